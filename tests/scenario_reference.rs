@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
-use masseter_shared::config::{FaultKindConfig, MotionConfig, Scenario, ScenarioError};
+use masseter_shared::config::{FaultKindConfig, MotionConfig, QuirkKindConfig, Scenario, ScenarioError};
 use serde_json::Value;
 
 use common::Workspace;
@@ -27,7 +27,7 @@ struct Section {
 }
 
 impl Section {
-    /// `can.identity` for `[can.identity]`; empty for the scenario itself.
+    /// `motion.phases` for `[motion.phases]`; empty for the scenario itself.
     fn path(&self) -> &str {
         let end = self.toml.find(']').unwrap_or(0);
         self.toml[..end].trim_start_matches('[')
@@ -44,6 +44,7 @@ impl Section {
         let required = match self.path() {
             "faults" => "kind = 'lose'",
             "stimulus" => "at_s = 0.0",
+            "drives.quirk" => "kind = 'two_boot_ups'",
             "motion" if rest.contains("file") => "path = 'jaw.csv'",
             _ => "",
         };
@@ -129,7 +130,7 @@ fn every_key_of_every_table_is_documented_and_no_others() {
         let unknown: Vec<_> = section.rows.keys().filter(|key| !keys.contains(*key)).collect();
         assert!(unknown.is_empty(), "{}: in docs/scenario.md, but no keys: {unknown:?}", section.toml);
     }
-    assert_eq!(sections.len(), 30);
+    assert_eq!(sections.len(), 32);
 }
 
 /// The word for a kind of motion. A new kind does not compile until it is here, and [`MOTIONS`] counts it.
@@ -145,7 +146,7 @@ fn kind_of_motion(motion: &MotionConfig) -> &'static str {
 const MOTIONS: usize = 5;
 
 #[test]
-fn every_kind_of_motion_and_of_fault_is_documented() {
+fn every_kind_of_motion_of_fault_and_of_quirk_is_documented() {
     let text = reference();
     let documented = |table: &str| -> BTreeSet<_> {
         let (_, rows) = text.split_once(&format!("| `{table}` | |\n| --- | --- |\n")).unwrap();
@@ -162,6 +163,8 @@ fn every_kind_of_motion_and_of_fault_is_documented() {
     let faults = documented("faults.kind");
     let kinds: BTreeSet<_> = FaultKindConfig::ALL.iter().map(|kind| kind.name()).collect();
     assert_eq!(faults, kinds);
+    let kinds: BTreeSet<_> = QuirkKindConfig::ALL.iter().map(|kind| kind.name()).collect();
+    assert_eq!(documented("drives.quirk.kind"), kinds);
 }
 
 #[test]

@@ -43,6 +43,14 @@ pub enum PlantError {
         /// What is wrong, with its remedy.
         problem: String,
     },
+    /// The file with the drives' memory.
+    #[error("drives.memory = {}: {reason}; mend the file, or remove it for drives that have stored nothing", path.display())]
+    Memory {
+        /// The file.
+        path: PathBuf,
+        /// Why it cannot be used.
+        reason: String,
+    },
     /// Values of the scenario that cannot be used together: their keys, the reason and the remedy.
     #[error("{0}")]
     Scenario(String),

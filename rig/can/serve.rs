@@ -60,6 +60,7 @@ pub(crate) fn serve(args: &ServeArgs) -> anyhow::Result<Exit> {
         wait(&listener, &clients).context("cannot wait for clients")?;
         let now_ns = clock::now_ns();
         link.advance(now_ns)?;
+        link.save_memory()?;
         if now_ns >= accept_from_ns && accept(&listener, &mut clients, now_ns) {
             accept_from_ns = now_ns + ACCEPT_INTERVAL_NS;
         }

@@ -4,13 +4,20 @@
 //! ([`masseter_plant::bringup`]): these modules hold arguments, files and text.
 
 mod args;
+mod check_pose;
 mod configure;
 mod evidence;
+mod hold;
+mod home;
 mod inspect;
 mod interfaces;
+mod jog;
+mod lengths;
 mod past;
+mod permission;
 mod restore;
 mod robot_line;
+mod session;
 mod snapshot;
 mod status;
 mod step;
@@ -20,9 +27,14 @@ mod writing;
 use clap::Subcommand;
 use masseter_terminal::{Exit, Failure, OrFailure};
 
+use check_pose::CheckPoseArgs;
 use configure::WriteArgs;
+use home::HomeArgs;
 use inspect::InspectArgs;
+use jog::JogArgs;
 use status::StatusArgs;
+
+pub(crate) use permission::check_bring_up;
 
 /// Verbs of `robot`.
 #[derive(Debug, Clone, Subcommand)]
@@ -35,6 +47,12 @@ pub(crate) enum RobotVerb {
     /// Write the values from before configure back
     #[command(after_help = "Example:\n  masseter robot restore robot.toml --can can0,can1 --axis l1")]
     Restore(WriteArgs),
+    /// Move one axis a short way and back, while the others have no power
+    Jog(JogArgs),
+    /// Home the axes, one after the other
+    Home(HomeArgs),
+    /// Check whether the axes tell the closed pose
+    CheckPose(CheckPoseArgs),
     /// Show which steps are done, and which is next
     Status(StatusArgs),
     /// Print the steps and their results as Markdown for a lab book
@@ -48,6 +66,9 @@ pub(crate) fn execute(verb: &RobotVerb) -> Result<Exit, Failure> {
         RobotVerb::Inspect(args) => inspect::inspect(args),
         RobotVerb::Configure(args) => configure::configure(args),
         RobotVerb::Restore(args) => restore::restore(args),
+        RobotVerb::Jog(args) => jog::jog(args),
+        RobotVerb::Home(args) => home::home(args),
+        RobotVerb::CheckPose(args) => check_pose::check_pose(args),
         RobotVerb::Status(args) => status::status(args).usage(),
         RobotVerb::Report(args) => status::report(args).usage(),
     }

@@ -66,6 +66,9 @@ pub(crate) struct RunArgs {
     /// Simulated buses, or the CAN interface of each bus, such as can0,can1
     #[arg(long, value_name = "virtual|IF[,IF]", value_parser = parse_wires, help_heading = HOW)]
     pub can: Option<Wires>,
+    /// Move a robot without a passed 'masseter robot check-pose': a wrong sign, scale or zero can drive an axis into its end
+    #[arg(long, help_heading = HOW)]
+    pub without_bring_up: bool,
     /// Cores of controller and plant
     #[arg(long, value_name = "N,N", value_parser = parse_cores, help_heading = HOW)]
     pub cores: Option<[usize; 2]>,

@@ -19,7 +19,7 @@ use super::room::{self, Reserve};
 use super::{supervisor, virtual_time};
 use crate::arguments::name_of;
 use crate::machine::interrupts::Interrupts;
-use crate::{doctor, machine};
+use crate::{doctor, machine, robot};
 
 /// Where runs without `--out` go.
 pub(super) const RUNS: &str = "runs";
@@ -51,6 +51,7 @@ impl PreparedRun {
     pub(crate) fn new(args: &RunArgs) -> Result<Self, Failure> {
         room::check_memory().usage()?;
         let (plan, args) = resolve(args).usage()?;
+        robot::check_bring_up(&plan.scenario, args.without_bring_up).usage()?;
         room::check_disk(args.out.as_deref().unwrap_or(RUNS.as_ref()), &plan).incomplete()?;
         let domain = match args.clock {
             ClockKind::Virtual => None,

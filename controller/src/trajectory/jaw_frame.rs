@@ -4,13 +4,14 @@
 //! origin at the incisal point, axes parallel to the base's.
 
 use masseter_shared::config::JawConfig;
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Pose};
+use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Pose, Vec3};
 use nalgebra::Translation3;
 
 use crate::kinematics::solve_completely;
 
 use super::TrajectoryError;
 use super::error::require;
+use super::mandible::condylar_middle;
 
 /// Farthest offset on a robot that fits on a table, m.
 const FARTHEST_M: f64 = 1.0;
@@ -58,4 +59,17 @@ pub fn closed_pose(jaw: &JawConfig, mechanism: &Mechanism) -> Result<Pose, Traje
     };
     let closed = solve_completely(mechanism, &actuators).map_err(no_pose)?.pose;
     Ok(Translation3::from(jaw.closed_offset_m) * closed)
+}
+
+/// Incisal point, right and left condyle in the platform frame, when the jaw is closed at that pose.
+///
+/// # Errors
+/// When a dimension of the mandible lies outside its range.
+pub fn jaw_points(jaw: &JawConfig, closed: &Pose) -> Result<[Vec3; 3], TrajectoryError> {
+    let middle = condylar_middle(jaw)?;
+    let aside = Vec3::new(0.0, jaw.bonwill_side_m / 2.0, 0.0);
+    let jaw_in_platform =
+        Pose::from_parts(Translation3::from(jaw.reference_point_m), closed.rotation.inverse());
+    Ok([Vec3::zeros(), middle - aside, middle + aside]
+        .map(|point| jaw_in_platform.transform_point(&point.into()).coords))
 }

@@ -30,7 +30,7 @@ use masseter_shared::geometry::{Mechanism, Pose};
 
 pub use check::{TrajectoryReport, check};
 pub use error::TrajectoryError;
-pub use jaw_frame::closed_pose;
+pub use jaw_frame::{closed_pose, jaw_points};
 
 pub(crate) use interpolation::interpolate;
 pub(crate) use rhythm::minimum_jerk;

@@ -19,7 +19,6 @@ use super::heard::{Heard, Strangers};
 use super::wires::Wires;
 use crate::error::PlantError;
 use crate::link::layout::{drive_ports, node_ids};
-use crate::mechanism::DynamicsError;
 
 /// Time between two looks at the buses, ns.
 const STEP_NS: u64 = MILLISECOND_NS;
@@ -74,9 +73,9 @@ pub enum LineError {
         /// The reason.
         error: SendError,
     },
-    /// The emulated mechanism failed.
+    /// The emulated mechanism failed, or the memory of emulated drives cannot be written.
     #[error(transparent)]
-    Dynamics(#[from] DynamicsError),
+    Emulation(#[from] PlantError),
     /// The log could not be written.
     #[error("the log of the bus cannot be written: {0}")]
     Log(#[from] io::Error),

@@ -4,23 +4,42 @@
 //! sequences of questions to a [`Line`]; time comes from the line, simulated or real. Files, arguments and the
 //! forward kinematics are not part of it.
 
+mod borrowed;
+mod caution;
 mod deviation;
 mod heard;
+mod home;
+mod jog;
 mod line;
+mod motion_error;
+mod mover;
 mod power;
 mod settings;
+mod stand;
+mod step_response;
 mod store;
 mod survey;
+mod switching;
+#[cfg(test)]
+mod tests;
+mod watch;
 mod wires;
 mod wording;
 mod write;
 
+pub use caution::{Caution, Operator, Wish};
 pub use deviation::{Deviation, Outcome, deviations};
 pub use heard::{Heard, Strangers};
+pub use home::{HomeReport, home};
+pub use jog::{JogOrder, JogReport, jog};
 pub use line::{Line, LineError, SdoReason};
+pub use motion_error::{MotionError, StopCause};
 pub use power::{PowerError, prove_no_power, take_over};
 pub use settings::{Difference, PdoLayout, PdoSetting, Setting, Settings};
+pub use stand::{Stand, stand};
+pub use step_response::StepResponse;
 pub use store::{StoreError, reset, store};
 pub use survey::Survey;
+pub use watch::Sample;
 pub use wording::{object_name, value_text};
 pub use write::{Change, WriteError, Writer};

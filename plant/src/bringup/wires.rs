@@ -8,7 +8,6 @@ use crate::emulation::VirtualLink;
 use crate::error::PlantError;
 use crate::link::sockets::SocketLink;
 use crate::link::{Buses, Link};
-use crate::mechanism::DynamicsError;
 
 /// The buses with their time.
 #[derive(Debug)]
@@ -32,7 +31,9 @@ impl Wires {
     /// The scenario's interfaces, or simulated buses where it names none.
     pub(super) fn open(scenario: &Scenario) -> Result<Self, PlantError> {
         Ok(if scenario.can.is_virtual() {
-            Self::Simulated(Box::new(VirtualLink::new(scenario, 0, 0)?), 0)
+            let mut link = VirtualLink::new(scenario, 0, 0)?;
+            link.emulation.add_stops();
+            Self::Simulated(Box::new(link), 0)
         } else {
             Self::Real(SocketLink::open(scenario, clock::now_ns())?)
         })
@@ -45,12 +46,13 @@ impl Wires {
         }
     }
 
-    /// Lets time pass.
-    pub(super) fn pass(&mut self, for_ns: u64) -> Result<(), DynamicsError> {
+    /// Lets time pass. What emulated drives store meanwhile goes to the file of their memory.
+    pub(super) fn pass(&mut self, for_ns: u64) -> Result<(), PlantError> {
         match self {
             Self::Simulated(link, now_ns) => {
                 *now_ns += for_ns;
-                link.advance(*now_ns)
+                link.advance(*now_ns)?;
+                link.emulation.save_memory()
             }
             Self::Real(_) => {
                 clock::sleep_until(clock::now_ns() + for_ns);

@@ -5,11 +5,12 @@
 
 use masseter_can::CanId;
 use masseter_can::canopen::{Cob, CobId, NmtCommand, NmtState, NodeId};
+use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::{DriveConfig, MASTER_NODE};
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
 
 use crate::drive::DriveSettings;
-use crate::drive::dictionary::{ENTRIES, Objects, PDOS};
+use crate::drive::dictionary::{ENTRIES, Objects, PDOS, names};
 
 const MASTER: &str = "Master";
 /// Receiver of messages to all nodes.
@@ -22,17 +23,25 @@ struct Signal {
     is_signed: bool,
     factor: f64,
     unit: &'static str,
+    /// Lowest and highest value in that unit; none where every value can come.
+    range: Option<[f64; 2]>,
 }
 
 /// Numbers without a unit.
 fn numbers<const N: usize>(signals: [(&str, usize); N]) -> Vec<Signal> {
-    let number =
-        |(name, bits): (&str, _)| Signal { name: name.into(), bits, is_signed: false, factor: 1.0, unit: "" };
+    let number = |(name, bits): (&str, _)| Signal {
+        name: name.into(),
+        bits,
+        is_signed: false,
+        factor: 1.0,
+        unit: "",
+        range: None,
+    };
     signals.map(number).into()
 }
 
 /// The file, lines ended by a line feed.
-pub(super) fn write(drives: &[DriveSettings; AXES]) -> String {
+pub(super) fn write(drives: &[DriveSettings; AXES], period_ns: u64) -> String {
     let to_all = [MASTER, ANYBODY];
     let mut parts = vec![
         format!("VERSION \"\"\n\nNS_ :\n\nBS_:\n\nBU_: {MASTER} {}\n\n", AXIS_NAMES.join(" ")),
@@ -44,6 +53,7 @@ pub(super) fn write(drives: &[DriveSettings; AXES]) -> String {
         parts.extend(services(settings.node, name));
         parts.extend(process_data(settings, name));
     }
+    parts.push(cycle_times(drives, period_ns));
     parts.push(values(Cob::Nmt, "Command", &NmtCommand::ALL.map(|command| (command.code(), command.name()))));
     let states = NmtState::ALL.map(|state| (state.code(), state.name()));
     let nodes = [MASTER_NODE].into_iter().chain(drives.iter().map(|settings| settings.node));
@@ -87,26 +97,62 @@ fn process_data(settings: &DriveSettings, name: &str) -> Vec<String> {
 fn mapped(objects: &Objects, index: u16, drive: &DriveConfig) -> Vec<Signal> {
     let signal = |place: usize| {
         let entry = &ENTRIES[place];
-        let (factor, unit) = match entry.address.index {
-            0x6064 | 0x607A => (drive.encoder_resolution_m, "m"),
-            0x6077 => (drive.rated_force_n / 1000.0, "N"),
-            _ => (1.0, ""),
+        let (factor, unit, limits) = match entry.address.index {
+            0x6064 | 0x607A => {
+                let ends = [names::MIN_POSITION_LIMIT, names::MAX_POSITION_LIMIT];
+                (drive.encoder_resolution_m, "m", Some(ends.map(|end| f64::from(objects.get(end)))))
+            }
+            0x6077 => {
+                let most = f64::from(objects.get(names::MAX_TORQUE));
+                (drive.rated_force_n / 1000.0, "N", Some([-most, most]))
+            }
+            _ => (1.0, "", entry.limits.map(|(lowest, highest)| [lowest as f64, highest as f64])),
         };
+        let range = limits.map(|limits| limits.map(|limit| rounded(limit * factor)));
         let (name, bits) = (entry.name.replace(' ', "_"), 8 * entry.kind.bytes());
-        Signal { name, bits, is_signed: entry.kind.is_signed(), factor, unit }
+        Signal { name, bits, is_signed: entry.kind.is_signed(), factor, unit, range }
     };
     objects.mapped(index).map(signal).collect()
 }
 
+/// Without the last digits of a product: 0.36 instead of 0.36000000000000004.
+fn rounded(value: f64) -> f64 {
+    (value * 1e12).round() / 1e12
+}
+
 fn message(id: CanId, name: &str, [sender, receiver]: [&str; 2], signals: &[Signal]) -> String {
     let (mut lines, mut start) = (Vec::new(), 0);
-    for Signal { name, bits, is_signed, factor, unit } in signals {
+    for Signal { name, bits, is_signed, factor, unit, range } in signals {
         let sign = if *is_signed { '-' } else { '+' };
         let place = format!("{start}|{bits}@1{sign}");
-        lines.push(format!(" SG_ {name} : {place} ({factor},0) [0|0] \"{unit}\" {receiver}\n"));
+        let [lowest, highest] = range.unwrap_or_default();
+        let scale = format!("({factor},0) [{lowest}|{highest}]");
+        lines.push(format!(" SG_ {name} : {place} {scale} \"{unit}\" {receiver}\n"));
         start += bits;
     }
     format!("BO_ {} {name}: {} {sender}\n{}\n", id.number(), start / 8, lines.concat())
+}
+
+/// How often each message that comes regularly does so, ms: heartbeats, and SYNC with the PDOs that follow it. Whole
+/// milliseconds alone can be said, so that a faster SYNC has no such time.
+fn cycle_times(drives: &[DriveSettings; AXES], period_ns: u64) -> String {
+    let heartbeat_ms =
+        |settings: &DriveSettings| u64::from(settings.objects.get(names::PRODUCER_HEARTBEAT_TIME_MS));
+    let mut times = vec![(CanId::from(Cob::Sync), period_ns / MILLISECOND_NS)];
+    times.push((Cob::Heartbeat(MASTER_NODE).into(), heartbeat_ms(&drives[0])));
+    for settings in drives {
+        times.push((Cob::Heartbeat(settings.node).into(), heartbeat_ms(settings)));
+        let communications = (0..PDOS as u16).flat_map(|number| [0x1400 + number, 0x1800 + number]);
+        times.extend(communications.filter_map(|communication| {
+            let id = CobId(settings.objects.at(communication, 1)).identifier()?;
+            let every = u64::from(settings.objects.at(communication, 2));
+            (1..=240).contains(&every).then_some((id, every * period_ns / MILLISECOND_NS))
+        }));
+    }
+    let head = "BA_DEF_ BO_ \"GenMsgCycleTime\" INT 0 65535;\nBA_DEF_DEF_ \"GenMsgCycleTime\" 0;\n";
+    let whole = times.into_iter().filter(|(_, ms)| *ms > 0);
+    let lines = whole.map(|(id, ms)| format!("BA_ \"GenMsgCycleTime\" BO_ {} {ms};\n", id.number()));
+    head.to_owned() + &lines.collect::<String>()
 }
 
 /// Names of the values of a signal.

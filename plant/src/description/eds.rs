@@ -3,21 +3,25 @@
 use masseter_can::canopen::NodeId;
 
 use crate::drive::DriveSettings;
-use crate::drive::dictionary::{Access, Entry, Initial, Mapping, OBJECTS, Object, Objects, PDOS, Shape};
+use crate::drive::dictionary::{
+    Access, Entry, Initial, Mapping, OBJECTS, Object, Objects, Overlay, PDOS, Shape, find,
+};
 
 /// Objects that CiA 301 makes mandatory.
 const MANDATORY: [u16; 3] = [0x1000, 0x1001, 0x1018];
 
 /// The file, lines ended by a line feed.
 pub(super) fn write(settings: &DriveSettings) -> String {
+    let overlay = &settings.quirks.overlay;
+    let there: Vec<_> = OBJECTS.iter().filter(|object| !entries(object, overlay).is_empty()).collect();
     let (mandatory, optional): (Vec<_>, Vec<_>) =
-        OBJECTS.iter().partition(|object| MANDATORY.contains(&object.index()));
+        there.iter().partition(|object| MANDATORY.contains(&object.index()));
     let lists = [
         list("MandatoryObjects", &mandatory),
         list("OptionalObjects", &optional),
         list("ManufacturerObjects", &[]),
     ];
-    let sections = OBJECTS.iter().map(|object| section(object, &settings.objects));
+    let sections = there.iter().map(|object| section(object, &entries(object, overlay), &settings.objects));
     [head(settings.node, &settings.objects)].into_iter().chain(lists).chain(sections).collect()
 }
 
@@ -40,8 +44,14 @@ fn list(section: &str, objects: &[&Object]) -> String {
     format!("[{section}]\nSupportedObjects={}\n{lines}\n", objects.len())
 }
 
-fn section(object: &Object, objects: &Objects) -> String {
-    let (index, Object { name, shape, entries }) = (object.index(), object);
+/// The entries of an object that the drive has.
+fn entries(object: &Object, overlay: &Overlay) -> Vec<Entry> {
+    let of_drive = |entry: &Entry| overlay.entry(find(entry.address).ok()?).copied();
+    object.entries.iter().filter_map(of_drive).collect()
+}
+
+fn section(object: &Object, entries: &[Entry], objects: &Objects) -> String {
+    let (index, Object { name, shape, .. }) = (object.index(), object);
     let kind = match shape {
         Shape::Var => return format!("[{index:04X}]\n{}", describe(&entries[0], objects)),
         Shape::Array => 0x8,

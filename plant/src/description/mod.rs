@@ -37,11 +37,13 @@ pub fn eds(scenario: &Scenario) -> Result<[String; AXES], PlantError> {
 /// # Ok::<_, masseter_plant::PlantError>(())
 /// ```
 pub fn dbc(scenario: &Scenario) -> Result<String, PlantError> {
-    Ok(dbc::write(&DriveSettings::for_axes(scenario)?))
+    Ok(dbc::write(&DriveSettings::for_axes(scenario)?, scenario.period_ns()))
 }
 
 #[cfg(test)]
 mod tests {
+    use masseter_shared::config::{QuirkConfig, QuirkKindConfig};
+
     use super::*;
     use crate::drive::dictionary::{Access, ENTRIES, Initial, Mapping, OBJECTS};
     use masseter_can::canopen::dcf::{self, Dcf};
@@ -89,6 +91,38 @@ mod tests {
                 assert_eq!(read.encode(default, settings.node), Some(value), "{at}");
             }
         }
+    }
+
+    #[test]
+    fn a_sheet_lists_what_the_drive_lets_clients_read() {
+        let mut scenario = Scenario::default();
+        scenario.drives.quirk = vec![QuirkConfig {
+            axes: Some(vec!["d1".to_owned()]),
+            ..QuirkConfig::new(QuirkKindConfig::MissingObjects)
+        }];
+        let [d1, d2, ..] = eds(&scenario).unwrap();
+        for index in ["6007", "6066", "6085"] {
+            assert!(!d1.contains(&format!("[{index}]")) && !d1.contains(&format!("=0x{index}\n")), "{index}");
+            assert!(d2.contains(&format!("[{index}]")) && d2.contains(&format!("=0x{index}\n")), "{index}");
+        }
+        assert_eq!(d1.matches("AccessType=").count(), ENTRIES.len() - 3);
+    }
+
+    #[test]
+    fn messages_have_ranges_and_cycle_times() {
+        let dbc = dbc(&Scenario::default()).unwrap();
+        for line in [
+            " SG_ Position_actual_value : 16|32@1- (0.000001,0) [0.24|0.3] \"m\" Master\n",
+            " SG_ Torque_actual_value : 48|16@1- (0.5,0) [-1000|1000] \"N\" Master\n",
+            "BA_DEF_ BO_ \"GenMsgCycleTime\" INT 0 65535;\n",
+            "BA_ \"GenMsgCycleTime\" BO_ 128 1;\n",
+            "BA_ \"GenMsgCycleTime\" BO_ 388 1;\n",
+            "BA_ \"GenMsgCycleTime\" BO_ 1796 50;\n",
+        ] {
+            assert!(dbc.contains(line), "{line}");
+        }
+        let fast = super::dbc(&Scenario { rate_hz: 2000, ..Scenario::default() }).unwrap();
+        assert!(!fast.contains("Time\" BO_ 128 "), "half a millisecond cannot be said");
     }
 
     #[test]

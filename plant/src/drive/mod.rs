@@ -6,11 +6,14 @@
 
 mod axis;
 pub(crate) mod dictionary;
+mod memory;
 mod node;
+mod quirks;
 mod settings;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use axis::{Encoder, Shaft};
+pub(crate) use memory::DriveMemory;
 pub(crate) use node::DriveNode;
 pub(crate) use settings::DriveSettings;

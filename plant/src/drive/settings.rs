@@ -6,6 +6,8 @@ use masseter_shared::geometry::AXES;
 
 use super::axis::configure;
 use super::dictionary::{Objects, names};
+use super::memory::DriveMemory;
+use super::quirks::Quirks;
 use crate::checks::check_quantities;
 use crate::error::PlantError;
 use crate::link::layout::node_ids;
@@ -19,8 +21,14 @@ pub(crate) struct DriveSettings {
     pub(crate) drive: DriveConfig,
     /// Step of the servo loops, s.
     pub(crate) step_s: f64,
-    /// The object dictionary after power-on.
+    /// The object dictionary as delivered.
     pub(crate) objects: Objects,
+    /// What the drive has stored.
+    pub(crate) memory: DriveMemory,
+    /// What it does otherwise than the standard.
+    pub(crate) quirks: Quirks,
+    /// The ends of the axis' stroke, m.
+    pub(crate) stroke_m: [f64; 2],
 }
 
 impl DriveSettings {
@@ -44,8 +52,13 @@ impl DriveSettings {
             objects.set(names::REVISION, identity.revision);
             objects.set(names::CONSUMER_HEARTBEAT_TIME, watched);
             objects.set(names::PRODUCER_HEARTBEAT_TIME_MS, scenario.can.heartbeat_producer_ms);
+            let of_axis = scenario.drives.quirk.iter().filter(|quirk| quirk.is_on(axis));
+            let mut quirks = Quirks::new(of_axis);
+            quirks.set_units(&mut objects);
             configure(&mut objects, &drive, scenario.period_ns(), position_limits);
-            Self { node, drive, step_s: scenario.dynamics.step_ns as f64 * 1e-9, objects }
+            quirks.set_values(scenario.period_ns(), &mut objects);
+            let (step_s, memory) = (scenario.dynamics.step_ns as f64 * 1e-9, DriveMemory::default());
+            Self { node, drive, step_s, objects, memory, quirks, stroke_m }
         }))
     }
 }

@@ -8,9 +8,11 @@ use masseter_shared::config::{FaultConfig, FaultKindConfig, FaultLayer, Scenario
 use masseter_shared::geometry::{AXES, Mechanism};
 use masseter_shared::injection::{Injected, Injection};
 use masseter_shared::messages::{Truth, pose_fields};
+use nalgebra::Translation3;
 
 use super::agenda::{Agenda, Change, Effect};
 use super::encoder_faults::{EncoderFaults, past_of};
+use super::memory::MemoryFile;
 use crate::checks::check_quantities;
 use crate::drive::{DriveNode, DriveSettings, Encoder, Shaft};
 use crate::error::PlantError;
@@ -53,6 +55,10 @@ pub struct Emulation {
     encoder_faults: [EncoderFaults; AXES],
     /// The scenario's own food.
     food: Option<Food>,
+    /// None for drives that forget everything at the end.
+    memory: Option<MemoryFile>,
+    /// The incisal point in the platform frame, m.
+    incisal_m: [f64; 3],
 }
 
 /// State of the mechanism at a SYNC. The truth is computed from it later, once the reading is on its way.
@@ -77,10 +83,17 @@ impl Emulation {
     /// [`PlantError`] where the scenario describes no mechanism or no drives.
     pub fn new(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
         check_quantities(scenario)?;
-        let settings = DriveSettings::for_axes(scenario)?;
+        let mut settings = DriveSettings::for_axes(scenario)?;
+        let memory = scenario.drives.memory.as_deref().map(MemoryFile::read).transpose()?;
+        if let Some(memory) = &memory {
+            for (axis, settings) in settings.iter_mut().enumerate() {
+                settings.memory = memory.of_axis(axis).clone();
+            }
+        }
         let mechanism = Mechanism::new(&scenario.mechanism)?;
         let food = scenario.food.map(|config| Food::new(config, &closed_mouth(&mechanism, &scenario.jaw)));
-        let start = level(&mechanism, scenario.dynamics.initial_leg_m);
+        let start = Translation3::from(scenario.dynamics.initial_offset_m)
+            * level(&mechanism, scenario.dynamics.initial_leg_m);
         let mut agenda = Agenda::new(scenario, &mechanism)?;
         let injection =
             Injection::new(scenario, now_ns).map_err(|error| PlantError::Scenario(error.to_string()))?;
@@ -96,11 +109,15 @@ impl Emulation {
             let config = &settings.drive;
             let encoder =
                 Encoder::new(config.encoder_resolution_m, config.encoder_noise_m, scenario.seed, axis);
-            DriveNode::new(settings, encoder, now_ns, positions_m[axis])
+            let drive = DriveNode::new(settings, encoder, now_ns, positions_m[axis]);
+            drive.map_err(|reason| match &memory {
+                Some(memory) => memory.refuse(axis, &reason),
+                None => PlantError::Scenario(reason),
+            })
         };
         let (force_n, step_ns) = ([0.0; AXES], scenario.dynamics.step_ns);
         Ok(Self {
-            drives: settings.iter().enumerate().map(drive).collect(),
+            drives: settings.iter().enumerate().map(drive).collect::<Result<_, _>>()?,
             sample: Sample::new(&dynamics, force_n, now_ns),
             dynamics,
             step_ns,
@@ -112,7 +129,32 @@ impl Emulation {
             agenda,
             encoder_faults: encoder_faults(scenario),
             food,
+            memory,
+            incisal_m: scenario.jaw.reference_point_m,
         })
+    }
+
+    /// Gives the mechanism hard stops 2 mm beyond its strokes, for tools that move axes without limits. A scenario with
+    /// faults or stimuli of the mechanism has them anyway.
+    pub fn add_stops(&mut self) {
+        if self.agenda.is_empty() {
+            self.dynamics.prepare_injection(self.incisal_m);
+        }
+    }
+
+    /// Writes what the drives have stored into the scenario's file (`drives.memory`), if that has changed. This takes
+    /// the time of a file: a loop in real time calls it at its end.
+    ///
+    /// # Errors
+    /// [`PlantError::Memory`] for a file that cannot be written.
+    pub fn save_memory(&mut self) -> Result<(), PlantError> {
+        let Some(memory) = &mut self.memory else { return Ok(()) };
+        for (axis, drive) in self.drives.iter_mut().enumerate() {
+            if let Some(changed) = drive.changed_memory() {
+                memory.take(axis, changed);
+            }
+        }
+        memory.write()
     }
 
     /// The mechanism's motion at the last SYNC.

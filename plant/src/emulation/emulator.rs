@@ -58,7 +58,8 @@ pub struct Emulator {
 impl Emulator {
     /// The scenario's drives, switched on at `now_ns` on the interfaces that it names.
     pub fn open(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
-        let emulation = Emulation::new(scenario, now_ns)?;
+        let mut emulation = Emulation::new(scenario, now_ns)?;
+        emulation.add_stops();
         let interfaces = drive_ports(&scenario.can)?.map(|at| &scenario.can.interfaces[at.bus]);
         let ports = interfaces.map(|interface| SocketCan::open(interface));
         let ports: Vec<_> = ports.into_iter().collect::<Result<_, OpenError>>()?;
@@ -74,6 +75,7 @@ impl Emulator {
                 SocketCan::wait::<AXES>(&self.ports, clock::now_ns() + LONGEST_WAIT_NS);
             }
             self.advance(clock::now_ns())?;
+            self.emulation.save_memory()?;
         }
         Ok(self.counters)
     }

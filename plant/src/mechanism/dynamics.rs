@@ -82,7 +82,8 @@ pub enum DynamicsError {
     Stiff,
     /// Initial legs on which the platform cannot be level within the strokes.
     #[error(
-        "dynamics.initial_leg_m = {initial_leg_m}: {violation}; choose legs on which the level platform is within its strokes"
+        "dynamics.initial_leg_m = {initial_leg_m}: {violation}; choose legs, and an initial_offset_m, with which the level \
+         platform is within its strokes"
     )]
     Start {
         /// Length of the legs, m.

@@ -149,6 +149,10 @@ fn apply(overrides: &Overrides, scenario: &mut Scenario) -> anyhow::Result<()> {
     for (_, file) in scenario.files_mut() {
         *file = absolute(file)?;
     }
+    if let Some(memory) = &mut scenario.drives.memory {
+        // The processes read it too, from other folders.
+        *memory = std::path::absolute(&*memory).context("drives.memory")?;
+    }
     if let Some(duration) = overrides.duration {
         scenario.duration_s = Some(duration.as_secs_f64());
     }

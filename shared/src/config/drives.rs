@@ -1,11 +1,14 @@
 //! The drives with their encoders: `[drives]`.
 
+use std::path::PathBuf;
+
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 use toml::Table;
 
 use super::error::ScenarioError;
 use super::need::{keyed, require_positive, require_within};
+use super::quirks::QuirkConfig;
 use crate::geometry::LEGS;
 
 /// Increments of encoders: with a coarser one the drives are never as near to their targets as the following limit
@@ -56,15 +59,20 @@ impl DriveConfig {
 }
 
 /// The drives of slides and of legs; a key that a table does not have keeps its default.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DrivesConfig {
+    /// File with the non-volatile memory of the emulated drives; when absent they forget everything at the end.
+    pub memory: Option<PathBuf>,
     /// Drives of d₁ d₂ d₃.
     #[serde(deserialize_with = "slide")]
     pub slide: DriveConfig,
     /// Drives of l₁ l₂ l₃.
     #[serde(deserialize_with = "leg")]
     pub leg: DriveConfig,
+    /// What emulated drives do otherwise than the standard.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub quirk: Vec<QuirkConfig>,
 }
 
 fn slide<'de, D: Deserializer<'de>>(table: D) -> Result<DriveConfig, D::Error> {
@@ -104,7 +112,7 @@ impl Default for DrivesConfig {
             velocity_gain_n_s_per_m: 2000.0,
             ..leg
         };
-        Self { slide, leg }
+        Self { memory: None, slide, leg, quirk: Vec::new() }
     }
 }
 
@@ -128,6 +136,10 @@ impl DrivesConfig {
         let increments = of_both!(encoder_resolution_m).map(|[(key, m)]| (key, m, FINEST_M, COARSEST_M));
         require_within(&increments)?;
         let noise = of_both!(encoder_noise_m).map(|[(key, value_m)]| (key, value_m, 0.0, NOISIEST_M));
-        require_within(&noise)
+        require_within(&noise)?;
+        for (number, quirk) in self.quirk.iter().enumerate() {
+            quirk.validate().map_err(|error| error.of_entry(number))?;
+        }
+        Ok(())
     }
 }

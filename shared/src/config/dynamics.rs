@@ -10,6 +10,8 @@ const LEAST_KG: f64 = 0.001;
 const MOST_KG: f64 = 100.0;
 /// The largest inertia: the largest mass at a length of 0.3 m, kg m².
 const MOST_KG_M2: f64 = 10.0;
+/// Beyond the strokes of a mechanism on a table, m.
+const FURTHEST_M: f64 = 0.5;
 /// Ten times the Earth's, for tests of the drives, m/s².
 const MOST_GRAVITY_M_S2: f64 = 100.0;
 
@@ -37,6 +39,8 @@ section! {
         pub gravity_m_s2: f64 = 9.81,
         /// Length of the legs when the rig is switched on, m.
         pub initial_leg_m: f64 = 0.29,
+        /// Where the platform is then beside its place above the middle of the slides, base axes, m.
+        pub initial_offset_m: [f64; 3] = [0.0; 3],
     }
 }
 
@@ -56,6 +60,8 @@ impl DynamicsConfig {
         ])?;
         let inertia = self.platform_inertia_kg_m2;
         require_within(&inertia.map(|kg_m2| ("dynamics.platform_inertia_kg_m2", kg_m2, 0.0, MOST_KG_M2)))?;
+        let offset_m = self.initial_offset_m;
+        require_within(&offset_m.map(|m| ("dynamics.initial_offset_m", m, -FURTHEST_M, FURTHEST_M)))?;
         require_positive(&keyed!("dynamics", self, initial_leg_m))?;
         require_not_negative(&keyed!("dynamics", self, slide_friction_n viscous_friction_n_s_per_m))?;
         if !Self::STEPS_NS.contains(&self.step_ns) {

@@ -126,6 +126,9 @@ impl Scenario {
             .map_err(|error| ScenarioError::Unreadable { path: path.to_owned(), error })?;
         let mut scenario = Self::parse(path, &text)?;
         if let Some(folder) = path.parent() {
+            if let Some(memory) = &mut scenario.drives.memory {
+                *memory = folder.join(&*memory);
+            }
             scenario.files_mut().for_each(|(_, file)| *file = folder.join(&file));
         }
         let folder = path.parent().unwrap_or(Path::new(""));

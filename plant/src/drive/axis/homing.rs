@@ -1,13 +1,81 @@
-//! Homing mode: methods 35 and 37 (the present position) and 33 and 34 (the next reference mark in negative
-//! or positive direction), with controlword bit 4 and statusword bits 10, 12 and 13.
+//! Homing mode, with controlword bit 4 and statusword bits 10, 12 and 13.
 //!
-//! The state machine returns commands; it moves nothing itself. The mechanism has no limit or home switches, so methods
-//! that need switches are not offered, and the speed for their search (6099h:1) has no use.
+//! | method (6098h) | home |
+//! | --- | --- |
+//! | 35, 37 | the present position |
+//! | 33, 34 | the next reference mark in negative, positive direction |
+//! | 17, 18 | where the negative, positive limit switch opens |
+//! | 1, 2 | the next reference mark after it, away from the switch |
+//! | −3, −4 | the positive, negative stop, at which the force exceeds a threshold |
+//! | −1, −2 | the next reference mark after it, away from the stop |
+//!
+//! The methods below 0 are the maker's own, with the numbers that maxon's EPOS4 gives them. The state machine returns
+//! commands; it moves nothing itself. The way to a switch or a stop takes the speed 6099h:01, every other way 6099h:02.
 
 use masseter_can::cia402::{Controlword, StatusBit, Statusword};
 
 use super::encoder::mark_between;
 use super::motion::{MotionCommand, PositionView};
+
+/// Further than any axis goes, increments: a search for a switch or a stop ends there alone.
+const FAR: i32 = 1 << 30;
+
+/// What ends a search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Target {
+    /// A reference mark.
+    Mark,
+    /// A limit switch.
+    Switch,
+    /// A stop.
+    Stop,
+}
+
+/// A search as its method says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Search {
+    target: Target,
+    /// Whether it begins towards larger positions.
+    is_positive: bool,
+    /// Whether home is the next reference mark on the way back.
+    then_mark: bool,
+}
+
+impl Search {
+    /// The search of a method; none for methods without one.
+    const fn of(method: i8) -> Option<Self> {
+        let (target, is_positive, then_mark) = match method {
+            33 | 34 => (Target::Mark, method == 34, false),
+            17 | 18 => (Target::Switch, method == 18, false),
+            1 | 2 => (Target::Switch, method == 2, true),
+            -3 | -4 => (Target::Stop, method == -3, false),
+            -1 | -2 => (Target::Stop, method == -1, true),
+            _ => return None,
+        };
+        Some(Self { target, is_positive, then_mark })
+    }
+
+    /// A way as long as can be, from the present position.
+    fn far(self, actual: i32, is_forwards: bool) -> MotionCommand {
+        let way = if self.is_positive == is_forwards { FAR } else { -FAR };
+        MotionCommand::MoveTo { target: actual.saturating_add(way) }
+    }
+}
+
+/// What homing sees of its axis in a step.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sensed {
+    /// The encoder's count before and its present one.
+    pub(super) counts: [i32; 2],
+    /// Position actual value (6064h).
+    pub(super) actual: i32,
+    /// Which limit switches are closed: the negative one, the positive one.
+    pub(super) limits: [bool; 2],
+    /// Whether the motor pushes with the threshold's force: towards smaller positions, towards larger ones.
+    pub(super) pushes: [bool; 2],
+    /// Whether the demand is no motion.
+    pub(super) is_at_rest: bool,
+}
 
 /// Progress of homing.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -15,25 +83,34 @@ pub(crate) enum Homing {
     /// Not started, or interrupted.
     #[default]
     Idle,
+    /// On the way to a switch or a stop.
+    Approaching(Search),
+    /// On the way back, until the switch opens.
+    Leaving(Search),
     /// On the way to a reference mark.
     Searching,
-    /// Slowing down after the mark at that count.
+    /// Slowing down after home, which is at that count.
     Settling { home_counts: i32 },
     /// Done.
     Attained,
-    /// There was no mark before the software limit.
+    /// The axis came to rest before home.
     Failed,
 }
 
 impl Homing {
     /// Whether the drive supports that method (6098h).
     pub(crate) const fn is_method(method: i8) -> bool {
-        matches!(method, 33 | 34 | 35 | 37)
+        matches!(method, 35 | 37) || Search::of(method).is_some()
     }
 
     /// Whether homing is under way.
     pub(crate) const fn is_running(self) -> bool {
-        matches!(self, Self::Searching | Self::Settling { .. })
+        !matches!(self, Self::Idle | Self::Attained | Self::Failed)
+    }
+
+    /// Whether the axis is on its way to a switch or a stop.
+    pub(super) const fn is_approaching(self) -> bool {
+        matches!(self, Self::Approaching(_))
     }
 
     /// The state after another mode or power state was entered: an attained home position stays.
@@ -54,11 +131,12 @@ impl Homing {
         [before, word]: [Controlword; 2],
         method: i8,
         counts: i32,
+        limits: [bool; 2],
         view: PositionView,
     ) -> Option<MotionCommand> {
         let is_start = |word: Controlword| word.starts() && !word.halts();
         if is_start(word) && !is_start(before) {
-            Some(self.start(method, counts, view))
+            Some(self.start(method, counts, limits, view))
         } else if !is_start(word) && self.is_running() {
             *self = Self::Idle;
             Some(MotionCommand::SlowDown)
@@ -67,32 +145,78 @@ impl Homing {
         }
     }
 
-    /// Methods 33 and 34 move as far as the software position limits allow, until a mark is passed.
-    fn start(&mut self, method: i8, counts: i32, view: PositionView) -> MotionCommand {
+    /// A search for a mark goes as far as the software position limits allow. One for a switch or a stop ignores them: they
+    /// mean nothing before homing.
+    fn start(&mut self, method: i8, counts: i32, limits: [bool; 2], view: PositionView) -> MotionCommand {
         let [lowest, highest] = view.allowed;
-        *self = Self::Searching;
-        match method {
-            33 => MotionCommand::MoveTo { target: lowest },
-            34 => MotionCommand::MoveTo { target: highest },
-            _ => self.attain(counts),
+        let Some(search) = Search::of(method) else { return self.attain(counts) };
+        match search.target {
+            Target::Mark => {
+                *self = Self::Searching;
+                MotionCommand::MoveTo { target: if search.is_positive { highest } else { lowest } }
+            }
+            Target::Switch if limits[usize::from(search.is_positive)] => {
+                *self = Self::Leaving(search);
+                search.far(view.actual, false)
+            }
+            Target::Switch | Target::Stop => {
+                *self = Self::Approaching(search);
+                search.far(view.actual, true)
+            }
         }
     }
 
-    /// Looks for a mark between the count before and the present one, then waits for standstill.
-    pub(super) fn step(&mut self, [before, now]: [i32; 2], is_at_rest: bool) -> Option<MotionCommand> {
+    /// Goes on with the search, then waits for standstill.
+    pub(super) fn step(&mut self, sensed: &Sensed) -> Option<MotionCommand> {
+        let [before, now] = sensed.counts;
         match *self {
+            Self::Approaching(search) => {
+                let end = usize::from(search.is_positive);
+                match search.target {
+                    Target::Switch if sensed.limits[end] => {
+                        *self = Self::Leaving(search);
+                        return Some(search.far(sensed.actual, false));
+                    }
+                    Target::Stop if sensed.pushes[end] => {
+                        return Some(self.leave(search, now, sensed.actual, MotionCommand::Hold));
+                    }
+                    _ => self.fail_at_rest(sensed.is_at_rest),
+                }
+                None
+            }
+            Self::Leaving(search) => {
+                if !sensed.limits[usize::from(search.is_positive)] {
+                    return Some(self.leave(search, now, sensed.actual, MotionCommand::SlowDown));
+                }
+                self.fail_at_rest(sensed.is_at_rest);
+                None
+            }
             Self::Searching => {
                 if let Some(home_counts) = mark_between(before, now) {
                     *self = Self::Settling { home_counts };
                     return Some(MotionCommand::SlowDown);
                 }
-                if is_at_rest {
-                    *self = Self::Failed;
-                }
+                self.fail_at_rest(sensed.is_at_rest);
                 None
             }
-            Self::Settling { home_counts } if is_at_rest => Some(self.attain(home_counts)),
+            Self::Settling { home_counts } if sensed.is_at_rest => Some(self.attain(home_counts)),
             _ => None,
+        }
+    }
+
+    /// Switch or stop is found at that count: home is there, or at the next mark on the way back.
+    fn leave(&mut self, search: Search, counts: i32, actual: i32, end: MotionCommand) -> MotionCommand {
+        if search.then_mark {
+            *self = Self::Searching;
+            return search.far(actual, false);
+        }
+        *self = Self::Settling { home_counts: counts };
+        end
+    }
+
+    fn fail_at_rest(&mut self, is_at_rest: bool) {
+        if is_at_rest {
+            *self = Self::Failed;
         }
     }
 
@@ -107,8 +231,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn methods_without_switches_are_offered() {
+    fn the_methods_offered_are_those_of_the_table() {
         let methods: Vec<_> = (i8::MIN..=i8::MAX).filter(|&method| Homing::is_method(method)).collect();
-        assert_eq!(methods, [33, 34, 35, 37]);
+        assert_eq!(methods, [-4, -3, -2, -1, 1, 2, 17, 18, 33, 34, 35, 37]);
     }
 }

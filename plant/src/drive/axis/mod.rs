@@ -4,7 +4,10 @@
 //! commands, the servo follows the [`Demand`], [`FollowingErrorMonitor`] supervises the servo. [`Parameters`] is
 //! the configuration in the object dictionary.
 
+mod brake;
+mod coordinates;
 mod demand;
+mod drivetrain;
 mod encoder;
 mod following;
 mod gear;
@@ -15,35 +18,54 @@ mod parameters;
 mod positioning;
 mod profile;
 mod servo;
+mod switches;
 
 use masseter_can::cia402::{Controlword, DriveState, StateCommand, StatusBit, Statusword};
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::config::{DriveConfig, FaultKindConfig};
 
+use super::quirks::AxisQuirks;
 use crate::drive::dictionary::{Objects, names};
 use crate::injection::Acting;
+use coordinates::Coordinates;
 use demand::Demand;
+use drivetrain::Drivetrain;
 use following::FollowingErrorMonitor;
-use gear::Gear;
 use motion::{Motion, MotionCommand, PositionView, clamp};
-use motor::{Asked, Motor};
-use parameters::Parameters;
+use parameters::{Offsets, Parameters};
 use positioning::Positioning;
 use profile::Profile;
-use servo::{Servo, ServoCommand, ServoLimits};
+use servo::{ServoCommand, ServoLimits};
+use switches::Switches;
 
 pub(crate) use encoder::Encoder;
 pub(super) use homing::Homing;
+use homing::Sensed;
 pub(crate) use motion::Shaft;
 pub(super) use motion::{Mode, NewTargets};
 pub(super) use parameters::configure;
+
+/// What an axis is made of.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct AxisSettings {
+    /// The drive.
+    pub(super) config: DriveConfig,
+    /// What it does otherwise than the standard.
+    pub(super) quirks: AxisQuirks,
+    /// Step of the servo loops, s.
+    pub(super) step_s: f64,
+    /// The ends of the stroke, m.
+    pub(super) stroke_m: [f64; 2],
+}
 
 /// One axis.
 #[derive(Debug, Clone)]
 pub(super) struct Axis {
     config: DriveConfig,
-    encoder: Encoder,
-    servo: Servo,
+    quirks: AxisQuirks,
+    coordinates: Coordinates,
+    switches: Switches,
+    drivetrain: Drivetrain,
     parameters: Parameters,
     demand: Demand,
     following: FollowingErrorMonitor,
@@ -53,51 +75,50 @@ pub(super) struct Axis {
     /// State of the power stage.
     power: DriveState,
     controlword: Controlword,
-    /// The encoder's last count.
-    counts: i32,
-    /// Position of the encoder's zero in the dictionary.
-    origin_increments: i32,
+    /// The state that the axis enters once it stands: 605Bh or 605Ch asks for a ramp.
+    leaves_for: Option<DriveState>,
+    /// Before then the torque is safely off, ns.
+    torque_from_ns: u64,
+    /// Offsets of the cyclic modes.
+    offsets: Offsets,
     /// Whether the newest cyclic target was limited.
     is_target_limited: bool,
-    gear: Gear,
-    motor: Motor,
     /// Injected faults of the drive.
     faults: Acting,
     /// Since when a fault delays "operation enabled", ns.
     enabling_since_ns: Option<u64>,
-    /// The motor's share of the force: without current the brake holds.
-    motor_n: f64,
 }
 
 impl Axis {
     /// An axis that is switched on at a position.
     pub(super) fn new(
-        config: DriveConfig,
+        settings: &AxisSettings,
         encoder: Encoder,
-        step_s: f64,
+        now_ns: u64,
         position_m: f64,
         objects: &Objects,
     ) -> Self {
+        let AxisSettings { config, quirks, step_s, stroke_m } = *settings;
         Self {
-            counts: encoder.nearest(position_m),
-            parameters: Parameters::from_objects(objects, &config),
-            servo: Servo::new(config, step_s, position_m),
+            parameters: Parameters::from_objects(objects, &config, &quirks),
+            drivetrain: Drivetrain::new(config, &quirks, step_s, position_m),
+            coordinates: Coordinates::new(encoder, position_m, quirks.is_incremental),
+            switches: Switches::new(stroke_m, position_m),
             config,
-            encoder,
+            quirks,
             demand: Demand::Brake,
             following: FollowingErrorMonitor::default(),
             positioning: Positioning::default(),
             homing: Homing::default(),
-            mode: Mode::CyclicPosition,
+            mode: Mode::from_number(objects.get(names::MODE)).unwrap_or(Mode::CyclicPosition),
             power: DriveState::NotReadyToSwitchOn,
             controlword: Controlword::DISABLE_VOLTAGE,
-            origin_increments: 0,
+            leaves_for: None,
+            torque_from_ns: now_ns.saturating_add(quirks.torque_off_ns),
+            offsets: Offsets::default(),
             is_target_limited: false,
-            gear: Gear::default(),
-            motor: Motor::default(),
             faults: Acting::default(),
             enabling_since_ns: None,
-            motor_n: 0.0,
         }
     }
 
@@ -141,15 +162,16 @@ impl Axis {
     /// The state after power-on: the brake closes, and positions count from the encoder's own zero.
     pub(super) fn restart(&mut self, now_ns: u64, objects: &Objects) {
         self.controlword = Controlword::DISABLE_VOLTAGE;
-        (self.homing, self.origin_increments) = (Homing::default(), 0);
+        self.homing = Homing::default();
+        self.coordinates.restart();
         self.enter(DriveState::NotReadyToSwitchOn, now_ns);
         self.configure(now_ns, objects);
     }
 
     /// Applies the dictionary's configuration. A mode that changes in operation brings the axis to rest first.
     pub(super) fn configure(&mut self, now_ns: u64, objects: &Objects) {
-        self.parameters = Parameters::from_objects(objects, &self.config);
-        let mode = Mode::from_number(objects.get(names::MODE)).unwrap_or(self.mode);
+        self.parameters = Parameters::from_objects(objects, &self.config, &self.quirks);
+        let mode = Mode::supported(objects.get(names::MODE), objects).unwrap_or(self.mode);
         if mode != self.mode {
             self.mode = mode;
             self.interrupt_mode();
@@ -164,12 +186,15 @@ impl Axis {
         let before = std::mem::replace(&mut self.controlword, word);
         let was_fault = self.power == DriveState::Fault;
         self.obey(word.command(before, self.power), now_ns);
-        if self.is_enabled() {
+        if self.is_enabled() && self.leaves_for.is_none() {
             let (words, view) = ([before, word], self.position_view(now_ns));
             let (target, method) = (objects.get(names::TARGET_POSITION), self.parameters.homing_method);
             let command = match self.mode {
                 Mode::ProfilePosition => self.positioning.control(words, target, view),
-                Mode::Homing => self.homing.control(words, method, self.counts, view),
+                Mode::Homing => {
+                    let (counts, limits) = (self.coordinates.counts(), self.switches.limits());
+                    self.homing.control(words, method, counts, limits, view)
+                }
                 Mode::CyclicPosition | Mode::CyclicTorque => None,
             };
             self.execute(command, now_ns);
@@ -184,7 +209,26 @@ impl Axis {
             self.power.after(command)
         };
         let next = self.delayed(next, now_ns);
-        self.enter(next, now_ns);
+        if next == DriveState::ReadyToSwitchOn && now_ns < self.torque_from_ns {
+            return;
+        }
+        match (self.is_enabled(), command, next) {
+            (true, StateCommand::Shutdown, next) => self.leave(next, self.parameters.shutdown_m_s2, now_ns),
+            (true, StateCommand::SwitchOn, next) => self.leave(next, self.parameters.disable_m_s2, now_ns),
+            _ => {
+                self.leaves_for = None;
+                self.enter(next, now_ns);
+            }
+        }
+    }
+
+    /// Leaves "operation enabled": at once, or once the axis stands after a ramp.
+    fn leave(&mut self, next: DriveState, deceleration_m_s2: Option<f64>, now_ns: u64) {
+        let Some(deceleration_m_s2) = deceleration_m_s2 else { return self.enter(next, now_ns) };
+        if self.leaves_for.replace(next).is_none() {
+            self.interrupt_mode();
+            self.slow_down(now_ns, deceleration_m_s2);
+        }
     }
 
     /// The next state, where an injected fault delays "operation enabled".
@@ -217,15 +261,18 @@ impl Axis {
 
     /// The buffered cyclic targets take effect; a position beyond the velocity limit is approached further.
     pub(super) fn synchronise(&mut self, now_ns: u64, new: NewTargets, objects: &Objects) {
-        if !self.is_enabled() || self.ignores(new) {
+        let is_free = self.leaves_for.is_none() && self.drivetrain.free_from_ns(now_ns) == now_ns;
+        if !self.is_enabled() || !is_free || self.ignores(new) {
             return;
         }
+        self.offsets = Offsets::from_objects(objects, &self.config);
         match self.mode {
             Mode::CyclicPosition
                 if new.position
                     || self.is_target_limited && matches!(self.demand, Demand::Interpolate { .. }) =>
             {
-                self.follow_target(now_ns, objects.get(names::TARGET_POSITION));
+                let target = objects.get(names::TARGET_POSITION);
+                self.follow_target(now_ns, target.saturating_add(self.offsets.position));
             }
             Mode::CyclicTorque if new.torque => self.apply_torque(objects.get(names::TARGET_TORQUE)),
             _ => {}
@@ -245,13 +292,13 @@ impl Axis {
     fn follow_target(&mut self, now_ns: u64, target: i32) {
         let allowed = self.position_view(now_ns).clamp(target);
         let Parameters { velocity_limit_m_s: limit_m_s, period_s, .. } = self.parameters;
-        let (actual_m, target_m) = (self.measured_m(), self.metres(allowed));
+        let (actual_m, target_m) = (self.measured_m(), self.coordinates.metres(allowed));
         let is_too_fast = self.demand.interpolate(now_ns, actual_m, target_m, period_s, limit_m_s);
         self.is_target_limited = is_too_fast || allowed != target;
     }
 
     fn apply_torque(&mut self, torque_permille: i16) {
-        let target_n = f64::from(torque_permille) / 1000.0 * self.config.rated_force_n;
+        let target_n = f64::from(torque_permille) / 1000.0 * self.config.rated_force_n + self.offsets.force_n;
         let limit_n = self.parameters.force_limit_n;
         let (force_n, is_limited) = clamp(target_n, [-limit_n, limit_n]);
         self.is_target_limited = is_limited;
@@ -263,54 +310,54 @@ impl Axis {
     pub(super) fn step(&mut self, now_ns: u64, shaft: Shaft) -> (f64, bool) {
         self.complete_transition(now_ns);
         self.take_off_torque(now_ns);
-        let seen_m = shaft.seen_m + self.gear_error_m(now_ns);
-        let before = std::mem::replace(&mut self.counts, self.encoder.read(seen_m));
-        if self.is_enabled() {
+        let demand_m = self.demand.position_m(now_ns);
+        let seen_m = shaft.seen_m + self.drivetrain.gear_error_m(demand_m, &mut self.faults);
+        let counts = self.coordinates.read(seen_m);
+        self.switches.look(shaft.is_m);
+        if self.is_enabled() && self.leaves_for.is_none() {
             let is_at_rest = self.demand.is_at_rest(now_ns);
             let command = match self.mode {
                 Mode::ProfilePosition => self.positioning.step(self.controlword, is_at_rest),
-                Mode::Homing => self.homing.step([before, self.counts], is_at_rest),
+                Mode::Homing => {
+                    let sensed = self.sensed(counts, is_at_rest);
+                    self.homing.step(&sensed)
+                }
                 Mode::CyclicPosition | Mode::CyclicTorque => None,
             };
             self.execute(command, now_ns);
         }
         let limits = self.servo_limits();
-        let measured_m = self.encoder.metres(self.counts);
-        let command = self.demand.servo_command(now_ns);
-        let asked_n = self.servo.step(measured_m, seen_m - shaft.is_m, command, &limits);
-        let is_braking = command == ServoCommand::Brake;
-        self.motor_n = if is_braking { 0.0 } else { asked_n };
-        let force_n =
-            self.drive_motor(Asked { force_n: asked_n, is_braking, max_force_n: self.config.max_force_n });
+        let places_m = [self.coordinates.read_m(), seen_m - shaft.is_m];
+        let command = self.servo_command(now_ns);
+        let force_n = self.drivetrain.step(now_ns, places_m, command, &limits, &mut self.faults);
         (force_n, self.supervise_following(now_ns))
     }
 
-    /// The force of motor and brake, N. The loops know nothing of a fault; the current that the drive shows is the motor's.
-    fn drive_motor(&mut self, asked: Asked) -> f64 {
-        let force_n = self.motor.force_n(asked, self.servo.shaft(), &mut self.faults);
-        if self.faults.has(FaultKindConfig::DriveRunaway) {
-            self.motor_n = asked.max_force_n;
+    /// The command of the loops, with the velocity offset of cyclic synchronous position.
+    fn servo_command(&self, now_ns: u64) -> ServoCommand {
+        match self.demand.servo_command(now_ns) {
+            ServoCommand::Follow(Motion { position_m, velocity_m_s })
+                if self.mode == Mode::CyclicPosition =>
+            {
+                let velocity_m_s = velocity_m_s + self.offsets.velocity_m_s;
+                ServoCommand::Follow(Motion { position_m, velocity_m_s })
+            }
+            command => command,
         }
-        if asked.is_braking && self.faults.has(FaultKindConfig::BrakeOpen) {
-            self.servo.release_brake();
-        }
-        force_n
+    }
+
+    /// What homing sees.
+    fn sensed(&self, counts: [i32; 2], is_at_rest: bool) -> Sensed {
+        let pushes = self.drivetrain.pushes();
+        let (actual, limits) = (self.coordinates.actual(), self.switches.limits());
+        Sensed { counts, actual, limits, pushes, is_at_rest }
     }
 
     /// Reads the encoder, as SYNC demands.
     pub(super) fn sample(&mut self, now_ns: u64, seen_m: f64) {
-        let gear_error_m = self.gear_error_m(now_ns);
-        self.counts = self.encoder.read(seen_m + gear_error_m);
-    }
-
-    /// The distance of what the drive sees from the shaft, where its gear ratio is or was wrong.
-    fn gear_error_m(&mut self, now_ns: u64) -> f64 {
-        let ratio = self.faults.size(FaultKindConfig::DriveScale);
-        let error_m = self.gear.error_m(ratio, self.demand.position_m(now_ns));
-        if error_m != 0.0 {
-            self.faults.strike(FaultKindConfig::DriveScale);
-        }
-        error_m
+        let demand_m = self.demand.position_m(now_ns);
+        let gear_error_m = self.drivetrain.gear_error_m(demand_m, &mut self.faults);
+        self.coordinates.read(seen_m + gear_error_m);
     }
 
     /// While the torque is safely off, the drive stays in "switch on disabled", or in fault.
@@ -333,30 +380,36 @@ impl Axis {
 
     /// Writes the state of the axis into the objects that show it.
     pub(super) fn show(&self, now_ns: u64, objects: &mut Objects) {
-        let actual = self.actual_increments();
-        let demand = self.demand.position_m(now_ns).map_or(actual, |demand_m| self.increments(demand_m));
-        let torque = self.motor_n / self.config.rated_force_n * 1000.0;
+        let actual = self.coordinates.actual();
+        let demand_m = self.demand.position_m(now_ns);
+        let demand = demand_m.map_or(actual, |demand_m| self.coordinates.increments(demand_m));
+        let torque = self.drivetrain.motor_n() / self.config.rated_force_n * 1000.0;
         objects.set(names::STATUSWORD, self.statusword(now_ns).0);
         objects.set(names::MODE_DISPLAY, self.mode.number());
         objects.set(names::POSITION_DEMAND, demand);
+        objects.set(names::ENCODER_COUNTS, self.coordinates.shown_counts());
         objects.set(names::POSITION_ACTUAL, actual);
-        objects.set(names::VELOCITY_ACTUAL, self.encoder.nearest(self.servo.motion().velocity_m_s));
+        objects
+            .set(names::VELOCITY_ACTUAL, self.coordinates.difference(self.drivetrain.motion().velocity_m_s));
         objects.set(names::TORQUE_ACTUAL, torque.round() as i16);
         objects.set(names::FOLLOWING_ERROR, demand.saturating_sub(actual));
+        objects.set(names::DIGITAL_INPUTS, self.switches.inputs());
     }
 
     fn statusword(&self, now_ns: u64) -> Statusword {
         let is_enabled = self.is_enabled();
-        let is_limited = self.is_target_limited || self.positioning.is_limited() || self.servo.is_limited();
+        let is_free = is_enabled && self.drivetrain.free_from_ns(now_ns) == now_ns;
+        let is_limited =
+            self.is_target_limited || self.positioning.is_limited() || self.drivetrain.is_limited();
         let word = Statusword::for_state(self.power)
             .with(StatusBit::VoltageEnabled, true)
             .with(StatusBit::Remote, true)
             .with(StatusBit::InternalLimit, is_enabled && is_limited);
         match self.mode {
             Mode::CyclicPosition => word
-                .with(StatusBit::TargetFollowed, is_enabled)
+                .with(StatusBit::TargetFollowed, is_free)
                 .with(StatusBit::FollowingError, self.following.is_fault()),
-            Mode::CyclicTorque => word.with(StatusBit::TargetFollowed, is_enabled),
+            Mode::CyclicTorque => word.with(StatusBit::TargetFollowed, is_free),
             Mode::ProfilePosition => word
                 .with(StatusBit::TargetReached, is_enabled && self.has_reached_setpoint(now_ns))
                 .with(StatusBit::SETPOINT_ACKNOWLEDGED, is_enabled && self.positioning.is_acknowledged())
@@ -378,7 +431,7 @@ impl Axis {
         if state == self.power {
             return;
         }
-        self.power = state;
+        (self.power, self.leaves_for) = (state, None);
         self.following.restart(self.is_in_fault());
         self.interrupt_mode();
         match state {
@@ -390,12 +443,13 @@ impl Axis {
     }
 
     fn interrupt_mode(&mut self) {
-        self.is_target_limited = false;
+        (self.is_target_limited, self.offsets) = (false, Offsets::default());
         (self.positioning, self.homing) = (Positioning::default(), self.homing.interrupted());
     }
 
     /// The cyclic modes wait for their first target behind a closed brake; the other modes hold the position.
     fn enable(&mut self, now_ns: u64) {
+        self.drivetrain.open_brake(now_ns);
         if matches!(self.mode, Mode::ProfilePosition | Mode::Homing) {
             let here = Motion::at_rest(self.measured_m());
             self.demand =
@@ -409,11 +463,11 @@ impl Axis {
             DriveState::QuickStopActive => {
                 !self.parameters.holds_quick_stop && self.demand.is_at_rest(now_ns)
             }
-            DriveState::FaultReactionActive => self.demand.is_at_rest(now_ns),
+            DriveState::FaultReactionActive | DriveState::OperationEnabled => self.demand.is_at_rest(now_ns),
             _ => true,
         };
         if is_complete {
-            self.enter(self.power.after_completion(), now_ns);
+            self.enter(self.leaves_for.unwrap_or(self.power.after_completion()), now_ns);
         }
     }
 
@@ -430,19 +484,31 @@ impl Axis {
 
     /// Executes a command of the mode of operation.
     fn execute(&mut self, command: Option<MotionCommand>, now_ns: u64) {
-        let Parameters { profile, homing, .. } = self.parameters;
-        let limits = if self.mode == Mode::Homing { homing } else { profile };
+        let Parameters { profile, homing, homing_to_switch, halt_m_s2, .. } = self.parameters;
+        let limits = match self.mode {
+            Mode::Homing if self.homing.is_approaching() => homing_to_switch,
+            Mode::Homing => homing,
+            _ => profile,
+        };
+        // Nothing moves while the brake opens.
+        let from_ns = self.drivetrain.free_from_ns(now_ns);
         match command {
             None => {}
             Some(MotionCommand::MoveTo { target }) => {
                 let start = self.demand.at(now_ns).unwrap_or(Motion::at_rest(self.measured_m()));
-                self.demand = Demand::Profile(Profile::to(now_ns, start, self.metres(target), &limits));
+                self.demand =
+                    Demand::Profile(Profile::to(from_ns, start, self.coordinates.metres(target), &limits));
             }
-            Some(MotionCommand::SlowDown) => self.slow_down(now_ns, limits.deceleration_m_s2),
-            // Zero is the home offset (607Ch) beyond home, so that home has the position minus the offset (CiA 402).
+            Some(MotionCommand::SlowDown) => {
+                let halt_m_s2 = halt_m_s2.filter(|_| self.controlword.halts());
+                self.slow_down(now_ns, halt_m_s2.unwrap_or(limits.deceleration_m_s2));
+            }
+            Some(MotionCommand::Hold) => {
+                let here = Motion::at_rest(self.measured_m());
+                self.demand = Demand::Profile(Profile::stop(now_ns, here, limits.deceleration_m_s2));
+            }
             Some(MotionCommand::SetHome { counts }) => {
-                self.origin_increments =
-                    0_i32.saturating_sub(counts).saturating_sub(self.parameters.home_offset);
+                self.coordinates.set_home(counts, self.parameters.home_position);
             }
         }
     }
@@ -455,45 +521,38 @@ impl Axis {
     }
 
     fn slow_down(&mut self, now_ns: u64, deceleration_m_s2: f64) {
-        self.demand.slow_down(now_ns, self.servo.motion(), deceleration_m_s2);
+        self.demand.slow_down(now_ns, self.drivetrain.motion(), deceleration_m_s2);
+    }
+
+    /// The software position limits, which mean nothing before the homing of an incremental encoder.
+    fn position_limits(&self) -> [i32; 2] {
+        let is_referenced = self.coordinates.is_referenced();
+        if is_referenced { self.parameters.position_limits } else { [i32::MIN, i32::MAX] }
     }
 
     /// In force control the axis may be no faster than it can stop before the software position limits, at the
     /// profile deceleration (6084h).
     fn servo_limits(&self) -> ServoLimits {
-        let Parameters { velocity_limit_m_s, force_limit_n, position_limits, profile, .. } = self.parameters;
-        let ([lowest_m, highest_m], at_m) = (position_limits.map(|end| self.metres(end)), self.measured_m());
+        let Parameters { velocity_limit_m_s, force_limit_n, profile, .. } = self.parameters;
+        let ([lowest_m, highest_m], at_m) =
+            (self.position_limits().map(|end| self.coordinates.metres(end)), self.measured_m());
         let braking_m_s =
             |way_m: f64| (2.0 * profile.deceleration_m_s2 * way_m.max(0.0)).sqrt().min(velocity_limit_m_s);
         let free_velocity_m_s = [-braking_m_s(at_m - lowest_m), braking_m_s(highest_m - at_m)];
-        ServoLimits { force_n: force_limit_n, velocity_m_s: velocity_limit_m_s, free_velocity_m_s }
+        let feed_n = if self.mode == Mode::CyclicPosition { self.offsets.force_n } else { 0.0 };
+        ServoLimits { force_n: force_limit_n, velocity_m_s: velocity_limit_m_s, free_velocity_m_s, feed_n }
     }
 
     /// The positions that a mode of operation sees. Homing moves the software position limits and may leave the axis
     /// outside of them: there it may stay or come nearer, but go no further.
     fn position_view(&self, now_ns: u64) -> PositionView {
-        let [lowest, highest] = self.parameters.position_limits;
-        let here = self.increments(self.demand.position_m(now_ns).unwrap_or(self.measured_m()));
-        PositionView { actual: self.actual_increments(), allowed: [lowest.min(here), highest.max(here)] }
+        let [lowest, highest] = self.position_limits();
+        let here = self.coordinates.increments(self.demand.position_m(now_ns).unwrap_or(self.measured_m()));
+        PositionView { actual: self.coordinates.actual(), allowed: [lowest.min(here), highest.max(here)] }
     }
 
     /// The measured position, m in the encoder's coordinates.
     fn measured_m(&self) -> f64 {
-        self.servo.motion().position_m
-    }
-
-    /// Position actual value (6064h).
-    fn actual_increments(&self) -> i32 {
-        self.counts.saturating_add(self.origin_increments)
-    }
-
-    /// A position of the dictionary in the encoder's metres.
-    fn metres(&self, increments: i32) -> f64 {
-        self.encoder.metres(increments.saturating_sub(self.origin_increments))
-    }
-
-    /// A position in the encoder's metres as the dictionary has it.
-    fn increments(&self, position_m: f64) -> i32 {
-        self.encoder.nearest(position_m).saturating_add(self.origin_increments)
+        self.drivetrain.motion().position_m
     }
 }

@@ -1,5 +1,7 @@
 //! Values that the parts of an axis exchange: modes of operation, their view and their commands, motion.
 
+use crate::drive::dictionary::{Objects, names};
+
 /// Position and velocity of an axis at an instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Motion {
@@ -55,6 +57,12 @@ impl Mode {
         modes.into_iter().find(|mode| mode.number() == number)
     }
 
+    /// The mode of that number; `None` where the dictionary (6502h) does not support it.
+    pub(crate) fn supported(number: i8, objects: &Objects) -> Option<Self> {
+        let mode = Self::from_number(number)?;
+        (objects.get(names::SUPPORTED_MODES) >> (number - 1) & 1 == 1).then_some(mode)
+    }
+
     /// The mode's number.
     pub(crate) const fn number(self) -> i8 {
         self as i8
@@ -94,6 +102,8 @@ pub(super) enum MotionCommand {
     MoveTo { target: i32 },
     /// Slow down to rest.
     SlowDown,
+    /// Come to rest at once where the axis is: it stands at a stop.
+    Hold,
     /// Make that count of the encoder the home position.
     SetHome { counts: i32 },
 }

@@ -6,7 +6,8 @@ use masseter_can::cia402::interpolation_period;
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::DriveConfig;
 
-use crate::drive::dictionary::{Objects, names};
+use crate::drive::dictionary::{Objects, RPM_PER_S, names};
+use crate::drive::quirks::AxisQuirks;
 
 /// Value of 6065h that switches the supervision of the following error off.
 const NO_WINDOW: u32 = u32::MAX;
@@ -17,6 +18,40 @@ pub(super) struct MotionLimits {
     pub(super) velocity_m_s: f64,
     pub(super) acceleration_m_s2: f64,
     pub(super) deceleration_m_s2: f64,
+}
+
+/// Offsets of the cyclic modes.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Offsets {
+    /// Added to the target position (60B0h), increments.
+    pub(super) position: i32,
+    /// Added to the velocity of the demand (60B1h), m/s.
+    pub(super) velocity_m_s: f64,
+    /// Added to the force of the velocity loop, or to the target torque (60B2h), N.
+    pub(super) force_n: f64,
+}
+
+impl Offsets {
+    /// The offsets in the dictionary.
+    pub(super) fn from_objects(objects: &Objects, drive: &DriveConfig) -> Self {
+        Self {
+            position: objects.get(names::POSITION_OFFSET),
+            velocity_m_s: f64::from(objects.get(names::VELOCITY_OFFSET)) * drive.encoder_resolution_m,
+            force_n: f64::from(objects.get(names::TORQUE_OFFSET)) / 1000.0 * drive.rated_force_n,
+        }
+    }
+}
+
+/// Seconds in a minute.
+const MINUTE_S: f64 = 60.0;
+
+/// The drive's unit of acceleration, m/s², from its own words (60AAh, 608Fh).
+fn acceleration_unit_m_s2(objects: &Objects, drive: &DriveConfig) -> f64 {
+    let increments_s2 = match objects.get(names::ACCELERATION_UNIT) {
+        RPM_PER_S => f64::from(objects.get(names::INCREMENTS_PER_TURN)) / MINUTE_S,
+        _ => 1.0,
+    };
+    increments_s2 * drive.encoder_resolution_m
 }
 
 /// The configuration of an axis.
@@ -45,27 +80,36 @@ pub(super) struct Parameters {
     pub(super) holds_quick_stop: bool,
     /// Deceleration of the fault reaction (605Eh), m/s²; none where the brake closes at once.
     pub(super) fault_stop_m_s2: Option<f64>,
+    /// Deceleration before "shutdown" and "disable operation" (605Bh, 605Ch), m/s²; none where the brake closes at once.
+    pub(super) shutdown_m_s2: Option<f64>,
+    pub(super) disable_m_s2: Option<f64>,
+    /// Deceleration of a halt (605Dh), m/s²; none for that of the mode.
+    pub(super) halt_m_s2: Option<f64>,
     /// Abort connection option code (6007h).
     pub(super) abort_connection_option: i16,
     /// Homing method (6098h).
     pub(super) homing_method: i8,
-    /// Search for a reference mark (6099h, 609Ah).
+    /// Way to a switch or a stop (6099h:01, 609Ah).
+    pub(super) homing_to_switch: MotionLimits,
+    /// Every other way of homing (6099h:02, 609Ah).
     pub(super) homing: MotionLimits,
-    /// Home offset (607Ch), increments.
-    pub(super) home_offset: i32,
+    /// Position at home, which the home offset (607Ch) decides, increments.
+    pub(super) home_position: i32,
 }
 
 impl Parameters {
     /// The dictionary's parameters, bounded by the abilities of the drive.
-    pub(super) fn from_objects(objects: &Objects, drive: &DriveConfig) -> Self {
+    pub(super) fn from_objects(objects: &Objects, drive: &DriveConfig, quirks: &AxisQuirks) -> Self {
+        let unit_m_s2 = acceleration_unit_m_s2(objects, drive);
+        let acceleration_m_s2 = |word: u32| f64::from(word) * unit_m_s2;
         let metres = |increments: u32| f64::from(increments) * drive.encoder_resolution_m;
         let velocity_limit_m_s = metres(objects.get(names::MAX_VELOCITY)).min(drive.max_velocity_m_s);
         let profile = MotionLimits {
             velocity_m_s: metres(objects.get(names::PROFILE_VELOCITY)).min(velocity_limit_m_s),
-            acceleration_m_s2: metres(objects.get(names::PROFILE_ACCELERATION)),
-            deceleration_m_s2: metres(objects.get(names::PROFILE_DECELERATION)),
+            acceleration_m_s2: acceleration_m_s2(objects.get(names::PROFILE_ACCELERATION)),
+            deceleration_m_s2: acceleration_m_s2(objects.get(names::PROFILE_DECELERATION)),
         };
-        let quick_stop_m_s2 = metres(objects.get(names::QUICK_STOP_DECELERATION));
+        let quick_stop_m_s2 = acceleration_m_s2(objects.get(names::QUICK_STOP_DECELERATION));
         let stop = |option: i16| match option {
             0 => None,
             1 | 5 => Some(profile.deceleration_m_s2),
@@ -74,14 +118,25 @@ impl Parameters {
         let window = Some(objects.get(names::FOLLOWING_WINDOW)).filter(|&window| window != NO_WINDOW);
         let torque_limit_n = f64::from(objects.get(names::MAX_TORQUE)) / 1000.0 * drive.rated_force_n;
         let exponent = i32::from(objects.get(names::PERIOD_INDEX));
+        let option_of = |option| Some(profile.deceleration_m_s2).filter(|_| objects.get(option) == 1);
+        // Zero is the home offset (607Ch) beyond home, so that home has the position minus the offset (CiA 402).
         let home_offset = objects.get(names::HOME_OFFSET);
-        let homing_m_s2 = metres(objects.get(names::HOMING_ACCELERATION));
+        let home_position =
+            if quirks.is_offset_inverted { home_offset } else { 0_i32.saturating_sub(home_offset) };
+        // Software position limits count from home.
+        let limits_shift = if quirks.are_limits_from_zero { 0 } else { home_position };
+        let homing_m_s2 = acceleration_m_s2(objects.get(names::HOMING_ACCELERATION));
+        let homing = |speed| MotionLimits {
+            velocity_m_s: metres(objects.get(speed)).min(velocity_limit_m_s),
+            acceleration_m_s2: homing_m_s2,
+            deceleration_m_s2: homing_m_s2,
+        };
         Self {
             period_s: f64::from(objects.get(names::PERIOD_VALUE)) * 10.0_f64.powi(exponent),
             velocity_limit_m_s,
             force_limit_n: torque_limit_n.min(drive.max_force_n),
             position_limits: [names::MIN_POSITION_LIMIT, names::MAX_POSITION_LIMIT]
-                .map(|end| objects.get(end).saturating_sub(home_offset)),
+                .map(|end| objects.get(end).saturating_add(limits_shift)),
             following_window_m: window.map(metres),
             following_timeout_ns: u64::from(objects.get(names::FOLLOWING_TIMEOUT_MS)) * MILLISECOND_NS,
             position_window_m: metres(objects.get(names::POSITION_WINDOW)),
@@ -89,14 +144,14 @@ impl Parameters {
             quick_stop_m_s2: stop(objects.get(names::QUICK_STOP_OPTION)),
             holds_quick_stop: objects.get(names::QUICK_STOP_OPTION) >= 5,
             fault_stop_m_s2: stop(objects.get(names::FAULT_OPTION)),
+            shutdown_m_s2: option_of(names::SHUTDOWN_OPTION),
+            disable_m_s2: option_of(names::DISABLE_OPERATION_OPTION),
+            halt_m_s2: Some(quick_stop_m_s2).filter(|_| objects.get(names::HALT_OPTION) == 2),
             abort_connection_option: objects.get(names::ABORT_CONNECTION_OPTION),
             homing_method: objects.get(names::HOMING_METHOD),
-            homing: MotionLimits {
-                velocity_m_s: metres(objects.get(names::HOMING_SPEED_ZERO)).min(velocity_limit_m_s),
-                acceleration_m_s2: homing_m_s2,
-                deceleration_m_s2: homing_m_s2,
-            },
-            home_offset,
+            homing_to_switch: homing(names::HOMING_SPEED_SWITCH),
+            homing: homing(names::HOMING_SPEED_ZERO),
+            home_position,
         }
     }
 }
@@ -110,7 +165,8 @@ pub(crate) fn configure(
 ) {
     let increments = |metres: f64| drive.increments(metres) as u32;
     let velocity = increments(drive.max_velocity_m_s).max(1);
-    let ramp = increments(drive.quick_stop_deceleration_m_s2).max(1);
+    let unit_m_s2 = acceleration_unit_m_s2(objects, drive);
+    let ramp = ((drive.quick_stop_deceleration_m_s2 / unit_m_s2).round() as u32).max(1);
     let [lowest, highest] = position_limits;
     let (value, exponent) = interpolation_period(period_ns);
     objects.set(names::FOLLOWING_WINDOW, increments(drive.following_error_m));
@@ -149,7 +205,7 @@ mod tests {
         let drive = DrivesConfig::default().leg;
         let mut objects = Objects::new(NodeId::new(1).unwrap());
         configure(&mut objects, &drive, MILLISECOND_NS, [-5, 7]);
-        let parameters = Parameters::from_objects(&objects, &drive);
+        let parameters = Parameters::from_objects(&objects, &drive, &AxisQuirks::default());
         assert!(near(parameters.period_s, 1e-3));
         assert!(near(parameters.velocity_limit_m_s, drive.max_velocity_m_s));
         assert!(near(parameters.force_limit_n, drive.max_force_n));
@@ -186,7 +242,7 @@ mod tests {
     #[test]
     fn every_parameter_is_read_in_si() {
         let (objects, drive) = objects();
-        let parameters = Parameters::from_objects(&objects, &drive);
+        let parameters = Parameters::from_objects(&objects, &drive, &AxisQuirks::default());
         assert!(near(parameters.period_s, 2.5e-3));
         assert!(near(parameters.velocity_limit_m_s, 0.3));
         assert!(near(parameters.force_limit_n, 750.0));
@@ -202,7 +258,7 @@ mod tests {
             found.iter().flatten().zip(expected.iter().flatten()).all(|(a, b)| near(*a, *b)),
             "{found:?}"
         );
-        assert_eq!((parameters.homing_method, parameters.home_offset), (34, 100));
+        assert_eq!((parameters.homing_method, parameters.home_position), (34, -100));
     }
 
     /// However high the dictionary's limits are.
@@ -213,7 +269,7 @@ mod tests {
             objects.set(velocity, 10_000_000);
         }
         objects.set(names::MAX_TORQUE, u16::MAX);
-        let parameters = Parameters::from_objects(&objects, &drive);
+        let parameters = Parameters::from_objects(&objects, &drive, &AxisQuirks::default());
         let velocities =
             [parameters.velocity_limit_m_s, parameters.profile.velocity_m_s, parameters.homing.velocity_m_s];
         assert!(velocities.iter().all(|velocity_m_s| near(*velocity_m_s, 0.4)), "{velocities:?}");
@@ -233,7 +289,7 @@ mod tests {
         for (option, ramp_m_s2, holds) in table {
             objects.set(names::QUICK_STOP_OPTION, option);
             objects.set(names::FAULT_OPTION, 2);
-            let parameters = Parameters::from_objects(&objects, &drive);
+            let parameters = Parameters::from_objects(&objects, &drive, &AxisQuirks::default());
             assert_eq!(
                 (parameters.quick_stop_m_s2, parameters.holds_quick_stop),
                 (ramp_m_s2, holds),
@@ -241,10 +297,17 @@ mod tests {
             );
             assert_eq!(parameters.fault_stop_m_s2, Some(12.0));
             objects.set(names::FAULT_OPTION, option);
-            assert_eq!(Parameters::from_objects(&objects, &drive).fault_stop_m_s2, ramp_m_s2, "{option}");
+            assert_eq!(
+                Parameters::from_objects(&objects, &drive, &AxisQuirks::default()).fault_stop_m_s2,
+                ramp_m_s2,
+                "{option}"
+            );
         }
         objects.set(names::FOLLOWING_WINDOW, u32::MAX);
-        assert_eq!(Parameters::from_objects(&objects, &drive).following_window_m, None);
+        assert_eq!(
+            Parameters::from_objects(&objects, &drive, &AxisQuirks::default()).following_window_m,
+            None
+        );
     }
 
     #[test]

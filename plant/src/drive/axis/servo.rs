@@ -27,7 +27,7 @@ pub(super) enum ServoCommand {
     },
 }
 
-/// Limits of a step.
+/// Limits of a step, and what is added to its loops.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ServoLimits {
     /// Largest force, N.
@@ -36,6 +36,8 @@ pub(super) struct ServoLimits {
     pub(super) velocity_m_s: f64,
     /// Lowest and highest velocity in force control, m/s.
     pub(super) free_velocity_m_s: [f64; 2],
+    /// Force that position control gives beside its loops, N.
+    pub(super) feed_n: f64,
 }
 
 /// The loops' memory.
@@ -129,7 +131,7 @@ impl Servo {
             clamp(unlimited_m_s, [-limits.velocity_m_s, limits.velocity_m_s]);
         let proportional_n = config.velocity_gain_n_s_per_m * (speed_m_s - actual.velocity_m_s);
         let (force_n, is_force_limited) =
-            clamp(proportional_n + self.integral_n, [-limits.force_n, limits.force_n]);
+            clamp(proportional_n + self.integral_n + limits.feed_n, [-limits.force_n, limits.force_n]);
         self.is_limited = is_velocity_limited || is_force_limited;
         if !self.is_limited {
             self.integral_n += proportional_n * self.step_s / config.velocity_integral_time_s;
@@ -160,7 +162,7 @@ mod tests {
 
     const STEP_S: f64 = 1.25e-4;
     const LIMITS: ServoLimits =
-        ServoLimits { force_n: 1000.0, velocity_m_s: 0.4, free_velocity_m_s: [-0.4, 0.4] };
+        ServoLimits { force_n: 1000.0, velocity_m_s: 0.4, free_velocity_m_s: [-0.4, 0.4], feed_n: 0.0 };
 
     /// A mass with a constant load.
     fn simulate(command: impl Fn(f64) -> ServoCommand, mass_kg: f64, load_n: f64, seconds: f64) -> Motion {

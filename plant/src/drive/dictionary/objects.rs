@@ -125,6 +125,15 @@ impl Objects {
         self.words[find(address).unwrap_or_else(|_| panic!("the table has no entry {address}"))]
     }
 
+    /// Sets the word of an entry that the table is known to have, whatever its access.
+    ///
+    /// # Panics
+    /// Where it has no such entry.
+    pub(crate) fn set_at(&mut self, index: u16, subindex: u8, word: u32) {
+        let address = ObjectAddress::new(index, subindex);
+        self.words[find(address).unwrap_or_else(|_| panic!("the table has no entry {address}"))] = word;
+    }
+
     /// The first `count` entries of a mapping parameter.
     pub(crate) fn mapping(&self, index: u16, count: u32) -> impl Iterator<Item = MappingEntry> {
         (1..=count as u8).map(move |subindex| MappingEntry(self.at(index, subindex)))

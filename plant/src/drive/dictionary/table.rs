@@ -3,14 +3,16 @@
 //! Positions are encoder increments, velocities increments/s, accelerations increments/s², torques per
 //! mille of the rated torque (of the rated force, for a linear axis).
 
+use masseter_can::canopen::CobId;
+use masseter_can::{EVERY_SYNC, Rpdo1, Tpdo1};
+use masseter_shared::config::INCREMENTS_PER_TURN;
+
 use super::entry::Access::{Constant, ReadOnly, ReadWrite};
 use super::entry::DataType::{I8, I16, I32, Text, U8, U16, U32};
 use super::entry::Initial::{Configured, OfNode, Value};
 use super::entry::Mapping::{Any, Tpdo};
 use super::entry::Shape::{Array, Record};
 use super::entry::{Access, DataType, Entry, Initial, Object, Shape};
-use masseter_can::canopen::CobId;
-use masseter_can::{EVERY_SYNC, Rpdo1, Tpdo1};
 
 /// PDOs of each direction.
 pub(crate) const PDOS: usize = 4;
@@ -22,6 +24,13 @@ pub(crate) const HISTORY: usize = 8;
 pub(crate) const CONSUMED: usize = 2;
 /// 6502h: profile position, homing, cyclic synchronous position and torque.
 const SUPPORTED_MODES: i64 = 1 << 0 | 1 << 5 | 1 << 7 | 1 << 9;
+
+/// Units in the notation of CiA 402 (60A8h to 60AAh): increments (B5h), a second of them (03h, 57h for its square), and
+/// turns a minute a second.
+pub(crate) const INCREMENTS: u32 = 0x00B5_0000;
+pub(crate) const INCREMENTS_PER_S: u32 = 0x00B5_0300;
+pub(crate) const INCREMENTS_PER_S2: u32 = 0x00B5_5700;
+pub(crate) const RPM_PER_S: u32 = 0x00C0_0300;
 
 /// An object of several entries.
 const fn object(name: &'static str, shape: Shape, entries: &'static [Entry]) -> Object {
@@ -46,6 +55,20 @@ const fn highest(index: u16, subindex: u8) -> Entry {
 /// A positive quantity that follows from the scenario.
 const fn positive(address: (u16, u8), name: &'static str) -> Entry {
     Entry::new(address, name, U32, ReadWrite, Configured).within(1, u32::MAX as i64)
+}
+
+/// A unit that clients may write, as long as it is the drive's.
+const fn unit(index: u16, name: &'static str, word: u32) -> Entry {
+    plain(index, name, U32, ReadWrite, Value(word as i64)).within(word as i64, word as i64)
+}
+
+/// A ratio that the drive's mechanics has: so much for each turn.
+const fn ratio(index: u16, names: [&'static str; 2], [per_turn, turns]: [u32; 2]) -> [Entry; 3] {
+    [
+        highest(index, 2),
+        Entry::new((index, 1), names[0], U32, Constant, Value(per_turn as i64)),
+        Entry::new((index, 2), names[1], U32, Constant, Value(turns as i64)),
+    ]
 }
 
 /// The COB-ID of a PDO: initially only the first one of each direction exists.
@@ -176,10 +199,14 @@ pub(crate) static OBJECTS: &[Object] = &[
     var(&[plain(0x6040, "Controlword", U16, ReadWrite, Value(0)).mapped(Any)]),
     var(&[plain(0x6041, "Statusword", U16, ReadOnly, Value(0)).mapped(Tpdo)]),
     var(&[plain(0x605A, "Quick stop option code", I16, ReadWrite, Value(2)).within(0, 6)]),
+    var(&[plain(0x605B, "Shutdown option code", I16, ReadWrite, Value(0)).within(0, 1)]),
+    var(&[plain(0x605C, "Disable operation option code", I16, ReadWrite, Value(0)).within(0, 1)]),
+    var(&[plain(0x605D, "Halt option code", I16, ReadWrite, Value(1)).within(1, 2)]),
     var(&[plain(0x605E, "Fault reaction option code", I16, ReadWrite, Value(2)).within(0, 2)]),
     var(&[plain(0x6060, "Modes of operation", I8, ReadWrite, Value(8)).mapped(Any)]),
     var(&[plain(0x6061, "Modes of operation display", I8, ReadOnly, Value(8)).mapped(Tpdo)]),
     var(&[plain(0x6062, "Position demand value", I32, ReadOnly, Value(0)).mapped(Tpdo)]),
+    var(&[plain(0x6063, "Position actual internal value", I32, ReadOnly, Value(0)).mapped(Tpdo)]),
     var(&[plain(0x6064, "Position actual value", I32, ReadOnly, Value(0)).mapped(Tpdo)]),
     var(&[plain(0x6065, "Following error window", U32, ReadWrite, Configured)]),
     var(&[plain(0x6066, "Following error time out", U16, ReadWrite, Configured)]),
@@ -200,6 +227,9 @@ pub(crate) static OBJECTS: &[Object] = &[
     var(&[positive((0x6083, 0), "Profile acceleration").mapped(Any)]),
     var(&[positive((0x6084, 0), "Profile deceleration").mapped(Any)]),
     var(&[positive((0x6085, 0), "Quick stop deceleration")]),
+    object("Position encoder resolution", Array, &ratio(0x608F, ["Encoder increments", "Motor revolutions"], [INCREMENTS_PER_TURN, 1])),
+    object("Gear ratio", Array, &ratio(0x6091, ["Motor revolutions", "Shaft revolutions"], [1, 1])),
+    object("Feed constant", Array, &ratio(0x6092, ["Feed", "Shaft revolutions"], [INCREMENTS_PER_TURN, 1])),
     var(&[plain(0x6098, "Homing method", I8, ReadWrite, Value(37))]),
     object("Homing speeds", Array, &[
         highest(0x6099, 2),
@@ -207,11 +237,18 @@ pub(crate) static OBJECTS: &[Object] = &[
         positive((0x6099, 2), "Speed during search for zero"),
     ]),
     var(&[positive((0x609A, 0), "Homing acceleration")]),
+    var(&[unit(0x60A8, "SI unit position", INCREMENTS)]),
+    var(&[unit(0x60A9, "SI unit velocity", INCREMENTS_PER_S)]),
+    var(&[unit(0x60AA, "SI unit acceleration", INCREMENTS_PER_S2)]),
+    var(&[plain(0x60B0, "Position offset", I32, ReadWrite, Value(0)).mapped(Any)]),
+    var(&[plain(0x60B1, "Velocity offset", I32, ReadWrite, Value(0)).mapped(Any)]),
+    var(&[plain(0x60B2, "Torque offset", I16, ReadWrite, Value(0)).mapped(Any)]),
     object("Interpolation time period", Record, &[
         highest(0x60C2, 2),
         Entry::new((0x60C2, 1), "Interpolation time period value", U8, ReadWrite, Configured).within(1, 255),
         Entry::new((0x60C2, 2), "Interpolation time index", I8, ReadWrite, Configured).within(-6, 0),
     ]),
     var(&[plain(0x60F4, "Following error actual value", I32, ReadOnly, Value(0)).mapped(Tpdo)]),
+    var(&[plain(0x60FD, "Digital inputs", U32, ReadOnly, Value(0)).mapped(Tpdo)]),
     var(&[plain(0x6502, "Supported drive modes", U32, Constant, Value(SUPPORTED_MODES))]),
 ];

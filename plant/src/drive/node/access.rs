@@ -7,7 +7,7 @@ use masseter_can::canopen::{AbortCode, Expedited, ObjectAddress};
 use super::rules::check;
 use super::storage::Storage;
 use crate::drive::axis::Axis;
-use crate::drive::dictionary::{ENTRIES, Initial, Objects, find, names};
+use crate::drive::dictionary::{Initial, Objects, Overlay, names};
 
 /// A value that was read.
 pub(super) enum Value {
@@ -21,7 +21,10 @@ pub(super) struct DictionaryAccess<'a> {
     pub(super) objects: &'a mut Objects,
     pub(super) storage: &'a mut Storage,
     pub(super) axis: &'a Axis,
+    pub(super) overlay: &'a Overlay,
     pub(super) is_operational: bool,
+    /// Whether PDO parameters cannot be written now.
+    pub(super) locks_pdos: bool,
     /// The object written, whose effect is due.
     pub(super) written: Option<ObjectAddress>,
 }
@@ -29,8 +32,7 @@ pub(super) struct DictionaryAccess<'a> {
 impl DictionaryAccess<'_> {
     /// The value of an entry.
     pub(super) fn read(&mut self, object: ObjectAddress) -> Result<Value, AbortCode> {
-        let place = find(object)?;
-        let entry = &ENTRIES[place];
+        let (place, entry) = self.overlay.find(object)?;
         if let Initial::Text(text) = entry.initial {
             return Ok(Value::Text(text));
         }
@@ -50,11 +52,19 @@ impl DictionaryAccess<'_> {
         data: &[u8],
         is_sized: bool,
     ) -> Result<(), AbortCode> {
-        let place = find(object)?;
-        let word = ENTRIES[place].writable(data, is_sized)?;
-        check(object, word, self.objects, self.axis, self.is_operational)?;
+        let (place, entry) = self.overlay.find(object)?;
+        let word = entry.writable(data, is_sized)?;
+        let is_closed = match object.index {
+            0x1400..0x1C00 => self.locks_pdos,
+            0x1010 | 0x1011 => self.storage.is_busy(),
+            _ => false,
+        };
+        if is_closed {
+            return Err(AbortCode::DEVICE_STATE);
+        }
+        check(object, word, self.objects, self.axis, self.overlay, self.is_operational)?;
         match object.index {
-            0x1010 => self.storage.store(self.objects),
+            0x1010 => self.storage.save(self.now_ns, self.objects),
             0x1011 => self.storage.restore_factory(),
             _ => {
                 self.objects.words[place] = word;

@@ -12,24 +12,38 @@ use crate::drive::dictionary::{HISTORY, Objects};
 const GENERIC: u8 = 0x01;
 const COMMUNICATION: u8 = 0x10;
 const PROFILE: u8 = 0x20;
+const CURRENT: u8 = 0x02;
 const VOLTAGE: u8 = 0x04;
+const TEMPERATURE: u8 = 0x08;
 
 /// The number of errors that the drive can report: room for each of them once.
-const COUNT: usize = 10;
+const COUNT: usize = 11;
 
 /// The errors that put the drive into fault and last until it is reset: a following error outside its window for longer
 /// than its time out, a drive that nobody controls any more where 6007h makes that a fault, and a logic supply that is
 /// too low.
-pub(super) const FAULTS: [EmergencyCode; 3] =
+const FAULTS: [EmergencyCode; 3] =
     [EmergencyCode::FOLLOWING_ERROR, EmergencyCode::COMMUNICATION, EmergencyCode::LOGIC_SUPPLY];
 
 /// The present errors, the newest first.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Errors {
+    /// The fault that is present at power-on.
+    at_power_on: Option<EmergencyCode>,
     present: ArrayVec<EmergencyCode, COUNT>,
 }
 
 impl Errors {
+    /// No errors yet, of a drive with that fault at power-on.
+    pub(super) fn new(at_power_on: Option<u16>) -> Self {
+        Self { at_power_on: at_power_on.map(EmergencyCode), ..Self::default() }
+    }
+
+    /// The errors that a fault reset clears.
+    pub(super) fn faults(&self) -> impl Iterator<Item = EmergencyCode> + use<> {
+        FAULTS.into_iter().chain(self.at_power_on)
+    }
+
     /// An error appears; returns its emergency message, unless the error was present already.
     pub(super) fn raise(&mut self, error: EmergencyCode, objects: &mut Objects) -> Option<Emergency> {
         if self.present.contains(&error) {
@@ -49,7 +63,8 @@ impl Errors {
 
     /// Clears the errors of the communication without a message, as its reset does; faults stay.
     pub(super) fn forget_communication(&mut self, objects: &mut Objects) {
-        self.present.retain(|error| FAULTS.contains(error));
+        let at_power_on = self.at_power_on;
+        self.present.retain(|error| FAULTS.contains(error) || Some(*error) == at_power_on);
         self.show(objects);
     }
 
@@ -71,8 +86,11 @@ fn register_bits(error: EmergencyCode) -> u8 {
     GENERIC
         | match error {
             EmergencyCode::FOLLOWING_ERROR => PROFILE,
-            EmergencyCode::LOGIC_SUPPLY => VOLTAGE,
-            _ => COMMUNICATION,
+            EmergencyCode(0x2000..0x3000) => CURRENT,
+            EmergencyCode(0x3000..0x4000) | EmergencyCode::LOGIC_SUPPLY => VOLTAGE,
+            EmergencyCode(0x4000..0x5000) => TEMPERATURE,
+            EmergencyCode(0x8100..0x8300) => COMMUNICATION,
+            _ => 0,
         }
 }
 

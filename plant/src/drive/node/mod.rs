@@ -22,12 +22,14 @@ use masseter_can::{ErrorState, Frame};
 use masseter_shared::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_shared::config::FaultKindConfig;
 
-use super::axis::{Axis, Encoder, Shaft};
-use super::dictionary::{Objects, PDOS, names};
+use super::axis::{Axis, AxisSettings, Encoder, Shaft};
+use super::dictionary::{Objects, Overlay, PDOS, names};
+use super::memory::DriveMemory;
+use super::quirks::{NodeQuirks, Quirks};
 use super::settings::DriveSettings;
 use crate::injection::Acting;
 use access::DictionaryAccess;
-use errors::{Errors, FAULTS, clear_history};
+use errors::{Errors, clear_history};
 use heartbeats::{Consumer, Producer};
 use nmt::{BOOT_NS, Nmt};
 use outbox::Outbox;
@@ -43,6 +45,12 @@ const STORM: EmergencyCode = EmergencyCode(0xFF00);
 pub(crate) struct DriveNode {
     id: NodeId,
     objects: Objects,
+    overlay: Overlay,
+    quirks: NodeQuirks,
+    /// The fault that the drive has once it has started (603Fh).
+    due_fault: Option<u16>,
+    /// When the drive restarts by itself, ns.
+    restarts_at_ns: Option<u64>,
     storage: Storage,
     axis: Axis,
     nmt: Nmt,
@@ -62,17 +70,33 @@ pub(crate) struct DriveNode {
 
 impl DriveNode {
     /// A drive that is switched on at `now_ns` with its axis at a position.
-    pub(crate) fn new(settings: &DriveSettings, encoder: Encoder, now_ns: u64, position_m: f64) -> Self {
-        let objects = settings.objects.clone();
+    ///
+    /// # Errors
+    /// The stored value that the drive does not take.
+    pub(crate) fn new(
+        settings: &DriveSettings,
+        encoder: Encoder,
+        now_ns: u64,
+        position_m: f64,
+    ) -> Result<Self, String> {
+        let DriveSettings { drive: config, step_s, stroke_m, .. } = *settings;
+        let Quirks { node: quirks, axis, overlay, .. } = &settings.quirks;
+        let axis = AxisSettings { config, quirks: *axis, step_s, stroke_m };
+        let mut objects = settings.objects.clone();
+        settings.memory.restore(&mut objects, overlay)?;
         // Staggered, so that the heartbeats of several nodes do not coincide.
         let heartbeat_ns = u64::from(objects.get(names::PRODUCER_HEARTBEAT_TIME_MS)) * MILLISECOND_NS;
         let stagger_ns = heartbeat_ns / 8 * u64::from(settings.node.get() % 8);
-        Self {
+        Ok(Self {
             id: settings.node,
-            storage: Storage::new(&objects),
-            axis: Axis::new(settings.drive, encoder, settings.step_s, position_m, &objects),
-            nmt: Nmt::booting(now_ns),
-            errors: Errors::default(),
+            storage: Storage::new(&settings.objects, &objects, quirks.save_ns),
+            axis: Axis::new(&axis, encoder, now_ns, position_m, &objects),
+            nmt: Nmt::booting(now_ns, quirks.boot_ups),
+            errors: Errors::new(quirks.fault),
+            quirks: *quirks,
+            due_fault: quirks.fault,
+            restarts_at_ns: quirks.restart_ns.map(|after_ns| now_ns + after_ns),
+            overlay: overlay.clone(),
             error_state: ErrorState::Active,
             producer: Producer::new(&objects, now_ns + BOOT_NS + stagger_ns),
             consumer: Consumer::new(&objects),
@@ -82,7 +106,7 @@ impl DriveNode {
             is_off: false,
             next_storm_ns: 0,
             objects,
-        }
+        })
     }
 
     /// State of the drive's power stage.
@@ -95,6 +119,12 @@ impl DriveNode {
     #[cfg(test)]
     pub(super) fn objects(&self) -> &Objects {
         &self.objects
+    }
+
+    /// What the drive keeps without supply, if that has changed since the last call.
+    pub(crate) fn changed_memory(&mut self) -> Option<DriveMemory> {
+        let has_changed = self.storage.take_changed();
+        has_changed.then(|| DriveMemory::of(self.storage.stored(), self.storage.factory()))
     }
 
     /// The next frame that the drive transmits.
@@ -140,12 +170,17 @@ impl DriveNode {
     /// A step of the servo loops: the force until the next one, N.
     pub(crate) fn step(&mut self, now_ns: u64, shaft: Shaft) -> f64 {
         self.follow_supply(now_ns);
+        if self.restarts_at_ns.take_if(|at_ns| now_ns >= *at_ns).is_some() {
+            self.reset_node(now_ns);
+        }
         if self.is_off {
             return self.axis.step(now_ns, shaft).0;
         }
         if self.nmt.boot(now_ns) {
             self.outbox.add(Heartbeat { state: NmtState::BootUp }.frame(self.id));
+            self.fail_at_power_on(now_ns);
         }
+        self.storage.finish(now_ns, &mut self.objects);
         if let Some(state) = self.nmt.state()
             && self.producer.is_due(now_ns)
         {
@@ -180,6 +215,16 @@ impl DriveNode {
             }
             (true, false) => self.reset_node(now_ns),
             _ => {}
+        }
+    }
+
+    /// Goes into the fault that is present when the drive has started.
+    fn fail_at_power_on(&mut self, now_ns: u64) {
+        if self.nmt.state().is_some()
+            && let Some(code) = self.due_fault.take()
+        {
+            self.axis.fail(now_ns);
+            self.raise(EmergencyCode(code));
         }
     }
 
@@ -264,13 +309,15 @@ impl DriveNode {
         self.consumer = Consumer::new(&self.objects);
         self.process_data = ProcessData::new(&self.objects);
         self.sdo = SdoServer::default();
-        self.nmt = Nmt::booting(now_ns);
+        self.nmt = Nmt::booting(now_ns, self.quirks.boot_ups);
     }
 
     /// The state after power-on: the brake closes, every object has its stored value, the node boots.
     fn reset_node(&mut self, now_ns: u64) {
+        self.storage.interrupt();
         self.objects = self.storage.stored().clone();
-        self.errors = Errors::default();
+        self.errors = Errors::new(self.quirks.fault);
+        self.due_fault = self.quirks.fault;
         self.axis.restart(now_ns, &self.objects);
         self.reset_communication(now_ns);
     }
@@ -374,7 +421,9 @@ impl DriveNode {
             objects: &mut self.objects,
             storage: &mut self.storage,
             axis: &self.axis,
+            overlay: &self.overlay,
             is_operational: self.nmt.is_operational(),
+            locks_pdos: self.quirks.locks_pdos && self.nmt.is_operational(),
             written: None,
         };
         let answer = self.sdo.answer(data, &mut access);
@@ -414,7 +463,7 @@ impl DriveNode {
         }
         let word = Controlword(self.objects.get(names::CONTROLWORD));
         if commands && self.axis.control(now_ns, word, &self.objects) {
-            for error in FAULTS {
+            for error in self.errors.faults() {
                 self.clear(error);
             }
         }

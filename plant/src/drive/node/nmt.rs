@@ -14,12 +14,14 @@ pub(super) struct Nmt {
     /// None while the node boots.
     state: Option<NmtState>,
     boot_at_ns: u64,
+    /// Boot-up messages left before the node has booted: a boot loader sends one of its own.
+    boot_ups: u8,
 }
 
 impl Nmt {
-    /// A node that begins to boot at `now_ns`.
-    pub(super) fn booting(now_ns: u64) -> Self {
-        Self { state: None, boot_at_ns: now_ns + BOOT_NS }
+    /// A node that begins to boot at `now_ns`, and sends so many boot-up messages.
+    pub(super) fn booting(now_ns: u64, boot_ups: u8) -> Self {
+        Self { state: None, boot_at_ns: now_ns + BOOT_NS, boot_ups }
     }
 
     /// The state; none while the node boots.
@@ -42,12 +44,14 @@ impl Nmt {
         matches!(self.state, Some(NmtState::Operational | NmtState::PreOperational))
     }
 
-    /// Ends the boot when it is time; returns whether the boot-up message is due.
+    /// Ends the boot when it is time; returns whether a boot-up message is due.
     pub(super) fn boot(&mut self, now_ns: u64) -> bool {
-        let is_booted = self.state.is_none() && now_ns >= self.boot_at_ns;
-        if is_booted {
-            self.state = Some(NmtState::PreOperational);
+        let is_due = self.state.is_none() && now_ns >= self.boot_at_ns;
+        if is_due {
+            self.boot_ups = self.boot_ups.saturating_sub(1);
+            self.boot_at_ns += BOOT_NS;
+            self.state = (self.boot_ups == 0).then_some(NmtState::PreOperational);
         }
-        is_booted
+        is_due
     }
 }

@@ -8,7 +8,7 @@ use masseter_can::canopen::{AbortCode, CobId, ObjectAddress};
 use super::heartbeats::consumed_node;
 use crate::drive::axis::{Axis, Homing, Mode};
 use crate::drive::dictionary::{
-    CONSUMED, DataType, ENTRIES, MAPPED_MAX, Mapping, MappingEntry, Objects, find, names,
+    CONSUMED, DataType, MAPPED_MAX, Mapping, MappingEntry, Objects, Overlay, names,
 };
 
 /// Signature of 1010h, "save".
@@ -32,6 +32,7 @@ pub(super) fn check(
     word: u32,
     objects: &Objects,
     axis: &Axis,
+    overlay: &Overlay,
     is_operational: bool,
 ) -> Result<(), AbortCode> {
     let ObjectAddress { index, subindex } = object;
@@ -49,10 +50,12 @@ pub(super) fn check(
             allow(!is_operational, AbortCode::DEVICE_STATE)
         }
         0x1400..0x1600 | 0x1800..0x1A00 => communication(object, word, objects),
-        0x1600..0x1800 | 0x1A00..0x1C00 => mapping(object, word, objects),
+        0x1600..0x1800 | 0x1A00..0x1C00 => mapping(object, word, objects, overlay),
         0x605A => allow(!matches!(word, 3 | 4), AbortCode::INVALID_VALUE),
         // 0 leaves the mode as it is.
-        0x6060 => allow(word as i8 == 0 || Mode::from_number(word as i8).is_some(), AbortCode::INVALID_VALUE),
+        0x6060 => {
+            allow(word as i8 == 0 || Mode::supported(word as i8, objects).is_some(), AbortCode::INVALID_VALUE)
+        }
         0x607D => {
             let (lowest, highest) = match subindex {
                 1 => (word as i32, objects.get(names::MAX_POSITION_LIMIT)),
@@ -115,14 +118,14 @@ fn communication(object: ObjectAddress, word: u32, objects: &Objects) -> Result<
 }
 
 /// The mapping changes only while the PDO does not exist, its entries only while it holds none.
-fn mapping(object: ObjectAddress, word: u32, objects: &Objects) -> Result<(), AbortCode> {
+fn mapping(object: ObjectAddress, word: u32, objects: &Objects, overlay: &Overlay) -> Result<(), AbortCode> {
     let ObjectAddress { index, subindex } = object;
     let exists = pdo_cob_id(index, objects).is_valid();
     let is_open = !exists && (subindex == 0 || objects.at(index, 0) == 0);
     allow(is_open, AbortCode::PARAMETER_INCOMPATIBLE)?;
     if subindex > 0 {
         let is_transmitted = index >= 0x1A00;
-        return if word == 0 { Ok(()) } else { mappable(MappingEntry(word), is_transmitted) };
+        return if word == 0 { Ok(()) } else { mappable(MappingEntry(word), is_transmitted, overlay) };
     }
     let has_gap = objects.mapping(index, word).any(|entry| entry.0 == 0);
     allow(!has_gap, AbortCode::PARAMETER_INCOMPATIBLE)?;
@@ -131,8 +134,8 @@ fn mapping(object: ObjectAddress, word: u32, objects: &Objects) -> Result<(), Ab
 }
 
 /// Whether an object may be mapped with that length.
-fn mappable(entry: MappingEntry, is_transmitted: bool) -> Result<(), AbortCode> {
-    let object = &ENTRIES[find(entry.object())?];
+fn mappable(entry: MappingEntry, is_transmitted: bool, overlay: &Overlay) -> Result<(), AbortCode> {
+    let (_, object) = overlay.find(entry.object())?;
     let is_allowed = match object.mapping {
         Mapping::Never => false,
         Mapping::Tpdo => is_transmitted,

@@ -6,7 +6,6 @@ use arrayvec::ArrayVec;
 use masseter_can::canopen::{AbortCode, ObjectAddress, SdoError, SdoRequest, SdoResponse, Segment};
 
 use super::access::{DictionaryAccess, Value};
-use crate::drive::dictionary::{ENTRIES, find};
 
 /// Silence of a client in the middle of a transfer that ends it, ns.
 const TIMEOUT_NS: u64 = 1_000_000_000;
@@ -78,7 +77,7 @@ impl SdoServer {
                 let written = access.write(object, data.data(), data.is_sized());
                 (object, written.map(|()| (SdoResponse::Download { object }, None)))
             }
-            SdoRequest::InitiateDownload { object, size } => (object, begin_download(now_ns, object, size)),
+            SdoRequest::InitiateDownload { object, size } => (object, begin_download(object, size, access)),
             SdoRequest::DownloadSegment { toggle, data, is_last } => {
                 let answer = continued(toggle).and_then(|transfer| download(transfer, data, is_last, access));
                 (running, answer.map(|transfer| (SdoResponse::DownloadSegment { toggle }, transfer)))
@@ -117,13 +116,13 @@ fn upload(mut transfer: Transfer, toggle: bool) -> Answer {
     Ok((SdoResponse::UploadSegment { toggle, data, is_last }, (!is_last).then_some(transfer)))
 }
 
-fn begin_download(now_ns: u64, object: ObjectAddress, size: Option<u32>) -> Answer {
-    ENTRIES[find(object)?].check_access()?;
+fn begin_download(object: ObjectAddress, size: Option<u32>, access: &DictionaryAccess<'_>) -> Answer {
+    access.overlay.find(object)?.1.check_access()?;
     if size.is_some_and(|size| size > WRITABLE_BYTES as u32) {
         return Err(AbortCode::TOO_LONG);
     }
     let progress = Progress::Download { received: ArrayVec::new(), announced: size };
-    let transfer = Transfer::begin(now_ns, object, progress);
+    let transfer = Transfer::begin(access.now_ns, object, progress);
     Ok((SdoResponse::Download { object }, Some(transfer)))
 }
 

@@ -1,11 +1,13 @@
 //! Scenarios of a single drive that moves a mass, driven by frames alone.
 
+mod commissioning;
 mod communication;
 mod cyclic;
 mod homing;
 mod modes;
 mod objects;
 mod process_data;
+mod quirks;
 mod sdo;
 
 use masseter_can::canopen::{
@@ -41,6 +43,8 @@ struct Bench {
     velocity_m_s: f64,
     force_n: f64,
     load_n: f64,
+    /// Hard stops of the axis.
+    stops_m: [f64; 2],
     sent: Vec<Frame>,
 }
 
@@ -48,9 +52,10 @@ fn id(number: u8) -> NodeId {
     NodeId::new(number).unwrap()
 }
 
-/// A leg's drive, with limits that leave it more room than the default.
-fn settings() -> DriveSettings {
-    let mut scenario = Scenario::default();
+/// A leg's drive, with limits that leave it more room than the default, and with the scenario's quirks.
+fn settings(quirks: &str) -> DriveSettings {
+    let mut scenario = Scenario::parse(std::path::Path::new("quirks.toml"), quirks).unwrap();
+    scenario.validate().unwrap();
     scenario.dynamics.step_ns = STEP_NS;
     scenario.mechanism.strokes.leg_m = LIMITS.map(|end| f64::from(end) * 1e-6);
     let [_, _, _, leg, ..] = DriveSettings::for_axes(&scenario).unwrap();
@@ -61,20 +66,30 @@ fn settings() -> DriveSettings {
 impl Bench {
     /// A drive that has booted.
     fn new() -> Self {
-        let settings = settings();
+        Self::with(&settings(""))
+    }
+
+    /// The same of a drive with those settings.
+    fn with(settings: &DriveSettings) -> Self {
+        let mut bench = Self::switched_on(settings);
+        bench.run_ms(25);
+        bench
+    }
+
+    /// A drive that has just been switched on.
+    fn switched_on(settings: &DriveSettings) -> Self {
         let increment_m = settings.drive.encoder_resolution_m;
         let position_m = f64::from(START) * increment_m;
-        let mut bench = Self {
-            drive: DriveNode::new(&settings, Encoder::new(increment_m, 0.0, 1, 0), 0, position_m),
+        Self {
+            drive: DriveNode::new(settings, Encoder::new(increment_m, 0.0, 1, 0), 0, position_m).unwrap(),
             now_ns: 0,
             position_m,
             velocity_m_s: 0.0,
             force_n: 0.0,
             load_n: LOAD_N,
+            stops_m: [f64::NEG_INFINITY, f64::INFINITY],
             sent: Vec::new(),
-        };
-        bench.run_ms(25);
-        bench
+        }
     }
 
     /// A drive that is operational.
@@ -103,7 +118,10 @@ impl Bench {
     fn run_ms(&mut self, ms: u64) {
         for _ in 0..ms * STEPS_PER_MS {
             let step_s = STEP_NS as f64 * 1e-9;
-            self.velocity_m_s += (self.force_n - self.load_n) / MASS_KG * step_s;
+            let [low_m, high_m] = self.stops_m;
+            let stopped_n = 1e6 * ((low_m - self.position_m).max(0.0) - (self.position_m - high_m).max(0.0));
+            let damped_n = if stopped_n == 0.0 { 0.0 } else { 1e3 * self.velocity_m_s };
+            self.velocity_m_s += (self.force_n - self.load_n + stopped_n - damped_n) / MASS_KG * step_s;
             self.position_m += self.velocity_m_s * step_s;
             self.now_ns += STEP_NS;
             self.force_n = self.drive.step(self.now_ns, Shaft::at(self.position_m));

@@ -24,7 +24,7 @@ fn what_may_not_be_written_is_aborted_with_the_reason() {
         ("interpolation faster than 1 µs", (0x60C2, 2), &[(-7_i8) as u8], AbortCode::TOO_LOW),
         ("profile velocity mode", MODE, &[3], AbortCode::INVALID_VALUE),
         ("quick stop at the current limit", (0x605A, 0), &[3, 0], AbortCode::INVALID_VALUE),
-        ("homing onto a switch", (0x6098, 0), &[17], AbortCode::INVALID_VALUE),
+        ("homing onto the home switch", (0x6098, 0), &[7], AbortCode::INVALID_VALUE),
         ("limits crossed", (0x607D, 1), &400_000_i32.to_le_bytes(), AbortCode::MAXIMUM_BELOW_MINIMUM),
         ("limits crossed", (0x607D, 2), &[0; 4], AbortCode::MAXIMUM_BELOW_MINIMUM),
         ("history set to other than 0", (0x1003, 0), &[1], AbortCode::INVALID_VALUE),

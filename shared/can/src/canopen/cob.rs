@@ -13,7 +13,8 @@ impl CobId {
     /// Bit 30 of the COB-ID of a TPDO: the TPDO answers no remote request.
     pub const NO_REMOTE_REQUEST: u32 = 1 << 30;
 
-    const NOT_VALID: u32 = 1 << 31;
+    /// Bit 31: the communication object does not exist.
+    pub const NOT_VALID: u32 = 1 << 31;
     const IS_EXTENDED: u32 = 1 << 29;
     const NUMBER: u32 = 0x1FFF_FFFF;
 

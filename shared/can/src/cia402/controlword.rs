@@ -1,6 +1,6 @@
 //! The controlword, object 6040, and the command in its bits.
 //!
-//! The bits of the modes of operation (4 to 6) and halt (8) can be read; their effect is not part of this module.
+//! The bits of the modes of operation (4 to 6) and halt (8) can be set and read; their effect is not part of this module.
 
 use super::{DriveState, StateCommand};
 
@@ -77,6 +77,24 @@ impl Controlword {
     /// Bit 8: the axis stops.
     pub const fn halts(self) -> bool {
         self.has(HALT)
+    }
+
+    /// The same with bit 4: a new set-point, or the start of homing.
+    #[must_use]
+    pub const fn with_start(self) -> Self {
+        Self(self.0 | MODE_START)
+    }
+
+    /// The same with bit 5: a new set-point takes effect at once.
+    #[must_use]
+    pub const fn with_immediate_change(self) -> Self {
+        Self(self.0 | CHANGE_IMMEDIATELY)
+    }
+
+    /// The same with bit 8: the axis stops.
+    #[must_use]
+    pub const fn with_halt(self) -> Self {
+        Self(self.0 | HALT)
     }
 
     const fn has(self, bit: u16) -> bool {

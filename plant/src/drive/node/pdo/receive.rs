@@ -54,6 +54,8 @@ impl Effects {
                 0x6040 => effects.commands = true,
                 0x6071 => effects.targets.torque = true,
                 0x607A => effects.targets.position = true,
+                // They take effect with the next target, so that an old target moves nothing.
+                0x60B0..=0x60B2 => {}
                 0x6000.. => effects.configures = true,
                 _ => {}
             }

@@ -11,7 +11,7 @@ use crate::drive::dictionary::Objects;
 const INHIBIT_UNIT_NS: u64 = MILLISECOND_NS / 10;
 /// Objects that change with every sample. As in most drives their change is no event, since noise alone would fill the
 /// bus; the event timer (1800h:5) sends them.
-const SAMPLED: [u16; 5] = [0x6062, 0x6064, 0x606C, 0x6077, 0x60F4];
+const SAMPLED: [u16; 6] = [0x6062, 0x6063, 0x6064, 0x606C, 0x6077, 0x60F4];
 
 /// The condition for sending a TPDO.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

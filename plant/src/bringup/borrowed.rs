@@ -1,0 +1,108 @@
+//! Objects of one drive that a step changes for its own duration.
+
+use masseter_can::canopen::ObjectAddress;
+use masseter_shared::config::{DriveProfile, ObjectKey, ObjectRule};
+
+use super::line::{Line, LineError};
+
+/// A changed object with its old value.
+#[derive(Debug, Clone, Copy)]
+struct Old {
+    object: ObjectAddress,
+    value: u32,
+    bytes: usize,
+}
+
+/// The changed objects of a drive, in the order of their changes.
+#[derive(Debug)]
+pub(super) struct Borrowed<'a> {
+    axis: usize,
+    profile: &'a DriveProfile,
+    old: Vec<Old>,
+}
+
+impl<'a> Borrowed<'a> {
+    /// Nothing is changed yet.
+    pub(super) const fn of_axis(axis: usize, profile: &'a DriveProfile) -> Self {
+        Self { axis, profile, old: Vec::new() }
+    }
+
+    /// Writes the lowest bytes of a value as the profile's rule allows, and keeps the old one.
+    pub(super) fn set(
+        &mut self,
+        line: &mut Line,
+        object: ObjectAddress,
+        value: u32,
+        bytes: usize,
+    ) -> Result<(), LineError> {
+        match self.profile.object(ObjectKey(object)).rule {
+            ObjectRule::Absent | ObjectRule::Expect => Ok(()),
+            ObjectRule::Optional => self.set_if_taken(line, object, value, bytes),
+            ObjectRule::Write => self.replace(line, object, value, bytes),
+        }
+    }
+
+    /// The same, unless the drive has no such object or refuses the value.
+    pub(super) fn set_if_taken(
+        &mut self,
+        line: &mut Line,
+        object: ObjectAddress,
+        value: u32,
+        bytes: usize,
+    ) -> Result<(), LineError> {
+        match self.replace(line, object, value, bytes) {
+            Err(error) if error.abort_code().is_none() => Err(error),
+            _ => Ok(()),
+        }
+    }
+
+    /// An equal value is not written: some objects are constant.
+    fn replace(
+        &mut self,
+        line: &mut Line,
+        object: ObjectAddress,
+        value: u32,
+        bytes: usize,
+    ) -> Result<(), LineError> {
+        let before = line.read_number(self.axis, object)?;
+        let mask = u32::MAX >> (32 - 8 * bytes);
+        if before & mask == value & mask {
+            return Ok(());
+        }
+        line.write(self.axis, object, value, bytes)?;
+        self.old.push(Old { object, value: before, bytes });
+        Ok(())
+    }
+
+    /// Sets the software limits (607Dh) to positions as 6064h shows them, in increments; never the lower one above the upper one.
+    pub(super) fn set_limits(&mut self, line: &mut Line, ends: [i32; 2]) -> Result<(), LineError> {
+        let offset = self.limit_offset(line);
+        let [lowest, highest] = ends.map(|end| end.saturating_sub(offset) as u32);
+        let [lower, upper] = [1, 2].map(|end| ObjectAddress::new(0x607D, end));
+        if lowest as i32 > line.read_number(self.axis, upper)? as i32 {
+            self.set(line, upper, highest, 4)?;
+            return self.set(line, lower, lowest, 4);
+        }
+        self.set(line, lower, lowest, 4)?;
+        self.set(line, upper, highest, 4)
+    }
+
+    /// What the drive adds to its software limits, increments: the position at home as the drive has it now.
+    fn limit_offset(&self, line: &mut Line) -> i32 {
+        let homing = self.profile.homing;
+        if !homing.limits_from_home {
+            return 0;
+        }
+        let home = line.read_number(self.axis, homing.home_object.0).unwrap_or(0) as i32;
+        home.saturating_mul(homing.home_sign.into())
+    }
+
+    /// Writes every old value back, the last change first. A failure does not keep the others from their old values.
+    pub(super) fn restore(&mut self, line: &mut Line) -> Result<(), LineError> {
+        let mut restored = Ok(());
+        while let Some(Old { object, value, bytes }) = self.old.pop() {
+            restored = restored.and(line.write(self.axis, object, value, bytes));
+        }
+        restored
+    }
+}

@@ -1,0 +1,192 @@
+//! Why a motion of the bring-up did not begin, or ended early.
+
+use masseter_can::canopen::EmergencyCode;
+use masseter_can::cia402::DriveState;
+use masseter_shared::geometry::AXIS_NAMES;
+
+use super::line::LineError;
+
+/// What stopped a motion.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum StopCause {
+    /// The person stopped it.
+    #[error("stopped on request")]
+    Requested,
+    /// The axis did not follow its demand.
+    #[error("following error beyond {:.3} mm; check motor, brake and gains", .window_m * 1e3)]
+    FollowingError {
+        /// The window (6065h), m.
+        window_m: f64,
+    },
+    /// The motor's force was too high.
+    #[error("force {force_n:.1} N above {limit_n:.1} N; check brake and guides, or allow more with --torque")]
+    Force {
+        /// The force, N.
+        force_n: f64,
+        /// What is allowed, N.
+        limit_n: f64,
+    },
+    /// A limit switch closed.
+    #[error("limit switch (60FDh = {bits:08X}h); move the axis the other way")]
+    LimitSwitch {
+        /// 60FDh.
+        bits: u32,
+    },
+    /// The axis moved against its target.
+    #[error("moved {:.4} mm against its target; check the phases of the motor and the sign of the encoder", .moved_m * 1e3)]
+    WrongDirection {
+        /// How far, m.
+        moved_m: f64,
+    },
+    /// The axis does not stand still with power on.
+    #[error("moved {:.3} mm with power on and no target; check brake and gains", .moved_m * 1e3)]
+    Restless {
+        /// How far within a second, m.
+        moved_m: f64,
+    },
+    /// Another axis moved, though it is braked.
+    #[error("{} moved {:.3} mm, though it is off; check its brake", AXIS_NAMES[*other], .moved_m * 1e3)]
+    OtherAxis {
+        /// The other axis.
+        other: usize,
+        /// How far, m.
+        moved_m: f64,
+    },
+    /// A drive sent an emergency.
+    #[error("{} sent emergency {:04X}h; see the drive's manual", AXIS_NAMES[*sender], .code.0)]
+    Emergency {
+        /// The axis of the drive.
+        sender: usize,
+        /// The code.
+        code: EmergencyCode,
+    },
+    /// The drive left "operation enabled".
+    #[error("the drive went to {state} (error code {error_code:04X}h); see the drive's manual")]
+    LeftOperation {
+        /// Where it went.
+        state: DriveState,
+        /// 603Fh.
+        error_code: u16,
+    },
+    /// The motion took too long.
+    #[error("not done within {:.1} s; check whether the drive takes set-points, or its unit of velocity", .limit_s)]
+    TimedOut {
+        /// What was allowed, s.
+        limit_s: f64,
+    },
+    /// The drive could not home.
+    #[error("homing failed (statusword bit 13); check method, switches and index")]
+    Homing,
+}
+
+/// Why a motion did not begin, or ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum MotionError {
+    /// The line failed.
+    #[error(transparent)]
+    Line(#[from] LineError),
+    /// The axis was stopped and switched off.
+    #[error("{}: {cause}; the axis is off", AXIS_NAMES[*axis])]
+    Stopped {
+        /// The axis.
+        axis: usize,
+        /// Why.
+        cause: StopCause,
+    },
+    /// A drive has power that this step did not give.
+    #[error("{}: {state} already; end the program that controls it, and switch the drive off", AXIS_NAMES[*axis])]
+    Powered {
+        /// The axis.
+        axis: usize,
+        /// The state of its drive.
+        state: DriveState,
+    },
+    /// The drive does not go to "operation enabled".
+    #[error("{}: stays in {state} (error code {error_code:04X}h); check safe torque off, supply and faults", AXIS_NAMES[*axis])]
+    NotEnabled {
+        /// The axis.
+        axis: usize,
+        /// The state of its drive.
+        state: DriveState,
+        /// 603Fh.
+        error_code: u16,
+    },
+    /// The drive does not take a mode of operation.
+    #[error("{}: mode {wanted} was asked for, 6061h shows {found}; check 6502h", AXIS_NAMES[*axis])]
+    Mode {
+        /// The axis.
+        axis: usize,
+        /// The mode.
+        wanted: i8,
+        /// 6061h.
+        found: i8,
+    },
+    /// A statusword of no state.
+    #[error("{}: {source}", AXIS_NAMES[*axis])]
+    Statusword {
+        /// The axis.
+        axis: usize,
+        /// The statusword.
+        source: masseter_can::cia402::StatuswordError,
+    },
+    /// The drive did not confirm that it is off.
+    #[error("{}: NOT PROVED OFF ({reason}); press the emergency stop", AXIS_NAMES[*axis])]
+    StaysOn {
+        /// The axis.
+        axis: usize,
+        /// What is known.
+        reason: String,
+    },
+    /// A way that is not for this step.
+    #[error("{}: {:.3} mm is no way for a jog; give up to {:.0} mm, at least ten increments", AXIS_NAMES[*axis], .by_m * 1e3, .most_m * 1e3)]
+    Way {
+        /// The axis.
+        axis: usize,
+        /// The way, m.
+        by_m: f64,
+        /// The longest, m.
+        most_m: f64,
+    },
+    /// An incremental encoder whose home has no position.
+    #[error("{}: enter drive_profile.homing.home_position_m: what d or l is at the home position", AXIS_NAMES[*axis])]
+    NoHomePosition {
+        /// The axis.
+        axis: usize,
+    },
+    /// 6064h at home is not what the profile says.
+    #[error(
+        "{}: 6064h shows {:.3} mm at home, the profile says {:.3} mm; check drive_profile.homing.home_sign, home_object and reversed",
+        AXIS_NAMES[*axis], .found_m * 1e3, .expected_m * 1e3
+    )]
+    HomePosition {
+        /// The axis.
+        axis: usize,
+        /// What 6064h shows, m.
+        found_m: f64,
+        /// What the profile says, m.
+        expected_m: f64,
+    },
+    /// A second homing found another place.
+    #[error("{}: a second homing is {:.3} mm beside the first, allowed are {:.3} mm (drive_profile.homing.tolerance_m)", AXIS_NAMES[*axis], .spread_m * 1e3, .tolerance_m * 1e3)]
+    Spread {
+        /// The axis.
+        axis: usize,
+        /// The distance, m.
+        spread_m: f64,
+        /// What is allowed, m.
+        tolerance_m: f64,
+    },
+    /// An absolute encoder shows a position beyond the stroke.
+    #[error(
+        "{}: 6064h shows {:.3} mm, the stroke is {:.1} to {:.1} mm; check the stored home, drive_profile.reversed and encoder_resolution_m",
+        AXIS_NAMES[*axis], .found_m * 1e3, .stroke_m[0] * 1e3, .stroke_m[1] * 1e3
+    )]
+    BeyondStroke {
+        /// The axis.
+        axis: usize,
+        /// What 6064h shows, m.
+        found_m: f64,
+        /// The stroke, m.
+        stroke_m: [f64; 2],
+    },
+}

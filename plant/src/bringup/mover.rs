@@ -1,0 +1,300 @@
+//! One axis with power, under watch: prepared, switched on, moved to a position, and stopped whatever happens.
+
+use masseter_can::canopen::{NmtCommand, ObjectAddress};
+use masseter_can::cia402::{Controlword, StatusBit};
+use masseter_shared::clock::SECOND_NS;
+use masseter_shared::config::{AxisScale, DriveProfile, MASTER_NODE, Scenario};
+use masseter_shared::geometry::AXES;
+
+use super::borrowed::Borrowed;
+use super::caution::{Caution, Operator, Wish};
+use super::line::{Line, LineError};
+use super::motion_error::{MotionError, StopCause};
+use super::switching::{self, seconds};
+use super::watch::{Bounds, Sample, Watch, read_position};
+
+/// Profile position and homing (6060h).
+pub(super) const POSITIONING: i8 = 1;
+pub(super) const HOMING: i8 = 6;
+/// How long an axis must stand with power on, and within which time it must, ns.
+const STILL_NS: u64 = SECOND_NS;
+const RESTLESS_NS: u64 = 5 * SECOND_NS;
+/// The motor may use this share of its force limit (6072h): at the limit it no longer follows.
+const USABLE: f64 = 0.9;
+/// An axis moves against its target if it does so by this many times its noise, and by more than this many increments.
+const NOISES: f64 = 3.0;
+const INCREMENTS: f64 = 3.0;
+
+/// One axis to be moved.
+#[derive(Debug)]
+pub(super) struct Mover<'a> {
+    line: &'a mut Line,
+    scenario: &'a Scenario,
+    axis: usize,
+    caution: Caution,
+    borrowed: Borrowed<'a>,
+    watch: Watch,
+    /// Half of the range of 6064h while the axis stood, m.
+    noise_m: f64,
+}
+
+impl<'a> Mover<'a> {
+    /// Prepares a drive without power: pre-operational, the watched heartbeat, reduced limits.
+    pub(super) fn prepare(
+        line: &'a mut Line,
+        scenario: &'a Scenario,
+        axis: usize,
+        caution: Caution,
+    ) -> Result<Self, MotionError> {
+        line.command(axis, NmtCommand::EnterPreOperational)?;
+        let following_m = scenario.drives.of_axis(axis).following_error_m;
+        let bounds = Bounds {
+            force_n: USABLE * caution.force_n,
+            window_m: following_m.min(2.0 * caution.still_m + caution.speed_m_s * 0.05),
+            still_m: caution.still_m,
+        };
+        let scales = std::array::from_fn::<_, AXES, _>(|axis| scenario.scale(axis));
+        let watch = Watch::begin(line, axis, scales, bounds)?;
+        let mut mover = Self {
+            line,
+            scenario,
+            axis,
+            caution,
+            borrowed: Borrowed::of_axis(axis, scenario.profile(axis)),
+            watch,
+            noise_m: 0.0,
+        };
+        match mover.configure() {
+            Ok(()) => Ok(mover),
+            Err(error) => {
+                let _ = mover.borrowed.restore(mover.line);
+                Err(error.into())
+            }
+        }
+    }
+
+    fn configure(&mut self) -> Result<(), LineError> {
+        let (can, scale) = (&self.scenario.can, self.scale());
+        let Caution { speed_m_s, acceleration_m_s2, force_n, .. } = self.caution;
+        // The drive stops when this program dies: it watches the heartbeat, and a lost one is a quick stop.
+        self.line.beat_every(can.heartbeat_producer_ms);
+        let consumed = u32::from(MASTER_NODE.get()) << 16 | u32::from(can.heartbeat_consumer_ms);
+        let acceleration = scale.acceleration(acceleration_m_s2);
+        let permille = (force_n / scale.permille_n.abs()).round() as u32;
+        for (index, subindex, value, bytes) in [
+            (0x1016, 1, consumed, 4),
+            (0x6007, 0, 3, 2),
+            (0x605A, 0, 2, 2),
+            (0x6065, 0, scale.window(self.watch.bounds().window_m), 4),
+            (0x6072, 0, permille, 2),
+            (0x6081, 0, scale.velocity(speed_m_s), 4),
+            (0x6083, 0, acceleration, 4),
+            (0x6084, 0, acceleration, 4),
+        ] {
+            self.borrow(index, subindex, value, bytes)?;
+        }
+        // A following error is a fault at once, and a fault closes the brake at once: the feedback may be what is wrong, and
+        // then a ramp only drives the axis further. Not every drive takes these values.
+        for index in [0x6066, 0x605E] {
+            self.borrowed.set_if_taken(self.line, ObjectAddress::new(index, 0), 0, 2)?;
+        }
+        Ok(())
+    }
+
+    /// Changes an object until the end.
+    pub(super) fn borrow(
+        &mut self,
+        index: u16,
+        subindex: u8,
+        value: u32,
+        bytes: usize,
+    ) -> Result<(), LineError> {
+        self.borrowed.set(self.line, ObjectAddress::new(index, subindex), value, bytes)
+    }
+
+    /// Sets the software limits (607Dh) until the end, in increments of 6064h.
+    pub(super) fn borrow_limits(&mut self, ends: [i32; 2]) -> Result<(), LineError> {
+        self.borrowed.set_limits(self.line, ends)
+    }
+
+    /// The line, for questions beside the motion.
+    pub(super) fn line(&mut self) -> &mut Line {
+        self.line
+    }
+
+    /// The watch over the motion.
+    pub(super) fn watch(&mut self) -> &mut Watch {
+        &mut self.watch
+    }
+
+    /// Scales of the axis.
+    pub(super) fn scale(&self) -> AxisScale {
+        self.scenario.scale(self.axis)
+    }
+
+    /// The profile of the drive.
+    pub(super) fn profile(&self) -> &'a DriveProfile {
+        self.scenario.profile(self.axis)
+    }
+
+    /// How carefully the axis is moved.
+    pub(super) fn caution(&self) -> Caution {
+        self.caution
+    }
+
+    /// Noise of 6064h: half of its range while the axis stood, m.
+    pub(super) fn noise_m(&self) -> f64 {
+        self.noise_m
+    }
+
+    /// Where the axis is, m.
+    pub(super) fn position_m(&mut self) -> Result<f64, LineError> {
+        read_position(self.line, self.axis, &self.scenario.scale(self.axis))
+    }
+
+    /// One look at the axis.
+    pub(super) fn look(&mut self) -> Result<Sample, MotionError> {
+        self.watch.look(self.line)
+    }
+
+    /// Sends a controlword.
+    pub(super) fn control(&mut self, word: Controlword) -> Result<(), LineError> {
+        self.line.control(self.axis, word)
+    }
+
+    /// Ends the motion for that reason.
+    pub(super) fn stopped<T>(&self, cause: StopCause) -> Result<T, MotionError> {
+        Err(MotionError::Stopped { axis: self.axis, cause })
+    }
+
+    /// Switches on in a mode, with the place of the axis as its target, and waits until brake and axis are ready.
+    pub(super) fn switch_on(&mut self, mode: i8, operator: &mut Operator<'_>) -> Result<(), MotionError> {
+        self.borrow(0x6060, 0, mode as u32, 1)?;
+        switching::wait_for_mode(self.line, self.axis, mode)?;
+        let here = self.line.read_number(self.axis, ObjectAddress::new(0x6064, 0))?;
+        self.line.write(self.axis, ObjectAddress::new(0x607A, 0), here, 4)?;
+        switching::switch_on(self.line, self.axis)?;
+        let opened_ns = self.line.now_ns() + seconds(self.profile().brake.open_s);
+        while self.line.now_ns() < opened_ns {
+            self.look()?;
+        }
+        self.wait_until_still(operator)
+    }
+
+    /// Goes on only once the axis has stood for a second.
+    fn wait_until_still(&mut self, operator: &mut Operator<'_>) -> Result<(), MotionError> {
+        let restless_ns = self.line.now_ns() + RESTLESS_NS;
+        let mut since_ns = self.line.now_ns();
+        let mut range_m = [f64::INFINITY, f64::NEG_INFINITY];
+        loop {
+            let Sample { at_ns, position_m, .. } = self.look()?;
+            if operator(at_ns) == Wish::Stop {
+                return self.stopped(StopCause::Requested);
+            }
+            range_m = [range_m[0].min(position_m), range_m[1].max(position_m)];
+            let moved_m = range_m[1] - range_m[0];
+            if moved_m > self.caution.still_m {
+                if at_ns >= restless_ns {
+                    return self.stopped(StopCause::Restless { moved_m });
+                }
+                (since_ns, range_m) = (at_ns, [position_m; 2]);
+            } else if at_ns - since_ns >= STILL_NS {
+                self.noise_m = moved_m / 2.0;
+                return Ok(());
+            }
+        }
+    }
+
+    /// Moves to a position in profile position; returns everything that was seen, from the set-point on.
+    pub(super) fn move_to(
+        &mut self,
+        target: i32,
+        operator: &mut Operator<'_>,
+    ) -> Result<Vec<Sample>, MotionError> {
+        let scale = self.scale();
+        let (start_m, target_m) = (self.position_m()?, scale.metres(target));
+        let backwards_m = (NOISES * self.noise_m).max(INCREMENTS * scale.increment_m.abs());
+        let Caution { speed_m_s, acceleration_m_s2, still_m, .. } = self.caution;
+        let limit_s = 1.5 * ((target_m - start_m).abs() / speed_m_s + speed_m_s / acceleration_m_s2) + 1.0;
+        let word = Controlword::ENABLE_OPERATION;
+        while operator(self.line.now_ns()) == Wish::Halt {
+            self.look()?;
+        }
+        self.line.write(self.axis, ObjectAddress::new(0x607A, 0), target as u32, 4)?;
+        self.line.control(self.axis, word)?;
+        self.line.control(self.axis, word.with_start().with_immediate_change())?;
+        let mut until_ns = self.line.now_ns() + seconds(limit_s);
+        let (mut seen, mut is_taken, mut halted_ns) = (vec![], false, None);
+        loop {
+            let sample = self.look()?;
+            seen.push(sample);
+            let moved_m = (start_m - sample.position_m) * (target_m - start_m).signum();
+            if moved_m > backwards_m {
+                return self.stopped(StopCause::WrongDirection { moved_m });
+            }
+            match (operator(sample.at_ns), halted_ns) {
+                (Wish::Stop, _) => return self.stopped(StopCause::Requested),
+                (Wish::Halt, None) => {
+                    self.line.control(self.axis, word.with_halt())?;
+                    halted_ns = Some(sample.at_ns);
+                }
+                (Wish::Move, Some(since_ns)) => {
+                    self.line.control(self.axis, word)?;
+                    until_ns += sample.at_ns - since_ns;
+                    halted_ns = None;
+                }
+                _ => {}
+            }
+            if !is_taken && sample.status.has(StatusBit::SETPOINT_ACKNOWLEDGED) {
+                is_taken = true;
+                self.line.control(self.axis, if halted_ns.is_some() { word.with_halt() } else { word })?;
+            }
+            let is_there = (sample.position_m - target_m).abs() <= still_m;
+            if is_taken && is_there && sample.status.has(StatusBit::TargetReached) {
+                return Ok(seen);
+            }
+            if halted_ns.is_none() && sample.at_ns >= until_ns {
+                return self.stopped(StopCause::TimedOut { limit_s });
+            }
+        }
+    }
+
+    /// Looks for that long, at an axis that stands.
+    pub(super) fn dwell(
+        &mut self,
+        for_ns: u64,
+        operator: &mut Operator<'_>,
+    ) -> Result<Vec<Sample>, MotionError> {
+        let until_ns = self.line.now_ns() + for_ns;
+        let mut seen = Vec::new();
+        while self.line.now_ns() < until_ns {
+            let sample = self.look()?;
+            seen.push(sample);
+            if operator(sample.at_ns) == Wish::Stop {
+                return self.stopped(StopCause::Requested);
+            }
+        }
+        Ok(seen)
+    }
+
+    /// Switches off an axis that stands; returns how far it moved meanwhile, m.
+    pub(super) fn switch_off(&mut self) -> Result<f64, MotionError> {
+        switching::switch_off(self.line, self.axis, &self.scenario.scale(self.axis), &self.profile().brake)
+    }
+
+    /// Ends: stops and switches off after a failure, and writes the old values back in any case.
+    ///
+    /// # Errors
+    /// That of the motion, unless the drive is not proved off.
+    pub(super) fn finish<T>(mut self, done: Result<T, MotionError>) -> Result<T, MotionError> {
+        let stopped = match &done {
+            Ok(_) => Ok(()),
+            Err(_) => switching::stop(self.line, self.axis, &self.profile().brake),
+        };
+        let restored = self.borrowed.restore(self.line);
+        stopped?;
+        let done = done?;
+        restored?;
+        Ok(done)
+    }
+}

@@ -1,0 +1,116 @@
+//! Switching one drive on and off, with the times of its brake.
+
+use masseter_can::canopen::ObjectAddress;
+use masseter_can::cia402::{Controlword, DriveState};
+use masseter_shared::clock::{MILLISECOND_NS, SECOND_NS};
+use masseter_shared::config::{AxisScale, BrakeConfig};
+
+use super::line::Line;
+use super::motion_error::MotionError;
+use super::watch::{read_error_code, read_position, read_state};
+
+/// How long a drive may take from one state to the next, ns.
+const TRANSITION_NS: u64 = SECOND_NS;
+/// How long a halt may take before the quick stop comes, ns.
+const HALT_NS: u64 = 100 * MILLISECOND_NS;
+
+/// Switches a drive on, up to "operation enabled". The brake is opening then: the axis may not move yet.
+pub(super) fn switch_on(line: &mut Line, axis: usize) -> Result<(), MotionError> {
+    for (word, wanted) in [
+        (Controlword::SHUTDOWN, DriveState::ReadyToSwitchOn),
+        (Controlword::SWITCH_ON, DriveState::SwitchedOn),
+        (Controlword::ENABLE_OPERATION, DriveState::OperationEnabled),
+    ] {
+        line.control(axis, word)?;
+        let state = wait_for(line, axis, TRANSITION_NS, |state| state == wanted)?;
+        if state != wanted {
+            let error_code = read_error_code(line, axis);
+            return Err(MotionError::NotEnabled { axis, state, error_code });
+        }
+    }
+    Ok(())
+}
+
+/// Switches off an axis that stands: "disable operation" closes the brake, and the voltage goes once the brake holds. Returns
+/// how far the axis moved meanwhile, m.
+pub(super) fn switch_off(
+    line: &mut Line,
+    axis: usize,
+    scale: &AxisScale,
+    brake: &BrakeConfig,
+) -> Result<f64, MotionError> {
+    let before_m = read_position(line, axis, scale)?;
+    line.control(axis, Controlword::SWITCH_ON)?;
+    line.listen(seconds(brake.close_s))?;
+    disable_voltage(line, axis)?;
+    Ok(read_position(line, axis, scale)? - before_m)
+}
+
+/// Stops an axis in whatever it does: halt, quick stop, voltage off. Every command is sent, whatever became of the one before.
+///
+/// # Errors
+/// [`MotionError::StaysOn`] unless the statusword proves that the drive is off.
+pub(super) fn stop(line: &mut Line, axis: usize, brake: &BrakeConfig) -> Result<(), MotionError> {
+    let is_enabled = !matches!(read_state(line, axis), Ok(state) if state != DriveState::OperationEnabled);
+    if is_enabled {
+        let halted = line.control(axis, Controlword::ENABLE_OPERATION.with_halt());
+        let waited = halted.and_then(|()| line.listen(HALT_NS));
+        let braked = line.control(axis, Controlword::QUICK_STOP);
+        // The drive may stay in the quick stop (605Ah = 5 or 6): the voltage goes after the same time.
+        let _ = (waited, braked);
+        let _ = wait_for(line, axis, TRANSITION_NS, |state| !state.is_powered());
+    }
+    disable_voltage(line, axis)?;
+    Ok(line.listen(seconds(brake.close_s))?)
+}
+
+fn disable_voltage(line: &mut Line, axis: usize) -> Result<(), MotionError> {
+    let sent = line.control(axis, Controlword::DISABLE_VOLTAGE);
+    let reason = match wait_for(line, axis, TRANSITION_NS, |state| !state.is_powered()) {
+        Ok(state) if !state.is_powered() => {
+            line.note_off(axis);
+            return Ok(());
+        }
+        Ok(state) => format!("it shows {state}"),
+        Err(error) => error.to_string(),
+    };
+    let reason = sent.err().map_or(reason, |error| error.to_string());
+    Err(MotionError::StaysOn { axis, reason })
+}
+
+/// Waits until a drive shows a mode of operation (6061h).
+pub(super) fn wait_for_mode(line: &mut Line, axis: usize, wanted: i8) -> Result<(), MotionError> {
+    let until_ns = line.now_ns() + TRANSITION_NS;
+    loop {
+        let found = line.read_number(axis, ObjectAddress::new(0x6061, 0))? as i8;
+        if found == wanted {
+            return Ok(());
+        }
+        if line.now_ns() >= until_ns {
+            return Err(MotionError::Mode { axis, wanted, found });
+        }
+        line.listen(MILLISECOND_NS)?;
+    }
+}
+
+/// The state that a drive has when the condition holds, or at the end of the time.
+fn wait_for(
+    line: &mut Line,
+    axis: usize,
+    within_ns: u64,
+    holds: impl Fn(DriveState) -> bool,
+) -> Result<DriveState, MotionError> {
+    let until_ns = line.now_ns() + within_ns;
+    loop {
+        let state = read_state(line, axis)?;
+        if holds(state) || line.now_ns() >= until_ns {
+            return Ok(state);
+        }
+        line.listen(MILLISECOND_NS)?;
+    }
+}
+
+/// Seconds in ns.
+pub(super) fn seconds(time_s: f64) -> u64 {
+    (time_s * SECOND_NS as f64) as u64
+}

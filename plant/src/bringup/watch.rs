@@ -1,0 +1,163 @@
+//! The watch over a motion: one look reads the moved axis and one of the others, and says what must stop the motion.
+
+use masseter_can::canopen::{EmergencyCode, ObjectAddress};
+use masseter_can::cia402::{DriveState, StatusBit, Statusword};
+use masseter_shared::config::AxisScale;
+use masseter_shared::geometry::AXES;
+
+use super::line::{Line, LineError};
+use super::motion_error::{MotionError, StopCause};
+
+/// Digital inputs (60FDh): negative and positive limit switch.
+const LIMIT_SWITCHES: u32 = 0b11;
+
+/// What is allowed while one axis moves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Bounds {
+    /// Force of the motor, N.
+    pub(super) force_n: f64,
+    /// The following error window, m.
+    pub(super) window_m: f64,
+    /// Motion of an axis that shall stand, m.
+    pub(super) still_m: f64,
+}
+
+/// The moved axis at one look.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// When, ns.
+    pub at_ns: u64,
+    /// 6064h, m.
+    pub position_m: f64,
+    /// 6077h, N.
+    pub force_n: f64,
+    /// 6041h.
+    pub status: Statusword,
+}
+
+/// The watch.
+#[derive(Debug)]
+pub(super) struct Watch {
+    axis: usize,
+    scales: [AxisScale; AXES],
+    bounds: Bounds,
+    /// Where every axis stood at the beginning, m.
+    began_m: [f64; AXES],
+    /// Emergencies heard before.
+    emergencies: [usize; AXES],
+    /// 60FDh at the beginning; none in a drive without that object.
+    switches: Option<u32>,
+    /// The other axis that is looked at next.
+    next: usize,
+}
+
+/// 6041h.
+pub(super) fn read_status(line: &mut Line, axis: usize) -> Result<Statusword, LineError> {
+    Ok(Statusword(line.read_number(axis, ObjectAddress::new(0x6041, 0))? as u16))
+}
+
+/// The state in 6041h.
+pub(super) fn read_state(line: &mut Line, axis: usize) -> Result<DriveState, MotionError> {
+    read_status(line, axis)?.state().map_err(|source| MotionError::Statusword { axis, source })
+}
+
+/// 6064h, m.
+pub(super) fn read_position(line: &mut Line, axis: usize, scale: &AxisScale) -> Result<f64, LineError> {
+    Ok(scale.metres(line.read_number(axis, ObjectAddress::new(0x6064, 0))? as i32))
+}
+
+/// 603Fh, or 0 in a drive that does not tell it.
+pub(super) fn read_error_code(line: &mut Line, axis: usize) -> u16 {
+    line.read_number(axis, ObjectAddress::new(0x603F, 0)).unwrap_or(0) as u16
+}
+
+impl Watch {
+    /// Begins; refuses if a drive has power.
+    pub(super) fn begin(
+        line: &mut Line,
+        axis: usize,
+        scales: [AxisScale; AXES],
+        bounds: Bounds,
+    ) -> Result<Self, MotionError> {
+        let mut began_m = [0.0; AXES];
+        for (axis, began_m) in began_m.iter_mut().enumerate() {
+            let state = read_state(line, axis)?;
+            if state.is_powered() {
+                return Err(MotionError::Powered { axis, state });
+            }
+            *began_m = read_position(line, axis, &scales[axis])?;
+        }
+        let switches = line.read_number(axis, ObjectAddress::new(0x60FD, 0)).ok();
+        let emergencies = std::array::from_fn(|axis| line.heard(axis).emergencies.len());
+        Ok(Self { axis, scales, bounds, began_m, emergencies, switches, next: 0 })
+    }
+
+    /// What is allowed.
+    pub(super) fn bounds(&self) -> Bounds {
+        self.bounds
+    }
+
+    /// The limit switches count no more: homing looks for them.
+    pub(super) fn ignore_switches(&mut self) {
+        self.switches = None;
+    }
+
+    /// Looks once. The position comes before the statusword: a statusword without "homed" proves an old position.
+    ///
+    /// # Errors
+    /// [`MotionError::Stopped`] for what must stop the motion.
+    pub(super) fn look(&mut self, line: &mut Line) -> Result<Sample, MotionError> {
+        let (axis, scale) = (self.axis, self.scales[self.axis]);
+        let at_ns = line.now_ns();
+        let position_m = read_position(line, axis, &scale)?;
+        let status = read_status(line, axis)?;
+        let permille = line.read_number(axis, ObjectAddress::new(0x6077, 0))? as i16;
+        let sample = Sample { at_ns, position_m, force_n: f64::from(permille) * scale.permille_n, status };
+        let cause = match self.judge(line, &sample)? {
+            Some(cause) => Some(cause),
+            None => self.look_at_switches(line)?.or(self.look_at_another(line)?),
+        };
+        cause.map_or(Ok(sample), |cause| Err(MotionError::Stopped { axis, cause }))
+    }
+
+    fn judge(&self, line: &mut Line, sample: &Sample) -> Result<Option<StopCause>, MotionError> {
+        let (axis, Bounds { force_n: limit_n, window_m, .. }) = (self.axis, self.bounds);
+        let Sample { status, force_n, .. } = *sample;
+        // In homing the same bit is a homing error, which the caller judges.
+        let state = status.state().map_err(|source| MotionError::Statusword { axis, source })?;
+        let fails = state != DriveState::OperationEnabled;
+        if fails && status.has(StatusBit::FollowingError) {
+            return Ok(Some(StopCause::FollowingError { window_m }));
+        }
+        for (sender, &before) in self.emergencies.iter().enumerate() {
+            let new = line.heard(sender).emergencies[before..].iter().find(|emergency| !emergency.is_reset());
+            if let Some(emergency) = new {
+                let is_following = sender == axis && emergency.code == EmergencyCode::FOLLOWING_ERROR;
+                let emergency = StopCause::Emergency { sender, code: emergency.code };
+                let following = StopCause::FollowingError { window_m };
+                return Ok(Some(if is_following { following } else { emergency }));
+            }
+        }
+        if fails {
+            return Ok(Some(StopCause::LeftOperation { state, error_code: read_error_code(line, axis) }));
+        }
+        Ok((force_n.abs() > limit_n).then_some(StopCause::Force { force_n, limit_n }))
+    }
+
+    /// A switch that was closed at the beginning may be left.
+    fn look_at_switches(&self, line: &mut Line) -> Result<Option<StopCause>, MotionError> {
+        let Some(before) = self.switches else { return Ok(None) };
+        let bits = line.read_number(self.axis, ObjectAddress::new(0x60FD, 0))?;
+        Ok((bits & !before & LIMIT_SWITCHES != 0).then_some(StopCause::LimitSwitch { bits }))
+    }
+
+    fn look_at_another(&mut self, line: &mut Line) -> Result<Option<StopCause>, MotionError> {
+        let other = self.next;
+        self.next = (other + 1) % AXES;
+        if other == self.axis {
+            return Ok(None);
+        }
+        let moved_m = read_position(line, other, &self.scales[other])? - self.began_m[other];
+        Ok((moved_m.abs() > self.bounds.still_m).then_some(StopCause::OtherAxis { other, moved_m }))
+    }
+}

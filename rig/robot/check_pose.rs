@@ -1,0 +1,204 @@
+//! `masseter robot check-pose`: whether the six positions tell the closed pose.
+
+use anyhow::{Context, anyhow, bail};
+use clap::Args;
+use masseter_controller::kinematics::Solutions;
+use masseter_controller::trajectory::{closed_pose, jaw_points};
+use masseter_plant::bringup::{Stand, stand};
+use masseter_shared::clock::MILLISECOND_NS;
+use masseter_shared::config::Scenario;
+use masseter_shared::geometry::{AXES, AXIS_NAMES, Actuators, Jacobian, Joints, Mechanism, Pose, Vec3};
+use masseter_shared::messages::pose_fields;
+use masseter_terminal::{Exit, Failure, OrFailure, result_line};
+use serde_json::{Value, json};
+
+use super::args::RobotArgs;
+use super::lengths::parse_length;
+use super::session::Session;
+use super::step::Step;
+
+/// How long the axes must stand, ns, and how far they may move meanwhile, m.
+const STAND_NS: u64 = 200 * MILLISECOND_NS;
+const STILL_M: f64 = 1e-4;
+/// By how much an axis is assumed to be wrong, m.
+const WRONG_M: f64 = 1e-3;
+
+/// The arguments of `robot check-pose`.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = "Example:\n  masseter robot check-pose --tolerance 0.5mm --angle 0.5")]
+pub(crate) struct CheckPoseArgs {
+    #[command(flatten)]
+    robot: RobotArgs,
+    /// How far incisal point and condyles may be from the closed pose
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length, default_value = "0.5mm")]
+    tolerance: f64,
+    /// How far the platform may be turned from the closed pose, degrees
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.5)]
+    angle: f64,
+    /// Go on without the evidence of the earlier steps
+    #[arg(long)]
+    out_of_order: bool,
+}
+
+/// What six positions tell.
+struct Found {
+    pose: Pose,
+    condition: f64,
+    /// Distances of incisal point, right and left condyle from the closed pose, m.
+    apart_m: [f64; 3],
+    /// Angle to the closed pose, degrees.
+    turned_deg: f64,
+    /// By how much each axis differs from the closed pose, m.
+    differs_m: [f64; AXES],
+    /// What each axis would move the three points by, if it were wrong by [`WRONG_M`], m; none without a pose there.
+    wrong_m: [Option<[f64; 3]>; AXES],
+}
+
+/// Reads, computes, prints, and keeps the pose. Nothing is moved.
+pub(crate) fn check_pose(args: &CheckPoseArgs) -> Result<Exit, Failure> {
+    let axes: Vec<usize> = (0..AXES).collect();
+    let earlier = |_| (!args.out_of_order).then_some(Step::Home);
+    let mut session = Session::begin(&args.robot, Step::CheckPose, &axes, earlier)?;
+    let stand = match stand(&mut session.line, &session.scenario, STAND_NS) {
+        Ok(stand) => stand,
+        Err(error) => return Err(session.fail(error)),
+    };
+    let found = at_rest(&stand).and_then(|()| Found::new(&session.scenario, stand.positions_m));
+    let judged = found.and_then(|found| {
+        found.print(&stand)?;
+        let data = found.data(&stand);
+        Ok((found.judge(args, &session.scenario), data))
+    });
+    match judged {
+        Ok((Ok(()), data)) => session.finish(true, &data).map(|()| Exit::Passed),
+        Ok((Err(error), data)) => {
+            session.finish(false, &data)?;
+            Err(Failure::with(Exit::Failed, error))
+        }
+        Err(error) => {
+            session
+                .finish(false, &json!({ "error": error.to_string(), "positions_m": stand.positions_m }))?;
+            Err(error).map_err(|error| Failure::with(Exit::Failed, error))
+        }
+    }
+}
+
+fn at_rest(stand: &Stand) -> anyhow::Result<()> {
+    for (name, moved_m) in AXIS_NAMES.iter().zip(stand.moved_m) {
+        if moved_m.abs() > STILL_M {
+            bail!("{name}: moved {:.3} mm; check its brake, and hold the robot still", moved_m * 1e3);
+        }
+    }
+    Ok(())
+}
+
+/// The only true pose of six positions.
+fn pose_of(mechanism: &Mechanism, actuators: &Actuators) -> anyhow::Result<(Pose, Joints)> {
+    let solutions = Solutions::new(mechanism, actuators)?;
+    let true_ones: Vec<_> = solutions.true_ones().collect();
+    match true_ones[..] {
+        [only] => Ok((only.pose, Joints { actuators: *actuators, theta_rad: only.theta_rad })),
+        [] => {
+            Err(anyhow!("the six positions fit no pose; check home, reversed and resolution of every axis"))
+        }
+        _ => Err(anyhow!(
+            "the six positions fit {} poses; check home, reversed and resolution of every axis",
+            true_ones.len()
+        )),
+    }
+}
+
+fn distances_m(points: &[Vec3; 3], a: &Pose, b: &Pose) -> [f64; 3] {
+    points.map(|point| (a.transform_point(&point.into()) - b.transform_point(&point.into())).norm())
+}
+
+impl Found {
+    fn new(scenario: &Scenario, positions_m: [f64; AXES]) -> anyhow::Result<Self> {
+        let mechanism = Mechanism::new(&scenario.mechanism)?;
+        let closed = closed_pose(&scenario.jaw, &mechanism)?;
+        let points = jaw_points(&scenario.jaw, &closed)?;
+        let closed_m = mechanism.inverse(&closed)?.actuators.to_axes();
+        let (pose, joints) = pose_of(&mechanism, &Actuators::from_axes(positions_m))
+            .with_context(|| format!("positions {}", in_mm(&positions_m)))?;
+        let wrong = |axis: usize| {
+            let mut wrong_m = positions_m;
+            wrong_m[axis] += WRONG_M;
+            let (moved, _) = pose_of(&mechanism, &Actuators::from_axes(wrong_m)).ok()?;
+            Some(distances_m(&points, &moved, &pose))
+        };
+        Ok(Self {
+            pose,
+            condition: Jacobian::new(&mechanism, &pose, &joints).condition(),
+            apart_m: distances_m(&points, &pose, &closed),
+            turned_deg: pose.rotation.angle_to(&closed.rotation).to_degrees(),
+            differs_m: std::array::from_fn(|axis| positions_m[axis] - closed_m[axis]),
+            wrong_m: std::array::from_fn(wrong),
+        })
+    }
+
+    fn judge(&self, args: &CheckPoseArgs, scenario: &Scenario) -> anyhow::Result<()> {
+        let furthest_m = self.apart_m.into_iter().fold(0.0, f64::max);
+        let most = scenario.limits.max_condition;
+        if furthest_m > args.tolerance || self.turned_deg > args.angle {
+            let worst =
+                (0..AXES).max_by(|&a, &b| self.differs_m[a].abs().total_cmp(&self.differs_m[b].abs()));
+            let worst = worst.unwrap_or_default();
+            bail!(
+                "the pose is {:.3} mm and {:.3}° from the closed pose, allowed are {:.3} mm and {:.3}°; {} differs most, by \
+                 {:.3} mm: home it again, or bring the jaw to the closed pose (jaw.closed_leg_m)",
+                furthest_m * 1e3,
+                self.turned_deg,
+                args.tolerance * 1e3,
+                args.angle,
+                AXIS_NAMES[worst],
+                self.differs_m[worst] * 1e3
+            );
+        }
+        if self.condition > most {
+            bail!("the condition number is {:.2}, allowed is {most} (limits.max_condition)", self.condition);
+        }
+        Ok(())
+    }
+
+    fn print(&self, stand: &Stand) -> anyhow::Result<()> {
+        let (position_m, quaternion) = pose_fields(&self.pose);
+        result_line!("platform at {} mm, quaternion {quaternion:.6?}", in_mm(&position_m))?;
+        result_line!(
+            "from the closed pose: incisal point, right and left condyle {} mm, turned {:.3}°; condition number {:.2}",
+            in_mm(&self.apart_m),
+            self.turned_deg,
+            self.condition
+        )?;
+        result_line!("axis  6064h, mm  from closed, mm  1 mm wrong moves the three points by, mm  drive")?;
+        for axis in 0..AXES {
+            let wrong = self.wrong_m[axis].map_or_else(|| "no pose".to_owned(), |wrong_m| in_mm(&wrong_m));
+            result_line!(
+                "{:<4} {:>10.4} {:>16.4}  {wrong:<42} {}",
+                AXIS_NAMES[axis],
+                stand.positions_m[axis] * 1e3,
+                self.differs_m[axis] * 1e3,
+                stand.states[axis]
+            )?;
+        }
+        Ok(())
+    }
+
+    fn data(&self, stand: &Stand) -> Value {
+        let (position_m, quaternion) = pose_fields(&self.pose);
+        json!({
+            "positions_m": stand.positions_m,
+            "position_m": position_m,
+            "quaternion": quaternion,
+            "points_from_closed_m": self.apart_m,
+            "turned_deg": self.turned_deg,
+            "condition": self.condition,
+            "axes_from_closed_m": self.differs_m,
+            "axis_wrong_by_1mm_moves_points_m": self.wrong_m,
+        })
+    }
+}
+
+fn in_mm(lengths_m: &[f64]) -> String {
+    let each: Vec<_> = lengths_m.iter().map(|length_m| format!("{:.4}", length_m * 1e3)).collect();
+    each.join(" ")
+}

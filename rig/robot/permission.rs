@@ -1,0 +1,44 @@
+//! Whether `masseter run` may move a real robot: only with a passed pose check of the same drives and profiles.
+
+use std::io;
+use std::path::Path;
+
+use anyhow::{Context, ensure};
+use masseter_plant::bringup::Line;
+use masseter_shared::config::Scenario;
+use masseter_shared::geometry::AXES;
+use masseter_terminal::status;
+
+use super::evidence::Basis;
+use super::past::Past;
+use super::session::serials;
+use super::step::Step;
+
+/// Where the evidence is.
+const FOLDER: &str = "bringup";
+
+/// Refuses a run on real interfaces without a passed check-pose. The files are read before anything is sent; then the drives
+/// tell their serial numbers.
+pub(crate) fn check_bring_up(scenario: &Scenario, is_waived: bool) -> anyhow::Result<()> {
+    if scenario.can.is_virtual() {
+        return Ok(());
+    }
+    if is_waived {
+        status!(
+            "WITHOUT BRING-UP: signs, scales and zeros are not proved, and a wrong one can drive an axis into its end"
+        );
+        return Ok(());
+    }
+    let refused = "a run needs a passed pose check of this robot; --without-bring-up goes on without, and then a wrong \
+                   sign, scale or zero can drive an axis into its end";
+    let past = Past::read(Path::new(FOLDER))?;
+    let axes: [usize; AXES] = std::array::from_fn(|axis| axis);
+    let unknown = Basis::new(scenario, [None; AXES])?;
+    past.require(Step::CheckPose, &axes, &unknown).context(refused)?;
+    let found = serials(&mut Line::open(scenario, Box::new(io::sink()))?);
+    ensure!(
+        found.iter().all(Option::is_some),
+        "a drive does not tell its serial number (1018h:04); check power and wiring, or use --without-bring-up"
+    );
+    past.require(Step::CheckPose, &axes, &Basis { serials: found, ..unknown }).context(refused)
+}

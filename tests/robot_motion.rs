@@ -1,0 +1,94 @@
+//! The verbs of `robot` that move axes, on emulated drives.
+
+mod common;
+
+use common::{Workspace, masseter, stderr, stdout};
+use serde_json::Value;
+
+/// A rig whose jaw is closed, as check-pose wants it.
+const CLOSED: &str = "[dynamics]\ninitial_leg_m = 0.2974\n";
+
+/// A verb of `robot` in an empty folder without earlier steps: exit code, standard output, standard error, result.
+fn robot(scenario: &str, arguments: &[&str]) -> (Option<i32>, String, String, Value) {
+    let workspace = Workspace::new(scenario);
+    let (file, evidence) = (workspace.file("scenario.toml"), workspace.file("bringup"));
+    let more = ["--out-of-order", "--folder", evidence.to_str().unwrap(), file.to_str().unwrap()];
+    let output = masseter(&[&["robot"], arguments, &more].concat());
+    let folders = std::fs::read_dir(evidence).unwrap();
+    let folder = folders.last().unwrap().unwrap().path();
+    assert!(folder.join("candump.log").exists());
+    let result = std::fs::read_to_string(folder.join("result.json")).unwrap();
+    (output.status.code(), stdout(&output), stderr(&output), serde_json::from_str(&result).unwrap())
+}
+
+#[test]
+fn a_jog_passes_with_a_right_reading_of_a_gauge_alone() {
+    for (measured, code, passed, text) in [
+        (None, 0, false, "not passed yet"),
+        (Some("1.01mm"), 0, true, "/bringup/01-jog-l1"),
+        (Some("0.97mm"), 1, false, "multiply encoder_resolution_m"),
+        (Some("-1mm"), 1, false, "drive_profile.reversed"),
+    ] {
+        let more = measured.map_or(vec![], |measured| vec!["--measured", measured]);
+        let (found, out, err, result) =
+            robot("", &[&["jog", "--axis", "l1", "--by", "1mm"], &more[..]].concat());
+        assert_eq!((found, &result["passed"]), (Some(code), &Value::Bool(passed)), "{out}{err}");
+        assert!(out.contains("friction") && err.contains(text), "{out}{err}");
+        assert!((result["result"]["moved_m"].as_f64().unwrap() - 1e-3).abs() < 1e-5, "{result}");
+    }
+}
+
+#[test]
+fn a_jog_that_is_stopped_ends_with_5_and_is_no_evidence() {
+    let jammed = "[[faults]]\nkind = 'drive_fault'\naxis = 'l1'\nfrom_s = 2.2\n";
+    let (code, _, err, result) = robot(jammed, &["jog", "--axis", "l1", "--by", "5mm"]);
+    assert_eq!(code, Some(5), "{err}");
+    assert!(err.contains("l1: l1 sent emergency 5112h") && err.contains("the axis is off"), "{err}");
+    assert_eq!(result["passed"], false);
+}
+
+#[test]
+fn nothing_moves_without_a_held_key() {
+    let (code, out, err, result) = robot("", &["jog", "--axis", "d1", "--by=-1mm", "--hold"]);
+    assert_eq!(code, Some(130), "{out}{err}");
+    assert!(err.contains("stopped on request") && !out.contains("moved"), "{out}{err}");
+    assert_eq!(result["passed"], false);
+}
+
+#[test]
+fn absolute_axes_are_compared_and_incremental_ones_home_twice() {
+    let (code, out, err, _) = robot("", &["home"]);
+    assert_eq!((code, out.lines().count()), (Some(0), 6), "{out}{err}");
+    assert!(out.starts_with("l1: 290.000") && out.contains("the encoder keeps its position"), "{out}");
+    let index = "[[drive_profile]]\naxes = ['l1']\n\
+                 homing = { method = 33, absolute = false, home_position_m = 0.288 }\n";
+    let (code, out, err, result) = robot(index, &["home", "--axis", "l1"]);
+    assert_eq!(code, Some(0), "{out}{err}");
+    assert!(result["result"][0]["spread_m"].as_f64().unwrap() < 5e-5, "{result}");
+}
+
+#[test]
+fn the_closed_pose_passes_and_another_one_is_explained_by_axis() {
+    let (code, out, err, result) = robot(CLOSED, &["check-pose"]);
+    assert_eq!((code, &result["passed"]), (Some(0), &Value::Bool(true)), "{out}{err}");
+    assert!(out.contains("condition number") && out.lines().count() == 9, "{out}");
+    // A slipped coupling.
+    let slipped =
+        format!("{CLOSED}[[faults]]\nkind = 'encoder_offset'\naxis = 'd2'\nsize = 0.002\nfrom_s = 0.0\n");
+    let (code, out, err, result) = robot(&slipped, &["check-pose"]);
+    assert_eq!((code, &result["passed"]), (Some(1), &Value::Bool(false)), "{out}{err}");
+    assert!(err.contains("d2 differs most, by 2.0"), "{out}{err}");
+}
+
+#[test]
+fn a_step_needs_the_earlier_one_and_a_length_its_unit() {
+    let workspace = Workspace::new("");
+    let evidence = workspace.file("bringup");
+    let jog = ["robot", "jog", "--axis", "l1", "--folder", evidence.to_str().unwrap(), "--by"];
+    let output = masseter(&[&jog[..], &["1mm"]].concat());
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+    assert!(stderr(&output).contains("l1: configure not done"), "{}", stderr(&output));
+    assert!(!evidence.exists(), "a refused step makes no folder");
+    let output = masseter(&[&jog[..], &["1"]].concat());
+    assert!(stderr(&output).contains("such as 1mm"), "{}", stderr(&output));
+}
