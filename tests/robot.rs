@@ -64,7 +64,8 @@ fn inspection_sends_uploads_and_nothing_else() {
 
 #[test]
 fn every_deviation_of_every_drive_is_in_one_table() {
-    let workspace = Workspace::new("[[drive_profile]]\nkind = 'epos4'\nunits.lead_m = 0.003\naxes = ['l1', 'l2']");
+    let workspace =
+        Workspace::new("[[drive_profile]]\nkind = 'epos4'\nunits.lead_m = 0.003\naxes = ['l1', 'l2']");
     let output = robot(&workspace, &["inspect"]);
     let text = stdout(&output);
     assert_eq!(output.status.code(), Some(1), "{text}{}", stderr(&output));
@@ -80,7 +81,10 @@ fn every_deviation_of_every_drive_is_in_one_table() {
     assert_eq!(refused.status.code(), Some(2), "{}", stdout(&refused));
     assert!(stderr(&refused).contains("run 'masseter robot inspect' first"), "{}", stderr(&refused));
     let (_, log) = log(&workspace, "02-configure");
-    assert!(frames(&log).all(|(id, data)| !id.starts_with('6') || !data.starts_with('2')), "nothing is written");
+    assert!(
+        frames(&log).all(|(id, data)| !id.starts_with('6') || !data.starts_with('2')),
+        "nothing is written"
+    );
 }
 
 /// Whatever differs is written, read back, stored and proved; the steps need each other in order.
@@ -92,7 +96,11 @@ fn configuration_needs_the_inspection_and_leaves_evidence() {
     assert!(stderr(&early).contains("inspect not done"), "{}", stderr(&early));
     let inspected = robot(&workspace, &["inspect"]);
     assert_eq!(inspected.status.code(), Some(0), "{}", stdout(&inspected));
-    assert!(stdout(&inspected).contains("passed: configure would mend 7 deviations"), "{}", stdout(&inspected));
+    assert!(
+        stdout(&inspected).contains("passed: configure would mend 7 deviations"),
+        "{}",
+        stdout(&inspected)
+    );
     let configured = robot(&workspace, &["configure", "--store"]);
     let text = stdout(&configured);
     assert_eq!(configured.status.code(), Some(0), "{text}{}", stderr(&configured));

@@ -63,7 +63,9 @@ pub(crate) fn check_pose(args: &CheckPoseArgs) -> Result<Exit, Failure> {
         Ok(stand) => stand,
         Err(error) => return Err(session.fail(error)),
     };
-    let found = at_rest(&stand).and_then(|()| Found::new(&session.scenario, stand.positions_m));
+    let found = at_rest(&stand)
+        .and_then(|()| within_strokes(&session.scenario, &stand.positions_m))
+        .and_then(|()| Found::new(&session.scenario, stand.positions_m));
     let judged = found.and_then(|found| {
         found.print(&stand)?;
         let data = found.data(&stand);
@@ -87,6 +89,24 @@ fn at_rest(stand: &Stand) -> anyhow::Result<()> {
     for (name, moved_m) in AXIS_NAMES.iter().zip(stand.moved_m) {
         if moved_m.abs() > STILL_M {
             bail!("{name}: moved {:.3} mm; check its brake, and hold the robot still", moved_m * 1e3);
+        }
+    }
+    Ok(())
+}
+
+/// Positions outside of the strokes are no positions of this robot: most often an encoder that lost its zero.
+fn within_strokes(scenario: &Scenario, positions_m: &[f64; AXES]) -> anyhow::Result<()> {
+    for (axis, &position_m) in positions_m.iter().enumerate() {
+        let [low_m, high_m] = scenario.mechanism.strokes.of_axis(axis);
+        if !(low_m - STILL_M..=high_m + STILL_M).contains(&position_m) {
+            bail!(
+                "{}: 6064h shows {:.3} mm, the stroke is {:.1} to {:.1} mm; home it again: an incremental encoder loses its \
+                 zero without power",
+                AXIS_NAMES[axis],
+                position_m * 1e3,
+                low_m * 1e3,
+                high_m * 1e3
+            );
         }
     }
     Ok(())

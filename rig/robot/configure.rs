@@ -75,7 +75,10 @@ pub(crate) fn configure(args: &WriteArgs) -> Result<Exit, Failure> {
 fn refused(robot: &RobotLine, surveys: &[Option<Survey>; AXES]) -> Vec<(usize, Deviation)> {
     let of_drive = |(axis, survey): (usize, &Option<Survey>)| {
         let deviations = survey.as_ref().map(|survey| robot.deviations(axis, survey)).unwrap_or_default();
-        deviations.into_iter().filter(|deviation| deviation.outcome == Outcome::Refused).map(move |one| (axis, one))
+        deviations
+            .into_iter()
+            .filter(|deviation| deviation.outcome == Outcome::Refused)
+            .map(move |one| (axis, one))
     };
     surveys.iter().enumerate().flat_map(of_drive).collect()
 }

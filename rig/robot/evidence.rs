@@ -107,6 +107,11 @@ impl StepFolder {
         Ok(begun)
     }
 
+    /// Where the step leaves its evidence.
+    pub(crate) fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
     /// The log of the buses, for a line.
     ///
     /// # Errors
