@@ -123,6 +123,11 @@ impl StepFolder {
         self.folder.keep(&self.folder.file(name), text)
     }
 
+    /// The folder itself.
+    pub(crate) fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
     /// What this step's result depends on, with serial numbers as far as they are noted.
     pub(crate) fn basis(&self) -> Basis {
         let Evidence { profile_hash, serials, .. } = self.evidence.clone();

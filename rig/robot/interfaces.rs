@@ -36,7 +36,9 @@ fn judge(name: &str, details: InterfaceDetails, wanted_bps: u32) -> InterfaceRes
         faults.push(format!("{name} is {state}; check bit rate, termination and wiring"));
     }
     if restart_ms == Some(0) && bitrate_bps.is_some() {
-        doubts.push(format!("{name} has restart-ms 0: it stays off for good after bus-off; set restart-ms 100"));
+        doubts.push(format!(
+            "{name} has restart-ms 0: it stays off for good after bus-off; set restart-ms 100"
+        ));
     }
     if let Some([sent, received]) = errors.filter(|errors| *errors != [0, 0]) {
         doubts.push(format!("{name} counts {sent} errors while sending and {received} while receiving"));

@@ -149,7 +149,8 @@ mod tests {
         let parent = folder.path().join("bringup");
         let basis = Basis::new(&Scenario::default(), [1, 2, 3, 4, 5, 6].map(Some)).unwrap();
         let check = |basis: &Basis| refusal(&parent, Step::Inspect, &ALL, basis);
-        let error = Past::read(&parent).unwrap().require(Step::Inspect, &[3], &basis).unwrap_err().to_string();
+        let error =
+            Past::read(&parent).unwrap().require(Step::Inspect, &[3], &basis).unwrap_err().to_string();
         assert!(error.starts_with("l1: inspect not done (evidence in"), "{error}");
         assert!(error.ends_with("run 'masseter robot inspect' first"), "{error}");
         take(&parent, Step::Inspect, &ALL, Some(true));

@@ -74,7 +74,9 @@ impl RobotLine {
     /// What to do about a drive that does not answer.
     pub(crate) fn silence(&self, axis: usize) -> String {
         let node = self.scenario.can.node_ids[axis];
-        format!("node {node} does not answer; check its power, wiring, bit rate and node id (inspect --scan finds others)")
+        format!(
+            "node {node} does not answer; check its power, wiring, bit rate and node id (inspect --scan finds others)"
+        )
     }
 
     /// Refuses to go on where somebody else may control the drives.

@@ -69,7 +69,8 @@ fn read(args: &StatusArgs) -> anyhow::Result<(Past, Basis, Vec<Link>)> {
     let past = Past::read(&args.robot.folder)?;
     let newest_serial = |axis: usize| past.steps().rev().find_map(|(_, evidence)| evidence.serials[axis]);
     let basis = Basis::new(&args.robot.scenario()?, std::array::from_fn(newest_serial))?;
-    let links = Step::chain().into_iter().map(|step| Link { step, state: state(&past, &basis, step) }).collect();
+    let links =
+        Step::chain().into_iter().map(|step| Link { step, state: state(&past, &basis, step) }).collect();
     Ok((past, basis, links))
 }
 
@@ -96,7 +97,11 @@ fn state(past: &Past, basis: &Basis, step: Step) -> Result<String, String> {
             format!("{}: {lack}", names.join(" "))
         }
     };
-    if lacks.is_empty() { Ok(newest) } else { Err(lacks.iter().map(with_axes).collect::<Vec<_>>().join("; ")) }
+    if lacks.is_empty() {
+        Ok(newest)
+    } else {
+        Err(lacks.iter().map(with_axes).collect::<Vec<_>>().join("; "))
+    }
 }
 
 fn next(links: &[Link]) -> Option<String> {

@@ -38,12 +38,10 @@ pub(crate) fn table(deviations: &[(usize, Deviation)]) -> String {
     }
     let head = HEAD.map(str::to_owned);
     let all = || [&head].into_iter().chain(&cells);
-    let widths: [usize; 6] = std::array::from_fn(|column| {
-        all().map(|row| row[column].chars().count()).max().unwrap_or_default()
-    });
+    let widths: [usize; 6] =
+        std::array::from_fn(|column| all().map(|row| row[column].chars().count()).max().unwrap_or_default());
     let line = |row: &[String; 6]| {
-        let padded: Vec<_> =
-            row.iter().zip(widths).map(|(cell, width)| format!("{cell:<width$}")).collect();
+        let padded: Vec<_> = row.iter().zip(widths).map(|(cell, width)| format!("{cell:<width$}")).collect();
         padded.join("  ").trim_end().to_owned() + "\n"
     };
     all().map(line).collect()

@@ -109,8 +109,7 @@ fn check(
         .filter(|difference| difference.rule != masseter_shared::config::ObjectRule::Optional)
         .map(|difference| difference.object.to_string())
         .collect();
-    Ok((!wrong.is_empty())
-        .then(|| format!("{}: {} differ {when}", AXIS_NAMES[axis], wrong.join(", "))))
+    Ok((!wrong.is_empty()).then(|| format!("{}: {} differ {when}", AXIS_NAMES[axis], wrong.join(", "))))
 }
 
 /// Prints and keeps the result.

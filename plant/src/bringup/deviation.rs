@@ -157,8 +157,7 @@ fn of_units(survey: &Survey, profile: &DriveProfile) -> Vec<Deviation> {
         let values = [units.gear_ratio.to_string(), format!("{motor}/{shaft}")];
         let remedy = "compare with the gear: a wrong ratio scales every motion";
         let object = ObjectAddress::new(0x6091, 1);
-        (!is_right)
-            .then(|| new(object, values, Outcome::Doubtful, remedy, "drive_profile.units.gear_ratio"))
+        (!is_right).then(|| new(object, values, Outcome::Doubtful, remedy, "drive_profile.units.gear_ratio"))
     };
     declared.into_iter().filter_map(of_code).chain(of_gear()).collect()
 }

@@ -126,7 +126,8 @@ impl Settings {
                 PdoLayout { transmission, inhibit: timer, event: timer, mapping: pdo.mapping.to_vec() };
             PdoSetting { communication: pdo.communication, cob_id: pdo.cob_id, layout: Some(layout) }
         });
-        let others = OTHER_PDOS.map(|communication| PdoSetting { communication, cob_id: NO_PDO, layout: None });
+        let others =
+            OTHER_PDOS.map(|communication| PdoSetting { communication, cob_id: NO_PDO, layout: None });
         let home = Some(wanted.home).filter(|home| home.rule != ObjectRule::Absent);
         let objects = home.iter().chain(&wanted.objects).map(|wanted| Setting {
             object: ObjectKey(wanted.object),

@@ -58,7 +58,8 @@ impl InterfaceDetails {
         sendto(&socket, &request, SendFlags::empty(), &SocketAddrNetlink::new(0, 0))?;
         let mut answer = [0; 1 << 15];
         let (length, _) = recv(&socket, &mut answer[..], RecvFlags::empty())?;
-        Self::parse(&answer[..length]).ok_or_else(|| io::Error::other("the kernel's answer describes no link"))
+        Self::parse(&answer[..length])
+            .ok_or_else(|| io::Error::other("the kernel's answer describes no link"))
     }
 
     /// None for another message than the description of a link.
@@ -113,7 +114,8 @@ mod tests {
 
     #[test]
     fn the_settings_of_a_controller_are_found_among_other_attributes() {
-        let timing: Vec<u8> = [500_000u32, 875, 1, 2, 3, 4, 5, 6].iter().flat_map(|n| n.to_ne_bytes()).collect();
+        let timing: Vec<u8> =
+            [500_000u32, 875, 1, 2, 3, 4, 5, 6].iter().flat_map(|n| n.to_ne_bytes()).collect();
         let data = [
             attribute(BIT_TIMING, &timing),
             attribute(3, &[1, 2, 3]),
