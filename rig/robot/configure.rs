@@ -10,7 +10,7 @@ use masseter_shared::wording::counted;
 use masseter_terminal::{Exit, Failure, OrFailure, result};
 
 use super::args::{RobotArgs, parse_axis};
-use super::evidence::StepFolder;
+use super::evidence::{Basis, StepFolder};
 use super::past::Past;
 use super::robot_line::{RobotLine, failed, serials};
 use super::step::Step;
@@ -44,6 +44,8 @@ impl WriteArgs {
 pub(crate) fn configure(args: &WriteArgs) -> Result<Exit, Failure> {
     let scenario = args.robot.scenario().usage()?;
     let (axes, past) = (args.axes(), Past::read(&args.robot.folder).usage()?);
+    // A refused step makes no folder: it would replace the evidence of the same step from before.
+    past.require(Step::Inspect, &axes, &Basis::new(&scenario, [None; AXES]).usage()?).usage()?;
     let mut folder = StepFolder::begin(&args.robot.folder, Step::Configure, &axes, &scenario).usage()?;
     let mut robot = RobotLine::open(scenario, folder.log().usage()?).usage()?;
     let surveys = robot.surveys(&axes).map_err(failed)?;

@@ -107,11 +107,6 @@ impl StepFolder {
         Ok(begun)
     }
 
-    /// Where the step leaves its evidence.
-    pub(crate) fn path(&self) -> &Path {
-        self.folder.path()
-    }
-
     /// The log of the buses, for a line.
     ///
     /// # Errors
@@ -126,6 +121,11 @@ impl StepFolder {
     /// When it cannot be written.
     pub(crate) fn keep(&self, name: &str, text: &str) -> io::Result<()> {
         self.folder.keep(&self.folder.file(name), text)
+    }
+
+    /// The folder itself.
+    pub(crate) fn path(&self) -> &Path {
+        self.folder.path()
     }
 
     /// What this step's result depends on, with serial numbers as far as they are noted.
