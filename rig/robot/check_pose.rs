@@ -170,11 +170,10 @@ impl Found {
             self.condition
         )?;
         result_line!("axis  6064h, mm  from closed, mm  1 mm wrong moves the three points by, mm  drive")?;
-        for axis in 0..AXES {
+        for (axis, name) in AXIS_NAMES.iter().enumerate() {
             let wrong = self.wrong_m[axis].map_or_else(|| "no pose".to_owned(), |wrong_m| in_mm(&wrong_m));
             result_line!(
-                "{:<4} {:>10.4} {:>16.4}  {wrong:<42} {}",
-                AXIS_NAMES[axis],
+                "{name:<4} {:>10.4} {:>16.4}  {wrong:<42} {}",
                 stand.positions_m[axis] * 1e3,
                 self.differs_m[axis] * 1e3,
                 stand.states[axis]
