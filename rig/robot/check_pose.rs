@@ -9,7 +9,7 @@ use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{AXES, AXIS_NAMES, Actuators, Jacobian, Joints, Mechanism, Pose, Vec3};
 use masseter_shared::messages::pose_fields;
-use masseter_terminal::{Exit, Failure, OrFailure, result_line};
+use masseter_terminal::{Exit, Failure, result_line};
 use serde_json::{Value, json};
 
 use super::args::RobotArgs;
@@ -80,7 +80,7 @@ pub(crate) fn check_pose(args: &CheckPoseArgs) -> Result<Exit, Failure> {
         Err(error) => {
             session
                 .finish(false, &json!({ "error": error.to_string(), "positions_m": stand.positions_m }))?;
-            Err(error).map_err(|error| Failure::with(Exit::Failed, error))
+            Err(Failure::with(Exit::Failed, error))
         }
     }
 }
@@ -190,11 +190,10 @@ impl Found {
             self.condition
         )?;
         result_line!("axis  6064h, mm  from closed, mm  1 mm wrong moves the three points by, mm  drive")?;
-        for axis in 0..AXES {
+        for (axis, name) in AXIS_NAMES.iter().enumerate() {
             let wrong = self.wrong_m[axis].map_or_else(|| "no pose".to_owned(), |wrong_m| in_mm(&wrong_m));
             result_line!(
-                "{:<4} {:>10.4} {:>16.4}  {wrong:<42} {}",
-                AXIS_NAMES[axis],
+                "{name:<4} {:>10.4} {:>16.4}  {wrong:<42} {}",
                 stand.positions_m[axis] * 1e3,
                 self.differs_m[axis] * 1e3,
                 stand.states[axis]
@@ -219,6 +218,8 @@ impl Found {
 }
 
 fn in_mm(lengths_m: &[f64]) -> String {
-    let each: Vec<_> = lengths_m.iter().map(|length_m| format!("{:.4}", length_m * 1e3)).collect();
+    // A rounded −0 is 0.
+    let rounded = |length_m: &f64| (length_m * 1e7).round() / 1e4 + 0.0;
+    let each: Vec<_> = lengths_m.iter().map(|length_m| format!("{:.4}", rounded(length_m))).collect();
     each.join(" ")
 }
