@@ -15,6 +15,7 @@ pub mod process;
 mod safety;
 mod sequence;
 mod sequencer;
+mod start;
 pub mod trajectory;
 
 pub use safety::Fault;

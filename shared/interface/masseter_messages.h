@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define MASSETER_LAYOUT_VERSION 10u
+#define MASSETER_LAYOUT_VERSION 11u
 /* masseter_event.axis when no axis is concerned. */
 #define MASSETER_NO_AXIS 4294967295u
 /* masseter_reading.drive_state of a drive not heard of yet, or lost. */
@@ -137,7 +137,7 @@ enum masseter_cause {
     MASSETER_CAUSE_DUPLICATE_NODE = 30,
     /* A node booted without a request. */
     MASSETER_CAUSE_NODE_RESTARTED = 31,
-    /* A drive is in fault and a fault reset does not help (EMCY code, object 603F). */
+    /* A drive is in fault and a fault reset does not help (EMCY code, object 603F; the limit is the statusword). */
     MASSETER_CAUSE_FAULT_AT_START = 32,
     /* A node left the NMT state operational by itself (reported NMT state; the limit is the code of operational). */
     MASSETER_CAUSE_NODE_STOPPED = 33,
@@ -177,6 +177,18 @@ enum masseter_cause {
     MASSETER_CAUSE_STIMULUS_BEGAN = 51,
     /* A stimulus of the scenario is over (number in its list, from 1). */
     MASSETER_CAUSE_STIMULUS_ENDED = 52,
+    /* A drive is in fault at the start, and no reset is allowed (EMCY code, object 603F; the limit is the statusword). */
+    MASSETER_CAUSE_FAULT_FOUND = 53,
+    /* A fault found at the start was reset (EMCY code, object 603F; the limit is the statusword). */
+    MASSETER_CAUSE_FAULT_RESET = 54,
+    /* The drives wait for one that is not ready to switch on (statusword; the limit is its EMCY code). */
+    MASSETER_CAUSE_WAITS_FOR_DRIVE = 55,
+    /* A drive did not become ready to switch on in time (statusword; the limit is its EMCY code). */
+    MASSETER_CAUSE_NOT_READY = 56,
+    /* A drive was not enabled in time with the others (statusword; the limit is its EMCY code). */
+    MASSETER_CAUSE_NOT_ENABLED = 57,
+    /* The jaw is too far from the first pose of the motion (m). */
+    MASSETER_CAUSE_START_TOO_FAR = 58,
 };
 
 enum masseter_no_pose {
@@ -197,7 +209,7 @@ enum masseter_no_pose {
 };
 
 #define MASSETER_READING_TOPIC "reading"
-#define MASSETER_READING_TYPE_NAME "masseter/Reading/bb2f589d33e3a1bb"
+#define MASSETER_READING_TYPE_NAME "masseter/Reading/94853854c9557b3e"
 
 /* Positions, forces and states of the drives, once a cycle. */
 typedef struct masseter_reading {
@@ -269,7 +281,7 @@ static_assert(offsetof(masseter_reading, fresh_axes) == 248, "offset of fresh_ax
 static_assert(offsetof(masseter_reading, master_fault) == 252, "offset of master_fault");
 
 #define MASSETER_COMMAND_TOPIC "command"
-#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/767c9c9017684645"
+#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/6065a09d021116a2"
 
 /* Targets and request for the drives, once a cycle. */
 typedef struct masseter_command {
@@ -302,7 +314,7 @@ static_assert(offsetof(masseter_command, request) == 88, "offset of request");
 static_assert(offsetof(masseter_command, controller_state) == 92, "offset of controller_state");
 
 #define MASSETER_STATE_TOPIC "state"
-#define MASSETER_STATE_TYPE_NAME "masseter/State/f421712d5da92ad3"
+#define MASSETER_STATE_TYPE_NAME "masseter/State/02b70dfd5982e3ba"
 
 /* The controller's state and its estimate, once a cycle. */
 typedef struct masseter_state {
@@ -389,7 +401,7 @@ static_assert(offsetof(masseter_state, iterations) == 288, "offset of iterations
 static_assert(offsetof(masseter_state, controller_state) == 292, "offset of controller_state");
 
 #define MASSETER_EVENT_TOPIC "event"
-#define MASSETER_EVENT_TYPE_NAME "masseter/Event/cc6511c727ba4a8c"
+#define MASSETER_EVENT_TYPE_NAME "masseter/Event/b006626f5ff90a6d"
 
 /* A single occurrence: a change of state, a fault, an alarm. */
 typedef struct masseter_event {
@@ -446,7 +458,7 @@ static_assert(offsetof(masseter_event, value) == 72, "offset of value");
 static_assert(offsetof(masseter_event, limit) == 80, "offset of limit");
 
 #define MASSETER_TRUTH_TOPIC "truth"
-#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/c6324a5cf49e118a"
+#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/6d0e196875312133"
 
 /* The true state of the mechanism, once a cycle; the controller never reads it. */
 typedef struct masseter_truth {

@@ -7,7 +7,7 @@ numpy.dtype(Reading) is the NumPy type of a message.
 import ctypes
 import enum
 
-LAYOUT_VERSION = 10
+LAYOUT_VERSION = 11
 #: Event.axis when no axis is concerned.
 NO_AXIS = 4294967295
 #: Reading.drive_state of a drive not heard of yet, or lost.
@@ -144,7 +144,7 @@ class Cause(enum.IntEnum):
     DUPLICATE_NODE = 30
     #: A node booted without a request.
     NODE_RESTARTED = 31
-    #: A drive is in fault and a fault reset does not help (EMCY code, object 603F).
+    #: A drive is in fault and a fault reset does not help (EMCY code, object 603F; the limit is the statusword).
     FAULT_AT_START = 32
     #: A node left the NMT state operational by itself (reported NMT state; the limit is the code of operational).
     NODE_STOPPED = 33
@@ -184,6 +184,18 @@ class Cause(enum.IntEnum):
     STIMULUS_BEGAN = 51
     #: A stimulus of the scenario is over (number in its list, from 1).
     STIMULUS_ENDED = 52
+    #: A drive is in fault at the start, and no reset is allowed (EMCY code, object 603F; the limit is the statusword).
+    FAULT_FOUND = 53
+    #: A fault found at the start was reset (EMCY code, object 603F; the limit is the statusword).
+    FAULT_RESET = 54
+    #: The drives wait for one that is not ready to switch on (statusword; the limit is its EMCY code).
+    WAITS_FOR_DRIVE = 55
+    #: A drive did not become ready to switch on in time (statusword; the limit is its EMCY code).
+    NOT_READY = 56
+    #: A drive was not enabled in time with the others (statusword; the limit is its EMCY code).
+    NOT_ENABLED = 57
+    #: The jaw is too far from the first pose of the motion (m).
+    START_TOO_FAR = 58
 
 
 class NoPose(enum.IntEnum):
@@ -254,7 +266,7 @@ class Reading(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Reading/bb2f589d33e3a1bb"
+        return "masseter/Reading/94853854c9557b3e"
 
 
 _check(Reading, 256, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 176, 224, 248, 252])
@@ -285,7 +297,7 @@ class Command(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Command/767c9c9017684645"
+        return "masseter/Command/6065a09d021116a2"
 
 
 _check(Command, 96, [0, 8, 16, 24, 32, 40, 88, 92])
@@ -352,7 +364,7 @@ class State(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/State/f421712d5da92ad3"
+        return "masseter/State/02b70dfd5982e3ba"
 
 
 _check(State, 296, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 136, 160, 192, 216, 248, 272, 280, 288, 292])
@@ -399,7 +411,7 @@ class Event(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Event/cc6511c727ba4a8c"
+        return "masseter/Event/b006626f5ff90a6d"
 
 
 _check(Event, 88, [0, 8, 16, 24, 32, 40, 44, 48, 52, 56, 60, 62, 64, 68, 72, 80])
@@ -436,7 +448,7 @@ class Truth(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Truth/c6324a5cf49e118a"
+        return "masseter/Truth/6d0e196875312133"
 
 
 _check(Truth, 248, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240])

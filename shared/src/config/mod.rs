@@ -10,6 +10,7 @@ mod can;
 mod control;
 mod document;
 mod drives;
+mod dry;
 mod dynamics;
 mod error;
 mod faults;
@@ -29,6 +30,7 @@ pub use control::{
     ChecksConfig, ControllerConfig, CpuDmaLatency, MOST_LEAD_CYCLES, RealtimeConfig, TimingConfig,
 };
 pub use drives::{DriveConfig, DrivesConfig};
+pub use dry::DryConfig;
 pub use dynamics::DynamicsConfig;
 pub use error::ScenarioError;
 pub use faults::{FaultConfig, FaultKindConfig, FaultLayer, FaultPlace, FaultSize};

@@ -10,8 +10,8 @@ use super::error::ScenarioError;
 use super::need::{LONGEST_S, SHORTEST_MOTION_S, require_within};
 use super::when::EntryNames;
 use super::{
-    CanConfig, ChecksConfig, ControllerConfig, DrivesConfig, DynamicsConfig, ExpectConfig, FaultConfig,
-    FoodConfig, JawConfig, MotionConfig, RealtimeConfig, RequirementConfig, StimulusConfig,
+    CanConfig, ChecksConfig, ControllerConfig, DrivesConfig, DryConfig, DynamicsConfig, ExpectConfig,
+    FaultConfig, FoodConfig, JawConfig, MotionConfig, RealtimeConfig, RequirementConfig, StimulusConfig,
     TrajectoryLimitsConfig,
 };
 use crate::clock::SECOND_NS;
@@ -60,6 +60,8 @@ section! {
         pub can: CanConfig = CanConfig::default(),
         /// The drives.
         pub drives: DrivesConfig = DrivesConfig::default(),
+        /// The dry run.
+        pub dry: DryConfig = DryConfig::default(),
         /// The emulated mechanism.
         pub dynamics: DynamicsConfig = DynamicsConfig::default(),
         /// Food between the teeth of the emulated jaw; none when absent.
@@ -248,6 +250,7 @@ impl Scenario {
             food.validate()?;
         }
         self.limits.validate()?;
+        self.dry.validate()?;
         self.controller.validate(self.rate_hz)?;
         self.checks.validate()
     }
@@ -257,6 +260,12 @@ impl Scenario {
     pub fn observation_s(&self) -> f64 {
         let times = self.require.iter().filter_map(|requirement| requirement.stays_for);
         times.map(|time| time.si()).fold(0.0, f64::max).min(LONGEST_OBSERVATION_S)
+    }
+
+    /// How far the jaw may be from the first pose of the motion at the start, m; none for any distance.
+    pub fn start_tolerance_m(&self) -> Option<f64> {
+        let on_robot_mm = (!self.can.is_virtual()).then_some(ControllerConfig::START_TOLERANCE_MM);
+        self.controller.start_tolerance_mm.or(on_robot_mm).map(|tolerance_mm| tolerance_mm * 1e-3)
     }
 
     /// The names of the faults and stimuli.

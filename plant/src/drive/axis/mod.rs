@@ -183,8 +183,19 @@ impl Axis {
         } else {
             self.power.after(command)
         };
-        let next = self.delayed(next, now_ns);
+        let next = if self.is_kept_off(next) { self.power } else { self.delayed(next, now_ns) };
         self.enter(next, now_ns);
+    }
+
+    /// Whether the drive would leave "switch on disabled" while the torque is safely off.
+    fn is_kept_off(&mut self, next: DriveState) -> bool {
+        let is_kept = self.faults.has(FaultKindConfig::DriveSto)
+            && self.power == DriveState::SwitchOnDisabled
+            && next != self.power;
+        if is_kept {
+            self.faults.strike(FaultKindConfig::DriveSto);
+        }
+        is_kept
     }
 
     /// The next state, where an injected fault delays "operation enabled".

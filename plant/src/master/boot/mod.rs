@@ -62,6 +62,10 @@ pub(super) struct Boot {
     readings: u32,
     /// The value to be written back.
     kept: Expedited,
+    /// The statusword of a drive found in fault.
+    fault_statusword: u32,
+    /// A fault was reset, which is to be reported.
+    reset_fault: Option<Failure>,
     client: SdoClient,
     restarts: u32,
     has_repeated: bool,
@@ -79,6 +83,8 @@ impl Boot {
             next: 0,
             readings: 0,
             kept: Expedited::of_unknown_size([0; Expedited::MAX]),
+            fault_statusword: 0,
+            reset_fault: None,
             client: SdoClient::default(),
             restarts: 0,
             has_repeated: false,
@@ -86,6 +92,11 @@ impl Boot {
             reset_at_ns: now_ns + RESET_EVERY_NS,
             since_ns: now_ns,
         }
+    }
+
+    /// The fault that was reset, once.
+    pub(super) fn reset_fault(&mut self) -> Option<Failure> {
+        self.reset_fault.take()
     }
 
     /// How far the boot is.
@@ -216,7 +227,7 @@ impl Boot {
         let is_missing = matches!(code, AbortCode::NO_OBJECT | AbortCode::NO_SUBINDEX);
         match self.steps[self.next] {
             Step::Write { is_optional: true, .. } => Some(0),
-            Step::Read(_, Check::Unset { .. }) if is_missing => Some(0),
+            Step::WriteIfPresent { .. } | Step::Read(_, Check::Unset { .. }) if is_missing => Some(0),
             Step::Read(_, Check::PdoElseSkip(skipped)) if is_missing => Some(skipped),
             _ => None,
         }
@@ -234,7 +245,7 @@ impl Boot {
                 self.end_step(0);
             }
             Step::Read(object, _) => self.client.begin(object, None),
-            Step::Write { object, value, bytes, .. } => {
+            Step::Write { object, value, bytes, .. } | Step::WriteIfPresent { object, value, bytes } => {
                 let value = Expedited::new(&value.to_le_bytes()[..bytes]).expect("one to four bytes");
                 self.client.begin(object, Some(value));
             }
@@ -269,14 +280,17 @@ impl Boot {
                 return if otherwise == Cause::NotAccepted { self.read_again(failure) } else { Err(failure) };
             }
             Check::Unset { otherwise } if found != 0 => return Err(at(otherwise, object, found, 0)),
+            Check::FaultRefused => return Err(at(Cause::FaultFound, object, found, self.fault_statusword)),
             Check::NoFault if in_fault(found) => {
-                return self.read_again(at(Cause::FaultAtStart, object, number(self.kept), 0));
+                return self.read_again(self.fault(Cause::FaultAtStart, object));
             }
+            Check::NoFault => self.reset_fault = Some(self.fault(Cause::FaultReset, object)),
             Check::NoVoltage if may_be_powered(found) => {
                 return self.read_again(at(Cause::StillPowered, object, found, 0));
             }
             Check::Keep => self.kept = Expedited::new(read.data()).expect("one to four bytes"),
             Check::FaultElseSkip(skipped) if !in_fault(found) => return Ok(Some(skipped)),
+            Check::FaultElseSkip(_) => self.fault_statusword = found,
             Check::PdoElseSkip(skipped) => {
                 let cob_id = CobId(found);
                 self.kept = Expedited::new(&cob_id.invalidated().0.to_le_bytes()).expect("four bytes");
@@ -285,6 +299,11 @@ impl Boot {
             _ => {}
         }
         Ok(Some(0))
+    }
+
+    /// The fault of the drive, whose code (603Fh) was kept.
+    fn fault(&self, cause: Cause, object: ObjectAddress) -> Failure {
+        at(cause, object, number(self.kept), self.fault_statusword)
     }
 
     /// A value that may still change is read again, but not for ever.

@@ -38,6 +38,8 @@ pub(super) enum Step {
     Read(ObjectAddress, Check),
     /// Write that many bytes to the object; the drive may refuse an optional value.
     Write { object: ObjectAddress, value: u32, bytes: usize, is_optional: bool },
+    /// Write that many bytes to the object, if the drive has it.
+    WriteIfPresent { object: ObjectAddress, value: u32, bytes: usize },
     /// Write the kept value.
     WriteKept(ObjectAddress),
 }
@@ -53,6 +55,8 @@ pub(super) enum Check {
     Keep,
     /// A statusword: without a fault, now or after repetitions.
     NoFault,
+    /// The error code of a fault, for which the drive is given up.
+    FaultRefused,
     /// A statusword: without voltage, now or after repetitions.
     NoVoltage,
     /// A statusword: unless the drive is in fault, skip that many steps.
@@ -97,20 +101,26 @@ pub(super) fn plan(node: NodeId, scenario: &Scenario, axis: usize) -> Vec<Step> 
     // Many drives have no such timer; the heartbeat and the master supervise them too.
     steps.push(Step::Write { object, value, bytes: 2, is_optional: true });
     steps.extend(configure(scenario, axis));
+    steps.push(limit_force(scenario, axis));
     // A drive may begin to follow its target with the mode, and may have moved before the last step.
     steps.extend(HOLD_POSITION);
     steps.push(write(0x6060, 0, CYCLIC_POSITION, 1));
     steps.push(expect(0x6061, 0, CYCLIC_POSITION, Cause::NotAccepted));
-    // A fault whose cause is gone is reset by an edge; one that persists is reported with its code.
-    let reset_fault = [
-        Step::Read(ObjectAddress::new(0x603F, 0), Check::Keep),
-        control(Controlword::DISABLE_VOLTAGE),
-        control(Controlword::FAULT_RESET),
-        control(Controlword::DISABLE_VOLTAGE),
-        Step::Read(STATUSWORD, Check::NoFault),
-    ];
-    steps.push(Step::Read(STATUSWORD, Check::FaultElseSkip(reset_fault.len())));
-    steps.extend(reset_fault);
+    // A fault tells what somebody has to look at, so it is reset only on request: by an edge, if its cause is gone.
+    let error_code = ObjectAddress::new(0x603F, 0);
+    let with_fault = if scenario.can.reset_faults {
+        vec![
+            Step::Read(error_code, Check::Keep),
+            control(Controlword::DISABLE_VOLTAGE),
+            control(Controlword::FAULT_RESET),
+            control(Controlword::DISABLE_VOLTAGE),
+            Step::Read(STATUSWORD, Check::NoFault),
+        ]
+    } else {
+        vec![Step::Read(error_code, Check::FaultRefused)]
+    };
+    steps.push(Step::Read(STATUSWORD, Check::FaultElseSkip(with_fault.len())));
+    steps.extend(with_fault);
     steps.extend(HOLD_POSITION);
     steps.push(Step::Enter(BootPhase::Configured));
     steps
@@ -126,6 +136,19 @@ pub(crate) fn shortest_boot(scenario: &Scenario) -> usize {
         _ => 0,
     };
     steps.len() - steps.iter().map(without_exchange).sum::<usize>()
+}
+
+/// Every run writes the limit of force: a dry run before may have lowered it. A drive without this limit takes part in normal
+/// runs only.
+fn limit_force(scenario: &Scenario, axis: usize) -> Step {
+    let (drive, object, bytes) = (scenario.drives.of_axis(axis), ObjectAddress::new(0x6072, 0), 2);
+    let share = drive.max_force_n / drive.rated_force_n * scenario.dry.force_now();
+    let value = (share * 1000.0).round().clamp(1.0, f64::from(u16::MAX)) as u32;
+    if scenario.dry.is_on {
+        Step::Write { object, value, bytes, is_optional: false }
+    } else {
+        Step::WriteIfPresent { object, value, bytes }
+    }
 }
 
 const fn expect(index: u16, subindex: u8, value: u32, otherwise: Cause) -> Step {
