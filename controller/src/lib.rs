@@ -16,6 +16,7 @@ mod safety;
 mod sequence;
 mod sequencer;
 mod slew;
+mod start;
 pub mod trajectory;
 
 pub use safety::Fault;

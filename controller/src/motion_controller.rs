@@ -20,6 +20,7 @@ use crate::pose_law::{Demand, PoseLaw};
 use crate::safety::{self, Fault};
 use crate::sequencer::Sequencer;
 use crate::slew::Slew;
+use crate::start::StartTolerance;
 use crate::trajectory::{self, Trajectory};
 
 /// How many parameters the controller has beside those of the law.
@@ -53,6 +54,7 @@ pub struct MotionController {
     velocity_limit_m_s: [f64; AXES],
     /// The most that the trim may move an axis.
     trim_reach_m: f64,
+    start: StartTolerance,
     playback: Playback,
     acknowledgement: CommandAcknowledgement,
     law: Box<dyn PoseLaw>,
@@ -93,6 +95,7 @@ impl MotionController {
             sequencer: Sequencer::new(scenario, mechanism.clone()),
             velocity_limit_m_s: std::array::from_fn(|axis| scenario.drives.of_axis(axis).max_velocity_m_s),
             trim_reach_m: config.trim_limit_m + config.trim_limit_rad * mechanism.platform_arm_m(),
+            start: StartTolerance::new(scenario, &mechanism),
             mechanism,
             playback: Playback::new(trajectory, config.ease_s, config.stop_ramp_s, change_s),
             acknowledgement: CommandAcknowledgement::default(),
@@ -133,6 +136,15 @@ impl MotionController {
         safety::check_velocity(&target, &before, &self.velocity_limit_m_s, demand.period_s)?;
         self.target = Some(target);
         Ok(())
+    }
+
+    /// Before the drives are enabled, the jaw must be near the first pose of the motion.
+    fn check_start(&self) -> Result<(), Fault> {
+        if !self.sequencer.has_steady_readings() {
+            return Ok(());
+        }
+        let found = self.sequencer.estimate.map(|estimate| estimate.solution.pose);
+        found.map_or(Ok(()), |found| self.start.check(&found, &self.playback.first_pose()))
     }
 
     fn demand(&self, desired: Pose) -> Demand {
@@ -204,6 +216,7 @@ impl Controller for MotionController {
         let fault = self.sequencer.begin_cycle(tick);
         let desired = self.playback.pose_ahead(-self.sample_age_s());
         self.desired = Some(desired);
+        let fault = fault.or_else(|| self.check_start().err());
         let fault = fault.or_else(|| self.control(desired).err());
         let event = self.sequencer.follow(fault, self.is_over(), tick);
         if event.is_some() {

@@ -67,6 +67,11 @@ impl Playback {
         self.amplitude.set(amplitude);
     }
 
+    /// The first pose of the motion.
+    pub(crate) fn first_pose(&self) -> Pose {
+        self.trajectory.pose(0.0)
+    }
+
     /// Holds `pose`.
     pub(crate) fn hold(&mut self, pose: Pose) {
         self.begin(Part::Hold(pose));
@@ -126,9 +131,7 @@ impl Playback {
         let time_s = self.time_ahead_s(ahead_s);
         match self.part {
             Part::Hold(pose) => pose,
-            Part::Ease(from) => {
-                interpolate(&from, &self.trajectory.pose(0.0), minimum_jerk(time_s / self.ease_s))
-            }
+            Part::Ease(from) => interpolate(&from, &self.first_pose(), minimum_jerk(time_s / self.ease_s)),
             Part::Motion => self.trajectory.scaled_pose(time_s, self.amplitude.ahead(self.rate * ahead_s)),
         }
     }

@@ -63,6 +63,7 @@ fn play(
     let scenario = &context.scenario;
     let mechanism = Mechanism::new(&scenario.mechanism)?;
     let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
+    let trajectory = trajectory.slowed(scenario.dry.speed_now());
     let mut controller = build(scenario, mechanism, trajectory);
     Ok(Session::start(context, controller.declared())?.run(&mut *controller)?)
 }

@@ -35,6 +35,8 @@ pub(crate) struct Estimate {
 pub(crate) struct Sequencer {
     pub(crate) config: ControllerConfig,
     pub(crate) period_s: f64,
+    /// How long the drives may take to be enabled, s: the master, which knows more of them, gives up first.
+    enable_timeout_s: f64,
     /// How long a safe stop is observed, s.
     observation_s: f64,
     pub(crate) tracker: ForwardTracker,
@@ -58,6 +60,7 @@ impl Sequencer {
         Self {
             config: scenario.controller,
             period_s: scenario.period_s(),
+            enable_timeout_s: scenario.controller.start_timeout_s + scenario.can.longest_enabling_s(),
             observation_s: scenario.observation_s(),
             tracker: ForwardTracker::new(mechanism),
             state: ControllerState::WaitReadings,
@@ -122,10 +125,14 @@ impl Sequencer {
             (cycles as f64 > limit).then(|| Fault::new(cause, cycles as f64, limit))
         };
         let timeout_cycles = self.config.start_timeout_s / self.period_s;
+        let enable_cycles = self.enable_timeout_s / self.period_s;
         let silence = || over(Cause::StaleReading, self.silent_cycles, self.config.stale_cycles.into());
         match self.state {
             ControllerState::WaitReadings => over(Cause::StaleReading, self.cycles_in_state, timeout_cycles),
-            ControllerState::Enabling | ControllerState::Disabling => {
+            ControllerState::Enabling => {
+                over(Cause::EnableTimeout, self.cycles_in_state, enable_cycles).or_else(silence)
+            }
+            ControllerState::Disabling => {
                 over(Cause::EnableTimeout, self.cycles_in_state, timeout_cycles).or_else(silence)
             }
             ControllerState::Finished | ControllerState::SafeStop => None,
@@ -164,11 +171,16 @@ impl Sequencer {
         Some(event)
     }
 
+    /// Whether the drives are about to be enabled.
+    pub(crate) fn has_steady_readings(&self) -> bool {
+        self.state == ControllerState::WaitReadings && self.steady_readings >= self.config.steady_readings
+    }
+
     /// Whether the condition that ends the state holds.
     fn is_done(&self, is_over: bool) -> bool {
         let enabled = DriveState::OperationEnabled.code();
         match self.state {
-            ControllerState::WaitReadings => self.steady_readings >= self.config.steady_readings,
+            ControllerState::WaitReadings => self.has_steady_readings(),
             ControllerState::Enabling => self.drive_state.iter().all(|&code| code == enabled),
             ControllerState::Easing | ControllerState::Running | ControllerState::Holding => is_over,
             ControllerState::Disabling => self.drives_are_off(),

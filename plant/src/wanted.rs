@@ -165,7 +165,7 @@ fn objects(scenario: &Scenario, axis: usize) -> Result<Vec<WantedObject>, PlantE
         if !config.takes(value) {
             return Err(beyond(profile, key, object, value, &config));
         }
-        let rule = if is_optional_by_default(object) && config == ObjectConfig::default() {
+        let rule = if may_lack(object, scenario) && config == ObjectConfig::default() {
             ObjectRule::Optional
         } else {
             config.rule
@@ -211,21 +211,28 @@ fn beyond(
     ))
 }
 
-/// Many drives have no event timer for RPDOs; heartbeat and master supervise these drives too.
-fn is_optional_by_default(object: ObjectAddress) -> bool {
-    object == ObjectAddress::new(0x1400, 5)
+/// Whether a drive may lack an object of which the profile says nothing. Many have no event timer for RPDOs; heartbeat and
+/// master supervise these drives too. Only a dry run needs the limit of force.
+fn may_lack(object: ObjectAddress, scenario: &Scenario) -> bool {
+    match (object.index, object.subindex) {
+        (0x1400, 5) => true,
+        (0x6072, 0) => !scenario.dry.is_on,
+        _ => false,
+    }
 }
 
 /// Index, sub-index, value, bytes, and the key that decides the value.
 type KnownObject = (u16, u8, i64, usize, &'static str);
 
-fn known_objects(scenario: &Scenario, axis: usize) -> Result<[KnownObject; 12], PlantError> {
+fn known_objects(scenario: &Scenario, axis: usize) -> Result<[KnownObject; 13], PlantError> {
     let (can, drive, scale) = (&scenario.can, scenario.drives.of_axis(axis), scenario.scale(axis));
     let profile = scenario.profile(axis);
     let consumed = i64::from(MASTER_NODE.get()) << 16 | i64::from(can.heartbeat_consumer_ms);
     let quick_stop = i64::from(scale.acceleration(drive.quick_stop_deceleration_m_s2));
     let window = i64::from(scale.window(drive.following_error_m));
     let [lowest, highest] = software_limits(scenario, axis);
+    let force_share = drive.max_force_n / drive.rated_force_n * scenario.dry.force_now();
+    let force_limit = (force_share * 1000.0).round().clamp(1.0, f64::from(u16::MAX)) as i64;
     let (period, exponent) = period(scenario, profile)?;
     let key = |slide, leg| if axis < LEGS { slide } else { leg };
     let quick_stop_key =
@@ -241,6 +248,8 @@ fn known_objects(scenario: &Scenario, axis: usize) -> Result<[KnownObject; 12], 
         (0x6085, 0, quick_stop, 4, quick_stop_key),
         (0x6065, 0, window, 4, window_key),
         (0x6066, 0, drive.following_error_timeout_ms.into(), 2, timeout_key),
+        // A dry run before may have lowered the limit.
+        (0x6072, 0, force_limit, 2, key("drives.slide.max_force_n", "drives.leg.max_force_n")),
         // The upper limit comes first: the boot opens the lower one before.
         (0x607D, 2, highest.into(), 4, "mechanism.strokes"),
         (0x607D, 1, lowest.into(), 4, "mechanism.strokes"),

@@ -1,6 +1,8 @@
 //! The sinks of every received message: the recording, Foxglove clients, and the progress on standard error.
 
 use masseter_recording::{Backlog, Recorded};
+use masseter_shared::messages::codes::Cause;
+use masseter_shared::messages::explain;
 use masseter_shared::wording::counted;
 use masseter_terminal::Exit;
 
@@ -21,9 +23,20 @@ impl Sinks {
         self.backlog.record(message, now_ns);
         if let Some(progress) = &mut self.progress {
             progress.add(message);
+            self.show_news(message);
         }
         if let Some(server) = &self.server {
             server.offer(message, now_ns);
+        }
+    }
+
+    /// Shows what the user may have to act on while the run waits.
+    fn show_news(&mut self, message: &Recorded) {
+        let Recorded::Event(event) = message else { return };
+        let is_news = [Cause::WaitsForDrive, Cause::FaultReset].iter().any(|news| news.code() == event.cause);
+        if let Some(text) = explain(event).filter(|_| is_news) {
+            self.end_line(self.losses());
+            self.stderr.write(&format!("masseter: {text}\n"));
         }
     }
 

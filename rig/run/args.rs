@@ -70,6 +70,8 @@ pub(crate) struct RunArgs {
     /// Move a robot without a passed 'masseter robot check-pose': a wrong sign, scale or zero can drive an axis into its end
     #[arg(long, help_heading = HOW)]
     pub without_bring_up: bool,
+    #[command(flatten)]
+    pub start: StartArgs,
     /// Cores of controller and plant
     #[arg(long, value_name = "N,N", value_parser = parse_cores, help_heading = HOW)]
     pub cores: Option<[usize; 2]>,
@@ -111,6 +113,20 @@ pub(crate) struct RunArgs {
     pub quiet: bool,
 }
 
+/// How carefully the run starts.
+#[derive(Debug, Clone, Default, Args)]
+pub(crate) struct StartArgs {
+    /// Play the motion at a tenth of its speed with little force, and predict what it demands at full speed
+    #[arg(long, help_heading = HOW)]
+    pub dry: bool,
+    /// Reset the fault of a drive that is in fault at the start, instead of ending the run
+    #[arg(long, help_heading = HOW)]
+    pub reset_faults: bool,
+    /// How long to wait for a drive that is not ready, such as one with safe torque off [default: 5s]
+    #[arg(long, value_name = "TIME", value_parser = parse_duration, help_heading = HOW)]
+    pub wait_ready: Option<Duration>,
+}
+
 impl RunArgs {
     /// How much of the report standard output gets.
     pub(super) fn detail(&self) -> Detail {
@@ -133,6 +149,9 @@ impl RunArgs {
             interfaces: self.can.as_ref().map(|wires| wires.0.clone()),
             cores: self.cores,
             seed: self.seed,
+            is_dry: self.start.dry,
+            reset_faults: self.start.reset_faults,
+            wait_ready: self.start.wait_ready,
         }
     }
 }

@@ -137,7 +137,7 @@ enum masseter_cause {
     MASSETER_CAUSE_DUPLICATE_NODE = 30,
     /* A node booted without a request. */
     MASSETER_CAUSE_NODE_RESTARTED = 31,
-    /* A drive is in fault and a fault reset does not help (EMCY code, object 603F). */
+    /* A drive is in fault and a fault reset does not help (EMCY code, object 603F; the limit is the statusword). */
     MASSETER_CAUSE_FAULT_AT_START = 32,
     /* A node left the NMT state operational by itself (reported NMT state; the limit is the code of operational). */
     MASSETER_CAUSE_NODE_STOPPED = 33,

@@ -11,8 +11,9 @@ const SHORTEST_CUT_S: f64 = 1e-6;
 
 /// Maps the trajectory's time to the motion's time.
 #[derive(Debug, Clone, Copy)]
-#[expect(clippy::struct_field_names, reason = "a unit is part of its name")]
 pub(super) struct MotionClock {
+    /// Share of real time at which it runs.
+    speed: f64,
     ramp_s: f64,
     stopped_s: f64,
     pub duration_s: f64,
@@ -28,7 +29,17 @@ impl MotionClock {
     pub(super) fn new(length_s: f64, duration_s: f64) -> Self {
         let ramp_s = RAMP_S.min(length_s).min(duration_s / 2.0);
         let whole_s = length_s + RAMP_S.min(length_s);
-        Self { ramp_s, stopped_s: duration_s.min(length_s + ramp_s), duration_s, whole_s }
+        Self { speed: 1.0, ramp_s, stopped_s: duration_s.min(length_s + ramp_s), duration_s, whole_s }
+    }
+
+    /// The same clock at a share of its speed.
+    pub(super) fn slowed(self, speed: f64) -> Self {
+        Self {
+            speed: self.speed * speed,
+            duration_s: self.duration_s / speed,
+            whole_s: self.whole_s / speed,
+            ..self
+        }
     }
 
     /// What the motion would take to its end, s, where the duration cuts it by more than rounding.
@@ -38,6 +49,7 @@ impl MotionClock {
 
     /// The motion's time, s.
     pub(super) fn motion_time_s(&self, t_s: f64) -> f64 {
+        let t_s = t_s * self.speed;
         let ramped = |t_s: f64| self.ramp_s * minimum_jerk_integral(t_s / self.ramp_s);
         let to_stop_s = self.stopped_s - t_s;
         if t_s < self.ramp_s {
@@ -72,6 +84,17 @@ mod tests {
             assert!((clock.motion_time_s(duration_s + 9.0) - end_s).abs() < 1e-12);
             assert_eq!(clock.cut_from_s().is_some(), end_s < length_s);
             assert!(clock.motion_time_s(-1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_slowed_motion_passes_the_same_times_later() {
+        let clock = MotionClock::new(3.0, 3.2);
+        let slow = clock.slowed(0.1);
+        assert!((slow.duration_s - 32.0).abs() < 1e-9);
+        assert!(slow.cut_from_s().is_some_and(|whole_s| (whole_s - 35.0).abs() < 1e-9));
+        for t_s in [0.1, 1.0, 3.0, 9.0] {
+            assert!((slow.motion_time_s(10.0 * t_s) - clock.motion_time_s(t_s)).abs() < 1e-9);
         }
     }
 

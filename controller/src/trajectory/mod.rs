@@ -97,6 +97,13 @@ impl Trajectory {
         Ok(Self { motion, clock, frame })
     }
 
+    /// The same motion at a share of its speed.
+    #[must_use]
+    pub fn slowed(mut self, speed: f64) -> Self {
+        self.clock = self.clock.slowed(speed);
+        self
+    }
+
     /// The platform in the base frame `t_s` seconds after the start; at rest before 0 and after
     /// [`duration_s`](Self::duration_s).
     pub fn pose(&self, t_s: f64) -> Pose {

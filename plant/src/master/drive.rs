@@ -2,8 +2,8 @@
 //!
 //! A [`RemoteDrive`] sends nothing; it returns frames and judgements.
 
-use masseter_can::canopen::{Cob, Nmt, NmtCommand, NmtState, NmtTarget, NodeId, SdoResponse};
-use masseter_can::cia402::{Controlword, DriveRequest, DriveState, next_controlword};
+use masseter_can::canopen::{Cob, EmergencyCode, Nmt, NmtCommand, NmtState, NmtTarget, NodeId, SdoResponse};
+use masseter_can::cia402::{Controlword, DriveRequest, DriveState, Statusword, next_controlword};
 use masseter_can::{CanId, Frame, Rpdo1, Tpdo1};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::{AxisScale, Scenario};
@@ -38,6 +38,9 @@ pub(super) struct RemoteDrive {
     /// The function codes of its objects that had a wrong length, bit i for function code i.
     wrong_lengths: u16,
     power: Option<DriveState>,
+    statusword: Statusword,
+    /// What its last emergency message reported.
+    emergency: EmergencyCode,
     actual_increments: i32,
     torque_permille: i16,
     controlword: Controlword,
@@ -57,7 +60,7 @@ impl RemoteDrive {
         now_ns: u64,
     ) -> Result<Self, PlantError> {
         let can = &scenario.can;
-        let boot = Boot::new(&WantedDrive::of_axis(scenario, axis, id)?, now_ns);
+        let boot = Boot::new(&WantedDrive::of_axis(scenario, axis, id)?, can.reset_faults, now_ns);
         Ok(Self {
             id,
             bus,
@@ -73,6 +76,8 @@ impl RemoteDrive {
             is_absence_known: false,
             wrong_lengths: 0,
             power: None,
+            statusword: Statusword(0),
+            emergency: EmergencyCode::RESET,
             actual_increments: 0,
             torque_permille: 0,
             controlword: Controlword::DISABLE_VOLTAGE,
@@ -124,6 +129,21 @@ impl RemoteDrive {
     /// State of its power stage, as far as it is known.
     pub(super) fn drive_state(&self) -> Option<DriveState> {
         self.power.filter(|_| self.is_operational())
+    }
+
+    /// Statusword and code of its last emergency, which explain why it is not enabled.
+    pub(super) fn power_words(&self) -> [f64; 2] {
+        [self.statusword.0, self.emergency.0].map(f64::from)
+    }
+
+    /// It reported an emergency, or its end.
+    pub(super) fn note_emergency(&mut self, code: EmergencyCode) {
+        self.emergency = code;
+    }
+
+    /// The fault that its boot reset, once.
+    pub(super) fn reset_fault(&mut self) -> Option<Failure> {
+        self.boot.reset_fault()
     }
 
     /// Writes its actual values and its state.
@@ -183,6 +203,7 @@ impl RemoteDrive {
             return None;
         }
         let before = self.drive_state();
+        self.statusword = tpdo.statusword;
         if let Ok(state) = tpdo.statusword.state() {
             self.power = Some(state);
         }
@@ -252,7 +273,7 @@ impl RemoteDrive {
         self.following.stop();
         self.presence.forget_answer();
         (self.is_started, self.power) = (false, None);
-        self.controlword = Controlword::DISABLE_VOLTAGE;
+        (self.controlword, self.emergency) = (Controlword::DISABLE_VOLTAGE, EmergencyCode::RESET);
     }
 
     /// Completes its boot if it was started and has become operational; otherwise continues it after some time.
@@ -292,19 +313,22 @@ impl RemoteDrive {
         Nmt { command, target: NmtTarget::Node(self.id) }.frame()
     }
 
-    /// The process data for a request and a target, if the drive exchanges any. Until the drive follows targets, its
+    /// The process data for a request and a target, if the drive exchanges any. While the drive may not be switched on, it is
+    /// led to "ready to switch on" only. Until the drive follows targets, its
     /// target is its position, so that nothing jumps when it begins to (607Ah := 6064h).
     pub(super) fn process_data(
         &mut self,
         now_ns: u64,
-        request: DriveRequest,
+        (request, may_switch_on): (DriveRequest, bool),
         target_m: Option<f64>,
     ) -> Option<Frame> {
         if !self.is_operational() {
             return None;
         }
         let state = self.power.unwrap_or(DriveState::NotReadyToSwitchOn);
-        self.controlword = next_controlword(state, request, self.controlword);
+        let word = next_controlword(state, request, self.controlword);
+        let switches_on = matches!(word, Controlword::SWITCH_ON | Controlword::ENABLE_OPERATION);
+        self.controlword = if switches_on && !may_switch_on { Controlword::SHUTDOWN } else { word };
         let follows = state == DriveState::OperationEnabled && request == DriveRequest::Enable;
         let target_increments = if let Some(target_m) = target_m.filter(|_| follows) {
             self.following.follow(now_ns, self.position_m(), target_m);

@@ -26,9 +26,18 @@ impl Failure {
 
     /// The event that reports the failure.
     pub(super) fn event(&self) -> Event {
+        self.event_of(EventKind::Fault)
+    }
+
+    /// The event that reports the same without a reaction.
+    pub(super) fn notice(&self) -> Event {
+        self.event_of(EventKind::Notice)
+    }
+
+    fn event_of(&self, kind: EventKind) -> Event {
         let Self { cause, object, value, limit } = *self;
         let object = object.map_or(0, |object| u32::from(object.index) << 8 | u32::from(object.subindex));
-        Event { object, value, limit, ..Event::new(Source::Master, EventKind::Fault, cause) }
+        Event { object, value, limit, ..Event::new(Source::Master, kind, cause) }
     }
 }
 

@@ -13,6 +13,7 @@ mod boot;
 mod bus_monitor;
 mod commands;
 mod drive;
+mod enabling;
 mod events;
 mod exchange;
 mod failure;
@@ -42,6 +43,7 @@ use crate::link::layout::{drive_ports, node_ids};
 use bus_monitor::BusMonitor;
 use commands::Commands;
 use drive::RemoteDrive;
+use enabling::Enabling;
 use events::{EventLog, Subject, notice, transition};
 use exchange::Exchange;
 use failure::Failure;
@@ -61,6 +63,7 @@ pub(crate) struct Master {
     buses: Vec<BusMonitor>,
     exchange: Exchange,
     commands: Commands,
+    enabling: Enabling,
     supervision: Supervision,
     events: EventLog,
 }
@@ -86,6 +89,7 @@ impl Master {
             buses: vec![BusMonitor::default(); can.buses.len()],
             exchange: Exchange::new(can, now_ns)?,
             commands: Commands::new(scenario),
+            enabling: Enabling::new(can),
             supervision: Supervision::default(),
             events: EventLog::new(addresses),
         })
@@ -150,8 +154,9 @@ impl Master {
         self.take_command(now_ns, command);
         self.restore(now_ns);
         let (request, targets_m) = (self.request(), self.commands.targets_m());
+        let may_switch_on = self.enabling.may_switch_on();
         for (axis, target_m) in targets_m.into_iter().enumerate() {
-            if let Some(frame) = self.drives[axis].process_data(now_ns, request, target_m) {
+            if let Some(frame) = self.drives[axis].process_data(now_ns, (request, may_switch_on), target_m) {
                 self.send_to(now_ns, axis, frame, buses);
             }
         }
@@ -191,11 +196,10 @@ impl Master {
 
     fn supervise(&mut self, now_ns: u64) {
         let is_enable = self.request() == DriveRequest::Enable;
-        let mut all_are_enabled = true;
         for axis in 0..AXES {
             let is_fresh = self.is_fresh(axis);
             if let Some(failure) = self.drives[axis].absence(now_ns) {
-                self.fail_boot(now_ns, axis, &failure);
+                self.name(now_ns, axis, &failure);
             }
             if let Some(failure) = self.drives[axis].loss(now_ns, is_fresh) {
                 self.fail(now_ns, Subject::Axis(axis), &failure);
@@ -203,13 +207,27 @@ impl Master {
                 self.report_boot(now_ns, axis, Ok(()));
             }
             let state = self.drives[axis].drive_state();
-            all_are_enabled &= state == Some(DriveState::OperationEnabled);
-            let disobedience = self.supervision.judge(state, is_enable);
+            let disobedience = self.enabling.judge(state, is_enable);
             if let Some(failure) = disobedience.or_else(|| self.drives[axis].following_error(is_fresh)) {
                 self.fail(now_ns, Subject::Axis(axis), &failure);
             }
         }
-        self.supervision.end_cycle(is_enable, all_are_enabled);
+        self.supervise_enabling(now_ns, is_enable);
+    }
+
+    /// Names the drives that keep the others from being enabled; beyond its time, each of them stops all.
+    fn supervise_enabling(&mut self, now_ns: u64, is_enable: bool) {
+        let states = self.drives.each_ref().map(RemoteDrive::drive_state);
+        let is_enable = is_enable && self.supervision.may_move();
+        for (axis, cause) in self.enabling.end_cycle(now_ns, is_enable, states).into_iter().enumerate() {
+            let Some(cause) = cause else { continue };
+            let failure = Failure::with(cause, self.drives[axis].power_words());
+            if cause == Cause::WaitsForDrive {
+                self.events.add(now_ns, Subject::Axis(axis), failure.notice());
+            } else {
+                self.name(now_ns, axis, &failure);
+            }
+        }
     }
 
     /// Reports a bus that goes off and one that returns; the drives of a bus in bus-off stop by themselves.
@@ -361,6 +379,7 @@ impl Master {
             Ok(Message::Emergency(emergency)) => {
                 // Before its boot-up, a drive reports emergencies of a time before this master, which resets it.
                 let is_past = emergency.is_reset() || drive.boot_phase() == BootPhase::Waiting;
+                drive.note_emergency(emergency.code);
                 self.events.add(time_ns, Subject::Axis(axis), events::emergency(emergency, is_past));
             }
             Ok(Message::SdoAnswer(answer)) => {
@@ -387,7 +406,10 @@ impl Master {
     fn report_boot(&mut self, time_ns: u64, axis: usize, result: Result<(), Failure>) {
         if let Err(failure) = result {
             self.drives[axis].give_up();
-            self.fail_boot(time_ns, axis, &failure);
+            self.name(time_ns, axis, &failure);
+        }
+        if let Some(reset) = self.drives[axis].reset_fault() {
+            self.events.add(time_ns, Subject::Axis(axis), reset.notice());
         }
         if let Some([before, after]) = self.drives[axis].phase_change() {
             let event = transition(Source::Master, before.code(), after.code());
@@ -395,9 +417,9 @@ impl Master {
         }
     }
 
-    /// Reports why a drive was given up. The failure of one drive to boot is no consequence of another's, so that each is
-    /// reported.
-    fn fail_boot(&mut self, now_ns: u64, axis: usize, failure: &Failure) {
+    /// Reports why a drive cannot be used. The failure of one drive at the start is no consequence of another's, so that each
+    /// is reported.
+    fn name(&mut self, now_ns: u64, axis: usize, failure: &Failure) {
         self.supervision.stop(failure.cause);
         self.events.add(now_ns, Subject::Axis(axis), failure.event());
     }

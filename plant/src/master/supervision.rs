@@ -2,9 +2,7 @@
 //!
 //! Other parts find the causes of a stop. The supervision keeps their consequence; the master sends it to the drives.
 
-use masseter_shared::messages::codes::{Cause, DriveRequest, DriveState, drive_state_code};
-
-use super::failure::Failure;
+use masseter_shared::messages::codes::{Cause, DriveRequest};
 
 /// How long the drives stay stopped.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -20,8 +18,6 @@ enum Stop {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Supervision {
     stop: Stop,
-    /// Whether all drives have been enabled since they were to be: none may leave operation by itself.
-    were_enabled: bool,
     /// Whether the drives stop for the end of the run.
     is_ending: bool,
     /// Whether a refused command stopped the drives.
@@ -55,17 +51,6 @@ impl Supervision {
         }
     }
 
-    /// Judges the state of a drive in a cycle in which the drives are to be enabled, or not.
-    pub(super) fn judge(self, state: Option<DriveState>, is_enable: bool) -> Option<Failure> {
-        let has_left = is_enable && self.were_enabled && state != Some(DriveState::OperationEnabled);
-        has_left.then(|| Failure::with(Cause::DriveFault, [f64::from(drive_state_code(state)), 0.0]))
-    }
-
-    /// Ends the judgement of a cycle.
-    pub(super) fn end_cycle(&mut self, is_enable: bool, all_are_enabled: bool) {
-        self.were_enabled = is_enable && (self.were_enabled || all_are_enabled);
-    }
-
     /// Whether drives may be booted. During a stop they may not: the drives have to stop first. After a permanent stop
     /// nobody moves the drives again, and another master may control them.
     pub(super) fn may_boot(self, drives_are_off: bool) -> bool {
@@ -86,7 +71,11 @@ impl Supervision {
         let is_first = !self.is_stopped();
         if is_first {
             self.stop = match cause {
-                Cause::CommandLost | Cause::DriveFault | Cause::FollowingError => Stop::Permanent,
+                Cause::CommandLost
+                | Cause::DriveFault
+                | Cause::FollowingError
+                | Cause::NotReady
+                | Cause::NotEnabled => Stop::Permanent,
                 _ => Stop::UntilRestored,
             };
         }
@@ -100,7 +89,7 @@ impl Supervision {
 
     /// Ends a stop.
     pub(super) fn restore(&mut self) {
-        (self.stop, self.were_enabled) = (Stop::None, false);
+        self.stop = Stop::None;
     }
 
     /// Stops the drives for the end of the run.
@@ -128,6 +117,8 @@ mod tests {
             Cause::AccelerationLimit,
             Cause::DriveFault,
             Cause::FollowingError,
+            Cause::NotReady,
+            Cause::NotEnabled,
         ];
         let restorable = [
             Cause::BusOff,
@@ -139,6 +130,7 @@ mod tests {
             Cause::DuplicateNode,
             Cause::SdoAborted,
             Cause::BootTimeout,
+            Cause::FaultFound,
         ];
         for (causes, is_permanent) in [(&permanent[..], true), (&restorable[..], false)] {
             for &cause in causes {
@@ -190,30 +182,5 @@ mod tests {
         stopped.restore();
         assert!(!stopped.is_stopped() && stopped.may_boot(false));
         assert_eq!(stopped.request(Enable, true), Enable);
-    }
-
-    #[test]
-    fn a_drive_may_leave_operation_only_before_all_were_enabled_or_when_it_is_told_to() {
-        let mut supervision = Supervision::default();
-        let left = [None, Some(DriveState::SwitchedOn), Some(DriveState::Fault)];
-        let may_leave =
-            |supervision: Supervision| left.iter().all(|&state| supervision.judge(state, true).is_none());
-        supervision.end_cycle(true, false);
-        assert!(may_leave(supervision), "while they are switched on");
-        for all_are_enabled in [true, false] {
-            supervision.end_cycle(true, all_are_enabled);
-            assert_eq!(supervision.judge(Some(DriveState::OperationEnabled), true), None);
-            for state in left {
-                let explanation = [f64::from(drive_state_code(state)), 0.0];
-                let failure = Failure::with(Cause::DriveFault, explanation);
-                assert_eq!(supervision.judge(state, true), Some(failure));
-                assert_eq!(supervision.judge(state, false), None);
-            }
-        }
-        let mut restored = supervision;
-        restored.restore();
-        assert!(may_leave(restored), "after a stop");
-        supervision.end_cycle(false, true);
-        assert!(may_leave(supervision), "after they were switched off");
     }
 }

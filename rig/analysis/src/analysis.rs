@@ -8,6 +8,7 @@ use masseter_shared::messages::{Event, FrameTap, Message, Reading, State, Truth}
 use masseter_shared::named::Declared;
 
 use crate::attribution::OverrunAttribution;
+use crate::axes::AxisWatch;
 use crate::code::Code;
 use crate::declared_faults::FaultWatch;
 use crate::digest::Digest;
@@ -56,6 +57,8 @@ pub struct Analysis {
     has_truth: bool,
     intervals: Intervals,
     longest_cycles: LongestCycles,
+    /// None but in a dry run.
+    axes: Option<AxisWatch>,
     tracking: Tracking,
     faults: FaultWatch,
     fault_kinds: Vec<FaultKindConfig>,
@@ -93,6 +96,7 @@ impl Analysis {
             has_truth: is_emulated,
             intervals: Intervals::new(period_ns),
             longest_cycles: LongestCycles::default(),
+            axes: scenario.dry.is_on.then(|| AxisWatch::new(scenario)),
             tracking: Tracking::new(
                 if is_emulated { PoseSource::Truth } else { PoseSource::Estimate },
                 scenario.jaw.reference_point_m,
@@ -135,6 +139,7 @@ impl Analysis {
             Recorded::Command(command) => {
                 self.intervals.command(command);
                 self.longest_cycles.command(command);
+                self.axes.iter_mut().for_each(|axes| axes.command(command));
             }
             Recorded::Reading(reading) => self.reading(reading),
             Recorded::State(state) => self.state(state),
@@ -177,6 +182,7 @@ impl Analysis {
         let skipped = self.plant_skips.take(&Counters::from(reading), self.period_ns, is_of_scenario);
         self.intervals.reading(reading, skipped);
         self.longest_cycles.reading(reading);
+        self.axes.iter_mut().for_each(|axes| axes.reading(reading));
         self.over_time.wake_up(PLANT, reading.due_ns, reading.woke_ns);
         self.outage.reading(reading, is_of_scenario);
         self.first_sample_ns.get_or_insert(reading.sampled_ns);
@@ -189,6 +195,7 @@ impl Analysis {
         let skipped = self.controller_skips.take(&Counters::from(state), self.period_ns, is_of_scenario);
         self.intervals.state(state, is_fresh, skipped);
         self.longest_cycles.state(state, is_fresh);
+        self.axes.iter_mut().for_each(|axes| axes.state(state));
         self.over_time.wake_up(CONTROLLER, state.due_ns, state.woke_ns);
         self.outage.state(state, is_of_scenario);
         let is_disturbed = self.disturbance.take(state, is_fresh, is_path_of_scenario);
@@ -272,6 +279,7 @@ impl Analysis {
             events: self.events,
             cut_short,
             damage: damage.to_vec(),
+            axes: self.axes.map(AxisWatch::finish).unwrap_or_default(),
             track,
             over_time: self.over_time.finish(self.declared.signals.len()),
         }

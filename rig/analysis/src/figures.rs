@@ -1,10 +1,12 @@
 //! The figures of a run: everything that a run is reported and judged by.
 
 use masseter_recording::Damage;
+use masseter_shared::geometry::AXES;
 use masseter_shared::messages::codes::ControllerState;
 use serde::Serialize;
 
 use crate::attribution::OverrunAttribution;
+use crate::axes::AxisFigures;
 use crate::bus_response::BusResponse;
 use crate::code::Code;
 use crate::declared_faults::FaultFigures;
@@ -69,6 +71,9 @@ pub struct Figures {
     pub cut_short: bool,
     /// Stretches of the recording that cannot be read.
     pub damage: Vec<Damage>,
+    /// Demands on each axis and how they were met, while the motion played.
+    #[serde(skip)]
+    pub axes: [AxisFigures; AXES],
     /// Tracking over time, for plots.
     #[serde(skip)]
     pub track: Track,

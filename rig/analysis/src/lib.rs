@@ -6,6 +6,7 @@
 mod analysis;
 mod answer;
 mod attribution;
+mod axes;
 mod bus_response;
 mod by_cycle;
 mod code;
@@ -36,6 +37,7 @@ mod tracking;
 
 pub use analysis::Analysis;
 pub use attribution::OverrunAttribution;
+pub use axes::AxisFigures;
 pub use bus_response::{BusResponse, ResponseFigures};
 pub use code::Code;
 pub use declared_faults::{Detection, FaultFigures};

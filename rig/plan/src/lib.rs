@@ -12,6 +12,7 @@
 //! # Ok::<(), anyhow::Error>(())
 //! ```
 
+mod dry;
 mod scenario;
 
 use std::path::{Path, PathBuf};
@@ -24,6 +25,8 @@ use masseter_shared::config::{FileConfig, MotionConfig, Scenario};
 use masseter_shared::geometry::Mechanism;
 use masseter_shared::schedule::CycleSchedule;
 
+use dry::enter_dry_run;
+
 pub use scenario::{read_scenario, read_scenario_with};
 
 /// A run that fits its mechanism, drives and buses.
@@ -35,7 +38,7 @@ pub struct RunPlan {
     pub mechanism: Mechanism,
     /// Its motion, within the limits of strokes, velocities, accelerations and conditioning.
     pub trajectory: Trajectory,
-    /// The largest demands of the motion on the axes.
+    /// The largest demands of the motion on the axes, at full speed.
     pub demands: TrajectoryReport,
     /// The cycle's time table on the bus.
     pub schedule: CycleSchedule,
@@ -58,6 +61,12 @@ pub struct Overrides {
     pub cores: Option<[usize; 2]>,
     /// Seed of every random number.
     pub seed: Option<u64>,
+    /// Whether a fault that a drive has at the start is reset.
+    pub reset_faults: bool,
+    /// Whether the run is a dry one.
+    pub is_dry: bool,
+    /// How long the drives wait for one that is not ready.
+    pub wait_ready: Option<Duration>,
 }
 
 impl RunPlan {
@@ -70,7 +79,9 @@ impl RunPlan {
         let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns())?;
         plant::check(&scenario)?;
         let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
+        // Also a dry run is one of a motion that the mechanism can follow at full speed.
         let demands = demands(&scenario, &trajectory, &mechanism)?;
+        let trajectory = trajectory.slowed(scenario.dry.speed_now());
         Ok(Self { scenario, mechanism, trajectory, demands, schedule })
     }
 
@@ -158,6 +169,14 @@ fn apply(overrides: &Overrides, scenario: &mut Scenario) -> anyhow::Result<()> {
     }
     if let Some(interfaces) = &overrides.interfaces {
         scenario.can.interfaces.clone_from(interfaces);
+    }
+    if overrides.is_dry {
+        enter_dry_run(scenario);
+    }
+    scenario.can.reset_faults |= overrides.reset_faults;
+    if let Some(wait) = overrides.wait_ready {
+        scenario.can.ready_timeout_ms =
+            u32::try_from(wait.as_millis()).context("--wait-ready: use at most 49 days")?;
     }
     scenario.rate_hz = overrides.rate_hz.unwrap_or(scenario.rate_hz);
     scenario.seed = overrides.seed.unwrap_or(scenario.seed);

@@ -11,6 +11,7 @@ mod check;
 mod checks;
 pub mod compare;
 mod event_log;
+mod full_speed;
 pub mod histogram_log;
 mod judgement;
 mod junit;

@@ -3,12 +3,14 @@
 use std::fmt::Write;
 
 use masseter_shared::config::MotionConfig;
-use masseter_shared::messages::codes::EventKind;
+use masseter_shared::messages::codes::{Cause, EventKind};
 
+use crate::full_speed;
 use crate::text::{decimals, event_with_cycle, microseconds, or_dash};
 use crate::verdict::Verdict;
 use masseter_analysis::{
-    BusResponse, Figures, IntervalFigures, PoseErrors, ReadingFigures, ResponseFigures, TrackingFigures,
+    BusResponse, EventRecord, Figures, IntervalFigures, PoseErrors, ReadingFigures, ResponseFigures,
+    TrackingFigures,
 };
 use masseter_recording::{Manifest, RunUsage, Usage};
 use masseter_shared::wording::counted;
@@ -47,6 +49,8 @@ pub(crate) fn text(manifest: &Manifest, figures: &Figures, verdict: &Verdict, de
         if detail == Detail::Whole {
             write_figures(&mut text, manifest, figures)?;
         }
+        full_speed::write(&mut text, manifest, figures)?;
+        write_start(&mut text, figures)?;
         if detail == Detail::Whole || verdict.exit_code != Exit::Passed {
             write_faults(&mut text, figures)?;
         }
@@ -219,6 +223,18 @@ fn losses(text: &mut String, figures: &Figures) -> std::fmt::Result {
     writeln!(text, "messages: {}", topics.join(", "))?;
     let frames: Vec<_> = figures.frames.iter().enumerate().map(|(bus, n)| format!("can{bus} {n}")).collect();
     writeln!(text, "frames: {}", frames.join(", "))
+}
+
+/// What somebody has to know of the start, also of a run that passed.
+fn write_start(text: &mut String, figures: &Figures) -> std::fmt::Result {
+    let is_of_start = |event: &&EventRecord| {
+        [Cause::FaultReset, Cause::WaitsForDrive].into_iter().any(|cause| event.cause == cause)
+    };
+    let mut events = figures.events.iter().filter(is_of_start).peekable();
+    if events.peek().is_some() {
+        writeln!(text, "\nstart:")?;
+    }
+    events.try_for_each(|event| writeln!(text, "  {}", event_with_cycle(event)))
 }
 
 fn write_faults(text: &mut String, figures: &Figures) -> std::fmt::Result {

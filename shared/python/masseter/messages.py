@@ -144,7 +144,7 @@ class Cause(enum.IntEnum):
     DUPLICATE_NODE = 30
     #: A node booted without a request.
     NODE_RESTARTED = 31
-    #: A drive is in fault and a fault reset does not help (EMCY code, object 603F).
+    #: A drive is in fault and a fault reset does not help (EMCY code, object 603F; the limit is the statusword).
     FAULT_AT_START = 32
     #: A node left the NMT state operational by itself (reported NMT state; the limit is the code of operational).
     NODE_STOPPED = 33

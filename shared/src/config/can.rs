@@ -43,6 +43,13 @@ section! {
         pub answer_us: u32 = 0,
         /// How long the drives may take to boot, ms.
         pub boot_timeout_ms: u32 = 2000,
+        /// Whether a fault that a drive has at the start is reset. Otherwise the run ends and names the fault.
+        pub reset_faults: bool = false,
+        /// How long the drives wait for one that is not ready to switch on, such as one with safe torque off, ms.
+        pub ready_timeout_ms: u32 = 5000,
+        /// How long the drives may take from "ready to switch on" until all are enabled, ms. Brakes take up to a second to
+        /// open; the rest is for the drive.
+        pub enable_timeout_ms: u32 = 1500,
         /// Cycles without a fresh command after which the master quick-stops the drives.
         pub command_timeout_cycles: u32 = 20,
         /// Distance of a drive from where its targets should have taken it, m. Drives that follow are within half of
@@ -63,6 +70,11 @@ impl CanConfig {
         self.interfaces.is_empty()
     }
 
+    /// The longest time from the request to enable the drives until the master gives up, s.
+    pub fn longest_enabling_s(&self) -> f64 {
+        f64::from(self.ready_timeout_ms) * 1e-3 + f64::from(self.enable_timeout_ms) * 1e-3
+    }
+
     /// Bit rate of every bus.
     pub fn bitrate(&self) -> Result<Bitrate, BitrateError> {
         let bitrate = Bitrate::new(self.bitrate_bps)?;
@@ -75,7 +87,7 @@ impl CanConfig {
             return Err(ScenarioError::bad("can.heartbeat_producer_ms", &0, need));
         }
         require_positive(&keyed!("can", self,
-            heartbeat_consumer_ms boot_timeout_ms command_timeout_cycles following_limit_m
+            heartbeat_consumer_ms boot_timeout_ms ready_timeout_ms enable_timeout_ms command_timeout_cycles following_limit_m
             following_limit_cycles
         ))?;
         for (axis, id) in self.node_ids.iter().enumerate() {

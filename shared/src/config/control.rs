@@ -19,10 +19,14 @@ section! {
     pub struct ControllerConfig {
         /// Complete readings in a row before the drives are switched on.
         pub steady_readings: u32 = 10,
-        /// How long the first readings, the enabling of the drives, and at the end their switching off may take each, s.
+        /// How long the first readings, and at the end the switching off of the drives, may take each, s. The enabling may
+        /// take longer by `can.ready_timeout_ms` and `can.enable_timeout_ms`.
         pub start_timeout_s: f64 = 5.0,
         /// Duration of the move from the measured pose to the first pose of the motion, s.
         pub ease_s: f64 = 1.0,
+        /// Distance of the jaw from the first pose of the motion from which on it does not start, mm: the largest of the
+        /// incisal point and the corners of the platform. By default 2 mm on real interfaces, and any on simulated buses.
+        pub start_tolerance_mm: Option<f64> = None,
         /// How long the last pose is held before the drives are switched off, s.
         pub hold_s: f64 = 0.2,
         /// How long a motion takes to come to rest when it is stopped halfway, s.
@@ -122,6 +126,10 @@ pub enum TimingConfig {
 }
 
 impl ControllerConfig {
+    /// Start tolerance on real interfaces, mm: a person puts the jaw so near to the first pose, and a wrong zero of an
+    /// encoder is mostly farther away.
+    pub(super) const START_TOLERANCE_MM: f64 = 2.0;
+
     /// The largest integral gain at this rate of cycles, 1/s.
     pub fn most_integral_gain_per_s(&self, rate_hz: u32) -> f64 {
         f64::from(rate_hz) / self.lead_cycles
@@ -134,6 +142,9 @@ impl ControllerConfig {
             steady_readings lead_cycles integral_gain_per_s trim_limit_m trim_limit_rad stale_cycles
             tracking_limit_m tracking_limit_rad tracking_rms_time_s tracking_rms_limit_m tracking_rms_limit_rad
         ))?;
+        if let Some(tolerance_mm) = self.start_tolerance_mm {
+            require_positive(&[("controller.start_tolerance_mm", tolerance_mm)])?;
+        }
         // The lead is no longer than a drive needs, and an error is corrected only once within the lead.
         if self.lead_cycles > MOST_LEAD_CYCLES as f64 {
             let need = format!(

@@ -12,6 +12,7 @@ mod control;
 mod document;
 mod drive_profile;
 mod drives;
+mod dry;
 mod dynamics;
 mod error;
 mod expect;
@@ -38,6 +39,7 @@ pub use drive_profile::{
     ObjectKey, ObjectRule, StoreConfig, UnitsConfig, VelocityUnit,
 };
 pub use drives::{DriveConfig, DrivesConfig};
+pub use dry::DryConfig;
 pub use dynamics::DynamicsConfig;
 pub use error::ScenarioError;
 pub use expect::{ExpectConfig, ExpectedVerdict};

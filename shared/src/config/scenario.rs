@@ -13,9 +13,9 @@ use super::merge::merge;
 use super::need::{LONGEST_S, SHORTEST_MOTION_S, require_within};
 use super::when::EntryNames;
 use super::{
-    AxisScale, CanConfig, ChecksConfig, ControllerConfig, DriveProfile, DrivesConfig, DynamicsConfig,
-    ExpectConfig, FaultConfig, FoodConfig, JawConfig, MotionConfig, RealtimeConfig, RequirementConfig,
-    StimulusConfig, TrajectoryLimitsConfig,
+    AxisScale, CanConfig, ChecksConfig, ControllerConfig, DriveProfile, DrivesConfig, DryConfig,
+    DynamicsConfig, ExpectConfig, FaultConfig, FoodConfig, JawConfig, MotionConfig, RealtimeConfig,
+    RequirementConfig, StimulusConfig, TrajectoryLimitsConfig,
 };
 use crate::clock::SECOND_NS;
 use crate::geometry::MechanismConfig;
@@ -66,6 +66,8 @@ section! {
         /// What the master expects of each kind of drive; the emulated drives when absent.
         #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "over_kinds")]
         pub drive_profile: Vec<DriveProfile> = Vec::new(),
+        /// The dry run.
+        pub dry: DryConfig = DryConfig::default(),
         /// The emulated mechanism.
         pub dynamics: DynamicsConfig = DynamicsConfig::default(),
         /// Food between the teeth of the emulated jaw; none when absent.
@@ -279,6 +281,7 @@ impl Scenario {
             food.validate()?;
         }
         self.limits.validate()?;
+        self.dry.validate()?;
         self.controller.validate(self.rate_hz)?;
         self.checks.validate()
     }
@@ -298,6 +301,12 @@ impl Scenario {
     /// From metres to the numbers of the drive of an axis.
     pub fn scale(&self, axis: usize) -> AxisScale {
         AxisScale::new(&self.drives.of_axis(axis), self.profile(axis), axis)
+    }
+
+    /// How far the jaw may be from the first pose of the motion at the start, m; none for any distance.
+    pub fn start_tolerance_m(&self) -> Option<f64> {
+        let on_robot_mm = (!self.can.is_virtual()).then_some(ControllerConfig::START_TOLERANCE_MM);
+        self.controller.start_tolerance_mm.or(on_robot_mm).map(|tolerance_mm| tolerance_mm * 1e-3)
     }
 
     /// The names of the faults and stimuli.

@@ -152,7 +152,7 @@ codes! {
         DuplicateNode = 30 "duplicate_node",
         /// A node booted without a request.
         NodeRestarted = 31 "node_restarted",
-        /// A drive is in fault and a fault reset does not help (EMCY code, object 603F).
+        /// A drive is in fault and a fault reset does not help (EMCY code, object 603F; the limit is the statusword).
         FaultAtStart = 32 "fault_at_start",
         /// A node left the NMT state operational by itself (reported NMT state; the limit is the code of operational).
         NodeStopped = 33 "node_stopped",
@@ -196,6 +196,18 @@ codes! {
         WrongObject = 53 "wrong_object",
         /// A drive counts accelerations in another unit than its profile says (60AAh; the limit is the expected one).
         WrongUnit = 54 "wrong_unit",
+        /// A drive is in fault at the start, and no reset is allowed (EMCY code, object 603F; the limit is the statusword).
+        FaultFound = 55 "fault_found",
+        /// A fault found at the start was reset (EMCY code, object 603F; the limit is the statusword).
+        FaultReset = 56 "fault_reset",
+        /// The drives wait for one that is not ready to switch on (statusword; the limit is its EMCY code).
+        WaitsForDrive = 57 "waits_for_drive",
+        /// A drive did not become ready to switch on in time (statusword; the limit is its EMCY code).
+        NotReady = 58 "not_ready",
+        /// A drive was not enabled in time with the others (statusword; the limit is its EMCY code).
+        NotEnabled = 59 "not_enabled",
+        /// The jaw is too far from the first pose of the motion (m).
+        StartTooFar = 60 "start_too_far",
     }
 }
 

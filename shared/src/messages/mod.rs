@@ -133,7 +133,7 @@ macro_rules! messages {
 
 messages! {
     /// Targets and request for the drives, once a cycle.
-    Command on "command" keeping 2048 as "masseter/Command/2d16e906cbecc19c" {
+    Command on "command" keeping 2048 as "masseter/Command/1f1a892af93718b5" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -147,7 +147,7 @@ messages! {
     }
 
     /// Positions, forces and states of the drives, once a cycle.
-    Reading on "reading" keeping 2048 as "masseter/Reading/ef3a56a745011190" {
+    Reading on "reading" keeping 2048 as "masseter/Reading/3b19bd46b3ecd631" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// Cycle of the last command received when the sample was taken; 0 before the first.
@@ -187,7 +187,7 @@ messages! {
     }
 
     /// The controller's state and its estimate, once a cycle.
-    State on "state" keeping 2048 as "masseter/State/50121e46202e7604" {
+    State on "state" keeping 2048 as "masseter/State/4ef6b0906fbe819d" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -240,7 +240,7 @@ messages! {
 
     /// The signals that the controller declares, once a cycle; without any, there is no such message. A recording's
     /// definition of the message has a field for each signal.
-    Signals on "signal" keeping 2048 as "masseter/Signals/f8fc0cb8d3509669" {
+    Signals on "signal" keeping 2048 as "masseter/Signals/79a2eb7431a69ee4" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// The signals, in the order of their declaration.
@@ -249,7 +249,7 @@ messages! {
 
     /// The parameters that the controller declares, in its first cycle and in each that begins with another value. A
     /// recording's definition of the message has a field for each parameter.
-    Parameters on "parameter" keeping 256 as "masseter/Parameters/51e15853a80162b7" {
+    Parameters on "parameter" keeping 256 as "masseter/Parameters/c88d93a42054c0a2" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// The parameters, in the order of their declaration.
@@ -257,7 +257,7 @@ messages! {
     }
 
     /// The true state of the mechanism, once a cycle; the controller never reads it.
-    Truth on "truth" keeping 2048 as "masseter/Truth/aa8226ad0adce9bd" {
+    Truth on "truth" keeping 2048 as "masseter/Truth/c07707f6f3b43950" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// The instant it describes: that of the reading's sample, ns.
@@ -277,7 +277,7 @@ messages! {
     }
 
     /// An observation of a tap on a CAN wire: a frame, or an error message in the coding of `linux/can/error.h`.
-    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/5dd679ec0e9e7514" {
+    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/87ab8e7a01e64bad" {
         /// When its last bit was on the wire, ns.
         time_ns: u64,
         /// When its transmitter had it queued, ns; 0 on real wires.
@@ -294,7 +294,7 @@ messages! {
 
     /// Counters of the kernel for the machine and both loops. The recorder reads and records them; the message is not
     /// published.
-    Machine on "machine" keeping 1 as "masseter/Machine/ce50f5b67b19760a" {
+    Machine on "machine" keeping 1 as "masseter/Machine/3b15ceb2deb74b6b" {
         /// Time of the sample, ns.
         time_ns: u64,
         /// Time that the hypervisor had taken from all cores together, as far as the hypervisor reports it, ns.
@@ -306,7 +306,7 @@ messages! {
     }
 
     /// A single occurrence: a change of state, a fault, an alarm.
-    Event on "event" keeping 1024 as "masseter/Event/3fbb3af877448017" {
+    Event on "event" keeping 1024 as "masseter/Event/c2e1365b706a3502" {
         /// When, ns.
         time_ns: u64,
         /// Cycle of the process that reports it.

@@ -5,6 +5,7 @@ use super::codes::{Cause, EventKind, NoPose, Source};
 use crate::geometry::AXIS_NAMES;
 use crate::wording::counted;
 use masseter_can::canopen::{AbortCode, EmergencyCode, ObjectAddress};
+use masseter_can::cia402::{DriveState, Statusword};
 
 /// The sentence for an event that names a node, a bus, an object, or why there is no pose; `None` for other events.
 pub fn explain(event: &Event) -> Option<String> {
@@ -45,9 +46,23 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
         Cause::DuplicateNode if value == 0 => "more answers than SDO requests, again and again".to_owned(),
         Cause::DuplicateNode => "different process data after one SYNC, again and again".to_owned(),
         Cause::NodeRestarted => "booted although the master did not reset it".to_owned(),
-        Cause::FaultAtStart => format!(
-            "in fault, and a fault reset does not help; error code {}",
-            EmergencyCode(event.value as u16)
+        Cause::FaultAtStart => {
+            format!("in fault, and a fault reset does not help; {}", fault(value, limit))
+        }
+        Cause::FaultFound => format!("was found in fault; {}", fault(value, limit)),
+        Cause::FaultReset => format!("was found in fault, which was reset; {}", fault(value, limit)),
+        Cause::WaitsForDrive => format!("the other drives wait for this one: {}", power(value, limit)),
+        Cause::NotReady => {
+            format!("not ready to switch on within can.ready_timeout_ms: {}", power(value, limit))
+        }
+        Cause::NotEnabled => format!(
+            "not enabled within can.enable_timeout_ms, so all drives are switched off: {}",
+            power(value, limit)
+        ),
+        Cause::StartTooFar => format!(
+            "the jaw is {:.3} mm from the first pose of the motion, limit {:.3} mm",
+            event.value * 1e3,
+            event.limit * 1e3
         ),
         Cause::StillPowered => {
             format!("was left switched on, and a quick stop does not switch it off; statusword {value:04X}h")
@@ -90,6 +105,21 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
     })
 }
 
+/// Error code and state of a drive in fault.
+fn fault(code: u32, statusword: u32) -> String {
+    format!("error code {}, statusword {statusword:04X}h", EmergencyCode(code as u16))
+}
+
+/// State of a drive that is not enabled, and its emergency code if it has reported one.
+fn power(statusword: u32, code: u32) -> String {
+    let state = Statusword(statusword as u16).state();
+    let name = state.map_or_else(|_| "unknown state".to_owned(), |state| state.name().replace('_', " "));
+    let guess = if state == Ok(DriveState::SwitchOnDisabled) { "; safe torque off?" } else { "" };
+    let code = EmergencyCode(code as u16);
+    let reported = if code == EmergencyCode::RESET { String::new() } else { format!(", EMCY {code}") };
+    format!("{name} ({statusword:04X}h){reported}{guess}")
+}
+
 const fn no_pose(reason: NoPose) -> &'static str {
     match reason {
         NoPose::NotFinite => "a coordinate is no finite number",
@@ -120,6 +150,18 @@ const fn remedy(cause: Cause) -> Option<&'static str> {
             "check its wiring, its load, and controller.lead_cycles if it smooths its targets"
         }
         Cause::FaultAtStart => "remove the cause of the drive's error code, then switch the drive off and on",
+        Cause::FaultFound => {
+            "remove the cause of the error code, then reset the drive, or run with --reset-faults (can.reset_faults = true)"
+        }
+        Cause::NotReady => {
+            "release the emergency stop and check the drive's supply; --wait-ready 60s waits longer"
+        }
+        Cause::NotEnabled => {
+            "check its supply and its brake; raise can.enable_timeout_ms if its brake opens late"
+        }
+        Cause::StartTooFar => {
+            "bring the jaw closer, begin the motion where the jaw is, or raise controller.start_tolerance_mm"
+        }
         Cause::StillPowered => {
             "stop the other program that controls the drive, then switch its power off and on"
         }
@@ -171,6 +213,27 @@ mod tests {
         assert!(explain(&refused).unwrap().contains("object 1017h:00h: 06010002h (object is read-only)"));
         let off = Event { axis: NO_AXIS, node: 0, value: 256.0, ..event(Cause::BusOff) };
         assert!(explain(&off).unwrap().starts_with("bus 1: off after"));
+    }
+
+    #[test]
+    fn what_keeps_drives_off_is_said_with_state_code_and_remedy() {
+        let at = |cause, value: u16, limit: u16| {
+            explain(&Event { value: value.into(), limit: limit.into(), ..event(cause) }).unwrap()
+        };
+        assert_eq!(
+            at(Cause::FaultFound, 0x8611, 0x0218),
+            "axis l1 (node 4 on bus 1): was found in fault; error code 8611h (following error), statusword 0218h; \
+             remove the cause of the error code, then reset the drive, or run with --reset-faults \
+             (can.reset_faults = true)"
+        );
+        assert_eq!(
+            at(Cause::WaitsForDrive, 0x0250, 0),
+            "axis l1 (node 4 on bus 1): the other drives wait for this one: switch on disabled (0250h); safe torque off?"
+        );
+        assert!(
+            at(Cause::NotEnabled, 0x0233, 0x5112)
+                .contains("switched on (0233h), EMCY 5112h (logic supply too low);")
+        );
     }
 
     #[test]

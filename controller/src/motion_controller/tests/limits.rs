@@ -2,6 +2,24 @@
 
 use super::*;
 
+#[test]
+fn a_jaw_too_far_from_the_first_pose_is_not_moved_and_no_drive_is_enabled() {
+    let mut scenario = short();
+    scenario.controller.start_tolerance_mm = Some(5.0);
+    // The first pose has legs of 0.2974 m.
+    for (leg_m, is_near) in [(0.29, false), (0.297, true)] {
+        let mut bench = Bench::of(&scenario, [leg_m; LEGS]);
+        for _ in 0..50 {
+            bench.cycle(Some);
+            let is_off = bench.commands[1].request != DriveRequest::Enable.code();
+            assert!(is_near || is_off, "no drive is enabled");
+        }
+        assert_eq!(bench.controller.state() == ControllerState::SafeStop, !is_near);
+        let fault = bench.events.iter().find(|event| event.cause == Cause::StartTooFar.code());
+        assert_eq!(fault.map(|fault| (fault.limit, fault.value > 5e-3)), (!is_near).then_some((5e-3, true)));
+    }
+}
+
 /// The highest speed of each axis' targets in an undisturbed run, m/s.
 fn highest_speed_m_s() -> [f64; AXES] {
     let mut bench = Bench::new();

@@ -208,7 +208,7 @@ impl Axis {
         } else {
             self.power.after(command)
         };
-        let next = self.delayed(next, now_ns);
+        let next = if self.is_kept_off(next) { self.power } else { self.delayed(next, now_ns) };
         if next == DriveState::ReadyToSwitchOn && now_ns < self.torque_from_ns {
             return;
         }
@@ -229,6 +229,17 @@ impl Axis {
             self.interrupt_mode();
             self.slow_down(now_ns, deceleration_m_s2);
         }
+    }
+
+    /// Whether the drive would leave "switch on disabled" while the torque is safely off.
+    fn is_kept_off(&mut self, next: DriveState) -> bool {
+        let is_kept = self.faults.has(FaultKindConfig::DriveSto)
+            && self.power == DriveState::SwitchOnDisabled
+            && next != self.power;
+        if is_kept {
+            self.faults.strike(FaultKindConfig::DriveSto);
+        }
+        is_kept
     }
 
     /// The next state, where an injected fault delays "operation enabled".

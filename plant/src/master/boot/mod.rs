@@ -63,6 +63,10 @@ pub(super) struct Boot {
     readings: u32,
     /// The value to be written back.
     kept: Expedited,
+    /// The statusword of a drive found in fault.
+    fault_statusword: u32,
+    /// A fault was reset, which is to be reported.
+    reset_fault: Option<Failure>,
     client: SdoClient,
     restarts: u32,
     has_repeated: bool,
@@ -73,13 +77,15 @@ pub(super) struct Boot {
 
 impl Boot {
     /// The boot of a drive of which nothing is known at `now_ns`.
-    pub(super) fn new(wanted: &WantedDrive, now_ns: u64) -> Self {
+    pub(super) fn new(wanted: &WantedDrive, resets_faults: bool, now_ns: u64) -> Self {
         Self {
             phase: BootPhase::Waiting,
-            steps: plan(wanted),
+            steps: plan(wanted, resets_faults),
             next: 0,
             readings: 0,
             kept: Expedited::of_unknown_size([0; Expedited::MAX]),
+            fault_statusword: 0,
+            reset_fault: None,
             client: SdoClient::default(),
             restarts: 0,
             has_repeated: false,
@@ -87,6 +93,11 @@ impl Boot {
             reset_at_ns: now_ns + RESET_EVERY_NS,
             since_ns: now_ns,
         }
+    }
+
+    /// The fault that was reset, once.
+    pub(super) fn reset_fault(&mut self) -> Option<Failure> {
+        self.reset_fault.take()
     }
 
     /// How far the boot is.
@@ -275,14 +286,17 @@ impl Boot {
             Check::Unit(declared) if is_other_unit(found, declared) => {
                 return Err(at(Cause::WrongUnit, object, found, declared.code()));
             }
+            Check::FaultRefused => return Err(at(Cause::FaultFound, object, found, self.fault_statusword)),
             Check::NoFault if in_fault(found) => {
-                return self.read_again(at(Cause::FaultAtStart, object, number(self.kept), 0));
+                return self.read_again(self.fault(Cause::FaultAtStart, object));
             }
+            Check::NoFault => self.reset_fault = Some(self.fault(Cause::FaultReset, object)),
             Check::NoVoltage if may_be_powered(found) => {
                 return self.read_again(at(Cause::StillPowered, object, found, 0));
             }
             Check::Keep => self.kept = Expedited::new(read.data()).expect("one to four bytes"),
             Check::FaultElseSkip(skipped) if !in_fault(found) => return Ok(Some(skipped)),
+            Check::FaultElseSkip(_) => self.fault_statusword = found,
             Check::PdoElseSkip(skipped) => {
                 let cob_id = CobId(found);
                 self.kept = Expedited::new(&cob_id.invalidated().0.to_le_bytes()).expect("four bytes");
@@ -291,6 +305,11 @@ impl Boot {
             _ => {}
         }
         Ok(Some(0))
+    }
+
+    /// The fault of the drive, whose code (603Fh) was kept.
+    fn fault(&self, cause: Cause, object: ObjectAddress) -> Failure {
+        at(cause, object, number(self.kept), self.fault_statusword)
     }
 
     /// A value that may still change is read again, but not for ever.
@@ -328,7 +347,7 @@ mod tests {
     fn a_drive_that_is_waited_for_is_reset_twice_a_second() {
         let node = masseter_can::canopen::NodeId::new(4).unwrap();
         let wanted = WantedDrive::of_axis(&masseter_shared::config::Scenario::default(), 3, node).unwrap();
-        let mut boot = Boot::new(&wanted, 0);
+        let mut boot = Boot::new(&wanted, false, 0);
         let resets: Vec<_> = (0..1600).filter(|ms| boot.command(ms * MILLISECOND_NS).is_some()).collect();
         assert_eq!(resets, [500, 1000, 1500]);
     }

@@ -44,6 +44,8 @@ pub(super) enum Check {
     Keep,
     /// A statusword: without a fault, now or after repetitions.
     NoFault,
+    /// The error code of a fault, for which the drive is given up.
+    FaultRefused,
     /// A statusword: without voltage, now or after repetitions.
     NoVoltage,
     /// A statusword: unless the drive is in fault, skip that many steps.
@@ -52,8 +54,8 @@ pub(super) enum Check {
     PdoElseSkip(usize),
 }
 
-/// The steps for a drive, in their order.
-pub(super) fn plan(wanted: &WantedDrive) -> Vec<Step> {
+/// The steps for a drive, in their order; a fault that is found ends them, or is reset.
+pub(super) fn plan(wanted: &WantedDrive, resets_faults: bool) -> Vec<Step> {
     let mut steps = vec![Step::Enter(BootPhase::Identifying)];
     steps.extend(wanted.identity.iter().map(|&wanted| compare(wanted, Cause::WrongIdentity)));
     steps.push(Step::Enter(BootPhase::CheckingPdos));
@@ -83,16 +85,21 @@ pub(super) fn plan(wanted: &WantedDrive) -> Vec<Step> {
     steps.extend(HOLD_POSITION);
     steps.push(write(0x6060, 0, CYCLIC_POSITION, 1));
     steps.push(expect(0x6061, 0, CYCLIC_POSITION, Cause::NotAccepted));
-    // A fault whose cause is gone is reset by an edge; one that persists is reported with its code.
-    let reset_fault = [
-        Step::Read(ObjectAddress::new(0x603F, 0), Check::Keep),
-        control(Controlword::DISABLE_VOLTAGE),
-        control(Controlword::FAULT_RESET),
-        control(Controlword::DISABLE_VOLTAGE),
-        Step::Read(STATUSWORD, Check::NoFault),
-    ];
-    steps.push(Step::Read(STATUSWORD, Check::FaultElseSkip(reset_fault.len())));
-    steps.extend(reset_fault);
+    // A fault tells what somebody has to look at, so it is reset only on request: by an edge, if its cause is gone.
+    let error_code = ObjectAddress::new(0x603F, 0);
+    let with_fault = if resets_faults {
+        vec![
+            Step::Read(error_code, Check::Keep),
+            control(Controlword::DISABLE_VOLTAGE),
+            control(Controlword::FAULT_RESET),
+            control(Controlword::DISABLE_VOLTAGE),
+            Step::Read(STATUSWORD, Check::NoFault),
+        ]
+    } else {
+        vec![Step::Read(error_code, Check::FaultRefused)]
+    };
+    steps.push(Step::Read(STATUSWORD, Check::FaultElseSkip(with_fault.len())));
+    steps.extend(with_fault);
     steps.extend(HOLD_POSITION);
     steps.push(Step::Enter(BootPhase::Configured));
     steps
@@ -101,7 +108,7 @@ pub(super) fn plan(wanted: &WantedDrive) -> Vec<Step> {
 /// The least number of SDO exchanges that the boot of a drive takes: of a drive without a fault and without other PDOs
 /// that gives the expected answers at once.
 pub(crate) fn shortest_boot(wanted: &WantedDrive) -> usize {
-    let steps = plan(wanted);
+    let steps = plan(wanted, false);
     let without_exchange = |step: &Step| match step {
         Step::Enter(_) => 1,
         Step::Read(_, Check::FaultElseSkip(skipped) | Check::PdoElseSkip(skipped)) => *skipped,
@@ -163,7 +170,7 @@ mod tests {
         scenario.mechanism.strokes.slide_m = [-10.0, 20.0].map(|increments| increments * increment_m);
         let wanted = WantedDrive::of_axis(&scenario, 0, id).unwrap();
         for mut limits in [[-500, -400], [-10, 20], [400, 500], [i32::MIN, i32::MAX], [0, 0]] {
-            for step in plan(&wanted) {
+            for step in plan(&wanted, false) {
                 if let Step::Write { object, value, .. } = step
                     && object.index == 0x607D
                 {

@@ -1,6 +1,7 @@
 //! From power-on to enabled drives, and the reasons that prevent it.
 
 use masseter_can::canopen::{AbortCode, NmtState, SdoRequest};
+use masseter_can::cia402::Statusword;
 
 use super::peer::POSITION;
 use super::*;
@@ -41,6 +42,7 @@ fn a_drive_is_configured_as_the_scenario_declares() {
         ((0x6085, 0), 10_000_000),
         ((0x6065, 0), 2000),
         ((0x6066, 0), 20),
+        ((0x6072, 0), 2000),
         ((0x60C2, 1), 1),
         ((0x60C2, 2), 0xFD),
         ((0x6060, 0), 8),
@@ -97,7 +99,7 @@ fn a_drive_that_is_not_as_expected_is_named_and_no_drive_is_enabled() {
             0x60_7C00,
         ),
         (|drive| drive.servers = 2, Cause::DuplicateNode, 0),
-        (|drive| drive.get_stuck_in(DriveState::Fault), Cause::FaultAtStart, 0x60_4100),
+        (|drive| drive.get_stuck_in(DriveState::Fault), Cause::FaultFound, 0x60_3F00),
     ];
     for (change, cause, object) in table {
         let mut bench = Bench::new();
@@ -150,13 +152,60 @@ fn nothing_is_written_to_a_device_that_is_another() {
     assert!(!bench.drive(0).requests.iter().any(wrote));
 }
 
+fn resetting_faults() -> Bench {
+    let mut scenario = Scenario::default();
+    scenario.can.reset_faults = true;
+    Bench::of(scenario)
+}
+
 #[test]
-fn a_fault_that_is_only_remembered_is_reset_by_an_edge() {
+fn a_fault_found_at_the_start_is_named_and_neither_reset_nor_followed_by_power() {
     let mut bench = Bench::new();
+    bench.drive(2).power = DriveState::Fault;
+    bench.cycles(400, DriveRequest::Enable);
+    assert_eq!(bench.drive(2).power, DriveState::Fault);
+    assert!((0..AXES).all(|axis| !bench.drive(axis).power.is_powered()));
+    let fault = *bench.events_of(EventKind::Fault).next().unwrap();
+    assert_eq!((fault.cause, fault.axis, fault.value as u16), (Cause::FaultFound.code(), 2, 0x7320));
+    assert_eq!(fault.limit as u16, Statusword::for_state(DriveState::Fault).0);
+    assert_eq!(bench.causes(EventKind::Fault).len(), 1);
+}
+
+#[test]
+fn a_fault_that_is_only_remembered_is_reset_by_an_edge_on_request_and_reported() {
+    let mut bench = resetting_faults();
     bench.drive(2).power = DriveState::Fault;
     bench.cycles(400, DriveRequest::Enable);
     assert!(bench.all_are(DriveState::OperationEnabled));
     assert_eq!(bench.causes(EventKind::Fault), []);
+    let notice = *bench.events_of(EventKind::Notice).next().unwrap();
+    assert_eq!((notice.cause, notice.axis, notice.value as u16), (Cause::FaultReset.code(), 2, 0x7320));
+}
+
+#[test]
+fn a_fault_that_persists_is_named_although_a_reset_was_requested() {
+    let mut bench = resetting_faults();
+    bench.drive(3).get_stuck_in(DriveState::Fault);
+    bench.cycles(800, DriveRequest::Enable);
+    assert!(bench.nobody_is_enabled());
+    assert_eq!(bench.causes(EventKind::Fault), [Cause::FaultAtStart]);
+    assert_eq!(bench.causes(EventKind::Notice), []);
+}
+
+#[test]
+fn a_dry_run_lowers_the_limit_of_force_and_needs_a_drive_that_has_one() {
+    for is_on in [false, true] {
+        let mut scenario = Scenario::default();
+        scenario.dry.is_on = is_on;
+        let mut bench = Bench::of(scenario.clone());
+        bench.cycles(400, DriveRequest::Enable);
+        assert_eq!(bench.drive(0).written(0x6072, 0), if is_on { 600 } else { 2000 });
+        let mut bench = Bench::of(scenario);
+        bench.drive(0).refuses = Some(((0x6072, 0), AbortCode::NO_OBJECT));
+        bench.cycles(400, DriveRequest::Enable);
+        assert_eq!(bench.all_are(DriveState::OperationEnabled), !is_on);
+        assert_eq!(bench.causes(EventKind::Fault).first(), is_on.then_some(&Cause::SdoAborted));
+    }
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Scenarios of the master with scripted drives.
 
 mod boot;
+mod enabling;
 mod lost;
 mod peer;
 mod recovery;
@@ -36,7 +37,11 @@ struct Bench {
 impl Bench {
     /// Everything switched on, the drives as the master expects them.
     fn new() -> Self {
-        let mut scenario = Scenario::default();
+        Self::of(Scenario::default())
+    }
+
+    /// The same with a scenario of its own.
+    fn of(mut scenario: Scenario) -> Self {
         scenario.mechanism.strokes.leg_m = scenario.mechanism.strokes.slide_m;
         let ids = scenario.can.node_ids.map(|id| NodeId::new(id).unwrap());
         Self {

@@ -111,6 +111,11 @@ impl Peer {
         (self.power, self.stuck_in) = (state, Some(state));
     }
 
+    /// Leaves every state again that it is told to leave.
+    pub(super) fn be_free(&mut self) {
+        self.stuck_in = None;
+    }
+
     /// Power off and on: it comes back as it left the factory.
     pub(super) fn cycle_power(&mut self) {
         (self.nmt, self.power, self.buffered) = (None, DriveState::SwitchOnDisabled, None);

@@ -35,9 +35,46 @@ impl EmergencyCode {
     pub const FOLLOWING_ERROR: Self = Self(0x8611);
 }
 
+/// The meaning of the codes whose leading digits are those given (CiA 301, table 21; CiA 402, error codes). The longest
+/// match counts.
+#[rustfmt::skip]
+const MEANINGS: [(&str, &str); 64] = [
+    ("0000", "no error"), ("10", "generic error"),
+    ("2", "current"), ("21", "current at the input"), ("22", "current inside the device"),
+    ("23", "current at the output"), ("231", "continuous overcurrent"), ("232", "short circuit or earth leakage"),
+    ("233", "earth leakage"), ("234", "short circuit in the motor"), ("235", "load too high (I²t)"),
+    ("3", "voltage"), ("31", "mains voltage"), ("311", "mains overvoltage"), ("312", "mains undervoltage"),
+    ("313", "mains phase missing"), ("32", "voltage inside the device"), ("321", "DC link overvoltage"),
+    ("322", "DC link undervoltage"), ("33", "output voltage"),
+    ("4", "temperature"), ("41", "ambient temperature"), ("42", "temperature of the device"),
+    ("43", "temperature of the drive"), ("44", "temperature of the supply"),
+    ("5", "hardware"), ("51", "supply"), ("511", "logic supply too low"), ("54", "power section"),
+    ("541", "output stage"), ("55", "data memory"),
+    ("6", "software"), ("601", "software reset by the watchdog"), ("61", "internal software"),
+    ("62", "user software"), ("63", "data record"), ("631", "parameters lost"), ("632", "wrong parameters"),
+    ("7", "additional module"), ("711", "brake chopper"), ("712", "motor"), ("7121", "motor blocked"),
+    ("7122", "motor error or commutation"), ("73", "sensor"), ("7305", "incremental encoder 1"),
+    ("731", "speed sensor"), ("732", "position sensor"), ("75", "communication module"),
+    ("8", "monitoring"), ("81", "communication"), ("812", "CAN controller error passive"),
+    ("813", "heartbeat or node guarding missing"), ("814", "CAN controller was off the bus"), ("82", "protocol"),
+    ("821", "PDO too short"), ("822", "PDO too long"), ("825", "process data missing"), ("83", "torque control"),
+    ("84", "speed control"), ("85", "position control"), ("86", "positioning"), ("8611", "following error"),
+    ("90", "external error"), ("FF", "of the maker: see the drive's manual"),
+];
+
+impl EmergencyCode {
+    /// What the code means, by its leading digits; none for codes of no class of the standards.
+    pub fn meaning(self) -> Option<&'static str> {
+        let digits = format!("{:04X}", self.0);
+        let known = MEANINGS.iter().filter(|(leading, _)| digits.starts_with(leading));
+        known.max_by_key(|(leading, _)| leading.len()).map(|(_, meaning)| *meaning)
+    }
+}
+
 impl fmt::Display for EmergencyCode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:04X}h", self.0)
+        write!(f, "{:04X}h", self.0)?;
+        self.meaning().map_or(Ok(()), |meaning| write!(f, " ({meaning})"))
     }
 }
 
@@ -109,6 +146,23 @@ mod tests {
         assert_eq!(emergency.frame(NodeId::new(2).unwrap()).to_string(), "082#1186210102030405");
         assert!(!emergency.is_reset());
         assert!(Emergency::RESET.is_reset());
+    }
+
+    #[test]
+    fn a_code_is_explained_by_the_longest_leading_digits_that_are_known() {
+        let in_words =
+            [0x8611, 0x8612, 0x7305, 0x5112, 0xFF03, 0xA000].map(|code| EmergencyCode(code).to_string());
+        assert_eq!(
+            in_words,
+            [
+                "8611h (following error)",
+                "8612h (positioning)",
+                "7305h (incremental encoder 1)",
+                "5112h (logic supply too low)",
+                "FF03h (of the maker: see the drive's manual)",
+                "A000h"
+            ]
+        );
     }
 
     proptest! {
