@@ -9,7 +9,7 @@ use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{AXES, AXIS_NAMES, Actuators, Jacobian, Joints, Mechanism, Pose, Vec3};
 use masseter_shared::messages::pose_fields;
-use masseter_terminal::{Exit, Failure, OrFailure, result_line};
+use masseter_terminal::{Exit, Failure, result_line};
 use serde_json::{Value, json};
 
 use super::args::RobotArgs;
