@@ -59,7 +59,7 @@ fn nothing_moves_without_a_held_key() {
 fn absolute_axes_are_compared_and_incremental_ones_home_twice() {
     let (code, out, err, _) = robot("", &["home"]);
     assert_eq!((code, out.lines().count()), (Some(0), 6), "{out}{err}");
-    assert!(out.starts_with("l1: 290.000") && out.contains("the encoder keeps its position"), "{out}");
+    assert!(out.starts_with("l1: 289.9") && out.contains("the encoder keeps its position"), "{out}");
     let index = "[[drive_profile]]\naxes = ['l1']\n\
                  homing = { method = 33, absolute = false, home_position_m = 0.288 }\n";
     let (code, out, err, result) = robot(index, &["home", "--axis", "l1"]);
@@ -74,7 +74,7 @@ fn the_closed_pose_passes_and_another_one_is_explained_by_axis() {
     assert!(out.contains("condition number") && out.lines().count() == 9, "{out}");
     // A slipped coupling.
     let slipped =
-        format!("{CLOSED}[[faults]]\nkind = 'encoder_offset'\naxis = 'd2'\nsize = 0.002\nfrom_s = 0.0\n");
+        format!("{CLOSED}[[faults]]\nkind = 'encoder_offset'\naxis = 'd2'\nsize = '2 mm'\nfrom_s = 0.0\n");
     let (code, out, err, result) = robot(&slipped, &["check-pose"]);
     assert_eq!((code, &result["passed"]), (Some(1), &Value::Bool(false)), "{out}{err}");
     assert!(err.contains("d2 differs most, by 2.0"), "{out}{err}");
@@ -91,4 +91,19 @@ fn a_step_needs_the_earlier_one_and_a_length_its_unit() {
     assert!(!evidence.exists(), "a refused step makes no folder");
     let output = masseter(&[&jog[..], &["1"]].concat());
     assert!(stderr(&output).contains("such as 1mm"), "{}", stderr(&output));
+}
+
+#[test]
+fn the_steps_follow_each_other_by_their_evidence() {
+    let workspace = Workspace::new("");
+    let (file, evidence) = (workspace.file("scenario.toml"), workspace.file("bringup"));
+    let places = ["--folder", evidence.to_str().unwrap(), file.to_str().unwrap()];
+    for step in ["inspect", "configure", "jog --axis l1 --by 2mm --measured 2mm", "home --axis l1"] {
+        let step: Vec<_> = step.split(' ').collect();
+        let output = masseter(&[&["robot"], &step[..], &places].concat());
+        assert_eq!(output.status.code(), Some(0), "{step:?}: {}{}", stdout(&output), stderr(&output));
+    }
+    let output = masseter(&[&["robot", "check-pose"], &places[..]].concat());
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+    assert!(stderr(&output).contains("d1: home not done"), "{}", stderr(&output));
 }

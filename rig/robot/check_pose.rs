@@ -63,7 +63,9 @@ pub(crate) fn check_pose(args: &CheckPoseArgs) -> Result<Exit, Failure> {
         Ok(stand) => stand,
         Err(error) => return Err(session.fail(error)),
     };
-    let found = at_rest(&stand).and_then(|()| Found::new(&session.scenario, stand.positions_m));
+    let found = at_rest(&stand)
+        .and_then(|()| within_strokes(&session.scenario, &stand.positions_m))
+        .and_then(|()| Found::new(&session.scenario, stand.positions_m));
     let judged = found.and_then(|found| {
         found.print(&stand)?;
         let data = found.data(&stand);
@@ -78,7 +80,7 @@ pub(crate) fn check_pose(args: &CheckPoseArgs) -> Result<Exit, Failure> {
         Err(error) => {
             session
                 .finish(false, &json!({ "error": error.to_string(), "positions_m": stand.positions_m }))?;
-            Err(error).map_err(|error| Failure::with(Exit::Failed, error))
+            Err(Failure::with(Exit::Failed, error))
         }
     }
 }
@@ -87,6 +89,24 @@ fn at_rest(stand: &Stand) -> anyhow::Result<()> {
     for (name, moved_m) in AXIS_NAMES.iter().zip(stand.moved_m) {
         if moved_m.abs() > STILL_M {
             bail!("{name}: moved {:.3} mm; check its brake, and hold the robot still", moved_m * 1e3);
+        }
+    }
+    Ok(())
+}
+
+/// Positions outside of the strokes are no positions of this robot: most often an encoder that lost its zero.
+fn within_strokes(scenario: &Scenario, positions_m: &[f64; AXES]) -> anyhow::Result<()> {
+    for (axis, &position_m) in positions_m.iter().enumerate() {
+        let [low_m, high_m] = scenario.mechanism.strokes.of_axis(axis);
+        if !(low_m - STILL_M..=high_m + STILL_M).contains(&position_m) {
+            bail!(
+                "{}: 6064h shows {:.3} mm, the stroke is {:.1} to {:.1} mm; home it again: an incremental encoder loses its \
+                 zero without power",
+                AXIS_NAMES[axis],
+                position_m * 1e3,
+                low_m * 1e3,
+                high_m * 1e3
+            );
         }
     }
     Ok(())
@@ -170,11 +190,10 @@ impl Found {
             self.condition
         )?;
         result_line!("axis  6064h, mm  from closed, mm  1 mm wrong moves the three points by, mm  drive")?;
-        for axis in 0..AXES {
+        for (axis, name) in AXIS_NAMES.iter().enumerate() {
             let wrong = self.wrong_m[axis].map_or_else(|| "no pose".to_owned(), |wrong_m| in_mm(&wrong_m));
             result_line!(
-                "{:<4} {:>10.4} {:>16.4}  {wrong:<42} {}",
-                AXIS_NAMES[axis],
+                "{name:<4} {:>10.4} {:>16.4}  {wrong:<42} {}",
                 stand.positions_m[axis] * 1e3,
                 self.differs_m[axis] * 1e3,
                 stand.states[axis]
@@ -199,6 +218,8 @@ impl Found {
 }
 
 fn in_mm(lengths_m: &[f64]) -> String {
-    let each: Vec<_> = lengths_m.iter().map(|length_m| format!("{:.4}", length_m * 1e3)).collect();
+    // A rounded −0 is 0.
+    let rounded = |length_m: &f64| (length_m * 1e7).round() / 1e4 + 0.0;
+    let each: Vec<_> = lengths_m.iter().map(|length_m| format!("{:.4}", rounded(length_m))).collect();
     each.join(" ")
 }

@@ -30,6 +30,7 @@ const DEFAULT_PATIENCE: Duration = Duration::from_secs(10);
 #[command(
     after_help = "Examples:\n  masseter run --duration 30\n  masseter run scenario.toml --live\n  masseter run --clock virtual --seed 2 --out /tmp/run"
 )]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub(crate) struct RunArgs {
     /// Scenario file [default: ten seconds of chewing]
     pub scenario: Option<PathBuf>,

@@ -36,6 +36,7 @@ pub struct HomeReport {
 
 /// One search.
 #[derive(Debug, Clone, Copy)]
+#[expect(clippy::struct_field_names, reason = "the unit ends every name")]
 struct Found {
     /// Way of the search, m.
     way_m: f64,

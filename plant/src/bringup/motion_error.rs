@@ -137,6 +137,17 @@ pub enum MotionError {
         /// What is known.
         reason: String,
     },
+    /// The axis moved after its power went.
+    #[error(
+        "{}: moved {:.3} mm after its power went; support the axis, and let the drive close the brake before it takes the current away",
+        AXIS_NAMES[*axis], .moved_m * 1e3
+    )]
+    Dropped {
+        /// The axis.
+        axis: usize,
+        /// How far, m.
+        moved_m: f64,
+    },
     /// A way that is not for this step.
     #[error("{}: {:.3} mm is no way for a jog; give up to {:.0} mm, at least ten increments", AXIS_NAMES[*axis], .by_m * 1e3, .most_m * 1e3)]
     Way {

@@ -11,6 +11,10 @@ use super::watch::{read_error_code, read_position, read_state};
 
 /// How long a drive may take from one state to the next, ns.
 const TRANSITION_NS: u64 = SECOND_NS;
+/// How long an axis is watched after its power went, ns.
+const SETTLING_NS: u64 = SECOND_NS;
+/// How far an axis may move as its brake closes, m: some turns of play, and not a fall.
+const MOST_DROP_M: f64 = 5e-4;
 /// How long a halt may take before the quick stop comes, ns.
 const HALT_NS: u64 = 100 * MILLISECOND_NS;
 
@@ -32,7 +36,10 @@ pub(super) fn switch_on(line: &mut Line, axis: usize) -> Result<(), MotionError>
 }
 
 /// Switches off an axis that stands: "disable operation" closes the brake, and the voltage goes once the brake holds. Returns
-/// how far the axis moved meanwhile, m.
+/// how far the axis moved until a second later, m.
+///
+/// # Errors
+/// [`MotionError::Dropped`] for an axis that nothing holds without power.
 pub(super) fn switch_off(
     line: &mut Line,
     axis: usize,
@@ -43,7 +50,9 @@ pub(super) fn switch_off(
     line.control(axis, Controlword::SWITCH_ON)?;
     line.listen(seconds(brake.close_s))?;
     disable_voltage(line, axis)?;
-    Ok(read_position(line, axis, scale)? - before_m)
+    line.listen(SETTLING_NS)?;
+    let moved_m = read_position(line, axis, scale)? - before_m;
+    if moved_m.abs() > MOST_DROP_M { Err(MotionError::Dropped { axis, moved_m }) } else { Ok(moved_m) }
 }
 
 /// Stops an axis in whatever it does: halt, quick stop, voltage off. Every command is sent, whatever became of the one before.

@@ -299,3 +299,15 @@ fn the_stand_shows_every_axis_and_writes_nothing() {
     assert!(stand.moved_m.iter().all(|moved_m| moved_m.abs() < 1e-5));
     assert_eq!(stand.states.len(), AXES);
 }
+
+/// A leg that nothing holds falls as its power goes: with a brake that closes late, and without one.
+#[test]
+fn an_axis_that_falls_without_power_fails_the_jog() {
+    for quirk in ["kind = 'slow_brake'\nclose_s = 1.0", "kind = 'no_brake'"] {
+        let mut bench = Bench::new(&format!("[[drives.quirk]]\n{quirk}\naxes = ['l1']"));
+        let error = bench.jog(0.001).unwrap_err();
+        let MotionError::Dropped { axis: L1, moved_m } = error else { panic!("{quirk}: {error}") };
+        assert!(moved_m < -0.001, "{moved_m}");
+        bench.assert_off();
+    }
+}

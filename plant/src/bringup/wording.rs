@@ -6,21 +6,8 @@ use super::line::SdoReason;
 use crate::drive::dictionary::{ENTRIES, find};
 
 /// Objects that the emulated drives do not have.
-const FURTHER: [(u16, u8, &str); 13] = [
-    (0x30B0, 0, "Home position"),
-    (0x30B1, 0, "Home offset move distance"),
-    (0x605B, 0, "Shutdown option code"),
-    (0x605C, 0, "Disable operation option code"),
-    (0x608F, 1, "Encoder increments"),
-    (0x608F, 2, "Motor revolutions"),
-    (0x6091, 1, "Gear ratio: motor turns"),
-    (0x6091, 2, "Gear ratio: shaft turns"),
-    (0x6092, 1, "Feed"),
-    (0x6092, 2, "Feed: shaft turns"),
-    (0x60A8, 0, "Unit of position"),
-    (0x60A9, 0, "Unit of velocity"),
-    (0x60AA, 0, "Unit of acceleration"),
-];
+const FURTHER: [(u16, u8, &str); 2] =
+    [(0x30B0, 0, "Home position"), (0x30B1, 0, "Home offset move distance")];
 
 /// Name of an object; empty where the rig knows none.
 pub fn object_name(object: ObjectAddress) -> &'static str {
@@ -80,7 +67,7 @@ mod tests {
             assert_eq!(value_text(ObjectAddress::new(index, subindex), value), text);
         }
         assert_eq!(object_name(ObjectAddress::new(0x6066, 0)), "Following error time out");
-        assert_eq!(object_name(ObjectAddress::new(0x6091, 1)), "Gear ratio: motor turns");
+        assert_eq!(object_name(ObjectAddress::new(0x6091, 1)), "Motor revolutions");
         assert_eq!(object_name(ObjectAddress::new(0x2000, 0)), "");
     }
 }

@@ -1,0 +1,114 @@
+//! Which step of the bring-up finds which habit of a drive: every row of the table in docs/robot.md is played.
+//!
+//! The emulated drives take the habits of vendors' drives from `[[drives.quirk]]`.
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use common::{MASSETER, Workspace, stderr, stdout};
+
+const AXES: [&str; 6] = ["l1", "l2", "l3", "d1", "d2", "d3"];
+
+/// A row of the table.
+#[derive(Debug)]
+struct Row {
+    quirk: String,
+    found_by: Option<String>,
+    exit: Option<i32>,
+    says: Option<String>,
+    /// Keys of a profile with which every step passes; none where no profile helps.
+    profile: Option<String>,
+}
+
+/// The text between the backticks of a cell.
+fn quoted(cell: &str) -> Option<String> {
+    Some(cell.split('`').nth(1)?.to_owned())
+}
+
+fn rows() -> Vec<Row> {
+    let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/robot.md")).unwrap();
+    let (_, table) = text.split_once("| quirk | found by | exit |").unwrap();
+    let lines = table.lines().skip(2).take_while(|line| line.starts_with('|'));
+    let row = |line: &str| {
+        let [_, quirk, found_by, exit, says, profile, _] = line.split('|').collect::<Vec<_>>()[..] else {
+            panic!("{line}");
+        };
+        let no_profile_helps = profile.trim().starts_with("none");
+        Row {
+            quirk: quoted(quirk).unwrap(),
+            found_by: quoted(found_by),
+            exit: exit.trim().parse().ok(),
+            says: quoted(says),
+            profile: (!no_profile_helps).then(|| quoted(profile).unwrap_or_default()),
+        }
+    };
+    lines.map(row).collect()
+}
+
+/// A robot whose jaw is closed, with that quirk and those keys of a profile.
+fn robot(quirk: &str, profile: &str) -> Workspace {
+    let quirk = quirk.replace(", ", "\n");
+    Workspace::new(&format!(
+        "[drives]\nmemory = 'drives.json'\n[[drives.quirk]]\n{quirk}\n[dynamics]\ninitial_leg_m = 0.2974\n\
+         [[drive_profile]]\n{profile}\n"
+    ))
+}
+
+/// Every step in its order: its name, and its arguments.
+fn steps() -> Vec<(&'static str, Vec<&'static str>)> {
+    let jog = |axis| ("jog", vec!["--axis", axis, "--by", "1mm", "--measured", "1mm"]);
+    let before = [("inspect", vec![]), ("configure", vec!["--store"])];
+    before.into_iter().chain(AXES.map(jog)).chain([("home", vec![]), ("check-pose", vec![])]).collect()
+}
+
+/// Plays one step; returns its exit code and what it says.
+fn play(robot: &Workspace, step: &str, arguments: &[&str]) -> (i32, String) {
+    let mut command = Command::new(MASSETER);
+    command.args(["robot", step]).arg(robot.file("scenario.toml")).args(arguments);
+    let output = command.arg("--folder").arg(robot.file("bringup")).output().expect("masseter starts");
+    (output.status.code().unwrap_or(-1), stdout(&output) + &stderr(&output))
+}
+
+/// The steps up to the one that finds the quirk.
+fn assert_found(row: &Row) {
+    let Some(found_by) = &row.found_by else { return };
+    let robot = robot(&row.quirk, "");
+    for (step, arguments) in steps() {
+        let (exit, text) = play(&robot, step, &arguments);
+        if step == found_by {
+            let says = row.says.as_deref().unwrap();
+            assert_eq!((Some(exit), text.contains(says)), (row.exit, true), "{row:?}: {step}: {text}");
+            return;
+        }
+        assert_eq!(exit, 0, "{row:?}: {step}: {text}");
+    }
+    panic!("{row:?}: there is no step {found_by}");
+}
+
+/// All steps, where a profile tells of the quirk.
+fn assert_passes(row: &Row) {
+    let Some(profile) = &row.profile else { return };
+    let robot = robot(&row.quirk, profile);
+    for (step, arguments) in steps() {
+        let (exit, text) = play(&robot, step, &arguments);
+        assert_eq!(exit, 0, "{row:?}: {step}: {text}");
+    }
+    let (exit, text) = play(&robot, "inspect", &[]);
+    assert!(
+        exit == 0 && text.contains("passed: all drives are as the scenario needs them"),
+        "{row:?}: {text}"
+    );
+}
+
+#[test]
+fn every_quirk_is_found_by_its_step_and_passes_with_its_profile() {
+    let rows = rows();
+    assert!(rows.len() >= 16, "{}", rows.len());
+    for row in &rows {
+        assert_found(row);
+        assert_passes(row);
+    }
+}
