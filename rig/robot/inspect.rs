@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use clap::Args;
-use masseter_can::canopen::AbortCode;
-use masseter_plant::bringup::{Deviation, Outcome, SdoReason, Survey, object_name};
+use masseter_can::canopen::ObjectAddress;
+use masseter_plant::bringup::{Deviation, Outcome, Survey, object_name, reason_text};
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
 use masseter_shared::wording::counted;
@@ -103,11 +103,11 @@ fn other_nodes(robot: &RobotLine) -> Vec<String> {
 }
 
 fn drive(robot: &RobotLine, axis: usize, survey: Option<&Survey>) -> DriveResult {
-    let text = |index| survey?.text(masseter_can::canopen::ObjectAddress::new(index, 0));
+    let text = |index| survey?.text(ObjectAddress::new(index, 0));
     let unread = survey.into_iter().flat_map(Survey::readings);
     let unread = unread.filter_map(|(object, reading)| {
         let reason = reading.as_ref().err()?;
-        Some((format!("{object} {}", object_name(object)).trim_end().to_owned(), word(*reason)))
+        Some((format!("{object} {}", object_name(object)).trim_end().to_owned(), reason_text(*reason)))
     });
     DriveResult {
         axis: AXIS_NAMES[axis],
@@ -116,13 +116,6 @@ fn drive(robot: &RobotLine, axis: usize, survey: Option<&Survey>) -> DriveResult
         device: [0x1008, 0x1009, 0x100A].map(text),
         deviations: survey.map(|survey| robot.deviations(axis, survey)).unwrap_or_default(),
         unread: unread.collect(),
-    }
-}
-
-fn word(reason: SdoReason) -> String {
-    match reason {
-        SdoReason::Aborted(AbortCode::NO_OBJECT | AbortCode::NO_SUBINDEX) => "not there".to_owned(),
-        reason => reason.to_string(),
     }
 }
 

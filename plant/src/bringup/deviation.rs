@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::settings::{Difference, Settings};
 use super::survey::Survey;
-use super::wording::{object_name, value_text};
+use super::wording::{object_name, reason_text, value_text};
 use crate::wanted::{WantedDrive, WantedIdentity};
 
 /// Bit of 6502h: cyclic synchronous position.
@@ -55,12 +55,20 @@ pub fn deviations(
         wanted.identity.iter().filter_map(|&identity| of_identity(survey, identity)).collect();
     all.extend(of_state(survey));
     all.extend(of_units(survey, profile));
-    let mut differences = settings.differences(survey);
-    // A unit that the profile lists as an object is compared as such.
+    let differences = settings.differences(survey);
+    let is_at =
+        |deviation: &Deviation, difference: &Difference| deviation.object == difference.object.to_string();
+    // A unit that the profile writes is mended; one that it expects is told in words.
     all.retain(|deviation| {
-        !differences.iter().any(|difference| difference.object.to_string() == deviation.object)
+        let mut written = differences.iter().filter(|difference| difference.rule != ObjectRule::Expect);
+        !written.any(|difference| is_at(deviation, difference))
     });
-    all.extend(differences.drain(..).map(|difference| of_object(survey, &difference)));
+    let others: Vec<_> = differences
+        .iter()
+        .filter(|difference| !all.iter().any(|deviation| is_at(deviation, difference)))
+        .map(|difference| of_object(survey, difference))
+        .collect();
+    all.extend(others);
     all
 }
 
@@ -77,9 +85,10 @@ fn new(
 
 /// A value, or why there is none.
 fn found_text(survey: &Survey, object: ObjectAddress) -> String {
-    survey.number(object).map(|value| value_text(object, value)).unwrap_or_else(|| {
-        survey.refusal(object).map_or_else(|| "not there".to_owned(), |reason| reason.to_string())
-    })
+    survey
+        .number(object)
+        .map(|value| value_text(object, value))
+        .unwrap_or_else(|| survey.refusal(object).map_or_else(|| "not there".to_owned(), reason_text))
 }
 
 fn of_identity(survey: &Survey, WantedIdentity { object, mask, value }: WantedIdentity) -> Option<Deviation> {
@@ -180,12 +189,9 @@ fn of_object(survey: &Survey, difference: &Difference) -> Deviation {
         (_, Some(_)) => (Outcome::Mended, format!("write {}", value_text(*object, *wanted))),
     };
     let wanted = if is_pdo && *wanted >> 31 == 1 { "off".to_owned() } else { value_text(*object, *wanted) };
-    let key = if outcome == Outcome::Refused && found.is_none() && !is_pdo {
-        format!("drive_profile.objects (value: {key})")
-    } else {
-        key.clone()
-    };
-    new(*object, [wanted, found_text(survey, *object)], outcome, &remedy, &key)
+    let is_missing = outcome == Outcome::Refused && found.is_none() && !is_pdo;
+    let key = if is_missing { "drive_profile.objects" } else { key };
+    new(*object, [wanted, found_text(survey, *object)], outcome, &remedy, key)
 }
 
 #[cfg(test)]

@@ -41,5 +41,5 @@ pub use step_response::StepResponse;
 pub use store::{StoreError, reset, store};
 pub use survey::Survey;
 pub use watch::Sample;
-pub use wording::{object_name, value_text};
+pub use wording::{object_name, reason_text, value_text};
 pub use write::{Change, WriteError, Writer};

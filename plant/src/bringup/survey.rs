@@ -10,7 +10,7 @@ use super::line::{Line, LineError, SdoReason};
 const OF_EVERY_DRIVE: [(u16, &[u8]); 20] = [
     (0x1000, &[0]),
     (0x1001, &[0]),
-    (0x1003, &[0, 1]),
+    (0x1003, &[0]),
     (0x1008, &[0]),
     (0x1009, &[0]),
     (0x100A, &[0]),
@@ -31,6 +31,8 @@ const OF_EVERY_DRIVE: [(u16, &[u8]); 20] = [
 ];
 /// Most objects of a PDO.
 const MAPPED_MAX: u32 = 64;
+/// Most errors of the history (1003h) that are read.
+const ERRORS_MAX: u32 = 8;
 /// Communication parameters of the PDOs with identifiers of CiA 301.
 const PDOS: [u16; 8] = [0x1400, 0x1401, 0x1402, 0x1403, 0x1800, 0x1801, 0x1802, 0x1803];
 
@@ -55,6 +57,10 @@ impl Survey {
             for &subindex in subindices {
                 survey.read(line, axis, ObjectAddress::new(index, subindex))?;
             }
+        }
+        let errors = survey.number(ObjectAddress::new(0x1003, 0)).unwrap_or(0).min(ERRORS_MAX);
+        for place in 1..=errors as u8 {
+            survey.read(line, axis, ObjectAddress::new(0x1003, place))?;
         }
         for communication in PDOS {
             survey.read_pdo(line, axis, communication)?;

@@ -1,5 +1,7 @@
 //! Kinds of drives whose profiles come with the rig.
 
+use std::collections::BTreeMap;
+
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
 use toml::Table;
@@ -15,8 +17,24 @@ const KINDS: [(&str, &str); 3] =
 pub(in crate::config) fn over_kinds<'de, D: Deserializer<'de>>(
     list: D,
 ) -> Result<Vec<DriveProfile>, D::Error> {
-    let tables = Vec::<Table>::deserialize(list)?;
-    tables.into_iter().map(|table| over_kind(table).map_err(D::Error::custom)).collect()
+    let tables = Vec::<BTreeMap<String, Option<Given>>>::deserialize(list)?;
+    tables.into_iter().map(|table| over_kind(without_null(table)).map_err(D::Error::custom)).collect()
+}
+
+/// A value of TOML, or of the manifest's JSON, where a key that is not given is null.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Given {
+    Table(BTreeMap<String, Option<Given>>),
+    Value(toml::Value),
+}
+
+fn without_null(table: BTreeMap<String, Option<Given>>) -> Table {
+    let value = |given| match given {
+        Given::Table(table) => toml::Value::Table(without_null(table)),
+        Given::Value(value) => value,
+    };
+    table.into_iter().filter_map(|(key, given)| Some((key, value(given?)))).collect()
 }
 
 fn over_kind(given: Table) -> Result<DriveProfile, toml::de::Error> {
