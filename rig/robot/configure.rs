@@ -45,7 +45,7 @@ pub(crate) fn configure(args: &WriteArgs) -> Result<Exit, Failure> {
     let scenario = args.robot.scenario().usage()?;
     let (axes, past) = (args.axes(), Past::read(&args.robot.folder).usage()?);
     // A refused step makes no folder: it would replace the evidence of the same step from before.
-    past.require(Step::Inspect, &axes, &Basis::new(&scenario, [None; AXES]).usage()?).usage()?;
+    past.require(Step::Inspect, &axes, &Basis::new(&scenario, [None; AXES])).usage()?;
     let mut folder = StepFolder::begin(&args.robot.folder, Step::Configure, &axes, &scenario).usage()?;
     let mut robot = RobotLine::open(scenario, folder.log().usage()?).usage()?;
     let surveys = robot.surveys(&axes).map_err(failed)?;

@@ -8,8 +8,6 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
-use masseter_can::canopen::NodeId;
-use masseter_plant::wanted::WantedDrive;
 use masseter_recording::RunFolder;
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
@@ -29,18 +27,14 @@ pub(crate) struct Basis {
 }
 
 impl Basis {
-    /// Of the scenario's profiles and these drives.
-    ///
-    /// # Errors
-    /// When a value of the scenario is not one that a profile allows.
-    pub(crate) fn new(scenario: &Scenario, serials: [Option<u32>; AXES]) -> anyhow::Result<Self> {
+    /// Of the scenario's profiles and these drives. Limits of a run do not count: a run writes them itself, and a dry run has others.
+    pub(crate) fn new(scenario: &Scenario, serials: [Option<u32>; AXES]) -> Self {
         let mut hasher = crc32fast::Hasher::new();
-        for (axis, id) in scenario.can.node_ids.into_iter().enumerate() {
-            let wanted = WantedDrive::of_axis(scenario, axis, NodeId::new(id)?)?;
-            let parts = format!("{wanted:?}{:?}{:?}", scenario.profile(axis), scenario.scale(axis));
+        for (axis, node) in scenario.can.node_ids.into_iter().enumerate() {
+            let parts = format!("{node}{:?}{:?}", scenario.profile(axis), scenario.scale(axis));
             hasher.update(parts.as_bytes());
         }
-        Ok(Self { profile_hash: format!("{:08x}", hasher.finalize()), serials })
+        Self { profile_hash: format!("{:08x}", hasher.finalize()), serials }
     }
 }
 
@@ -90,7 +84,7 @@ impl StepFolder {
     ) -> anyhow::Result<Self> {
         let number = numbered(parent)?.last().map_or(1, |(number, _)| number + 1);
         let folder = RunFolder::create(&parent.join(format!("{number:02}-{step}")))?;
-        let Basis { profile_hash, serials } = Basis::new(scenario, [None; AXES])?;
+        let Basis { profile_hash, serials } = Basis::new(scenario, [None; AXES]);
         let begun = Self {
             folder,
             evidence: Evidence {

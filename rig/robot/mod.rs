@@ -6,6 +6,7 @@
 mod args;
 mod check_pose;
 mod configure;
+mod dry_run;
 mod evidence;
 mod hold;
 mod home;
@@ -34,6 +35,7 @@ use inspect::InspectArgs;
 use jog::JogArgs;
 use status::StatusArgs;
 
+pub(crate) use dry_run::keep_dry_run;
 pub(crate) use permission::check_bring_up;
 
 /// Verbs of `robot`.

@@ -1,4 +1,5 @@
-//! Whether `masseter run` may move a real robot: only with a passed pose check of the same drives and profiles.
+//! Whether `masseter run` may move a real robot: only with a passed pose check of the same drives and profiles, and at full speed
+//! only after a passed dry run.
 
 use std::io;
 use std::path::Path;
@@ -15,9 +16,9 @@ use super::session::serials;
 use super::step::Step;
 
 /// Where the evidence is.
-const FOLDER: &str = "bringup";
+pub(super) const FOLDER: &str = "bringup";
 
-/// Refuses a run on real interfaces without a passed check-pose. The files are read before anything is sent; then the drives
+/// Refuses a run on real interfaces without its earlier steps. The files are read before anything is sent; then the drives
 /// tell their serial numbers.
 pub(crate) fn check_bring_up(scenario: &Scenario, is_waived: bool) -> anyhow::Result<()> {
     if scenario.can.is_virtual() {
@@ -29,16 +30,19 @@ pub(crate) fn check_bring_up(scenario: &Scenario, is_waived: bool) -> anyhow::Re
         );
         return Ok(());
     }
-    let refused = "a run needs a passed pose check of this robot; --without-bring-up goes on without, and then a wrong \
+    let refused = "a run needs a passed pose check of this robot, and at full speed a passed dry run; --without-bring-up goes on without, and then a wrong \
                    sign, scale or zero can drive an axis into its end";
     let past = Past::read(Path::new(FOLDER))?;
     let axes: [usize; AXES] = std::array::from_fn(|axis| axis);
-    let unknown = Basis::new(scenario, [None; AXES])?;
-    past.require(Step::CheckPose, &axes, &unknown).context(refused)?;
+    let unknown = Basis::new(scenario, [None; AXES]);
+    let steps: &[Step] =
+        if scenario.dry.is_on { &[Step::CheckPose] } else { &[Step::CheckPose, Step::DryRun] };
+    let require = |basis: &Basis| steps.iter().try_for_each(|&step| past.require(step, &axes, basis));
+    require(&unknown).context(refused)?;
     let found = serials(&mut Line::open(scenario, Box::new(io::sink()))?);
     ensure!(
         found.iter().all(Option::is_some),
         "a drive does not tell its serial number (1018h:04); check power and wiring, or use --without-bring-up"
     );
-    past.require(Step::CheckPose, &axes, &Basis { serials: found, ..unknown }).context(refused)
+    require(&Basis { serials: found, ..unknown }).context(refused)
 }

@@ -43,7 +43,7 @@ impl Session {
             needed.try_for_each(|(earlier, axis)| past.require(earlier, &[axis], basis))
         };
         // A refused step makes no folder: it would replace the evidence of the same step from before.
-        require(&Basis::new(&scenario, [None; AXES]).usage()?).usage()?;
+        require(&Basis::new(&scenario, [None; AXES])).usage()?;
         let mut folder = StepFolder::begin(&args.folder, step, axes, &scenario).usage()?;
         let log = folder.log().context("cannot write the log of the buses").incomplete()?;
         let mut line = Line::open(&scenario, log).usage()?;

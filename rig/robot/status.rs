@@ -68,7 +68,7 @@ pub(crate) fn report(args: &StatusArgs) -> anyhow::Result<Exit> {
 fn read(args: &StatusArgs) -> anyhow::Result<(Past, Basis, Vec<Link>)> {
     let past = Past::read(&args.robot.folder)?;
     let newest_serial = |axis: usize| past.steps().rev().find_map(|(_, evidence)| evidence.serials[axis]);
-    let basis = Basis::new(&args.robot.scenario()?, std::array::from_fn(newest_serial))?;
+    let basis = Basis::new(&args.robot.scenario()?, std::array::from_fn(newest_serial));
     let links =
         Step::chain().into_iter().map(|step| Link { step, state: state(&past, &basis, step) }).collect();
     Ok((past, basis, links))
