@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::Context;
 use masseter_analysis::Figures;
 use masseter_plan::RunPlan;
-use masseter_recording::{Ending, Manifest, RunFolder};
+use masseter_recording::{Ending, FullSpeed, Manifest, RunFolder};
 use masseter_report::Judgement;
 use masseter_shared::config::{FileConfig, Scenario};
 use masseter_shared::input::read_text;
@@ -161,6 +161,10 @@ fn manifest_of(plan: &RunPlan, args: &RunArgs) -> Manifest {
     let (motion_s, clock) = (plan.trajectory.duration_s(), name_of(&args.clock));
     let mut manifest = Manifest::new(plan.scenario.clone(), motion_s, &clock, machine::describe());
     manifest.controller = args.controller.name();
+    manifest.full_speed = plan.scenario.dry.is_on.then_some(FullSpeed {
+        velocity_m_s: plan.demands.velocity_m_s,
+        acceleration_m_s2: plan.demands.acceleration_m_s2,
+    });
     if args.clock == ClockKind::Rt {
         manifest.mending_command = doctor::mending_command();
     }

@@ -181,6 +181,18 @@ enum masseter_cause {
     MASSETER_CAUSE_WRONG_OBJECT = 53,
     /* A drive counts accelerations in another unit than its profile says (60AAh; the limit is the expected one). */
     MASSETER_CAUSE_WRONG_UNIT = 54,
+    /* A drive is in fault at the start, and no reset is allowed (EMCY code, object 603F; the limit is the statusword). */
+    MASSETER_CAUSE_FAULT_FOUND = 55,
+    /* A fault found at the start was reset (EMCY code, object 603F; the limit is the statusword). */
+    MASSETER_CAUSE_FAULT_RESET = 56,
+    /* The drives wait for one that is not ready to switch on (statusword; the limit is its EMCY code). */
+    MASSETER_CAUSE_WAITS_FOR_DRIVE = 57,
+    /* A drive did not become ready to switch on in time (statusword; the limit is its EMCY code). */
+    MASSETER_CAUSE_NOT_READY = 58,
+    /* A drive was not enabled in time with the others (statusword; the limit is its EMCY code). */
+    MASSETER_CAUSE_NOT_ENABLED = 59,
+    /* The jaw is too far from the first pose of the motion (m). */
+    MASSETER_CAUSE_START_TOO_FAR = 60,
 };
 
 enum masseter_no_pose {
@@ -201,7 +213,7 @@ enum masseter_no_pose {
 };
 
 #define MASSETER_READING_TOPIC "reading"
-#define MASSETER_READING_TYPE_NAME "masseter/Reading/ef3a56a745011190"
+#define MASSETER_READING_TYPE_NAME "masseter/Reading/3b19bd46b3ecd631"
 
 /* Positions, forces and states of the drives, once a cycle. */
 typedef struct masseter_reading {
@@ -273,7 +285,7 @@ static_assert(offsetof(masseter_reading, fresh_axes) == 248, "offset of fresh_ax
 static_assert(offsetof(masseter_reading, master_fault) == 252, "offset of master_fault");
 
 #define MASSETER_COMMAND_TOPIC "command"
-#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/2d16e906cbecc19c"
+#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/1f1a892af93718b5"
 
 /* Targets and request for the drives, once a cycle. */
 typedef struct masseter_command {
@@ -306,7 +318,7 @@ static_assert(offsetof(masseter_command, request) == 88, "offset of request");
 static_assert(offsetof(masseter_command, controller_state) == 92, "offset of controller_state");
 
 #define MASSETER_STATE_TOPIC "state"
-#define MASSETER_STATE_TYPE_NAME "masseter/State/50121e46202e7604"
+#define MASSETER_STATE_TYPE_NAME "masseter/State/4ef6b0906fbe819d"
 
 /* The controller's state and its estimate, once a cycle. */
 typedef struct masseter_state {
@@ -393,7 +405,7 @@ static_assert(offsetof(masseter_state, iterations) == 288, "offset of iterations
 static_assert(offsetof(masseter_state, controller_state) == 292, "offset of controller_state");
 
 #define MASSETER_EVENT_TOPIC "event"
-#define MASSETER_EVENT_TYPE_NAME "masseter/Event/3fbb3af877448017"
+#define MASSETER_EVENT_TYPE_NAME "masseter/Event/c2e1365b706a3502"
 
 /* A single occurrence: a change of state, a fault, an alarm. */
 typedef struct masseter_event {
@@ -450,7 +462,7 @@ static_assert(offsetof(masseter_event, value) == 72, "offset of value");
 static_assert(offsetof(masseter_event, limit) == 80, "offset of limit");
 
 #define MASSETER_TRUTH_TOPIC "truth"
-#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/aa8226ad0adce9bd"
+#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/c07707f6f3b43950"
 
 /* The true state of the mechanism, once a cycle; the controller never reads it. */
 typedef struct masseter_truth {

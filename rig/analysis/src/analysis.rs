@@ -195,7 +195,6 @@ impl Analysis {
         let skipped = self.controller_skips.take(&Counters::from(state), self.period_ns, is_of_scenario);
         self.intervals.state(state, is_fresh, skipped);
         self.longest_cycles.state(state, is_fresh);
-        self.axes.iter_mut().for_each(|axes| axes.state(state));
         self.over_time.wake_up(CONTROLLER, state.due_ns, state.woke_ns);
         self.outage.state(state, is_of_scenario);
         let is_disturbed = self.disturbance.take(state, is_fresh, is_path_of_scenario);

@@ -71,7 +71,7 @@ pub struct Figures {
     pub cut_short: bool,
     /// Stretches of the recording that cannot be read.
     pub damage: Vec<Damage>,
-    /// Demands on each axis and how they were met, while the motion played.
+    /// How each drive met the demands while the motion played; zeros but in a dry run.
     #[serde(skip)]
     pub axes: [AxisFigures; AXES],
     /// Tracking over time, for plots.

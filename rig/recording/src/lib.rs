@@ -30,7 +30,7 @@ pub use backlog::{Backlog, Pace, WriteOutcome};
 pub use circumstances::{DmaLatency, Ending, Machine as MachineInfo, ProcessFault, RunUsage, Usage};
 pub use encoding::{CDR_LITTLE_ENDIAN, Channel, Encoded, Encoder, SCHEMA_ENCODING, definitions};
 pub use folder::{FolderError, RunFolder};
-pub use manifest::Manifest;
+pub use manifest::{FullSpeed, Manifest};
 pub use reader::{Chunks, Entry, ReadError, Reader};
 pub use recover::{RecoverError, Recovered, recover};
 pub use scene::{Scene, jaw_points};

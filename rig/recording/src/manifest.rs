@@ -7,6 +7,7 @@ use std::time::UNIX_EPOCH;
 
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
+use masseter_shared::geometry::AXES;
 use masseter_shared::named::Declared;
 use masseter_shared::realtime::scheduling::Obtained;
 use serde::{Deserialize, Serialize};
@@ -55,6 +56,9 @@ pub struct Manifest {
     pub scenario: Scenario,
     /// Duration of the motion, s.
     pub motion_s: f64,
+    /// What the plan demands of the axes at full speed; none but in a dry run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub full_speed: Option<FullSpeed>,
     /// The machine.
     pub machine: Machine,
     /// The scheduling that each process requested and obtained; empty under virtual time.
@@ -73,6 +77,15 @@ pub struct Manifest {
     pub ending: Ending,
 }
 
+/// The largest demands of the motion at full speed, by the plan.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FullSpeed {
+    /// Velocity of each axis, m/s.
+    pub velocity_m_s: [f64; AXES],
+    /// Acceleration of each axis, m/s².
+    pub acceleration_m_s2: [f64; AXES],
+}
+
 impl Manifest {
     /// The circumstances that are known before the start.
     pub fn new(scenario: Scenario, motion_s: f64, clock: &str, machine: Machine) -> Self {
@@ -86,6 +99,7 @@ impl Manifest {
             declared: Declared::default(),
             scenario,
             motion_s,
+            full_speed: None,
             machine,
             scheduling: BTreeMap::new(),
             cpu_dma_latency: None,

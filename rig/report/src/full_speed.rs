@@ -1,6 +1,6 @@
 //! What a dry run says of the same motion at full speed.
 //!
-//! Velocity and acceleration follow from the motion alone. The following error is scaled as a drive's that lags by a time.
+//! Velocity and acceleration are those of the plan. The following error is scaled as a drive's that lags by a time.
 //! The force of the slow motion is that of weight and friction; how much the motion adds depends on masses that a run at
 //! this speed does not show. So the table has the mass that the rest of the force accelerates.
 
@@ -15,10 +15,7 @@ use crate::text::{microseconds, or_dash};
 /// The table; nothing of a run that is no dry one.
 pub(crate) fn write(text: &mut String, manifest: &Manifest, figures: &Figures) -> std::fmt::Result {
     let scenario = &manifest.scenario;
-    let dry = scenario.dry;
-    if !dry.is_on {
-        return Ok(());
-    }
+    let (dry, Some(planned)) = (scenario.dry, manifest.full_speed) else { return Ok(()) };
     let limits = scenario.limits.within(&scenario.drives);
     writeln!(
         text,
@@ -33,17 +30,14 @@ pub(crate) fn write(text: &mut String, manifest: &Manifest, figures: &Figures) -
         "TPDO1 here, µs"
     )?;
     for (axis, name) in AXIS_NAMES.into_iter().enumerate() {
-        let AxisFigures { velocity_m_s, acceleration_m_s2, following_error_m, force_n } = figures.axes[axis];
-        let acceleration_m_s2 = acceleration_m_s2 / dry.speed.powi(2);
+        let AxisFigures { following_error_m, force_n } = figures.axes[axis];
+        let (velocity_m_s, acceleration_m_s2) = (planned.velocity_m_s[axis], planned.acceleration_m_s2[axis]);
         let most_n = scenario.drives.of_axis(axis).max_force_n;
         let with_limit = |value: String, limit: String| format!("{value} ({limit})");
         writeln!(
             text,
             "{name:<4} {:>15} {:>15} {:>17} {:>17} {:>11} {:>19}",
-            with_limit(
-                format!("{:.3}", velocity_m_s / dry.speed),
-                format!("{:.3}", limits.velocity_m_s(axis))
-            ),
+            with_limit(format!("{velocity_m_s:.3}"), format!("{:.3}", limits.velocity_m_s(axis))),
             with_limit(format!("{acceleration_m_s2:.2}"), format!("{:.1}", limits.acceleration_m_s2(axis))),
             with_limit(
                 format!("{:.1}", following_error_m / dry.speed * 1e6),

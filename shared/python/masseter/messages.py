@@ -188,6 +188,18 @@ class Cause(enum.IntEnum):
     WRONG_OBJECT = 53
     #: A drive counts accelerations in another unit than its profile says (60AAh; the limit is the expected one).
     WRONG_UNIT = 54
+    #: A drive is in fault at the start, and no reset is allowed (EMCY code, object 603F; the limit is the statusword).
+    FAULT_FOUND = 55
+    #: A fault found at the start was reset (EMCY code, object 603F; the limit is the statusword).
+    FAULT_RESET = 56
+    #: The drives wait for one that is not ready to switch on (statusword; the limit is its EMCY code).
+    WAITS_FOR_DRIVE = 57
+    #: A drive did not become ready to switch on in time (statusword; the limit is its EMCY code).
+    NOT_READY = 58
+    #: A drive was not enabled in time with the others (statusword; the limit is its EMCY code).
+    NOT_ENABLED = 59
+    #: The jaw is too far from the first pose of the motion (m).
+    START_TOO_FAR = 60
 
 
 class NoPose(enum.IntEnum):
@@ -258,7 +270,7 @@ class Reading(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Reading/ef3a56a745011190"
+        return "masseter/Reading/3b19bd46b3ecd631"
 
 
 _check(Reading, 256, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 176, 224, 248, 252])
@@ -289,7 +301,7 @@ class Command(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Command/2d16e906cbecc19c"
+        return "masseter/Command/1f1a892af93718b5"
 
 
 _check(Command, 96, [0, 8, 16, 24, 32, 40, 88, 92])
@@ -356,7 +368,7 @@ class State(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/State/50121e46202e7604"
+        return "masseter/State/4ef6b0906fbe819d"
 
 
 _check(State, 296, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 136, 160, 192, 216, 248, 272, 280, 288, 292])
@@ -403,7 +415,7 @@ class Event(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Event/3fbb3af877448017"
+        return "masseter/Event/c2e1365b706a3502"
 
 
 _check(Event, 88, [0, 8, 16, 24, 32, 40, 44, 48, 52, 56, 60, 62, 64, 68, 72, 80])
@@ -440,7 +452,7 @@ class Truth(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Truth/aa8226ad0adce9bd"
+        return "masseter/Truth/c07707f6f3b43950"
 
 
 _check(Truth, 248, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240])
