@@ -21,7 +21,7 @@ pub(crate) enum Lack {
     #[error("outdated: the profiles changed since {0}")]
     OtherProfile(String),
     /// The drive is another one.
-    #[error("outdated: the drive's serial number was {}, and is {}", number(.before), number(.now))]
+    #[error("outdated: the drive's serial number was {}, and is {}", number(*.before), number(*.now))]
     OtherDrive {
         /// Its serial number then.
         before: Option<u32>,
@@ -33,7 +33,7 @@ pub(crate) enum Lack {
     Restored(String),
 }
 
-fn number(serial: &Option<u32>) -> String {
+fn number(serial: Option<u32>) -> String {
     serial.map_or_else(|| "unknown".to_owned(), |serial| serial.to_string())
 }
 

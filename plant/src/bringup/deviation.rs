@@ -85,10 +85,8 @@ fn new(
 
 /// A value, or why there is none.
 fn found_text(survey: &Survey, object: ObjectAddress) -> String {
-    survey
-        .number(object)
-        .map(|value| value_text(object, value))
-        .unwrap_or_else(|| survey.refusal(object).map_or_else(|| "not there".to_owned(), reason_text))
+    let refusal = || survey.refusal(object).map_or_else(|| "not there".to_owned(), reason_text);
+    survey.number(object).map_or_else(refusal, |value| value_text(object, value))
 }
 
 fn of_identity(survey: &Survey, WantedIdentity { object, mask, value }: WantedIdentity) -> Option<Deviation> {

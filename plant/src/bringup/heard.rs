@@ -65,7 +65,7 @@ impl Strangers {
                 self.nodes.insert((bus, node));
                 return;
             }
-            _ => return,
+            Cob::Rpdo1(_) => return,
         };
         self.masters.insert((bus, sign));
     }

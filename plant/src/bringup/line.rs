@@ -114,7 +114,10 @@ pub struct Line {
 
 impl Debug for Line {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Line").field("names", &self.names).field("switched_on", &self.switched_on).finish()
+        f.debug_struct("Line")
+            .field("names", &self.names)
+            .field("switched_on", &self.switched_on)
+            .finish_non_exhaustive()
     }
 }
 

@@ -94,9 +94,10 @@ impl PdoSetting {
 
     /// Whether a COB-ID is right: the number counts for a PDO that exists.
     pub(super) fn has_cob_id(&self, found: u32) -> bool {
-        match CobId(self.cob_id).is_valid() {
-            true => (self.cob_id ^ found) & COB_ID_BITS == 0,
-            false => !CobId(found).is_valid(),
+        if CobId(self.cob_id).is_valid() {
+            (self.cob_id ^ found) & COB_ID_BITS == 0
+        } else {
+            !CobId(found).is_valid()
         }
     }
 
@@ -146,6 +147,7 @@ impl Settings {
     }
 
     /// The same objects and PDOs with the values that were found, without those that the drive does not have.
+    #[must_use]
     pub fn found(&self, survey: &Survey) -> Self {
         let pdo = |like: &PdoSetting| {
             let read = |part| survey.number(like.part(part));

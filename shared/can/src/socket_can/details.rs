@@ -56,7 +56,7 @@ impl InterfaceDetails {
         request[6..8].copy_from_slice(&REQUEST.to_ne_bytes());
         request[20..24].copy_from_slice(&index.to_ne_bytes());
         sendto(&socket, &request, SendFlags::empty(), &SocketAddrNetlink::new(0, 0))?;
-        let mut answer = [0; 1 << 15];
+        let mut answer = vec![0; 1 << 15];
         let (length, _) = recv(&socket, &mut answer[..], RecvFlags::empty())?;
         Self::parse(&answer[..length])
             .ok_or_else(|| io::Error::other("the kernel's answer describes no link"))
