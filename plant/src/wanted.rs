@@ -16,7 +16,7 @@ use crate::error::PlantError;
 
 /// Abort connection option code (6007h): quick stop.
 const QUICK_STOP_AT_ABORT: i64 = 3;
-/// Quick stop option code (605Ah): quick-stop ramp, then switch on disabled.
+/// Quick stop (605Ah) and fault reaction (605Eh) option codes: quick-stop ramp, then off.
 pub(crate) const RAMP_THEN_OFF: i64 = 2;
 /// COB-ID without the bit for remote requests, which the master does not send.
 pub(crate) const COB_ID_BITS: u32 = !CobId::NO_REMOTE_REQUEST;
@@ -157,7 +157,7 @@ fn objects(scenario: &Scenario, axis: usize) -> Result<Vec<WantedObject>, PlantE
     let mut wanted = Vec::with_capacity(known.len());
     for (index, subindex, value, bytes, key) in known {
         let object = ObjectAddress::new(index, subindex);
-        let config = profile.object(ObjectKey(object));
+        let config = in_this_run(profile.object(ObjectKey(object)), object, scenario)?;
         let value = config.value.unwrap_or(value);
         if config.rule == ObjectRule::Absent {
             continue;
@@ -211,12 +211,31 @@ fn beyond(
     ))
 }
 
+/// What the profile says of an object, in a dry run with less force: no rule may keep that from the drive.
+fn in_this_run(
+    config: ObjectConfig,
+    object: ObjectAddress,
+    scenario: &Scenario,
+) -> Result<ObjectConfig, PlantError> {
+    if object != ObjectAddress::new(0x6072, 0) || !scenario.dry.is_on {
+        return Ok(config);
+    }
+    if matches!(config.rule, ObjectRule::Absent | ObjectRule::Expect) {
+        let reason = "a dry run must reduce the force; give the object the rule write";
+        return Err(PlantError::Scenario(format!("drive_profile.objects.{}: {reason}", ObjectKey(object))));
+    }
+    let value = config.value.map(|value| (value as f64 * scenario.dry.force).round() as i64);
+    Ok(ObjectConfig { rule: ObjectRule::Write, value, ..config })
+}
+
 /// Whether a drive may lack an object of which the profile says nothing. Many have no event timer for RPDOs; heartbeat and
 /// master supervise these drives too. Only a dry run needs the limit of force.
 fn may_lack(object: ObjectAddress, scenario: &Scenario) -> bool {
     match (object.index, object.subindex) {
         (0x1400, 5) => true,
         (0x6072, 0) => !scenario.dry.is_on,
+        // A step of the bring-up that was killed may have left another reaction.
+        (0x605E, 0) => true,
         _ => false,
     }
 }
@@ -224,7 +243,7 @@ fn may_lack(object: ObjectAddress, scenario: &Scenario) -> bool {
 /// Index, sub-index, value, bytes, and the key that decides the value.
 type KnownObject = (u16, u8, i64, usize, &'static str);
 
-fn known_objects(scenario: &Scenario, axis: usize) -> Result<[KnownObject; 13], PlantError> {
+fn known_objects(scenario: &Scenario, axis: usize) -> Result<[KnownObject; 14], PlantError> {
     let (can, drive, scale) = (&scenario.can, scenario.drives.of_axis(axis), scenario.scale(axis));
     let profile = scenario.profile(axis);
     let consumed = i64::from(MASTER_NODE.get()) << 16 | i64::from(can.heartbeat_consumer_ms);
@@ -245,6 +264,7 @@ fn known_objects(scenario: &Scenario, axis: usize) -> Result<[KnownObject; 13], 
         (0x1016, 1, consumed, 4, "can.heartbeat_consumer_ms"),
         (0x6007, 0, QUICK_STOP_AT_ABORT, 2, "drive_profile.objects"),
         (0x605A, 0, RAMP_THEN_OFF, 2, "drive_profile.objects"),
+        (0x605E, 0, RAMP_THEN_OFF, 2, "drive_profile.objects"),
         (0x6085, 0, quick_stop, 4, quick_stop_key),
         (0x6065, 0, window, 4, window_key),
         (0x6066, 0, drive.following_error_timeout_ms.into(), 2, timeout_key),

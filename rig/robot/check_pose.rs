@@ -20,6 +20,9 @@ use super::step::Step;
 /// How long the axes must stand, ns, and how far they may move meanwhile, m.
 const STAND_NS: u64 = 200 * MILLISECOND_NS;
 const STILL_M: f64 = 1e-4;
+/// The widest tolerances that say something of signs, scales and zeros.
+const WIDEST_M: f64 = 5e-3;
+const WIDEST_DEG: f64 = 5.0;
 /// By how much an axis is assumed to be wrong, m.
 const WRONG_M: f64 = 1e-3;
 
@@ -56,6 +59,10 @@ struct Found {
 
 /// Reads, computes, prints, and keeps the pose. Nothing is moved.
 pub(crate) fn check_pose(args: &CheckPoseArgs) -> Result<Exit, Failure> {
+    if args.tolerance > WIDEST_M || args.angle > WIDEST_DEG {
+        let error = anyhow!("--tolerance goes up to {} mm, --angle up to {WIDEST_DEG}°", WIDEST_M * 1e3);
+        return Err(Failure::with(Exit::Usage, error));
+    }
     let axes: Vec<usize> = (0..AXES).collect();
     let earlier = |_| (!args.out_of_order).then_some(Step::Home);
     let mut session = Session::begin(&args.robot, Step::CheckPose, &axes, earlier)?;

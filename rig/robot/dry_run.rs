@@ -11,10 +11,15 @@ use super::permission::FOLDER;
 use super::step::Step;
 
 /// Notes in the folder of the bring-up, if there is one, whether a dry run passed. The drives are those of the pose check, which
-/// a dry run on real interfaces has compared.
-pub(crate) fn keep_dry_run(scenario: &Scenario, run: &Path, passed: bool) -> anyhow::Result<()> {
+/// a dry run on real interfaces has compared; one without bring-up has compared nothing and counts for nothing.
+pub(crate) fn keep_dry_run(
+    scenario: &Scenario,
+    run: &Path,
+    passed: bool,
+    is_waived: bool,
+) -> anyhow::Result<()> {
     let parent = Path::new(FOLDER);
-    if !scenario.dry.is_on || !parent.is_dir() {
+    if !scenario.dry.is_on || is_waived || !parent.is_dir() {
         return Ok(());
     }
     let past = Past::read(parent)?;

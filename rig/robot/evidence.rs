@@ -11,7 +11,7 @@ use std::time::UNIX_EPOCH;
 use masseter_recording::RunFolder;
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
+use masseter_shared::geometry::{AXES, AXIS_NAMES, MechanismConfig};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -27,9 +27,15 @@ pub(crate) struct Basis {
 }
 
 impl Basis {
-    /// Of the scenario's profiles and these drives. Limits of a run do not count: a run writes them itself, and a dry run has others.
+    /// Of the scenario's profiles, interfaces, mechanism and jaw, and of these drives. Limits of a run do not count: a run writes
+    /// them itself, and a dry run has others.
     pub(crate) fn new(scenario: &Scenario, serials: [Option<u32>; AXES]) -> Self {
         let mut hasher = crc32fast::Hasher::new();
+        let mut mechanism = scenario.mechanism.clone();
+        mechanism.strokes = MechanismConfig::default().strokes;
+        // Evidence of emulated drives is none of real ones.
+        let place = format!("{:?}{:?}{:?}", scenario.can.interfaces, scenario.jaw, mechanism);
+        hasher.update(place.as_bytes());
         for (axis, node) in scenario.can.node_ids.into_iter().enumerate() {
             let parts = format!("{node}{:?}{:?}", scenario.profile(axis), scenario.scale(axis));
             hasher.update(parts.as_bytes());
@@ -51,6 +57,8 @@ pub(crate) struct Evidence {
     pub(crate) profile_hash: String,
     /// See [`Basis`].
     pub(crate) serials: [Option<u32>; AXES],
+    /// Whether the steps before were there.
+    pub(crate) in_order: bool,
     /// The axes of which it is evidence.
     pub(crate) axes: Vec<String>,
     /// The step's own data.
@@ -93,6 +101,7 @@ impl StepFolder {
                 passed: false,
                 profile_hash,
                 serials,
+                in_order: true,
                 axes: axes.iter().map(|&axis| AXIS_NAMES[axis].to_owned()).collect(),
                 result: Value::Null,
             },
@@ -126,6 +135,11 @@ impl StepFolder {
     pub(crate) fn basis(&self) -> Basis {
         let Evidence { profile_hash, serials, .. } = self.evidence.clone();
         Basis { profile_hash, serials }
+    }
+
+    /// Notes that the step was made without the steps before: it shows something, but counts for no further step.
+    pub(crate) fn note_out_of_order(&mut self) {
+        self.evidence.in_order = false;
     }
 
     /// Notes the serial numbers of the drives.

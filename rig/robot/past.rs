@@ -31,6 +31,17 @@ pub(crate) enum Lack {
     /// The drives got their old objects again.
     #[error("outdated: restored at {0}")]
     Restored(String),
+    /// An earlier step was made again since then.
+    #[error("outdated: {step} again at {at}")]
+    Repeated {
+        /// The earlier step.
+        step: Step,
+        /// When.
+        at: String,
+    },
+    /// It was made with `--out-of-order`.
+    #[error("made out of order at {0}")]
+    OutOfOrder(String),
 }
 
 fn number(serial: Option<u32>) -> String {
@@ -78,8 +89,29 @@ impl Past {
 
     /// The newest evidence of a step for an axis, with its folder.
     pub(crate) fn newest(&self, step: Step, axis: usize) -> Option<&(PathBuf, Evidence)> {
+        self.place(step, axis).map(|place| &self.steps[place])
+    }
+
+    /// The place of the newest evidence of a step for an axis among all.
+    fn place(&self, step: Step, axis: usize) -> Option<usize> {
         let name = step.to_string();
-        self.steps.iter().rev().find(|(_, evidence)| evidence.step == name && evidence.is_about(axis))
+        self.steps.iter().rposition(|(_, evidence)| evidence.step == name && evidence.is_about(axis))
+    }
+
+    /// Why the evidence at a place is outdated by what came after, if so: positions follow from objects and home.
+    fn outdated(&self, step: Step, axis: usize, place: usize) -> Option<Lack> {
+        let since = |earlier| {
+            let newer = self.place(earlier, axis).filter(|&newer| newer > place)?;
+            Some(self.steps[newer].1.started.clone())
+        };
+        if step >= Step::Configure
+            && let Some(at) = since(Step::Restore)
+        {
+            return Some(Lack::Restored(at));
+        }
+        let earlier = [Step::Configure, Step::Home, Step::CheckPose];
+        let mut repeated = earlier.into_iter().filter(|&earlier| step >= Step::Home && earlier < step);
+        repeated.find_map(|step| Some(Lack::Repeated { step, at: since(step)? }))
     }
 
     /// Why the newest evidence of a step does not count for an axis, if so. An unknown serial number of now is not compared.
@@ -87,17 +119,17 @@ impl Past {
     /// # Errors
     /// The reason.
     pub(crate) fn check(&self, step: Step, axis: usize, basis: &Basis) -> Result<&Evidence, Lack> {
-        let (path, evidence) = self.newest(step, axis).ok_or(Lack::Missing)?;
+        let place = self.place(step, axis).ok_or(Lack::Missing)?;
+        let evidence = &self.steps[place].1;
         let at = || evidence.started.clone();
-        let restored = self.newest(Step::Restore, axis).filter(|(restored, _)| restored > path);
-        match restored {
-            Some((_, restored)) if step >= Step::Configure => {
-                return Err(Lack::Restored(restored.started.clone()));
-            }
-            _ => {}
+        if let Some(lack) = self.outdated(step, axis, place) {
+            return Err(lack);
         }
         if !evidence.passed {
             return Err(Lack::NotPassed(at()));
+        }
+        if !evidence.in_order {
+            return Err(Lack::OutOfOrder(at()));
         }
         if evidence.profile_hash != basis.profile_hash {
             return Err(Lack::OtherProfile(at()));
@@ -158,7 +190,11 @@ mod tests {
         let exchanged = Basis { serials: [1, 2, 3, 4, 5, 7].map(Some), ..basis.clone() };
         assert_eq!(check(&exchanged).unwrap(), "outdated: the drive's serial number was 6, and is 7");
         let faster = Scenario { rate_hz: 500, ..Scenario::default() };
-        assert_eq!(check(&Basis::new(&faster, basis.serials)), None, "a run writes the objects of its rate itself");
+        assert_eq!(
+            check(&Basis::new(&faster, basis.serials)),
+            None,
+            "a run writes the objects of its rate itself"
+        );
         let mut changed = Scenario::default();
         changed.drives.leg.encoder_resolution_m = 2e-6;
         let changed = Basis::new(&changed, basis.serials);

@@ -45,6 +45,9 @@ impl Session {
         // A refused step makes no folder: it would replace the evidence of the same step from before.
         require(&Basis::new(&scenario, [None; AXES])).usage()?;
         let mut folder = StepFolder::begin(&args.folder, step, axes, &scenario).usage()?;
+        if axes.iter().any(|&axis| earlier(axis).is_none()) {
+            folder.note_out_of_order();
+        }
         let log = folder.log().context("cannot write the log of the buses").incomplete()?;
         let mut line = Line::open(&scenario, log).usage()?;
         line.listen(LISTEN_NS).died()?;

@@ -107,7 +107,8 @@ impl PlayedRun {
         let Self { args, folder, manifest, reserved, written } = self;
         let exit = masseter_report::report_run(&folder, &manifest, args.format, args.detail(), reserved)?;
         written?;
-        robot::keep_dry_run(&manifest.scenario, folder.path(), exit == Exit::Passed).incomplete()?;
+        robot::keep_dry_run(&manifest.scenario, folder.path(), exit == Exit::Passed, args.without_bring_up)
+            .incomplete()?;
         Ok(exit)
     }
 

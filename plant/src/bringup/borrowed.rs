@@ -76,7 +76,7 @@ impl<'a> Borrowed<'a> {
 
     /// Sets the software limits (607Dh) to positions as 6064h shows them, in increments; never the lower one above the upper one.
     pub(super) fn set_limits(&mut self, line: &mut Line, ends: [i32; 2]) -> Result<(), LineError> {
-        let offset = self.limit_offset(line);
+        let offset = self.limit_offset(line)?;
         let [lowest, highest] = ends.map(|end| end.saturating_sub(offset) as u32);
         let [lower, upper] = [1, 2].map(|end| ObjectAddress::new(0x607D, end));
         if lowest as i32 > line.read_number(self.axis, upper)? as i32 {
@@ -88,13 +88,17 @@ impl<'a> Borrowed<'a> {
     }
 
     /// What the drive adds to its software limits, increments: the position at home as the drive has it now.
-    fn limit_offset(&self, line: &mut Line) -> i32 {
+    fn limit_offset(&self, line: &mut Line) -> Result<i32, LineError> {
         let homing = self.profile.homing;
         if !homing.limits_from_home {
-            return 0;
+            return Ok(0);
         }
-        let home = line.read_number(self.axis, homing.home_object.0).unwrap_or(0) as i32;
-        home.saturating_mul(homing.home_sign.into())
+        match line.read_number(self.axis, homing.home_object.0) {
+            Ok(home) => Ok((home as i32).saturating_mul(homing.home_sign.into())),
+            // Without such an object the drive has no offset.
+            Err(error) if error.abort_code().is_some() => Ok(0),
+            Err(error) => Err(error),
+        }
     }
 
     /// Writes every old value back, the last change first. A failure does not keep the others from their old values.

@@ -3,6 +3,7 @@
 //! Encoders that keep their position are compared and not moved. The others home twice: the second homing shows the spread.
 
 use masseter_can::cia402::{Controlword, StatusBit};
+use masseter_shared::clock::SECOND_NS;
 use masseter_shared::config::{AxisScale, DriveProfile, HomingConfig, ObjectKey, ObjectRule, Scenario};
 
 use super::caution::{Caution, Operator, Wish};
@@ -12,6 +13,8 @@ use super::mover::{HOMING, Mover, POSITIONING};
 use super::switching::seconds;
 use super::watch::read_position;
 
+/// Methods that make the present place home (6098h).
+const ON_THE_SPOT: [i8; 2] = [35, 37];
 /// How far the axis goes back before it homes again, m: beyond the place where it stopped, not beyond the next index.
 const BACK_M: f64 = 1e-3;
 /// A homing with a shorter way needs no way back, m.
@@ -100,10 +103,12 @@ fn home_twice(
     // The limits count from the new home.
     open_limits(mover, stroke_m)?;
     if first.way_m.abs() > NO_WAY_M {
+        mover.heed_switches();
         mover.switch_on(POSITIONING, operator)?;
         let back_m = mover.position_m()? - BACK_M * first.way_m.signum();
         mover.move_to(scale.increments(back_m), operator)?;
         mover.switch_off()?;
+        mover.watch().ignore_switches();
     }
     let second = search(mover, &homing, stroke_m, operator)?;
     let spread_m = second.shift_m.abs();
@@ -155,6 +160,10 @@ fn search(
     let limit_s = PATIENCE * stroke_m * (1.0 / homing.speed_m_s + 1.0 / homing.zero_speed_m_s);
     let until_ns = mover.line().now_ns() + seconds(limit_s);
     mover.control(Controlword::ENABLE_OPERATION)?;
+    // "Attained" of a homing before proves nothing: it must go first, except where the drive homes on the spot.
+    let mut is_old =
+        mover.look()?.status.has(StatusBit::HOMING_ATTAINED) && !ON_THE_SPOT.contains(&homing.method);
+    let begins_ns = mover.line().now_ns() + SECOND_NS;
     mover.control(Controlword::ENABLE_OPERATION.with_start())?;
     let mut before_m = began_m;
     loop {
@@ -162,8 +171,13 @@ fn search(
         if sample.status.has(StatusBit::HOMING_ERROR) {
             return mover.stopped(StopCause::Homing);
         }
-        if sample.status.has(StatusBit::HOMING_ATTAINED) && sample.status.has(StatusBit::TargetReached) {
+        let is_attained = sample.status.has(StatusBit::HOMING_ATTAINED);
+        is_old &= is_attained;
+        if is_attained && !is_old && sample.status.has(StatusBit::TargetReached) {
             break;
+        }
+        if is_old && sample.at_ns >= begins_ns {
+            return mover.stopped(StopCause::NotBegun);
         }
         if operator(sample.at_ns) != Wish::Move {
             return mover.stopped(StopCause::Requested);

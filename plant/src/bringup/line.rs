@@ -24,6 +24,8 @@ use crate::link::layout::{drive_ports, node_ids};
 const STEP_NS: u64 = MILLISECOND_NS;
 /// Silence of a server after which a request is repeated, and how often that is done.
 const TIMEOUT_NS: u64 = 500 * MILLISECOND_NS;
+/// The same while a drive has power: a motion nobody sees must be short.
+const POWERED_TIMEOUT_NS: u64 = 100 * MILLISECOND_NS;
 const ATTEMPTS: u32 = 3;
 /// Time that a node has to answer a scan, ns.
 const SCAN_NS: u64 = 10 * MILLISECOND_NS;
@@ -206,7 +208,7 @@ impl Line {
             _ => return Err(failed(SdoReason::Malformed)),
         }
         let (mut value, mut toggle) = (Vec::new(), false);
-        while value.len() <= LONGEST_VALUE {
+        for _ in 0..LONGEST_VALUE {
             match self.ask(axis, object, SdoRequest::UploadSegment { toggle })? {
                 SdoResponse::UploadSegment { toggle: answered, data, is_last } if answered == toggle => {
                     value.extend_from_slice(data.data());
@@ -327,10 +329,11 @@ impl Line {
         let (bus, node) = self.addresses[axis];
         let failed = |reason| LineError::Sdo { axis, object, reason };
         let attempts = if matches!(request, SdoRequest::UploadSegment { .. }) { 1 } else { ATTEMPTS };
+        let timeout_ns = if self.switched_on.is_some() { POWERED_TIMEOUT_NS } else { TIMEOUT_NS };
         for _ in 0..attempts {
             self.heard[axis].answer = None;
             self.send(bus, request.frame(node))?;
-            self.listen_until(TIMEOUT_NS, |line| line.heard[axis].answer.is_some())?;
+            self.listen_until(timeout_ns, |line| line.heard[axis].answer.is_some())?;
             match self.heard[axis].answer.take() {
                 Some(SdoResponse::Abort { code, .. }) => return Err(failed(SdoReason::Aborted(code))),
                 Some(answer) if answers(&answer, object) => return Ok(answer),
@@ -349,8 +352,8 @@ impl Line {
 
     /// A step of time: the heartbeat, and every frame that has come.
     fn step(&mut self) -> Result<(), LineError> {
-        self.send_heartbeat()?;
         self.wires.pass(STEP_NS)?;
+        self.send_heartbeat()?;
         for bus in 0..self.names.len() {
             while let Some(tapped) = self.wires.tap(bus) {
                 let mut text = String::new();

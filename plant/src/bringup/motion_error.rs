@@ -1,6 +1,6 @@
 //! Why a motion of the bring-up did not begin, or ended early.
 
-use masseter_can::canopen::EmergencyCode;
+use masseter_can::canopen::{EmergencyCode, ObjectAddress};
 use masseter_can::cia402::DriveState;
 use masseter_shared::geometry::AXIS_NAMES;
 
@@ -38,6 +38,12 @@ pub enum StopCause {
         /// How far, m.
         moved_m: f64,
     },
+    /// The axis went past its target.
+    #[error("went {:.3} mm past its target; check the scale and the gains", .beyond_m * 1e3)]
+    Overrun {
+        /// How far, m.
+        beyond_m: f64,
+    },
     /// The axis does not stand still with power on.
     #[error("moved {:.3} mm with power on and no target; check brake and gains", .moved_m * 1e3)]
     Restless {
@@ -74,6 +80,11 @@ pub enum StopCause {
         /// What was allowed, s.
         limit_s: f64,
     },
+    /// The drive shows the homing before.
+    #[error(
+        "homing did not begin: statusword bit 12 stays from the homing before; check mode 6 and the start bit"
+    )]
+    NotBegun,
     /// The drive could not home.
     #[error("homing failed (statusword bit 13); check method, switches and index")]
     Homing,
@@ -130,12 +141,35 @@ pub enum MotionError {
         source: masseter_can::cia402::StatuswordError,
     },
     /// The drive did not confirm that it is off.
-    #[error("{}: NOT PROVED OFF ({reason}); press the emergency stop", AXIS_NAMES[*axis])]
+    #[error("{}: NOT PROVED OFF ({reason}); press the emergency stop. The drive keeps the reduced limits", AXIS_NAMES[*axis])]
     StaysOn {
         /// The axis.
         axis: usize,
         /// What is known.
         reason: String,
+    },
+    /// Objects of the drive kept the values of this step.
+    #[error(
+        "{}: {}not every old value returned ({source}); run 'masseter robot configure'",
+        AXIS_NAMES[*axis], cause.as_ref().map(|cause| format!("{cause}; ")).unwrap_or_default()
+    )]
+    NotRestored {
+        /// The axis.
+        axis: usize,
+        /// Why the motion ended early, if so.
+        cause: Option<String>,
+        /// Why the value did not return.
+        source: LineError,
+    },
+    /// An object that the profile keeps from being written is not careful enough.
+    #[error("{}: object {object} is {found}, and its rule in drive_profile.objects lets nobody reduce it; change the rule", AXIS_NAMES[*axis])]
+    Careless {
+        /// The axis.
+        axis: usize,
+        /// The object.
+        object: ObjectAddress,
+        /// Its value.
+        found: u32,
     },
     /// The axis moved after its power went.
     #[error(

@@ -66,14 +66,11 @@ impl<'a> Mover<'a> {
         };
         match mover.configure() {
             Ok(()) => Ok(mover),
-            Err(error) => {
-                let _ = mover.borrowed.restore(mover.line);
-                Err(error.into())
-            }
+            Err(error) => Err(mover.give_back(error)),
         }
     }
 
-    fn configure(&mut self) -> Result<(), LineError> {
+    fn configure(&mut self) -> Result<(), MotionError> {
         let (can, scale) = (&self.scenario.can, self.scale());
         let Caution { speed_m_s, acceleration_m_s2, force_n, .. } = self.caution;
         // The drive stops when this program dies: it watches the heartbeat, and a lost one is a quick stop.
@@ -93,12 +90,28 @@ impl<'a> Mover<'a> {
         ] {
             self.borrow(index, subindex, value, bytes)?;
         }
+        // A profile may keep the step from writing an object: then the drive must be as careful by itself.
+        self.require(0x1016, 1, |found| found == consumed)?;
+        self.require(0x6072, 0, |found| found <= permille)?;
+        self.require(0x6081, 0, |found| found <= scale.velocity(speed_m_s))?;
         // A following error is a fault at once, and a fault closes the brake at once: the feedback may be what is wrong, and
         // then a ramp only drives the axis further. Not every drive takes these values.
         for index in [0x6066, 0x605E] {
             self.borrowed.set_if_taken(self.line, ObjectAddress::new(index, 0), 0, 2)?;
         }
         Ok(())
+    }
+
+    /// Reads an object that must be good before the drive gets power.
+    fn require(
+        &mut self,
+        index: u16,
+        subindex: u8,
+        is_good: impl Fn(u32) -> bool,
+    ) -> Result<(), MotionError> {
+        let (axis, object) = (self.axis, ObjectAddress::new(index, subindex));
+        let found = self.line.read_number(axis, object)?;
+        if is_good(found) { Ok(()) } else { Err(MotionError::Careless { axis, object, found }) }
     }
 
     /// Changes an object until the end.
@@ -125,6 +138,11 @@ impl<'a> Mover<'a> {
     /// The watch over the motion.
     pub(super) fn watch(&mut self) -> &mut Watch {
         &mut self.watch
+    }
+
+    /// The limit switches end the next motion.
+    pub(super) fn heed_switches(&mut self) {
+        self.watch.heed_switches(self.line);
     }
 
     /// Scales of the axis.
@@ -217,11 +235,9 @@ impl<'a> Mover<'a> {
         let Caution { speed_m_s, acceleration_m_s2, still_m, .. } = self.caution;
         let limit_s = 1.5 * ((target_m - start_m).abs() / speed_m_s + speed_m_s / acceleration_m_s2) + 1.0;
         let word = Controlword::ENABLE_OPERATION;
-        while operator(self.line.now_ns()) == Wish::Halt {
-            self.look()?;
-        }
         self.line.write(self.axis, ObjectAddress::new(0x607A, 0), target as u32, 4)?;
         self.line.control(self.axis, word)?;
+        self.wait_for_leave(operator)?;
         self.line.control(self.axis, word.with_start().with_immediate_change())?;
         let mut until_ns = self.line.now_ns() + seconds(limit_s);
         let (mut seen, mut is_taken, mut halted_ns) = (vec![], false, None);
@@ -231,6 +247,10 @@ impl<'a> Mover<'a> {
             let moved_m = (start_m - sample.position_m) * (target_m - start_m).signum();
             if moved_m > backwards_m {
                 return self.stopped(StopCause::WrongDirection { moved_m });
+            }
+            let beyond_m = (sample.position_m - target_m) * (target_m - start_m).signum();
+            if beyond_m > 2.0 * still_m + self.watch.bounds().window_m {
+                return self.stopped(StopCause::Overrun { beyond_m });
             }
             match (operator(sample.at_ns), halted_ns) {
                 (Wish::Stop, _) => return self.stopped(StopCause::Requested),
@@ -259,6 +279,17 @@ impl<'a> Mover<'a> {
         }
     }
 
+    /// Waits until the operator lets the axis move: a motion begins on a wish to move alone.
+    fn wait_for_leave(&mut self, operator: &mut Operator<'_>) -> Result<(), MotionError> {
+        loop {
+            match operator(self.line.now_ns()) {
+                Wish::Move => return Ok(()),
+                Wish::Stop => return self.stopped(StopCause::Requested),
+                Wish::Halt => drop(self.look()?),
+            }
+        }
+    }
+
     /// Looks for that long, at an axis that stands.
     pub(super) fn dwell(
         &mut self,
@@ -282,19 +313,31 @@ impl<'a> Mover<'a> {
         switching::switch_off(self.line, self.axis, &self.scenario.scale(self.axis), &self.profile().brake)
     }
 
-    /// Ends: stops and switches off after a failure, and writes the old values back in any case.
+    /// Ends: stops and switches off after a failure, and writes the old values back. A drive that is not proved off keeps its
+    /// reduced limits.
     ///
     /// # Errors
-    /// That of the motion, unless the drive is not proved off.
+    /// That of the motion, unless the drive is not proved off, or an old value did not return.
     pub(super) fn finish<T>(mut self, done: Result<T, MotionError>) -> Result<T, MotionError> {
-        let stopped = match &done {
-            Ok(_) => Ok(()),
-            Err(_) => switching::stop(self.line, self.axis, &self.profile().brake),
-        };
-        let restored = self.borrowed.restore(self.line);
-        stopped?;
-        let done = done?;
-        restored?;
-        Ok(done)
+        match done {
+            Ok(done) => match self.borrowed.restore(self.line) {
+                Ok(()) => Ok(done),
+                Err(source) => Err(MotionError::NotRestored { axis: self.axis, cause: None, source }),
+            },
+            Err(error) => {
+                switching::stop(self.line, self.axis, &self.profile().brake)?;
+                Err(self.give_back(error))
+            }
+        }
+    }
+
+    /// Writes the old values back after a failure; returns what to report.
+    fn give_back(&mut self, error: MotionError) -> MotionError {
+        match self.borrowed.restore(self.line) {
+            Ok(()) => error,
+            Err(source) => {
+                MotionError::NotRestored { axis: self.axis, cause: Some(error.to_string()), source }
+            }
+        }
     }
 }

@@ -15,8 +15,9 @@ const TRANSITION_NS: u64 = SECOND_NS;
 const SETTLING_NS: u64 = SECOND_NS;
 /// How far an axis may move as its brake closes, m: some turns of play, and not a fall.
 const MOST_DROP_M: f64 = 5e-4;
-/// How long a halt may take before the quick stop comes, ns.
-const HALT_NS: u64 = 100 * MILLISECOND_NS;
+/// How long a stop is tried, and after which time its command is repeated, ns.
+const STOP_NS: u64 = SECOND_NS;
+const REPEAT_NS: u64 = 200 * MILLISECOND_NS;
 
 /// Switches a drive on, up to "operation enabled". The brake is opening then: the axis may not move yet.
 pub(super) fn switch_on(line: &mut Line, axis: usize) -> Result<(), MotionError> {
@@ -55,36 +56,44 @@ pub(super) fn switch_off(
     if moved_m.abs() > MOST_DROP_M { Err(MotionError::Dropped { axis, moved_m }) } else { Ok(moved_m) }
 }
 
-/// Stops an axis in whatever it does: halt, quick stop, voltage off. Every command is sent, whatever became of the one before.
+/// Stops an axis in whatever it does: quick stop, then voltage off. Neither word can enable a drive, whatever its state. Commands that
+/// are lost are repeated.
 ///
 /// # Errors
 /// [`MotionError::StaysOn`] unless the statusword proves that the drive is off.
 pub(super) fn stop(line: &mut Line, axis: usize, brake: &BrakeConfig) -> Result<(), MotionError> {
-    let is_enabled = !matches!(read_state(line, axis), Ok(state) if state != DriveState::OperationEnabled);
-    if is_enabled {
-        let halted = line.control(axis, Controlword::ENABLE_OPERATION.with_halt());
-        let waited = halted.and_then(|()| line.listen(HALT_NS));
-        let braked = line.control(axis, Controlword::QUICK_STOP);
-        // The drive may stay in the quick stop (605Ah = 5 or 6): the voltage goes after the same time.
-        let _ = (waited, braked);
-        let _ = wait_for(line, axis, TRANSITION_NS, |state| !state.is_powered());
-    }
+    // The drive may stay in the quick stop (605Ah = 5 or 6): the voltage goes after the same time.
+    let _ = repeat(line, axis, Controlword::QUICK_STOP);
     disable_voltage(line, axis)?;
     Ok(line.listen(seconds(brake.close_s))?)
 }
 
 fn disable_voltage(line: &mut Line, axis: usize) -> Result<(), MotionError> {
-    let sent = line.control(axis, Controlword::DISABLE_VOLTAGE);
-    let reason = match wait_for(line, axis, TRANSITION_NS, |state| !state.is_powered()) {
-        Ok(state) if !state.is_powered() => {
+    match repeat(line, axis, Controlword::DISABLE_VOLTAGE) {
+        Ok(()) => {
             line.note_off(axis);
-            return Ok(());
+            Ok(())
         }
-        Ok(state) => format!("it shows {state}"),
-        Err(error) => error.to_string(),
-    };
-    let reason = sent.err().map_or(reason, |error| error.to_string());
-    Err(MotionError::StaysOn { axis, reason })
+        Err(reason) => Err(MotionError::StaysOn { axis, reason }),
+    }
+}
+
+/// Sends a controlword again and again until the drive shows no voltage, for a limited time; returns why that is not proved.
+fn repeat(line: &mut Line, axis: usize, word: Controlword) -> Result<(), String> {
+    let until_ns = line.now_ns() + STOP_NS;
+    loop {
+        let sent = line.control(axis, word);
+        let reason = match wait_for(line, axis, REPEAT_NS, |state| !state.is_powered()) {
+            Ok(state) if !state.is_powered() => return Ok(()),
+            Ok(state) => format!("it shows {state}"),
+            Err(error) => error.to_string(),
+        };
+        if line.now_ns() >= until_ns {
+            return Err(sent.err().map_or(reason, |error| error.to_string()));
+        }
+        // Time passes also where nothing can be sent.
+        let _ = line.listen(MILLISECOND_NS);
+    }
 }
 
 /// Waits until a drive shows a mode of operation (6061h).

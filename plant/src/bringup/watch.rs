@@ -102,6 +102,11 @@ impl Watch {
         self.switches = None;
     }
 
+    /// The limit switches count again, except those that are closed now.
+    pub(super) fn heed_switches(&mut self, line: &mut Line) {
+        self.switches = line.read_number(self.axis, ObjectAddress::new(0x60FD, 0)).ok();
+    }
+
     /// Looks once. The position comes before the statusword: a statusword without "homed" proves an old position.
     ///
     /// # Errors

@@ -31,8 +31,8 @@ impl DryConfig {
 
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
         require_within(&[
-            ("dry.speed", self.speed, 0.01, 1.0),
-            ("dry.force", self.force, 0.01, 1.0),
+            ("dry.speed", self.speed, 0.01, 0.25),
+            ("dry.force", self.force, 0.01, 0.5),
             ("dry.stroke_margin_mm", self.stroke_margin_mm, 0.0, 100.0),
         ])
     }

@@ -125,7 +125,7 @@ impl StopRequest {
 
     /// Listens for SIGTERM and SIGINT, in a process without a supervisor.
     pub fn listen_alone() -> io::Result<Self> {
-        Self::by(&[SIGTERM, SIGINT])
+        Self::by(&[SIGTERM, SIGINT, SIGHUP])
     }
 
     fn by(signals: &[i32]) -> io::Result<Self> {

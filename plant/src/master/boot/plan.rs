@@ -8,7 +8,7 @@ use masseter_can::cia402::Controlword;
 use masseter_shared::config::{AccelerationUnit, ObjectRule};
 use masseter_shared::messages::codes::{BootPhase, Cause};
 
-use crate::wanted::{OTHER_PDOS, RAMP_THEN_OFF, WantedDrive, WantedIdentity, WantedObject};
+use crate::wanted::{OTHER_PDOS, WantedDrive, WantedIdentity, WantedObject};
 
 /// 6041h.
 const STATUSWORD: ObjectAddress = ObjectAddress::new(0x6041, 0);
@@ -64,12 +64,12 @@ pub(super) fn plan(wanted: &WantedDrive, resets_faults: bool) -> Vec<Step> {
     steps.push(Step::Enter(BootPhase::Configuring));
     // Another master may have left the drive enabled, and a reset of the communication does not change that. The drive
     // stops along its quick-stop ramp, if it allows that option.
-    let object = ObjectAddress::new(0x605A, 0);
-    steps.extend([
-        Step::Write { object, value: RAMP_THEN_OFF as u32, bytes: 2, is_optional: true },
-        control(Controlword::QUICK_STOP),
-        Step::Read(STATUSWORD, Check::NoVoltage),
-    ]);
+    let is_written =
+        |wanted: &&WantedObject| wanted.object.index == 0x605A && wanted.rule != ObjectRule::Expect;
+    if let Some(&WantedObject { object, value, bytes, .. }) = wanted.objects.iter().find(is_written) {
+        steps.push(Step::Write { object, value, bytes, is_optional: true });
+    }
+    steps.extend([control(Controlword::QUICK_STOP), Step::Read(STATUSWORD, Check::NoVoltage)]);
     for communication in OTHER_PDOS {
         let cob_id = ObjectAddress::new(communication, 1);
         steps.extend([Step::Read(cob_id, Check::PdoElseSkip(1)), Step::WriteKept(cob_id)]);
@@ -139,10 +139,13 @@ const fn control(word: Controlword) -> Step {
 /// one is opened first.
 fn configure(objects: &[WantedObject]) -> Vec<Step> {
     let mut steps = Vec::with_capacity(objects.len() + 1);
-    let mut is_open = false;
+    let is_lower_written = |wanted: &WantedObject| {
+        wanted.object == ObjectAddress::new(0x607D, 1) && wanted.rule != ObjectRule::Expect
+    };
     for &WantedObject { object, value, bytes, rule, .. } in objects {
-        if object.index == 0x607D && rule != ObjectRule::Expect && !std::mem::replace(&mut is_open, true) {
-            steps.push(write(0x607D, 1, i32::MIN as u32, 4));
+        if object == ObjectAddress::new(0x607D, 2) && objects.iter().any(is_lower_written) {
+            let (object, value) = (ObjectAddress::new(0x607D, 1), i32::MIN as u32);
+            steps.push(Step::Write { object, value, bytes: 4, is_optional: true });
         }
         steps.push(match rule {
             ObjectRule::Expect => {
