@@ -226,7 +226,23 @@ fn a_released_key_halts_and_a_stop_switches_off() {
     bench.assert_off();
     let words = bench.log.controlwords();
     let halts = words.iter().filter(|(_, word)| word.halts()).count();
-    assert_eq!(halts, 2, "one at the release, one before the quick stop: {words:?}");
+    assert_eq!(halts, 1, "at the release: {words:?}");
+    let end: Vec<_> = words[words.len() - 2..].iter().map(|(_, word)| *word).collect();
+    assert_eq!(end, [Controlword::QUICK_STOP, Controlword::DISABLE_VOLTAGE]);
+}
+
+/// A person who lets go before the motion begins, and then ends it, sees no motion.
+#[test]
+fn a_stop_while_the_axis_waits_starts_nothing() {
+    let mut bench = Bench::new("");
+    let order = JogOrder::usual(&bench.scenario, L1, 0.002);
+    let wish = |now_ns: u64| if now_ns < 3 * SECOND_NS { Wish::Halt } else { Wish::Stop };
+    let error = jog(&mut bench.line, &bench.scenario, &order, &mut |now_ns| wish(now_ns));
+    assert!(matches!(error, Err(MotionError::Stopped { cause: StopCause::Requested, .. })), "{error:?}");
+    bench.assert_off();
+    let words = bench.log.controlwords();
+    assert!(words.iter().any(|(_, word)| *word == Controlword::ENABLE_OPERATION), "it had power: {words:?}");
+    assert!(!words.iter().any(|(_, word)| word.starts()), "{words:?}");
 }
 
 #[test]

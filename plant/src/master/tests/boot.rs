@@ -122,7 +122,7 @@ fn a_drive_that_is_not_as_expected_is_named_and_no_drive_is_enabled() {
 fn answers_that_come_twice_now_and_then_are_no_second_drive() {
     let mut bench = Bench::new();
     for _ in 0..400 {
-        let is_repeated = bench.drive(3).requests.len() % 8 == 7;
+        let is_repeated = bench.drive(3).requests.len() % 10 == 9;
         bench.drive(3).servers = if is_repeated { 2 } else { 1 };
         bench.cycle(Some(DriveRequest::Enable));
     }
