@@ -229,13 +229,12 @@ fn in_this_run(
 }
 
 /// Whether a drive may lack an object of which the profile says nothing. Many have no event timer for RPDOs; heartbeat and
-/// master supervise these drives too. Only a dry run needs the limit of force.
+/// master supervise these drives too. A bring-up that was killed may have left another fault reaction (605Eh). Only a dry run needs
+/// the limit of force.
 fn may_lack(object: ObjectAddress, scenario: &Scenario) -> bool {
     match (object.index, object.subindex) {
-        (0x1400, 5) => true,
+        (0x1400, 5) | (0x605E, 0) => true,
         (0x6072, 0) => !scenario.dry.is_on,
-        // A step of the bring-up that was killed may have left another reaction.
-        (0x605E, 0) => true,
         _ => false,
     }
 }
