@@ -23,6 +23,8 @@ use crate::slew::Slew;
 use crate::start::StartTolerance;
 use crate::trajectory::{self, Trajectory};
 
+/// Time between two looks at the motion for its margins, s.
+const MARGINS_EVERY_S: f64 = 0.005;
 /// How many parameters the controller has beside those of the law.
 const OWN: usize = 2;
 /// Age of a reading that comes late but is used.
@@ -87,7 +89,9 @@ impl MotionController {
     ) -> Self {
         let config = scenario.controller;
         let limits = scenario.limits.within(&scenario.drives);
-        let demands = trajectory::check(&trajectory, &mechanism, &limits, scenario.period_s()).ok();
+        // The plan has checked every cycle; the margins that a change of rate needs show in a coarser look.
+        let period_s = scenario.period_s().max(MARGINS_EVERY_S);
+        let demands = trajectory::check(&trajectory, &mechanism, &limits, period_s).ok();
         let change_s = Slew::change_s(demands.as_ref(), &limits);
         let mut declared = law.declared();
         declared.parameters.extend(own_parameters());
