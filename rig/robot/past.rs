@@ -206,6 +206,25 @@ mod tests {
         assert!(parent.join("03-inspect/result.json").exists());
     }
 
+    /// A pose that was checked before the axes were homed again says nothing of the new zeros.
+    #[test]
+    fn a_step_that_is_repeated_outdates_those_after_it_and_one_out_of_order_counts_for_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let basis = Basis::new(&Scenario::default(), [None; AXES]);
+        let check = |step, axis| refusal(folder.path(), step, &[axis], &basis);
+        take(folder.path(), Step::Home, &ALL, Some(true));
+        take(folder.path(), Step::CheckPose, &ALL, Some(true));
+        assert_eq!(check(Step::CheckPose, 3), None);
+        take(folder.path(), Step::Home, &[3], Some(false));
+        assert!(check(Step::CheckPose, 3).unwrap().starts_with("outdated: home again at "));
+        assert_eq!(check(Step::CheckPose, 4), None, "another axis");
+        let mut alone =
+            StepFolder::begin(folder.path(), Step::CheckPose, &ALL, &Scenario::default()).unwrap();
+        alone.note_out_of_order();
+        alone.finish(true, &"data").unwrap();
+        assert!(check(Step::CheckPose, 3).unwrap().starts_with("made out of order at "));
+    }
+
     #[test]
     fn a_step_of_one_axis_says_nothing_of_the_others_and_restore_undoes_configure() {
         let folder = tempfile::tempdir().unwrap();
