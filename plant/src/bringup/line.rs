@@ -402,23 +402,8 @@ fn answers(answer: &SdoResponse, asked: ObjectAddress) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::{Arc, Mutex};
-
     use super::*;
-
-    /// A log that a test can read.
-    #[derive(Debug, Clone, Default)]
-    struct Log(Arc<Mutex<Vec<u8>>>);
-
-    impl Write for Log {
-        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            self.0.lock().unwrap().write(bytes)
-        }
-
-        fn flush(&mut self) -> io::Result<()> {
-            Ok(())
-        }
-    }
+    use crate::bringup::test_log::Log;
 
     fn line() -> (Line, Log) {
         let log = Log::default();
@@ -453,7 +438,7 @@ mod tests {
         line.control(3, Controlword::DISABLE_VOLTAGE).unwrap();
         line.note_off(3);
         line.control(4, Controlword::SWITCH_ON).unwrap();
-        let log = String::from_utf8(log.0.lock().unwrap().clone()).unwrap();
+        let log = log.text();
         assert_eq!(log.matches(" can1 605#2B40600007").count(), 1, "{log}");
     }
 }

@@ -21,6 +21,8 @@ mod store;
 mod survey;
 mod switching;
 #[cfg(test)]
+mod test_log;
+#[cfg(test)]
 mod tests;
 mod watch;
 mod wires;

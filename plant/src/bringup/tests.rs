@@ -1,8 +1,6 @@
 //! Jog and home on emulated drives.
 
-use std::io::{self, Write};
 use std::path::Path;
-use std::sync::{Arc, Mutex};
 
 use masseter_can::canopen::{NodeId, ObjectAddress};
 use masseter_can::cia402::Controlword;
@@ -10,38 +8,10 @@ use masseter_shared::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
 
+use super::test_log::Log;
 use super::*;
 
 const L1: usize = 3;
-
-/// A log that a test can read.
-#[derive(Debug, Clone, Default)]
-struct Log(Arc<Mutex<Vec<u8>>>);
-
-impl Write for Log {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.lock().unwrap().write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
-impl Log {
-    /// Every controlword that was sent, with the node.
-    fn controlwords(&self) -> Vec<(u8, Controlword)> {
-        let text = String::from_utf8(self.0.lock().unwrap().clone()).unwrap();
-        let words = text.lines().filter_map(|line| {
-            let (id, data) = line.split_whitespace().last()?.split_once('#')?;
-            let node = u16::from_str_radix(id, 16).ok()?.checked_sub(0x600)?;
-            let word = data.strip_prefix("2B406000")?;
-            let low = u16::from_str_radix(word.get(..4)?, 16).ok()?;
-            Some((u8::try_from(node).ok()?, Controlword(low.swap_bytes())))
-        });
-        words.collect()
-    }
-}
 
 struct Bench {
     scenario: Scenario,
