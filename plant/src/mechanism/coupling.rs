@@ -29,16 +29,15 @@ pub(super) struct DriveSide {
     mass_kg: f64,
     position_m: f64,
     speed_m_s: f64,
-    acceleration_m_s2: f64,
     /// The step that is being solved.
     step: Step,
 }
 
-/// The drive's acceleration in a step is `free_m_s2` plus `per_speed` times the joint's speed at the end of the step.
+/// The drive's speed at the end of a step is `free_m_s` plus `per_speed` times the joint's.
 #[derive(Debug, Clone, Copy, Default)]
 struct Step {
-    free_m_s2: f64,
-    per_speed_per_s: f64,
+    free_m_s: f64,
+    per_speed: f64,
 }
 
 impl Coupling {
@@ -60,8 +59,7 @@ impl Coupling {
         };
         let mass_kg = DRIVE_SHARE * axis_mass_kg;
         let step = Step::default();
-        *self =
-            Self::Loose(DriveSide { half_m, mass_kg, position_m, speed_m_s, acceleration_m_s2: 0.0, step });
+        *self = Self::Loose(DriveSide { half_m, mass_kg, position_m, speed_m_s, step });
     }
 
     /// Gets rigid where it is.
@@ -88,14 +86,13 @@ impl Coupling {
     /// Solves the drive's side, now that the joint's speed at the end of the step is known.
     pub(super) fn settle(&mut self, joint_m_s: f64) {
         if let Self::Loose(side) = self {
-            side.acceleration_m_s2 = side.step.free_m_s2 + side.step.per_speed_per_s * joint_m_s;
+            side.speed_m_s = side.step.free_m_s + side.step.per_speed * joint_m_s;
         }
     }
 
     /// Moves the drive's side.
     pub(super) fn advance(&mut self, dt_s: f64) {
         if let Self::Loose(side) = self {
-            side.speed_m_s += side.acceleration_m_s2 * dt_s;
             side.position_m += side.speed_m_s * dt_s;
         }
     }
@@ -110,8 +107,7 @@ impl DriveSide {
         let moved = self.mass_kg + step_s * (damping + DRIVE_DAMPING_N_S_PER_M);
         let free_m_s = (self.mass_kg * self.speed_m_s + step_s * (drive_n - spring_n)) / moved;
         let per_speed = step_s * damping / moved;
-        self.step =
-            Step { free_m_s2: (free_m_s - self.speed_m_s) / step_s, per_speed_per_s: per_speed / step_s };
+        self.step = Step { free_m_s, per_speed };
         let damping_n_s_per_m = damping * (1.0 - per_speed);
         let force_n = spring_n + damping * free_m_s - damping_n_s_per_m * joint_m_s;
         Element { force_n, damping_n_s_per_m }

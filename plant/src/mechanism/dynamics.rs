@@ -3,22 +3,26 @@
 //!
 //! The state is the platform's pose and twist. Joint positions come from inverse kinematics and joint
 //! rates from the Jacobian. The forward kinematics is never solved here, so the mechanism is an
-//! independent oracle for it. The masses are the platform with the jaw, the carriages (moved by the slides)
-//! and the rods (moved along and across by the legs); carriages and rods are constant joint inertias. With J the
-//! Jacobian of slides, legs and hinges and M_q their inertias,
+//! independent oracle for it. With the [equations](masseter_shared::dynamics) of the rigid bodies,
 //!
-//! (M_platform + Jᵀ M_q J) V̇ = Jᵀ(τ − friction − M_q J̇V) + gravity + food − gyroscopic moment.
+//! M V̇ = Jᵀ(τ − friction) + food − h.
+//!
+//! The integration is the leapfrog scheme (Störmer and Verlet): forces act on the twist at the beginning of a step, and the
+//! platform then moves with this twist to the step's end. The twist is that of the middle of the step, so that the scheme
+//! is of second order. Terms of h that depend on the twist take it at the beginning, extrapolated by half a step. No energy
+//! drifts away or comes in, and the forces need to be known only once a step.
 //!
 //! End stops, play and elasticity are left out, unless a scenario has [faults](super::disturbances) of the mechanism.
 
 use masseter_shared::config::{DynamicsConfig, FaultKindConfig};
+use masseter_shared::dynamics::{Bodies, Equations, Motion};
 use masseter_shared::geometry::{
-    AXES, InverseError, Jacobian, Joints, LEGS, LimitViolation, Mechanism, Pose, Twist, Vec3,
+    AXES, InverseError, Jacobian, Joints, LimitViolation, Mechanism, Pose, Twist, Vec3,
 };
-use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Matrix6, UnitQuaternion, Vector6};
 
 use super::disturbances::{AxisMotion, Disturbances, Disturbed};
-use super::food::{Food, vertical};
+use super::food::Food;
 use super::friction;
 use super::load::Load;
 
@@ -27,6 +31,7 @@ use super::load::Load;
 pub(crate) struct MechanismState {
     /// The platform in the base frame.
     pub(crate) pose: Pose,
+    /// In the middle of the present step.
     twist: Twist,
     joints: Joints,
 }
@@ -43,8 +48,9 @@ impl MechanismState {
 pub(crate) struct Dynamics {
     mechanism: Mechanism,
     config: DynamicsConfig,
+    bodies: Bodies,
     state: MechanismState,
-    /// V̇ under the forces that act.
+    /// V̇ in the present step.
     acceleration: Twist,
     food: Option<Food>,
     /// None where the scenario has neither faults nor stimuli of the mechanism.
@@ -107,7 +113,8 @@ impl Dynamics {
         }
         let (twist, acceleration) = (Twist::zeros(), Twist::zeros());
         let state = MechanismState { pose, twist, joints };
-        let dynamics = Self { mechanism, config, state, acceleration, food, injected: None };
+        let bodies = Bodies::from(&config);
+        let dynamics = Self { mechanism, config, bodies, state, acceleration, food, injected: None };
         match dynamics.longest_step_ns()? {
             longest_ns if longest_ns < *DynamicsConfig::STEPS_NS.start() => Err(DynamicsError::Stiff),
             longest_step_ns if config.step_ns > longest_step_ns => {
@@ -128,7 +135,7 @@ impl Dynamics {
     pub(crate) fn begin_fault(&mut self, axis: usize, kind: FaultKindConfig, size: f64) {
         let (positions_m, speeds_m_s) = (self.state.positions_m(), self.velocities_m_s(&self.state));
         let (position_m, speed_m_s) = (positions_m[axis], speeds_m_s[axis]);
-        let motion = AxisMotion { position_m, speed_m_s, mass_kg: self.axis_mass_kg()[axis] };
+        let motion = AxisMotion { position_m, speed_m_s, mass_kg: self.bodies.axis_mass_kg()[axis] };
         if let Some(injected) = &mut self.injected {
             injected.disturbances.begin(axis, kind, size, motion);
         }
@@ -188,10 +195,10 @@ impl Dynamics {
     /// eigenvalue of M⁻¹ Jᵀ C J, C being how steeply friction grows with speed at rest. With M = L Lᵀ it is that of
     /// the symmetric B Bᵀ, B = L⁻¹ Jᵀ √C.
     fn longest_step_ns(&self) -> Result<u64, DynamicsError> {
-        let jacobian = self.jacobian_at(&self.state);
-        let mass = self.mass(&jacobian, &self.platform_inertia()).cholesky().ok_or(DynamicsError::Mass)?;
+        let motion = self.motion();
+        let mass = Equations::new(&self.bodies, &motion).mass.cholesky().ok_or(DynamicsError::Mass)?;
         let root = Matrix6::from_diagonal(&friction::damping_n_s_per_m(&self.config).map(f64::sqrt));
-        let braked = jacobian.actuators.transpose() * root;
+        let braked = motion.jacobian.actuators.transpose() * root;
         let braked = mass.l().solve_lower_triangular(&braked).ok_or(DynamicsError::Mass)?;
         let rates_per_s = braked * braked.transpose();
         // The search for eigenvalues never ends with NaN or infinity.
@@ -216,49 +223,42 @@ impl Dynamics {
         (self.jacobian_at(state).actuators * state.twist).into()
     }
 
-    /// Applies the actuators' forces (N) from now on: the platform keeps the acceleration of this state until
-    /// the next call.
+    /// Applies the actuators' forces (N) for the step that begins.
     pub(crate) fn push(&mut self, force_n: &[f64; AXES]) -> Result<(), DynamicsError> {
-        let jacobian = self.jacobian_at(&self.state);
-        let (axes, hinges) = self.bias(&jacobian);
-        let inertia = self.platform_inertia();
-        let disturbed = self.disturb(&jacobian, force_n);
+        let motion = self.motion();
+        let axes = motion.bias.axes_m_s2;
+        let actuators = &motion.jacobian.actuators;
+        let speeds_m_s = actuators * self.state.twist;
+        let disturbed = self.disturb(&speeds_m_s, force_n);
         let driven_n = disturbed.map_or(Vector6::from(*force_n), |disturbed| disturbed.force_n);
-        let axes_n = driven_n
-            - friction::force_n(&self.config, &(jacobian.actuators * self.state.twist))
-            - self.axis_mass_kg().component_mul(&axes);
+        let axes_n = driven_n - friction::force_n(&self.config, &speeds_m_s);
         let food = self
             .food
             .as_mut()
             .map_or_else(Vector6::zeros, |food| food.bite(&self.state.pose, &self.state.twist));
-        let hinges_nm = hinges * -self.config.leg_inertia_kg_m2;
-        let mut wrench =
-            jacobian.actuators.tr_mul(&axes_n) + jacobian.hinges.tr_mul(&hinges_nm) + self.gravity() + food
-                - self.gyroscopic(&inertia);
-        let mut mass = self.mass(&jacobian, &inertia);
+        let Equations { mut mass, bias, .. } = Equations::new(&self.bodies, &motion);
+        let mut wrench = actuators.tr_mul(&axes_n) + food - bias;
         if let (Some(disturbed), Some(injected)) = (disturbed, &self.injected) {
-            let MechanismState { pose, twist, .. } = &self.state;
+            let Motion { pose, twist, .. } = &motion;
             wrench += injected.load.wrench(pose, twist, self.config.gravity_m_s2)
-                + jacobian.actuators.tr_mul(&disturbed.parted_kg.component_mul(&axes));
+                + actuators.tr_mul(&disturbed.parted_kg.component_mul(&axes));
             let moved_kg = Matrix6::from_diagonal(&(disturbed.resisting_kg - disturbed.parted_kg));
-            mass += injected.load.mass(pose) + jacobian.actuators.tr_mul(&(moved_kg * jacobian.actuators));
+            mass += injected.load.mass(pose) + actuators.tr_mul(&(moved_kg * actuators));
         }
-        let solver = mass.cholesky().ok_or(DynamicsError::Mass)?;
-        self.acceleration = solver.solve(&wrench);
+        self.acceleration = mass.cholesky().ok_or(DynamicsError::Mass)?.solve(&wrench);
         let step_s = self.step_s();
+        self.state.twist += self.acceleration * step_s;
         if let Some(injected) = &mut self.injected {
-            let change_m_s2 = jacobian.actuators * self.acceleration + axes;
-            let speeds_m_s = jacobian.actuators * self.state.twist + change_m_s2 * step_s;
-            injected.disturbances.settle(&speeds_m_s);
+            let change_m_s2 = actuators * self.acceleration + axes;
+            injected.disturbances.settle(&(speeds_m_s + change_m_s2 * step_s));
         }
         Ok(())
     }
 
-    /// What the faults make of the drives' forces (N) in a step; none where there are no faults.
-    fn disturb(&mut self, jacobian: &Jacobian, force_n: &[f64; AXES]) -> Option<Disturbed> {
-        let (positions_m, masses_kg) = (self.state.positions_m(), self.axis_mass_kg());
+    /// What the faults make of the drives' forces (N) in a step, at these speeds of the axes; none where there are no faults.
+    fn disturb(&mut self, speeds_m_s: &Vector6<f64>, force_n: &[f64; AXES]) -> Option<Disturbed> {
+        let (positions_m, masses_kg) = (self.state.positions_m(), self.bodies.axis_mass_kg());
         let injected = self.injected.as_mut()?;
-        let speeds_m_s = jacobian.actuators * self.state.twist;
         let motions = std::array::from_fn(|axis| AxisMotion {
             position_m: positions_m[axis],
             speed_m_s: speeds_m_s[axis],
@@ -271,10 +271,9 @@ impl Dynamics {
         self.config.step_ns as f64 * 1e-9
     }
 
-    /// Integrates over `dt_s`: semi-implicit Euler.
+    /// Moves the mechanism for `dt_s`, a part of the step.
     pub(crate) fn advance(&mut self, dt_s: f64) -> Result<(), DynamicsError> {
         let MechanismState { pose, twist, joints } = &mut self.state;
-        *twist += self.acceleration * dt_s;
         let linear = twist.fixed_rows::<3>(0) * dt_s;
         let angular = twist.fixed_rows::<3>(3) * dt_s;
         let mut rotation = UnitQuaternion::from_scaled_axis(angular) * pose.rotation;
@@ -287,78 +286,15 @@ impl Dynamics {
         Ok(())
     }
 
+    /// The motion at the beginning of a step, half a step after the middle of the last one.
+    fn motion(&self) -> Motion {
+        let MechanismState { pose, twist, joints } = &self.state;
+        let twist = twist + self.acceleration * (self.step_s() / 2.0);
+        Motion::of_joints(&self.mechanism, pose, joints, &twist)
+    }
+
     fn jacobian_at(&self, MechanismState { pose, joints, .. }: &MechanismState) -> Jacobian {
         Jacobian::new(&self.mechanism, pose, joints)
-    }
-
-    /// Inertia of the platform about its origin in base axes, kg m².
-    fn platform_inertia(&self) -> Matrix3<f64> {
-        let rotation = self.state.pose.rotation.to_rotation_matrix().into_inner();
-        rotation
-            * Matrix3::from_diagonal(&Vec3::from(self.config.platform_inertia_kg_m2))
-            * rotation.transpose()
-    }
-
-    /// Mass that each axis moves along itself, kg.
-    fn axis_mass_kg(&self) -> Vector6<f64> {
-        let (rod, slide) = (self.config.rod_mass_kg, self.config.carriage_mass_kg + self.config.rod_mass_kg);
-        Vector6::new(slide, slide, slide, rod, rod, rod)
-    }
-
-    /// J̇V: accelerations of axes (m/s²) and hinges (rad/s²) while the twist stays constant.
-    ///
-    /// A corner is then accelerated by ω×(ω×r) alone. Slide and leg see their component of it, the leg
-    /// also the centrifugal lθ̇², the hinge the Coriolis −2l̇θ̇/l. The first three columns of a row of the
-    /// Jacobian are the direction to project on.
-    fn bias(&self, jacobian: &Jacobian) -> (Vector6<f64>, Vector3<f64>) {
-        let MechanismState { pose, twist, joints } = &self.state;
-        let omega: Vec3 = twist.fixed_rows::<3>(3).into();
-        let rates = jacobian.actuators * twist;
-        let swings = jacobian.hinges * twist;
-        let along_axes = jacobian.actuators.fixed_columns::<3>(0);
-        let about_hinges = jacobian.hinges.fixed_columns::<3>(0);
-        let (mut axes, mut hinges) = (Vector6::zeros(), Vector3::zeros());
-        for (leg, corner) in self.mechanism.platform_corners().iter().enumerate() {
-            let corner = omega.cross(&omega.cross(&(pose.rotation * corner)));
-            let (length_m, swing, stretch) = (joints.actuators.leg_m[leg], swings[leg], rates[LEGS + leg]);
-            axes[leg] = (along_axes.row(leg) * corner).x;
-            axes[LEGS + leg] = (along_axes.row(LEGS + leg) * corner).x + length_m * swing * swing;
-            hinges[leg] = (about_hinges.row(leg) * corner).x - 2.0 * stretch * swing / length_m;
-        }
-        (axes, hinges)
-    }
-
-    /// Mass matrix against the twist: platform + Jᵀ·M·J of slides and rods + hinges.
-    fn mass(&self, jacobian: &Jacobian, platform_inertia: &Matrix3<f64>) -> Matrix6<f64> {
-        let config = &self.config;
-        let mut moved = jacobian.actuators;
-        for (mut row, mass_kg) in moved.row_iter_mut().zip(&self.axis_mass_kg()) {
-            row *= *mass_kg;
-        }
-        let mut mass = jacobian.actuators.tr_mul(&moved);
-        mass += jacobian.hinges.tr_mul(&jacobian.hinges) * config.leg_inertia_kg_m2;
-        for i in 0..3 {
-            mass[(i, i)] += config.platform_mass_kg;
-        }
-        let mut rotational = mass.fixed_view_mut::<3, 3>(3, 3);
-        rotational += platform_inertia;
-        mass
-    }
-
-    /// Weight of platform and rods as a wrench on the platform; a rod's centre is taken at its joint.
-    fn gravity(&self) -> Vector6<f64> {
-        let DynamicsConfig { platform_mass_kg, rod_mass_kg, gravity_m_s2, .. } = self.config;
-        let platform = vertical(-platform_mass_kg * gravity_m_s2, &Vec3::zeros());
-        self.mechanism.platform_corners().iter().fold(platform, |wrench, corner| {
-            wrench + vertical(-rod_mass_kg * gravity_m_s2, &(self.state.pose.rotation * corner))
-        })
-    }
-
-    /// ω × Iω of the platform.
-    fn gyroscopic(&self, platform_inertia: &Matrix3<f64>) -> Vector6<f64> {
-        let omega: Vec3 = self.state.twist.fixed_rows::<3>(3).into();
-        let moment = omega.cross(&(platform_inertia * omega));
-        Vector6::new(0.0, 0.0, 0.0, moment.x, moment.y, moment.z)
     }
 }
 
