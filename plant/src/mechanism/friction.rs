@@ -1,39 +1,124 @@
-//! Friction of the axes: Coulomb friction, which fades towards zero at rest, and viscous friction. There is no stiction.
+//! Friction of the moving mechanism: what brakes the axes, hinges and ball joints in a step.
+//!
+//! The law of friction is [shared](masseter_shared::dynamics::Friction). Here are its state, which are the bristles of
+//! axes at rest, and its integration: each force acts as if the speed stayed, with its change as a damping (see
+//! [`Element`]), so that no friction makes a motion grow. The loads are those of the steps before.
 
-use masseter_shared::config::DynamicsConfig;
-use masseter_shared::geometry::LEGS;
-use nalgebra::Vector6;
+use masseter_shared::config::{DynamicsConfig, FrictionConfig, FrictionModel};
+use masseter_shared::dynamics::{Bodies, Friction, Loads, Motion};
+use masseter_shared::geometry::{AXES, LEGS};
+use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector6};
 
 use super::element::Element;
 
-/// Below about this speed Coulomb friction fades towards zero, m/s.
-const STICTION_SPEED_M_S: f64 = 1e-3;
-/// Coulomb friction of a leg as a share of a slide's.
-const LEG_SHARE: f64 = 0.25;
+/// Time in which friction follows the loads, s. Without it, a guide that can lock itself would shake.
+const LOAD_TIME_S: f64 = 1e-3;
+/// Below about this speed the friction of a hinge or a ball fades towards zero, rad/s.
+const TURN_RAD_S: f64 = 0.01;
 
-/// Coulomb friction of the axes d₁ d₂ d₃ l₁ l₂ l₃.
-fn coulomb_n(config: &DynamicsConfig) -> Vector6<f64> {
-    let share = |axis: usize| if axis < LEGS { 1.0 } else { LEG_SHARE };
-    Vector6::from_fn(|axis, _| config.slide_friction_n * share(axis))
+/// Friction with its state.
+#[derive(Debug, Clone)]
+pub(super) struct Braking {
+    law: Friction,
+    config: FrictionConfig,
+    masses_kg: Vector6<f64>,
+    loads: Loads,
+    bristles: [Bristles; AXES],
 }
 
-/// Force against a motion of the axes at these speeds (m/s), N.
-pub(super) fn force_n(config: &DynamicsConfig, speeds_m_s: &Vector6<f64>) -> Vector6<f64> {
-    coulomb_n(config).zip_map(speeds_m_s, |coulomb_n, speed| {
-        coulomb_n * speed / speed.hypot(STICTION_SPEED_M_S) + config.viscous_friction_n_s_per_m * speed
-    })
+/// The bristles of an axis (LuGre; Canudas de Wit et al., IEEE Trans. Automatic Control 40, 1995), whose stiffness grows
+/// with the load as Coulomb friction does.
+#[derive(Debug, Clone, Copy, Default)]
+struct Bristles {
+    deflection_m: f64,
 }
 
-/// The change of an axis' force where its friction is a multiple of what it was, at a speed (m/s). More friction acts on the
-/// speed at the end of a step, so that no factor turns a motion back.
-pub(super) fn change(config: &DynamicsConfig, axis: usize, factor: f64, speed_m_s: f64) -> Element {
-    let slope_n_s_per_m =
-        coulomb_n(config)[axis] / speed_m_s.hypot(STICTION_SPEED_M_S) + config.viscous_friction_n_s_per_m;
-    let damping_n_s_per_m = (factor - 1.0) * slope_n_s_per_m;
-    Element { force_n: -damping_n_s_per_m * speed_m_s, damping_n_s_per_m: damping_n_s_per_m.max(0.0) }
+impl Braking {
+    /// The friction of a mechanism without load.
+    pub(super) fn new(config: &DynamicsConfig, bodies: &Bodies) -> Self {
+        Self {
+            law: Friction::new(config),
+            config: config.friction,
+            masses_kg: bodies.axis_mass_kg(),
+            loads: Loads::default(),
+            bristles: [Bristles::default(); AXES],
+        }
+    }
+
+    /// The force on an axis in a step, at a speed (m/s), where its friction is a multiple of the usual one.
+    pub(super) fn on_axis(&self, axis: usize, speed_m_s: f64, factor: f64, step_s: f64) -> Element {
+        let coulomb_n = self.law.coulomb_n(&self.loads)[axis];
+        let element = match self.config.model {
+            FrictionModel::Smooth => {
+                let drag_n_s_per_m = self.law.drag_n_s_per_m(coulomb_n, speed_m_s);
+                Element { force_n: -drag_n_s_per_m * speed_m_s, damping_n_s_per_m: drag_n_s_per_m }
+            }
+            FrictionModel::Lugre => self.bristled(axis, coulomb_n, speed_m_s, step_s),
+        };
+        Element { force_n: factor * element.force_n, damping_n_s_per_m: factor * element.damping_n_s_per_m }
+    }
+
+    /// F = σ₀ z + σ₁ ż + σ₂ v.
+    fn bristled(&self, axis: usize, coulomb_n: f64, speed_m_s: f64, step_s: f64) -> Element {
+        let stiffness_n_per_m = coulomb_n / self.config.bristle_deflection_m;
+        let slip = self.slip(speed_m_s, step_s);
+        let z_m = self.bristles[axis].deflection_m;
+        let next_m = (z_m + step_s * speed_m_s) / slip;
+        // The damping fades with speed, so that sliding bristles do not drive the axis.
+        let fading = (-(speed_m_s / self.config.breakaway_speed_m_s).powi(2)).exp();
+        let damping_n_s_per_m = self.config.bristle_damping_ratio
+            * 2.0
+            * (stiffness_n_per_m * self.masses_kg[axis]).sqrt()
+            * fading;
+        let viscous_n_s_per_m = self.law.viscous_n_s_per_m();
+        Element {
+            force_n: -stiffness_n_per_m * next_m
+                - damping_n_s_per_m * (next_m - z_m) / step_s
+                - viscous_n_s_per_m * speed_m_s,
+            damping_n_s_per_m: (stiffness_n_per_m * step_s + damping_n_s_per_m) / slip + viscous_n_s_per_m,
+        }
+    }
+
+    /// The bristles' deflection after a step is (z + h v) / slip: ż = v − |v| z/z_max, implicit in z.
+    fn slip(&self, speed_m_s: f64, step_s: f64) -> f64 {
+        let FrictionConfig { bristle_deflection_m, breakaway_ratio, breakaway_speed_m_s, .. } = self.config;
+        let excess = (breakaway_ratio - 1.0) * (-(speed_m_s / breakaway_speed_m_s).powi(2)).exp();
+        1.0 + step_s * speed_m_s.abs() / (bristle_deflection_m * (1.0 + excess))
+    }
+
+    /// The damping of hinges and ball joints against the platform's twist: their friction is its product with the twist.
+    pub(super) fn of_joints(&self, motion: &Motion) -> Matrix6<f64> {
+        let mut damping = Matrix6::zeros();
+        for leg in 0..LEGS {
+            let hinge = motion.jacobian.hinges.row(leg).transpose();
+            let swing_rad_s = motion.swings_rad_s[leg];
+            let drag = self.law.hinge_nm(self.loads.hinge_n[leg]) / swing_rad_s.hypot(TURN_RAD_S);
+            damping.ger(drag, &hinge, &hinge, 1.0);
+            let turns = ball_turns(motion, leg);
+            let turn_rad_s = (turns * motion.twist).norm();
+            let drag = self.law.ball_nm(self.loads.ball_n[leg]) / turn_rad_s.hypot(TURN_RAD_S);
+            damping += turns.tr_mul(&turns) * drag;
+        }
+        damping
+    }
+
+    /// Takes the loads of a step, at whose end the axes have these speeds, m/s.
+    pub(super) fn settle(&mut self, loads: &Loads, speeds_m_s: &Vector6<f64>, step_s: f64) {
+        self.loads = self.loads.towards(loads, step_s / (step_s + LOAD_TIME_S));
+        for axis in 0..AXES {
+            let slip = self.slip(speeds_m_s[axis], step_s);
+            let bristles = &mut self.bristles[axis];
+            bristles.deflection_m = (bristles.deflection_m + step_s * speeds_m_s[axis]) / slip;
+        }
+    }
 }
 
-/// The steepest slope of the force over speed, which is that at rest, N per m/s.
-pub(super) fn damping_n_s_per_m(config: &DynamicsConfig) -> Vector6<f64> {
-    coulomb_n(config).map(|coulomb_n| coulomb_n / STICTION_SPEED_M_S + config.viscous_friction_n_s_per_m)
+/// How fast a ball turns in its socket, by the platform's twist: the ball turns with the platform, the socket with the leg
+/// about the slide's direction û.
+fn ball_turns(motion: &Motion, leg: usize) -> Matrix3x6<f64> {
+    let along_slide = motion.jacobian.actuators.fixed_view::<1, 3>(leg, 0).transpose();
+    let mut turns = -along_slide * motion.jacobian.hinges.row(leg);
+    let mut of_platform = turns.fixed_view_mut::<3, 3>(0, 3);
+    of_platform += Matrix3::identity();
+    turns
 }

@@ -5,6 +5,7 @@ use std::ops::RangeInclusive;
 use nalgebra::Matrix3;
 
 use super::error::ScenarioError;
+use super::friction::FrictionConfig;
 use super::need::{keyed, require_not_negative, require_positive, require_within};
 
 /// Masses of a mechanism that fits on a table, kg. Beyond them the equations of motion lose their digits.
@@ -49,6 +50,8 @@ section! {
         pub slide_friction_n: f64 = 8.0,
         /// Viscous friction of every axis, N per m/s.
         pub viscous_friction_n_s_per_m: f64 = 20.0,
+        /// Friction under load.
+        pub friction: FrictionConfig = FrictionConfig::default(),
         /// Gravity along −z, m/s².
         pub gravity_m_s2: f64 = 9.81,
         /// Length of the legs when the rig is switched on, m.
@@ -78,6 +81,7 @@ impl DynamicsConfig {
         require_within(&offset_m.map(|m| ("dynamics.initial_offset_m", m, -FURTHEST_M, FURTHEST_M)))?;
         require_positive(&keyed!("dynamics", self, initial_leg_m))?;
         require_not_negative(&keyed!("dynamics", self, slide_friction_n viscous_friction_n_s_per_m))?;
+        self.friction.validate()?;
         if !Self::STEPS_NS.contains(&self.step_ns) {
             return Err(ScenarioError::bad("dynamics.step_ns", &self.step_ns, "use 10000 to 250000 ns"));
         }

@@ -11,6 +11,7 @@ use super::drive_profile::over_kinds;
 use super::error::ScenarioError;
 use super::merge::merge;
 use super::need::{LONGEST_S, SHORTEST_MOTION_S, require_within};
+use super::robot_file;
 use super::when::EntryNames;
 use super::{
     AxisScale, CanConfig, ChecksConfig, ControllerConfig, DriveProfile, DrivesConfig, DryConfig,
@@ -39,6 +40,9 @@ section! {
     pub struct Scenario {
         /// Name of the run, with which the name of its folder ends.
         pub name: String = "chewing".to_owned(),
+        /// The file of the robot, whose tables this scenario changes; the built-in defaults when absent.
+        #[serde(skip_serializing)]
+        pub robot: Option<PathBuf> = None,
         /// Seed of every random number.
         pub seed: u64 = 1,
         /// Cycles per second, Hz.
@@ -127,15 +131,27 @@ impl Scenario {
         let text = read_text(path, MOST_BYTES)
             .map_err(|error| ScenarioError::Unreadable { path: path.to_owned(), error })?;
         let mut scenario = Self::parse(path, &text)?;
-        if let Some(folder) = path.parent() {
-            if let Some(memory) = &mut scenario.drives.memory {
-                *memory = folder.join(&*memory);
-            }
-            scenario.files_mut().for_each(|(_, file)| *file = folder.join(&file));
-        }
         let folder = path.parent().unwrap_or(Path::new(""));
+        if let Some(robot) = &scenario.robot {
+            let mut whole = Self::read_robot(&folder.join(robot))?;
+            merge(&mut whole, table_of(&text));
+            scenario = Self::parse(path, &whole.to_string())?;
+        }
+        if let Some(memory) = &mut scenario.drives.memory {
+            *memory = folder.join(&*memory);
+        }
+        scenario.files_mut().for_each(|(_, file)| *file = folder.join(&file));
         scenario.drive_profile.iter_mut().try_for_each(|profile| profile.read_dcf(folder))?;
         Ok(scenario)
+    }
+
+    /// The tables of a robot's file, each checked by itself.
+    fn read_robot(path: &Path) -> Result<Table, ScenarioError> {
+        let text = read_text(path, MOST_BYTES)
+            .map_err(|error| ScenarioError::Unreadable { path: path.to_owned(), error })?;
+        let alone = Self::parse(path, &text)?;
+        alone.validate().map_err(|refusal| Self::place_refusal(refusal, path))?;
+        robot_file::tables(path, table_of(&text))
     }
 
     /// The files that a run reads beside the scenario, each with the name of its copy in the run's folder.
@@ -326,6 +342,10 @@ impl Scenario {
     pub fn period_s(&self) -> f64 {
         self.period_ns() as f64 / SECOND_NS as f64
     }
+}
+
+fn table_of(text: &str) -> Table {
+    toml::from_str(text).expect("the text is that of a scenario")
 }
 
 /// The message on a key that is none of a scenario.

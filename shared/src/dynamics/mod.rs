@@ -6,7 +6,7 @@
 //!
 //! M V̇ + h = Jᵀ τ + w.
 //!
-//! A wrench is a force (N), then a moment (N m) about the platform's origin, in base axes. Friction is no part of these
+//! A wrench is a force (N), then a moment (N m) about the platform's origin, in base axes. [Friction] is no part of these
 //! equations: τ is what reaches the bodies. Equations and their validation: `docs/dynamics.md`.
 //!
 //! Whoever has a motion asks in this order:
@@ -43,12 +43,14 @@
 mod bodies;
 mod energy;
 mod equations;
+mod friction;
 mod motion;
 mod reactions;
 
 pub use bodies::{Bodies, Link, Platform};
 pub use energy::Energy;
 pub use equations::Equations;
+pub use friction::{Friction, Loads};
 pub use motion::{JointAccelerations, Motion};
 pub use reactions::{JointWrench, LegReactions, Reactions};
 

@@ -1,0 +1,186 @@
+//! Friction of axes and joints under load.
+//!
+//! Guides, screws and seals brake the axes; hinges and ball joints brake the legs' turns. Friction here depends on speed
+//! and load alone. The bristles of an axis at rest are a part of the plant.
+
+use crate::config::{DynamicsConfig, FrictionConfig};
+use crate::geometry::{AXES, LEGS};
+
+/// Friction of a leg without load, as a share of a slide's.
+const LEG_SHARE: f64 = 0.25;
+
+/// Forces and moments that joints carry, all of them not negative.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Loads {
+    /// Normal force on the guide of each slide, N.
+    pub guide_n: [f64; LEGS],
+    /// Moment on the guide of each slide, N m.
+    pub guide_nm: [f64; LEGS],
+    /// Force that the screw of each axis transmits, N.
+    pub screw_n: [f64; AXES],
+    /// Force on each hinge, N.
+    pub hinge_n: [f64; LEGS],
+    /// Force on each ball joint, N.
+    pub ball_n: [f64; LEGS],
+}
+
+impl Loads {
+    /// Loads a share of the way from here to others.
+    #[must_use]
+    pub fn towards(&self, others: &Self, share: f64) -> Self {
+        fn mix<const N: usize>(from: [f64; N], to: [f64; N], share: f64) -> [f64; N] {
+            std::array::from_fn(|i| from[i] + share * (to[i] - from[i]))
+        }
+        Self {
+            guide_n: mix(self.guide_n, others.guide_n, share),
+            guide_nm: mix(self.guide_nm, others.guide_nm, share),
+            screw_n: mix(self.screw_n, others.screw_n, share),
+            hinge_n: mix(self.hinge_n, others.hinge_n, share),
+            ball_n: mix(self.ball_n, others.ball_n, share),
+        }
+    }
+}
+
+/// The friction of a mechanism.
+///
+/// ```
+/// use masseter_shared::config::DynamicsConfig;
+/// use masseter_shared::dynamics::{Friction, Loads};
+///
+/// let friction = Friction::new(&DynamicsConfig::default());
+/// let coulomb_n = friction.coulomb_n(&Loads { guide_n: [1000.0; 3], ..Loads::default() });
+/// // 8 N of the seals and 0.5 % of the load.
+/// assert!((coulomb_n[0] - 13.0).abs() < 1e-12);
+/// // At 50 mm/s: Coulomb friction and 20 N s/m.
+/// let at_n = friction.drag_n_s_per_m(coulomb_n[0], 0.05) * 0.05;
+/// assert!((at_n - 14.0).abs() < 1e-9);
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Friction {
+    config: FrictionConfig,
+    unloaded_n: [f64; AXES],
+    viscous_n_s_per_m: f64,
+}
+
+impl Friction {
+    /// The friction that a scenario describes.
+    pub fn new(dynamics: &DynamicsConfig) -> Self {
+        let share = |axis: usize| if axis < LEGS { 1.0 } else { LEG_SHARE };
+        Self {
+            config: dynamics.friction,
+            unloaded_n: std::array::from_fn(|axis| dynamics.slide_friction_n * share(axis)),
+            viscous_n_s_per_m: dynamics.viscous_friction_n_s_per_m,
+        }
+    }
+
+    /// Coulomb friction of the axes d₁ d₂ d₃ l₁ l₂ l₃, N: seals, screws, and for slides the guides,
+    /// F_seal + |f|(1/η − 1) + μ(N + k M/L).
+    pub fn coulomb_n(&self, loads: &Loads) -> [f64; AXES] {
+        std::array::from_fn(|axis| {
+            let guided_n = if axis < LEGS { self.guide_n(loads.guide_n[axis], loads.guide_nm[axis]) } else { 0.0 };
+            self.unloaded_n[axis] + loads.screw_n[axis] * self.screw_loss(axis) + guided_n
+        })
+    }
+
+    /// Friction of a guide under a normal force (N) and a moment (N m), N.
+    fn guide_n(&self, normal_n: f64, moment_nm: f64) -> f64 {
+        let FrictionConfig { guide_coefficient, block_factor, block_spacing_m, .. } = self.config;
+        guide_coefficient * (normal_n + block_factor * moment_nm / block_spacing_m)
+    }
+
+    /// Force that a screw loses, as a share of the force that the screw transmits; the same share when the load drives.
+    fn screw_loss(&self, axis: usize) -> f64 {
+        let FrictionConfig { slide_screw_efficiency, leg_screw_efficiency, .. } = self.config;
+        let efficiency = if axis < LEGS { slide_screw_efficiency } else { leg_screw_efficiency };
+        1.0 / efficiency - 1.0
+    }
+
+    /// Friction divided by speed, N per m/s: Stribeck curve and viscous friction,
+    /// F = √(2e)(F_s − F_c) exp(−(v/v_S)²) v/v_S + F_c tanh(v/v_C) + f v with v_S = √2 v_b and v_C = v_b/10 (MathWorks,
+    /// Translational Friction).
+    pub fn drag_n_s_per_m(&self, coulomb_n: f64, speed_m_s: f64) -> f64 {
+        let breakaway_m_s = self.config.breakaway_speed_m_s;
+        let (stribeck_m_s, coulomb_m_s) = (breakaway_m_s * 2f64.sqrt(), breakaway_m_s / 10.0);
+        let excess_n = coulomb_n * (self.config.breakaway_ratio - 1.0);
+        let stribeck = (2.0 * std::f64::consts::E).sqrt() * excess_n / stribeck_m_s
+            * (-(speed_m_s / stribeck_m_s).powi(2)).exp();
+        let ratio = (speed_m_s / coulomb_m_s).abs();
+        // tanh x / x, which is 1 at rest.
+        let coulomb = coulomb_n / coulomb_m_s * if ratio > 1e-6 { ratio.tanh() / ratio } else { 1.0 };
+        stribeck + coulomb + self.viscous_n_s_per_m
+    }
+
+    /// Viscous friction of an axis, N per m/s.
+    pub fn viscous_n_s_per_m(&self) -> f64 {
+        self.viscous_n_s_per_m
+    }
+
+    /// Torque of friction in a hinge under a force (N), N m: μ r f.
+    pub fn hinge_nm(&self, force_n: f64) -> f64 {
+        self.config.joint_coefficient * self.config.hinge_radius_m * force_n
+    }
+
+    /// Torque of friction in a ball joint under a force (N), N m: μ r f.
+    pub fn ball_nm(&self, force_n: f64) -> f64 {
+        self.config.joint_coefficient * self.config.ball_radius_m * force_n
+    }
+
+    /// Friction of a guide per force across the slide that acts at a lever (m): μ k h/L. From 1 on the guide locks itself.
+    pub fn self_locking(&self, lever_m: f64) -> f64 {
+        let FrictionConfig { guide_coefficient, block_factor, block_spacing_m, .. } = self.config;
+        guide_coefficient * block_factor * lever_m / block_spacing_m
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn friction(change: impl Fn(&mut DynamicsConfig)) -> Friction {
+        let mut config = DynamicsConfig { slide_friction_n: 0.0, ..DynamicsConfig::default() };
+        change(&mut config);
+        Friction::new(&config)
+    }
+
+    #[test]
+    fn a_bite_with_shear_loads_a_ball_rail_little_and_a_bush_more_than_the_slide_can_push() {
+        let loads = Loads { guide_n: [400.0; 3], guide_nm: [33.5; 3], ..Loads::default() };
+        for (guide_coefficient, expected_n) in [(0.005, 6.2), (0.1, 124.0)] {
+            let friction = friction(|config| config.friction.guide_coefficient = guide_coefficient);
+            let [found_n, ..] = friction.coulomb_n(&loads);
+            assert!((found_n / expected_n - 1.0).abs() < 0.01, "{found_n} N");
+        }
+    }
+
+    #[test]
+    fn a_trapezoidal_screw_of_a_leg_loses_more_than_the_bite() {
+        let loads = Loads { screw_n: [400.0; 6], ..Loads::default() };
+        for (leg_screw_efficiency, expected_n) in [(0.9, 44.4), (0.4, 600.0), (1.0, 0.0)] {
+            let friction = friction(|config| config.friction.leg_screw_efficiency = leg_screw_efficiency);
+            let found_n = friction.coulomb_n(&loads)[3];
+            assert!((found_n - expected_n).abs() < 0.1, "{found_n} N");
+        }
+    }
+
+    #[test]
+    fn the_curve_peaks_at_the_breakaway_speed_and_falls_to_coulomb_friction() {
+        let friction = friction(|config| config.viscous_friction_n_s_per_m = 0.0);
+        let at_n = |speed_m_s: f64| friction.drag_n_s_per_m(10.0, speed_m_s) * speed_m_s;
+        assert!((at_n(0.002) - 12.0).abs() < 1e-6 && (at_n(0.1) - 10.0).abs() < 1e-6, "{} N", at_n(0.002));
+        assert!(at_n(0.0019) < at_n(0.002) && at_n(0.0021) < at_n(0.002));
+        assert_eq!(at_n(-0.01), -at_n(0.01));
+        assert_eq!(at_n(0.0), 0.0);
+    }
+
+    #[test]
+    fn a_bush_on_a_short_carriage_locks_itself_where_the_lever_is_long() {
+        // Spacing 60 mm, lever 0.27 m: from a coefficient of 0.11 on.
+        for (guide_coefficient, locks) in [(0.10, false), (0.12, true)] {
+            let friction = friction(|config| {
+                config.friction.guide_coefficient = guide_coefficient;
+                config.friction.block_spacing_m = 0.06;
+            });
+            assert_eq!(friction.self_locking(0.27) >= 1.0, locks, "{guide_coefficient}");
+        }
+    }
+}
