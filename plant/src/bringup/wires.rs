@@ -31,9 +31,7 @@ impl Wires {
     /// The scenario's interfaces, or simulated buses where it names none.
     pub(super) fn open(scenario: &Scenario) -> Result<Self, PlantError> {
         Ok(if scenario.can.is_virtual() {
-            let mut link = VirtualLink::new(scenario, 0, 0)?;
-            link.emulation.add_stops();
-            Self::Simulated(Box::new(link), 0)
+            Self::Simulated(Box::new(VirtualLink::new(scenario, 0, 0)?), 0)
         } else {
             Self::Real(SocketLink::open(scenario, clock::now_ns())?)
         })

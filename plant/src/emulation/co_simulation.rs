@@ -57,8 +57,6 @@ pub struct Emulation {
     food: Option<Food>,
     /// None for drives that forget everything at the end.
     memory: Option<MemoryFile>,
-    /// The incisal point in the platform frame, m.
-    incisal_m: [f64; 3],
 }
 
 /// State of the mechanism at a SYNC. The truth is computed from it later, once the reading is on its way.
@@ -100,10 +98,8 @@ impl Emulation {
         for (injected, window_ns) in known_windows(scenario, &injection) {
             agenda.set_window(injected, &window_ns);
         }
-        let mut dynamics = Dynamics::new(mechanism, scenario.dynamics, start, food.clone())?;
-        if !agenda.is_empty() {
-            dynamics.prepare_injection(scenario.jaw.reference_point_m);
-        }
+        let incisal_m = scenario.jaw.reference_point_m;
+        let dynamics = Dynamics::new(mechanism, scenario.dynamics, start, food.clone(), incisal_m)?;
         let positions_m = dynamics.state().positions_m();
         let drive = |(axis, settings): (usize, &DriveSettings)| {
             let config = &settings.drive;
@@ -130,16 +126,7 @@ impl Emulation {
             encoder_faults: encoder_faults(scenario),
             food,
             memory,
-            incisal_m: scenario.jaw.reference_point_m,
         })
-    }
-
-    /// Gives the mechanism hard stops 2 mm beyond its strokes, for tools that move axes without limits. A scenario with
-    /// faults or stimuli of the mechanism has them anyway.
-    pub fn add_stops(&mut self) {
-        if self.agenda.is_empty() {
-            self.dynamics.prepare_injection(self.incisal_m);
-        }
     }
 
     /// Writes what the drives have stored into the scenario's file (`drives.memory`), if that has changed. This takes

@@ -58,8 +58,7 @@ pub struct Emulator {
 impl Emulator {
     /// The scenario's drives, switched on at `now_ns` on the interfaces that it names.
     pub fn open(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
-        let mut emulation = Emulation::new(scenario, now_ns)?;
-        emulation.add_stops();
+        let emulation = Emulation::new(scenario, now_ns)?;
         let interfaces = drive_ports(&scenario.can)?.map(|at| &scenario.can.interfaces[at.bus]);
         let ports = interfaces.map(|interface| SocketCan::open(interface));
         let ports: Vec<_> = ports.into_iter().collect::<Result<_, OpenError>>()?;

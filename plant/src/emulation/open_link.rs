@@ -53,8 +53,7 @@ pub struct NodePort {
 impl OpenLink {
     /// The scenario's drives, switched on at `now_ns`, with this many free ports on each bus.
     pub fn new(scenario: &Scenario, others: usize, now_ns: u64) -> Result<Self, PlantError> {
-        let mut link = VirtualLink::new(scenario, others, now_ns)?;
-        link.emulation.add_stops();
+        let link = VirtualLink::new(scenario, others, now_ns)?;
         let ports = |axes: &Vec<usize>| (1 + axes.len()..1 + axes.len() + others).rev().collect();
         Ok(Self { link, free: scenario.can.buses.iter().map(ports).collect() })
     }

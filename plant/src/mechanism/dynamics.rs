@@ -12,18 +12,18 @@
 //! is of second order. Terms of h that depend on the twist take it at the beginning, extrapolated by half a step. No energy
 //! drifts away or comes in, and the forces need to be known only once a step.
 //!
-//! End stops, play and elasticity are left out, unless a scenario has [faults](super::disturbances) of the mechanism.
+//! The parts are rigid: elasticity is left out.
 
 use masseter_shared::config::{DynamicsConfig, FaultKindConfig};
-use masseter_shared::dynamics::{Bodies, Equations, Motion};
+use masseter_shared::dynamics::{Bodies, Equations, Motion, Reactions};
 use masseter_shared::geometry::{
     AXES, InverseError, Jacobian, Joints, LimitViolation, Mechanism, Pose, Twist, Vec3,
 };
 use nalgebra::{Matrix6, UnitQuaternion, Vector6};
 
-use super::disturbances::{AxisMotion, Disturbances, Disturbed};
+use super::axes::{Axes, AxesForces, AxisMotion};
 use super::food::Food;
-use super::friction;
+use super::friction::Braking;
 use super::load::Load;
 
 /// Pose, twist and joint coordinates of the mechanism.
@@ -53,14 +53,8 @@ pub(crate) struct Dynamics {
     /// V̇ in the present step.
     acceleration: Twist,
     food: Option<Food>,
-    /// None where the scenario has neither faults nor stimuli of the mechanism.
-    injected: Option<Injected>,
-}
-
-/// What a scenario does to the mechanism.
-#[derive(Debug, Clone)]
-struct Injected {
-    disturbances: Disturbances,
+    braking: Braking,
+    axes: Axes,
     load: Load,
 }
 
@@ -73,19 +67,6 @@ pub enum DynamicsError {
     /// The mass matrix cannot be inverted: masses or inertias are not positive.
     #[error("the mechanism's mass matrix is not positive definite; check [dynamics]")]
     Mass,
-    /// Friction that the integration cannot resolve.
-    #[error(
-        "[dynamics]: too much friction for the masses it brakes; use less, or a dynamics.step_ns of at most {longest_step_ns}"
-    )]
-    Friction {
-        /// The longest step that resolves it, ns.
-        longest_step_ns: u64,
-    },
-    /// Friction that no allowed step resolves.
-    #[error(
-        "[dynamics]: too much friction for the masses it brakes, and no dynamics.step_ns resolves it; use less"
-    )]
-    Stiff,
     /// Initial legs on which the platform cannot be level within the strokes.
     #[error(
         "dynamics.initial_leg_m = {initial_leg_m}: {violation}; choose legs, and an initial_offset_m, with which the level \
@@ -106,6 +87,7 @@ impl Dynamics {
         config: DynamicsConfig,
         pose: Pose,
         food: Option<Food>,
+        incisal_m: [f64; 3],
     ) -> Result<Self, DynamicsError> {
         let joints = mechanism.inverse(&pose)?;
         if let Err(violation) = mechanism.strokes().check(&joints.actuators) {
@@ -114,67 +96,57 @@ impl Dynamics {
         let (twist, acceleration) = (Twist::zeros(), Twist::zeros());
         let state = MechanismState { pose, twist, joints };
         let bodies = Bodies::from(&config);
-        let dynamics = Self { mechanism, config, bodies, state, acceleration, food, injected: None };
-        match dynamics.longest_step_ns()? {
-            longest_ns if longest_ns < *DynamicsConfig::STEPS_NS.start() => Err(DynamicsError::Stiff),
-            longest_step_ns if config.step_ns > longest_step_ns => {
-                Err(DynamicsError::Friction { longest_step_ns })
-            }
-            _ => Ok(dynamics),
-        }
-    }
-
-    /// Makes the mechanism ready for faults and loads, with the incisal point in the platform frame, m.
-    pub(crate) fn prepare_injection(&mut self, incisal_m: [f64; 3]) {
-        let strokes = self.mechanism.strokes();
-        let disturbances = Disturbances::new(std::array::from_fn(|axis| strokes.of_axis(axis)));
-        self.injected = Some(Injected { disturbances, load: Load::new(Vec3::from(incisal_m)) });
+        Ok(Self {
+            braking: Braking::new(&config, &bodies),
+            axes: Axes::new(&config.axes, &mechanism, state.positions_m(), &bodies.axis_mass_kg()),
+            load: Load::new(Vec3::from(incisal_m)),
+            mechanism,
+            config,
+            bodies,
+            state,
+            acceleration,
+            food,
+        })
     }
 
     /// A fault of an axis begins.
     pub(crate) fn begin_fault(&mut self, axis: usize, kind: FaultKindConfig, size: f64) {
-        let (positions_m, speeds_m_s) = (self.state.positions_m(), self.velocities_m_s(&self.state));
-        let (position_m, speed_m_s) = (positions_m[axis], speeds_m_s[axis]);
-        let motion = AxisMotion { position_m, speed_m_s, mass_kg: self.bodies.axis_mass_kg()[axis] };
-        if let Some(injected) = &mut self.injected {
-            injected.disturbances.begin(axis, kind, size, motion);
-        }
+        let speed_m_s = self.velocities_m_s(&self.state)[axis];
+        let motion = AxisMotion { position_m: self.state.positions_m()[axis], speed_m_s };
+        self.axes.begin_fault(axis, kind, size, motion);
     }
 
     /// A fault of an axis ends.
     pub(crate) fn end_fault(&mut self, axis: usize, kind: FaultKindConfig) {
-        let position_m = self.state.positions_m()[axis];
-        if let Some(injected) = &mut self.injected {
-            injected.disturbances.end(axis, kind, position_m);
-        }
+        let speed_m_s = self.velocities_m_s(&self.state)[axis];
+        let motion = AxisMotion { position_m: self.state.positions_m()[axis], speed_m_s };
+        self.axes.end_fault(axis, kind, motion);
     }
 
     /// Whether a fault of an axis has changed something.
     pub(crate) fn has_struck(&self, axis: usize, kind: FaultKindConfig) -> bool {
-        let acting = self.injected.as_ref().map(|injected| injected.disturbances.acting(axis));
-        acting.is_some_and(|acting| acting.has_struck(kind))
+        self.axes.acting(axis).has_struck(kind)
+    }
+
+    /// The next axis that has run into one of its end stops, with its speed, m/s.
+    pub(crate) fn take_stop_hit(&mut self) -> Option<(usize, f64)> {
+        self.axes.take_stop_hit()
     }
 
     /// Another mass at the incisal point, kg.
     pub(crate) fn set_payload(&mut self, payload_kg: f64) {
-        if let Some(injected) = &mut self.injected {
-            injected.load.set_payload(payload_kg);
-        }
+        self.load.set_payload(payload_kg);
     }
 
     /// Takes the forces of the last step from the platform.
     pub(crate) fn release(&mut self) {
-        if let Some(injected) = &mut self.injected {
-            injected.load.release();
-        }
+        self.load.release();
     }
 
     /// Adds a force (N) and a torque (N m) for the coming step, in base axes. The force acts at a point of the platform (m;
     /// the incisal point when absent).
     pub(crate) fn load(&mut self, wrench: &Vector6<f64>, point_m: Option<[f64; 3]>) {
-        if let Some(injected) = &mut self.injected {
-            injected.load.push(&self.state.pose, wrench, point_m.map(Vec3::from));
-        }
+        self.load.push(&self.state.pose, wrench, point_m.map(Vec3::from));
     }
 
     /// Another food, or none.
@@ -184,28 +156,7 @@ impl Dynamics {
 
     /// Where the encoders see the axes, m: at the drives' side of each joint.
     pub(crate) fn drive_positions_m(&self) -> [f64; AXES] {
-        let joints_m = self.state.positions_m();
-        match &self.injected {
-            None => joints_m,
-            Some(injected) => injected.disturbances.drive_positions_m(joints_m),
-        }
-    }
-
-    /// The longest step in which friction does not turn a motion into a faster one back: 2 by the greatest
-    /// eigenvalue of M⁻¹ Jᵀ C J, C being how steeply friction grows with speed at rest. With M = L Lᵀ it is that of
-    /// the symmetric B Bᵀ, B = L⁻¹ Jᵀ √C.
-    fn longest_step_ns(&self) -> Result<u64, DynamicsError> {
-        let motion = self.motion();
-        let mass = Equations::new(&self.bodies, &motion).mass.cholesky().ok_or(DynamicsError::Mass)?;
-        let root = Matrix6::from_diagonal(&friction::damping_n_s_per_m(&self.config).map(f64::sqrt));
-        let braked = motion.jacobian.actuators.transpose() * root;
-        let braked = mass.l().solve_lower_triangular(&braked).ok_or(DynamicsError::Mass)?;
-        let rates_per_s = braked * braked.transpose();
-        // The search for eigenvalues never ends with NaN or infinity.
-        if !rates_per_s.iter().all(|rate| rate.is_finite()) {
-            return Err(DynamicsError::Stiff);
-        }
-        Ok((2e9 / rates_per_s.symmetric_eigenvalues().max()) as u64)
+        self.axes.drive_positions_m(self.state.positions_m())
     }
 
     /// The force with which the food pushes the jaw open, N.
@@ -225,46 +176,37 @@ impl Dynamics {
 
     /// Applies the actuators' forces (N) for the step that begins.
     pub(crate) fn push(&mut self, force_n: &[f64; AXES]) -> Result<(), DynamicsError> {
-        let motion = self.motion();
-        let axes = motion.bias.axes_m_s2;
+        let (motion, step_s) = (self.motion(), self.step_s());
+        let MechanismState { pose, twist, .. } = self.state;
+        let bias_m_s2 = motion.bias.axes_m_s2;
         let actuators = &motion.jacobian.actuators;
-        let speeds_m_s = actuators * self.state.twist;
-        let disturbed = self.disturb(&speeds_m_s, force_n);
-        let driven_n = disturbed.map_or(Vector6::from(*force_n), |disturbed| disturbed.force_n);
-        let axes_n = driven_n - friction::force_n(&self.config, &speeds_m_s);
-        let food = self
-            .food
-            .as_mut()
-            .map_or_else(Vector6::zeros, |food| food.bite(&self.state.pose, &self.state.twist));
+        let speeds_m_s = actuators * twist;
+        let forces = self.axes.act(force_n, self.state.positions_m(), &speeds_m_s, &self.braking, step_s);
+        let food = self.food.as_mut().map_or_else(Vector6::zeros, |food| food.bite(&pose, &twist));
+        let joints = self.braking.of_joints(&motion);
         let Equations { mut mass, bias, .. } = Equations::new(&self.bodies, &motion);
-        let mut wrench = actuators.tr_mul(&axes_n) + food - bias;
-        if let (Some(disturbed), Some(injected)) = (disturbed, &self.injected) {
-            let Motion { pose, twist, .. } = &motion;
-            wrench += injected.load.wrench(pose, twist, self.config.gravity_m_s2)
-                + actuators.tr_mul(&disturbed.parted_kg.component_mul(&axes));
-            let moved_kg = Matrix6::from_diagonal(&(disturbed.resisting_kg - disturbed.parted_kg));
-            mass += injected.load.mass(pose) + actuators.tr_mul(&(moved_kg * actuators));
-        }
+        let axes_n = forces.force_n + forces.parted_kg.component_mul(&bias_m_s2);
+        let wrench = actuators.tr_mul(&axes_n) - joints * twist
+            + food
+            + self.load.wrench(&motion.pose, &motion.twist, self.config.gravity_m_s2)
+            - bias;
+        let moved_kg = Matrix6::from_diagonal(&(forces.resisting_kg - forces.parted_kg));
+        mass += self.load.mass(&pose) + actuators.tr_mul(&(moved_kg * actuators)) + joints * step_s;
         self.acceleration = mass.cholesky().ok_or(DynamicsError::Mass)?.solve(&wrench);
-        let step_s = self.step_s();
         self.state.twist += self.acceleration * step_s;
-        if let Some(injected) = &mut self.injected {
-            let change_m_s2 = actuators * self.acceleration + axes;
-            injected.disturbances.settle(&(speeds_m_s + change_m_s2 * step_s));
-        }
+        self.settle(&motion, &speeds_m_s, &forces);
         Ok(())
     }
 
-    /// What the faults make of the drives' forces (N) in a step, at these speeds of the axes; none where there are no faults.
-    fn disturb(&mut self, speeds_m_s: &Vector6<f64>, force_n: &[f64; AXES]) -> Option<Disturbed> {
-        let (positions_m, masses_kg) = (self.state.positions_m(), self.bodies.axis_mass_kg());
-        let injected = self.injected.as_mut()?;
-        let motions = std::array::from_fn(|axis| AxisMotion {
-            position_m: positions_m[axis],
-            speed_m_s: speeds_m_s[axis],
-            mass_kg: masses_kg[axis],
-        });
-        Some(injected.disturbances.act(&self.config, force_n, motions))
+    /// Ends a step that began with these speeds of the axes: what remembers something learns the new speeds and the loads.
+    fn settle(&mut self, motion: &Motion, speeds_m_s: &Vector6<f64>, forces: &AxesForces) {
+        let step_s = self.step_s();
+        let changes_m_s = motion.accelerations(&self.acceleration).axes_m_s2 * step_s;
+        let speeds_m_s = speeds_m_s + changes_m_s;
+        let forces_n = forces.force_n - forces.resisting_kg.component_mul(&changes_m_s) / step_s;
+        let loads = Reactions::new(&self.bodies, motion, &self.acceleration, &forces_n).loads(&forces_n);
+        self.braking.settle(&loads, &speeds_m_s, step_s);
+        self.axes.settle(&speeds_m_s);
     }
 
     fn step_s(&self) -> f64 {
@@ -280,9 +222,7 @@ impl Dynamics {
         rotation.renormalize();
         *pose = Pose::from_parts((pose.translation.vector + linear).into(), rotation);
         *joints = self.mechanism.inverse(pose)?;
-        if let Some(injected) = &mut self.injected {
-            injected.disturbances.advance(dt_s);
-        }
+        self.axes.advance(dt_s);
         Ok(())
     }
 

@@ -3,8 +3,8 @@
 //!
 //! This module never solves the forward kinematics. Drives and buses are not part of it.
 
+mod axes;
 mod coupling;
-mod disturbances;
 mod dynamics;
 mod element;
 mod food;

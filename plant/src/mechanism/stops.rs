@@ -1,18 +1,24 @@
 //! Hard stops at both ends of an axis' way: they push and never pull.
 
-use super::element::{CONTACT, Element};
+use super::element::{CONTACT, Element, Spring};
 
 /// Two stops.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stops {
     low_m: f64,
     high_m: f64,
+    spring: Spring,
 }
 
 impl Stops {
-    /// Stops at these positions.
-    pub(super) fn between([low_m, high_m]: [f64; 2]) -> Self {
-        Self { low_m, high_m }
+    /// Stops at these positions, of a stiffness and a damping.
+    pub(super) fn between([low_m, high_m]: [f64; 2], spring: Spring) -> Self {
+        Self { low_m, high_m, spring }
+    }
+
+    /// Stops of steel at these positions.
+    pub(super) fn steel(ends_m: [f64; 2]) -> Self {
+        Self::between(ends_m, CONTACT)
     }
 
     /// The force on the axis in a step; none where the axis touches no stop before its end.
@@ -25,7 +31,7 @@ impl Stops {
         } else {
             return None;
         };
-        let contact = Element::spring(CONTACT, into_m, speed_m_s, step_s);
+        let contact = Element::spring(self.spring, into_m, speed_m_s, step_s);
         (contact.force_n * away > 0.0).then_some(contact)
     }
 }
@@ -36,7 +42,7 @@ mod tests {
 
     #[test]
     fn they_push_back_and_never_pull() {
-        let stops = Stops::between([-0.01, 0.01]);
+        let stops = Stops::steel([-0.01, 0.01]);
         let force_n = |position_m, speed_m_s| {
             stops.touch(position_m, speed_m_s, 1e-4).map_or(0.0, |contact| contact.force_n)
         };

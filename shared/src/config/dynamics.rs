@@ -4,9 +4,10 @@ use std::ops::RangeInclusive;
 
 use nalgebra::Matrix3;
 
+use super::axes::AxesConfig;
 use super::error::ScenarioError;
 use super::friction::FrictionConfig;
-use super::need::{keyed, require_not_negative, require_positive, require_within};
+use super::need::{keyed, require_positive, require_within};
 
 /// Masses of a mechanism that fits on a table, kg. Beyond them the equations of motion lose their digits.
 const LEAST_KG: f64 = 0.001;
@@ -17,6 +18,10 @@ const MOST_KG_M2: f64 = 10.0;
 const ROUNDING: f64 = 1e-6;
 /// Beyond the strokes of a mechanism on a table, m.
 const FURTHEST_M: f64 = 0.5;
+/// Twice what the drives can push, N.
+const MOST_FRICTION_N: f64 = 1000.0;
+/// The drives' whole force at 10 mm/s, N per m/s.
+const MOST_VISCOUS_N_S_PER_M: f64 = 50_000.0;
 /// Ten times the Earth's, for tests of the drives, m/s².
 const MOST_GRAVITY_M_S2: f64 = 100.0;
 
@@ -24,7 +29,7 @@ section! {
     /// The moving masses and their friction.
     #[derive(Copy)]
     pub struct DynamicsConfig {
-        /// Integration step of the mechanism and of the drives' inner loops, ns; the more friction, the shorter.
+        /// Integration step of the mechanism and of the drives' inner loops, ns.
         pub step_ns: u64 = 125_000,
         /// Carriage, which a slide moves, kg.
         pub carriage_mass_kg: f64 = 0.7,
@@ -50,6 +55,8 @@ section! {
         pub slide_friction_n: f64 = 8.0,
         /// Viscous friction of every axis, N per m/s.
         pub viscous_friction_n_s_per_m: f64 = 20.0,
+        /// End stops and play.
+        pub axes: AxesConfig = AxesConfig::default(),
         /// Friction under load.
         pub friction: FrictionConfig = FrictionConfig::default(),
         /// Gravity along −z, m/s².
@@ -64,6 +71,23 @@ section! {
 impl DynamicsConfig {
     /// Valid integration steps: short enough for the stiffest parts, long enough for the computing time, ns.
     pub const STEPS_NS: RangeInclusive<u64> = 10_000..=250_000;
+
+    /// The same mechanism without friction.
+    #[must_use]
+    pub fn without_friction(self) -> Self {
+        Self {
+            slide_friction_n: 0.0,
+            viscous_friction_n_s_per_m: 0.0,
+            friction: FrictionConfig {
+                guide_coefficient: 0.0,
+                slide_screw_efficiency: 1.0,
+                leg_screw_efficiency: 1.0,
+                joint_coefficient: 0.0,
+                ..self.friction
+            },
+            ..self
+        }
+    }
 
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
         let masses = keyed!("dynamics", self, carriage_mass_kg cylinder_mass_kg rod_mass_kg platform_mass_kg);
@@ -80,7 +104,16 @@ impl DynamicsConfig {
         let offset_m = self.initial_offset_m;
         require_within(&offset_m.map(|m| ("dynamics.initial_offset_m", m, -FURTHEST_M, FURTHEST_M)))?;
         require_positive(&keyed!("dynamics", self, initial_leg_m))?;
-        require_not_negative(&keyed!("dynamics", self, slide_friction_n viscous_friction_n_s_per_m))?;
+        require_within(&[
+            ("dynamics.slide_friction_n", self.slide_friction_n, 0.0, MOST_FRICTION_N),
+            (
+                "dynamics.viscous_friction_n_s_per_m",
+                self.viscous_friction_n_s_per_m,
+                0.0,
+                MOST_VISCOUS_N_S_PER_M,
+            ),
+        ])?;
+        self.axes.validate()?;
         self.friction.validate()?;
         if !Self::STEPS_NS.contains(&self.step_ns) {
             return Err(ScenarioError::bad("dynamics.step_ns", &self.step_ns, "use 10000 to 250000 ns"));

@@ -33,7 +33,7 @@ section! {
         /// Breakaway friction divided by Coulomb friction.
         pub breakaway_ratio: f64 = 1.2,
         /// Speed at which the breakaway friction is reached, m/s.
-        pub breakaway_speed_m_s: f64 = 0.002,
+        pub breakaway_speed_m_s: f64 = 0.01,
         /// Share of the force that the screw of a slide transmits.
         pub slide_screw_efficiency: f64 = 0.9,
         /// Share of the force that the screw of a leg transmits.

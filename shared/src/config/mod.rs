@@ -6,6 +6,7 @@
 #[macro_use]
 mod section;
 
+mod axes;
 mod can;
 mod circle;
 mod control;
@@ -32,6 +33,7 @@ mod scenario;
 mod stimuli;
 mod when;
 
+pub use axes::AxesConfig;
 pub use can::{CanConfig, MASTER_NODE};
 pub use control::{
     ChecksConfig, ControllerConfig, CpuDmaLatency, MOST_LEAD_CYCLES, RealtimeConfig, TimingConfig,

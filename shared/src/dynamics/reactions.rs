@@ -4,7 +4,7 @@ use std::ops::AddAssign;
 
 use nalgebra::Vector6;
 
-use super::{Bodies, Link, Motion};
+use super::{Bodies, Link, Loads, Motion};
 use crate::geometry::{LEGS, Twist, Vec3};
 
 /// A force and a moment at a leg's hinge, in the leg's axes: û along the slide, v̂ inward, ẑ up.
@@ -67,6 +67,18 @@ impl Reactions {
             LegReactions::new(bodies, &moving, ball_n)
         });
         Self { legs }
+    }
+
+    /// What friction depends on, with the forces of the axes (N) that these reactions are of.
+    pub fn loads(&self, force_n: &Vector6<f64>) -> Loads {
+        let across = |load: &Vec3| load.y.hypot(load.z);
+        Loads {
+            guide_n: self.legs.map(|leg| across(&leg.guide.force_n)),
+            guide_nm: self.legs.map(|leg| across(&leg.guide.moment_nm)),
+            screw_n: force_n.abs().into(),
+            hinge_n: self.legs.map(|leg| leg.hinge.force_n.norm()),
+            ball_n: self.legs.map(|leg| leg.ball_n.norm()),
+        }
     }
 }
 

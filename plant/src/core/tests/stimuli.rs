@@ -13,7 +13,8 @@ fn stimulus() -> StimulusConfig {
 }
 
 fn bench_with(stimulus: StimulusConfig) -> (Bench, [f64; AXES]) {
-    let scenario = Scenario { stimulus: vec![stimulus], ..Scenario::default() };
+    let dynamics = Scenario::default().dynamics.without_friction();
+    let scenario = Scenario { stimulus: vec![stimulus], dynamics, ..Scenario::default() };
     scenario.validate().unwrap();
     let mut bench = Bench::new(&scenario);
     bench.enable();
@@ -71,7 +72,6 @@ fn the_axes_balance_a_push_on_the_jaw_with_its_moment() {
 fn the_axes_balance_a_torque_on_the_jaw() {
     let torque = [0.3, -0.2, 0.4];
     let [during, after] = wrench_changes(StimulusConfig { torque_n_m: Some(torque), ..stimulus() });
-    // Friction carries a part.
     let expected = -nalgebra::Vector6::new(0.0, 0.0, 0.0, torque[0], torque[1], torque[2]);
     assert!((during - expected).fixed_rows::<3>(0).amax() < 0.3, "{during} for {expected}");
     assert!((during - expected).fixed_rows::<3>(3).amax() < 0.05, "{during} for {expected}");
