@@ -22,6 +22,7 @@ use anyhow::{Context, ensure};
 use masseter_controller::trajectory::{self, Trajectory, TrajectoryError, TrajectoryReport};
 use masseter_plant::core as plant;
 use masseter_shared::config::{FileConfig, MotionConfig, Scenario};
+use masseter_shared::dynamics::Friction;
 use masseter_shared::geometry::Mechanism;
 use masseter_shared::schedule::CycleSchedule;
 
@@ -97,7 +98,8 @@ impl RunPlan {
         })
     }
 
-    /// A line that describes the run, one if the motion file lacks the marker's offset, and one for each doubt about it.
+    /// A line that describes the run, one if the motion file lacks the marker's offset, one for each doubt about it, and
+    /// one if the guides can lock themselves.
     pub fn announcement(&self) -> String {
         let scenario = &self.scenario;
         let wires = match &scenario.can.interfaces[..] {
@@ -112,13 +114,33 @@ impl RunPlan {
         let doubts =
             self.trajectory.doubts().iter().map(|doubt| format!("\n  warning: the motion's {doubt}"));
         let doubts: String = doubts.collect();
+        let locking = self.locking().map_or_else(String::new, |locking| format!("\n  warning: {locking}"));
         format!(
-            "{}: {:.1} s of motion at {} Hz on {wires}, seed {}{cut}{centroid}{doubts}",
+            "{}: {:.1} s of motion at {} Hz on {wires}, seed {}{cut}{centroid}{doubts}{locking}",
             scenario.name,
             self.trajectory.duration_s(),
             scenario.rate_hz,
             scenario.seed
         )
+    }
+
+    /// What is wrong with guides that a force at the balls can lock: their friction grows as fast as the force.
+    fn locking(&self) -> Option<String> {
+        let joints = self.mechanism.inverse(&self.trajectory.pose(0.0)).ok()?;
+        let heights_m =
+            joints.actuators.leg_m.into_iter().zip(joints.theta_rad).map(|(m, rad)| m * rad.sin());
+        let lever_m = heights_m.fold(0.0, f64::max);
+        let dynamics = &self.scenario.dynamics;
+        let ratio = Friction::new(dynamics).self_locking(lever_m);
+        (ratio >= 1.0).then(|| {
+            format!(
+                "the guides can jam: a force across at a ball, {:.0} mm above the slide, causes {ratio:.1} times as much \
+                 friction; use bearing blocks further apart than {:.0} mm (dynamics.friction.block_spacing_m), or a lower \
+                 guide_coefficient",
+                lever_m * 1e3,
+                dynamics.friction.block_spacing_m * ratio * 1e3,
+            )
+        })
     }
 }
 

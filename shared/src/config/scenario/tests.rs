@@ -254,3 +254,34 @@ fn wrong_scenarios_are_refused_with_place_and_remedy() {
         assert!(error.contains(expected), "{text:?} gave {error:?}");
     }
 }
+
+#[test]
+fn the_file_of_a_robot_gives_the_defaults_of_its_scenarios() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    let robot = "[dynamics]\nrod_mass_kg = 0.6\nplatform_mass_kg = 0.7\n[drives]\nmemory = 'flash.json'";
+    write("robot.toml", robot);
+    let path = write("slow.toml", "robot = 'robot.toml'\nrate_hz = 500\n[dynamics]\nrod_mass_kg = 0.8");
+    let scenario = Scenario::read(&path).unwrap();
+    assert_eq!((scenario.rate_hz, scenario.dynamics.rod_mass_kg), (500, 0.8), "the scenario's own keys win");
+    assert_eq!(scenario.dynamics.platform_mass_kg, 0.7);
+    assert_eq!(scenario.drives.memory, Some(folder.path().join("flash.json")));
+    let resolved = Scenario::parse(&path, &scenario.to_toml()).unwrap();
+    assert_eq!(resolved.dynamics, scenario.dynamics, "the resolved scenario stands alone");
+
+    let cases = [
+        ("rate_hz = 500", "rate_hz does not describe a robot; a robot's file has mechanism,"),
+        ("[dynamics]\nrod_mass_kg = 0.0", "other.toml:2:1: dynamics.rod_mass_kg = 0: use 0.001 to 100"),
+        ("[dynamic]", "did you mean 'dynamics'?"),
+    ];
+    let path = write("own.toml", "robot = 'other.toml'");
+    for (text, expected) in cases {
+        write("other.toml", text);
+        let error = Scenario::read(&path).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+}
