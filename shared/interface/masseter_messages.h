@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define MASSETER_LAYOUT_VERSION 11u
+#define MASSETER_LAYOUT_VERSION 12u
 /* masseter_event.axis when no axis is concerned. */
 #define MASSETER_NO_AXIS 4294967295u
 /* masseter_reading.drive_state of a drive not heard of yet, or lost. */
@@ -213,7 +213,7 @@ enum masseter_no_pose {
 };
 
 #define MASSETER_READING_TOPIC "reading"
-#define MASSETER_READING_TYPE_NAME "masseter/Reading/3b19bd46b3ecd631"
+#define MASSETER_READING_TYPE_NAME "masseter/Reading/5d636b58d953e426"
 
 /* Positions, forces and states of the drives, once a cycle. */
 typedef struct masseter_reading {
@@ -251,7 +251,7 @@ typedef struct masseter_reading {
     uint64_t overlong_ns;
     /* Encoder positions d₁ d₂ d₃ l₁ l₂ l₃, m. */
     double position_m[6];
-    /* Actuator forces, positive towards increasing position, N. */
+    /* Actuator forces as the drives report them, positive towards increasing position, N. An emulated drive reports the mean since the last SYNC. */
     double force_n[6];
     /* Drive states, DriveState, or NO_DRIVE_STATE. */
     uint32_t drive_state[6];
@@ -285,7 +285,7 @@ static_assert(offsetof(masseter_reading, fresh_axes) == 248, "offset of fresh_ax
 static_assert(offsetof(masseter_reading, master_fault) == 252, "offset of master_fault");
 
 #define MASSETER_COMMAND_TOPIC "command"
-#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/1f1a892af93718b5"
+#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/d671984687b2aa88"
 
 /* Targets and request for the drives, once a cycle. */
 typedef struct masseter_command {
@@ -318,7 +318,7 @@ static_assert(offsetof(masseter_command, request) == 88, "offset of request");
 static_assert(offsetof(masseter_command, controller_state) == 92, "offset of controller_state");
 
 #define MASSETER_STATE_TOPIC "state"
-#define MASSETER_STATE_TYPE_NAME "masseter/State/4ef6b0906fbe819d"
+#define MASSETER_STATE_TYPE_NAME "masseter/State/e76dd2c6f6224022"
 
 /* The controller's state and its estimate, once a cycle. */
 typedef struct masseter_state {
@@ -405,7 +405,7 @@ static_assert(offsetof(masseter_state, iterations) == 288, "offset of iterations
 static_assert(offsetof(masseter_state, controller_state) == 292, "offset of controller_state");
 
 #define MASSETER_EVENT_TOPIC "event"
-#define MASSETER_EVENT_TYPE_NAME "masseter/Event/c2e1365b706a3502"
+#define MASSETER_EVENT_TYPE_NAME "masseter/Event/adca6f2f641c19c9"
 
 /* A single occurrence: a change of state, a fault, an alarm. */
 typedef struct masseter_event {
@@ -462,7 +462,7 @@ static_assert(offsetof(masseter_event, value) == 72, "offset of value");
 static_assert(offsetof(masseter_event, limit) == 80, "offset of limit");
 
 #define MASSETER_TRUTH_TOPIC "truth"
-#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/c07707f6f3b43950"
+#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/4dcef821dc5beae4"
 
 /* The true state of the mechanism, once a cycle; the controller never reads it. */
 typedef struct masseter_truth {
@@ -484,13 +484,17 @@ typedef struct masseter_truth {
     double joint_m[6];
     /* Joint velocities, m/s. */
     double joint_m_s[6];
-    /* Actuator forces, N. */
+    /* Actuator forces, N: means over the cycle before the sample. */
     double force_n[6];
-    /* Bite force on the platform, N. */
+    /* Actuator forces at the sample, N. */
+    double force_sample_n[6];
+    /* Bite force on the platform, N: mean over the cycle before the sample. */
     double bite_force_n;
+    /* Bite force at the sample, N. */
+    double bite_force_sample_n;
 } masseter_truth;
 
-static_assert(sizeof(masseter_truth) == 248, "size of masseter_truth");
+static_assert(sizeof(masseter_truth) == 304, "size of masseter_truth");
 static_assert(offsetof(masseter_truth, seq) == 0, "offset of seq");
 static_assert(offsetof(masseter_truth, published_ns) == 8, "offset of published_ns");
 static_assert(offsetof(masseter_truth, version) == 16, "offset of version");
@@ -501,6 +505,8 @@ static_assert(offsetof(masseter_truth, quaternion_wxyz) == 64, "offset of quater
 static_assert(offsetof(masseter_truth, joint_m) == 96, "offset of joint_m");
 static_assert(offsetof(masseter_truth, joint_m_s) == 144, "offset of joint_m_s");
 static_assert(offsetof(masseter_truth, force_n) == 192, "offset of force_n");
-static_assert(offsetof(masseter_truth, bite_force_n) == 240, "offset of bite_force_n");
+static_assert(offsetof(masseter_truth, force_sample_n) == 240, "offset of force_sample_n");
+static_assert(offsetof(masseter_truth, bite_force_n) == 288, "offset of bite_force_n");
+static_assert(offsetof(masseter_truth, bite_force_sample_n) == 296, "offset of bite_force_sample_n");
 
 #endif

@@ -7,7 +7,7 @@ numpy.dtype(Reading) is the NumPy type of a message.
 import ctypes
 import enum
 
-LAYOUT_VERSION = 11
+LAYOUT_VERSION = 12
 #: Event.axis when no axis is concerned.
 NO_AXIS = 4294967295
 #: Reading.drive_state of a drive not heard of yet, or lost.
@@ -258,7 +258,7 @@ class Reading(ctypes.Structure):
         ("overlong_ns", ctypes.c_uint64),
         # Encoder positions d₁ d₂ d₃ l₁ l₂ l₃, m.
         ("position_m", ctypes.c_double * 6),
-        # Actuator forces, positive towards increasing position, N.
+        # Actuator forces as the drives report them, positive towards increasing position, N. An emulated drive reports the mean since the last SYNC.
         ("force_n", ctypes.c_double * 6),
         # Drive states, DriveState, or NO_DRIVE_STATE.
         ("drive_state", ctypes.c_uint32 * 6),
@@ -270,7 +270,7 @@ class Reading(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Reading/3b19bd46b3ecd631"
+        return "masseter/Reading/5d636b58d953e426"
 
 
 _check(Reading, 256, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 176, 224, 248, 252])
@@ -301,7 +301,7 @@ class Command(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Command/1f1a892af93718b5"
+        return "masseter/Command/d671984687b2aa88"
 
 
 _check(Command, 96, [0, 8, 16, 24, 32, 40, 88, 92])
@@ -368,7 +368,7 @@ class State(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/State/4ef6b0906fbe819d"
+        return "masseter/State/e76dd2c6f6224022"
 
 
 _check(State, 296, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 136, 160, 192, 216, 248, 272, 280, 288, 292])
@@ -415,7 +415,7 @@ class Event(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Event/c2e1365b706a3502"
+        return "masseter/Event/adca6f2f641c19c9"
 
 
 _check(Event, 88, [0, 8, 16, 24, 32, 40, 44, 48, 52, 56, 60, 62, 64, 68, 72, 80])
@@ -444,15 +444,19 @@ class Truth(ctypes.Structure):
         ("joint_m", ctypes.c_double * 6),
         # Joint velocities, m/s.
         ("joint_m_s", ctypes.c_double * 6),
-        # Actuator forces, N.
+        # Actuator forces, N: means over the cycle before the sample.
         ("force_n", ctypes.c_double * 6),
-        # Bite force on the platform, N.
+        # Actuator forces at the sample, N.
+        ("force_sample_n", ctypes.c_double * 6),
+        # Bite force on the platform, N: mean over the cycle before the sample.
         ("bite_force_n", ctypes.c_double),
+        # Bite force at the sample, N.
+        ("bite_force_sample_n", ctypes.c_double),
     ]
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Truth/c07707f6f3b43950"
+        return "masseter/Truth/4dcef821dc5beae4"
 
 
-_check(Truth, 248, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240])
+_check(Truth, 304, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240, 288, 296])
