@@ -7,10 +7,9 @@
 //!
 //! M V̇ = Jᵀ(τ − friction) + food − h.
 //!
-//! The integration is the leapfrog scheme (Störmer and Verlet): forces act on the twist at the beginning of a step, and the
-//! platform then moves with this twist to the step's end. The twist is that of the middle of the step, so that the scheme
-//! is of second order. Terms of h that depend on the twist take it at the beginning, extrapolated by half a step. No energy
-//! drifts away or comes in, and the forces need to be known only once a step.
+//! A step is one of the leapfrog scheme (Störmer and Verlet): the acceleration of its middle holds for the whole step.
+//! The forces of the drives are held too, so that they act exactly. The scheme is of second order, and no energy drifts
+//! away or comes in. Terms of h that depend on the twist take it extrapolated from the last step.
 //!
 //! The parts are rigid: elasticity is left out.
 
@@ -31,7 +30,6 @@ use super::load::Load;
 pub(crate) struct MechanismState {
     /// The platform in the base frame.
     pub(crate) pose: Pose,
-    /// In the middle of the present step.
     twist: Twist,
     joints: Joints,
 }
@@ -176,13 +174,13 @@ impl Dynamics {
 
     /// Applies the actuators' forces (N) for the step that begins.
     pub(crate) fn push(&mut self, force_n: &[f64; AXES]) -> Result<(), DynamicsError> {
-        let (motion, step_s) = (self.motion(), self.step_s());
-        let MechanismState { pose, twist, .. } = self.state;
+        let (middle, twist, step_s) = (self.middle()?, self.state.twist, self.step_s());
+        let motion = self.motion_of(&middle);
         let bias_m_s2 = motion.bias.axes_m_s2;
         let actuators = &motion.jacobian.actuators;
         let speeds_m_s = actuators * twist;
-        let forces = self.axes.act(force_n, self.state.positions_m(), &speeds_m_s, &self.braking, step_s);
-        let food = self.food.as_mut().map_or_else(Vector6::zeros, |food| food.bite(&pose, &twist));
+        let forces = self.axes.act(force_n, middle.positions_m(), &speeds_m_s, &self.braking, step_s);
+        let food = self.food.as_mut().map_or_else(Vector6::zeros, |food| food.bite(&middle.pose, &twist));
         let joints = self.braking.of_joints(&motion);
         let Equations { mut mass, bias, .. } = Equations::new(&self.bodies, &motion);
         let axes_n = forces.force_n + forces.parted_kg.component_mul(&bias_m_s2);
@@ -191,9 +189,8 @@ impl Dynamics {
             + self.load.wrench(&motion.pose, &motion.twist, self.config.gravity_m_s2)
             - bias;
         let moved_kg = Matrix6::from_diagonal(&(forces.resisting_kg - forces.parted_kg));
-        mass += self.load.mass(&pose) + actuators.tr_mul(&(moved_kg * actuators)) + joints * step_s;
+        mass += self.load.mass(&middle.pose) + actuators.tr_mul(&(moved_kg * actuators)) + joints * step_s;
         self.acceleration = mass.cholesky().ok_or(DynamicsError::Mass)?.solve(&wrench);
-        self.state.twist += self.acceleration * step_s;
         self.settle(&motion, &speeds_m_s, &forces);
         Ok(())
     }
@@ -213,22 +210,33 @@ impl Dynamics {
         self.config.step_ns as f64 * 1e-9
     }
 
-    /// Moves the mechanism for `dt_s`, a part of the step.
+    /// Moves the mechanism for `dt_s`, a part of the step, under the step's acceleration.
     pub(crate) fn advance(&mut self, dt_s: f64) -> Result<(), DynamicsError> {
-        let MechanismState { pose, twist, joints } = &mut self.state;
-        let linear = twist.fixed_rows::<3>(0) * dt_s;
-        let angular = twist.fixed_rows::<3>(3) * dt_s;
-        let mut rotation = UnitQuaternion::from_scaled_axis(angular) * pose.rotation;
-        rotation.renormalize();
-        *pose = Pose::from_parts((pose.translation.vector + linear).into(), rotation);
-        *joints = self.mechanism.inverse(pose)?;
+        let mean_twist = self.state.twist + self.acceleration * (dt_s / 2.0);
+        self.state = self.moved(&mean_twist, dt_s)?;
+        self.state.twist += self.acceleration * dt_s;
         self.axes.advance(dt_s);
         Ok(())
     }
 
-    /// The motion at the beginning of a step, half a step after the middle of the last one.
-    fn motion(&self) -> Motion {
-        let MechanismState { pose, twist, joints } = &self.state;
+    /// Pose and joints in the middle of the step that begins.
+    fn middle(&self) -> Result<MechanismState, DynamicsError> {
+        self.moved(&self.state.twist, self.step_s() / 2.0)
+    }
+
+    /// The state with pose and joints moved on by a twist.
+    fn moved(&self, twist: &Twist, dt_s: f64) -> Result<MechanismState, DynamicsError> {
+        let MechanismState { pose, .. } = &self.state;
+        let linear = twist.fixed_rows::<3>(0) * dt_s;
+        let angular = twist.fixed_rows::<3>(3) * dt_s;
+        let mut rotation = UnitQuaternion::from_scaled_axis(angular) * pose.rotation;
+        rotation.renormalize();
+        let pose = Pose::from_parts((pose.translation.vector + linear).into(), rotation);
+        Ok(MechanismState { pose, joints: self.mechanism.inverse(&pose)?, twist: self.state.twist })
+    }
+
+    /// The motion in the middle of a step, there with the twist that the last step's acceleration leads to.
+    fn motion_of(&self, MechanismState { pose, twist, joints }: &MechanismState) -> Motion {
         let twist = twist + self.acceleration * (self.step_s() / 2.0);
         Motion::of_joints(&self.mechanism, pose, joints, &twist)
     }
@@ -238,5 +246,7 @@ impl Dynamics {
     }
 }
 
+#[cfg(test)]
+mod reference;
 #[cfg(test)]
 mod tests;

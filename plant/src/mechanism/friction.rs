@@ -49,7 +49,7 @@ impl Braking {
     pub(super) fn on_axis(&self, axis: usize, speed_m_s: f64, factor: f64, step_s: f64) -> Element {
         let coulomb_n = self.law.coulomb_n(&self.loads)[axis];
         let element = match self.config.model {
-            FrictionModel::Smooth => {
+            FrictionModel::Smooth | FrictionModel::None => {
                 let drag_n_s_per_m = self.law.drag_n_s_per_m(coulomb_n, speed_m_s);
                 Element { force_n: -drag_n_s_per_m * speed_m_s, damping_n_s_per_m: drag_n_s_per_m }
             }

@@ -6,7 +6,7 @@ use nalgebra::Matrix3;
 
 use super::axes::AxesConfig;
 use super::error::ScenarioError;
-use super::friction::FrictionConfig;
+use super::friction::{FrictionConfig, FrictionModel};
 use super::need::{keyed, require_positive, require_within};
 
 /// Masses of a mechanism that fits on a table, kg. Beyond them the equations of motion lose their digits.
@@ -75,18 +75,7 @@ impl DynamicsConfig {
     /// The same mechanism without friction.
     #[must_use]
     pub fn without_friction(self) -> Self {
-        Self {
-            slide_friction_n: 0.0,
-            viscous_friction_n_s_per_m: 0.0,
-            friction: FrictionConfig {
-                guide_coefficient: 0.0,
-                slide_screw_efficiency: 1.0,
-                leg_screw_efficiency: 1.0,
-                joint_coefficient: 0.0,
-                ..self.friction
-            },
-            ..self
-        }
+        Self { friction: FrictionConfig { model: FrictionModel::None, ..self.friction }, ..self }
     }
 
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {

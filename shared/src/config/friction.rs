@@ -14,6 +14,8 @@ pub enum FrictionModel {
     /// Stribeck curve through zero: an axis at rest creeps under a load.
     #[default]
     Smooth,
+    /// No friction at all, `[dynamics]` included.
+    None,
     /// LuGre: bristles hold an axis at rest.
     Lugre,
 }

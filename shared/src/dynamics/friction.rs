@@ -3,7 +3,7 @@
 //! Guides, screws and seals brake the axes; hinges and ball joints brake the legs' turns. Friction here depends on speed
 //! and load alone. The bristles of an axis at rest are a part of the plant.
 
-use crate::config::{DynamicsConfig, FrictionConfig};
+use crate::config::{DynamicsConfig, FrictionConfig, FrictionModel};
 use crate::geometry::{AXES, LEGS};
 
 /// Friction of a leg without load, as a share of a slide's.
@@ -66,11 +66,25 @@ impl Friction {
     /// The friction that a scenario describes.
     pub fn new(dynamics: &DynamicsConfig) -> Self {
         let share = |axis: usize| if axis < LEGS { 1.0 } else { LEG_SHARE };
+        if dynamics.friction.model == FrictionModel::None {
+            return Self::none(&dynamics.friction);
+        }
         Self {
             config: dynamics.friction,
             unloaded_n: std::array::from_fn(|axis| dynamics.slide_friction_n * share(axis)),
             viscous_n_s_per_m: dynamics.viscous_friction_n_s_per_m,
         }
+    }
+
+    fn none(config: &FrictionConfig) -> Self {
+        let config = FrictionConfig {
+            guide_coefficient: 0.0,
+            slide_screw_efficiency: 1.0,
+            leg_screw_efficiency: 1.0,
+            joint_coefficient: 0.0,
+            ..*config
+        };
+        Self { config, unloaded_n: [0.0; AXES], viscous_n_s_per_m: 0.0 }
     }
 
     /// Coulomb friction of the axes d₁ d₂ d₃ l₁ l₂ l₃, N: seals, screws, and for slides the guides,
