@@ -46,9 +46,9 @@ mod tests {
         let mut mean = HeldMean::new(1000);
         mean.hold(8.0, 1100);
         mean.hold(2.0, 1200);
-        assert_eq!(mean.take(1400), (0.0 * 100.0 + 8.0 * 100.0 + 2.0 * 200.0) / 400.0);
-        assert_eq!(mean.take(1400), 2.0, "no time has passed");
+        // 0 for 100 ns, 8 for 100 ns, 2 for 200 ns; then no time; then 2 and 5 for 100 ns each.
+        let means = [mean.take(1400), mean.take(1400)];
         mean.hold(5.0, 1500);
-        assert_eq!((mean.take(1600), mean.value()), (3.5, 5.0));
+        assert_eq!((means, mean.take(1600), mean.value()), ([3.0, 2.0], 3.5, 5.0));
     }
 }

@@ -3,6 +3,7 @@
 //! | module | holds | depends on |
 //! | --- | --- | --- |
 //! | `injection` | times and events of faults and stimuli, faults of commands | |
+//! | `held_mean` | the mean over time of a held value | |
 //! | `mechanism` | dynamics, axes with friction and stops, food, poses at rest | `injection` |
 //! | `link` | traits between master and wires, real interfaces, layout of the buses | `mechanism` (its errors), `injection` |
 //! | `drive` | an emulated drive: node (CiA 301), axis (CiA 402), object dictionary | `link` (layout) |
