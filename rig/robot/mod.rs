@@ -13,6 +13,7 @@ mod home;
 mod inspect;
 mod interfaces;
 mod jog;
+mod ledger;
 mod lengths;
 mod past;
 mod permission;
