@@ -70,6 +70,8 @@ pub struct WantedDrive {
     pub pdos: [WantedPdo; 2],
     /// The object that sets 6064h at home, with its value; 0 where the drive's own zero is right.
     pub home: WantedObject,
+    /// Length of an increment of 6064h, m.
+    pub increment_m: f64,
     /// Unit of the drive's accelerations (60AAh).
     pub acceleration_unit: AccelerationUnit,
     /// The objects to write or to compare, in the order in which they are written.
@@ -87,6 +89,7 @@ impl WantedDrive {
             identity: identity(profile),
             pdos: pdos(profile, node),
             home: home(scenario, axis),
+            increment_m: scenario.scale(axis).increment_m.abs(),
             acceleration_unit: profile.units.acceleration,
             objects: objects(scenario, axis)?,
         })
