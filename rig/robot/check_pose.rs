@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 
 use super::args::RobotArgs;
 use super::lengths::parse_length;
+use super::power_mark;
 use super::robot_line::failed;
 use super::session::Session;
 use super::step::Step;
@@ -88,7 +89,10 @@ pub(crate) fn check_pose(args: &CheckPoseArgs) -> Result<Exit, Failure> {
         Ok((found.judge(args, &session.scenario), data))
     });
     match judged {
-        Ok((Ok(()), data)) => session.finish(true, &data).map(|()| Exit::Passed),
+        Ok((Ok(()), mut data)) => {
+            data["marks"] = json!(power_mark::mark(&session.scenario, &mut session.line));
+            session.finish(true, &data).map(|()| Exit::Passed)
+        }
         Ok((Err(error), data)) => {
             session.finish(false, &data)?;
             Err(Failure::with(Exit::Failed, error))

@@ -17,6 +17,7 @@ mod ledger;
 mod lengths;
 mod past;
 mod permission;
+mod power_mark;
 mod restore;
 mod robot_line;
 mod session;

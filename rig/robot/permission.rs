@@ -14,6 +14,7 @@ use super::dry_run::{FOLDER, check_motion};
 use super::evidence::Basis;
 use super::ledger;
 use super::past::Past;
+use super::power_mark;
 use super::session::serials;
 use super::step::Step;
 
@@ -45,10 +46,14 @@ pub(crate) fn check_bring_up(scenario: &Scenario, is_waived: bool) -> anyhow::Re
     if !scenario.dry.is_on {
         check_motion(&past, scenario).context(refused)?;
     }
-    let found = serials(&mut Line::open(scenario, Box::new(io::sink()))?);
+    let mut line = Line::open(scenario, Box::new(io::sink()))?;
+    let found = serials(&mut line);
     ensure!(
         found.iter().all(Option::is_some),
         "a drive does not tell its serial number (1018h:04); check power and wiring, or use --without-bring-up"
     );
-    require(&Basis { serials: found, ..unknown }).context(refused)
+    require(&Basis { serials: found, ..unknown }).context(refused)?;
+    let Some((_, checked)) = past.newest(Step::CheckPose, 0) else { return Ok(()) };
+    let marks = serde_json::from_value(checked.result["marks"].clone()).unwrap_or_default();
+    power_mark::check(&marks, &checked.started, &mut line).context(refused)
 }
