@@ -29,7 +29,7 @@ pub(super) fn mark(scenario: &Scenario, line: &mut Line) -> Marks {
 /// A velocity below the present one, which tells from another start of the drive.
 fn mark_axis(line: &mut Line, axis: usize) -> Option<u32> {
     let before = line.read_number(axis, MARKED).ok().filter(|&before| before > 1)?;
-    let mark = 1 + clock::wall_time().subsec_nanos() / 1000 % (before - 1);
+    let mark = 1 + clock::wall_time().subsec_micros() % (before - 1);
     line.write(axis, MARKED, mark, 4).ok()?;
     line.read_number(axis, MARKED).ok().filter(|&found| found == mark)
 }

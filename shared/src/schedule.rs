@@ -293,7 +293,7 @@ mod tests {
     use super::*;
 
     fn scenario(can: CanConfig, rate_hz: u32) -> Scenario {
-        Scenario { can, rate_hz, ..Scenario::default() }
+        Scenario { rate_hz, can, ..Scenario::default() }
     }
 
     /// RPDO1 of eight bytes: three frames of 20 µs more on each bus.
