@@ -2,7 +2,10 @@
 
 mod common;
 
-use common::{Workspace, masseter, stderr, stdout};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use common::{MASSETER, Workspace, masseter, stderr, stdout};
 use serde_json::Value;
 
 /// A rig whose jaw is closed, as check-pose wants it.
@@ -106,4 +109,46 @@ fn the_steps_follow_each_other_by_their_evidence() {
     let output = masseter(&[&["robot", "check-pose"], &places[..]].concat());
     assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
     assert!(stderr(&output).contains("d1: home not done"), "{}", stderr(&output));
+}
+
+/// The emulated drives do not outlive their process: what the next step writes back is proved by the library's test.
+#[test]
+fn a_killed_jog_leaves_the_old_values_in_a_file_and_the_next_step_settles_them() {
+    let workspace = Workspace::new("");
+    let (file, evidence) = (workspace.file("scenario.toml"), workspace.file("bringup"));
+    let places = ["--out-of-order", "--folder", evidence.to_str().unwrap(), file.to_str().unwrap()];
+    let jog = ["robot", "jog", "--axis", "l1", "--by", "1mm"];
+    let owed = evidence.join("borrowed-l1.json");
+    let mut killed = Command::new(MASSETER);
+    killed.args(jog).args(["--dwell", "100000s"]).args(places);
+    let mut killed = killed.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    for _ in 0..1000 {
+        if owed.exists() {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    // SIGKILL.
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    assert!(std::fs::read_to_string(&owed).unwrap().contains("\"object\": \"60"));
+    let inspect = masseter(&[&["robot", "inspect"], &places[1..]].concat());
+    assert!(
+        stdout(&inspect).contains("warning: l1: a killed step left reduced values"),
+        "{}",
+        stdout(&inspect)
+    );
+    assert!(owed.exists(), "inspect writes nothing");
+    let next = masseter(&[&jog[..], &places].concat());
+    assert_eq!(next.status.code(), Some(0), "{}", stderr(&next));
+    assert!(
+        stderr(&next).contains("l1: a step was killed; the drive has its old values again"),
+        "{}",
+        stderr(&next)
+    );
+    assert!(!owed.exists(), "the step itself owes nothing at its end");
+    std::fs::write(&owed, r#"{ "serial": 77, "values": [] }"#).unwrap();
+    let other = masseter(&[&jog[..], &places].concat());
+    assert_eq!(other.status.code(), Some(1), "{}", stderr(&other));
+    assert!(stderr(&other).contains("another serial number (1018h:04)"), "{}", stderr(&other));
 }

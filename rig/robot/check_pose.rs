@@ -4,7 +4,7 @@ use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use masseter_controller::kinematics::Solutions;
 use masseter_controller::trajectory::{closed_pose, jaw_points};
-use masseter_plant::bringup::{Stand, stand};
+use masseter_plant::bringup::{MotionError, Stand, stand};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{AXES, AXIS_NAMES, Actuators, Jacobian, Joints, Mechanism, Pose, Vec3};
@@ -14,6 +14,8 @@ use serde_json::{Value, json};
 
 use super::args::RobotArgs;
 use super::lengths::parse_length;
+use super::power_mark;
+use super::robot_line::failed;
 use super::session::Session;
 use super::step::Step;
 
@@ -66,11 +68,19 @@ pub(crate) fn check_pose(args: &CheckPoseArgs) -> Result<Exit, Failure> {
     let axes: Vec<usize> = (0..AXES).collect();
     let earlier = |_| (!args.out_of_order).then_some(Step::Home);
     let mut session = Session::begin(&args.robot, Step::CheckPose, &axes, earlier)?;
+    let boot_ups = |session: &Session| axes.iter().map(|&axis| session.line.heard(axis).boot_ups).collect();
+    let before: Vec<_> = boot_ups(&session);
     let stand = match stand(&mut session.line, &session.scenario, STAND_NS) {
         Ok(stand) => stand,
+        // No drive has power by this step: there is nothing to stop.
+        Err(error @ MotionError::Line(_)) => {
+            session.finish(false, &json!({ "error": error.to_string() }))?;
+            return Err(failed(error));
+        }
         Err(error) => return Err(session.fail(error)),
     };
-    let found = at_rest(&stand)
+    let found = no_restart(&before, &boot_ups(&session))
+        .and_then(|()| at_rest(&stand))
         .and_then(|()| within_strokes(&session.scenario, &stand.positions_m))
         .and_then(|()| Found::new(&session.scenario, stand.positions_m));
     let judged = found.and_then(|found| {
@@ -79,7 +89,10 @@ pub(crate) fn check_pose(args: &CheckPoseArgs) -> Result<Exit, Failure> {
         Ok((found.judge(args, &session.scenario), data))
     });
     match judged {
-        Ok((Ok(()), data)) => session.finish(true, &data).map(|()| Exit::Passed),
+        Ok((Ok(()), mut data)) => {
+            data["marks"] = json!(power_mark::mark(&session.scenario, &mut session.line));
+            session.finish(true, &data).map(|()| Exit::Passed)
+        }
         Ok((Err(error), data)) => {
             session.finish(false, &data)?;
             Err(Failure::with(Exit::Failed, error))
@@ -89,6 +102,14 @@ pub(crate) fn check_pose(args: &CheckPoseArgs) -> Result<Exit, Failure> {
                 .finish(false, &json!({ "error": error.to_string(), "positions_m": stand.positions_m }))?;
             Err(Failure::with(Exit::Failed, error))
         }
+    }
+}
+
+/// A drive that lost its power may have lost its position.
+fn no_restart(before: &[u32], after: &[u32]) -> anyhow::Result<()> {
+    match (0..AXES).find(|&axis| before[axis] != after[axis]) {
+        Some(axis) => bail!("{}: the drive restarted during the check; check its supply", AXIS_NAMES[axis]),
+        None => Ok(()),
     }
 }
 

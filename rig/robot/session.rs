@@ -13,7 +13,9 @@ use serde_json::json;
 
 use super::args::RobotArgs;
 use super::evidence::{Basis, StepFolder};
+use super::ledger::{self, Files};
 use super::past::Past;
+use super::robot_line::failed;
 use super::step::Step;
 
 /// How long the step listens for other masters, ns.
@@ -55,8 +57,11 @@ impl Session {
             let other = anyhow!("bus {bus}: another master sends {sign}; end that program first");
             return Err(Failure::with(Exit::Usage, other));
         }
-        folder.note_serials(serials(&mut line));
+        let serials = serials(&mut line);
+        folder.note_serials(serials);
         require(&folder.basis()).usage()?;
+        ledger::settle(&args.folder, &scenario, &mut line).map_err(failed)?;
+        line.keep_old_values_in(Box::new(Files::new(&args.folder, serials)));
         Ok(Self { scenario, line, stop, folder })
     }
 

@@ -66,6 +66,7 @@ pub(super) fn write(
     let before = serde_json::to_string_pretty(&target.found(survey)).incomplete()?;
     folder.keep(&before_file(axis), &(before + "\n")).incomplete()?;
     let profile = robot.scenario.profile(axis).clone();
+    let boot_ups = robot.line.heard(axis).boot_ups;
     let mut writer = Writer::new(&mut robot.line, axis, &profile);
     let applied = writer.apply(target, survey);
     let (changes, mut stored) = (writer.into_changes(), false);
@@ -74,6 +75,12 @@ pub(super) fn write(
         Err(error) => Some(error.to_string()),
         Ok(()) => check(robot, axis, target, "after writing").usage()?,
     };
+    let error = error.or_else(|| {
+        // What was read back before a restart is lost.
+        let has_restarted = robot.line.heard(axis).boot_ups != boot_ups;
+        let why = "the drive restarted meanwhile; check its supply, and configure again";
+        has_restarted.then(|| format!("{}: {why}", AXIS_NAMES[axis]))
+    });
     let error = match error {
         None if stores => {
             let error = store_and_check(robot, axis, target).usage()?;

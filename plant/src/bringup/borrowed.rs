@@ -3,22 +3,15 @@
 use masseter_can::canopen::ObjectAddress;
 use masseter_shared::config::{DriveProfile, ObjectKey, ObjectRule};
 
+use super::ledger::OldValue;
 use super::line::{Line, LineError};
-
-/// A changed object with its old value.
-#[derive(Debug, Clone, Copy)]
-struct Old {
-    object: ObjectAddress,
-    value: u32,
-    bytes: usize,
-}
 
 /// The changed objects of a drive, in the order of their changes.
 #[derive(Debug)]
 pub(super) struct Borrowed<'a> {
     axis: usize,
     profile: &'a DriveProfile,
-    old: Vec<Old>,
+    old: Vec<OldValue>,
 }
 
 impl<'a> Borrowed<'a> {
@@ -56,7 +49,7 @@ impl<'a> Borrowed<'a> {
         }
     }
 
-    /// An equal value is not written: some objects are constant.
+    /// An equal value is not written: some objects are constant. The old value is kept before: a kill may come between.
     fn replace(
         &mut self,
         line: &mut Line,
@@ -69,9 +62,13 @@ impl<'a> Borrowed<'a> {
         if before & mask == value & mask {
             return Ok(());
         }
-        line.write(self.axis, object, value, bytes)?;
-        self.old.push(Old { object, value: before, bytes });
-        Ok(())
+        self.old.push(OldValue { object: ObjectKey(object), value: before, bytes });
+        line.keep_old_values(self.axis, &self.old)?;
+        let written = line.write(self.axis, object, value, bytes);
+        if written.is_err() {
+            self.old.pop();
+        }
+        written
     }
 
     /// Sets the software limits (607Dh) to positions as 6064h shows them, in increments; never the lower one above the upper one.
@@ -103,10 +100,28 @@ impl<'a> Borrowed<'a> {
 
     /// Writes every old value back, the last change first. A failure does not keep the others from their old values.
     pub(super) fn restore(&mut self, line: &mut Line) -> Result<(), LineError> {
-        let mut restored = Ok(());
-        while let Some(Old { object, value, bytes }) = self.old.pop() {
-            restored = restored.and(line.write(self.axis, object, value, bytes));
+        let (mut restored, mut left) = (Ok(()), Vec::new());
+        while let Some(old) = self.old.pop() {
+            let OldValue { object: ObjectKey(object), value, bytes } = old;
+            let written = line.write(self.axis, object, value, bytes);
+            if written.is_err() {
+                left.insert(0, old);
+            }
+            restored = restored.and(written);
         }
-        restored
+        restored.and(line.keep_old_values(self.axis, &left))
     }
+}
+
+/// Writes old values back that a killed step left, the last change first.
+///
+/// # Errors
+/// The first failure; the other values have returned nevertheless.
+pub fn give_back(
+    line: &mut Line,
+    axis: usize,
+    profile: &DriveProfile,
+    old: &[OldValue],
+) -> Result<(), LineError> {
+    Borrowed { axis, profile, old: old.to_vec() }.restore(line)
 }

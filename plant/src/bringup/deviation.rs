@@ -2,7 +2,7 @@
 
 use masseter_can::canopen::ObjectAddress;
 use masseter_can::cia402::Statusword;
-use masseter_shared::config::{AccelerationUnit, DriveProfile, ObjectRule, VelocityUnit};
+use masseter_shared::config::{AccelerationUnit, DriveProfile, ObjectKey, ObjectRule, VelocityUnit};
 use serde::Serialize;
 
 use super::settings::{Difference, Settings};
@@ -55,6 +55,7 @@ pub fn deviations(
         wanted.identity.iter().filter_map(|&identity| of_identity(survey, identity)).collect();
     all.extend(of_state(survey));
     all.extend(of_units(survey, profile));
+    all.extend(of_ratios(survey, profile, wanted.increment_m));
     let differences = settings.differences(survey);
     let is_at =
         |deviation: &Deviation, difference: &Difference| deviation.object == difference.object.to_string();
@@ -157,16 +158,43 @@ fn of_units(survey: &Survey, profile: &DriveProfile) -> Vec<Deviation> {
             format!("the drive counts {quantity} in {found}, the profile declares {declared}: change one");
         Some(new(object, [declared.to_owned(), found], outcome, &remedy, key))
     };
-    let ratio = [1, 2].map(|part| survey.number(ObjectAddress::new(0x6091, part)).map(f64::from));
-    let of_gear = || {
-        let [Some(motor), Some(shaft)] = ratio else { return None };
-        let is_right = (motor / shaft / units.gear_ratio - 1.0).abs() < 1e-6;
-        let values = [units.gear_ratio.to_string(), format!("{motor}/{shaft}")];
-        let remedy = "compare with the gear: a wrong ratio scales every motion";
-        let object = ObjectAddress::new(0x6091, 1);
-        (!is_right).then(|| new(object, values, Outcome::Doubtful, remedy, "drive_profile.units.gear_ratio"))
+    declared.into_iter().filter_map(of_code).collect()
+}
+
+/// Ratios by which the drive counts its way, as far as the drive has them: gear, feed and encoder. A wrong one scales every motion.
+/// Without a lead the profile declares no travel, so that a gear is only to be looked at. A feed decides the unit of 6064h; the encoder
+/// decides without one.
+fn of_ratios(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Deviation> {
+    let units = &profile.units;
+    let found = |index| {
+        let [many, turns] = [1, 2].map(|part| survey.number(ObjectAddress::new(index, part)).map(f64::from));
+        Some(many? / turns.filter(|&turns| turns > 0.0)?)
     };
-    declared.into_iter().filter_map(of_code).chain(of_gear()).collect()
+    let feed = units.lead_m.map(|lead_m| lead_m / increment_m);
+    let encoder = feed.map(|feed| feed / units.gear_ratio);
+    let decides = |decides| if decides { Outcome::Refused } else { Outcome::Doubtful };
+    let lead_key = "drive_profile.units.lead_m";
+    let ratios = [
+        (
+            0x6091,
+            Some(units.gear_ratio),
+            "motor turns/screw turn",
+            decides(units.lead_m.is_some()),
+            "drive_profile.units.gear_ratio",
+        ),
+        (0x6092, feed, "increments/screw turn", Outcome::Refused, lead_key),
+        (0x608F, encoder, "increments/motor turn", decides(found(0x6092).is_none()), lead_key),
+    ];
+    let of_ratio = |(index, wanted, unit, outcome, key)| {
+        let object = ObjectAddress::new(index, 1);
+        let (wanted, found): (f64, f64) = (wanted?, found(index)?);
+        let is_left = profile.object(ObjectKey(object)).rule == ObjectRule::Absent;
+        let text = |ratio: f64| format!("{} {unit}", (ratio * 1e6).round() / 1e6);
+        let remedy = format!("the drive has {}, the profile {}: change one", text(found), text(wanted));
+        let is_right = is_left || (found / wanted - 1.0).abs() < 1e-6;
+        (!is_right).then(|| new(object, [text(wanted), text(found)], outcome, &remedy, key))
+    };
+    ratios.into_iter().filter_map(of_ratio).collect()
 }
 
 fn of_object(survey: &Survey, difference: &Difference) -> Deviation {
@@ -244,14 +272,52 @@ mod tests {
     fn a_unit_is_told_in_words() {
         let mut survey = Survey::default();
         survey.insert(ObjectAddress::new(0x60AA, 0), 0x00C0_0300);
-        survey.insert(ObjectAddress::new(0x6091, 1), 26);
-        survey.insert(ObjectAddress::new(0x6091, 2), 1);
         let all = of_units(&survey, &DriveProfile::default());
         assert_eq!(
             all[0].remedy,
             "the drive counts acceleration in rpm/s, the profile declares increments/s²: change one"
         );
-        assert_eq!((all[0].outcome, all[1].outcome), (Outcome::Refused, Outcome::Doubtful));
-        assert_eq!(all[1].found, "26/1");
+        assert_eq!(all[0].outcome, Outcome::Refused);
+    }
+
+    /// Where 6092h decides the unit of 6064h, 608Fh is only to be looked at.
+    #[test]
+    fn ratios_of_the_drive_are_those_of_the_profile() {
+        let ratios = |found: &[(u16, u32, u32)], profile: &str| {
+            let mut survey = Survey::default();
+            for &(index, many, turns) in found {
+                survey.insert(ObjectAddress::new(index, 1), many);
+                survey.insert(ObjectAddress::new(index, 2), turns);
+            }
+            let text = format!("[[drive_profile]]\n{profile}");
+            let scenario = Scenario::parse(Path::new("robot.toml"), &text).unwrap();
+            let all = of_ratios(&survey, scenario.profile(3), 1e-6);
+            all.into_iter().map(|one| (one.outcome, one.remedy)).collect::<Vec<_>>()
+        };
+        let lead = "units = { gear_ratio = 2.5, lead_m = 0.01 }";
+        let right = [(0x6091, 5, 2), (0x6092, 10_000, 1), (0x608F, 4000, 1)];
+        assert_eq!(ratios(&right, lead), []);
+        let [(gear, gear_text), (feed, feed_text), (encoder, _)] =
+            &ratios(&[(0x6091, 26, 1), (0x6092, 6000, 1), (0x608F, 2048, 1)], lead)[..]
+        else {
+            panic!("three ratios differ")
+        };
+        assert_eq!([gear, feed, encoder], [&Outcome::Refused, &Outcome::Refused, &Outcome::Doubtful]);
+        assert_eq!(
+            gear_text,
+            "the drive has 26 motor turns/screw turn, the profile 2.5 motor turns/screw turn: change one"
+        );
+        assert!(feed_text.contains("6000 increments/screw turn, the profile 10000"), "{feed_text}");
+        assert_eq!(ratios(&[(0x608F, 2048, 1)], lead)[0].0, Outcome::Refused);
+        assert_eq!(
+            ratios(&[(0x6091, 26, 1), (0x6092, 6000, 1)], "")[..],
+            [(
+                Outcome::Doubtful,
+                "the drive has 26 motor turns/screw turn, the profile 1 motor turns/screw turn: change one"
+                    .to_owned()
+            )]
+        );
+        let left = format!("{lead}\nobjects.'608Fh:01' = {{ rule = 'absent' }}");
+        assert_eq!(ratios(&[(0x608F, 2048, 1)], &left), []);
     }
 }

@@ -16,6 +16,7 @@ use masseter_shared::config::{MASTER_NODE, Scenario};
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
 
 use super::heard::{Heard, Strangers};
+use super::ledger::{Ledger, OldValue};
 use super::wires::Wires;
 use crate::error::PlantError;
 use crate::link::layout::{drive_ports, node_ids};
@@ -78,6 +79,14 @@ pub enum LineError {
     /// The emulated mechanism failed, or the memory of emulated drives cannot be written.
     #[error(transparent)]
     Emulation(#[from] PlantError),
+    /// Old values could not be kept.
+    #[error("old values of {} cannot be kept, so that nothing was changed: {source}; free the disk", AXIS_NAMES[*axis])]
+    Ledger {
+        /// The axis.
+        axis: usize,
+        /// The reason.
+        source: io::Error,
+    },
     /// The log could not be written.
     #[error("the log of the bus cannot be written: {0}")]
     Log(#[from] io::Error),
@@ -112,6 +121,8 @@ pub struct Line {
     /// The axis whose drive this line has switched on.
     switched_on: Option<usize>,
     log: Box<dyn Write + Send>,
+    /// Where old values are kept; none where nobody needs them after a kill.
+    ledger: Option<Box<dyn Ledger>>,
 }
 
 impl Debug for Line {
@@ -142,7 +153,19 @@ impl Line {
             beat: None,
             switched_on: None,
             log,
+            ledger: None,
         })
+    }
+
+    /// Keeps old values of drives in this ledger from now on.
+    pub fn keep_old_values_in(&mut self, ledger: Box<dyn Ledger>) {
+        self.ledger = Some(ledger);
+    }
+
+    /// Keeps the old values of a drive.
+    pub(super) fn keep_old_values(&mut self, axis: usize, values: &[OldValue]) -> Result<(), LineError> {
+        let Some(ledger) = &mut self.ledger else { return Ok(()) };
+        ledger.keep(axis, values).map_err(|source| LineError::Ledger { axis, source })
     }
 
     /// The present time, ns: simulated from 0, or the machine's.

@@ -274,7 +274,12 @@ impl<'a> Mover<'a> {
                 return Ok(seen);
             }
             if halted_ns.is_none() && sample.at_ns >= until_ns {
-                return self.stopped(StopCause::TimedOut { limit_s });
+                let is_limited = sample.status.has(StatusBit::InternalLimit);
+                return self.stopped(if is_limited {
+                    StopCause::Limited { limit_s }
+                } else {
+                    StopCause::TimedOut { limit_s }
+                });
             }
         }
     }

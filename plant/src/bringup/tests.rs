@@ -1,6 +1,8 @@
 //! Jog and home on emulated drives.
 
+use std::io;
 use std::path::Path;
+use std::sync::{Arc, Mutex};
 
 use masseter_can::canopen::{NodeId, ObjectAddress};
 use masseter_can::cia402::Controlword;
@@ -296,4 +298,46 @@ fn an_axis_that_falls_without_power_fails_the_jog() {
         assert!(moved_m < -0.001, "{moved_m}");
         bench.assert_off();
     }
+}
+
+/// A ledger that a test can read.
+#[derive(Debug, Clone, Default)]
+struct Notes(Arc<Mutex<Vec<OldValue>>>);
+
+impl Ledger for Notes {
+    fn keep(&mut self, axis: usize, values: &[OldValue]) -> io::Result<()> {
+        assert_eq!(axis, L1);
+        *self.0.lock().unwrap() = values.to_vec();
+        Ok(())
+    }
+}
+
+/// A step that is killed at any moment: what was kept until then returns all old values.
+#[test]
+fn kept_values_return_what_a_killed_step_has_changed() {
+    let mut bench = Bench::new("");
+    let (notes, before) = (Notes::default(), bench.objects());
+    bench.line.keep_old_values_in(Box::new(notes.clone()));
+    let kept = notes.clone();
+    let order = JogOrder::usual(&bench.scenario, L1, 1e-3);
+    let mut at_kill = Vec::new();
+    jog(&mut bench.line, &bench.scenario, &order, &mut |_| {
+        at_kill.clone_from(&kept.0.lock().unwrap());
+        Wish::Move
+    })
+    .unwrap();
+    assert!(at_kill.len() > 6, "{at_kill:?}");
+    assert_eq!(
+        (bench.objects(), notes.0.lock().unwrap().len()),
+        (before.clone(), 0),
+        "nothing is owed any more"
+    );
+    // The drive as the kill left it.
+    for old in &at_kill {
+        let reduced = if old.object.0.index == 0x607D { old.value } else { 1 };
+        bench.line.write(L1, old.object.0, reduced, old.bytes).unwrap();
+    }
+    assert_ne!(bench.objects(), before);
+    give_back(&mut bench.line, L1, bench.scenario.profile(L1), &at_kill).unwrap();
+    assert_eq!(bench.objects(), before);
 }
