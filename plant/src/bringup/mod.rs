@@ -21,6 +21,7 @@ mod step_response;
 mod store;
 mod survey;
 mod switching;
+mod sync_answer;
 #[cfg(test)]
 mod test_log;
 #[cfg(test)]
