@@ -24,6 +24,9 @@ pub(crate) const COB_ID_BITS: u32 = !CobId::NO_REMOTE_REQUEST;
 /// plan of the bus does not include them.
 pub(crate) const OTHER_PDOS: [u16; 6] = [0x1401, 0x1402, 0x1403, 0x1801, 0x1802, 0x1803];
 
+/// Offsets of position, velocity and torque, with the bytes of each. A drive keeps the last value of its process data.
+pub(crate) const OFFSETS: [(u16, usize); 3] = [(0x60B0, 4), (0x60B1, 4), (0x60B2, 2)];
+
 /// One object as it must be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WantedObject {

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 
 use super::args::RobotArgs;
 use super::lengths::parse_length;
-use super::power_mark;
+use super::power_mark::{self, Marks};
 use super::robot_line::failed;
 use super::session::Session;
 use super::step::Step;
@@ -68,8 +68,7 @@ pub(crate) fn check_pose(args: &CheckPoseArgs) -> Result<Exit, Failure> {
     let axes: Vec<usize> = (0..AXES).collect();
     let earlier = |_| (!args.out_of_order).then_some(Step::Home);
     let mut session = Session::begin(&args.robot, Step::CheckPose, &axes, earlier)?;
-    let boot_ups = |session: &Session| axes.iter().map(|&axis| session.line.heard(axis).boot_ups).collect();
-    let before: Vec<_> = boot_ups(&session);
+    let marks = if args.out_of_order { Ok(Marks::default()) } else { check_marks(&mut session) };
     let stand = match stand(&mut session.line, &session.scenario, STAND_NS) {
         Ok(stand) => stand,
         // No drive has power by this step: there is nothing to stop.
@@ -79,20 +78,20 @@ pub(crate) fn check_pose(args: &CheckPoseArgs) -> Result<Exit, Failure> {
         }
         Err(error) => return Err(session.fail(error)),
     };
-    let found = no_restart(&before, &boot_ups(&session))
-        .and_then(|()| at_rest(&stand))
-        .and_then(|()| within_strokes(&session.scenario, &stand.positions_m))
-        .and_then(|()| Found::new(&session.scenario, stand.positions_m));
-    let judged = found.and_then(|found| {
+    let found = session
+        .check_no_restart()
+        .and(marks)
+        .and_then(|marks| Ok((marks, at_rest(&stand)?)))
+        .and_then(|(marks, ())| Ok((marks, within_strokes(&session.scenario, &stand.positions_m)?)))
+        .and_then(|(marks, ())| Ok((marks, Found::new(&session.scenario, stand.positions_m)?)));
+    let judged = found.and_then(|(marks, found)| {
         found.print(&stand)?;
-        let data = found.data(&stand);
+        let mut data = found.data(&stand);
+        data["marks"] = json!(marks);
         Ok((found.judge(args, &session.scenario), data))
     });
     match judged {
-        Ok((Ok(()), mut data)) => {
-            data["marks"] = json!(power_mark::mark(&session.scenario, &mut session.line));
-            session.finish(true, &data).map(|()| Exit::Passed)
-        }
+        Ok((Ok(()), data)) => session.finish(true, &data).map(|()| Exit::Passed),
         Ok((Err(error), data)) => {
             session.finish(false, &data)?;
             Err(Failure::with(Exit::Failed, error))
@@ -105,12 +104,16 @@ pub(crate) fn check_pose(args: &CheckPoseArgs) -> Result<Exit, Failure> {
     }
 }
 
-/// A drive that lost its power may have lost its position.
-fn no_restart(before: &[u32], after: &[u32]) -> anyhow::Result<()> {
-    match (0..AXES).find(|&axis| before[axis] != after[axis]) {
-        Some(axis) => bail!("{}: the drive restarted during the check; check its supply", AXIS_NAMES[axis]),
-        None => Ok(()),
+/// The marks that home left. A drive without its mark may have lost its position.
+fn check_marks(session: &mut Session) -> anyhow::Result<Marks> {
+    let Session { past, scenario, line, .. } = session;
+    let mut marks = Marks::default();
+    for (axis, mark) in marks.iter_mut().enumerate() {
+        let (_, homed) = past.newest(Step::Home, axis).context("there is no home")?;
+        *mark = power_mark::of_home(homed, axis)?;
+        power_mark::check_axis(scenario, *mark, &homed.started, line, axis)?;
     }
+    Ok(marks)
 }
 
 fn at_rest(stand: &Stand) -> anyhow::Result<()> {

@@ -37,7 +37,7 @@ use inspect::InspectArgs;
 use jog::JogArgs;
 use status::StatusArgs;
 
-pub(crate) use dry_run::keep_dry_run;
+pub(crate) use dry_run::{Played, keep_dry_run};
 pub(crate) use permission::check_bring_up;
 
 /// Verbs of `robot`.

@@ -6,11 +6,10 @@ use std::path::Path;
 
 use anyhow::{Context, bail, ensure};
 use masseter_plant::bringup::Line;
-use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
 use masseter_terminal::status;
 
-use super::dry_run::{FOLDER, check_motion};
+use super::dry_run::{FOLDER, Played, check_motion};
 use super::evidence::Basis;
 use super::ledger;
 use super::past::Past;
@@ -20,7 +19,8 @@ use super::step::Step;
 
 /// Refuses a run on real interfaces without its earlier steps. The files are read before anything is sent; then the drives
 /// tell their serial numbers.
-pub(crate) fn check_bring_up(scenario: &Scenario, is_waived: bool) -> anyhow::Result<()> {
+pub(crate) fn check_bring_up(played: &Played<'_>, is_waived: bool) -> anyhow::Result<()> {
+    let scenario = played.scenario;
     if scenario.can.is_virtual() {
         return Ok(());
     }
@@ -44,16 +44,16 @@ pub(crate) fn check_bring_up(scenario: &Scenario, is_waived: bool) -> anyhow::Re
     let require = |basis: &Basis| steps.iter().try_for_each(|&step| past.require(step, &axes, basis));
     require(&unknown).context(refused)?;
     if !scenario.dry.is_on {
-        check_motion(&past, scenario).context(refused)?;
+        check_motion(&past, played).context(refused)?;
     }
     let mut line = Line::open(scenario, Box::new(io::sink()))?;
-    let found = serials(&mut line);
+    let found = serials(&mut line)?;
     ensure!(
         found.iter().all(Option::is_some),
         "a drive does not tell its serial number (1018h:04); check power and wiring, or use --without-bring-up"
     );
     require(&Basis { serials: found, ..unknown }).context(refused)?;
-    let Some((_, checked)) = past.newest(Step::CheckPose, 0) else { return Ok(()) };
-    let marks = serde_json::from_value(checked.result["marks"].clone()).unwrap_or_default();
-    power_mark::check(&marks, &checked.started, &mut line).context(refused)
+    let (_, checked) = past.newest(Step::CheckPose, 0).context("there is no pose check")?;
+    let marks = power_mark::of_pose_check(checked).context(refused)?;
+    power_mark::check(scenario, &marks, &checked.started, &mut line).context(refused)
 }

@@ -83,7 +83,7 @@ pub enum LineError {
     #[error(transparent)]
     Emulation(#[from] PlantError),
     /// Old values could not be kept.
-    #[error("old values of {} cannot be kept, so that nothing was changed: {source}; free the disk", AXIS_NAMES[*axis])]
+    #[error("old values of {} cannot be kept, so that no further value is written: {source}; free the disk", AXIS_NAMES[*axis])]
     Ledger {
         /// The axis.
         axis: usize,
