@@ -85,13 +85,21 @@ fn a_drive_that_goes_while_it_is_configured_fails_the_step_and_is_named() {
     }
 }
 
+/// While l2 or l3 is written: the values of l1 are lost.
+#[test]
+fn a_drive_that_restarts_after_its_own_turn_fails_the_configuration() {
+    let (code, text) = play(DIP, 3.2, &["configure"]);
+    assert_eq!(code, Some(1), "{text}");
+    assert!(text.contains("failed: l1: the drive restarted meanwhile") && text.contains("l3: "), "{text}");
+}
+
 /// Between the two readings: nothing has power, so there is nothing to stop.
 #[test]
 fn a_drive_that_goes_while_the_pose_is_checked_fails_the_check() {
     for (fault, why) in [
         (CABLE, "l1: object 6064h:00h: no answer"),
         (SUPPLY, "l1: object 6064h:00h: no answer"),
-        (DIP, "l1: the drive restarted during the check; check its supply"),
+        (DIP, "l1: the drive restarted during the step; check its supply"),
     ] {
         let (code, text) = play(fault, 0.6, &["check-pose", "--out-of-order"]);
         assert_eq!(code, Some(1), "{text}");

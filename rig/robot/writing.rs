@@ -166,7 +166,7 @@ pub(super) fn finish(
     let _ = match (failed, stores) {
         (true, _) => writeln!(
             text,
-            "the drives after it were not written; 'masseter robot restore' writes the old values back"
+            "drives without a line here were not written; 'masseter robot restore' writes the old values back"
         ),
         (false, true) => writeln!(text, "passed: the values are stored"),
         (false, false) => writeln!(text, "passed: the values last until a reset; --store keeps them"),

@@ -2,7 +2,9 @@
 
 use masseter_can::canopen::ObjectAddress;
 use masseter_can::cia402::Statusword;
-use masseter_shared::config::{AccelerationUnit, DriveProfile, ObjectKey, ObjectRule, VelocityUnit};
+use masseter_shared::config::{
+    AccelerationUnit, DriveProfile, ObjectConfig, ObjectKey, ObjectRule, VelocityUnit,
+};
 use serde::Serialize;
 
 use super::settings::{Difference, Settings};
@@ -55,7 +57,6 @@ pub fn deviations(
         wanted.identity.iter().filter_map(|&identity| of_identity(survey, identity)).collect();
     all.extend(of_state(survey));
     all.extend(of_units(survey, profile));
-    all.extend(of_ratios(survey, profile, wanted.increment_m));
     let differences = settings.differences(survey);
     let is_at =
         |deviation: &Deviation, difference: &Difference| deviation.object == difference.object.to_string();
@@ -64,6 +65,7 @@ pub fn deviations(
         let mut written = differences.iter().filter(|difference| difference.rule != ObjectRule::Expect);
         !written.any(|difference| is_at(deviation, difference))
     });
+    all.extend(of_ratios(survey, profile, wanted.increment_m));
     let others: Vec<_> = differences
         .iter()
         .filter(|difference| !all.iter().any(|deviation| is_at(deviation, difference)))
@@ -166,10 +168,18 @@ fn of_units(survey: &Survey, profile: &DriveProfile) -> Vec<Deviation> {
 /// decides without one.
 fn of_ratios(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Deviation> {
     let units = &profile.units;
-    let found = |index| {
-        let [many, turns] = [1, 2].map(|part| survey.number(ObjectAddress::new(index, part)).map(f64::from));
-        Some(many? / turns.filter(|&turns| turns > 0.0)?)
+    // A value that configure writes counts, and not the one that it replaces.
+    let part = |index, subindex| {
+        let object = ObjectAddress::new(index, subindex);
+        let ObjectConfig { rule, value, .. } = profile.object(ObjectKey(object));
+        let found = || survey.number(object).map(f64::from);
+        match rule {
+            ObjectRule::Absent => None,
+            ObjectRule::Write => value.map(|value| value as f64).or_else(found),
+            ObjectRule::Expect | ObjectRule::Optional => found(),
+        }
     };
+    let ratio = |index| Some(part(index, 1)? / part(index, 2).filter(|&turns| turns > 0.0)?);
     let feed = units.lead_m.map(|lead_m| lead_m / increment_m);
     let encoder = feed.map(|feed| feed / units.gear_ratio);
     let decides = |decides| if decides { Outcome::Refused } else { Outcome::Doubtful };
@@ -183,15 +193,14 @@ fn of_ratios(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<D
             "drive_profile.units.gear_ratio",
         ),
         (0x6092, feed, "increments/screw turn", Outcome::Refused, lead_key),
-        (0x608F, encoder, "increments/motor turn", decides(found(0x6092).is_none()), lead_key),
+        (0x608F, encoder, "increments/motor turn", decides(ratio(0x6092).is_none()), lead_key),
     ];
     let of_ratio = |(index, wanted, unit, outcome, key)| {
         let object = ObjectAddress::new(index, 1);
-        let (wanted, found): (f64, f64) = (wanted?, found(index)?);
-        let is_left = profile.object(ObjectKey(object)).rule == ObjectRule::Absent;
+        let (wanted, found): (f64, f64) = (wanted?, ratio(index)?);
         let text = |ratio: f64| format!("{} {unit}", (ratio * 1e6).round() / 1e6);
         let remedy = format!("the drive has {}, the profile {}: change one", text(found), text(wanted));
-        let is_right = is_left || (found / wanted - 1.0).abs() < 1e-6;
+        let is_right = (found / wanted - 1.0).abs() < 1e-6;
         (!is_right).then(|| new(object, [text(wanted), text(found)], outcome, &remedy, key))
     };
     ratios.into_iter().filter_map(of_ratio).collect()
@@ -319,5 +328,22 @@ mod tests {
         );
         let left = format!("{lead}\nobjects.'608Fh:01' = {{ rule = 'absent' }}");
         assert_eq!(ratios(&[(0x608F, 2048, 1)], &left), []);
+        let written = format!("{lead}\nobjects.'6091h:01' = {{ value = 5, bytes = 4 }}");
+        assert_eq!(ratios(&[(0x6091, 26, 2)], &written), [], "configure writes it");
+        assert_eq!(ratios(&[(0x6091, 5, 1)], &written)[0].0, Outcome::Refused, "what it writes is wrong");
+        let absent = format!("{lead}\nobjects.'6092h:01' = {{ rule = 'absent' }}");
+        let found = [(0x6092, 10_000, 1), (0x608F, 2048, 1)];
+        assert_eq!(ratios(&found, &absent)[0].0, Outcome::Refused, "without a feed the encoder decides");
+    }
+
+    /// Emulated drives have a gear of 1: a profile that writes another one is told of its own mistake.
+    #[test]
+    fn a_ratio_that_the_profile_itself_makes_wrong_is_refused() {
+        let all = of_profile(
+            "[[drive_profile]]\nunits = { gear_ratio = 2.5, lead_m = 0.025 }\n\
+             objects.'6091h:01' = { value = 26, bytes = 4 }",
+        );
+        let gear: Vec<_> = all.iter().filter(|(object, ..)| object == "6091h:01h").collect();
+        assert!(matches!(gear[..], [(_, Outcome::Refused, _)]), "{all:?}");
     }
 }

@@ -83,7 +83,7 @@ pub enum StopCause {
     /// It did not end in time, and the drive reports a limit.
     #[error(
         "not done within {limit_s:.1} s, and the drive reports a limit (statusword bit 11); check what 607Dh counts from: \
-         drive_profile.homing.limits_from_home"
+         drive_profile.homing.limits_from_home or home_sign"
     )]
     Limited {
         /// What was allowed, s.
