@@ -149,7 +149,9 @@ pub(super) fn finish(
     stores: bool,
 ) -> Result<Exit, Failure> {
     robot.line.flush().incomplete()?;
-    all.iter_mut().for_each(|written| written.note_restart(&robot.line));
+    for written in &mut all {
+        written.note_restart(&robot.line);
+    }
     let mut text = String::new();
     for Written { axis, changes, stored, error, .. } in &all {
         let count = counted(changes.len() as u64, "value");
