@@ -47,7 +47,7 @@ pub(crate) fn check_bring_up(played: &Played<'_>, is_waived: bool) -> anyhow::Re
         check_motion(&past, played).context(refused)?;
     }
     let mut line = Line::open(scenario, Box::new(io::sink()))?;
-    let found = serials(&mut line)?;
+    let found = serials(&mut line).context(refused)?;
     ensure!(
         found.iter().all(Option::is_some),
         "a drive does not tell its serial number (1018h:04); check power and wiring, or use --without-bring-up"
