@@ -2,7 +2,12 @@
 
 mod common;
 
-use common::{Workspace, masseter, stderr, stdout};
+use std::collections::BTreeSet;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use common::{MASSETER, Workspace, masseter, stderr, stdout};
+use masseter_shared::geometry::AXIS_NAMES;
 use serde_json::Value;
 
 /// A rig whose jaw is closed, as check-pose wants it.
@@ -106,4 +111,137 @@ fn the_steps_follow_each_other_by_their_evidence() {
     let output = masseter(&[&["robot", "check-pose"], &places[..]].concat());
     assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
     assert!(stderr(&output).contains("d1: home not done"), "{}", stderr(&output));
+}
+
+/// All steps up to the pose check, which may fail.
+fn bring_up(workspace: &Workspace) -> (Option<i32>, String) {
+    let places = ["--folder", "bringup", "scenario.toml"];
+    let play = |step: &[&str]| {
+        let mut command = Command::new(MASSETER);
+        command.arg("robot").args(step).args(places).current_dir(workspace.file("."));
+        command.output().expect("masseter starts")
+    };
+    let jogs = AXIS_NAMES.map(|axis| vec!["jog", "--axis", axis, "--by", "1mm", "--measured", "1mm"]);
+    let before = [vec!["inspect"], vec!["configure"]];
+    for step in before.into_iter().chain(jogs).chain([vec!["home"]]) {
+        let output = play(&step);
+        assert_eq!(output.status.code(), Some(0), "{step:?}: {}{}", stdout(&output), stderr(&output));
+    }
+    let output = play(&["check-pose"]);
+    (output.status.code(), stderr(&output))
+}
+
+/// Zero is the place of a slide at the closed pose, so that the pose alone shows no lost position. Emulated drives lose their
+/// power between two commands.
+#[test]
+fn a_slide_that_was_without_power_since_home_fails_the_pose_check() {
+    let slides = "axes = ['d1', 'd2', 'd3']\n";
+    let workspace = Workspace::new(&format!(
+        "{CLOSED}[[drives.quirk]]\nkind = 'incremental_encoder'\n{slides}[[drive_profile]]\n{slides}\
+         homing = {{ absolute = false, method = 37, home_position_m = 0.0 }}\n"
+    ));
+    let (code, err) = bring_up(&workspace);
+    assert_eq!(code, Some(1), "{err}");
+    assert!(err.contains("d1: the drive was without power, reset or jogged since "), "{err}");
+    let moved = AXIS_NAMES.map(|axis| format!("jog-{axis}")).into_iter().chain(["home".to_owned()]);
+    assert_eq!(steps_with_power(&workspace), moved.collect());
+}
+
+/// The nodes with power after each controlword that a step has sent by SDO.
+fn powered(log: &str) -> Vec<BTreeSet<u8>> {
+    let frames = log.lines().filter_map(|line| line.split_whitespace().nth(2)?.split_once('#'));
+    let mut on = BTreeSet::new();
+    let mut all = Vec::new();
+    for (id, data) in frames {
+        let id = u16::from_str_radix(id, 16).unwrap();
+        assert!(!(0x201..0x280).contains(&id), "process data: {id:X}#{data}");
+        let Some(word) = data.strip_prefix("2B406000").filter(|_| id > 0x600) else { continue };
+        let node = (id - 0x600) as u8;
+        // Bits 0 and 1: "switch on" and "enable voltage".
+        let low = u8::from_str_radix(&word[..2], 16).unwrap();
+        if low & 3 == 3 {
+            on.insert(node)
+        } else {
+            low & 2 == 0 && on.remove(&node)
+        };
+        all.push(on.clone());
+    }
+    all
+}
+
+/// The steps that gave an axis power, and never a second one; at their end none has power.
+fn steps_with_power(workspace: &Workspace) -> BTreeSet<String> {
+    let folders = std::fs::read_dir(workspace.file("bringup")).unwrap().map(|entry| entry.unwrap().path());
+    let mut moved = BTreeSet::new();
+    for folder in folders {
+        // A dry run is a run, and has no log here.
+        let Ok(log) = std::fs::read_to_string(folder.join("candump.log")) else { continue };
+        let (powered, name) = (powered(&log), folder.file_name().unwrap().to_str().unwrap()[3..].to_owned());
+        assert!(powered.iter().all(|on| on.len() <= 1), "{name}: {powered:?}");
+        assert!(powered.last().is_none_or(BTreeSet::is_empty), "{name}: {powered:?}");
+        if powered.iter().any(|on| !on.is_empty()) {
+            moved.insert(name);
+        }
+    }
+    moved
+}
+
+#[test]
+fn no_step_before_the_run_gives_two_axes_power() {
+    let workspace = Workspace::new(&format!("duration_s = 0.2\n{CLOSED}"));
+    let (code, err) = bring_up(&workspace);
+    assert_eq!(code, Some(0), "{err}");
+    let run = Command::new(MASSETER)
+        .args(["run", "scenario.toml", "--dry", "--clock", "virtual", "--quiet"])
+        .current_dir(workspace.file("."))
+        .output()
+        .unwrap();
+    assert_eq!(run.status.code(), Some(0), "{}{}", stdout(&run), stderr(&run));
+    let dry = std::fs::read_dir(workspace.file("bringup")).unwrap().map(|entry| entry.unwrap().path());
+    let dry = dry.filter(|path| path.ends_with("11-dry-run")).last().expect("the dry run leaves evidence");
+    assert_eq!(common::json(&dry.join("result.json"))["passed"], true);
+    let jogs = AXIS_NAMES.map(|axis| format!("jog-{axis}"));
+    assert_eq!(steps_with_power(&workspace), jogs.into(), "absolute drives need no homing");
+}
+
+/// The emulated drives do not outlive their process: what the next step writes back is proved by the library's test.
+#[test]
+fn a_killed_jog_leaves_the_old_values_in_a_file_and_the_next_step_settles_them() {
+    let workspace = Workspace::new("");
+    let (file, evidence) = (workspace.file("scenario.toml"), workspace.file("bringup"));
+    let places = ["--out-of-order", "--folder", evidence.to_str().unwrap(), file.to_str().unwrap()];
+    let jog = ["robot", "jog", "--axis", "l1", "--by", "1mm"];
+    let owed = evidence.join("borrowed-l1.json");
+    let mut killed = Command::new(MASSETER);
+    killed.args(jog).args(["--dwell", "100000s"]).args(places);
+    let mut killed = killed.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    for _ in 0..1000 {
+        if owed.exists() {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    // SIGKILL.
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    assert!(std::fs::read_to_string(&owed).unwrap().contains("\"object\": \"60"));
+    let inspect = masseter(&[&["robot", "inspect"], &places[1..]].concat());
+    assert!(
+        stdout(&inspect).contains("warning: l1: a killed step left reduced values"),
+        "{}",
+        stdout(&inspect)
+    );
+    assert!(owed.exists(), "inspect writes nothing");
+    let next = masseter(&[&jog[..], &places].concat());
+    assert_eq!(next.status.code(), Some(0), "{}", stderr(&next));
+    assert!(
+        stderr(&next).contains("l1: a step was killed; the drive has its old values again"),
+        "{}",
+        stderr(&next)
+    );
+    assert!(!owed.exists(), "the step itself owes nothing at its end");
+    std::fs::write(&owed, r#"{ "serial": 77, "values": [] }"#).unwrap();
+    let other = masseter(&[&jog[..], &places].concat());
+    assert_eq!(other.status.code(), Some(1), "{}", stderr(&other));
+    assert!(stderr(&other).contains("another serial number (1018h:04)"), "{}", stderr(&other));
 }

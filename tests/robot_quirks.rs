@@ -16,6 +16,8 @@ const AXES: [&str; 6] = ["l1", "l2", "l3", "d1", "d2", "d3"];
 #[derive(Debug)]
 struct Row {
     quirk: String,
+    /// Keys of the profile without which the quirk does not show.
+    shown_with: String,
     found_by: Option<String>,
     exit: Option<i32>,
     says: Option<String>,
@@ -23,9 +25,13 @@ struct Row {
     profile: Option<String>,
 }
 
-/// The text between the backticks of a cell.
+/// The first text between backticks of a cell.
 fn quoted(cell: &str) -> Option<String> {
-    Some(cell.split('`').nth(1)?.to_owned())
+    quoted_at(cell, 0)
+}
+
+fn quoted_at(cell: &str, place: usize) -> Option<String> {
+    Some(cell.split('`').nth(2 * place + 1)?.to_owned())
 }
 
 fn rows() -> Vec<Row> {
@@ -39,6 +45,7 @@ fn rows() -> Vec<Row> {
         let no_profile_helps = profile.trim().starts_with("none");
         Row {
             quirk: quoted(quirk).unwrap(),
+            shown_with: quoted_at(quirk, 1).unwrap_or_default(),
             found_by: quoted(found_by),
             exit: exit.trim().parse().ok(),
             says: quoted(says),
@@ -75,7 +82,7 @@ fn play(robot: &Workspace, step: &str, arguments: &[&str]) -> (i32, String) {
 /// The steps up to the one that finds the quirk.
 fn assert_found(row: &Row) {
     let Some(found_by) = &row.found_by else { return };
-    let robot = robot(&row.quirk, "");
+    let robot = robot(&row.quirk, &row.shown_with);
     for (step, arguments) in steps() {
         let (exit, text) = play(&robot, step, &arguments);
         if step == found_by {

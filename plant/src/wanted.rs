@@ -24,6 +24,9 @@ pub(crate) const COB_ID_BITS: u32 = !CobId::NO_REMOTE_REQUEST;
 /// plan of the bus does not include them.
 pub(crate) const OTHER_PDOS: [u16; 6] = [0x1401, 0x1402, 0x1403, 0x1801, 0x1802, 0x1803];
 
+/// Offsets of position, velocity and torque, with the bytes of each. A drive keeps the last value of its process data.
+pub(crate) const OFFSETS: [(u16, usize); 3] = [(0x60B0, 4), (0x60B1, 4), (0x60B2, 2)];
+
 /// One object as it must be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WantedObject {
@@ -70,6 +73,8 @@ pub struct WantedDrive {
     pub pdos: [WantedPdo; 2],
     /// The object that sets 6064h at home, with its value; 0 where the drive's own zero is right.
     pub home: WantedObject,
+    /// Length of an increment of 6064h, m.
+    pub increment_m: f64,
     /// Unit of the drive's accelerations (60AAh).
     pub acceleration_unit: AccelerationUnit,
     /// The objects to write or to compare, in the order in which they are written.
@@ -87,6 +92,7 @@ impl WantedDrive {
             identity: identity(profile),
             pdos: pdos(profile, node),
             home: home(scenario, axis),
+            increment_m: scenario.scale(axis).increment_m.abs(),
             acceleration_unit: profile.units.acceleration,
             objects: objects(scenario, axis)?,
         })
@@ -173,6 +179,7 @@ fn objects(scenario: &Scenario, axis: usize) -> Result<Vec<WantedObject>, PlantE
         };
         wanted.push(WantedObject { object, value: value as u32, bytes, rule, key });
     }
+    wanted.extend(offsets(profile));
     for (&ObjectKey(object), config) in &profile.objects {
         let is_known = wanted.iter().any(|known| known.object == object);
         let (Some(value), false, false) = (config.value, is_known, config.rule == ObjectRule::Absent) else {
@@ -195,6 +202,19 @@ fn objects(scenario: &Scenario, axis: usize) -> Result<Vec<WantedObject>, PlantE
         });
     }
     Ok(wanted)
+}
+
+/// Offsets that the profile names and the process data do not carry: 0, instead of the last value of other process data.
+fn offsets(profile: &DriveProfile) -> impl Iterator<Item = WantedObject> + '_ {
+    let mapping = profile.pdos.rpdo1();
+    OFFSETS.into_iter().filter_map(move |(index, bytes)| {
+        let object = ObjectAddress::new(index, 0);
+        let ObjectConfig { rule, value, .. } = *profile.objects.get(&ObjectKey(object))?;
+        let is_mapped = mapping.entries().iter().any(|entry| entry >> 16 == u32::from(index));
+        let is_left = is_mapped || rule == ObjectRule::Absent;
+        let value = value.unwrap_or(0) as u32;
+        (!is_left).then_some(WantedObject { object, value, bytes, rule, key: "drive_profile.objects" })
+    })
 }
 
 fn beyond(
@@ -383,6 +403,25 @@ mod tests {
         assert_eq!(find(&wanted, 0x6007, 0), None);
         assert_eq!(find(&wanted, 0x6065, 0).unwrap().rule, ObjectRule::Optional);
         assert_eq!(find(&wanted, 0x1400, 5).unwrap().rule, ObjectRule::Optional);
+    }
+
+    /// A drive keeps the last force of process data that no longer carry it.
+    #[test]
+    fn offsets_of_a_profile_that_names_them_are_0_unless_they_are_process_data() {
+        let offset = |text: &str, index| {
+            let wanted = wanted(&format!("[[drive_profile]]\n{text}"), 3).unwrap();
+            find(&wanted, index, 0).map(|wanted| (wanted.value, wanted.bytes, wanted.rule))
+        };
+        assert_eq!(offset("", 0x60B2), None, "the default boot stays as it is");
+        for kind in ["kind = 'epos4'\nunits = { lead_m = 0.003 }", "kind = 'n5'"] {
+            for (index, bytes) in OFFSETS {
+                assert_eq!(offset(kind, index), Some((0, bytes, ObjectRule::Optional)), "{kind}");
+            }
+        }
+        let mapped = "kind = 'n5'\npdos.rpdo1 = ['6040h', '607Ah', '60B2h']";
+        assert_eq!(offset(mapped, 0x60B2), None);
+        assert!(offset(mapped, 0x60B1).is_some());
+        assert_eq!(offset("objects.60B2h = { value = 5 }", 0x60B2), Some((5, 2, ObjectRule::Write)));
     }
 
     /// A leg of 0.2 m at home whose limits count from there, and the same on a drive that counts the other way.

@@ -4,7 +4,7 @@ use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use masseter_controller::kinematics::Solutions;
 use masseter_controller::trajectory::{closed_pose, jaw_points};
-use masseter_plant::bringup::{Stand, stand};
+use masseter_plant::bringup::{MotionError, Stand, stand};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{AXES, AXIS_NAMES, Actuators, Jacobian, Joints, Mechanism, Pose, Vec3};
@@ -14,6 +14,8 @@ use serde_json::{Value, json};
 
 use super::args::RobotArgs;
 use super::lengths::parse_length;
+use super::power_mark::{self, Marks};
+use super::robot_line::failed;
 use super::session::Session;
 use super::step::Step;
 
@@ -66,16 +68,26 @@ pub(crate) fn check_pose(args: &CheckPoseArgs) -> Result<Exit, Failure> {
     let axes: Vec<usize> = (0..AXES).collect();
     let earlier = |_| (!args.out_of_order).then_some(Step::Home);
     let mut session = Session::begin(&args.robot, Step::CheckPose, &axes, earlier)?;
+    let marks = if args.out_of_order { Ok(Marks::default()) } else { check_marks(&mut session) };
     let stand = match stand(&mut session.line, &session.scenario, STAND_NS) {
         Ok(stand) => stand,
+        // No drive has power by this step: there is nothing to stop.
+        Err(error @ MotionError::Line(_)) => {
+            session.finish(false, &json!({ "error": error.to_string() }))?;
+            return Err(failed(error));
+        }
         Err(error) => return Err(session.fail(error)),
     };
-    let found = at_rest(&stand)
-        .and_then(|()| within_strokes(&session.scenario, &stand.positions_m))
-        .and_then(|()| Found::new(&session.scenario, stand.positions_m));
-    let judged = found.and_then(|found| {
+    let found = session
+        .check_no_restart()
+        .and(marks)
+        .and_then(|marks| Ok((marks, at_rest(&stand)?)))
+        .and_then(|(marks, ())| Ok((marks, within_strokes(&session.scenario, &stand.positions_m)?)))
+        .and_then(|(marks, ())| Ok((marks, Found::new(&session.scenario, stand.positions_m)?)));
+    let judged = found.and_then(|(marks, found)| {
         found.print(&stand)?;
-        let data = found.data(&stand);
+        let mut data = found.data(&stand);
+        data["marks"] = json!(marks);
         Ok((found.judge(args, &session.scenario), data))
     });
     match judged {
@@ -90,6 +102,18 @@ pub(crate) fn check_pose(args: &CheckPoseArgs) -> Result<Exit, Failure> {
             Err(Failure::with(Exit::Failed, error))
         }
     }
+}
+
+/// The marks that home left. A drive without its mark may have lost its position.
+fn check_marks(session: &mut Session) -> anyhow::Result<Marks> {
+    let Session { past, scenario, line, .. } = session;
+    let mut marks = Marks::default();
+    for (axis, mark) in marks.iter_mut().enumerate() {
+        let (_, homed) = past.newest(Step::Home, axis).context("there is no home")?;
+        *mark = power_mark::of_home(homed, axis)?;
+        power_mark::check_axis(scenario, *mark, &homed.started, line, axis)?;
+    }
+    Ok(marks)
 }
 
 fn at_rest(stand: &Stand) -> anyhow::Result<()> {

@@ -11,6 +11,7 @@ use masseter_terminal::{Exit, Failure, OrFailure, result};
 
 use super::args::{RobotArgs, parse_axis};
 use super::evidence::{Basis, StepFolder};
+use super::ledger;
 use super::past::Past;
 use super::robot_line::{RobotLine, failed, serials};
 use super::step::Step;
@@ -48,6 +49,7 @@ pub(crate) fn configure(args: &WriteArgs) -> Result<Exit, Failure> {
     past.require(Step::Inspect, &axes, &Basis::new(&scenario, [None; AXES])).usage()?;
     let mut folder = StepFolder::begin(&args.robot.folder, Step::Configure, &axes, &scenario).usage()?;
     let mut robot = RobotLine::open(scenario, folder.log().usage()?).usage()?;
+    ledger::settle(&args.robot.folder, &robot.scenario, &mut robot.line, args.take_over)?;
     let surveys = robot.surveys(&axes).map_err(failed)?;
     folder.note_serials(serials(&surveys));
     past.require(Step::Inspect, &axes, &folder.basis()).usage()?;
@@ -70,7 +72,7 @@ pub(crate) fn configure(args: &WriteArgs) -> Result<Exit, Failure> {
             break;
         }
     }
-    finish(&mut robot, folder, &all, args.store)
+    finish(&mut robot, folder, all, args.store)
 }
 
 /// What no writing can mend.

@@ -7,6 +7,8 @@ use masseter_terminal::{Exit, Failure, result_line};
 use serde_json::{Value, json};
 
 use super::args::{RobotArgs, parse_axis};
+use super::power_mark;
+use super::robot_line::failed;
 use super::session::Session;
 use super::step::Step;
 
@@ -47,8 +49,17 @@ pub(crate) fn home(args: &HomeArgs) -> Result<Exit, Failure> {
             Err(error) => return Err(session.fail(error)),
         }
     }
-    session.finish(true, &data)?;
-    Ok(Exit::Passed)
+    let marked = mark(&mut session, &axes, &mut data);
+    session.finish(marked.is_ok(), &data)?;
+    marked.map(|()| Exit::Passed).map_err(failed)
+}
+
+/// Leaves a mark in each drive that forgets its position without power.
+fn mark(session: &mut Session, axes: &[usize], data: &mut [Value]) -> anyhow::Result<()> {
+    for (&axis, data) in axes.iter().zip(data) {
+        data["mark"] = json!(power_mark::leave(&session.scenario, &mut session.line, axis)?);
+    }
+    session.check_no_restart()
 }
 
 fn print(axis: usize, report: &HomeReport) -> anyhow::Result<()> {

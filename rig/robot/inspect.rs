@@ -15,6 +15,7 @@ use serde::Serialize;
 use super::args::RobotArgs;
 use super::evidence::StepFolder;
 use super::interfaces::{InterfaceResult, interfaces};
+use super::ledger;
 use super::robot_line::{RobotLine, failed, masters, serials};
 use super::snapshot::dcf;
 use super::step::Step;
@@ -77,7 +78,10 @@ pub(crate) fn inspect(args: &InspectArgs) -> Result<Exit, Failure> {
         folder.keep(&format!("{}.dcf", AXIS_NAMES[axis]), &text).incomplete()?;
     }
     folder.note_serials(serials(&surveys));
-    let (text, passed) = describe(&robot, &result);
+    let (mut text, passed) = describe(&robot, &result);
+    for axis in ledger::owed_axes(&args.robot.folder) {
+        let _ = writeln!(text, "warning: {}", ledger::advice(&args.robot.folder, axis));
+    }
     folder.finish(passed, &result).incomplete()?;
     result_with_tones(&text, &[("passed", Tone::Good), ("failed", Tone::Bad), ("warning", Tone::Doubtful)])
         .usage()?;

@@ -117,9 +117,13 @@ fn text(axis: usize, report: &JogReport) -> String {
         || "too few looks for friction; jog further or slower".to_owned(),
         |[friction_n, load_n]| format!("friction {friction_n:.1} N, load {load_n:.1} N"),
     );
+    let answer = report.sync_answer_ns.map_or_else(
+        || "no answer to a SYNC".to_owned(),
+        |answer_ns| format!("SYNC answered within {} µs (can.answer_us)", answer_ns.div_ceil(1000)),
+    );
     format!(
         "{}: moved {:.4} mm and back to {:.4} mm; noise ±{:.4} mm\nthere: rise {:.3} s, overshoot {:.4} mm, settled {:.3} s\n\
-         back:  rise {:.3} s, overshoot {:.4} mm, settled {:.3} s\n{forces}; {:.4} mm of motion as the brake closed",
+         back:  rise {:.3} s, overshoot {:.4} mm, settled {:.3} s\n{forces}; {:.4} mm of motion as the brake closed\n{answer}",
         AXIS_NAMES[axis],
         report.moved_m() * 1e3,
         (report.positions_m[2] - report.positions_m[0]) * 1e3,
@@ -148,6 +152,7 @@ fn data(by_m: f64, report: &JogReport, measured_m: Option<f64>, factor: Option<f
         "friction_n": forces.map(|[friction_n, _]| friction_n),
         "load_n": forces.map(|[_, load_n]| load_n),
         "drop_m": report.drop_m,
+        "answer_us": report.sync_answer_ns.map(|answer_ns| answer_ns.div_ceil(1000)),
         "measured_m": measured_m,
         "measured_by_moved": factor,
     })

@@ -13,9 +13,11 @@ mod home;
 mod inspect;
 mod interfaces;
 mod jog;
+mod ledger;
 mod lengths;
 mod past;
 mod permission;
+mod power_mark;
 mod restore;
 mod robot_line;
 mod session;
@@ -35,7 +37,7 @@ use inspect::InspectArgs;
 use jog::JogArgs;
 use status::StatusArgs;
 
-pub(crate) use dry_run::keep_dry_run;
+pub(crate) use dry_run::{Played, keep_dry_run};
 pub(crate) use permission::check_bring_up;
 
 /// Verbs of `robot`.

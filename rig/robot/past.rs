@@ -109,9 +109,14 @@ impl Past {
         {
             return Some(Lack::Restored(at));
         }
-        let earlier = [Step::Configure, Step::Home, Step::CheckPose];
-        let mut repeated = earlier.into_iter().filter(|&earlier| step >= Step::Home && earlier < step);
-        repeated.find_map(|step| Some(Lack::Repeated { step, at: since(step)? }))
+        // A jog takes the mark of power out of the drive, and home sets the zero for good.
+        let earlier: &[Step] = match step {
+            Step::Home => &[Step::Configure],
+            Step::CheckPose => &[Step::Configure, Step::Jog(axis), Step::Home],
+            Step::DryRun => &[Step::Configure, Step::Jog(axis), Step::Home, Step::CheckPose],
+            _ => &[],
+        };
+        earlier.iter().find_map(|&step| Some(Lack::Repeated { step, at: since(step)? }))
     }
 
     /// Why the newest evidence of a step does not count for an axis, if so. An unknown serial number of now is not compared.
@@ -218,6 +223,16 @@ mod tests {
         take(folder.path(), Step::Home, &[3], Some(false));
         assert!(check(Step::CheckPose, 3).unwrap().starts_with("outdated: home again at "));
         assert_eq!(check(Step::CheckPose, 4), None, "another axis");
+        take(folder.path(), Step::Home, &ALL, Some(true));
+        for step in [Step::CheckPose, Step::DryRun] {
+            take(folder.path(), step, &ALL, Some(true));
+        }
+        take(folder.path(), Step::Jog(3), &[3], Some(true));
+        assert_eq!(check(Step::Home, 3), None, "a jog returns what it changes");
+        for step in [Step::CheckPose, Step::DryRun] {
+            assert!(check(step, 3).unwrap().starts_with("outdated: jog-l1 again at "));
+            assert_eq!(check(step, 4), None, "another axis");
+        }
         let mut alone =
             StepFolder::begin(folder.path(), Step::CheckPose, &ALL, &Scenario::default()).unwrap();
         alone.note_out_of_order();

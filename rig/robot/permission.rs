@@ -4,23 +4,23 @@
 use std::io;
 use std::path::Path;
 
-use anyhow::{Context, ensure};
+use anyhow::{Context, bail, ensure};
 use masseter_plant::bringup::Line;
-use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
 use masseter_terminal::status;
 
+use super::dry_run::{FOLDER, Played, check_motion};
 use super::evidence::Basis;
+use super::ledger;
 use super::past::Past;
+use super::power_mark;
 use super::session::serials;
 use super::step::Step;
 
-/// Where the evidence is.
-pub(super) const FOLDER: &str = "bringup";
-
 /// Refuses a run on real interfaces without its earlier steps. The files are read before anything is sent; then the drives
 /// tell their serial numbers.
-pub(crate) fn check_bring_up(scenario: &Scenario, is_waived: bool) -> anyhow::Result<()> {
+pub(crate) fn check_bring_up(played: &Played<'_>, is_waived: bool) -> anyhow::Result<()> {
+    let scenario = played.scenario;
     if scenario.can.is_virtual() {
         return Ok(());
     }
@@ -32,17 +32,28 @@ pub(crate) fn check_bring_up(scenario: &Scenario, is_waived: bool) -> anyhow::Re
     }
     let refused = "a run needs a passed pose check of this robot, and at full speed a passed dry run; --without-bring-up goes on without, and then a wrong \
                    sign, scale or zero can drive an axis into its end";
-    let past = Past::read(Path::new(FOLDER))?;
+    let folder = Path::new(FOLDER);
+    if let Some(&axis) = ledger::owed_axes(folder).first() {
+        bail!(ledger::advice(folder, axis));
+    }
+    let past = Past::read(folder)?;
     let axes: [usize; AXES] = std::array::from_fn(|axis| axis);
     let unknown = Basis::new(scenario, [None; AXES]);
     let steps: &[Step] =
         if scenario.dry.is_on { &[Step::CheckPose] } else { &[Step::CheckPose, Step::DryRun] };
     let require = |basis: &Basis| steps.iter().try_for_each(|&step| past.require(step, &axes, basis));
     require(&unknown).context(refused)?;
-    let found = serials(&mut Line::open(scenario, Box::new(io::sink()))?);
+    if !scenario.dry.is_on {
+        check_motion(&past, played).context(refused)?;
+    }
+    let mut line = Line::open(scenario, Box::new(io::sink()))?;
+    let found = serials(&mut line).context(refused)?;
     ensure!(
         found.iter().all(Option::is_some),
         "a drive does not tell its serial number (1018h:04); check power and wiring, or use --without-bring-up"
     );
-    require(&Basis { serials: found, ..unknown }).context(refused)
+    require(&Basis { serials: found, ..unknown }).context(refused)?;
+    let (_, checked) = past.newest(Step::CheckPose, 0).context("there is no pose check")?;
+    let marks = power_mark::of_pose_check(checked).context(refused)?;
+    power_mark::check(scenario, &marks, &checked.started, &mut line).context(refused)
 }

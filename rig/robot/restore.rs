@@ -9,6 +9,7 @@ use masseter_terminal::{Exit, Failure, OrFailure};
 
 use super::configure::WriteArgs;
 use super::evidence::StepFolder;
+use super::ledger;
 use super::past::Past;
 use super::robot_line::{RobotLine, failed, serials};
 use super::step::Step;
@@ -20,6 +21,7 @@ pub(crate) fn restore(args: &WriteArgs) -> Result<Exit, Failure> {
     let (axes, past) = (args.axes(), Past::read(&args.robot.folder).usage()?);
     let mut folder = StepFolder::begin(&args.robot.folder, Step::Restore, &axes, &scenario).usage()?;
     let mut robot = RobotLine::open(scenario, folder.log().usage()?).usage()?;
+    ledger::settle(&args.robot.folder, &robot.scenario, &mut robot.line, args.take_over)?;
     let surveys = robot.surveys(&axes).map_err(failed)?;
     let serials = serials(&surveys);
     folder.note_serials(serials);
@@ -37,7 +39,7 @@ pub(crate) fn restore(args: &WriteArgs) -> Result<Exit, Failure> {
             break;
         }
     }
-    finish(&mut robot, folder, &all, args.store)
+    finish(&mut robot, folder, all, args.store)
 }
 
 /// The values of a drive from before the first `configure` since it was last restored.

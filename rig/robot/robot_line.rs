@@ -4,7 +4,7 @@ use std::io::Write;
 
 use anyhow::Context;
 use masseter_can::canopen::{NodeId, ObjectAddress};
-use masseter_plant::bringup::{Deviation, Line, Settings, Strangers, Survey, deviations};
+use masseter_plant::bringup::{Deviation, Line, LineError, Settings, Strangers, Survey, deviations};
 use masseter_plant::wanted::WantedDrive;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
@@ -101,6 +101,17 @@ pub(crate) fn failed(error: impl Into<anyhow::Error>) -> Failure {
 /// Signs of other masters in words.
 pub(crate) fn masters(strangers: &Strangers) -> Vec<String> {
     strangers.masters.iter().map(|(bus, sign)| format!("bus {bus}: {sign}")).collect()
+}
+
+/// The serial number of a drive; none where the drive says that it has none.
+///
+/// # Errors
+/// [`LineError`], also for a drive that is silent: it may be any drive.
+pub(crate) fn serial(line: &mut Line, axis: usize) -> Result<Option<u32>, LineError> {
+    match line.read_number(axis, SERIAL) {
+        Err(error) if error.abort_code().is_some() => Ok(None),
+        read => read.map(Some),
+    }
 }
 
 /// Serial numbers of the drives that were surveyed.

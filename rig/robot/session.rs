@@ -1,11 +1,10 @@
 //! A step that moves or reads the drives, from the claimed interfaces to its evidence and exit code.
 
-use anyhow::{Context, anyhow};
-use masseter_can::canopen::ObjectAddress;
-use masseter_plant::bringup::{Line, MotionError, StopCause};
+use anyhow::{Context, anyhow, bail};
+use masseter_plant::bringup::{Line, LineError, MotionError, StopCause};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::Scenario;
-use masseter_shared::geometry::AXES;
+use masseter_shared::geometry::{AXES, AXIS_NAMES};
 use masseter_shared::lifecycle::StopRequest;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 use serde::Serialize;
@@ -13,7 +12,10 @@ use serde_json::json;
 
 use super::args::RobotArgs;
 use super::evidence::{Basis, StepFolder};
+use super::ledger::{self, Files};
 use super::past::Past;
+use super::power_mark;
+use super::robot_line::{failed, serial};
 use super::step::Step;
 
 /// How long the step listens for other masters, ns.
@@ -24,7 +26,10 @@ pub(super) struct Session {
     pub(super) scenario: Scenario,
     pub(super) line: Line,
     pub(super) stop: StopRequest,
+    pub(super) past: Past,
     folder: StepFolder,
+    /// Boot-up messages before the step.
+    boot_ups: [u32; AXES],
 }
 
 impl Session {
@@ -55,9 +60,28 @@ impl Session {
             let other = anyhow!("bus {bus}: another master sends {sign}; end that program first");
             return Err(Failure::with(Exit::Usage, other));
         }
-        folder.note_serials(serials(&mut line));
+        let boot_ups = boot_ups(&line);
+        let serials = serials(&mut line).map_err(failed)?;
+        folder.note_serials(serials);
         require(&folder.basis()).usage()?;
-        Ok(Self { scenario, line, stop, folder })
+        ledger::settle(&args.folder, &scenario, &mut line, false)?;
+        // A step that borrows the marked object must not return a mark.
+        if matches!(step, Step::Jog(_) | Step::Home) {
+            axes.iter().try_for_each(|&axis| power_mark::remove(&past, &scenario, &mut line, axis))?;
+        }
+        line.keep_old_values_in(Box::new(Files::new(&args.folder, serials)));
+        Ok(Self { scenario, line, stop, past, folder, boot_ups })
+    }
+
+    /// Refuses a drive that restarted since the step began: it may have lost its position, or what was written.
+    pub(super) fn check_no_restart(&self) -> anyhow::Result<()> {
+        let now = boot_ups(&self.line);
+        match (0..AXES).find(|&axis| now[axis] != self.boot_ups[axis]) {
+            Some(axis) => {
+                bail!("{}: the drive restarted during the step; check its supply", AXIS_NAMES[axis])
+            }
+            None => Ok(()),
+        }
     }
 
     /// Writes the result, whether it is evidence, and where it is.
@@ -85,7 +109,18 @@ impl Session {
     }
 }
 
-/// Serial numbers (1018h:04); none of a drive that tells none.
-pub(super) fn serials(line: &mut Line) -> [Option<u32>; AXES] {
-    std::array::from_fn(|axis| line.read_number(axis, ObjectAddress::new(0x1018, 4)).ok())
+fn boot_ups(line: &Line) -> [u32; AXES] {
+    std::array::from_fn(|axis| line.heard(axis).boot_ups)
+}
+
+/// Serial numbers (1018h:04); none of a drive that says that it has none.
+///
+/// # Errors
+/// [`LineError`] of the first drive that does not answer.
+pub(super) fn serials(line: &mut Line) -> Result<[Option<u32>; AXES], LineError> {
+    let mut serials = [None; AXES];
+    for (axis, found) in serials.iter_mut().enumerate() {
+        *found = serial(line, axis)?;
+    }
+    Ok(serials)
 }

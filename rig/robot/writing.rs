@@ -3,8 +3,9 @@
 use std::fmt::Write;
 
 use masseter_plant::bringup::{
-    Change, PowerError, Settings, Survey, WriteError, Writer, prove_no_power, reset, store, take_over,
+    Change, Line, PowerError, Settings, Survey, WriteError, Writer, prove_no_power, reset, store, take_over,
 };
+use masseter_shared::config::{ObjectRule, Scenario};
 use masseter_shared::geometry::AXIS_NAMES;
 use masseter_shared::wording::counted;
 use masseter_terminal::{Exit, Failure, OrFailure, Tone, result_with_tones};
@@ -20,12 +21,23 @@ pub(super) struct Written {
     changes: Vec<Change>,
     stored: bool,
     error: Option<String>,
+    /// Number of the axis, and the boot-ups of its drive when its turn ended.
+    #[serde(skip)]
+    turn: (usize, u32),
 }
 
 impl Written {
     /// Whether the drive does not have its settings.
     pub(super) fn failed(&self) -> bool {
         self.error.is_some()
+    }
+
+    /// Notes a restart since the drive's turn: values that are not stored are lost.
+    fn note_restart(&mut self, line: &Line) {
+        let (axis, boot_ups) = self.turn;
+        if self.error.is_none() && line.heard(axis).boot_ups != boot_ups {
+            self.error = Some(restarted(axis));
+        }
     }
 }
 
@@ -37,20 +49,26 @@ pub(super) fn before_file(axis: usize) -> String {
 /// Proves that none of these drives has power, before anything is written to one of them.
 pub(super) fn prove_all(robot: &mut RobotLine, axes: &[usize], may_stop: bool) -> Result<(), Failure> {
     robot.refuse_masters().map_err(failed)?;
-    for &axis in axes {
-        let noise_m = robot.scenario.profile(axis).homing.tolerance_m;
-        let noise = robot.scenario.scale(axis).window(noise_m);
-        match prove_no_power(&mut robot.line, axis, noise) {
-            Err(PowerError::Powered { .. }) if may_stop => {
-                take_over(&mut robot.line, axis, noise).map_err(failed)?;
-                // A drive that the rig could not stop is the case of an emergency stop.
-                let proved = prove_no_power(&mut robot.line, axis, noise);
-                proved.map_err(|error| Failure::with(Exit::SafeStop, error))?;
-            }
-            proved => proved.map_err(failed)?,
+    axes.iter().try_for_each(|&axis| prove_off(&mut robot.line, &robot.scenario, axis, may_stop))
+}
+
+/// Proves that a drive has no power; one that has is stopped first if that is allowed.
+pub(super) fn prove_off(
+    line: &mut Line,
+    scenario: &Scenario,
+    axis: usize,
+    may_stop: bool,
+) -> Result<(), Failure> {
+    let noise = scenario.scale(axis).window(scenario.profile(axis).homing.tolerance_m);
+    match prove_no_power(line, axis, noise) {
+        Err(PowerError::Powered { .. }) if may_stop => {
+            take_over(line, axis, noise).map_err(failed)?;
+            // A drive that the rig could not stop is the case of an emergency stop.
+            let proved = prove_no_power(line, axis, noise);
+            proved.map_err(|error| Failure::with(Exit::SafeStop, error))
         }
+        proved => proved.map_err(failed),
     }
-    Ok(())
 }
 
 /// Keeps the old values of a drive in a file, writes the new ones, and reads everything again; stores on request. A drive
@@ -66,6 +84,7 @@ pub(super) fn write(
     let before = serde_json::to_string_pretty(&target.found(survey)).incomplete()?;
     folder.keep(&before_file(axis), &(before + "\n")).incomplete()?;
     let profile = robot.scenario.profile(axis).clone();
+    let boot_ups = robot.line.heard(axis).boot_ups;
     let mut writer = Writer::new(&mut robot.line, axis, &profile);
     let applied = writer.apply(target, survey);
     let (changes, mut stored) = (writer.into_changes(), false);
@@ -74,6 +93,11 @@ pub(super) fn write(
         Err(error) => Some(error.to_string()),
         Ok(()) => check(robot, axis, target, "after writing").usage()?,
     };
+    let error = error.or_else(|| {
+        // What was read back before a restart is lost.
+        let has_restarted = robot.line.heard(axis).boot_ups != boot_ups;
+        has_restarted.then(|| restarted(axis))
+    });
     let error = match error {
         None if stores => {
             let error = store_and_check(robot, axis, target).usage()?;
@@ -82,7 +106,12 @@ pub(super) fn write(
         }
         error => error,
     };
-    Ok(Written { axis: AXIS_NAMES[axis], changes, stored, error })
+    let turn = (axis, robot.line.heard(axis).boot_ups);
+    Ok(Written { axis: AXIS_NAMES[axis], changes, stored, error, turn })
+}
+
+fn restarted(axis: usize) -> String {
+    format!("{}: the drive restarted meanwhile; check its supply, and configure again", AXIS_NAMES[axis])
 }
 
 fn store_and_check(robot: &mut RobotLine, axis: usize, target: &Settings) -> anyhow::Result<Option<String>> {
@@ -106,7 +135,7 @@ fn check(
     let wrong: Vec<_> = target
         .differences(&survey)
         .into_iter()
-        .filter(|difference| difference.rule != masseter_shared::config::ObjectRule::Optional)
+        .filter(|difference| difference.rule != ObjectRule::Optional)
         .map(|difference| difference.object.to_string())
         .collect();
     Ok((!wrong.is_empty()).then(|| format!("{}: {} differ {when}", AXIS_NAMES[axis], wrong.join(", "))))
@@ -116,12 +145,15 @@ fn check(
 pub(super) fn finish(
     robot: &mut RobotLine,
     folder: StepFolder,
-    all: &[Written],
+    mut all: Vec<Written>,
     stores: bool,
 ) -> Result<Exit, Failure> {
     robot.line.flush().incomplete()?;
+    for written in &mut all {
+        written.note_restart(&robot.line);
+    }
     let mut text = String::new();
-    for Written { axis, changes, stored, error } in all {
+    for Written { axis, changes, stored, error, .. } in &all {
         let count = counted(changes.len() as u64, "value");
         let _ = writeln!(text, "{axis}: {count} written{}", if *stored { ", stored" } else { "" });
         for Change { object, name, before, after } in changes {
@@ -136,7 +168,7 @@ pub(super) fn finish(
     let _ = match (failed, stores) {
         (true, _) => writeln!(
             text,
-            "the drives after it were not written; 'masseter robot restore' writes the old values back"
+            "drives without a line here were not written; 'masseter robot restore' writes the old values back"
         ),
         (false, true) => writeln!(text, "passed: the values are stored"),
         (false, false) => writeln!(text, "passed: the values last until a reset; --store keeps them"),

@@ -19,6 +19,7 @@ use super::room::{self, Reserve};
 use super::{supervisor, virtual_time};
 use crate::arguments::name_of;
 use crate::machine::interrupts::Interrupts;
+use crate::robot::Played;
 use crate::{doctor, machine, robot};
 
 /// Where runs without `--out` go.
@@ -51,7 +52,9 @@ impl PreparedRun {
     pub(crate) fn new(args: &RunArgs) -> Result<Self, Failure> {
         room::check_memory().usage()?;
         let (plan, args) = resolve(args).usage()?;
-        robot::check_bring_up(&plan.scenario, args.without_bring_up).usage()?;
+        let (controller, motion_s) = (args.controller.name(), plan.trajectory.duration_s());
+        let played = Played { scenario: &plan.scenario, controller: controller.as_deref(), motion_s };
+        robot::check_bring_up(&played, args.without_bring_up).usage()?;
         room::check_disk(args.out.as_deref().unwrap_or(RUNS.as_ref()), &plan).incomplete()?;
         let domain = match args.clock {
             ClockKind::Virtual => None,
@@ -107,7 +110,10 @@ impl PlayedRun {
         let Self { args, folder, manifest, reserved, written } = self;
         let exit = masseter_report::report_run(&folder, &manifest, args.format, args.detail(), reserved)?;
         written?;
-        robot::keep_dry_run(&manifest.scenario, folder.path(), exit == Exit::Passed, args.without_bring_up)
+        let controller = args.controller.name();
+        let Manifest { scenario, motion_s, .. } = &manifest;
+        let played = Played { scenario, controller: controller.as_deref(), motion_s: *motion_s };
+        robot::keep_dry_run(&played, folder.path(), exit == Exit::Passed, args.without_bring_up)
             .incomplete()?;
         Ok(exit)
     }

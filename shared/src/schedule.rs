@@ -224,8 +224,8 @@ pub fn plans(scenario: &Scenario) -> Result<Vec<BusPlan>, ScheduleError> {
     plans_of(scenario, scenario.period_ns(), false)
 }
 
-/// The plans while all drives run, or while the first one of every bus `boots` and the others run: then request and answer
-/// of one SDO exchange take the place of its process data. With more drives booting there is still one request in a cycle,
+/// The plans while all drives run, or while one of every bus `boots` and the others run: then request and answer of one SDO
+/// exchange take the place of its process data. The worst is the drive with the shortest RPDO1. With more drives booting there is still one request in a cycle,
 /// and each answer is no longer than the process data that its drive does not send.
 ///
 /// The offsets of the schedule hold as well: an SDO frame blocks the bus for longer than a heartbeat, but for no longer than
@@ -263,8 +263,10 @@ fn messages(
         release: None,
     };
     let mut messages = vec![message("SYNC".to_owned(), Cob::Sync, 0, period_ns)];
-    for (index, &(node, rpdo1)) in drives.iter().enumerate() {
-        if index == 0 && boots {
+    let shortest = drives.iter().min_by_key(|(_, rpdo1)| length(rpdo1)).filter(|_| boots);
+    let booting = shortest.map(|&(node, _)| node);
+    for &(node, rpdo1) in drives {
+        if booting == Some(node) {
             // The answer may take until the end of the next cycle.
             let sdo = |name: &str, cob| PeriodicMessage {
                 deadline_ns: 2 * period_ns,
@@ -293,7 +295,7 @@ mod tests {
     use super::*;
 
     fn scenario(can: CanConfig, rate_hz: u32) -> Scenario {
-        Scenario { can, rate_hz, ..Scenario::default() }
+        Scenario { rate_hz, can, ..Scenario::default() }
     }
 
     /// RPDO1 of eight bytes: three frames of 20 µs more on each bus.
@@ -342,6 +344,17 @@ mod tests {
         for plan in plans_of(&Scenario::default(), 1_000_000, true).unwrap() {
             assert_eq!(plan.check(), Ok(()));
         }
+    }
+
+    /// The frames of the drive that boots go: the worst case keeps the longer ones.
+    #[test]
+    fn the_drive_with_the_shortest_process_data_boots() {
+        let text =
+            "rate_hz = 500\n[[drive_profile]]\naxes = ['l1']\npdos.rpdo1 = ['6040h', '607Ah', '60B2h']";
+        let scenario = Scenario::parse(std::path::Path::new("robot.toml"), text).unwrap();
+        let plan = plans_of(&scenario, 2_000_000, true).unwrap().pop().unwrap();
+        let has = |name: &str| plan.messages.iter().any(|planned| planned.message.name == name);
+        assert_eq!(["RPDO1 4", "RPDO1 5", "SDO request 5"].map(has), [true, false, true]);
     }
 
     #[test]

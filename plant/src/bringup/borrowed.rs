@@ -1,16 +1,29 @@
 //! Objects of one drive that a step changes for its own duration.
 
+use std::mem;
+
 use masseter_can::canopen::ObjectAddress;
 use masseter_shared::config::{DriveProfile, ObjectKey, ObjectRule};
 
+use super::ledger::OldValue;
 use super::line::{Line, LineError};
+use super::settings::same;
 
-/// A changed object with its old value.
+/// A value for the duration of a step.
 #[derive(Debug, Clone, Copy)]
-struct Old {
-    object: ObjectAddress,
-    value: u32,
-    bytes: usize,
+pub(super) struct Loan {
+    pub(super) object: ObjectAddress,
+    pub(super) value: u32,
+    pub(super) bytes: usize,
+    /// Whether the drive may lack the object or refuse the value, whatever its profile says.
+    pub(super) may_lack: bool,
+}
+
+impl Loan {
+    /// The lowest bytes of a value.
+    pub(super) const fn new(index: u16, subindex: u8, value: u32, bytes: usize) -> Self {
+        Self { object: ObjectAddress::new(index, subindex), value, bytes, may_lack: false }
+    }
 }
 
 /// The changed objects of a drive, in the order of their changes.
@@ -18,7 +31,7 @@ struct Old {
 pub(super) struct Borrowed<'a> {
     axis: usize,
     profile: &'a DriveProfile,
-    old: Vec<Old>,
+    old: Vec<OldValue>,
 }
 
 impl<'a> Borrowed<'a> {
@@ -27,64 +40,69 @@ impl<'a> Borrowed<'a> {
         Self { axis, profile, old: Vec::new() }
     }
 
-    /// Writes the lowest bytes of a value as the profile's rule allows, and keeps the old one.
-    pub(super) fn set(
-        &mut self,
-        line: &mut Line,
-        object: ObjectAddress,
-        value: u32,
-        bytes: usize,
-    ) -> Result<(), LineError> {
-        match self.profile.object(ObjectKey(object)).rule {
-            ObjectRule::Absent | ObjectRule::Expect => Ok(()),
-            ObjectRule::Optional => self.set_if_taken(line, object, value, bytes),
-            ObjectRule::Write => self.replace(line, object, value, bytes),
+    /// Writes values as the profile's rules allow. All old values are kept at once, before the first write.
+    pub(super) fn set_all(&mut self, line: &mut Line, loans: &[Loan]) -> Result<(), LineError> {
+        let mut writes = Vec::new();
+        for loan in loans {
+            if let Some(may_lack) = self.may_lack(loan)
+                && let Some(old) = self.read(line, loan, may_lack)?
+            {
+                writes.push((loan, may_lack, old));
+            }
         }
-    }
-
-    /// The same, unless the drive has no such object or refuses the value.
-    pub(super) fn set_if_taken(
-        &mut self,
-        line: &mut Line,
-        object: ObjectAddress,
-        value: u32,
-        bytes: usize,
-    ) -> Result<(), LineError> {
-        match self.replace(line, object, value, bytes) {
-            Err(error) if error.abort_code().is_none() => Err(error),
-            _ => Ok(()),
-        }
-    }
-
-    /// An equal value is not written: some objects are constant.
-    fn replace(
-        &mut self,
-        line: &mut Line,
-        object: ObjectAddress,
-        value: u32,
-        bytes: usize,
-    ) -> Result<(), LineError> {
-        let before = line.read_number(self.axis, object)?;
-        let mask = u32::MAX >> (32 - 8 * bytes);
-        if before & mask == value & mask {
+        if writes.is_empty() {
             return Ok(());
         }
-        line.write(self.axis, object, value, bytes)?;
-        self.old.push(Old { object, value: before, bytes });
+        // A kill may come between.
+        self.old.extend(writes.iter().map(|(.., old)| *old));
+        line.keep_old_values(self.axis, &self.old)?;
+        for (loan, may_lack, old) in writes {
+            match line.write(self.axis, loan.object, loan.value, loan.bytes) {
+                // The drive has refused, so that nothing is changed. Without an answer it may have taken the value.
+                Err(error) if error.abort_code().is_some() => {
+                    let place = self.old.iter().rposition(|kept| *kept == old);
+                    self.old.remove(place.expect("it was kept"));
+                    line.keep_old_values(self.axis, &self.old)?;
+                    if !may_lack {
+                        return Err(error);
+                    }
+                }
+                written => written?,
+            }
+        }
         Ok(())
+    }
+
+    /// Whether the drive may lack the object or refuse the value; none where the profile leaves the object.
+    fn may_lack(&self, loan: &Loan) -> Option<bool> {
+        match self.profile.object(ObjectKey(loan.object)).rule {
+            _ if loan.may_lack => Some(true),
+            ObjectRule::Absent | ObjectRule::Expect => None,
+            ObjectRule::Optional => Some(true),
+            ObjectRule::Write => Some(false),
+        }
+    }
+
+    /// The old value; none where nothing is to be written. An equal value is not written: some objects are constant.
+    fn read(&self, line: &mut Line, loan: &Loan, may_lack: bool) -> Result<Option<OldValue>, LineError> {
+        let &Loan { object, value, bytes, .. } = loan;
+        match line.read_number(self.axis, object) {
+            Err(error) if may_lack && error.abort_code().is_some() => Ok(None),
+            Err(error) => Err(error),
+            Ok(before) if same(before, value, bytes) => Ok(None),
+            Ok(before) => Ok(Some(OldValue { object: ObjectKey(object), value: before, bytes })),
+        }
     }
 
     /// Sets the software limits (607Dh) to positions as 6064h shows them, in increments; never the lower one above the upper one.
     pub(super) fn set_limits(&mut self, line: &mut Line, ends: [i32; 2]) -> Result<(), LineError> {
         let offset = self.limit_offset(line)?;
         let [lowest, highest] = ends.map(|end| end.saturating_sub(offset) as u32);
-        let [lower, upper] = [1, 2].map(|end| ObjectAddress::new(0x607D, end));
-        if lowest as i32 > line.read_number(self.axis, upper)? as i32 {
-            self.set(line, upper, highest, 4)?;
-            return self.set(line, lower, lowest, 4);
+        let mut limits = [(1, lowest), (2, highest)].map(|(end, value)| Loan::new(0x607D, end, value, 4));
+        if lowest as i32 > line.read_number(self.axis, limits[1].object)? as i32 {
+            limits.reverse();
         }
-        self.set(line, lower, lowest, 4)?;
-        self.set(line, upper, highest, 4)
+        self.set_all(line, &limits)
     }
 
     /// What the drive adds to its software limits, increments: the position at home as the drive has it now.
@@ -103,10 +121,33 @@ impl<'a> Borrowed<'a> {
 
     /// Writes every old value back, the last change first. A failure does not keep the others from their old values.
     pub(super) fn restore(&mut self, line: &mut Line) -> Result<(), LineError> {
-        let mut restored = Ok(());
-        while let Some(Old { object, value, bytes }) = self.old.pop() {
-            restored = restored.and(line.write(self.axis, object, value, bytes));
-        }
-        restored
+        let failures = write_back(line, self.axis, &mem::take(&mut self.old));
+        let left: Vec<_> = failures.iter().rev().map(|(old, _)| *old).collect();
+        let kept = line.keep_old_values(self.axis, &left);
+        failures.into_iter().next().map_or(kept, |(_, error)| Err(error))
     }
+}
+
+/// Writes old values back that a killed step left, the last change first. Returns those that the drive refuses: it never takes
+/// them, so that it is owed them no more.
+///
+/// # Errors
+/// The first failure; the other values have returned nevertheless.
+pub fn give_back(line: &mut Line, axis: usize, old: &[OldValue]) -> Result<Vec<OldValue>, LineError> {
+    let failures = write_back(line, axis, old);
+    let (refused, lost): (Vec<_>, Vec<_>) =
+        failures.into_iter().partition(|(_, error)| error.abort_code().is_some());
+    let left: Vec<_> = lost.iter().rev().map(|(old, _)| *old).collect();
+    line.keep_old_values(axis, &left)?;
+    let refused = refused.into_iter().map(|(old, _)| old).collect();
+    lost.into_iter().next().map_or(Ok(refused), |(_, error)| Err(error))
+}
+
+/// Writes values, the last one first. Returns those that failed, in this order.
+fn write_back(line: &mut Line, axis: usize, old: &[OldValue]) -> Vec<(OldValue, LineError)> {
+    let write = |old: &OldValue| {
+        let OldValue { object: ObjectKey(object), value, bytes } = *old;
+        Some((*old, line.write(axis, object, value, bytes).err()?))
+    };
+    old.iter().rev().filter_map(write).collect()
 }

@@ -2,7 +2,9 @@
 
 use masseter_can::canopen::ObjectAddress;
 use masseter_can::cia402::Statusword;
-use masseter_shared::config::{AccelerationUnit, DriveProfile, ObjectRule, VelocityUnit};
+use masseter_shared::config::{
+    AccelerationUnit, DriveProfile, ObjectConfig, ObjectKey, ObjectRule, VelocityUnit,
+};
 use serde::Serialize;
 
 use super::settings::{Difference, Settings};
@@ -63,6 +65,7 @@ pub fn deviations(
         let mut written = differences.iter().filter(|difference| difference.rule != ObjectRule::Expect);
         !written.any(|difference| is_at(deviation, difference))
     });
+    all.extend(of_ratios(survey, profile, wanted.increment_m));
     let others: Vec<_> = differences
         .iter()
         .filter(|difference| !all.iter().any(|deviation| is_at(deviation, difference)))
@@ -157,16 +160,50 @@ fn of_units(survey: &Survey, profile: &DriveProfile) -> Vec<Deviation> {
             format!("the drive counts {quantity} in {found}, the profile declares {declared}: change one");
         Some(new(object, [declared.to_owned(), found], outcome, &remedy, key))
     };
-    let ratio = [1, 2].map(|part| survey.number(ObjectAddress::new(0x6091, part)).map(f64::from));
-    let of_gear = || {
-        let [Some(motor), Some(shaft)] = ratio else { return None };
-        let is_right = (motor / shaft / units.gear_ratio - 1.0).abs() < 1e-6;
-        let values = [units.gear_ratio.to_string(), format!("{motor}/{shaft}")];
-        let remedy = "compare with the gear: a wrong ratio scales every motion";
-        let object = ObjectAddress::new(0x6091, 1);
-        (!is_right).then(|| new(object, values, Outcome::Doubtful, remedy, "drive_profile.units.gear_ratio"))
+    declared.into_iter().filter_map(of_code).collect()
+}
+
+/// Ratios by which the drive counts its way, as far as the drive has them: gear, feed and encoder. A wrong one scales every motion.
+/// Without a lead the profile declares no travel, so that a gear is only to be looked at. A feed decides the unit of 6064h; the encoder
+/// decides without one.
+fn of_ratios(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Deviation> {
+    let units = &profile.units;
+    // A value that configure writes counts, and not the one that it replaces.
+    let part = |index, subindex| {
+        let object = ObjectAddress::new(index, subindex);
+        let ObjectConfig { rule, value, .. } = profile.object(ObjectKey(object));
+        let found = || survey.number(object).map(f64::from);
+        match rule {
+            ObjectRule::Absent => None,
+            ObjectRule::Write => value.map(|value| value as f64).or_else(found),
+            ObjectRule::Expect | ObjectRule::Optional => found(),
+        }
     };
-    declared.into_iter().filter_map(of_code).chain(of_gear()).collect()
+    let ratio = |index| Some(part(index, 1)? / part(index, 2).filter(|&turns| turns > 0.0)?);
+    let feed = units.lead_m.map(|lead_m| lead_m / increment_m);
+    let encoder = feed.map(|feed| feed / units.gear_ratio);
+    let decides = |decides| if decides { Outcome::Refused } else { Outcome::Doubtful };
+    let lead_key = "drive_profile.units.lead_m";
+    let ratios = [
+        (
+            0x6091,
+            Some(units.gear_ratio),
+            "motor turns/screw turn",
+            decides(units.lead_m.is_some()),
+            "drive_profile.units.gear_ratio",
+        ),
+        (0x6092, feed, "increments/screw turn", Outcome::Refused, lead_key),
+        (0x608F, encoder, "increments/motor turn", decides(ratio(0x6092).is_none()), lead_key),
+    ];
+    let of_ratio = |(index, wanted, unit, outcome, key)| {
+        let object = ObjectAddress::new(index, 1);
+        let (wanted, found): (f64, f64) = (wanted?, ratio(index)?);
+        let text = |ratio: f64| format!("{} {unit}", (ratio * 1e6).round() / 1e6);
+        let remedy = format!("the drive has {}, the profile {}: change one", text(found), text(wanted));
+        let is_right = (found / wanted - 1.0).abs() < 1e-6;
+        (!is_right).then(|| new(object, [text(wanted), text(found)], outcome, &remedy, key))
+    };
+    ratios.into_iter().filter_map(of_ratio).collect()
 }
 
 fn of_object(survey: &Survey, difference: &Difference) -> Deviation {
@@ -244,14 +281,69 @@ mod tests {
     fn a_unit_is_told_in_words() {
         let mut survey = Survey::default();
         survey.insert(ObjectAddress::new(0x60AA, 0), 0x00C0_0300);
-        survey.insert(ObjectAddress::new(0x6091, 1), 26);
-        survey.insert(ObjectAddress::new(0x6091, 2), 1);
         let all = of_units(&survey, &DriveProfile::default());
         assert_eq!(
             all[0].remedy,
             "the drive counts acceleration in rpm/s, the profile declares increments/s²: change one"
         );
-        assert_eq!((all[0].outcome, all[1].outcome), (Outcome::Refused, Outcome::Doubtful));
-        assert_eq!(all[1].found, "26/1");
+        assert_eq!(all[0].outcome, Outcome::Refused);
+    }
+
+    /// Where 6092h decides the unit of 6064h, 608Fh is only to be looked at.
+    #[test]
+    fn ratios_of_the_drive_are_those_of_the_profile() {
+        let ratios = |found: &[(u16, u32, u32)], profile: &str| {
+            let mut survey = Survey::default();
+            for &(index, many, turns) in found {
+                survey.insert(ObjectAddress::new(index, 1), many);
+                survey.insert(ObjectAddress::new(index, 2), turns);
+            }
+            let text = format!("[[drive_profile]]\n{profile}");
+            let scenario = Scenario::parse(Path::new("robot.toml"), &text).unwrap();
+            let all = of_ratios(&survey, scenario.profile(3), 1e-6);
+            all.into_iter().map(|one| (one.outcome, one.remedy)).collect::<Vec<_>>()
+        };
+        let lead = "units = { gear_ratio = 2.5, lead_m = 0.01 }";
+        let right = [(0x6091, 5, 2), (0x6092, 10_000, 1), (0x608F, 4000, 1)];
+        assert_eq!(ratios(&right, lead), []);
+        let [(gear, gear_text), (feed, feed_text), (encoder, _)] =
+            &ratios(&[(0x6091, 26, 1), (0x6092, 6000, 1), (0x608F, 2048, 1)], lead)[..]
+        else {
+            panic!("three ratios differ")
+        };
+        assert_eq!([gear, feed, encoder], [&Outcome::Refused, &Outcome::Refused, &Outcome::Doubtful]);
+        assert_eq!(
+            gear_text,
+            "the drive has 26 motor turns/screw turn, the profile 2.5 motor turns/screw turn: change one"
+        );
+        assert!(feed_text.contains("6000 increments/screw turn, the profile 10000"), "{feed_text}");
+        assert_eq!(ratios(&[(0x608F, 2048, 1)], lead)[0].0, Outcome::Refused);
+        assert_eq!(
+            ratios(&[(0x6091, 26, 1), (0x6092, 6000, 1)], "")[..],
+            [(
+                Outcome::Doubtful,
+                "the drive has 26 motor turns/screw turn, the profile 1 motor turns/screw turn: change one"
+                    .to_owned()
+            )]
+        );
+        let left = format!("{lead}\nobjects.'608Fh:01' = {{ rule = 'absent' }}");
+        assert_eq!(ratios(&[(0x608F, 2048, 1)], &left), []);
+        let written = format!("{lead}\nobjects.'6091h:01' = {{ value = 5, bytes = 4 }}");
+        assert_eq!(ratios(&[(0x6091, 26, 2)], &written), [], "configure writes it");
+        assert_eq!(ratios(&[(0x6091, 5, 1)], &written)[0].0, Outcome::Refused, "what it writes is wrong");
+        let absent = format!("{lead}\nobjects.'6092h:01' = {{ rule = 'absent' }}");
+        let found = [(0x6092, 10_000, 1), (0x608F, 2048, 1)];
+        assert_eq!(ratios(&found, &absent)[0].0, Outcome::Refused, "without a feed the encoder decides");
+    }
+
+    /// Emulated drives have a gear of 1: a profile that writes another one is told of its own mistake.
+    #[test]
+    fn a_ratio_that_the_profile_itself_makes_wrong_is_refused() {
+        let all = of_profile(
+            "[[drive_profile]]\nunits = { gear_ratio = 2.5, lead_m = 0.025 }\n\
+             objects.'6091h:01' = { value = 26, bytes = 4 }",
+        );
+        let gear: Vec<_> = all.iter().filter(|(object, ..)| object == "6091h:01h").collect();
+        assert!(matches!(gear[..], [(_, Outcome::Refused, _)]), "{all:?}");
     }
 }

@@ -15,6 +15,8 @@ pub struct Heard {
     pub boot_ups: u32,
     /// Its emergencies, the oldest first.
     pub emergencies: Vec<Emergency>,
+    /// When it began to transmit process data last, ns.
+    pub(super) process_data_ns: Option<u64>,
     /// An answer of its SDO server that nobody has taken.
     pub(super) answer: Option<SdoResponse>,
 }

@@ -6,6 +6,7 @@ use masseter_can::cia402::{Controlword, StatusBit};
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::config::{AxisScale, DriveProfile, HomingConfig, ObjectKey, ObjectRule, Scenario};
 
+use super::borrowed::Loan;
 use super::caution::{Caution, Operator, Wish};
 use super::line::Line;
 use super::motion_error::{MotionError, StopCause};
@@ -126,14 +127,12 @@ fn configure(
     scale: &AxisScale,
 ) -> Result<(), MotionError> {
     let homing = &profile.homing;
-    for (index, subindex, value, bytes) in [
-        (0x6098, 0, homing.method as u32, 1),
-        (0x6099, 1, scale.velocity(homing.speed_m_s), 4),
-        (0x6099, 2, scale.velocity(homing.zero_speed_m_s), 4),
-        (0x609A, 0, scale.acceleration(homing.acceleration_m_s2), 4),
-    ] {
-        mover.borrow(index, subindex, value, bytes)?;
-    }
+    mover.borrow(&[
+        Loan::new(0x6098, 0, homing.method as u32, 1),
+        Loan::new(0x6099, 1, scale.velocity(homing.speed_m_s), 4),
+        Loan::new(0x6099, 2, scale.velocity(homing.zero_speed_m_s), 4),
+        Loan::new(0x609A, 0, scale.acceleration(homing.acceleration_m_s2), 4),
+    ])?;
     let ObjectKey(object) = homing.home_object;
     if profile.object(homing.home_object).rule != ObjectRule::Absent {
         let value = homing.home_increments(scale.increment_m) as u32;

@@ -1,7 +1,7 @@
 //! Jog: one axis goes a short way and back, while the other five stay without power.
 //!
-//! Everything goes by SDO in pre-operational, in profile position (mode 1). The time from SYNC to a drive's answer cannot be
-//! measured here: there is no SYNC, and an answer to SDO is another task of the drive.
+//! Everything goes by SDO in pre-operational, in profile position (mode 1). After that, the drive answers some SYNCs without
+//! power, for the time that its answers take.
 
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::Scenario;
@@ -11,6 +11,7 @@ use super::line::Line;
 use super::motion_error::MotionError;
 use super::mover::{Mover, POSITIONING};
 use super::step_response::StepResponse;
+use super::sync_answer;
 use super::watch::Sample;
 
 /// The longest way of a jog, m.
@@ -42,6 +43,8 @@ pub struct JogReport {
     pub ways: [StepResponse; 2],
     /// How far the axis moved while the brake closed, m.
     pub drop_m: f64,
+    /// The longest time from SYNC to process data, ns; none for a drive that left a SYNC without an answer.
+    pub sync_answer_ns: Option<u64>,
 }
 
 impl JogOrder {
@@ -83,7 +86,8 @@ pub fn jog(
     }
     let mut mover = Mover::prepare(line, scenario, axis, caution)?;
     let done = go(&mut mover, order, operator);
-    mover.finish(done)
+    let report = mover.finish(done)?;
+    Ok(JogReport { sync_answer_ns: sync_answer::longest_ns(line, axis)?, ..report })
 }
 
 fn go(
@@ -110,6 +114,7 @@ fn go(
         noise_m,
         ways: [response(&there, [began_m, far_m]), response(&back, [far_m, end_m])],
         drop_m,
+        sync_answer_ns: None,
     })
 }
 

@@ -7,15 +7,17 @@ use std::io::{self, Write};
 
 use masseter_can::canopen::{
     AbortCode, Cob, Expedited, Heartbeat, Nmt, NmtCommand, NmtState, NmtTarget, NodeId, ObjectAddress,
-    SdoRequest, SdoResponse,
+    SdoRequest, SdoResponse, sync,
 };
 use masseter_can::cia402::Controlword;
-use masseter_can::{Frame, SendError, candump};
+use masseter_can::wire::{Bitrate, INTERFRAME_BITS, frame_bits};
+use masseter_can::{Frame, SendError, Tapped, TappedFrame, candump};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::{MASTER_NODE, Scenario};
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
 
 use super::heard::{Heard, Strangers};
+use super::ledger::{Ledger, OldValue};
 use super::wires::Wires;
 use crate::error::PlantError;
 use crate::link::layout::{drive_ports, node_ids};
@@ -29,6 +31,8 @@ const POWERED_TIMEOUT_NS: u64 = 100 * MILLISECOND_NS;
 const ATTEMPTS: u32 = 3;
 /// Time that a node has to answer a scan, ns.
 const SCAN_NS: u64 = 10 * MILLISECOND_NS;
+/// Longest time for which an answer to SYNC is waited for, ns.
+const SYNC_NS: u64 = 20 * MILLISECOND_NS;
 /// Bytes of the longest value that is read: no text of an identity is longer.
 const LONGEST_VALUE: usize = 256;
 
@@ -78,6 +82,14 @@ pub enum LineError {
     /// The emulated mechanism failed, or the memory of emulated drives cannot be written.
     #[error(transparent)]
     Emulation(#[from] PlantError),
+    /// Old values could not be kept.
+    #[error("old values of {} cannot be kept, so that no further value is written: {source}; free the disk", AXIS_NAMES[*axis])]
+    Ledger {
+        /// The axis.
+        axis: usize,
+        /// The reason.
+        source: io::Error,
+    },
     /// The log could not be written.
     #[error("the log of the bus cannot be written: {0}")]
     Log(#[from] io::Error),
@@ -109,9 +121,14 @@ pub struct Line {
     heard: [Heard; AXES],
     strangers: Strangers,
     beat: Option<Beat>,
+    /// When the last SYNC of this line was on its bus, ns.
+    sync_ns: Option<u64>,
+    bitrate: Bitrate,
     /// The axis whose drive this line has switched on.
     switched_on: Option<usize>,
     log: Box<dyn Write + Send>,
+    /// Where old values are kept; none where nobody needs them after a kill.
+    ledger: Option<Box<dyn Ledger>>,
 }
 
 impl Debug for Line {
@@ -140,9 +157,23 @@ impl Line {
             heard: Default::default(),
             strangers: Strangers::default(),
             beat: None,
+            sync_ns: None,
+            bitrate: Bitrate::new(can.bitrate_bps)?,
             switched_on: None,
             log,
+            ledger: None,
         })
+    }
+
+    /// Keeps old values of drives in this ledger from now on.
+    pub fn keep_old_values_in(&mut self, ledger: Box<dyn Ledger>) {
+        self.ledger = Some(ledger);
+    }
+
+    /// Keeps the old values of a drive.
+    pub(super) fn keep_old_values(&mut self, axis: usize, values: &[OldValue]) -> Result<(), LineError> {
+        let Some(ledger) = &mut self.ledger else { return Ok(()) };
+        ledger.keep(axis, values).map_err(|source| LineError::Ledger { axis, source })
     }
 
     /// The present time, ns: simulated from 0, or the machine's.
@@ -297,6 +328,19 @@ impl Line {
         Ok(())
     }
 
+    /// Sends SYNC to the bus of an axis. Returns the time from its end until the drive began to transmit its process data, ns;
+    /// none where nothing came.
+    pub(super) fn sync_answer_ns(&mut self, axis: usize) -> Result<Option<u64>, LineError> {
+        let (bus, _) = self.addresses[axis];
+        (self.sync_ns, self.heard[axis].process_data_ns) = (None, None);
+        self.send(bus, sync::frame())?;
+        self.listen_until(SYNC_NS, |line| line.heard[axis].process_data_ns.is_some())?;
+        Ok(self.heard[axis]
+            .process_data_ns
+            .zip(self.sync_ns)
+            .map(|(begin_ns, sync_ns)| begin_ns.saturating_sub(sync_ns)))
+    }
+
     /// Everything of the log is on its way to its file.
     ///
     /// # Errors
@@ -359,12 +403,31 @@ impl Line {
                 let mut text = String::new();
                 candump::write(&mut text, &self.names[bus], &tapped).expect("a text takes everything");
                 writeln!(self.log, "{text}")?;
+                if let Tapped::Frame(tapped) = tapped {
+                    self.note_time(bus, &tapped);
+                }
             }
             while let Some(received) = self.wires.receive(bus) {
                 self.take(bus, &received.frame);
             }
         }
         Ok(())
+    }
+
+    /// Notes the times of SYNC and of process data.
+    fn note_time(&mut self, bus: usize, tapped: &TappedFrame) {
+        match Cob::try_from(tapped.frame.id()) {
+            Ok(Cob::Sync) => self.sync_ns = Some(tapped.time_ns),
+            Ok(Cob::Tpdo1(node)) => {
+                let bits = frame_bits(&tapped.frame) - INTERFRAME_BITS;
+                let begin_ns = tapped.time_ns.saturating_sub(self.bitrate.bits_to_ns(bits));
+                let axis = self.addresses.iter().position(|at| *at == (bus, node));
+                if let Some(axis) = axis {
+                    self.heard[axis].process_data_ns = Some(begin_ns);
+                }
+            }
+            _ => {}
+        }
     }
 
     fn send_heartbeat(&mut self) -> Result<(), LineError> {

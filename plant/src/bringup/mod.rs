@@ -10,6 +10,7 @@ mod deviation;
 mod heard;
 mod home;
 mod jog;
+mod ledger;
 mod line;
 mod motion_error;
 mod mover;
@@ -20,6 +21,7 @@ mod step_response;
 mod store;
 mod survey;
 mod switching;
+mod sync_answer;
 #[cfg(test)]
 mod test_log;
 #[cfg(test)]
@@ -29,11 +31,13 @@ mod wires;
 mod wording;
 mod write;
 
+pub use borrowed::give_back;
 pub use caution::{Caution, Operator, Wish};
 pub use deviation::{Deviation, Outcome, deviations};
 pub use heard::{Heard, Strangers};
 pub use home::{HomeReport, home};
 pub use jog::{JogOrder, JogReport, jog};
+pub use ledger::{Ledger, OldValue};
 pub use line::{Line, LineError, SdoReason};
 pub use motion_error::{MotionError, StopCause};
 pub use power::{PowerError, prove_no_power, take_over};

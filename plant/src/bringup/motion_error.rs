@@ -80,6 +80,15 @@ pub enum StopCause {
         /// What was allowed, s.
         limit_s: f64,
     },
+    /// It did not end in time, and the drive reports a limit.
+    #[error(
+        "not done within {limit_s:.1} s, and the drive reports a limit (statusword bit 11); check what 607Dh counts from: \
+         drive_profile.homing.limits_from_home or home_sign"
+    )]
+    Limited {
+        /// What was allowed, s.
+        limit_s: f64,
+    },
     /// The drive shows the homing before.
     #[error(
         "homing did not begin: statusword bit 12 stays from the homing before; check mode 6 and the start bit"

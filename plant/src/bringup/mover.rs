@@ -3,15 +3,16 @@
 use masseter_can::canopen::{NmtCommand, ObjectAddress};
 use masseter_can::cia402::{Controlword, StatusBit};
 use masseter_shared::clock::SECOND_NS;
-use masseter_shared::config::{AxisScale, DriveProfile, MASTER_NODE, Scenario};
+use masseter_shared::config::{AxisScale, DriveProfile, MASTER_NODE, ObjectKey, ObjectRule, Scenario};
 use masseter_shared::geometry::AXES;
 
-use super::borrowed::Borrowed;
+use super::borrowed::{Borrowed, Loan};
 use super::caution::{Caution, Operator, Wish};
 use super::line::{Line, LineError};
 use super::motion_error::{MotionError, StopCause};
 use super::switching::{self, seconds};
 use super::watch::{Bounds, Sample, Watch, read_position};
+use crate::wanted::OFFSETS;
 
 /// Profile position and homing (6060h).
 pub(super) const POSITIONING: i8 = 1;
@@ -78,26 +79,43 @@ impl<'a> Mover<'a> {
         let consumed = u32::from(MASTER_NODE.get()) << 16 | u32::from(can.heartbeat_consumer_ms);
         let acceleration = scale.acceleration(acceleration_m_s2);
         let permille = (force_n / scale.permille_n.abs()).round() as u32;
-        for (index, subindex, value, bytes) in [
-            (0x1016, 1, consumed, 4),
-            (0x6007, 0, 3, 2),
-            (0x605A, 0, 2, 2),
-            (0x6065, 0, scale.window(self.watch.bounds().window_m), 4),
-            (0x6072, 0, permille, 2),
-            (0x6081, 0, scale.velocity(speed_m_s), 4),
-            (0x6083, 0, acceleration, 4),
-            (0x6084, 0, acceleration, 4),
-        ] {
-            self.borrow(index, subindex, value, bytes)?;
-        }
+        // A following error is a fault at once, and a fault closes the brake at once: the feedback may be what is wrong, and
+        // then a ramp only drives the axis further. Not every drive takes these values.
+        let at_once = [0x6066, 0x605E].map(|index| Loan { may_lack: true, ..Loan::new(index, 0, 0, 2) });
+        let window = scale.window(self.watch.bounds().window_m);
+        let reduced = [
+            Loan::new(0x1016, 1, consumed, 4),
+            Loan::new(0x6007, 0, 3, 2),
+            Loan::new(0x605A, 0, 2, 2),
+            Loan::new(0x6065, 0, window, 4),
+            Loan::new(0x6072, 0, permille, 2),
+            Loan::new(0x6081, 0, scale.velocity(speed_m_s), 4),
+            Loan::new(0x6083, 0, acceleration, 4),
+            Loan::new(0x6084, 0, acceleration, 4),
+        ];
+        self.borrow(&[&reduced[..], &at_once].concat())?;
         // A profile may keep the step from writing an object: then the drive must be as careful by itself.
         self.require(0x1016, 1, |found| found == consumed)?;
         self.require(0x6072, 0, |found| found <= permille)?;
         self.require(0x6081, 0, |found| found <= scale.velocity(speed_m_s))?;
-        // A following error is a fault at once, and a fault closes the brake at once: the feedback may be what is wrong, and
-        // then a ramp only drives the axis further. Not every drive takes these values.
-        for index in [0x6066, 0x605E] {
-            self.borrowed.set_if_taken(self.line, ObjectAddress::new(index, 0), 0, 2)?;
+        self.clear_offsets()?;
+        Ok(())
+    }
+
+    /// Offsets of the cyclic modes (60B0h to 60B2h) are 0 from now on: a drive may keep the last one of its process data, and some
+    /// drives add it in every mode.
+    fn clear_offsets(&mut self) -> Result<(), LineError> {
+        for (index, bytes) in OFFSETS {
+            let object = ObjectAddress::new(index, 0);
+            if self.profile().object(ObjectKey(object)).rule == ObjectRule::Absent {
+                continue;
+            }
+            match self.line.read_number(self.axis, object) {
+                Ok(0) => {}
+                Ok(_) => self.line.write(self.axis, object, 0, bytes)?,
+                Err(error) if error.abort_code().is_some() => {}
+                Err(error) => return Err(error),
+            }
         }
         Ok(())
     }
@@ -114,15 +132,9 @@ impl<'a> Mover<'a> {
         if is_good(found) { Ok(()) } else { Err(MotionError::Careless { axis, object, found }) }
     }
 
-    /// Changes an object until the end.
-    pub(super) fn borrow(
-        &mut self,
-        index: u16,
-        subindex: u8,
-        value: u32,
-        bytes: usize,
-    ) -> Result<(), LineError> {
-        self.borrowed.set(self.line, ObjectAddress::new(index, subindex), value, bytes)
+    /// Changes objects until the end.
+    pub(super) fn borrow(&mut self, loans: &[Loan]) -> Result<(), LineError> {
+        self.borrowed.set_all(self.line, loans)
     }
 
     /// Sets the software limits (607Dh) until the end, in increments of 6064h.
@@ -187,7 +199,7 @@ impl<'a> Mover<'a> {
 
     /// Switches on in a mode, with the place of the axis as its target, and waits until brake and axis are ready.
     pub(super) fn switch_on(&mut self, mode: i8, operator: &mut Operator<'_>) -> Result<(), MotionError> {
-        self.borrow(0x6060, 0, mode as u32, 1)?;
+        self.borrow(&[Loan::new(0x6060, 0, mode as u32, 1)])?;
         switching::wait_for_mode(self.line, self.axis, mode)?;
         let here = self.line.read_number(self.axis, ObjectAddress::new(0x6064, 0))?;
         self.line.write(self.axis, ObjectAddress::new(0x607A, 0), here, 4)?;
@@ -274,7 +286,12 @@ impl<'a> Mover<'a> {
                 return Ok(seen);
             }
             if halted_ns.is_none() && sample.at_ns >= until_ns {
-                return self.stopped(StopCause::TimedOut { limit_s });
+                let is_limited = sample.status.has(StatusBit::InternalLimit);
+                return self.stopped(if is_limited {
+                    StopCause::Limited { limit_s }
+                } else {
+                    StopCause::TimedOut { limit_s }
+                });
             }
         }
     }

@@ -8,7 +8,7 @@ use masseter_can::cia402::Controlword;
 use masseter_shared::config::{AccelerationUnit, ObjectRule};
 use masseter_shared::messages::codes::{BootPhase, Cause};
 
-use crate::wanted::{OTHER_PDOS, WantedDrive, WantedIdentity, WantedObject};
+use crate::wanted::{OTHER_PDOS, WantedDrive, WantedIdentity, WantedObject, WantedPdo};
 
 /// 6041h.
 const STATUSWORD: ObjectAddress = ObjectAddress::new(0x6041, 0);
@@ -59,7 +59,7 @@ pub(super) fn plan(wanted: &WantedDrive, resets_faults: bool) -> Vec<Step> {
     let mut steps = vec![Step::Enter(BootPhase::Identifying)];
     steps.extend(wanted.identity.iter().map(|&wanted| compare(wanted, Cause::WrongIdentity)));
     steps.push(Step::Enter(BootPhase::CheckingPdos));
-    let pdos = wanted.pdos.iter().flat_map(|pdo| pdo.entries());
+    let pdos = wanted.pdos.iter().flat_map(WantedPdo::entries);
     steps.extend(pdos.map(|entry| compare(entry, Cause::WrongPdo)));
     steps.push(Step::Enter(BootPhase::Configuring));
     // Another master may have left the drive enabled, and a reset of the communication does not change that. The drive

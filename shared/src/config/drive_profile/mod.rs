@@ -1,7 +1,7 @@
 //! What the master expects of a kind of drive: `[[drive_profile]]`.
 //!
-//! A profile is data: identity, units, objects, storing, brake and homing. Nothing here talks to a drive, and an emulated drive
-//! takes nothing but its identity from its profile.
+//! A profile is data: identity, units, objects, storing, brake and homing. Nothing here talks to a drive. What an
+//! emulated drive takes from its profile is in the plant.
 
 mod dcf;
 mod homing;

@@ -1,0 +1,212 @@
+//! Old values that a jog or a homing owes to a drive: a file for each axis, which only a killed step leaves.
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, anyhow, ensure};
+use masseter_plant::bringup::{Ledger, Line, OldValue, give_back, object_name, value_text};
+use masseter_shared::clock::MILLISECOND_NS;
+use masseter_shared::config::{ObjectKey, Scenario};
+use masseter_shared::geometry::{AXES, AXIS_NAMES};
+use masseter_terminal::{Failure, status};
+use serde::{Deserialize, Serialize};
+
+use super::robot_line::{failed, serial};
+use super::writing::prove_off;
+
+/// How long the line listens for other masters before the drives get their old values, ns.
+const LISTEN_NS: u64 = 500 * MILLISECOND_NS;
+
+/// What one drive is owed.
+#[derive(Debug, Serialize, Deserialize)]
+struct Owed {
+    /// Its serial number; none where the drive has none.
+    serial: Option<u32>,
+    /// The oldest change first.
+    values: Vec<OldValue>,
+}
+
+/// A file whose values no step has written.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {object} with {bytes} bytes is no old value of a step; the file is damaged: remove it, and configure again", .path.display())]
+struct Damaged {
+    path: PathBuf,
+    object: ObjectKey,
+    bytes: usize,
+}
+
+impl Owed {
+    /// What the drive of an axis is owed; another drive is owed nothing.
+    fn read(folder: &Path, line: &mut Line, axis: usize) -> anyhow::Result<Self> {
+        let path = file(folder, axis);
+        let text = fs::read_to_string(&path)?;
+        let owed: Self = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
+        let is_strange = |old: &&OldValue| !matches!(old.bytes, 1 | 2 | 4) || old.object.0.index == 0x6040;
+        if let Some(&OldValue { object, bytes, .. }) = owed.values.iter().find(is_strange) {
+            return Err(Damaged { path, object, bytes }.into());
+        }
+        ensure!(
+            serial(line, axis)? == owed.serial,
+            "{}: {} has the old values of a drive with another serial number (1018h:04); put that drive back, or remove \
+             the file",
+            AXIS_NAMES[axis],
+            path.display()
+        );
+        Ok(owed)
+    }
+
+    /// Writes the values into a drive without power, and says so.
+    fn return_to(self, folder: &Path, line: &mut Line, axis: usize) -> anyhow::Result<()> {
+        let (Self { serial, values }, name) = (self, AXIS_NAMES[axis]);
+        line.keep_old_values_in(Box::new(Files::new(folder, std::array::from_fn(|_| serial))));
+        let refused = give_back(line, axis, &values)?;
+        status!("{name}: a step was killed; the drive has its old values again:");
+        for old in values {
+            let OldValue { object: ObjectKey(object), value, .. } = old;
+            let taken =
+                if refused.contains(&old) { "; warning: the drive refuses it, look at it" } else { "" };
+            status!("  {object} {}: {}{taken}", object_name(object), value_text(object, value));
+        }
+        Ok(())
+    }
+}
+
+/// The files in the folder of the bring-up.
+#[derive(Debug)]
+pub(super) struct Files {
+    folder: PathBuf,
+    serials: [Option<u32>; AXES],
+}
+
+impl Files {
+    /// Files for drives with these serial numbers.
+    pub(super) fn new(folder: &Path, serials: [Option<u32>; AXES]) -> Self {
+        Self { folder: folder.to_owned(), serials }
+    }
+}
+
+impl Ledger for Files {
+    /// Completely or not at all, also after a power cut.
+    fn keep(&mut self, axis: usize, values: &[OldValue]) -> io::Result<()> {
+        let path = file(&self.folder, axis);
+        if values.is_empty() {
+            if path.exists() {
+                fs::remove_file(path)?;
+                File::open(&self.folder)?.sync_all()?;
+            }
+            return Ok(());
+        }
+        let owed = Owed { serial: self.serials[axis], values: values.to_vec() };
+        let unfinished = path.with_extension("part");
+        let mut part = File::create(&unfinished)?;
+        part.write_all(serde_json::to_string_pretty(&owed)?.as_bytes())?;
+        part.sync_all()?;
+        fs::rename(unfinished, path)?;
+        File::open(&self.folder)?.sync_all()
+    }
+}
+
+fn file(folder: &Path, axis: usize) -> PathBuf {
+    folder.join(format!("borrowed-{}.json", AXIS_NAMES[axis]))
+}
+
+/// The axes whose drives a killed step left with reduced values.
+pub(super) fn owed_axes(folder: &Path) -> Vec<usize> {
+    (0..AXES).filter(|&axis| file(folder, axis).exists()).collect()
+}
+
+/// What to do about such a drive.
+pub(super) fn advice(folder: &Path, axis: usize) -> String {
+    format!(
+        "{}: a killed step left reduced values in the drive ({}); the next jog, home, check-pose, configure or restore \
+         writes the old ones back",
+        AXIS_NAMES[axis],
+        file(folder, axis).display()
+    )
+}
+
+/// Writes old values back that a killed step left, and says so. Without such values nothing is sent.
+///
+/// # Errors
+/// When a drive is another one, has power, or does not take a value.
+pub(super) fn settle(
+    folder: &Path,
+    scenario: &Scenario,
+    line: &mut Line,
+    may_stop: bool,
+) -> Result<(), Failure> {
+    let axes = owed_axes(folder);
+    if axes.is_empty() {
+        return Ok(());
+    }
+    line.listen(LISTEN_NS).map_err(failed)?;
+    if !line.strangers().masters.is_empty() {
+        return Err(failed(anyhow!("another master may control the drives; end that master first")));
+    }
+    for axis in axes {
+        let owed = Owed::read(folder, line, axis).map_err(failed)?;
+        prove_off(line, scenario, axis, may_stop)?;
+        owed.return_to(folder, line, axis).map_err(failed)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_can::cia402::Controlword;
+
+    use super::*;
+
+    const L1: usize = 3;
+
+    /// Emulated drives of a scenario, and a file with that old value of l1.
+    fn robot(text: &str, old: &str) -> (tempfile::TempDir, Scenario, Line) {
+        let folder = tempfile::tempdir().unwrap();
+        let scenario = Scenario::parse(Path::new("robot.toml"), text).unwrap();
+        let mut line = Line::open(&scenario, Box::new(io::sink())).unwrap();
+        line.listen(LISTEN_NS).unwrap();
+        let serial = serial(&mut line, L1).map_or("null".to_owned(), |serial| serial.unwrap().to_string());
+        let owed = format!(r#"{{ "serial": {serial}, "values": [{old}] }}"#);
+        fs::write(file(folder.path(), L1), owed).unwrap();
+        (folder, scenario, line)
+    }
+
+    const VELOCITY: &str = r#"{ "object": "6081h", "value": 77, "bytes": 4 }"#;
+
+    #[test]
+    fn a_damaged_file_is_refused_and_nothing_is_written() {
+        for old in [
+            r#"{ "object": "6081h", "value": 77, "bytes": 3 }"#,
+            r#"{ "object": "6081h", "value": 77, "bytes": 40 }"#,
+            r#"{ "object": "6040h", "value": 15, "bytes": 2 }"#,
+        ] {
+            let (folder, scenario, mut line) = robot("", old);
+            let refusal = settle(folder.path(), &scenario, &mut line, false).unwrap_err().error.to_string();
+            assert!(refusal.contains("the file is damaged: remove it"), "{refusal}");
+            assert_eq!(owed_axes(folder.path()), [L1]);
+        }
+    }
+
+    #[test]
+    fn a_silent_drive_is_no_other_drive() {
+        let cable = "[[faults]]\nkind = 'disconnect'\nbus = 1\nnode = 4\nfrom_s = 0.0";
+        let (folder, scenario, mut line) = robot(cable, VELOCITY);
+        let refusal = settle(folder.path(), &scenario, &mut line, false).unwrap_err().error.to_string();
+        assert!(refusal.starts_with("l1: object 1018h:04h: no answer; check its power"), "{refusal}");
+    }
+
+    #[test]
+    fn a_drive_with_power_gets_its_old_values_once_it_may_be_stopped() {
+        let (folder, scenario, mut line) = robot("", VELOCITY);
+        for word in [Controlword::SHUTDOWN, Controlword::SWITCH_ON] {
+            line.control(L1, word).unwrap();
+        }
+        line.listen(LISTEN_NS).unwrap();
+        assert!(settle(folder.path(), &scenario, &mut line, false).is_err());
+        settle(folder.path(), &scenario, &mut line, true).unwrap();
+        let velocity = masseter_can::canopen::ObjectAddress::new(0x6081, 0);
+        assert_eq!(line.read_number(L1, velocity).unwrap(), 77);
+        assert!(owed_axes(folder.path()).is_empty());
+    }
+}
