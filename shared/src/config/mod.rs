@@ -19,6 +19,7 @@ mod expect;
 mod faults;
 mod food;
 mod jaw;
+mod kinds;
 mod limits;
 mod merge;
 mod motion;
