@@ -3,7 +3,7 @@
 //! | module | holds | depends on |
 //! | --- | --- | --- |
 //! | `injection` | times and events of faults and stimuli, faults of commands | |
-//! | `mechanism` | dynamics, friction, food, disturbances, poses at rest | `injection` |
+//! | `mechanism` | dynamics, friction, contact of teeth and food, disturbances, poses at rest | `injection` |
 //! | `link` | traits between master and wires, real interfaces, layout of the buses | `mechanism` (its errors), `injection` |
 //! | `drive` | an emulated drive: node (CiA 301), axis (CiA 402), object dictionary | `link` (layout) |
 //! | [`wanted`] | the objects of a drive as the rig needs them | |
@@ -34,4 +34,4 @@ pub mod process;
 pub mod wanted;
 
 pub use error::PlantError;
-pub use mechanism::DynamicsError;
+pub use mechanism::{ContactError, DynamicsError};

@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define MASSETER_LAYOUT_VERSION 11u
+#define MASSETER_LAYOUT_VERSION 12u
 /* masseter_event.axis when no axis is concerned. */
 #define MASSETER_NO_AXIS 4294967295u
 /* masseter_reading.drive_state of a drive not heard of yet, or lost. */
@@ -193,6 +193,8 @@ enum masseter_cause {
     MASSETER_CAUSE_NOT_ENABLED = 59,
     /* The jaw is too far from the first pose of the motion (m). */
     MASSETER_CAUSE_START_TOO_FAR = 60,
+    /* Food between the teeth broke (force before, N; the limit is its strength). The object is the first of its teeth. */
+    MASSETER_CAUSE_FOOD_BROKE = 61,
 };
 
 enum masseter_no_pose {
@@ -213,7 +215,7 @@ enum masseter_no_pose {
 };
 
 #define MASSETER_READING_TOPIC "reading"
-#define MASSETER_READING_TYPE_NAME "masseter/Reading/3b19bd46b3ecd631"
+#define MASSETER_READING_TYPE_NAME "masseter/Reading/8ff0bab1a651c782"
 
 /* Positions, forces and states of the drives, once a cycle. */
 typedef struct masseter_reading {
@@ -285,7 +287,7 @@ static_assert(offsetof(masseter_reading, fresh_axes) == 248, "offset of fresh_ax
 static_assert(offsetof(masseter_reading, master_fault) == 252, "offset of master_fault");
 
 #define MASSETER_COMMAND_TOPIC "command"
-#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/1f1a892af93718b5"
+#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/42c5abb9c9070938"
 
 /* Targets and request for the drives, once a cycle. */
 typedef struct masseter_command {
@@ -318,7 +320,7 @@ static_assert(offsetof(masseter_command, request) == 88, "offset of request");
 static_assert(offsetof(masseter_command, controller_state) == 92, "offset of controller_state");
 
 #define MASSETER_STATE_TOPIC "state"
-#define MASSETER_STATE_TYPE_NAME "masseter/State/4ef6b0906fbe819d"
+#define MASSETER_STATE_TYPE_NAME "masseter/State/9c120622196cc126"
 
 /* The controller's state and its estimate, once a cycle. */
 typedef struct masseter_state {
@@ -405,7 +407,7 @@ static_assert(offsetof(masseter_state, iterations) == 288, "offset of iterations
 static_assert(offsetof(masseter_state, controller_state) == 292, "offset of controller_state");
 
 #define MASSETER_EVENT_TOPIC "event"
-#define MASSETER_EVENT_TYPE_NAME "masseter/Event/c2e1365b706a3502"
+#define MASSETER_EVENT_TYPE_NAME "masseter/Event/c974f125f5a2d951"
 
 /* A single occurrence: a change of state, a fault, an alarm. */
 typedef struct masseter_event {
@@ -462,7 +464,7 @@ static_assert(offsetof(masseter_event, value) == 72, "offset of value");
 static_assert(offsetof(masseter_event, limit) == 80, "offset of limit");
 
 #define MASSETER_TRUTH_TOPIC "truth"
-#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/c07707f6f3b43950"
+#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/1d5ba1c40fbbab47"
 
 /* The true state of the mechanism, once a cycle; the controller never reads it. */
 typedef struct masseter_truth {
@@ -486,7 +488,7 @@ typedef struct masseter_truth {
     double joint_m_s[6];
     /* Actuator forces, N. */
     double force_n[6];
-    /* Bite force on the platform, N. */
+    /* Vertical force of food and upper teeth on the lower jaw, positive downwards, N. */
     double bite_force_n;
 } masseter_truth;
 
@@ -502,5 +504,38 @@ static_assert(offsetof(masseter_truth, joint_m) == 96, "offset of joint_m");
 static_assert(offsetof(masseter_truth, joint_m_s) == 144, "offset of joint_m_s");
 static_assert(offsetof(masseter_truth, force_n) == 192, "offset of force_n");
 static_assert(offsetof(masseter_truth, bite_force_n) == 240, "offset of bite_force_n");
+
+#define MASSETER_CONTACT_TOPIC "contact"
+#define MASSETER_CONTACT_TYPE_NAME "masseter/Contact/4b88af72ab2dc3ef"
+
+/* The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads it. */
+typedef struct masseter_contact {
+    /* Number of this message on its topic, from 1. */
+    uint64_t seq;
+    /* When it was published, ns. */
+    uint64_t published_ns;
+    /* Version of the sender's layouts. */
+    uint64_t version;
+    /* Cycle of the plant, from 1. */
+    uint64_t cycle;
+    /* End of the time that it describes: the instant of the reading's sample, ns. */
+    uint64_t sampled_ns;
+    /* FDI numbers of the lower teeth, 0 where there are no more. */
+    uint32_t tooth[16];
+    /* Force of antagonist and food on each lower tooth, x y z in base axes, mean over the cycle, N. */
+    double force_n[48];
+    /* Where the force acts on the tooth, x y z in the platform frame, m. */
+    double place_m[48];
+} masseter_contact;
+
+static_assert(sizeof(masseter_contact) == 872, "size of masseter_contact");
+static_assert(offsetof(masseter_contact, seq) == 0, "offset of seq");
+static_assert(offsetof(masseter_contact, published_ns) == 8, "offset of published_ns");
+static_assert(offsetof(masseter_contact, version) == 16, "offset of version");
+static_assert(offsetof(masseter_contact, cycle) == 24, "offset of cycle");
+static_assert(offsetof(masseter_contact, sampled_ns) == 32, "offset of sampled_ns");
+static_assert(offsetof(masseter_contact, tooth) == 40, "offset of tooth");
+static_assert(offsetof(masseter_contact, force_n) == 104, "offset of force_n");
+static_assert(offsetof(masseter_contact, place_m) == 488, "offset of place_m");
 
 #endif

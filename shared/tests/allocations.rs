@@ -7,7 +7,7 @@ use std::hint::black_box;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use masseter_shared::clock;
-use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
+use masseter_shared::messages::{Command, Contact, Event, FrameTap, Message, Reading, State, Truth};
 use masseter_shared::realtime::Cycle;
 use masseter_shared::transport::{BatchPublisher, BatchSubscriber, Node, ScratchDomain};
 
@@ -104,6 +104,7 @@ fn waiting_and_receiving_allocate_nothing_and_sending_one_small_counter() {
     check_topic::<Reading>(&node);
     check_topic::<State>(&node);
     check_topic::<Truth>(&node);
+    check_topic::<Contact>(&node);
     check_batches(&node);
     check_topic::<Event>(&node);
 

@@ -7,7 +7,7 @@ use masseter_can::{CanId, ErrorState, Frame};
 use masseter_shared::config::{FaultConfig, FaultKindConfig, FaultLayer, Scenario};
 use masseter_shared::geometry::{AXES, Mechanism};
 use masseter_shared::injection::{Injected, Injection};
-use masseter_shared::messages::{Truth, pose_fields};
+use masseter_shared::messages::{Contact, Truth, pose_fields};
 use nalgebra::Translation3;
 
 use super::agenda::{Agenda, Change, Effect};
@@ -16,8 +16,8 @@ use super::memory::MemoryFile;
 use crate::checks::check_quantities;
 use crate::drive::{DriveNode, DriveSettings, Encoder, Shaft};
 use crate::error::PlantError;
-use crate::injection::{Occurrence, known_windows};
-use crate::mechanism::{Dynamics, DynamicsError, Food, MechanismState, closed_mouth, level};
+use crate::injection::{FoodBreak, Occurrence, known_windows};
+use crate::mechanism::{Dynamics, DynamicsError, Food, MechanismState, Occlusion, closed_mouth, level};
 
 /// The six drives and the mechanism that they move.
 ///
@@ -55,6 +55,10 @@ pub struct Emulation {
     encoder_faults: [EncoderFaults; AXES],
     /// The scenario's own food.
     food: Option<Food>,
+    /// With its time, ns.
+    food_break: Option<(u64, FoodBreak)>,
+    /// The forces between the jaws in the cycle before the sample; none where the jaws cannot touch.
+    contact: Option<Contact>,
     /// None for drives that forget everything at the end.
     memory: Option<MemoryFile>,
     /// The incisal point in the platform frame, m.
@@ -91,16 +95,17 @@ impl Emulation {
             }
         }
         let mechanism = Mechanism::new(&scenario.mechanism)?;
-        let food = scenario.food.map(|config| Food::new(config, &closed_mouth(&mechanism, &scenario.jaw)));
+        let food = scenario.food.as_ref().map(|config| Food::new(config, &scenario.arch()));
+        let occlusion = Occlusion::new(scenario, &closed_mouth(&mechanism, &scenario.jaw));
         let start = Translation3::from(scenario.dynamics.initial_offset_m)
             * level(&mechanism, scenario.dynamics.initial_leg_m);
-        let mut agenda = Agenda::new(scenario, &mechanism)?;
+        let mut agenda = Agenda::new(scenario)?;
         let injection =
             Injection::new(scenario, now_ns).map_err(|error| PlantError::Scenario(error.to_string()))?;
         for (injected, window_ns) in known_windows(scenario, &injection) {
             agenda.set_window(injected, &window_ns);
         }
-        let mut dynamics = Dynamics::new(mechanism, scenario.dynamics, start, food.clone())?;
+        let mut dynamics = Dynamics::new(mechanism, scenario.dynamics, start, occlusion)?;
         if !agenda.is_empty() {
             dynamics.prepare_injection(scenario.jaw.reference_point_m);
         }
@@ -129,6 +134,8 @@ impl Emulation {
             agenda,
             encoder_faults: encoder_faults(scenario),
             food,
+            food_break: None,
+            contact: scenario.has_contact().then(Contact::default),
             memory,
             incisal_m: scenario.jaw.reference_point_m,
         })
@@ -171,6 +178,16 @@ impl Emulation {
             bite_force_n,
             ..Truth::default()
         }
+    }
+
+    /// The forces between the jaws, mean over the time between the last two SYNCs; none where the jaws cannot touch.
+    pub fn contact(&self) -> Option<Contact> {
+        self.contact
+    }
+
+    /// The next break of a piece of food, with its time, ns.
+    pub(crate) fn next_food_break(&mut self) -> Option<(u64, FoodBreak)> {
+        self.food_break.take()
     }
 
     /// When the drives' servo loops are due next, ns.
@@ -225,6 +242,9 @@ impl Emulation {
             self.dynamics.push(&self.force_n)?;
         } else {
             self.push_injected(now_ns)?;
+        }
+        if let Some(broke) = self.dynamics.occlusion().take_break() {
+            self.food_break = Some((now_ns, broke));
         }
         self.next_step_ns += self.step_ns;
         Ok(())
@@ -339,6 +359,9 @@ impl Emulation {
         if self.synchronised[axis] {
             self.synchronised = [false; AXES];
             self.sample = Sample::new(&self.dynamics, self.force_n, now_ns);
+            if let Some(contact) = &mut self.contact {
+                *contact = Contact { sampled_ns: now_ns, ..self.dynamics.occlusion().take_mean() };
+            }
         }
         self.synchronised[axis] = true;
     }

@@ -8,6 +8,7 @@ use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::{Command, Event, LAYOUT_VERSION};
 
 use super::commands::CommandFaults;
+use super::food_break::FoodBreak;
 use super::occurrence::Occurrence;
 use crate::error::PlantError;
 use crate::journal::Journal;
@@ -80,6 +81,11 @@ impl Injector {
             self.has_news = true;
         }
         self.events.add(occurrence.event(cycle));
+    }
+
+    /// Takes the break of a piece of food.
+    pub(crate) fn note_food_break(&mut self, time_ns: u64, broke: &FoodBreak, cycle: u64) {
+        self.events.add(broke.event(time_ns, cycle));
     }
 
     /// The next window that has become known.

@@ -7,7 +7,7 @@
 //! and the rods (moved along and across by the legs); carriages and rods are constant joint inertias. With J the
 //! Jacobian of slides, legs and hinges and M_q their inertias,
 //!
-//! (M_platform + Jᵀ M_q J) V̇ = Jᵀ(τ − friction − M_q J̇V) + gravity + food − gyroscopic moment.
+//! (M_platform + Jᵀ M_q J) V̇ = Jᵀ(τ − friction − M_q J̇V) + gravity + contact − gyroscopic moment.
 //!
 //! End stops, play and elasticity are left out, unless a scenario has [faults](super::disturbances) of the mechanism.
 
@@ -17,10 +17,10 @@ use masseter_shared::geometry::{
 };
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
+use super::contact::{ContactError, Food, Occlusion};
 use super::disturbances::{AxisMotion, Disturbances, Disturbed};
-use super::food::{Food, vertical};
 use super::friction;
-use super::load::Load;
+use super::load::{Load, vertical};
 
 /// Pose, twist and joint coordinates of the mechanism.
 #[derive(Debug, Clone, Copy)]
@@ -46,7 +46,7 @@ pub(crate) struct Dynamics {
     state: MechanismState,
     /// V̇ under the forces that act.
     acceleration: Twist,
-    food: Option<Food>,
+    occlusion: Occlusion,
     /// None where the scenario has neither faults nor stimuli of the mechanism.
     injected: Option<Injected>,
 }
@@ -80,6 +80,9 @@ pub enum DynamicsError {
         "[dynamics]: too much friction for the masses it brakes, and no dynamics.step_ns resolves it; use less"
     )]
     Stiff,
+    /// Contact between the jaws that the integration cannot resolve.
+    #[error(transparent)]
+    Contact(#[from] ContactError),
     /// Initial legs on which the platform cannot be level within the strokes.
     #[error(
         "dynamics.initial_leg_m = {initial_leg_m}: {violation}; choose legs, and an initial_offset_m, with which the level \
@@ -99,7 +102,7 @@ impl Dynamics {
         mechanism: Mechanism,
         config: DynamicsConfig,
         pose: Pose,
-        food: Option<Food>,
+        occlusion: Occlusion,
     ) -> Result<Self, DynamicsError> {
         let joints = mechanism.inverse(&pose)?;
         if let Err(violation) = mechanism.strokes().check(&joints.actuators) {
@@ -107,7 +110,9 @@ impl Dynamics {
         }
         let (twist, acceleration) = (Twist::zeros(), Twist::zeros());
         let state = MechanismState { pose, twist, joints };
-        let dynamics = Self { mechanism, config, state, acceleration, food, injected: None };
+        let dynamics = Self { mechanism, config, state, acceleration, occlusion, injected: None };
+        let mass = dynamics.mass(&dynamics.jacobian_at(&state), &dynamics.platform_inertia());
+        dynamics.occlusion.check(&mass, config.step_ns)?;
         match dynamics.longest_step_ns()? {
             longest_ns if longest_ns < *DynamicsConfig::STEPS_NS.start() => Err(DynamicsError::Stiff),
             longest_step_ns if config.step_ns > longest_step_ns => {
@@ -172,7 +177,12 @@ impl Dynamics {
 
     /// Another food, or none.
     pub(crate) fn set_food(&mut self, food: Option<Food>) {
-        self.food = food;
+        self.occlusion.set_food(food);
+    }
+
+    /// Teeth and food.
+    pub(crate) fn occlusion(&mut self) -> &mut Occlusion {
+        &mut self.occlusion
     }
 
     /// Where the encoders see the axes, m: at the drives' side of each joint.
@@ -201,9 +211,9 @@ impl Dynamics {
         Ok((2e9 / rates_per_s.symmetric_eigenvalues().max()) as u64)
     }
 
-    /// The force with which the food pushes the jaw open, N.
+    /// The vertical force of food and upper teeth on the jaw, downwards, N.
     pub(crate) fn bite_force_n(&self) -> f64 {
-        self.food.as_ref().map_or(0.0, |food| food.force_n)
+        self.occlusion.bite_force_n()
     }
 
     /// The present state.
@@ -227,14 +237,13 @@ impl Dynamics {
         let axes_n = driven_n
             - friction::force_n(&self.config, &(jacobian.actuators * self.state.twist))
             - self.axis_mass_kg().component_mul(&axes);
-        let food = self
-            .food
-            .as_mut()
-            .map_or_else(Vector6::zeros, |food| food.bite(&self.state.pose, &self.state.twist));
+        let contact = self.occlusion.push(&self.state.pose, &self.state.twist, self.step_s());
         let hinges_nm = hinges * -self.config.leg_inertia_kg_m2;
-        let mut wrench =
-            jacobian.actuators.tr_mul(&axes_n) + jacobian.hinges.tr_mul(&hinges_nm) + self.gravity() + food
-                - self.gyroscopic(&inertia);
+        let mut wrench = jacobian.actuators.tr_mul(&axes_n)
+            + jacobian.hinges.tr_mul(&hinges_nm)
+            + self.gravity()
+            + contact
+            - self.gyroscopic(&inertia);
         let mut mass = self.mass(&jacobian, &inertia);
         if let (Some(disturbed), Some(injected)) = (disturbed, &self.injected) {
             let MechanismState { pose, twist, .. } = &self.state;

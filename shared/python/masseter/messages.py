@@ -7,7 +7,7 @@ numpy.dtype(Reading) is the NumPy type of a message.
 import ctypes
 import enum
 
-LAYOUT_VERSION = 11
+LAYOUT_VERSION = 12
 #: Event.axis when no axis is concerned.
 NO_AXIS = 4294967295
 #: Reading.drive_state of a drive not heard of yet, or lost.
@@ -200,6 +200,8 @@ class Cause(enum.IntEnum):
     NOT_ENABLED = 59
     #: The jaw is too far from the first pose of the motion (m).
     START_TOO_FAR = 60
+    #: Food between the teeth broke (force before, N; the limit is its strength). The object is the first of its teeth.
+    FOOD_BROKE = 61
 
 
 class NoPose(enum.IntEnum):
@@ -270,7 +272,7 @@ class Reading(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Reading/3b19bd46b3ecd631"
+        return "masseter/Reading/8ff0bab1a651c782"
 
 
 _check(Reading, 256, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 176, 224, 248, 252])
@@ -301,7 +303,7 @@ class Command(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Command/1f1a892af93718b5"
+        return "masseter/Command/42c5abb9c9070938"
 
 
 _check(Command, 96, [0, 8, 16, 24, 32, 40, 88, 92])
@@ -368,7 +370,7 @@ class State(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/State/4ef6b0906fbe819d"
+        return "masseter/State/9c120622196cc126"
 
 
 _check(State, 296, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 136, 160, 192, 216, 248, 272, 280, 288, 292])
@@ -415,7 +417,7 @@ class Event(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Event/c2e1365b706a3502"
+        return "masseter/Event/c974f125f5a2d951"
 
 
 _check(Event, 88, [0, 8, 16, 24, 32, 40, 44, 48, 52, 56, 60, 62, 64, 68, 72, 80])
@@ -446,13 +448,44 @@ class Truth(ctypes.Structure):
         ("joint_m_s", ctypes.c_double * 6),
         # Actuator forces, N.
         ("force_n", ctypes.c_double * 6),
-        # Bite force on the platform, N.
+        # Vertical force of food and upper teeth on the lower jaw, positive downwards, N.
         ("bite_force_n", ctypes.c_double),
     ]
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Truth/c07707f6f3b43950"
+        return "masseter/Truth/1d5ba1c40fbbab47"
 
 
 _check(Truth, 248, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240])
+
+
+class Contact(ctypes.Structure):
+    """The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads it."""
+
+    TOPIC = "contact"
+    _fields_ = [
+        # Number of this message on its topic, from 1.
+        ("seq", ctypes.c_uint64),
+        # When it was published, ns.
+        ("published_ns", ctypes.c_uint64),
+        # Version of the sender's layouts.
+        ("version", ctypes.c_uint64),
+        # Cycle of the plant, from 1.
+        ("cycle", ctypes.c_uint64),
+        # End of the time that it describes: the instant of the reading's sample, ns.
+        ("sampled_ns", ctypes.c_uint64),
+        # FDI numbers of the lower teeth, 0 where there are no more.
+        ("tooth", ctypes.c_uint32 * 16),
+        # Force of antagonist and food on each lower tooth, x y z in base axes, mean over the cycle, N.
+        ("force_n", ctypes.c_double * 48),
+        # Where the force acts on the tooth, x y z in the platform frame, m.
+        ("place_m", ctypes.c_double * 48),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "masseter/Contact/4b88af72ab2dc3ef"
+
+
+_check(Contact, 872, [0, 8, 16, 24, 32, 40, 104, 488])

@@ -59,7 +59,10 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
 }
 
 /// Version of the layouts below; it changes with any of them, and with what a field means.
-pub const LAYOUT_VERSION: u64 = 11;
+pub const LAYOUT_VERSION: u64 = 12;
+
+/// Room for the contact of this many pairs of teeth: all lower ones.
+pub const MOST_PAIRS: usize = 16;
 
 macro_rules! messages {
     ($($(#[doc = $doc:literal])* $name:ident on $topic:literal keeping $depth:literal as $type_name:tt {
@@ -133,7 +136,7 @@ macro_rules! messages {
 
 messages! {
     /// Targets and request for the drives, once a cycle.
-    Command on "command" keeping 2048 as "masseter/Command/1f1a892af93718b5" {
+    Command on "command" keeping 2048 as "masseter/Command/42c5abb9c9070938" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -147,7 +150,7 @@ messages! {
     }
 
     /// Positions, forces and states of the drives, once a cycle.
-    Reading on "reading" keeping 2048 as "masseter/Reading/3b19bd46b3ecd631" {
+    Reading on "reading" keeping 2048 as "masseter/Reading/8ff0bab1a651c782" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// Cycle of the last command received when the sample was taken; 0 before the first.
@@ -187,7 +190,7 @@ messages! {
     }
 
     /// The controller's state and its estimate, once a cycle.
-    State on "state" keeping 2048 as "masseter/State/4ef6b0906fbe819d" {
+    State on "state" keeping 2048 as "masseter/State/9c120622196cc126" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -240,7 +243,7 @@ messages! {
 
     /// The signals that the controller declares, once a cycle; without any, there is no such message. A recording's
     /// definition of the message has a field for each signal.
-    Signals on "signal" keeping 2048 as "masseter/Signals/79a2eb7431a69ee4" {
+    Signals on "signal" keeping 2048 as "masseter/Signals/b0b4d914ac2f3e01" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// The signals, in the order of their declaration.
@@ -249,7 +252,7 @@ messages! {
 
     /// The parameters that the controller declares, in its first cycle and in each that begins with another value. A
     /// recording's definition of the message has a field for each parameter.
-    Parameters on "parameter" keeping 256 as "masseter/Parameters/c88d93a42054c0a2" {
+    Parameters on "parameter" keeping 256 as "masseter/Parameters/3985af0b0384874d" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// The parameters, in the order of their declaration.
@@ -257,7 +260,7 @@ messages! {
     }
 
     /// The true state of the mechanism, once a cycle; the controller never reads it.
-    Truth on "truth" keeping 2048 as "masseter/Truth/c07707f6f3b43950" {
+    Truth on "truth" keeping 2048 as "masseter/Truth/1d5ba1c40fbbab47" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// The instant it describes: that of the reading's sample, ns.
@@ -272,12 +275,27 @@ messages! {
         joint_m_s: [f64; AXES],
         /// Actuator forces, N.
         force_n: [f64; AXES],
-        /// Bite force on the platform, N.
+        /// Vertical force of food and upper teeth on the lower jaw, positive downwards, N.
         bite_force_n: f64,
     }
 
+    /// The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads
+    /// it.
+    Contact on "contact" keeping 2048 as "masseter/Contact/4b88af72ab2dc3ef" {
+        /// Cycle of the plant, from 1.
+        cycle: u64,
+        /// End of the time that it describes: the instant of the reading's sample, ns.
+        sampled_ns: u64,
+        /// FDI numbers of the lower teeth, 0 where there are no more.
+        tooth: [u32; MOST_PAIRS],
+        /// Force of antagonist and food on each lower tooth, x y z in base axes, mean over the cycle, N.
+        force_n: [f64; 3 * MOST_PAIRS],
+        /// Where the force acts on the tooth, x y z in the platform frame, m.
+        place_m: [f64; 3 * MOST_PAIRS],
+    }
+
     /// An observation of a tap on a CAN wire: a frame, or an error message in the coding of `linux/can/error.h`.
-    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/87ab8e7a01e64bad" {
+    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/1e8a5db119d79c70" {
         /// When its last bit was on the wire, ns.
         time_ns: u64,
         /// When its transmitter had it queued, ns; 0 on real wires.
@@ -294,7 +312,7 @@ messages! {
 
     /// Counters of the kernel for the machine and both loops. The recorder reads and records them; the message is not
     /// published.
-    Machine on "machine" keeping 1 as "masseter/Machine/3b15ceb2deb74b6b" {
+    Machine on "machine" keeping 1 as "masseter/Machine/6e225ca4f67a72ee" {
         /// Time of the sample, ns.
         time_ns: u64,
         /// Time that the hypervisor had taken from all cores together, as far as the hypervisor reports it, ns.
@@ -306,7 +324,7 @@ messages! {
     }
 
     /// A single occurrence: a change of state, a fault, an alarm.
-    Event on "event" keeping 1024 as "masseter/Event/c2e1365b706a3502" {
+    Event on "event" keeping 1024 as "masseter/Event/c974f125f5a2d951" {
         /// When, ns.
         time_ns: u64,
         /// Cycle of the process that reports it.
@@ -334,6 +352,34 @@ messages! {
         value: f64,
         /// The limit it is held against, in the same unit.
         limit: f64,
+    }
+}
+
+/// A lower tooth of a [`Contact`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ToothContact {
+    /// FDI number.
+    pub number: u32,
+    /// Force on it in base axes, N.
+    pub force_n: [f64; 3],
+    /// Where the force acts in the platform frame, m.
+    pub place_m: [f64; 3],
+}
+
+impl ToothContact {
+    /// The magnitude of the force, N.
+    pub fn load_n(&self) -> f64 {
+        self.force_n.iter().map(|force_n| force_n * force_n).sum::<f64>().sqrt()
+    }
+}
+
+impl Contact {
+    /// The teeth in the order of their numbers.
+    pub fn teeth(&self) -> impl Iterator<Item = ToothContact> {
+        let (forces_n, places_m) = (self.force_n.as_chunks::<3>().0, self.place_m.as_chunks::<3>().0);
+        let vectors = forces_n.iter().zip(places_m);
+        let tooth = |(&number, (&force_n, &place_m))| ToothContact { number, force_n, place_m };
+        self.tooth.iter().zip(vectors).map(tooth).filter(|tooth| tooth.number > 0)
     }
 }
 
@@ -404,6 +450,7 @@ mod tests {
         check::<Signals>();
         check::<Parameters>();
         check::<Truth>();
+        check::<Contact>();
         check::<FrameTap>();
         check::<Machine>();
         check::<Event>();
@@ -413,7 +460,7 @@ mod tests {
     fn the_hash_covers_version_fields_data_bytes_and_codes() {
         let layout = layout::<FrameTap>();
         for (found, other) in
-            [("v11", "v12"), ("queued_ns", "waiting_ns"), ("[<=64]", "[<=8]"), ("fault=8", "fault=9")]
+            [("v12", "v13"), ("queued_ns", "waiting_ns"), ("[<=64]", "[<=8]"), ("fault=8", "fault=9")]
         {
             let changed = layout.replace(found, other);
             assert_ne!((hash(&layout), &layout), (hash(&changed), &changed));

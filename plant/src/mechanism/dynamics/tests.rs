@@ -6,7 +6,12 @@ use super::*;
 
 fn at_rest(config: DynamicsConfig) -> Dynamics {
     let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
-    Dynamics::new(mechanism, config, Pose::translation(0.0, 0.0, 0.268_452_355), None).unwrap()
+    Dynamics::new(mechanism, config, Pose::translation(0.0, 0.0, 0.268_452_355), without_contact()).unwrap()
+}
+
+/// Jaws that never touch.
+fn without_contact() -> Occlusion {
+    Occlusion::new(&masseter_shared::config::Scenario::default(), &Pose::identity())
 }
 
 fn frictionless() -> DynamicsConfig {
