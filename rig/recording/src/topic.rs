@@ -15,6 +15,7 @@ macro_rules! topics {
 
         /// A message of any topic.
         #[derive(Debug, Clone, Copy, PartialEq)]
+        #[expect(clippy::large_enum_variant, reason = "a message is copied as it lies, without an allocation")]
         pub enum Recorded {
             $($(#[$doc])* $name($message)),*
         }

@@ -176,8 +176,10 @@ mod tests {
         let numbers: Vec<_> = arch.iter().map(|tooth| tooth.number).collect();
         assert_eq!(numbers, [31, 32, 33, 34, 35, 36, 37, 41, 42, 43, 44, 45, 46, 47]);
         let of = |number: u8| arch.iter().find(|tooth| tooth.number == number).unwrap().point_m;
-        assert_eq!(of(36), [0.0024, 0.0248, 0.0]);
-        assert_eq!(of(46), [0.0024, -0.0248, 0.0]);
+        assert_eq!(
+            [of(36), of(46)].map(|place_m| format!("{place_m:?}")),
+            ["[0.0024, 0.0248, 0.0]", "[0.0024, -0.0248, 0.0]"]
+        );
         let incisal = JawConfig::default().reference_point_m;
         assert!((of(31)[0] - incisal[0]).abs() < 5e-4 && of(31)[1] < 4e-3, "{:?}", of(31));
         // Neighbours are about as far apart as their widths together, halved.
