@@ -58,6 +58,7 @@ pub struct Figures {
     /// robot.
     pub bite_force_max_n: Option<f64>,
     /// What the lower teeth bore; none where the jaws cannot touch, and on the robot.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub contact: Option<ContactFigures>,
     /// Measured intervals.
     pub intervals: Vec<IntervalFigures>,
