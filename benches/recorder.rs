@@ -119,8 +119,12 @@ impl Publishers {
             Recorded::State(message) => self.state.publish(|place| *place = *message)?,
             Recorded::Truth(message) => self.truth.publish(|place| *place = *message)?,
             // Those of a cycle travel together, and the recorder has this topic from nobody.
-            // There is no signal or parameter.
-            Recorded::Frame(_) | Recorded::Machine(_) | Recorded::Signals(_) | Recorded::Parameters(_) => {}
+            // There is no signal, no parameter and no contact.
+            Recorded::Frame(_)
+            | Recorded::Machine(_)
+            | Recorded::Signals(_)
+            | Recorded::Parameters(_)
+            | Recorded::Contact(_) => {}
             Recorded::Event(message) => {
                 let is_of_controller = message.source == Source::Controller.code();
                 self.events[usize::from(!is_of_controller)].publish(|place| *place = *message)?;

@@ -43,16 +43,18 @@ fn keys(path: &str, value: &Value, found: &mut BTreeSet<String>) {
 
 #[test]
 fn the_summary_has_the_keys_that_are_documented_and_no_others() {
-    let workspace = Workspace::new("duration_s = 1.0");
-    assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
-    let mut found = BTreeSet::new();
-    keys("", &workspace.summary(), &mut found);
-    let (documented, optional) = documented();
-    let undocumented: Vec<_> = found.difference(&documented).collect();
-    assert!(undocumented.is_empty(), "not in docs/summary.md: {undocumented:?}");
-    let absent: Vec<_> = documented.difference(&found).filter(|key| !optional.contains(*key)).collect();
-    assert!(absent.is_empty(), "in docs/summary.md, but not in summary.json: {absent:?}");
-    assert_eq!(workspace.summary()["form"], 2);
+    for tables in ["", "[teeth]\n[food]"] {
+        let workspace = Workspace::new(&format!("duration_s = 1.0\n{tables}"));
+        assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
+        let mut found = BTreeSet::new();
+        keys("", &workspace.summary(), &mut found);
+        let (documented, optional) = documented();
+        let undocumented: Vec<_> = found.difference(&documented).collect();
+        assert!(undocumented.is_empty(), "not in docs/summary.md: {undocumented:?}");
+        let absent: Vec<_> = documented.difference(&found).filter(|key| !optional.contains(*key)).collect();
+        assert!(absent.is_empty(), "in docs/summary.md, but not in summary.json: {absent:?}");
+        assert_eq!(workspace.summary()["form"], 2);
+    }
 }
 
 #[test]

@@ -8,7 +8,7 @@ mod wire_events;
 use masseter_can::canopen::Cob;
 use masseter_can::{ReceiveError, Tapped};
 use masseter_shared::config::Scenario;
-use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth, tap};
+use masseter_shared::messages::{Command, Contact, Event, FrameTap, Reading, Truth, tap};
 use masseter_shared::realtime::Wake;
 
 use crate::emulation::VirtualLink;
@@ -157,6 +157,11 @@ impl<L: Link> PlantCore<L> {
         self.link.truth().map(|truth| Truth { cycle: self.cycle, ..truth })
     }
 
+    /// The forces between the jaws in the cycle before this one, where they are emulated here and can touch.
+    pub fn contact(&self) -> Option<Contact> {
+        self.link.contact().map(|contact| Contact { cycle: self.cycle, ..contact })
+    }
+
     /// Answers the cycle with the newest command, if one came.
     pub fn apply(&mut self, now_ns: u64, command: Option<&Command>) -> Result<(), PlantError> {
         self.link.advance(now_ns)?;
@@ -239,6 +244,9 @@ impl<L: Link> PlantCore<L> {
                 let axis = note.port.and_then(|port| self.link.axis_at(bus, port));
                 self.wire_events.add(wire_events::from_note(&note, bus, axis, self.cycle));
             }
+        }
+        while let Some((time_ns, mishap)) = self.link.next_mishap() {
+            self.injector.note_mishap(time_ns, &mishap, self.cycle);
         }
         if !self.injector.is_empty() {
             self.follow_injections();

@@ -2,7 +2,7 @@
 
 use std::borrow::Borrow;
 
-use masseter_shared::messages::{Command, Reading, Truth};
+use masseter_shared::messages::{Command, Contact, Reading, Truth};
 use masseter_shared::realtime::Wake;
 use masseter_shared::schedule::CycleSchedule;
 
@@ -38,6 +38,12 @@ pub trait PlantPorts<L: Link> {
     /// When the message cannot be sent.
     fn publish_truth(&mut self, truth: &Truth) -> Result<(), Self::Error>;
 
+    /// Publishes the forces between the jaws.
+    ///
+    /// # Errors
+    /// When the message cannot be sent.
+    fn publish_contact(&mut self, contact: &Contact) -> Result<(), Self::Error>;
+
     /// The command of this cycle, or the newest there is once waiting any longer would cost the deadline.
     ///
     /// # Errors
@@ -51,7 +57,7 @@ pub trait PlantPorts<L: Link> {
     fn publish_frames_and_events(&mut self, plant: &mut PlantCore<L>) -> Result<(), Self::Error>;
 }
 
-/// Runs one cycle: SYNC, process data, reading, truth, command; then frames and events, for which nobody waits.
+/// Runs one cycle: SYNC, process data, reading, truth, contact, command; then frames and events, for which nobody waits.
 ///
 /// ```
 /// use masseter_plant::core::PlantCore;
@@ -91,6 +97,9 @@ pub fn run_cycle<L: Link, P: PlantPorts<L>>(
     ports.publish_reading(|reading| plant.fill_reading(reading))?;
     if let Some(truth) = plant.truth() {
         ports.publish_truth(&truth)?;
+    }
+    if let Some(contact) = plant.contact() {
+        ports.publish_contact(&contact)?;
     }
     let applied = ports
         .command(wake)

@@ -4,7 +4,7 @@
 //! | --- | --- | --- |
 //! | `injection` | times and events of faults and stimuli, faults of commands | |
 //! | `held_mean` | the mean over time of a held value | |
-//! | `mechanism` | dynamics, axes with friction and stops, food, poses at rest | `injection` |
+//! | `mechanism` | dynamics, axes with friction and stops, contact of teeth and food, poses at rest | `injection` |
 //! | `link` | traits between master and wires, real interfaces, layout of the buses | `mechanism` (its errors), `injection` |
 //! | `drive` | an emulated drive: node (CiA 301), axis (CiA 402), object dictionary | `link` (layout) |
 //! | [`wanted`] | the objects of a drive as the rig needs them | |
@@ -36,4 +36,4 @@ pub mod process;
 pub mod wanted;
 
 pub use error::PlantError;
-pub use mechanism::DynamicsError;
+pub use mechanism::{ContactError, DynamicsError};

@@ -4,7 +4,7 @@ use masseter_shared::clock;
 use masseter_shared::config::Scenario;
 use masseter_shared::lifecycle::{Party, ProcessArguments, ProcessContext, ProcessError, StopRequest};
 use masseter_shared::lockstep::{Clock, Lockstep};
-use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth};
+use masseter_shared::messages::{Command, Contact, Event, FrameTap, Reading, Truth};
 use masseter_shared::realtime::{Cycle, Wake};
 use masseter_shared::schedule::CycleSchedule;
 use masseter_shared::transport::{
@@ -52,6 +52,7 @@ struct Ports {
     commands: Subscriber<Command>,
     readings: Publisher<Reading>,
     truths: Publisher<Truth>,
+    contacts: Publisher<Contact>,
     frames: BatchPublisher<FrameTap>,
     events: Publisher<Event>,
 }
@@ -62,6 +63,7 @@ impl Ports {
             commands: node.newest_subscriber()?,
             readings: node.publisher()?,
             truths: node.publisher()?,
+            contacts: node.publisher()?,
             frames: BatchPublisher::open(node)?,
             events: node.publisher()?,
         })
@@ -72,6 +74,7 @@ impl Ports {
         self.commands.connect()?;
         self.readings.connect()?;
         self.truths.connect()?;
+        self.contacts.connect()?;
         self.frames.connect()?;
         self.events.connect()
     }
@@ -80,6 +83,7 @@ impl Ports {
     fn warm_up(&self) -> Result<(), TransportError> {
         self.readings.warm_up()?;
         self.truths.warm_up()?;
+        self.contacts.warm_up()?;
         self.frames.warm_up()?;
         self.events.warm_up()
     }
@@ -164,6 +168,10 @@ impl<L: Link> PlantPorts<L> for Binding<'_> {
 
     fn publish_truth(&mut self, truth: &Truth) -> Result<(), PlantProcessError> {
         Ok(self.ports.truths.publish_by(|| self.clock.now_ns(), |message| *message = *truth)?)
+    }
+
+    fn publish_contact(&mut self, contact: &Contact) -> Result<(), PlantProcessError> {
+        Ok(self.ports.contacts.publish_by(|| self.clock.now_ns(), |message| *message = *contact)?)
     }
 
     fn command(&mut self, wake: &Wake) -> Result<Option<ReceivedMessage<Command>>, PlantProcessError> {

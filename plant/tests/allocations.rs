@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use masseter_plant::core::PlantCore;
 use masseter_shared::config::{
-    FaultConfig, FaultKindConfig, FaultLayer, FaultPlace, FoodConfig, Scenario, StimulusConfig,
+    FaultConfig, FaultKindConfig, FaultLayer, FaultPlace, FoodConfig, Scenario, StimulusConfig, TeethConfig,
 };
 use masseter_shared::geometry::AXIS_NAMES;
 use masseter_shared::messages::codes::{DriveRequest, DriveState};
@@ -75,7 +75,7 @@ fn table() -> PathBuf {
 
 /// One of every kind of the plant, each for a while, on the axes in turn, and stimuli.
 fn injected() -> Scenario {
-    let mut scenario = Scenario::default();
+    let mut scenario = Scenario { teeth: Some(TeethConfig::default()), ..Scenario::default() };
     let of_plant = |kind: &FaultKindConfig| {
         !matches!(kind.layer(), FaultLayer::Bus | FaultLayer::Process | FaultLayer::Command)
     };

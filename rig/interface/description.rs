@@ -3,7 +3,7 @@
 use masseter_shared::messages::codes::{
     Cause, ControllerState, DriveRequest, DriveState, EventKind, NoPose, Source,
 };
-use masseter_shared::messages::{Command, Event, Field, Message, Reading, State, Truth};
+use masseter_shared::messages::{Command, Contact, Event, Field, Message, Reading, State, Truth};
 
 /// A message as other languages need it.
 pub(super) struct Layout {
@@ -34,7 +34,14 @@ pub(super) struct Enumeration {
 }
 
 pub(super) fn layouts() -> Vec<Layout> {
-    vec![layout::<Reading>(), layout::<Command>(), layout::<State>(), layout::<Event>(), layout::<Truth>()]
+    vec![
+        layout::<Reading>(),
+        layout::<Command>(),
+        layout::<State>(),
+        layout::<Event>(),
+        layout::<Truth>(),
+        layout::<Contact>(),
+    ]
 }
 
 fn layout<M: Message>() -> Layout {

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use masseter_recording::Recorded;
 
 /// The publishers.
-const LANES: usize = 9;
+const LANES: usize = 10;
 
 /// Messages that wait for their turn.
 #[derive(Debug, Default)]
@@ -28,13 +28,14 @@ impl InOrder {
                 0
             }
             Recorded::Truth(_) => 1,
-            Recorded::Command(_) => 2,
-            Recorded::State(_) => 3,
-            Recorded::Signals(_) => 4,
-            Recorded::Parameters(_) => 5,
-            Recorded::Event(event) if event.is_of_controller() => 6,
-            Recorded::Frame(_) => 7,
-            Recorded::Event(_) | Recorded::Machine(_) => 8,
+            Recorded::Contact(_) => 2,
+            Recorded::Command(_) => 3,
+            Recorded::State(_) => 4,
+            Recorded::Signals(_) => 5,
+            Recorded::Parameters(_) => 6,
+            Recorded::Event(event) if event.is_of_controller() => 7,
+            Recorded::Frame(_) => 8,
+            Recorded::Event(_) | Recorded::Machine(_) => 9,
         };
         self.lanes[lane].push_back(*message);
     }
@@ -56,7 +57,7 @@ impl InOrder {
 #[cfg(test)]
 mod tests {
     use masseter_shared::messages::codes::Source;
-    use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
+    use masseter_shared::messages::{Command, Contact, Event, FrameTap, Message, Reading, State, Truth};
 
     use super::*;
 
@@ -73,6 +74,7 @@ mod tests {
             [
                 stamped(Reading::default(), start_ns + 5),
                 stamped(Truth::default(), start_ns + 5),
+                stamped(Contact::default(), start_ns + 5),
                 stamped(Command::default(), start_ns + 6),
                 stamped(State::default(), start_ns + 6),
                 stamped(of_controller, start_ns + 6),
@@ -83,7 +85,7 @@ mod tests {
         let [first, second] = [cycle(0), cycle(10)];
         let mut in_order = InOrder::default();
         // Topic by topic, the events in any order of their publishers.
-        for place in [0, 2, 3, 1, 5, 6, 4] {
+        for place in [0, 3, 4, 1, 2, 6, 7, 5] {
             in_order.add(&first[place]);
             in_order.add(&second[place]);
         }

@@ -2,7 +2,7 @@
 
 use masseter_recording::Recorded;
 use masseter_shared::messages::{
-    Command, Event, FrameTap, Message, Parameters, Reading, Signals, State, Truth,
+    Command, Contact, Event, FrameTap, Message, Parameters, Reading, Signals, State, Truth,
 };
 use masseter_shared::transport::{BatchSubscriber, Node, Subscriber, TransportError};
 
@@ -13,6 +13,7 @@ pub(super) struct Subscribers {
     signals: Subscriber<Signals>,
     parameters: Subscriber<Parameters>,
     truths: Subscriber<Truth>,
+    contacts: Subscriber<Contact>,
     frames: BatchSubscriber<FrameTap>,
     events: Subscriber<Event>,
 }
@@ -26,6 +27,7 @@ impl Subscribers {
             signals: node.subscriber()?,
             parameters: node.subscriber()?,
             truths: node.subscriber()?,
+            contacts: node.subscriber()?,
             frames: BatchSubscriber::open(node)?,
             events: node.subscriber()?,
         })
@@ -40,6 +42,7 @@ impl Subscribers {
         drain(&self.signals, take)?;
         drain(&self.parameters, take)?;
         drain(&self.truths, take)?;
+        drain(&self.contacts, take)?;
         drain_batches(&self.frames, take)?;
         drain(&self.events, take)
     }

@@ -17,7 +17,9 @@ use masseter_plant::emulation::VirtualLink;
 use masseter_recording::{Backlog, Ending, Manifest, Pace, Recorded, Recorder, RunFolder, Scene};
 use masseter_shared::control::{Controller, ControllerPorts, Duties, Operator, Outcome, set_parameters};
 use masseter_shared::lockstep::EPOCH_NS;
-use masseter_shared::messages::{Command, Event, Message, Parameters, Reading, Signals, State, Truth};
+use masseter_shared::messages::{
+    Command, Contact, Event, Message, Parameters, Reading, Signals, State, Truth,
+};
 use masseter_shared::named::NamedValues;
 use masseter_shared::realtime::Wake;
 use masseter_shared::schedule::CycleSchedule;
@@ -152,6 +154,11 @@ impl<S: Sink> PlantPorts<VirtualLink> for VirtualRig<'_, S> {
         Ok(())
     }
 
+    fn publish_contact(&mut self, contact: &Contact) -> Result<(), PlantError> {
+        self.log.record(Publisher::Contact, self.now_ns, |message| *message = *contact);
+        Ok(())
+    }
+
     fn command(&mut self, sync: &Wake) -> Result<Option<Command>, PlantError> {
         self.now_ns = sync.due_ns + self.schedule.controller_at_ns;
         let wake = Wake::on_time(sync.cycle, self.now_ns);
@@ -223,6 +230,7 @@ enum Publisher {
     Signals,
     Parameters,
     Truth,
+    Contact,
     Frame,
     ControllerEvent,
     PlantEvent,

@@ -193,6 +193,8 @@ enum masseter_cause {
     MASSETER_CAUSE_NOT_ENABLED = 59,
     /* The jaw is too far from the first pose of the motion (m). */
     MASSETER_CAUSE_START_TOO_FAR = 60,
+    /* Food between the teeth broke (force before, N; the limit is its strength). The object is the first of its teeth. */
+    MASSETER_CAUSE_FOOD_BROKE = 61,
 };
 
 enum masseter_no_pose {
@@ -511,5 +513,38 @@ static_assert(offsetof(masseter_truth, force_n) == 192, "offset of force_n");
 static_assert(offsetof(masseter_truth, force_sample_n) == 240, "offset of force_sample_n");
 static_assert(offsetof(masseter_truth, bite_force_n) == 288, "offset of bite_force_n");
 static_assert(offsetof(masseter_truth, bite_force_sample_n) == 296, "offset of bite_force_sample_n");
+
+#define MASSETER_CONTACT_TOPIC "contact"
+#define MASSETER_CONTACT_TYPE_NAME "masseter/Contact/4b88af72ab2dc3ef"
+
+/* The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads it. */
+typedef struct masseter_contact {
+    /* Number of this message on its topic, from 1. */
+    uint64_t seq;
+    /* When it was published, ns. */
+    uint64_t published_ns;
+    /* Version of the sender's layouts. */
+    uint64_t version;
+    /* Cycle of the plant, from 1. */
+    uint64_t cycle;
+    /* End of the time that it describes: the instant of the reading's sample, ns. */
+    uint64_t sampled_ns;
+    /* FDI numbers of the lower teeth, 0 where there are no more. */
+    uint32_t tooth[16];
+    /* Force of antagonist and food on each lower tooth, x y z in base axes, mean over the cycle, N. */
+    double force_n[48];
+    /* Where the force acts on the tooth, x y z in the platform frame, m. */
+    double place_m[48];
+} masseter_contact;
+
+static_assert(sizeof(masseter_contact) == 872, "size of masseter_contact");
+static_assert(offsetof(masseter_contact, seq) == 0, "offset of seq");
+static_assert(offsetof(masseter_contact, published_ns) == 8, "offset of published_ns");
+static_assert(offsetof(masseter_contact, version) == 16, "offset of version");
+static_assert(offsetof(masseter_contact, cycle) == 24, "offset of cycle");
+static_assert(offsetof(masseter_contact, sampled_ns) == 32, "offset of sampled_ns");
+static_assert(offsetof(masseter_contact, tooth) == 40, "offset of tooth");
+static_assert(offsetof(masseter_contact, force_n) == 104, "offset of force_n");
+static_assert(offsetof(masseter_contact, place_m) == 488, "offset of place_m");
 
 #endif

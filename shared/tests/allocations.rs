@@ -10,7 +10,7 @@ use masseter_shared::clock;
 use masseter_shared::config::DynamicsConfig;
 use masseter_shared::dynamics::{Bodies, Equations, Motion, Reactions};
 use masseter_shared::geometry::{Mechanism, MechanismConfig, Pose, Twist};
-use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
+use masseter_shared::messages::{Command, Contact, Event, FrameTap, Message, Reading, State, Truth};
 use masseter_shared::realtime::Cycle;
 use masseter_shared::transport::{BatchPublisher, BatchSubscriber, Node, ScratchDomain};
 use nalgebra::Vector6;
@@ -122,6 +122,7 @@ fn waiting_receiving_and_dynamics_allocate_nothing_and_sending_one_small_counter
     check_topic::<Reading>(&node);
     check_topic::<State>(&node);
     check_topic::<Truth>(&node);
+    check_topic::<Contact>(&node);
     check_batches(&node);
     check_topic::<Event>(&node);
     check_dynamics();

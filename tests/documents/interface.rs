@@ -6,7 +6,7 @@ use std::fs;
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::codes::Cause;
 use masseter_shared::messages::{
-    Command, Event, Field, FrameTap, Machine, Message, Parameters, Reading, Signals, State, Truth,
+    Command, Contact, Event, Field, FrameTap, Machine, Message, Parameters, Reading, Signals, State, Truth,
 };
 
 use super::project;
@@ -23,13 +23,14 @@ fn layout<M: Message>() -> Layout {
 }
 
 /// The messages that concern a controller.
-fn layouts() -> [Layout; 7] {
+fn layouts() -> [Layout; 8] {
     [
         layout::<Reading>(),
         layout::<Command>(),
         layout::<State>(),
         layout::<Event>(),
         layout::<Truth>(),
+        layout::<Contact>(),
         layout::<Signals>(),
         layout::<Parameters>(),
     ]

@@ -5,15 +5,16 @@
 use std::collections::VecDeque;
 use std::ops::Range;
 
-use masseter_shared::config::{FaultConfig, FaultKindConfig, FaultLayer, Scenario, StimulusConfig};
-use masseter_shared::geometry::{Mechanism, Pose};
+use masseter_shared::config::{
+    FaultConfig, FaultKindConfig, FaultLayer, Scenario, StimulusConfig, ToothConfig,
+};
 use masseter_shared::injection::Injected;
 use nalgebra::Vector6;
 
 use super::push::Push;
 use crate::error::PlantError;
 use crate::injection::{Occurrence, acting_ns};
-use crate::mechanism::{Food, closed_mouth};
+use crate::mechanism::Food;
 
 /// What an entry does.
 #[derive(Debug, Clone)]
@@ -61,14 +62,14 @@ pub(super) struct Agenda {
 
 impl Agenda {
     /// The entries of a scenario that drives and mechanism carry out. None acts before its window is set.
-    pub(super) fn new(scenario: &Scenario, mechanism: &Mechanism) -> Result<Self, PlantError> {
-        let closed = closed_mouth(mechanism, &scenario.jaw);
+    pub(super) fn new(scenario: &Scenario) -> Result<Self, PlantError> {
+        let arch = scenario.arch();
         let faults = scenario.faults.iter().enumerate().filter_map(|(place, config)| {
             Some(Entry::new(Injected::Fault(place), effect_of_fault(config)?, Some(config)))
         });
         let mut entries: Vec<_> = faults.collect();
         for (place, config) in scenario.stimulus.iter().enumerate() {
-            let effect = effect_of_stimulus(config, &closed)?;
+            let effect = effect_of_stimulus(config, &arch)?;
             entries.extend(effect.map(|effect| Entry::new(Injected::Stimulus(place), effect, None)));
         }
         // An entry begins once and ends once.
@@ -226,9 +227,9 @@ fn effect_of_fault(config: &FaultConfig) -> Option<Effect> {
     }
 }
 
-fn effect_of_stimulus(config: &StimulusConfig, closed: &Pose) -> Result<Option<Effect>, PlantError> {
+fn effect_of_stimulus(config: &StimulusConfig, arch: &[ToothConfig]) -> Result<Option<Effect>, PlantError> {
     let push = Push::new(config)?.map(|push| Effect::Push(Box::new(push)));
-    let food = || config.food.map(|food| Effect::Food(Box::new(Food::new(food, closed))));
+    let food = || config.food.as_ref().map(|food| Effect::Food(Box::new(Food::new(food, arch))));
     let payload = || config.payload.map(|payload| Effect::Payload { kg: payload.si() });
     Ok(push.or_else(food).or_else(payload))
 }
@@ -240,7 +241,7 @@ mod tests {
     use super::*;
 
     fn agenda(scenario: &Scenario) -> Agenda {
-        Agenda::new(scenario, &Mechanism::new(&scenario.mechanism).unwrap()).unwrap()
+        Agenda::new(scenario).unwrap()
     }
 
     #[test]

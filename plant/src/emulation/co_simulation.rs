@@ -7,7 +7,7 @@ use masseter_can::{CanId, ErrorState, Frame};
 use masseter_shared::config::{FaultConfig, FaultKindConfig, FaultLayer, Scenario};
 use masseter_shared::geometry::{AXES, Mechanism};
 use masseter_shared::injection::{Injected, Injection};
-use masseter_shared::messages::{Truth, pose_fields};
+use masseter_shared::messages::{Contact, Truth, pose_fields};
 use nalgebra::Translation3;
 
 use super::agenda::{Agenda, Change, Effect};
@@ -17,8 +17,8 @@ use crate::checks::check_quantities;
 use crate::drive::{DriveNode, DriveSettings, Encoder, Shaft};
 use crate::error::PlantError;
 use crate::held_mean::HeldMean;
-use crate::injection::{Occurrence, known_windows};
-use crate::mechanism::{Dynamics, DynamicsError, Food, MechanismState, closed_mouth, level};
+use crate::injection::{Mishap, Occurrence, known_windows};
+use crate::mechanism::{Dynamics, DynamicsError, Food, MechanismState, Occlusion, closed_mouth, level};
 
 /// The six drives and the mechanism that they move.
 ///
@@ -57,6 +57,10 @@ pub struct Emulation {
     encoder_faults: [EncoderFaults; AXES],
     /// The scenario's own food.
     food: Option<Food>,
+    /// One of each axis, and one of the food, with its time, ns.
+    mishaps: [Option<(u64, Mishap)>; AXES + 1],
+    /// The forces between the jaws in the cycle before the sample; none where the jaws cannot touch.
+    contact: Option<Contact>,
     /// None for drives that forget everything at the end.
     memory: Option<MemoryFile>,
 }
@@ -87,17 +91,18 @@ impl Emulation {
             }
         }
         let mechanism = Mechanism::new(&scenario.mechanism)?;
-        let food = scenario.food.map(|config| Food::new(config, &closed_mouth(&mechanism, &scenario.jaw)));
+        let food = scenario.food.as_ref().map(|config| Food::new(config, &scenario.arch()));
+        let occlusion = Occlusion::new(scenario, &closed_mouth(&mechanism, &scenario.jaw));
         let start = Translation3::from(scenario.dynamics.initial_offset_m)
             * level(&mechanism, scenario.dynamics.initial_leg_m);
-        let mut agenda = Agenda::new(scenario, &mechanism)?;
+        let mut agenda = Agenda::new(scenario)?;
         let injection =
             Injection::new(scenario, now_ns).map_err(|error| PlantError::Scenario(error.to_string()))?;
         for (injected, window_ns) in known_windows(scenario, &injection) {
             agenda.set_window(injected, &window_ns);
         }
         let incisal_m = scenario.jaw.reference_point_m;
-        let dynamics = Dynamics::new(mechanism, scenario.dynamics, start, food.clone(), incisal_m)?;
+        let dynamics = Dynamics::new(mechanism, scenario.dynamics, start, occlusion, incisal_m)?;
         let positions_m = dynamics.state().positions_m();
         let drive = |(axis, settings): (usize, &DriveSettings)| {
             let config = &settings.drive;
@@ -125,6 +130,8 @@ impl Emulation {
             agenda,
             encoder_faults: encoder_faults(scenario),
             food,
+            mishaps: [None; AXES + 1],
+            contact: scenario.has_contact().then(Contact::default),
             memory,
         })
     }
@@ -159,6 +166,25 @@ impl Emulation {
             bite_force_n: bite_force_n[0],
             bite_force_sample_n: bite_force_n[1],
             ..Truth::default()
+        }
+    }
+
+    /// The forces between the jaws, mean over the time between the last two SYNCs; none where the jaws cannot touch.
+    pub fn contact(&self) -> Option<Contact> {
+        self.contact
+    }
+
+    /// The next mishap of the mechanism, with its time, ns.
+    pub(crate) fn next_mishap(&mut self) -> Option<(u64, Mishap)> {
+        self.mishaps.iter_mut().find_map(Option::take)
+    }
+
+    fn note_mishaps(&mut self, now_ns: u64) {
+        while let Some((axis, speed_m_s)) = self.dynamics.take_stop_hit() {
+            self.mishaps[axis] = Some((now_ns, Mishap::EndStopHit { axis, speed_m_s }));
+        }
+        if let Some(broke) = self.dynamics.occlusion().take_break() {
+            self.mishaps[AXES] = Some((now_ns, Mishap::FoodBreak(broke)));
         }
     }
 
@@ -217,6 +243,7 @@ impl Emulation {
             self.push_injected(now_ns)?;
         }
         self.bite_force_n.hold(self.dynamics.bite_force_n(), now_ns);
+        self.note_mishaps(now_ns);
         self.next_step_ns += self.step_ns;
         Ok(())
     }
@@ -343,6 +370,9 @@ impl Emulation {
                 ],
                 bite_force_n: [self.bite_force_n.take(now_ns), self.bite_force_n.value()],
             };
+            if let Some(contact) = &mut self.contact {
+                *contact = Contact { sampled_ns: now_ns, ..self.dynamics.occlusion().take_mean() };
+            }
         }
         self.synchronised[axis] = true;
     }

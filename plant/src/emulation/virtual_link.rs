@@ -7,12 +7,12 @@ use masseter_can::{Bus, ReceiveError, Tapped, VirtualWire, WireConfig};
 use masseter_shared::config::{MASTER_NODE, Scenario};
 use masseter_shared::geometry::AXES;
 use masseter_shared::injection::Injected;
-use masseter_shared::messages::Truth;
+use masseter_shared::messages::{Contact, Truth};
 use masseter_shared::realtime::Waiter;
 
 use super::co_simulation::Emulation;
 use crate::error::PlantError;
-use crate::injection::Occurrence;
+use crate::injection::{Mishap, Occurrence};
 use crate::link::faults::{fault_seed, faults_of_bus, restart_after_ns};
 use crate::link::layout::{DrivePort, MASTER_PORT, drive_ports, node_ids};
 use crate::link::{Buses, Link};
@@ -75,6 +75,10 @@ impl Link for VirtualLink {
         self.emulation.next_occurrence()
     }
 
+    fn next_mishap(&mut self) -> Option<(u64, Mishap)> {
+        self.emulation.next_mishap()
+    }
+
     fn axis_at(&self, bus: usize, port: usize) -> Option<usize> {
         self.ports.iter().position(|at| *at == DrivePort { bus, port })
     }
@@ -85,6 +89,10 @@ impl Link for VirtualLink {
 
     fn truth(&self) -> Option<Truth> {
         Some(self.emulation.truth())
+    }
+
+    fn contact(&self) -> Option<Contact> {
+        self.emulation.contact()
     }
 }
 

@@ -8,6 +8,7 @@ use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::{Command, Event, LAYOUT_VERSION};
 
 use super::commands::CommandFaults;
+use super::mishap::Mishap;
 use super::occurrence::Occurrence;
 use crate::error::PlantError;
 use crate::journal::Journal;
@@ -80,6 +81,11 @@ impl Injector {
             self.has_news = true;
         }
         self.events.add(occurrence.event(cycle));
+    }
+
+    /// Takes a mishap of the mechanism.
+    pub(crate) fn note_mishap(&mut self, time_ns: u64, mishap: &Mishap, cycle: u64) {
+        self.events.add(mishap.event(time_ns, cycle));
     }
 
     /// The next window that has become known.

@@ -8,10 +8,10 @@ use std::ops::Range;
 use masseter_can::faults::FaultNote;
 use masseter_can::{Bus, ReceiveError, Tapped};
 use masseter_shared::injection::Injected;
-use masseter_shared::messages::Truth;
+use masseter_shared::messages::{Contact, Truth};
 use masseter_shared::realtime::Waiter;
 
-use crate::injection::Occurrence;
+use crate::injection::{Mishap, Occurrence};
 use crate::mechanism::DynamicsError;
 
 pub(crate) mod faults;
@@ -46,6 +46,11 @@ pub trait Link: Buses {
         None
     }
 
+    /// The next mishap of the mechanism, with its time, ns.
+    fn next_mishap(&mut self) -> Option<(u64, Mishap)> {
+        None
+    }
+
     /// The axis whose drive is at a port of a simulated wire; none at the master's.
     fn axis_at(&self, _bus: usize, _port: usize) -> Option<usize> {
         None
@@ -56,6 +61,11 @@ pub trait Link: Buses {
 
     /// The mechanism's true motion at the last SYNC, where it is emulated here.
     fn truth(&self) -> Option<Truth> {
+        None
+    }
+
+    /// The forces between the jaws in the cycle before the last SYNC, where they are emulated here and can touch.
+    fn contact(&self) -> Option<Contact> {
         None
     }
 }

@@ -5,7 +5,7 @@
 //! rates from the Jacobian. The forward kinematics is never solved here, so the mechanism is an
 //! independent oracle for it. With the [equations](masseter_shared::dynamics) of the rigid bodies,
 //!
-//! M V̇ = Jᵀ(τ − friction) + food − h.
+//! M V̇ = Jᵀ(τ − friction) + contact − h.
 //!
 //! A step is one of the leapfrog scheme (Störmer and Verlet): the acceleration of its middle holds for the whole step.
 //! The forces of the drives are held too, so that they act exactly. The scheme is of second order, and no energy drifts
@@ -21,7 +21,7 @@ use masseter_shared::geometry::{
 use nalgebra::{Matrix6, UnitQuaternion, Vector6};
 
 use super::axes::{Axes, AxesForces, AxisMotion};
-use super::food::Food;
+use super::contact::{ContactError, Food, Occlusion};
 use super::friction::Braking;
 use super::load::Load;
 
@@ -50,7 +50,7 @@ pub(crate) struct Dynamics {
     state: MechanismState,
     /// V̇ in the present step.
     acceleration: Twist,
-    food: Option<Food>,
+    occlusion: Occlusion,
     braking: Braking,
     axes: Axes,
     load: Load,
@@ -65,6 +65,9 @@ pub enum DynamicsError {
     /// The mass matrix cannot be inverted: masses or inertias are not positive.
     #[error("the mechanism's mass matrix is not positive definite; check [dynamics]")]
     Mass,
+    /// Contact between the jaws that the integration cannot resolve.
+    #[error(transparent)]
+    Contact(#[from] ContactError),
     /// Initial legs on which the platform cannot be level within the strokes.
     #[error(
         "dynamics.initial_leg_m = {initial_leg_m}: {violation}; choose legs, and an initial_offset_m, with which the level \
@@ -84,7 +87,7 @@ impl Dynamics {
         mechanism: Mechanism,
         config: DynamicsConfig,
         pose: Pose,
-        food: Option<Food>,
+        occlusion: Occlusion,
         incisal_m: [f64; 3],
     ) -> Result<Self, DynamicsError> {
         let joints = mechanism.inverse(&pose)?;
@@ -94,6 +97,8 @@ impl Dynamics {
         let (twist, acceleration) = (Twist::zeros(), Twist::zeros());
         let state = MechanismState { pose, twist, joints };
         let bodies = Bodies::from(&config);
+        let motion = Motion::of_joints(&mechanism, &pose, &joints, &twist);
+        occlusion.check(&Equations::new(&bodies, &motion).mass, config.step_ns)?;
         Ok(Self {
             braking: Braking::new(&config, &bodies),
             axes: Axes::new(&config.axes, &mechanism, state.positions_m(), &bodies.axis_mass_kg()),
@@ -103,7 +108,7 @@ impl Dynamics {
             bodies,
             state,
             acceleration,
-            food,
+            occlusion,
         })
     }
 
@@ -149,7 +154,12 @@ impl Dynamics {
 
     /// Another food, or none.
     pub(crate) fn set_food(&mut self, food: Option<Food>) {
-        self.food = food;
+        self.occlusion.set_food(food);
+    }
+
+    /// Teeth and food.
+    pub(crate) fn occlusion(&mut self) -> &mut Occlusion {
+        &mut self.occlusion
     }
 
     /// Where the encoders see the axes, m: at the drives' side of each joint.
@@ -157,9 +167,9 @@ impl Dynamics {
         self.axes.drive_positions_m(self.state.positions_m())
     }
 
-    /// The force with which the food pushes the jaw open, N.
+    /// The vertical force of food and upper teeth on the jaw, downwards, N.
     pub(crate) fn bite_force_n(&self) -> f64 {
-        self.food.as_ref().map_or(0.0, |food| food.force_n)
+        self.occlusion.bite_force_n()
     }
 
     /// The present state.
@@ -180,12 +190,12 @@ impl Dynamics {
         let actuators = &motion.jacobian.actuators;
         let speeds_m_s = actuators * twist;
         let forces = self.axes.act(force_n, middle.positions_m(), &speeds_m_s, &self.braking, step_s);
-        let food = self.food.as_mut().map_or_else(Vector6::zeros, |food| food.bite(&middle.pose, &twist));
+        let contact = self.occlusion.push(&middle.pose, &twist, step_s);
         let joints = self.braking.of_joints(&motion);
         let Equations { mut mass, bias, .. } = Equations::new(&self.bodies, &motion);
         let axes_n = forces.force_n + forces.parted_kg.component_mul(&bias_m_s2);
         let wrench = actuators.tr_mul(&axes_n) - joints * twist
-            + food
+            + contact
             + self.load.wrench(&motion.pose, &motion.twist, self.config.gravity_m_s2)
             - bias;
         let moved_kg = Matrix6::from_diagonal(&(forces.resisting_kg - forces.parted_kg));

@@ -5,7 +5,10 @@ use std::ops::AddAssign;
 use masseter_shared::geometry::{Pose, Twist, Vec3};
 use nalgebra::{Matrix3, Matrix6, Vector6};
 
-use super::food::vertical;
+/// The wrench of a vertical force (N) at an arm (m) about the platform's origin.
+pub(super) fn vertical(force_n: f64, arm: &Vec3) -> Vector6<f64> {
+    Vector6::new(0.0, 0.0, force_n, arm.y * force_n, -arm.x * force_n, 0.0)
+}
 
 /// The load.
 #[derive(Debug, Clone, Copy)]

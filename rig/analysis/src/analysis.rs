@@ -10,6 +10,7 @@ use masseter_shared::named::Declared;
 use crate::attribution::OverrunAttribution;
 use crate::axes::AxisWatch;
 use crate::code::Code;
+use crate::contact::ContactWatch;
 use crate::declared_faults::FaultWatch;
 use crate::digest::Digest;
 use crate::disturbance::Disturbance;
@@ -79,6 +80,7 @@ pub struct Analysis {
     outage: OutageWatch,
     final_state: Option<Code<ControllerState>>,
     bite_force_max_n: Option<f64>,
+    contact: ContactWatch,
     /// None where the scenario requires nothing.
     requirements: Option<Requirements>,
 }
@@ -120,7 +122,8 @@ impl Analysis {
             outage: OutageWatch::default(),
             final_state: None,
             // The robot has no sensor for this force.
-            bite_force_max_n: scenario.food.filter(|_| is_emulated).map(|_| 0.0),
+            bite_force_max_n: scenario.has_contact().then_some(0.0),
+            contact: ContactWatch::default(),
             requirements: (!requirements.is_empty()).then_some(requirements),
         }
     }
@@ -144,6 +147,10 @@ impl Analysis {
             Recorded::Reading(reading) => self.reading(reading),
             Recorded::State(state) => self.state(state),
             Recorded::Truth(truth) => self.truth(truth),
+            Recorded::Contact(contact) => {
+                let since_ns = self.over_time.since(contact.sampled_ns);
+                self.contact.take(contact, since_ns);
+            }
             Recorded::Frame(frame) => self.frame(frame)?,
             Recorded::Signals(message) => {
                 self.named.signals(message);
@@ -270,6 +277,7 @@ impl Analysis {
             signals,
             parameters,
             bite_force_max_n: self.bite_force_max_n,
+            contact: self.contact.finish(),
             worst_cycles: self.longest_cycles.finish(),
             intervals: self.intervals.finish(),
             topics,

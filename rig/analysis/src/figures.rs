@@ -9,6 +9,7 @@ use crate::attribution::OverrunAttribution;
 use crate::axes::AxisFigures;
 use crate::bus_response::BusResponse;
 use crate::code::Code;
+use crate::contact::ContactFigures;
 use crate::declared_faults::FaultFigures;
 use crate::events::EventRecord;
 use crate::freshness::ReadingFigures;
@@ -53,8 +54,12 @@ pub struct Figures {
     pub signals: Vec<SignalFigures>,
     /// The controller's parameters.
     pub parameters: Vec<ParameterFigures>,
-    /// The greatest force with which the emulated jaw bit on food, N; none without food, and on the robot.
+    /// The greatest vertical force of food and upper teeth on the emulated jaw, N; none where the jaws cannot touch, and on the
+    /// robot.
     pub bite_force_max_n: Option<f64>,
+    /// What the lower teeth bore; none where the jaws cannot touch, and on the robot.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contact: Option<ContactFigures>,
     /// Measured intervals.
     pub intervals: Vec<IntervalFigures>,
     /// The longest cycles, each with the hop furthest above its median.

@@ -69,7 +69,8 @@ impl OverTimeCollector {
         Self { incisal_m, bitrate, ..Self::default() }
     }
 
-    fn since(&mut self, time_ns: u64) -> u64 {
+    /// A time of the run's clock since the first, ns.
+    pub(super) fn since(&mut self, time_ns: u64) -> u64 {
         let since_ns = time_ns.saturating_sub(*self.began_ns.get_or_insert(time_ns));
         self.lasted_ns = self.lasted_ns.max(since_ns);
         since_ns

@@ -13,6 +13,7 @@ pub const TITLE: u32 = 16;
 /// Room for labels below and left of a plot, px; names of places need more than numbers.
 const LABELS: [u32; 3] = [42, 64, 90];
 const MARGIN: u32 = 10;
+const RIM: RGBColor = RGBColor(0x55, 0x55, 0x55);
 const MESH: RGBColor = RGBColor(0xe4, 0xe4, 0xe4);
 /// From one row of a legend to the next, px.
 pub(crate) const ROW: u32 = 20;
@@ -41,6 +42,21 @@ pub struct Bar {
     pub colour: RGBColor,
     /// Lines of text above it.
     pub text: Vec<String>,
+}
+
+/// A disc.
+#[derive(Debug, Clone)]
+pub struct Disc {
+    /// Its middle, in values of the axes.
+    pub at: (f64, f64),
+    /// Its radius, px.
+    pub radius: u32,
+    /// Of its face; none leaves the face empty.
+    pub colour: Option<RGBColor>,
+    /// Stands beside it.
+    pub text: String,
+    /// Where the text begins, or ends if that is left of the middle: right and down from the middle, px.
+    pub beside: [i32; 2],
 }
 
 /// What stands before a name in a legend.
@@ -181,6 +197,39 @@ pub fn cells(
                 |colour: RGBColor| Rectangle::new([(x(from), y(row)), (x(to), y(row + 1))], colour.filled());
             chart.draw_series(run[0].1.map(rectangle))?;
         }
+    }
+    Ok(())
+}
+
+/// Filled rectangles between two places along each axis.
+///
+/// # Errors
+/// When the chart cannot be drawn on.
+pub fn tiles(
+    chart: &mut Chart<'_, '_>,
+    tiles: impl IntoIterator<Item = ([f64; 2], [f64; 2], RGBColor)>,
+) -> Result<(), Error> {
+    let tile = |([left, right], [low, high], colour): ([f64; 2], [f64; 2], RGBColor)| {
+        Rectangle::new([(left, low), (right, high)], colour.filled())
+    };
+    chart.draw_series(tiles.into_iter().map(tile))?;
+    Ok(())
+}
+
+/// Discs with a rim, each with text beside it.
+///
+/// # Errors
+/// When the chart cannot be drawn on.
+pub fn discs(chart: &mut Chart<'_, '_>, discs: &[Disc]) -> Result<(), Error> {
+    for Disc { at, radius, colour, .. } in discs {
+        let face = colour.map(|colour| Circle::new(*at, *radius, colour.filled()));
+        chart.draw_series(face.into_iter().chain([Circle::new(*at, *radius, RIM.stroke_width(1))]))?;
+    }
+    for Disc { at, text, beside, .. } in discs {
+        let end = if beside[0] < 0 { HPos::Right } else { HPos::Left };
+        let style = ("sans-serif", TEXT).into_font().color(&BLACK).pos(Pos::new(end, VPos::Center));
+        let text = Text::new(text.clone(), (beside[0], beside[1]), style);
+        chart.draw_series([EmptyElement::at(*at) + text])?;
     }
     Ok(())
 }

@@ -29,7 +29,8 @@ mod ticks;
 
 pub use axis::{Axis, Scale};
 pub use canvas::{
-    Area, Bar, Chart, Error, Key, LegendEntry, TEXT, TITLE, bars, cells, chart, legend, marks, svg,
+    Area, Bar, Chart, Disc, Error, Key, LegendEntry, TEXT, TITLE, bars, cells, chart, discs, legend, marks,
+    svg, tiles,
 };
 pub use colour_scale::ColourScale;
 pub use line_chart::{Drawn, Legend, Limit, Line, LineChart};

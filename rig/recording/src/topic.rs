@@ -1,7 +1,7 @@
 //! The topics of a recording and their messages: one table of both.
 
 use masseter_shared::messages::{
-    Command, Event, FrameTap, Machine, Message, Parameters, Reading, Signals, State, Truth,
+    Command, Contact, Event, FrameTap, Machine, Message, Parameters, Reading, Signals, State, Truth,
 };
 
 macro_rules! topics {
@@ -15,6 +15,7 @@ macro_rules! topics {
 
         /// A message of any topic.
         #[derive(Debug, Clone, Copy, PartialEq)]
+        #[expect(clippy::large_enum_variant, reason = "a message is copied as it lies, without an allocation")]
         pub enum Recorded {
             $($(#[$doc])* $name($message)),*
         }
@@ -78,6 +79,8 @@ topics! {
     State: State,
     /// The true motion of the emulated mechanism.
     Truth: Truth,
+    /// The forces between the emulated jaws.
+    Contact: Contact,
     /// CAN frames.
     Frame: FrameTap,
     /// Events.

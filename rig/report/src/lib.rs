@@ -18,6 +18,7 @@ mod junit;
 mod motion_checks;
 mod outcome;
 mod page;
+mod pressure;
 mod run_report;
 mod summary;
 mod table;

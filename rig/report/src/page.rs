@@ -11,6 +11,7 @@ use masseter_shared::config::{MotionConfig, Scenario};
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::wording::counted;
 
+use crate::pressure::Pressure;
 use crate::text::{microseconds, or_dash, significant};
 use crate::verdict::Verdict;
 use crate::{animation, charts, time_line};
@@ -23,6 +24,7 @@ struct Page<'a> {
     verdict: &'a Verdict,
     animation: Option<String>,
     motions: [(&'static str, Option<Drawn>); 2],
+    pressure: Option<Pressure>,
     actuators: [(&'static str, Option<Drawn>); 4],
     signals: Vec<(String, Option<Drawn>)>,
     requirements: Vec<(String, Option<Drawn>)>,
@@ -41,6 +43,7 @@ pub(crate) fn html(manifest: &Manifest, figures: &Figures, verdict: &Verdict) ->
         verdict,
         animation: animation::json(scenario, figures),
         motions: charts::motion(scenario, figures),
+        pressure: Pressure::draw(figures),
         actuators: charts::actuators(scenario, figures),
         signals: charts::signals(scenario, figures),
         requirements: requirements(scenario, figures),

@@ -200,6 +200,8 @@ class Cause(enum.IntEnum):
     NOT_ENABLED = 59
     #: The jaw is too far from the first pose of the motion (m).
     START_TOO_FAR = 60
+    #: Food between the teeth broke (force before, N; the limit is its strength). The object is the first of its teeth.
+    FOOD_BROKE = 61
 
 
 class NoPose(enum.IntEnum):

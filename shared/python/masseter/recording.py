@@ -20,7 +20,14 @@ Messages = NDArray[np.void]
 
 _LAYOUTS = {
     layout.TOPIC: layout
-    for layout in (messages.Reading, messages.Command, messages.State, messages.Event, messages.Truth)
+    for layout in (
+        messages.Reading,
+        messages.Command,
+        messages.State,
+        messages.Event,
+        messages.Truth,
+        messages.Contact,
+    )
 }
 
 
@@ -34,6 +41,8 @@ class Run:
     state: Messages
     event: Messages
     truth: Messages
+    #: Forces on the teeth of the emulated jaw; empty without `[teeth]` and food.
+    contact: Messages
     #: A field for each signal that the controller declared.
     signal: Messages
     #: A field for each parameter, with a row at the start and one for each change.

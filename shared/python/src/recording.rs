@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use masseter_recording::{Reader, Recorded};
-use masseter_shared::messages::{Command, Event, Message, Parameters, Reading, Signals, State, Truth};
+use masseter_shared::messages::{
+    Command, Contact, Event, Message, Parameters, Reading, Signals, State, Truth,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -31,6 +33,7 @@ fn read(path: &std::path::Path) -> Result<(Topics, bool), masseter_recording::Re
         State::TOPIC,
         Event::TOPIC,
         Truth::TOPIC,
+        Contact::TOPIC,
         Signals::TOPIC,
         Parameters::TOPIC,
     ];
@@ -42,6 +45,7 @@ fn read(path: &std::path::Path) -> Result<(Topics, bool), masseter_recording::Re
             Recorded::State(message) => (State::TOPIC, message.body()),
             Recorded::Event(message) => (Event::TOPIC, message.body()),
             Recorded::Truth(message) => (Truth::TOPIC, message.body()),
+            Recorded::Contact(message) => (Contact::TOPIC, message.body()),
             Recorded::Signals(message) => (Signals::TOPIC, message.body()),
             Recorded::Parameters(message) => (Parameters::TOPIC, message.body()),
             _ => continue,

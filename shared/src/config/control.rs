@@ -50,7 +50,7 @@ section! {
         /// 300 Hz on a first missed target stays below 0.5 mm and 0.5° too, at 100 Hz it leads to 1.1 mm and 1.5°.
         pub tracking_limit_m: f64 = 0.2e-3,
         /// Angle of the platform to its desired orientation at which the controller stops safely, rad.
-        /// 0.2°, four times the largest of the default food, 0.052°; such a drive adds up to 0.18° a cycle at
+        /// 0.2°, four times the largest of the default food, 0.053°; such a drive adds up to 0.18° a cycle at
         /// 1 kHz.
         pub tracking_limit_rad: f64 = 3.5e-3,
         /// Time constant of the mean squares of that distance and that angle, s.

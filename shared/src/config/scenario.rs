@@ -9,6 +9,7 @@ use super::circle::refuse_circles;
 use super::document::{Document, place};
 use super::drive_profile::over_kinds;
 use super::error::ScenarioError;
+use super::food::over_food;
 use super::merge::merge;
 use super::need::{LONGEST_S, SHORTEST_MOTION_S, require_within};
 use super::robot_file;
@@ -16,7 +17,7 @@ use super::when::EntryNames;
 use super::{
     AxisScale, CanConfig, ChecksConfig, ControllerConfig, DriveProfile, DrivesConfig, DryConfig,
     DynamicsConfig, ExpectConfig, FaultConfig, FoodConfig, JawConfig, MotionConfig, RealtimeConfig,
-    RequirementConfig, StimulusConfig, TrajectoryLimitsConfig,
+    RequirementConfig, StimulusConfig, TeethConfig, ToothConfig, TrajectoryLimitsConfig,
 };
 use crate::clock::SECOND_NS;
 use crate::geometry::MechanismConfig;
@@ -74,7 +75,10 @@ section! {
         pub dry: DryConfig = DryConfig::default(),
         /// The emulated mechanism.
         pub dynamics: DynamicsConfig = DynamicsConfig::default(),
+        /// The teeth of the emulated jaw; when absent they never meet.
+        pub teeth: Option<TeethConfig> = None,
         /// Food between the teeth of the emulated jaw; none when absent.
+        #[serde(deserialize_with = "over_food")]
         pub food: Option<FoodConfig> = None,
         /// The scheduling of the real-time processes.
         pub realtime: RealtimeConfig = RealtimeConfig::default(),
@@ -197,7 +201,8 @@ impl Scenario {
         };
         let scenario: Self = toml::from_str(text).map_err(|error| {
             let (food, expect) = (Some(FoodConfig::default()), Some(ExpectConfig::default()));
-            let every_table = Self { food, expect, ..Self::default() };
+            let teeth = Some(TeethConfig::default());
+            let every_table = Self { teeth, food, expect, ..Self::default() };
             unnamed(&every_table).unwrap_or_else(|| malformed(path, text, Some(&document), &error))
         })?;
         unnamed(&scenario).map_or(Ok(scenario), Err)
@@ -276,12 +281,14 @@ impl Scenario {
         self.drives.validate()?;
         DriveProfile::validate_all(&self.drive_profile)?;
         self.dynamics.validate()?;
+        self.teeth.as_ref().map_or(Ok(()), TeethConfig::validate)?;
+        let arch = self.arch();
         let entries = self.entry_names();
         for (number, fault) in self.faults.iter().enumerate() {
             fault.validate(&self.can, &entries).map_err(|error| error.of_entry(number))?;
         }
         for (number, stimulus) in self.stimulus.iter().enumerate() {
-            stimulus.validate(&entries).map_err(|error| error.of_entry(number))?;
+            stimulus.validate(&entries, &arch).map_err(|error| error.of_entry(number))?;
         }
         let faults = self.faults.iter().map(|fault| fault.when(&entries).map(|when| when.start));
         let stimuli = self.stimulus.iter().map(|stimulus| stimulus.when(&entries).map(|when| when.start));
@@ -294,7 +301,7 @@ impl Scenario {
             expect.validate()?;
         }
         if let Some(food) = &self.food {
-            food.validate()?;
+            food.validate(&arch)?;
         }
         self.limits.validate()?;
         self.dry.validate()?;
@@ -307,6 +314,23 @@ impl Scenario {
     pub fn observation_s(&self) -> f64 {
         let times = self.require.iter().filter_map(|requirement| requirement.stays_for);
         times.map(|time| time.si()).fold(0.0, f64::max).min(LONGEST_OBSERVATION_S)
+    }
+
+    /// The lower teeth that the jaw has, by their numbers.
+    pub fn arch(&self) -> Vec<ToothConfig> {
+        self.teeth
+            .as_ref()
+            .map_or_else(|| TeethConfig::default().arch(&self.jaw), |teeth| teeth.arch(&self.jaw))
+    }
+
+    /// The foods of the whole run, those of the stimuli too.
+    pub fn foods(&self) -> impl Iterator<Item = &FoodConfig> {
+        self.food.iter().chain(self.stimulus.iter().filter_map(|stimulus| stimulus.food.as_ref()))
+    }
+
+    /// Whether the emulated jaws can touch: by their teeth, or by food.
+    pub fn has_contact(&self) -> bool {
+        self.can.is_virtual() && (self.teeth.is_some() || self.foods().next().is_some())
     }
 
     /// What the master expects of the drive of an axis.

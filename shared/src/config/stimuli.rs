@@ -6,9 +6,10 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use super::error::ScenarioError;
-use super::food::FoodConfig;
+use super::food::{FoodConfig, over_food};
 use super::need::{require_name, require_within};
 use super::quantity::{Dimension, Quantity};
+use super::teeth::ToothConfig;
 use super::when::{EntryNames, When, WhenKeys};
 
 /// The course of a stimulus between its beginning and its end.
@@ -73,6 +74,7 @@ pub struct StimulusConfig {
     /// Where the force acts, in the platform frame, m; the incisal point when absent.
     pub point_m: Option<[f64; 3]>,
     /// Another food from then on.
+    #[serde(default, deserialize_with = "over_food")]
     pub food: Option<FoodConfig>,
     /// A mass that the platform carries at the incisal point.
     pub payload: Option<Quantity>,
@@ -152,7 +154,11 @@ impl StimulusConfig {
         WhenKeys { names, at_s, after, for_s: self.for_s, from_s: None, until_s: None }.resolve(entries)
     }
 
-    pub(super) fn validate(&self, entries: &EntryNames<'_>) -> Result<(), ScenarioError> {
+    pub(super) fn validate(
+        &self,
+        entries: &EntryNames<'_>,
+        arch: &[ToothConfig],
+    ) -> Result<(), ScenarioError> {
         let refuse = |key, value: &str, need: &str| Err(ScenarioError::bad(key, &value, need));
         self.when(entries)?;
         if let Some(name) = &self.name {
@@ -182,7 +188,8 @@ impl StimulusConfig {
         if what == "parameter" && self.value.is_none() {
             return refuse("stimulus.value", "none", "give the value that the parameter gets");
         }
-        self.check_ranges()
+        self.check_ranges()?;
+        self.food.as_ref().map_or(Ok(()), |food| food.validate(arch))
     }
 
     fn check_ranges(&self) -> Result<(), ScenarioError> {
@@ -207,6 +214,6 @@ impl StimulusConfig {
         if self.value.is_some_and(|value| !value.is_finite()) {
             return Err(ScenarioError::bad("stimulus.value", &"not finite", "use a finite number"));
         }
-        self.food.map_or(Ok(()), |food| food.validate())
+        Ok(())
     }
 }

@@ -208,6 +208,10 @@ codes! {
         NotEnabled = 59 "not_enabled",
         /// The jaw is too far from the first pose of the motion (m).
         StartTooFar = 60 "start_too_far",
+        /// Food between the teeth broke (force before, N; the limit is its strength). The object is the first of its teeth.
+        FoodBroke = 61 "food_broke",
+        /// An axis of the mechanism ran into an end stop (m/s).
+        EndStopHit = 62 "end_stop_hit",
     }
 }
 

@@ -19,6 +19,7 @@ fn place(event: &Event) -> String {
     let Event { node, bus, .. } = event;
     match (AXIS_NAMES.get(event.axis as usize), node) {
         _ if event.cause == Cause::LawFailed.code() => "the pose law".to_owned(),
+        _ if event.cause == Cause::FoodBroke.code() => format!("tooth {}", event.object),
         (None, 0) if event.source == Source::Controller.code() => "the mechanism".to_owned(),
         (Some(axis), 1..) => format!("axis {axis} (node {node} on bus {bus})"),
         (Some(axis), 0) => format!("axis {axis}"),
@@ -64,6 +65,8 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
             event.value * 1e3,
             event.limit * 1e3
         ),
+        Cause::FoodBroke => format!("the food broke at {:.0} N", event.value),
+        Cause::EndStopHit => format!("ran into its end stop at {:.1} mm/s", event.value.abs() * 1e3),
         Cause::StillPowered => {
             format!("was left switched on, and a quick stop does not switch it off; statusword {value:04X}h")
         }

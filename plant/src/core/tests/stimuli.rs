@@ -109,16 +109,27 @@ fn the_axes_carry_a_payload_at_the_incisal_point() {
 
 #[test]
 fn another_food_bites_otherwise_for_its_time() {
-    // Between jaws that are 7.4 mm open.
-    let thick =
-        FoodConfig { thickness_m: 0.02, yield_n: 500.0, stiffness_n_per_m: 1000.0, ..FoodConfig::default() };
-    let (mut bench, held_m) = bench_with(StimulusConfig { food: Some(thick), ..stimulus() });
-    hold(&mut bench, held_m, 45);
-    assert!(bench.truth.bite_force_n < 1e-9, "there is no food");
-    hold(&mut bench, held_m, 150);
-    assert!((11.0..14.0).contains(&bench.truth.bite_force_n), "{}", bench.truth.bite_force_n);
-    hold(&mut bench, held_m, 100);
-    assert!(bench.truth.bite_force_n < 1e-9);
+    // Between jaws that are 7.4 mm open, and that legs longer by 1 mm close to 6.4 mm.
+    let food = FoodConfig {
+        thickness_m: 0.007,
+        stiffness_n_per_m: 20_000.0,
+        strength_n: 500.0,
+        ..FoodConfig::default()
+    };
+    let (mut bench, held_m) = bench_with(StimulusConfig { food: Some(food), ..stimulus() });
+    hold(&mut bench, held_m, 60);
+    assert!(bench.truth.bite_force_n < 1e-9, "the food does not fill the mouth");
+    for step in 1..=100 {
+        let closing_m = held_m.map(|held_m| held_m + if held_m > 0.1 { 1e-5 * f64::from(step) } else { 0.0 });
+        hold(&mut bench, closing_m, 1);
+    }
+    let closed_m = bench.reading.position_m;
+    assert!((9.0..14.0).contains(&bench.truth.bite_force_n), "{}", bench.truth.bite_force_n);
+    let contact = bench.plant.contact().unwrap();
+    let of_36 = contact.teeth().find(|tooth| tooth.number == 36).unwrap();
+    assert!((of_36.load_n() - bench.truth.bite_force_n).abs() < 1.0, "{of_36:?}");
+    hold(&mut bench, closed_m, 150);
+    assert!(bench.truth.bite_force_n < 1e-9, "the stimulus is over");
 }
 
 #[test]

@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use masseter_shared::config::Scenario;
+use masseter_shared::config::Scenario;
 use masseter_shared::dynamics::{Energy, Reactions};
 use masseter_shared::messages::{pose_fields, pose_from_fields};
 
@@ -58,7 +59,9 @@ fn answers(mechanism: &Mechanism, bodies: &Bodies, folder: &Path) -> String {
 fn path(mechanism: Mechanism, config: DynamicsConfig, folder: &Path) -> String {
     let [start] = *rows::<13>(&folder.join("start.csv")) else { panic!("one start") };
     let (pose, twist) = motion_of(&start);
-    let mut dynamics = Dynamics::new(mechanism, config, pose, None, [0.0; 3]).unwrap();
+    let mut dynamics =
+        Dynamics::new(mechanism, config, pose, Occlusion::new(&Scenario::default(), &pose), [0.0; 3])
+            .unwrap();
     dynamics.state.twist = twist;
     let mut path = String::new();
     for force_n in rows::<AXES>(&folder.join("forces.csv")) {

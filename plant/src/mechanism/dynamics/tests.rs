@@ -8,8 +8,19 @@ use super::*;
 
 fn at_rest(config: DynamicsConfig) -> Dynamics {
     let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
-    Dynamics::new(mechanism, config, Pose::translation(0.0, 0.0, 0.268_452_355), None, [0.03, 0.0, 0.0])
-        .unwrap()
+    Dynamics::new(
+        mechanism,
+        config,
+        Pose::translation(0.0, 0.0, 0.268_452_355),
+        without_contact(),
+        [0.03, 0.0, 0.0],
+    )
+    .unwrap()
+}
+
+/// Jaws that never touch.
+fn without_contact() -> Occlusion {
+    Occlusion::new(&masseter_shared::config::Scenario::default(), &Pose::identity())
 }
 
 /// Without friction, and with its end stops far away.

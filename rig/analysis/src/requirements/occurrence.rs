@@ -45,7 +45,7 @@ impl Occurrence {
 }
 
 /// What each reporter can report.
-const REPORTS: [(Source, &[Cause]); 4] = [
+const REPORTS: [(Source, &[Cause]); 5] = [
     (
         Source::Controller,
         &[
@@ -111,6 +111,7 @@ const REPORTS: [(Source, &[Cause]); 4] = [
     ),
     (Source::Drive, &[Cause::Sequence, Cause::Emergency]),
     (Source::Wire, &[Cause::ErrorActive, Cause::ErrorPassive, Cause::BusOff]),
+    (Source::Scenario, &[Cause::FoodBroke, Cause::EndStopHit]),
 ];
 
 /// Whether the name is the end of a stimulus or of a fault that has none.

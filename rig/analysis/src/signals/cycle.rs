@@ -1,6 +1,6 @@
 //! The messages of one cycle of the rig, from both loops.
 
-use masseter_shared::messages::{Command, Parameters, Reading, Signals, State, Truth};
+use masseter_shared::messages::{Command, Contact, Parameters, Reading, Signals, State, Truth};
 
 /// The messages of a cycle; none where a message is missing.
 #[derive(Debug, Clone, Copy, Default)]
@@ -13,6 +13,8 @@ pub struct CycleMessages {
     pub reading: Option<Reading>,
     /// The true motion at the sample.
     pub truth: Option<Truth>,
+    /// The forces between the jaws in the cycle before.
+    pub contact: Option<Contact>,
     /// What the controller made of the sample; without a new sample, its state alone.
     pub state: Option<State>,
     /// Whether the state was computed from this sample.

@@ -94,6 +94,7 @@ impl Registry {
         let jaw = Jaw::new(&scenario.jaw, scenario.can.is_virtual());
         let mut registry = Self { signals: Vec::new(), jaw };
         registry.add_jaw(jaw);
+        registry.add_contact(scenario);
         registry.add_axes();
         registry.add_controller();
         registry.add_timing();
@@ -229,9 +230,29 @@ impl Registry {
         self.add(
             "bite.force",
             "N",
-            "Force with which the emulated jaw bites on food, mean over the cycle.",
+            "Vertical force of food and upper teeth on the emulated jaw, mean over the cycle.",
             |messages| Some(messages.truth?.bite_force_n),
         );
+    }
+
+    /// None where the jaws cannot touch.
+    fn add_contact(&mut self, scenario: &Scenario) {
+        if !scenario.has_contact() {
+            return;
+        }
+        for tooth in scenario.arch().into_iter().map(|tooth| u32::from(tooth.number)) {
+            self.add(
+                format!("contact.{tooth}"),
+                "N",
+                format!("Force of antagonist and food on tooth {tooth}, mean over a cycle."),
+                move |messages| {
+                    loads_n(messages)?.find(|(number, _)| *number == tooth).map(|(_, load_n)| load_n)
+                },
+            );
+        }
+        self.add("contact.total", "N", "Sum of the forces on all teeth.", |messages| {
+            Some(loads_n(messages)?.map(|(_, load_n)| load_n).sum())
+        });
     }
 
     fn add_axes(&mut self) {
@@ -354,6 +375,11 @@ impl Registry {
             );
         }
     }
+}
+
+/// The force on each tooth, N.
+fn loads_n(messages: &CycleMessages) -> Option<impl Iterator<Item = (u32, f64)>> {
+    Some(messages.contact.as_ref()?.teeth().map(|tooth| (tooth.number, tooth.load_n())))
 }
 
 fn controller_states() -> Vec<(&'static str, u32)> {

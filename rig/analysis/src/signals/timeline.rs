@@ -48,6 +48,7 @@ impl Timeline {
         match message {
             Recorded::Reading(reading) => self.at(reading.cycle)?.reading = Some(*reading),
             Recorded::Truth(truth) => self.at(truth.cycle)?.truth = Some(*truth),
+            Recorded::Contact(contact) => self.at(contact.cycle)?.contact = Some(*contact),
             Recorded::State(state) => self.state(state),
             Recorded::Command(command) => self.at(command.cycle)?.command = Some(*command),
             Recorded::Signals(signals) => self.at(signals.cycle)?.signals = Some(*signals),
