@@ -6,7 +6,7 @@ use libfuzzer_sys::arbitrary::Unstructured;
 use libfuzzer_sys::fuzz_target;
 use masseter_can::canopen::{Cob, Emergency, Heartbeat, Nmt, NodeId, SdoRequest, SdoResponse};
 use masseter_can::socketcand::Requests;
-use masseter_can::{CanId, ErrorReport, Rpdo1, Tpdo1, candump};
+use masseter_can::{CanId, ErrorReport, PdoMapping, Rpdo1, Tpdo1, candump};
 use masseter_shared::messages::tap;
 use masseter_shared::messages::{CanData, FrameTap, Message};
 
@@ -36,11 +36,11 @@ fn canopen(data: &[u8]) {
     if let Ok(heartbeat) = Heartbeat::decode(data) {
         assert_eq!(heartbeat.frame(node).data(), data);
     }
-    if let Ok(pdo) = Rpdo1::decode(data) {
-        assert_eq!(pdo.encode(), data);
+    if let Ok(pdo) = Rpdo1::decode(data, &PdoMapping::RPDO1) {
+        assert_eq!(pdo.frame(node, &PdoMapping::RPDO1).data(), data);
     }
-    if let Ok(pdo) = Tpdo1::decode(data) {
-        assert_eq!(pdo.encode(), data);
+    if let Ok(pdo) = Tpdo1::decode(data, &PdoMapping::TPDO1) {
+        assert_eq!(pdo.frame(node, &PdoMapping::TPDO1).data(), data);
     }
 }
 

@@ -5,7 +5,7 @@
 use divan::{Bencher, black_box};
 use masseter_can::canopen::{NodeId, sync};
 use masseter_can::cia402::{Controlword, Statusword};
-use masseter_can::{Bitrate, Bus, Rpdo1, Tpdo1, VirtualWire, WireConfig};
+use masseter_can::{Bitrate, Bus, PdoMapping, Rpdo1, Tpdo1, VirtualWire, WireConfig};
 use masseter_plant::core::PlantCore;
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::codes::DriveRequest;
@@ -60,6 +60,10 @@ fn settle(wire: &mut VirtualWire) {
     }
 }
 
+fn rpdo1(target_increments: i32) -> Rpdo1 {
+    Rpdo1 { controlword: Controlword(0x1F), target_increments, torque_offset_permille: 0 }
+}
+
 /// SYNC, three TPDOs and three RPDOs on one wire.
 fn exchange(wire: &mut VirtualWire, bus: u8, cycle: u64) {
     let sync_ns = cycle * PERIOD_NS;
@@ -70,12 +74,12 @@ fn exchange(wire: &mut VirtualWire, bus: u8, cycle: u64) {
     for (port, id) in drives.clone() {
         let tpdo =
             Tpdo1 { statusword: Statusword(0x1237), actual_increments: position, torque_permille: 120 };
-        wire.port(port).send(sync_ns + 60_000, tpdo.frame(id)).expect("room");
+        wire.port(port).send(sync_ns + 60_000, tpdo.frame(id, &PdoMapping::TPDO1)).expect("room");
     }
     settle(wire);
     for (_, id) in drives {
-        let rpdo = Rpdo1 { controlword: Controlword(0x1F), target_increments: position };
-        wire.port(0).send(sync_ns + 545_000, rpdo.frame(id)).expect("room");
+        let rpdo = rpdo1(position);
+        wire.port(0).send(sync_ns + 545_000, rpdo.frame(id, &PdoMapping::RPDO1)).expect("room");
     }
     settle(wire);
 }
@@ -124,25 +128,25 @@ fn plant(bencher: Bencher<'_, '_>) {
 
 #[divan::bench]
 fn rpdo1_encode(bencher: Bencher<'_, '_>) {
-    let rpdo = Rpdo1 { controlword: Controlword(0x1F), target_increments: 123_456 };
-    bencher.bench(|| black_box(rpdo).frame(black_box(node(3))));
+    let rpdo = rpdo1(123_456);
+    bencher.bench(|| black_box(rpdo).frame(black_box(node(3)), &PdoMapping::RPDO1));
 }
 
 #[divan::bench]
 fn rpdo1_decode(bencher: Bencher<'_, '_>) {
-    let frame = Rpdo1 { controlword: Controlword(0x1F), target_increments: 123_456 }.frame(node(3));
-    bencher.bench(|| Rpdo1::decode(black_box(&frame).data()));
+    let frame = rpdo1(123_456).frame(node(3), &PdoMapping::RPDO1);
+    bencher.bench(|| Rpdo1::decode(black_box(&frame).data(), &PdoMapping::RPDO1));
 }
 
 #[divan::bench]
 fn tpdo1_encode(bencher: Bencher<'_, '_>) {
     let tpdo = Tpdo1 { statusword: Statusword(0x1237), actual_increments: 123_456, torque_permille: 120 };
-    bencher.bench(|| black_box(tpdo).frame(black_box(node(3))));
+    bencher.bench(|| black_box(tpdo).frame(black_box(node(3)), &PdoMapping::TPDO1));
 }
 
 #[divan::bench]
 fn tpdo1_decode(bencher: Bencher<'_, '_>) {
     let tpdo = Tpdo1 { statusword: Statusword(0x1237), actual_increments: 123_456, torque_permille: 120 };
-    let frame = tpdo.frame(node(3));
-    bencher.bench(|| Tpdo1::decode(black_box(&frame).data()));
+    let frame = tpdo.frame(node(3), &PdoMapping::TPDO1);
+    bencher.bench(|| Tpdo1::decode(black_box(&frame).data(), &PdoMapping::TPDO1));
 }

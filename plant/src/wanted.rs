@@ -5,7 +5,7 @@
 
 use masseter_can::canopen::{Cob, CobId, NodeId, ObjectAddress};
 use masseter_can::cia402::interpolation_period;
-use masseter_can::{CanId, EVERY_SYNC, Rpdo1, Tpdo1};
+use masseter_can::{CanId, EVERY_SYNC, PdoMapping};
 use masseter_shared::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_shared::config::{
     AccelerationUnit, DriveProfile, MASTER_NODE, ObjectConfig, ObjectKey, ObjectRule, Scenario,
@@ -58,7 +58,7 @@ pub struct WantedPdo {
     /// Its COB-ID.
     pub cob_id: u32,
     /// The mapped objects: index, sub-index, bits.
-    pub mapping: &'static [u32],
+    pub mapping: PdoMapping,
 }
 
 /// A drive as the rig needs it.
@@ -85,7 +85,7 @@ impl WantedDrive {
         let profile = scenario.profile(axis);
         Ok(Self {
             identity: identity(profile),
-            pdos: pdos(node),
+            pdos: pdos(profile, node),
             home: home(scenario, axis),
             acceleration_unit: profile.units.acceleration,
             objects: objects(scenario, axis)?,
@@ -108,18 +108,19 @@ fn identity(profile: &DriveProfile) -> [WantedIdentity; 4] {
     ]
 }
 
-fn pdos(node: NodeId) -> [WantedPdo; 2] {
+fn pdos(profile: &DriveProfile, node: NodeId) -> [WantedPdo; 2] {
     let pdo = |communication, cob: Cob, mapping| {
         let cob_id = CanId::from(cob).number();
         WantedPdo { communication, cob_id, mapping }
     };
-    [pdo(0x1400, Cob::Rpdo1(node), &Rpdo1::MAPPING), pdo(0x1800, Cob::Tpdo1(node), &Tpdo1::MAPPING)]
+    [pdo(0x1400, Cob::Rpdo1(node), profile.pdos.rpdo1()), pdo(0x1800, Cob::Tpdo1(node), profile.pdos.tpdo1())]
 }
 
 impl WantedPdo {
     /// Every object of the PDO with the bits that count and their value, in the order in which the master compares them.
-    pub fn entries(self) -> impl Iterator<Item = WantedIdentity> {
-        let Self { communication, cob_id, mapping } = self;
+    pub fn entries(&self) -> impl Iterator<Item = WantedIdentity> {
+        let Self { communication, cob_id, .. } = *self;
+        let mapping = self.mapping.entries();
         let entry = |index, subindex, mask, value| WantedIdentity {
             object: ObjectAddress::new(index, subindex),
             mask,

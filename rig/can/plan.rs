@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use masseter_can::{BusPlan, PlannedMessage};
 use masseter_plant::core as plant;
-use masseter_shared::config::{CanConfig, Scenario};
+use masseter_shared::config::Scenario;
 use masseter_shared::schedule::{CycleSchedule, Room, ScheduleError, plans};
 use serde_json::{Value, json};
 
@@ -31,8 +31,8 @@ pub(crate) fn plan(args: &PlanArgs) -> anyhow::Result<Exit> {
         scenario.rate_hz = args.rate_hz.unwrap_or(scenario.rate_hz);
         Ok(())
     })?;
-    let plans = plans(&scenario.can, scenario.period_ns())?;
-    let room = Room::for_link(&scenario.can)?;
+    let plans = plans(&scenario)?;
+    let room = Room::for_link(&scenario)?;
     let refusal = refusal(&scenario, &plans, &room);
     let text = match args.format {
         Format::Human => {
@@ -43,7 +43,7 @@ pub(crate) fn plan(args: &PlanArgs) -> anyhow::Result<Exit> {
             format!("{tables}{verdict}\n")
         }
         Format::Json => {
-            let buses: Result<Vec<_>, _> = plans.iter().map(|plan| of_bus(plan, &scenario.can)).collect();
+            let buses: Result<Vec<_>, _> = plans.iter().map(|plan| of_bus(plan, &scenario)).collect();
             let max_rate_hz = room.max_rate_hz;
             let plan = json!({
                 "fits": refusal.is_none(), "refusal": refusal, "max_rate_hz": max_rate_hz, "buses": buses?,
@@ -60,13 +60,14 @@ fn refusal(scenario: &Scenario, plans: &[BusPlan], room: &Room) -> Option<String
     if let Some(overload) = plans.iter().find_map(|plan| plan.check().err()) {
         return Some(format!("bus {} does not fit; {room}", overload.0.bus));
     }
-    let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns()).map_err(|error| error.to_string());
+    let schedule = CycleSchedule::new(scenario).map_err(|error| error.to_string());
     let plant = plant::check(scenario).map_err(|error| error.to_string());
     schedule.and(plant).err()
 }
 
-fn of_bus(plan: &BusPlan, can: &CanConfig) -> Result<Value, ScheduleError> {
-    let alone = CanConfig { buses: vec![can.buses[plan.bus].clone()], ..can.clone() };
+fn of_bus(plan: &BusPlan, scenario: &Scenario) -> Result<Value, ScheduleError> {
+    let mut alone = scenario.clone();
+    alone.can.buses = vec![scenario.can.buses[plan.bus].clone()];
     Ok(json!({
         "bus": plan.bus,
         "fits": plan.check().is_ok(),

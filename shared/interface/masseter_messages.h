@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define MASSETER_LAYOUT_VERSION 11u
+#define MASSETER_LAYOUT_VERSION 12u
 /* masseter_event.axis when no axis is concerned. */
 #define MASSETER_NO_AXIS 4294967295u
 /* masseter_reading.drive_state of a drive not heard of yet, or lost. */
@@ -213,7 +213,7 @@ enum masseter_no_pose {
 };
 
 #define MASSETER_READING_TOPIC "reading"
-#define MASSETER_READING_TYPE_NAME "masseter/Reading/3b19bd46b3ecd631"
+#define MASSETER_READING_TYPE_NAME "masseter/Reading/5d636b58d953e426"
 
 /* Positions, forces and states of the drives, once a cycle. */
 typedef struct masseter_reading {
@@ -285,7 +285,7 @@ static_assert(offsetof(masseter_reading, fresh_axes) == 248, "offset of fresh_ax
 static_assert(offsetof(masseter_reading, master_fault) == 252, "offset of master_fault");
 
 #define MASSETER_COMMAND_TOPIC "command"
-#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/1f1a892af93718b5"
+#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/9c0206e6ba4fe53c"
 
 /* Targets and request for the drives, once a cycle. */
 typedef struct masseter_command {
@@ -301,24 +301,27 @@ typedef struct masseter_command {
     uint64_t reading_cycle;
     /* Desired positions d₁ d₂ d₃ l₁ l₂ l₃, m. */
     double target_m[6];
+    /* Forces that the drives add to those of their position control, positive towards increasing position, N; 0 without feed-forward. */
+    double force_offset_n[6];
     /* Requested drive state, a DriveRequest. */
     uint32_t request;
     /* State of the controller, a ControllerState. */
     uint32_t controller_state;
 } masseter_command;
 
-static_assert(sizeof(masseter_command) == 96, "size of masseter_command");
+static_assert(sizeof(masseter_command) == 144, "size of masseter_command");
 static_assert(offsetof(masseter_command, seq) == 0, "offset of seq");
 static_assert(offsetof(masseter_command, published_ns) == 8, "offset of published_ns");
 static_assert(offsetof(masseter_command, version) == 16, "offset of version");
 static_assert(offsetof(masseter_command, cycle) == 24, "offset of cycle");
 static_assert(offsetof(masseter_command, reading_cycle) == 32, "offset of reading_cycle");
 static_assert(offsetof(masseter_command, target_m) == 40, "offset of target_m");
-static_assert(offsetof(masseter_command, request) == 88, "offset of request");
-static_assert(offsetof(masseter_command, controller_state) == 92, "offset of controller_state");
+static_assert(offsetof(masseter_command, force_offset_n) == 88, "offset of force_offset_n");
+static_assert(offsetof(masseter_command, request) == 136, "offset of request");
+static_assert(offsetof(masseter_command, controller_state) == 140, "offset of controller_state");
 
 #define MASSETER_STATE_TOPIC "state"
-#define MASSETER_STATE_TYPE_NAME "masseter/State/4ef6b0906fbe819d"
+#define MASSETER_STATE_TYPE_NAME "masseter/State/e76dd2c6f6224022"
 
 /* The controller's state and its estimate, once a cycle. */
 typedef struct masseter_state {
@@ -405,7 +408,7 @@ static_assert(offsetof(masseter_state, iterations) == 288, "offset of iterations
 static_assert(offsetof(masseter_state, controller_state) == 292, "offset of controller_state");
 
 #define MASSETER_EVENT_TOPIC "event"
-#define MASSETER_EVENT_TYPE_NAME "masseter/Event/c2e1365b706a3502"
+#define MASSETER_EVENT_TYPE_NAME "masseter/Event/adca6f2f641c19c9"
 
 /* A single occurrence: a change of state, a fault, an alarm. */
 typedef struct masseter_event {
@@ -462,7 +465,7 @@ static_assert(offsetof(masseter_event, value) == 72, "offset of value");
 static_assert(offsetof(masseter_event, limit) == 80, "offset of limit");
 
 #define MASSETER_TRUTH_TOPIC "truth"
-#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/c07707f6f3b43950"
+#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/f34e53239e7c14b3"
 
 /* The true state of the mechanism, once a cycle; the controller never reads it. */
 typedef struct masseter_truth {

@@ -8,11 +8,11 @@
 use std::fmt;
 
 use crate::clock::{MILLISECOND_NS, SECOND_NS};
-use crate::config::{CanConfig, MASTER_NODE, RATES_HZ};
+use crate::config::{CanConfig, MASTER_NODE, RATES_HZ, Scenario};
 use masseter_can::canopen::{Cob, NodeId, NodeIdError};
 use masseter_can::wire::{INTERFRAME_BITS, unstuffed_bits, worst_case_bits};
 use masseter_can::{
-    Bitrate, BitrateError, BusPlan, NoReleaser, Overload, PeriodicMessage, Release, Rpdo1, Tpdo1,
+    Bitrate, BitrateError, BusPlan, NoReleaser, Overload, PdoMapping, PeriodicMessage, Release,
 };
 
 /// SYNC and the controller's deadline keep this clear of whole milliseconds, where the kernel's timer
@@ -30,13 +30,13 @@ const COMPUTE_NS: u64 = 20_000;
 ///
 /// # Examples
 /// ```
-/// use masseter_shared::config::CanConfig;
+/// use masseter_shared::config::Scenario;
 /// use masseter_shared::schedule::CycleSchedule;
 ///
-/// let schedule = CycleSchedule::new(&CanConfig::default(), 1_000_000)?;
+/// let schedule = CycleSchedule::new(&Scenario::default())?;
 /// assert!(schedule.reading_by_ns < schedule.controller_at_ns);
 /// assert!(schedule.controller_at_ns < schedule.command_by_ns);
-/// let refused = CycleSchedule::new(&CanConfig::default(), 500_000).unwrap_err();
+/// let refused = CycleSchedule::new(&Scenario { rate_hz: 2000, ..Scenario::default() }).unwrap_err();
 /// assert!(refused.to_string().contains("the highest rate_hz that fits"));
 /// # Ok::<(), masseter_shared::schedule::ScheduleError>(())
 /// ```
@@ -96,37 +96,42 @@ pub enum Misfit {
 }
 
 impl CycleSchedule {
-    /// The schedule for cycles of `period_ns`, by the busiest bus.
+    /// The schedule of a scenario's cycles, by the busiest bus.
     ///
     /// # Errors
     /// [`ScheduleError`] for cycles that are too short, with the highest rate that fits.
-    pub fn new(can: &CanConfig, period_ns: u64) -> Result<Self, ScheduleError> {
-        match Self::fit(can, period_ns)? {
+    pub fn new(scenario: &Scenario) -> Result<Self, ScheduleError> {
+        match Self::fit(scenario, scenario.period_ns())? {
             Ok(schedule) => Ok(schedule),
-            Err(misfit) => Err(ScheduleError::Misfit { misfit, room: Room::for_link(can)? }),
+            Err(misfit) => Err(ScheduleError::Misfit { misfit, room: Room::for_link(scenario)? }),
         }
     }
 
-    fn fit(can: &CanConfig, period_ns: u64) -> Result<Result<Self, Misfit>, ScheduleError> {
-        let mut plans = plans(can, period_ns)?.into_iter().chain(plans_of(can, period_ns, true)?);
+    fn fit(scenario: &Scenario, period_ns: u64) -> Result<Result<Self, Misfit>, ScheduleError> {
+        let mut plans =
+            plans_of(scenario, period_ns, false)?.into_iter().chain(plans_of(scenario, period_ns, true)?);
         if let Some(overload) = plans.find_map(|plan| plan.check().err()) {
             return Ok(Err(overload.into()));
         }
-        Ok(Self::offsets(can, can.bitrate()?, period_ns))
+        Ok(Self::offsets(scenario, scenario.can.bitrate()?, period_ns))
     }
 
-    fn offsets(can: &CanConfig, bitrate: Bitrate, period_ns: u64) -> Result<Self, Misfit> {
+    fn offsets(scenario: &Scenario, bitrate: Bitrate, period_ns: u64) -> Result<Self, Misfit> {
+        let can = &scenario.can;
         let longest = |length| bitrate.bits_to_ns(worst_case_bits(length, false));
         let shortest = |length| bitrate.bits_to_ns(unstuffed_bits(length, false));
         let axes = can.buses.iter().map(Vec::len).max().unwrap_or(0) as u64;
-        let (sync, tpdo, rpdo) = (0, Tpdo1::LENGTH as u32, Rpdo1::LENGTH as u32);
+        let (sync, tpdo) = (0, length(&PdoMapping::TPDO1));
         // A frame has arrived before the interframe space behind it.
         let pause_ns = bitrate.bits_to_ns(INTERFRAME_BITS);
         let reading_from_ns = shortest(sync) + axes * shortest(tpdo) - pause_ns;
         // A heartbeat may have begun just before SYNC is queued.
         let heartbeat_ns = heartbeat_ns(bitrate);
         let up_ns = longest(sync) + axes * longest(tpdo);
-        let down_ns = axes * longest(rpdo);
+        let rpdos_ns = |axes: &Vec<usize>| {
+            axes.iter().map(|&axis| longest(length(&scenario.profile(axis).pdos.rpdo1()))).sum()
+        };
+        let down_ns = can.buses.iter().map(rpdos_ns).max().unwrap_or(0);
         let reading_by_ns = heartbeat_ns + up_ns + answer_ns(can, heartbeat_ns);
         let command_by_ns = period_ns.saturating_sub(heartbeat_ns + down_ns);
         let controller_at_ns = reading_by_ns + PUBLISH_NS;
@@ -160,13 +165,14 @@ impl fmt::Display for Room {
 }
 
 impl Room {
-    /// The room of a configured link, by bisection: whatever fits into a cycle fits into a longer one.
+    /// The room of a scenario's link, by bisection: whatever fits into a cycle fits into a longer one.
     ///
     /// # Errors
     /// [`ScheduleError`] for unknown bit rates and node ids.
-    pub fn for_link(can: &CanConfig) -> Result<Self, ScheduleError> {
+    pub fn for_link(scenario: &Scenario) -> Result<Self, ScheduleError> {
+        let can = &scenario.can;
         let fits = |rate_hz: u32| {
-            CycleSchedule::fit(can, SECOND_NS / u64::from(rate_hz)).map(|fitted| fitted.is_ok())
+            CycleSchedule::fit(scenario, SECOND_NS / u64::from(rate_hz)).map(|fitted| fitted.is_ok())
         };
         let answer_ns = answer_ns(can, heartbeat_ns(can.bitrate()?));
         let (mut max_rate_hz, mut too_high_hz) = (*RATES_HZ.start(), *RATES_HZ.end() + 1);
@@ -202,10 +208,10 @@ const HEARTBEAT_LENGTH: u32 = 1;
 /// SYNC and its own process data once a cycle, here without jitter.
 ///
 /// ```
-/// use masseter_shared::config::CanConfig;
+/// use masseter_shared::config::Scenario;
 /// use masseter_shared::schedule::plans;
 ///
-/// for plan in plans(&CanConfig::default(), 1_000_000)? {
+/// for plan in plans(&Scenario::default())? {
 ///     plan.check()?;
 ///     println!("{:.0} % of the bus in use", plan.utilisation() * 100.0);
 /// }
@@ -214,8 +220,8 @@ const HEARTBEAT_LENGTH: u32 = 1;
 ///
 /// # Errors
 /// [`ScheduleError`] for unknown bit rates, node ids and releasers. [`BusPlan::check`] finds messages that do not fit.
-pub fn plans(can: &CanConfig, period_ns: u64) -> Result<Vec<BusPlan>, ScheduleError> {
-    plans_of(can, period_ns, false)
+pub fn plans(scenario: &Scenario) -> Result<Vec<BusPlan>, ScheduleError> {
+    plans_of(scenario, scenario.period_ns(), false)
 }
 
 /// The plans while all drives run, or while the first one of every bus `boots` and the others run: then request and answer
@@ -224,16 +230,29 @@ pub fn plans(can: &CanConfig, period_ns: u64) -> Result<Vec<BusPlan>, ScheduleEr
 ///
 /// The offsets of the schedule hold as well: an SDO frame blocks the bus for longer than a heartbeat, but for no longer than
 /// a heartbeat and the missing process data.
-fn plans_of(can: &CanConfig, period_ns: u64, boots: bool) -> Result<Vec<BusPlan>, ScheduleError> {
+fn plans_of(scenario: &Scenario, period_ns: u64, boots: bool) -> Result<Vec<BusPlan>, ScheduleError> {
+    let can = &scenario.can;
     let plan = |(bus, axes): (usize, &Vec<usize>)| {
-        let ids = axes.iter().filter_map(|&axis| can.node_ids.get(axis)).map(|&id| NodeId::new(id));
-        let messages = messages(&ids.collect::<Result<Vec<_>, _>>()?, can, period_ns, boots);
+        let ids = axes.iter().filter_map(|&axis| Some((*can.node_ids.get(axis)?, axis)));
+        let drives = ids.map(|(id, axis)| Ok((NodeId::new(id)?, scenario.profile(axis).pdos.rpdo1())));
+        let drives = drives.collect::<Result<Vec<_>, NodeIdError>>()?;
+        let messages = messages(&drives, can, period_ns, boots);
         Ok(BusPlan::new(bus, can.bitrate()?, period_ns, messages)?)
     };
     can.buses.iter().enumerate().map(plan).collect()
 }
 
-fn messages(drives: &[NodeId], can: &CanConfig, period_ns: u64, boots: bool) -> Vec<PeriodicMessage> {
+/// Data bytes of a PDO.
+fn length(mapping: &PdoMapping) -> u32 {
+    mapping.length() as u32
+}
+
+fn messages(
+    drives: &[(NodeId, PdoMapping)],
+    can: &CanConfig,
+    period_ns: u64,
+    boots: bool,
+) -> Vec<PeriodicMessage> {
     let heartbeat_ns = u64::from(can.heartbeat_producer_ms) * MILLISECOND_NS;
     let message = |name: String, cob: Cob, data_length: u32, period_ns: u64| PeriodicMessage {
         name,
@@ -244,7 +263,7 @@ fn messages(drives: &[NodeId], can: &CanConfig, period_ns: u64, boots: bool) -> 
         release: None,
     };
     let mut messages = vec![message("SYNC".to_owned(), Cob::Sync, 0, period_ns)];
-    for (index, &node) in drives.iter().enumerate() {
+    for (index, &(node, rpdo1)) in drives.iter().enumerate() {
         if index == 0 && boots {
             // The answer may take until the end of the next cycle.
             let sdo = |name: &str, cob| PeriodicMessage {
@@ -255,14 +274,14 @@ fn messages(drives: &[NodeId], can: &CanConfig, period_ns: u64, boots: bool) -> 
             messages.push(sdo("SDO response", Cob::SdoResponse(node)));
             continue;
         }
-        let (tpdo, rpdo) = (Tpdo1::LENGTH as u32, Rpdo1::LENGTH as u32);
+        let (tpdo, rpdo) = (length(&PdoMapping::TPDO1), length(&rpdo1));
         messages.push(PeriodicMessage {
             release: Some(Release { by: Cob::Sync.into(), within_ns: u64::from(can.answer_us) * 1000 }),
             ..message(format!("TPDO1 {}", node.get()), Cob::Tpdo1(node), tpdo, period_ns)
         });
         messages.push(message(format!("RPDO1 {}", node.get()), Cob::Rpdo1(node), rpdo, period_ns));
     }
-    for &node in drives.iter().chain([&MASTER_NODE]) {
+    for node in drives.iter().map(|&(node, _)| node).chain([MASTER_NODE]) {
         let name = format!("heartbeat {}", node.get());
         messages.push(message(name, Cob::Heartbeat(node), HEARTBEAT_LENGTH, heartbeat_ns));
     }
@@ -273,9 +292,30 @@ fn messages(drives: &[NodeId], can: &CanConfig, period_ns: u64, boots: bool) -> 
 mod tests {
     use super::*;
 
+    fn scenario(can: CanConfig, rate_hz: u32) -> Scenario {
+        Scenario { can, rate_hz, ..Scenario::default() }
+    }
+
+    /// RPDO1 of eight bytes: three frames of 20 µs more on each bus.
+    #[test]
+    fn a_torque_offset_lengthens_the_frames_and_the_command_is_due_earlier() {
+        let with_offset = |axes: &str, rate_hz| {
+            let pdos = "pdos.rpdo1 = ['6040h', '607Ah', '60B2h']";
+            let text = format!("rate_hz = {rate_hz}\n[[drive_profile]]\naxes = [{axes}]\n{pdos}");
+            Scenario::parse(std::path::Path::new("robot.toml"), &text).unwrap()
+        };
+        let command_by_ns = |axes| CycleSchedule::new(&with_offset(axes, 500)).unwrap().command_by_ns;
+        let [none, one, all] = ["", "'l1'", "'d1', 'd2', 'd3', 'l1', 'l2', 'l3'"].map(command_by_ns);
+        assert_eq!([none - one, none - all], [20_000, 60_000], "the busiest bus counts");
+        let cycle_ns = |axes| plans(&with_offset(axes, 500)).unwrap().last().unwrap().cycle_time_ns();
+        assert_eq!(cycle_ns("'l1'") - cycle_ns(""), 20_000);
+        let refusal = CycleSchedule::new(&with_offset("'l1', 'l2', 'l3'", 1000)).unwrap_err().to_string();
+        assert!(refusal.ends_with("the highest rate_hz that fits is 970"), "{refusal}");
+    }
+
     #[test]
     fn two_buses_hold_a_kilohertz_and_the_offsets_follow_the_frames() {
-        let schedule = CycleSchedule::new(&CanConfig::default(), 1_000_000).unwrap();
+        let schedule = CycleSchedule::new(&Scenario::default()).unwrap();
         assert_eq!(schedule.reading_from_ns, (47 + 3 * 111 - 3) * 1000);
         assert_eq!(schedule.reading_by_ns, (65 + 55 + 3 * 135) * 1000);
         assert_eq!(schedule.controller_at_ns, schedule.reading_by_ns + PUBLISH_NS);
@@ -286,7 +326,7 @@ mod tests {
     fn drives_that_take_time_to_answer_delay_the_reading() {
         let slow = CanConfig { answer_us: 300, ..Default::default() };
         let [at_once, late] = [CanConfig::default(), slow]
-            .map(|can| CycleSchedule::new(&can, 2_000_000).unwrap().reading_by_ns);
+            .map(|can| CycleSchedule::new(&scenario(can, 500)).unwrap().reading_by_ns);
         assert_eq!(late, at_once + 300_000 + 65_000, "meanwhile another heartbeat may begin");
     }
 
@@ -295,11 +335,11 @@ mod tests {
         let bits = |length| worst_case_bits(length, false);
         for axes in 1..=6 {
             let [sdo, heartbeat] = [SDO_LENGTH, HEARTBEAT_LENGTH].map(bits);
-            let [tpdo, rpdo] = [Tpdo1::LENGTH, Rpdo1::LENGTH].map(|length| bits(length as u32));
+            let [tpdo, rpdo] = [PdoMapping::TPDO1, PdoMapping::RPDO1].map(|mapping| bits(length(&mapping)));
             assert!(sdo + (axes - 1) * tpdo <= heartbeat + axes * tpdo);
             assert!(sdo + (axes - 1) * rpdo <= heartbeat + axes * rpdo);
         }
-        for plan in plans_of(&CanConfig::default(), 1_000_000, true).unwrap() {
+        for plan in plans_of(&Scenario::default(), 1_000_000, true).unwrap() {
             assert_eq!(plan.check(), Ok(()));
         }
     }
@@ -307,21 +347,21 @@ mod tests {
     #[test]
     fn one_bus_at_a_kilohertz_is_refused_with_the_arithmetic() {
         let one = CanConfig { buses: vec![vec![0, 1, 2, 3, 4, 5]], ..Default::default() };
-        let error = CycleSchedule::new(&one, 1_000_000).unwrap_err().to_string();
+        let error = CycleSchedule::new(&scenario(one.clone(), 1000)).unwrap_err().to_string();
         assert!(error.contains("takes 1555.0 µs at worst;") && error.contains("too late"), "{error}");
-        assert!(CycleSchedule::new(&one, 4_000_000).is_ok());
+        assert!(CycleSchedule::new(&scenario(one, 250)).is_ok());
     }
 
     #[test]
     fn an_ideal_bus_holds_twenty_kilohertz() {
         let ideal = CanConfig { ideal: true, ..Default::default() };
-        let schedule = CycleSchedule::new(&ideal, 50_000).unwrap();
+        let schedule = CycleSchedule::new(&scenario(ideal, 20_000)).unwrap();
         assert!(schedule.reading_by_ns < 1000 && schedule.command_by_ns > 49_000, "{schedule:?}");
     }
 
     #[test]
     fn the_last_process_data_of_a_cycle_wait_for_all_others_and_a_heartbeat() {
-        let plans = plans(&CanConfig::default(), 1_000_000).unwrap();
+        let plans = plans(&Scenario::default()).unwrap();
         let last = Cob::Rpdo1(NodeId::new(3).unwrap()).into();
         let last = plans[0].messages.iter().find(|planned| planned.message.id == last).unwrap();
         assert_eq!(last.response_ns, Some((65 + 55 + 3 * 135 + 3 * 115) * 1000));
@@ -329,7 +369,7 @@ mod tests {
 
     #[test]
     fn a_cycle_without_time_for_the_controller_is_refused() {
-        let error = CycleSchedule::new(&CanConfig::default(), 960_000).unwrap_err();
+        let error = CycleSchedule::new(&scenario(CanConfig::default(), 1041)).unwrap_err();
         assert!(matches!(error, ScheduleError::Misfit { misfit: Misfit::NoTime { .. }, .. }), "{error}");
     }
 
@@ -341,26 +381,26 @@ mod tests {
             CanConfig { answer_us: 10, ..Default::default() },
             CanConfig { buses: one_bus, ..Default::default() },
         ] {
-            let highest_hz = Room::for_link(&can).unwrap().max_rate_hz.unwrap();
-            let fits = |rate_hz: u32| CycleSchedule::new(&can, SECOND_NS / u64::from(rate_hz)).is_ok();
+            let highest_hz = Room::for_link(&scenario(can.clone(), 1000)).unwrap().max_rate_hz.unwrap();
+            let fits = |rate_hz: u32| CycleSchedule::new(&scenario(can.clone(), rate_hz)).is_ok();
             assert!(fits(highest_hz) && !fits(highest_hz + 1), "{highest_hz} Hz: {can:?}");
         }
         let ideal = CanConfig { ideal: true, ..Default::default() };
-        assert_eq!(Room::for_link(&ideal).unwrap().max_rate_hz, Some(*RATES_HZ.end()));
+        assert_eq!(Room::for_link(&scenario(ideal, 1000)).unwrap().max_rate_hz, Some(*RATES_HZ.end()));
     }
 
     #[test]
     fn a_refusal_names_the_highest_rate_and_the_answer_time_of_slow_drives() {
         let slow = CanConfig { answer_us: 10, ..Default::default() };
-        let refusal = |can, period_ns| CycleSchedule::new(can, period_ns).unwrap_err().to_string();
-        let said = refusal(&slow, 1_000_000);
+        let refusal = |can, rate_hz| CycleSchedule::new(&scenario(can, rate_hz)).unwrap_err().to_string();
+        let said = refusal(slow, 1000);
         assert!(
             said.ends_with(
                 "the highest rate_hz that fits is 956, since can.answer_us takes 75 µs of every cycle"
             ),
             "{said}"
         );
-        let said = refusal(&CanConfig::default(), 800_000);
+        let said = refusal(CanConfig::default(), 1250);
         assert!(said.ends_with("the highest rate_hz that fits is 1030"), "{said}");
     }
 }

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use masseter_can::Frame;
 use masseter_can::canopen::{Cob, Emergency, Heartbeat, NmtState, NodeId, SdoResponse};
-use masseter_can::{Frame, Tpdo1};
 use masseter_shared::config::MASTER_NODE;
 
 /// What was heard of one drive.
@@ -15,8 +15,6 @@ pub struct Heard {
     pub boot_ups: u32,
     /// Its emergencies, the oldest first.
     pub emergencies: Vec<Emergency>,
-    /// Its newest process data.
-    pub process_data: Option<Tpdo1>,
     /// An answer of its SDO server that nobody has taken.
     pub(super) answer: Option<SdoResponse>,
 }
@@ -32,7 +30,6 @@ impl Heard {
                 }
             }
             Cob::Emergency(_) => self.emergencies.extend(Emergency::decode(frame.data())),
-            Cob::Tpdo1(_) => self.process_data = Tpdo1::decode(frame.data()).ok().or(self.process_data),
             Cob::SdoResponse(_) => self.answer = SdoResponse::decode(frame.data()).ok(),
             _ => {}
         }

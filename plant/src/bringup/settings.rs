@@ -123,8 +123,12 @@ impl Settings {
         let pdos = wanted.pdos.iter().map(|pdo| {
             let timer = (pdo.communication >= 0x1800).then_some(0);
             let transmission = EVERY_SYNC.into();
-            let layout =
-                PdoLayout { transmission, inhibit: timer, event: timer, mapping: pdo.mapping.to_vec() };
+            let layout = PdoLayout {
+                transmission,
+                inhibit: timer,
+                event: timer,
+                mapping: pdo.mapping.entries().to_vec(),
+            };
             PdoSetting { communication: pdo.communication, cob_id: pdo.cob_id, layout: Some(layout) }
         });
         let others =

@@ -102,7 +102,7 @@ fn mapped(objects: &Objects, index: u16, drive: &DriveConfig) -> Vec<Signal> {
                 let ends = [names::MIN_POSITION_LIMIT, names::MAX_POSITION_LIMIT];
                 (drive.encoder_resolution_m, "m", Some(ends.map(|end| f64::from(objects.get(end)))))
             }
-            0x6077 => {
+            0x6077 | 0x60B2 => {
                 let most = f64::from(objects.get(names::MAX_TORQUE));
                 (drive.rated_force_n / 1000.0, "N", Some([-most, most]))
             }

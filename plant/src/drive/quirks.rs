@@ -1,20 +1,16 @@
 //! What a drive does otherwise than the standard, from the scenario's quirks: in its dictionary, as a node, as an axis.
 
 use masseter_can::canopen::CobId;
-use masseter_can::{Rpdo1, Tpdo1};
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::config::{INCREMENTS_PER_TURN, QuirkConfig, QuirkKindConfig as Kind};
 
-use super::dictionary::{MAPPED_MAX, Objects, Overlay, PDOS, RPM_PER_S, names};
+use super::dictionary::{Objects, Overlay, PDOS, RPM_PER_S, names};
 
 /// Inhibit time of transmit PDOs as delivered: 1 ms.
 const FACTORY_INHIBIT: u16 = 10;
 /// CiA 402's generic PDOs after their first object, the controlword or the statusword: nothing, mode, position.
-const GENERIC: [[Option<u32>; 2]; 3] = [
-    [None, None],
-    [Some(0x6060_0008), Some(0x6061_0008)],
-    [Some(Rpdo1::MAPPING[1]), Some(Tpdo1::MAPPING[1])],
-];
+const GENERIC: [[Option<u32>; 2]; 3] =
+    [[None, None], [Some(0x6060_0008), Some(0x6061_0008)], [Some(0x607A_0020), Some(0x6064_0020)]];
 /// Most that 60C2h:01 takes where its limits are narrow.
 const NARROW_PERIOD: u8 = 100;
 /// Milliseconds in 60C2h:02.
@@ -150,7 +146,7 @@ impl Quirks {
 /// transmits the first one.
 fn set_factory_pdos(objects: &mut Objects) {
     for number in 0..PDOS as u16 {
-        let places = [(0x1400, Rpdo1::MAPPING[0], 0, 3), (0x1800, Tpdo1::MAPPING[0], 1, 1)];
+        let places = [(0x1400, 0x6040_0010, 0, 3), (0x1800, 0x6041_0010, 1, 1)];
         for (communication, first, direction, exist) in places {
             let index = communication + number;
             let cob_id = CobId(objects.at(index, 1) & !CobId::NOT_VALID);
@@ -161,11 +157,7 @@ fn set_factory_pdos(objects: &mut Objects) {
             }
             let second = GENERIC.get(usize::from(number)).map(|generic| generic[direction]);
             let mapped = [second.map(|_| first), second.flatten()];
-            for place in 1..=MAPPED_MAX {
-                let object = mapped.get(place - 1).copied().flatten().unwrap_or(0);
-                objects.set_at(index + 0x0200, place as u8, object);
-            }
-            objects.set_at(index + 0x0200, 0, mapped.iter().flatten().count() as u32);
+            objects.set_mapping(index + 0x0200, &mapped.into_iter().flatten().collect::<Vec<_>>());
         }
     }
 }

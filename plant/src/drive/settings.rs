@@ -1,7 +1,7 @@
 //! The settings of an emulated drive, from the scenario.
 
 use masseter_can::canopen::NodeId;
-use masseter_shared::config::{DriveConfig, MASTER_NODE, Scenario};
+use masseter_shared::config::{DriveConfig, DriveProfile, MASTER_NODE, Scenario};
 use masseter_shared::geometry::AXES;
 
 use super::axis::configure;
@@ -45,7 +45,9 @@ impl DriveSettings {
             let stroke_m = scenario.mechanism.strokes.of_axis(axis);
             let position_limits = stroke_m.map(|end_m| drive.increments(end_m) as i32);
             let mut objects = Objects::new(node);
-            let identity = &scenario.profile(axis).identity;
+            let DriveProfile { identity, pdos, .. } = scenario.profile(axis);
+            objects.set_mapping(0x1600, pdos.rpdo1().entries());
+            objects.set_mapping(0x1A00, pdos.tpdo1().entries());
             objects.set(names::DEVICE_TYPE, identity.device_type);
             objects.set(names::VENDOR_ID, identity.vendor_id);
             objects.set(names::PRODUCT_CODE, identity.product_code);

@@ -7,7 +7,7 @@ use masseter_shared::messages::{Command, Reading};
 
 use super::events::Subject;
 use super::failure::Failure;
-use super::gate::Gate;
+use super::gate::{Gate, Target};
 
 /// The received commands.
 #[derive(Debug, Clone)]
@@ -45,9 +45,9 @@ impl Commands {
         self.request
     }
 
-    /// The newest target for each drive, m; none before a target has passed the gate while the drive followed targets.
-    pub(super) fn targets_m(&self) -> [Option<f64>; AXES] {
-        self.gate.targets_m()
+    /// The newest target for each drive; none before a target has passed the gate while the drive followed targets.
+    pub(super) fn targets(&self) -> [Option<Target>; AXES] {
+        self.gate.targets()
     }
 
     /// Whether a command of this cycle switches the drives off.

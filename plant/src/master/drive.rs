@@ -4,7 +4,7 @@
 
 use masseter_can::canopen::{Cob, EmergencyCode, Nmt, NmtCommand, NmtState, NmtTarget, NodeId, SdoResponse};
 use masseter_can::cia402::{Controlword, DriveRequest, DriveState, Statusword, next_controlword};
-use masseter_can::{CanId, Frame, Rpdo1, Tpdo1};
+use masseter_can::{CanId, Frame, PdoMapping, Rpdo1, Tpdo1};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::{AxisScale, Scenario};
 use masseter_shared::messages::Reading;
@@ -13,6 +13,7 @@ use masseter_shared::messages::codes::{BootPhase, Cause, drive_state_code};
 use super::boot::{Boot, late};
 use super::failure::Failure;
 use super::following::Following;
+use super::gate::Target;
 use super::presence::{MISSING_CYCLES, Presence};
 use crate::error::PlantError;
 use crate::wanted::WantedDrive;
@@ -23,6 +24,8 @@ pub(super) struct RemoteDrive {
     id: NodeId,
     bus: usize,
     scale: AxisScale,
+    rpdo1: PdoMapping,
+    tpdo1: PdoMapping,
     heartbeat_timeout_ns: u64,
     boot_timeout_ns: u64,
     boot: Boot,
@@ -59,12 +62,14 @@ impl RemoteDrive {
         following: Following,
         now_ns: u64,
     ) -> Result<Self, PlantError> {
-        let can = &scenario.can;
+        let (can, pdos) = (&scenario.can, &scenario.profile(axis).pdos);
         let boot = Boot::new(&WantedDrive::of_axis(scenario, axis, id)?, can.reset_faults, now_ns);
         Ok(Self {
             id,
             bus,
             scale: scenario.scale(axis),
+            rpdo1: pdos.rpdo1(),
+            tpdo1: pdos.tpdo1(),
             heartbeat_timeout_ns: u64::from(can.heartbeat_consumer_ms) * MILLISECOND_NS,
             boot_timeout_ns: u64::from(can.boot_timeout_ms) * MILLISECOND_NS,
             reported_phase: boot.phase(),
@@ -92,6 +97,11 @@ impl RemoteDrive {
     /// The index of its bus.
     pub(super) fn bus(&self) -> usize {
         self.bus
+    }
+
+    /// What its process data carry.
+    pub(super) fn tpdo1(&self) -> &PdoMapping {
+        &self.tpdo1
     }
 
     /// How far its boot is.
@@ -320,7 +330,7 @@ impl RemoteDrive {
         &mut self,
         now_ns: u64,
         (request, may_switch_on): (DriveRequest, bool),
-        target_m: Option<f64>,
+        target: Option<Target>,
     ) -> Option<Frame> {
         if !self.is_operational() {
             return None;
@@ -330,14 +340,15 @@ impl RemoteDrive {
         let switches_on = matches!(word, Controlword::SWITCH_ON | Controlword::ENABLE_OPERATION);
         self.controlword = if switches_on && !may_switch_on { Controlword::SHUTDOWN } else { word };
         let follows = state == DriveState::OperationEnabled && request == DriveRequest::Enable;
-        let target_increments = if let Some(target_m) = target_m.filter(|_| follows) {
-            self.following.follow(now_ns, self.position_m(), target_m);
-            self.scale.increments(target_m)
+        let (target_increments, torque_offset_permille) = if let Some(target) = target.filter(|_| follows) {
+            self.following.follow(now_ns, self.position_m(), target.position_m);
+            (self.scale.increments(target.position_m), self.scale.permille(target.force_offset_n))
         } else {
             self.following.stop();
-            self.actual_increments
+            (self.actual_increments, 0)
         };
-        Some(Rpdo1 { controlword: self.controlword, target_increments }.frame(self.id))
+        let rpdo = Rpdo1 { controlword: self.controlword, target_increments, torque_offset_permille };
+        Some(rpdo.frame(self.id, &self.rpdo1))
     }
 
     fn hear_state(&mut self, time_ns: u64, state: NmtState) {

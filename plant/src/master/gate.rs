@@ -1,7 +1,7 @@
 //! The last gate before the wire: no target passes that a drive must not be sent to, whoever commands.
 //!
 //! Strokes, velocities and accelerations are those of targets that drives follow; others are not sent. The gate only
-//! judges; a command passes as a whole or not at all.
+//! judges; a command passes as a whole or not at all. Only forces are cut, to the limit of the drive.
 //!
 //! A motion waits while a process stalls. So targets may stop at once and go on as before, within twice the time-out of
 //! commands; after that they start from rest.
@@ -21,10 +21,20 @@ const MOST_PERIODS: u64 = 2;
 /// Periods that targets may have left: a late cycle of the master may take a command that came early, after late ones.
 const MOST_FREE_PERIODS: u64 = 3;
 
+/// What a drive that follows targets is sent to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Target {
+    pub(super) position_m: f64,
+    /// Force that the drive adds to that of its position control, N.
+    pub(super) force_offset_n: f64,
+}
+
 /// The target that a drive follows.
 #[derive(Debug, Clone, Copy)]
 struct Followed {
     target_m: f64,
+    /// Within the force limit of the drive.
+    force_offset_n: f64,
     velocity_m_s: f64,
     recent: RecentVelocities,
 }
@@ -44,6 +54,7 @@ struct AxisGate {
     stroke_m: [f64; 2],
     max_velocity_m_s: f64,
     max_acceleration_m_s2: f64,
+    max_force_n: f64,
     /// Distance by which a drive at rest may be elsewhere than its first target, m.
     standing_m: f64,
     followed: Option<Followed>,
@@ -81,6 +92,7 @@ impl Gate {
                 stroke_m: [low_m - margin_m, high_m + margin_m],
                 max_velocity_m_s: drive.max_velocity_m_s,
                 max_acceleration_m_s2: drive.max_acceleration_m_s2,
+                max_force_n: drive.max_force_n * scenario.dry.force_now(),
                 standing_m: scenario.can.following_limit_m.min(drive.max_velocity_m_s * scenario.period_s()),
                 followed: None,
             }
@@ -119,16 +131,21 @@ impl Gate {
         for (axis, position_m) in following_m.into_iter().enumerate() {
             let Some(position_m) = position_m.filter(|_| request == DriveRequest::Enable) else { continue };
             let next = self.axes[axis].follow(command.target_m[axis], position_m, step, self.timeout_cycles);
-            followed[axis] = Some(next.map_err(|failure| (Subject::Axis(axis), failure))?);
+            let next = next.map_err(|failure| (Subject::Axis(axis), failure))?;
+            let most_n = self.axes[axis].max_force_n;
+            let force_offset_n = command.force_offset_n[axis].clamp(-most_n, most_n);
+            followed[axis] = Some(Followed { force_offset_n, ..next });
         }
         self.axes.iter_mut().zip(followed).for_each(|(axis, followed)| axis.followed = followed);
         (self.passed_cycle, self.free_periods) = (command.cycle, self.free_periods.saturating_sub(periods));
         Ok(request)
     }
 
-    /// The target that passed last for each drive that follows targets, m.
-    pub(super) fn targets_m(&self) -> [Option<f64>; AXES] {
-        self.axes.map(|axis| axis.followed.map(|followed| followed.target_m))
+    /// The target that passed last for each drive that follows targets.
+    pub(super) fn targets(&self) -> [Option<Target>; AXES] {
+        let target =
+            |Followed { target_m, force_offset_n, .. }| Target { position_m: target_m, force_offset_n };
+        self.axes.map(|axis| axis.followed.map(target))
     }
 
     /// Periods that the step to a command's target takes: those since the last command by the controller's count. The
@@ -139,14 +156,16 @@ impl Gate {
     }
 }
 
-/// The request of a command, if its version is this program's, its targets are finite, and its request is known.
+/// The request of a command, if its version is this program's, its numbers are finite, and its request is known.
 fn check_message(command: &Command) -> Result<DriveRequest, (Subject, Failure)> {
     let bad = |subject, value, limit| Err((subject, Failure::with(Cause::BadMessage, [value, limit])));
     if command.version != LAYOUT_VERSION {
         return bad(Subject::Rig, command.version as f64, LAYOUT_VERSION as f64);
     }
-    if let Some(axis) = command.target_m.iter().position(|target_m| !target_m.is_finite()) {
-        return bad(Subject::Axis(axis), command.target_m[axis], 0.0);
+    for numbers in [command.target_m, command.force_offset_n] {
+        if let Some(axis) = numbers.iter().position(|number| !number.is_finite()) {
+            return bad(Subject::Axis(axis), numbers[axis], 0.0);
+        }
     }
     let request = DriveRequest::try_from(command.request);
     request.or_else(|_| bad(Subject::Rig, f64::from(command.request), 0.0))
@@ -212,6 +231,7 @@ impl AxisGate {
         check_limit(Cause::AccelerationLimit, acceleration_m_s2, self.max_acceleration_m_s2)?;
         Ok(Followed {
             target_m,
+            force_offset_n: 0.0,
             velocity_m_s,
             recent: recent.with(velocity_m_s, self.max_acceleration_m_s2 * step.duration_s),
         })
@@ -220,7 +240,7 @@ impl AxisGate {
     /// A drive that stands at its first target, or as near as its position allows.
     fn standing(&self, target_m: f64, position_m: f64) -> Followed {
         let target_m = target_m.clamp(position_m - self.standing_m, position_m + self.standing_m);
-        Followed { target_m, velocity_m_s: 0.0, recent: RecentVelocities::default() }
+        Followed { target_m, force_offset_n: 0.0, velocity_m_s: 0.0, recent: RecentVelocities::default() }
     }
 
     fn check_stroke(&self, target_m: f64) -> Result<(), Failure> {

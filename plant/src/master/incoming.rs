@@ -2,10 +2,10 @@
 //!
 //! Decoding only: the master decides the effect of a message.
 
-use masseter_can::Tpdo1;
 use masseter_can::canopen::{
     Cob, Emergency, Heartbeat, HeartbeatError, LengthError, NmtState, NodeId, SdoError, SdoResponse,
 };
+use masseter_can::{PdoMapping, Tpdo1};
 
 /// The contents of an object that the master receives from a node.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,15 +29,15 @@ impl Message {
         }
     }
 
-    /// Decodes the data of an object.
-    pub(super) fn decode(cob: Cob, data: &[u8]) -> Result<Self, LengthError> {
+    /// Decodes the data of an object, process data by that mapping.
+    pub(super) fn decode(cob: Cob, data: &[u8], tpdo1: &PdoMapping) -> Result<Self, LengthError> {
         match cob {
             Cob::Heartbeat(_) => match Heartbeat::decode(data) {
                 Ok(Heartbeat { state }) => Ok(Self::Heartbeat(state)),
                 Err(HeartbeatError::Length(error)) => Err(error),
                 Err(HeartbeatError::UnknownState { .. }) => Ok(Self::Foreign),
             },
-            Cob::Tpdo1(_) => Tpdo1::decode(data).map(Self::ProcessData),
+            Cob::Tpdo1(_) => Tpdo1::decode(data, tpdo1).map(Self::ProcessData),
             Cob::Emergency(_) => Emergency::decode(data).map(Self::Emergency),
             Cob::SdoResponse(_) => match SdoResponse::decode(data) {
                 Ok(answer) => Ok(Self::SdoAnswer(answer)),

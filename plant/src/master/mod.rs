@@ -28,7 +28,7 @@ mod tests;
 
 use masseter_can::canopen::{Cob, Heartbeat, NmtState, sync};
 use masseter_can::wire::worst_case_bits;
-use masseter_can::{Bus, Frame, ReceiveError, Received, Rpdo1};
+use masseter_can::{Bus, Frame, ReceiveError, Received};
 use masseter_shared::config::{MASTER_NODE, Scenario};
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::codes::{
@@ -77,10 +77,14 @@ impl Master {
         let can = &scenario.can;
         let (ports, ids) = (drive_ports(can)?, node_ids(can)?);
         let addresses = std::array::from_fn(|axis| (ids[axis], ports[axis].bus));
-        let rpdo_ns = can.bitrate()?.bits_to_ns(worst_case_bits(Rpdo1::LENGTH as u32, false));
+        let bitrate = can.bitrate()?;
+        let rpdo_ns = |&axis: &usize| {
+            let length = scenario.profile(axis).pdos.rpdo1().length();
+            bitrate.bits_to_ns(worst_case_bits(length as u32, false))
+        };
         let drive = |axis: usize| {
             let (id, bus) = addresses[axis];
-            let following = Following::new(scenario, axis, can.buses[bus].len() as u64 * rpdo_ns);
+            let following = Following::new(scenario, axis, can.buses[bus].iter().map(rpdo_ns).sum());
             RemoteDrive::new(scenario, axis, id, bus, following, now_ns)
         };
         let drives = (0..AXES).map(drive).collect::<Result<Vec<_>, _>>()?;
@@ -153,10 +157,10 @@ impl Master {
         self.supervise(now_ns);
         self.take_command(now_ns, command);
         self.restore(now_ns);
-        let (request, targets_m) = (self.request(), self.commands.targets_m());
+        let (request, targets) = (self.request(), self.commands.targets());
         let may_switch_on = self.enabling.may_switch_on();
-        for (axis, target_m) in targets_m.into_iter().enumerate() {
-            if let Some(frame) = self.drives[axis].process_data(now_ns, (request, may_switch_on), target_m) {
+        for (axis, target) in targets.into_iter().enumerate() {
+            if let Some(frame) = self.drives[axis].process_data(now_ns, (request, may_switch_on), target) {
                 self.send_to(now_ns, axis, frame, buses);
             }
         }
@@ -366,7 +370,7 @@ impl Master {
         };
         self.buses[bus].note_drive();
         let drive = &mut self.drives[axis];
-        match Message::decode(cob, received.frame.data()) {
+        match Message::decode(cob, received.frame.data(), drive.tpdo1()) {
             Ok(Message::Heartbeat(state)) => self.take_heartbeat(axis, state, time_ns),
             Ok(Message::ProcessData(tpdo)) => {
                 let Some([before, after]) = drive.take_process_data(time_ns, tpdo) else { return };

@@ -89,7 +89,7 @@ impl Seen {
 impl Responses {
     /// On the buses of a rig that was accepted; without plans there are no figures.
     pub(super) fn for_scenario(scenario: &Scenario) -> Self {
-        let plans = plans(&scenario.can, scenario.period_ns()).unwrap_or_default();
+        let plans = plans(scenario).unwrap_or_default();
         Self::with(plans, !scenario.faults.is_empty())
     }
 

@@ -76,7 +76,7 @@ impl RunPlan {
     /// When the cycle does not fit the buses, the plant cannot be built, or the motion exceeds a limit.
     pub fn new(scenario: Scenario) -> anyhow::Result<Self> {
         let mechanism = Mechanism::new(&scenario.mechanism)?;
-        let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns())?;
+        let schedule = CycleSchedule::new(&scenario)?;
         plant::check(&scenario)?;
         let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
         // Also a dry run is one of a motion that the mechanism can follow at full speed.

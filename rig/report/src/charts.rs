@@ -40,7 +40,7 @@ pub(super) fn percentiles(scenario: &Scenario, figures: &Figures) -> Option<Draw
 fn budgets(scenario: &Scenario) -> Vec<Limit> {
     let period_ns = scenario.period_ns();
     let mut budgets = vec![limit("budget: the period", &[period_ns as f64 / 1e3])];
-    if let Ok(schedule) = CycleSchedule::new(&scenario.can, period_ns) {
+    if let Ok(schedule) = CycleSchedule::new(scenario) {
         let controller_us = (schedule.command_by_ns - schedule.controller_at_ns) as f64 / 1e3;
         budgets.push(limit("budget: controller", &[controller_us]));
     }

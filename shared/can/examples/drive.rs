@@ -8,7 +8,9 @@ use std::error::Error;
 use masseter_can::canopen::{Cob, Expedited, NodeId, ObjectAddress, SdoRequest, SdoResponse, sync};
 use masseter_can::cia402::{Controlword, DriveRequest, DriveState, Statusword, next_controlword};
 use masseter_can::faults::{Fault, FaultKind, Faults};
-use masseter_can::{Bitrate, Bus, Frame, Received, Rpdo1, Tapped, Tpdo1, VirtualWire, WireConfig, candump};
+use masseter_can::{
+    Bitrate, Bus, Frame, PdoMapping, Received, Rpdo1, Tapped, Tpdo1, VirtualWire, WireConfig, candump,
+};
 
 const MASTER: usize = 0;
 const DRIVE: usize = 1;
@@ -29,12 +31,12 @@ struct Drive {
 impl Drive {
     fn answer(&mut self, frame: &Frame) -> Result<Option<Frame>, Box<dyn Error>> {
         match Cob::try_from(frame.id())? {
-            Cob::Sync => Ok(Some(self.process_data().frame(self.node))),
+            Cob::Sync => Ok(Some(self.process_data().frame(self.node, &PdoMapping::TPDO1))),
             Cob::SdoRequest(node) if node == self.node => {
                 Ok(read(SdoRequest::decode(frame.data())?).map(|answer| answer.frame(node)))
             }
             Cob::Rpdo1(node) if node == self.node => {
-                self.take(Rpdo1::decode(frame.data())?);
+                self.take(Rpdo1::decode(frame.data(), &PdoMapping::RPDO1)?);
                 Ok(None)
             }
             _ => Ok(None),
@@ -46,7 +48,7 @@ impl Drive {
         Tpdo1 { statusword, actual_increments: self.increments, torque_permille: 0 }
     }
 
-    fn take(&mut self, Rpdo1 { controlword, target_increments }: Rpdo1) {
+    fn take(&mut self, Rpdo1 { controlword, target_increments, .. }: Rpdo1) {
         self.state = self.state.after(controlword.command(self.controlword, self.state));
         self.controlword = controlword;
         if self.state == DriveState::OperationEnabled {
@@ -119,14 +121,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     for cycle in 1.. {
         let sync_ns = cycle * CYCLE_NS;
         let answer = exchange(&mut wire, &mut drive, sync_ns, sync::frame())?.ok_or("no answer to SYNC")?;
-        let Tpdo1 { statusword, actual_increments, .. } = Tpdo1::decode(answer.data())?;
+        let Tpdo1 { statusword, actual_increments, .. } = Tpdo1::decode(answer.data(), &PdoMapping::TPDO1)?;
         println!("cycle {cycle}: {}, {actual_increments} increments", statusword.state()?);
         if actual_increments == TARGET {
             break;
         }
         controlword = next_controlword(statusword.state()?, DriveRequest::Enable, controlword);
-        let target = Rpdo1 { controlword, target_increments: TARGET };
-        exchange(&mut wire, &mut drive, sync_ns + CYCLE_NS / 2, target.frame(node))?;
+        let target = Rpdo1 { controlword, target_increments: TARGET, torque_offset_permille: 0 };
+        exchange(&mut wire, &mut drive, sync_ns + CYCLE_NS / 2, target.frame(node, &PdoMapping::RPDO1))?;
     }
 
     while let Some(tapped) = wire.tap(u64::MAX)? {

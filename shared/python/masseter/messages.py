@@ -7,7 +7,7 @@ numpy.dtype(Reading) is the NumPy type of a message.
 import ctypes
 import enum
 
-LAYOUT_VERSION = 11
+LAYOUT_VERSION = 12
 #: Event.axis when no axis is concerned.
 NO_AXIS = 4294967295
 #: Reading.drive_state of a drive not heard of yet, or lost.
@@ -270,7 +270,7 @@ class Reading(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Reading/3b19bd46b3ecd631"
+        return "masseter/Reading/5d636b58d953e426"
 
 
 _check(Reading, 256, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 176, 224, 248, 252])
@@ -293,6 +293,8 @@ class Command(ctypes.Structure):
         ("reading_cycle", ctypes.c_uint64),
         # Desired positions d₁ d₂ d₃ l₁ l₂ l₃, m.
         ("target_m", ctypes.c_double * 6),
+        # Forces that the drives add to those of their position control, positive towards increasing position, N; 0 without feed-forward.
+        ("force_offset_n", ctypes.c_double * 6),
         # Requested drive state, a DriveRequest.
         ("request", ctypes.c_uint32),
         # State of the controller, a ControllerState.
@@ -301,10 +303,10 @@ class Command(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Command/1f1a892af93718b5"
+        return "masseter/Command/9c0206e6ba4fe53c"
 
 
-_check(Command, 96, [0, 8, 16, 24, 32, 40, 88, 92])
+_check(Command, 144, [0, 8, 16, 24, 32, 40, 88, 136, 140])
 
 
 class State(ctypes.Structure):
@@ -368,7 +370,7 @@ class State(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/State/4ef6b0906fbe819d"
+        return "masseter/State/e76dd2c6f6224022"
 
 
 _check(State, 296, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 136, 160, 192, 216, 248, 272, 280, 288, 292])
@@ -415,7 +417,7 @@ class Event(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Event/c2e1365b706a3502"
+        return "masseter/Event/adca6f2f641c19c9"
 
 
 _check(Event, 88, [0, 8, 16, 24, 32, 40, 44, 48, 52, 56, 60, 62, 64, 68, 72, 80])
@@ -452,7 +454,7 @@ class Truth(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Truth/c07707f6f3b43950"
+        return "masseter/Truth/f34e53239e7c14b3"
 
 
 _check(Truth, 248, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240])

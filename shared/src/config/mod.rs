@@ -36,7 +36,7 @@ pub use control::{
 };
 pub use drive_profile::{
     AccelerationUnit, AxisScale, BrakeConfig, DriveProfile, HomingConfig, IdentityConfig, ObjectConfig,
-    ObjectKey, ObjectRule, StoreConfig, UnitsConfig, VelocityUnit,
+    ObjectKey, ObjectRule, PdosConfig, StoreConfig, UnitsConfig, VelocityUnit,
 };
 pub use drives::{DriveConfig, DrivesConfig};
 pub use dry::DryConfig;

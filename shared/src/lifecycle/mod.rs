@@ -113,7 +113,7 @@ impl ProcessContext {
     ) -> Result<Self, ProcessError> {
         let scenario = Scenario::read(&arguments.scenario)?;
         scenario.validate()?;
-        let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns())?;
+        let schedule = CycleSchedule::new(&scenario)?;
         let node = Node::join(&Domain::named(&arguments.domain)?)?;
         Ok(Self { scenario, schedule, node, lockstep: arguments.lockstep, stop, link })
     }

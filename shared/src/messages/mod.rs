@@ -59,7 +59,7 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
 }
 
 /// Version of the layouts below; it changes with any of them, and with what a field means.
-pub const LAYOUT_VERSION: u64 = 11;
+pub const LAYOUT_VERSION: u64 = 12;
 
 macro_rules! messages {
     ($($(#[doc = $doc:literal])* $name:ident on $topic:literal keeping $depth:literal as $type_name:tt {
@@ -133,13 +133,16 @@ macro_rules! messages {
 
 messages! {
     /// Targets and request for the drives, once a cycle.
-    Command on "command" keeping 2048 as "masseter/Command/1f1a892af93718b5" {
+    Command on "command" keeping 2048 as "masseter/Command/9c0206e6ba4fe53c" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
         reading_cycle: u64,
         /// Desired positions d₁ d₂ d₃ l₁ l₂ l₃, m.
         target_m: [f64; AXES],
+        /// Forces that the drives add to those of their position control, positive towards increasing position, N; 0
+        /// without feed-forward.
+        force_offset_n: [f64; AXES],
         /// Requested drive state, a [`codes::DriveRequest`].
         request: u32,
         /// State of the controller, a [`codes::ControllerState`].
@@ -147,7 +150,7 @@ messages! {
     }
 
     /// Positions, forces and states of the drives, once a cycle.
-    Reading on "reading" keeping 2048 as "masseter/Reading/3b19bd46b3ecd631" {
+    Reading on "reading" keeping 2048 as "masseter/Reading/5d636b58d953e426" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// Cycle of the last command received when the sample was taken; 0 before the first.
@@ -187,7 +190,7 @@ messages! {
     }
 
     /// The controller's state and its estimate, once a cycle.
-    State on "state" keeping 2048 as "masseter/State/4ef6b0906fbe819d" {
+    State on "state" keeping 2048 as "masseter/State/e76dd2c6f6224022" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -240,7 +243,7 @@ messages! {
 
     /// The signals that the controller declares, once a cycle; without any, there is no such message. A recording's
     /// definition of the message has a field for each signal.
-    Signals on "signal" keeping 2048 as "masseter/Signals/79a2eb7431a69ee4" {
+    Signals on "signal" keeping 2048 as "masseter/Signals/33cc11a240871199" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// The signals, in the order of their declaration.
@@ -249,7 +252,7 @@ messages! {
 
     /// The parameters that the controller declares, in its first cycle and in each that begins with another value. A
     /// recording's definition of the message has a field for each parameter.
-    Parameters on "parameter" keeping 256 as "masseter/Parameters/c88d93a42054c0a2" {
+    Parameters on "parameter" keeping 256 as "masseter/Parameters/0e610e8bd224a13d" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// The parameters, in the order of their declaration.
@@ -257,7 +260,7 @@ messages! {
     }
 
     /// The true state of the mechanism, once a cycle; the controller never reads it.
-    Truth on "truth" keeping 2048 as "masseter/Truth/c07707f6f3b43950" {
+    Truth on "truth" keeping 2048 as "masseter/Truth/f34e53239e7c14b3" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// The instant it describes: that of the reading's sample, ns.
@@ -277,7 +280,7 @@ messages! {
     }
 
     /// An observation of a tap on a CAN wire: a frame, or an error message in the coding of `linux/can/error.h`.
-    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/87ab8e7a01e64bad" {
+    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/bcc7af79282fbf80" {
         /// When its last bit was on the wire, ns.
         time_ns: u64,
         /// When its transmitter had it queued, ns; 0 on real wires.
@@ -294,7 +297,7 @@ messages! {
 
     /// Counters of the kernel for the machine and both loops. The recorder reads and records them; the message is not
     /// published.
-    Machine on "machine" keeping 1 as "masseter/Machine/3b15ceb2deb74b6b" {
+    Machine on "machine" keeping 1 as "masseter/Machine/ebc07a0196dc60ca" {
         /// Time of the sample, ns.
         time_ns: u64,
         /// Time that the hypervisor had taken from all cores together, as far as the hypervisor reports it, ns.
@@ -306,7 +309,7 @@ messages! {
     }
 
     /// A single occurrence: a change of state, a fault, an alarm.
-    Event on "event" keeping 1024 as "masseter/Event/c2e1365b706a3502" {
+    Event on "event" keeping 1024 as "masseter/Event/adca6f2f641c19c9" {
         /// When, ns.
         time_ns: u64,
         /// Cycle of the process that reports it.
@@ -413,7 +416,7 @@ mod tests {
     fn the_hash_covers_version_fields_data_bytes_and_codes() {
         let layout = layout::<FrameTap>();
         for (found, other) in
-            [("v11", "v12"), ("queued_ns", "waiting_ns"), ("[<=64]", "[<=8]"), ("fault=8", "fault=9")]
+            [("v12", "v13"), ("queued_ns", "waiting_ns"), ("[<=64]", "[<=8]"), ("fault=8", "fault=9")]
         {
             let changed = layout.replace(found, other);
             assert_ne!((hash(&layout), &layout), (hash(&changed), &changed));

@@ -2,7 +2,7 @@
 
 use masseter_can::canopen::{Nmt, NmtCommand, NmtTarget};
 use masseter_can::cia402::Controlword;
-use masseter_can::{Bus, Frame, Rpdo1};
+use masseter_can::{Bus, Frame, PdoMapping, Rpdo1};
 
 use super::*;
 use crate::link::Buses;
@@ -63,8 +63,9 @@ fn a_quick_stop_slows_down_along_its_ramp() {
 #[test]
 fn a_drive_that_leaves_operation_stops_them_all_for_good() {
     let mut moving = Moving::new();
-    let stop = Rpdo1 { controlword: Controlword::QUICK_STOP, target_increments: 0 };
-    moving.disturb(1, stop.frame(NodeId::new(4).unwrap()));
+    let stop =
+        Rpdo1 { controlword: Controlword::QUICK_STOP, target_increments: 0, torque_offset_permille: 0 };
+    moving.disturb(1, stop.frame(NodeId::new(4).unwrap(), &PdoMapping::RPDO1));
     (0..100).for_each(|_| moving.cycle());
     assert!(moving.bench.plant.drives_are_off(), "{:?}", moving.bench.reading.drive_state);
     assert_eq!(moving.bench.causes(EventKind::Fault), [Cause::DriveFault]);
@@ -110,7 +111,7 @@ fn a_command_beyond_a_limit_is_refused_as_a_whole_and_stops_the_rig() {
         for frame in &bench.frames {
             let tapped = tap::decode(frame).unwrap();
             if let Some(Ok(Cob::Rpdo1(node))) = tapped.frame().map(|frame| Cob::try_from(frame.frame.id())) {
-                let rpdo = Rpdo1::decode(tapped.frame().unwrap().frame.data()).unwrap();
+                let rpdo = Rpdo1::decode(tapped.frame().unwrap().frame.data(), &PdoMapping::RPDO1).unwrap();
                 let sent_m = f64::from(rpdo.target_increments) * 1e-6;
                 let moved_m = sent_m - before[usize::from(node.get()) - 1];
                 assert!(moved_m.abs() < 5e-5, "{moved_m} m was on the wire");

@@ -5,7 +5,7 @@ use std::marker::PhantomData;
 use masseter_can::canopen::{AbortCode, NodeId, ObjectAddress};
 
 use super::entry::{DataType, Entry, Initial, MappingEntry};
-use super::table::OBJECTS;
+use super::table::{MAPPED_MAX, OBJECTS};
 
 /// Entries of the table.
 pub(crate) const COUNT: usize = {
@@ -132,6 +132,15 @@ impl Objects {
     pub(crate) fn set_at(&mut self, index: u16, subindex: u8, word: u32) {
         let address = ObjectAddress::new(index, subindex);
         self.words[find(address).unwrap_or_else(|_| panic!("the table has no entry {address}"))] = word;
+    }
+
+    /// Writes a mapping parameter.
+    pub(crate) fn set_mapping(&mut self, index: u16, entries: &[u32]) {
+        for place in 1..=MAPPED_MAX {
+            let entry = entries.get(place - 1).copied().unwrap_or(0);
+            self.set_at(index, place as u8, entry);
+        }
+        self.set_at(index, 0, entries.len() as u32);
     }
 
     /// The first `count` entries of a mapping parameter.

@@ -3,8 +3,8 @@
 //! Positions are encoder increments, velocities increments/s, accelerations increments/s², torques per
 //! mille of the rated torque (of the rated force, for a linear axis).
 
+use masseter_can::EVERY_SYNC;
 use masseter_can::canopen::CobId;
-use masseter_can::{EVERY_SYNC, Rpdo1, Tpdo1};
 use masseter_shared::config::INCREMENTS_PER_TURN;
 
 use super::entry::Access::{Constant, ReadOnly, ReadWrite};
@@ -102,8 +102,8 @@ const fn tpdo(number: u16) -> [Entry; 6] {
     ]
 }
 
-/// The mapping parameter of a PDO that initially carries these objects.
-const fn mapping(index: u16, objects: &[u32]) -> [Entry; MAPPED_MAX + 1] {
+/// The mapping parameter of a PDO, whose objects follow from the scenario.
+const fn mapping(index: u16) -> [Entry; MAPPED_MAX + 1] {
     const NAMES: [&str; MAPPED_MAX + 1] = [
         "Number of mapped objects",
         "Mapped object 1",
@@ -115,12 +115,11 @@ const fn mapping(index: u16, objects: &[u32]) -> [Entry; MAPPED_MAX + 1] {
         "Mapped object 7",
         "Mapped object 8",
     ];
-    let count = plain(index, NAMES[0], U8, ReadWrite, Value(objects.len() as i64));
+    let count = plain(index, NAMES[0], U8, ReadWrite, Configured);
     let mut entries = [count.within(0, MAPPED_MAX as i64); MAPPED_MAX + 1];
     let mut place = 1;
     while place <= MAPPED_MAX {
-        let object = if place <= objects.len() { objects[place - 1] as i64 } else { 0 };
-        entries[place] = Entry::new((index, place as u8), NAMES[place], U32, ReadWrite, Value(object));
+        entries[place] = Entry::new((index, place as u8), NAMES[place], U32, ReadWrite, Configured);
         place += 1;
     }
     entries
@@ -182,18 +181,18 @@ pub(crate) static OBJECTS: &[Object] = &[
     object("RPDO 2 communication parameter", Record, &rpdo(1)),
     object("RPDO 3 communication parameter", Record, &rpdo(2)),
     object("RPDO 4 communication parameter", Record, &rpdo(3)),
-    object("RPDO 1 mapping parameter", Record, &mapping(0x1600, &Rpdo1::MAPPING)),
-    object("RPDO 2 mapping parameter", Record, &mapping(0x1601, &[])),
-    object("RPDO 3 mapping parameter", Record, &mapping(0x1602, &[])),
-    object("RPDO 4 mapping parameter", Record, &mapping(0x1603, &[])),
+    object("RPDO 1 mapping parameter", Record, &mapping(0x1600)),
+    object("RPDO 2 mapping parameter", Record, &mapping(0x1601)),
+    object("RPDO 3 mapping parameter", Record, &mapping(0x1602)),
+    object("RPDO 4 mapping parameter", Record, &mapping(0x1603)),
     object("TPDO 1 communication parameter", Record, &tpdo(0)),
     object("TPDO 2 communication parameter", Record, &tpdo(1)),
     object("TPDO 3 communication parameter", Record, &tpdo(2)),
     object("TPDO 4 communication parameter", Record, &tpdo(3)),
-    object("TPDO 1 mapping parameter", Record, &mapping(0x1A00, &Tpdo1::MAPPING)),
-    object("TPDO 2 mapping parameter", Record, &mapping(0x1A01, &[])),
-    object("TPDO 3 mapping parameter", Record, &mapping(0x1A02, &[])),
-    object("TPDO 4 mapping parameter", Record, &mapping(0x1A03, &[])),
+    object("TPDO 1 mapping parameter", Record, &mapping(0x1A00)),
+    object("TPDO 2 mapping parameter", Record, &mapping(0x1A01)),
+    object("TPDO 3 mapping parameter", Record, &mapping(0x1A02)),
+    object("TPDO 4 mapping parameter", Record, &mapping(0x1A03)),
     var(&[plain(0x6007, "Abort connection option code", I16, ReadWrite, Value(3)).within(0, 3)]),
     var(&[plain(0x603F, "Error code", U16, ReadOnly, Value(0)).mapped(Tpdo)]),
     var(&[plain(0x6040, "Controlword", U16, ReadWrite, Value(0)).mapped(Any)]),

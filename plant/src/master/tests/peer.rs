@@ -8,7 +8,9 @@ use masseter_can::canopen::{
     SdoResponse,
 };
 use masseter_can::cia402::{Controlword, DriveState, Statusword};
-use masseter_can::{Bus, BusStatus, ErrorState, Frame, ReceiveError, Received, Rpdo1, SendError, Tpdo1};
+use masseter_can::{
+    Bus, BusStatus, ErrorState, Frame, PdoMapping, ReceiveError, Received, Rpdo1, SendError, Tpdo1,
+};
 use masseter_shared::config::IdentityConfig;
 use masseter_shared::geometry::AXES;
 
@@ -41,6 +43,10 @@ pub(super) struct Peer {
     pub(super) requests: Vec<(u64, SdoRequest)>,
     controlword: Controlword,
     buffered: Option<Rpdo1>,
+    /// What its RPDO1 carries.
+    pub(super) rpdo1: PdoMapping,
+    /// The torque offset that it received last, ‰ of the rated torque.
+    pub(super) torque_offset_permille: i16,
     /// Its torque, ‰ of the rated one.
     pub(super) torque_permille: i16,
     /// Its position, increments.
@@ -90,6 +96,8 @@ impl Peer {
             requests: Vec::new(),
             controlword: Controlword::DISABLE_VOLTAGE,
             buffered: None,
+            rpdo1: PdoMapping::RPDO1,
+            torque_offset_permille: 0,
             torque_permille: 0,
             position: POSITION,
             may_move: false,
@@ -146,8 +154,9 @@ impl Peer {
             Cob::Nmt => self.obey(Nmt::decode(frame.data()).unwrap()),
             Cob::Sync if self.nmt == Some(NmtState::Operational) => self.synchronise(out),
             Cob::Rpdo1(id) if id == self.id => {
-                let rpdo = Rpdo1::decode(frame.data()).unwrap();
+                let rpdo = Rpdo1::decode(frame.data(), &self.rpdo1).unwrap();
                 self.targets.push((self.power, rpdo.target_increments));
+                self.torque_offset_permille = rpdo.torque_offset_permille;
                 self.buffered = Some(rpdo);
             }
             Cob::SdoRequest(id) if id == self.id => {
@@ -182,7 +191,7 @@ impl Peer {
         let statusword = Statusword::for_state(self.power);
         for actual_increments in self.twin_position.into_iter().chain([self.position]) {
             let tpdo = Tpdo1 { statusword, actual_increments, torque_permille: self.torque_permille };
-            out.push(tpdo.frame(self.id));
+            out.push(tpdo.frame(self.id, &PdoMapping::TPDO1));
         }
     }
 

@@ -50,6 +50,34 @@ fn a_target_from_before_a_drive_follows_is_never_sent() {
     assert_eq!(bench.causes(EventKind::Fault), []);
 }
 
+/// The drive of `l1` takes a torque offset, counts backwards, and may have 60 % of its force.
+#[test]
+fn a_force_offset_is_sent_where_it_is_mapped_and_within_the_force_limit() {
+    let text = "[[drive_profile]]\naxes = ['l1']\nreversed = ['l1']\npdos.rpdo1 = ['6040h', '607Ah', '60B2h']\n\
+                [drives.leg]\nrated_force_n = 100.0\nmax_force_n = 60.0";
+    let scenario = Scenario::parse(std::path::Path::new("robot.toml"), text).unwrap();
+    let mut bench = Bench::of(scenario.clone());
+    let drive = bench.drive(3);
+    drive.rpdo1 = scenario.profile(3).pdos.rpdo1();
+    drive.objects.insert((0x1600, 0), vec![3]);
+    drive.objects.insert((0x1600, 3), 0x60B2_0010_u32.to_le_bytes().to_vec());
+    bench.cycles(400, DriveRequest::Enable);
+    assert!(bench.all_are(DriveState::OperationEnabled), "{:?}", bench.events);
+    for (force_offset_n, permille) in [(25.0, -250), (-7.0, 70), (1e6, -600), (-1e6, 600), (0.0, 0)] {
+        bench.cycle_with(|command| {
+            let request = DriveRequest::Enable.code();
+            Some(Command { request, force_offset_n: [force_offset_n; AXES], ..command })
+        });
+        assert_eq!(bench.drive(3).torque_offset_permille, permille, "{force_offset_n} N");
+    }
+    bench.cycle_with(|command| {
+        Some(Command { request: DriveRequest::QuickStop.code(), force_offset_n: [9.0; AXES], ..command })
+    });
+    assert_eq!(bench.drive(3).torque_offset_permille, 0, "a drive that follows nothing gets no force");
+    bench.cycle_with(|command| Some(Command { force_offset_n: [f64::INFINITY; AXES], ..command }));
+    assert_eq!(bench.causes(EventKind::Fault), [Cause::BadMessage]);
+}
+
 #[test]
 fn a_refused_command_counts_as_none() {
     let mut bench = Bench::enabled();

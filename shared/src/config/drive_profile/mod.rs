@@ -8,6 +8,7 @@ mod homing;
 mod identity;
 mod kind;
 mod object;
+mod pdos;
 mod scale;
 mod units;
 
@@ -23,6 +24,7 @@ pub use homing::HomingConfig;
 pub use identity::IdentityConfig;
 pub(super) use kind::over_kinds;
 pub use object::{ObjectConfig, ObjectKey, ObjectRule};
+pub use pdos::PdosConfig;
 pub use scale::AxisScale;
 pub use units::{AccelerationUnit, UnitsConfig, VelocityUnit};
 
@@ -46,6 +48,8 @@ section! {
         pub identity: IdentityConfig = IdentityConfig::EMULATED,
         /// What the drive's numbers count.
         pub units: UnitsConfig = UnitsConfig::default(),
+        /// What the process data carry.
+        pub pdos: PdosConfig = PdosConfig::default(),
         /// Single objects, such as `"6066h" = { rule = "absent" }`.
         pub objects: BTreeMap<ObjectKey, ObjectConfig> = BTreeMap::new(),
         /// How the drive stores its objects.
@@ -126,6 +130,7 @@ impl DriveProfile {
         for (key, object) in &self.objects {
             object.validate(*key)?;
         }
+        self.pdos.validate()?;
         self.units.validate()?;
         self.homing.validate()?;
         let BrakeConfig { open_s, close_s } = self.brake;
@@ -181,6 +186,11 @@ mod tests {
             ("axes = ['l4']", "drive_profile.axes = 'l4': name axes"),
             ("reversed = ['x']", "drive_profile.reversed = 'x': name axes"),
             ("units.acceleration = 'rpm_s'", "drive_profile.units.lead_m"),
+            ("pdos.rpdo1 = ['6040h']", "drive_profile.pdos.rpdo1 = 6040h: the master needs object 607Ah:00h"),
+            (
+                "pdos.tpdo1 = ['6041h', '6064h', '606Ch']",
+                "drive_profile.pdos.tpdo1 = 6041h, 6064h, 606Ch: the master",
+            ),
             ("objects.6066h = { lowest = 2, highest = 1 }", "drive_profile.objects = 6066h"),
             ("objects.6066h = { value = 2, highest = 1 }", "drive_profile.objects = 6066h"),
             ("axes = ['l1']\n[[drive_profile]]\naxes = ['l1']", "drive_profile.axes = 'l1': give each axis"),

@@ -48,6 +48,11 @@ impl AxisScale {
         f64::from(increments) * self.increment_m
     }
 
+    /// A force in the direction of d or l, in ‰ of the rated force.
+    pub fn permille(&self, force_n: f64) -> i16 {
+        (force_n / self.permille_n).round() as i16
+    }
+
     /// A length without a sign, such as a window, in increments.
     pub fn window(&self, length_m: f64) -> u32 {
         (length_m / self.increment_m.abs()).round() as u32
@@ -101,5 +106,7 @@ mod tests {
         assert!(is_near(ahead.metres(5), 5e-6) && is_near(back.metres(-5), 5e-6));
         assert_eq!((ahead.window(0.002), back.window(0.002)), (2000, 2000));
         assert!(is_near(ahead.permille_n, -back.permille_n));
+        let force_n = 40.0 * ahead.permille_n;
+        assert_eq!((ahead.permille(force_n), back.permille(force_n)), (40, -40));
     }
 }
