@@ -10,9 +10,14 @@ use masseter_shared::control::{Controller, Outcome, Tick};
 use masseter_shared::geometry::{AXES, Actuators, Jacobian, Joints, Mechanism, Pose};
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::{Command, Event, Reading, State};
-use masseter_shared::named::{Declared, Parameter};
+use masseter_shared::named::{Declared, Parameter, Signal};
+use nalgebra::Translation3;
 
 use crate::command_acknowledgement::CommandAcknowledgement;
+use crate::feed_forward::FeedForward;
+use crate::force_control::ForceControl;
+use crate::force_observer::ForceObserver;
+use crate::model::Model;
 use crate::path_supervision::PathSupervision;
 use crate::playback::Playback;
 use crate::pose_control::PoseControl;
@@ -27,6 +32,8 @@ use crate::trajectory::{self, Trajectory};
 const MARGINS_EVERY_S: f64 = 0.005;
 /// How many parameters the controller has beside those of the law.
 const OWN: usize = 2;
+/// How many signals the observer of forces has.
+const OBSERVED: usize = 5;
 /// Age of a reading that comes late but is used.
 const LATE_READING_CYCLES: u64 = 1;
 
@@ -62,6 +69,10 @@ pub struct MotionController {
     law: Box<dyn PoseLaw>,
     /// What the law declares, then the controller's own parameters.
     declared: Declared,
+    /// None unless the scenario has forces fed forward.
+    feed_forward: Option<FeedForward>,
+    /// None unless the scenario has the bite force estimated or controlled.
+    observer: Option<ForceObserver>,
     supervision: PathSupervision,
     /// By how many cycles the platform may be earlier or later on its path.
     slack_cycles: f64,
@@ -71,16 +82,22 @@ pub struct MotionController {
     /// The pose that the law asked for last.
     asked: Option<Pose>,
     target: Option<Actuators>,
+    force_offset_n: [f64; AXES],
 }
 
 impl MotionController {
     /// A controller that plays `trajectory` on `mechanism` once the rig is ready.
     pub fn new(scenario: &Scenario, mechanism: Mechanism, trajectory: Trajectory) -> Self {
-        let law = Box::new(PoseControl::new(scenario.controller, scenario.rate_hz));
+        let law: Box<dyn PoseLaw> = match scenario.force_control {
+            Some(config) => {
+                Box::new(ForceControl::new(scenario, config, trajectory.closed_pose().translation.z))
+            }
+            None => Box::new(PoseControl::new(scenario.controller, scenario.rate_hz)),
+        };
         Self::with_law(scenario, mechanism, trajectory, law)
     }
 
-    /// The same with another pose law.
+    /// The same with another pose law, which takes the place of the scenario's force control too.
     pub fn with_law(
         scenario: &Scenario,
         mechanism: Mechanism,
@@ -93,8 +110,11 @@ impl MotionController {
         let period_s = scenario.period_s().max(MARGINS_EVERY_S);
         let demands = trajectory::check(&trajectory, &mechanism, &limits, period_s).ok();
         let change_s = Slew::change_s(demands.as_ref(), &limits);
+        let model = Model::new(scenario, mechanism.clone());
+        let is_observed = scenario.force_estimate.is_some() || scenario.force_control.is_some();
         let mut declared = law.declared();
         declared.parameters.extend(own_parameters());
+        declared.signals.extend(is_observed.then(observed_signals).into_iter().flatten());
         Self {
             sequencer: Sequencer::new(scenario, mechanism.clone()),
             velocity_limit_m_s: std::array::from_fn(|axis| scenario.drives.of_axis(axis).max_velocity_m_s),
@@ -105,12 +125,17 @@ impl MotionController {
             acknowledgement: CommandAcknowledgement::default(),
             law,
             declared,
+            feed_forward: config
+                .feed_forward_torque
+                .then(|| FeedForward::new(model.clone(), scenario.period_s())),
+            observer: is_observed.then(|| ForceObserver::new(scenario, model)),
             supervision: PathSupervision::new(scenario),
             slack_cycles: 0.0,
             cycles_at_rest: 0,
             desired: None,
             asked: None,
             target: None,
+            force_offset_n: [0.0; AXES],
         }
     }
 
@@ -127,8 +152,9 @@ impl MotionController {
         let demand = self.demand(desired);
         if let Some(estimated) = &demand.estimated {
             let slack_s = self.slack_cycles * demand.period_s;
+            let detour = Translation3::from(self.law.detour().at_sample_m);
             let earlier = self.playback.pose_ahead(-self.sample_age_s() - slack_s);
-            self.supervision.check(&desired, estimated, &earlier)?;
+            self.supervision.check(&(detour * desired), estimated, &(detour * earlier))?;
         }
         let asked = self.law.command(&demand)?;
         safety::check_asked(&asked)?;
@@ -139,6 +165,12 @@ impl MotionController {
         let target = self.mechanism.strokes().clamp(&joints.actuators, &before, self.trim_reach_m)?;
         safety::check_velocity(&target, &before, &self.velocity_limit_m_s, demand.period_s)?;
         self.target = Some(target);
+        if let Some(feed_forward) = &self.feed_forward {
+            // A target is approached during the last period before it is reached.
+            let middle_s = (self.sequencer.config.lead_cycles - 0.5) * demand.period_s;
+            let poses = [-1.0, 0.0, 1.0].map(|step| self.playback.pose_ahead(middle_s + step * demand.period_s));
+            self.force_offset_n = feed_forward.offset_n(poses, &self.law.detour());
+        }
         Ok(())
     }
 
@@ -161,6 +193,7 @@ impl MotionController {
             desired,
             estimated: estimate.filter(|_| *silent_cycles == 0).map(|estimate| estimate.solution.pose),
             ahead: self.playback.pose_ahead(config.lead_cycles * period_s),
+            external: self.observer.as_ref().and_then(ForceObserver::external),
         }
     }
 
@@ -209,6 +242,15 @@ impl Controller for MotionController {
         {
             self.slack_cycles = self.supervision.slack_cycles(estimate);
         }
+        if let Some(observer) = &mut self.observer {
+            match (reading, &self.sequencer.estimate) {
+                _ if !self.sequencer.is_moving() => observer.reset(),
+                (Some(reading), Some(estimate)) if self.sequencer.silent_cycles == 0 => {
+                    observer.take(reading.cycle, &estimate.solution.pose, &reading.force_n);
+                }
+                _ => {}
+            }
+        }
     }
 
     fn decide(&mut self, tick: Tick) -> Option<Event> {
@@ -219,7 +261,7 @@ impl Controller for MotionController {
         }
         let fault = self.sequencer.begin_cycle(tick);
         let desired = self.playback.pose_ahead(-self.sample_age_s());
-        self.desired = Some(desired);
+        self.desired = Some(Translation3::from(self.law.detour().at_sample_m) * desired);
         let fault = fault.or_else(|| self.check_start().err());
         let fault = fault.or_else(|| self.control(desired).err());
         let event = self.sequencer.follow(fault, self.is_over(), tick);
@@ -232,6 +274,9 @@ impl Controller for MotionController {
 
     fn fill_command(&self, command: &mut Command) {
         *command = self.sequencer.command(self.target);
+        if self.sequencer.is_moving() {
+            command.force_offset_n = self.force_offset_n;
+        }
     }
 
     /// Also the conditioning, which is only reported, and so computed after the command has gone out.
@@ -266,7 +311,14 @@ impl Controller for MotionController {
     }
 
     fn fill_signals(&self, signals: &mut [f64]) {
-        self.law.fill_signals(signals);
+        let (of_law, observed) = signals.split_at_mut(signals.len() - self.observer.as_ref().map_or(0, |_| OBSERVED));
+        self.law.fill_signals(of_law);
+        if let Some(observer) = &self.observer {
+            observed.copy_from_slice(&observer.external().map_or([f64::NAN; OBSERVED], |external| {
+                let [x, y, z] = external.force_n;
+                [x, y, z, external.bite_n(), external.uncertainty_n]
+            }));
+        }
     }
 
     fn warm_up(&self) {
@@ -289,6 +341,18 @@ fn own_parameters() -> [Parameter; OWN] {
         share("motion_rate", "Speed of the motion; 1 as written."),
         share("motion_amplitude", "Share of the way from the motion's first pose; 1 as written."),
     ]
+}
+
+/// The signals of the observer of forces.
+fn observed_signals() -> [Signal; OBSERVED] {
+    [
+        ("external_force_x_n", "External force on the platform along x of the base."),
+        ("external_force_y_n", "External force on the platform along y of the base."),
+        ("external_force_z_n", "External force on the platform along z of the base."),
+        ("bite_force_n", "Estimated bite force: what pushes the platform downwards."),
+        ("bite_force_uncertainty_n", "Bound of the error of the estimated bite force."),
+    ]
+    .map(|(name, about)| Signal { name: name.to_owned(), unit: "N".to_owned(), about: about.to_owned() })
 }
 
 #[cfg(test)]

@@ -1,0 +1,89 @@
+//! Feed-forward of forces: what the desired motion needs of each axis while the drives move to the targets of a cycle.
+//!
+//! A target acts from the next SYNC on and is reached one period later: the offset of this cycle is that of the middle of this
+//! period. Velocity and acceleration are differences of three desired poses, one period apart.
+
+use masseter_shared::geometry::{AXES, Pose, Twist};
+
+use crate::model::{Model, twist_between};
+use crate::pose_law::Detour;
+
+/// Inverse dynamics along the desired motion.
+#[derive(Debug, Clone)]
+pub(crate) struct FeedForward {
+    model: Model,
+    period_s: f64,
+}
+
+impl FeedForward {
+    pub(crate) fn new(model: Model, period_s: f64) -> Self {
+        Self { model, period_s }
+    }
+
+    /// The forces for the middle one of three desired poses, one period apart, N. A law's detour changes the velocity; its
+    /// acceleration, and its way from the pose, are left out. Zeros in a singular pose.
+    pub(crate) fn offset_n(&self, poses: [Pose; 3], detour: &Detour) -> [f64; AXES] {
+        let [before, here, after] = poses;
+        let (to, from) =
+            (twist_between(&before, &here, self.period_s), twist_between(&here, &after, self.period_s));
+        let mut twist = (to + from) / 2.0;
+        twist.fixed_rows_mut::<3>(0).zip_apply(&detour.ahead_m_s, |mean, more| *mean += more);
+        let acceleration: Twist = (from - to) / self.period_s;
+        let motion = self.model.motion(&here, &twist);
+        let force_n = motion.and_then(|motion| self.model.force_n(&motion, &acceleration));
+        force_n.map_or([0.0; AXES], Into::into)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::config::{DynamicsConfig, Scenario};
+    use masseter_shared::geometry::{LEGS, Mechanism, MechanismConfig, Vec3};
+
+    use super::*;
+
+    const PERIOD_S: f64 = 1e-3;
+
+    fn offset_n(dynamics: DynamicsConfig, velocity_m_s: f64, acceleration_m_s2: f64, detour: &Detour) -> [f64; AXES] {
+        let scenario = Scenario { dynamics, ..Scenario::default() };
+        let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
+        let feed = FeedForward::new(Model::new(&scenario, mechanism), PERIOD_S);
+        let at = |time_s: f64| {
+            let way_m = velocity_m_s * time_s + acceleration_m_s2 * time_s * time_s / 2.0;
+            Pose::translation(0.0, 0.0, 0.268_452_355 + way_m)
+        };
+        feed.offset_n([at(-PERIOD_S), at(0.0), at(PERIOD_S)], detour)
+    }
+
+    fn legs_n(forces_n: [f64; AXES]) -> f64 {
+        forces_n[LEGS..].iter().sum()
+    }
+
+    #[test]
+    fn at_rest_the_legs_carry_the_weight_of_platform_and_rods() {
+        let still = offset_n(DynamicsConfig::default(), 0.0, 0.0, &Detour::default());
+        let weight_n = (0.5 + 3.0 * 0.4) * 9.81;
+        assert!((legs_n(still) - weight_n).abs() < 0.3, "{still:?}");
+        assert!(still[..LEGS].iter().all(|slide_n| slide_n.abs() < 0.5), "{still:?}");
+    }
+
+    #[test]
+    fn friction_changes_its_sign_with_the_motion_and_mass_adds_with_the_acceleration() {
+        let frictionless =
+            DynamicsConfig { slide_friction_n: 0.0, viscous_friction_n_s_per_m: 0.0, ..DynamicsConfig::default() };
+        let none = Detour::default();
+        let [up, down] = [0.05, -0.05].map(|speed| legs_n(offset_n(DynamicsConfig::default(), speed, 0.0, &none)));
+        // Each leg: 2 N and 20 N s/m · 50 mm/s, in both directions.
+        assert!((up - down - 18.0).abs() < 0.2, "{up} {down}");
+        let [still, gains] = [0.0, 2.0].map(|gain| legs_n(offset_n(frictionless, 0.0, gain, &none)));
+        assert!((gains - still - 2.0 * 1.7).abs() < 0.2, "{still} {gains}");
+    }
+
+    #[test]
+    fn a_law_that_holds_the_platform_back_takes_the_friction_back() {
+        let held = Detour { ahead_m_s: Vec3::new(0.0, 0.0, -0.05), ..Detour::default() };
+        let [still, held] = [(0.0, Detour::default()), (0.05, held)]
+            .map(|(speed, detour)| legs_n(offset_n(DynamicsConfig::default(), speed, 0.0, &detour)));
+        assert!((still - held).abs() < 1e-6, "{still} {held}");
+    }
+}
