@@ -25,6 +25,7 @@ pub mod description;
 mod drive;
 pub mod emulation;
 mod error;
+mod held_mean;
 mod injection;
 mod journal;
 mod link;

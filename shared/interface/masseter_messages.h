@@ -251,7 +251,7 @@ typedef struct masseter_reading {
     uint64_t overlong_ns;
     /* Encoder positions d₁ d₂ d₃ l₁ l₂ l₃, m. */
     double position_m[6];
-    /* Actuator forces, positive towards increasing position, N. */
+    /* Actuator forces as the drives report them, positive towards increasing position, N. An emulated drive reports the mean since the last SYNC. */
     double force_n[6];
     /* Drive states, DriveState, or NO_DRIVE_STATE. */
     uint32_t drive_state[6];
@@ -465,7 +465,7 @@ static_assert(offsetof(masseter_event, value) == 72, "offset of value");
 static_assert(offsetof(masseter_event, limit) == 80, "offset of limit");
 
 #define MASSETER_TRUTH_TOPIC "truth"
-#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/f34e53239e7c14b3"
+#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/4dcef821dc5beae4"
 
 /* The true state of the mechanism, once a cycle; the controller never reads it. */
 typedef struct masseter_truth {
@@ -487,13 +487,17 @@ typedef struct masseter_truth {
     double joint_m[6];
     /* Joint velocities, m/s. */
     double joint_m_s[6];
-    /* Actuator forces, N. */
+    /* Actuator forces, N: means over the cycle before the sample. */
     double force_n[6];
-    /* Bite force on the platform, N. */
+    /* Actuator forces at the sample, N. */
+    double force_sample_n[6];
+    /* Bite force on the platform, N: mean over the cycle before the sample. */
     double bite_force_n;
+    /* Bite force at the sample, N. */
+    double bite_force_sample_n;
 } masseter_truth;
 
-static_assert(sizeof(masseter_truth) == 248, "size of masseter_truth");
+static_assert(sizeof(masseter_truth) == 304, "size of masseter_truth");
 static_assert(offsetof(masseter_truth, seq) == 0, "offset of seq");
 static_assert(offsetof(masseter_truth, published_ns) == 8, "offset of published_ns");
 static_assert(offsetof(masseter_truth, version) == 16, "offset of version");
@@ -504,6 +508,8 @@ static_assert(offsetof(masseter_truth, quaternion_wxyz) == 64, "offset of quater
 static_assert(offsetof(masseter_truth, joint_m) == 96, "offset of joint_m");
 static_assert(offsetof(masseter_truth, joint_m_s) == 144, "offset of joint_m_s");
 static_assert(offsetof(masseter_truth, force_n) == 192, "offset of force_n");
-static_assert(offsetof(masseter_truth, bite_force_n) == 240, "offset of bite_force_n");
+static_assert(offsetof(masseter_truth, force_sample_n) == 240, "offset of force_sample_n");
+static_assert(offsetof(masseter_truth, bite_force_n) == 288, "offset of bite_force_n");
+static_assert(offsetof(masseter_truth, bite_force_sample_n) == 296, "offset of bite_force_sample_n");
 
 #endif

@@ -139,9 +139,11 @@ fn inside_the_limit_of_stability_a_bite_is_quiet_and_far_outside_of_it_the_bite_
                 ..hold()
             };
             let mut world = World { stiffness_n_per_m, ..World::new(config) };
-            world.run_to(1.0);
-            let swing_n = world.most_n([0.85, 0.9]) - world.least_n([0.85, 0.9]);
-            assert_eq!(swing_n < 2.0, is_quiet, "{stiffness_n_per_m} N/m, {damping_n_s_per_m} N s/m: {swing_n} N");
+            world.run_to(0.85);
+            let swing_n = world.most_n([0.75, 0.85]) - world.least_n([0.75, 0.85]);
+            // A bite that shakes enough looks like food that breaks.
+            let found = swing_n < 2.0 && world.law.phase != Phase::Broken;
+            assert_eq!(found, is_quiet, "{stiffness_n_per_m} N/m, {damping_n_s_per_m} N s/m: {swing_n} N");
         }
     }
 }

@@ -16,6 +16,7 @@ use super::memory::MemoryFile;
 use crate::checks::check_quantities;
 use crate::drive::{DriveNode, DriveSettings, Encoder, Shaft};
 use crate::error::PlantError;
+use crate::held_mean::HeldMean;
 use crate::injection::{Occurrence, known_windows};
 use crate::mechanism::{Dynamics, DynamicsError, Food, MechanismState, closed_mouth, level};
 
@@ -47,7 +48,8 @@ pub struct Emulation {
     step_ns: u64,
     next_step_ns: u64,
     moved_to_ns: u64,
-    force_n: [f64; AXES],
+    force_n: [HeldMean; AXES],
+    bite_force_n: HeldMean,
     sample: Sample,
     /// Whether each drive has received the SYNC of the sample.
     synchronised: [bool; AXES],
@@ -66,14 +68,10 @@ pub struct Emulation {
 struct Sample {
     time_ns: u64,
     state: MechanismState,
-    force_n: [f64; AXES],
-    bite_force_n: f64,
-}
-
-impl Sample {
-    fn new(dynamics: &Dynamics, force_n: [f64; AXES], time_ns: u64) -> Self {
-        Self { time_ns, state: *dynamics.state(), force_n, bite_force_n: dynamics.bite_force_n() }
-    }
+    /// The actuators' forces: means since the last sample, and present values.
+    force_n: [[f64; AXES]; 2],
+    /// The bite force: mean since the last sample, and present value.
+    bite_force_n: [f64; 2],
 }
 
 impl Emulation {
@@ -115,16 +113,18 @@ impl Emulation {
                 None => PlantError::Scenario(reason),
             })
         };
-        let (force_n, step_ns) = ([0.0; AXES], scenario.dynamics.step_ns);
+        let step_ns = scenario.dynamics.step_ns;
+        let state = *dynamics.state();
         Ok(Self {
             drives: settings.iter().enumerate().map(drive).collect::<Result<_, _>>()?,
-            sample: Sample::new(&dynamics, force_n, now_ns),
+            sample: Sample { time_ns: now_ns, state, force_n: [[0.0; AXES]; 2], bite_force_n: [0.0; 2] },
             dynamics,
             step_ns,
             // Half a step beside the SYNCs of a cycle that is a multiple of the step: SYNCs are work enough.
             next_step_ns: now_ns + step_ns / 2,
             moved_to_ns: now_ns,
-            force_n,
+            force_n: [HeldMean::new(now_ns); AXES],
+            bite_force_n: HeldMean::new(now_ns),
             synchronised: [true; AXES],
             agenda,
             encoder_faults: encoder_faults(scenario),
@@ -167,8 +167,10 @@ impl Emulation {
             quaternion_wxyz,
             joint_m: state.positions_m(),
             joint_m_s: self.dynamics.velocities_m_s(&state),
-            force_n,
-            bite_force_n,
+            force_n: force_n[0],
+            force_sample_n: force_n[1],
+            bite_force_n: bite_force_n[0],
+            bite_force_sample_n: bite_force_n[1],
             ..Truth::default()
         }
     }
@@ -219,15 +221,22 @@ impl Emulation {
         let positions_m = self.dynamics.drive_positions_m();
         for (axis, is_m) in positions_m.into_iter().enumerate() {
             let seen_m = self.encoder_faults[axis].seen_m(now_ns, is_m);
-            self.force_n[axis] = self.drives[axis].step(now_ns, Shaft { seen_m, is_m });
+            let force_n = self.drives[axis].step(now_ns, Shaft { seen_m, is_m });
+            self.force_n[axis].hold(force_n, now_ns);
         }
         if self.agenda.is_empty() {
-            self.dynamics.push(&self.force_n)?;
+            self.push()?;
         } else {
             self.push_injected(now_ns)?;
         }
+        self.bite_force_n.hold(self.dynamics.bite_force_n(), now_ns);
         self.next_step_ns += self.step_ns;
         Ok(())
+    }
+
+    /// Pushes the mechanism with the drives' forces.
+    fn push(&mut self) -> Result<(), DynamicsError> {
+        self.dynamics.push(&self.force_n.map(|force_n| force_n.value()))
     }
 
     /// Pushes the mechanism with the scenario's forces too, and reports the faults that have struck.
@@ -236,7 +245,7 @@ impl Emulation {
         for (wrench, point_m) in self.agenda.pushes(now_ns) {
             self.dynamics.load(&wrench, point_m);
         }
-        self.dynamics.push(&self.force_n)?;
+        self.push()?;
         let mut from = 0;
         while let Some(place) = self.agenda.next_waiting(from) {
             if self.has_struck(place) {
@@ -338,7 +347,15 @@ impl Emulation {
     fn synchronise(&mut self, axis: usize, now_ns: u64) {
         if self.synchronised[axis] {
             self.synchronised = [false; AXES];
-            self.sample = Sample::new(&self.dynamics, self.force_n, now_ns);
+            self.sample = Sample {
+                time_ns: now_ns,
+                state: *self.dynamics.state(),
+                force_n: [
+                    self.force_n.each_mut().map(|force_n| force_n.take(now_ns)),
+                    self.force_n.map(|force_n| force_n.value()),
+                ],
+                bite_force_n: [self.bite_force_n.take(now_ns), self.bite_force_n.value()],
+            };
         }
         self.synchronised[axis] = true;
     }

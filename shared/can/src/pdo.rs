@@ -61,7 +61,8 @@ pub struct Tpdo1 {
     pub statusword: Statusword,
     /// Object 6064, encoder increments.
     pub actual_increments: i32,
-    /// Object 6077, per mille of the rated torque (of the rated force, for a linear axis).
+    /// Object 6077, per mille of the rated torque (of the rated force, for a linear axis). An emulated drive gives the mean
+    /// since the last SYNC.
     pub torque_permille: i16,
 }
 

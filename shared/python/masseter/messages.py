@@ -258,7 +258,7 @@ class Reading(ctypes.Structure):
         ("overlong_ns", ctypes.c_uint64),
         # Encoder positions d₁ d₂ d₃ l₁ l₂ l₃, m.
         ("position_m", ctypes.c_double * 6),
-        # Actuator forces, positive towards increasing position, N.
+        # Actuator forces as the drives report them, positive towards increasing position, N. An emulated drive reports the mean since the last SYNC.
         ("force_n", ctypes.c_double * 6),
         # Drive states, DriveState, or NO_DRIVE_STATE.
         ("drive_state", ctypes.c_uint32 * 6),
@@ -446,15 +446,19 @@ class Truth(ctypes.Structure):
         ("joint_m", ctypes.c_double * 6),
         # Joint velocities, m/s.
         ("joint_m_s", ctypes.c_double * 6),
-        # Actuator forces, N.
+        # Actuator forces, N: means over the cycle before the sample.
         ("force_n", ctypes.c_double * 6),
-        # Bite force on the platform, N.
+        # Actuator forces at the sample, N.
+        ("force_sample_n", ctypes.c_double * 6),
+        # Bite force on the platform, N: mean over the cycle before the sample.
         ("bite_force_n", ctypes.c_double),
+        # Bite force at the sample, N.
+        ("bite_force_sample_n", ctypes.c_double),
     ]
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Truth/f34e53239e7c14b3"
+        return "masseter/Truth/4dcef821dc5beae4"
 
 
-_check(Truth, 248, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240])
+_check(Truth, 304, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240, 288, 296])

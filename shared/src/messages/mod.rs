@@ -179,7 +179,8 @@ messages! {
         overlong_ns: u64,
         /// Encoder positions d₁ d₂ d₃ l₁ l₂ l₃, m.
         position_m: [f64; AXES],
-        /// Actuator forces, positive towards increasing position, N.
+        /// Actuator forces as the drives report them, positive towards increasing position, N. An emulated drive reports the
+        /// mean since the last SYNC.
         force_n: [f64; AXES],
         /// Drive states, [`codes::DriveState`], or [`codes::NO_DRIVE_STATE`].
         drive_state: [u32; AXES],
@@ -260,7 +261,7 @@ messages! {
     }
 
     /// The true state of the mechanism, once a cycle; the controller never reads it.
-    Truth on "truth" keeping 2048 as "masseter/Truth/f34e53239e7c14b3" {
+    Truth on "truth" keeping 2048 as "masseter/Truth/4dcef821dc5beae4" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// The instant it describes: that of the reading's sample, ns.
@@ -273,10 +274,14 @@ messages! {
         joint_m: [f64; AXES],
         /// Joint velocities, m/s.
         joint_m_s: [f64; AXES],
-        /// Actuator forces, N.
+        /// Actuator forces, N: means over the cycle before the sample.
         force_n: [f64; AXES],
-        /// Bite force on the platform, N.
+        /// Actuator forces at the sample, N.
+        force_sample_n: [f64; AXES],
+        /// Bite force on the platform, N: mean over the cycle before the sample.
         bite_force_n: f64,
+        /// Bite force at the sample, N.
+        bite_force_sample_n: f64,
     }
 
     /// An observation of a tap on a CAN wire: a frame, or an error message in the coding of `linux/can/error.h`.

@@ -8,6 +8,7 @@ use super::motion::Motion;
 use super::motor::{Asked, Motor};
 use super::servo::{Servo, ServoCommand, ServoLimits};
 use crate::drive::quirks::AxisQuirks;
+use crate::held_mean::HeldMean;
 use crate::injection::Acting;
 
 /// Share of the rated force at which a motor counts as pushing against a stop.
@@ -22,7 +23,7 @@ pub(super) struct Drivetrain {
     motor: Motor,
     brake: Brake,
     /// The motor's share of the force: without current the brake holds.
-    motor_n: f64,
+    motor_n: HeldMean,
 }
 
 impl Drivetrain {
@@ -34,7 +35,7 @@ impl Drivetrain {
             gear: Gear::default(),
             motor: Motor::default(),
             brake: Brake::new(quirks.opening_ns, quirks.closing_ns),
-            motor_n: 0.0,
+            motor_n: HeldMean::new(0),
         }
     }
 
@@ -50,13 +51,18 @@ impl Drivetrain {
 
     /// The motor's force as its current shows it, N.
     pub(super) fn motor_n(&self) -> f64 {
-        self.motor_n
+        self.motor_n.value()
+    }
+
+    /// Its mean since the last call, N.
+    pub(super) fn take_mean_motor_n(&mut self, now_ns: u64) -> f64 {
+        self.motor_n.take(now_ns)
     }
 
     /// Whether the motor pushes against a stop: towards smaller positions, towards larger ones.
     pub(super) fn pushes(&self) -> [bool; 2] {
         let threshold_n = STOP_SHARE * self.config.rated_force_n;
-        [self.motor_n <= -threshold_n, self.motor_n >= threshold_n]
+        [self.motor_n() <= -threshold_n, self.motor_n() >= threshold_n]
     }
 
     /// Begins to open the brake.
@@ -90,7 +96,7 @@ impl Drivetrain {
     ) -> f64 {
         let force_n = self.servo.step(measured_m, error_m, command, limits);
         let is_braking = command == ServoCommand::Brake;
-        self.motor_n = if is_braking { 0.0 } else { force_n };
+        let mut motor_n = if is_braking { 0.0 } else { force_n };
         let mut asked = Asked { force_n, is_braking, max_force_n: self.config.max_force_n };
         let is_held = self.brake.holds(now_ns, is_braking);
         if is_braking && !is_held {
@@ -99,8 +105,9 @@ impl Drivetrain {
         }
         let force_n = self.motor.force_n(asked, self.servo.shaft(), faults);
         if faults.has(FaultKindConfig::DriveRunaway) {
-            self.motor_n = asked.max_force_n;
+            motor_n = asked.max_force_n;
         }
+        self.motor_n.hold(motor_n, now_ns);
         if is_braking && faults.has(FaultKindConfig::BrakeOpen) {
             self.servo.release_brake();
         }

@@ -66,6 +66,8 @@ pub(super) struct Axis {
     coordinates: Coordinates,
     switches: Switches,
     drivetrain: Drivetrain,
+    /// The motor's force that 6077h shows: at SYNC the mean since the last one, otherwise the present value; N.
+    shown_n: f64,
     parameters: Parameters,
     demand: Demand,
     following: FollowingErrorMonitor,
@@ -102,6 +104,7 @@ impl Axis {
         Self {
             parameters: Parameters::from_objects(objects, &config, &quirks),
             drivetrain: Drivetrain::new(config, &quirks, step_s, position_m),
+            shown_n: 0.0,
             coordinates: Coordinates::new(encoder, position_m, quirks.is_incremental),
             switches: Switches::new(stroke_m, position_m),
             config,
@@ -341,6 +344,7 @@ impl Axis {
         let places_m = [self.coordinates.read_m(), seen_m - shaft.is_m];
         let command = self.servo_command(now_ns);
         let force_n = self.drivetrain.step(now_ns, places_m, command, &limits, &mut self.faults);
+        self.shown_n = self.drivetrain.motor_n();
         (force_n, self.supervise_following(now_ns))
     }
 
@@ -364,8 +368,9 @@ impl Axis {
         Sensed { counts, actual, limits, pushes, is_at_rest }
     }
 
-    /// Reads the encoder, as SYNC demands.
+    /// Reads the encoder and takes the motor's mean force, as SYNC demands.
     pub(super) fn sample(&mut self, now_ns: u64, seen_m: f64) {
+        self.shown_n = self.drivetrain.take_mean_motor_n(now_ns);
         let demand_m = self.demand.position_m(now_ns);
         let gear_error_m = self.drivetrain.gear_error_m(demand_m, &mut self.faults);
         self.coordinates.read(seen_m + gear_error_m);
@@ -394,7 +399,7 @@ impl Axis {
         let actual = self.coordinates.actual();
         let demand_m = self.demand.position_m(now_ns);
         let demand = demand_m.map_or(actual, |demand_m| self.coordinates.increments(demand_m));
-        let torque = self.drivetrain.motor_n() / self.config.rated_force_n * 1000.0;
+        let torque = self.shown_n / self.config.rated_force_n * 1000.0;
         objects.set(names::STATUSWORD, self.statusword(now_ns).0);
         objects.set(names::MODE_DISPLAY, self.mode.number());
         objects.set(names::POSITION_DEMAND, demand);

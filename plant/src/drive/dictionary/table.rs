@@ -213,6 +213,8 @@ pub(crate) static OBJECTS: &[Object] = &[
     var(&[plain(0x606C, "Velocity actual value", I32, ReadOnly, Value(0)).mapped(Tpdo)]),
     var(&[plain(0x6071, "Target torque", I16, ReadWrite, Value(0)).mapped(Any)]),
     var(&[plain(0x6072, "Max torque", U16, ReadWrite, Configured)]),
+    // In process data that answer a SYNC, the mean since the last SYNC, so that no cycle's work is missed between samples.
+    // Otherwise the present value.
     var(&[plain(0x6077, "Torque actual value", I16, ReadOnly, Value(0)).mapped(Tpdo)]),
     var(&[plain(0x607A, "Target position", I32, ReadWrite, Value(0)).mapped(Any)]),
     var(&[plain(0x607C, "Home offset", I32, ReadWrite, Value(0))]),

@@ -226,9 +226,12 @@ impl Registry {
             "Angle of the platform from its desired orientation.",
             move |messages| Some(jaw.actual(messages)?.rotation.angle_to(&desired(messages)?.rotation)),
         );
-        self.add("bite.force", "N", "Force with which the emulated jaw bites on food.", |messages| {
-            Some(messages.truth?.bite_force_n)
-        });
+        self.add(
+            "bite.force",
+            "N",
+            "Force with which the emulated jaw bites on food, mean over the cycle.",
+            |messages| Some(messages.truth?.bite_force_n),
+        );
     }
 
     fn add_axes(&mut self) {
@@ -254,9 +257,12 @@ impl Registry {
             self.add(format!("{name}.velocity"), "mm/s", "True velocity of the axis.", move |messages| {
                 Some(at(messages.truth?.joint_m_s))
             });
-            self.add(format!("{name}.force"), "N", "Force that the drive reports.", move |messages| {
-                Some(at(reading(messages)?.force_n))
-            });
+            self.add(
+                format!("{name}.force"),
+                "N",
+                "Force that the drive reports; of an emulated one the mean over the cycle.",
+                move |messages| Some(at(reading(messages)?.force_n)),
+            );
             self.add(format!("{name}.target"), "mm", "Target of the cycle's command.", move |messages| {
                 Some(at(command(messages)?.target_m))
             });
