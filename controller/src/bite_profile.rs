@@ -23,7 +23,8 @@ mod tests {
 
     #[test]
     fn a_bite_begins_with_the_force_of_contact_and_comes_to_its_peak() {
-        let half_sine = ForceControlConfig { contact_n: 10.0, peak_n: 50.0, bite_s: 0.2, ..Default::default() };
+        let half_sine =
+            ForceControlConfig { contact_n: 10.0, peak_n: 50.0, bite_s: 0.2, ..Default::default() };
         let hold = ForceControlConfig { profile: BiteProfile::Hold, ..half_sine };
         let table = [
             (half_sine, [Some(10.0), Some(38.284), Some(50.0), Some(38.284), None]),
@@ -32,7 +33,8 @@ mod tests {
         for (config, expected_n) in table {
             for (time_s, expected_n) in [0.0, 0.05, 0.1, 0.15, 0.2].into_iter().zip(expected_n) {
                 let found_n = desired_n(&config, time_s);
-                let is_near = found_n.zip(expected_n).is_none_or(|(found, expected)| (found - expected).abs() < 0.01);
+                let is_near =
+                    found_n.zip(expected_n).is_none_or(|(found, expected)| (found - expected).abs() < 0.01);
                 assert!(found_n.is_some() == expected_n.is_some() && is_near, "{time_s} s: {found_n:?}");
             }
         }

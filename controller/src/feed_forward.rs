@@ -44,7 +44,12 @@ mod tests {
 
     const PERIOD_S: f64 = 1e-3;
 
-    fn offset_n(dynamics: DynamicsConfig, velocity_m_s: f64, acceleration_m_s2: f64, detour: &Detour) -> [f64; AXES] {
+    fn offset_n(
+        dynamics: DynamicsConfig,
+        velocity_m_s: f64,
+        acceleration_m_s2: f64,
+        detour: &Detour,
+    ) -> [f64; AXES] {
         let scenario = Scenario { dynamics, ..Scenario::default() };
         let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
         let feed = FeedForward::new(Model::new(&scenario, mechanism), PERIOD_S);
@@ -69,10 +74,14 @@ mod tests {
 
     #[test]
     fn friction_changes_its_sign_with_the_motion_and_mass_adds_with_the_acceleration() {
-        let frictionless =
-            DynamicsConfig { slide_friction_n: 0.0, viscous_friction_n_s_per_m: 0.0, ..DynamicsConfig::default() };
+        let frictionless = DynamicsConfig {
+            slide_friction_n: 0.0,
+            viscous_friction_n_s_per_m: 0.0,
+            ..DynamicsConfig::default()
+        };
         let none = Detour::default();
-        let [up, down] = [0.05, -0.05].map(|speed| legs_n(offset_n(DynamicsConfig::default(), speed, 0.0, &none)));
+        let [up, down] =
+            [0.05, -0.05].map(|speed| legs_n(offset_n(DynamicsConfig::default(), speed, 0.0, &none)));
         // Each leg: 2 N and 20 N s/m · 50 mm/s, in both directions.
         assert!((up - down - 18.0).abs() < 0.2, "{up} {down}");
         let [still, gains] = [0.0, 2.0].map(|gain| legs_n(offset_n(frictionless, 0.0, gain, &none)));

@@ -5,8 +5,8 @@
 //! M v̇ + D v = f_desired − f, with M = D times 3 ms.
 //!
 //! The speed begins with that of the motion, so that nothing jumps. The damping D grows where the teeth meet. A bite ends after
-//! its time, or where the food breaks. From then on the jaw does not close: the jaw waits, or gives way to more than the force
-//! of contact, until the opening motion has come to it. Only the height is controlled; the other five freedoms keep to the motion.
+//! its time, where the food breaks, or where the opening motion has come to the jaw. From then on the jaw does not close: the
+//! jaw waits, or gives way to more than the force of contact, and goes with the motion again when the motion opens. Only the height is controlled; the other five freedoms keep to the motion.
 
 use masseter_shared::config::{ForceControlConfig, MOST_LEAD_CYCLES, Scenario};
 use masseter_shared::geometry::{Pose, Vec3};
@@ -115,7 +115,8 @@ impl ForceControl {
             Phase::Biting { .. } if self.has_broken() => Phase::Broken,
             Phase::Biting { time_s } => {
                 let time_s = time_s + self.period_s;
-                let goes_on = is_running && time_s < self.config.bite_s;
+                let is_taken_along = self.motion_m_s < -SLOW_M_S && self.offsets_m[0] >= 0.0;
+                let goes_on = is_running && time_s < self.config.bite_s && !is_taken_along;
                 if goes_on { Phase::Biting { time_s } } else { Phase::Opening }
             }
             waiting => {

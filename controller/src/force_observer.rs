@@ -14,6 +14,7 @@
 use masseter_shared::config::{ForceEstimateConfig, Scenario};
 use masseter_shared::dynamics::{Equations, Motion};
 use masseter_shared::geometry::{AXES, Pose, Twist};
+use masseter_shared::named::Signal;
 use nalgebra::Vector6;
 
 use crate::model::{Model, twist_between};
@@ -56,6 +57,34 @@ pub(crate) struct ForceObserver {
 }
 
 impl ForceObserver {
+    /// How many signals the observer has.
+    pub(crate) const SIGNALS: usize = 5;
+
+    /// The signals that the controller publishes of the observer.
+    pub(crate) fn declared() -> [Signal; Self::SIGNALS] {
+        [
+            ("external_force_x_n", "External force on the platform along x of the base."),
+            ("external_force_y_n", "External force on the platform along y of the base."),
+            ("external_force_z_n", "External force on the platform along z of the base."),
+            ("bite_force_n", "Estimated bite force: what pushes the platform downwards."),
+            ("bite_force_uncertainty_n", "Bound of the error of the estimated bite force."),
+        ]
+        .map(|(name, about)| Signal {
+            name: name.to_owned(),
+            unit: "N".to_owned(),
+            about: about.to_owned(),
+        })
+    }
+
+    /// Writes these signals; no numbers before there is an estimate.
+    pub(crate) fn fill_signals(&self, signals: &mut [f64]) {
+        let values = self.external().map(|external| {
+            let [x, y, z] = external.force_n;
+            [x, y, z, external.bite_n(), external.uncertainty_n]
+        });
+        signals.copy_from_slice(&values.unwrap_or([f64::NAN; Self::SIGNALS]));
+    }
+
     pub(crate) fn new(scenario: &Scenario, model: Model) -> Self {
         Self {
             model,
@@ -205,7 +234,8 @@ mod tests {
     fn near_rest_the_uncertainty_has_the_whole_coulomb_friction_of_the_legs() {
         let scenario = Scenario::default();
         let mut observer = ForceObserver::new(&scenario, model(&scenario));
-        let uncertainty_n = |observer: &ForceObserver| observer.external().map(|external| external.uncertainty_n);
+        let uncertainty_n =
+            |observer: &ForceObserver| observer.external().map(|external| external.uncertainty_n);
         for cycle in 1..=3 {
             assert_eq!(uncertainty_n(&observer), None, "cycle {cycle}");
             observer.take(cycle, &Pose::translation(0.0, 0.0, 0.27), &[0.0; AXES]);

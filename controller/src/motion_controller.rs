@@ -10,7 +10,7 @@ use masseter_shared::control::{Controller, Outcome, Tick};
 use masseter_shared::geometry::{AXES, Actuators, Jacobian, Joints, Mechanism, Pose};
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::{Command, Event, Reading, State};
-use masseter_shared::named::{Declared, Parameter, Signal};
+use masseter_shared::named::{Declared, Parameter};
 use nalgebra::Translation3;
 
 use crate::command_acknowledgement::CommandAcknowledgement;
@@ -32,8 +32,6 @@ use crate::trajectory::{self, Trajectory};
 const MARGINS_EVERY_S: f64 = 0.005;
 /// How many parameters the controller has beside those of the law.
 const OWN: usize = 2;
-/// How many signals the observer of forces has.
-const OBSERVED: usize = 5;
 /// Age of a reading that comes late but is used.
 const LATE_READING_CYCLES: u64 = 1;
 
@@ -114,7 +112,7 @@ impl MotionController {
         let is_observed = scenario.force_estimate.is_some() || scenario.force_control.is_some();
         let mut declared = law.declared();
         declared.parameters.extend(own_parameters());
-        declared.signals.extend(is_observed.then(observed_signals).into_iter().flatten());
+        declared.signals.extend(is_observed.then(ForceObserver::declared).into_iter().flatten());
         Self {
             sequencer: Sequencer::new(scenario, mechanism.clone()),
             velocity_limit_m_s: std::array::from_fn(|axis| scenario.drives.of_axis(axis).max_velocity_m_s),
@@ -165,12 +163,7 @@ impl MotionController {
         let target = self.mechanism.strokes().clamp(&joints.actuators, &before, self.trim_reach_m)?;
         safety::check_velocity(&target, &before, &self.velocity_limit_m_s, demand.period_s)?;
         self.target = Some(target);
-        if let Some(feed_forward) = &self.feed_forward {
-            // A target is approached during the last period before it is reached.
-            let middle_s = (self.sequencer.config.lead_cycles - 0.5) * demand.period_s;
-            let poses = [-1.0, 0.0, 1.0].map(|step| self.playback.pose_ahead(middle_s + step * demand.period_s));
-            self.force_offset_n = feed_forward.offset_n(poses, &self.law.detour());
-        }
+        self.feed_forward();
         Ok(())
     }
 
@@ -202,6 +195,28 @@ impl MotionController {
         let Sequencer { cycle, period_s, estimate, .. } = &self.sequencer;
         let reading_cycle = estimate.map_or(*cycle, |estimate| estimate.reading_cycle);
         cycle.saturating_sub(reading_cycle).min(LATE_READING_CYCLES) as f64 * period_s
+    }
+
+    /// The observer of forces takes each fresh sample while the drives carry the jaw.
+    fn observe_force(&mut self, reading: Option<&Reading>) {
+        let Some(observer) = &mut self.observer else { return };
+        match (reading, &self.sequencer.estimate) {
+            _ if !self.sequencer.is_moving() => observer.reset(),
+            (Some(reading), Some(estimate)) if self.sequencer.silent_cycles == 0 => {
+                observer.take(reading.cycle, &estimate.solution.pose, &reading.force_n);
+            }
+            _ => {}
+        }
+    }
+
+    /// The forces that the motion needs while the drives move to the targets of this cycle: they approach a target during the
+    /// last period before it is reached.
+    fn feed_forward(&mut self) {
+        let Some(feed_forward) = &self.feed_forward else { return };
+        let Sequencer { period_s, config, .. } = &self.sequencer;
+        let poses = [1.5, 0.5, -0.5]
+            .map(|earlier| self.playback.pose_ahead((config.lead_cycles - earlier) * period_s));
+        self.force_offset_n = feed_forward.offset_n(poses, &self.law.detour());
     }
 
     /// Whether the motion of this state is over.
@@ -242,15 +257,7 @@ impl Controller for MotionController {
         {
             self.slack_cycles = self.supervision.slack_cycles(estimate);
         }
-        if let Some(observer) = &mut self.observer {
-            match (reading, &self.sequencer.estimate) {
-                _ if !self.sequencer.is_moving() => observer.reset(),
-                (Some(reading), Some(estimate)) if self.sequencer.silent_cycles == 0 => {
-                    observer.take(reading.cycle, &estimate.solution.pose, &reading.force_n);
-                }
-                _ => {}
-            }
-        }
+        self.observe_force(reading);
     }
 
     fn decide(&mut self, tick: Tick) -> Option<Event> {
@@ -311,13 +318,11 @@ impl Controller for MotionController {
     }
 
     fn fill_signals(&self, signals: &mut [f64]) {
-        let (of_law, observed) = signals.split_at_mut(signals.len() - self.observer.as_ref().map_or(0, |_| OBSERVED));
+        let observed = self.observer.as_ref().map_or(0, |_| ForceObserver::SIGNALS);
+        let (of_law, observed) = signals.split_at_mut(signals.len() - observed);
         self.law.fill_signals(of_law);
         if let Some(observer) = &self.observer {
-            observed.copy_from_slice(&observer.external().map_or([f64::NAN; OBSERVED], |external| {
-                let [x, y, z] = external.force_n;
-                [x, y, z, external.bite_n(), external.uncertainty_n]
-            }));
+            observer.fill_signals(observed);
         }
     }
 
@@ -341,18 +346,6 @@ fn own_parameters() -> [Parameter; OWN] {
         share("motion_rate", "Speed of the motion; 1 as written."),
         share("motion_amplitude", "Share of the way from the motion's first pose; 1 as written."),
     ]
-}
-
-/// The signals of the observer of forces.
-fn observed_signals() -> [Signal; OBSERVED] {
-    [
-        ("external_force_x_n", "External force on the platform along x of the base."),
-        ("external_force_y_n", "External force on the platform along y of the base."),
-        ("external_force_z_n", "External force on the platform along z of the base."),
-        ("bite_force_n", "Estimated bite force: what pushes the platform downwards."),
-        ("bite_force_uncertainty_n", "Bound of the error of the estimated bite force."),
-    ]
-    .map(|(name, about)| Signal { name: name.to_owned(), unit: "N".to_owned(), about: about.to_owned() })
 }
 
 #[cfg(test)]

@@ -46,7 +46,8 @@ impl World {
     }
 
     fn motion_m(time_s: f64) -> f64 {
-        let opening = 1.0 - minimum_jerk(time_s / MOVE_S) + minimum_jerk((time_s - MOVE_S - CLOSED_S) / MOVE_S);
+        let opening =
+            1.0 - minimum_jerk(time_s / MOVE_S) + minimum_jerk((time_s - MOVE_S - CLOSED_S) / MOVE_S);
         -OPENING_M * opening
     }
 
@@ -145,7 +146,11 @@ fn inside_the_limit_of_stability_a_bite_is_quiet_and_far_outside_of_it_the_bite_
             let swing_n = world.most_n([0.75, 0.85]) - world.least_n([0.75, 0.85]);
             // A bite that shakes enough looks like food that breaks.
             let found = swing_n < 2.0 && world.law.phase != Phase::Broken;
-            assert_eq!(found, is_quiet, "{stiffness_n_per_m} N/m, {damping_n_s_per_m} N s/m: {swing_n} N, {:?}", world.law.phase);
+            assert_eq!(
+                found, is_quiet,
+                "{stiffness_n_per_m} N/m, {damping_n_s_per_m} N s/m: {swing_n} N, {:?}",
+                world.law.phase
+            );
         }
     }
 }

@@ -97,7 +97,11 @@ impl ForceControlConfig {
         let delay_s = lead_s + observer_s + Self::MASS_TIME_S;
         for (key, damping, stiffness) in [
             ("force_control.damping_n_s_per_m", self.damping_n_s_per_m, self.food_stiffness_n_per_m),
-            ("force_control.tooth_damping_n_s_per_m", self.tooth_damping_n_s_per_m, self.tooth_stiffness_n_per_m),
+            (
+                "force_control.tooth_damping_n_s_per_m",
+                self.tooth_damping_n_s_per_m,
+                self.tooth_stiffness_n_per_m,
+            ),
         ] {
             let least = Self::least_damping_n_s_per_m(stiffness, delay_s);
             if !(damping >= least && damping.is_finite()) {

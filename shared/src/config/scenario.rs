@@ -14,8 +14,8 @@ use super::need::{LONGEST_S, SHORTEST_MOTION_S, require_within};
 use super::when::EntryNames;
 use super::{
     AxisScale, CanConfig, ChecksConfig, ControllerConfig, DriveProfile, DrivesConfig, DryConfig,
-    DynamicsConfig, ExpectConfig, FaultConfig, FoodConfig, ForceControlConfig, ForceEstimateConfig, JawConfig,
-    MotionConfig, RealtimeConfig, RequirementConfig, StimulusConfig, TrajectoryLimitsConfig,
+    DynamicsConfig, ExpectConfig, FaultConfig, FoodConfig, ForceControlConfig, ForceEstimateConfig,
+    JawConfig, MotionConfig, RealtimeConfig, RequirementConfig, StimulusConfig, TrajectoryLimitsConfig,
 };
 use crate::clock::SECOND_NS;
 use crate::geometry::{AXES, AXIS_NAMES, MechanismConfig};
@@ -207,7 +207,8 @@ impl Scenario {
         let Some(model) = model else { return };
         let mut whole = Table::try_from(self.dynamics).expect("[dynamics] has a TOML form");
         merge(&mut whole, model.clone());
-        self.controller.model = Some(whole.try_into().expect("[dynamics] and [controller.model] have been read"));
+        self.controller.model =
+            Some(whole.try_into().expect("[dynamics] and [controller.model] have been read"));
     }
 
     /// The scenario with one value changed: `KEY=VALUE`, with the key and the value as in a file. A value that is no TOML is
