@@ -1,28 +1,39 @@
 //! Feed-forward of forces: what the desired motion needs of each axis while the drives move to the targets of a cycle.
 //!
 //! A target acts from the next SYNC on and is reached one period later: the offset of this cycle is that of the middle of this
-//! period. Velocity and acceleration are differences of three desired poses, one period apart.
+//! period. Velocity and acceleration are differences of three desired poses, one period apart. The offsets fade in, since the
+//! drives' own loops carry the weight when the motion begins.
 
 use masseter_shared::geometry::{AXES, Pose, Twist};
 
 use crate::model::{Model, twist_between};
 use crate::pose_law::Detour;
 
+/// Time from no offset to the whole one, s: the loops of a drive take a tenth of it.
+const FADE_IN_S: f64 = 0.3;
+
 /// Inverse dynamics along the desired motion.
 #[derive(Debug, Clone)]
 pub(crate) struct FeedForward {
     model: Model,
     period_s: f64,
+    /// Share of the forces that is fed forward.
+    share: f64,
 }
 
 impl FeedForward {
     pub(crate) fn new(model: Model, period_s: f64) -> Self {
-        Self { model, period_s }
+        Self { model, period_s, share: 0.0 }
+    }
+
+    /// The motion begins anew.
+    pub(crate) fn begin(&mut self) {
+        self.share = 0.0;
     }
 
     /// The forces for the middle one of three desired poses, one period apart, N. A law's detour changes the velocity; its
     /// acceleration, and its way from the pose, are left out. Zeros in a singular pose.
-    pub(crate) fn offset_n(&self, poses: [Pose; 3], detour: &Detour) -> [f64; AXES] {
+    pub(crate) fn offset_n(&mut self, poses: [Pose; 3], detour: &Detour) -> [f64; AXES] {
         let [before, here, after] = poses;
         let (to, from) =
             (twist_between(&before, &here, self.period_s), twist_between(&here, &after, self.period_s));
@@ -31,7 +42,8 @@ impl FeedForward {
         let acceleration: Twist = (from - to) / self.period_s;
         let motion = self.model.motion(&here, &twist);
         let force_n = motion.and_then(|motion| self.model.force_n(&motion, &acceleration));
-        force_n.map_or([0.0; AXES], Into::into)
+        self.share = (self.share + self.period_s / FADE_IN_S).min(1.0);
+        force_n.map_or([0.0; AXES], |force_n| (force_n * self.share).into())
     }
 }
 
@@ -52,7 +64,8 @@ mod tests {
     ) -> [f64; AXES] {
         let scenario = Scenario { dynamics, ..Scenario::default() };
         let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
-        let feed = FeedForward::new(Model::new(&scenario, mechanism), PERIOD_S);
+        let mut feed =
+            FeedForward { share: 1.0, ..FeedForward::new(Model::new(&scenario, mechanism), PERIOD_S) };
         let at = |time_s: f64| {
             let way_m = velocity_m_s * time_s + acceleration_m_s2 * time_s * time_s / 2.0;
             Pose::translation(0.0, 0.0, 0.268_452_355 + way_m)
@@ -86,6 +99,19 @@ mod tests {
         assert!((up - down - 18.0).abs() < 0.2, "{up} {down}");
         let [still, gains] = [0.0, 2.0].map(|gain| legs_n(offset_n(frictionless, 0.0, gain, &none)));
         assert!((gains - still - 2.0 * 1.7).abs() < 0.2, "{still} {gains}");
+    }
+
+    #[test]
+    fn the_forces_fade_in_after_a_beginning() {
+        let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
+        let mut feed = FeedForward::new(Model::new(&Scenario::default(), mechanism), PERIOD_S);
+        let mut weight_n =
+            || legs_n(feed.offset_n([Pose::translation(0.0, 0.0, 0.27); 3], &Detour::default()));
+        let first_n = weight_n();
+        let most_n = (0..400).map(|_| weight_n()).fold(0.0, f64::max);
+        assert!(first_n < 0.1 && (most_n - 1.7 * 9.81).abs() < 0.3, "{first_n} {most_n}");
+        feed.begin();
+        assert_eq!(feed.share, 0.0);
     }
 
     #[test]

@@ -143,7 +143,8 @@ impl ForceControl {
             Phase::Free => self.motion_m_s,
             Phase::Biting { .. } => ((self.desired_n - self.bite_n()) / damping).min(self.config.closing_m_s),
             Phase::Opening | Phase::Broken if offset_m < 0.0 => {
-                -(self.bite_n() - self.config.contact_n).max(0.0) / damping
+                let gives_way_m_s = (self.bite_n() - self.config.contact_n).max(0.0) / damping;
+                -gives_way_m_s.min(self.config.closing_m_s)
             }
             Phase::Opening | Phase::Broken => self.motion_m_s - offset_m / CATCH_UP_S,
         }

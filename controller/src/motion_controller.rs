@@ -212,7 +212,7 @@ impl MotionController {
     /// The forces that the motion needs while the drives move to the targets of this cycle: they approach a target during the
     /// last period before it is reached.
     fn feed_forward(&mut self) {
-        let Some(feed_forward) = &self.feed_forward else { return };
+        let Some(feed_forward) = &mut self.feed_forward else { return };
         let Sequencer { period_s, config, .. } = &self.sequencer;
         let poses = [1.5, 0.5, -0.5]
             .map(|earlier| self.playback.pose_ahead((config.lead_cycles - earlier) * period_s));
@@ -237,7 +237,10 @@ impl MotionController {
                     self.playback.hold(estimate.solution.pose);
                 }
             }
-            ControllerState::Easing => self.playback.ease(),
+            ControllerState::Easing => {
+                self.playback.ease();
+                self.feed_forward.iter_mut().for_each(FeedForward::begin);
+            }
             ControllerState::Running => self.playback.play(),
             ControllerState::Holding => self.playback.stop(),
             ControllerState::SafeStop => {

@@ -53,10 +53,10 @@ section! {
         pub tooth_stiffness_n_per_m: f64 = 1.5e5,
         /// Opening of the mouth below which the damping grows towards that of the teeth, m.
         pub tooth_zone_m: f64 = 5e-4,
-        /// Largest closing speed under force control, m/s.
+        /// Largest speed of closing on food, and of giving way after a bite, m/s.
         pub closing_m_s: f64 = 0.06,
         /// Largest distance of the platform from the motion, m.
-        pub reach_m: f64 = 0.008,
+        pub reach_m: f64 = 0.012,
     }
 }
 
