@@ -45,6 +45,7 @@ profile = "hold"
 bite_s = 0.6
 """
 
+SOFT = HOLD + "[food]\n"
 TEETH = HOLD + "[food]\nthickness_m = 1e-4\nstiffness_n_per_m = 1e6\ndamping_n_s_per_m = 100.0\nyield_n = 1500.0\n"
 
 
@@ -130,17 +131,37 @@ def estimate(masseter: str) -> Iterable[list[str]]:
         yield [name, *(f"{value:.1f}" for value in values(run(masseter, scenario, settings)))]
 
 
+FORCES = "".join(
+    [
+        found("peak", signal="bite.force", during="signal.force_phase > 0.5"),
+        # The second bite has settled.
+        error("steady", "{bite.force} - {signal.desired_bite_force_n}", {"from_s": 2.8, "to_s": 2.88}, "rms"),
+    ]
+)
+
+
+def bites(masseter: str, scenario: str, peak_n: float, settings: dict[str, object]) -> list[str]:
+    """Overshoot, and rms error of the hold."""
+    summary = run(masseter, scenario + FORCES, {"force_control.peak_n": peak_n, **settings})
+    if summary["figures"]["final_state"] != "finished":
+        return ["", "safe stop"]
+    peak, steady = values(summary)
+    return [f"{100 * (peak / peak_n - 1):.0f} %", f"{100 * steady / peak_n:.1f} %"]
+
+
 def force_control(masseter: str) -> Iterable[list[str]]:
-    judged = "".join(
-        [
-            found("peak", signal="bite.force", during="signal.force_phase > 0.5"),
-            # The second bite has settled.
-            error("steady", "{bite.force} - {signal.desired_bite_force_n}", {"from_s": 2.8, "to_s": 2.88}, "rms"),
-        ]
-    )
-    for name, scenario, peak_n in (("soft food, 3.5 N/mm", HOLD + "[food]\n", 25), ("teeth, 1 N/µm", TEETH, 60)):
-        peak, steady = values(run(masseter, scenario + judged, {"force_control.peak_n": peak_n}))
-        yield [name, str(peak_n), f"{100 * (peak / peak_n - 1):.0f} %", f"{100 * steady / peak_n:.1f} %"]
+    for name, scenario, peak_n in (("soft food, 3.5 N/mm", SOFT, 25), ("teeth, 1 N/µm", TEETH, 60)):
+        yield [name, str(peak_n), *bites(masseter, scenario, peak_n, {})]
+
+
+def limit(masseter: str) -> Iterable[list[str]]:
+    """Dampings on both sides of the limit. The stated stiffness is small, so that none is refused."""
+    soft = {"force_control.food_stiffness_n_per_m": 10}
+    for damping in (5, 10, 18, 36, 100):
+        yield ["soft food", str(damping), *bites(masseter, SOFT, 25, {"force_control.damping_n_s_per_m": damping, **soft})]
+    for damping in (200, 300, 400, 764, 1000):
+        settings = {"force_control.tooth_damping_n_s_per_m": damping, "force_control.tooth_stiffness_n_per_m": 10}
+        yield ["teeth", str(damping), *bites(masseter, TEETH, 60, settings)]
 
 
 def main() -> None:
@@ -149,6 +170,7 @@ def main() -> None:
     table(["feed-forward", *(f"{rate}: {what}" for rate in ("1.43 Hz", "2.17 Hz") for what in each)], feed_forward(masseter))
     table(["model", "rms, N", "99 %, N", "largest, N", "mean uncertainty, N"], estimate(masseter))
     table(["bite on", "desired, N", "overshoot", "rms error of the hold"], force_control(masseter))
+    table(["bite on", "damping, N s/m", "overshoot", "rms error of the hold"], limit(masseter))
 
 
 main()

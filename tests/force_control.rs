@@ -51,3 +51,27 @@ fn friction_that_is_wrong_by_a_third_shifts_the_estimate_by_a_part_of_the_fricti
     // Three legs of 2 N and 20 N s/m · 60 mm/s, 30 % off.
     assert!((0.5..4.0).contains(&rms_n), "{rms_n}");
 }
+
+/// Bites of 25 N on soft food, with a damping for food as soft as nothing.
+fn hold(damping_n_s_per_m: f64) -> String {
+    let example = include_str!("../examples/force_control.toml");
+    let damped = format!("[force_control]\ndamping_n_s_per_m = {damping_n_s_per_m}\nfood_stiffness_n_per_m = 10.0");
+    example.replace("[force_control]", &damped)
+}
+
+#[test]
+fn the_bite_force_is_held_within_the_limit_of_stability_and_not_far_outside_of_it() {
+    // The limit for soft food is 17.8 N s/m.
+    for (damping_n_s_per_m, is_held) in [(100.0, true), (36.0, true), (5.0, false)] {
+        let workspace = Workspace::new(&hold(damping_n_s_per_m));
+        let output = workspace.run_virtual(&[]);
+        assert_eq!(output.status.success(), is_held, "{damping_n_s_per_m} N s/m: {}", stdout(&output));
+    }
+}
+
+#[test]
+fn a_break_of_the_food_withdraws_the_force_and_the_platform_does_not_rise() {
+    let workspace = Workspace::new(include_str!("../examples/suite/food_breaks.toml"));
+    let output = workspace.run_virtual(&[]);
+    assert!(output.status.success(), "{}", stdout(&output));
+}

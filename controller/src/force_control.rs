@@ -6,7 +6,8 @@
 //!
 //! The speed begins with that of the motion, so that nothing jumps. The damping D grows where the teeth meet. A bite ends after
 //! its time, where the food breaks, or where the opening motion has come to the jaw. From then on the jaw does not close: the
-//! jaw waits, or gives way to more than the force of contact, and goes with the motion again when the motion opens. Only the height is controlled; the other five freedoms keep to the motion.
+//! jaw waits, or gives way to more than the force of contact, and goes with the motion again when the motion opens. Only the
+//! height is controlled; the other five freedoms keep to the motion. Limit of stability: `docs/dynamics-control.md`.
 
 use masseter_shared::config::{ForceControlConfig, MOST_LEAD_CYCLES, Scenario};
 use masseter_shared::geometry::{Pose, Vec3};
@@ -35,7 +36,7 @@ enum Phase {
     Free,
     /// The force, for that long, s.
     Biting { time_s: f64 },
-    /// The motion again, as soon as it opens the mouth further than it is.
+    /// The motion again, as soon as the motion is further open than the mouth.
     Opening,
     /// The same after food broke.
     Broken,
