@@ -55,7 +55,8 @@ fn friction_that_is_wrong_by_a_third_shifts_the_estimate_by_a_part_of_the_fricti
 /// Bites of 25 N on soft food, with a damping for food as soft as nothing.
 fn hold(damping_n_s_per_m: f64) -> String {
     let example = include_str!("../examples/force_control.toml");
-    let damped = format!("[force_control]\ndamping_n_s_per_m = {damping_n_s_per_m}\nfood_stiffness_n_per_m = 10.0");
+    let damped =
+        format!("[force_control]\ndamping_n_s_per_m = {damping_n_s_per_m}\nfood_stiffness_n_per_m = 10.0");
     example.replace("[force_control]", &damped)
 }
 

@@ -111,7 +111,7 @@ mod tests {
         let most_n = (0..400).map(|_| weight_n()).fold(0.0, f64::max);
         assert!(first_n < 0.1 && (most_n - 1.7 * 9.81).abs() < 0.3, "{first_n} {most_n}");
         feed.begin();
-        assert_eq!(feed.share, 0.0);
+        assert!(feed.share <= 0.0);
     }
 
     #[test]

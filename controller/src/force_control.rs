@@ -73,7 +73,7 @@ impl ForceControl {
             config,
             period_s: scenario.period_s(),
             lead_cycles: scenario.controller.lead_cycles,
-            position: PoseControl::new(scenario.controller, scenario.rate_hz),
+            position: PoseControl::new(&scenario.controller, scenario.rate_hz),
             closed_m,
             phase: Phase::Free,
             motion_m: None,

@@ -90,7 +90,7 @@ impl MotionController {
             Some(config) => {
                 Box::new(ForceControl::new(scenario, config, trajectory.closed_pose().translation.z))
             }
-            None => Box::new(PoseControl::new(scenario.controller, scenario.rate_hz)),
+            None => Box::new(PoseControl::new(&scenario.controller, scenario.rate_hz)),
         };
         Self::with_law(scenario, mechanism, trajectory, law)
     }

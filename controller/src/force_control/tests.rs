@@ -189,7 +189,7 @@ fn when_food_breaks_the_jaw_neither_slams_nor_closes_again() {
     assert_eq!(world.law.phase, Phase::Broken);
     assert!((0.0..5e-4).contains(&travelled_m), "{travelled_m}");
     assert!(highest_m < -2e-3, "the mouth stays open until the motion opens it: {highest_m}");
-    assert_eq!(world.law.desired_n, 0.0);
+    assert!(world.law.desired_n <= 0.0);
 }
 
 #[test]

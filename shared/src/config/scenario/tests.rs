@@ -276,7 +276,10 @@ fn the_controllers_model_is_that_of_the_mechanism_but_for_what_it_names() {
     assert_eq!(scenario.model(), DynamicsConfig { rod_mass_kg: 0.36, ..scenario.dynamics });
     // Also where a resolved scenario gets another value by an argument.
     let scenario = scenario.with("controller.model.slide_friction_n=5").unwrap();
-    assert_eq!(scenario.model().rod_mass_kg, 0.36);
+    assert_eq!(
+        scenario.model(),
+        DynamicsConfig { slide_friction_n: 5.0, rod_mass_kg: 0.36, ..scenario.dynamics }
+    );
     assert_eq!(Scenario::default().model(), DynamicsConfig::default());
 }
 
