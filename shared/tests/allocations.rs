@@ -1,4 +1,4 @@
-//! What a cycle allocates: nothing for waiting and receiving, and for each message sent the one small
+//! What a cycle allocates: nothing for waiting, receiving and dynamics, and for each message sent the one small
 //! counter that iceoryx2 keeps a loan with. Alone in its file: the allocator counts for the whole process.
 #![allow(unsafe_code)] // A global allocator is an unsafe trait; this one only counts and passes on.
 
@@ -7,9 +7,13 @@ use std::hint::black_box;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use masseter_shared::clock;
+use masseter_shared::config::DynamicsConfig;
+use masseter_shared::dynamics::{Bodies, Equations, Motion, Reactions};
+use masseter_shared::geometry::{Mechanism, MechanismConfig, Pose, Twist};
 use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
 use masseter_shared::realtime::Cycle;
 use masseter_shared::transport::{BatchPublisher, BatchSubscriber, Node, ScratchDomain};
+use nalgebra::Vector6;
 
 struct Counting;
 
@@ -96,8 +100,22 @@ fn check_batches(node: &Node) {
     assert_eq!((receiving, received), ((0, 0), MESSAGES as usize * frames.len()));
 }
 
+fn check_dynamics() {
+    let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
+    let bodies = Bodies::from(&DynamicsConfig::default());
+    let allocations = allocations_of(|| {
+        let motion =
+            Motion::new(&mechanism, &Pose::translation(0.0, 0.0, 0.27), &Twist::repeat(0.1)).unwrap();
+        let equations = Equations::new(&bodies, &motion);
+        let acceleration = equations.forward(&Vector6::repeat(1.0), &Vector6::zeros()).unwrap();
+        let force_n = equations.inverse(&acceleration, &Vector6::zeros()).unwrap();
+        black_box(Reactions::new(&bodies, &motion, &acceleration, &force_n));
+    });
+    assert_eq!(allocations, (0, 0));
+}
+
 #[test]
-fn waiting_and_receiving_allocate_nothing_and_sending_one_small_counter() {
+fn waiting_receiving_and_dynamics_allocate_nothing_and_sending_one_small_counter() {
     let domain = ScratchDomain::claim("test-allocations").unwrap();
     let node = Node::join(&domain).unwrap();
     check_topic::<Command>(&node);
@@ -106,6 +124,7 @@ fn waiting_and_receiving_allocate_nothing_and_sending_one_small_counter() {
     check_topic::<Truth>(&node);
     check_batches(&node);
     check_topic::<Event>(&node);
+    check_dynamics();
 
     let subscriber = node.subscriber::<Command>().unwrap();
     let mut cycle = Cycle::new(clock::now_ns() + PERIOD_NS, PERIOD_NS);

@@ -29,15 +29,16 @@ pub(super) struct DriveSide {
     mass_kg: f64,
     position_m: f64,
     speed_m_s: f64,
+    acceleration_m_s2: f64,
     /// The step that is being solved.
     step: Step,
 }
 
-/// The drive's speed at the end of a step is `free_m_s` plus `per_speed` times the joint's.
+/// The drive's acceleration in a step is `free_m_s2` plus `per_speed` times the joint's speed at the end of the step.
 #[derive(Debug, Clone, Copy, Default)]
 struct Step {
-    free_m_s: f64,
-    per_speed: f64,
+    free_m_s2: f64,
+    per_speed_per_s: f64,
 }
 
 impl Coupling {
@@ -59,7 +60,8 @@ impl Coupling {
         };
         let mass_kg = DRIVE_SHARE * axis_mass_kg;
         let step = Step::default();
-        *self = Self::Loose(DriveSide { half_m, mass_kg, position_m, speed_m_s, step });
+        *self =
+            Self::Loose(DriveSide { half_m, mass_kg, position_m, speed_m_s, acceleration_m_s2: 0.0, step });
     }
 
     /// Gets rigid where it is.
@@ -75,7 +77,7 @@ impl Coupling {
         }
     }
 
-    /// The force on the joint in a step in which the drive has a force.
+    /// The force on the joint in a step in which the drive has a force. The joint is there in the middle of the step.
     pub(super) fn push(&mut self, force_n: f64, joint_m: f64, joint_m_s: f64, step_s: f64) -> Element {
         match self {
             Self::Rigid { .. } => Element { force_n, damping_n_s_per_m: 0.0 },
@@ -86,14 +88,15 @@ impl Coupling {
     /// Solves the drive's side, now that the joint's speed at the end of the step is known.
     pub(super) fn settle(&mut self, joint_m_s: f64) {
         if let Self::Loose(side) = self {
-            side.speed_m_s = side.step.free_m_s + side.step.per_speed * joint_m_s;
+            side.acceleration_m_s2 = side.step.free_m_s2 + side.step.per_speed_per_s * joint_m_s;
         }
     }
 
     /// Moves the drive's side.
     pub(super) fn advance(&mut self, dt_s: f64) {
         if let Self::Loose(side) = self {
-            side.position_m += side.speed_m_s * dt_s;
+            side.position_m += (side.speed_m_s + 0.5 * side.acceleration_m_s2 * dt_s) * dt_s;
+            side.speed_m_s += side.acceleration_m_s2 * dt_s;
         }
     }
 }
@@ -102,12 +105,14 @@ impl DriveSide {
     /// With the contact's force k g + d (v′ − q̇′), for a gap closed by g, the drive's side obeys
     /// m (v′ − v)/h = F − b v′ − k g − d (v′ − q̇′). That gives v′ as a linear function of the joint's speed q̇′.
     fn push(&mut self, drive_n: f64, joint_m: f64, joint_m_s: f64, step_s: f64) -> Element {
-        let (closed_m, damping) = self.contact(joint_m, joint_m_s, step_s);
+        let middle_m = self.position_m + 0.5 * step_s * self.speed_m_s;
+        let (closed_m, damping) = self.contact(middle_m - joint_m, joint_m_s, step_s);
         let spring_n = CONTACT.stiffness_n_per_m * closed_m;
         let moved = self.mass_kg + step_s * (damping + DRIVE_DAMPING_N_S_PER_M);
         let free_m_s = (self.mass_kg * self.speed_m_s + step_s * (drive_n - spring_n)) / moved;
         let per_speed = step_s * damping / moved;
-        self.step = Step { free_m_s, per_speed };
+        self.step =
+            Step { free_m_s2: (free_m_s - self.speed_m_s) / step_s, per_speed_per_s: per_speed / step_s };
         let damping_n_s_per_m = damping * (1.0 - per_speed);
         let force_n = spring_n + damping * free_m_s - damping_n_s_per_m * joint_m_s;
         Element { force_n, damping_n_s_per_m }
@@ -115,8 +120,7 @@ impl DriveSide {
 
     /// By how much the play is closed, positive where the drive pushes upwards, and the contact's damping in the step; zeros
     /// where the sides do not touch before its end.
-    fn contact(&self, joint_m: f64, joint_m_s: f64, step_s: f64) -> (f64, f64) {
-        let ahead_m = self.position_m - joint_m;
+    fn contact(&self, ahead_m: f64, joint_m_s: f64, step_s: f64) -> (f64, f64) {
         let next_m = ahead_m + step_s * (self.speed_m_s - joint_m_s);
         if next_m.abs() <= self.half_m {
             return (0.0, 0.0);
@@ -138,10 +142,11 @@ mod tests {
         coupling.loosen(play_m, 0.4, 0.0, 0.0);
         let (mut joint_m, mut joint_m_s) = (0.0, 0.0);
         for _ in 0..(seconds / STEP_S) as usize {
+            joint_m += 0.5 * STEP_S * joint_m_s;
             let Element { force_n, damping_n_s_per_m } = coupling.push(drive_n, joint_m, joint_m_s, STEP_S);
             joint_m_s += STEP_S * (force_n + load_n) / (0.5 + STEP_S * damping_n_s_per_m);
             coupling.settle(joint_m_s);
-            joint_m += STEP_S * joint_m_s;
+            joint_m += 0.5 * STEP_S * joint_m_s;
             coupling.advance(STEP_S);
         }
         (joint_m, coupling.drive_m(joint_m))

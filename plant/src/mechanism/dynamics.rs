@@ -7,10 +7,9 @@
 //!
 //! M V̇ = Jᵀ(τ − friction) + food − h.
 //!
-//! The integration is the leapfrog scheme (Störmer and Verlet): forces act on the twist at the beginning of a step, and the
-//! platform then moves with this twist to the step's end. The twist is that of the middle of the step, so that the scheme
-//! is of second order. Terms of h that depend on the twist take it at the beginning, extrapolated by half a step. No energy
-//! drifts away or comes in, and the forces need to be known only once a step.
+//! A step is one of the leapfrog scheme (Störmer and Verlet): the acceleration of its middle holds for the whole step.
+//! The forces of the drives are held too, so that they act exactly. The scheme is of second order, and no energy drifts
+//! away or comes in. Terms of h that depend on the twist take it extrapolated from the last step.
 //!
 //! End stops, play and elasticity are left out, unless a scenario has [faults](super::disturbances) of the mechanism.
 
@@ -31,7 +30,6 @@ use super::load::Load;
 pub(crate) struct MechanismState {
     /// The platform in the base frame.
     pub(crate) pose: Pose,
-    /// In the middle of the present step.
     twist: Twist,
     joints: Joints,
 }
@@ -195,7 +193,7 @@ impl Dynamics {
     /// eigenvalue of M⁻¹ Jᵀ C J, C being how steeply friction grows with speed at rest. With M = L Lᵀ it is that of
     /// the symmetric B Bᵀ, B = L⁻¹ Jᵀ √C.
     fn longest_step_ns(&self) -> Result<u64, DynamicsError> {
-        let motion = self.motion();
+        let motion = self.motion_of(&self.state);
         let mass = Equations::new(&self.bodies, &motion).mass.cholesky().ok_or(DynamicsError::Mass)?;
         let root = Matrix6::from_diagonal(&friction::damping_n_s_per_m(&self.config).map(f64::sqrt));
         let braked = motion.jacobian.actuators.transpose() * root;
@@ -225,17 +223,16 @@ impl Dynamics {
 
     /// Applies the actuators' forces (N) for the step that begins.
     pub(crate) fn push(&mut self, force_n: &[f64; AXES]) -> Result<(), DynamicsError> {
-        let motion = self.motion();
+        let middle = self.middle()?;
+        let motion = self.motion_of(&middle);
         let axes = motion.bias.axes_m_s2;
         let actuators = &motion.jacobian.actuators;
         let speeds_m_s = actuators * self.state.twist;
-        let disturbed = self.disturb(&speeds_m_s, force_n);
+        let disturbed = self.disturb(middle.positions_m(), &speeds_m_s, force_n);
         let driven_n = disturbed.map_or(Vector6::from(*force_n), |disturbed| disturbed.force_n);
         let axes_n = driven_n - friction::force_n(&self.config, &speeds_m_s);
-        let food = self
-            .food
-            .as_mut()
-            .map_or_else(Vector6::zeros, |food| food.bite(&self.state.pose, &self.state.twist));
+        let food =
+            self.food.as_mut().map_or_else(Vector6::zeros, |food| food.bite(&middle.pose, &self.state.twist));
         let Equations { mut mass, bias, .. } = Equations::new(&self.bodies, &motion);
         let mut wrench = actuators.tr_mul(&axes_n) + food - bias;
         if let (Some(disturbed), Some(injected)) = (disturbed, &self.injected) {
@@ -247,7 +244,6 @@ impl Dynamics {
         }
         self.acceleration = mass.cholesky().ok_or(DynamicsError::Mass)?.solve(&wrench);
         let step_s = self.step_s();
-        self.state.twist += self.acceleration * step_s;
         if let Some(injected) = &mut self.injected {
             let change_m_s2 = actuators * self.acceleration + axes;
             injected.disturbances.settle(&(speeds_m_s + change_m_s2 * step_s));
@@ -255,9 +251,15 @@ impl Dynamics {
         Ok(())
     }
 
-    /// What the faults make of the drives' forces (N) in a step, at these speeds of the axes; none where there are no faults.
-    fn disturb(&mut self, speeds_m_s: &Vector6<f64>, force_n: &[f64; AXES]) -> Option<Disturbed> {
-        let (positions_m, masses_kg) = (self.state.positions_m(), self.bodies.axis_mass_kg());
+    /// What the faults make of the drives' forces (N) in a step, at these positions (m) and speeds (m/s) of the axes; none
+    /// where there are no faults.
+    fn disturb(
+        &mut self,
+        positions_m: [f64; AXES],
+        speeds_m_s: &Vector6<f64>,
+        force_n: &[f64; AXES],
+    ) -> Option<Disturbed> {
+        let masses_kg = self.bodies.axis_mass_kg();
         let injected = self.injected.as_mut()?;
         let motions = std::array::from_fn(|axis| AxisMotion {
             position_m: positions_m[axis],
@@ -271,24 +273,35 @@ impl Dynamics {
         self.config.step_ns as f64 * 1e-9
     }
 
-    /// Moves the mechanism for `dt_s`, a part of the step.
+    /// Moves the mechanism for `dt_s`, a part of the step, under the step's acceleration.
     pub(crate) fn advance(&mut self, dt_s: f64) -> Result<(), DynamicsError> {
-        let MechanismState { pose, twist, joints } = &mut self.state;
-        let linear = twist.fixed_rows::<3>(0) * dt_s;
-        let angular = twist.fixed_rows::<3>(3) * dt_s;
-        let mut rotation = UnitQuaternion::from_scaled_axis(angular) * pose.rotation;
-        rotation.renormalize();
-        *pose = Pose::from_parts((pose.translation.vector + linear).into(), rotation);
-        *joints = self.mechanism.inverse(pose)?;
+        let mean_twist = self.state.twist + self.acceleration * (dt_s / 2.0);
+        self.state = self.moved(&mean_twist, dt_s)?;
+        self.state.twist += self.acceleration * dt_s;
         if let Some(injected) = &mut self.injected {
             injected.disturbances.advance(dt_s);
         }
         Ok(())
     }
 
-    /// The motion at the beginning of a step, half a step after the middle of the last one.
-    fn motion(&self) -> Motion {
-        let MechanismState { pose, twist, joints } = &self.state;
+    /// Pose and joints in the middle of the step that begins.
+    fn middle(&self) -> Result<MechanismState, DynamicsError> {
+        self.moved(&self.state.twist, self.step_s() / 2.0)
+    }
+
+    /// The state with pose and joints moved on by a twist.
+    fn moved(&self, twist: &Twist, dt_s: f64) -> Result<MechanismState, DynamicsError> {
+        let MechanismState { pose, .. } = &self.state;
+        let linear = twist.fixed_rows::<3>(0) * dt_s;
+        let angular = twist.fixed_rows::<3>(3) * dt_s;
+        let mut rotation = UnitQuaternion::from_scaled_axis(angular) * pose.rotation;
+        rotation.renormalize();
+        let pose = Pose::from_parts((pose.translation.vector + linear).into(), rotation);
+        Ok(MechanismState { pose, joints: self.mechanism.inverse(&pose)?, twist: self.state.twist })
+    }
+
+    /// The motion in the middle of a step, there with the twist that the last step's acceleration leads to.
+    fn motion_of(&self, MechanismState { pose, twist, joints }: &MechanismState) -> Motion {
         let twist = twist + self.acceleration * (self.step_s() / 2.0);
         Motion::of_joints(&self.mechanism, pose, joints, &twist)
     }
@@ -298,5 +311,7 @@ impl Dynamics {
     }
 }
 
+#[cfg(test)]
+mod reference;
 #[cfg(test)]
 mod tests;

@@ -1,0 +1,78 @@
+//! The forces that a run records balance the motion that it records.
+
+mod common;
+
+use common::{Workspace, stdout};
+use masseter_recording::{Reader, Recorded};
+use masseter_shared::config::DynamicsConfig;
+use masseter_shared::dynamics::{Bodies, Equations, Motion};
+use masseter_shared::geometry::{Jacobian, Mechanism, MechanismConfig, Pose, Twist};
+use masseter_shared::messages::{Truth, pose_from_fields};
+use nalgebra::Vector6;
+
+/// The greatest imbalance of an axis, rms, N.
+const BALANCED_N: f64 = 0.05;
+
+fn truths(workspace: &Workspace) -> Vec<Truth> {
+    let mut reader = Reader::open(&workspace.run_folder().join("recording.mcap")).unwrap();
+    let mut truths = Vec::new();
+    while let Some(message) = reader.next_message().unwrap() {
+        if let Recorded::Truth(truth) = message {
+            truths.push(truth);
+        }
+    }
+    truths
+}
+
+fn pose_of(truth: &Truth) -> Pose {
+    pose_from_fields(truth.position_m, truth.quaternion_wxyz)
+}
+
+/// The platform's twist, of the rates of the joints.
+fn twist_of(mechanism: &Mechanism, truth: &Truth) -> Twist {
+    let pose = pose_of(truth);
+    let jacobian = Jacobian::new(mechanism, &pose, &mechanism.inverse(&pose).unwrap());
+    jacobian.actuators.lu().solve(&Vector6::from(truth.joint_m_s)).unwrap()
+}
+
+/// The mean forces that the motion between two samples needs: those of its middle.
+fn needed_n(mechanism: &Mechanism, bodies: &Bodies, [before, after]: [&Truth; 2]) -> Vector6<f64> {
+    let twists = [before, after].map(|truth| twist_of(mechanism, truth));
+    let between_s = (after.sampled_ns - before.sampled_ns) as f64 * 1e-9;
+    let acceleration = (twists[1] - twists[0]) / between_s;
+    let pose = pose_of(before).lerp_slerp(&pose_of(after), 0.5);
+    let motion = Motion::new(mechanism, &pose, &((twists[0] + twists[1]) / 2.0)).unwrap();
+    Equations::new(bodies, &motion).inverse(&acceleration, &Vector6::zeros()).unwrap()
+}
+
+/// Imbalance of every axis, rms, N.
+fn imbalance_n(truths: &[Truth], forces_of: impl Fn(&Truth) -> Vector6<f64>) -> Vector6<f64> {
+    let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
+    let bodies = Bodies::from(&DynamicsConfig::default());
+    let squares = truths.windows(2).map(|pair| {
+        let off_n = forces_of(&pair[1]) - needed_n(&mechanism, &bodies, [&pair[0], &pair[1]]);
+        off_n.component_mul(&off_n)
+    });
+    (squares.sum::<Vector6<f64>>() / (truths.len() - 1) as f64).map(f64::sqrt)
+}
+
+#[test]
+fn mean_forces_balance_the_chewing_motion_and_samples_do_not() {
+    for rate_hz in [1.43, 2.17] {
+        let workspace = Workspace::new(&format!(
+            "duration_s = 4.0\n[motion]\nkind = 'chewing'\ncycle_rate_hz = {rate_hz}\n\
+             [dynamics]\nslide_friction_n = 0.0\nviscous_friction_n_s_per_m = 0.0\n"
+        ));
+        let output = workspace.run_virtual(&[]);
+        assert!(output.status.success(), "{}", stdout(&output));
+        let truths = truths(&workspace);
+        // Before that the brakes hold the axes, and the controller brings the jaw to its start.
+        let chewing = &truths[truths.len() - 3000..truths.len() - 100];
+        let of_means = imbalance_n(chewing, |truth| Vector6::from(truth.force_n));
+        let of_samples = imbalance_n(chewing, |truth| Vector6::from(truth.force_sample_n));
+        println!("{rate_hz} Hz: mean forces off by {:.4?} N rms", of_means.as_slice());
+        println!("{rate_hz} Hz: samples off by {:.4?} N rms", of_samples.as_slice());
+        assert!(of_means.max() <= BALANCED_N, "{of_means}");
+        assert!(of_samples.max() > BALANCED_N, "{of_samples}");
+    }
+}
