@@ -11,8 +11,13 @@ use masseter_shared::geometry::{AXES, Actuators, Jacobian, Joints, Mechanism, Po
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::{Command, Event, Reading, State};
 use masseter_shared::named::{Declared, Parameter};
+use nalgebra::Translation3;
 
 use crate::command_acknowledgement::CommandAcknowledgement;
+use crate::feed_forward::FeedForward;
+use crate::force_control::ForceControl;
+use crate::force_observer::ForceObserver;
+use crate::model::Model;
 use crate::path_supervision::PathSupervision;
 use crate::playback::Playback;
 use crate::pose_control::PoseControl;
@@ -62,6 +67,10 @@ pub struct MotionController {
     law: Box<dyn PoseLaw>,
     /// What the law declares, then the controller's own parameters.
     declared: Declared,
+    /// None unless the scenario has forces fed forward.
+    feed_forward: Option<FeedForward>,
+    /// None unless the scenario has the bite force estimated or controlled.
+    observer: Option<ForceObserver>,
     supervision: PathSupervision,
     /// By how many cycles the platform may be earlier or later on its path.
     slack_cycles: f64,
@@ -71,16 +80,22 @@ pub struct MotionController {
     /// The pose that the law asked for last.
     asked: Option<Pose>,
     target: Option<Actuators>,
+    force_offset_n: [f64; AXES],
 }
 
 impl MotionController {
     /// A controller that plays `trajectory` on `mechanism` once the rig is ready.
     pub fn new(scenario: &Scenario, mechanism: Mechanism, trajectory: Trajectory) -> Self {
-        let law = Box::new(PoseControl::new(scenario.controller, scenario.rate_hz));
+        let law: Box<dyn PoseLaw> = match scenario.force_control {
+            Some(config) => {
+                Box::new(ForceControl::new(scenario, config, trajectory.closed_pose().translation.z))
+            }
+            None => Box::new(PoseControl::new(&scenario.controller, scenario.rate_hz)),
+        };
         Self::with_law(scenario, mechanism, trajectory, law)
     }
 
-    /// The same with another pose law.
+    /// The same with another pose law, which takes the place of the scenario's force control too.
     pub fn with_law(
         scenario: &Scenario,
         mechanism: Mechanism,
@@ -93,8 +108,11 @@ impl MotionController {
         let period_s = scenario.period_s().max(MARGINS_EVERY_S);
         let demands = trajectory::check(&trajectory, &mechanism, &limits, period_s).ok();
         let change_s = Slew::change_s(demands.as_ref(), &limits);
+        let model = Model::new(scenario, mechanism.clone());
+        let is_observed = scenario.force_estimate.is_some() || scenario.force_control.is_some();
         let mut declared = law.declared();
         declared.parameters.extend(own_parameters());
+        declared.signals.extend(is_observed.then(ForceObserver::declared).into_iter().flatten());
         Self {
             sequencer: Sequencer::new(scenario, mechanism.clone()),
             velocity_limit_m_s: std::array::from_fn(|axis| scenario.drives.of_axis(axis).max_velocity_m_s),
@@ -105,12 +123,17 @@ impl MotionController {
             acknowledgement: CommandAcknowledgement::default(),
             law,
             declared,
+            feed_forward: config
+                .feed_forward_torque
+                .then(|| FeedForward::new(model.clone(), scenario.period_s())),
+            observer: is_observed.then(|| ForceObserver::new(scenario, model)),
             supervision: PathSupervision::new(scenario),
             slack_cycles: 0.0,
             cycles_at_rest: 0,
             desired: None,
             asked: None,
             target: None,
+            force_offset_n: [0.0; AXES],
         }
     }
 
@@ -127,8 +150,9 @@ impl MotionController {
         let demand = self.demand(desired);
         if let Some(estimated) = &demand.estimated {
             let slack_s = self.slack_cycles * demand.period_s;
+            let detour = Translation3::from(self.law.detour().at_sample_m);
             let earlier = self.playback.pose_ahead(-self.sample_age_s() - slack_s);
-            self.supervision.check(&desired, estimated, &earlier)?;
+            self.supervision.check(&(detour * desired), estimated, &(detour * earlier))?;
         }
         let asked = self.law.command(&demand)?;
         safety::check_asked(&asked)?;
@@ -139,6 +163,7 @@ impl MotionController {
         let target = self.mechanism.strokes().clamp(&joints.actuators, &before, self.trim_reach_m)?;
         safety::check_velocity(&target, &before, &self.velocity_limit_m_s, demand.period_s)?;
         self.target = Some(target);
+        self.feed_forward();
         Ok(())
     }
 
@@ -161,6 +186,7 @@ impl MotionController {
             desired,
             estimated: estimate.filter(|_| *silent_cycles == 0).map(|estimate| estimate.solution.pose),
             ahead: self.playback.pose_ahead(config.lead_cycles * period_s),
+            external: self.observer.as_ref().and_then(ForceObserver::external),
         }
     }
 
@@ -169,6 +195,28 @@ impl MotionController {
         let Sequencer { cycle, period_s, estimate, .. } = &self.sequencer;
         let reading_cycle = estimate.map_or(*cycle, |estimate| estimate.reading_cycle);
         cycle.saturating_sub(reading_cycle).min(LATE_READING_CYCLES) as f64 * period_s
+    }
+
+    /// The observer of forces takes each fresh sample while the drives carry the jaw.
+    fn observe_force(&mut self, reading: Option<&Reading>) {
+        let Some(observer) = &mut self.observer else { return };
+        match (reading, &self.sequencer.estimate) {
+            _ if !self.sequencer.is_moving() => observer.reset(),
+            (Some(reading), Some(estimate)) if self.sequencer.silent_cycles == 0 => {
+                observer.take(reading.cycle, &estimate.solution.pose, &reading.force_n);
+            }
+            _ => {}
+        }
+    }
+
+    /// The forces that the motion needs while the drives move to the targets of this cycle: they approach a target during the
+    /// last period before it is reached.
+    fn feed_forward(&mut self) {
+        let Some(feed_forward) = &mut self.feed_forward else { return };
+        let Sequencer { period_s, config, .. } = &self.sequencer;
+        let poses = [1.5, 0.5, -0.5]
+            .map(|earlier| self.playback.pose_ahead((config.lead_cycles - earlier) * period_s));
+        self.force_offset_n = feed_forward.offset_n(poses, &self.law.detour());
     }
 
     /// Whether the motion of this state is over.
@@ -189,7 +237,10 @@ impl MotionController {
                     self.playback.hold(estimate.solution.pose);
                 }
             }
-            ControllerState::Easing => self.playback.ease(),
+            ControllerState::Easing => {
+                self.playback.ease();
+                self.feed_forward.iter_mut().for_each(FeedForward::begin);
+            }
             ControllerState::Running => self.playback.play(),
             ControllerState::Holding => self.playback.stop(),
             ControllerState::SafeStop => {
@@ -209,6 +260,7 @@ impl Controller for MotionController {
         {
             self.slack_cycles = self.supervision.slack_cycles(estimate);
         }
+        self.observe_force(reading);
     }
 
     fn decide(&mut self, tick: Tick) -> Option<Event> {
@@ -219,7 +271,7 @@ impl Controller for MotionController {
         }
         let fault = self.sequencer.begin_cycle(tick);
         let desired = self.playback.pose_ahead(-self.sample_age_s());
-        self.desired = Some(desired);
+        self.desired = Some(Translation3::from(self.law.detour().at_sample_m) * desired);
         let fault = fault.or_else(|| self.check_start().err());
         let fault = fault.or_else(|| self.control(desired).err());
         let event = self.sequencer.follow(fault, self.is_over(), tick);
@@ -232,6 +284,9 @@ impl Controller for MotionController {
 
     fn fill_command(&self, command: &mut Command) {
         *command = self.sequencer.command(self.target);
+        if self.sequencer.is_moving() {
+            command.force_offset_n = self.force_offset_n;
+        }
     }
 
     /// Also the conditioning, which is only reported, and so computed after the command has gone out.
@@ -266,7 +321,12 @@ impl Controller for MotionController {
     }
 
     fn fill_signals(&self, signals: &mut [f64]) {
-        self.law.fill_signals(signals);
+        let observed = self.observer.as_ref().map_or(0, |_| ForceObserver::SIGNALS);
+        let (of_law, observed) = signals.split_at_mut(signals.len() - observed);
+        self.law.fill_signals(of_law);
+        if let Some(observer) = &self.observer {
+            observer.fill_signals(observed);
+        }
     }
 
     fn warm_up(&self) {

@@ -21,9 +21,9 @@ pub(crate) struct PoseControl {
 
 impl PoseControl {
     /// At this rate of cycles, Hz.
-    pub(crate) fn new(config: ControllerConfig, rate_hz: u32) -> Self {
+    pub(crate) fn new(config: &ControllerConfig, rate_hz: u32) -> Self {
         let most_gain_per_s = config.most_integral_gain_per_s(rate_hz);
-        Self { config, most_gain_per_s, position_m: Vec3::zeros(), rotation_rad: Vec3::zeros() }
+        Self { config: *config, most_gain_per_s, position_m: Vec3::zeros(), rotation_rad: Vec3::zeros() }
     }
 
     /// Takes the difference between the desired pose and the estimated pose, at the same instant.
@@ -103,7 +103,7 @@ mod tests {
     /// A platform that always stands a fixed step beside what was asked for.
     #[test]
     fn a_constant_offset_is_taken_out() {
-        let mut control = PoseControl::new(ControllerConfig::default(), 1000);
+        let mut control = PoseControl::new(&ControllerConfig::default(), 1000);
         let offset = Pose::new(Vec3::new(2e-4, -1e-4, 5e-5), Vec3::new(1e-3, 0.0, -2e-3));
         let desired = Pose::translation(0.0, 0.0, 0.27);
         let estimated = |asked: &Pose| {
@@ -124,7 +124,7 @@ mod tests {
     #[test]
     fn the_correction_is_bounded() {
         let config = ControllerConfig::default();
-        let mut control = PoseControl::new(config, 1000);
+        let mut control = PoseControl::new(&config, 1000);
         let (desired, estimated) = (Pose::identity(), Pose::new(Vec3::repeat(1.0), Vec3::repeat(0.5)));
         for _ in 0..10_000 {
             control.observe(&desired, &estimated, 1e-3);

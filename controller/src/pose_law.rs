@@ -3,7 +3,7 @@
 //! The sequence (enable, ease, run, hold, disable), kinematics, playback and every safety check stay with
 //! [`MotionController`](crate::motion_controller::MotionController), whatever the law is.
 
-use masseter_shared::geometry::Pose;
+use masseter_shared::geometry::{Pose, Vec3};
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::named::Declared;
 
@@ -24,6 +24,42 @@ pub struct Demand {
     pub estimated: Option<Pose>,
     /// The desired pose at the instant at which this cycle's command is reached.
     pub ahead: Pose,
+    /// The external force at the sample; none unless the scenario has it estimated.
+    pub external: Option<ExternalForce>,
+}
+
+/// What pushes the platform from outside, in base axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExternalForce {
+    /// Force, N.
+    pub force_n: [f64; 3],
+    /// Moment about the platform's origin, N m.
+    pub moment_nm: [f64; 3],
+    /// Bound of the error of the bite force, N.
+    pub uncertainty_n: f64,
+}
+
+impl ExternalForce {
+    /// The force with which the jaw bites: the platform is pushed downwards, N.
+    pub fn bite_n(&self) -> f64 {
+        -self.force_n[2]
+    }
+}
+
+/// By how much a law means to leave the desired pose, in base axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Detour {
+    /// Distance from the desired position at the sample of the coming cycle, m.
+    pub at_sample_m: Vec3,
+    /// Velocity beside the desired one until the last command is reached, m/s.
+    pub ahead_m_s: Vec3,
+}
+
+impl Default for Detour {
+    /// None.
+    fn default() -> Self {
+        Self { at_sample_m: Vec3::zeros(), ahead_m_s: Vec3::zeros() }
+    }
 }
 
 /// A law gave no pose. The program itself says why; the event of the safe stop has the cause `law_failed`.
@@ -67,6 +103,12 @@ pub trait PoseLaw: std::fmt::Debug {
     /// # Errors
     /// When there is no such pose: the controller then stops safely.
     fn command(&mut self, demand: &Demand) -> Result<Pose, LawFailed>;
+
+    /// The law's detour from the desired pose. The supervision of the path and the published state count it as desired, so
+    /// that the limits hold for what the law did not mean. Whoever makes a detour bounds it.
+    fn detour(&self) -> Detour {
+        Detour::default()
+    }
 
     /// The signals and parameters of the law. Called once, before the start.
     fn declared(&self) -> Declared {

@@ -9,7 +9,7 @@ use std::hint::black_box;
 use masseter_controller::kinematics::{ForwardTracker, Method, Options, Solutions, solve};
 use masseter_controller::motion_controller::MotionController;
 use masseter_controller::trajectory::Trajectory;
-use masseter_shared::config::Scenario;
+use masseter_shared::config::{ControllerConfig, ForceControlConfig, Scenario};
 use masseter_shared::control::{Controller, Tick};
 use masseter_shared::geometry::{AXES, Actuators, LEGS, Mechanism, MechanismConfig};
 use masseter_shared::messages::codes::{ControllerState, DriveRequest, DriveState};
@@ -48,13 +48,25 @@ fn allocations_of(work: impl FnOnce()) -> u64 {
 /// Drives that are where they were told to be, from the wait for readings until the motion is played.
 #[test]
 fn no_cycle_of_the_controller_allocates() {
-    let scenario = Scenario { duration_s: Some(0.5), ..Scenario::default() };
+    check_cycles(&Scenario { duration_s: Some(0.5), ..Scenario::default() });
+}
+
+/// The drives push with the forces of a bite, so that force control has its turn.
+#[test]
+fn no_cycle_with_feed_forward_and_force_control_allocates() {
+    let controller = ControllerConfig { feed_forward_torque: true, ..ControllerConfig::default() };
+    let force_control = Some(ForceControlConfig::default());
+    check_cycles(&Scenario { duration_s: Some(0.5), controller, force_control, ..Scenario::default() });
+}
+
+fn check_cycles(scenario: &Scenario) {
     let mechanism = Mechanism::new(&scenario.mechanism).unwrap();
     let trajectory =
         Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s).unwrap();
     let start = Actuators { slide_m: [0.0; LEGS], leg_m: [0.29; LEGS] }.to_axes();
-    let mut controller = MotionController::new(&scenario, mechanism, trajectory);
+    let mut controller = MotionController::new(scenario, mechanism, trajectory);
     let (mut reading, mut command, mut state) = (Reading::default(), Command::default(), State::default());
+    let mut signals = vec![0.0; controller.declared().signals.len()];
     let cycling = allocations_of(|| {
         for cycle in 1..=3000 {
             controller.warm_up();
@@ -62,6 +74,7 @@ fn no_cycle_of_the_controller_allocates() {
             reading = Reading {
                 cycle,
                 answers_cycle: cycle - 1,
+                force_n: [0.0, 0.0, 0.0, 20.0, 20.0, 20.0],
                 position_m: if is_driven { command.target_m } else { start },
                 drive_state: [DriveState::OperationEnabled.code(); AXES],
                 fresh_axes: (1 << AXES) - 1,
@@ -71,6 +84,7 @@ fn no_cycle_of_the_controller_allocates() {
             controller.decide(Tick { cycle, now_ns: cycle * 1_000_000 });
             controller.fill_command(&mut command);
             controller.fill_state(&mut state);
+            controller.fill_signals(&mut signals);
         }
     });
     assert_eq!(cycling, 0);

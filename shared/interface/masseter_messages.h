@@ -215,7 +215,7 @@ enum masseter_no_pose {
 };
 
 #define MASSETER_READING_TOPIC "reading"
-#define MASSETER_READING_TYPE_NAME "masseter/Reading/5d636b58d953e426"
+#define MASSETER_READING_TYPE_NAME "masseter/Reading/d2cd93de2ef83cfd"
 
 /* Positions, forces and states of the drives, once a cycle. */
 typedef struct masseter_reading {
@@ -287,7 +287,7 @@ static_assert(offsetof(masseter_reading, fresh_axes) == 248, "offset of fresh_ax
 static_assert(offsetof(masseter_reading, master_fault) == 252, "offset of master_fault");
 
 #define MASSETER_COMMAND_TOPIC "command"
-#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/9c0206e6ba4fe53c"
+#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/5644f2d889328c9b"
 
 /* Targets and request for the drives, once a cycle. */
 typedef struct masseter_command {
@@ -323,7 +323,7 @@ static_assert(offsetof(masseter_command, request) == 136, "offset of request");
 static_assert(offsetof(masseter_command, controller_state) == 140, "offset of controller_state");
 
 #define MASSETER_STATE_TOPIC "state"
-#define MASSETER_STATE_TYPE_NAME "masseter/State/e76dd2c6f6224022"
+#define MASSETER_STATE_TYPE_NAME "masseter/State/f47c6f6aaf18d571"
 
 /* The controller's state and its estimate, once a cycle. */
 typedef struct masseter_state {
@@ -410,7 +410,7 @@ static_assert(offsetof(masseter_state, iterations) == 288, "offset of iterations
 static_assert(offsetof(masseter_state, controller_state) == 292, "offset of controller_state");
 
 #define MASSETER_EVENT_TOPIC "event"
-#define MASSETER_EVENT_TYPE_NAME "masseter/Event/adca6f2f641c19c9"
+#define MASSETER_EVENT_TYPE_NAME "masseter/Event/aa094a1dc1b716ce"
 
 /* A single occurrence: a change of state, a fault, an alarm. */
 typedef struct masseter_event {
@@ -467,7 +467,7 @@ static_assert(offsetof(masseter_event, value) == 72, "offset of value");
 static_assert(offsetof(masseter_event, limit) == 80, "offset of limit");
 
 #define MASSETER_TRUTH_TOPIC "truth"
-#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/4dcef821dc5beae4"
+#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/e16017c620132113"
 
 /* The true state of the mechanism, once a cycle; the controller never reads it. */
 typedef struct masseter_truth {
@@ -515,7 +515,7 @@ static_assert(offsetof(masseter_truth, bite_force_n) == 288, "offset of bite_for
 static_assert(offsetof(masseter_truth, bite_force_sample_n) == 296, "offset of bite_force_sample_n");
 
 #define MASSETER_CONTACT_TOPIC "contact"
-#define MASSETER_CONTACT_TYPE_NAME "masseter/Contact/4b88af72ab2dc3ef"
+#define MASSETER_CONTACT_TYPE_NAME "masseter/Contact/a5b5b76cdbcc4528"
 
 /* The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads it. */
 typedef struct masseter_contact {

@@ -125,6 +125,11 @@ impl Trajectory {
         self.frame.platform(&self.motion.displacement(motion_s))
     }
 
+    /// The platform in the base frame when the mouth is closed.
+    pub(crate) fn closed_pose(&self) -> Pose {
+        self.frame.platform(&Pose::identity())
+    }
+
     /// How far the motion has come `t_s` seconds after the start, s: of a recording, the time since its first row. It
     /// passes more slowly while the motion gathers speed and while it comes to rest.
     pub fn motion_time_s(&self, t_s: f64) -> f64 {

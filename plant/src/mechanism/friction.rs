@@ -6,15 +6,13 @@
 
 use masseter_shared::config::{DynamicsConfig, FrictionConfig, FrictionModel};
 use masseter_shared::dynamics::{Bodies, Friction, Loads, Motion};
-use masseter_shared::geometry::{AXES, LEGS};
-use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector6};
+use masseter_shared::geometry::AXES;
+use nalgebra::{Matrix6, Vector6};
 
 use super::element::Element;
 
 /// Time in which friction follows the loads, s. Without it, a guide that can lock itself would shake.
 const LOAD_TIME_S: f64 = 1e-3;
-/// Below about this speed the friction of a hinge or a ball fades towards zero, rad/s.
-const TURN_RAD_S: f64 = 0.01;
 
 /// Friction with its state.
 #[derive(Debug, Clone)]
@@ -88,18 +86,7 @@ impl Braking {
 
     /// The damping of hinges and ball joints against the platform's twist: their friction is its product with the twist.
     pub(super) fn of_joints(&self, motion: &Motion) -> Matrix6<f64> {
-        let mut damping = Matrix6::zeros();
-        for leg in 0..LEGS {
-            let hinge = motion.jacobian.hinges.row(leg).transpose();
-            let swing_rad_s = motion.swings_rad_s[leg];
-            let drag = self.law.hinge_nm(self.loads.hinge_n[leg]) / swing_rad_s.hypot(TURN_RAD_S);
-            damping.ger(drag, &hinge, &hinge, 1.0);
-            let turns = ball_turns(motion, leg);
-            let turn_rad_s = (turns * motion.twist).norm();
-            let drag = self.law.ball_nm(self.loads.ball_n[leg]) / turn_rad_s.hypot(TURN_RAD_S);
-            damping += turns.tr_mul(&turns) * drag;
-        }
-        damping
+        self.law.joint_damping(&self.loads, motion)
     }
 
     /// Takes the loads of a step, at whose end the axes have these speeds, m/s.
@@ -111,14 +98,4 @@ impl Braking {
             bristles.deflection_m = (bristles.deflection_m + step_s * speeds_m_s[axis]) / slip;
         }
     }
-}
-
-/// How fast a ball turns in its socket, by the platform's twist: the ball turns with the platform, the socket with the leg
-/// about the slide's direction û.
-fn ball_turns(motion: &Motion, leg: usize) -> Matrix3x6<f64> {
-    let along_slide = motion.jacobian.actuators.fixed_view::<1, 3>(leg, 0).transpose();
-    let mut turns = -along_slide * motion.jacobian.hinges.row(leg);
-    let mut of_platform = turns.fixed_view_mut::<3, 3>(0, 3);
-    of_platform += Matrix3::identity();
-    turns
 }

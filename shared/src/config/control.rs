@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::dynamics::DynamicsConfig;
 use super::error::ScenarioError;
 use super::need::{LONGEST_S, keyed, require_duration, require_positive, require_within};
 
@@ -59,6 +60,10 @@ section! {
         pub tracking_rms_limit_m: f64 = 0.1e-3,
         /// Root mean square angle at which the controller stops safely, rad. Half of the limit for a moment.
         pub tracking_rms_limit_rad: f64 = 1.75e-3,
+        /// Whether the drives are sent the forces that the desired motion needs (60B2h).
+        pub feed_forward_torque: bool = false,
+        /// Masses and friction that the controller believes in. A key that is absent is that of `[dynamics]`.
+        pub model: Option<DynamicsConfig> = None,
     }
 }
 
@@ -144,6 +149,9 @@ impl ControllerConfig {
         ))?;
         if let Some(tolerance_mm) = self.start_tolerance_mm {
             require_positive(&[("controller.start_tolerance_mm", tolerance_mm)])?;
+        }
+        if let Some(model) = &self.model {
+            model.validate().map_err(|error| error.of_table("controller.model"))?;
         }
         // The lead is no longer than a drive needs, and an error is corrected only once within the lead.
         if self.lead_cycles > MOST_LEAD_CYCLES as f64 {

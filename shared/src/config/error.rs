@@ -46,6 +46,14 @@ impl ScenarioError {
         Self::BadValue { place: None, entry: None, key, value, need: need.into() }
     }
 
+    /// The same of a table that has the keys of another one.
+    pub(super) fn of_table(mut self, table: &str) -> Self {
+        if let Self::BadValue { need, .. } = &mut self {
+            *need = format!("{need}; the value is that of [{table}]");
+        }
+        self
+    }
+
     /// The same of a table in a list of tables.
     pub(super) fn of_entry(mut self, number: usize) -> Self {
         if let Self::BadValue { entry, .. } = &mut self {

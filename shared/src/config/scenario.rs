@@ -16,11 +16,12 @@ use super::robot_file;
 use super::when::EntryNames;
 use super::{
     AxisScale, CanConfig, ChecksConfig, ControllerConfig, DriveProfile, DrivesConfig, DryConfig,
-    DynamicsConfig, ExpectConfig, FaultConfig, FoodConfig, JawConfig, MotionConfig, RealtimeConfig,
-    RequirementConfig, StimulusConfig, TeethConfig, ToothConfig, TrajectoryLimitsConfig,
+    DynamicsConfig, ExpectConfig, FaultConfig, FoodConfig, ForceControlConfig, ForceEstimateConfig,
+    JawConfig, MotionConfig, RealtimeConfig, RequirementConfig, StimulusConfig, TeethConfig, ToothConfig,
+    TrajectoryLimitsConfig,
 };
 use crate::clock::SECOND_NS;
-use crate::geometry::MechanismConfig;
+use crate::geometry::{AXES, AXIS_NAMES, MechanismConfig};
 use crate::input::{excerpt, read_text};
 use crate::wording::nearest;
 
@@ -80,6 +81,10 @@ section! {
         /// Food between the teeth of the emulated jaw; none when absent.
         #[serde(deserialize_with = "over_food")]
         pub food: Option<FoodConfig> = None,
+        /// Estimate of the bite force; none when absent, unless the bite force is controlled.
+        pub force_estimate: Option<ForceEstimateConfig> = None,
+        /// Control of the bite force; position control only when absent.
+        pub force_control: Option<ForceControlConfig> = None,
         /// The scheduling of the real-time processes.
         pub realtime: RealtimeConfig = RealtimeConfig::default(),
         /// The limits beyond which the run fails.
@@ -199,13 +204,33 @@ impl Scenario {
             let reason = format!("{key} is an array; write a table, which names its values");
             Some(ScenarioError::Malformed { place, reason })
         };
-        let scenario: Self = toml::from_str(text).map_err(|error| {
-            let (food, expect) = (Some(FoodConfig::default()), Some(ExpectConfig::default()));
-            let teeth = Some(TeethConfig::default());
-            let every_table = Self { teeth, food, expect, ..Self::default() };
+        let mut scenario: Self = toml::from_str(text).map_err(|error| {
+            let every_table = Self {
+                teeth: Some(TeethConfig::default()),
+                food: Some(FoodConfig::default()),
+                force_estimate: Some(ForceEstimateConfig::default()),
+                force_control: Some(ForceControlConfig::default()),
+                expect: Some(ExpectConfig::default()),
+                ..Self::default()
+            };
             unnamed(&every_table).unwrap_or_else(|| malformed(path, text, Some(&document), &error))
         })?;
-        unnamed(&scenario).map_or(Ok(scenario), Err)
+        if let Some(refused) = unnamed(&scenario) {
+            return Err(refused);
+        }
+        scenario.complete_model(text);
+        Ok(scenario)
+    }
+
+    /// A key that `[controller.model]` of the text leaves out gets the value that `[dynamics]` has.
+    fn complete_model(&mut self, text: &str) {
+        let Ok(given) = toml::from_str::<Table>(text) else { return };
+        let model = given.get("controller").and_then(|controller| controller.get("model")?.as_table());
+        let Some(model) = model else { return };
+        let mut whole = Table::try_from(self.dynamics).expect("[dynamics] has a TOML form");
+        merge(&mut whole, model.clone());
+        self.controller.model =
+            Some(whole.try_into().expect("[dynamics] and [controller.model] have been read"));
     }
 
     /// The scenario with one value changed: `KEY=VALUE`, with the key and the value as in a file. A value that is no TOML is
@@ -306,7 +331,34 @@ impl Scenario {
         self.limits.validate()?;
         self.dry.validate()?;
         self.controller.validate(self.rate_hz)?;
+        self.check_torque_offsets()?;
+        let estimate = self.force_estimate.unwrap_or_default();
+        estimate.validate()?;
+        if let Some(control) = &self.force_control {
+            control.validate(self.controller.lead_cycles * self.period_s(), estimate.observer_time_s)?;
+        }
         self.checks.validate()
+    }
+
+    /// Feed-forward needs an object of the process data that carries it.
+    fn check_torque_offsets(&self) -> Result<(), ScenarioError> {
+        let without = (0..AXES).find(|&axis| !self.profile(axis).pdos.rpdo1().has_torque_offset());
+        match without {
+            Some(axis) if self.controller.feed_forward_torque => {
+                let need = format!(
+                    "the drive of {} takes no torque offset; add \"60B2h\" to rpdo1 in [drive_profile.pdos], as far as the \
+                     drive can map the object",
+                    AXIS_NAMES[axis]
+                );
+                Err(ScenarioError::bad("controller.feed_forward_torque", &true, need))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Masses and friction that the controller believes in.
+    pub fn model(&self) -> DynamicsConfig {
+        self.controller.model.unwrap_or(self.dynamics)
     }
 
     /// How long a run goes on after a safe stop, so that requirements can see that the rig stays stopped: the longest

@@ -3,11 +3,16 @@
 //! Guides, screws and seals brake the axes; hinges and ball joints brake the legs' turns. Friction here depends on speed
 //! and load alone. The bristles of an axis at rest are a part of the plant.
 
+use nalgebra::{Matrix3, Matrix3x6, Matrix6};
+
+use super::Motion;
 use crate::config::{DynamicsConfig, FrictionConfig, FrictionModel};
 use crate::geometry::{AXES, LEGS};
 
 /// Friction of a leg without load, as a share of a slide's.
 const LEG_SHARE: f64 = 0.25;
+/// Below about this speed the friction of a hinge or a ball fades towards zero, rad/s.
+const TURN_RAD_S: f64 = 0.01;
 
 /// Forces and moments that joints carry, all of them not negative.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -130,14 +135,20 @@ impl Friction {
         self.viscous_n_s_per_m
     }
 
-    /// Torque of friction in a hinge under a force (N), N m: μ r f.
-    pub fn hinge_nm(&self, force_n: f64) -> f64 {
-        self.config.joint_coefficient * self.config.hinge_radius_m * force_n
-    }
-
-    /// Torque of friction in a ball joint under a force (N), N m: μ r f.
-    pub fn ball_nm(&self, force_n: f64) -> f64 {
-        self.config.joint_coefficient * self.config.ball_radius_m * force_n
+    /// Damping of hinges and ball joints against the platform's twist V, N s/m to N m s/rad: their friction is the wrench −D V on
+    /// the platform. The torque is μ r f, and fades towards zero at rest.
+    pub fn joint_damping(&self, loads: &Loads, motion: &Motion) -> Matrix6<f64> {
+        let FrictionConfig { joint_coefficient, hinge_radius_m, ball_radius_m, .. } = self.config;
+        let mut damping = Matrix6::zeros();
+        for leg in 0..LEGS {
+            let hinge = motion.jacobian.hinges.row(leg).transpose();
+            let torque_nm = joint_coefficient * hinge_radius_m * loads.hinge_n[leg];
+            damping.ger(torque_nm / motion.swings_rad_s[leg].hypot(TURN_RAD_S), &hinge, &hinge, 1.0);
+            let turns = ball_turns(motion, leg);
+            let torque_nm = joint_coefficient * ball_radius_m * loads.ball_n[leg];
+            damping += turns.tr_mul(&turns) * (torque_nm / (turns * motion.twist).norm().hypot(TURN_RAD_S));
+        }
+        damping
     }
 
     /// Friction of a guide per force across the slide that acts at a lever (m): μ k h/L. From 1 on the guide locks itself.
@@ -145,6 +156,16 @@ impl Friction {
         let FrictionConfig { guide_coefficient, block_factor, block_spacing_m, .. } = self.config;
         guide_coefficient * block_factor * lever_m / block_spacing_m
     }
+}
+
+/// How fast a ball turns in its socket, by the platform's twist: the ball turns with the platform, the socket with the leg
+/// about the slide's direction û.
+fn ball_turns(motion: &Motion, leg: usize) -> Matrix3x6<f64> {
+    let along_slide = motion.jacobian.actuators.fixed_view::<1, 3>(leg, 0).transpose();
+    let mut turns = -along_slide * motion.jacobian.hinges.row(leg);
+    let mut of_platform = turns.fixed_view_mut::<3, 3>(0, 3);
+    of_platform += Matrix3::identity();
+    turns
 }
 
 #[cfg(test)]

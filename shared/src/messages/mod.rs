@@ -136,7 +136,7 @@ macro_rules! messages {
 
 messages! {
     /// Targets and request for the drives, once a cycle.
-    Command on "command" keeping 2048 as "masseter/Command/9c0206e6ba4fe53c" {
+    Command on "command" keeping 2048 as "masseter/Command/5644f2d889328c9b" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -153,7 +153,7 @@ messages! {
     }
 
     /// Positions, forces and states of the drives, once a cycle.
-    Reading on "reading" keeping 2048 as "masseter/Reading/5d636b58d953e426" {
+    Reading on "reading" keeping 2048 as "masseter/Reading/d2cd93de2ef83cfd" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// Cycle of the last command received when the sample was taken; 0 before the first.
@@ -194,7 +194,7 @@ messages! {
     }
 
     /// The controller's state and its estimate, once a cycle.
-    State on "state" keeping 2048 as "masseter/State/e76dd2c6f6224022" {
+    State on "state" keeping 2048 as "masseter/State/f47c6f6aaf18d571" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -247,7 +247,7 @@ messages! {
 
     /// The signals that the controller declares, once a cycle; without any, there is no such message. A recording's
     /// definition of the message has a field for each signal.
-    Signals on "signal" keeping 2048 as "masseter/Signals/33cc11a240871199" {
+    Signals on "signal" keeping 2048 as "masseter/Signals/18f7b3435d12c91e" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// The signals, in the order of their declaration.
@@ -256,7 +256,7 @@ messages! {
 
     /// The parameters that the controller declares, in its first cycle and in each that begins with another value. A
     /// recording's definition of the message has a field for each parameter.
-    Parameters on "parameter" keeping 256 as "masseter/Parameters/0e610e8bd224a13d" {
+    Parameters on "parameter" keeping 256 as "masseter/Parameters/f885397903c8dcfa" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// The parameters, in the order of their declaration.
@@ -264,7 +264,7 @@ messages! {
     }
 
     /// The true state of the mechanism, once a cycle; the controller never reads it.
-    Truth on "truth" keeping 2048 as "masseter/Truth/4dcef821dc5beae4" {
+    Truth on "truth" keeping 2048 as "masseter/Truth/e16017c620132113" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// The instant it describes: that of the reading's sample, ns.
@@ -289,7 +289,7 @@ messages! {
 
     /// The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads
     /// it.
-    Contact on "contact" keeping 2048 as "masseter/Contact/4b88af72ab2dc3ef" {
+    Contact on "contact" keeping 2048 as "masseter/Contact/a5b5b76cdbcc4528" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// End of the time that it describes: the instant of the reading's sample, ns.
@@ -303,7 +303,7 @@ messages! {
     }
 
     /// An observation of a tap on a CAN wire: a frame, or an error message in the coding of `linux/can/error.h`.
-    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/bcc7af79282fbf80" {
+    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/32d2e6273a2d0827" {
         /// When its last bit was on the wire, ns.
         time_ns: u64,
         /// When its transmitter had it queued, ns; 0 on real wires.
@@ -320,7 +320,7 @@ messages! {
 
     /// Counters of the kernel for the machine and both loops. The recorder reads and records them; the message is not
     /// published.
-    Machine on "machine" keeping 1 as "masseter/Machine/ebc07a0196dc60ca" {
+    Machine on "machine" keeping 1 as "masseter/Machine/fec2983c987152e9" {
         /// Time of the sample, ns.
         time_ns: u64,
         /// Time that the hypervisor had taken from all cores together, as far as the hypervisor reports it, ns.
@@ -332,7 +332,7 @@ messages! {
     }
 
     /// A single occurrence: a change of state, a fault, an alarm.
-    Event on "event" keeping 1024 as "masseter/Event/adca6f2f641c19c9" {
+    Event on "event" keeping 1024 as "masseter/Event/aa094a1dc1b716ce" {
         /// When, ns.
         time_ns: u64,
         /// Cycle of the process that reports it.
@@ -447,7 +447,7 @@ mod tests {
 
     fn check<M: Message>() {
         let expected = format!("{}/{:016x}", M::TYPE_NAME, hash(&layout::<M>()));
-        println!("REHASH {} {}", M::SHARED_MEMORY_NAME, expected);
+        assert_eq!(M::SHARED_MEMORY_NAME, expected, "name the new layout so: {}", layout::<M>());
     }
 
     #[test]

@@ -42,7 +42,7 @@ impl PoseLaw for Copied {
 #[test]
 fn a_law_equal_to_the_default_one_gives_equal_commands_whether_warmed_up_or_not() {
     let scenario = short();
-    let law = Box::new(Copied(PoseControl::new(scenario.controller, 1000)));
+    let law = Box::new(Copied(PoseControl::new(&scenario.controller, 1000)));
     let controller = MotionController::with_law(&scenario, mechanism(), trajectory(&scenario), law);
     let (mut default, mut own) = (Bench::new(), Bench { controller, ..Bench::new() });
     while own.controller.state() != ControllerState::Finished {

@@ -5,7 +5,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use masseter_shared::config::Scenario;
-use masseter_shared::config::Scenario;
 use masseter_shared::dynamics::{Energy, Reactions};
 use masseter_shared::messages::{pose_fields, pose_from_fields};
 

@@ -154,6 +154,19 @@ const WRONG: &[(&str, &str)] = &[
         "[dynamics]\nplatform_inertia_kg_m2 = [1e-4, 1e-4, 3e-4, 0, 0, 0]",
         "no inertia is larger than the other two together",
     ),
+    (
+        "[controller]\nfeed_forward_torque = true",
+        "controller.feed_forward_torque = true: the drive of d1 takes no torque offset; add \"60B2h\" to rpdo1",
+    ),
+    (
+        "[controller.model]\nplatform_mass_kg = 0.0",
+        "dynamics.platform_mass_kg = 0: use 0.001 to 100; the value is that of [controller.model]",
+    ),
+    ("[force_estimate]\nobserver_time_s = -1.0", "force_estimate.observer_time_s = -1: use 0 to 1"),
+    (
+        "[force_control]\ndamping_n_s_per_m = 1.0",
+        "force_control.damping_n_s_per_m = 1: use at least 17.8: with less, the loop is not stable",
+    ),
     ("[can]\nboot_timeout_ms = 0", "can.boot_timeout_ms = 0: use a finite number above 0"),
     ("[controller]\nease_s = 0.0", "controller.ease_s = 0: use 0.1 to"),
     ("[checks]\ntracking_rms_mm = inf", "checks.tracking_rms_mm"),
@@ -299,4 +312,26 @@ fn the_file_of_a_robot_gives_the_defaults_of_its_scenarios() {
         let error = Scenario::read(&path).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}");
     }
+}
+
+#[test]
+fn the_controllers_model_is_that_of_the_mechanism_but_for_what_it_names() {
+    let text =
+        "[dynamics]\nplatform_mass_kg = 0.7\nrod_mass_kg = 0.3\n[controller.model]\nrod_mass_kg = 0.36";
+    let scenario = Scenario::parse(Path::new("s.toml"), text).unwrap();
+    assert_eq!(scenario.model(), DynamicsConfig { rod_mass_kg: 0.36, ..scenario.dynamics });
+    // Also where a resolved scenario gets another value by an argument.
+    let scenario = scenario.with("controller.model.slide_friction_n=5").unwrap();
+    assert_eq!(
+        scenario.model(),
+        DynamicsConfig { slide_friction_n: 5.0, rod_mass_kg: 0.36, ..scenario.dynamics }
+    );
+    assert_eq!(Scenario::default().model(), DynamicsConfig::default());
+}
+
+#[test]
+fn feed_forward_is_accepted_where_every_drive_takes_torque_offsets() {
+    let text = "[controller]\nfeed_forward_torque = true\n[[drive_profile]]\n\
+                pdos = { rpdo1 = ['6040h', '607Ah', '60B2h'] }";
+    assert!(Scenario::parse(Path::new("s.toml"), text).unwrap().validate().is_ok());
 }

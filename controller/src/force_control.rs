@@ -1,0 +1,234 @@
+//! Control of the bite force between the teeth, position control elsewhere.
+//!
+//! From the contact on, the height of the platform follows an admittance instead of the motion:
+//!
+//! M v̇ + D v = f_desired − f, with M = D times 3 ms.
+//!
+//! The speed begins with that of the motion, so that nothing jumps. The damping D grows where the teeth meet. A bite ends after
+//! its time, where the food breaks, or where the opening motion has come to the jaw. From then on the jaw does not close: the
+//! jaw waits, or gives way to more than the force of contact, and goes with the motion again when the motion opens. Only the
+//! height is controlled; the other five freedoms keep to the motion. Limit of stability: `docs/dynamics-control.md`.
+
+use masseter_shared::config::{ForceControlConfig, MOST_LEAD_CYCLES, Scenario};
+use masseter_shared::geometry::{Pose, Vec3};
+use masseter_shared::messages::codes::ControllerState;
+use masseter_shared::named::{Declared, Signal};
+use nalgebra::Translation3;
+
+use crate::bite_profile::desired_n;
+use crate::pose_control::PoseControl;
+use crate::pose_law::{Demand, Detour, LawFailed, PoseLaw};
+
+/// Cycles within which a bite force falls to half where food breaks.
+const BREAK_CYCLES: usize = 10;
+/// Share of the force that is left then.
+const BREAK_SHARE: f64 = 0.5;
+/// Time constant with which the jaw catches up with the opening motion, s.
+const CATCH_UP_S: f64 = 0.02;
+/// The jaw is back on the motion when nearer and not faster than this beside it, m and m/s.
+const NEAR_M: f64 = 2e-6;
+const SLOW_M_S: f64 = 2e-3;
+
+/// Who moves the jaw up and down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Phase {
+    /// The motion.
+    Free,
+    /// The force, for that long, s.
+    Biting { time_s: f64 },
+    /// The motion again, as soon as the motion is further open than the mouth.
+    Opening,
+    /// The same after food broke.
+    Broken,
+}
+
+/// The law with its memory.
+#[derive(Debug, Clone)]
+pub(crate) struct ForceControl {
+    config: ForceControlConfig,
+    period_s: f64,
+    lead_cycles: f64,
+    /// Corrects what the drives leave of the pose that is asked for.
+    position: PoseControl,
+    /// Height of the platform in the closed mouth, m.
+    closed_m: f64,
+    phase: Phase,
+    /// The last height of the motion, m.
+    motion_m: Option<f64>,
+    /// Speed of the height that is asked for, and of the motion's, m/s.
+    speed_m_s: f64,
+    motion_m_s: f64,
+    /// Heights asked for above those of the motion, the newest first, m.
+    offsets_m: [f64; MOST_LEAD_CYCLES + 1],
+    /// Bite forces of the last cycles, the newest first, N.
+    bites_n: [f64; BREAK_CYCLES],
+    /// What the bite is to be, N; 0 between bites.
+    desired_n: f64,
+}
+
+impl ForceControl {
+    /// The law of a scenario with these values; the platform of the closed mouth has that height, m.
+    pub(crate) fn new(scenario: &Scenario, config: ForceControlConfig, closed_m: f64) -> Self {
+        Self {
+            config,
+            period_s: scenario.period_s(),
+            lead_cycles: scenario.controller.lead_cycles,
+            position: PoseControl::new(&scenario.controller, scenario.rate_hz),
+            closed_m,
+            phase: Phase::Free,
+            motion_m: None,
+            speed_m_s: 0.0,
+            motion_m_s: 0.0,
+            offsets_m: [0.0; MOST_LEAD_CYCLES + 1],
+            bites_n: [0.0; BREAK_CYCLES],
+            desired_n: 0.0,
+        }
+    }
+
+    fn bite_n(&self) -> f64 {
+        self.bites_n[0]
+    }
+
+    /// Takes the newest force and the newest height of the motion. A cycle without an estimate keeps the last one.
+    fn observe(&mut self, demand: &Demand) {
+        let bite_n = demand.external.map_or(self.bite_n(), |external| external.bite_n());
+        self.bites_n.rotate_right(1);
+        self.bites_n[0] = bite_n;
+        let height_m = demand.ahead.translation.z;
+        let before_m = self.motion_m.replace(height_m).unwrap_or(height_m);
+        self.motion_m_s = (height_m - before_m) / self.period_s;
+    }
+
+    /// Whether the force has fallen while it should not have.
+    fn has_broken(&self) -> bool {
+        let before_n = self.bites_n[BREAK_CYCLES - 1].min(self.desired_n);
+        before_n >= self.config.contact_n && self.bite_n() < BREAK_SHARE * before_n
+    }
+
+    fn next_phase(&self, state: ControllerState) -> Phase {
+        let is_running = state == ControllerState::Running;
+        match self.phase {
+            Phase::Free => {
+                let closes = is_running && self.motion_m_s > 0.0;
+                let bites = closes && self.bite_n() >= self.config.contact_n;
+                if bites { Phase::Biting { time_s: 0.0 } } else { Phase::Free }
+            }
+            Phase::Biting { .. } if self.has_broken() => Phase::Broken,
+            Phase::Biting { time_s } => {
+                let time_s = time_s + self.period_s;
+                let is_taken_along = self.motion_m_s < -SLOW_M_S && self.offsets_m[0] >= 0.0;
+                let goes_on = is_running && time_s < self.config.bite_s && !is_taken_along;
+                if goes_on { Phase::Biting { time_s } } else { Phase::Opening }
+            }
+            waiting => {
+                let is_near = self.offsets_m[0].abs() < NEAR_M;
+                let is_slow = (self.speed_m_s - self.motion_m_s).abs() < SLOW_M_S;
+                if is_near && is_slow { Phase::Free } else { waiting }
+            }
+        }
+    }
+
+    /// Damping at the height that was asked for last, N per m/s: between food and teeth by the opening of the mouth.
+    fn damping_n_s_per_m(&self) -> f64 {
+        let Self { config, closed_m, offsets_m, motion_m, .. } = self;
+        let opening_m = closed_m - motion_m.unwrap_or(*closed_m) - offsets_m[0];
+        let share = (opening_m / config.tooth_zone_m).clamp(0.0, 1.0);
+        let ratio = config.damping_n_s_per_m / config.tooth_damping_n_s_per_m;
+        config.tooth_damping_n_s_per_m * ratio.powf(share)
+    }
+
+    /// The speed that the height is to have in this phase, m/s.
+    fn wanted_m_s(&self) -> f64 {
+        let (offset_m, damping) = (self.offsets_m[0], self.damping_n_s_per_m());
+        match self.phase {
+            Phase::Free => self.motion_m_s,
+            Phase::Biting { .. } => ((self.desired_n - self.bite_n()) / damping).min(self.config.closing_m_s),
+            Phase::Opening | Phase::Broken if offset_m < 0.0 => {
+                let gives_way_m_s = (self.bite_n() - self.config.contact_n).max(0.0) / damping;
+                -gives_way_m_s.min(self.config.closing_m_s)
+            }
+            Phase::Opening | Phase::Broken => self.motion_m_s - offset_m / CATCH_UP_S,
+        }
+    }
+
+    /// The next height above that of the motion, m.
+    fn advance(&mut self) -> Result<f64, LawFailed> {
+        if self.phase == Phase::Free {
+            self.speed_m_s = self.motion_m_s;
+            return Ok(0.0);
+        }
+        let share = self.period_s / (self.period_s + ForceControlConfig::MASS_TIME_S);
+        self.speed_m_s += (self.wanted_m_s() - self.speed_m_s) * share;
+        let offset_m = self.offsets_m[0] + (self.speed_m_s - self.motion_m_s) * self.period_s;
+        let reach_m = self.config.reach_m;
+        if offset_m > reach_m {
+            self.speed_m_s = self.speed_m_s.min(self.motion_m_s);
+        }
+        // Pressed further, food would push back with any force.
+        if offset_m < -reach_m { Err(LawFailed) } else { Ok(offset_m.min(reach_m)) }
+    }
+
+    /// The height above that of the motion some cycles before the coming one, m.
+    fn offset_before_m(&self, cycles: f64) -> f64 {
+        let at = (cycles - 1.0).clamp(0.0, (MOST_LEAD_CYCLES - 1) as f64);
+        let (place, share) = (at.floor() as usize, at.fract());
+        self.offsets_m[place] + (self.offsets_m[place + 1] - self.offsets_m[place]) * share
+    }
+}
+
+impl PoseLaw for ForceControl {
+    fn command(&mut self, demand: &Demand) -> Result<Pose, LawFailed> {
+        let at_sample_m = self.detour().at_sample_m;
+        self.observe(demand);
+        self.phase = self.next_phase(demand.state);
+        self.desired_n = match self.phase {
+            Phase::Biting { time_s } => desired_n(&self.config, time_s).unwrap_or(0.0),
+            Phase::Free | Phase::Opening | Phase::Broken => 0.0,
+        };
+        let offset_m = self.advance()?;
+        self.offsets_m.rotate_right(1);
+        self.offsets_m[0] = offset_m;
+        let desired = Translation3::from(at_sample_m) * demand.desired;
+        let ahead = Translation3::new(0.0, 0.0, offset_m) * demand.ahead;
+        self.position.command(&Demand { desired, ahead, ..*demand })
+    }
+
+    fn detour(&self) -> Detour {
+        let vertical = |value| Vec3::new(0.0, 0.0, value);
+        Detour {
+            at_sample_m: vertical(self.offset_before_m(self.lead_cycles)),
+            ahead_m_s: vertical(self.speed_m_s - self.motion_m_s),
+        }
+    }
+
+    fn declared(&self) -> Declared {
+        let signal = |name: &str, unit: &str, about: &str| Signal {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            about: about.to_owned(),
+        };
+        let signals = vec![
+            signal("desired_bite_force_n", "N", "What the bite force is to be; 0 between bites."),
+            signal("force_detour_m", "m", "Height asked for above that of the motion."),
+            signal("force_phase", "", "0: position control; 1: force control; 2: opening; 3: food broke."),
+        ];
+        Declared { signals, ..self.position.declared() }
+    }
+
+    fn set_parameter(&mut self, place: usize, value: f64) {
+        self.position.set_parameter(place, value);
+    }
+
+    fn fill_signals(&self, signals: &mut [f64]) {
+        let phase = match self.phase {
+            Phase::Free => 0.0,
+            Phase::Biting { .. } => 1.0,
+            Phase::Opening => 2.0,
+            Phase::Broken => 3.0,
+        };
+        signals.copy_from_slice(&[self.desired_n, self.offsets_m[0], phase]);
+    }
+}
+
+#[cfg(test)]
+mod tests;

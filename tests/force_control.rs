@@ -1,0 +1,78 @@
+//! The bite force of whole runs: its estimate against the truth, its control, and what happens when food breaks.
+
+mod common;
+
+use common::{Workspace, check, stderr, stdout};
+
+/// Errors of the estimate while the jaw chews, as bounds that only serve to report the values.
+const ESTIMATE: &str = "
+duration_s = 5.0
+[food]
+[force_estimate]
+[[require]]
+name = 'rms'
+expression = '{signal.bite_force_n} - {bite.force}'
+unit = 'N'
+during = 'bite.force > 1 N'
+statistic = 'rms'
+max = '100 N'
+[[require]]
+name = 'beyond'
+expression = 'abs({signal.bite_force_n} - {bite.force}) - {signal.bite_force_uncertainty_n}'
+unit = 'N'
+during = 'running'
+statistic = 'percentile'
+percentile = 90
+max = '100 N'
+";
+
+/// The value that a requirement of at most 100 has found.
+fn found(scenario: &str, names: &[&str]) -> Vec<f64> {
+    let workspace = Workspace::new(scenario);
+    let output = workspace.run_virtual(&[]);
+    assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+    let summary = workspace.summary();
+    let value = |name: &&str| 100.0 - check(&summary, name)["margin"].as_f64().unwrap();
+    names.iter().map(value).collect()
+}
+
+#[test]
+fn with_known_friction_the_estimate_is_within_a_newton_and_its_uncertainty_covers_the_error() {
+    let [rms_n, beyond_n] = found(ESTIMATE, &["rms", "beyond"])[..] else { panic!() };
+    assert!(rms_n < 1.0, "{rms_n}");
+    assert!(beyond_n <= 0.0, "{beyond_n}");
+}
+
+#[test]
+fn friction_that_is_wrong_by_a_third_shifts_the_estimate_by_a_part_of_the_friction() {
+    let wrong =
+        format!("{ESTIMATE}\n[controller.model]\nslide_friction_n = 5.6\nviscous_friction_n_s_per_m = 14.0");
+    let [rms_n] = found(&wrong, &["rms"])[..] else { panic!() };
+    // Three legs of 2 N and 20 N s/m · 60 mm/s, 30 % off.
+    assert!((0.5..4.0).contains(&rms_n), "{rms_n}");
+}
+
+/// Bites of 25 N on soft food, with a damping for food as soft as nothing.
+fn hold(damping_n_s_per_m: f64) -> String {
+    let example = include_str!("../examples/force_control.toml");
+    let damped =
+        format!("[force_control]\ndamping_n_s_per_m = {damping_n_s_per_m}\nfood_stiffness_n_per_m = 10.0");
+    example.replace("[force_control]", &damped)
+}
+
+#[test]
+fn the_bite_force_is_held_within_the_limit_of_stability_and_not_far_outside_of_it() {
+    // The limit for soft food is 17.8 N s/m.
+    for (damping_n_s_per_m, is_held) in [(100.0, true), (36.0, true), (5.0, false)] {
+        let workspace = Workspace::new(&hold(damping_n_s_per_m));
+        let output = workspace.run_virtual(&[]);
+        assert_eq!(output.status.success(), is_held, "{damping_n_s_per_m} N s/m: {}", stdout(&output));
+    }
+}
+
+#[test]
+fn a_break_of_the_food_withdraws_the_force_and_the_platform_does_not_rise() {
+    let workspace = Workspace::new(include_str!("../examples/suite/food_breaks.toml"));
+    let output = workspace.run_virtual(&[]);
+    assert!(output.status.success(), "{}", stdout(&output));
+}
