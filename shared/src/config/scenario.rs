@@ -258,6 +258,10 @@ impl Scenario {
         let as_text = || toml::from_str(&format!("{key} = {}", toml::Value::from(value)));
         let given = as_toml.or_else(|_| as_text()).map_err(|error| refused(error.message().to_owned()))?;
         let mut whole: Table = toml::from_str(&self.to_toml()).expect("it was written from a scenario");
+        if key.trim() == "food.kind" {
+            // The values of another kind come with it.
+            whole.remove("food");
+        }
         merge(&mut whole, given);
         Self::parse(Path::new(assignment), &whole.to_string()).map_err(|error| match error {
             // The place is one in the resolved scenario, which the user does not see.

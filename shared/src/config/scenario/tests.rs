@@ -284,6 +284,14 @@ fn wrong_scenarios_are_refused_with_place_and_remedy() {
 }
 
 #[test]
+fn another_kind_of_food_brings_its_values() {
+    let soft = Scenario::parse(Path::new("s.toml"), "[food]").unwrap();
+    let gum = Scenario::parse(Path::new("s.toml"), "[food]\nkind = 'gum'").unwrap();
+    assert_eq!(soft.with("food.kind=gum").unwrap().food, gum.food);
+    assert_ne!(soft.food, gum.food);
+}
+
+#[test]
 fn the_file_of_a_robot_gives_the_defaults_of_its_scenarios() {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| {
