@@ -46,7 +46,7 @@ bite_s = 0.6
 """
 
 SOFT = HOLD + "[food]\n"
-TEETH = HOLD + "[food]\nthickness_m = 1e-4\nstiffness_n_per_m = 1e6\ndamping_n_s_per_m = 100.0\nyield_n = 1500.0\n"
+TEETH = HOLD + "[teeth]\nclearance_m = -5e-5\n"
 
 
 def found(name: str, **keys: object) -> str:
@@ -150,7 +150,7 @@ def bites(masseter: str, scenario: str, peak_n: float, settings: dict[str, objec
 
 
 def force_control(masseter: str) -> Iterable[list[str]]:
-    for name, scenario, peak_n in (("soft food, 3.5 N/mm", SOFT, 25), ("teeth, 1 N/µm", TEETH, 60)):
+    for name, scenario, peak_n in (("soft food, 3.5 N/mm", SOFT, 25), ("14 teeth that meet", TEETH, 60)):
         yield [name, str(peak_n), *bites(masseter, scenario, peak_n, {})]
 
 
@@ -159,7 +159,7 @@ def limit(masseter: str) -> Iterable[list[str]]:
     soft = {"force_control.food_stiffness_n_per_m": 10}
     for damping in (5, 10, 18, 36, 100):
         yield ["soft food", str(damping), *bites(masseter, SOFT, 25, {"force_control.damping_n_s_per_m": damping, **soft})]
-    for damping in (200, 300, 400, 764, 1000):
+    for damping in (500, 764, 1000, 1834, 3000):
         settings = {"force_control.tooth_damping_n_s_per_m": damping, "force_control.tooth_stiffness_n_per_m": 10}
         yield ["teeth", str(damping), *bites(masseter, TEETH, 60, settings)]
 

@@ -216,10 +216,10 @@ fn shared_memory_without_room_for_a_rig_is_refused_and_with_just_enough_it_runs(
     }
     let output = run("8m");
     assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
-    let refusal = "/dev/shm has 8.4 MB free, and a rig needs 32.0 MB";
+    let refusal = "/dev/shm has 8.4 MB free, and a rig needs 36.0 MB";
     assert!(stderr(&output).contains(refusal), "{}", stderr(&output));
     assert!(!workspace.run_folder().exists());
-    let output = run("31m");
+    let output = run("35m");
     assert_played(&workspace.run_folder(), output.status, &(stdout(&output) + &stderr(&output)));
 }
 

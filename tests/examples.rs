@@ -21,10 +21,10 @@ fn every_example_passes_under_virtual_time() {
         let place = tempfile::tempdir().unwrap();
         let out = place.path().join("run");
         let [scenario, folder] = [&example, &out].map(|path| path.to_str().unwrap());
-        let output = masseter(&["run", "--clock", "virtual", "--duration", "2s", "--out", folder, scenario]);
+        let output = masseter(&["run", "--clock", "virtual", "--out", folder, scenario]);
         assert_eq!(output.status.code(), Some(0), "{scenario}: {}{}", stdout(&output), stderr(&output));
         let samples = &json(&out.join("summary.json"))["figures"]["tracking"]["samples"];
-        assert!(samples.as_u64().is_some_and(|samples| samples >= 2000), "{scenario}: {samples} samples");
+        assert!(samples.as_u64().is_some_and(|samples| samples >= 500), "{scenario}: {samples} samples");
     }
 }
 

@@ -12,7 +12,7 @@ use rustix::process::{Resource, getrlimit};
 
 const SHARED_MEMORY: &str = "/dev/shm";
 /// What the topics of a rig take in shared memory: 27 MB measured, and some for observers.
-const SHARED_BYTES: u64 = 32_000_000;
+const SHARED_BYTES: u64 = 36_000_000;
 /// What a cycle leaves on the disk: 1.7 kB measured, half of them in the recording.
 const CYCLE_BYTES: f64 = 2000.0;
 /// What a run leaves on the disk besides: page, figures, scenario.

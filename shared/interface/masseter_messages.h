@@ -195,6 +195,8 @@ enum masseter_cause {
     MASSETER_CAUSE_START_TOO_FAR = 60,
     /* Food between the teeth broke (force before, N; the limit is its strength). The object is the first of its teeth. */
     MASSETER_CAUSE_FOOD_BROKE = 61,
+    /* An axis of the mechanism ran into an end stop (m/s). */
+    MASSETER_CAUSE_END_STOP_HIT = 62,
 };
 
 enum masseter_no_pose {
@@ -493,7 +495,7 @@ typedef struct masseter_truth {
     double force_n[6];
     /* Actuator forces at the sample, N. */
     double force_sample_n[6];
-    /* Bite force on the platform, N: mean over the cycle before the sample. */
+    /* Vertical force of food and upper teeth on the lower jaw, positive downwards, N: mean over the cycle before the sample. */
     double bite_force_n;
     /* Bite force at the sample, N. */
     double bite_force_sample_n;

@@ -202,6 +202,8 @@ class Cause(enum.IntEnum):
     START_TOO_FAR = 60
     #: Food between the teeth broke (force before, N; the limit is its strength). The object is the first of its teeth.
     FOOD_BROKE = 61
+    #: An axis of the mechanism ran into an end stop (m/s).
+    END_STOP_HIT = 62
 
 
 class NoPose(enum.IntEnum):
@@ -452,7 +454,7 @@ class Truth(ctypes.Structure):
         ("force_n", ctypes.c_double * 6),
         # Actuator forces at the sample, N.
         ("force_sample_n", ctypes.c_double * 6),
-        # Bite force on the platform, N: mean over the cycle before the sample.
+        # Vertical force of food and upper teeth on the lower jaw, positive downwards, N: mean over the cycle before the sample.
         ("bite_force_n", ctypes.c_double),
         # Bite force at the sample, N.
         ("bite_force_sample_n", ctypes.c_double),
@@ -464,3 +466,34 @@ class Truth(ctypes.Structure):
 
 
 _check(Truth, 304, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240, 288, 296])
+
+
+class Contact(ctypes.Structure):
+    """The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads it."""
+
+    TOPIC = "contact"
+    _fields_ = [
+        # Number of this message on its topic, from 1.
+        ("seq", ctypes.c_uint64),
+        # When it was published, ns.
+        ("published_ns", ctypes.c_uint64),
+        # Version of the sender's layouts.
+        ("version", ctypes.c_uint64),
+        # Cycle of the plant, from 1.
+        ("cycle", ctypes.c_uint64),
+        # End of the time that it describes: the instant of the reading's sample, ns.
+        ("sampled_ns", ctypes.c_uint64),
+        # FDI numbers of the lower teeth, 0 where there are no more.
+        ("tooth", ctypes.c_uint32 * 16),
+        # Force of antagonist and food on each lower tooth, x y z in base axes, mean over the cycle, N.
+        ("force_n", ctypes.c_double * 48),
+        # Where the force acts on the tooth, x y z in the platform frame, m.
+        ("place_m", ctypes.c_double * 48),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "masseter/Contact/a5b5b76cdbcc4528"
+
+
+_check(Contact, 872, [0, 8, 16, 24, 32, 40, 104, 488])

@@ -48,9 +48,9 @@ section! {
         /// The stiffest food that this damping is for, N/m.
         pub food_stiffness_n_per_m: f64 = 3500.0,
         /// Admittance where the teeth meet, N per m/s.
-        pub tooth_damping_n_s_per_m: f64 = 1000.0,
+        pub tooth_damping_n_s_per_m: f64 = 2000.0,
         /// Stiffness of teeth, their holder and the drives in series, N/m.
-        pub tooth_stiffness_n_per_m: f64 = 1.5e5,
+        pub tooth_stiffness_n_per_m: f64 = 3.6e5,
         /// Opening of the mouth below which the damping grows towards that of the teeth, m.
         pub tooth_zone_m: f64 = 5e-4,
         /// Largest speed of closing on food, and of giving way after a bite, m/s.
@@ -133,7 +133,7 @@ mod tests {
             (soft(f64::NAN), Some("damping_n_s_per_m = NaN")),
             (
                 ForceControlConfig { tooth_stiffness_n_per_m: 5e6, ..control },
-                Some("force_control.tooth_damping_n_s_per_m = 1000: use at least 25464.8"),
+                Some("force_control.tooth_damping_n_s_per_m = 2000: use at least 25464.8"),
             ),
             (ForceControlConfig { peak_n: 5.0, ..control }, Some("force_control.peak_n = 5: use 10 to 1000")),
         ] {
