@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 MASSES = {"carriage_mass_kg": 0.7, "cylinder_mass_kg": 0.5, "rod_mass_kg": 0.4, "platform_mass_kg": 0.5}
-FRICTION = {"slide_friction_n": 8.0, "viscous_friction_n_s_per_m": 20.0}
+FRICTION = {"slide_friction_n": 5.0, "viscous_friction_n_s_per_m": 20.0}
 
 OFFSETS = """
 duration_s = 6.0

@@ -46,7 +46,7 @@ fn with_known_friction_the_estimate_is_within_a_newton_and_its_uncertainty_cover
 #[test]
 fn friction_that_is_wrong_by_a_third_shifts_the_estimate_by_a_part_of_the_friction() {
     let wrong =
-        format!("{ESTIMATE}\n[controller.model]\nslide_friction_n = 5.6\nviscous_friction_n_s_per_m = 14.0");
+        format!("{ESTIMATE}\n[controller.model]\nslide_friction_n = 3.5\nviscous_friction_n_s_per_m = 14.0");
     let [rms_n] = found(&wrong, &["rms"])[..] else { panic!() };
     // Three legs of 2 N and 20 N s/m · 60 mm/s, 30 % off.
     assert!((0.5..4.0).contains(&rms_n), "{rms_n}");

@@ -6,7 +6,7 @@ use std::fs;
 
 use common::{Workspace, json, masseter, stderr, stdout};
 
-const TABLE: &str = "time_s,force_x_n,force_y_n,force_z_n\n0,0,0,0\n0.1,0,0,-20\n0.2,0,0,0\n";
+const TABLE: &str = "time_s,force_x_n,force_y_n,force_z_n\n0,0,0,0\n0.1,0,0,-12\n0.2,0,0,0\n";
 const PUSHED: &str = "duration_s = 1.5\n[[stimulus]]\nat_s = 0.5\npush_table = 'push.csv'\n\
      [[stimulus]]\nname = 'turn'\nat_s = 1.0\nfor_s = 0.2\ntorque_n_m = [0.0, 0.0, 0.5]\n";
 
@@ -39,7 +39,7 @@ fn every_process_and_every_repetition_reads_the_table_that_the_run_keeps() {
     assert!(lasted_s.len() == 2 && lasted_s.iter().all(|s| (s - 0.2).abs() < 1e-3), "{lasted_s:?}");
 
     // Another table lies there now, and the run folder still has the first.
-    by_virtual.write("push.csv", &TABLE.replace("-20", "20"));
+    by_virtual.write("push.csv", &TABLE.replace("-12", "12"));
     let (kept, again) = (by_virtual.run_folder().join("scenario.toml"), by_virtual.file("again"));
     assert_eq!(fs::read_to_string(by_virtual.run_folder().join("stimulus_1.csv")).unwrap(), TABLE);
     let arguments =

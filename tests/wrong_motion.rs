@@ -77,7 +77,7 @@ fn a_safe_stop_that_comes_too_late_fails_the_run() {
 /// The drive interpolates to its next target, as after a late SYNC.
 #[test]
 fn a_single_lost_target_leads_nowhere_and_passes() {
-    let workspace = Workspace::new(&deaf_drive(3.25, 1));
+    let workspace = Workspace::new(&deaf_drive(3.23, 1));
     let output = workspace.run_virtual(&[]);
     assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
     let fault = &workspace.summary()["figures"]["faults"][0];

@@ -91,9 +91,9 @@ mod tests {
         let none = Detour::default();
         let [up, down] =
             [0.05, -0.05].map(|speed| legs_n(offset_n(DynamicsConfig::default(), speed, 0.0, &none)));
-        // Each leg: 2 N and 20 N s/m · 50 mm/s, in both directions; and the screws lose a ninth of the weight.
+        // Each leg: 1.25 N and 20 N s/m · 50 mm/s, in both directions; and the screws lose a ninth of the weight.
         let screws_n = 2.0 * (0.5 + 3.0 * 0.4) * 9.81 / 9.0;
-        assert!((up - down - 18.0 - screws_n).abs() < 0.2, "{up} {down}");
+        assert!((up - down - 13.5 - screws_n).abs() < 0.2, "{up} {down}");
         let [still, gains] = [0.0, 2.0].map(|gain| legs_n(offset_n(frictionless, 0.0, gain, &none)));
         assert!((gains - still - 2.0 * 1.7).abs() < 0.2, "{still} {gains}");
     }

@@ -52,7 +52,7 @@ section! {
         /// Elements xx, yy, zz, xy, xz, yz of its inertia tensor about the centre of mass, platform axes, kg m².
         pub platform_inertia_kg_m2: [f64; 6] = [2.0e-4, 2.0e-4, 3.5e-4, 0.0, 0.0, 0.0],
         /// Coulomb friction of a slide, N; of a leg a quarter of it.
-        pub slide_friction_n: f64 = 8.0,
+        pub slide_friction_n: f64 = 5.0,
         /// Viscous friction of every axis, N per m/s.
         pub viscous_friction_n_s_per_m: f64 = 20.0,
         /// End stops and play.

@@ -337,7 +337,7 @@ fn dry_guides_take_more_force_for_the_same_motion() {
         bench.truth.force_n[0].abs()
     };
     let (usual_n, more_n) = (force_n("1"), force_n("3"));
-    // Twice 8 N more, and some viscous friction.
+    // Twice 5 N more, the screw, and some viscous friction.
     assert!((12.0..25.0).contains(&(more_n - usual_n)), "{usual_n} N became {more_n} N");
 }
 

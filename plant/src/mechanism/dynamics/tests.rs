@@ -80,9 +80,9 @@ fn drift_mm(model: FrictionModel, push_n: f64, [from_s, until_s]: [f64; 2]) -> f
 
 #[test]
 fn bristles_hold_a_slide_up_to_the_breakaway_force_where_the_smooth_curve_creeps() {
-    // Seals 8 N, the guide 0.1 N under the weight; breakaway 1.2 times as much.
-    assert!(drift_mm(FrictionModel::Lugre, 6.0, [0.5, 1.0]).abs() < 1e-4);
-    assert!(drift_mm(FrictionModel::Smooth, 6.0, [0.5, 1.0]) > 0.05);
+    // Seals 5 N, the guide 0.1 N under the weight; breakaway 1.2 times as much.
+    assert!(drift_mm(FrictionModel::Lugre, 4.0, [0.5, 1.0]).abs() < 1e-4);
+    assert!(drift_mm(FrictionModel::Smooth, 4.0, [0.5, 1.0]) > 0.05);
     assert!(drift_mm(FrictionModel::Lugre, 12.0, [0.0, 0.2]) > 1.0);
 }
 
