@@ -57,12 +57,12 @@ mod tests {
     const PERIOD_S: f64 = 1e-3;
 
     fn offset_n(
-        dynamics: DynamicsConfig,
+        dynamics: &DynamicsConfig,
         velocity_m_s: f64,
         acceleration_m_s2: f64,
         detour: &Detour,
     ) -> [f64; AXES] {
-        let scenario = Scenario { dynamics, ..Scenario::default() };
+        let scenario = Scenario { dynamics: *dynamics, ..Scenario::default() };
         let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
         let mut feed =
             FeedForward { share: 1.0, ..FeedForward::new(Model::new(&scenario, mechanism), PERIOD_S) };
@@ -79,7 +79,7 @@ mod tests {
 
     #[test]
     fn at_rest_the_legs_carry_the_weight_of_platform_and_rods() {
-        let still = offset_n(DynamicsConfig::default(), 0.0, 0.0, &Detour::default());
+        let still = offset_n(&DynamicsConfig::default(), 0.0, 0.0, &Detour::default());
         let weight_n = (0.5 + 3.0 * 0.4) * 9.81;
         assert!((legs_n(still) - weight_n).abs() < 0.3, "{still:?}");
         assert!(still[..LEGS].iter().all(|slide_n| slide_n.abs() < 0.5), "{still:?}");
@@ -90,11 +90,11 @@ mod tests {
         let frictionless = DynamicsConfig::default().without_friction();
         let none = Detour::default();
         let [up, down] =
-            [0.05, -0.05].map(|speed| legs_n(offset_n(DynamicsConfig::default(), speed, 0.0, &none)));
+            [0.05, -0.05].map(|speed| legs_n(offset_n(&DynamicsConfig::default(), speed, 0.0, &none)));
         // Each leg: 1.25 N and 20 N s/m · 50 mm/s, in both directions; and the screws lose a ninth of the weight.
         let screws_n = 2.0 * (0.5 + 3.0 * 0.4) * 9.81 / 9.0;
         assert!((up - down - 13.5 - screws_n).abs() < 0.2, "{up} {down}");
-        let [still, gains] = [0.0, 2.0].map(|gain| legs_n(offset_n(frictionless, 0.0, gain, &none)));
+        let [still, gains] = [0.0, 2.0].map(|gain| legs_n(offset_n(&frictionless, 0.0, gain, &none)));
         assert!((gains - still - 2.0 * 1.7).abs() < 0.2, "{still} {gains}");
     }
 
@@ -115,7 +115,7 @@ mod tests {
     fn a_law_that_holds_the_platform_back_takes_the_friction_back() {
         let held = Detour { ahead_m_s: Vec3::new(0.0, 0.0, -0.05), ..Detour::default() };
         let [still, held] = [(0.0, Detour::default()), (0.05, held)]
-            .map(|(speed, detour)| legs_n(offset_n(DynamicsConfig::default(), speed, 0.0, &detour)));
+            .map(|(speed, detour)| legs_n(offset_n(&DynamicsConfig::default(), speed, 0.0, &detour)));
         assert!((still - held).abs() < 1e-6, "{still} {held}");
     }
 }

@@ -102,7 +102,7 @@ impl Emulation {
             agenda.set_window(injected, &window_ns);
         }
         let incisal_m = scenario.jaw.reference_point_m;
-        let dynamics = Dynamics::new(mechanism, scenario.dynamics, start, occlusion, incisal_m)?;
+        let dynamics = Dynamics::new(mechanism, &scenario.dynamics, start, occlusion, incisal_m)?;
         let positions_m = dynamics.state().positions_m();
         let drive = |(axis, settings): (usize, &DriveSettings)| {
             let config = &settings.drive;

@@ -85,7 +85,7 @@ impl Dynamics {
     /// The mechanism at rest in a pose of the platform, which must be within the strokes.
     pub(crate) fn new(
         mechanism: Mechanism,
-        config: DynamicsConfig,
+        config: &DynamicsConfig,
         pose: Pose,
         occlusion: Occlusion,
         incisal_m: [f64; 3],
@@ -96,15 +96,15 @@ impl Dynamics {
         }
         let (twist, acceleration) = (Twist::zeros(), Twist::zeros());
         let state = MechanismState { pose, twist, joints };
-        let bodies = Bodies::from(&config);
+        let bodies = Bodies::from(config);
         let motion = Motion::of_joints(&mechanism, &pose, &joints, &twist);
         occlusion.check(&Equations::new(&bodies, &motion).mass, config.step_ns)?;
         Ok(Self {
-            braking: Braking::new(&config, &bodies),
+            braking: Braking::new(config, &bodies),
             axes: Axes::new(&config.axes, &mechanism, state.positions_m(), &bodies.axis_mass_kg()),
             load: Load::new(Vec3::from(incisal_m)),
             mechanism,
-            config,
+            config: *config,
             bodies,
             state,
             acceleration,

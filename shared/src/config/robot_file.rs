@@ -19,11 +19,13 @@ pub(super) fn tables(path: &Path, mut given: Table) -> Result<Table, ScenarioErr
         return Err(ScenarioError::Malformed { place: path.display().to_string(), reason });
     }
     let folder = path.parent().unwrap_or(Path::new(""));
-    let memory = given.get_mut("drives").and_then(|drives| drives.get_mut("memory"));
-    memory.into_iter().for_each(|file| put_in(folder, file));
+    if let Some(file) = given.get_mut("drives").and_then(|drives| drives.get_mut("memory")) {
+        put_in(folder, file);
+    }
     let profiles = given.get_mut("drive_profile").and_then(Value::as_array_mut);
-    let files = profiles.into_iter().flatten().filter_map(|profile| profile.get_mut("dcf"));
-    files.for_each(|file| put_in(folder, file));
+    for file in profiles.into_iter().flatten().filter_map(|profile| profile.get_mut("dcf")) {
+        put_in(folder, file);
+    }
     Ok(given)
 }
 

@@ -55,7 +55,7 @@ fn answers(mechanism: &Mechanism, bodies: &Bodies, folder: &Path) -> String {
 }
 
 /// The way from a start under given forces: the pose after each millisecond.
-fn path(mechanism: Mechanism, config: DynamicsConfig, folder: &Path) -> String {
+fn path(mechanism: Mechanism, config: &DynamicsConfig, folder: &Path) -> String {
     let [start] = *rows::<13>(&folder.join("start.csv")) else { panic!("one start") };
     let (pose, twist) = motion_of(&start);
     let mut dynamics =
@@ -84,6 +84,6 @@ fn answers_a_reference() {
         let mechanism = Mechanism::new(&scenario.mechanism).unwrap();
         let bodies = Bodies::from(&scenario.dynamics);
         fs::write(folder.join("answers.csv"), answers(&mechanism, &bodies, &folder)).unwrap();
-        fs::write(folder.join("path.csv"), path(mechanism, scenario.dynamics, &folder)).unwrap();
+        fs::write(folder.join("path.csv"), path(mechanism, &scenario.dynamics, &folder)).unwrap();
     }
 }

@@ -6,7 +6,7 @@ use masseter_shared::geometry::MechanismConfig;
 
 use super::*;
 
-fn at_rest(config: DynamicsConfig) -> Dynamics {
+fn at_rest(config: &DynamicsConfig) -> Dynamics {
     let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
     Dynamics::new(
         mechanism,
@@ -42,7 +42,7 @@ fn friction_of_any_size_ends_a_motion_and_never_turns_it_round() {
             let friction = FrictionConfig { model, ..FrictionConfig::default() };
             let config =
                 DynamicsConfig { gravity_m_s2: 0.0, slide_friction_n, friction, ..DynamicsConfig::default() };
-            let mut dynamics = at_rest(config);
+            let mut dynamics = at_rest(&config);
             dynamics.state.twist = Twist::new(0.05, 0.02, 0.03, 0.3, -0.2, 0.1);
             for _ in 0..4000 {
                 let before_j = energy(&dynamics).total_j();
@@ -66,7 +66,7 @@ fn friction_of_any_size_ends_a_motion_and_never_turns_it_round() {
 /// How far a slide goes under a force from one time to another (s), mm, with the weight carried.
 fn drift_mm(model: FrictionModel, push_n: f64, [from_s, until_s]: [f64; 2]) -> f64 {
     let friction = FrictionConfig { model, ..FrictionConfig::default() };
-    let mut dynamics = at_rest(DynamicsConfig { friction, ..DynamicsConfig::default() });
+    let mut dynamics = at_rest(&DynamicsConfig { friction, ..DynamicsConfig::default() });
     let equations = Equations::new(&dynamics.bodies, &dynamics.motion_of(&dynamics.state));
     let carrying_n = equations.inverse(&Twist::zeros(), &Vector6::zeros()).unwrap();
     let force_n = carrying_n + Vector6::new(push_n, 0.0, 0.0, 0.0, 0.0, 0.0);
@@ -88,7 +88,7 @@ fn bristles_hold_a_slide_up_to_the_breakaway_force_where_the_smooth_curve_creeps
 
 #[test]
 fn an_axis_that_runs_into_its_end_stop_says_so_once_and_stays_there() {
-    let mut dynamics = at_rest(DynamicsConfig { axes: AxesConfig::default(), ..free() });
+    let mut dynamics = at_rest(&DynamicsConfig { axes: AxesConfig::default(), ..free() });
     let force_n = [0.0, 0.0, 0.0, 60.0, 60.0, 60.0];
     let hits: Vec<_> = (0..4000)
         .filter_map(|_| {
@@ -104,7 +104,7 @@ fn an_axis_that_runs_into_its_end_stop_says_so_once_and_stays_there() {
 
 #[test]
 fn forces_that_carry_the_weight_keep_it_at_rest() {
-    let mut dynamics = at_rest(free());
+    let mut dynamics = at_rest(&free());
     let equations = Equations::new(&dynamics.bodies, &dynamics.motion_of(&dynamics.state));
     let force_n = equations.inverse(&Twist::zeros(), &Vector6::zeros()).unwrap().into();
     (0..8000).for_each(|_| step(&mut dynamics, &force_n));
@@ -115,7 +115,7 @@ fn forces_that_carry_the_weight_keep_it_at_rest() {
 #[test]
 fn released_it_falls_as_all_its_moving_masses_weigh() {
     let config = free();
-    let mut dynamics = at_rest(config);
+    let mut dynamics = at_rest(&config);
     step(&mut dynamics, &[0.0; AXES]);
     let acceleration = dynamics.state.twist[2] / 1.25e-4;
     assert!((-9.9..-9.0).contains(&acceleration), "{acceleration}");
@@ -130,7 +130,7 @@ fn energy(dynamics: &Dynamics) -> Energy {
 const SPRING_N_PER_M: f64 = 200.0;
 
 /// Swings for 10 s. Returns the largest kinetic energy and, for each second, the largest change of the total.
-fn swing(config: DynamicsConfig, start: Twist) -> (f64, [f64; 10]) {
+fn swing(config: &DynamicsConfig, start: Twist) -> (f64, [f64; 10]) {
     let mut dynamics = at_rest(config);
     dynamics.state.twist = start;
     let rest_m = [0.0, 0.0, 0.0, 0.28, 0.28, 0.28];
@@ -156,7 +156,7 @@ fn swing(config: DynamicsConfig, start: Twist) -> (f64, [f64; 10]) {
 fn ten_seconds_of_free_swing_keep_the_energy_within_a_thousandth() {
     let config = DynamicsConfig { platform_centre_m: [0.01, -0.004, 0.012], ..free() };
     for start in [Twist::new(0.05, -0.08, 0.05, 1.0, -0.5, 2.0), Twist::new(0.0, 0.1, -0.1, -2.0, 1.0, 0.0)] {
-        let (kinetic_j, drift_j) = swing(config, start);
+        let (kinetic_j, drift_j) = swing(&config, start);
         println!("kinetic energy {kinetic_j:.4} J, largest change of the energy in each second:");
         println!("{:.4?} ‰", drift_j.map(|drift_j| 1e3 * drift_j / kinetic_j));
         assert!(drift_j.iter().all(|drift_j| *drift_j <= 1e-3 * kinetic_j), "{drift_j:?} of {kinetic_j} J");
@@ -166,7 +166,7 @@ fn ten_seconds_of_free_swing_keep_the_energy_within_a_thousandth() {
 /// None of the equations' terms makes or loses energy but the axes' forces.
 #[test]
 fn work_of_the_axes_is_all_the_energy_gains_even_in_a_tumble() {
-    let mut dynamics = at_rest(DynamicsConfig { step_ns: 2_000, ..free() });
+    let mut dynamics = at_rest(&DynamicsConfig { step_ns: 2_000, ..free() });
     dynamics.state.twist = Twist::new(0.2, -0.1, 0.5, 4.0, -3.0, 2.0);
     let force_n = [3.0, -2.0, 1.0, 2.0, 3.0, 4.0];
     let (start_j, start_m) = (energy(&dynamics).total_j(), dynamics.state().positions_m());
@@ -180,7 +180,7 @@ fn work_of_the_axes_is_all_the_energy_gains_even_in_a_tumble() {
 #[test]
 fn without_forces_energy_is_only_lost() {
     let config = DynamicsConfig { gravity_m_s2: 0.0, ..DynamicsConfig::default() };
-    let mut dynamics = at_rest(config);
+    let mut dynamics = at_rest(&config);
     dynamics.state.twist = Twist::new(0.05, 0.02, 0.03, 0.3, -0.2, 0.1);
     let mut before = energy(&dynamics).total_j();
     for _ in 0..400 {

@@ -304,7 +304,7 @@ fn the_file_of_a_robot_gives_the_defaults_of_its_scenarios() {
     let path = write("slow.toml", "robot = 'robot.toml'\nrate_hz = 500\n[dynamics]\nrod_mass_kg = 0.8");
     let scenario = Scenario::read(&path).unwrap();
     assert_eq!((scenario.rate_hz, scenario.dynamics.rod_mass_kg), (500, 0.8), "the scenario's own keys win");
-    assert_eq!(scenario.dynamics.platform_mass_kg, 0.7);
+    assert!((scenario.dynamics.platform_mass_kg - 0.7).abs() < 1e-12);
     assert_eq!(scenario.drives.memory, Some(folder.path().join("flash.json")));
     let resolved = Scenario::parse(&path, &scenario.to_toml()).unwrap();
     assert_eq!(resolved.dynamics, scenario.dynamics, "the resolved scenario stands alone");
