@@ -15,14 +15,14 @@ from pathlib import Path
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
-# A run in simulated time has no messages about the machine.
+# A run in simulated time has no messages about the machine, and one without teeth and food none about contact.
 TOPICS = {"command", "reading", "state", "truth", "frame", "event", "parameter", "/tf", "/scene"}
 
 folder = Path(sys.argv[1])
 summary = json.loads((folder / "summary.json").read_text())
 topics = defaultdict(list)
 with AnyReader([folder / "recording.mcap"]) as reader:
-    assert {connection.topic for connection in reader.connections} == TOPICS | {"machine"}, reader.connections
+    assert {connection.topic for connection in reader.connections} == TOPICS | {"machine", "contact"}
     for connection, _, data in reader.messages():
         topics[connection.topic].append(reader.deserialize(data, connection.msgtype))
 
