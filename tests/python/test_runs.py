@@ -131,7 +131,7 @@ def test_names_that_are_not_declared_are_refused() -> None:
         masseter.run(controller=law, arguments=SHORT)
     with pytest.raises(masseter.MasseterError, match="no name of a signal"):
         masseter.run(controller=ahead, signals=[masseter.Signal("Depth")])
-    with pytest.raises(masseter.MasseterError, match="no parameter 'gain'; it declares none"):
+    with pytest.raises(masseter.MasseterError, match="no parameter 'gain', but: motion_rate, motion_amplitude"):
         masseter.run(controller=ahead, arguments=[*SHORT, "--set", "gain=3"])
 
 
