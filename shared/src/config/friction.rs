@@ -53,7 +53,24 @@ section! {
     }
 }
 
+/// A screw of less efficiency hides too much of a load that drives it.
+const LEAST_SHOWN: f64 = 0.7;
+
 impl FrictionConfig {
+    /// Refuses screws through which the forces of the drives do not show the load.
+    pub(super) fn require_open_screws(&self) -> Result<(), ScenarioError> {
+        let need = "use at least 0.7 with [force_estimate] or [force_control]: this screw hides the load from its drive";
+        for (key, efficiency) in [
+            ("dynamics.friction.slide_screw_efficiency", self.slide_screw_efficiency),
+            ("dynamics.friction.leg_screw_efficiency", self.leg_screw_efficiency),
+        ] {
+            if self.model != FrictionModel::None && efficiency < LEAST_SHOWN {
+                return Err(ScenarioError::bad(key, &efficiency, need));
+            }
+        }
+        Ok(())
+    }
+
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
         require_within(&[
             ("dynamics.friction.guide_coefficient", self.guide_coefficient, 0.0, 1.0),

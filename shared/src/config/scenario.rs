@@ -341,6 +341,9 @@ impl Scenario {
         if let Some(control) = &self.force_control {
             control.validate(self.controller.lead_cycles * self.period_s(), estimate.observer_time_s)?;
         }
+        if self.force_estimate.is_some() || self.force_control.is_some() {
+            self.model().friction.require_open_screws()?;
+        }
         self.checks.validate()
     }
 

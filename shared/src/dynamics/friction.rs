@@ -108,8 +108,9 @@ impl Friction {
         guide_coefficient * (normal_n + block_factor * moment_nm / block_spacing_m)
     }
 
-    /// Force that a screw loses, as a share of the force that the screw transmits; the same share when the load drives.
-    fn screw_loss(&self, axis: usize) -> f64 {
+    /// Force that the screw of an axis loses, as a share of the force that the screw transmits; the same share when the load
+    /// drives.
+    pub fn screw_loss(&self, axis: usize) -> f64 {
         let FrictionConfig { slide_screw_efficiency, leg_screw_efficiency, .. } = self.config;
         let efficiency = if axis < LEGS { slide_screw_efficiency } else { leg_screw_efficiency };
         1.0 / efficiency - 1.0
@@ -171,6 +172,7 @@ fn ball_turns(motion: &Motion, leg: usize) -> Matrix3x6<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::{Mechanism, MechanismConfig, Pose, Twist, Vec3};
 
     fn friction(change: impl Fn(&mut DynamicsConfig)) -> Friction {
         let mut config = DynamicsConfig { slide_friction_n: 0.0, ..DynamicsConfig::default() };
@@ -206,6 +208,24 @@ mod tests {
         assert!(at_n(0.009) < at_n(0.01) && at_n(0.011) < at_n(0.01));
         assert!((at_n(-0.01) + at_n(0.01)).abs() < 1e-12);
         assert!(at_n(0.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn hinges_and_balls_take_the_power_of_their_torques() {
+        let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
+        let twist = Twist::new(0.05, -0.02, 0.08, 2.0, -1.0, 3.0);
+        let motion = Motion::new(&mechanism, &Pose::translation(0.0, 0.0, 0.268), &twist).unwrap();
+        let loads = Loads { hinge_n: [100.0; 3], ball_n: [200.0; 3], ..Loads::default() };
+        let damping = friction(|_| ()).joint_damping(&loads, &motion);
+        let expected_w: f64 = (0..LEGS)
+            .map(|leg| {
+                let swing = mechanism.slide_direction(leg) * motion.swings_rad_s[leg];
+                // 0.1 · 5 mm · 100 N in a hinge, 0.1 · 10 mm · 200 N in a ball.
+                0.05 * swing.norm() + 0.2 * (Vec3::new(2.0, -1.0, 3.0) - swing).norm()
+            })
+            .sum();
+        let power_w = twist.dot(&(damping * twist));
+        assert!((power_w / expected_w - 1.0).abs() < 1e-3, "{power_w} W, expected {expected_w} W");
     }
 
     #[test]

@@ -363,6 +363,23 @@ fn a_broken_rod_drops_the_leg_while_its_drive_stands() {
 }
 
 #[test]
+fn an_axis_that_falls_on_its_end_stop_is_an_event() {
+    let mut scenario = Scenario { faults: vec![on_l2(Kind::BrokenRod, None)], ..Scenario::default() };
+    scenario.mechanism.strokes.leg_m = [0.288, 0.3];
+    scenario.dynamics.axes.stop_beyond_m = 0.0;
+    let mut bench = Bench::new(&scenario);
+    bench.enable();
+    bench.controller_state = ControllerState::Running;
+    hold_until(&mut bench, 1.5);
+    let hits = bench.events.iter().filter(|event| event.cause == Cause::EndStopHit.code());
+    let hit = hits.clone().next().expect("the leg falls on its stop");
+    assert_eq!((hit.axis, hit.source), (L2 as u32, Source::Scenario.code()));
+    let speeds: Vec<_> = hits.map(|hit| hit.value).collect();
+    assert!(hit.value < 0.0 && speeds.len() <= 3, "the leg rests after a bounce: {speeds:?}");
+    assert!((bench.truth.joint_m[L2] - 0.288).abs() < 1e-4, "{}", bench.truth.joint_m[L2]);
+}
+
+#[test]
 fn a_hard_stop_ends_the_axis_way() {
     let mut sound = Bench::new(&Scenario::default());
     play_until(&mut sound, 0.501);

@@ -263,6 +263,10 @@ const WRONG: &[(&str, &str)] = &[
     ),
     ("teeth = [36]", "s.toml:1:9: teeth is an array; write a table"),
     ("[food]\nstiffness_n_per_m = 0.0", "food.stiffness_n_per_m = 0: use 1 to 1000000"),
+    (
+        "[force_estimate]\n[dynamics.friction]\nleg_screw_efficiency = 0.4",
+        "dynamics.friction.leg_screw_efficiency = 0.4: use at least 0.7 with [force_estimate]",
+    ),
     ("[food]\nthickness_mm = 10.0", "did you mean 'thickness_m'?"),
     ("[[faults]]\nkind = 'melt'\nbus = 0\nfrom_s = 1.0", "s.toml:2:8: faults.kind: unknown value 'melt'"),
     (
