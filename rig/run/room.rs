@@ -149,7 +149,7 @@ mod tests {
         fs::File::create_new(&path).unwrap().set_len(1 << 50).unwrap();
         let failure = reserve_shared_memory(&domain).usage().unwrap_err();
         assert_eq!(failure.exit, Exit::Usage);
-        assert!(failure.error.to_string().contains("--shm-size=62m"), "{}", failure.error);
+        assert!(failure.error.to_string().contains("--shm-size=69m"), "{}", failure.error);
     }
 
     #[test]
