@@ -56,6 +56,6 @@ pub(super) fn over_kind<T: DeserializeOwned>(kinds: &Kinds, given: Table) -> Res
         return Err(TomlError::custom(format!("there is no kind '{kind}'; use {names}")));
     };
     let mut whole: Table = toml::from_str(text).expect("the rig's kinds are TOML");
-    merge(&mut whole, given);
+    merge(&mut whole, given).map_err(TomlError::custom)?;
     whole.try_into()
 }

@@ -29,6 +29,8 @@ use crate::wording::nearest;
 const MOST_BYTES: u64 = 1 << 20;
 /// What a message on an unknown key begins with.
 const UNKNOWN_KEY: &str = "unknown key";
+/// The lists whose entries have names.
+const LISTS: [&str; 3] = ["faults", "stimulus", "require"];
 /// Longest time after a safe stop, s.
 const LONGEST_OBSERVATION_S: f64 = 10.0;
 /// Characters of the longest message of the TOML reader.
@@ -143,7 +145,7 @@ impl Scenario {
         let folder = path.parent().unwrap_or(Path::new(""));
         if let Some(robot) = &scenario.robot {
             let mut whole = Self::read_robot(&folder.join(robot))?;
-            merge(&mut whole, table_of(&text));
+            merge(&mut whole, table_of(&text)).map_err(|reason| Self::malformed_at(path, reason))?;
             scenario = Self::parse(path, &whole.to_string())?;
         }
         if let Some(memory) = &mut scenario.drives.memory {
@@ -228,13 +230,13 @@ impl Scenario {
         let model = given.get("controller").and_then(|controller| controller.get("model")?.as_table());
         let Some(model) = model else { return };
         let mut whole = Table::try_from(self.dynamics).expect("[dynamics] has a TOML form");
-        merge(&mut whole, model.clone());
+        merge(&mut whole, model.clone()).expect("[dynamics] has no lists");
         self.controller.model =
             Some(whole.try_into().expect("[dynamics] and [controller.model] have been read"));
     }
 
-    /// The scenario with one value changed: `KEY=VALUE`, with the key and the value as in a file. A value that is no TOML is
-    /// text. A name that is no key of a scenario is that of a parameter of the controller. The value is not checked yet:
+    /// The scenario with one value changed: `KEY=VALUE`, with the key and the value as in a file; see [`Self::with_table`] for
+    /// lists. A value that is no TOML is text. A name that is no key of a scenario is that of a parameter of the controller. The value is not checked yet:
     /// see [`Self::validate`].
     ///
     /// ```
@@ -257,17 +259,31 @@ impl Scenario {
         let as_toml = toml::from_str::<Table>(&format!("{key} = {value}"));
         let as_text = || toml::from_str(&format!("{key} = {}", toml::Value::from(value)));
         let given = as_toml.or_else(|_| as_text()).map_err(|error| refused(error.message().to_owned()))?;
-        let mut whole: Table = toml::from_str(&self.to_toml()).expect("it was written from a scenario");
-        if key.trim() == "food.kind" {
-            // The values of another kind come with it.
-            whole.remove("food");
-        }
-        merge(&mut whole, given);
-        Self::parse(Path::new(assignment), &whole.to_string()).map_err(|error| match error {
+        self.with_table(given).map_err(|error| match error {
             // The place is one in the resolved scenario, which the user does not see.
             ScenarioError::Malformed { reason, .. } => refused(reason),
             other => other,
         })
+    }
+
+    /// The scenario with the values of a table in place of its own. A table of another `kind` replaces the one that is there,
+    /// and an entry of a list has the name that `after` and requirements use: `faults.NAME.at_s`.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Malformed`] for an unknown key, a value of another type, or an entry that is not there.
+    pub fn with_table(&self, given: Table) -> Result<Self, ScenarioError> {
+        let changed = Path::new("the changed scenario");
+        let mut whole: Table = toml::from_str(&self.to_toml()).expect("it was written from a scenario");
+        // Empty lists are not written.
+        for list in LISTS {
+            whole.entry(list).or_insert_with(|| toml::Value::Array(Vec::new()));
+        }
+        merge(&mut whole, given).map_err(|reason| Self::malformed_at(changed, reason))?;
+        Self::parse(changed, &whole.to_string())
+    }
+
+    fn malformed_at(path: &Path, reason: String) -> ScenarioError {
+        ScenarioError::Malformed { place: path.display().to_string(), reason }
     }
 
     /// The question whether a key of a scenario is meant, for a name that is none but like one.

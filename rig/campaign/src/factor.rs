@@ -1,0 +1,262 @@
+//! A factor: a key of the scenario that varies, or a fault that is there or not, and the values that it takes.
+
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, Normal};
+use toml::Value;
+
+use crate::case::Setting;
+
+/// The word for no fault.
+const NO_FAULT: &str = "none";
+/// Levels of a range on a grid, if the factor names none.
+const LEVELS: usize = 5;
+/// The most levels of a factor.
+const MOST_LEVELS: usize = 10_000;
+
+/// How the values of a range are spread.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Distribution {
+    /// Evenly.
+    #[default]
+    Uniform,
+    /// Evenly in the logarithm.
+    LogUniform,
+    /// By a normal distribution of `mean` and `deviation`, cut at the range where there is one.
+    Normal,
+}
+
+/// What varies. Exactly one of `range`, `values` and `faults` is given; a normal distribution needs no range.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Factor {
+    /// The key of the scenario, as on the command line: `dynamics.slide_friction_n`, `faults.NAME.at_s`, `motion`.
+    pub key: Option<String>,
+    /// The name in results; the key when absent.
+    pub name: Option<String>,
+    /// Least and greatest value.
+    pub range: Option<[Value; 2]>,
+    /// How the values are spread.
+    #[serde(default)]
+    pub distribution: Distribution,
+    /// Mean of a normal distribution.
+    pub mean: Option<f64>,
+    /// Standard deviation of a normal distribution.
+    pub deviation: Option<f64>,
+    /// Unit, for keys whose values have one in the scenario, such as "mm".
+    pub unit: Option<String>,
+    /// Points on a grid.
+    pub levels: Option<usize>,
+    /// The values themselves, of any type: numbers, names, whole tables.
+    pub values: Option<Vec<Value>>,
+    /// Whole faults, of which one at a time is added to those of the scenario, or "none".
+    pub faults: Option<Vec<Value>>,
+}
+
+/// Why a factor is refused.
+#[derive(Debug, thiserror::Error)]
+#[error("factor '{factor}': {reason}")]
+pub struct FactorError {
+    factor: String,
+    reason: String,
+}
+
+impl Factor {
+    /// A factor with values in a range.
+    pub fn of_range(key: &str, range: [f64; 2]) -> Self {
+        Self {
+            key: Some(key.to_owned()),
+            name: None,
+            range: Some(range.map(Value::Float)),
+            distribution: Distribution::default(),
+            mean: None,
+            deviation: None,
+            unit: None,
+            levels: None,
+            values: None,
+            faults: None,
+        }
+    }
+
+    /// The name in results.
+    pub fn name(&self) -> &str {
+        let faults = self.faults.as_ref().map(|_| "fault");
+        self.name.as_deref().or(self.key.as_deref()).or(faults).unwrap_or("?")
+    }
+
+    /// Whether its values are numbers between two ends, as a search needs them.
+    pub fn is_continuous(&self) -> bool {
+        self.values.is_none() && self.faults.is_none()
+    }
+
+    /// The number of its levels on a grid.
+    pub fn level_count(&self) -> usize {
+        let listed = self.values.as_ref().or(self.faults.as_ref());
+        listed.map_or_else(|| self.levels.unwrap_or(LEVELS), Vec::len)
+    }
+
+    /// The value at `u` of \[0, 1): that quantile of a range, or that share of a list.
+    pub fn at(&self, u: f64) -> Setting {
+        let of_list = |list: &[Value]| list[((u * list.len() as f64) as usize).min(list.len() - 1)].clone();
+        if let Some(faults) = &self.faults {
+            let chosen = of_list(faults);
+            let fault = chosen.as_table().cloned();
+            return Setting::fault(self.name(), fault);
+        }
+        let value = match &self.values {
+            Some(values) => of_list(values),
+            None => self.of_range_at(u),
+        };
+        Setting::key(self.name(), self.key.as_deref().unwrap_or_default(), value)
+    }
+
+    fn of_range_at(&self, u: f64) -> Value {
+        let ends = self.ends();
+        let number = match self.distribution {
+            Distribution::Uniform => ends[0] + u * (ends[1] - ends[0]),
+            Distribution::LogUniform => ends[0] * (ends[1] / ends[0]).powf(u),
+            Distribution::Normal => self.normal().map_or(f64::NAN, |normal| {
+                let [from, to] = ends.map(|end| normal.cdf(end));
+                // The ends of an endless range have no quantile.
+                normal.inverse_cdf((from + u * (to - from)).clamp(1e-12, 1.0 - 1e-12))
+            }),
+        };
+        match (&self.unit, self.is_whole()) {
+            (Some(unit), _) => Value::String(format!("{number} {unit}")),
+            (None, true) => Value::Integer((number + 0.5).floor().min(ends[1]) as i64),
+            (None, false) => Value::Float(number),
+        }
+    }
+
+    /// Whether the values are whole numbers: those of both ends are.
+    fn is_whole(&self) -> bool {
+        self.range.as_ref().is_some_and(|ends| ends.iter().all(Value::is_integer))
+    }
+
+    fn ends(&self) -> [f64; 2] {
+        let endless = [f64::NEG_INFINITY, f64::INFINITY];
+        self.range.as_ref().map_or(endless, |ends| ends.each_ref().map(|end| number(end).unwrap_or(f64::NAN)))
+    }
+
+    fn normal(&self) -> Option<Normal> {
+        Normal::new(self.mean?, self.deviation?).ok()
+    }
+
+    /// Checks the factor by itself; its keys are checked with the scenario of each case.
+    pub(crate) fn validate(&self) -> Result<(), FactorError> {
+        let refuse = |reason: &str| {
+            Err(FactorError { factor: self.name().to_owned(), reason: reason.to_owned() })
+        };
+        let is_normal = self.distribution == Distribution::Normal;
+        let given = [self.range.is_some() || is_normal, self.values.is_some(), self.faults.is_some()];
+        if given.into_iter().filter(|is_given| *is_given).count() != 1 {
+            return refuse("give one of range, values and faults");
+        }
+        if self.faults.is_some() == self.key.is_some() {
+            return refuse("give the key of the scenario that varies, or faults");
+        }
+        if self.values.as_ref().or(self.faults.as_ref()).is_some_and(Vec::is_empty) {
+            return refuse("give at least one value");
+        }
+        if let Some(faults) = &self.faults {
+            let is_fault = |fault: &Value| fault.is_table() || fault.as_str() == Some(NO_FAULT);
+            if !faults.iter().all(is_fault) {
+                return refuse("write each fault as a table, such as { kind = \"lose\", at_s = 2.0 }, or \"none\"");
+            }
+        }
+        if self.levels.is_some_and(|levels| !(1..=MOST_LEVELS).contains(&levels)) {
+            return refuse("levels: use 1 to 10000");
+        }
+        if let Some([low, high]) = self.range.as_ref().map(|_| self.ends()) {
+            if !(low.is_finite() && high.is_finite() && low < high) {
+                return refuse("range: give two numbers, the smaller first");
+            }
+            if self.distribution == Distribution::LogUniform && low <= 0.0 {
+                return refuse("range: a log-uniform distribution needs numbers above 0");
+            }
+        }
+        if is_normal && self.normal().is_none() {
+            return refuse("a normal distribution needs mean, and a deviation above 0");
+        }
+        if !is_normal && (self.mean.is_some() || self.deviation.is_some()) {
+            return refuse("mean and deviation need distribution = \"normal\"");
+        }
+        Ok(())
+    }
+}
+
+fn number(value: &Value) -> Option<f64> {
+    value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn factor(text: &str) -> Factor {
+        toml::from_str(text).unwrap()
+    }
+
+    fn value_at(text: &str, u: f64) -> Value {
+        let factor = factor(text);
+        factor.validate().unwrap();
+        factor.at(u).value.unwrap()
+    }
+
+    #[test]
+    fn the_values_of_a_range_follow_its_distribution() {
+        assert_eq!(value_at("key = 'a'\nrange = [2.0, 4.0]", 0.5), Value::Float(3.0));
+        let log = value_at("key = 'a'\nrange = [1.0, 100.0]\ndistribution = 'log-uniform'", 0.5);
+        assert!((log.as_float().unwrap() - 10.0).abs() < 1e-12);
+        let normal = "key = 'a'\ndistribution = 'normal'\nmean = 5.0\ndeviation = 2.0";
+        assert!((value_at(normal, 0.5).as_float().unwrap() - 5.0).abs() < 1e-9);
+        assert!((value_at(normal, 0.841_344_746).as_float().unwrap() - 7.0).abs() < 1e-6);
+        let cut = format!("{normal}\nrange = [5.0, 6.0]");
+        assert!((value_at(&cut, 0.0).as_float().unwrap() - 5.0).abs() < 1e-9);
+        assert!(value_at(&cut, 0.999_999).as_float().unwrap() <= 6.0);
+    }
+
+    #[test]
+    fn whole_ends_give_whole_numbers_and_a_unit_gives_quantities() {
+        let whole = "key = 'a'\nrange = [1, 3]";
+        assert_eq!([0.0, 0.5, 0.999].map(|u| value_at(whole, u)), [1, 2, 3].map(Value::Integer));
+        assert_eq!(value_at("key = 'a'\nrange = [1.0, 2.0]\nunit = 'mm'", 0.5), Value::from("1.5 mm"));
+    }
+
+    #[test]
+    fn a_list_is_shared_out_evenly() {
+        let list = "key = 'motion'\nvalues = [{ kind = 'opening' }, { kind = 'chewing' }]";
+        assert_eq!(value_at(list, 0.49).get("kind"), Some(&Value::from("opening")));
+        assert_eq!(value_at(list, 0.5).get("kind"), Some(&Value::from("chewing")));
+    }
+
+    #[test]
+    fn a_fault_is_added_or_not() {
+        let faults = factor("faults = ['none', { kind = 'lose', at_s = 2.0 }]");
+        faults.validate().unwrap();
+        assert_eq!(faults.name(), "fault");
+        assert_eq!(faults.at(0.0).fault, None);
+        assert_eq!(faults.at(0.9).fault.unwrap()["at_s"], Value::Float(2.0));
+    }
+
+    #[test]
+    fn a_wrong_factor_is_refused_with_what_to_do() {
+        for (text, reason) in [
+            ("key = 'a'", "give one of range, values and faults"),
+            ("key = 'a'\nrange = [1.0, 2.0]\nvalues = [1]", "give one of range"),
+            ("range = [1.0, 2.0]", "give the key"),
+            ("key = 'a'\nfaults = ['none']", "give the key of the scenario that varies, or faults"),
+            ("key = 'a'\nvalues = []", "at least one value"),
+            ("faults = ['some']", "write each fault as a table"),
+            ("key = 'a'\nrange = [2.0, 1.0]", "the smaller first"),
+            ("key = 'a'\nrange = ['1 mm', '2 mm']", "give two numbers"),
+            ("key = 'a'\nrange = [0.0, 1.0]\ndistribution = 'log-uniform'", "above 0"),
+            ("key = 'a'\ndistribution = 'normal'\nmean = 1.0", "a deviation above 0"),
+            ("key = 'a'\nrange = [1.0, 2.0]\nmean = 1.0", "need distribution"),
+            ("key = 'a'\nrange = [1.0, 2.0]\nlevels = 0", "use 1 to 10000"),
+        ] {
+            let refusal = factor(text).validate().unwrap_err().to_string();
+            assert!(refusal.contains(reason), "{text}: {refusal}");
+        }
+    }
+}

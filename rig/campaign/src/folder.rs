@@ -1,0 +1,374 @@
+//! The folder of a campaign: its plan, the result of every case once, and attempts that are under way.
+//!
+//! An attempt has a folder of its own, which is renamed to that of the case when the case has ended. So a case has a result
+//! or none, whenever a process dies. An attempt whose process is gone is swept.
+
+use std::fs::{self, File};
+use std::io::{self, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+use masseter_shared::config::Scenario;
+use rustix::fs::{FlockOperation, flock};
+use tempfile::TempDir;
+
+use crate::campaign::Campaign;
+use crate::case::Case;
+use crate::result::CaseResult;
+
+const PLAN: &str = "plan.json";
+const CASES: &str = "cases";
+const ATTEMPTS: &str = "attempts";
+const LOCK: &str = "lock";
+const RESULT: &str = "result.json";
+const SCENARIO: &str = "scenario.toml";
+
+/// Why the folder of a campaign cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum FolderError {
+    /// It is that of another campaign.
+    #[error("{} belongs to another campaign: {difference}; choose another --out", path.display())]
+    OfAnother {
+        /// The folder.
+        path: PathBuf,
+        /// What differs.
+        difference: &'static str,
+    },
+    /// A process runs this campaign.
+    #[error("another masseter runs the campaign in {}", .0.display())]
+    InUse(PathBuf),
+    /// It holds files, but no campaign.
+    #[error("{} exists and is no folder of a campaign; choose another --out", .0.display())]
+    NoCampaign(PathBuf),
+    /// A file in it has been damaged.
+    #[error("{}: {reason}; remove it, and the case runs again", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The system refuses an operation.
+    #[error("{}: {error}", path.display())]
+    System {
+        /// The file or folder.
+        path: PathBuf,
+        /// The error of the operating system.
+        error: io::Error,
+    },
+}
+
+/// A campaign on the disk.
+#[derive(Debug)]
+pub struct CampaignFolder {
+    path: PathBuf,
+}
+
+/// The right to run a campaign; given back when it is dropped or its process dies.
+#[derive(Debug)]
+pub struct CampaignLock {
+    _file: File,
+}
+
+impl CampaignFolder {
+    /// Makes the folder of a campaign, or goes on with the same campaign.
+    ///
+    /// # Errors
+    /// [`FolderError`]: another campaign is there, or a process runs this one.
+    pub fn begin(path: &Path, campaign: &Campaign) -> Result<(Self, CampaignLock), FolderError> {
+        let folder = Self { path: path.to_owned() };
+        if path.is_dir() && !folder.plan_path().exists() && fs::read_dir(path).is_ok_and(has_more_than_a_lock) {
+            return Err(FolderError::NoCampaign(path.to_owned()));
+        }
+        for inner in [folder.cases_path(), folder.path.join(ATTEMPTS)] {
+            fs::create_dir_all(&inner).map_err(system(&inner))?;
+        }
+        let lock = folder.lock()?;
+        if folder.plan_path().exists() {
+            folder.refuse_another(campaign)?;
+        } else {
+            let plan = serde_json::to_string_pretty(campaign).expect("a campaign has a JSON form");
+            folder.write_whole(&folder.plan_path(), &plan)?;
+        }
+        folder.sweep()?;
+        Ok((folder, lock))
+    }
+
+    /// Opens the folder of a campaign that has begun, and reads its plan.
+    ///
+    /// # Errors
+    /// [`FolderError`]: no campaign is there.
+    pub fn open(path: &Path) -> Result<(Self, Campaign), FolderError> {
+        let folder = Self { path: path.to_owned() };
+        if !folder.plan_path().is_file() {
+            return Err(FolderError::NoCampaign(path.to_owned()));
+        }
+        let campaign = folder.read_plan()?;
+        Ok((folder, campaign))
+    }
+
+    /// The folder itself.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Another file of this name.
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+
+    /// Where the scenario of a case is that did not pass.
+    pub fn scenario_of(&self, result: &CaseResult) -> PathBuf {
+        self.cases_path().join(result.folder_name()).join(SCENARIO)
+    }
+
+    /// Whether a case has ended.
+    pub fn has(&self, case: &Case) -> bool {
+        self.cases_path().join(case.folder_name()).join(RESULT).is_file()
+    }
+
+    /// The result of a case; none of one that has not ended.
+    ///
+    /// # Errors
+    /// [`FolderError::Damaged`] for a result that is none.
+    pub fn result_of(&self, case: &Case) -> Result<Option<CaseResult>, FolderError> {
+        let path = self.cases_path().join(case.folder_name()).join(RESULT);
+        if path.is_file() { read_result(&path).map(Some) } else { Ok(None) }
+    }
+
+    /// The results of all cases that have ended, in the order of their numbers.
+    ///
+    /// # Errors
+    /// [`FolderError::Damaged`] for a result that is none.
+    pub fn results(&self) -> Result<Vec<CaseResult>, FolderError> {
+        let path = self.cases_path();
+        let entries = fs::read_dir(&path).map_err(system(&path))?;
+        let mut results = Vec::new();
+        for entry in entries {
+            let result = entry.map_err(system(&path))?.path().join(RESULT);
+            if result.is_file() {
+                results.push(read_result(&result)?);
+            }
+        }
+        results.sort_by_key(|result: &CaseResult| result.number);
+        Ok(results)
+    }
+
+    /// Begins an attempt at a case.
+    ///
+    /// # Errors
+    /// When its folder cannot be made.
+    pub fn attempt(&self, case: &Case) -> Result<Attempt, FolderError> {
+        let attempts = self.path.join(ATTEMPTS);
+        let prefix = format!("{}.", case.folder_name());
+        let folder =
+            tempfile::Builder::new().prefix(&prefix).tempdir_in(&attempts).map_err(system(&attempts))?;
+        let lock = locked(&folder.path().join(LOCK))?;
+        let lock = lock.ok_or_else(|| FolderError::InUse(folder.path().to_owned()))?;
+        Ok(Attempt { folder, target: self.cases_path().join(case.folder_name()), _lock: lock })
+    }
+
+    /// Removes the attempts of processes that are gone.
+    fn sweep(&self) -> Result<(), FolderError> {
+        let attempts = self.path.join(ATTEMPTS);
+        for entry in fs::read_dir(&attempts).map_err(system(&attempts))? {
+            let path = entry.map_err(system(&attempts))?.path();
+            // An attempt that just begins has no lock yet; then the folder is empty, and stays.
+            if path.join(LOCK).exists() && locked(&path.join(LOCK))?.is_some() {
+                fs::remove_dir_all(&path).map_err(system(&path))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn lock(&self) -> Result<CampaignLock, FolderError> {
+        let file = locked(&self.path.join(LOCK))?;
+        file.map(|file| CampaignLock { _file: file }).ok_or_else(|| FolderError::InUse(self.path.clone()))
+    }
+
+    fn refuse_another(&self, campaign: &Campaign) -> Result<(), FolderError> {
+        let begun = self.read_plan()?;
+        let difference = begun.difference_to(campaign);
+        difference.map_or(Ok(()), |difference| {
+            Err(FolderError::OfAnother { path: self.path.clone(), difference })
+        })
+    }
+
+    fn read_plan(&self) -> Result<Campaign, FolderError> {
+        let path = self.plan_path();
+        let text = fs::read_to_string(&path).map_err(system(&path))?;
+        serde_json::from_str(&text)
+            .map_err(|error| FolderError::Damaged { path, reason: format!("it is no plan: {error}") })
+    }
+
+    fn write_whole(&self, path: &Path, text: &str) -> Result<(), FolderError> {
+        let write = || {
+            let mut file = tempfile::NamedTempFile::new_in(&self.path)?;
+            file.write_all(text.as_bytes())?;
+            file.as_file().sync_all()?;
+            file.persist(path).map_err(|error| error.error)
+        };
+        write().map(drop).map_err(system(path))
+    }
+
+    fn plan_path(&self) -> PathBuf {
+        self.path.join(PLAN)
+    }
+
+    fn cases_path(&self) -> PathBuf {
+        self.path.join(CASES)
+    }
+}
+
+/// A case that is being run.
+#[derive(Debug)]
+pub struct Attempt {
+    folder: TempDir,
+    target: PathBuf,
+    _lock: File,
+}
+
+impl Attempt {
+    /// Keeps the result, and the scenario of a case that did not pass. If another attempt was faster, its result stays.
+    ///
+    /// # Errors
+    /// When a file cannot be written.
+    pub fn finish(self, result: &CaseResult, scenario: Option<&Scenario>) -> Result<(), FolderError> {
+        let path = self.folder.path();
+        if let Some(scenario) = scenario.filter(|_| !result.has_passed()) {
+            let kept = path.join(SCENARIO);
+            fs::write(&kept, scenario.to_toml()).map_err(system(&kept))?;
+        }
+        let kept = path.join(RESULT);
+        let text = serde_json::to_string(result).expect("a result has a JSON form");
+        fs::write(&kept, text).map_err(system(&kept))?;
+        let _ = fs::remove_file(path.join(LOCK));
+        match fs::rename(path, &self.target) {
+            Err(error) if !matches!(error.kind(), ErrorKind::DirectoryNotEmpty | ErrorKind::AlreadyExists) => {
+                Err(error).map_err(system(&self.target))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+fn has_more_than_a_lock(entries: fs::ReadDir) -> bool {
+    let ours = [LOCK, CASES, ATTEMPTS];
+    entries.flatten().any(|entry| !ours.iter().any(|name| entry.file_name() == *name))
+}
+
+/// A locked file; none if another process has locked it.
+fn locked(path: &Path) -> Result<Option<File>, FolderError> {
+    let file = File::options().create(true).append(true).open(path).map_err(system(path))?;
+    match flock(&file, FlockOperation::NonBlockingLockExclusive) {
+        Ok(()) => Ok(Some(file)),
+        Err(rustix::io::Errno::WOULDBLOCK) => Ok(None),
+        Err(error) => Err(system(path)(error.into())),
+    }
+}
+
+fn read_result(path: &Path) -> Result<CaseResult, FolderError> {
+    let text = fs::read_to_string(path).map_err(system(path))?;
+    serde_json::from_str(&text).map_err(|error| FolderError::Damaged {
+        path: path.to_owned(),
+        reason: format!("it is no result: {error}"),
+    })
+}
+
+fn system(path: &Path) -> impl FnOnce(io::Error) -> FolderError {
+    let path = path.to_owned();
+    |error| FolderError::System { path, error }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn campaign(text: &str) -> Campaign {
+        Campaign {
+            file: toml::from_str(text).unwrap(),
+            controller: "motion".to_owned(),
+            program: "program".to_owned(),
+            folder: "/".into(),
+            base: Scenario::default().to_toml(),
+        }
+    }
+
+    fn two() -> Campaign {
+        campaign("[[factor]]\nkey = 'rate_hz'\nvalues = [500, 1000]")
+    }
+
+    fn case(number: usize) -> Case {
+        two().case(&two().points(), number)
+    }
+
+    fn failed(case: &Case) -> CaseResult {
+        CaseResult::without_run(case, "FAIL", 1, "failed: tracking".to_owned())
+    }
+
+    #[test]
+    fn a_campaign_goes_on_where_it_was_and_keeps_each_result_once() {
+        let parent = tempfile::tempdir().unwrap();
+        let path = parent.path().join("campaign");
+        let (folder, lock) = CampaignFolder::begin(&path, &two()).unwrap();
+        let first = case(0);
+        folder.attempt(&first).unwrap().finish(&failed(&first), first.scenario.as_ref().ok()).unwrap();
+        // The second attempt comes too late, and does no harm.
+        let late = CaseResult { word: "PASS".to_owned(), exit_code: 0, ..failed(&first) };
+        folder.attempt(&first).unwrap().finish(&late, first.scenario.as_ref().ok()).unwrap();
+        drop(lock);
+
+        let (folder, _lock) = CampaignFolder::begin(&path, &two()).unwrap();
+        assert!(folder.has(&first) && !folder.has(&case(1)));
+        assert_eq!(folder.results().unwrap(), [failed(&first)]);
+        assert!(folder.scenario_of(&failed(&first)).is_file());
+        assert_eq!(fs::read_dir(path.join(ATTEMPTS)).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn an_attempt_of_a_dead_process_is_swept_and_a_live_one_stays() {
+        let parent = tempfile::tempdir().unwrap();
+        let (folder, lock) = CampaignFolder::begin(parent.path(), &two()).unwrap();
+        let live = folder.attempt(&case(0)).unwrap();
+        let dead = parent.path().join(ATTEMPTS).join("00001-dead.x");
+        fs::create_dir(&dead).unwrap();
+        fs::write(dead.join(LOCK), "").unwrap();
+        drop(lock);
+        CampaignFolder::begin(parent.path(), &two()).unwrap();
+        assert!(!dead.exists() && live.folder.path().exists());
+    }
+
+    #[test]
+    fn the_folder_of_another_campaign_is_refused_with_the_difference() {
+        let parent = tempfile::tempdir().unwrap();
+        let (_, lock) = CampaignFolder::begin(parent.path(), &two()).unwrap();
+        let refusal = |campaign: &Campaign| {
+            CampaignFolder::begin(parent.path(), campaign).unwrap_err().to_string()
+        };
+        assert!(refusal(&two()).contains("another masseter runs"));
+        drop(lock);
+        let other = campaign("[[factor]]\nkey = 'rate_hz'\nvalues = [500, 1000, 2000]");
+        assert!(refusal(&other).contains("the file of the campaign has changed"), "{}", refusal(&other));
+        let rebuilt = Campaign { program: "other".to_owned(), ..two() };
+        assert!(refusal(&rebuilt).contains("another build of masseter"), "{}", refusal(&rebuilt));
+    }
+
+    #[test]
+    fn a_folder_with_other_files_is_left_alone() {
+        let parent = tempfile::tempdir().unwrap();
+        fs::write(parent.path().join("thesis.tex"), "").unwrap();
+        let refusal = CampaignFolder::begin(parent.path(), &two()).unwrap_err().to_string();
+        assert!(refusal.contains("is no folder of a campaign"), "{refusal}");
+        assert_eq!(fs::read_dir(parent.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_damaged_result_is_named() {
+        let parent = tempfile::tempdir().unwrap();
+        let (folder, _lock) = CampaignFolder::begin(parent.path(), &two()).unwrap();
+        let kept = parent.path().join(CASES).join(case(0).folder_name());
+        fs::create_dir(&kept).unwrap();
+        fs::write(kept.join(RESULT), "{").unwrap();
+        let refusal = folder.results().unwrap_err().to_string();
+        assert!(refusal.contains("remove it, and the case runs again"), "{refusal}");
+    }
+}

@@ -1,0 +1,21 @@
+//! Campaigns: one scenario with many values of its keys, faults and motions; what is run, and what came of it.
+//!
+//! A [`CampaignFile`] names a scenario, the [factors](Factor) that vary, and a [sampler](Sampler). A [`Campaign`] makes a
+//! [`Case`] of every point: a whole scenario. A [`CampaignFolder`] keeps the [result](CaseResult) of each case once. This crate
+//! runs no case: see the verb `campaign`.
+
+mod campaign;
+mod case;
+mod factor;
+mod file;
+mod folder;
+mod result;
+mod sampler;
+
+pub use campaign::Campaign;
+pub use case::{Case, Setting};
+pub use factor::{Distribution, Factor, FactorError};
+pub use file::{CampaignFile, FileError, StopRules};
+pub use folder::{Attempt, CampaignFolder, CampaignLock, FolderError};
+pub use result::{CaseCheck, CaseResult};
+pub use sampler::{Sampler, points};

@@ -1,0 +1,132 @@
+//! What came of a case, as it is kept.
+
+use masseter_analysis::Figures;
+use masseter_report::{CheckResult, Verdict};
+use serde::{Deserialize, Serialize};
+
+use crate::case::{Case, Setting};
+
+/// A requirement or check of a case.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CaseCheck {
+    /// Its name.
+    pub name: String,
+    /// Whether it passed; none where it could not show.
+    pub passed: Option<bool>,
+    /// How far it is from failing; none of a check without a limit in numbers.
+    pub margin: Option<f64>,
+    /// Unit of the margin.
+    pub unit: String,
+    /// The margin as a share of the limit.
+    pub relative_margin: Option<f64>,
+}
+
+/// The result of a case.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CaseResult {
+    /// The case's place in the campaign, from 0.
+    pub number: usize,
+    /// The case's identity.
+    pub id: String,
+    /// The values of the factors.
+    pub settings: Vec<Setting>,
+    /// The seed of the scenario.
+    pub seed: u64,
+    /// The verdict in a word; REFUSED where the values lead to no run.
+    pub word: String,
+    /// The verdict as an exit code.
+    pub exit_code: u8,
+    /// The reason in a sentence.
+    pub reason: String,
+    /// The digest of what the rig did; empty where nothing ran.
+    pub digest: String,
+    /// The checks in their order.
+    pub checks: Vec<CaseCheck>,
+    /// Root mean square distance of the incisal point from its desired place, mm.
+    pub incisal_rms_mm: Option<f64>,
+    /// The largest such distance, mm.
+    pub incisal_max_mm: Option<f64>,
+    /// The largest error of the platform's rotation, degrees.
+    pub rotation_max_deg: Option<f64>,
+    /// The greatest bite force, N.
+    pub bite_force_max_n: Option<f64>,
+    /// The time that it took, s.
+    pub took_s: f64,
+}
+
+impl CaseResult {
+    /// The word of a case that could not run.
+    pub const REFUSED: &str = "REFUSED";
+
+    /// The result of a case that ran.
+    pub fn new(case: &Case, verdict: &Verdict, figures: &Figures, took_s: f64) -> Self {
+        let errors = &figures.tracking.actual;
+        Self {
+            checks: verdict.checks.iter().map(check).collect(),
+            digest: figures.digest.clone(),
+            incisal_rms_mm: errors.incisal_rms_mm,
+            incisal_max_mm: errors.incisal_max_mm,
+            rotation_max_deg: errors.max_deg,
+            bite_force_max_n: figures.bite_force_max_n,
+            took_s,
+            ..Self::without_run(case, verdict.word, verdict.exit_code as u8, verdict.reason.clone())
+        }
+    }
+
+    /// The result of a case that could not run.
+    pub fn without_run(case: &Case, word: &str, exit_code: u8, reason: String) -> Self {
+        Self {
+            number: case.number,
+            id: case.id.clone(),
+            settings: case.settings.clone(),
+            seed: case.seed,
+            word: word.to_owned(),
+            exit_code,
+            reason,
+            digest: String::new(),
+            checks: Vec::new(),
+            incisal_rms_mm: None,
+            incisal_max_mm: None,
+            rotation_max_deg: None,
+            bite_force_max_n: None,
+            took_s: 0.0,
+        }
+    }
+
+    /// The name of the case's folder.
+    pub fn folder_name(&self) -> String {
+        crate::case::folder_name(self.number, &self.id)
+    }
+
+    /// Whether the case passed.
+    pub fn has_passed(&self) -> bool {
+        self.exit_code == 0
+    }
+
+    /// Whether it says anything about the rig: it passed, failed or stopped. What could not run, was not tested or cannot be
+    /// judged says nothing.
+    pub fn is_judged(&self) -> bool {
+        !matches!(self.word.as_str(), Self::REFUSED | "UNTESTED" | "INVALID" | "INCOMPLETE" | "INTERRUPTED")
+    }
+
+    /// The smallest margin of its checks as a share of their limits, with the name of the check.
+    pub fn least_margin(&self) -> Option<(&str, f64)> {
+        let margins = self.checks.iter().filter_map(|check| Some((check.name.as_str(), check.relative_margin?)));
+        margins.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+}
+
+fn check(check: &masseter_report::Check) -> CaseCheck {
+    let figures = check.figures.as_ref();
+    CaseCheck {
+        name: check.name.to_string(),
+        passed: match check.result {
+            CheckResult::Passed => Some(true),
+            CheckResult::Failed => Some(false),
+            CheckResult::Excused | CheckResult::Untested | CheckResult::NotJudged => None,
+        },
+        margin: figures.and_then(|figures| figures.margin),
+        unit: figures.map_or_else(String::new, |figures| figures.margin_unit.to_owned()),
+        relative_margin: figures.and_then(|figures| figures.relative_margin),
+    }
+}
