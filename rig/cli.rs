@@ -9,6 +9,10 @@ use rustix::process::umask;
 
 use crate::bench::ipc::PeerArgs;
 use crate::bench::{self, args::BenchArgs};
+use crate::campaigns::{
+    self,
+    args::{CampaignArgs, CampaignCaseArgs, SearchArgs, ShrinkArgs},
+};
 use crate::can::{self, CanVerb};
 use crate::clean;
 use crate::controller::{self, ControllerArgs};
@@ -77,6 +81,12 @@ enum Verb {
     Run(RunArgs),
     /// Run the scenarios of a folder as a suite of tests
     Test(TestArgs),
+    /// Run a scenario with many values of its keys, faults and motions
+    Campaign(CampaignArgs),
+    /// Search for the values of a campaign's factors that come nearest to a failure
+    Search(SearchArgs),
+    /// Make a failing scenario as small as it can be and still fail
+    Shrink(ShrinkArgs),
     /// Lay down a scenario, a motion and a CI workflow to start from
     Init(InitArgs),
     /// Forward kinematics of a CSV file: actuator positions to poses
@@ -132,6 +142,8 @@ enum Verb {
     #[command(hide = true)]
     BenchPeer(PeerArgs),
     #[command(hide = true)]
+    CampaignCase(CampaignCaseArgs),
+    #[command(hide = true)]
     Recorder(RecorderArgs),
     #[command(hide = true)]
     ExecProgram(ExecProgramArgs),
@@ -181,6 +193,10 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
     match verb {
         Verb::Run(args) => run::run(&args),
         Verb::Test(args) => suite::test(&args),
+        Verb::Campaign(args) => campaigns::campaign(&args),
+        Verb::Search(args) => campaigns::search::search(&args),
+        Verb::Shrink(args) => campaigns::shrink::shrink(&args),
+        Verb::CampaignCase(args) => campaigns::worker::run_case(&args),
         Verb::Init(args) => init::init(&args).usage(),
         Verb::Faults(verb) => faults::execute(&verb),
         Verb::Signals(args) => signals_cli::signals(&args).usage(),

@@ -1,4 +1,4 @@
-//! The `masseter` command. Modules of verbs: `bench`, `can`, `clean`, `doctor`, `init`, `kinematics_cli`,
+//! The `masseter` command. Modules of verbs: `bench`, `campaigns`, `can`, `clean`, `doctor`, `init`, `kinematics_cli`,
 //! `manuals`, `paper_study`, `plant`, `recording_cli`, `report_cli`, `robot`, `run` and `uniqueness`; [`cli`] dispatches to them.
 //!
 //! `run` starts controller, plant and `recorder` as processes of this executable (`run::supervisor`), or steps their
@@ -11,6 +11,7 @@
 
 mod arguments;
 mod bench;
+mod campaigns;
 mod can;
 mod clean;
 pub mod cli;
@@ -19,6 +20,7 @@ mod doctor;
 mod error_text;
 mod faults;
 mod foxglove;
+mod guarded;
 mod help;
 mod init;
 mod interface;
@@ -34,6 +36,7 @@ mod recording_cli;
 mod report_cli;
 mod robot;
 mod run;
+mod shell;
 mod signals_cli;
 mod starter;
 mod stderr_writer;

@@ -15,6 +15,7 @@ use super::case::{Case, cases, scenario_of};
 use super::phases::phases;
 use super::picture;
 use super::table::{Coverage, HEADER, Row};
+use crate::arguments::ControllerKind;
 use crate::machine::interrupts::Interrupts;
 use crate::run::figures_unrecorded;
 
@@ -42,10 +43,10 @@ pub(super) fn play(args: &MatrixArgs) -> Result<Exit, Failure> {
 }
 
 fn row(base: &Scenario, case: Case, interrupts: &Interrupts) -> Result<Row, Failure> {
-    let plan = RunPlan::new(scenario_of(base, &case)).usage()?;
-    let (manifest, figures) = figures_unrecorded(&plan, interrupts)?;
+    let scenario = scenario_of(base, &case);
+    let (manifest, figures) = figures_unrecorded(&scenario, ControllerKind::default(), interrupts)?;
     let verdict = Verdict::new(&manifest, &figures);
-    Ok(Row::new(case, &figures, &verdict, &plan.scenario.checks))
+    Ok(Row::new(case, &figures, &verdict, &scenario.checks))
 }
 
 fn write(args: &MatrixArgs, rows: &[Row]) -> anyhow::Result<()> {

@@ -29,6 +29,7 @@ use args::RunArgs;
 
 pub(crate) use clock::needs_processes;
 pub(crate) use prepared::{PreparedRun, figures_unrecorded, judge_unrecorded};
+pub(crate) use resolve::check_simulated;
 
 /// Plays the motion, judges the run, and writes its folder.
 pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {

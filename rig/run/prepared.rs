@@ -14,10 +14,10 @@ use masseter_shared::transport::{Domain, DomainLock};
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
 use super::args::{ClockKind, RunArgs};
-use super::resolve::resolve;
+use super::resolve::{resolve, resolve_simulated};
 use super::room::{self, Reserve};
 use super::{supervisor, virtual_time};
-use crate::arguments::name_of;
+use crate::arguments::{ControllerChoice, ControllerKind, name_of};
 use crate::machine::interrupts::Interrupts;
 use crate::robot::Played;
 use crate::{doctor, machine, robot};
@@ -143,12 +143,15 @@ pub(crate) fn judge_unrecorded(args: &RunArgs, interrupts: &Interrupts) -> Resul
     Ok(Judgement::new(&manifest, &figures))
 }
 
-/// Plays a plan under virtual time by the rig's own controller; its figures, without a folder.
+/// Plays a scenario under virtual time by a controller of the rig; its figures, without a folder.
 pub(crate) fn figures_unrecorded(
-    plan: &RunPlan,
+    scenario: &Scenario,
+    controller: ControllerKind,
     interrupts: &Interrupts,
 ) -> Result<(Manifest, Figures), Failure> {
-    unrecorded(plan, &RunArgs { clock: ClockKind::Virtual, ..RunArgs::default() }, interrupts)
+    let plan = resolve_simulated(scenario, controller.builder()).usage()?;
+    let controller = ControllerChoice::Own(controller);
+    unrecorded(&plan, &RunArgs { clock: ClockKind::Virtual, controller, ..RunArgs::default() }, interrupts)
 }
 
 fn unrecorded(

@@ -1,7 +1,6 @@
 //! One scenario of a suite: run, judged, and kept where it failed.
 
 use std::fs;
-use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
 
 use masseter_report::Judgement;
@@ -13,9 +12,11 @@ use super::case::Case;
 use super::outcome::{Outcome, Tested};
 use crate::arguments::name_of;
 use crate::error_text::in_one_line;
+use crate::guarded::guarded;
 use crate::machine::interrupts::Interrupts;
 use crate::run::args::{ClockKind, RunArgs};
 use crate::run::{PreparedRun, judge_unrecorded};
+use crate::shell::word;
 
 /// How the scenarios of a suite are run.
 pub(super) struct Trials<'a> {
@@ -139,48 +140,7 @@ impl Trials<'_> {
     }
 }
 
-/// Runs one scenario so that its panic is its own failure: the others go on.
-fn guarded<T>(run: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
-    // What it leaves half done belongs to this scenario alone.
-    panic::catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|payload| {
-        let texts = [payload.downcast_ref::<String>().map(String::as_str), payload.downcast_ref().copied()];
-        let why = texts.into_iter().flatten().next().unwrap_or("it gave no message");
-        let error = anyhow::anyhow!("DIED: the rig panicked: {why}: report this as a defect of masseter");
-        Err(Failure::with(Exit::Died, error))
-    })
-}
-
 /// No judgement is an error here: nothing was recorded.
 fn interrupted(judgement: Option<Judgement>) -> Result<Judgement, Failure> {
     judgement.ok_or_else(|| Failure::with(Exit::Interrupted, anyhow::anyhow!("interrupted")))
-}
-
-/// A word of a shell's command line.
-fn word(text: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:,@%".contains(c);
-    if !text.is_empty() && text.chars().all(is_plain) {
-        return text.to_owned();
-    }
-    format!("'{}'", text.replace('\'', r"'\''"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_panic_is_the_failure_of_its_scenario() {
-        let said = |run: fn() -> Result<u8, Failure>| guarded(run).unwrap_err().error.to_string();
-        assert!(said(|| panic!("of {}", 3)).starts_with("DIED: the rig panicked: of 3: "));
-        assert!(said(|| panic!("plain")).starts_with("DIED: the rig panicked: plain: "));
-        assert!(said(|| panic::panic_any(7)).contains("it gave no message"));
-        assert_eq!(guarded(|| Ok(1)).ok(), Some(1));
-    }
-
-    #[test]
-    fn a_word_is_quoted_where_a_shell_would_read_more_than_one() {
-        assert_eq!(word("a/b-1.toml"), "a/b-1.toml");
-        assert_eq!(word("my file.toml"), "'my file.toml'");
-        assert_eq!(word("it's"), r"'it'\''s'");
-    }
 }

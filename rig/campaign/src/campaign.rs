@@ -1,6 +1,8 @@
 //! A campaign that can be run: its base scenario, its points, and the case of each.
 
-use std::path::PathBuf;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
 
 use masseter_shared::config::{Scenario, ScenarioError};
 use masseter_shared::input::read_text;
@@ -11,6 +13,7 @@ use toml::{Table, Value};
 use crate::case::{Case, Setting};
 use crate::factor::Factor;
 use crate::file::CampaignFile;
+use crate::result::CaseResult;
 use crate::sampler::points;
 
 /// Bytes of the largest file that a scenario names.
@@ -67,12 +70,19 @@ impl Campaign {
 
     /// The case at a point, with this number added to the seed of the scenario.
     pub fn case_at(&self, number: usize, point: &[f64], more_seed: u64) -> Case {
-        let settings: Vec<_> =
-            self.file.factors.iter().zip(point).map(|(factor, u)| factor.at(*u)).collect();
+        let settings = self.file.factors.iter().zip(point).map(|(factor, u)| factor.at(*u)).collect();
+        self.case_with(number, settings, more_seed)
+    }
+
+    /// The case of a result.
+    pub fn case_of(&self, result: &CaseResult) -> Case {
+        self.case_with(result.number, result.settings.clone(), result.more_seed)
+    }
+
+    fn case_with(&self, number: usize, settings: Vec<Setting>, more_seed: u64) -> Case {
         let scenario = self.scenario(&settings, more_seed);
-        let seed = scenario.as_ref().map_or(more_seed, |scenario| scenario.seed);
-        let id = self.id_of(&settings, seed, scenario.as_ref().ok());
-        Case { number, id, settings, seed, scenario: scenario.map_err(|error| format!("{error:#}")) }
+        let id = self.id_of(&settings, more_seed, scenario.as_ref().ok());
+        Case { number, id, settings, more_seed, scenario: scenario.map_err(|error| format!("{error:#}")) }
     }
 
     /// The scenario that varies.
@@ -99,10 +109,10 @@ impl Campaign {
         Ok(scenario)
     }
 
-    fn id_of(&self, settings: &[Setting], seed: u64, scenario: Option<&Scenario>) -> String {
+    fn id_of(&self, settings: &[Setting], more_seed: u64, scenario: Option<&Scenario>) -> String {
         let settings = serde_json::to_string(settings).expect("settings have a JSON form");
         let mut hasher = Sha1::new();
-        for part in [&self.program, &self.controller, &self.base, &settings, &seed.to_string()] {
+        for part in [&self.program, &self.controller, &self.base, &settings, &more_seed.to_string()] {
             hasher.update(part.as_bytes());
             hasher.update([0]);
         }
@@ -123,6 +133,14 @@ impl Campaign {
         ];
         differences.into_iter().find_map(|(is_different, words)| is_different.then_some(words))
     }
+}
+
+/// A digest of a program: of the one that runs the cases.
+///
+/// # Errors
+/// When the file cannot be read.
+pub fn digest_of_program(path: &Path) -> io::Result<String> {
+    Ok(data_encoding::HEXLOWER.encode(&Sha1::digest(fs::read(path)?)))
 }
 
 #[cfg(test)]

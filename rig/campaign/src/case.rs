@@ -77,22 +77,10 @@ pub struct Case {
     pub id: String,
     /// The values of the factors.
     pub settings: Vec<Setting>,
-    /// The seed of the scenario.
-    pub seed: u64,
+    /// What is added to the seed of the scenario.
+    pub more_seed: u64,
     /// The scenario, or why the values lead to none.
     pub scenario: Result<Scenario, String>,
-}
-
-impl Case {
-    /// The name of its folder.
-    pub fn folder_name(&self) -> String {
-        folder_name(self.number, &self.id)
-    }
-}
-
-/// The name of the folder of a case.
-pub(crate) fn folder_name(number: usize, id: &str) -> String {
-    format!("{number:05}-{id}")
 }
 
 #[cfg(test)]

@@ -13,6 +13,28 @@ const LEVELS: usize = 5;
 /// The most levels of a factor.
 const MOST_LEVELS: usize = 10_000;
 
+/// Endings of keys with their units; the longer ending first.
+const ENDINGS: [(&str, &str); 18] = [
+    ("_n_per_m", "N/m"),
+    ("_n_s_per_m", "N s/m"),
+    ("_m_per_s", "m/s"),
+    ("_m_s2", "m/s²"),
+    ("_m_s", "m/s"),
+    ("_per_s", "1/s"),
+    ("_kg", "kg"),
+    ("_hz", "Hz"),
+    ("_deg", "°"),
+    ("_rad", "rad"),
+    ("_mm", "mm"),
+    ("_ms", "ms"),
+    ("_us", "µs"),
+    ("_ns", "ns"),
+    ("_percent", "%"),
+    ("_n", "N"),
+    ("_s", "s"),
+    ("_m", "m"),
+];
+
 /// How the values of a range are spread.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -82,6 +104,16 @@ impl Factor {
     pub fn name(&self) -> &str {
         let faults = self.faults.as_ref().map(|_| "fault");
         self.name.as_deref().or(self.key.as_deref()).or(faults).unwrap_or("?")
+    }
+
+    /// The unit of its numbers: the given one, or the one with which the key ends.
+    pub fn unit(&self) -> &str {
+        let of_key = || {
+            let key = self.key.as_deref()?;
+            let ending = |(ending, unit): &(&str, &'static str)| key.ends_with(ending).then_some(*unit);
+            ENDINGS.iter().find_map(ending)
+        };
+        self.unit.as_deref().or_else(of_key).unwrap_or_default()
     }
 
     /// Whether its values are numbers between two ends, as a search needs them.
@@ -221,6 +253,15 @@ mod tests {
         let whole = "key = 'a'\nrange = [1, 3]";
         assert_eq!([0.0, 0.5, 0.999].map(|u| value_at(whole, u)), [1, 2, 3].map(Value::Integer));
         assert_eq!(value_at("key = 'a'\nrange = [1.0, 2.0]\nunit = 'mm'", 0.5), Value::from("1.5 mm"));
+    }
+
+    #[test]
+    fn the_unit_is_given_or_that_of_the_key() {
+        let unit = |text: &str| factor(text).unit().to_owned();
+        assert_eq!(unit("key = 'dynamics.slide_friction_n'\nrange = [1.0, 2.0]"), "N");
+        assert_eq!(unit("key = 'drives.d1.velocity_gain_n_s_per_m'\nrange = [1.0, 2.0]"), "N s/m");
+        assert_eq!(unit("key = 'faults.play.size'\nunit = 'mm'\nrange = [1.0, 2.0]"), "mm");
+        assert_eq!(unit("key = 'motion'\nvalues = [1]"), "");
     }
 
     #[test]

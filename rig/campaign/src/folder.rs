@@ -118,12 +118,7 @@ impl CampaignFolder {
 
     /// Where the scenario of a case is that did not pass.
     pub fn scenario_of(&self, result: &CaseResult) -> PathBuf {
-        self.cases_path().join(result.folder_name()).join(SCENARIO)
-    }
-
-    /// Whether a case has ended.
-    pub fn has(&self, case: &Case) -> bool {
-        self.cases_path().join(case.folder_name()).join(RESULT).is_file()
+        self.cases_path().join(&result.id).join(SCENARIO)
     }
 
     /// The result of a case; none of one that has not ended.
@@ -131,11 +126,11 @@ impl CampaignFolder {
     /// # Errors
     /// [`FolderError::Damaged`] for a result that is none.
     pub fn result_of(&self, case: &Case) -> Result<Option<CaseResult>, FolderError> {
-        let path = self.cases_path().join(case.folder_name()).join(RESULT);
+        let path = self.cases_path().join(&case.id).join(RESULT);
         if path.is_file() { read_result(&path).map(Some) } else { Ok(None) }
     }
 
-    /// The results of all cases that have ended, in the order of their numbers.
+    /// The result of every case that has ended.
     ///
     /// # Errors
     /// [`FolderError::Damaged`] for a result that is none.
@@ -149,7 +144,6 @@ impl CampaignFolder {
                 results.push(read_result(&result)?);
             }
         }
-        results.sort_by_key(|result: &CaseResult| result.number);
         Ok(results)
     }
 
@@ -159,12 +153,12 @@ impl CampaignFolder {
     /// When its folder cannot be made.
     pub fn attempt(&self, case: &Case) -> Result<Attempt, FolderError> {
         let attempts = self.path.join(ATTEMPTS);
-        let prefix = format!("{}.", case.folder_name());
+        let prefix = format!("{}.", case.id);
         let folder =
             tempfile::Builder::new().prefix(&prefix).tempdir_in(&attempts).map_err(system(&attempts))?;
         let lock = locked(&folder.path().join(LOCK))?;
         let lock = lock.ok_or_else(|| FolderError::InUse(folder.path().to_owned()))?;
-        Ok(Attempt { folder, target: self.cases_path().join(case.folder_name()), _lock: lock })
+        Ok(Attempt { folder, target: self.cases_path().join(&case.id), _lock: lock })
     }
 
     /// Removes the attempts of processes that are gone.
@@ -318,7 +312,7 @@ mod tests {
         drop(lock);
 
         let (folder, _lock) = CampaignFolder::begin(&path, &two()).unwrap();
-        assert!(folder.has(&first) && !folder.has(&case(1)));
+        assert_eq!(folder.result_of(&case(1)).unwrap(), None);
         assert_eq!(folder.results().unwrap(), [failed(&first)]);
         assert!(folder.scenario_of(&failed(&first)).is_file());
         assert_eq!(fs::read_dir(path.join(ATTEMPTS)).unwrap().count(), 0);
@@ -365,7 +359,7 @@ mod tests {
     fn a_damaged_result_is_named() {
         let parent = tempfile::tempdir().unwrap();
         let (folder, _lock) = CampaignFolder::begin(parent.path(), &two()).unwrap();
-        let kept = parent.path().join(CASES).join(case(0).folder_name());
+        let kept = parent.path().join(CASES).join(case(0).id);
         fs::create_dir(&kept).unwrap();
         fs::write(kept.join(RESULT), "{").unwrap();
         let refusal = folder.results().unwrap_err().to_string();

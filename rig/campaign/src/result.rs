@@ -30,8 +30,8 @@ pub struct CaseResult {
     pub id: String,
     /// The values of the factors.
     pub settings: Vec<Setting>,
-    /// The seed of the scenario.
-    pub seed: u64,
+    /// What is added to the seed of the scenario.
+    pub more_seed: u64,
     /// The verdict in a word; REFUSED where the values lead to no run.
     pub word: String,
     /// The verdict as an exit code.
@@ -79,7 +79,7 @@ impl CaseResult {
             number: case.number,
             id: case.id.clone(),
             settings: case.settings.clone(),
-            seed: case.seed,
+            more_seed: case.more_seed,
             word: word.to_owned(),
             exit_code,
             reason,
@@ -91,11 +91,6 @@ impl CaseResult {
             bite_force_max_n: None,
             took_s: 0.0,
         }
-    }
-
-    /// The name of the case's folder.
-    pub fn folder_name(&self) -> String {
-        crate::case::folder_name(self.number, &self.id)
     }
 
     /// Whether the case passed.

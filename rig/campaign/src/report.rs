@@ -1,0 +1,211 @@
+//! What a campaign came to: the share that passed, the worst cases, and the files in which both are kept.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::PathBuf;
+
+use anyhow::Context;
+use masseter_shared::wording::counted;
+
+use crate::campaign::Campaign;
+use crate::folder::CampaignFolder;
+use crate::page;
+use crate::result::CaseResult;
+use crate::results_table::results_table;
+use crate::statistics::SuccessRate;
+
+/// File of the results, a row a case.
+const TABLE: &str = "cases.parquet";
+/// The page.
+const PAGE: &str = "campaign.html";
+
+/// A case with a small margin, and how to see it again.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WorstCase {
+    /// The case's place in the campaign.
+    pub number: usize,
+    /// The command that plays it again.
+    pub command: String,
+    /// The folder of its run, if it was recorded.
+    pub run: Option<PathBuf>,
+}
+
+/// The results of a campaign.
+#[derive(Debug)]
+pub struct Report<'a> {
+    pub(crate) campaign: &'a Campaign,
+    /// In the order of their numbers.
+    pub(crate) results: Vec<CaseResult>,
+}
+
+impl<'a> Report<'a> {
+    /// The report on these results.
+    pub fn new(campaign: &'a Campaign, mut results: Vec<CaseResult>) -> Self {
+        results.sort_by_key(|result| result.number);
+        Self { campaign, results }
+    }
+
+    /// The number of results.
+    #[expect(clippy::len_without_is_empty, reason = "a report is asked for its size, never whether it has one")]
+    pub fn len(&self) -> usize {
+        self.results.len()
+    }
+
+    /// The share of judged cases that passed.
+    pub fn rate(&self) -> SuccessRate {
+        let judged = self.results.iter().filter(|result| result.is_judged());
+        let passed = self.results.iter().filter(|result| result.has_passed());
+        SuccessRate::new(passed.count(), judged.count())
+    }
+
+    /// Whether enough cases passed: all, or the share that the file demands. Only judged cases count towards that share; without
+    /// any, nothing was shown.
+    pub fn is_success(&self) -> bool {
+        match (self.campaign.file.least_success, self.rate().share()) {
+            (_, None) => false,
+            (Some(least), Some(share)) => share >= least,
+            (None, Some(_)) => self.results.iter().all(CaseResult::has_passed),
+        }
+    }
+
+    /// The cases that did not pass, then those with the smallest margins: at most this many.
+    pub fn worst(&self, most: usize) -> Vec<&CaseResult> {
+        let rank = |result: &CaseResult| {
+            let margin = result.least_margin().map_or(f64::INFINITY, |(_, margin)| margin);
+            (!result.is_judged(), result.has_passed(), margin)
+        };
+        let mut all: Vec<_> = self.results.iter().collect();
+        all.sort_by(|a, b| {
+            let (a, b) = (rank(a), rank(b));
+            (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2))
+        });
+        all.truncate(most);
+        all
+    }
+
+    /// How many cases have each word of a verdict.
+    pub fn counts(&self) -> BTreeMap<&str, usize> {
+        let mut counts = BTreeMap::new();
+        for result in &self.results {
+            *counts.entry(result.word.as_str()).or_default() += 1;
+        }
+        counts
+    }
+
+    /// Writes table and page into the folder of the campaign.
+    ///
+    /// # Errors
+    /// When a file cannot be written.
+    pub fn write(&self, folder: &CampaignFolder, worst: &[WorstCase]) -> anyhow::Result<()> {
+        let path = folder.file(TABLE);
+        let unfinished = path.with_extension("part");
+        let file = File::create(&unfinished).with_context(|| format!("cannot write {}", path.display()))?;
+        results_table(self.campaign, &self.results).write_parquet(file)?;
+        std::fs::rename(&unfinished, &path).with_context(|| format!("cannot write {}", path.display()))?;
+        let html = page::html(self, worst).context("cannot make the page")?;
+        let path = folder.file(PAGE);
+        std::fs::write(&path, html).with_context(|| format!("cannot write {}", path.display()))
+    }
+
+    /// The result in lines for a terminal.
+    pub fn text(&self, folder: &CampaignFolder) -> String {
+        let counts: Vec<_> = self.counts().iter().map(|(word, count)| format!("{count} {word}")).collect();
+        let worst = self.worst(1);
+        let worst = worst.first().and_then(|result| {
+            let (name, margin) = result.least_margin()?;
+            Some(format!("smallest margin: {:.1} % of its limit, {name}, case {}\n", margin * 100.0, result.number))
+        });
+        let word = if self.is_success() { "PASS" } else { "FAIL" };
+        format!(
+            "{word}: {} of {}: {}\n{}{}page: {}\ntable: {}\n",
+            counted(self.results.len() as u64, "case"),
+            self.campaign.case_count(),
+            counts.join(", "),
+            self.rate_in_words(),
+            worst.unwrap_or_default(),
+            folder.file(PAGE).display(),
+            folder.file(TABLE).display()
+        )
+    }
+
+    fn rate_in_words(&self) -> String {
+        let rate = self.rate();
+        let Some(share) = rate.share() else { return "no case was judged\n".to_owned() };
+        let [low, high] = rate.interval.map(|end| end * 100.0);
+        let demanded = self.campaign.file.least_success;
+        let demanded = demanded.map_or_else(String::new, |least| format!(", demanded {:.1} %", least * 100.0));
+        format!(
+            "success rate: {:.1} % of {} judged, 95 % interval {low:.1} to {high:.1} %{demanded}\n",
+            share * 100.0,
+            rate.judged
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::result::CaseCheck;
+    use masseter_shared::config::Scenario;
+
+    fn campaign(text: &str) -> Campaign {
+        Campaign {
+            file: toml::from_str(text).unwrap(),
+            controller: "motion".to_owned(),
+            program: "program".to_owned(),
+            folder: "/".into(),
+            base: Scenario::default().to_toml(),
+        }
+    }
+
+    fn result(campaign: &Campaign, number: usize, word: &str, exit_code: u8, margin: f64) -> CaseResult {
+        let case = campaign.case(&campaign.points(), number);
+        let check = CaseCheck {
+            name: "incisal".to_owned(),
+            passed: Some(margin > 0.0),
+            margin: Some(margin),
+            unit: "mm".to_owned(),
+            relative_margin: Some(margin),
+        };
+        CaseResult { checks: vec![check], ..CaseResult::without_run(&case, word, exit_code, String::new()) }
+    }
+
+    fn results(campaign: &Campaign) -> Vec<CaseResult> {
+        vec![
+            result(campaign, 3, "UNTESTED", 1, 0.9),
+            result(campaign, 0, "PASS", 0, 0.5),
+            result(campaign, 1, "FAIL", 1, -0.2),
+            result(campaign, 2, "PASS", 0, 0.1),
+        ]
+    }
+
+    const FOUR: &str = "[[factor]]\nkey = 'dynamics.slide_friction_n'\nrange = [1.0, 2.0]\nlevels = 4";
+
+    #[test]
+    fn the_worst_cases_are_those_that_failed_then_the_smallest_margins() {
+        let campaign = campaign(FOUR);
+        let report = Report::new(&campaign, results(&campaign));
+        let worst: Vec<_> = report.worst(3).iter().map(|result| result.number).collect();
+        assert_eq!(worst, [1, 2, 0]);
+    }
+
+    #[test]
+    fn only_judged_cases_count_towards_the_rate() {
+        let campaign = campaign(FOUR);
+        let rate = Report::new(&campaign, results(&campaign)).rate();
+        assert_eq!((rate.passed, rate.judged), (2, 3));
+    }
+
+    #[test]
+    fn a_campaign_passes_if_all_cases_do_or_the_share_that_it_demands() {
+        let passes = |text: &str, results: fn(&Campaign) -> Vec<CaseResult>| {
+            let campaign = campaign(&format!("{text}\n{FOUR}"));
+            Report::new(&campaign, results(&campaign)).is_success()
+        };
+        assert!(!passes("", results));
+        assert!(passes("least_success = 0.6", results));
+        assert!(!passes("least_success = 0.7", results));
+        assert!(passes("", |campaign| vec![result(campaign, 0, "PASS", 0, 0.5)]));
+        assert!(!passes("least_success = 0.0", |campaign| vec![result(campaign, 0, "UNTESTED", 1, 0.5)]));
+    }
+}

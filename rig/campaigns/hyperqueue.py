@@ -1,0 +1,15 @@
+"""Submits the cases of a campaign to a HyperQueue server, and waits until they have ended.
+
+Arguments: the program, the folder of the campaign, the folder of the server or nothing. Standard input: numbers of cases.
+"""
+
+import sys
+
+from hyperqueue import Client, Job
+
+program, folder, server = sys.argv[1:]
+client = Client(server or None)
+job = Job(max_fails=None)
+for number in sys.stdin.read().split():
+    job.program([program, "campaign-case", folder, number], stdout=None, stderr=None)
+client.wait_for_jobs([client.submit(job)], raise_on_error=False)

@@ -1,0 +1,136 @@
+//! `masseter search`: the values of a campaign's factors with the smallest margin.
+
+use std::sync::Mutex;
+
+use anyhow::ensure;
+use masseter_campaign::{
+    Campaign, CampaignFolder, CaseResult, Factor, Method, Report, Sampler, Search, Value,
+};
+use masseter_terminal::{Exit, Failure, OrFailure, result, status};
+
+use super::args::{SearchArgs, SearchMethod};
+use super::player::Player;
+use super::{RECORD, begin, folder_by_time, listen, plan, worst};
+
+/// The value of a case that did not pass although no margin shows it: below every one that does.
+const STOPPED: f64 = -1.0;
+
+/// Searches; [`Exit::Failed`] if a margin below zero was found.
+pub(crate) fn search(args: &SearchArgs) -> Result<Exit, Failure> {
+    let mut campaign = plan(&args.file, args.controller).usage()?;
+    // The archive is that of a random campaign, whose points the search chooses.
+    campaign.file.sampler = Sampler::Random;
+    campaign.file.runs = Some(args.runs);
+    campaign.file.seeds = None;
+    check(&campaign, args).usage()?;
+    let out = args.out.clone().unwrap_or_else(|| folder_by_time(&args.file));
+    let (folder, _lock) = begin(&out, &campaign)?;
+    let interrupts = listen()?;
+    status!("at most {} runs; results in {}", args.runs, out.display());
+    let player = Player { controller: args.controller, interrupts: &interrupts };
+    let seeker = Seeker { args, campaign: &campaign, folder: &folder, player: &player, ended: Mutex::default() };
+    let first = seeker.run()?;
+    if interrupts.is_stop_requested() {
+        status!("interrupted; the same command with --out {} goes on", out.display());
+        return Ok(Exit::Interrupted);
+    }
+    let report = Report::new(&campaign, seeker.into_results());
+    let kept = worst::keep(&report, &campaign, &folder, args.record.unwrap_or(RECORD), &player)?;
+    report.write(&folder, &kept).incomplete()?;
+    let found = first.map_or_else(
+        || format!("nothing below zero in {} runs\n", report.len()),
+        |runs| format!("below zero after {runs} runs\n"),
+    );
+    let again = kept.first().map_or_else(String::new, |worst| format!("again: {}\n", worst.command));
+    result(&(found + &again + &report.text(&folder))).incomplete()?;
+    Ok(if first.is_some() { Exit::Failed } else { Exit::Passed })
+}
+
+fn check(campaign: &Campaign, args: &SearchArgs) -> anyhow::Result<()> {
+    ensure!(args.runs > 0, "--runs: give at least 1");
+    let factors = &campaign.file.factors;
+    ensure!(factors.iter().any(Factor::is_continuous), "a search needs a [[factor]] with a range");
+    let names: Vec<_> = campaign.base()?.require.iter().map(|require| require.name.clone()).collect();
+    let name = args.requirement();
+    ensure!(
+        name.is_none_or(|name| names.iter().any(|known| known == name)),
+        "--minimise {}: the scenario has no such requirement; there are: {}",
+        args.minimise.as_deref().unwrap_or_default(),
+        names.join(", ")
+    );
+    ensure!(!names.is_empty(), "a search needs a [[require]] with a limit in numbers: its margin leads the way");
+    Ok(())
+}
+
+/// A search that is under way.
+struct Seeker<'a> {
+    args: &'a SearchArgs,
+    campaign: &'a Campaign,
+    folder: &'a CampaignFolder,
+    player: &'a Player<'a>,
+    ended: Mutex<Ended>,
+}
+
+#[derive(Default)]
+struct Ended {
+    results: Vec<CaseResult>,
+    failure: Option<Failure>,
+}
+
+impl Seeker<'_> {
+    /// The number of runs until the first margin below zero.
+    fn run(&self) -> Result<Option<usize>, Failure> {
+        let search = Search {
+            method: match self.args.method {
+                SearchMethod::CmaEs => Method::CmaEs,
+                SearchMethod::Random => Method::Random,
+            },
+            dimension: self.campaign.file.factors.len(),
+            runs: self.args.runs,
+            seed: self.args.seed,
+            goes_on: self.args.go_on,
+        };
+        let first = search.run(|number, point| self.evaluate(number, point));
+        self.lock().failure.take().map_or(Ok(first), Err)
+    }
+
+    fn evaluate(&self, number: usize, point: &[f64]) -> Value {
+        let case = self.campaign.case_at(number, point, 0);
+        match self.player.settle(self.folder, &case) {
+            Ok(Some(result)) => {
+                let value = value(&result, self.args.requirement());
+                self.lock().results.push(CaseResult { number, ..result });
+                value
+            }
+            Ok(None) => Value::End,
+            Err(failure) => {
+                self.lock().failure.get_or_insert(failure);
+                Value::End
+            }
+        }
+    }
+
+    fn into_results(self) -> Vec<CaseResult> {
+        self.ended.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner).results
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, Ended> {
+        self.ended.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+}
+
+/// The margin that leads the search: that of the named requirement, or the smallest of all, as a share of its limit. A fault
+/// that never struck, or a case that could not run, says nothing.
+fn value(result: &CaseResult, requirement: Option<&str>) -> Value {
+    if !result.is_judged() {
+        return Value::Nothing;
+    }
+    let margin = match requirement {
+        Some(name) => result.checks.iter().find(|check| check.name == name).and_then(|check| check.relative_margin),
+        None if !result.has_passed() => {
+            Some(result.least_margin().map_or(STOPPED, |(_, margin)| margin.min(STOPPED)))
+        }
+        None => result.least_margin().map(|(_, margin)| margin),
+    };
+    margin.map_or(Value::Nothing, Value::Margin)
+}

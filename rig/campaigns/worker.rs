@@ -1,0 +1,34 @@
+//! One case of a campaign in a process of its own, for engines that start processes.
+
+use anyhow::{Context, ensure};
+use masseter_campaign::CampaignFolder;
+use masseter_terminal::{Exit, Failure, OrFailure};
+use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
+
+use super::args::CampaignCaseArgs;
+use super::controller_of;
+use super::player::Player;
+use crate::machine::interrupts::Interrupts;
+
+/// Runs a case unless its result is there. Any result is success: the campaign judges.
+pub(crate) fn run_case(args: &CampaignCaseArgs) -> Result<Exit, Failure> {
+    die_with_the_parent().died()?;
+    let (folder, campaign) = CampaignFolder::open(&args.folder).usage()?;
+    let controller = controller_of(&campaign).usage()?;
+    let count = campaign.case_count();
+    if args.number >= count {
+        return Err(anyhow::anyhow!("the campaign has cases 0 to {}", count.saturating_sub(1))).usage();
+    }
+    let interrupts = Interrupts::listen().context("cannot listen for signals").died()?;
+    let case = campaign.case(&campaign.points(), args.number);
+    let result = Player { controller, interrupts: &interrupts }.settle(&folder, &case)?;
+    Ok(if result.is_some() { Exit::Passed } else { Exit::Interrupted })
+}
+
+/// A worker that is killed takes its case along: no orphan computes what the next worker computes again.
+fn die_with_the_parent() -> anyhow::Result<()> {
+    let parent = getppid();
+    set_parent_process_death_signal(Some(Signal::KILL)).context("cannot bind the case to its worker")?;
+    ensure!(getppid() == parent && parent != Some(Pid::INIT), "the worker is gone");
+    Ok(())
+}
