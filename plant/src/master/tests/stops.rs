@@ -31,6 +31,11 @@ const PERMANENT: [(Cause, Trigger); 13] = [
         bench.wires.wire(1).arrive(now_ns, sync::frame());
         bench.cycle(Some(DriveRequest::Enable));
     }),
+    (Cause::SecondMaster, |bench| {
+        let (now_ns, target) = (bench.now_ns(), NmtTarget::All);
+        bench.wires.wire(0).arrive(now_ns, Nmt { command: NmtCommand::ResetNode, target }.frame());
+        bench.cycle(Some(DriveRequest::Enable));
+    }),
 ];
 
 /// Default of `can.command_timeout_cycles`.
