@@ -1,13 +1,13 @@
 //! Permanent stops: neither switching off nor a new demand for motion ends them.
 
-use masseter_can::canopen::sync;
+use masseter_can::canopen::{Nmt, NmtCommand, NmtTarget, sync};
 
 use super::*;
 
 type Trigger = fn(&mut Bench);
 
 /// What stops the drives permanently, and the cause that is reported.
-const PERMANENT: [(Cause, Trigger); 13] = [
+const PERMANENT: [(Cause, Trigger); 14] = [
     (Cause::CommandLost, |bench| (0..=TIMEOUT_CYCLES).for_each(|_| bench.cycle(None))),
     (Cause::CommandLost, |bench| {
         let stale_cycle = bench.cycle;
