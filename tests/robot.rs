@@ -172,3 +172,120 @@ fn what_a_drive_cannot_take_is_named_with_its_key() {
         "{text}"
     );
 }
+
+/// A file that a person or a full disk has damaged: nothing is sent to a drive.
+#[test]
+fn damaged_old_values_are_refused_with_what_to_do() {
+    let workspace = Workspace::new("");
+    for step in ["inspect", "configure"] {
+        assert_eq!(robot(&workspace, &[step]).status.code(), Some(0));
+    }
+    let file = workspace.file("bringup/02-configure/before-l1.json");
+    let sound = fs::read_to_string(&file).unwrap();
+    assert!(sound.contains("\"6065h\"") && sound.contains("\"bytes\": 4"), "{sound}");
+    for (damaged, named) in [
+        (sound.replace("\"6065h\"", "\"606h\""), "'606h' is no object"),
+        (sound.replace("\"6065h\"", "\"6040h\""), "6040h with 4 bytes is no old value"),
+        (sound.replace("\"bytes\": 4", "\"bytes\": 5"), "with 5 bytes is no old value"),
+        (sound.replace("\"bytes\": 4", "\"bytes\": 0"), "with 0 bytes is no old value"),
+        (
+            sound.replace("\"communication\": 5120", "\"communication\": 65535"),
+            "FFFFh with 2 objects is no PDO",
+        ),
+        (sound[..sound.len() / 2].to_owned(), "EOF while parsing"),
+        (String::new(), "EOF while parsing"),
+    ] {
+        fs::write(&file, &damaged).unwrap();
+        let output = robot(&workspace, &["restore"]);
+        let text = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{named}: {text}");
+        assert!(text.contains(named) && text.contains("before-l1.json: "), "{named}: {text}");
+        assert!(text.contains("the file is damaged: bring it back from a backup, or remove it"), "{text}");
+        let (_, log) = log(&workspace, "03-restore");
+        assert!(!frames(&log).any(|(id, data)| id == "604" && data.starts_with('2')), "nothing is written");
+        fs::remove_dir_all(workspace.file("bringup/03-restore")).unwrap();
+    }
+    fs::write(&file, sound).unwrap();
+    assert_eq!(robot(&workspace, &["restore"]).status.code(), Some(0));
+}
+
+/// Node 9 answers on bus 0 once it is asked, as a drive with another id than the scenario's does.
+#[test]
+fn a_scan_asks_every_node_id_and_names_a_drive_with_another_one() {
+    let answer = "[[faults]]\nkind = 'babble'\nbus = 0\nnode = 1\nid = 0x589\n\
+                  data = [0x43, 0, 0x10, 0, 0x92, 1, 2, 0]\ncount = 1\nfrom_s = 3.0\n";
+    let workspace = Workspace::new(answer);
+    let asked = |step: &str| {
+        let (_, log) = log(&workspace, step);
+        let requests = frames(&log).filter(|(_, data)| data.starts_with("40001000"));
+        let ids = requests.filter_map(|(id, _)| Some(u16::from_str_radix(id, 16).ok()? - 0x600));
+        ids.collect::<std::collections::BTreeSet<_>>()
+    };
+    let output = robot(&workspace, &["inspect"]);
+    assert_eq!((output.status.code(), stdout(&output).contains("node 9")), (Some(0), false));
+    assert_eq!(asked("01-inspect"), (1..=6).collect());
+    let output = robot(&workspace, &["inspect", "--scan"]);
+    let text = stdout(&output);
+    assert_eq!(output.status.code(), Some(0), "{text}");
+    assert!(text.contains("warning: node 9 on bus 0 is not of the scenario"), "{text}");
+    assert_eq!(asked("02-inspect"), (1..=127).collect());
+}
+
+/// Somebody else has switched on l1 by SDO, which the rig's interface has not heard, and left.
+#[test]
+fn a_drive_with_power_is_refused_and_stopped_with_take_over_alone() {
+    let mut switched_on =
+        "[[faults]]\nkind = 'lose'\nbus = 1\nnode = 127\nid = 0x604\nfrom_s = 0.0\n".to_owned();
+    for (word, from_s) in [(6, 0.1), (7, 0.2)] {
+        switched_on += &format!(
+            "[[faults]]\nkind = 'babble'\nbus = 1\nnode = 5\nid = 0x604\ncount = 1\nfrom_s = {from_s}\n\
+             data = [0x2B, 0x40, 0x60, 0, {word}, 0, 0, 0]\n"
+        );
+    }
+    let workspace = Workspace::new(&switched_on);
+    let inspected = robot(&workspace, &["inspect"]);
+    assert_eq!(inspected.status.code(), Some(0), "{}", stdout(&inspected));
+    assert!(stdout(&inspected).contains("configure refuses unless --take-over may stop the drive"));
+    let refused = robot(&workspace, &["configure"]);
+    assert_eq!(refused.status.code(), Some(1), "{}", stdout(&refused));
+    let says = "does not show that the drive is without power; switch it off, or use --take-over";
+    assert!(
+        stderr(&refused).contains("l1: statusword ") && stderr(&refused).contains(says),
+        "{}",
+        stderr(&refused)
+    );
+    let words = |step: &str| {
+        let (_, log) = log(&workspace, step);
+        let words = frames(&log).filter(|(id, data)| *id == "604" && data.starts_with("2B406000"));
+        words.map(|(_, data)| data[8..10].to_owned()).collect::<Vec<_>>()
+    };
+    assert_eq!(words("02-configure"), ["06", "07"], "those of the other one");
+    for step in ["configure", "restore"] {
+        let output = robot(&workspace, &[step, "--take-over"]);
+        assert_eq!(output.status.code(), Some(0), "{step}: {}{}", stdout(&output), stderr(&output));
+    }
+    for step in ["03-configure", "04-restore"] {
+        assert_eq!(words(step), ["06", "07", "02", "00"], "{step}: quick stop, then no voltage");
+    }
+}
+
+/// A force offset of an earlier run, whose process data carried 60B2h, is in the drive. The default profile does not name the object.
+#[test]
+fn an_old_torque_offset_does_not_act_in_a_later_run() {
+    let workspace = Workspace::new(
+        "duration_s = 0.2\n[[faults]]\nkind = 'babble'\nbus = 1\nnode = 5\nid = 0x604\ncount = 1\nfrom_s = 0.05\n\
+         data = [0x2B, 0xB2, 0x60, 0, 55, 0, 0, 0]\n",
+    );
+    let inspected = stdout(&robot(&workspace, &["inspect"]));
+    let row = inspected.lines().find(|line| line.contains("60B2h:00h")).unwrap_or_default();
+    assert!(row.starts_with("l1 ") && row.contains("55 ") && row.contains("write 0"), "{inspected}");
+    let run = workspace.run_virtual(&[]);
+    assert_eq!(run.status.code(), Some(0), "{}{}", stdout(&run), stderr(&run));
+    let log = fs::read_to_string(workspace.run_folder().join("can1.log")).unwrap();
+    let frames: Vec<_> = frames(&log).collect();
+    let place = |is_it: fn(&(&str, &str)) -> bool, what| frames.iter().position(is_it).expect(what);
+    let old = place(|frame| *frame == ("604", "2BB2600037000000"), "the offset of the earlier run");
+    let cleared = place(|frame| *frame == ("604", "2BB2600000000000"), "the boot writes 0");
+    let enabled = place(|(id, data)| *id == "204" && data.starts_with("0F"), "l1 has power");
+    assert!(old < cleared && cleared < enabled, "{old} {cleared} {enabled}");
+}

@@ -23,6 +23,8 @@ struct Row {
     says: Option<String>,
     /// Keys of a profile with which every step passes; none where no profile helps.
     profile: Option<String>,
+    /// How `run --dry` and `run` end on the same robot without the profile, and what they say.
+    runs: [(i32, Option<String>); 2],
 }
 
 /// The first text between backticks of a cell.
@@ -39,7 +41,8 @@ fn rows() -> Vec<Row> {
     let (_, table) = text.split_once("| quirk | found by | exit |").unwrap();
     let lines = table.lines().skip(2).take_while(|line| line.starts_with('|'));
     let row = |line: &str| {
-        let [_, quirk, found_by, exit, says, profile, _] = line.split('|').collect::<Vec<_>>()[..] else {
+        let [_, quirk, found_by, exit, says, profile, dry, full, _] = line.split('|').collect::<Vec<_>>()[..]
+        else {
             panic!("{line}");
         };
         let no_profile_helps = profile.trim().starts_with("none");
@@ -50,6 +53,10 @@ fn rows() -> Vec<Row> {
             exit: exit.trim().parse().ok(),
             says: quoted(says),
             profile: (!no_profile_helps).then(|| quoted(profile).unwrap_or_default()),
+            runs: [dry, full].map(|cell| {
+                let exit = cell.split_whitespace().next().and_then(|exit| exit.parse().ok());
+                (exit.unwrap_or_else(|| panic!("{line}: '{cell}' begins with an exit code")), quoted(cell))
+            }),
         }
     };
     lines.map(row).collect()
@@ -59,7 +66,7 @@ fn rows() -> Vec<Row> {
 fn robot(quirk: &str, profile: &str) -> Workspace {
     let quirk = quirk.replace(", ", "\n");
     Workspace::new(&format!(
-        "[drives]\nmemory = 'drives.json'\n[[drives.quirk]]\n{quirk}\n[dynamics]\ninitial_leg_m = 0.2974\n\
+        "duration_s = 0.2\n[drives]\nmemory = 'drives.json'\n[[drives.quirk]]\n{quirk}\n[dynamics]\ninitial_leg_m = 0.2974\n\
          [[drive_profile]]\n{profile}\n"
     ))
 }
@@ -108,6 +115,41 @@ fn assert_passes(row: &Row) {
         exit == 0 && text.contains("passed: all drives are as the scenario needs them"),
         "{row:?}: {text}"
     );
+}
+
+/// `run --dry` and `run`: exit codes and what they say.
+fn play_runs(robot: &Workspace) -> [(Option<i32>, String); 2] {
+    [&["--dry"][..], &[]].map(|arguments| {
+        let output = robot.run_virtual(arguments);
+        fs::remove_dir_all(robot.run_folder()).expect("a run leaves a folder");
+        (output.status.code(), stdout(&output) + &stderr(&output))
+    })
+}
+
+/// A run does not need the steps on simulated buses. The drives are as `configure --store` leaves them.
+fn assert_runs(row: &Row) {
+    let robot = robot(&row.quirk, &row.shown_with);
+    for (step, arguments) in &steps()[..2] {
+        play(&robot, step, arguments);
+    }
+    for ((exit, text), (wanted, says)) in play_runs(&robot).into_iter().zip(&row.runs) {
+        let is_said = says.as_ref().is_none_or(|says| text.contains(says));
+        assert_eq!((exit, is_said), (Some(*wanted), true), "{row:?}: {text}");
+    }
+    if let Some(profile) = &row.profile {
+        let robot = self::robot(&row.quirk, profile);
+        for (step, arguments) in &steps()[..2] {
+            assert_eq!(play(&robot, step, arguments).0, 0);
+        }
+        for (exit, text) in play_runs(&robot) {
+            assert_eq!(exit, Some(0), "{row:?} with its profile: {text}");
+        }
+    }
+}
+
+#[test]
+fn every_quirk_does_in_a_run_what_the_table_says() {
+    rows().iter().for_each(assert_runs);
 }
 
 #[test]

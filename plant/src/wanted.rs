@@ -25,7 +25,9 @@ pub(crate) const COB_ID_BITS: u32 = !CobId::NO_REMOTE_REQUEST;
 pub(crate) const OTHER_PDOS: [u16; 6] = [0x1401, 0x1402, 0x1403, 0x1801, 0x1802, 0x1803];
 
 /// Offsets of position, velocity and torque, with the bytes of each. A drive keeps the last value of its process data.
-pub(crate) const OFFSETS: [(u16, usize); 3] = [(0x60B0, 4), (0x60B1, 4), (0x60B2, 2)];
+pub(crate) const OFFSETS: [(u16, usize); 3] = [(0x60B0, 4), (0x60B1, 4), TORQUE_OFFSET];
+/// The only offset that process data of the rig may carry.
+const TORQUE_OFFSET: (u16, usize) = (0x60B2, 2);
 
 /// One object as it must be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -204,12 +206,16 @@ fn objects(scenario: &Scenario, axis: usize) -> Result<Vec<WantedObject>, PlantE
     Ok(wanted)
 }
 
-/// Offsets that the profile names and the process data do not carry: 0, instead of the last value of other process data.
+/// Offsets that the process data do not carry: 0, instead of the last value of other process data. The torque offset of an earlier run
+/// acts in every drive that has the object; the others are those that the profile names.
 fn offsets(profile: &DriveProfile) -> impl Iterator<Item = WantedObject> + '_ {
     let mapping = profile.pdos.rpdo1();
     OFFSETS.into_iter().filter_map(move |(index, bytes)| {
         let object = ObjectAddress::new(index, 0);
-        let ObjectConfig { rule, value, .. } = *profile.objects.get(&ObjectKey(object))?;
+        let may_lack = ObjectConfig { rule: ObjectRule::Optional, ..ObjectConfig::default() };
+        let named = profile.objects.get(&ObjectKey(object)).copied();
+        let of_every_profile = ((index, bytes) == TORQUE_OFFSET).then_some(may_lack);
+        let ObjectConfig { rule, value, .. } = named.or(of_every_profile)?;
         let is_mapped = mapping.entries().iter().any(|entry| entry >> 16 == u32::from(index));
         let is_left = is_mapped || rule == ObjectRule::Absent;
         let value = value.unwrap_or(0) as u32;
@@ -407,12 +413,14 @@ mod tests {
 
     /// A drive keeps the last force of process data that no longer carry it.
     #[test]
-    fn offsets_of_a_profile_that_names_them_are_0_unless_they_are_process_data() {
+    fn offsets_are_0_unless_they_are_process_data() {
         let offset = |text: &str, index| {
             let wanted = wanted(&format!("[[drive_profile]]\n{text}"), 3).unwrap();
             find(&wanted, index, 0).map(|wanted| (wanted.value, wanted.bytes, wanted.rule))
         };
-        assert_eq!(offset("", 0x60B2), None, "the default boot stays as it is");
+        assert_eq!(offset("", 0x60B2), Some((0, 2, ObjectRule::Optional)));
+        assert_eq!(offset("", 0x60B1), None, "no process data of the rig carry it");
+        assert_eq!(offset("objects.60B2h = { rule = 'absent' }", 0x60B2), None);
         for kind in ["kind = 'epos4'\nunits = { lead_m = 0.003 }", "kind = 'n5'"] {
             for (index, bytes) in OFFSETS {
                 assert_eq!(offset(kind, index), Some((0, bytes, ObjectRule::Optional)), "{kind}");

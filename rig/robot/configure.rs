@@ -50,7 +50,7 @@ pub(crate) fn configure(args: &WriteArgs) -> Result<Exit, Failure> {
     let mut folder = StepFolder::begin(&args.robot.folder, Step::Configure, &axes, &scenario).usage()?;
     let mut robot = RobotLine::open(scenario, folder.log().usage()?).usage()?;
     ledger::settle(&args.robot.folder, &robot.scenario, &mut robot.line, args.take_over)?;
-    let surveys = robot.surveys(&axes).map_err(failed)?;
+    let (surveys, boot_ups) = robot.surveys(&axes).map_err(failed)?;
     folder.note_serials(serials(&surveys));
     past.require(Step::Inspect, &axes, &folder.basis()).usage()?;
     let refused = refused(&robot, &surveys);
@@ -67,7 +67,7 @@ pub(crate) fn configure(args: &WriteArgs) -> Result<Exit, Failure> {
     for (axis, survey) in surveys.iter().enumerate() {
         let Some(survey) = survey else { continue };
         let target = robot.settings(axis).clone();
-        all.push(write(&mut robot, &folder, axis, &target, survey, args.store)?);
+        all.push(write(&mut robot, &folder, axis, &target, (survey, boot_ups), args.store)?);
         if all.last().is_some_and(Written::failed) {
             break;
         }

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use clap::Args;
 use masseter_can::canopen::ObjectAddress;
-use masseter_plant::bringup::{Deviation, Outcome, Survey, object_name, reason_text};
+use masseter_plant::bringup::{BootUps, Deviation, Outcome, Restarted, Survey, object_name, reason_text};
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
 use masseter_shared::wording::counted;
@@ -55,6 +55,7 @@ struct InspectResult {
     interfaces: Vec<InterfaceResult>,
     masters: Vec<String>,
     other_nodes: Vec<String>,
+    restarted: Vec<String>,
     drives: Vec<DriveResult>,
 }
 
@@ -65,11 +66,12 @@ pub(crate) fn inspect(args: &InspectArgs) -> Result<Exit, Failure> {
     let mut folder = StepFolder::begin(&args.robot.folder, Step::Inspect, &all, &scenario).usage()?;
     let interfaces = interfaces(&scenario.can);
     let mut robot = RobotLine::open(scenario, folder.log().usage()?).usage()?;
-    let surveys = read(&mut robot, args.scan).map_err(failed)?;
+    let (surveys, restarted) = read(&mut robot, args.scan).map_err(failed)?;
     let result = InspectResult {
         interfaces,
         masters: masters(robot.line.strangers()),
         other_nodes: other_nodes(&robot),
+        restarted: restarted.iter().map(Restarted::to_string).collect(),
         drives: all.iter().map(|&axis| drive(&robot, axis, surveys[axis].as_ref())).collect(),
     };
     for (axis, survey) in surveys.iter().enumerate() {
@@ -88,8 +90,10 @@ pub(crate) fn inspect(args: &InspectArgs) -> Result<Exit, Failure> {
     Ok(if passed { Exit::Passed } else { Exit::Failed })
 }
 
-fn read(robot: &mut RobotLine, scan: bool) -> anyhow::Result<[Option<Survey>; AXES]> {
+/// The drives, and those that restarted while they were read: what was read before may be another value now.
+fn read(robot: &mut RobotLine, scan: bool) -> anyhow::Result<([Option<Survey>; AXES], Vec<Restarted>)> {
     robot.line.listen(LISTEN_NS)?;
+    let boot_ups = BootUps::until_now(&robot.line);
     let mut surveys = [const { None }; AXES];
     for (axis, place) in surveys.iter_mut().enumerate() {
         *place = Some(robot.survey(axis)?).filter(|survey| !survey.is_silent());
@@ -98,7 +102,8 @@ fn read(robot: &mut RobotLine, scan: bool) -> anyhow::Result<[Option<Survey>; AX
         robot.line.scan()?;
     }
     robot.line.flush()?;
-    Ok(surveys)
+    let restarted = (0..AXES).filter_map(|axis| boot_ups.check_axis(&robot.line, axis).err());
+    Ok((surveys, restarted.collect()))
 }
 
 fn other_nodes(robot: &RobotLine) -> Vec<String> {
@@ -118,7 +123,11 @@ fn drive(robot: &RobotLine, axis: usize, survey: Option<&Survey>) -> DriveResult
         node: robot.scenario.can.node_ids[axis],
         answers: survey.is_some_and(|survey| !survey.fell_silent()),
         device: [0x1008, 0x1009, 0x100A].map(text),
-        deviations: survey.map(|survey| robot.deviations(axis, survey)).unwrap_or_default(),
+        // What a drive did not answer says nothing of what it has.
+        deviations: survey
+            .filter(|survey| !survey.fell_silent())
+            .map(|survey| robot.deviations(axis, survey))
+            .unwrap_or_default(),
         unread: unread.collect(),
     }
 }
@@ -144,6 +153,7 @@ fn describe(robot: &RobotLine, result: &InspectResult) -> (String, bool) {
     for node in &result.other_nodes {
         let _ = writeln!(text, "warning: {node} is not of the scenario");
     }
+    result.restarted.iter().for_each(|restarted| fail(&mut text, restarted));
     for (axis, drive) in result.drives.iter().enumerate().filter(|(_, drive)| !drive.answers) {
         fail(&mut text, &format!("{}: {}", drive.axis, robot.silence(axis)));
     }

@@ -12,6 +12,7 @@ use serde_json::json;
 use super::args::{RobotArgs, parse_axis};
 use super::hold::Hold;
 use super::lengths::{parse_length, parse_speed};
+use super::robot_line::failed;
 use super::session::Session;
 use super::step::Step;
 use crate::arguments::parse_duration;
@@ -73,6 +74,10 @@ pub(crate) fn jog(args: &JogArgs) -> Result<Exit, Failure> {
         Ok(report) => report,
         Err(error) => return Err(session.fail(error)),
     };
+    if let Err(restarted) = session.check_no_restart() {
+        session.finish(false, &json!({ "error": restarted.to_string() }))?;
+        return Err(failed(restarted));
+    }
     let text = text(axis, &report);
     let factor = args.measured.map(|measured_m| measured_m / report.moved_m());
     let is_right = factor.is_some_and(|factor| (factor - 1.0).abs() <= DEVIATION);

@@ -4,6 +4,7 @@
 //! ([`masseter_plant::bringup`]): these modules hold arguments, files and text.
 
 mod args;
+mod before;
 mod check_pose;
 mod configure;
 mod dry_run;

@@ -4,14 +4,18 @@ use std::io::Write;
 
 use anyhow::Context;
 use masseter_can::canopen::{NodeId, ObjectAddress};
-use masseter_plant::bringup::{Deviation, Line, LineError, Settings, Strangers, Survey, deviations};
+use masseter_plant::bringup::{BootUps, Deviation, Line, LineError, Settings, Strangers, Survey, deviations};
 use masseter_plant::wanted::WantedDrive;
+use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
 use masseter_terminal::{Exit, Failure};
 
 /// Serial number.
 const SERIAL: ObjectAddress = ObjectAddress::new(0x1018, 4);
+
+/// How long the drives may take to boot at power-on before they are read, ns.
+const LISTEN_NS: u64 = 500 * MILLISECOND_NS;
 
 /// A line to the drives of a scenario.
 #[derive(Debug)]
@@ -50,20 +54,22 @@ impl RobotLine {
         Ok(Survey::take(&mut self.line, axis, self.settings[axis].addresses())?)
     }
 
-    /// Surveys of these drives.
+    /// Surveys of these drives, and the boot-ups before: after a restart a survey is no more than a memory.
     ///
     /// # Errors
     /// When the bus or the log fails, or a drive does not answer.
-    pub(crate) fn surveys(&mut self, axes: &[usize]) -> anyhow::Result<[Option<Survey>; AXES]> {
-        let mut surveys = [const { None }; AXES];
+    pub(crate) fn surveys(&mut self, axes: &[usize]) -> anyhow::Result<([Option<Survey>; AXES], BootUps)> {
+        self.line.listen(LISTEN_NS)?;
+        let (mut surveys, boot_ups) = ([const { None }; AXES], BootUps::until_now(&self.line));
         for &axis in axes {
             let survey = self.survey(axis)?;
             if survey.fell_silent() {
                 anyhow::bail!("{}: {}", AXIS_NAMES[axis], self.silence(axis));
             }
+            boot_ups.check_axis(&self.line, axis)?;
             surveys[axis] = Some(survey);
         }
-        Ok(surveys)
+        Ok((surveys, boot_ups))
     }
 
     /// Everything of a drive that is not as scenario and profile need it.

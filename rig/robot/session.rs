@@ -1,10 +1,10 @@
 //! A step that moves or reads the drives, from the claimed interfaces to its evidence and exit code.
 
-use anyhow::{Context, anyhow, bail};
-use masseter_plant::bringup::{Line, LineError, MotionError, StopCause};
+use anyhow::{Context, anyhow};
+use masseter_plant::bringup::{BootUps, Line, LineError, MotionError, StopCause};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::Scenario;
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
+use masseter_shared::geometry::AXES;
 use masseter_shared::lifecycle::StopRequest;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 use serde::Serialize;
@@ -29,7 +29,7 @@ pub(super) struct Session {
     pub(super) past: Past,
     folder: StepFolder,
     /// Boot-up messages before the step.
-    boot_ups: [u32; AXES],
+    boot_ups: BootUps,
 }
 
 impl Session {
@@ -60,7 +60,7 @@ impl Session {
             let other = anyhow!("bus {bus}: another master sends {sign}; end that program first");
             return Err(Failure::with(Exit::Usage, other));
         }
-        let boot_ups = boot_ups(&line);
+        let boot_ups = BootUps::until_now(&line);
         let serials = serials(&mut line).map_err(failed)?;
         folder.note_serials(serials);
         require(&folder.basis()).usage()?;
@@ -75,13 +75,7 @@ impl Session {
 
     /// Refuses a drive that restarted since the step began: it may have lost its position, or what was written.
     pub(super) fn check_no_restart(&self) -> anyhow::Result<()> {
-        let now = boot_ups(&self.line);
-        match (0..AXES).find(|&axis| now[axis] != self.boot_ups[axis]) {
-            Some(axis) => {
-                bail!("{}: the drive restarted during the step; check its supply", AXIS_NAMES[axis])
-            }
-            None => Ok(()),
-        }
+        Ok(self.boot_ups.check(&self.line)?)
     }
 
     /// Writes the result, whether it is evidence, and where it is.
@@ -107,10 +101,6 @@ impl Session {
         let written = self.finish(false, &json!({ "error": error.to_string() }));
         written.err().unwrap_or_else(|| Failure::with(exit, error))
     }
-}
-
-fn boot_ups(line: &Line) -> [u32; AXES] {
-    std::array::from_fn(|axis| line.heard(axis).boot_ups)
 }
 
 /// Serial numbers (1018h:04); none of a drive that says that it has none.

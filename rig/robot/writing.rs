@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use masseter_plant::bringup::{
-    Change, Line, PowerError, Settings, Survey, WriteError, Writer, prove_no_power, reset, store, take_over,
+    BootUps, Change, Line, PowerError, Settings, Survey, Writer, prove_no_power, reset, store, take_over,
 };
 use masseter_shared::config::{ObjectRule, Scenario};
 use masseter_shared::geometry::AXIS_NAMES;
@@ -11,6 +11,7 @@ use masseter_shared::wording::counted;
 use masseter_terminal::{Exit, Failure, OrFailure, Tone, result_with_tones};
 use serde::Serialize;
 
+use super::before::before_file;
 use super::evidence::StepFolder;
 use super::robot_line::{RobotLine, failed};
 
@@ -21,9 +22,9 @@ pub(super) struct Written {
     changes: Vec<Change>,
     stored: bool,
     error: Option<String>,
-    /// Number of the axis, and the boot-ups of its drive when its turn ended.
+    /// Number of the axis, and the boot-ups when its turn ended.
     #[serde(skip)]
-    turn: (usize, u32),
+    turn: (usize, BootUps),
 }
 
 impl Written {
@@ -35,15 +36,10 @@ impl Written {
     /// Notes a restart since the drive's turn: values that are not stored are lost.
     fn note_restart(&mut self, line: &Line) {
         let (axis, boot_ups) = self.turn;
-        if self.error.is_none() && line.heard(axis).boot_ups != boot_ups {
-            self.error = Some(restarted(axis));
+        if self.error.is_none() {
+            self.error = boot_ups.check_axis(line, axis).err().map(|error| error.to_string());
         }
     }
-}
-
-/// Name of the file with the old values of a drive.
-pub(super) fn before_file(axis: usize) -> String {
-    format!("before-{}.json", AXIS_NAMES[axis])
 }
 
 /// Proves that none of these drives has power, before anything is written to one of them.
@@ -78,49 +74,58 @@ pub(super) fn write(
     folder: &StepFolder,
     axis: usize,
     target: &Settings,
-    survey: &Survey,
+    (survey, boot_ups): (&Survey, BootUps),
     stores: bool,
 ) -> Result<Written, Failure> {
     let before = serde_json::to_string_pretty(&target.found(survey)).incomplete()?;
     folder.keep(&before_file(axis), &(before + "\n")).incomplete()?;
     let profile = robot.scenario.profile(axis).clone();
-    let boot_ups = robot.line.heard(axis).boot_ups;
     let mut writer = Writer::new(&mut robot.line, axis, &profile);
     let applied = writer.apply(target, survey);
     let (changes, mut stored) = (writer.into_changes(), false);
     let error = match applied {
-        Err(WriteError::Line(error)) => Some(error.to_string()),
         Err(error) => Some(error.to_string()),
         Ok(()) => check(robot, axis, target, "after writing").usage()?,
     };
-    let error = error.or_else(|| {
-        // What was read back before a restart is lost.
-        let has_restarted = robot.line.heard(axis).boot_ups != boot_ups;
-        has_restarted.then(|| restarted(axis))
-    });
+    // What was read back before a restart is lost.
+    let error = error.or_else(|| no_restart(robot, axis, boot_ups));
     let error = match error {
         None if stores => {
-            let error = store_and_check(robot, axis, target).usage()?;
+            let error = store_and_check(robot, axis, target, boot_ups).usage()?;
             stored = error.is_none();
             error
         }
         error => error,
     };
-    let turn = (axis, robot.line.heard(axis).boot_ups);
+    let turn = (axis, BootUps::until_now(&robot.line));
     Ok(Written { axis: AXIS_NAMES[axis], changes, stored, error, turn })
 }
 
-fn restarted(axis: usize) -> String {
-    format!("{}: the drive restarted meanwhile; check its supply, and configure again", AXIS_NAMES[axis])
+/// The restart of a drive since then, if so.
+fn no_restart(robot: &RobotLine, axis: usize, since: BootUps) -> Option<String> {
+    since.check_axis(&robot.line, axis).err().map(|error| error.to_string())
 }
 
-fn store_and_check(robot: &mut RobotLine, axis: usize, target: &Settings) -> anyhow::Result<Option<String>> {
+/// Stores, resets, and reads everything again. No restart but this reset counts as a proof.
+fn store_and_check(
+    robot: &mut RobotLine,
+    axis: usize,
+    target: &Settings,
+    before: BootUps,
+) -> anyhow::Result<Option<String>> {
     let config = robot.scenario.profile(axis).store;
-    let stored = store(&mut robot.line, axis, config).and_then(|()| reset(&mut robot.line, axis));
-    match stored {
-        Err(error) => Ok(Some(error.to_string())),
-        Ok(()) => check(robot, axis, target, "after the reset, so the drive did not store it"),
+    if let Err(error) = store(&mut robot.line, axis, config) {
+        return Ok(Some(error.to_string()));
     }
+    if let Some(error) = no_restart(robot, axis, before) {
+        return Ok(Some(error));
+    }
+    if let Err(error) = reset(&mut robot.line, axis) {
+        return Ok(Some(error.to_string()));
+    }
+    let after = BootUps::until_now(&robot.line);
+    let wrong = check(robot, axis, target, "after the reset, so the drive did not store it")?;
+    Ok(wrong.or_else(|| no_restart(robot, axis, after)))
 }
 
 /// Reads everything again; returns what is not as it was written.

@@ -147,7 +147,7 @@ enum masseter_cause {
     MASSETER_CAUSE_WRONG_LENGTH = 35,
     /* A node that is not configured is on the bus. */
     MASSETER_CAUSE_UNKNOWN_NODE = 36,
-    /* Another node sends SYNC or has the master's id: its heartbeats would keep the drives going without this one. */
+    /* Another node sends SYNC or NMT, or has the master's id: its heartbeats would keep the drives going without this one. */
     MASSETER_CAUSE_SECOND_MASTER = 37,
     /* A drive has voltage in spite of a quick stop (statusword, object 6041). */
     MASSETER_CAUSE_STILL_POWERED = 38,

@@ -143,11 +143,20 @@ pub fn give_back(line: &mut Line, axis: usize, old: &[OldValue]) -> Result<Vec<O
     lost.into_iter().next().map_or(Ok(refused), |(_, error)| Err(error))
 }
 
-/// Writes values, the last one first. Returns those that failed, in this order.
+/// Writes the oldest value of each object, the last one first. Returns those that failed, in this order. A refused one is tried again after the others: the software
+/// limits of a drive that restarted must not cross either.
 fn write_back(line: &mut Line, axis: usize, old: &[OldValue]) -> Vec<(OldValue, LineError)> {
-    let write = |old: &OldValue| {
+    let mut write = |old: &OldValue| {
         let OldValue { object: ObjectKey(object), value, bytes } = *old;
         Some((*old, line.write(axis, object, value, bytes).err()?))
     };
-    old.iter().rev().filter_map(write).collect()
+    let is_oldest =
+        |(place, one): &(usize, &OldValue)| old[..*place].iter().all(|other| other.object != one.object);
+    let oldest: Vec<_> = old.iter().enumerate().filter(is_oldest).map(|(_, one)| one).collect();
+    let failed: Vec<_> = oldest.into_iter().rev().filter_map(&mut write).collect();
+    let again = |(old, error): (OldValue, LineError)| match error.abort_code() {
+        Some(_) => write(&old),
+        None => Some((old, error)),
+    };
+    failed.into_iter().filter_map(again).collect()
 }

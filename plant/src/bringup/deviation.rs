@@ -3,7 +3,7 @@
 use masseter_can::canopen::ObjectAddress;
 use masseter_can::cia402::Statusword;
 use masseter_shared::config::{
-    AccelerationUnit, DriveProfile, ObjectConfig, ObjectKey, ObjectRule, VelocityUnit,
+    AccelerationUnit, DriveProfile, INCREMENTS, ObjectConfig, ObjectKey, ObjectRule, VelocityUnit,
 };
 use serde::Serialize;
 
@@ -129,9 +129,15 @@ fn of_state(survey: &Survey) -> Vec<Deviation> {
     all
 }
 
-/// The unit of a code, in words.
+/// The unit of a code (CiA 303-2), in words.
 fn unit_name(code: u32) -> Option<&'static str> {
-    const NAMES: [(u32, &str); 5] = [
+    const NAMES: [(u32, &str); 11] = [
+        (INCREMENTS, "increments"),
+        (0x0041_0000, "degrees"),
+        (0xFF41_0000, "0.1 degrees"),
+        (0x00B4_0000, "turns"),
+        (0xFD01_0000, "mm"),
+        (0xFA01_0000, "µm"),
         (AccelerationUnit::IncrementsS2.code(), "increments/s²"),
         (AccelerationUnit::RpmPerS.code(), "rpm/s"),
         (VelocityUnit::IncrementsS.code(), "increments/s"),
@@ -141,15 +147,17 @@ fn unit_name(code: u32) -> Option<&'static str> {
     NAMES.iter().find(|(known, _)| *known == code).map(|(_, name)| *name)
 }
 
+/// Units as far as the drive tells them (60A8h to 60AAh). A value that configure writes counts, and not the one that it replaces.
 fn of_units(survey: &Survey, profile: &DriveProfile) -> Vec<Deviation> {
     let units = &profile.units;
     let declared = [
+        (0x60A8, INCREMENTS, "position", "drive_profile.objects"),
         (0x60A9, units.velocity.code(), "velocity", "drive_profile.units.velocity"),
         (0x60AA, units.acceleration.code(), "acceleration", "drive_profile.units.acceleration"),
     ];
     let of_code = |(index, declared, quantity, key)| {
         let object = ObjectAddress::new(index, 0);
-        let code = survey.number(object).filter(|&code| code != declared)?;
+        let code = told(survey, profile, object).filter(|&code| code != declared)?;
         let declared = unit_name(declared).expect("every unit of a profile has a name");
         // Drives use codes of their own for units that the rig has: such a code proves nothing.
         let (found, outcome) = match unit_name(code) {
@@ -163,22 +171,24 @@ fn of_units(survey: &Survey, profile: &DriveProfile) -> Vec<Deviation> {
     declared.into_iter().filter_map(of_code).collect()
 }
 
+/// The value of an object after `configure`: one that it writes counts, and not the one that it replaces. None where the drive has no
+/// such object, and where the profile says so.
+fn told(survey: &Survey, profile: &DriveProfile, object: ObjectAddress) -> Option<u32> {
+    let ObjectConfig { rule, value, .. } = profile.object(ObjectKey(object));
+    let found = || survey.number(object);
+    match rule {
+        ObjectRule::Absent => None,
+        ObjectRule::Write => value.map(|value| value as u32).or_else(found),
+        ObjectRule::Expect | ObjectRule::Optional => found(),
+    }
+}
+
 /// Ratios by which the drive counts its way, as far as the drive has them: gear, feed and encoder. A wrong one scales every motion.
 /// Without a lead the profile declares no travel, so that a gear is only to be looked at. A feed decides the unit of 6064h; the encoder
 /// decides without one.
 fn of_ratios(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Deviation> {
     let units = &profile.units;
-    // A value that configure writes counts, and not the one that it replaces.
-    let part = |index, subindex| {
-        let object = ObjectAddress::new(index, subindex);
-        let ObjectConfig { rule, value, .. } = profile.object(ObjectKey(object));
-        let found = || survey.number(object).map(f64::from);
-        match rule {
-            ObjectRule::Absent => None,
-            ObjectRule::Write => value.map(|value| value as f64).or_else(found),
-            ObjectRule::Expect | ObjectRule::Optional => found(),
-        }
-    };
+    let part = |index, subindex| told(survey, profile, ObjectAddress::new(index, subindex)).map(f64::from);
     let ratio = |index| Some(part(index, 1)? / part(index, 2).filter(|&turns| turns > 0.0)?);
     let feed = units.lead_m.map(|lead_m| lead_m / increment_m);
     let encoder = feed.map(|feed| feed / units.gear_ratio);
@@ -287,6 +297,35 @@ mod tests {
             "the drive counts acceleration in rpm/s, the profile declares increments/s²: change one"
         );
         assert_eq!(all[0].outcome, Outcome::Refused);
+    }
+
+    /// A drive of the default profile too: as delivered some count tenths of a degree.
+    #[test]
+    fn units_of_every_profile_are_those_of_the_drive() {
+        let units = |found: &[(u16, u32)], profile: &str| {
+            let mut survey = Survey::default();
+            found.iter().for_each(|&(index, code)| survey.insert(ObjectAddress::new(index, 0), code));
+            let scenario = Scenario::parse(Path::new("robot.toml"), profile).unwrap();
+            let all = of_units(&survey, scenario.profile(3));
+            all.into_iter().map(|one| (one.object, one.outcome, one.remedy)).collect::<Vec<_>>()
+        };
+        let profile = |keys: &str| format!("[[drive_profile]]\n{keys}");
+        let right = [(0x60A8, 0x00B5_0000), (0x60A9, 0x00B5_0300), (0x60AA, 0x00B5_5700)];
+        for keys in ["", &profile("kind = 'n5'")] {
+            assert_eq!(units(&right, keys), []);
+            assert_eq!(units(&[], keys), [], "a drive need not tell its units");
+            let degrees = units(&[(0x60A8, 0xFF41_0000)], keys);
+            let remedy =
+                "the drive counts position in 0.1 degrees, the profile declares increments: change one";
+            assert_eq!(degrees, [("60A8h:00h".to_owned(), Outcome::Refused, remedy.to_owned())]);
+            let wrong = units(&[(0x60A8, 0x0001_0000), (0x60A9, 0x00B4_4700), (0x60AA, 0x00C0_0300)], keys);
+            let outcomes: Vec<_> = wrong.iter().map(|(.., outcome, _)| *outcome).collect();
+            assert_eq!(outcomes, [Outcome::Doubtful, Outcome::Refused, Outcome::Refused], "{wrong:?}");
+        }
+        let degrees = [(0x60A8, 0xFF41_0000)];
+        assert_eq!(units(&degrees, &profile("objects.60A8h = { rule = 'absent' }")), []);
+        let written = "objects.60A8h = { value = 0x00B5_0000, bytes = 4 }";
+        assert_eq!(units(&degrees, &profile(written)), [], "configure writes it");
     }
 
     /// Where 6092h decides the unit of 6064h, 608Fh is only to be looked at.

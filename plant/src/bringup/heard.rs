@@ -6,6 +6,9 @@ use masseter_can::Frame;
 use masseter_can::canopen::{Cob, Emergency, Heartbeat, NmtState, NodeId, SdoResponse};
 use masseter_shared::config::MASTER_NODE;
 
+/// Sign of another master that commands nodes.
+pub(super) const NMT: &str = "NMT";
+
 /// What was heard of one drive.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Heard {
@@ -57,7 +60,7 @@ impl Strangers {
     pub(super) fn take(&mut self, bus: usize, cob: Cob) {
         let sign = match cob {
             Cob::Sync => "SYNC",
-            Cob::Nmt => "NMT",
+            Cob::Nmt => NMT,
             Cob::SdoRequest(_) => "SDO requests",
             Cob::Heartbeat(node) if node == MASTER_NODE => "a heartbeat of node 127",
             Cob::Heartbeat(node) | Cob::Emergency(node) | Cob::SdoResponse(node) | Cob::Tpdo1(node) => {

@@ -5,6 +5,7 @@ use masseter_can::cia402::DriveState;
 use masseter_shared::geometry::AXIS_NAMES;
 
 use super::line::LineError;
+use super::restart::Restarted;
 
 /// What stopped a motion.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -74,6 +75,9 @@ pub enum StopCause {
         /// 603Fh.
         error_code: u16,
     },
+    /// A drive restarted.
+    #[error(transparent)]
+    Restarted(#[from] Restarted),
     /// The motion took too long.
     #[error("not done within {:.1} s; check whether the drive takes set-points, or its unit of velocity", .limit_s)]
     TimedOut {

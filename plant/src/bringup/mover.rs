@@ -203,6 +203,7 @@ impl<'a> Mover<'a> {
         switching::wait_for_mode(self.line, self.axis, mode)?;
         let here = self.line.read_number(self.axis, ObjectAddress::new(0x6064, 0))?;
         self.line.write(self.axis, ObjectAddress::new(0x607A, 0), here, 4)?;
+        self.watch.check_no_restart(self.line)?;
         switching::switch_on(self.line, self.axis)?;
         let opened_ns = self.line.now_ns() + seconds(self.profile().brake.open_s);
         while self.line.now_ns() < opened_ns {
@@ -338,11 +339,13 @@ impl<'a> Mover<'a> {
     pub(super) fn finish<T>(mut self, done: Result<T, MotionError>) -> Result<T, MotionError> {
         match done {
             Ok(done) => match self.borrowed.restore(self.line) {
-                Ok(()) => Ok(done),
+                Ok(()) => self.watch.check_no_restart(self.line).map(|()| done),
                 Err(source) => Err(MotionError::NotRestored { axis: self.axis, cause: None, source }),
             },
             Err(error) => {
                 switching::stop(self.line, self.axis, &self.profile().brake)?;
+                // A restart is the cause of whatever else was seen, such as a position that jumps.
+                let error = self.watch.check_no_restart(self.line).err().unwrap_or(error);
                 Err(self.give_back(error))
             }
         }

@@ -52,13 +52,18 @@ pub fn store(line: &mut Line, axis: usize, config: StoreConfig) -> Result<(), St
     let until_ns = line.now_ns() + u64::from(timeout_ms) * MILLISECOND_NS;
     // Some drives answer nothing until they are done.
     unless_silent(line.write(axis, object, SAVE, 4))?;
-    while unless_silent(line.read_number(axis, object))?.is_none_or(|word| word & 1 == 0) {
+    loop {
+        let read = line.read_number(axis, object);
+        if matches!(read, Ok(word) if word & 1 == 1) {
+            return Ok(());
+        }
         if line.now_ns() >= until_ns {
+            read?;
             return Err(StoreError::Late { axis, object, timeout_ms });
         }
+        unless_silent(read)?;
         line.listen(LOOK_NS)?;
     }
-    Ok(())
 }
 
 /// Resets a drive, so that it starts from its memory, and waits for the last of its boot-up messages.

@@ -301,6 +301,33 @@ fn an_axis_that_falls_without_power_fails_the_jog() {
     }
 }
 
+/// A supply that dips at any moment from the first reduced value to the last, also before the axis has power: the limits are lost.
+#[test]
+fn a_drive_that_restarts_ends_every_motion_with_the_axis_off() {
+    let profile = "[[drive_profile]]\nhoming = { method = 33, absolute = false, home_position_m = 0.27 }\n";
+    type Motion = fn(&mut Bench) -> Result<(), MotionError>;
+    let motions: [Motion; 2] = [|bench| bench.jog(0.001).map(drop), |bench| bench.home().map(drop)];
+    for motion in motions {
+        let mut sound = Bench::new(profile);
+        motion(&mut sound).unwrap();
+        let length_s = (sound.line.now_ns() - 100 * MILLISECOND_NS) as f64 / SECOND_NS as f64;
+        for part in 0..12 {
+            let from_s = 0.15 + 0.9 * length_s * f64::from(part) / 12.0;
+            let dip =
+                format!("[[faults]]\nkind = 'drive_reboot'\naxis = 'l1'\nsize = '5 ms'\nfrom_s = {from_s}\n");
+            let mut bench = Bench::new(&(profile.to_owned() + &dip));
+            let Err(error) = motion(&mut bench) else {
+                panic!("{from_s} s: the drive has lost the values of the step")
+            };
+            let MotionError::Stopped { cause: StopCause::Restarted(restarted), .. } = error else {
+                panic!("{from_s} s: {error}")
+            };
+            assert_eq!(restarted, Restarted { axis: L1, by_master: false });
+            bench.assert_off();
+        }
+    }
+}
+
 /// A ledger that a test can read.
 #[derive(Debug, Clone, Default)]
 struct Notes(Arc<Mutex<Vec<OldValue>>>);

@@ -7,6 +7,7 @@ use masseter_shared::geometry::AXES;
 
 use super::line::{Line, LineError};
 use super::motion_error::{MotionError, StopCause};
+use super::restart::BootUps;
 
 /// Digital inputs (60FDh): negative and positive limit switch.
 const LIMIT_SWITCHES: u32 = 0b11;
@@ -45,6 +46,7 @@ pub(super) struct Watch {
     began_m: [f64; AXES],
     /// Emergencies heard before.
     emergencies: [usize; AXES],
+    boot_ups: BootUps,
     /// 60FDh at the beginning; none in a drive without that object.
     switches: Option<u32>,
     /// The other axis that is looked at next.
@@ -89,12 +91,22 @@ impl Watch {
         }
         let switches = line.read_number(axis, ObjectAddress::new(0x60FD, 0)).ok();
         let emergencies = std::array::from_fn(|axis| line.heard(axis).emergencies.len());
-        Ok(Self { axis, scales, bounds, began_m, emergencies, switches, next: 0 })
+        let boot_ups = BootUps::until_now(line);
+        Ok(Self { axis, scales, bounds, began_m, emergencies, boot_ups, switches, next: 0 })
     }
 
     /// What is allowed.
     pub(super) fn bounds(&self) -> Bounds {
         self.bounds
+    }
+
+    /// Refuses to go on after a restart of a drive: its reduced limits are lost.
+    ///
+    /// # Errors
+    /// [`MotionError::Stopped`].
+    pub(super) fn check_no_restart(&self, line: &Line) -> Result<(), MotionError> {
+        let axis = self.axis;
+        self.boot_ups.check(line).map_err(|restarted| MotionError::Stopped { axis, cause: restarted.into() })
     }
 
     /// The limit switches count no more: homing looks for them.
@@ -118,6 +130,7 @@ impl Watch {
         let status = read_status(line, axis)?;
         let permille = line.read_number(axis, ObjectAddress::new(0x6077, 0))? as i16;
         let sample = Sample { at_ns, position_m, force_n: f64::from(permille) * scale.permille_n, status };
+        self.check_no_restart(line)?;
         let cause = match self.judge(line, &sample)? {
             Some(cause) => Some(cause),
             None => self.look_at_switches(line)?.or(self.look_at_another(line)?),

@@ -66,7 +66,9 @@ fn kind(config: &FaultConfig) -> FaultKind {
         }
         FaultKindConfig::Duplicate => FaultKind::Duplicate,
         FaultKindConfig::Babble => {
-            FaultKind::Babble { frame: Frame::fixed(standard(config.id.unwrap_or(BABBLE_ID)), BABBLE_DATA) }
+            let (id, data) = (standard(config.id.unwrap_or(BABBLE_ID)), config.data.as_deref());
+            let frame = Frame::new(id, data.unwrap_or(&BABBLE_DATA)).expect("at most 8 bytes");
+            FaultKind::Babble { frame }
         }
         FaultKindConfig::Disconnect => FaultKind::Disconnect,
         FaultKindConfig::BusOff => FaultKind::BusOff,

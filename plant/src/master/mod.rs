@@ -356,8 +356,8 @@ impl Master {
         let Ok(cob) = Cob::try_from(received.frame.id()) else { return };
         let time_ns = received.time_ns;
         let sender = Message::sender(cob);
-        // Only a master sends SYNC, and this master does not receive its own frames.
-        if cob == Cob::Sync || sender == Some(MASTER_NODE) {
+        // Only a master sends SYNC and NMT, and this master does not receive its own frames.
+        if matches!(cob, Cob::Sync | Cob::Nmt) || sender == Some(MASTER_NODE) {
             return self.yield_to_other_master(time_ns, bus);
         }
         let Some(id) = sender else { return };

@@ -154,7 +154,7 @@ class Cause(enum.IntEnum):
     WRONG_LENGTH = 35
     #: A node that is not configured is on the bus.
     UNKNOWN_NODE = 36
-    #: Another node sends SYNC or has the master's id: its heartbeats would keep the drives going without this one.
+    #: Another node sends SYNC or NMT, or has the master's id: its heartbeats would keep the drives going without this one.
     SECOND_MASTER = 37
     #: A drive has voltage in spite of a quick stop (statusword, object 6041).
     STILL_POWERED = 38

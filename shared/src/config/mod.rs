@@ -42,8 +42,8 @@ pub use control::{
     ChecksConfig, ControllerConfig, CpuDmaLatency, MOST_LEAD_CYCLES, RealtimeConfig, TimingConfig,
 };
 pub use drive_profile::{
-    AccelerationUnit, AxisScale, BrakeConfig, DriveProfile, HomingConfig, IdentityConfig, ObjectConfig,
-    ObjectKey, ObjectRule, PdosConfig, StoreConfig, UnitsConfig, VelocityUnit,
+    AccelerationUnit, AxisScale, BrakeConfig, DriveProfile, HomingConfig, INCREMENTS, IdentityConfig,
+    ObjectConfig, ObjectKey, ObjectRule, PdosConfig, StoreConfig, UnitsConfig, VelocityUnit,
 };
 pub use drives::{DriveConfig, DrivesConfig};
 pub use dry::DryConfig;

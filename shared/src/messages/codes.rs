@@ -162,7 +162,7 @@ codes! {
         WrongLength = 35 "wrong_length",
         /// A node that is not configured is on the bus.
         UnknownNode = 36 "unknown_node",
-        /// Another node sends SYNC or has the master's id: its heartbeats would keep the drives going without this one.
+        /// Another node sends SYNC or NMT, or has the master's id: its heartbeats would keep the drives going without this one.
         SecondMaster = 37 "second_master",
         /// A drive has voltage in spite of a quick stop (statusword, object 6041).
         StillPowered = 38 "still_powered",

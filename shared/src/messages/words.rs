@@ -95,7 +95,7 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
             )
         }
         Cause::UnknownNode => "a node that no axis is configured with".to_owned(),
-        Cause::SecondMaster => "another node sends SYNC or has the master's id".to_owned(),
+        Cause::SecondMaster => "another node sends SYNC or NMT, or has the master's id".to_owned(),
         Cause::LawFailed if event.limit > 0.0 => {
             format!("gave no pose: its quaternion has the length {}, not 1", event.value)
         }

@@ -1,13 +1,13 @@
 //! Permanent stops: neither switching off nor a new demand for motion ends them.
 
-use masseter_can::canopen::sync;
+use masseter_can::canopen::{Nmt, NmtCommand, NmtTarget, sync};
 
 use super::*;
 
 type Trigger = fn(&mut Bench);
 
 /// What stops the drives permanently, and the cause that is reported.
-const PERMANENT: [(Cause, Trigger); 13] = [
+const PERMANENT: [(Cause, Trigger); 14] = [
     (Cause::CommandLost, |bench| (0..=TIMEOUT_CYCLES).for_each(|_| bench.cycle(None))),
     (Cause::CommandLost, |bench| {
         let stale_cycle = bench.cycle;
@@ -29,6 +29,11 @@ const PERMANENT: [(Cause, Trigger); 13] = [
     (Cause::SecondMaster, |bench| {
         let now_ns = bench.now_ns();
         bench.wires.wire(1).arrive(now_ns, sync::frame());
+        bench.cycle(Some(DriveRequest::Enable));
+    }),
+    (Cause::SecondMaster, |bench| {
+        let (now_ns, target) = (bench.now_ns(), NmtTarget::All);
+        bench.wires.wire(0).arrive(now_ns, Nmt { command: NmtCommand::ResetNode, target }.frame());
         bench.cycle(Some(DriveRequest::Enable));
     }),
 ];

@@ -26,7 +26,7 @@ pub(super) use kind::over_kinds;
 pub use object::{ObjectConfig, ObjectKey, ObjectRule};
 pub use pdos::PdosConfig;
 pub use scale::AxisScale;
-pub use units::{AccelerationUnit, UnitsConfig, VelocityUnit};
+pub use units::{AccelerationUnit, INCREMENTS, UnitsConfig, VelocityUnit};
 
 /// The profile of axes that no `[[drive_profile]]` names.
 static EMULATED: LazyLock<DriveProfile> = LazyLock::new(DriveProfile::default);

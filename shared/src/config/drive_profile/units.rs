@@ -31,6 +31,9 @@ pub enum AccelerationUnit {
     RpmPerS,
 }
 
+/// Increments in 60A8h (CiA 303-2: prefix, numerator, denominator).
+pub const INCREMENTS: u32 = 0x00B5_0000;
+
 impl VelocityUnit {
     /// The unit in 60A9h (CiA 303-2: prefix, numerator, denominator).
     pub const fn code(self) -> u32 {

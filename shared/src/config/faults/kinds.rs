@@ -122,7 +122,7 @@ fault_kinds! {
     Delay "delay": Bus, Frames, Time 0.0 to 10.0 "how long";
     /// Frames arrive, and their transmitter repeats them.
     Duplicate "duplicate": Bus, Frames;
-    /// A node sends 8 bytes of 55h with identifier `id` (001h unless given) whenever the bus is idle.
+    /// A node sends `data` (8 bytes of 55h unless given) with identifier `id` (001h unless given) whenever the bus is idle.
     Babble "babble": Bus, Node;
     /// A node is disconnected.
     Disconnect "disconnect": Bus, Node;

@@ -41,6 +41,8 @@ pub struct FaultConfig {
     pub node: Option<u8>,
     /// COB-ID of the frames concerned, or of those that are babbled (11 bits); all when absent.
     pub id: Option<u16>,
+    /// Bytes of the frames that are babbled, at most eight.
+    pub data: Option<Vec<u8>>,
     /// Axis concerned: d1 to l3.
     pub axis: Option<String>,
     /// How much, with its unit; what that is depends on the kind.
@@ -87,6 +89,7 @@ impl FaultConfig {
             bus: None,
             node: None,
             id: None,
+            data: None,
             axis: None,
             size: None,
             probability: 1.0,
@@ -153,6 +156,7 @@ impl FaultConfig {
             ("faults.bus", self.bus.is_some(), is_of_bus, is_of_bus),
             ("faults.node", self.node.is_some(), is_of_bus, place == Node),
             ("faults.id", self.id.is_some(), is_of_bus && !matches!(kind, Disconnect | BusOff), false),
+            ("faults.data", self.data.is_some(), kind == Babble, false),
             ("faults.axis", self.axis.is_some(), matches!(place, Axis | Axes), place == Axis),
             ("faults.size", self.size.is_some(), kind.size().is_some(), kind.size().is_some()),
             ("faults.probability", self.probability < 1.0, place == Frames, false),
@@ -211,6 +215,9 @@ impl FaultConfig {
         }
         if self.count == Some(0) {
             return refuse("faults.count", &0, format!("use at least 1, {never_acts}"));
+        }
+        if let Some(data) = self.data.as_ref().filter(|data| data.len() > 8) {
+            return refuse("faults.data", &format!("{} bytes", data.len()), "a frame has at most 8 bytes");
         }
         match self.id {
             Some(id) if id > 0x7FF => refuse("faults.id", &id, "use an 11-bit identifier, at most 0x7FF"),

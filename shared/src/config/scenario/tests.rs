@@ -176,6 +176,11 @@ const WRONG: &[(&str, &str)] = &[
     ("[[faults]]\nkind = 'corrupt'\nbus = 2\nfrom_s = 0.0", "faults.bus = 2: name a bus"),
     ("[[faults]]\nkind = 'babble'\nbus = 0\nfrom_s = 0.0", "faults.node = none"),
     (
+        "[[faults]]\nkind = 'babble'\nbus = 0\nnode = 1\nfrom_s = 0.0\ndata = [1, 2, 3, 4, 5, 6, 7, 8, 9]",
+        "faults.data = 9 bytes: a frame has at most 8 bytes",
+    ),
+    ("[[faults]]\nkind = 'lose'\nbus = 0\nfrom_s = 0.0\ndata = [1]", "faults.data = given: leave it away"),
+    (
         "[[faults]]\nkind = 'delay'\nbus = 0\nfrom_s = 0.0",
         "faults.size = none: give how long, such as \"1 ms\"",
     ),
