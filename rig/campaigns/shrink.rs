@@ -103,5 +103,5 @@ fn has_failed(verdict: &Verdict, name: &str) -> bool {
 /// The cause of the first fault that somebody detected.
 fn first_cause(figures: &Figures) -> Option<String> {
     let fault = figures.events.iter().find(|event| event.kind == EventKind::Fault)?;
-    Some(fault.cause.name().to_owned())
+    Some(fault.cause.to_string())
 }

@@ -9,7 +9,9 @@ use masseter_shared::config::Scenario;
 use toml::{Table, Value};
 
 /// The lists whose entries are changes of their own.
-const LISTS: [&str; 3] = ["faults", "stimulus", "require"];
+const LISTS: [&str; 3] = ["faults", "stimulus", REQUIREMENTS];
+/// The list whose entries stay as they are, or go whole: another limit would be another failure.
+const REQUIREMENTS: &str = "require";
 /// Bisections towards a default.
 const BISECTIONS: usize = 5;
 /// Digits of numbers, the fewest first.
@@ -27,6 +29,12 @@ struct Change {
     default: Option<Value>,
     /// Whether the value is an entry of the list at the path.
     is_entry: bool,
+}
+
+impl Change {
+    fn is_requirement(&self) -> bool {
+        self.path == [REQUIREMENTS]
+    }
 }
 
 /// Reduces a scenario as long as `fails` holds of it.
@@ -73,7 +81,7 @@ impl<F: FnMut(&Scenario) -> bool> Shrink<F> {
 
     /// Removes the keys of entries and whole tables that the failure does not need.
     fn barer(&mut self, changes: &mut Vec<Change>) {
-        for at in 0..changes.len() {
+        for at in (0..changes.len()).filter(|at| !changes[*at].is_requirement()).collect::<Vec<_>>() {
             let keys = |change: &Change| change.value.as_table().map_or_else(Vec::new, |t| t.keys().cloned().collect());
             for key in keys(&changes[at]) {
                 let mut tried = changes.clone();
@@ -87,7 +95,7 @@ impl<F: FnMut(&Scenario) -> bool> Shrink<F> {
 
     /// Moves every number towards its default, then cuts its digits.
     fn simpler(&mut self, changes: &mut Vec<Change>) {
-        for at in 0..changes.len() {
+        for at in (0..changes.len()).filter(|at| !changes[*at].is_requirement()).collect::<Vec<_>>() {
             let places = number_places(&changes[at].value);
             for place in places {
                 self.nearer(changes, at, &place);
@@ -285,6 +293,15 @@ for_s = 0.1
         let fails = |scenario: &Scenario| scenario.duration_s.is_some_and(|duration_s| duration_s > 2.9);
         let small = scenario(&Shrink::run(fails, &scenario(MANY)));
         assert!(small.duration_s.unwrap() < 3.5, "{:?}", small.duration_s);
+    }
+
+    #[test]
+    fn a_requirement_stays_as_it_is_or_goes() {
+        let text = "[[require]]\nname = 'a'\nsignal = 'incisal.error'\nduring = 'running'\nmax = '61.7 um'\n\
+                    [[require]]\nname = 'b'\nsignal = 'jaw.opening'\nmax = '40 mm'";
+        let fails = |scenario: &Scenario| scenario.require.iter().any(|require| require.name == "a");
+        let small = scenario(&Shrink::run(fails, &scenario(text)));
+        assert_eq!(small.require, scenario(text).require[..1]);
     }
 
     #[test]
