@@ -5,8 +5,9 @@ use std::fmt::Write;
 use clap::Command;
 
 /// What a user wants, and the verbs for that.
-const GROUPS: [(&str, &[&str]); 6] = [
-    ("Play a motion and judge it", &["init", "run", "test", "signals", "faults", "report", "recording"]),
+const GROUPS: [(&str, &[&str]); 7] = [
+    ("Play a motion and judge it", &["init", "run", "test", "signals", "faults"]),
+    ("Work with past runs", &["report", "replay", "diff", "recording"]),
     ("Bring your own controller", &["new", "interface", "controller", "param"]),
     ("Prepare this machine", &["doctor", "bench", "clean"]),
     ("Work with CAN and the drives", &["robot", "can", "plant"]),
