@@ -147,8 +147,9 @@ fn save_readable(args: &RecoverArgs) -> anyhow::Result<Exit> {
 
 fn keep_few(args: &ThinArgs) -> anyhow::Result<Exit> {
     let (path, out) = (args.from.path()?, &args.out);
+    let mut reader = open(&path)?;
     let file = File::create_new(out).with_context(|| format!("cannot create {}", out.display()))?;
-    let kept = thin(&mut open(&path)?, BufWriter::new(file)).inspect_err(|_| {
+    let kept = thin(&mut reader, BufWriter::new(file)).inspect_err(|_| {
         // The first error is the one to report.
         let _ = fs::remove_file(out);
     });

@@ -69,7 +69,8 @@ pub(crate) fn replay(args: &ReplayArgs) -> anyhow::Result<Exit> {
     let path = folder.manifest();
     let manifest = Manifest::read(&folder).with_context(|| path.display().to_string())?;
     let recorded_kind = ControllerKind::of_manifest(manifest.controller.as_deref());
-    let recorded_kind = recorded_kind.ok_or_else(|| ReplayError::ForeignController(manifest.controller.clone()))?;
+    let recorded_kind =
+        recorded_kind.ok_or_else(|| ReplayError::ForeignController(manifest.controller.clone()))?;
     let kind = args.controller.unwrap_or(recorded_kind);
     let overrides = Overrides { set: args.set.clone(), ..Overrides::default() };
     let scenario = scenario_with_overrides(Some(&folder.scenario()), &overrides)?;
@@ -83,8 +84,13 @@ pub(crate) fn replay(args: &ReplayArgs) -> anyhow::Result<Exit> {
     }
     let (cycles, differences) = replay.finish()?;
     let exit = differences.exit();
-    let replayed =
-        Replayed { controller: name_of(&kind), clock: manifest.clock.clone(), cycles, open_loop: true, differences };
+    let replayed = Replayed {
+        controller: name_of(&kind),
+        clock: manifest.clock.clone(),
+        cycles,
+        open_loop: true,
+        differences,
+    };
     result(&match args.format {
         Format::Human => replayed.in_words(&manifest),
         Format::Json => serde_json::to_string_pretty(&replayed)? + "\n",
@@ -146,7 +152,8 @@ impl Replay {
         let since_first_sync_ns =
             CycleSchedule::new(scenario)?.controller_at_ns + (first.cycle - 1) * scenario.period_ns();
         let operator = Operator::new(scenario, declared, first.due_ns.saturating_sub(since_first_sync_ns))?;
-        let compared = if manifest.is_in_real_time() { Compared::WithoutStamps } else { Compared::Everything };
+        let compared =
+            if manifest.is_in_real_time() { Compared::WithoutStamps } else { Compared::Everything };
         Ok(Self {
             controller,
             duties: Duties { named, operator },

@@ -50,7 +50,8 @@ impl RecordedRun {
         if reader.was_cut_short() || !reader.damage().is_empty() {
             return Err(ReplayError::Incomplete);
         }
-        let needed = sequence.finish().into_iter().filter(|of| NEEDED.iter().any(|topic| topic.name() == of.topic));
+        let needed =
+            sequence.finish().into_iter().filter(|of| NEEDED.iter().any(|topic| topic.name() == of.topic));
         for topic in needed.filter(|topic| topic.missing > 0) {
             return Err(ReplayError::Gap { topic: topic.topic, missing: topic.missing });
         }
@@ -82,7 +83,9 @@ impl RecordedRun {
     pub(super) fn is_answer(&self, message: &Recorded) -> bool {
         let is_of_controller = match message {
             Recorded::Event(event) => event.is_of_controller(),
-            _ => matches!(message.topic(), Topic::Command | Topic::State | Topic::Signals | Topic::Parameters),
+            _ => {
+                matches!(message.topic(), Topic::Command | Topic::State | Topic::Signals | Topic::Parameters)
+            }
         };
         is_of_controller && message.cycle().is_some_and(|cycle| cycle <= self.last_cycle)
     }

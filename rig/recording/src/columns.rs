@@ -142,7 +142,8 @@ impl Field {
 
     /// The names of its columns.
     fn columns(&self) -> impl Iterator<Item = String> {
-        let name = |element| if self.is_array() { format!("{}_{element}", self.name) } else { self.name.clone() };
+        let name =
+            |element| if self.is_array() { format!("{}_{element}", self.name) } else { self.name.clone() };
         (0..self.elements.unwrap_or(1)).map(name)
     }
 }
@@ -232,7 +233,8 @@ impl Columns {
     /// The values of a message; none if its length differs from the definition's.
     pub fn values(&self, body: &[u8]) -> Option<impl Iterator<Item = String>> {
         let (fixed, tail) = self.split(body)?;
-        let values = self.fields.iter().flat_map(|field| field.numbers(fixed)).map(|number| number.to_string());
+        let values =
+            self.fields.iter().flat_map(|field| field.numbers(fixed)).map(|number| number.to_string());
         Some(values.chain(self.tail.iter().map(|_| HEXUPPER.encode(tail))))
     }
 }

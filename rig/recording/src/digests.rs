@@ -30,7 +30,10 @@ impl Digests {
         let read = |file: &Attachment| {
             let topic = Topic::named(file.name.strip_prefix(NAME)?)?;
             let (total, after_cycles) = file.data.split_first_chunk()?;
-            Some((topic, TopicDigest { total: u32::from_le_bytes(*total), after_cycles: after_cycles.to_vec() }))
+            Some((
+                topic,
+                TopicDigest { total: u32::from_le_bytes(*total), after_cycles: after_cycles.to_vec() },
+            ))
         };
         Self(attachments.iter().filter_map(read).collect())
     }
@@ -117,7 +120,11 @@ mod tests {
         let mut digester = Digester::default();
         for (cycle, target_m) in (1..).zip(targets_m) {
             digester.take(&Recorded::Reading(Reading { cycle, ..Reading::default() }));
-            digester.take(&Recorded::Command(Command { cycle, target_m: [*target_m; 6], ..Command::default() }));
+            digester.take(&Recorded::Command(Command {
+                cycle,
+                target_m: [*target_m; 6],
+                ..Command::default()
+            }));
         }
         digester.finish()
     }

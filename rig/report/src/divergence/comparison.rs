@@ -90,8 +90,8 @@ impl Comparison {
         if !compared.has_topic(message.topic()) {
             return;
         }
-        if let (Side::A, Recorded::State(state)) = (side, message) {
-            self.clock.take(state);
+        if side == Side::A {
+            self.clock.take(message);
         }
         // A frame belongs to the cycle in which it is recorded.
         let cycle = message.cycle().unwrap_or(self.clock.cycle);

@@ -119,7 +119,14 @@ impl Differences {
             let _ = writeln!(
                 text,
                 "\n{:<36} {:>8} {:>9} {:>13} {:>9} {:>13} {:>9} {:>13}",
-                "differing field", "cycle", "motion, s", "first", "> 1 unit", "largest", "in cycle", "at the end"
+                "differing field",
+                "cycle",
+                "motion, s",
+                "first",
+                "> 1 unit",
+                "largest",
+                "in cycle",
+                "at the end"
             );
         }
         for FieldDifference { topic, motion_s, growth } in &self.fields {
@@ -139,10 +146,12 @@ impl Differences {
         for OneSided { topic, only_in_b, missing } in &self.one_sided {
             let Missing { first_cycle, messages } = missing;
             let name = names[usize::from(*only_in_b)];
-            let _ = writeln!(text, "only in {name}: {messages} on '{topic}', the first in cycle {first_cycle}");
+            let _ =
+                writeln!(text, "only in {name}: {messages} on '{topic}', the first in cycle {first_cycle}");
         }
         for topic in &self.redefined {
-            let _ = writeln!(text, "not compared: '{topic}', whose messages have other fields in {}", names[1]);
+            let _ =
+                writeln!(text, "not compared: '{topic}', whose messages have other fields in {}", names[1]);
         }
         for DigestDifference { topic, first_cycle } in &self.digests {
             let _ = writeln!(text, "the digests of '{topic}' differ from cycle {first_cycle} on");
@@ -167,12 +176,15 @@ impl Differences {
         let digest = self.digests.first().map(|DigestDifference { topic, first_cycle }| {
             let what = format!("topic '{topic}' by its digest");
             let whole = self.fields.first().filter(|field| field.growth.first_cycle > *first_cycle);
-            let whole = whole.zip(field.as_ref()).map(|(_, (cycle, what))| format!("; in cycle {cycle}, {what}"));
+            let whole =
+                whole.zip(field.as_ref()).map(|(_, (cycle, what))| format!("; in cycle {cycle}, {what}"));
             (*first_cycle, what + &whole.unwrap_or_default())
         });
         // Of several in one cycle the field says most.
         let first = [field.clone(), one_sided, digest].into_iter().flatten().min_by_key(|(cycle, _)| *cycle);
-        let Some((cycle, what)) = first else { return "DIFFERENT: the messages have other fields".to_owned() };
+        let Some((cycle, what)) = first else {
+            return "DIFFERENT: the messages have other fields".to_owned();
+        };
         let time = self.clock.motion_s(cycle);
         let time = time.map_or_else(String::new, |motion_s| format!(", {motion_s:.3} s of the motion"));
         format!("DIFFERENT from cycle {cycle} on{time}: {what}")

@@ -110,6 +110,9 @@ impl FieldGrowth {
             1e-3..1e5 => format!("{size:.3}"),
             _ => format!("{size:.2e}"),
         };
-        size.map_or_else(|| "–".to_owned(), |size| format!("{} {}", number(size), self.unit).trim_end().to_owned())
+        size.map_or_else(
+            || "–".to_owned(),
+            |size| format!("{} {}", number(size), self.unit).trim_end().to_owned(),
+        )
     }
 }

@@ -32,7 +32,8 @@ pub(super) struct LaneKey {
 
 impl LaneKey {
     pub(super) fn of(message: &Recorded) -> Self {
-        let place = ORDER.iter().position(|topic| *topic == message.topic()).expect("every topic has a place");
+        let place =
+            ORDER.iter().position(|topic| *topic == message.topic()).expect("every topic has a place");
         let is_of_controller = matches!(message, Recorded::Event(event) if event.is_of_controller());
         Self { place, is_of_controller }
     }

@@ -4,7 +4,8 @@ use masseter_recording::Field;
 
 /// What the name of a field ends with, the unit for its differences, and how many of these make one of the field's unit.
 /// The longest ends come first.
-const UNITS: [(&str, &str, f64); 6] = [
+const UNITS: [(&str, &str, f64); 7] = [
+    ("_per_s", "1/s", 1.0),
     ("_m_s", "mm/s", 1e3),
     ("_rad", "mrad", 1e3),
     ("_ns", "µs", 1e-3),
@@ -55,7 +56,10 @@ impl Measure {
         let size = match self {
             Self::Elements(_, factor) => {
                 // Unlike `max`, this keeps what is no number.
-                factor * differences().map(f64::abs).fold(0.0, |most, size| if size <= most { most } else { size })
+                factor
+                    * differences()
+                        .map(f64::abs)
+                        .fold(0.0, |most, size| if size <= most { most } else { size })
             }
             Self::Distance => 1e6 * norm(1.0),
             // A quaternion and its negative are one orientation; the chord between two is twice the sine of a quarter.

@@ -1,7 +1,8 @@
-//! Time since the start of the motion, from the states of a recording.
+//! Time since the start of the motion, from the states and events of a recording.
 
+use masseter_recording::Recorded;
 use masseter_shared::messages::State;
-use masseter_shared::messages::codes::ControllerState;
+use masseter_shared::messages::codes::{ControllerState, EventKind, Source};
 
 /// What tells the time of a cycle.
 #[derive(Debug, Clone, Copy, Default)]
@@ -16,11 +17,27 @@ pub(super) struct MotionClock {
 }
 
 impl MotionClock {
-    pub(super) fn take(&mut self, state: &State) {
+    pub(super) fn take(&mut self, message: &Recorded) {
+        match message {
+            Recorded::State(state) => self.take_state(state),
+            // A thinned recording has all events, and few states.
+            Recorded::Event(event)
+                if event.source == Source::Controller.code()
+                    && event.kind == EventKind::Transition.code()
+                    && event.to == ControllerState::Running.code() =>
+            {
+                self.running_from.get_or_insert(event.cycle);
+            }
+            _ => {}
+        }
+    }
+
+    fn take_state(&mut self, state: &State) {
         self.cycle = state.cycle;
         let (first_cycle, first_ns) = *self.first.get_or_insert((state.cycle, state.due_ns));
         let cycles = state.cycle.saturating_sub(first_cycle);
-        self.period_ns = self.period_ns.or_else(|| (state.due_ns.saturating_sub(first_ns)).checked_div(cycles));
+        self.period_ns =
+            self.period_ns.or_else(|| (state.due_ns.saturating_sub(first_ns)).checked_div(cycles));
         if state.controller_state == ControllerState::Running.code() {
             self.running_from.get_or_insert(state.cycle);
         }
