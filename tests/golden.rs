@@ -20,22 +20,22 @@ fn golden(extension: &str) -> Vec<PathBuf> {
 fn every_golden_scenario_gives_the_messages_that_were_recorded() {
     let scenarios = golden("toml");
     assert!(scenarios.len() >= 5, "{scenarios:?}");
-    let mut differences = String::new();
-    for scenario in scenarios {
-        let workspace = Workspace::new(&fs::read_to_string(&scenario).unwrap());
-        let played = workspace.run_virtual(&["--quiet"]);
-        let (recording, run) = (scenario.with_extension("mcap"), workspace.run_folder());
-        let compared = masseter(&["diff", recording.to_str().unwrap(), run.to_str().unwrap()]);
-        if compared.status.code() != Some(0) {
-            let name = scenario.file_stem().unwrap().display();
-            let said = [stderr(&played), stdout(&compared), stderr(&compared)].concat();
-            differences += &format!("{name} (A: golden, B: this build)\n{said}\n");
-        }
-    }
+    let differences: String = scenarios.iter().filter_map(|scenario| difference(scenario)).collect();
     assert!(
         differences.is_empty(),
         "{differences}If the change is meant: 'scripts/golden --renew' replaces the recordings; name the reason in the commit."
     );
+}
+
+/// Plays a scenario; what differs from its recording, if anything does.
+fn difference(scenario: &Path) -> Option<String> {
+    let workspace = Workspace::new(&fs::read_to_string(scenario).unwrap());
+    let played = workspace.run_virtual(&["--quiet"]);
+    let (recording, run) = (scenario.with_extension("mcap"), workspace.run_folder());
+    let compared = masseter(&["diff", recording.to_str().unwrap(), run.to_str().unwrap()]);
+    let name = scenario.file_stem().unwrap().display();
+    let said = [stderr(&played), stdout(&compared), stderr(&compared)].concat();
+    (compared.status.code() != Some(0)).then(|| format!("{name} (A: golden, B: this build)\n{said}\n"))
 }
 
 #[test]

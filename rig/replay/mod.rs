@@ -19,7 +19,7 @@ use masseter_report::divergence::{Compared, Comparison, Differences, Side};
 use masseter_shared::config::Scenario;
 use masseter_shared::control::{Controller, Duties, Operator, run_cycle, set_parameters};
 use masseter_shared::messages::codes::Cause;
-use masseter_shared::messages::{Event, Reading, State};
+use masseter_shared::messages::{Event, State};
 use masseter_shared::named::NamedValues;
 use masseter_shared::realtime::{Account, Wake};
 use masseter_shared::schedule::CycleSchedule;
@@ -199,12 +199,12 @@ impl Replay {
         while let Some(event) = run.intervention_in(state.cycle) {
             intervene(&event, &mut **controller, duties, run);
         }
-        let reading: Option<Reading> = deliveries.take(state)?;
+        let reading = deliveries.take(state)?;
         let times_ns = [state.received_ns, state.solved_ns, state.commanded_ns];
         let Ok(()) = run_cycle(
             &mut **controller,
             duties,
-            &mut LoggedPorts::new(log, times_ns, reading),
+            &mut LoggedPorts::new(log, times_ns, reading.as_ref()),
             &wake_of(state),
         );
         self.cycles += 1;

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::io::{Read, Seek};
 
-use masseter_analysis::SequenceCheck;
+use masseter_analysis::{SequenceCheck, TopicFigures};
 use masseter_recording::{Columns, Ending, Manifest, Reader, Recorded, Topic};
 use masseter_shared::messages::codes::{Cause, Source};
 use masseter_shared::messages::{Event, State};
@@ -50,10 +50,10 @@ impl RecordedRun {
         if reader.was_cut_short() || !reader.damage().is_empty() {
             return Err(ReplayError::Incomplete);
         }
-        let needed =
-            sequence.finish().into_iter().filter(|of| NEEDED.iter().any(|topic| topic.name() == of.topic));
-        for topic in needed.filter(|topic| topic.missing > 0) {
-            return Err(ReplayError::Gap { topic: topic.topic, missing: topic.missing });
+        let is_needed = |topic: &str| NEEDED.iter().any(|needed| needed.name() == topic);
+        let gap = sequence.finish().into_iter().find(|of| of.missing > 0 && is_needed(of.topic));
+        if let Some(TopicFigures { topic, missing, .. }) = gap {
+            return Err(ReplayError::Gap { topic, missing });
         }
         let has_died = matches!(manifest.ending, Ending::Died { .. });
         Ok(Self {

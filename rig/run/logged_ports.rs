@@ -22,8 +22,8 @@ pub(crate) struct LoggedPorts<'a, S> {
 
 impl<'a, S> LoggedPorts<'a, S> {
     /// The ports of a cycle with this reading, whose parts end at these times: reception, pose, command.
-    pub(crate) fn new(log: &'a mut Log<S>, times_ns: [u64; 3], reading: Option<Reading>) -> Self {
-        Self { log, times_ns, asked: Cell::new(0), reading, command: None }
+    pub(crate) fn new(log: &'a mut Log<S>, times_ns: [u64; 3], reading: Option<&Reading>) -> Self {
+        Self { log, times_ns, asked: Cell::new(0), reading: reading.copied(), command: None }
     }
 
     /// The command that the controller published.

@@ -161,7 +161,7 @@ impl<S: Sink> PlantPorts<VirtualLink> for VirtualRig<'_, S> {
         self.now_ns = sync.due_ns + self.schedule.controller_at_ns;
         let wake = Wake::on_time(sync.cycle, self.now_ns);
         let (reading, now_ns) = (self.reading.take(), self.now_ns);
-        let mut ports = LoggedPorts::new(&mut self.log, [now_ns; 3], reading);
+        let mut ports = LoggedPorts::new(&mut self.log, [now_ns; 3], reading.as_ref());
         let Ok(()) =
             masseter_shared::control::run_cycle(&mut *self.controller, &mut self.duties, &mut ports, &wake);
         Ok(ports.into_command())

@@ -176,7 +176,7 @@ impl Columns {
             let definition = str::from_utf8(&channel.schema.as_ref()?.data).ok()?;
             Some((Topic::named(&channel.topic)?, Self::from_definition(definition)?))
         };
-        channels.filter_map(|channel| table(channel)).collect()
+        channels.filter_map(table).collect()
     }
 
     fn add_field(&mut self, line: &str) -> Option<()> {
