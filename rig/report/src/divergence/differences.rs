@@ -6,7 +6,7 @@ use masseter_recording::Topic;
 use masseter_terminal::Exit;
 use serde::Serialize;
 
-use super::comparison::Compared;
+use super::compared::Compared;
 use super::field_growth::FieldGrowth;
 use super::lane::{Lane, Missing};
 use super::motion_clock::MotionClock;

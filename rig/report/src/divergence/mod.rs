@@ -3,6 +3,7 @@
 //! `masseter diff` compares two recordings, `masseter replay` a recording with the answers of a controller. Numbers are
 //! compared bit by bit. Figures of two runs are compared by [`compare`](crate::compare).
 
+mod compared;
 mod comparison;
 mod differences;
 mod field_growth;
@@ -11,6 +12,7 @@ mod measure;
 mod motion_clock;
 mod recordings;
 
-pub use comparison::{Compared, Comparison, Side};
+pub use compared::Compared;
+pub use comparison::{Comparison, Side};
 pub use differences::Differences;
 pub use recordings::recordings;

@@ -8,7 +8,8 @@ use anyhow::{Context, ensure};
 use masseter_recording::{Columns, Digester, Digests, Reader, Recorded, RunFolder, is_kept};
 use masseter_terminal::{Exit, Format, result};
 
-use super::comparison::{Compared, Comparison, Side};
+use super::compared::Compared;
+use super::comparison::{Comparison, Side};
 use super::differences::Differences;
 
 /// What a reader may want to know next.
