@@ -42,6 +42,11 @@ pub(crate) enum ControllerKind {
 }
 
 impl ControllerKind {
+    /// The controller that a manifest names; none for a program of the user.
+    pub(crate) fn of_manifest(name: Option<&str>) -> Option<Self> {
+        name.map_or_else(|| Some(Self::default()), |name| Self::from_str(name, false).ok())
+    }
+
     /// How the controller is built.
     pub(crate) fn builder(self) -> BuildController {
         match self {

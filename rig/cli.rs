@@ -16,6 +16,7 @@ use crate::campaigns::{
 use crate::can::{self, CanVerb};
 use crate::clean;
 use crate::controller::{self, ControllerArgs};
+use crate::diff::{self, DiffArgs};
 use crate::doctor::{self, DoctorArgs};
 use crate::error_text::in_one_line;
 use crate::faults::{self, FaultsVerb};
@@ -30,6 +31,7 @@ use crate::param::{self, ParamVerb};
 use crate::plant::{self, PlantArgs};
 use crate::recorder::{self, RecorderArgs};
 use crate::recording_cli::{self, RecordingVerb};
+use crate::replay::{self, ReplayArgs};
 use crate::report_cli::{self, ReportArgs};
 use crate::robot::{self, RobotVerb};
 use crate::run::{
@@ -116,6 +118,10 @@ enum Verb {
     Plant(PlantArgs),
     /// Write the report of a run again, or compare two runs
     Report(ReportArgs),
+    /// Give the recorded readings of a run to its controller again, and compare the answers
+    Replay(ReplayArgs),
+    /// Find the first message in which two recordings differ
+    Diff(DiffArgs),
     /// Check whether this machine is fit for real-time runs
     Doctor(DoctorArgs),
     /// Inspect, verify, recover and export recordings
@@ -201,6 +207,8 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Faults(verb) => faults::execute(&verb),
         Verb::Signals(args) => signals_cli::signals(&args).usage(),
         Verb::Report(args) => report_cli::report(&args),
+        Verb::Replay(args) => replay::replay(&args).usage(),
+        Verb::Diff(args) => diff::diff(&args).usage(),
         Verb::Bench(args) => bench::run(&args),
         Verb::BenchPeer(args) => bench::ipc::answer(&args).map(|()| Exit::Passed).usage(),
         Verb::Fk(args) => kinematics_cli::forward(&args).usage(),

@@ -5,9 +5,10 @@ use std::fmt::Write;
 use clap::Command;
 
 /// What a user wants, and the verbs for that.
-const GROUPS: [(&str, &[&str]); 7] = [
-    ("Play a motion and judge it", &["init", "run", "test", "signals", "faults", "report", "recording"]),
+const GROUPS: [(&str, &[&str]); 8] = [
+    ("Play a motion and judge it", &["init", "run", "test", "signals", "faults"]),
     ("Play a scenario in many variants", &["campaign", "search", "shrink"]),
+    ("Work with past runs", &["report", "replay", "diff", "recording"]),
     ("Bring your own controller", &["new", "interface", "controller", "param"]),
     ("Prepare this machine", &["doctor", "bench", "clean"]),
     ("Work with CAN and the drives", &["robot", "can", "plant"]),

@@ -1,5 +1,4 @@
-//! The `masseter` command. Modules of verbs: `bench`, `campaigns`, `can`, `clean`, `doctor`, `init`, `kinematics_cli`,
-//! `manuals`, `paper_study`, `plant`, `recording_cli`, `report_cli`, `robot`, `run` and `uniqueness`; [`cli`] dispatches to them.
+//! The `masseter` command. [`cli`] dispatches to the modules of verbs.
 //!
 //! `run` starts controller, plant and `recorder` as processes of this executable (`run::supervisor`), or steps their
 //! cores in one thread under virtual time (`run::virtual_time`). Figures of a run are computed from its recording and
@@ -16,6 +15,7 @@ mod can;
 mod clean;
 pub mod cli;
 mod controller;
+mod diff;
 mod doctor;
 mod error_text;
 mod faults;
@@ -33,6 +33,7 @@ mod param;
 mod plant;
 mod recorder;
 mod recording_cli;
+mod replay;
 mod report_cli;
 mod robot;
 mod run;

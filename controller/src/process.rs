@@ -60,10 +60,20 @@ fn play(
     context: ProcessContext,
     build: impl FnOnce(&Scenario, Mechanism, Trajectory) -> Box<dyn Controller>,
 ) -> Result<Outcome, ControllerError> {
-    let scenario = &context.scenario;
+    let mut controller = for_scenario(&context.scenario, build)?;
+    Ok(Session::start(context, controller.declared())?.run(&mut *controller)?)
+}
+
+/// Builds a controller for the mechanism and the motion of a scenario.
+///
+/// # Errors
+/// [`ControllerError`] when either cannot be used.
+pub fn for_scenario(
+    scenario: &Scenario,
+    build: impl FnOnce(&Scenario, Mechanism, Trajectory) -> Box<dyn Controller>,
+) -> Result<Box<dyn Controller>, ControllerError> {
     let mechanism = Mechanism::new(&scenario.mechanism)?;
     let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
     let trajectory = trajectory.slowed(scenario.dry.speed_now());
-    let mut controller = build(scenario, mechanism, trajectory);
-    Ok(Session::start(context, controller.declared())?.run(&mut *controller)?)
+    Ok(build(scenario, mechanism, trajectory))
 }

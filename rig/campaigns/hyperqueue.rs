@@ -68,13 +68,18 @@ fn submit(folder: &Path, open: &[usize], args: &HyperqueueArgs) -> anyhow::Resul
         .stdin(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
-        .with_context(|| format!("cannot start {}: install it, or name another --python", python.display()))?;
+        .with_context(|| {
+            format!("cannot start {}: install it, or name another --python", python.display())
+        })?;
     let numbers: Vec<_> = open.iter().map(ToString::to_string).collect();
     let written = child.stdin.take().context("no standard input")?.write_all(numbers.join(" ").as_bytes());
     let output = child.wait_with_output().context("cannot wait for HyperQueue")?;
     let said = String::from_utf8_lossy(&output.stderr);
     if said.contains("No module named 'hyperqueue'") {
-        bail!("{} has no package hyperqueue: pip install hyperqueue, in the version of the server", python.display());
+        bail!(
+            "{} has no package hyperqueue: pip install hyperqueue, in the version of the server",
+            python.display()
+        );
     }
     let last = said.trim().lines().next_back().unwrap_or_default();
     ensure!(

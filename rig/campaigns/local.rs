@@ -77,7 +77,12 @@ impl Tally {
         if now_ns - self.said_ns >= PROGRESS_EVERY_NS {
             self.said_ns = now_ns;
             let left_s = self.lasted_s() / self.ended as f64 * (self.of - self.ended) as f64;
-            status!("{} of {} cases, {} did not pass, about {left_s:.0} s left", self.ended, self.of, self.failures);
+            status!(
+                "{} of {} cases, {} did not pass, about {left_s:.0} s left",
+                self.ended,
+                self.of,
+                self.failures
+            );
         }
     }
 

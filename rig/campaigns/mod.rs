@@ -47,7 +47,12 @@ pub(crate) fn campaign(args: &CampaignArgs) -> Result<Exit, Failure> {
         EngineKind::Hyperqueue => hyperqueue::run(&campaign, &folder, &args.hyperqueue),
     }?;
     if interrupts.is_stop_requested() {
-        status!("interrupted after {} of {} cases; {}", results.len(), campaign.case_count(), go_on(args, &out));
+        status!(
+            "interrupted after {} of {} cases; {}",
+            results.len(),
+            campaign.case_count(),
+            go_on(args, &out)
+        );
         return Ok(Exit::Interrupted);
     }
     let report = Report::new(&campaign, results);

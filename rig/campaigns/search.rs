@@ -28,7 +28,8 @@ pub(crate) fn search(args: &SearchArgs) -> Result<Exit, Failure> {
     let interrupts = listen()?;
     status!("at most {} runs; results in {}", args.runs, out.display());
     let player = Player { controller: args.controller, interrupts: &interrupts };
-    let seeker = Seeker { args, campaign: &campaign, folder: &folder, player: &player, ended: Mutex::default() };
+    let seeker =
+        Seeker { args, campaign: &campaign, folder: &folder, player: &player, ended: Mutex::default() };
     let first = seeker.run()?;
     if interrupts.is_stop_requested() {
         status!("interrupted; the same command with --out {} goes on", out.display());
@@ -58,7 +59,10 @@ fn check(campaign: &Campaign, args: &SearchArgs) -> anyhow::Result<()> {
         args.minimise.as_deref().unwrap_or_default(),
         names.join(", ")
     );
-    ensure!(!names.is_empty(), "a search needs a [[require]] with a limit in numbers: its margin leads the way");
+    ensure!(
+        !names.is_empty(),
+        "a search needs a [[require]] with a limit in numbers: its margin leads the way"
+    );
     Ok(())
 }
 
@@ -126,7 +130,9 @@ fn value(result: &CaseResult, requirement: Option<&str>) -> Value {
         return Value::Nothing;
     }
     let margin = match requirement {
-        Some(name) => result.checks.iter().find(|check| check.name == name).and_then(|check| check.relative_margin),
+        Some(name) => {
+            result.checks.iter().find(|check| check.name == name).and_then(|check| check.relative_margin)
+        }
         None if !result.has_passed() => {
             Some(result.least_margin().map_or(STOPPED, |(_, margin)| margin.min(STOPPED)))
         }

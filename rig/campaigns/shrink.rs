@@ -83,7 +83,10 @@ fn reason_of(player: &Player<'_>, scenario: &Scenario, requirement: Option<&str>
     let (verdict, figures) = player.judge(scenario)?;
     if let Some(name) = requirement {
         let refusal = || anyhow!("'{name}' does not fail: {}: {}", verdict.word, verdict.reason);
-        return has_failed(&verdict, name).then(|| Reason::Check(name.to_owned())).ok_or_else(refusal).usage();
+        return has_failed(&verdict, name)
+            .then(|| Reason::Check(name.to_owned()))
+            .ok_or_else(refusal)
+            .usage();
     }
     if verdict.exit_code == Exit::Passed {
         return Err(anyhow!("the scenario passes: there is nothing to shrink")).usage();

@@ -70,6 +70,7 @@ fn record(file: &Path, run: &Path, result: &CaseResult, player: &Player<'_>) -> 
 /// The command that plays the case again.
 fn command(file: &Path, controller: ControllerKind) -> String {
     let is_default = controller == ControllerKind::default();
-    let controller = if is_default { String::new() } else { format!(" --controller {}", name_of(&controller)) };
+    let controller =
+        if is_default { String::new() } else { format!(" --controller {}", name_of(&controller)) };
     format!("masseter run {} --clock virtual{controller}", word(&file.display().to_string()))
 }

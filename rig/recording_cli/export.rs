@@ -7,11 +7,9 @@ use std::iter;
 use std::path::Path;
 
 use anyhow::Context;
-use masseter_recording::{CDR_LITTLE_ENDIAN, Entry, Reader, Recorded};
+use masseter_recording::{CDR_LITTLE_ENDIAN, Columns, Entry, Reader, Recorded};
 use masseter_report::CandumpLogs;
 use masseter_shared::messages::tap;
-
-use super::columns::Columns;
 
 /// A CSV file that is being written.
 struct CsvFile {
@@ -56,7 +54,7 @@ impl CsvFile {
         let path = folder.join(&name);
         let file = File::create_new(&path).with_context(|| format!("cannot create {}", path.display()))?;
         let mut table = csv::Writer::from_writer(file);
-        table.write_record(iter::once("log_time_ns").chain(columns.names()))?;
+        table.write_record(iter::once("log_time_ns".to_owned()).chain(columns.names()))?;
         Ok(Self { name, columns, table, rows: 0 })
     }
 

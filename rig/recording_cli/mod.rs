@@ -5,7 +5,6 @@
 //! recording it reads.
 
 mod attached;
-mod columns;
 mod export;
 mod selection;
 mod survey;
@@ -17,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
-use masseter_recording::{Reader, Recovered, RunFolder, recover};
+use masseter_recording::{Reader, Recovered, RunFolder, recover, thin};
 use masseter_shared::wording::counted;
 use masseter_terminal::{Exit, result, result_with_tones};
 
@@ -35,6 +34,8 @@ pub(crate) enum RecordingVerb {
     Verify(RecordingArgs),
     /// Save the readable messages of a damaged recording in a new one
     Recover(RecoverArgs),
+    /// Keep few messages and the digests of all: a golden run, small enough for a repository
+    Thin(ThinArgs),
     /// Write one CSV file per topic, and the CAN frames as candump logs; or the attached files
     Export(ExportArgs),
 }
@@ -56,6 +57,19 @@ pub(crate) struct RecoverArgs {
     /// New recording; must not exist [default: beside the old one, with '.recovered' in its name]
     #[arg(long, value_name = "FILE.mcap")]
     out: Option<PathBuf>,
+}
+
+/// The arguments of `thin`.
+#[derive(Debug, Clone, Args)]
+#[command(
+    after_help = "Example:\n  masseter recording thin runs/latest --out golden.mcap\n\n'masseter diff golden.mcap RUN' compares a later run with it."
+)]
+pub(crate) struct ThinArgs {
+    #[command(flatten)]
+    from: RecordingArgs,
+    /// New recording; must not exist
+    #[arg(long, value_name = "FILE.mcap")]
+    out: PathBuf,
 }
 
 /// The arguments of `export`.
@@ -93,6 +107,7 @@ pub(crate) fn execute(verb: &RecordingVerb) -> anyhow::Result<Exit> {
         RecordingVerb::Info(args) => inspect(args, Survey::info),
         RecordingVerb::Verify(args) => inspect(args, Survey::verification),
         RecordingVerb::Recover(args) => save_readable(args),
+        RecordingVerb::Thin(args) => keep_few(args),
         RecordingVerb::Export(args) => export(args),
     }
 }
@@ -127,6 +142,19 @@ fn save_readable(args: &RecoverArgs) -> anyhow::Result<Exit> {
         let _ = fs::remove_file(&out);
     })?;
     result(&format!("{}\n{}{}", out.display(), recovered_text(recovered), survey.loss()?))?;
+    Ok(Exit::Passed)
+}
+
+fn keep_few(args: &ThinArgs) -> anyhow::Result<Exit> {
+    let (path, out) = (args.from.path()?, &args.out);
+    let mut reader = open(&path)?;
+    let file = File::create_new(out).with_context(|| format!("cannot create {}", out.display()))?;
+    let kept = thin(&mut reader, BufWriter::new(file)).inspect_err(|_| {
+        // The first error is the one to report.
+        let _ = fs::remove_file(out);
+    });
+    let kept = kept.with_context(|| path.display().to_string())?;
+    result(&format!("{}\n{} and the digests of all\n", out.display(), counted(kept, "message")))?;
     Ok(Exit::Passed)
 }
 

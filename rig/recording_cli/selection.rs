@@ -3,11 +3,9 @@
 use std::collections::BTreeMap;
 
 use anyhow::bail;
-use masseter_recording::SCHEMA_ENCODING;
+use masseter_recording::{Columns, SCHEMA_ENCODING};
 use masseter_shared::wording::nearest;
 use mcap::{Channel, Schema};
-
-use super::columns::Columns;
 
 /// The selected and the skipped topics.
 #[derive(Debug, Default)]

@@ -10,6 +10,8 @@ mod clock;
 mod controller;
 mod ending;
 pub(crate) mod exec_program;
+mod log;
+mod logged_ports;
 mod prepared;
 mod program;
 mod reports;
@@ -28,8 +30,11 @@ use crate::machine::interrupts::Interrupts;
 use args::RunArgs;
 
 pub(crate) use clock::needs_processes;
+pub(crate) use log::Log;
+pub(crate) use logged_ports::LoggedPorts;
 pub(crate) use prepared::{PreparedRun, figures_unrecorded, judge_unrecorded};
 pub(crate) use resolve::check_simulated;
+pub(crate) use sink::Sink;
 
 /// Plays the motion, judges the run, and writes its folder.
 pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {

@@ -32,7 +32,10 @@ pub(super) fn resolve(args: &RunArgs) -> anyhow::Result<(RunPlan, RunArgs)> {
 
 /// The plan of a scenario for virtual time, under which a controller of the rig runs alone.
 pub(super) fn resolve_simulated(scenario: &Scenario, build: BuildController) -> anyhow::Result<RunPlan> {
-    ensure!(!needs_processes(scenario), "a fault of a process needs processes, which virtual time does not have");
+    ensure!(
+        !needs_processes(scenario),
+        "a fault of a process needs processes, which virtual time does not have"
+    );
     let plan = RunPlan::new(scenario.clone())?;
     check_controller(&plan, build)?;
     Ok(plan)

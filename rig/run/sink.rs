@@ -5,7 +5,7 @@ use masseter_recording::{Backlog, Recorded};
 use masseter_shared::messages::tap::TapError;
 
 /// Takes every message of a run.
-pub(super) trait Sink {
+pub(crate) trait Sink {
     /// Takes a message that was published at `now_ns`.
     fn take(&mut self, message: &Recorded, now_ns: u64);
 

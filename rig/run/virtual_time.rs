@@ -4,8 +4,6 @@
 //! same bytes. Computing takes no time here, and readings and commands go out when the time table has them at the
 //! latest: what varies is the bus.
 
-use std::convert::Infallible;
-
 use anyhow::Context;
 use masseter_analysis::{Analysis, Figures};
 use masseter_controller::process::BuildController;
@@ -14,18 +12,18 @@ use masseter_plant::PlantError;
 use masseter_plant::core::PlantCore;
 use masseter_plant::cycle::PlantPorts;
 use masseter_plant::emulation::VirtualLink;
-use masseter_recording::{Backlog, Ending, Manifest, Pace, Recorded, Recorder, RunFolder, Scene};
-use masseter_shared::control::{Controller, ControllerPorts, Duties, Operator, Outcome, set_parameters};
+use masseter_recording::{Backlog, Ending, Manifest, Pace, Recorder, RunFolder, Scene};
+use masseter_shared::control::{Controller, Duties, Operator, Outcome, set_parameters};
 use masseter_shared::lockstep::EPOCH_NS;
-use masseter_shared::messages::{
-    Command, Contact, Event, Message, Parameters, Reading, Signals, State, Truth,
-};
+use masseter_shared::messages::{Command, Contact, Reading, Truth};
 use masseter_shared::named::NamedValues;
 use masseter_shared::realtime::Wake;
 use masseter_shared::schedule::CycleSchedule;
 use masseter_terminal::status;
 
 use super::child::PLANT;
+use super::log::{Log, Publisher};
+use super::logged_ports::LoggedPorts;
 use super::sink::{Sink, Stream};
 use crate::machine::interrupts::Interrupts;
 
@@ -89,14 +87,14 @@ impl Run {
         let Self { controller, duties } = self;
         let scenario = &plan.scenario;
         let mut plant = PlantCore::new(scenario, EPOCH_NS)?;
-        let log = Log { sink, published: Default::default() };
+        let log = Log::new(sink);
         let mut rig =
             VirtualRig { controller, duties, schedule: &plan.schedule, log, now_ns: EPOCH_NS, reading: None };
 
         let (mut cycle, mut plant_error) = (0, None);
         while plant_error.is_none()
             && rig.controller.outcome().is_none()
-            && !rig.log.sink.has_failed()
+            && !rig.log.sink().has_failed()
             && !interrupts.is_abort_requested()
         {
             cycle += 1;
@@ -112,7 +110,7 @@ impl Run {
             (None, Some(Outcome::SafeStop)) => Ending::SafeStop,
             (None, _) => Ending::Completed,
         };
-        Ok((rig.log.sink, ending))
+        Ok((rig.log.into_sink(), ending))
     }
 }
 
@@ -163,109 +161,14 @@ impl<S: Sink> PlantPorts<VirtualLink> for VirtualRig<'_, S> {
         self.now_ns = sync.due_ns + self.schedule.controller_at_ns;
         let wake = Wake::on_time(sync.cycle, self.now_ns);
         let (reading, now_ns) = (self.reading.take(), self.now_ns);
-        let mut ports = VirtualPorts { log: &mut self.log, now_ns, reading, command: None };
+        let mut ports = LoggedPorts::new(&mut self.log, [now_ns; 3], reading.as_ref());
         let Ok(()) =
             masseter_shared::control::run_cycle(&mut *self.controller, &mut self.duties, &mut ports, &wake);
-        Ok(ports.command)
+        Ok(ports.into_command())
     }
 
     fn publish_frames_and_events(&mut self, plant: &mut PlantCore) -> Result<(), PlantError> {
         self.log.drain(plant, self.now_ns);
         Ok(())
-    }
-}
-
-/// The controller's side of a cycle.
-struct VirtualPorts<'a, S> {
-    log: &'a mut Log<S>,
-    now_ns: u64,
-    reading: Option<Reading>,
-    command: Option<Command>,
-}
-
-impl<S: Sink> ControllerPorts for VirtualPorts<'_, S> {
-    type Reading = Reading;
-    type Error = Infallible;
-
-    fn now_ns(&self) -> u64 {
-        self.now_ns
-    }
-
-    fn reading(&mut self, _: &Wake) -> Result<Option<Reading>, Infallible> {
-        Ok(self.reading.take())
-    }
-
-    fn publish_command(&mut self, fill: impl FnOnce(&mut Command)) -> Result<(), Infallible> {
-        self.command = Some(self.log.record(Publisher::Command, self.now_ns, fill));
-        Ok(())
-    }
-
-    fn publish_state(&mut self, fill: impl FnOnce(&mut State)) -> Result<(), Infallible> {
-        self.log.record(Publisher::State, self.now_ns, fill);
-        Ok(())
-    }
-
-    fn publish_signals(&mut self, fill: impl FnOnce(&mut Signals)) -> Result<(), Infallible> {
-        self.log.record(Publisher::Signals, self.now_ns, fill);
-        Ok(())
-    }
-
-    fn publish_parameters(&mut self, fill: impl FnOnce(&mut Parameters)) -> Result<(), Infallible> {
-        self.log.record(Publisher::Parameters, self.now_ns, fill);
-        Ok(())
-    }
-
-    fn publish_event(&mut self, event: &Event) -> Result<(), Infallible> {
-        self.log.record(Publisher::ControllerEvent, self.now_ns, |message| *message = *event);
-        Ok(())
-    }
-}
-
-/// The publishers of a run. Each numbers its own messages.
-#[derive(Clone, Copy)]
-enum Publisher {
-    Command,
-    Reading,
-    State,
-    Signals,
-    Parameters,
-    Truth,
-    Contact,
-    Frame,
-    ControllerEvent,
-    PlantEvent,
-}
-
-/// The sink, and how many messages of each publisher it took.
-struct Log<S> {
-    sink: S,
-    published: [u64; Publisher::PlantEvent as usize + 1],
-}
-
-impl<S: Sink> Log<S> {
-    /// Numbers a message, as its publisher would, and hands it on.
-    fn record<M: Message + Into<Recorded>>(
-        &mut self,
-        publisher: Publisher,
-        now_ns: u64,
-        fill: impl FnOnce(&mut M),
-    ) -> M {
-        let mut message = M::default();
-        fill(&mut message);
-        let number = &mut self.published[publisher as usize];
-        *number += 1;
-        message.stamp(*number, now_ns);
-        self.sink.take(&message.into(), now_ns);
-        message
-    }
-
-    /// Hands on the frames and events of a cycle.
-    fn drain(&mut self, plant: &mut PlantCore, now_ns: u64) {
-        for frame in plant.drain_frames() {
-            self.record(Publisher::Frame, now_ns, |message| *message = frame);
-        }
-        plant.drain_events(&mut |event| {
-            self.record(Publisher::PlantEvent, now_ns, |message| *message = event);
-        });
     }
 }

@@ -54,9 +54,8 @@ impl Campaign {
         self.base()?;
         for factor in &self.file.factors {
             let refusal = self.scenario(&[factor.at(0.5)], 0).err();
-            let refusal = refusal.filter(|error| {
-                !matches!(error.downcast_ref(), Some(ScenarioError::BadValue { .. }))
-            });
+            let refusal =
+                refusal.filter(|error| !matches!(error.downcast_ref(), Some(ScenarioError::BadValue { .. })));
             refusal.map_or(Ok(()), |error| Err(error.context(format!("factor '{}'", factor.name()))))?;
         }
         Ok(())
@@ -161,7 +160,8 @@ mod tests {
     fn every_point_is_run_with_every_seed() {
         let campaign = campaign("seeds = 2\n[[factor]]\nkey = 'rate_hz'\nvalues = [500, 1000]");
         let points = campaign.points();
-        let scenarios = (0..campaign.case_count()).map(|number| campaign.case(&points, number).scenario.unwrap());
+        let scenarios =
+            (0..campaign.case_count()).map(|number| campaign.case(&points, number).scenario.unwrap());
         let runs: Vec<_> = scenarios.map(|scenario| (scenario.rate_hz, scenario.seed)).collect();
         assert_eq!(runs, [(500, 1), (500, 2), (1000, 1), (1000, 2)]);
     }

@@ -54,7 +54,8 @@ impl Setting {
     /// Enters the value into a scenario's table of changes.
     pub(crate) fn enter(&self, changes: &mut Table) {
         let (Some(key), Some(value)) = (&self.key, &self.value) else { return };
-        let (folders, name) = key.rsplit_once('.').map_or(("", key.as_str()), |(folders, name)| (folders, name));
+        let (folders, name) =
+            key.rsplit_once('.').map_or(("", key.as_str()), |(folders, name)| (folders, name));
         let folders = folders.split('.').filter(|name| !name.is_empty());
         let inner = folders.fold(changes, |table, name| {
             let entry = table.entry(name).or_insert_with(|| Value::Table(Table::new()));

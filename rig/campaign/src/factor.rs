@@ -176,9 +176,8 @@ impl Factor {
 
     /// Checks the factor by itself; its keys are checked with the scenario of each case.
     pub(crate) fn validate(&self) -> Result<(), FactorError> {
-        let refuse = |reason: &str| {
-            Err(FactorError { factor: self.name().to_owned(), reason: reason.to_owned() })
-        };
+        let refuse =
+            |reason: &str| Err(FactorError { factor: self.name().to_owned(), reason: reason.to_owned() });
         let is_normal = self.distribution == Distribution::Normal;
         let given = [self.range.is_some() || is_normal, self.values.is_some(), self.faults.is_some()];
         if given.into_iter().filter(|is_given| *is_given).count() != 1 {
@@ -193,7 +192,9 @@ impl Factor {
         if let Some(faults) = &self.faults {
             let is_fault = |fault: &Value| fault.is_table() || fault.as_str() == Some(NO_FAULT);
             if !faults.iter().all(is_fault) {
-                return refuse("write each fault as a table, such as { kind = \"lose\", at_s = 2.0 }, or \"none\"");
+                return refuse(
+                    "write each fault as a table, such as { kind = \"lose\", at_s = 2.0 }, or \"none\"",
+                );
             }
         }
         if self.levels.is_some_and(|levels| !(1..=MOST_LEVELS).contains(&levels)) {

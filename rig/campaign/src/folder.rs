@@ -76,7 +76,8 @@ impl CampaignFolder {
     /// [`FolderError`]: another campaign is there, or a process runs this one.
     pub fn begin(path: &Path, campaign: &Campaign) -> Result<(Self, CampaignLock), FolderError> {
         let folder = Self { path: path.to_owned() };
-        if path.is_dir() && !folder.plan_path().exists() && fs::read_dir(path).is_ok_and(has_more_than_a_lock) {
+        if path.is_dir() && !folder.plan_path().exists() && fs::read_dir(path).is_ok_and(has_more_than_a_lock)
+        {
             return Err(FolderError::NoCampaign(path.to_owned()));
         }
         for inner in [folder.cases_path(), folder.path.join(ATTEMPTS)] {
@@ -182,9 +183,8 @@ impl CampaignFolder {
     fn refuse_another(&self, campaign: &Campaign) -> Result<(), FolderError> {
         let begun = self.read_plan()?;
         let difference = begun.difference_to(campaign);
-        difference.map_or(Ok(()), |difference| {
-            Err(FolderError::OfAnother { path: self.path.clone(), difference })
-        })
+        difference
+            .map_or(Ok(()), |difference| Err(FolderError::OfAnother { path: self.path.clone(), difference }))
     }
 
     fn read_plan(&self) -> Result<Campaign, FolderError> {
@@ -237,7 +237,9 @@ impl Attempt {
         fs::write(&kept, text).map_err(system(&kept))?;
         let _ = fs::remove_file(path.join(LOCK));
         match fs::rename(path, &self.target) {
-            Err(error) if !matches!(error.kind(), ErrorKind::DirectoryNotEmpty | ErrorKind::AlreadyExists) => {
+            Err(error)
+                if !matches!(error.kind(), ErrorKind::DirectoryNotEmpty | ErrorKind::AlreadyExists) =>
+            {
                 Err(error).map_err(system(&self.target))
             }
             _ => Ok(()),
@@ -335,9 +337,8 @@ mod tests {
     fn the_folder_of_another_campaign_is_refused_with_the_difference() {
         let parent = tempfile::tempdir().unwrap();
         let (_, lock) = CampaignFolder::begin(parent.path(), &two()).unwrap();
-        let refusal = |campaign: &Campaign| {
-            CampaignFolder::begin(parent.path(), campaign).unwrap_err().to_string()
-        };
+        let refusal =
+            |campaign: &Campaign| CampaignFolder::begin(parent.path(), campaign).unwrap_err().to_string();
         assert!(refusal(&two()).contains("another masseter runs"));
         drop(lock);
         let other = campaign("[[factor]]\nkey = 'rate_hz'\nvalues = [500, 1000, 2000]");

@@ -139,7 +139,11 @@ fn rate_in_words(report: &Report<'_>) -> String {
     let [low, high] = rate.interval.map(percent);
     let demanded = report.campaign.file.least_success;
     let demanded = demanded.map_or_else(String::new, |least| format!("; {} demanded", percent(least)));
-    format!("Success rate {} of {} judged cases, 95 % interval {low} to {high}{demanded}.", percent(share), rate.judged)
+    format!(
+        "Success rate {} of {} judged cases, 95 % interval {low} to {high}{demanded}.",
+        percent(share),
+        rate.judged
+    )
 }
 
 fn least_margin(result: &CaseResult) -> String {

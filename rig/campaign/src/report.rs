@@ -46,7 +46,10 @@ impl<'a> Report<'a> {
     }
 
     /// The number of results.
-    #[expect(clippy::len_without_is_empty, reason = "a report is asked for its size, never whether it has one")]
+    #[expect(
+        clippy::len_without_is_empty,
+        reason = "a report is asked for its size, never whether it has one"
+    )]
     pub fn len(&self) -> usize {
         self.results.len()
     }
@@ -113,7 +116,11 @@ impl<'a> Report<'a> {
         let worst = self.worst(1);
         let worst = worst.first().and_then(|result| {
             let (name, margin) = result.least_margin()?;
-            Some(format!("smallest margin: {:.1} % of its limit, {name}, case {}\n", margin * 100.0, result.number))
+            Some(format!(
+                "smallest margin: {:.1} % of its limit, {name}, case {}\n",
+                margin * 100.0,
+                result.number
+            ))
         });
         let word = if self.is_success() { "PASS" } else { "FAIL" };
         format!(
@@ -133,7 +140,8 @@ impl<'a> Report<'a> {
         let Some(share) = rate.share() else { return "no case was judged\n".to_owned() };
         let [low, high] = rate.interval.map(|end| end * 100.0);
         let demanded = self.campaign.file.least_success;
-        let demanded = demanded.map_or_else(String::new, |least| format!(", demanded {:.1} %", least * 100.0));
+        let demanded =
+            demanded.map_or_else(String::new, |least| format!(", demanded {:.1} %", least * 100.0));
         format!(
             "success rate: {:.1} % of {} judged, 95 % interval {low:.1} to {high:.1} %{demanded}\n",
             share * 100.0,

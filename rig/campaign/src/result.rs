@@ -106,7 +106,8 @@ impl CaseResult {
 
     /// The smallest margin of its checks as a share of their limits, with the name of the check.
     pub fn least_margin(&self) -> Option<(&str, f64)> {
-        let margins = self.checks.iter().filter_map(|check| Some((check.name.as_str(), check.relative_margin?)));
+        let margins =
+            self.checks.iter().filter_map(|check| Some((check.name.as_str(), check.relative_margin?)));
         margins.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 }

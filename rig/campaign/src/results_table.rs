@@ -7,7 +7,8 @@ use crate::result::{CaseCheck, CaseResult};
 
 /// The table: case, factors, verdict, margins, figures.
 pub(crate) fn results_table(campaign: &Campaign, results: &[CaseResult]) -> Table {
-    let columns = [identity(results), factors(campaign, results), verdict(results), checks(results), figures(results)];
+    let columns =
+        [identity(results), factors(campaign, results), verdict(results), checks(results), figures(results)];
     Table::new(columns.into_iter().flatten().collect())
 }
 
@@ -15,7 +16,12 @@ fn identity(results: &[CaseResult]) -> Vec<Column> {
     vec![
         Column::new("case", "", "place in the campaign", whole(results, |result| result.number as i64)),
         Column::new("id", "", "identity by content", words(results, |result| result.id.clone())),
-        Column::new("more_seed", "", "added to the seed of the scenario", whole(results, |result| result.more_seed as i64)),
+        Column::new(
+            "more_seed",
+            "",
+            "added to the seed of the scenario",
+            whole(results, |result| result.more_seed as i64),
+        ),
     ]
 }
 
@@ -37,7 +43,12 @@ fn factors(campaign: &Campaign, results: &[CaseResult]) -> Vec<Column> {
 fn verdict(results: &[CaseResult]) -> Vec<Column> {
     vec![
         Column::new("verdict", "", "verdict in a word", words(results, |result| result.word.clone())),
-        Column::new("exit_code", "", "verdict as exit code", whole(results, |result| result.exit_code.into())),
+        Column::new(
+            "exit_code",
+            "",
+            "verdict as exit code",
+            whole(results, |result| result.exit_code.into()),
+        ),
         Column::new("reason", "", "reason of the verdict", words(results, |result| result.reason.clone())),
         Column::new("digest", "", "what the rig did", words(results, |result| result.digest.clone())),
         Column::new("took_s", "s", "time that the case took", numbers(results, |result| Some(result.took_s))),
@@ -49,8 +60,12 @@ fn checks(results: &[CaseResult]) -> Vec<Column> {
     let columns = |name: &String| {
         let of = |result: &CaseResult| result.checks.iter().find(|check| check.name == *name).cloned();
         let passed = results.iter().map(|result| of(result).and_then(|check| check.passed)).collect();
-        let mut columns =
-            vec![Column::new(&format!("{name}.passed"), "", "whether the check passed", Values::Truths(passed))];
+        let mut columns = vec![Column::new(
+            &format!("{name}.passed"),
+            "",
+            "whether the check passed",
+            Values::Truths(passed),
+        )];
         let some: Vec<CaseCheck> = results.iter().filter_map(of).collect();
         if let Some(unit) = some.iter().find(|check| check.margin.is_some()).map(|check| &check.unit) {
             let margin = |result: &CaseResult| of(result)?.margin;

@@ -42,7 +42,12 @@ impl Search {
     /// the point; it returns none where the point says nothing, and is called on all cores at once. Returns the number of
     /// evaluations up to the first value below zero, if there is one.
     pub fn run(&self, evaluate: impl Fn(usize, &[f64]) -> Value + Sync) -> Option<usize> {
-        let watch = Watch { search: self, next: AtomicUsize::new(0), is_over: AtomicBool::new(false), found: Mutex::new(None) };
+        let watch = Watch {
+            search: self,
+            next: AtomicUsize::new(0),
+            is_over: AtomicBool::new(false),
+            found: Mutex::new(None),
+        };
         let evaluate = |point: &[f64]| watch.evaluate(point, &evaluate);
         match self.method {
             Method::Random => self.at_random(&watch, &evaluate),
@@ -147,7 +152,8 @@ mod tests {
     }
 
     fn median_runs(method: Method) -> usize {
-        let find = |seed| search(method, seed).run(|_, point| Value::Margin(corner(point))).unwrap_or(usize::MAX);
+        let find =
+            |seed| search(method, seed).run(|_, point| Value::Margin(corner(point))).unwrap_or(usize::MAX);
         let mut runs: Vec<_> = (1..=20).map(find).collect();
         runs.sort_unstable();
         runs[10]

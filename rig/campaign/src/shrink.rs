@@ -66,7 +66,8 @@ impl<F: FnMut(&Scenario) -> bool> Shrink<F> {
         while !changes.is_empty() {
             let length = changes.len().div_ceil(parts);
             let without = (0..parts).find_map(|part| {
-                let (from, to) = ((part * length).min(changes.len()), ((part + 1) * length).min(changes.len()));
+                let (from, to) =
+                    ((part * length).min(changes.len()), ((part + 1) * length).min(changes.len()));
                 let rest = [&changes[..from], &changes[to..]].concat();
                 (from < to && self.does_fail(&rest)).then_some(rest)
             });
@@ -82,7 +83,9 @@ impl<F: FnMut(&Scenario) -> bool> Shrink<F> {
     /// Removes the keys of entries and whole tables that the failure does not need.
     fn barer(&mut self, changes: &mut Vec<Change>) {
         for at in (0..changes.len()).filter(|at| !changes[*at].is_requirement()).collect::<Vec<_>>() {
-            let keys = |change: &Change| change.value.as_table().map_or_else(Vec::new, |t| t.keys().cloned().collect());
+            let keys = |change: &Change| {
+                change.value.as_table().map_or_else(Vec::new, |t| t.keys().cloned().collect())
+            };
             for key in keys(&changes[at]) {
                 let mut tried = changes.clone();
                 tried[at].value.as_table_mut().map(|table| table.remove(&key));
@@ -195,7 +198,9 @@ fn collect(found: &mut Vec<Change>, path: &[String], given: &Table, default: &Ta
         let path = [path, std::slice::from_ref(name)].concat();
         match (value, default.get(name)) {
             (value, Some(default)) if value == default => {}
-            (Value::Table(given), Some(Value::Table(default))) if given.get("kind") == default.get("kind") => {
+            (Value::Table(given), Some(Value::Table(default)))
+                if given.get("kind") == default.get("kind") =>
+            {
                 collect(found, &path, given, default);
             }
             (Value::Array(list), _) if path.len() == 1 && LISTS.contains(&name.as_str()) => {
@@ -285,7 +290,10 @@ for_s = 0.1
         assert!(fails(&small), "{shrunk}");
         assert_eq!((small.seed, small.rate_hz, small.duration_s), (1, 1000, None), "{shrunk}");
         assert!(shrunk.contains("slide_friction_n = 8.0"), "{shrunk}");
-        assert!(shrunk.ends_with("[[faults]]\nat_s = 3.0\naxis = \"l2\"\nkind = \"encoder_stuck\"\n"), "{shrunk}");
+        assert!(
+            shrunk.ends_with("[[faults]]\nat_s = 3.0\naxis = \"l2\"\nkind = \"encoder_stuck\"\n"),
+            "{shrunk}"
+        );
     }
 
     #[test]

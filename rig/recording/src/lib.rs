@@ -11,7 +11,9 @@
 mod backlog;
 mod chunk;
 mod circumstances;
+mod columns;
 mod definitions;
+mod digests;
 mod encoding;
 mod folder;
 mod manifest;
@@ -22,18 +24,22 @@ mod ros;
 mod scene;
 #[cfg(test)]
 mod tests;
+mod thin;
 mod topic;
 mod walk;
 mod writer;
 
 pub use backlog::{Backlog, Pace, WriteOutcome};
 pub use circumstances::{DmaLatency, Ending, Machine as MachineInfo, ProcessFault, RunUsage, Usage};
+pub use columns::{Columns, Field, Number};
+pub use digests::{Digester, Digests};
 pub use encoding::{CDR_LITTLE_ENDIAN, Channel, Encoded, Encoder, SCHEMA_ENCODING, definitions};
 pub use folder::{FolderError, RunFolder};
 pub use manifest::{FullSpeed, Manifest};
 pub use reader::{Chunks, Entry, ReadError, Reader};
 pub use recover::{RecoverError, Recovered, recover};
 pub use scene::{Scene, jaw_points};
+pub use thin::{ThinError, is_kept, thin};
 pub use topic::{Recorded, Topic};
 pub use walk::Damage;
 pub use writer::{DurableFile, Medium, Recorder, WriteError};

@@ -11,11 +11,15 @@ use masseter_shared::geometry::AXES;
 use masseter_shared::named::Declared;
 use masseter_shared::realtime::scheduling::Obtained;
 use serde::{Deserialize, Serialize};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::circumstances::{DmaLatency, Ending, Machine, ProcessFault, RunUsage};
 use crate::folder::RunFolder;
 
+/// The name of what a recording says of the circumstances at the start.
+pub(super) const AT_START: &str = "circumstances.json";
+/// The clock of runs in real time.
+const REAL_TIME: &str = "rt";
 /// Version of the manifest's form.
 const FORM: u32 = 1;
 
@@ -114,12 +118,22 @@ impl Manifest {
     /// recordings are equal.
     pub(crate) fn at_start(&self) -> String {
         let mut known = json!({ "masseter": self.masseter, "motion_s": self.motion_s });
-        if self.clock == "rt" {
+        if self.is_in_real_time() {
             known["began"] = json!(self.began);
             known["clock"] = json!(self.clock);
             known["machine"] = json!(self.machine);
         }
         format!("{known:#}\n")
+    }
+
+    /// Whether the clock was the machine's.
+    pub fn is_in_real_time(&self) -> bool {
+        self.clock == REAL_TIME
+    }
+
+    /// Whether what [`Self::at_start`] wrote is of a run in real time.
+    pub(super) fn says_real_time(at_start: &[u8]) -> bool {
+        serde_json::from_slice::<Value>(at_start).is_ok_and(|known| known["clock"] == REAL_TIME)
     }
 
     /// The first refused request for scheduling, with its remedy, and the process that made it.

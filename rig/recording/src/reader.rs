@@ -15,6 +15,7 @@ use mcap::records::{AttachmentHeader, MessageHeader, Record, op};
 use super::chunk;
 use super::definitions::Definitions;
 use super::encoding::CDR_LITTLE_ENDIAN;
+use super::manifest::{AT_START, Manifest};
 use super::topic::{Recorded, Stamps, Topic};
 use super::walk::{Damage, Step, Walk};
 
@@ -142,6 +143,12 @@ impl<R: Read + Seek> Reader<R> {
     /// The files attached so far.
     pub fn attachments(&self) -> &[Attachment<'static>] {
         &self.attachments
+    }
+
+    /// Whether the files attached so far say that the run was in real time. A recording begins with them.
+    pub fn is_in_real_time(&self) -> bool {
+        let at_start = self.attachments.iter().find(|file| file.name == AT_START);
+        at_start.is_some_and(|file| Manifest::says_real_time(&file.data))
     }
 
     /// Bytes of the file.

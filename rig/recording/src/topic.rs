@@ -111,6 +111,21 @@ impl Recorded {
         self.stamps().published_ns
     }
 
+    /// The cycle of its publisher; none for what no cycle makes.
+    pub fn cycle(&self) -> Option<u64> {
+        Some(match self {
+            Self::Command(message) => message.cycle,
+            Self::Reading(message) => message.cycle,
+            Self::State(message) => message.cycle,
+            Self::Truth(message) => message.cycle,
+            Self::Contact(message) => message.cycle,
+            Self::Event(message) => message.cycle,
+            Self::Signals(message) => message.cycle,
+            Self::Parameters(message) => message.cycle,
+            Self::Frame(_) | Self::Machine(_) => return None,
+        })
+    }
+
     fn stamps(&self) -> Stamps {
         Stamps::read(self.body()).expect("every message begins with its stamps")
     }

@@ -18,7 +18,7 @@ use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 
 use super::encoding::{Channel, Encoded, Encoder, definitions};
 use super::folder::RunFolder;
-use super::manifest::Manifest;
+use super::manifest::{AT_START, Manifest};
 use super::scene::Scene;
 use super::topic::Recorded;
 
@@ -157,7 +157,7 @@ impl Recorder {
                 recorder.attach(&name, "text/csv", &fs::read(path)?)?;
             }
         }
-        recorder.attach("circumstances.json", "application/json", manifest.at_start().as_bytes())?;
+        recorder.attach(AT_START, "application/json", manifest.at_start().as_bytes())?;
         recorder.flush()?;
         Ok(recorder)
     }

@@ -10,6 +10,7 @@ mod charts;
 mod check;
 mod checks;
 pub mod compare;
+pub mod divergence;
 mod event_log;
 mod full_speed;
 pub mod histogram_log;

@@ -89,7 +89,8 @@ impl Column {
                 writer.write_batch(&there(values), Some(&levels(values)), None)
             }
             (Values::Words(values), ColumnWriter::ByteArrayColumnWriter(writer)) => {
-                let words: Vec<_> = values.iter().flatten().map(|word| ByteArray::from(word.as_str())).collect();
+                let words: Vec<_> =
+                    values.iter().flatten().map(|word| ByteArray::from(word.as_str())).collect();
                 writer.write_batch(&words, Some(&levels(values)), None)
             }
             _ => Err(ParquetError::General(format!("column {} has another type than its schema", self.name))),

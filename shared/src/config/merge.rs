@@ -61,11 +61,15 @@ mod tests {
 
     #[test]
     fn an_entry_of_a_list_is_changed_by_its_name_or_kind() {
-        let list = "[[faults]]\nkind = 'lose'\nat_s = 1.0\n[[faults]]\nkind = 'lose'\nname = 'late'\nat_s = 2.0";
+        let list =
+            "[[faults]]\nkind = 'lose'\nat_s = 1.0\n[[faults]]\nkind = 'lose'\nname = 'late'\nat_s = 2.0";
         let whole = merged(list, "faults.late.at_s = 3.0").unwrap();
         assert_eq!(whole["faults"][0]["at_s"].as_float(), Some(1.0));
         assert_eq!(whole["faults"][1]["at_s"].as_float(), Some(3.0));
-        assert_eq!(merged(list, "faults.lose.at_s = 3.0").unwrap()["faults"][0]["at_s"].as_float(), Some(3.0));
+        assert_eq!(
+            merged(list, "faults.lose.at_s = 3.0").unwrap()["faults"][0]["at_s"].as_float(),
+            Some(3.0)
+        );
         assert_eq!(
             merged(list, "faults.x.at_s = 3.0").unwrap_err(),
             "faults has no entry 'x'; there are: lose, late"

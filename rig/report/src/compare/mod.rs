@@ -1,4 +1,5 @@
-//! Two runs side by side: their verdicts, their different circumstances, and the change of every figure.
+//! Two runs side by side: their verdicts, their different circumstances, and the change of every figure. Their messages are
+//! compared by [`divergence`](crate::divergence).
 //!
 //! The weight of a change is only an estimate: runs of the same scenario differ by more than their own seconds do.
 
@@ -23,6 +24,7 @@ const FORM: u32 = 1;
 const LEGEND: &str = "\
 beyond spread: by more than three standard errors, estimated from the seconds of each run.
 Runs differ by more than their seconds do: repeat both in turn to be certain.
+'masseter diff A B' finds the first message in which two runs differ.
 ";
 
 /// As JSON it is what `report A B --format json` writes.

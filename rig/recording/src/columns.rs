@@ -1,9 +1,15 @@
-//! Messages as CSV rows, by the ROS 2 message definition in the recording; so recordings of other versions work too.
+//! The numbers in a message, by the ROS 2 message definition in the recording; so recordings of other versions work too.
 //!
 //! A definition may hold numbers, arrays of fixed length, and one byte sequence at its end. Other definitions, and those
 //! of messages longer than any of the rig's, are refused.
 
+use std::collections::BTreeMap;
+use std::fmt;
+
 use data_encoding::HEXUPPER;
+use mcap::Channel;
+
+use super::topic::Topic;
 
 /// A primitive type of the definition language.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,17 +41,53 @@ impl Kind {
         size
     }
 
-    /// The little-endian value at the beginning of `bytes`.
-    fn text(self, bytes: &[u8]) -> String {
+    /// The little-endian number at the beginning of `bytes`.
+    fn number(self, bytes: &[u8]) -> Number {
         let mut wide = [0; 8];
         wide[..self.size()].copy_from_slice(&bytes[..self.size()]);
         let unsigned = u64::from_le_bytes(wide);
         let unused = 64 - 8 * self.size() as u32;
         match self {
-            Self::Unsigned(_) => unsigned.to_string(),
-            Self::Signed(_) => ((unsigned << unused).cast_signed() >> unused).to_string(),
-            Self::Float(4) => f32::from_bits(unsigned as u32).to_string(),
-            Self::Float(_) => f64::from_bits(unsigned).to_string(),
+            Self::Unsigned(_) => Number::Unsigned(unsigned),
+            Self::Signed(_) => Number::Signed((unsigned << unused).cast_signed() >> unused),
+            Self::Float(4) => Number::Single(f32::from_bits(unsigned as u32)),
+            Self::Float(_) => Number::Double(f64::from_bits(unsigned)),
+        }
+    }
+}
+
+/// A number of a message. As text it has as many digits as give the same number again.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Number {
+    /// Without a sign.
+    Unsigned(u64),
+    /// With a sign.
+    Signed(i64),
+    /// A float of 32 bits.
+    Single(f32),
+    /// A float of 64 bits.
+    Double(f64),
+}
+
+impl Number {
+    /// The number as a float.
+    pub fn to_f64(self) -> f64 {
+        match self {
+            Self::Unsigned(value) => value as f64,
+            Self::Signed(value) => value as f64,
+            Self::Single(value) => value.into(),
+            Self::Double(value) => value,
+        }
+    }
+}
+
+impl fmt::Display for Number {
+    fn fmt(&self, text: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Unsigned(value) => value.fmt(text),
+            Self::Signed(value) => value.fmt(text),
+            Self::Single(value) => value.fmt(text),
+            Self::Double(value) => value.fmt(text),
         }
     }
 }
@@ -61,20 +103,56 @@ fn is_byte_sequence(kind: &str) -> bool {
     kind.strip_prefix("uint8[").is_some_and(|bound| bound == "]" || bound.starts_with("<="))
 }
 
-/// A column: a field, or an element of an array.
+/// A field of numbers: one, or an array of them.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Column {
+pub struct Field {
     name: String,
     kind: Kind,
     /// Byte offset behind the CDR header.
     offset: usize,
+    /// None for a single number.
+    elements: Option<usize>,
+}
+
+impl Field {
+    /// Its name, which ends with the unit.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Whether it is an array.
+    pub fn is_array(&self) -> bool {
+        self.elements.is_some()
+    }
+
+    /// Whether its numbers have no fractions.
+    pub fn is_integer(&self) -> bool {
+        !matches!(self.kind, Kind::Float(_))
+    }
+
+    /// Its bytes in the body of a message.
+    pub fn bytes<'a>(&self, body: &'a [u8]) -> &'a [u8] {
+        &body[self.offset..][..self.kind.size() * self.elements.unwrap_or(1)]
+    }
+
+    /// Its numbers in the body of a message.
+    pub fn numbers(&self, body: &[u8]) -> impl Iterator<Item = Number> {
+        self.bytes(body).chunks_exact(self.kind.size()).map(|bytes| self.kind.number(bytes))
+    }
+
+    /// The names of its columns.
+    fn columns(&self) -> impl Iterator<Item = String> {
+        let name =
+            |element| if self.is_array() { format!("{}_{element}", self.name) } else { self.name.clone() };
+        (0..self.elements.unwrap_or(1)).map(name)
+    }
 }
 
 /// The table of a message definition.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Columns {
-    fixed: Vec<Column>,
-    /// Bytes of the fixed columns.
+pub struct Columns {
+    fields: Vec<Field>,
+    /// Bytes of the fields.
     bytes: usize,
     /// Name of the byte sequence at the end, a column in hexadecimal digits.
     tail: Option<String>,
@@ -82,14 +160,23 @@ pub(super) struct Columns {
 
 impl Columns {
     /// Parses a definition; none if it does not fit a table.
-    pub(super) fn from_definition(definition: &str) -> Option<Self> {
-        let mut table = Self { fixed: Vec::new(), bytes: 0, tail: None };
+    pub fn from_definition(definition: &str) -> Option<Self> {
+        let mut table = Self { fields: Vec::new(), bytes: 0, tail: None };
         for line in definition.lines().map(|line| line.split('#').next().unwrap_or_default().trim()) {
             if !line.is_empty() {
                 table.add_field(line)?;
             }
         }
         Some(table)
+    }
+
+    /// The tables of the rig's topics among these channels.
+    pub fn of_topics<'a>(channels: impl Iterator<Item = &'a Channel<'static>>) -> BTreeMap<Topic, Self> {
+        let table = |channel: &Channel| {
+            let definition = str::from_utf8(&channel.schema.as_ref()?.data).ok()?;
+            Some((Topic::named(&channel.topic)?, Self::from_definition(definition)?))
+        };
+        channels.filter_map(table).collect()
     }
 
     fn add_field(&mut self, line: &str) -> Option<()> {
@@ -113,28 +200,42 @@ impl Columns {
         if elements.unwrap_or(1) > MAX_MESSAGE_BYTES.saturating_sub(self.bytes) / kind.size() {
             return None;
         }
-        for element in 0..elements.unwrap_or(1) {
-            let name = if elements.is_some() { format!("{name}_{element}") } else { name.to_owned() };
-            self.fixed.push(Column { name, kind, offset: self.bytes });
-            self.bytes += kind.size();
-        }
+        self.fields.push(Field { name: name.to_owned(), kind, offset: self.bytes, elements });
+        self.bytes += kind.size() * elements.unwrap_or(1);
         Some(())
     }
 
-    /// The names of the columns.
-    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
-        self.fixed.iter().map(|column| &column.name).chain(&self.tail).map(String::as_str)
+    /// The fields of numbers.
+    pub fn fields(&self) -> &[Field] {
+        &self.fields
     }
 
-    /// The values of a message; none if its length differs from the definition's.
-    pub(super) fn values(&self, body: &[u8]) -> Option<impl Iterator<Item = String>> {
+    /// The name of the byte sequence at the end, if there is one.
+    pub fn tail(&self) -> Option<&str> {
+        self.tail.as_deref()
+    }
+
+    /// The names of the columns.
+    pub fn names(&self) -> impl Iterator<Item = String> {
+        self.fields.iter().flat_map(Field::columns).chain(self.tail.clone())
+    }
+
+    /// The fields and the byte sequence of a message; none if its length differs from the definition's.
+    pub fn split<'a>(&self, body: &'a [u8]) -> Option<(&'a [u8], &'a [u8])> {
         let (fixed, tail) = body.split_at_checked(self.bytes)?;
         let fits = match self.tail {
             Some(_) => fixed.ends_with(&(tail.len() as u32).to_le_bytes()),
             None => tail.is_empty(),
         };
-        let values = self.fixed.iter().map(|column| column.kind.text(&body[column.offset..]));
-        fits.then(|| values.chain(self.tail.iter().map(|_| HEXUPPER.encode(tail))))
+        fits.then_some((fixed, tail))
+    }
+
+    /// The values of a message; none if its length differs from the definition's.
+    pub fn values(&self, body: &[u8]) -> Option<impl Iterator<Item = String>> {
+        let (fixed, tail) = self.split(body)?;
+        let values =
+            self.fields.iter().flat_map(|field| field.numbers(fixed)).map(|number| number.to_string());
+        Some(values.chain(self.tail.iter().map(|_| HEXUPPER.encode(tail))))
     }
 }
 
