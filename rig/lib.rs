@@ -18,6 +18,7 @@ mod controller;
 mod doctor;
 mod error_text;
 mod faults;
+mod force_study;
 mod foxglove;
 mod help;
 mod init;
