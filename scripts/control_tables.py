@@ -157,7 +157,7 @@ def force_control(masseter: str) -> Iterable[list[str]]:
 def load_cell(masseter: str) -> Iterable[list[str]]:
     """Estimate and load cell, with friction in the model that is right and wrong."""
     error_n, held = "{bite.force} - {signal.desired_bite_force_n}", {"from_s": 2.8, "to_s": 2.88}
-    scenario = SOFT + "peak_n = 25\n[load_cell]\n" + error("mean", error_n, held, "mean") + error("rms", error_n, held, "rms")
+    scenario = HOLD + "peak_n = 25\n[food]\n[load_cell]\n" + error("mean", error_n, held, "mean") + error("rms", error_n, held, "rms")
     for source in ("estimate", "load_cell"):
         for name, share in (("right", 1.0), ("30 % too small", 0.7), ("30 % too large", 1.3)):
             summary = run(masseter, scenario, {"force_control.source": source, **scaled(FRICTION, share)})
