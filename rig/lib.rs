@@ -19,6 +19,7 @@ mod diff;
 mod doctor;
 mod error_text;
 mod faults;
+mod force_study;
 mod foxglove;
 mod guarded;
 mod help;

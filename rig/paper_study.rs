@@ -9,6 +9,8 @@ use masseter_shared::config::Scenario;
 use masseter_study::{Settings, Study};
 use masseter_terminal::{Exit, result_line, status};
 
+use crate::force_study;
+
 /// The arguments of `kinematics`.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = "Example:\n  masseter kinematics --out study")]
@@ -39,7 +41,9 @@ pub(crate) fn study(args: &KinematicsArgs) -> anyhow::Result<Exit> {
     new_folder(&args.out)?;
     let settings = Settings { seed: args.seed, samples: args.samples as usize, cells: args.cells as usize };
     let study = prepared.run(settings, |stage| status!("{stage}"))?;
-    for claim in masseter_study::write(&study, &args.out, &args.command())? {
+    status!("forces of runs");
+    let forces = force_study::play()?;
+    for claim in masseter_study::write(&study, forces, &args.out, &args.command())? {
         result_line!("{:<13}  {}", claim.judgement.name(), claim.statement)?;
     }
     result_line!("{}", args.out.join("claims.md").display())?;

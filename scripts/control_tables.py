@@ -154,6 +154,16 @@ def force_control(masseter: str) -> Iterable[list[str]]:
         yield [name, str(peak_n), *bites(masseter, scenario, peak_n, {})]
 
 
+def load_cell(masseter: str) -> Iterable[list[str]]:
+    """Estimate and load cell, with friction in the model that is right and wrong."""
+    error_n, held = "{bite.force} - {signal.desired_bite_force_n}", {"from_s": 2.8, "to_s": 2.88}
+    scenario = HOLD + "peak_n = 25\n[food]\n[load_cell]\n" + error("mean", error_n, held, "mean") + error("rms", error_n, held, "rms")
+    for source in ("estimate", "load_cell"):
+        for name, share in (("right", 1.0), ("30 % too small", 0.7), ("30 % too large", 1.3)):
+            summary = run(masseter, scenario, {"force_control.source": source, **scaled(FRICTION, share)})
+            yield [source, name, *(f"{value:.2f} N" for value in values(summary))]
+
+
 def limit(masseter: str) -> Iterable[list[str]]:
     """Dampings on both sides of the limit. The stated stiffness is small, so that none is refused."""
     soft = {"force_control.food_stiffness_n_per_m": 10}
@@ -170,6 +180,7 @@ def main() -> None:
     table(["feed-forward", *(f"{rate}: {what}" for rate in ("1.43 Hz", "2.17 Hz") for what in each)], feed_forward(masseter))
     table(["model", "rms, N", "99 %, N", "largest, N", "mean uncertainty, N"], estimate(masseter))
     table(["bite on", "desired, N", "overshoot", "rms error of the hold"], force_control(masseter))
+    table(["force by", "friction in the model", "mean error of the hold", "rms error of the hold"], load_cell(masseter))
     table(["bite on", "damping, N s/m", "overshoot", "rms error of the hold"], limit(masseter))
 
 

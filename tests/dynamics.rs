@@ -12,6 +12,7 @@ use nalgebra::Vector6;
 
 /// The greatest imbalance of an axis, rms, N.
 const BALANCED_N: f64 = 0.05;
+const DOCUMENT: &str = include_str!("../docs/dynamics.md");
 
 fn truths(workspace: &Workspace) -> Vec<Truth> {
     let mut reader = Reader::open(&workspace.run_folder().join("recording.mcap")).unwrap();
@@ -70,8 +71,14 @@ fn mean_forces_balance_the_chewing_motion_and_samples_do_not() {
         let chewing = &truths[truths.len() - 3000..truths.len() - 100];
         let of_means = imbalance_n(chewing, |truth| Vector6::from(truth.force_n));
         let of_samples = imbalance_n(chewing, |truth| Vector6::from(truth.force_sample_n));
-        println!("{rate_hz} Hz: mean forces off by {:.4?} N rms", of_means.as_slice());
+        let quantity = format!(
+            "| recorded mean forces against inverse dynamics, {rate_hz} Hz, without friction: rms of the worst axis |"
+        );
+        println!("{quantity} {:.4} N | {BALANCED_N} N |", of_means.max());
         println!("{rate_hz} Hz: samples off by {:.4?} N rms", of_samples.as_slice());
+        let is_stated =
+            |line: &str| line.starts_with(&quantity) && line.ends_with(&format!("| {BALANCED_N} N |"));
+        assert!(DOCUMENT.lines().any(is_stated), "docs/dynamics.md has no row: {quantity}");
         assert!(of_means.max() <= BALANCED_N, "{of_means}");
         assert!(of_samples.max() > BALANCED_N, "{of_samples}");
     }

@@ -9,7 +9,7 @@
 //! jaw waits, or gives way to more than the force of contact, and goes with the motion again when the motion opens. Only the
 //! height is controlled; the other five freedoms keep to the motion. Limit of stability: `docs/dynamics-control.md`.
 
-use masseter_shared::config::{ForceControlConfig, MOST_LEAD_CYCLES, Scenario};
+use masseter_shared::config::{ForceControlConfig, ForceSource, MOST_LEAD_CYCLES, Scenario};
 use masseter_shared::geometry::{Pose, Vec3};
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::named::{Declared, Signal};
@@ -89,9 +89,13 @@ impl ForceControl {
         self.bites_n[0]
     }
 
-    /// Takes the newest force and the newest height of the motion. A cycle without an estimate keeps the last one.
+    /// Takes the newest force and the newest height of the motion. A cycle without a force keeps the last one.
     fn observe(&mut self, demand: &Demand) {
-        let bite_n = demand.external.map_or(self.bite_n(), |external| external.bite_n());
+        let known_n = match self.config.source {
+            ForceSource::Estimate => demand.external.map(|external| external.bite_n()),
+            ForceSource::LoadCell => demand.load_cell_n,
+        };
+        let bite_n = known_n.unwrap_or(self.bite_n());
         self.bites_n.rotate_right(1);
         self.bites_n[0] = bite_n;
         let height_m = demand.ahead.translation.z;

@@ -69,8 +69,11 @@ pub struct MotionController {
     declared: Declared,
     /// None unless the scenario has forces fed forward.
     feed_forward: Option<FeedForward>,
-    /// None unless the scenario has the bite force estimated or controlled.
+    /// None unless the scenario has the bite force estimated.
     observer: Option<ForceObserver>,
+    has_load_cell: bool,
+    /// What the load cell showed last, N.
+    load_cell_n: Option<f64>,
     supervision: PathSupervision,
     /// By how many cycles the platform may be earlier or later on its path.
     slack_cycles: f64,
@@ -109,7 +112,7 @@ impl MotionController {
         let demands = trajectory::check(&trajectory, &mechanism, &limits, period_s).ok();
         let change_s = Slew::change_s(demands.as_ref(), &limits);
         let model = Model::new(scenario, mechanism.clone());
-        let is_observed = scenario.force_estimate.is_some() || scenario.force_control.is_some();
+        let is_observed = scenario.is_force_estimated();
         let mut declared = law.declared();
         declared.parameters.extend(own_parameters());
         declared.signals.extend(is_observed.then(ForceObserver::declared).into_iter().flatten());
@@ -127,6 +130,8 @@ impl MotionController {
                 .feed_forward_torque
                 .then(|| FeedForward::new(model.clone(), scenario.period_s())),
             observer: is_observed.then(|| ForceObserver::new(scenario, model)),
+            has_load_cell: scenario.load_cell.is_some(),
+            load_cell_n: None,
             supervision: PathSupervision::new(scenario),
             slack_cycles: 0.0,
             cycles_at_rest: 0,
@@ -187,6 +192,7 @@ impl MotionController {
             estimated: estimate.filter(|_| *silent_cycles == 0).map(|estimate| estimate.solution.pose),
             ahead: self.playback.pose_ahead(config.lead_cycles * period_s),
             external: self.observer.as_ref().and_then(ForceObserver::external),
+            load_cell_n: self.load_cell_n,
         }
     }
 
@@ -261,6 +267,9 @@ impl Controller for MotionController {
             self.slack_cycles = self.supervision.slack_cycles(estimate);
         }
         self.observe_force(reading);
+        if let Some(reading) = reading.filter(|_| self.has_load_cell) {
+            self.load_cell_n = Some(reading.load_cell_n);
+        }
     }
 
     fn decide(&mut self, tick: Tick) -> Option<Event> {

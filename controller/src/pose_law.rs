@@ -26,6 +26,8 @@ pub struct Demand {
     pub ahead: Pose,
     /// The external force at the sample; none unless the scenario has it estimated.
     pub external: Option<ExternalForce>,
+    /// The bite force that the load cell showed last, N; none without a load cell.
+    pub load_cell_n: Option<f64>,
 }
 
 /// What pushes the platform from outside, in base axes.

@@ -113,6 +113,9 @@ pub(crate) fn check_reading(reading: &Reading) -> Result<(), Fault> {
             return Err(Fault::for_axis(Cause::BadMessage, axis, value, 0.0));
         }
     }
+    if !reading.load_cell_n.is_finite() {
+        return Err(Fault::new(Cause::BadMessage, reading.load_cell_n, 0.0));
+    }
     Ok(())
 }
 

@@ -7,7 +7,7 @@ use masseter_can::canopen::{NodeId, sync};
 use masseter_can::cia402::{Controlword, Statusword};
 use masseter_can::{Bitrate, Bus, PdoMapping, Rpdo1, Tpdo1, VirtualWire, WireConfig};
 use masseter_plant::core::PlantCore;
-use masseter_shared::config::Scenario;
+use masseter_shared::config::{FoodConfig, FrictionModel, LoadCellConfig, Scenario, TeethConfig};
 use masseter_shared::messages::codes::DriveRequest;
 use masseter_shared::messages::{Command, LAYOUT_VERSION, Reading};
 use masseter_shared::realtime::Wake;
@@ -98,7 +98,24 @@ fn wires(bencher: Bencher<'_, '_>) {
 /// Master, wires, drives and mechanism, booted and enabled.
 #[divan::bench]
 fn plant(bencher: Bencher<'_, '_>) {
-    let mut plant = PlantCore::new(&Scenario::default(), 0).expect("the default is a plant");
+    plant_of(bencher, &Scenario::default());
+}
+
+/// The same with bristles, teeth, food and a load cell.
+#[divan::bench]
+fn plant_with_everything(bencher: Bencher<'_, '_>) {
+    let mut scenario = Scenario {
+        teeth: Some(TeethConfig::default()),
+        food: Some(FoodConfig::default()),
+        load_cell: Some(LoadCellConfig::default()),
+        ..Scenario::default()
+    };
+    scenario.dynamics.friction.model = FrictionModel::Lugre;
+    plant_of(bencher, &scenario);
+}
+
+fn plant_of(bencher: Bencher<'_, '_>, scenario: &Scenario) {
+    let mut plant = PlantCore::new(scenario, 0).expect("the scenario is a plant");
     let mut reading = Reading::default();
     let mut run = |cycle: u64| {
         let sync_ns = cycle * PERIOD_NS;

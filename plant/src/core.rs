@@ -150,6 +150,7 @@ impl<L: Link> PlantCore<L> {
     pub fn fill_reading(&self, reading: &mut Reading) {
         self.master.fill_reading(reading);
         reading.command_sent_ns = self.command_sent_ns;
+        reading.load_cell_n = self.link.load_cell_n();
     }
 
     /// The mechanism's true motion at the cycle's SYNC, where it is emulated here.

@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define MASSETER_LAYOUT_VERSION 12u
+#define MASSETER_LAYOUT_VERSION 13u
 /* masseter_event.axis when no axis is concerned. */
 #define MASSETER_NO_AXIS 4294967295u
 /* masseter_reading.drive_state of a drive not heard of yet, or lost. */
@@ -217,7 +217,7 @@ enum masseter_no_pose {
 };
 
 #define MASSETER_READING_TOPIC "reading"
-#define MASSETER_READING_TYPE_NAME "masseter/Reading/d2cd93de2ef83cfd"
+#define MASSETER_READING_TYPE_NAME "masseter/Reading/601d80ebaa1988e2"
 
 /* Positions, forces and states of the drives, once a cycle. */
 typedef struct masseter_reading {
@@ -257,6 +257,8 @@ typedef struct masseter_reading {
     double position_m[6];
     /* Actuator forces as the drives report them, positive towards increasing position, N. An emulated drive reports the mean since the last SYNC. */
     double force_n[6];
+    /* Bite force that the load cell shows at SYNC, N; 0 without a load cell. */
+    double load_cell_n;
     /* Drive states, DriveState, or NO_DRIVE_STATE. */
     uint32_t drive_state[6];
     /* Axes whose process data arrived this cycle, bit i for axis i. */
@@ -265,7 +267,7 @@ typedef struct masseter_reading {
     uint32_t master_fault;
 } masseter_reading;
 
-static_assert(sizeof(masseter_reading) == 256, "size of masseter_reading");
+static_assert(sizeof(masseter_reading) == 264, "size of masseter_reading");
 static_assert(offsetof(masseter_reading, seq) == 0, "offset of seq");
 static_assert(offsetof(masseter_reading, published_ns) == 8, "offset of published_ns");
 static_assert(offsetof(masseter_reading, version) == 16, "offset of version");
@@ -284,12 +286,13 @@ static_assert(offsetof(masseter_reading, worked_ns) == 112, "offset of worked_ns
 static_assert(offsetof(masseter_reading, overlong_ns) == 120, "offset of overlong_ns");
 static_assert(offsetof(masseter_reading, position_m) == 128, "offset of position_m");
 static_assert(offsetof(masseter_reading, force_n) == 176, "offset of force_n");
-static_assert(offsetof(masseter_reading, drive_state) == 224, "offset of drive_state");
-static_assert(offsetof(masseter_reading, fresh_axes) == 248, "offset of fresh_axes");
-static_assert(offsetof(masseter_reading, master_fault) == 252, "offset of master_fault");
+static_assert(offsetof(masseter_reading, load_cell_n) == 224, "offset of load_cell_n");
+static_assert(offsetof(masseter_reading, drive_state) == 232, "offset of drive_state");
+static_assert(offsetof(masseter_reading, fresh_axes) == 256, "offset of fresh_axes");
+static_assert(offsetof(masseter_reading, master_fault) == 260, "offset of master_fault");
 
 #define MASSETER_COMMAND_TOPIC "command"
-#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/5644f2d889328c9b"
+#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/89cc47d3acfa3c24"
 
 /* Targets and request for the drives, once a cycle. */
 typedef struct masseter_command {
@@ -325,7 +328,7 @@ static_assert(offsetof(masseter_command, request) == 136, "offset of request");
 static_assert(offsetof(masseter_command, controller_state) == 140, "offset of controller_state");
 
 #define MASSETER_STATE_TOPIC "state"
-#define MASSETER_STATE_TYPE_NAME "masseter/State/f47c6f6aaf18d571"
+#define MASSETER_STATE_TYPE_NAME "masseter/State/38cfecc852cdda30"
 
 /* The controller's state and its estimate, once a cycle. */
 typedef struct masseter_state {
@@ -412,7 +415,7 @@ static_assert(offsetof(masseter_state, iterations) == 288, "offset of iterations
 static_assert(offsetof(masseter_state, controller_state) == 292, "offset of controller_state");
 
 #define MASSETER_EVENT_TOPIC "event"
-#define MASSETER_EVENT_TYPE_NAME "masseter/Event/aa094a1dc1b716ce"
+#define MASSETER_EVENT_TYPE_NAME "masseter/Event/f3a493a87ee0268b"
 
 /* A single occurrence: a change of state, a fault, an alarm. */
 typedef struct masseter_event {
@@ -469,7 +472,7 @@ static_assert(offsetof(masseter_event, value) == 72, "offset of value");
 static_assert(offsetof(masseter_event, limit) == 80, "offset of limit");
 
 #define MASSETER_TRUTH_TOPIC "truth"
-#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/e16017c620132113"
+#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/8f925f7eb4c8621e"
 
 /* The true state of the mechanism, once a cycle; the controller never reads it. */
 typedef struct masseter_truth {
@@ -517,7 +520,7 @@ static_assert(offsetof(masseter_truth, bite_force_n) == 288, "offset of bite_for
 static_assert(offsetof(masseter_truth, bite_force_sample_n) == 296, "offset of bite_force_sample_n");
 
 #define MASSETER_CONTACT_TOPIC "contact"
-#define MASSETER_CONTACT_TYPE_NAME "masseter/Contact/a5b5b76cdbcc4528"
+#define MASSETER_CONTACT_TYPE_NAME "masseter/Contact/fafe7ef19ff6d2f5"
 
 /* The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads it. */
 typedef struct masseter_contact {

@@ -8,7 +8,7 @@ from collections import Counter
 
 from mcap_ros2.reader import read_ros2_messages
 
-LAYOUT_VERSION = 12
+LAYOUT_VERSION = 13
 TOPICS = ("command", "reading", "state", "truth", "frame", "event", "parameter")
 
 counts = Counter()

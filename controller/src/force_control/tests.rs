@@ -74,6 +74,7 @@ impl World {
             estimated: None,
             ahead: pose(time_s + LEAD_CYCLES as f64 * PERIOD_S),
             external: Some(external),
+            load_cell_n: None,
         })?;
         self.asked_m.push(asked.translation.z);
         Ok(())

@@ -12,6 +12,7 @@ use nalgebra::Translation3;
 
 use super::agenda::{Agenda, Change, Effect};
 use super::encoder_faults::{EncoderFaults, past_of};
+use super::load_cell::LoadCell;
 use super::memory::MemoryFile;
 use crate::checks::check_quantities;
 use crate::drive::{DriveNode, DriveSettings, Encoder, Shaft};
@@ -50,6 +51,7 @@ pub struct Emulation {
     moved_to_ns: u64,
     force_n: [HeldMean; AXES],
     bite_force_n: HeldMean,
+    load_cell: Option<LoadCell>,
     sample: Sample,
     /// Whether each drive has received the SYNC of the sample.
     synchronised: [bool; AXES],
@@ -74,6 +76,8 @@ struct Sample {
     force_n: [[f64; AXES]; 2],
     /// The bite force: mean since the last sample, and present value.
     bite_force_n: [f64; 2],
+    /// What the load cell shows; 0 without one.
+    load_cell_n: f64,
 }
 
 impl Emulation {
@@ -118,7 +122,13 @@ impl Emulation {
         let state = *dynamics.state();
         Ok(Self {
             drives: settings.iter().enumerate().map(drive).collect::<Result<_, _>>()?,
-            sample: Sample { time_ns: now_ns, state, force_n: [[0.0; AXES]; 2], bite_force_n: [0.0; 2] },
+            sample: Sample {
+                time_ns: now_ns,
+                state,
+                force_n: [[0.0; AXES]; 2],
+                bite_force_n: [0.0; 2],
+                load_cell_n: 0.0,
+            },
             dynamics,
             step_ns,
             // Half a step beside the SYNCs of a cycle that is a multiple of the step: SYNCs are work enough.
@@ -126,6 +136,7 @@ impl Emulation {
             moved_to_ns: now_ns,
             force_n: [HeldMean::new(now_ns); AXES],
             bite_force_n: HeldMean::new(now_ns),
+            load_cell: scenario.load_cell.map(|config| LoadCell::new(config, scenario.seed)),
             synchronised: [true; AXES],
             agenda,
             encoder_faults: encoder_faults(scenario),
@@ -153,7 +164,7 @@ impl Emulation {
 
     /// The mechanism's motion at the last SYNC.
     pub fn truth(&self) -> Truth {
-        let Sample { time_ns, state, force_n, bite_force_n } = self.sample;
+        let Sample { time_ns, state, force_n, bite_force_n, .. } = self.sample;
         let (position_m, quaternion_wxyz) = pose_fields(&state.pose);
         Truth {
             sampled_ns: time_ns,
@@ -167,6 +178,11 @@ impl Emulation {
             bite_force_sample_n: bite_force_n[1],
             ..Truth::default()
         }
+    }
+
+    /// What the load cell showed at the last SYNC, N; 0 without one.
+    pub(crate) fn load_cell_n(&self) -> f64 {
+        self.sample.load_cell_n
     }
 
     /// The forces between the jaws, mean over the time between the last two SYNCs; none where the jaws cannot touch.
@@ -241,6 +257,9 @@ impl Emulation {
             self.push()?;
         } else {
             self.push_injected(now_ns)?;
+        }
+        if let Some(cell) = &mut self.load_cell {
+            cell.follow(self.bite_force_n.value(), self.step_ns as f64 * 1e-9);
         }
         self.bite_force_n.hold(self.dynamics.bite_force_n(), now_ns);
         self.note_mishaps(now_ns);
@@ -369,6 +388,7 @@ impl Emulation {
                     self.force_n.map(|force_n| force_n.value()),
                 ],
                 bite_force_n: [self.bite_force_n.take(now_ns), self.bite_force_n.value()],
+                load_cell_n: self.load_cell.as_mut().map_or(0.0, LoadCell::read),
             };
             if let Some(contact) = &mut self.contact {
                 *contact = Contact { sampled_ns: now_ns, ..self.dynamics.occlusion().take_mean() };

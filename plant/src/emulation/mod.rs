@@ -7,6 +7,7 @@ mod agenda;
 mod co_simulation;
 mod emulator;
 mod encoder_faults;
+mod load_cell;
 mod memory;
 mod open_link;
 mod push;

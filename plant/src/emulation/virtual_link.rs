@@ -91,6 +91,10 @@ impl Link for VirtualLink {
         Some(self.emulation.truth())
     }
 
+    fn load_cell_n(&self) -> f64 {
+        self.emulation.load_cell_n()
+    }
+
     fn contact(&self) -> Option<Contact> {
         self.emulation.contact()
     }

@@ -64,6 +64,11 @@ pub trait Link: Buses {
         None
     }
 
+    /// What the load cell showed at the last SYNC, N; 0 where there is none.
+    fn load_cell_n(&self) -> f64 {
+        0.0
+    }
+
     /// The forces between the jaws in the cycle before the last SYNC, where they are emulated here and can touch.
     fn contact(&self) -> Option<Contact> {
         None

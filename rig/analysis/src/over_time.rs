@@ -32,6 +32,8 @@ pub struct OverTime {
     pub velocity_m_s: [Curve; AXES],
     /// Force of each actuator, N.
     pub force_n: [Curve; AXES],
+    /// Vertical force of food and upper teeth on the jaw, N.
+    pub bite_force_n: Curve,
     /// Share of each bus in use, 0 to 1.
     pub bus_load: Vec<Curve>,
     /// The controller's signals.
@@ -47,7 +49,8 @@ pub(super) struct OverTimeCollector {
     incisal_m: [f64; 3],
     jaw: Series<Extremes<{ DISTANCE + 1 }>>,
     late: Series<Extremes<2>>,
-    axes: Series<Extremes<{ 3 * AXES }>>,
+    /// Of the axes, and the bite force.
+    axes: Series<Extremes<{ 3 * AXES + 1 }>>,
     /// Time that frames took on each bus.
     busy_ns: Vec<Series<u64>>,
     signals: Series<Extremes<MOST_VALUES>>,
@@ -106,7 +109,8 @@ impl OverTimeCollector {
     pub(super) fn truth(&mut self, truth: &Truth) {
         let since_ns = self.since(truth.sampled_ns);
         let values = [truth.joint_m, truth.joint_m_s, truth.force_n];
-        for (index, value) in values.into_iter().flatten().enumerate() {
+        let bite_force_n = [truth.bite_force_n];
+        for (index, value) in values.into_iter().flatten().chain(bite_force_n).enumerate() {
             self.axes.take(since_ns, index, value);
         }
     }
@@ -146,6 +150,7 @@ impl OverTimeCollector {
             position_m: bands(0),
             velocity_m_s: bands(1),
             force_n: bands(2),
+            bite_force_n: self.axes.band(3 * AXES),
             bus_load: self.busy_ns.iter().map(load).collect(),
             signals: (0..signals).map(|place| self.signals.band(place)).collect(),
         }

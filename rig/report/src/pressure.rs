@@ -26,18 +26,19 @@ const COLUMNS: usize = 350;
 const NONE_N: f64 = 0.05;
 
 /// Two drawings and the words to them.
-pub(crate) struct Pressure {
+#[derive(Debug)]
+pub struct Pressure {
     /// What the arch shows.
-    pub(crate) caption: String,
+    pub caption: String,
     /// The arch.
-    pub(crate) arch: String,
+    pub arch: String,
     /// Each tooth over time.
-    pub(crate) over_time: String,
+    pub over_time: String,
 }
 
 impl Pressure {
     /// None where the jaws cannot touch.
-    pub(crate) fn draw(figures: &Figures) -> Option<Self> {
+    pub fn draw(figures: &Figures) -> Option<Self> {
         let contact = figures.contact.as_ref()?;
         let most_n = contact.teeth.iter().fold(0.0, |most_n: f64, tooth| most_n.max(tooth.max_n));
         let scale = ColourScale::new("force, N", [0.0, most_n]);

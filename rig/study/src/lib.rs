@@ -5,12 +5,12 @@
 //! function of the [`Settings`].
 //!
 //! ```no_run
-//! use masseter_study::{Settings, Study, write};
+//! use masseter_study::{Forces, Settings, Study, write};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let settings = Settings { seed: 1, samples: 2000, cells: 60 };
 //! let study = Study::prepare(None)?.run(settings, |stage| eprintln!("{stage}"))?;
-//! for claim in write(&study, "study".as_ref(), "masseter kinematics --out DIR")? {
+//! for claim in write(&study, Forces::default(), "study".as_ref(), "masseter kinematics --out DIR")? {
 //!     println!("{}: {}", claim.judgement.name(), claim.statement);
 //! }
 //! # Ok(())
@@ -38,4 +38,4 @@ mod write;
 pub use claims::{ClaimJudgement, PaperClaim};
 pub use share::median;
 pub use study::{PreparedStudy, Settings, Study};
-pub use write::write;
+pub use write::{ForceFigure, Forces, write};

@@ -7,7 +7,7 @@ numpy.dtype(Reading) is the NumPy type of a message.
 import ctypes
 import enum
 
-LAYOUT_VERSION = 12
+LAYOUT_VERSION = 13
 #: Event.axis when no axis is concerned.
 NO_AXIS = 4294967295
 #: Reading.drive_state of a drive not heard of yet, or lost.
@@ -264,6 +264,8 @@ class Reading(ctypes.Structure):
         ("position_m", ctypes.c_double * 6),
         # Actuator forces as the drives report them, positive towards increasing position, N. An emulated drive reports the mean since the last SYNC.
         ("force_n", ctypes.c_double * 6),
+        # Bite force that the load cell shows at SYNC, N; 0 without a load cell.
+        ("load_cell_n", ctypes.c_double),
         # Drive states, DriveState, or NO_DRIVE_STATE.
         ("drive_state", ctypes.c_uint32 * 6),
         # Axes whose process data arrived this cycle, bit i for axis i.
@@ -274,10 +276,10 @@ class Reading(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Reading/d2cd93de2ef83cfd"
+        return "masseter/Reading/601d80ebaa1988e2"
 
 
-_check(Reading, 256, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 176, 224, 248, 252])
+_check(Reading, 264, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 176, 224, 232, 256, 260])
 
 
 class Command(ctypes.Structure):
@@ -307,7 +309,7 @@ class Command(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Command/5644f2d889328c9b"
+        return "masseter/Command/89cc47d3acfa3c24"
 
 
 _check(Command, 144, [0, 8, 16, 24, 32, 40, 88, 136, 140])
@@ -374,7 +376,7 @@ class State(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/State/f47c6f6aaf18d571"
+        return "masseter/State/38cfecc852cdda30"
 
 
 _check(State, 296, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 136, 160, 192, 216, 248, 272, 280, 288, 292])
@@ -421,7 +423,7 @@ class Event(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Event/aa094a1dc1b716ce"
+        return "masseter/Event/f3a493a87ee0268b"
 
 
 _check(Event, 88, [0, 8, 16, 24, 32, 40, 44, 48, 52, 56, 60, 62, 64, 68, 72, 80])
@@ -462,7 +464,7 @@ class Truth(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Truth/e16017c620132113"
+        return "masseter/Truth/8f925f7eb4c8621e"
 
 
 _check(Truth, 304, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240, 288, 296])
@@ -493,7 +495,7 @@ class Contact(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Contact/a5b5b76cdbcc4528"
+        return "masseter/Contact/fafe7ef19ff6d2f5"
 
 
 _check(Contact, 872, [0, 8, 16, 24, 32, 40, 104, 488])

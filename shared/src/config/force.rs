@@ -31,10 +31,23 @@ pub enum BiteProfile {
     Hold,
 }
 
+/// Which force is controlled.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ForceSource {
+    /// The estimate from the forces of the drives.
+    #[default]
+    Estimate,
+    /// The measurement of the load cell.
+    LoadCell,
+}
+
 section! {
     /// Control of the bite force, between contact and opening of the mouth.
     #[derive(Copy)]
     pub struct ForceControlConfig {
+        /// Where the bite force is known from.
+        pub source: ForceSource = ForceSource::Estimate,
         /// The course of the desired force.
         pub profile: BiteProfile = BiteProfile::HalfSine,
         /// Bite force at which force control takes over from position control, N.
@@ -80,8 +93,9 @@ impl ForceControlConfig {
         FRAC_2_PI * stiffness_n_per_m * delay_s
     }
 
-    /// Refuses values without use, and a damping below the limit of stability for the delays of lead and observer (s).
-    pub(super) fn validate(&self, lead_s: f64, observer_s: f64) -> Result<(), ScenarioError> {
+    /// Refuses values without use, and a damping below the limit of stability for the delays of lead and of the
+    /// observer or the load cell (s).
+    pub(super) fn validate(&self, lead_s: f64, source_s: f64) -> Result<(), ScenarioError> {
         require_positive(&[
             ("force_control.contact_n", self.contact_n),
             ("force_control.bite_s", self.bite_s),
@@ -94,7 +108,7 @@ impl ForceControlConfig {
             ("force_control.peak_n", self.peak_n, self.contact_n, 1000.0),
             ("force_control.reach_m", self.reach_m, 1e-6, 0.05),
         ])?;
-        let delay_s = lead_s + observer_s + Self::MASS_TIME_S;
+        let delay_s = lead_s + source_s + Self::MASS_TIME_S;
         for (key, damping, stiffness) in [
             ("force_control.damping_n_s_per_m", self.damping_n_s_per_m, self.food_stiffness_n_per_m),
             (

@@ -59,7 +59,8 @@ const LEAST_SHOWN: f64 = 0.7;
 impl FrictionConfig {
     /// Refuses screws through which the forces of the drives do not show the load.
     pub(super) fn require_open_screws(&self) -> Result<(), ScenarioError> {
-        let need = "use at least 0.7 with [force_estimate] or [force_control]: this screw hides the load from its drive";
+        let need = "use at least 0.7 with [force_estimate] or [force_control], or control by a load cell: this screw hides the load from \
+                    its drive";
         for (key, efficiency) in [
             ("dynamics.friction.slide_screw_efficiency", self.slide_screw_efficiency),
             ("dynamics.friction.leg_screw_efficiency", self.leg_screw_efficiency),

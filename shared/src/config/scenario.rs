@@ -17,8 +17,8 @@ use super::when::EntryNames;
 use super::{
     AxisScale, CanConfig, ChecksConfig, ControllerConfig, DriveProfile, DrivesConfig, DryConfig,
     DynamicsConfig, ExpectConfig, FaultConfig, FoodConfig, ForceControlConfig, ForceEstimateConfig,
-    JawConfig, MotionConfig, RealtimeConfig, RequirementConfig, StimulusConfig, TeethConfig, ToothConfig,
-    TrajectoryLimitsConfig,
+    ForceSource, JawConfig, LoadCellConfig, MotionConfig, RealtimeConfig, RequirementConfig, StimulusConfig,
+    TeethConfig, ToothConfig, TrajectoryLimitsConfig,
 };
 use crate::clock::SECOND_NS;
 use crate::geometry::{AXES, AXIS_NAMES, MechanismConfig};
@@ -83,7 +83,9 @@ section! {
         /// Food between the teeth of the emulated jaw; none when absent.
         #[serde(deserialize_with = "over_food")]
         pub food: Option<FoodConfig> = None,
-        /// Estimate of the bite force; none when absent, unless the bite force is controlled.
+        /// The load cell of the emulated jaw; none when absent.
+        pub load_cell: Option<LoadCellConfig> = None,
+        /// Estimate of the bite force; none when absent, unless the bite force is controlled by it.
         pub force_estimate: Option<ForceEstimateConfig> = None,
         /// Control of the bite force; position control only when absent.
         pub force_control: Option<ForceControlConfig> = None,
@@ -210,6 +212,7 @@ impl Scenario {
             let every_table = Self {
                 teeth: Some(TeethConfig::default()),
                 food: Some(FoodConfig::default()),
+                load_cell: Some(LoadCellConfig::default()),
                 force_estimate: Some(ForceEstimateConfig::default()),
                 force_control: Some(ForceControlConfig::default()),
                 expect: Some(ExpectConfig::default()),
@@ -354,13 +357,37 @@ impl Scenario {
         self.check_torque_offsets()?;
         let estimate = self.force_estimate.unwrap_or_default();
         estimate.validate()?;
+        self.load_cell.as_ref().map_or(Ok(()), LoadCellConfig::validate)?;
         if let Some(control) = &self.force_control {
-            control.validate(self.controller.lead_cycles * self.period_s(), estimate.observer_time_s)?;
+            let source_s = self.check_source(control)?.unwrap_or(estimate.observer_time_s);
+            control.validate(self.controller.lead_cycles * self.period_s(), source_s)?;
         }
-        if self.force_estimate.is_some() || self.force_control.is_some() {
+        if self.is_force_estimated() {
             self.model().friction.require_open_screws()?;
         }
         self.checks.validate()
+    }
+
+    /// Control by a load cell needs one, and only the emulated jaw has one. Returns the cell's time constant; none for
+    /// control by the estimate.
+    fn check_source(&self, control: &ForceControlConfig) -> Result<Option<f64>, ScenarioError> {
+        if control.source == ForceSource::Estimate {
+            return Ok(None);
+        }
+        let bad = |need| Err(ScenarioError::bad("force_control.source", &"\"load_cell\"", need));
+        match self.load_cell {
+            None => bad("add the table [load_cell], or use \"estimate\""),
+            Some(_) if !self.can.is_virtual() => {
+                bad("use \"estimate\": on real interfaces the rig reads no load cell")
+            }
+            Some(cell) => Ok(Some(cell.time_s())),
+        }
+    }
+
+    /// Whether the bite force is estimated: because the scenario asks for the estimate, or controls the force by it.
+    pub fn is_force_estimated(&self) -> bool {
+        self.force_estimate.is_some()
+            || self.force_control.is_some_and(|control| control.source == ForceSource::Estimate)
     }
 
     /// Feed-forward needs an object of the process data that carries it.

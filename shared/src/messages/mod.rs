@@ -59,7 +59,7 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
 }
 
 /// Version of the layouts below; it changes with any of them, and with what a field means.
-pub const LAYOUT_VERSION: u64 = 12;
+pub const LAYOUT_VERSION: u64 = 13;
 
 /// Room for the contact of this many pairs of teeth: all lower ones.
 pub const MOST_PAIRS: usize = 16;
@@ -136,7 +136,7 @@ macro_rules! messages {
 
 messages! {
     /// Targets and request for the drives, once a cycle.
-    Command on "command" keeping 2048 as "masseter/Command/5644f2d889328c9b" {
+    Command on "command" keeping 2048 as "masseter/Command/89cc47d3acfa3c24" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -153,7 +153,7 @@ messages! {
     }
 
     /// Positions, forces and states of the drives, once a cycle.
-    Reading on "reading" keeping 2048 as "masseter/Reading/d2cd93de2ef83cfd" {
+    Reading on "reading" keeping 2048 as "masseter/Reading/601d80ebaa1988e2" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// Cycle of the last command received when the sample was taken; 0 before the first.
@@ -185,6 +185,8 @@ messages! {
         /// Actuator forces as the drives report them, positive towards increasing position, N. An emulated drive reports the
         /// mean since the last SYNC.
         force_n: [f64; AXES],
+        /// Bite force that the load cell shows at SYNC, N; 0 without a load cell.
+        load_cell_n: f64,
         /// Drive states, [`codes::DriveState`], or [`codes::NO_DRIVE_STATE`].
         drive_state: [u32; AXES],
         /// Axes whose process data arrived this cycle, bit i for axis i.
@@ -194,7 +196,7 @@ messages! {
     }
 
     /// The controller's state and its estimate, once a cycle.
-    State on "state" keeping 2048 as "masseter/State/f47c6f6aaf18d571" {
+    State on "state" keeping 2048 as "masseter/State/38cfecc852cdda30" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -247,7 +249,7 @@ messages! {
 
     /// The signals that the controller declares, once a cycle; without any, there is no such message. A recording's
     /// definition of the message has a field for each signal.
-    Signals on "signal" keeping 2048 as "masseter/Signals/18f7b3435d12c91e" {
+    Signals on "signal" keeping 2048 as "masseter/Signals/32757a278e752a65" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// The signals, in the order of their declaration.
@@ -256,7 +258,7 @@ messages! {
 
     /// The parameters that the controller declares, in its first cycle and in each that begins with another value. A
     /// recording's definition of the message has a field for each parameter.
-    Parameters on "parameter" keeping 256 as "masseter/Parameters/f885397903c8dcfa" {
+    Parameters on "parameter" keeping 256 as "masseter/Parameters/0345b7aedc173f87" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// The parameters, in the order of their declaration.
@@ -264,7 +266,7 @@ messages! {
     }
 
     /// The true state of the mechanism, once a cycle; the controller never reads it.
-    Truth on "truth" keeping 2048 as "masseter/Truth/e16017c620132113" {
+    Truth on "truth" keeping 2048 as "masseter/Truth/8f925f7eb4c8621e" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// The instant it describes: that of the reading's sample, ns.
@@ -289,7 +291,7 @@ messages! {
 
     /// The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads
     /// it.
-    Contact on "contact" keeping 2048 as "masseter/Contact/a5b5b76cdbcc4528" {
+    Contact on "contact" keeping 2048 as "masseter/Contact/fafe7ef19ff6d2f5" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// End of the time that it describes: the instant of the reading's sample, ns.
@@ -303,7 +305,7 @@ messages! {
     }
 
     /// An observation of a tap on a CAN wire: a frame, or an error message in the coding of `linux/can/error.h`.
-    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/32d2e6273a2d0827" {
+    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/c8198f9944bb4dec" {
         /// When its last bit was on the wire, ns.
         time_ns: u64,
         /// When its transmitter had it queued, ns; 0 on real wires.
@@ -320,7 +322,7 @@ messages! {
 
     /// Counters of the kernel for the machine and both loops. The recorder reads and records them; the message is not
     /// published.
-    Machine on "machine" keeping 1 as "masseter/Machine/fec2983c987152e9" {
+    Machine on "machine" keeping 1 as "masseter/Machine/093face44eee4072" {
         /// Time of the sample, ns.
         time_ns: u64,
         /// Time that the hypervisor had taken from all cores together, as far as the hypervisor reports it, ns.
@@ -332,7 +334,7 @@ messages! {
     }
 
     /// A single occurrence: a change of state, a fault, an alarm.
-    Event on "event" keeping 1024 as "masseter/Event/aa094a1dc1b716ce" {
+    Event on "event" keeping 1024 as "masseter/Event/f3a493a87ee0268b" {
         /// When, ns.
         time_ns: u64,
         /// Cycle of the process that reports it.
@@ -468,7 +470,7 @@ mod tests {
     fn the_hash_covers_version_fields_data_bytes_and_codes() {
         let layout = layout::<FrameTap>();
         for (found, other) in
-            [("v12", "v13"), ("queued_ns", "waiting_ns"), ("[<=64]", "[<=8]"), ("fault=8", "fault=9")]
+            [("v13", "v14"), ("queued_ns", "waiting_ns"), ("[<=64]", "[<=8]"), ("fault=8", "fault=9")]
         {
             let changed = layout.replace(found, other);
             assert_ne!((hash(&layout), &layout), (hash(&changed), &changed));

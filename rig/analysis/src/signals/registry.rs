@@ -95,6 +95,11 @@ impl Registry {
         let mut registry = Self { signals: Vec::new(), jaw };
         registry.add_jaw(jaw);
         registry.add_contact(scenario);
+        if scenario.load_cell.is_some() {
+            registry.add("load_cell.force", "N", "Bite force that the load cell shows.", |messages| {
+                Some(messages.reading?.load_cell_n)
+            });
+        }
         registry.add_axes();
         registry.add_controller();
         registry.add_timing();

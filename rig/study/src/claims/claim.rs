@@ -46,7 +46,9 @@ impl ClaimJudgement {
         }
     }
 
-    pub(super) fn new(holds: bool, partly: bool) -> Self {
+    /// Holds by its criterion, or partly by the weaker one.
+    #[must_use]
+    pub fn new(holds: bool, partly: bool) -> Self {
         match (holds, partly) {
             (true, _) => Self::Holds,
             (false, true) => Self::HoldsPartly,

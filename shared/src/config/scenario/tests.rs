@@ -170,6 +170,23 @@ const WRONG: &[(&str, &str)] = &[
     ("[can]\nboot_timeout_ms = 0", "can.boot_timeout_ms = 0: use a finite number above 0"),
     ("[controller]\nease_s = 0.0", "controller.ease_s = 0: use 0.1 to"),
     ("[checks]\ntracking_rms_mm = inf", "checks.tracking_rms_mm"),
+    (
+        "[force_control]\nsource = 'load_cell'",
+        "force_control.source = \"load_cell\": add the table [load_cell], or use \"estimate\"",
+    ),
+    (
+        "[can]\ninterfaces = ['a', 'b']\n[load_cell]\n[force_control]\nsource = 'load_cell'",
+        "force_control.source = \"load_cell\": use \"estimate\": on real interfaces",
+    ),
+    ("[force_control]\nsource = 'loadcell'", "did you mean 'load_cell'?"),
+    (
+        "[load_cell]\nbandwidth_hz = 10.0\n[force_control]\nsource = 'load_cell'\ndamping_n_s_per_m = 40.0",
+        "force_control.damping_n_s_per_m = 40: use at least 46.6",
+    ),
+    ("[load_cell]\nbandwidth_hz = 0.0", "load_cell.bandwidth_hz = 0: use 1 to 100000"),
+    ("[load_cell]\nnoise_n = -1.0", "load_cell.noise_n = -1: use 0 to 1000"),
+    ("[load_cell]\noffset_n = nan", "load_cell.offset_n = NaN: use -1000 to 1000"),
+    ("[load_cell]\nrange_n = 0.0", "load_cell.range_n = 0: use 0.1 to 100000"),
     ("[drives.leg]\nmax_force = 1.0", "did you mean 'max_force_n'?"),
     ("name = ", "s.toml:1"),
     ("[can]\nideal = true\ninterfaces = ['a', 'b']", "can.ideal = true: leave it away"),
