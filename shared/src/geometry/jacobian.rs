@@ -37,6 +37,16 @@ impl Jacobian {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn new(mechanism: &Mechanism, pose: &Pose, joints: &Joints) -> Self {
+        Self::with_sin_cos(mechanism, pose, joints, &joints.theta_rad.map(f64::sin_cos))
+    }
+
+    /// The same where sines and cosines of the hinges' angles are known.
+    pub(crate) fn with_sin_cos(
+        mechanism: &Mechanism,
+        pose: &Pose,
+        joints: &Joints,
+        sin_cos: &[(f64, f64); LEGS],
+    ) -> Self {
         let mut jacobian = Self {
             actuators: Matrix6::zeros(),
             hinges: Matrix3x6::zeros(),
@@ -44,7 +54,7 @@ impl Jacobian {
         };
         for leg in 0..LEGS {
             let arm = pose.rotation * mechanism.platform_corners()[leg];
-            let (sin, cos) = joints.theta_rad[leg].sin_cos();
+            let (sin, cos) = sin_cos[leg];
             let inward = mechanism.inward_direction(leg);
             let along_leg = inward * cos + Vec3::z() * sin;
             let across_leg = Vec3::z() * cos - inward * sin;
