@@ -62,7 +62,7 @@ pub(super) fn analyse(
     interrupts: &Interrupts,
 ) -> anyhow::Result<Figures> {
     let run = Run::new(plan, build, manifest)?;
-    let stream = Stream::new(Analysis::new(&plan.scenario, &manifest.declared));
+    let stream = Stream::new(Analysis::without_report(&plan.scenario, &manifest.declared));
     let (stream, ending) = run.play(plan, stream, interrupts)?;
     manifest.ending = ending;
     stream.finish().context("a message on topic 'frame' holds no CAN frame")
