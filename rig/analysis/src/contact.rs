@@ -54,7 +54,9 @@ impl ContactWatch {
             let load_n = tooth.load_n();
             total_n += load_n;
             self.max_n[place] = self.max_n[place].max(load_n);
-            since_ns.into_iter().for_each(|since_ns| self.courses.take(since_ns, place, load_n));
+            if let Some(since_ns) = since_ns {
+                self.courses.take(since_ns, place, load_n);
+            }
         }
         if total_n > self.total_max_n {
             (self.total_max_n, self.greatest) = (total_n, *contact);

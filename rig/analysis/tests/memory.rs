@@ -57,7 +57,9 @@ fn take_cycle(analysis: &mut Analysis, cycle: u64) {
         .into(),
         tap::encode(0, &tapped).into(),
     ];
-    messages.iter().for_each(|message| analysis.take(message).unwrap());
+    for message in &messages {
+        analysis.take(message).unwrap();
+    }
 }
 
 #[test]

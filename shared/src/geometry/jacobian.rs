@@ -52,9 +52,8 @@ impl Jacobian {
             hinges: Matrix3x6::zeros(),
             length_m: mechanism.platform_sides_m()[0],
         };
-        for leg in 0..LEGS {
+        for (leg, &(sin, cos)) in sin_cos.iter().enumerate() {
             let arm = pose.rotation * mechanism.platform_corners()[leg];
-            let (sin, cos) = sin_cos[leg];
             let inward = mechanism.inward_direction(leg);
             let along_leg = inward * cos + Vec3::z() * sin;
             let across_leg = Vec3::z() * cos - inward * sin;
