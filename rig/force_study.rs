@@ -15,9 +15,8 @@ use masseter_shared::geometry::{AXES, AXIS_NAMES, LEGS};
 use masseter_shared::messages::codes::ControllerState;
 use masseter_study::{ClaimJudgement, ForceFigure, Forces, PaperClaim};
 
-use crate::arguments::ControllerKind;
 use crate::machine::interrupts::Interrupts;
-use crate::run::figures_unrecorded;
+use crate::run::shown_figures;
 
 /// Encoders without noise, whose share of the forces would hide that of friction.
 const CHEWING: &str = "duration_s = 4.0
@@ -58,7 +57,7 @@ pub(crate) fn play() -> anyhow::Result<Forces> {
     let interrupts = Interrupts::listen().context("cannot listen for signals")?;
     let run = |text: &str| {
         let scenario = Scenario::parse(Path::new("study.toml"), text)?;
-        figures_unrecorded(&scenario, ControllerKind::default(), &interrupts).map_err(|failure| failure.error)
+        shown_figures(&scenario, &interrupts).map_err(|failure| failure.error)
     };
     let mut chewing = Vec::new();
     for (_, friction) in FRICTIONS {

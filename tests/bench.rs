@@ -10,6 +10,7 @@ use std::time::Duration;
 use common::{Cores, MASSETER, child_of};
 use masseter_shared::clock;
 use rustix::process::{Pid, Signal, kill_process, test_kill_process};
+use serde_json::Value;
 
 /// Waits until a run in one of the folders there is under way.
 fn wait_for_a_run(place: &Path) {
@@ -45,4 +46,23 @@ fn an_interrupted_bench_ends_after_its_run_and_leaves_nothing() {
         assert!(test_kill_process(run).is_err(), "{signal:?}: its run still plays");
         assert_eq!(fs::read_dir(place.path()).unwrap().count(), 0, "{signal:?}: its folder is still there");
     }
+}
+
+#[test]
+fn a_run_without_a_recording_is_measured_by_time_and_memory() {
+    let _cores = Cores::take();
+    let output = Command::new(MASSETER)
+        .args(["bench", "virtual", "--rounds", "1", "--format", "json"])
+        .output()
+        .unwrap();
+    // The machine may be too disturbed for a bench.
+    assert!(matches!(output.status.code(), Some(0 | 3)), "{output:?}");
+    let results: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let virtual_time = &results["comparisons"][0];
+    let names = [0, 1].map(|place| &virtual_time["candidates"][place]["name"]);
+    assert_eq!(names, ["wall time", "CPU time"]);
+    let notes: Vec<_> = virtual_time["notes"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+    let [wall, cpu, memory] = notes[..] else { panic!("{notes:?}") };
+    assert!(wall.ends_with("times real time") && cpu.ends_with("times real time"), "{notes:?}");
+    assert!(memory.ends_with(" MB"), "{memory}");
 }

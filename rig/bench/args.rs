@@ -16,12 +16,14 @@ pub(crate) enum Kind {
     Rate,
     /// Whole runs in lockstep and in virtual time, against real time and a round trip over bare iceoryx2
     Simulated,
+    /// One motion of 10 s in virtual time without a recording, as suites and campaigns play it
+    Virtual,
 }
 
 /// The arguments.
 #[derive(Debug, Clone, Args)]
 #[command(
-    after_help = "Examples:\n  masseter bench loop\n  masseter bench loop ipc rate simulated --out figures"
+    after_help = "Examples:\n  masseter bench loop\n  masseter bench loop ipc rate simulated virtual --out figures"
 )]
 pub(crate) struct BenchArgs {
     /// What to measure

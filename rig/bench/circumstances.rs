@@ -42,10 +42,10 @@ pub(super) fn check_cores(kinds: &[Kind], cores: [usize; 2]) -> anyhow::Result<(
 fn check(kinds: &[Kind], [own, peer]: [usize; 2], allowed: &[usize]) -> anyhow::Result<()> {
     let named = allowed.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
     ensure!(
-        kinds.iter().all(|kind| *kind == Kind::Loop)
+        kinds.iter().all(|kind| matches!(kind, Kind::Loop | Kind::Virtual))
             || own != peer && [own, peer].iter().all(|core| allowed.contains(core)),
         "bench ipc, rate and simulated need two cores: choose two among {named} with --cores; 'masseter doctor' shows how to allow \
-         other cores. bench loop needs one"
+         other cores. bench loop and virtual need one"
     );
     Ok(())
 }
@@ -59,7 +59,9 @@ mod tests {
         let refusal =
             |kind, cores, allowed: &[usize]| check(&[kind], cores, allowed).err().map(|e| e.to_string());
         assert_eq!(refusal(Kind::Ipc, [0, 1], &[0, 1]), None);
-        assert_eq!(refusal(Kind::Loop, [0, 0], &[0]), None, "one side needs one");
+        for kind in [Kind::Loop, Kind::Virtual] {
+            assert_eq!(refusal(kind, [0, 0], &[0]), None, "one side needs one");
+        }
         for (kind, cores, allowed, choice) in [
             (Kind::Ipc, [0, 1], &[3][..], "among 3 with"),
             (Kind::Rate, [1, 1], &[0, 1], "among 0, 1 with"),

@@ -14,6 +14,7 @@ mod rate;
 mod simulated;
 mod table;
 mod thread;
+mod virtual_time;
 mod wake;
 
 use std::fs;
@@ -73,6 +74,7 @@ fn measure_each(args: &BenchArgs, results: &mut Results) -> anyhow::Result<()> {
             Kind::Ipc => ipc::measure(args.rounds, args.cores),
             Kind::Rate => rate::measure(args.rounds, args.cores),
             Kind::Simulated => simulated::measure(args.rounds, args.cores),
+            Kind::Virtual => virtual_time::measure(args.rounds, args.cores[0]),
         };
         results.comparisons.push(comparison.with_context(|| format!("bench {name}"))?);
         if let Some(folder) = &args.out {

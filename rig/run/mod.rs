@@ -32,7 +32,7 @@ use args::RunArgs;
 pub(crate) use clock::needs_processes;
 pub(crate) use log::Log;
 pub(crate) use logged_ports::LoggedPorts;
-pub(crate) use prepared::{PreparedRun, figures_unrecorded, judge_unrecorded};
+pub(crate) use prepared::{PreparedRun, figures_unrecorded, judge_unrecorded, shown_figures};
 pub(crate) use resolve::check_simulated;
 pub(crate) use sink::Sink;
 

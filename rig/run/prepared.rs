@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::Path;
 
 use anyhow::Context;
-use masseter_analysis::Figures;
+use masseter_analysis::{Analysis, Figures};
 use masseter_plan::RunPlan;
 use masseter_recording::{Ending, FullSpeed, Manifest, RunFolder};
 use masseter_report::Judgement;
@@ -16,6 +16,7 @@ use masseter_terminal::{Exit, Failure, OrFailure, status};
 use super::args::{ClockKind, RunArgs};
 use super::resolve::{resolve, resolve_simulated};
 use super::room::{self, Reserve};
+use super::virtual_time::StartAnalysis;
 use super::{supervisor, virtual_time};
 use crate::arguments::{ControllerChoice, ControllerKind, name_of};
 use crate::machine::interrupts::Interrupts;
@@ -139,30 +140,49 @@ impl PlayedRun {
 /// Plays a run under virtual time without a folder, and judges it from its messages.
 pub(crate) fn judge_unrecorded(args: &RunArgs, interrupts: &Interrupts) -> Result<Judgement, Failure> {
     let (plan, args) = resolve(args).usage()?;
-    let (manifest, figures) = unrecorded(&plan, &args, interrupts)?;
+    let (manifest, figures) = unrecorded(&plan, &args, Analysis::without_report, interrupts)?;
     Ok(Judgement::new(&manifest, &figures))
 }
 
-/// Plays a scenario under virtual time by a controller of the rig; its figures, without a folder.
+/// Plays a scenario under virtual time by a controller of the rig; the figures that its verdict needs, without a folder.
 pub(crate) fn figures_unrecorded(
     scenario: &Scenario,
     controller: ControllerKind,
     interrupts: &Interrupts,
 ) -> Result<(Manifest, Figures), Failure> {
+    figures_of(scenario, controller, Analysis::without_report, interrupts)
+}
+
+/// Plays a scenario under virtual time by the rig's own controller; all its figures, with the curves of a report.
+pub(crate) fn shown_figures(
+    scenario: &Scenario,
+    interrupts: &Interrupts,
+) -> Result<(Manifest, Figures), Failure> {
+    figures_of(scenario, ControllerKind::default(), Analysis::new, interrupts)
+}
+
+fn figures_of(
+    scenario: &Scenario,
+    controller: ControllerKind,
+    start: StartAnalysis,
+    interrupts: &Interrupts,
+) -> Result<(Manifest, Figures), Failure> {
     let plan = resolve_simulated(scenario, controller.builder()).usage()?;
     let controller = ControllerChoice::Own(controller);
-    unrecorded(&plan, &RunArgs { clock: ClockKind::Virtual, controller, ..RunArgs::default() }, interrupts)
+    let args = RunArgs { clock: ClockKind::Virtual, controller, ..RunArgs::default() };
+    unrecorded(&plan, &args, start, interrupts)
 }
 
 fn unrecorded(
     plan: &RunPlan,
     args: &RunArgs,
+    start: StartAnalysis,
     interrupts: &Interrupts,
 ) -> Result<(Manifest, Figures), Failure> {
     let mut manifest = manifest_of(plan, args);
     let build =
         args.controller.builder().context("virtual time runs controllers of the rig alone").usage()?;
-    let figures = virtual_time::analyse(plan, build, &mut manifest, interrupts).died()?;
+    let figures = virtual_time::analyse(plan, build, start, &mut manifest, interrupts).died()?;
     Ok((manifest, figures))
 }
 

@@ -13,10 +13,11 @@ use masseter_plant::core::PlantCore;
 use masseter_plant::cycle::PlantPorts;
 use masseter_plant::emulation::VirtualLink;
 use masseter_recording::{Backlog, Ending, Manifest, Pace, Recorder, RunFolder, Scene};
+use masseter_shared::config::Scenario;
 use masseter_shared::control::{Controller, Duties, Operator, Outcome, set_parameters};
 use masseter_shared::lockstep::EPOCH_NS;
 use masseter_shared::messages::{Command, Contact, Reading, Truth};
-use masseter_shared::named::NamedValues;
+use masseter_shared::named::{Declared, NamedValues};
 use masseter_shared::realtime::Wake;
 use masseter_shared::schedule::CycleSchedule;
 use masseter_terminal::status;
@@ -26,6 +27,9 @@ use super::log::{Log, Publisher};
 use super::logged_ports::LoggedPorts;
 use super::sink::{Sink, Stream};
 use crate::machine::interrupts::Interrupts;
+
+/// Makes the analysis of a run: with everything that a report shows, or with what a verdict needs alone.
+pub(super) type StartAnalysis = fn(&Scenario, &Declared) -> Analysis;
 
 /// Runs the rig and records the run; it ends as the processes would, also when the user stops it. Enters the ending and what
 /// the controller declares into the manifest.
@@ -56,11 +60,12 @@ pub(super) fn record(
 pub(super) fn analyse(
     plan: &RunPlan,
     build: BuildController,
+    start: StartAnalysis,
     manifest: &mut Manifest,
     interrupts: &Interrupts,
 ) -> anyhow::Result<Figures> {
     let run = Run::new(plan, build, manifest)?;
-    let stream = Stream::new(Analysis::new(&plan.scenario, &manifest.declared));
+    let stream = Stream::new(start(&plan.scenario, &manifest.declared));
     let (stream, ending) = run.play(plan, stream, interrupts)?;
     manifest.ending = ending;
     stream.finish().context("a message on topic 'frame' holds no CAN frame")

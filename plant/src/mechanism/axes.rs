@@ -126,11 +126,12 @@ impl Axes {
             parted_kg: Vector6::zeros(),
             resisting_kg: Vector6::zeros(),
         };
+        let coulomb_n = braking.coulomb_n();
         for (number, axis) in self.axes.iter_mut().enumerate() {
             let motion = AxisMotion { position_m: positions_m[number], speed_m_s: speeds_m_s[number] };
             let factor = axis.acting.size(FaultKindConfig::Friction).unwrap_or(1.0);
             let mut element = axis.act(drives_n[number], motion, step_s);
-            element += braking.on_axis(number, motion.speed_m_s, factor, step_s);
+            element += braking.on_axis(number, coulomb_n[number], motion.speed_m_s, factor, step_s);
             forces.force_n[number] = element.force_n;
             forces.parted_kg[number] = axis.coupling.parted_kg();
             forces.resisting_kg[number] = element.damping_n_s_per_m * step_s;

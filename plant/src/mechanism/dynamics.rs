@@ -16,9 +16,9 @@
 use masseter_shared::config::{DynamicsConfig, FaultKindConfig};
 use masseter_shared::dynamics::{Bodies, Equations, Motion, Reactions};
 use masseter_shared::geometry::{
-    AXES, InverseError, Jacobian, Joints, LimitViolation, Mechanism, Pose, Twist, Vec3,
+    AXES, Actuators, InverseError, Jacobian, LimitViolation, Mechanism, Pose, Twist, Vec3,
 };
-use nalgebra::{Matrix6, UnitQuaternion, Vector6};
+use nalgebra::{UnitQuaternion, Vector6};
 
 use super::axes::{Axes, AxesForces, AxisMotion};
 use super::contact::{ContactError, Food, Occlusion};
@@ -31,13 +31,13 @@ pub(crate) struct MechanismState {
     /// The platform in the base frame.
     pub(crate) pose: Pose,
     twist: Twist,
-    joints: Joints,
+    actuators: Actuators,
 }
 
 impl MechanismState {
     /// Joint positions d₁ d₂ d₃ l₁ l₂ l₃, m.
     pub(crate) fn positions_m(&self) -> [f64; AXES] {
-        self.joints.actuators.to_axes()
+        self.actuators.to_axes()
     }
 }
 
@@ -95,7 +95,7 @@ impl Dynamics {
             return Err(DynamicsError::Start { initial_leg_m: config.initial_leg_m, violation });
         }
         let (twist, acceleration) = (Twist::zeros(), Twist::zeros());
-        let state = MechanismState { pose, twist, joints };
+        let state = MechanismState { pose, twist, actuators: joints.actuators };
         let bodies = Bodies::from(config);
         let motion = Motion::of_joints(&mechanism, &pose, &joints, &twist);
         occlusion.check(&Equations::new(&bodies, &motion).mass, config.step_ns)?;
@@ -179,18 +179,20 @@ impl Dynamics {
 
     /// Joint velocities in a state, m/s. They cost more than a step, so that only callers who need them pay.
     pub(crate) fn velocities_m_s(&self, state: &MechanismState) -> [f64; AXES] {
-        (self.jacobian_at(state).actuators * state.twist).into()
+        let joints = self.mechanism.inverse(&state.pose).expect("a pose that was reached has joints");
+        (Jacobian::new(&self.mechanism, &state.pose, &joints).actuators * state.twist).into()
     }
 
     /// Applies the actuators' forces (N) for the step that begins.
     pub(crate) fn push(&mut self, force_n: &[f64; AXES]) -> Result<(), DynamicsError> {
-        let (middle, twist, step_s) = (self.middle()?, self.state.twist, self.step_s());
-        let motion = self.motion_of(&middle);
+        let (twist, step_s) = (self.state.twist, self.step_s());
+        let motion = self.middle()?;
+        let positions_m = motion.joints.actuators.to_axes();
         let bias_m_s2 = motion.bias.axes_m_s2;
         let actuators = &motion.jacobian.actuators;
         let speeds_m_s = actuators * twist;
-        let forces = self.axes.act(force_n, middle.positions_m(), &speeds_m_s, &self.braking, step_s);
-        let contact = self.occlusion.push(&middle.pose, &twist, step_s);
+        let forces = self.axes.act(force_n, positions_m, &speeds_m_s, &self.braking, step_s);
+        let contact = self.occlusion.push(&motion.pose, &twist, step_s);
         let joints = self.braking.of_joints(&motion);
         let Equations { mut mass, bias, .. } = Equations::new(&self.bodies, &motion);
         let axes_n = forces.force_n + forces.parted_kg.component_mul(&bias_m_s2);
@@ -198,8 +200,10 @@ impl Dynamics {
             + contact
             + self.load.wrench(&motion.pose, &motion.twist, self.config.gravity_m_s2)
             - bias;
-        let moved_kg = Matrix6::from_diagonal(&(forces.resisting_kg - forces.parted_kg));
-        mass += self.load.mass(&middle.pose) + actuators.tr_mul(&(moved_kg * actuators)) + joints * step_s;
+        let moved_kg = forces.resisting_kg - forces.parted_kg;
+        let mut moved = *actuators;
+        moved.row_iter_mut().zip(&moved_kg).for_each(|(mut row, kg)| row *= *kg);
+        mass += self.load.mass(&motion.pose) + actuators.tr_mul(&moved) + joints * step_s;
         self.acceleration = mass.cholesky().ok_or(DynamicsError::Mass)?.solve(&wrench);
         self.settle(&motion, &speeds_m_s, &forces);
         Ok(())
@@ -208,10 +212,11 @@ impl Dynamics {
     /// Ends a step that began with these speeds of the axes: what remembers something learns the new speeds and the loads.
     fn settle(&mut self, motion: &Motion, speeds_m_s: &Vector6<f64>, forces: &AxesForces) {
         let step_s = self.step_s();
-        let changes_m_s = motion.accelerations(&self.acceleration).axes_m_s2 * step_s;
+        let accelerations = motion.accelerations(&self.acceleration);
+        let changes_m_s = accelerations.axes_m_s2 * step_s;
         let speeds_m_s = speeds_m_s + changes_m_s;
         let forces_n = forces.force_n - forces.resisting_kg.component_mul(&changes_m_s) / step_s;
-        let loads = Reactions::new(&self.bodies, motion, &self.acceleration, &forces_n).loads(&forces_n);
+        let loads = Reactions::of_joints(&self.bodies, motion, &accelerations, &forces_n).loads(&forces_n);
         self.braking.settle(&loads, &speeds_m_s, step_s);
         self.axes.settle(&speeds_m_s);
     }
@@ -223,36 +228,28 @@ impl Dynamics {
     /// Moves the mechanism for `dt_s`, a part of the step, under the step's acceleration.
     pub(crate) fn advance(&mut self, dt_s: f64) -> Result<(), DynamicsError> {
         let mean_twist = self.state.twist + self.acceleration * (dt_s / 2.0);
-        self.state = self.moved(&mean_twist, dt_s)?;
-        self.state.twist += self.acceleration * dt_s;
+        let pose = self.moved(&mean_twist, dt_s);
+        let twist = self.state.twist + self.acceleration * dt_s;
+        self.state = MechanismState { pose, twist, actuators: self.mechanism.actuators(&pose)? };
         self.axes.advance(dt_s);
         Ok(())
     }
 
-    /// Pose and joints in the middle of the step that begins.
-    fn middle(&self) -> Result<MechanismState, DynamicsError> {
-        self.moved(&self.state.twist, self.step_s() / 2.0)
+    /// The motion in the middle of the step that begins, there with the twist that the last step's acceleration leads to.
+    fn middle(&self) -> Result<Motion, DynamicsError> {
+        let half_s = self.step_s() / 2.0;
+        let twist = self.state.twist + self.acceleration * half_s;
+        Ok(Motion::new(&self.mechanism, &self.moved(&self.state.twist, half_s), &twist)?)
     }
 
-    /// The state with pose and joints moved on by a twist.
-    fn moved(&self, twist: &Twist, dt_s: f64) -> Result<MechanismState, DynamicsError> {
+    /// The pose moved on by a twist.
+    fn moved(&self, twist: &Twist, dt_s: f64) -> Pose {
         let MechanismState { pose, .. } = &self.state;
         let linear = twist.fixed_rows::<3>(0) * dt_s;
         let angular = twist.fixed_rows::<3>(3) * dt_s;
         let mut rotation = UnitQuaternion::from_scaled_axis(angular) * pose.rotation;
         rotation.renormalize();
-        let pose = Pose::from_parts((pose.translation.vector + linear).into(), rotation);
-        Ok(MechanismState { pose, joints: self.mechanism.inverse(&pose)?, twist: self.state.twist })
-    }
-
-    /// The motion in the middle of a step, there with the twist that the last step's acceleration leads to.
-    fn motion_of(&self, MechanismState { pose, twist, joints }: &MechanismState) -> Motion {
-        let twist = twist + self.acceleration * (self.step_s() / 2.0);
-        Motion::of_joints(&self.mechanism, pose, joints, &twist)
-    }
-
-    fn jacobian_at(&self, MechanismState { pose, joints, .. }: &MechanismState) -> Jacobian {
-        Jacobian::new(&self.mechanism, pose, joints)
+        Pose::from_parts((pose.translation.vector + linear).into(), rotation)
     }
 }
 

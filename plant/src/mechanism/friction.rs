@@ -43,9 +43,21 @@ impl Braking {
         }
     }
 
-    /// The force on an axis in a step, at a speed (m/s), where its friction is a multiple of the usual one.
-    pub(super) fn on_axis(&self, axis: usize, speed_m_s: f64, factor: f64, step_s: f64) -> Element {
-        let coulomb_n = self.law.coulomb_n(&self.loads)[axis];
+    /// Coulomb friction of the axes under the present loads, N.
+    pub(super) fn coulomb_n(&self) -> [f64; AXES] {
+        self.law.coulomb_n(&self.loads)
+    }
+
+    /// The force on an axis of this Coulomb friction in a step, at a speed (m/s), where its friction is a multiple of the
+    /// usual one.
+    pub(super) fn on_axis(
+        &self,
+        axis: usize,
+        coulomb_n: f64,
+        speed_m_s: f64,
+        factor: f64,
+        step_s: f64,
+    ) -> Element {
         let element = match self.config.model {
             FrictionModel::Smooth | FrictionModel::None => {
                 let drag_n_s_per_m = self.law.drag_n_s_per_m(coulomb_n, speed_m_s);
@@ -92,6 +104,9 @@ impl Braking {
     /// Takes the loads of a step, at whose end the axes have these speeds, m/s.
     pub(super) fn settle(&mut self, loads: &Loads, speeds_m_s: &Vector6<f64>, step_s: f64) {
         self.loads = self.loads.towards(loads, step_s / (step_s + LOAD_TIME_S));
+        if self.config.model != FrictionModel::Lugre {
+            return;
+        }
         for axis in 0..AXES {
             let slip = self.slip(speeds_m_s[axis], step_s);
             let bristles = &mut self.bristles[axis];

@@ -47,8 +47,11 @@ impl Load {
 
     /// The payload's share of the platform's mass matrix, which is that of a point mass.
     pub(super) fn mass(&self, pose: &Pose) -> Matrix6<f64> {
-        let across = self.arm(pose).cross_matrix() * self.payload_kg;
         let mut mass = Matrix6::zeros();
+        if self.payload_kg == 0.0 {
+            return mass;
+        }
+        let across = self.arm(pose).cross_matrix() * self.payload_kg;
         mass.fixed_view_mut::<3, 3>(0, 0).copy_from(&(Matrix3::identity() * self.payload_kg));
         mass.fixed_view_mut::<3, 3>(0, 3).copy_from(&-across);
         mass.fixed_view_mut::<3, 3>(3, 0).copy_from(&across);
@@ -58,6 +61,9 @@ impl Load {
 
     /// The wrench on the platform: forces, the payload's weight, and its centrifugal force.
     pub(super) fn wrench(&self, pose: &Pose, twist: &Twist, gravity_m_s2: f64) -> Vector6<f64> {
+        if self.payload_kg == 0.0 {
+            return self.pushed;
+        }
         let arm = self.arm(pose);
         let omega: Vec3 = twist.fixed_rows::<3>(3).into();
         let force = omega.cross(&omega.cross(&arm)) * -self.payload_kg;

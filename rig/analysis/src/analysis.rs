@@ -17,22 +17,22 @@ use crate::disturbance::Disturbance;
 use crate::events::EventRecord;
 use crate::figures::Figures;
 use crate::freshness::Freshness;
-use crate::intervals::Intervals;
-use crate::longest_cycles::LongestCycles;
 use crate::named::NamedWatch;
 use crate::outage::OutageWatch;
-use crate::over_time::{CONTROLLER, OverTimeCollector, PLANT};
 use crate::pose_errors::pose;
 use crate::requirements::Requirements;
 use crate::response::Responses;
 use crate::scenario_stalls::ScenarioStalls;
 use crate::sequence::SequenceCheck;
+use crate::shown::Shown;
 use crate::skips::{Counters, Skips};
 use crate::tracking::{PathSample, PoseSource, Tracking};
 
 /// Computes the [`Figures`] of a run from its messages, in their order in the recording.
 ///
 /// It holds no more than a fixed amount of memory, beside one histogram per second of the run and the run's events.
+/// [Without a report](Self::without_report) there are no histograms: beside about 1 MB it holds 8 bytes per second of the
+/// motion, the run's events, and the frames since the last SYNC of each bus.
 ///
 /// ```
 /// use masseter_analysis::Analysis;
@@ -56,8 +56,8 @@ pub struct Analysis {
     named: NamedWatch,
     /// Whether the mechanism is emulated, so that its true motion is recorded.
     has_truth: bool,
-    intervals: Intervals,
-    longest_cycles: LongestCycles,
+    /// None where nothing is shown.
+    shown: Option<Box<Shown>>,
     /// None but in a dry run.
     axes: Option<AxisWatch>,
     tracking: Tracking,
@@ -67,7 +67,6 @@ pub struct Analysis {
     sequence: SequenceCheck,
     frames: Vec<u64>,
     events: Vec<EventRecord>,
-    over_time: OverTimeCollector,
     responses: Responses,
     cycles: u64,
     freshness: Freshness,
@@ -96,8 +95,7 @@ impl Analysis {
             declared: declared.clone(),
             named: NamedWatch::new(declared),
             has_truth: is_emulated,
-            intervals: Intervals::new(period_ns),
-            longest_cycles: LongestCycles::default(),
+            shown: Some(Box::new(Shown::new(scenario))),
             axes: scenario.dry.is_on.then(|| AxisWatch::new(scenario)),
             tracking: Tracking::new(
                 if is_emulated { PoseSource::Truth } else { PoseSource::Estimate },
@@ -109,7 +107,6 @@ impl Analysis {
             sequence: SequenceCheck::default(),
             frames: Vec::new(),
             events: Vec::new(),
-            over_time: OverTimeCollector::new(scenario.jaw.reference_point_m, scenario.can.bitrate().ok()),
             responses: Responses::for_scenario(scenario),
             cycles: 0,
             freshness: Freshness::default(),
@@ -128,6 +125,12 @@ impl Analysis {
         }
     }
 
+    /// The same for a run that is judged and not shown: no intervals, longest cycles, or curves.
+    #[must_use]
+    pub fn without_report(scenario: &Scenario, declared: &Declared) -> Self {
+        Self { shown: None, ..Self::new(scenario, declared) }
+    }
+
     /// Takes the next message.
     ///
     /// # Errors
@@ -140,25 +143,26 @@ impl Analysis {
         }
         match message {
             Recorded::Command(command) => {
-                self.intervals.command(command);
-                self.longest_cycles.command(command);
+                self.shown.iter_mut().for_each(|shown| shown.command(command));
                 self.axes.iter_mut().for_each(|axes| axes.command(command));
             }
             Recorded::Reading(reading) => self.reading(reading),
             Recorded::State(state) => self.state(state),
             Recorded::Truth(truth) => self.truth(truth),
             Recorded::Contact(contact) => {
-                let since_ns = self.over_time.since(contact.sampled_ns);
+                let since_ns = self.shown.as_mut().map(|shown| shown.over_time.since(contact.sampled_ns));
                 self.contact.take(contact, since_ns);
             }
             Recorded::Frame(frame) => self.frame(frame)?,
             Recorded::Signals(message) => {
                 self.named.signals(message);
-                self.over_time.signals(message);
+                self.shown.iter_mut().for_each(|shown| shown.signals(message));
             }
             Recorded::Parameters(message) => self.named.parameters(message),
             Recorded::Event(event) => self.event(EventRecord::of_run(event, &self.declared)),
-            Recorded::Machine(machine) => self.longest_cycles.machine(machine),
+            Recorded::Machine(machine) => {
+                self.shown.iter_mut().for_each(|shown| shown.longest_cycles.machine(machine));
+            }
         }
         Ok(())
     }
@@ -187,10 +191,8 @@ impl Analysis {
     fn reading(&mut self, reading: &Reading) {
         let is_of_scenario = self.stalls.reading(reading);
         let skipped = self.plant_skips.take(&Counters::from(reading), self.period_ns, is_of_scenario);
-        self.intervals.reading(reading, skipped);
-        self.longest_cycles.reading(reading);
+        self.shown.iter_mut().for_each(|shown| shown.reading(reading, skipped));
         self.axes.iter_mut().for_each(|axes| axes.reading(reading));
-        self.over_time.wake_up(PLANT, reading.due_ns, reading.woke_ns);
         self.outage.reading(reading, is_of_scenario);
         self.first_sample_ns.get_or_insert(reading.sampled_ns);
         self.last_sample_ns = reading.sampled_ns;
@@ -200,17 +202,15 @@ impl Analysis {
         let is_fresh = self.freshness.take(state);
         let (is_of_scenario, is_path_of_scenario) = self.stalls.state(state);
         let skipped = self.controller_skips.take(&Counters::from(state), self.period_ns, is_of_scenario);
-        self.intervals.state(state, is_fresh, skipped);
-        self.longest_cycles.state(state, is_fresh);
-        self.over_time.wake_up(CONTROLLER, state.due_ns, state.woke_ns);
+        self.shown.iter_mut().for_each(|shown| shown.state(state, is_fresh, skipped));
         self.outage.state(state, is_of_scenario);
         let is_disturbed = self.disturbance.take(state, is_fresh, is_path_of_scenario);
         if let Some(requirements) = self.requirements.as_mut().filter(|_| is_disturbed) {
             requirements.disturb(state.cycle);
         }
-        if is_fresh && !self.has_truth {
+        if let Some(shown) = self.shown.as_mut().filter(|_| is_fresh && !self.has_truth) {
             let estimated = pose(state.estimated_position_m, state.estimated_quaternion_wxyz);
-            self.over_time.actual(state.sampled_ns, estimated.as_ref());
+            shown.over_time.actual(state.sampled_ns, estimated.as_ref());
         }
         self.tracking.state(state, is_fresh, is_disturbed).into_iter().for_each(|sample| self.path(sample));
         self.cycles = self.cycles.max(state.seq);
@@ -220,13 +220,11 @@ impl Analysis {
     fn truth(&mut self, truth: &Truth) {
         self.tracking.truth(truth).into_iter().flatten().for_each(|sample| self.path(sample));
         self.bite_force_max_n = self.bite_force_max_n.map(|most_n| most_n.max(truth.bite_force_n));
-        self.over_time.truth(truth);
-        let actual = pose(truth.position_m, truth.quaternion_wxyz);
-        self.over_time.actual(truth.sampled_ns, actual.as_ref());
+        self.shown.iter_mut().for_each(|shown| shown.truth(truth));
     }
 
     fn path(&mut self, sample: PathSample) {
-        self.over_time.path(&sample);
+        self.shown.iter_mut().for_each(|shown| shown.over_time.path(&sample));
         self.faults.sample(sample);
     }
 
@@ -245,7 +243,7 @@ impl Analysis {
             self.frames.resize(bus + 1, 0);
         }
         self.frames[bus] += u64::from(tapped.frame().is_some());
-        self.over_time.frame(tap.time_ns, bus, &tapped);
+        self.shown.iter_mut().for_each(|shown| shown.frame(tap, bus, &tapped));
         self.responses.frame(tap, bus, &tapped);
         Ok(())
     }
@@ -260,6 +258,10 @@ impl Analysis {
         let missing_frames =
             topics.iter().find(|topic| topic.topic == FrameTap::TOPIC).map_or(0, |topic| topic.missing);
         let (signals, parameters) = self.named.finish();
+        let (intervals, worst_cycles, over_time) = self.shown.map_or_else(Default::default, |shown| {
+            let Shown { intervals, longest_cycles, over_time } = *shown;
+            (intervals.finish(), longest_cycles.finish(), over_time.finish(self.declared.signals.len()))
+        });
         self.events.sort_by_key(|event| event.time_ns);
         Figures {
             digest: self.digest.finish(),
@@ -278,8 +280,8 @@ impl Analysis {
             parameters,
             bite_force_max_n: self.bite_force_max_n,
             contact: self.contact.finish(),
-            worst_cycles: self.longest_cycles.finish(),
-            intervals: self.intervals.finish(),
+            worst_cycles,
+            intervals,
             topics,
             frames: self.frames,
             bus_response: self.responses.finish(missing_frames),
@@ -288,7 +290,7 @@ impl Analysis {
             damage: damage.to_vec(),
             axes: self.axes.map(AxisWatch::finish).unwrap_or_default(),
             track,
-            over_time: self.over_time.finish(self.declared.signals.len()),
+            over_time,
         }
     }
 }

@@ -47,14 +47,16 @@ pub(super) struct ContactWatch {
 }
 
 impl ContactWatch {
-    /// Takes a message, sampled so long after the run's first SYNC.
-    pub(super) fn take(&mut self, contact: &Contact, since_ns: u64) {
+    /// Takes a message, sampled so long after the run's first SYNC; none where no course is shown.
+    pub(super) fn take(&mut self, contact: &Contact, since_ns: Option<u64>) {
         let mut total_n = 0.0;
         for (place, tooth) in contact.teeth().enumerate() {
             let load_n = tooth.load_n();
             total_n += load_n;
             self.max_n[place] = self.max_n[place].max(load_n);
-            self.courses.take(since_ns, place, load_n);
+            if let Some(since_ns) = since_ns {
+                self.courses.take(since_ns, place, load_n);
+            }
         }
         if total_n > self.total_max_n {
             (self.total_max_n, self.greatest) = (total_n, *contact);
@@ -96,7 +98,8 @@ mod tests {
     fn the_greatest_of_each_tooth_and_the_greatest_sum_are_kept_with_their_moment() {
         let mut watch = ContactWatch::default();
         for (millisecond, forces_n) in [(1, [5.0, 0.0]), (2, [30.0, 20.0]), (3, [40.0, 1.0])] {
-            watch.take(&contact(millisecond * 1_000_000, forces_n), millisecond * 1_000_000);
+            let at_ns = millisecond * 1_000_000;
+            watch.take(&contact(at_ns, forces_n), Some(at_ns));
         }
         let figures = watch.finish().unwrap();
         assert_eq!((figures.total_max_n, figures.total_max_at_ns), (50.0, 2_000_000));

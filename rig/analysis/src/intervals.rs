@@ -95,7 +95,7 @@ impl Intervals {
         if reading.complete_ns > 0 {
             self.add(Interval::ProcessData, reading.sampled_ns, reading.complete_ns);
         }
-        if let Some(received_ns) = self.received_ns.get(reading.cycle) {
+        if let Some(received_ns) = self.received_ns.get(reading.cycle).copied() {
             self.add(Interval::ReadingTransport, reading.published_ns, received_ns);
         }
         self.readings.insert(reading.cycle, *reading);
@@ -103,10 +103,10 @@ impl Intervals {
         if let Some(sent_ns) = answer.sent_ns {
             self.add(Interval::CommandToWire, answer.received_ns, sent_ns);
         }
-        if let Some(command) = self.commands.get(answer.cycle) {
+        if let Some(command) = self.commands.get(answer.cycle).copied() {
             self.command_and_answer(&command, &answer);
         }
-        if let Some(state) = self.states.get(answer.cycle) {
+        if let Some(state) = self.states.get(answer.cycle).copied() {
             self.round_trip(&state, &answer);
         }
         self.answered.insert(answer.cycle, answer);
@@ -121,13 +121,13 @@ impl Intervals {
         }
         self.add(Interval::ForwardKinematics, state.received_ns, state.solved_ns);
         self.add(Interval::Control, state.solved_ns, state.commanded_ns);
-        if let Some(reading) = self.readings.get(state.reading_cycle) {
+        if let Some(reading) = self.readings.get(state.reading_cycle).copied() {
             self.add(Interval::ReadingTransport, reading.published_ns, state.received_ns);
         }
-        if let Some(command) = self.commands.get(state.cycle) {
+        if let Some(command) = self.commands.get(state.cycle).copied() {
             self.add(Interval::ControllerCycle, state.received_ns, command.published_ns);
         }
-        if let Some(answer) = self.answered.get(state.cycle) {
+        if let Some(answer) = self.answered.get(state.cycle).copied() {
             self.round_trip(state, &answer);
         }
         self.received_ns.insert(state.reading_cycle, state.received_ns);
@@ -135,10 +135,10 @@ impl Intervals {
     }
 
     pub(super) fn command(&mut self, command: &Command) {
-        if let Some(state) = self.states.get(command.cycle) {
+        if let Some(state) = self.states.get(command.cycle).copied() {
             self.add(Interval::ControllerCycle, state.received_ns, command.published_ns);
         }
-        if let Some(answer) = self.answered.get(command.cycle) {
+        if let Some(answer) = self.answered.get(command.cycle).copied() {
             self.command_and_answer(command, &answer);
         }
         self.commands.insert(command.cycle, *command);
@@ -146,14 +146,16 @@ impl Intervals {
 
     fn command_and_answer(&mut self, command: &Command, answer: &Answer) {
         self.add(Interval::CommandTransport, command.published_ns, answer.received_ns);
-        if let (Some(reading), Some(sent_ns)) = (self.readings.get(command.reading_cycle), answer.sent_ns) {
+        if let (Some(reading), Some(sent_ns)) =
+            (self.readings.get(command.reading_cycle).copied(), answer.sent_ns)
+        {
             self.add(Interval::SampleToWire, reading.sampled_ns, sent_ns);
         }
     }
 
     /// A reading is recorded before the one that answers it.
     fn round_trip(&mut self, state: &State, answer: &Answer) {
-        if let Some(reading) = self.readings.get(state.reading_cycle) {
+        if let Some(reading) = self.readings.get(state.reading_cycle).copied() {
             let exchange_ns = reading.published_ns.saturating_sub(reading.woke_ns);
             let answered_ns = answer.received_ns.saturating_sub(state.received_ns);
             let both_ns = answered_ns.saturating_add(exchange_ns);

@@ -32,6 +32,7 @@ mod response;
 mod scenario_stalls;
 mod sequence;
 mod series;
+mod shown;
 pub mod signals;
 mod skips;
 mod tracking;

@@ -120,7 +120,7 @@ impl LongestCycles {
     /// None while a part is missing.
     fn path(&self, parts: &Parts) -> Option<CyclePath> {
         let (state, controller_stalled_ns) = parts.state?;
-        let (reading, plant_stalled_ns) = self.readings.get(state.reading_cycle)?;
+        let (reading, plant_stalled_ns) = self.readings.get(state.reading_cycle).copied()?;
         let ([received_ns, sent_ns], plant_stalled_next_ns) = parts.sent_ns?;
         let plant_ns = passed_ns(plant_stalled_ns, plant_stalled_next_ns);
         let controller_ns = passed_ns(controller_stalled_ns, parts.stalled_when_next_due_ns?);

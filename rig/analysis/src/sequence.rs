@@ -6,7 +6,7 @@ use masseter_shared::messages::Event;
 use masseter_shared::messages::codes::Source;
 use serde::Serialize;
 
-use masseter_recording::Recorded;
+use masseter_recording::{Recorded, Topic};
 
 /// Messages and losses of one topic.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -33,10 +33,13 @@ fn publisher_of(event: &Event) -> u32 {
 /// Follows every publisher of every topic. Each counts its own messages from 1.
 #[derive(Debug, Default)]
 pub struct SequenceCheck {
-    streams: BTreeMap<(&'static str, u32), Stream>,
+    /// Of the topics that one process publishes.
+    topics: [Stream; Topic::ALL.len()],
+    /// Of the events, by their publisher.
+    events: BTreeMap<u32, Stream>,
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Stream {
     messages: u64,
     highest: u64,
@@ -45,29 +48,31 @@ struct Stream {
 impl SequenceCheck {
     /// Counts a message.
     pub fn take(&mut self, message: &Recorded) {
-        let publisher = match message {
-            Recorded::Event(event) => publisher_of(event),
-            _ => 0,
+        let stream = match message {
+            Recorded::Event(event) => self.events.entry(publisher_of(event)).or_default(),
+            _ => &mut self.topics[message.topic() as usize],
         };
-        let stream = self.streams.entry((message.topic().name(), publisher)).or_default();
         stream.messages += 1;
         stream.highest = stream.highest.max(message.seq());
     }
 
     /// The counts of every topic.
     pub fn finish(self) -> Vec<TopicFigures> {
-        let mut topics: Vec<TopicFigures> = Vec::new();
-        for ((topic, _), stream) in self.streams {
-            let missing = stream.highest.saturating_sub(stream.messages);
-            match topics.last_mut().filter(|last| last.topic == topic) {
-                Some(last) => {
-                    last.messages += stream.messages;
-                    last.missing += missing;
+        let figures = Topic::ALL.into_iter().map(|topic| {
+            let events = self.events.values().filter(|_| topic == Topic::Event);
+            let streams = events.chain([&self.topics[topic as usize]]);
+            streams.fold(TopicFigures { topic: topic.name(), messages: 0, missing: 0 }, |sum, stream| {
+                let missing = stream.highest.saturating_sub(stream.messages);
+                TopicFigures {
+                    messages: sum.messages + stream.messages,
+                    missing: sum.missing + missing,
+                    ..sum
                 }
-                None => topics.push(TopicFigures { topic, messages: stream.messages, missing }),
-            }
-        }
-        topics
+            })
+        });
+        let mut figures: Vec<_> = figures.filter(|topic| topic.messages > 0).collect();
+        figures.sort_by_key(|topic| topic.topic);
+        figures
     }
 }
 

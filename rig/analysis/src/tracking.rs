@@ -132,7 +132,8 @@ pub(super) struct Tracking {
     incisal_m: [f64; 3],
     /// By the controller's cycle, until their truths come.
     waiting: ByCycle<Sample>,
-    truths: ByCycle<Truth>,
+    /// Time and pose of the truths, by the plant's cycle.
+    truths: ByCycle<(u64, Option<Pose>)>,
     was_moving: bool,
     actual: PoseErrorSums,
     estimated: PoseErrorSums,
@@ -167,27 +168,23 @@ impl Tracking {
             let estimated = pose(state.estimated_position_m, state.estimated_quaternion_wxyz);
             return is_fresh.then(|| self.compare(&sample, state.sampled_ns, estimated)).flatten();
         }
-        let Some(truth) = self.truths.get(cycle) else {
+        let Some(&(sampled_ns, actual)) = self.truths.get(cycle) else {
             self.waiting.insert(state.cycle, sample);
             return None;
         };
-        self.compare_with_truth(&sample, &truth)
+        self.compare(&sample, sampled_ns, actual)
     }
 
     /// The true pose of a sample, with the states that wait for it: its own cycle's and its neighbours'.
     pub(super) fn truth(&mut self, truth: &Truth) -> [Option<PathSample>; 3] {
-        self.truths.insert(truth.cycle, *truth);
+        let actual = pose(truth.position_m, truth.quaternion_wxyz);
+        self.truths.insert(truth.cycle, (truth.sampled_ns, actual));
         let cycles = [truth.cycle.saturating_sub(1), truth.cycle, truth.cycle + 1];
         cycles.map(|cycle| {
             self.waiting.get(cycle).filter(|sample| sample.cycle == truth.cycle)?;
             let sample = self.waiting.take(cycle)?;
-            self.compare_with_truth(&sample, truth)
+            self.compare(&sample, truth.sampled_ns, actual)
         })
-    }
-
-    fn compare_with_truth(&mut self, sample: &Sample, truth: &Truth) -> Option<PathSample> {
-        let actual = pose(truth.position_m, truth.quaternion_wxyz);
-        self.compare(sample, truth.sampled_ns, actual)
     }
 
     /// The deviation from the path, where there is one.

@@ -111,7 +111,7 @@ impl Bodies {
     /// Q_θ = (I_y + m_y a² + I_r + m_r w²) θ̈ + 2 m_r w l̇ θ̇ + g (m_y a + m_r w) cos θ.
     pub(super) fn leg(&self, motion: &Motion, leg: usize) -> LegEquations {
         let leg_m = motion.joints.actuators.leg_m[leg];
-        let (sin, cos) = motion.joints.theta_rad[leg].sin_cos();
+        let (sin, cos) = motion.sin_cos[leg];
         let (stretch_m_s, swing_rad_s) = (motion.rates_m_s[LEGS + leg], motion.swings_rad_s[leg]);
         let rod_kg_m = self.rod.mass_kg * self.rod_from_hinge_m(leg_m);
         LegEquations {

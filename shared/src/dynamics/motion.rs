@@ -13,6 +13,8 @@ pub struct Motion {
     pub twist: Twist,
     /// Positions of slides, legs and hinges.
     pub joints: Joints,
+    /// Sines and cosines of the hinges' angles, which Jacobian, equations and reactions share.
+    pub(super) sin_cos: [(f64, f64); LEGS],
     /// Joint rates as linear functions of the twist.
     pub jacobian: Jacobian,
     /// Rates of the axes d₁ d₂ d₃ l₁ l₂ l₃, m/s.
@@ -43,13 +45,15 @@ impl Motion {
 
     /// The same where the joint coordinates of the pose (of [`Mechanism::inverse`]) are known.
     pub fn of_joints(mechanism: &Mechanism, pose: &Pose, joints: &Joints, twist: &Twist) -> Self {
-        let jacobian = Jacobian::new(mechanism, pose, joints);
+        let sin_cos = joints.theta_rad.map(f64::sin_cos);
+        let jacobian = Jacobian::with_sin_cos(mechanism, pose, joints, &sin_cos);
         let (rates_m_s, swings_rad_s) = (jacobian.actuators * twist, jacobian.hinges * twist);
         let still = JointAccelerations { axes_m_s2: Vector6::zeros(), hinges_rad_s2: Vector3::zeros() };
         let mut motion = Self {
             pose: *pose,
             twist: *twist,
             joints: *joints,
+            sin_cos,
             jacobian,
             rates_m_s,
             swings_rad_s,

@@ -4,7 +4,7 @@ use std::ops::AddAssign;
 
 use nalgebra::Vector6;
 
-use super::{Bodies, Link, Loads, Motion};
+use super::{Bodies, JointAccelerations, Link, Loads, Motion};
 use crate::geometry::{LEGS, Twist, Vec3};
 
 /// A force and a moment at a leg's hinge, in the leg's axes: û along the slide, v̂ inward, ẑ up.
@@ -55,7 +55,16 @@ impl Reactions {
     /// (N): those of [`Equations::inverse`](super::Equations::inverse), or those that [`forward`](super::Equations::forward)
     /// made the acceleration of. Friction of an axis is a part of its force.
     pub fn new(bodies: &Bodies, motion: &Motion, acceleration: &Twist, force_n: &Vector6<f64>) -> Self {
-        let accelerations = motion.accelerations(acceleration);
+        Self::of_joints(bodies, motion, &motion.accelerations(acceleration), force_n)
+    }
+
+    /// The same where the joints' accelerations are known.
+    pub fn of_joints(
+        bodies: &Bodies,
+        motion: &Motion,
+        accelerations: &JointAccelerations,
+        force_n: &Vector6<f64>,
+    ) -> Self {
         let legs = std::array::from_fn(|leg| {
             let (axes, swing_rad_s2) = (accelerations.axes_m_s2, accelerations.hinges_rad_s2[leg]);
             let moving = LegMotion::new(bodies, motion, leg, [axes[leg], axes[LEGS + leg], swing_rad_s2]);
@@ -100,7 +109,7 @@ impl LegReactions {
 impl LegMotion {
     fn new(bodies: &Bodies, motion: &Motion, leg: usize, accelerations: [f64; 3]) -> Self {
         let [slide_m_s2, stretch_m_s2, swing_rad_s2] = accelerations;
-        let (sin, cos) = motion.joints.theta_rad[leg].sin_cos();
+        let (sin, cos) = motion.sin_cos[leg];
         Self {
             along: Vec3::new(0.0, cos, sin),
             across: Vec3::new(0.0, -sin, cos),

@@ -37,14 +37,23 @@ impl Jacobian {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn new(mechanism: &Mechanism, pose: &Pose, joints: &Joints) -> Self {
+        Self::with_sin_cos(mechanism, pose, joints, &joints.theta_rad.map(f64::sin_cos))
+    }
+
+    /// The same where sines and cosines of the hinges' angles are known.
+    pub(crate) fn with_sin_cos(
+        mechanism: &Mechanism,
+        pose: &Pose,
+        joints: &Joints,
+        sin_cos: &[(f64, f64); LEGS],
+    ) -> Self {
         let mut jacobian = Self {
             actuators: Matrix6::zeros(),
             hinges: Matrix3x6::zeros(),
             length_m: mechanism.platform_sides_m()[0],
         };
-        for leg in 0..LEGS {
+        for (leg, &(sin, cos)) in sin_cos.iter().enumerate() {
             let arm = pose.rotation * mechanism.platform_corners()[leg];
-            let (sin, cos) = joints.theta_rad[leg].sin_cos();
             let inward = mechanism.inward_direction(leg);
             let along_leg = inward * cos + Vec3::z() * sin;
             let across_leg = Vec3::z() * cos - inward * sin;

@@ -194,10 +194,23 @@ impl Mechanism {
     /// [`InverseError`] for a pose that is not finite, and where a corner lies on its slide's hinge.
     #[doc(alias("inverse kinematics", "IK"))]
     pub fn inverse(&self, pose: &Pose) -> Result<Joints, InverseError> {
-        let mut joints = Joints {
-            actuators: Actuators { slide_m: [0.0; LEGS], leg_m: [0.0; LEGS] },
-            theta_rad: [0.0; LEGS],
-        };
+        let mut theta_rad = [0.0; LEGS];
+        let actuators = self.legs(pose, |leg, up_m, inward_m| theta_rad[leg] = up_m.atan2(inward_m))?;
+        Ok(Joints { actuators, theta_rad })
+    }
+
+    /// Slides and legs of [`inverse`](Self::inverse) without the angles, which take half of its time.
+    ///
+    /// # Errors
+    /// Those of [`inverse`](Self::inverse).
+    pub fn actuators(&self, pose: &Pose) -> Result<Actuators, InverseError> {
+        self.legs(pose, |_, _, _| {})
+    }
+
+    /// Slides and legs; `angle` gets the number of each leg and its direction: upwards and inwards, m.
+    #[inline]
+    fn legs(&self, pose: &Pose, mut angle: impl FnMut(usize, f64, f64)) -> Result<Actuators, InverseError> {
+        let mut actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [0.0; LEGS] };
         for (leg, corner) in self.corners_at(pose).iter().enumerate() {
             let slide = &self.slides[leg];
             let from_centre = corner - slide.centre;
@@ -209,11 +222,11 @@ impl Mechanism {
             if leg_m < SHORTEST_LEG_M {
                 return Err(InverseError::NoLength { leg, leg_m });
             }
-            joints.actuators.slide_m[leg] = from_centre.dot(&slide.along);
-            joints.actuators.leg_m[leg] = leg_m;
-            joints.theta_rad[leg] = from_centre.z.atan2(horizontal);
+            actuators.slide_m[leg] = from_centre.dot(&slide.along);
+            actuators.leg_m[leg] = leg_m;
+            angle(leg, from_centre.z, horizontal);
         }
-        Ok(joints)
+        Ok(actuators)
     }
 }
 

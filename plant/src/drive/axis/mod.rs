@@ -324,28 +324,27 @@ impl Axis {
     pub(super) fn step(&mut self, now_ns: u64, shaft: Shaft) -> (f64, bool) {
         self.complete_transition(now_ns);
         self.take_off_torque(now_ns);
-        let demand_m = self.demand.position_m(now_ns);
-        let seen_m = shaft.seen_m + self.drivetrain.gear_error_m(demand_m, &mut self.faults);
+        let seen_m = shaft.seen_m + self.gear_error_m(now_ns);
         let counts = self.coordinates.read(seen_m);
         self.switches.look(shaft.is_m);
         if self.is_enabled() && self.leaves_for.is_none() {
-            let is_at_rest = self.demand.is_at_rest(now_ns);
+            let is_at_rest = || self.demand.is_at_rest(now_ns);
             let command = match self.mode {
-                Mode::ProfilePosition => self.positioning.step(self.controlword, is_at_rest),
+                Mode::ProfilePosition => self.positioning.step(self.controlword, is_at_rest()),
                 Mode::Homing => {
-                    let sensed = self.sensed(counts, is_at_rest);
+                    let sensed = self.sensed(counts, is_at_rest());
                     self.homing.step(&sensed)
                 }
                 Mode::CyclicPosition | Mode::CyclicTorque => None,
             };
             self.execute(command, now_ns);
         }
-        let limits = self.servo_limits();
         let places_m = [self.coordinates.read_m(), seen_m - shaft.is_m];
         let command = self.servo_command(now_ns);
+        let limits = self.servo_limits(command);
         let force_n = self.drivetrain.step(now_ns, places_m, command, &limits, &mut self.faults);
         self.shown_n = self.drivetrain.motor_n();
-        (force_n, self.supervise_following(now_ns))
+        (force_n, self.supervise_following(now_ns, command))
     }
 
     /// The command of the loops, with the velocity offset of cyclic synchronous position.
@@ -371,9 +370,14 @@ impl Axis {
     /// Reads the encoder and takes the motor's mean force, as SYNC demands.
     pub(super) fn sample(&mut self, now_ns: u64, seen_m: f64) {
         self.shown_n = self.drivetrain.take_mean_motor_n(now_ns);
-        let demand_m = self.demand.position_m(now_ns);
-        let gear_error_m = self.drivetrain.gear_error_m(demand_m, &mut self.faults);
+        let gear_error_m = self.gear_error_m(now_ns);
         self.coordinates.read(seen_m + gear_error_m);
+    }
+
+    /// The distance of what the drive sees from the shaft. Only a fault asks for the demand, which costs two divisions.
+    fn gear_error_m(&mut self, now_ns: u64) -> f64 {
+        let demand_m = if self.faults.is_empty() { None } else { self.demand.position_m(now_ns) };
+        self.drivetrain.gear_error_m(demand_m, &mut self.faults)
     }
 
     /// While the torque is safely off, the drive stays in "switch on disabled", or in fault.
@@ -479,7 +483,8 @@ impl Axis {
             DriveState::QuickStopActive => {
                 !self.parameters.holds_quick_stop && self.demand.is_at_rest(now_ns)
             }
-            DriveState::FaultReactionActive | DriveState::OperationEnabled => self.demand.is_at_rest(now_ns),
+            DriveState::FaultReactionActive => self.demand.is_at_rest(now_ns),
+            DriveState::OperationEnabled => self.leaves_for.is_some() && self.demand.is_at_rest(now_ns),
             _ => true,
         };
         if is_complete {
@@ -487,9 +492,13 @@ impl Axis {
         }
     }
 
-    fn supervise_following(&mut self, now_ns: u64) -> bool {
+    /// Judges the position that the servo was told to follow.
+    fn supervise_following(&mut self, now_ns: u64, command: ServoCommand) -> bool {
         let Some(window_m) = self.parameters.following_window_m else { return false };
-        let error_m = self.demand.position_m(now_ns).map_or(0.0, |demand_m| demand_m - self.measured_m());
+        let error_m = match command {
+            ServoCommand::Follow(demanded) => demanded.position_m - self.measured_m(),
+            ServoCommand::Brake | ServoCommand::Force { .. } => 0.0,
+        };
         if !self.following.exceeds(now_ns, error_m, window_m, self.parameters.following_timeout_ns) {
             return false;
         }
@@ -500,6 +509,7 @@ impl Axis {
 
     /// Executes a command of the mode of operation.
     fn execute(&mut self, command: Option<MotionCommand>, now_ns: u64) {
+        let Some(command) = command else { return };
         let Parameters { profile, homing, homing_to_switch, halt_m_s2, .. } = self.parameters;
         let limits = match self.mode {
             Mode::Homing if self.homing.is_approaching() => homing_to_switch,
@@ -509,21 +519,20 @@ impl Axis {
         // Nothing moves while the brake opens.
         let from_ns = self.drivetrain.free_from_ns(now_ns);
         match command {
-            None => {}
-            Some(MotionCommand::MoveTo { target }) => {
+            MotionCommand::MoveTo { target } => {
                 let start = self.demand.at(now_ns).unwrap_or(Motion::at_rest(self.measured_m()));
                 self.demand =
                     Demand::Profile(Profile::to(from_ns, start, self.coordinates.metres(target), &limits));
             }
-            Some(MotionCommand::SlowDown) => {
+            MotionCommand::SlowDown => {
                 let halt_m_s2 = halt_m_s2.filter(|_| self.controlword.halts());
                 self.slow_down(now_ns, halt_m_s2.unwrap_or(limits.deceleration_m_s2));
             }
-            Some(MotionCommand::Hold) => {
+            MotionCommand::Hold => {
                 let here = Motion::at_rest(self.measured_m());
                 self.demand = Demand::Profile(Profile::stop(now_ns, here, limits.deceleration_m_s2));
             }
-            Some(MotionCommand::SetHome { counts }) => {
+            MotionCommand::SetHome { counts } => {
                 self.coordinates.set_home(counts, self.parameters.home_position);
             }
         }
@@ -546,17 +555,23 @@ impl Axis {
         if is_referenced { self.parameters.position_limits } else { [i32::MIN, i32::MAX] }
     }
 
+    fn servo_limits(&self, command: ServoCommand) -> ServoLimits {
+        let Parameters { velocity_limit_m_s, force_limit_n, .. } = self.parameters;
+        let is_force = matches!(command, ServoCommand::Force { .. });
+        let free_velocity_m_s = if is_force { self.free_velocity_m_s() } else { [0.0; 2] };
+        let feed_n = if self.mode == Mode::CyclicPosition { self.offsets.force_n } else { 0.0 };
+        ServoLimits { force_n: force_limit_n, velocity_m_s: velocity_limit_m_s, free_velocity_m_s, feed_n }
+    }
+
     /// In force control the axis may be no faster than it can stop before the software position limits, at the
     /// profile deceleration (6084h).
-    fn servo_limits(&self) -> ServoLimits {
-        let Parameters { velocity_limit_m_s, force_limit_n, profile, .. } = self.parameters;
+    fn free_velocity_m_s(&self) -> [f64; 2] {
+        let Parameters { velocity_limit_m_s, profile, .. } = self.parameters;
         let ([lowest_m, highest_m], at_m) =
             (self.position_limits().map(|end| self.coordinates.metres(end)), self.measured_m());
         let braking_m_s =
             |way_m: f64| (2.0 * profile.deceleration_m_s2 * way_m.max(0.0)).sqrt().min(velocity_limit_m_s);
-        let free_velocity_m_s = [-braking_m_s(at_m - lowest_m), braking_m_s(highest_m - at_m)];
-        let feed_n = if self.mode == Mode::CyclicPosition { self.offsets.force_n } else { 0.0 };
-        ServoLimits { force_n: force_limit_n, velocity_m_s: velocity_limit_m_s, free_velocity_m_s, feed_n }
+        [-braking_m_s(at_m - lowest_m), braking_m_s(highest_m - at_m)]
     }
 
     /// The positions that a mode of operation sees. Homing moves the software position limits and may leave the axis

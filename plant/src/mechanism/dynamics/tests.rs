@@ -67,7 +67,7 @@ fn friction_of_any_size_ends_a_motion_and_never_turns_it_round() {
 fn drift_mm(model: FrictionModel, push_n: f64, [from_s, until_s]: [f64; 2]) -> f64 {
     let friction = FrictionConfig { model, ..FrictionConfig::default() };
     let mut dynamics = at_rest(&DynamicsConfig { friction, ..DynamicsConfig::default() });
-    let equations = Equations::new(&dynamics.bodies, &dynamics.motion_of(&dynamics.state));
+    let equations = Equations::new(&dynamics.bodies, &motion(&dynamics));
     let carrying_n = equations.inverse(&Twist::zeros(), &Vector6::zeros()).unwrap();
     let force_n = carrying_n + Vector6::new(push_n, 0.0, 0.0, 0.0, 0.0, 0.0);
     let mut position_after_m = |seconds: f64| {
@@ -105,7 +105,7 @@ fn an_axis_that_runs_into_its_end_stop_says_so_once_and_stays_there() {
 #[test]
 fn forces_that_carry_the_weight_keep_it_at_rest() {
     let mut dynamics = at_rest(&free());
-    let equations = Equations::new(&dynamics.bodies, &dynamics.motion_of(&dynamics.state));
+    let equations = Equations::new(&dynamics.bodies, &motion(&dynamics));
     let force_n = equations.inverse(&Twist::zeros(), &Vector6::zeros()).unwrap().into();
     (0..8000).for_each(|_| step(&mut dynamics, &force_n));
     assert!((dynamics.state().pose.translation.z - 0.268_452_355).abs() < 1e-6);
@@ -121,9 +121,12 @@ fn released_it_falls_as_all_its_moving_masses_weigh() {
     assert!((-9.9..-9.0).contains(&acceleration), "{acceleration}");
 }
 
+fn motion(dynamics: &Dynamics) -> Motion {
+    Motion::new(&dynamics.mechanism, &dynamics.state.pose, &dynamics.state.twist).unwrap()
+}
+
 fn energy(dynamics: &Dynamics) -> Energy {
-    let MechanismState { pose, twist, joints } = &dynamics.state;
-    Energy::new(&dynamics.bodies, &Motion::of_joints(&dynamics.mechanism, pose, joints, twist))
+    Energy::new(&dynamics.bodies, &motion(dynamics))
 }
 
 /// The mechanism hangs on soft springs, one at each axis, N/m.
@@ -134,16 +137,16 @@ fn swing(config: &DynamicsConfig, start: Twist) -> (f64, [f64; 10]) {
     let mut dynamics = at_rest(config);
     dynamics.state.twist = start;
     let rest_m = [0.0, 0.0, 0.0, 0.28, 0.28, 0.28];
-    let stretched_m = |state: &MechanismState| Vector6::from(state.positions_m()) - Vector6::from(rest_m);
+    let stretched_m = |at: &Actuators| Vector6::from(at.to_axes()) - Vector6::from(rest_m);
     let total_j = |dynamics: &Dynamics| {
-        let springs_j = 0.5 * SPRING_N_PER_M * stretched_m(&dynamics.state).norm_squared();
+        let springs_j = 0.5 * SPRING_N_PER_M * stretched_m(&dynamics.state.actuators).norm_squared();
         energy(dynamics).total_j() + springs_j
     };
     let (start_j, mut kinetic_j) = (total_j(&dynamics), 0.0_f64);
     let drift_j = std::array::from_fn(|_| {
         (0..1_000_000_000 / config.step_ns).fold(0.0_f64, |most_j, _| {
             // A spring is a part of the mechanism: unlike a drive, the spring feels the middle of the step.
-            let force_n = stretched_m(&dynamics.middle().unwrap()) * -SPRING_N_PER_M;
+            let force_n = stretched_m(&dynamics.middle().unwrap().joints.actuators) * -SPRING_N_PER_M;
             step(&mut dynamics, &force_n.into());
             kinetic_j = kinetic_j.max(energy(&dynamics).kinetic_j);
             most_j.max((total_j(&dynamics) - start_j).abs())

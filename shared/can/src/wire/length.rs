@@ -63,10 +63,12 @@ fn header(id: CanId, length: u32) -> u64 {
     arbitration << 7 | u64::from(length)
 }
 
-/// CRC of a content. The CRC starts from zero, so the zeros above the content do not change it.
+/// CRC of a content. The CRC starts from zero, so the zeros above the content do not change it, and their bytes are left
+/// out.
 fn crc15(content: u128) -> u16 {
-    content.to_be_bytes().into_iter().fold(0, |crc, byte| {
-        let index = (crc >> (CRC_BITS - 8)) as u8 ^ byte;
+    let zeros = content.leading_zeros() as usize / 8;
+    content.to_be_bytes()[zeros..].iter().fold(0, |crc, byte| {
+        let index = (crc >> (CRC_BITS - 8)) as u8 ^ *byte;
         (crc << 8 & CRC_MASK) ^ CRC_OF_BYTE[usize::from(index)]
     })
 }

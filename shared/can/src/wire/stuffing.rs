@@ -14,8 +14,10 @@ pub(super) fn stuff_bits(sequence: u128, length: u32) -> u32 {
     let filled = alternating.unbounded_shl(length) | content;
     let mut run = Run::of_one_bit(filled.leading_zeros() > 0);
     let mut stuffed = 0;
-    for byte in filled.to_be_bytes() {
-        let (next, inserted) = STEPS[usize::from(run.0)][usize::from(byte)];
+    // A whole byte of alternating bits ends in the run that it began with.
+    let alternating_bytes = (u128::BITS - length) as usize / 8;
+    for byte in &filled.to_be_bytes()[alternating_bytes..] {
+        let (next, inserted) = STEPS[usize::from(run.0)][usize::from(*byte)];
         run = next;
         stuffed += u32::from(inserted);
     }

@@ -1,0 +1,61 @@
+//! Figures that no verdict depends on: a report shows them, and a run without a report does without.
+
+use masseter_can::Tapped;
+use masseter_shared::config::Scenario;
+use masseter_shared::messages::{Command, FrameTap, Reading, Signals, State, Truth};
+
+use crate::intervals::Intervals;
+use crate::longest_cycles::LongestCycles;
+use crate::over_time::{CONTROLLER, OverTimeCollector, PLANT};
+use crate::pose_errors::pose;
+
+/// Collects them.
+#[derive(Debug)]
+pub(super) struct Shown {
+    pub(super) intervals: Intervals,
+    pub(super) longest_cycles: LongestCycles,
+    pub(super) over_time: OverTimeCollector,
+}
+
+impl Shown {
+    pub(super) fn new(scenario: &Scenario) -> Self {
+        Self {
+            intervals: Intervals::new(scenario.period_ns()),
+            longest_cycles: LongestCycles::default(),
+            over_time: OverTimeCollector::new(scenario.jaw.reference_point_m, scenario.can.bitrate().ok()),
+        }
+    }
+
+    pub(super) fn command(&mut self, command: &Command) {
+        self.intervals.command(command);
+        self.longest_cycles.command(command);
+    }
+
+    /// `skipped`: deadlines skipped just before it.
+    pub(super) fn reading(&mut self, reading: &Reading, skipped: u64) {
+        self.intervals.reading(reading, skipped);
+        self.longest_cycles.reading(reading);
+        self.over_time.wake_up(PLANT, reading.due_ns, reading.woke_ns);
+    }
+
+    /// `is_fresh`: the state's reading is used for the first time. `skipped`: deadlines skipped just before it.
+    pub(super) fn state(&mut self, state: &State, is_fresh: bool, skipped: u64) {
+        self.intervals.state(state, is_fresh, skipped);
+        self.longest_cycles.state(state, is_fresh);
+        self.over_time.wake_up(CONTROLLER, state.due_ns, state.woke_ns);
+    }
+
+    pub(super) fn truth(&mut self, truth: &Truth) {
+        let actual = pose(truth.position_m, truth.quaternion_wxyz);
+        self.over_time.truth(truth);
+        self.over_time.actual(truth.sampled_ns, actual.as_ref());
+    }
+
+    pub(super) fn signals(&mut self, message: &Signals) {
+        self.over_time.signals(message);
+    }
+
+    pub(super) fn frame(&mut self, tap: &FrameTap, bus: usize, tapped: &Tapped) {
+        self.over_time.frame(tap.time_ns, bus, tapped);
+    }
+}
