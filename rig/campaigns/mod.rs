@@ -57,7 +57,7 @@ pub(crate) fn campaign(args: &CampaignArgs) -> Result<Exit, Failure> {
     }
     let report = Report::new(&campaign, results);
     let worst = worst::keep(&report, &campaign, &folder, args.record.unwrap_or(RECORD), &player)?;
-    report.write(&folder, &worst).incomplete()?;
+    masseter_campaign::write(&report, &folder, &worst).incomplete()?;
     result(&report.text(&folder)).incomplete()?;
     Ok(if report.is_success() { Exit::Passed } else { Exit::Failed })
 }

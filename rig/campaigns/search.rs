@@ -37,7 +37,7 @@ pub(crate) fn search(args: &SearchArgs) -> Result<Exit, Failure> {
     }
     let report = Report::new(&campaign, seeker.into_results());
     let kept = worst::keep(&report, &campaign, &folder, args.record.unwrap_or(RECORD), &player)?;
-    report.write(&folder, &kept).incomplete()?;
+    masseter_campaign::write(&report, &folder, &kept).incomplete()?;
     let found = first.map_or_else(
         || format!("nothing below zero in {} runs\n", report.len()),
         |runs| format!("below zero after {runs} runs\n"),

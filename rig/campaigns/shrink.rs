@@ -91,9 +91,11 @@ fn reason_of(player: &Player<'_>, scenario: &Scenario, requirement: Option<&str>
     if verdict.exit_code == Exit::Passed {
         return Err(anyhow!("the scenario passes: there is nothing to shrink")).usage();
     }
-    let is_stopped = verdict.exit_code == Exit::SafeStop;
-    let failed = verdict.checks.iter().find(|check| check.result == CheckResult::Failed);
-    Ok(match failed.filter(|_| !is_stopped) {
+    let failed = || verdict.checks.iter().filter(|check| check.result == CheckResult::Failed);
+    // A requirement of the user says more than a check that every run has; after a safe stop these say nothing of its cause.
+    let requirement = failed().find(|check| check.figures.is_some());
+    let other = failed().next().filter(|_| verdict.exit_code != Exit::SafeStop);
+    Ok(match requirement.or(other) {
         Some(check) => Reason::Check(check.name.to_string()),
         None => Reason::Verdict(verdict.word, first_cause(&figures)),
     })

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::workspace::{list, metadata, text, within};
 
 /// The crates of the workspace that each crate may use, all by their folders. The root package may use all.
-const MAY_USE: [(&str, &[&str]); 14] = [
+const MAY_USE: [(&str, &[&str]); 16] = [
     ("shared/can", &[]),
     ("shared", &["shared/can"]),
     ("controller", &["shared/can", "shared"]),
@@ -14,6 +14,7 @@ const MAY_USE: [(&str, &[&str]); 14] = [
     ("plant", &["shared/can", "shared"]),
     ("rig/terminal", &[]),
     ("rig/charts", &[]),
+    ("rig/table", &[]),
     ("rig/plan", &["shared", "controller", "plant"]),
     ("rig/recording", &["shared"]),
     ("rig/analysis", &["shared/can", "shared", "rig/recording"]),
@@ -30,6 +31,7 @@ const MAY_USE: [(&str, &[&str]); 14] = [
         ],
     ),
     ("rig/study", &["shared", "controller", "rig/plan", "rig/charts"]),
+    ("rig/campaign", &["shared", "rig/analysis", "rig/charts", "rig/report", "rig/table"]),
     // Its drive is none of the product's, or errors of master and drive could cancel out.
     ("tests/canopen_node", &["shared/can"]),
 ];

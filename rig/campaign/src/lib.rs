@@ -17,6 +17,7 @@ mod sampler;
 mod search;
 mod shrink;
 mod statistics;
+mod write;
 
 pub use campaign::{Campaign, digest_of_program};
 pub use case::{Case, Setting};
@@ -29,3 +30,4 @@ pub use sampler::{Sampler, points};
 pub use search::{Method, Search, Value};
 pub use shrink::Shrink;
 pub use statistics::SuccessRate;
+pub use write::write;

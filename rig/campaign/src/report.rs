@@ -1,23 +1,19 @@
 //! What a campaign came to: the share that passed, the worst cases, and the files in which both are kept.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::path::PathBuf;
 
-use anyhow::Context;
 use masseter_shared::wording::counted;
 
 use crate::campaign::Campaign;
 use crate::folder::CampaignFolder;
-use crate::page;
 use crate::result::CaseResult;
-use crate::results_table::results_table;
 use crate::statistics::SuccessRate;
 
 /// File of the results, a row a case.
-const TABLE: &str = "cases.parquet";
+pub(crate) const TABLE: &str = "cases.parquet";
 /// The page.
-const PAGE: &str = "campaign.html";
+pub(crate) const PAGE: &str = "campaign.html";
 
 /// A case with a small margin, and how to see it again.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,21 +89,6 @@ impl<'a> Report<'a> {
             *counts.entry(result.word.as_str()).or_default() += 1;
         }
         counts
-    }
-
-    /// Writes table and page into the folder of the campaign.
-    ///
-    /// # Errors
-    /// When a file cannot be written.
-    pub fn write(&self, folder: &CampaignFolder, worst: &[WorstCase]) -> anyhow::Result<()> {
-        let path = folder.file(TABLE);
-        let unfinished = path.with_extension("part");
-        let file = File::create(&unfinished).with_context(|| format!("cannot write {}", path.display()))?;
-        results_table(self.campaign, &self.results).write_parquet(file)?;
-        std::fs::rename(&unfinished, &path).with_context(|| format!("cannot write {}", path.display()))?;
-        let html = page::html(self, worst).context("cannot make the page")?;
-        let path = folder.file(PAGE);
-        std::fs::write(&path, html).with_context(|| format!("cannot write {}", path.display()))
     }
 
     /// The result in lines for a terminal.

@@ -1,0 +1,26 @@
+//! The files of a campaign's report.
+
+use std::fs::{self, File};
+
+use anyhow::Context;
+
+use crate::folder::CampaignFolder;
+use crate::page;
+use crate::report::{PAGE, Report, TABLE, WorstCase};
+use crate::results_table::results_table;
+
+/// Writes table and page into the folder of the campaign.
+///
+/// # Errors
+/// When a file cannot be written.
+pub fn write(report: &Report<'_>, folder: &CampaignFolder, worst: &[WorstCase]) -> anyhow::Result<()> {
+    let path = folder.file(TABLE);
+    let unfinished = path.with_extension("part");
+    let unwritten = || format!("cannot write {}", path.display());
+    let file = File::create(&unfinished).with_context(unwritten)?;
+    results_table(report.campaign, &report.results).write_parquet(file)?;
+    fs::rename(&unfinished, &path).with_context(unwritten)?;
+    let html = page::html(report, worst).context("cannot make the page")?;
+    let path = folder.file(PAGE);
+    fs::write(&path, html).with_context(|| format!("cannot write {}", path.display()))
+}
