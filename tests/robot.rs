@@ -234,15 +234,14 @@ fn a_scan_asks_every_node_id_and_names_a_drive_with_another_one() {
 /// Somebody else has switched on l1 by SDO, which the rig's interface has not heard, and left.
 #[test]
 fn a_drive_with_power_is_refused_and_stopped_with_take_over_alone() {
-    let mut switched_on =
-        "[[faults]]\nkind = 'lose'\nbus = 1\nnode = 127\nid = 0x604\nfrom_s = 0.0\n".to_owned();
-    for (word, from_s) in [(6, 0.1), (7, 0.2)] {
-        switched_on += &format!(
+    let commanded = |word: u8, from_s: f64| {
+        format!(
             "[[faults]]\nkind = 'babble'\nbus = 1\nnode = 5\nid = 0x604\ncount = 1\nfrom_s = {from_s}\n\
              data = [0x2B, 0x40, 0x60, 0, {word}, 0, 0, 0]\n"
-        );
-    }
-    let workspace = Workspace::new(&switched_on);
+        )
+    };
+    let unheard = "[[faults]]\nkind = 'lose'\nbus = 1\nnode = 127\nid = 0x604\nfrom_s = 0.0\n";
+    let workspace = Workspace::new(&(unheard.to_owned() + &commanded(6, 0.1) + &commanded(7, 0.2)));
     let inspected = robot(&workspace, &["inspect"]);
     assert_eq!(inspected.status.code(), Some(0), "{}", stdout(&inspected));
     assert!(stdout(&inspected).contains("configure refuses unless --take-over may stop the drive"));

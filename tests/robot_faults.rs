@@ -155,7 +155,9 @@ fn a_fault_in_the_middle_of_a_step_ends_it_safely_and_owes_nothing_for_ever() {
             let output = robot(&workspace, tried.step);
             let text = stdout(&output) + &stderr(&output);
             assert_eq!(output.status.code(), Some(tried.exit), "{case}: {text}");
-            says.iter().for_each(|said| assert!(text.contains(said), "{case}: no '{said}' in {text}"));
+            for said in says {
+                assert!(text.contains(said), "{case}: no '{said}' in {text}");
+            }
             let folder = newest(&workspace);
             assert_eq!(json(&folder.join("result.json"))["passed"], false, "{case}: it would be evidence");
             let log = fs::read_to_string(folder.join("candump.log")).unwrap();
@@ -214,7 +216,9 @@ fn a_fault_in_the_middle_of_a_run_stops_all_drives_and_names_the_one() {
             (RESET, "another node sends SYNC or NMT"),
         ] {
             let workspace = Workspace::new(SOUND);
-            ["inspect", "configure --store"].iter().for_each(|step| assert_passes(&workspace, step));
+            for step in ["inspect", "configure --store"] {
+                assert_passes(&workspace, step);
+            }
             workspace.write("scenario.toml", &format!("{SOUND}[[faults]]\n{fault}\nat_s = 0.2\n"));
             let mut command = Command::new(MASSETER);
             command.args(["run", "scenario.toml", "--out", "run", "--clock", "virtual"]).args(arguments);

@@ -304,7 +304,9 @@ mod tests {
     fn units_of_every_profile_are_those_of_the_drive() {
         let units = |found: &[(u16, u32)], profile: &str| {
             let mut survey = Survey::default();
-            found.iter().for_each(|&(index, code)| survey.insert(ObjectAddress::new(index, 0), code));
+            for &(index, code) in found {
+                survey.insert(ObjectAddress::new(index, 0), code);
+            }
             let scenario = Scenario::parse(Path::new("robot.toml"), profile).unwrap();
             let all = of_units(&survey, scenario.profile(3));
             all.into_iter().map(|one| (one.object, one.outcome, one.remedy)).collect::<Vec<_>>()

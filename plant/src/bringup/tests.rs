@@ -304,8 +304,8 @@ fn an_axis_that_falls_without_power_fails_the_jog() {
 /// A supply that dips at any moment from the first reduced value to the last, also before the axis has power: the limits are lost.
 #[test]
 fn a_drive_that_restarts_ends_every_motion_with_the_axis_off() {
-    let profile = "[[drive_profile]]\nhoming = { method = 33, absolute = false, home_position_m = 0.27 }\n";
     type Motion = fn(&mut Bench) -> Result<(), MotionError>;
+    let profile = "[[drive_profile]]\nhoming = { method = 33, absolute = false, home_position_m = 0.27 }\n";
     let motions: [Motion; 2] = [|bench| bench.jog(0.001).map(drop), |bench| bench.home().map(drop)];
     for motion in motions {
         let mut sound = Bench::new(profile);

@@ -94,7 +94,9 @@ impl Campaign {
 
     fn scenario(&self, settings: &[Setting], more_seed: u64) -> anyhow::Result<Scenario> {
         let mut changes = Table::new();
-        settings.iter().for_each(|setting| setting.enter(&mut changes));
+        for setting in settings {
+            setting.enter(&mut changes);
+        }
         let mut scenario = self.base()?.with_table(changes)?;
         let added: Vec<_> = settings.iter().filter_map(|setting| setting.fault.clone()).collect();
         if !added.is_empty() {

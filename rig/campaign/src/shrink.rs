@@ -117,7 +117,7 @@ impl<F: FnMut(&Scenario) -> bool> Shrink<F> {
         let Some(mut passing) = target else { return };
         let Some(mut failing) = at_place(&change.value, place).and_then(number) else { return };
         for _ in 0..BISECTIONS {
-            let middle = (passing + failing) / 2.0;
+            let middle = f64::midpoint(passing, failing);
             if self.try_number(changes, at, place, middle) { failing = middle } else { passing = middle }
         }
     }
@@ -146,7 +146,7 @@ impl<F: FnMut(&Scenario) -> bool> Shrink<F> {
             Value::Integer(whole) => *whole = to.round() as i64,
             Value::String(text) => {
                 let unit = text.split_once(' ').map_or("", |(_, unit)| unit);
-                *text = format!("{to} {unit}").trim_end().to_owned();
+                format!("{to} {unit}").trim_end().clone_into(text);
             }
             other => *other = Value::Float(to),
         }
