@@ -140,3 +140,119 @@ fn value(result: &CaseResult, requirement: Option<&str>) -> Value {
     };
     margin.map_or(Value::Nothing, Value::Margin)
 }
+
+#[cfg(test)]
+mod tests {
+    use masseter_controller::motion_controller::MotionController;
+    use masseter_controller::pose_law::{Demand, LawFailed, PoseLaw};
+    use masseter_report::Verdict;
+    use masseter_shared::config::Scenario;
+    use masseter_shared::geometry::{Pose, Vec3};
+
+    use super::*;
+    use crate::machine::interrupts::Interrupts;
+    use crate::run::figures_by;
+
+    const SCENARIO: &str = "\
+duration_s = 0.6
+[[require]]
+name = 'incisal'
+signal = 'incisal.error'
+during = 'running'
+max = '200 um'
+";
+    const CAMPAIGN: &str = "\
+[[factor]]
+key = 'dynamics.slide_friction_n'
+range = [1.0, 5.0]
+[[factor]]
+key = 'dynamics.viscous_friction_n_s_per_m'
+range = [0.0, 10.0]
+[[factor]]
+key = 'dynamics.platform_mass_kg'
+range = [0.2, 1.0]
+[[factor]]
+key = 'motion.cycle_rate_hz'
+range = [0.5, 1.0]
+";
+    /// The corner in which the controller fails: its middle and half its width, as shares of each range.
+    const CORNER: [f64; 2] = [0.85, 0.1];
+
+    /// The law follows the desired pose, but beside it by 0.2 mm in the middle of the corner, and by less further away.
+    #[derive(Debug)]
+    struct WeakInACorner {
+        beside_m: Vec3,
+    }
+
+    impl WeakInACorner {
+        fn new(scenario: &Scenario) -> Self {
+            let masseter_shared::config::MotionConfig::Chewing(chewing) = &scenario.motion else {
+                panic!("the campaign has one motion")
+            };
+            let dynamics = &scenario.dynamics;
+            let shares = [
+                (dynamics.slide_friction_n - 1.0) / 4.0,
+                dynamics.viscous_friction_n_s_per_m / 10.0,
+                (dynamics.platform_mass_kg - 0.2) / 0.8,
+                (chewing.cycle_rate_hz - 0.5) / 0.5,
+            ];
+            let [middle, half] = CORNER;
+            let distance = shares.iter().map(|share| (share - middle).abs()).fold(0.0, f64::max);
+            // On the border of the corner the error is the limit.
+            let beside_mm = 0.2 * (1.0 - (distance - half));
+            Self { beside_m: Vec3::new(0.0, 0.0, beside_mm * 1e-3) }
+        }
+    }
+
+    impl PoseLaw for WeakInACorner {
+        fn command(&mut self, demand: &Demand) -> Result<Pose, LawFailed> {
+            let mut pose = demand.ahead;
+            pose.translation.vector += self.beside_m;
+            Ok(pose)
+        }
+    }
+
+    /// The runs until a margin below zero.
+    fn runs_until_found(method: Method, seed: u64, campaign: &Campaign) -> usize {
+        let interrupts = Interrupts::default();
+        let search = Search { method, dimension: 4, runs: 20_000, seed, goes_on: false };
+        let evaluate = |number: usize, point: &[f64]| {
+            let case = campaign.case_at(number, point, 0);
+            let scenario = case.scenario.as_ref().expect("every point is a scenario");
+            let (manifest, figures) = figures_by(
+                scenario,
+                |scenario, mechanism, motion| {
+                    let law = Box::new(WeakInACorner::new(scenario));
+                    Box::new(MotionController::with_law(scenario, mechanism, motion, law))
+                },
+                &interrupts,
+            )
+            .map_err(|failure| failure.error)
+            .expect("every point can be played");
+            let verdict = Verdict::new(&manifest, &figures);
+            value(&CaseResult::new(&case, &verdict, &figures, 0.0), Some("incisal"))
+        };
+        search.run(evaluate).expect("the corner is found")
+    }
+
+    #[test]
+    #[ignore = "plays thousands of runs: docs/campaigns.md has the command"]
+    fn a_weakness_in_a_corner_of_four_factors_is_found_in_a_fifth_of_the_random_runs() {
+        let base = Scenario::parse("weak.toml".as_ref(), SCENARIO).unwrap();
+        let campaign = Campaign {
+            file: toml::from_str(CAMPAIGN).unwrap(),
+            controller: "weak".to_owned(),
+            program: "test".to_owned(),
+            folder: "/".into(),
+            base: base.to_toml(),
+        };
+        let median = |method| {
+            let mut runs: Vec<_> = (1..=20).map(|seed| runs_until_found(method, seed, &campaign)).collect();
+            runs.sort_unstable();
+            runs[runs.len() / 2]
+        };
+        let [by_covariance, at_random] = [Method::CmaEs, Method::Random].map(median);
+        eprintln!("median of 20 seeds: CMA-ES {by_covariance} runs, random {at_random} runs");
+        assert!(by_covariance * 5 <= at_random, "{by_covariance} against {at_random}");
+    }
+}

@@ -32,6 +32,8 @@ use args::RunArgs;
 pub(crate) use clock::needs_processes;
 pub(crate) use log::Log;
 pub(crate) use logged_ports::LoggedPorts;
+#[cfg(test)]
+pub(crate) use prepared::figures_by;
 pub(crate) use prepared::{PreparedRun, figures_unrecorded, judge_unrecorded, shown_figures};
 pub(crate) use resolve::check_simulated;
 pub(crate) use sink::Sink;

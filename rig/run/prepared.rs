@@ -5,6 +5,7 @@ use std::path::Path;
 
 use anyhow::Context;
 use masseter_analysis::{Analysis, Figures};
+use masseter_controller::process::BuildController;
 use masseter_plan::RunPlan;
 use masseter_recording::{Ending, FullSpeed, Manifest, RunFolder};
 use masseter_report::Judgement;
@@ -140,7 +141,9 @@ impl PlayedRun {
 /// Plays a run under virtual time without a folder, and judges it from its messages.
 pub(crate) fn judge_unrecorded(args: &RunArgs, interrupts: &Interrupts) -> Result<Judgement, Failure> {
     let (plan, args) = resolve(args).usage()?;
-    let (manifest, figures) = unrecorded(&plan, &args, Analysis::without_report, interrupts)?;
+    let build =
+        args.controller.builder().context("virtual time runs controllers of the rig alone").usage()?;
+    let (manifest, figures) = unrecorded(&plan, &args, build, Analysis::without_report, interrupts)?;
     Ok(Judgement::new(&manifest, &figures))
 }
 
@@ -150,7 +153,17 @@ pub(crate) fn figures_unrecorded(
     controller: ControllerKind,
     interrupts: &Interrupts,
 ) -> Result<(Manifest, Figures), Failure> {
-    figures_of(scenario, controller, Analysis::without_report, interrupts)
+    figures_of(scenario, controller, controller.builder(), Analysis::without_report, interrupts)
+}
+
+/// The same by another controller.
+#[cfg(test)]
+pub(crate) fn figures_by(
+    scenario: &Scenario,
+    build: BuildController,
+    interrupts: &Interrupts,
+) -> Result<(Manifest, Figures), Failure> {
+    figures_of(scenario, ControllerKind::default(), build, Analysis::without_report, interrupts)
 }
 
 /// Plays a scenario under virtual time by the rig's own controller; all its figures, with the curves of a report.
@@ -158,30 +171,31 @@ pub(crate) fn shown_figures(
     scenario: &Scenario,
     interrupts: &Interrupts,
 ) -> Result<(Manifest, Figures), Failure> {
-    figures_of(scenario, ControllerKind::default(), Analysis::new, interrupts)
+    let controller = ControllerKind::default();
+    figures_of(scenario, controller, controller.builder(), Analysis::new, interrupts)
 }
 
 fn figures_of(
     scenario: &Scenario,
     controller: ControllerKind,
+    build: BuildController,
     start: StartAnalysis,
     interrupts: &Interrupts,
 ) -> Result<(Manifest, Figures), Failure> {
-    let plan = resolve_simulated(scenario, controller.builder()).usage()?;
+    let plan = resolve_simulated(scenario, build).usage()?;
     let controller = ControllerChoice::Own(controller);
     let args = RunArgs { clock: ClockKind::Virtual, controller, ..RunArgs::default() };
-    unrecorded(&plan, &args, start, interrupts)
+    unrecorded(&plan, &args, build, start, interrupts)
 }
 
 fn unrecorded(
     plan: &RunPlan,
     args: &RunArgs,
+    build: BuildController,
     start: StartAnalysis,
     interrupts: &Interrupts,
 ) -> Result<(Manifest, Figures), Failure> {
     let mut manifest = manifest_of(plan, args);
-    let build =
-        args.controller.builder().context("virtual time runs controllers of the rig alone").usage()?;
     let figures = virtual_time::analyse(plan, build, start, &mut manifest, interrupts).died()?;
     Ok((manifest, figures))
 }
