@@ -44,7 +44,7 @@ pub(crate) fn campaign(args: &CampaignArgs) -> Result<Exit, Failure> {
     let player = Player { controller: args.controller, interrupts: &interrupts };
     let results = match args.engine {
         EngineKind::Local => local::run(&campaign, &folder, &player),
-        EngineKind::Hyperqueue => hyperqueue::run(&campaign, &folder, &args.hyperqueue),
+        EngineKind::Hyperqueue => hyperqueue::run(&campaign, &folder, &args.hyperqueue, &interrupts),
     }?;
     if interrupts.is_stop_requested() {
         status!(
@@ -56,6 +56,8 @@ pub(crate) fn campaign(args: &CampaignArgs) -> Result<Exit, Failure> {
         return Ok(Exit::Interrupted);
     }
     let report = Report::new(&campaign, results);
+    // Whatever becomes of the recordings, the results are there.
+    masseter_campaign::write(&report, &folder, &[]).incomplete()?;
     let worst = worst::keep(&report, &campaign, &folder, args.record.unwrap_or(RECORD), &player)?;
     masseter_campaign::write(&report, &folder, &worst).incomplete()?;
     result(&report.text(&folder)).incomplete()?;
@@ -75,11 +77,10 @@ fn plan(file: &Path, controller: ControllerKind) -> anyhow::Result<Campaign> {
     let read = CampaignFile::read(file)?;
     let base = scenario_with_overrides(read.scenario.as_deref(), &Overrides::default())?;
     let parent = file.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let program = std::env::current_exe().and_then(|path| digest_of_program(&path));
     let campaign = Campaign {
         file: read,
         controller: name_of(&controller),
-        program: program.context("cannot read this program")?,
+        program: program()?,
         folder: parent.canonicalize()?,
         base: base.to_toml(),
     };
@@ -87,6 +88,12 @@ fn plan(file: &Path, controller: ControllerKind) -> anyhow::Result<Campaign> {
     // What is wrong with the scenario itself is wrong with every case.
     check_simulated(&base, controller).context("the scenario of the campaign")?;
     Ok(campaign)
+}
+
+/// The digest of this program.
+fn program() -> anyhow::Result<String> {
+    let digest = std::env::current_exe().and_then(|path| digest_of_program(&path));
+    digest.context("cannot read this program")
 }
 
 /// The controller of a campaign that has begun.

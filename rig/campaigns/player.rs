@@ -26,31 +26,32 @@ impl Player<'_> {
             return Ok(Some(kept));
         }
         let attempt = folder.attempt(case).incomplete()?;
-        let Some(result) = self.play(case) else { return Ok(None) };
+        let Some(result) = self.play(case)? else { return Ok(None) };
         attempt.finish(&result, case.scenario.as_ref().ok()).incomplete()?;
         Ok(Some(result))
     }
 
-    /// Plays a case and judges it; none if the user interrupts.
-    pub(super) fn play(&self, case: &Case) -> Option<CaseResult> {
+    /// Plays a case and judges it; none if the user interrupts. What the machine refuses, such as memory, is no result.
+    fn play(&self, case: &Case) -> Result<Option<CaseResult>, Failure> {
         let began_ns = clock::now_ns();
         let refused = |reason| CaseResult::without_run(case, CaseResult::REFUSED, Exit::Usage as u8, reason);
         let scenario = match &case.scenario {
             Ok(scenario) => scenario,
-            Err(reason) => return Some(refused(reason.clone())),
+            Err(reason) => return Ok(Some(refused(reason.clone()))),
         };
         let judged = self.judge(scenario);
         if self.interrupts.is_stop_requested() {
-            return None;
+            return Ok(None);
         }
         let took_s = || (clock::now_ns() - began_ns) as f64 / 1e9;
-        Some(match judged {
+        Ok(Some(match judged {
             Ok((verdict, figures)) => CaseResult::new(case, &verdict, &figures, took_s()),
             Err(Failure { exit: Exit::Usage, error }) => refused(in_one_line(&error)),
-            Err(Failure { exit, error }) => {
-                CaseResult::without_run(case, "DIED", exit as u8, in_one_line(&error))
+            Err(Failure { exit: Exit::Died, error }) => {
+                CaseResult::without_run(case, CaseResult::DIED, Exit::Died as u8, in_one_line(&error))
             }
-        })
+            Err(failure) => return Err(failure),
+        }))
     }
 
     /// The verdict on a scenario, and its figures.

@@ -3,11 +3,11 @@
 use anyhow::{Context, ensure};
 use masseter_campaign::CampaignFolder;
 use masseter_terminal::{Exit, Failure, OrFailure};
-use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
+use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 
 use super::args::CampaignCaseArgs;
-use super::controller_of;
 use super::player::Player;
+use super::{controller_of, program};
 use crate::machine::interrupts::Interrupts;
 
 /// Runs a case unless its result is there. Any result is success: the campaign judges.
@@ -15,6 +15,10 @@ pub(crate) fn run_case(args: &CampaignCaseArgs) -> Result<Exit, Failure> {
     die_with_the_parent().died()?;
     let (folder, campaign) = CampaignFolder::open(&args.folder).usage()?;
     let controller = controller_of(&campaign).usage()?;
+    if program().usage()? != campaign.program {
+        return Err(anyhow::anyhow!("another build of masseter began the campaign; begin another one"))
+            .usage();
+    }
     let count = campaign.case_count();
     if args.number >= count {
         return Err(anyhow::anyhow!("the campaign has cases 0 to {}", count.saturating_sub(1))).usage();
@@ -29,6 +33,6 @@ pub(crate) fn run_case(args: &CampaignCaseArgs) -> Result<Exit, Failure> {
 fn die_with_the_parent() -> anyhow::Result<()> {
     let parent = getppid();
     set_parent_process_death_signal(Some(Signal::KILL)).context("cannot bind the case to its worker")?;
-    ensure!(getppid() == parent && parent != Some(Pid::INIT), "the worker is gone");
+    ensure!(getppid() == parent, "the worker is gone");
     Ok(())
 }

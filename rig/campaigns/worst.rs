@@ -29,7 +29,7 @@ pub(super) fn keep(
     let mut kept = Vec::new();
     for result in report.worst(most) {
         let Ok(scenario) = campaign.case_of(result).scenario else { continue };
-        let run = parent.join(format!("case-{}", result.number));
+        let run = parent.join(format!("case-{}-{}", result.number, result.id));
         let file = run.with_extension("toml");
         let written = fs::write(&file, scenario.to_toml());
         written.with_context(|| format!("cannot write {}", file.display())).incomplete()?;
@@ -43,9 +43,11 @@ pub(super) fn keep(
 }
 
 fn record(file: &Path, run: &Path, result: &CaseResult, player: &Player<'_>) -> Result<(), Failure> {
+    let unfinished = run.with_extension("part");
+    let _ = fs::remove_dir_all(&unfinished);
     let args = RunArgs {
         scenario: Some(file.to_owned()),
-        out: Some(run.to_owned()),
+        out: Some(unfinished.clone()),
         clock: ClockKind::Virtual,
         controller: ControllerChoice::Own(player.controller),
         quiet: true,
@@ -64,7 +66,7 @@ fn record(file: &Path, run: &Path, result: &CaseResult, player: &Player<'_>) -> 
         );
         return Err(Failure::with(Exit::Failed, error));
     }
-    Ok(())
+    fs::rename(&unfinished, run).with_context(|| format!("cannot make {}", run.display())).incomplete()
 }
 
 /// The command that plays the case again.

@@ -60,8 +60,8 @@ pub(super) struct Following {
     longest_step_m: f64,
     /// Largest change from one step to the next of an even demand, m.
     even_change_m: f64,
-    /// Distance that an uneven demand excuses, in steps of that demand: one for a target that SYNC overtook, the others
-    /// for the drive, which is late.
+    /// Distance that an uneven demand excuses, in steps of that demand: one for a target that SYNC overtook, one for the way
+    /// that a suddenly held mechanism swings and sticks, the others for the drive, which is late.
     excused_steps: f64,
     settling_syncs: u32,
     /// Time by which the drive lags behind the demand, in periods.
@@ -94,7 +94,7 @@ impl Following {
             sending_ns,
             longest_step_m: drive.max_velocity_m_s * period_s,
             even_change_m: EVEN_CHANGE_M_S2 * period_s * period_s,
-            excused_steps: 1.0 + (LATE_S / period_s).max(1.0),
+            excused_steps: 2.0 + (LATE_S / period_s).max(1.0),
             settling_syncs: SETTLING_SYNCS.max((SETTLING_S / period_s).ceil() as u32),
             lag_periods: (scenario.controller.lead_cycles - LEAST_LEAD_CYCLES).ceil().max(0.0),
             line: None,

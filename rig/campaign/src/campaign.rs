@@ -4,8 +4,8 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use anyhow::ensure;
 use masseter_shared::config::{Scenario, ScenarioError};
-use masseter_shared::input::read_text;
 use serde::{Deserialize, Serialize};
 use sha1::{Digest, Sha1};
 use toml::{Table, Value};
@@ -16,8 +16,8 @@ use crate::file::CampaignFile;
 use crate::result::CaseResult;
 use crate::sampler::points;
 
-/// Bytes of the largest file that a scenario names.
-const MOST_FILE_BYTES: u64 = 1 << 30;
+/// Keys that name files which only the reading of a scenario's file resolves.
+const FILE_KEYS: [&str; 2] = ["robot", "drive_profile"];
 
 /// A campaign with its resolved scenario.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -53,10 +53,19 @@ impl Campaign {
     pub fn check(&self) -> anyhow::Result<()> {
         self.base()?;
         for factor in &self.file.factors {
-            let refusal = self.scenario(&[factor.at(0.5)], 0).err();
-            let refusal =
-                refusal.filter(|error| !matches!(error.downcast_ref(), Some(ScenarioError::BadValue { .. })));
-            refusal.map_or(Ok(()), |error| Err(error.context(format!("factor '{}'", factor.name()))))?;
+            let key = factor.key.as_deref().unwrap_or_default();
+            // Their files are read with the file of a scenario alone.
+            let is_of_file = FILE_KEYS.iter().any(|name| key.split('.').next() == Some(*name));
+            ensure!(!is_of_file, "factor '{}': give each variant a campaign of its own", factor.name());
+            let levels = factor.level_count();
+            for level in 0..levels {
+                let setting = factor.at((level as f64 + 0.5) / levels as f64);
+                let refusal = self
+                    .scenario(&[setting], 0)
+                    .err()
+                    .filter(|error| !matches!(error.downcast_ref(), Some(ScenarioError::BadValue { .. })));
+                refusal.map_or(Ok(()), |error| Err(error.context(format!("factor '{}'", factor.name()))))?;
+            }
         }
         Ok(())
     }
@@ -105,6 +114,9 @@ impl Campaign {
             scenario = scenario.with_table(Table::from_iter([("faults".to_owned(), all)]))?;
         }
         scenario.files_mut().for_each(|(_, path)| *path = self.folder.join(&path));
+        if let Some(memory) = &mut scenario.drives.memory {
+            *memory = self.folder.join(&memory);
+        }
         scenario.seed = scenario.seed.wrapping_add(more_seed);
         scenario.validate()?;
         Ok(scenario)
@@ -117,9 +129,12 @@ impl Campaign {
             hasher.update(part.as_bytes());
             hasher.update([0]);
         }
-        for (_, path) in scenario.cloned().iter_mut().flat_map(Scenario::files_mut) {
+        let memory = scenario.and_then(|scenario| scenario.drives.memory.clone());
+        let mut scenario = scenario.cloned();
+        let files = scenario.iter_mut().flat_map(Scenario::files_mut).map(|(_, path)| path.clone());
+        for path in files.chain(memory) {
             // A file that cannot be read is the reason why its case cannot run.
-            hasher.update(read_text(path, MOST_FILE_BYTES).unwrap_or_default());
+            hasher.update(fs::read(path).unwrap_or_default());
         }
         data_encoding::HEXLOWER.encode(&hasher.finalize()[..6])
     }
@@ -212,6 +227,8 @@ mod tests {
         for (text, reason) in [
             ("key = 'dynamics.slide_frictio_n'\nrange = [1.0, 2.0]", "did you mean 'slide_friction_n'?"),
             ("key = 'rate_hz'\nrange = [500.0, 1000.0]", "rate_hz"),
+            ("key = 'rate_hz'\nvalues = [500, 'fast']", "rate_hz"),
+            ("key = 'robot'\nvalues = ['a.toml']", "a campaign of its own"),
             ("key = 'faults.late.at_s'\nrange = [1.0, 2.0]", "faults has no entry"),
         ] {
             let refusal = format!("{:#}", campaign(&format!("[[factor]]\n{text}")).check().unwrap_err());

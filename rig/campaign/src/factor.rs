@@ -124,7 +124,13 @@ impl Factor {
     /// The number of its levels on a grid.
     pub fn level_count(&self) -> usize {
         let listed = self.values.as_ref().or(self.faults.as_ref());
-        listed.map_or_else(|| self.levels.unwrap_or(LEVELS), Vec::len)
+        listed.map_or_else(|| self.levels.unwrap_or(LEVELS.min(self.most_levels())), Vec::len)
+    }
+
+    /// A range of whole numbers has no more levels than numbers.
+    fn most_levels(&self) -> usize {
+        let [low, high] = self.ends();
+        if self.is_whole() { (high - low) as usize + 1 } else { MOST_LEVELS }
     }
 
     /// The value at `u` of \[0, 1): that quantile of a range, or that share of a list.
@@ -145,17 +151,22 @@ impl Factor {
     fn of_range_at(&self, u: f64) -> Value {
         let ends = self.ends();
         let number = match self.distribution {
+            // Every whole number has the same share.
+            Distribution::Uniform if self.is_whole() => {
+                (ends[0] + u * (ends[1] - ends[0] + 1.0)).floor().min(ends[1])
+            }
             Distribution::Uniform => ends[0] + u * (ends[1] - ends[0]),
             Distribution::LogUniform => ends[0] * (ends[1] / ends[0]).powf(u),
             Distribution::Normal => self.normal().map_or(f64::NAN, |normal| {
                 let [from, to] = ends.map(|end| normal.cdf(end));
                 // The ends of an endless range have no quantile.
-                normal.inverse_cdf((from + u * (to - from)).clamp(1e-12, 1.0 - 1e-12))
+                let number = normal.inverse_cdf((from + u * (to - from)).clamp(1e-12, 1.0 - 1e-12));
+                number.clamp(ends[0], ends[1])
             }),
         };
         match (&self.unit, self.is_whole()) {
             (Some(unit), _) => Value::String(format!("{number} {unit}")),
-            (None, true) => Value::Integer((number + 0.5).floor().min(ends[1]) as i64),
+            (None, true) => Value::Integer(number.round() as i64),
             (None, false) => Value::Float(number),
         }
     }
@@ -197,9 +208,6 @@ impl Factor {
                 );
             }
         }
-        if self.levels.is_some_and(|levels| !(1..=MOST_LEVELS).contains(&levels)) {
-            return refuse("levels: use 1 to 10000");
-        }
         if let Some([low, high]) = self.range.as_ref().map(|_| self.ends()) {
             if !(low.is_finite() && high.is_finite() && low < high) {
                 return refuse("range: give two numbers, the smaller first");
@@ -208,6 +216,17 @@ impl Factor {
                 return refuse("range: a log-uniform distribution needs numbers above 0");
             }
         }
+        if self.levels.is_some_and(|levels| !(1..=MOST_LEVELS.min(self.most_levels())).contains(&levels)) {
+            return refuse("levels: use 1 to 10000, and no more than a range has whole numbers");
+        }
+        if self.distribution == Distribution::LogUniform && self.range.is_none() {
+            return refuse("distribution: it needs a range");
+        }
+        let listed = [&self.values, &self.faults].into_iter().flatten().flatten();
+        let numbers = [self.mean, self.deviation].into_iter().flatten();
+        if !listed.into_iter().all(is_finite) || !numbers.into_iter().all(f64::is_finite) {
+            return refuse("use finite numbers");
+        }
         if is_normal && self.normal().is_none() {
             return refuse("a normal distribution needs mean, and a deviation above 0");
         }
@@ -215,6 +234,16 @@ impl Factor {
             return refuse("mean and deviation need distribution = \"normal\"");
         }
         Ok(())
+    }
+}
+
+/// Whether every number of a value is finite: other numbers have no form in the files of a campaign.
+fn is_finite(value: &Value) -> bool {
+    match value {
+        Value::Float(number) => number.is_finite(),
+        Value::Table(table) => table.values().all(is_finite),
+        Value::Array(list) => list.iter().all(is_finite),
+        _ => true,
     }
 }
 
@@ -247,12 +276,16 @@ mod tests {
         let cut = format!("{normal}\nrange = [5.0, 6.0]");
         assert!((value_at(&cut, 0.0).as_float().unwrap() - 5.0).abs() < 1e-9);
         assert!(value_at(&cut, 0.999_999).as_float().unwrap() <= 6.0);
+        let tail = "key = 'a'\ndistribution = 'normal'\nmean = 0.0\ndeviation = 1.0\nrange = [8.0, 9.0]";
+        assert!((8.0..=9.0).contains(&value_at(tail, 0.5).as_float().unwrap()));
     }
 
     #[test]
     fn whole_ends_give_whole_numbers_and_a_unit_gives_quantities() {
         let whole = "key = 'a'\nrange = [1, 3]";
-        assert_eq!([0.0, 0.5, 0.999].map(|u| value_at(whole, u)), [1, 2, 3].map(Value::Integer));
+        let shares = [0.0, 0.33, 0.34, 0.66, 0.67, 0.999].map(|u| value_at(whole, u));
+        assert_eq!(shares, [1, 1, 2, 2, 3, 3].map(Value::Integer));
+        assert_eq!(factor(whole).level_count(), 3);
         assert_eq!(value_at("key = 'a'\nrange = [1.0, 2.0]\nunit = 'mm'", 0.5), Value::from("1.5 mm"));
     }
 
@@ -296,6 +329,10 @@ mod tests {
             ("key = 'a'\ndistribution = 'normal'\nmean = 1.0", "a deviation above 0"),
             ("key = 'a'\nrange = [1.0, 2.0]\nmean = 1.0", "need distribution"),
             ("key = 'a'\nrange = [1.0, 2.0]\nlevels = 0", "use 1 to 10000"),
+            ("key = 'a'\nrange = [1, 3]\nlevels = 4", "no more than a range has whole numbers"),
+            ("key = 'a'\nvalues = [0.0, 1.0]\ndistribution = 'log-uniform'", "it needs a range"),
+            ("key = 'a'\nvalues = [nan]", "use finite numbers"),
+            ("faults = [{ kind = 'lose', at_s = inf }]", "use finite numbers"),
         ] {
             let refusal = factor(text).validate().unwrap_err().to_string();
             assert!(refusal.contains(reason), "{text}: {refusal}");

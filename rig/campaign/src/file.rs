@@ -13,6 +13,22 @@ const MOST_BYTES: u64 = 1 << 20;
 /// The most cases of a campaign.
 const MOST_CASES: usize = 1_000_000;
 
+/// The columns of every table of results that are no factors.
+const COLUMNS: [&str; 12] = [
+    "case",
+    "id",
+    "more_seed",
+    "verdict",
+    "exit_code",
+    "reason",
+    "digest",
+    "took_s",
+    "incisal_rms_mm",
+    "incisal_max_mm",
+    "rotation_max_deg",
+    "bite_force_max_n",
+];
+
 /// When a campaign ends before its last case.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -133,8 +149,8 @@ impl CampaignFile {
         if self.least_success.is_some_and(|share| !(0.0..=1.0).contains(&share)) {
             return Err("least_success: give a share from 0 to 1");
         }
-        if self.stop_after.time_s.is_some_and(|time_s| time_s.is_nan() || time_s <= 0.0) {
-            return Err("stop_after.time_s: give a time above 0");
+        if self.stop_after.time_s.is_some_and(|time_s| !time_s.is_finite() || time_s <= 0.0) {
+            return Err("stop_after.time_s: give a finite time above 0");
         }
         if self.stop_after.failures == Some(0) {
             return Err("stop_after.failures: give at least 1");
@@ -142,9 +158,15 @@ impl CampaignFile {
         Ok(())
     }
 
-    /// Refuses two factors of one name: a result could not tell their values apart.
+    /// Refuses two factors of one name, and names of other columns: a table could not tell their values apart.
     fn refuse_twins(&self) -> Result<(), String> {
         for (at, factor) in self.factors.iter().enumerate() {
+            if COLUMNS.contains(&factor.name()) {
+                return Err(format!(
+                    "'{}' is the name of another column; give the factor another name",
+                    factor.name()
+                ));
+            }
             if self.factors[..at].iter().any(|other| other.name() == factor.name()) {
                 return Err(format!("two factors are called '{}'; give each a name", factor.name()));
             }

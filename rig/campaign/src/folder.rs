@@ -40,7 +40,7 @@ pub enum FolderError {
     #[error("{} exists and is no folder of a campaign; choose another --out", .0.display())]
     NoCampaign(PathBuf),
     /// A file in it has been damaged.
-    #[error("{}: {reason}; remove it, and the case runs again", path.display())]
+    #[error("{}: {reason}; remove its folder, and the rest goes on", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
@@ -167,9 +167,10 @@ impl CampaignFolder {
         let attempts = self.path.join(ATTEMPTS);
         for entry in fs::read_dir(&attempts).map_err(system(&attempts))? {
             let path = entry.map_err(system(&attempts))?.path();
-            // An attempt that just begins has no lock yet; then the folder is empty, and stays.
-            if path.join(LOCK).exists() && locked(&path.join(LOCK))?.is_some() {
-                fs::remove_dir_all(&path).map_err(system(&path))?;
+            // An attempt that just begins has no lock yet, and one that just ended is gone.
+            let Ok(file) = File::open(path.join(LOCK)) else { continue };
+            if flock(&file, FlockOperation::NonBlockingLockExclusive).is_ok() {
+                let _ = fs::remove_dir_all(&path);
             }
         }
         Ok(())
@@ -196,7 +197,7 @@ impl CampaignFolder {
 
     fn write_whole(&self, path: &Path, text: &str) -> Result<(), FolderError> {
         let write = || {
-            let mut file = tempfile::NamedTempFile::new_in(&self.path)?;
+            let mut file = tempfile::NamedTempFile::new_in(self.path.join(ATTEMPTS))?;
             file.write_all(text.as_bytes())?;
             file.as_file().sync_all()?;
             file.persist(path).map_err(|error| error.error)
@@ -234,17 +235,26 @@ impl Attempt {
         }
         let kept = path.join(RESULT);
         let text = serde_json::to_string(result).expect("a result has a JSON form");
-        fs::write(&kept, text).map_err(system(&kept))?;
-        let _ = fs::remove_file(path.join(LOCK));
-        match fs::rename(path, &self.target) {
-            Err(error)
-                if !matches!(error.kind(), ErrorKind::DirectoryNotEmpty | ErrorKind::AlreadyExists) =>
-            {
-                Err(error).map_err(system(&self.target))
-            }
-            _ => Ok(()),
+        write_through(&kept, &text).map_err(system(&kept))?;
+        if self.target.exists() && read_result(&self.target.join(RESULT)).is_err() {
+            // What a power cut or a user left there is no result.
+            fs::remove_dir_all(&self.target).map_err(system(&self.target))?;
         }
+        let renamed = fs::rename(path, &self.target);
+        let is_late = |kind| matches!(kind, ErrorKind::DirectoryNotEmpty | ErrorKind::AlreadyExists);
+        if let Err(error) = renamed {
+            return if is_late(error.kind()) { Ok(()) } else { Err(error).map_err(system(&self.target)) };
+        }
+        let _ = fs::remove_file(self.target.join(LOCK));
+        Ok(())
     }
+}
+
+/// Writes a file so that it survives a power cut.
+fn write_through(path: &Path, text: &str) -> io::Result<()> {
+    let mut file = File::create(path)?;
+    file.write_all(text.as_bytes())?;
+    file.sync_all()
 }
 
 fn has_more_than_a_lock(entries: fs::ReadDir) -> bool {
@@ -357,6 +367,17 @@ mod tests {
     }
 
     #[test]
+    fn a_result_takes_the_place_of_what_is_none() {
+        let parent = tempfile::tempdir().unwrap();
+        let (folder, _lock) = CampaignFolder::begin(parent.path(), &two()).unwrap();
+        let left = parent.path().join(CASES).join(case(0).id);
+        fs::create_dir(&left).unwrap();
+        fs::write(left.join(SCENARIO), "").unwrap();
+        folder.attempt(&case(0)).unwrap().finish(&failed(&case(0)), None).unwrap();
+        assert_eq!(folder.results().unwrap(), [failed(&case(0))]);
+    }
+
+    #[test]
     fn a_damaged_result_is_named() {
         let parent = tempfile::tempdir().unwrap();
         let (folder, _lock) = CampaignFolder::begin(parent.path(), &two()).unwrap();
@@ -364,6 +385,6 @@ mod tests {
         fs::create_dir(&kept).unwrap();
         fs::write(kept.join(RESULT), "{").unwrap();
         let refusal = folder.results().unwrap_err().to_string();
-        assert!(refusal.contains("remove it, and the case runs again"), "{refusal}");
+        assert!(refusal.contains("remove its folder, and the rest goes on"), "{refusal}");
     }
 }

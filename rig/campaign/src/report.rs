@@ -52,14 +52,19 @@ impl<'a> Report<'a> {
 
     /// The share of judged cases that passed.
     pub fn rate(&self) -> SuccessRate {
-        let judged = self.results.iter().filter(|result| result.is_judged());
-        let passed = self.results.iter().filter(|result| result.has_passed());
+        // Equal cases are one trial.
+        let cases: BTreeMap<_, _> = self.results.iter().map(|result| (&result.id, result)).collect();
+        let judged = cases.values().filter(|result| result.is_judged());
+        let passed = cases.values().filter(|result| result.has_passed());
         SuccessRate::new(passed.count(), judged.count())
     }
 
     /// Whether enough cases passed: all, or the share that the file demands. Only judged cases count towards that share; without
-    /// any, nothing was shown.
+    /// any, nothing was shown. A defect of the rig fails the campaign.
     pub fn is_success(&self) -> bool {
+        if self.results.iter().any(|result| result.word == CaseResult::DIED) {
+            return false;
+        }
         match (self.campaign.file.least_success, self.rate().share()) {
             (_, None) => false,
             (Some(least), Some(share)) => share >= least,
@@ -105,15 +110,19 @@ impl<'a> Report<'a> {
         });
         let word = if self.is_success() { "PASS" } else { "FAIL" };
         format!(
-            "{word}: {} of {}: {}\n{}{}page: {}\ntable: {}\n",
+            "{word}: {} of {}: {}\n{}{}{}",
             counted(self.results.len() as u64, "case"),
             self.campaign.case_count(),
             counts.join(", "),
             self.rate_in_words(),
             worst.unwrap_or_default(),
-            folder.file(PAGE).display(),
-            folder.file(TABLE).display()
+            self.files(folder)
         )
+    }
+
+    /// Where page and table are, in lines for a terminal.
+    pub fn files(&self, folder: &CampaignFolder) -> String {
+        format!("page: {}\ntable: {}\n", folder.file(PAGE).display(), folder.file(TABLE).display())
     }
 
     fn rate_in_words(&self) -> String {

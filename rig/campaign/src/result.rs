@@ -57,6 +57,8 @@ pub struct CaseResult {
 impl CaseResult {
     /// The word of a case that could not run.
     pub const REFUSED: &str = "REFUSED";
+    /// The word of a case at which the rig itself failed.
+    pub const DIED: &str = "DIED";
 
     /// The result of a case that ran.
     pub fn new(case: &Case, verdict: &Verdict, figures: &Figures, took_s: f64) -> Self {
@@ -101,7 +103,10 @@ impl CaseResult {
     /// Whether it says anything about the rig: it passed, failed or stopped. What could not run, was not tested or cannot be
     /// judged says nothing.
     pub fn is_judged(&self) -> bool {
-        !matches!(self.word.as_str(), Self::REFUSED | "UNTESTED" | "INVALID" | "INCOMPLETE" | "INTERRUPTED")
+        !matches!(
+            self.word.as_str(),
+            Self::REFUSED | Self::DIED | "UNTESTED" | "INVALID" | "INCOMPLETE" | "INTERRUPTED"
+        )
     }
 
     /// The smallest margin of its checks as a share of their limits, with the name of the check.

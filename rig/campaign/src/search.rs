@@ -113,6 +113,9 @@ impl Watch<'_> {
             return NOTHING;
         }
         let number = self.next.fetch_add(1, Ordering::Relaxed);
+        if number >= self.search.runs {
+            return NOTHING;
+        }
         match evaluate(number, point) {
             Value::End => {
                 self.is_over.store(true, Ordering::Relaxed);

@@ -12,6 +12,8 @@ use toml::{Table, Value};
 const LISTS: [&str; 3] = ["faults", "stimulus", REQUIREMENTS];
 /// The list whose entries stay as they are, or go whole: another limit would be another failure.
 const REQUIREMENTS: &str = "require";
+/// The most rounds of all reductions; two are usual.
+const ROUNDS: usize = 8;
 /// Bisections towards a default.
 const BISECTIONS: usize = 5;
 /// Digits of numbers, the fewest first.
@@ -49,15 +51,16 @@ impl<F: FnMut(&Scenario) -> bool> Shrink<F> {
         let name: String = format!("{}-shrunk", scenario.name).chars().take(64).collect();
         let mut shrink = Self { fails, name: Value::String(name) };
         let mut changes = changes(scenario);
-        loop {
+        for _ in 0..ROUNDS {
             let before = changes.clone();
             changes = shrink.fewer(changes);
             shrink.barer(&mut changes);
             shrink.simpler(&mut changes);
             if changes == before {
-                return shrink.text(&changes);
+                break;
             }
         }
+        shrink.text(&changes)
     }
 
     /// Delta debugging: removes parts of the changes, halves first.
@@ -129,8 +132,8 @@ impl<F: FnMut(&Scenario) -> bool> Shrink<F> {
             let nearest: f64 = format!("{exact:.*e}", digits - 1).parse().unwrap_or(exact);
             // The nearest may lie on the other side of the failure's border.
             let unit = 10f64.powi(exact.abs().log10().floor() as i32 - digits as i32 + 1);
-            let beyond = format!("{:.*e}", digits - 1, nearest + unit.copysign(exact));
-            for rounded in [nearest, beyond.parse().unwrap_or(exact)] {
+            let beside = [unit, -unit].map(|step| format!("{:.*e}", digits - 1, nearest + step).parse());
+            for rounded in [Ok(nearest)].into_iter().chain(beside).flatten() {
                 if rounded.to_bits() == exact.to_bits() || self.try_number(changes, at, place, rounded) {
                     return;
                 }

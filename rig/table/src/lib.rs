@@ -120,14 +120,23 @@ pub struct Table {
 pub struct TableError(#[from] ParquetError);
 
 impl Table {
-    /// A table.
+    /// A table. A second column of the same name gets a number behind the name.
     ///
     /// # Panics
     /// When the columns differ in length.
     pub fn new(columns: Vec<Column>) -> Self {
         let rows = columns.first().map_or(0, |column| column.values.len());
         assert!(columns.iter().all(|column| column.values.len() == rows), "all columns have the same length");
-        Self { columns }
+        let mut named: Vec<Column> = Vec::new();
+        for mut column in columns {
+            let is_taken = |name: &str| named.iter().any(|other| other.name == name);
+            if is_taken(&column.name) {
+                let others = (2..).map(|number| format!("{} ({number})", column.name));
+                column.name = others.into_iter().find(|name| !is_taken(name)).unwrap_or_default();
+            }
+            named.push(column);
+        }
+        Self { columns: named }
     }
 
     /// Writes the table as Parquet, compressed by zstd.
