@@ -23,6 +23,8 @@ use crate::pose_law::{Demand, Detour, LawFailed, PoseLaw};
 const BREAK_CYCLES: usize = 10;
 /// Share of the force that is left then.
 const BREAK_SHARE: f64 = 0.5;
+/// Cycles at the end of its range after which a load cell tells nothing.
+const FULL_CYCLES: usize = 3;
 /// Time constant with which the jaw catches up with the opening motion, s.
 const CATCH_UP_S: f64 = 0.02;
 /// The jaw is back on the motion when nearer and not faster than this beside it, m and m/s.
@@ -48,6 +50,8 @@ pub(crate) struct ForceControl {
     config: ForceControlConfig,
     period_s: f64,
     lead_cycles: f64,
+    /// End of the range of the force that is controlled, N.
+    range_n: f64,
     /// Corrects what the drives leave of the pose that is asked for.
     position: PoseControl,
     /// Height of the platform in the closed mouth, m.
@@ -73,6 +77,10 @@ impl ForceControl {
             config,
             period_s: scenario.period_s(),
             lead_cycles: scenario.controller.lead_cycles,
+            range_n: match config.source {
+                ForceSource::Estimate => f64::INFINITY,
+                ForceSource::LoadCell => scenario.load_cell.map_or(f64::INFINITY, |cell| cell.range_n),
+            },
             position: PoseControl::new(&scenario.controller, scenario.rate_hz),
             closed_m,
             phase: Phase::Free,
@@ -89,8 +97,9 @@ impl ForceControl {
         self.bites_n[0]
     }
 
-    /// Takes the newest force and the newest height of the motion. A cycle without a force keeps the last one.
-    fn observe(&mut self, demand: &Demand) {
+    /// Takes the newest force and the newest height of the motion. A cycle without a force keeps the last one. A load cell
+    /// that stays at the end of its range hides how hard the jaw bites.
+    fn observe(&mut self, demand: &Demand) -> Result<(), LawFailed> {
         let known_n = match self.config.source {
             ForceSource::Estimate => demand.external.map(|external| external.bite_n()),
             ForceSource::LoadCell => demand.load_cell_n,
@@ -101,6 +110,8 @@ impl ForceControl {
         let height_m = demand.ahead.translation.z;
         let before_m = self.motion_m.replace(height_m).unwrap_or(height_m);
         self.motion_m_s = (height_m - before_m) / self.period_s;
+        let is_full = self.bites_n[..FULL_CYCLES].iter().all(|bite_n| bite_n.abs() >= self.range_n);
+        if is_full { Err(LawFailed) } else { Ok(()) }
     }
 
     /// Whether the force has fallen while it should not have.
@@ -183,7 +194,7 @@ impl ForceControl {
 impl PoseLaw for ForceControl {
     fn command(&mut self, demand: &Demand) -> Result<Pose, LawFailed> {
         let at_sample_m = self.detour().at_sample_m;
-        self.observe(demand);
+        self.observe(demand)?;
         self.phase = self.next_phase(demand.state);
         self.desired_n = match self.phase {
             Phase::Biting { time_s } => desired_n(&self.config, time_s).unwrap_or(0.0),

@@ -1,7 +1,7 @@
 //! The law against food in a world that is only as high as the bite: drives that are two cycles late, and an observer that is
 //! a low-pass.
 
-use masseter_shared::config::BiteProfile;
+use masseter_shared::config::{BiteProfile, LoadCellConfig};
 
 use super::*;
 use crate::pose_law::ExternalForce;
@@ -29,6 +29,8 @@ struct World {
     thickness_m: f64,
     /// Deeper than this the food breaks, m.
     breaks_at_m: f64,
+    /// Ends of what the load cell shows, N.
+    cell_ends_n: [f64; 2],
 }
 
 impl World {
@@ -42,6 +44,7 @@ impl World {
             stiffness_n_per_m: 3500.0,
             thickness_m: 0.01,
             breaks_at_m: f64::INFINITY,
+            cell_ends_n: [f64::NEG_INFINITY, f64::INFINITY],
         }
     }
 
@@ -74,7 +77,7 @@ impl World {
             estimated: None,
             ahead: pose(time_s + LEAD_CYCLES as f64 * PERIOD_S),
             external: Some(external),
-            load_cell_n: None,
+            load_cell_n: Some(bite_n.clamp(self.cell_ends_n[0], self.cell_ends_n[1])),
         })?;
         self.asked_m.push(asked.translation.z);
         Ok(())
@@ -205,6 +208,32 @@ fn an_empty_mouth_closes_with_the_motion_and_a_wall_beyond_the_reach_ends_it() {
     let failed = (0..1000).find_map(|_| world.step().err());
     assert_eq!(failed, Some(LawFailed));
     assert!(world.law.offsets_m[0] >= -0.003);
+}
+
+/// A law by a load cell of 50 N.
+fn by_cell() -> World {
+    let config = ForceControlConfig { source: ForceSource::LoadCell, ..hold() };
+    let cell = LoadCellConfig { range_n: 50.0, ..LoadCellConfig::default() };
+    let scenario = Scenario { load_cell: Some(cell), ..Scenario::default() };
+    World { law: ForceControl::new(&scenario, config, 0.0), ..World::new(config) }
+}
+
+#[test]
+fn a_load_cell_that_stays_at_the_end_of_its_range_ends_the_bite() {
+    for (ends_n, fails) in
+        [([-50.0, 50.0], false), ([50.0, 50.0], true), ([-50.0, -50.0], true), ([49.9, 49.9], false)]
+    {
+        let mut world = World { cell_ends_n: ends_n, ..by_cell() };
+        let failed = (0..30).find(|_| world.step().is_err());
+        assert_eq!(failed, fails.then_some(FULL_CYCLES - 1), "{ends_n:?}");
+    }
+    // One cycle below the end begins the count anew.
+    let mut world = by_cell();
+    for cycle in 0..30 {
+        let shown_n = if cycle % FULL_CYCLES == 0 { 49.0 } else { 50.0 };
+        world.cell_ends_n = [shown_n; 2];
+        assert_eq!(world.step(), Ok(()));
+    }
 }
 
 #[test]

@@ -51,6 +51,11 @@ fn every_value_of_a_reading_must_be_a_number_and_every_code_known() {
             assert_eq!(fault.value.to_bits(), value.to_bits());
         }
     }
+    for load_cell_n in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let fault = check_reading(&Reading { load_cell_n, ..good_reading() }).unwrap_err();
+        assert_eq!((fault.cause, fault.axis, fault.limit), (Cause::BadMessage, None, 0.0));
+        assert_eq!(fault.value.to_bits(), load_cell_n.to_bits());
+    }
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! A load cell that measures the bite force of the emulated jaw: `[load_cell]`.
 
 use super::error::ScenarioError;
+use super::force::ForceControlConfig;
 use super::need::{keyed, require_within};
 
 section! {
@@ -30,5 +31,50 @@ impl LoadCellConfig {
         let within =
             values.into_iter().zip(bounds).map(|((key, value), (least, most))| (key, value, least, most));
         require_within(&within.collect::<Vec<_>>())
+    }
+
+    /// Refuses a cell by which this control cannot tell a bite: one that is full below the peak, or that shows a contact
+    /// without one.
+    pub(super) fn require_for(&self, control: &ForceControlConfig) -> Result<(), ScenarioError> {
+        let Self { noise_n, offset_n, range_n, .. } = *self;
+        let [most_offset_n, most_noise_n] = [control.contact_n / 2.0, control.contact_n / 5.0];
+        let least_range_n = 1.2 * control.peak_n + offset_n.abs() + 5.0 * noise_n;
+        let bad = |key, value, need: String| Err(ScenarioError::bad(key, &value, need));
+        if offset_n.abs() >= most_offset_n {
+            let need = format!(
+                "use less than {most_offset_n} N on both sides, half of force_control.contact_n: with more, the controller \
+                 takes the offset for a contact, or misses one"
+            );
+            return bad("load_cell.offset_n", offset_n, need);
+        }
+        if noise_n > most_noise_n {
+            let need = format!(
+                "use at most {most_noise_n} N, a fifth of force_control.contact_n: with more, noise looks like a contact"
+            );
+            return bad("load_cell.noise_n", noise_n, need);
+        }
+        if range_n < least_range_n {
+            let need = format!(
+                "use at least {least_range_n} N, 1.2 times force_control.peak_n with offset and five times the noise: a \
+                 cell at the end of its range hides the force"
+            );
+            return bad("load_cell.range_n", range_n, need);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_load_cell_at_the_bounds_of_control_is_accepted() {
+        let control = ForceControlConfig { peak_n: 60.0, ..ForceControlConfig::default() };
+        let cell =
+            LoadCellConfig { noise_n: 2.0, offset_n: -4.0, range_n: 86.0, ..LoadCellConfig::default() };
+        assert!(cell.require_for(&control).is_ok());
+        let narrow = LoadCellConfig { range_n: 85.9, ..cell };
+        assert!(narrow.require_for(&control).is_err());
     }
 }

@@ -357,10 +357,18 @@ impl Scenario {
         self.check_torque_offsets()?;
         let estimate = self.force_estimate.unwrap_or_default();
         estimate.validate()?;
-        self.load_cell.as_ref().map_or(Ok(()), LoadCellConfig::validate)?;
+        if let Some(cell) = &self.load_cell {
+            cell.validate()?;
+            if !self.can.is_virtual() {
+                let need = "leave the table away with can.interfaces: the rig reads no load cell there";
+                return Err(ScenarioError::bad("load_cell", &"given", need));
+            }
+        }
         if let Some(control) = &self.force_control {
-            let source_s = self.check_source(control)?.unwrap_or(estimate.observer_time_s);
+            let cell = self.check_source(control)?;
+            let source_s = cell.map_or(estimate.observer_time_s, LoadCellConfig::time_s);
             control.validate(self.controller.lead_cycles * self.period_s(), source_s)?;
+            cell.map_or(Ok(()), |cell| cell.require_for(control))?;
         }
         if self.is_force_estimated() {
             self.model().friction.require_open_screws()?;
@@ -368,19 +376,17 @@ impl Scenario {
         self.checks.validate()
     }
 
-    /// Control by a load cell needs one, and only the emulated jaw has one. Returns the cell's time constant; none for
-    /// control by the estimate.
-    fn check_source(&self, control: &ForceControlConfig) -> Result<Option<f64>, ScenarioError> {
+    /// Control by a load cell needs one, and only the emulated jaw has one. Returns the cell; none for control by the
+    /// estimate.
+    fn check_source(&self, control: &ForceControlConfig) -> Result<Option<&LoadCellConfig>, ScenarioError> {
         if control.source == ForceSource::Estimate {
             return Ok(None);
         }
         let bad = |need| Err(ScenarioError::bad("force_control.source", &"\"load_cell\"", need));
-        match self.load_cell {
-            None => bad("add the table [load_cell], or use \"estimate\""),
-            Some(_) if !self.can.is_virtual() => {
-                bad("use \"estimate\": on real interfaces the rig reads no load cell")
-            }
-            Some(cell) => Ok(Some(cell.time_s())),
+        match &self.load_cell {
+            None if self.can.is_virtual() => bad("add the table [load_cell], or use \"estimate\""),
+            None => bad("use \"estimate\": on real interfaces the rig reads no load cell"),
+            cell => Ok(cell.as_ref()),
         }
     }
 

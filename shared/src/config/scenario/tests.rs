@@ -175,13 +175,29 @@ const WRONG: &[(&str, &str)] = &[
         "force_control.source = \"load_cell\": add the table [load_cell], or use \"estimate\"",
     ),
     (
-        "[can]\ninterfaces = ['a', 'b']\n[load_cell]\n[force_control]\nsource = 'load_cell'",
+        "[can]\ninterfaces = ['a', 'b']\n[force_control]\nsource = 'load_cell'",
         "force_control.source = \"load_cell\": use \"estimate\": on real interfaces",
     ),
     ("[force_control]\nsource = 'loadcell'", "did you mean 'load_cell'?"),
     (
         "[load_cell]\nbandwidth_hz = 10.0\n[force_control]\nsource = 'load_cell'\ndamping_n_s_per_m = 40.0",
         "force_control.damping_n_s_per_m = 40: use at least 46.6",
+    ),
+    (
+        "[can]\ninterfaces = ['a', 'b']\n[load_cell]",
+        "load_cell = given: leave the table away with can.interfaces: the rig reads no load cell there",
+    ),
+    (
+        "[load_cell]\nrange_n = 74.4\noffset_n = -2.0\n[force_control]\nsource = 'load_cell'\npeak_n = 60.0",
+        "load_cell.range_n = 74.4: use at least 74.5 N",
+    ),
+    (
+        "[load_cell]\noffset_n = -5.0\n[force_control]\nsource = 'load_cell'",
+        "load_cell.offset_n = -5: use less than 5 N on both sides, half of force_control.contact_n",
+    ),
+    (
+        "[load_cell]\nnoise_n = 2.1\n[force_control]\nsource = 'load_cell'",
+        "load_cell.noise_n = 2.1: use at most 2 N, a fifth of force_control.contact_n",
     ),
     ("[load_cell]\nbandwidth_hz = 0.0", "load_cell.bandwidth_hz = 0: use 1 to 100000"),
     ("[load_cell]\nnoise_n = -1.0", "load_cell.noise_n = -1: use 0 to 1000"),
