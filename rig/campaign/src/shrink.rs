@@ -43,13 +43,14 @@ impl Change {
 pub struct Shrink<F> {
     fails: F,
     name: Value,
+    default: Table,
 }
 
 impl<F: FnMut(&Scenario) -> bool> Shrink<F> {
     /// The minimal scenario of one that fails, as TOML with its changes alone.
     pub fn run(fails: F, scenario: &Scenario) -> String {
         let name: String = format!("{}-shrunk", scenario.name).chars().take(64).collect();
-        let mut shrink = Self { fails, name: Value::String(name) };
+        let mut shrink = Self { fails, name: Value::String(name), default: table(&Scenario::default()) };
         let mut changes = changes(scenario);
         for _ in 0..ROUNDS {
             let before = changes.clone();
@@ -169,8 +170,13 @@ impl<F: FnMut(&Scenario) -> bool> Shrink<F> {
         let mut whole = Table::from_iter([("name".to_owned(), self.name.clone())]);
         for Change { path, value, is_entry, .. } in changes {
             let [folders @ .., name] = path.as_slice() else { continue };
+            let mut default = Some(&self.default);
             let table = folders.iter().fold(&mut whole, |table, folder| {
-                let inner = table.entry(folder).or_insert_with(|| Value::Table(Table::new()));
+                default = default.and_then(|default| default.get(folder)?.as_table());
+                // A table of a kind cannot be read without its kind.
+                let kind = default.and_then(|default| default.get_key_value("kind"));
+                let begun = Table::from_iter(kind.map(|(key, kind)| (key.clone(), kind.clone())));
+                let inner = table.entry(folder).or_insert_with(|| Value::Table(begun));
                 inner.as_table_mut().expect("a key is either a table or a value")
             });
             if *is_entry {
@@ -186,14 +192,15 @@ impl<F: FnMut(&Scenario) -> bool> Shrink<F> {
 
 /// The differences of a scenario from the default one.
 fn changes(scenario: &Scenario) -> Vec<Change> {
-    let table = |scenario: &Scenario| -> Table {
-        toml::from_str(&scenario.to_toml()).expect("it was written from a scenario")
-    };
     let mut given = table(scenario);
     given.remove("name");
     let mut found = Vec::new();
     collect(&mut found, &[], &given, &table(&Scenario::default()));
     found
+}
+
+fn table(scenario: &Scenario) -> Table {
+    toml::from_str(&scenario.to_toml()).expect("it was written from a scenario")
 }
 
 fn collect(found: &mut Vec<Change>, path: &[String], given: &Table, default: &Table) {
@@ -304,6 +311,21 @@ for_s = 0.1
         let fails = |scenario: &Scenario| scenario.duration_s.is_some_and(|duration_s| duration_s > 2.9);
         let small = scenario(&Shrink::run(fails, &scenario(MANY)));
         assert!(small.duration_s.unwrap() < 3.5, "{:?}", small.duration_s);
+    }
+
+    #[test]
+    fn a_key_of_the_motion_keeps_the_kind_of_the_motion() {
+        let fails = |scenario: &Scenario| {
+            let masseter_shared::config::MotionConfig::Chewing(chewing) = &scenario.motion else {
+                return false;
+            };
+            chewing.cycle_rate_hz > 1.2
+        };
+        let small = Shrink::run(
+            fails,
+            &scenario("[motion]\nkind = 'chewing'\ncycle_rate_hz = 1.4321\nlateral_mm = 5.0"),
+        );
+        assert!(small.ends_with("[motion]\ncycle_rate_hz = 1.3\nkind = \"chewing\"\n"), "{small}");
     }
 
     #[test]
