@@ -319,13 +319,13 @@ for_s = 0.1
             let masseter_shared::config::MotionConfig::Chewing(chewing) = &scenario.motion else {
                 return false;
             };
-            chewing.cycle_rate_hz > 1.2
+            chewing.cycle_rate_hz > 1.5
         };
         let small = Shrink::run(
             fails,
-            &scenario("[motion]\nkind = 'chewing'\ncycle_rate_hz = 1.4321\nlateral_mm = 5.0"),
+            &scenario("[motion]\nkind = 'chewing'\ncycle_rate_hz = 1.6321\nlateral_mm = 5.0"),
         );
-        assert!(small.ends_with("[motion]\ncycle_rate_hz = 1.3\nkind = \"chewing\"\n"), "{small}");
+        assert!(small.ends_with("[motion]\ncycle_rate_hz = 2.0\nkind = \"chewing\"\n"), "{small}");
     }
 
     #[test]
