@@ -260,7 +260,7 @@ range = [0.5, 1.0]
             runs[runs.len() / 2]
         };
         let [by_covariance, at_random] = [Method::CmaEs, Method::Random].map(median);
-        eprintln!("median of 20 seeds: CMA-ES {by_covariance} runs, random {at_random} runs");
+        status!("median of 20 seeds: CMA-ES {by_covariance} runs, random {at_random} runs");
         assert!(by_covariance * 5 <= at_random, "{by_covariance} against {at_random}");
     }
 }
