@@ -258,7 +258,10 @@ impl Axis {
             return next;
         }
         self.faults.strike(FaultKindConfig::DriveSlowEnable);
-        if self.power == DriveState::ReadyToSwitchOn { DriveState::SwitchedOn } else { self.power }
+        match self.power {
+            DriveState::ReadyToSwitchOn => DriveState::SwitchedOn,
+            power => power,
+        }
     }
 
     /// Reacts by 6007h when nobody controls the drive any more; returns whether that put it into fault.

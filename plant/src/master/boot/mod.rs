@@ -130,7 +130,7 @@ impl Boot {
     pub(super) fn forget(&mut self, now_ns: u64) {
         self.start_over();
         (self.phase, self.restarts) = (BootPhase::Waiting, 0);
-        (self.reset_at_ns, self.since_ns) = (now_ns + RESET_EVERY_NS, now_ns);
+        (self.reset_at_ns, self.since_ns) = (now_ns.saturating_add(RESET_EVERY_NS), now_ns);
     }
 
     /// The plan begins anew, and no transfer is under way.
