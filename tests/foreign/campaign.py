@@ -24,6 +24,10 @@ folder.mkdir()
     "duration_s = 1.0\n[[require]]\nname = 'incisal'\nsignal = 'incisal.error'\nduring = 'running'\nmax = '60 um'\n"
 )
 CASES = 40
+RECORDED = 3
+KILLS = 4
+PASSED = {"PASS"}.__contains__
+JUDGED = {"PASS", "FAIL", "SAFE STOP", "DIED"}.__contains__
 (folder / "friction.toml").write_text(
     f"""scenario = "chewing.toml"
 sampler = "latin-hypercube"
@@ -54,7 +58,7 @@ time.sleep(600)
 
 
 def command(out, *more):
-    return [program, "campaign", "friction.toml", "--out", out, "--record", "3", *more]
+    return [program, "campaign", "friction.toml", "--out", out, "--record", str(RECORDED), *more]
 
 
 def start(out, *more):
@@ -78,6 +82,17 @@ def cases_alive():
     return [int(process) for process in listed.stdout.split()]
 
 
+def kill_a_case():
+    """Whether a case was alive for its kill."""
+    for process in cases_alive():
+        try:
+            os.kill(process, signal.SIGKILL)
+            return True
+        except ProcessLookupError:
+            pass
+    return False
+
+
 def wait_until(what, is_so, for_s=60.0):
     give_up = time.monotonic() + for_s
     while not is_so():
@@ -88,12 +103,24 @@ def wait_until(what, is_so, for_s=60.0):
 def check_complete(out):
     assert len(results(out)) == CASES, out
     assert not list((folder / out / "attempts").iterdir()), out
+    assert rows(out)["case"].to_list() == list(range(CASES)), out
     assert rows(out).equals(rows("whole")), out
+    assert len(list((folder / out / "worst").glob("*/report.html"))) == RECORDED, out
+    assert not list((folder / out / "worst").glob("*.part")), out
+
+
+def kill_it(campaign):
+    """A kill that comes too late would prove nothing."""
+    campaign.kill()
+    campaign.communicate()
+    assert campaign.returncode == -signal.SIGKILL, "the campaign ended before its kill"
 
 
 # A whole campaign, read by two programs.
+began = time.monotonic()
 done = start("whole")
 said, _ = done.communicate()
+lasted_s = time.monotonic() - began
 assert done.returncode == 1 and said.startswith(f"FAIL: {CASES} cases of {CASES}"), said
 table = polars.read_parquet(folder / "whole/cases.parquet")
 assert table.height == CASES and table["dynamics.slide_friction_n"].dtype == polars.Float64
@@ -111,14 +138,16 @@ assert dict(counted) == collections.Counter(result["word"] for result in results
 # The page has a command for each of the worst cases, which gives the same run again.
 page = (folder / "whole/campaign.html").read_text()
 scenarios = sorted((folder / "whole/worst").glob("*.toml"))
-assert len(scenarios) == 3 and "Success rate" in page
+passed, judged = (sum(test(result["word"]) for result in results("whole")) for test in (PASSED, JUDGED))
+assert f"Success rate {100 * passed / judged:.1f} % of {judged} judged cases" in page
+assert len(scenarios) == RECORDED
 for scenario in scenarios:
     again = f"masseter run {scenario.relative_to(folder)} --clock virtual"
     assert again in page, again
     out = folder / f"again-{scenario.stem}"
     subprocess.run([program, *again.split()[1:], "--quiet", "--out", out], cwd=folder, stdout=subprocess.PIPE)
     digest = json.loads((out / "summary.json").read_text())["figures"]["digest"]
-    assert digest in {result["digest"] for result in results("whole")}, scenario
+    assert digest == by_id[scenario.stem.rsplit("-", 1)[1]]["digest"], scenario
 
 # An ended campaign runs nothing again.
 times = lambda: {path: path.stat().st_mtime_ns for path in (folder / "whole/cases").glob("*/result.json")}
@@ -126,17 +155,20 @@ before = times()
 start("whole").communicate()
 assert times() == before
 
-# The campaign is killed at moments of its life, and goes on.
+# The campaign is killed at moments of its life, then while it records, and goes on. All the moments fit into one life.
 moments = random.Random(1)
-for kill in range(4):
+for _ in range(KILLS):
     killed = start("killed")
-    time.sleep(moments.uniform(0.1, 1.2))
-    killed.kill()
-    killed.communicate()
+    time.sleep(moments.uniform(0.05, 0.5 / KILLS) * lasted_s)
+    kill_it(killed)
+assert len(results("killed")) < CASES
+killed = start("killed")
+wait_until("a case is recorded", lambda: list((folder / "killed/worst").glob("*.part")))
+kill_it(killed)
 start("killed").communicate()
 check_complete("killed")
 
-# A case is killed, then the cluster with its server and workers; a new cluster goes on.
+# A case is killed and runs again. Then the cluster is killed with its server and workers, and a new cluster goes on.
 server = folder / "server"
 
 
@@ -149,10 +181,14 @@ def cluster():
 
 engine = ["--engine", "hyperqueue", "--server-dir", server, "--python", sys.executable]
 first = cluster()
+campaign = start("case", *engine)
+wait_until("a case dies", kill_a_case)
+_, said = campaign.communicate()
+assert campaign.returncode == 1 and f"1 of {CASES} cases to HyperQueue" in said, (campaign.returncode, said)
+# What the killed case left goes with the next start of the command.
+start("case", *engine).communicate()
+check_complete("case")
 campaign = start("cluster", *engine)
-wait_until("a case runs", cases_alive)
-for process in cases_alive()[:1]:
-    os.kill(process, signal.SIGKILL)
 wait_until("some cases have ended", lambda: (folder / "cluster/cases").is_dir() and len(results("cluster")) > 5)
 first.kill()
 first.wait()
