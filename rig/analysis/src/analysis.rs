@@ -49,7 +49,7 @@ use crate::tracking::{PathSample, PoseSource, Tracking};
 /// assert_eq!((figures.cycles, figures.missing_messages()), (3, 0));
 /// # Ok::<(), masseter_shared::messages::tap::TapError>(())
 /// ```
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Analysis {
     period_ns: u64,
     declared: Declared,
@@ -129,6 +129,16 @@ impl Analysis {
     #[must_use]
     pub fn without_report(scenario: &Scenario, declared: &Declared) -> Self {
         Self { shown: None, ..Self::new(scenario, declared) }
+    }
+
+    /// The same for messages that come while the run goes on. A clone that [finishes](Self::finish) gives the figures so far.
+    #[must_use]
+    pub fn while_running(scenario: &Scenario, declared: &Declared) -> Self {
+        let requirements = Requirements::while_running(scenario, declared);
+        Self {
+            requirements: (!requirements.is_empty()).then_some(requirements),
+            ..Self::new(scenario, declared)
+        }
     }
 
     /// Takes the next message.

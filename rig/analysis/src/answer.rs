@@ -13,7 +13,7 @@ pub(super) struct Answer {
 }
 
 /// Finds the readings that answer a new command.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Answers {
     last: u64,
 }

@@ -20,7 +20,7 @@ pub struct AxisFigures {
 }
 
 /// Collects them.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct AxisWatch {
     /// From a command to the reading of the position that its targets lead to.
     lead_cycles: u64,

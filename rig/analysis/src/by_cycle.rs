@@ -6,7 +6,7 @@
 const KEPT: usize = 1 << 13;
 
 /// The latest values by cycle.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct ByCycle<T> {
     /// Empty before the first value: where nothing waits, no memory is used.
     slots: Vec<Option<(u64, T)>>,

@@ -36,7 +36,7 @@ pub struct ToothFigures {
 }
 
 /// Collects them.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct ContactWatch {
     total_max_n: f64,
     greatest: Contact,

@@ -46,7 +46,7 @@ pub struct Detection {
 const KEPT: usize = 1 << 13;
 
 /// Follows the declared faults.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct FaultWatch {
     faults: Vec<Effect>,
     stops: Vec<Stop>,

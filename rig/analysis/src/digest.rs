@@ -8,7 +8,7 @@ use crc32fast::Hasher;
 use masseter_recording::Recorded;
 
 /// Digests each topic by itself, since the recorder drains topic after topic.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Digest {
     commands: Hasher,
     readings: Hasher,

@@ -10,7 +10,7 @@ use masseter_shared::messages::State;
 const SETTLING_NS: u64 = 100_000_000;
 
 /// Follows the controller's messages.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Disturbance {
     skipped: u64,
     was_in_time: bool,

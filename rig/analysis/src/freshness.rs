@@ -18,7 +18,7 @@ pub struct ReadingFigures {
 }
 
 /// Separates fresh readings from those used again.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Freshness {
     last: u64,
     pub(super) figures: ReadingFigures,

@@ -61,7 +61,7 @@ pub(super) struct HopTime {
 }
 
 /// How long the hops typically take.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct TypicalHops([Histogram<u64>; HOPS.len()]);
 
 impl Default for TypicalHops {

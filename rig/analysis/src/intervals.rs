@@ -48,7 +48,7 @@ const NAMES: [&str; Interval::RoundTrip as usize + 1] = [
 
 /// All intervals of a run, and the latest messages, between which they lie. The later message completes an interval,
 /// whichever that is.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Intervals {
     period_ns: u64,
     measured: Vec<Measured>,

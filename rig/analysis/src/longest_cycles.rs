@@ -56,7 +56,7 @@ struct Parts {
 }
 
 /// Follows every cycle and keeps the longest.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct LongestCycles {
     readings: ByCycle<Counted<Reading>>,
     parts: ByCycle<Parts>,
@@ -158,7 +158,7 @@ impl LongestCycles {
 }
 
 /// Computes a process's counter of stalls at a deadline from the counter in its message, which is that at the wake-up.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 struct Stalls {
     counted_ns: u64,
 }

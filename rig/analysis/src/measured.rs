@@ -63,7 +63,7 @@ impl Seconds {
 }
 
 /// Collects the samples of an interval.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Measured {
     name: &'static str,
     total: Histogram<u64>,

@@ -37,7 +37,7 @@ pub struct ParameterFigures {
 }
 
 /// Collects both.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct NamedWatch {
     signals: Vec<SignalFigures>,
     parameters: Vec<ParameterFigures>,

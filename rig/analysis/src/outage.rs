@@ -35,7 +35,7 @@ impl Outage {
 }
 
 /// Counts the deadlines that both processes miss until the rig stops.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct OutageWatch {
     stopped_ns: Option<u64>,
     controller: Misses,
@@ -64,7 +64,7 @@ impl OutageWatch {
 }
 
 /// Deadlines that a process missed around the stop: when it counted them, in its next message, and how many.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 struct Misses {
     counted: u64,
     recent: VecDeque<(u64, u64)>,

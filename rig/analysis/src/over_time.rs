@@ -41,7 +41,7 @@ pub struct OverTime {
 }
 
 /// Collects them.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct OverTimeCollector {
     began_ns: Option<u64>,
     lasted_ns: u64,

@@ -46,7 +46,7 @@ pub struct PoseErrors {
 }
 
 /// Root mean square and maximum of what is added.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Accumulator {
     pub(super) samples: u64,
     squares: f64,
@@ -73,7 +73,7 @@ impl Accumulator {
 }
 
 /// Collects [`PoseErrors`].
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct PoseErrorSums {
     origin: Accumulator,
     incisal: Accumulator,

@@ -23,14 +23,14 @@ const CROWDED_CYCLES: u64 = 2;
 const FEWEST_ON_TIME: u64 = 10;
 
 /// Follows every frame.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Responses {
     buses: Vec<Followed>,
     has_faults: bool,
 }
 
 /// One bus.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Followed {
     plan: BusPlan,
     /// In the order of the plan's messages.

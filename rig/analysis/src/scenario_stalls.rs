@@ -11,14 +11,14 @@ use masseter_shared::messages::{Reading, State};
 const AFTER_NS: u64 = 10_000_000;
 
 /// The stalls, and how far the messages of each loop have come.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct ScenarioStalls {
     controller: Stalled,
     plant: Stalled,
 }
 
 /// The stalls of one loop.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 struct Stalled {
     windows_ns: Vec<Range<u64>>,
     woke_ns: u64,

@@ -31,7 +31,7 @@ fn publisher_of(event: &Event) -> u32 {
 }
 
 /// Follows every publisher of every topic. Each counts its own messages from 1.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct SequenceCheck {
     /// Of the topics that one process publishes.
     topics: [Stream; Topic::ALL.len()],

@@ -10,7 +10,7 @@ use crate::over_time::{CONTROLLER, OverTimeCollector, PLANT};
 use crate::pose_errors::pose;
 
 /// Collects them.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Shown {
     pub(super) intervals: Intervals,
     pub(super) longest_cycles: LongestCycles,

@@ -125,7 +125,7 @@ impl Loss {
 }
 
 /// Follows the counters of one process.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Skips {
     pub(super) figures: SkipFigures,
     last_seq: u64,

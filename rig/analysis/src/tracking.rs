@@ -125,7 +125,7 @@ pub(super) struct PathSample {
 }
 
 /// Joins desired, estimated and, where there are any, true poses of the same sample.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Tracking {
     source: PoseSource,
     /// The incisal point in the platform frame.

@@ -10,7 +10,7 @@ use crate::series::{Extremes, Series};
 use crate::signals::Values;
 
 /// Judges bounds.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Bounds {
     of: Quantified,
     window: Window,

@@ -10,7 +10,7 @@ use super::window::Window;
 use crate::signals::Values;
 
 /// Judges a number of occurrences.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Count {
     trigger: Trigger,
     window: Window,

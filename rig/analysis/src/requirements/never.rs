@@ -10,7 +10,7 @@ use super::window::Window;
 use crate::signals::Values;
 
 /// Judges that something never happens.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Never {
     what: What,
     window: Window,
@@ -21,7 +21,7 @@ pub(super) struct Never {
     worst: Option<(f64, u64)>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 enum What {
     Condition(Condition),
     Occurrence(Trigger),

@@ -8,7 +8,7 @@ use super::trigger::Trigger;
 use crate::signals::Values;
 
 /// Judges the order of the first occurrences.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Order {
     /// Each with the time of its first occurrence, ns.
     steps: Vec<(Trigger, Option<u64>)>,

@@ -12,14 +12,14 @@ use super::response::Response;
 use crate::signals::Values;
 
 /// A requirement while the run is read.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Requirement {
     name: String,
     is_expected_event: bool,
     kind: Kind,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 enum Kind {
     Bounds(Box<Bounds>),
     Response(Box<Response>),

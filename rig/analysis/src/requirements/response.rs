@@ -21,7 +21,7 @@ use crate::signals::Values;
 const MOST_OPEN: usize = 1000;
 
 /// Judges responses.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Response {
     trigger: Trigger,
     then: Condition,

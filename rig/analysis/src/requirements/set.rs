@@ -33,7 +33,7 @@ use crate::signals::{Registry, Sample, Timeline, Values};
 /// assert_eq!(found[0].margin.map(f64::round), Some(10.0));
 /// # Ok::<(), masseter_shared::config::ScenarioError>(())
 /// ```
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Requirements {
     list: Vec<Requirement>,
     values: Values,
@@ -82,6 +82,12 @@ impl Requirements {
         list.extend(expected.map(|config| read(&config).into_expected_event()));
         let state = values.choose("controller.state").expect("every run has this signal");
         Self { list, values, timeline: Timeline::default(), row: Vec::new(), state, motion_ns: None }
+    }
+
+    /// The same for messages that come while the run goes on, each soon after its cycle.
+    #[must_use]
+    pub fn while_running(scenario: &Scenario, declared: &Declared) -> Self {
+        Self { timeline: Timeline::while_running(), ..Self::new(scenario, declared) }
     }
 
     /// Whether there are none: then nothing has to be taken.

@@ -1,7 +1,7 @@
 //! The share of its core that a loop takes, from the account of its time in its messages.
 
 /// Follows the account of a loop.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct CpuShare {
     last: Option<[u64; 2]>,
 }

@@ -3,6 +3,7 @@
 //! Values are SI numbers; states are their codes. A value that a cycle does not have is none, never a guess.
 
 use std::fmt;
+use std::sync::Arc;
 
 use masseter_shared::config::{Dimension, Scenario, Unit};
 use masseter_shared::geometry::{AXES, AXIS_NAMES, Pose};
@@ -15,7 +16,7 @@ use super::cycle::CycleMessages;
 use super::derived::{Jaw, JawPoint, desired, estimated, solution};
 
 /// How a signal's value follows from a cycle; none where the cycle does not have it.
-type Extract = Box<dyn Fn(&CycleMessages, &Start) -> Option<f64> + Send>;
+type Extract = Box<dyn Fn(&CycleMessages, &Start) -> Option<f64> + Send + Sync>;
 
 /// What some signals count from: the pose of the jaw in the first cycle of the motion.
 #[derive(Debug, Clone, Copy, Default)]
@@ -129,7 +130,7 @@ impl Registry {
         name: impl Into<String>,
         unit: &str,
         about: impl Into<String>,
-        extract: impl Fn(&CycleMessages) -> Option<f64> + Send + 'static,
+        extract: impl Fn(&CycleMessages) -> Option<f64> + Send + Sync + 'static,
     ) {
         self.add_from(name, unit, about, move |messages, _| extract(messages));
     }
@@ -139,7 +140,7 @@ impl Registry {
         name: impl Into<String>,
         unit: &str,
         about: impl Into<String>,
-        extract: impl Fn(&CycleMessages, &Start) -> Option<f64> + Send + 'static,
+        extract: impl Fn(&CycleMessages, &Start) -> Option<f64> + Send + Sync + 'static,
     ) {
         let shown = Unit::named(unit).unwrap_or_else(|| Dimension::One.si_unit());
         self.signals.push(NamedSignal {
@@ -158,7 +159,7 @@ impl Registry {
         name: impl Into<String>,
         about: &str,
         states: StateNames,
-        extract: impl Fn(&CycleMessages) -> Option<u32> + Send + 'static,
+        extract: impl Fn(&CycleMessages) -> Option<u32> + Send + Sync + 'static,
     ) {
         self.add(name, "", about, move |messages| extract(messages).map(f64::from));
         if let Some(signal) = self.signals.last_mut() {
@@ -396,9 +397,9 @@ fn drive_states() -> Vec<(&'static str, u32)> {
 }
 
 /// The values of chosen signals, cycle by cycle.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Values {
-    registry: Registry,
+    registry: Arc<Registry>,
     /// The places of the chosen signals.
     chosen: Vec<usize>,
     start: Start,
@@ -407,7 +408,7 @@ pub struct Values {
 impl Values {
     /// None chosen yet.
     pub fn new(registry: Registry) -> Self {
-        Self { registry, chosen: Vec::new(), start: Start::default() }
+        Self { registry: Arc::new(registry), chosen: Vec::new(), start: Start::default() }
     }
 
     /// Chooses the signal of that name; returns its place among the chosen ones.

@@ -13,6 +13,8 @@ use crate::events::EventRecord;
 
 /// Cycles kept; more than a subscriber's queue holds of any topic.
 const KEPT: usize = 1 << 13;
+/// Cycles kept while the run goes on: more than come between two looks of the recorder.
+const KEPT_WHILE_RUNNING: usize = 1 << 8;
 
 /// A cycle whose messages are complete.
 #[derive(Debug, Clone)]
@@ -28,8 +30,9 @@ pub struct Sample {
 }
 
 /// Joins the messages of each cycle.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone)]
 pub struct Timeline {
+    kept: usize,
     cycles: VecDeque<CycleMessages>,
     /// Events that were not handed out yet.
     events: Vec<EventRecord>,
@@ -42,7 +45,33 @@ pub struct Timeline {
     is_closed: bool,
 }
 
+impl Default for Timeline {
+    fn default() -> Self {
+        Self::keeping(KEPT)
+    }
+}
+
 impl Timeline {
+    /// For messages that come soon after their cycle: a message that comes 256
+    /// cycles late is left out.
+    pub fn while_running() -> Self {
+        Self::keeping(KEPT_WHILE_RUNNING)
+    }
+
+    fn keeping(kept: usize) -> Self {
+        Self {
+            kept,
+            cycles: VecDeque::new(),
+            events: Vec::new(),
+            parameters: None,
+            controller_cpu: CpuShare::default(),
+            plant_cpu: CpuShare::default(),
+            newest_reading: 0,
+            last_ns: 0,
+            is_closed: false,
+        }
+    }
+
     /// Takes a message of a cycle; hands out a cycle that is complete now.
     pub fn take(&mut self, message: &Recorded) -> Option<Sample> {
         match message {
@@ -55,7 +84,7 @@ impl Timeline {
             Recorded::Parameters(parameters) => self.at(parameters.cycle)?.parameters = Some(*parameters),
             Recorded::Event(_) | Recorded::Frame(_) | Recorded::Machine(_) => {}
         }
-        if self.cycles.len() > KEPT { self.hand_out() } else { None }
+        if self.cycles.len() > self.kept { self.hand_out() } else { None }
     }
 
     /// A state belongs to the sample that it was computed from, which may be late. Without a new sample it belongs to its own
