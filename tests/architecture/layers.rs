@@ -5,7 +5,7 @@ use std::path::Path;
 use super::workspace::{list, metadata, text, within};
 
 /// The crates of the workspace that each crate may use, all by their folders. The root package may use all.
-const MAY_USE: [(&str, &[&str]); 16] = [
+const MAY_USE: [(&str, &[&str]); 17] = [
     ("shared/can", &[]),
     ("shared", &["shared/can"]),
     ("controller", &["shared/can", "shared"]),
@@ -14,6 +14,7 @@ const MAY_USE: [(&str, &[&str]); 16] = [
     ("plant", &["shared/can", "shared"]),
     ("rig/terminal", &[]),
     ("rig/charts", &[]),
+    ("rig/page", &[]),
     ("rig/table", &[]),
     ("rig/plan", &["shared", "controller", "plant"]),
     ("rig/recording", &["shared"]),
@@ -27,6 +28,7 @@ const MAY_USE: [(&str, &[&str]); 16] = [
             "rig/recording",
             "rig/analysis",
             "rig/charts",
+            "rig/page",
             "rig/terminal",
         ],
     ),

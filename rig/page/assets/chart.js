@@ -1,0 +1,326 @@
+// Draws a chart as SVG: axes, curves, limits, moments, cursor and legend. Colours and strokes are those of the style sheet.
+{
+  const { element, svg } = Masseter;
+  const ROOM = { left: 62, right: 16, top: 8, below: 38 };
+  const SMALL = { left: 2, right: 2, top: 3, below: 3 };
+  // Height of a row of names above the plot, and width of a letter, px.
+  const ROW = 16, LETTER = 6.4;
+  // A limit further from the curves than this many times their height is written, not drawn.
+  const FAR = 1.5;
+  const PALETTE = 8;
+  const OWN_COLOUR = { desired: 'desired', true: 'true', estimated: 'estimated' };
+  const all = new Set();
+  let clips = 0;
+
+  // A view of another quantity than time: it has a cursor of its own and no zoom.
+  function ownView(changed) {
+    return {
+      window: [0, 1],
+      cursor: null,
+      isPlaying: false,
+      seek(at) { this.cursor = at === null ? null : Math.min(this.window[1], Math.max(this.window[0], at)); changed(); },
+      zoom() {}, zoomAbout() {}, reset() {}, play() {},
+      text: (at) => `${Masseter.significant(100 - 100 / at, 6)} %`,
+    };
+  }
+
+  function prepared(series, place, plainBefore) {
+    const { xs, ys } = Masseter.points(series.points || []);
+    const number = series.colour ?? plainBefore;
+    const own = series.colour === undefined && OWN_COLOUR[series.style];
+    const stroke = own ? `var(--${own})` : `var(--c${number % PALETTE})`;
+    const isSecond = !own && number >= PALETTE;
+    return { name: series.name, style: series.style, xs, ys, stroke, isSecond, isShown: true, place };
+  }
+
+  function preparedAll(data) {
+    let plain = 0;
+    return data.series.map((series, place) => {
+      const next = prepared(series, place, plain);
+      if (series.style === 'plain' && series.colour === undefined) plain += 1;
+      return next;
+    });
+  }
+
+  const strokeOf = (series) => ({ class: `curve ${series.style}${series.isSecond ? ' second' : ''}`, style: `--c:${series.stroke}` });
+
+  // The lowest and the highest value of shown curves in a window.
+  function extremes(shown, window, isLog) {
+    let low = Infinity, high = -Infinity;
+    const take = (value) => {
+      if (value === null || (isLog && value <= 0)) return;
+      low = Math.min(low, value);
+      high = Math.max(high, value);
+    };
+    for (const series of shown) {
+      const [first, end] = [Masseter.placeOf(series.xs, window[0]), Masseter.placeOf(series.xs, window[1])];
+      for (let at = first; at < end; at += 1) take(series.ys[at]);
+      window.forEach((x) => take(Masseter.valueAt(series, x)));
+    }
+    return low <= high ? [low, high] : null;
+  }
+
+  // The ends of the vertical axis, and the limits that lie near enough.
+  function fitted(found, limits, isLog) {
+    let [low, high] = found;
+    const far = FAR * Math.max(high - low, 1e-9 * Math.abs(high));
+    const isNear = (value) => isLog || (value >= low - far && value <= high + far);
+    const near = limits.flatMap(({ name, values }) => values.filter(isNear).map((value) => ({ name, value })));
+    const beyond = limits.map(({ name, values }) => ({ name, values: values.filter((value) => !isNear(value)) }))
+      .filter(({ values }) => values.length);
+    for (const { value } of near) { low = Math.min(low, value); high = Math.max(high, value); }
+    if (isLog) return { ends: [low / 1.3, high * 1.3], near, beyond };
+    const margin = Math.max(0.06 * (high - low), 1e-9 * Math.max(Math.abs(low), Math.abs(high)), 1e-12);
+    return { ends: [low - margin, high + margin], near, beyond };
+  }
+
+  // Gives each moment in the window a row above the plot, so that no two names cover each other.
+  function placed(moments, window, axis, right) {
+    const ends = [];
+    return moments.filter(({ at_s: at }) => at >= window[0] && at <= window[1]).sort((a, b) => a.at_s - b.at_s).map((moment) => {
+      const x = axis.position(moment.at_s), width = moment.name.length * LETTER + 10;
+      const isLeft = x + width > right;
+      const from = isLeft ? x - width : x;
+      let row = ends.findIndex((end) => end <= from);
+      if (row < 0) row = ends.push(0) - 1;
+      ends[row] = from + width;
+      return { ...moment, x, row, isLeft };
+    });
+  }
+
+  Masseter.chart = (holder, data, clock, isSmall = false) => {
+    const isTime = data.across === 'time', isLogX = data.across === 'percentile', isLog = data.scale === 'log';
+    const view = isTime ? clock : ownView(() => moveCursor());
+    const clip = `clip-${clips += 1}`;
+    let series = preparedAll(data), plot = null, isDirty = true, isVisible = true, isWaiting = false, isUnderPointer = false;
+
+    const label = data.unit ? `${data.title}, ${data.unit}` : data.title;
+    const drawing = svg('svg', isSmall ? { role: 'img' } : { tabindex: 0, role: 'application', 'aria-roledescription': 'chart' });
+    const legend = element('div', { class: 'legend' }), words = element('p', { class: 'beyond' });
+    const chart = {
+      data, view, drawing, label, isTime,
+      get series() { return series; },
+      get plot() { return plot; },
+      get isShowing() { return series.some(({ xs }) => xs.length); },
+      // The values under the cursor in a sentence.
+      spoken() {
+        const values = series.filter(({ isShown }) => isShown).map((one) => [one.name, Masseter.valueAt(one, view.cursor)]);
+        return [view.text(view.cursor), ...values.filter(([, value]) => value !== null).map(([name, value]) => `${name} ${valueText(value)}`)].join(', ');
+      },
+      setPointer(is) { isUnderPointer = is; moveCursor(); },
+      redraw,
+      draw,
+    };
+
+    function summary() {
+      const ranges = series.filter(({ ys }) => ys.length).map(({ name, ys }) => {
+        const [low, high] = ys.reduce(([least, most], y) => [Math.min(least, y), Math.max(most, y)], [Infinity, -Infinity]);
+        return `${name} from ${Masseter.significant(low)} to ${Masseter.significant(high)} ${data.unit}`;
+      });
+      return ranges.length ? `${data.title}. ${ranges.join('; ')}. Arrow keys move the cursor.` : `${data.title}. ${data.otherwise}`;
+    }
+
+    // Draws in the next frame, or once the chart is seen.
+    function redraw() {
+      isDirty = true;
+      if (isWaiting || !isVisible) return;
+      isWaiting = true;
+      requestAnimationFrame(() => { isWaiting = false; if (isDirty && isVisible) draw(); });
+    }
+
+    function draw() {
+      isDirty = false;
+      const width = Math.round(holder.clientWidth) || 640;
+      const window = isTime ? clock.window : ownWindow();
+      const shown = series.filter(({ isShown }) => isShown);
+      const found = extremes(shown, window, isLog);
+      if (!isTime) view.window = window;
+      drawing.replaceChildren();
+      words.textContent = '';
+      if (!found) {
+        const height = isSmall ? data.height : 48;
+        size(width, height);
+        plot = null;
+        drawing.append(svg('text', { x: isSmall ? 4 : ROOM.left, y: height / 2 + 4, class: 'empty' }, chart.isShowing ? 'Nothing in this stretch.' : data.otherwise));
+        return;
+      }
+      const room = isSmall ? SMALL : ROOM;
+      const { ends, near, beyond } = fitted(found, data.limits || [], isLog);
+      const right = width - room.right;
+      const x = Masseter.axis(isLogX, window, [room.left, right]);
+      const moments = isTime ? placed([...(isSmall ? [] : Masseter.moments), ...(data.moments || [])], window, x, right) : [];
+      const top = room.top + (isSmall ? 0 : ROW * Math.max(0, ...moments.map(({ row }) => row + 1)));
+      const bottom = top + data.height;
+      const y = Masseter.axis(isLog, ends, [bottom, top]);
+      plot = { x, y, left: room.left, right, top, bottom, window };
+      size(width, bottom + room.below);
+      drawing.append(svg('clipPath', { id: clip }, svg('rect', { x: room.left, y: top, width: right - room.left, height: data.height })));
+      if (!isSmall) drawing.append(...grid(width));
+      drawing.append(svg('g', { 'clip-path': `url(#${clip})` }, ...near.map(level), ...shown.map(curve)));
+      if (!isSmall) drawing.append(...near.map(levelName));
+      drawing.append(...moments.map(mark), svg('g', { class: 'cursor' }));
+      if (beyond.length) words.textContent = `Not in the picture: ${beyond.map(inWords).join('; ')}.`;
+      moveCursor();
+    }
+
+    function ownWindow() {
+      const xs = series.flatMap((one) => [one.xs[0], one.xs[one.xs.length - 1]]).filter((x) => x !== undefined);
+      return xs.length ? [Math.min(...xs), Math.max(...xs)] : [0, 1];
+    }
+
+    function size(width, height) {
+      drawing.setAttribute('viewBox', `0 0 ${width} ${height}`);
+      drawing.setAttribute('width', width);
+      drawing.setAttribute('height', height);
+    }
+
+    function grid(width) {
+      const { x, y, left, right, top, bottom, window } = plot;
+      const many = Math.max(3, Math.floor((right - left) / 90)), few = Math.max(3, Math.floor(data.height / 40));
+      const across = isTime ? clock.ticks(window, many) : isLogX ? Masseter.percentileTicks(window) : Masseter.linearTicks(window, many);
+      const up = isLog ? Masseter.logTicks(y.ends, few) : Masseter.linearTicks(y.ends, few);
+      const vertical = across.map(({ value, text }) => [
+        svg('line', { x1: x.position(value), x2: x.position(value), y1: top, y2: bottom, class: 'mesh' }),
+        svg('text', { x: x.position(value), y: bottom + 16, class: 'tick', 'text-anchor': 'middle' }, text)]);
+      const horizontal = up.map(({ value, text }) => [
+        svg('line', { x1: left, x2: right, y1: y.position(value), y2: y.position(value), class: 'mesh' }),
+        svg('text', { x: left - 6, y: y.position(value) + 4, class: 'tick', 'text-anchor': 'end' }, text)]);
+      const name = isTime ? clock.label : isLogX ? 'percentile' : data.across.values;
+      return [...vertical.flat(), ...horizontal.flat(), svg('rect', { x: left, y: top, width: right - left, height: bottom - top, class: 'frame' }),
+        svg('text', { x: width - ROOM.right, y: bottom + 32, class: 'tick', 'text-anchor': 'end' }, name)];
+    }
+
+    function curve(one) {
+      const { x, y, window } = plot;
+      const points = Masseter.thinned(one, window, x.position, plot.right - plot.left)
+        .filter((at) => !isLog || one.ys[at] > 0)
+        .map((at) => `${x.position(one.xs[at]).toFixed(1)} ${y.position(one.ys[at]).toFixed(1)}`);
+      return svg('path', { ...strokeOf(one), d: points.length ? `M${points.join('L')}` : '' });
+    }
+
+    function level({ value }) {
+      const at = plot.y.position(value);
+      return svg('line', { x1: plot.left, x2: plot.right, y1: at, y2: at, class: 'limit' });
+    }
+
+    function levelName({ name, value }) {
+      const at = plot.y.position(value), isHigh = at - plot.top < 18;
+      return svg('text', { x: plot.right - 4, y: at + (isHigh ? 13 : -4), class: 'limit-name', 'text-anchor': 'end' },
+        `${name} ${Masseter.significant(value)} ${data.unit}`);
+    }
+
+    const inWords = ({ name, values }) => `${name} ${values.map((value) => Masseter.significant(value)).join(' and ')} ${data.unit}`.trim();
+
+    function mark({ x, row, kind, name, text, isLeft }) {
+      const from = isSmall ? plot.top : ROOM.top + ROW * row;
+      const side = isLeft ? -5 : 5;
+      return svg('g', { class: `moment ${kind}` }, svg('title', {}, text),
+        svg('line', { x1: x, x2: x, y1: from, y2: plot.bottom }),
+        ...(isSmall ? [] : [svg('text', { x: x + side, y: from + 11, 'text-anchor': isLeft ? 'end' : 'start' }, name)]));
+    }
+
+    // The line of the cursor, a dot on each curve, the values in the legend and, under the pointer, in a box.
+    function moveCursor() {
+      const group = drawing.querySelector('.cursor');
+      const at = view.cursor;
+      const isInside = plot && group && at !== null && at >= plot.window[0] && at <= plot.window[1];
+      if (group) group.replaceChildren();
+      const shown = series.filter(({ isShown }) => isShown);
+      const values = shown.map((one) => (isInside ? Masseter.valueAt(one, at) : null));
+      if (!isSmall) writeLegendValues(shown, values);
+      if (!isInside) return;
+      const x = plot.x.position(at);
+      group.append(svg('line', { x1: x, x2: x, y1: plot.top, y2: plot.bottom }));
+      if (isSmall) return;
+      values.forEach((value, place) => {
+        if (value === null || (isLog && value <= 0)) return;
+        group.append(svg('circle', { cx: x, cy: plot.y.position(value), r: 3, style: `fill:${shown[place].stroke}` }));
+      });
+      if (isUnderPointer) group.append(box(x, shown, values));
+    }
+
+    const decimals = () => (plot ? Math.max(0, 3 - Math.floor(Math.log10(plot.y.ends[1] - plot.y.ends[0]))) : 3);
+    const valueText = (value) => `${isLog ? Masseter.significant(value) : Masseter.fixed(value, Math.min(6, decimals()))} ${data.unit}`.trim();
+
+    function box(x, shown, values) {
+      const lines = [view.text(view.cursor), ...shown.map((one, place) => (values[place] === null ? null : `${one.name}  ${valueText(values[place])}`))]
+        .filter((line) => line !== null);
+      const width = Math.max(...lines.map((line) => line.length)) * LETTER + 14, height = lines.length * 15 + 8;
+      const left = x + 10 + width > plot.right ? x - 10 - width : x + 10;
+      const top = plot.top + 4;
+      return svg('g', { class: 'box' }, svg('rect', { x: left, y: top, width, height, rx: 4 }),
+        ...lines.map((line, at) => svg('text', { x: left + 7, y: top + 16 + at * 15, class: at ? '' : 'time' }, line)));
+    }
+
+    function writeLegendValues(shown, values) {
+      for (const entry of legend.querySelectorAll('[data-place]')) {
+        const at = shown.findIndex(({ place }) => place === Number(entry.dataset.place));
+        entry.querySelector('.value').textContent = at >= 0 && values[at] !== null && values[at] !== undefined ? valueText(values[at]) : '';
+      }
+    }
+
+    function writeLegend() {
+      legend.replaceChildren(...series.map((one) => element('button', {
+        type: 'button', 'data-place': one.place, 'aria-pressed': String(one.isShown), title: `Show or hide ${one.name}`,
+        onclick: () => { one.isShown = !one.isShown; writeLegend(); redraw(); },
+      }, svg('svg', { width: 28, height: 12, 'aria-hidden': 'true' }, svg('path', { ...strokeOf(one), d: 'M2 6H26' })),
+      element('span', {}, one.name), element('span', { class: 'value' }))));
+      drawing.setAttribute('aria-label', summary());
+      moveCursor();
+    }
+
+    if (isSmall) {
+      holder.append(drawing);
+      drawing.setAttribute('aria-label', summary());
+    } else {
+      holder.append(element('figcaption', {}, element('h3', {}, label), Masseter.chartMenu(chart)), legend, drawing, words);
+      writeLegend();
+      Masseter.gestures(chart);
+    }
+    if (isTime) {
+      clock.on('window', redraw);
+      clock.on('mode', redraw);
+      clock.on('cursor', () => { if (isVisible) moveCursor(); });
+    }
+    new IntersectionObserver(([entry]) => { isVisible = entry.isIntersecting; if (isVisible && isDirty) redraw(); }, { rootMargin: '300px' })
+      .observe(holder);
+    new ResizeObserver(([entry]) => { if (plot === null || Math.abs(entry.contentRect.width - drawing.viewBox.baseVal.width) > 1) redraw(); })
+      .observe(holder);
+    all.add(chart);
+    draw();
+
+    return {
+      // Adds points to a curve, x, y, x, y …; a curve of a new name is a plain one.
+      append(name, points) {
+        let one = series.find((known) => known.name === name);
+        if (!one) {
+          data.series.push({ name, style: 'plain', points: [] });
+          series.push(one = prepared({ name, style: 'plain' }, series.length, series.length));
+          writeLegend();
+        }
+        const { xs, ys } = Masseter.points(points);
+        one.xs.push(...xs);
+        one.ys.push(...ys);
+        redraw();
+      },
+      // Takes the place of the whole chart.
+      update(next) {
+        Object.assign(data, next);
+        const hidden = new Set(series.filter(({ isShown }) => !isShown).map(({ name }) => name));
+        series = preparedAll(data);
+        series.forEach((one) => { one.isShown = !hidden.has(one.name); });
+        if (!isSmall) writeLegend();
+        redraw();
+      },
+    };
+  };
+
+  Masseter.block('chart', (holder, data, clock) => {
+    const figure = element('figure', { class: 'chart' });
+    holder.append(figure);
+    return Masseter.chart(figure, data, clock);
+  });
+
+  // Paper shows what no screen has shown yet, at its own width.
+  Masseter.drawAll = () => all.forEach((chart) => chart.draw());
+}

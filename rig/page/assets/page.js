@@ -1,0 +1,82 @@
+// Builds the page from its data, and lets a run that goes on add to it.
+{
+  const { element } = Masseter;
+  const page = JSON.parse(document.getElementById('data').textContent);
+  const clock = Masseter.clock(page.time);
+  const MODES = { motion: 'motion time', cycle: 'cycle', wall: 'wall time' };
+  const spoken = element('p', { class: 'spoken', 'aria-live': 'polite' });
+
+  Masseter.time = clock;
+  Masseter.page = page;
+  Masseter.moments = page.moments;
+  Masseter.phases = page.phases;
+  // What a screen reader says.
+  Masseter.say = (text) => { spoken.textContent = text; };
+
+  // The four ways in which a run that goes on changes the page. Unknown ids and contents without the method are left alone.
+  // Adds points to a series of a chart, or whatever the block's content takes.
+  Masseter.append = (id, series, points) => Masseter.handles.get(id)?.append?.(series, points);
+  // Replaces the content of a block.
+  Masseter.update = (id, data) => Masseter.handles.get(id)?.update?.(data);
+  // Adds a moment, which all charts over time mark.
+  Masseter.mark = (moment) => { Masseter.moments.push(moment); clock.setMode(clock.mode); };
+  // The controller enters a state.
+  Masseter.enter = (name, at) => {
+    const last = Masseter.phases[Masseter.phases.length - 1];
+    if (last) last.to_s = at;
+    Masseter.phases.push({ name, from_s: at, to_s: at });
+  };
+
+  function build({ id, kind, data }) {
+    const holder = element('div', { id, class: `block ${kind}` });
+    return [holder, () => {
+      const handle = Masseter.builders[kind]?.(holder, data, clock);
+      if (handle) Masseter.handles.set(id, handle);
+    }];
+  }
+
+  function section({ id, title, blocks }) {
+    const built = blocks.map(build);
+    document.getElementById('sections').append(element('section', { id: `section-${id}`, 'aria-labelledby': `title-${id}` },
+      element('h2', { id: `title-${id}` }, title), ...built.map(([holder]) => holder)));
+    return built.map(([, start]) => start);
+  }
+
+  function timeBar() {
+    const play = element('button', { type: 'button', class: 'play', 'aria-label': 'play', onclick: () => clock.play(!clock.isPlaying) }, '▶');
+    const slider = element('input', { type: 'range', min: 0, max: 1, step: 'any', value: 0, 'aria-label': 'time', oninput: () => {
+      clock.play(false);
+      const [from, to] = clock.window;
+      clock.seek(from + Number(slider.value) * (to - from));
+    } });
+    const now = element('output', {}, '–');
+    const mode = element('select', { 'aria-label': 'how times are shown', onchange: () => clock.setMode(mode.value) },
+      ...clock.modes.map((name) => element('option', { value: name }, MODES[name])));
+    const whole = element('button', { type: 'button', class: 'whole', onclick: () => clock.reset() }, 'whole run');
+    const show = () => {
+      const [from, to] = clock.window, at = clock.cursor;
+      slider.value = at === null ? 0 : (at - from) / (to - from);
+      now.textContent = at === null ? '–' : clock.text(at);
+      slider.setAttribute('aria-valuetext', now.textContent);
+      whole.disabled = !clock.isZoomed;
+    };
+    ['cursor', 'window', 'mode', 'range'].forEach((what) => clock.on(what, show));
+    clock.on('play', () => {
+      play.textContent = clock.isPlaying ? '❚❚' : '▶';
+      play.setAttribute('aria-label', clock.isPlaying ? 'pause' : 'play');
+    });
+    document.getElementById('time-bar').append(play, slider, now, mode, whole);
+    show();
+  }
+
+  document.getElementById('top').append(element('h1', {}, page.title), spoken);
+  document.getElementById('sections').replaceChildren();
+  const starts = page.sections.flatMap(section);
+  const links = page.sections.slice(1).map(({ id, title }) => element('a', { href: `#section-${id}` }, title));
+  const first = document.querySelector('#sections > section');
+  if (first) first.after(element('nav', { 'aria-label': 'Sections' }, ...links));
+  timeBar();
+  starts.forEach((start) => start());
+  addEventListener('beforeprint', Masseter.drawAll);
+  document.documentElement.dataset.ready = 'yes';
+}

@@ -1,0 +1,207 @@
+//! Sections and their blocks. Text in them may mark `code` with backticks.
+
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::chart::Chart;
+use crate::time::Moment;
+
+/// A section of the page.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Section {
+    /// Unique in the page.
+    pub id: String,
+    /// The heading.
+    pub title: String,
+    /// In its order.
+    pub blocks: Vec<Block>,
+}
+
+impl Section {
+    /// A section of these blocks.
+    #[must_use]
+    pub fn new(id: &str, title: &str, blocks: Vec<Block>) -> Self {
+        Self { id: id.to_owned(), title: title.to_owned(), blocks }
+    }
+}
+
+/// A part of a section.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Block {
+    /// Unique in the page: a live view changes the block by it.
+    pub id: String,
+    /// What it shows.
+    #[serde(flatten)]
+    pub content: Content,
+}
+
+impl Block {
+    /// A block of this id.
+    #[must_use]
+    pub fn new(id: impl Into<String>, content: Content) -> Self {
+        Self { id: id.into(), content }
+    }
+
+    /// A chart.
+    #[must_use]
+    pub fn chart(id: impl Into<String>, chart: Chart) -> Self {
+        Self::new(id, Content::Chart(Box::new(chart)))
+    }
+
+    /// A table.
+    #[must_use]
+    pub fn table(id: impl Into<String>, table: Table) -> Self {
+        Self::new(id, Content::Table(table))
+    }
+
+    /// A paragraph.
+    #[must_use]
+    pub fn text(id: impl Into<String>, text: impl Into<String>) -> Self {
+        Self::new(id, Content::Text(text.into()))
+    }
+}
+
+/// What a block shows. A script of the page draws each kind: `Masseter.block(kind, build)`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "kind", content = "data", rename_all = "snake_case")]
+pub enum Content {
+    /// A paragraph.
+    Text(String),
+    /// The judgement.
+    Verdict(Verdict),
+    /// Rows and columns.
+    Table(Table),
+    /// Curves.
+    Chart(Box<Chart>),
+    /// What happened when.
+    Events(Events),
+    /// A drawing as SVG, and what it shows.
+    Picture {
+        /// The drawing.
+        svg: String,
+        /// What it shows, for those who cannot see it.
+        label: String,
+    },
+    /// The mechanism in three dimensions; `scene.js` knows the data.
+    Scene(Value),
+    /// The views of the jaw; `jaw.js` knows the data.
+    Jaw(Value),
+}
+
+/// Whether something is as it should be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Tone {
+    /// It is.
+    Good,
+    /// It may not be.
+    Doubtful,
+    /// It is not.
+    Bad,
+    /// It is not judged.
+    Plain,
+}
+
+/// The judgement of a run: of its function, and of its timing.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Verdict {
+    /// The outcome in a word.
+    pub word: String,
+    /// The reason in a sentence.
+    pub reason: String,
+    /// The outcome as a colour.
+    pub tone: Tone,
+    /// The timing in a word.
+    pub timing: String,
+    /// More on the timing; may be empty.
+    pub timing_reason: String,
+    /// The timing as a colour.
+    pub timing_tone: Tone,
+    /// Figures that matter most, each with its name.
+    pub figures: Vec<[String; 2]>,
+}
+
+/// A column of a table.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Column {
+    /// The heading.
+    pub title: String,
+    /// Whether it holds numbers, which stand at the right.
+    pub is_number: bool,
+}
+
+impl Column {
+    /// Of text.
+    #[must_use]
+    pub fn text(title: &str) -> Self {
+        Self { title: title.to_owned(), is_number: false }
+    }
+
+    /// Of numbers.
+    #[must_use]
+    pub fn number(title: &str) -> Self {
+        Self { title: title.to_owned(), is_number: true }
+    }
+}
+
+/// A cell of a table.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Cell {
+    /// Text or a number in words.
+    Text(String),
+    /// A word that judges.
+    Mark {
+        /// The word.
+        mark: String,
+        /// Its colour.
+        tone: Tone,
+    },
+    /// A small plot.
+    Plot {
+        /// The chart.
+        plot: Box<Chart>,
+    },
+}
+
+impl<T: Into<String>> From<T> for Cell {
+    fn from(text: T) -> Self {
+        Self::Text(text.into())
+    }
+}
+
+/// A table.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Table {
+    /// What it holds, for those who cannot see it.
+    pub label: String,
+    /// From left to right.
+    pub columns: Vec<Column>,
+    /// As many cells each as columns.
+    pub rows: Vec<Vec<Cell>>,
+}
+
+/// The events of a run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Events {
+    /// The events of the start, which are folded.
+    pub start: Vec<EventRow>,
+    /// All others.
+    pub rest: Vec<EventRow>,
+}
+
+/// An event.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EventRow {
+    /// When, s since the first SYNC.
+    pub at_s: f64,
+    /// Who reported it.
+    pub source: String,
+    /// Whether it is a fault.
+    pub is_fault: bool,
+    /// What happened.
+    pub text: String,
+}
+
+/// The moments of a run, which all charts over time mark.
+pub type Moments = Vec<Moment>;
