@@ -19,7 +19,6 @@ use crate::figures::Figures;
 use crate::freshness::Freshness;
 use crate::named::NamedWatch;
 use crate::outage::OutageWatch;
-use crate::pose_errors::pose;
 use crate::requirements::Requirements;
 use crate::response::Responses;
 use crate::scenario_stalls::ScenarioStalls;
@@ -54,8 +53,6 @@ pub struct Analysis {
     period_ns: u64,
     declared: Declared,
     named: NamedWatch,
-    /// Whether the mechanism is emulated, so that its true motion is recorded.
-    has_truth: bool,
     /// None where nothing is shown.
     shown: Option<Box<Shown>>,
     /// None but in a dry run.
@@ -94,7 +91,6 @@ impl Analysis {
             period_ns,
             declared: declared.clone(),
             named: NamedWatch::new(declared),
-            has_truth: is_emulated,
             shown: Some(Box::new(Shown::new(scenario))),
             axes: scenario.dry.is_on.then(|| AxisWatch::new(scenario)),
             tracking: Tracking::new(
@@ -218,10 +214,6 @@ impl Analysis {
         if let Some(requirements) = self.requirements.as_mut().filter(|_| is_disturbed) {
             requirements.disturb(state.cycle);
         }
-        if let Some(shown) = self.shown.as_mut().filter(|_| is_fresh && !self.has_truth) {
-            let estimated = pose(state.estimated_position_m, state.estimated_quaternion_wxyz);
-            shown.over_time.actual(state.sampled_ns, estimated.as_ref());
-        }
         self.tracking.state(state, is_fresh, is_disturbed).into_iter().for_each(|sample| self.path(sample));
         self.cycles = self.cycles.max(state.seq);
         self.final_state = Some(state.controller_state.into());
@@ -269,7 +261,7 @@ impl Analysis {
             topics.iter().find(|topic| topic.topic == FrameTap::TOPIC).map_or(0, |topic| topic.missing);
         let (signals, parameters) = self.named.finish();
         let (intervals, worst_cycles, over_time) = self.shown.map_or_else(Default::default, |shown| {
-            let Shown { intervals, longest_cycles, over_time } = *shown;
+            let Shown { intervals, longest_cycles, over_time, .. } = *shown;
             (intervals.finish(), longest_cycles.finish(), over_time.finish(self.declared.signals.len()))
         });
         self.events.sort_by_key(|event| event.time_ns);

@@ -35,6 +35,7 @@ mod series;
 mod shown;
 pub mod signals;
 mod skips;
+mod smoothing;
 mod tracking;
 
 pub use analysis::Analysis;

@@ -3,9 +3,10 @@
 use masseter_can::Tapped;
 use masseter_can::{Bitrate, wire};
 use masseter_shared::geometry::{AXES, Pose, Vec3};
-use masseter_shared::messages::{MOST_VALUES, Signals, Truth};
+use masseter_shared::messages::{MOST_VALUES, Reading, Signals, Truth};
 
 use super::series::{Curve, Extremes, Series};
+use super::smoothing::Smoothing;
 use super::tracking::PathSample;
 
 /// A run over time, from the first message to the last: seconds since its first SYNC, and the lowest and the highest value
@@ -14,14 +15,21 @@ use super::tracking::PathSample;
 pub struct OverTime {
     /// The instant that curves count from, ns of the run's clock.
     pub began_ns: u64,
+    /// The sample with which the motion began: the first of the controller's state `running`, ns of the run's clock; none
+    /// where the motion never began.
+    pub motion_began_ns: Option<u64>,
     /// When the last value came, s.
     pub duration_s: f64,
     /// Place of the incisal point along x, y and z of the base while it has a desired one, m.
     pub desired_incisal_m: [Curve; 3],
     /// The same of the actual pose of the platform, in the whole run.
     pub actual_incisal_m: [Curve; 3],
+    /// The same of the pose that forward kinematics found; without truth it is the actual one.
+    pub estimated_incisal_m: [Curve; 3],
     /// Largest distance of the incisal point from its desired place, m.
     pub distance_m: Curve,
+    /// Largest angle of the platform from its desired orientation, rad.
+    pub angle_rad: Curve,
     /// Latest wake-up of the controller in each stretch, ns late.
     pub controller_late_ns: Curve,
     /// Latest wake-up of the plant in each stretch, ns late.
@@ -32,6 +40,8 @@ pub struct OverTime {
     pub velocity_m_s: [Curve; AXES],
     /// Force of each actuator, N.
     pub force_n: [Curve; AXES],
+    /// Its moving mean over 20 ms.
+    pub smooth_force_n: [Curve; AXES],
     /// Vertical force of food and upper teeth on the jaw, N.
     pub bite_force_n: Curve,
     /// Share of each bus in use, 0 to 1.
@@ -47,20 +57,36 @@ pub(super) struct OverTimeCollector {
     lasted_ns: u64,
     /// The incisal point in the platform frame.
     incisal_m: [f64; 3],
-    jaw: Series<Extremes<{ DISTANCE + 1 }>>,
+    motion_began_ns: Option<u64>,
+    jaw: Series<Extremes<{ ANGLE + 1 }>>,
     late: Series<Extremes<2>>,
     /// Of the axes, and the bite force.
-    axes: Series<Extremes<{ 3 * AXES + 1 }>>,
+    axes: Series<Extremes<{ BITE_FORCE + 1 }>>,
+    smoothing: Smoothing<AXES>,
+    smooth_force_n: Series<Extremes<AXES>>,
     /// Time that frames took on each bus.
     busy_ns: Vec<Series<u64>>,
     signals: Series<Extremes<MOST_VALUES>>,
     bitrate: Option<Bitrate>,
 }
 
-/// Indices of the incisal point's place along x, y and z, desired and actual, and of the distance between the two.
+/// Indices of the incisal point's place along x, y and z, desired, actual and estimated; of the distance and of the angle
+/// between desired and actual.
 const DESIRED: usize = 0;
 const ACTUAL: usize = 3;
-const DISTANCE: usize = 6;
+const ESTIMATED: usize = 6;
+const DISTANCE: usize = 9;
+const ANGLE: usize = 10;
+
+/// Quantities of the axes.
+const POSITION: usize = 0;
+const VELOCITY: usize = 1;
+const FORCE: usize = 2;
+/// Index of the bite force behind the values of the axes.
+const BITE_FORCE: usize = 3 * AXES;
+
+/// Time over which the load of a bus is a share, ns.
+const LOAD_WIDTH_NS: u64 = 10_000_000;
 
 /// Indices of the two processes.
 pub(super) const CONTROLLER: usize = 0;
@@ -88,6 +114,7 @@ impl OverTimeCollector {
     pub(super) fn path(&mut self, sample: &PathSample) {
         let since_ns = self.since(sample.sampled_ns);
         self.jaw.take(since_ns, DISTANCE, sample.deviation.incisal_m);
+        self.jaw.take(since_ns, ANGLE, sample.deviation.angle_rad);
         self.incisal(since_ns, DESIRED, sample.desired.as_ref());
     }
 
@@ -95,6 +122,17 @@ impl OverTimeCollector {
     pub(super) fn actual(&mut self, sampled_ns: u64, pose: Option<&Pose>) {
         let since_ns = self.since(sampled_ns);
         self.incisal(since_ns, ACTUAL, pose);
+    }
+
+    /// The pose that forward kinematics found.
+    pub(super) fn estimated(&mut self, sampled_ns: u64, pose: Option<&Pose>) {
+        let since_ns = self.since(sampled_ns);
+        self.incisal(since_ns, ESTIMATED, pose);
+    }
+
+    /// The motion plays in this sample.
+    pub(super) fn running(&mut self, sampled_ns: u64) {
+        self.motion_began_ns.get_or_insert(sampled_ns);
     }
 
     fn incisal(&mut self, since_ns: u64, first: usize, pose: Option<&Pose>) {
@@ -108,10 +146,30 @@ impl OverTimeCollector {
 
     pub(super) fn truth(&mut self, truth: &Truth) {
         let since_ns = self.since(truth.sampled_ns);
-        let values = [truth.joint_m, truth.joint_m_s, truth.force_n];
-        let bite_force_n = [truth.bite_force_n];
-        for (index, value) in values.into_iter().flatten().chain(bite_force_n).enumerate() {
-            self.axes.take(since_ns, index, value);
+        self.axis(since_ns, POSITION, truth.joint_m);
+        self.axis(since_ns, VELOCITY, truth.joint_m_s);
+        self.force(since_ns, truth.force_n);
+        self.axes.take(since_ns, BITE_FORCE, truth.bite_force_n);
+    }
+
+    /// Positions and forces that the drives of the robot report, which has no truth.
+    pub(super) fn reported(&mut self, reading: &Reading) {
+        let since_ns = self.since(reading.sampled_ns);
+        self.axis(since_ns, POSITION, reading.position_m);
+        self.force(since_ns, reading.force_n);
+    }
+
+    fn force(&mut self, since_ns: u64, force_n: [f64; AXES]) {
+        self.axis(since_ns, FORCE, force_n);
+        let Some((at_ns, mean_n)) = self.smoothing.take(since_ns, force_n) else { return };
+        for (axis, mean_n) in mean_n.into_iter().enumerate() {
+            self.smooth_force_n.take(at_ns, axis, mean_n);
+        }
+    }
+
+    fn axis(&mut self, since_ns: u64, quantity: usize, values: [f64; AXES]) {
+        for (axis, value) in values.into_iter().enumerate() {
+            self.axes.take(since_ns, quantity * AXES + axis, value);
         }
     }
 
@@ -126,7 +184,8 @@ impl OverTimeCollector {
         let since_ns = self.since(time_ns);
         if let Some((received, bitrate)) = tapped.frame().zip(self.bitrate) {
             let busy_ns = bitrate.bits_to_ns(wire::frame_bits(&received.frame));
-            self.busy_ns.resize_with(self.busy_ns.len().max(bus + 1), Series::default);
+            let buses = self.busy_ns.len().max(bus + 1);
+            self.busy_ns.resize_with(buses, || Series::of_width(LOAD_WIDTH_NS));
             *self.busy_ns[bus].at(since_ns) += busy_ns;
         }
     }
@@ -141,16 +200,20 @@ impl OverTimeCollector {
         };
         OverTime {
             began_ns: self.began_ns.unwrap_or(0),
+            motion_began_ns: self.motion_began_ns,
             duration_s: self.lasted_ns as f64 / 1e9,
             desired_incisal_m: places(DESIRED),
             actual_incisal_m: places(ACTUAL),
+            estimated_incisal_m: places(ESTIMATED),
             distance_m: self.jaw.highest(DISTANCE),
+            angle_rad: self.jaw.highest(ANGLE),
             controller_late_ns: self.late.highest(CONTROLLER),
             plant_late_ns: self.late.highest(PLANT),
-            position_m: bands(0),
-            velocity_m_s: bands(1),
-            force_n: bands(2),
-            bite_force_n: self.axes.band(3 * AXES),
+            position_m: bands(POSITION),
+            velocity_m_s: bands(VELOCITY),
+            force_n: bands(FORCE),
+            smooth_force_n: std::array::from_fn(|axis| self.smooth_force_n.band(axis)),
+            bite_force_n: self.axes.band(BITE_FORCE),
             bus_load: self.busy_ns.iter().map(load).collect(),
             signals: (0..signals).map(|place| self.signals.band(place)).collect(),
         }
@@ -199,7 +262,7 @@ mod tests {
         let ends = |curve: &Curve| [curve[0], curve[curve.len() - 1]];
         assert_eq!(ends(&over_time.actual_incisal_m[0]), [(0.0, 0.03), (0.039, 0.069)]);
         assert_eq!(ends(&over_time.desired_incisal_m[0]), [(0.0, 0.031), (0.019, 0.05)]);
-        assert_eq!(ends(&over_time.actual_incisal_m[2]), [(0.0, -0.01), (0.03, -0.01)]);
+        assert_eq!(ends(&over_time.actual_incisal_m[2]), [(0.0, -0.01), (0.039, -0.01)]);
         assert!(over_time.distance_m.iter().all(|(_, distance_m)| (distance_m - 1e-3).abs() < 1e-12));
     }
 }

@@ -8,9 +8,9 @@ type Point = (f64, f64);
 pub type Curve = Vec<Point>;
 
 /// Stretches kept at most.
-const MOST: usize = 1024;
+const MOST: usize = 4096;
 /// Width of the first stretches, ns.
-const FIRST_WIDTH_NS: u64 = 10_000_000;
+const FIRST_WIDTH_NS: u64 = 1_000_000;
 
 /// Values within a stretch of time.
 pub(super) trait Merge: Clone + Default {
@@ -32,6 +32,11 @@ impl<T> Default for Series<T> {
 }
 
 impl<T: Merge> Series<T> {
+    /// Whose first stretches have this width, ns.
+    pub(super) fn of_width(width_ns: u64) -> Self {
+        Self { width_ns, stretches: Vec::new() }
+    }
+
     /// The stretch that holds this time since the beginning.
     pub(super) fn at(&mut self, since_ns: u64) -> &mut T {
         while since_ns / self.width_ns >= MOST as u64 {
@@ -190,10 +195,10 @@ mod tests {
     #[test]
     fn a_curve_of_one_value_is_a_straight_line_and_no_number_is_left_out() {
         let mut series = Series::<Extremes<1>>::default();
-        for (millisecond, value) in [(0, 1.0), (1, f64::NAN), (2, f64::INFINITY), (3, 1.0), (10, 1.0)] {
-            series.take(millisecond * 1_000_000, 0, value);
+        for (microsecond, value) in [(0, 1.0), (1, f64::NAN), (2, f64::INFINITY), (3, 1.0), (1000, 1.0)] {
+            series.take(microsecond * 1000, 0, value);
         }
-        assert_eq!(series.band(0), [(0.0, 1.0), (0.01, 1.0)]);
+        assert_eq!(series.band(0), [(0.0, 1.0), (0.001, 1.0)]);
     }
 
     #[test]

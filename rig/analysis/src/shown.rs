@@ -2,6 +2,7 @@
 
 use masseter_can::Tapped;
 use masseter_shared::config::Scenario;
+use masseter_shared::messages::codes::{ControllerState, NO_DRIVE_STATE};
 use masseter_shared::messages::{Command, FrameTap, Reading, Signals, State, Truth};
 
 use crate::intervals::Intervals;
@@ -12,6 +13,8 @@ use crate::pose_errors::pose;
 /// Collects them.
 #[derive(Debug, Clone)]
 pub(super) struct Shown {
+    /// Whether the mechanism is emulated, so that its true motion is recorded.
+    has_truth: bool,
     pub(super) intervals: Intervals,
     pub(super) longest_cycles: LongestCycles,
     pub(super) over_time: OverTimeCollector,
@@ -20,6 +23,7 @@ pub(super) struct Shown {
 impl Shown {
     pub(super) fn new(scenario: &Scenario) -> Self {
         Self {
+            has_truth: scenario.can.is_virtual(),
             intervals: Intervals::new(scenario.period_ns()),
             longest_cycles: LongestCycles::default(),
             over_time: OverTimeCollector::new(scenario.jaw.reference_point_m, scenario.can.bitrate().ok()),
@@ -36,6 +40,9 @@ impl Shown {
         self.intervals.reading(reading, skipped);
         self.longest_cycles.reading(reading);
         self.over_time.wake_up(PLANT, reading.due_ns, reading.woke_ns);
+        if !self.has_truth && reading.drive_state.iter().all(|state| *state != NO_DRIVE_STATE) {
+            self.over_time.reported(reading);
+        }
     }
 
     /// `is_fresh`: the state's reading is used for the first time. `skipped`: deadlines skipped just before it.
@@ -43,6 +50,21 @@ impl Shown {
         self.intervals.state(state, is_fresh, skipped);
         self.longest_cycles.state(state, is_fresh);
         self.over_time.wake_up(CONTROLLER, state.due_ns, state.woke_ns);
+        if is_fresh {
+            self.solution(state);
+        }
+    }
+
+    fn solution(&mut self, state: &State) {
+        if state.controller_state == ControllerState::Running.code() {
+            self.over_time.running(state.sampled_ns);
+        }
+        let estimated = pose(state.estimated_position_m, state.estimated_quaternion_wxyz);
+        if self.has_truth {
+            self.over_time.estimated(state.sampled_ns, estimated.as_ref());
+        } else {
+            self.over_time.actual(state.sampled_ns, estimated.as_ref());
+        }
     }
 
     pub(super) fn truth(&mut self, truth: &Truth) {

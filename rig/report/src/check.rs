@@ -25,11 +25,6 @@ impl CheckResult {
         self == Self::Failed
     }
 
-    /// Whether a run with it does not pass, whatever else it shows.
-    pub(crate) fn is_short(self) -> bool {
-        matches!(self, Self::Failed | Self::Untested)
-    }
-
     /// The word in tables.
     pub fn mark(self) -> &'static str {
         match self {
@@ -116,11 +111,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_untested_has_not_failed_and_does_not_pass() {
+    fn what_is_untested_has_not_failed() {
         use CheckResult::{Excused, Failed, NotJudged, Passed, Untested};
         let results = [Passed, Failed, Excused, Untested, NotJudged];
         assert_eq!(results.map(CheckResult::is_failed), [false, true, false, false, false]);
-        assert_eq!(results.map(CheckResult::is_short), [false, true, false, true, false]);
     }
 
     #[test]

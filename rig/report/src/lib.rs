@@ -4,9 +4,7 @@
 //! All of it is computed from the manifest and the recording, so `masseter report` can repeat it. The figures come from
 //! the crate `masseter-analysis`; this crate judges them, and each of its modules writes one form of the result.
 
-mod animation;
 mod candump_logs;
-mod charts;
 mod check;
 mod checks;
 pub mod compare;
@@ -24,7 +22,6 @@ mod run_report;
 mod summary;
 mod table;
 mod text;
-mod time_line;
 mod timing;
 mod verdict;
 mod write_error;

@@ -83,15 +83,6 @@ impl Verdict {
         Self { word: outcome.word(), reason, exit_code: outcome.exit(), timing, checks: all }
     }
 
-    /// The colour of the run: passed with its timing held, passed without, or not passed.
-    pub(crate) fn colour(&self) -> &'static str {
-        match (self.exit_code, self.timing.word) {
-            (Exit::Passed, TimingWord::Disturbed) => "disturbed",
-            (Exit::Passed, _) => "pass",
-            _ => "not-passed",
-        }
-    }
-
     /// What to do about the machine; none where the machine disturbed nothing.
     pub(crate) fn advice(&self, manifest: &Manifest) -> Option<String> {
         // The reason of an INVALID run contains the advice.

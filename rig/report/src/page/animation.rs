@@ -1,9 +1,10 @@
-//! The recorded motion as data for the 3-D animation of the page.
+//! The recorded motion as data for the 3-D view of the page.
 
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{LEGS, Mechanism, Pose};
 use masseter_shared::messages::pose_fields;
 use serde::Serialize;
+use serde_json::Value;
 
 use masseter_analysis::{Figures, PoseSource, TrackingSample};
 use masseter_recording::jaw_points;
@@ -24,29 +25,30 @@ struct Animation {
     corners: [[f64; 3]; LEGS],
     /// Incisal point and condyles in the platform frame.
     jaw: [[f64; 3]; 3],
-    /// When the first frame was sampled, s of the recording.
-    began_s: f64,
-    /// Time in s since the first frame, then the actual and the desired pose of the platform and, where the actual pose is the true one, the
+    /// What the actual pose is called.
+    actual_name: &'static str,
+    /// Time since the run's first SYNC, s, then the actual and the desired pose of the platform and, where the actual pose is the true one, the
     /// estimated one, each as x y z, w x y z.
     frames: Vec<Vec<f64>>,
 }
 
-/// The animation as JSON; none without a motion or without a mechanism.
-pub(crate) fn json(scenario: &Scenario, figures: &Figures) -> Option<String> {
+/// The animation; none without a motion or without a mechanism.
+pub(super) fn data(scenario: &Scenario, figures: &Figures) -> Option<Value> {
     let mechanism = Mechanism::new(&scenario.mechanism).ok()?;
     let samples = &figures.track.samples;
-    let first = samples.first()?;
-    let frame = |sample| frame(sample, first.sampled_ns, figures.tracking.actual_source);
+    samples.first()?;
+    let source = figures.tracking.actual_source;
+    let frame = |sample| frame(sample, figures.over_time.began_ns, source);
     let animation = Animation {
         centres: std::array::from_fn(|leg| mechanism.hinge(leg, 0.0).into()),
         along: std::array::from_fn(|leg| mechanism.slide_direction(leg).into()),
         slide_ends: mechanism.strokes().slide_m,
         corners: mechanism.platform_corners().map(Into::into),
         jaw: jaw_points(&scenario.jaw).map(Into::into),
-        began_s: first.sampled_ns.saturating_sub(figures.over_time.began_ns) as f64 / 1e9,
+        actual_name: source.adjective(),
         frames: samples.iter().map(frame).collect(),
     };
-    serde_json::to_string(&animation).ok()
+    serde_json::to_value(&animation).ok()
 }
 
 fn frame(sample: &TrackingSample, began_ns: u64, source: PoseSource) -> Vec<f64> {

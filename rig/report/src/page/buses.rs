@@ -1,0 +1,65 @@
+//! Messages and losses, the load of the buses, and the response times of their messages.
+
+use masseter_analysis::{Figures, ResponseFigures, TopicFigures};
+use masseter_page::{Block, Cell, Chart, Column, Section, Table, Tone};
+
+use super::charts::{limit, plain};
+use crate::text::{microseconds, or_dash};
+
+pub(super) fn section(figures: &Figures) -> Section {
+    let mut blocks = vec![
+        Block::chart("buses", load(figures)),
+        Block::text(
+            "responses-in-words",
+            "From the queueing to the end of a frame, beside the worst case by the plan.",
+        ),
+        Block::table("responses", responses(&figures.bus_response.messages)),
+    ];
+    if let Some(why) = &figures.bus_response.unbounded {
+        blocks.push(Block::text("unbounded", format!("No bounds hold for this run: {why}.")));
+    }
+    blocks.push(Block::table("topics", topics(&figures.topics)));
+    Section::new("messages", "Messages and buses", blocks)
+}
+
+/// Share of each bus in use.
+fn load(figures: &Figures) -> Chart {
+    let loads = figures.over_time.bus_load.iter().enumerate();
+    Chart {
+        series: loads.map(|(bus, load)| plain(&format!("can{bus}"), load, 100.0)).collect(),
+        limits: vec![limit("full", &[100.0])],
+        otherwise: "No frame was recorded.".to_owned(),
+        ..Chart::over_time("Load of the buses", "%")
+    }
+}
+
+fn responses(messages: &[ResponseFigures]) -> Table {
+    let row = |message: &ResponseFigures| -> Vec<Cell> {
+        let us = |ns: Option<u64>| or_dash(ns, microseconds);
+        let max = us(message.max_ns);
+        let max = if message.exceeds() { Cell::Mark { mark: max, tone: Tone::Bad } } else { max.into() };
+        let name = format!("can{} {}", message.bus, message.message);
+        vec![name.into(), message.frames.to_string().into(), max, us(message.bound_ns).into()]
+    };
+    let numbers = ["frames", "max, µs", "bound, µs"].map(Column::number);
+    Table {
+        label: "Response times of the buses' messages".to_owned(),
+        columns: [Column::text("message")].into_iter().chain(numbers).collect(),
+        rows: messages.iter().map(row).collect(),
+    }
+}
+
+fn topics(topics: &[TopicFigures]) -> Table {
+    let row = |topic: &TopicFigures| -> Vec<Cell> {
+        vec![
+            topic.topic.into(),
+            topic.messages.to_string().into(),
+            topic.missing.to_string().into(),
+        ]
+    };
+    Table {
+        label: "Messages of the topics".to_owned(),
+        columns: vec![Column::text("topic"), Column::number("messages"), Column::number("dropped")],
+        rows: topics.iter().map(row).collect(),
+    }
+}

@@ -1,0 +1,109 @@
+//! The mechanism in three dimensions, the motion of the jaw, and the pressure between the jaws.
+
+use masseter_analysis::{Curve, Figures};
+use masseter_controller::trajectory::closed_pose;
+use masseter_page::{Block, Chart, Content, Points, Section, Series, Style};
+use masseter_shared::config::Scenario;
+use masseter_shared::geometry::{Mechanism, Vec3};
+
+use super::charts::plain;
+use super::{animation, in_unit};
+use crate::pressure::Pressure;
+use crate::table;
+
+/// Directions of the base, and where they point.
+const DIRECTIONS: [[&str; 2]; 3] = [["x", "forward"], ["y", "to the left"], ["z", "up"]];
+
+/// None without a motion.
+pub(super) fn mechanism(scenario: &Scenario, figures: &Figures) -> Option<Section> {
+    let scene = Content::Scene(animation::data(scenario, figures)?);
+    Some(Section::new("mechanism", "Mechanism", vec![Block::new("scene", scene)]))
+}
+
+pub(super) fn section(scenario: &Scenario, figures: &Figures) -> Section {
+    let over_time = &figures.over_time;
+    let mut blocks = vec![Block::text("motion-in-words", in_words(figures))];
+    if let Some(closed_m) = closed_incisal_m(scenario) {
+        for (axis, [name, _]) in DIRECTIONS.into_iter().enumerate() {
+            blocks.push(Block::chart(format!("motion-{name}"), displacement(figures, axis, closed_m[axis])));
+        }
+    }
+    let error = |title: &str, unit: &str, curve: &Curve, factor: f64| Chart {
+        series: vec![plain("distance", curve, factor)],
+        otherwise: "There was no desired motion.".to_owned(),
+        height: 140,
+        ..Chart::over_time(title, unit)
+    };
+    let distance = error("Incisal point from desired", "µm", &over_time.distance_m, 1e6);
+    let mut angle = error("Platform from desired, angle", "°", &over_time.angle_rad, 1f64.to_degrees());
+    "angle".clone_into(&mut angle.series[0].name);
+    blocks.push(Block::chart("error", distance));
+    blocks.push(Block::chart("angle", angle));
+    if figures.bite_force_max_n.is_some() {
+        let force = Chart {
+            series: vec![plain("bite force", &over_time.bite_force_n, 1.0)],
+            ..Chart::over_time("Bite force, vertical", "N")
+        };
+        blocks.push(Block::chart("bite", force));
+    }
+    Section::new("motion", "Motion", blocks)
+}
+
+/// Desired, actual and estimated displacement of the incisal point from the closed jaw, along one direction.
+fn displacement(figures: &Figures, axis: usize, closed_m: f64) -> Chart {
+    let over_time = &figures.over_time;
+    let series = |name: &str, style: Style, curves: &[Curve; 3]| {
+        Series::new(name, style, Points::over_time(&in_unit(&curves[axis], closed_m, 1e3)))
+    };
+    let source = figures.tracking.actual_source;
+    let mut all = vec![series("desired", Style::Desired, &over_time.desired_incisal_m)];
+    if source.is_truth() {
+        all.push(series("true", Style::True, &over_time.actual_incisal_m));
+        all.push(series("estimated", Style::Estimated, &over_time.estimated_incisal_m));
+    } else {
+        all.push(series("estimated", Style::Estimated, &over_time.actual_incisal_m));
+    }
+    let [name, direction] = DIRECTIONS[axis];
+    Chart {
+        series: all,
+        otherwise: "Nothing moved.".to_owned(),
+        height: 150,
+        ..Chart::over_time(format!("Incisal point from the closed jaw, {name}: {direction}"), "mm")
+    }
+}
+
+fn in_words(figures: &Figures) -> String {
+    let tracking = &figures.tracking;
+    let estimate = tracking.estimate_rms_mm.map(|rms| format!("Estimated against true: rms {rms:.4} mm."));
+    let bite = figures.bite_force_max_n.map(|most_n| format!("Bite force: at most {most_n:.1} N."));
+    let sentences = [format!("Platform, {}.", table::distances(tracking))];
+    sentences.into_iter().chain(estimate).chain(bite).collect::<Vec<_>>().join(" ")
+}
+
+/// Place of the incisal point when the jaw is closed, base frame; none for a scenario without a closed pose, which no run
+/// has.
+fn closed_incisal_m(scenario: &Scenario) -> Option<[f64; 3]> {
+    let mechanism = Mechanism::new(&scenario.mechanism).ok()?;
+    let closed = closed_pose(&scenario.jaw, &mechanism).ok()?;
+    let incisal = Vec3::from(scenario.jaw.reference_point_m);
+    Some((closed.translation.vector + closed.rotation * incisal).into())
+}
+
+/// None where the jaws cannot touch.
+pub(super) fn pressure(figures: &Figures) -> Option<Section> {
+    let Pressure { caption, arch, over_time } = Pressure::draw(figures)?;
+    let picture = |svg: String, label: &str| Content::Picture { svg, label: label.to_owned() };
+    let blocks = vec![
+        Block::text(
+            "pressure-in-words",
+            format!("Force of antagonist and food on each lower tooth, mean over a cycle. {caption}"),
+        ),
+        Block::new("pressure", picture(arch, "The lower arch from above with the force on each tooth")),
+        Block::text(
+            "pressure-over-time-in-words",
+            "The greatest force on each tooth over time; a tooth without force has no colour.",
+        ),
+        Block::new("pressure-over-time", picture(over_time, "The greatest force on each tooth over time")),
+    ];
+    Some(Section::new("pressure-between-jaws", "Pressure between the jaws", blocks))
+}
