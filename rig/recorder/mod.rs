@@ -15,7 +15,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use masseter_recording::{Backlog, Pace, Recorder, RunFolder, Scene};
+use masseter_recording::{Backlog, Manifest, Pace, Recorder, RunFolder, Scene};
 use masseter_shared::clock;
 use masseter_shared::geometry::Mechanism;
 use masseter_shared::lifecycle::{Start, StopRequest};
@@ -25,7 +25,7 @@ use masseter_shared::transport::Domain;
 use masseter_terminal::Exit;
 
 use crate::arguments::ProcessArgs;
-use crate::foxglove::{FoxgloveServer, Listener};
+use crate::live::{Listener, LiveServer};
 use crate::machine::SystemRoot;
 use crate::machine::sampler::Sampler;
 use crate::stderr_writer::StderrWriter;
@@ -69,17 +69,22 @@ pub(crate) fn record(args: RecorderArgs) -> anyhow::Result<Exit> {
     let scene = Scene::new(&Mechanism::new(&scenario.mechanism)?, &scenario.jaw);
     let listener = args.live.map(Listener::bind).transpose()?;
     let pace = if is_lockstep { Pace::Virtual } else { Pace::RealTime };
-    let mut recorder = Recorder::of_run(&RunFolder::of_recording(&args.recording), scene.clone())?;
+    let folder = RunFolder::of_recording(&args.recording);
+    let mut recorder = Recorder::of_run(&folder, scene.clone())?;
     let mut signals = is_lockstep.then(|| RecorderSignals::open(&process, DRAIN_INTERVAL)).transpose()?;
     let start = process.ready(None)?;
     recorder.declare(&start.declared)?;
     let backlog = Backlog::start(recorder, pace);
     let domain = Domain::named(&process_arguments.domain)?;
-    let serve = |listener| FoxgloveServer::start(listener, scene, start.declared.clone(), domain);
+    let serve = |listener| -> anyhow::Result<_> {
+        let manifest = Manifest::read(&folder)?;
+        Ok(LiveServer::start(listener, manifest, scene, start.declared.clone(), domain)?)
+    };
     let server = listener.map(serve).transpose()?;
 
     let stderr = StderrWriter::start();
     if let Some(server) = &server {
+        stderr.write(&format!("live in a browser: {}\n", server.page_url()));
         stderr.write(&format!("live on {} for Foxglove\n", server.url()));
     }
     let progress = (!args.quiet).then(|| Progress::new(args.motion_s, scenario.period_s(), clock::now_ns()));

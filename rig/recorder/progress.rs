@@ -12,7 +12,7 @@ use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::{Reading, State};
 use nalgebra::Vector3;
 
-use crate::foxglove::ClientCounts;
+use crate::live::ClientCounts;
 
 /// Time between two lines, ns: a log of a short run has its verdict in sight.
 const LINE_INTERVAL_NS: u64 = 10 * SECOND_NS;

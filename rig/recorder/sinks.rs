@@ -7,12 +7,12 @@ use masseter_shared::wording::counted;
 use masseter_terminal::Exit;
 
 use super::progress::{Losses, Progress};
-use crate::foxglove::{ClientLosses, FoxgloveServer};
+use crate::live::{ClientLosses, LiveServer};
 use crate::stderr_writer::StderrWriter;
 
 pub(super) struct Sinks {
     pub backlog: Backlog,
-    pub server: Option<FoxgloveServer>,
+    pub server: Option<LiveServer>,
     pub progress: Option<Progress>,
     pub stderr: StderrWriter,
 }
@@ -41,7 +41,7 @@ impl Sinks {
     }
 
     fn losses(&self) -> Losses {
-        let clients = self.server.as_ref().map(FoxgloveServer::counts);
+        let clients = self.server.as_ref().map(LiveServer::counts);
         Losses { unrecorded: self.backlog.dropped(), clients }
     }
 

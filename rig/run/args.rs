@@ -15,7 +15,7 @@ use crate::arguments::{
     ControllerChoice, Wires, parse_address, parse_controller, parse_cores, parse_duration, parse_patience,
     parse_wires,
 };
-use crate::foxglove;
+use crate::live;
 
 const WHAT: &str = "Choose what to play";
 const HOW: &str = "Choose how it runs";
@@ -90,7 +90,7 @@ pub(crate) struct RunArgs {
     /// Exit with 3 unless the kernel grants cores, SCHED_FIFO, locked memory and, if requested, /dev/cpu_dma_latency
     #[arg(long, help_heading = HOW)]
     pub require_rt: bool,
-    /// Show the run live in Foxglove (WebSocket) on a port of this machine, such as --live=9000, or on an address
+    /// Show the run live in a browser and in Foxglove on a port of this machine, such as --live=9000, or on an address
     /// [default: 127.0.0.1:8765]
     #[arg(
         long,
@@ -99,7 +99,7 @@ pub(crate) struct RunArgs {
         help_heading = WATCH,
         num_args = 0..=1,
         require_equals = true,
-        default_missing_value = foxglove::DEFAULT_ADDRESS
+        default_missing_value = live::DEFAULT_ADDRESS
     )]
     pub live: Option<SocketAddr>,
     /// Who may read the run's files

@@ -12,7 +12,7 @@ use masseter_shared::named::{NameError, NamedValues};
 use super::args::RunArgs;
 use super::clock::{self, needs_processes};
 use crate::arguments::{ControllerKind, check_cores};
-use crate::foxglove;
+use crate::live;
 
 /// Plans the run and chooses its clock; refuses interfaces and addresses that this machine does not have.
 pub(super) fn resolve(args: &RunArgs) -> anyhow::Result<(RunPlan, RunArgs)> {
@@ -20,7 +20,7 @@ pub(super) fn resolve(args: &RunArgs) -> anyhow::Result<(RunPlan, RunArgs)> {
     args.cores.map_or(Ok(()), |cores| check_cores(&cores))?;
     let args = clock::choose(args, &scenario);
     clock::check(&args, &scenario)?;
-    args.live.map_or(Ok(()), foxglove::check)?;
+    args.live.map_or(Ok(()), live::check)?;
     let plan = RunPlan::of_file(scenario, args.scenario.as_deref())?;
     plant::check_interfaces(&plan.scenario)?;
     match args.controller.builder() {

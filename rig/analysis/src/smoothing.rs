@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 const WINDOW_NS: u64 = 20_000_000;
 
 /// Smooths `N` values that come together.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Smoothing<const N: usize> {
     held: VecDeque<(u64, [f64; N])>,
 }

@@ -299,8 +299,9 @@
           writeLegend();
         }
         const { xs, ys } = Masseter.points(points);
-        one.xs.push(...xs);
-        one.ys.push(...ys);
+        // The page may have been made with some of them.
+        const last = one.xs.length ? one.xs[one.xs.length - 1] : -Infinity;
+        xs.forEach((x, at) => { if (x > last) { one.xs.push(x); one.ys.push(ys[at]); } });
         redraw();
       },
       // Takes the place of the whole chart.

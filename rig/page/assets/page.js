@@ -35,11 +35,28 @@
     }];
   }
 
+  // The section as an element, and what draws its blocks once the element is in the page.
   function section({ id, title, blocks }) {
     const built = blocks.map(build);
-    document.getElementById('sections').append(element('section', { id: `section-${id}`, 'aria-labelledby': `title-${id}` },
-      element('h2', { id: `title-${id}` }, title), ...built.map(([holder]) => holder)));
-    return built.map(([, start]) => start);
+    const whole = element('section', { id: `section-${id}`, 'aria-labelledby': `title-${id}` },
+      element('h2', { id: `title-${id}` }, title), ...built.map(([holder]) => holder));
+    return [whole, () => built.forEach(([, start]) => start())];
+  }
+
+  // Takes the place of a section, or adds the section below another one.
+  Masseter.section = (data, above) => {
+    const [whole, start] = section(data);
+    const earlier = document.getElementById(`section-${data.id}`);
+    if (earlier) earlier.replaceWith(whole);
+    else if (above) document.getElementById(`section-${above}`).after(whole);
+    else document.getElementById('sections').prepend(whole);
+    start();
+    links();
+  };
+
+  function links() {
+    const found = [...document.querySelectorAll('#sections > section')];
+    document.querySelector('nav').replaceChildren(...found.slice(1).map((each) => element('a', { href: `#${each.id}` }, each.querySelector('h2').textContent)));
   }
 
   function timeBar() {
@@ -71,12 +88,14 @@
 
   document.getElementById('top').append(element('h1', {}, page.title), spoken);
   document.getElementById('sections').replaceChildren();
-  const starts = page.sections.flatMap(section);
-  const links = page.sections.slice(1).map(({ id, title }) => element('a', { href: `#section-${id}` }, title));
+  const built = page.sections.map(section);
+  document.getElementById('sections').append(...built.map(([whole]) => whole));
   const first = document.querySelector('#sections > section');
-  if (first) first.after(element('nav', { 'aria-label': 'Sections' }, ...links));
+  if (first) first.append(element('nav', { 'aria-label': 'Sections' }));
+  links();
   timeBar();
-  starts.forEach((start) => start());
+  built.forEach(([, start]) => start());
   addEventListener('beforeprint', Masseter.drawAll);
   document.documentElement.dataset.ready = 'yes';
+  if (page.life === 'live') Masseter.connect();
 }

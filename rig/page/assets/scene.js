@@ -100,5 +100,11 @@ Masseter.block('scene', (holder, data, clock) => {
   clock.on('cursor', draw);
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', draw);
   draw();
-  return { append(_, frames) { data.frames.push(...frames); draw(); } };
+  return {
+    append(_, frames) {
+      const last = data.frames.length ? data.frames[data.frames.length - 1][0] : -Infinity;
+      data.frames.push(...frames.filter(([at]) => at > last));
+      draw();
+    },
+  };
 });

@@ -4,6 +4,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::chart::Chart;
+use crate::live::{Live, Parameter};
 use crate::time::Moment;
 
 /// A section of the page.
@@ -86,6 +87,10 @@ pub enum Content {
     Scene(Value),
     /// The views of the jaw; `jaw.js` knows the data.
     Jaw(Value),
+    /// The state of a run that goes on.
+    Live(Live),
+    /// Parameters to change.
+    Parameters(Vec<Parameter>),
 }
 
 /// Whether something is as it should be.

@@ -108,6 +108,11 @@ pub struct Chart {
 }
 
 impl Chart {
+    /// Whether it shares cursor and zoom with the other charts over time.
+    pub fn is_over_time(&self) -> bool {
+        self.across == Across::Time
+    }
+
     /// Over time, without curves yet.
     #[must_use]
     pub fn over_time(title: impl Into<String>, unit: impl Into<String>) -> Self {

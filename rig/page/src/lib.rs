@@ -18,14 +18,14 @@
 
 mod block;
 mod chart;
+mod live;
 mod page;
 mod points;
 mod time;
 
-pub use block::{
-    Block, Cell, Column, Content, EventRow, Events, Moments, Section, Table, Tone, Verdict,
-};
+pub use block::{Block, Cell, Column, Content, EventRow, Events, Moments, Section, Table, Tone, Verdict};
 pub use chart::{Across, Chart, Limit, Scale, Series, Style};
+pub use live::{Live, Parameter};
 pub use page::{Life, Page, PageError};
 pub use points::Points;
 pub use time::{Moment, MomentKind, Phase, Time};

@@ -45,7 +45,7 @@ pub enum PageError {
 }
 
 /// The scripts in the order in which they need each other. The last one builds the page.
-const SCRIPTS: [&str; 10] = [
+const SCRIPTS: [&str; 11] = [
     include_str!("../assets/base.js"),
     include_str!("../assets/points.js"),
     include_str!("../assets/axis.js"),
@@ -55,6 +55,7 @@ const SCRIPTS: [&str; 10] = [
     include_str!("../assets/chart.js"),
     include_str!("../assets/blocks.js"),
     include_str!("../assets/scene.js"),
+    include_str!("../assets/live.js"),
     include_str!("../assets/page.js"),
 ];
 
@@ -117,7 +118,9 @@ mod tests {
     #[test]
     fn no_script_ends_its_element_and_nothing_is_fetched() {
         for script in SCRIPTS {
-            assert!(!script.contains("</script") && !script.contains("fetch(") && !script.contains("import "));
+            assert!(
+                !script.contains("</script") && !script.contains("fetch(") && !script.contains("import ")
+            );
         }
     }
 }

@@ -1,29 +1,32 @@
 //! The points of a curve, small enough for a page that holds a minute of thirty curves.
 
 use data_encoding::BASE64;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// Resolution of times, s.
 const TIME_STEP_S: f64 = 1e-6;
 /// Steps of a packed value from the lowest to the highest.
 const VALUE_STEPS: f64 = 1_048_576.0;
 
-/// The points of a curve in the order of x.
+/// The points of a curve in the order of x. What is no finite number is left out.
 ///
-/// Packed: whole numbers of steps, each as the difference from the one before. A difference is zigzag-coded (0, −1, 1, −2 …) and
-/// written in bytes of seven bits, the lowest first, the eighth bit set where more follow. The bytes are in Base64.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// Packed, they are whole numbers of steps, each as the difference from the one before. A difference is zigzag-coded (0, −1, 1,
+/// −2 …) and written in bytes of seven bits, the lowest first, the eighth bit set where more follow. The bytes are in Base64.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Points {
+    points: Vec<(f64, f64)>,
+    is_packed: bool,
+}
+
+/// Points as the page reads them.
+#[derive(Serialize)]
 #[serde(untagged)]
-pub enum Points {
+enum Written {
     /// One list of x, y, x, y …
     Plain(Vec<f64>),
-    /// x, y, x, y … packed.
     Packed {
-        /// Differences in Base64.
         packed: String,
-        /// A step of x.
         x_step: f64,
-        /// A step of y.
         y_step: f64,
     },
 }
@@ -32,34 +35,52 @@ impl Points {
     /// None yet: the live view adds them.
     #[must_use]
     pub fn none() -> Self {
-        Self::Plain(Vec::new())
+        Self::default()
     }
 
-    /// Values by seconds, to the microsecond and a millionth of their range. What is no finite number is left out.
+    /// Values by seconds, written to the microsecond and a millionth of their range.
     #[must_use]
     pub fn over_time(points: &[(f64, f64)]) -> Self {
-        let finite = || points.iter().filter(|(at_s, value)| at_s.is_finite() && value.is_finite());
+        Self { is_packed: true, ..Self::plain(points) }
+    }
+
+    /// Points that are written as they are, for short curves of any two quantities.
+    #[must_use]
+    pub fn plain(points: &[(f64, f64)]) -> Self {
+        let is_finite = |(x, y): &&(f64, f64)| x.is_finite() && y.is_finite();
+        Self { points: points.iter().filter(is_finite).copied().collect(), is_packed: false }
+    }
+
+    /// The points, x and y.
+    pub fn iter(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.points.iter().copied()
+    }
+
+    fn packed(&self) -> Written {
         let outside = [f64::INFINITY, f64::NEG_INFINITY];
-        let [low, high] =
-            finite().fold(outside, |[low, high], (_, value)| [low.min(*value), high.max(*value)]);
+        let [low, high] = self.iter().fold(outside, |[low, high], (_, y)| [low.min(y), high.max(y)]);
         // Of a curve without height any step will do that its values are multiples of.
         let y_step = if high > low { (high - low) / VALUE_STEPS } else { low.abs().max(1.0) };
         let (mut bytes, mut before) = (Vec::new(), [0_i64; 2]);
-        for (at_s, value) in finite() {
+        for (at_s, value) in self.iter() {
             let steps = [at_s / TIME_STEP_S, value / y_step].map(|steps| steps.round() as i64);
             for (now, before) in steps.iter().zip(&before) {
                 push(&mut bytes, now - before);
             }
             before = steps;
         }
-        Self::Packed { packed: BASE64.encode(&bytes), x_step: TIME_STEP_S, y_step }
+        Written::Packed { packed: BASE64.encode(&bytes), x_step: TIME_STEP_S, y_step }
     }
+}
 
-    /// Points as they are, for short curves of any two quantities.
-    #[must_use]
-    pub fn plain(points: &[(f64, f64)]) -> Self {
-        let finite = points.iter().filter(|(x, y)| x.is_finite() && y.is_finite());
-        Self::Plain(finite.flat_map(|&(x, y)| [x, y]).collect())
+impl Serialize for Points {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let written = if self.is_packed {
+            self.packed()
+        } else {
+            Written::Plain(self.iter().flat_map(|(x, y)| [x, y]).collect())
+        };
+        written.serialize(serializer)
     }
 }
 
@@ -78,7 +99,7 @@ mod tests {
     use super::*;
 
     fn unpacked(points: &Points) -> Vec<(f64, f64)> {
-        let Points::Packed { packed, x_step, y_step } = points else { panic!("not packed") };
+        let Written::Packed { packed, x_step, y_step } = points.packed() else { panic!("not packed") };
         let (mut numbers, mut number, mut shift) = (Vec::new(), 0_u64, 0);
         for byte in BASE64.decode(packed.as_bytes()).unwrap() {
             number |= u64::from(byte & 0x7f) << shift;
@@ -98,19 +119,24 @@ mod tests {
 
     #[test]
     fn packed_points_are_those_of_the_curve_to_a_millionth_of_its_range() {
-        let curve: Vec<_> = (0..5000).map(|i| (f64::from(i) * 1e-3, -40.0 + (f64::from(i) * 0.01).sin())).collect();
+        let curve: Vec<_> =
+            (0..5000).map(|i| (f64::from(i) * 1e-3, -40.0 + (f64::from(i) * 0.01).sin())).collect();
         let points = Points::over_time(&curve);
         for ((at_s, value), (at_found_s, found)) in curve.iter().zip(unpacked(&points)) {
             assert!((at_s - at_found_s).abs() < 1e-6 && (value - found).abs() < 2e-6, "{value}: {found}");
         }
-        let Points::Packed { packed, .. } = points else { panic!("not packed") };
+        let Written::Packed { packed, .. } = points.packed() else { panic!("not packed") };
         assert!(packed.len() < 7 * curve.len(), "{} characters", packed.len());
     }
 
     #[test]
     fn a_curve_without_height_keeps_its_value_and_what_is_no_number_is_left_out() {
-        assert_eq!(unpacked(&Points::over_time(&[(0.0, 2.5), (1.0, f64::NAN), (2.0, 2.5)])), [(0.0, 2.5), (2.0, 2.5)]);
-        assert_eq!(Points::plain(&[(1.0, 2.0), (f64::INFINITY, 3.0)]), Points::Plain(vec![1.0, 2.0]));
+        assert_eq!(
+            unpacked(&Points::over_time(&[(0.0, 2.5), (1.0, f64::NAN), (2.0, 2.5)])),
+            [(0.0, 2.5), (2.0, 2.5)]
+        );
+        let plain = Points::plain(&[(1.0, 2.0), (f64::INFINITY, 3.0)]);
+        assert_eq!(serde_json::to_string(&plain).unwrap(), "[1.0,2.0]");
         assert_eq!(unpacked(&Points::over_time(&[])), []);
     }
 }

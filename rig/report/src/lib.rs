@@ -30,6 +30,7 @@ pub use candump_logs::CandumpLogs;
 pub use check::{Check, CheckFigures, CheckResult};
 pub use judgement::Judgement;
 pub use junit::{JunitRun, junit_of_suite};
+pub use page::so_far as page_so_far;
 pub use pressure::Pressure;
 pub use run_report::{judge_run, report_past_run, report_run};
 pub use table::Detail;

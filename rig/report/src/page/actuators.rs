@@ -48,13 +48,7 @@ fn both_ways(most: f64) -> Vec<Limit> {
     vec![limit("limit", &[most, -most])]
 }
 
-fn curves(
-    kind: &Kind,
-    quantity: &str,
-    unit: &str,
-    si: &[Curve; AXES],
-    limits: Vec<Limit>,
-) -> Chart {
+fn curves(kind: &Kind, quantity: &str, unit: &str, si: &[Curve; AXES], limits: Vec<Limit>) -> Chart {
     let series = (kind.first..kind.first + LEGS).map(|axis| plain(AXIS_NAMES[axis], &si[axis], 1e3));
     Chart {
         series: series.collect(),

@@ -51,11 +51,7 @@ fn responses(messages: &[ResponseFigures]) -> Table {
 
 fn topics(topics: &[TopicFigures]) -> Table {
     let row = |topic: &TopicFigures| -> Vec<Cell> {
-        vec![
-            topic.topic.into(),
-            topic.messages.to_string().into(),
-            topic.missing.to_string().into(),
-        ]
+        vec![topic.topic.into(), topic.messages.to_string().into(), topic.missing.to_string().into()]
     };
     Table {
         label: "Messages of the topics".to_owned(),

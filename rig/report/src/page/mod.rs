@@ -6,6 +6,7 @@ mod buses;
 mod charts;
 mod circumstances;
 mod events;
+mod live;
 mod motion;
 mod named;
 mod requirements;
@@ -22,9 +23,21 @@ use crate::verdict::Verdict;
 
 /// The page.
 pub(crate) fn html(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Result<String, PageError> {
+    let first = vec![result::section(manifest, figures, verdict)];
+    page(Life::Finished, first, manifest, figures, verdict).to_html()
+}
+
+/// The page of a run that goes on, with the figures so far; `number` is that of the page's update. `left_out`: messages that are
+/// not in the figures.
+pub fn so_far(manifest: &Manifest, figures: &Figures, number: u64, left_out: u64) -> Page {
+    let verdict = Verdict::new(manifest, figures);
+    let first = live::sections(manifest, figures, number, left_out);
+    page(Life::Live, first, manifest, figures, &verdict)
+}
+
+fn page(life: Life, first: Vec<Section>, manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Page {
     let scenario = &manifest.scenario;
-    let sections: [Option<Section>; 11] = [
-        Some(result::section(manifest, figures, verdict)),
+    let others: [Option<Section>; 10] = [
         requirements::section(figures, verdict),
         motion::mechanism(scenario, figures),
         Some(motion::section(scenario, figures)),
@@ -36,13 +49,12 @@ pub(crate) fn html(manifest: &Manifest, figures: &Figures, verdict: &Verdict) ->
         Some(events::section(figures)),
         Some(circumstances::section(manifest)),
     ];
-    let page = Page {
+    Page {
         moments: moments(scenario, figures),
         phases: phases(figures),
-        sections: sections.into_iter().flatten().collect(),
-        ..Page::new(&scenario.name, Life::Finished, time(manifest, figures))
-    };
-    page.to_html()
+        sections: first.into_iter().chain(others.into_iter().flatten()).collect(),
+        ..Page::new(&scenario.name, life, time(manifest, figures))
+    }
 }
 
 fn time(manifest: &Manifest, figures: &Figures) -> Time {

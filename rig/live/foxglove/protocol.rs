@@ -15,7 +15,7 @@ const MESSAGE_DATA: u8 = 1;
 const MESSAGE_HEAD: usize = 1 + 4 + 8;
 
 /// The newest supported subprotocol of a client's offer, a list separated by commas.
-pub(super) fn choose_subprotocol(offered: &str) -> Option<&'static str> {
+pub(in crate::live) fn choose_subprotocol(offered: &str) -> Option<&'static str> {
     let offers = |name: &&str| offered.split(',').any(|offer| offer.trim() == *name);
     SUBPROTOCOLS.into_iter().find(offers)
 }

@@ -2,25 +2,28 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::time::Duration;
 
-use masseter_recording::{Channel, Topic};
+use masseter_recording::{Channel, MachineInfo, Topic};
 use masseter_shared::clock;
-use masseter_shared::config::JawConfig;
+use masseter_shared::config::{JawConfig, Scenario};
 use masseter_shared::geometry::{Mechanism, MechanismConfig};
 use masseter_shared::messages::State;
+use masseter_shared::messages::codes::ControllerState;
 use tungstenite::client::IntoClientRequest;
 use tungstenite::http::HeaderValue;
 use tungstenite::{Message, WebSocket};
 
 use super::*;
 
-fn server() -> FoxgloveServer {
+fn server() -> LiveServer {
     let scene = Scene::new(&Mechanism::new(&MechanismConfig::default()).unwrap(), &JawConfig::default());
     let listener = Listener::bind("127.0.0.1:0".parse().unwrap()).unwrap();
-    FoxgloveServer::start(listener, scene, Declared::default(), Domain::named("test").unwrap()).unwrap()
+    let machine = MachineInfo { cpu: String::new(), cores: 2, kernel: String::new(), is_virtual: false };
+    let manifest = Manifest::new(Scenario::default(), 1.0, "rt", machine);
+    LiveServer::start(listener, manifest, scene, Declared::default(), Domain::named("test").unwrap()).unwrap()
 }
 
 /// A client whose subscription to the controller's state the server has received.
-fn client_of(server: &FoxgloveServer) -> WebSocket<TcpStream> {
+fn client_of(server: &LiveServer) -> WebSocket<TcpStream> {
     let mut request = server.url().into_client_request().unwrap();
     request.headers_mut().insert("Sec-WebSocket-Protocol", HeaderValue::from_static("foxglove.sdk.v1"));
     let (mut socket, _) = tungstenite::client(request, TcpStream::connect(server.address).unwrap()).unwrap();
@@ -33,7 +36,7 @@ fn client_of(server: &FoxgloveServer) -> WebSocket<TcpStream> {
 }
 
 /// The first line that the server answers to a handshake with these headers.
-fn answer_to(server: &FoxgloveServer, path: &str, headers: &str) -> String {
+fn answer_to(server: &LiveServer, path: &str, headers: &str) -> String {
     let mut stream = TcpStream::connect(server.address).unwrap();
     let request = format!(
         "GET {path} HTTP/1.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n\
@@ -43,6 +46,62 @@ fn answer_to(server: &FoxgloveServer, path: &str, headers: &str) -> String {
     let mut line = String::new();
     BufReader::new(stream).read_line(&mut line).unwrap();
     line
+}
+
+/// The answer to a browser that asks for this path of this host.
+fn page_at(server: &LiveServer, path: &str, host: &str) -> String {
+    let mut stream = TcpStream::connect(server.address).unwrap();
+    stream.write_all(format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n").as_bytes()).unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    answer
+}
+
+#[test]
+fn a_browser_with_the_secret_gets_the_page_and_no_other_one_does() {
+    let server = server();
+    let path = format!("/{}", server.secret);
+    let page = page_at(&server, &path, "127.0.0.1");
+    assert!(page.starts_with("HTTP/1.1 200") && page.trim_end().ends_with("</html>"));
+    assert!(page.contains(r#""life":"live""#));
+    for (path, host) in [("/", "127.0.0.1"), (&*path, "evil.example")] {
+        let answer = page_at(&server, path, host);
+        assert!(answer.starts_with("HTTP/1.1 403") && !answer.contains("<html"), "{answer}");
+    }
+}
+
+#[test]
+fn a_page_gets_what_has_changed_since_it_was_made() {
+    let server = server();
+    assert!(page_at(&server, &format!("/{}", server.secret), "127.0.0.1").contains(r#""number":1"#));
+    let url = format!("{}?after=1", server.url());
+    let mut request = url.into_client_request().unwrap();
+    request.headers_mut().insert("Sec-WebSocket-Protocol", HeaderValue::from_static("masseter.page.v1"));
+    let stream = TcpStream::connect(server.address).unwrap();
+    let (mut socket, _) = tungstenite::client(request, stream).unwrap();
+    let running = ControllerState::Running.code();
+    for cycle in 1..=2000 {
+        let times = (cycle * 1_000_000, cycle * 1_000_000 + 1000);
+        let state = State {
+            seq: cycle,
+            cycle,
+            due_ns: times.0,
+            woke_ns: times.1,
+            controller_state: running,
+            ..State::default()
+        };
+        server.offer(&Recorded::State(state), times.1);
+    }
+    let mut comes = |parts: [&str; 2]| {
+        (0..40).any(|_| {
+            let message = socket.read().unwrap();
+            parts.iter().all(|part| message.to_text().unwrap().contains(part))
+        })
+    };
+    assert!(
+        comes([r#""state":"running""#, r#"["controller wake-up","2000""#]),
+        "state and table stay as they were"
+    );
 }
 
 #[test]
@@ -89,7 +148,7 @@ fn comes_true(is_so: impl Fn() -> bool) -> bool {
 }
 
 /// Offers messages until one is dropped; returns how many were offered.
-fn offer_until_one_is_dropped(server: &FoxgloveServer) -> u64 {
+fn offer_until_one_is_dropped(server: &LiveServer) -> u64 {
     let mut offered = 0;
     while server.counts().dropped == 0 {
         assert!(offered < 1_000_000, "there is room for everything");

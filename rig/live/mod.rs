@@ -1,14 +1,17 @@
-//! A WebSocket server for Foxglove: shows a run while it goes on, with the channels, schemas and bytes of the recording.
+//! Shows a run while it goes on: as a page in a browser, and in Foxglove with the channels, schemas and bytes of the recording.
 //!
 //! Each client has a thread and a queue of fixed length of its own. The recorder puts messages into the queues and never
 //! waits for a client; no other process is involved. A message without room is dropped and counted. The server of the
 //! `foxglove` crate counts no drops and brings an asynchronous runtime, so it is not used. Parameters are read and set at the
-//! controller, by the client's thread. There are no services, assets or publishing clients. Who connects must name the
-//! secret of the URL.
+//! controller, by the client's thread. Who connects must name the secret of the URL.
 
 mod admission;
 mod client;
-mod protocol;
+mod foxglove;
+mod handshake;
+mod page;
+mod request;
+mod supervisor;
 #[cfg(test)]
 mod tests;
 
@@ -19,12 +22,14 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use masseter_recording::{Recorded, Scene};
+use masseter_recording::{Manifest, Recorded, Scene};
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::named::Declared;
 use masseter_shared::transport::{Domain, secret};
 
-use client::{Client, Greeting};
+use client::{Client, Host};
+use page::Feed;
+use supervisor::Supervisor;
 
 /// The default address: this machine only, on Foxglove's usual port.
 pub(crate) const DEFAULT_ADDRESS: &str = "127.0.0.1:8765";
@@ -50,7 +55,7 @@ pub(crate) struct ClientLosses {
 /// The server cannot listen on its address.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "cannot listen for Foxglove on {address}: {error}; choose another with --live=PORT or --live=ADDR:PORT (port 0 takes a free one)"
+    "cannot listen for browsers and Foxglove on {address}: {error}; choose another with --live=PORT or --live=ADDR:PORT (port 0 takes a free one)"
 )]
 pub(crate) struct ListenError {
     /// The requested address.
@@ -94,9 +99,10 @@ impl Listener {
 
 /// A running server.
 #[derive(Debug)]
-pub(crate) struct FoxgloveServer {
+pub(crate) struct LiveServer {
     address: SocketAddr,
     secret: String,
+    feed: Arc<Feed>,
     clients: Arc<Clients>,
     dropped: AtomicU64,
     accepting: JoinHandle<()>,
@@ -114,7 +120,7 @@ impl Clients {
     }
 
     /// Accepts clients and disconnects those without room, until the server closes.
-    fn accept(&self, listener: &TcpListener, scene: &Scene, greeting: &Greeting) {
+    fn accept(&self, listener: &TcpListener, host: &Host) {
         let mut newcomers = Vec::new();
         while !self.is_closing.load(Ordering::Relaxed) {
             let now_ns = clock::now_ns();
@@ -128,7 +134,7 @@ impl Clients {
             }
             let handshake_by_ns = now_ns + HANDSHAKE_NS;
             // Without a thread for it, the client is disconnected.
-            newcomers.extend(Client::start(stream, scene.clone(), greeting.clone(), handshake_by_ns));
+            newcomers.extend(Client::start(stream, host.clone(), handshake_by_ns));
             clock::sleep(ACCEPT_INTERVAL);
         }
         self.admit(&mut newcomers, clock::now_ns());
@@ -168,7 +174,7 @@ fn bind(address: SocketAddr) -> Result<TcpListener, ListenError> {
     bound.map_err(|error| ListenError { address, error })
 }
 
-impl FoxgloveServer {
+impl LiveServer {
     /// Serves clients that name the secret, which is new. The domain is that of the run, whose controller makes the
     /// declaration.
     ///
@@ -176,23 +182,35 @@ impl FoxgloveServer {
     /// When the system refuses a thread or random numbers.
     pub(crate) fn start(
         Listener { listener, address }: Listener,
+        manifest: Manifest,
         scene: Scene,
         declared: Declared,
         domain: Domain,
     ) -> Result<Self, ListenError> {
-        let secret = secret().map_err(|error| ListenError { address, error })?;
+        let refused = |error| ListenError { address, error };
+        let secret = secret().map_err(refused)?;
+        let feed = Feed::start(manifest, &declared).map_err(refused)?;
+        let host = Host {
+            secret: secret.clone(),
+            scene,
+            declared: Arc::new(declared),
+            domain,
+            feed: Arc::clone(&feed),
+            supervisor: Supervisor::of_this_process(),
+        };
         let clients = Arc::new(Clients::default());
         let accepted = Arc::clone(&clients);
-        let texts = [protocol::server_info(domain.id(), &declared), protocol::advertise(&declared)];
-        let declared = Arc::new(declared);
-        let greeting = Greeting { secret: secret.clone(), texts, declared, domain };
-        let accept = move || accepted.accept(&listener, &scene, &greeting);
         let accepting =
-            thread::Builder::new().spawn(accept).map_err(|error| ListenError { address, error })?;
-        Ok(Self { address, secret, clients, dropped: AtomicU64::new(0), accepting })
+            thread::Builder::new().spawn(move || accepted.accept(&listener, &host)).map_err(refused)?;
+        Ok(Self { address, secret, feed, clients, dropped: AtomicU64::new(0), accepting })
     }
 
-    /// The URL for clients, with the secret.
+    /// The address of the page, with the secret.
+    pub(crate) fn page_url(&self) -> String {
+        format!("http://{}/{}", self.address, self.secret)
+    }
+
+    /// The URL for Foxglove, with the secret.
     pub(crate) fn url(&self) -> String {
         format!("ws://{}/{}", self.address, self.secret)
     }
@@ -200,6 +218,7 @@ impl FoxgloveServer {
     /// Queues a message that was received at `log_time_ns` for the clients that subscribe to its topic. Never waits for
     /// one.
     pub(crate) fn offer(&self, message: &Recorded, log_time_ns: u64) {
+        self.feed.offer(message);
         let clients = self.clients.connected();
         let dropped = clients.iter().filter(|client| !client.offer(message, log_time_ns)).count();
         self.dropped.fetch_add(dropped as u64, Ordering::Relaxed);

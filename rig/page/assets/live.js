@@ -1,0 +1,87 @@
+// The page of a run that goes on: its state, its parameters, and the connection that keeps it up to date.
+{
+  const { element, rich } = Masseter;
+  // Time until a lost connection is tried again, ms.
+  const AGAIN_MS = 1000;
+  let socket = null, isOver = false;
+
+  const ask = (wish) => { if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(wish)); };
+
+  Masseter.block('live', (holder, data) => {
+    const word = element('strong', {}), progress = element('p', {}), figures = element('dl', { class: 'figures' });
+    const panel = element('div', { class: 'panel' }, element('span', { class: 'name' }, 'state'), word, progress);
+    const stop = element('button', { type: 'button', class: 'stop', onclick: () => {
+      stop.disabled = true;
+      stop.textContent = 'stopping …';
+      ask({ op: 'stop' });
+    } }, 'stop the run');
+    const note = element('p', { class: 'note', role: 'status' });
+    holder.append(element('div', { class: 'live' }, panel, stop), note, figures);
+    const update = (now) => {
+      if (word.textContent !== now.state) Masseter.say(now.state);
+      panel.className = `panel ${now.tone}`;
+      word.textContent = now.state;
+      progress.textContent = now.progress;
+      figures.replaceChildren(...now.figures.map(([name, value]) => element('div', {}, element('dt', {}, name), element('dd', {}, value))));
+    };
+    update(data);
+    Masseter.live = { number: data.number, say: (text) => { note.textContent = text; }, end: () => { stop.disabled = true; stop.textContent = 'stop the run'; } };
+    return { update };
+  });
+
+  Masseter.block('parameters', (holder, data) => {
+    const inputs = new Map();
+    const row = ({ name, unit, about, value, range: [least, most] }) => {
+      const input = element('input', { type: 'number', id: `parameter-${name}`, min: least, max: most, step: 'any', value,
+        onchange: () => ask({ op: 'set', name, value: Number(input.value) }) });
+      inputs.set(name, input);
+      return element('tr', {}, element('th', { scope: 'row' }, element('label', { for: input.id }, name)), element('td', {}, input, unit ? ` ${unit}` : ''),
+        element('td', {}, `${least} to ${most}`), element('td', {}, ...rich(about)));
+    };
+    const head = ['parameter', 'value', 'range', 'meaning'].map((title) => element('th', { scope: 'col' }, title));
+    holder.append(element('div', { class: 'table', tabindex: 0, role: 'region', 'aria-label': 'Parameters' },
+      element('table', {}, element('thead', {}, element('tr', {}, ...head)), element('tbody', {}, ...data.map(row)))));
+    return {
+      // Another value came from the controller; what the user types stays.
+      update(now) {
+        for (const { name, value } of now) {
+          const input = inputs.get(name);
+          if (input && input !== document.activeElement) input.value = value;
+        }
+      },
+    };
+  });
+
+  function take(message) {
+    if (message.reload) { location.reload(); return; }
+    if (message.refused) Masseter.live.say(message.refused);
+    if (message.over) {
+      isOver = true;
+      Masseter.live.end();
+      Masseter.live.say('The run is over. Its report has the verdict.');
+    }
+    if (message.end_s === undefined) return;
+    Masseter.live.number += 1;
+    if (message.motion_s !== undefined) Masseter.time.setMotion(message.motion_s);
+    for (const { name, from_s: from } of message.enter || []) Masseter.enter(name, from);
+    for (const [above, section] of message.sections || []) Masseter.section(section, above);
+    for (const [id, series, points] of message.append) Masseter.append(id, series, points);
+    for (const [id, data] of message.update) Masseter.update(id, data);
+    for (const moment of message.mark || []) Masseter.mark(moment);
+    Masseter.time.extend(message.end_s);
+  }
+
+  // Called once the page is built.
+  Masseter.connect = () => {
+    const address = `${location.href.split(/[?#]/)[0].replace(/^http/, 'ws')}?after=${Masseter.live.number}`;
+    socket = new WebSocket(address, 'masseter.page.v1');
+    socket.onmessage = ({ data }) => take(JSON.parse(data));
+    socket.onopen = () => { Masseter.live.say(''); document.documentElement.dataset.live = 'yes'; };
+    socket.onclose = () => {
+      document.documentElement.dataset.live = 'no';
+      if (isOver) return;
+      Masseter.live.say('The connection is lost.');
+      setTimeout(Masseter.connect, AGAIN_MS);
+    };
+  };
+}
