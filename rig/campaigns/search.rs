@@ -186,10 +186,14 @@ range = [0.5, 1.0]
     /// The corner in which the controller fails: its middle and half its width, as shares of each range.
     const CORNER: [f64; 2] = [0.85, 0.1];
 
-    /// The law follows the desired pose, but beside it by 0.2 mm in the middle of the corner, and by less further away.
+    /// Cycles in which the law goes aside: a jump would be a safe stop.
+    const EASED: u32 = 100;
+
+    /// The law follows the desired pose, but beside it by 0.22 mm in the middle of the corner, and by less further away.
     #[derive(Debug)]
     struct WeakInACorner {
         beside_m: Vec3,
+        cycles: u32,
     }
 
     impl WeakInACorner {
@@ -208,14 +212,16 @@ range = [0.5, 1.0]
             let distance = shares.iter().map(|share| (share - middle).abs()).fold(0.0, f64::max);
             // On the border of the corner the error is the limit.
             let beside_mm = 0.2 * (1.0 - (distance - half));
-            Self { beside_m: Vec3::new(0.0, 0.0, beside_mm * 1e-3) }
+            Self { beside_m: Vec3::new(0.0, 0.0, beside_mm * 1e-3), cycles: 0 }
         }
     }
 
     impl PoseLaw for WeakInACorner {
         fn command(&mut self, demand: &Demand) -> Result<Pose, LawFailed> {
+            self.cycles = (self.cycles + 1).min(EASED);
+            let share = 0.5 - 0.5 * (std::f64::consts::PI * f64::from(self.cycles) / f64::from(EASED)).cos();
             let mut pose = demand.ahead;
-            pose.translation.vector += self.beside_m;
+            pose.translation.vector += share * self.beside_m;
             Ok(pose)
         }
     }
