@@ -40,6 +40,16 @@ Masseter.block = (kind, build) => { Masseter.builders[kind] = build; };
     return grouped(Number(text) === 0 ? text.replace('-', '') : text);
   };
 
+  // A number with at most six significant digits, without zeros at its end.
+  Masseter.short = (value) => grouped(String(Number(value.toPrecision(6))));
+
+  const ruler = document.createElement('canvas').getContext('2d');
+  // Width of a text in a drawing, px.
+  Masseter.textWidth = (text, size = 12) => {
+    ruler.font = `${size}px system-ui, sans-serif`;
+    return ruler.measureText(text).width;
+  };
+
   // A number with so many significant digits.
   Masseter.significant = (value, digits = 4) => {
     if (value === 0) return '0';

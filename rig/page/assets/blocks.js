@@ -13,7 +13,7 @@
       element('span', { class: 'name' }, name), element('strong', {}, word), reason ? element('p', {}, ...rich(reason)) : null);
     const update = (now) => {
       const figures = now.figures.map(([name, value]) => [element('dt', {}, name), element('dd', {}, value)]);
-      holder.replaceChildren(element('div', { class: 'verdict' }, panel('function', now.tone, now.word, now.reason),
+      holder.replaceChildren(element('div', { class: 'panels' }, panel('function', now.tone, now.word, now.reason),
         panel('timing', now.timing_tone, now.timing, now.timing_reason)), element('dl', { class: 'figures' }, ...figures.map((pair) => element('div', {}, ...pair))));
     };
     update(data);
@@ -23,7 +23,7 @@
   Masseter.block('table', (holder, data, clock) => {
     const cell = (content, { is_number: isNumber }, isFirst) => {
       const td = element(isFirst ? 'th' : 'td', { class: isNumber ? 'number' : '', scope: isFirst ? 'row' : null });
-      if (typeof content === 'string') td.append(...rich(content));
+      if (typeof content === 'string') td.append(...rich(isNumber ? content.replace(/^-/, '\u2212') : content));
       else if (content.mark !== undefined) td.append(element('span', { class: `mark ${content.tone}` }, content.mark));
       else Masseter.chart(td.appendChild(element('div', { class: 'small' })), content.plot, clock, true);
       return td;
@@ -89,7 +89,7 @@
       const phases = Masseter.phases.filter(({ from_s: from, to_s: to }) => to > clock.window[0] && from < clock.window[1]).map((phase, at) => {
         const [from, to] = [clamp(phase.from_s), clamp(phase.to_s)];
         return svg('g', { class: `phase ${phase.name.replace(/\W+/g, '-')}` }, svg('title', {}, phase.name), svg('rect', { x: from, y: 3, width: Math.max(0.5, to - from), height: ROW - 6 }),
-          to - from > phase.name.length * 6.4 + 6 ? svg('text', { x: (from + to) / 2, y: 16, 'text-anchor': 'middle' }, phase.name) : null);
+          to - from > Masseter.textWidth(phase.name) + 6 ? svg('text', { x: (from + to) / 2, y: 16, 'text-anchor': 'middle' }, phase.name) : null);
       });
       const rows = sources.map((source, row) => {
         const y = ROW * (row + 1.5);
@@ -97,9 +97,9 @@
           .map((event) => svg('circle', { cx: x.position(event.at_s).toFixed(1), cy: y, r: 4, class: event.is_fault ? 'fault' : 'event' }, svg('title', {}, `${clock.text(event.at_s)} ${event.text}`)));
         return svg('g', {}, svg('line', { x1: LEFT, x2: width - RIGHT, y1: y, y2: y, class: 'mesh' }), svg('text', { x: LEFT - 8, y: y + 4, class: 'tick', 'text-anchor': 'end' }, source), ...marks);
       });
-      const ticks = clock.ticks(clock.window, Math.max(3, Math.floor((width - LEFT) / 90)))
+      const ticks = clock.ticks(clock.window, Math.max(3, Math.floor((width - LEFT) / clock.tickRoom)))
         .map(({ value, text }) => svg('text', { x: x.position(value), y: bottom + 16, class: 'tick', 'text-anchor': 'middle' }, text));
-      drawing.replaceChildren(svg('text', { x: LEFT - 8, y: 16, class: 'tick', 'text-anchor': 'end' }, 'controller'), ...phases, ...rows, ...ticks,
+      drawing.replaceChildren(svg('text', { x: LEFT - 8, y: 16, class: 'tick', 'text-anchor': 'end' }, 'state'), ...phases, ...rows, ...ticks,
         svg('text', { x: width - RIGHT, y: bottom + 32, class: 'tick', 'text-anchor': 'end' }, clock.label), svg('line', { class: 'cursor-line', y1: 0, y2: bottom }));
       cursor();
     }

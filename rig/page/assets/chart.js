@@ -2,11 +2,13 @@
 {
   const { element, svg } = Masseter;
   const ROOM = { left: 62, right: 16, top: 8, below: 38 };
+  // On a phone every pixel counts.
+  const NARROW = { width: 500, left: 46, right: 10 };
   const SMALL = { left: 2, right: 2, top: 3, below: 3 };
-  // Height of a row of names above the plot, and width of a letter, px.
-  const ROW = 16, LETTER = 6.4;
+  // Height of a row of names above the plot, px.
+  const ROW = 16;
   // A limit further from the curves than this many times their height is written, not drawn.
-  const FAR = 1.5;
+  const FAR = 0.6;
   const PALETTE = 8;
   const OWN_COLOUR = { desired: 'desired', true: 'true', estimated: 'estimated' };
   const all = new Set();
@@ -30,7 +32,7 @@
     const own = series.colour === undefined && OWN_COLOUR[series.style];
     const stroke = own ? `var(--${own})` : `var(--c${number % PALETTE})`;
     const isSecond = !own && number >= PALETTE;
-    return { name: series.name, style: series.style, xs, ys, stroke, isSecond, isShown: true, place };
+    return { name: series.name, style: series.style, xs, ys, step: Infinity, stroke, isSecond, isShown: true, place };
   }
 
   function preparedAll(data) {
@@ -61,10 +63,10 @@
   }
 
   // The ends of the vertical axis, and the limits that lie near enough.
-  function fitted(found, limits, isLog) {
+  function fitted(found, limits, isLog, isWhole) {
     let [low, high] = found;
     const far = FAR * Math.max(high - low, 1e-9 * Math.abs(high));
-    const isNear = (value) => isLog || (value >= low - far && value <= high + far);
+    const isNear = (value) => isLog || isWhole || (value >= low - far && value <= high + far);
     const near = limits.flatMap(({ name, values }) => values.filter(isNear).map((value) => ({ name, value })));
     const beyond = limits.map(({ name, values }) => ({ name, values: values.filter((value) => !isNear(value)) }))
       .filter(({ values }) => values.length);
@@ -74,17 +76,26 @@
     return { ends: [low - margin, high + margin], near, beyond };
   }
 
-  // Gives each moment in the window a row above the plot, so that no two names cover each other.
+  // Moments closer together than this share a name, px.
+  const CLOSE = 14;
+
+  // Gives the moments in the window names and rows above the plot, so that no two names cover each other.
   function placed(moments, window, axis, right) {
-    const ends = [];
-    return moments.filter(({ at_s: at }) => at >= window[0] && at <= window[1]).sort((a, b) => a.at_s - b.at_s).map((moment) => {
-      const x = axis.position(moment.at_s), width = moment.name.length * LETTER + 10;
-      const isLeft = x + width > right;
+    const ends = [], joined = [];
+    for (const moment of moments.filter(({ at_s: at }) => at >= window[0] && at <= window[1]).sort((a, b) => a.at_s - b.at_s)) {
+      const x = axis.position(moment.at_s), last = joined[joined.length - 1];
+      if (last && x - last.marks[last.marks.length - 1].x < CLOSE) last.marks.push({ ...moment, x });
+      else joined.push({ marks: [{ ...moment, x }] });
+    }
+    return joined.map(({ marks }) => {
+      const name = marks.map((one) => one.name).join(', '), width = Masseter.textWidth(name, 11.5) + 10;
+      const isLeft = marks[marks.length - 1].x + width > right;
+      const x = marks[isLeft ? 0 : marks.length - 1].x;
       const from = isLeft ? x - width : x;
       let row = ends.findIndex((end) => end <= from);
       if (row < 0) row = ends.push(0) - 1;
       ends[row] = from + width;
-      return { ...moment, x, row, isLeft };
+      return { marks, name, x, row, isLeft };
     });
   }
 
@@ -130,6 +141,7 @@
 
     function draw() {
       isDirty = false;
+      if (isTime) series.forEach((one) => { one.step = Masseter.longestStep(one.xs); });
       const width = Math.round(holder.clientWidth) || 640;
       const window = isTime ? clock.window : ownWindow();
       const shown = series.filter(({ isShown }) => isShown);
@@ -144,8 +156,8 @@
         drawing.append(svg('text', { x: isSmall ? 4 : ROOM.left, y: height / 2 + 4, class: 'empty' }, chart.isShowing ? 'Nothing in this stretch.' : data.otherwise));
         return;
       }
-      const room = isSmall ? SMALL : ROOM;
-      const { ends, near, beyond } = fitted(found, data.limits || [], isLog);
+      const room = isSmall ? SMALL : width < NARROW.width ? { ...ROOM, ...NARROW } : ROOM;
+      const { ends, near, beyond } = fitted(found, data.limits || [], isLog, isSmall);
       const right = width - room.right;
       const x = Masseter.axis(isLogX, window, [room.left, right]);
       const moments = isTime ? placed([...(isSmall ? [] : Masseter.moments), ...(data.moments || [])], window, x, right) : [];
@@ -155,7 +167,7 @@
       plot = { x, y, left: room.left, right, top, bottom, window };
       size(width, bottom + room.below);
       drawing.append(svg('clipPath', { id: clip }, svg('rect', { x: room.left, y: top, width: right - room.left, height: data.height })));
-      if (!isSmall) drawing.append(...grid(width));
+      if (!isSmall) drawing.append(...grid());
       drawing.append(svg('g', { 'clip-path': `url(#${clip})` }, ...near.map(level), ...shown.map(curve)));
       if (!isSmall) drawing.append(...near.map(levelName));
       drawing.append(...moments.map(mark), svg('g', { class: 'cursor' }));
@@ -174,9 +186,9 @@
       drawing.setAttribute('height', height);
     }
 
-    function grid(width) {
+    function grid() {
       const { x, y, left, right, top, bottom, window } = plot;
-      const many = Math.max(3, Math.floor((right - left) / 90)), few = Math.max(3, Math.floor(data.height / 40));
+      const many = Math.max(3, Math.floor((right - left) / (isTime ? clock.tickRoom : 64))), few = Math.max(4, Math.floor(data.height / 27));
       const across = isTime ? clock.ticks(window, many) : isLogX ? Masseter.percentileTicks(window) : Masseter.linearTicks(window, many);
       const up = isLog ? Masseter.logTicks(y.ends, few) : Masseter.linearTicks(y.ends, few);
       const vertical = across.map(({ value, text }) => [
@@ -187,15 +199,15 @@
         svg('text', { x: left - 6, y: y.position(value) + 4, class: 'tick', 'text-anchor': 'end' }, text)]);
       const name = isTime ? clock.label : isLogX ? 'percentile' : data.across.values;
       return [...vertical.flat(), ...horizontal.flat(), svg('rect', { x: left, y: top, width: right - left, height: bottom - top, class: 'frame' }),
-        svg('text', { x: width - ROOM.right, y: bottom + 32, class: 'tick', 'text-anchor': 'end' }, name)];
+        svg('text', { x: right, y: bottom + 32, class: 'tick', 'text-anchor': 'end' }, name)];
     }
 
     function curve(one) {
       const { x, y, window } = plot;
-      const points = Masseter.thinned(one, window, x.position, plot.right - plot.left)
-        .filter((at) => !isLog || one.ys[at] > 0)
-        .map((at) => `${x.position(one.xs[at]).toFixed(1)} ${y.position(one.ys[at]).toFixed(1)}`);
-      return svg('path', { ...strokeOf(one), d: points.length ? `M${points.join('L')}` : '' });
+      const places = Masseter.thinned(one, window, x.position, plot.right - plot.left).filter((at) => !isLog || one.ys[at] > 0);
+      const joins = (at, before) => before !== undefined && one.xs[at] - one.xs[at - 1] <= one.step;
+      const points = places.map((at, place) => `${joins(at, places[place - 1]) ? 'L' : 'M'}${x.position(one.xs[at]).toFixed(1)} ${y.position(one.ys[at]).toFixed(1)}`);
+      return svg('path', { ...strokeOf(one), d: points.join('') });
     }
 
     function level({ value }) {
@@ -206,17 +218,19 @@
     function levelName({ name, value }) {
       const at = plot.y.position(value), isHigh = at - plot.top < 18;
       return svg('text', { x: plot.right - 4, y: at + (isHigh ? 13 : -4), class: 'limit-name', 'text-anchor': 'end' },
-        `${name} ${Masseter.significant(value)} ${data.unit}`);
+        `${name} ${Masseter.short(value)} ${data.unit}`);
     }
 
-    const inWords = ({ name, values }) => `${name} ${values.map((value) => Masseter.significant(value)).join(' and ')} ${data.unit}`.trim();
+    const inWords = ({ name, values }) => `${name} ${values.map(Masseter.short).join(' and ')} ${data.unit}`.trim();
 
-    function mark({ x, row, kind, name, text, isLeft }) {
+    function mark({ marks, name, x, row, isLeft }) {
       const from = isSmall ? plot.top : ROOM.top + ROW * row;
-      const side = isLeft ? -5 : 5;
-      return svg('g', { class: `moment ${kind}` }, svg('title', {}, text),
-        svg('line', { x1: x, x2: x, y1: from, y2: plot.bottom }),
-        ...(isSmall ? [] : [svg('text', { x: x + side, y: from + 11, 'text-anchor': isLeft ? 'end' : 'start' }, name)]));
+      const lines = marks.map((one) => svg('g', { class: `moment ${one.kind}` }, svg('title', {}, `${one.text}, ${clock.text(one.at_s)}`),
+        svg('line', { x1: one.x, x2: one.x, y1: from, y2: plot.bottom })));
+      if (isSmall) return svg('g', {}, ...lines);
+      const kind = marks.every((one) => one.kind === 'note') ? 'note' : 'fault';
+      return svg('g', {}, ...lines, svg('g', { class: `moment ${kind}` },
+        svg('text', { x: x + (isLeft ? -5 : 5), y: from + 11, 'text-anchor': isLeft ? 'end' : 'start' }, name)));
     }
 
     // The line of the cursor, a dot on each curve, the values in the legend and, under the pointer, in a box.
@@ -245,7 +259,7 @@
     function box(x, shown, values) {
       const lines = [view.text(view.cursor), ...shown.map((one, place) => (values[place] === null ? null : `${one.name}  ${valueText(values[place])}`))]
         .filter((line) => line !== null);
-      const width = Math.max(...lines.map((line) => line.length)) * LETTER + 14, height = lines.length * 15 + 8;
+      const width = Math.max(...lines.map((line) => Masseter.textWidth(line))) + 16, height = lines.length * 15 + 8;
       const left = x + 10 + width > plot.right ? x - 10 - width : x + 10;
       const top = plot.top + 4;
       return svg('g', { class: 'box' }, svg('rect', { x: left, y: top, width, height, rx: 4 }),
@@ -263,7 +277,7 @@
       legend.replaceChildren(...series.map((one) => element('button', {
         type: 'button', 'data-place': one.place, 'aria-pressed': String(one.isShown), title: `Show or hide ${one.name}`,
         onclick: () => { one.isShown = !one.isShown; writeLegend(); redraw(); },
-      }, svg('svg', { width: 28, height: 12, 'aria-hidden': 'true' }, svg('path', { ...strokeOf(one), d: 'M2 6H26' })),
+      }, svg('svg', { width: 22, height: 12, 'aria-hidden': 'true' }, svg('path', { ...strokeOf(one), d: 'M2 6H20' })),
       element('span', {}, one.name), element('span', { class: 'value' }))));
       drawing.setAttribute('aria-label', summary());
       moveCursor();
@@ -282,7 +296,10 @@
       clock.on('mode', redraw);
       clock.on('cursor', () => { if (isVisible) moveCursor(); });
     }
-    new IntersectionObserver(([entry]) => { isVisible = entry.isIntersecting; if (isVisible && isDirty) redraw(); }, { rootMargin: '300px' })
+    new IntersectionObserver(([entry]) => {
+      isVisible = entry.isIntersecting;
+      if (isVisible && isDirty) redraw(); else if (isVisible) moveCursor();
+    }, { rootMargin: '300px' })
       .observe(holder);
     new ResizeObserver(([entry]) => { if (plot === null || Math.abs(entry.contentRect.width - drawing.viewBox.baseVal.width) > 1) redraw(); })
       .observe(holder);

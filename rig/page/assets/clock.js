@@ -8,7 +8,7 @@
   Masseter.clock = (time) => {
     const listeners = { cursor: [], window: [], mode: [], play: [], range: [] };
     const tell = (what) => listeners[what].forEach((listener) => listener());
-    const began = time.began ? Date.parse(time.began) / 1000 : null;
+    const began = time.wall_s ?? null;
     let range = [0, Math.max(time.end_s, 1e-3)], window = [...range], before = null;
 
     const clock = {
@@ -81,6 +81,8 @@
         if (clock.mode === 'wall') return 'time, UTC';
         return time.motion_s === null ? 'time since the first SYNC, s' : 'motion time, s';
       },
+      // Room that a tick's text needs, px.
+      get tickRoom() { return clock.mode === 'wall' ? 100 : 64; },
       // Ticks between two times.
       ticks([from, to], most) {
         const shift = clock.shown(0), scale = clock.mode === 'cycle' ? 1 / time.period_s : 1;

@@ -31,7 +31,7 @@
     let x = 10, row = 0;
     const shown = series.filter(({ isShown }) => isShown), keys = [];
     shown.forEach((one) => {
-      const room = 40 + one.name.length * 7;
+      const room = 40 + Masseter.textWidth(one.name);
       if (x + room > width && x > 10) { x = 10; row += 1; }
       const line = svg('path', { d: `M${x} ${36 + row * 18}h24` });
       const drawn = getComputedStyle(drawing.querySelectorAll('path.curve')[keys.length / 2] || drawing);

@@ -27,9 +27,10 @@
     Masseter.phases.push({ name, from_s: at, to_s: at });
   };
 
-  function build({ id, kind, data }) {
-    const holder = element('div', { id, class: `block ${kind}` });
-    return [holder, () => {
+  function build({ id, kind, data, folded, is_half: isHalf }) {
+    const holder = element('div', { id, class: `block block-${kind}${isHalf ? ' half' : ''}` });
+    const whole = folded ? element('details', { class: 'block' }, element('summary', {}, folded), holder) : holder;
+    return [whole, () => {
       const handle = Masseter.builders[kind]?.(holder, data, clock);
       if (handle) Masseter.handles.set(id, handle);
     }];
@@ -86,7 +87,7 @@
     show();
   }
 
-  document.getElementById('top').append(element('h1', {}, page.title), spoken);
+  document.getElementById('top').append(element('h1', {}, page.title), element('p', { class: 'about' }, page.about), spoken);
   document.getElementById('sections').replaceChildren();
   const built = page.sections.map(section);
   document.getElementById('sections').append(...built.map(([whole]) => whole));
@@ -95,7 +96,15 @@
   links();
   timeBar();
   built.forEach(([, start]) => start());
-  addEventListener('beforeprint', Masseter.drawAll);
+  // Paper shows everything, also what is folded.
+  addEventListener('beforeprint', () => {
+    document.querySelectorAll('section details').forEach((details) => { details.dataset.was = details.open; details.open = !details.classList.contains('menu'); });
+    Masseter.drawAll();
+  });
+  addEventListener('afterprint', () => {
+    document.querySelectorAll('section details[data-was]').forEach((details) => { details.open = details.dataset.was === 'true'; });
+    Masseter.drawAll();
+  });
   document.documentElement.dataset.ready = 'yes';
   if (page.life === 'live') Masseter.connect();
 }

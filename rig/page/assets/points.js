@@ -33,11 +33,19 @@
     return low;
   };
 
-  // The value at x, on the line between two points; none outside the curve.
-  Masseter.valueAt = ({ xs, ys }, x) => {
+  // The longest step of x that is no gap: points further apart than six usual steps are not joined.
+  Masseter.longestStep = (xs) => {
+    const every = Math.max(1, Math.floor(xs.length / 200)), steps = [];
+    for (let at = every; at < xs.length; at += every) steps.push(xs[at] - xs[at - 1]);
+    return steps.length < 8 ? Infinity : 6 * steps.sort((a, b) => a - b)[steps.length >> 1];
+  };
+
+  // The value at x, on the line between two points; none outside the curve and in its gaps.
+  Masseter.valueAt = ({ xs, ys, step = Infinity }, x) => {
     if (!xs.length || x < xs[0] || x > xs[xs.length - 1]) return null;
     const after = Math.max(1, Masseter.placeOf(xs, x)), before = after - 1;
     if (after >= xs.length) return ys[xs.length - 1];
+    if (xs[after] - xs[before] > step) return null;
     const share = xs[after] > xs[before] ? (x - xs[before]) / (xs[after] - xs[before]) : 1;
     return ys[before] + share * (ys[after] - ys[before]);
   };

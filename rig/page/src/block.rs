@@ -31,6 +31,12 @@ impl Section {
 pub struct Block {
     /// Unique in the page: a live view changes the block by it.
     pub id: String,
+    /// Where it is folded at first: what stands there instead.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub folded: Option<String>,
+    /// Whether it takes half the width of a wide screen.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub is_half: bool,
     /// What it shows.
     #[serde(flatten)]
     pub content: Content,
@@ -40,7 +46,19 @@ impl Block {
     /// A block of this id.
     #[must_use]
     pub fn new(id: impl Into<String>, content: Content) -> Self {
-        Self { id: id.into(), content }
+        Self { id: id.into(), folded: None, is_half: false, content }
+    }
+
+    /// Folded at first.
+    #[must_use]
+    pub fn folded(self, summary: impl Into<String>) -> Self {
+        Self { folded: Some(summary.into()), ..self }
+    }
+
+    /// Half as wide as the page, beside another one.
+    #[must_use]
+    pub fn half(self) -> Self {
+        Self { is_half: true, ..self }
     }
 
     /// A chart.

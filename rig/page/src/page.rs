@@ -21,6 +21,8 @@ pub enum Life {
 pub struct Page {
     /// The heading.
     pub title: String,
+    /// A line below the heading.
+    pub about: String,
     /// Whether the run is over.
     pub life: Life,
     /// What times count from.
@@ -74,6 +76,7 @@ impl Page {
     pub fn new(title: &str, life: Life, time: Time) -> Self {
         Self {
             title: title.to_owned(),
+            about: String::new(),
             life,
             time,
             moments: Vec::new(),

@@ -11,13 +11,13 @@ pub struct Time {
     pub end_s: f64,
     /// Period of the cycle, s.
     pub period_s: f64,
-    /// The date and time of the beginning, UTC, by RFC 3339; none in simulated time.
-    pub began: Option<String>,
+    /// The first SYNC on the wall's clock, s since 1970-01-01 00:00 UTC; none in simulated time.
+    pub wall_s: Option<f64>,
 }
 
 impl Default for Time {
     fn default() -> Self {
-        Self { motion_s: None, end_s: 0.0, period_s: 1e-3, began: None }
+        Self { motion_s: None, end_s: 0.0, period_s: 1e-3, wall_s: None }
     }
 }
 

@@ -48,6 +48,9 @@ pub struct Manifest {
     pub masseter: String,
     /// When the run began, UTC.
     pub began: String,
+    /// By how much UTC was ahead of the run's clock then, ns; none in simulated time.
+    #[serde(default)]
+    pub wall_ahead_ns: Option<i64>,
     /// `rt`, `lockstep` or `virtual`.
     pub clock: String,
     /// Who controlled the robot, if not the motion controller of the rig: `hold`, `external` or the path of a program.
@@ -98,6 +101,7 @@ impl Manifest {
             form: FORM,
             masseter: env!("CARGO_PKG_VERSION").to_owned(),
             began: began.to_string(),
+            wall_ahead_ns: if clock == "rt" { clock::wall_ahead_ns() } else { None },
             clock: clock.to_owned(),
             controller: None,
             declared: Declared::default(),

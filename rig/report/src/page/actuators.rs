@@ -29,16 +29,16 @@ pub(super) fn section(scenario: &Scenario, figures: &Figures) -> Section {
         let [low, high] = strokes_mm[at];
         let limits = vec![limit("lower end", &[low]), limit("upper end", &[high])];
         let chart = curves(kind, "Position", "mm", &over_time.position_m, limits);
-        Block::chart(kind.id, chart)
+        Block::chart(kind.id, chart).half()
     });
     let velocities = each(&|kind, at| {
         let most = drives[at].max_velocity_m_s * 1e3;
         let chart = curves(kind, "Velocity", "mm/s", &over_time.velocity_m_s, both_ways(most));
-        Block::chart(format!("velocity-{}", kind.id), chart)
+        Block::chart(format!("velocity-{}", kind.id), chart).half()
     });
     let forces = each(&|kind, at| {
         let limits = both_ways(drives[at].max_force_n);
-        Block::chart(format!("force-{}", kind.id), forces(kind, figures, limits))
+        Block::chart(format!("force-{}", kind.id), forces(kind, figures, limits)).half()
     });
     let blocks = positions.into_iter().chain(velocities).chain(forces).collect();
     Section::new("actuators", "Actuators", blocks)
@@ -73,6 +73,6 @@ fn forces(kind: &Kind, figures: &Figures, limits: Vec<Limit>) -> Chart {
     Chart {
         series: raw.chain(smooth).collect(),
         limits,
-        ..Chart::over_time(format!("Force of the {}, and its mean over 20 ms", kind.name), "N")
+        ..Chart::over_time(format!("Force of the {}, raw and mean of 20 ms", kind.name), "N")
     }
 }

@@ -1,25 +1,36 @@
 //! Messages and losses, the load of the buses, and the response times of their messages.
 
-use masseter_analysis::{Figures, ResponseFigures, TopicFigures};
+use masseter_analysis::{BusResponse, Figures, ResponseFigures, TopicFigures};
 use masseter_page::{Block, Cell, Chart, Column, Section, Table, Tone};
 
 use super::charts::{limit, plain};
-use crate::text::{microseconds, or_dash};
+use crate::text::{grouped, microseconds, or_dash};
 
 pub(super) fn section(figures: &Figures) -> Section {
+    let response = &figures.bus_response;
     let mut blocks = vec![
         Block::chart("buses", load(figures)),
-        Block::text(
-            "responses-in-words",
-            "From the queueing to the end of a frame, beside the worst case by the plan.",
-        ),
-        Block::table("responses", responses(&figures.bus_response.messages)),
+        Block::table("responses", responses(&response.messages)).folded(responses_in_words(response)),
+        Block::table("topics", topics(&figures.topics)).folded(topics_in_words(&figures.topics)),
     ];
-    if let Some(why) = &figures.bus_response.unbounded {
+    if let Some(why) = &response.unbounded {
         blocks.push(Block::text("unbounded", format!("No bounds hold for this run: {why}.")));
     }
-    blocks.push(Block::table("topics", topics(&figures.topics)));
     Section::new("messages", "Messages and buses", blocks)
+}
+
+fn responses_in_words(response: &BusResponse) -> String {
+    let tightest = response.tightest().map_or_else(String::new, |message| {
+        let us = |ns: Option<u64>| or_dash(ns, microseconds);
+        let (max, bound) = (us(message.max_ns), us(message.bound_ns));
+        format!("; closest to its bound: {} on can{} with {max} of {bound} µs", message.message, message.bus)
+    });
+    format!("Response times from the queueing to the end of a frame, beside the worst case by the plan{tightest}")
+}
+
+fn topics_in_words(topics: &[TopicFigures]) -> String {
+    let sum = |count: fn(&TopicFigures) -> u64| grouped(topics.iter().map(count).sum());
+    format!("Messages: {} recorded, {} dropped", sum(|topic| topic.messages), sum(|topic| topic.missing))
 }
 
 /// Share of each bus in use.

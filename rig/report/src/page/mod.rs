@@ -50,11 +50,26 @@ fn page(life: Life, first: Vec<Section>, manifest: &Manifest, figures: &Figures,
         Some(circumstances::section(manifest)),
     ];
     Page {
+        about: about(manifest, figures),
         moments: moments(scenario, figures),
         phases: phases(figures),
         sections: first.into_iter().chain(others.into_iter().flatten()).collect(),
         ..Page::new(&scenario.name, life, time(manifest, figures))
     }
+}
+
+/// A line of what the run was.
+fn about(manifest: &Manifest, figures: &Figures) -> String {
+    let scenario = &manifest.scenario;
+    format!(
+        "{} UTC · {:.1} s of motion at {} Hz · {} clock · seed {} · digest {}",
+        manifest.began.trim_end_matches('Z').replace('T', " "),
+        manifest.motion_s,
+        scenario.rate_hz,
+        manifest.clock,
+        scenario.seed,
+        figures.digest
+    )
 }
 
 fn time(manifest: &Manifest, figures: &Figures) -> Time {
@@ -64,7 +79,7 @@ fn time(manifest: &Manifest, figures: &Figures) -> Time {
         motion_s: over_time.motion_began_ns.map(|began_ns| since_s(figures, began_ns)),
         end_s: over_time.duration_s.max(last_s),
         period_s: manifest.scenario.period_ns() as f64 / 1e9,
-        began: (manifest.clock == "rt").then(|| manifest.began.clone()),
+        wall_s: manifest.wall_ahead_ns.map(|ahead_ns| (over_time.began_ns as f64 + ahead_ns as f64) / 1e9),
     }
 }
 

@@ -24,9 +24,12 @@ pub(super) fn section(scenario: &Scenario, figures: &Figures) -> Section {
     let over_time = &figures.over_time;
     let mut blocks = vec![Block::text("motion-in-words", in_words(figures))];
     if let Some(closed_m) = closed_incisal_m(scenario) {
-        for (axis, [name, _]) in DIRECTIONS.into_iter().enumerate() {
-            blocks.push(Block::chart(format!("motion-{name}"), displacement(figures, axis, closed_m[axis])));
-        }
+        let along = |axis: usize| {
+            let chart = displacement(figures, axis, closed_m[axis]);
+            Block::chart(format!("motion-{}", DIRECTIONS[axis][0]), chart)
+        };
+        // The jaw opens downwards, so z says most.
+        blocks.extend([along(2), along(0).half(), along(1).half()]);
     }
     let error = |title: &str, unit: &str, curve: &Curve, factor: f64| Chart {
         series: vec![plain("distance", curve, factor)],
@@ -37,8 +40,8 @@ pub(super) fn section(scenario: &Scenario, figures: &Figures) -> Section {
     let distance = error("Incisal point from desired", "µm", &over_time.distance_m, 1e6);
     let mut angle = error("Platform from desired, angle", "°", &over_time.angle_rad, 1f64.to_degrees());
     "angle".clone_into(&mut angle.series[0].name);
-    blocks.push(Block::chart("error", distance));
-    blocks.push(Block::chart("angle", angle));
+    blocks.push(Block::chart("error", distance).half());
+    blocks.push(Block::chart("angle", angle).half());
     if figures.bite_force_max_n.is_some() {
         let force = Chart {
             series: vec![plain("bite force", &over_time.bite_force_n, 1.0)],
@@ -68,7 +71,7 @@ fn displacement(figures: &Figures, axis: usize, closed_m: f64) -> Chart {
         series: all,
         otherwise: "Nothing moved.".to_owned(),
         height: 150,
-        ..Chart::over_time(format!("Incisal point from the closed jaw, {name}: {direction}"), "mm")
+        ..Chart::over_time(format!("Incisal point from closed, {name} ({direction})"), "mm")
     }
 }
 

@@ -25,13 +25,12 @@ pub(super) fn section(figures: &Figures, verdict: &Verdict) -> Option<Section> {
     let columns = vec![
         Column::text("requirement"),
         Column::text("result"),
+        Column::text("signal and limit"),
         Column::text("must hold"),
         Column::text("found"),
         Column::number("margin"),
-        Column::number("of the limit"),
-        Column::number("smallest at, s of the motion"),
+        Column::number("smallest at, s"),
         Column::number("latency, ms"),
-        Column::text("signal and limit"),
     ];
     let table = Table { label: "Requirements".to_owned(), columns, rows };
     let charts = figures.requirements.iter().enumerate().filter_map(|(place, found)| {
@@ -43,18 +42,20 @@ pub(super) fn section(figures: &Figures, verdict: &Verdict) -> Option<Section> {
 
 fn row(figures: &Figures, found: &RequirementFigures, check: &Check) -> Vec<Cell> {
     let margin = or_dash(found.margin, |margin| format!("{} {}", significant(margin), found.margin_unit));
-    let plot = chart(figures, found)
-        .map_or_else(|| "".into(), |chart| Cell::Plot { plot: Box::new(Chart { height: SMALL, ..chart }) });
+    let share = found.relative_margin.map(|share| format!(" ({:.0} %)", share * 100.0)).unwrap_or_default();
+    let plot = chart(figures, found).map_or_else(
+        || "".into(),
+        |chart| Cell::Plot { plot: Box::new(Chart { height: SMALL, ..chart }) },
+    );
     vec![
         found.name.clone().into(),
         mark(check.result),
+        plot,
         found.must.clone().into(),
         found.finding.clone().into(),
-        margin.trim_end().into(),
-        or_dash(found.relative_margin, |share| format!("{:.0} %", share * 100.0)).into(),
+        format!("{}{share}", margin.trim_end()).into(),
         or_dash(found.worst_at_s, |at_s| format!("{at_s:.3}")).into(),
         or_dash(found.latency_ms, |ms| format!("{ms:.3}")).into(),
-        plot,
     ]
 }
 

@@ -60,19 +60,17 @@ fn panel(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> masseter_
             TimingWord::Missed => Tone::Bad,
             TimingWord::Simulated | TimingWord::Unknown => Tone::Plain,
         },
-        figures: figures_in_words(manifest, figures),
+        figures: figures_in_words(figures),
     }
 }
 
-fn figures_in_words(manifest: &Manifest, figures: &Figures) -> Vec<[String; 2]> {
+fn figures_in_words(figures: &Figures) -> Vec<[String; 2]> {
     let errors = figures.tracking.actual;
     let mm = |value: Option<f64>| or_dash(value, |mm| format!("{} mm", decimals(mm)));
     let longest = figures.worst_cycles.first().map(|cycle| cycle.total_ns);
-    let rate_hz = manifest.scenario.rate_hz;
     let mut all = [
         ["incisal point from desired, rms", &mm(errors.incisal_rms_mm)],
-        ["the same, greatest", &mm(errors.incisal_max_mm)],
-        ["motion", &format!("{:.1} s at {rate_hz} Hz", manifest.motion_s)],
+        ["incisal point from desired, most", &mm(errors.incisal_max_mm)],
     ]
     .map(|pair| pair.map(str::to_owned))
     .to_vec();
@@ -82,6 +80,5 @@ fn figures_in_words(manifest: &Manifest, figures: &Figures) -> Vec<[String; 2]> 
     if let Some(most_n) = figures.bite_force_max_n.filter(|most_n| *most_n > 0.0) {
         all.push(["greatest bite force".to_owned(), format!("{most_n:.1} N")]);
     }
-    all.push(["digest".to_owned(), figures.digest.clone()]);
     all
 }

@@ -26,7 +26,7 @@ core, and page faults of both processes.";
 pub(super) fn section(scenario: &Scenario, figures: &Figures) -> Section {
     let blocks = vec![
         Block::chart("percentiles", percentiles(scenario, figures)),
-        Block::table("latencies", latencies(&figures.intervals)),
+        Block::table("latencies", latencies(&figures.intervals)).folded("Latencies in numbers"),
         Block::text("percentiles-in-words", P999),
         Block::text("skipped", skipped(figures)),
         Block::chart("jitter", wake_ups(figures)),
