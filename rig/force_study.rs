@@ -234,6 +234,6 @@ fn pressure_claim(figures: &Figures) -> anyhow::Result<(PaperClaim, ForceFigure)
         judgement: ClaimJudgement::new((contact.total_max_n / bite_n - 1.0).abs() < BALANCED, false),
         figure: Some("pressure"),
     };
-    let Pressure { caption, arch, .. } = Pressure::draw(figures).context("cannot draw the pressure")?;
+    let Pressure { caption, arch } = Pressure::draw(figures).context("cannot draw the pressure")?;
     Ok((claim, ForceFigure { name: "pressure", svg: arch, caption }))
 }

@@ -1,5 +1,6 @@
 //! The report's page as a run leaves it: in a real browser nothing fails, nothing is fetched, everything is there; on a phone
-//! it fits. Its charts have the time of the recording, and the start of the drives is folded.
+//! it fits. All its times count from the first SYNC, the motion's beginning is known, and the start of the drives is folded.
+//! `tests/browser/page.py` uses the page as a hand does.
 
 mod common;
 
@@ -10,22 +11,26 @@ use common::{Cores, LENIENT, Workspace, skip, stderr};
 use masseter_recording::{Reader, Recorded};
 use masseter_shared::messages::Event;
 use masseter_shared::messages::codes::{ControllerState, Source};
+use serde_json::Value;
 
 const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 /// What every report of a run that moved shows.
-const ELEMENTS: [&str; 15] = [
+const ELEMENTS: [&str; 18] = [
     "verdict",
     "checks",
-    "mechanism",
-    "animation",
-    "motion",
+    "scene",
+    "motion-x",
+    "motion-y",
+    "motion-z",
     "error",
+    "angle",
     "slides",
     "legs",
-    "velocities",
-    "forces",
+    "velocity-slides",
+    "velocity-legs",
+    "force-slides",
+    "force-legs",
     "percentiles",
-    "jitter",
     "worst",
     "buses",
     "events",
@@ -53,10 +58,49 @@ fn open(browser: &Path, page: &Path, profile: &Path) -> Output {
         .expect("the browser starts")
 }
 
-/// The time that the animation shows in a document, s.
-fn clock_s(output: &Output) -> Option<f64> {
-    let document = String::from_utf8_lossy(&output.stdout);
-    document.split("id=\"clock\">").nth(1)?.split(' ').next()?.parse().ok()
+/// What the page of a run shows, as its scripts read it.
+fn data(workspace: &Workspace) -> Value {
+    let page = std::fs::read_to_string(workspace.run_folder().join("report.html")).unwrap();
+    let (_, from) = page.split_once("<script type=\"application/json\" id=\"data\">").expect("the page has data");
+    serde_json::from_str(from.split_once("</script>").expect("the data end").0).unwrap()
+}
+
+/// The content of a block.
+fn block<'a>(page: &'a Value, id: &str) -> &'a Value {
+    let sections = page["sections"].as_array().unwrap().iter();
+    let mut blocks = sections.flat_map(|section| section["blocks"].as_array().unwrap());
+    &blocks.find(|block| block["id"] == id).unwrap_or_else(|| panic!("there is no block {id}"))["data"]
+}
+
+/// The packed points of a curve, unpacked as `masseter-page` documents them.
+fn points(series: &Value) -> Vec<(f64, f64)> {
+    let points = &series["points"];
+    let bytes = data_encoding::BASE64.decode(points["packed"].as_str().expect("packed").as_bytes()).unwrap();
+    let steps = ["x_step", "y_step"].map(|name| points[name].as_f64().unwrap());
+    let (mut differences, mut number, mut shift) = (Vec::new(), 0_u64, 0);
+    for byte in bytes {
+        number |= u64::from(byte & 0x7f) << shift;
+        shift += 7;
+        if byte & 0x80 == 0 {
+            differences.push((number >> 1) as i64 ^ -((number & 1) as i64));
+            (number, shift) = (0, 0);
+        }
+    }
+    let mut at = [0_i64; 2];
+    let point = |pair: &[i64]| {
+        at = [at[0] + pair[0], at[1] + pair[1]];
+        (at[0] as f64 * steps[0], at[1] as f64 * steps[1])
+    };
+    differences.chunks(2).map(point).collect()
+}
+
+/// Where the curves of a chart begin and end, s.
+fn curves_s(chart: &Value) -> Vec<[f64; 2]> {
+    let ends = |series: &Value| {
+        let points = points(series);
+        [points[0].0, points[points.len() - 1].0]
+    };
+    chart["series"].as_array().unwrap().iter().map(ends).collect()
 }
 
 #[test]
@@ -65,34 +109,19 @@ fn the_page_works_in_a_browser() {
     let workspace = Workspace::new("duration_s = 2.0");
     assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     let page = workspace.run_folder().join("report.html");
-    // The animation plays: its clock has left the beginning. A browser beside much other work may draw no frame.
-    let mut openings = (0..5).map(|_| open(&browser, &page, &workspace.file("profile")));
-    let output = openings.find(|output| clock_s(output) > Some(0.0)).expect("the animation plays");
+    let output = open(&browser, &page, &workspace.file("profile"));
     let document = String::from_utf8_lossy(&output.stdout);
+    assert!(document.contains("data-ready=\"yes\""), "the page is not built: {}", stderr(&output));
     for id in ELEMENTS {
         assert!(document.contains(&format!("id=\"{id}\"")), "{id} is missing: {}", stderr(&output));
     }
+    let curves = document.split("<path class=\"curve").filter(|path| path.contains("d=\"M")).count();
+    assert!(curves > 30, "{curves} curves are drawn");
     assert!(!stderr(&output).contains("CONSOLE"), "{}", stderr(&output));
     let offline = document.replace("http://www.w3.org/2000/svg", "");
     for outside in ["http://", "https://", "src=", "<link", "@import"] {
         assert!(!offline.contains(outside), "the page refers to {outside}");
     }
-}
-
-/// The drawing of a part of the page.
-fn drawing<'a>(page: &'a str, id: &str) -> &'a str {
-    let (_, from) = page.split_once(&format!("<div id=\"{id}\">")).expect("the part is there");
-    from.split_once("</svg>").expect("it is a drawing").0
-}
-
-/// The right end of the thin lines of a drawing, px.
-fn last_x(drawing: &str) -> f64 {
-    let lines = drawing.split("<polyline").skip(1).filter(|line| line.contains("stroke-width=\"2\""));
-    let points = lines.filter_map(|line| line.split("points=\"").nth(1)?.split('"').next());
-    points
-        .flat_map(str::split_whitespace)
-        .filter_map(|point| point.split(',').next()?.parse().ok())
-        .fold(0.0, f64::max)
 }
 
 #[test]
@@ -101,15 +130,22 @@ fn after_a_safe_stop_the_charts_go_on_and_show_the_fault_and_its_detection() {
         "duration_s = 4.0\n[[faults]]\nkind = 'disconnect'\nbus = 1\nnode = 5\nfrom_s = 2.2\n",
     );
     assert_eq!(workspace.run_virtual(&[]).status.code(), Some(5));
-    let page = std::fs::read_to_string(workspace.run_folder().join("report.html")).unwrap();
-    for id in ["motion", "error", "slides", "legs", "velocities", "forces", "buses"] {
-        let drawing = drawing(&page, id);
-        assert!(drawing.contains("fault 1: disconnect (bus 1, node 5), 2.2"), "{id}");
-        assert!(drawing.contains("safe stop: master, "), "{id}");
-    }
+    let page = data(&workspace);
+    let [fault, stop] = &page["moments"].as_array().unwrap()[..] else { panic!("{}", page["moments"]) };
+    assert_eq!((&fault["kind"], &stop["kind"]), (&"fault".into(), &"detection".into()));
+    assert_eq!(fault["text"], "fault 1: disconnect (bus 1, node 5)");
+    assert!(stop["text"].as_str().unwrap().starts_with("safe stop: master, "), "{stop}");
+    let in_motion_s = |moment: &Value| moment["at_s"].as_f64().unwrap() - motion_s(&page);
+    assert!((in_motion_s(fault) - 2.2).abs() < 0.002 && in_motion_s(stop) > in_motion_s(fault), "{fault} {stop}");
     // The jaw is followed for as long as the axes are.
-    let [motion, legs] = ["motion", "legs"].map(|id| last_x(drawing(&page, id)));
-    assert!(motion > 0.0 && (motion - legs).abs() < 2.0, "{motion} and {legs}");
+    let [jaw, legs] = ["motion-z", "legs"].map(|id| curves_s(block(&page, id)));
+    assert!((jaw[1][1] - legs[0][1]).abs() < 0.01, "{jaw:?} and {legs:?}");
+    assert!(jaw[0][1] < jaw[1][1], "the desired motion ends with the stop");
+}
+
+/// When the motion began, by the page, s since the first SYNC.
+fn motion_s(page: &Value) -> f64 {
+    page["time"]["motion_s"].as_f64().expect("the motion began")
 }
 
 /// Width of a phone's screen, px.
@@ -181,99 +217,59 @@ impl Times {
     }
 }
 
-/// The values of an attribute in every element of that name, in a drawing.
-fn attribute<'a>(drawing: &'a str, element: &str, name: &str) -> Vec<&'a str> {
-    let (opening, assignment) = (format!("<{element}"), format!(" {name}=\""));
-    let elements = drawing.split(opening.as_str()).skip(1);
-    elements.filter_map(|rest| rest.split('>').next()?.split(&assignment).nth(1)?.split('"').next()).collect()
-}
-
-/// A time axis: the place of time zero, px, and of a second, px/s. By the numbers below the axis.
-fn time_axis(drawing: &str) -> (f64, f64) {
-    let below = drawing.split("<text ").skip(1).filter(|text| text.contains("dy=\"0.76em\""));
-    let ticks: Vec<(f64, f64)> = below
-        .filter_map(|text| {
-            let x = text.strip_prefix("x=\"")?.split('"').next()?.parse().ok()?;
-            let label = text.split('>').nth(1)?.split('<').next()?;
-            Some((x, label.trim().parse().ok()?))
-        })
-        .collect();
-    let [(first, from_s), .., (last, to_s)] = ticks[..] else { panic!("no time axis: {ticks:?}") };
-    let second = (last - first) / (to_s - from_s);
-    (first - from_s * second, second)
-}
-
-/// Where the curves of a chart begin and end, s. Curves are wider than axes.
-fn curves_s(drawing: &str) -> Vec<[f64; 2]> {
-    let (zero, second) = time_axis(drawing);
-    let lines = drawing.split("<polyline").skip(1).filter(|line| !line.contains("stroke-width=\"1\""));
-    let at = |point: &str| (point.split(',').next().unwrap().parse::<f64>().unwrap() - zero) / second;
-    let ends = lines.filter_map(|line| {
-        let points: Vec<_> = line.split("points=\"").nth(1)?.split('"').next()?.split_whitespace().collect();
-        // The keys of the legend have two points.
-        let [first, _, .., last] = points[..] else { return None };
-        Some([at(first), at(last)])
-    });
-    ends.collect()
-}
-
-/// Steps of decimation and of the drawing, and the time of a chunk of bus load, s.
+/// Steps of decimation, and the time that a smoothed value and a load stand for, s.
 const CLOSE_S: f64 = 0.05;
 
 /// Judges every chart over time: curves of what is there from the first cycle on begin at zero and end with the recording.
 fn assert_one_zero(workspace: &Workspace, charts: &[&str]) {
     let times = Times::of(workspace);
-    let page = std::fs::read_to_string(workspace.run_folder().join("report.html")).unwrap();
+    let page = data(workspace);
+    let running_s = times.entered_s(ControllerState::Running);
+    assert!((motion_s(&page) - running_s).abs() < 0.002, "{} instead of {running_s}", motion_s(&page));
     for id in charts {
-        let curves = curves_s(drawing(&page, id));
+        let curves = curves_s(block(&page, id));
         assert!(!curves.is_empty(), "{id}");
         for [from_s, to_s] in curves {
-            // The path begins with the first move.
-            let begins_s = [0.0, times.entered_s(ControllerState::Easing)];
-            let is_begin = begins_s.iter().any(|begin_s| (from_s - begin_s).abs() < CLOSE_S);
-            assert!(is_begin, "{id}: a curve begins at {from_s} s, not at any of {begins_s:?}");
+            // The path begins with the first move, and the estimate with the first readings.
+            let states = [ControllerState::Easing, ControllerState::Enabling];
+            let mut begins_s = states.map(|state| times.entered_s(state)).into_iter().chain([0.0]);
+            let is_begin = begins_s.any(|begin_s| (from_s - begin_s).abs() < CLOSE_S);
+            assert!(is_begin, "{id}: a curve begins at {from_s} s");
             assert!(to_s < times.end_s + CLOSE_S, "{id}: a curve ends at {to_s} s, after {} s", times.end_s);
         }
     }
-    for id in ["slides", "legs", "velocities", "forces"] {
-        for [from_s, to_s] in curves_s(drawing(&page, id)) {
+    for id in ["slides", "legs", "velocity-legs", "force-legs"] {
+        for [from_s, to_s] in curves_s(block(&page, id)) {
             assert!(
                 from_s.abs() < CLOSE_S && (to_s - times.end_s).abs() < CLOSE_S,
                 "{id}: {from_s} to {to_s} s"
             );
         }
     }
-    let time_line = drawing(&page, "events");
-    let (zero, second) = time_axis(time_line);
-    let mut marks: Vec<f64> =
-        attribute(time_line, "circle", "cx").iter().map(|x| x.parse().unwrap()).collect();
-    let mut expected: Vec<f64> =
-        times.events.iter().map(|event| zero + times.since_s(event) * second).collect();
-    marks.sort_by(f64::total_cmp);
-    expected.sort_by(f64::total_cmp);
-    assert_eq!(marks.len(), expected.len());
-    for (mark, expected) in marks.iter().zip(expected) {
-        assert!((mark - expected).abs() < 2.0, "an event is drawn at {mark} px, and came at {expected} px");
-    }
 }
 
-const OVER_TIME: [&str; 7] = ["motion", "error", "slides", "legs", "velocities", "forces", "buses"];
+const OVER_TIME: [&str; 7] = ["motion-x", "motion-z", "error", "slides", "legs", "force-slides", "buses"];
 
 #[test]
 fn every_chart_over_time_has_the_zero_of_the_recording() {
     let workspace = Workspace::new("duration_s = 1.0");
     assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     assert_one_zero(&workspace, &OVER_TIME);
+    assert!(data(&workspace)["time"]["wall_s"].is_null(), "simulated time has no date");
     // In real time the recorder may begin later.
     let times = Times::of(&workspace);
     let later_ns = times.first_ns - times.zero_ns;
     assert!(later_ns < 1_000_000, "the first message was recorded {later_ns} ns after the charts' zero");
 
     let workspace = Workspace::new(&format!("duration_s = 1.0\n{LENIENT}"));
+    let before_s = masseter_shared::clock::wall_time().as_secs_f64();
     let output = workspace.run(&Cores::take(), &[]);
+    let after_s = masseter_shared::clock::wall_time().as_secs_f64();
     assert!(workspace.run_folder().join("report.html").exists(), "{}", stderr(&output));
     // Only in real time are there late wake-ups.
     assert_one_zero(&workspace, &[&OVER_TIME[..], &["jitter"]].concat());
+    let wall_s = data(&workspace)["time"]["wall_s"].as_f64().expect("a date");
+    assert!((before_s..after_s).contains(&wall_s), "{wall_s} is not between {before_s} and {after_s}");
 }
 
 #[test]
@@ -281,21 +277,18 @@ fn the_start_of_the_drives_is_folded_and_every_event_is_there_with_its_time() {
     let workspace = Workspace::new("duration_s = 0.5");
     assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     let times = Times::of(&workspace);
-    let page = std::fs::read_to_string(workspace.run_folder().join("report.html")).unwrap();
-    let (_, list) = page.split_once("<div id=\"events\">").unwrap();
-    let (folded, shown) = list.split_once("</details>").expect("a part that is folded");
-    let (_, folded) = folded.split_once("<details>").expect("it is folded at first");
-    let listed_s = |text: &str| -> Vec<f64> {
-        let items = text.split("<li>").skip(1).map(|item| item.split(" s ").next().unwrap());
-        items.map(|seconds| seconds.parse().unwrap()).collect()
+    let page = data(&workspace);
+    let listed_s = |part: &str| -> Vec<f64> {
+        let events = block(&page, "events")[part].as_array().unwrap();
+        events.iter().map(|event| event["at_s"].as_f64().unwrap()).collect()
     };
     let moves_s = times.entered_s(ControllerState::Easing);
-    let (boot_s, rest_s) = (listed_s(folded), listed_s(shown));
-    assert!(boot_s.len() > 20 && rest_s.len() > 2, "{boot_s:?} and {rest_s:?}");
-    assert!(boot_s.iter().all(|at_s| *at_s <= moves_s + 0.001), "{boot_s:?}");
+    let (start_s, rest_s) = (listed_s("start"), listed_s("rest"));
+    assert!(start_s.len() > 20 && rest_s.len() > 2, "{start_s:?} and {rest_s:?}");
+    assert!(start_s.iter().all(|at_s| *at_s <= moves_s + 0.001), "{start_s:?}");
     assert!(rest_s.iter().all(|at_s| *at_s >= moves_s - 0.001), "{rest_s:?}");
-    assert_eq!(boot_s.len() + rest_s.len(), times.events.len());
-    for (listed_s, event) in boot_s.iter().chain(&rest_s).zip(&times.events) {
+    assert_eq!(start_s.len() + rest_s.len(), times.events.len());
+    for (listed_s, event) in start_s.iter().chain(&rest_s).zip(&times.events) {
         let came_s = times.since_s(event);
         assert!((listed_s - came_s).abs() < 0.002, "{listed_s} s instead of {came_s} s");
     }

@@ -63,7 +63,7 @@ fn a_requirement_that_holds_has_its_margin_everywhere() {
     assert!(junit.contains("<property name=\"margin\""), "{junit}");
     let page = read(&workspace, "report.html");
     assert!(
-        page.contains("<h2>Requirements</h2>") && page.contains("smallest margin"),
+        page.contains("\"title\":\"Requirements\"") && page.contains("smallest margin"),
         "no requirement in the page"
     );
 }

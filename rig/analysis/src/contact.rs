@@ -14,9 +14,6 @@ pub struct ContactFigures {
     pub total_max_at_ns: u64,
     /// The lower teeth, in the order of their numbers.
     pub teeth: Vec<ToothFigures>,
-    /// The width of a stretch of time in the courses of the teeth, s.
-    #[serde(skip)]
-    pub stretch_s: f64,
 }
 
 /// What a tooth bore.
@@ -78,7 +75,6 @@ impl ContactWatch {
             total_max_n: self.total_max_n,
             total_max_at_ns: self.greatest.sampled_ns,
             teeth: self.newest?.teeth().enumerate().map(tooth).collect(),
-            stretch_s: self.courses.width_s(),
         })
     }
 }

@@ -201,21 +201,6 @@ pub fn cells(
     Ok(())
 }
 
-/// Filled rectangles between two places along each axis.
-///
-/// # Errors
-/// When the chart cannot be drawn on.
-pub fn tiles(
-    chart: &mut Chart<'_, '_>,
-    tiles: impl IntoIterator<Item = ([f64; 2], [f64; 2], RGBColor)>,
-) -> Result<(), Error> {
-    let tile = |([left, right], [low, high], colour): ([f64; 2], [f64; 2], RGBColor)| {
-        Rectangle::new([(left, low), (right, high)], colour.filled())
-    };
-    chart.draw_series(tiles.into_iter().map(tile))?;
-    Ok(())
-}
-
 /// Discs with a rim, each with text beside it.
 ///
 /// # Errors

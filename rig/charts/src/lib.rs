@@ -30,7 +30,7 @@ mod ticks;
 pub use axis::{Axis, Scale};
 pub use canvas::{
     Area, Bar, Chart, Disc, Error, Key, LegendEntry, TEXT, TITLE, bars, cells, chart, discs, legend, marks,
-    svg, tiles,
+    svg,
 };
 pub use colour_scale::ColourScale;
 pub use line_chart::{Drawn, Legend, Limit, Line, LineChart};

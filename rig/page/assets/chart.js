@@ -143,7 +143,7 @@
       isDirty = false;
       if (isTime) series.forEach((one) => { one.step = Masseter.longestStep(one.xs); });
       const width = Math.round(holder.clientWidth) || 640;
-      const window = isTime ? clock.window : ownWindow();
+      const window = !isTime ? ownWindow() : isSmall ? clock.range : clock.window;
       const shown = series.filter(({ isShown }) => isShown);
       const found = extremes(shown, window, isLog);
       if (!isTime) view.window = window;
@@ -307,6 +307,7 @@
     draw();
 
     return {
+      chart,
       // Adds points to a curve, x, y, x, y …; a curve of a new name is a plain one.
       append(name, points) {
         let one = series.find((known) => known.name === name);

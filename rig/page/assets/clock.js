@@ -41,14 +41,14 @@
       },
       // Zooms about a moment that stays where it is.
       zoomAbout(at, factor) { clock.zoom(at - (at - window[0]) * factor, at + (window[1] - at) * factor); },
-      reset() { clock.zoom(...range); },
+      reset() { window = [...range]; tell('window'); },
       // The run has gone on until then.
       extend(end) {
         if (end <= range[1]) return;
         const isWhole = !clock.isZoomed, follows = window[1] === range[1], length = window[1] - window[0];
         range = [range[0], end];
         tell('range');
-        if (isWhole) clock.zoom(...range); else if (follows) clock.zoom(end - length, end);
+        if (isWhole) clock.reset(); else if (follows) clock.zoom(end - length, end);
       },
       play(isPlaying) {
         if (clock.isPlaying === isPlaying) return;

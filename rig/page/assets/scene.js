@@ -5,7 +5,7 @@ Masseter.block('scene', (holder, data, clock) => {
   const pen = canvas.getContext('2d');
   const keys = [['true', data.actual_name], ['estimated', 'estimated'], ['desired', 'desired'], ['jaw', 'incisal point and condyles']];
   holder.append(element('div', { class: 'scene' }, canvas, element('p', { class: 'keys' },
-    ...keys.filter(([, name], at) => at !== 1 || name !== data.actual_name).map(([colour, name]) => element('span', { style: `color:var(--${colour})` }, `${name} `)), 'Drag to turn.')));
+    ...keys.filter(([, name], at) => at !== 1 || name !== data.actual_name).map(([colour, name]) => element('span', { style: `--c:var(--${colour})` }, `${name} `)), 'Drag to turn.')));
   const ACTUAL = 1, DESIRED = 8, ESTIMATED = 15;
   let turn = -2.2, tilt = 0.35, drag = null;
 

@@ -5,6 +5,7 @@ use serde_json::Value;
 
 use crate::chart::Chart;
 use crate::live::{Live, Parameter};
+use crate::pressure::Pressure;
 use crate::time::Moment;
 
 /// A section of the page.
@@ -101,6 +102,8 @@ pub enum Content {
         /// What it shows, for those who cannot see it.
         label: String,
     },
+    /// The force on each lower tooth.
+    Pressure(Pressure),
     /// The mechanism in three dimensions; `scene.js` knows the data.
     Scene(Value),
     /// The views of the jaw; `jaw.js` knows the data.

@@ -21,6 +21,7 @@ mod chart;
 mod live;
 mod page;
 mod points;
+mod pressure;
 mod time;
 
 pub use block::{Block, Cell, Column, Content, EventRow, Events, Moments, Section, Table, Tone, Verdict};
@@ -28,4 +29,5 @@ pub use chart::{Across, Chart, Limit, Scale, Series, Style};
 pub use live::{Live, Parameter};
 pub use page::{Life, Page, PageError};
 pub use points::Points;
+pub use pressure::{Pressure, Tooth};
 pub use time::{Moment, MomentKind, Phase, Time};

@@ -56,6 +56,7 @@ const SCRIPTS: [&str; 11] = [
     include_str!("../assets/gestures.js"),
     include_str!("../assets/chart.js"),
     include_str!("../assets/blocks.js"),
+    include_str!("../assets/pressure.js"),
     include_str!("../assets/scene.js"),
     include_str!("../assets/live.js"),
     include_str!("../assets/page.js"),

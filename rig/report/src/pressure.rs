@@ -1,7 +1,7 @@
-//! The pressure between the jaws: the lower arch from above when the teeth bear most, and each tooth over time.
+//! The pressure between the jaws as a drawing for documents: the lower arch from above when the teeth bear most.
 
 use masseter_analysis::{ContactFigures, Figures, ToothFigures};
-use masseter_charts::{Axis, ColourScale, Disc, Error, Scale, chart, discs, svg, tiles};
+use masseter_charts::{Axis, ColourScale, Disc, Error, Scale, chart, discs, svg};
 
 /// Width of a picture, px.
 const WIDTH: u32 = 960;
@@ -17,23 +17,16 @@ const ROOM_MM: f64 = 7.0;
 const RADII: [f64; 2] = [18.0, 4.0];
 /// Between a disc and its text, px.
 const GAP: f64 = 6.0;
-/// Height of a tooth's row, px, and room for the time axis below all rows.
-const ROW: u32 = 20;
-const BELOW: u32 = 66;
-/// Most columns over time; more are narrower than the eye can tell apart.
-const COLUMNS: usize = 350;
 /// What counts as no force, N.
 const NONE_N: f64 = 0.05;
 
-/// Two drawings and the words to them.
+/// A drawing and the words to it.
 #[derive(Debug)]
 pub struct Pressure {
     /// What the arch shows.
     pub caption: String,
     /// The arch.
     pub arch: String,
-    /// Each tooth over time.
-    pub over_time: String,
 }
 
 impl Pressure {
@@ -42,9 +35,7 @@ impl Pressure {
         let contact = figures.contact.as_ref()?;
         let most_n = contact.teeth.iter().fold(0.0, |most_n: f64, tooth| most_n.max(tooth.max_n));
         let scale = ColourScale::new("force, N", [0.0, most_n]);
-        let [arch, over_time] =
-            [arch(contact, &scale), over_time(contact, figures.over_time.duration_s, &scale)];
-        Some(Self { caption: caption(figures, contact), arch: arch.ok()?, over_time: over_time.ok()? })
+        Some(Self { caption: caption(figures, contact), arch: arch(contact, &scale).ok()? })
     }
 }
 
@@ -113,51 +104,6 @@ fn ends_mm(teeth: &[ToothFigures]) -> [[f64; 2]; 2] {
     [around(extents[0], pixels[0]), around(extents[1], pixels[1])]
 }
 
-fn over_time(contact: &ContactFigures, duration_s: f64, scale: &ColourScale) -> Result<String, Error> {
-    let teeth = in_order_of_arch(&contact.teeth);
-    let column_s = contact.stretch_s.max(duration_s / COLUMNS as f64);
-    let height = ROW * teeth.len() as u32 + BELOW;
-    svg((WIDTH, height), |area| {
-        let (plot, bar) = area.split_horizontally(WIDTH - BAR);
-        let x = Axis::new("time, s", Scale::Linear, [0.0, duration_s]);
-        let names = teeth.iter().map(|tooth| tooth.number.to_string()).collect();
-        let mut chart = chart(&plot, "", x, Axis::of_names("tooth", names))?;
-        for (row, tooth) in (0..).map(f64::from).zip(&teeth) {
-            let columns = columns(tooth, column_s).into_iter().enumerate();
-            let loaded = columns.filter(|(_, load_n)| *load_n >= NONE_N);
-            tiles(
-                &mut chart,
-                loaded.map(|(column, load_n)| {
-                    let from_s = column as f64 * column_s;
-                    let to_s = (from_s + column_s).min(duration_s);
-                    ([from_s, to_s], [row - 0.45, row + 0.45], scale.colour(load_n))
-                }),
-            )?;
-        }
-        scale.draw(&bar)
-    })
-}
-
-/// From the last tooth on the right to the last on the left, the lowest row first.
-fn in_order_of_arch(teeth: &[ToothFigures]) -> Vec<&ToothFigures> {
-    let mut teeth: Vec<_> = teeth.iter().collect();
-    teeth.sort_by(|a, b| a.place_m[1].total_cmp(&b.place_m[1]));
-    teeth
-}
-
-/// The greatest force on a tooth in each column of time, N.
-fn columns(tooth: &ToothFigures, column_s: f64) -> Vec<f64> {
-    let mut columns = Vec::new();
-    for &(at_s, load_n) in &tooth.course_n {
-        let column = (at_s / column_s) as usize;
-        if column >= columns.len() {
-            columns.resize(column + 1, 0.0);
-        }
-        columns[column] = f64::max(columns[column], load_n);
-    }
-    columns
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -168,13 +114,13 @@ mod tests {
             place_m: [0.01, y_m, 0.0],
             max_n: load_n,
             at_total_max_n: [0.0, 0.0, -load_n],
-            course_n: vec![(0.5, load_n), (1.5, 0.0), (1.6, load_n / 2.0)],
+            course_n: Vec::new(),
         }
     }
 
     fn contact() -> ContactFigures {
         let teeth = vec![tooth(36, 0.025, 40.0), tooth(46, -0.025, 0.0)];
-        ContactFigures { total_max_n: 40.0, total_max_at_ns: 0, teeth, stretch_s: 0.1 }
+        ContactFigures { total_max_n: 40.0, total_max_at_ns: 0, teeth }
     }
 
     #[test]
@@ -190,13 +136,5 @@ mod tests {
         let pixels = [f64::from(WIDTH - BAR) - AROUND[0], f64::from(ARCH) - AROUND[1]];
         assert!(((across[1] - across[0]) / pixels[0] - (up[1] - up[0]) / pixels[1]).abs() < 1e-9);
         assert!(across[0] <= -25.0 - ROOM_MM && across[1] >= 25.0 + ROOM_MM, "{across:?}");
-    }
-
-    #[test]
-    fn a_column_of_time_has_the_greatest_force_in_it_and_the_left_side_stands_above() {
-        assert_eq!(columns(&tooth(36, 0.0, 8.0), 1.0), [8.0, 4.0]);
-        let teeth = contact().teeth;
-        let numbers: Vec<_> = in_order_of_arch(&teeth).iter().map(|tooth| tooth.number).collect();
-        assert_eq!(numbers, [46, 36]);
     }
 }

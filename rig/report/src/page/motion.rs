@@ -1,18 +1,20 @@
 //! The mechanism in three dimensions, the motion of the jaw, and the pressure between the jaws.
 
-use masseter_analysis::{Curve, Figures};
+use masseter_analysis::{Curve, Figures, ToothFigures};
 use masseter_controller::trajectory::closed_pose;
-use masseter_page::{Block, Chart, Content, Points, Section, Series, Style};
+use masseter_page::{Block, Chart, Content, Points, Pressure, Section, Series, Style, Tooth};
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{Mechanism, Vec3};
 
 use super::charts::plain;
-use super::{animation, in_unit};
-use crate::pressure::Pressure;
+use super::{animation, in_unit, since_s};
 use crate::table;
 
 /// Directions of the base, and where they point.
 const DIRECTIONS: [[&str; 2]; 3] = [["x", "forward"], ["y", "to the left"], ["z", "up"]];
+
+/// Least end of a scale of forces, N.
+const LEAST_N: f64 = 0.1;
 
 /// None without a motion.
 pub(super) fn mechanism(scenario: &Scenario, figures: &Figures) -> Option<Section> {
@@ -94,19 +96,26 @@ fn closed_incisal_m(scenario: &Scenario) -> Option<[f64; 3]> {
 
 /// None where the jaws cannot touch.
 pub(super) fn pressure(figures: &Figures) -> Option<Section> {
-    let Pressure { caption, arch, over_time } = Pressure::draw(figures)?;
-    let picture = |svg: String, label: &str| Content::Picture { svg, label: label.to_owned() };
+    let contact = figures.contact.as_ref()?;
+    let tooth = |tooth: &ToothFigures| Tooth {
+        number: tooth.number,
+        across_mm: -tooth.place_m[1] * 1e3,
+        forward_mm: tooth.place_m[0] * 1e3,
+        points: Points::over_time(&tooth.course_n),
+    };
+    let pressure = Pressure {
+        teeth: contact.teeth.iter().map(tooth).collect(),
+        most_n: contact.teeth.iter().map(|tooth| tooth.max_n).fold(LEAST_N, f64::max),
+        at_s: since_s(figures, contact.total_max_at_ns),
+    };
+    let words = format!(
+        "Force of antagonist and food on each lower tooth, mean over a cycle, from above: at most {:.1} N on all teeth \
+         together. The area of a disc is the force.",
+        contact.total_max_n
+    );
     let blocks = vec![
-        Block::text(
-            "pressure-in-words",
-            format!("Force of antagonist and food on each lower tooth, mean over a cycle. {caption}"),
-        ),
-        Block::new("pressure", picture(arch, "The lower arch from above with the force on each tooth")),
-        Block::text(
-            "pressure-over-time-in-words",
-            "The greatest force on each tooth over time; a tooth without force has no colour.",
-        ),
-        Block::new("pressure-over-time", picture(over_time, "The greatest force on each tooth over time")),
+        Block::text("pressure-in-words", words),
+        Block::new("pressure", Content::Pressure(pressure)),
     ];
     Some(Section::new("pressure-between-jaws", "Pressure between the jaws", blocks))
 }

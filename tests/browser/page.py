@@ -1,0 +1,322 @@
+"""The page of a run in a browser, used as a hand does: it loads fast, fetches nothing, draws every chart, follows pointer, wheel,
+fingers and keys, fits a phone, prints, has a dark face, and axe finds nothing serious.
+
+Usage: page.py MASSETER FOLDER [CHROMIUM]
+"""
+
+import csv
+import io
+import subprocess
+import sys
+import time
+import xml.etree.ElementTree as xml
+from pathlib import Path
+
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Page, sync_playwright
+
+MASSETER, FOLDER = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve()
+BROWSER = sys.argv[3] if len(sys.argv) > 3 else None
+LARGEST_MB = 3.0
+LONGEST_S = 1.0
+PHONE = {"width": 390, "height": 844}
+DESK = {"width": 1280, "height": 900}
+
+
+def run(name: str, *arguments: str, code: int = 0) -> Path:
+    """The page of a run in simulated time."""
+    command = [MASSETER, "run", *arguments, "--clock", "virtual", "--out", FOLDER / name]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ended.returncode == code, ended.stdout + ended.stderr
+    return FOLDER / name / "report.html"
+
+
+class Sheet:
+    """A page that is open in a browser of its own settings; everything that it says or asks for is kept."""
+
+    def __init__(self, browser, path: Path, **settings):
+        context = browser.new_context(**{"viewport": DESK, **settings}, accept_downloads=True)
+        self.page: Page = context.new_page()
+        self.said, self.asked = [], []
+        self.page.on("console", lambda message: self.said.append(message.text))
+        self.page.on("pageerror", lambda error: self.said.append(str(error)))
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        began = time.monotonic()
+        self.page.goto(path.as_uri(), wait_until="load")
+        self.page.wait_for_selector("html[data-ready=yes]", state="attached")
+        self.loaded_s = time.monotonic() - began
+
+    def get(self, script: str):
+        return self.page.evaluate(script)
+
+    def chart(self, name: str):
+        """The drawing of a chart, in view."""
+        drawing = self.page.locator(f"#{name} svg[tabindex]")
+        drawing.evaluate("element => element.scrollIntoView({block: 'center'})")
+        return drawing
+
+    def frame(self):
+        """Waits until what is due has been drawn."""
+        self.get("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
+
+    def close(self):
+        assert self.said == [], self.said
+        others = [url for url in self.asked if not url.startswith(("file:", "blob:"))]
+        assert others == [] and len([url for url in self.asked if url.startswith("file:")]) == 1, self.asked
+        self.page.context.close()
+
+
+def loads_fast(browser, path: Path) -> float:
+    sheets = [Sheet(browser, path) for _ in range(3)]
+    best_s = min(sheet.loaded_s for sheet in sheets)
+    for sheet in sheets:
+        sheet.close()
+    assert best_s < LONGEST_S, f"{path} takes {best_s:.2f} s"
+    return best_s
+
+
+def draws_every_chart(sheet: Sheet):
+    """A curve has a height in pixels, and its colour is really in the picture."""
+    names = sheet.get("() => [...document.querySelectorAll('.block-chart')].map(block => block.id)")
+    assert len(names) > 12, names
+    empty = [name for name in names if not sheet.page.locator(f"#{name} svg[tabindex] path.curve[d^=M]").count()]
+    # No wake-up is late in simulated time.
+    assert empty == ["jitter"], empty
+    for name in [name for name in names if name not in empty]:
+        drawing = sheet.chart(name)
+        sheet.frame()
+        shades = sheet.get(f"""async () => {{
+            const text = Masseter.svgText(Masseter.handles.get('{name}').chart);
+            const image = new Image();
+            image.src = 'data:image/svg+xml,' + encodeURIComponent(text);
+            await image.decode();
+            const canvas = Object.assign(document.createElement('canvas'), {{width: image.width, height: image.height}});
+            const pen = canvas.getContext('2d');
+            pen.drawImage(image, 0, 0);
+            const {{data}} = pen.getImageData(0, 0, canvas.width, canvas.height);
+            let coloured = 0;
+            for (let at = 0; at < data.length; at += 4) {{
+                if (Math.max(data[at], data[at + 1], data[at + 2]) - Math.min(data[at], data[at + 1], data[at + 2]) > 60) coloured += 1;
+            }}
+            return coloured;
+        }}""")
+        assert shades > 300, f"{name}: {shades} coloured pixels"
+        assert drawing.bounding_box()["height"] > 100, name
+
+
+def keeps_extremes(sheet: Sheet):
+    """The highest point of a noisy curve is drawn where it is, although there are fewer pixels than points."""
+    found = sheet.get("""() => {
+        const {series, plot} = Masseter.handles.get('force-slides').chart;
+        const raw = series.find(({style}) => style === 'raw');
+        const paths = [...document.querySelectorAll('#force-slides svg[tabindex] path.curve.raw')];
+        const drawn = Math.min(...paths[0].getAttribute('d').match(/ [-\\d.]+/g).map(Number));
+        return {points: raw.xs.length, pixels: plot.right - plot.left, drawn, expected: plot.y.position(Math.max(...raw.ys))};
+    }""")
+    assert found["points"] > 4 * found["pixels"], found
+    assert abs(found["drawn"] - found["expected"]) < 0.06, found
+
+
+def follows_the_pointer(sheet: Sheet):
+    """The value beside the name is that of the curve, and other charts show the same moment."""
+    drawing = sheet.chart("legs")
+    box = drawing.bounding_box()
+    sheet.page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 80)
+    sheet.frame()
+    found = sheet.get("""() => {
+        const {series} = Masseter.handles.get('legs').chart;
+        const shown = document.querySelector('#legs .legend .value').textContent;
+        return {shown, value: Masseter.valueAt(series[0], Masseter.time.cursor), at: Masseter.time.text(Masseter.time.cursor),
+            box: document.querySelector('#legs .box')?.textContent, bar: document.querySelector('#time-bar output').textContent,
+            dots: document.querySelectorAll('#legs .cursor circle').length, linked: document.querySelectorAll('#slides .cursor line').length};
+    }""")
+    assert found["shown"].endswith(" mm"), found
+    assert abs(float(found["shown"].removesuffix(" mm")) - found["value"]) < 0.01, found
+    assert found["box"].startswith(found["at"]) and found["bar"] == found["at"], found
+    assert found["dots"] == 3 and found["linked"] == 1, found
+
+
+def zooms(sheet: Sheet):
+    page, window = sheet.page, "() => Masseter.time.window"
+    whole = sheet.get(window)
+    ticks = "() => [...document.querySelectorAll('#motion-z .tick')].map(tick => tick.textContent).join()"
+    before = sheet.get(ticks)
+    box = sheet.chart("legs").bounding_box()
+    x, y = box["x"], box["y"] + 80
+    page.mouse.move(x + 0.4 * box["width"], y)
+    page.mouse.down()
+    page.mouse.move(x + 0.6 * box["width"], y, steps=4)
+    page.mouse.up()
+    sheet.frame()
+    dragged = sheet.get(window)
+    length = (whole[1] - whole[0]) * 0.2
+    assert 0.9 * length < dragged[1] - dragged[0] < 1.4 * length, (whole, dragged)
+    sheet.chart("motion-z")
+    sheet.frame()
+    assert sheet.get(ticks) != before, "the other charts do not follow"
+    box = sheet.chart("legs").bounding_box()
+    page.mouse.move(x + 0.5 * box["width"], box["y"] + 80)
+    page.keyboard.down("Control")
+    page.mouse.wheel(0, -200)
+    page.keyboard.up("Control")
+    sheet.frame()
+    wheeled = sheet.get(window)
+    assert wheeled[1] - wheeled[0] < 0.8 * (dragged[1] - dragged[0]), (dragged, wheeled)
+    page.mouse.dblclick(x + 0.5 * box["width"], box["y"] + 80)
+    assert sheet.get(window) == whole, ("a double click shows everything", sheet.get(window))
+    sheet.chart("legs").focus()
+    at = sheet.get("() => Masseter.time.cursor")
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("+")
+    moved, zoomed = sheet.get("() => Masseter.time.cursor"), sheet.get(window)
+    assert moved > at and zoomed[1] - zoomed[0] < 0.6 * (whole[1] - whole[0]), (at, moved, zoomed)
+    assert " mm" in page.locator(".spoken").text_content(), "a screen reader hears the values"
+    page.keyboard.press("Escape")
+    assert sheet.get(window) == whole
+
+
+def toggles_curves_and_time(sheet: Sheet):
+    page = sheet.page
+    button = page.locator("#legs .legend button").first
+    button.click()
+    sheet.frame()
+    assert page.locator("#legs path.curve[d^=M]").count() == 2 + 3, "three keys and two curves"
+    button.click()
+    page.select_option("#time-bar select", "cycle")
+    sheet.frame()
+    assert "cycle" in page.locator("#legs svg[tabindex]").text_content()
+    worst = page.locator("#worst tbody tr").first
+    cycle, at_s = worst.locator("th").text_content(), worst.locator("td").first.text_content().replace("\u2212", "-")
+    shown = sheet.get(f"() => Masseter.time.shown(Masseter.time.time.motion_s + {at_s})")
+    assert abs(shown - float(cycle)) <= 1, (cycle, shown)
+    page.select_option("#time-bar select", "motion")
+
+
+def saves(sheet: Sheet):
+    def saved(name: str) -> str:
+        sheet.chart("force-legs")
+        sheet.page.click("#force-legs .menu summary")
+        with sheet.page.expect_download() as download:
+            sheet.page.click(f"#force-legs .menu button:has-text('{name}')")
+        return Path(download.value.path()).read_text()
+
+    rows = list(csv.reader(io.StringIO(saved("CSV"))))
+    assert rows[0][0] == "motion time, s" and "l1 (N)" in rows[0] and len(rows) > 1000, rows[0]
+    times = [float(row[0]) for row in rows[1:]]
+    assert times == sorted(times) and times[0] < 0 < times[-1], (times[0], times[-1])
+    drawing = xml.fromstring(saved("SVG"))
+    paths = [part for part in drawing.iter("{http://www.w3.org/2000/svg}path") if part.get("d", "").startswith("M")]
+    assert len(paths) >= 12 and all(part.get("stroke", "").startswith("rgb") for part in paths), len(paths)
+
+
+def plays(sheet: Sheet):
+    sheet.get("() => Masseter.time.seek(1)")
+    sheet.page.click("#time-bar .play")
+    sheet.page.wait_for_function("() => Masseter.time.cursor > 1.3", timeout=10_000)
+    sheet.page.click("#time-bar .play")
+    assert not sheet.get("() => Masseter.time.isPlaying")
+
+
+def marks_the_stop(sheet: Sheet):
+    marks = sheet.page.locator("#motion-z .moment line")
+    assert marks.count() == 2, marks.count()
+    text = sheet.page.locator("#motion-z svg[tabindex]").text_content()
+    assert "fault 1" in text and "safe stop" in text, text
+    folded = sheet.page.locator("#events details")
+    assert folded.get_attribute("open") is None and folded.locator("li").count() > 20
+
+
+def goes_on(sheet: Sheet):
+    """What a run that goes on adds."""
+    found = sheet.get("""() => {
+        const end = Masseter.time.range[1];
+        Masseter.time.extend(end + 1);
+        Masseter.append('bite-of-a-test', 'none', [0, 1]);
+        Masseter.append('legs', 'l1', [end + 0.5, 250, end + 1, 260]);
+        Masseter.append('legs', 'new', [end + 0.5, 250, end + 1, 260]);
+        const {series} = Masseter.handles.get('legs').chart;
+        return {end: Masseter.time.window[1] - end, names: series.map(({name}) => name), last: series[0].ys[series[0].ys.length - 1]};
+    }""")
+    assert found == {"end": 1, "names": ["l1", "l2", "l3", "new"], "last": 260}, found
+    sheet.get("""() => Masseter.update('verdict', {word: 'RUNNING', reason: 'see `masseter`', tone: 'plain', timing: 'held',
+        timing_reason: '', timing_tone: 'good', figures: []})""")
+    assert sheet.page.locator("#verdict code").text_content() == "masseter"
+
+
+def pinches(sheet: Sheet):
+    """Two fingers move apart."""
+    box = sheet.chart("legs").bounding_box()
+    session = sheet.page.context.new_cdp_session(sheet.page)
+    middle, y = box["x"] + 0.55 * box["width"], box["y"] + 80
+
+    def touch(kind: str, apart: float):
+        points = [] if kind == "touchEnd" else [{"x": middle + side * apart, "y": y, "id": side + 1} for side in (-1, 1)]
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    whole = sheet.get("() => Masseter.time.window")
+    touch("touchStart", 30)
+    for apart in (40, 60, 80, 90):
+        touch("touchMove", apart)
+    touch("touchEnd", 0)
+    window = sheet.get("() => Masseter.time.window")
+    assert window[1] - window[0] < 0.5 * (whole[1] - whole[0]), (whole, window)
+
+
+def fits_the_screen(sheet: Sheet):
+    width = sheet.get("() => document.documentElement.scrollWidth")
+    assert width <= sheet.page.viewport_size["width"], width
+
+
+def is_accessible(sheet: Sheet):
+    found = Axe().run(sheet.page).response["violations"]
+    serious = [(rule["id"], [node["target"] for node in rule["nodes"]][:3]) for rule in found if rule["impact"] in ("serious", "critical")]
+    assert serious == [], serious
+
+
+def prints(sheet: Sheet):
+    pdf = sheet.page.pdf(prefer_css_page_size=True)
+    assert pdf.startswith(b"%PDF") and 3 <= pdf.count(b"/Type /Page\n") <= 20, pdf.count(b"/Type /Page\n")
+    sheet.page.emulate_media(media="print")
+    hidden = sheet.page.locator("#time-bar, .menu").evaluate_all("all => all.every(one => getComputedStyle(one).display === 'none')")
+    assert hidden, "controls are printed"
+    background = sheet.get("() => getComputedStyle(document.body).backgroundColor")
+    assert background == "rgb(255, 255, 255)", background
+
+
+def is_dark(sheet: Sheet):
+    background, text = (sheet.get(f"() => getComputedStyle(document.body).{name}") for name in ("backgroundColor", "color"))
+    shade = [sum(int(part) for part in colour[4:-1].split(",")) for colour in (background, text)]
+    assert shade[0] < 100 < 500 < shade[1], (background, text)
+
+
+def main():
+    stop = FOLDER / "stop.toml"
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    stop.write_text("name = 'stop'\nduration_s = 4.0\n[[faults]]\nkind = 'disconnect'\nbus = 1\nnode = 5\nfrom_s = 2.2\n")
+    chewing, stopped = run("chewing"), run("stopped", str(stop), code=5)
+    long = run("long", "--duration", "60")
+    size_mb = long.stat().st_size / 1e6
+    assert size_mb <= LARGEST_MB, f"60 s take {size_mb:.2f} MB"
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        short_s, long_s = loads_fast(browser, chewing), loads_fast(browser, long)
+        sheet = Sheet(browser, chewing)
+        for check in (draws_every_chart, follows_the_pointer, zooms, toggles_curves_and_time, saves, plays, fits_the_screen, is_accessible):
+            check(sheet)
+        goes_on(sheet)
+        sheet.close()
+        for path, settings, checks in (
+            (long, {}, [keeps_extremes]),
+            (stopped, {}, [marks_the_stop, draws_every_chart, prints]),
+            (chewing, {"color_scheme": "dark"}, [is_dark, is_accessible, prints]),
+            (stopped, {"viewport": PHONE, "has_touch": True, "is_mobile": True}, [fits_the_screen, pinches, is_accessible]),
+        ):
+            sheet = Sheet(browser, path, **settings)
+            for check in checks:
+                check(sheet)
+            sheet.close()
+        browser.close()
+    print(f"page: 10 s load in {short_s:.2f} s; 60 s take {size_mb:.2f} MB and load in {long_s:.2f} s")
+
+
+main()
