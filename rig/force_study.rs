@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::Context;
 use masseter_analysis::{Curve, Figures};
 use masseter_charts::{
-    Axis, Error, Key, Legend, LegendEntry, Line, LineChart, Scale, SeriesLabelPosition, legend, palette, svg,
+    Axis, Error, Key, LegendEntry, Line, LineChart, Scale, SeriesLabelPosition, legend, palette, svg,
 };
 use masseter_recording::Manifest;
 use masseter_report::Pressure;
@@ -162,9 +162,7 @@ fn forces_svg(chewing: &[CycleForces]) -> Result<String, Error> {
                 x: Axis::new("time in the cycle, s", Scale::Linear, [0.0, CYCLE_S]),
                 y: Axis::new("force, N", Scale::Linear, spans[axis / LEGS]),
                 lines: chewing.iter().zip(colours).map(line).collect(),
-                limits: Vec::new(),
-                moments: Vec::new(),
-                legend: Legend::Inside(SeriesLabelPosition::UpperRight),
+                legend: SeriesLabelPosition::UpperRight,
             }
             .draw_on(panel)?;
         }
@@ -206,9 +204,7 @@ fn bites_svg(bites: &[(&str, [Curve; 3])]) -> Result<String, Error> {
                     Line::new("estimated", estimated).coloured(palette::VERMILION),
                     Line::new("true", bitten).coloured(palette::BLUE),
                 ],
-                limits: Vec::new(),
-                moments: Vec::new(),
-                legend: Legend::Inside(SeriesLabelPosition::UpperRight),
+                legend: SeriesLabelPosition::UpperRight,
             }
             .draw_on(&panel)?;
         }

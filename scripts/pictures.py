@@ -26,11 +26,9 @@ SCRIPTS_MS = 2000
 
 # The report down to its first chart, with the jaw open.
 CUT_REPORT = """<script>
-for (let last = document.getElementById("motion"); last; last = last.parentElement)
+for (let last = document.getElementById("motion-z"); last !== document.body; last = last.parentElement)
   while (last.nextElementSibling) last.nextElementSibling.remove();
-const time = document.getElementById("time");
-time.value = 0.154;
-time.dispatchEvent(new Event("input"));
+Masseter.time.seek(Masseter.time.time.motion_s + 0.55);
 </script>"""
 # Leaves the height of the page, px, in its document.
 MEASURE = """<script>

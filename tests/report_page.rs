@@ -61,7 +61,8 @@ fn open(browser: &Path, page: &Path, profile: &Path) -> Output {
 /// What the page of a run shows, as its scripts read it.
 fn data(workspace: &Workspace) -> Value {
     let page = std::fs::read_to_string(workspace.run_folder().join("report.html")).unwrap();
-    let (_, from) = page.split_once("<script type=\"application/json\" id=\"data\">").expect("the page has data");
+    let (_, from) =
+        page.split_once("<script type=\"application/json\" id=\"data\">").expect("the page has data");
     serde_json::from_str(from.split_once("</script>").expect("the data end").0).unwrap()
 }
 
@@ -76,7 +77,7 @@ fn block<'a>(page: &'a Value, id: &str) -> &'a Value {
 fn points(series: &Value) -> Vec<(f64, f64)> {
     let points = &series["points"];
     let bytes = data_encoding::BASE64.decode(points["packed"].as_str().expect("packed").as_bytes()).unwrap();
-    let steps = ["x_step", "y_step"].map(|name| points[name].as_f64().unwrap());
+    let [x_step, y_step, y_from] = ["x_step", "y_step", "y_from"].map(|name| points[name].as_f64().unwrap());
     let (mut differences, mut number, mut shift) = (Vec::new(), 0_u64, 0);
     for byte in bytes {
         number |= u64::from(byte & 0x7f) << shift;
@@ -89,7 +90,7 @@ fn points(series: &Value) -> Vec<(f64, f64)> {
     let mut at = [0_i64; 2];
     let point = |pair: &[i64]| {
         at = [at[0] + pair[0], at[1] + pair[1]];
-        (at[0] as f64 * steps[0], at[1] as f64 * steps[1])
+        (at[0] as f64 * x_step, y_from + at[1] as f64 * y_step)
     };
     differences.chunks(2).map(point).collect()
 }
@@ -136,7 +137,10 @@ fn after_a_safe_stop_the_charts_go_on_and_show_the_fault_and_its_detection() {
     assert_eq!(fault["text"], "fault 1: disconnect (bus 1, node 5)");
     assert!(stop["text"].as_str().unwrap().starts_with("safe stop: master, "), "{stop}");
     let in_motion_s = |moment: &Value| moment["at_s"].as_f64().unwrap() - motion_s(&page);
-    assert!((in_motion_s(fault) - 2.2).abs() < 0.002 && in_motion_s(stop) > in_motion_s(fault), "{fault} {stop}");
+    assert!(
+        (in_motion_s(fault) - 2.2).abs() < 0.002 && in_motion_s(stop) > in_motion_s(fault),
+        "{fault} {stop}"
+    );
     // The jaw is followed for as long as the axes are.
     let [jaw, legs] = ["motion-z", "legs"].map(|id| curves_s(block(&page, id)));
     assert!((jaw[1][1] - legs[0][1]).abs() < 0.01, "{jaw:?} and {legs:?}");

@@ -80,9 +80,8 @@ def draws_every_chart(sheet: Sheet):
     names = sheet.get("() => [...document.querySelectorAll('.block-chart')].map(block => block.id)")
     assert len(names) > 12, names
     empty = [name for name in names if not sheet.page.locator(f"#{name} svg[tabindex] path.curve[d^=M]").count()]
-    # No wake-up is late in simulated time.
-    assert empty == ["jitter"], empty
-    for name in [name for name in names if name not in empty]:
+    assert empty == [], empty
+    for name in names:
         drawing = sheet.chart(name)
         sheet.frame()
         shades = sheet.get(f"""async () => {{

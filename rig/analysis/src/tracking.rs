@@ -91,15 +91,13 @@ pub struct TrackingSample {
 /// pose is the last one.
 #[derive(Debug, Clone, Default)]
 pub struct Track {
-    /// Cycles from the first on, as many as a screen shows; of a long run not to its end.
+    /// Cycles from the first to the last, as many as a screen shows; fewer of a long run.
     pub samples: Vec<TrackingSample>,
-    /// How long it went on, s.
-    pub duration_s: f64,
 }
 
-/// Time between two samples of the track, ns: the 60 Hz of a screen.
+/// Time between two samples of the track at first, ns: the 60 Hz of a screen.
 const SAMPLE_NS: u64 = SECOND_NS / 60;
-/// Samples of the track: half a minute.
+/// Most samples of the track: of more than half a minute every second, fourth … sample stays.
 const MOST_SAMPLES: usize = 2048;
 
 /// The state of a cycle, and its sample.
@@ -142,8 +140,8 @@ pub(super) struct Tracking {
     estimates: Accumulator,
     track: Vec<TrackingSample>,
     next_sample_ns: u64,
-    began_ns: Option<u64>,
-    ended_ns: u64,
+    /// How often the time between two samples of the track has doubled.
+    halvings: u32,
     /// The last one before a stop.
     desired: Option<Pose>,
     second: Accumulator,
@@ -241,12 +239,16 @@ impl Tracking {
     /// Takes a sample with a desired, an estimated and an actual pose into the track.
     fn draw(&mut self, sampled_ns: u64, poses: [Option<Pose>; 3]) {
         let [Some(desired), Some(estimated), Some(actual)] = poses else { return };
-        self.began_ns.get_or_insert(sampled_ns);
-        self.ended_ns = sampled_ns;
-        if sampled_ns >= self.next_sample_ns && self.track.len() < MOST_SAMPLES {
-            self.track.push(TrackingSample { sampled_ns, desired, estimated, actual });
-            self.next_sample_ns = sampled_ns + SAMPLE_NS;
+        if sampled_ns < self.next_sample_ns {
+            return;
         }
+        if self.track.len() == MOST_SAMPLES {
+            let mut place = 0..;
+            self.track.retain(|_| place.next().is_some_and(|place| place % 2 == 0));
+            self.halvings += 1;
+        }
+        self.track.push(TrackingSample { sampled_ns, desired, estimated, actual });
+        self.next_sample_ns = sampled_ns + (SAMPLE_NS << self.halvings);
     }
 
     /// Seconds of the motion, each with an error of its own: how much they differ is the figure's noise.
@@ -277,9 +279,7 @@ impl Tracking {
                 estimated: self.undisturbed_estimated.finish(),
             },
         };
-        let lasted_ns = self.ended_ns.saturating_sub(self.began_ns.unwrap_or(self.ended_ns));
-        let track = Track { samples: self.track, duration_s: lasted_ns as f64 / 1e9 };
-        (figures, track)
+        (figures, Track { samples: self.track })
     }
 }
 

@@ -19,22 +19,20 @@ pub enum Scale {
     Linear,
     /// By their logarithm.
     Log,
-    /// Values are 1/(1 − quantile), spaced by their logarithm and labelled as percentiles.
-    Percentile,
 }
 
 impl Scale {
     pub(crate) fn position(self, value: f64) -> f64 {
         match self {
             Self::Linear => value,
-            Self::Log | Self::Percentile => value.log10(),
+            Self::Log => value.log10(),
         }
     }
 
     fn value(self, position: f64) -> f64 {
         match self {
             Self::Linear => position,
-            Self::Log | Self::Percentile => 10f64.powf(position),
+            Self::Log => 10f64.powf(position),
         }
     }
 }
@@ -85,12 +83,6 @@ impl Axis {
         self.ends.get_or_insert([low, high.max(low + least)]);
     }
 
-    /// Whether a value lies between its ends.
-    pub(crate) fn covers(&self, value: f64) -> bool {
-        let [low, high] = self.ends();
-        (low..=high).contains(&self.scale.position(value))
-    }
-
     pub(crate) fn has_names(&self) -> bool {
         !self.names.is_empty()
     }
@@ -105,7 +97,6 @@ impl Axis {
             Scale::Linear if self.has_names() => (0..self.names.len()).map(|index| index as f64).collect(),
             Scale::Linear => ticks::linear(low, high),
             Scale::Log => ticks::logarithmic(low, high),
-            Scale::Percentile => ticks::decades(low, high),
         }
     }
 }
@@ -139,7 +130,6 @@ impl ValueFormatter<f64> for Axis {
             Scale::Linear if self.has_names() => self.names.get(*value as usize).cloned().unwrap_or_default(),
             Scale::Linear => ticks::multiple(*value, ticks::step(self.ends()[1] - self.ends()[0])),
             Scale::Log => ticks::power(nearly_whole(position), self.ends()),
-            Scale::Percentile => ticks::percentile(position),
         }
     }
 }

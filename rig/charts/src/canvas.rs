@@ -16,11 +16,13 @@ const MARGIN: u32 = 10;
 const RIM: RGBColor = RGBColor(0x55, 0x55, 0x55);
 const MESH: RGBColor = RGBColor(0xe4, 0xe4, 0xe4);
 /// From one row of a legend to the next, px.
-pub(crate) const ROW: u32 = 20;
+const ROW: u32 = 20;
 /// Width of a wide line, px.
 const WIDE: u32 = 8;
 /// Opacity of a wide line.
 const PALE: f64 = 0.35;
+/// Length of a line before a name, px.
+const KEY: i32 = 18;
 /// Length of a dash and of the gap after it, px.
 pub(crate) const DASH: [u32; 2] = [6, 4];
 
@@ -64,10 +66,6 @@ pub struct Disc {
 pub enum Key {
     /// A stroke.
     Line,
-    /// A wide, pale stroke.
-    Wide,
-    /// A dashed stroke.
-    Dashes,
     /// A filled box.
     Box,
 }
@@ -113,21 +111,10 @@ pub fn chart<'a, 'svg>(
     x: Axis,
     y: Axis,
 ) -> Result<Chart<'a, 'svg>, Error> {
-    chart_below(0, area, title, x, y)
-}
-
-/// The same with so many pixels left free above the plot.
-pub(crate) fn chart_below<'a, 'svg>(
-    room: u32,
-    area: &'a Area<'svg>,
-    title: &str,
-    x: Axis,
-    y: Axis,
-) -> Result<Chart<'a, 'svg>, Error> {
     let labels = [x.label.clone(), y.label.clone()];
     let [below, numbers, names] = LABELS;
     let mut builder = ChartBuilder::on(area);
-    builder.margin(MARGIN).margin_top(MARGIN + room).margin_right(2 * MARGIN).x_label_area_size(below);
+    builder.margin(MARGIN).margin_right(2 * MARGIN).x_label_area_size(below);
     builder.y_label_area_size(if y.has_names() { names } else { numbers });
     if !title.is_empty() {
         builder.caption(title, ("sans-serif", TITLE));
@@ -227,22 +214,16 @@ pub fn legend(area: &Area, entries: &[LegendEntry], columns: usize) -> Result<()
     let (width, _) = area.dim_in_pixel();
     let column = width as i32 / columns as i32;
     let text = ("sans-serif", TEXT).into_text_style(area).pos(Pos::new(HPos::Left, VPos::Center));
-    let [dash, gap] = DASH.map(u32::cast_signed);
     for (index, LegendEntry { name, colour, key }) in entries.iter().enumerate() {
         let x = MARGIN as i32 + column * (index % columns) as i32;
         let y = (MARGIN / 2 + ROW / 2) as i32 + ROW as i32 * (index / columns) as i32;
-        let stroke = |from: i32, length: i32| {
-            let style = stroke(*colour, *key == Key::Wide);
-            area.draw(&PathElement::new([(from, y), (from + length, y)], style))
-        };
         match key {
             Key::Box => {
                 let corners = [(x, y - 6), (x + 16, y + 6)];
                 area.draw(&Rectangle::new(corners, colour.filled()))?;
                 area.draw(&Rectangle::new(corners, BLACK))?;
             }
-            Key::Line | Key::Wide => stroke(x, 3 * dash)?,
-            Key::Dashes => stroke(x, dash).and_then(|()| stroke(x + dash + gap, dash))?,
+            Key::Line => area.draw(&PathElement::new([(x, y), (x + KEY, y)], stroke(*colour, false)))?,
         }
         area.draw_text(name, &text, (x + 24, y))?;
     }

@@ -54,7 +54,7 @@ pub(crate) fn logarithmic(low: f64, high: f64) -> Vec<f64> {
 }
 
 /// Whole exponents between two of them, every second, third … one where there are many.
-pub(crate) fn decades(low: f64, high: f64) -> Vec<f64> {
+fn decades(low: f64, high: f64) -> Vec<f64> {
     let [first, last] = [(low - 1e-9).ceil() as i64, (high + 1e-9).floor() as i64];
     let stride = ((last - first) as f64 / MOST).ceil().max(1.0) as i64;
     (first..=last).filter(|exponent| exponent % stride == 0).map(|exponent| exponent as f64).collect()
@@ -83,12 +83,6 @@ pub(crate) fn power(exponent: f64, [low, high]: [f64; 2]) -> String {
         None => '⁻',
     };
     format!("10{}", (exponent as i64).to_string().chars().map(raised).collect::<String>())
-}
-
-/// Nines of a quantile as a percentile: 3 nines are 99.9 %.
-pub(crate) fn percentile(nines: f64) -> String {
-    let decimals = (nines.round() as usize).saturating_sub(2);
-    format!("{:.decimals$} %", 100.0 * (1.0 - 10f64.powf(-nines)))
 }
 
 #[cfg(test)]
@@ -128,11 +122,6 @@ mod tests {
             labels(1e-8, 1.0),
             ["10⁻⁸", "10⁻⁷", "10⁻⁶", "10⁻⁵", "10⁻⁴", "10⁻³", "10⁻²", "10⁻¹", "10⁰"]
         );
-    }
-
-    #[test]
-    fn percentiles_are_labelled_as_people_say_them() {
-        assert_eq!([0.0, 1.0, 2.0, 3.0, 4.0].map(percentile), ["0 %", "90 %", "99 %", "99.9 %", "99.99 %"]);
     }
 
     #[test]

@@ -14,7 +14,8 @@
   Masseter.linearTicks = ([low, high], most) => {
     const step = stepOf(high - low || 1, most), decimals = decimalsOf(step), ticks = [];
     for (let number = Math.ceil(low / step - 1e-9); number * step <= high + step * 1e-9; number += 1) {
-      ticks.push({ value: number * step, text: Masseter.fixed(number * step, decimals) });
+      const value = number * step;
+      ticks.push({ value, text: decimals > 9 ? value.toExponential(2) : Masseter.fixed(value, decimals) });
     }
     return ticks;
   };

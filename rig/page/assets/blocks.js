@@ -48,10 +48,22 @@
     return { update };
   });
 
+  // A button that shows a time and moves the cursor there.
+  const timeButton = (at, clock) => element('button', { type: 'button', 'data-at': at, title: 'Move the cursor there',
+    onclick: () => { clock.play(false); clock.seek(at); } }, clock.text(at));
+  const retell = (holder, clock) => holder.querySelectorAll('[data-at]').forEach((button) => { button.textContent = clock.text(Number(button.dataset.at)); });
+
+  Masseter.block('moments', (holder, _, clock) => {
+    const write = () => holder.replaceChildren(element('ul', { class: 'events' }, ...Masseter.moments
+      .map((moment) => element('li', { class: moment.kind === 'note' ? '' : 'fault' }, timeButton(moment.at_s, clock), ` ${moment.text}`))));
+    // A new moment tells the mode again.
+    clock.on('mode', write);
+    write();
+  });
+
   Masseter.block('events', (holder, data, clock) => {
     const item = (event) => element('li', { class: event.is_fault ? 'fault' : '' },
-      element('button', { type: 'button', 'data-at': event.at_s, title: 'Move the cursor there', onclick: () => { clock.play(false); clock.seek(event.at_s); } }, clock.text(event.at_s)),
-      ` ${event.source}: `, ...rich(event.text));
+timeButton(event.at_s, clock), ` ${event.source}: `, ...rich(event.text));
     const list = (events) => element('ul', { class: 'events' }, ...events.map(item));
     const count = (events) => `${events.length} event${events.length === 1 ? '' : 's'}`;
     const start = element('details', {}), rest = element('div', {});
@@ -65,7 +77,7 @@
     Masseter.lanes(lanes, () => [...data.start, ...data.rest], clock);
     holder.append(lanes, start, rest);
     update(data);
-    clock.on('mode', () => holder.querySelectorAll('[data-at]').forEach((button) => { button.textContent = clock.text(Number(button.dataset.at)); }));
+    clock.on('mode', () => retell(holder, clock));
     return {
       update,
       // Adds events to those after the start.

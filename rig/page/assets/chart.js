@@ -72,7 +72,7 @@
       .filter(({ values }) => values.length);
     for (const { value } of near) { low = Math.min(low, value); high = Math.max(high, value); }
     if (isLog) return { ends: [low / 1.3, high * 1.3], near, beyond };
-    const margin = Math.max(0.06 * (high - low), 1e-9 * Math.max(Math.abs(low), Math.abs(high)), 1e-12);
+    const margin = high > low ? Math.max(0.06 * (high - low), 1e-9 * Math.abs(high)) : Math.max(0.05 * Math.abs(high), 1e-6);
     return { ends: [low - margin, high + margin], near, beyond };
   }
 

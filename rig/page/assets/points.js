@@ -15,7 +15,7 @@
       weight *= 128;
       if (byte & 0x80) continue;
       const difference = number % 2 ? -(number + 1) / 2 : number / 2;
-      if (isX) { x += difference; } else { y += difference; xs.push(x * source.x_step); ys.push(y * source.y_step); }
+      if (isX) { x += difference; } else { y += difference; xs.push(x * source.x_step); ys.push(source.y_from + y * source.y_step); }
       isX = !isX;
       number = 0;
       weight = 1;

@@ -6,7 +6,6 @@ use serde_json::Value;
 use crate::chart::Chart;
 use crate::live::{Live, Parameter};
 use crate::pressure::Pressure;
-use crate::time::Moment;
 
 /// A section of the page.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -95,6 +94,8 @@ pub enum Content {
     Chart(Box<Chart>),
     /// What happened when.
     Events(Events),
+    /// The page's moments in words.
+    Moments,
     /// A drawing as SVG, and what it shows.
     Picture {
         /// The drawing.
@@ -228,6 +229,3 @@ pub struct EventRow {
     /// What happened.
     pub text: String,
 }
-
-/// The moments of a run, which all charts over time mark.
-pub type Moments = Vec<Moment>;

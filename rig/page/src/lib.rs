@@ -24,7 +24,7 @@ mod points;
 mod pressure;
 mod time;
 
-pub use block::{Block, Cell, Column, Content, EventRow, Events, Moments, Section, Table, Tone, Verdict};
+pub use block::{Block, Cell, Column, Content, EventRow, Events, Section, Table, Tone, Verdict};
 pub use chart::{Across, Chart, Limit, Scale, Series, Style};
 pub use live::{Live, Parameter};
 pub use page::{Life, Page, PageError};

@@ -3,8 +3,8 @@
 use askama::Template;
 use serde::Serialize;
 
-use crate::block::{Moments, Section};
-use crate::time::{Phase, Time};
+use crate::block::Section;
+use crate::time::{Moment, Phase, Time};
 
 /// Whether the run is over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -28,7 +28,7 @@ pub struct Page {
     /// What times count from.
     pub time: Time,
     /// What all charts over time mark.
-    pub moments: Moments,
+    pub moments: Vec<Moment>,
     /// The controller's states, one after the other.
     pub phases: Vec<Phase>,
     /// In their order.

@@ -7,6 +7,8 @@ use serde::{Serialize, Serializer};
 const TIME_STEP_S: f64 = 1e-6;
 /// Steps of a packed value from the lowest to the highest.
 const VALUE_STEPS: f64 = 1_048_576.0;
+/// Beyond this, values are so far apart that their difference may be no number.
+const LARGEST: f64 = 1e300;
 
 /// The points of a curve in the order of x. What is no finite number is left out.
 ///
@@ -28,6 +30,8 @@ enum Written {
         packed: String,
         x_step: f64,
         y_step: f64,
+        /// What y counts from.
+        y_from: f64,
     },
 }
 
@@ -47,7 +51,7 @@ impl Points {
     /// Points that are written as they are, for short curves of any two quantities.
     #[must_use]
     pub fn plain(points: &[(f64, f64)]) -> Self {
-        let is_finite = |(x, y): &&(f64, f64)| x.is_finite() && y.is_finite();
+        let is_finite = |(x, y): &&(f64, f64)| x.is_finite() && y.abs() < LARGEST;
         Self { points: points.iter().filter(is_finite).copied().collect(), is_packed: false }
     }
 
@@ -59,17 +63,17 @@ impl Points {
     fn packed(&self) -> Written {
         let outside = [f64::INFINITY, f64::NEG_INFINITY];
         let [low, high] = self.iter().fold(outside, |[low, high], (_, y)| [low.min(y), high.max(y)]);
-        // Of a curve without height any step will do that its values are multiples of.
-        let y_step = if high > low { (high - low) / VALUE_STEPS } else { low.abs().max(1.0) };
+        let y_step = if high > low { (high - low) / VALUE_STEPS } else { 1.0 };
+        let y_from = if low.is_finite() { low } else { 0.0 };
         let (mut bytes, mut before) = (Vec::new(), [0_i64; 2]);
         for (at_s, value) in self.iter() {
-            let steps = [at_s / TIME_STEP_S, value / y_step].map(|steps| steps.round() as i64);
+            let steps = [at_s / TIME_STEP_S, (value - y_from) / y_step].map(|steps| steps.round() as i64);
             for (now, before) in steps.iter().zip(&before) {
                 push(&mut bytes, now - before);
             }
             before = steps;
         }
-        Written::Packed { packed: BASE64.encode(&bytes), x_step: TIME_STEP_S, y_step }
+        Written::Packed { packed: BASE64.encode(&bytes), x_step: TIME_STEP_S, y_step, y_from }
     }
 }
 
@@ -99,7 +103,7 @@ mod tests {
     use super::*;
 
     fn unpacked(points: &Points) -> Vec<(f64, f64)> {
-        let Written::Packed { packed, x_step, y_step } = points.packed() else { panic!("not packed") };
+        let Written::Packed { packed, x_step, y_step, y_from } = points.packed() else { panic!("not packed") };
         let (mut numbers, mut number, mut shift) = (Vec::new(), 0_u64, 0);
         for byte in BASE64.decode(packed.as_bytes()).unwrap() {
             number |= u64::from(byte & 0x7f) << shift;
@@ -112,7 +116,7 @@ mod tests {
         let (mut x, mut y) = (0, 0);
         let pair = |pair: &[i64]| {
             (x, y) = (x + pair[0], y + pair[1]);
-            (x as f64 * x_step, y as f64 * y_step)
+            (x as f64 * x_step, y_from + y as f64 * y_step)
         };
         numbers.chunks(2).map(pair).collect()
     }
@@ -138,5 +142,7 @@ mod tests {
         let plain = Points::plain(&[(1.0, 2.0), (f64::INFINITY, 3.0)]);
         assert_eq!(serde_json::to_string(&plain).unwrap(), "[1.0,2.0]");
         assert_eq!(unpacked(&Points::over_time(&[])), []);
+        let far = [(0.0, 1e17), (1.0, 1e17 + 1e3), (2.0, 1e301)];
+        assert_eq!(unpacked(&Points::over_time(&far)), far[..2]);
     }
 }

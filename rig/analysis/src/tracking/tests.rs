@@ -44,7 +44,7 @@ fn a_platform_that_never_ran_has_no_tracking_error() {
 }
 
 #[test]
-fn a_long_run_keeps_close_samples_of_its_beginning() {
+fn a_long_run_keeps_samples_from_its_beginning_to_its_end() {
     let mut tracking = Tracking::new(PoseSource::Truth, [0.0; 3]);
     for cycle in 0..100_000 {
         // To and fro in 0.7 s, as fast as chewing.
@@ -53,11 +53,11 @@ fn a_long_run_keeps_close_samples_of_its_beginning() {
         tracking.truth(&Truth { sampled_ns: cycle * PERIOD_NS, ..truth(cycle, x) });
     }
     let (_, track) = tracking.finish();
-    assert!((track.duration_s - 99.999).abs() < 1e-9);
-    assert!(
-        track.samples.windows(2).all(|pair| pair[1].sampled_ns - pair[0].sampled_ns <= SAMPLE_NS + PERIOD_NS)
-    );
+    let longest_ns = 4 * (SAMPLE_NS + PERIOD_NS);
+    assert!(track.samples.windows(2).all(|pair| pair[1].sampled_ns - pair[0].sampled_ns <= longest_ns));
     assert_eq!(track.samples[0].sampled_ns, 0);
+    assert!(99_999 * PERIOD_NS - track.samples[track.samples.len() - 1].sampled_ns <= longest_ns);
+    assert!((MOST_SAMPLES / 2..=MOST_SAMPLES).contains(&track.samples.len()), "{}", track.samples.len());
 }
 
 #[test]
@@ -164,5 +164,4 @@ fn after_a_safe_stop_the_track_goes_on_beside_the_last_desired_pose() {
     let last = track.samples.last().unwrap();
     assert_eq!((last.sampled_ns, last.actual.translation.x), (60 * SAMPLE_NS, 0.06));
     assert!((last.desired.translation.x - 0.02).abs() < 1e-12, "the sample that ended the motion");
-    assert!((track.duration_s - 59.0 / 60.0).abs() < 1e-6);
 }

@@ -25,7 +25,9 @@ fn responses_in_words(response: &BusResponse) -> String {
         let (max, bound) = (us(message.max_ns), us(message.bound_ns));
         format!("; closest to its bound: {} on can{} with {max} of {bound} µs", message.message, message.bus)
     });
-    format!("Response times from the queueing to the end of a frame, beside the worst case by the plan{tightest}")
+    format!(
+        "Response times from the queueing to the end of a frame, beside the worst case by the plan{tightest}"
+    )
 }
 
 fn topics_in_words(topics: &[TopicFigures]) -> String {

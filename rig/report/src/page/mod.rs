@@ -131,3 +131,56 @@ fn phases(figures: &Figures) -> Vec<Phase> {
 fn in_unit(curve: &Curve, zero: f64, unit: f64) -> Vec<(f64, f64)> {
     curve.iter().map(|&(at_s, value)| (at_s, (value - zero) * unit)).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use masseter_analysis::{Analysis, TrackingSample};
+    use masseter_recording::MachineInfo;
+    use masseter_shared::geometry::Pose;
+    use masseter_shared::named::Declared;
+    use serde_json::Value;
+
+    use super::*;
+
+    /// The data of the page of a run on these interfaces, with a motion of one sample.
+    fn data(interfaces: &[&str]) -> Value {
+        let mut scenario = Scenario::default();
+        scenario.can.interfaces = interfaces.iter().map(|name| (*name).to_owned()).collect();
+        let mut figures = Analysis::new(&scenario, &Declared::default()).finish(false, &[]);
+        let still = Pose::identity();
+        figures.track.samples =
+            vec![TrackingSample { sampled_ns: 0, desired: still, estimated: still, actual: still }];
+        let machine = MachineInfo { cpu: String::new(), cores: 2, kernel: String::new(), is_virtual: false };
+        let manifest = Manifest::new(scenario, 1.0, "rt", machine);
+        let page = html(&manifest, &figures, &Verdict::new(&manifest, &figures)).unwrap();
+        let (_, from) = page.split_once("id=\"data\">").unwrap();
+        serde_json::from_str(from.split_once("</script>").unwrap().0).unwrap()
+    }
+
+    fn block(page: &Value, id: &str) -> Value {
+        let sections = page["sections"].as_array().unwrap().iter();
+        let mut blocks = sections.flat_map(|section| section["blocks"].as_array().unwrap());
+        blocks.find(|block| block["id"] == id).unwrap()["data"].clone()
+    }
+
+    #[test]
+    fn without_truth_nothing_is_called_true() {
+        let names = |page: &Value| -> Vec<String> {
+            let series = block(page, "motion-z")["series"].as_array().unwrap().clone();
+            series.iter().map(|series| series["name"].as_str().unwrap().to_owned()).collect()
+        };
+        let (emulated, robot) = (data(&[]), data(&["can0", "can1"]));
+        assert_eq!(names(&emulated), ["desired", "true", "estimated"]);
+        assert_eq!(names(&robot), ["desired", "estimated"]);
+        assert_eq!(
+            [&emulated, &robot].map(|page| block(page, "scene")["actual_name"].clone()),
+            ["true", "estimated"]
+        );
+    }
+
+    #[test]
+    fn a_run_that_never_moved_has_no_time_of_its_motion() {
+        let page = data(&[]);
+        assert!(page["time"]["motion_s"].is_null() && page["moments"].as_array().unwrap().is_empty());
+    }
+}

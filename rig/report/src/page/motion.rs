@@ -113,9 +113,7 @@ pub(super) fn pressure(figures: &Figures) -> Option<Section> {
          together. The area of a disc is the force.",
         contact.total_max_n
     );
-    let blocks = vec![
-        Block::text("pressure-in-words", words),
-        Block::new("pressure", Content::Pressure(pressure)),
-    ];
+    let blocks =
+        vec![Block::text("pressure-in-words", words), Block::new("pressure", Content::Pressure(pressure))];
     Some(Section::new("pressure-between-jaws", "Pressure between the jaws", blocks))
 }

@@ -43,10 +43,8 @@ pub(super) fn section(figures: &Figures, verdict: &Verdict) -> Option<Section> {
 fn row(figures: &Figures, found: &RequirementFigures, check: &Check) -> Vec<Cell> {
     let margin = or_dash(found.margin, |margin| format!("{} {}", significant(margin), found.margin_unit));
     let share = found.relative_margin.map(|share| format!(" ({:.0} %)", share * 100.0)).unwrap_or_default();
-    let plot = chart(figures, found).map_or_else(
-        || "".into(),
-        |chart| Cell::Plot { plot: Box::new(Chart { height: SMALL, ..chart }) },
-    );
+    let plot = chart(figures, found)
+        .map_or_else(|| "".into(), |chart| Cell::Plot { plot: Box::new(Chart { height: SMALL, ..chart }) });
     vec![
         found.name.clone().into(),
         mark(check.result),

@@ -23,6 +23,7 @@ pub(super) fn section(manifest: &Manifest, figures: &Figures, verdict: &Verdict)
     };
     let blocks = vec![
         Block::new("verdict", Content::Verdict(panel(manifest, figures, verdict))),
+        Block::new("moments", Content::Moments),
         Block::table("checks", table),
     ];
     Section::new("result", "Result", blocks)

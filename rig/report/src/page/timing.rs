@@ -29,7 +29,7 @@ pub(super) fn section(scenario: &Scenario, figures: &Figures) -> Section {
         Block::table("latencies", latencies(&figures.intervals)).folded("Latencies in numbers"),
         Block::text("percentiles-in-words", P999),
         Block::text("skipped", skipped(figures)),
-        Block::chart("jitter", wake_ups(figures)),
+        wake_ups(figures),
         Block::text("worst-in-words", LONGEST),
         Block::table("worst", longest(figures)),
     ];
@@ -66,22 +66,24 @@ fn budgets(scenario: &Scenario) -> Vec<Limit> {
     budgets
 }
 
-/// The latest wake-ups over time; none under virtual time, where no wake-up is late.
-fn wake_ups(figures: &Figures) -> Chart {
+/// The latest wake-ups over time; words under virtual time, where no wake-up is late.
+fn wake_ups(figures: &Figures) -> Block {
     let over_time = &figures.over_time;
     let curves = [("controller", &over_time.controller_late_ns), ("plant", &over_time.plant_late_ns)];
     let is_late = |curve: &Curve| curve.iter().any(|(_, late_ns)| *late_ns > 0.0);
+    if !curves.iter().any(|(_, curve)| is_late(curve)) {
+        return Block::text("jitter", "Under virtual time no wake-up is late.");
+    }
     let late = |(name, curve): (&str, &Curve)| {
         let points: Vec<_> = curve.iter().map(|&(at_s, late_ns)| (at_s, in_us(late_ns))).collect();
         Series::new(name, Style::Plain, Points::over_time(&points))
     };
-    let is_any = curves.iter().any(|(_, curve)| is_late(curve));
-    Chart {
+    let chart = Chart {
         scale: Scale::Log,
-        series: if is_any { curves.map(late).into() } else { Vec::new() },
-        otherwise: "Under virtual time no wake-up is late.".to_owned(),
+        series: curves.map(late).into(),
         ..Chart::over_time("Latest wake-up after its deadline", "µs")
-    }
+    };
+    Block::chart("jitter", chart)
 }
 
 fn in_us(ns: f64) -> f64 {

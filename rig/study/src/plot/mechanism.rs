@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use masseter_charts::palette::{BLUE, GREEN, GREY, PURPLE, VERMILION};
 use masseter_charts::{
-    Area, Axis, Chart, Error, Legend, Line, LineChart, Scale, SeriesLabelPosition, TEXT, TITLE, marks, svg,
+    Area, Axis, Chart, Error, Line, LineChart, Scale, SeriesLabelPosition, TEXT, TITLE, marks, svg,
 };
 use masseter_controller::kinematics::Solution;
 use masseter_shared::geometry::{LEGS, Vec3};
@@ -66,9 +66,7 @@ fn loci<'a>(study: &Study, found: impl Iterator<Item = &'a Solution>) -> LineCha
         x: Axis::new("x (anterior), mm", Scale::Linear, WINDOW_MM[0]),
         y: Axis::new("z (up), mm", Scale::Linear, WINDOW_MM[1]),
         lines: circles.into_iter().map(circle).chain(triangles).collect(),
-        limits: Vec::new(),
-        moments: Vec::new(),
-        legend: Legend::Inside(SeriesLabelPosition::UpperRight),
+        legend: SeriesLabelPosition::UpperRight,
     }
 }
 

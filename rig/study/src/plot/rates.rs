@@ -1,6 +1,6 @@
 //! How often random guesses lead to the true solution, by their distance from it.
 
-use masseter_charts::{Axis, Error, Legend, Line, LineChart, Scale, SeriesLabelPosition};
+use masseter_charts::{Axis, Error, Line, LineChart, Scale, SeriesLabelPosition};
 
 use super::colours::SOLVER_COLOURS;
 use crate::sample::{GUESSES, Guesses};
@@ -35,8 +35,6 @@ fn panel(title: &str, share: impl Fn(Solver, Guesses) -> Share) -> LineChart {
         x: Axis::new("guesses within ±, °", Scale::Linear, [0.0, 95.0]),
         y: Axis::new("share of guesses, %", Scale::Linear, [0.0, 102.0]),
         lines: COMPARED.into_iter().zip(SOLVER_COLOURS).map(line).collect(),
-        limits: Vec::new(),
-        moments: Vec::new(),
-        legend: Legend::Inside(SeriesLabelPosition::LowerLeft),
+        legend: SeriesLabelPosition::LowerLeft,
     }
 }

@@ -1,8 +1,6 @@
 //! Fig. 5: iterations and time of a solution.
 
-use masseter_charts::{
-    Area, Axis, Bar, Error, Legend, Line, LineChart, Scale, SeriesLabelPosition, bars, chart,
-};
+use masseter_charts::{Area, Axis, Bar, Error, Line, LineChart, Scale, SeriesLabelPosition, bars, chart};
 
 use super::colours::SOLVER_COLOURS;
 use crate::sample::Guesses;
@@ -37,9 +35,7 @@ fn iterations(study: &Study) -> LineChart {
         x: Axis::new("iterations", Scale::Linear, [0.0, MOST as f64]),
         y: Axis::new("share of guesses solved, %", Scale::Linear, [0.0, 102.0]),
         lines: COMPARED.into_iter().zip(SOLVER_COLOURS).map(line).collect(),
-        limits: Vec::new(),
-        moments: Vec::new(),
-        legend: Legend::Inside(SeriesLabelPosition::LowerRight),
+        legend: SeriesLabelPosition::LowerRight,
     }
 }
 

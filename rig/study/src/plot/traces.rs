@@ -1,6 +1,6 @@
 //! Figs. 3 and 4: the error against the iteration for single guesses.
 
-use masseter_charts::{Axis, Error, Legend, Line, LineChart, Scale, SeriesLabelPosition};
+use masseter_charts::{Axis, Error, Line, LineChart, Scale, SeriesLabelPosition};
 
 use super::colours::SOLVER_COLOURS;
 use crate::pairs::{Course, Disagreement, Trace};
@@ -38,9 +38,7 @@ fn course(disagreement: &Disagreement) -> LineChart {
         x: Axis::new("iteration", Scale::Linear, [0.0, ITERATIONS as f64]),
         y: Axis::fitted("error f₁² + f₂² + f₃², cm²", Scale::Log).including(1.0),
         lines: named.zip(SOLVER_COLOURS).map(line).collect(),
-        limits: Vec::new(),
-        moments: Vec::new(),
-        legend: Legend::Inside(SeriesLabelPosition::MiddleRight),
+        legend: SeriesLabelPosition::MiddleRight,
     }
 }
 
@@ -54,8 +52,6 @@ fn last_cycles(errors_cm2: &[f64]) -> LineChart {
         x: Axis::fitted("iteration", Scale::Linear),
         y: Axis::fitted("", Scale::Linear),
         lines: vec![Line::new("", points.collect()).coloured(colour).marked()],
-        limits: Vec::new(),
-        moments: Vec::new(),
-        legend: Legend::Inside(SeriesLabelPosition::UpperRight),
+        legend: SeriesLabelPosition::UpperRight,
     }
 }
