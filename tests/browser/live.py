@@ -10,7 +10,7 @@ import sys
 import time
 from pathlib import Path
 
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import expect, sync_playwright
 
 MASSETER, FOLDER = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve()
 BROWSER = sys.argv[3] if len(sys.argv) > 3 else None
@@ -54,10 +54,9 @@ with sync_playwright() as playwright:
     page.goto(url)
     page.wait_for_selector("html[data-live=yes]", state="attached")
     state = page.locator("#now strong")
-    page.wait_for_function("document.querySelector('#now strong').textContent === 'running'", timeout=20_000)
+    expect(state).to_have_text("running", timeout=20_000)
 
     # It keeps up, and what it shows grows.
-    number = "Masseter.live.number"
     shown = "[Masseter.live.number, Masseter.time.range[1], document.querySelector('#now .panel p').textContent]"
     page.wait_for_selector("#section-mechanism canvas")
     before, began = page.evaluate(shown), time.monotonic()
@@ -66,11 +65,11 @@ with sync_playwright() as playwright:
     rate_hz = (after[0] - before[0]) / seconds
     assert rate_hz > LEAST_HZ, rate_hz
     assert after[1] - before[1] > 0.7 * seconds and after[2] != before[2], (before, after)
-    curve = page.locator("#section-motion .chart path.curve").first
+    curve = page.locator("#section-motion .chart svg[tabindex] path.curve").first
     curve.scroll_into_view_if_needed()
     drawn = curve.get_attribute("d")
     page.wait_for_timeout(500)
-    assert page.locator("#section-motion .chart path.curve").first.get_attribute("d") != drawn
+    assert curve.get_attribute("d") != drawn
     assert "incisal" in page.locator("#requirements").inner_text()
 
     # A parameter is changed; a value out of its range is refused in words.
@@ -82,7 +81,8 @@ with sync_playwright() as playwright:
     assert subprocess.run(listed, capture_output=True, text=True).stdout.strip() == "7"
     gain.fill("-3")
     gain.press("Tab")
-    page.wait_for_function("document.querySelector('#now .note').textContent.includes('integral_gain_per_s')")
+    note = page.locator("#now .note")
+    expect(note).to_contain_text("integral_gain_per_s")
 
     # A second window of a phone has the whole run so far, and fits.
     phone = browser(playwright.chromium).new_page(viewport=PHONE)
@@ -93,7 +93,7 @@ with sync_playwright() as playwright:
     assert first_s is not None
 
     page.get_by_role("button", name="stop the run").click()
-    page.wait_for_function("document.querySelector('#now .note').textContent.includes('over')", timeout=20_000)
+    expect(note).to_contain_text("over", timeout=20_000)
     assert state.inner_text() in ("finished", "holding"), state.inner_text()
     own = url.replace("http", "ws")
     assert all(each in (url,) or each.startswith(own) for each in asked), asked

@@ -47,7 +47,7 @@ pub enum PageError {
 }
 
 /// The scripts in the order in which they need each other. The last one builds the page.
-const SCRIPTS: [&str; 11] = [
+const SCRIPTS: [&str; 12] = [
     include_str!("../assets/base.js"),
     include_str!("../assets/points.js"),
     include_str!("../assets/axis.js"),
