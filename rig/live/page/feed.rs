@@ -132,7 +132,7 @@ impl Feed {
         let count = shown.count + 1;
         let dropped = self.dropped.load(Ordering::Relaxed);
         let mut page = masseter_report::page_so_far(&shown.manifest, &figures, count, dropped);
-        let is_whole = is_asked || count % WHOLE == 0;
+        let is_whole = is_asked || count.is_multiple_of(WHOLE);
         let update = changes::between(&shown.page, &mut page, is_whole);
         shown.updates.push_back(update.to_string().into());
         if shown.updates.len() > KEPT {

@@ -103,7 +103,9 @@ mod tests {
     use super::*;
 
     fn unpacked(points: &Points) -> Vec<(f64, f64)> {
-        let Written::Packed { packed, x_step, y_step, y_from } = points.packed() else { panic!("not packed") };
+        let Written::Packed { packed, x_step, y_step, y_from } = points.packed() else {
+            panic!("not packed")
+        };
         let (mut numbers, mut number, mut shift) = (Vec::new(), 0_u64, 0);
         for byte in BASE64.decode(packed.as_bytes()).unwrap() {
             number |= u64::from(byte & 0x7f) << shift;

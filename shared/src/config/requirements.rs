@@ -52,10 +52,8 @@ pub enum Statistic {
     Percentile,
 }
 
-impl Statistic {
-    fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 /// One requirement: bounds of a signal, a response, a condition that must never hold, a number of occurrences, or their
@@ -74,7 +72,7 @@ pub struct RequirementConfig {
     /// When it is judged; the whole run when absent.
     pub during: Option<During>,
     /// Bounds: what of the signal.
-    #[serde(skip_serializing_if = "Statistic::is_default")]
+    #[serde(skip_serializing_if = "is_default")]
     pub statistic: Statistic,
     /// Bounds: the percentile, 0 to 100.
     pub percentile: Option<f64>,
