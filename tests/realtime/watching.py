@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""What being watched costs the loops: runs alone, with the progress on a terminal, and with a WebSocket client that
-takes every message, in turn, again and again.
+"""What being watched costs the loops: runs alone, with the progress on a terminal, with a WebSocket client that takes every
+message, and with a page that takes its updates, in turn, again and again. The page is not drawn: a browser on this machine
+would measure itself.
 
     tests/realtime/watching.py target/release/masseter --rounds 5 --seconds 12
 
@@ -14,12 +15,14 @@ import json
 import os
 import pty
 import random
+import re
 import socket
 import statistics
 import struct
 import subprocess
 import tempfile
 import threading
+import urllib.request
 from pathlib import Path
 
 CHANNELS = 9
@@ -36,25 +39,44 @@ def frame(text):
     return struct.pack(">BBH4x", 0x81, 0xFE, len(data)) + data
 
 
+def connect(url, path, protocol):
+    """A WebSocket of this protocol."""
+    address = url.split("/")[2]
+    host, port = address.split(":")
+    link = socket.create_connection((host, int(port)))
+    link.sendall(
+        f"GET {path} HTTP/1.1\r\nHost: {address}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n"
+        f"Sec-WebSocket-Protocol: {protocol}\r\n\r\n".encode()
+    )
+    answer = b""
+    while b"\r\n\r\n" not in answer:
+        answer += link.recv(1)
+    return link
+
+
+def count_bytes(link):
+    total = 0
+    while data := link.recv(1 << 20):
+        total += len(data)
+    return total
+
+
 def take_everything(url):
     """Subscribes to every channel and reads all that comes; returns how many bytes came."""
-    address, secret = url.removeprefix("ws://").split("/")
-    host, port = address.split(":")
-    with socket.create_connection((host, int(port))) as link:
-        link.sendall(
-            f"GET /{secret} HTTP/1.1\r\nHost: {address}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-            "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n"
-            "Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n".encode()
-        )
-        answer = b""
-        while b"\r\n\r\n" not in answer:
-            answer += link.recv(1)
+    with connect(url, "/" + url.split("/")[3], "foxglove.sdk.v1") as link:
         wanted = [{"id": channel, "channelId": channel} for channel in range(CHANNELS)]
         link.sendall(frame(json.dumps({"op": "subscribe", "subscriptions": wanted})))
-        total = 0
-        while data := link.recv(1 << 20):
-            total += len(data)
-        return total
+        return count_bytes(link)
+
+
+def take_the_page(url):
+    """Loads the page and takes its updates; returns how many bytes came."""
+    path = "/" + url.split("/")[3]
+    html = urllib.request.urlopen(url.replace("ws:", "http:")).read().decode()
+    number = re.search(r'"number":(\d+)', html).group(1)
+    with connect(url, f"{path}?after={number}", "masseter.page.v1") as link:
+        return len(html) + count_bytes(link)
 
 
 def alone(command):
@@ -75,20 +97,28 @@ def terminal(command):
     os.waitpid(process, 0)
 
 
-def live(command):
-    """With a client that takes every message; returns how many bytes."""
+def watched(command, take):
+    """With a client on the live view; returns how many bytes it took."""
     rig = subprocess.Popen(
         [*command, "--live=127.0.0.1:0"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     )
     url = next(line.split()[2] for line in rig.stderr if line.startswith("live on "))
     taken = []
-    watcher = threading.Thread(target=lambda: taken.append(take_everything(url)))
+    watcher = threading.Thread(target=lambda: taken.append(take(url)))
     watcher.start()
     said = rig.stderr.read()
     rig.wait()
     watcher.join()
     assert "not shown live" not in said, said
     return taken[0]
+
+
+def live(command):
+    return watched(command, take_everything)
+
+
+def page(command):
+    return watched(command, take_the_page)
 
 
 def figures(masseter, how, seconds):
@@ -99,7 +129,7 @@ def figures(masseter, how, seconds):
             summary = json.loads((run / "summary.json").read_text())
         print(f"  {how.__name__:<9} {summary['verdict']['word']}", flush=True)
         if summary["figures"]["final_state"] == "finished":
-            assert how is not live or bytes_taken > 1_000_000, bytes_taken
+            assert how not in (live, page) or bytes_taken > 500_000, bytes_taken
             return {interval["name"]: interval for interval in summary["figures"]["intervals"]}
     raise SystemExit(f"{TRIES} runs in a row did not come to their end: the machine is too disturbed")
 
@@ -118,7 +148,7 @@ def main():
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--seconds", type=int, default=12)
     arguments = parser.parse_args()
-    ways = [alone, terminal, live]
+    ways = [alone, terminal, live, page]
     chance = random.Random(1)
     runs = {way: [] for way in ways}
     for _ in range(arguments.rounds):
