@@ -41,10 +41,20 @@ impl Heard {
     }
 }
 
+/// Another master, which may control the drives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("bus {bus}: another master sends {sign}; end that program")]
+pub struct OtherMaster {
+    /// The bus.
+    pub bus: usize,
+    /// What it sends.
+    pub sign: &'static str,
+}
+
 /// Signs of other masters and of nodes that the scenario does not have.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Strangers {
-    /// SYNC, NMT, requests to SDO servers, or a heartbeat of the master's node id: with the bus.
+    /// SYNC, NMT, process data or SDO requests to a drive, or a heartbeat of the master's node id: with the bus.
     pub masters: BTreeSet<(usize, &'static str)>,
     /// Node ids that are none of the scenario, with their bus.
     pub nodes: BTreeSet<(usize, NodeId)>,
@@ -56,18 +66,26 @@ impl Strangers {
         self.masters.is_empty() && self.nodes.is_empty()
     }
 
+    /// Refuses to go on where another master was heard.
+    ///
+    /// # Errors
+    /// [`OtherMaster`].
+    pub fn refuse_masters(&self) -> Result<(), OtherMaster> {
+        self.masters.first().map_or(Ok(()), |&(bus, sign)| Err(OtherMaster { bus, sign }))
+    }
+
     /// Takes a frame of a node that is no drive of the scenario.
     pub(super) fn take(&mut self, bus: usize, cob: Cob) {
         let sign = match cob {
             Cob::Sync => "SYNC",
             Cob::Nmt => NMT,
             Cob::SdoRequest(_) => "SDO requests",
+            Cob::Rpdo1(_) => "process data",
             Cob::Heartbeat(node) if node == MASTER_NODE => "a heartbeat of node 127",
             Cob::Heartbeat(node) | Cob::Emergency(node) | Cob::SdoResponse(node) | Cob::Tpdo1(node) => {
                 self.nodes.insert((bus, node));
                 return;
             }
-            Cob::Rpdo1(_) => return,
         };
         self.masters.insert((bus, sign));
     }

@@ -35,7 +35,7 @@ mod write;
 pub use borrowed::give_back;
 pub use caution::{Caution, Operator, Wish};
 pub use deviation::{Deviation, Outcome, deviations};
-pub use heard::{Heard, Strangers};
+pub use heard::{Heard, OtherMaster, Strangers};
 pub use home::{HomeReport, home};
 pub use jog::{JogOrder, JogReport, jog};
 pub use ledger::{Ledger, OldValue};

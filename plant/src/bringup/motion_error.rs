@@ -4,6 +4,7 @@ use masseter_can::canopen::{EmergencyCode, ObjectAddress};
 use masseter_can::cia402::DriveState;
 use masseter_shared::geometry::AXIS_NAMES;
 
+use super::heard::OtherMaster;
 use super::line::LineError;
 use super::restart::Restarted;
 
@@ -59,6 +60,17 @@ pub enum StopCause {
         /// How far, m.
         moved_m: f64,
     },
+    /// Another drive has power, which this step did not give.
+    #[error("{} went to {state}, and this step did not switch it on; end the program that controls it", AXIS_NAMES[*other])]
+    OtherPowered {
+        /// The axis of the other drive.
+        other: usize,
+        /// The state of that drive.
+        state: DriveState,
+    },
+    /// Another master was heard.
+    #[error(transparent)]
+    OtherMaster(#[from] OtherMaster),
     /// A drive sent an emergency.
     #[error("{} sent emergency {:04X}h; see the drive's manual", AXIS_NAMES[*sender], .code.0)]
     Emergency {
@@ -154,16 +166,24 @@ pub enum MotionError {
         source: masseter_can::cia402::StatuswordError,
     },
     /// The drive did not confirm that it is off.
-    #[error("{}: NOT PROVED OFF ({reason}); press the emergency stop. The drive keeps the reduced limits", AXIS_NAMES[*axis])]
+    #[error("{}: NOT PROVED OFF ({reason}); press the emergency stop. The next step writes the old limits back", AXIS_NAMES[*axis])]
     StaysOn {
         /// The axis.
         axis: usize,
         /// What is known.
         reason: String,
     },
+    /// The drive did not answer, or with no state, and the axis was switched off afterwards.
+    #[error("{source}; {} is off", AXIS_NAMES[*axis])]
+    Unread {
+        /// The axis.
+        axis: usize,
+        /// What ended the motion.
+        source: Box<MotionError>,
+    },
     /// Objects of the drive kept the values of this step.
     #[error(
-        "{}: {}not every old value returned ({source}); run 'masseter robot configure'",
+        "{}: {}not every old value returned ({source}); the next step that writes tries again",
         AXIS_NAMES[*axis], cause.as_ref().map(|cause| format!("{cause}; ")).unwrap_or_default()
     )]
     NotRestored {

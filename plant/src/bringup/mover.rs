@@ -67,7 +67,7 @@ impl<'a> Mover<'a> {
         };
         match mover.configure() {
             Ok(()) => Ok(mover),
-            Err(error) => Err(mover.give_back(error)),
+            Err(error) => mover.give_back(Err(error)),
         }
     }
 
@@ -203,8 +203,7 @@ impl<'a> Mover<'a> {
         switching::wait_for_mode(self.line, self.axis, mode)?;
         let here = self.line.read_number(self.axis, ObjectAddress::new(0x6064, 0))?;
         self.line.write(self.axis, ObjectAddress::new(0x607A, 0), here, 4)?;
-        self.watch.check_no_restart(self.line)?;
-        switching::switch_on(self.line, self.axis)?;
+        switching::switch_on(self.line, self.axis, &self.watch)?;
         let opened_ns = self.line.now_ns() + seconds(self.profile().brake.open_s);
         while self.line.now_ns() < opened_ns {
             self.look()?;
@@ -337,27 +336,26 @@ impl<'a> Mover<'a> {
     /// # Errors
     /// That of the motion, unless the drive is not proved off, or an old value did not return.
     pub(super) fn finish<T>(mut self, done: Result<T, MotionError>) -> Result<T, MotionError> {
-        match done {
-            Ok(done) => match self.borrowed.restore(self.line) {
-                Ok(()) => self.watch.check_no_restart(self.line).map(|()| done),
-                Err(source) => Err(MotionError::NotRestored { axis: self.axis, cause: None, source }),
-            },
-            Err(error) => {
-                switching::stop(self.line, self.axis, &self.profile().brake)?;
-                // A restart is the cause of whatever else was seen, such as a position that jumps.
-                let error = self.watch.check_no_restart(self.line).err().unwrap_or(error);
-                Err(self.give_back(error))
-            }
+        let axis = self.axis;
+        if done.is_err() {
+            switching::stop(self.line, axis, &self.profile().brake)?;
         }
+        let done = done.map_err(|error| match error {
+            MotionError::Line(_) | MotionError::Statusword { .. } => {
+                MotionError::Unread { axis, source: Box::new(error) }
+            }
+            error => error,
+        });
+        self.give_back(done)
     }
 
-    /// Writes the old values back after a failure; returns what to report.
-    fn give_back(&mut self, error: MotionError) -> MotionError {
-        match self.borrowed.restore(self.line) {
-            Ok(()) => error,
-            Err(source) => {
-                MotionError::NotRestored { axis: self.axis, cause: Some(error.to_string()), source }
-            }
-        }
+    /// Writes the old values back, and judges the motion. A restart or another master is the cause of whatever else was seen, such as a
+    /// position that jumps.
+    fn give_back<T>(&mut self, done: Result<T, MotionError>) -> Result<T, MotionError> {
+        let restored = self.borrowed.restore(self.line);
+        let done = self.watch.check_undisturbed(self.line).and(done);
+        let Err(source) = restored else { return done };
+        let cause = done.err().map(|error| error.to_string());
+        Err(MotionError::NotRestored { axis: self.axis, cause, source })
     }
 }

@@ -24,11 +24,11 @@ impl std::error::Error for Restarted {}
 
 impl Display for Restarted {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let (name, cause) = (
+        let (name, remedy) = (
             AXIS_NAMES[self.axis],
             if self.by_master { "end the other master, which sends NMT" } else { "check its supply" },
         );
-        write!(f, "{name} restarted during the step; {cause}, and configure again")
+        write!(f, "{name} restarted during the step; {remedy} (values that are not stored are lost)")
     }
 }
 

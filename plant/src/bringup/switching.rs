@@ -7,7 +7,7 @@ use masseter_shared::config::{AxisScale, BrakeConfig};
 
 use super::line::Line;
 use super::motion_error::MotionError;
-use super::watch::{read_error_code, read_position, read_state};
+use super::watch::{Watch, read_error_code, read_position, read_state};
 
 /// How long a drive may take from one state to the next, ns.
 const TRANSITION_NS: u64 = SECOND_NS;
@@ -19,8 +19,9 @@ const MOST_DROP_M: f64 = 5e-4;
 const STOP_NS: u64 = SECOND_NS;
 const REPEAT_NS: u64 = 200 * MILLISECOND_NS;
 
-/// Switches a drive on, up to "operation enabled". The brake is opening then: the axis may not move yet.
-pub(super) fn switch_on(line: &mut Line, axis: usize) -> Result<(), MotionError> {
+/// Switches a drive on, up to "operation enabled". The brake is opening then: the axis may not move yet. A drive that restarted has
+/// lost its reduced limits: it gets no power. One that restarts later is no longer ready to switch on, and takes no further word.
+pub(super) fn switch_on(line: &mut Line, axis: usize, watch: &Watch) -> Result<(), MotionError> {
     for (word, wanted) in [
         (Controlword::SHUTDOWN, DriveState::ReadyToSwitchOn),
         (Controlword::SWITCH_ON, DriveState::SwitchedOn),
@@ -32,6 +33,7 @@ pub(super) fn switch_on(line: &mut Line, axis: usize) -> Result<(), MotionError>
             let error_code = read_error_code(line, axis);
             return Err(MotionError::NotEnabled { axis, state, error_code });
         }
+        watch.check_undisturbed(line)?;
     }
     Ok(())
 }

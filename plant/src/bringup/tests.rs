@@ -54,6 +54,14 @@ impl Bench {
         cause
     }
 
+    /// What stopped a jog. Another drive has power.
+    fn stopped_beside(&mut self, by_m: f64) -> StopCause {
+        let error = self.jog(by_m).unwrap_err();
+        let MotionError::Stopped { axis: L1, cause } = error else { panic!("{error}") };
+        assert!(!stand(&mut self.line, &self.scenario, 0).unwrap().states[L1].is_powered());
+        cause
+    }
+
     fn assert_off(&mut self) {
         let stand = stand(&mut self.line, &self.scenario, 0).unwrap();
         assert!(stand.states.iter().all(|state| !state.is_powered()), "{:?}", stand.states);
@@ -165,6 +173,74 @@ fn a_drive_that_somebody_else_controls_keeps_every_axis_from_power() {
     assert!(matches!(error, MotionError::Powered { axis: 0, .. }), "{error}");
     let l1 = bench.scenario.can.node_ids[L1];
     assert!(bench.log.controlwords().iter().all(|&(node, _)| node != l1));
+}
+
+/// Somebody switches on d1 in the middle of the jog, and this interface hears no other master.
+#[test]
+fn a_second_drive_that_somebody_else_switches_on_ends_a_jog() {
+    let word = |word: u8, from_s: f64| {
+        format!(
+            "[[faults]]\nkind = 'babble'\nbus = 0\nnode = 2\nid = 0x601\ncount = 1\nfrom_s = {from_s}\n\
+             data = [0x2B, 0x40, 0x60, 0, {word}, 0, 0, 0]\n"
+        )
+    };
+    let unheard = "[[faults]]\nkind = 'lose'\nbus = 0\nnode = 127\nid = 0x601\nfrom_s = 0.0\n";
+    let cause = Bench::new(&(unheard.to_owned() + &word(6, 2.0005) + &word(7, 2.1005))).stopped_beside(0.005);
+    assert!(matches!(cause, StopCause::OtherPowered { other: 0, .. }), "{cause:?}");
+    let cause = Bench::new(&word(6, 2.0005)).stopped(0.005);
+    assert_eq!(cause, StopCause::OtherMaster(OtherMaster { bus: 0, sign: "SDO requests" }));
+}
+
+#[test]
+fn another_master_ends_a_jog_whatever_it_sends() {
+    for (id, sign) in
+        [(0x80, "SYNC"), (0, "NMT"), (0x203, "process data"), (0x77F, "a heartbeat of node 127")]
+    {
+        let master = format!(
+            "[[faults]]\nkind = 'babble'\nbus = 1\nnode = 5\nid = {id}\ndata = [5, 9]\ncount = 1\nfrom_s = 2.0\n"
+        );
+        let cause = Bench::new(&master).stopped(0.005);
+        assert_eq!(cause, StopCause::OtherMaster(OtherMaster { bus: 1, sign }));
+    }
+}
+
+/// The supply dips around the moment of power: the drive is back within 10 ms, and its own limits are in it.
+#[test]
+fn a_drive_that_restarted_gets_no_power() {
+    let mut sound = Bench::new("");
+    sound.jog(0.001).unwrap();
+    let log = sound.log.text();
+    let at_s = |frame: &str| {
+        let line = log.lines().find(|line| line.contains(frame)).unwrap();
+        line[1..].split(')').next().unwrap().parse::<f64>().unwrap()
+    };
+    let (first_s, on_s) = (at_s("604#2"), at_s("604#2B40600007"));
+    for step in 0..60 {
+        // From the first reduced value to the milliseconds before the power.
+        let from_s = if step < 20 {
+            first_s + (on_s - first_s) * f64::from(step) / 20.0
+        } else {
+            on_s - 0.020 + 5e-4 * f64::from(step - 20)
+        };
+        let dip =
+            format!("[[faults]]\nkind = 'drive_reboot'\naxis = 'l1'\nsize = '10 ms'\nfrom_s = {from_s}\n");
+        let mut bench = Bench::new(&dip);
+        let cause = bench.stopped(0.001);
+        assert!(matches!(cause, StopCause::Restarted(_)), "{from_s} s: {cause:?}");
+        let words = bench.log.controlwords();
+        let enables = words.iter().any(|&(_, word)| word == Controlword::ENABLE_OPERATION);
+        assert!(!enables, "{from_s} s, power at {on_s} s: {words:?}");
+    }
+}
+
+/// The answers stop for a second in the middle of the motion.
+#[test]
+fn a_motion_that_ends_without_answers_says_that_the_axis_is_off() {
+    let lost = "[[faults]]\nkind = 'lose'\nbus = 1\nnode = 127\nid = 0x584\nfrom_s = 2.0\nuntil_s = 2.8\n";
+    let mut bench = Bench::new(lost);
+    let error = bench.jog(0.001).unwrap_err().to_string();
+    assert!(error.starts_with("l1: object 60") && error.ends_with("; l1 is off"), "{error}");
+    bench.assert_off();
 }
 
 #[test]

@@ -100,13 +100,14 @@ impl Watch {
         self.bounds
     }
 
-    /// Refuses to go on after a restart of a drive: its reduced limits are lost.
+    /// Refuses to go on after a restart of a drive, whose reduced limits are lost, and beside another master.
     ///
     /// # Errors
     /// [`MotionError::Stopped`].
-    pub(super) fn check_no_restart(&self, line: &Line) -> Result<(), MotionError> {
-        let axis = self.axis;
-        self.boot_ups.check(line).map_err(|restarted| MotionError::Stopped { axis, cause: restarted.into() })
+    pub(super) fn check_undisturbed(&self, line: &Line) -> Result<(), MotionError> {
+        let stopped = |cause| MotionError::Stopped { axis: self.axis, cause };
+        self.boot_ups.check(line).map_err(|restarted| stopped(restarted.into()))?;
+        line.strangers().refuse_masters().map_err(|master| stopped(master.into()))
     }
 
     /// The limit switches count no more: homing looks for them.
@@ -130,7 +131,7 @@ impl Watch {
         let status = read_status(line, axis)?;
         let permille = line.read_number(axis, ObjectAddress::new(0x6077, 0))? as i16;
         let sample = Sample { at_ns, position_m, force_n: f64::from(permille) * scale.permille_n, status };
-        self.check_no_restart(line)?;
+        self.check_undisturbed(line)?;
         let cause = match self.judge(line, &sample)? {
             Some(cause) => Some(cause),
             None => self.look_at_switches(line)?.or(self.look_at_another(line)?),
@@ -174,6 +175,11 @@ impl Watch {
         self.next = (other + 1) % AXES;
         if other == self.axis {
             return Ok(None);
+        }
+        let state = read_state(line, other)?;
+        // A drive in fault reacts without power too, and its emergency tells more.
+        if state.is_powered() && state != DriveState::FaultReactionActive {
+            return Ok(Some(StopCause::OtherPowered { other, state }));
         }
         let moved_m = read_position(line, other, &self.scales[other])? - self.began_m[other];
         Ok((moved_m.abs() > self.bounds.still_m).then_some(StopCause::OtherAxis { other, moved_m }))
