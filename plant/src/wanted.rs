@@ -26,6 +26,11 @@ pub(crate) const OTHER_PDOS: [u16; 6] = [0x1401, 0x1402, 0x1403, 0x1801, 0x1802,
 
 /// Offsets of position, velocity and torque, with the bytes of each. A drive keeps the last value of its process data.
 pub(crate) const OFFSETS: [(u16, usize); 3] = [(0x60B0, 4), (0x60B1, 4), TORQUE_OFFSET];
+/// Whether a drive that has an object may keep another value. An offset moves the axis or loads it: the drive may lack it, and no more.
+pub(crate) fn may_keep(rule: ObjectRule, object: ObjectAddress) -> bool {
+    rule == ObjectRule::Optional && OFFSETS.iter().all(|(index, _)| *index != object.index)
+}
+
 /// The only offset that process data of the rig may carry.
 const TORQUE_OFFSET: (u16, usize) = (0x60B2, 2);
 

@@ -8,7 +8,7 @@ use masseter_shared::config::{ObjectKey, ObjectRule};
 use serde::{Deserialize, Serialize};
 
 use super::survey::Survey;
-use crate::wanted::{COB_ID_BITS, OTHER_PDOS, WantedDrive};
+use crate::wanted::{COB_ID_BITS, OTHER_PDOS, WantedDrive, may_keep};
 
 /// The COB-ID of a PDO that does not exist.
 const NO_PDO: u32 = CobId(0).invalidated().0;
@@ -74,6 +74,13 @@ pub struct Difference {
     pub rule: ObjectRule,
     /// The key of the scenario that decides the value.
     pub key: String,
+}
+
+impl Difference {
+    /// Whether the drive may keep its value.
+    pub fn may_stay(&self) -> bool {
+        may_keep(self.rule, self.object)
+    }
 }
 
 impl PdoSetting {

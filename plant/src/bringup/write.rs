@@ -10,7 +10,7 @@ use super::line::{Line, LineError};
 use super::settings::{PdoSetting, Setting, Settings, same};
 use super::survey::Survey;
 use super::wording::{object_name, value_text};
-use crate::wanted::COB_ID_BITS;
+use crate::wanted::{COB_ID_BITS, may_keep};
 
 /// The time that a drive gets to become pre-operational, ns.
 const ENTER_NS: u64 = 100 * MILLISECOND_NS;
@@ -157,7 +157,7 @@ impl<'a> Writer<'a> {
             return Ok(());
         }
         match self.write(*object, *value, *bytes, key, before) {
-            Err(WriteError::Refused { .. }) if *rule == ObjectRule::Optional => Ok(()),
+            Err(WriteError::Refused { .. }) if may_keep(*rule, *object) => Ok(()),
             written => written,
         }
     }
@@ -300,6 +300,32 @@ mod tests {
             "l1: object 60C2h:02h (Interpolation time index) := -9: 06090032h (value is too low); the profile takes -9 to \
              any; change rate_hz"
         );
+    }
+
+    /// A drive may lack the torque offset, but not keep one: another node answers in its place with "read-only".
+    #[test]
+    fn an_offset_that_a_drive_keeps_is_refused_and_another_optional_value_is_left() {
+        for (index, is_refused) in [(0x60B2_u16, true), (0x6072, false)] {
+            let [high, low] = index.to_be_bytes();
+            let faults = format!(
+                "[[faults]]\nkind = 'lose'\nbus = 1\nnode = 4\nid = 0x604\nfrom_s = 0.15\n\
+                 [[faults]]\nkind = 'babble'\nbus = 1\nnode = 5\nid = 0x584\ncount = 1\nfrom_s = 0.2005\n\
+                 data = [0x80, {low}, {high}, 0, 2, 0, 1, 6]\n"
+            );
+            let scenario = Scenario::parse(std::path::Path::new("robot.toml"), &faults).unwrap();
+            let (mut line, _) = line(&scenario);
+            let object = ObjectAddress::new(index, 0);
+            let mut found = Survey::default();
+            found.insert(object, 55);
+            let rule = ObjectRule::Optional;
+            let zero =
+                Setting { object: ObjectKey(object), value: 0, bytes: 2, rule, key: "profile".to_owned() };
+            let settings = Settings { pdos: vec![], objects: vec![zero] };
+            let applied = Writer::new(&mut line, AXIS, scenario.profile(AXIS)).apply(&settings, &found);
+            let refused = matches!(applied, Err(WriteError::Refused { code: AbortCode::READ_ONLY, .. }));
+            assert_eq!((applied.is_err(), refused), (is_refused, is_refused), "{index:X}: {applied:?}");
+            assert_eq!(settings.differences(&found)[0].may_stay(), !is_refused);
+        }
     }
 
     #[test]

@@ -16,7 +16,7 @@ use masseter_shared::messages::codes::{BootPhase, Cause};
 
 use super::failure::Failure;
 use crate::wanted::WantedDrive;
-use plan::{Check, Step, plan};
+use plan::{Check, IfRefused, Step, plan};
 use sdo::{ATTEMPTS, SdoClient, SdoFailure, TIMEOUT_NS};
 
 pub(crate) use plan::shortest_boot;
@@ -63,6 +63,8 @@ pub(super) struct Boot {
     readings: u32,
     /// The value to be written back.
     kept: Expedited,
+    /// Why the write of this step failed, while the object is read instead.
+    refused: Option<SdoFailure>,
     /// The statusword of a drive found in fault.
     fault_statusword: u32,
     /// A fault was reset, which is to be reported.
@@ -84,6 +86,7 @@ impl Boot {
             next: 0,
             readings: 0,
             kept: Expedited::of_unknown_size([0; Expedited::MAX]),
+            refused: None,
             fault_statusword: 0,
             reset_fault: None,
             client: SdoClient::default(),
@@ -136,7 +139,7 @@ impl Boot {
     /// The plan begins anew, and no transfer is under way.
     fn start_over(&mut self) {
         (self.next, self.readings, self.client) = (0, 0, SdoClient::default());
-        (self.has_repeated, self.unasked) = (false, 0);
+        (self.has_repeated, self.unasked, self.refused) = (false, 0, None);
     }
 
     /// Takes a heartbeat or a boot-up message.
@@ -227,11 +230,37 @@ impl Boot {
         let SdoFailure::Aborted { code, .. } = failure else { return None };
         let is_missing = matches!(code, AbortCode::NO_OBJECT | AbortCode::NO_SUBINDEX);
         match self.steps[self.next] {
-            Step::Write { is_optional: true, .. } => Some(0),
+            Step::Write { if_refused: IfRefused::Leave, .. } => Some(0),
+            Step::Write { if_refused: IfRefused::MayLack, .. } if is_missing => Some(0),
             Step::Read(_, Check::EqualsIfPresent { value: 0, .. } | Check::Unit(_)) if is_missing => Some(0),
             Step::Read(_, Check::PdoElseSkip(skipped)) if is_missing => Some(skipped),
             _ => None,
         }
+    }
+
+    /// Whether a drive that refuses this step may have the value already.
+    fn may_be_constant(&self, failure: SdoFailure) -> bool {
+        let SdoFailure::Aborted { code, .. } = failure else { return false };
+        match self.steps[self.next] {
+            Step::Write { if_refused: IfRefused::MayLack, .. } => true,
+            Step::Write { .. } => code == AbortCode::READ_ONLY,
+            _ => false,
+        }
+    }
+
+    /// Ends the step of a refused write: the value that was read instead must be the wanted one.
+    fn judge_constant(
+        &mut self,
+        refused: SdoFailure,
+        read: Result<Expedited, SdoFailure>,
+    ) -> Result<(), Failure> {
+        let Step::Write { value, bytes, .. } = self.steps[self.next] else { return Err(refused.into()) };
+        let has_value = |read| (number(read) ^ value) & (u32::MAX >> (32 - 8 * bytes)) == 0;
+        if !read.is_ok_and(has_value) {
+            return Err(refused.into());
+        }
+        self.end_step(0);
+        Ok(())
     }
 
     /// Ends the step under way, and skips the next ones.
@@ -246,6 +275,7 @@ impl Boot {
                 self.end_step(0);
             }
             Step::Read(object, _) => self.client.begin(object, None),
+            Step::Write { object, .. } if self.refused.is_some() => self.client.begin(object, None),
             Step::Write { object, value, bytes, .. } => {
                 let value = Expedited::new(&value.to_le_bytes()[..bytes]).expect("one to four bytes");
                 self.client.begin(object, Some(value));
@@ -256,10 +286,19 @@ impl Boot {
 
     /// Ends the step under way with the outcome of its transfer, unless a value is to be read again.
     fn end_transfer(&mut self, outcome: Result<Expedited, SdoFailure>) -> Result<(), Failure> {
+        if let Some(refused) = self.refused.take() {
+            return self.judge_constant(refused, outcome);
+        }
         let skipped = match (outcome, self.steps[self.next]) {
             (Ok(value), Step::Read(object, check)) => self.judge(object, check, value)?,
             (Ok(_), _) => Some(0),
-            (Err(failure), _) => Some(self.skipped_if_refused(failure).ok_or(failure)?),
+            (Err(failure), _) => match self.skipped_if_refused(failure) {
+                None if self.may_be_constant(failure) => {
+                    self.refused = Some(failure);
+                    None
+                }
+                skipped => Some(skipped.ok_or(failure)?),
+            },
         };
         if let Some(skipped) = skipped {
             self.end_step(skipped);

@@ -8,7 +8,7 @@ use masseter_can::cia402::Controlword;
 use masseter_shared::config::{AccelerationUnit, ObjectRule};
 use masseter_shared::messages::codes::{BootPhase, Cause};
 
-use crate::wanted::{OTHER_PDOS, WantedDrive, WantedIdentity, WantedObject, WantedPdo};
+use crate::wanted::{OTHER_PDOS, WantedDrive, WantedIdentity, WantedObject, WantedPdo, may_keep};
 
 /// 6041h.
 const STATUSWORD: ObjectAddress = ObjectAddress::new(0x6041, 0);
@@ -25,10 +25,21 @@ pub(super) enum Step {
     Enter(BootPhase),
     /// Read the object and check its value.
     Read(ObjectAddress, Check),
-    /// Write that many bytes to the object; the drive may refuse an optional value.
-    Write { object: ObjectAddress, value: u32, bytes: usize, is_optional: bool },
+    /// Write that many bytes to the object.
+    Write { object: ObjectAddress, value: u32, bytes: usize, if_refused: IfRefused },
     /// Write the kept value.
     WriteKept(ObjectAddress),
+}
+
+/// What follows from a refused write.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum IfRefused {
+    /// The drive is not enabled, unless the object is constant and has the value already.
+    Fail,
+    /// The drive may lack the object. Where it has the object, it must have the value already.
+    MayLack,
+    /// The drive keeps its own value.
+    Leave,
 }
 
 /// The use of a value that was read.
@@ -67,7 +78,7 @@ pub(super) fn plan(wanted: &WantedDrive, resets_faults: bool) -> Vec<Step> {
     let is_written =
         |wanted: &&WantedObject| wanted.object.index == 0x605A && wanted.rule != ObjectRule::Expect;
     if let Some(&WantedObject { object, value, bytes, .. }) = wanted.objects.iter().find(is_written) {
-        steps.push(Step::Write { object, value, bytes, is_optional: true });
+        steps.push(Step::Write { object, value, bytes, if_refused: IfRefused::Leave });
     }
     steps.extend([control(Controlword::QUICK_STOP), Step::Read(STATUSWORD, Check::NoVoltage)]);
     for communication in OTHER_PDOS {
@@ -128,7 +139,7 @@ const fn expect(index: u16, subindex: u8, value: u32, otherwise: Cause) -> Step 
 
 const fn write(index: u16, subindex: u8, value: u32, bytes: usize) -> Step {
     let object = ObjectAddress::new(index, subindex);
-    Step::Write { object, value, bytes, is_optional: false }
+    Step::Write { object, value, bytes, if_refused: IfRefused::Fail }
 }
 
 const fn control(word: Controlword) -> Step {
@@ -145,17 +156,25 @@ fn configure(objects: &[WantedObject]) -> Vec<Step> {
     for &WantedObject { object, value, bytes, rule, .. } in objects {
         if object == ObjectAddress::new(0x607D, 2) && objects.iter().any(is_lower_written) {
             let (object, value) = (ObjectAddress::new(0x607D, 1), i32::MIN as u32);
-            steps.push(Step::Write { object, value, bytes: 4, is_optional: true });
+            steps.push(Step::Write { object, value, bytes: 4, if_refused: IfRefused::Leave });
         }
         steps.push(match rule {
             ObjectRule::Expect => {
                 let mask = u32::MAX >> (32 - 8 * bytes);
                 Step::Read(object, Check::Equals { mask, value, otherwise: Cause::WrongObject })
             }
-            rule => Step::Write { object, value, bytes, is_optional: rule == ObjectRule::Optional },
+            rule => Step::Write { object, value, bytes, if_refused: if_refused(rule, object) },
         });
     }
     steps
+}
+
+fn if_refused(rule: ObjectRule, object: ObjectAddress) -> IfRefused {
+    match rule {
+        _ if may_keep(rule, object) => IfRefused::Leave,
+        ObjectRule::Optional => IfRefused::MayLack,
+        _ => IfRefused::Fail,
+    }
 }
 
 #[cfg(test)]

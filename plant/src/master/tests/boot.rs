@@ -117,6 +117,28 @@ fn a_drive_that_is_not_as_expected_is_named_and_no_drive_is_enabled() {
     }
 }
 
+/// An object that a drive cannot change is right where it has the value; an offset that stays would act in the motion.
+#[test]
+fn a_constant_object_passes_with_the_value_of_the_rig_alone() {
+    for (object, value, enabled) in [
+        ((0x60C2, 2), vec![0xFD], true),
+        ((0x60C2, 2), vec![0xFE], false),
+        ((0x60B2, 0), vec![0, 0], true),
+        ((0x60B2, 0), vec![55, 0], false),
+    ] {
+        let mut bench = Bench::new();
+        let drive = bench.drive(3);
+        drive.constants.push(object);
+        drive.objects.insert(object, value.clone());
+        bench.cycles(800, DriveRequest::Enable);
+        let faults: Vec<_> =
+            bench.events_of(EventKind::Fault).map(|fault| (fault.cause, fault.object)).collect();
+        let refused = (Cause::SdoAborted.code(), u32::from(object.0) << 8 | u32::from(object.1));
+        assert_eq!(faults, if enabled { vec![] } else { vec![refused] }, "{object:X?} is {value:?}");
+        assert_eq!(bench.nobody_is_enabled(), !enabled, "{object:X?} is {value:?}");
+    }
+}
+
 /// The table above has a drive that answers every request twice.
 #[test]
 fn answers_that_come_twice_now_and_then_are_no_second_drive() {

@@ -39,6 +39,8 @@ pub(super) struct Peer {
     pub(super) twin_position: Option<i32>,
     /// An object that it refuses to have read or written.
     pub(super) refuses: Option<((u16, u8), AbortCode)>,
+    /// Objects that it refuses to have written.
+    pub(super) constants: Vec<(u16, u8)>,
     /// SDO requests received, each with its time.
     pub(super) requests: Vec<(u64, SdoRequest)>,
     controlword: Controlword,
@@ -93,6 +95,7 @@ impl Peer {
             servers: 1,
             twin_position: None,
             refuses: None,
+            constants: Vec::new(),
             requests: Vec::new(),
             controlword: Controlword::DISABLE_VOLTAGE,
             buffered: None,
@@ -249,6 +252,9 @@ impl Peer {
         let address = (object.index, object.subindex);
         if let Some(refusal) = self.refusal(object) {
             return refusal;
+        }
+        if self.constants.contains(&address) {
+            return SdoResponse::Abort { object, code: AbortCode::READ_ONLY };
         }
         let is_powered = self.power.is_powered();
         let stops = matches!(address, (0x605A | 0x6040, 0));
