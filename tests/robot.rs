@@ -186,6 +186,7 @@ fn damaged_old_values_are_refused_with_what_to_do() {
     for (damaged, named) in [
         (sound.replace("\"6065h\"", "\"606h\""), "'606h' is no object"),
         (sound.replace("\"6065h\"", "\"6040h\""), "6040h with 4 bytes is no old value"),
+        (sound.replace("\"6065h\"", "\"6040h:01\""), "6040h:01 with 4 bytes is no old value"),
         (sound.replace("\"bytes\": 4", "\"bytes\": 5"), "with 5 bytes is no old value"),
         (sound.replace("\"bytes\": 4", "\"bytes\": 0"), "with 0 bytes is no old value"),
         (
@@ -206,7 +207,74 @@ fn damaged_old_values_are_refused_with_what_to_do() {
         fs::remove_dir_all(workspace.file("bringup/03-restore")).unwrap();
     }
     fs::write(&file, sound).unwrap();
+    let result = workspace.file("bringup/02-configure/result.json");
+    let configured = fs::read_to_string(&result).unwrap();
+    fs::write(&result, &configured[..configured.len() / 2]).unwrap();
+    let refused = robot(&workspace, &["restore"]);
+    assert_eq!(refused.status.code(), Some(2), "{}", stdout(&refused));
+    let says = "before-d1.json: the file result.json beside it is missing or damaged, so that nobody knows whose values";
+    assert!(stderr(&refused).contains(says), "{}", stderr(&refused));
+    fs::write(&result, configured).unwrap();
     assert_eq!(robot(&workspace, &["restore"]).status.code(), Some(0));
+}
+
+/// Another tool has changed nothing meanwhile: what the first configuration found is in the drives and in their memory in the end.
+#[test]
+fn old_values_can_be_stored_after_they_were_restored_until_a_reset() {
+    let workspace = Workspace::new(
+        "[drives]\nmemory = 'memory.json'\n[[drive_profile]]\nobjects.6066h = { value = 9 }\naxes = ['l1']",
+    );
+    let play = |arguments: &[&str], says: &str| {
+        let output = robot(&workspace, arguments);
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}{}", stdout(&output), stderr(&output));
+        assert!(stdout(&output).contains(says), "{arguments:?}: {}", stdout(&output));
+    };
+    play(&["inspect"], "");
+    play(&["configure", "--store"], "6066h:00h Following error time out: 20 -> 9");
+    play(&["restore"], "6066h:00h Following error time out: 9 -> 20");
+    play(&["restore", "--store"], "6066h:00h Following error time out: 9 -> 20");
+    let again = robot(&workspace, &["restore"]);
+    assert!(stderr(&again).contains("there is nothing to restore"), "{}{}", stdout(&again), stderr(&again));
+    play(&["inspect"], "l1    6066h:00h Following error time out  9");
+}
+
+/// The object is no object of the rig any more.
+#[test]
+fn a_changed_profile_does_not_keep_old_values_from_their_drive() {
+    let sound = "[drives]\nmemory = 'memory.json'\n";
+    let profile = "[[drive_profile]]\nobjects.6084h = { value = 77, bytes = 4 }\naxes = ['l1']";
+    let workspace = Workspace::new(&format!("{sound}{profile}"));
+    for step in [&["inspect"][..], &["configure", "--store"]] {
+        let output = robot(&workspace, step);
+        assert_eq!(output.status.code(), Some(0), "{step:?}: {}{}", stdout(&output), stderr(&output));
+    }
+    workspace.write("scenario.toml", sound);
+    let output = robot(&workspace, &["restore", "--store"]);
+    let text = stdout(&output);
+    assert_eq!(output.status.code(), Some(0), "{text}{}", stderr(&output));
+    assert!(text.contains("  6084h:00h") && text.contains(": 77 -> "), "{text}");
+}
+
+/// Another master is on the bus, so that nothing is written.
+#[test]
+fn a_refused_step_outdates_no_evidence() {
+    let workspace = Workspace::new("");
+    for step in ["inspect", "configure"] {
+        assert_eq!(robot(&workspace, &[step]).status.code(), Some(0));
+    }
+    workspace.write(
+        "scenario.toml",
+        "[[faults]]\nkind = 'babble'\nbus = 0\nnode = 2\nid = 0x80\ndata = []\ncount = 1\nfrom_s = 0.2\n",
+    );
+    let refused = robot(&workspace, &["restore"]);
+    assert_eq!(refused.status.code(), Some(1), "{}", stderr(&refused));
+    assert!(
+        stderr(&refused).contains("nothing was written: bus 0: another master sends SYNC"),
+        "{}",
+        stderr(&refused)
+    );
+    let status = stdout(&robot(&workspace, &["status"]));
+    assert!(status.contains("passed  configure"), "{status}");
 }
 
 /// Node 9 answers on bus 0 once it is asked, as a drive with another id than the scenario's does.

@@ -1,5 +1,5 @@
 //! Faults in the middle of every step from inspection to run: a cable is pulled, a supply fails for long or for a moment, another master
-//! resets a node. The step ends with an exit code above 0, names the drive, gives no drive power again, and is no evidence. What it
+//! resets a node or only sends SYNC. The step ends with an exit code above 0, names the drive, gives no drive power again, and is no evidence. What it
 //! owes to a drive returns with the next step.
 
 mod common;
@@ -17,6 +17,8 @@ const SUPPLY: &str = "kind = 'drive_reboot'\naxis = 'l1'\nsize = '10 s'";
 const DIP: &str = "kind = 'drive_reboot'\naxis = 'l1'\nsize = '10 ms'";
 /// NMT "reset node", as another master on the place of l2 sends it.
 const RESET: &str = "kind = 'babble'\nbus = 1\nnode = 5\nid = 0\ndata = [0x81, 4]\ncount = 1";
+/// SYNC, as another master on the place of d2 sends it.
+const SYNC: &str = "kind = 'babble'\nbus = 0\nnode = 2\nid = 0x80\ndata = []\ncount = 1";
 const SOUND: &str = "duration_s = 0.5\n[drives]\nmemory = 'memory.json'\n[[drives.quirk]]\nkind = 'slow_save'\nfor_s = 1.0\n\
                      [dynamics]\ninitial_leg_m = 0.2974\n[[drive_profile]]\naxes = ['l1', 'l2', 'l3']\n\
                      homing = { absolute = false, method = 33, home_position_m = 0.2974 }\n";
@@ -25,6 +27,8 @@ const NOT_PROVED: &str = "l1: NOT PROVED OFF (l1: object 6040h:00h: no answer";
 const DIPPED: &str = "l1 restarted during the step; check its supply";
 const BY_MASTER: &str = "l1 restarted during the step; end the other master, which sends NMT";
 
+const BESIDE: &str = "bus 0: another master sends SYNC; end that program";
+
 /// A step with the moment of its fault: s since switch-on, in the middle of what the step does with l1.
 #[derive(Debug)]
 struct Tried {
@@ -32,8 +36,8 @@ struct Tried {
     step: &'static str,
     from_s: f64,
     exit: i32,
-    /// What the step says after each of the four faults.
-    says: [&'static [&'static str]; 4],
+    /// What the step says after each of the five faults.
+    says: [&'static [&'static str]; 5],
 }
 
 const SILENT: &[&str] = &["node 4 does not answer; check its power"];
@@ -43,7 +47,13 @@ const ALL: [Tried; 7] = [
         step: "inspect",
         from_s: 2.3,
         exit: 1,
-        says: [SILENT, SILENT, &[DIPPED], &["bus 1: NMT: another master is on the bus", BY_MASTER]],
+        says: [
+            SILENT,
+            SILENT,
+            &[DIPPED],
+            &["failed: bus 1: another master sends NMT; end that program", BY_MASTER],
+            &[BESIDE],
+        ],
     },
     // The drives after l1 are not touched.
     Tried {
@@ -56,6 +66,7 @@ const ALL: [Tried; 7] = [
             &["failed: l1: object 607Ch:00h: no answer; check its power", "masseter robot restore"],
             &[DIPPED],
             &[BY_MASTER],
+            &[BESIDE],
         ],
     },
     // Between 1010h and the reset that proves the memory.
@@ -69,6 +80,7 @@ const ALL: [Tried; 7] = [
             &["failed: l1: object 1010h:01h: no answer"],
             &[DIPPED],
             &[BY_MASTER],
+            &[BESIDE],
         ],
     },
     Tried {
@@ -81,6 +93,7 @@ const ALL: [Tried; 7] = [
             &["failed: l1: object 607Ch:00h: no answer"],
             &[DIPPED],
             &[BY_MASTER],
+            &[BESIDE],
         ],
     },
     Tried {
@@ -88,14 +101,14 @@ const ALL: [Tried; 7] = [
         step: "jog --axis l1 --by=-5mm --measured=-5mm --out-of-order",
         from_s: 2.5,
         exit: 5,
-        says: [&[NOT_PROVED], &[NOT_PROVED], &[DIPPED, OFF], &[BY_MASTER, OFF]],
+        says: [&[NOT_PROVED], &[NOT_PROVED], &[DIPPED, OFF], &[BY_MASTER, OFF], &[BESIDE, OFF]],
     },
     Tried {
         before: &[],
         step: "home --axis l1 --out-of-order",
         from_s: 2.5,
         exit: 5,
-        says: [&[NOT_PROVED], &[NOT_PROVED], &[DIPPED, OFF], &[BY_MASTER, OFF]],
+        says: [&[NOT_PROVED], &[NOT_PROVED], &[DIPPED, OFF], &[BY_MASTER, OFF], &[BESIDE, OFF]],
     },
     // Between the two readings.
     Tried {
@@ -108,6 +121,7 @@ const ALL: [Tried; 7] = [
             &["l1: object 6064h:00h: no answer"],
             &[DIPPED],
             &[BY_MASTER],
+            &[BESIDE],
         ],
     },
 ];
@@ -144,7 +158,7 @@ fn controlwords(log: &str) -> Vec<(f64, u16, u8)> {
 #[test]
 fn a_fault_in_the_middle_of_a_step_ends_it_safely_and_owes_nothing_for_ever() {
     for tried in &ALL {
-        for (fault, says) in [CABLE, SUPPLY, DIP, RESET].into_iter().zip(tried.says) {
+        for (fault, says) in [CABLE, SUPPLY, DIP, RESET, SYNC].into_iter().zip(tried.says) {
             let case = format!("{} with {}", tried.step, fault.lines().next().unwrap());
             let workspace = Workspace::new(SOUND);
             tried.before.iter().for_each(|step| assert_passes(&workspace, step));
@@ -192,6 +206,110 @@ fn a_drive_that_restarts_after_its_own_turn_fails_the_configuration() {
     let text = stdout(&output) + &stderr(&output);
     assert_eq!(output.status.code(), Some(1), "{text}");
     assert!(text.contains(&format!("failed: {DIPPED}")) && text.contains("l3: "), "{text}");
+}
+
+/// When a frame like this is on the bus first, and the frames after it, s since switch-on.
+fn find<'l>(log: &'l str, is_it: impl Fn(&str, &str) -> bool) -> (f64, &'l str) {
+    let place = |line: &str| {
+        let mut words = line.split_whitespace();
+        let at_s: f64 = words.next()?.trim_matches(['(', ')']).parse().ok()?;
+        let (id, data) = words.nth(1)?.split_once('#')?;
+        is_it(id, data).then_some(at_s)
+    };
+    let mut rest = log;
+    while let Some((line, after)) = rest.split_once('\n') {
+        if let Some(at_s) = place(line) {
+            return (at_s, after);
+        }
+        rest = after;
+    }
+    panic!("no such frame");
+}
+
+/// A download to an object, by its first byte.
+fn writes(data: &str) -> bool {
+    data.starts_with('2')
+}
+
+/// The log of a step without a fault.
+fn sound_log(before: &[&str], step: &str) -> String {
+    let workspace = Workspace::new(SOUND);
+    before.iter().chain([&step]).for_each(|step| assert_passes(&workspace, step));
+    fs::read_to_string(newest(&workspace).join("candump.log")).unwrap()
+}
+
+/// A step with a fault at that time; its exit code, what it says, and its result.
+fn with_fault(before: &[&str], step: &str, fault: &str, from_s: f64) -> (Option<i32>, String, Workspace) {
+    let workspace = Workspace::new(SOUND);
+    before.iter().for_each(|step| assert_passes(&workspace, step));
+    workspace.write("scenario.toml", &format!("{SOUND}[[faults]]\n{fault}\nfrom_s = {from_s:?}\n"));
+    let output = robot(&workspace, step);
+    (output.status.code(), stdout(&output) + &stderr(&output), workspace)
+}
+
+/// Once the step is done with l1, l1 is dark to the end.
+#[test]
+fn a_drive_that_fails_after_its_own_turn_fails_the_step() {
+    let l2_begins = |id: &str, data: &str| id == "605" && data.starts_with("40001000");
+    let l2_is_written = |id: &str, data: &str| id == "605" && writes(data);
+    let l1_is_compared = |id: &str, data: &str| id == "584" && data.starts_with("43646000");
+    type Moment<'m> = &'m dyn Fn(&str, &str) -> bool;
+    let (home, silent) = ("home --axis d1 --out-of-order", "l1: object 1018h:04h: no answer");
+    let tried: [(&[&str], &str, Moment<'_>, &str); 5] = [
+        (&[], "inspect", &l2_begins, SILENT[0]),
+        (&["inspect"], "configure", &l2_is_written, silent),
+        (&["inspect", "configure --store"], "restore", &l2_is_written, silent),
+        (&[], home, &|id, data| id == "581" && data.starts_with("43646000"), silent),
+        (&[], "check-pose --out-of-order", &l1_is_compared, "l1: object"),
+    ];
+    for (before, step, is_done, says) in tried {
+        let log = sound_log(before, step);
+        let (mut done_s, after) = find(&log, is_done);
+        if step.starts_with("check-pose") {
+            // The second reading.
+            done_s = find(after, is_done).0;
+        }
+        for fault in [CABLE, SUPPLY] {
+            let (exit, text, workspace) = with_fault(before, step, fault, done_s + 5e-4);
+            assert_eq!((exit, text.contains(says)), (Some(1), true), "{step} with {fault}: {text}");
+            let result = json(&newest(&workspace).join("result.json"));
+            assert_eq!(result["passed"], false, "{step} with {fault}: it would be evidence");
+        }
+    }
+}
+
+/// The values of l1 are written, and read again.
+#[test]
+fn a_drive_that_is_lost_while_its_values_are_compared_has_no_wrong_values() {
+    let log = sound_log(&["inspect"], "configure");
+    let (_, written) = find(&log, |id, data| id == "604" && writes(data));
+    let (compared_s, _) = find(written, |id, data| id == "604" && data.starts_with("40001000"));
+    let bus = "kind = 'bus_off'\nbus = 1\nnode = 127\ncount = 1000";
+    for (fault, says) in [
+        (CABLE, "failed: l1: node 4 does not answer"),
+        (SUPPLY, "failed: l1: node 4 does not answer"),
+        (bus, "failed: bus 1: bus-off"),
+    ] {
+        let (exit, text, workspace) = with_fault(&["inspect"], "configure", fault, compared_s + 0.02);
+        assert_eq!((exit, text.contains(says)), (Some(1), true), "{fault}: {text}");
+        assert!(text.contains("l1: 4 values written") && !text.contains("differ"), "{fault}: {text}");
+        let result = json(&newest(&workspace).join("result.json"));
+        assert_eq!(result["result"].as_array().map(Vec::len), Some(4), "d1 to l1: {result}");
+    }
+}
+
+/// A dip at any moment from the first value to the last comparison of l1: that it restarted, and no consequence of that.
+#[test]
+fn a_restart_is_told_before_what_follows_from_it() {
+    let log = sound_log(&["inspect"], "configure");
+    let (first_s, _) = find(&log, |id, data| id == "604" && writes(data));
+    let (last_s, _) = find(&log, |id, data| id == "605" && writes(data));
+    for part in 0..12 {
+        let from_s = first_s + (last_s - first_s) * f64::from(part) / 12.0;
+        let (exit, text, _) = with_fault(&["inspect"], "configure", DIP, from_s);
+        assert_eq!((exit, text.contains(&format!("failed: {DIPPED}"))), (Some(1), true), "{from_s}: {text}");
+        assert!(!text.contains("differ") && !text.contains("no answer"), "{from_s}: {text}");
+    }
 }
 
 /// The last statusword of each node on the bus of the legs, as the process data of a run told it.

@@ -1,11 +1,11 @@
-//! Arguments that all verbs of `robot` share.
+//! Arguments that several verbs of `robot` share.
 
 use std::path::PathBuf;
 
 use clap::Args;
 use masseter_plan::{Overrides, scenario_with_overrides};
 use masseter_shared::config::Scenario;
-use masseter_shared::geometry::AXIS_NAMES;
+use masseter_shared::geometry::{AXES, AXIS_NAMES};
 
 use crate::arguments::{Wires, parse_wires};
 
@@ -30,6 +30,29 @@ impl RobotArgs {
     pub(crate) fn scenario(&self) -> anyhow::Result<Scenario> {
         let interfaces = self.can.as_ref().map(|wires| wires.0.clone());
         scenario_with_overrides(self.scenario.as_deref(), &Overrides { interfaces, ..Overrides::default() })
+    }
+}
+
+/// The arguments of `robot configure` and `robot restore`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct WriteArgs {
+    #[command(flatten)]
+    pub(crate) robot: RobotArgs,
+    /// This axis alone
+    #[arg(long, value_parser = parse_axis)]
+    pub(crate) axis: Option<usize>,
+    /// Store in the drives' memory, and prove it by a reset
+    #[arg(long)]
+    pub(crate) store: bool,
+    /// Stop a drive that somebody else left with power, instead of refusing
+    #[arg(long)]
+    pub(crate) take_over: bool,
+}
+
+impl WriteArgs {
+    /// The axes to be written.
+    pub(crate) fn axes(&self) -> Vec<usize> {
+        self.axis.map_or_else(|| (0..AXES).collect(), |axis| vec![axis])
     }
 }
 

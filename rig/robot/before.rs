@@ -5,15 +5,14 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use masseter_can::canopen::ObjectAddress;
-use masseter_plant::bringup::Settings;
+use masseter_plant::bringup::{Setting, Settings};
 use masseter_shared::config::ObjectKey;
 use masseter_shared::geometry::AXIS_NAMES;
 
 /// Most objects of a PDO (CiA 301).
 const MAPPED_MAX: usize = 64;
 /// Controlword: no step writes this object.
-const CONTROLWORD: ObjectAddress = ObjectAddress::new(0x6040, 0);
+const CONTROLWORD: u16 = 0x6040;
 
 /// A file whose values no drive had.
 #[derive(Debug, thiserror::Error)]
@@ -39,6 +38,11 @@ enum Damage {
     /// No step writes this.
     #[error("{object} with {bytes} bytes is no old value")]
     Object { object: ObjectKey, bytes: usize },
+    /// Nobody knows whose values they are.
+    #[error(
+        "the file result.json beside it is missing or damaged, so that nobody knows whose values these are"
+    )]
+    Nameless,
     /// There is no such PDO.
     #[error("{communication:04X}h with {mapped} objects is no PDO")]
     Pdo { communication: u16, mapped: usize },
@@ -47,6 +51,11 @@ enum Damage {
 /// Name of the file for an axis.
 pub(super) fn before_file(axis: usize) -> String {
     format!("before-{}.json", AXIS_NAMES[axis])
+}
+
+/// A file without a readable result beside it.
+pub(super) fn nameless(path: PathBuf) -> Damaged {
+    Damaged { path, damage: Damage::Nameless }
 }
 
 /// The values in a file.
@@ -59,8 +68,8 @@ pub(super) fn read(path: &Path) -> Result<Settings, Damaged> {
 
 fn parse(path: &Path) -> Result<Settings, Damage> {
     let settings: Settings = serde_json::from_str(&fs::read_to_string(path)?)?;
-    let is_strange = |bytes, object| !matches!(bytes, 1 | 2 | 4) || object == CONTROLWORD;
-    if let Some(one) = settings.objects.iter().find(|one| is_strange(one.bytes, one.object.0)) {
+    let is_strange = |one: &&Setting| !matches!(one.bytes, 1 | 2 | 4) || one.object.0.index == CONTROLWORD;
+    if let Some(one) = settings.objects.iter().find(is_strange) {
         return Err(Damage::Object { object: one.object, bytes: one.bytes });
     }
     for pdo in &settings.pdos {

@@ -73,13 +73,15 @@ pub(crate) fn check_pose(args: &CheckPoseArgs) -> Result<Exit, Failure> {
         Ok(stand) => stand,
         // No drive has power by this step: there is nothing to stop.
         Err(error @ MotionError::Line(_)) => {
+            let error = session.check_undisturbed().err().map_or_else(|| error.into(), anyhow::Error::new);
             session.finish(false, &json!({ "error": error.to_string() }))?;
             return Err(failed(error));
         }
         Err(error) => return Err(session.fail(error)),
     };
     let found = session
-        .check_no_restart()
+        .check_present()
+        .map_err(anyhow::Error::new)
         .and(marks)
         .and_then(|marks| Ok((marks, at_rest(&stand)?)))
         .and_then(|(marks, ())| Ok((marks, within_strokes(&session.scenario, &stand.positions_m)?)))

@@ -59,7 +59,7 @@ fn mark(session: &mut Session, axes: &[usize], data: &mut [Value]) -> anyhow::Re
     for (&axis, data) in axes.iter().zip(data) {
         data["mark"] = json!(power_mark::leave(&session.scenario, &mut session.line, axis)?);
     }
-    session.check_no_restart()
+    Ok(session.check_present()?)
 }
 
 fn print(axis: usize, report: &HomeReport) -> anyhow::Result<()> {

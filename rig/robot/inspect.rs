@@ -5,7 +5,9 @@ use std::fmt::Write;
 
 use clap::Args;
 use masseter_can::canopen::ObjectAddress;
-use masseter_plant::bringup::{BootUps, Deviation, Outcome, Restarted, Survey, object_name, reason_text};
+use masseter_plant::bringup::{
+    BootUps, Deviation, LineError, OtherMaster, Outcome, Restarted, Survey, object_name, reason_text,
+};
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
 use masseter_shared::wording::counted;
@@ -16,7 +18,7 @@ use super::args::RobotArgs;
 use super::evidence::StepFolder;
 use super::interfaces::{InterfaceResult, interfaces};
 use super::ledger;
-use super::robot_line::{RobotLine, failed, masters, serials};
+use super::robot_line::{RobotLine, failed, serial, serials};
 use super::snapshot::dcf;
 use super::step::Step;
 use super::table::{axes_text, table};
@@ -49,6 +51,16 @@ struct DriveResult {
     unread: BTreeMap<String, String>,
 }
 
+/// What the drives say.
+struct Read {
+    /// None of a drive that never answered.
+    surveys: [Option<Survey>; AXES],
+    /// Whether a drive answers to the end.
+    answer: [bool; AXES],
+    /// Drives whose values may be others than those that were read.
+    restarted: Vec<Restarted>,
+}
+
 /// What was found of everything.
 #[derive(Debug, Serialize)]
 struct InspectResult {
@@ -66,13 +78,13 @@ pub(crate) fn inspect(args: &InspectArgs) -> Result<Exit, Failure> {
     let mut folder = StepFolder::begin(&args.robot.folder, Step::Inspect, &all, &scenario).usage()?;
     let interfaces = interfaces(&scenario.can);
     let mut robot = RobotLine::open(scenario, folder.log().usage()?).usage()?;
-    let (surveys, restarted) = read(&mut robot, args.scan).map_err(failed)?;
+    let Read { surveys, answer, restarted } = read(&mut robot, args.scan).map_err(failed)?;
     let result = InspectResult {
         interfaces,
-        masters: masters(robot.line.strangers()),
+        masters: masters(&robot),
         other_nodes: other_nodes(&robot),
         restarted: restarted.iter().map(Restarted::to_string).collect(),
-        drives: all.iter().map(|&axis| drive(&robot, axis, surveys[axis].as_ref())).collect(),
+        drives: all.iter().map(|&axis| drive(&robot, axis, surveys[axis].as_ref(), answer[axis])).collect(),
     };
     for (axis, survey) in surveys.iter().enumerate() {
         let Some(survey) = survey else { continue };
@@ -90,20 +102,29 @@ pub(crate) fn inspect(args: &InspectArgs) -> Result<Exit, Failure> {
     Ok(if passed { Exit::Passed } else { Exit::Failed })
 }
 
-/// The drives, and those that restarted while they were read: what was read before may be another value now.
-fn read(robot: &mut RobotLine, scan: bool) -> anyhow::Result<([Option<Survey>; AXES], Vec<Restarted>)> {
+/// Reads all drives, and asks each of them again at the end.
+fn read(robot: &mut RobotLine, scan: bool) -> Result<Read, LineError> {
     robot.line.listen(LISTEN_NS)?;
     let boot_ups = BootUps::until_now(&robot.line);
     let mut surveys = [const { None }; AXES];
     for (axis, place) in surveys.iter_mut().enumerate() {
-        *place = Some(robot.survey(axis)?).filter(|survey| !survey.is_silent());
+        let settings = robot.settings(axis).clone();
+        *place = Some(robot.survey(axis, &settings)?).filter(|survey| !survey.is_silent());
     }
     if scan {
         robot.line.scan()?;
     }
+    let is_whole = |survey: &Option<Survey>| survey.as_ref().is_some_and(|survey| !survey.fell_silent());
+    let answer =
+        std::array::from_fn(|axis| is_whole(&surveys[axis]) && serial(&mut robot.line, axis).is_ok());
     robot.line.flush()?;
-    let restarted = (0..AXES).filter_map(|axis| boot_ups.check_axis(&robot.line, axis).err());
-    Ok((surveys, restarted.collect()))
+    let restarted = (0..AXES).filter_map(|axis| boot_ups.check_axis(&robot.line, axis).err()).collect();
+    Ok(Read { surveys, answer, restarted })
+}
+
+fn masters(robot: &RobotLine) -> Vec<String> {
+    let masters = &robot.line.strangers().masters;
+    masters.iter().map(|&(bus, sign)| OtherMaster { bus, sign }.to_string()).collect()
 }
 
 fn other_nodes(robot: &RobotLine) -> Vec<String> {
@@ -111,7 +132,7 @@ fn other_nodes(robot: &RobotLine) -> Vec<String> {
     nodes.iter().map(|(bus, node)| format!("node {node} on bus {bus}")).collect()
 }
 
-fn drive(robot: &RobotLine, axis: usize, survey: Option<&Survey>) -> DriveResult {
+fn drive(robot: &RobotLine, axis: usize, survey: Option<&Survey>, answers: bool) -> DriveResult {
     let text = |index| survey?.text(ObjectAddress::new(index, 0));
     let unread = survey.into_iter().flat_map(Survey::readings);
     let unread = unread.filter_map(|(object, reading)| {
@@ -121,7 +142,7 @@ fn drive(robot: &RobotLine, axis: usize, survey: Option<&Survey>) -> DriveResult
     DriveResult {
         axis: AXIS_NAMES[axis],
         node: robot.scenario.can.node_ids[axis],
-        answers: survey.is_some_and(|survey| !survey.fell_silent()),
+        answers,
         device: [0x1008, 0x1009, 0x100A].map(text),
         // What a drive did not answer says nothing of what it has.
         deviations: survey
@@ -148,7 +169,7 @@ fn describe(robot: &RobotLine, result: &InspectResult) -> (String, bool) {
         }
     }
     for sign in &result.masters {
-        fail(&mut text, &format!("{sign}: another master is on the bus; end it before configure"));
+        fail(&mut text, sign);
     }
     for node in &result.other_nodes {
         let _ = writeln!(text, "warning: {node} is not of the scenario");

@@ -74,9 +74,9 @@ pub(crate) fn jog(args: &JogArgs) -> Result<Exit, Failure> {
         Ok(report) => report,
         Err(error) => return Err(session.fail(error)),
     };
-    if let Err(restarted) = session.check_no_restart() {
-        session.finish(false, &json!({ "error": restarted.to_string() }))?;
-        return Err(failed(restarted));
+    if let Err(disturbance) = session.check_present() {
+        session.finish(false, &json!({ "error": disturbance.to_string() }))?;
+        return Err(failed(disturbance));
     }
     let text = text(axis, &report);
     let factor = args.measured.map(|measured_m| measured_m / report.moved_m());

@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, anyhow, ensure};
+use anyhow::ensure;
 use masseter_plant::bringup::{Ledger, Line, OldValue, give_back, object_name, value_text};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::{ObjectKey, Scenario};
@@ -27,25 +27,46 @@ struct Owed {
     values: Vec<OldValue>,
 }
 
-/// A file whose values no step has written.
+/// A file that no step has written like this. The drive itself returns to its old values when it restarts: no step stores reduced ones.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: {object} with {bytes} bytes is no old value of a step; the file is damaged: remove it, and configure again", .path.display())]
+#[error(
+    "{}: {damage}; the file is damaged: remove it, and switch the drive's supply off and on, which brings its stored values back",
+    .path.display()
+)]
 struct Damaged {
     path: PathBuf,
-    object: ObjectKey,
-    bytes: usize,
+    damage: Damage,
+}
+
+/// What is wrong with such a file.
+#[derive(Debug, thiserror::Error)]
+enum Damage {
+    /// It cannot be read.
+    #[error(transparent)]
+    File(#[from] io::Error),
+    /// It has not the form of such a file.
+    #[error(transparent)]
+    Form(#[from] serde_json::Error),
+    /// No step changes this.
+    #[error("{object} with {bytes} bytes is no old value of a step")]
+    Object { object: ObjectKey, bytes: usize },
 }
 
 impl Owed {
+    /// What a file says.
+    fn parse(path: &Path) -> Result<Self, Damage> {
+        let owed: Self = serde_json::from_str(&fs::read_to_string(path)?)?;
+        let is_strange = |old: &&OldValue| !matches!(old.bytes, 1 | 2 | 4) || old.object.0.index == 0x6040;
+        match owed.values.iter().find(is_strange) {
+            Some(&OldValue { object, bytes, .. }) => Err(Damage::Object { object, bytes }),
+            None => Ok(owed),
+        }
+    }
+
     /// What the drive of an axis is owed; another drive is owed nothing.
     fn read(folder: &Path, line: &mut Line, axis: usize) -> anyhow::Result<Self> {
         let path = file(folder, axis);
-        let text = fs::read_to_string(&path)?;
-        let owed: Self = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
-        let is_strange = |old: &&OldValue| !matches!(old.bytes, 1 | 2 | 4) || old.object.0.index == 0x6040;
-        if let Some(&OldValue { object, bytes, .. }) = owed.values.iter().find(is_strange) {
-            return Err(Damaged { path, object, bytes }.into());
-        }
+        let owed = Self::parse(&path).map_err(|damage| Damaged { path: path.clone(), damage })?;
         ensure!(
             serial(line, axis)? == owed.serial,
             "{}: {} has the old values of a drive with another serial number (1018h:04); put that drive back, or remove \
@@ -141,9 +162,7 @@ pub(super) fn settle(
         return Ok(());
     }
     line.listen(LISTEN_NS).map_err(failed)?;
-    if !line.strangers().masters.is_empty() {
-        return Err(failed(anyhow!("another master may control the drives; end that master first")));
-    }
+    line.strangers().refuse_masters().map_err(failed)?;
     for axis in axes {
         let owed = Owed::read(folder, line, axis).map_err(failed)?;
         prove_off(line, scenario, axis, may_stop)?;
@@ -180,6 +199,7 @@ mod tests {
             r#"{ "object": "6081h", "value": 77, "bytes": 3 }"#,
             r#"{ "object": "6081h", "value": 77, "bytes": 40 }"#,
             r#"{ "object": "6040h", "value": 15, "bytes": 2 }"#,
+            r#"{ "object": "6081h", "value": 77"#,
         ] {
             let (folder, scenario, mut line) = robot("", old);
             let refusal = settle(folder.path(), &scenario, &mut line, false).unwrap_err().error.to_string();

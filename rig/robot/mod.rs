@@ -19,6 +19,7 @@ mod lengths;
 mod past;
 mod permission;
 mod power_mark;
+mod presence;
 mod restore;
 mod robot_line;
 mod session;
@@ -31,8 +32,8 @@ mod writing;
 use clap::Subcommand;
 use masseter_terminal::{Exit, Failure, OrFailure};
 
+use args::WriteArgs;
 use check_pose::CheckPoseArgs;
-use configure::WriteArgs;
 use home::HomeArgs;
 use inspect::InspectArgs;
 use jog::JogArgs;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use masseter_shared::geometry::AXIS_NAMES;
 
+use super::before::{Damaged, before_file, nameless};
 use super::evidence::{Basis, Evidence, numbered};
 use super::step::Step;
 
@@ -44,7 +45,8 @@ pub(crate) enum Lack {
     OutOfOrder(String),
 }
 
-fn number(serial: Option<u32>) -> String {
+/// A serial number in words.
+pub(super) fn number(serial: Option<u32>) -> String {
     serial.map_or_else(|| "unknown".to_owned(), |serial| serial.to_string())
 }
 
@@ -66,20 +68,37 @@ pub(crate) struct Past {
     folder: PathBuf,
     /// Oldest first.
     steps: Vec<(PathBuf, Evidence)>,
+    /// Folders without a readable result.
+    damaged: Vec<PathBuf>,
 }
 
 impl Past {
-    /// Reads the evidence in a folder. A folder without a readable result proves nothing and is left out.
+    /// Reads the evidence in a folder. A folder without a readable result proves nothing and is no step.
     ///
     /// # Errors
     /// When the folder itself cannot be read.
     pub(crate) fn read(folder: &Path) -> anyhow::Result<Self> {
-        let read = |path: PathBuf| {
+        let read = |path: &Path| {
             let text = fs::read_to_string(path.join("result.json")).ok()?;
-            Some((path, serde_json::from_str(&text).ok()?))
+            serde_json::from_str(&text).ok()
         };
-        let steps = numbered(folder)?.into_iter().filter_map(|(_, path)| read(path)).collect();
-        Ok(Self { folder: folder.to_owned(), steps })
+        let (mut steps, mut damaged) = (Vec::new(), Vec::new());
+        for (_, path) in numbered(folder)? {
+            match read(&path) {
+                Some(evidence) => steps.push((path, evidence)),
+                None => damaged.push(path),
+            }
+        }
+        Ok(Self { folder: folder.to_owned(), steps, damaged })
+    }
+
+    /// Refuses old values of an axis without a readable result: they may be those of another drive.
+    ///
+    /// # Errors
+    /// With the file.
+    pub(super) fn check_old_values(&self, axis: usize) -> Result<(), Damaged> {
+        let files = self.damaged.iter().map(|path| path.join(before_file(axis)));
+        files.filter(|file| file.exists()).map(nameless).map(Err).next().unwrap_or(Ok(()))
     }
 
     /// Every past step, the oldest first.
@@ -94,15 +113,26 @@ impl Past {
 
     /// The place of the newest evidence of a step for an axis among all.
     fn place(&self, step: Step, axis: usize) -> Option<usize> {
+        self.all_of(step, axis).next_back()
+    }
+
+    /// The places of a step for an axis among all, the oldest first.
+    fn all_of(&self, step: Step, axis: usize) -> impl DoubleEndedIterator<Item = usize> {
         let name = step.to_string();
-        self.steps.iter().rposition(|(_, evidence)| evidence.step == name && evidence.is_about(axis))
+        let is_it = move |evidence: &Evidence| evidence.step == name && evidence.is_about(axis);
+        (0..self.steps.len()).filter(move |&place| is_it(&self.steps[place].1))
     }
 
     /// Why the evidence at a place is outdated by what came after, if so: positions follow from objects and home.
     fn outdated(&self, step: Step, axis: usize, place: usize) -> Option<Lack> {
-        let since = |earlier| {
-            let newer = self.place(earlier, axis).filter(|&newer| newer > place)?;
-            Some(self.steps[newer].1.started.clone())
+        let since = |earlier: Step| {
+            // A step that writes keeps the old values first: without them nothing was written to the drive.
+            let may_have_acted = |path: &Path| {
+                !matches!(earlier, Step::Configure | Step::Restore) || path.join(before_file(axis)).exists()
+            };
+            let newer = self.all_of(earlier, axis).filter(|&newer| newer > place);
+            let mut steps = newer.map(|newer| &self.steps[newer]);
+            Some(steps.rfind(|(path, _)| may_have_acted(path))?.1.started.clone())
         };
         if step >= Step::Configure
             && let Some(at) = since(Step::Restore)
@@ -171,6 +201,9 @@ mod tests {
     fn take(parent: &Path, step: Step, axes: &[usize], passed: Option<bool>) {
         let mut folder = StepFolder::begin(parent, step, axes, &Scenario::default()).unwrap();
         folder.note_serials([1, 2, 3, 4, 5, 6].map(Some));
+        if [Step::Configure, Step::Restore].contains(&step) {
+            axes.iter().for_each(|&axis| folder.keep(&before_file(axis), "").unwrap());
+        }
         if let Some(passed) = passed {
             folder.finish(passed, &"data").unwrap();
         }
@@ -249,6 +282,9 @@ mod tests {
         assert_eq!((check(3), check(4)), (None, Some("not done".to_owned())));
         take(folder.path(), Step::Configure, &ALL, Some(true));
         assert_eq!((check(3), check(4)), (None, None));
+        let refused = StepFolder::begin(folder.path(), Step::Restore, &ALL, &Scenario::default()).unwrap();
+        drop(refused);
+        assert_eq!((check(3), check(4)), (None, None), "a refused step has written nothing");
         take(folder.path(), Step::Restore, &[3], Some(true));
         assert!(check(3).unwrap().starts_with("outdated: restored at "));
         assert_eq!(check(4), None);

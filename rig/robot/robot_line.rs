@@ -2,9 +2,9 @@
 
 use std::io::Write;
 
-use anyhow::Context;
+use anyhow::ensure;
 use masseter_can::canopen::{NodeId, ObjectAddress};
-use masseter_plant::bringup::{BootUps, Deviation, Line, LineError, Settings, Strangers, Survey, deviations};
+use masseter_plant::bringup::{BootUps, Deviation, Line, LineError, Settings, Survey, deviations};
 use masseter_plant::wanted::WantedDrive;
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::Scenario;
@@ -16,6 +16,9 @@ const SERIAL: ObjectAddress = ObjectAddress::new(0x1018, 4);
 
 /// How long the drives may take to boot at power-on before they are read, ns.
 const LISTEN_NS: u64 = 500 * MILLISECOND_NS;
+
+/// What each drive said of itself, as far as it was asked.
+pub(crate) type Surveys = [Option<Survey>; AXES];
 
 /// A line to the drives of a scenario.
 #[derive(Debug)]
@@ -46,30 +49,49 @@ impl RobotLine {
         &self.settings[axis]
     }
 
-    /// What a drive says of itself.
+    /// Listens until all drives may have booted. Returns their boot-ups until then: after a restart a survey is no more than a memory.
     ///
     /// # Errors
     /// When the bus or the log fails.
-    pub(crate) fn survey(&mut self, axis: usize) -> anyhow::Result<Survey> {
-        Ok(Survey::take(&mut self.line, axis, self.settings[axis].addresses())?)
+    pub(crate) fn listen(&mut self) -> Result<BootUps, LineError> {
+        self.line.listen(LISTEN_NS)?;
+        Ok(BootUps::until_now(&self.line))
     }
 
-    /// Surveys of these drives, and the boot-ups before: after a restart a survey is no more than a memory.
+    /// Surveys of the drives that are to be written.
     ///
     /// # Errors
-    /// When the bus or the log fails, or a drive does not answer.
-    pub(crate) fn surveys(&mut self, axes: &[usize]) -> anyhow::Result<([Option<Survey>; AXES], BootUps)> {
-        self.line.listen(LISTEN_NS)?;
-        let (mut surveys, boot_ups) = ([const { None }; AXES], BootUps::until_now(&self.line));
-        for &axis in axes {
-            let survey = self.survey(axis)?;
-            if survey.fell_silent() {
-                anyhow::bail!("{}: {}", AXIS_NAMES[axis], self.silence(axis));
-            }
-            boot_ups.check_axis(&self.line, axis)?;
-            surveys[axis] = Some(survey);
+    /// When the bus or the log fails, or a drive does not answer, or restarts.
+    pub(crate) fn surveys(
+        &mut self,
+        targets: &[(usize, Settings)],
+        boot_ups: BootUps,
+    ) -> anyhow::Result<Surveys> {
+        let mut surveys = [const { None }; AXES];
+        for (axis, target) in targets {
+            let survey = self.whole_survey(*axis, target);
+            boot_ups.check_axis(&self.line, *axis)?;
+            surveys[*axis] = Some(survey?);
         }
-        Ok((surveys, boot_ups))
+        Ok(surveys)
+    }
+
+    /// What a drive says of itself, and of the objects of these settings.
+    ///
+    /// # Errors
+    /// When the bus or the log fails.
+    pub(crate) fn survey(&mut self, axis: usize, settings: &Settings) -> Result<Survey, LineError> {
+        Survey::take(&mut self.line, axis, settings.addresses())
+    }
+
+    /// The same of a drive that answers to the end.
+    ///
+    /// # Errors
+    /// When the bus or the log fails, or the drive does not answer.
+    pub(crate) fn whole_survey(&mut self, axis: usize, settings: &Settings) -> anyhow::Result<Survey> {
+        let survey = self.survey(axis, settings)?;
+        ensure!(!survey.fell_silent(), "{}: {}", AXIS_NAMES[axis], self.silence(axis));
+        Ok(survey)
     }
 
     /// Everything of a drive that is not as scenario and profile need it.
@@ -84,29 +106,11 @@ impl RobotLine {
             "node {node} does not answer; check its power, wiring, bit rate and node id (inspect --scan finds others)"
         )
     }
-
-    /// Refuses to go on where somebody else may control the drives.
-    ///
-    /// # Errors
-    /// With the sign that was heard.
-    pub(crate) fn refuse_masters(&self) -> anyhow::Result<()> {
-        let signs = masters(self.line.strangers());
-        match &signs[..] {
-            [] => Ok(()),
-            signs => Err(anyhow::anyhow!("{}: another master may control the drives", signs.join(", ")))
-                .context("nothing was written; end that master first"),
-        }
-    }
 }
 
 /// A drive or a bus that is not as the step needs it: exit code 1.
 pub(crate) fn failed(error: impl Into<anyhow::Error>) -> Failure {
     Failure::with(Exit::Failed, error)
-}
-
-/// Signs of other masters in words.
-pub(crate) fn masters(strangers: &Strangers) -> Vec<String> {
-    strangers.masters.iter().map(|(bus, sign)| format!("bus {bus}: {sign}")).collect()
 }
 
 /// The serial number of a drive; none where the drive says that it has none.
@@ -121,6 +125,6 @@ pub(crate) fn serial(line: &mut Line, axis: usize) -> Result<Option<u32>, LineEr
 }
 
 /// Serial numbers of the drives that were surveyed.
-pub(crate) fn serials(surveys: &[Option<Survey>; AXES]) -> [Option<u32>; AXES] {
+pub(crate) fn serials(surveys: &Surveys) -> [Option<u32>; AXES] {
     std::array::from_fn(|axis| surveys[axis].as_ref()?.number(SERIAL))
 }

@@ -1,6 +1,6 @@
 //! A step that moves or reads the drives, from the claimed interfaces to its evidence and exit code.
 
-use anyhow::{Context, anyhow};
+use anyhow::Context;
 use masseter_plant::bringup::{BootUps, Line, LineError, MotionError, StopCause};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::Scenario;
@@ -15,11 +15,14 @@ use super::evidence::{Basis, StepFolder};
 use super::ledger::{self, Files};
 use super::past::Past;
 use super::power_mark;
+use super::presence::{Disturbance, check_present, check_undisturbed};
 use super::robot_line::{failed, serial};
 use super::step::Step;
 
 /// How long the step listens for other masters, ns.
 const LISTEN_NS: u64 = 500 * MILLISECOND_NS;
+/// All axes.
+const ALL: [usize; AXES] = [0, 1, 2, 3, 4, 5];
 
 /// A step under way.
 pub(super) struct Session {
@@ -30,6 +33,8 @@ pub(super) struct Session {
     folder: StepFolder,
     /// Boot-up messages before the step.
     boot_ups: BootUps,
+    /// Serial numbers at the beginning.
+    serials: [Option<u32>; AXES],
 }
 
 impl Session {
@@ -56,10 +61,7 @@ impl Session {
         let log = folder.log().context("cannot write the log of the buses").incomplete()?;
         let mut line = Line::open(&scenario, log).usage()?;
         line.listen(LISTEN_NS).died()?;
-        if let Some((bus, sign)) = line.strangers().masters.first() {
-            let other = anyhow!("bus {bus}: another master sends {sign}; end that program first");
-            return Err(Failure::with(Exit::Usage, other));
-        }
+        line.strangers().refuse_masters().usage()?;
         let boot_ups = BootUps::until_now(&line);
         let serials = serials(&mut line).map_err(failed)?;
         folder.note_serials(serials);
@@ -70,12 +72,17 @@ impl Session {
             axes.iter().try_for_each(|&axis| power_mark::remove(&past, &scenario, &mut line, axis))?;
         }
         line.keep_old_values_in(Box::new(Files::new(&args.folder, serials)));
-        Ok(Self { scenario, line, stop, past, folder, boot_ups })
+        Ok(Self { scenario, line, stop, past, folder, boot_ups, serials })
     }
 
-    /// Refuses a drive that restarted since the step began: it may have lost its position, or what was written.
-    pub(super) fn check_no_restart(&self) -> anyhow::Result<()> {
-        Ok(self.boot_ups.check(&self.line)?)
+    /// Refuses a drive that restarted since the step began, since it may have lost its position or what was written, and another master.
+    pub(super) fn check_undisturbed(&self) -> Result<(), Disturbance> {
+        check_undisturbed(&self.line, &ALL, self.boot_ups)
+    }
+
+    /// The same before the step is judged, and asks every drive whether it is still there.
+    pub(super) fn check_present(&mut self) -> Result<(), Disturbance> {
+        check_present(&mut self.line, &ALL, self.boot_ups, &self.serials)
     }
 
     /// Writes the result, whether it is evidence, and where it is.
@@ -90,9 +97,10 @@ impl Session {
     pub(super) fn fail(self, error: MotionError) -> Failure {
         let exit = match &error {
             MotionError::Stopped { cause: StopCause::Requested, .. } => Exit::Interrupted,
-            MotionError::Stopped { .. } | MotionError::StaysOn { .. } | MotionError::Line(_) => {
-                Exit::SafeStop
-            }
+            MotionError::Stopped { .. }
+            | MotionError::StaysOn { .. }
+            | MotionError::Unread { .. }
+            | MotionError::Line(_) => Exit::SafeStop,
             MotionError::Way { .. } | MotionError::NoHomePosition { .. } | MotionError::Powered { .. } => {
                 Exit::Usage
             }

@@ -2,50 +2,55 @@
 
 use std::fmt::Write;
 
+use anyhow::{Context, ensure};
 use masseter_plant::bringup::{
     BootUps, Change, Line, PowerError, Settings, Survey, Writer, prove_no_power, reset, store, take_over,
 };
-use masseter_shared::config::{ObjectRule, Scenario};
-use masseter_shared::geometry::AXIS_NAMES;
+use masseter_shared::config::Scenario;
+use masseter_shared::geometry::{AXES, AXIS_NAMES};
 use masseter_shared::wording::counted;
 use masseter_terminal::{Exit, Failure, OrFailure, Tone, result_with_tones};
 use serde::Serialize;
 
+use super::args::WriteArgs;
 use super::before::before_file;
-use super::evidence::StepFolder;
-use super::robot_line::{RobotLine, failed};
+use super::evidence::{Evidence, StepFolder};
+use super::presence::{check_present, check_undisturbed};
+use super::robot_line::{RobotLine, Surveys, failed};
 
 /// What became of one drive.
 #[derive(Debug, Serialize)]
-pub(super) struct Written {
+struct Written {
     axis: &'static str,
     changes: Vec<Change>,
     stored: bool,
     error: Option<String>,
     /// Number of the axis, and the boot-ups when its turn ended.
     #[serde(skip)]
-    turn: (usize, BootUps),
+    end: (usize, BootUps),
 }
 
 impl Written {
-    /// Whether the drive does not have its settings.
-    pub(super) fn failed(&self) -> bool {
-        self.error.is_some()
-    }
-
-    /// Notes a restart since the drive's turn: values that are not stored are lost.
-    fn note_restart(&mut self, line: &Line) {
-        let (axis, boot_ups) = self.turn;
+    /// Notes what has happened to the drive since its turn: values that are not stored may be lost.
+    fn judge(&mut self, line: &mut Line, serials: &[Option<u32>; AXES]) {
+        let (axis, boot_ups) = self.end;
         if self.error.is_none() {
-            self.error = boot_ups.check_axis(line, axis).err().map(|error| error.to_string());
+            let present = check_present(line, &[axis], boot_ups, serials);
+            self.error = present.err().map(|error| error.to_string());
         }
     }
 }
 
+/// Whether a drive has stored what this step wrote to it, by the step's result.
+pub(super) fn is_stored(evidence: &Evidence, axis: usize) -> bool {
+    let all = evidence.result.as_array().into_iter().flatten();
+    all.filter(|written| written["axis"] == AXIS_NAMES[axis]).any(|written| written["stored"] == true)
+}
+
 /// Proves that none of these drives has power, before anything is written to one of them.
-pub(super) fn prove_all(robot: &mut RobotLine, axes: &[usize], may_stop: bool) -> Result<(), Failure> {
-    robot.refuse_masters().map_err(failed)?;
-    axes.iter().try_for_each(|&axis| prove_off(&mut robot.line, &robot.scenario, axis, may_stop))
+fn prove_all(robot: &mut RobotLine, targets: &[(usize, Settings)], may_stop: bool) -> Result<(), Failure> {
+    robot.line.strangers().refuse_masters().context("nothing was written").map_err(failed)?;
+    targets.iter().try_for_each(|&(axis, _)| prove_off(&mut robot.line, &robot.scenario, axis, may_stop))
 }
 
 /// Proves that a drive has no power; one that has is stopped first if that is allowed.
@@ -67,9 +72,29 @@ pub(super) fn prove_off(
     }
 }
 
+/// Writes settings to drives without power, one after the other, up to the first that does not take them; then prints and keeps the result.
+pub(super) fn write_all(
+    robot: &mut RobotLine,
+    folder: StepFolder,
+    targets: &[(usize, Settings)],
+    (surveys, boot_ups): (&Surveys, BootUps),
+    args: &WriteArgs,
+) -> Result<Exit, Failure> {
+    prove_all(robot, targets, args.take_over)?;
+    let mut all: Vec<Written> = Vec::new();
+    for (axis, target) in targets {
+        let survey = surveys[*axis].as_ref().expect("every axis was surveyed");
+        all.push(write(robot, &folder, *axis, target, (survey, boot_ups), args.store)?);
+        if all.last().is_some_and(|written| written.error.is_some()) {
+            break;
+        }
+    }
+    finish(robot, folder, all, args.store)
+}
+
 /// Keeps the old values of a drive in a file, writes the new ones, and reads everything again; stores on request. A drive
 /// that does not take them is part of the result.
-pub(super) fn write(
+fn write(
     robot: &mut RobotLine,
     folder: &StepFolder,
     axis: usize,
@@ -82,28 +107,31 @@ pub(super) fn write(
     let profile = robot.scenario.profile(axis).clone();
     let mut writer = Writer::new(&mut robot.line, axis, &profile);
     let applied = writer.apply(target, survey);
-    let (changes, mut stored) = (writer.into_changes(), false);
-    let error = match applied {
-        Err(error) => Some(error.to_string()),
-        Ok(()) => check(robot, axis, target, "after writing").usage()?,
+    let changes = writer.into_changes();
+    let written = match applied {
+        Err(error) => Err(error.into()),
+        Ok(()) => check(robot, axis, target, "after writing"),
     };
-    // What was read back before a restart is lost.
-    let error = error.or_else(|| no_restart(robot, axis, boot_ups));
-    let error = match error {
-        None if stores => {
-            let error = store_and_check(robot, axis, target, boot_ups).usage()?;
-            stored = error.is_none();
-            error
-        }
-        error => error,
+    let written = undisturbed(robot, axis, boot_ups, written);
+    let is_written = written.is_ok();
+    let done = match written {
+        Ok(()) if stores => store_and_check(robot, axis, target, boot_ups),
+        written => written,
     };
-    let turn = (axis, BootUps::until_now(&robot.line));
-    Ok(Written { axis: AXIS_NAMES[axis], changes, stored, error, turn })
+    let (stored, error) = (is_written && stores && done.is_ok(), done.err().map(|error| error.to_string()));
+    let end = (axis, BootUps::until_now(&robot.line));
+    Ok(Written { axis: AXIS_NAMES[axis], changes, stored, error, end })
 }
 
-/// The restart of a drive since then, if so.
-fn no_restart(robot: &RobotLine, axis: usize, since: BootUps) -> Option<String> {
-    since.check_axis(&robot.line, axis).err().map(|error| error.to_string())
+/// What was done, unless the drive restarted since then or another master was heard: that is the cause of whatever else failed.
+fn undisturbed(
+    robot: &RobotLine,
+    axis: usize,
+    since: BootUps,
+    done: anyhow::Result<()>,
+) -> anyhow::Result<()> {
+    check_undisturbed(&robot.line, &[axis], since)?;
+    done
 }
 
 /// Stores, resets, and reads everything again. No restart but this reset counts as a proof.
@@ -112,51 +140,41 @@ fn store_and_check(
     axis: usize,
     target: &Settings,
     before: BootUps,
-) -> anyhow::Result<Option<String>> {
+) -> anyhow::Result<()> {
     let config = robot.scenario.profile(axis).store;
-    if let Err(error) = store(&mut robot.line, axis, config) {
-        return Ok(Some(error.to_string()));
-    }
-    if let Some(error) = no_restart(robot, axis, before) {
-        return Ok(Some(error));
-    }
-    if let Err(error) = reset(&mut robot.line, axis) {
-        return Ok(Some(error.to_string()));
-    }
+    let stored = store(&mut robot.line, axis, config);
+    undisturbed(robot, axis, before, stored.map_err(Into::into))?;
+    reset(&mut robot.line, axis)?;
     let after = BootUps::until_now(&robot.line);
-    let wrong = check(robot, axis, target, "after the reset, so the drive did not store it")?;
-    Ok(wrong.or_else(|| no_restart(robot, axis, after)))
+    let checked = check(robot, axis, target, "after the reset, so the drive did not store it");
+    undisturbed(robot, axis, after, checked)
 }
 
-/// Reads everything again; returns what is not as it was written.
-fn check(
-    robot: &mut RobotLine,
-    axis: usize,
-    target: &Settings,
-    when: &str,
-) -> anyhow::Result<Option<String>> {
-    let survey = robot.survey(axis)?;
+/// Reads everything again; refuses what is not as it was written.
+fn check(robot: &mut RobotLine, axis: usize, target: &Settings, when: &str) -> anyhow::Result<()> {
+    let survey = robot.whole_survey(axis, target)?;
     // An optional object may keep a value of its own.
     let wrong: Vec<_> = target
         .differences(&survey)
         .into_iter()
-        .filter(|difference| difference.rule != ObjectRule::Optional)
+        .filter(|difference| !difference.may_stay())
         .map(|difference| difference.object.to_string())
         .collect();
-    Ok((!wrong.is_empty()).then(|| format!("{}: {} differ {when}", AXIS_NAMES[axis], wrong.join(", "))))
+    ensure!(wrong.is_empty(), "{}: {} differ {when}", AXIS_NAMES[axis], wrong.join(", "));
+    Ok(())
 }
 
-/// Prints and keeps the result.
-pub(super) fn finish(
+/// Judges all drives once more, prints and keeps the result.
+fn finish(
     robot: &mut RobotLine,
     folder: StepFolder,
     mut all: Vec<Written>,
     stores: bool,
 ) -> Result<Exit, Failure> {
-    robot.line.flush().incomplete()?;
     for written in &mut all {
-        written.note_restart(&robot.line);
+        written.judge(&mut robot.line, &folder.basis().serials);
     }
+    robot.line.flush().incomplete()?;
     let mut text = String::new();
     for Written { axis, changes, stored, error, .. } in &all {
         let count = counted(changes.len() as u64, "value");
@@ -169,7 +187,7 @@ pub(super) fn finish(
             let _ = writeln!(text, "failed: {error}");
         }
     }
-    let failed = all.iter().any(Written::failed);
+    let failed = all.iter().any(|written| written.error.is_some());
     let _ = match (failed, stores) {
         (true, _) => writeln!(
             text,

@@ -1,0 +1,59 @@
+//! Whether the drives are at the end of a step those of its beginning: a step may be done with a drive long before it ends.
+
+use masseter_plant::bringup::{BootUps, Line, LineError, OtherMaster, Restarted};
+use masseter_shared::geometry::{AXES, AXIS_NAMES};
+
+use super::past::number;
+use super::robot_line::serial;
+
+/// Why what a step has read from a drive, or written to it, may not count any more.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum Disturbance {
+    /// It restarted.
+    #[error(transparent)]
+    Restarted(#[from] Restarted),
+    /// Another master may have changed it.
+    #[error(transparent)]
+    OtherMaster(#[from] OtherMaster),
+    /// It does not answer any more.
+    #[error(transparent)]
+    Line(#[from] LineError),
+    /// Another drive answers.
+    #[error(
+        "{}: the drive's serial number was {} before, and is {}; leave the drives in their places during a step",
+        AXIS_NAMES[*axis], number(*.before), number(*.now)
+    )]
+    OtherDrive {
+        /// The axis.
+        axis: usize,
+        /// Its serial number at the beginning.
+        before: Option<u32>,
+        /// Its serial number now.
+        now: Option<u32>,
+    },
+}
+
+/// Refuses drives of which one restarted since then, or beside which another master was heard. Nothing is sent.
+pub(super) fn check_undisturbed(line: &Line, axes: &[usize], since: BootUps) -> Result<(), Disturbance> {
+    axes.iter().try_for_each(|&axis| since.check_axis(line, axis))?;
+    Ok(line.strangers().refuse_masters()?)
+}
+
+/// The same, and asks the drives for their serial numbers again.
+pub(super) fn check_present(
+    line: &mut Line,
+    axes: &[usize],
+    since: BootUps,
+    serials: &[Option<u32>; AXES],
+) -> Result<(), Disturbance> {
+    let answers: Vec<_> = axes.iter().map(|&axis| (axis, serial(line, axis))).collect();
+    // A restart is the cause of a missing answer, and may become known while the answer is waited for.
+    check_undisturbed(line, axes, since)?;
+    for (axis, now) in answers {
+        let (before, now) = (serials[axis], now?);
+        if now != before {
+            return Err(Disturbance::OtherDrive { axis, before, now });
+        }
+    }
+    Ok(())
+}
