@@ -7,6 +7,7 @@
 mod borrowed;
 mod caution;
 mod deviation;
+mod deviations;
 mod heard;
 mod home;
 mod jog;
@@ -27,6 +28,7 @@ mod sync_answer;
 mod test_log;
 #[cfg(test)]
 mod tests;
+mod units;
 mod watch;
 mod wires;
 mod wording;
@@ -34,7 +36,8 @@ mod write;
 
 pub use borrowed::give_back;
 pub use caution::{Caution, Operator, Wish};
-pub use deviation::{Deviation, Outcome, deviations};
+pub use deviation::{Deviation, Outcome};
+pub use deviations::deviations;
 pub use heard::{Heard, OtherMaster, Strangers};
 pub use home::{HomeReport, home};
 pub use jog::{JogOrder, JogReport, jog};

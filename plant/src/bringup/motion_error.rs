@@ -166,7 +166,7 @@ pub enum MotionError {
         source: masseter_can::cia402::StatuswordError,
     },
     /// The drive did not confirm that it is off.
-    #[error("{}: NOT PROVED OFF ({reason}); press the emergency stop. The next step writes the old limits back", AXIS_NAMES[*axis])]
+    #[error("{}: NOT PROVED OFF ({reason}); press the emergency stop. The next step that writes gives the old limits back", AXIS_NAMES[*axis])]
     StaysOn {
         /// The axis.
         axis: usize,

@@ -1,0 +1,176 @@
+//! Every deviation of one drive from what scenario and profile need.
+
+use masseter_can::canopen::ObjectAddress;
+use masseter_can::cia402::Statusword;
+use masseter_shared::config::{DriveProfile, ObjectRule};
+
+use super::deviation::{Deviation, Outcome};
+use super::settings::{Difference, Settings};
+use super::survey::Survey;
+use super::units::{of_ratios, of_units};
+use super::wording::{reason_text, value_text};
+use crate::wanted::{WantedDrive, WantedIdentity};
+
+/// Bit of 6502h: cyclic synchronous position.
+const CYCLIC_POSITION: u32 = 1 << 7;
+
+/// Every deviation of a drive.
+pub fn deviations(
+    survey: &Survey,
+    wanted: &WantedDrive,
+    settings: &Settings,
+    profile: &DriveProfile,
+) -> Vec<Deviation> {
+    let mut all: Vec<_> =
+        wanted.identity.iter().filter_map(|&identity| of_identity(survey, identity)).collect();
+    all.extend(of_state(survey));
+    all.extend(of_units(survey, profile, wanted.increment_m));
+    let differences = settings.differences(survey);
+    let is_at =
+        |deviation: &Deviation, difference: &Difference| deviation.object == difference.object.to_string();
+    // A unit that the profile writes is mended; one that it expects is told in words.
+    all.retain(|deviation| {
+        let mut written = differences.iter().filter(|difference| difference.rule != ObjectRule::Expect);
+        !written.any(|difference| is_at(deviation, difference))
+    });
+    all.extend(of_ratios(survey, profile, wanted.increment_m));
+    let others: Vec<_> = differences
+        .iter()
+        .filter(|difference| !all.iter().any(|deviation| is_at(deviation, difference)))
+        .map(|difference| of_object(survey, difference))
+        .collect();
+    all.extend(others);
+    all
+}
+
+/// A value, or why there is none.
+fn found_text(survey: &Survey, object: ObjectAddress) -> String {
+    let refusal = || survey.refusal(object).map_or_else(|| "not there".to_owned(), reason_text);
+    survey.number(object).map_or_else(refusal, |value| value_text(object, value))
+}
+
+fn of_identity(survey: &Survey, WantedIdentity { object, mask, value }: WantedIdentity) -> Option<Deviation> {
+    let is_right = survey.number(object).is_some_and(|found| found & mask == value & mask);
+    let key = match object {
+        ObjectAddress { index: 0x1000, .. } => "drive_profile.identity.device_type",
+        ObjectAddress { subindex: 1, .. } => "drive_profile.identity.vendor_id",
+        ObjectAddress { subindex: 2, .. } => "drive_profile.identity.product_code",
+        _ => "drive_profile.identity.revision",
+    };
+    let values = [value_text(object, value & mask), found_text(survey, object)];
+    let remedy = "enter this drive's identity, or use the drive that the profile is for";
+    (!is_right).then(|| Deviation::new(object, values, Outcome::Refused, remedy, key))
+}
+
+fn of_state(survey: &Survey) -> Vec<Deviation> {
+    let (modes, status) = (ObjectAddress::new(0x6502, 0), ObjectAddress::new(0x6041, 0));
+    let mut all = Vec::new();
+    if survey.number(modes).is_some_and(|modes| modes & CYCLIC_POSITION == 0) {
+        let values = ["bit 7".to_owned(), found_text(survey, modes)];
+        let remedy = "the drive has no cyclic synchronous position mode: the rig cannot use it";
+        all.push(Deviation::new(modes, values, Outcome::Refused, remedy, ""));
+    }
+    let state = survey.number(status).map(|word| Statusword(word as u16).state());
+    if let Some(Ok(state)) = state
+        && state.is_powered()
+    {
+        let values = ["no voltage".to_owned(), format!("{state:?}")];
+        let remedy = "configure refuses unless --take-over may stop the drive";
+        all.push(Deviation::new(status, values, Outcome::Doubtful, remedy, ""));
+    }
+    let error = ObjectAddress::new(0x603F, 0);
+    if survey.number(error).is_some_and(|code| code != 0) {
+        let values = ["0h".to_owned(), found_text(survey, error)];
+        all.push(Deviation::new(
+            error,
+            values,
+            Outcome::Doubtful,
+            "find the cause in the drive's manual",
+            "",
+        ));
+    }
+    all
+}
+
+fn of_object(survey: &Survey, difference: &Difference) -> Deviation {
+    let Difference { object, wanted, found, rule, key } = difference;
+    let is_pdo = (0x1400..0x1C00).contains(&object.index);
+    let (outcome, remedy) = match (rule, found) {
+        (ObjectRule::Expect, _) => (Outcome::Refused, "the profile expects another value".to_owned()),
+        (ObjectRule::Optional, None) => (Outcome::Doubtful, "left".to_owned()),
+        (_, None) if !is_pdo => {
+            let remedy = "the drive has no such object: give it the rule 'absent' or 'optional'";
+            (Outcome::Refused, remedy.to_owned())
+        }
+        (_, None) if object.index < 0x1600 || (0x1800..0x1A00).contains(&object.index) => {
+            (Outcome::Refused, "the drive has no such PDO".to_owned())
+        }
+        (_, None) => (Outcome::Mended, "map".to_owned()),
+        (_, Some(_)) if is_pdo && *wanted >> 31 == 1 => (Outcome::Mended, "switch off".to_owned()),
+        (_, Some(_)) => (Outcome::Mended, format!("write {}", value_text(*object, *wanted))),
+    };
+    let wanted = if is_pdo && *wanted >> 31 == 1 { "off".to_owned() } else { value_text(*object, *wanted) };
+    let is_missing = outcome == Outcome::Refused && found.is_none() && !is_pdo;
+    let key = if is_missing { "drive_profile.objects" } else { key };
+    Deviation::new(*object, [wanted, found_text(survey, *object)], outcome, &remedy, key)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+    use std::path::Path;
+
+    use masseter_can::canopen::NodeId;
+    use masseter_shared::clock::MILLISECOND_NS;
+    use masseter_shared::config::Scenario;
+
+    use super::*;
+    use crate::bringup::Line;
+
+    /// What emulated drives lack of what this profile needs.
+    fn of_profile(text: &str) -> Vec<(String, Outcome, String)> {
+        let scenario = Scenario::parse(Path::new("robot.toml"), text).unwrap();
+        let mut line = Line::open(&Scenario::default(), Box::new(io::sink())).unwrap();
+        line.listen(100 * MILLISECOND_NS).unwrap();
+        let wanted = WantedDrive::of_axis(&scenario, 3, NodeId::new(4).unwrap()).unwrap();
+        let settings = Settings::wanted(&wanted);
+        let survey = Survey::take(&mut line, 3, settings.addresses()).unwrap();
+        let all = deviations(&survey, &wanted, &settings, scenario.profile(3));
+        all.into_iter().map(|one| (one.object, one.outcome, one.remedy)).collect()
+    }
+
+    #[test]
+    fn an_emulated_drive_has_all_that_the_rig_needs_but_the_event_timer() {
+        let timer = ("1400h:05h".to_owned(), Outcome::Mended, "write 150".to_owned());
+        assert_eq!(of_profile(""), [timer]);
+    }
+
+    #[test]
+    fn every_deviation_is_found_at_once_with_what_becomes_of_it() {
+        let all = of_profile(
+            "[[drive_profile]]\nidentity.revision = 7\nobjects.6066h = { value = 9 }\n\
+             objects.6007h = { rule = 'expect', value = 1 }\nobjects.2222h = { value = 1, bytes = 1 }\n\
+             homing = { home_object = '30B0h', home_position_m = 0.1 }",
+        );
+        let of = |object: &str| {
+            let found = all.iter().find(|(at, ..)| at == object);
+            found.map(|(_, outcome, remedy)| (*outcome, remedy.as_str()))
+        };
+        assert_eq!(of("6066h:00h"), Some((Outcome::Mended, "write 9")));
+        assert_eq!(of("6007h:00h"), Some((Outcome::Refused, "the profile expects another value")));
+        for object in ["1018h:03h", "2222h:00h", "30B0h:00h"] {
+            assert_eq!(of(object).map(|(outcome, _)| outcome), Some(Outcome::Refused), "{object}: {all:?}");
+        }
+    }
+
+    /// Emulated drives have a gear of 1: a profile that writes another one is told of its own mistake.
+    #[test]
+    fn a_ratio_that_the_profile_itself_makes_wrong_is_refused() {
+        let all = of_profile(
+            "[[drive_profile]]\nunits = { gear_ratio = 2.5, lead_m = 0.025 }\n\
+             objects.'6091h:01' = { value = 26, bytes = 4 }",
+        );
+        let gear: Vec<_> = all.iter().filter(|(object, ..)| object == "6091h:01h").collect();
+        assert!(matches!(gear[..], [(_, Outcome::Refused, _)]), "{all:?}");
+    }
+}
