@@ -209,7 +209,7 @@ fn a_drive_that_restarts_after_its_own_turn_fails_the_configuration() {
 }
 
 /// When a frame like this is on the bus first, and the frames after it, s since switch-on.
-fn find<'l>(log: &'l str, is_it: impl Fn(&str, &str) -> bool) -> (f64, &'l str) {
+fn find(log: &str, is_it: impl Fn(&str, &str) -> bool) -> (f64, &str) {
     let place = |line: &str| {
         let mut words = line.split_whitespace();
         let at_s: f64 = words.next()?.trim_matches(['(', ')']).parse().ok()?;
@@ -234,18 +234,25 @@ fn writes(data: &str) -> bool {
 /// The log of a step without a fault.
 fn sound_log(before: &[&str], step: &str) -> String {
     let workspace = Workspace::new(SOUND);
-    before.iter().chain([&step]).for_each(|step| assert_passes(&workspace, step));
+    for step in before.iter().chain([&step]) {
+        assert_passes(&workspace, step);
+    }
     fs::read_to_string(newest(&workspace).join("candump.log")).unwrap()
 }
 
 /// A step with a fault at that time; its exit code, what it says, and its result.
 fn with_fault(before: &[&str], step: &str, fault: &str, from_s: f64) -> (Option<i32>, String, Workspace) {
     let workspace = Workspace::new(SOUND);
-    before.iter().for_each(|step| assert_passes(&workspace, step));
+    for step in before {
+        assert_passes(&workspace, step);
+    }
     workspace.write("scenario.toml", &format!("{SOUND}[[faults]]\n{fault}\nfrom_s = {from_s:?}\n"));
     let output = robot(&workspace, step);
     (output.status.code(), stdout(&output) + &stderr(&output), workspace)
 }
+
+/// Whether a frame, by its identifier and data, is a moment of a step.
+type Moment<'m> = &'m dyn Fn(&str, &str) -> bool;
 
 /// Once the step is done with l1, l1 is dark to the end.
 #[test]
@@ -253,7 +260,6 @@ fn a_drive_that_fails_after_its_own_turn_fails_the_step() {
     let l2_begins = |id: &str, data: &str| id == "605" && data.starts_with("40001000");
     let l2_is_written = |id: &str, data: &str| id == "605" && writes(data);
     let l1_is_compared = |id: &str, data: &str| id == "584" && data.starts_with("43646000");
-    type Moment<'m> = &'m dyn Fn(&str, &str) -> bool;
     let (home, silent) = ("home --axis d1 --out-of-order", "l1: object 1018h:04h: no answer");
     let tried: [(&[&str], &str, Moment<'_>, &str); 5] = [
         (&[], "inspect", &l2_begins, SILENT[0]),

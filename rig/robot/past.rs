@@ -202,7 +202,9 @@ mod tests {
         let mut folder = StepFolder::begin(parent, step, axes, &Scenario::default()).unwrap();
         folder.note_serials([1, 2, 3, 4, 5, 6].map(Some));
         if [Step::Configure, Step::Restore].contains(&step) {
-            axes.iter().for_each(|&axis| folder.keep(&before_file(axis), "").unwrap());
+            for &axis in axes {
+                folder.keep(&before_file(axis), "").unwrap();
+            }
         }
         if let Some(passed) = passed {
             folder.finish(passed, &"data").unwrap();

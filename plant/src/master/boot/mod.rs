@@ -231,8 +231,12 @@ impl Boot {
         let is_missing = matches!(code, AbortCode::NO_OBJECT | AbortCode::NO_SUBINDEX);
         match self.steps[self.next] {
             Step::Write { if_refused: IfRefused::Leave, .. } => Some(0),
-            Step::Write { if_refused: IfRefused::MayLack, .. } if is_missing => Some(0),
-            Step::Read(_, Check::EqualsIfPresent { value: 0, .. } | Check::Unit(_)) if is_missing => Some(0),
+            Step::Write { if_refused: IfRefused::MayLack, .. }
+            | Step::Read(_, Check::EqualsIfPresent { value: 0, .. } | Check::Unit(_))
+                if is_missing =>
+            {
+                Some(0)
+            }
             Step::Read(_, Check::PdoElseSkip(skipped)) if is_missing => Some(skipped),
             _ => None,
         }
