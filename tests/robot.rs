@@ -212,7 +212,7 @@ fn damaged_old_values_are_refused_with_what_to_do() {
     fs::write(&result, &configured[..configured.len() / 2]).unwrap();
     let refused = robot(&workspace, &["restore"]);
     assert_eq!(refused.status.code(), Some(2), "{}", stdout(&refused));
-    let says = "before-d1.json: the file result.json beside it is missing or damaged, so that nobody knows whose values";
+    let says = "before-d1.json: result.json beside it is missing or damaged, so that nobody knows whose values these are";
     assert!(stderr(&refused).contains(says), "{}", stderr(&refused));
     fs::write(&result, configured).unwrap();
     assert_eq!(robot(&workspace, &["restore"]).status.code(), Some(0));

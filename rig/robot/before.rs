@@ -38,11 +38,6 @@ enum Damage {
     /// No step writes this.
     #[error("{object} with {bytes} bytes is no old value")]
     Object { object: ObjectKey, bytes: usize },
-    /// Nobody knows whose values they are.
-    #[error(
-        "the file result.json beside it is missing or damaged, so that nobody knows whose values these are"
-    )]
-    Nameless,
     /// There is no such PDO.
     #[error("{communication:04X}h with {mapped} objects is no PDO")]
     Pdo { communication: u16, mapped: usize },
@@ -54,9 +49,13 @@ pub(super) fn before_file(axis: usize) -> String {
 }
 
 /// A file without a readable result beside it.
-pub(super) fn nameless(path: PathBuf) -> Damaged {
-    Damaged { path, damage: Damage::Nameless }
-}
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "{}: result.json beside it is missing or damaged, so that nobody knows whose values these are; bring it back from a \
+     backup, or move the file away and write its values by hand",
+    .0.display()
+)]
+pub(super) struct Nameless(pub(super) PathBuf);
 
 /// The values in a file.
 ///

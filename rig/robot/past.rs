@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use masseter_shared::geometry::AXIS_NAMES;
 
-use super::before::{Damaged, before_file, nameless};
+use super::before::{Nameless, before_file};
 use super::evidence::{Basis, Evidence, numbered};
 use super::step::Step;
 
@@ -96,9 +96,9 @@ impl Past {
     ///
     /// # Errors
     /// With the file.
-    pub(super) fn check_old_values(&self, axis: usize) -> Result<(), Damaged> {
+    pub(super) fn check_old_values(&self, axis: usize) -> Result<(), Nameless> {
         let files = self.damaged.iter().map(|path| path.join(before_file(axis)));
-        files.filter(|file| file.exists()).map(nameless).map(Err).next().unwrap_or(Ok(()))
+        files.filter(|file| file.exists()).map(Nameless).map(Err).next().unwrap_or(Ok(()))
     }
 
     /// Every past step, the oldest first.

@@ -8,7 +8,7 @@ use masseter_shared::geometry::{AXES, AXIS_NAMES};
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
 use super::args::WriteArgs;
-use super::before::{self, Damaged, before_file};
+use super::before::{self, before_file};
 use super::evidence::{Evidence, StepFolder};
 use super::ledger;
 use super::past::Past;
@@ -46,7 +46,7 @@ pub(crate) fn restore(args: &WriteArgs) -> Result<Exit, Failure> {
 
 /// The values of a drive from before the first `configure` since they were last restored for good; none where `configure` has not
 /// begun with it. Values that were restored without `--store` last until a reset.
-fn old_values(past: &Past, axis: usize, serial: Option<u32>) -> Result<Option<Settings>, Damaged> {
+fn old_values(past: &Past, axis: usize, serial: Option<u32>) -> anyhow::Result<Option<Settings>> {
     past.check_old_values(axis)?;
     let steps = past.steps().filter(|(_, evidence)| evidence.is_about(axis));
     let steps: Vec<_> = steps.filter(|(_, evidence)| evidence.serials[axis] == serial).collect();
@@ -55,5 +55,5 @@ fn old_values(past: &Past, axis: usize, serial: Option<u32>) -> Result<Option<Se
     };
     let restored = steps.iter().rposition(is_restored).map_or(0, |place| place + 1);
     let mut files = steps[restored..].iter().map(|(path, _)| path.join(before_file(axis)));
-    files.find(|file| file.exists()).map(|file| before::read(&file)).transpose()
+    Ok(files.find(|file| file.exists()).map(|file| before::read(&file)).transpose()?)
 }
