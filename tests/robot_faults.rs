@@ -338,6 +338,7 @@ fn a_fault_in_the_middle_of_a_run_stops_all_drives_and_names_the_one() {
             (SUPPLY, "process_data_lost (axis l1 (node 4 on bus 1)"),
             (DIP, "process_data_lost (axis l1 (node 4 on bus 1)"),
             (RESET, "another node sends SYNC or NMT"),
+            (SYNC, "another node sends SYNC or NMT"),
         ] {
             let workspace = Workspace::new(SOUND);
             for step in ["inspect", "configure --store"] {
