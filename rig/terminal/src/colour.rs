@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use anstream::AutoStream;
 use anstyle::{AnsiColor, Style};
 
-use crate::{escaped, taken};
+use crate::{escaped, taken, wrap};
 
 /// What a word means for who reads it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,7 +41,7 @@ pub fn choose_colour(choice: clap::ColorChoice) {
 }
 
 /// Writes a result to standard output as [`result`](crate::result) does. Each word of `tones` with which a line begins is
-/// coloured.
+/// coloured. On a terminal, lines are broken to its width.
 ///
 /// # Errors
 /// When the write fails, except for a closed pipe.
@@ -61,7 +61,7 @@ pub fn result_with_tones(text: &str, tones: &[(&str, Tone)]) -> anyhow::Result<(
 }
 
 fn coloured(text: &str, tones: &[(&str, Tone)]) -> String {
-    let text = escaped(text);
+    let text = wrap::for_stdout(&escaped(text));
     text.split_inclusive('\n').map(|line| coloured_line(line, tones)).collect()
 }
 

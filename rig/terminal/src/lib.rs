@@ -14,6 +14,7 @@
 
 mod colour;
 mod exit;
+mod wrap;
 
 use std::fmt::Write as _;
 use std::io::{self, ErrorKind, Write};
