@@ -3,7 +3,7 @@
 use masseter_shared::messages::codes::{
     Cause, ControllerState, DriveRequest, DriveState, EventKind, NoPose, Source,
 };
-use masseter_shared::messages::{Command, Contact, Event, Field, Message, Reading, State, Truth};
+use masseter_shared::messages::{Command, Contact, Event, Field, Message, Reading, State, Truth, plain};
 
 /// A message as other languages need it.
 pub(super) struct Layout {
@@ -55,19 +55,14 @@ fn layout<M: Message>() -> Layout {
     }
 }
 
-fn layout_field(Field { name, ros_type, offset, about }: Field) -> LayoutField {
+fn layout_field(field: Field) -> LayoutField {
+    let about = field.meaning();
+    let Field { name, ros_type, offset, .. } = field;
     let (element, count) = match ros_type.split_once('[') {
         Some((element, count)) => (element.to_owned(), count.trim_end_matches(']').parse().ok()),
         None => (ros_type, None),
     };
-    LayoutField { name, element, count, offset, about: plain(about) }
-}
-
-/// A comment without the links of Rust's documentation.
-fn plain(about: &str) -> String {
-    let text = about.replace("codes::", "").replace("super::", "");
-    let text = text.replace("[`", "").replace("`]", "").replace('`', "");
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
+    LayoutField { name, element, count, offset, about }
 }
 
 pub(super) fn enumerations() -> Vec<Enumeration> {

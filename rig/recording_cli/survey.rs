@@ -5,7 +5,7 @@ use std::fmt::{Error, Write};
 use std::io::{Read, Seek};
 
 use masseter_analysis::{SequenceCheck, TopicFigures};
-use masseter_recording::{Chunks, Damage, Entry, ReadError, Reader};
+use masseter_recording::{Chunks, Damage, Entry, ReadError, Reader, Recorded};
 use masseter_shared::wording::counted;
 use masseter_terminal::{Exit, Tone};
 
@@ -49,6 +49,9 @@ impl Survey {
             channels.entry(channel.id).or_default().add(&entry);
             if let Some(Ok(message)) = entry.recorded() {
                 sequence.take(&message);
+            }
+            for frame in entry.frames().into_iter().flatten().flatten() {
+                sequence.take(&Recorded::Frame(frame));
             }
         }
         let channels = reader.channels().map(|channel| {
@@ -228,7 +231,8 @@ impl ChannelFigures {
         self.last_ns = self.last_ns.max(entry.header.log_time);
         self.messages += 1;
         self.bytes += entry.data.len() as u64;
-        if let Some(Err(error)) = entry.recorded() {
+        let unread = entry.recorded().and_then(Result::err).or(entry.frames().and_then(Result::err));
+        if let Some(error) = unread {
             self.unreadable += 1;
             self.reason.get_or_insert_with(|| error.to_string());
         }

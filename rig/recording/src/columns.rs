@@ -7,8 +7,10 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use data_encoding::HEXUPPER;
+use masseter_shared::messages::{FrameTap, Message};
 use mcap::Channel;
 
+use super::frames::FrameBatch;
 use super::topic::Topic;
 
 /// A primitive type of the definition language.
@@ -173,6 +175,9 @@ impl Columns {
     /// The tables of the rig's topics among these channels.
     pub fn of_topics<'a>(channels: impl Iterator<Item = &'a Channel<'static>>) -> BTreeMap<Topic, Self> {
         let table = |channel: &Channel| {
+            if channel.topic == FrameBatch::TOPIC {
+                return Some((Topic::Frame, Self::from_definition(&FrameTap::schema())?));
+            }
             let definition = str::from_utf8(&channel.schema.as_ref()?.data).ok()?;
             Some((Topic::named(&channel.topic)?, Self::from_definition(definition)?))
         };

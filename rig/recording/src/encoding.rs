@@ -7,6 +7,7 @@ use cdr::{CdrLe, Infinite};
 
 use masseter_shared::named::Declared;
 
+use super::frames::FrameBatch;
 use super::ros::{MarkerArray, RosMessage, TfMessage};
 use super::scene::Scene;
 use super::topic::{Recorded, Stamps, Topic};
@@ -27,15 +28,17 @@ pub enum Channel {
     Transforms,
     /// Shapes in these frames.
     Markers,
+    /// CAN frames, many in a message, as recordings have them in place of the topic's single ones.
+    Frames,
 }
 
 impl Channel {
     /// How many there are.
-    pub const COUNT: usize = Topic::ALL.len() + 2;
+    pub const COUNT: usize = Topic::ALL.len() + 3;
 
     /// Every channel, by its place.
     pub fn all() -> impl Iterator<Item = Self> {
-        Topic::ALL.into_iter().map(Self::Topic).chain([Self::Transforms, Self::Markers])
+        Topic::ALL.into_iter().map(Self::Topic).chain([Self::Transforms, Self::Markers, Self::Frames])
     }
 
     /// Its place among all.
@@ -44,10 +47,11 @@ impl Channel {
             Self::Topic(topic) => topic as usize,
             Self::Transforms => Topic::ALL.len(),
             Self::Markers => Topic::ALL.len() + 1,
+            Self::Frames => Topic::ALL.len() + 2,
         }
     }
 
-    /// The channels that carry a topic's messages, or a view of them.
+    /// The channels that carry a topic's messages to live viewers, or a view of them.
     pub fn for_topic(topic: Topic) -> Vec<Self> {
         match topic {
             Topic::State => vec![Self::Topic(topic), Self::Transforms],
@@ -57,10 +61,20 @@ impl Channel {
     }
 }
 
-/// The definitions of the channels of a run whose controller declares these signals and parameters, numbered by their places
-/// from 1.
+/// The definitions of the channels for live viewers, of a run whose controller declares these signals and parameters, numbered
+/// by their places from 1.
 pub fn definitions(declared: &Declared) -> Vec<(Channel, mcap::Channel<'static>)> {
-    Channel::all().filter_map(|channel| Some((channel, definition(channel, declared)?))).collect()
+    defined(declared, |channel| channel != Channel::Frames)
+}
+
+/// The same for recordings.
+pub(super) fn recorded_definitions(declared: &Declared) -> Vec<(Channel, mcap::Channel<'static>)> {
+    defined(declared, |channel| channel != Channel::Topic(Topic::Frame))
+}
+
+fn defined(declared: &Declared, is_needed: fn(Channel) -> bool) -> Vec<(Channel, mcap::Channel<'static>)> {
+    let needed = Channel::all().filter(|channel| is_needed(*channel));
+    needed.filter_map(|channel| Some((channel, definition(channel, declared)?))).collect()
 }
 
 fn definition(channel: Channel, declared: &Declared) -> Option<mcap::Channel<'static>> {
@@ -71,6 +85,9 @@ fn definition(channel: Channel, declared: &Declared) -> Option<mcap::Channel<'st
         }
         Channel::Transforms => view::<TfMessage>(Scene::TRANSFORMS),
         Channel::Markers => view::<MarkerArray>(Scene::MARKERS),
+        Channel::Frames => {
+            (FrameBatch::TOPIC, FrameBatch::TYPE_NAME.to_owned(), FrameBatch::DEFINITION.to_owned())
+        }
     };
     let id = channel.place() as u16 + 1;
     let (encoding, data) = (SCHEMA_ENCODING.to_owned(), definition.into_bytes().into());
@@ -101,8 +118,8 @@ fn named_definition(topic: Topic, definition: String, declared: &Declared) -> Op
 }
 
 fn field(name: &str, unit: &str, about: &str) -> String {
-    let comment = [unit, about].map(|text| text.replace(['\n', '\r'], " ")).join(" ");
-    format!("float64 {name}  # {}\n", comment.trim())
+    let unit = if unit.is_empty() { String::new() } else { format!("[{unit}] ") };
+    format!("float64 {name}  # {unit}{about}\n").replace(['\n', '\r'], " ").trim_end().to_owned() + "\n"
 }
 
 fn view<M: RosMessage>(topic: &'static str) -> (&'static str, String, String) {
@@ -176,6 +193,7 @@ impl Encoder {
 
 #[cfg(test)]
 mod tests {
+    use masseter_shared::messages::{Message, Signals};
     use masseter_shared::named::Signal;
 
     use super::*;
@@ -184,14 +202,14 @@ mod tests {
     fn every_channel_stands_at_its_place_and_carries_a_topic() {
         assert!(Channel::all().map(Channel::place).eq(0..Channel::COUNT));
         let found: Vec<_> = Topic::ALL.into_iter().flat_map(Channel::for_topic).collect();
-        assert!(Channel::all().all(|channel| found.contains(&channel)));
+        assert!(Channel::all().all(|channel| found.contains(&channel) != (channel == Channel::Frames)));
     }
 
     #[test]
     fn signals_are_fields_of_their_message_and_without_any_there_is_no_channel() {
         let is_named = |channel: Channel| channel == Channel::Topic(Topic::Signals);
         let none = definitions(&Declared::default());
-        assert!(!none.iter().any(|(channel, _)| is_named(*channel)) && none.len() == Channel::COUNT - 2);
+        assert!(!none.iter().any(|(channel, _)| is_named(*channel)) && none.len() == Channel::COUNT - 3);
         let signal = |name: &str, unit: &str| Signal {
             name: name.into(),
             unit: unit.into(),
@@ -202,10 +220,12 @@ mod tests {
         let definitions = definitions(&declared);
         let (_, channel) = definitions.iter().find(|(channel, _)| is_named(*channel)).unwrap();
         let definition = str::from_utf8(&channel.schema.as_ref().unwrap().data).unwrap();
+        let before =
+            Signals::definition().lines().take(5).map(|line| line.to_owned() + "\n").collect::<String>();
+        assert!(before.ends_with("uint64 cycle  # Cycle of the controller, from 1.\n"), "{before}");
         assert_eq!(
             definition,
-            "uint64 seq\nuint64 published_ns\nuint64 version\nuint64 cycle\nuint32 length\n\
-             float64 grip  # N What it is.\nfloat64 count  # What it is.\n"
+            format!("{before}uint32 length\nfloat64 grip  # [N] What it is.\nfloat64 count  # What it is.\n")
         );
     }
 }

@@ -8,13 +8,14 @@ use std::path::Path;
 use std::sync::Arc;
 use std::vec;
 
-use masseter_shared::messages::LAYOUT_VERSION;
+use masseter_shared::messages::{FrameTap, LAYOUT_VERSION};
 use mcap::Attachment;
 use mcap::records::{AttachmentHeader, MessageHeader, Record, op};
 
 use super::chunk;
 use super::definitions::Definitions;
 use super::encoding::CDR_LITTLE_ENDIAN;
+use super::frames::{self, FrameBatch};
 use super::manifest::{AT_START, Manifest};
 use super::topic::{Recorded, Stamps, Topic};
 use super::walk::{Damage, Step, Walk};
@@ -94,6 +95,8 @@ pub struct Reader<R = BufReader<File>> {
     walk: Walk<R>,
     /// The rest of the current chunk.
     unpacked: vec::IntoIter<Record<'static>>,
+    /// The rest of the frames of the current message.
+    frames: vec::IntoIter<FrameTap>,
     definitions: Definitions,
     attachments: Vec<Attachment<'static>>,
     chunks: Chunks,
@@ -116,6 +119,7 @@ impl<R: Read + Seek> Reader<R> {
         Ok(Self {
             walk: Walk::new(source)?,
             unpacked: Vec::new().into_iter(),
+            frames: Vec::new().into_iter(),
             definitions: Definitions::default(),
             attachments: Vec::new(),
             chunks: Chunks::default(),
@@ -163,12 +167,18 @@ impl<R: Read + Seek> Reader<R> {
 
     /// The next message of the rig's topics, or none at the end. Other topics are skipped.
     pub fn next_message(&mut self) -> Result<Option<Recorded>, ReadError> {
-        while let Some(entry) = self.next_entry()? {
+        loop {
+            if let Some(frame) = self.frames.next() {
+                return Ok(Some(Recorded::Frame(frame)));
+            }
+            let Some(entry) = self.next_entry()? else { return Ok(None) };
             if let Some(message) = entry.recorded() {
                 return message.map(Some);
             }
+            if let Some(frames) = entry.frames() {
+                self.frames = frames?.into_iter();
+            }
         }
-        Ok(None)
     }
 
     /// The next message of any topic, or none at the end.
@@ -274,11 +284,24 @@ impl<R: Read + Seek> Reader<R> {
 }
 
 impl Entry {
-    /// The message, or why this program cannot read it; none on topics that are not the rig's.
+    /// The message, or why this program cannot read it; none on topics that are not the rig's, and for [frames](Self::frames).
     pub fn recorded(&self) -> Option<Result<Recorded, ReadError>> {
         let topic = Topic::named(&self.channel.as_ref()?.topic)?;
         Some(read(topic, &self.data))
     }
+
+    /// The CAN frames, or why this program cannot read them; none where it holds something else.
+    pub fn frames(&self) -> Option<Result<Vec<FrameTap>, ReadError>> {
+        (self.channel.as_ref()?.topic == FrameBatch::TOPIC).then(|| read_frames(&self.data))
+    }
+}
+
+/// The frames of a message, if they have this version's layout.
+fn read_frames(data: &[u8]) -> Result<Vec<FrameTap>, ReadError> {
+    let body = data.strip_prefix(&CDR_LITTLE_ENDIAN);
+    let version = body.and_then(Stamps::read).map_or(0, |stamps| stamps.version);
+    let frames = body.filter(|_| version == LAYOUT_VERSION).and_then(frames::frames);
+    frames.ok_or_else(|| ReadError::Foreign { topic: FrameBatch::TOPIC, found: data.len(), version })
 }
 
 /// The message of a topic behind the CDR header, if it has this version's layout.

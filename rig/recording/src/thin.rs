@@ -51,6 +51,10 @@ pub fn is_kept(message: &Recorded) -> bool {
 pub fn thin<R: Read + Seek, W: Write + Seek>(reader: &mut Reader<R>, medium: W) -> Result<u64, ThinError> {
     let (mut digester, mut kept) = (Digester::default(), Vec::new());
     while let Some(entry) = reader.next_entry()? {
+        // Of frames only the digest is kept.
+        for frame in entry.frames().transpose()?.into_iter().flatten() {
+            digester.take(&Recorded::Frame(frame));
+        }
         let Some(message) = entry.recorded().transpose()? else { continue };
         digester.take(&message);
         kept.extend(is_kept(&message).then_some(entry));

@@ -34,7 +34,7 @@ macro_rules! topics {
             /// Name and definition of the message type, as ROS 2 has them.
             pub(super) fn definition(self) -> (String, String) {
                 match self {
-                    $(Self::$name => (<$message>::TYPE_NAME.replacen('/', "/msg/", 1), <$message>::schema())),*
+                    $(Self::$name => (<$message>::TYPE_NAME.replacen('/', "/msg/", 1), <$message>::definition())),*
                 }
             }
         }

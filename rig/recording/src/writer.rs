@@ -16,8 +16,9 @@ use masseter_shared::named::Declared;
 use mcap::records::MessageHeader;
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 
-use super::encoding::{Channel, Encoded, Encoder, definitions};
+use super::encoding::{Channel, Encoded, Encoder, recorded_definitions};
 use super::folder::RunFolder;
+use super::frames::FrameBatch;
 use super::manifest::{AT_START, Manifest};
 use super::scene::Scene;
 use super::topic::Recorded;
@@ -117,6 +118,7 @@ pub(super) fn add_schema<W: Write + Seek>(
 pub struct Recorder<W: Medium = DurableFile> {
     channels: Channels<W>,
     encoder: Encoder,
+    frames: FrameBatch,
 }
 
 /// The file with the numbers of its channels, by their places.
@@ -168,7 +170,7 @@ impl<W: Medium> Recorder<W> {
     /// read.
     pub fn new(medium: W, scene: Scene) -> Result<Self, WriteError> {
         let channels = Channels { writer: options().create(medium)?, ids: [None; Channel::COUNT] };
-        let mut recorder = Self { channels, encoder: Encoder::new(scene) };
+        let mut recorder = Self { channels, encoder: Encoder::new(scene), frames: FrameBatch::default() };
         recorder.declare(&Declared::default())?;
         Ok(recorder)
     }
@@ -176,7 +178,7 @@ impl<W: Medium> Recorder<W> {
     /// Adds the channels of the signals and parameters that a controller declares; before, their messages are left out.
     pub fn declare(&mut self, declared: &Declared) -> Result<(), WriteError> {
         let Channels { writer, ids } = &mut self.channels;
-        for (channel, definition) in definitions(declared) {
+        for (channel, definition) in recorded_definitions(declared) {
             let id = &mut ids[channel.place()];
             if id.is_none() {
                 let schema = add_schema(writer, &definition)?;
@@ -202,17 +204,40 @@ impl<W: Medium> Recorder<W> {
 
     /// Appends a message that was received at `log_time_ns`, and its view in 3-D.
     pub fn record(&mut self, message: &Recorded, log_time_ns: u64) -> Result<(), WriteError> {
-        let Self { channels, encoder } = self;
+        if let Recorded::Frame(frame) = message {
+            if !self.frames.takes(frame) {
+                self.end_frames()?;
+            }
+            self.frames.push(frame, log_time_ns);
+            return Ok(());
+        }
+        self.end_frames()?;
+        let Self { channels, encoder, .. } = self;
         encoder.encode(message, |message| channels.write(&message, log_time_ns))
+    }
+
+    /// Writes the frames gathered so far, so that messages stay in their order.
+    fn end_frames(&mut self) -> Result<(), WriteError> {
+        let log_time_ns = self.frames.log_time_ns;
+        let Some((first, bytes)) = self.frames.end() else { return Ok(()) };
+        let message = Encoded {
+            channel: Channel::Frames,
+            sequence: first.seq as u32,
+            publish_time_ns: first.published_ns,
+            bytes,
+        };
+        self.channels.write(&message, log_time_ns)
     }
 
     /// Ends the chunk and hands everything recorded so far to the medium.
     pub fn flush(&mut self) -> Result<(), WriteError> {
+        self.end_frames()?;
         Ok(self.channels.writer.flush()?)
     }
 
     /// Ends the file with its index, and waits until it is safe.
     pub fn finish(mut self) -> Result<(), WriteError> {
+        self.end_frames()?;
         self.channels.writer.finish()?;
         Ok(self.channels.writer.into_inner().close().map_err(McapError::from)?)
     }

@@ -12,6 +12,8 @@ pub const OF_OPERATOR: u32 = 1;
 
 /// [`Reading::drive_state`](super::Reading::drive_state) of a drive not heard of yet, or lost.
 pub const NO_DRIVE_STATE: u32 = 0;
+/// Its name.
+const NO_STATE_NAME: &str = "unknown";
 
 codes! {
     /// State of the controller's sequence.
@@ -215,6 +217,25 @@ codes! {
     }
 }
 
+/// The numbers and names of an enumeration that messages carry, by the name of its type; empty for other types.
+pub(super) fn of_enumeration(name: &str) -> Vec<(u32, &'static str)> {
+    macro_rules! among {
+        ($($enumeration:ident),*) => {
+            match name {
+                $(stringify!($enumeration) => {
+                    $enumeration::ALL.map(|value| (u32::from(value.code()), value.name())).to_vec()
+                })*
+                _ => Vec::new(),
+            }
+        };
+    }
+    let mut codes = among!(DriveRequest, DriveState, ControllerState, Source, EventKind, Cause, NoPose);
+    if name == "DriveState" {
+        codes.insert(0, (NO_DRIVE_STATE, NO_STATE_NAME));
+    }
+    codes
+}
+
 /// What a message carries for the state of a drive; [`NO_DRIVE_STATE`] for none.
 pub fn drive_state_code(state: Option<DriveState>) -> u32 {
     state.map_or(NO_DRIVE_STATE, DriveState::code)
@@ -233,7 +254,7 @@ pub fn drive_state(code: u32) -> Result<Option<DriveState>, UnknownCode> {
 /// # Errors
 /// A code that no state has.
 pub fn drive_state_name(code: u32) -> Result<&'static str, UnknownCode> {
-    Ok(drive_state(code)?.map_or("unknown", DriveState::name))
+    Ok(drive_state(code)?.map_or(NO_STATE_NAME, DriveState::name))
 }
 
 #[cfg(test)]

@@ -29,6 +29,11 @@ impl CanData {
         Self { length: data.len() as u32, bytes }
     }
 
+    /// The data of a frame; none with more bytes than there is room for.
+    pub fn checked(data: &[u8]) -> Option<Self> {
+        (data.len() <= MOST).then(|| Self::new(data))
+    }
+
     /// The bytes in use.
     pub fn as_slice(&self) -> &[u8] {
         &self.bytes[..MOST - self.unused_bytes()]

@@ -4,7 +4,7 @@
 //! layout. All times are nanoseconds of `CLOCK_MONOTONIC`, 0 where nothing happened yet. Fields lie
 //! on their natural alignment without padding, so that the bytes in shared memory are also a valid
 //! CDR body, except for unused bytes at the end of a field of variable length. The recording writes [`Message::body`]
-//! unchanged, with the schema that [`Message::schema`] derives from the same table.
+//! unchanged, with the definition that [`Message::definition`] derives from the same table.
 //!
 //! The codes of enumerations are in [`codes`]. The transport is in [`transport`](crate::transport).
 
@@ -25,7 +25,7 @@ use codes::{Cause, EventKind, NO_AXIS, OF_OPERATOR, Source};
 use schema::FieldType;
 
 pub use data::CanData;
-pub use schema::Field;
+pub use schema::{Field, plain};
 pub use values::{MOST_VALUES, Values};
 pub use words::explain;
 
@@ -46,9 +46,13 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
     fn about() -> &'static str;
     /// The fields in order.
     fn fields() -> Vec<Field>;
-    /// The layout in the ROS 2 message definition language, as recordings carry it.
+    /// The layout in the ROS 2 message definition language.
     fn schema() -> String {
         schema::definition(&Self::fields())
+    }
+    /// The same with comments: meaning, units and the names of codes. Recordings carry it.
+    fn definition() -> String {
+        schema::commented(Self::about(), &Self::fields())
     }
     /// The CDR body: all bytes except the unused ones at the end.
     fn body(&self) -> &[u8];

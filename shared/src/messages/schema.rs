@@ -1,5 +1,7 @@
 //! The fields of a message, and their ROS 2 message definition, from the table of the layouts.
 
+use super::codes;
+
 /// A type that a message field may have.
 pub(super) trait FieldType {
     fn ros_type() -> String;
@@ -28,6 +30,10 @@ impl<T: FieldType, const N: usize> FieldType for [T; N] {
     }
 }
 
+/// The endings of names that tell a unit; of two that fit, the first counts.
+const UNITS: [(&str, &str); 6] =
+    [("_m_s", "m/s"), ("_ns", "ns"), ("_m", "m"), ("_s", "s"), ("_n", "N"), ("_rad", "rad")];
+
 /// A field of a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Field {
@@ -45,6 +51,44 @@ impl Field {
     pub(super) fn new<T: FieldType>(name: &'static str, offset: usize, about: &'static str) -> Self {
         Self { name, ros_type: T::ros_type(), offset, about }
     }
+
+    /// The unit of its values; empty where they have none.
+    pub fn unit(&self) -> &'static str {
+        UNITS.iter().find(|(ending, _)| self.name.ends_with(ending)).map_or("", |(_, unit)| unit)
+    }
+
+    /// What it is, without the links of Rust's documentation.
+    pub fn meaning(&self) -> String {
+        plain(self.about)
+    }
+
+    /// The numbers and names of its values, where it is an enumeration.
+    pub fn codes(&self) -> Vec<(u32, &'static str)> {
+        let Some((before, behind)) = self.about.split_once("[`codes::") else { return Vec::new() };
+        let is_all_it_holds = [", a ", ", an ", ", "].iter().any(|words| before.ends_with(words));
+        let name = behind.split('`').next().filter(|_| is_all_it_holds);
+        name.map(codes::of_enumeration).unwrap_or_default()
+    }
+
+    /// Its line in a definition with comments: unit, meaning, and the names of its values.
+    fn line(&self) -> String {
+        let mut comment = String::new();
+        if !self.unit().is_empty() {
+            comment += &format!("[{}] ", self.unit());
+        }
+        comment += &self.meaning();
+        for (place, (code, name)) in self.codes().into_iter().enumerate() {
+            comment += &format!("{} {code} = {name}", if place == 0 { "" } else { "," });
+        }
+        format!("{} {}  # {comment}\n", self.ros_type, self.name)
+    }
+}
+
+/// A comment without the links of Rust's documentation.
+pub fn plain(about: &str) -> String {
+    let text = about.replace("codes::", "").replace("super::", "");
+    let text = text.replace("[`", "").replace("`]", "").replace('`', "");
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// One `type name` line a field.
@@ -52,9 +96,16 @@ pub(super) fn definition(fields: &[Field]) -> String {
     fields.iter().fold(String::new(), |text, field| text + &field.ros_type + " " + field.name + "\n")
 }
 
+/// The same with comments, below one that says what the message is.
+pub(super) fn commented(about: &str, fields: &[Field]) -> String {
+    let lines = fields.iter().map(Field::line);
+    lines.fold(format!("# {}\n", plain(about)), |text, line| text + &line)
+}
+
 #[cfg(test)]
 mod tests {
-    use crate::messages::{CanData, Command, FrameTap, Message};
+    use super::Field;
+    use crate::messages::{CanData, Command, Event, FrameTap, Message, Reading, State};
 
     #[test]
     fn the_schema_lists_every_field_in_order() {
@@ -64,6 +115,47 @@ mod tests {
              uint32 id\nuint32 bus\nuint32 flags\nuint8[<=64] data\n"
         );
         assert!(Command::schema().contains("float64[6] target_m\n"));
+    }
+
+    #[test]
+    fn the_comments_of_a_definition_tell_units_meanings_and_codes_and_change_no_field() {
+        let commented = State::definition();
+        assert!(commented.starts_with("# The controller's state and its estimate, once a cycle.\n"));
+        for line in [
+            "float64[3] leg_angle_rad  # [rad] θ₁ θ₂ θ₃, rad.\n",
+            "uint32 iterations  # Iterations of the forward kinematics.\n",
+            "uint32 controller_state  # State of the controller, a ControllerState. 0 = wait_readings, 1 = enabling,",
+        ] {
+            assert!(commented.contains(line), "{line}: {commented}");
+        }
+        let bare = commented.lines().filter_map(|line| line.split("  # ").next());
+        let bare = bare.filter(|line| !line.starts_with('#')).map(|line| line.to_owned() + "\n");
+        assert_eq!(bare.collect::<String>(), State::schema());
+    }
+
+    #[test]
+    fn only_a_field_that_holds_nothing_else_has_the_names_of_codes() {
+        let with_codes = |fields: Vec<Field>| -> Vec<_> {
+            fields.iter().filter(|field| !field.codes().is_empty()).map(|field| field.name).collect()
+        };
+        assert_eq!(with_codes(Event::fields()), ["source", "kind", "cause"]);
+        assert_eq!(with_codes(Reading::fields()), ["drive_state"]);
+        assert_eq!(with_codes(Command::fields()), ["request", "controller_state"]);
+    }
+
+    #[test]
+    fn a_unit_in_the_name_of_a_field_is_that_of_its_meaning() {
+        fn check<M: Message>() {
+            for field in M::fields().iter().filter(|field| !field.unit().is_empty()) {
+                let meaning = field.meaning();
+                let words = meaning.split([' ', '.', ',', ';', ':']).collect::<Vec<_>>();
+                assert!(words.contains(&field.unit()), "{} [{}]: {meaning}", field.name, field.unit());
+            }
+        }
+        check::<Command>();
+        check::<State>();
+        check::<FrameTap>();
+        check::<Event>();
     }
 
     #[test]
