@@ -19,6 +19,7 @@ use crate::controller::{self, ControllerArgs};
 use crate::diff::{self, DiffArgs};
 use crate::doctor::{self, DoctorArgs};
 use crate::error_text::in_one_line;
+use crate::export::{self, ExportArgs};
 use crate::faults::{self, FaultsVerb};
 use crate::help::with_overview;
 use crate::init::{self, InitArgs};
@@ -124,7 +125,9 @@ enum Verb {
     Diff(DiffArgs),
     /// Check whether this machine is fit for real-time runs
     Doctor(DoctorArgs),
-    /// Inspect, verify, recover and export recordings
+    /// Write a recording as tables: Parquet or CSV, with a codebook
+    Export(ExportArgs),
+    /// Inspect, verify, recover and thin recordings
     #[command(subcommand, alias = "log", after_help = "Example:\n  masseter recording info runs/latest")]
     Recording(RecordingVerb),
     /// Plan the buses, describe the drives (EDS, DBC), serve simulated buses
@@ -218,6 +221,7 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Uniqueness(verb) => uniqueness::uniqueness(&verb).usage(),
         Verb::Kinematics(args) => paper_study::study(&args).usage(),
         Verb::Doctor(args) => doctor::examine(&args).usage(),
+        Verb::Export(args) => export::export(&args).usage(),
         Verb::Recording(verb) => recording_cli::execute(&verb).usage(),
         Verb::Clean => clean::clean().usage(),
         Verb::Completions(args) => manuals::completions(&args, command()).usage(),

@@ -8,7 +8,7 @@ use clap::Command;
 const GROUPS: [(&str, &[&str]); 8] = [
     ("Play a motion and judge it", &["init", "run", "test", "signals", "faults"]),
     ("Play a scenario in many variants", &["campaign", "search", "shrink"]),
-    ("Work with past runs", &["report", "replay", "diff", "recording"]),
+    ("Work with past runs", &["report", "export", "replay", "diff", "recording"]),
     ("Bring your own controller", &["new", "interface", "controller", "param"]),
     ("Prepare this machine", &["doctor", "bench", "clean"]),
     ("Work with CAN and the drives", &["robot", "can", "plant"]),

@@ -18,6 +18,7 @@ mod controller;
 mod diff;
 mod doctor;
 mod error_text;
+mod export;
 mod faults;
 mod force_study;
 mod guarded;

@@ -19,11 +19,11 @@ fn a_duration_without_a_unit_is_in_seconds() {
 }
 
 #[test]
-fn the_similar_topic_is_suggested() {
+fn the_similar_table_is_suggested() {
     let workspace = Workspace::new("duration_s = 0.5");
     assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     let (run, out) = (workspace.run_folder(), workspace.file("tables"));
-    let arguments = ["recording", "export", run.to_str().unwrap(), "--topic", "States", "--out"];
+    let arguments = ["export", run.to_str().unwrap(), "--table", "States", "--out"];
     let output = masseter(&[&arguments[..], &[out.to_str().unwrap()]].concat());
     assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
     assert!(stderr(&output).contains("did you mean 'state'?"), "{}", stderr(&output));

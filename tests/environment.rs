@@ -329,8 +329,9 @@ fn a_full_disk_is_exit_6_of_every_verb_that_writes_files() {
     assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     let run = workspace.run_folder();
     let run = run.to_str().unwrap();
-    let verbs: [&[&str]; 4] = [
-        &["recording", "export", run, "--out"],
+    let verbs: [&[&str]; 5] = [
+        &["export", run, "--out"],
+        &["export", run, "--format", "csv", "--out"],
         &["recording", "recover", run, "--out"],
         &["uniqueness", "search", "--inputs", "10", "--out"],
         &["kinematics", "--samples", "10", "--cells", "2", "--out"],

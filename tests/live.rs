@@ -9,7 +9,7 @@ use std::process::{Child, ChildStderr, ExitStatus, Stdio};
 use std::thread;
 
 use common::{Cores, LENIENT, Workspace, assert_played, has_event, masseter, stderr, stdout};
-use masseter_recording::Reader;
+use masseter_recording::{CDR_LITTLE_ENDIAN, Reader, Recorded, Topic};
 use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::http::HeaderValue;
@@ -111,8 +111,13 @@ fn recorded(workspace: &Workspace) -> BTreeMap<String, HashSet<Vec<u8>>> {
     let mut reader = Reader::open(&workspace.run_folder().join("recording.mcap")).unwrap();
     let mut recorded: BTreeMap<String, HashSet<Vec<u8>>> = BTreeMap::new();
     while let Some(entry) = reader.next_entry().unwrap() {
+        // Live, each frame is a message of its own.
+        for frame in entry.frames().into_iter().flat_map(Result::unwrap) {
+            let bytes = [&CDR_LITTLE_ENDIAN, Recorded::Frame(frame).body()].concat();
+            recorded.entry(Topic::Frame.name().to_owned()).or_default().insert(bytes);
+        }
         let topic = entry.channel.unwrap().topic.clone();
-        recorded.entry(topic).or_default().insert(entry.data.clone());
+        recorded.entry(topic).or_default().insert(entry.data);
     }
     recorded
 }

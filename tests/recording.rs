@@ -138,67 +138,6 @@ fn a_cut_recording_is_recovered_beside_the_old_one_and_nothing_is_overwritten() 
     assert!(!workspace.file("foreign.recovered.mcap").exists());
 }
 
-#[test]
-fn a_recording_becomes_tables_and_candump_logs() {
-    let workspace = virtual_run();
-    let out = workspace.file("tables");
-    let export = || log("export", &workspace.run_folder(), &["--out", out.to_str().unwrap()]);
-    assert_eq!(export().status.code(), Some(0), "{}", stderr(&export()));
-    assert_eq!(export().status.code(), Some(2), "an existing folder was written to");
-
-    let mut table = csv::Reader::from_path(out.join("reading.csv")).unwrap();
-    let header = table.headers().unwrap().clone();
-    let column = |name: &str| header.iter().position(|header| header == name).unwrap();
-    let (cycle, length) = (column("cycle"), column("position_m_3"));
-    let lines: Vec<_> = table.records().map(Result::unwrap).collect();
-    let readings =
-        messages(&workspace.run_folder().join("recording.mcap")).into_iter().filter_map(|message| {
-            let Recorded::Reading(reading) = message else { return None };
-            Some(reading)
-        });
-    let readings: Vec<_> = readings.collect();
-    assert_eq!(lines.len(), readings.len());
-    for (line, reading) in lines.iter().zip(&readings) {
-        assert_eq!(line[cycle].parse(), Ok(reading.cycle));
-        assert_eq!(line[length].parse(), Ok(reading.position_m[3]));
-    }
-    let frames = fs::read_to_string(out.join("can0.log")).unwrap();
-    assert!(frames.lines().count() > 1000);
-    assert_eq!(frames, fs::read_to_string(workspace.run_folder().join("can0.log")).unwrap());
-}
-
-#[test]
-fn a_topic_that_the_recording_does_not_have_is_refused_with_those_it_has() {
-    let workspace = virtual_run();
-    let out = workspace.file("tables");
-    let output =
-        log("export", &workspace.run_folder(), &["--topic", "raeding", "--out", out.to_str().unwrap()]);
-    assert_eq!(output.status.code(), Some(2));
-    let said = stderr(&output);
-    assert!(said.contains("no topic 'raeding'") && said.contains(", reading, "), "{said}");
-    assert!(!out.exists());
-}
-
-#[test]
-fn topics_without_a_table_are_listed_and_refused_on_request() {
-    let workspace = virtual_run();
-    let out = workspace.file("tables");
-    let export = |more: &[&str]| {
-        log("export", &workspace.run_folder(), &[&["--out", out.to_str().unwrap()], more].concat())
-    };
-    let refused = export(&["--topic", "reading", "--topic", "/tf"]);
-    assert_eq!(refused.status.code(), Some(2));
-    let said = stderr(&refused);
-    assert!(said.contains("'/tf' cannot become a table: its messages hold more than numbers"), "{said}");
-    assert!(!out.exists());
-
-    let said = stdout(&export(&[]));
-    assert!(said.contains("no table  /tf: its messages hold more than numbers"), "{said}");
-    assert!(said.contains("no table  /scene: "), "{said}");
-    let silent = fs::read_to_string(out.join("machine.csv")).unwrap();
-    assert_eq!(silent.lines().count(), 1, "a topic without messages has its header");
-}
-
 /// A run of real time also attaches when and where it was made.
 #[test]
 fn a_recording_explains_itself() {
@@ -238,13 +177,13 @@ fn the_attached_scenario_and_motion_give_the_same_run_again() {
     // Nothing else is left of the run.
     fs::remove_dir_all(workspace.run_folder()).unwrap();
     fs::remove_file(workspace.file("jaw.csv")).unwrap();
-    let export = || log("export", &lone, &["--attached", "--out", out.to_str().unwrap()]);
-    let output = export();
+    let extract = || log("extract", &lone, &["--out", out.to_str().unwrap()]);
+    let output = extract();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     for name in ["scenario.toml", "motion.csv", "circumstances.json"] {
         assert!(stdout(&output).contains(out.join(name).to_str().unwrap()), "{}", stdout(&output));
     }
-    assert_eq!(export().status.code(), Some(2), "an existing folder was written to");
+    assert_eq!(extract().status.code(), Some(2), "an existing folder was written to");
 
     let [scenario, run] = [out.join("scenario.toml"), again.clone()].map(|path| path.display().to_string());
     let output = masseter(&["run", &scenario, "--clock", "virtual", "--out", &run]);

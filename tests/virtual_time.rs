@@ -150,7 +150,7 @@ fn the_desired_pose_at_a_time_is_the_recordings_sample_of_that_time() {
     assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     let (run, out) = (workspace.run_folder(), workspace.file("csv"));
     let [run, out] = [&run, &out].map(|path| path.to_str().unwrap());
-    common::masseter(&["recording", "export", run, "--topic", "state", "--out", out]);
+    common::masseter(&["export", run, "--format", "csv", "--table", "state", "--out", out]);
 
     let table = fs::read_to_string(workspace.file("csv").join("state.csv")).unwrap();
     let (header, lines) = table.split_once('\n').unwrap();

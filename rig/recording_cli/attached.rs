@@ -13,7 +13,7 @@ pub(super) fn write<'a>(
     attachments: &'a [Attachment<'static>],
     folder: &Path,
 ) -> anyhow::Result<Vec<(&'a str, usize)>> {
-    ensure!(!attachments.is_empty(), "no file is attached to the recording: export its topics instead");
+    ensure!(!attachments.is_empty(), "no file is attached to the recording");
     for Attachment { name, .. } in attachments {
         let is_plain = Path::new(name).file_name() == Some(OsStr::new(name));
         ensure!(is_plain, "a file is attached as '{name}', which is not the plain name of a file");

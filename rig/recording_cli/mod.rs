@@ -1,13 +1,11 @@
-//! `masseter recording` (alias `log`): inspects, verifies, recovers and exports recordings.
+//! `masseter recording` (alias `log`): inspects, verifies and recovers recordings; `masseter export` makes tables of them.
 //!
-//! `info`, `verify` and `export` end with 0 if the recording is complete, 6 if messages or its end are missing, and 2 if it
+//! `info`, `verify` and `extract` end with 0 if the recording is complete, 6 if messages or its end are missing, and 2 if it
 //! holds bytes that Masseter did not write. `recover` ends with 0 once it has saved what is readable. No verb changes the
 //! recording it reads.
 
 mod attached;
-mod export;
-mod selection;
-mod survey;
+pub(crate) mod survey;
 
 use std::fmt;
 use std::fs::{self, File};
@@ -20,7 +18,6 @@ use masseter_recording::{Reader, Recovered, RunFolder, recover, thin};
 use masseter_shared::wording::counted;
 use masseter_terminal::{Exit, result, result_with_tones};
 
-use selection::Selection;
 use survey::Survey;
 
 /// Verbs of `recording`.
@@ -36,8 +33,8 @@ pub(crate) enum RecordingVerb {
     Recover(RecoverArgs),
     /// Keep few messages and the digests of all: a golden run, small enough for a repository
     Thin(ThinArgs),
-    /// Write one CSV file per topic, and the CAN frames as candump logs; or the attached files
-    Export(ExportArgs),
+    /// Write the attached files: the scenario, and the recorded motion that it plays
+    Extract(ExtractArgs),
 }
 
 /// The recording to read.
@@ -72,27 +69,20 @@ pub(crate) struct ThinArgs {
     out: PathBuf,
 }
 
-/// The arguments of `export`.
+/// The arguments of `extract`.
 #[derive(Debug, Clone, Args)]
-#[command(
-    after_help = "Examples:\n  masseter recording export runs/latest --topic state --out /tmp/tables\n  masseter recording export recording.mcap --attached --out /tmp/again"
-)]
-pub(crate) struct ExportArgs {
+#[command(after_help = "Example:\n  masseter recording extract recording.mcap --out /tmp/again")]
+pub(crate) struct ExtractArgs {
     #[command(flatten)]
     from: RecordingArgs,
     /// Folder for the files; must not exist
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Topic to export; may be repeated [default: all that fit a table]
-    #[arg(long = "topic", value_name = "TOPIC")]
-    topics: Vec<String>,
-    /// Write the attached files instead: the scenario, and the recorded motion that it plays
-    #[arg(long, conflicts_with = "topics")]
-    attached: bool,
 }
 
 impl RecordingArgs {
-    fn path(&self) -> anyhow::Result<PathBuf> {
+    /// The file.
+    pub(crate) fn path(&self) -> anyhow::Result<PathBuf> {
         if self.recording.is_dir() {
             Ok(RunFolder::open(&self.recording)?.recording())
         } else {
@@ -108,7 +98,7 @@ pub(crate) fn execute(verb: &RecordingVerb) -> anyhow::Result<Exit> {
         RecordingVerb::Verify(args) => inspect(args, Survey::verification),
         RecordingVerb::Recover(args) => save_readable(args),
         RecordingVerb::Thin(args) => keep_few(args),
-        RecordingVerb::Export(args) => export(args),
+        RecordingVerb::Extract(args) => extract(args),
     }
 }
 
@@ -166,24 +156,12 @@ fn recovered_text(recovered: Recovered) -> String {
     }
 }
 
-fn export(args: &ExportArgs) -> anyhow::Result<Exit> {
+fn extract(args: &ExtractArgs) -> anyhow::Result<Exit> {
     let path = args.from.path()?;
     let mut reader = open(&path)?;
     let survey = survey(&path, &mut reader)?;
-    if args.attached {
-        for (name, bytes) in attached::write(reader.attachments(), &args.out)? {
-            result(&format!("{bytes:>10}  {}\n", args.out.join(name).display()))?;
-        }
-        result(&survey.loss()?)?;
-        return Ok(survey.exit());
-    }
-    let Selection { tables, skipped } = Selection::new(reader.channels(), &args.topics)?;
-    fs::create_dir(&args.out).with_context(|| format!("cannot create {}", args.out.display()))?;
-    for (name, rows) in export::write(&mut open(&path)?, &args.out, tables)? {
-        result(&format!("{rows:>10}  {}\n", args.out.join(name).display()))?;
-    }
-    for (topic, reason) in skipped {
-        result(&format!("{:>10}  {topic}: {reason}\n", "no table"))?;
+    for (name, bytes) in attached::write(reader.attachments(), &args.out)? {
+        result(&format!("{bytes:>10}  {}\n", args.out.join(name).display()))?;
     }
     result(&survey.loss()?)?;
     Ok(survey.exit())

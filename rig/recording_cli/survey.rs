@@ -6,6 +6,7 @@ use std::io::{Read, Seek};
 
 use masseter_analysis::{SequenceCheck, TopicFigures};
 use masseter_recording::{Chunks, Damage, Entry, ReadError, Reader, Recorded};
+use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::wording::counted;
 use masseter_terminal::{Exit, Tone};
 
@@ -23,7 +24,7 @@ struct ChannelFigures {
 
 /// Contents, gaps and damage of a recording.
 #[derive(Debug)]
-pub(super) struct Survey {
+pub(crate) struct Survey {
     size: u64,
     channels: Vec<(mcap::Channel<'static>, ChannelFigures)>,
     sequences: Vec<TopicFigures>,
@@ -33,14 +34,16 @@ pub(super) struct Survey {
     chunks: Chunks,
     damage: Vec<Damage>,
     was_cut_short: bool,
+    /// When the sample of the motion's first cycle was taken, ns; none without a motion.
+    motion_ns: Option<u64>,
 }
 
 impl Survey {
     /// Reads the recording to its end.
-    pub(super) fn read<R: Read + Seek>(reader: &mut Reader<R>) -> Result<Self, ReadError> {
+    pub(crate) fn read<R: Read + Seek>(reader: &mut Reader<R>) -> Result<Self, ReadError> {
         let mut channels: BTreeMap<u16, ChannelFigures> = BTreeMap::new();
         let mut sequence = SequenceCheck::default();
-        let mut undefined = 0;
+        let (mut undefined, mut motion_ns) = (0, None);
         while let Some(entry) = reader.next_entry()? {
             let Some(channel) = &entry.channel else {
                 undefined += 1;
@@ -49,6 +52,15 @@ impl Survey {
             channels.entry(channel.id).or_default().add(&entry);
             if let Some(Ok(message)) = entry.recorded() {
                 sequence.take(&message);
+                if let Recorded::State(state) = message
+                    && state.controller_state == ControllerState::Running.code()
+                {
+                    motion_ns.get_or_insert(if state.sampled_ns > 0 {
+                        state.sampled_ns
+                    } else {
+                        state.due_ns
+                    });
+                }
             }
             for frame in entry.frames().into_iter().flatten().flatten() {
                 sequence.take(&Recorded::Frame(frame));
@@ -72,7 +84,18 @@ impl Survey {
             chunks: reader.chunks().clone(),
             damage: reader.damage().to_vec(),
             was_cut_short: reader.was_cut_short(),
+            motion_ns,
         })
+    }
+
+    /// When the sample of the motion's first cycle was taken, ns; none without a motion.
+    pub(crate) fn motion_ns(&self) -> Option<u64> {
+        self.motion_ns
+    }
+
+    /// The rig's topics with messages that this program can read.
+    pub(crate) fn topics(&self) -> impl Iterator<Item = &'static str> {
+        self.sequences.iter().filter(|topic| topic.messages > 0).map(|topic| topic.topic)
     }
 
     fn unreadable(&self) -> u64 {
@@ -93,7 +116,7 @@ impl Survey {
     }
 
     /// The exit code of a verb that read this recording.
-    pub(super) fn exit(&self) -> Exit {
+    pub(crate) fn exit(&self) -> Exit {
         if self.unreadable() + self.undefined > 0 || !self.is_undamaged_to_its_end() {
             Exit::Usage
         } else if self.was_cut_short || self.missing() > 0 {
@@ -180,7 +203,7 @@ impl Survey {
     }
 
     /// What is missing or unreadable, and where; empty for a complete recording.
-    pub(super) fn loss(&self) -> Result<String, Error> {
+    pub(crate) fn loss(&self) -> Result<String, Error> {
         let mut text = String::new();
         for damage in &self.damage {
             writeln!(text, "unreadable: {damage}")?;

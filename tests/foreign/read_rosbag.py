@@ -16,7 +16,7 @@ from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
 # A run in simulated time has no messages about the machine, and one without teeth and food none about contact.
-TOPICS = {"command", "reading", "state", "truth", "frame", "event", "parameter", "/tf", "/scene"}
+TOPICS = {"command", "reading", "state", "truth", "frames", "event", "parameter", "/tf", "/scene"}
 
 folder = Path(sys.argv[1])
 summary = json.loads((folder / "summary.json").read_text())
@@ -27,14 +27,17 @@ with AnyReader([folder / "recording.mcap"]) as reader:
         topics[connection.topic].append(reader.deserialize(data, connection.msgtype))
 
 assert set(topics) == TOPICS, set(topics)
-for name in TOPICS - {"/tf", "/scene"}:
+frames = [frame for message in topics["frames"] for frame in message.frames]
+recorded = next(topic["messages"] for topic in summary["figures"]["topics"] if topic["topic"] == "frame")
+assert len(frames) == recorded, (len(frames), recorded)
+for name in TOPICS - {"/tf", "/scene", "frames"}:
     recorded = next(topic["messages"] for topic in summary["figures"]["topics"] if topic["topic"] == name)
     assert len(topics[name]) == recorded, (name, len(topics[name]), recorded)
 commands = {command.cycle: command for command in topics["command"]}
 truths = {truth.cycle: truth for truth in topics["truth"]}
 assert all(reading.fresh_axes in range(64) for reading in topics["reading"])
 assert all(commands[state.cycle].controller_state == state.controller_state for state in topics["state"])
-assert {len(frame.data) for frame in topics["frame"]} <= set(range(9))
+assert {len(frame.data) for frame in frames} <= set(range(9))
 sources = {event["source"] for event in summary["figures"]["events"]}
 assert len({event.source for event in topics["event"]}) == len(sources), sources
 by_time = {truth.sampled_ns: truth for truth in truths.values()}

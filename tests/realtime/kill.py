@@ -116,9 +116,10 @@ def lost_ms(masseter, run, hit_ns):
         raise Disturbed
     run_verb(masseter, "recover", recording, 0, "--out", recovered)
     run_verb(masseter, "verify", recovered, 0)
-    run_verb(masseter, "export", recovered, 0, "--topic", "reading", "--out", tables)
+    words = [masseter, "export", recovered, "--format", "csv", "--table", "reading", "--out", tables]
+    subprocess.run(words, check=True, capture_output=True)
     with (tables / "reading.csv").open() as table:
-        last_ns = max(int(line["log_time_ns"]) for line in csv.DictReader(table))
+        last_ns = max(int(line["published_ns"]) for line in csv.DictReader(table))
     return max(0.0, (hit_ns - last_ns) / 1e6)
 
 

@@ -3,6 +3,7 @@
 use std::fs::{self, File};
 
 use anyhow::Context;
+use masseter_table::{Format, write_table};
 
 use crate::folder::CampaignFolder;
 use crate::page;
@@ -18,7 +19,7 @@ pub fn write(report: &Report<'_>, folder: &CampaignFolder, worst: &[WorstCase]) 
     let unfinished = path.with_extension("part");
     let unwritten = || format!("cannot write {}", path.display());
     let file = File::create(&unfinished).with_context(unwritten)?;
-    results_table(report.campaign, &report.results).write_parquet(file)?;
+    write_table(Format::Parquet, file, &results_table(report.campaign, &report.results))?;
     fs::rename(&unfinished, &path).with_context(unwritten)?;
     let html = page::html(report, worst).context("cannot make the page")?;
     let path = folder.file(PAGE);

@@ -6,7 +6,6 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use data_encoding::HEXUPPER;
 use masseter_shared::messages::{FrameTap, Message};
 use mcap::Channel;
 
@@ -72,6 +71,16 @@ pub enum Number {
 }
 
 impl Number {
+    /// The number as a whole one; a fraction is cut off.
+    pub fn to_i64(self) -> i64 {
+        match self {
+            Self::Unsigned(value) => value as i64,
+            Self::Signed(value) => value,
+            Self::Single(value) => value as i64,
+            Self::Double(value) => value as i64,
+        }
+    }
+
     /// The number as a float.
     pub fn to_f64(self) -> f64 {
         match self {
@@ -143,7 +152,7 @@ impl Field {
     }
 
     /// The names of its columns.
-    fn columns(&self) -> impl Iterator<Item = String> {
+    pub fn columns(&self) -> impl Iterator<Item = String> {
         let name =
             |element| if self.is_array() { format!("{}_{element}", self.name) } else { self.name.clone() };
         (0..self.elements.unwrap_or(1)).map(name)
@@ -220,11 +229,6 @@ impl Columns {
         self.tail.as_deref()
     }
 
-    /// The names of the columns.
-    pub fn names(&self) -> impl Iterator<Item = String> {
-        self.fields.iter().flat_map(Field::columns).chain(self.tail.clone())
-    }
-
     /// The fields and the byte sequence of a message; none if its length differs from the definition's.
     pub fn split<'a>(&self, body: &'a [u8]) -> Option<(&'a [u8], &'a [u8])> {
         let (fixed, tail) = body.split_at_checked(self.bytes)?;
@@ -234,30 +238,30 @@ impl Columns {
         };
         fits.then_some((fixed, tail))
     }
-
-    /// The values of a message; none if its length differs from the definition's.
-    pub fn values(&self, body: &[u8]) -> Option<impl Iterator<Item = String>> {
-        let (fixed, tail) = self.split(body)?;
-        let values =
-            self.fields.iter().flat_map(|field| field.numbers(fixed)).map(|number| number.to_string());
-        Some(values.chain(self.tail.iter().map(|_| HEXUPPER.encode(tail))))
-    }
 }
 
 #[cfg(test)]
 mod tests {
+    use data_encoding::HEXUPPER;
     use masseter_shared::messages::{CanData, FrameTap, Message, Reading};
 
     use super::*;
 
     fn line(columns: &Columns, body: &[u8]) -> Option<String> {
-        Some(columns.values(body)?.collect::<Vec<_>>().join(","))
+        let (fixed, tail) = columns.split(body)?;
+        let numbers = columns.fields().iter().flat_map(|field| field.numbers(fixed));
+        let tail = columns.tail().map(|_| HEXUPPER.encode(tail));
+        Some(numbers.map(|number| number.to_string()).chain(tail).collect::<Vec<_>>().join(","))
+    }
+
+    fn names(columns: &Columns) -> Vec<String> {
+        columns.fields().iter().flat_map(Field::columns).chain(columns.tail().map(str::to_owned)).collect()
     }
 
     #[test]
     fn a_message_of_the_rig_becomes_a_row() {
         let columns = Columns::from_definition(&FrameTap::schema()).unwrap();
-        let names = columns.names().collect::<Vec<_>>().join(",");
+        let names = names(&columns).join(",");
         assert_eq!(names, "seq,published_ns,version,time_ns,queued_ns,id,bus,flags,data");
         for length in 0..3 {
             let data = CanData::new(&[0xAA; 3][..length]);
@@ -280,7 +284,7 @@ mod tests {
         body.extend(300i16.to_le_bytes());
         body.extend([0; 4]);
         body.extend((-0.1f64).to_le_bytes());
-        assert_eq!(columns.names().collect::<Vec<_>>(), ["a", "b", "c_0", "c_1", "d"]);
+        assert_eq!(names(&columns), ["a", "b", "c_0", "c_1", "d"]);
         assert_eq!(line(&columns, &body).as_deref(), Some("-1,0.5,-2,300,-0.1"));
     }
 

@@ -114,7 +114,8 @@ fn named_definition(topic: Topic, definition: String, declared: &Declared) -> Op
     };
     let before = definition.lines().filter(|line| !line.contains("[<="));
     let before = before.fold(String::new(), |text, line| text + line + "\n");
-    (!fields.is_empty()).then(|| before + "uint32 length\n" + &fields.concat())
+    (!fields.is_empty())
+        .then(|| before + "uint32 length  # Number of values that follow.\n" + &fields.concat())
 }
 
 fn field(name: &str, unit: &str, about: &str) -> String {
@@ -225,7 +226,9 @@ mod tests {
         assert!(before.ends_with("uint64 cycle  # Cycle of the controller, from 1.\n"), "{before}");
         assert_eq!(
             definition,
-            format!("{before}uint32 length\nfloat64 grip  # [N] What it is.\nfloat64 count  # What it is.\n")
+            format!(
+                "{before}uint32 length  # Number of values that follow.\nfloat64 grip  # [N] What it is.\nfloat64 count  # What it is.\n"
+            )
         );
     }
 }

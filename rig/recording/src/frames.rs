@@ -8,13 +8,14 @@ use super::encoding::CDR_LITTLE_ENDIAN;
 
 /// Most frames of a message; a cycle of the rig has fewer.
 const MOST_FRAMES: u32 = 256;
-/// Bytes behind the CDR header up to the first frame, and where the number of frames stands among them.
-const HEAD: usize = 40;
-const COUNT_AT: usize = 32;
+/// Where the number of frames stands behind the CDR header: behind three stamps, and two times of the first frame.
+const COUNT_AT: usize = 40;
+/// Bytes up to the first frame.
+const HEAD: usize = COUNT_AT + 4;
 /// Bytes of a frame before its data: two differences of times, identifier, bus, flags, length of the data.
-const FRAME_HEAD: usize = 32;
+const FRAME_HEAD: usize = 24;
 /// The alignment of a frame.
-const ALIGNMENT: usize = 8;
+const ALIGNMENT: usize = 4;
 
 /// Frames that are gathered for a message.
 #[derive(Debug, Default)]
@@ -40,6 +41,16 @@ impl FrameBatch {
             || self.count < MOST_FRAMES
                 && frame.seq == first.seq + u64::from(self.count)
                 && (frame.published_ns, frame.version) == (first.published_ns, first.version)
+                && self
+                    .differences_ns(frame)
+                    .iter()
+                    .all(|difference_ns| i32::try_from(*difference_ns).is_ok())
+    }
+
+    /// The times of a frame since those of the first: on the wire, and in the queue.
+    fn differences_ns(&self, frame: &FrameTap) -> [i64; 2] {
+        let FrameTap { time_ns, queued_ns, .. } = self.first;
+        [frame.time_ns.wrapping_sub(time_ns), frame.queued_ns.wrapping_sub(queued_ns)].map(u64::cast_signed)
     }
 
     /// Adds a frame that it [takes](Self::takes).
@@ -48,17 +59,16 @@ impl FrameBatch {
             (self.first, self.log_time_ns) = (*frame, log_time_ns);
             self.bytes.clear();
             self.bytes.extend_from_slice(&CDR_LITTLE_ENDIAN);
-            for stamp in [frame.seq, frame.published_ns, frame.version, frame.time_ns, 0] {
-                self.bytes.extend_from_slice(&stamp.to_le_bytes());
+            for number in [frame.seq, frame.published_ns, frame.version, frame.time_ns, frame.queued_ns] {
+                self.bytes.extend_from_slice(&number.to_le_bytes());
             }
+            self.bytes.extend_from_slice(&[0; HEAD - COUNT_AT]);
         }
         self.count += 1;
         let body = self.bytes.len() - CDR_LITTLE_ENDIAN.len();
         self.bytes.resize(CDR_LITTLE_ENDIAN.len() + body.next_multiple_of(ALIGNMENT), 0);
-        let after_ns = frame.time_ns.wrapping_sub(self.first.time_ns);
-        let waited_ns = if frame.queued_ns == 0 { 0 } else { frame.time_ns.wrapping_sub(frame.queued_ns) };
-        for time in [after_ns, waited_ns] {
-            self.bytes.extend_from_slice(&time.to_le_bytes());
+        for difference_ns in self.differences_ns(frame) {
+            self.bytes.extend_from_slice(&(difference_ns as i32).to_le_bytes());
         }
         let data = frame.data.as_slice();
         for number in [frame.id, frame.bus, frame.flags, data.len() as u32] {
@@ -79,22 +89,24 @@ impl FrameBatch {
 /// The frames of a message's body; none where they do not fill it.
 pub(super) fn frames(body: &[u8]) -> Option<Vec<FrameTap>> {
     let (head, mut rest) = body.split_at_checked(HEAD)?;
-    let [seq, published_ns, version, first_ns]: [u64; 4] = bytemuck::pod_read_unaligned(&head[..COUNT_AT]);
-    let [count, unused]: [u32; 2] = bytemuck::pod_read_unaligned(&head[COUNT_AT..]);
+    let [seq, published_ns, version, first_ns, first_queued_ns]: [u64; 5] =
+        bytemuck::pod_read_unaligned(&head[..COUNT_AT]);
+    let count: u32 = bytemuck::pod_read_unaligned(&head[COUNT_AT..]);
     let mut frames = Vec::new();
     for number in 0..u64::from(count) {
         let (frame, behind) = rest.split_at_checked(FRAME_HEAD)?;
-        let [after_ns, waited_ns]: [u64; 2] = bytemuck::pod_read_unaligned(&frame[..16]);
-        let [id, bus, flags, length]: [u32; 4] = bytemuck::pod_read_unaligned(&frame[16..]);
+        let [after_ns, queued_after_ns]: [i32; 2] = bytemuck::pod_read_unaligned(&frame[..8]);
+        let [id, bus, flags, length]: [u32; 4] = bytemuck::pod_read_unaligned(&frame[8..]);
         let (data, behind) = behind.split_at_checked(length as usize)?;
-        let padding = length.next_multiple_of(ALIGNMENT as u32) - length;
-        rest = behind.get(padding as usize..).unwrap_or_default();
-        let time_ns = first_ns.wrapping_add(after_ns);
-        let queued_ns = if waited_ns == 0 { 0 } else { time_ns.wrapping_sub(waited_ns) };
-        let (seq, data) = (seq.checked_add(number)?, CanData::checked(data)?);
+        let data = CanData::checked(data)?;
+        // The last one is not padded.
+        rest = behind.get(data.as_slice().len().wrapping_neg() % ALIGNMENT..).unwrap_or_default();
+        let time_ns = first_ns.wrapping_add_signed(after_ns.into());
+        let queued_ns = first_queued_ns.wrapping_add_signed(queued_after_ns.into());
+        let seq = seq.checked_add(number)?;
         frames.push(FrameTap { seq, published_ns, version, time_ns, queued_ns, id, bus, flags, data });
     }
-    (unused == 0 && rest.is_empty()).then_some(frames)
+    rest.is_empty().then_some(frames)
 }
 
 #[cfg(test)]
@@ -126,6 +138,15 @@ mod tests {
     }
 
     #[test]
+    fn a_frame_seconds_away_begins_another_message() {
+        let mut batch = FrameBatch::default();
+        batch.push(&FrameTap { time_ns: 5_000_000_000, queued_ns: 4_999_000_000, ..frame(3, 10) }, 1);
+        let at = |time_ns, queued_ns| FrameTap { time_ns, queued_ns, ..frame(4, 10) };
+        assert!(batch.takes(&at(7_000_000_000, 3_000_000_000)));
+        assert!(!batch.takes(&at(8_000_000_000, 4_999_000_000)) && !batch.takes(&at(5_000_100_000, 0)));
+    }
+
+    #[test]
     fn a_body_that_is_cut_or_continued_holds_no_frames() {
         let mut batch = FrameBatch::default();
         for seq in 1..=2 {
@@ -140,15 +161,19 @@ mod tests {
     proptest! {
         #[test]
         fn frames_are_read_as_they_were_written(
+            first_ns: u64,
+            first_queued_ns: u64,
             seen in prop::collection::vec(
-                (any::<u64>(), 1..u64::MAX, any::<bool>(), any::<[u32; 3]>(), prop::collection::vec(any::<u8>(), 0..=64)),
+                (any::<[i32; 2]>(), any::<[u32; 3]>(), prop::collection::vec(any::<u8>(), 0..=64)),
                 1..20,
             ),
         ) {
-            let written: Vec<_> = (5..).zip(seen).map(|(seq, (time_ns, waited_ns, is_known, [id, bus, flags], data))| {
-                let queued_ns = if is_known { time_ns.wrapping_sub(waited_ns) } else { 0 };
+            let mut written = vec![FrameTap { time_ns: first_ns, queued_ns: first_queued_ns, ..frame(4, 9) }];
+            written.extend((5..).zip(seen).map(|(seq, ([after_ns, queued_after_ns], [id, bus, flags], data))| {
+                let time_ns = first_ns.wrapping_add_signed(after_ns.into());
+                let queued_ns = first_queued_ns.wrapping_add_signed(queued_after_ns.into());
                 FrameTap { time_ns, queued_ns, id, bus, flags, data: CanData::new(&data), ..frame(seq, 9) }
-            }).collect();
+            }));
             let mut batch = FrameBatch::default();
             for frame in &written {
                 prop_assert!(batch.takes(frame));

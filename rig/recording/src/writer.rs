@@ -27,7 +27,7 @@ use super::topic::Recorded;
 /// zstd's buffer wraps at this level, which costs more than smaller chunks do.
 const CHUNK_BYTES: u64 = 600 << 10;
 /// zstd's fastest level: its ratio on these messages is within a tenth of the default level's.
-const COMPRESSION_LEVEL: u32 = 1;
+const COMPRESSION_LEVEL: u32 = 3;
 /// The profile in the header of a recording: its messages have ROS 2's encoding and definitions.
 const PROFILE: &str = "ros2";
 /// The name of this program in the header of a recording.

@@ -55,7 +55,7 @@ impl fmt::Debug for NamedSignal {
 
 impl NamedSignal {
     /// The unit in which it is shown.
-    pub(crate) fn shown(&self) -> Unit {
+    pub fn shown(&self) -> Unit {
         self.shown
     }
 
@@ -65,7 +65,7 @@ impl NamedSignal {
     }
 
     /// The names of its values, where it is a state.
-    pub(crate) fn states(&self) -> Option<Vec<(&'static str, u32)>> {
+    pub fn states(&self) -> Option<Vec<(&'static str, u32)>> {
         self.states.map(|names| names())
     }
 }
@@ -411,6 +411,12 @@ impl Values {
         Self { registry: Arc::new(registry), chosen: Vec::new(), start: Start::default() }
     }
 
+    /// Every signal, at its place in the registry.
+    pub fn of_all(registry: Registry) -> Self {
+        let chosen = (0..registry.signals.len()).collect();
+        Self { registry, chosen, start: Start::default() }
+    }
+
     /// Chooses the signal of that name; returns its place among the chosen ones.
     ///
     /// # Errors
@@ -429,7 +435,7 @@ impl Values {
     }
 
     /// The values of the chosen signals in a cycle; NaN where the cycle does not have one.
-    pub(crate) fn take(&mut self, messages: &CycleMessages, values: &mut Vec<f64>) {
+    pub fn take(&mut self, messages: &CycleMessages, values: &mut Vec<f64>) {
         let running = ControllerState::Running.code();
         if self.start.pose.is_none() && messages.state.is_some_and(|state| state.controller_state == running)
         {
