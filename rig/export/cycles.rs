@@ -82,10 +82,11 @@ fn cell(signal: &NamedSignal, si: f64) -> Cell {
     }
 }
 
-/// The signal's name with its unit, as a name without other characters than those of identifiers.
+/// The signal's name with its unit, in the form of the fields of messages.
 fn column_name(signal: &NamedSignal) -> String {
     let name = signal.name.replace('.', "_");
     let unit =
         signal.unit.replace("1/", "per_").replace('/', "_").replace('%', "percent").replace('°', "deg");
+    let unit = unit.to_lowercase();
     if unit.is_empty() || name.ends_with(&format!("_{unit}")) { name } else { format!("{name}_{unit}") }
 }

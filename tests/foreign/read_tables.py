@@ -36,12 +36,16 @@ assert reading["time_s"].to_list() == times
 for name in sorted(names):
     rows = pl.read_parquet(folder / "parquet" / f"{name}.parquet")
     as_csv = pl.read_csv(folder / "csv" / f"{name}.csv", schema=rows.schema)
+    if name == "frame":
+        # CSV does not distinguish a frame without data from a missing value.
+        as_csv = as_csv.with_columns(pl.col("data").fill_null(""))
     assert rows.equals(as_csv), name
     counted = duckdb.sql(f"SELECT count(*) FROM '{folder}/parquet/{name}.parquet'").fetchall()[0][0]
     assert counted == len(rows) > 0, (name, counted)
 
 # Units and meanings of the file are those of the codebook.
-codebook = duckdb.sql(f"SELECT * FROM '{folder}/parquet/codebook.csv'").pl()
+codebook = pl.read_csv(folder / "parquet" / "codebook.csv")
+assert duckdb.sql(f"SELECT count(DISTINCT meaning) FROM '{folder}/csv/codebook.csv'").fetchall()[0][0] > 100
 for name in names:
     metadata = pl.read_parquet_metadata(folder / "parquet" / f"{name}.parquet")
     described = codebook.filter(pl.col("table") == name)

@@ -7,13 +7,12 @@ use cdr::{CdrLe, Infinite};
 
 use masseter_shared::named::Declared;
 
+use super::encapsulation::CDR_LITTLE_ENDIAN;
 use super::frames::FrameBatch;
 use super::ros::{MarkerArray, RosMessage, TfMessage};
 use super::scene::Scene;
 use super::topic::{Recorded, Stamps, Topic};
 
-/// Encapsulation header of plain little-endian CDR (version 1, OMG CDR).
-pub const CDR_LITTLE_ENDIAN: [u8; 4] = [0x00, 0x01, 0x00, 0x00];
 /// Encoding of all messages.
 const MESSAGE_ENCODING: &str = "cdr";
 /// Encoding of all schemas.

@@ -4,7 +4,7 @@
 
 use masseter_shared::messages::{CanData, FrameTap};
 
-use super::encoding::CDR_LITTLE_ENDIAN;
+use super::encapsulation::CDR_LITTLE_ENDIAN;
 
 /// Most frames of a message; a cycle of the rig has fewer.
 const MOST_FRAMES: u32 = 256;

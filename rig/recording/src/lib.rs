@@ -15,6 +15,7 @@ mod columns;
 mod definitions;
 mod description;
 mod digests;
+mod encapsulation;
 mod encoding;
 mod folder;
 mod frames;
@@ -36,7 +37,8 @@ pub use circumstances::{DmaLatency, Ending, Machine as MachineInfo, ProcessFault
 pub use columns::{Columns, Field, Number};
 pub use description::Description;
 pub use digests::{Digester, Digests};
-pub use encoding::{CDR_LITTLE_ENDIAN, Channel, Encoded, Encoder, SCHEMA_ENCODING, definitions};
+pub use encapsulation::CDR_LITTLE_ENDIAN;
+pub use encoding::{Channel, Encoded, Encoder, SCHEMA_ENCODING, definitions};
 pub use folder::{FolderError, RunFolder};
 pub use manifest::{FullSpeed, Manifest};
 pub use reader::{Chunks, Entry, ReadError, Reader};

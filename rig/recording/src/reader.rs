@@ -14,7 +14,7 @@ use mcap::records::{AttachmentHeader, MessageHeader, Record, op};
 
 use super::chunk;
 use super::definitions::Definitions;
-use super::encoding::CDR_LITTLE_ENDIAN;
+use super::encapsulation::CDR_LITTLE_ENDIAN;
 use super::frames::{self, FrameBatch};
 use super::manifest::{AT_START, Manifest};
 use super::topic::{Recorded, Stamps, Topic};

@@ -23,10 +23,10 @@ use super::manifest::{AT_START, Manifest};
 use super::scene::Scene;
 use super::topic::Recorded;
 
-/// Bytes of messages in a chunk: what is compressed together, and read together by a tool that seeks. Beyond 640 KiB
-/// zstd's buffer wraps at this level, which costs more than smaller chunks do.
+/// Bytes of messages in a chunk: what is compressed together, and read together by a tool that seeks. Larger chunks save less
+/// than a thousandth.
 const CHUNK_BYTES: u64 = 600 << 10;
-/// zstd's fastest level: its ratio on these messages is within a tenth of the default level's.
+/// zstd's default level: 3 % fewer bytes than the fastest one. The next level that saves as much takes twice the time.
 const COMPRESSION_LEVEL: u32 = 3;
 /// The profile in the header of a recording: its messages have ROS 2's encoding and definitions.
 const PROFILE: &str = "ros2";
