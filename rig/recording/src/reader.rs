@@ -301,7 +301,7 @@ fn read_frames(data: &[u8]) -> Result<Vec<FrameTap>, ReadError> {
     let body = data.strip_prefix(&CDR_LITTLE_ENDIAN);
     let version = body.and_then(Stamps::read).map_or(0, |stamps| stamps.version);
     let frames = body.filter(|_| version == LAYOUT_VERSION).and_then(frames::frames);
-    frames.ok_or_else(|| ReadError::Foreign { topic: FrameBatch::TOPIC, found: data.len(), version })
+    frames.ok_or(ReadError::Foreign { topic: FrameBatch::TOPIC, found: data.len(), version })
 }
 
 /// The message of a topic behind the CDR header, if it has this version's layout.

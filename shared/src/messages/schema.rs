@@ -72,15 +72,10 @@ impl Field {
 
     /// Its line in a definition with comments: unit, meaning, and the names of its values.
     fn line(&self) -> String {
-        let mut comment = String::new();
-        if !self.unit().is_empty() {
-            comment += &format!("[{}] ", self.unit());
-        }
-        comment += &self.meaning();
-        for (place, (code, name)) in self.codes().into_iter().enumerate() {
-            comment += &format!("{} {code} = {name}", if place == 0 { "" } else { "," });
-        }
-        format!("{} {}  # {comment}\n", self.ros_type, self.name)
+        let unit = if self.unit().is_empty() { String::new() } else { format!("[{}] ", self.unit()) };
+        let codes: Vec<_> = self.codes().iter().map(|(code, name)| format!("{code} = {name}")).collect();
+        let codes = if codes.is_empty() { String::new() } else { format!(" {}", codes.join(", ")) };
+        format!("{} {}  # {unit}{}{codes}\n", self.ros_type, self.name, self.meaning())
     }
 }
 

@@ -414,7 +414,7 @@ impl Values {
     /// Every signal, at its place in the registry.
     pub fn of_all(registry: Registry) -> Self {
         let chosen = (0..registry.signals.len()).collect();
-        Self { registry, chosen, start: Start::default() }
+        Self { chosen, ..Self::new(registry) }
     }
 
     /// Chooses the signal of that name; returns its place among the chosen ones.
