@@ -11,17 +11,15 @@ pub(super) fn declared<'a>(channels: impl Iterator<Item = &'a Channel<'static>>)
         let found = named(channel);
         match Topic::named(&channel.topic) {
             Some(Topic::Signals) => declared.signals.extend(found),
-            Some(Topic::Parameters) => {
-                declared.parameters.extend(found.map(|Signal { name, unit, about }| Parameter {
-                    unit,
-                    about,
-                    ..Parameter::new(&name, f64::NAN)
-                }))
-            }
+            Some(Topic::Parameters) => declared.parameters.extend(found.map(parameter)),
             _ => {}
         }
     }
     declared
+}
+
+fn parameter(Signal { name, unit, about }: Signal) -> Parameter {
+    Parameter { unit, about, ..Parameter::new(&name, f64::NAN) }
 }
 
 /// The named values of a message: its numbers with fractions, which no other field of it has.
