@@ -96,13 +96,13 @@
   links();
   timeBar();
   built.forEach(([, start]) => start());
-  // Paper shows everything, also what is folded.
+  // Paper shows also the blocks that are folded.
   addEventListener('beforeprint', () => {
-    document.querySelectorAll('section details').forEach((details) => { details.dataset.was = details.open; details.open = !details.classList.contains('menu'); });
+    document.querySelectorAll('details.block').forEach((details) => { details.dataset.was = details.open; details.open = true; });
     Masseter.drawAll();
   });
   addEventListener('afterprint', () => {
-    document.querySelectorAll('section details[data-was]').forEach((details) => { details.open = details.dataset.was === 'true'; });
+    document.querySelectorAll('details[data-was]').forEach((details) => { details.open = details.dataset.was === 'true'; });
     Masseter.drawAll();
   });
   document.documentElement.dataset.ready = 'yes';

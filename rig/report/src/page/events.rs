@@ -4,7 +4,7 @@ use masseter_analysis::{EventRecord, Figures};
 use masseter_page::{Block, Content, EventRow, Events, Section};
 use masseter_shared::messages::codes::{ControllerState, EventKind};
 
-use super::since_s;
+use super::times::since_s;
 use crate::text;
 
 pub(super) fn section(figures: &Figures) -> Section {

@@ -6,8 +6,9 @@ use masseter_page::{Block, Chart, Content, Points, Pressure, Section, Series, St
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{Mechanism, Vec3};
 
-use super::charts::plain;
-use super::{animation, in_unit, since_s};
+use super::animation;
+use super::charts::{in_unit, plain};
+use super::times::since_s;
 use crate::table;
 
 /// Directions of the base, and where they point.

@@ -6,7 +6,7 @@ use masseter_page::{Block, Cell, Chart, Column, Moment, MomentKind, Points, Sect
 
 use super::charts::limit;
 use super::result::mark;
-use super::since_s;
+use super::times::since_s;
 use crate::check::Check;
 use crate::text::{or_dash, significant};
 use crate::verdict::Verdict;

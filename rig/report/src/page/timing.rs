@@ -8,7 +8,7 @@ use masseter_shared::config::Scenario;
 use masseter_shared::schedule::CycleSchedule;
 
 use super::charts::limit;
-use super::since_s;
+use super::times::{motion_s, since_s};
 use crate::table;
 use crate::text::{microseconds, or_dash};
 
@@ -149,11 +149,6 @@ fn longest(figures: &Figures) -> Table {
     ];
     let rows = figures.worst_cycles.iter().map(row).collect();
     Table { label: "Longest cycles".to_owned(), columns, rows }
-}
-
-/// When the motion began; the first SYNC where it did not.
-fn motion_s(figures: &Figures) -> f64 {
-    figures.over_time.motion_began_ns.map_or(0.0, |began_ns| since_s(figures, began_ns))
 }
 
 fn us(ns: Option<u64>) -> String {

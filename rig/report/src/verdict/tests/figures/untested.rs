@@ -30,8 +30,8 @@ fn what_was_not_tested_is_neither_passed_nor_failed() {
         let text = table::text(&run.manifest, &run.figures, &verdict, table::Detail::Brief);
         assert!(text.starts_with("UNTESTED: ") && text.contains("\n  UNTESTED "), "{text}");
         let page = page::html(&run.manifest, &run.figures, &verdict).unwrap();
-        assert!(page.contains("class=\"not-passed\"><strong>UNTESTED</strong>"), "{page}");
-        assert!(page.contains("class=\"failed\">UNTESTED<"), "{page}");
+        assert!(page.contains("\"word\":\"UNTESTED\"") && page.contains("\"tone\":\"bad\""), "{page}");
+        assert!(page.contains("{\"mark\":\"UNTESTED\",\"tone\":\"doubtful\"}"), "{page}");
     }
 }
 

@@ -1,0 +1,68 @@
+//! The times of a run as the page has them: seconds since its first SYNC.
+
+use masseter_analysis::{EventRecord, FaultFigures, Figures};
+use masseter_page::{Moment, MomentKind, Phase, Time};
+use masseter_recording::Manifest;
+use masseter_shared::config::Scenario;
+use masseter_shared::messages::codes::Source;
+
+/// What the page's times count from.
+pub(super) fn time(manifest: &Manifest, figures: &Figures) -> Time {
+    let over_time = &figures.over_time;
+    let last_s = figures.events.last().map_or(0.0, |event| since_s(figures, event.time_ns));
+    Time {
+        motion_s: over_time.motion_began_ns.map(|began_ns| since_s(figures, began_ns)),
+        end_s: over_time.duration_s.max(last_s),
+        period_s: manifest.scenario.period_ns() as f64 / 1e9,
+        wall_s: manifest.wall_ahead_ns.map(|ahead_ns| (over_time.began_ns as f64 + ahead_ns as f64) / 1e9),
+    }
+}
+
+/// An instant of the run's clock as a time of the page, s since the first SYNC.
+pub(super) fn since_s(figures: &Figures, time_ns: u64) -> f64 {
+    time_ns.saturating_sub(figures.over_time.began_ns) as f64 / 1e9
+}
+
+/// The first strike of every fault, and the event that began the first safe stop.
+pub(super) fn moments(scenario: &Scenario, figures: &Figures) -> Vec<Moment> {
+    let strike = |fault: &FaultFigures| {
+        let declared = scenario.faults.get(fault.number - 1)?;
+        Some(Moment {
+            at_s: since_s(figures, fault.struck_ns?),
+            kind: MomentKind::Fault,
+            name: format!("fault {}", fault.number),
+            text: format!("fault {}: {declared}", fault.number),
+        })
+    };
+    let stop = figures.events.iter().find(|event| event.begins_stop());
+    let detection = |EventRecord { source, cause, time_ns, .. }: &EventRecord| Moment {
+        at_s: since_s(figures, *time_ns),
+        kind: MomentKind::Detection,
+        name: "safe stop".to_owned(),
+        text: format!("safe stop: {source}, {cause}"),
+    };
+    figures.faults.iter().filter_map(strike).chain(stop.map(detection)).collect()
+}
+
+/// The states of the controller, one after the other.
+pub(super) fn phases(figures: &Figures) -> Vec<Phase> {
+    let mut phases: Vec<Phase> = Vec::new();
+    for event in figures.events.iter().filter(|event| event.source == Source::Controller) {
+        let Some([from, to]) = &event.transition else { continue };
+        let at_s = since_s(figures, event.time_ns);
+        match phases.last_mut() {
+            Some(last) => last.to_s = at_s,
+            None => phases.push(Phase { from_s: 0.0, to_s: at_s, name: from.clone() }),
+        }
+        phases.push(Phase { from_s: at_s, to_s: at_s, name: to.clone() });
+    }
+    if let Some(last) = phases.last_mut() {
+        last.to_s = figures.over_time.duration_s.max(last.from_s);
+    }
+    phases
+}
+
+/// When the motion began; the first SYNC where it did not.
+pub(super) fn motion_s(figures: &Figures) -> f64 {
+    figures.over_time.motion_began_ns.map_or(0.0, |began_ns| since_s(figures, began_ns))
+}
