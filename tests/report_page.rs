@@ -136,11 +136,8 @@ fn after_a_safe_stop_the_charts_go_on_and_show_the_fault_and_its_detection() {
     assert_eq!((&fault["kind"], &stop["kind"]), (&"fault".into(), &"detection".into()));
     assert_eq!(fault["text"], "fault 1: disconnect (bus 1, node 5)");
     assert!(stop["text"].as_str().unwrap().starts_with("safe stop: master, "), "{stop}");
-    let in_motion_s = |moment: &Value| moment["at_s"].as_f64().unwrap() - motion_s(&page);
-    assert!(
-        (in_motion_s(fault) - 2.2).abs() < 0.002 && in_motion_s(stop) > in_motion_s(fault),
-        "{fault} {stop}"
-    );
+    let [struck_s, stopped_s] = [fault, stop].map(|moment| moment["at_s"].as_f64().unwrap());
+    assert!((struck_s - 2.2).abs() < 0.002 && stopped_s > struck_s, "{fault} {stop}");
     // The jaw is followed for as long as the axes are.
     let [jaw, legs] = ["motion-z", "legs"].map(|id| curves_s(block(&page, id)));
     assert!((jaw[1][1] - legs[0][1]).abs() < 0.01, "{jaw:?} and {legs:?}");
