@@ -5,7 +5,7 @@ use masseter_page::{Block, Content, Live, Parameter, Section, Tone};
 use masseter_recording::Manifest;
 use masseter_shared::messages::codes::ControllerState;
 
-use super::since_s;
+use super::times::since_s;
 use crate::text::{decimals, or_dash};
 
 pub(super) fn sections(manifest: &Manifest, figures: &Figures, number: u64, left_out: u64) -> Vec<Section> {
