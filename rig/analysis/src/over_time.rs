@@ -85,8 +85,8 @@ const FORCE: usize = 2;
 /// Index of the bite force behind the values of the axes.
 const BITE_FORCE: usize = 3 * AXES;
 
-/// Time over which the load of a bus is a share, ns.
-const LOAD_WIDTH_NS: u64 = 10_000_000;
+/// Time over which the load of a bus is a share and a wake-up the latest of several, ns.
+const WIDE_NS: u64 = 10_000_000;
 
 /// Indices of the two processes.
 pub(super) const CONTROLLER: usize = 0;
@@ -95,7 +95,7 @@ pub(super) const PLANT: usize = 1;
 impl OverTimeCollector {
     /// For a jaw with this incisal point in the platform frame, and buses of this bit rate; without one there is no load.
     pub(super) fn new(incisal_m: [f64; 3], bitrate: Option<Bitrate>) -> Self {
-        Self { incisal_m, bitrate, ..Self::default() }
+        Self { incisal_m, bitrate, late: Series::of_width(WIDE_NS), ..Self::default() }
     }
 
     /// A time of the run's clock since the first, ns.
@@ -185,7 +185,7 @@ impl OverTimeCollector {
         if let Some((received, bitrate)) = tapped.frame().zip(self.bitrate) {
             let busy_ns = bitrate.bits_to_ns(wire::frame_bits(&received.frame));
             let buses = self.busy_ns.len().max(bus + 1);
-            self.busy_ns.resize_with(buses, || Series::of_width(LOAD_WIDTH_NS));
+            self.busy_ns.resize_with(buses, || Series::of_width(WIDE_NS));
             *self.busy_ns[bus].at(since_ns) += busy_ns;
         }
     }

@@ -54,7 +54,7 @@
   const retell = (holder, clock) => holder.querySelectorAll('[data-at]').forEach((button) => { button.textContent = clock.text(Number(button.dataset.at)); });
 
   Masseter.block('moments', (holder, _, clock) => {
-    const write = () => holder.replaceChildren(element('ul', { class: 'events' }, ...Masseter.moments
+    const write = () => holder.replaceChildren(element('ul', { class: 'events' }, ...[...Masseter.moments].sort((a, b) => a.at_s - b.at_s)
       .map((moment) => element('li', { class: moment.kind === 'note' ? '' : 'fault' }, timeButton(moment.at_s, clock), ` ${moment.text}`))));
     // A new moment tells the mode again.
     clock.on('mode', write);
