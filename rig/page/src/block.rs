@@ -6,6 +6,7 @@ use serde_json::Value;
 use crate::chart::Chart;
 use crate::live::{Live, Parameter};
 use crate::pressure::Pressure;
+use crate::tone::Tone;
 
 /// A section of the page.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -113,20 +114,6 @@ pub enum Content {
     Live(Live),
     /// Parameters to change.
     Parameters(Vec<Parameter>),
-}
-
-/// Whether something is as it should be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Tone {
-    /// It is.
-    Good,
-    /// It may not be.
-    Doubtful,
-    /// It is not.
-    Bad,
-    /// It is not judged.
-    Plain,
 }
 
 /// The judgement of a run: of its function, and of its timing.

@@ -23,11 +23,13 @@ mod page;
 mod points;
 mod pressure;
 mod time;
+mod tone;
 
-pub use block::{Block, Cell, Column, Content, EventRow, Events, Section, Table, Tone, Verdict};
+pub use block::{Block, Cell, Column, Content, EventRow, Events, Section, Table, Verdict};
 pub use chart::{Across, Chart, Limit, Scale, Series, Style};
 pub use live::{Live, Parameter};
 pub use page::{Life, Page, PageError};
 pub use points::Points;
 pub use pressure::{Pressure, Tooth};
 pub use time::{Moment, MomentKind, Phase, Time};
+pub use tone::Tone;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::block::Tone;
+use crate::tone::Tone;
 
 /// The state of a run that goes on. Its block has a button that ends the run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
