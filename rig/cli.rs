@@ -26,6 +26,7 @@ use crate::init::{self, InitArgs};
 use crate::interface::{self, InterfaceArgs};
 use crate::kinematics_cli::{self, CsvArgs, FkArgs};
 use crate::manuals::{self, CompletionsArgs, ManArgs};
+use crate::motion::{self, MotionArgs};
 use crate::new::{self, NewVerb};
 use crate::paper_study::{self, KinematicsArgs};
 use crate::param::{self, ParamVerb};
@@ -90,6 +91,8 @@ enum Verb {
     Search(SearchArgs),
     /// Make a failing scenario as small as it can be and still fail
     Shrink(ShrinkArgs),
+    /// Describe a recorded jaw motion, and whether the rig can play it
+    Motion(MotionArgs),
     /// Lay down a scenario, a motion and a CI workflow to start from
     Init(InitArgs),
     /// Forward kinematics of a CSV file: actuator positions to poses
@@ -206,6 +209,7 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Search(args) => campaigns::search::search(&args),
         Verb::Shrink(args) => campaigns::shrink::shrink(&args),
         Verb::CampaignCase(args) => campaigns::worker::run_case(&args),
+        Verb::Motion(args) => motion::motion(&args).usage(),
         Verb::Init(args) => init::init(&args).usage(),
         Verb::Faults(verb) => faults::execute(&verb),
         Verb::Signals(args) => signals_cli::signals(&args).usage(),

@@ -6,7 +6,7 @@ use clap::Command;
 
 /// What a user wants, and the verbs for that.
 const GROUPS: [(&str, &[&str]); 8] = [
-    ("Play a motion and judge it", &["init", "run", "test", "signals", "faults"]),
+    ("Play a motion and judge it", &["init", "motion", "run", "test", "signals", "faults"]),
     ("Play a scenario in many variants", &["campaign", "search", "shrink"]),
     ("Work with past runs", &["report", "export", "replay", "diff", "recording"]),
     ("Bring your own controller", &["new", "interface", "controller", "param"]),

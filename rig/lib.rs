@@ -29,6 +29,7 @@ mod kinematics_cli;
 mod live;
 pub mod machine;
 mod manuals;
+mod motion;
 mod new;
 mod paper_study;
 mod param;

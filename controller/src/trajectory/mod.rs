@@ -12,9 +12,11 @@ mod chewing;
 mod clock;
 mod error;
 mod excursion;
+mod glitches;
 mod import;
 mod interpolation;
 mod jaw_frame;
+mod likely_axes;
 mod lowpass;
 mod mandible;
 mod markers;
@@ -23,6 +25,7 @@ mod pose_csv;
 mod recording;
 mod rhythm;
 mod spline;
+mod survey;
 mod table;
 
 use masseter_shared::config::{JawConfig, MotionConfig};
@@ -30,7 +33,9 @@ use masseter_shared::geometry::{Mechanism, Pose};
 
 pub use check::{TrajectoryReport, check};
 pub use error::TrajectoryError;
+pub use glitches::Glitch;
 pub use jaw_frame::{closed_pose, jaw_points};
+pub use survey::{Gap, PointFigures, Range, RecordingSurvey, StepFigures, SurveyRow, survey};
 
 pub(crate) use interpolation::interpolate;
 pub(crate) use rhythm::minimum_jerk;
@@ -154,9 +159,9 @@ impl Trajectory {
     }
 
     /// What is doubtful in a recording, each with its line; nothing for a generator.
-    pub fn doubts(&self) -> &[String] {
-        let Motion::Recording(recording) = &self.motion else { return &[] };
-        &recording.doubts
+    pub fn doubts(&self) -> Vec<String> {
+        let Motion::Recording(recording) = &self.motion else { return Vec::new() };
+        recording.doubts.iter().cloned().chain(plausibility::jumps(&recording.glitches)).collect()
     }
 
     /// File and line, `motion.csv:7`, of the recording nearest to a time of the trajectory; none for a generator.

@@ -1,54 +1,111 @@
 //! Warnings about a recording that may not be the motion of a jaw. The user decides.
 
+use masseter_shared::geometry::Vec3;
 use nalgebra::Vector6;
+
+use super::glitches::Glitch;
 
 /// Below this everywhere, a file may hold metres where it should hold millimetres, m and rad.
 const STILL_M: f64 = 1e-4;
 const STILL_RAD: f64 = 2e-3;
-/// The least deviation of one row that counts as a glitch, m.
-const GLITCH_M: f64 = 1e-3;
-/// In a glitch of one row, its neighbours deviate half as much, and the rows beside those hardly.
-const NEIGHBOURS: std::ops::Range<f64> = 0.3..0.7;
-const BEYOND: f64 = 0.1;
+/// No jaw opens further, m.
+const WIDEST_M: f64 = 0.1;
+/// A jaw glides so far without a turn, m. One that opens turns by 0.6 to 0.7° a millimetre; a sixth of that is doubtful.
+const GLIDE_M: f64 = 0.012;
+const TURN_DEG_PER_M: f64 = 100.0;
+/// The first row of a recording of poses is near the closed jaw, m and rad.
+const CLOSED_M: f64 = 0.01;
+const CLOSED_RAD: f64 = 0.1;
 
-/// What is doubtful in rows of translation (m) and rotation vector (rad) from the first row, with the line of a row.
-pub(super) fn doubts(time_s: &[f64], rows: &[Vector6<f64>], lines: &[u64]) -> Vec<String> {
-    still(rows, lines).into_iter().chain(glitch(time_s, rows, lines)).collect()
+/// The rows of a recording: translation of the incisal point (m) from the closed pose, and rotation vector (rad) from the
+/// first row's orientation.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rows<'a> {
+    pub time_s: &'a [f64],
+    pub lines: &'a [u64],
+    pub coordinates: &'a [Vector6<f64>],
+    /// The first row's turn from the closed pose, rad.
+    pub first_turn_rad: f64,
 }
 
-fn still(rows: &[Vector6<f64>], lines: &[u64]) -> Option<String> {
-    let first = rows[0].fixed_rows::<3>(0);
-    let way_m = |row: &Vector6<f64>| (row.fixed_rows::<3>(0) - first).norm();
-    let (farthest, way_m) = rows.iter().map(way_m).enumerate().max_by(|(_, a), (_, b)| a.total_cmp(b))?;
-    let turns = rows.iter().any(|row| row.fixed_rows::<3>(3).norm() > STILL_RAD);
-    (way_m < STILL_M && !turns).then(|| {
-        let (line, way_mm) = (lines[farthest], way_m * 1e3);
-        format!("line {line}: the farthest row is {way_mm:.4} mm from the first; is the unit millimetres?")
+impl Rows<'_> {
+    /// Where the incisal point is in a row, m.
+    pub(super) fn place_m(&self, row: usize) -> Vec3 {
+        self.coordinates[row].fixed_rows::<3>(0).into_owned()
+    }
+
+    fn turn_rad(&self, row: usize) -> f64 {
+        self.coordinates[row].fixed_rows::<3>(3).norm()
+    }
+
+    fn way_m(&self, row: usize) -> f64 {
+        (self.place_m(row) - self.place_m(0)).norm()
+    }
+
+    fn farthest(&self) -> usize {
+        (0..self.lines.len()).max_by(|&a, &b| self.way_m(a).total_cmp(&self.way_m(b))).unwrap_or_default()
+    }
+}
+
+/// What is doubtful in the rows, each with a line. Glitches are not part of it.
+pub(super) fn doubts(rows: &Rows) -> Vec<String> {
+    not_closed(rows).into_iter().chain(units(rows)).collect()
+}
+
+fn not_closed(rows: &Rows) -> Option<String> {
+    let (away_m, line) = (rows.place_m(0).norm(), rows.lines[0]);
+    (away_m > CLOSED_M || rows.first_turn_rad > CLOSED_RAD).then(|| {
+        format!(
+            "line {line}: the first row is {:.1} mm and {:.1}° from the closed jaw; are the poses relative to the closed \
+             jaw, and the quaternions in the order qw,qx,qy,qz?",
+            away_m * 1e3,
+            rows.first_turn_rad.to_degrees()
+        )
     })
 }
 
-fn glitch(time_s: &[f64], rows: &[Vector6<f64>], lines: &[u64]) -> Option<String> {
-    let at = |row: usize| rows[row].fixed_rows::<3>(0).into_owned();
-    // From the straight way between the rows beside it.
-    let deviation_m = |row: usize| {
-        let [before_s, at_s, after_s] = [row - 1, row, row + 1].map(|row| time_s[row]);
-        let share = (at_s - before_s) / (after_s - before_s);
-        (at(row) - at(row - 1).lerp(&at(row + 1), share)).norm()
+fn units(rows: &Rows) -> Option<String> {
+    let farthest = rows.farthest();
+    let (way_m, line) = (rows.way_m(farthest), rows.lines[farthest]);
+    let way_mm = way_m * 1e3;
+    let turn_rad = (0..rows.lines.len()).map(|row| rows.turn_rad(row)).fold(0.0, f64::max);
+    let turn_deg = turn_rad.to_degrees();
+    if way_m < STILL_M && turn_rad <= STILL_RAD {
+        Some(format!(
+            "line {line}: the farthest row is {way_mm:.4} mm from the first; is the unit millimetres?"
+        ))
+    } else if way_m > WIDEST_M {
+        Some(format!(
+            "line {line}: the incisal point is {way_mm:.0} mm from the first row; is the unit millimetres?"
+        ))
+    } else if way_m > GLIDE_M && turn_deg < TURN_DEG_PER_M * way_m {
+        Some(format!(
+            "line {line}: the incisal point is {way_mm:.1} mm from the first row, yet the jaw turns by {turn_deg:.2}° at \
+             most; are angles in the right unit, and all markers on the lower jaw?"
+        ))
+    } else {
+        None
+    }
+}
+
+/// One warning for all glitches.
+pub(super) fn jumps(glitches: &[Glitch]) -> Option<String> {
+    let first = glitches.first()?;
+    let others = match glitches.len() - 1 {
+        0 => String::new(),
+        others => format!(" (and {others} more)"),
     };
-    (3..rows.len().saturating_sub(3)).find_map(|row| {
-        let peak_m = deviation_m(row);
-        let is_alone = peak_m > GLITCH_M
-            && [row - 1, row + 1].iter().all(|&row| NEIGHBOURS.contains(&(deviation_m(row) / peak_m)))
-            && [row - 2, row + 2].iter().all(|&row| deviation_m(row) < BEYOND * peak_m);
-        is_alone.then(|| {
-            let (line, jump_mm) = (lines[row], peak_m * 1e3);
-            format!("line {line}: one row jumps by {jump_mm:.1} mm and back; is it a glitch of the tracker?")
-        })
-    })
+    Some(format!(
+        "line {}: the incisal point jumps by {:.1} mm within {:.0} ms{others}; is it a glitch of the tracker?",
+        first.line,
+        first.jump_m * 1e3,
+        first.within_s * 1e3
+    ))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::glitches::glitches;
     use super::*;
 
     /// Chewing at 2 Hz by 18 mm, sampled at this rate.
@@ -57,11 +114,14 @@ mod tests {
         let pose = |(row, t_s): (usize, &f64)| {
             let mut pose = Vector6::zeros();
             pose[2] = -0.009 * (1.0 - (4.0 * std::f64::consts::PI * t_s).cos());
+            pose[4] = -10.0 * pose[2];
             change(row, &mut pose);
             pose
         };
         let rows: Vec<_> = time_s.iter().enumerate().map(pose).collect();
-        doubts(&time_s, &rows, &(2..202).collect::<Vec<_>>())
+        let lines: Vec<_> = (2..202).collect();
+        let rows = Rows { time_s: &time_s, lines: &lines, coordinates: &rows, first_turn_rad: 0.0 };
+        doubts(&rows).into_iter().chain(jumps(&glitches(&rows))).collect()
     }
 
     #[test]
@@ -80,5 +140,15 @@ mod tests {
         let turning =
             doubts_of(200.0, |_, pose| *pose = Vector6::new(0.0, 0.0, 0.0, pose[2] * 10.0, 0.0, 0.0));
         assert_eq!(turning, [""; 0]);
+    }
+
+    #[test]
+    fn units_that_make_no_jaw_are_named() {
+        let radians_as_degrees = doubts_of(200.0, |_, pose| pose[4] /= 57.3);
+        assert!(radians_as_degrees[0].contains("turns by 0.18°"), "{radians_as_degrees:?}");
+        let micrometres = doubts_of(200.0, |_, pose| pose[2] *= 1000.0);
+        assert!(micrometres[0].contains("18000 mm") && micrometres.len() == 1, "{micrometres:?}");
+        let open = doubts_of(200.0, |_, pose| pose[2] -= 0.02);
+        assert!(open[0].starts_with("line 2: the first row is 20.0 mm"), "{open:?}");
     }
 }

@@ -9,8 +9,9 @@ use masseter_shared::geometry::{Pose, Vec3};
 use nalgebra::{UnitQuaternion, Vector6};
 
 use super::error::Located;
+use super::glitches::{Glitch, glitches};
 use super::lowpass::lowpass;
-use super::plausibility::doubts;
+use super::plausibility::{Rows, doubts};
 use super::spline::Spline;
 
 /// Least rate of the even grid, Hz: well above what a jaw does. What is sampled faster keeps its rate, because what a
@@ -40,8 +41,10 @@ pub(super) struct Recording {
     curve: Spline<6>,
     /// The largest turn, degrees, if it makes the markers' centroid a bad substitute for the incisal point.
     pub centroid_turn_deg: Option<f64>,
-    /// What is doubtful, with the line.
+    /// What is doubtful beside the glitches, with the line.
     pub doubts: Vec<String>,
+    /// Rows that leave the path of their neighbours.
+    pub glitches: Vec<Glitch>,
 }
 
 impl Recording {
@@ -62,12 +65,15 @@ impl Recording {
         let is_bad = are_of_centroid && largest_turn_deg > CENTROID_TURN_DEG;
         let time_s: Vec<f64> = samples.iter().map(|sample| sample.time_s - first.time_s).collect();
         let lines: Vec<_> = samples.iter().map(|sample| sample.line).collect();
-        let doubts = doubts(&time_s, &coordinates, &lines);
+        let first_turn_rad = first_rotation.angle();
+        let rows = Rows { time_s: &time_s, lines: &lines, coordinates: &coordinates, first_turn_rad };
+        let (doubts, glitches) = (doubts(&rows), glitches(&rows));
         let raw = Spline::through(time_s.clone(), coordinates);
         Ok(Self {
             path,
             lines,
             doubts,
+            glitches,
             first_rotation,
             curve: if lowpass_hz == 0.0 { raw } else { smoothed(&raw, &time_s, lowpass_hz) },
             centroid_turn_deg: is_bad.then_some(largest_turn_deg),

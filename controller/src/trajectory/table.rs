@@ -46,7 +46,7 @@ pub(super) struct Table {
 }
 
 impl Format {
-    fn columns(self) -> &'static [&'static str] {
+    pub(super) fn columns(self) -> &'static [&'static str] {
         match self {
             Self::Poses => &POSES,
             Self::Markers => &MARKERS,

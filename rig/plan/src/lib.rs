@@ -13,6 +13,7 @@
 //! ```
 
 mod dry;
+mod placement;
 mod scenario;
 
 use std::path::{Path, PathBuf};
@@ -28,6 +29,7 @@ use masseter_shared::schedule::CycleSchedule;
 
 use dry::enter_dry_run;
 
+pub use placement::{Placement, best_placement};
 pub use scenario::{read_scenario, read_scenario_with};
 
 /// A run that fits its mechanism, drives and buses.
@@ -112,7 +114,7 @@ impl RunPlan {
         });
         let centroid = self.trajectory.centroid_turn_deg().map_or_else(String::new, of_centroid);
         let doubts =
-            self.trajectory.doubts().iter().map(|doubt| format!("\n  warning: the motion's {doubt}"));
+            self.trajectory.doubts().into_iter().map(|doubt| format!("\n  warning: the motion's {doubt}"));
         let doubts: String = doubts.collect();
         let locking = self.locking().map_or_else(String::new, |locking| format!("\n  warning: {locking}"));
         format!(

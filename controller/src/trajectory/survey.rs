@@ -1,0 +1,250 @@
+//! What a recorded motion holds, before it is played.
+//!
+//! Everything here describes the file. Whether the mechanism can follow the motion is judged by [`check`](super::check).
+
+use masseter_shared::config::{FileConfig, JawConfig};
+use masseter_shared::geometry::{Pose, Vec3};
+use serde::Serialize;
+
+use super::TrajectoryError;
+use super::glitches::Glitch;
+use super::import::Source;
+use super::likely_axes::likely_axes;
+use super::mandible::condylar_middle;
+use super::recording::{Recording, Sample};
+use super::table::{Format, Table};
+
+/// A step longer than this many usual ones is a gap.
+const GAP_STEPS: f64 = 1.5;
+const POINTS: [&str; 3] = ["incisal point", "right condyle", "left condyle"];
+/// Components of the rotation vector: about the axes that point anterior, left and up.
+const TURNS: [&str; 3] = ["roll to the right", "opening", "yaw to the left"];
+
+/// What a recorded motion holds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RecordingSurvey {
+    /// `poses` or `markers`.
+    pub format: &'static str,
+    /// The point that the file follows.
+    pub follows: String,
+    /// Rows of data.
+    pub rows: usize,
+    /// Lines of the first and of the last row.
+    pub lines: [u64; 2],
+    /// From the first to the last row, s.
+    pub duration_s: f64,
+    /// Time between rows.
+    pub steps: StepFigures,
+    /// Steps of more than one and a half usual ones.
+    pub gaps: Vec<Gap>,
+    /// Each column of the file, as written.
+    pub columns: Vec<Range>,
+    /// Incisal point, right and left condyle, away from the closed jaw.
+    pub points: [PointFigures; 3],
+    /// Components of the rotation vector from the closed jaw, about the axes that point anterior, left and up, degrees.
+    pub turns_deg: [Range; 3],
+    /// The largest turn from the closed jaw, degrees.
+    pub turn_deg: f64,
+    /// Rows that leave the path of their neighbours.
+    pub glitches: Vec<Glitch>,
+    /// What may not be the motion of a jaw, each with a line.
+    pub doubts: Vec<String>,
+    /// The file's axes that point anterior, left and up, where the motion shows others than the stated ones.
+    pub likely_axes: Option<[String; 3]>,
+    /// The rows in the jaw frame.
+    #[serde(skip)]
+    pub path: Vec<SurveyRow>,
+}
+
+/// Time between rows, s.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct StepFigures {
+    /// Median: the usual step.
+    pub usual_s: f64,
+    /// The shortest.
+    pub shortest_s: f64,
+    /// The longest.
+    pub longest_s: f64,
+    /// Standard deviation of all steps that are no gaps.
+    pub jitter_s: f64,
+}
+
+impl StepFigures {
+    /// Rows a second, Hz.
+    pub fn rate_hz(&self) -> f64 {
+        1.0 / self.usual_s
+    }
+}
+
+/// A step longer than usual.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Gap {
+    /// Line of the row after it.
+    pub line: u64,
+    /// Its length, s.
+    pub lasts_s: f64,
+}
+
+/// Least and greatest value.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Range {
+    /// Of what.
+    pub name: &'static str,
+    /// The least value.
+    pub least: f64,
+    /// The greatest value.
+    pub greatest: f64,
+}
+
+/// Where a point of the jaw goes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PointFigures {
+    /// Its name.
+    pub name: &'static str,
+    /// Least displacement from the closed jaw along the axes that point anterior, left and up, mm.
+    pub least_mm: [f64; 3],
+    /// The greatest displacement, mm.
+    pub greatest_mm: [f64; 3],
+    /// The greatest distance from its place in the closed jaw, mm.
+    pub farthest_mm: f64,
+    /// The greatest speed as played, after the low-pass, mm/s.
+    pub fastest_mm_s: f64,
+}
+
+/// A row in the jaw frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurveyRow {
+    /// Since the first row, s.
+    pub time_s: f64,
+    /// Displacement of incisal point, right and left condyle from the closed jaw, m.
+    pub points_m: [Vec3; 3],
+    /// Rotation vector from the closed jaw, rad.
+    pub turn_rad: Vec3,
+}
+
+/// Reads a file and describes its motion.
+///
+/// # Errors
+/// When the file cannot be used: its line, the reason and a remedy.
+pub fn survey(config: &FileConfig, jaw: &JawConfig) -> Result<RecordingSurvey, TrajectoryError> {
+    let source = Source::read(config, jaw)?;
+    let (samples, recording) = source.recording()?;
+    let points = jaw_frame_points(jaw)?;
+    let table = &source.table;
+    let row = |sample: &Sample| survey_row(&points, sample.time_s - samples[0].time_s, &sample.displacement);
+    let path: Vec<SurveyRow> = samples.iter().map(row).collect();
+    let (steps, gaps) = steps_and_gaps(table);
+    Ok(RecordingSurvey {
+        format: match table.format {
+            Format::Poses => "poses",
+            Format::Markers => "markers",
+        },
+        follows: follows(config, &source),
+        rows: table.rows.len(),
+        lines: [table.rows[0].line, table.rows[table.rows.len() - 1].line],
+        duration_s: recording.length_s(),
+        steps,
+        gaps,
+        columns: columns(table),
+        points: std::array::from_fn(|point| point_figures(&path, &points, &recording, point)),
+        turns_deg: std::array::from_fn(|axis| {
+            range(TURNS[axis], path.iter().map(|row| row.turn_rad[axis].to_degrees()))
+        }),
+        turn_deg: path.iter().map(|row| row.turn_rad.norm().to_degrees()).fold(0.0, f64::max),
+        likely_axes: likely_axes(&source, &config.axes),
+        glitches: recording.glitches,
+        doubts: recording.doubts,
+        path,
+    })
+}
+
+/// Incisal point, right and left condyle in the jaw frame, m.
+fn jaw_frame_points(jaw: &JawConfig) -> Result<[Vec3; 3], TrajectoryError> {
+    let middle = condylar_middle(jaw)?;
+    let aside = Vec3::new(0.0, jaw.bonwill_side_m / 2.0, 0.0);
+    Ok([Vec3::zeros(), middle - aside, middle + aside])
+}
+
+fn survey_row(points: &[Vec3; 3], time_s: f64, displacement: &Pose) -> SurveyRow {
+    SurveyRow {
+        time_s,
+        points_m: points.map(|point| moved(displacement, &point)),
+        turn_rad: displacement.rotation.scaled_axis(),
+    }
+}
+
+fn moved(displacement: &Pose, point: &Vec3) -> Vec3 {
+    displacement.rotation * point + displacement.translation.vector - point
+}
+
+fn follows(config: &FileConfig, source: &Source) -> String {
+    let mm = |point: &Vec3| format!("({:.1}, {:.1}, {:.1}) mm", point.x * 1e3, point.y * 1e3, point.z * 1e3);
+    let reference = mm(&source.reference);
+    match (source.table.format, config.reference_point_mm, config.marker_origin_mm) {
+        (Format::Poses, None, _) => format!(
+            "the middle between the condyles, {reference} from the incisal point\n        (assumed; if it is another point, set motion.reference_point_mm)"
+        ),
+        (Format::Poses, Some(_), _) => format!("the point {reference} from the incisal point"),
+        (Format::Markers, _, None) => {
+            "the markers' centroid, not the incisal point (set motion.marker_origin_mm)".to_owned()
+        }
+        (Format::Markers, _, Some([x, y, z])) => {
+            format!("the incisal point, at ({x:.1}, {y:.1}, {z:.1}) mm of the tracker in the first row")
+        }
+    }
+}
+
+fn steps_and_gaps(table: &Table) -> (StepFigures, Vec<Gap>) {
+    let steps = || table.rows.windows(2).map(|pair| (pair[1].line, pair[1].time_s - pair[0].time_s));
+    let mut sorted: Vec<f64> = steps().map(|(_, step_s)| step_s).collect();
+    sorted.sort_by(f64::total_cmp);
+    let usual_s = sorted[sorted.len() / 2];
+    let is_gap = |step_s: f64| step_s > GAP_STEPS * usual_s;
+    let even: Vec<f64> = sorted.iter().copied().filter(|&step_s| !is_gap(step_s)).collect();
+    let mean_s = even.iter().sum::<f64>() / even.len() as f64;
+    let variance = even.iter().map(|step_s| (step_s - mean_s).powi(2)).sum::<f64>() / even.len() as f64;
+    let gaps = steps().filter(|&(_, step_s)| is_gap(step_s));
+    let figures = StepFigures {
+        usual_s,
+        shortest_s: sorted[0],
+        longest_s: sorted[sorted.len() - 1],
+        jitter_s: variance.sqrt(),
+    };
+    (figures, gaps.map(|(line, lasts_s)| Gap { line, lasts_s }).collect())
+}
+
+fn columns(table: &Table) -> Vec<Range> {
+    let values = |column: usize| table.rows.iter().map(move |row| row.values[column]);
+    let names = table.format.columns()[1..].iter().enumerate();
+    names.map(|(column, name)| range(name, values(column))).collect()
+}
+
+fn range(name: &'static str, values: impl Iterator<Item = f64>) -> Range {
+    let outside = Range { name, least: f64::INFINITY, greatest: f64::NEG_INFINITY };
+    values.fold(outside, |range, value| Range {
+        name,
+        least: range.least.min(value),
+        greatest: range.greatest.max(value),
+    })
+}
+
+fn point_figures(
+    path: &[SurveyRow],
+    points: &[Vec3; 3],
+    recording: &Recording,
+    point: usize,
+) -> PointFigures {
+    let along: [Range; 3] = std::array::from_fn(|axis| {
+        range(POINTS[point], path.iter().map(|row| row.points_m[point][axis] * 1e3))
+    });
+    let played = |row: &SurveyRow| moved(&recording.displacement(row.time_s), &points[point]);
+    let speed_m_s =
+        |pair: &[SurveyRow]| (played(&pair[1]) - played(&pair[0])).norm() / (pair[1].time_s - pair[0].time_s);
+    PointFigures {
+        name: POINTS[point],
+        least_mm: std::array::from_fn(|axis| along[axis].least),
+        greatest_mm: std::array::from_fn(|axis| along[axis].greatest),
+        farthest_mm: path.iter().map(|row| row.points_m[point].norm() * 1e3).fold(0.0, f64::max),
+        fastest_mm_s: path.windows(2).map(speed_m_s).fold(0.0, f64::max) * 1e3,
+    }
+}

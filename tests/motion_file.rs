@@ -1,0 +1,187 @@
+//! `masseter motion`: what a recording holds before it is played.
+
+mod common;
+
+use std::f64::consts::TAU;
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use common::{Workspace, masseter, stderr, stdout};
+use serde_json::Value;
+
+const POSES: &str = "time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n";
+
+/// Two seconds of opening by 12° at 1 Hz and 100 rows a second, from line 2 on; `change` gets the row's number and its
+/// numbers.
+fn opening(change: impl Fn(usize, &mut [f64; 8])) -> String {
+    (0..=200).fold(POSES.to_owned(), |text, row| {
+        let time_s = f64::from(row) / 100.0;
+        let share = (1.0 - (TAU * time_s).cos()) / 2.0;
+        let half = (12_f64.to_radians() * share) / 2.0;
+        let mut numbers = [time_s, 4.0 * share, 0.0, -3.0 * share, half.cos(), 0.0, half.sin(), 0.0];
+        change(row as usize, &mut numbers);
+        text + &numbers.map(|number| format!("{number:.6}")).join(",") + "\n"
+    })
+}
+
+fn describe(text: &str, arguments: &[&str]) -> Output {
+    let workspace = Workspace::new("");
+    let file = workspace.write("motion.csv", text);
+    masseter(&[&["motion", file.to_str().unwrap()], arguments].concat())
+}
+
+fn described(text: &str) -> Value {
+    serde_json::from_slice(&describe(text, &["--format", "json"]).stdout).unwrap()
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap()
+}
+
+#[test]
+fn a_motion_is_described_by_its_rows_rate_range_turn_and_speed() {
+    let output = describe(&opening(|_, _| ()), &[]);
+    assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
+    for part in ["201 rows of poses, lines 2 to 202", "2.000 s at 100.00 Hz", "no gaps", "PLAYS: "] {
+        assert!(stdout(&output).contains(part), "{part}: {}", stdout(&output));
+    }
+    let found = described(&opening(|_, _| ()));
+    assert!((number(&found["turns_deg"][1]["greatest"]) - 12.0).abs() < 1e-3, "{found}");
+    let condyle = &found["points"][1];
+    assert!((number(&condyle["farthest_mm"]) - 5.0).abs() < 1e-3, "{condyle}");
+    // The condyle goes out and back by 5 mm in a second: at π times that at the fastest.
+    assert!((number(&condyle["fastest_mm_s"]) - 5.0 * TAU / 2.0).abs() < 0.2, "{condyle}");
+    assert_eq!(found["glitches"], Value::Array(Vec::new()));
+}
+
+#[test]
+fn a_jump_of_the_tracker_and_a_gap_are_named_with_their_lines() {
+    let text = opening(|row, numbers| {
+        numbers[2] += if row == 150 { 2.7 } else { 0.0 };
+        numbers[0] += if row >= 60 { 0.1 } else { 0.0 };
+    });
+    let found = described(&text);
+    let glitch = &found["glitches"][0];
+    assert_eq!((&glitch["line"], found["glitches"].as_array().unwrap().len()), (&152.into(), 1));
+    assert!((number(&glitch["jump_m"]) - 2.7e-3).abs() < 2e-4, "{glitch}");
+    assert_eq!(found["gaps"][0]["line"], 62);
+    assert!((number(&found["gaps"][0]["lasts_s"]) - 0.11).abs() < 1e-6, "{}", found["gaps"]);
+    let said = stdout(&describe(&text, &[]));
+    assert!(said.contains("glitch  line 152, 1.600 s: 2.7 mm within 10 ms"), "{said}");
+}
+
+#[test]
+fn units_that_look_wrong_are_named() {
+    let scaled = |factor: f64| {
+        let half = move |numbers: &mut [f64; 8]| {
+            let half = numbers[6].asin() * factor;
+            (numbers[4], numbers[6]) = (half.cos(), half.sin());
+        };
+        opening(move |_, numbers| {
+            numbers[1] *= 4.0;
+            numbers[3] *= 4.0;
+            half(numbers);
+        })
+    };
+    let metres = opening(|_, numbers| {
+        numbers[1..4].iter_mut().for_each(|mm| *mm /= 1000.0);
+        (numbers[4], numbers[6]) = (1.0, 0.0);
+    });
+    let order = opening(|_, numbers| numbers[4..].rotate_left(1));
+    for (text, doubt) in [
+        (metres, "is the unit millimetres?"),
+        (scaled(1.0_f64.to_radians()), "are angles in the right unit"),
+        (order, "the quaternions in the order qw,qx,qy,qz?"),
+    ] {
+        let found = described(&text);
+        let doubts = found["doubts"].to_string();
+        assert!(doubts.contains(doubt) && doubts.contains("line "), "{doubt}: {doubts}");
+    }
+}
+
+/// Degrees where radians belong turn the jaw by more than any jaw.
+#[test]
+fn a_file_that_cannot_be_read_is_refused_with_its_row() {
+    let degrees = opening(|_, numbers| {
+        let half = numbers[6].asin() * 57.3;
+        (numbers[4], numbers[6]) = (half.cos(), half.sin());
+    });
+    let late = opening(|row, numbers| numbers[0] -= if row == 30 { 0.5 } else { 0.0 });
+    let broken = opening(|_, _| ()).replacen("0.100000,", "0.100000,much,", 1);
+    for (text, reason) in [(degrees, "turned by"), (late, "motion.csv:32: time"), (broken, "motion.csv:12: ")]
+    {
+        let output = describe(&text, &[]);
+        assert_eq!(output.status.code(), Some(2), "{}", stdout(&output));
+        let said = stderr(&output);
+        assert!(said.contains(reason) && said.contains("motion.csv:"), "{reason}: {said}");
+    }
+}
+
+/// The verdict is that of `masseter run`, in the same words.
+#[test]
+fn what_a_run_would_refuse_is_refused_in_the_same_words_and_a_place_that_fits_is_suggested() {
+    let workspace = Workspace::new("[jaw]\nclosed_offset_m = [-0.024, 0.0, 0.0]\n");
+    let file = workspace.write("motion.csv", &opening(|_, _| ()));
+    let (file, scenario) = (file.to_str().unwrap().to_owned(), workspace.file("scenario.toml"));
+    let scenario = scenario.to_str().unwrap();
+    let refused = masseter(&["motion", &file, "--scenario", scenario]);
+    assert_eq!(refused.status.code(), Some(1), "{}", stdout(&refused));
+    let run = stderr(&workspace.run_virtual(&["--trajectory", &file]));
+    let reason = stdout(&refused);
+    let reason = reason.lines().find_map(|line| line.strip_prefix("REFUSED: ")).unwrap();
+    assert!(run.contains(reason), "{run}\n{reason}");
+
+    let found = masseter(&["motion", &file, "--scenario", scenario, "--format", "json"]);
+    let found: Value = serde_json::from_slice(&found.stdout).unwrap();
+    let suggestion = &found["suggestion"];
+    assert!(number(&suggestion["strokes"]["margin_mm"]) > 1.0, "{suggestion}");
+    let set = format!("jaw.closed_offset_m={}", suggestion["closed_offset_m"]);
+    let moved = masseter(&["motion", &file, "--scenario", scenario, "--set", &set]);
+    assert_eq!(moved.status.code(), Some(0), "{}", stdout(&moved));
+}
+
+#[test]
+fn a_motion_too_large_for_any_place_is_said_to_be() {
+    let output = describe(&opening(|_, numbers| numbers[1..4].iter_mut().for_each(|mm| *mm *= 20.0)), &[]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stdout(&output).contains("even then the motion is refused"), "{}", stdout(&output));
+}
+
+fn example(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(name)
+}
+
+#[test]
+fn the_axes_of_a_tracker_are_found_from_how_the_jaw_opens() {
+    let tracker = example("tracker.csv");
+    let found = masseter(&["motion", tracker.to_str().unwrap(), "--format", "json"]);
+    let found: Value = serde_json::from_slice(&found.stdout).unwrap();
+    assert_eq!(found["suggestion"]["axes"], serde_json::json!(["+y", "-x", "+z"]));
+    let scenario = example("markers.toml");
+    let stated = masseter(&[
+        "motion",
+        tracker.to_str().unwrap(),
+        "--scenario",
+        scenario.to_str().unwrap(),
+        "--format",
+        "json",
+    ]);
+    let stated: Value = serde_json::from_slice(&stated.stdout).unwrap();
+    assert!(stated["likely_axes"].is_null() && stated["refused"].is_null(), "{stated}");
+}
+
+#[test]
+fn the_picture_shows_the_paths_the_courses_and_the_glitches() {
+    let workspace = Workspace::new("");
+    let mut text = opening(|row, numbers| numbers[2] += if row == 150 { 2.7 } else { 0.0 });
+    let _ = writeln!(text);
+    let (file, picture) = (workspace.write("motion.csv", &text), workspace.file("motion.svg"));
+    let output = masseter(&["motion", file.to_str().unwrap(), "--svg", picture.to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let picture = fs::read_to_string(picture).unwrap();
+    for part in ["<svg", "Sagittal", "Frontal", "opening", "line 152"] {
+        assert!(picture.contains(part), "{part}");
+    }
+}
