@@ -7,7 +7,7 @@
 use masseter_shared::geometry::Vec3;
 use serde::Serialize;
 
-use super::plausibility::Rows;
+use super::recorded_rows::Rows;
 
 /// The least deviation of a row, m.
 const LEAST_M: f64 = 1e-3;

@@ -22,6 +22,7 @@ mod mandible;
 mod markers;
 mod plausibility;
 mod pose_csv;
+mod recorded_rows;
 mod recording;
 mod rhythm;
 mod spline;

@@ -1,9 +1,7 @@
 //! Warnings about a recording that may not be the motion of a jaw. The user decides.
 
-use masseter_shared::geometry::Vec3;
-use nalgebra::Vector6;
-
 use super::glitches::Glitch;
+use super::recorded_rows::Rows;
 
 /// Below this everywhere, a file may hold metres where it should hold millimetres, m and rad.
 const STILL_M: f64 = 1e-4;
@@ -16,36 +14,6 @@ const TURN_DEG_PER_M: f64 = 100.0;
 /// The first row of a recording of poses is near the closed jaw, m and rad.
 const CLOSED_M: f64 = 0.01;
 const CLOSED_RAD: f64 = 0.1;
-
-/// The rows of a recording: translation of the incisal point (m) from the closed pose, and rotation vector (rad) from the
-/// first row's orientation.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Rows<'a> {
-    pub time_s: &'a [f64],
-    pub lines: &'a [u64],
-    pub coordinates: &'a [Vector6<f64>],
-    /// The first row's turn from the closed pose, rad.
-    pub first_turn_rad: f64,
-}
-
-impl Rows<'_> {
-    /// Where the incisal point is in a row, m.
-    pub(super) fn place_m(&self, row: usize) -> Vec3 {
-        self.coordinates[row].fixed_rows::<3>(0).into_owned()
-    }
-
-    fn turn_rad(&self, row: usize) -> f64 {
-        self.coordinates[row].fixed_rows::<3>(3).norm()
-    }
-
-    fn way_m(&self, row: usize) -> f64 {
-        (self.place_m(row) - self.place_m(0)).norm()
-    }
-
-    fn farthest(&self) -> usize {
-        (0..self.lines.len()).max_by(|&a, &b| self.way_m(a).total_cmp(&self.way_m(b))).unwrap_or_default()
-    }
-}
 
 /// What is doubtful in the rows, each with a line. Glitches are not part of it.
 pub(super) fn doubts(rows: &Rows) -> Vec<String> {
@@ -105,6 +73,8 @@ pub(super) fn jumps(glitches: &[Glitch]) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector6;
+
     use super::super::glitches::glitches;
     use super::*;
 

@@ -11,7 +11,8 @@ use nalgebra::{UnitQuaternion, Vector6};
 use super::error::Located;
 use super::glitches::{Glitch, glitches};
 use super::lowpass::lowpass;
-use super::plausibility::{Rows, doubts};
+use super::plausibility::doubts;
+use super::recorded_rows::Rows;
 use super::spline::Spline;
 
 /// Least rate of the even grid, Hz: well above what a jaw does. What is sampled faster keeps its rate, because what a
