@@ -260,10 +260,12 @@ impl Analysis {
         let missing_frames =
             topics.iter().find(|topic| topic.topic == FrameTap::TOPIC).map_or(0, |topic| topic.missing);
         let (signals, parameters) = self.named.finish();
-        let (intervals, worst_cycles, over_time) = self.shown.map_or_else(Default::default, |shown| {
-            let Shown { intervals, longest_cycles, over_time, .. } = *shown;
-            (intervals.finish(), longest_cycles.finish(), over_time.finish(self.declared.signals.len()))
-        });
+        let (intervals, worst_cycles, over_time, jaw_cycles) =
+            self.shown.map_or_else(Default::default, |shown| {
+                let Shown { intervals, longest_cycles, over_time, jaw_cycles, .. } = *shown;
+                let over_time = over_time.finish(self.declared.signals.len());
+                (intervals.finish(), longest_cycles.finish(), over_time, jaw_cycles.finish())
+            });
         self.events.sort_by_key(|event| event.time_ns);
         Figures {
             digest: self.digest.finish(),
@@ -282,6 +284,7 @@ impl Analysis {
             parameters,
             bite_force_max_n: self.bite_force_max_n,
             contact: self.contact.finish(),
+            jaw_cycles,
             worst_cycles,
             intervals,
             topics,

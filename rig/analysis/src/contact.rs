@@ -14,6 +14,9 @@ pub struct ContactFigures {
     pub total_max_at_ns: u64,
     /// The lower teeth, in the order of their numbers.
     pub teeth: Vec<ToothFigures>,
+    /// What the teeth bore over time, as often as a screen shows it; of a long run not to its end.
+    #[serde(skip)]
+    pub moments: Vec<ToothLoads>,
 }
 
 /// What a tooth bore.
@@ -32,9 +35,27 @@ pub struct ToothFigures {
     pub course_n: Curve,
 }
 
+/// What the teeth bore when their sum was greatest within the time of a frame on a screen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ToothLoads {
+    /// When, s since the run's first SYNC.
+    pub at_s: f64,
+    /// Place of a tooth in the list of teeth, and the force on it, base axes, N; those without a force are left out.
+    pub forces_n: Vec<(usize, [f64; 3])>,
+    total_n: f64,
+}
+
+/// Length of a frame, s, and the frames that are kept.
+const FRAME_S: f64 = 1.0 / 60.0;
+const MOST_FRAMES: usize = 2048;
+/// Less is no force to be shown, N.
+const LEAST_N: f64 = 0.1;
+
 /// Collects them.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ContactWatch {
+    moments: Vec<ToothLoads>,
+    frame_ends_s: f64,
     total_max_n: f64,
     greatest: Contact,
     max_n: [f64; MOST_PAIRS],
@@ -55,10 +76,31 @@ impl ContactWatch {
                 self.courses.take(since_ns, place, load_n);
             }
         }
+        if let Some(since_ns) = since_ns {
+            self.moment(since_ns as f64 / 1e9, total_n, contact);
+        }
         if total_n > self.total_max_n {
             (self.total_max_n, self.greatest) = (total_n, *contact);
         }
         self.newest = Some(*contact);
+    }
+
+    fn moment(&mut self, at_s: f64, total_n: f64, contact: &Contact) {
+        let is_of_last = at_s < self.frame_ends_s;
+        let is_less = self.moments.last().is_some_and(|last| is_of_last && total_n <= last.total_n);
+        if total_n < LEAST_N || is_less {
+            return;
+        }
+        if is_of_last {
+            self.moments.pop();
+        } else if self.moments.len() == MOST_FRAMES {
+            return;
+        } else {
+            self.frame_ends_s = at_s + FRAME_S;
+        }
+        let loaded = contact.teeth().enumerate().filter(|(_, tooth)| tooth.load_n() >= LEAST_N);
+        let forces_n = loaded.map(|(place, tooth)| (place, tooth.force_n)).collect();
+        self.moments.push(ToothLoads { at_s, forces_n, total_n });
     }
 
     /// The figures; none without a message.
@@ -75,6 +117,7 @@ impl ContactWatch {
             total_max_n: self.total_max_n,
             total_max_at_ns: self.greatest.sampled_ns,
             teeth: self.newest?.teeth().enumerate().map(tooth).collect(),
+            moments: self.moments,
         })
     }
 }
@@ -103,6 +146,10 @@ mod tests {
             figures.teeth.iter().map(|tooth| (tooth.number, tooth.max_n, tooth.at_total_max_n[2])).collect();
         assert_eq!(found, [(36, 40.0, -30.0), (46, 20.0, -20.0)]);
         assert_eq!(figures.teeth[0].course_n, [(0.0003, 40.0)]);
+        // The three messages share a frame of a screen.
+        let moments: Vec<_> =
+            figures.moments.iter().map(|moment| (moment.at_s, moment.forces_n.len())).collect();
+        assert_eq!(moments, [(0.0002, 2)]);
         assert_eq!(ContactWatch::default().finish(), None);
     }
 }

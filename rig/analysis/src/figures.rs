@@ -13,6 +13,7 @@ use crate::contact::ContactFigures;
 use crate::declared_faults::FaultFigures;
 use crate::events::EventRecord;
 use crate::freshness::ReadingFigures;
+use crate::jaw_cycles::JawCycleFigures;
 use crate::longest_cycles::WorstCycle;
 use crate::measured::IntervalFigures;
 use crate::named::{ParameterFigures, SignalFigures};
@@ -60,6 +61,8 @@ pub struct Figures {
     /// What the lower teeth bore; none where the jaws cannot touch, and on the robot.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contact: Option<ContactFigures>,
+    /// Cycles of the jaw; none without a report.
+    pub jaw_cycles: JawCycleFigures,
     /// Measured intervals.
     pub intervals: Vec<IntervalFigures>,
     /// The longest cycles, each with the hop furthest above its median.

@@ -2,10 +2,12 @@
 
 use masseter_can::Tapped;
 use masseter_shared::config::Scenario;
+use masseter_shared::geometry::Pose;
 use masseter_shared::messages::codes::{ControllerState, NO_DRIVE_STATE};
 use masseter_shared::messages::{Command, FrameTap, Reading, Signals, State, Truth};
 
 use crate::intervals::Intervals;
+use crate::jaw_cycles::JawCycles;
 use crate::longest_cycles::LongestCycles;
 use crate::over_time::{CONTROLLER, OverTimeCollector, PLANT};
 use crate::pose_errors::pose;
@@ -18,6 +20,7 @@ pub(super) struct Shown {
     pub(super) intervals: Intervals,
     pub(super) longest_cycles: LongestCycles,
     pub(super) over_time: OverTimeCollector,
+    pub(super) jaw_cycles: JawCycles,
 }
 
 impl Shown {
@@ -27,6 +30,7 @@ impl Shown {
             intervals: Intervals::new(scenario.period_ns()),
             longest_cycles: LongestCycles::default(),
             over_time: OverTimeCollector::new(scenario.jaw.reference_point_m, scenario.can.bitrate().ok()),
+            jaw_cycles: JawCycles::new(scenario.jaw.reference_point_m, scenario.has_contact()),
         }
     }
 
@@ -63,14 +67,23 @@ impl Shown {
         if self.has_truth {
             self.over_time.estimated(state.sampled_ns, estimated.as_ref());
         } else {
-            self.over_time.actual(state.sampled_ns, estimated.as_ref());
+            self.actual(state.sampled_ns, estimated.as_ref(), 0.0);
+        }
+    }
+
+    /// The actual pose of the platform, and the vertical force on the jaw.
+    fn actual(&mut self, sampled_ns: u64, actual: Option<&Pose>, force_n: f64) {
+        self.over_time.actual(sampled_ns, actual);
+        let since_ns = self.over_time.since(sampled_ns);
+        if let Some(pose) = actual {
+            self.jaw_cycles.take(since_ns, pose, force_n);
         }
     }
 
     pub(super) fn truth(&mut self, truth: &Truth) {
         let actual = pose(truth.position_m, truth.quaternion_wxyz);
         self.over_time.truth(truth);
-        self.over_time.actual(truth.sampled_ns, actual.as_ref());
+        self.actual(truth.sampled_ns, actual.as_ref(), truth.bite_force_n);
     }
 
     pub(super) fn signals(&mut self, message: &Signals) {
