@@ -34,7 +34,7 @@
       const room = 40 + Masseter.textWidth(one.name);
       if (x + room > width && x > 10) { x = 10; row += 1; }
       const line = svg('path', { d: `M${x} ${36 + row * 18}h24` });
-      const drawn = getComputedStyle(drawing.querySelectorAll('path.curve')[keys.length / 2] || drawing);
+      const drawn = getComputedStyle(one.drawn || drawing.querySelectorAll('path.curve')[keys.length / 2] || drawing);
       SAVED.slice(0, 6).forEach((name) => line.setAttribute(name, drawn.getPropertyValue(name)));
       line.setAttribute('fill', 'none');
       keys.push(line, text(x + 30, 40 + row * 18, one.name, 12, 'normal'));

@@ -47,7 +47,7 @@ pub enum PageError {
 }
 
 /// The scripts in the order in which they need each other. The last one builds the page.
-const SCRIPTS: [&str; 12] = [
+const SCRIPTS: [&str; 14] = [
     include_str!("../assets/base.js"),
     include_str!("../assets/points.js"),
     include_str!("../assets/axis.js"),
@@ -57,7 +57,9 @@ const SCRIPTS: [&str; 12] = [
     include_str!("../assets/chart.js"),
     include_str!("../assets/blocks.js"),
     include_str!("../assets/pressure.js"),
+    include_str!("../assets/solid.js"),
     include_str!("../assets/scene.js"),
+    include_str!("../assets/jaw.js"),
     include_str!("../assets/live.js"),
     include_str!("../assets/page.js"),
 ];

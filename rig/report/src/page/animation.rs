@@ -1,12 +1,13 @@
 //! The recorded motion as data for the 3-D view of the page.
 
-use masseter_shared::config::Scenario;
+use masseter_shared::config::{Scenario, ToothConfig};
 use masseter_shared::geometry::{LEGS, Mechanism, Pose};
 use masseter_shared::messages::pose_fields;
 use serde::Serialize;
 use serde_json::Value;
 
-use masseter_analysis::{Figures, PoseSource, TrackingSample};
+use masseter_analysis::{Figures, PoseSource, ToothLoads, TrackingSample};
+use masseter_controller::trajectory::closed_pose;
 use masseter_recording::jaw_points;
 
 /// Positions to the micrometre and quaternions to a millionth are finer than any screen.
@@ -25,6 +26,13 @@ struct Animation {
     corners: [[f64; 3]; LEGS],
     /// Incisal point and condyles in the platform frame.
     jaw: [[f64; 3]; 3],
+    /// The platform when the jaw is closed, x y z, w x y z.
+    closed: Vec<f64>,
+    /// Numbers and places of the lower teeth in the platform frame.
+    teeth: Vec<(u8, [f64; 3])>,
+    /// Forces on the teeth: time since the run's first SYNC, s, then the place of a tooth in the list and its force along x, y and z of the
+    /// base, N, for each tooth with a force.
+    forces: Vec<Vec<f64>>,
     /// What the actual pose is called.
     actual_name: &'static str,
     /// Time since the run's first SYNC, s, then the actual and the desired pose of the platform and, where the actual pose is the true one, the
@@ -39,12 +47,17 @@ pub(super) fn data(scenario: &Scenario, figures: &Figures) -> Option<Value> {
     samples.first()?;
     let source = figures.tracking.actual_source;
     let frame = |sample| frame(sample, figures.over_time.began_ns, source);
+    let contact = figures.contact.as_ref();
+    let tooth = |tooth: &ToothConfig| (tooth.number, tooth.point_m.map(rounded));
     let animation = Animation {
         centres: std::array::from_fn(|leg| mechanism.hinge(leg, 0.0).into()),
         along: std::array::from_fn(|leg| mechanism.slide_direction(leg).into()),
         slide_ends: mechanism.strokes().slide_m,
         corners: mechanism.platform_corners().map(Into::into),
         jaw: jaw_points(&scenario.jaw).map(Into::into),
+        closed: numbers(&closed_pose(&scenario.jaw, &mechanism).ok()?).collect(),
+        teeth: scenario.arch().iter().map(tooth).collect(),
+        forces: contact.map(|contact| contact.moments.iter().map(forces).collect()).unwrap_or_default(),
         actual_name: source.adjective(),
         frames: samples.iter().map(frame).collect(),
     };
@@ -58,6 +71,14 @@ fn frame(sample: &TrackingSample, began_ns: u64, source: PoseSource) -> Vec<f64>
         frame.extend(numbers(&sample.estimated));
     }
     frame
+}
+
+fn forces(moment: &ToothLoads) -> Vec<f64> {
+    let to_tenth = |force_n: f64| (force_n * 10.0).round() / 10.0;
+    let forces = moment.forces_n.iter();
+    let of_teeth =
+        forces.flat_map(|(place, force_n)| [*place as f64].into_iter().chain(force_n.map(to_tenth)));
+    [rounded(moment.at_s)].into_iter().chain(of_teeth).collect()
 }
 
 fn numbers(pose: &Pose) -> impl Iterator<Item = f64> {

@@ -6,6 +6,7 @@ mod buses;
 mod charts;
 mod circumstances;
 mod events;
+mod jaw;
 mod live;
 mod motion;
 mod named;
@@ -36,9 +37,10 @@ pub fn so_far(manifest: &Manifest, figures: &Figures, number: u64, left_out: u64
 
 fn page(life: Life, first: Vec<Section>, manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Page {
     let scenario = &manifest.scenario;
-    let others: [Option<Section>; 10] = [
+    let others: [Option<Section>; 11] = [
         requirements::section(figures, verdict),
         motion::mechanism(scenario, figures),
+        jaw::section(scenario, figures),
         Some(motion::section(scenario, figures)),
         motion::pressure(figures),
         Some(actuators::section(scenario, figures)),
