@@ -172,6 +172,16 @@ fn the_axes_of_a_tracker_are_found_from_how_the_jaw_opens() {
     assert!(stated["likely_axes"].is_null() && stated["refused"].is_null(), "{stated}");
 }
 
+/// As of a tracker whose y points anterior and x to the right, on a jaw that hardly turns.
+#[test]
+fn the_axes_of_an_opening_without_a_turn_are_those_under_which_the_jaw_goes_down_and_back() {
+    let found = described(&opening(|_, numbers| {
+        let share = numbers[1] / 4.0;
+        *numbers = [numbers[0], -2.0 * share, -34.0 * share, -44.0 * share, 1.0, 0.0, 0.0, 0.0];
+    }));
+    assert_eq!(found["likely_axes"], serde_json::json!(["+y", "-x", "+z"]));
+}
+
 #[test]
 fn the_picture_shows_the_paths_the_courses_and_the_glitches() {
     let workspace = Workspace::new("");

@@ -15,10 +15,11 @@ use serde_json::Value;
 
 const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 /// What every report of a run that moved shows.
-const ELEMENTS: [&str; 18] = [
+const ELEMENTS: [&str; 19] = [
     "verdict",
     "checks",
     "scene",
+    "jaw",
     "motion-x",
     "motion-y",
     "motion-z",

@@ -274,6 +274,81 @@ def pinches(sheet: Sheet):
     assert window[1] - window[0] < 0.5 * (whole[1] - whole[0]), (whole, window)
 
 
+def shows_the_jaw_in_space(sheet: Sheet):
+    """Every view draws another picture; the cursor moves the jaw, and an exaggerated error moves it away from the desired one."""
+    canvas = sheet.page.locator(".scene canvas")
+    canvas.scroll_into_view_if_needed()
+
+    def picture() -> str:
+        sheet.frame()
+        return canvas.evaluate("canvas => canvas.toDataURL()")
+
+    sheet.get("() => Masseter.time.seek(Masseter.page.time.motion_s + 2.6)")
+    seen = [picture()]
+    for key in ("2", "3", "4", "ArrowLeft", "+"):
+        canvas.press(key)
+        seen.append(picture())
+    canvas.press("1")
+    assert picture() == seen[0], "the first view has changed"
+    sheet.page.click(".scene [data-value=whole]")
+    seen.append(picture())
+    sheet.page.click(".scene [data-value=jaw]")
+    sheet.page.select_option(".scene select", "1000")
+    seen.append(picture())
+    sheet.page.select_option(".scene select", "1")
+    sheet.get("() => Masseter.time.seek(Masseter.page.time.motion_s + 2.9)")
+    seen.append(picture())
+    assert len(set(seen)) == len(seen), [seen.index(one) for one in seen]
+
+
+def bites(sheet: Sheet):
+    """While teeth or food press on the jaw, the force is drawn and said."""
+    sheet.get("""() => {
+        const {forces} = Masseter.page.sections.flatMap(({blocks}) => blocks).find(({kind}) => kind === 'scene').data;
+        Masseter.time.seek(forces[Math.floor(forces.length / 2)][0]);
+    }""")
+    sheet.frame()
+    said = sheet.page.locator(".scene .state").inner_text()
+    assert float(said.split("teeth ")[1].split(" N")[0]) > 1, said
+
+
+def shows_the_paths_of_the_jaw(sheet: Sheet):
+    """Planes have one scale along both axes; a click on a path moves the cursor; the values are saved as they are drawn."""
+    planes = sheet.page.locator("#jaw .plane")
+    assert planes.count() >= 8, planes.count()
+    scales = sheet.get("""() => [...document.querySelectorAll('#jaw .plane')].slice(0, 6).map(plane => {
+        const ticks = [...plane.querySelectorAll('svg[role=img] .tick')].filter(tick => /^[−\\d.]+$/.test(tick.textContent));
+        const value = tick => Number(tick.textContent.replace('−', '-'));
+        const along = (name, anchor) => {
+            const [first, second] = ticks.filter(tick => tick.getAttribute('text-anchor') === anchor);
+            return (second.getAttribute(name) - first.getAttribute(name)) / (value(second) - value(first));
+        };
+        return along('x', 'middle') / along('y', 'end');
+    })""")
+    assert all(abs(scale + 1) < 0.01 for scale in scales), scales
+    sheet.get("() => Masseter.time.seek(null)")
+    planes.first.scroll_into_view_if_needed()
+    x, y = sheet.get("""() => {
+        const drawing = document.querySelector('#jaw .plane svg[role=img]'), curve = drawing.querySelectorAll('path.curve')[1];
+        const at = curve.getPointAtLength(curve.getTotalLength() * 0.03), box = drawing.getBoundingClientRect();
+        const scale = box.width / drawing.viewBox.baseVal.width;
+        return [box.left + at.x * scale, box.top + at.y * scale];
+    }""")
+    sheet.page.mouse.click(x, y)
+    assert sheet.get("() => Masseter.time.cursor") is not None
+    for kind, begin in (("SVG", b"<svg"), ("PNG", b"\x89PNG"), ("CSV", b'"curve"')):
+        planes.first.locator("summary").click()
+        with sheet.page.expect_download() as saved:
+            planes.first.get_by_text(f"Save as {kind}").click()
+        assert Path(saved.value.path()).read_bytes().startswith(begin), kind
+
+
+def counts_the_cycles(sheet: Sheet):
+    """Ten seconds of the default motion have thirteen cycles, of 18 mm less the half that does not count."""
+    rows = dict(sheet.page.locator("#jaw tbody tr").evaluate_all("rows => rows.map(row => [row.cells[0].textContent, row.cells[1].textContent])"))
+    assert abs(float(rows["duration, opening to opening"]) - 1 / 1.43) < 0.01 and 17 < float(rows["opening"]) < 18, rows
+
+
 def fits_the_screen(sheet: Sheet):
     width = sheet.get("() => document.documentElement.scrollWidth")
     assert width <= sheet.page.viewport_size["width"], width
@@ -310,19 +385,22 @@ def main():
     # A run in real time has a date; a run in simulated time is the same on every machine.
     dated = FOLDER / "dated.html"
     dated.write_text(chewing.read_text().replace('"wall_s":null', '"wall_s":1790250400.25'))
+    food = run("food", "examples/food.toml")
     size_mb = long.stat().st_size / 1e6
     assert size_mb <= LARGEST_MB, f"60 s take {size_mb:.2f} MB"
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
         short_s, long_s = loads_fast(browser, chewing), loads_fast(browser, long)
         sheet = Sheet(browser, chewing)
-        for check in (draws_every_chart, follows_the_pointer, zooms, toggles_curves_and_time, saves, plays, fits_the_screen, is_accessible):
+        for check in (draws_every_chart, follows_the_pointer, zooms, toggles_curves_and_time, saves, plays, shows_the_jaw_in_space,
+                      shows_the_paths_of_the_jaw, counts_the_cycles, fits_the_screen, is_accessible):
             check(sheet)
         goes_on(sheet)
         sheet.close()
         for path, settings, checks in (
             (long, {}, [keeps_extremes]),
             (dated, {}, [tells_wall_time]),
+            (food, {}, [bites, is_accessible]),
             (stopped, {}, [marks_the_stop, draws_every_chart, prints]),
             (chewing, {"color_scheme": "dark"}, [is_dark, is_accessible, prints]),
             (stopped, {"viewport": PHONE, "has_touch": True, "is_mobile": True}, [fits_the_screen, pinches, is_accessible]),

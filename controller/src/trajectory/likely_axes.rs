@@ -1,6 +1,6 @@
 //! Which axes of a file are likely to point anterior, left and up, from what a jaw does when it opens widest.
 //!
-//! Then the incisal point goes down and hardly aside, the jaw turns about the axis that points left, and the condyles go forward. A
+//! Then the incisal point goes down, rather back than forward and hardly aside, the jaw turns about the axis that points left, and the condyles go forward. A
 //! recording without an opening shows nothing of that.
 
 use masseter_shared::geometry::{Pose, Vec3};
@@ -16,10 +16,11 @@ const ROWS: usize = 200;
 const CLEAR_RAD: f64 = 0.05;
 /// A jaw reaches so far from the closed place only by opening, m.
 const OPENED_M: f64 = 0.015;
-/// A motion shows its axes from this score on, of 2.25 at most, and others than the stated ones only by this much more.
+/// A motion shows its axes from this score on, of less than 2.5, and others than the stated ones only by this much more.
 const LEAST: f64 = 0.6;
 const BETTER: f64 = 0.5;
-/// Weight of the condyles' way forward.
+/// Weights of the incisal point's way back, and of the condyles' way forward.
+const BACK: f64 = 0.5;
 const FORWARD: f64 = 0.25;
 
 const SIGNED: [&str; 6] = ["+x", "-x", "+y", "-y", "+z", "-z"];
@@ -70,7 +71,7 @@ fn score(source: &Source, axes: &Axes) -> Result<f64, Located> {
     }
     let turn = widest.rotation.scaled_axis();
     let condyle = incisal + widest.rotation * source.reference - source.reference;
-    let down = share(-incisal.z - incisal.y.abs(), &incisal);
+    let down = share(-incisal.z - incisal.y.abs() - BACK * incisal.x, &incisal);
     let opening = share(turn.y, &turn) * (turn.norm() / CLEAR_RAD).min(1.0);
     Ok(down + opening + FORWARD * share(condyle.x, &condyle))
 }

@@ -235,7 +235,8 @@
     chart(holder, clock, 'Opening: incisal point downwards', 'mm', [['desired', 'desired', overDesired(down)], [scene.actual_name, style, over(down)]]);
     chart(holder, clock, 'Rotation of the jaw from the closed jaw', '°', [['opening', 'plain', over(opening)], ['yaw to the left', 'plain', over(({ turn }) => turn[2])], ['roll to the right', 'plain', over(({ turn }) => turn[0])]]);
     chart(holder, clock, 'Velocity of the incisal point', 'mm/s', [['forward', 'plain', rates(path, ({ incisal }) => incisal[0])], ['to the left', 'plain', rates(path, ({ incisal }) => incisal[1])], ['up', 'plain', rates(path, ({ incisal }) => incisal[2])]]);
-    chart(holder, clock, 'Velocity of the rotation', '°/s', [['opening', 'plain', rates(path, opening)]]);
+    chart(holder, clock, 'Velocity of the rotation', '°/s', [['opening', 'plain', rates(path, opening)], ['yaw to the left', 'plain', rates(path, ({ turn }) => turn[2])],
+      ['roll to the right', 'plain', rates(path, ({ turn }) => turn[0])]]);
     cycles(holder, data, clock);
   });
 
@@ -250,6 +251,6 @@
       { name: 'Bonwill triangle', style: 'estimated', stroke: 'var(--jaw)', xs: [middle[0], 0], ys: [middle[2], 0] },
       { name: 'axis', style: 'dots', stroke: 'var(--c0)', xs: found.map(({ axis }) => axis.at[0]), ys: found.map(({ axis }) => axis.at[2]), at: found.map(({ time }) => time) },
       { name: 'condyles', style: 'dots', stroke: 'var(--jaw)', xs: [middle[0]], ys: [middle[2]] }],
-    note: found.length ? `Finite helical axis from the closed jaw, where it meets the midsagittal plane, for turns above ${LEAST_TURN}°. Tilt to the left–right axis: ${Masseter.fixed(tilt[0], 1)} to ${Masseter.fixed(tilt[1], 1)}°.` : `The jaw turns by less than ${LEAST_TURN}°.` });
+    note: found.length ? `Finite helical axis from the closed jaw, where it meets the midsagittal plane, for turns above ${LEAST_TURN}°. Tilt to the left–right axis: ${Masseter.fixed(tilt[0], 1)} to ${Masseter.fixed(tilt[1], 1)}°.` : `No axis: the jaw turns by less than ${LEAST_TURN}°, or about an axis that lies along the midsagittal plane.` });
   }
 }

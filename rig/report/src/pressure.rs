@@ -120,7 +120,7 @@ mod tests {
 
     fn contact() -> ContactFigures {
         let teeth = vec![tooth(36, 0.025, 40.0), tooth(46, -0.025, 0.0)];
-        ContactFigures { total_max_n: 40.0, total_max_at_ns: 0, teeth }
+        ContactFigures { total_max_n: 40.0, total_max_at_ns: 0, teeth, moments: Vec::new() }
     }
 
     #[test]
