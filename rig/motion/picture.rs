@@ -1,9 +1,7 @@
 //! The motion as a picture: paths of the incisal point and the condyles, and their course.
 
-use masseter_charts::{
-    Axis, Error, Legend, Line, LineChart, Moment, Scale, SeriesLabelPosition, svg as draw_svg,
-};
-use masseter_controller::trajectory::{RecordingSurvey, SurveyRow};
+use masseter_charts::{Axis, Error, Line, LineChart, Scale, SeriesLabelPosition, palette, svg as draw_svg};
+use masseter_controller::trajectory::{Glitch, RecordingSurvey, SurveyRow};
 
 const WIDTH: u32 = 960;
 const PATHS: u32 = 400;
@@ -12,6 +10,10 @@ const COURSE: u32 = 260;
 const PLOT: f64 = 316.0 / 386.0;
 /// Room around a path, as a share of its size.
 const ROOM: f64 = 1.15;
+/// Glitches that are marked.
+const MOST_MARKS: usize = 5;
+/// The component on which they are marked.
+const UP: usize = 2;
 /// A path of no size is drawn in a box of this size, mm.
 const LEAST_MM: f64 = 1.0;
 
@@ -63,9 +65,7 @@ fn path(survey: &RecordingSurvey, plane: &Plane) -> LineChart {
         x: Axis::new(plane.names[0], Scale::Linear, ends(x, width)),
         y: Axis::new(plane.names[1], Scale::Linear, ends(y, width * PLOT)),
         lines,
-        limits: Vec::new(),
-        moments: Vec::new(),
-        legend: Legend::Inside(SeriesLabelPosition::LowerRight),
+        legend: SeriesLabelPosition::LowerRight,
     }
 }
 
@@ -83,17 +83,21 @@ fn course(
     let line = |(axis, name): (usize, &str)| {
         Line::new(name, survey.path.iter().map(|row| (row.time_s, of(row)[axis])).collect())
     };
-    let moment = |glitch: &masseter_controller::trajectory::Glitch| Moment {
-        name: format!("line {}", glitch.line),
-        at: glitch.time_s,
+    let mark = |glitch: &Glitch| {
+        let row = survey.path.partition_point(|row| row.time_s < glitch.time_s).min(survey.path.len() - 1);
+        let at = (glitch.time_s, of(&survey.path[row])[UP]);
+        Line::new(&format!("glitch, line {}", glitch.line), vec![at]).marked().coloured(palette::RED)
     };
     LineChart {
         title: String::new(),
         x: Axis::fitted("time, s", Scale::Linear).including(0.0),
         y: Axis::fitted(label, Scale::Linear),
-        lines: names.into_iter().enumerate().map(line).collect(),
-        limits: Vec::new(),
-        moments: survey.glitches.iter().map(moment).collect(),
-        legend: Legend::Beside,
+        lines: names
+            .into_iter()
+            .enumerate()
+            .map(line)
+            .chain(survey.glitches.iter().take(MOST_MARKS).map(mark))
+            .collect(),
+        legend: SeriesLabelPosition::LowerRight,
     }
 }

@@ -20,7 +20,7 @@ const OPENED_M: f64 = 0.015;
 const LEAST: f64 = 0.6;
 const BETTER: f64 = 0.5;
 /// Weights of the incisal point's way back, and of the condyles' way forward.
-const BACK: f64 = 0.5;
+const BACK: f64 = 0.25;
 const FORWARD: f64 = 0.25;
 
 const SIGNED: [&str; 6] = ["+x", "-x", "+y", "-y", "+z", "-z"];
@@ -72,6 +72,8 @@ fn score(source: &Source, axes: &Axes) -> Result<f64, Located> {
     let turn = widest.rotation.scaled_axis();
     let condyle = incisal + widest.rotation * source.reference - source.reference;
     let down = share(-incisal.z - incisal.y.abs() - BACK * incisal.x, &incisal);
-    let opening = share(turn.y, &turn) * (turn.norm() / CLEAR_RAD).min(1.0);
-    Ok(down + opening + FORWARD * share(condyle.x, &condyle))
+    // A small turn is noise, and shows no axis.
+    let clear = (turn.norm() / CLEAR_RAD).min(1.0).powi(2);
+    let opening = share(turn.y, &turn) + FORWARD * share(condyle.x, &condyle);
+    Ok(down + clear * opening)
 }

@@ -104,11 +104,13 @@ impl Changes {
     }
 
     fn scene(&mut self, id: &str, scene: &Value) {
-        let Some(frames) = scene["frames"].as_array() else { return };
-        let is_new = |frame: &&Value| frame[0].as_f64().is_some_and(|at_s| self.settled.contains(at_s));
-        let frames: Vec<_> = frames.iter().filter(is_new).collect();
-        if !frames.is_empty() {
-            self.append.push(json!([id, null, frames]));
+        for what in ["frames", "forces"] {
+            let Some(moments) = scene[what].as_array() else { continue };
+            let is_new = |moment: &&Value| moment[0].as_f64().is_some_and(|at_s| self.settled.contains(at_s));
+            let moments: Vec<_> = moments.iter().filter(is_new).collect();
+            if !moments.is_empty() {
+                self.append.push(json!([id, what, moments]));
+            }
         }
     }
 }

@@ -12,6 +12,9 @@
   // Frames on either side over which a velocity is taken.
   const AROUND = 1;
 
+  // What follows the cursor until the next redraw.
+  let followers = [];
+
   // Position and turn of the jaw in each frame, in mm and degrees from the closed jaw, in the axes forward, left and up.
   function pathOf(scene, offset) {
     const { closed, jaw, frames } = scene, home = jaw.map((point) => placed(closed, point));
@@ -129,7 +132,7 @@
       dot.style.display = isIn ? '' : 'none';
       if (isIn) { dot.setAttribute('cx', x.position(xs[place])); dot.setAttribute('cy', y.position(ys[place])); }
     });
-    clock.on('cursor', show);
+    followers.push(show);
     show();
     drawing.addEventListener('click', (event) => {
       const frame = drawing.getBoundingClientRect(), ratio = drawing.viewBox.baseVal.width / frame.width;
@@ -152,12 +155,8 @@
   };
   const curve = (path, point, [, , , a, b], name, style, stroke) => ({ name, style, stroke, xs: path.map((frame) => frame[point][a]), ys: path.map((frame) => frame[point][b]), at: path.map(({ at }) => at) });
 
-  const chart = (holder, clock, title, unit, series, height = 130) => {
-    const block = element('div', { class: 'block chart' });
-    holder.append(block);
-    Masseter.chart(block, { title, unit, across: 'time', scale: 'linear', height, otherwise: 'Nothing moved.',
-      series: series.map(([name, style, points]) => ({ name, style, points: points.flat() })) }, clock);
-  };
+  const chartData = (title, unit, series) => ({ title, unit, across: 'time', scale: 'linear', height: 130, otherwise: 'Nothing moved.',
+    series: series.map(([name, style, points]) => ({ name, style, points: points.flat() })) });
 
   // The velocity of a component in mm/s or degrees a second.
   function rates(path, of) {
@@ -202,42 +201,60 @@
     holder.append(element('details', {}, element('summary', {}, `Each of ${rows.length === data.count ? 'the' : 'the first'} ${rows.length} cycles`), tableOf('Cycles', head, rows, 'cycles')));
   }
 
+  function planes(clock, scene, path, desired) {
+    const isTrue = scene.actual_name === 'true', own = isTrue ? 'var(--true)' : 'var(--estimated)', style = styleOf(scene);
+    const incisal = Object.values(PLANES).map((plan) => plane(clock, { title: `Incisal point: ${plan[0].toLowerCase()}`, across: plan[1], up: plan[2], isEqual: true, isPlaced: true, curves: [
+      curve(desired, 'incisal', plan, 'desired', 'desired', 'var(--desired)'), curve(path, 'incisal', plan, scene.actual_name, style, own)] }));
+    const condyles = [PLANES.sagittal, PLANES.horizontal].map((plan) => plane(clock, { title: `Condyles: ${plan[0].toLowerCase()}`, across: plan[1], up: plan[2], isEqual: true, isPlaced: true, curves: [
+      curve(desired, 'right', plan, '', 'desired', 'var(--desired)'), curve(desired, 'left', plan, 'desired', 'desired', 'var(--desired)'),
+      curve(path, 'right', plan, 'right', style, 'var(--c1)'), curve(path, 'left', plan, 'left', style, 'var(--c3)')] }));
+    return [...incisal, ...condyles, hinges(clock, scene, path)];
+  }
+
+  const styleOf = (scene) => (scene.actual_name === 'true' ? 'true' : 'smoothed');
+
+  function courses(scene, path, desired) {
+    const over = (frames, of) => frames.map((frame) => [frame.at, of(frame)]);
+    const down = ({ incisal }) => -incisal[2], parts = ['roll to the right', 'opening', 'yaw to the left'], order = [1, 2, 0];
+    return [
+      chartData('Opening: incisal point downwards', 'mm', [['desired', 'desired', over(desired, down)], [scene.actual_name, styleOf(scene), over(path, down)]]),
+      chartData('Rotation of the jaw from the closed jaw', '°', order.map((axis) => [parts[axis], 'plain', over(path, ({ turn }) => turn[axis])])),
+      chartData('Velocity of the incisal point', 'mm/s', ['forward', 'to the left', 'up'].map((name, axis) => [name, 'plain', rates(path, ({ incisal }) => incisal[axis])])),
+      chartData('Velocity of the rotation', '°/s', order.map((axis) => [parts[axis], 'plain', rates(path, ({ turn }) => turn[axis])])),
+    ];
+  }
+
   Masseter.block('jaw', (holder, data, clock) => {
-    const scene = Masseter.page.sections.flatMap(({ blocks }) => blocks).find(({ kind }) => kind === 'scene')?.data;
-    if (!scene?.frames.length) return;
-    const running = Masseter.phases.filter(({ name }) => name === 'running');
-    const isPlayed = ({ at }) => !running.length || running.some(({ from_s: from, to_s: to }) => at >= from && at <= to);
-    const isTrue = scene.actual_name === 'true', own = isTrue ? 'var(--true)' : 'var(--estimated)', style = isTrue ? 'true' : 'smoothed';
-    const whole = pathOf(scene, ACTUAL), path = whole.filter(isPlayed), desired = pathOf(scene, DESIRED).filter(isPlayed);
-    if (!path.length) {
-      holder.append(element('p', {}, 'The motion did not begin.'));
-      return;
+    const { scene } = Masseter;
+    const words = element('p', {}), views = element('div', { class: 'planes' }), found = element('div', {});
+    const isPlayed = (running) => ({ at }) => !running.length || running.some(({ from_s: from, to_s: to }, place) =>
+      at >= from && (at <= to || (Masseter.page.life === 'live' && place === running.length - 1)));
+    let charts = null;
+
+    function update(now) {
+      const running = Masseter.phases.filter(({ name }) => name === 'running');
+      const [path, desired] = [ACTUAL, DESIRED].map((offset) => pathOf(scene, offset).filter(isPlayed(running)));
+      followers = [];
+      found.replaceChildren();
+      if (path.length < 2 * AROUND + 1) {
+        words.textContent = 'The motion did not begin.';
+        return;
+      }
+      const lasts = path[path.length - 1].at - path[0].at;
+      words.textContent = `${Masseter.fixed(lasts, 1)} s of the motion at ${Masseter.fixed((path.length - 1) / (lasts || 1), 0)} poses a second`
+        + `${running.length && running[running.length - 1].to_s - path[path.length - 1].at > 0.1 ? '; the recording goes on' : ''}. Displacements count from the closed jaw. A click on a path moves the cursor there.`;
+      views.replaceChildren(...planes(clock, scene, path, desired));
+      const next = courses(scene, path, desired);
+      charts ||= next.map((course) => Masseter.chart(drawn.appendChild(element('div', { class: 'block chart' })), course, clock));
+      charts.forEach((chart, at) => chart.update(next[at]));
+      cycles(found, now, clock);
     }
-    const last = path[path.length - 1], lasts = last.at - path[0].at, isCut = running.length && running[running.length - 1].to_s - last.at > 0.1;
-    holder.append(element('p', {}, `${Masseter.fixed(lasts, 1)} s of the motion at ${Masseter.fixed((path.length - 1) / (lasts || 1), 0)} poses a second${isCut ? '; the recording goes on' : ''}. `
-      + 'Displacements count from the closed jaw. A click on a path moves the cursor there.'));
-    const views = element('div', { class: 'planes' });
-    for (const name of Object.keys(PLANES)) {
-      const plan = PLANES[name];
-      views.append(plane(clock, { title: `Incisal point: ${plan[0].toLowerCase()}`, across: plan[1], up: plan[2], isEqual: true, isPlaced: true, curves: [
-        curve(desired, 'incisal', plan, 'desired', 'desired', 'var(--desired)'), curve(path, 'incisal', plan, scene.actual_name, style, own)] }));
-    }
-    for (const name of ['sagittal', 'horizontal']) {
-      const plan = PLANES[name];
-      views.append(plane(clock, { title: `Condyles: ${plan[0].toLowerCase()}`, across: plan[1], up: plan[2], isEqual: true, isPlaced: true, curves: [
-        curve(desired, 'right', plan, '', 'desired', 'var(--desired)'), curve(desired, 'left', plan, 'desired', 'desired', 'var(--desired)'),
-        curve(path, 'right', plan, 'right', style, 'var(--c1)'), curve(path, 'left', plan, 'left', style, 'var(--c3)')] }));
-    }
-    views.append(hinges(clock, scene, path));
-    holder.append(views);
-    const over = (of) => path.map((frame) => [frame.at, of(frame)]), overDesired = (of) => desired.map((frame) => [frame.at, of(frame)]);
-    const down = ({ incisal }) => -incisal[2], opening = ({ turn }) => turn[1];
-    chart(holder, clock, 'Opening: incisal point downwards', 'mm', [['desired', 'desired', overDesired(down)], [scene.actual_name, style, over(down)]]);
-    chart(holder, clock, 'Rotation of the jaw from the closed jaw', '°', [['opening', 'plain', over(opening)], ['yaw to the left', 'plain', over(({ turn }) => turn[2])], ['roll to the right', 'plain', over(({ turn }) => turn[0])]]);
-    chart(holder, clock, 'Velocity of the incisal point', 'mm/s', [['forward', 'plain', rates(path, ({ incisal }) => incisal[0])], ['to the left', 'plain', rates(path, ({ incisal }) => incisal[1])], ['up', 'plain', rates(path, ({ incisal }) => incisal[2])]]);
-    chart(holder, clock, 'Velocity of the rotation', '°/s', [['opening', 'plain', rates(path, opening)], ['yaw to the left', 'plain', rates(path, ({ turn }) => turn[2])],
-      ['roll to the right', 'plain', rates(path, ({ turn }) => turn[0])]]);
-    cycles(holder, data, clock);
+
+    const drawn = element('div', {});
+    holder.append(words, views, drawn, found);
+    clock.on('cursor', () => followers.forEach((follow) => follow()));
+    update(data);
+    return { update };
   });
 
   // Where the hinge axis meets the midsagittal plane, beside the closed jaw.

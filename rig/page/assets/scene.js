@@ -15,6 +15,8 @@ Masseter.block('scene', (holder, data, clock) => {
   const HELD_S = 0.03;
   const [incisal, left, right] = data.jaw;
   const closed = data.closed;
+  // The views of the jaw draw the same poses.
+  Masseter.scene = data;
 
   const canvas = element('canvas', { tabindex: 0, role: 'application', 'aria-roledescription': '3-D view', 'aria-label':
     'The mechanism and the jaw at the time of the cursor. Arrow keys turn the view, plus and minus zoom, 1 to 4 choose a view, 0 resets it.' });
@@ -282,9 +284,10 @@ Masseter.block('scene', (holder, data, clock) => {
   }).observe(canvas);
   look(view);
   return {
-    append(_, frames) {
-      const last = data.frames.length ? data.frames[data.frames.length - 1][0] : -Infinity;
-      data.frames.push(...frames.filter(([at]) => at > last));
+    // More of the `frames`, or of the `forces`.
+    append(what, moments) {
+      const known = data[what], last = known.length ? known[known.length - 1][0] : -Infinity;
+      known.push(...moments.filter(([at]) => at > last));
       redraw();
     },
   };

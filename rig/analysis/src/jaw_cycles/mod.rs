@@ -55,7 +55,7 @@ pub struct JawCycleFigures {
 }
 
 /// Collects them.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct JawCycles {
     /// The incisal point in the platform frame.
     incisal_m: Vec3,

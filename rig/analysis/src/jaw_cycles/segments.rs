@@ -31,7 +31,7 @@ enum Phase {
 }
 
 /// The cutter: it holds the samples of one cycle.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Segments {
     samples: Vec<Sample>,
     phase: Phase,
