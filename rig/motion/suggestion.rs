@@ -65,7 +65,7 @@ fn better_offset(scenario: &Scenario, mechanism: &Mechanism) -> Option<[f64; 3]>
     let jaw = &scenario.jaw;
     let trajectory = Trajectory::new(&scenario.motion, jaw, mechanism, scenario.duration_s).ok()?;
     let best = best_placement(&trajectory, mechanism)?;
-    if best.shift_m == [0.0; 3] {
+    if best.shift_m.iter().all(|shift_m| shift_m.abs() < 1e-9) {
         return None;
     }
     let at = |axis: usize| ((jaw.closed_offset_m[axis] + best.shift_m[axis]) * 1e4).round() / 1e4;
