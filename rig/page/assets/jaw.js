@@ -254,7 +254,15 @@
     holder.append(words, views, drawn, found);
     clock.on('cursor', () => followers.forEach((follow) => follow()));
     update(data);
-    return { update };
+    // Out of sight nothing is drawn anew.
+    let isSeen = true, waiting = null;
+    new IntersectionObserver(([entry]) => {
+      isSeen = entry.isIntersecting;
+      if (!isSeen || !waiting) return;
+      update(waiting);
+      waiting = null;
+    }).observe(holder);
+    return { update(now) { if (isSeen) update(now); else waiting = now; } };
   });
 
   // Where the hinge axis meets the midsagittal plane, beside the closed jaw.
