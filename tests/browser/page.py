@@ -150,9 +150,9 @@ def zooms(sheet: Sheet):
     dragged = sheet.get(window)
     length = (whole[1] - whole[0]) * 0.2
     assert 0.9 * length < dragged[1] - dragged[0] < 1.4 * length, (whole, dragged)
+    # The other charts follow once they are seen.
     sheet.chart("motion-z")
-    sheet.frame()
-    assert sheet.get(ticks) != before, "the other charts do not follow"
+    page.wait_for_function(f"before => ({ticks})() !== before", arg=before, timeout=5000)
     box = sheet.chart("legs").bounding_box()
     page.mouse.move(x + 0.5 * box["width"], box["y"] + 80)
     page.keyboard.down("Control")
