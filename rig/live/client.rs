@@ -11,28 +11,19 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use masseter_recording::{Recorded, Scene, Topic};
+use masseter_recording::Recorded;
 use masseter_shared::clock;
-use masseter_shared::named::Declared;
-use masseter_shared::transport::Domain;
 
 use super::handshake::{self, Protocol};
-use super::page::{self, Feed};
+use super::host::Host;
+use super::queue::{Disconnected, INTERVAL, QUEUE, Queued, bit};
 use super::request::Peeked;
-use super::{foxglove, supervisor::Supervisor};
+use super::{foxglove, page};
 
-/// Length of a client's queue: almost half a second of every topic at 1 kHz.
-pub(super) const QUEUE: usize = 8192;
 /// A client that takes nothing for this long is disconnected.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
-/// Time that the thread waits for a request before it sends what is queued.
-pub(super) const INTERVAL: Duration = Duration::from_millis(10);
-
 /// Looks, one each [`INTERVAL`], for the connection of a client that has named the secret.
 const CONNECTION_POLLS: u32 = 100;
-
-/// A message, and when it was received, ns.
-pub(super) type Queued = (u64, Recorded);
 
 /// The recorder's end of a client's queue.
 #[derive(Debug)]
@@ -47,21 +38,6 @@ pub(super) struct Client {
     handshake_by_ns: u64,
     serving: JoinHandle<()>,
 }
-
-/// What clients may see and do: the secret that they must name, the run's scene, signals and parameters, its page, and who ends
-/// the run.
-#[derive(Debug, Clone)]
-pub(super) struct Host {
-    pub secret: String,
-    pub scene: Scene,
-    pub declared: Arc<Declared>,
-    pub domain: Domain,
-    pub feed: Arc<Feed>,
-    pub supervisor: Supervisor,
-}
-
-const _: () =
-    assert!(Topic::ALL.len() <= u16::BITS as usize, "every topic has a bit in `Client::subscribed`");
 
 impl Client {
     /// Starts the thread, which makes the handshake and then serves the client.
@@ -134,21 +110,6 @@ impl Client {
     pub(super) fn cut_off(&self) {
         // It fails where the client has just left.
         let _ = self.stream.shutdown(Shutdown::Both);
-    }
-}
-
-/// The bit of a topic in [`Client::subscribed`].
-pub(super) fn bit(topic: Topic) -> u16 {
-    1 << topic as u8
-}
-
-/// The client is disconnected.
-#[derive(Debug)]
-pub(super) struct Disconnected;
-
-impl From<io::Error> for Disconnected {
-    fn from(_: io::Error) -> Self {
-        Self
     }
 }
 

@@ -1,18 +1,17 @@
 //! The handshake of a WebSocket: who is admitted, and which protocol the connection has.
 
 use std::fmt::Display;
-use std::io::ErrorKind;
 use std::net::TcpStream;
 
+use tungstenite::accept_hdr_with_config;
 use tungstenite::handshake::server::{Callback, ErrorResponse, Request, Response};
 use tungstenite::http::{HeaderValue, StatusCode, header::SEC_WEBSOCKET_PROTOCOL};
-use tungstenite::protocol::frame::{CloseFrame, coding::CloseCode};
-use tungstenite::protocol::{Message, WebSocket, WebSocketConfig};
-use tungstenite::{Error, accept_hdr_with_config};
+use tungstenite::protocol::WebSocketConfig;
 
 use super::admission::admit;
-use super::client::{Disconnected, INTERVAL};
 use super::foxglove::choose_subprotocol;
+use super::queue::{Disconnected, INTERVAL};
+use super::socket::Socket;
 
 /// The longest message from a client, bytes; clients only ask.
 const MAX_REQUEST_BYTES: usize = 1 << 16;
@@ -45,7 +44,7 @@ pub(super) fn accept(stream: TcpStream, secret: &str) -> Result<Accepted, Discon
     let handshake = Handshake { secret, protocol: &mut protocol, after: &mut after };
     let socket = accept_hdr_with_config(stream, handshake, Some(config)).map_err(|_| Disconnected)?;
     socket.get_ref().set_read_timeout(Some(INTERVAL))?;
-    Ok(Accepted { socket: Socket(socket), protocol, after })
+    Ok(Accepted { socket: Socket::new(socket), protocol, after })
 }
 
 struct Handshake<'a> {
@@ -81,51 +80,6 @@ fn refused(status: StatusCode, reason: &dyn Display) -> ErrorResponse {
     let mut refusal = ErrorResponse::new(Some(format!("{reason}\n")));
     *refusal.status_mut() = status;
     refusal
-}
-
-impl From<Error> for Disconnected {
-    fn from(_: Error) -> Self {
-        Self
-    }
-}
-
-/// A WebSocket whose reads end after [`INTERVAL`].
-pub(super) struct Socket(WebSocket<TcpStream>);
-
-impl Socket {
-    /// The text of the next request, if one comes in a moment.
-    pub(super) fn receive(&mut self) -> Result<Option<String>, Disconnected> {
-        match self.0.read() {
-            Ok(Message::Text(text)) => Ok(Some(text.as_str().to_owned())),
-            Err(Error::Io(error)) if error.kind() != ErrorKind::WouldBlock => Err(Disconnected),
-            Ok(_) | Err(Error::Io(_)) => Ok(None),
-            Err(_) => Err(Disconnected),
-        }
-    }
-
-    /// Sends a text at once.
-    pub(super) fn text(&mut self, text: &str) -> Result<(), Disconnected> {
-        Ok(self.0.send(Message::text(text))?)
-    }
-
-    /// Writes bytes that go out with the next [`flush`](Self::flush).
-    pub(super) fn write(&mut self, bytes: Vec<u8>) -> Result<(), Disconnected> {
-        Ok(self.0.write(Message::Binary(bytes.into()))?)
-    }
-
-    /// Sends what is written.
-    pub(super) fn flush(&mut self) -> Result<(), Disconnected> {
-        Ok(self.0.flush()?)
-    }
-
-    /// Sends a close frame behind everything else. A client that answers the frame has read everything.
-    pub(super) fn close(&mut self) -> Result<(), Disconnected> {
-        let frame = CloseFrame { code: CloseCode::Away, reason: "the run is over".into() };
-        self.0.close(Some(frame))?;
-        loop {
-            self.receive()?;
-        }
-    }
 }
 
 #[cfg(test)]

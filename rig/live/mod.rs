@@ -6,11 +6,16 @@
 //! controller, by the client's thread. Who connects must name the secret of the URL.
 
 mod admission;
+mod changes;
 mod client;
+mod feed;
 mod foxglove;
 mod handshake;
+mod host;
 mod page;
+mod queue;
 mod request;
+mod socket;
 mod supervisor;
 #[cfg(test)]
 mod tests;
@@ -27,8 +32,9 @@ use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::named::Declared;
 use masseter_shared::transport::{Domain, secret};
 
-use client::{Client, Host};
-use page::Feed;
+use client::Client;
+use feed::Feed;
+use host::Host;
 use supervisor::Supervisor;
 
 /// The default address: this machine only, on Foxglove's usual port.

@@ -6,7 +6,7 @@ use masseter_shared::clock;
 use tungstenite::handshake::server::Request;
 use tungstenite::http::header::UPGRADE;
 
-use super::client::{Disconnected, INTERVAL};
+use super::queue::{Disconnected, INTERVAL};
 
 /// Longest request, bytes.
 const MOST: usize = 8192;

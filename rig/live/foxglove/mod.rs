@@ -12,8 +12,9 @@ use masseter_recording::{Channel, Encoded, Encoder, Recorded, Topic};
 use masseter_shared::messages::Parameters;
 use masseter_shared::named::{Parameter, access};
 
-use super::client::{Disconnected, Host, QUEUE, Queued, bit};
-use super::handshake::Socket;
+use super::host::Host;
+use super::queue::{Disconnected, QUEUE, Queued, bit};
+use super::socket::Socket;
 pub(super) use protocol::choose_subprotocol;
 use protocol::{ClientMessage, Level, WantedValue};
 

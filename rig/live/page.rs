@@ -1,10 +1,7 @@
 //! The page as client: its text, its updates, and what its user asks for.
 //!
-//! The page is that of the report, filled with the figures so far; [`Feed`] computes them. An update changes what has changed.
+//! The page is that of the report, filled with the figures so far; the feed computes them. An update changes what has changed.
 //! A page that falls behind loads itself again.
-
-mod changes;
-mod feed;
 
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpStream};
@@ -15,11 +12,11 @@ use serde::Deserialize;
 use serde_json::json;
 
 use super::admission::admit;
-use super::client::{Disconnected, Host, Queued};
-use super::handshake::Socket;
+use super::feed::Next;
+use super::host::Host;
+use super::queue::{Disconnected, Queued};
 use super::request::Peeked;
-pub(super) use feed::Feed;
-use feed::Next;
+use super::socket::Socket;
 
 /// Answers a request for the page's text.
 pub(super) fn answer(mut stream: TcpStream, peeked: &Peeked, host: &Host) -> Result<(), Disconnected> {

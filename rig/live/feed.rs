@@ -31,7 +31,7 @@ const WATCHED_NS: u64 = SECOND_NS;
 
 /// What a page gets next.
 #[derive(Debug)]
-pub(in crate::live) enum Next {
+pub(super) enum Next {
     /// An update as JSON.
     Update(Arc<str>),
     /// Nothing yet.
@@ -42,7 +42,7 @@ pub(in crate::live) enum Next {
 
 /// The page of a run that goes on.
 #[derive(Debug)]
-pub(in crate::live) struct Feed {
+pub(super) struct Feed {
     queue: SyncSender<Recorded>,
     dropped: AtomicU64,
     asked_ns: AtomicU64,
@@ -65,7 +65,7 @@ impl Feed {
     ///
     /// # Errors
     /// When the system refuses the thread.
-    pub(in crate::live) fn start(manifest: Manifest, declared: &Declared) -> std::io::Result<Arc<Self>> {
+    pub(super) fn start(manifest: Manifest, declared: &Declared) -> std::io::Result<Arc<Self>> {
         let analysis = Analysis::while_running(&manifest.scenario, declared);
         let page = masseter_report::page_so_far(&manifest, &analysis.clone().finish(false, &[]), 0, 0);
         let (queue, queued) = sync_channel(QUEUE);
@@ -90,7 +90,7 @@ impl Feed {
     }
 
     /// Queues a message. Never waits.
-    pub(in crate::live) fn offer(&self, message: &Recorded) {
+    pub(super) fn offer(&self, message: &Recorded) {
         if let Err(TrySendError::Full(_)) = self.queue.try_send(*message) {
             self.dropped.fetch_add(1, Ordering::Relaxed);
         }
@@ -120,7 +120,7 @@ impl Feed {
     }
 
     /// Makes the page anew, and an update of what has changed.
-    pub(in crate::live) fn refresh(&self) {
+    pub(super) fn refresh(&self) {
         drop(self.renewed(false));
     }
 
@@ -143,13 +143,13 @@ impl Feed {
     }
 
     /// The page at this moment, as HTML.
-    pub(in crate::live) fn html(&self) -> Result<String, PageError> {
+    pub(super) fn html(&self) -> Result<String, PageError> {
         self.asked_ns.store(clock::now_ns(), Ordering::Relaxed);
         self.renewed(true).page.to_html()
     }
 
     /// The update after the one of this number.
-    pub(in crate::live) fn after(&self, number: u64) -> Next {
+    pub(super) fn after(&self, number: u64) -> Next {
         self.asked_ns.store(clock::now_ns(), Ordering::Relaxed);
         let shown = lock(&self.shown);
         let first = shown.count - shown.updates.len() as u64;
