@@ -150,7 +150,7 @@ fn a_doubtful_motion_is_played_with_a_warning_that_names_the_line() {
     let still = |i: i32| -f64::from(i % 10) * 1e-3;
     let jump = |i: i32| if i == 25 { -2.0 } else { 0.0 };
     let cases: [(&dyn Fn(i32) -> f64, &str); 2] =
-        [(&still, "is the unit millimetres?"), (&jump, "line 27: one row jumps")];
+        [(&still, "is the unit millimetres?"), (&jump, "line 27: the incisal point jumps by 2.0 mm")];
     for (z_mm, warning) in cases {
         let workspace = Workspace::new("");
         let file = workspace.write("jaw.csv", &(head.to_owned() + &rows(z_mm)));

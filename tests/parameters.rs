@@ -149,8 +149,8 @@ fn signals_of_a_program_are_recorded_by_their_names_and_drawn() {
         let channel = reader.channels().find(|channel| channel.topic == topic).unwrap();
         String::from_utf8(channel.schema.as_ref().unwrap().data.to_vec()).unwrap()
     };
-    assert!(definition("signal").contains("float64 height  # mm Of a test.\n"));
-    assert!(definition("parameter").contains("float64 scale  # mm/m\n"));
+    assert!(definition("signal").contains("float64 height  # [mm] Of a test.\n"));
+    assert!(definition("parameter").contains("float64 scale  # [mm/m]\n"));
 
     let summary = workspace.summary();
     let figures = &summary["figures"];

@@ -3,7 +3,9 @@
 //! The file is read and the motion judged as `masseter run` does. What differs is the answer: a description, and the
 //! values of the scenario with which the motion would fit.
 
+mod found;
 mod picture;
+mod strokes;
 mod suggestion;
 mod text;
 
@@ -12,16 +14,14 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use masseter_controller::trajectory::{
-    RecordingSurvey, Trajectory, TrajectoryError, TrajectoryReport, survey,
-};
-use masseter_plan::{Overrides, demands, scenario_with_overrides};
+use masseter_controller::trajectory::survey;
+use masseter_plan::{Overrides, scenario_with_overrides};
 use masseter_shared::config::{FileConfig, MotionConfig, Scenario};
-use masseter_shared::geometry::{AXES, AXIS_NAMES, Mechanism};
+use masseter_shared::geometry::Mechanism;
 use masseter_terminal::{Exit, Format, Tone, result, result_with_tones};
-use serde::Serialize;
 
-use suggestion::Suggestion;
+use found::Found;
+use strokes::{judge, strokes};
 
 const TONES: [(&str, Tone); 4] =
     [("PLAYS", Tone::Good), ("suggest", Tone::Good), ("warning", Tone::Doubtful), ("REFUSED", Tone::Bad)];
@@ -47,25 +47,6 @@ pub(crate) struct MotionArgs {
     /// Format of standard output
     #[arg(long, value_enum, default_value_t)]
     format: Format,
-}
-
-/// What the verb finds.
-#[derive(Debug, Serialize)]
-struct Found {
-    file: PathBuf,
-    #[serde(flatten)]
-    survey: RecordingSurvey,
-    strokes: Option<Strokes>,
-    /// Why the rig would not play it.
-    refused: Option<String>,
-    suggestion: Option<Suggestion>,
-}
-
-/// The axis that comes nearest to an end of its stroke.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-struct Strokes {
-    axis: &'static str,
-    margin_mm: f64,
 }
 
 /// Describes the file. [`Exit::Failed`] where the rig would refuse to play it.
@@ -106,20 +87,4 @@ fn file_of(scenario: &Scenario) -> Option<&FileConfig> {
         MotionConfig::File(file) => Some(file),
         _ => None,
     }
-}
-
-/// The motion and its demands, if the rig would play it.
-fn judge(
-    scenario: &Scenario,
-    mechanism: &Mechanism,
-) -> Result<(Trajectory, TrajectoryReport), TrajectoryError> {
-    let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, mechanism, scenario.duration_s)?;
-    let report = demands(scenario, &trajectory, mechanism)?;
-    Ok((trajectory, report))
-}
-
-fn strokes(report: &TrajectoryReport, mechanism: &Mechanism) -> Strokes {
-    let margin_m = report.margin_m(mechanism.strokes());
-    let axis = (0..AXES).min_by(|&a, &b| margin_m[a].total_cmp(&margin_m[b])).unwrap_or_default();
-    Strokes { axis: AXIS_NAMES[axis], margin_mm: margin_m[axis] * 1e3 }
 }

@@ -6,7 +6,7 @@ use masseter_shared::config::{MotionConfig, Scenario};
 use masseter_shared::geometry::Mechanism;
 use serde::Serialize;
 
-use super::{Strokes, judge, strokes};
+use super::strokes::{Strokes, judge, strokes};
 
 /// With less left of a stroke another place is suggested, mm: the trim and a slow stop need some.
 const TIGHT_MM: f64 = 1.0;

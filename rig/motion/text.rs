@@ -5,7 +5,7 @@ use std::fmt::Write;
 use masseter_controller::trajectory::{PointFigures, Range, RecordingSurvey};
 use masseter_shared::wording::counted;
 
-use super::Found;
+use super::found::Found;
 use super::suggestion::Suggestion;
 
 /// Gaps and glitches that are listed.
