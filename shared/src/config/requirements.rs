@@ -52,10 +52,6 @@ pub enum Statistic {
     Percentile,
 }
 
-fn is_default<T: Default + PartialEq>(value: &T) -> bool {
-    *value == T::default()
-}
-
 /// One requirement: bounds of a signal, a response, a condition that must never hold, a number of occurrences, or their
 /// order.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -72,7 +68,6 @@ pub struct RequirementConfig {
     /// When it is judged; the whole run when absent.
     pub during: Option<During>,
     /// Bounds: what of the signal.
-    #[serde(skip_serializing_if = "is_default")]
     pub statistic: Statistic,
     /// Bounds: the percentile, 0 to 100.
     pub percentile: Option<f64>,
@@ -99,24 +94,11 @@ pub struct RequirementConfig {
     /// Count: the largest allowed number.
     pub at_most: Option<u64>,
     /// Occurrences whose first ones must come in this order.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub order: Vec<String>,
 }
 
 impl RequirementConfig {
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
         require_text("require.name", &self.name)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_requirement_is_written_as_short_as_it_was_read() {
-        let written = "name = \"follows\"\nsignal = \"incisal.error\"\n";
-        let read: RequirementConfig = toml::from_str(written).unwrap();
-        assert_eq!(toml::to_string(&read).unwrap(), written);
     }
 }
