@@ -24,9 +24,9 @@ MOST_BYTES = 200_000
 # The time that a page has for its scripts, ms.
 SCRIPTS_MS = 2000
 
-# The report down to its first chart, with the jaw open.
+# The report down to the jaw in space, with the jaw open.
 CUT_REPORT = """<script>
-for (let last = document.getElementById("motion-z"); last !== document.body; last = last.parentElement)
+for (let last = document.getElementById("section-mechanism"); last !== document.body; last = last.parentElement)
   while (last.nextElementSibling) last.nextElementSibling.remove();
 Masseter.time.seek(Masseter.time.time.motion_s + 0.55);
 </script>"""
