@@ -1,8 +1,8 @@
 //! Glitches of a tracker: rows that leave the path of their neighbours.
 //!
-//! A row is a glitch where three things meet: the row lies off the straight way between the rows beside it by more than
-//! 1 mm, by four times what is usual in the rows around, and the way to the row or from it is faster than usual there. A
-//! jaw that stops at the teeth stops hard, and is no faster before. Jumps of the orientation alone are not looked for.
+//! A glitch is a row that lies off the straight way between its neighbours, and is reached or left faster than usual. The
+//! deviation is above 1 mm and above four times the usual one of the rows around. A jaw that stops at the teeth stops hard,
+//! and is no faster before. Jumps of the orientation alone are not looked for.
 
 use masseter_shared::geometry::Vec3;
 use serde::Serialize;

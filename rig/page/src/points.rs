@@ -14,7 +14,7 @@ const LARGEST: f64 = 1e300;
 ///
 /// Packed, they are whole numbers of steps, each as the difference from the one before. A difference is zigzag-coded (0, −1, 1,
 /// −2 …) and written in bytes of seven bits, the lowest first, the eighth bit set where more follow. The bytes are in Base64.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Points {
     points: Vec<(f64, f64)>,
     is_packed: bool,
@@ -36,12 +36,6 @@ enum Written {
 }
 
 impl Points {
-    /// None yet: the live view adds them.
-    #[must_use]
-    pub fn none() -> Self {
-        Self::default()
-    }
-
     /// Values by seconds, written to the microsecond and a millionth of their range.
     #[must_use]
     pub fn over_time(points: &[(f64, f64)]) -> Self {

@@ -30,8 +30,8 @@ struct Animation {
     closed: Vec<f64>,
     /// Numbers and places of the lower teeth in the platform frame.
     teeth: Vec<(u8, [f64; 3])>,
-    /// Forces on the teeth: time since the run's first SYNC, s, then the place of a tooth in the list and its force along x, y and z of the
-    /// base, N, for each tooth with a force.
+    /// Forces on the teeth. A row begins with the time since the run's first SYNC, s. Four numbers follow for each tooth with a force:
+    /// the place in `teeth`, and the force along x, y and z of the base, N.
     forces: Vec<Vec<f64>>,
     /// What the actual pose is called.
     actual_name: &'static str,
