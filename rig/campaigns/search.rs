@@ -186,10 +186,13 @@ range = [0.5, 1.0]
     /// The corner in which the controller fails: its middle and half its width, as shares of each range.
     const CORNER: [f64; 2] = [0.85, 0.1];
 
+    /// Growth of the law's error towards the corner, per share of the ranges.
+    const STEEPNESS: f64 = 5.0;
+
     /// Cycles in which the law goes aside: a jump would be a safe stop.
     const EASED: u32 = 100;
 
-    /// The law follows the desired pose, but beside it by 0.22 mm in the middle of the corner, and by less further away.
+    /// The law follows the desired pose, but beside it by 0.33 mm in the middle of the corner, and by less further away.
     #[derive(Debug)]
     struct WeakInACorner {
         beside_m: Vec3,
@@ -210,8 +213,9 @@ range = [0.5, 1.0]
             ];
             let [middle, half] = CORNER;
             let distance = shares.iter().map(|share| (share - middle).abs()).fold(0.0, f64::max);
-            // On the border of the corner the error is the limit.
-            let beside_mm = 0.2 * (1.0 - (distance - half));
+            // On the border of the corner the error is the limit. The slope there is steep: the law's own error of some µm
+            // would widen a flat corner.
+            let beside_mm = 0.2 * (STEEPNESS * (half - distance)).exp();
             Self { beside_m: Vec3::new(0.0, 0.0, beside_mm * 1e-3), cycles: 0 }
         }
     }

@@ -18,7 +18,7 @@ use masseter_shared::dynamics::{Bodies, Equations, Motion, Reactions};
 use masseter_shared::geometry::{
     AXES, Actuators, InverseError, Jacobian, LimitViolation, Mechanism, Pose, Twist, Vec3,
 };
-use nalgebra::{UnitQuaternion, Vector6};
+use nalgebra::{Quaternion, UnitQuaternion, Vector6};
 
 use super::axes::{Axes, AxesForces, AxisMotion};
 use super::contact::{ContactError, Food, Occlusion};
@@ -90,14 +90,14 @@ impl Dynamics {
         occlusion: Occlusion,
         incisal_m: [f64; 3],
     ) -> Result<Self, DynamicsError> {
-        let joints = mechanism.inverse(&pose)?;
-        if let Err(violation) = mechanism.strokes().check(&joints.actuators) {
+        let actuators = mechanism.actuators(&pose)?;
+        if let Err(violation) = mechanism.strokes().check(&actuators) {
             return Err(DynamicsError::Start { initial_leg_m: config.initial_leg_m, violation });
         }
         let (twist, acceleration) = (Twist::zeros(), Twist::zeros());
-        let state = MechanismState { pose, twist, actuators: joints.actuators };
+        let state = MechanismState { pose, twist, actuators };
         let bodies = Bodies::from(config);
-        let motion = Motion::of_joints(&mechanism, &pose, &joints, &twist);
+        let motion = Motion::new(&mechanism, &pose, &twist)?;
         occlusion.check(&Equations::new(&bodies, &motion).mass, config.step_ns)?;
         Ok(Self {
             braking: Braking::new(config, &bodies),
@@ -179,15 +179,15 @@ impl Dynamics {
 
     /// Joint velocities in a state, m/s. They cost more than a step, so that only callers who need them pay.
     pub(crate) fn velocities_m_s(&self, state: &MechanismState) -> [f64; AXES] {
-        let joints = self.mechanism.inverse(&state.pose).expect("a pose that was reached has joints");
-        (Jacobian::new(&self.mechanism, &state.pose, &joints).actuators * state.twist).into()
+        let legs = self.mechanism.legs(&state.pose).expect("a pose that was reached has joints");
+        (Jacobian::of_legs(&self.mechanism, &legs).actuators * state.twist).into()
     }
 
     /// Applies the actuators' forces (N) for the step that begins.
     pub(crate) fn push(&mut self, force_n: &[f64; AXES]) -> Result<(), DynamicsError> {
         let (twist, step_s) = (self.state.twist, self.step_s());
         let motion = self.middle()?;
-        let positions_m = motion.joints.actuators.to_axes();
+        let positions_m = motion.legs.actuators.to_axes();
         let bias_m_s2 = motion.bias.axes_m_s2;
         let actuators = &motion.jacobian.actuators;
         let speeds_m_s = actuators * twist;
@@ -246,11 +246,25 @@ impl Dynamics {
     fn moved(&self, twist: &Twist, dt_s: f64) -> Pose {
         let MechanismState { pose, .. } = &self.state;
         let linear = twist.fixed_rows::<3>(0) * dt_s;
-        let angular = twist.fixed_rows::<3>(3) * dt_s;
-        let mut rotation = UnitQuaternion::from_scaled_axis(angular) * pose.rotation;
-        rotation.renormalize();
+        let angular: Vec3 = twist.fixed_rows::<3>(3) * dt_s;
+        let mut rotation = turn(&angular) * pose.rotation;
+        rotation.renormalize_fast();
         Pose::from_parts((pose.translation.vector + linear).into(), rotation)
     }
+}
+
+/// The rotation by a vector, rad. A step turns so little that two terms of each series suffice: the third, h⁶/720 for half
+/// the angle h, is less than a rounding.
+fn turn(angle_rad: &Vec3) -> UnitQuaternion<f64> {
+    const SERIES_SUFFICES: f64 = 1e-5;
+    let half = angle_rad / 2.0;
+    let square = half.norm_squared();
+    if square > SERIES_SUFFICES {
+        return UnitQuaternion::from_scaled_axis(*angle_rad);
+    }
+    let cos = 1.0 - square / 2.0 * (1.0 - square / 12.0);
+    let sinc = 1.0 - square / 6.0 * (1.0 - square / 20.0);
+    UnitQuaternion::new_unchecked(Quaternion::from_imag(half * sinc) + Quaternion::from_real(cos))
 }
 
 #[cfg(test)]

@@ -110,8 +110,8 @@ impl Bodies {
     /// Q_d = (m_c + m_y + m_r) d̈, Q_l = m_r l̈ − m_r w θ̇² + m_r g sin θ,
     /// Q_θ = (I_y + m_y a² + I_r + m_r w²) θ̈ + 2 m_r w l̇ θ̇ + g (m_y a + m_r w) cos θ.
     pub(super) fn leg(&self, motion: &Motion, leg: usize) -> LegEquations {
-        let leg_m = motion.joints.actuators.leg_m[leg];
-        let (sin, cos) = motion.sin_cos[leg];
+        let leg_m = motion.legs.actuators.leg_m[leg];
+        let (sin, cos) = motion.legs.sin_cos[leg];
         let (stretch_m_s, swing_rad_s) = (motion.rates_m_s[LEGS + leg], motion.swings_rad_s[leg]);
         let rod_kg_m = self.rod.mass_kg * self.rod_from_hinge_m(leg_m);
         LegEquations {

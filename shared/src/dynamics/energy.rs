@@ -17,12 +17,12 @@ impl Energy {
     pub fn new(bodies: &Bodies, motion: &Motion) -> Self {
         let mut energy = Self::of_platform(bodies, motion);
         for leg in 0..LEGS {
-            let leg_m = motion.joints.actuators.leg_m[leg];
+            let leg_m = motion.legs.actuators.leg_m[leg];
             let rates = [motion.rates_m_s[leg], motion.rates_m_s[LEGS + leg], motion.swings_rad_s[leg]];
             let masses = [bodies.slide_kg(), bodies.rod.mass_kg, bodies.leg_inertia_kg_m2(leg_m)];
             let squares = masses.iter().zip(rates).map(|(mass, rate)| mass * rate * rate);
             energy.kinetic_j += 0.5 * squares.sum::<f64>();
-            let sin = motion.joints.theta_rad[leg].sin();
+            let (sin, _) = motion.legs.sin_cos[leg];
             energy.potential_j += bodies.gravity_m_s2 * bodies.leg_moment_kg_m(leg_m) * sin;
         }
         energy

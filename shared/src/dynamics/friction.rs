@@ -144,10 +144,10 @@ impl Friction {
         for leg in 0..LEGS {
             let hinge = motion.jacobian.hinges.row(leg).transpose();
             let torque_nm = joint_coefficient * hinge_radius_m * loads.hinge_n[leg];
-            damping.ger(torque_nm / motion.swings_rad_s[leg].hypot(TURN_RAD_S), &hinge, &hinge, 1.0);
+            damping.ger(torque_nm / faded(motion.swings_rad_s[leg].powi(2)), &hinge, &hinge, 1.0);
             let turns = ball_turns(motion, leg);
             let torque_nm = joint_coefficient * ball_radius_m * loads.ball_n[leg];
-            damping += turns.tr_mul(&turns) * (torque_nm / (turns * motion.twist).norm().hypot(TURN_RAD_S));
+            damping += turns.tr_mul(&turns) * (torque_nm / faded((turns * motion.twist).norm_squared()));
         }
         damping
     }
@@ -157,6 +157,11 @@ impl Friction {
         let FrictionConfig { guide_coefficient, block_factor, block_spacing_m, .. } = self.config;
         guide_coefficient * block_factor * lever_m / block_spacing_m
     }
+}
+
+/// The speed by which the torque of a turn is divided, which stays above zero at rest, rad/s.
+fn faded(square_rad2_s2: f64) -> f64 {
+    (square_rad2_s2 + TURN_RAD_S * TURN_RAD_S).sqrt()
 }
 
 /// How fast a ball turns in its socket, by the platform's twist: the ball turns with the platform, the socket with the leg

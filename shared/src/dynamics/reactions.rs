@@ -80,7 +80,7 @@ impl Reactions {
 
     /// What friction depends on, with the forces of the axes (N) that these reactions are of.
     pub fn loads(&self, force_n: &Vector6<f64>) -> Loads {
-        let across = |load: &Vec3| load.y.hypot(load.z);
+        let across = |load: &Vec3| load.yz().norm();
         Loads {
             guide_n: self.legs.map(|leg| across(&leg.guide.force_n)),
             guide_nm: self.legs.map(|leg| across(&leg.guide.moment_nm)),
@@ -109,11 +109,11 @@ impl LegReactions {
 impl LegMotion {
     fn new(bodies: &Bodies, motion: &Motion, leg: usize, accelerations: [f64; 3]) -> Self {
         let [slide_m_s2, stretch_m_s2, swing_rad_s2] = accelerations;
-        let (sin, cos) = motion.sin_cos[leg];
+        let (sin, cos) = motion.legs.sin_cos[leg];
         Self {
             along: Vec3::new(0.0, cos, sin),
             across: Vec3::new(0.0, -sin, cos),
-            leg_m: motion.joints.actuators.leg_m[leg],
+            leg_m: motion.legs.actuators.leg_m[leg],
             stretch_m_s: motion.rates_m_s[LEGS + leg],
             swing_rad_s: motion.swings_rad_s[leg],
             slide_m_s2,

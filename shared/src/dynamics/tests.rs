@@ -132,7 +132,7 @@ proptest! {
         for (leg, reactions) in legs.iter().enumerate() {
             prop_assert!(reactions.hinge.moment_nm.x.abs() < 1e-9, "a hinge has no moment about its axis");
             prop_assert!((reactions.guide.force_n.x - force_n[leg]).abs() < 1e-9, "the slide's axis pushes along");
-            let (sin, cos) = motion.joints.theta_rad[leg].sin_cos();
+            let (sin, cos) = motion.legs.sin_cos[leg];
             let along_leg = reactions.rod.force_n.dot(&Vec3::new(0.0, cos, sin));
             prop_assert!((along_leg - force_n[LEGS + leg]).abs() < 1e-9, "the leg's axis pushes the rod");
             let axes = [mechanism.slide_direction(leg), mechanism.inward_direction(leg), Vec3::z()];

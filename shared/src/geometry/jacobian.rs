@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3x6, Matrix6, Vector6};
 
-use super::{Joints, LEGS, Mechanism, Pose, Vec3};
+use super::{Joints, LEGS, Legs, Mechanism, Pose, Vec3};
 
 /// Twist of the platform in the base frame: velocity of its origin (m/s), then angular velocity (rad/s).
 #[doc(alias("spatial velocity", "velocity screw"))]
@@ -37,23 +37,25 @@ impl Jacobian {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn new(mechanism: &Mechanism, pose: &Pose, joints: &Joints) -> Self {
-        Self::with_sin_cos(mechanism, pose, joints, &joints.theta_rad.map(f64::sin_cos))
+        Self::of_legs(
+            mechanism,
+            &Legs {
+                actuators: joints.actuators,
+                sin_cos: joints.theta_rad.map(f64::sin_cos),
+                arms_m: mechanism.platform_corners().map(|corner| pose.rotation * corner),
+            },
+        )
     }
 
-    /// The same where sines and cosines of the hinges' angles are known.
-    pub(crate) fn with_sin_cos(
-        mechanism: &Mechanism,
-        pose: &Pose,
-        joints: &Joints,
-        sin_cos: &[(f64, f64); LEGS],
-    ) -> Self {
+    /// The Jacobian where the legs' directions are known (of [`Mechanism::legs`]).
+    pub fn of_legs(mechanism: &Mechanism, legs: &Legs) -> Self {
         let mut jacobian = Self {
             actuators: Matrix6::zeros(),
             hinges: Matrix3x6::zeros(),
             length_m: mechanism.platform_sides_m()[0],
         };
-        for (leg, &(sin, cos)) in sin_cos.iter().enumerate() {
-            let arm = pose.rotation * mechanism.platform_corners()[leg];
+        for (leg, &(sin, cos)) in legs.sin_cos.iter().enumerate() {
+            let arm = legs.arms_m[leg];
             let inward = mechanism.inward_direction(leg);
             let along_leg = inward * cos + Vec3::z() * sin;
             let across_leg = Vec3::z() * cos - inward * sin;
@@ -63,7 +65,7 @@ impl Jacobian {
             };
             jacobian.actuators.set_row(leg, &rate_along(&mechanism.slide_direction(leg)));
             jacobian.actuators.set_row(LEGS + leg, &rate_along(&along_leg));
-            jacobian.hinges.set_row(leg, &(rate_along(&across_leg) / joints.actuators.leg_m[leg]));
+            jacobian.hinges.set_row(leg, &(rate_along(&across_leg) / legs.actuators.leg_m[leg]));
         }
         jacobian
     }

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::Vec3;
+
 /// Legs of the mechanism; each has one slide and one telescopic stroke.
 pub const LEGS: usize = 3;
 /// Actuated axes, in the order d₁ d₂ d₃ l₁ l₂ l₃ everywhere: messages, nodes, CSV columns.
@@ -48,6 +50,17 @@ pub struct Joints {
     pub actuators: Actuators,
     /// θᵢ: angle of leg i against the base, measured from the inward horizontal, radians.
     pub theta_rad: [f64; LEGS],
+}
+
+/// Slides and legs at a pose, with the directions of the legs in place of the angles, which cost an arc tangent each.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Legs {
+    /// Slides and legs.
+    pub actuators: Actuators,
+    /// sin θᵢ and cos θᵢ.
+    pub sin_cos: [(f64, f64); LEGS],
+    /// Corners Aᵢ from the platform's origin, base axes, m.
+    pub arms_m: [Vec3; LEGS],
 }
 
 /// The strokes of slides and legs, both ends included.

@@ -5,7 +5,7 @@
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
-use super::{Actuators, Joints, LEGS, Pose, StrokeLimits, Vec3};
+use super::{Actuators, Joints, LEGS, Legs, Pose, StrokeLimits, Vec3};
 
 /// One slide in the base plane.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -195,8 +195,27 @@ impl Mechanism {
     #[doc(alias("inverse kinematics", "IK"))]
     pub fn inverse(&self, pose: &Pose) -> Result<Joints, InverseError> {
         let mut theta_rad = [0.0; LEGS];
-        let actuators = self.legs(pose, |leg, up_m, inward_m| theta_rad[leg] = up_m.atan2(inward_m))?;
+        let actuators = self.resolve(&self.corners_at(pose), |leg, [up_m, inward_m], _| {
+            theta_rad[leg] = up_m.atan2(inward_m)
+        })?;
         Ok(Joints { actuators, theta_rad })
+    }
+
+    /// The joints of [`inverse`](Self::inverse) with the legs' directions instead of their angles.
+    ///
+    /// # Errors
+    /// Those of [`inverse`](Self::inverse).
+    pub fn legs(&self, pose: &Pose) -> Result<Legs, InverseError> {
+        let rotation = pose.rotation.to_rotation_matrix();
+        let arms_m = self.corners.map(|corner| rotation * corner);
+        let mut sin_cos = [(0.0, 0.0); LEGS];
+        let actuators = self.resolve(
+            &arms_m.map(|arm| arm + pose.translation.vector),
+            |leg, [up_m, inward_m], leg_m| {
+                sin_cos[leg] = (up_m / leg_m, inward_m / leg_m);
+            },
+        )?;
+        Ok(Legs { actuators, sin_cos, arms_m })
     }
 
     /// Slides and legs of [`inverse`](Self::inverse) without the angles, which take half of its time.
@@ -204,18 +223,24 @@ impl Mechanism {
     /// # Errors
     /// Those of [`inverse`](Self::inverse).
     pub fn actuators(&self, pose: &Pose) -> Result<Actuators, InverseError> {
-        self.legs(pose, |_, _, _| {})
+        self.resolve(&self.corners_at(pose), |_, _, _| {})
     }
 
-    /// Slides and legs; `angle` gets the number of each leg and its direction: upwards and inwards, m.
+    /// Slides and legs for the corners in the base frame. `take` gets each leg: its number, its reach upwards and inwards, and
+    /// its length, m.
     #[inline]
-    fn legs(&self, pose: &Pose, mut angle: impl FnMut(usize, f64, f64)) -> Result<Actuators, InverseError> {
+    fn resolve(
+        &self,
+        corners: &[Vec3; LEGS],
+        mut take: impl FnMut(usize, [f64; 2], f64),
+    ) -> Result<Actuators, InverseError> {
         let mut actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [0.0; LEGS] };
-        for (leg, corner) in self.corners_at(pose).iter().enumerate() {
+        for (leg, corner) in corners.iter().enumerate() {
             let slide = &self.slides[leg];
             let from_centre = corner - slide.centre;
             let horizontal = from_centre.dot(&slide.inward);
-            let leg_m = horizontal.hypot(from_centre.z);
+            // Dimensions are checked: no square overflows, and hypot takes five times as long.
+            let leg_m = (horizontal * horizontal + from_centre.z * from_centre.z).sqrt();
             if !from_centre.iter().all(|x| x.is_finite()) {
                 return Err(InverseError::NotFinite);
             }
@@ -224,7 +249,7 @@ impl Mechanism {
             }
             actuators.slide_m[leg] = from_centre.dot(&slide.along);
             actuators.leg_m[leg] = leg_m;
-            angle(leg, from_centre.z, horizontal);
+            take(leg, [from_centre.z, horizontal], leg_m);
         }
         Ok(actuators)
     }

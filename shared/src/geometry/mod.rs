@@ -15,7 +15,7 @@ mod mechanism;
 
 pub use deviation::Deviation;
 pub use jacobian::{Jacobian, Twist};
-pub use joints::{AXES, AXIS_NAMES, Actuators, Joints, LEGS, LimitViolation, StrokeLimits};
+pub use joints::{AXES, AXIS_NAMES, Actuators, Joints, LEGS, Legs, LimitViolation, StrokeLimits};
 pub use mechanism::{GeometryError, InverseError, Mechanism, MechanismConfig, SlideConfig, frame_of_corners};
 
 /// Platform frame in the base frame; metres.

@@ -146,7 +146,7 @@ fn swing(config: &DynamicsConfig, start: Twist) -> (f64, [f64; 10]) {
     let drift_j = std::array::from_fn(|_| {
         (0..1_000_000_000 / config.step_ns).fold(0.0_f64, |most_j, _| {
             // A spring is a part of the mechanism: unlike a drive, the spring feels the middle of the step.
-            let force_n = stretched_m(&dynamics.middle().unwrap().joints.actuators) * -SPRING_N_PER_M;
+            let force_n = stretched_m(&dynamics.middle().unwrap().legs.actuators) * -SPRING_N_PER_M;
             step(&mut dynamics, &force_n.into());
             kinetic_j = kinetic_j.max(energy(&dynamics).kinetic_j);
             most_j.max((total_j(&dynamics) - start_j).abs())
@@ -196,5 +196,14 @@ fn without_forces_energy_is_only_lost() {
         let now = energy(&dynamics).total_j();
         assert!(now <= before * (1.0 + 1e-4), "{now} after {before}");
         before = now;
+    }
+}
+
+#[test]
+fn a_step_turns_as_far_as_the_exponential_of_its_vector() {
+    for angle_rad in [0.0, 1e-9, 1e-4, 6.3e-3, 6.4e-3, 1.0] {
+        let vector = Vec3::new(0.6, 0.0, -0.8) * angle_rad;
+        let distance = turn(&vector).coords - UnitQuaternion::from_scaled_axis(vector).coords;
+        assert!(distance.norm() < 4e-16, "{angle_rad} rad: {:e}", distance.norm());
     }
 }

@@ -13,7 +13,9 @@ const TRAILER_BITS: u32 = 1 + 1 + BEHIND_ACKNOWLEDGE_BITS;
 const CRC_BITS: u32 = 15;
 const CRC_POLYNOMIAL: u16 = 0x4599;
 const CRC_MASK: u16 = (1 << CRC_BITS) - 1;
-static CRC_OF_BYTE: [u16; 256] = crc_of_bytes();
+/// Bytes of the longest content.
+const CONTENT_BYTES: usize = 16;
+static CRC_OF_BYTE: [[u16; 256]; CONTENT_BYTES] = crc_of_bytes();
 const STANDARD_HEADER_BITS: u32 = 19;
 const EXTENDED_HEADER_BITS: u32 = 39;
 
@@ -63,30 +65,32 @@ fn header(id: CanId, length: u32) -> u64 {
     arbitration << 7 | u64::from(length)
 }
 
-/// CRC of a content. The CRC starts from zero, so the zeros above the content do not change it, and their bytes are left
-/// out.
+/// CRC of a content. The CRC starts from zero and is linear: the CRCs of the bytes at their places add up, and the zeros above the
+/// content add nothing.
 fn crc15(content: u128) -> u16 {
-    let zeros = content.leading_zeros() as usize / 8;
-    content.to_be_bytes()[zeros..].iter().fold(0, |crc, byte| {
-        let index = (crc >> (CRC_BITS - 8)) as u8 ^ *byte;
-        (crc << 8 & CRC_MASK) ^ CRC_OF_BYTE[usize::from(index)]
-    })
+    let bytes = content.to_le_bytes();
+    bytes.iter().zip(&CRC_OF_BYTE).fold(0, |crc, (byte, of_byte)| crc ^ of_byte[usize::from(*byte)])
 }
 
-const fn crc_of_bytes() -> [u16; 256] {
-    let mut table = [0; 256];
+/// The CRC of each byte with this many bytes of zeros behind it.
+const fn crc_of_bytes() -> [[u16; 256]; CONTENT_BYTES] {
+    let mut tables = [[0; 256]; CONTENT_BYTES];
     let mut byte = 0;
     while byte < 256 {
-        let (mut crc, mut bit) = ((byte as u16) << (CRC_BITS - 8), 0);
-        while bit < 8 {
-            let carry = crc >> (CRC_BITS - 1) & 1;
-            crc = (crc << 1 & CRC_MASK) ^ (carry * CRC_POLYNOMIAL);
-            bit += 1;
+        let (mut crc, mut place) = ((byte as u16) << (CRC_BITS - 8), 0);
+        while place < CONTENT_BYTES {
+            let mut bit = 0;
+            while bit < 8 {
+                let carry = crc >> (CRC_BITS - 1) & 1;
+                crc = (crc << 1 & CRC_MASK) ^ (carry * CRC_POLYNOMIAL);
+                bit += 1;
+            }
+            tables[place][byte] = crc;
+            place += 1;
         }
-        table[byte] = crc;
         byte += 1;
     }
-    table
+    tables
 }
 
 #[cfg(test)]
