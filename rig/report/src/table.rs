@@ -128,13 +128,13 @@ fn write_figures(text: &mut String, manifest: &Manifest, figures: &Figures) -> s
 fn latencies(text: &mut String, intervals: &[IntervalFigures]) -> std::fmt::Result {
     writeln!(
         text,
-        "{:<27} {:>8} {:>10} {:>10} {:>10} {:>10}",
+        "{:<28} {:>8} {:>10} {:>10} {:>10} {:>10}",
         "interval, µs", "n", "p50", "p99", "p99.9", "max"
     )?;
     for interval in intervals {
         writeln!(
             text,
-            "{:<27} {:>8} {:>10} {:>10} {:>10} {:>10}",
+            "{:<28} {:>8} {:>10} {:>10} {:>10} {:>10}",
             interval.name,
             interval.n,
             or_dash(interval.p50_ns, microseconds),
