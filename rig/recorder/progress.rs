@@ -18,6 +18,8 @@ use crate::live::ClientCounts;
 const LINE_INTERVAL_NS: u64 = 10 * SECOND_NS;
 /// The same where the line is rewritten, ns.
 const REWRITE_INTERVAL_NS: u64 = SECOND_NS / 5;
+/// What separates two figures.
+const BETWEEN: &str = "   ";
 /// Erases the line and switches wrapping off: a wrapped line could not be rewritten.
 const BEFORE_REWRITE: &str = "\r\x1b[2K\x1b[?7l";
 /// Switches wrapping on again, and leaves the cursor where an echoed ^C stays in the line.
@@ -112,7 +114,7 @@ impl Progress {
     /// The next line, or the same line again.
     pub(super) fn next(&mut self, now_ns: u64, losses: Losses) -> String {
         self.shown_ns = now_ns;
-        if self.is_in_place { self.rewritten(losses) } else { self.line(losses) + "\n" }
+        if self.is_in_place { self.rewritten(losses) } else { self.line(losses, usize::MAX) + "\n" }
     }
 
     /// Ends the line that is rewritten, with its last figures; other text follows.
@@ -121,24 +123,40 @@ impl Progress {
     }
 
     fn rewritten(&self, losses: Losses) -> String {
-        format!("{BEFORE_REWRITE}{}{AFTER_REWRITE}", self.line(losses))
+        let columns = masseter_terminal::columns(io::stderr()).unwrap_or(usize::MAX);
+        format!("{BEFORE_REWRITE}{}{AFTER_REWRITE}", self.line(losses, columns))
     }
 
-    fn line(&self, Losses { unrecorded, clients }: Losses) -> String {
-        let live = clients.map_or_else(String::new, |ClientCounts { connected, dropped }| {
-            format!("   live {connected} watching, {dropped} dropped")
-        });
-        format!(
-            "{:<13} motion {:>5.2} of {:.2} s   missed {}   dropped {}   tracking error {:.3} mm, max {:.3}   latest {:.0} µs{live}",
-            self.controller_state().map_or("?", ControllerState::name),
-            self.motion_s.min(self.running as f64 * self.period_s),
-            self.motion_s,
-            self.state.skipped_cycles + self.reading.skipped_cycles,
-            self.missing + unrecorded,
-            self.error_mm(),
-            self.max_error_mm,
-            self.max_late_ns as f64 / 1e3,
-        )
+    /// The figures for which a line of that many columns has room. The least important ones give way first.
+    fn line(&self, losses: Losses, columns: usize) -> String {
+        let mut figures = self.figures(losses);
+        loop {
+            let line = figures.iter().map(|(_, text)| text.as_str()).collect::<Vec<_>>().join(BETWEEN);
+            let least = figures.iter().map(|(rank, _)| *rank).max().unwrap_or(0);
+            if least == 0 || line.chars().count() <= columns {
+                return line;
+            }
+            figures.retain(|(rank, _)| *rank != least);
+        }
+    }
+
+    /// Each figure in its place, behind its rank: 0 is the most important.
+    fn figures(&self, Losses { unrecorded, clients }: Losses) -> Vec<(u8, String)> {
+        let state = self.controller_state().map_or("?", ControllerState::name);
+        let (motion_s, of_s) = (self.motion_s.min(self.running as f64 * self.period_s), self.motion_s);
+        let missed = self.state.skipped_cycles + self.reading.skipped_cycles;
+        let mut figures = vec![
+            (0, format!("{state:<13} motion {motion_s:>5.2} of {of_s:.2} s")),
+            (1, format!("missed {missed}")),
+            (3, format!("dropped {}", self.missing + unrecorded)),
+            (2, format!("tracking error {:.3} mm", self.error_mm())),
+            (4, format!("max {:.3} mm", self.max_error_mm)),
+            (5, format!("latest {:.0} µs", self.max_late_ns as f64 / 1e3)),
+        ];
+        figures.extend(clients.map(|ClientCounts { connected, dropped }| {
+            (6, format!("live {connected} watching, {dropped} dropped"))
+        }));
+        figures
     }
 
     /// Distance between desired and estimated position of the platform in the newest state, mm.
@@ -180,9 +198,18 @@ mod tests {
         let line = after_ten_cycles(false).next(SECOND_NS, Losses { unrecorded: 2, clients });
         assert_eq!(
             line,
-            "running       motion  1.00 of 4.00 s   missed 6   dropped 5   tracking error 2.000 mm, max 4.000   latest 50 µs   \
+            "running       motion  1.00 of 4.00 s   missed 6   dropped 5   tracking error 2.000 mm   max 4.000 mm   latest 50 µs   \
              live 1 watching, 7 dropped\n"
         );
+    }
+
+    #[test]
+    fn a_narrow_terminal_shows_what_matters_most() {
+        let progress = after_ten_cycles(true);
+        let shown = |columns| progress.line(Losses::default(), columns);
+        assert_eq!(shown(80), "running       motion  1.00 of 4.00 s   missed 6   tracking error 2.000 mm");
+        assert_eq!(shown(20), "running       motion  1.00 of 4.00 s");
+        assert_eq!(shown(120), shown(usize::MAX));
     }
 
     #[test]

@@ -95,7 +95,7 @@ fn write_verdict(
     let names =
         verdict.checks.iter().map(|check| check.name.chars().count()).max().unwrap_or(0).clamp(18, 40);
     for check in &verdict.checks {
-        writeln!(text, "  {:<widest$} {:<names$} {}", check.result.mark(), check.name, check.finding)?;
+        writeln!(text, "  {:<widest$} {:<names$}  {}", check.result.mark(), check.name, check.finding)?;
     }
     Ok(())
 }

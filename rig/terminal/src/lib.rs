@@ -25,6 +25,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 pub use colour::{Tone, choose_colour, result_with_tones};
 pub use exit::{Exit, Failure, OrFailure};
+pub use wrap::columns;
 
 /// A pipe that takes anything takes as many bytes as one write, bytes.
 const PIPE_PART: usize = 4096;

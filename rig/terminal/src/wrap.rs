@@ -1,16 +1,22 @@
 //! Lines no wider than the terminal. What follows a break stands below the last column of the line.
 
 use std::io;
+use std::os::fd::AsFd;
 
 use rustix::termios::{isatty, tcgetwinsize};
 
 /// Narrower terminals get lines as they are: their users would see one word a line.
 const LEAST: usize = 40;
 
+/// Characters in a line of a terminal; none where the stream is no terminal, or one of unknown width.
+pub fn columns(stream: impl AsFd) -> Option<usize> {
+    let size = isatty(&stream).then(|| tcgetwinsize(&stream).ok()).flatten()?;
+    (size.ws_col > 0).then_some(size.ws_col.into())
+}
+
 /// The text for standard output: with breaks if that is a terminal.
 pub(crate) fn for_stdout(text: &str) -> String {
-    let stdout = io::stdout();
-    let width = if isatty(&stdout) { tcgetwinsize(&stdout).map_or(0, |size| size.ws_col.into()) } else { 0 };
+    let width = columns(io::stdout()).unwrap_or(0);
     text.split_inclusive('\n').map(|line| wrapped(line, width)).collect()
 }
 
