@@ -48,10 +48,10 @@ pub(crate) fn campaign(args: &CampaignArgs) -> Result<Exit, Failure> {
     }?;
     if interrupts.is_stop_requested() {
         status!(
-            "interrupted after {} of {} cases; {}",
+            "interrupted after {} of {} cases; the same command with --out {} goes on",
             results.len(),
             campaign.case_count(),
-            go_on(args, &out)
+            word(&out.display().to_string())
         );
         return Ok(Exit::Interrupted);
     }
@@ -105,10 +105,4 @@ fn folder_by_time(file: &Path) -> PathBuf {
     let time = humantime::format_rfc3339_millis(UNIX_EPOCH + clock::wall_time()).to_string();
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
     Path::new(CAMPAIGNS).join(format!("{}-{name}", time.replace([':', '-'], "")))
-}
-
-/// The command that goes on with a campaign.
-fn go_on(args: &CampaignArgs, out: &Path) -> String {
-    let path = |path: &Path| word(&path.display().to_string());
-    format!("to go on: masseter campaign {} --out {}", path(&args.file), path(out))
 }

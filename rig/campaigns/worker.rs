@@ -1,7 +1,10 @@
 //! One case of a campaign in a process of its own, for engines that start processes.
 
+use std::time::Duration;
+
 use anyhow::{Context, ensure};
-use masseter_campaign::CampaignFolder;
+use masseter_campaign::{CampaignFolder, Interruption};
+use masseter_shared::clock;
 use masseter_terminal::{Exit, Failure, OrFailure};
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 
@@ -10,7 +13,10 @@ use super::player::Player;
 use super::{controller_of, program};
 use crate::machine::interrupts::Interrupts;
 
-/// Runs a case unless its result is there. Any result is success: the campaign judges.
+/// Time between two looks whether the campaign is interrupted.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+
+/// Runs a case unless its result is there, or the campaign is interrupted. Any result is success: the campaign judges.
 pub(crate) fn run_case(args: &CampaignCaseArgs) -> Result<Exit, Failure> {
     die_with_the_parent().died()?;
     let (folder, campaign) = CampaignFolder::open(&args.folder).usage()?;
@@ -23,10 +29,24 @@ pub(crate) fn run_case(args: &CampaignCaseArgs) -> Result<Exit, Failure> {
     if args.number >= count {
         return Err(anyhow::anyhow!("the campaign has cases 0 to {}", count.saturating_sub(1))).usage();
     }
+    if folder.interruption().is_marked() {
+        return Ok(Exit::Interrupted);
+    }
     let interrupts = Interrupts::listen().context("cannot listen for signals").died()?;
+    stop_at(folder.interruption(), interrupts.clone());
     let case = campaign.case(&campaign.points(), args.number);
     let result = Player { controller, interrupts: &interrupts }.settle(&folder, &case)?;
     Ok(if result.is_some() { Exit::Passed } else { Exit::Interrupted })
+}
+
+/// Stops the case once the campaign is interrupted: a signal does not reach another machine.
+fn stop_at(interruption: Interruption, interrupts: Interrupts) {
+    std::thread::spawn(move || {
+        while !interruption.is_marked() {
+            clock::sleep(LOOK_EVERY);
+        }
+        interrupts.request_stop();
+    });
 }
 
 /// A worker that is killed takes its case along: no orphan computes what the next worker computes again.

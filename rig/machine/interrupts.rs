@@ -36,6 +36,11 @@ impl Interrupts {
         Ok(interrupts)
     }
 
+    /// Requests an orderly stop, as a signal does.
+    pub(crate) fn request_stop(&self) {
+        self.count.fetch_add(1, Ordering::Relaxed);
+    }
+
     /// Whether an orderly stop is requested.
     pub(crate) fn is_stop_requested(&self) -> bool {
         self.count.load(Ordering::Relaxed) > 0

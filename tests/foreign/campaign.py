@@ -1,5 +1,5 @@
 """Reads the results of a campaign with polars and DuckDB, and kills what runs it. Every case must have one result, whatever
-dies: the campaign itself, a case, or a whole HyperQueue cluster. In the package from PyPI, the workers of a cluster are threads
+dies: the campaign itself, a case, or a whole HyperQueue cluster; and so after interrupts, which leave no case behind. In the package from PyPI, the workers of a cluster are threads
 of its server, so a worker cannot be killed alone here.
 
     campaign.py MASSETER FOLDER
@@ -54,6 +54,13 @@ cluster.start_worker(WorkerConfig(cores=1))
 cluster.start_worker(WorkerConfig(cores=1))
 print("ready", flush=True)
 time.sleep(600)
+"""
+
+# Returns when every task of a job has ended.
+AWAIT_JOB = """
+import sys
+from hyperqueue import Client
+Client(sys.argv[1]).connection.wait_for_jobs([int(sys.argv[2])], lambda status: None)
 """
 
 
@@ -179,16 +186,19 @@ def cluster():
     return started
 
 
-engine = ["--engine", "hyperqueue", "--server-dir", server, "--python", sys.executable]
+def engine(server):
+    return ["--engine", "hyperqueue", "--server-dir", server, "--python", sys.executable]
+
+
 first = cluster()
-campaign = start("case", *engine)
+campaign = start("case", *engine(server))
 wait_until("a case dies", kill_a_case)
 _, said = campaign.communicate()
 assert campaign.returncode == 1 and f"1 of {CASES} cases to HyperQueue" in said, (campaign.returncode, said)
 # What the killed case left goes with the next start of the command.
-start("case", *engine).communicate()
+start("case", *engine(server)).communicate()
 check_complete("case")
-campaign = start("cluster", *engine)
+campaign = start("cluster", *engine(server))
 wait_until("some cases have ended", lambda: (folder / "cluster/cases").is_dir() and len(results("cluster")) > 5)
 first.kill()
 first.wait()
@@ -197,9 +207,28 @@ _, said = campaign.communicate()
 assert campaign.returncode == 4 and "the same command goes on" in said, (campaign.returncode, said)
 assert len(results("cluster")) < CASES
 second = cluster()
-campaign = start("cluster", *engine)
+campaign = start("cluster", *engine(server))
 said = campaign.communicate()
 second.kill()
 assert campaign.returncode == 1, said
 check_complete("cluster")
+
+# An interrupt ends the cases at the workers too, and empties the queue. The same command runs what is left.
+server = folder / "another"
+third = cluster()
+for signalled in (signal.SIGINT, signal.SIGTERM):
+    before = len(results("interrupted"))
+    campaign = start("interrupted", *engine(server))
+    wait_until("some cases have ended", lambda: len(results("interrupted")) > before + 5)
+    campaign.send_signal(signalled)
+    _, said = campaign.communicate()
+    assert campaign.returncode == 130 and "begin no more; 'hq job cancel " in said, (campaign.returncode, said)
+    job = int(said.split("hq job cancel ")[1].split("'")[0])
+    subprocess.run([sys.executable, "-c", AWAIT_JOB, server, str(job)], check=True, timeout=30.0)
+    assert not cases_alive() and before < len(results("interrupted")) < CASES
+campaign = start("interrupted", *engine(server))
+said = campaign.communicate()
+third.kill()
+assert campaign.returncode == 1, said
+check_complete("interrupted")
 print(f"{CASES} cases: read by two programs, and each with one result after every kill")

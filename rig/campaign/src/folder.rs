@@ -13,6 +13,7 @@ use tempfile::TempDir;
 
 use crate::campaign::Campaign;
 use crate::case::Case;
+use crate::interruption::Interruption;
 use crate::result::CaseResult;
 
 const PLAN: &str = "plan.json";
@@ -90,6 +91,7 @@ impl CampaignFolder {
             let plan = serde_json::to_string_pretty(campaign).expect("a campaign has a JSON form");
             folder.write_whole(&folder.plan_path(), &plan)?;
         }
+        folder.interruption().clear().map_err(system(path))?;
         folder.sweep()?;
         Ok((folder, lock))
     }
@@ -110,6 +112,11 @@ impl CampaignFolder {
     /// The folder itself.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Whether the campaign is interrupted, until it goes on.
+    pub fn interruption(&self) -> Interruption {
+        Interruption::of(&self.path)
     }
 
     /// Another file of this name.
@@ -321,9 +328,12 @@ mod tests {
         // The second attempt comes too late, and does no harm.
         let late = CaseResult { word: "PASS".to_owned(), exit_code: 0, ..failed(&first) };
         folder.attempt(&first).unwrap().finish(&late, first.scenario.as_ref().ok()).unwrap();
+        folder.interruption().mark().unwrap();
+        assert!(folder.interruption().is_marked());
         drop(lock);
 
         let (folder, _lock) = CampaignFolder::begin(&path, &two()).unwrap();
+        assert!(!folder.interruption().is_marked());
         assert_eq!(folder.result_of(&case(1)).unwrap(), None);
         assert_eq!(folder.results().unwrap(), [failed(&first)]);
         assert!(folder.scenario_of(&failed(&first)).is_file());

@@ -1,4 +1,4 @@
-"""Submits the cases of a campaign to a HyperQueue server, and waits until they have ended.
+"""Submits the cases of a campaign to a HyperQueue server, prints the number of the job, and waits until it has ended.
 
 Arguments: the program, the folder of the campaign, the folder of the server or nothing. Standard input: numbers of cases.
 """
@@ -12,4 +12,6 @@ client = Client(server or None)
 job = Job(max_fails=None)
 for number in sys.stdin.read().split():
     job.program([program, "campaign-case", folder, number], stdout=None, stderr=None)
-client.wait_for_jobs([client.submit(job)], raise_on_error=False)
+submitted = client.submit(job)
+print(submitted.id, flush=True)
+client.wait_for_jobs([submitted], raise_on_error=False)
