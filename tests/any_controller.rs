@@ -12,7 +12,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
 use common::{Cores, LENIENT, MASSETER, PASSED_OR_INVALID, Workspace, masseter, stderr, stdout, wait_until};
-use masseter_shared::lifecycle::attach::socket;
+use masseter_shared::control::Session;
+use masseter_shared::lifecycle::attach::{self, socket};
+use masseter_shared::named::Declared;
 use masseter_shared::transport::Domain;
 use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 
@@ -34,7 +36,7 @@ fn waiting(workspace: &Workspace, name: &str) -> Child {
 }
 
 /// The rig's own controller as a program.
-fn attach(arguments: &[&str]) -> Command {
+fn program(arguments: &[&str]) -> Command {
     let mut command = Command::new(MASSETER);
     command.arg("controller").args(arguments).env_remove("MASSETER_RIG");
     command
@@ -57,7 +59,7 @@ fn a_program_leaves_the_bytes_of_the_rigs_own_controller() {
     let by_hand = Workspace::new(SCENARIO);
     let name = unique("by-hand");
     let rig = waiting(&by_hand, &name);
-    assert_eq!(attach(&["--rig", &name]).status().unwrap().code(), Some(0));
+    assert_eq!(program(&["--rig", &name]).status().unwrap().code(), Some(0));
     let output = rig.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert!(by_hand.recording() == own.recording());
@@ -113,6 +115,23 @@ fn a_program_that_dies_or_never_attaches_is_named_with_its_exit_and_the_drives_s
     );
 }
 
+/// The supervisor sees both ends at once: the plant has ended because the program has left.
+#[test]
+fn a_program_that_leaves_is_named_though_the_plant_has_ended_too() {
+    let workspace = Workspace::new(SCENARIO);
+    let name = unique("leaves");
+    let rig = waiting(&workspace, &name);
+    let session = Session::start(attach::attach(Some(&name)).unwrap(), Declared::default()).unwrap();
+    kill_process(Pid::from_child(&rig), Signal::STOP).unwrap();
+    session.fail("no more ideas").unwrap();
+    let plant = common::child_of(&rig, "plant").as_raw_nonzero().get();
+    wait_until("the plant has ended", || is_dead(plant));
+    kill_process(Pid::from_child(&rig), Signal::CONT).unwrap();
+    let output = rig.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(4), "{}", stderr(&output));
+    assert_eq!(workspace.summary()["verdict"]["reason"], "the controller died: no more ideas");
+}
+
 #[test]
 fn a_program_that_hangs_is_given_up_by_its_silence() {
     let workspace = Workspace::new("duration_s = 60.0\n");
@@ -136,7 +155,7 @@ fn a_program_of_the_user_that_hangs_is_left_to_its_user_and_the_run_ends() {
     let rig = workspace.start_lockstep(&arguments);
     let socket = socket(&Domain::named(&name).unwrap());
     wait_until("the rig waits", || UnixStream::connect(&socket).is_ok());
-    let mut program = attach(&["--rig", &name]).spawn().unwrap();
+    let mut program = program(&["--rig", &name]).spawn().unwrap();
     common::wait_until_it_records(&workspace);
     kill_process(Pid::from_child(&program), Signal::STOP).unwrap();
     let output = rig.wait_with_output().unwrap();
@@ -238,20 +257,20 @@ fn a_second_program_another_version_and_a_stranger_are_refused_and_the_run_goes_
     let stranger = answer_to("GET / HTTP/1.1");
     assert!(stranger.contains("refused") && stranger.contains("greeting"), "{stranger}");
 
-    let hello = serde_json::to_string(&masseter_shared::lifecycle::attach::Hello::new()).unwrap();
+    let hello = serde_json::to_string(&attach::Hello::new()).unwrap();
     let mut first = UnixStream::connect(&path).unwrap();
     writeln!(first, "{hello}").unwrap();
     let mut answer = String::new();
     BufReader::new(&first).read_line(&mut answer).unwrap();
     assert!(answer.contains("invited"), "{answer}");
-    let second = attach(&["--rig", &name]).output().unwrap();
+    let second = program(&["--rig", &name]).output().unwrap();
     assert_eq!(second.status.code(), Some(2));
     assert!(stderr(&second).contains("has its controller"), "{}", stderr(&second));
 
     // The first one leaves before it is ready: the rig waits for the next.
     drop(first);
     wait_until("another program is admitted", || {
-        attach(&["--rig", &name]).stderr(Stdio::null()).status().unwrap().success()
+        program(&["--rig", &name]).stderr(Stdio::null()).status().unwrap().success()
     });
     let output = rig.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
@@ -263,7 +282,7 @@ fn without_such_a_rig_those_that_wait_are_listed() {
     let workspace = Workspace::new(SCENARIO);
     let name = unique("listed");
     let rig = waiting(&workspace, &name);
-    let output = attach(&["--rig", "nowhere"]).output().unwrap();
+    let output = program(&["--rig", "nowhere"]).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
     let said = stderr(&output);
     assert!(said.contains("no rig named 'nowhere' takes a controller") && said.contains(&name), "{said}");

@@ -8,18 +8,23 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
+use masseter_shared::clock;
 use masseter_shared::lifecycle::{Order, Party, Silence, Start, line};
 use rustix::process::{
     Pid, PidfdFlags, Resource, Rlimit, Signal, getrlimit, kill_process, pidfd_open, prlimit,
 };
 
 use super::reports::{Due, Readiness, Ready, Reports};
+use crate::machine::interrupts::Interrupts;
 
 /// Longest time for a process to open its ports and lock its memory.
 pub(super) const READY_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// Polling interval while waiting for readiness.
 pub(super) const POLL: Duration = Duration::from_millis(20);
+
+/// Polling interval while waiting for the end.
+const END_POLL: Duration = Duration::from_millis(2);
 
 /// What became of a process that the rig ended.
 pub(super) const KILLED: &str = "was killed";
@@ -122,6 +127,32 @@ impl Process {
     /// Asks it to end (SIGTERM).
     pub(super) fn terminate(&mut self) {
         self.signal(Signal::TERM);
+    }
+
+    /// The same, and kills it if it does not end in time; its status if it did.
+    pub(super) fn end(&mut self, timeout_ns: u64, interrupts: &Interrupts) -> io::Result<Option<ExitStatus>> {
+        self.terminate();
+        let status = self.await_end(timeout_ns, interrupts)?;
+        if status.is_none() {
+            self.kill();
+        }
+        Ok(status)
+    }
+
+    /// Waits for its end; its exit status, if it ends in time and before an immediate end is requested.
+    pub(super) fn await_end(
+        &mut self,
+        timeout_ns: u64,
+        interrupts: &Interrupts,
+    ) -> io::Result<Option<ExitStatus>> {
+        let deadline_ns = clock::now_ns() + timeout_ns;
+        loop {
+            let status = self.exit_status()?;
+            if status.is_some() || interrupts.is_abort_requested() || clock::now_ns() >= deadline_ns {
+                return Ok(status);
+            }
+            clock::sleep(END_POLL);
+        }
     }
 
     /// Ends it at once (SIGKILL).

@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::fs;
 use std::io;
+use std::os::unix::process::ExitStatusExt;
 use std::process::ExitStatus;
 use std::time::Duration;
 
@@ -269,10 +270,13 @@ impl Rig {
                 return Ok(Ending::Interrupted);
             }
             self.strike();
+            // In this order: a process that has ended before the controller did not miss it.
+            let others = [self.recorder.exit_status()?, self.plant.exit_status()?];
+            let end = self.controller.end()?;
             if interruption.is_none() {
-                interruption = self.interrupt_controller(interrupts)?;
+                interruption = self.interrupt_controller(interrupts, others, end.is_some())?;
             }
-            if let Some(end) = self.controller.end()? {
+            if let Some(end) = end {
                 break end;
             }
             let now_ns = clock::now_ns();
@@ -285,8 +289,8 @@ impl Rig {
             clock::sleep(POLL);
         };
         let controller = self.controller_ending(end_of_controller, interrupts)?;
-        let plant = end(&mut self.plant, END_TIMEOUT_NS, interrupts)?;
-        let recorder = end(&mut self.recorder, RECORD_TIMEOUT_NS, interrupts)?;
+        let plant = self.plant.end(END_TIMEOUT_NS, interrupts)?;
+        let recorder = self.recorder.end(RECORD_TIMEOUT_NS, interrupts)?;
         if interrupts.is_abort_requested() {
             return Ok(Ending::Interrupted);
         }
@@ -300,12 +304,20 @@ impl Rig {
     }
 
     /// Asks the controller to end if the user interrupts, or another process was silent or has ended; returns that ending.
-    fn interrupt_controller(&mut self, interrupts: &Interrupts) -> io::Result<Option<Ending>> {
-        let (recorder, plant) = (self.recorder.exit_status()?, self.plant.exit_status()?);
+    /// Where the controller has left, the others miss it: only one that was killed has an ending of its own.
+    fn interrupt_controller(
+        &mut self,
+        interrupts: &Interrupts,
+        [recorder, plant]: [Option<ExitStatus>; 2],
+        has_left: bool,
+    ) -> io::Result<Option<Ending>> {
+        let is_killed = |status: &ExitStatus| status.signal().is_some();
         let ending = if interrupts.is_stop_requested() {
             Ending::Interrupted
         } else if let Some(ending) = self.end_silent() {
             ending
+        } else if has_left && ![recorder, plant].iter().flatten().any(is_killed) {
+            return Ok(None);
         } else if recorder.is_some() {
             if self.is_lockstep {
                 // It would wait for the recorder.
@@ -349,7 +361,7 @@ impl Rig {
             End::SafeStop => return Ok(Ending::SafeStop),
             End::Failed { reason } => reason,
         };
-        wait_for(&mut self.plant, self.plant_alone_ns, interrupts)?;
+        self.plant.await_end(self.plant_alone_ns, interrupts)?;
         Ok(Ending::died(CONTROLLER, reason))
     }
 }
@@ -358,31 +370,6 @@ impl Rig {
 fn next_epoch_ns(period_ns: u64) -> u64 {
     let earliest = clock::now_ns() + START_LEAD_NS;
     earliest.next_multiple_of(MILLISECOND_NS.max(period_ns)) + OFF_TICK_NS.min(period_ns / 4)
-}
-
-/// Asks a process to end, and kills it if it does not; its status if it did.
-fn end(process: &mut Process, timeout_ns: u64, interrupts: &Interrupts) -> io::Result<Option<ExitStatus>> {
-    process.terminate();
-    let status = wait_for(process, timeout_ns, interrupts)?;
-    if status.is_none() {
-        process.kill();
-    }
-    Ok(status)
-}
-
-fn wait_for(
-    process: &mut Process,
-    timeout_ns: u64,
-    interrupts: &Interrupts,
-) -> io::Result<Option<ExitStatus>> {
-    let deadline_ns = clock::now_ns() + timeout_ns;
-    loop {
-        let status = process.exit_status()?;
-        if status.is_some() || interrupts.is_abort_requested() || clock::now_ns() >= deadline_ns {
-            return Ok(status);
-        }
-        clock::sleep(POLL);
-    }
 }
 
 /// Prints what the kernel refused; returns the number of refusals.

@@ -423,11 +423,7 @@ def test_a_flood_of_events_costs_the_flooder_alone(masseter_command: str, tmp_pa
 
 
 def test_a_controller_that_leaves_is_named(masseter_command: str, tmp_path: Path) -> None:
-    def leave(session: masseter.Session) -> None:
-        session.wait()
-        session.fail("no more ideas")
-
-    code, said = session_run(masseter_command, tmp_path, leave)
+    code, said = session_run(masseter_command, tmp_path, lambda session: session.fail("no more ideas"))
     assert code == 4 and "no more ideas" in said, said
 
 
