@@ -1,47 +1,17 @@
-//! The file with the values of a drive from before `configure`. Other programs and people may have changed it: what is read
-//! is checked before anything is sent.
+//! The file with the values of a drive from before `configure`.
 
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 
-use masseter_plant::bringup::{Setting, Settings};
-use masseter_shared::config::ObjectKey;
+use masseter_plant::bringup::Settings;
 use masseter_shared::geometry::AXIS_NAMES;
+
+use super::damaged::{Damage, DamagedFile, check_old_value, parse};
 
 /// Most objects of a PDO (CiA 301).
 const MAPPED_MAX: usize = 64;
-/// Controlword: no step writes this object.
-const CONTROLWORD: u16 = 0x6040;
-
-/// A file whose values no drive had.
-#[derive(Debug, thiserror::Error)]
-#[error(
-    "{}: {damage}; the file is damaged: bring it back from a backup, or remove it and write the values by hand that \
-     result.json beside it shows",
-    path.display()
-)]
-pub(super) struct Damaged {
-    path: PathBuf,
-    damage: Damage,
-}
-
-/// What is wrong with such a file.
-#[derive(Debug, thiserror::Error)]
-enum Damage {
-    /// It cannot be read.
-    #[error(transparent)]
-    File(#[from] io::Error),
-    /// It has not the form of such a file.
-    #[error(transparent)]
-    Form(#[from] serde_json::Error),
-    /// No step writes this.
-    #[error("{object} with {bytes} bytes is no old value")]
-    Object { object: ObjectKey, bytes: usize },
-    /// There is no such PDO.
-    #[error("{communication:04X}h with {mapped} objects is no PDO")]
-    Pdo { communication: u16, mapped: usize },
-}
+/// What to do about a damaged file.
+const REMEDY: &str =
+    "bring it back from a backup, or remove it and write the values by hand that result.json beside it shows";
 
 /// Name of the file for an axis.
 pub(super) fn before_file(axis: usize) -> String {
@@ -60,17 +30,14 @@ pub(super) struct Nameless(pub(super) PathBuf);
 /// The values in a file.
 ///
 /// # Errors
-/// [`Damaged`].
-pub(super) fn read(path: &Path) -> Result<Settings, Damaged> {
-    parse(path).map_err(|damage| Damaged { path: path.to_owned(), damage })
+/// [`DamagedFile`].
+pub(super) fn read(path: &Path) -> Result<Settings, DamagedFile> {
+    checked(path).map_err(|damage| DamagedFile { path: path.to_owned(), damage, remedy: REMEDY })
 }
 
-fn parse(path: &Path) -> Result<Settings, Damage> {
-    let settings: Settings = serde_json::from_str(&fs::read_to_string(path)?)?;
-    let is_strange = |one: &&Setting| !matches!(one.bytes, 1 | 2 | 4) || one.object.0.index == CONTROLWORD;
-    if let Some(one) = settings.objects.iter().find(is_strange) {
-        return Err(Damage::Object { object: one.object, bytes: one.bytes });
-    }
+fn checked(path: &Path) -> Result<Settings, Damage> {
+    let settings: Settings = parse(path)?;
+    settings.objects.iter().try_for_each(|one| check_old_value(one.object, one.bytes))?;
     for pdo in &settings.pdos {
         let (communication, mapped) =
             (pdo.communication, pdo.layout.as_ref().map_or(0, |layout| layout.mapping.len()));

@@ -12,6 +12,7 @@ use masseter_shared::geometry::{AXES, AXIS_NAMES};
 use masseter_terminal::{Failure, status};
 use serde::{Deserialize, Serialize};
 
+use super::damaged::{Damage, DamagedFile, check_old_value, parse};
 use super::robot_line::{failed, serial};
 use super::writing::prove_off;
 
@@ -27,46 +28,26 @@ struct Owed {
     values: Vec<OldValue>,
 }
 
-/// A file that no step has written like this. The drive itself returns to its old values when it restarts: no step stores reduced ones.
-#[derive(Debug, thiserror::Error)]
-#[error(
-    "{}: {damage}; the file is damaged: remove it, and switch the drive's supply off and on, which brings its stored values back",
-    .path.display()
-)]
-struct Damaged {
-    path: PathBuf,
-    damage: Damage,
-}
-
-/// What is wrong with such a file.
-#[derive(Debug, thiserror::Error)]
-enum Damage {
-    /// It cannot be read.
-    #[error(transparent)]
-    File(#[from] io::Error),
-    /// It has not the form of such a file.
-    #[error(transparent)]
-    Form(#[from] serde_json::Error),
-    /// No step changes this.
-    #[error("{object} with {bytes} bytes is no old value of a step")]
-    Object { object: ObjectKey, bytes: usize },
-}
+/// What to do about a damaged file. The drive itself returns to its old values when it restarts: no step stores reduced ones.
+const REMEDY: &str =
+    "remove it, and switch the drive's supply off and on, which brings its stored values back";
 
 impl Owed {
     /// What a file says.
-    fn parse(path: &Path) -> Result<Self, Damage> {
-        let owed: Self = serde_json::from_str(&fs::read_to_string(path)?)?;
-        let is_strange = |old: &&OldValue| !matches!(old.bytes, 1 | 2 | 4) || old.object.0.index == 0x6040;
-        match owed.values.iter().find(is_strange) {
-            Some(&OldValue { object, bytes, .. }) => Err(Damage::Object { object, bytes }),
-            None => Ok(owed),
-        }
+    fn checked(path: &Path) -> Result<Self, Damage> {
+        let owed: Self = parse(path)?;
+        owed.values.iter().try_for_each(|old| check_old_value(old.object, old.bytes))?;
+        Ok(owed)
     }
 
     /// What the drive of an axis is owed; another drive is owed nothing.
     fn read(folder: &Path, line: &mut Line, axis: usize) -> anyhow::Result<Self> {
         let path = file(folder, axis);
-        let owed = Self::parse(&path).map_err(|damage| Damaged { path: path.clone(), damage })?;
+        let owed = Self::checked(&path).map_err(|damage| DamagedFile {
+            path: path.clone(),
+            damage,
+            remedy: REMEDY,
+        })?;
         ensure!(
             serial(line, axis)? == owed.serial,
             "{}: {} has the old values of a drive with another serial number (1018h:04); put that drive back, or remove \

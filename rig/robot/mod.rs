@@ -7,6 +7,7 @@ mod args;
 mod before;
 mod check_pose;
 mod configure;
+mod damaged;
 mod dry_run;
 mod evidence;
 mod hold;
