@@ -100,7 +100,7 @@
   }
 
   Masseter.chart = (holder, data, clock, isSmall = false) => {
-    const isTime = data.across === 'time', isLogX = data.across === 'percentile', isLog = data.scale === 'log';
+    const isTime = data.across === 'time', isLog = data.scale === 'log';
     const view = isTime ? clock : ownView(() => moveCursor());
     const clip = `clip-${clips += 1}`;
     let series = preparedAll(data), plot = null, isDirty = true, isVisible = true, isWaiting = false, isUnderPointer = false;
@@ -159,7 +159,7 @@
       const room = isSmall ? SMALL : width < NARROW.width ? { ...ROOM, ...NARROW } : ROOM;
       const { ends, near, beyond } = fitted(found, data.limits || [], isLog, isSmall);
       const right = width - room.right;
-      const x = Masseter.axis(isLogX, window, [room.left, right]);
+      const x = Masseter.axis(!isTime, window, [room.left, right]);
       const moments = isTime ? placed([...(isSmall ? [] : Masseter.moments), ...(data.moments || [])], window, x, right) : [];
       const top = room.top + (isSmall ? 0 : ROW * Math.max(0, ...moments.map(({ row }) => row + 1)));
       const bottom = top + data.height;
@@ -189,7 +189,7 @@
     function grid() {
       const { x, y, left, right, top, bottom, window } = plot;
       const many = Math.max(3, Math.floor((right - left) / (isTime ? clock.tickRoom : 64))), few = Math.max(4, Math.floor(data.height / 27));
-      const across = isTime ? clock.ticks(window, many) : isLogX ? Masseter.percentileTicks(window) : Masseter.linearTicks(window, many);
+      const across = isTime ? clock.ticks(window, many) : Masseter.percentileTicks(window);
       const up = isLog ? Masseter.logTicks(y.ends, few) : Masseter.linearTicks(y.ends, few);
       const vertical = across.map(({ value, text }) => [
         svg('line', { x1: x.position(value), x2: x.position(value), y1: top, y2: bottom, class: 'mesh' }),
@@ -197,7 +197,7 @@
       const horizontal = up.map(({ value, text }) => [
         svg('line', { x1: left, x2: right, y1: y.position(value), y2: y.position(value), class: 'mesh' }),
         svg('text', { x: left - 6, y: y.position(value) + 4, class: 'tick', 'text-anchor': 'end' }, text)]);
-      const name = isTime ? clock.label : isLogX ? 'percentile' : data.across.values;
+      const name = isTime ? clock.label : 'percentile';
       return [...vertical.flat(), ...horizontal.flat(), svg('rect', { x: left, y: top, width: right - left, height: bottom - top, class: 'frame' }),
         svg('text', { x: right, y: bottom + 32, class: 'tick', 'text-anchor': 'end' }, name)];
     }

@@ -59,7 +59,7 @@
     }));
     const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replace(/"/g, '""')}"` : text);
     const names = shown.map(({ name }) => quoted(data.unit ? `${name} (${data.unit})` : name));
-    const first = isTime ? view.label : data.across === 'percentile' ? '1/(1 - quantile)' : data.across.values;
+    const first = isTime ? view.label : '1/(1 - quantile)';
     const lines = [...rows].sort(([a], [b]) => a - b).map(([x, cells]) => [Number((isTime ? view.shown(x) : x).toFixed(9)), ...cells].join(','));
     return `${[quoted(first), ...names].join(',')}\n${lines.join('\n')}\n`;
   };

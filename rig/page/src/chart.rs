@@ -6,15 +6,13 @@ use crate::points::Points;
 use crate::time::Moment;
 
 /// What is drawn from left to right.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Across {
     /// Seconds since the first SYNC. Charts over time share cursor and zoom.
     Time,
     /// 1/(1 − quantile), by its logarithm, labelled as percentiles.
     Percentile,
-    /// Values of another quantity, with its name and unit.
-    Values(String),
 }
 
 /// How values are spaced from bottom to top.
