@@ -6,7 +6,8 @@ use masseter_can::canopen::ObjectAddress;
 use masseter_shared::config::{DriveProfile, ObjectKey, ObjectRule};
 
 use super::ledger::OldValue;
-use super::line::{Line, LineError};
+use super::line::Line;
+use super::line_error::LineError;
 use super::settings::same;
 
 /// A value for the duration of a step.

@@ -3,27 +3,21 @@
 //! The line keeps one promise for every step of the bring-up: while it has switched on one drive, it refuses to switch on another.
 
 use std::fmt::{self, Debug, Formatter};
-use std::io::{self, Write};
+use std::io::Write;
 
 use masseter_can::canopen::{
-    AbortCode, Cob, Expedited, Heartbeat, Nmt, NmtCommand, NmtState, NmtTarget, NodeId, ObjectAddress,
-    SdoRequest, SdoResponse, sync,
+    AbortCode, Expedited, Nmt, NmtCommand, NmtTarget, NodeId, ObjectAddress, SdoRequest, SdoResponse, sync,
 };
 use masseter_can::cia402::Controlword;
-use masseter_can::wire::{Bitrate, INTERFRAME_BITS, frame_bits};
-use masseter_can::{Frame, SendError, Tapped, TappedFrame, candump};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::{MASTER_NODE, Scenario};
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
 
 use super::heard::{Heard, Strangers};
 use super::ledger::{Ledger, OldValue};
-use super::wires::Wires;
+use super::line_error::{LineError, SdoReason};
+use super::traffic::Traffic;
 use crate::error::PlantError;
-use crate::link::layout::{drive_ports, node_ids};
 
-/// Time between two looks at the buses, ns.
-const STEP_NS: u64 = MILLISECOND_NS;
 /// Silence of a server after which a request is repeated, and how often that is done.
 const TIMEOUT_NS: u64 = 500 * MILLISECOND_NS;
 /// The same while a drive has power: a motion nobody sees must be short.
@@ -36,97 +30,11 @@ const SYNC_NS: u64 = 20 * MILLISECOND_NS;
 /// Bytes of the longest value that is read: no text of an identity is longer.
 const LONGEST_VALUE: usize = 256;
 
-/// Why a question had no answer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum SdoReason {
-    /// The drive refused the transfer.
-    #[error("{0}")]
-    Aborted(AbortCode),
-    /// Nothing came.
-    #[error("no answer; check its power, wiring, bit rate and node id")]
-    Silent,
-    /// The answers do not follow the protocol, or never end.
-    #[error("answers beside the protocol; check whether two nodes have this id")]
-    Malformed,
-}
-
-/// Why a line cannot go on.
-#[derive(Debug, thiserror::Error)]
-pub enum LineError {
-    /// A transfer failed.
-    #[error("{}: object {object}: {reason}", AXIS_NAMES[*axis])]
-    Sdo {
-        /// The axis.
-        axis: usize,
-        /// The object.
-        object: ObjectAddress,
-        /// The reason.
-        reason: SdoReason,
-    },
-    /// A second drive would be switched on.
-    #[error("{}: not switched on, because {} still is; end that step first", AXIS_NAMES[*axis], AXIS_NAMES[*other])]
-    SecondAxis {
-        /// The axis to be switched on.
-        axis: usize,
-        /// The axis that is.
-        other: usize,
-    },
-    /// A frame could not be sent.
-    #[error("bus {bus}: {error}")]
-    Send {
-        /// The bus.
-        bus: usize,
-        /// The reason.
-        error: SendError,
-    },
-    /// The emulated mechanism failed, or the memory of emulated drives cannot be written.
-    #[error(transparent)]
-    Emulation(#[from] PlantError),
-    /// Old values could not be kept.
-    #[error("old values of {} cannot be kept, so that no further value is written: {source}; free the disk", AXIS_NAMES[*axis])]
-    Ledger {
-        /// The axis.
-        axis: usize,
-        /// The reason.
-        source: io::Error,
-    },
-    /// The log could not be written.
-    #[error("the log of the bus cannot be written: {0}")]
-    Log(#[from] io::Error),
-}
-
-impl LineError {
-    /// The code with which a drive refused a transfer.
-    pub fn abort_code(&self) -> Option<AbortCode> {
-        match self {
-            Self::Sdo { reason: SdoReason::Aborted(code), .. } => Some(*code),
-            _ => None,
-        }
-    }
-}
-
-/// The heartbeat of this node: drives that watch it stop without it.
-#[derive(Debug, Clone, Copy)]
-struct Beat {
-    every_ns: u64,
-    next_ns: u64,
-}
-
 /// The line.
 pub struct Line {
-    wires: Wires,
-    /// Names of the buses in the log.
-    names: Vec<String>,
-    addresses: [(usize, NodeId); AXES],
-    heard: [Heard; AXES],
-    strangers: Strangers,
-    beat: Option<Beat>,
-    /// When the last SYNC of this line was on its bus, ns.
-    sync_ns: Option<u64>,
-    bitrate: Bitrate,
+    traffic: Traffic,
     /// The axis whose drive this line has switched on.
     switched_on: Option<usize>,
-    log: Box<dyn Write + Send>,
     /// Where old values are kept; none where nobody needs them after a kill.
     ledger: Option<Box<dyn Ledger>>,
 }
@@ -134,7 +42,7 @@ pub struct Line {
 impl Debug for Line {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         f.debug_struct("Line")
-            .field("names", &self.names)
+            .field("names", &self.traffic.names())
             .field("switched_on", &self.switched_on)
             .finish_non_exhaustive()
     }
@@ -147,22 +55,7 @@ impl Line {
     /// # Errors
     /// [`PlantError`] for interfaces that cannot be opened and for buses that cannot be built.
     pub fn open(scenario: &Scenario, log: Box<dyn Write + Send>) -> Result<Self, PlantError> {
-        let can = &scenario.can;
-        let (ports, ids) = (drive_ports(can)?, node_ids(can)?);
-        let simulated = (0..can.buses.len()).map(|bus| format!("can{bus}")).collect();
-        Ok(Self {
-            wires: Wires::open(scenario)?,
-            names: if can.is_virtual() { simulated } else { can.interfaces.clone() },
-            addresses: std::array::from_fn(|axis| (ports[axis].bus, ids[axis])),
-            heard: Default::default(),
-            strangers: Strangers::default(),
-            beat: None,
-            sync_ns: None,
-            bitrate: Bitrate::new(can.bitrate_bps)?,
-            switched_on: None,
-            log,
-            ledger: None,
-        })
+        Ok(Self { traffic: Traffic::open(scenario, log)?, switched_on: None, ledger: None })
     }
 
     /// Keeps old values of drives in this ledger from now on.
@@ -178,22 +71,22 @@ impl Line {
 
     /// The present time, ns: simulated from 0, or the machine's.
     pub fn now_ns(&self) -> u64 {
-        self.wires.now_ns()
+        self.traffic.now_ns()
     }
 
     /// What was heard of a drive.
     pub fn heard(&self, axis: usize) -> &Heard {
-        &self.heard[axis]
+        self.traffic.heard(axis)
     }
 
     /// Who else was heard.
     pub fn strangers(&self) -> &Strangers {
-        &self.strangers
+        self.traffic.strangers()
     }
 
     /// Sends the master's heartbeat from now on, with that interval.
     pub fn beat_every(&mut self, interval_ms: u16) {
-        self.beat = Some(Beat { every_ns: u64::from(interval_ms) * MILLISECOND_NS, next_ns: self.now_ns() });
+        self.traffic.beat_every(interval_ms);
     }
 
     /// Listens for that long.
@@ -203,7 +96,7 @@ impl Line {
     pub fn listen(&mut self, for_ns: u64) -> Result<(), LineError> {
         let until_ns = self.now_ns() + for_ns;
         while self.now_ns() < until_ns {
-            self.step()?;
+            self.traffic.step()?;
         }
         Ok(())
     }
@@ -222,7 +115,7 @@ impl Line {
             if self.now_ns() >= until_ns {
                 return Ok(false);
             }
-            self.step()?;
+            self.traffic.step()?;
         }
         Ok(true)
     }
@@ -308,8 +201,8 @@ impl Line {
     /// # Errors
     /// [`LineError::Send`].
     pub fn command(&mut self, axis: usize, command: NmtCommand) -> Result<(), LineError> {
-        let (bus, node) = self.addresses[axis];
-        self.send(bus, Nmt { command, target: NmtTarget::Node(node) }.frame())
+        let (bus, node) = self.traffic.address(axis);
+        self.traffic.send(bus, Nmt { command, target: NmtTarget::Node(node) }.frame())
     }
 
     /// Asks every node id for its device type. Nodes that are none of the scenario's show as [strangers](Self::strangers).
@@ -320,8 +213,8 @@ impl Line {
         let request = SdoRequest::InitiateUpload { object: ObjectAddress::new(0x1000, 0) };
         for id in 1..=MASTER_NODE.get() {
             let node = NodeId::new(id).expect("the id is in range");
-            for bus in 0..self.names.len() {
-                self.send(bus, request.frame(node))?;
+            for bus in 0..self.traffic.names().len() {
+                self.traffic.send(bus, request.frame(node))?;
             }
             self.listen(SCAN_NS)?;
         }
@@ -331,14 +224,11 @@ impl Line {
     /// Sends SYNC to the bus of an axis. Returns the time from its end until the drive began to transmit its process data, ns;
     /// none where nothing came.
     pub(super) fn sync_answer_ns(&mut self, axis: usize) -> Result<Option<u64>, LineError> {
-        let (bus, _) = self.addresses[axis];
-        (self.sync_ns, self.heard[axis].process_data_ns) = (None, None);
-        self.send(bus, sync::frame())?;
-        self.listen_until(SYNC_NS, |line| line.heard[axis].process_data_ns.is_some())?;
-        Ok(self.heard[axis]
-            .process_data_ns
-            .zip(self.sync_ns)
-            .map(|(begin_ns, sync_ns)| begin_ns.saturating_sub(sync_ns)))
+        let (bus, _) = self.traffic.address(axis);
+        self.traffic.forget_sync(axis);
+        self.traffic.send(bus, sync::frame())?;
+        self.listen_until(SYNC_NS, |line| line.heard(axis).process_data_ns.is_some())?;
+        Ok(self.traffic.sync_answer_ns(axis))
     }
 
     /// Everything of the log is on its way to its file.
@@ -346,7 +236,7 @@ impl Line {
     /// # Errors
     /// [`LineError::Log`].
     pub fn flush(&mut self) -> Result<(), LineError> {
-        Ok(self.log.flush()?)
+        self.traffic.flush()
     }
 
     fn download(
@@ -370,15 +260,15 @@ impl Line {
         object: ObjectAddress,
         request: SdoRequest,
     ) -> Result<SdoResponse, LineError> {
-        let (bus, node) = self.addresses[axis];
+        let (bus, node) = self.traffic.address(axis);
         let failed = |reason| LineError::Sdo { axis, object, reason };
         let attempts = if matches!(request, SdoRequest::UploadSegment { .. }) { 1 } else { ATTEMPTS };
         let timeout_ns = if self.switched_on.is_some() { POWERED_TIMEOUT_NS } else { TIMEOUT_NS };
         for _ in 0..attempts {
-            self.heard[axis].answer = None;
-            self.send(bus, request.frame(node))?;
-            self.listen_until(timeout_ns, |line| line.heard[axis].answer.is_some())?;
-            match self.heard[axis].answer.take() {
+            self.traffic.take_answer(axis);
+            self.traffic.send(bus, request.frame(node))?;
+            self.listen_until(timeout_ns, |line| line.heard(axis).answer.is_some())?;
+            match self.traffic.take_answer(axis) {
                 Some(SdoResponse::Abort { code, .. }) => return Err(failed(SdoReason::Aborted(code))),
                 Some(answer) if answers(&answer, object) => return Ok(answer),
                 // An answer to an earlier request: this one is repeated.
@@ -386,70 +276,8 @@ impl Line {
             }
         }
         let code = AbortCode::TIMED_OUT;
-        self.send(bus, SdoRequest::Abort { object, code }.frame(node))?;
+        self.traffic.send(bus, SdoRequest::Abort { object, code }.frame(node))?;
         Err(failed(SdoReason::Silent))
-    }
-
-    fn send(&mut self, bus: usize, frame: Frame) -> Result<(), LineError> {
-        self.wires.send(bus, frame).map_err(|error| LineError::Send { bus, error })
-    }
-
-    /// A step of time: the heartbeat, and every frame that has come.
-    fn step(&mut self) -> Result<(), LineError> {
-        self.wires.pass(STEP_NS)?;
-        self.send_heartbeat()?;
-        for bus in 0..self.names.len() {
-            while let Some(tapped) = self.wires.tap(bus) {
-                let mut text = String::new();
-                candump::write(&mut text, &self.names[bus], &tapped).expect("a text takes everything");
-                writeln!(self.log, "{text}")?;
-                if let Tapped::Frame(tapped) = tapped {
-                    self.note_time(bus, &tapped);
-                }
-            }
-            while let Some(received) = self.wires.receive(bus) {
-                self.take(bus, &received.frame);
-            }
-        }
-        Ok(())
-    }
-
-    /// Notes the times of SYNC and of process data.
-    fn note_time(&mut self, bus: usize, tapped: &TappedFrame) {
-        match Cob::try_from(tapped.frame.id()) {
-            Ok(Cob::Sync) => self.sync_ns = Some(tapped.time_ns),
-            Ok(Cob::Tpdo1(node)) => {
-                let bits = frame_bits(&tapped.frame) - INTERFRAME_BITS;
-                let begin_ns = tapped.time_ns.saturating_sub(self.bitrate.bits_to_ns(bits));
-                let axis = self.addresses.iter().position(|at| *at == (bus, node));
-                if let Some(axis) = axis {
-                    self.heard[axis].process_data_ns = Some(begin_ns);
-                }
-            }
-            _ => {}
-        }
-    }
-
-    fn send_heartbeat(&mut self) -> Result<(), LineError> {
-        let now_ns = self.now_ns();
-        let Some(beat) = self.beat.as_mut().filter(|beat| now_ns >= beat.next_ns) else { return Ok(()) };
-        beat.next_ns = now_ns + beat.every_ns;
-        let frame = Heartbeat { state: NmtState::Operational }.frame(MASTER_NODE);
-        (0..self.names.len()).try_for_each(|bus| self.send(bus, frame))
-    }
-
-    fn take(&mut self, bus: usize, frame: &Frame) {
-        let Ok(cob) = Cob::try_from(frame.id()) else { return };
-        let sender = match cob {
-            Cob::Heartbeat(node) | Cob::Emergency(node) | Cob::SdoResponse(node) | Cob::Tpdo1(node) => {
-                Some(node)
-            }
-            _ => None,
-        };
-        match self.addresses.iter().position(|&(at, node)| at == bus && Some(node) == sender) {
-            Some(axis) => self.heard[axis].take(cob, frame),
-            None => self.strangers.take(bus, cob),
-        }
     }
 }
 

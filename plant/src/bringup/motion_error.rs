@@ -5,7 +5,7 @@ use masseter_can::cia402::DriveState;
 use masseter_shared::geometry::AXIS_NAMES;
 
 use super::heard::OtherMaster;
-use super::line::LineError;
+use super::line_error::LineError;
 use super::restart::Restarted;
 
 /// What stopped a motion.

@@ -8,7 +8,8 @@ use masseter_shared::geometry::AXES;
 
 use super::borrowed::{Borrowed, Loan};
 use super::caution::{Caution, Operator, Wish};
-use super::line::{Line, LineError};
+use super::line::Line;
+use super::line_error::LineError;
 use super::motion_error::{MotionError, StopCause};
 use super::switching::{self, seconds};
 use super::watch::{Bounds, Sample, Watch, read_position};

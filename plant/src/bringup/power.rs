@@ -5,7 +5,8 @@ use masseter_can::cia402::{Controlword, Statusword};
 use masseter_shared::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_shared::geometry::AXIS_NAMES;
 
-use super::line::{Line, LineError};
+use super::line::Line;
+use super::line_error::LineError;
 
 /// For how long an axis is watched, ns.
 const WATCH_NS: u64 = 200 * MILLISECOND_NS;

@@ -5,7 +5,8 @@ use masseter_shared::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_shared::config::StoreConfig;
 use masseter_shared::geometry::AXIS_NAMES;
 
-use super::line::{Line, LineError, SdoReason};
+use super::line::Line;
+use super::line_error::{LineError, SdoReason};
 
 /// "save", the last letter in the highest byte (CiA 301, 7.5.2.13).
 const SAVE: u32 = 0x6576_6173;

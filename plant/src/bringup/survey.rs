@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use masseter_can::canopen::{Expedited, ObjectAddress};
 
-use super::line::{Line, LineError, SdoReason};
+use super::line::Line;
+use super::line_error::{LineError, SdoReason};
 
 /// Device, state and units: index and sub-indices.
 const OF_EVERY_DRIVE: [(u16, &[u8]); 20] = [

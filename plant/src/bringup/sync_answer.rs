@@ -3,7 +3,8 @@
 use masseter_can::canopen::NmtCommand;
 use masseter_shared::clock::MILLISECOND_NS;
 
-use super::line::{Line, LineError};
+use super::line::Line;
+use super::line_error::LineError;
 
 /// How many SYNCs a drive answers.
 const SYNCS: usize = 50;

@@ -5,7 +5,8 @@ use masseter_can::cia402::{DriveState, StatusBit, Statusword};
 use masseter_shared::config::AxisScale;
 use masseter_shared::geometry::AXES;
 
-use super::line::{Line, LineError};
+use super::line::Line;
+use super::line_error::LineError;
 use super::motion_error::{MotionError, StopCause};
 use super::restart::BootUps;
 

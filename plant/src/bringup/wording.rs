@@ -2,7 +2,7 @@
 
 use masseter_can::canopen::{AbortCode, ObjectAddress};
 
-use super::line::SdoReason;
+use super::line_error::SdoReason;
 use crate::drive::dictionary::{ENTRIES, find};
 
 /// Objects that the emulated drives do not have.

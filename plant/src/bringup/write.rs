@@ -6,7 +6,8 @@ use masseter_shared::config::{DriveProfile, ObjectKey, ObjectRule};
 use masseter_shared::geometry::AXIS_NAMES;
 use serde::Serialize;
 
-use super::line::{Line, LineError};
+use super::line::Line;
+use super::line_error::LineError;
 use super::settings::{PdoSetting, Setting, Settings, same};
 use super::survey::Survey;
 use super::wording::{object_name, value_text};
