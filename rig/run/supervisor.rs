@@ -274,7 +274,7 @@ impl Rig {
             let others = [self.recorder.exit_status()?, self.plant.exit_status()?];
             let end = self.controller.end()?;
             if interruption.is_none() {
-                interruption = self.interrupt_controller(interrupts, others, end.is_some())?;
+                interruption = self.interrupt_controller(interrupts, others, end.is_some());
             }
             if let Some(end) = end {
                 break end;
@@ -310,14 +310,14 @@ impl Rig {
         interrupts: &Interrupts,
         [recorder, plant]: [Option<ExitStatus>; 2],
         has_left: bool,
-    ) -> io::Result<Option<Ending>> {
+    ) -> Option<Ending> {
         let is_killed = |status: &ExitStatus| status.signal().is_some();
         let ending = if interrupts.is_stop_requested() {
             Ending::Interrupted
         } else if let Some(ending) = self.end_silent() {
             ending
         } else if has_left && ![recorder, plant].iter().flatten().any(is_killed) {
-            return Ok(None);
+            return None;
         } else if recorder.is_some() {
             if self.is_lockstep {
                 // It would wait for the recorder.
@@ -327,14 +327,14 @@ impl Rig {
         } else if let Some(status) = plant {
             if status.code() == Some(Exit::SafeStop as i32) {
                 let fate = self.controller.give_up();
-                return Ok(Some(Ending::died(CONTROLLER, format!("{SILENT}, and {fate}"))));
+                return Some(Ending::died(CONTROLLER, format!("{SILENT}, and {fate}")));
             }
             died(PLANT, Some(status))
         } else {
-            return Ok(None);
+            return None;
         };
         self.controller.terminate();
-        Ok(Some(ending))
+        Some(ending)
     }
 
     /// Kills the first process that was reported to be silent in lockstep, if any. Were it stopped and went on, it would
