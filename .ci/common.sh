@@ -8,6 +8,8 @@ target=${CARGO_TARGET_DIR:-target}
 mkdir -p "$target/ci"
 tools=$(realpath "$target/ci")
 export PATH="$tools/bin:$PATH"
+# A run from nothing has no use for what a later compilation could reuse.
+[ -z "${CI:-}" ] || export CARGO_INCREMENTAL=0
 
 as_root() { if [ "$(id -u)" -eq 0 ]; then "$@"; else sudo "$@"; fi; }
 
@@ -22,7 +24,8 @@ has_any() { local name; for name in "$@"; do command -v "$name" >/dev/null && re
 # A cargo tool in exactly this version. It goes into the project's target folder, beside a developer's own tools.
 install_cargo_tool() { # name, version
     has_any "$1" && [[ "$(cargo "${1#cargo-}" --version)" == *" $2"* ]] && return
-    cargo install --locked --quiet --root "$tools" "$1" --version "=$2"
+    # Without optimisation: it takes longer to compile these than to run them.
+    cargo install --locked --quiet --debug --root "$tools" "$1" --version "=$2"
 }
 
 # Sets $python to an interpreter that has the packages of .ci/requirements.txt.

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::workspace::{list, metadata, text, within};
 
 /// The crates of the workspace that each crate may use, all by their folders. The root package may use all.
-const MAY_USE: [(&str, &[&str]); 17] = [
+const MAY_USE: [(&str, &[&str]); 18] = [
     ("shared/can", &[]),
     ("shared", &["shared/can"]),
     ("controller", &["shared/can", "shared"]),
@@ -36,6 +36,7 @@ const MAY_USE: [(&str, &[&str]); 17] = [
     ("rig/campaign", &["shared", "rig/analysis", "rig/charts", "rig/report", "rig/table"]),
     // Its drive is none of the product's, or errors of master and drive could cancel out.
     ("tests/canopen_node", &["shared/can"]),
+    ("fuzz", &["shared/can", "shared", "controller", "rig/recording"]),
 ];
 
 fn may_use(folder: &str, needed: &str) -> bool {

@@ -20,6 +20,13 @@ def shell(command: str, folder: Path) -> str:
     return ended.stdout
 
 
+def release_profile() -> str:
+    """The section of Cargo.toml on the profile `release`."""
+    head = "[profile.release]"
+    cargo = Path(__file__).parents[2] / "Cargo.toml"
+    return head + cargo.read_text().partition(head)[2].partition("[profile.dist]")[0]
+
+
 def make(masseter: str, language: str, folder: Path, target: Path) -> str:
     """The program of a new project, built by the command that `new` prints."""
     said = shell(f"{masseter} new controller --lang {language} {language}", folder)
@@ -29,8 +36,10 @@ def make(masseter: str, language: str, folder: Path, target: Path) -> str:
         lines = len(source.read_text().splitlines())
         assert lines <= MOST_LINES, f"{source}: {lines} lines"
     if language == "rust":
-        # Only to share what is built already.
-        shell(f"{command} --target-dir {target}", project)
+        # Target and profile are the library's in C, so that both use the same built dependencies.
+        profile = folder / "profile.toml"
+        profile.write_text(release_profile())
+        shell(f"{command} --target-dir {target} --config {profile}", project)
         return str(target / "release" / "my_controller")
     if language == "python":
         shell(command, project)
