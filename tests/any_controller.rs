@@ -1,8 +1,6 @@
 //! A program as the controller: started by the rig or by hand, in lockstep and in real time. The rig watches and judges it as
 //! its own; programs that cannot take part are refused with the reason.
 
-mod common;
-
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::fs::PermissionsExt;
@@ -11,7 +9,9 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
-use common::{Cores, LENIENT, MASSETER, PASSED_OR_INVALID, Workspace, masseter, stderr, stdout, wait_until};
+use crate::common::{
+    self, Cores, LENIENT, MASSETER, PASSED_OR_INVALID, Workspace, masseter, stderr, stdout, wait_until,
+};
 use masseter_shared::control::Session;
 use masseter_shared::lifecycle::attach::{self, socket};
 use masseter_shared::named::Declared;

@@ -65,6 +65,20 @@ fn planted_circles(files: &[(&str, &str)]) -> Vec<String> {
     circles(workspace.path())
 }
 
+/// `cargo test` runs no file of `tests` that `main.rs` does not name.
+#[test]
+fn every_file_of_tests_belongs_to_the_program() {
+    let main = fs::read_to_string(project().join("tests/main.rs")).unwrap();
+    for entry in fs::read_dir(project().join("tests")).unwrap() {
+        let file = entry.unwrap().file_name().into_string().unwrap();
+        let Some(name) = file.strip_suffix(".rs").filter(|name| *name != "main") else { continue };
+        assert!(
+            main.contains(&format!("\nmod {name};\n")),
+            "{file} never runs: add 'mod {name};' to tests/main.rs"
+        );
+    }
+}
+
 #[test]
 fn a_planted_impl_in_another_file_than_its_type_is_found() {
     let manifest = ("Cargo.toml", "[package]\nname = \"planted\"\nedition = \"2024\"\n");

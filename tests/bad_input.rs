@@ -1,10 +1,8 @@
 //! What bad input gets: refused before anything starts, with place and reason, exit code 2.
 
-mod common;
-
 use std::process::Command;
 
-use common::{MASSETER, Workspace, masseter, stderr, stdout};
+use crate::common::{MASSETER, Workspace, masseter, stderr, stdout};
 use serde_json::{Value, json};
 
 #[test]

@@ -1,13 +1,11 @@
 //! `masseter bench` as its users meet it.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use common::{Cores, MASSETER, child_of};
+use crate::common::{Cores, MASSETER, child_of};
 use masseter_shared::clock;
 use rustix::process::{Pid, Signal, kill_process, test_kill_process};
 use serde_json::Value;

@@ -1,12 +1,10 @@
 //! `masseter campaign`, `search` and `shrink` as a user meets them. Kills and foreign readers: `tests/foreign/campaign.py`.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use common::{MASSETER, json, stderr, stdout};
+use crate::common::{MASSETER, json, stderr, stdout};
 use serde_json::Value;
 use tempfile::TempDir;
 

@@ -1,13 +1,11 @@
 //! The CAN link seen from outside: what is planned, what a run measures beside it, and what is served.
 
-mod common;
-
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use common::{MASSETER, Workspace, check, masseter, stdout, wait_until};
+use crate::common::{MASSETER, Workspace, check, masseter, stdout, wait_until};
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 

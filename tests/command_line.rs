@@ -1,12 +1,10 @@
 //! What the command line offers besides its verbs' work: units, colour, completions, manual pages.
 
-mod common;
-
 use std::fs;
 use std::io::Write;
 use std::process::{Command, Stdio};
 
-use common::{MASSETER, Workspace, masseter, stderr, stdout};
+use crate::common::{MASSETER, Workspace, masseter, stderr, stdout};
 
 #[test]
 fn a_duration_without_a_unit_is_in_seconds() {

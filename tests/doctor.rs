@@ -1,8 +1,6 @@
 //! The doctor on the machine at hand: whatever it finds, exit code, report and reality agree.
 
-mod common;
-
-use common::{masseter, stdout};
+use crate::common::{masseter, stdout};
 use serde_json::Value;
 
 /// On any machine; where there is SocketCAN, its interfaces are one more.

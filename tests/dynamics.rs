@@ -1,8 +1,6 @@
 //! The forces that a run records balance the motion that it records.
 
-mod common;
-
-use common::{Workspace, stdout};
+use crate::common::{Workspace, stdout};
 use masseter_recording::{Reader, Recorded};
 use masseter_shared::config::DynamicsConfig;
 use masseter_shared::dynamics::{Bodies, Equations, Motion};

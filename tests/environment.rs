@@ -1,7 +1,5 @@
 //! Runs on a machine that refuses something: real time, or room on the disk.
 
-mod common;
-
 use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::io::{Read, Write};
@@ -11,8 +9,8 @@ use std::process::{Child, Command, Output, Stdio};
 use std::thread;
 use std::time::Duration;
 
-use common::{
-    Cores, LENIENT, SharedMemory, Workspace, assert_played, cramped, masseter, skip, stderr, stdout,
+use crate::common::{
+    self, Cores, LENIENT, SharedMemory, Workspace, assert_played, cramped, masseter, skip, stderr, stdout,
     wait_until_it_records,
 };
 use masseter_shared::clock::{self, SECOND_NS};

@@ -1,11 +1,9 @@
 //! Every scenario in `examples/` plays as it stands, also where `masseter init` lays it down.
 
-mod common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::{Workspace, json, masseter, stderr, stdout};
+use crate::common::{Workspace, json, masseter, stderr, stdout};
 
 fn examples() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");

@@ -1,13 +1,11 @@
 //! `masseter export`: what users find in the tables of a recording.
 
-mod common;
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 use std::process::Output;
 
-use common::{Workspace, masseter, stderr, stdout};
+use crate::common::{Workspace, masseter, stderr, stdout};
 use masseter_recording::{Reader, Recorded};
 
 fn virtual_run(scenario: &str) -> Workspace {

@@ -1,8 +1,6 @@
 //! The bite force of whole runs: its estimate against the truth, its control, and what happens when food breaks.
 
-mod common;
-
-use common::{Workspace, check, stderr, stdout};
+use crate::common::{Workspace, check, stderr, stdout};
 
 /// Errors of the estimate while the jaw chews, as bounds that only serve to report the values.
 const ESTIMATE: &str = "

@@ -1,11 +1,9 @@
 //! Golden runs: the scenarios of `tests/golden` still give the messages that were recorded of them.
 
-mod common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::{Workspace, masseter, stderr, stdout};
+use crate::common::{Workspace, masseter, stderr, stdout};
 
 /// Bytes that the recordings may take in the repository.
 const MOST_BYTES: u64 = 300_000;

@@ -1,13 +1,11 @@
 //! Runs that the user ends, by a key, a signal or a closed terminal, before or during the motion.
 
-mod common;
-
 use std::fs;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Stdio};
 use std::time::Duration;
 
-use common::{Cores, LENIENT, Workspace, child_of, stderr, stdout, wait_until};
+use crate::common::{Cores, LENIENT, Workspace, child_of, stderr, stdout, wait_until};
 use masseter_shared::clock;
 use rustix::process::{Pid, Signal, kill_process, kill_process_group, test_kill_process};
 

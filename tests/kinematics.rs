@@ -1,7 +1,5 @@
 //! `masseter ik` and `masseter fk` as a pipeline.
 
-mod common;
-
 use std::fmt::Write as _;
 use std::io::Write;
 use std::process::{Command, Output, Stdio};
@@ -9,7 +7,7 @@ use std::process::{Command, Output, Stdio};
 use masseter_controller::kinematics::Equations;
 use masseter_shared::geometry::{Actuators, Mechanism, MechanismConfig};
 
-use common::{MASSETER, masseter, stderr, stdout};
+use crate::common::{MASSETER, masseter, stderr, stdout};
 
 fn pipe(arguments: &[&str], input: &str) -> Output {
     let mut child = Command::new(MASSETER)

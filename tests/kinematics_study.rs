@@ -1,13 +1,11 @@
 //! `masseter kinematics`: the folder it leaves.
 
-mod common;
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 use std::process::Output;
 
-use common::{masseter, stderr, stdout};
+use crate::common::{masseter, stderr, stdout};
 
 const FIGURES: [&str; 16] = [
     "fig3_diverging",

@@ -1,14 +1,12 @@
 //! Runs that are watched while they go on: what watchers see, and that their recordings stay complete.
 
-mod common;
-
 use std::collections::{BTreeMap, HashSet};
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::{Child, ChildStderr, ExitStatus, Stdio};
 use std::thread;
 
-use common::{Cores, LENIENT, Workspace, assert_played, has_event, masseter, stderr, stdout};
+use crate::common::{Cores, LENIENT, Workspace, assert_played, has_event, masseter, stderr, stdout};
 use masseter_recording::{CDR_LITTLE_ENDIAN, Reader, Recorded, Topic};
 use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest;

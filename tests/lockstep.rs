@@ -1,12 +1,12 @@
 //! Runs in lockstep: three real processes leave the bytes of virtual time, whatever the machine does to them. A process
 //! that is killed or stays silent ends the run with its name.
 
-mod common;
-
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use common::{SharedMemory, Workspace, child_of, has_event, masseter, stderr, stdout, wait_until_it_records};
+use crate::common::{
+    self, SharedMemory, Workspace, child_of, has_event, masseter, stderr, stdout, wait_until_it_records,
+};
 use masseter_shared::clock;
 use rustix::process::{Pid, Signal, kill_process};
 

@@ -1,14 +1,12 @@
 //! `masseter motion`: what a recording holds before it is played.
 
-mod common;
-
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use common::{Workspace, masseter, stderr, stdout};
+use crate::common::{Workspace, masseter, stderr, stdout};
 use serde_json::Value;
 
 const POSES: &str = "time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n";

@@ -1,8 +1,6 @@
 //! The operator of a scenario: parameters that are set and stops that are asked for, at times of the motion.
 
-mod common;
-
-use common::{Workspace, has_event, masseter, stderr, stdout};
+use crate::common::{self, Workspace, has_event, masseter, stderr, stdout};
 use serde_json::Value;
 
 const SETS: &str = "duration_s = 2.0\n\

@@ -2,14 +2,12 @@
 //!
 //! Root becomes a victim and a stranger with `setpriv`; without root these tests are skipped.
 
-mod common;
-
 use std::fs::{self, DirBuilder, File};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt, chown, symlink};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-use common::{
+use crate::common::{
     Cores, LENIENT, MASSETER, Workspace, assert_played, masseter, skip, stderr, stdout, wait_until,
 };
 use rustix::process::getuid;

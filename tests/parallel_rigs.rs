@@ -1,8 +1,6 @@
 //! Two rigs on one machine: side by side, and under one name.
 
-mod common;
-
-use common::{
+use crate::common::{
     Cores, LENIENT, Workspace, assert_played, check, has_event, stderr, stdout, wait_until_it_records,
 };
 use rustix::process::{Pid, Signal, kill_process};

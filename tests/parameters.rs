@@ -1,11 +1,9 @@
 //! Signals and parameters of a controller: declared, set from outside while it runs, recorded and reported.
 
-mod common;
-
 use std::process::{Child, Output};
 use std::thread;
 
-use common::{Workspace, masseter, stderr, stdout, wait_until, wait_until_it_records};
+use crate::common::{Workspace, masseter, stderr, stdout, wait_until, wait_until_it_records};
 use masseter_controller::pose_law::{Demand, LawFailed, PoseLaw};
 use masseter_controller::process::run_with_law;
 use masseter_recording::{Reader, Recorded};

@@ -1,12 +1,10 @@
 //! Every process is killed, or stopped for a while, at chosen cycles of the controller's sequence. No test here judges
 //! speed: `tests/realtime/kill.py` measures at random cycles how soon a rig reacts.
 
-mod common;
-
 use std::process::{Child, Output};
 use std::time::Duration;
 
-use common::{
+use crate::common::{
     Cores, LENIENT, SharedMemory, Workspace, assert_played, child_of, has_event, masseter, stderr, stdout,
 };
 use masseter_recording::{Reader, Recorded};

@@ -1,11 +1,9 @@
 //! Faults of processes: each strikes real processes at its time of the motion, and ends the run as it must.
 
-mod common;
-
 use std::fs;
 use std::process::Output;
 
-use common::{Cores, LENIENT, Workspace, check, masseter, skip, stderr, stdout};
+use crate::common::{self, Cores, LENIENT, Workspace, check, masseter, skip, stderr, stdout};
 use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
 
 /// A scenario with one fault, half a second into the motion.

@@ -1,11 +1,9 @@
 //! Runs in real time: three processes, what they leave, and what becomes of a run when one of them is stopped or dies.
 //! Nothing here judges speed.
 
-mod common;
-
 use std::fs;
 
-use common::{
+use crate::common::{
     Cores, LENIENT, SharedMemory, Workspace, assert_played, check, child_of, has_event, masseter, stderr,
     stdout, wait_until,
 };

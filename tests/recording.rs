@@ -1,14 +1,14 @@
 //! Recordings as their users meet them: looked at, proved, cut, killed, repaired, converted.
 
-mod common;
-
 use std::fs;
 use std::io::Cursor;
 use std::path::Path;
 use std::process::Output;
 use std::time::Duration;
 
-use common::{Cores, LENIENT, Workspace, child_of, cramped, json, masseter, stderr, stdout, wait_until};
+use crate::common::{
+    Cores, LENIENT, Workspace, child_of, cramped, json, masseter, stderr, stdout, wait_until,
+};
 use masseter_recording::{Reader, Recorded, Recorder, Scene};
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::config::Scenario;

@@ -1,14 +1,12 @@
 //! `masseter replay` and `masseter diff`: recorded runs go through their controllers again, and messages are compared bit
 //! by bit.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 use std::process::Output;
 use std::time::Duration;
 
-use common::{Cores, Workspace, masseter, skip, stderr, stdout, wait_until_it_records};
+use crate::common::{Cores, Workspace, masseter, skip, stderr, stdout, wait_until_it_records};
 use masseter_shared::clock;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;

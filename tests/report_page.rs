@@ -2,12 +2,10 @@
 //! it fits. All its times count from the first SYNC, the motion's beginning is known, and the start of the drives is folded.
 //! `tests/browser/page.py` uses the page as a hand does.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use common::{Cores, LENIENT, Workspace, skip, stderr};
+use crate::common::{Cores, LENIENT, Workspace, skip, stderr};
 use masseter_recording::{Reader, Recorded};
 use masseter_shared::messages::Event;
 use masseter_shared::messages::codes::{ControllerState, Source};

@@ -1,10 +1,8 @@
 //! Requirements and expected outcomes of whole runs: verdict, exit code, summary, JUnit, report page.
 
-mod common;
-
 use std::fs;
 
-use common::{Cores, LENIENT, Workspace, check, stdout};
+use crate::common::{Cores, LENIENT, Workspace, check, stdout};
 
 /// Runs a scenario under virtual time; its exit code, and what it printed.
 fn run(workspace: &Workspace) -> (Option<i32>, String) {

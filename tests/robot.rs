@@ -1,12 +1,10 @@
 //! The bring-up of a robot as a user calls it: `masseter robot`, on emulated drives.
 
-mod common;
-
 use std::fs;
 use std::path::PathBuf;
 use std::process::Output;
 
-use common::{MASSETER, Workspace, json, stderr, stdout};
+use crate::common::{MASSETER, Workspace, json, stderr, stdout};
 
 /// Calls a verb of `robot` with this workspace's scenario and folder.
 fn robot(workspace: &Workspace, arguments: &[&str]) -> Output {

@@ -2,13 +2,11 @@
 //! resets a node or only sends SYNC. The step ends with an exit code above 0, names the drive, gives no drive power again, and is no evidence. What it
 //! owes to a drive returns with the next step.
 
-mod common;
-
 use std::fs;
 use std::path::PathBuf;
 use std::process::{Command, Output};
 
-use common::{MASSETER, Workspace, json, stderr, stdout};
+use crate::common::{MASSETER, Workspace, json, stderr, stdout};
 
 /// The leg l1 has node 4 on bus 1.
 const CABLE: &str = "kind = 'disconnect'\nbus = 1\nnode = 4";

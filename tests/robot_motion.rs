@@ -1,12 +1,10 @@
 //! The verbs of `robot` that move axes, on emulated drives.
 
-mod common;
-
 use std::collections::BTreeSet;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use common::{MASSETER, Workspace, masseter, stderr, stdout};
+use crate::common::{self, MASSETER, Workspace, masseter, stderr, stdout};
 use masseter_shared::geometry::AXIS_NAMES;
 use serde_json::Value;
 

@@ -2,13 +2,11 @@
 //!
 //! The emulated drives take the habits of vendors' drives from `[[drives.quirk]]`.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use common::{MASSETER, Workspace, stderr, stdout};
+use crate::common::{MASSETER, Workspace, stderr, stdout};
 
 const AXES: [&str; 6] = ["l1", "l2", "l3", "d1", "d2", "d3"];
 

@@ -2,8 +2,6 @@
 //!
 //! The keys are those of the scenario as it is written with every default.
 
-mod common;
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
@@ -11,7 +9,7 @@ use std::path::Path;
 use masseter_shared::config::{FaultKindConfig, MotionConfig, QuirkKindConfig, Scenario, ScenarioError};
 use serde_json::Value;
 
-use common::Workspace;
+use crate::common::Workspace;
 
 /// The rows of one heading: key and default, as written.
 type Rows = BTreeMap<String, String>;

@@ -1,8 +1,6 @@
 //! The start of a run: what keeps the drives off, and the dry run, as a user sees them.
 
-mod common;
-
-use common::{Workspace, stderr, stdout};
+use crate::common::{Workspace, stderr, stdout};
 
 /// Runs the scenario under virtual time; the exit code and what was printed.
 fn run(scenario: &str, arguments: &[&str]) -> (Option<i32>, String) {

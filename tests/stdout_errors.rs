@@ -1,12 +1,10 @@
 //! Results that standard output cannot take: a full disk is exit code 6, a closed pipe is no failure.
 
-mod common;
-
 use std::fs::File;
 use std::io;
 use std::process::{Command, Stdio};
 
-use common::{Cores, MASSETER, Workspace, stderr};
+use crate::common::{Cores, MASSETER, Workspace, stderr};
 
 #[test]
 fn a_full_disk_behind_standard_output_is_exit_6_and_a_closed_pipe_is_no_failure() {

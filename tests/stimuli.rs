@@ -1,10 +1,8 @@
 //! Stimuli in whole runs: pushes by tables and torques, and a motion whose rate and amplitude change.
 
-mod common;
-
 use std::fs;
 
-use common::{Workspace, json, masseter, stderr, stdout};
+use crate::common::{Workspace, json, masseter, stderr, stdout};
 
 const TABLE: &str = "time_s,force_x_n,force_y_n,force_z_n\n0,0,0,0\n0.1,0,0,-12\n0.2,0,0,0\n";
 const PUSHED: &str = "duration_s = 1.5\n[[stimulus]]\nat_s = 0.5\npush_table = 'push.csv'\n\

@@ -1,14 +1,12 @@
 //! `masseter test`: suites of real scenario files, their lines, exit codes, JUnit file and kept folders.
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
-use common::{MASSETER, json, stderr, stdout, wait_until};
+use crate::common::{MASSETER, json, stderr, stdout, wait_until};
 use masseter_shared::clock;
 use rustix::process::{Pid, Signal, kill_process};
 

@@ -1,12 +1,10 @@
 //! `summary.json` and `junit.xml` are what their descriptions say.
 
-mod common;
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-use common::Workspace;
+use crate::common::Workspace;
 use masseter_analysis::hop_names;
 use masseter_shared::messages::codes::Source;
 use serde_json::Value;

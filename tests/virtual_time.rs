@@ -1,11 +1,9 @@
 //! Runs under virtual time: determinism, tracking, the files a run leaves, recordings played.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::{Workspace, json, stderr, stdout, wait_until_it_records};
+use crate::common::{self, Workspace, json, stderr, stdout, wait_until_it_records};
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::json;
 

@@ -1,8 +1,6 @@
 //! Faults that lead the jaw off its path are detected before it is far, or fail the run.
 
-mod common;
-
-use common::{Cores, Workspace, check, stdout};
+use crate::common::{Cores, Workspace, check, stdout};
 use masseter_shared::config::ChecksConfig;
 use serde_json::Value;
 

@@ -3,6 +3,8 @@
 
 mod args;
 mod case;
+#[cfg(test)]
+mod fault_table;
 mod matrix;
 mod phases;
 mod picture;
