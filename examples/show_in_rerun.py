@@ -18,19 +18,33 @@ from mcap_ros2.reader import read_ros2_messages
 
 LINE_STRIP, LINE_LIST, SPHERE_LIST, TRIANGLE_LIST = 4, 5, 7, 11
 TIMELINE = "message_log_time"
+# Where the eye is and looks, m: the whole mechanism with the jaw above it.
+EYE_M, TARGET_M = (0.34, -0.38, 0.3), (0.0, 0.0, 0.17)
+# Of the curves of a plot, in turn; also colour-blind people tell them apart.
+COLORS = ((0, 114, 178), (213, 94, 0), (0, 158, 115))
+SLIDES, LEGS = {"d1": 0, "d2": 1, "d3": 2}, {"l1": 3, "l2": 4, "l3": 5}
+
+
+def fields(name, elements):
+    """The elements of a field by their names in the legend."""
+    return {title: f".{name}[{element}]" for title, element in elements.items()}
+
+
 # Title, topic, message, and its fields by their names in the legend.
 PLOTS = (
-    ("Platform, true position [m]", "truth", "Truth", {axis: f".position_m[{i}]" for i, axis in enumerate("xyz")}),
-    ("Axes [m]", "reading", "Reading", {axis: f".position_m[{i}]" for i, axis in enumerate(("d1", "d2", "d3", "l1", "l2", "l3"))}),
-    ("Forces of the actuators [N]", "reading", "Reading", {axis: f".force_n[{i}]" for i, axis in enumerate(("d1", "d2", "d3", "l1", "l2", "l3"))}),
-    ("State of the controller", "state", "State", {"state": ".controller_state"}),
+    ("Height of the platform [m]", "truth", "Truth", fields("position_m", {"z": 2})),
+    ("Lengths of the legs [m]", "truth", "Truth", fields("joint_m", LEGS)),
+    ("Positions of the slides [m]", "truth", "Truth", fields("joint_m", SLIDES)),
+    ("Forces in the legs [N]", "reading", "Reading", fields("force_n", LEGS)),
+    ("Forces of the slides [N]", "reading", "Reading", fields("force_n", SLIDES)),
+    ("State of the controller, code", "state", "State", {"state": ".controller_state"}),
 )
 
 
 def plot(title, topic, message, fields):
     """A view with a curve for each field of a topic's messages."""
     curves = [
-        rr.SeriesLines(names=name).visualizer(
+        rr.SeriesLines(names=name, colors=color).visualizer(
             mappings=[
                 rrb.encodings.VisualizerComponentMapping(
                     "Scalars:scalars",
@@ -40,15 +54,23 @@ def plot(title, topic, message, fields):
                 )
             ]
         )
-        for name, selector in fields.items()
+        for (name, selector), color in zip(fields.items(), COLORS)
     ]
-    return rrb.TimeSeriesView(name=title, origin=f"/{topic}", overrides={f"/{topic}": curves})
+    legend = rrb.Corner2D.LeftTop
+    return rrb.TimeSeriesView(name=title, origin=f"/{topic}", overrides={f"/{topic}": curves}, plot_legend=legend)
 
 
 def blueprint():
     """What the viewer shows."""
-    scene = rrb.Spatial3DView(name="Mechanism", origin="/", contents=["/tf", "/scene/**"])
-    return rrb.Blueprint(rrb.Horizontal(scene, rrb.Vertical(*(plot(*spec) for spec in PLOTS))))
+    eye = rrb.EyeControls3D(position=EYE_M, look_target=TARGET_M, eye_up=(0.0, 0.0, 1.0))
+    scene = rrb.Spatial3DView(name="Mechanism", origin="/", contents=["/tf", "/scene/**"], eye_controls=eye)
+    plots = rrb.Vertical(*(plot(*spec) for spec in PLOTS))
+    panels = (
+        rrb.BlueprintPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE),
+    )
+    return rrb.Blueprint(rrb.Horizontal(scene, plots, column_shares=[2, 3]), *panels)
 
 
 def shape(marker):
