@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+import rerun_cli
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
@@ -45,7 +46,8 @@ def viewer(recording):
     web, data = free_port(), free_port()
     ports = ["--web-viewer-port", str(web), "--port", str(data), "--bind", "127.0.0.1"]
     log = (FOLDER / "rerun.log").open("w")
-    program = Path(sys.executable).parent / "rerun"
+    # The program itself: the script of this name in the folder of programs does not end its child.
+    program = Path(rerun_cli.__file__).parent / "rerun"
     server = subprocess.Popen([program, recording, "--serve-web", *ports], stdout=log, stderr=log)
     try:
         until(lambda: socket.create_connection(("127.0.0.1", web)).close() or True, OSError)
