@@ -60,6 +60,16 @@ fn a_whole_recording_passes_info_and_verify() {
     }
 }
 
+/// At 1 kHz 700 bytes a cycle are 0.7 MB/s.
+#[test]
+fn a_cycle_of_the_default_run_takes_at_most_700_bytes() {
+    let workspace = Workspace::new("");
+    let output = workspace.run_virtual(&["--quiet"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let cycles = workspace.summary()["figures"]["cycles"].as_u64().unwrap();
+    assert!(cycles > 11_000 && workspace.recorded_bytes() <= 700 * cycles, "{}", workspace.recorded_bytes());
+}
+
 #[test]
 fn damaged_recordings_are_exit_2_and_cut_ones_exit_6_with_the_place() {
     let workspace = virtual_run();

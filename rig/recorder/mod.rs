@@ -107,8 +107,14 @@ fn record_in_real_time(
     let mut samples = 0;
     loop {
         let is_last = stop.is_made();
-        // Each message has its own time, because some are published during the drain.
-        subscribers.drain(&mut |message| sinks.write(message, clock::now_ns()))?;
+        // One time for a drain takes fewer bytes. But some messages are published during it.
+        let mut received_ns = clock::now_ns();
+        subscribers.drain(&mut |message| {
+            if message.published_ns() > received_ns {
+                received_ns = clock::now_ns();
+            }
+            sinks.write(message, received_ns);
+        })?;
         let now_ns = clock::now_ns();
         if let Some(sample) = sampler.sample(now_ns)
             && let Some(machine) = machine_topic::message(samples + 1, &sample)

@@ -29,9 +29,10 @@ for message in read_ros2_messages(sys.argv[1], topics=TOPICS):
         largest_angle_rad = max(largest_angle_rad, *body.leg_angle_rad)
     if topic == "frames":
         assert body.frames[0].after_ns == 0 and len(body.frames) > 0, body
+        waited_ns = body.time_ns - body.queued_ns
         for frame in body.frames:
             assert frame.bus in (0, 1) and len(frame.data) <= 8, (frame.bus, frame.data)
-            waited_ns = body.time_ns + frame.after_ns - body.queued_ns - frame.queued_after_ns
+            waited_ns += frame.after_ns - frame.queued_after_ns
             assert 0 < waited_ns < 1_000_000_000, waited_ns
             largest_data = max(largest_data, len(frame.data))
     if topic == "parameter":

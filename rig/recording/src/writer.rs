@@ -23,11 +23,11 @@ use super::manifest::{AT_START, Manifest};
 use super::scene::Scene;
 use super::topic::Recorded;
 
-/// Bytes of messages in a chunk: what is compressed together, and read together by a tool that seeks. Larger chunks save less
-/// than a thousandth.
-const CHUNK_BYTES: u64 = 600 << 10;
-/// zstd's default level: 3 % fewer bytes than the fastest one. The next level that saves as much takes twice the time.
-const COMPRESSION_LEVEL: u32 = 3;
+/// Bytes of messages in a chunk: what is compressed together, and read together by a tool that seeks. Twice as many save 0.4 %.
+const CHUNK_BYTES: u64 = 1 << 20;
+/// A level of zstd: 2 % fewer bytes than the default one, for 0.7 % of a core at 1 kHz. The next level that saves as much takes
+/// fifteen times the time.
+const COMPRESSION_LEVEL: u32 = 6;
 /// The profile in the header of a recording: its messages have ROS 2's encoding and definitions.
 const PROFILE: &str = "ros2";
 /// The name of this program in the header of a recording.
@@ -205,7 +205,7 @@ impl<W: Medium> Recorder<W> {
     /// Appends a message that was received at `log_time_ns`, and its view in 3-D.
     pub fn record(&mut self, message: &Recorded, log_time_ns: u64) -> Result<(), WriteError> {
         if let Recorded::Frame(frame) = message {
-            if !self.frames.takes(frame) {
+            if !self.frames.takes(frame, log_time_ns) {
                 self.end_frames()?;
             }
             self.frames.push(frame, log_time_ns);
