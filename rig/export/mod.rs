@@ -91,6 +91,9 @@ pub(crate) fn export(args: &ExportArgs) -> anyhow::Result<Exit> {
     if survey.motion_ns().is_none() {
         result("the recording has no motion: the tables have no time_s\n")?;
     }
+    if args.tables.is_empty() && !reader.has_frames() {
+        result("the recording leaves out the CAN frames: there is no table 'frame' and no candump log\n")?;
+    }
     result(&survey.loss()?)?;
     Ok(survey.exit())
 }

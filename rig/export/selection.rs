@@ -38,6 +38,9 @@ impl Selection {
             .chain(topics.keys().map(|topic| topic.name()))
             .collect();
         if let Some(unknown) = requested.iter().find(|name| !known.contains(&name.as_str())) {
+            if unknown == Topic::Frame.name() && !reader.has_frames() {
+                bail!("the recording gives no table 'frame': it leaves out the CAN frames");
+            }
             let likely = nearest(unknown, known.iter().copied());
             let likely = likely.map_or_else(String::new, |name| format!("; did you mean '{name}'?"));
             bail!("the recording gives no table '{unknown}'; it gives {}{likely}", known.join(", "));

@@ -34,6 +34,7 @@ pub(crate) struct Survey {
     chunks: Chunks,
     damage: Vec<Damage>,
     was_cut_short: bool,
+    has_frames: bool,
     /// When the sample of the motion's first cycle was taken, ns; none without a motion.
     motion_ns: Option<u64>,
 }
@@ -84,6 +85,7 @@ impl Survey {
             chunks: reader.chunks().clone(),
             damage: reader.damage().to_vec(),
             was_cut_short: reader.was_cut_short(),
+            has_frames: reader.has_frames(),
             motion_ns,
         })
     }
@@ -192,6 +194,9 @@ impl Survey {
                 "{mark} {topic:<8} {:>18}, {missing} missing between them",
                 counted(*messages, "message")
             )?;
+        }
+        if !self.has_frames {
+            writeln!(text, "–    {:<8} {:>18}", "frame", "not recorded")?;
         }
         let Chunks { count, damaged, .. } = self.chunks;
         writeln!(text, "{} chunks with their checksum: {count}, without: {damaged}", mark(damaged))?;

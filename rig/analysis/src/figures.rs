@@ -69,8 +69,8 @@ pub struct Figures {
     pub worst_cycles: Vec<WorstCycle>,
     /// Messages and losses of each topic.
     pub topics: Vec<TopicFigures>,
-    /// Frames on each bus.
-    pub frames: Vec<u64>,
+    /// Frames on each bus; none where the scenario leaves them out.
+    pub frames: Option<Vec<u64>>,
     /// Response times of the buses' messages, beside their bounds.
     pub bus_response: BusResponse,
     /// Events in the order of their times.

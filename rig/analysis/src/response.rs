@@ -22,11 +22,16 @@ const CROWDED_CYCLES: u64 = 2;
 /// Fewest frames at their times by which a bus with other frames is judged.
 const FEWEST_ON_TIME: u64 = 10;
 
+/// Why runs of some scenarios have no bounds.
+const FAULTS: &str = "the scenario's faults are in no plan";
+const NOT_RECORDED: &str = "the CAN frames are not recorded (recording.frames = false)";
+
 /// Follows every frame.
 #[derive(Debug, Clone)]
 pub(super) struct Responses {
     buses: Vec<Followed>,
-    has_faults: bool,
+    /// Why no run of the scenario has bounds.
+    unbounded: Option<&'static str>,
 }
 
 /// One bus.
@@ -89,11 +94,14 @@ impl Seen {
 impl Responses {
     /// On the buses of a rig that was accepted; without plans there are no figures.
     pub(super) fn for_scenario(scenario: &Scenario) -> Self {
+        if !scenario.recording.frames {
+            return Self::with(Vec::new(), Some(NOT_RECORDED));
+        }
         let plans = plans(scenario).unwrap_or_default();
-        Self::with(plans, !scenario.faults.is_empty())
+        Self::with(plans, (!scenario.faults.is_empty()).then_some(FAULTS))
     }
 
-    fn with(plans: Vec<BusPlan>, has_faults: bool) -> Self {
+    fn with(plans: Vec<BusPlan>, unbounded: Option<&'static str>) -> Self {
         let followed = |plan: BusPlan| Followed {
             messages: vec![Seen::default(); plan.messages.len()],
             plan,
@@ -104,7 +112,7 @@ impl Responses {
             off_time_until_ns: 0,
             pending: Vec::new(),
         };
-        Self { buses: plans.into_iter().map(followed).collect(), has_faults }
+        Self { buses: plans.into_iter().map(followed).collect(), unbounded }
     }
 
     /// `tapped`: what `tap` holds.
@@ -133,8 +141,8 @@ impl Responses {
 
     /// Why there are no bounds for this run.
     fn unbounded(&self, missing: u64) -> Option<String> {
-        if self.has_faults {
-            return Some("the scenario's faults are in no plan".to_owned());
+        if let Some(why) = self.unbounded {
+            return Some(why.to_owned());
         }
         if missing > 0 {
             return Some(format!("the recording lacks {}", counted(missing, "frame")));

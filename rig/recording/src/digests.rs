@@ -50,6 +50,11 @@ impl Digests {
         self.0.is_empty()
     }
 
+    /// Whether there is one of the topic.
+    pub fn has(&self, topic: Topic) -> bool {
+        self.0.contains_key(&topic)
+    }
+
     /// Each topic that differs, with the cycle in which it first does.
     pub fn differences(&self, other: &Self) -> Vec<(Topic, u64)> {
         let topics: BTreeSet<_> = self.0.keys().chain(other.0.keys()).collect();

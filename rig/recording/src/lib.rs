@@ -2,8 +2,9 @@
 //!
 //! A recording is an MCAP file with every message of every topic. A message's body is written as it lay in shared
 //! memory, behind the four bytes that make it CDR, under a ROS 2 message definition: MCAP tools and `rosbags` read it
-//! without this program. CAN frames that were published together are one message. For 3-D views it also holds the mechanism in messages of ROS 2, and the scenario is attached. Chunks are
-//! compressed by zstd and carry checksums; each can be read without the others.
+//! without this program. CAN frames that were received together are one message; `recording.frames = false` leaves them
+//! out. For 3-D views it also holds the mechanism in messages of ROS 2, and the scenario is attached. Chunks are compressed
+//! by zstd and carry checksums; each can be read without the others.
 //!
 //! [`Recorder`] writes recordings, [`Backlog`] does so without delaying its caller, and [`Reader`] reads them, also
 //! damaged ones. This crate computes no figures; see `masseter-analysis`.

@@ -144,6 +144,11 @@ impl<R: Read + Seek> Reader<R> {
         self.definitions.channels.values().map(Arc::as_ref)
     }
 
+    /// Whether the definitions so far are those of a recording with CAN frames.
+    pub fn has_frames(&self) -> bool {
+        self.channels().any(|channel| channel.topic == FrameBatch::TOPIC)
+    }
+
     /// The files attached so far.
     pub fn attachments(&self) -> &[Attachment<'static>] {
         &self.attachments

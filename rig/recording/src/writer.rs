@@ -12,6 +12,7 @@ use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread::{self, JoinHandle};
 
+use masseter_shared::messages::FrameTap;
 use masseter_shared::named::Declared;
 use mcap::records::MessageHeader;
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
@@ -25,7 +26,7 @@ use super::topic::Recorded;
 
 /// Bytes of messages in a chunk: what is compressed together, and read together by a tool that seeks. Twice as many save 0.4 %.
 const CHUNK_BYTES: u64 = 1 << 20;
-/// A level of zstd: 2 % fewer bytes than the default one, for 0.7 % of a core at 1 kHz. The next level that saves as much takes
+/// A level of zstd: 2 % fewer bytes than the default one, for 1.4 % of a core at 1 kHz. The next level that saves as much takes
 /// fifteen times the time.
 const COMPRESSION_LEVEL: u32 = 6;
 /// The profile in the header of a recording: its messages have ROS 2's encoding and definitions.
@@ -118,7 +119,8 @@ pub(super) fn add_schema<W: Write + Seek>(
 pub struct Recorder<W: Medium = DurableFile> {
     channels: Channels<W>,
     encoder: Encoder,
-    frames: FrameBatch,
+    /// None where the frames are left out.
+    frames: Option<FrameBatch>,
 }
 
 /// The file with the numbers of its channels, by their places.
@@ -148,10 +150,11 @@ impl Recorder {
     }
 
     /// Creates the recording of a run, with what explains it attached: the scenario, the files that it names, and
-    /// the circumstances at the start. A file that is cut short contains them.
+    /// the circumstances at the start. A file that is cut short contains them. The scenario says whether it has the CAN frames.
     pub fn of_run(folder: &RunFolder, scene: Scene) -> Result<Self, WriteError> {
-        let mut recorder = Self::create(&folder.recording(), scene)?;
         let mut manifest = Manifest::read(folder)?;
+        let frames = manifest.scenario.recording.frames.then(FrameBatch::default);
+        let mut recorder = Self::with(DurableFile::create(&folder.recording())?, scene, frames)?;
         recorder.attach("scenario.toml", "application/toml", &fs::read(folder.scenario())?)?;
         for (name, _) in manifest.scenario.files_mut() {
             let path = folder.file(&name);
@@ -169,8 +172,12 @@ impl<W: Medium> Recorder<W> {
     /// Begins a recording with the definitions of all channels, which are flushed at once: without them no message can be
     /// read.
     pub fn new(medium: W, scene: Scene) -> Result<Self, WriteError> {
+        Self::with(medium, scene, Some(FrameBatch::default()))
+    }
+
+    fn with(medium: W, scene: Scene, frames: Option<FrameBatch>) -> Result<Self, WriteError> {
         let channels = Channels { writer: options().create(medium)?, ids: [None; Channel::COUNT] };
-        let mut recorder = Self { channels, encoder: Encoder::new(scene), frames: FrameBatch::default() };
+        let mut recorder = Self { channels, encoder: Encoder::new(scene), frames };
         recorder.declare(&Declared::default())?;
         Ok(recorder)
     }
@@ -178,7 +185,11 @@ impl<W: Medium> Recorder<W> {
     /// Adds the channels of the signals and parameters that a controller declares; before, their messages are left out.
     pub fn declare(&mut self, declared: &Declared) -> Result<(), WriteError> {
         let Channels { writer, ids } = &mut self.channels;
-        for (channel, definition) in recorded_definitions(declared) {
+        let has_frames = self.frames.is_some();
+        let definitions = recorded_definitions(declared).into_iter();
+        for (channel, definition) in
+            definitions.filter(|(channel, _)| has_frames || *channel != Channel::Frames)
+        {
             let id = &mut ids[channel.place()];
             if id.is_none() {
                 let schema = add_schema(writer, &definition)?;
@@ -205,21 +216,28 @@ impl<W: Medium> Recorder<W> {
     /// Appends a message that was received at `log_time_ns`, and its view in 3-D.
     pub fn record(&mut self, message: &Recorded, log_time_ns: u64) -> Result<(), WriteError> {
         if let Recorded::Frame(frame) = message {
-            if !self.frames.takes(frame, log_time_ns) {
-                self.end_frames()?;
-            }
-            self.frames.push(frame, log_time_ns);
-            return Ok(());
+            return self.record_frame(frame, log_time_ns);
         }
         self.end_frames()?;
         let Self { channels, encoder, .. } = self;
         encoder.encode(message, |message| channels.write(&message, log_time_ns))
     }
 
+    fn record_frame(&mut self, frame: &FrameTap, log_time_ns: u64) -> Result<(), WriteError> {
+        if self.frames.as_ref().is_some_and(|frames| !frames.takes(frame, log_time_ns)) {
+            self.end_frames()?;
+        }
+        if let Some(frames) = &mut self.frames {
+            frames.push(frame, log_time_ns);
+        }
+        Ok(())
+    }
+
     /// Writes the frames gathered so far, so that messages stay in their order.
     fn end_frames(&mut self) -> Result<(), WriteError> {
-        let log_time_ns = self.frames.log_time_ns;
-        let Some((first, bytes)) = self.frames.end() else { return Ok(()) };
+        let Some(frames) = &mut self.frames else { return Ok(()) };
+        let log_time_ns = frames.log_time_ns;
+        let Some((first, bytes)) = frames.end() else { return Ok(()) };
         let message = Encoded {
             channel: Channel::Frames,
             sequence: first.seq as u32,

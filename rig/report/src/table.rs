@@ -221,7 +221,10 @@ fn losses(text: &mut String, figures: &Figures) -> std::fmt::Result {
         .map(|topic| format!("{} {} ({} dropped)", topic.topic, topic.messages, topic.missing))
         .collect();
     writeln!(text, "messages: {}", topics.join(", "))?;
-    let frames: Vec<_> = figures.frames.iter().enumerate().map(|(bus, n)| format!("can{bus} {n}")).collect();
+    let Some(frames) = &figures.frames else {
+        return writeln!(text, "frames: not recorded (recording.frames = false)");
+    };
+    let frames: Vec<_> = frames.iter().enumerate().map(|(bus, n)| format!("can{bus} {n}")).collect();
     writeln!(text, "frames: {}", frames.join(", "))
 }
 

@@ -17,8 +17,8 @@ use super::when::EntryNames;
 use super::{
     AxisScale, CanConfig, ChecksConfig, ControllerConfig, DriveProfile, DrivesConfig, DryConfig,
     DynamicsConfig, ExpectConfig, FaultConfig, FoodConfig, ForceControlConfig, ForceEstimateConfig,
-    ForceSource, JawConfig, LoadCellConfig, MotionConfig, RealtimeConfig, RequirementConfig, StimulusConfig,
-    TeethConfig, ToothConfig, TrajectoryLimitsConfig,
+    ForceSource, JawConfig, LoadCellConfig, MotionConfig, RealtimeConfig, RecordingConfig, RequirementConfig,
+    StimulusConfig, TeethConfig, ToothConfig, TrajectoryLimitsConfig,
 };
 use crate::clock::SECOND_NS;
 use crate::geometry::{AXES, AXIS_NAMES, MechanismConfig};
@@ -91,6 +91,8 @@ section! {
         pub force_control: Option<ForceControlConfig> = None,
         /// The scheduling of the real-time processes.
         pub realtime: RealtimeConfig = RealtimeConfig::default(),
+        /// What is recorded.
+        pub recording: RecordingConfig = RecordingConfig::default(),
         /// The limits beyond which the run fails.
         pub checks: ChecksConfig = ChecksConfig::default(),
         /// Faults of every layer.

@@ -23,7 +23,7 @@ fn message(name: &str, id: u16, data_length: u32) -> PeriodicMessage {
 fn responses(has_faults: bool) -> Responses {
     let messages = vec![message("SYNC", 0x080, 0), message("TPDO1 1", 0x181, 8)];
     let plan = BusPlan::new(0, Bitrate::MAX, PERIOD_NS, messages).unwrap();
-    Responses::with(vec![plan], has_faults)
+    Responses::with(vec![plan], has_faults.then_some(FAULTS))
 }
 
 fn seen(id: u32, queued_ns: u64, took_us: u64) -> FrameTap {

@@ -42,19 +42,32 @@ pub struct Comparison {
     columns: BTreeMap<Topic, Columns>,
     lanes: BTreeMap<LaneKey, Lane>,
     clock: MotionClock,
+    /// Topics that one side has not recorded.
+    unrecorded: Vec<Topic>,
 }
 
 impl Comparison {
     /// A comparison of messages with these definitions.
     pub fn new(compared: Compared, [mut columns, of_b]: [BTreeMap<Topic, Columns>; 2]) -> Self {
         columns.retain(|topic, columns| of_b.get(topic) == Some(columns));
-        Self { compared, columns, lanes: BTreeMap::new(), clock: MotionClock::default() }
+        Self {
+            compared,
+            columns,
+            lanes: BTreeMap::new(),
+            clock: MotionClock::default(),
+            unrecorded: Vec::new(),
+        }
+    }
+
+    /// Leaves a topic out that one side has not recorded. The differences name it.
+    pub(super) fn leave_out(&mut self, topic: Topic) {
+        self.unrecorded.extend(self.compared.has_topic(topic).then_some(topic));
     }
 
     /// Takes the next message of one side, and compares what has a partner.
     pub fn take(&mut self, side: Side, message: &Recorded) {
         let compared = self.compared;
-        if !compared.has_topic(message.topic()) {
+        if !compared.has_topic(message.topic()) || self.unrecorded.contains(&message.topic()) {
             return;
         }
         if side == Side::A {
@@ -75,9 +88,11 @@ impl Comparison {
 
     /// The same, with the digests of messages that were not compared.
     pub(super) fn finish_with(self, a: &Digests, b: &Digests) -> Differences {
-        let Self { compared, columns, lanes, clock } = self;
-        let mut differences = Differences::new(compared, clock);
-        differences.add_digests(a.differences(b));
+        let Self { compared, columns, lanes, clock, unrecorded } = self;
+        let mut digests = a.differences(b);
+        digests.retain(|(topic, _)| !unrecorded.contains(topic));
+        let mut differences = Differences::new(compared, clock, &unrecorded);
+        differences.add_digests(digests);
         for (key, lane) in lanes {
             differences.add(key.topic(), columns.contains_key(&key.topic()), lane);
         }

@@ -54,6 +54,8 @@ pub struct Differences {
     one_sided: Vec<OneSided>,
     /// Topics whose messages have other fields.
     redefined: Vec<&'static str>,
+    /// Topics that one side has not recorded, which are not compared.
+    unrecorded: Vec<&'static str>,
     digests: Vec<DigestDifference>,
     #[serde(skip)]
     compared: Compared,
@@ -62,7 +64,7 @@ pub struct Differences {
 }
 
 impl Differences {
-    pub(super) fn new(compared: Compared, clock: MotionClock) -> Self {
+    pub(super) fn new(compared: Compared, clock: MotionClock, unrecorded: &[Topic]) -> Self {
         Self {
             form: FORM,
             is_equal: true,
@@ -70,6 +72,7 @@ impl Differences {
             fields: Vec::new(),
             one_sided: Vec::new(),
             redefined: Vec::new(),
+            unrecorded: unrecorded.iter().map(|topic| topic.name()).collect(),
             digests: Vec::new(),
             compared,
             clock,
@@ -152,6 +155,9 @@ impl Differences {
         for topic in &self.redefined {
             let _ =
                 writeln!(text, "not compared: '{topic}', whose messages have other fields in {}", names[1]);
+        }
+        for topic in &self.unrecorded {
+            let _ = writeln!(text, "not compared: '{topic}', which one side has not recorded");
         }
         for DigestDifference { topic, first_cycle } in &self.digests {
             let _ = writeln!(text, "the digests of '{topic}' differ from cycle {first_cycle} on");

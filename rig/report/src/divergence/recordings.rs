@@ -5,7 +5,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
-use masseter_recording::{Columns, Digester, Digests, Reader, Recorded, RunFolder, is_kept};
+use masseter_recording::{Columns, Digester, Digests, Reader, Recorded, RunFolder, Topic, is_kept};
 use masseter_terminal::{Exit, Format, result};
 
 use super::compared::Compared;
@@ -35,6 +35,11 @@ impl Stream {
         let next = reader.next_message().with_context(name)?;
         let digests = Digests::attached(reader.attachments());
         Ok(Self { path, reader, next, digests, digester: Digester::default() })
+    }
+
+    /// Whether it has the CAN frames, or their digest.
+    fn has_frames(&self) -> bool {
+        self.reader.has_frames() || self.digests.has(Topic::Frame)
     }
 
     fn is_thinned(&self) -> bool {
@@ -83,6 +88,9 @@ fn compare(mut a: Stream, mut b: Stream) -> anyhow::Result<Differences> {
     let compared = if is_in_real_time { Compared::WithoutTimes } else { Compared::Everything };
     let columns = [&a, &b].map(|stream| Columns::of_topics(stream.reader.channels()));
     let mut comparison = Comparison::new(compared, columns);
+    if !(a.has_frames() && b.has_frames()) {
+        comparison.leave_out(Topic::Frame);
+    }
     let is_thinned = a.is_thinned() || b.is_thinned();
     // In turn, so that few messages wait for their partners.
     let mut has_more = true;

@@ -6,17 +6,29 @@ use masseter_page::{Block, Cell, Chart, Column, Section, Table, Tone};
 use super::charts::{limit, plain};
 use crate::text::{grouped, microseconds, or_dash};
 
+/// What stands in the place of all that the frames would show.
+const WITHOUT_FRAMES: &str = "The CAN frames are not recorded (recording.frames = false): the run has no load of the buses, no \
+     response times and no candump logs.";
+
 pub(super) fn section(figures: &Figures) -> Section {
+    let mut blocks = match figures.frames {
+        Some(_) => of_frames(figures),
+        None => vec![Block::text("buses", WITHOUT_FRAMES.to_owned())],
+    };
+    blocks.push(Block::table("topics", topics(&figures.topics)).folded(topics_in_words(&figures.topics)));
+    Section::new("messages", "Messages and buses", blocks)
+}
+
+fn of_frames(figures: &Figures) -> Vec<Block> {
     let response = &figures.bus_response;
     let mut blocks = vec![
         Block::chart("buses", load(figures)),
         Block::table("responses", responses(&response.messages)).folded(responses_in_words(response)),
-        Block::table("topics", topics(&figures.topics)).folded(topics_in_words(&figures.topics)),
     ];
     if let Some(why) = &response.unbounded {
         blocks.push(Block::text("unbounded", format!("No bounds hold for this run: {why}.")));
     }
-    Section::new("messages", "Messages and buses", blocks)
+    blocks
 }
 
 fn responses_in_words(response: &BusResponse) -> String {

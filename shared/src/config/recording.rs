@@ -1,0 +1,11 @@
+//! What a run records.
+
+section! {
+    /// What the recording of a run leaves out.
+    #[derive(Copy, Eq)]
+    pub struct RecordingConfig {
+        /// Whether it has the CAN frames. Without them a run has no response times and no load of the buses, and no candump
+        /// logs.
+        pub frames: bool = true,
+    }
+}
