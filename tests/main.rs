@@ -46,4 +46,5 @@ mod stimuli;
 mod suite;
 mod summary;
 mod virtual_time;
+mod without_frames;
 mod wrong_motion;

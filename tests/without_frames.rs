@@ -1,11 +1,9 @@
 //! Runs whose recording leaves the CAN frames out: every reader says so, and nothing else changes.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::{Cores, LENIENT, Workspace, assert_played, check, json, masseter, stderr, stdout};
+use crate::common::{Cores, LENIENT, Workspace, assert_played, check, json, masseter, stderr, stdout};
 use masseter_recording::{Reader, Recorded};
 use serde_json::Value;
 

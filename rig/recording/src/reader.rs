@@ -37,7 +37,7 @@ pub enum ReadError {
     /// A topic's message does not have this version's layout.
     #[error(
         "topic '{topic}' holds a message of {found} bytes, layout version {version}; \
-         this program reads whole messages of version {LAYOUT_VERSION}"
+         this program reads whole messages of version {LAYOUT_VERSION}, as this build writes them"
     )]
     Foreign {
         /// The topic.

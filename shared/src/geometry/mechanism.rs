@@ -196,7 +196,7 @@ impl Mechanism {
     pub fn inverse(&self, pose: &Pose) -> Result<Joints, InverseError> {
         let mut theta_rad = [0.0; LEGS];
         let actuators = self.resolve(&self.corners_at(pose), |leg, [up_m, inward_m], _| {
-            theta_rad[leg] = up_m.atan2(inward_m)
+            theta_rad[leg] = up_m.atan2(inward_m);
         })?;
         Ok(Joints { actuators, theta_rad })
     }
@@ -208,13 +208,11 @@ impl Mechanism {
     pub fn legs(&self, pose: &Pose) -> Result<Legs, InverseError> {
         let rotation = pose.rotation.to_rotation_matrix();
         let arms_m = self.corners.map(|corner| rotation * corner);
+        let corners = arms_m.map(|arm| arm + pose.translation.vector);
         let mut sin_cos = [(0.0, 0.0); LEGS];
-        let actuators = self.resolve(
-            &arms_m.map(|arm| arm + pose.translation.vector),
-            |leg, [up_m, inward_m], leg_m| {
-                sin_cos[leg] = (up_m / leg_m, inward_m / leg_m);
-            },
-        )?;
+        let actuators = self.resolve(&corners, |leg, [up_m, inward_m], leg_m| {
+            sin_cos[leg] = (up_m / leg_m, inward_m / leg_m);
+        })?;
         Ok(Legs { actuators, sin_cos, arms_m })
     }
 
