@@ -58,6 +58,8 @@ pub(crate) struct CampaignCaseArgs {
     pub folder: PathBuf,
     /// Number of the case
     pub number: usize,
+    /// Number of the start of the campaign, at whose interruption the case stops
+    pub start: Option<u64>,
 }
 
 /// The arguments of `search`.

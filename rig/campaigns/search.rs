@@ -11,6 +11,7 @@ use masseter_terminal::{Exit, Failure, OrFailure, result, status};
 use super::args::{SearchArgs, SearchMethod};
 use super::player::Player;
 use super::{RECORD, begin, folder_by_time, listen, plan, worst};
+use crate::shell::word;
 
 /// The value of a case that did not pass although no margin shows it: below every one that does.
 const STOPPED: f64 = -1.0;
@@ -32,7 +33,7 @@ pub(crate) fn search(args: &SearchArgs) -> Result<Exit, Failure> {
         Seeker { args, campaign: &campaign, folder: &folder, player: &player, ended: Mutex::default() };
     let first = seeker.run()?;
     if interrupts.is_stop_requested() {
-        status!("interrupted; the same command with --out {} goes on", out.display());
+        status!("interrupted; the same command with --out {} goes on", word(&out.display().to_string()));
         return Ok(Exit::Interrupted);
     }
     let report = Report::new(&campaign, seeker.into_results());

@@ -13,10 +13,10 @@ use super::player::Player;
 use super::{controller_of, program};
 use crate::machine::interrupts::Interrupts;
 
-/// Time between two looks whether the campaign is interrupted.
+/// Time between two looks whether the start is interrupted.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
-/// Runs a case unless its result is there, or the campaign is interrupted. Any result is success: the campaign judges.
+/// Runs a case unless its result is there, or its start of the campaign is interrupted. Any result is success: the campaign judges.
 pub(crate) fn run_case(args: &CampaignCaseArgs) -> Result<Exit, Failure> {
     die_with_the_parent().died()?;
     let (folder, campaign) = CampaignFolder::open(&args.folder).usage()?;
@@ -29,17 +29,20 @@ pub(crate) fn run_case(args: &CampaignCaseArgs) -> Result<Exit, Failure> {
     if args.number >= count {
         return Err(anyhow::anyhow!("the campaign has cases 0 to {}", count.saturating_sub(1))).usage();
     }
-    if folder.interruption().is_marked() {
-        return Ok(Exit::Interrupted);
-    }
     let interrupts = Interrupts::listen().context("cannot listen for signals").died()?;
-    stop_at(folder.interruption(), interrupts.clone());
+    if let Some(start) = args.start {
+        let interruption = folder.interruption(start);
+        if interruption.is_marked() {
+            return Ok(Exit::Interrupted);
+        }
+        stop_at(interruption, interrupts.clone());
+    }
     let case = campaign.case(&campaign.points(), args.number);
     let result = Player { controller, interrupts: &interrupts }.settle(&folder, &case)?;
     Ok(if result.is_some() { Exit::Passed } else { Exit::Interrupted })
 }
 
-/// Stops the case once the campaign is interrupted: a signal does not reach another machine.
+/// Stops the case once the start is interrupted: a signal does not reach another machine.
 fn stop_at(interruption: Interruption, interrupts: Interrupts) {
     std::thread::spawn(move || {
         while !interruption.is_marked() {

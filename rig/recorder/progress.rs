@@ -140,15 +140,16 @@ impl Progress {
         }
     }
 
-    /// Each figure in its place, behind its rank: 0 is the most important.
+    /// Each figure in its place, behind its rank: 0 is the most important. Losses are more important than the error.
     fn figures(&self, Losses { unrecorded, clients }: Losses) -> Vec<(u8, String)> {
         let state = self.controller_state().map_or("?", ControllerState::name);
         let (motion_s, of_s) = (self.motion_s.min(self.running as f64 * self.period_s), self.motion_s);
+        let dropped = self.missing + unrecorded;
         let missed = self.state.skipped_cycles + self.reading.skipped_cycles;
         let mut figures = vec![
             (0, format!("{state:<13} motion {motion_s:>5.2} of {of_s:.2} s")),
             (1, format!("missed {missed}")),
-            (3, format!("dropped {}", self.missing + unrecorded)),
+            (if dropped > 0 { 1 } else { 3 }, format!("dropped {dropped}")),
             (2, format!("tracking error {:.3} mm", self.error_mm())),
             (4, format!("max {:.3} mm", self.max_error_mm)),
             (5, format!("latest {:.0} µs", self.max_late_ns as f64 / 1e3)),
@@ -207,7 +208,7 @@ mod tests {
     fn a_narrow_terminal_shows_what_matters_most() {
         let progress = after_ten_cycles(true);
         let shown = |columns| progress.line(Losses::default(), columns);
-        assert_eq!(shown(80), "running       motion  1.00 of 4.00 s   missed 6   tracking error 2.000 mm");
+        assert_eq!(shown(80), "running       motion  1.00 of 4.00 s   missed 6   dropped 3");
         assert_eq!(shown(20), "running       motion  1.00 of 4.00 s");
         assert_eq!(shown(120), shown(usize::MAX));
     }

@@ -129,7 +129,7 @@ impl Process {
         self.signal(Signal::TERM);
     }
 
-    /// The same, and kills it if it does not end in time; its status if it did.
+    /// Asks the process to end, and kills it if it does not end in time; its status if it did.
     pub(super) fn end(&mut self, timeout_ns: u64, interrupts: &Interrupts) -> io::Result<Option<ExitStatus>> {
         self.terminate();
         let status = self.await_end(timeout_ns, interrupts)?;

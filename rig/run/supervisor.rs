@@ -270,7 +270,7 @@ impl Rig {
                 return Ok(Ending::Interrupted);
             }
             self.strike();
-            // In this order: a process that has ended before the controller did not miss it.
+            // The others first: if one has ended and the controller has not, the controller is not the cause.
             let others = [self.recorder.exit_status()?, self.plant.exit_status()?];
             let end = self.controller.end()?;
             if interruption.is_none() {

@@ -19,7 +19,7 @@ from pathlib import Path
 import pyte
 
 # Narrower than the line of the progress, and longer than everything that is said.
-COLUMNS, LINES = 60, 300
+COLUMNS, LINES = 80, 300
 INTERRUPTED = 130
 LENIENT = Path(__file__).parents[1] / "lenient.toml"
 # Passed, too disturbed to judge, or incomplete because the machine starved the recorder: this judges the terminal.

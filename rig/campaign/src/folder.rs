@@ -91,7 +91,6 @@ impl CampaignFolder {
             let plan = serde_json::to_string_pretty(campaign).expect("a campaign has a JSON form");
             folder.write_whole(&folder.plan_path(), &plan)?;
         }
-        folder.interruption().clear().map_err(system(path))?;
         folder.sweep()?;
         Ok((folder, lock))
     }
@@ -114,9 +113,9 @@ impl CampaignFolder {
         &self.path
     }
 
-    /// Whether the campaign is interrupted, until it goes on.
-    pub fn interruption(&self) -> Interruption {
-        Interruption::of(&self.path)
+    /// Whether the start with this number is interrupted.
+    pub fn interruption(&self, start: u64) -> Interruption {
+        Interruption::of(&self.path, start)
     }
 
     /// Another file of this name.
@@ -328,12 +327,11 @@ mod tests {
         // The second attempt comes too late, and does no harm.
         let late = CaseResult { word: "PASS".to_owned(), exit_code: 0, ..failed(&first) };
         folder.attempt(&first).unwrap().finish(&late, first.scenario.as_ref().ok()).unwrap();
-        folder.interruption().mark().unwrap();
-        assert!(folder.interruption().is_marked());
+        folder.interruption(1).mark().unwrap();
         drop(lock);
 
         let (folder, _lock) = CampaignFolder::begin(&path, &two()).unwrap();
-        assert!(!folder.interruption().is_marked());
+        assert!(folder.interruption(1).is_marked() && !folder.interruption(2).is_marked());
         assert_eq!(folder.result_of(&case(1)).unwrap(), None);
         assert_eq!(folder.results().unwrap(), [failed(&first)]);
         assert!(folder.scenario_of(&failed(&first)).is_file());

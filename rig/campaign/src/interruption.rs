@@ -1,22 +1,21 @@
-//! The mark of an interrupted campaign in its folder. Engines may hold cases that they have not started yet, on other machines:
-//! whoever is about to run a case, or runs one, stops at the mark.
+//! The mark of an interrupted start of a campaign, a file in its folder. An engine may hold cases that it has not begun yet, on other
+//! machines: whoever is about to run a case of that start, or runs one, stops at the mark. Another start has another mark, so
+//! that it goes on while cases of the interrupted one still wait in a queue.
 
-use std::fs::{self, File};
-use std::io::{self, ErrorKind};
+use std::fs::File;
+use std::io;
 use std::path::{Path, PathBuf};
 
-const MARK: &str = "interrupted";
-
-/// The mark, set or not.
+/// The mark of one start, set or not.
 #[derive(Debug)]
 pub struct Interruption {
     path: PathBuf,
 }
 
 impl Interruption {
-    /// That of the campaign in this folder.
-    pub(crate) fn of(folder: &Path) -> Self {
-        Self { path: folder.join(MARK) }
+    /// That of the start with this number, in the folder of the campaign.
+    pub(crate) fn of(folder: &Path, start: u64) -> Self {
+        Self { path: folder.join(format!("interrupted-{start}")) }
     }
 
     /// Sets the mark.
@@ -30,13 +29,5 @@ impl Interruption {
     /// Whether the mark is set.
     pub fn is_marked(&self) -> bool {
         self.path.exists()
-    }
-
-    /// The campaign goes on.
-    pub(crate) fn clear(&self) -> io::Result<()> {
-        match fs::remove_file(&self.path) {
-            Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
-            _ => Ok(()),
-        }
     }
 }

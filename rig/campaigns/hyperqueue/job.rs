@@ -36,17 +36,23 @@ pub(super) enum End {
 }
 
 impl Job {
-    /// Submits these cases of the campaign in a folder.
+    /// Submits these cases of the campaign in a folder, as those of the start with that number.
     ///
     /// # Errors
     /// When Python does not start.
-    pub(super) fn submit(folder: &Path, cases: &[usize], args: &HyperqueueArgs) -> anyhow::Result<Self> {
+    pub(super) fn submit(
+        folder: &Path,
+        cases: &[usize],
+        start: u64,
+        args: &HyperqueueArgs,
+    ) -> anyhow::Result<Self> {
         let folder = folder.canonicalize().context("cannot find the folder of the campaign")?;
         let python = args.python.clone().unwrap_or_else(|| "python3".into());
         let mut waiter = Command::new(&python)
             .args(["-c", SUBMIT])
             .arg(std::env::current_exe().context("cannot find this program")?)
             .arg(folder)
+            .arg(start.to_string())
             .arg(args.server_dir.as_deref().unwrap_or(Path::new("")))
             // A progress bar that nobody reads would fill the pipe, and the waiter would stop.
             .env("TQDM_DISABLE", "1")

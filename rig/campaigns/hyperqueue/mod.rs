@@ -5,6 +5,7 @@ mod job;
 
 use anyhow::Context;
 use masseter_campaign::{Campaign, CampaignFolder, CaseResult, StopRules};
+use masseter_shared::clock;
 use masseter_terminal::{Failure, OrFailure, status};
 
 use super::args::HyperqueueArgs;
@@ -24,15 +25,17 @@ pub(super) fn run(
     if campaign.file.stop_after != StopRules::default() {
         return Err(anyhow::anyhow!("stop_after: HyperQueue runs every case; leave the rule away")).usage();
     }
+    // Another number than those of the starts before.
+    let start = clock::wall_time().as_nanos() as u64;
     for _ in 0..ROUNDS {
         let (ended, open) = sort(campaign, folder)?;
         if open.is_empty() || interrupts.is_stop_requested() {
             return Ok(ended);
         }
         status!("{} of {} cases to HyperQueue", open.len(), campaign.case_count());
-        let job = Job::submit(folder.path(), &open, args).died()?;
+        let job = Job::submit(folder.path(), &open, start, args).died()?;
         if let End::Interrupted { number } = job.wait(interrupts).died()? {
-            stop(folder, number).incomplete()?;
+            stop(folder, start, number).incomplete()?;
             return Ok(sort(campaign, folder)?.0);
         }
     }
@@ -63,11 +66,10 @@ fn sort(campaign: &Campaign, folder: &CampaignFolder) -> Result<(Vec<CaseResult>
     Ok((ended, open))
 }
 
-/// Keeps the workers from the cases of an interrupted campaign. The package of HyperQueue cannot cancel a job.
-fn stop(folder: &CampaignFolder, number: Option<u32>) -> anyhow::Result<()> {
-    folder.interruption().mark().context("cannot mark the campaign as interrupted")?;
-    let also =
-        number.map_or_else(String::new, |job| format!("; 'hq job cancel {job}' also empties its queue"));
-    status!("HyperQueue's workers end their cases and begin no more{also}");
+/// Keeps the workers from the cases of an interrupted start. The package of HyperQueue cannot cancel a job.
+fn stop(folder: &CampaignFolder, start: u64, job: Option<u32>) -> anyhow::Result<()> {
+    folder.interruption(start).mark().context("cannot mark the campaign as interrupted")?;
+    let also = job.map_or_else(String::new, |job| format!("; 'hq job cancel {job}' also empties the queue"));
+    status!("HyperQueue's workers stop their cases and start no others{also}");
     Ok(())
 }

@@ -36,8 +36,8 @@ pub enum ReadError {
     },
     /// A topic's message does not have this version's layout.
     #[error(
-        "topic '{topic}' holds a message of {found} bytes, layout version {version}; \
-         this program reads whole messages of version {LAYOUT_VERSION}, as this build writes them"
+        "topic '{topic}' has a message of {found} bytes, layout version {version}, which is none of this build (version \
+         {LAYOUT_VERSION}): read the recording with the masseter that made it; circumstances.json names its version"
     )]
     Foreign {
         /// The topic.
@@ -146,7 +146,8 @@ impl<R: Read + Seek> Reader<R> {
 
     /// Whether the definitions so far are those of a recording with CAN frames.
     pub fn has_frames(&self) -> bool {
-        self.channels().any(|channel| channel.topic == FrameBatch::TOPIC)
+        self.channels()
+            .any(|channel| [FrameBatch::TOPIC, Topic::Frame.name()].contains(&channel.topic.as_str()))
     }
 
     /// The files attached so far.

@@ -64,8 +64,8 @@ const SHORTEST_LEG_M: f64 = 1e-9;
 #[doc(alias = "IK")]
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum InverseError {
-    /// The pose holds a value that is no finite number.
-    #[error("the pose holds a value that is not a finite number")]
+    /// The pose has a value that is no finite number, or one whose square is none.
+    #[error("the pose has a value that is no finite number, or too large a one")]
     NotFinite,
     /// Platform corner and hinge coincide, so the leg's angle is undefined.
     #[error("leg {leg} has no length ({leg_m:e} m): its angle is undefined")]
@@ -237,9 +237,9 @@ impl Mechanism {
             let slide = &self.slides[leg];
             let from_centre = corner - slide.centre;
             let horizontal = from_centre.dot(&slide.inward);
-            // Dimensions are checked: no square overflows, and hypot takes five times as long.
+            // hypot takes five times as long, and no mechanism is so large that a square overflows.
             let leg_m = (horizontal * horizontal + from_centre.z * from_centre.z).sqrt();
-            if !from_centre.iter().all(|x| x.is_finite()) {
+            if !(leg_m.is_finite() && from_centre.iter().all(|x| x.is_finite())) {
                 return Err(InverseError::NotFinite);
             }
             if leg_m < SHORTEST_LEG_M {

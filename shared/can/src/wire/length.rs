@@ -13,7 +13,7 @@ const TRAILER_BITS: u32 = 1 + 1 + BEHIND_ACKNOWLEDGE_BITS;
 const CRC_BITS: u32 = 15;
 const CRC_POLYNOMIAL: u16 = 0x4599;
 const CRC_MASK: u16 = (1 << CRC_BITS) - 1;
-/// Bytes of the longest content.
+/// Bytes of the number that has a content.
 const CONTENT_BYTES: usize = 16;
 static CRC_OF_BYTE: [[u16; 256]; CONTENT_BYTES] = crc_of_bytes();
 const STANDARD_HEADER_BITS: u32 = 19;
