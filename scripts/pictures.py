@@ -1,7 +1,7 @@
-"""Writes terminal.png and report.png into a folder: scripts/pictures.py MASSETER BROWSER FOLDER
+"""Writes terminal.png, report.png and jaw.png into a folder: scripts/pictures.py MASSETER BROWSER FOLDER
 
-The run is in lockstep, so that its figures are the same on every machine. `pyte` renders what a user sees on the
-terminal, and a browser without a window draws both pictures.
+The runs are in simulated time, so that their figures are the same on every machine. `pyte` renders what a user sees on the
+terminal, and a browser without a window draws the pictures.
 """
 
 import os
@@ -29,6 +29,14 @@ CUT_REPORT = """<script>
 for (let last = document.getElementById("section-mechanism"); last !== document.body; last = last.parentElement)
   while (last.nextElementSibling) last.nextElementSibling.remove();
 Masseter.time.seek(Masseter.time.time.motion_s + 0.55);
+</script>"""
+# The planes of the jaw's motion, and its opening over time.
+CUT_JAW = """<script>
+for (let kept = document.getElementById("section-jaw"); kept !== document.body; kept = kept.parentElement)
+  for (const other of [...kept.parentElement.children])
+    if (other !== kept && !["SCRIPT", "STYLE"].includes(other.tagName)) other.remove();
+for (let last = document.querySelector("#section-jaw .block.chart"); last.id !== "section-jaw"; last = last.parentElement)
+  while (last.nextElementSibling) last.nextElementSibling.remove();
 </script>"""
 # Leaves the height of the page, px, in its document.
 MEASURE = """<script>
@@ -102,12 +110,20 @@ def draw(browser, page, picture):
     print(f"{picture}: {size} bytes")
 
 
+def draw_part(browser, report, cut, picture):
+    """Draws the part of a report that a script of its page leaves."""
+    with report.open("a") as file:
+        file.write(cut)
+    draw(browser, report, picture)
+
+
 masseter, browser, pictures = os.path.abspath(sys.argv[1]), sys.argv[2], Path(sys.argv[3])
 with tempfile.TemporaryDirectory(prefix="rig-") as folder:
     terminal, report = Path(folder) / "terminal.html", Path(folder) / "run" / "report.html"
     # Another folder's name would make another picture.
     terminal.write_text(page_of(play(masseter, folder)).replace(folder, "/home/you"))
     draw(browser, terminal, pictures / "terminal.png")
-    with report.open("a") as file:
-        file.write(CUT_REPORT)
-    draw(browser, report, pictures / "report.png")
+    draw_part(browser, report, CUT_REPORT, pictures / "report.png")
+    patient = ["run", "examples/patient.toml", "--trajectory", "examples/patient.csv", "--clock", "virtual", "--quiet"]
+    subprocess.run([masseter, *patient, "--out", f"{folder}/patient"], check=True, stdout=subprocess.DEVNULL)
+    draw_part(browser, Path(folder) / "patient/report.html", CUT_JAW, pictures / "jaw.png")
