@@ -108,7 +108,7 @@ enum Verb {
     /// List, read and set the parameters of a running controller
     #[command(subcommand, after_help = "Example:\n  masseter param set integral_gain_per_s=8")]
     Param(ParamVerb),
-    /// List the kinds of faults, or play them all: who detects which
+    /// List the kinds of faults, or play them all: what detects each
     #[command(subcommand, after_help = "Example:\n  masseter faults matrix")]
     Faults(FaultsVerb),
     /// List the signals that requirements can use

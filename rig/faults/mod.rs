@@ -1,4 +1,4 @@
-//! `masseter faults`: the kinds of faults, and the coverage of the rig: who detects which fault, and how far the jaw
+//! `masseter faults`: the kinds of faults, and the coverage of the rig: what detects each fault, and how far the jaw
 //! leaves its path until then.
 
 mod args;
@@ -22,7 +22,7 @@ pub(crate) enum FaultsVerb {
     /// List the kinds of faults with what they stand for
     #[command(after_help = "Example:\n  masseter faults list")]
     List,
-    /// Play every kind at every axis and phase of the motion: who detects it, how fast, how far the jaw leaves its path
+    /// Play every kind at every axis and phase of the motion: what detects it, how fast, how far the jaw leaves its path
     #[command(after_help = "Example:\n  masseter faults matrix --out faults")]
     Matrix(MatrixArgs),
 }
