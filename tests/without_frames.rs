@@ -56,6 +56,8 @@ fn a_virtual_run_differs_by_its_frames_alone() {
     let (code, words) = said(&["diff"], &[&with.run_folder(), &without.run_folder()]);
     assert_eq!(code, Some(0), "{words}");
     assert!(words.starts_with("EQUAL") && words.contains("not compared: 'frame'"), "{words}");
+    let (code, words) = said(&["diff"], &[&without.run_folder(), &without.run_folder()]);
+    assert!(code == Some(0) && !words.contains("not compared"), "neither run has frames: {words}");
 }
 
 #[test]

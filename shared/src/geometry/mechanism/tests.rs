@@ -62,8 +62,11 @@ fn neutral_pose_of_the_paper() {
 #[test]
 fn a_pose_that_is_not_finite_is_refused() {
     let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
-    let pose = Pose::translation(f64::NAN, 0.0, 0.27);
-    assert_eq!(mechanism.inverse(&pose), Err(InverseError::NotFinite));
+    for x_m in [f64::NAN, f64::INFINITY, 1e160] {
+        let pose = Pose::translation(x_m, 0.0, 0.27);
+        assert_eq!(mechanism.inverse(&pose), Err(InverseError::NotFinite), "{x_m}");
+        assert_eq!(mechanism.legs(&pose), Err(InverseError::NotFinite), "{x_m}");
+    }
 }
 
 #[test]
