@@ -67,7 +67,7 @@ impl Controller for HoldPosition {
         *command = self.sequencer.command(self.held.map(|held| held.measured));
     }
 
-    fn fill_state(&self, state: &mut State) {
+    fn fill_state(&mut self, state: &mut State) {
         *state = self.sequencer.state_message(self.held.as_ref().map(|held| &held.solution.pose));
     }
 

@@ -7,7 +7,7 @@ use std::hint::black_box;
 
 use masseter_shared::config::Scenario;
 use masseter_shared::control::{Controller, Outcome, Tick};
-use masseter_shared::geometry::{AXES, Actuators, Jacobian, Joints, Mechanism, Pose};
+use masseter_shared::geometry::{AXES, Actuators, Conditioning, Jacobian, Joints, Mechanism, Pose};
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::{Command, Event, Reading, State};
 use masseter_shared::named::{Declared, Parameter};
@@ -30,6 +30,8 @@ use crate::trajectory::{self, Trajectory};
 
 /// Time between two looks at the motion for its margins, s.
 const MARGINS_EVERY_S: f64 = 0.005;
+/// Cycles between two condition numbers, which change slowly and take a microsecond each.
+const CYCLES_OF_A_CONDITION: u64 = 10;
 /// How many parameters the controller has beside those of the law.
 const OWN: usize = 2;
 /// Age of a reading that comes late but is used.
@@ -84,6 +86,8 @@ pub struct MotionController {
     asked: Option<Pose>,
     target: Option<Actuators>,
     force_offset_n: [f64; AXES],
+    /// Of the last cycle that computed one; 0 before the first.
+    condition: f64,
 }
 
 impl MotionController {
@@ -139,6 +143,7 @@ impl MotionController {
             asked: None,
             target: None,
             force_offset_n: [0.0; AXES],
+            condition: 0.0,
         }
     }
 
@@ -154,9 +159,11 @@ impl MotionController {
         }
         let demand = self.demand(desired);
         if let Some(estimated) = &demand.estimated {
-            let slack_s = self.slack_cycles * demand.period_s;
             let detour = Translation3::from(self.law.detour().at_sample_m);
-            let earlier = self.playback.pose_ahead(-self.sample_age_s() - slack_s);
+            let earlier = match self.slack_cycles * demand.period_s {
+                0.0 => desired,
+                slack_s => self.playback.pose_ahead(-self.sample_age_s() - slack_s),
+            };
             self.supervision.check(&(detour * desired), estimated, &(detour * earlier))?;
         }
         let asked = self.law.command(&demand)?;
@@ -299,13 +306,16 @@ impl Controller for MotionController {
     }
 
     /// Also the conditioning, which is only reported, and so computed after the command has gone out.
-    fn fill_state(&self, state: &mut State) {
+    fn fill_state(&mut self, state: &mut State) {
         *state = self.sequencer.state_message(self.desired.as_ref());
         state.motion_time_s = self.playback.motion_time_ahead_s(-self.sample_age_s());
-        if let Some(estimate) = &self.sequencer.estimate {
+        let Some(estimate) = &self.sequencer.estimate else { return };
+        if self.condition == 0.0 || self.sequencer.cycle.is_multiple_of(CYCLES_OF_A_CONDITION) {
             let joints = Joints { actuators: estimate.measured, theta_rad: estimate.solution.theta_rad };
-            state.condition = Jacobian::new(&self.mechanism, &estimate.solution.pose, &joints).condition();
+            let jacobian = Jacobian::new(&self.mechanism, &estimate.solution.pose, &joints);
+            self.condition = Conditioning::new(&jacobian).number();
         }
+        state.condition = self.condition;
     }
 
     fn request_stop(&mut self) {

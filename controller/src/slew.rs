@@ -116,7 +116,6 @@ mod tests {
             highest_m: [0.02; AXES],
             velocity_m_s: [velocity_m_s; AXES],
             acceleration_m_s2: [acceleration_m_s2; AXES],
-            condition: 1.0,
         };
         let change_s = |velocity_m_s, acceleration_m_s2| {
             Slew::change_s(Some(&demands(velocity_m_s, acceleration_m_s2)), &limits)

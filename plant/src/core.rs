@@ -155,12 +155,16 @@ impl<L: Link> PlantCore<L> {
 
     /// The mechanism's true motion at the cycle's SYNC, where it is emulated here.
     pub fn truth(&self) -> Option<Truth> {
-        self.link.truth().map(|truth| Truth { cycle: self.cycle, ..truth })
+        let mut truth = Truth { cycle: self.cycle, ..self.link.truth()? };
+        truth.round();
+        Some(truth)
     }
 
     /// The forces between the jaws in the cycle before this one, where they are emulated here and can touch.
     pub fn contact(&self) -> Option<Contact> {
-        self.link.contact().map(|contact| Contact { cycle: self.cycle, ..contact })
+        let mut contact = Contact { cycle: self.cycle, ..self.link.contact()? };
+        contact.round();
+        Some(contact)
     }
 
     /// Answers the cycle with the newest command, if one came.

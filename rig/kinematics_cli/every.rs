@@ -3,7 +3,7 @@
 use std::iter;
 
 use masseter_controller::kinematics::{Assembly, ForwardError, Solution, Solutions, nearest_assembly_m};
-use masseter_shared::geometry::{Actuators, Jacobian, Joints, LEGS, Mechanism};
+use masseter_shared::geometry::{Actuators, Conditioning, Jacobian, Joints, LEGS, Mechanism};
 use masseter_shared::messages::pose_fields;
 use masseter_terminal::Exit;
 
@@ -71,7 +71,7 @@ fn values_of(
     let joints = Joints { actuators: *actuators, theta_rad: solution.theta_rad };
     let separation_rad = solutions.separation_rad(solution).unwrap_or(f64::NAN);
     // Of actuator rates to the platform's twist.
-    let condition = Jacobian::new(mechanism, &solution.pose, &joints).condition();
+    let condition = Conditioning::new(&Jacobian::new(mechanism, &solution.pose, &joints)).number();
     let quality = [separation_rad, solution.determinant, condition, solution.residual_m, 0.0];
     let pose = position_m.into_iter().chain(quaternion).chain(solution.theta_rad);
     pose.chain(conditions.map(f64::from)).chain(quality)

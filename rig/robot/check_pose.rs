@@ -7,7 +7,9 @@ use masseter_controller::trajectory::{closed_pose, jaw_points};
 use masseter_plant::bringup::{MotionError, Stand, stand};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::Scenario;
-use masseter_shared::geometry::{AXES, AXIS_NAMES, Actuators, Jacobian, Joints, Mechanism, Pose, Vec3};
+use masseter_shared::geometry::{
+    AXES, AXIS_NAMES, Actuators, Conditioning, Jacobian, Joints, Mechanism, Pose, Vec3,
+};
 use masseter_shared::messages::pose_fields;
 use masseter_terminal::{Exit, Failure, result_line};
 use serde_json::{Value, json};
@@ -181,7 +183,7 @@ impl Found {
         };
         Ok(Self {
             pose,
-            condition: Jacobian::new(&mechanism, &pose, &joints).condition(),
+            condition: Conditioning::new(&Jacobian::new(&mechanism, &pose, &joints)).number(),
             apart_m: distances_m(&points, &pose, &closed),
             turned_deg: pose.rotation.angle_to(&closed.rotation).to_degrees(),
             differs_m: std::array::from_fn(|axis| positions_m[axis] - closed_m[axis]),

@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define MASSETER_LAYOUT_VERSION 13u
+#define MASSETER_LAYOUT_VERSION 14u
 /* masseter_event.axis when no axis is concerned. */
 #define MASSETER_NO_AXIS 4294967295u
 /* masseter_reading.drive_state of a drive not heard of yet, or lost. */
@@ -217,7 +217,7 @@ enum masseter_no_pose {
 };
 
 #define MASSETER_READING_TOPIC "reading"
-#define MASSETER_READING_TYPE_NAME "masseter/Reading/601d80ebaa1988e2"
+#define MASSETER_READING_TYPE_NAME "masseter/Reading/7a9cf3adbffb7059"
 
 /* Positions, forces and states of the drives, once a cycle. */
 typedef struct masseter_reading {
@@ -292,7 +292,7 @@ static_assert(offsetof(masseter_reading, fresh_axes) == 256, "offset of fresh_ax
 static_assert(offsetof(masseter_reading, master_fault) == 260, "offset of master_fault");
 
 #define MASSETER_COMMAND_TOPIC "command"
-#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/89cc47d3acfa3c24"
+#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/f6bdf7e657686cf9"
 
 /* Targets and request for the drives, once a cycle. */
 typedef struct masseter_command {
@@ -328,9 +328,9 @@ static_assert(offsetof(masseter_command, request) == 136, "offset of request");
 static_assert(offsetof(masseter_command, controller_state) == 140, "offset of controller_state");
 
 #define MASSETER_STATE_TOPIC "state"
-#define MASSETER_STATE_TYPE_NAME "masseter/State/38cfecc852cdda30"
+#define MASSETER_STATE_TYPE_NAME "masseter/State/015bac90893f58ef"
 
-/* The controller's state and its estimate, once a cycle. */
+/* The controller's state and its estimate, once a cycle. All figures but times have 37 significant bits. */
 typedef struct masseter_state {
     /* Number of this message on its topic, from 1. */
     uint64_t seq;
@@ -378,7 +378,7 @@ typedef struct masseter_state {
     double leg_angle_rad[3];
     /* Largest difference of a platform side from its length, m. */
     double residual_m;
-    /* Condition number of the actuators' Jacobian, angular columns scaled by the platform's side A₁A₂. */
+    /* Condition number of the actuators' Jacobian, angular columns scaled by the platform's side A₁A₂. The rig's own controllers compute one every ten cycles. */
     double condition;
     /* Iterations of the forward kinematics. */
     uint32_t iterations;
@@ -415,7 +415,7 @@ static_assert(offsetof(masseter_state, iterations) == 288, "offset of iterations
 static_assert(offsetof(masseter_state, controller_state) == 292, "offset of controller_state");
 
 #define MASSETER_EVENT_TOPIC "event"
-#define MASSETER_EVENT_TYPE_NAME "masseter/Event/f3a493a87ee0268b"
+#define MASSETER_EVENT_TYPE_NAME "masseter/Event/04bb9c8121ad78e8"
 
 /* A single occurrence: a change of state, a fault, an alarm. */
 typedef struct masseter_event {
@@ -472,9 +472,9 @@ static_assert(offsetof(masseter_event, value) == 72, "offset of value");
 static_assert(offsetof(masseter_event, limit) == 80, "offset of limit");
 
 #define MASSETER_TRUTH_TOPIC "truth"
-#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/8f925f7eb4c8621e"
+#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/4fc7cea39aa0c231"
 
-/* The true state of the mechanism, once a cycle; the controller never reads it. */
+/* The true state of the mechanism, once a cycle; the controller never reads it. All figures but times have 37 significant bits. */
 typedef struct masseter_truth {
     /* Number of this message on its topic, from 1. */
     uint64_t seq;
@@ -520,9 +520,9 @@ static_assert(offsetof(masseter_truth, bite_force_n) == 288, "offset of bite_for
 static_assert(offsetof(masseter_truth, bite_force_sample_n) == 296, "offset of bite_force_sample_n");
 
 #define MASSETER_CONTACT_TOPIC "contact"
-#define MASSETER_CONTACT_TYPE_NAME "masseter/Contact/fafe7ef19ff6d2f5"
+#define MASSETER_CONTACT_TYPE_NAME "masseter/Contact/771c03b7d9b0a3de"
 
-/* The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads it. */
+/* The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads it. All figures but times have 37 significant bits. */
 typedef struct masseter_contact {
     /* Number of this message on its topic, from 1. */
     uint64_t seq;

@@ -7,10 +7,11 @@
 //! edge of the strokes about one standing input in 23,000 has two (see
 //! [`uniqueness`](super::uniqueness)), and nothing here relies on there being one.
 
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Vec3};
+use masseter_shared::geometry::{Actuators, LEGS, Legs, Mechanism, Pose, Vec3};
 use nalgebra::Vector3;
 
 use super::Equations;
+use super::equations::directions;
 use super::legs::each;
 
 /// What must hold for a true solution, in the order in which it is checked.
@@ -56,6 +57,14 @@ impl Assembly {
         let at = equations.evaluate(Vector3::from(*theta_rad));
         let hinges = std::array::from_fn(|leg| mechanism.hinge(leg, actuators.slide_m[leg]));
         Self::from_corners(mechanism, &hinges, &at.corners, equations.determinant(&at))
+    }
+
+    /// Judges a pose and its legs (of [`Mechanism::legs`]).
+    pub fn at_pose(mechanism: &Mechanism, pose: &Pose, legs: &Legs) -> Self {
+        let corners = legs.arms_m.map(|arm| arm + pose.translation.vector);
+        let hinges = std::array::from_fn(|leg| mechanism.hinge(leg, legs.actuators.slide_m[leg]));
+        let determinant = directions(mechanism, &corners, &legs.sin_cos).determinant();
+        Self::from_corners(mechanism, &hinges, &corners, determinant)
     }
 
     #[inline]
@@ -133,5 +142,19 @@ mod tests {
         let mechanism = published_mechanism();
         let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
         assert!(!Assembly::new(&mechanism, &neutral, &[f64::NAN; LEGS]).is_true());
+    }
+
+    #[test]
+    fn a_pose_is_judged_as_its_leg_angles_are() {
+        let mechanism = published_mechanism();
+        let judged = (-12..=12).map(|step| {
+            let pose = Pose::new(Vec3::new(0.0, 0.0, 0.268), Vec3::new(0.25, 0.1, 0.05) * f64::from(step));
+            let joints = mechanism.inverse(&pose).unwrap();
+            let assembly = Assembly::at_pose(&mechanism, &pose, &mechanism.legs(&pose).unwrap());
+            assert_eq!(assembly, Assembly::new(&mechanism, &joints.actuators, &joints.theta_rad), "{pose}");
+            assembly.is_true()
+        });
+        let true_ones = judged.filter(|is_true| *is_true).count();
+        assert!((1..25).contains(&true_ones), "{true_ones} of 25 are true");
     }
 }

@@ -66,21 +66,30 @@ impl<'a> Equations<'a> {
         self.directions(at).determinant()
     }
 
-    /// Row k holds the cosines between side k and the directions in which its two ends swing.
     fn directions(&self, at: &Evaluation) -> Matrix3<f64> {
-        let swings: [Vec3; LEGS] = std::array::from_fn(|leg| {
-            let (sin, cos) = at.theta_rad[leg].sin_cos();
-            Vec3::z() * cos - self.mechanism.inward_direction(leg) * sin
-        });
-        let mut rows = Matrix3::zeros();
-        for side in 0..LEGS {
-            let far = next(side);
-            let along_side = (at.corners[side] - at.corners[far]).normalize();
-            rows[(side, side)] = along_side.dot(&swings[side]);
-            rows[(side, far)] = -along_side.dot(&swings[far]);
-        }
-        rows
+        let sin_cos = std::array::from_fn(|leg| at.theta_rad[leg].sin_cos());
+        directions(self.mechanism, &at.corners, &sin_cos)
     }
+}
+
+/// Row k holds the cosines between side k and the directions in which its two ends swing.
+pub(super) fn directions(
+    mechanism: &Mechanism,
+    corners: &[Vec3; LEGS],
+    sin_cos: &[(f64, f64); LEGS],
+) -> Matrix3<f64> {
+    let swings: [Vec3; LEGS] = std::array::from_fn(|leg| {
+        let (sin, cos) = sin_cos[leg];
+        Vec3::z() * cos - mechanism.inward_direction(leg) * sin
+    });
+    let mut rows = Matrix3::zeros();
+    for side in 0..LEGS {
+        let far = next(side);
+        let along_side = (corners[side] - corners[far]).normalize();
+        rows[(side, side)] = along_side.dot(&swings[side]);
+        rows[(side, far)] = -along_side.dot(&swings[far]);
+    }
+    rows
 }
 
 impl Evaluation {

@@ -6,7 +6,9 @@
 //! carries beyond a stroke is held at its end.
 
 use masseter_shared::config::TrajectoryLimitsConfig;
-use masseter_shared::geometry::{AXES, AXIS_NAMES, Jacobian, LEGS, Mechanism, Pose, StrokeLimits};
+use masseter_shared::geometry::{
+    AXES, AXIS_NAMES, Conditioning, Jacobian, LEGS, Mechanism, Pose, StrokeLimits,
+};
 
 use crate::kinematics::Assembly;
 
@@ -25,8 +27,6 @@ pub struct TrajectoryReport {
     pub velocity_m_s: [f64; AXES],
     /// Largest acceleration, m/s².
     pub acceleration_m_s2: [f64; AXES],
-    /// Largest condition number of the 6×6 Jacobian, angular velocities scaled by the platform's side A₁A₂.
-    pub condition: f64,
 }
 
 impl TrajectoryReport {
@@ -51,7 +51,6 @@ impl TrajectoryReport {
 /// let motion = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
 /// let report = check(&motion, &mechanism, &scenario.limits, scenario.period_s())?;
 /// assert!(report.margin_m(mechanism.strokes()).iter().all(|&margin_m| margin_m > 0.0));
-/// assert!(report.condition < scenario.limits.max_condition);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
@@ -82,6 +81,8 @@ struct Survey<'a> {
     period_s: f64,
     last_m: Option<[f64; AXES]>,
     last_velocity_m_s: Option<[f64; AXES]>,
+    /// Of the last pose that needed one of its own.
+    conditioning: Option<Conditioning>,
     report: TrajectoryReport,
 }
 
@@ -93,9 +94,16 @@ impl<'a> Survey<'a> {
             highest_m: [f64::NEG_INFINITY; AXES],
             velocity_m_s: [0.0; AXES],
             acceleration_m_s2: [0.0; AXES],
-            condition: 0.0,
         };
-        Self { mechanism, limits, period_s, last_m: None, last_velocity_m_s: None, report }
+        Self {
+            mechanism,
+            limits,
+            period_s,
+            last_m: None,
+            last_velocity_m_s: None,
+            conditioning: None,
+            report,
+        }
     }
 
     fn visit(&mut self, pose: &Pose) -> Result<(), String> {
@@ -117,32 +125,36 @@ impl<'a> Survey<'a> {
     }
 
     fn visit_pose(&mut self, pose: &Pose) -> Result<[f64; AXES], String> {
-        let joints = self.mechanism.inverse(pose).map_err(|error| error.to_string())?;
-        let axes_m = joints.actuators.to_axes();
+        let legs = self.mechanism.legs(pose).map_err(|error| error.to_string())?;
+        let axes_m = legs.actuators.to_axes();
         for (axis, value_m) in axes_m.into_iter().enumerate() {
             self.report.lowest_m[axis] = self.report.lowest_m[axis].min(value_m);
             self.report.highest_m[axis] = self.report.highest_m[axis].max(value_m);
         }
-        self.mechanism.strokes().check(&joints.actuators).map_err(|violation| {
+        self.mechanism.strokes().check(&legs.actuators).map_err(|violation| {
             format!(
                 "{violation}; make the motion smaller, turn the axes of its file, or move the closed pose \
                  (jaw.closed_offset_m, jaw.closed_leg_m)"
             )
         })?;
-        if let Some(violated) = Assembly::new(self.mechanism, &joints.actuators, &joints.theta_rad).violated()
-        {
+        if let Some(violated) = Assembly::at_pose(self.mechanism, pose, &legs).violated() {
             return Err(format!("{violated}; make the motion smaller"));
         }
-        let condition = Jacobian::new(self.mechanism, pose, &joints).condition();
-        self.report.condition = self.report.condition.max(condition);
-        let limit = self.limits.max_condition;
-        if condition > limit {
-            let remedy = "too close to a singularity; make the motion smaller";
-            return Err(format!(
-                "condition number {condition:.1}, limit {limit:?} (limits.max_condition): {remedy}"
-            ));
-        }
+        self.check_condition(&Jacobian::of_legs(self.mechanism, &legs))?;
         Ok(axes_m)
+    }
+
+    fn check_condition(&mut self, jacobian: &Jacobian) -> Result<(), String> {
+        let limit = self.limits.max_condition;
+        if self.conditioning.is_some_and(|nearby| nearby.most(jacobian) <= limit) {
+            return Ok(());
+        }
+        let condition = self.conditioning.insert(Conditioning::new(jacobian)).number();
+        if condition <= limit {
+            return Ok(());
+        }
+        let remedy = "too close to a singularity; make the motion smaller";
+        Err(format!("condition number {condition:.1}, limit {limit:?} (limits.max_condition): {remedy}"))
     }
 
     fn rates(&self, before: &[f64; AXES], after: &[f64; AXES]) -> [f64; AXES] {

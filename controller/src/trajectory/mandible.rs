@@ -24,6 +24,8 @@ const REACHED_MM: f64 = 1e-6;
 pub(super) struct Mandible {
     /// Middle between the condyles.
     middle: Vec3,
+    /// How far the incisal point lies below the condyles, seen from them, rad.
+    declination_rad: f64,
     width_m: f64,
     path: Vec3,
     balancing_path: Vec3,
@@ -96,8 +98,10 @@ impl Mandible {
         let (down, forward) = inclination_deg.to_radians().sin_cos();
         let (inward, straight) = bennett_angle_deg.to_radians().sin_cos();
         let working = working.sign();
+        let middle = condylar_middle(jaw)?;
         Ok(Self {
-            middle: condylar_middle(jaw)?,
+            middle,
+            declination_rad: declination(&-middle),
             width_m: jaw.bonwill_side_m,
             path: Vec3::new(forward, 0.0, -down),
             balancing_path: Vec3::new(forward * straight, working * forward * inward, -down),
@@ -140,7 +144,7 @@ impl Mandible {
         }
         let advance_m = (half - root_squared.sqrt()) / path.norm_squared();
         let arm = line.turn.inverse() * (arm - path * advance_m);
-        let pitch_rad = declination(&arm) - declination(&-self.middle);
+        let pitch_rad = declination(&arm) - self.declination_rad;
         Some(Posture { pitch_rad, advance_m, balancing_m })
     }
 

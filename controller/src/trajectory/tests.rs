@@ -112,7 +112,6 @@ fn every_generator_passes_the_check_with_its_defaults() {
         let report = judge(&build(&motion, None)).unwrap_or_else(|error| panic!("{motion:?}: {error}"));
         assert_eq!(report.samples, 10_001);
         assert!(report.margin_m(mechanism().strokes()).iter().all(|&margin_m| margin_m > 0.0));
-        assert!(report.condition < 4.0);
     }
 }
 

@@ -226,14 +226,15 @@ impl Emulation {
 
     /// Delivers a frame to a drive. Only a SYNC moves the mechanism to this very instant, and makes the drive look at it.
     pub fn deliver(&mut self, axis: usize, frame: &Frame, now_ns: u64) -> Result<(), DynamicsError> {
-        let mut position_m = self.dynamics.drive_positions_m()[axis];
-        if frame.id() == CanId::from(Cob::Sync) {
-            self.move_mechanism(now_ns)?;
-            self.follow_agenda(now_ns);
-            self.synchronise(axis, now_ns);
-            position_m = self.encoder_faults[axis].seen_m(now_ns, self.dynamics.drive_positions_m()[axis]);
+        if frame.id() != CanId::from(Cob::Sync) {
+            self.drives[axis].receive(now_ns, frame);
+            return Ok(());
         }
-        self.drives[axis].receive(now_ns, frame, position_m);
+        self.move_mechanism(now_ns)?;
+        self.follow_agenda(now_ns);
+        self.synchronise(axis, now_ns);
+        let seen_m = self.encoder_faults[axis].seen_m(now_ns, self.dynamics.drive_positions_m()[axis]);
+        self.drives[axis].take_sync(now_ns, frame, seen_m);
         Ok(())
     }
 

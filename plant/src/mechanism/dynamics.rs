@@ -194,16 +194,17 @@ impl Dynamics {
         let forces = self.axes.act(force_n, positions_m, &speeds_m_s, &self.braking, step_s);
         let contact = self.occlusion.push(&motion.pose, &twist, step_s);
         let joints = self.braking.of_joints(&motion);
-        let Equations { mut mass, bias, .. } = Equations::new(&self.bodies, &motion);
+        let moved_kg = forces.resisting_kg - forces.parted_kg;
+        let Equations { mut mass, bias, .. } = Equations::with_added(&self.bodies, &motion, &moved_kg);
         let axes_n = forces.force_n + forces.parted_kg.component_mul(&bias_m_s2);
         let wrench = actuators.tr_mul(&axes_n) - joints * twist
             + contact
             + self.load.wrench(&motion.pose, &motion.twist, self.config.gravity_m_s2)
             - bias;
-        let moved_kg = forces.resisting_kg - forces.parted_kg;
-        let mut moved = *actuators;
-        moved.row_iter_mut().zip(&moved_kg).for_each(|(mut row, kg)| row *= *kg);
-        mass += self.load.mass(&motion.pose) + actuators.tr_mul(&moved) + joints * step_s;
+        mass += joints * step_s;
+        if let Some(payload) = self.load.mass(&motion.pose) {
+            mass += payload;
+        }
         self.acceleration = mass.cholesky().ok_or(DynamicsError::Mass)?.solve(&wrench);
         self.settle(&motion, &speeds_m_s, &forces);
         Ok(())

@@ -45,18 +45,18 @@ impl Load {
         self.pushed.fixed_rows_mut::<3>(3).add_assign(&moment);
     }
 
-    /// The payload's share of the platform's mass matrix, which is that of a point mass.
-    pub(super) fn mass(&self, pose: &Pose) -> Matrix6<f64> {
-        let mut mass = Matrix6::zeros();
+    /// The payload's share of the platform's mass matrix, which is that of a point mass; none without a payload.
+    pub(super) fn mass(&self, pose: &Pose) -> Option<Matrix6<f64>> {
         if self.payload_kg == 0.0 {
-            return mass;
+            return None;
         }
+        let mut mass = Matrix6::zeros();
         let across = self.arm(pose).cross_matrix() * self.payload_kg;
         mass.fixed_view_mut::<3, 3>(0, 0).copy_from(&(Matrix3::identity() * self.payload_kg));
         mass.fixed_view_mut::<3, 3>(0, 3).copy_from(&-across);
         mass.fixed_view_mut::<3, 3>(3, 0).copy_from(&across);
         mass.fixed_view_mut::<3, 3>(3, 3).copy_from(&-(across * self.arm(pose).cross_matrix()));
-        mass
+        Some(mass)
     }
 
     /// The wrench on the platform: forces, the payload's weight, and its centrifugal force.
@@ -95,7 +95,7 @@ mod tests {
         let (linear, angular): (Vec3, Vec3) =
             (twist.fixed_rows::<3>(0).into(), twist.fixed_rows::<3>(3).into());
         let speed = linear + angular.cross(&(pose.rotation * Vec3::new(0.03, 0.0, 0.01)));
-        let energy_j = 0.5 * twist.dot(&(load().mass(&pose) * twist));
+        let energy_j = 0.5 * twist.dot(&(load().mass(&pose).unwrap() * twist));
         assert!((energy_j - speed.norm_squared()).abs() < 1e-12);
     }
 

@@ -2,8 +2,10 @@
 //!
 //! The recorder drains topic after topic, so messages of one cycle lie some tens of cycles apart.
 
-/// Cycles kept; more than a subscriber's queue holds of any topic.
-const KEPT: usize = 1 << 13;
+/// Cycles kept at most; more than a subscriber's queue holds of any topic.
+const MOST: usize = 1 << 13;
+/// Places at first. Where every value is taken out soon, no more are needed.
+const FEWEST: usize = 1 << 6;
 
 /// The latest values by cycle.
 #[derive(Debug, Clone)]
@@ -19,22 +21,42 @@ impl<T> Default for ByCycle<T> {
 }
 
 impl<T: Copy> ByCycle<T> {
+    /// Keeps a value. Where the places are full, their number doubles, or the oldest value is lost.
     pub(super) fn insert(&mut self, cycle: u64, value: T) {
-        self.slots.resize(KEPT, None);
-        self.slots[cycle as usize % KEPT] = Some((cycle, value));
+        if self.slots.is_empty() {
+            self.slots = vec![None; FEWEST];
+        }
+        let held_by_another =
+            |slots: &[Option<(u64, T)>]| slots[place(cycle, slots)].is_some_and(|(held, _)| held != cycle);
+        while self.slots.len() < MOST && held_by_another(&self.slots) {
+            let mut slots = vec![None; 2 * self.slots.len()];
+            for kept in self.slots.iter().flatten() {
+                let place = place(kept.0, &slots);
+                slots[place] = Some(*kept);
+            }
+            self.slots = slots;
+        }
+        let place = place(cycle, &self.slots);
+        self.slots[place] = Some((cycle, value));
     }
 
     pub(super) fn get(&self, cycle: u64) -> Option<&T> {
-        let (held, value) = self.slots.get(cycle as usize % KEPT)?.as_ref()?;
+        let (held, value) = self.slots.get(place(cycle, &self.slots))?.as_ref()?;
         (*held == cycle).then_some(value)
     }
 
     /// Takes the value out.
     pub(super) fn take(&mut self, cycle: u64) -> Option<T> {
         let value = *self.get(cycle)?;
-        self.slots[cycle as usize % KEPT] = None;
+        let place = place(cycle, &self.slots);
+        self.slots[place] = None;
         Some(value)
     }
+}
+
+/// The number of places is 0 or a power of two.
+fn place<T>(cycle: u64, slots: &[T]) -> usize {
+    cycle as usize & slots.len().wrapping_sub(1)
 }
 
 #[cfg(test)]
@@ -46,8 +68,28 @@ mod tests {
         let mut values = ByCycle::default();
         values.insert(5, 'a');
         assert_eq!(values.get(5), Some(&'a'));
-        assert_eq!(values.get(5 + KEPT as u64), None);
+        assert_eq!(values.get(5 + FEWEST as u64), None);
         assert_eq!(values.take(5), Some('a'));
         assert_eq!(values.get(5), None);
+    }
+
+    #[test]
+    fn as_many_cycles_as_a_queue_holds_are_kept_and_no_more() {
+        let mut values = ByCycle::default();
+        for cycle in 0..=MOST as u64 {
+            values.insert(cycle, cycle);
+        }
+        assert_eq!(values.get(0), None);
+        assert!((1..=MOST as u64).all(|cycle| values.take(cycle) == Some(cycle)));
+    }
+
+    #[test]
+    fn values_that_are_taken_out_soon_need_few_places() {
+        let mut values = ByCycle::default();
+        for cycle in 20..10_000 {
+            values.insert(cycle, cycle);
+            assert_eq!(values.take(cycle - 19), (cycle >= 39).then_some(cycle - 19));
+        }
+        assert_eq!(values.slots.len(), FEWEST);
     }
 }

@@ -5,7 +5,7 @@ use masseter_controller::trajectory::{Trajectory, TrajectoryReport};
 use masseter_shared::config::{
     ChewingConfig, LateralConfig, MotionConfig, OpeningConfig, ProtrusionConfig, Scenario,
 };
-use masseter_shared::geometry::{LEGS, Mechanism};
+use masseter_shared::geometry::{Conditioning, Jacobian, LEGS, Mechanism, Pose};
 
 use super::sample::distance_rad;
 use super::solver::{COMPARED, CONTROLLER, Solver, Start};
@@ -21,8 +21,10 @@ const TRUE_WITHIN_RAD: f64 = 1e-6;
 pub(super) struct Motion {
     pub name: String,
     pub trajectory: Trajectory,
-    /// The strokes, velocities and conditioning that it needs, or why the mechanism cannot follow.
+    /// The strokes and velocities that it needs, or why the mechanism cannot follow.
     pub demands: Result<TrajectoryReport, String>,
+    /// Largest condition number of its poses.
+    pub condition: f64,
     /// How each of [`COMPARED`] followed it, 1 ms a step.
     pub followed: [Followed; COMPARED.len()],
 }
@@ -70,14 +72,23 @@ impl Motion {
         let demands =
             masseter_plan::demands(scenario, &trajectory, mechanism).map_err(|error| error.to_string());
         let followed = COMPARED.map(|solver| follow(solver, mechanism, &trajectory));
-        Ok(Self { name: name.to_owned(), trajectory, demands, followed })
+        let conditions = poses(&trajectory).filter_map(|pose| {
+            let jacobian = Jacobian::of_legs(mechanism, &mechanism.legs(&pose).ok()?);
+            Some(Conditioning::new(&jacobian).number())
+        });
+        let condition = conditions.fold(0.0, f64::max);
+        Ok(Self { name: name.to_owned(), trajectory, demands, condition, followed })
     }
 
     /// The platform's poses, every 10 ms.
-    pub(super) fn poses(&self) -> impl Iterator<Item = masseter_shared::geometry::Pose> {
-        let steps = (self.trajectory.duration_s() / (10.0 * CYCLE_S)) as usize;
-        (0..=steps).map(|step| self.trajectory.pose(step as f64 * 10.0 * CYCLE_S))
+    pub(super) fn poses(&self) -> impl Iterator<Item = Pose> {
+        poses(&self.trajectory)
     }
+}
+
+fn poses(trajectory: &Trajectory) -> impl Iterator<Item = Pose> {
+    let steps = (trajectory.duration_s() / (10.0 * CYCLE_S)) as usize;
+    (0..=steps).map(|step| trajectory.pose(step as f64 * 10.0 * CYCLE_S))
 }
 
 fn follow(solver: Solver, mechanism: &Mechanism, trajectory: &Trajectory) -> Followed {
@@ -113,7 +124,7 @@ pub(super) fn table(motions: &[Motion], mechanism: &Mechanism) -> String {
         let needs = motion.demands.as_ref().map_or([f64::NAN; 3], |demands| {
             let margins_m = demands.margin_m(mechanism.strokes());
             let least_m = |axes: &[f64]| axes.iter().copied().fold(f64::INFINITY, f64::min);
-            [least_m(&margins_m[..LEGS]), least_m(&margins_m[LEGS..]), demands.condition]
+            [least_m(&margins_m[..LEGS]), least_m(&margins_m[LEGS..]), motion.condition]
         });
         COMPARED.into_iter().zip(motion.followed).map(move |(solver, followed)| {
             let Followed { steps, lost, iterations_mean } = followed;

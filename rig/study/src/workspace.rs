@@ -5,7 +5,7 @@
 //! drawn into it is a projection: it leaves the slice in the other coordinates.
 
 use masseter_controller::kinematics::{Assembly, Solutions};
-use masseter_shared::geometry::{Jacobian, LEGS, Mechanism, Pose, Vec3};
+use masseter_shared::geometry::{Conditioning, Jacobian, LEGS, Mechanism, Pose, Vec3};
 use nalgebra::{Translation3, UnitQuaternion};
 use rayon::prelude::*;
 
@@ -152,7 +152,7 @@ fn quality(mechanism: &Mechanism, pose: &Pose) -> Option<PoseQuality> {
     let here = solutions.iter().min_by(|a, b| distance(&a.theta_rad).total_cmp(&distance(&b.theta_rad)))?;
     let regular_rad = here.certificate.map_or(0.0, |proof| proof.regular_within_rad);
     Some(PoseQuality {
-        condition: Jacobian::new(mechanism, pose, &joints).condition(),
+        condition: Conditioning::new(&Jacobian::new(mechanism, pose, &joints)).number(),
         determinant: here.determinant,
         regular_within_deg: regular_rad.to_degrees(),
         separation_deg: solutions.separation_rad(here).unwrap_or(f64::NAN).to_degrees(),

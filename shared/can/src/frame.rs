@@ -60,8 +60,20 @@ impl Frame {
         &self.bytes[..usize::from(self.length)]
     }
 
+    /// A frame of the first bytes of these.
+    ///
+    /// # Errors
+    /// [`FrameError::DataLength`] with more than 8 bytes.
+    pub fn of_padded(id: CanId, length: usize, bytes: [u8; Self::MAX_DATA]) -> Result<Self, FrameError> {
+        if length > Self::MAX_DATA {
+            return Err(FrameError::DataLength { length });
+        }
+        let used = u64::MAX.unbounded_shr(8 * (Self::MAX_DATA - length) as u32);
+        Ok(Self { id, length: length as u8, bytes: (u64::from_le_bytes(bytes) & used).to_le_bytes() })
+    }
+
     /// The bytes of the longest frame; bytes beyond the data are zero.
-    pub(super) const fn padded(&self) -> &[u8; Self::MAX_DATA] {
+    pub const fn padded(&self) -> &[u8; Self::MAX_DATA] {
         &self.bytes
     }
 }

@@ -7,7 +7,7 @@ numpy.dtype(Reading) is the NumPy type of a message.
 import ctypes
 import enum
 
-LAYOUT_VERSION = 13
+LAYOUT_VERSION = 14
 #: Event.axis when no axis is concerned.
 NO_AXIS = 4294967295
 #: Reading.drive_state of a drive not heard of yet, or lost.
@@ -276,7 +276,7 @@ class Reading(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Reading/601d80ebaa1988e2"
+        return "masseter/Reading/7a9cf3adbffb7059"
 
 
 _check(Reading, 264, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 176, 224, 232, 256, 260])
@@ -309,14 +309,14 @@ class Command(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Command/89cc47d3acfa3c24"
+        return "masseter/Command/f6bdf7e657686cf9"
 
 
 _check(Command, 144, [0, 8, 16, 24, 32, 40, 88, 136, 140])
 
 
 class State(ctypes.Structure):
-    """The controller's state and its estimate, once a cycle."""
+    """The controller's state and its estimate, once a cycle. All figures but times have 37 significant bits."""
 
     TOPIC = "state"
     _fields_ = [
@@ -366,7 +366,7 @@ class State(ctypes.Structure):
         ("leg_angle_rad", ctypes.c_double * 3),
         # Largest difference of a platform side from its length, m.
         ("residual_m", ctypes.c_double),
-        # Condition number of the actuators' Jacobian, angular columns scaled by the platform's side A₁A₂.
+        # Condition number of the actuators' Jacobian, angular columns scaled by the platform's side A₁A₂. The rig's own controllers compute one every ten cycles.
         ("condition", ctypes.c_double),
         # Iterations of the forward kinematics.
         ("iterations", ctypes.c_uint32),
@@ -376,7 +376,7 @@ class State(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/State/38cfecc852cdda30"
+        return "masseter/State/015bac90893f58ef"
 
 
 _check(State, 296, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 136, 160, 192, 216, 248, 272, 280, 288, 292])
@@ -423,14 +423,14 @@ class Event(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Event/f3a493a87ee0268b"
+        return "masseter/Event/04bb9c8121ad78e8"
 
 
 _check(Event, 88, [0, 8, 16, 24, 32, 40, 44, 48, 52, 56, 60, 62, 64, 68, 72, 80])
 
 
 class Truth(ctypes.Structure):
-    """The true state of the mechanism, once a cycle; the controller never reads it."""
+    """The true state of the mechanism, once a cycle; the controller never reads it. All figures but times have 37 significant bits."""
 
     TOPIC = "truth"
     _fields_ = [
@@ -464,14 +464,14 @@ class Truth(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Truth/8f925f7eb4c8621e"
+        return "masseter/Truth/4fc7cea39aa0c231"
 
 
 _check(Truth, 304, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240, 288, 296])
 
 
 class Contact(ctypes.Structure):
-    """The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads it."""
+    """The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads it. All figures but times have 37 significant bits."""
 
     TOPIC = "contact"
     _fields_ = [
@@ -495,7 +495,7 @@ class Contact(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Contact/fafe7ef19ff6d2f5"
+        return "masseter/Contact/771c03b7d9b0a3de"
 
 
 _check(Contact, 872, [0, 8, 16, 24, 32, 40, 104, 488])

@@ -121,7 +121,7 @@ pub fn run_cycle<P: ControllerPorts>(
     ports.publish_state(|state| {
         controller.fill_state(state);
         operator.note_state(state.controller_state);
-        stamp(state, wake, [received_ns, solved_ns, commanded_ns]);
+        complete(state, wake, [received_ns, solved_ns, commanded_ns]);
     })?;
     controller.fill_signals(named.signals_mut());
     let tick = Tick { cycle: wake.cycle, now_ns: commanded_ns };
@@ -163,12 +163,13 @@ pub(super) fn publish_begin<P: ControllerPorts>(
     event.map_or(Ok(()), |event| ports.publish_event(&event))
 }
 
-/// Enters the cycle's times and the use of time into a state: when the reading was received, the pose was found, and the
-/// command was ready.
-pub(super) fn stamp(state: &mut State, wake: &Wake, [received_ns, solved_ns, commanded_ns]: [u64; 3]) {
+/// Makes a state ready to be published: rounds its figures, and enters the use of time and the cycle's times, when the reading
+/// was received, the pose was found, and the command was ready.
+pub(super) fn complete(state: &mut State, wake: &Wake, [received_ns, solved_ns, commanded_ns]: [u64; 3]) {
     (state.due_ns, state.woke_ns) = (wake.due_ns, wake.woke_ns);
     (state.received_ns, state.solved_ns, state.commanded_ns) = (received_ns, solved_ns, commanded_ns);
     (state.skipped_cycles, state.stalled_ns) = (wake.skipped, wake.account.stalled_ns);
     (state.spun_ns, state.worked_ns) = (wake.account.spun_ns, wake.account.worked_ns);
     state.overlong_ns = wake.account.overlong_ns;
+    state.round();
 }

@@ -67,7 +67,7 @@ pub enum Outcome {
 ///         *command = Command { cycle, reading_cycle, request: DriveRequest::Off.code(), ..Command::default() };
 ///     }
 ///
-///     fn fill_state(&self, state: &mut State) {
+///     fn fill_state(&mut self, state: &mut State) {
 ///         let controller_state = ControllerState::Finished.code();
 ///         *state = State { cycle: self.cycle, controller_state, ..State::default() };
 ///     }
@@ -91,7 +91,7 @@ pub trait Controller {
     fn fill_command(&self, command: &mut Command);
 
     /// Writes what this cycle made of the reading.
-    fn fill_state(&self, state: &mut State);
+    fn fill_state(&mut self, state: &mut State);
 
     /// Asks for an orderly stop: the motion comes to rest, then the drives are switched off.
     fn request_stop(&mut self);

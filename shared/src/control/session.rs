@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::cycle::{publish_begin, publish_named, set_parameters, stamp};
+use super::cycle::{complete, publish_begin, publish_named, set_parameters};
 use super::operator::{Due, Operator};
 use super::{Controller, ControllerPorts, Duties, Outcome, Tick, run_cycle};
 use crate::clock;
@@ -214,7 +214,7 @@ impl Session {
         self.ports.publish_state(|message| {
             *message = *state;
             self.duties.operator.note_state(state.controller_state);
-            stamp(message, &wake, [received_ns, commanded_ns, commanded_ns]);
+            complete(message, &wake, [received_ns, commanded_ns, commanded_ns]);
         })?;
         let tick = Tick { cycle: wake.cycle, now_ns: commanded_ns };
         publish_named(&mut self.duties.named, None, &mut self.ports, tick)?;

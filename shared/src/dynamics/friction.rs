@@ -3,7 +3,7 @@
 //! Guides, screws and seals brake the axes; hinges and ball joints brake the legs' turns. Friction here depends on speed
 //! and load alone. The bristles of an axis at rest are a part of the plant.
 
-use nalgebra::{Matrix3, Matrix3x6, Matrix6};
+use nalgebra::Matrix6;
 
 use super::Motion;
 use crate::config::{DynamicsConfig, FrictionConfig, FrictionModel};
@@ -138,16 +138,26 @@ impl Friction {
 
     /// Damping of hinges and ball joints against the platform's twist V, N s/m to N m s/rad: their friction is the wrench −D V on
     /// the platform. The torque is μ r f, and fades towards zero at rest.
+    ///
+    /// A ball turns with the platform in a socket that turns with the leg, at ω − θ̇ û. With θ̇ = hᵀV and u = (0, û), hinge and
+    /// ball of a leg add c_h h hᵀ + c_b (I_ω − u hᵀ − h uᵀ + h hᵀ) to D.
     pub fn joint_damping(&self, loads: &Loads, motion: &Motion) -> Matrix6<f64> {
         let FrictionConfig { joint_coefficient, hinge_radius_m, ball_radius_m, .. } = self.config;
         let mut damping = Matrix6::zeros();
         for leg in 0..LEGS {
-            let hinge = motion.jacobian.hinges.row(leg).transpose();
-            let torque_nm = joint_coefficient * hinge_radius_m * loads.hinge_n[leg];
-            damping.ger(torque_nm / faded(motion.swings_rad_s[leg].powi(2)), &hinge, &hinge, 1.0);
-            let turns = ball_turns(motion, leg);
-            let torque_nm = joint_coefficient * ball_radius_m * loads.ball_n[leg];
-            damping += turns.tr_mul(&turns) * (torque_nm / faded((turns * motion.twist).norm_squared()));
+            let (hinge, swing_rad_s) =
+                (motion.jacobian.hinges.row(leg).transpose(), motion.swings_rad_s[leg]);
+            let along_slide = motion.jacobian.actuators.fixed_view::<1, 3>(leg, 0).transpose();
+            let turn_rad_s = motion.omega() - along_slide * swing_rad_s;
+            let of_hinge =
+                joint_coefficient * hinge_radius_m * loads.hinge_n[leg] / faded(swing_rad_s.powi(2));
+            let of_ball =
+                joint_coefficient * ball_radius_m * loads.ball_n[leg] / faded(turn_rad_s.norm_squared());
+            let mut half = hinge * (0.5 * (of_hinge + of_ball));
+            half.fixed_rows_mut::<3>(3).axpy(-of_ball, &along_slide, 1.0);
+            damping.ger(1.0, &hinge, &half, 1.0);
+            damping.ger(1.0, &half, &hinge, 1.0);
+            (LEGS..2 * LEGS).for_each(|row| damping[(row, row)] += of_ball);
         }
         damping
     }
@@ -162,16 +172,6 @@ impl Friction {
 /// The speed by which the torque of a turn is divided, which stays above zero at rest, rad/s.
 fn faded(square_rad2_s2: f64) -> f64 {
     (square_rad2_s2 + TURN_RAD_S * TURN_RAD_S).sqrt()
-}
-
-/// How fast a ball turns in its socket, by the platform's twist: the ball turns with the platform, the socket with the leg
-/// about the slide's direction û.
-fn ball_turns(motion: &Motion, leg: usize) -> Matrix3x6<f64> {
-    let along_slide = motion.jacobian.actuators.fixed_view::<1, 3>(leg, 0).transpose();
-    let mut turns = -along_slide * motion.jacobian.hinges.row(leg);
-    let mut of_platform = turns.fixed_view_mut::<3, 3>(0, 3);
-    of_platform += Matrix3::identity();
-    turns
 }
 
 #[cfg(test)]

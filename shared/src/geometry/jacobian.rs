@@ -1,4 +1,4 @@
-//! The Jacobian from the platform's twist to joint rates, and its condition number.
+//! The Jacobian from the platform's twist to joint rates.
 
 use nalgebra::{Matrix3x6, Matrix6, Vector6};
 
@@ -70,20 +70,11 @@ impl Jacobian {
         jacobian
     }
 
-    /// Condition number of the actuators' rates: the ratio of the largest to the smallest singular value of their rows, with
-    /// angular velocities scaled by the platform's side A₁A₂ so that all columns are velocities. Infinite when singular, or
-    /// no number.
-    pub fn condition(&self) -> f64 {
+    /// The actuators' rates with all columns as velocities.
+    pub(super) fn scaled(&self) -> Matrix6<f64> {
         let mut scaled = self.actuators;
-        // The eigenvalue iteration terminates for finite numbers only.
-        if !scaled.iter().all(|rate| rate.is_finite()) {
-            return f64::INFINITY;
-        }
         scaled.fixed_columns_mut::<3>(3).scale_mut(1.0 / self.length_m);
-        // Eigenvalues of JᵀJ cost half as much as the singular values of J and are as good as long as the
-        // condition number stays far below 10⁷, where a mechanism is of no use any more.
-        let squares = (scaled.transpose() * scaled).symmetric_eigenvalues();
-        if squares.min() > 0.0 { (squares.max() / squares.min()).sqrt() } else { f64::INFINITY }
+        scaled
     }
 }
 
@@ -133,34 +124,5 @@ mod tests {
                 prop_assert!((difference / (2.0 * h) - hinge_rates[leg]).abs() < 1e-6);
             }
         }
-    }
-
-    #[test]
-    fn a_jacobian_that_is_not_finite_has_an_infinite_condition() {
-        let not_finite =
-            Jacobian { actuators: Matrix6::repeat(f64::NAN), hinges: Matrix3x6::zeros(), length_m: 0.05 };
-        assert!(not_finite.condition().is_infinite());
-    }
-
-    #[test]
-    fn conditioning_of_the_papers_mechanism_is_mild_when_neutral() {
-        let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
-        let pose = Pose::translation(0.0, 0.0, 0.268_452_355);
-        let joints = mechanism.inverse(&pose).unwrap();
-        let condition = Jacobian::new(&mechanism, &pose, &joints).condition();
-        assert!((1.0..5.0).contains(&condition), "{condition}");
-    }
-
-    #[test]
-    fn a_mechanism_three_times_as_large_is_as_well_conditioned() {
-        let condition_at_scale = |scale: f64| {
-            let mut config = MechanismConfig::default();
-            config.slides.iter_mut().for_each(|slide| slide.centre_m = slide.centre_m.map(|x| scale * x));
-            config.platform_sides_m = config.platform_sides_m.map(|side_m| scale * side_m);
-            let mechanism = Mechanism::new(&config).unwrap();
-            let pose = Pose::translation(0.0, 0.005 * scale, 0.268 * scale);
-            Jacobian::new(&mechanism, &pose, &mechanism.inverse(&pose).unwrap()).condition()
-        };
-        assert!((condition_at_scale(3.0) - condition_at_scale(1.0)).abs() < 1e-9);
     }
 }

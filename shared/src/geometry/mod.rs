@@ -8,11 +8,13 @@
 //! This module holds the geometry, the closed-form inverse kinematics and the Jacobian, which controller and plant
 //! share. It does not hold forward kinematics: only the controller has it, so that the plant stays an independent oracle.
 
+mod conditioning;
 mod deviation;
 mod jacobian;
 mod joints;
 mod mechanism;
 
+pub use conditioning::Conditioning;
 pub use deviation::Deviation;
 pub use jacobian::{Jacobian, Twist};
 pub use joints::{AXES, AXIS_NAMES, Actuators, Joints, LEGS, Legs, LimitViolation, StrokeLimits};

@@ -2,6 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
+use masseter_can::Frame;
 
 use super::schema::FieldType;
 
@@ -27,6 +28,13 @@ impl CanData {
         let mut bytes = [0; MOST];
         bytes[..data.len()].copy_from_slice(data);
         Self { length: data.len() as u32, bytes }
+    }
+
+    /// The data of a classic frame.
+    pub fn of_frame(frame: &Frame) -> Self {
+        let mut bytes = [0; MOST];
+        bytes[..Frame::MAX_DATA].copy_from_slice(frame.padded());
+        Self { length: frame.data().len() as u32, bytes }
     }
 
     /// The data of a frame; none with more bytes than there is room for.

@@ -10,6 +10,8 @@
 
 pub mod codes;
 mod data;
+mod message;
+mod precision;
 mod schema;
 pub mod tap;
 mod values;
@@ -22,125 +24,21 @@ use iceoryx2::prelude::ZeroCopySend;
 
 use crate::geometry::{AXES, LEGS, Pose};
 use codes::{Cause, EventKind, NO_AXIS, OF_OPERATOR, Source};
+use message::messages;
 use schema::FieldType;
 
 pub use data::CanData;
+pub use message::{LAYOUT_VERSION, Message};
 pub use schema::{Field, plain};
 pub use values::{MOST_VALUES, Values};
 pub use words::explain;
 
-/// The type of the messages of a topic.
-pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
-    /// The topic the message travels on.
-    const TOPIC: &'static str;
-    /// Messages that a subscriber keeps; a slower subscriber loses the oldest ones.
-    const DEPTH: usize;
-    /// Type name in recordings.
-    const TYPE_NAME: &'static str;
-    /// Type name in shared memory, `masseter/Reading/<hash>`: a service of another layout is refused when it is opened. The
-    /// hash covers the schema, the version, and the number and name of every code that messages carry.
-    const SHARED_MEMORY_NAME: &'static str;
-    /// [`LAYOUT_VERSION`] of the sender.
-    fn version(&self) -> u64;
-    /// What the message is.
-    fn about() -> &'static str;
-    /// The fields in order.
-    fn fields() -> Vec<Field>;
-    /// The layout in the ROS 2 message definition language.
-    fn schema() -> String {
-        schema::definition(&Self::fields())
-    }
-    /// The same with comments: meaning, units and the names of codes. Recordings carry it.
-    fn definition() -> String {
-        schema::commented(Self::about(), &Self::fields())
-    }
-    /// The CDR body: all bytes except the unused ones at the end.
-    fn body(&self) -> &[u8];
-    /// The message with this body; none when no message of this type has such a body.
-    fn from_body(body: &[u8]) -> Option<Self>;
-    /// Stamps sequence number, time and version just before it is sent.
-    fn stamp(&mut self, seq: u64, published_ns: u64);
-}
-
-/// Version of the layouts below; it changes with any of them, and with what a field means.
-pub const LAYOUT_VERSION: u64 = 13;
-
 /// Room for the contact of this many pairs of teeth: all lower ones.
 pub const MOST_PAIRS: usize = 16;
 
-macro_rules! messages {
-    ($($(#[doc = $doc:literal])* $name:ident on $topic:literal keeping $depth:literal as $type_name:tt {
-        $($(#[doc = $field_doc:literal])* $field:ident: $type:ty,)*
-    })*) => {$(
-        $(#[doc = $doc])*
-        #[repr(C)]
-        #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, ZeroCopySend)]
-        #[type_name($type_name)]
-        pub struct $name {
-            /// Number of this message on its topic, from 1.
-            pub seq: u64,
-            /// When it was published, ns.
-            pub published_ns: u64,
-            /// [`LAYOUT_VERSION`] of the sender.
-            pub version: u64,
-            $($(#[doc = $field_doc])* pub $field: $type,)*
-        }
-
-        impl Default for $name {
-            /// All zeros.
-            fn default() -> Self {
-                Self::zeroed()
-            }
-        }
-
-        impl Message for $name {
-            const TOPIC: &'static str = $topic;
-            const DEPTH: usize = $depth;
-            const TYPE_NAME: &'static str = concat!("masseter/", stringify!($name));
-            const SHARED_MEMORY_NAME: &'static str = $type_name;
-
-            fn version(&self) -> u64 {
-                self.version
-            }
-
-            fn about() -> &'static str {
-                concat!($($doc),*)
-            }
-
-            fn fields() -> Vec<Field> {
-                vec![
-                    Field::new::<u64>("seq", offset_of!(Self, seq), " Number of this message on its topic, from 1."),
-                    Field::new::<u64>("published_ns", offset_of!(Self, published_ns), " When it was published, ns."),
-                    Field::new::<u64>("version", offset_of!(Self, version), " Version of the sender's layouts."),
-                    $(Field::new::<$type>(
-                        stringify!($field),
-                        offset_of!(Self, $field),
-                        concat!($($field_doc),*),
-                    ),)*
-                ]
-            }
-
-            fn body(&self) -> &[u8] {
-                let unused = 0 $(+ self.$field.unused_bytes())*;
-                &bytes_of(self)[..size_of::<Self>() - unused]
-            }
-
-            fn from_body(body: &[u8]) -> Option<Self> {
-                let mut message = Self::default();
-                bytes_of_mut(&mut message).get_mut(..body.len())?.copy_from_slice(body);
-                (message.body().len() == body.len()).then_some(message)
-            }
-
-            fn stamp(&mut self, seq: u64, published_ns: u64) {
-                (self.seq, self.published_ns, self.version) = (seq, published_ns, LAYOUT_VERSION);
-            }
-        }
-    )*};
-}
-
 messages! {
     /// Targets and request for the drives, once a cycle.
-    Command on "command" keeping 2048 as "masseter/Command/89cc47d3acfa3c24" {
+    Command on "command" keeping 2048 as "masseter/Command/f6bdf7e657686cf9" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -157,7 +55,7 @@ messages! {
     }
 
     /// Positions, forces and states of the drives, once a cycle.
-    Reading on "reading" keeping 2048 as "masseter/Reading/601d80ebaa1988e2" {
+    Reading on "reading" keeping 2048 as "masseter/Reading/7a9cf3adbffb7059" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// Cycle of the last command received when the sample was taken; 0 before the first.
@@ -199,8 +97,8 @@ messages! {
         master_fault: u32,
     }
 
-    /// The controller's state and its estimate, once a cycle.
-    State on "state" keeping 2048 as "masseter/State/38cfecc852cdda30" {
+    /// The controller's state and its estimate, once a cycle. All figures but times have 37 significant bits.
+    State on "state" keeping 2048 as "masseter/State/015bac90893f58ef" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -243,7 +141,8 @@ messages! {
         leg_angle_rad: [f64; LEGS],
         /// Largest difference of a platform side from its length, m.
         residual_m: f64,
-        /// Condition number of the actuators' Jacobian, angular columns scaled by the platform's side A₁A₂.
+        /// Condition number of the actuators' Jacobian, angular columns scaled by the platform's side A₁A₂. The rig's own
+        /// controllers compute one every ten cycles.
         condition: f64,
         /// Iterations of the forward kinematics.
         iterations: u32,
@@ -253,7 +152,7 @@ messages! {
 
     /// The signals that the controller declares, once a cycle; without any, there is no such message. A recording's
     /// definition of the message has a field for each signal.
-    Signals on "signal" keeping 2048 as "masseter/Signals/32757a278e752a65" {
+    Signals on "signal" keeping 2048 as "masseter/Signals/7967d39c539e2e98" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// The signals, in the order of their declaration.
@@ -262,15 +161,16 @@ messages! {
 
     /// The parameters that the controller declares, in its first cycle and in each that begins with another value. A
     /// recording's definition of the message has a field for each parameter.
-    Parameters on "parameter" keeping 256 as "masseter/Parameters/0345b7aedc173f87" {
+    Parameters on "parameter" keeping 256 as "masseter/Parameters/49aff8ac440bf498" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// The parameters, in the order of their declaration.
         parameters: Values,
     }
 
-    /// The true state of the mechanism, once a cycle; the controller never reads it.
-    Truth on "truth" keeping 2048 as "masseter/Truth/8f925f7eb4c8621e" {
+    /// The true state of the mechanism, once a cycle; the controller never reads it. All figures but times have 37 significant
+    /// bits.
+    Truth on "truth" keeping 2048 as "masseter/Truth/4fc7cea39aa0c231" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// The instant it describes: that of the reading's sample, ns.
@@ -294,8 +194,8 @@ messages! {
     }
 
     /// The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads
-    /// it.
-    Contact on "contact" keeping 2048 as "masseter/Contact/fafe7ef19ff6d2f5" {
+    /// it. All figures but times have 37 significant bits.
+    Contact on "contact" keeping 2048 as "masseter/Contact/771c03b7d9b0a3de" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// End of the time that it describes: the instant of the reading's sample, ns.
@@ -309,7 +209,7 @@ messages! {
     }
 
     /// An observation of a tap on a CAN wire: a frame, or an error message in the coding of `linux/can/error.h`.
-    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/c8198f9944bb4dec" {
+    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/0e3210e25e1ed031" {
         /// When its last bit was on the wire, ns.
         time_ns: u64,
         /// When its transmitter had it queued, ns; 0 on real wires.
@@ -326,7 +226,7 @@ messages! {
 
     /// Counters of the kernel for the machine and both loops. The recorder reads and records them; the message is not
     /// published.
-    Machine on "machine" keeping 1 as "masseter/Machine/093face44eee4072" {
+    Machine on "machine" keeping 1 as "masseter/Machine/4a2a0af32cbeddbb" {
         /// Time of the sample, ns.
         time_ns: u64,
         /// Time that the hypervisor had taken from all cores together, as far as the hypervisor reports it, ns.
@@ -338,7 +238,7 @@ messages! {
     }
 
     /// A single occurrence: a change of state, a fault, an alarm.
-    Event on "event" keeping 1024 as "masseter/Event/f3a493a87ee0268b" {
+    Event on "event" keeping 1024 as "masseter/Event/04bb9c8121ad78e8" {
         /// When, ns.
         time_ns: u64,
         /// Cycle of the process that reports it.
@@ -388,12 +288,43 @@ impl ToothContact {
 }
 
 impl Contact {
+    /// Rounds forces and places to the precision of published figures.
+    pub fn round(&mut self) {
+        precision::round(&mut self.force_n);
+        precision::round(&mut self.place_m);
+    }
+
     /// The teeth in the order of their numbers.
     pub fn teeth(&self) -> impl Iterator<Item = ToothContact> {
         let (forces_n, places_m) = (self.force_n.as_chunks::<3>().0, self.place_m.as_chunks::<3>().0);
         let vectors = forces_n.iter().zip(places_m);
         let tooth = |(&number, (&force_n, &place_m))| ToothContact { number, force_n, place_m };
         self.tooth.iter().zip(vectors).map(tooth).filter(|tooth| tooth.number > 0)
+    }
+}
+
+impl State {
+    /// Rounds the poses and what belongs to them to the precision of published figures. The motion's time stays exact.
+    pub fn round(&mut self) {
+        precision::round(&mut self.desired_position_m);
+        precision::round(&mut self.desired_quaternion_wxyz);
+        precision::round(&mut self.estimated_position_m);
+        precision::round(&mut self.estimated_quaternion_wxyz);
+        precision::round(&mut self.leg_angle_rad);
+        precision::round([&mut self.residual_m, &mut self.condition]);
+    }
+}
+
+impl Truth {
+    /// Rounds all figures but the time to the precision of published figures.
+    pub fn round(&mut self) {
+        precision::round(&mut self.position_m);
+        precision::round(&mut self.quaternion_wxyz);
+        precision::round(&mut self.joint_m);
+        precision::round(&mut self.joint_m_s);
+        precision::round(&mut self.force_n);
+        precision::round(&mut self.force_sample_n);
+        precision::round([&mut self.bite_force_n, &mut self.bite_force_sample_n]);
     }
 }
 
@@ -429,55 +360,4 @@ pub fn pose_from_fields(position_m: [f64; 3], [w, x, y, z]: [f64; 4]) -> Pose {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::codes::{BootPhase, ControllerState, DriveRequest, DriveState, NoPose};
-    use super::*;
-
-    /// FNV-1a, 64 bits.
-    fn hash(text: &str) -> u64 {
-        text.bytes()
-            .fold(0xCBF2_9CE4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3))
-    }
-
-    /// Schema, version and codes; [`Pod`] excludes padding, so the schema fixes every offset.
-    fn layout<M: Message>() -> String {
-        macro_rules! codes {
-            ($($name:ident),*) => {
-                [$($name::ALL.map(|value| format!("{value}={}", value.code())).join(" ")),*].join("\n")
-            };
-        }
-        let codes =
-            codes!(DriveState, DriveRequest, ControllerState, BootPhase, Source, EventKind, NoPose, Cause);
-        format!("{} v{LAYOUT_VERSION}\n{}{codes}", M::TYPE_NAME, M::schema())
-    }
-
-    fn check<M: Message>() {
-        let expected = format!("{}/{:016x}", M::TYPE_NAME, hash(&layout::<M>()));
-        assert_eq!(M::SHARED_MEMORY_NAME, expected, "name the new layout so: {}", layout::<M>());
-    }
-
-    #[test]
-    fn names_in_shared_memory_carry_the_hash_of_the_layout() {
-        check::<Command>();
-        check::<Reading>();
-        check::<State>();
-        check::<Signals>();
-        check::<Parameters>();
-        check::<Truth>();
-        check::<Contact>();
-        check::<FrameTap>();
-        check::<Machine>();
-        check::<Event>();
-    }
-
-    #[test]
-    fn the_hash_covers_version_fields_data_bytes_and_codes() {
-        let layout = layout::<FrameTap>();
-        for (found, other) in
-            [("v13", "v14"), ("queued_ns", "waiting_ns"), ("[<=64]", "[<=8]"), ("fault=8", "fault=9")]
-        {
-            let changed = layout.replace(found, other);
-            assert_ne!((hash(&layout), &layout), (hash(&changed), &changed));
-        }
-    }
-}
+mod tests;

@@ -115,7 +115,9 @@ mod tests {
     #[test]
     fn the_comments_of_a_definition_tell_units_meanings_and_codes_and_change_no_field() {
         let commented = State::definition();
-        assert!(commented.starts_with("# The controller's state and its estimate, once a cycle.\n"));
+        assert!(
+            commented.starts_with("# The controller's state and its estimate, once a cycle. All figures")
+        );
         for line in [
             "float64[3] leg_angle_rad  # [rad] θ₁ θ₂ θ₃, rad.\n",
             "uint32 iterations  # Iterations of the forward kinematics.\n",

@@ -34,7 +34,7 @@ pub fn encode(bus: u16, tapped: &Tapped) -> FrameTap {
             queued_ns: queued_ns.unwrap_or(0),
             id: frame.id().flagged(),
             bus: bus.into(),
-            data: CanData::new(frame.data()),
+            data: CanData::of_frame(frame),
             ..FrameTap::default()
         },
         Tapped::Error(report) => {
@@ -68,10 +68,8 @@ pub fn decode(tap: &FrameTap) -> Result<Tapped, TapError> {
         let (said, _) = tap.data.bytes.split_first_chunk().expect("an error message has 8 bytes");
         return Ok(Tapped::Error(ErrorReport::decode(tap.time_ns, tap.id, *said)?));
     }
-    if tap.data.length as usize > Frame::MAX_DATA {
-        return Err(FrameError::DataLength { length: tap.data.length as usize }.into());
-    }
-    let frame = Frame::new(CanId::from_flagged(tap.id)?, tap.data.as_slice())?;
+    let (padded, _) = tap.data.bytes.split_first_chunk().expect("room for the longest frame");
+    let frame = Frame::of_padded(CanId::from_flagged(tap.id)?, tap.data.length as usize, *padded)?;
     let queued_ns = Some(tap.queued_ns).filter(|&queued_ns| queued_ns > 0);
     Ok(Tapped::Frame(TappedFrame { frame, time_ns: tap.time_ns, queued_ns }))
 }

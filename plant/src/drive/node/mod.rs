@@ -142,9 +142,9 @@ impl DriveNode {
         self.axis.faults_mut()
     }
 
-    /// Takes a frame that arrived at `now_ns` with the encoder at `position_m`. Frames for others and malformed frames have
-    /// no effect; process data of a wrong length are reported by EMCY.
-    pub(crate) fn receive(&mut self, now_ns: u64, frame: &Frame, position_m: f64) {
+    /// Takes a frame, but no SYNC, that arrived at `now_ns`. Frames for others and malformed frames have no effect; process data
+    /// of a wrong length are reported by EMCY.
+    pub(crate) fn receive(&mut self, now_ns: u64, frame: &Frame) {
         if self.is_off {
             return;
         }
@@ -156,7 +156,6 @@ impl DriveNode {
                     self.obey_nmt(message.command, now_ns);
                 }
             }
-            Ok(Cob::Sync) => self.take_sync(now_ns, frame.data(), position_m),
             Ok(Cob::SdoRequest(node)) if node == self.id && self.nmt.is_served() => {
                 self.serve(now_ns, frame.data());
             }
@@ -164,6 +163,32 @@ impl DriveNode {
                 self.take_heartbeat(now_ns, node, frame.data());
             }
             _ => self.take_process_data(now_ns, frame),
+        }
+    }
+
+    /// Takes a SYNC that arrived at `now_ns` with the encoder at `position_m`: buffered process data take effect, actual values are
+    /// sampled and sent.
+    pub(crate) fn take_sync(&mut self, now_ns: u64, frame: &Frame, position_m: f64) {
+        if self.is_off || !self.nmt.is_served() {
+            return;
+        }
+        let counter = match (frame.data(), self.objects.get(names::SYNC_OVERFLOW)) {
+            ([], 0) => 0,
+            ([counter], 2..) => *counter,
+            _ => return self.raise(EmergencyCode::SYNC_LENGTH),
+        };
+        self.clear(EmergencyCode::SYNC_LENGTH);
+        let is_operational = self.nmt.is_operational();
+        if is_operational {
+            for number in 0..PDOS {
+                self.apply_process_data(number, now_ns);
+            }
+        }
+        self.axis.synchronise(now_ns, self.process_data.take_targets(), &self.objects);
+        if is_operational {
+            self.axis.sample(now_ns, position_m);
+            self.axis.show(now_ns, &mut self.objects);
+            self.process_data.send(&mut self.outbox, |tpdo| tpdo.at_sync(now_ns, counter, &self.objects));
         }
     }
 
@@ -320,31 +345,6 @@ impl DriveNode {
         self.due_fault = self.quirks.fault;
         self.axis.restart(now_ns, &self.objects);
         self.reset_communication(now_ns);
-    }
-
-    /// SYNC: buffered process data take effect, actual values are sampled and sent.
-    fn take_sync(&mut self, now_ns: u64, data: &[u8], position_m: f64) {
-        if !self.nmt.is_served() {
-            return;
-        }
-        let counter = match (data, self.objects.get(names::SYNC_OVERFLOW)) {
-            ([], 0) => 0,
-            ([counter], 2..) => *counter,
-            _ => return self.raise(EmergencyCode::SYNC_LENGTH),
-        };
-        self.clear(EmergencyCode::SYNC_LENGTH);
-        let is_operational = self.nmt.is_operational();
-        if is_operational {
-            for number in 0..PDOS {
-                self.apply_process_data(number, now_ns);
-            }
-        }
-        self.axis.synchronise(now_ns, self.process_data.take_targets(), &self.objects);
-        if is_operational {
-            self.axis.sample(now_ns, position_m);
-            self.axis.show(now_ns, &mut self.objects);
-            self.process_data.send(&mut self.outbox, |tpdo| tpdo.at_sync(now_ns, counter, &self.objects));
-        }
     }
 
     /// Process data wait for the next SYNC, or take effect at once where their PDO is event-driven.

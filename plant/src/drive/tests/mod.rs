@@ -136,7 +136,11 @@ impl Bench {
     }
 
     fn receive(&mut self, frame: Frame) {
-        self.drive.receive(self.now_ns, &frame, self.position_m);
+        if frame.id() == CanId::from(Cob::Sync) {
+            self.drive.take_sync(self.now_ns, &frame, self.position_m);
+        } else {
+            self.drive.receive(self.now_ns, &frame);
+        }
         self.collect();
     }
 

@@ -162,7 +162,7 @@ fn add_controller(list: &mut SignalList) {
     list.add("fk.residual", "um", "Largest difference of a platform side from its length.", |messages| {
         Some(solution(messages)?.residual_m)
     });
-    list.add("fk.condition", "", "Condition number of the Jacobian.", |messages| {
+    list.add("fk.condition", "", "Condition number of the Jacobian, every ten cycles.", |messages| {
         Some(solution(messages)?.condition)
     });
     list.add("fk.iterations", "", "Iterations of the forward kinematics.", |messages| {

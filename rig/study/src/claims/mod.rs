@@ -42,7 +42,7 @@ fn movement_is_covered(study: &Study) -> PaperClaim {
             let least_mm = margin_m.iter().copied().fold(f64::INFINITY, f64::min) * 1e3;
             format!(
                 "{}: {least_mm:.1} mm of stroke left, condition at most {:.1}",
-                motion.name, demands.condition
+                motion.name, motion.condition
             )
         }
         Err(reason) => format!("{}: {reason}", motion.name),

@@ -7,79 +7,27 @@ pub(super) fn stuff_bits(sequence: u128, length: u32) -> u32 {
     if length == 0 {
         return 0;
     }
-    // Alternating bits before the first get no stuff bit and fill up the number.
-    let begins_recessive = sequence >> (length - 1) & 1 == 1;
-    let alternating = if begins_recessive { u128::MAX / 3 * 2 } else { u128::MAX / 3 };
-    let content = sequence & u128::MAX >> (u128::BITS - length);
-    let filled = alternating.unbounded_shl(length) | content;
-    let mut run = Run::of_one_bit(filled.leading_zeros() > 0);
+    // Index 0 is the highest bit, the first on the wire.
+    let bits = sequence << (u128::BITS - length);
+    let equals_next = !(bits ^ bits << 1) & !u128::MAX.unbounded_shr(length - 1);
+    let begins_four = equals_next & equals_next << 1 & equals_next << 2;
+    let begins_five = begins_four & equals_next << 3;
+    // A stuff bit and four bits of its level.
+    let precedes_four_others = begins_four << 1 & !equals_next;
     let mut stuffed = 0;
-    // A whole byte of alternating bits ends in the run that it began with.
-    let alternating_bytes = (u128::BITS - length) as usize / 8;
-    for byte in &filled.to_be_bytes()[alternating_bytes..] {
-        let (next, inserted) = STEPS[usize::from(run.0)][usize::from(*byte)];
-        run = next;
-        stuffed += u32::from(inserted);
+    // The bits from here on follow a stuff bit, or are the first.
+    let mut from = 0;
+    while from < length {
+        let is_chained = from > 0 && precedes_four_others << (from - 1) >> (u128::BITS - 1) == 1;
+        from = match (begins_five << from).leading_zeros() {
+            _ if is_chained => from + 4,
+            u128::BITS => break,
+            zeros => from + zeros + 5,
+        };
+        stuffed += 1;
     }
     stuffed
 }
-
-/// The equal bits at the end of the sequence: one to four, since the fifth brings its stuff bit at once. The value is the
-/// number of bits − 1, plus 4 for recessive bits.
-#[derive(Debug, Clone, Copy)]
-struct Run(u8);
-
-impl Run {
-    const COUNT: usize = 8;
-    const RECESSIVE: u8 = 4;
-    const LONGEST: u8 = 3;
-
-    const fn of_one_bit(recessive: bool) -> Self {
-        Self(if recessive { Self::RECESSIVE } else { 0 })
-    }
-
-    const fn is_recessive(self) -> bool {
-        self.0 & Self::RECESSIVE != 0
-    }
-
-    /// The run after one more bit, and the stuff bits inserted.
-    const fn push(self, recessive: bool) -> (Self, u8) {
-        if recessive != self.is_recessive() {
-            (Self::of_one_bit(recessive), 0)
-        } else if self.0 & Self::LONGEST == Self::LONGEST {
-            (Self::of_one_bit(!recessive), 1)
-        } else {
-            (Self(self.0 + 1), 0)
-        }
-    }
-
-    /// The run after eight more bits, and the stuff bits inserted.
-    const fn push_byte(self, byte: u8) -> (Self, u8) {
-        let (mut run, mut total, mut bit) = (self, 0, 8);
-        while bit > 0 {
-            bit -= 1;
-            let (next, stuffed) = run.push(byte >> bit & 1 == 1);
-            run = next;
-            total += stuffed;
-        }
-        (run, total)
-    }
-}
-
-/// For every run and every byte that follows it: the run at the end of the byte, and the stuff bits inserted.
-static STEPS: [[(Run, u8); 256]; Run::COUNT] = {
-    let mut steps = [[(Run(0), 0); 256]; Run::COUNT];
-    let mut run = 0;
-    while run < Run::COUNT {
-        let mut byte = 0;
-        while byte < 256 {
-            steps[run][byte] = Run(run as u8).push_byte(byte as u8);
-            byte += 1;
-        }
-        run += 1;
-    }
-    steps
-};
 
 #[cfg(test)]
 pub(super) mod reference {
@@ -88,7 +36,7 @@ pub(super) mod reference {
         (0..length).rev().map(move |bit| field >> bit & 1 == 1)
     }
 
-    /// Stuffing as a transmitter does it, bit by bit: the reference for the table.
+    /// Stuffing as a transmitter does it, bit by bit: the reference.
     #[derive(Debug, Clone, Copy, Default)]
     pub(in crate::wire) struct Stuffer {
         last: Option<bool>,

@@ -1,0 +1,49 @@
+//! The precision of computed figures in messages: 37 significant bits, eleven decimal digits.
+//!
+//! A place of 0.1 m keeps steps of a picometre, far below every encoder. The bits below are the rounding of a formula, which no
+//! compressor shortens: they would be an eighth of a recording (docs/data.md). Commands, readings, times, and a user's own
+//! signals keep every bit.
+
+/// Bits of the significand that are zero.
+const ZERO_BITS: u32 = 16;
+
+/// Rounds to the nearest number with the published precision, away from zero where two are as near.
+pub(super) fn round<'a>(values: impl IntoIterator<Item = &'a mut f64>) {
+    const HALF: u64 = 1 << (ZERO_BITS - 1);
+    for value in values {
+        // A carry into the exponent is the next power of two, which is right.
+        *value = f64::from_bits((value.to_bits() + HALF) & (u64::MAX << ZERO_BITS));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn rounded(value: f64) -> f64 {
+        let mut values = [value];
+        round(&mut values);
+        values[0]
+    }
+
+    proptest! {
+        #[test]
+        fn the_nearest_number_of_eleven_digits(value in prop::num::f64::NORMAL) {
+            prop_assume!(value.abs() < 1e300);
+            let rounded = rounded(value);
+            prop_assert_eq!(rounded.to_bits() % (1 << ZERO_BITS), 0);
+            prop_assert!((rounded - value).abs() <= value.abs() * 2.0_f64.powi(-37));
+        }
+    }
+
+    #[test]
+    fn what_is_exact_or_no_number_stays() {
+        for value in [0.0, -0.0, 1.0, -0.25, 1e9, f64::INFINITY, f64::NEG_INFINITY] {
+            assert_eq!(rounded(value).to_bits(), value.to_bits());
+        }
+        assert!(rounded(f64::NAN).is_nan());
+        assert_eq!(rounded(2.0 - f64::EPSILON).to_bits(), 2.0_f64.to_bits(), "a carry into the exponent");
+    }
+}

@@ -1,0 +1,78 @@
+use super::codes::{BootPhase, ControllerState, DriveRequest, DriveState, NoPose};
+use super::*;
+
+/// FNV-1a, 64 bits.
+fn hash(text: &str) -> u64 {
+    text.bytes()
+        .fold(0xCBF2_9CE4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3))
+}
+
+/// Schema, version and codes; [`Pod`] excludes padding, so the schema fixes every offset.
+fn layout<M: Message>() -> String {
+    macro_rules! codes {
+        ($($name:ident),*) => {
+            [$($name::ALL.map(|value| format!("{value}={}", value.code())).join(" ")),*].join("\n")
+        };
+    }
+    let codes =
+        codes!(DriveState, DriveRequest, ControllerState, BootPhase, Source, EventKind, NoPose, Cause);
+    format!("{} v{LAYOUT_VERSION}\n{}{codes}", M::TYPE_NAME, M::schema())
+}
+
+fn check<M: Message>() {
+    let expected = format!("{}/{:016x}", M::TYPE_NAME, hash(&layout::<M>()));
+    assert_eq!(M::SHARED_MEMORY_NAME, expected, "name the new layout so: {}", layout::<M>());
+}
+
+#[test]
+fn names_in_shared_memory_carry_the_hash_of_the_layout() {
+    check::<Command>();
+    check::<Reading>();
+    check::<State>();
+    check::<Signals>();
+    check::<Parameters>();
+    check::<Truth>();
+    check::<Contact>();
+    check::<FrameTap>();
+    check::<Machine>();
+    check::<Event>();
+}
+
+#[test]
+fn the_hash_covers_version_fields_data_bytes_and_codes() {
+    let layout = layout::<FrameTap>();
+    for (found, other) in
+        [("v14", "v15"), ("queued_ns", "waiting_ns"), ("[<=64]", "[<=8]"), ("fault=8", "fault=9")]
+    {
+        let changed = layout.replace(found, other);
+        assert_ne!((hash(&layout), &layout), (hash(&changed), &changed));
+    }
+}
+
+/// Whether the lowest 16 bits of each figure are zero once it is rounded, and all bits were set before.
+fn check_rounding<M: Message>(round: fn(&mut M), exact: &[&str]) {
+    let mut message = M::zeroed();
+    let fields = M::fields();
+    let is_figure = |field: &&Field| field.ros_type.starts_with("float64");
+    let of_figures = |field: &Field| {
+        let figures = field.ros_type.trim_start_matches("float64").trim_matches(['[', ']']);
+        (0..figures.parse().unwrap_or(1)).map(|place| field.offset + 8 * place).collect::<Vec<_>>()
+    };
+    for at in fields.iter().filter(is_figure).flat_map(of_figures) {
+        bytes_of_mut(&mut message)[at..at + 8].copy_from_slice(&0.1_f64.to_le_bytes());
+    }
+    round(&mut message);
+    for field in fields.iter().filter(is_figure) {
+        for at in of_figures(field) {
+            let is_rounded = bytes_of(&message)[at..at + 2] == [0, 0];
+            assert_eq!(is_rounded, !exact.contains(&field.name), "{} {}", M::TYPE_NAME, field.name);
+        }
+    }
+}
+
+#[test]
+fn every_figure_of_state_truth_and_contact_is_rounded_but_for_the_time() {
+    check_rounding(State::round, &["motion_time_s"]);
+    check_rounding(Truth::round, &[]);
+    check_rounding(Contact::round, &[]);
+}
