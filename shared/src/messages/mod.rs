@@ -97,7 +97,7 @@ messages! {
         master_fault: u32,
     }
 
-    /// The controller's state and its estimate, once a cycle. All figures but times have 37 significant bits.
+    /// The controller's state and its estimate, once a cycle. All figures but times have 31 significant bits.
     State on "state" keeping 2048 as "masseter/State/015bac90893f58ef" {
         /// Cycle of the controller, from 1.
         cycle: u64,
@@ -168,7 +168,7 @@ messages! {
         parameters: Values,
     }
 
-    /// The true state of the mechanism, once a cycle; the controller never reads it. All figures but times have 37 significant
+    /// The true state of the mechanism, once a cycle; the controller never reads it. All figures but times have 31 significant
     /// bits.
     Truth on "truth" keeping 2048 as "masseter/Truth/4fc7cea39aa0c231" {
         /// Cycle of the plant, from 1.
@@ -194,7 +194,7 @@ messages! {
     }
 
     /// The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads
-    /// it. All figures but times have 37 significant bits.
+    /// it. All figures but times have 31 significant bits.
     Contact on "contact" keeping 2048 as "masseter/Contact/771c03b7d9b0a3de" {
         /// Cycle of the plant, from 1.
         cycle: u64,

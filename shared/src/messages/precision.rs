@@ -1,11 +1,11 @@
-//! The precision of computed figures in messages: 37 significant bits, eleven decimal digits.
+//! The precision of computed figures in messages: 31 significant bits, nine decimal digits.
 //!
-//! A place of 0.1 m keeps steps of a picometre, far below every encoder. The bits below are the rounding of a formula, which no
-//! compressor shortens: they would be an eighth of a recording (docs/data.md). Commands, readings, times, and a user's own
-//! signals keep every bit.
+//! A place of 0.1 m keeps steps of a tenth of a nanometre, far below every encoder. The bits below are the rounding of a
+//! formula, which no compressor shortens: they would be a sixth of a recording (docs/data.md). Commands, readings, times, and
+//! the signals of a controller keep every bit.
 
 /// Bits of the significand that are zero.
-const ZERO_BITS: u32 = 16;
+const ZERO_BITS: u32 = 22;
 
 /// Rounds to the nearest number with the published precision, away from zero where two are as near.
 pub(super) fn round<'a>(values: impl IntoIterator<Item = &'a mut f64>) {
@@ -30,11 +30,11 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_nearest_number_of_eleven_digits(value in prop::num::f64::NORMAL) {
+        fn the_nearest_number_of_nine_digits(value in prop::num::f64::NORMAL) {
             prop_assume!(value.abs() < 1e300);
             let rounded = rounded(value);
             prop_assert_eq!(rounded.to_bits() % (1 << ZERO_BITS), 0);
-            prop_assert!((rounded - value).abs() <= value.abs() * 2.0_f64.powi(-37));
+            prop_assert!((rounded - value).abs() <= value.abs() * 2.0_f64.powi(-31));
         }
     }
 

@@ -49,7 +49,7 @@ fn the_hash_covers_version_fields_data_bytes_and_codes() {
     }
 }
 
-/// Whether the lowest 16 bits of each figure are zero once it is rounded, and all bits were set before.
+/// Whether the lowest bits of each figure are zero once it is rounded, and all bits were set before.
 fn check_rounding<M: Message>(round: fn(&mut M), exact: &[&str]) {
     let mut message = M::zeroed();
     let fields = M::fields();
