@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 PARTS = {
-    "condition number": ["Jacobian::condition", "symmetric_eigen", "SymmetricEigen", "symmetric_tridiagonal"],
+    "condition number": ["Conditioning::", "symmetric_eigen", "SymmetricEigen", "symmetric_tridiagonal"],
     "analysis": ["masseter_analysis::"],
     "check of the motion": ["masseter_plan::", "trajectory::check"],
     "simulated wires": ["masseter_can::"],

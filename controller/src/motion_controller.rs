@@ -86,8 +86,8 @@ pub struct MotionController {
     asked: Option<Pose>,
     target: Option<Actuators>,
     force_offset_n: [f64; AXES],
-    /// Of the last cycle that computed one; 0 before the first.
-    condition: f64,
+    /// The last condition number, with the cycle that computed it.
+    condition: Option<(u64, f64)>,
 }
 
 impl MotionController {
@@ -143,7 +143,7 @@ impl MotionController {
             asked: None,
             target: None,
             force_offset_n: [0.0; AXES],
-            condition: 0.0,
+            condition: None,
         }
     }
 
@@ -160,9 +160,10 @@ impl MotionController {
         let demand = self.demand(desired);
         if let Some(estimated) = &demand.estimated {
             let detour = Translation3::from(self.law.detour().at_sample_m);
-            let earlier = match self.slack_cycles * demand.period_s {
-                0.0 => desired,
-                slack_s => self.playback.pose_ahead(-self.sample_age_s() - slack_s),
+            let earlier = if self.slack_cycles > 0.0 {
+                self.playback.pose_ahead(-self.sample_age_s() - self.slack_cycles * demand.period_s)
+            } else {
+                desired
             };
             self.supervision.check(&(detour * desired), estimated, &(detour * earlier))?;
         }
@@ -310,12 +311,14 @@ impl Controller for MotionController {
         *state = self.sequencer.state_message(self.desired.as_ref());
         state.motion_time_s = self.playback.motion_time_ahead_s(-self.sample_age_s());
         let Some(estimate) = &self.sequencer.estimate else { return };
-        if self.condition == 0.0 || self.sequencer.cycle.is_multiple_of(CYCLES_OF_A_CONDITION) {
+        let cycle = self.sequencer.cycle;
+        let held = self.condition.filter(|(computed, _)| cycle < computed + CYCLES_OF_A_CONDITION);
+        let (_, condition) = *self.condition.insert(held.unwrap_or_else(|| {
             let joints = Joints { actuators: estimate.measured, theta_rad: estimate.solution.theta_rad };
             let jacobian = Jacobian::new(&self.mechanism, &estimate.solution.pose, &joints);
-            self.condition = Conditioning::new(&jacobian).number();
-        }
-        state.condition = self.condition;
+            (cycle, Conditioning::new(&jacobian).number())
+        }));
+        state.condition = condition;
     }
 
     fn request_stop(&mut self) {

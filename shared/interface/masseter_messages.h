@@ -330,7 +330,7 @@ static_assert(offsetof(masseter_command, controller_state) == 140, "offset of co
 #define MASSETER_STATE_TOPIC "state"
 #define MASSETER_STATE_TYPE_NAME "masseter/State/015bac90893f58ef"
 
-/* The controller's state and its estimate, once a cycle. All figures but times have 31 significant bits. */
+/* The controller's state and its estimate, once a cycle. All float64 fields but `motion_time_s` have 31 significant bits. */
 typedef struct masseter_state {
     /* Number of this message on its topic, from 1. */
     uint64_t seq;
@@ -378,7 +378,7 @@ typedef struct masseter_state {
     double leg_angle_rad[3];
     /* Largest difference of a platform side from its length, m. */
     double residual_m;
-    /* Condition number of the actuators' Jacobian, angular columns scaled by the platform's side A₁A₂. The rig's own controllers compute one every ten cycles. */
+    /* Condition number of the actuators' Jacobian, angular columns scaled by the platform's side A₁A₂. The motion controller computes one every ten cycles and repeats it; 0 where none is computed. */
     double condition;
     /* Iterations of the forward kinematics. */
     uint32_t iterations;
@@ -474,7 +474,7 @@ static_assert(offsetof(masseter_event, limit) == 80, "offset of limit");
 #define MASSETER_TRUTH_TOPIC "truth"
 #define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/4fc7cea39aa0c231"
 
-/* The true state of the mechanism, once a cycle; the controller never reads it. All figures but times have 31 significant bits. */
+/* The true state of the mechanism, once a cycle; the controller never reads it. All float64 fields have 31 significant bits. */
 typedef struct masseter_truth {
     /* Number of this message on its topic, from 1. */
     uint64_t seq;
@@ -522,7 +522,7 @@ static_assert(offsetof(masseter_truth, bite_force_sample_n) == 296, "offset of b
 #define MASSETER_CONTACT_TOPIC "contact"
 #define MASSETER_CONTACT_TYPE_NAME "masseter/Contact/771c03b7d9b0a3de"
 
-/* The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads it. All figures but times have 31 significant bits. */
+/* The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads it. All float64 fields have 31 significant bits. */
 typedef struct masseter_contact {
     /* Number of this message on its topic, from 1. */
     uint64_t seq;

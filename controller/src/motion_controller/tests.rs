@@ -187,6 +187,32 @@ fn the_estimated_pose_at_a_sample_is_the_desired_pose() {
     assert!(worst_m < 2e-5, "{worst_m}");
 }
 
+#[test]
+fn a_condition_number_is_computed_every_ten_cycles_and_held_in_between() {
+    let mut bench = Bench::new();
+    let mut state = State::default();
+    bench.controller.fill_state(&mut state);
+    assert_eq!(state.condition.to_bits(), 0, "without an estimate");
+    bench.run_until(ControllerState::Running);
+    // Away from the closed pose, where the jaw rests.
+    (0..100).for_each(|_| bench.cycle(Some));
+    let mut changes = Vec::new();
+    for _ in 0..40 {
+        let before = state.condition;
+        bench.cycle(Some);
+        bench.controller.fill_state(&mut state);
+        if state.condition.to_bits() != before.to_bits() {
+            changes.push(bench.controller.sequencer.cycle);
+            let estimate = bench.controller.sequencer.estimate.unwrap();
+            let mechanism = &bench.controller.mechanism;
+            let legs = mechanism.legs(&estimate.solution.pose).unwrap();
+            let here = Conditioning::new(&Jacobian::of_legs(mechanism, &legs)).number();
+            assert!((state.condition - here).abs() < 1e-9, "{} {here}", state.condition);
+        }
+    }
+    assert!(changes.len() >= 4 && changes.windows(2).all(|pair| pair[1] - pair[0] == 10), "{changes:?}");
+}
+
 /// As after its drives were off: the encoders may count the end of the stroke as outside, or it was pushed there.
 #[test]
 fn axes_slightly_outside_their_strokes_are_eased_back() {

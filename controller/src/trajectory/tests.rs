@@ -6,7 +6,7 @@ use masseter_shared::config::{
     ChewingConfig, FileConfig, JawConfig, JawSide, LateralConfig, MotionConfig, OpeningConfig,
     ProtrusionConfig, TrajectoryLimitsConfig,
 };
-use masseter_shared::geometry::{AXES, Mechanism, MechanismConfig};
+use masseter_shared::geometry::{AXES, Conditioning, Jacobian, Mechanism, MechanismConfig};
 use nalgebra::SVector;
 
 use super::*;
@@ -149,6 +149,33 @@ fn what_exceeds_a_limit_is_refused_with_time_axis_and_limit() {
     let trajectory = Trajectory::new(&MotionConfig::default(), &low, &mechanism(), None).unwrap();
     let refused = judge(&trajectory).unwrap_err().to_string();
     assert!(refused.contains("is outside its stroke"), "{refused}");
+}
+
+/// The check computes few condition numbers, and finds the same first pose as all of them.
+#[test]
+fn the_first_pose_beyond_the_condition_limit_is_refused() {
+    let mechanism = mechanism();
+    let chewing = build(&MotionConfig::default(), None);
+    let conditions: Vec<_> = (0..=10_000)
+        .map(|sample| {
+            let legs = mechanism.legs(&chewing.pose(f64::from(sample) * PERIOD_S)).unwrap();
+            Conditioning::new(&Jacobian::of_legs(&mechanism, &legs)).number()
+        })
+        .collect();
+    let largest = conditions.iter().copied().fold(0.0, f64::max);
+    for share in [0.01, 0.3, 0.9, 0.999_999] {
+        let max_condition = conditions[0] + share * (largest - conditions[0]);
+        let limits = TrajectoryLimitsConfig { max_condition, ..Default::default() };
+        let first = conditions.iter().position(|condition| *condition > max_condition).unwrap();
+        assert!(first > 0, "{share}");
+        let error = check(&chewing, &mechanism, &limits, PERIOD_S).unwrap_err().to_string();
+        assert!(
+            error.starts_with(&format!("motion at {:.3} s: condition", first as f64 * PERIOD_S)),
+            "{error}"
+        );
+    }
+    let limits = TrajectoryLimitsConfig { max_condition: largest, ..Default::default() };
+    assert!(check(&chewing, &mechanism, &limits, PERIOD_S).is_ok());
 }
 
 #[test]

@@ -4,7 +4,7 @@
 
 /// Cycles kept at most; more than a subscriber's queue holds of any topic.
 const MOST: usize = 1 << 13;
-/// Places at first. Where every value is taken out soon, no more are needed.
+/// Places at first. As long as every value is taken out soon, no more are needed.
 const FEWEST: usize = 1 << 6;
 
 /// The latest values by cycle.
@@ -21,7 +21,8 @@ impl<T> Default for ByCycle<T> {
 }
 
 impl<T: Copy> ByCycle<T> {
-    /// Keeps a value. Where the places are full, their number doubles, or the oldest value is lost.
+    /// Keeps a value. While its place holds another cycle, the number of places doubles, up to [`MOST`]. Beyond, the value
+    /// replaces that of the other cycle.
     pub(super) fn insert(&mut self, cycle: u64, value: T) {
         if self.slots.is_empty() {
             self.slots = vec![None; FEWEST];
@@ -81,6 +82,18 @@ mod tests {
         }
         assert_eq!(values.get(0), None);
         assert!((1..=MOST as u64).all(|cycle| values.take(cycle) == Some(cycle)));
+    }
+
+    #[test]
+    fn values_that_stay_and_older_ones_that_come_late_are_kept() {
+        let mut values = ByCycle::default();
+        values.insert(10_064, 'b');
+        values.insert(10_000, 'a');
+        values.insert(10_000, 'c');
+        for cycle in 10_065..10_500 {
+            values.insert(cycle, '-');
+        }
+        assert_eq!((values.take(10_064), values.take(10_000)), (Some('b'), Some('c')));
     }
 
     #[test]

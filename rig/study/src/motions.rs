@@ -23,7 +23,7 @@ pub(super) struct Motion {
     pub trajectory: Trajectory,
     /// The strokes and velocities that it needs, or why the mechanism cannot follow.
     pub demands: Result<TrajectoryReport, String>,
-    /// Largest condition number of its poses.
+    /// Largest condition number of its poses every 10 ms.
     pub condition: f64,
     /// How each of [`COMPARED`] followed it, 1 ms a step.
     pub followed: [Followed; COMPARED.len()],

@@ -60,7 +60,7 @@ impl Frame {
         &self.bytes[..usize::from(self.length)]
     }
 
-    /// A frame of the first bytes of these.
+    /// A frame with the first `length` bytes as data.
     ///
     /// # Errors
     /// [`FrameError::DataLength`] with more than 8 bytes.
@@ -126,6 +126,19 @@ mod tests {
             FrameError::DataLength { length: 9 }.to_string(),
             "9 data bytes: a classical frame carries at most 8"
         );
+    }
+
+    #[test]
+    fn bytes_behind_the_length_are_no_data() {
+        for length in 0..=9 {
+            let frame = Frame::of_padded(id(), length, [0xA5; 8]);
+            let expected = if length <= 8 {
+                Frame::new(id(), &vec![0xA5; length])
+            } else {
+                Err(FrameError::DataLength { length })
+            };
+            assert_eq!(frame, expected);
+        }
     }
 
     #[test]

@@ -316,7 +316,7 @@ _check(Command, 144, [0, 8, 16, 24, 32, 40, 88, 136, 140])
 
 
 class State(ctypes.Structure):
-    """The controller's state and its estimate, once a cycle. All figures but times have 31 significant bits."""
+    """The controller's state and its estimate, once a cycle. All float64 fields but `motion_time_s` have 31 significant bits."""
 
     TOPIC = "state"
     _fields_ = [
@@ -366,7 +366,7 @@ class State(ctypes.Structure):
         ("leg_angle_rad", ctypes.c_double * 3),
         # Largest difference of a platform side from its length, m.
         ("residual_m", ctypes.c_double),
-        # Condition number of the actuators' Jacobian, angular columns scaled by the platform's side A₁A₂. The rig's own controllers compute one every ten cycles.
+        # Condition number of the actuators' Jacobian, angular columns scaled by the platform's side A₁A₂. The motion controller computes one every ten cycles and repeats it; 0 where none is computed.
         ("condition", ctypes.c_double),
         # Iterations of the forward kinematics.
         ("iterations", ctypes.c_uint32),
@@ -430,7 +430,7 @@ _check(Event, 88, [0, 8, 16, 24, 32, 40, 44, 48, 52, 56, 60, 62, 64, 68, 72, 80]
 
 
 class Truth(ctypes.Structure):
-    """The true state of the mechanism, once a cycle; the controller never reads it. All figures but times have 31 significant bits."""
+    """The true state of the mechanism, once a cycle; the controller never reads it. All float64 fields have 31 significant bits."""
 
     TOPIC = "truth"
     _fields_ = [
@@ -471,7 +471,7 @@ _check(Truth, 304, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240, 288, 296])
 
 
 class Contact(ctypes.Structure):
-    """The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads it. All figures but times have 31 significant bits."""
+    """The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads it. All float64 fields have 31 significant bits."""
 
     TOPIC = "contact"
     _fields_ = [

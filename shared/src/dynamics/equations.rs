@@ -24,7 +24,8 @@ impl Equations {
         Self::with_added(bodies, motion, &Vector6::zeros())
     }
 
-    /// The same where the change of each axis' speed acts against a further mass, kg, without weight and without bias.
+    /// The same with a further mass on each axis, kg, which may be negative. It resists the change of the axis' speed, and adds
+    /// neither weight nor bias.
     pub fn with_added(bodies: &Bodies, motion: &Motion, added_kg: &Vector6<f64>) -> Self {
         let mut sums = Sums::of_platform(bodies, motion);
         let (actuators, hinges) = (&motion.jacobian.actuators, &motion.jacobian.hinges);

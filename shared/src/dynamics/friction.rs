@@ -139,8 +139,9 @@ impl Friction {
     /// Damping of hinges and ball joints against the platform's twist V, N s/m to N m s/rad: their friction is the wrench −D V on
     /// the platform. The torque is μ r f, and fades towards zero at rest.
     ///
-    /// A ball turns with the platform in a socket that turns with the leg, at ω − θ̇ û. With θ̇ = hᵀV and u = (0, û), hinge and
-    /// ball of a leg add c_h h hᵀ + c_b (I_ω − u hᵀ − h uᵀ + h hᵀ) to D.
+    /// A ball turns with the platform in a socket that turns with the leg about the slide's direction û, so at ω − θ̇ û. With
+    /// θ̇ = hᵀV, u = (0, û), and the identity I_ω of the angular part, hinge and ball of a leg add
+    /// c_h h hᵀ + c_b (I_ω − u hᵀ − h uᵀ + h hᵀ) to D. c is the torque divided by the speed of the turn.
     pub fn joint_damping(&self, loads: &Loads, motion: &Motion) -> Matrix6<f64> {
         let FrictionConfig { joint_coefficient, hinge_radius_m, ball_radius_m, .. } = self.config;
         let mut damping = Matrix6::zeros();
@@ -157,7 +158,7 @@ impl Friction {
             half.fixed_rows_mut::<3>(3).axpy(-of_ball, &along_slide, 1.0);
             damping.ger(1.0, &hinge, &half, 1.0);
             damping.ger(1.0, &half, &hinge, 1.0);
-            (LEGS..2 * LEGS).for_each(|row| damping[(row, row)] += of_ball);
+            (3..6).for_each(|row| damping[(row, row)] += of_ball);
         }
         damping
     }
@@ -176,6 +177,9 @@ fn faded(square_rad2_s2: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{Matrix3, Matrix3x6};
+    use proptest::prelude::*;
+
     use super::*;
     use crate::geometry::{Mechanism, MechanismConfig, Pose, Twist, Vec3};
 
@@ -231,6 +235,41 @@ mod tests {
             .sum();
         let power_w = twist.dot(&(damping * twist));
         assert!((power_w / expected_w - 1.0).abs() < 1e-3, "{power_w} W, expected {expected_w} W");
+    }
+
+    /// How fast a ball turns in its socket, by the platform's twist.
+    fn ball_turns(motion: &Motion, leg: usize) -> Matrix3x6<f64> {
+        let along_slide = motion.jacobian.actuators.fixed_view::<1, 3>(leg, 0).transpose();
+        let mut turns = -along_slide * motion.jacobian.hinges.row(leg);
+        let mut of_platform = turns.fixed_view_mut::<3, 3>(0, 3);
+        of_platform += Matrix3::identity();
+        turns
+    }
+
+    proptest! {
+        #[test]
+        fn joint_damping_is_the_sum_over_all_turns(
+            place_m in [-0.02..0.02f64, -0.02..0.02f64, 0.25..0.29f64],
+            turn_rad in [-0.3..0.3f64, -0.3..0.3f64, -0.3..0.3f64],
+            twist in [-0.2..0.2f64, -0.2..0.2f64, -0.2..0.2f64, -3.0..3.0f64, -3.0..3.0f64, -3.0..3.0f64],
+            hinge_n in [0.0..300.0f64, 0.0..300.0f64, 0.0..300.0f64],
+            ball_n in [0.0..300.0f64, 0.0..300.0f64, 0.0..300.0f64],
+        ) {
+            let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
+            let pose = Pose::new(Vec3::from(place_m), Vec3::from(turn_rad));
+            let motion = Motion::new(&mechanism, &pose, &Twist::from(twist)).unwrap();
+            let mut expected = Matrix6::zeros();
+            for leg in 0..LEGS {
+                let hinge = motion.jacobian.hinges.row(leg);
+                let turns = ball_turns(&motion, leg);
+                let torques_nm = [0.1 * 0.005 * hinge_n[leg], 0.1 * 0.01 * ball_n[leg]];
+                expected += hinge.transpose() * hinge * (torques_nm[0] / faded(motion.swings_rad_s[leg].powi(2)));
+                expected += turns.transpose() * turns * (torques_nm[1] / faded((turns * motion.twist).norm_squared()));
+            }
+            let loads = Loads { hinge_n, ball_n, ..Loads::default() };
+            let found = friction(|_| ()).joint_damping(&loads, &motion);
+            prop_assert!((found - expected).amax() <= 1e-12 * (1.0 + expected.amax()), "{found} {expected}");
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Laws of mechanics that the equations keep for any bodies, poses and motions.
 
-use nalgebra::{Matrix3, Translation3, UnitQuaternion, Vector6};
+use nalgebra::{Matrix3, Matrix6, Translation3, UnitQuaternion, Vector6};
 use proptest::prelude::*;
 
 use super::*;
@@ -108,6 +108,19 @@ proptest! {
         let found_w = (energy_j(h) - energy_j(-h)) / (2.0 * h);
         let power_w = force_n.dot(&motion.rates_m_s) + wrench.dot(&twist);
         prop_assert!((found_w - power_w).abs() < 1e-5 * (1.0 + power_w.abs()), "{found_w} W, forces {power_w} W");
+    }
+
+    #[test]
+    fn an_added_mass_resists_its_axis_alone(
+        bodies in bodies(), pose in pose(), twist in twist(), added_kg in six(2.0),
+    ) {
+        let motion = Motion::new(&mechanism(), &pose, &twist).unwrap();
+        let (without, with) =
+            (Equations::new(&bodies, &motion), Equations::with_added(&bodies, &motion, &added_kg));
+        let rows = &motion.jacobian.actuators;
+        let expected = without.mass + rows.transpose() * Matrix6::from_diagonal(&added_kg) * rows;
+        prop_assert!((with.mass - expected).amax() < 1e-12);
+        prop_assert_eq!(with.bias, without.bias);
     }
 
     /// M and the energy of motion are the same thing.

@@ -97,7 +97,7 @@ messages! {
         master_fault: u32,
     }
 
-    /// The controller's state and its estimate, once a cycle. All figures but times have 31 significant bits.
+    /// The controller's state and its estimate, once a cycle. All float64 fields but `motion_time_s` have 31 significant bits.
     State on "state" keeping 2048 as "masseter/State/015bac90893f58ef" {
         /// Cycle of the controller, from 1.
         cycle: u64,
@@ -141,8 +141,8 @@ messages! {
         leg_angle_rad: [f64; LEGS],
         /// Largest difference of a platform side from its length, m.
         residual_m: f64,
-        /// Condition number of the actuators' Jacobian, angular columns scaled by the platform's side A₁A₂. The rig's own
-        /// controllers compute one every ten cycles.
+        /// Condition number of the actuators' Jacobian, angular columns scaled by the platform's side A₁A₂. The motion
+        /// controller computes one every ten cycles and repeats it; 0 where none is computed.
         condition: f64,
         /// Iterations of the forward kinematics.
         iterations: u32,
@@ -168,8 +168,8 @@ messages! {
         parameters: Values,
     }
 
-    /// The true state of the mechanism, once a cycle; the controller never reads it. All figures but times have 31 significant
-    /// bits.
+    /// The true state of the mechanism, once a cycle; the controller never reads it. All float64 fields have 31
+    /// significant bits.
     Truth on "truth" keeping 2048 as "masseter/Truth/4fc7cea39aa0c231" {
         /// Cycle of the plant, from 1.
         cycle: u64,
@@ -194,7 +194,7 @@ messages! {
     }
 
     /// The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads
-    /// it. All figures but times have 31 significant bits.
+    /// it. All float64 fields have 31 significant bits.
     Contact on "contact" keeping 2048 as "masseter/Contact/771c03b7d9b0a3de" {
         /// Cycle of the plant, from 1.
         cycle: u64,

@@ -116,7 +116,9 @@ mod tests {
     fn the_comments_of_a_definition_tell_units_meanings_and_codes_and_change_no_field() {
         let commented = State::definition();
         assert!(
-            commented.starts_with("# The controller's state and its estimate, once a cycle. All figures")
+            commented.starts_with(
+                "# The controller's state and its estimate, once a cycle. All float64 fields but "
+            )
         );
         for line in [
             "float64[3] leg_angle_rad  # [rad] θ₁ θ₂ θ₃, rad.\n",

@@ -142,7 +142,7 @@ impl DriveNode {
         self.axis.faults_mut()
     }
 
-    /// Takes a frame, but no SYNC, that arrived at `now_ns`. Frames for others and malformed frames have no effect; process data
+    /// Takes a frame other than SYNC that arrived at `now_ns`. Frames for others and malformed frames have no effect; process data
     /// of a wrong length are reported by EMCY.
     pub(crate) fn receive(&mut self, now_ns: u64, frame: &Frame) {
         if self.is_off {

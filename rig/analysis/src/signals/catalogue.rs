@@ -162,9 +162,12 @@ fn add_controller(list: &mut SignalList) {
     list.add("fk.residual", "um", "Largest difference of a platform side from its length.", |messages| {
         Some(solution(messages)?.residual_m)
     });
-    list.add("fk.condition", "", "Condition number of the Jacobian, every ten cycles.", |messages| {
-        Some(solution(messages)?.condition)
-    });
+    list.add(
+        "fk.condition",
+        "",
+        "Condition number of the Jacobian, computed every ten cycles and held in between.",
+        |messages| Some(solution(messages)?.condition),
+    );
     list.add("fk.iterations", "", "Iterations of the forward kinematics.", |messages| {
         Some(f64::from(solution(messages)?.iterations))
     });

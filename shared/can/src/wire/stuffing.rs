@@ -74,7 +74,19 @@ mod tests {
         assert_eq!(stuff_bits(0b11111, 5), 1);
         assert_eq!(stuff_bits(0b1111, 4), 0);
         assert_eq!(stuff_bits(0b1_1111_0000, 9), 2, "the stuff bit counts towards the next five");
+        assert_eq!(stuff_bits(0b1_1111_0000_1111, 13), 3, "three times in a row");
         assert_eq!(stuff_bits(0, 0), 0);
+    }
+
+    #[test]
+    fn all_short_sequences_are_stuffed_as_the_transmitter_does() {
+        for length in 0..=16 {
+            for sequence in 0..1_u128 << length {
+                let mut stuffer = Stuffer::default();
+                bits_of(sequence, length).for_each(|bit| stuffer.push(bit));
+                assert_eq!(stuff_bits(sequence, length), stuffer.with_last(), "{sequence:0b}");
+            }
+        }
     }
 
     proptest! {
