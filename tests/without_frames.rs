@@ -67,6 +67,7 @@ fn every_verb_that_shows_frames_says_that_there_are_none() {
     for (verb, words) in [
         (&["report"][..], "frames: not recorded (recording.frames = false)"),
         (&["recording", "verify"], "frame          not recorded"),
+        (&["recording", "info"], "frames   not recorded (recording.frames = false)"),
         (&["export"], "the recording leaves out the CAN frames"),
     ] {
         let (code, found) = said(verb, &[&run]);

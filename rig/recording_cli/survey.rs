@@ -163,6 +163,9 @@ impl Survey {
                 channel.message_encoding,
             )?;
         }
+        if !self.has_frames {
+            writeln!(text, "{:<8} not recorded (recording.frames = false)", "frames")?;
+        }
         for (name, bytes) in &self.attachments {
             writeln!(text, "attached: {name}, {}", counted(*bytes as u64, "byte"))?;
         }
