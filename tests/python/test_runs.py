@@ -48,9 +48,10 @@ def test_the_demand_is_what_the_state_message_reports() -> None:
     assert run.is_whole and len(demands) > 1000
     for demand in demands:
         state = states[demand.cycle]
-        assert demand.desired.position_m == tuple(state["desired_position_m"])
+        # Messages have nine decimal digits.
+        assert demand.desired.position_m == pytest.approx(state["desired_position_m"], rel=1e-9)
         assert demand.estimated is not None
-        assert demand.estimated.quaternion_wxyz == tuple(state["estimated_quaternion_wxyz"])
+        assert demand.estimated.quaternion_wxyz == pytest.approx(state["estimated_quaternion_wxyz"], rel=1e-9)
         # A change of state comes after the law's turn.
         if demand.controller_state == state["controller_state"]:
             assert demand.motion_time_s == state["motion_time_s"]
