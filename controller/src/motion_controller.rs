@@ -312,13 +312,12 @@ impl Controller for MotionController {
         state.motion_time_s = self.playback.motion_time_ahead_s(-self.sample_age_s());
         let Some(estimate) = &self.sequencer.estimate else { return };
         let cycle = self.sequencer.cycle;
-        let held = self.condition.filter(|(computed, _)| cycle < computed + CYCLES_OF_A_CONDITION);
-        let (_, condition) = *self.condition.insert(held.unwrap_or_else(|| {
+        if self.condition.is_none_or(|(computed, _)| cycle >= computed + CYCLES_OF_A_CONDITION) {
             let joints = Joints { actuators: estimate.measured, theta_rad: estimate.solution.theta_rad };
             let jacobian = Jacobian::new(&self.mechanism, &estimate.solution.pose, &joints);
-            (cycle, Conditioning::new(&jacobian).number())
-        }));
-        state.condition = condition;
+            self.condition = Some((cycle, Conditioning::new(&jacobian).number()));
+        }
+        state.condition = self.condition.map_or(0.0, |(_, number)| number);
     }
 
     fn request_stop(&mut self) {

@@ -139,9 +139,11 @@ impl Friction {
     /// Damping of hinges and ball joints against the platform's twist V, N s/m to N m s/rad: their friction is the wrench −D V on
     /// the platform. The torque is μ r f, and fades towards zero at rest.
     ///
-    /// A ball turns with the platform in a socket that turns with the leg about the slide's direction û, so at ω − θ̇ û. With
-    /// θ̇ = hᵀV, u = (0, û), and the identity I_ω of the angular part, hinge and ball of a leg add
-    /// c_h h hᵀ + c_b (I_ω − u hᵀ − h uᵀ + h hᵀ) to D. c is the torque divided by the speed of the turn.
+    /// Each leg adds c_h h hᵀ for its hinge and c_b (I_ω − u hᵀ − h uᵀ + h hᵀ) for its ball:
+    /// - c is the torque divided by the speed of the turn.
+    /// - The hinge turns at θ̇ = hᵀV about the slide's direction û, and u = (0, û).
+    /// - The ball turns at ω − θ̇ û, with the platform in a socket that turns with the leg.
+    /// - I_ω is the identity of the angular part.
     pub fn joint_damping(&self, loads: &Loads, motion: &Motion) -> Matrix6<f64> {
         let FrictionConfig { joint_coefficient, hinge_radius_m, ball_radius_m, .. } = self.config;
         let mut damping = Matrix6::zeros();

@@ -21,8 +21,8 @@ impl Conditioning {
         if !scaled.iter().all(|rate| rate.is_finite()) {
             return Self { scaled, smallest: 0.0, largest: f64::INFINITY };
         }
-        // Eigenvalues of JᵀJ cost half as much as the singular values of J and are as good as long as the
-        // condition number stays far below 10⁷, where a mechanism is of no use any more.
+        // Eigenvalues of JᵀJ cost half as much as the singular values of J. They are as good far below a condition number
+        // of 10⁷, and no mechanism is of use beyond.
         let squares = (scaled.transpose() * scaled).symmetric_eigenvalues();
         Self { scaled, smallest: squares.min().max(0.0).sqrt(), largest: squares.max().sqrt() }
     }
