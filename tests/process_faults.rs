@@ -18,6 +18,24 @@ fn in_lockstep(scenario: &str) -> (Workspace, Output, String) {
     (workspace, output, said)
 }
 
+/// A run in real time in which the machine took less than half of the cycles that a stall of 100 ms takes. Were those
+/// taken for the machine's, no run would be quiet.
+fn in_quiet_real_time(cores: &Cores, scenario: &str) -> (Workspace, String) {
+    let mut lost = Vec::new();
+    while lost.len() < 10 {
+        let workspace = Workspace::new(scenario);
+        let output = workspace.run(cores, &["--quiet"]);
+        let said = format!("{scenario}: {}{}", stdout(&output), stderr(&output));
+        assert!(common::PASSED_OR_INVALID.contains(&output.status.code()), "{said}");
+        let cycles = workspace.summary()["verdict"]["timing"]["lost"].as_u64().unwrap();
+        if cycles < 50 {
+            return (workspace, said);
+        }
+        lost.push(cycles);
+    }
+    panic!("cycles lost to the machine, each try: {lost:?}: {scenario}");
+}
+
 /// The fault's strike, s from the beginning of the motion.
 fn struck_s(workspace: &Workspace) -> f64 {
     let figures = &workspace.summary()["figures"];
@@ -87,10 +105,8 @@ fn stalls_of_the_loops_are_real_in_real_time_and_the_scenarios_own() {
              [[require]]\nname = 'ends'\nevent = 'fault.{kind}.ended'\nat_least = 1\nat_most = 1\n\
              "
         );
-        let workspace = Workspace::new(&(with_fault(kind, "size = '100 ms'\n") + LENIENT + &require));
-        let output = workspace.run(&cores, &["--quiet"]);
-        let said = format!("{kind}: {}{}", stdout(&output), stderr(&output));
-        assert!(common::PASSED_OR_INVALID.contains(&output.status.code()), "{said}");
+        let scenario = with_fault(kind, "size = '100 ms'\n") + LENIENT + &require;
+        let (workspace, said) = in_quiet_real_time(&cores, &scenario);
         let summary = workspace.summary();
         let skipped = summary["figures"][skips]["by_scenario"].as_u64().unwrap();
         assert!((80..200).contains(&skipped), "{skipped} skipped: {said}");
@@ -98,10 +114,7 @@ fn stalls_of_the_loops_are_real_in_real_time_and_the_scenarios_own() {
             assert_eq!(check(&summary, name)["result"], "passed", "{said}");
         }
         let timing = &summary["verdict"]["timing"];
-        assert!(
-            timing["stalled"].as_u64() == Some(skipped) && timing["lost"].as_u64().unwrap() < 50,
-            "{said}"
-        );
+        assert_eq!(timing["stalled"].as_u64(), Some(skipped), "{said}");
         let fault = &workspace.manifest()["process_faults"][0];
         let lasted_ns = fault["ended_ns"].as_u64().unwrap() - fault["struck_ns"].as_u64().unwrap();
         assert!((100_000_000..200_000_000).contains(&lasted_ns), "{lasted_ns} ns: {said}");

@@ -57,7 +57,7 @@ impl Process {
             })
             .with_context(|| format!("the {role} cannot be started"))?;
         let output = child.stdout.take().expect("standard output is piped");
-        Ok(Self { role, child, reports: Reports::of(output), status: None })
+        Ok(Self { role, child, reports: Reports::of(output.into()), status: None })
     }
 
     /// Its process id.
@@ -88,8 +88,7 @@ impl Process {
 
     /// Its report that another process was silent, if it has made one.
     pub(super) fn reported_silence(&mut self) -> Option<Silence> {
-        let has_ended = matches!(self.exit_status(), Ok(Some(_)));
-        self.reports.silence(has_ended)
+        self.reports.silence()
     }
 
     /// Its next report that a fault is due.

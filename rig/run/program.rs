@@ -170,7 +170,7 @@ impl Program {
             if (&stream).write_all(line(&answer).as_bytes()).is_ok() && is_admitted {
                 let process_id = socket_peercred(&stream)
                     .map_or(0, |peer| peer.pid.as_raw_nonzero().get().cast_unsigned());
-                let reports = Reports::of(stream.try_clone()?);
+                let reports = Reports::of(stream.try_clone()?.into());
                 self.admitted = Some(Admitted { stream, process_id, reports });
             }
         }
@@ -212,7 +212,7 @@ impl Program {
 
     /// Its report that another process was silent, if it has made one.
     pub(super) fn reported_silence(&mut self) -> Option<Silence> {
-        self.admitted.as_mut()?.reports.silence(false)
+        self.admitted.as_mut()?.reports.silence()
     }
 
     /// Its next report that a fault is due.

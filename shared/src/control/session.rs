@@ -247,11 +247,17 @@ impl Session {
     /// # Errors
     /// [`ProcessError`] when the supervisor is gone.
     pub fn fail(mut self, reason: &str) -> Result<(), ProcessError> {
-        self.end(End::Failed { reason: reason.to_owned() })
+        // The reason first: the plant may end as soon as the last turn has.
+        self.report_end(End::Failed { reason: reason.to_owned() })?;
+        self.end_turn(true)
     }
 
     fn end(&mut self, end: End) -> Result<(), ProcessError> {
         self.end_turn(true)?;
+        self.report_end(end)
+    }
+
+    fn report_end(&self, end: End) -> Result<(), ProcessError> {
         self.context.link.end(end).map_err(ProcessError::Supervisor)
     }
 
