@@ -25,6 +25,7 @@ mod jaw;
 mod kinds;
 mod limits;
 mod load_cell;
+mod malformed;
 mod merge;
 mod motion;
 mod need;

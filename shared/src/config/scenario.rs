@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 use toml::Table;
 
 use super::circle::refuse_circles;
-use super::document::{Document, place};
+use super::document::Document;
 use super::drive_profile::over_kinds;
 use super::error::ScenarioError;
 use super::food::over_food;
+use super::malformed::{UNKNOWN_KEY, in_words, malformed};
 use super::merge::merge;
 use super::need::{LONGEST_S, SHORTEST_MOTION_S, require_within};
 use super::robot_file;
@@ -22,19 +23,14 @@ use super::{
 };
 use crate::clock::SECOND_NS;
 use crate::geometry::{AXES, AXIS_NAMES, MechanismConfig};
-use crate::input::{excerpt, read_text};
-use crate::wording::nearest;
+use crate::input::read_text;
 
 /// Size of the largest scenario file, bytes.
 const MOST_BYTES: u64 = 1 << 20;
-/// What a message on an unknown key begins with.
-const UNKNOWN_KEY: &str = "unknown key";
 /// The lists whose entries have names.
 const LISTS: [&str; 3] = ["faults", "stimulus", "require"];
 /// Longest time after a safe stop, s.
 const LONGEST_OBSERVATION_S: f64 = 10.0;
-/// Characters of the longest message of the TOML reader.
-const LONGEST_REASON: usize = 2000;
 
 /// Rates at which the rig can be asked to run, Hz.
 pub(crate) const RATES_HZ: std::ops::RangeInclusive<u32> = 10..=20_000;
@@ -202,7 +198,7 @@ impl Scenario {
     /// [`ScenarioError::Malformed`] with line, column and key, and with the most similar key for an unknown one. An array
     /// in place of a table is refused.
     pub fn parse(path: &Path, text: &str) -> Result<Self, ScenarioError> {
-        let refused = |error| malformed(path, text, None, &error);
+        let refused = |error| malformed::<Self>(path, text, None, &error);
         let document = Document::parse(path, text).map_err(refused)?;
         let unnamed = |scenario: &Self| {
             let resolved = serde_json::to_value(scenario).expect("every part of a scenario has a JSON form");
@@ -220,7 +216,7 @@ impl Scenario {
                 expect: Some(ExpectConfig::default()),
                 ..Self::default()
             };
-            unnamed(&every_table).unwrap_or_else(|| malformed(path, text, Some(&document), &error))
+            unnamed(&every_table).unwrap_or_else(|| malformed::<Self>(path, text, Some(&document), &error))
         })?;
         if let Some(refused) = unnamed(&scenario) {
             return Err(refused);
@@ -494,53 +490,6 @@ fn place_of_refusal(path: &Path, refusal: &str, key: &str, entry: Option<usize>)
     let refused_alone = Scenario::parse(path, &text).ok()?.validate().err()?;
     let document = Document::parse(path, &text).ok()?;
     (refused_alone.to_string() == refusal).then(|| document.place_of(key, entry))
-}
-
-fn malformed(path: &Path, text: &str, document: Option<&Document>, error: &toml::de::Error) -> ScenarioError {
-    let offset = error.span().map_or(0, |span| span.start);
-    let mut place = place(path, text, offset);
-    let mut reason = in_words(error.message().lines().next().unwrap_or_default());
-    if let Some(twice) = error.span().filter(|_| reason == "duplicate key").and_then(|span| text.get(span)) {
-        reason = format!("{}: the key is there already", excerpt(twice));
-    }
-    let key = document.and_then(|document| {
-        let key = document.key_at(offset)?;
-        let culprit = document.culprit::<Scenario>(&key);
-        if let Some(culprit) = &culprit {
-            place = document.place_of(culprit, None);
-        }
-        Some(culprit.unwrap_or(key))
-    });
-    if let Some(key) = key.filter(|_| !reason.starts_with(UNKNOWN_KEY)) {
-        reason = format!("{}: {reason}", excerpt(&key));
-    }
-    ScenarioError::Malformed { place, reason }
-}
-
-/// A message of the TOML reader in the words of the documents, with the most similar of the keys or values that it
-/// expects.
-fn in_words(message: &str) -> String {
-    let message = cut(message);
-    let known = [("unknown field", UNKNOWN_KEY), ("unknown variant", "unknown value")];
-    let known = known.iter().find_map(|(of_reader, ours)| Some((*ours, message.strip_prefix(of_reader)?)));
-    let Some((ours, rest)) = known else { return quoted(&message) };
-    let mut names = rest.split('`').skip(1).step_by(2);
-    let likely = names.next().and_then(|unknown| nearest(unknown, names));
-    let question = likely.map_or_else(String::new, |likely| format!("; did you mean '{likely}'?"));
-    format!("{ours}{}{question}", quoted(rest))
-}
-
-fn quoted(message: &str) -> String {
-    message.replace('`', "'")
-}
-
-/// A message of the TOML reader with every quotation cut.
-fn cut(message: &str) -> String {
-    let quotations = message.split_inclusive(['`', '"']).map(|part| match part.chars().next_back() {
-        Some(mark @ ('`' | '"')) => excerpt(&part[..part.len() - 1]) + mark.encode_utf8(&mut [0; 4]),
-        _ => excerpt(part),
-    });
-    quotations.collect::<String>().chars().take(LONGEST_REASON).collect()
 }
 
 #[cfg(test)]
