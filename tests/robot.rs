@@ -216,7 +216,8 @@ fn damaged_old_values_are_refused_with_what_to_do() {
     assert_eq!(robot(&workspace, &["restore"]).status.code(), Some(0));
 }
 
-/// Another tool has changed nothing meanwhile: what the first configuration found is in the drives and in their memory in the end.
+/// Another tool has changed nothing meanwhile: what the first configuration found is in the drives and in their memory
+/// in the end.
 #[test]
 fn old_values_can_be_stored_after_they_were_restored_until_a_reset() {
     let workspace = Workspace::new(
@@ -334,7 +335,8 @@ fn a_drive_with_power_is_refused_and_stopped_with_take_over_alone() {
     }
 }
 
-/// A force offset of an earlier run, whose process data carried 60B2h, is in the drive. The default profile does not name the object.
+/// A force offset of an earlier run, whose process data carried 60B2h, is in the drive. The default profile does not
+/// name the object.
 #[test]
 fn an_old_torque_offset_does_not_act_in_a_later_run() {
     let workspace = Workspace::new(

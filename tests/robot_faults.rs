@@ -1,6 +1,6 @@
-//! Faults in the middle of every step from inspection to run: a cable is pulled, a supply fails for long or for a moment, another master
-//! resets a node or only sends SYNC. The step ends with an exit code above 0, names the drive, gives no drive power again, and is no evidence. What it
-//! owes to a drive returns with the next step.
+//! Faults in the middle of every step from inspection to run: a cable is pulled, a supply fails for long or for a
+//! moment, another master resets a node or only sends SYNC. The step ends with an exit code above 0, names the drive,
+//! gives no drive power again, and is no evidence. What it owes to a drive returns with the next step.
 
 use std::fs;
 use std::path::PathBuf;

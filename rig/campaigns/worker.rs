@@ -16,7 +16,8 @@ use crate::machine::interrupts::Interrupts;
 /// Time between two looks whether the start is interrupted.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
-/// Runs a case unless its result is there, or its start of the campaign is interrupted. Any result is success: the campaign judges.
+/// Runs a case unless its result is there, or its start of the campaign is interrupted. Any result is success: the
+/// campaign judges.
 pub(crate) fn run_case(args: &CampaignCaseArgs) -> Result<Exit, Failure> {
     die_with_the_parent().died()?;
     let (folder, campaign) = CampaignFolder::open(&args.folder).usage()?;

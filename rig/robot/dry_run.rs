@@ -70,8 +70,9 @@ impl Played<'_> {
         self.motion_s * self.scenario.dry.speed_now()
     }
 
-    /// Hash of what moves: motion and stimuli with their files, rate of the cycles, controller, lead, ease and parameters. The files
-    /// are those of the scenario, or their copies in a run's folder. The mechanism is part of the basis of all evidence.
+    /// Hash of what moves: motion and stimuli with their files, rate of the cycles, controller, lead, ease and
+    /// parameters. The files are those of the scenario, or their copies in a run's folder. The mechanism is part of the
+    /// basis of all evidence.
     fn hash(&self, copies: Option<&Path>) -> anyhow::Result<String> {
         let (mut scenario, mut hasher) = (self.scenario.clone(), crc32fast::Hasher::new());
         for (name, file) in scenario.files_mut() {

@@ -82,7 +82,8 @@ fn needs(profile: &DriveProfile, axis: usize) -> bool {
     !profile.homing.absolute && is_free
 }
 
-/// Leaves a mark in a drive that forgets its position without power: a velocity below the present one, which tells from another start.
+/// Leaves a mark in a drive that forgets its position without power: a velocity below the present one, which tells from
+/// another start.
 pub(super) fn leave(scenario: &Scenario, line: &mut Line, axis: usize) -> Result<Option<Mark>, MarkError> {
     if !needs(scenario.profile(axis), axis) {
         return Ok(None);

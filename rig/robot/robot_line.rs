@@ -49,7 +49,8 @@ impl RobotLine {
         &self.settings[axis]
     }
 
-    /// Listens until all drives may have booted. Returns their boot-ups until then: after a restart a survey is no more than a memory.
+    /// Listens until all drives may have booted. Returns their boot-ups until then: after a restart a survey is no more
+    /// than a memory.
     ///
     /// # Errors
     /// When the bus or the log fails.

@@ -75,7 +75,8 @@ impl Session {
         Ok(Self { scenario, line, stop, past, folder, boot_ups, serials })
     }
 
-    /// Refuses a drive that restarted since the step began, since it may have lost its position or what was written, and another master.
+    /// Refuses a drive that restarted since the step began, since it may have lost its position or what was written,
+    /// and another master.
     pub(super) fn check_undisturbed(&self) -> Result<(), Disturbance> {
         check_undisturbed(&self.line, &ALL, self.boot_ups)
     }

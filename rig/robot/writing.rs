@@ -72,7 +72,8 @@ pub(super) fn prove_off(
     }
 }
 
-/// Writes settings to drives without power, one after the other, up to the first that does not take them; then prints and keeps the result.
+/// Writes settings to drives without power, one after the other, up to the first that does not take them; then prints
+/// and keeps the result.
 pub(super) fn write_all(
     robot: &mut RobotLine,
     folder: StepFolder,

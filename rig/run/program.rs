@@ -1,7 +1,8 @@
 //! A program of the user as the controller: admitted over the domain's socket, and watched until it ends.
 //!
-//! An executable is started and, if it does not end in time, killed; the kernel kills it if the supervisor dies. A program that the user starts by hand, perhaps under a
-//! debugger, is waited for and never killed. The rig admits one program; it refuses any other with the reason.
+//! An executable is started and, if it does not end in time, killed; the kernel kills it if the supervisor dies. A
+//! program that the user starts by hand, perhaps under a debugger, is waited for and never killed. The rig admits one
+//! program; it refuses any other with the reason.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Write};

@@ -99,7 +99,8 @@ fn more_shared_memory() -> String {
     )
 }
 
-/// Room on the disk for the manifest and the summary at the end of a run. Its files have no names, so nothing of them outlives a kill.
+/// Room on the disk for the manifest and the summary at the end of a run. Its files have no names, so nothing of them
+/// outlives a kill.
 pub(super) struct Reserve {
     pub manifest: fs::File,
     pub summary: fs::File,

@@ -224,9 +224,10 @@ pub fn plans(scenario: &Scenario) -> Result<Vec<BusPlan>, ScheduleError> {
     plans_of(scenario, scenario.period_ns(), false)
 }
 
-/// The plans while all drives run, or while one of every bus `boots` and the others run: then request and answer of one SDO
-/// exchange take the place of its process data. The worst is the drive with the shortest RPDO1. With more drives booting there is still one request in a cycle,
-/// and each answer is no longer than the process data that its drive does not send.
+/// The plans while all drives run, or while one of every bus `boots` and the others run: then request and answer of one
+/// SDO exchange take the place of its process data. The worst is the drive with the shortest RPDO1. With more drives
+/// booting there is still one request in a cycle, and each answer is no longer than the process data that its drive
+/// does not send.
 ///
 /// The offsets of the schedule hold as well: an SDO frame blocks the bus for longer than a heartbeat, but for no longer than
 /// a heartbeat and the missing process data.

@@ -16,8 +16,9 @@ pub struct Solutions {
 }
 
 impl Solutions {
-    /// Solves completely; the module `elimination` has the reason why nothing is missed. No solution is a result, not an error: the
-    /// mechanism cannot be assembled. Two solutions that rounding does not separate are both there, without a certificate.
+    /// Solves completely; the module `elimination` has the reason why nothing is missed. No solution is a result, not
+    /// an error: the mechanism cannot be assembled. Two solutions that rounding does not separate are both there,
+    /// without a certificate.
     ///
     /// # Errors
     /// [`ForwardError::NotFinite`], [`ForwardError::NoLength`], and [`ForwardError::Undecided`] where

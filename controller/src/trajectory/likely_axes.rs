@@ -1,7 +1,7 @@
 //! Which axes of a file are likely to point anterior, left and up, from what a jaw does when it opens widest.
 //!
-//! Then the incisal point goes down, rather back than forward and hardly aside, the jaw turns about the axis that points left, and the condyles go forward. A
-//! recording without an opening shows nothing of that.
+//! Then the incisal point goes down, rather back than forward and hardly aside, the jaw turns about the axis that
+//! points left, and the condyles go forward. A recording without an opening shows nothing of that.
 
 use masseter_shared::geometry::{Pose, Vec3};
 

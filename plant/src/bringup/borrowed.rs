@@ -144,8 +144,8 @@ pub fn give_back(line: &mut Line, axis: usize, old: &[OldValue]) -> Result<Vec<O
     lost.into_iter().next().map_or(Ok(refused), |(_, error)| Err(error))
 }
 
-/// Writes the oldest value of each object, the last one first. Returns those that failed, in this order. A refused one is tried again after the others: the software
-/// limits of a drive that restarted must not cross either.
+/// Writes the oldest value of each object, the last one first. Returns those that failed, in this order. A refused one
+/// is tried again after the others: the software limits of a drive that restarted must not cross either.
 fn write_back(line: &mut Line, axis: usize, old: &[OldValue]) -> Vec<(OldValue, LineError)> {
     let mut write = |old: &OldValue| {
         let OldValue { object: ObjectKey(object), value, bytes } = *old;

@@ -1,6 +1,7 @@
 //! A line to all drives: SDO, NMT and the heartbeat, one question at a time.
 //!
-//! The line keeps one promise for every step of the bring-up: while it has switched on one drive, it refuses to switch on another.
+//! The line keeps one promise for every step of the bring-up: while it has switched on one drive, it refuses to switch
+//! on another.
 
 use std::fmt::{self, Debug, Formatter};
 use std::io::Write;

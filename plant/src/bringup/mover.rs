@@ -103,8 +103,8 @@ impl<'a> Mover<'a> {
         Ok(())
     }
 
-    /// Offsets of the cyclic modes (60B0h to 60B2h) are 0 from now on: a drive may keep the last one of its process data, and some
-    /// drives add it in every mode.
+    /// Offsets of the cyclic modes (60B0h to 60B2h) are 0 from now on: a drive may keep the last one of its process
+    /// data, and some drives add it in every mode.
     fn clear_offsets(&mut self) -> Result<(), LineError> {
         for (index, bytes) in OFFSETS {
             let object = ObjectAddress::new(index, 0);
@@ -350,8 +350,8 @@ impl<'a> Mover<'a> {
         self.give_back(done)
     }
 
-    /// Writes the old values back, and judges the motion. A restart or another master is the cause of whatever else was seen, such as a
-    /// position that jumps.
+    /// Writes the old values back, and judges the motion. A restart or another master is the cause of whatever else was
+    /// seen, such as a position that jumps.
     fn give_back<T>(&mut self, done: Result<T, MotionError>) -> Result<T, MotionError> {
         let restored = self.borrowed.restore(self.line);
         let done = self.watch.check_undisturbed(self.line).and(done);

@@ -19,8 +19,9 @@ const MOST_DROP_M: f64 = 5e-4;
 const STOP_NS: u64 = SECOND_NS;
 const REPEAT_NS: u64 = 200 * MILLISECOND_NS;
 
-/// Switches a drive on, up to "operation enabled". The brake is opening then: the axis may not move yet. A drive that restarted has
-/// lost its reduced limits: it gets no power. One that restarts later is no longer ready to switch on, and takes no further word.
+/// Switches a drive on, up to "operation enabled". The brake is opening then: the axis may not move yet. A drive that
+/// restarted has lost its reduced limits: it gets no power. One that restarts later is no longer ready to switch on,
+/// and takes no further word.
 pub(super) fn switch_on(line: &mut Line, axis: usize, watch: &Watch) -> Result<(), MotionError> {
     for (word, wanted) in [
         (Controlword::SHUTDOWN, DriveState::ReadyToSwitchOn),
@@ -58,8 +59,8 @@ pub(super) fn switch_off(
     if moved_m.abs() > MOST_DROP_M { Err(MotionError::Dropped { axis, moved_m }) } else { Ok(moved_m) }
 }
 
-/// Stops an axis in whatever it does: quick stop, then voltage off. Neither word can enable a drive, whatever its state. Commands that
-/// are lost are repeated.
+/// Stops an axis in whatever it does: quick stop, then voltage off. Neither word can enable a drive, whatever its
+/// state. Commands that are lost are repeated.
 ///
 /// # Errors
 /// [`MotionError::StaysOn`] unless the statusword proves that the drive is off.

@@ -102,8 +102,8 @@ pub(super) fn of_units(survey: &Survey, profile: &DriveProfile, increment_m: f64
         .collect()
 }
 
-/// The value of an object after `configure`: one that it writes counts, and not the one that it replaces. None where the drive has no
-/// such object, and where the profile says so.
+/// The value of an object after `configure`: one that it writes counts, and not the one that it replaces. None where
+/// the drive has no such object, and where the profile says so.
 fn told(survey: &Survey, profile: &DriveProfile, object: ObjectAddress) -> Option<u32> {
     let ObjectConfig { rule, value, .. } = profile.object(ObjectKey(object));
     let found = || survey.number(object);
@@ -114,9 +114,9 @@ fn told(survey: &Survey, profile: &DriveProfile, object: ObjectAddress) -> Optio
     }
 }
 
-/// Ratios by which the drive counts its way, as far as the drive has them: gear, feed and encoder. A wrong one scales every motion.
-/// Without a lead the profile declares no travel, so that a gear is only to be looked at. A feed decides the unit of 6064h; the encoder
-/// decides without one.
+/// Ratios by which the drive counts its way, as far as the drive has them: gear, feed and encoder. A wrong one scales
+/// every motion. Without a lead the profile declares no travel, so that a gear is only to be looked at. A feed decides
+/// the unit of 6064h; the encoder decides without one.
 pub(super) fn of_ratios(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Deviation> {
     let units = &profile.units;
     let part = |index, subindex| told(survey, profile, ObjectAddress::new(index, subindex)).map(f64::from);

@@ -23,7 +23,8 @@ pub(crate) const OFFSETS: [(u16, usize); 3] = [(0x60B0, 4), (0x60B1, 4), TORQUE_
 /// The only offset that process data of the rig may carry.
 pub(super) const TORQUE_OFFSET: (u16, usize) = (0x60B2, 2);
 
-/// Whether a drive that has an object may keep another value. An offset moves the axis or loads it: the drive may lack it, and no more.
+/// Whether a drive that has an object may keep another value. An offset moves the axis or loads it: the drive may lack
+/// it, and no more.
 pub(crate) fn may_keep(rule: ObjectRule, object: ObjectAddress) -> bool {
     rule == ObjectRule::Optional && OFFSETS.iter().all(|(index, _)| *index != object.index)
 }

@@ -54,8 +54,8 @@ pub(super) fn objects(scenario: &Scenario, axis: usize) -> Result<Vec<WantedObje
     Ok(wanted)
 }
 
-/// Offsets that the process data do not carry: 0, instead of the last value of other process data. The torque offset of an earlier run
-/// acts in every drive that has the object; the others are those that the profile names.
+/// Offsets that the process data do not carry: 0, instead of the last value of other process data. The torque offset of
+/// an earlier run acts in every drive that has the object; the others are those that the profile names.
 fn offsets(profile: &DriveProfile) -> impl Iterator<Item = WantedObject> + '_ {
     let mapping = profile.pdos.rpdo1();
     OFFSETS.into_iter().filter_map(move |(index, bytes)| {
@@ -103,9 +103,9 @@ fn in_this_run(
     Ok(ObjectConfig { rule: ObjectRule::Write, value, ..config })
 }
 
-/// Whether a drive may lack an object of which the profile says nothing. Many have no event timer for RPDOs; heartbeat and
-/// master supervise these drives too. A bring-up that was killed may have left another fault reaction (605Eh). Only a dry run needs
-/// the limit of force.
+/// Whether a drive may lack an object of which the profile says nothing. Many have no event timer for RPDOs; heartbeat
+/// and master supervise these drives too. A bring-up that was killed may have left another fault reaction (605Eh). Only
+/// a dry run needs the limit of force.
 fn may_lack(object: ObjectAddress, scenario: &Scenario) -> bool {
     match (object.index, object.subindex) {
         (0x1400, 5) | (0x605E, 0) => true,

@@ -1,6 +1,6 @@
-//! The mark of an interrupted start of a campaign, a file in its folder. An engine may hold cases that it has not begun yet, on other
-//! machines: whoever is about to run a case of that start, or runs one, stops at the mark. Another start has another mark, so
-//! that it goes on while cases of the interrupted one still wait in a queue.
+//! The mark of an interrupted start of a campaign, a file in its folder. An engine may hold cases that it has not begun
+//! yet, on other machines: whoever is about to run a case of that start, or runs one, stops at the mark. Another start
+//! has another mark, so that it goes on while cases of the interrupted one still wait in a queue.
 
 use std::fs::File;
 use std::io;

@@ -236,9 +236,9 @@ impl Scenario {
             Some(whole.try_into().expect("[dynamics] and [controller.model] have been read"));
     }
 
-    /// The scenario with one value changed: `KEY=VALUE`, with the key and the value as in a file; see [`Self::with_table`] for
-    /// lists. A value that is no TOML is text. A name that is no key of a scenario is that of a parameter of the controller. The value is not checked yet:
-    /// see [`Self::validate`].
+    /// The scenario with one value changed: `KEY=VALUE`, with the key and the value as in a file; see
+    /// [`Self::with_table`] for lists. A value that is no TOML is text. A name that is no key of a scenario is that of
+    /// a parameter of the controller. The value is not checked yet: see [`Self::validate`].
     ///
     /// ```
     /// use masseter_shared::config::Scenario;

@@ -32,8 +32,9 @@ impl Conditioning {
         if self.smallest > 0.0 { self.largest / self.smallest } else { f64::INFINITY }
     }
 
-    /// A condition number that another pose of the same mechanism does not exceed, without singular values of its own: each of them differs from
-    /// the one here by at most the norm of the matrices' difference (Weyl's inequality). Infinite for a pose too far away.
+    /// A condition number that another pose of the same mechanism does not exceed, without singular values of its own:
+    /// each of them differs from the one here by at most the norm of the matrices' difference (Weyl's inequality).
+    /// Infinite for a pose too far away.
     pub fn most(&self, other: &Jacobian) -> f64 {
         let change = (other.scaled() - self.scaled).norm();
         if self.smallest > change {

@@ -186,7 +186,8 @@ codes! {
         FollowingError = 46 "following_error",
         /// Platform turned too far from where it should be (rad).
         OrientationLost = 48 "orientation_lost",
-        /// The pose law failed (0), or gave a pose with a bad coordinate (m), or with a bad quaternion (its length; the limit is 1).
+        /// The pose law failed (0), or gave a pose with a bad coordinate (m), or with a bad quaternion (its length; the
+        /// limit is 1).
         LawFailed = 49 "law_failed",
         /// A parameter of the controller was set (new value; the limit is the value before). The object is its place.
         ParameterSet = 50 "parameter_set",

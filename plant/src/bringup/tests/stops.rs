@@ -144,7 +144,8 @@ fn an_axis_that_falls_without_power_fails_the_jog() {
     }
 }
 
-/// A supply that dips at any moment from the first reduced value to the last, also before the axis has power: the limits are lost.
+/// A supply that dips at any moment from the first reduced value to the last, also before the axis has power: the
+/// limits are lost.
 #[test]
 fn a_drive_that_restarts_ends_every_motion_with_the_axis_off() {
     type Motion = fn(&mut Bench) -> Result<(), MotionError>;

@@ -142,8 +142,8 @@ impl DriveNode {
         self.axis.faults_mut()
     }
 
-    /// Takes a frame other than SYNC that arrived at `now_ns`. Frames for others and malformed frames have no effect; process data
-    /// of a wrong length are reported by EMCY.
+    /// Takes a frame other than SYNC that arrived at `now_ns`. Frames for others and malformed frames have no effect;
+    /// process data of a wrong length are reported by EMCY.
     pub(crate) fn receive(&mut self, now_ns: u64, frame: &Frame) {
         if self.is_off {
             return;
@@ -166,8 +166,8 @@ impl DriveNode {
         }
     }
 
-    /// Takes a SYNC that arrived at `now_ns` with the encoder at `position_m`: buffered process data take effect, actual values are
-    /// sampled and sent.
+    /// Takes a SYNC that arrived at `now_ns` with the encoder at `position_m`: buffered process data take effect,
+    /// actual values are sampled and sent.
     pub(crate) fn take_sync(&mut self, now_ns: u64, frame: &Frame, position_m: f64) {
         if self.is_off || !self.nmt.is_served() {
             return;

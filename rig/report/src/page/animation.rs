@@ -30,13 +30,13 @@ struct Animation {
     closed: Vec<f64>,
     /// Numbers and places of the lower teeth in the platform frame.
     teeth: Vec<(u8, [f64; 3])>,
-    /// Forces on the teeth. A row begins with the time since the run's first SYNC, s. Four numbers follow for each tooth with a force:
-    /// the place in `teeth`, and the force along x, y and z of the base, N.
+    /// Forces on the teeth. A row begins with the time since the run's first SYNC, s. Four numbers follow for each
+    /// tooth with a force: the place in `teeth`, and the force along x, y and z of the base, N.
     forces: Vec<Vec<f64>>,
     /// What the actual pose is called.
     actual_name: &'static str,
-    /// Time since the run's first SYNC, s, then the actual and the desired pose of the platform and, where the actual pose is the true one, the
-    /// estimated one, each as x y z, w x y z.
+    /// Time since the run's first SYNC, s, then the actual and the desired pose of the platform and, where the actual
+    /// pose is the true one, the estimated one, each as x y z, w x y z.
     frames: Vec<Vec<f64>>,
 }
 

@@ -65,8 +65,8 @@ fn header(id: CanId, length: u32) -> u64 {
     arbitration << 7 | u64::from(length)
 }
 
-/// CRC of a content. The CRC starts from zero and is linear: the CRCs of the bytes at their places add up, and the zeros above the
-/// content add nothing.
+/// CRC of a content. The CRC starts from zero and is linear: the CRCs of the bytes at their places add up, and the
+/// zeros above the content add nothing.
 fn crc15(content: u128) -> u16 {
     let bytes = content.to_le_bytes();
     bytes.iter().zip(&CRC_OF_BYTE).fold(0, |crc, (byte, of_byte)| crc ^ of_byte[usize::from(*byte)])
