@@ -1,8 +1,8 @@
 //! The `masseter` command. [`cli`] dispatches to the modules of verbs.
 //!
 //! `run` starts controller, plant and `recorder` as processes of this executable (`run::supervisor`), or steps their
-//! cores in one thread under virtual time (`run::virtual_time`). Figures of a run are computed from its recording and
-//! manifest only (crate `masseter_analysis`), so `report` can compute them again. This crate holds no control, physics,
+//! cores in one thread under virtual time (`run::virtual_time`). Figures of a recorded run are computed from its
+//! recording and manifest only (crate `masseter_analysis`), so `report` can compute them again. This crate holds no control, physics,
 //! analysis or file formats.
 
 // `println!` panics on a closed terminal, which would end a run: see `masseter_terminal`.

@@ -1,5 +1,5 @@
 //! The architecture's rules on dependencies: crates keep their layers, the files of a crate have no circle of imports,
-//! and an inherent impl of a type stands in the file that defines the type.
+//! an inherent impl of a type stands in the file that defines the type, and every file belongs to a module.
 //!
 //! A file imports another file of its crate when a path in a `use` or in its code leads to an item of that file. A
 //! re-export of a file below (`mod child; pub use child::Item;`) is no import, and a path through a re-export leads to
@@ -14,6 +14,8 @@ mod impls;
 mod imports;
 #[path = "architecture/layers.rs"]
 mod layers;
+#[path = "architecture/orphans.rs"]
+mod orphans;
 #[path = "architecture/workspace.rs"]
 mod workspace;
 
@@ -23,6 +25,7 @@ use std::path::Path;
 use circles::circles;
 use impls::split_types;
 use layers::layer_violations;
+use orphans::orphans;
 
 #[test]
 fn crates_keep_their_layers() {
@@ -42,6 +45,13 @@ fn every_type_has_its_methods_in_its_own_file() {
     assert!(split.is_empty(), "\n{}", split.join("\n"));
 }
 
+#[test]
+fn every_file_belongs_to_a_module() {
+    for crates in ["controller", "plant", "rig", "shared"] {
+        assert_eq!(orphans(&project().join(crates)), Vec::<std::path::PathBuf>::new());
+    }
+}
+
 fn project() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
@@ -57,6 +67,20 @@ fn planted(files: &[(&str, &str)]) -> tempfile::TempDir {
         fs::write(path, text).unwrap();
     }
     workspace
+}
+
+#[test]
+fn a_file_without_a_module_is_found() {
+    let files = [
+        ("Cargo.toml", ""),
+        ("lib.rs", "mod known;"),
+        ("known.rs", "pub(crate) mod part;"),
+        ("known/part.rs", ""),
+        ("known/lost.rs", ""),
+        ("tests/whole.rs", ""),
+    ];
+    let workspace = planted(&files);
+    assert_eq!(orphans(workspace.path()), [workspace.path().join("known/lost.rs")]);
 }
 
 fn planted_circles(files: &[(&str, &str)]) -> Vec<String> {

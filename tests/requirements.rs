@@ -180,7 +180,7 @@ fn a_wrong_requirement_is_refused_before_anything_starts() {
         ("never = 'fault.deaf'", "'fault.deaf' is no occurrence"),
         (
             "expression = '{l1.force} * {l1.velocity}'\nunit = 'N'\nmax = '1 N'",
-            "unit = 'N': the expression '{l1.force} * {l1.velocity}' has the unit W",
+            "expression = '{l1.force} * {l1.velocity}': its unit is W, not 'N'",
         ),
     ] {
         let workspace = Workspace::new(&format!("[[require]]\nname = 'it'\n{requirement}"));

@@ -7,9 +7,9 @@
 //! is the external wrench behind a low-pass of the time constant T. No acceleration is needed. Between two samples the twist is
 //! the difference of the poses, and the force of a drive is the mean of that time.
 //!
-//! The bite force is the vertical component. Its uncertainty is a bound: the friction of moving axes is known but for a share,
-//! that of an axis near rest only by its largest size; the drives round their forces, of which twice the standard deviation
-//! counts.
+//! The bite force is the vertical component. Its uncertainty is a bound. The friction of a moving axis is known except for a
+//! share, that of an axis near rest only by its largest size. The drives round their forces: twice the standard deviation of
+//! this rounding counts.
 
 use masseter_shared::config::{ForceEstimateConfig, Scenario};
 use masseter_shared::dynamics::{Equations, Motion};

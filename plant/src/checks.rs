@@ -1,4 +1,4 @@
-//! Checks of quantities against each other. The scenario checks each quantity alone.
+//! Checks of quantities that drives and bus need to fit each other.
 
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::Scenario;

@@ -5,7 +5,7 @@ use masseter_shared::config::Scenario;
 use masseter_shared::lifecycle::{Party, ProcessArguments, ProcessContext, ProcessError, StopRequest};
 use masseter_shared::lockstep::{Clock, Lockstep};
 use masseter_shared::messages::{Command, Contact, Event, FrameTap, Reading, Truth};
-use masseter_shared::realtime::{Cycle, Wake};
+use masseter_shared::realtime::Wake;
 use masseter_shared::schedule::CycleSchedule;
 use masseter_shared::transport::{
     BatchPublisher, Node, Publisher, ReceivedMessage, Subscriber, TransportError,
@@ -227,20 +227,12 @@ fn serve<L: Link>(
     build(scenario, 0)?;
     let ports = Ports::open(&context.node)?;
     ports.warm_up()?;
-    let lockstep =
-        context.lockstep.map(|patience| Lockstep::open(context, patience, Party::Plant, Party::Controller));
-    let lockstep = lockstep.transpose().map_err(ProcessError::from)?;
+    let lockstep = Lockstep::open(context, Party::Plant, Party::Controller).map_err(ProcessError::from)?;
     let start = context.ready(Some(scenario.realtime.cores[1]))?;
     ports.connect()?;
 
     let mut plant = build(scenario, start.epoch_ns)?;
-    let clock = match lockstep {
-        None => Clock::RealTime(Cycle::new(start.epoch_ns, scenario.period_ns())),
-        Some(mut lockstep) => {
-            lockstep.start(start.epoch_ns);
-            Clock::Lockstep(Box::new(lockstep))
-        }
-    };
+    let clock = Clock::start(lockstep, start.epoch_ns, scenario.period_ns());
     let mut binding = Binding { ports, clock, schedule, takes_commands: true, samples: 0 };
     let most_silent_cycles = most_silent_cycles(context);
     while binding.goes_on(&context.stop) && u64::from(plant.silent_cycles()) <= most_silent_cycles {

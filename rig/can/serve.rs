@@ -2,8 +2,8 @@
 //!
 //! Every client is a node on the bus that it opens: its frames take part in arbitration and reach the drives and the
 //! other clients. No master runs here; a client can be one. A client that reads too slowly first loses frames, then the
-//! connection, and delays no other. On a full bus a new client takes the place of the one that has asked for nothing for
-//! longest: idle clients lock nobody out, and who only listens is disconnected for want of room alone.
+//! connection, and delays no other. On a full bus a new client takes the place of the client whose last request is
+//! the oldest. So idle clients lock nobody out. A client that only listens keeps its place until a new client needs it.
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};

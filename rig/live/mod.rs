@@ -1,7 +1,7 @@
 //! Shows a run while it goes on: as a page in a browser, and in Foxglove with the channels, schemas and bytes of the recording.
 //!
 //! Each client has a thread and a queue of fixed length of its own. The recorder puts messages into the queues and never
-//! waits for a client; no other process is involved. A message without room is dropped and counted. The server of the
+//! waits for a client. A message without room is dropped and counted. The server of the
 //! `foxglove` crate counts no drops and brings an asynchronous runtime, so it is not used. Parameters are read and set at the
 //! controller, by the client's thread. Who connects must name the secret of the URL.
 

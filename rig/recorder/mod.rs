@@ -1,8 +1,8 @@
 //! The recorder process: writes every message of a run into the recording, and shows the run's progress.
 //!
 //! It runs at ordinary priority and off the loops' cores. Where only two cores are left it shares the controller's,
-//! because the plant has less time to spare. It computes no figure of the run and judges nothing: analysis does, from
-//! the recording.
+//! because the plant has less time to spare. It judges nothing, and computes figures for the live page
+//! only: those of the run come from the recording.
 
 mod lockstep;
 mod machine_topic;
@@ -47,7 +47,7 @@ pub(crate) struct RecorderArgs {
     /// Duration of the motion, s
     #[arg(long)]
     motion_s: f64,
-    /// Address of the Foxglove server
+    /// Address of the live page and the Foxglove server
     #[arg(long)]
     live: Option<SocketAddr>,
     #[arg(long)]

@@ -1,4 +1,4 @@
-//! The sinks of every received message: the recording, Foxglove clients, and the progress on standard error.
+//! The sinks of every received message: the recording, the clients of the live page and Foxglove, and the progress on standard error.
 
 use masseter_recording::{Backlog, Recorded};
 use masseter_shared::messages::codes::Cause;

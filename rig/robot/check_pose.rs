@@ -3,7 +3,7 @@
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use masseter_controller::kinematics::Solutions;
-use masseter_controller::trajectory::{closed_pose, jaw_points};
+use masseter_controller::trajectory::{closed_jaw_points, closed_pose};
 use masseter_plant::bringup::{MotionError, Stand, stand};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::Scenario;
@@ -81,31 +81,34 @@ pub(crate) fn check_pose(args: &CheckPoseArgs) -> Result<Exit, Failure> {
         }
         Err(error) => return Err(session.fail(error)),
     };
-    let found = session
-        .check_present()
-        .map_err(anyhow::Error::new)
-        .and(marks)
-        .and_then(|marks| Ok((marks, at_rest(&stand)?)))
-        .and_then(|(marks, ())| Ok((marks, within_strokes(&session.scenario, &stand.positions_m)?)))
-        .and_then(|(marks, ())| Ok((marks, Found::new(&session.scenario, stand.positions_m)?)));
-    let judged = found.and_then(|(marks, found)| {
-        found.print(&stand)?;
-        let mut data = found.data(&stand);
-        data["marks"] = json!(marks);
-        Ok((found.judge(args, &session.scenario), data))
-    });
-    match judged {
-        Ok((Ok(()), data)) => session.finish(true, &data).map(|()| Exit::Passed),
-        Ok((Err(error), data)) => {
-            session.finish(false, &data)?;
-            Err(Failure::with(Exit::Failed, error))
+    let (judged, data) = match find(&mut session, marks, &stand) {
+        Ok((marks, found)) => {
+            let mut data = found.data(&stand);
+            data["marks"] = json!(marks);
+            (found.judge(args, &session.scenario), data)
         }
         Err(error) => {
-            session
-                .finish(false, &json!({ "error": error.to_string(), "positions_m": stand.positions_m }))?;
-            Err(Failure::with(Exit::Failed, error))
+            let data = json!({ "error": error.to_string(), "positions_m": stand.positions_m });
+            (Err(error), data)
         }
-    }
+    };
+    session.finish(judged.is_ok(), &data)?;
+    judged.map(|()| Exit::Passed).map_err(|error| Failure::with(Exit::Failed, error))
+}
+
+/// The pose of the robot where it stands, printed; an error where the positions are none of a robot at rest.
+fn find(
+    session: &mut Session,
+    marks: anyhow::Result<Marks>,
+    stand: &Stand,
+) -> anyhow::Result<(Marks, Found)> {
+    session.check_present()?;
+    let marks = marks?;
+    at_rest(stand)?;
+    within_strokes(&session.scenario, &stand.positions_m)?;
+    let found = Found::new(&session.scenario, stand.positions_m)?;
+    found.print(stand)?;
+    Ok((marks, found))
 }
 
 /// The marks that home left. A drive without its mark may have lost its position.
@@ -171,7 +174,7 @@ impl Found {
     fn new(scenario: &Scenario, positions_m: [f64; AXES]) -> anyhow::Result<Self> {
         let mechanism = Mechanism::new(&scenario.mechanism)?;
         let closed = closed_pose(&scenario.jaw, &mechanism)?;
-        let points = jaw_points(&scenario.jaw, &closed)?;
+        let points = closed_jaw_points(&scenario.jaw, &closed)?;
         let closed_m = mechanism.inverse(&closed)?.actuators.to_axes();
         let (pose, joints) = pose_of(&mechanism, &Actuators::from_axes(positions_m))
             .with_context(|| format!("positions {}", in_mm(&positions_m)))?;

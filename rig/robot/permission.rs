@@ -30,8 +30,8 @@ pub(crate) fn check_bring_up(played: &Played<'_>, is_waived: bool) -> anyhow::Re
         );
         return Ok(());
     }
-    let refused = "a run needs a passed pose check of this robot, and at full speed a passed dry run; --without-bring-up goes on without, and then a wrong \
-                   sign, scale or zero can drive an axis into its end";
+    let refused = "a run needs a passed pose check of this robot, and at full speed also a passed dry run; \
+                   --without-bring-up skips both: a wrong sign, scale or zero can then drive an axis into its end";
     let folder = Path::new(FOLDER);
     if let Some(&axis) = ledger::owed_axes(folder).first() {
         bail!(ledger::advice(folder, axis));

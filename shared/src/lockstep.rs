@@ -1,7 +1,7 @@
 //! Simulated time in three processes: plant and controller take turns, and the plant never runs far ahead of the recorder.
 //!
 //! A turn ends with a signal to the other loop, after all messages of the turn. A process that waits sleeps. Whoever
-//! stops answering for longer than the [`Patience`] is given up: the process that waits reports that to the supervisor and
+//! stops answering for longer than the [`Patience`], the plant for longer than twice that, is given up: the process that waits reports that to the supervisor and
 //! goes on alone, in real time, so that its watchdogs end the run.
 
 use std::mem;
@@ -43,6 +43,13 @@ pub enum Clock {
 }
 
 impl Clock {
+    /// The clock of a loop whose first cycle is due at this time, ns.
+    pub fn start(lockstep: Option<Lockstep>, first_due_ns: u64, period_ns: u64) -> Self {
+        let Some(mut lockstep) = lockstep else { return Self::RealTime(Cycle::new(first_due_ns, period_ns)) };
+        lockstep.start(first_due_ns);
+        Self::Lockstep(Box::new(lockstep))
+    }
+
     /// Now, ns.
     pub fn now_ns(&self) -> u64 {
         match self {
@@ -103,15 +110,11 @@ impl Lockstep {
     ///
     /// # Errors
     /// Those of the signals.
-    pub fn open(
-        context: &ProcessContext,
-        patience: Patience,
-        own: Party,
-        other: Party,
-    ) -> Result<Self, DomainError> {
+    pub fn open(context: &ProcessContext, own: Party, other: Party) -> Result<Option<Self>, DomainError> {
+        let Some(patience) = context.lockstep else { return Ok(None) };
         let node = &context.node;
         let period_ns = context.scenario.period_ns();
-        Ok(Self {
+        Ok(Some(Self {
             signals: SignalReceiver::open(node, own.name(), SLICE)?,
             arrived: 0,
             other: (other, SignalSender::open(node, other.name())?),
@@ -129,7 +132,7 @@ impl Lockstep {
             silence: SilenceCount::default(),
             unrecorded: 0,
             is_recording: false,
-        })
+        }))
     }
 
     /// Begins the first cycle at this time, ns.

@@ -65,7 +65,7 @@ pub fn closed_pose(jaw: &JawConfig, mechanism: &Mechanism) -> Result<Pose, Traje
 ///
 /// # Errors
 /// When a dimension of the mandible lies outside its range.
-pub fn jaw_points(jaw: &JawConfig, closed: &Pose) -> Result<[Vec3; 3], TrajectoryError> {
+pub fn closed_jaw_points(jaw: &JawConfig, closed: &Pose) -> Result<[Vec3; 3], TrajectoryError> {
     let middle = condylar_middle(jaw)?;
     let aside = Vec3::new(0.0, jaw.bonwill_side_m / 2.0, 0.0);
     let jaw_in_platform =

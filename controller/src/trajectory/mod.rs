@@ -35,7 +35,7 @@ use masseter_shared::geometry::{Mechanism, Pose};
 pub use check::{TrajectoryReport, check};
 pub use error::TrajectoryError;
 pub use glitches::Glitch;
-pub use jaw_frame::{closed_pose, jaw_points};
+pub use jaw_frame::{closed_jaw_points, closed_pose};
 pub use survey::{Gap, PointFigures, Range, RecordingSurvey, StepFigures, SurveyRow, survey};
 
 pub(crate) use interpolation::interpolate;

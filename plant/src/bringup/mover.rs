@@ -243,10 +243,14 @@ impl<'a> Mover<'a> {
         operator: &mut Operator<'_>,
     ) -> Result<Vec<Sample>, MotionError> {
         let scale = self.scale();
-        let (start_m, target_m) = (self.position_m()?, scale.metres(target));
-        let backwards_m = (NOISES * self.noise_m).max(INCREMENTS * scale.increment_m.abs());
         let Caution { speed_m_s, acceleration_m_s2, still_m, .. } = self.caution;
-        let limit_s = 1.5 * ((target_m - start_m).abs() / speed_m_s + speed_m_s / acceleration_m_s2) + 1.0;
+        let way = Way {
+            start_m: self.position_m()?,
+            target_m: scale.metres(target),
+            backwards_m: (NOISES * self.noise_m).max(INCREMENTS * scale.increment_m.abs()),
+            beyond_m: 2.0 * still_m + self.watch.bounds().window_m,
+        };
+        let limit_s = 1.5 * (way.length_m() / speed_m_s + speed_m_s / acceleration_m_s2) + 1.0;
         let word = Controlword::ENABLE_OPERATION;
         self.line.write(self.axis, ObjectAddress::new(0x607A, 0), target as u32, 4)?;
         self.line.control(self.axis, word)?;
@@ -257,13 +261,8 @@ impl<'a> Mover<'a> {
         loop {
             let sample = self.look()?;
             seen.push(sample);
-            let moved_m = (start_m - sample.position_m) * (target_m - start_m).signum();
-            if moved_m > backwards_m {
-                return self.stopped(StopCause::WrongDirection { moved_m });
-            }
-            let beyond_m = (sample.position_m - target_m) * (target_m - start_m).signum();
-            if beyond_m > 2.0 * still_m + self.watch.bounds().window_m {
-                return self.stopped(StopCause::Overrun { beyond_m });
+            if let Some(cause) = way.left_at(sample.position_m) {
+                return self.stopped(cause);
             }
             match (operator(sample.at_ns), halted_ns) {
                 (Wish::Stop, _) => return self.stopped(StopCause::Requested),
@@ -282,7 +281,7 @@ impl<'a> Mover<'a> {
                 is_taken = true;
                 self.line.control(self.axis, if halted_ns.is_some() { word.with_halt() } else { word })?;
             }
-            let is_there = (sample.position_m - target_m).abs() <= still_m;
+            let is_there = (sample.position_m - way.target_m).abs() <= still_m;
             if is_taken && is_there && sample.status.has(StatusBit::TargetReached) {
                 return Ok(seen);
             }
@@ -358,5 +357,33 @@ impl<'a> Mover<'a> {
         let Err(source) = restored else { return done };
         let cause = done.err().map(|error| error.to_string());
         Err(MotionError::NotRestored { axis: self.axis, cause, source })
+    }
+}
+
+/// The way of a motion from rest to rest, with what may be seen beside it.
+#[expect(clippy::struct_field_names, reason = "the unit ends every name")]
+struct Way {
+    start_m: f64,
+    target_m: f64,
+    /// As far as it may seem to go backwards.
+    backwards_m: f64,
+    /// As far as it may go beyond the target.
+    beyond_m: f64,
+}
+
+impl Way {
+    fn length_m(&self) -> f64 {
+        (self.target_m - self.start_m).abs()
+    }
+
+    /// Why an axis at this position must stop, if it must.
+    fn left_at(&self, position_m: f64) -> Option<StopCause> {
+        let direction = (self.target_m - self.start_m).signum();
+        let moved_m = (self.start_m - position_m) * direction;
+        if moved_m > self.backwards_m {
+            return Some(StopCause::WrongDirection { moved_m });
+        }
+        let beyond_m = (position_m - self.target_m) * direction;
+        (beyond_m > self.beyond_m).then_some(StopCause::Overrun { beyond_m })
     }
 }

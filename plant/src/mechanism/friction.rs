@@ -1,8 +1,8 @@
 //! Friction of the moving mechanism: what brakes the axes, hinges and ball joints in a step.
 //!
-//! The law of friction is [shared](masseter_shared::dynamics::Friction). Here are its state, which are the bristles of
-//! axes at rest, and its integration: each force acts as if the speed stayed, with its change as a damping (see
-//! [`Element`]), so that no friction makes a motion grow. The loads are those of the steps before.
+//! The law of friction is [shared](masseter_shared::dynamics::Friction). This module has the state of friction, which is
+//! the bristles of axes at rest, and its integration. Each force acts as if the speed stayed, and the change of the force with
+//! the speed acts as a damping (see [`Element`]). So no friction makes a motion grow. The loads are those of the steps before.
 
 use masseter_shared::config::{DynamicsConfig, FrictionConfig, FrictionModel};
 use masseter_shared::dynamics::{Bodies, Friction, Loads, Motion};

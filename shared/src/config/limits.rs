@@ -9,9 +9,9 @@ section! {
     /// What the axes may be asked for by a trajectory, where their drives do not allow less. Strokes are the mechanism's
     /// own.
     ///
-    /// Velocities stay a quarter below the drives' own limits. Fast human chewing (0.46 s a cycle)
-    /// takes 3.5 m/s² of a leg, and a jaw tracker's own jumps, low-passed at 12 Hz, up to 5.8 m/s² of
-    /// a slide: 8 m/s² lets both pass and stops what is no jaw motion.
+    /// Velocities stay a quarter below the drives' own limits. Fast human chewing (0.46 s a cycle) takes 3.5 m/s² of a
+    /// leg. A jaw tracker's own jumps, low-passed at 12 Hz, take up to 5.8 m/s² of a slide. The limit of 8 m/s² admits
+    /// both, and refuses what is no jaw motion.
     #[derive(Copy)]
     pub struct TrajectoryLimitsConfig {
         /// Speed of a slide, m/s.

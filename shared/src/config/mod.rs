@@ -1,7 +1,7 @@
 //! Scenario files: the configuration of a run, resolved and validated before the run starts.
 //!
-//! A scenario is TOML. Every key has a default, so an empty file is the default run. This module checks values on their own;
-//! checks against other parts, such as a trajectory against the strokes, are made where these parts are built.
+//! A scenario is TOML. Every key has a default, so an empty file is the default run. This module checks values
+//! within the scenario; checks against other parts, such as a trajectory against the strokes, are made where these parts are built.
 
 #[macro_use]
 mod section;

@@ -1,4 +1,4 @@
-//! Requirements of a run, and the outcome that is expected: `[[require]]` and `[expect]`.
+//! Requirements of a run: `[[require]]`.
 //!
 //! This module holds what is written. Signals, conditions and their units are resolved and judged by the crate
 //! `masseter-analysis`.

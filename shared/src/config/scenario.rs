@@ -305,11 +305,29 @@ impl Scenario {
         toml::to_string_pretty(self).expect("every part of a scenario has a TOML form")
     }
 
-    /// Checks every value on its own.
+    /// Checks every value, and those that need each other.
     ///
     /// # Errors
     /// [`ScenarioError::BadValue`] with key, value and valid values.
     pub fn validate(&self) -> Result<(), ScenarioError> {
+        self.validate_run()?;
+        self.realtime.validate()?;
+        self.can.validate()?;
+        self.drives.validate()?;
+        DriveProfile::validate_all(&self.drive_profile)?;
+        self.dynamics.validate()?;
+        self.teeth.as_ref().map_or(Ok(()), TeethConfig::validate)?;
+        self.validate_entries()?;
+        self.food.as_ref().map_or(Ok(()), |food| food.validate(&self.arch()))?;
+        self.limits.validate()?;
+        self.dry.validate()?;
+        self.controller.validate(self.rate_hz)?;
+        self.check_torque_offsets()?;
+        self.validate_forces()?;
+        self.checks.validate()
+    }
+
+    fn validate_run(&self) -> Result<(), ScenarioError> {
         let named = self.name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_');
         if !named || !(1..=64).contains(&self.name.len()) {
             let need = "use 1 to 64 letters, digits, '-' or '_'";
@@ -319,17 +337,13 @@ impl Scenario {
             let need = format!("use {} to {} Hz", RATES_HZ.start(), RATES_HZ.end());
             return Err(ScenarioError::bad("rate_hz", &self.rate_hz, need));
         }
-        if let Some(duration_s) = self.duration_s {
-            require_within(&[("duration_s", duration_s, SHORTEST_MOTION_S, LONGEST_S)])?;
-        }
-        self.realtime.validate()?;
-        self.can.validate()?;
-        self.drives.validate()?;
-        DriveProfile::validate_all(&self.drive_profile)?;
-        self.dynamics.validate()?;
-        self.teeth.as_ref().map_or(Ok(()), TeethConfig::validate)?;
-        let arch = self.arch();
-        let entries = self.entry_names();
+        let duration_s = self.duration_s.unwrap_or(LONGEST_S);
+        require_within(&[("duration_s", duration_s, SHORTEST_MOTION_S, LONGEST_S)])
+    }
+
+    /// Faults, stimuli and requirements, and the order that `after` gives them.
+    fn validate_entries(&self) -> Result<(), ScenarioError> {
+        let (arch, entries) = (self.arch(), self.entry_names());
         for (number, fault) in self.faults.iter().enumerate() {
             fault.validate(&self.can, &entries).map_err(|error| error.of_entry(number))?;
         }
@@ -343,16 +357,11 @@ impl Scenario {
         for (number, requirement) in self.require.iter().enumerate() {
             requirement.validate().map_err(|error| error.of_entry(number))?;
         }
-        if let Some(expect) = &self.expect {
-            expect.validate()?;
-        }
-        if let Some(food) = &self.food {
-            food.validate(&arch)?;
-        }
-        self.limits.validate()?;
-        self.dry.validate()?;
-        self.controller.validate(self.rate_hz)?;
-        self.check_torque_offsets()?;
+        self.expect.as_ref().map_or(Ok(()), ExpectConfig::validate)
+    }
+
+    /// Load cell, estimate and control of the bite force.
+    fn validate_forces(&self) -> Result<(), ScenarioError> {
         let estimate = self.force_estimate.unwrap_or_default();
         estimate.validate()?;
         if let Some(cell) = &self.load_cell {
@@ -371,7 +380,7 @@ impl Scenario {
         if self.is_force_estimated() {
             self.model().friction.require_open_screws()?;
         }
-        self.checks.validate()
+        Ok(())
     }
 
     /// Control by a load cell needs one, and only the emulated jaw has one. Returns the cell; none for control by the

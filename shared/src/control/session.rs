@@ -10,7 +10,7 @@ use crate::lifecycle::{End, Party, ProcessContext, ProcessError, Report, Supervi
 use crate::lockstep::{Clock, Lockstep};
 use crate::messages::{Command, Event, Parameters, Reading, Signals, State};
 use crate::named::{Declared, NamedValues, access};
-use crate::realtime::{Cycle, Wake};
+use crate::realtime::Wake;
 use crate::transport::{Publisher, ReceivedMessage, Subscriber, TransportError};
 
 /// A started run, from the side of its controller.
@@ -303,10 +303,7 @@ impl Ports {
         signals.as_ref().map_or(Ok(()), Publisher::warm_up)?;
         parameters.as_ref().map_or(Ok(()), Publisher::warm_up)?;
         events.warm_up()?;
-        let lockstep = context
-            .lockstep
-            .map(|patience| Lockstep::open(context, patience, Party::Controller, Party::Plant));
-        let lockstep = lockstep.transpose()?;
+        let lockstep = Lockstep::open(context, Party::Controller, Party::Plant)?;
         let start = context.ready_with(Some(scenario.realtime.cores[0]), declared)?;
         readings.connect()?;
         commands.connect()?;
@@ -315,13 +312,7 @@ impl Ports {
         parameters.as_ref().map_or(Ok(()), Publisher::connect)?;
         events.connect()?;
         let first_due_ns = start.epoch_ns + schedule.controller_at_ns;
-        let clock = match lockstep {
-            None => Clock::RealTime(Cycle::new(first_due_ns, scenario.period_ns())),
-            Some(mut lockstep) => {
-                lockstep.start(first_due_ns);
-                Clock::Lockstep(Box::new(lockstep))
-            }
-        };
+        let clock = Clock::start(lockstep, first_due_ns, scenario.period_ns());
         let ports = Self {
             readings,
             commands,

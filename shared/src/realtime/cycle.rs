@@ -68,7 +68,7 @@ impl Cycle {
         self.due_ns(self.next + 1)
     }
 
-    /// The next deadline that is at most a period past at `now_ns`, counting those before it as skipped.
+    /// The next deadline that is less than a period past at `now_ns`, counting those before it as skipped.
     fn claim(&mut self, now_ns: u64) -> u64 {
         self.next += 1;
         let late_ns = now_ns.saturating_sub(self.due_ns(self.next));

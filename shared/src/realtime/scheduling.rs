@@ -152,7 +152,7 @@ fn is_locked() -> bool {
     locked_kb.is_some_and(|kb| !kb.trim().starts_with("0 "))
 }
 
-/// The only `unsafe` outside of tests: no maintained crate wraps the scheduling policy of a thread.
+/// The only `unsafe` here: no maintained crate wraps the scheduling policy of a thread.
 #[allow(unsafe_code)]
 mod fifo {
     use std::io;

@@ -1,5 +1,5 @@
-//! How long before a deadline a task stops sleeping and spins: twice the recent wake-up latency, at most a third of the
-//! period.
+//! How long before a deadline a task stops sleeping and spins: twice the recent wake-up latency, at most 200 µs and
+//! a third of the period.
 //!
 //! Pure: the latencies come in as arguments; no clock is read here.
 

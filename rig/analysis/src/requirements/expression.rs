@@ -30,58 +30,57 @@ enum Source {
 impl Quantified {
     pub(super) fn new(config: &RequirementConfig, values: &mut Values) -> Result<Self, String> {
         match (&config.signal, &config.expression) {
-            (Some(name), None) => {
-                let signal = values.choose(name)?;
-                let named = values.signal(signal);
-                if named.states().is_some() {
-                    return Err(format!(
-                        "{name} is a state, which has no bounds; use never, or when and then"
-                    ));
-                }
-                let (unit, absence) = (named.shown(), named.absence());
-                Ok(Self { text: name.clone(), unit, absence, source: Source::Signal(signal) })
-            }
+            (Some(name), None) => Self::of_signal(name, values),
             (None, Some(text)) => {
                 let name = config.unit.as_deref().unwrap_or_default();
                 let unit =
                     Unit::named(name).ok_or_else(|| format!("unit = '{name}': the unit is unknown"))?;
-                let parsed =
-                    exmex::parse::<f64>(text).map_err(|error| format!("expression = '{text}': {error}"))?;
-                let signals: Vec<_> =
-                    parsed.var_names().iter().map(|name| values.choose(name)).collect::<Result<_, _>>()?;
-                if signals.is_empty() || text.matches('{').count() != text.matches('}').count() {
-                    return Err(format!(
-                        "expression = '{text}': write signals in braces, such as {{l1.force}}"
-                    ));
-                }
-                if let Some(state) = signals.iter().find(|signal| values.signal(**signal).states().is_some())
-                {
-                    return Err(format!(
-                        "expression = '{text}': {} is a state, no number",
-                        values.signal(*state).name
-                    ));
-                }
-                let of = |name: &str| {
-                    let place = parsed.var_names().iter().position(|known| known == name);
-                    let signal = place.map(|place| values.signal(signals[place]));
-                    signal.map_or(Dimension::One, |signal| signal.shown().dimension)
-                };
-                let derived = derived(text, of).map_err(|why| format!("expression = '{text}': {why}"))?;
-                if derived != BaseExponents::of(unit.dimension) {
-                    return Err(format!("unit = '{name}': the expression '{text}' has the unit {derived}"));
-                }
-                let arguments = vec![0.0; signals.len()];
-                let absences = signals.iter().map(|signal| values.signal(*signal).absence());
-                let absence = absences.into_iter().find(|absence| !absence.is_empty()).unwrap_or_default();
-                Ok(Self {
-                    text: text.clone(),
-                    unit,
-                    absence,
-                    source: Source::Expression { parsed: Box::new(parsed), signals, arguments },
-                })
+                Self::of_expression(text, unit, values).map_err(|why| format!("expression = '{text}': {why}"))
             }
             _ => Err("give a signal or an expression".to_owned()),
         }
+    }
+
+    fn of_signal(name: &str, values: &mut Values) -> Result<Self, String> {
+        let signal = values.choose(name)?;
+        let named = values.signal(signal);
+        if named.states().is_some() {
+            return Err(format!("{name} is a state, which has no bounds; use never, or when and then"));
+        }
+        let (unit, absence) = (named.shown(), named.absence());
+        Ok(Self { text: name.to_owned(), unit, absence, source: Source::Signal(signal) })
+    }
+
+    fn of_expression(text: &str, unit: Unit, values: &mut Values) -> Result<Self, String> {
+        let parsed = exmex::parse::<f64>(text).map_err(|error| error.to_string())?;
+        let signals: Vec<_> =
+            parsed.var_names().iter().map(|name| values.choose(name)).collect::<Result<_, _>>()?;
+        if signals.is_empty() || text.matches('{').count() != text.matches('}').count() {
+            return Err("write signals in braces, such as {l1.force}".to_owned());
+        }
+        let named: Vec<_> = signals.iter().map(|signal| values.signal(*signal)).collect();
+        if let Some(state) = named.iter().find(|signal| signal.states().is_some()) {
+            return Err(format!("{} is a state, no number", state.name));
+        }
+        let dimension_of = |name: &str| {
+            let place = parsed.var_names().iter().position(|known| known == name);
+            place.map_or(Dimension::One, |place| named[place].shown().dimension)
+        };
+        let derived = derived(text, dimension_of)?;
+        if derived != BaseExponents::of(unit.dimension) {
+            return Err(format!("its unit is {derived}, not '{}'", unit.name));
+        }
+        let absences = named.iter().map(|signal| signal.absence());
+        Ok(Self {
+            text: text.to_owned(),
+            unit,
+            absence: absences.into_iter().find(|absence| !absence.is_empty()).unwrap_or_default(),
+            source: Source::Expression {
+                arguments: vec![0.0; signals.len()],
+                parsed: Box::new(parsed),
+                signals,
+            },
+        })
     }
 
     /// The value in SI units; none where a signal is missing.
