@@ -10,7 +10,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
 use crate::common::{
-    self, Cores, LENIENT, MASSETER, PASSED_OR_INVALID, Workspace, masseter, stderr, stdout, wait_until,
+    self, Cores, LENIENT, MASSETER, PASSED_OR_INVALID, Workspace, is_dead, masseter, stderr, stdout,
+    wait_until,
 };
 use masseter_shared::control::Session;
 use masseter_shared::lifecycle::attach::{self, socket};
@@ -166,12 +167,6 @@ fn a_program_of_the_user_that_hangs_is_left_to_its_user_and_the_run_ends() {
     program.wait().unwrap();
 }
 
-/// Whether a process is gone, or at least dead: who adopts it may leave it unawaited.
-fn is_dead(pid: i32) -> bool {
-    let status = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
-    status.rsplit_once(") ").is_none_or(|(_, rest)| rest.starts_with(['Z', 'X']))
-}
-
 #[test]
 fn a_program_that_ignores_everything_dies_with_the_rig() {
     // One never attaches; the other one takes part, and is then stopped.
@@ -195,6 +190,18 @@ fn a_program_that_ignores_everything_dies_with_the_rig() {
         rig.wait().unwrap();
         wait_until("the program is gone", || is_dead(pid));
     }
+}
+
+/// A script that prepares the surroundings of a program may start more than that.
+#[test]
+fn nothing_that_a_program_has_started_outlives_the_run() {
+    let workspace = Workspace::new(SCENARIO);
+    let pid = workspace.file("pid");
+    let text = format!("sleep 1000 &\necho $! > {}\n{MASSETER} controller", pid.display());
+    let output = run(&workspace, &script(&workspace, &text), "lockstep");
+    assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+    let pid = fs::read_to_string(pid).unwrap().trim().parse().unwrap();
+    wait_until("the script's child is gone", || is_dead(pid));
 }
 
 #[test]
@@ -315,12 +322,14 @@ fn without_a_controller_plant_and_recorder_run_for_the_length_of_the_motion() {
     let output = workspace.run(&cores, &["--controller", "none", "--quiet"]);
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     assert!(stdout(&output).starts_with("UNTESTED: no cycle ran"), "{}", stdout(&output));
-    let topics = &workspace.summary()["figures"]["topics"];
+    let figures = &workspace.summary()["figures"];
+    let topics = &figures["topics"];
     let messages = |name: &str| {
         let topic = topics.as_array().unwrap().iter().find(|topic| topic["topic"] == name);
         topic.map_or(0, |topic| topic["messages"].as_u64().unwrap())
     };
-    assert!(messages("reading") > 900 && messages("command") == 0 && messages("state") == 0, "{topics}");
+    let plant_cycles = messages("reading") + figures["plant_skips"]["skipped"].as_u64().unwrap();
+    assert!(plant_cycles > 900 && messages("command") == 0 && messages("state") == 0, "{topics}");
     let refused = workspace.run_virtual(&["--controller", "none"]);
     assert!(refused.status.code() == Some(2) && stderr(&refused).contains("needs --clock rt"));
 }

@@ -50,7 +50,7 @@ fn an_ordinary_user_runs_the_rig_without_real_time() {
     let folder = workspace.file("home");
     fs::create_dir(&folder).unwrap();
     let executable = folder.join("masseter");
-    fs::copy(common::MASSETER, &executable).unwrap();
+    common::copy_program(&executable);
     fs::copy(workspace.file("scenario.toml"), folder.join("scenario.toml")).unwrap();
     let status = Command::new("chown").args(["-R", "65534:65534"]).arg(workspace.file("")).status().unwrap();
     assert!(status.success());
@@ -71,7 +71,7 @@ fn a_run_in_a_read_only_folder_is_reported() {
     let workspace = Workspace::new("duration_s = 0.5\n[checks]\ntracking_rms_mm = 1e-9");
     assert_eq!(workspace.run_virtual(&[]).status.code(), Some(1));
     let (run, executable) = (workspace.run_folder(), workspace.file("masseter"));
-    fs::copy(common::MASSETER, &executable).unwrap();
+    common::copy_program(&executable);
     let status = Command::new("chmod").args(["-R", "a=rX"]).arg(workspace.file("")).status().unwrap();
     assert!(status.success());
     let mut report = Command::new("setpriv");
@@ -98,7 +98,7 @@ impl<'a> SmallDisk<'a> {
 
     /// In the file `image`, as a file system that can be frozen.
     fn in_file(folder: &'a Path, image: &Path) -> Option<Self> {
-        File::create(image).unwrap().set_len(128 << 20).unwrap();
+        File::create(image).unwrap().set_len(512 << 20).unwrap();
         let made = Command::new("mkfs.ext4").arg("-q").arg(image).status();
         made.is_ok_and(|status| status.success()).then_some(())?;
         Self::mount(folder, &["-o", "loop", image.to_str()?])
@@ -110,11 +110,11 @@ impl<'a> SmallDisk<'a> {
         mounted.is_ok_and(|status| status.success()).then(|| Self(folder))
     }
 
-    /// Lets all writers wait for so long. The disk is thawed even if this test ends before.
-    fn freeze_s(folder: &Path, seconds: u32) -> Child {
-        let script = "fsfreeze -f \"$1\" && echo frozen && sleep \"$2\"; fsfreeze -u \"$1\"";
+    /// Lets all writers wait until standard input of the child is closed, also by the end of this test.
+    fn freeze(folder: &Path) -> Child {
+        let script = "fsfreeze -f \"$1\" && echo frozen && read -r _; fsfreeze -u \"$1\"";
         let mut freeze = Command::new("sh");
-        freeze.args(["-c", script, "sh"]).arg(folder).arg(seconds.to_string()).stdout(Stdio::piped());
+        freeze.args(["-c", script, "sh"]).arg(folder).stdin(Stdio::piped()).stdout(Stdio::piped());
         let mut child = freeze.spawn().expect("a shell starts");
         let mut said = [0; 6];
         child.stdout.as_mut().expect("it is piped").read_exact(&mut said).expect("the disk is frozen");
@@ -278,8 +278,8 @@ fn a_full_disk_ends_a_run_under_virtual_time() {
 
 #[test]
 fn a_full_disk_leaves_a_verdict_of_a_run_in_lockstep() {
-    let output = run_on_a_small_disk("32m", |small| {
-        let rig = small.start_lockstep(&["--duration", "6s"]);
+    let output = run_on_a_small_disk("160m", |small| {
+        let rig = small.start_lockstep(&["--duration", "60s"]);
         let memory = SharedMemory::of_running(&format!("{}-", rig.id()));
         wait_until_it_records(small);
         SmallDisk::fill(&small.file(""));
@@ -296,7 +296,7 @@ fn a_full_disk_leaves_a_verdict_of_a_run_in_lockstep() {
 /// The recorder waits for the disk, and plant and controller for the recorder.
 #[test]
 fn a_disk_that_stands_still_for_five_seconds_changes_no_byte_of_a_run_in_lockstep() {
-    let scenario = "duration_s = 10.0";
+    let scenario = "duration_s = 60.0";
     let [reference, workspace] = [1, 2].map(|_| Workspace::new(scenario));
     let folder = workspace.file("");
     let Some(_disk) = SmallDisk::in_file(&folder, &reference.file("disk")) else {
@@ -307,11 +307,12 @@ fn a_disk_that_stands_still_for_five_seconds_changes_no_byte_of_a_run_in_lockste
     assert_eq!(reference.run_virtual(&[]).status.code(), Some(0));
     let rig = workspace.start_lockstep(&[]);
     wait_until_it_records(&workspace);
-    let mut freeze = SmallDisk::freeze_s(&folder, 5);
+    let mut freeze = SmallDisk::freeze(&folder);
     clock::sleep(Duration::from_secs(1));
     let recorded_bytes = workspace.recorded_bytes();
-    clock::sleep(Duration::from_secs(3));
+    clock::sleep(Duration::from_secs(4));
     assert_eq!(workspace.recorded_bytes(), recorded_bytes);
+    drop(freeze.stdin.take());
     assert!(freeze.wait().unwrap().success());
     let output = rig.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));

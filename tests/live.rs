@@ -151,6 +151,9 @@ fn a_watcher_sets_a_parameter_and_another_one_sees_the_change() {
     let mut setter = Watcher::connect(&shown, "foxglove.sdk.v1");
     let gain = |value: f64| json!({"name": "integral_gain_per_s", "value": value, "type": "float64"});
     onlooker.ask(&json!({"op": "subscribeParameterUpdates", "parameterNames": ["integral_gain_per_s"]}));
+    // The answer to a later request shows that the subscription holds.
+    onlooker.ask(&json!({"op": "getParameters", "parameterNames": ["integral_gain_per_s"], "id": "0"}));
+    while text(&mut onlooker.socket)["id"] != "0" {}
     setter.ask(&json!({"op": "getParameters", "parameterNames": ["integral_gain_per_s"], "id": "1"}));
     assert_eq!(
         text(&mut setter.socket),

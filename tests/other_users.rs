@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
 use crate::common::{
-    Cores, LENIENT, MASSETER, Workspace, assert_played, masseter, skip, stderr, stdout, wait_until,
+    Cores, LENIENT, MASSETER, Workspace, assert_played, copy_program, masseter, skip, stderr, stdout,
+    wait_until,
 };
 use rustix::process::getuid;
 
@@ -30,7 +31,7 @@ impl Victim {
         let workspace = Workspace::new(scenario);
         let folder = workspace.file("");
         fs::set_permissions(&folder, PermissionsExt::from_mode(0o755)).unwrap();
-        fs::copy(MASSETER, folder.join("masseter")).unwrap();
+        copy_program(&folder.join("masseter"));
         for path in [folder.clone(), folder.join("masseter"), folder.join("scenario.toml")] {
             chown(path, Some(id), Some(id)).unwrap();
         }

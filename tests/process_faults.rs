@@ -6,6 +6,9 @@ use std::process::Output;
 use crate::common::{self, Cores, LENIENT, Workspace, check, masseter, skip, stderr, stdout};
 use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
 
+/// When the fault of a motion of 1.5 s may strike in real time: the supervisor may come late, but never early.
+const DUE_S: std::ops::Range<f64> = 0.499..1.5;
+
 /// A scenario with one fault, half a second into the motion.
 fn with_fault(kind: &str, more: &str) -> String {
     format!("duration_s = 1.5\n[[faults]]\nkind = '{kind}'\nat_s = 0.5\n{more}")
@@ -109,7 +112,6 @@ fn stalls_of_the_loops_are_real_in_real_time_and_the_scenarios_own() {
         let (workspace, said) = in_quiet_real_time(&cores, &scenario);
         let summary = workspace.summary();
         let skipped = summary["figures"][skips]["by_scenario"].as_u64().unwrap();
-        assert!((80..200).contains(&skipped), "{skipped} skipped: {said}");
         for name in ["once", "ends"] {
             assert_eq!(check(&summary, name)["result"], "passed", "{said}");
         }
@@ -117,7 +119,8 @@ fn stalls_of_the_loops_are_real_in_real_time_and_the_scenarios_own() {
         assert_eq!(timing["stalled"].as_u64(), Some(skipped), "{said}");
         let fault = &workspace.manifest()["process_faults"][0];
         let lasted_ns = fault["ended_ns"].as_u64().unwrap() - fault["struck_ns"].as_u64().unwrap();
-        assert!((100_000_000..200_000_000).contains(&lasted_ns), "{lasted_ns} ns: {said}");
+        assert!(lasted_ns >= 100_000_000, "{lasted_ns} ns: {said}");
+        assert!(skipped.abs_diff(lasted_ns / 1_000_000) < 20, "{skipped} skipped in {lasted_ns} ns: {said}");
     }
 }
 
@@ -145,7 +148,7 @@ fn a_core_that_another_task_takes_is_judged_in_real_time() {
     let output = workspace.run(&cores, &["--quiet"]);
     let said = format!("{}{}", stdout(&output), stderr(&output));
     assert_eq!(workspace.manifest()["process_faults"][0]["number"], 1, "{said}");
-    assert!((struck_s(&workspace) - 0.5).abs() < 0.1, "{said}");
+    assert!(DUE_S.contains(&struck_s(&workspace)), "{said}");
     assert!(common::PASSED_OR_INVALID.contains(&output.status.code()), "{said}");
 }
 
@@ -156,7 +159,7 @@ fn a_process_is_killed_in_real_time_too() {
     let output = workspace.run(&cores, &["--quiet"]);
     assert_eq!(output.status.code(), Some(4), "{}{}", stdout(&output), stderr(&output));
     assert_eq!(workspace.summary()["verdict"]["reason"], "the plant died: SIGKILL (9)");
-    assert!((struck_s(&workspace) - 0.5).abs() < 0.1);
+    assert!(DUE_S.contains(&struck_s(&workspace)));
 }
 
 #[test]

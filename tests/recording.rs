@@ -150,6 +150,10 @@ fn a_cut_recording_is_recovered_beside_the_old_one_and_nothing_is_overwritten() 
     assert!(!saved.is_empty() && saved == messages(&cut));
     assert_eq!(log("verify", &recovered, &[]).status.code(), Some(0));
 
+    assert!(!stdout(&output).contains("recording recover"), "advice already followed: {}", stdout(&output));
+    let diff = masseter(&["diff", recovered.to_str().unwrap(), recovered.to_str().unwrap()]);
+    assert_eq!(diff.status.code(), Some(0), "{}", stdout(&diff));
+
     let before = fs::read(&recovered).unwrap();
     assert_eq!(log("recover", &cut, &[]).status.code(), Some(2));
     assert!(before == fs::read(&recovered).unwrap());
@@ -157,6 +161,24 @@ fn a_cut_recording_is_recovered_beside_the_old_one_and_nothing_is_overwritten() 
     let foreign = workspace.write("foreign.mcap", "no recording at all");
     assert_eq!(log("recover", &foreign, &[]).status.code(), Some(2));
     assert!(!workspace.file("foreign.recovered.mcap").exists());
+}
+
+#[test]
+fn a_thinned_recording_lacks_nothing_and_recovered_it_is_still_one() {
+    let workspace = virtual_run();
+    let [thinned, again] = ["thinned.mcap", "again.mcap"].map(|name| workspace.file(name));
+    let run = workspace.run_folder();
+    assert_eq!(log("thin", &run, &["--out", thinned.to_str().unwrap()]).status.code(), Some(0));
+    let proof = log("verify", &thinned, &[]);
+    assert_eq!(proof.status.code(), Some(0), "{}", stdout(&proof));
+    assert!(
+        stdout(&proof).contains("thinned: ") && stdout(&proof).contains(" left out"),
+        "{}",
+        stdout(&proof)
+    );
+    assert_eq!(log("recover", &thinned, &["--out", again.to_str().unwrap()]).status.code(), Some(0));
+    let diff = masseter(&["diff", run.to_str().unwrap(), again.to_str().unwrap()]);
+    assert_eq!(diff.status.code(), Some(0), "{}", stdout(&diff));
 }
 
 /// A run of real time also attaches when and where it was made.

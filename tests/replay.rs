@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::Output;
 use std::time::Duration;
 
-use crate::common::{Cores, Workspace, masseter, skip, stderr, stdout, wait_until_it_records};
+use crate::common::{Cores, LENIENT, Workspace, masseter, skip, stderr, stdout, wait_until_it_records};
 use masseter_shared::clock;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
@@ -82,8 +82,8 @@ fn twenty_runs_in_simulated_time_are_replayed_bit_by_bit() {
 #[test]
 fn a_run_in_real_time_is_replayed_with_its_skipped_cycles_set_parameters_and_the_stop_of_its_user() {
     let cores = Cores::take();
-    let stall = "duration_s = 60.0\n[[faults]]\nkind = 'controller_stall'\nat_s = 0.2\nsize = '8 ms'";
-    let workspace = Workspace::new(stall);
+    let stall = "duration_s = 60.0\n[[faults]]\nkind = 'controller_stall'\nat_s = 0.2\nsize = '8 ms'\n";
+    let workspace = Workspace::new(&format!("{stall}{LENIENT}"));
     let name = format!("replay-{}", std::process::id());
     let mut run = workspace.start(&cores, &["--name", &name]);
     wait_until_it_records(&workspace);

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::common::{Workspace, json, masseter, stderr, stdout};
+use crate::common::{Workspace, check, json, masseter, stderr, stdout};
 
 const TABLE: &str = "time_s,force_x_n,force_y_n,force_z_n\n0,0,0,0\n0.1,0,0,-12\n0.2,0,0,0\n";
 const PUSHED: &str = "duration_s = 1.5\n[[stimulus]]\nat_s = 0.5\npush_table = 'push.csv'\n\
@@ -61,6 +61,15 @@ fn a_table_that_cannot_be_used_is_refused_with_its_line_before_the_start() {
         stderr(&output)
     );
     assert!(!workspace.run_folder().exists());
+}
+
+#[test]
+fn a_motion_too_slow_to_be_played_fails_the_run() {
+    let workspace = Workspace::new("duration_s = 1.0\n[parameters]\nmotion_rate = 0.02\n");
+    let output = workspace.run_virtual(&["--quiet"]);
+    assert_eq!(output.status.code(), Some(1), "{}{}", stdout(&output), stderr(&output));
+    let finding = "the motion came to 0.1 of 1.0 s in 10 times its duration";
+    assert_eq!(check(&workspace.summary(), "sequence")["finding"], finding);
 }
 
 #[test]

@@ -211,11 +211,28 @@ fn a_scenario_that_passes_after_a_retry_is_shown_as_such() {
 }
 
 #[test]
-fn an_interrupt_ends_the_suite() {
-    let files: Vec<_> = (0..40).map(|number| format!("long{number}.toml")).collect();
-    let files: Vec<_> = files.iter().map(|name| (name.as_str(), "duration_s = 20.0\n")).collect();
+fn a_scenario_that_is_named_twice_runs_once() {
+    let suite = Suite::of(&[("one.toml", "duration_s = 0.5\n"), ("two.toml", "duration_s = 0.5\n")]);
+    let output = suite.test(&["suite", "suite/one.toml", "suite/../suite/two.toml"]);
+    assert!(stdout(&output).contains("running 2 tests\n"), "{}", stdout(&output));
+}
+
+#[test]
+fn a_controller_that_the_suite_does_not_start_is_refused() {
+    let suite = Suite::of(&[("one.toml", "duration_s = 0.5\n")]);
+    for controller in ["external", "none"] {
+        let output = suite.test(&["suite", "--controller", controller]);
+        assert_eq!(output.status.code(), Some(2), "{}", stdout(&output));
+        assert!(stderr(&output).contains("motion, hold, or a path"), "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn an_interrupt_ends_the_suite_with_the_results_until_then() {
+    let files: Vec<_> = (0..400).map(|number| format!("long{number}.toml")).collect();
+    let files: Vec<_> = files.iter().map(|name| (name.as_str(), "duration_s = 2.0\n")).collect();
     let suite = Suite::of(&files);
-    let mut command = suite.command(&["suite"]);
+    let mut command = suite.command(&["suite", "--junit", "junit.xml"]);
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let status = PathBuf::from(format!("/proc/{}/status", child.id()));
     wait_until("it catches SIGINT", || {
@@ -225,10 +242,13 @@ fn an_interrupt_ends_the_suite() {
             .and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok())
             .is_some_and(|mask| mask >> 1 & 1 == 1)
     });
-    clock::sleep(Duration::from_millis(500));
+    clock::sleep(Duration::from_secs(2));
     kill_process(Pid::from_child(&child), Signal::INT).unwrap();
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130), "{}{}", stdout(&output), stderr(&output));
     assert!(stderr(&output).contains("interrupted after"), "{}", stderr(&output));
+    let tested = stdout(&output).matches("... ok\n").count();
+    let junit = fs::read_to_string(suite.path("junit.xml")).unwrap();
+    assert!(tested > 0 && junit.matches("<testsuite ").count() == tested, "{tested}: {junit}");
     assert!(!suite.path("runs").exists());
 }

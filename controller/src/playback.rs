@@ -2,13 +2,11 @@
 //! it is stopped halfway. Time comes in as the steps of the motion, so that the motion waits while the drives cannot follow.
 //! Rate and amplitude of the motion may change while it plays.
 
+use masseter_shared::config::MotionConfig;
 use masseter_shared::geometry::Pose;
 
 use crate::slew::Slew;
 use crate::trajectory::{Trajectory, interpolate, minimum_jerk};
-
-/// A motion is given up after as many of its durations, however slow it is.
-const MOST_DURATIONS: f64 = 10.0;
 
 /// The part that is playing.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -138,7 +136,7 @@ impl Playback {
 
     /// Whether the current part has reached its end, or a motion has taken too long.
     pub(crate) fn is_over(&self) -> bool {
-        let most_s = MOST_DURATIONS * self.trajectory.duration_s();
+        let most_s = MotionConfig::MOST_DURATIONS * self.trajectory.duration_s();
         self.is_at_end() || (self.part == Part::Motion && self.played_s >= most_s)
     }
 

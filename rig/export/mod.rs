@@ -94,7 +94,7 @@ pub(crate) fn export(args: &ExportArgs) -> anyhow::Result<Exit> {
     if args.tables.is_empty() && !reader.has_frames() {
         result("the recording leaves out the CAN frames: there is no table 'frame' and no candump log\n")?;
     }
-    result(&survey.loss()?)?;
+    result(&survey.loss_with_advice()?)?;
     Ok(survey.exit())
 }
 

@@ -80,9 +80,10 @@ const HANDSHAKE_NS: u64 = 5 * SECOND_NS;
 const INTERVAL: Duration = Duration::from_millis(50);
 /// Time between two new connections: a handshake takes less than that of [`MAX_NEWCOMERS`] others.
 const ACCEPT_INTERVAL: Duration = Duration::from_millis(10);
-/// Time between two looks whether all clients have read the rest, and how many there are: 0.5 s.
+/// Time that clients have to read the rest.
+const CLOSING: Duration = Duration::from_millis(500);
+/// Time between two looks whether all have read it.
 const CLOSING_POLL: Duration = Duration::from_millis(10);
-const CLOSING_POLLS: u32 = 50;
 
 /// A socket that listens, and does not answer yet.
 #[derive(Debug)]
@@ -238,12 +239,16 @@ impl LiveServer {
 
     /// Sends what is queued, gives clients half a second to read it, and closes; returns what they missed.
     pub(crate) fn finish(self) -> ClientLosses {
+        self.finish_within(CLOSING)
+    }
+
+    fn finish_within(self, time: Duration) -> ClientLosses {
         self.clients.is_closing.store(true, Ordering::Relaxed);
         // A panic of this thread is on standard error already, and does not concern the recording.
         let _ = self.accepting.join();
         let mut clients = self.clients.connected();
         clients.iter_mut().for_each(Client::close);
-        for _ in 0..CLOSING_POLLS {
+        for _ in 0..time.as_millis() / CLOSING_POLL.as_millis() {
             clients.retain(|client| !client.is_gone());
             if clients.is_empty() {
                 break;

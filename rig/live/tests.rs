@@ -177,7 +177,7 @@ fn a_client_that_reads_in_the_end_gets_everything_but_the_counted_drops() {
             }
         }
     });
-    let losses = server.finish();
+    let losses = server.finish_within(Duration::from_secs(10));
     assert_eq!(losses.cut_off, 0);
     assert_eq!(reading.join().unwrap() + losses.dropped, offered);
 }

@@ -6,12 +6,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::flag;
 use signal_hook::iterator::Signals;
 use signal_hook::low_level::emulate_default_handler;
 
-/// Counts the signals: the first requests an orderly stop, the second an immediate end.
+/// The first signal requests an orderly stop, the second an immediate end.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Interrupts {
+    /// Set by the handler itself: what a signal has done to other processes is seen after this.
+    is_requested: Arc<AtomicBool>,
     count: Arc<AtomicUsize>,
     is_over: Arc<AtomicBool>,
 }
@@ -21,9 +24,13 @@ impl Interrupts {
     pub(crate) fn listen() -> io::Result<Self> {
         let interrupts = Self::default();
         let hang_up = (!is_ignored(SIGHUP)).then_some(SIGHUP);
-        let mut signals = Signals::new([SIGINT, SIGTERM].into_iter().chain(hang_up))?;
+        let caught: Vec<_> = [SIGINT, SIGTERM].into_iter().chain(hang_up).collect();
+        for signal in &caught {
+            flag::register(*signal, Arc::clone(&interrupts.is_requested))?;
+        }
+        let mut signals = Signals::new(caught)?;
         std::thread::spawn({
-            let Self { count, is_over } = interrupts.clone();
+            let Self { count, is_over, .. } = interrupts.clone();
             move || {
                 for signal in signals.forever() {
                     if is_over.load(Ordering::Relaxed) {
@@ -38,12 +45,13 @@ impl Interrupts {
 
     /// Requests an orderly stop, as a signal does.
     pub(crate) fn request_stop(&self) {
+        self.is_requested.store(true, Ordering::Relaxed);
         self.count.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Whether an orderly stop is requested.
     pub(crate) fn is_stop_requested(&self) -> bool {
-        self.count.load(Ordering::Relaxed) > 0
+        self.is_requested.load(Ordering::Relaxed)
     }
 
     /// Whether an immediate end is requested.

@@ -163,6 +163,6 @@ fn extract(args: &ExtractArgs) -> anyhow::Result<Exit> {
     for (name, bytes) in attached::write(reader.attachments(), &args.out)? {
         result(&format!("{bytes:>10}  {}\n", args.out.join(name).display()))?;
     }
-    result(&survey.loss()?)?;
+    result(&survey.loss_with_advice()?)?;
     Ok(survey.exit())
 }

@@ -5,7 +5,7 @@ use std::fmt::{Error, Write};
 use std::io::{Read, Seek};
 
 use masseter_analysis::{SequenceCheck, TopicFigures};
-use masseter_recording::{Chunks, Damage, Entry, ReadError, Reader, Recorded};
+use masseter_recording::{Chunks, Damage, Digests, Entry, ReadError, Reader, Recorded};
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::wording::counted;
 use masseter_terminal::{Exit, Tone};
@@ -35,6 +35,8 @@ pub(crate) struct Survey {
     damage: Vec<Damage>,
     was_cut_short: bool,
     has_frames: bool,
+    /// Whether it is a golden run, which keeps few messages.
+    is_thinned: bool,
     /// When the sample of the motion's first cycle was taken, ns; none without a motion.
     motion_ns: Option<u64>,
 }
@@ -86,6 +88,7 @@ impl Survey {
             damage: reader.damage().to_vec(),
             was_cut_short: reader.was_cut_short(),
             has_frames: reader.has_frames(),
+            is_thinned: !Digests::attached(reader.attachments()).is_empty(),
             motion_ns,
         })
     }
@@ -104,8 +107,9 @@ impl Survey {
         self.channels.iter().map(|(_, figures)| figures.unreadable).sum()
     }
 
-    fn missing(&self) -> u64 {
-        self.sequences.iter().map(|topic| topic.missing).sum()
+    /// Topics without some of their messages, which a thinned recording leaves out on purpose.
+    fn incomplete_topics(&self) -> impl Iterator<Item = &TopicFigures> {
+        self.sequences.iter().filter(|topic| topic.missing > 0 && !self.is_thinned)
     }
 
     /// Whether the file has no damage, except that its last bytes may be missing.
@@ -121,7 +125,7 @@ impl Survey {
     pub(crate) fn exit(&self) -> Exit {
         if self.unreadable() + self.undefined > 0 || !self.is_undamaged_to_its_end() {
             Exit::Usage
-        } else if self.was_cut_short || self.missing() > 0 {
+        } else if self.was_cut_short || self.incomplete_topics().next().is_some() {
             Exit::Incomplete
         } else {
             Exit::Passed
@@ -172,7 +176,7 @@ impl Survey {
         let from_ns = self.times().map(|(first, _)| first).min().unwrap_or(0);
         let to_ns = self.times().map(|(_, last)| last).max().unwrap_or(0);
         writeln!(text, "recorded from {from_ns} to {to_ns} ns, {:.3} s", (to_ns - from_ns) as f64 / 1e9)?;
-        Ok(text + &self.loss()?)
+        Ok(text + &self.loss_with_advice()?)
     }
 
     fn times(&self) -> impl Iterator<Item = (u64, u64)> {
@@ -191,10 +195,11 @@ impl Survey {
         let mut text = String::new();
         for topic in &self.sequences {
             let TopicFigures { topic, messages, missing } = topic;
-            let mark = mark(*missing);
+            let mark = mark(if self.is_thinned { 0 } else { *missing });
+            let between = if self.is_thinned { "left out" } else { "missing" };
             writeln!(
                 text,
-                "{mark} {topic:<8} {:>18}, {missing} missing between them",
+                "{mark} {topic:<8} {:>18}, {missing} {between} between them",
                 counted(*messages, "message")
             )?;
         }
@@ -207,16 +212,28 @@ impl Survey {
         writeln!(text, "{} {unreadable} of {} bytes cannot be read", mark(unreadable), self.size)?;
         let end = if self.was_cut_short { "lacks" } else { "has" };
         writeln!(text, "{} the file {end} its end", mark(self.was_cut_short.into()))?;
-        Ok(text + &self.loss()?)
+        Ok(text + &self.loss_with_advice()?)
     }
 
-    /// What is missing or unreadable, and where; empty for a complete recording.
-    pub(crate) fn loss(&self) -> Result<String, Error> {
+    /// What is missing or unreadable, and what helps; empty for a complete recording.
+    pub(crate) fn loss_with_advice(&self) -> Result<String, Error> {
+        let mut text = self.loss()?;
+        if self.was_cut_short {
+            writeln!(text, "'masseter recording recover' writes a file with an end")?;
+        }
+        Ok(text)
+    }
+
+    /// What is missing or unreadable, and where.
+    pub(super) fn loss(&self) -> Result<String, Error> {
         let mut text = String::new();
+        if self.is_thinned {
+            writeln!(text, "thinned: it keeps few messages, and the digests of all")?;
+        }
         for damage in &self.damage {
             writeln!(text, "unreadable: {damage}")?;
         }
-        for topic in self.sequences.iter().filter(|topic| topic.missing > 0) {
+        for topic in self.incomplete_topics() {
             writeln!(text, "missing: {} on '{}'", counted(topic.missing, "message"), topic.topic)?;
         }
         for (_, figures) in &self.channels {
@@ -232,7 +249,7 @@ impl Survey {
             )?;
         }
         if self.was_cut_short {
-            writeln!(text, "the file lacks its end: 'masseter recording recover' writes a complete file")?;
+            writeln!(text, "the file lacks its end")?;
         }
         Ok(text)
     }

@@ -39,7 +39,7 @@ impl Step {
     /// The command of the step.
     pub(crate) fn command(self) -> String {
         match self {
-            Self::Jog(axis) => format!("masseter robot jog --axis {}", AXIS_NAMES[axis]),
+            Self::Jog(axis) => format!("masseter robot jog --axis {} --by 1mm", AXIS_NAMES[axis]),
             Self::DryRun => "masseter run --dry".to_owned(),
             _ => format!("masseter robot {self}"),
         }
@@ -70,6 +70,6 @@ mod tests {
         assert_eq!(chain.len(), 5 + AXES);
         assert!(chain.is_sorted());
         assert_eq!(chain[4].to_string(), "jog-d3");
-        assert_eq!(chain[4].command(), "masseter robot jog --axis d3");
+        assert_eq!(chain[4].command(), "masseter robot jog --axis d3 --by 1mm");
     }
 }

@@ -38,13 +38,13 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "FILE.csv", help_heading = WHAT)]
     pub trajectory: Option<PathBuf>,
     /// Duration of the motion in seconds, or with a unit, such as 10, 10s or 2min
-    #[arg(long, value_name = "TIME", value_parser = parse_duration, help_heading = WHAT)]
+    #[arg(long, value_name = "TIME", value_parser = parse_duration, allow_negative_numbers = true, help_heading = WHAT)]
     pub duration: Option<Duration>,
     /// Change a key of the scenario, such as controller.integral_gain_per_s=50; may be given several times
     #[arg(long, value_name = "KEY=VALUE", help_heading = WHAT)]
     pub set: Vec<String>,
     /// Cycles per second
-    #[arg(long, value_name = "HZ", help_heading = HOW)]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, help_heading = HOW)]
     pub rate_hz: Option<u32>,
     /// Clock of the run
     #[arg(long, value_enum, default_value_t, help_heading = HOW)]
@@ -76,7 +76,7 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "N,N", value_parser = parse_cores, help_heading = HOW)]
     pub cores: Option<[usize; 2]>,
     /// Seed of every random number
-    #[arg(long, help_heading = HOW)]
+    #[arg(long, allow_negative_numbers = true, help_heading = HOW)]
     pub seed: Option<u64>,
     /// Run folder; must not exist [default: runs/UTC_TIME-NAME]
     #[arg(long, value_name = "DIR", help_heading = KEEP)]

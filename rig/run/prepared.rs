@@ -107,6 +107,8 @@ impl PlayedRun {
     /// Judges the run, prints its report and writes it into the folder.
     pub(super) fn report(self) -> Result<Exit, Failure> {
         if self.is_unstarted() {
+            let folder = self.folder.path().display();
+            status!("masseter: interrupted before the first cycle: nothing is recorded in {folder}");
             return Ok(Exit::Interrupted);
         }
         let Self { args, folder, manifest, reserved, written } = self;

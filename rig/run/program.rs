@@ -21,6 +21,7 @@ use masseter_shared::lifecycle::{End, Order, Silence, Start, line};
 use masseter_shared::transport::Domain;
 use masseter_terminal::status;
 use rustix::net::sockopt::socket_peercred;
+use rustix::process::{Pid, Signal, kill_process_group};
 
 use super::child::{KILLED, POLL, READY_TIMEOUT, describe, open_handle};
 use super::exec_program::tied_to_this_process;
@@ -49,6 +50,14 @@ struct Admitted {
     stream: UnixStream,
     process_id: u32,
     reports: Reports,
+}
+
+impl Executable {
+    /// Kills it with what it has started, which is in its process group; whether something was there. A script may wait for
+    /// the controller, and leave it behind.
+    fn kill(&self) -> bool {
+        kill_process_group(Pid::from_child(&self.child), Signal::KILL).is_ok()
+    }
 }
 
 impl Program {
@@ -234,7 +243,7 @@ impl Program {
 
     /// Kills an executable of the rig; whether it did.
     pub(super) fn kill(&mut self) -> bool {
-        self.executable.as_mut().is_some_and(|Executable { child, .. }| child.kill().is_ok())
+        self.executable.as_ref().is_some_and(Executable::kill)
     }
 
     /// How the program ended its work; none while it works. It has failed where it gives no report.
@@ -270,9 +279,8 @@ impl Program {
     /// Closes the line, and ends an executable at once (SIGKILL); returns what became of the program, in words.
     pub(super) fn give_up(&mut self) -> &'static str {
         self.close();
-        let Some(Executable { child, .. }) = &mut self.executable else { return "was left to its user" };
-        // It may have ended meanwhile.
-        let _ = child.kill();
+        let Some(executable) = &self.executable else { return "was left to its user" };
+        executable.kill();
         KILLED
     }
 

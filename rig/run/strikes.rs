@@ -120,9 +120,10 @@ fn stall(handle: OwnedFd, size: Duration) -> anyhow::Result<End> {
     pidfd_send_signal(&handle, Signal::STOP)?;
     thread::spawn(move || {
         clock::sleep(size);
+        // Told first: the run may end as soon as the process goes on.
+        let _ = tell.send(clock::now_ns());
         // It may have been killed meanwhile.
         let _ = pidfd_send_signal(&handle, Signal::CONT);
-        let _ = tell.send(clock::now_ns());
     });
     Ok(end)
 }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use anyhow::ensure;
 use clap::{Args, ValueEnum};
 
 use crate::arguments::{ControllerChoice, parse_controller};
@@ -43,6 +44,18 @@ pub(crate) struct TestArgs {
     /// Folder for the runs that failed; must not exist [default: runs/test-UTC_TIME]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+}
+
+impl TestArgs {
+    /// Refuses a controller that somebody else would have to start, and a suite without one.
+    pub(super) fn check_controller(&self) -> anyhow::Result<()> {
+        let is_started = !matches!(self.controller, ControllerChoice::External | ControllerChoice::None);
+        ensure!(
+            is_started,
+            "a suite starts its controllers itself: use --controller motion, hold, or a path"
+        );
+        Ok(())
+    }
 }
 
 /// The clock of the runs of a suite.

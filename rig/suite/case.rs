@@ -1,6 +1,6 @@
 //! The scenarios of a suite: found, named and chosen.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -34,6 +34,9 @@ impl Cases {
         for path in paths {
             files.extend(files_of(path)?);
         }
+        // A folder may be named beside one of its files.
+        let mut seen = BTreeSet::new();
+        files.retain(|file| seen.insert(file.canonicalize().unwrap_or_else(|_| file.clone())));
         let all = named(files);
         let (chosen, others): (Vec<_>, Vec<_>) =
             all.into_iter().partition(|case| filter.is_none_or(|text| case.name.contains(text)));

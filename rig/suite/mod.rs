@@ -30,21 +30,22 @@ use trial::Trials;
 /// Runs the suite; [`Exit::Passed`] only if every scenario passed.
 pub(crate) fn test(args: &TestArgs) -> Result<Exit, Failure> {
     let began_ns = clock::now_ns();
+    args.check_controller().usage()?;
     let Cases { chosen, filtered_out } = Cases::find(&args.paths, args.filter.as_deref()).usage()?;
     let out = out_folder(args).usage()?;
     let interrupts = Interrupts::listen().context("cannot listen for signals").died()?;
     print::begin(chosen.len()).incomplete()?;
     let all = run_all(&chosen, &Trials { args, out: &out, interrupts: &interrupts }).incomplete()?;
-    if interrupts.is_stop_requested() {
-        status!("masseter: interrupted after {} of {} tests", all.len(), chosen.len());
-        return Ok(Exit::Interrupted);
-    }
     let took_s = (clock::now_ns() - began_ns) as f64 / 1e9;
     print::end(&all, filtered_out, args.allow_untested, took_s).incomplete()?;
     if let Some(path) = &args.junit {
         let runs: Vec<_> = all.iter().map(|tested| tested.junit(args.allow_untested)).collect();
         let xml = junit_of_suite(&runs, took_s).context("cannot make the JUnit document").incomplete()?;
         fs::write(path, xml).with_context(|| format!("cannot write {}", path.display())).incomplete()?;
+    }
+    if interrupts.is_stop_requested() {
+        status!("masseter: interrupted after {} of {} tests", all.len(), chosen.len());
+        return Ok(Exit::Interrupted);
     }
     let has_failed = all.iter().any(|tested| tested.outcome.is_short(args.allow_untested));
     Ok(if has_failed { Exit::Failed } else { Exit::Passed })

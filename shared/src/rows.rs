@@ -64,7 +64,9 @@ fn number(text: &str, column: &str) -> Result<f64, String> {
     let finite = text.parse().ok().filter(|value: &f64| value.is_finite());
     finite.ok_or_else(|| {
         let text = excerpt(text);
-        format!("{column} is '{text}', not a finite number; write it with a decimal point")
+        format!(
+            "{column} is '{text}', not a finite number; write it with a decimal point, or delete the line"
+        )
     })
 }
 
@@ -170,7 +172,7 @@ mod tests {
             ("", "an empty line"),
             ("1", "1 field, expected 2; complete the line or delete it"),
             ("1,2,3", "3 fields, expected 2"),
-            ("1,zero", "b is 'zero', not a finite number; write it with a decimal point"),
+            ("1,zero", "b is 'zero', not a finite number; write it with a decimal point, or delete the line"),
             ("NaN,1", "a is 'NaN', not a finite number"),
             ("1,inf", "b is 'inf', not a finite number"),
         ] {

@@ -1,10 +1,10 @@
 //! What a cycle allocates: nothing for waiting, receiving and dynamics, and for each message sent the one small
-//! counter that iceoryx2 keeps a loan with. Alone in its file: the allocator counts for the whole process.
+//! counter that iceoryx2 keeps a loan with. Alone in its file: the allocator is that of the whole program.
 #![allow(unsafe_code)] // A global allocator is an unsafe trait; this one only counts and passes on.
 
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
 use std::hint::black_box;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use masseter_shared::clock;
 use masseter_shared::config::DynamicsConfig;
@@ -17,8 +17,11 @@ use nalgebra::Vector6;
 
 struct Counting;
 
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-static LARGEST: AtomicU64 = AtomicU64::new(0);
+thread_local! {
+    /// Of this thread alone: the test harness allocates in its own.
+    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+    static LARGEST: Cell<u64> = const { Cell::new(0) };
+}
 
 #[global_allocator]
 static COUNTING: Counting = Counting;
@@ -26,8 +29,8 @@ static COUNTING: Counting = Counting;
 // SAFETY: every call goes to the system's allocator unchanged, so its guarantees are this one's.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        LARGEST.fetch_max(layout.size() as u64, Ordering::Relaxed);
+        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
+        LARGEST.set(LARGEST.get().max(layout.size() as u64));
         // SAFETY: the caller's promises about `layout` are passed on.
         unsafe { System.alloc(layout) }
     }
@@ -40,10 +43,10 @@ unsafe impl GlobalAlloc for Counting {
 
 /// Number and largest size of the allocations that `work` makes.
 fn allocations_of(work: impl FnOnce()) -> (u64, u64) {
-    LARGEST.store(0, Ordering::Relaxed);
-    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    LARGEST.set(0);
+    let before = ALLOCATIONS.get();
     work();
-    (ALLOCATIONS.load(Ordering::Relaxed) - before, LARGEST.load(Ordering::Relaxed))
+    (ALLOCATIONS.get() - before, LARGEST.get())
 }
 
 /// Messages sent and received a measurement.

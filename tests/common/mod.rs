@@ -219,6 +219,19 @@ pub(crate) fn has_event(summary: &Value, kind: &str, cause: &str) -> bool {
     events.any(|event| event["kind"] == kind && event["cause"] == cause)
 }
 
+/// Whether a process has ended, also if nobody has waited for it.
+pub(crate) fn is_dead(pid: i32) -> bool {
+    let status = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+    status.rsplit_once(") ").is_none_or(|(_, rest)| rest.starts_with(['Z', 'X']))
+}
+
+/// Copies the program by another process: a file that this one has open for writing cannot be executed, and a child
+/// that another test starts meanwhile would hold it open.
+pub(crate) fn copy_program(to: &Path) {
+    let status = Command::new("cp").arg(MASSETER).arg(to).status().expect("cp starts");
+    assert!(status.success(), "{}", to.display());
+}
+
 pub(crate) fn masseter(arguments: &[&str]) -> Output {
     Command::new(MASSETER).args(arguments).output().expect("masseter starts")
 }

@@ -76,6 +76,7 @@ pub struct Analysis {
     plant_skips: Skips,
     outage: OutageWatch,
     final_state: Option<Code<ControllerState>>,
+    motion_reached_s: Option<f64>,
     bite_force_max_n: Option<f64>,
     contact: ContactWatch,
     /// None where the scenario requires nothing.
@@ -115,6 +116,7 @@ impl Analysis {
             plant_skips: Skips::default(),
             outage: OutageWatch::default(),
             final_state: None,
+            motion_reached_s: None,
             // The robot has no sensor for this force.
             bite_force_max_n: scenario.has_contact().then_some(0.0),
             contact: ContactWatch::default(),
@@ -222,6 +224,10 @@ impl Analysis {
         self.tracking.state(state, is_fresh, is_disturbed).into_iter().for_each(|sample| self.path(sample));
         self.cycles = self.cycles.max(state.seq);
         self.final_state = Some(state.controller_state.into());
+        if state.controller_state == ControllerState::Running.code() && state.motion_time_s > 0.0 {
+            let reached_s = self.motion_reached_s.get_or_insert(0.0);
+            *reached_s = reached_s.max(state.motion_time_s);
+        }
     }
 
     fn truth(&mut self, truth: &Truth) {
@@ -282,6 +288,7 @@ impl Analysis {
             plant_skips: self.plant_skips.figures,
             readings: self.freshness.figures,
             final_state: self.final_state,
+            motion_reached_s: self.motion_reached_s,
             outage: self.outage.finish(self.period_ns),
             tracking,
             faults: self.faults.finish(),

@@ -43,6 +43,8 @@ pub struct Figures {
     pub overrun_attribution: Option<OverrunAttribution>,
     /// The last state of the controller's sequence; none without a single state message.
     pub final_state: Option<Code<ControllerState>>,
+    /// The furthest motion time that the controller stated while the motion played, s; none without one.
+    pub motion_reached_s: Option<f64>,
     /// Deadlines missed just before a safe stop; none without one.
     pub outage: Option<Outage>,
     /// Distance of the platform from its desired pose, while the motion played.

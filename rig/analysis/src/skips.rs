@@ -166,7 +166,8 @@ impl Skips {
         let skipped = counters.skipped.saturating_sub(past.skipped);
         let lost = self.carried_over.and(Loss { waiting_ns: stall_ns, working_ns: overlong_ns });
         let is_next = counters.seq == std::mem::replace(&mut self.last_seq, counters.seq).wrapping_add(1);
-        let known = if is_next { skipped } else { 0 };
+        // Before its first wait a process keeps no account of what held it up.
+        let known = if is_next && counters.seq > 1 { skipped } else { 0 };
         if is_of_scenario {
             return self.take_of_scenario(counters, skipped, known);
         }
@@ -278,6 +279,12 @@ mod tests {
         }
     }
 
+    #[test]
+    fn deadlines_that_passed_before_the_first_wait_have_an_unknown_cause() {
+        let figures = skips_of(&[[50, 0, 0, 0], [52, 2_000_000, 0, 0]]).figures;
+        assert_eq!([figures.unknown_cause, figures.by_machine, figures.skipped], [50, 2, 52]);
+    }
+
     /// A process that skips as the real-time loop does, and its account.
     #[derive(Default)]
     struct Process {
@@ -288,6 +295,13 @@ mod tests {
     }
 
     impl Process {
+        /// In its first wait.
+        fn started() -> Self {
+            let mut process = Self::default();
+            process.cycle(0, 0, 0);
+            process
+        }
+
         /// Works and waits so long after a wake-up, is held up meanwhile, and if it came back in time once more while it
         /// waits for its deadline.
         fn cycle(&mut self, own_ns: u64, held_up_ns: u64, held_up_waiting_ns: u64) {
@@ -323,7 +337,7 @@ mod tests {
     fn stalls_of_whole_periods_explain_what_they_skip() {
         for periods in [1, 2, 5] {
             for [held_up, waiting] in [[periods, 0], [0, periods]] {
-                let mut process = Process::default();
+                let mut process = Process::started();
                 let own_ns = if held_up > 0 { PERIOD_NS } else { PERIOD_NS / 2 };
                 process.cycle(own_ns, held_up * PERIOD_NS, waiting * PERIOD_NS);
                 process.cycle(PERIOD_NS, 0, 0);
@@ -339,7 +353,7 @@ mod tests {
         fn a_process_that_keeps_its_time_has_every_skip_explained(
             cycles in proptest::collection::vec((0..=PERIOD_NS, 0..3 * PERIOD_NS, 0..3 * PERIOD_NS), 1..100)
         ) {
-            let mut process = Process::default();
+            let mut process = Process::started();
             for (own_ns, held_up_ns, waiting_ns) in cycles {
                 process.cycle(own_ns, held_up_ns, waiting_ns);
             }
@@ -360,8 +374,7 @@ mod tests {
 
     #[test]
     fn what_happened_behind_missing_messages_has_no_known_cause() {
-        let mut process = Process::default();
-        process.cycle(0, 0, 0);
+        let mut process = Process::started();
         process.counters.seq += 1;
         process.cycle(0, 5 * PERIOD_NS, 0);
         assert_eq!(process.skips.as_long_as(1), (0, 0));

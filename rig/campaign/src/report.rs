@@ -133,9 +133,22 @@ impl<'a> Report<'a> {
         let demanded =
             demanded.map_or_else(String::new, |least| format!(", demanded {:.1} %", least * 100.0));
         format!(
-            "success rate: {:.1} % of {} judged, 95 % interval {low:.1} to {high:.1} %{demanded}\n",
+            "success rate: {:.1} % of {} judged, 95 % interval {low:.1} to {high:.1} %{demanded}\n{}",
             share * 100.0,
-            rate.judged
+            rate.judged,
+            self.unjudged_in_words()
+        )
+    }
+
+    /// That cases without a judgement fail the campaign, where they do.
+    fn unjudged_in_words(&self) -> String {
+        let unjudged = self.results.iter().filter(|result| !result.is_judged()).count();
+        if unjudged == 0 || self.campaign.file.least_success.is_some() {
+            return String::new();
+        }
+        let unjudged = counted(unjudged as u64, "case");
+        format!(
+            "not judged: {unjudged}; every case must pass, unless least_success demands a share of the judged ones\n"
         )
     }
 }

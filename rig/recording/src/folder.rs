@@ -29,6 +29,16 @@ pub enum FolderError {
     /// It is no run folder.
     #[error("{} is no folder with a recording.mcap; name the folder of a run", .0.display())]
     NoRun(PathBuf),
+    /// The user may not look into it.
+    #[error(
+        "{} cannot be read: {error}; its owner can make it readable: chmod -R a+rX, or masseter run --readable-by", path.display()
+    )]
+    Unreadable {
+        /// The folder.
+        path: PathBuf,
+        /// The system's reason.
+        error: io::Error,
+    },
     /// It could not be made.
     #[error(transparent)]
     New(#[from] OutputError),
@@ -65,7 +75,13 @@ impl RunFolder {
     /// Opens the folder of a past run.
     pub fn open(path: &Path) -> Result<Self, FolderError> {
         let folder = Self(path.to_owned());
-        if folder.recording().is_file() { Ok(folder) } else { Err(FolderError::NoRun(path.to_owned())) }
+        match fs::metadata(folder.recording()) {
+            Ok(file) if file.is_file() => Ok(folder),
+            Err(error) if error.kind() == io::ErrorKind::PermissionDenied => {
+                Err(FolderError::Unreadable { path: path.to_owned(), error })
+            }
+            _ => Err(FolderError::NoRun(path.to_owned())),
+        }
     }
 
     /// Writes one of its files completely or not at all, so that a power cut leaves the scenario and the manifest of a

@@ -62,22 +62,49 @@ pub fn recover<R: Read + Seek, W: Write + Seek>(
     medium: W,
 ) -> Result<Recovered, RecoverError> {
     let mut writer = options().create(medium)?;
-    let mut defined = BTreeSet::new();
+    let mut definitions = Definitions::default();
     let mut recovered = Recovered::default();
     while let Some(Entry { channel, header, data }) = reader.next_entry()? {
-        let Some(channel) = channel else {
+        if channel.is_none() {
             recovered.undefined += 1;
             continue;
-        };
-        let mcap::Channel { id, topic, message_encoding, metadata, .. } = &*channel;
-        if defined.insert(*id) {
-            let schema = add_schema(&mut writer, &channel)?;
-            writer.add_channel_with_id(*id, schema, topic, message_encoding, metadata)?;
+        }
+        if !definitions.channels.contains(&header.channel_id) {
+            definitions.copy(reader, &mut writer)?;
         }
         writer.write_to_known_channel(&header, &data)?;
         recovered.messages += 1;
     }
-    reader.attachments().iter().try_for_each(|attachment| writer.attach(attachment))?;
+    definitions.copy(reader, &mut writer)?;
     writer.finish()?;
     Ok(recovered)
+}
+
+/// What has been copied beside messages. A reader of the new recording looks for it before the first message.
+#[derive(Default)]
+struct Definitions {
+    channels: BTreeSet<u16>,
+    attachments: usize,
+}
+
+impl Definitions {
+    /// Copies the channels and attached files that the reader has come to know since the last call.
+    fn copy<R: Read + Seek, W: Write + Seek>(
+        &mut self,
+        reader: &Reader<R>,
+        writer: &mut mcap::Writer<W>,
+    ) -> Result<(), McapError> {
+        for attachment in &reader.attachments()[self.attachments..] {
+            writer.attach(attachment)?;
+        }
+        self.attachments = reader.attachments().len();
+        for channel in reader.channels() {
+            let mcap::Channel { id, topic, message_encoding, metadata, .. } = channel;
+            if self.channels.insert(*id) {
+                let schema = add_schema(writer, channel)?;
+                writer.add_channel_with_id(*id, schema, topic, message_encoding, metadata)?;
+            }
+        }
+        Ok(())
+    }
 }

@@ -2,7 +2,7 @@
 //!
 //! What the checks come to is the [verdict](super::verdict)'s.
 
-use masseter_shared::config::{ExpectConfig, ExpectedVerdict, StimulusConfig};
+use masseter_shared::config::{ExpectConfig, ExpectedVerdict, MotionConfig, StimulusConfig};
 use masseter_shared::messages::codes::{Cause, ControllerState};
 use masseter_shared::wording::counted;
 
@@ -23,7 +23,10 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     }
     let limits = &manifest.scenario.checks;
     let is_disturbed = timing.is_disturbed();
-    let sequence = sequence(figures.final_state, &figures.events, manifest.scenario.expect.as_ref());
+    let sequence = match given_up(manifest, figures) {
+        Some(finding) => Check::judged("sequence", finding, false),
+        None => sequence(figures.final_state, &figures.events, manifest.scenario.expect.as_ref()),
+    };
     let TrackingFigures { actual_source, samples, actual, estimated, undisturbed, .. } = &figures.tracking;
     let tracking_of = |name, errors, undisturbed_errors| {
         let check = tracking(name, *samples, errors, limits);
@@ -63,6 +66,17 @@ fn kept_time(timing: &Timing, limit: u64) -> Option<Check> {
     };
     let finding = format!("{timing}{}, limit of the rig {limit}", timing.evidence);
     Some(Check::new("timing", finding, result))
+}
+
+/// The finding on a motion that passed so slowly that the controller gave it up on its way.
+fn given_up(manifest: &Manifest, figures: &Figures) -> Option<String> {
+    let (motion_s, reached_s) = (manifest.motion_s, figures.motion_reached_s?);
+    let played_s = figures.tracking.samples as f64 * manifest.scenario.period_s();
+    let is_given_up = played_s > 0.99 * MotionConfig::MOST_DURATIONS * motion_s && reached_s < 0.9 * motion_s;
+    is_given_up.then(|| {
+        let times = MotionConfig::MOST_DURATIONS;
+        format!("the motion came to {reached_s:.1} of {motion_s:.1} s in {times} times its duration")
+    })
 }
 
 /// The motion must be played to its end, and not be stopped by request, unless the scenario expects that.

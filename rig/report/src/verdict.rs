@@ -162,10 +162,10 @@ fn incomplete(figures: &Figures) -> Option<OutcomeReason> {
 }
 
 /// Why the machine leaves nothing to judge a run by that ended normally; none where the run can be judged. What the rig
-/// missed by itself fails the run.
+/// missed by itself fails the run, and where no cycle ran there is nothing to judge.
 fn unjudged(limits: &ChecksConfig, timing: &Timing, checks: &[Check]) -> Option<String> {
     let has = |result| checks.iter().any(|check| check.result == result);
-    if timing.word == TimingWord::Missed {
+    if matches!(timing.word, TimingWord::Missed | TimingWord::Unknown) {
         return None;
     }
     if timing.is_disturbed() && limits.timing == TimingConfig::Strict {

@@ -44,6 +44,11 @@ pub enum MotionConfig {
     File(FileConfig),
 }
 
+impl MotionConfig {
+    /// The rig's controller gives a motion up after as many of its durations, however slow it is.
+    pub const MOST_DURATIONS: f64 = 10.0;
+}
+
 impl Default for MotionConfig {
     fn default() -> Self {
         Self::Chewing(ChewingConfig::default())

@@ -75,8 +75,9 @@ impl Response {
         scenario: &Scenario,
         values: &mut Values,
     ) -> Result<Self, String> {
-        let given = config.when.as_deref().zip(config.then.as_deref());
-        let (when, then) = given.ok_or("give when and then")?;
+        let missing = |key| format!("give when and then: {key} is missing");
+        let when = config.when.as_deref().ok_or_else(|| missing("when"))?;
+        let then = config.then.as_deref().ok_or_else(|| missing("then"))?;
         let time_ns = |key: &str, time: Option<Quantity>| {
             let seconds = time
                 .map(|time| time.si_of(Dimension::Time).map_err(|need| format!("{key} = {time}: {need}")));

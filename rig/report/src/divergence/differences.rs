@@ -91,7 +91,9 @@ impl Differences {
     pub(super) fn add(&mut self, topic: Topic, has_same_fields: bool, lane: Lane) {
         let topic = topic.name();
         self.messages += lane.messages;
-        self.redefined.extend((lane.messages > 0 && !has_same_fields).then_some(topic));
+        // Each source of a topic has a lane.
+        let is_redefined = lane.messages > 0 && !has_same_fields && !self.redefined.contains(&topic);
+        self.redefined.extend(is_redefined.then_some(topic));
         let (growths, missing) = lane.finish();
         for growth in growths {
             let motion_s = self.clock.motion_s(growth.first_cycle);

@@ -130,7 +130,7 @@ fn a_run_without_anything_wrong_passes_every_check() {
 
 #[test]
 fn each_thing_that_is_wrong_has_its_verdict() {
-    let cases: [(Change, Exit, &str); 17] = [
+    let cases: [(Change, Exit, &str); 18] = [
         (|run| run.figures.controller_skips.skipped = 3, Exit::Failed, "failed: timing"),
         (|run| run.figures.plant_skips.skipped = 1, Exit::Failed, "failed: timing"),
         (|run| run.figures.tracking.actual.rms_mm = Some(0.11), Exit::Failed, "failed: tracking"),
@@ -140,6 +140,14 @@ fn each_thing_that_is_wrong_has_its_verdict() {
             "failed: estimated tracking",
         ),
         (|run| run.figures.final_state = None, Exit::Failed, "failed: sequence"),
+        (
+            |run| {
+                run.figures.tracking.samples = 100_000;
+                run.figures.motion_reached_s = Some(0.2);
+            },
+            Exit::Failed,
+            "failed: sequence",
+        ),
         (
             |run| run.figures.final_state = Some(Code::Known(ControllerState::Disabling)),
             Exit::Failed,
