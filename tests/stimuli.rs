@@ -64,12 +64,16 @@ fn a_table_that_cannot_be_used_is_refused_with_its_line_before_the_start() {
 }
 
 #[test]
-fn a_motion_too_slow_to_be_played_fails_the_run() {
-    let workspace = Workspace::new("duration_s = 1.0\n[parameters]\nmotion_rate = 0.02\n");
-    let output = workspace.run_virtual(&["--quiet"]);
-    assert_eq!(output.status.code(), Some(1), "{}{}", stdout(&output), stderr(&output));
-    let finding = "the motion came to 0.1 of 1.0 s in 10 times its duration";
-    assert_eq!(check(&workspace.summary(), "sequence")["finding"], finding);
+fn a_motion_too_slow_to_be_played_in_ten_times_its_duration_fails_the_run() {
+    for (rate, code, finding) in [
+        (0.02, 1, "the motion came to 0.02 of 0.50 s of its own time in 10 times its duration"),
+        (0.1, 0, "ended in state finished"),
+    ] {
+        let workspace = Workspace::new(&format!("duration_s = 1.0\n[parameters]\nmotion_rate = {rate}\n"));
+        let output = workspace.run_virtual(&["--quiet"]);
+        assert_eq!(output.status.code(), Some(code), "{rate}: {}{}", stdout(&output), stderr(&output));
+        assert_eq!(check(&workspace.summary(), "sequence")["finding"], finding);
+    }
 }
 
 #[test]

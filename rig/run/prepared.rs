@@ -206,6 +206,7 @@ fn unrecorded(
 fn manifest_of(plan: &RunPlan, args: &RunArgs) -> Manifest {
     let (motion_s, clock) = (plan.trajectory.duration_s(), name_of(&args.clock));
     let mut manifest = Manifest::new(plan.scenario.clone(), motion_s, &clock, machine::describe());
+    manifest.motion_end_s = Some(plan.trajectory.motion_time_s(motion_s));
     manifest.controller = args.controller.name();
     manifest.full_speed = plan.scenario.dry.is_on.then_some(FullSpeed {
         velocity_m_s: plan.demands.velocity_m_s,

@@ -63,6 +63,9 @@ pub struct Manifest {
     pub scenario: Scenario,
     /// Duration of the motion, s.
     pub motion_s: f64,
+    /// The motion time at its end (`state.motion_time_s`), s; none where it was not known.
+    #[serde(default)]
+    pub motion_end_s: Option<f64>,
     /// What the plan demands of the axes at full speed; none but in a dry run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub full_speed: Option<FullSpeed>,
@@ -107,6 +110,7 @@ impl Manifest {
             declared: Declared::default(),
             scenario,
             motion_s,
+            motion_end_s: None,
             full_speed: None,
             machine,
             scheduling: BTreeMap::new(),

@@ -70,12 +70,14 @@ fn kept_time(timing: &Timing, limit: u64) -> Option<Check> {
 
 /// The finding on a motion that passed so slowly that the controller gave it up on its way.
 fn given_up(manifest: &Manifest, figures: &Figures) -> Option<String> {
-    let (motion_s, reached_s) = (manifest.motion_s, figures.motion_reached_s?);
+    let (end_s, reached_s) = (manifest.motion_end_s?, figures.motion_reached_s?);
     let played_s = figures.tracking.samples as f64 * manifest.scenario.period_s();
-    let is_given_up = played_s > 0.99 * MotionConfig::MOST_DURATIONS * motion_s && reached_s < 0.9 * motion_s;
+    let times = MotionConfig::MOST_DURATIONS;
+    let is_given_up = played_s > 0.99 * times * manifest.motion_s && reached_s < 0.99 * end_s;
     is_given_up.then(|| {
-        let times = MotionConfig::MOST_DURATIONS;
-        format!("the motion came to {reached_s:.1} of {motion_s:.1} s in {times} times its duration")
+        format!(
+            "the motion came to {reached_s:.2} of {end_s:.2} s of its own time in {times} times its duration"
+        )
     })
 }
 

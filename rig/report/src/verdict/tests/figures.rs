@@ -143,7 +143,8 @@ fn each_thing_that_is_wrong_has_its_verdict() {
         (
             |run| {
                 run.figures.tracking.samples = 100_000;
-                run.figures.motion_reached_s = Some(0.2);
+                run.manifest.motion_end_s = Some(9.0);
+                run.figures.motion_reached_s = Some(8.8);
             },
             Exit::Failed,
             "failed: sequence",
