@@ -6,8 +6,8 @@ use std::process::Output;
 use crate::common::{self, Cores, LENIENT, Workspace, check, masseter, skip, stderr, stdout};
 use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
 
-/// When the fault of a motion of 1.5 s may strike in real time: the supervisor may come late, but never early.
-const DUE_S: std::ops::Range<f64> = 0.499..1.5;
+/// A busy machine may disturb a run in real time.
+const TRIES: usize = 10;
 
 /// A scenario with one fault, half a second into the motion.
 fn with_fault(kind: &str, more: &str) -> String {
@@ -25,7 +25,7 @@ fn in_lockstep(scenario: &str) -> (Workspace, Output, String) {
 /// taken for the machine's, no run would be quiet.
 fn in_quiet_real_time(cores: &Cores, scenario: &str) -> (Workspace, String) {
     let mut lost = Vec::new();
-    while lost.len() < 10 {
+    while lost.len() < TRIES {
         let workspace = Workspace::new(scenario);
         let output = workspace.run(cores, &["--quiet"]);
         let said = format!("{scenario}: {}{}", stdout(&output), stderr(&output));
@@ -46,6 +46,21 @@ fn struck_s(workspace: &Workspace) -> f64 {
     let runs = events.iter().find(|event| event["transition"][1] == "running").expect("the motion began");
     let struck_ns = figures["faults"][0]["struck_ns"].as_f64().expect("the fault has struck");
     (struck_ns - runs["time_ns"].as_f64().unwrap()) / 1e9
+}
+
+/// A run in real time whose fault struck within 0.1 s of its time; a busy machine may hold the supervisor up for longer.
+fn struck_in_time(cores: &Cores, scenario: &str) -> (Workspace, Output) {
+    let mut late_s = Vec::new();
+    while late_s.len() < TRIES {
+        let workspace = Workspace::new(&format!("{scenario}{LENIENT}"));
+        let output = workspace.run(cores, &["--quiet"]);
+        let late = struck_s(&workspace) - 0.5;
+        if late.abs() < 0.1 {
+            return (workspace, output);
+        }
+        late_s.push(late);
+    }
+    panic!("the fault was late in each try: {late_s:?} s: {scenario}");
 }
 
 #[test]
@@ -144,22 +159,18 @@ fn a_core_that_another_task_takes_is_judged_in_real_time() {
     if let Some(refusal) = obtained.refusals.first() {
         return skip(refusal);
     }
-    let workspace = Workspace::new(&(with_fault("core_stall", "size = '5 ms'\n") + LENIENT));
-    let output = workspace.run(&cores, &["--quiet"]);
+    let (workspace, output) = struck_in_time(&cores, &with_fault("core_stall", "size = '5 ms'\n"));
     let said = format!("{}{}", stdout(&output), stderr(&output));
     assert_eq!(workspace.manifest()["process_faults"][0]["number"], 1, "{said}");
-    assert!(DUE_S.contains(&struck_s(&workspace)), "{said}");
     assert!(common::PASSED_OR_INVALID.contains(&output.status.code()), "{said}");
 }
 
 #[test]
 fn a_process_is_killed_in_real_time_too() {
     let cores = Cores::take();
-    let workspace = Workspace::new(&(with_fault("plant_kill", "") + LENIENT));
-    let output = workspace.run(&cores, &["--quiet"]);
+    let (workspace, output) = struck_in_time(&cores, &with_fault("plant_kill", ""));
     assert_eq!(output.status.code(), Some(4), "{}{}", stdout(&output), stderr(&output));
     assert_eq!(workspace.summary()["verdict"]["reason"], "the plant died: SIGKILL (9)");
-    assert!(DUE_S.contains(&struck_s(&workspace)));
 }
 
 #[test]

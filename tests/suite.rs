@@ -2,12 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
-use std::time::Duration;
 
-use crate::common::{MASSETER, json, stderr, stdout, wait_until};
-use masseter_shared::clock;
+use crate::common::{MASSETER, json, stderr, stdout};
 use rustix::process::{Pid, Signal, kill_process};
 
 const PASSES: &str = "duration_s = 1.0\n";
@@ -233,22 +232,20 @@ fn an_interrupt_ends_the_suite_with_the_results_until_then() {
     let files: Vec<_> = files.iter().map(|name| (name.as_str(), "duration_s = 2.0\n")).collect();
     let suite = Suite::of(&files);
     let mut command = suite.command(&["suite", "--junit", "junit.xml"]);
-    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let status = PathBuf::from(format!("/proc/{}/status", child.id()));
-    wait_until("it catches SIGINT", || {
-        let text = fs::read_to_string(&status).unwrap_or_default();
-        let caught = text.lines().find_map(|line| line.strip_prefix("SigCgt:"));
-        caught
-            .and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok())
-            .is_some_and(|mask| mask >> 1 & 1 == 1)
-    });
-    clock::sleep(Duration::from_secs(2));
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines().map(Result::unwrap);
+    let mut said: Vec<_> = lines.by_ref().take_while(|line| !line.ends_with("... ok")).collect();
     kill_process(Pid::from_child(&child), Signal::INT).unwrap();
+    said.extend(lines);
     let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(130), "{}{}", stdout(&output), stderr(&output));
+    assert_eq!(output.status.code(), Some(130), "{said:?}{}", stderr(&output));
     assert!(stderr(&output).contains("interrupted after"), "{}", stderr(&output));
-    let tested = stdout(&output).matches("... ok\n").count();
+    let result = said.last().unwrap();
+    assert!(result.contains("INTERRUPTED. ") && result.contains(" not run; "), "{said:?}");
+    // The first one is not in `said`.
+    let tested = 1 + said.iter().filter(|line| line.ends_with("... ok")).count();
     let junit = fs::read_to_string(suite.path("junit.xml")).unwrap();
-    assert!(tested > 0 && junit.matches("<testsuite ").count() == tested, "{tested}: {junit}");
+    let count = |text| junit.matches(text).count();
+    assert_eq!((count("<testsuite "), count("interrupted before its end")), (400, 400 - tested), "{junit}");
     assert!(!suite.path("runs").exists());
 }

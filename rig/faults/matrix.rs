@@ -5,6 +5,7 @@ use std::fs;
 
 use anyhow::Context;
 use masseter_plan::{RunPlan, read_scenario};
+use masseter_recording::output::new_folder;
 use masseter_report::Verdict;
 use masseter_shared::config::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure, result, status};
@@ -27,13 +28,16 @@ pub(super) fn play(args: &MatrixArgs) -> Result<Exit, Failure> {
     if cases.is_empty() {
         return Err(anyhow::anyhow!("no kind has this text in its name; see masseter faults list")).usage();
     }
-    fs::create_dir(&args.out).with_context(|| format!("cannot make {}", args.out.display())).usage()?;
+    new_folder(&args.out).usage()?;
     let interrupts = Interrupts::listen().context("cannot listen for signals").died()?;
     status!("{} runs", cases.len());
     let rows: Vec<_> =
         cases.into_par_iter().map(|case| row(&plan.scenario, case, &interrupts)).collect::<Result<_, _>>()?;
     interrupts.restore_default_actions();
     if interrupts.is_stop_requested() {
+        // Empty as it is, it would only be in the way of the next matrix.
+        let _ = fs::remove_dir(&args.out);
+        status!("masseter: interrupted: no table is written");
         return Ok(Exit::Interrupted);
     }
     write(args, &rows).incomplete()?;

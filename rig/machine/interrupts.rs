@@ -25,10 +25,10 @@ impl Interrupts {
         let interrupts = Self::default();
         let hang_up = (!is_ignored(SIGHUP)).then_some(SIGHUP);
         let caught: Vec<_> = [SIGINT, SIGTERM].into_iter().chain(hang_up).collect();
-        for signal in &caught {
-            flag::register(*signal, Arc::clone(&interrupts.is_requested))?;
+        let mut signals = Signals::new(&caught)?;
+        for signal in caught {
+            flag::register(signal, Arc::clone(&interrupts.is_requested))?;
         }
-        let mut signals = Signals::new(caught)?;
         std::thread::spawn({
             let Self { count, is_over, .. } = interrupts.clone();
             move || {
@@ -45,13 +45,12 @@ impl Interrupts {
 
     /// Requests an orderly stop, as a signal does.
     pub(crate) fn request_stop(&self) {
-        self.is_requested.store(true, Ordering::Relaxed);
         self.count.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Whether an orderly stop is requested.
     pub(crate) fn is_stop_requested(&self) -> bool {
-        self.is_requested.load(Ordering::Relaxed)
+        self.is_requested.load(Ordering::Relaxed) || self.count.load(Ordering::Relaxed) > 0
     }
 
     /// Whether an immediate end is requested.

@@ -1,13 +1,13 @@
 //! `masseter recording` (alias `log`): inspects, verifies and recovers recordings; `masseter export` makes tables of them.
 //!
 //! `info`, `verify` and `extract` end with 0 if the recording is complete, 6 if messages or its end are missing, and 2 if it
-//! holds bytes that Masseter did not write. `recover` ends with 0 once it has saved what is readable. No verb changes the
-//! recording it reads.
+//! holds bytes that Masseter did not write. `recover` ends with 0 once it has saved what is readable. No verb changes
+//! the recording it reads.
 
 mod attached;
 pub(crate) mod survey;
 
-use std::fmt;
+use std::fmt::{self, Write};
 use std::fs::{self, File};
 use std::io::{BufReader, BufWriter};
 use std::path::{Path, PathBuf};
@@ -131,7 +131,11 @@ fn save_readable(args: &RecoverArgs) -> anyhow::Result<Exit> {
         // The first error is the one to report.
         let _ = fs::remove_file(&out);
     })?;
-    result(&format!("{}\n{}{}", out.display(), recovered_text(recovered), survey.loss()?))?;
+    let mut text = format!("{}\n{}", out.display(), recovered_text(recovered));
+    for line in survey.loss()?.lines() {
+        writeln!(text, "{}: {line}", path.display())?;
+    }
+    result(&text)?;
     Ok(Exit::Passed)
 }
 

@@ -215,7 +215,7 @@ impl Survey {
         Ok(text + &self.loss_with_advice()?)
     }
 
-    /// What is missing or unreadable, and what helps; empty for a complete recording.
+    /// What is thinned, missing or unreadable, and what helps; empty for a complete recording.
     pub(crate) fn loss_with_advice(&self) -> Result<String, Error> {
         let mut text = self.loss()?;
         if self.was_cut_short {
@@ -224,7 +224,7 @@ impl Survey {
         Ok(text)
     }
 
-    /// What is missing or unreadable, and where.
+    /// What is thinned, missing or unreadable, and where.
     pub(super) fn loss(&self) -> Result<String, Error> {
         let mut text = String::new();
         if self.is_thinned {

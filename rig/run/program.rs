@@ -21,7 +21,7 @@ use masseter_shared::lifecycle::{End, Order, Silence, Start, line};
 use masseter_shared::transport::Domain;
 use masseter_terminal::status;
 use rustix::net::sockopt::socket_peercred;
-use rustix::process::{Pid, Signal, kill_process_group};
+use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
 
 use super::child::{KILLED, POLL, READY_TIMEOUT, describe, open_handle};
 use super::exec_program::tied_to_this_process;
@@ -44,6 +44,7 @@ pub(super) struct Program {
 struct Executable {
     path: PathBuf,
     child: Child,
+    status: Option<ExitStatus>,
 }
 
 struct Admitted {
@@ -53,10 +54,34 @@ struct Admitted {
 }
 
 impl Executable {
-    /// Kills it with what it has started, which is in its process group; whether something was there. A script may wait for
-    /// the controller, and leave it behind.
-    fn kill(&self) -> bool {
-        kill_process_group(Pid::from_child(&self.child), Signal::KILL).is_ok()
+    /// Its exit status once it has ended. What it has started is killed then, as long as its process group keeps its
+    /// name: a script may leave the controller behind.
+    fn exit_status(&mut self) -> io::Result<Option<ExitStatus>> {
+        if self.status.is_none() && self.is_zombie()? {
+            self.kill_group();
+            self.status = Some(self.child.wait()?);
+        }
+        Ok(self.status)
+    }
+
+    /// Whether it has ended and nobody has waited for it.
+    fn is_zombie(&self) -> io::Result<bool> {
+        let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
+        Ok(waitid(WaitId::Pid(Pid::from_child(&self.child)), options)?.is_some())
+    }
+
+    /// Kills it, with what it has started; whether it still ran.
+    fn kill(&mut self) -> bool {
+        if self.status.is_some() {
+            return false;
+        }
+        self.kill_group();
+        self.child.kill().is_ok()
+    }
+
+    fn kill_group(&self) {
+        // It may have left its group.
+        let _ = kill_process_group(Pid::from_child(&self.child), Signal::KILL);
     }
 }
 
@@ -90,7 +115,7 @@ impl Program {
                     .spawn()
             })
             .with_context(|| format!("the controller {} cannot be started", path.display()))?;
-        program.executable = Some(Executable { path: path.to_owned(), child });
+        program.executable = Some(Executable { path: path.to_owned(), child, status: None });
         Ok(program)
     }
 
@@ -99,8 +124,8 @@ impl Program {
         self.admitted.as_ref().map_or(0, |admitted| admitted.process_id)
     }
 
-    /// Waits until the program has attached and is ready; none if `is_cancelled` becomes true first. Fails once another process
-    /// has died.
+    /// Waits until the program has attached and is ready; none if `is_cancelled` becomes true first. Fails once another
+    /// process has died.
     pub(super) fn wait_ready(
         &mut self,
         is_cancelled: impl Fn() -> bool,
@@ -143,9 +168,10 @@ impl Program {
 
     /// Refuses an executable that has ended or has taken too long.
     fn check_executable(&mut self, is_in_time: bool) -> anyhow::Result<()> {
-        let Some(Executable { path, child }) = &mut self.executable else { return Ok(()) };
-        let path = path.display();
-        if let Some(status) = child.try_wait()? {
+        let Some(executable) = &mut self.executable else { return Ok(()) };
+        let status = executable.exit_status()?;
+        let path = executable.path.display();
+        if let Some(status) = status {
             bail!(
                 "the controller {path} ended ({}) before it was ready; see its message above, and docs/interface.md for \
                  how a controller attaches",
@@ -243,7 +269,7 @@ impl Program {
 
     /// Kills an executable of the rig; whether it did.
     pub(super) fn kill(&mut self) -> bool {
-        self.executable.as_ref().is_some_and(Executable::kill)
+        self.executable.as_mut().is_some_and(Executable::kill)
     }
 
     /// How the program ended its work; none while it works. It has failed where it gives no report.
@@ -266,9 +292,9 @@ impl Program {
 
     /// The exit status of an executable, if it ends in time.
     fn await_exit(&mut self) -> io::Result<Option<ExitStatus>> {
-        let Some(Executable { child, .. }) = &mut self.executable else { return Ok(None) };
+        let Some(executable) = &mut self.executable else { return Ok(None) };
         for _ in 0..EXIT_TIMEOUT.as_millis() / POLL.as_millis() {
-            if let Some(status) = child.try_wait()? {
+            if let Some(status) = executable.exit_status()? {
                 return Ok(Some(status));
             }
             clock::sleep(POLL);
@@ -279,7 +305,7 @@ impl Program {
     /// Closes the line, and ends an executable at once (SIGKILL); returns what became of the program, in words.
     pub(super) fn give_up(&mut self) -> &'static str {
         self.close();
-        let Some(executable) = &self.executable else { return "was left to its user" };
+        let Some(executable) = &mut self.executable else { return "was left to its user" };
         executable.kill();
         KILLED
     }

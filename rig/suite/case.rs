@@ -36,7 +36,7 @@ impl Cases {
         }
         // A folder may be named beside one of its files.
         let mut seen = BTreeSet::new();
-        files.retain(|file| seen.insert(file.canonicalize().unwrap_or_else(|_| file.clone())));
+        files.retain(|file| seen.insert(located(file)));
         let all = named(files);
         let (chosen, others): (Vec<_>, Vec<_>) =
             all.into_iter().partition(|case| filter.is_none_or(|text| case.name.contains(text)));
@@ -46,6 +46,12 @@ impl Cases {
         }
         Ok(Self { chosen, filtered_out: others.len() })
     }
+}
+
+/// A file by the one name of its folder. The file may be a link, and its folder has the files that it names.
+fn located(file: &Path) -> PathBuf {
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    folder.canonicalize().unwrap_or_else(|_| folder.to_owned()).join(file.file_name().unwrap_or_default())
 }
 
 /// The scenarios of a folder in the order of their names, or a file itself.

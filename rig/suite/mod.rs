@@ -14,7 +14,7 @@ use std::path::PathBuf;
 use std::time::UNIX_EPOCH;
 
 use anyhow::{Context, ensure};
-use masseter_report::junit_of_suite;
+use masseter_report::{JunitRun, junit_of_suite};
 use masseter_shared::clock;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 use rayon::prelude::*;
@@ -25,6 +25,7 @@ use crate::run::needs_processes;
 use args::{TestArgs, TestClock};
 use case::{Case, Cases};
 use outcome::Tested;
+use print::Others;
 use trial::Trials;
 
 /// Runs the suite; [`Exit::Passed`] only if every scenario passed.
@@ -37,9 +38,16 @@ pub(crate) fn test(args: &TestArgs) -> Result<Exit, Failure> {
     print::begin(chosen.len()).incomplete()?;
     let all = run_all(&chosen, &Trials { args, out: &out, interrupts: &interrupts }).incomplete()?;
     let took_s = (clock::now_ns() - began_ns) as f64 / 1e9;
-    print::end(&all, filtered_out, args.allow_untested, took_s).incomplete()?;
+    let is_over = |case: &&Case| all.iter().any(|tested| tested.case == **case);
+    let unrun: Vec<_> = chosen.iter().filter(|case| !is_over(case)).collect();
+    let others = Others { filtered_out, unrun: unrun.len() };
+    print::end(&all, others, args.allow_untested, took_s).incomplete()?;
     if let Some(path) = &args.junit {
-        let runs: Vec<_> = all.iter().map(|tested| tested.junit(args.allow_untested)).collect();
+        let runs = all.iter().map(|tested| tested.junit(args.allow_untested));
+        // As errors, since most CI systems show a suite with skipped cases as passed.
+        let unrun =
+            unrun.iter().map(|case| JunitRun::new(&case.name, Err("interrupted before its end"), true, 0.0));
+        let runs: Vec<_> = runs.chain(unrun).collect();
         let xml = junit_of_suite(&runs, took_s).context("cannot make the JUnit document").incomplete()?;
         fs::write(path, xml).with_context(|| format!("cannot write {}", path.display())).incomplete()?;
     }

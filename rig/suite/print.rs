@@ -24,17 +24,20 @@ fn times(retries: u32) -> String {
     if retries == 1 { "1 retry".to_owned() } else { format!("{retries} retries") }
 }
 
-/// What failed and why, then the result of the suite.
-pub(super) fn end(
-    all: &[Tested],
-    filtered_out: usize,
-    allow_untested: bool,
-    took_s: f64,
-) -> anyhow::Result<()> {
-    result(&text(all, filtered_out, allow_untested, took_s))
+/// The numbers of scenarios without a result.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Others {
+    pub(super) filtered_out: usize,
+    /// Because the user interrupted.
+    pub(super) unrun: usize,
 }
 
-fn text(all: &[Tested], filtered_out: usize, allow_untested: bool, took_s: f64) -> String {
+/// What failed and why, then the result of the suite.
+pub(super) fn end(all: &[Tested], others: Others, allow_untested: bool, took_s: f64) -> anyhow::Result<()> {
+    result(&text(all, others, allow_untested, took_s))
+}
+
+fn text(all: &[Tested], others: Others, allow_untested: bool, took_s: f64) -> String {
     let short: Vec<_> = all.iter().filter(|tested| tested.outcome.is_short(allow_untested)).collect();
     let mut text = String::from("\n");
     if !short.is_empty() {
@@ -43,8 +46,13 @@ fn text(all: &[Tested], filtered_out: usize, allow_untested: bool, took_s: f64) 
         text = format!("\nfailures:\n\n{}\nfailures:\n{}\n", details.join("\n"), names.concat());
     }
     let count = |outcome| all.iter().filter(|tested| tested.outcome == outcome).count();
-    let word = if short.is_empty() { "ok" } else { "FAILED" };
-    let others = if filtered_out > 0 { format!("; {filtered_out} filtered out") } else { String::new() };
+    let word = match (short.is_empty(), others.unrun) {
+        (false, _) => "FAILED",
+        (true, 0) => "ok",
+        (true, _) => "INTERRUPTED",
+    };
+    let left_out = |count, why| if count > 0 { format!("; {count} {why}") } else { String::new() };
+    let others = left_out(others.unrun, "not run") + &left_out(others.filtered_out, "filtered out");
     text + &format!(
         "test result: {word}. {} passed; {} failed; {} untested{others}; finished in {took_s:.2}s\n",
         count(Outcome::Passed),

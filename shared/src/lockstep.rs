@@ -1,8 +1,9 @@
-//! Simulated time in three processes: plant and controller take turns, and the plant never runs far ahead of the recorder.
+//! Simulated time in three processes: plant and controller take turns, and the plant never runs far ahead of the
+//! recorder.
 //!
-//! A turn ends with a signal to the other loop, after all messages of the turn. A process that waits sleeps. Whoever
-//! stops answering for longer than the [`Patience`], the plant for longer than twice that, is given up: the process that waits reports that to the supervisor and
-//! goes on alone, in real time, so that its watchdogs end the run.
+//! A turn ends with a signal to the other loop, after all messages of the turn. A process that waits sleeps. A process
+//! that does not answer is given up after the [`Patience`], the plant after twice that. The process that waits reports
+//! the silence to the supervisor and goes on alone, in real time, so that its watchdogs end the run.
 
 use std::mem;
 use std::time::Duration;
@@ -198,8 +199,8 @@ impl Lockstep {
         Ok(ended.is_some())
     }
 
-    /// Whether the other loop ends its turn within this time, which [`Self::await_turn`] then returns at once. So it is once
-    /// the other loop was given up: its silence counts from one call to the next.
+    /// Whether the other loop ends its turn within this time, which [`Self::await_turn`] then returns at once. So it is
+    /// once the other loop was given up: its silence counts from one call to the next.
     ///
     /// # Errors
     /// As [`Self::await_turn`].

@@ -22,15 +22,21 @@ pub(super) fn orphans(folder: &Path) -> Vec<PathBuf> {
     orphans
 }
 
-/// Whether the file is a root of its folder, or the file of the module above has a `mod` of its name.
+/// Whether the file is the root of a crate, or the file of the module above has a `mod` of its name.
 fn is_named(path: &Path) -> bool {
-    let name = path.file_stem().and_then(|name| name.to_str()).unwrap();
-    let folder = path.parent().unwrap();
+    // A `mod.rs` goes by the name of its folder.
+    let module = if path.ends_with("mod.rs") { path.parent().unwrap() } else { path };
+    let folder = module.parent().unwrap();
+    let name = module.file_stem().and_then(|name| name.to_str()).unwrap();
+    let is_in_root = [folder, folder.parent().unwrap()].iter().any(|above| above.join("Cargo.toml").exists());
+    if is_in_root && ["lib", "main", "build"].contains(&name) {
+        return true;
+    }
     let above = ["mod.rs", "lib.rs", "main.rs"].map(|root| folder.join(root));
     // The module above may be a block in the file of the one above that.
     let files = folder.ancestors().take(2).map(|folder| folder.with_extension("rs"));
-    let above = above.into_iter().chain(files);
-    let text: String = above.filter_map(|file| fs::read_to_string(file).ok()).collect();
-    let is_mod = |line: &str| line.ends_with(&format!("mod {name};"));
-    ["mod", "lib", "main", "build"].contains(&name) || text.lines().any(is_mod)
+    let text: String =
+        above.into_iter().chain(files).filter_map(|file| fs::read_to_string(file).ok()).collect();
+    let is_mod = |line: &str| !line.trim_start().starts_with("//") && line.ends_with(&format!("mod {name};"));
+    text.lines().any(is_mod)
 }

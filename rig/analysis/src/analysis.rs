@@ -30,8 +30,8 @@ use crate::tracking::{PathSample, PoseSource, Tracking};
 /// Computes the [`Figures`] of a run from its messages, in their order in the recording.
 ///
 /// It holds no more than a fixed amount of memory, beside one histogram per second of the run and the run's events.
-/// [Without a report](Self::without_report) there are no histograms: beside about 1 MB it holds 8 bytes per second of the
-/// motion, the run's events, and the frames since the last SYNC of each bus.
+/// [Without a report](Self::without_report) there are no histograms: beside about 1 MB it holds 8 bytes per second of
+/// the motion, the run's events, and the frames since the last SYNC of each bus.
 ///
 /// ```
 /// use masseter_analysis::Analysis;
@@ -130,7 +130,8 @@ impl Analysis {
         Self { shown: None, ..Self::new(scenario, declared) }
     }
 
-    /// The same for messages that come while the run goes on. A clone that [finishes](Self::finish) gives the figures so far.
+    /// The same for messages that come while the run goes on. A clone that [finishes](Self::finish) gives the figures
+    /// so far.
     #[must_use]
     pub fn while_running(scenario: &Scenario, declared: &Declared) -> Self {
         let requirements = Requirements::while_running(scenario, declared);
@@ -224,7 +225,7 @@ impl Analysis {
         self.tracking.state(state, is_fresh, is_disturbed).into_iter().for_each(|sample| self.path(sample));
         self.cycles = self.cycles.max(state.seq);
         self.final_state = Some(state.controller_state.into());
-        if state.controller_state == ControllerState::Running.code() && state.motion_time_s > 0.0 {
+        if state.motion_time_s >= 0.0 {
             let reached_s = self.motion_reached_s.get_or_insert(0.0);
             *reached_s = reached_s.max(state.motion_time_s);
         }

@@ -43,7 +43,7 @@ pub struct Figures {
     pub overrun_attribution: Option<OverrunAttribution>,
     /// The last state of the controller's sequence; none without a single state message.
     pub final_state: Option<Code<ControllerState>>,
-    /// The furthest motion time that the controller stated while the motion played, s; none without one.
+    /// The furthest motion time that the controller stated, s; none without one.
     pub motion_reached_s: Option<f64>,
     /// Deadlines missed just before a safe stop; none without one.
     pub outage: Option<Outage>,
@@ -57,8 +57,8 @@ pub struct Figures {
     pub signals: Vec<SignalFigures>,
     /// The controller's parameters.
     pub parameters: Vec<ParameterFigures>,
-    /// The greatest vertical force of food and upper teeth on the emulated jaw, N; none where the jaws cannot touch, and on the
-    /// robot.
+    /// The greatest vertical force of food and upper teeth on the emulated jaw, N; none where the jaws cannot touch,
+    /// and on the robot.
     pub bite_force_max_n: Option<f64>,
     /// What the lower teeth bore; none where the jaws cannot touch, and on the robot.
     #[serde(skip_serializing_if = "Option::is_none")]

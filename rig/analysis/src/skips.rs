@@ -29,7 +29,7 @@ pub struct SkipFigures {
     pub by_machine: u64,
     /// Those before which a stretch of work took too long.
     pub while_working: u64,
-    /// Those behind messages that were not recorded.
+    /// Those behind messages that were not recorded, and those that passed before the first wait.
     pub unknown_cause: u64,
     /// Those of a stall that a fault of the scenario made.
     pub by_scenario: u64,
@@ -157,8 +157,8 @@ impl Default for Skips {
 
 impl Skips {
     /// The process' counters in its next message. Returns how many deadlines were skipped just before its wake-up; none
-    /// where messages before it are missing, since which wake-up skipped them is not known. A fault of the scenario may have
-    /// stalled the process before: what it lost is no evidence then.
+    /// where messages before it are missing, since which wake-up skipped them is not known. A fault of the scenario may
+    /// have stalled the process before: what it lost is no evidence then.
     pub(super) fn take(&mut self, counters: &Counters, period_ns: u64, is_of_scenario: bool) -> u64 {
         let past = self.figures;
         let stall_ns = counters.stalled_ns.saturating_sub(past.stalled_ns);

@@ -2,7 +2,7 @@
 //!
 //! What the checks come to is the [verdict](super::verdict)'s.
 
-use masseter_shared::config::{ExpectConfig, ExpectedVerdict, MotionConfig, StimulusConfig};
+use masseter_shared::config::{ExpectedVerdict, MotionConfig, StimulusConfig};
 use masseter_shared::messages::codes::{Cause, ControllerState};
 use masseter_shared::wording::counted;
 
@@ -11,9 +11,7 @@ use crate::motion_checks::{faults, tracking};
 use crate::text;
 use crate::timing::{Timing, TimingWord};
 use masseter_analysis::requirements::{RequirementFigures, RequirementResult};
-use masseter_analysis::{
-    BusResponse, Code, EventRecord, Figures, ResponseFigures, SkipFigures, TrackingFigures,
-};
+use masseter_analysis::{BusResponse, EventRecord, Figures, ResponseFigures, SkipFigures, TrackingFigures};
 use masseter_recording::{Ending, Manifest};
 
 /// None in a run that ended before its first cycle.
@@ -23,10 +21,7 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     }
     let limits = &manifest.scenario.checks;
     let is_disturbed = timing.is_disturbed();
-    let sequence = match given_up(manifest, figures) {
-        Some(finding) => Check::judged("sequence", finding, false),
-        None => sequence(figures.final_state, &figures.events, manifest.scenario.expect.as_ref()),
-    };
+    let sequence = sequence(manifest, figures);
     let TrackingFigures { actual_source, samples, actual, estimated, undisturbed, .. } = &figures.tracking;
     let tracking_of = |name, errors, undisturbed_errors| {
         let check = tracking(name, *samples, errors, limits);
@@ -68,26 +63,10 @@ fn kept_time(timing: &Timing, limit: u64) -> Option<Check> {
     Some(Check::new("timing", finding, result))
 }
 
-/// The finding on a motion that passed so slowly that the controller gave it up on its way.
-fn given_up(manifest: &Manifest, figures: &Figures) -> Option<String> {
-    let (end_s, reached_s) = (manifest.motion_end_s?, figures.motion_reached_s?);
-    let played_s = figures.tracking.samples as f64 * manifest.scenario.period_s();
-    let times = MotionConfig::MOST_DURATIONS;
-    let is_given_up = played_s > 0.99 * times * manifest.motion_s && reached_s < 0.99 * end_s;
-    is_given_up.then(|| {
-        format!(
-            "the motion came to {reached_s:.2} of {end_s:.2} s of its own time in {times} times its duration"
-        )
-    })
-}
-
 /// The motion must be played to its end, and not be stopped by request, unless the scenario expects that.
-fn sequence(
-    state: Option<Code<ControllerState>>,
-    events: &[EventRecord],
-    expect: Option<&ExpectConfig>,
-) -> Check {
-    let was_stopped = events.iter().any(|event| event.cause == Cause::StopRequested);
+fn sequence(manifest: &Manifest, figures: &Figures) -> Check {
+    let (state, expect) = (figures.final_state, manifest.scenario.expect.as_ref());
+    let was_stopped = figures.events.iter().any(|event| event.cause == Cause::StopRequested);
     let how = if was_stopped { ", stopped by request before the motion's end" } else { "" };
     let in_words = state.map_or_else(|| "none".to_owned(), |state| state.to_string());
     let is_in = |expected| state.is_some_and(|state| state == expected);
@@ -95,16 +74,33 @@ fn sequence(
     if is_expected(ExpectedVerdict::Died) || is_expected(ExpectedVerdict::Incomplete) {
         return Check::not_judged("sequence", format!("ended in state {in_words}{how}"));
     }
+    let has_finished = is_in(ControllerState::Finished);
+    if let Some(finding) = given_up(manifest, figures).filter(|_| has_finished && !was_stopped) {
+        return Check::judged("sequence", finding, false);
+    }
     let (is_good, as_expected) = if is_expected(ExpectedVerdict::SafeStop) && is_in(ControllerState::SafeStop)
     {
         (true, ", as expected")
     } else if is_expected(ExpectedVerdict::Interrupted) {
-        (was_stopped && is_in(ControllerState::Finished), ", as expected")
+        (was_stopped && has_finished, ", as expected")
     } else {
-        (is_in(ControllerState::Finished) && !was_stopped, "")
+        (has_finished && !was_stopped, "")
     };
     let as_expected = if is_good { as_expected } else { "" };
     Check::judged("sequence", format!("ended in state {in_words}{how}{as_expected}"), is_good)
+}
+
+/// The finding on a motion that did not come to its end: the rig's motion controller gives up what passes too slowly. A
+/// program of the user may have a motion time of its own.
+fn given_up(manifest: &Manifest, figures: &Figures) -> Option<String> {
+    let (end_s, reached_s) = (manifest.motion_end_s?, figures.motion_reached_s?);
+    let is_given_up = manifest.controller.is_none() && reached_s < 0.99 * end_s;
+    let times = MotionConfig::MOST_DURATIONS;
+    is_given_up.then(|| {
+        format!(
+            "the motion came to {reached_s:.2} of {end_s:.2} s of its own time in {times} times its duration"
+        )
+    })
 }
 
 /// The name of the check of the stimuli.
@@ -171,8 +167,8 @@ fn dropped_messages(missing: u64, ending: &Ending, is_cut_short: bool, is_damage
     }
 }
 
-/// No message may take longer on its bus than the plan allows at worst. Frames off their times are left out only where the
-/// machine lost cycles.
+/// No message may take longer on its bus than the plan allows at worst. Frames off their times are left out only where
+/// the machine lost cycles.
 fn bus_response(response: &BusResponse, plant: &SkipFigures) -> Check {
     const NAME: &str = "bus response";
     if let Some(why) = &response.unbounded {

@@ -47,8 +47,8 @@ section! {
         pub seed: u64 = 1,
         /// Cycles per second, Hz.
         pub rate_hz: u32 = 1000,
-        /// Duration of the motion, s; when absent a recording's own length, or ten seconds. A generated motion ends closed
-        /// if this holds a cycle and half a second, otherwise on its way.
+        /// Duration of the motion, s; when absent a recording's own length, or ten seconds. A generated motion ends
+        /// closed if this holds a cycle and half a second, otherwise on its way.
         pub duration_s: Option<f64> = None,
         /// The motion of the jaw.
         pub motion: MotionConfig = MotionConfig::default(),
@@ -106,8 +106,8 @@ section! {
 }
 
 impl Scenario {
-    /// A refusal with its place in the file of the scenario, if the file alone leads to it: an argument may have replaced
-    /// the value.
+    /// A refusal with its place in the file of the scenario, if the file alone leads to it: an argument may have
+    /// replaced the value.
     #[must_use]
     pub fn place_refusal(mut refusal: ScenarioError, path: &Path) -> ScenarioError {
         let in_words = refusal.to_string();
@@ -195,8 +195,8 @@ impl Scenario {
     /// ```
     ///
     /// # Errors
-    /// [`ScenarioError::Malformed`] with line, column and key, and with the most similar key for an unknown one. An array
-    /// in place of a table is refused.
+    /// [`ScenarioError::Malformed`] with line, column and key, and with the most similar key for an unknown one. An
+    /// array in place of a table is refused.
     pub fn parse(path: &Path, text: &str) -> Result<Self, ScenarioError> {
         let refused = |error| malformed::<Self>(path, text, None, &error);
         let document = Document::parse(path, text).map_err(refused)?;
@@ -267,8 +267,8 @@ impl Scenario {
         })
     }
 
-    /// The scenario with the values of a table in place of its own. A table of another `kind` replaces the one that is there,
-    /// and an entry of a list has the name that `after` and requirements use: `faults.NAME.at_s`.
+    /// The scenario with the values of a table in place of its own. A table of another `kind` replaces the one that is
+    /// there, and an entry of a list has the name that `after` and requirements use: `faults.NAME.at_s`.
     ///
     /// # Errors
     /// [`ScenarioError::Malformed`] for an unknown key, a value of another type, or an entry that is not there.
@@ -341,7 +341,7 @@ impl Scenario {
         require_within(&[("duration_s", duration_s, SHORTEST_MOTION_S, LONGEST_S)])
     }
 
-    /// Faults, stimuli and requirements, and the order that `after` gives them.
+    /// Faults, stimuli and their order by `after`, then requirements and the expected outcome.
     fn validate_entries(&self) -> Result<(), ScenarioError> {
         let (arch, entries) = (self.arch(), self.entry_names());
         for (number, fault) in self.faults.iter().enumerate() {

@@ -195,12 +195,12 @@ impl Session {
         self.duties.named.signals_mut()
     }
 
-    /// Publishes this cycle's command and what the program made of the reading. The session enters the time stamps and the
-    /// use of time into the state.
+    /// Publishes this cycle's command and what the program made of the reading. The session enters the time stamps and
+    /// the use of time into the state.
     ///
     /// # Errors
-    /// [`SessionError`] for a second command in one cycle, a command that names another cycle, before the first cycle, or
-    /// when it cannot be sent.
+    /// [`SessionError`] for a second command in one cycle, a command that names another cycle, before the first cycle,
+    /// or when it cannot be sent.
     pub fn publish(&mut self, command: &Command, state: &State) -> Result<(), SessionError> {
         let OpenCycle { wake, received_ns, is_published } = self.cycle.ok_or(SessionError::NoCycle)?;
         if is_published {
@@ -247,7 +247,7 @@ impl Session {
     /// # Errors
     /// [`ProcessError`] when the supervisor is gone.
     pub fn fail(mut self, reason: &str) -> Result<(), ProcessError> {
-        // The reason first: the plant may end as soon as the last turn has.
+        // The reason first: the turn cannot end where the plant has failed too.
         self.report_end(End::Failed { reason: reason.to_owned() })?;
         self.end_turn(true)
     }
@@ -410,8 +410,8 @@ impl ControllerPorts for Ports {
         Ok(self.events.publish_by(|| self.clock.now_ns(), |message| *message = *event)?)
     }
 
-    /// The supervisor carries it out. In lockstep, simulated time stands still until it has, so that the fault strikes in
-    /// this cycle.
+    /// The supervisor carries it out. In lockstep, simulated time stands still until it has, so that the fault strikes
+    /// in this cycle.
     fn fault_is_due(&mut self, fault: usize) -> Result<(), ProcessError> {
         let report = Report::Due { fault, now_ns: self.clock.now_ns() };
         self.link.report(&report).map_err(ProcessError::Supervisor)?;

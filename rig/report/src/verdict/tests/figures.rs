@@ -142,7 +142,6 @@ fn each_thing_that_is_wrong_has_its_verdict() {
         (|run| run.figures.final_state = None, Exit::Failed, "failed: sequence"),
         (
             |run| {
-                run.figures.tracking.samples = 100_000;
                 run.manifest.motion_end_s = Some(9.0);
                 run.figures.motion_reached_s = Some(8.8);
             },
