@@ -12,6 +12,7 @@ use clap::Args;
 use masseter_shared::geometry::Mechanism;
 use masseter_shared::input::excerpt;
 use masseter_shared::rows::{Line, fields, numbers};
+use masseter_shared::wording::shortest;
 use masseter_terminal::{Exit, status, taken};
 use rayon::prelude::*;
 
@@ -61,7 +62,7 @@ impl Lines {
     /// One line: its values, nothing for those that are no number or absent, then its status.
     pub(super) fn row(&mut self, values: impl IntoIterator<Item = f64>, status: &str) {
         let values = values.into_iter().chain(iter::repeat(f64::NAN)).take(self.width);
-        let cells = values.map(|value| if value.is_nan() { String::new() } else { value.to_string() });
+        let cells = values.map(|value| if value.is_nan() { String::new() } else { shortest(value) });
         let written = self.csv.write_record(cells.chain([status.to_owned()]));
         written.expect("all lines have the same width, and a vector takes them");
     }

@@ -21,6 +21,21 @@ pub fn counted(number: u64, noun: &str) -> String {
     format!("{number} {noun}{ending}")
 }
 
+/// The shortest text that is read as the same number. Numbers below 1e-5 and from 1e16 on have an exponent.
+///
+/// # Examples
+/// ```
+/// use masseter_shared::wording::shortest;
+///
+/// assert_eq!(shortest(0.268), "0.268");
+/// assert_eq!(shortest(-5.23707e-18), "-5.23707e-18");
+/// assert_eq!(shortest(0.0), "0");
+/// ```
+pub fn shortest(number: f64) -> String {
+    let is_plain = number == 0.0 || !number.is_finite() || (1e-5..1e16).contains(&number.abs());
+    if is_plain { number.to_string() } else { format!("{number:e}") }
+}
+
 /// The most similar of the names to one that is none of them, whatever its case; none if all are unlike it.
 ///
 /// # Examples

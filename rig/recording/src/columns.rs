@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use masseter_shared::messages::{FrameTap, Message};
+use masseter_shared::wording::shortest;
 use mcap::Channel;
 
 use super::frames::FrameBatch;
@@ -98,7 +99,7 @@ impl fmt::Display for Number {
             Self::Unsigned(value) => value.fmt(text),
             Self::Signed(value) => value.fmt(text),
             Self::Single(value) => value.fmt(text),
-            Self::Double(value) => value.fmt(text),
+            Self::Double(value) => shortest(*value).fmt(text),
         }
     }
 }
