@@ -54,8 +54,8 @@ struct Admitted {
 }
 
 impl Executable {
-    /// Its exit status once it has ended. What it has started is killed then, as long as its process group keeps its
-    /// name: a script may leave the controller behind.
+    /// Its exit status once it has ended. Its process group is killed first, before the number can be another's: a
+    /// script may leave the controller behind.
     fn exit_status(&mut self) -> io::Result<Option<ExitStatus>> {
         if self.status.is_none() && self.is_zombie()? {
             self.kill_group();
