@@ -272,7 +272,12 @@ fn nothing_of_a_run_can_be_read_by_a_stranger() {
     drop(cores);
     assert_played(&folder, output.status, &(stdout(&output) + &stderr(&output)));
     assert_eq!((mode(&folder), mode(&recording)), (0o700, 0o600));
-    assert!(!stranger_can("ls", &[folder.to_str().unwrap()]));
+    let folder = folder.to_str().unwrap();
+    assert!(!stranger_can("ls", &[folder]));
+    let program = victim.workspace.file("masseter");
+    let report = as_user(STRANGER, program.to_str().unwrap()).args(["report", folder]).output().unwrap();
+    assert_eq!(report.status.code(), Some(2), "{}", stdout(&report));
+    assert!(stderr(&report).contains("cannot be read: Permission denied"), "{}", stderr(&report));
 }
 
 #[test]
