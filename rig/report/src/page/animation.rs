@@ -35,8 +35,8 @@ struct Animation {
     forces: Vec<Vec<f64>>,
     /// What the actual pose is called.
     actual_name: &'static str,
-    /// Time since the run's first SYNC, s, then the actual and the desired pose of the platform and, where the actual
-    /// pose is the true one, the estimated one, each as x y z, w x y z.
+    /// Time since the run's first SYNC, s, then the actual and the desired pose of the platform, each as x y z, w x y z.
+    /// The estimated pose follows where the actual one is the true one.
     frames: Vec<Vec<f64>>,
 }
 

@@ -1,0 +1,190 @@
+mod counters;
+
+use proptest::prelude::*;
+
+use super::*;
+
+const PERIOD_NS: u64 = 1_000_000;
+
+/// `[skipped, stalled_ns, overlong_ns, late_ns]` message by message.
+type Messages<'a> = &'a [[u64; 4]];
+
+fn skips_of(messages: Messages) -> Skips {
+    let mut skips = Skips::default();
+    for (seq, &[skipped, stalled_ns, overlong_ns, late_ns]) in (1..).zip(messages) {
+        let counters = Counters { seq, skipped, stalled_ns, overlong_ns, late_ns, ..Counters::default() };
+        skips.take(&counters, PERIOD_NS, false);
+    }
+    skips
+}
+
+#[test]
+fn each_skip_has_one_cause() {
+    const STALL: u64 = 8_600_000;
+    const MORE: u64 = STALL + 3_000_000;
+    // What is counted message by message; skips by the machine, while working, and all.
+    let cases: [(Messages, [u64; 3]); 14] = [
+        (&[[0, 0, 0, 0], [0, 0, 0, 0]], [0, 0, 0]),
+        // Woken 8.6 ms late; the passed deadlines are skipped after the late cycle.
+        (&[[0, 0, 0, 0], [0, STALL, 0, STALL], [7, STALL, 0, 100]], [7, 0, 7]),
+        // A stretch of work of 8.6 ms.
+        (&[[0, 0, 0, 0], [8, 0, STALL, 0]], [0, 8, 8]),
+        // No time lost at all: the rig's own.
+        (&[[0, 0, 0, 0], [3, 0, 0, 0]], [0, 0, 3]),
+        // More skipped than the time lost explains.
+        (&[[0, 0, 0, 0], [20, STALL, 0, 0]], [8, 0, 20]),
+        // The greater loss explains first.
+        (&[[0, 0, 0, 0], [8, 60_000, STALL, 0]], [0, 8, 8]),
+        (&[[0, 0, 0, 0], [2, 2_500_000, 3_500_000, 0]], [0, 2, 2]),
+        (&[[0, 0, 0, 0], [2, 3_500_000, 2_500_000, 0]], [2, 0, 2]),
+        // Neither alone explains it.
+        (&[[0, 0, 0, 0], [1, 700_000, 600_000, 0]], [0, 1, 1]),
+        // One loss explains its skips once, also when more are skipped a cycle later.
+        (&[[0, 0, 0, 0], [3, 3_000_000, 0, 900_000], [6, 3_000_000, 0, 0]], [3, 0, 6]),
+        (&[[0, 0, 0, 0], [3, 0, 3_000_000, 900_000], [6, 0, 3_000_000, 0]], [0, 3, 6]),
+        // A carried-over loss explains a later skip, and a new loss its own.
+        (&[[0, STALL, 0, STALL], [8, MORE, 0, 3_000_000], [11, MORE, 0, 0]], [11, 0, 11]),
+        // As late as both losses together, but not by all of the work.
+        (&[[0, 1_000_000, 3_000_000, 2_000_000], [4, 1_000_000, 3_000_000, 0]], [1, 1, 4]),
+        // Time that a wake-up in time had made up for explains nothing.
+        (&[[0, STALL, STALL, 0], [2, STALL, STALL, 0]], [0, 0, 2]),
+    ];
+    for (messages, expected) in cases {
+        let figures = skips_of(messages).figures;
+        let found = [figures.by_machine, figures.while_working, figures.skipped];
+        assert_eq!(found, expected, "{messages:?}");
+    }
+}
+
+#[test]
+fn deadlines_that_passed_before_the_first_wait_have_an_unknown_cause() {
+    let figures = skips_of(&[[50, 0, 0, 0], [52, 2_000_000, 0, 0]]).figures;
+    assert_eq!([figures.unknown_cause, figures.by_machine, figures.skipped], [50, 2, 52]);
+}
+
+/// A process that skips as the real-time loop does, and its account.
+#[derive(Default)]
+struct Process {
+    now_ns: u64,
+    cycle: u64,
+    counters: Counters,
+    skips: Skips,
+}
+
+impl Process {
+    /// In its first wait.
+    fn started() -> Self {
+        let mut process = Self::default();
+        process.cycle(0, 0, 0);
+        process
+    }
+
+    /// Works and waits so long after a wake-up, is held up meanwhile, and if it came back in time once more while it
+    /// waits for its deadline.
+    fn cycle(&mut self, own_ns: u64, held_up_ns: u64, held_up_waiting_ns: u64) {
+        self.now_ns += own_ns + held_up_ns;
+        self.counters.stalled_ns += held_up_ns;
+        self.cycle += 1;
+        let missed = self.now_ns.saturating_sub(self.cycle * PERIOD_NS) / PERIOD_NS;
+        self.counters.skipped += missed;
+        self.cycle += missed;
+        let due_ns = self.cycle * PERIOD_NS;
+        if self.now_ns < due_ns {
+            self.now_ns = due_ns + held_up_waiting_ns;
+            self.counters.stalled_ns += held_up_waiting_ns;
+        }
+        self.counters.late_ns = self.now_ns - due_ns;
+        self.counters.seq += 1;
+        self.skips.take(&self.counters, PERIOD_NS, false);
+    }
+}
+
+#[test]
+fn a_moment_withheld_in_every_cycle_excuses_no_skip() {
+    let mut process = Process::default();
+    for cycle in 1..=1000 {
+        let own_ns = if cycle % 50 == 0 { 22 * PERIOD_NS / 10 } else { 9 * PERIOD_NS / 10 };
+        process.cycle(own_ns, 1000, 1000);
+    }
+    let figures = process.skips.figures;
+    assert_eq!((figures.by_machine, figures.while_working, figures.skipped), (0, 0, 20));
+}
+
+#[test]
+fn stalls_of_whole_periods_explain_what_they_skip() {
+    for periods in [1, 2, 5] {
+        for [held_up, waiting] in [[periods, 0], [0, periods]] {
+            let mut process = Process::started();
+            let own_ns = if held_up > 0 { PERIOD_NS } else { PERIOD_NS / 2 };
+            process.cycle(own_ns, held_up * PERIOD_NS, waiting * PERIOD_NS);
+            process.cycle(PERIOD_NS, 0, 0);
+            process.cycle(PERIOD_NS, 0, 0);
+            let figures = process.skips.figures;
+            assert_eq!((figures.by_machine, figures.skipped), (periods, periods), "{held_up} {waiting}");
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn a_process_that_keeps_its_time_has_every_skip_explained(
+        cycles in proptest::collection::vec((0..=PERIOD_NS, 0..3 * PERIOD_NS, 0..3 * PERIOD_NS), 1..100)
+    ) {
+        let mut process = Process::started();
+        for (own_ns, held_up_ns, waiting_ns) in cycles {
+            process.cycle(own_ns, held_up_ns, waiting_ns);
+        }
+        let figures = process.skips.figures;
+        prop_assert_eq!(figures.by_machine, figures.skipped);
+    }
+}
+
+#[test]
+fn skips_belong_to_a_wake_up_only_if_the_message_before_it_is_known() {
+    let skipped_before = |seq| {
+        let mut skips = Skips::default();
+        skips.take(&Counters { seq: 1, ..Counters::default() }, PERIOD_NS, false);
+        skips.take(&Counters { seq, skipped: 3, ..Counters::default() }, PERIOD_NS, false)
+    };
+    assert_eq!((skipped_before(2), skipped_before(3)), (3, 0));
+}
+
+#[test]
+fn what_happened_behind_missing_messages_has_no_known_cause() {
+    let mut process = Process::started();
+    process.counters.seq += 1;
+    process.cycle(0, 5 * PERIOD_NS, 0);
+    assert_eq!(process.skips.as_long_as(1), (0, 0));
+    process.cycle(0, 5 * PERIOD_NS, 0);
+    let figures = process.skips.figures;
+    assert_eq!((figures.skipped, figures.by_machine, figures.unknown_cause), (8, 4, 4));
+    assert_eq!(process.skips.as_long_as(1), (1, 0));
+}
+
+#[test]
+fn what_the_scenario_stalls_is_no_skip_of_machine_or_rig() {
+    let mut skips = Skips::default();
+    let stalls =
+        [(1, 0, 0, false), (2, 0, 60_000_000, true), (3, 60, 60_000_000, true), (4, 61, 61_000_000, false)];
+    for (seq, skipped, stalled_ns, is_of_scenario) in stalls {
+        let counters = Counters { seq, skipped, stalled_ns, ..Counters::default() };
+        skips.take(&counters, PERIOD_NS, is_of_scenario);
+    }
+    let figures = skips.figures;
+    assert_eq!((figures.skipped, figures.by_scenario, figures.by_machine), (61, 60, 1));
+    assert_eq!(skips.as_long_as(1), (1, 0));
+}
+
+#[test]
+fn stretches_are_counted_from_the_shortest_that_cost_a_deadline() {
+    let skips = skips_of(&[[0, 60_000, 70_000, 0], [1, 60_000, 2_070_000, 0], [5, 4_060_000, 7_070_000, 0]]);
+    assert_eq!(skips.shortest_costly_ns, Some(2_000_000));
+    assert_eq!(skips.as_long_as(2_000_000), (1, 2));
+    assert_eq!([0, 1].map(|least_ns| skips.as_long_as(least_ns)), [(2, 3); 2]);
+    // A stretch that a wake-up in time made up for is none of the next.
+    let skips = skips_of(&[[0, 0, 5_000_000, 0], [2, 0, 7_000_000, 0]]);
+    assert_eq!(skips.shortest_costly_ns, Some(2_000_000));
+    // What is left of a stretch is not a shorter one.
+    let skips = skips_of(&[[0, 0, 5_000_000, 2_000_000], [2, 0, 5_000_000, 0]]);
+    assert_eq!(skips.shortest_costly_ns, Some(5_000_000));
+}
