@@ -36,6 +36,7 @@ mod param;
 mod plant;
 mod recorder;
 mod recording_cli;
+mod refusals;
 mod replay;
 mod report_cli;
 mod robot;

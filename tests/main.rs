@@ -3,6 +3,7 @@
 
 mod any_controller;
 mod architecture;
+mod attacks;
 mod bad_input;
 mod bench;
 mod campaign;

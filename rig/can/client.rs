@@ -3,46 +3,41 @@
 //! The connection never blocks. Unsent text waits in a buffer of bounded size.
 
 use std::fmt::Display;
-use std::io::{self, Read, Write};
-use std::net::TcpStream;
 
-use masseter_can::socketcand::{ECHO, GREETING, OK, Request, RequestError, Requests, write_frame};
+use masseter_can::socketcand::{ECHO, OK, Request, RequestError, Requests, write_frame};
 use masseter_can::{Bus, ReceiveError};
 use masseter_plant::emulation::{NodePort, OpenLink};
 use masseter_shared::clock::SECOND_NS;
+use masseter_shared::conversation::{Conversation, Left, Limits};
 use masseter_shared::wording::counted;
 
 use crate::stderr_writer::StderrWriter;
 
-/// Most unsent bytes of a client; a bus at full load makes about 0.5 MB a second.
-const MAX_UNSENT: usize = 1 << 20;
+/// Most bytes from a client that has opened no bus.
+const MOST_BYTES: usize = 1 << 16;
 /// Delay of frames after the answer to a change of mode: clients expect that answer in a packet of its own, ns.
 const MODE_DELAY_NS: u64 = 20_000_000;
 
-/// Time for a new client to open a bus, so that silent connections keep no places, ns.
+/// Time for a client to open a bus after its first request, so that silent connections keep no places, ns.
 const OPEN_TIMEOUT_NS: u64 = 5 * SECOND_NS;
 
 /// A connected client.
 #[derive(Debug)]
 pub(super) struct Client {
-    stream: TcpStream,
+    conversation: Conversation,
     requests: Requests,
-    unsent: Vec<u8>,
     /// The bus that it asked for, and its place there once it has one.
     bus: Option<usize>,
     node: Option<NodePort>,
     frames_from_ns: Option<u64>,
-    open_by_ns: u64,
     heard_ns: u64,
 }
 
 /// Why a connection is closed.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum CloseReason {
-    #[error("closed")]
-    Closed,
     #[error(transparent)]
-    Io(#[from] io::Error),
+    Left(#[from] Left),
     #[error(transparent)]
     Request(#[from] RequestError),
     #[error("no bus '{name}'; the buses are can0 to can{}", .buses - 1)]
@@ -55,29 +50,14 @@ pub(super) enum CloseReason {
     Silent,
     #[error("a connection opens one bus: use another connection for another bus")]
     OpenTwice,
-    #[error("it reads too slowly: {0} bytes are unread")]
-    TooSlow(usize),
 }
 
 impl Client {
-    /// Greets a new client.
-    pub(super) fn accept(stream: TcpStream, now_ns: u64) -> io::Result<Self> {
-        stream.set_nonblocking(true)?;
-        stream.set_nodelay(true)?;
-        let unsent = GREETING.as_bytes().to_vec();
-        let open_by_ns = now_ns + OPEN_TIMEOUT_NS;
+    /// A client whose first request has come.
+    pub(super) fn new(mut conversation: Conversation, now_ns: u64) -> Self {
+        conversation.renew(Limits::answer(OPEN_TIMEOUT_NS, MOST_BYTES), now_ns);
         let requests = Requests::default();
-        let heard_ns = now_ns;
-        Ok(Self {
-            stream,
-            requests,
-            unsent,
-            bus: None,
-            node: None,
-            frames_from_ns: None,
-            open_by_ns,
-            heard_ns,
-        })
+        Self { conversation, requests, bus: None, node: None, frames_from_ns: None, heard_ns: now_ns }
     }
 
     /// When its last request came, ns.
@@ -100,52 +80,40 @@ impl Client {
     }
 
     /// The connection, for polling.
-    pub(super) fn stream(&self) -> &TcpStream {
-        &self.stream
+    pub(super) fn conversation(&self) -> &Conversation {
+        &self.conversation
     }
 
-    /// Answers requests and sends received frames; false once the connection is closed.
-    pub(super) fn serve(&mut self, link: &mut OpenLink, now_ns: u64, stderr: &StderrWriter) -> bool {
-        let served = self.read_requests(now_ns).and_then(|()| {
-            self.connect(link);
-            self.answer(link, now_ns)?;
-            self.queue_frames(link, now_ns, stderr);
-            self.check_open(now_ns)?;
-            self.write_unsent()
-        });
-        let Err(reason) = served else { return true };
-        self.close(&reason, link, stderr);
-        false
+    /// Answers requests and sends received frames. Returns why the connection is closed, if it is.
+    pub(super) fn serve(
+        &mut self,
+        link: &mut OpenLink,
+        now_ns: u64,
+        stderr: &StderrWriter,
+    ) -> Result<(), CloseReason> {
+        self.conversation.hear();
+        self.connect(link, now_ns);
+        // A client that waits for its place can send only what its connection has room for.
+        if self.awaited().is_none() {
+            let bytes = self.conversation.consume(self.conversation.heard().len());
+            self.heard_ns = if bytes.is_empty() { self.heard_ns } else { now_ns };
+            self.requests.push(&bytes);
+        }
+        self.answer(link, now_ns)?;
+        self.queue_frames(link, now_ns, stderr);
+        match self.conversation.left(now_ns) {
+            None => Ok(()),
+            Some(Left::Late(_)) => Err(CloseReason::Silent),
+            Some(left) => Err(left.into()),
+        }
     }
 
     /// Says why, and frees its place.
-    pub(super) fn close(&mut self, reason: &CloseReason, link: &mut OpenLink, stderr: &StderrWriter) {
-        if !matches!(reason, CloseReason::Closed) {
-            stderr.write(&format!("a client is disconnected: {reason}\n"));
-            // The client may have closed its end already.
-            self.refuse(reason);
-            let _ = self.write_unsent();
-        }
+    pub(super) fn close(mut self, reason: &CloseReason, link: &mut OpenLink) {
+        // The client may have closed its end already.
+        self.refuse(reason);
         if let Some(node) = self.node.take() {
             link.disconnect(node);
-        }
-    }
-
-    fn check_open(&self, now_ns: u64) -> Result<(), CloseReason> {
-        if self.node.is_none() && now_ns > self.open_by_ns { Err(CloseReason::Silent) } else { Ok(()) }
-    }
-
-    fn read_requests(&mut self, now_ns: u64) -> Result<(), CloseReason> {
-        let mut bytes = [0; 4096];
-        match self.stream.read(&mut bytes) {
-            Ok(0) => Err(CloseReason::Closed),
-            Ok(count) => {
-                self.heard_ns = now_ns;
-                self.requests.push(&bytes[..count]);
-                Ok(())
-            }
-            Err(error) if error.kind() == io::ErrorKind::WouldBlock => Ok(()),
-            Err(error) => Err(error.into()),
         }
     }
 
@@ -164,7 +132,7 @@ impl Client {
 
     fn handle(&mut self, request: Request, link: &mut OpenLink, now_ns: u64) -> Result<(), CloseReason> {
         match request {
-            Request::Open(name) => self.open(&name, link)?,
+            Request::Open(name) => self.open(&name, link, now_ns)?,
             Request::RawMode => {
                 self.frames_from_ns = Some(now_ns + MODE_DELAY_NS);
                 self.queue(OK);
@@ -187,7 +155,7 @@ impl Client {
         self.queue(&format!("< error {reason} >"));
     }
 
-    fn open(&mut self, name: &str, link: &mut OpenLink) -> Result<(), CloseReason> {
+    fn open(&mut self, name: &str, link: &mut OpenLink, now_ns: u64) -> Result<(), CloseReason> {
         if self.node.is_some() {
             return Err(CloseReason::OpenTwice);
         }
@@ -196,15 +164,16 @@ impl Client {
         if self.bus.is_none() {
             return Err(CloseReason::NoBus { name: name.to_owned(), buses });
         }
-        self.connect(link);
+        self.connect(link, now_ns);
         Ok(())
     }
 
     /// Takes a place on the bus for which it waits, if there is one.
-    fn connect(&mut self, link: &mut OpenLink) {
+    fn connect(&mut self, link: &mut OpenLink, now_ns: u64) {
         let Some(bus) = self.awaited() else { return };
         self.node = link.connect(bus);
         if self.is_open() {
+            self.conversation.renew(Limits::admitted(usize::MAX), now_ns);
             self.queue(OK);
         }
     }
@@ -231,20 +200,6 @@ impl Client {
     }
 
     fn queue(&mut self, text: &str) {
-        self.unsent.extend_from_slice(text.as_bytes());
-    }
-
-    fn write_unsent(&mut self) -> Result<(), CloseReason> {
-        while !self.unsent.is_empty() {
-            match self.stream.write(&self.unsent) {
-                Ok(count) => drop(self.unsent.drain(..count)),
-                Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
-                Err(error) => return Err(error.into()),
-            }
-        }
-        match self.unsent.len() {
-            waiting if waiting > MAX_UNSENT => Err(CloseReason::TooSlow(waiting)),
-            _ => Ok(()),
-        }
+        self.conversation.say(text.as_bytes());
     }
 }

@@ -11,9 +11,11 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
+use masseter_can::socketcand::GREETING;
 use masseter_plant::emulation::OpenLink;
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
+use masseter_shared::conversation::{Left, Limits, Look, Newcomers};
 use masseter_shared::geometry::AXIS_NAMES;
 use masseter_shared::lifecycle::StopRequest;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -21,14 +23,17 @@ use rustix::io::Errno;
 
 use super::client::{Client, CloseReason};
 use crate::arguments::parse_address;
+use crate::refusals::Refusals;
 use crate::stderr_writer::StderrWriter;
 use masseter_terminal::Exit;
 
 /// Clients on one bus at a time.
 const CLIENTS: usize = 8;
-/// Clients that have opened no bus yet.
+/// Clients without a request, and clients that have opened no bus yet.
 const NEWCOMERS: usize = 32;
-/// Least time between two new clients, so that a client has some time to open a bus before many others come, ns.
+/// Bytes until the end of a client's first request.
+const LONGEST_FIRST: usize = 256;
+/// Least time between two looks for new clients, which bounds what they cost, ns.
 const ACCEPT_INTERVAL_NS: u64 = 2_000_000;
 /// Longest wait between two steps of the buses.
 const STEP: Timespec = Timespec { tv_sec: 0, tv_nsec: 500_000 };
@@ -54,28 +59,36 @@ pub(crate) fn serve(args: &ServeArgs) -> anyhow::Result<Exit> {
     let mut link = OpenLink::new(&scenario, CLIENTS, clock::now_ns())?;
     let stderr = StderrWriter::start();
     announce(&listener, &scenario, &stderr)?;
+    let newcomers = Newcomers::at(listener.into(), NEWCOMERS, Limits::newcomer(LONGEST_FIRST));
+    let mut newcomers = newcomers.context("cannot serve without blocking")?.greeted_with(GREETING.as_bytes());
     let mut clients = Vec::new();
+    let mut refusals =
+        Refusals::new("a client is disconnected".to_owned(), "clients are disconnected".to_owned());
     let mut accept_from_ns = 0;
     while !stop.is_made() {
-        wait(&listener, &clients).context("cannot wait for clients")?;
+        wait(&clients).context("cannot wait for clients")?;
         let now_ns = clock::now_ns();
         link.advance(now_ns)?;
         link.save_memory()?;
-        if now_ns >= accept_from_ns && accept(&listener, &mut clients, now_ns) {
+        if now_ns >= accept_from_ns {
             accept_from_ns = now_ns + ACCEPT_INTERVAL_NS;
+            let Look { asking, out } = newcomers.look(now_ns, |bytes| bytes.contains(&b'>'));
+            clients.extend(asking.into_iter().map(|conversation| Client::new(conversation, now_ns)));
+            out.into_iter().for_each(|left| count(&left.into(), &mut refusals));
         }
-        clients.retain_mut(|client| client.serve(&mut link, now_ns, &stderr));
-        make_room(&mut clients, &mut link, &stderr);
+        serve_clients(&mut clients, &mut link, now_ns, &stderr, &mut refusals);
+        make_room(&mut clients, &mut link, &mut refusals);
+        if let Some(line) = refusals.line(now_ns) {
+            stderr.write(&format!("{line}\n"));
+        }
     }
     stderr.finish();
     Ok(Exit::Passed)
 }
 
 fn listen(address: SocketAddr) -> anyhow::Result<TcpListener> {
-    let listener = TcpListener::bind(address)
-        .with_context(|| format!("cannot listen on {address}; choose another address with --listen"))?;
-    listener.set_nonblocking(true).context("cannot serve without blocking")?;
-    Ok(listener)
+    TcpListener::bind(address)
+        .with_context(|| format!("cannot listen on {address}; choose another address with --listen"))
 }
 
 /// Lists buses, drives and the address on standard error.
@@ -90,38 +103,56 @@ fn announce(listener: &TcpListener, scenario: &Scenario, stderr: &StderrWriter) 
     Ok(())
 }
 
-/// Waits for the next step, a new client, or a request.
-fn wait(listener: &TcpListener, clients: &[Client]) -> io::Result<()> {
-    let mut events = vec![PollFd::new(listener, PollFlags::IN)];
-    events.extend(clients.iter().map(|client| PollFd::new(client.stream(), PollFlags::IN)));
+/// Waits for the next step, or a request.
+fn wait(clients: &[Client]) -> io::Result<()> {
+    let of_client = |client| PollFd::new(Client::conversation(client), PollFlags::IN);
+    let mut events: Vec<_> = clients.iter().map(of_client).collect();
     match poll(&mut events, Some(&STEP)) {
         Ok(_) | Err(Errno::INTR) => Ok(()),
         Err(error) => Err(error.into()),
     }
 }
 
-/// Whether a client came.
-fn accept(listener: &TcpListener, clients: &mut Vec<Client>, now_ns: u64) -> bool {
-    let accepted = listener.accept();
-    let is_new = accepted.is_ok();
-    // A client may leave at any time.
-    clients.extend(accepted.and_then(|(stream, _)| Client::accept(stream, now_ns)));
-    is_new
+/// Serves every client, and disconnects those that have left or broken the rules.
+fn serve_clients(
+    clients: &mut Vec<Client>,
+    link: &mut OpenLink,
+    now_ns: u64,
+    stderr: &StderrWriter,
+    refusals: &mut Refusals,
+) {
+    for at in (0..clients.len()).rev() {
+        if let Err(reason) = clients[at].serve(link, now_ns, stderr) {
+            disconnect(clients.remove(at), &reason, link, refusals);
+        }
+    }
+}
+
+fn disconnect(client: Client, reason: &CloseReason, link: &mut OpenLink, refusals: &mut Refusals) {
+    client.close(reason, link);
+    count(reason, refusals);
+}
+
+/// A client that leaves by itself is not worth a word.
+fn count(reason: &CloseReason, refusals: &mut Refusals) {
+    if !matches!(reason, CloseReason::Left(Left::Closed)) {
+        refusals.count(reason.to_string());
+    }
 }
 
 /// Disconnects, for each client that waits for a place on a bus, the one there that has asked for nothing for longest, and
 /// the oldest of too many newcomers.
-fn make_room(clients: &mut Vec<Client>, link: &mut OpenLink, stderr: &StderrWriter) {
+fn make_room(clients: &mut Vec<Client>, link: &mut OpenLink, refusals: &mut Refusals) {
     let awaited: Vec<_> = clients.iter().filter_map(Client::awaited).collect();
     for bus in awaited {
         let of_bus = (0..clients.len()).filter(|&at| clients[at].is_on(bus));
         if let Some(idle) = of_bus.min_by_key(|&at| clients[at].heard_ns()) {
-            clients.remove(idle).close(&CloseReason::Idle, link, stderr);
+            disconnect(clients.remove(idle), &CloseReason::Idle, link, refusals);
         }
     }
     if clients.iter().filter(|client| !client.is_open()).count() > NEWCOMERS
         && let Some(oldest) = clients.iter().position(|client| !client.is_open())
     {
-        clients.remove(oldest).close(&CloseReason::Crowded, link, stderr);
+        disconnect(clients.remove(oldest), &CloseReason::Crowded, link, refusals);
     }
 }

@@ -3,14 +3,14 @@
 //! Each client has a thread and a queue of fixed length of its own. The recorder puts messages into the queues and never
 //! waits for a client. A message without room is dropped and counted. The server of the
 //! `foxglove` crate counts no drops and brings an asynchronous runtime, so it is not used. Parameters are read and set at the
-//! controller, by the client's thread. Who connects must name the secret of the URL.
+//! controller, by the client's thread. Who connects must name the secret of the URL: before that, a connection gets a small
+//! buffer and neither a thread nor a queue.
 
 mod admission;
 mod changes;
 mod client;
 mod feed;
 mod foxglove;
-mod handshake;
 mod host;
 mod page;
 mod queue;
@@ -28,13 +28,17 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use masseter_recording::{Manifest, Recorded, Scene};
-use masseter_shared::clock::{self, SECOND_NS};
+use masseter_shared::clock;
+use masseter_shared::conversation::{Conversation, Limits, Newcomers};
 use masseter_shared::named::Declared;
 use masseter_shared::transport::{Domain, secret};
+
+use tungstenite::http::StatusCode;
 
 use client::Client;
 use feed::Feed;
 use host::Host;
+use request::Wish;
 use supervisor::Supervisor;
 
 /// The default address: this machine only, on Foxglove's usual port.
@@ -72,14 +76,14 @@ pub(crate) struct ListenError {
 
 /// Most clients at a time; each has a thread and a queue of its own.
 const MAX_CLIENTS: usize = 8;
-/// Most connections in their handshakes, which anybody may begin: a further one takes the place of the oldest.
-const MAX_NEWCOMERS: usize = 16;
-/// Time that a client may take over its handshake, however it divides it: an idle connection keeps no place, ns.
-const HANDSHAKE_NS: u64 = 5 * SECOND_NS;
-/// Time between two looks for new clients.
+/// Most pages that are sent at a time, each by a thread.
+const MAX_PAGES: usize = 4;
+/// Most connections that have not named the secret; anybody may begin one.
+const MAX_NEWCOMERS: usize = 32;
+/// Longest wait between two looks whether the server closes.
 const INTERVAL: Duration = Duration::from_millis(50);
-/// Time between two new connections: a handshake takes less than that of [`MAX_NEWCOMERS`] others.
-const ACCEPT_INTERVAL: Duration = Duration::from_millis(10);
+/// Least time between two looks for new connections, which bounds what they cost.
+const ACCEPT_INTERVAL: Duration = Duration::from_millis(5);
 /// Time that clients have to read the rest.
 const CLOSING: Duration = Duration::from_millis(500);
 /// Time between two looks whether all have read it.
@@ -126,42 +130,46 @@ impl Clients {
         self.connected.lock().expect("no thread panics with it")
     }
 
-    /// Accepts clients and disconnects those without room, until the server closes.
-    fn accept(&self, listener: &TcpListener, host: &Host) {
-        let mut newcomers = Vec::new();
+    /// Admits clients until the server closes.
+    fn accept(&self, newcomers: &mut Newcomers, host: &Host) {
+        let mut pages = Vec::new();
         while !self.is_closing.load(Ordering::Relaxed) {
-            let now_ns = clock::now_ns();
-            self.admit(&mut newcomers, now_ns);
-            let Ok((stream, _)) = listener.accept() else {
-                clock::sleep(INTERVAL);
-                continue;
-            };
-            if newcomers.len() == MAX_NEWCOMERS {
-                newcomers.remove(0).cut_off();
+            newcomers.wait(INTERVAL);
+            for conversation in newcomers.look(clock::now_ns(), request::is_whole).asking {
+                self.admit(conversation, host, &mut pages);
             }
-            let handshake_by_ns = now_ns + HANDSHAKE_NS;
-            // Without a thread for it, the client is disconnected.
-            newcomers.extend(Client::start(stream, host.clone(), handshake_by_ns));
+            // Those who have left are dropped without the lock, for which the recorder waits.
+            let gone: Vec<_> = self.connected().extract_if(.., |client| client.is_gone()).collect();
+            drop(gone);
             clock::sleep(ACCEPT_INTERVAL);
         }
-        self.admit(&mut newcomers, clock::now_ns());
-        newcomers.iter().for_each(Client::cut_off);
     }
 
-    /// Moves the newcomers that have named the secret to the clients, and disconnects those that take too long. The
-    /// recorder waits for the list of clients, so nothing slow is done with it.
-    fn admit(&self, newcomers: &mut Vec<Client>, now_ns: u64) {
-        newcomers.iter().filter(|client| client.is_overdue(now_ns)).for_each(Client::cut_off);
-        newcomers.retain(|client| !client.is_gone());
-        let mut admitted: Vec<_> = newcomers.extract_if(.., |client| client.is_admitted()).collect();
-        let mut connected = self.connected();
-        let gone: Vec<_> = connected.extract_if(.., |client| client.is_gone()).collect();
-        let room = MAX_CLIENTS - connected.len();
-        admitted.iter().take(room).for_each(Client::connect);
-        connected.extend(admitted.drain(..room.min(admitted.len())));
-        drop(connected);
-        drop(gone);
-        admitted.iter().for_each(Client::cut_off);
+    /// Serves a client that names the secret, if there is room, and answers every other.
+    fn admit(&self, mut conversation: Conversation, host: &Host, pages: &mut Vec<JoinHandle<()>>) {
+        let (wish, length) = match request::wish(conversation.heard(), &host.secret) {
+            Ok(admitted) => admitted,
+            Err(refusal) => return conversation.say(&refusal),
+        };
+        conversation.consume(length);
+        pages.retain(|page| !page.is_finished());
+        match wish {
+            Wish::Page if pages.len() < MAX_PAGES => {
+                let host = host.clone();
+                let send = move || page::send_text(conversation, &host);
+                // Without a thread for it, the client is disconnected.
+                pages.extend(thread::Builder::new().spawn(send));
+            }
+            Wish::Socket { protocol, opening } if self.connected().len() < MAX_CLIENTS => {
+                // The client is known to the recorder before it can subscribe: it misses no message from then on.
+                let mut connected = self.connected();
+                connected.extend(Client::start(conversation, protocol, &opening, host.clone()));
+            }
+            Wish::Page | Wish::Socket { .. } => {
+                let full = "as many clients watch this run as it shows itself to: close another one";
+                conversation.say(&request::answer(StatusCode::SERVICE_UNAVAILABLE, "text/plain", &full));
+            }
+        }
     }
 }
 
@@ -207,8 +215,10 @@ impl LiveServer {
         };
         let clients = Arc::new(Clients::default());
         let accepted = Arc::clone(&clients);
+        let limits = Limits::newcomer(request::LONGEST);
+        let mut newcomers = Newcomers::at(listener.into(), MAX_NEWCOMERS, limits).map_err(refused)?;
         let accepting =
-            thread::Builder::new().spawn(move || accepted.accept(&listener, &host)).map_err(refused)?;
+            thread::Builder::new().spawn(move || accepted.accept(&mut newcomers, &host)).map_err(refused)?;
         Ok(Self { address, secret, feed, clients, dropped: AtomicU64::new(0), accepting })
     }
 

@@ -3,40 +3,32 @@
 //! The page is that of the report, filled with the figures so far; the feed computes them. An update changes what has changed.
 //! A page that falls behind loads itself again.
 
-use std::io::{Read, Write};
-use std::net::{Shutdown, TcpStream};
 use std::sync::mpsc::{Receiver, TryRecvError};
 
+use masseter_shared::clock::{self, SECOND_NS};
+use masseter_shared::conversation::Conversation;
 use masseter_shared::named::access;
 use serde::Deserialize;
 use serde_json::json;
+use tungstenite::http::StatusCode;
 
-use super::admission::admit;
 use super::feed::Next;
 use super::host::Host;
 use super::queue::{Disconnected, Queued};
-use super::request::Peeked;
+use super::request::answer;
 use super::socket::Socket;
 
+/// Time in which a browser takes the page's text, however it divides it, ns.
+const TEXT_NS: u64 = 10 * SECOND_NS;
+
 /// Answers a request for the page's text.
-pub(super) fn answer(mut stream: TcpStream, peeked: &Peeked, host: &Host) -> Result<(), Disconnected> {
-    // Data that nobody has read would end the connection before its answer.
-    stream.read_exact(&mut vec![0; peeked.length])?;
-    let (status, kind, text) = match admit(&peeked.request, &host.secret) {
-        Err(refusal) => ("403 Forbidden", "text/plain", format!("{refusal}\n")),
-        Ok(()) => match host.feed.html() {
-            Ok(html) => ("200 OK", "text/html", html),
-            Err(error) => ("500 Internal Server Error", "text/plain", format!("{error}\n")),
-        },
+pub(super) fn send_text(mut conversation: Conversation, host: &Host) {
+    let answer = match host.feed.html() {
+        Ok(html) => answer(StatusCode::OK, "text/html", &html),
+        Err(error) => answer(StatusCode::INTERNAL_SERVER_ERROR, "text/plain", &error),
     };
-    let head = format!(
-        "HTTP/1.1 {status}\r\nContent-Type: {kind}; charset=utf-8\r\nContent-Length: {}\r\nCache-Control: no-store\r\n\
-         Referrer-Policy: no-referrer\r\nX-Content-Type-Options: nosniff\r\nConnection: close\r\n\r\n",
-        text.len()
-    );
-    stream.write_all(head.as_bytes())?;
-    stream.write_all(text.as_bytes())?;
-    Ok(stream.shutdown(Shutdown::Write)?)
+    conversation.say(&answer);
+    conversation.send_rest(clock::now_ns() + TEXT_NS);
 }
 
 /// What the page asks for.

@@ -1,76 +1,159 @@
-//! What a new connection wants, read from its request without taking the request off the connection.
+//! What a new connection wants: the page or a WebSocket; and the answer to one that gets neither.
 
-use std::net::TcpStream;
+use std::fmt::Display;
 
-use masseter_shared::clock;
-use tungstenite::handshake::server::Request;
-use tungstenite::http::header::UPGRADE;
+use tungstenite::handshake::server::{Request, create_response, write_response};
+use tungstenite::http::header::{SEC_WEBSOCKET_PROTOCOL, UPGRADE};
+use tungstenite::http::{HeaderValue, StatusCode};
 
-use super::queue::{Disconnected, INTERVAL};
+use super::admission::admit;
+use super::foxglove::choose_subprotocol;
 
 /// Longest request, bytes.
-const MOST: usize = 8192;
+pub(super) const LONGEST: usize = 8192;
 /// Most headers of a request.
 const HEADERS: usize = 64;
+/// The protocol of the page's updates.
+const PAGE: &str = "masseter.page.v1";
 
-/// A request, and its length on the connection.
-pub(super) struct Peeked {
-    pub request: Request,
-    pub length: usize,
+/// What is spoken on a WebSocket.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Protocol {
+    /// Topics, with their schemas.
+    Foxglove,
+    /// Changes of the page, after the update that the page shows already.
+    Page {
+        /// The number of that update.
+        after: Option<u64>,
+    },
 }
 
-impl Peeked {
-    /// Waits for a whole request. The server shuts a connection down that takes too long.
-    pub(super) fn wait(stream: &TcpStream) -> Result<Self, Disconnected> {
-        let mut buffer = [0; MOST];
-        loop {
-            let available = stream.peek(&mut buffer)?;
-            if available == 0 {
-                return Err(Disconnected);
-            }
-            if let Some(peeked) = parse(&buffer[..available])? {
-                return Ok(peeked);
-            }
-            if available == MOST {
-                return Err(Disconnected);
-            }
-            clock::sleep(INTERVAL);
-        }
-    }
+/// What an admitted client wants.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Wish {
+    /// The page's text.
+    Page,
+    /// A WebSocket.
+    Socket {
+        protocol: Protocol,
+        /// The answer that opens it.
+        opening: Vec<u8>,
+    },
+}
 
-    /// Whether the client wants a WebSocket; otherwise a page.
-    pub(super) fn is_for_socket(&self) -> bool {
-        let upgrade = self.request.headers().get(UPGRADE).and_then(|upgrade| upgrade.to_str().ok());
-        upgrade.is_some_and(|upgrade| upgrade.eq_ignore_ascii_case("websocket"))
+/// Whether the bytes begin with a whole request, or with none at all.
+pub(super) fn is_whole(bytes: &[u8]) -> bool {
+    !matches!(parse(bytes), Ok(None))
+}
+
+/// The wish of a whole request, and the request's length; or the answer to a client that is refused, empty for what is no
+/// request.
+pub(super) fn wish(bytes: &[u8], secret: &str) -> Result<(Wish, usize), Vec<u8>> {
+    let Ok(Some((request, length))) = parse(bytes) else { return Err(Vec::new()) };
+    admit(&request, secret).map_err(|refusal| answer(StatusCode::FORBIDDEN, "text/plain", &refusal))?;
+    let upgrade = request.headers().get(UPGRADE).and_then(|upgrade| upgrade.to_str().ok());
+    if upgrade.is_some_and(|upgrade| upgrade.eq_ignore_ascii_case("websocket")) {
+        let refused = |reason: &dyn Display| answer(StatusCode::BAD_REQUEST, "text/plain", reason);
+        let (protocol, name) =
+            choose(&request).ok_or_else(|| refused(&"offer a protocol of Foxglove or of the page"))?;
+        let opening = open(&request, name).map_err(|error| refused(&error))?;
+        return Ok((Wish::Socket { protocol, opening }, length));
     }
+    Ok((Wish::Page, length))
+}
+
+/// A whole answer of HTTP, after which the connection ends.
+pub(super) fn answer(status: StatusCode, kind: &str, text: &dyn Display) -> Vec<u8> {
+    let text = format!("{text}\n");
+    let head = format!(
+        "HTTP/1.1 {status}\r\nContent-Type: {kind}; charset=utf-8\r\nContent-Length: {}\r\nCache-Control: no-store\r\n\
+         Referrer-Policy: no-referrer\r\nX-Content-Type-Options: nosniff\r\nConnection: close\r\n\r\n",
+        text.len()
+    );
+    (head + &text).into_bytes()
 }
 
 /// None where the request has not come completely.
-fn parse(bytes: &[u8]) -> Result<Option<Peeked>, Disconnected> {
+fn parse(bytes: &[u8]) -> Result<Option<(Request, usize)>, NoRequest> {
     let mut headers = [httparse::EMPTY_HEADER; HEADERS];
     let mut parsed = httparse::Request::new(&mut headers);
-    let httparse::Status::Complete(length) = parsed.parse(bytes).map_err(|_| Disconnected)? else {
+    let httparse::Status::Complete(length) = parsed.parse(bytes).map_err(|_| NoRequest)? else {
         return Ok(None);
     };
     let mut request = Request::builder().method(parsed.method.unwrap_or("")).uri(parsed.path.unwrap_or(""));
     for header in parsed.headers.iter() {
         request = request.header(header.name, header.value);
     }
-    let request = request.body(()).map_err(|_| Disconnected)?;
-    Ok(Some(Peeked { request, length }))
+    Ok(Some((request.body(()).map_err(|_| NoRequest)?, length)))
+}
+
+/// The bytes are no request of HTTP.
+#[derive(Debug)]
+struct NoRequest;
+
+/// The first offered protocol that this server speaks, and its name.
+fn choose(request: &Request) -> Option<(Protocol, &'static str)> {
+    let query = request.uri().query().unwrap_or("");
+    let after = query.strip_prefix("after=").and_then(|number| number.parse().ok());
+    let mut offers = request.headers().get_all(SEC_WEBSOCKET_PROTOCOL).iter();
+    offers.find_map(|offer| {
+        let offer = offer.to_str().ok()?;
+        let is_page = offer.split(',').any(|offer| offer.trim() == PAGE);
+        let page = is_page.then_some((Protocol::Page { after }, PAGE));
+        page.or_else(|| choose_subprotocol(offer).map(|name| (Protocol::Foxglove, name)))
+    })
+}
+
+fn open(request: &Request, protocol: &'static str) -> tungstenite::Result<Vec<u8>> {
+    let mut response = create_response(request)?;
+    response.headers_mut().insert(SEC_WEBSOCKET_PROTOCOL, HeaderValue::from_static(protocol));
+    let mut bytes = Vec::new();
+    write_response(&mut bytes, &response)?;
+    Ok(bytes)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    const SECRET: &str = "5ec7e7";
+
+    fn asking(lines: &str) -> Vec<u8> {
+        format!("GET /{SECRET} HTTP/1.1\r\nHost: localhost\r\n{lines}\r\n").into_bytes()
+    }
+
     #[test]
-    fn a_request_is_complete_with_its_empty_line() {
-        let whole = b"GET /5ec7e7 HTTP/1.1\r\nHost: localhost\r\nUpgrade: WebSocket\r\n\r\n";
-        assert!(parse(&whole[..whole.len() - 1]).is_ok_and(|peeked| peeked.is_none()));
-        let Ok(Some(peeked)) = parse(whole) else { panic!("no request") };
-        assert_eq!((peeked.length, peeked.request.uri().path()), (whole.len(), "/5ec7e7"));
-        assert!(peeked.is_for_socket());
-        assert!(parse(b"\x16\x03\x01 TLS").is_err());
+    fn a_request_is_whole_with_its_empty_line() {
+        let bytes = asking("");
+        assert!(!is_whole(&bytes[..bytes.len() - 1]) && is_whole(&bytes));
+        assert_eq!(wish(&bytes, SECRET), Ok((Wish::Page, bytes.len())));
+        // It is answered at once, with nothing.
+        assert!(is_whole(b"\x16\x03\x01 TLS"));
+        assert_eq!(wish(b"\x16\x03\x01 TLS", SECRET), Err(Vec::new()));
+    }
+
+    #[test]
+    fn the_page_and_foxglove_have_protocols_of_their_own() {
+        let protocol_of = |offered: &str| {
+            let bytes = asking(&format!(
+                "Upgrade: WebSocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: \
+                 dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Protocol: {offered}\r\n"
+            ));
+            wish(&bytes, SECRET).map(|(wish, _)| match wish {
+                Wish::Page => None,
+                Wish::Socket { protocol, opening } => {
+                    assert!(opening.starts_with(b"HTTP/1.1 101"));
+                    Some(protocol)
+                }
+            })
+        };
+        assert_eq!(protocol_of("masseter.page.v1"), Ok(Some(Protocol::Page { after: None })));
+        assert_eq!(protocol_of("foxglove.sdk.v1"), Ok(Some(Protocol::Foxglove)));
+        assert!(protocol_of("chat").unwrap_err().starts_with(b"HTTP/1.1 400"));
+    }
+
+    #[test]
+    fn without_the_secret_nothing_is_given() {
+        assert!(wish(&asking(""), "other").unwrap_err().starts_with(b"HTTP/1.1 403"));
     }
 }

@@ -5,17 +5,23 @@ use std::net::TcpStream;
 
 use tungstenite::Error;
 use tungstenite::protocol::frame::{CloseFrame, coding::CloseCode};
-use tungstenite::protocol::{Message, WebSocket};
+use tungstenite::protocol::{Message, Role, WebSocket, WebSocketConfig};
 
 use super::queue::Disconnected;
+
+/// The longest message from a client, bytes; clients only ask.
+const MAX_REQUEST_BYTES: usize = 1 << 16;
 
 /// A WebSocket whose reads end after a moment.
 pub(super) struct Socket(WebSocket<TcpStream>);
 
 impl Socket {
-    /// The connection has a time-out for reads.
-    pub(super) fn new(socket: WebSocket<TcpStream>) -> Self {
-        Self(socket)
+    /// A connection with a time-out for reads, whose handshake is done. The client has sent `behind` already.
+    pub(super) fn new(stream: TcpStream, behind: Vec<u8>) -> Self {
+        let config = WebSocketConfig::default()
+            .max_message_size(Some(MAX_REQUEST_BYTES))
+            .max_frame_size(Some(MAX_REQUEST_BYTES));
+        Self(WebSocket::from_partially_read(stream, behind, Role::Server, Some(config)))
     }
 
     /// The text of the next request, if one comes in a moment.

@@ -57,7 +57,7 @@ impl Process {
             })
             .with_context(|| format!("the {role} cannot be started"))?;
         let output = child.stdout.take().expect("standard output is piped");
-        Ok(Self { role, child, reports: Reports::of(output.into()), status: None })
+        Ok(Self { role, child, reports: Reports::of(output.into())?, status: None })
     }
 
     /// Its process id.

@@ -80,7 +80,10 @@ impl Controller {
     pub(super) fn start(&mut self, start: &Start) -> io::Result<()> {
         match self {
             Self::Own(process) => process.start(start),
-            Self::Program(program) => program.start(start),
+            Self::Program(program) => {
+                program.start(start);
+                Ok(())
+            }
             Self::None { motion_ns, ends_ns } => {
                 *ends_ns = start.epoch_ns + *motion_ns;
                 Ok(())
@@ -147,6 +150,11 @@ impl Controller {
                 _ => End::Failed { reason: describe(status) },
             })),
         }
+    }
+
+    /// Whether it has left without a report, though its exit status is not known yet.
+    pub(super) fn has_left(&self) -> bool {
+        matches!(self, Self::Program(program) if program.has_left())
     }
 
     /// Asks it to end.

@@ -14,6 +14,7 @@ mod log;
 mod logged_ports;
 mod prepared;
 mod program;
+mod reception;
 mod reports;
 mod resolve;
 mod room;

@@ -5,19 +5,17 @@
 //! program; it refuses any other with the reason.
 
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, ErrorKind, Write};
-use std::net::Shutdown;
+use std::io;
 use std::os::fd::{AsFd, OwnedFd};
-use std::os::unix::net::{UnixListener, UnixStream};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ExitStatus, Stdio};
-use std::time::Duration;
 
 use anyhow::{Context, bail};
-use masseter_shared::clock;
-use masseter_shared::lifecycle::attach::{Answer, Hello, Invitation, RIG_VARIABLE, socket};
-use masseter_shared::lifecycle::{End, Order, Silence, Start, line};
+use masseter_shared::clock::{self, SECOND_NS};
+use masseter_shared::conversation::Left;
+use masseter_shared::lifecycle::attach::{Invitation, RIG_VARIABLE};
+use masseter_shared::lifecycle::{End, Order, Silence, Start};
 use masseter_shared::transport::Domain;
 use masseter_terminal::status;
 use rustix::net::sockopt::socket_peercred;
@@ -25,18 +23,15 @@ use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, wa
 
 use super::child::{KILLED, POLL, READY_TIMEOUT, describe, open_handle};
 use super::exec_program::tied_to_this_process;
+use super::reception::Reception;
 use super::reports::{Due, Readiness, Ready, Reports};
 
-/// Longest wait for the greeting of a program that has connected.
-const HELLO_TIMEOUT: Duration = Duration::from_millis(500);
 /// Longest wait for an executable to end by itself after its work.
-const EXIT_TIMEOUT: Duration = Duration::from_secs(5);
+const EXIT_TIMEOUT_NS: u64 = 5 * SECOND_NS;
 
 /// A program that is, or will be, the controller.
 pub(super) struct Program {
-    rig: String,
-    listener: UnixListener,
-    invitation: Invitation,
+    reception: Reception,
     executable: Option<Executable>,
     admitted: Option<Admitted>,
 }
@@ -48,9 +43,10 @@ struct Executable {
 }
 
 struct Admitted {
-    stream: UnixStream,
     process_id: u32,
     reports: Reports,
+    /// Once its line is closed without a report: until when its exit status is awaited.
+    exit_by_ns: Option<u64>,
 }
 
 impl Executable {
@@ -88,14 +84,7 @@ impl Executable {
 impl Program {
     /// Listens for a program that the user starts.
     pub(super) fn external(domain: &Domain, invitation: Invitation) -> anyhow::Result<Self> {
-        let path = socket(domain);
-        let listen = || {
-            let listener = UnixListener::bind(&path)?;
-            listener.set_nonblocking(true)?;
-            Ok::<_, io::Error>(listener)
-        };
-        let listener = listen().with_context(|| format!("cannot listen at {}", path.display()))?;
-        Ok(Self { rig: domain.id().to_owned(), listener, invitation, executable: None, admitted: None })
+        Ok(Self { reception: Reception::open(domain, invitation)?, executable: None, admitted: None })
     }
 
     /// Starts an executable, and listens for it. Its standard output goes to standard error, since the rig's own is the
@@ -134,10 +123,10 @@ impl Program {
         if self.executable.is_none() {
             status!(
                 "waiting for a controller: start yours with {RIG_VARIABLE}={}; Ctrl-C gives up",
-                self.rig
+                self.reception.rig()
             );
         }
-        let mut polls = READY_TIMEOUT.as_millis() / POLL.as_millis();
+        let ready_by_ns = clock::now_ns() + READY_TIMEOUT.as_nanos() as u64;
         loop {
             match self.await_readiness()? {
                 Readiness::Ready(ready) => return Ok(Some(ready)),
@@ -148,22 +137,29 @@ impl Program {
                     self.admitted = None;
                 }
                 Readiness::Closed => bail!("the controller ended before it was ready; see its message above"),
-                Readiness::NotYet => polls = polls.saturating_sub(1),
+                Readiness::NotYet => {}
             }
             if let Some(death) = has_died() {
                 bail!(death);
             }
-            self.check_executable(polls > 0)?;
+            self.check_executable(clock::now_ns() < ready_by_ns)?;
         }
     }
 
     fn await_readiness(&mut self) -> anyhow::Result<Readiness> {
-        self.admit()?;
-        if let Some(admitted) = &mut self.admitted {
-            return admitted.reports.await_ready(POLL).context("the controller did not get ready");
+        self.admit();
+        let Some(admitted) = &mut self.admitted else {
+            clock::sleep(POLL);
+            return Ok(Readiness::NotYet);
+        };
+        let readiness = admitted.reports.await_ready(POLL).context("the controller did not get ready");
+        match readiness {
+            Err(error) if self.executable.is_none() => {
+                status!("masseter: {error:#}");
+                Ok(Readiness::Closed)
+            }
+            readiness => readiness,
         }
-        clock::sleep(POLL);
-        Ok(Readiness::NotYet)
     }
 
     /// Refuses an executable that has ended or has taken too long.
@@ -189,61 +185,30 @@ impl Program {
     }
 
     /// Answers the programs that have connected: admits the first one, refuses every other.
-    pub(super) fn admit(&mut self) -> io::Result<()> {
-        loop {
-            let stream = match self.listener.accept() {
-                Ok((stream, _)) => stream,
-                Err(error) if error.kind() == ErrorKind::WouldBlock => return Ok(()),
-                Err(error) => return Err(error),
-            };
-            // A program that does not greet, or is gone, is none.
-            let Ok(hello) = receive_hello(&stream) else { continue };
-            let answer = self.answer(hello.as_ref());
-            let is_admitted = matches!(answer, Answer::Invited(_));
-            if let Answer::Refused { reason } = &answer {
-                status!("masseter: a program that attaches to '{}' is refused: {reason}", self.rig);
-            }
-            if (&stream).write_all(line(&answer).as_bytes()).is_ok() && is_admitted {
-                let process_id = socket_peercred(&stream)
-                    .map_or(0, |peer| peer.pid.as_raw_nonzero().get().cast_unsigned());
-                let reports = Reports::of(stream.try_clone()?.into());
-                self.admitted = Some(Admitted { stream, process_id, reports });
-            }
-        }
-    }
-
-    fn answer(&self, hello: Option<&Hello>) -> Answer {
-        let refused = |reason| Answer::Refused { reason };
-        let Some(hello) = hello else {
-            return refused("its greeting is not that of a controller of this version".to_owned());
-        };
-        if let Some((theirs, own)) = hello.difference() {
-            return refused(format!(
-                "it uses the message '{theirs}', the rig '{own}': build it against this version of Masseter"
-            ));
-        }
-        match &self.admitted {
-            Some(first) => refused(format!(
-                "the rig has its controller, process {}: stop that one, or start another rig",
-                first.process_id
-            )),
-            None => Answer::Invited(self.invitation.clone()),
+    fn admit(&mut self) {
+        let controller = self.admitted.as_ref().map(|admitted| admitted.process_id);
+        if let Some(conversation) = self.reception.admit(controller) {
+            let process_id = socket_peercred(&conversation)
+                .map_or(0, |peer| peer.pid.as_raw_nonzero().get().cast_unsigned());
+            let reports = Reports::of_admitted(conversation);
+            self.admitted = Some(Admitted { process_id, reports, exit_by_ns: None });
         }
     }
 
     /// Starts its work.
-    pub(super) fn start(&mut self, start: &Start) -> io::Result<()> {
-        self.order(&Order::Start(start.clone()))
+    pub(super) fn start(&mut self, start: &Start) {
+        self.order(&Order::Start(start.clone()));
     }
 
     /// Asks it to end. A program whose line is closed has ended.
     pub(super) fn terminate(&mut self) {
-        let _ = self.order(&Order::Stop);
+        self.order(&Order::Stop);
     }
 
-    fn order(&mut self, order: &Order) -> io::Result<()> {
-        let Some(admitted) = &self.admitted else { return Ok(()) };
-        (&admitted.stream).write_all(line(order).as_bytes())
+    fn order(&mut self, order: &Order) {
+        if let Some(admitted) = &mut self.admitted {
+            admitted.reports.order(order);
+        }
     }
 
     /// Its report that another process was silent, if it has made one.
@@ -258,7 +223,7 @@ impl Program {
 
     /// Tells it that the fault has struck. It may have ended.
     pub(super) fn go_on(&mut self) {
-        let _ = self.order(&Order::Struck);
+        self.order(&Order::Struck);
     }
 
     /// The process file of an executable of the rig.
@@ -272,34 +237,35 @@ impl Program {
         self.executable.as_mut().is_some_and(Executable::kill)
     }
 
-    /// How the program ended its work; none while it works. It has failed where it gives no report.
+    /// How the program ended its work; none while it works. It has failed where it gives no report. Never waits.
     pub(super) fn end(&mut self) -> io::Result<Option<End>> {
-        self.admit()?;
-        let Some(Admitted { reports, .. }) = &mut self.admitted else { return Ok(None) };
+        self.admit();
+        let Some(Admitted { reports, exit_by_ns, .. }) = &mut self.admitted else { return Ok(None) };
         // The reports come before the end of the line.
-        let is_closed = reports.is_closed();
-        Ok(match reports.end() {
-            None if is_closed => Some(End::Failed { reason: self.exit()? }),
-            end => end,
-        })
+        let left = reports.left().map(without_report);
+        if let Some(end) = reports.end() {
+            return Ok(Some(end));
+        }
+        let Some(left) = left else { return Ok(None) };
+        let now_ns = clock::now_ns();
+        let exit_by_ns = *exit_by_ns.get_or_insert(now_ns + EXIT_TIMEOUT_NS);
+        let Some(executable) = &mut self.executable else { return Ok(Some(End::Failed { reason: left })) };
+        let exited = executable.exit_status()?.map(describe);
+        Ok(exited.or_else(|| (now_ns >= exit_by_ns).then_some(left)).map(|reason| End::Failed { reason }))
     }
 
-    /// How the process ended, which gives no report any more.
-    fn exit(&mut self) -> io::Result<String> {
-        let exited = self.await_exit()?;
-        Ok(exited.map_or_else(|| "it left the rig without a report".to_owned(), describe))
+    /// Whether it has closed its line without a report.
+    pub(super) fn has_left(&self) -> bool {
+        self.admitted.as_ref().is_some_and(|admitted| admitted.exit_by_ns.is_some())
     }
 
-    /// The exit status of an executable, if it ends in time.
-    fn await_exit(&mut self) -> io::Result<Option<ExitStatus>> {
-        let Some(executable) = &mut self.executable else { return Ok(None) };
-        for _ in 0..EXIT_TIMEOUT.as_millis() / POLL.as_millis() {
-            if let Some(status) = executable.exit_status()? {
-                return Ok(Some(status));
-            }
+    /// Waits until an executable has ended, for a limited time.
+    fn await_exit(&mut self) {
+        let Some(executable) = &mut self.executable else { return };
+        let exit_by_ns = clock::now_ns() + EXIT_TIMEOUT_NS;
+        while matches!(executable.exit_status(), Ok(None)) && clock::now_ns() < exit_by_ns {
             clock::sleep(POLL);
         }
-        Ok(None)
     }
 
     /// Closes the line, and ends an executable at once (SIGKILL); returns what became of the program, in words.
@@ -311,10 +277,9 @@ impl Program {
     }
 
     /// Closes the line, by which the program notices that the rig is gone.
-    fn close(&mut self) {
+    fn close(&self) {
         if let Some(admitted) = &self.admitted {
-            // The program may have closed it before.
-            let _ = admitted.stream.shutdown(Shutdown::Both);
+            admitted.reports.close();
         }
     }
 }
@@ -322,7 +287,7 @@ impl Program {
 impl Drop for Program {
     fn drop(&mut self) {
         self.close();
-        let _ = self.await_exit();
+        self.await_exit();
         self.give_up();
         if let Some(Executable { child, .. }) = &mut self.executable {
             let _ = child.wait();
@@ -330,16 +295,10 @@ impl Drop for Program {
     }
 }
 
-/// The greeting of a program; none if it is not one.
-fn receive_hello(stream: &UnixStream) -> io::Result<Option<Hello>> {
-    stream.set_nonblocking(false)?;
-    stream.set_read_timeout(Some(HELLO_TIMEOUT))?;
-    let mut text = String::new();
-    // The program sends nothing more before the answer, so nothing is lost in this buffer.
-    BufReader::new(io::Read::take(stream, 4096)).read_line(&mut text)?;
-    stream.set_read_timeout(None)?;
-    if text.is_empty() {
-        return Err(ErrorKind::UnexpectedEof.into());
+/// What is said of a program that reports nothing more.
+fn without_report(left: &Left) -> String {
+    match left {
+        Left::Closed => "it left the rig without a report".to_owned(),
+        left => format!("the rig closed its line: {left}"),
     }
-    Ok(serde_json::from_str(&text).ok())
 }

@@ -1,31 +1,29 @@
 //! The reports of a process to the supervisor. What a report means for the run is not decided here.
 
 use std::collections::VecDeque;
+use std::io;
 use std::os::fd::OwnedFd;
 use std::time::Duration;
 
 use anyhow::Context;
-use masseter_shared::lifecycle::{End, Report, Silence};
+use masseter_shared::clock;
+use masseter_shared::conversation::{Conversation, Left, Limits};
+use masseter_shared::lifecycle::{End, Order, Report, Silence, line};
 use masseter_shared::named::Declared;
 use masseter_shared::realtime::scheduling::Obtained;
-use rustix::buffer::spare_capacity;
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::io::{Errno, read};
 
-/// Most bytes of one read; all that a process has to report is less.
-const READ_BYTES: usize = 65_536;
+/// Bytes of all reports of a process: a declaration, a fault that is due now and then, and an end.
+const MOST_BYTES: usize = 1 << 20;
 
 /// The reports that were read and not yet looked at, and those that matter until the end.
 ///
 /// They are read where they are looked at: a report that was made before is seen.
 pub(super) struct Reports {
-    input: OwnedFd,
-    /// Read, and not yet taken as lines.
-    unread: Vec<u8>,
+    conversation: Conversation,
     silence: Option<Silence>,
     due: VecDeque<Due>,
     end: Option<End>,
-    is_closed: bool,
+    left: Option<Left>,
 }
 
 /// The report of a process that is ready.
@@ -53,19 +51,42 @@ pub(super) enum Readiness {
 }
 
 impl Reports {
-    /// The reports in `input`, which the process writes.
-    pub(super) fn of(input: OwnedFd) -> Self {
-        Self { input, unread: Vec::new(), silence: None, due: VecDeque::new(), end: None, is_closed: false }
+    /// The reports that the process writes into `input`.
+    pub(super) fn of(input: OwnedFd) -> io::Result<Self> {
+        let now_ns = clock::now_ns();
+        Ok(Self::over(Conversation::begin(input, Limits::admitted(MOST_BYTES), now_ns)?))
+    }
+
+    /// The reports of a program that was admitted.
+    pub(super) fn of_admitted(mut conversation: Conversation) -> Self {
+        conversation.renew(Limits::admitted(MOST_BYTES), clock::now_ns());
+        Self::over(conversation)
+    }
+
+    fn over(conversation: Conversation) -> Self {
+        Self { conversation, silence: None, due: VecDeque::new(), end: None, left: None }
+    }
+
+    /// Sends an order to a program. A program that does not read its orders is out.
+    pub(super) fn order(&mut self, order: &Order) {
+        self.conversation.say(line(order).as_bytes());
+    }
+
+    /// Closes the line, by which a program notices that the rig is gone.
+    pub(super) fn close(&self) {
+        self.conversation.close();
     }
 
     /// Waits for the report of readiness, for at most this time.
     pub(super) fn await_ready(&mut self, timeout: Duration) -> anyhow::Result<Readiness> {
-        let line = self.next_line().or_else(|| {
-            self.receive(timeout);
-            self.next_line()
-        });
+        let mut line = self.conversation.next_line();
+        if line.is_none() {
+            self.conversation.wait(timeout);
+            self.conversation.hear();
+            line = self.conversation.next_line();
+        }
         let Some(line) = line else {
-            return Ok(if self.is_closed { Readiness::Closed } else { Readiness::NotYet });
+            return Ok(if self.has_left() { Readiness::Closed } else { Readiness::NotYet });
         };
         match serde_json::from_str(&line).with_context(|| format!("its report is '{line}'"))? {
             Report::Ready { scheduling, declared } => Ok(Readiness::Ready(Ready { scheduling, declared })),
@@ -98,15 +119,23 @@ impl Reports {
         self.end.clone()
     }
 
-    /// Whether the process has closed the line.
-    pub(super) fn is_closed(&mut self) -> bool {
+    /// Why the process reports nothing more; none while it can.
+    pub(super) fn left(&mut self) -> Option<&Left> {
         self.look();
-        self.is_closed
+        self.has_left();
+        self.left.as_ref()
+    }
+
+    fn has_left(&mut self) -> bool {
+        if self.left.is_none() {
+            self.left = self.conversation.left(clock::now_ns());
+        }
+        self.left.is_some()
     }
 
     fn look(&mut self) {
-        self.receive(Duration::ZERO);
-        while let Some(line) = self.next_line() {
+        self.conversation.hear();
+        while let Some(line) = self.conversation.next_line() {
             if let Ok(report) = serde_json::from_str(&line) {
                 self.keep(report);
             }
@@ -120,26 +149,5 @@ impl Reports {
             Report::Ended(end) => self.end = Some(end),
             Report::Ready { .. } => {}
         }
-    }
-
-    /// Reads what has come, and waits at most this time for that.
-    fn receive(&mut self, timeout: Duration) {
-        let timeout = Timespec::try_from(timeout).expect("a few milliseconds");
-        if self.is_closed || poll(&mut [PollFd::new(&self.input, PollFlags::IN)], Some(&timeout)) != Ok(1) {
-            return;
-        }
-        self.unread.reserve(READ_BYTES);
-        match read(&self.input, spare_capacity(&mut self.unread)) {
-            Err(Errno::INTR) => {}
-            // A line that cannot be read is closed.
-            read => self.is_closed = read.unwrap_or(0) == 0,
-        }
-    }
-
-    /// Takes a line that is complete.
-    fn next_line(&mut self) -> Option<String> {
-        let end = self.unread.iter().position(|byte| *byte == b'\n')?;
-        let line: Vec<u8> = self.unread.drain(..=end).collect();
-        Some(String::from_utf8_lossy(&line[..end]).into_owned())
     }
 }

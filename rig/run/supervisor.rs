@@ -274,7 +274,8 @@ impl Rig {
             let others = [self.recorder.exit_status()?, self.plant.exit_status()?];
             let end = self.controller.end()?;
             if interruption.is_none() {
-                interruption = self.interrupt_controller(interrupts, others, end.is_some());
+                let has_left = end.is_some() || self.controller.has_left();
+                interruption = self.interrupt_controller(interrupts, others, has_left);
             }
             if let Some(end) = end {
                 break end;

@@ -7,6 +7,7 @@
 pub mod clock;
 pub mod config;
 pub mod control;
+pub mod conversation;
 pub mod dynamics;
 pub mod geometry;
 pub mod injection;

@@ -8,23 +8,24 @@
 //! [`Order`]: super::Order
 
 use std::env;
-use std::io::{self, BufRead, BufReader};
-use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use super::link::send_all;
 use super::{Patience, ProcessArguments, ProcessContext, ProcessError, SupervisorLink, line};
+use crate::clock::SECOND_NS;
+use crate::conversation::{Conversation, Left, Limits};
 use crate::messages::{Command, Event, Message, Reading, State};
 use crate::transport::{Domain, DomainError};
 
 /// The environment variable with the name of the rig. The rig sets it for a program that it starts.
 pub const RIG_VARIABLE: &str = "MASSETER_RIG";
 
-/// Longest wait for the rig's answer.
-const ANSWER_TIMEOUT: Duration = Duration::from_secs(10);
+/// Longest wait for the rig's answer, ns.
+const ANSWER_TIMEOUT_NS: u64 = 10 * SECOND_NS;
+/// Bytes of the longest answer.
+const LONGEST_ANSWER: usize = 1 << 16;
 const SOCKET: &str = "attach";
 
 /// The first message of a program.
@@ -121,12 +122,12 @@ pub enum AttachError {
         reason: String,
     },
     /// The rig did not answer.
-    #[error("the rig '{rig}' does not answer: {error}")]
+    #[error("the rig '{rig}' does not answer: {left}")]
     NoAnswer {
         /// The rig.
         rig: String,
-        /// What the system said.
-        error: io::Error,
+        /// Why no answer is awaited any more.
+        left: Left,
     },
     /// The rigs of this user cannot be found.
     #[error(transparent)]
@@ -173,28 +174,27 @@ pub fn socket(domain: &Domain) -> PathBuf {
 pub fn attach(rig: Option<&str>) -> Result<ProcessContext, AttachError> {
     let named = rig.map(str::to_owned).or_else(|| env::var(RIG_VARIABLE).ok());
     let rig = named.map_or_else(only_rig, Ok)?;
-    let Ok(stream) = UnixStream::connect(socket(&Domain::named(&rig)?)) else {
+    let limits = Limits::answer(ANSWER_TIMEOUT_NS, LONGEST_ANSWER);
+    let Ok(mut conversation) = Conversation::connect(&socket(&Domain::named(&rig)?), limits) else {
         return Err(AttachError::NoSuchRig { name: rig, waiting: waiting()? });
     };
-    let invitation = match greet(&stream) {
+    let invitation = match greet(&mut conversation) {
         Ok(Answer::Invited(invitation)) => invitation,
         Ok(Answer::Refused { reason }) => return Err(AttachError::Refused { rig, reason }),
-        Err(error) => return Err(AttachError::NoAnswer { rig, error }),
+        Err(left) => return Err(AttachError::NoAnswer { rig, left }),
     };
     let lockstep = invitation.is_lockstep.then_some(Patience(invitation.patience));
     let arguments = ProcessArguments { scenario: invitation.scenario, domain: rig, lockstep };
-    let (link, stop) = SupervisorLink::over(stream).map_err(ProcessError::Supervisor)?;
+    let connection = conversation.into_connection().map_err(ProcessError::Supervisor)?;
+    let (link, stop) = SupervisorLink::over(connection.into()).map_err(ProcessError::Supervisor)?;
     Ok(ProcessContext::new(&arguments, stop, link)?)
 }
 
-fn greet(stream: &UnixStream) -> io::Result<Answer> {
-    send_all(stream, line(&Hello::new()).as_bytes())?;
-    stream.set_read_timeout(Some(ANSWER_TIMEOUT))?;
-    let mut text = String::new();
-    // The rig sends nothing more before this program is ready, so nothing is lost in this buffer.
-    BufReader::new(stream).read_line(&mut text)?;
-    stream.set_read_timeout(None)?;
-    Ok(serde_json::from_str(&text)?)
+fn greet(conversation: &mut Conversation) -> Result<Answer, Left> {
+    conversation.say(line(&Hello::new()).as_bytes());
+    // The rig sends nothing more before this program is ready.
+    let answer = conversation.await_line()?;
+    serde_json::from_str(&answer).map_err(|error| Left::Failed(error.into()))
 }
 
 fn only_rig() -> Result<String, AttachError> {

@@ -4,30 +4,47 @@
 //! it. A request and its answer are a line of JSON each. A thread of its own serves them, never the loop.
 
 use std::fs;
-use std::io::{self, BufRead, BufReader, Read, Write};
-use std::os::unix::net::{UnixListener, UnixStream};
+use std::io;
+use std::os::unix::net::UnixListener;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::{Parameter, Settings};
+use crate::clock::{self, MILLISECOND_NS, SECOND_NS};
+use crate::conversation::{Conversation, Left, Limits, Newcomers};
+use crate::lifecycle::line;
 use crate::transport::{Domain, DomainError};
 
 const SOCKET: &str = "parameters";
-/// Longest wait for the other side.
-const TIMEOUT: Duration = Duration::from_secs(2);
-/// Bytes of the longest line: 64 parameters with long descriptions.
-const LONGEST_LINE: u64 = 1 << 20;
+/// Time after which a request has no effect any more, ns.
+const EXPIRY_NS: u64 = 2 * SECOND_NS;
+/// Time for an answer that was made just before that, ns.
+const GRACE_NS: u64 = 200 * MILLISECOND_NS;
+/// Bytes of the longest request.
+const LONGEST_REQUEST: usize = 4096;
+/// Bytes of the longest answer: 64 parameters with long descriptions.
+const LONGEST_ANSWER: usize = 1 << 20;
+/// Most programs whose request is not whole, and most that have not read their answer.
+const MOST_PEERS: usize = 16;
+/// Least time between two looks for requests, which bounds what they cost.
+const INTERVAL: Duration = Duration::from_millis(5);
+/// Longest time between two looks.
+const IDLE: Duration = Duration::from_mins(1);
 
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Request {
     List,
-    Set { name: String, value: f64 },
+    /// Refused from `expires_ns` on, ns of `CLOCK_MONOTONIC`: its sender waits no longer.
+    Set {
+        name: String,
+        value: f64,
+        expires_ns: u64,
+    },
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -52,13 +69,26 @@ pub enum AccessError {
     /// The controller refuses the name or the value.
     #[error("{0}")]
     Refused(String),
-    /// The line to the controller failed.
-    #[error("the controller of rig '{rig}' does not answer: {error}")]
+    /// The controller does not answer.
+    #[error("the controller of rig '{rig}' does not answer: {left}")]
     NoAnswer {
         /// The rig.
         rig: String,
-        /// The system's error.
-        error: io::Error,
+        /// Why no answer is awaited any more.
+        left: Left,
+    },
+    /// The controller does not answer a request for another value.
+    #[error(
+        "the controller of rig '{rig}' does not answer: {left}; the request has expired, but the controller may have taken \
+         the value just before: 'masseter param get {name} --rig {rig}' shows the value that holds"
+    )]
+    NotConfirmed {
+        /// The rig.
+        rig: String,
+        /// The parameter.
+        name: String,
+        /// Why no answer is awaited any more.
+        left: Left,
     },
 }
 
@@ -75,25 +105,45 @@ pub(crate) fn serve(domain: &Domain, settings: Arc<Settings>) -> io::Result<()> 
     // That of a program which ended before the start of the run.
     let _ = fs::remove_file(&path);
     let listener = UnixListener::bind(path)?;
+    let mut newcomers = Newcomers::at(listener.into(), MOST_PEERS, Limits::newcomer(LONGEST_REQUEST))?;
     thread::Builder::new().name("parameters".to_owned()).spawn(move || {
-        for stream in listener.incoming().map_while(Result::ok) {
-            // The other side may leave at any time.
-            let _ = answer(&stream, &settings);
+        let mut reading: Vec<Conversation> = Vec::new();
+        loop {
+            newcomers.wait(if reading.is_empty() { IDLE } else { INTERVAL });
+            let now_ns = clock::now_ns();
+            let mut look = newcomers.look(now_ns, |bytes| bytes.contains(&b'\n'));
+            look.asking.iter_mut().for_each(|conversation| answer(conversation, &settings));
+            reading.append(&mut look.asking);
+            reading.iter_mut().for_each(Conversation::hear);
+            reading.retain_mut(|conversation| !conversation.is_sent() && conversation.left(now_ns).is_none());
+            reading.drain(..reading.len().saturating_sub(MOST_PEERS));
+            clock::sleep(INTERVAL);
         }
     })?;
     Ok(())
 }
 
-fn answer(stream: &UnixStream, settings: &Settings) -> io::Result<()> {
-    let set = match receive(stream)? {
-        Request::List => Ok(()),
-        Request::Set { name, value } => settings.set(&name, value),
+/// Answers a request, unless its sender has left or waits no longer: a value that was said to be refused is not set later.
+fn answer(conversation: &mut Conversation, settings: &Settings) {
+    let request = conversation.next_line().unwrap_or_default();
+    conversation.hear();
+    let now_ns = clock::now_ns();
+    if conversation.left(now_ns).is_some() {
+        return;
+    }
+    let set = match serde_json::from_str(&request) {
+        Ok(Request::List) => Ok(()),
+        Ok(Request::Set { expires_ns, .. }) if now_ns >= expires_ns => {
+            Err("the request came too late: its time is over".to_owned())
+        }
+        Ok(Request::Set { name, value, .. }) => settings.set(&name, value).map_err(|error| error.to_string()),
+        Err(error) => Err(format!("it is no request: {error}")),
     };
     let answer = match set {
         Ok(()) => Answer::Parameters(present(settings)),
-        Err(error) => Answer::Refused { reason: error.to_string() },
+        Err(reason) => Answer::Refused { reason },
     };
-    send(stream, &answer)
+    conversation.say(line(&answer).as_bytes());
 }
 
 fn present(settings: &Settings) -> Vec<Parameter> {
@@ -108,7 +158,7 @@ fn present(settings: &Settings) -> Vec<Parameter> {
 /// # Errors
 /// [`AccessError`] when no controller with parameters runs there.
 pub fn list(domain: &Domain) -> Result<Vec<Parameter>, AccessError> {
-    ask(domain, &Request::List)
+    ask(domain, &Request::List).map_err(|failure| failure.into_error(domain, None))
 }
 
 /// Sets a parameter of a rig's controller, which takes it over in its next cycle. Returns all parameters.
@@ -119,7 +169,9 @@ pub fn set(domain: &Domain, name: &str, value: f64) -> Result<Vec<Parameter>, Ac
     if !value.is_finite() {
         return Err(AccessError::Refused(format!("parameter '{name}' cannot be {value}")));
     }
-    ask(domain, &Request::Set { name: name.to_owned(), value })
+    let expires_ns = clock::now_ns() + EXPIRY_NS;
+    let request = Request::Set { name: name.to_owned(), value, expires_ns };
+    ask(domain, &request).map_err(|failure| failure.into_error(domain, Some(name)))
 }
 
 /// The rigs whose controllers have parameters.
@@ -131,32 +183,44 @@ pub fn rigs() -> Result<Vec<Domain>, DomainError> {
     Ok(Domain::all()?.into_iter().filter(serves).collect())
 }
 
-fn ask(domain: &Domain, request: &Request) -> Result<Vec<Parameter>, AccessError> {
-    let rig = domain.id().to_owned();
-    let Ok(stream) = UnixStream::connect(socket(domain)) else { return Err(AccessError::NoParameters(rig)) };
-    match send(&stream, request).and_then(|()| receive(&stream)) {
-        Ok(Answer::Parameters(parameters)) => Ok(parameters),
-        Ok(Answer::Refused { reason }) => Err(AccessError::Refused(reason)),
-        Err(error) => Err(AccessError::NoAnswer { rig, error }),
+/// Why a request has not succeeded.
+enum Failure {
+    NobodyListens,
+    Refused(String),
+    NoAnswer(Left),
+}
+
+impl Failure {
+    /// The error of a request to set the parameter `set`, or to list them.
+    fn into_error(self, domain: &Domain, set: Option<&str>) -> AccessError {
+        let rig = domain.id().to_owned();
+        match (self, set.map(str::to_owned)) {
+            (Self::NobodyListens, _) => AccessError::NoParameters(rig),
+            (Self::Refused(reason), _) => AccessError::Refused(reason),
+            (Self::NoAnswer(left), None) => AccessError::NoAnswer { rig, left },
+            (Self::NoAnswer(left), Some(name)) => AccessError::NotConfirmed { rig, name, left },
+        }
     }
 }
 
-fn send(mut stream: &UnixStream, message: &impl Serialize) -> io::Result<()> {
-    stream.set_write_timeout(Some(TIMEOUT))?;
-    let line = serde_json::to_string(message)? + "\n";
-    stream.write_all(line.as_bytes())
-}
-
-fn receive<T: DeserializeOwned>(stream: &UnixStream) -> io::Result<T> {
-    stream.set_read_timeout(Some(TIMEOUT))?;
-    let mut line = String::new();
-    BufReader::new(stream.take(LONGEST_LINE)).read_line(&mut line)?;
-    Ok(serde_json::from_str(&line)?)
+fn ask(domain: &Domain, request: &Request) -> Result<Vec<Parameter>, Failure> {
+    let limits = Limits::answer(EXPIRY_NS + GRACE_NS, LONGEST_ANSWER);
+    let mut conversation =
+        Conversation::connect(&socket(domain), limits).map_err(|_| Failure::NobodyListens)?;
+    conversation.say(line(request).as_bytes());
+    let answer = conversation.await_line().map_err(Failure::NoAnswer)?;
+    match serde_json::from_str(&answer) {
+        Ok(Answer::Parameters(parameters)) => Ok(parameters),
+        Ok(Answer::Refused { reason }) => Err(Failure::Refused(reason)),
+        Err(error) => Err(Failure::NoAnswer(Left::Failed(error.into()))),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
+    use std::io::Write;
+    use std::os::unix::net::UnixStream;
 
     use super::*;
     use crate::named::{Declared, NamedValues};
@@ -179,8 +243,48 @@ mod tests {
         for (name, value) in [("gain", 10.0), ("gain", f64::NAN), ("gian", 1.0)] {
             assert!(matches!(set(&domain, name, value), Err(AccessError::Refused(_))));
         }
-        // What is no request closes its own connection only.
+        // What is no request concerns its own connection only.
         UnixStream::connect(socket(&domain)).unwrap().write_all(b"hello\n").unwrap();
         assert_eq!(value(list(&domain)), Some([3.0]));
+    }
+
+    #[test]
+    fn a_request_has_no_effect_once_its_time_is_over_or_its_sender_has_left() {
+        let declared = Declared { parameters: vec![Parameter::new("gain", 1.0)], signals: Vec::new() };
+        let mut named = NamedValues::new(declared, &BTreeMap::new()).unwrap();
+        let settings = Arc::clone(named.settings());
+        let mut ask = |expires_ns, is_there: bool| {
+            let (mut peer, own) = UnixStream::pair().unwrap();
+            let now_ns = clock::now_ns();
+            let mut conversation =
+                Conversation::begin(own.into(), Limits::newcomer(LONGEST_REQUEST), now_ns).unwrap();
+            let request = Request::Set { name: "gain".to_owned(), value: 2.0, expires_ns };
+            peer.write_all(line(&request).as_bytes()).unwrap();
+            let peer = is_there.then_some(peer);
+            conversation.hear();
+            answer(&mut conversation, &settings);
+            drop(peer);
+            named.take_change().is_some()
+        };
+        let later_ns = clock::now_ns() + SECOND_NS;
+        assert!(!ask(clock::now_ns(), true), "it has expired");
+        assert!(!ask(later_ns, false), "nobody waits for it");
+        assert!(ask(later_ns, true));
+    }
+
+    #[test]
+    fn peers_that_drip_or_stay_silent_delay_no_other() {
+        let domain = ScratchDomain::claim("drip").unwrap();
+        let declared = Declared { parameters: vec![Parameter::new("gain", 1.0)], signals: Vec::new() };
+        let named = NamedValues::new(declared, &BTreeMap::new()).unwrap();
+        serve(&domain, Arc::clone(named.settings())).unwrap();
+        let mut peers: Vec<_> = (0..100).map(|_| UnixStream::connect(socket(&domain)).unwrap()).collect();
+        for _ in 0..10 {
+            // It fails once the server has closed the connection.
+            peers.iter_mut().for_each(|peer| drop(peer.write_all(b"x")));
+            let began_ns = clock::now_ns();
+            assert!(set(&domain, "gain", 2.0).is_ok());
+            assert!(clock::now_ns() - began_ns < SECOND_NS);
+        }
     }
 }
