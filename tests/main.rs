@@ -38,6 +38,7 @@ mod report_page;
 mod requirements;
 mod robot;
 mod robot_faults;
+mod robot_liars;
 mod robot_motion;
 mod robot_quirks;
 mod scenario_reference;

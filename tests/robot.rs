@@ -53,7 +53,7 @@ fn inspection_sends_uploads_and_nothing_else() {
     assert!(requests > 300, "{requests}");
     let result = result(&workspace, "01-inspect");
     assert_eq!((&result["step"], &result["passed"]), (&"inspect".into(), &true.into()));
-    assert_eq!(result["serials"].as_array().unwrap().len(), 6);
+    assert_eq!(result["drives"].as_array().unwrap().len(), 6);
     let sheet = fs::read_to_string(workspace.file("bringup/01-inspect/l1.dcf")).unwrap();
     assert!(sheet.contains("[6066]\nParameterName=Following error time out\n"), "{sheet}");
     assert!(sheet.contains("ParameterValue=Masseter emulated drive"), "{sheet}");

@@ -258,7 +258,7 @@ fn a_drive_that_fails_after_its_own_turn_fails_the_step() {
     let l2_begins = |id: &str, data: &str| id == "605" && data.starts_with("40001000");
     let l2_is_written = |id: &str, data: &str| id == "605" && writes(data);
     let l1_is_compared = |id: &str, data: &str| id == "584" && data.starts_with("43646000");
-    let (home, silent) = ("home --axis d1 --out-of-order", "l1: object 1018h:04h: no answer");
+    let (home, silent) = ("home --axis d1 --out-of-order", "l1: object 1018h:01h: no answer");
     let tried: [(&[&str], &str, Moment<'_>, &str); 5] = [
         (&[], "inspect", &l2_begins, SILENT[0]),
         (&["inspect"], "configure", &l2_is_written, silent),

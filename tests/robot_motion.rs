@@ -230,6 +230,8 @@ fn a_killed_jog_leaves_the_old_values_in_a_file_and_the_next_step_settles_them()
         stdout(&inspect)
     );
     assert!(owed.exists(), "inspect writes nothing");
+    let mut of_another = common::json(&owed);
+    of_another["drive"]["serial"] = serde_json::json!({ "told": 77 });
     let next = masseter(&[&jog[..], &places].concat());
     assert_eq!(next.status.code(), Some(0), "{}", stderr(&next));
     assert!(
@@ -238,8 +240,9 @@ fn a_killed_jog_leaves_the_old_values_in_a_file_and_the_next_step_settles_them()
         stderr(&next)
     );
     assert!(!owed.exists(), "the step itself owes nothing at its end");
-    std::fs::write(&owed, r#"{ "serial": 77, "values": [] }"#).unwrap();
+    std::fs::write(&owed, of_another.to_string()).unwrap();
     let other = masseter(&[&jog[..], &places].concat());
     assert_eq!(other.status.code(), Some(1), "{}", stderr(&other));
-    assert!(stderr(&other).contains("another serial number (1018h:04)"), "{}", stderr(&other));
+    let says = "has the old values of another drive (serial number was 77, and is 4)";
+    assert!(stderr(&other).contains(says), "{}", stderr(&other));
 }

@@ -4,15 +4,15 @@
 //! drives after it are not touched, and no drive ever gets power.
 
 use masseter_plant::bringup::{Deviation, Outcome, Settings};
-use masseter_shared::geometry::AXES;
 use masseter_shared::wording::counted;
 use masseter_terminal::{Exit, Failure, OrFailure, result};
 
 use super::args::WriteArgs;
 use super::evidence::{Basis, StepFolder};
+use super::identity::NOT_ASKED;
 use super::ledger;
 use super::past::Past;
-use super::robot_line::{RobotLine, Surveys, failed, serials};
+use super::robot_line::{RobotLine, Surveys, drives, failed};
 use super::step::Step;
 use super::table::table;
 use super::writing::write_all;
@@ -22,7 +22,7 @@ pub(crate) fn configure(args: &WriteArgs) -> Result<Exit, Failure> {
     let scenario = args.robot.scenario().usage()?;
     let (axes, past) = (args.axes(), Past::read(&args.robot.folder).usage()?);
     // A refused step makes no folder: it would replace the evidence of the same step from before.
-    past.require(Step::Inspect, &axes, &Basis::new(&scenario, [None; AXES])).usage()?;
+    past.require(Step::Inspect, &axes, &Basis::new(&scenario, NOT_ASKED)).usage()?;
     let mut folder = StepFolder::begin(&args.robot.folder, Step::Configure, &axes, &scenario).usage()?;
     let mut robot = RobotLine::open(scenario, folder.log().usage()?).usage()?;
     ledger::settle(&args.robot.folder, &robot.scenario, &mut robot.line, args.take_over)?;
@@ -30,7 +30,7 @@ pub(crate) fn configure(args: &WriteArgs) -> Result<Exit, Failure> {
     let targets: Vec<(usize, Settings)> =
         axes.iter().map(|&axis| (axis, robot.settings(axis).clone())).collect();
     let surveys = robot.surveys(&targets, boot_ups).map_err(failed)?;
-    folder.note_serials(serials(&surveys));
+    folder.note_drives(drives(&surveys, &robot.scenario.can));
     past.require(Step::Inspect, &axes, &folder.basis()).usage()?;
     let refused = refused(&robot, &surveys);
     if !refused.is_empty() {

@@ -8,6 +8,7 @@ use masseter_shared::config::Scenario;
 use serde_json::json;
 
 use super::evidence::StepFolder;
+use super::identity::Known;
 use super::past::Past;
 use super::step::Step;
 
@@ -39,9 +40,10 @@ pub(crate) fn keep_dry_run(
         return Ok(());
     }
     let past = Past::read(parent)?;
-    let serial = |axis| past.newest(Step::CheckPose, axis).and_then(|(_, evidence)| evidence.serials[axis]);
+    let drive =
+        |axis| past.newest(Step::CheckPose, axis).map_or(Known::NotAsked, |(_, one)| one.drives[axis]);
     let mut folder = StepFolder::begin(parent, Step::DryRun, &Step::DryRun.axes(), scenario)?;
-    folder.note_serials(std::array::from_fn(serial));
+    folder.note_drives(std::array::from_fn(drive));
     let (motion, motion_s) = (played.hash(Some(run))?, played.full_speed_s());
     folder.finish(passed, &json!({ "run": run, "motion": motion, "motion_s": motion_s }))
 }

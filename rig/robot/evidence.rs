@@ -15,6 +15,7 @@ use masseter_shared::geometry::{AXES, AXIS_NAMES, MechanismConfig};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::identity::{Known, NOT_ASKED};
 use super::step::Step;
 
 /// What a result depends on: another drive or another profile makes it outdated.
@@ -22,14 +23,14 @@ use super::step::Step;
 pub(crate) struct Basis {
     /// Hash of everything that decides the objects and the scales of the drives.
     pub(crate) profile_hash: String,
-    /// Serial numbers (1018h:04); none where a drive was not asked or has none.
-    pub(crate) serials: [Option<u32>; AXES],
+    /// The drives.
+    pub(crate) drives: [Known; AXES],
 }
 
 impl Basis {
     /// Of the scenario's profiles, interfaces, mechanism and jaw, and of these drives. Limits of a run do not count: a run writes
     /// them itself, and a dry run has others.
-    pub(crate) fn new(scenario: &Scenario, serials: [Option<u32>; AXES]) -> Self {
+    pub(crate) fn new(scenario: &Scenario, drives: [Known; AXES]) -> Self {
         let mut hasher = crc32fast::Hasher::new();
         let mut mechanism = scenario.mechanism.clone();
         mechanism.strokes = MechanismConfig::default().strokes;
@@ -40,7 +41,7 @@ impl Basis {
             let parts = format!("{node}{:?}{:?}", scenario.profile(axis), scenario.scale(axis));
             hasher.update(parts.as_bytes());
         }
-        Self { profile_hash: format!("{:08x}", hasher.finalize()), serials }
+        Self { profile_hash: format!("{:08x}", hasher.finalize()), drives }
     }
 }
 
@@ -56,7 +57,7 @@ pub(crate) struct Evidence {
     /// See [`Basis`].
     pub(crate) profile_hash: String,
     /// See [`Basis`].
-    pub(crate) serials: [Option<u32>; AXES],
+    pub(crate) drives: [Known; AXES],
     /// Whether the steps before were there.
     pub(crate) in_order: bool,
     /// The axes of which it is evidence.
@@ -80,7 +81,7 @@ pub(crate) struct StepFolder {
 }
 
 impl StepFolder {
-    /// Makes the next folder, with a result that is not passed. The serial numbers are not known yet.
+    /// Makes the next folder, with a result that is not passed. The drives are not known yet.
     ///
     /// # Errors
     /// When the folder cannot be written, or the scenario has no right profiles.
@@ -92,7 +93,7 @@ impl StepFolder {
     ) -> anyhow::Result<Self> {
         let number = numbered(parent)?.last().map_or(1, |(number, _)| number + 1);
         let folder = RunFolder::create(&parent.join(format!("{number:02}-{step}")))?;
-        let Basis { profile_hash, serials } = Basis::new(scenario, [None; AXES]);
+        let Basis { profile_hash, drives } = Basis::new(scenario, NOT_ASKED);
         let begun = Self {
             folder,
             evidence: Evidence {
@@ -100,7 +101,7 @@ impl StepFolder {
                 started: humantime::format_rfc3339_seconds(UNIX_EPOCH + clock::wall_time()).to_string(),
                 passed: false,
                 profile_hash,
-                serials,
+                drives,
                 in_order: true,
                 axes: axes.iter().map(|&axis| AXIS_NAMES[axis].to_owned()).collect(),
                 result: Value::Null,
@@ -131,10 +132,10 @@ impl StepFolder {
         self.folder.path()
     }
 
-    /// What this step's result depends on, with serial numbers as far as they are noted.
+    /// What this step's result depends on, with the drives as far as they are noted.
     pub(crate) fn basis(&self) -> Basis {
-        let Evidence { profile_hash, serials, .. } = self.evidence.clone();
-        Basis { profile_hash, serials }
+        let Evidence { profile_hash, drives, .. } = self.evidence.clone();
+        Basis { profile_hash, drives }
     }
 
     /// Notes that the step was made without the steps before: it shows something, but counts for no further step.
@@ -142,9 +143,9 @@ impl StepFolder {
         self.evidence.in_order = false;
     }
 
-    /// Notes the serial numbers of the drives.
-    pub(crate) fn note_serials(&mut self, serials: [Option<u32>; AXES]) {
-        self.evidence.serials = serials;
+    /// Notes who the drives are.
+    pub(crate) fn note_drives(&mut self, drives: [Known; AXES]) {
+        self.evidence.drives = drives;
     }
 
     /// Replaces the result by that of the ended step.

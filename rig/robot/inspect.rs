@@ -16,9 +16,10 @@ use serde::Serialize;
 
 use super::args::RobotArgs;
 use super::evidence::StepFolder;
+use super::identity::gaps;
 use super::interfaces::{InterfaceResult, interfaces};
 use super::ledger;
-use super::robot_line::{RobotLine, failed, serial, serials};
+use super::robot_line::{RobotLine, drives, failed};
 use super::snapshot::dcf;
 use super::step::Step;
 use super::table::{axes_text, table};
@@ -91,8 +92,12 @@ pub(crate) fn inspect(args: &InspectArgs) -> Result<Exit, Failure> {
         let text = dcf(survey, robot.scenario.can.node_ids[axis], AXIS_NAMES[axis]);
         folder.keep(&format!("{}.dcf", AXIS_NAMES[axis]), &text).incomplete()?;
     }
-    folder.note_serials(serials(&surveys));
+    let drives = drives(&surveys, &robot.scenario.can);
+    folder.note_drives(drives);
     let (mut text, passed) = describe(&robot, &result);
+    for gap in gaps(&drives) {
+        let _ = writeln!(text, "warning: {gap}");
+    }
     for axis in ledger::owed_axes(&args.robot.folder) {
         let _ = writeln!(text, "warning: {}", ledger::advice(&args.robot.folder, axis));
     }
@@ -115,8 +120,7 @@ fn read(robot: &mut RobotLine, scan: bool) -> Result<Read, LineError> {
         robot.line.scan()?;
     }
     let is_whole = |survey: &Option<Survey>| survey.as_ref().is_some_and(|survey| !survey.fell_silent());
-    let answer =
-        std::array::from_fn(|axis| is_whole(&surveys[axis]) && serial(&mut robot.line, axis).is_ok());
+    let answer = std::array::from_fn(|axis| is_whole(&surveys[axis]) && robot.answers(axis));
     robot.line.flush()?;
     let restarted = (0..AXES).filter_map(|axis| boot_ups.check_axis(&robot.line, axis).err()).collect();
     Ok(Read { surveys, answer, restarted })

@@ -7,13 +7,14 @@ use std::path::{Path, PathBuf};
 use anyhow::ensure;
 use masseter_plant::bringup::{Ledger, Line, OldValue, give_back, object_name, value_text};
 use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::config::{ObjectKey, Scenario};
+use masseter_shared::config::{CanConfig, ObjectKey, Scenario};
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
 use masseter_terminal::{Failure, status};
 use serde::{Deserialize, Serialize};
 
 use super::damaged::{Damage, DamagedFile, check_old_value, parse};
-use super::robot_line::{failed, serial};
+use super::identity::Identity;
+use super::robot_line::failed;
 use super::writing::prove_off;
 
 /// How long the line listens for other masters before the drives get their old values, ns.
@@ -22,8 +23,8 @@ const LISTEN_NS: u64 = 500 * MILLISECOND_NS;
 /// What one drive is owed.
 #[derive(Debug, Serialize, Deserialize)]
 struct Owed {
-    /// Its serial number; none where the drive has none.
-    serial: Option<u32>,
+    /// The drive.
+    drive: Identity,
     /// The oldest change first.
     values: Vec<OldValue>,
 }
@@ -41,27 +42,28 @@ impl Owed {
     }
 
     /// What the drive of an axis is owed; another drive is owed nothing.
-    fn read(folder: &Path, line: &mut Line, axis: usize) -> anyhow::Result<Self> {
+    fn read(folder: &Path, line: &mut Line, can: &CanConfig, axis: usize) -> anyhow::Result<Self> {
         let path = file(folder, axis);
         let owed = Self::checked(&path).map_err(|damage| DamagedFile {
             path: path.clone(),
             damage,
             remedy: REMEDY,
         })?;
+        let now = Identity::read(line, can, axis)?;
         ensure!(
-            serial(line, axis)? == owed.serial,
-            "{}: {} has the old values of a drive with another serial number (1018h:04); put that drive back, or remove \
-             the file",
+            now == owed.drive,
+            "{}: {} has the old values of another drive ({}); put that drive back, or remove the file",
             AXIS_NAMES[axis],
-            path.display()
+            path.display(),
+            now.differs_from(&owed.drive)
         );
         Ok(owed)
     }
 
     /// Writes the values into a drive without power, and says so.
     fn return_to(self, folder: &Path, line: &mut Line, axis: usize) -> anyhow::Result<()> {
-        let (Self { serial, values }, name) = (self, AXIS_NAMES[axis]);
-        line.keep_old_values_in(Box::new(Files::new(folder, std::array::from_fn(|_| serial))));
+        let (Self { drive, values }, name) = (self, AXIS_NAMES[axis]);
+        line.keep_old_values_in(Box::new(Files::new(folder, [drive; AXES])));
         let refused = give_back(line, axis, &values)?;
         status!("{name}: a step was killed; the drive has its old values again:");
         for old in values {
@@ -78,13 +80,13 @@ impl Owed {
 #[derive(Debug)]
 pub(super) struct Files {
     folder: PathBuf,
-    serials: [Option<u32>; AXES],
+    drives: [Identity; AXES],
 }
 
 impl Files {
-    /// Files for drives with these serial numbers.
-    pub(super) fn new(folder: &Path, serials: [Option<u32>; AXES]) -> Self {
-        Self { folder: folder.to_owned(), serials }
+    /// Files for these drives.
+    pub(super) fn new(folder: &Path, drives: [Identity; AXES]) -> Self {
+        Self { folder: folder.to_owned(), drives }
     }
 }
 
@@ -99,7 +101,7 @@ impl Ledger for Files {
             }
             return Ok(());
         }
-        let owed = Owed { serial: self.serials[axis], values: values.to_vec() };
+        let owed = Owed { drive: self.drives[axis], values: values.to_vec() };
         let unfinished = path.with_extension("part");
         let mut part = File::create(&unfinished)?;
         part.write_all(serde_json::to_string_pretty(&owed)?.as_bytes())?;
@@ -145,7 +147,7 @@ pub(super) fn settle(
     line.listen(LISTEN_NS).map_err(failed)?;
     line.strangers().refuse_masters().map_err(failed)?;
     for axis in axes {
-        let owed = Owed::read(folder, line, axis).map_err(failed)?;
+        let owed = Owed::read(folder, line, &scenario.can, axis).map_err(failed)?;
         prove_off(line, scenario, axis, may_stop)?;
         owed.return_to(folder, line, axis).map_err(failed)?;
     }
@@ -166,8 +168,12 @@ mod tests {
         let scenario = Scenario::parse(Path::new("robot.toml"), text).unwrap();
         let mut line = Line::open(&scenario, Box::new(io::sink())).unwrap();
         line.listen(LISTEN_NS).unwrap();
-        let serial = serial(&mut line, L1).map_or("null".to_owned(), |serial| serial.unwrap().to_string());
-        let owed = format!(r#"{{ "serial": {serial}, "values": [{old}] }}"#);
+        let sound = Line::open(&Scenario::default(), Box::new(io::sink()));
+        let mut sound = sound.unwrap();
+        sound.listen(LISTEN_NS).unwrap();
+        let drive = Identity::read(&mut sound, &scenario.can, L1).unwrap();
+        let drive = serde_json::to_string(&drive).unwrap();
+        let owed = format!(r#"{{ "drive": {drive}, "values": [{old}] }}"#);
         fs::write(file(folder.path(), L1), owed).unwrap();
         (folder, scenario, line)
     }
@@ -194,7 +200,7 @@ mod tests {
         let cable = "[[faults]]\nkind = 'disconnect'\nbus = 1\nnode = 4\nfrom_s = 0.0";
         let (folder, scenario, mut line) = robot(cable, VELOCITY);
         let refusal = settle(folder.path(), &scenario, &mut line, false).unwrap_err().error.to_string();
-        assert!(refusal.starts_with("l1: object 1018h:04h: no answer; check its power"), "{refusal}");
+        assert!(refusal.starts_with("l1: object 1018h:01h: no answer; check its power"), "{refusal}");
     }
 
     #[test]

@@ -12,6 +12,7 @@ mod dry_run;
 mod evidence;
 mod hold;
 mod home;
+mod identity;
 mod inspect;
 mod interfaces;
 mod jog;

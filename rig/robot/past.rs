@@ -7,6 +7,7 @@ use masseter_shared::geometry::AXIS_NAMES;
 
 use super::before::{Nameless, before_file};
 use super::evidence::{Basis, Evidence, numbered};
+use super::identity::{Identity, Known};
 use super::step::Step;
 
 /// Why a step has no evidence that counts.
@@ -21,14 +22,17 @@ pub(crate) enum Lack {
     /// The profiles or the values that decide objects are others.
     #[error("outdated: the profiles changed since {0}")]
     OtherProfile(String),
-    /// The drive is another one.
-    #[error("outdated: the drive's serial number was {}, and is {}", number(*.before), number(*.now))]
+    /// The drive is another one, or tells less or more of itself.
+    #[error("outdated: the drive's {}", .now.differs_from(before))]
     OtherDrive {
-        /// Its serial number then.
-        before: Option<u32>,
-        /// Its serial number now.
-        now: Option<u32>,
+        /// The drive then.
+        before: Identity,
+        /// The drive now.
+        now: Identity,
     },
+    /// Nobody asked the drive then.
+    #[error("outdated: nobody knows which drive it was at {0}")]
+    NobodyAsked(String),
     /// The drives got their old objects again.
     #[error("outdated: restored at {0}")]
     Restored(String),
@@ -43,11 +47,6 @@ pub(crate) enum Lack {
     /// It was made with `--out-of-order`.
     #[error("made out of order at {0}")]
     OutOfOrder(String),
-}
-
-/// A serial number in words.
-pub(super) fn number(serial: Option<u32>) -> String {
-    serial.map_or_else(|| "unknown".to_owned(), |serial| serial.to_string())
 }
 
 /// A step that must pass first.
@@ -149,7 +148,7 @@ impl Past {
         earlier.iter().find_map(|&step| Some(Lack::Repeated { step, at: since(step)? }))
     }
 
-    /// Why the newest evidence of a step does not count for an axis, if so. An unknown serial number of now is not compared.
+    /// Why the newest evidence of a step does not count for an axis, if so. A drive that is not asked is not compared.
     ///
     /// # Errors
     /// The reason.
@@ -169,11 +168,11 @@ impl Past {
         if evidence.profile_hash != basis.profile_hash {
             return Err(Lack::OtherProfile(at()));
         }
-        let (before, now) = (evidence.serials[axis], basis.serials[axis]);
-        if now.is_some() && before != now {
-            return Err(Lack::OtherDrive { before, now });
+        match (evidence.drives[axis], basis.drives[axis]) {
+            (Known::Is(before), Known::Is(now)) if before != now => Err(Lack::OtherDrive { before, now }),
+            (Known::NotAsked, Known::Is(_)) => Err(Lack::NobodyAsked(at())),
+            (_, Known::NotAsked) | (Known::Is(_), Known::Is(_)) => Ok(evidence),
         }
-        Ok(evidence)
     }
 
     /// Refuses to go on unless an earlier step passed for these axes, with the same drives and profiles.
@@ -195,12 +194,16 @@ mod tests {
 
     use super::*;
     use crate::robot::evidence::StepFolder;
+    use crate::robot::identity::tests::drives;
+    use crate::robot::identity::{Entry, NOT_ASKED};
 
+    const SERIALS: [Entry; AXES] =
+        [Entry::Told(1), Entry::Told(2), Entry::Told(3), Entry::Told(4), Entry::Told(5), Entry::Told(6)];
     const ALL: [usize; AXES] = [0, 1, 2, 3, 4, 5];
 
     fn take(parent: &Path, step: Step, axes: &[usize], passed: Option<bool>) {
         let mut folder = StepFolder::begin(parent, step, axes, &Scenario::default()).unwrap();
-        folder.note_serials([1, 2, 3, 4, 5, 6].map(Some));
+        folder.note_drives(drives(SERIALS));
         if [Step::Configure, Step::Restore].contains(&step) {
             for &axis in axes {
                 folder.keep(&before_file(axis), "").unwrap();
@@ -219,7 +222,7 @@ mod tests {
     fn evidence_counts_for_the_same_drives_and_profiles_alone() {
         let folder = tempfile::tempdir().unwrap();
         let parent = folder.path().join("bringup");
-        let basis = Basis::new(&Scenario::default(), [1, 2, 3, 4, 5, 6].map(Some));
+        let basis = Basis::new(&Scenario::default(), drives(SERIALS));
         let check = |basis: &Basis| refusal(&parent, Step::Inspect, &ALL, basis);
         let error =
             Past::read(&parent).unwrap().require(Step::Inspect, &[3], &basis).unwrap_err().to_string();
@@ -227,17 +230,24 @@ mod tests {
         assert!(error.ends_with("run 'masseter robot inspect' first"), "{error}");
         take(&parent, Step::Inspect, &ALL, Some(true));
         assert_eq!(check(&basis), None);
-        let exchanged = Basis { serials: [1, 2, 3, 4, 5, 7].map(Some), ..basis.clone() };
-        assert_eq!(check(&exchanged).unwrap(), "outdated: the drive's serial number was 6, and is 7");
+        let exchanged = |serial| {
+            let serials = [[1, 2, 3, 4, 5].map(Entry::Told).as_slice(), &[serial]].concat();
+            check(&Basis { drives: drives(serials.try_into().unwrap()), ..basis.clone() })
+        };
+        assert_eq!(exchanged(Entry::Told(6)), None);
+        for (serial, says) in [(Entry::Told(7), "7"), (Entry::Absent, "none")] {
+            let says = format!("outdated: the drive's serial number was 6, and is {says}");
+            assert_eq!(exchanged(serial), Some(says));
+        }
         let faster = Scenario { rate_hz: 500, ..Scenario::default() };
         assert_eq!(
-            check(&Basis::new(&faster, basis.serials)),
+            check(&Basis::new(&faster, basis.drives)),
             None,
             "a run writes the objects of its rate itself"
         );
         let mut changed = Scenario::default();
         changed.drives.leg.encoder_resolution_m = 2e-6;
-        let changed = Basis::new(&changed, basis.serials);
+        let changed = Basis::new(&changed, basis.drives);
         assert!(check(&changed).unwrap().starts_with("outdated: the profiles changed"));
         take(&parent, Step::Inspect, &ALL, None);
         assert!(check(&basis).unwrap().starts_with("not passed at "), "a killed step proves nothing");
@@ -250,7 +260,7 @@ mod tests {
     #[test]
     fn a_step_that_is_repeated_outdates_those_after_it_and_one_out_of_order_counts_for_nothing() {
         let folder = tempfile::tempdir().unwrap();
-        let basis = Basis::new(&Scenario::default(), [None; AXES]);
+        let basis = Basis::new(&Scenario::default(), NOT_ASKED);
         let check = |step, axis| refusal(folder.path(), step, &[axis], &basis);
         take(folder.path(), Step::Home, &ALL, Some(true));
         take(folder.path(), Step::CheckPose, &ALL, Some(true));
@@ -278,7 +288,7 @@ mod tests {
     #[test]
     fn a_step_of_one_axis_says_nothing_of_the_others_and_restore_undoes_configure() {
         let folder = tempfile::tempdir().unwrap();
-        let basis = Basis::new(&Scenario::default(), [None; AXES]);
+        let basis = Basis::new(&Scenario::default(), NOT_ASKED);
         let check = |axis| refusal(folder.path(), Step::Configure, &[axis], &basis);
         take(folder.path(), Step::Configure, &[3], Some(true));
         assert_eq!((check(3), check(4)), (None, Some("not done".to_owned())));

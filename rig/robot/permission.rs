@@ -4,21 +4,21 @@
 use std::io;
 use std::path::Path;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, bail};
 use masseter_plant::bringup::Line;
 use masseter_shared::geometry::AXES;
 use masseter_terminal::status;
 
 use super::dry_run::{FOLDER, Played, check_motion};
 use super::evidence::Basis;
+use super::identity::{Identity, Known, NOT_ASKED, warn_of_gaps};
 use super::ledger;
 use super::past::Past;
 use super::power_mark;
-use super::session::serials;
 use super::step::Step;
 
 /// Refuses a run on real interfaces without its earlier steps. The files are read before anything is sent; then the drives
-/// tell their serial numbers.
+/// tell who they are.
 pub(crate) fn check_bring_up(played: &Played<'_>, is_waived: bool) -> anyhow::Result<()> {
     let scenario = played.scenario;
     if scenario.can.is_virtual() {
@@ -38,7 +38,7 @@ pub(crate) fn check_bring_up(played: &Played<'_>, is_waived: bool) -> anyhow::Re
     }
     let past = Past::read(folder)?;
     let axes: [usize; AXES] = std::array::from_fn(|axis| axis);
-    let unknown = Basis::new(scenario, [None; AXES]);
+    let unknown = Basis::new(scenario, NOT_ASKED);
     let steps: &[Step] =
         if scenario.dry.is_on { &[Step::CheckPose] } else { &[Step::CheckPose, Step::DryRun] };
     let require = |basis: &Basis| steps.iter().try_for_each(|&step| past.require(step, &axes, basis));
@@ -47,12 +47,9 @@ pub(crate) fn check_bring_up(played: &Played<'_>, is_waived: bool) -> anyhow::Re
         check_motion(&past, played).context(refused)?;
     }
     let mut line = Line::open(scenario, Box::new(io::sink()))?;
-    let found = serials(&mut line).context(refused)?;
-    ensure!(
-        found.iter().all(Option::is_some),
-        "a drive does not tell its serial number (1018h:04); check power and wiring, or use --without-bring-up"
-    );
-    require(&Basis { serials: found, ..unknown }).context(refused)?;
+    let drives = Identity::read_all(&mut line, &scenario.can).context(refused)?.map(Known::Is);
+    require(&Basis { drives, ..unknown }).context(refused)?;
+    warn_of_gaps(&drives);
     let (_, checked) = past.newest(Step::CheckPose, 0).context("there is no pose check")?;
     let marks = power_mark::of_pose_check(checked).context(refused)?;
     power_mark::check(scenario, &marks, &checked.started, &mut line).context(refused)

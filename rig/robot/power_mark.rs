@@ -93,12 +93,9 @@ pub(super) fn leave(scenario: &Scenario, line: &mut Line, axis: usize) -> Result
         return Err(MarkError::NoRoom { axis, found: before });
     }
     let value = before - 1 - clock::wall_time().subsec_micros() % (before - 1).min(FURTHEST);
-    line.write(axis, MARKED, value, 4)?;
-    let found = line.read_number(axis, MARKED)?;
-    if found == value {
-        Ok(Some(Mark { before, value }))
-    } else {
-        Err(MarkError::NotTaken { axis, value, found })
+    match line.write(axis, MARKED, value, 4) {
+        Err(LineError::NotKept { found: Some(found), .. }) => Err(MarkError::NotTaken { axis, value, found }),
+        written => Ok(written.map(|()| Some(Mark { before, value }))?),
     }
 }
 

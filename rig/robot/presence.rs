@@ -1,10 +1,10 @@
 //! Whether the drives are at the end of a step those of its beginning: a step may be done with a drive long before it ends.
 
 use masseter_plant::bringup::{BootUps, Line, LineError, OtherMaster, Restarted};
+use masseter_shared::config::CanConfig;
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
 
-use super::past::number;
-use super::robot_line::serial;
+use super::identity::{Identity, Known};
 
 /// Why what a step has read from a drive, or written to it, may not count any more.
 #[derive(Debug, thiserror::Error)]
@@ -20,16 +20,16 @@ pub(super) enum Disturbance {
     Line(#[from] LineError),
     /// Another drive answers.
     #[error(
-        "{}: the drive's serial number was {} before, and is {}; leave the drives in their places during a step",
-        AXIS_NAMES[*axis], number(*.before), number(*.now)
+        "{}: the drive's {}; leave the drives in their places during a step",
+        AXIS_NAMES[*axis], .now.differs_from(before)
     )]
     OtherDrive {
         /// The axis.
         axis: usize,
-        /// Its serial number at the beginning.
-        before: Option<u32>,
-        /// Its serial number now.
-        now: Option<u32>,
+        /// The drive at the beginning.
+        before: Identity,
+        /// The drive now.
+        now: Identity,
     },
 }
 
@@ -39,19 +39,22 @@ pub(super) fn check_undisturbed(line: &Line, axes: &[usize], since: BootUps) -> 
     Ok(line.strangers().refuse_masters()?)
 }
 
-/// The same, and asks the drives for their serial numbers again.
+/// The same, and asks the drives again who they are.
 pub(super) fn check_present(
     line: &mut Line,
+    can: &CanConfig,
     axes: &[usize],
     since: BootUps,
-    serials: &[Option<u32>; AXES],
+    drives: &[Known; AXES],
 ) -> Result<(), Disturbance> {
-    let answers: Vec<_> = axes.iter().map(|&axis| (axis, serial(line, axis))).collect();
+    let answers: Vec<_> = axes.iter().map(|&axis| (axis, Identity::read(line, can, axis))).collect();
     // A restart is the cause of a missing answer, and may become known while the answer is waited for.
     check_undisturbed(line, axes, since)?;
     for (axis, now) in answers {
-        let (before, now) = (serials[axis], now?);
-        if now != before {
+        let now = now?;
+        if let Known::Is(before) = drives[axis]
+            && before != now
+        {
             return Err(Disturbance::OtherDrive { axis, before, now });
         }
     }

@@ -4,15 +4,16 @@ use std::path::PathBuf;
 
 use anyhow::anyhow;
 use masseter_plant::bringup::Settings;
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
+use masseter_shared::geometry::AXIS_NAMES;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
 use super::args::WriteArgs;
 use super::before::{self, before_file};
 use super::evidence::{Evidence, StepFolder};
+use super::identity::{Identity, Known, NOT_ASKED};
 use super::ledger;
 use super::past::Past;
-use super::robot_line::{RobotLine, failed, serial};
+use super::robot_line::{RobotLine, failed};
 use super::step::Step;
 use super::writing::{is_stored, write_all};
 
@@ -24,14 +25,15 @@ pub(crate) fn restore(args: &WriteArgs) -> Result<Exit, Failure> {
     let mut robot = RobotLine::open(scenario, folder.log().usage()?).usage()?;
     ledger::settle(&args.robot.folder, &robot.scenario, &mut robot.line, args.take_over)?;
     let boot_ups = robot.listen().map_err(failed)?;
-    let mut serials = [None; AXES];
+    let mut drives = NOT_ASKED;
     for &axis in &axes {
-        serials[axis] = serial(&mut robot.line, axis).map_err(failed)?;
+        let identity = Identity::read(&mut robot.line, &robot.scenario.can, axis).map_err(failed)?;
+        drives[axis] = Known::Is(identity);
     }
-    folder.note_serials(serials);
+    folder.note_drives(drives);
     let mut targets = Vec::new();
     for &axis in &axes {
-        match old_values(&past, axis, serials[axis]).usage()? {
+        match old_values(&past, axis, drives[axis]).usage()? {
             Some(target) => targets.push((axis, target)),
             // A configuration that failed has not reached the drives after the failed one.
             None => status!("{}: configure wrote nothing to this drive", AXIS_NAMES[axis]),
@@ -46,10 +48,10 @@ pub(crate) fn restore(args: &WriteArgs) -> Result<Exit, Failure> {
 
 /// The values of a drive from before the first `configure` since they were last restored for good; none where `configure` has not
 /// begun with it. Values that were restored without `--store` last until a reset.
-fn old_values(past: &Past, axis: usize, serial: Option<u32>) -> anyhow::Result<Option<Settings>> {
+fn old_values(past: &Past, axis: usize, drive: Known) -> anyhow::Result<Option<Settings>> {
     past.check_old_values(axis)?;
     let steps = past.steps().filter(|(_, evidence)| evidence.is_about(axis));
-    let steps: Vec<_> = steps.filter(|(_, evidence)| evidence.serials[axis] == serial).collect();
+    let steps: Vec<_> = steps.filter(|(_, evidence)| evidence.drives[axis] == drive).collect();
     let is_restored = |(_, evidence): &&(PathBuf, Evidence)| {
         evidence.passed && evidence.step == Step::Restore.to_string() && is_stored(evidence, axis)
     };

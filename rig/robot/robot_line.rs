@@ -3,16 +3,15 @@
 use std::io::Write;
 
 use anyhow::ensure;
-use masseter_can::canopen::{NodeId, ObjectAddress};
+use masseter_can::canopen::NodeId;
 use masseter_plant::bringup::{BootUps, Deviation, Line, LineError, Settings, Survey, deviations};
 use masseter_plant::wanted::WantedDrive;
 use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::config::Scenario;
+use masseter_shared::config::{CanConfig, Scenario};
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
 use masseter_terminal::{Exit, Failure};
 
-/// Serial number.
-const SERIAL: ObjectAddress = ObjectAddress::new(0x1018, 4);
+use super::identity::{Identity, Known};
 
 /// How long the drives may take to boot at power-on before they are read, ns.
 const LISTEN_NS: u64 = 500 * MILLISECOND_NS;
@@ -95,6 +94,11 @@ impl RobotLine {
         Ok(survey)
     }
 
+    /// Whether a drive still says who it is.
+    pub(crate) fn answers(&mut self, axis: usize) -> bool {
+        Identity::read(&mut self.line, &self.scenario.can, axis).is_ok()
+    }
+
     /// Everything of a drive that is not as scenario and profile need it.
     pub(crate) fn deviations(&self, axis: usize, survey: &Survey) -> Vec<Deviation> {
         deviations(survey, &self.wanted[axis], &self.settings[axis], self.scenario.profile(axis))
@@ -114,18 +118,7 @@ pub(crate) fn failed(error: impl Into<anyhow::Error>) -> Failure {
     Failure::with(Exit::Failed, error)
 }
 
-/// The serial number of a drive; none where the drive says that it has none.
-///
-/// # Errors
-/// [`LineError`], also for a drive that is silent: it may be any drive.
-pub(crate) fn serial(line: &mut Line, axis: usize) -> Result<Option<u32>, LineError> {
-    match line.read_number(axis, SERIAL) {
-        Err(error) if error.abort_code().is_some() => Ok(None),
-        read => read.map(Some),
-    }
-}
-
-/// Serial numbers of the drives that were surveyed.
-pub(crate) fn serials(surveys: &Surveys) -> [Option<u32>; AXES] {
-    std::array::from_fn(|axis| surveys[axis].as_ref()?.number(SERIAL))
+/// The drives that were surveyed.
+pub(crate) fn drives(surveys: &Surveys, can: &CanConfig) -> [Known; AXES] {
+    std::array::from_fn(|axis| Known::of_survey(surveys[axis].as_ref(), can.node_ids[axis]))
 }

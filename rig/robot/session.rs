@@ -1,7 +1,9 @@
 //! A step that moves or reads the drives, from the claimed interfaces to its evidence and exit code.
 
 use anyhow::Context;
+use masseter_can::canopen::NodeId;
 use masseter_plant::bringup::{BootUps, Line, LineError, MotionError, StopCause};
+use masseter_plant::wanted::WantedDrive;
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
@@ -12,11 +14,12 @@ use serde_json::json;
 
 use super::args::RobotArgs;
 use super::evidence::{Basis, StepFolder};
+use super::identity::{Identity, Known, NOT_ASKED, warn_of_gaps};
 use super::ledger::{self, Files};
 use super::past::Past;
 use super::power_mark;
 use super::presence::{Disturbance, check_present, check_undisturbed};
-use super::robot_line::{failed, serial};
+use super::robot_line::failed;
 use super::step::Step;
 
 /// How long the step listens for other masters, ns.
@@ -33,8 +36,8 @@ pub(super) struct Session {
     folder: StepFolder,
     /// Boot-up messages before the step.
     boot_ups: BootUps,
-    /// Serial numbers at the beginning.
-    serials: [Option<u32>; AXES],
+    /// The drives at the beginning.
+    drives: [Known; AXES],
 }
 
 impl Session {
@@ -53,7 +56,7 @@ impl Session {
             needed.try_for_each(|(earlier, axis)| past.require(earlier, &[axis], basis))
         };
         // A refused step makes no folder: it would replace the evidence of the same step from before.
-        require(&Basis::new(&scenario, [None; AXES])).usage()?;
+        require(&Basis::new(&scenario, NOT_ASKED)).usage()?;
         let mut folder = StepFolder::begin(&args.folder, step, axes, &scenario).usage()?;
         if axes.iter().any(|&axis| earlier(axis).is_none()) {
             folder.note_out_of_order();
@@ -63,16 +66,23 @@ impl Session {
         line.listen(LISTEN_NS).died()?;
         line.strangers().refuse_masters().usage()?;
         let boot_ups = BootUps::until_now(&line);
-        let serials = serials(&mut line).map_err(failed)?;
-        folder.note_serials(serials);
+        let identities = Identity::read_all(&mut line, &scenario.can).map_err(failed)?;
+        let drives = identities.map(Known::Is);
+        folder.note_drives(drives);
         require(&folder.basis()).usage()?;
+        for &axis in axes {
+            let node = NodeId::new(scenario.can.node_ids[axis]).context("node ids").usage()?;
+            let wanted = WantedDrive::of_axis(&scenario, axis, node).usage()?;
+            identities[axis].check_kind(axis, &wanted).map_err(failed)?;
+        }
+        warn_of_gaps(&drives);
         ledger::settle(&args.folder, &scenario, &mut line, false)?;
         // A step that borrows the marked object must not return a mark.
         if matches!(step, Step::Jog(_) | Step::Home) {
             axes.iter().try_for_each(|&axis| power_mark::remove(&past, &scenario, &mut line, axis))?;
         }
-        line.keep_old_values_in(Box::new(Files::new(&args.folder, serials)));
-        Ok(Self { scenario, line, stop, past, folder, boot_ups, serials })
+        line.keep_old_values_in(Box::new(Files::new(&args.folder, identities)));
+        Ok(Self { scenario, line, stop, past, folder, boot_ups, drives })
     }
 
     /// Refuses a drive that restarted since the step began, since it may have lost its position or what was written,
@@ -83,7 +93,7 @@ impl Session {
 
     /// The same before the step is judged, and asks every drive whether it is still there.
     pub(super) fn check_present(&mut self) -> Result<(), Disturbance> {
-        check_present(&mut self.line, &ALL, self.boot_ups, &self.serials)
+        check_present(&mut self.line, &self.scenario.can, &ALL, self.boot_ups, &self.drives)
     }
 
     /// Writes the result, whether it is evidence, and where it is.
@@ -97,6 +107,8 @@ impl Session {
     /// Writes that the step failed, and why.
     pub(super) fn fail(self, error: MotionError) -> Failure {
         let exit = match &error {
+            // No motion begins before its values are in the drive.
+            MotionError::Line(LineError::NotKept { .. }) => Exit::Failed,
             MotionError::Stopped { cause: StopCause::Requested, .. } => Exit::Interrupted,
             MotionError::Stopped { .. }
             | MotionError::StaysOn { .. }
@@ -110,16 +122,4 @@ impl Session {
         let written = self.finish(false, &json!({ "error": error.to_string() }));
         written.err().unwrap_or_else(|| Failure::with(exit, error))
     }
-}
-
-/// Serial numbers (1018h:04); none of a drive that says that it has none.
-///
-/// # Errors
-/// [`LineError`] of the first drive that does not answer.
-pub(super) fn serials(line: &mut Line) -> Result<[Option<u32>; AXES], LineError> {
-    let mut serials = [None; AXES];
-    for (axis, found) in serials.iter_mut().enumerate() {
-        *found = serial(line, axis)?;
-    }
-    Ok(serials)
 }

@@ -8,6 +8,7 @@ use masseter_terminal::{Exit, Tone, result, result_with_tones};
 
 use super::args::RobotArgs;
 use super::evidence::Basis;
+use super::identity::{Identity, Known};
 use super::past::Past;
 use super::step::Step;
 
@@ -50,9 +51,9 @@ pub(crate) fn report(args: &StatusArgs) -> anyhow::Result<Exit> {
         let (Ok(more) | Err(more)) = state;
         writeln!(text, "| {step} | {}{more} |", if state.is_ok() { "passed " } else { "" })?;
     }
-    writeln!(text, "\nProfiles: {}\n\n| axis | serial number |\n| --- | --- |", basis.profile_hash)?;
-    for (name, serial) in AXIS_NAMES.iter().zip(basis.serials) {
-        writeln!(text, "| {name} | {} |", serial.map_or_else(String::new, |serial| serial.to_string()))?;
+    writeln!(text, "\nProfiles: {}\n\n| axis | drive |\n| --- | --- |", basis.profile_hash)?;
+    for (name, drive) in AXIS_NAMES.iter().zip(basis.drives) {
+        writeln!(text, "| {name} | {} |", drive.identity().map_or_else(String::new, Identity::to_string))?;
     }
     for (path, evidence) in past.steps() {
         let folder = path.file_name().unwrap_or_default().display();
@@ -67,8 +68,11 @@ pub(crate) fn report(args: &StatusArgs) -> anyhow::Result<Exit> {
 
 fn read(args: &StatusArgs) -> anyhow::Result<(Past, Basis, Vec<Link>)> {
     let past = Past::read(&args.robot.folder)?;
-    let newest_serial = |axis: usize| past.steps().rev().find_map(|(_, evidence)| evidence.serials[axis]);
-    let basis = Basis::new(&args.robot.scenario()?, std::array::from_fn(newest_serial));
+    let newest = |axis: usize| {
+        let mut drives = past.steps().rev().map(|(_, evidence)| evidence.drives[axis]);
+        drives.find(|drive| *drive != Known::NotAsked).unwrap_or(Known::NotAsked)
+    };
+    let basis = Basis::new(&args.robot.scenario()?, std::array::from_fn(newest));
     let links =
         Step::chain().into_iter().map(|step| Link { step, state: state(&past, &basis, step) }).collect();
     Ok((past, basis, links))

@@ -15,6 +15,7 @@ use serde::Serialize;
 use super::args::WriteArgs;
 use super::before::before_file;
 use super::evidence::{Evidence, StepFolder};
+use super::identity::Known;
 use super::presence::{check_present, check_undisturbed};
 use super::robot_line::{RobotLine, Surveys, failed};
 
@@ -32,10 +33,10 @@ struct Written {
 
 impl Written {
     /// Notes what has happened to the drive since its turn: values that are not stored may be lost.
-    fn judge(&mut self, line: &mut Line, serials: &[Option<u32>; AXES]) {
+    fn judge(&mut self, robot: &mut RobotLine, drives: &[Known; AXES]) {
         let (axis, boot_ups) = self.end;
         if self.error.is_none() {
-            let present = check_present(line, &[axis], boot_ups, serials);
+            let present = check_present(&mut robot.line, &robot.scenario.can, &[axis], boot_ups, drives);
             self.error = present.err().map(|error| error.to_string());
         }
     }
@@ -173,7 +174,7 @@ fn finish(
     stores: bool,
 ) -> Result<Exit, Failure> {
     for written in &mut all {
-        written.judge(&mut robot.line, &folder.basis().serials);
+        written.judge(robot, &folder.basis().drives);
     }
     robot.line.flush().incomplete()?;
     let mut text = String::new();

@@ -5,10 +5,11 @@ use masseter_can::cia402::Statusword;
 use masseter_shared::config::{DriveProfile, ObjectRule};
 
 use super::deviation::{Deviation, Outcome};
+use super::line_error::reason_text;
 use super::settings::{Difference, Settings};
 use super::survey::Survey;
 use super::units::{of_ratios, of_units};
-use super::wording::{reason_text, value_text};
+use super::wording::value_text;
 use crate::wanted::{WantedDrive, WantedIdentity};
 
 /// Bit of 6502h: cyclic synchronous position.
@@ -89,7 +90,23 @@ fn of_state(survey: &Survey) -> Vec<Deviation> {
             "",
         ));
     }
+    all.extend(of_switches(survey));
     all
+}
+
+/// A limit switch that is closed while the axis stands.
+fn of_switches(survey: &Survey) -> Option<Deviation> {
+    let inputs = ObjectAddress::new(0x60FD, 0);
+    let closed = match survey.number(inputs)? & 0b11 {
+        0 => return None,
+        0b01 => "negative closed",
+        0b10 => "positive closed",
+        _ => "both closed",
+    };
+    let remedy =
+        "a limit switch: the axis is at its end, or its wire is broken; no jog goes in its direction";
+    let values = ["open", closed].map(str::to_owned);
+    Some(Deviation::new(inputs, values, Outcome::Doubtful, remedy, ""))
 }
 
 fn of_object(survey: &Survey, difference: &Difference) -> Deviation {
@@ -172,5 +189,17 @@ mod tests {
         );
         let gear: Vec<_> = all.iter().filter(|(object, ..)| object == "6091h:01h").collect();
         assert!(matches!(gear[..], [(_, Outcome::Refused, _)]), "{all:?}");
+    }
+
+    #[test]
+    fn a_limit_switch_that_is_closed_is_worth_a_look() {
+        for (bits, found) in [(0b100, None), (0b110, Some("positive closed")), (0b011, Some("both closed"))] {
+            let mut survey = Survey::default();
+            survey.insert(ObjectAddress::new(0x60FD, 0), bits);
+            let deviation = of_switches(&survey);
+            assert_eq!(deviation.as_ref().map(|one| one.found.as_str()), found);
+            assert!(deviation.is_none_or(|one| one.outcome == Outcome::Doubtful));
+        }
+        assert_eq!(of_switches(&Survey::default()), None, "a drive without that object");
     }
 }

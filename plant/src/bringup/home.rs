@@ -104,7 +104,7 @@ fn home_twice(
     // The limits count from the new home.
     open_limits(mover, stroke_m)?;
     if first.way_m.abs() > NO_WAY_M {
-        mover.heed_switches();
+        mover.heed_switches()?;
         mover.switch_on(POSITIONING, operator)?;
         let back_m = mover.position_m()? - BACK_M * first.way_m.signum();
         mover.move_to(scale.increments(back_m), operator)?;

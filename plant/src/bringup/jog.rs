@@ -99,6 +99,7 @@ fn go(
     let Caution { still_m, .. } = mover.caution();
     let here = scale.increments(mover.position_m()?);
     let way = (order.by_m / scale.increment_m).round() as i32;
+    mover.check_way(here + way)?;
     let room = way.abs() + scale.window(still_m) as i32;
     mover.borrow_limits([here - room, here + room])?;
     mover.switch_on(POSITIONING, operator)?;

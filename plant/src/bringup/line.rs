@@ -18,6 +18,7 @@ use super::ledger::{Ledger, OldValue};
 use super::line_error::{LineError, SdoReason};
 use super::traffic::Traffic;
 use crate::error::PlantError;
+use crate::wanted::shown_bits;
 
 /// Silence of a server after which a request is repeated, and how often that is done.
 const TIMEOUT_NS: u64 = 500 * MILLISECOND_NS;
@@ -160,7 +161,8 @@ impl Line {
         Ok(value.iter().rfold(0, |number, &byte| number << 8 | u32::from(byte)))
     }
 
-    /// Writes the lowest bytes of a value to an object. The controlword has [its own function](Self::control).
+    /// Writes the lowest bytes of a value to an object, and reads it back: a write is believed when the drive shows it. What
+    /// does not show itself is for the caller to prove. The controlword has [its own function](Self::control).
     ///
     /// # Errors
     /// [`LineError`].
@@ -175,7 +177,16 @@ impl Line {
         bytes: usize,
     ) -> Result<(), LineError> {
         assert!(object.index != 0x6040, "controlwords go through control");
-        self.download(axis, object, value, bytes)
+        self.download(axis, object, value, bytes)?;
+        let Some(bits) = shown_bits(object, value, bytes) else { return Ok(()) };
+        let found = match self.read_number(axis, object) {
+            Err(error) if error.abort_code().is_some() => None,
+            read => Some(read?),
+        };
+        if found.is_some_and(|found| (found ^ value) & bits == 0) {
+            return Ok(());
+        }
+        Err(LineError::NotKept { axis, object, written: value, found })
     }
 
     /// Sends a controlword by SDO. One that switches a drive on is refused while another drive is on.

@@ -6,6 +6,7 @@ use masseter_can::SendError;
 use masseter_can::canopen::{AbortCode, ObjectAddress};
 use masseter_shared::geometry::AXIS_NAMES;
 
+use super::wording::{object_name, value_text};
 use crate::error::PlantError;
 
 /// Why a question had no answer.
@@ -22,6 +23,14 @@ pub enum SdoReason {
     Malformed,
 }
 
+/// Why an object could not be read.
+pub fn reason_text(reason: SdoReason) -> String {
+    match reason {
+        SdoReason::Aborted(AbortCode::NO_OBJECT | AbortCode::NO_SUBINDEX) => "not there".to_owned(),
+        reason => reason.to_string(),
+    }
+}
+
 /// Why a line cannot go on.
 #[derive(Debug, thiserror::Error)]
 pub enum LineError {
@@ -34,6 +43,22 @@ pub enum LineError {
         object: ObjectAddress,
         /// The reason.
         reason: SdoReason,
+    },
+    /// The drive acknowledged a value and shows another one, or none.
+    #[error(
+        "{}: object {object} ({}) := {}: the drive acknowledged it and shows {}",
+        AXIS_NAMES[*axis], object_name(*object), value_text(*object, *written),
+        found.map_or_else(|| "nothing".to_owned(), |found| value_text(*object, found))
+    )]
+    NotKept {
+        /// The axis.
+        axis: usize,
+        /// The object.
+        object: ObjectAddress,
+        /// The value that was written.
+        written: u32,
+        /// The value that the drive shows; none where it refuses to show the object.
+        found: Option<u32>,
     },
     /// A second drive would be switched on.
     #[error("{}: not switched on, because {} still is; end that step first", AXIS_NAMES[*axis], AXIS_NAMES[*other])]

@@ -204,6 +204,18 @@ pub enum MotionError {
         /// Its value.
         found: u32,
     },
+    /// A limit switch in the direction of the way is closed before it begins.
+    #[error(
+        "{}: a limit switch is closed (60FDh = {bits:08X}h), and the way goes in its direction; move the axis the other way, \
+         or check the switch and its wire",
+        AXIS_NAMES[*axis]
+    )]
+    OnSwitch {
+        /// The axis.
+        axis: usize,
+        /// 60FDh.
+        bits: u32,
+    },
     /// The axis moved after its power went.
     #[error(
         "{}: moved {:.3} mm after its power went; support the axis, and let the drive close the brake before it takes the current away",

@@ -154,8 +154,18 @@ impl<'a> Mover<'a> {
     }
 
     /// The limit switches end the next motion.
-    pub(super) fn heed_switches(&mut self) {
-        self.watch.heed_switches(self.line);
+    pub(super) fn heed_switches(&mut self) -> Result<(), LineError> {
+        self.watch.heed_switches(self.line)
+    }
+
+    /// Refuses a target in the direction of a limit switch that is closed.
+    pub(super) fn check_way(&self, target: i32) -> Result<(), MotionError> {
+        self.watch.check_way(self.scale().metres(target), self.backwards_m())
+    }
+
+    /// As far as an axis may seem to go backwards, m.
+    fn backwards_m(&self) -> f64 {
+        (NOISES * self.noise_m).max(INCREMENTS * self.scale().increment_m.abs())
     }
 
     /// Scales of the axis.
@@ -242,12 +252,13 @@ impl<'a> Mover<'a> {
         target: i32,
         operator: &mut Operator<'_>,
     ) -> Result<Vec<Sample>, MotionError> {
+        self.check_way(target)?;
         let scale = self.scale();
         let Caution { speed_m_s, acceleration_m_s2, still_m, .. } = self.caution;
         let way = Way {
             start_m: self.position_m()?,
             target_m: scale.metres(target),
-            backwards_m: (NOISES * self.noise_m).max(INCREMENTS * scale.increment_m.abs()),
+            backwards_m: self.backwards_m(),
             beyond_m: 2.0 * still_m + self.watch.bounds().window_m,
         };
         let limit_s = 1.5 * (way.length_m() / speed_m_s + speed_m_s / acceleration_m_s2) + 1.0;
@@ -341,6 +352,7 @@ impl<'a> Mover<'a> {
             switching::stop(self.line, axis, &self.profile().brake)?;
         }
         let done = done.map_err(|error| match error {
+            MotionError::Line(LineError::NotKept { .. }) => error,
             MotionError::Line(_) | MotionError::Statusword { .. } => {
                 MotionError::Unread { axis, source: Box::new(error) }
             }

@@ -8,7 +8,7 @@ use super::line::Line;
 use super::line_error::{LineError, SdoReason};
 
 /// Device, state and units: index and sub-indices.
-const OF_EVERY_DRIVE: [(u16, &[u8]); 20] = [
+const OF_EVERY_DRIVE: [(u16, &[u8]); 21] = [
     (0x1000, &[0]),
     (0x1001, &[0]),
     (0x1003, &[0]),
@@ -22,6 +22,7 @@ const OF_EVERY_DRIVE: [(u16, &[u8]); 20] = [
     (0x6061, &[0]),
     (0x603F, &[0]),
     (0x6064, &[0]),
+    (0x60FD, &[0]),
     (0x608F, &[1, 2]),
     (0x6091, &[1, 2]),
     (0x6092, &[1, 2]),

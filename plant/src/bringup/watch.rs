@@ -10,8 +10,10 @@ use super::line_error::LineError;
 use super::motion_error::{MotionError, StopCause};
 use super::restart::BootUps;
 
-/// Digital inputs (60FDh): negative and positive limit switch.
-const LIMIT_SWITCHES: u32 = 0b11;
+/// Digital inputs (60FDh): limit switches.
+const INPUTS: ObjectAddress = ObjectAddress::new(0x60FD, 0);
+const NEGATIVE_SWITCH: u32 = 0b01;
+const POSITIVE_SWITCH: u32 = 0b10;
 
 /// What is allowed while one axis moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,6 +24,15 @@ pub(super) struct Bounds {
     pub(super) window_m: f64,
     /// Motion of an axis that shall stand, m.
     pub(super) still_m: f64,
+}
+
+/// The limit switches at the beginning of a motion.
+#[derive(Debug, Clone, Copy)]
+struct Switches {
+    /// 60FDh.
+    bits: u32,
+    /// Where the axis stood, m.
+    place_m: f64,
 }
 
 /// The moved axis at one look.
@@ -48,8 +59,8 @@ pub(super) struct Watch {
     /// Emergencies heard before.
     emergencies: [usize; AXES],
     boot_ups: BootUps,
-    /// 60FDh at the beginning; none in a drive without that object.
-    switches: Option<u32>,
+    /// None in a drive without 60FDh, and while they do not count.
+    switches: Option<Switches>,
     /// The other axis that is looked at next.
     next: usize,
 }
@@ -74,6 +85,11 @@ pub(super) fn read_error_code(line: &mut Line, axis: usize) -> u16 {
     line.read_number(axis, ObjectAddress::new(0x603F, 0)).unwrap_or(0) as u16
 }
 
+/// The limit switches of an axis that stands there; none in a drive without 60FDh.
+fn read_switches(line: &mut Line, axis: usize, place_m: f64) -> Option<Switches> {
+    Some(Switches { bits: line.read_number(axis, INPUTS).ok()?, place_m })
+}
+
 impl Watch {
     /// Begins; refuses if a drive has power.
     pub(super) fn begin(
@@ -90,7 +106,7 @@ impl Watch {
             }
             *began_m = read_position(line, axis, &scales[axis])?;
         }
-        let switches = line.read_number(axis, ObjectAddress::new(0x60FD, 0)).ok();
+        let switches = read_switches(line, axis, began_m[axis]);
         let emergencies = std::array::from_fn(|axis| line.heard(axis).emergencies.len());
         let boot_ups = BootUps::until_now(line);
         Ok(Self { axis, scales, bounds, began_m, emergencies, boot_ups, switches, next: 0 })
@@ -116,9 +132,27 @@ impl Watch {
         self.switches = None;
     }
 
-    /// The limit switches count again, except those that are closed now.
-    pub(super) fn heed_switches(&mut self, line: &mut Line) {
-        self.switches = line.read_number(self.axis, ObjectAddress::new(0x60FD, 0)).ok();
+    /// The limit switches count again. Those that are closed now end no motion, and allow none in their direction.
+    pub(super) fn heed_switches(&mut self, line: &mut Line) -> Result<(), LineError> {
+        let place_m = read_position(line, self.axis, &self.scales[self.axis])?;
+        self.switches = read_switches(line, self.axis, place_m);
+        Ok(())
+    }
+
+    /// Refuses a target beyond the place where the axis stood, in the direction of a switch that was closed there: the axis
+    /// is at its end, or the switch or its wire is broken. Positions within the noise are one place.
+    ///
+    /// # Errors
+    /// [`MotionError::OnSwitch`].
+    pub(super) fn check_way(&self, target_m: f64, noise_m: f64) -> Result<(), MotionError> {
+        let (axis, Some(Switches { bits, place_m })) = (self.axis, self.switches) else { return Ok(()) };
+        // The drive counts the other way on a reversed axis.
+        let beyond_m = (target_m - place_m) * self.scales[axis].increment_m.signum();
+        let blocks = |switch, beyond_m| bits & switch != 0 && beyond_m > noise_m;
+        if blocks(POSITIVE_SWITCH, beyond_m) || blocks(NEGATIVE_SWITCH, -beyond_m) {
+            return Err(MotionError::OnSwitch { axis, bits });
+        }
+        Ok(())
     }
 
     /// Looks once. The position comes before the statusword: a statusword without "homed" proves an old position.
@@ -167,8 +201,9 @@ impl Watch {
     /// A switch that was closed at the beginning may be left.
     fn look_at_switches(&self, line: &mut Line) -> Result<Option<StopCause>, MotionError> {
         let Some(before) = self.switches else { return Ok(None) };
-        let bits = line.read_number(self.axis, ObjectAddress::new(0x60FD, 0))?;
-        Ok((bits & !before & LIMIT_SWITCHES != 0).then_some(StopCause::LimitSwitch { bits }))
+        let bits = line.read_number(self.axis, INPUTS)?;
+        let closed = bits & !before.bits & (NEGATIVE_SWITCH | POSITIVE_SWITCH);
+        Ok((closed != 0).then_some(StopCause::LimitSwitch { bits }))
     }
 
     fn look_at_another(&mut self, line: &mut Line) -> Result<Option<StopCause>, MotionError> {

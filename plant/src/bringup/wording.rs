@@ -1,8 +1,7 @@
 //! Objects and their values in words.
 
-use masseter_can::canopen::{AbortCode, ObjectAddress};
+use masseter_can::canopen::ObjectAddress;
 
-use super::line_error::SdoReason;
 use crate::drive::dictionary::{ENTRIES, find};
 
 /// Objects that the emulated drives do not have.
@@ -28,14 +27,6 @@ pub fn value_text(object: ObjectAddress, value: u32) -> String {
         Ok(place) => ENTRIES[place].kind.number(value).to_string(),
         Err(_) if object.index == 0x30B0 => (value as i32).to_string(),
         Err(_) => value.to_string(),
-    }
-}
-
-/// Why an object could not be read.
-pub fn reason_text(reason: SdoReason) -> String {
-    match reason {
-        SdoReason::Aborted(AbortCode::NO_OBJECT | AbortCode::NO_SUBINDEX) => "not there".to_owned(),
-        reason => reason.to_string(),
     }
 }
 

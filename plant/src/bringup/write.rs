@@ -51,20 +51,11 @@ pub enum WriteError {
         /// The key of the scenario that decides the value.
         key: String,
     },
-    /// The drive took a value and shows another one.
-    #[error(
-        "{}: object {object} ({}) := {}: the drive took it and shows {}; change {key}",
-        AXIS_NAMES[*axis], object_name(*object), value_text(*object, *value), value_text(*object, *found)
-    )]
+    /// The drive acknowledged a value and shows another one.
+    #[error("{source}; change {key}")]
     NotKept {
-        /// The axis.
-        axis: usize,
-        /// The object.
-        object: ObjectAddress,
-        /// The value.
-        value: u32,
-        /// What the drive shows.
-        found: u32,
+        /// The object with its values.
+        source: LineError,
         /// The key of the scenario that decides the value.
         key: String,
     },
@@ -171,27 +162,24 @@ impl<'a> Writer<'a> {
         key: &str,
         before: Option<u32>,
     ) -> Result<(), WriteError> {
-        let axis = self.axis;
-        match self.line.write(axis, object, value, bytes) {
-            Ok(()) => {}
-            Err(error) => {
-                let Some(code) = error.abort_code() else { return Err(error.into()) };
-                let (limits, key) = (self.limits(object), key.to_owned());
-                return Err(WriteError::Refused { axis, object, value, code, limits, key });
-            }
-        }
-        let found = self.line.read_number(axis, object)?;
-        self.changes.push(Change {
+        let (axis, key) = (self.axis, key.to_owned());
+        let written = self.line.write(axis, object, value, bytes);
+        let shown = match written {
+            Ok(()) => Some(value),
+            Err(LineError::NotKept { found, .. }) => found,
+            Err(_) => None,
+        };
+        self.changes.extend(shown.map(|shown| Change {
             object: object.to_string(),
             name: object_name(object),
             before: before.map(|before| value_text(object, before)),
-            after: value_text(object, found),
-        });
-        if same(found, value, bytes) {
-            Ok(())
-        } else {
-            Err(WriteError::NotKept { axis, object, value, found, key: key.to_owned() })
-        }
+            after: value_text(object, shown),
+        }));
+        written.map_err(|error| match error.abort_code() {
+            Some(code) => WriteError::Refused { axis, object, value, code, limits: self.limits(object), key },
+            None if matches!(error, LineError::NotKept { .. }) => WriteError::NotKept { source: error, key },
+            None => error.into(),
+        })
     }
 
     fn limits(&self, object: ObjectAddress) -> String {

@@ -2,9 +2,10 @@
 
 use masseter_can::canopen::CobId;
 use masseter_shared::clock::SECOND_NS;
-use masseter_shared::config::{INCREMENTS_PER_TURN, QuirkConfig, QuirkKindConfig as Kind};
+use masseter_shared::config::{INCREMENTS_PER_TURN, ObjectKey, QuirkConfig, QuirkKindConfig as Kind};
 
-use super::dictionary::{Objects, Overlay, PDOS, RPM_PER_S, names};
+use super::dictionary::{Objects, Overlay, PDOS, RPM_PER_S, find, names};
+use crate::error::PlantError;
 
 /// Inhibit time of transmit PDOs as delivered: 1 ms.
 const FACTORY_INHIBIT: u16 = 10;
@@ -60,15 +61,18 @@ pub(crate) struct Quirks {
 
 impl Quirks {
     /// The quirks of one drive.
-    pub(crate) fn new<'a>(quirks: impl Iterator<Item = &'a QuirkConfig>) -> Self {
+    ///
+    /// # Errors
+    /// [`PlantError::Scenario`] for an object that no emulated drive has.
+    pub(crate) fn new<'a>(mut quirks: impl Iterator<Item = &'a QuirkConfig>) -> Result<Self, PlantError> {
         let node = NodeQuirks { boot_ups: 1, locks_pdos: false, save_ns: 0, fault: None, restart_ns: None };
         let axis = AxisQuirks { closing_ns: Some(0), ..AxisQuirks::default() };
         let mut all = Self { node, axis, overlay: Overlay::default(), of_dictionary: Vec::new() };
-        quirks.for_each(|quirk| all.add(quirk));
-        all
+        quirks.try_for_each(|quirk| all.add(quirk))?;
+        Ok(all)
     }
 
-    fn add(&mut self, quirk: &QuirkConfig) {
+    fn add(&mut self, quirk: &QuirkConfig) -> Result<(), PlantError> {
         let ns = |time_s: Option<f64>| time_s.map(|time_s| (time_s * SECOND_NS as f64) as u64);
         let Self { node, axis, overlay, of_dictionary } = self;
         match quirk.kind {
@@ -102,7 +106,19 @@ impl Quirks {
             Kind::LimitsFromZero => axis.are_limits_from_zero = true,
             Kind::StoAtPowerOn => axis.torque_off_ns = ns(quirk.for_s).unwrap_or(u64::MAX),
             Kind::IncrementalEncoder => axis.is_incremental = true,
+            Kind::Shows | Kind::Lacks => {
+                for ObjectKey(object) in quirk.objects.iter().flatten() {
+                    let place = find(*object).map_err(|code| {
+                        PlantError::Scenario(format!("drives.quirk.objects: {object}: {code}"))
+                    })?;
+                    match quirk.value {
+                        Some(word) => overlay.show(place, word),
+                        None => overlay.hide_entry(place),
+                    }
+                }
+            }
         }
+        Ok(())
     }
 
     /// Writes the units that the drive counts in into its dictionary: before quantities are written in them.

@@ -40,6 +40,9 @@ impl DriveSettings {
         check_quantities(scenario)?;
         let ids = node_ids(&scenario.can)?;
         let watched = u32::from(MASTER_NODE.get()) << 16 | u32::from(scenario.can.heartbeat_consumer_ms);
+        let of_axis = |axis| scenario.drives.quirk.iter().filter(move |quirk| quirk.is_on(axis));
+        let quirks =
+            (0..AXES).map(|axis| Quirks::new(of_axis(axis))).collect::<Result<Vec<_>, PlantError>>()?;
         Ok(std::array::from_fn(|axis| {
             let (node, drive) = (ids[axis], scenario.drives.of_axis(axis));
             let stroke_m = scenario.mechanism.strokes.of_axis(axis);
@@ -54,8 +57,7 @@ impl DriveSettings {
             objects.set(names::REVISION, identity.revision);
             objects.set(names::CONSUMER_HEARTBEAT_TIME, watched);
             objects.set(names::PRODUCER_HEARTBEAT_TIME_MS, scenario.can.heartbeat_producer_ms);
-            let of_axis = scenario.drives.quirk.iter().filter(|quirk| quirk.is_on(axis));
-            let mut quirks = Quirks::new(of_axis);
+            let mut quirks = quirks[axis].clone();
             quirks.set_units(&mut objects);
             configure(&mut objects, &drive, scenario.period_ns(), position_limits);
             quirks.set_values(scenario.period_ns(), &mut objects);

@@ -11,6 +11,6 @@ mod process_data;
 
 pub use drive::WantedDrive;
 pub use object::WantedObject;
-pub(crate) use object::{OFFSETS, may_keep};
+pub(crate) use object::{OFFSETS, may_keep, shown_bits};
 pub(crate) use process_data::{COB_ID_BITS, OTHER_PDOS};
 pub use process_data::{WantedIdentity, WantedPdo};

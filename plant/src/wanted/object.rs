@@ -1,7 +1,9 @@
 //! One object of a drive as the rig needs it.
 
-use masseter_can::canopen::ObjectAddress;
+use masseter_can::canopen::{CobId, ObjectAddress};
 use masseter_shared::config::ObjectRule;
+
+use super::process_data::COB_ID_BITS;
 
 /// One object as it must be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,6 +18,27 @@ pub struct WantedObject {
     pub rule: ObjectRule,
     /// The key of the scenario that decides the value.
     pub key: &'static str,
+}
+
+/// Objects that do not show what was written to them, with what proves the write instead.
+const SHOWN_ELSEWHERE: [(u16, &str); 4] = [
+    (0x1010, "a signature starts the saving, and a reset shows what was saved"),
+    (0x1011, "as 1010h"),
+    (0x6040, "a command, whose effect the statusword (6041h) shows"),
+    (0x6060, "drives after DSP 402 2.0 do not show it; 6061h shows the mode"),
+];
+
+/// The bits of an object that must be those that were written to it; none where something else proves the write.
+pub(crate) fn shown_bits(object: ObjectAddress, value: u32, bytes: usize) -> Option<u32> {
+    let is_cob_id = matches!(object.index, 0x1400..0x1600 | 0x1800..0x1A00) && object.subindex == 1;
+    match SHOWN_ELSEWHERE.iter().find(|(index, _)| *index == object.index) {
+        Some(_) => None,
+        // The number of a PDO that does not exist means nothing.
+        None if is_cob_id && !CobId(value).is_valid() => Some(CobId::NOT_VALID),
+        // A drive decides itself whether it answers remote requests, which nobody sends.
+        None if is_cob_id => Some(COB_ID_BITS),
+        None => Some(u32::MAX >> (32 - 8 * bytes)),
+    }
 }
 
 /// Offsets of position, velocity and torque, with the bytes of each. A drive keeps the last value of its process data.

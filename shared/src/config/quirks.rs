@@ -5,6 +5,7 @@ use std::fmt::{self, Display, Formatter};
 
 use serde::{Deserialize, Serialize};
 
+use super::drive_profile::ObjectKey;
 use super::error::ScenarioError;
 use super::need::{LONGEST_S, require_within};
 use crate::geometry::AXIS_NAMES;
@@ -79,6 +80,10 @@ quirk_kinds! {
     FaultAtPowerOn "fault_at_power_on" ["code"];
     /// The drive restarts by itself once, `after_s` after power-on.
     Restarts "restarts" ["after_s"];
+    /// SDO shows `value` in each of `objects`; writes are acknowledged, and change nothing.
+    Shows "shows" ["objects", "value"];
+    /// The drive has none of `objects`.
+    Lacks "lacks" ["objects"];
 }
 
 impl Display for QuirkKindConfig {
@@ -107,6 +112,10 @@ pub struct QuirkConfig {
     pub increments_per_turn: Option<u32>,
     /// Error code (603Fh).
     pub code: Option<u16>,
+    /// The objects that it is about.
+    pub objects: Option<Vec<ObjectKey>>,
+    /// What they show.
+    pub value: Option<u32>,
 }
 
 impl QuirkConfig {
@@ -121,6 +130,8 @@ impl QuirkConfig {
             close_s: None,
             increments_per_turn: None,
             code: None,
+            objects: None,
+            value: None,
         }
     }
 
@@ -130,8 +141,9 @@ impl QuirkConfig {
     }
 
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
-        use QuirkKindConfig::{FaultAtPowerOn, Restarts, SlowBrake, SlowSave};
-        let Self { kind, axes, for_s, after_s, open_s, close_s, increments_per_turn, code } = self;
+        use QuirkKindConfig::{FaultAtPowerOn, Lacks, Restarts, Shows, SlowBrake, SlowSave};
+        let Self { kind, axes, for_s, after_s, open_s, close_s, increments_per_turn, code, objects, value } =
+            self;
         let bad = |key, value: &dyn Display, need: &str| Err(ScenarioError::bad(key, value, need));
         let given = [
             ("drives.quirk.for_s", "for_s", for_s.is_some(), *kind == SlowSave),
@@ -140,6 +152,8 @@ impl QuirkConfig {
             ("drives.quirk.close_s", "close_s", close_s.is_some(), false),
             ("drives.quirk.increments_per_turn", "increments_per_turn", increments_per_turn.is_some(), false),
             ("drives.quirk.code", "code", code.is_some(), *kind == FaultAtPowerOn),
+            ("drives.quirk.objects", "objects", objects.is_some(), matches!(kind, Shows | Lacks)),
+            ("drives.quirk.value", "value", value.is_some(), *kind == Shows),
         ];
         for (whole, key, is_given, is_needed) in given {
             if is_given && !kind.keys().contains(&key) {
@@ -159,6 +173,9 @@ impl QuirkConfig {
         }
         if axes.as_ref().is_some_and(Vec::is_empty) {
             return bad("drives.quirk.axes", &"[]", "name at least one axis, or leave it away for all");
+        }
+        if objects.as_ref().is_some_and(Vec::is_empty) {
+            return bad("drives.quirk.objects", &"[]", "name at least one object, such as '6065h'");
         }
         if *increments_per_turn == Some(0) {
             return bad("drives.quirk.increments_per_turn", &0, "use at least 1");
@@ -196,6 +213,8 @@ mod tests {
             let values = kind.keys().iter().map(|key| match *key {
                 "increments_per_turn" => "increments_per_turn = 4096\n".to_owned(),
                 "code" => "code = 0x7305\n".to_owned(),
+                "objects" => "objects = ['60C2h:01']\n".to_owned(),
+                "value" => "value = 1\n".to_owned(),
                 time => format!("{time} = 0.5\n"),
             });
             let text = format!("kind = '{kind}'\naxes = ['l2']\n{}", values.collect::<String>());
@@ -216,6 +235,8 @@ mod tests {
             ("kind = 'fault_at_power_on'\ncode = 0", "quirk.code = 0: use an error code"),
             ("kind = 'acceleration_in_rpm_s'\nincrements_per_turn = 0", "use at least 1"),
             ("kind = 'slow_saves'\nfor_s = 1.0", "did you mean 'slow_save'?"),
+            ("kind = 'shows'\nobjects = ['6065h']", "quirk.value = none: give it"),
+            ("kind = 'lacks'\nobjects = []", "quirk.objects = []: name at least one"),
         ];
         for (text, expected) in table {
             let refusal = refusal(text).unwrap_or_else(|| panic!("{text} is accepted"));

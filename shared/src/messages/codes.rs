@@ -215,6 +215,8 @@ codes! {
         FoodBroke = 61 "food_broke",
         /// An axis of the mechanism ran into an end stop (m/s).
         EndStopHit = 62 "end_stop_hit",
+        /// A drive acknowledged a value and shows another one (value that it shows; the limit is the one written).
+        NotKept = 63 "not_kept",
     }
 }
 

@@ -40,6 +40,9 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
         | Cause::WrongUnit => {
             format!("object {object} is {value:08X}h, expected {limit:08X}h")
         }
+        Cause::NotKept => {
+            format!("object {object} was written as {limit:08X}h and acknowledged, and reads {value:08X}h")
+        }
         Cause::SdoAborted => format!("object {object}: {}", AbortCode(value)),
         Cause::SdoTimeout => {
             format!("object {object}: no answer for {value} ms, the request was repeated every {limit} ms")
@@ -143,6 +146,9 @@ const fn remedy(cause: Cause) -> Option<&'static str> {
         Cause::WrongPdo => "give the drive the rig's PDO mapping and store it",
         Cause::NotAccepted => "check whether the drive supports cyclic synchronous position",
         Cause::SdoAborted => "look the object up in the drive's manual",
+        Cause::NotKept => {
+            "look up when the drive takes this object; its rule in drive_profile.objects says whether the rig writes it"
+        }
         Cause::SdoTimeout => "check power, wiring and bit rate of this drive",
         Cause::DuplicateNode => "give every node an id of its own, and let no other client use SDO meanwhile",
         Cause::NodeRestarted => "check its power supply",

@@ -119,3 +119,19 @@ fn a_refused_old_value_does_not_stay_in_the_ledger() {
     assert_eq!(bench.line.read_number(L1, good.object.0).unwrap(), 77);
     assert!(notes.0.lock().unwrap().is_empty());
 }
+
+/// A drive that takes the value of one object for another one: nothing is powered, and the refusal names both values.
+#[test]
+fn a_loan_that_a_drive_does_not_keep_is_refused_before_power() {
+    for object in ["1016h:01", "6007h", "605Ah", "605Eh", "6065h", "6066h", "6072h", "607Dh:01", "607Ah"] {
+        let quirk =
+            format!("[[drives.quirk]]\nkind = 'shows'\nobjects = ['{object}']\nvalue = 165\naxes = ['l1']");
+        let mut bench = Bench::new(&quirk);
+        let refusal = bench.jog(1e-3).unwrap_err();
+        let text = refusal.to_string();
+        let first = if object.ends_with("h") { format!("{object}:00h") } else { format!("{object}h") };
+        assert!(text.starts_with(&format!("l1: object {first} (")), "{text}");
+        assert!(text.contains(": the drive acknowledged it and shows "), "{text}");
+        assert!(!bench.log.controlwords().iter().any(|(_, word)| word.0 & 1 == 1), "{object}: it had power");
+    }
+}

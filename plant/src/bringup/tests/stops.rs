@@ -53,6 +53,30 @@ fn a_drive_that_somebody_else_controls_keeps_every_axis_from_power() {
     assert!(bench.log.controlwords().iter().all(|&(node, _)| node != l1));
 }
 
+/// A switch whose wire is broken: the axis may go away from it and come back, and not beyond its place.
+#[test]
+fn an_axis_does_not_go_in_the_direction_of_a_switch_that_is_closed_at_the_start() {
+    let table = [
+        ("", 0b10, [0.001, -0.001], [true, false]),
+        ("", 0b01, [0.001, -0.001], [false, true]),
+        ("", 0b11, [0.001, -1e-5], [true, true]),
+        ("[[drive_profile]]\nreversed = ['l1']\n", 0b10, [0.001, -0.001], [false, true]),
+    ];
+    for (profile, bits, ways_m, refused) in table {
+        for (by_m, is_refused) in ways_m.into_iter().zip(refused) {
+            let quirk = format!("[[drives.quirk]]\nkind = 'shows'\nobjects = ['60FDh']\nvalue = {bits}");
+            let mut bench = Bench::new(&format!("{profile}{quirk}"));
+            let before = bench.objects();
+            let jogged = bench.jog(by_m);
+            let on_switch =
+                matches!(jogged, Err(MotionError::OnSwitch { axis: L1, bits: found }) if found == bits);
+            assert_eq!((on_switch, jogged.is_ok()), (is_refused, !is_refused), "{bits:b} {by_m}: {jogged:?}");
+            let switched_on = bench.log.controlwords().iter().any(|(_, word)| word.0 & 1 == 1);
+            assert_eq!((switched_on, bench.objects()), (!is_refused, before), "no power for a refused way");
+        }
+    }
+}
+
 /// Somebody switches on d1 in the middle of the jog, and this interface hears no other master.
 #[test]
 fn a_second_drive_that_somebody_else_switches_on_ends_a_jog() {

@@ -318,7 +318,7 @@ fn a_storm_sends_an_emergency_every_so_often() {
 #[test]
 fn a_jam_stops_the_axis_at_once_and_holds_it() {
     let mut bench = bench_with(FaultConfig { for_s: Some(0.2), ..on_l2(Kind::Jam, None) });
-    play_until(&mut bench, 0.502);
+    play_until(&mut bench, 0.505);
     let stuck_m = bench.truth.joint_m[L2];
     assert!(bench.truth.joint_m_s[L2].abs() < 1e-3, "{}", bench.truth.joint_m_s[L2]);
     for _ in 0..100 {

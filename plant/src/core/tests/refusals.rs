@@ -37,8 +37,8 @@ fn what_cannot_work_is_refused_with_its_key() {
         scenario.controller.start_timeout_s = start_timeout_s;
         check(&scenario)
     };
-    assert!(boots_within(5.0).unwrap_err().to_string().contains("the drives take 15.7 s to boot"));
-    assert_eq!(boots_within(15.8), Ok(()));
+    assert!(boots_within(5.0).unwrap_err().to_string().contains("the drives take 20.8 s to boot"));
+    assert_eq!(boots_within(20.9), Ok(()));
 }
 
 #[test]

@@ -10,6 +10,8 @@ use super::objects::{ENTRIES, find};
 pub(crate) struct Overlay {
     /// Places in the table with their entries in this drive; none where the drive lacks it.
     changed: Vec<(usize, Option<Entry>)>,
+    /// Places whose entries show a value that no write changes.
+    shown: Vec<(usize, u32)>,
 }
 
 impl Overlay {
@@ -17,6 +19,21 @@ impl Overlay {
     pub(crate) fn hide(&mut self, index: u16) {
         let places = (0..ENTRIES.len()).filter(|place| ENTRIES[*place].address.index == index);
         self.changed.extend(places.map(|place| (place, None)));
+    }
+
+    /// The drive lacks an entry.
+    pub(crate) fn hide_entry(&mut self, place: usize) {
+        self.changed.push((place, None));
+    }
+
+    /// An entry shows this value, whatever is written.
+    pub(crate) fn show(&mut self, place: usize, word: u32) {
+        self.shown.push((place, word));
+    }
+
+    /// The value that an entry shows whatever is written, if it has one.
+    pub(crate) fn shown(&self, place: usize) -> Option<u32> {
+        self.shown.iter().find(|(at, _)| *at == place).map(|(_, word)| *word)
     }
 
     /// An entry takes these values alone.
@@ -48,7 +65,12 @@ impl Overlay {
     /// [`AbortCode::NO_OBJECT`], [`AbortCode::NO_SUBINDEX`].
     pub(crate) fn find(&self, address: ObjectAddress) -> Result<(usize, &Entry), AbortCode> {
         let place = find(address)?;
-        Ok((place, self.entry(place).ok_or(AbortCode::NO_OBJECT)?))
+        if let Some(entry) = self.entry(place) {
+            return Ok((place, entry));
+        }
+        let mut of_object = (0..ENTRIES.len()).filter(|&at| ENTRIES[at].address.index == address.index);
+        let is_there = of_object.any(|at| self.entry(at).is_some());
+        Err(if is_there { AbortCode::NO_SUBINDEX } else { AbortCode::NO_OBJECT })
     }
 }
 

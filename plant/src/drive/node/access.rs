@@ -40,7 +40,7 @@ impl DictionaryAccess<'_> {
             return Err(AbortCode::NO_DATA);
         }
         self.axis.show(self.now_ns, self.objects);
-        let word = self.objects.words[place].to_le_bytes();
+        let word = self.overlay.shown(place).unwrap_or(self.objects.words[place]).to_le_bytes();
         let data = Expedited::new(&word[..entry.kind.bytes()]).ok_or(AbortCode::GENERAL)?;
         Ok(Value::Number(data))
     }
@@ -53,6 +53,9 @@ impl DictionaryAccess<'_> {
         is_sized: bool,
     ) -> Result<(), AbortCode> {
         let (place, entry) = self.overlay.find(object)?;
+        if self.overlay.shown(place).is_some() {
+            return entry.check_access();
+        }
         let word = entry.writable(data, is_sized)?;
         let is_closed = match object.index {
             0x1400..0x1C00 => self.locks_pdos,

@@ -218,6 +218,31 @@ fn a_drive_that_restarts_does_so_once() {
 }
 
 #[test]
+fn an_object_that_shows_its_value_acknowledges_every_other_one() {
+    let mut bench = bench("kind = 'shows'\nobjects = ['6065h', '60FDh', '60C2h:01']\nvalue = 0x182");
+    assert_eq!(bench.write((0x6065, 0), &777_u32.to_le_bytes()), Ok(()));
+    let shown = [(0x6065, 0), (0x60FD, 0), (0x60C2, 1)].map(|object| bench.read(object));
+    assert_eq!(shown, [Ok(0x182), Ok(0x182), Ok(0x82)], "as many bytes as the object has");
+    assert_eq!(bench.write((0x60FD, 0), &[0; 4]), Err(AbortCode::READ_ONLY), "what it refuses, it refuses");
+}
+
+#[test]
+fn an_object_that_a_drive_lacks_leaves_the_others_of_its_index() {
+    let mut bench = bench("kind = 'lacks'\nobjects = ['1018h:04', '6007h']");
+    assert_eq!(bench.read((0x1018, 4)), Err(AbortCode::NO_SUBINDEX));
+    assert_eq!(bench.read((0x6007, 0)), Err(AbortCode::NO_OBJECT));
+    assert!(bench.read((0x1018, 3)).is_ok());
+}
+
+#[test]
+fn an_object_that_no_emulated_drive_has_is_refused_with_the_key() {
+    let text = "[[drives.quirk]]\nkind = 'lacks'\nobjects = ['9999h']";
+    let scenario = Scenario::parse(std::path::Path::new("s.toml"), text).unwrap();
+    let refusal = DriveSettings::for_axes(&scenario).unwrap_err().to_string();
+    assert!(refusal.starts_with("drives.quirk.objects: 9999h:00h: "), "{refusal}");
+}
+
+#[test]
 fn a_quirk_is_on_its_axes_alone() {
     let mut bench = bench("kind = 'missing_objects'\naxes = ['l2', 'd1']");
     assert!(bench.read((0x6066, 0)).is_ok(), "this is l1");
@@ -263,6 +288,8 @@ fn every_kind_leaves_the_drive_readable() {
         let value = |key: &&str| match *key {
             "increments_per_turn" => "increments_per_turn = 4096\n".to_owned(),
             "code" => "code = 0x7305\n".to_owned(),
+            "objects" => "objects = ['6065h']\n".to_owned(),
+            "value" => "value = 7\n".to_owned(),
             time => format!("{time} = 0.5\n"),
         };
         let mut bench =
@@ -275,7 +302,11 @@ fn every_kind_leaves_the_drive_readable() {
                 None | Some(SdoResponse::Abort { code: AbortCode::NO_OBJECT, .. })
             )
         });
-        let missing = if *kind == QuirkKindConfig::MissingObjects { 3 } else { 0 };
+        let missing = match kind {
+            QuirkKindConfig::MissingObjects => 3,
+            QuirkKindConfig::Lacks => 1,
+            _ => 0,
+        };
         assert_eq!(readable.count(), ENTRIES.len() - missing, "{kind}");
     }
 }

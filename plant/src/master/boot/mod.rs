@@ -16,7 +16,7 @@ use masseter_shared::messages::codes::{BootPhase, Cause};
 
 use super::failure::Failure;
 use crate::wanted::WantedDrive;
-use plan::{Check, IfRefused, Step, plan};
+use plan::{Check, Demand, Step, Write, plan};
 use sdo::{ATTEMPTS, SdoClient, SdoFailure, TIMEOUT_NS};
 
 pub(crate) use plan::shortest_boot;
@@ -28,7 +28,7 @@ const START_WITHIN_NS: u64 = 1_000_000_000;
 /// Readings of a value that a drive may take some time to show.
 const READINGS: u32 = 100;
 /// Answers without a request in one boot that repeated frames explain; more of them mean a second drive with this id.
-const UNASKED: u32 = 5;
+const UNASKED: u32 = 7;
 /// Boot-up messages during a boot before the drive is given up.
 const RESTARTS: u32 = 3;
 
@@ -63,8 +63,8 @@ pub(super) struct Boot {
     readings: u32,
     /// The value to be written back.
     kept: Expedited,
-    /// Why the write of this step failed, while the object is read instead.
-    refused: Option<SdoFailure>,
+    /// How the write of this step ended, while the object is read back.
+    written: Option<Result<(), SdoFailure>>,
     /// The statusword of a drive found in fault.
     fault_statusword: u32,
     /// A fault was reset, which is to be reported.
@@ -86,7 +86,7 @@ impl Boot {
             next: 0,
             readings: 0,
             kept: Expedited::of_unknown_size([0; Expedited::MAX]),
-            refused: None,
+            written: None,
             fault_statusword: 0,
             reset_fault: None,
             client: SdoClient::default(),
@@ -139,7 +139,7 @@ impl Boot {
     /// The plan begins anew, and no transfer is under way.
     fn start_over(&mut self) {
         (self.next, self.readings, self.client) = (0, 0, SdoClient::default());
-        (self.has_repeated, self.unasked, self.refused) = (false, 0, None);
+        (self.has_repeated, self.unasked, self.written) = (false, 0, None);
     }
 
     /// Takes a heartbeat or a boot-up message.
@@ -230,8 +230,8 @@ impl Boot {
         let SdoFailure::Aborted { code, .. } = failure else { return None };
         let is_missing = matches!(code, AbortCode::NO_OBJECT | AbortCode::NO_SUBINDEX);
         match self.steps[self.next] {
-            Step::Write { if_refused: IfRefused::Leave, .. } => Some(0),
-            Step::Write { if_refused: IfRefused::MayLack, .. }
+            Step::Write(Write { demand: Demand::KeptIfTaken | Demand::Nothing, .. }) => Some(0),
+            Step::Write(Write { demand: Demand::KeptIfPresent, .. })
             | Step::Read(_, Check::EqualsIfPresent { value: 0, .. } | Check::Unit(_))
                 if is_missing =>
             {
@@ -246,25 +246,44 @@ impl Boot {
     fn may_be_constant(&self, failure: SdoFailure) -> bool {
         let SdoFailure::Aborted { code, .. } = failure else { return false };
         match self.steps[self.next] {
-            Step::Write { if_refused: IfRefused::MayLack, .. } => true,
-            Step::Write { .. } => code == AbortCode::READ_ONLY,
+            Step::Write(Write { demand: Demand::KeptIfPresent, .. }) => true,
+            Step::Write(_) => code == AbortCode::READ_ONLY,
             _ => false,
         }
     }
 
-    /// Ends the step of a refused write: the value that was read instead must be the wanted one.
-    fn judge_constant(
+    /// The write under way, if one is.
+    fn write(&self) -> Option<Write> {
+        match self.steps[self.next] {
+            Step::Write(write) => Some(write),
+            Step::WriteKept(object) => {
+                let (value, bytes) = (number(self.kept), self.kept.data().len());
+                Some(Write { object, value, bytes, demand: Demand::Kept })
+            }
+            _ => None,
+        }
+    }
+
+    /// Ends the step of a write: the object must show the value, whether the drive took it or had it already.
+    fn judge_shown(
         &mut self,
-        refused: SdoFailure,
+        written: Result<(), SdoFailure>,
         read: Result<Expedited, SdoFailure>,
     ) -> Result<(), Failure> {
-        let Step::Write { value, bytes, .. } = self.steps[self.next] else { return Err(refused.into()) };
-        let has_value = |read| (number(read) ^ value) & (u32::MAX >> (32 - 8 * bytes)) == 0;
-        if !read.is_ok_and(has_value) {
-            return Err(refused.into());
+        let Write { object, value, .. } = self.write().expect("only a write is read back");
+        let bits = self.bits_to_show().unwrap_or(u32::MAX);
+        match (written, read.map(|read| number(read) & bits)) {
+            (_, Ok(found)) if found == value & bits => self.end_step(0),
+            (Err(refused), _) => return Err(refused.into()),
+            (Ok(()), Ok(found)) => return Err(at(Cause::NotKept, object, found, value & bits)),
+            (Ok(()), Err(failure)) => return Err(failure.into()),
         }
-        self.end_step(0);
         Ok(())
+    }
+
+    /// The bits that prove the write under way; none where it is no write, or a later step proves it.
+    fn bits_to_show(&self) -> Option<u32> {
+        self.write()?.shown_bits()
     }
 
     /// Ends the step under way, and skips the next ones.
@@ -279,26 +298,29 @@ impl Boot {
                 self.end_step(0);
             }
             Step::Read(object, _) => self.client.begin(object, None),
-            Step::Write { object, .. } if self.refused.is_some() => self.client.begin(object, None),
-            Step::Write { object, value, bytes, .. } => {
+            Step::Write(_) | Step::WriteKept(_) => {
+                let Write { object, value, bytes, .. } = self.write().expect("a write is under way");
                 let value = Expedited::new(&value.to_le_bytes()[..bytes]).expect("one to four bytes");
-                self.client.begin(object, Some(value));
+                self.client.begin(object, self.written.is_none().then_some(value));
             }
-            Step::WriteKept(object) => self.client.begin(object, Some(self.kept)),
         }
     }
 
     /// Ends the step under way with the outcome of its transfer, unless a value is to be read again.
     fn end_transfer(&mut self, outcome: Result<Expedited, SdoFailure>) -> Result<(), Failure> {
-        if let Some(refused) = self.refused.take() {
-            return self.judge_constant(refused, outcome);
+        if let Some(written) = self.written.take() {
+            return self.judge_shown(written, outcome);
         }
         let skipped = match (outcome, self.steps[self.next]) {
             (Ok(value), Step::Read(object, check)) => self.judge(object, check, value)?,
+            (Ok(_), _) if self.bits_to_show().is_some() => {
+                self.written = Some(Ok(()));
+                None
+            }
             (Ok(_), _) => Some(0),
             (Err(failure), _) => match self.skipped_if_refused(failure) {
                 None if self.may_be_constant(failure) => {
-                    self.refused = Some(failure);
+                    self.written = Some(Err(failure));
                     None
                 }
                 skipped => Some(skipped.ok_or(failure)?),

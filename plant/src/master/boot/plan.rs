@@ -8,7 +8,7 @@ use masseter_can::cia402::Controlword;
 use masseter_shared::config::{AccelerationUnit, ObjectRule};
 use masseter_shared::messages::codes::{BootPhase, Cause};
 
-use crate::wanted::{OTHER_PDOS, WantedDrive, WantedIdentity, WantedObject, WantedPdo, may_keep};
+use crate::wanted::{OTHER_PDOS, WantedDrive, WantedIdentity, WantedObject, WantedPdo, may_keep, shown_bits};
 
 /// 6041h.
 const STATUSWORD: ObjectAddress = ObjectAddress::new(0x6041, 0);
@@ -25,21 +25,40 @@ pub(super) enum Step {
     Enter(BootPhase),
     /// Read the object and check its value.
     Read(ObjectAddress, Check),
-    /// Write that many bytes to the object.
-    Write { object: ObjectAddress, value: u32, bytes: usize, if_refused: IfRefused },
-    /// Write the kept value.
+    /// Write to the object, and read it back.
+    Write(Write),
+    /// The same with the kept value.
     WriteKept(ObjectAddress),
 }
 
-/// What follows from a refused write.
+/// A value for an object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum IfRefused {
-    /// The drive is not enabled, unless the object is constant and has the value already.
-    Fail,
-    /// The drive may lack the object. Where it has the object, it must have the value already.
-    MayLack,
-    /// The drive keeps its own value.
-    Leave,
+pub(super) struct Write {
+    pub(super) object: ObjectAddress,
+    pub(super) value: u32,
+    pub(super) bytes: usize,
+    pub(super) demand: Demand,
+}
+
+/// What a write must achieve. A drive that acknowledges a value and does not keep it is never enabled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Demand {
+    /// The drive has the value. A constant object may have it already.
+    Kept,
+    /// The same, but the drive may lack the object.
+    KeptIfPresent,
+    /// The drive may refuse the value, and keeps its own then.
+    KeptIfTaken,
+    /// Nothing: the write only makes room for a later one of the same object, which counts.
+    Nothing,
+}
+
+impl Write {
+    /// The bits of the object that must be those of the value afterwards; none where a later step proves the write.
+    pub(super) fn shown_bits(&self) -> Option<u32> {
+        let Self { object, value, bytes, demand } = *self;
+        if demand == Demand::Nothing { None } else { shown_bits(object, value, bytes) }
+    }
 }
 
 /// The use of a value that was read.
@@ -78,7 +97,7 @@ pub(super) fn plan(wanted: &WantedDrive, resets_faults: bool) -> Vec<Step> {
     let is_written =
         |wanted: &&WantedObject| wanted.object.index == 0x605A && wanted.rule != ObjectRule::Expect;
     if let Some(&WantedObject { object, value, bytes, .. }) = wanted.objects.iter().find(is_written) {
-        steps.push(Step::Write { object, value, bytes, if_refused: IfRefused::Leave });
+        steps.push(Step::Write(Write { object, value, bytes, demand: Demand::Nothing }));
     }
     steps.extend([control(Controlword::QUICK_STOP), Step::Read(STATUSWORD, Check::NoVoltage)]);
     for communication in OTHER_PDOS {
@@ -117,15 +136,23 @@ pub(super) fn plan(wanted: &WantedDrive, resets_faults: bool) -> Vec<Step> {
 }
 
 /// The least number of SDO exchanges that the boot of a drive takes: of a drive without a fault and without other PDOs
-/// that gives the expected answers at once.
+/// that gives the expected answers at once, and takes every value.
 pub(crate) fn shortest_boot(wanted: &WantedDrive) -> usize {
     let steps = plan(wanted, false);
-    let without_exchange = |step: &Step| match step {
-        Step::Enter(_) => 1,
-        Step::Read(_, Check::FaultElseSkip(skipped) | Check::PdoElseSkip(skipped)) => *skipped,
-        _ => 0,
-    };
-    steps.len() - steps.iter().map(without_exchange).sum::<usize>()
+    let (mut exchanges, mut rest) = (0, steps.iter());
+    while let Some(step) = rest.next() {
+        exchanges += match step {
+            Step::Enter(_) => 0,
+            Step::Read(_, Check::FaultElseSkip(skipped) | Check::PdoElseSkip(skipped)) => {
+                rest.nth(skipped - 1);
+                1
+            }
+            Step::Read(..) => 1,
+            Step::Write(write) => 1 + usize::from(write.shown_bits().is_some()),
+            Step::WriteKept(_) => 2,
+        };
+    }
+    exchanges
 }
 
 const fn compare(WantedIdentity { object, mask, value }: WantedIdentity, otherwise: Cause) -> Step {
@@ -139,7 +166,7 @@ const fn expect(index: u16, subindex: u8, value: u32, otherwise: Cause) -> Step 
 
 const fn write(index: u16, subindex: u8, value: u32, bytes: usize) -> Step {
     let object = ObjectAddress::new(index, subindex);
-    Step::Write { object, value, bytes, if_refused: IfRefused::Fail }
+    Step::Write(Write { object, value, bytes, demand: Demand::Kept })
 }
 
 const fn control(word: Controlword) -> Step {
@@ -156,24 +183,24 @@ fn configure(objects: &[WantedObject]) -> Vec<Step> {
     for &WantedObject { object, value, bytes, rule, .. } in objects {
         if object == ObjectAddress::new(0x607D, 2) && objects.iter().any(is_lower_written) {
             let (object, value) = (ObjectAddress::new(0x607D, 1), i32::MIN as u32);
-            steps.push(Step::Write { object, value, bytes: 4, if_refused: IfRefused::Leave });
+            steps.push(Step::Write(Write { object, value, bytes: 4, demand: Demand::Nothing }));
         }
         steps.push(match rule {
             ObjectRule::Expect => {
                 let mask = u32::MAX >> (32 - 8 * bytes);
                 Step::Read(object, Check::Equals { mask, value, otherwise: Cause::WrongObject })
             }
-            rule => Step::Write { object, value, bytes, if_refused: if_refused(rule, object) },
+            rule => Step::Write(Write { object, value, bytes, demand: demand(rule, object) }),
         });
     }
     steps
 }
 
-fn if_refused(rule: ObjectRule, object: ObjectAddress) -> IfRefused {
+fn demand(rule: ObjectRule, object: ObjectAddress) -> Demand {
     match rule {
-        _ if may_keep(rule, object) => IfRefused::Leave,
-        ObjectRule::Optional => IfRefused::MayLack,
-        _ => IfRefused::Fail,
+        _ if may_keep(rule, object) => Demand::KeptIfTaken,
+        ObjectRule::Optional => Demand::KeptIfPresent,
+        _ => Demand::Kept,
     }
 }
 
@@ -193,7 +220,7 @@ mod tests {
         let wanted = WantedDrive::of_axis(&scenario, 0, id).unwrap();
         for mut limits in [[-500, -400], [-10, 20], [400, 500], [i32::MIN, i32::MAX], [0, 0]] {
             for step in plan(&wanted, false) {
-                if let Step::Write { object, value, .. } = step
+                if let Step::Write(Write { object, value, .. }) = step
                     && object.index == 0x607D
                 {
                     limits[usize::from(object.subindex) - 1] = value as i32;

@@ -1,5 +1,7 @@
 //! From power-on to enabled drives, and the reasons that prevent it.
 
+use std::collections::BTreeSet;
+
 use masseter_can::canopen::{AbortCode, NmtState, SdoRequest};
 use masseter_can::cia402::Statusword;
 
@@ -136,6 +138,38 @@ fn a_constant_object_passes_with_the_value_of_the_rig_alone() {
         let refused = (Cause::SdoAborted.code(), u32::from(object.0) << 8 | u32::from(object.1));
         assert_eq!(faults, if enabled { vec![] } else { vec![refused] }, "{object:X?} is {value:?}");
         assert_eq!(bench.nobody_is_enabled(), !enabled, "{object:X?} is {value:?}");
+    }
+}
+
+/// Every object that a boot writes, in turn. The drive acts on controlwords, and shows its mode in another object.
+#[test]
+fn a_drive_that_acknowledges_a_value_and_does_not_keep_it_is_never_enabled() {
+    let another_pdo = |drive: &mut Peer| drive.objects.insert((0x1801, 1), vec![0x82, 2, 0, 0x40]);
+    let mut sound = Bench::new();
+    another_pdo(sound.drive(3));
+    sound.cycles(400, DriveRequest::Enable);
+    let written = sound.drive(3).requests.iter().filter_map(|(_, request)| match request {
+        SdoRequest::Download { object, .. } => Some((object.index, object.subindex)),
+        _ => None,
+    });
+    let written: BTreeSet<_> = written.filter(|object| *object != (0x6040, 0)).collect();
+    assert!(written.len() > 17, "{written:X?}");
+    for object in written {
+        let mut bench = Bench::new();
+        let drive = bench.drive(3);
+        another_pdo(drive);
+        drive.forgets = Some(object);
+        // The mode is read again and again.
+        bench.cycles(800, DriveRequest::Enable);
+        assert!(bench.nobody_is_enabled(), "{object:X?}");
+        let faults: Vec<_> =
+            bench.events_of(EventKind::Fault).map(|fault| (fault.cause, fault.object)).collect();
+        let at = |(index, subindex): (u16, u8)| u32::from(index) << 8 | u32::from(subindex);
+        let named = match object {
+            (0x6060, 0) => (Cause::NotAccepted.code(), at((0x6061, 0))),
+            _ => (Cause::NotKept.code(), at(object)),
+        };
+        assert_eq!(faults, [named], "{object:X?}");
     }
 }
 

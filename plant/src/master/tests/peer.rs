@@ -41,6 +41,8 @@ pub(super) struct Peer {
     pub(super) refuses: Option<((u16, u8), AbortCode)>,
     /// Objects that it refuses to have written.
     pub(super) constants: Vec<(u16, u8)>,
+    /// An object that it acknowledges and does not keep.
+    pub(super) forgets: Option<(u16, u8)>,
     /// SDO requests received, each with its time.
     pub(super) requests: Vec<(u64, SdoRequest)>,
     controlword: Controlword,
@@ -96,6 +98,7 @@ impl Peer {
             twin_position: None,
             refuses: None,
             constants: Vec::new(),
+            forgets: None,
             requests: Vec::new(),
             controlword: Controlword::DISABLE_VOLTAGE,
             buffered: None,
@@ -259,10 +262,16 @@ impl Peer {
         let is_powered = self.power.is_powered();
         let stops = matches!(address, (0x605A | 0x6040, 0));
         assert!(stops || !is_powered, "{object} of a drive that is {}", self.power);
-        self.objects.insert(address, data.to_vec());
+        let data = if self.forgets == Some(address) {
+            // Another value of the same length.
+            data.iter().map(|byte| !byte).collect()
+        } else {
+            data.to_vec()
+        };
+        self.objects.insert(address, data.clone());
         match address {
             (0x6040, 0) => self.control(Controlword(u16::from_le_bytes(data.try_into().unwrap()))),
-            (0x6060, 0) => drop(self.objects.insert((0x6061, 0), data.to_vec())),
+            (0x6060, 0) => drop(self.objects.insert((0x6061, 0), data)),
             _ => {}
         }
         SdoResponse::Download { object }

@@ -101,6 +101,7 @@ const REPORTS: [(Source, &[Cause]); 5] = [
             Cause::StillPowered,
             Cause::HomeOffset,
             Cause::WrongObject,
+            Cause::NotKept,
             Cause::WrongUnit,
             Cause::FaultFound,
             Cause::FaultReset,

@@ -1,0 +1,248 @@
+//! Who the drive of an axis is: what it says of itself (1018h), and the node that says it.
+
+use std::fmt::{self, Display, Formatter};
+
+use masseter_can::canopen::ObjectAddress;
+use masseter_plant::bringup::{Line, LineError, Survey, object_name, value_text};
+use masseter_plant::wanted::WantedDrive;
+use masseter_shared::config::CanConfig;
+use masseter_shared::geometry::{AXES, AXIS_NAMES};
+use masseter_terminal::status;
+use serde::{Deserialize, Serialize};
+
+/// The identity object.
+const INDEX: u16 = 0x1018;
+const SERIAL: u8 = 4;
+/// Drives of which nothing is known.
+pub(crate) const NOT_ASKED: [Known; AXES] = [Known::NotAsked; AXES];
+
+/// One entry of the identity object, all but the first of which are optional (CiA 301, 7.5.2.19).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Entry {
+    /// The drive tells this number.
+    Told(u32),
+    /// The drive was asked and refuses to tell one: it has none.
+    Absent,
+}
+
+/// The identity of a drive. Equal ones are one drive, as far as it tells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Identity {
+    /// The node id at which it answers.
+    node: u8,
+    vendor: Entry,
+    product: Entry,
+    revision: Entry,
+    serial: Entry,
+}
+
+/// What is known of the drive of an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Known {
+    /// Nobody asked it, or it did not answer.
+    NotAsked,
+    /// It is this one.
+    Is(Identity),
+}
+
+/// A drive of another identity than the profile's.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "{}: object {object} ({}) is {}, the profile wants {}; enter this drive's identity in drive_profile.identity, or use \
+     the drive that the profile is for",
+    AXIS_NAMES[*axis], object_name(*object), .found.text(object.subindex), value_text(*object, *wanted)
+)]
+pub(crate) struct OtherKind {
+    axis: usize,
+    object: ObjectAddress,
+    found: Entry,
+    wanted: u32,
+}
+
+impl Entry {
+    /// In words: a serial number as on the type plate.
+    fn text(self, subindex: u8) -> String {
+        match self {
+            Self::Told(number) if subindex == SERIAL => number.to_string(),
+            Self::Told(number) => format!("{number:X}h"),
+            Self::Absent => "none".to_owned(),
+        }
+    }
+}
+
+impl Identity {
+    /// Asks a drive.
+    ///
+    /// # Errors
+    /// [`LineError`], also for a drive that is silent: it may be any drive.
+    pub(crate) fn read(line: &mut Line, can: &CanConfig, axis: usize) -> Result<Self, LineError> {
+        Self::of(can.node_ids[axis], |object| match line.read_number(axis, object) {
+            Err(error) if error.abort_code().is_some() => Ok(Entry::Absent),
+            read => read.map(Entry::Told),
+        })
+    }
+
+    /// Asks all drives.
+    ///
+    /// # Errors
+    /// Those of [`Self::read`], for the first drive that does not answer.
+    pub(crate) fn read_all(line: &mut Line, can: &CanConfig) -> Result<[Self; AXES], LineError> {
+        let all = (0..AXES).map(|axis| Self::read(line, can, axis)).collect::<Result<Vec<_>, _>>()?;
+        Ok(all.try_into().expect("one for each axis"))
+    }
+
+    fn of<E>(node: u8, mut entry: impl FnMut(ObjectAddress) -> Result<Entry, E>) -> Result<Self, E> {
+        let mut of = |subindex| entry(ObjectAddress::new(INDEX, subindex));
+        Ok(Self { node, vendor: of(1)?, product: of(2)?, revision: of(3)?, serial: of(SERIAL)? })
+    }
+
+    /// Its entries with their sub-indices and names.
+    fn entries(&self) -> [(u8, &'static str, Entry); 4] {
+        let Self { vendor, product, revision, serial, .. } = *self;
+        [
+            (1, "vendor", vendor),
+            (2, "product code", product),
+            (3, "revision", revision),
+            (SERIAL, "serial number", serial),
+        ]
+    }
+
+    /// Refuses a drive of another vendor, product or revision than the profile's.
+    ///
+    /// # Errors
+    /// [`OtherKind`].
+    pub(crate) fn check_kind(&self, axis: usize, wanted: &WantedDrive) -> Result<(), OtherKind> {
+        for (subindex, _, found) in self.entries() {
+            let object = ObjectAddress::new(INDEX, subindex);
+            let entry = wanted.identity.iter().find(|wanted| wanted.object == object);
+            let is_right = entry.is_none_or(|wanted| match found {
+                Entry::Told(number) => number & wanted.mask == wanted.value & wanted.mask,
+                Entry::Absent => wanted.mask == 0,
+            });
+            if let (false, Some(wanted)) = (is_right, entry) {
+                return Err(OtherKind { axis, object, found, wanted: wanted.value });
+            }
+        }
+        Ok(())
+    }
+
+    /// What tells it from another one, such as "product code was 402h, and is 7h".
+    pub(crate) fn differs_from(&self, before: &Self) -> String {
+        let entries = before.entries().into_iter().zip(self.entries());
+        let others = entries.filter(|((.., before), (.., now))| before != now);
+        let others = others.map(|((part, name, before), (.., now))| {
+            format!("{name} was {}, and is {}", before.text(part), now.text(part))
+        });
+        let node = format!("node was {}, and is {}", before.node, self.node);
+        others.chain((before.node != self.node).then_some(node)).collect::<Vec<_>>().join("; ")
+    }
+
+    /// The entries alone: what another node may tell too.
+    fn told(&self) -> [Entry; 4] {
+        self.entries().map(|(_, _, entry)| entry)
+    }
+}
+
+impl Display for Identity {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "node {}", self.node)?;
+        self.entries()
+            .into_iter()
+            .try_for_each(|(part, name, entry)| write!(f, ", {name} {}", entry.text(part)))
+    }
+}
+
+impl Known {
+    /// What a survey tells of a drive; nothing without all answers.
+    pub(crate) fn of_survey(survey: Option<&Survey>, node: u8) -> Self {
+        let Some(survey) = survey.filter(|survey| !survey.fell_silent()) else { return Self::NotAsked };
+        let entry = |object| {
+            Ok::<_, std::convert::Infallible>(survey.number(object).map_or(Entry::Absent, Entry::Told))
+        };
+        let Ok(identity) = Identity::of(node, entry);
+        Self::Is(identity)
+    }
+
+    /// The identity, if it is known.
+    pub(crate) const fn identity(&self) -> Option<&Identity> {
+        match self {
+            Self::NotAsked => None,
+            Self::Is(identity) => Some(identity),
+        }
+    }
+}
+
+/// What these identities do not tell, one line for each gap.
+pub(crate) fn gaps(drives: &[Known; AXES]) -> Vec<String> {
+    let known = || drives.iter().enumerate().filter_map(|(axis, known)| Some((axis, known.identity()?)));
+    let names = |alike: &dyn Fn(&Identity) -> bool| {
+        let alike = known().filter(|(_, identity)| alike(identity));
+        alike.map(|(axis, _)| AXIS_NAMES[axis]).collect::<Vec<_>>()
+    };
+    let mut gaps = Vec::new();
+    let without = names(&|identity| identity.serial == Entry::Absent);
+    if !without.is_empty() {
+        gaps.push(format!(
+            "{}: no serial number (1018h:04), so that nobody knows whether a drive of the same vendor, product and revision \
+             has taken its place",
+            without.join(" ")
+        ));
+    }
+    for (axis, identity) in known().filter(|(_, identity)| identity.serial != Entry::Absent) {
+        let twins = names(&|other| other.told() == identity.told());
+        if twins.len() > 1 && twins[0] == AXIS_NAMES[axis] {
+            gaps.push(format!(
+                "{}: one identity, serial number {}: nobody knows which is which when they change places",
+                twins.join(" "),
+                identity.serial.text(SERIAL)
+            ));
+        }
+    }
+    gaps
+}
+
+/// Says what the identities do not tell.
+pub(crate) fn warn_of_gaps(drives: &[Known; AXES]) {
+    for gap in gaps(drives) {
+        status!("warning: {gap}");
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// A drive of the rig's kind at a node.
+    pub(crate) fn drive(node: u8, serial: Entry) -> Identity {
+        let [vendor, product, revision] = [0x004D_5354, 0x402, 0x1_0000].map(Entry::Told);
+        Identity { node, vendor, product, revision, serial }
+    }
+
+    /// Six drives with these serial numbers.
+    pub(crate) fn drives(serials: [Entry; AXES]) -> [Known; AXES] {
+        std::array::from_fn(|axis| Known::Is(drive(axis as u8 + 1, serials[axis])))
+    }
+
+    #[test]
+    fn what_identities_do_not_tell_is_said_in_one_line_for_each_gap() {
+        let told = [1, 2, 3, 4, 5, 6].map(Entry::Told);
+        assert_eq!(gaps(&drives(told)), [""; 0]);
+        assert_eq!(gaps(&NOT_ASKED), [""; 0], "who is not asked has not refused to tell");
+        let mut serials = told;
+        (serials[1], serials[3], serials[5]) = (Entry::Absent, Entry::Told(5), Entry::Absent);
+        let [without, twins] = &gaps(&drives(serials))[..] else { panic!("{:?}", gaps(&drives(serials))) };
+        assert!(without.starts_with("d2 l3: no serial number (1018h:04)"), "{without}");
+        assert!(twins.starts_with("l1 l2: one identity, serial number 5:"), "{twins}");
+    }
+
+    #[test]
+    fn every_part_of_an_identity_counts() {
+        let before = drive(4, Entry::Told(7));
+        assert_eq!(drive(4, Entry::Absent).differs_from(&before), "serial number was 7, and is none");
+        let product = Entry::Told(9);
+        assert_eq!(Identity { product, ..before }.differs_from(&before), "product code was 402h, and is 9h");
+        assert_eq!(Identity { node: 5, ..before }.differs_from(&before), "node was 4, and is 5");
+    }
+}
