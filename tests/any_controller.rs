@@ -14,8 +14,10 @@ use crate::common::{
     wait_until,
 };
 use masseter_shared::control::Session;
-use masseter_shared::lifecycle::attach::{self, socket};
-use masseter_shared::named::Declared;
+use masseter_shared::lifecycle::attach::{self, Hello, socket};
+use masseter_shared::lifecycle::{Report, line};
+use masseter_shared::named::{Declared, Parameter, Signal};
+use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
 use masseter_shared::transport::Domain;
 use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 
@@ -332,4 +334,52 @@ fn without_a_controller_plant_and_recorder_run_for_the_length_of_the_motion() {
     assert!(plant_cycles > 900 && messages("command") == 0 && messages("state") == 0, "{topics}");
     let refused = workspace.run_virtual(&["--controller", "none"]);
     assert!(refused.status.code() == Some(2) && stderr(&refused).contains("needs --clock rt"));
+}
+
+/// The answers of the rig to a program that greets as it should and then sends this line.
+fn answer_to(name: &str, report: &str) -> String {
+    let stream = UnixStream::connect(socket(&Domain::named(name).unwrap())).unwrap();
+    let mut input = BufReader::new(&stream);
+    let mut answers = String::new();
+    for said in [line(&Hello::new()), format!("{report}\n")] {
+        (&stream).write_all(said.as_bytes()).unwrap();
+        input.read_line(&mut answers).unwrap();
+    }
+    answers
+}
+
+/// What a program declares stands in schemas, pages and terminals.
+#[test]
+fn a_program_that_declares_what_cannot_be_shown_is_refused_and_the_next_one_taken() {
+    let workspace = Workspace::new(SCENARIO);
+    let name = unique("declares");
+    let rig = waiting(&workspace, &name);
+    let signal = |name: &str, unit: &str, about: &str| Signal {
+        name: name.to_owned(),
+        unit: unit.to_owned(),
+        about: about.to_owned(),
+    };
+    let of = |signals: Vec<Signal>| Declared { signals, parameters: Vec::new() };
+    let reversed = Parameter { range: [9.0, 1.0], ..Parameter::new("gain", 5.0) };
+    let scheduling = obtain(SchedulingRequest { core: None, fifo_priority: None, locked_memory: false });
+    for (declared, limit) in [
+        (of((0..65).map(|number| signal(&format!("s{number}"), "mm", "")).collect()), "up to 64"),
+        (of(vec![signal("a", "mm", ""), signal("a", "mm", "")]), "are named 'a'"),
+        (of(vec![signal("</script>", "", "")]), "lower-case letters"),
+        (of(vec![signal("a", "m\nfloat64 evil", "")]), "printable characters"),
+        (of(vec![signal("a", "", "\u{1b}]0;evil\u{7}")]), "printable characters"),
+        (of(vec![signal("a", "", &"x".repeat(100_000))]), "at most 65536 bytes"),
+        (Declared { parameters: vec![reversed], signals: Vec::new() }, "range of parameter 'gain'"),
+    ] {
+        let report = Report::Ready { scheduling: scheduling.clone(), declared };
+        let answers = answer_to(&name, line(&report).trim_end());
+        assert!(answers.contains("refused") && answers.contains(limit), "{answers}");
+    }
+    assert!(answer_to(&name, "\u{1b}[2J").contains("no report of this version"));
+    assert_eq!(program(&["--rig", &name]).status().unwrap().code(), Some(0));
+    let output = rig.wait_with_output().unwrap();
+    let said = stderr(&output);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert_eq!(said.matches("the controller is refused: ").count(), 8, "{said}");
+    assert!(!said.contains(['\u{1b}', '\u{7}']) && said.len() < 8000, "{said}");
 }

@@ -69,11 +69,12 @@ impl Process {
     pub(super) fn wait_ready(&mut self, is_cancelled: impl Fn() -> bool) -> anyhow::Result<Option<Ready>> {
         let not_ready = || format!("the {} did not get ready", self.role);
         for _ in 0..READY_TIMEOUT.as_millis() / POLL.as_millis() {
-            match self.reports.await_ready(POLL).with_context(not_ready)? {
+            match self.reports.await_ready(POLL) {
                 Readiness::Ready(ready) => return Ok(Some(ready)),
                 // Ctrl-C also reaches the process, and may end it before it handles signals.
                 _ if is_cancelled() => return Ok(None),
                 Readiness::NotYet => {}
+                Readiness::Refused(refusal) => bail!("{}: {refusal}", not_ready()),
                 Readiness::Closed => bail!("{}: it ended; see its message above", not_ready()),
             }
         }

@@ -15,7 +15,7 @@ use anyhow::{Context, bail};
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::conversation::Left;
 use masseter_shared::lifecycle::attach::{Invitation, RIG_VARIABLE};
-use masseter_shared::lifecycle::{End, Order, Silence, Start};
+use masseter_shared::lifecycle::{End, Order, ReportError, Silence, Start};
 use masseter_shared::transport::Domain;
 use masseter_terminal::status;
 use rustix::net::sockopt::socket_peercred;
@@ -128,7 +128,7 @@ impl Program {
         }
         let ready_by_ns = clock::now_ns() + READY_TIMEOUT.as_nanos() as u64;
         loop {
-            match self.await_readiness()? {
+            match self.await_readiness() {
                 Readiness::Ready(ready) => return Ok(Some(ready)),
                 _ if is_cancelled() => return Ok(None),
                 // The user may correct it and start it again.
@@ -137,6 +137,7 @@ impl Program {
                     self.admitted = None;
                 }
                 Readiness::Closed => bail!("the controller ended before it was ready; see its message above"),
+                Readiness::Refused(refusal) => self.send_away(&refusal)?,
                 Readiness::NotYet => {}
             }
             if let Some(death) = has_died() {
@@ -146,20 +147,26 @@ impl Program {
         }
     }
 
-    fn await_readiness(&mut self) -> anyhow::Result<Readiness> {
+    fn await_readiness(&mut self) -> Readiness {
         self.admit();
-        let Some(admitted) = &mut self.admitted else {
-            clock::sleep(POLL);
-            return Ok(Readiness::NotYet);
-        };
-        let readiness = admitted.reports.await_ready(POLL).context("the controller did not get ready");
-        match readiness {
-            Err(error) if self.executable.is_none() => {
-                status!("masseter: {error:#}");
-                Ok(Readiness::Closed)
-            }
-            readiness => readiness,
+        if let Some(admitted) = &mut self.admitted {
+            return admitted.reports.await_ready(POLL);
         }
+        clock::sleep(POLL);
+        Readiness::NotYet
+        }
+    }
+
+    /// Tells a program why the rig does not take it. The user of one that was started by hand may correct it.
+    fn send_away(&mut self, refusal: &ReportError) -> anyhow::Result<()> {
+        self.order(&Order::Refused { reason: refusal.to_string() });
+        self.close();
+        self.admitted = None;
+        match &self.executable {
+            Some(Executable { path, .. }) => bail!("the controller {} is refused: {refusal}", path.display()),
+            None => status!("masseter: the controller is refused: {refusal}; waiting for the next"),
+        }
+        Ok(())
     }
 
     /// Refuses an executable that has ended or has taken too long.

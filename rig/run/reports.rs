@@ -5,10 +5,9 @@ use std::io;
 use std::os::fd::OwnedFd;
 use std::time::Duration;
 
-use anyhow::Context;
 use masseter_shared::clock;
 use masseter_shared::conversation::{Conversation, Left, Limits};
-use masseter_shared::lifecycle::{End, Order, Report, Silence, line};
+use masseter_shared::lifecycle::{End, Order, Report, ReportError, Silence, line};
 use masseter_shared::named::Declared;
 use masseter_shared::realtime::scheduling::Obtained;
 
@@ -46,6 +45,8 @@ pub(super) struct Due {
 pub(super) enum Readiness {
     Ready(Ready),
     NotYet,
+    /// Its report cannot be recorded or shown.
+    Refused(ReportError),
     /// The process has closed the line.
     Closed,
 }
@@ -78,7 +79,7 @@ impl Reports {
     }
 
     /// Waits for the report of readiness, for at most this time.
-    pub(super) fn await_ready(&mut self, timeout: Duration) -> anyhow::Result<Readiness> {
+    pub(super) fn await_ready(&mut self, timeout: Duration) -> Readiness {
         let mut line = self.conversation.next_line();
         if line.is_none() {
             self.conversation.wait(timeout);
@@ -86,18 +87,19 @@ impl Reports {
             line = self.conversation.next_line();
         }
         let Some(line) = line else {
-            return Ok(if self.has_left() { Readiness::Closed } else { Readiness::NotYet });
+            return if self.has_left() { Readiness::Closed } else { Readiness::NotYet };
         };
-        match serde_json::from_str(&line).with_context(|| format!("its report is '{line}'"))? {
-            Report::Ready { scheduling, declared } => Ok(Readiness::Ready(Ready { scheduling, declared })),
-            Report::Ended(end) => {
+        match Report::read(&line) {
+            Ok(Report::Ready { scheduling, declared }) => Readiness::Ready(Ready { scheduling, declared }),
+            Ok(Report::Ended(end)) => {
                 self.end = Some(end);
-                Ok(Readiness::Closed)
+                Readiness::Closed
             }
-            report => {
+            Ok(report) => {
                 self.keep(report);
-                Ok(Readiness::NotYet)
+                Readiness::NotYet
             }
+            Err(refusal) => Readiness::Refused(refusal),
         }
     }
 
@@ -136,8 +138,13 @@ impl Reports {
     fn look(&mut self) {
         self.conversation.hear();
         while let Some(line) = self.conversation.next_line() {
-            if let Ok(report) = serde_json::from_str(&line) {
-                self.keep(report);
+            match Report::read(&line) {
+                Ok(report) => self.keep(report),
+                // The first one counts: whoever reports what cannot be is no controller.
+                Err(refusal) => {
+                    let reason = format!("its report is refused: {refusal}");
+                    self.end.get_or_insert(End::Failed { reason });
+                }
             }
         }
     }
@@ -146,7 +153,7 @@ impl Reports {
         match report {
             Report::Silence(silence) => self.silence = Some(silence),
             Report::Due { fault, now_ns } => self.due.push_back(Due { fault, now_ns }),
-            Report::Ended(end) => self.end = Some(end),
+            Report::Ended(end) => drop(self.end.get_or_insert(end)),
             Report::Ready { .. } => {}
         }
     }

@@ -341,6 +341,9 @@ impl Rig {
     /// Kills the first process that was reported to be silent in lockstep, if any. Were it stopped and went on, it would
     /// find the others silent.
     fn end_silent(&mut self) -> Option<Ending> {
+        if !self.is_lockstep {
+            return None;
+        }
         let reports = [self.controller.reported_silence(), self.plant.reported_silence()];
         let Silence { process, cycle, silent_s } = reports.into_iter().flatten().next()?;
         let fate = match process {

@@ -1,19 +1,49 @@
 //! Input files of limited size, and their text as messages quote it.
 
-use std::fs::OpenOptions;
+use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Read};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 
 use rustix::fs::OFlags;
 
+/// Size of the largest file that the rig reads back of those that it has written, bytes.
+pub const MOST_KEPT_BYTES: u64 = 64 << 20;
 /// Characters of a value that a message quotes.
 const QUOTED: usize = 80;
+/// Characters of a sentence of somebody else that a message quotes.
+const QUOTED_SENTENCE: usize = 200;
 
-/// The text of a regular file of at most `most_bytes`. A device or a pipe is refused at once: neither has an end.
+/// A regular file, opened for reading. A device or a pipe is refused at once: neither has an end.
 ///
 /// # Errors
-/// The system's, and when the file is no regular file, is larger, or is not text in UTF-8.
+/// The system's, and when the file is no regular file.
+pub fn open_regular(path: &Path) -> io::Result<File> {
+    // A pipe would block the opening until somebody writes.
+    let file = OpenOptions::new().read(true).custom_flags(OFlags::NONBLOCK.bits() as i32).open(path)?;
+    if !file.metadata()?.is_file() {
+        return Err(io::Error::other("it is no regular file; copy its content into one"));
+    }
+    Ok(file)
+}
+
+/// The content of a regular file of at most `most_bytes`.
+///
+/// # Errors
+/// Those of [`open_regular`], and when the file is larger.
+pub fn read_bytes(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open_regular(path)?.take(most_bytes + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > most_bytes {
+        return Err(io::Error::other(format!("it is larger than {most_bytes} bytes")));
+    }
+    Ok(bytes)
+}
+
+/// The text of a regular file of at most `most_bytes`.
+///
+/// # Errors
+/// Those of [`read_bytes`], and when the file is not text in UTF-8.
 ///
 /// # Examples
 /// ```
@@ -25,17 +55,7 @@ const QUOTED: usize = 80;
 /// assert!(error.to_string().contains("no regular file"));
 /// ```
 pub fn read_text(path: &Path, most_bytes: u64) -> io::Result<String> {
-    // A pipe would block the opening until somebody writes.
-    let file = OpenOptions::new().read(true).custom_flags(OFlags::NONBLOCK.bits() as i32).open(path)?;
-    if !file.metadata()?.is_file() {
-        return Err(io::Error::other("it is no regular file; copy its content into one"));
-    }
-    let mut bytes = Vec::new();
-    file.take(most_bytes + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > most_bytes {
-        return Err(io::Error::other(format!("it is larger than {most_bytes} bytes")));
-    }
-    String::from_utf8(bytes).map_err(|error| {
+    String::from_utf8(read_bytes(path, most_bytes)?).map_err(|error| {
         let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
         let line = valid.split(|byte| *byte == b'\n').count();
         io::Error::new(ErrorKind::InvalidData, format!("line {line} is no text in UTF-8"))
@@ -52,16 +72,49 @@ pub fn read_text(path: &Path, most_bytes: u64) -> io::Result<String> {
 /// assert_eq!(excerpt(&"x".repeat(100)).chars().count(), 81);
 /// ```
 pub fn excerpt(text: &str) -> String {
-    let mut characters = text.chars();
-    let mut quoted = String::new();
-    for character in characters.by_ref().take(QUOTED) {
-        match character {
-            '"' | '\'' | '\\' => quoted.push(character),
-            _ => quoted.extend(character.escape_debug()),
+    quoted(text, QUOTED)
+}
+
+/// A sentence of somebody else as messages quote it: at most 200 characters, without control characters.
+///
+/// # Examples
+/// ```
+/// use masseter_shared::input::sentence;
+///
+/// assert_eq!(sentence("it's over\n"), "it's over\\n");
+/// assert_eq!(sentence(&"x".repeat(300)).chars().count(), 201);
+/// ```
+pub fn sentence(text: &str) -> String {
+    quoted(text, QUOTED_SENTENCE)
+}
+
+/// Whether a text is at most `most_bytes` long, and none of its characters commands a terminal, ends a line or turns the
+/// direction of reading.
+///
+/// # Examples
+/// ```
+/// use masseter_shared::input::is_printable;
+///
+/// assert!(is_printable("µm/s²", 48));
+/// assert!(!is_printable("m\nfloat64 evil", 48));
+/// ```
+pub fn is_printable(text: &str, most_bytes: usize) -> bool {
+    let turns_or_ends =
+        |c| matches!(c, '\u{200e}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    text.len() <= most_bytes && !text.chars().any(|c| c.is_control() || turns_or_ends(c))
+}
+
+fn quoted(text: &str, most: usize) -> String {
+    let (mut quoted, mut length) = (String::new(), 0);
+    for character in text.chars() {
+        let plain = matches!(character, '"' | '\'' | '\\').then_some(character);
+        let shown = plain.map_or_else(|| character.escape_debug().to_string(), String::from);
+        length += shown.chars().count();
+        if length > most {
+            quoted.push('…');
+            break;
         }
-    }
-    if characters.next().is_some() {
-        quoted.push('…');
+        quoted.push_str(&shown);
     }
     quoted
 }
@@ -69,6 +122,14 @@ pub fn excerpt(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_quotation_is_short_and_commands_nothing() {
+        for hostile in ["\u{1b}[31m".repeat(1000), "\u{202e}\n\0".repeat(1000), "ä".repeat(100_000)] {
+            let quoted = sentence(&hostile);
+            assert!(quoted.chars().count() <= 201 && is_printable(&quoted, 1000), "{quoted}");
+        }
+    }
 
     #[test]
     fn a_file_beyond_its_limit_is_refused() {

@@ -6,6 +6,7 @@ use super::cycle::{complete, publish_begin, publish_named, set_parameters};
 use super::operator::{Due, Operator};
 use super::{Controller, ControllerPorts, Duties, Outcome, Tick, run_cycle};
 use crate::clock;
+use crate::input::sentence;
 use crate::lifecycle::{End, Party, ProcessContext, ProcessError, Report, SupervisorLink};
 use crate::lockstep::{Clock, Lockstep};
 use crate::messages::{Command, Event, Parameters, Reading, Signals, State};
@@ -248,7 +249,7 @@ impl Session {
     /// [`ProcessError`] when the supervisor is gone.
     pub fn fail(mut self, reason: &str) -> Result<(), ProcessError> {
         // The reason first: the turn cannot end where the plant has failed too.
-        self.report_end(End::Failed { reason: reason.to_owned() })?;
+        self.report_end(End::Failed { reason: sentence(reason) })?;
         self.end_turn(true)
     }
 

@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 use super::{Patience, ProcessArguments, ProcessContext, ProcessError, SupervisorLink, line};
 use crate::clock::SECOND_NS;
 use crate::conversation::{Conversation, Left, Limits};
+use crate::input::excerpt;
 use crate::messages::{Command, Event, Message, Reading, State};
 use crate::transport::{Domain, DomainError};
 
@@ -47,7 +48,7 @@ impl Hello {
         Self { layouts: layouts.map(str::to_owned).to_vec() }
     }
 
-    /// The first layout that differs from this version's, with this version's, if any does.
+    /// The first layout that differs from this version's, as messages quote it, with this version's, if any does.
     pub fn difference(&self) -> Option<(String, String)> {
         let own = Self::new().layouts;
         let theirs = |index: usize| self.layouts.get(index).cloned().unwrap_or_default();
@@ -55,6 +56,7 @@ impl Hello {
             .enumerate()
             .map(|(index, own)| (theirs(index), own))
             .find(|(theirs, own)| theirs != own)
+            .map(|(theirs, own)| (excerpt(&theirs), own))
     }
 }
 

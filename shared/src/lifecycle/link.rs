@@ -11,7 +11,7 @@ use rustix::net::{SendFlags, send};
 use rustix::process::{Signal, set_parent_process_death_signal};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
-use super::protocol::{End, Order, Report, Start, line};
+use super::protocol::{End, Order, Report, line};
 
 /// The process's end of the line.
 #[derive(Debug, Clone)]
@@ -26,7 +26,8 @@ pub(crate) enum SupervisorLink {
 #[derive(Debug)]
 pub(crate) struct Socket {
     stream: UnixStream,
-    starts: Mutex<Receiver<Start>>,
+    /// The order that follows the report of readiness.
+    starts: Mutex<Receiver<Order>>,
     strikes: Mutex<Receiver<()>>,
 }
 
@@ -41,7 +42,7 @@ impl SupervisorLink {
         thread::Builder::new().name("supervisor".to_owned()).spawn(move || {
             for line in input.lines().map_while(Result::ok) {
                 let is_taken = match serde_json::from_str(&line) {
-                    Ok(Order::Start(start)) => sender.send(start).is_ok(),
+                    Ok(order @ (Order::Start(_) | Order::Refused { .. })) => sender.send(order).is_ok(),
                     Ok(Order::Struck) => struck.send(()).is_ok(),
                     Ok(Order::Stop) | Err(_) => false,
                 };
@@ -62,16 +63,13 @@ impl SupervisorLink {
         }
     }
 
-    /// Waits for the start; none when the supervisor ends or cancels it.
-    pub(crate) fn await_start(&self) -> io::Result<Option<Start>> {
+    /// Waits for the order to start, or a refusal; none when the supervisor ends or cancels the start.
+    pub(crate) fn await_start(&self) -> io::Result<Option<Order>> {
         match self {
             Self::Pipes => {
                 let mut line = String::new();
                 io::stdin().read_line(&mut line)?;
-                Ok(match serde_json::from_str(&line) {
-                    Ok(Order::Start(start)) => Some(start),
-                    _ => None,
-                })
+                Ok(serde_json::from_str(&line).ok())
             }
             Self::Socket(socket) => Ok(socket.starts.lock().ok().and_then(|starts| starts.recv().ok())),
         }

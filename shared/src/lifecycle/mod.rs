@@ -22,7 +22,7 @@ use crate::transport::{Domain, DomainError, Node, TransportError};
 
 pub use link::StopRequest;
 pub(crate) use link::SupervisorLink;
-pub use protocol::{End, Order, Party, Report, Silence, Start, line};
+pub use protocol::{End, Order, Party, Report, ReportError, Silence, Start, line};
 
 /// The arguments of a process.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -92,6 +92,9 @@ pub enum ProcessError {
     /// The line to the supervisor failed.
     #[error("the line to the supervisor failed: {0}")]
     Supervisor(io::Error),
+    /// The rig does not take this program.
+    #[error("the rig refuses this program: {0}")]
+    Refused(String),
     /// The supervisor ended before the start, or cancelled the start.
     #[error("the supervisor ended or cancelled the start")]
     NoStart,
@@ -135,7 +138,11 @@ impl ProcessContext {
             locked_memory: core.is_some() && realtime.lock_memory,
         });
         self.report(&Report::Ready { scheduling, declared: declared.clone() })?;
-        self.link.await_start().map_err(ProcessError::Supervisor)?.ok_or(ProcessError::NoStart)
+        match self.link.await_start().map_err(ProcessError::Supervisor)? {
+            Some(Order::Start(start)) => Ok(start),
+            Some(Order::Refused { reason }) => Err(ProcessError::Refused(reason)),
+            Some(Order::Struck | Order::Stop) | None => Err(ProcessError::NoStart),
+        }
     }
 
     pub(crate) fn report(&self, report: &Report) -> Result<(), ProcessError> {

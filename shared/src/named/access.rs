@@ -13,9 +13,10 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Parameter, Settings};
+use super::{Declared, Parameter, Settings};
 use crate::clock::{self, MILLISECOND_NS, SECOND_NS};
 use crate::conversation::{Conversation, Left, Limits, Newcomers};
+use crate::input::sentence;
 use crate::lifecycle::line;
 use crate::transport::{Domain, DomainError};
 
@@ -210,8 +211,13 @@ fn ask(domain: &Domain, request: &Request) -> Result<Vec<Parameter>, Failure> {
     conversation.say(line(request).as_bytes());
     let answer = conversation.await_line().map_err(Failure::NoAnswer)?;
     match serde_json::from_str(&answer) {
-        Ok(Answer::Parameters(parameters)) => Ok(parameters),
-        Ok(Answer::Refused { reason }) => Err(Failure::Refused(reason)),
+        Ok(Answer::Parameters(parameters)) => {
+            // Pages and terminals show them.
+            let declared = Declared { parameters, ..Declared::default() };
+            declared.check().map_err(|error| Failure::Refused(error.to_string()))?;
+            Ok(declared.parameters)
+        }
+        Ok(Answer::Refused { reason }) => Err(Failure::Refused(sentence(&reason))),
         Err(error) => Err(Failure::NoAnswer(Left::Failed(error.into()))),
     }
 }
@@ -223,7 +229,7 @@ mod tests {
     use std::os::unix::net::UnixStream;
 
     use super::*;
-    use crate::named::{Declared, NamedValues};
+    use crate::named::NamedValues;
     use crate::transport::ScratchDomain;
 
     #[test]

@@ -4,11 +4,16 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
+use crate::input::{excerpt, is_printable};
 use crate::messages::MOST_VALUES;
 use crate::wording::nearest;
 
 /// Characters of the longest name.
 const LONGEST_NAME: usize = 48;
+/// Bytes of the longest unit.
+const LONGEST_UNIT: usize = 48;
+/// Bytes of all texts of a declaration together.
+const MOST_TEXT_BYTES: usize = 64 << 10;
 /// The fields that stand beside the named values in a recorded message.
 const TAKEN: [&str; 5] = ["seq", "published_ns", "version", "cycle", "length"];
 
@@ -93,8 +98,8 @@ pub struct Declared {
 pub enum NameError {
     /// A recording could not have the name.
     #[error(
-        "'{0}' is no name of a signal or parameter: use up to {LONGEST_NAME} lower-case letters, digits and single '_', \
-         beginning with a letter, and none of seq, published_ns, version, cycle, length"
+        "'{}' is no name of a signal or parameter: use up to {LONGEST_NAME} lower-case letters, digits and single '_', \
+         beginning with a letter, and none of seq, published_ns, version, cycle, length", excerpt(.0)
     )]
     BadName(String),
     /// Two have one name.
@@ -103,6 +108,23 @@ pub enum NameError {
     /// There are too many.
     #[error("{0} {1} are too many: a controller has up to {MOST_VALUES}")]
     TooMany(usize, &'static str),
+    /// A unit or a description cannot be shown.
+    #[error(
+        "the {what} of '{name}' is '{}': use printable characters on one line, at most {most_bytes} bytes", excerpt(.text)
+    )]
+    Unprintable {
+        /// The signal or parameter.
+        name: String,
+        /// Unit or description.
+        what: &'static str,
+        /// The text.
+        text: String,
+        /// The longest such text.
+        most_bytes: usize,
+    },
+    /// The texts are too long.
+    #[error("names, units and descriptions take {0} bytes together: shorten them to {MOST_TEXT_BYTES} bytes")]
+    TooLong(usize),
     /// A range is not one, or is infinite.
     #[error("the range of parameter '{0}' is none: give a smallest and a larger or equal largest number")]
     BadRange(String),
@@ -121,13 +143,26 @@ pub enum NameError {
         unit: String,
     },
     /// There is no such parameter.
-    #[error("the controller has no parameter '{name}'{}", others(.name, .parameters))]
+    #[error("the controller has no parameter '{}'{}", excerpt(.name), others(.name, .parameters))]
     Unknown {
         /// The name.
         name: String,
         /// The parameters that there are.
         parameters: Vec<String>,
     },
+}
+
+impl NameError {
+    /// The signal or parameter, where one is at fault.
+    pub fn name(&self) -> Option<&str> {
+        match self {
+            Self::BadName(name) | Self::Twice(name) | Self::BadRange(name) => Some(name),
+            Self::Unprintable { name, .. } | Self::OutOfRange { name, .. } | Self::Unknown { name, .. } => {
+                Some(name)
+            }
+            Self::TooMany(..) | Self::TooLong(_) => None,
+        }
+    }
 }
 
 fn others(name: &str, parameters: &[String]) -> String {
@@ -147,6 +182,7 @@ impl Declared {
     pub fn check(&self) -> Result<(), NameError> {
         check_names(&self.signals.iter().map(|signal| &*signal.name).collect::<Vec<_>>(), "signals")?;
         check_names(&self.names(), "parameters")?;
+        self.check_texts()?;
         for parameter in &self.parameters {
             let [least, most] = parameter.range;
             if !(least.is_finite() && most.is_finite() && least <= most) {
@@ -155,6 +191,25 @@ impl Declared {
             parameter.check(parameter.value)?;
         }
         Ok(())
+    }
+
+    /// The texts stand in schemas, pages and terminals.
+    fn check_texts(&self) -> Result<(), NameError> {
+        let signals = self.signals.iter().map(|known| [&known.name, &known.unit, &known.about]);
+        let parameters = self.parameters.iter().map(|known| [&known.name, &known.unit, &known.about]);
+        let mut bytes = 0;
+        for texts @ [name, unit, about] in signals.chain(parameters) {
+            for (what, text, most_bytes) in
+                [("unit", unit, LONGEST_UNIT), ("description", about, MOST_TEXT_BYTES)]
+            {
+                if !is_printable(text, most_bytes) {
+                    let (name, text) = (name.clone(), text.clone());
+                    return Err(NameError::Unprintable { name, what, text, most_bytes });
+                }
+            }
+            bytes += texts.map(String::len).iter().sum::<usize>();
+        }
+        if bytes > MOST_TEXT_BYTES { Err(NameError::TooLong(bytes)) } else { Ok(()) }
     }
 
     /// The place of a parameter.
@@ -225,11 +280,54 @@ mod tests {
         for bad in ["", "Gain", "1st", "a b", "a__b", "a_", "cycle", "grün", &"a".repeat(49)] {
             assert_eq!(with_signals(&[bad]).check(), Err(NameError::BadName(bad.to_owned())), "{bad}");
         }
+        let refusal = with_signals(&[&"\u{1b}[2J".repeat(10_000)]).check().unwrap_err().to_string();
+        assert!(is_printable(&refusal, 400), "{refusal}");
         assert_eq!(with_signals(&["a", "b", "a"]).check(), Err(NameError::Twice("a".to_owned())));
         let many: Vec<_> = (0..65).map(|number| format!("s{number}")).collect();
         let many: Vec<_> = many.iter().map(String::as_str).collect();
         assert_eq!(with_signals(&many).check(), Err(NameError::TooMany(65, "signals")));
         assert_eq!(with_signals(&many[..64]).check(), Ok(()));
+    }
+
+    #[test]
+    fn texts_that_would_command_a_terminal_or_fill_a_schema_are_refused() {
+        let with = |unit: &str, about: &str| {
+            let signal = Signal { name: "grip".to_owned(), unit: unit.to_owned(), about: about.to_owned() };
+            let parameter = Parameter {
+                unit: unit.to_owned(),
+                about: about.to_owned(),
+                range: [0.0, 1.0],
+                ..Parameter::new("gain", 1.0)
+            };
+            let signals = Declared { signals: vec![signal], ..Declared::default() };
+            [signals, Declared { parameters: vec![parameter], ..Declared::default() }]
+        };
+        for declared in with("µm/s²", "Length of the <correction> \"so far\".") {
+            assert_eq!(declared.check(), Ok(()));
+        }
+        for hostile in ["m\nfloat64 evil", "\u{1b}[31m", "\0", "\u{202e}", "\u{2028}", "\u{9b}2J", "\r"] {
+            for declared in with(hostile, "").into_iter().chain(with("", hostile)) {
+                let error = declared.check().unwrap_err();
+                assert!(matches!(error, NameError::Unprintable { .. }), "{error}");
+                assert!(is_printable(&error.to_string(), 300), "{error}");
+            }
+        }
+        let [long, _] = with(&"m".repeat(49), "");
+        assert!(long.check().unwrap_err().to_string().contains("at most 48 bytes"));
+    }
+
+    #[test]
+    fn all_texts_together_take_64_kibibytes() {
+        let of = |about: usize| {
+            let signal = |number| Signal {
+                name: format!("s{number:02}"),
+                unit: "mm".to_owned(),
+                about: "x".repeat(about - 5),
+            };
+            Declared { signals: (0..64).map(signal).collect(), parameters: Vec::new() }
+        };
+        assert_eq!(of(1024).check(), Ok(()));
+        assert_eq!(of(1025).check(), Err(NameError::TooLong(65_600)));
     }
 
     #[test]

@@ -91,7 +91,7 @@ fn refused_core(core: usize, why: &str, choice: &[usize]) -> String {
             "only core {only} may be used, and controller and plant delay each other there: 'masseter doctor' shows how \
              to allow two"
         ),
-        choice => format!("choose two among {} with --cores", choice.join(", ")),
+        choice => format!("choose two with --cores, of {}", choice.join(", ")),
     };
     format!("core {core} refused ({why}): {remedy}")
 }
@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn a_refused_core_comes_with_its_remedy() {
-        assert!(refused_core(4, "EINVAL", &[0, 2]).contains("choose two among 0, 2 with --cores"));
+        assert!(refused_core(4, "EINVAL", &[0, 2]).contains("choose two with --cores, of 0, 2"));
         assert!(refused_core(1, "EINVAL", &[0]).contains("'masseter doctor' shows how to allow two"));
     }
 }
