@@ -52,6 +52,64 @@ fn every_file_belongs_to_a_module() {
     }
 }
 
+/// Files that read what the kernel serves, a private folder, or the program itself; everything else reads through
+/// `shared::input`, which refuses what has no end.
+const READERS: [&str; 13] = [
+    "rig/bench/played_run.rs",
+    "rig/bench/simulated.rs",
+    "rig/bench/virtual_time.rs",
+    "rig/campaign/src/campaign.rs",
+    "rig/campaign/src/folder.rs",
+    "rig/kinematics_cli/input.rs",
+    "rig/machine/interrupts.rs",
+    "rig/machine/mod.rs",
+    "rig/machine/system_root.rs",
+    "rig/recording/src/folder.rs",
+    "rig/recording/src/writer.rs",
+    "rig/robot/ledger.rs",
+    "shared/src/realtime/scheduling.rs",
+];
+
+#[test]
+fn files_of_users_are_read_up_to_a_limit() {
+    let mut readers = Vec::new();
+    for crates in ["controller", "plant", "rig", "shared"] {
+        readers.extend(unlimited_readers(&project().join(crates)));
+    }
+    let name = |path: std::path::PathBuf| path.strip_prefix(project()).unwrap().display().to_string();
+    let mut readers: Vec<_> = readers.into_iter().map(name).collect();
+    let is_of_system = |name: &String| name.contains("/transport/") || name.contains("/socket_can/");
+    readers.retain(|name| !is_of_system(name));
+    readers.sort();
+    assert_eq!(readers, READERS, "read through masseter_shared::input, or say here why not");
+}
+
+/// The files whose code outside of tests reads whole files without a limit, or opens devices.
+fn unlimited_readers(folder: &Path) -> Vec<std::path::PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let is_test = ["tests", "tests.rs", "examples", "fuzz", "reference.rs", "target"]
+            .iter()
+            .any(|name| path.ends_with(name));
+        if is_test {
+            continue;
+        }
+        if path.is_dir() {
+            found.extend(unlimited_readers(&path));
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            let text = fs::read_to_string(&path).unwrap();
+            let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
+            let reads = |line: &str| {
+                let calls = ["fs::read(", "fs::read_to_string(", "File::open("];
+                !line.trim_start().starts_with("//") && calls.iter().any(|call| line.contains(call))
+            };
+            found.extend(code.lines().any(reads).then_some(path));
+        }
+    }
+    found
+}
+
 fn project() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }

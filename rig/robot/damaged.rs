@@ -1,11 +1,11 @@
 //! Files with old values of drives, which a step writes and a later one reads. Other programs and people may have changed them:
 //! what is read is checked before anything is sent.
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use masseter_shared::config::ObjectKey;
+use masseter_shared::input::{MOST_KEPT_BYTES, read_text};
 use serde::de::DeserializeOwned;
 
 /// Controlword: no step keeps a value of this object.
@@ -40,7 +40,7 @@ pub(super) enum Damage {
 
 /// The content of a file.
 pub(super) fn parse<T: DeserializeOwned>(path: &Path) -> Result<T, Damage> {
-    Ok(serde_json::from_str(&fs::read_to_string(path)?)?)
+    Ok(serde_json::from_str(&read_text(path, MOST_KEPT_BYTES)?)?)
 }
 
 /// Refuses an old value that no step has kept.

@@ -1,10 +1,10 @@
 //! Evidence of a dry run: `masseter run --dry` leaves it beside the steps of the bring-up.
 
-use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, ensure};
-use masseter_shared::config::Scenario;
+use masseter_shared::config::{FileConfig, Scenario};
+use masseter_shared::input::read_bytes;
 use serde_json::json;
 
 use super::evidence::StepFolder;
@@ -79,7 +79,9 @@ impl Played<'_> {
         let (mut scenario, mut hasher) = (self.scenario.clone(), crc32fast::Hasher::new());
         for (name, file) in scenario.files_mut() {
             let path = copies.map_or_else(|| file.clone(), |folder| folder.join(&name));
-            hasher.update(&fs::read(&path).with_context(|| path.display().to_string())?);
+            hasher.update(
+                &read_bytes(&path, FileConfig::MOST_BYTES).with_context(|| path.display().to_string())?,
+            );
             file.clear();
         }
         // A dry run has a longer ease.
@@ -94,6 +96,8 @@ impl Played<'_> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     const fn played(scenario: &Scenario) -> Played<'_> {

@@ -1,9 +1,9 @@
 //! The past steps of a bring-up, and whether a further step may rely on them.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use masseter_shared::geometry::AXIS_NAMES;
+use masseter_shared::input::{MOST_KEPT_BYTES, read_text};
 
 use super::before::{Nameless, before_file};
 use super::evidence::{Basis, Evidence, numbered};
@@ -78,7 +78,7 @@ impl Past {
     /// When the folder itself cannot be read.
     pub(crate) fn read(folder: &Path) -> anyhow::Result<Self> {
         let read = |path: &Path| {
-            let text = fs::read_to_string(path.join("result.json")).ok()?;
+            let text = read_text(&path.join("result.json"), MOST_KEPT_BYTES).ok()?;
             serde_json::from_str(&text).ok()
         };
         let (mut steps, mut damaged) = (Vec::new(), Vec::new());

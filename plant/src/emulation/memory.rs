@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
+use masseter_shared::input::{MOST_KEPT_BYTES, read_text};
 
 use crate::drive::DriveMemory;
 use crate::error::PlantError;
@@ -23,7 +24,7 @@ pub(super) struct MemoryFile {
 impl MemoryFile {
     /// Reads a file; one that does not exist is that of drives that have stored nothing.
     pub(super) fn read(path: &Path) -> Result<Self, PlantError> {
-        let text = match fs::read_to_string(path) {
+        let text = match read_text(path, MOST_KEPT_BYTES) {
             Ok(text) => text,
             Err(error) if error.kind() == io::ErrorKind::NotFound => "{}".to_owned(),
             Err(error) => return Err(refused(path, &error)),

@@ -5,7 +5,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
-use masseter_shared::config::{Scenario, ScenarioError};
+use masseter_shared::config::{FileConfig, Scenario, ScenarioError};
+use masseter_shared::input::read_bytes;
 use serde::{Deserialize, Serialize};
 use sha1::{Digest, Sha1};
 use toml::{Table, Value};
@@ -134,7 +135,7 @@ impl Campaign {
         let files = scenario.iter_mut().flat_map(Scenario::files_mut).map(|(_, path)| path.clone());
         for path in files.chain(memory) {
             // A file that cannot be read is the reason why its case cannot run.
-            hasher.update(fs::read(path).unwrap_or_default());
+            hasher.update(read_bytes(&path, FileConfig::MOST_BYTES).unwrap_or_default());
         }
         data_encoding::HEXLOWER.encode(&hasher.finalize()[..6])
     }

@@ -8,6 +8,7 @@ use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use masseter_shared::config::Scenario;
+use masseter_shared::input::{MOST_KEPT_BYTES, read_text};
 use rustix::fs::{FlockOperation, flock};
 use tempfile::TempDir;
 
@@ -196,7 +197,7 @@ impl CampaignFolder {
 
     fn read_plan(&self) -> Result<Campaign, FolderError> {
         let path = self.plan_path();
-        let text = fs::read_to_string(&path).map_err(system(&path))?;
+        let text = read_text(&path, MOST_KEPT_BYTES).map_err(system(&path))?;
         serde_json::from_str(&text)
             .map_err(|error| FolderError::Damaged { path, reason: format!("it is no plan: {error}") })
     }
@@ -279,7 +280,7 @@ fn locked(path: &Path) -> Result<Option<File>, FolderError> {
 }
 
 fn read_result(path: &Path) -> Result<CaseResult, FolderError> {
-    let text = fs::read_to_string(path).map_err(system(path))?;
+    let text = read_text(path, MOST_KEPT_BYTES).map_err(system(path))?;
     serde_json::from_str(&text).map_err(|error| FolderError::Damaged {
         path: path.to_owned(),
         reason: format!("it is no result: {error}"),
@@ -383,6 +384,20 @@ mod tests {
         fs::write(left.join(SCENARIO), "").unwrap();
         folder.attempt(&case(0)).unwrap().finish(&failed(&case(0)), None).unwrap();
         assert_eq!(folder.results().unwrap(), [failed(&case(0))]);
+    }
+
+    #[test]
+    fn a_file_without_an_end_is_refused_at_once() {
+        let parent = tempfile::tempdir().unwrap();
+        let (folder, _lock) = CampaignFolder::begin(parent.path(), &two()).unwrap();
+        let endless = |path: &Path| std::os::unix::fs::symlink("/dev/zero", path).unwrap();
+        let kept = parent.path().join(CASES).join(case(0).id);
+        fs::create_dir(&kept).unwrap();
+        endless(&kept.join(RESULT));
+        assert!(read_result(&kept.join(RESULT)).unwrap_err().to_string().contains("no regular file"));
+        fs::remove_file(folder.plan_path()).unwrap();
+        endless(&folder.plan_path());
+        assert!(folder.read_plan().unwrap_err().to_string().contains("no regular file"));
     }
 
     #[test]

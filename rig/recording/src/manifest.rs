@@ -1,13 +1,13 @@
 //! `manifest.json`: scenario, machine, scheduling and end of a run.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::io;
 use std::time::UNIX_EPOCH;
 
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
+use masseter_shared::input::{MOST_KEPT_BYTES, read_text};
 use masseter_shared::named::Declared;
 use masseter_shared::realtime::scheduling::Obtained;
 use serde::{Deserialize, Serialize};
@@ -163,13 +163,14 @@ impl Manifest {
         struct Form {
             form: u32,
         }
-        let text = fs::read_to_string(folder.manifest())?;
+        let text = read_text(&folder.manifest(), MOST_KEPT_BYTES)?;
         let Form { form } = serde_json::from_str(&text)?;
         if form != FORM {
             return Err(io::Error::other(format!("it has form {form}, this program reads form {FORM}")));
         }
         let manifest: Self = serde_json::from_str(&text)?;
         manifest.scenario.validate().map_err(io::Error::other)?;
+        manifest.declared.check().map_err(io::Error::other)?;
         Ok(manifest)
     }
 }

@@ -8,6 +8,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::vec;
 
+use masseter_shared::input::open_regular;
 use masseter_shared::messages::{FrameTap, LAYOUT_VERSION};
 use mcap::Attachment;
 use mcap::records::{AttachmentHeader, MessageHeader, Record, op};
@@ -109,7 +110,7 @@ pub struct Reader<R = BufReader<File>> {
 impl Reader {
     /// Opens a recording.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        Self::new(BufReader::with_capacity(1 << 18, File::open(path)?))
+        Self::new(BufReader::with_capacity(1 << 18, open_regular(path)?))
     }
 }
 

@@ -12,6 +12,7 @@ use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread::{self, JoinHandle};
 
+use masseter_shared::input::read_bytes;
 use masseter_shared::messages::FrameTap;
 use masseter_shared::named::Declared;
 use mcap::records::MessageHeader;
@@ -155,11 +156,15 @@ impl Recorder {
         let mut manifest = Manifest::read(folder)?;
         let frames = manifest.scenario.recording.frames.then(FrameBatch::default);
         let mut recorder = Self::with(DurableFile::create(&folder.recording())?, scene, frames)?;
-        recorder.attach("scenario.toml", "application/toml", &fs::read(folder.scenario())?)?;
+        recorder.attach(
+            "scenario.toml",
+            "application/toml",
+            &read_bytes(&folder.scenario(), LONGEST_FILE)?,
+        )?;
         for (name, _) in manifest.scenario.files_mut() {
             let path = folder.file(&name);
             if fs::metadata(&path).is_ok_and(|file| file.len() <= LONGEST_FILE) {
-                recorder.attach(&name, "text/csv", &fs::read(path)?)?;
+                recorder.attach(&name, "text/csv", &read_bytes(&path, LONGEST_FILE)?)?;
             }
         }
         recorder.attach(AT_START, "application/json", manifest.at_start().as_bytes())?;

@@ -14,6 +14,7 @@ use hdrhistogram::serialization::interval_log::{
 use hdrhistogram::serialization::{Deserializer, V2DeflateSerializer};
 use masseter_analysis::IntervalFigures;
 use masseter_shared::clock::SECOND_NS;
+use masseter_shared::input::{MOST_KEPT_BYTES, read_bytes};
 
 use crate::write_error::WriteError;
 
@@ -69,7 +70,7 @@ pub fn write<H: Borrow<Histogram<u64>>>(
 
 /// Reads all seconds of a log into one histogram.
 pub fn read(path: &Path) -> io::Result<Histogram<u64>> {
-    let text = fs::read(path)?;
+    let text = read_bytes(path, MOST_KEPT_BYTES)?;
     let mut all = Histogram::new(3).expect("three digits are allowed");
     for entry in IntervalLogIterator::new(&text) {
         let entry = entry.map_err(|error| invalid(format!("a line holds no interval: {error:?}")))?;

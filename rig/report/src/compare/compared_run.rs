@@ -1,7 +1,6 @@
 //! One of two runs: verdict and figures from its summary, circumstances from its manifest.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, bail, ensure};
@@ -13,6 +12,7 @@ use crate::summary::FORM;
 use super::changes::{flatten, leaves};
 
 use masseter_recording::RunFolder;
+use masseter_shared::input::{MOST_KEPT_BYTES, read_text};
 
 /// Keys of the manifest that must agree for two runs to be comparable.
 const CIRCUMSTANCES: [&str; 4] = ["scenario", "clock", "machine", "masseter"];
@@ -72,7 +72,7 @@ impl ComparedRun {
 }
 
 fn json(path: &Path) -> anyhow::Result<Value> {
-    Ok(serde_json::from_str(&fs::read_to_string(path)?)?)
+    Ok(serde_json::from_str(&read_text(path, MOST_KEPT_BYTES)?)?)
 }
 
 pub(super) fn differences(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>) -> Vec<Difference> {
