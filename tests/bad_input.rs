@@ -1,5 +1,7 @@
 //! What bad input gets: refused before anything starts, with place and reason, exit code 2.
 
+use std::fs;
+use std::os::unix::fs::symlink;
 use std::process::Command;
 
 use crate::common::{MASSETER, Workspace, masseter, stderr, stdout};
@@ -79,6 +81,47 @@ fn a_key_that_is_set_by_an_argument_is_used_or_refused_with_the_argument() {
     }
 }
 
+#[test]
+fn what_only_the_controller_knows_is_refused_with_its_place_too() {
+    let two = "[[require]]\nname = 'a'\nsignal = 'l1.force'\nmax = '1 kN'\n[[require]]\nname = 'b'\n";
+    let set = "[[stimulus]]\nat_s = 1\nparameter = 'integral_gain_per_s'\n";
+    for (scenario, reason) in [
+        (format!("{two}never = 'l1.force'"), "scenario.toml:7:1: require.never: require 'b': "),
+        (format!("{two}when = 'running'\nthen = 'signal.x 5 N'"), "scenario.toml:8:1: require.then: "),
+        (format!("{two}signal = 'signal.x'\nmax = 1"), "scenario.toml:7:1: require.signal: "),
+        ("[expect]\nevents = ['drive.none']".to_owned(), "scenario.toml:2:1: expect.events: "),
+        (
+            "[parameters]\ngrip = 3\nintegral_gain = 3".to_owned(),
+            "scenario.toml:2:1: parameters.grip: the controller has no parameter 'grip'",
+        ),
+        (
+            "[parameters]\nintegral_gain_per_s = 1e9".to_owned(),
+            "scenario.toml:2:1: parameters.integral_gain_per_s: parameter 'integral_gain_per_s' cannot be",
+        ),
+        (format!("{set}value = 1e9"), "scenario.toml:4:1: stimulus.value: [[stimulus]] number 1: "),
+        (
+            format!("{set}value = 1\n[[stimulus]]\nat_s = 1\nparameter = 'x'\nvalue = 1"),
+            "scenario.toml:7:1: stimulus.parameter: [[stimulus]] number 2: ",
+        ),
+        (
+            format!("{two}expression = '{}'\nunit = 'N'\nmax = '1 N'", "abs(".repeat(10_000)),
+            "scenario.toml:7:1: require.expression: ",
+        ),
+        ("[controller]\nlead_cycles = 5e-324".to_owned(), "scenario.toml:2:1: controller.lead_cycles = "),
+    ] {
+        let workspace = Workspace::new(&scenario);
+        let output = workspace.run_virtual(&[]);
+        assert_eq!(output.status.code(), Some(2), "{scenario}: {}", stderr(&output));
+        let said = stderr(&output);
+        assert!(said.contains(reason) && said.chars().count() < 800, "{scenario:?} gave {said:?}");
+    }
+    // What an argument has replaced stands in no line of the file.
+    let workspace = Workspace::new("[parameters]\nintegral_gain_per_s = 3");
+    let output = workspace.run_virtual(&["--set", "integral_gain_per_s=1e9"]);
+    let said = stderr(&output);
+    assert!(said.contains("parameters.integral_gain_per_s: ") && !said.contains("toml:2"), "{said}");
+}
+
 /// A terminal would carry them out.
 #[test]
 fn control_characters_of_a_file_are_printed_as_codes() {
@@ -100,10 +143,39 @@ fn files_without_an_end_are_refused_at_once() {
         (["fk", "--scenario=/dev/zero"], "no regular file"),
         (["fk", "--input=/dev/zero"], "/dev/zero:1: longer than 4096 bytes"),
         (["ik", "--input=/dev/zero"], "/dev/zero:1: longer than 4096 bytes"),
+        (["diff", "/dev/zero"], "no regular file"),
     ] {
         let output = masseter(&arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", stderr(&output));
         assert!(stderr(&output).contains(reason), "{arguments:?}: {}", stderr(&output));
+    }
+}
+
+/// The rig has written them, and anybody may have replaced them since.
+#[test]
+fn files_of_a_folder_without_an_end_are_refused_at_once() {
+    let workspace = Workspace::new("duration_s = 0.5");
+    assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
+    let run = workspace.run_folder();
+    let run = run.to_str().unwrap();
+    let endless = |path: &str| {
+        fs::remove_file(path).unwrap();
+        symlink("/dev/zero", path).unwrap();
+    };
+    for (file, arguments) in [
+        ("summary.json", vec!["report", run, run]),
+        ("manifest.json", vec!["report", run]),
+        ("manifest.json", vec!["replay", run]),
+        ("recording.mcap", vec!["recording", "info", run]),
+    ] {
+        let kept = fs::read(format!("{run}/{file}")).unwrap();
+        endless(&format!("{run}/{file}"));
+        let output = masseter(&arguments);
+        let said = stderr(&output);
+        assert!(matches!(output.status.code(), Some(2 | 6)), "{arguments:?}: {said}");
+        assert!(said.contains("no regular file"), "{arguments:?}: {said}");
+        fs::remove_file(format!("{run}/{file}")).unwrap();
+        fs::write(format!("{run}/{file}"), kept).unwrap();
     }
 }
 

@@ -174,13 +174,20 @@ fn a_trigger_that_never_came_leaves_the_requirement_untested() {
 #[test]
 fn a_wrong_requirement_is_refused_before_anything_starts() {
     for (requirement, expected) in [
-        ("signal = 'incisal.eror'\nmax = '1 mm'", "require 'it': there is no signal 'incisal.eror'"),
+        (
+            "signal = 'incisal.eror'\nmax = '1 mm'",
+            "scenario.toml:3:1: require.signal: require 'it': there is no signal 'incisal.eror'",
+        ),
         ("signal = 'incisal.error'\nmax = '1 N'", "give a number with one of the units m, mm"),
         ("never = 'runing'", "'runing' is no occurrence"),
-        ("never = 'fault.deaf'", "'fault.deaf' is no occurrence"),
+        (
+            "never = 'fault.deaf'",
+            "scenario.toml:3:1: require.never: require 'it': 'fault.deaf' is no occurrence",
+        ),
+        ("signal = 'l1.force'", "scenario.toml:1:1: require.max: require 'it': give min, max or both"),
         (
             "expression = '{l1.force} * {l1.velocity}'\nunit = 'N'\nmax = '1 N'",
-            "expression = '{l1.force} * {l1.velocity}': its unit is W, not 'N'",
+            "scenario.toml:3:1: require.expression: require 'it': '{l1.force} * {l1.velocity}': its unit is W, not 'N'",
         ),
     ] {
         let workspace = Workspace::new(&format!("[[require]]\nname = 'it'\n{requirement}"));

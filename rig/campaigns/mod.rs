@@ -86,7 +86,8 @@ fn plan(file: &Path, controller: ControllerKind) -> anyhow::Result<Campaign> {
     };
     campaign.check().with_context(|| file.display().to_string())?;
     // What is wrong with the scenario itself is wrong with every case.
-    check_simulated(&base, controller).context("the scenario of the campaign")?;
+    check_simulated(&base, campaign.file.scenario.as_deref(), controller)
+        .context("the scenario of the campaign")?;
     Ok(campaign)
 }
 

@@ -129,13 +129,14 @@ fn check_controller_stall(args: &RunArgs, scenario: &Scenario) -> anyhow::Result
     if args.clock != ClockKind::Rt || args.controller == ControllerChoice::None {
         return Ok(());
     }
+    let entries = scenario.entry_names();
     for fault in scenario.faults.iter().filter(of_stall) {
         if args.controller == ControllerChoice::External {
             bail!(
                 "faults.kind = {stall}: the rig stops only what it started: use --controller with the path of yours"
             );
         }
-        if !is_seen_by_controller(fault.when(&scenario.entry_names())?, scenario) {
+        if !is_seen_by_controller(fault.when(&entries)?, scenario) {
             bail!(
                 "faults.after: in real time {stall} cannot count from an occurrence in the plant, which the controller does not \
                  see: count from the motion (at_s alone), or use --clock virtual"

@@ -184,7 +184,7 @@ fn figures_of(
     start: StartAnalysis,
     interrupts: &Interrupts,
 ) -> Result<(Manifest, Figures), Failure> {
-    let plan = resolve_simulated(scenario, build).usage()?;
+    let plan = resolve_simulated(scenario, None, build).usage()?;
     let controller = ControllerChoice::Own(controller);
     let args = RunArgs { clock: ClockKind::Virtual, controller, ..RunArgs::default() };
     unrecorded(&plan, &args, build, start, interrupts)

@@ -1,5 +1,7 @@
 //! Parts of sentences that many messages share.
 
+/// Bytes of the longest name that may be meant as another.
+const LONGEST: usize = 200;
 /// Likeness from which a name may be meant.
 const LIKELY: f64 = 0.7;
 
@@ -47,6 +49,9 @@ pub fn shortest(number: f64) -> String {
 /// assert_eq!(nearest("jaw", topics), None);
 /// ```
 pub fn nearest<'a>(unknown: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    if unknown.len() > LONGEST {
+        return None;
+    }
     let unknown = unknown.to_lowercase();
     let rated = names.into_iter().map(|name| (strsim::jaro_winkler(&unknown, name), name));
     let likely = rated.filter(|(likeness, _)| *likeness >= LIKELY);

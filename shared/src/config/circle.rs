@@ -1,5 +1,7 @@
 //! Circles among the faults and stimuli of a scenario: entries whose times count from each other never begin.
 
+use std::iter::successors;
+
 use super::error::ScenarioError;
 use super::when::{EntryNames, Start};
 
@@ -15,24 +17,45 @@ pub(super) fn refuse_circles(
         Start::Stimulus(place) => stimuli.get(place).copied(),
         Start::SwitchOn | Start::State(_) => None,
     };
-    let lists = [
-        ("faults.after", (0..faults.len()).map(Start::Fault).collect::<Vec<_>>()),
-        ("stimulus.after", (0..stimuli.len()).map(Start::Stimulus).collect()),
-    ];
-    for (key, list) in lists {
-        for (number, entry) in list.into_iter().enumerate() {
-            let chain = std::iter::successors(before(entry), |start| before(*start));
-            // A circle is no longer than all entries together.
-            let chain: Vec<_> = chain.take(faults.len() + stimuli.len()).collect();
-            let Some(end) = chain.iter().position(|start| *start == entry) else { continue };
-            let names = std::iter::once(&entry).chain(&chain[..=end]).map(|start| name(*start, entries));
-            let circle = names.collect::<Vec<_>>().join(" after ");
-            let need =
-                "these times count from each other, so nothing of them begins: let one count from the motion";
-            return Err(ScenarioError::bad(key, &circle, need).of_entry(number));
+    let place = |start: Start| match start {
+        Start::Fault(place) => Some(place),
+        Start::Stimulus(place) => Some(faults.len() + place),
+        Start::SwitchOn | Start::State(_) => None,
+    };
+    let all = (0..faults.len()).map(Start::Fault).chain((0..stimuli.len()).map(Start::Stimulus));
+    // The walk that first came to each entry: every entry is looked at once.
+    let mut first_walk = vec![None; faults.len() + stimuli.len()];
+    for (walk, entry) in all.enumerate() {
+        for start in successors(Some(entry), |start| before(*start)) {
+            let Some(there) = place(start).map(|place| &mut first_walk[place]) else { break };
+            match there {
+                None => *there = Some(walk),
+                Some(first) if *first == walk => return Err(circle(start, before, place, entries)),
+                Some(_) => break,
+            }
         }
     }
     Ok(())
+}
+
+/// The refusal of a circle, told from its first entry on.
+fn circle(
+    on_it: Start,
+    before: impl Fn(Start) -> Option<Start> + Copy,
+    place: impl Fn(Start) -> Option<usize>,
+    entries: &EntryNames<'_>,
+) -> ScenarioError {
+    let round = |from| successors(Some(from), move |start| before(*start).filter(|next| *next != from));
+    let first = round(on_it).min_by_key(|start| place(*start)).unwrap_or(on_it);
+    let names = round(first).chain([first]).map(|start| name(start, entries));
+    let circle = names.collect::<Vec<_>>().join(" after ");
+    let need = "these times count from each other, so nothing of them begins: let one count from the motion";
+    let (key, number) = match first {
+        Start::Stimulus(number) => ("stimulus.after", number),
+        Start::Fault(number) => ("faults.after", number),
+        Start::SwitchOn | Start::State(_) => ("faults.after", 0),
+    };
+    ScenarioError::bad(key, &circle, need).of_entry(number)
 }
 
 fn name(start: Start, entries: &EntryNames<'_>) -> String {

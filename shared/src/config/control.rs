@@ -9,6 +9,8 @@ use super::need::{LONGEST_S, keyed, require_duration, require_positive, require_
 /// SYNC takes one cycle and the drives' interpolation one; drives that smooth their targets take some more. The
 /// controller extrapolates the motion by this time.
 pub const MOST_LEAD_CYCLES: usize = 10;
+/// Smallest lead, cycles: the largest integral gain is the rate divided by it, which must be a number.
+const LEAST_LEAD_CYCLES: f64 = 1e-3;
 
 /// From the default start, 7 mm away, the move takes half of the legs' velocity then; a shorter one is none that drives
 /// follow, s.
@@ -154,9 +156,9 @@ impl ControllerConfig {
             model.validate().map_err(|error| error.of_table("controller.model"))?;
         }
         // The lead is no longer than a drive needs, and an error is corrected only once within the lead.
-        if self.lead_cycles > MOST_LEAD_CYCLES as f64 {
+        if !(LEAST_LEAD_CYCLES..=MOST_LEAD_CYCLES as f64).contains(&self.lead_cycles) {
             let need = format!(
-                "use at most {MOST_LEAD_CYCLES}: one until SYNC, and what the drives interpolate over"
+                "use {LEAST_LEAD_CYCLES} to {MOST_LEAD_CYCLES}: one until SYNC, and what the drives interpolate over"
             );
             return Err(ScenarioError::bad("controller.lead_cycles", &self.lead_cycles, need));
         }
@@ -209,8 +211,9 @@ mod tests {
             (
                 ControllerConfig { lead_cycles: 1000.0, ..default },
                 1000,
-                Some("controller.lead_cycles = 1000: use at most 10"),
+                Some("controller.lead_cycles = 1000: use 0.001 to 10"),
             ),
+            (ControllerConfig { lead_cycles: 5e-324, ..default }, 1000, Some(": use 0.001 to 10")),
             (ControllerConfig { integral_gain_per_s: 500.0, ..default }, 1000, None),
             (
                 ControllerConfig { integral_gain_per_s: 1e9, ..default },

@@ -8,6 +8,7 @@ use std::str::FromStr;
 use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use crate::input::excerpt;
 use crate::wording::nearest;
 
 /// The kind of a quantity. Values of different kinds cannot be compared.
@@ -205,7 +206,7 @@ impl FromStr for Quantity {
     type Err = QuantityError;
 
     fn from_str(text: &str) -> Result<Self, QuantityError> {
-        let refused = |reason: String| QuantityError { text: text.to_owned(), reason };
+        let refused = |reason: String| QuantityError { text: excerpt(text), reason };
         let trimmed = text.trim();
         let is_of_number = |(place, c): (usize, char)| {
             c.is_ascii_digit() || "+-.".contains(c) || is_exponent(trimmed, place)
@@ -219,7 +220,7 @@ impl FromStr for Quantity {
         let unit = Unit::named(name).ok_or_else(|| {
             let question = nearest(name, UNITS.iter().map(|unit| unit.name))
                 .map_or_else(String::new, |likely| format!("; did you mean '{likely}'?"));
-            refused(format!("the unit '{name}' is unknown{question}"))
+            refused(format!("the unit '{}' is unknown{question}", excerpt(name)))
         })?;
         if !(number * unit.si).is_finite() {
             return Err(refused("the number is too large".to_owned()));

@@ -23,7 +23,7 @@ use super::{
 };
 use crate::clock::SECOND_NS;
 use crate::geometry::{AXES, AXIS_NAMES, MechanismConfig};
-use crate::input::read_text;
+use crate::input::{excerpt, read_text};
 
 /// Size of the largest scenario file, bytes.
 const MOST_BYTES: u64 = 1 << 20;
@@ -121,15 +121,23 @@ impl Scenario {
     /// have this value: an argument may have replaced it.
     pub fn place_of(&self, path: &Path, refusal: &str) -> Option<String> {
         let is_of_key = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '.');
-        let key = refusal.split(|c| !is_of_key(c)).next()?;
+        self.place_of_key(path, refusal.split(|c| !is_of_key(c)).next()?, None)
+    }
+
+    /// The place in its file of a key, or of the table that would have it; `entry` is the number of the table in a list of
+    /// tables, from 0. None where the file does not have the value of this scenario: an argument may have replaced it.
+    pub fn place_of_key(&self, path: &Path, key: &str, entry: Option<usize>) -> Option<String> {
         let value_in = |scenario: &Self| {
             let values = serde_json::to_value(scenario).ok()?;
-            values.pointer(&format!("/{}", key.replace('.', "/"))).cloned()
+            let Some(number) = entry else { return values.pointer(&pointer([key])).cloned() };
+            let (list, key) = key.split_once('.').unwrap_or((key, ""));
+            let entry = values.pointer(&pointer([list, &number.to_string()]))?;
+            Some(entry.pointer(&pointer([key])).cloned().unwrap_or_default())
         };
         let text = read_text(path, MOST_BYTES).ok()?;
         let given = Self::parse(path, &text).ok()?;
         let is_given = value_in(&given)? == value_in(self)?;
-        is_given.then(|| Some(Document::parse(path, &text).ok()?.place_of(key, None))).flatten()
+        is_given.then(|| Some(Document::parse(path, &text).ok()?.place_of(key, entry))).flatten()
     }
 
     /// Reads a scenario file. The paths of its files are relative to its folder. The values are not checked
@@ -252,7 +260,7 @@ impl Scenario {
     /// # Errors
     /// [`ScenarioError::Malformed`] for an unknown key or a value of another type.
     pub fn with(&self, assignment: &str) -> Result<Self, ScenarioError> {
-        let refused = |reason| ScenarioError::Malformed { place: assignment.to_owned(), reason };
+        let refused = |reason| ScenarioError::Malformed { place: excerpt(assignment), reason };
         let (key, value) = assignment.split_once('=').ok_or_else(|| refused("write KEY=VALUE".to_owned()))?;
         if !key.contains('.') && refusal_of(key.trim()).is_some() {
             return self.with(&format!("parameters.{assignment}"));
@@ -466,10 +474,10 @@ impl Scenario {
 
     /// The names of the faults and stimuli.
     pub fn entry_names(&self) -> EntryNames<'_> {
-        EntryNames {
-            faults: self.faults.iter().map(FaultConfig::name).collect(),
-            stimuli: self.stimulus.iter().map(StimulusConfig::name).collect(),
-        }
+        EntryNames::new(
+            self.faults.iter().map(FaultConfig::name).collect(),
+            self.stimulus.iter().map(StimulusConfig::name).collect(),
+        )
     }
 
     /// Duration of a cycle, ns.
@@ -481,6 +489,11 @@ impl Scenario {
     pub fn period_s(&self) -> f64 {
         self.period_ns() as f64 / SECOND_NS as f64
     }
+}
+
+/// The JSON pointer to the value of keys within each other.
+fn pointer<const N: usize>(keys: [&str; N]) -> String {
+    keys.iter().filter(|key| !key.is_empty()).map(|key| format!("/{}", key.replace('.', "/"))).collect()
 }
 
 fn table_of(text: &str) -> Table {

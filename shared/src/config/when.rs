@@ -3,6 +3,8 @@
 //! Times count from switch-on, from the beginning of the motion, or from another occurrence. This module resolves names;
 //! [`Injection`](crate::injection) follows the occurrences of a run.
 
+use std::collections::BTreeMap;
+
 use super::error::ScenarioError;
 use super::need::{require_duration, require_not_negative};
 use crate::messages::codes::ControllerState;
@@ -28,6 +30,38 @@ pub struct EntryNames<'a> {
     pub faults: Vec<&'a str>,
     /// Of the stimuli, in their order.
     pub stimuli: Vec<&'a str>,
+    /// What `after` can name; none where several entries have the name.
+    starts: BTreeMap<String, Option<Start>>,
+}
+
+impl<'a> EntryNames<'a> {
+    pub(super) fn new(faults: Vec<&'a str>, stimuli: Vec<&'a str>) -> Self {
+        let of = |list: &str, name: &str| format!("{list}.{name}");
+        let states = ControllerState::ALL.iter();
+        let states = states.map(|state| (of("controller", state.name()), Start::State(*state)));
+        let named_faults =
+            faults.iter().enumerate().map(|(place, name)| (of("fault", name), Start::Fault(place)));
+        let named_stimuli = stimuli.iter().enumerate();
+        let named_stimuli = named_stimuli.map(|(place, name)| (of("stimulus", name), Start::Stimulus(place)));
+        let mut starts = BTreeMap::new();
+        for (name, start) in states.chain(named_faults).chain(named_stimuli) {
+            starts.entry(name).and_modify(|start| *start = None).or_insert(Some(start));
+        }
+        Self { faults, stimuli, starts }
+    }
+
+    /// The occurrence of that name.
+    fn start(&self, name: &str) -> Result<Start, String> {
+        match self.starts.get(name) {
+            Some(Some(start)) => Ok(*start),
+            Some(None) => Err("several entries have this name: give each a name of its own".to_owned()),
+            None => {
+                let question = nearest(name, self.starts.keys().map(String::as_str))
+                    .map_or_else(String::new, |likely| format!("; did you mean '{likely}'?"));
+                Err(format!("use fault.NAME, stimulus.NAME or controller.STATE{question}"))
+            }
+        }
+    }
 }
 
 /// When something acts.
@@ -91,32 +125,10 @@ impl WhenKeys<'_> {
         }
         let start = match self.after {
             None => Start::State(ControllerState::Running),
-            Some(name) => start_named(name, entries)
-                .map_err(|need| ScenarioError::bad(after, &format!("'{name}'"), need))?,
+            Some(name) => {
+                entries.start(name).map_err(|need| ScenarioError::bad(after, &format!("'{name}'"), need))?
+            }
         };
         Ok(When { start, begin_s: self.at_s.unwrap_or_default(), for_s: self.for_s })
-    }
-}
-
-/// The occurrence of that name.
-fn start_named(name: &str, entries: &EntryNames<'_>) -> Result<Start, String> {
-    let states = ControllerState::ALL
-        .iter()
-        .map(|state| (format!("controller.{}", state.name()), Start::State(*state)));
-    let faults = entries.faults.iter().enumerate();
-    let stimuli = entries.stimuli.iter().enumerate();
-    let named: Vec<_> = states
-        .chain(faults.map(|(place, name)| (format!("fault.{name}"), Start::Fault(place))))
-        .chain(stimuli.map(|(place, name)| (format!("stimulus.{name}"), Start::Stimulus(place))))
-        .collect();
-    let found: Vec<_> = named.iter().filter(|(known, _)| known == name).collect();
-    match found.as_slice() {
-        [(_, start)] => Ok(*start),
-        [] => {
-            let question = nearest(name, named.iter().map(|(known, _)| known.as_str()))
-                .map_or_else(String::new, |likely| format!("; did you mean '{likely}'?"));
-            Err(format!("use fault.NAME, stimulus.NAME or controller.STATE{question}"))
-        }
-        _ => Err("several entries have this name: give each a name of its own".to_owned()),
     }
 }

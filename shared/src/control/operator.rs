@@ -36,6 +36,21 @@ pub enum OperatorError {
     },
 }
 
+impl OperatorError {
+    /// The key in the scenario, and the number of its entry in the list, from 0.
+    pub fn key(&self) -> Option<(&'static str, usize)> {
+        match self {
+            Self::Scenario(_) => None,
+            Self::Parameter { number, error: NameError::OutOfRange { .. } } => {
+                Some(("stimulus.value", number - 1))
+            }
+            Self::Parameter { number, .. } => Some(("stimulus.parameter", number - 1)),
+            Self::Unseen { table: "[[faults]]", number } => Some(("faults.after", number - 1)),
+            Self::Unseen { number, .. } => Some(("stimulus.after", number - 1)),
+        }
+    }
+}
+
 /// What is due.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Due {
@@ -74,12 +89,12 @@ impl Operator {
     /// # Errors
     /// [`OperatorError`].
     pub fn new(scenario: &Scenario, declared: &Declared, now_ns: u64) -> Result<Self, OperatorError> {
-        let mut waiting = Vec::new();
+        let (mut waiting, entries) = (Vec::new(), scenario.entry_names());
         for (place, stimulus) in scenario.stimulus.iter().enumerate() {
             if !stimulus.is_of_controller() {
                 continue;
             }
-            let when = stimulus.when(&scenario.entry_names())?;
+            let when = stimulus.when(&entries)?;
             if !is_seen_by_controller(when, scenario) {
                 return Err(OperatorError::Unseen { table: "[[stimulus]]", number: place + 1 });
             }
@@ -92,7 +107,7 @@ impl Operator {
             if !is_of_process && fault.kind != FaultKindConfig::ControllerStall {
                 continue;
             }
-            let when = fault.when(&scenario.entry_names())?;
+            let when = fault.when(&entries)?;
             if !is_seen_by_controller(when, scenario) {
                 // In simulated time the plant alone stalls the commands; real time refuses this before the start.
                 if !is_of_process {

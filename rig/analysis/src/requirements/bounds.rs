@@ -5,6 +5,7 @@ use masseter_shared::config::{Quantity, RequirementConfig, Scenario, Statistic};
 use super::expression::Quantified;
 use super::finding::{Finding, RequirementPlot};
 use super::moment::Moment;
+use super::refusal::{OfKey, Refused};
 use super::window::Window;
 use crate::series::{Extremes, Series};
 use crate::signals::Values;
@@ -62,24 +63,31 @@ impl Bounds {
         config: &RequirementConfig,
         scenario: &Scenario,
         values: &mut Values,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, Refused> {
         let of = Quantified::new(config, values)?;
-        let limit = |key: &str, given: Option<Quantity>| {
-            let si = given.map(|given| {
-                given.si_of(of.unit.dimension).map_err(|need| format!("{key} = {given}: {need}"))
-            });
-            si.transpose()
+        let limit = |key: &'static str, given: Option<Quantity>| {
+            let si =
+                |given: Quantity| given.si_of(of.unit.dimension).map_err(|need| format!("{given}: {need}"));
+            given.map(si).transpose().of_key(key)
         };
-        let limits = Limits { min: limit("min", config.min)?, max: limit("max", config.max)? };
+        let limits =
+            Limits { min: limit("require.min", config.min)?, max: limit("require.max", config.max)? };
         match (limits.min, limits.max) {
-            (None, None) => return Err("give min, max or both".to_owned()),
-            (Some(min), Some(max)) if min > max => return Err("min is above max".to_owned()),
+            (None, None) => return Err(Refused::new("require.max", "give min, max or both")),
+            (Some(min), Some(max)) if min > max => {
+                return Err(Refused::new("require.min", "min is above max"));
+            }
             _ => {}
         }
         let percentile = match (config.statistic, config.percentile) {
             (Statistic::Percentile, Some(percentile)) if (0.0..=100.0).contains(&percentile) => percentile,
-            (Statistic::Percentile, _) => return Err("give percentile, 0 to 100".to_owned()),
-            (_, Some(_)) => return Err("percentile goes with statistic = \"percentile\"".to_owned()),
+            (Statistic::Percentile, _) => {
+                return Err(Refused::new("require.percentile", "give percentile, 0 to 100"));
+            }
+            (_, Some(_)) => {
+                let need = "percentile goes with statistic = \"percentile\"";
+                return Err(Refused::new("require.percentile", need));
+            }
             (_, None) => 0.0,
         };
         Ok(Self {

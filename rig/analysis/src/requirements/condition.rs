@@ -1,8 +1,10 @@
 //! Conditions on a signal: `bite.force > 5 N`, `controller.state == safe_stop`, or a state of the controller alone.
 
 use masseter_shared::config::{Dimension, Quantity, Unit};
+use masseter_shared::input::excerpt;
 use masseter_shared::messages::codes::ControllerState;
 
+use super::refusal::Reason;
 use crate::signals::Values;
 
 /// The comparison of a condition. `<` and `<=` are alike, since no measured value is exactly a limit.
@@ -38,13 +40,16 @@ pub(super) struct Condition {
 
 impl Condition {
     /// Reads a condition, and chooses its signal.
-    pub(super) fn parse(text: &str, values: &mut Values) -> Result<Self, String> {
+    pub(super) fn parse(text: &str, values: &mut Values) -> Result<Self, Reason> {
         let text = text.trim();
         if ControllerState::ALL.iter().any(|state| state.name() == text) {
             return Self::parse(&format!("controller.state == {text}"), values);
         }
         let (name, comparison, limit) = split(text).ok_or_else(|| {
-            format!("'{text}' is no condition: write such as \"bite.force > 5 N\" or \"controller.state == running\"")
+            format!(
+                "'{}' is no condition: write such as \"bite.force > 5 N\" or \"controller.state == running\"",
+                excerpt(text)
+            )
         })?;
         let signal = values.choose(name)?;
         let named = values.signal(signal);
@@ -55,19 +60,23 @@ impl Condition {
         };
         let is_state = named.states().is_some();
         if is_state && matches!(comparison, Comparison::AtMost | Comparison::AtLeast) {
-            return Err(format!("'{text}': states have no order; use == or !="));
+            return Err(format!("'{}': states have no order; use == or !=", excerpt(text)).into());
         }
         if !is_state
             && unit.dimension != Dimension::One
             && matches!(comparison, Comparison::Equal | Comparison::Unequal)
         {
-            return Err(format!("'{text}': a measured value is never exactly a number; use < or >"));
+            return Err(format!(
+                "'{}': a measured value is never exactly a number; use < or >",
+                excerpt(text)
+            )
+            .into());
         }
         Ok(Self { text: text.to_owned(), signal, comparison, limit, unit })
     }
 
     /// The controller is in that state.
-    pub(super) fn of_state(state: ControllerState, values: &mut Values) -> Result<Self, String> {
+    pub(super) fn of_state(state: ControllerState, values: &mut Values) -> Result<Self, Reason> {
         Self::parse(state.name(), values)
     }
 
@@ -110,13 +119,13 @@ fn split(text: &str) -> Option<(&str, Comparison, &str)> {
 fn limit_of(text: &str, dimension: Dimension) -> Result<f64, String> {
     let quantity: Quantity =
         text.parse().map_err(|error: masseter_shared::config::QuantityError| error.to_string())?;
-    quantity.si_of(dimension).map_err(|need| format!("'{text}': {need}"))
+    quantity.si_of(dimension).map_err(|need| format!("'{}': {need}", excerpt(text)))
 }
 
 fn state_code(name: &str, states: &[(&'static str, u32)]) -> Result<f64, String> {
     let code = states.iter().find(|(known, _)| *known == name).map(|(_, code)| f64::from(*code));
     code.ok_or_else(|| {
         let names: Vec<_> = states.iter().map(|(known, _)| *known).collect();
-        format!("'{name}' is no state: use {}", names.join(", "))
+        format!("'{}' is no state: use {}", excerpt(name), names.join(", "))
     })
 }

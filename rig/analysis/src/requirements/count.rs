@@ -5,6 +5,7 @@ use masseter_shared::wording::counted;
 
 use super::finding::Finding;
 use super::moment::Moment;
+use super::refusal::{OfKey, Refused};
 use super::trigger::Trigger;
 use super::window::Window;
 use crate::signals::Values;
@@ -26,15 +27,16 @@ impl Count {
         config: &RequirementConfig,
         scenario: &Scenario,
         values: &mut Values,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, Refused> {
         let RequirementConfig { at_least, at_most, .. } = *config;
         if at_least.is_none() && at_most.is_none() {
-            return Err("give at_least, at_most or both".to_owned());
+            return Err(Refused::new("require.at_least", "give at_least, at_most or both"));
         }
         if at_least.zip(at_most).is_some_and(|(least, most)| least > most) {
-            return Err("at_least is above at_most".to_owned());
+            return Err(Refused::new("require.at_least", "at_least is above at_most"));
         }
-        let trigger = Trigger::parse(config.event.as_deref().unwrap_or_default(), scenario, values)?;
+        let event = config.event.as_deref().unwrap_or_default();
+        let trigger = Trigger::parse(event, scenario, values).of_key("require.event")?;
         let window = Window::new(config.during.as_ref(), scenario, values)?;
         Ok(Self { trigger, window, at_least, at_most, samples: 0, times: 0, last_ns: None })
     }

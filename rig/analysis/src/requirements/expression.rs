@@ -4,10 +4,17 @@
 
 use exmex::{Express, FlatEx};
 use masseter_shared::config::{Dimension, RequirementConfig, Unit};
+use masseter_shared::input::{excerpt, sentence};
 
 use super::base_exponents::BaseExponents;
 use super::dimension::derived;
+use super::refusal::{OfKey, Reason, Refused};
 use crate::signals::Values;
+
+/// Bytes of the longest expression.
+const MOST_BYTES: usize = 4096;
+/// Most parentheses around a part of an expression.
+const MOST_LEVELS: usize = 64;
 
 /// A signal or an expression.
 #[derive(Debug, Clone)]
@@ -28,47 +35,50 @@ enum Source {
 }
 
 impl Quantified {
-    pub(super) fn new(config: &RequirementConfig, values: &mut Values) -> Result<Self, String> {
+    pub(super) fn new(config: &RequirementConfig, values: &mut Values) -> Result<Self, Refused> {
         match (&config.signal, &config.expression) {
-            (Some(name), None) => Self::of_signal(name, values),
+            (Some(name), None) => Self::of_signal(name, values).of_key("require.signal"),
             (None, Some(text)) => {
                 let name = config.unit.as_deref().unwrap_or_default();
-                let unit =
-                    Unit::named(name).ok_or_else(|| format!("unit = '{name}': the unit is unknown"))?;
-                Self::of_expression(text, unit, values).map_err(|why| format!("expression = '{text}': {why}"))
+                let unknown =
+                    || Refused::new("require.unit", format!("'{}': the unit is unknown", excerpt(name)));
+                let unit = Unit::named(name).ok_or_else(unknown)?;
+                Self::of_expression(text, unit, values).of_key("require.expression")
             }
-            _ => Err("give a signal or an expression".to_owned()),
+            _ => Err(Refused::new("require.expression", "give a signal or an expression")),
         }
     }
 
-    fn of_signal(name: &str, values: &mut Values) -> Result<Self, String> {
+    fn of_signal(name: &str, values: &mut Values) -> Result<Self, Reason> {
         let signal = values.choose(name)?;
         let named = values.signal(signal);
         if named.states().is_some() {
-            return Err(format!("{name} is a state, which has no bounds; use never, or when and then"));
+            return Err(format!("{name} is a state, which has no bounds; use never, or when and then").into());
         }
         let (unit, absence) = (named.shown(), named.absence());
         Ok(Self { text: name.to_owned(), unit, absence, source: Source::Signal(signal) })
     }
 
-    fn of_expression(text: &str, unit: Unit, values: &mut Values) -> Result<Self, String> {
-        let parsed = exmex::parse::<f64>(text).map_err(|error| error.to_string())?;
+    fn of_expression(text: &str, unit: Unit, values: &mut Values) -> Result<Self, Reason> {
+        let quoted = |reason: &str| format!("'{}': {}", excerpt(text), sentence(reason));
+        check_size(text).map_err(|reason| quoted(&reason))?;
+        let parsed = exmex::parse::<f64>(text).map_err(|error| quoted(&error.to_string()))?;
         let signals: Vec<_> =
             parsed.var_names().iter().map(|name| values.choose(name)).collect::<Result<_, _>>()?;
         if signals.is_empty() || text.matches('{').count() != text.matches('}').count() {
-            return Err("write signals in braces, such as {l1.force}".to_owned());
+            return Err(quoted("write signals in braces, such as {l1.force}").into());
         }
         let named: Vec<_> = signals.iter().map(|signal| values.signal(*signal)).collect();
         if let Some(state) = named.iter().find(|signal| signal.states().is_some()) {
-            return Err(format!("{} is a state, no number", state.name));
+            return Err(quoted(&format!("{} is a state, no number", state.name)).into());
         }
         let dimension_of = |name: &str| {
             let place = parsed.var_names().iter().position(|known| known == name);
             place.map_or(Dimension::One, |place| named[place].shown().dimension)
         };
-        let derived = derived(text, dimension_of)?;
+        let derived = derived(text, dimension_of).map_err(|reason| quoted(&reason))?;
         if derived != BaseExponents::of(unit.dimension) {
-            return Err(format!("its unit is {derived}, not '{}'", unit.name));
+            return Err(quoted(&format!("its unit is {derived}, not '{}'", unit.name)).into());
         }
         let absences = named.iter().map(|signal| signal.absence());
         Ok(Self {
@@ -96,4 +106,21 @@ impl Quantified {
             }
         }
     }
+}
+
+/// Refuses what would take long to read: the reader's time grows faster than the text.
+fn check_size(text: &str) -> Result<(), String> {
+    let level = |(now, most): (usize, usize), c: char| match c {
+        '(' => (now + 1, most.max(now + 1)),
+        ')' => (now.saturating_sub(1), most),
+        _ => (now, most),
+    };
+    let (_, levels) = text.chars().fold((0, 0), level);
+    if text.len() > MOST_BYTES {
+        return Err(format!("it has {} bytes: write at most {MOST_BYTES}", text.len()));
+    }
+    if levels > MOST_LEVELS {
+        return Err(format!("its parentheses are {levels} levels deep: use at most {MOST_LEVELS}"));
+    }
+    Ok(())
 }

@@ -14,6 +14,7 @@ mod moment;
 mod never;
 mod occurrence;
 mod order;
+mod refusal;
 mod requirement;
 mod response;
 mod set;
@@ -24,4 +25,5 @@ mod window;
 
 pub use finding::{RequirementFigures, RequirementPlot, RequirementResult};
 pub use occurrence::event_names;
+pub use refusal::RequirementError;
 pub use set::{Requirements, check_requirements};

@@ -5,6 +5,7 @@ use masseter_shared::config::{RequirementConfig, Scenario, Unit};
 use super::condition::Condition;
 use super::finding::Finding;
 use super::moment::Moment;
+use super::refusal::{OfKey, Refused};
 use super::trigger::Trigger;
 use super::window::Window;
 use crate::signals::Values;
@@ -32,14 +33,14 @@ impl Never {
         config: &RequirementConfig,
         scenario: &Scenario,
         values: &mut Values,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, Refused> {
         let text = config.never.as_deref().unwrap_or_default();
         let what = match Condition::parse(text, values) {
             Ok(condition) => What::Condition(condition),
             Err(_) if !text.contains(['<', '>', '=']) => {
-                What::Occurrence(Trigger::parse(text, scenario, values)?)
+                What::Occurrence(Trigger::parse(text, scenario, values).of_key("require.never")?)
             }
-            Err(error) => return Err(error),
+            refused => refused.map(What::Condition).of_key("require.never")?,
         };
         let window = Window::new(config.during.as_ref(), scenario, values)?;
         Ok(Self { what, window, samples: 0, times: 0, first_ns: None, worst: None })

@@ -1,6 +1,9 @@
 //! Occurrences in the events of a run: `fault.NAME`, `stimulus.NAME`, their ends, and `SOURCE.CAUSE`.
 
+use std::collections::BTreeSet;
+
 use masseter_shared::config::{FaultConfig, FaultLayer, Scenario};
+use masseter_shared::input::excerpt;
 use masseter_shared::messages::codes::{Cause, Source};
 use masseter_shared::wording::nearest;
 
@@ -26,10 +29,14 @@ impl Occurrence {
                 let question = nearest(name, known.iter().map(|(known, _)| known.as_str()))
                     .map_or_else(String::new, |likely| format!("; did you mean '{likely}'?"));
                 Err(format!(
-                    "'{name}' is no occurrence: use fault.NAME, stimulus.NAME, controller.STATE or SOURCE.CAUSE{question}"
+                    "'{}' is no occurrence: use fault.NAME, stimulus.NAME, controller.STATE or SOURCE.CAUSE{question}",
+                    excerpt(name)
                 ))
             }
-            _ => Err(format!("'{name}': several entries have this name; give each a name of its own")),
+            _ => Err(format!(
+                "'{}': several entries have this name; give each a name of its own",
+                excerpt(name)
+            )),
         }
     }
 
@@ -115,16 +122,15 @@ const REPORTS: [(Source, &[Cause]); 5] = [
     (Source::Scenario, &[Cause::FoodBroke, Cause::EndStopHit]),
 ];
 
-/// Whether the name is the end of a stimulus or of a fault that has none.
-fn is_endless(name: &str, scenario: &Scenario) -> bool {
-    let Some(name) = name.strip_suffix(".ended") else { return false };
+/// The ends of stimuli and faults that have none.
+fn endless(scenario: &Scenario) -> BTreeSet<String> {
     let is_of_process = |fault: &&FaultConfig| fault.kind.layer() == FaultLayer::Process;
     let faults = scenario.faults.iter().filter(is_of_process).filter(|fault| fault.kind.size().is_none());
     let stimuli = scenario.stimulus.iter().filter(|stimulus| stimulus.is_of_controller());
-    let mut endless = faults
-        .map(|fault| format!("fault.{}", fault.name()))
-        .chain(stimuli.map(|stimulus| format!("stimulus.{}", stimulus.name())));
-    endless.any(|endless| endless == name)
+    faults
+        .map(|fault| format!("fault.{}.ended", fault.name()))
+        .chain(stimuli.map(|stimulus| format!("stimulus.{}.ended", stimulus.name())))
+        .collect()
 }
 
 /// The names of the events of the rig that can be occurrences.
@@ -151,5 +157,6 @@ fn known(scenario: &Scenario) -> Vec<(String, Occurrence)> {
             move |cause: &Cause| (format!("{source}.{cause}"), Occurrence::Event { source, cause: *cause });
         causes.iter().map(named).collect::<Vec<_>>()
     });
-    faults.into_iter().chain(stimuli).chain(events).filter(|(name, _)| !is_endless(name, scenario)).collect()
+    let endless = endless(scenario);
+    faults.into_iter().chain(stimuli).chain(events).filter(|(name, _)| !endless.contains(name)).collect()
 }

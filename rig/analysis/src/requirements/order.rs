@@ -4,6 +4,7 @@ use masseter_shared::config::{Dimension, RequirementConfig, Scenario};
 
 use super::finding::Finding;
 use super::moment::Moment;
+use super::refusal::{OfKey, Refused};
 use super::trigger::Trigger;
 use crate::signals::Values;
 
@@ -19,12 +20,13 @@ impl Order {
         config: &RequirementConfig,
         scenario: &Scenario,
         values: &mut Values,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, Refused> {
         if config.order.len() < 2 {
-            return Err("give at least two occurrences in order".to_owned());
+            return Err(Refused::new("require.order", "give at least two occurrences in order"));
         }
-        let step = |name: &String| Ok::<_, String>((Trigger::parse(name, scenario, values)?, None));
-        Ok(Self { steps: config.order.iter().map(step).collect::<Result<_, _>>()? })
+        let mut step =
+            |name: &String| Ok((Trigger::parse(name, scenario, values).of_key("require.order")?, None));
+        Ok(Self { steps: config.order.iter().map(&mut step).collect::<Result<_, Refused>>()? })
     }
 
     /// What must hold, in words.

@@ -8,6 +8,7 @@ use super::finding::{Finding, RequirementFigures, RequirementPlot};
 use super::moment::Moment;
 use super::never::Never;
 use super::order::Order;
+use super::refusal::Refused;
 use super::response::Response;
 use crate::signals::Values;
 
@@ -36,7 +37,7 @@ impl Requirement {
         config: &RequirementConfig,
         scenario: &Scenario,
         values: &mut Values,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, Refused> {
         let kinds = [
             (config.signal.is_some() || config.expression.is_some(), "signal"),
             (config.when.is_some() || config.then.is_some(), "when"),
@@ -52,14 +53,13 @@ impl Requirement {
             ["event"] => Kind::Count(Count::new(config, scenario, values)?),
             ["order"] => Kind::Order(Order::new(config, scenario, values)?),
             _ => {
-                return Err(
-                    "give exactly one of signal (or expression), when with then, never, event, order"
-                        .to_owned(),
-                );
+                let need = "give exactly one of signal (or expression), when with then, never, event, order";
+                return Err(Refused::new("require", need));
             }
         };
-        idle_key(config, given[0])
-            .map_or(Ok(()), |key| Err(format!("{key} has no effect with {}", given[0])))?;
+        if let Some(key) = idle_key(config, given[0]) {
+            return Err(Refused::new(key, format!("it has no effect with {}", given[0])));
+        }
         Ok(Self { name: config.name.clone(), is_expected_event: false, kind })
     }
 
@@ -129,19 +129,19 @@ impl Requirement {
 fn idle_key(config: &RequirementConfig, kind: &str) -> Option<&'static str> {
     let is_default_statistic = config.statistic == masseter_shared::config::Statistic::default();
     let keys = [
-        ("unit", config.unit.is_some(), "signal"),
-        ("statistic", !is_default_statistic, "signal"),
-        ("percentile", config.percentile.is_some(), "signal"),
-        ("min", config.min.is_some(), "signal"),
-        ("max", config.max.is_some(), "signal"),
-        ("delay", config.delay.is_some(), "when"),
-        ("within", config.within.is_some(), "when"),
-        ("stays_for", config.stays_for.is_some(), "when"),
-        ("at_least", config.at_least.is_some(), "event"),
-        ("at_most", config.at_most.is_some(), "event"),
+        ("require.unit", config.unit.is_some(), "signal"),
+        ("require.statistic", !is_default_statistic, "signal"),
+        ("require.percentile", config.percentile.is_some(), "signal"),
+        ("require.min", config.min.is_some(), "signal"),
+        ("require.max", config.max.is_some(), "signal"),
+        ("require.delay", config.delay.is_some(), "when"),
+        ("require.within", config.within.is_some(), "when"),
+        ("require.stays_for", config.stays_for.is_some(), "when"),
+        ("require.at_least", config.at_least.is_some(), "event"),
+        ("require.at_most", config.at_most.is_some(), "event"),
     ];
     let idle = keys.into_iter().find(|(_, is_given, of)| *is_given && *of != kind);
     let idle = idle.map(|(key, ..)| key);
-    idle.or_else(|| (config.during.is_some() && kind == "order").then_some("during"))
-        .or_else(|| (config.unit.is_some() && config.signal.is_some()).then_some("unit"))
+    idle.or_else(|| (config.during.is_some() && kind == "order").then_some("require.during"))
+        .or_else(|| (config.unit.is_some() && config.signal.is_some()).then_some("require.unit"))
 }

@@ -13,6 +13,7 @@ use masseter_shared::wording::counted;
 use super::condition::Condition;
 use super::finding::Finding;
 use super::moment::Moment;
+use super::refusal::{OfKey, Refused};
 use super::trigger::Trigger;
 use super::window::Window;
 use crate::signals::Values;
@@ -74,31 +75,32 @@ impl Response {
         config: &RequirementConfig,
         scenario: &Scenario,
         values: &mut Values,
-    ) -> Result<Self, String> {
-        let missing = |key| format!("give when and then: {key} is missing");
-        let when = config.when.as_deref().ok_or_else(|| missing("when"))?;
-        let then = config.then.as_deref().ok_or_else(|| missing("then"))?;
-        let time_ns = |key: &str, time: Option<Quantity>| {
-            let seconds = time
-                .map(|time| time.si_of(Dimension::Time).map_err(|need| format!("{key} = {time}: {need}")));
-            let seconds = seconds.transpose()?;
+    ) -> Result<Self, Refused> {
+        let missing = |key| Refused::new(key, "give when and then: it is missing");
+        let when = config.when.as_deref().ok_or_else(|| missing("require.when"))?;
+        let then = config.then.as_deref().ok_or_else(|| missing("require.then"))?;
+        let time_ns = |key: &'static str, time: Option<Quantity>| {
+            let seconds =
+                time.map(|time| time.si_of(Dimension::Time).map_err(|need| format!("{time}: {need}")));
+            let seconds = seconds.transpose().of_key(key)?;
             if seconds.is_some_and(|seconds| seconds < 0.0) {
-                return Err(format!("{key}: use a time not below 0"));
+                return Err(Refused::new(key, "use a time not below 0"));
             }
-            Ok::<_, String>(seconds.map(|seconds| (seconds * SECOND_NS as f64).round() as u64))
+            Ok(seconds.map(|seconds| (seconds * SECOND_NS as f64).round() as u64))
         };
-        let (delay_ns, within_ns) =
-            (time_ns("delay", config.delay)?.unwrap_or(0), time_ns("within", config.within)?);
+        let delay_ns = time_ns("require.delay", config.delay)?.unwrap_or(0);
+        let within_ns = time_ns("require.within", config.within)?;
+        let stays_for_ns = time_ns("require.stays_for", config.stays_for)?.unwrap_or(0);
         if within_ns.is_some_and(|within_ns| within_ns < delay_ns) {
-            return Err("within is shorter than delay".to_owned());
+            return Err(Refused::new("require.within", "it is shorter than delay"));
         }
         Ok(Self {
-            trigger: Trigger::parse(when, scenario, values)?,
-            then: Condition::parse(then, values)?,
+            trigger: Trigger::parse(when, scenario, values).of_key("require.when")?,
+            then: Condition::parse(then, values).of_key("require.then")?,
             window: Window::new(config.during.as_ref(), scenario, values)?,
             delay_ns,
             within_ns,
-            stays_for_ns: time_ns("stays_for", config.stays_for)?.unwrap_or(0),
+            stays_for_ns,
             waiting: VecDeque::new(),
             smallest: VecDeque::new(),
             open: Vec::new(),
@@ -108,7 +110,7 @@ impl Response {
             worst: None,
             longest_s: None,
             last_ns: 0,
-            full_ns: time_ns("stays_for", config.stays_for)?.unwrap_or(0),
+            full_ns: stays_for_ns,
             beyond: 0,
         })
     }

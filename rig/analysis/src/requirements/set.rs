@@ -1,13 +1,18 @@
 //! The requirements of a run, judged together.
 
+use std::collections::BTreeSet;
+
 use masseter_recording::Recorded;
 use masseter_shared::config::{RequirementConfig, Scenario};
+use masseter_shared::input::excerpt;
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::named::Declared;
 
 use super::finding::RequirementFigures;
 use super::moment::Moment;
+use super::refusal::{Reason, Refused, RequirementError};
 use super::requirement::Requirement;
+use super::trigger::Trigger;
 use crate::events::EventRecord;
 use crate::signals::{Registry, Sample, Timeline, Values};
 
@@ -47,24 +52,36 @@ pub struct Requirements {
 /// parameters are unknown yet and not checked.
 ///
 /// # Errors
-/// A sentence that names the requirement.
-pub fn check_requirements(scenario: &Scenario, declared: Option<&Declared>) -> Result<(), String> {
+/// [`RequirementError`] with the key in the scenario.
+pub fn check_requirements(scenario: &Scenario, declared: Option<&Declared>) -> Result<(), RequirementError> {
     let mut values = Values::new(Registry::new(scenario, declared.unwrap_or(&Declared::default())));
+    let may_come = |reason: &Reason| match reason {
+        Reason::Unknown(signal) => declared.is_none() && signal.is_of_controller(),
+        Reason::Wrong(_) => false,
+    };
+    let mut names = BTreeSet::new();
     for (place, config) in scenario.require.iter().enumerate() {
-        if scenario.require[..place].iter().any(|other| other.name == config.name) {
-            return Err(format!("require '{}': another requirement has this name", config.name));
+        let refused = |Refused { key, reason }| RequirementError {
+            key,
+            entry: Some(place),
+            of: format!("require '{}'", excerpt(&config.name)),
+            reason: reason.to_string(),
+        };
+        if !names.insert(&config.name) {
+            return Err(refused(Refused::new("require.name", "another requirement has this name")));
         }
-        let read = Requirement::new(config, scenario, &mut values);
-        if let Err(reason) = read
-            && (declared.is_some() || !(reason.contains("'signal.") || reason.contains("'parameter.")))
-        {
-            return Err(format!("require '{}': {reason}", config.name));
+        match Requirement::new(config, scenario, &mut values) {
+            Err(error) if !may_come(&error.reason) => return Err(refused(error)),
+            _ => {}
         }
     }
-    let expected = scenario.expect.iter().flat_map(|expect| &expect.events);
-    for name in expected {
-        super::trigger::Trigger::parse(name, scenario, &mut values)
-            .map_err(|reason| format!("expect.events: {reason}"))?;
+    for name in scenario.expect.iter().flat_map(|expect| &expect.events) {
+        Trigger::parse(name, scenario, &mut values).map_err(|reason| RequirementError {
+            key: "expect.events",
+            entry: None,
+            of: "expect.events".to_owned(),
+            reason: reason.to_string(),
+        })?;
     }
     Ok(())
 }
@@ -76,7 +93,7 @@ impl Requirements {
         let expected = scenario.expect.iter().flat_map(|expect| &expect.events).map(expected_event);
         let mut read = |config: &RequirementConfig| {
             Requirement::new(config, scenario, &mut values)
-                .unwrap_or_else(|reason| Requirement::unknown(config, reason))
+                .unwrap_or_else(|refused| Requirement::unknown(config, refused.reason.to_string()))
         };
         let mut list: Vec<_> = scenario.require.iter().map(&mut read).collect();
         list.extend(expected.map(|config| read(&config).into_expected_event()));

@@ -297,9 +297,15 @@ fn wrong_requirements_are_refused_with_what_to_write() {
             "signal = 'l1.forse'\nmax = '1 N'",
             "there is no signal 'l1.forse'; masseter signals lists them; did you mean 'l1.force'?",
         ),
-        ("signal = 'l1.force'\nmax = '1 mm'", "max = 1 mm: give a number with one of the units N, mN, kN"),
+        (
+            "signal = 'l1.force'\nmax = '1 mm'",
+            "require.max: require 'it': 1 mm: give a number with one of the units N, mN, kN",
+        ),
         ("signal = 'l1.force'", "give min, max or both"),
-        ("signal = 'l1.force'\nmax = '1 N'\nwithin = '1 ms'", "within has no effect with signal"),
+        (
+            "signal = 'l1.force'\nmax = '1 N'\nwithin = '1 ms'",
+            "require.within: require 'it': it has no effect with signal",
+        ),
         ("signal = 'l1.force'\nnever = 'safe_stop'\nmax = '1 N'", "give exactly one of signal"),
         ("signal = 'controller.state'\nmax = 3", "controller.state is a state, which has no bounds"),
         ("signal = 'l1.force'\nmax = '1 N'\nduring = 'runing'", "'runing' is no condition"),
@@ -315,7 +321,7 @@ fn wrong_requirements_are_refused_with_what_to_write() {
         ("never = 'controller.following_error'", "'controller.following_error' is no occurrence"),
         (
             "when = 'fault.encoder_stuck'\nthen = 'controller.state == safe_stop'\nwithin = '-5 ms'",
-            "within: use a time not below 0",
+            "require.within: require 'it': use a time not below 0",
         ),
         (
             "signal = 'l1.force'\nmax = '1 N'\nduring = { after = 'fault.encoder_stuck', for_s = -1.0 }",
@@ -325,15 +331,23 @@ fn wrong_requirements_are_refused_with_what_to_write() {
         ("expression = '5'\nunit = 'N'\nmax = '1 N'", "write signals in braces"),
         ("expression = '{controller.state}'\nunit = ''\nmax = 1", "controller.state is a state, no number"),
         ("order = ['fault.encoder_stuck']", "give at least two occurrences"),
-        ("expression = '{l1.force} +'\nunit = 'N'\nmax = '1 N'", "expression = '{l1.force} +'"),
-        ("expression = '{l1.force}'\nunit = 'stone'\nmax = '1 N'", "unit = 'stone': the unit is unknown"),
+        (
+            "expression = '{l1.force} +'\nunit = 'N'\nmax = '1 N'",
+            "require.expression: require 'it': '{l1.force} +': ",
+        ),
+        (
+            "expression = '{l1.force}'\nunit = 'stone'\nmax = '1 N'",
+            "require.unit: require 'it': 'stone': the unit is unknown",
+        ),
     ] {
         let text = format!(
             "[[faults]]\nkind = 'encoder_stuck'\naxis = 'l2'\nat_s = 0.0\n[[require]]\nname = 'it'\n{requirement}"
         );
         let scenario = Scenario::parse("s.toml".as_ref(), &text).unwrap();
         let error = check_requirements(&scenario, None).unwrap_err();
-        assert!(error.starts_with("require 'it': ") && error.contains(expected), "{requirement}: {error}");
+        let said = format!("{}: {error}", error.key);
+        assert!(said.contains("require 'it': ") && said.contains(expected), "{requirement}: {said}");
+        assert_eq!(error.entry, Some(0));
     }
 }
 
@@ -343,12 +357,54 @@ fn signals_of_a_controller_are_checked_once_it_has_declared_them() {
     let text = "[[require]]\nname = 'grip'\nsignal = 'signal.grip'\nmax = '3 N'";
     let scenario = Scenario::parse("s.toml".as_ref(), text).unwrap();
     check_requirements(&scenario, None).unwrap();
-    assert!(check_requirements(&scenario, Some(&Declared::default())).unwrap_err().contains("'signal.grip'"));
+    let refusal = check_requirements(&scenario, Some(&Declared::default())).unwrap_err().to_string();
+    assert!(refusal.contains("'signal.grip'"), "{refusal}");
     let signal = Signal { name: "grip".into(), unit: "N".into(), about: String::new() };
     let declared = Declared { signals: vec![signal], parameters: Vec::new() };
     check_requirements(&scenario, Some(&declared)).unwrap();
     let found = Requirements::new(&scenario, &Declared::default()).finish();
     assert_eq!(found[0].result, Untested, "the controller has no such signal");
+}
+
+/// What the controller may yet declare is a name, and nothing else of a requirement.
+#[test]
+fn what_is_wrong_whatever_the_controller_declares_is_refused_before_it_starts() {
+    for (requirement, key) in [
+        ("when = 'controller.running'\nthen = 'signal.foo 5 N'", "require.then"),
+        ("never = 'signal.foo'", "require.never"),
+        ("event = 'parameter.foo'\nat_most = 1", "require.event"),
+        ("expression = '{signal.foo} +'\nunit = 'N'\nmax = '1 N'", "require.expression"),
+        ("signal = 'signals.foo'\nmax = 1", "require.signal"),
+    ] {
+        let text = format!("[[require]]\nname = 'it'\n{requirement}");
+        let scenario = Scenario::parse("s.toml".as_ref(), &text).unwrap();
+        let refusal = check_requirements(&scenario, None).unwrap_err();
+        assert_eq!(refusal.key, key, "{requirement}: {refusal}");
+    }
+}
+
+#[test]
+fn an_expression_is_short_and_flat_and_a_refusal_quotes_little_of_it() {
+    let refusal = |expression: &str| {
+        let text = format!("[[require]]\nname = 'it'\nexpression = '{expression}'\nunit = 'N'\nmax = '1 N'");
+        let scenario = Scenario::parse("s.toml".as_ref(), &text).unwrap();
+        check_requirements(&scenario, None).map_err(|error| error.to_string())
+    };
+    let nested = |levels: usize| format!("{}{{l1.force}}{}", "abs(".repeat(levels), ")".repeat(levels));
+    assert_eq!(refusal(&nested(64)), Ok(()));
+    let sum = |terms: usize| format!("{{l1.force}}{}", " + {l1.force}".repeat(terms));
+    assert_eq!(refusal(&sum(300)), Ok(()));
+    for (expression, limit) in [
+        (nested(65), "65 levels deep: use at most 64"),
+        (nested(10_000), "write at most 4096"),
+        (sum(1000), "write at most 4096"),
+        ("x".repeat(100_000), "write at most 4096"),
+        (format!("{{{}}}", "x".repeat(4000)), "there is no signal"),
+        (format!("{{l1.force}} {}", "§".repeat(2000)), "'{l1.force} §"),
+    ] {
+        let said = refusal(&expression).unwrap_err();
+        assert!(said.contains(limit) && said.chars().count() < 400, "{said}");
+    }
 }
 
 #[test]
@@ -358,6 +414,6 @@ fn what_has_no_end_has_no_occurrence_of_it() {
         let text = format!("{fault}[[require]]\nname = 'it'\nnever = 'fault.it.ended'");
         check_requirements(&Scenario::parse("s.toml".as_ref(), &text).unwrap(), None)
     };
-    assert!(check("plant_kill").unwrap_err().contains("'fault.it.ended' is no occurrence"));
+    assert!(check("plant_kill").unwrap_err().to_string().contains("'fault.it.ended' is no occurrence"));
     assert_eq!(check("plant_stall"), Ok(()));
 }

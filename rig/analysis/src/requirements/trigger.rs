@@ -6,6 +6,7 @@ use masseter_shared::messages::{self, codes::ControllerState};
 use super::condition::Condition;
 use super::moment::Moment;
 use super::occurrence::Occurrence;
+use super::refusal::Reason;
 use crate::events::EventRecord;
 use crate::signals::Values;
 
@@ -55,7 +56,7 @@ impl StateEntry {
 
 impl Trigger {
     /// Reads an occurrence or a condition. `controller.running` and the like are the beginnings of the controller's states.
-    pub(super) fn parse(text: &str, scenario: &Scenario, values: &mut Values) -> Result<Self, String> {
+    pub(super) fn parse(text: &str, scenario: &Scenario, values: &mut Values) -> Result<Self, Reason> {
         let text = text.trim();
         let state = text.strip_prefix("controller.").unwrap_or(text);
         let source = match ControllerState::ALL.iter().find(|known| known.name() == state) {

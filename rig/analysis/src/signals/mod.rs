@@ -14,7 +14,7 @@ mod timeline;
 mod values;
 
 pub use cycle::CycleMessages;
-pub use registry::Registry;
+pub use registry::{Registry, UnknownSignal};
 pub use signal::NamedSignal;
 pub use timeline::{Sample, Timeline};
 pub use values::Values;

@@ -1,12 +1,29 @@
 //! The signals of a run by their names.
 
 use masseter_shared::config::Scenario;
+use masseter_shared::input::excerpt;
 use masseter_shared::named::Declared;
 use masseter_shared::wording::nearest;
 
 use super::catalogue::signals;
 use super::derived::Jaw;
 use super::signal::NamedSignal;
+
+/// There is no signal of that name.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("there is no signal '{}'; masseter signals lists them{question}", excerpt(.name))]
+pub struct UnknownSignal {
+    name: String,
+    /// The most similar name, as a question.
+    question: String,
+}
+
+impl UnknownSignal {
+    /// Whether the controller may declare it: a signal or a parameter of its own.
+    pub fn is_of_controller(&self) -> bool {
+        self.name.starts_with("signal.") || self.name.starts_with("parameter.")
+    }
+}
 
 /// The signals of a run.
 ///
@@ -18,8 +35,9 @@ use super::signal::NamedSignal;
 /// let registry = Registry::new(&Scenario::default(), &Declared::default());
 /// let place = registry.place_of("incisal.error")?;
 /// assert_eq!(registry.signals()[place].unit, "mm");
-/// assert!(registry.place_of("incisal.eror").unwrap_err().ends_with("did you mean 'incisal.error'?"));
-/// # Ok::<(), String>(())
+/// let refusal = registry.place_of("incisal.eror").unwrap_err().to_string();
+/// assert!(refusal.ends_with("did you mean 'incisal.error'?"));
+/// # Ok::<(), masseter_analysis::signals::UnknownSignal>(())
 /// ```
 #[derive(Debug)]
 pub struct Registry {
@@ -42,12 +60,12 @@ impl Registry {
     /// The place of the signal of that name.
     ///
     /// # Errors
-    /// A sentence with the most similar name.
-    pub fn place_of(&self, name: &str) -> Result<usize, String> {
+    /// [`UnknownSignal`] with the most similar name.
+    pub fn place_of(&self, name: &str) -> Result<usize, UnknownSignal> {
         self.signals.iter().position(|signal| signal.name == name).ok_or_else(|| {
             let question = nearest(name, self.signals.iter().map(|signal| signal.name.as_str()))
                 .map_or_else(String::new, |likely| format!("; did you mean '{likely}'?"));
-            format!("there is no signal '{name}'; masseter signals lists them{question}")
+            UnknownSignal { name: name.to_owned(), question }
         })
     }
 

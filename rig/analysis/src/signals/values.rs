@@ -5,7 +5,7 @@ use std::sync::Arc;
 use masseter_shared::messages::codes::ControllerState;
 
 use super::cycle::CycleMessages;
-use super::registry::Registry;
+use super::registry::{Registry, UnknownSignal};
 use super::signal::{NamedSignal, Start};
 
 /// The values of chosen signals, cycle by cycle.
@@ -33,7 +33,7 @@ impl Values {
     ///
     /// # Errors
     /// As [`Registry::place_of`].
-    pub fn choose(&mut self, name: &str) -> Result<usize, String> {
+    pub fn choose(&mut self, name: &str) -> Result<usize, UnknownSignal> {
         let place = self.registry.place_of(name)?;
         Ok(self.chosen.iter().position(|chosen| *chosen == place).unwrap_or_else(|| {
             self.chosen.push(place);

@@ -385,3 +385,20 @@ fn feed_forward_is_accepted_where_every_drive_takes_torque_offsets() {
                 pdos = { rpdo1 = ['6040h', '607Ah', '60B2h'] }";
     assert!(Scenario::parse(Path::new("s.toml"), text).unwrap().validate().is_ok());
 }
+
+/// Work that grows with the square of the entries would take minutes.
+#[test]
+fn ten_thousand_entries_after_each_other_are_checked_at_once() {
+    let fault = |number: usize, after: usize| {
+        format!(
+            "[[faults]]\nkind = 'encoder_stuck'\nname = 'f{number}'\naxis = 'l2'\nat_s = 0.0\nafter = 'fault.f{after}'\n"
+        )
+    };
+    let first = "[[faults]]\nkind = 'encoder_stuck'\nname = 'f0'\naxis = 'l2'\nat_s = 0.0\n";
+    let chain: String = (1..10_000).map(|number| fault(number, number - 1)).collect();
+    let scenario = Scenario::parse(Path::new("s.toml"), &format!("{first}{chain}")).unwrap();
+    scenario.validate().unwrap();
+    let circle = Scenario::parse(Path::new("s.toml"), &format!("{chain}{}", fault(0, 9999))).unwrap();
+    let refusal = circle.validate().unwrap_err().to_string();
+    assert!(refusal.starts_with("faults.after = fault.f1 after fault.f0 after"), "{refusal}");
+}
