@@ -232,7 +232,7 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Man(args) => manuals::manual(&args, command()).usage(),
         Verb::New(verb) => new::new(&verb).usage(),
         Verb::Param(verb) => param::param(&verb).usage(),
-        Verb::Interface(args) => interface::interface(&args).died(),
+        Verb::Interface(args) => interface::interface(&args).usage(),
         Verb::Controller(args) => controller::control(args).usage(),
         Verb::Plant(args) => plant::plant(args).usage(),
         Verb::Recorder(args) => recorder::record(args).usage(),

@@ -16,7 +16,7 @@ use crate::common::{
 use masseter_shared::control::Session;
 use masseter_shared::lifecycle::attach::{self, Hello, socket};
 use masseter_shared::lifecycle::{Report, line};
-use masseter_shared::named::{Declared, Parameter, Signal};
+use masseter_shared::named::{self, Declared, Parameter};
 use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
 use masseter_shared::transport::Domain;
 use rustix::process::{Pid, Signal, kill_process, kill_process_group};
@@ -354,12 +354,12 @@ fn a_program_that_declares_what_cannot_be_shown_is_refused_and_the_next_one_take
     let workspace = Workspace::new(SCENARIO);
     let name = unique("declares");
     let rig = waiting(&workspace, &name);
-    let signal = |name: &str, unit: &str, about: &str| Signal {
+    let signal = |name: &str, unit: &str, about: &str| named::Signal {
         name: name.to_owned(),
         unit: unit.to_owned(),
         about: about.to_owned(),
     };
-    let of = |signals: Vec<Signal>| Declared { signals, parameters: Vec::new() };
+    let of = |signals: Vec<named::Signal>| Declared { signals, parameters: Vec::new() };
     let reversed = Parameter { range: [9.0, 1.0], ..Parameter::new("gain", 5.0) };
     let scheduling = obtain(SchedulingRequest { core: None, fifo_priority: None, locked_memory: false });
     for (declared, limit) in [

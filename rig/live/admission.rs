@@ -6,12 +6,15 @@
 use std::net::IpAddr;
 
 use tungstenite::handshake::server::Request;
+use tungstenite::http::Method;
 use tungstenite::http::header::{HOST, ORIGIN};
 use tungstenite::http::uri::{Authority, Uri};
 
 /// Why a client is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Refusal {
+    #[error("ask with GET: nothing can be sent here")]
+    Method,
     #[error("connect to an IP address or to localhost")]
     Host,
     #[error("only pages of foxglove.dev and of this machine may watch")]
@@ -20,10 +23,12 @@ pub(super) enum Refusal {
     Secret,
 }
 
-/// Checks host, origin and secret of a request.
+/// Checks method, host, origin and secret of a request.
 pub(super) fn admit(request: &Request, secret: &str) -> Result<(), Refusal> {
     let header = |name| request.headers().get(name).map(|value| value.to_str().unwrap_or_default());
-    if !header(HOST).is_some_and(is_address) {
+    if request.method() != Method::GET {
+        Err(Refusal::Method)
+    } else if !header(HOST).is_some_and(is_address) {
         Err(Refusal::Host)
     } else if !header(ORIGIN).is_none_or(is_allowed) {
         Err(Refusal::Origin)
@@ -35,13 +40,15 @@ pub(super) fn admit(request: &Request, secret: &str) -> Result<(), Refusal> {
 }
 
 fn is_address(host: &str) -> bool {
-    host.parse().is_ok_and(|host: Authority| is_local(&host) || ip(&host).is_some())
+    // `user@host` is no host.
+    !host.contains('@') && host.parse().is_ok_and(|host: Authority| is_local(&host) || ip(&host).is_some())
 }
 
 /// Pages have the scheme http or https, or the origin null; other schemes are those of programs.
 fn is_allowed(origin: &str) -> bool {
     if let Some(("http" | "https", authority)) = origin.split_once("://") {
         return origin.parse::<Uri>().is_ok()
+            && !authority.contains('@')
             && authority.parse().is_ok_and(|host: Authority| {
                 is_local(&host) || (origin.starts_with("https:") && is_of_foxglove(&host))
             });
@@ -80,11 +87,31 @@ mod tests {
     }
 
     #[test]
+    fn only_what_asks_is_answered() {
+        let ask = |method: &str| {
+            let request = Request::builder().method(method).uri("/5ec7e7").header(HOST, "127.0.0.1");
+            admit(&request.body(()).unwrap(), "5ec7e7")
+        };
+        assert_eq!(ask("GET"), Ok(()));
+        for method in ["POST", "PUT", "DELETE", "HEAD", "OPTIONS", "CONNECT", "BREW"] {
+            assert_eq!(ask(method), Err(Refusal::Method), "{method}");
+        }
+    }
+
+    #[test]
     fn a_name_is_no_address() {
         for host in ["127.0.0.1", "[::1]:8765", "localhost:8765", "192.168.1.5:9000"] {
             assert_eq!(ask("/5ec7e7", host, None), Ok(()), "{host}");
         }
-        for host in ["", "evil.example:8765", "127.0.0.1.evil.example", "localhost.evil.example", "a b"] {
+        for host in [
+            "",
+            "evil.example:8765",
+            "127.0.0.1.evil.example",
+            "localhost.evil.example",
+            "a b",
+            "user@127.0.0.1",
+            "user:word@localhost:8765",
+        ] {
             assert_eq!(ask("/5ec7e7", host, None), Err(Refusal::Host), "{host}");
         }
     }
@@ -103,6 +130,8 @@ mod tests {
         for origin in [
             "null",
             "",
+            "http://localhost@evil.example",
+            "http://evil@localhost",
             "http://app.foxglove.dev",
             "https://evil.example",
             "https://foxglove.dev.evil.example",

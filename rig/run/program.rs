@@ -154,7 +154,6 @@ impl Program {
         }
         clock::sleep(POLL);
         Readiness::NotYet
-        }
     }
 
     /// Tells a program why the rig does not take it. The user of one that was started by hand may correct it.

@@ -7,6 +7,7 @@
 mod law;
 mod outcome;
 
+use std::borrow::Cow;
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::time::Duration;
 
@@ -307,9 +308,9 @@ pub unsafe extern "C" fn masseter_finish(session: *mut MasseterSession, is_safe_
 pub unsafe extern "C" fn masseter_fail(session: *mut MasseterSession, reason: *const c_char) -> c_int {
     guarded(|| {
         // SAFETY: as this function's.
-        let (session, reason) = unsafe { (owned(session)?, text(reason)?) };
+        let (session, reason) = unsafe { (owned(session)?, lossy(reason)) };
         if let Stage::Started(session) = session.stage {
-            session.fail(reason.unwrap_or("no reason is given"))?;
+            session.fail(&reason)?;
         }
         Ok(OK)
     })
@@ -372,4 +373,31 @@ unsafe fn text<'a>(text: *const c_char) -> Result<Option<&'a str>, Failure> {
     // SAFETY: as this function's.
     let text = unsafe { CStr::from_ptr(text) }.to_str();
     text.map(Some).map_err(|_| Failure::of("a string is not UTF-8"))
+}
+
+/// The reason of an end, which must be reported whatever the bytes are.
+///
+/// # Safety
+/// `text` is null or ends with a zero.
+unsafe fn lossy<'a>(text: *const c_char) -> Cow<'a, str> {
+    if text.is_null() {
+        return "no reason is given".into();
+    }
+    // SAFETY: as this function's.
+    unsafe { CStr::from_ptr(text) }.to_string_lossy()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reason_that_is_no_utf_8_is_a_reason_all_the_same() {
+        for (given, expected) in [(c"over", "over"), (c"\xff over", "\u{fffd} over"), (c"", "")] {
+            // SAFETY: strings of C.
+            assert_eq!(unsafe { lossy(given.as_ptr()) }, expected);
+        }
+        // SAFETY: null is allowed.
+        assert_eq!(unsafe { lossy(std::ptr::null()) }, "no reason is given");
+    }
 }

@@ -194,9 +194,8 @@ impl Domain {
     /// When shared memory cannot be listed.
     pub fn foreign_file(&self) -> Result<Option<PathBuf>, DomainError> {
         let files = self.shared_memory()?;
-        // iceoryx2 may have removed a file since it was listed.
-        let is_foreign =
-            |path: &PathBuf| path.symlink_metadata().is_ok() && runtime::own_file(path).is_none();
+        // Asked once: iceoryx2 may remove an own file at any time, which is then nobody's.
+        let is_foreign = |path: &PathBuf| path.symlink_metadata().is_ok_and(|found| !runtime::is_own(&found));
         Ok(files.into_iter().find(is_foreign))
     }
 
@@ -204,22 +203,14 @@ impl Domain {
     /// can exchange an own file, since the folder is sticky.
     ///
     /// # Errors
-    /// [`DomainError::Foreign`] for a file that is not this user's, or no longer there.
+    /// [`DomainError::Foreign`] for a file that is not this user's, [`DomainError::Gone`] for one that is no longer there.
     pub fn check_mapped(&self) -> Result<(), DomainError> {
         let maps = Path::new("/proc/self/maps");
         let text = fs::read_to_string(maps).map_err(file_error("read", maps))?;
         let prefix = self.prefix().map_err(file_error("read", &self.root))?;
         let prefix = format!("{SHARED_MEMORY}/{prefix}");
-        // 7f00-7f01 rw-s 00000000 00:1a 12345    /dev/shm/masseter_…
-        let is_own = |line: &str, path: &str| {
-            let inode = line.split_whitespace().nth(4).and_then(|inode| inode.parse().ok());
-            runtime::own_file(Path::new(path)).is_some_and(|file| Some(file.ino()) == inode)
-        };
-        let mapped = text.lines().filter_map(|line| Some((line, &line[line.find(&prefix)?..])));
-        match mapped.into_iter().find(|(line, path)| !is_own(line, path)) {
-            Some((_, path)) => Err(DomainError::Foreign { path: path.into() }),
-            None => Ok(()),
-        }
+        let mut mapped = text.lines().filter_map(|line| Some((line, &line[line.find(&prefix)?..])));
+        mapped.try_for_each(|(line, path)| check_mapped(line, path))
     }
 
     /// Asking takes the lock for a moment, which only one may do at a time.
@@ -261,6 +252,18 @@ impl Domain {
 
 fn is_id(id: &str) -> bool {
     (1..=32).contains(&id.len()) && id.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_')
+}
+
+/// Refuses a line of `/proc/self/maps` whose file is not this user's: `7f00-7f01 rw-s 00000000 00:1a 12345 /dev/shm/…`.
+fn check_mapped(line: &str, path: &str) -> Result<(), DomainError> {
+    let inode = line.split_whitespace().nth(4).and_then(|inode| inode.parse().ok());
+    // The kernel marks what has been removed.
+    let (path, is_removed) = path.strip_suffix(" (deleted)").map_or((path, false), |path| (path, true));
+    match fs::symlink_metadata(path) {
+        Ok(found) if runtime::is_own(&found) && Some(found.ino()) == inode && !is_removed => Ok(()),
+        Ok(found) if !runtime::is_own(&found) => Err(DomainError::Foreign { path: path.into() }),
+        _ => Err(DomainError::Gone { path: path.into() }),
+    }
 }
 
 /// The process that locked the file, by its id and name.

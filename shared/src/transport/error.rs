@@ -50,6 +50,14 @@ pub enum DomainError {
         /// The file.
         path: PathBuf,
     },
+    /// This process uses a file that has been removed: nobody knows any more whose it was.
+    #[error(
+        "{path} was removed while the rig started, as when one of its processes is killed: start the rig again"
+    )]
+    Gone {
+        /// The file.
+        path: PathBuf,
+    },
     /// The file system refused.
     #[error("cannot {action} {path}: {error}")]
     File {

@@ -124,7 +124,12 @@ fn is_own_folder_without(rights: u32, path: &Path) -> bool {
 
 /// What the system says of a file of this user; none for a link, another user's file, or one that is gone.
 pub(super) fn own_file(path: &Path) -> Option<Metadata> {
-    fs::symlink_metadata(path).ok().filter(|found| found.is_file() && found.uid() == geteuid().as_raw())
+    fs::symlink_metadata(path).ok().filter(is_own)
+}
+
+/// Whether it is a file of this user, and no link.
+pub(super) fn is_own(found: &Metadata) -> bool {
+    found.is_file() && found.uid() == geteuid().as_raw()
 }
 
 /// Takes the rights of others from a file of this user; leaves other files alone.

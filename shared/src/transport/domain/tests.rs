@@ -64,6 +64,47 @@ fn a_file_of_others_is_found_and_does_no_harm() {
     assert_eq!(fs::metadata(&own).unwrap().mode() & 0o777, 0o600);
 }
 
+/// iceoryx2 removes its own files while others are listed.
+#[test]
+fn a_file_that_vanishes_is_nobody_elses() {
+    let domain = ScratchDomain::claim("test-vanish").unwrap();
+    let own = segment(&domain);
+    let is_over = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            while !is_over.load(Ordering::Relaxed) {
+                fs::write(&own, "").unwrap();
+                fs::remove_file(&own).unwrap();
+            }
+        });
+        let found: Vec<_> = (0..5000).filter_map(|_| domain.foreign_file().unwrap()).collect();
+        is_over.store(true, Ordering::Relaxed);
+        assert_eq!(found, [PathBuf::new(); 0]);
+    });
+}
+
+#[test]
+fn memory_whose_file_is_gone_is_told_from_that_of_another_user() {
+    let folder = std::env::temp_dir().join(unique("mapped").id());
+    fs::create_dir(&folder).unwrap();
+    let (own, link) = (folder.join("own"), folder.join("link"));
+    fs::write(&own, "").unwrap();
+    std::os::unix::fs::symlink("/dev/null", &link).unwrap();
+    let judged = |path: &str, inode: u64| {
+        check_mapped(&format!("7f00-7f01 rw-s 00000000 00:1a {inode}    {path}"), path)
+    };
+    let (path, inode) = (own.to_str().unwrap(), fs::metadata(&own).unwrap().ino());
+    let (same, other) = (judged(path, inode), judged(path, inode + 1));
+    let removed = judged(&format!("{path} (deleted)"), inode);
+    let foreign = judged(link.to_str().unwrap(), inode);
+    fs::remove_dir_all(&folder).unwrap();
+    assert!(same.is_ok(), "{same:?}");
+    for gone in [other, removed, judged(path, inode)] {
+        assert!(matches!(gone, Err(DomainError::Gone { .. })), "{gone:?}");
+    }
+    assert!(matches!(foreign, Err(DomainError::Foreign { .. })), "{foreign:?}");
+}
+
 #[test]
 fn a_claimed_domain_is_alive_refused_to_others_and_not_swept() {
     let domain = unique("claim");
