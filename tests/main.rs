@@ -22,6 +22,7 @@ mod golden;
 mod interrupts;
 mod kinematics;
 mod kinematics_study;
+mod liars;
 mod live;
 mod lockstep;
 mod motion_file;

@@ -106,7 +106,11 @@ impl PoseLaw for Watching {
             about: "Of a test.".into(),
         };
         let scale = Parameter { range: [1.0, 1e4], unit: "mm/m".into(), ..Parameter::new("scale", 1.0) };
-        Declared { signals: vec![signal("height", "mm"), signal("no_number", "")], parameters: vec![scale] }
+        Declared {
+            signals: vec![signal("height", "mm"), signal("no_number", "")],
+            parameters: vec![scale],
+            ..Declared::default()
+        }
     }
 
     fn set_parameter(&mut self, _: usize, value: f64) {

@@ -66,8 +66,8 @@ fn a_table_that_cannot_be_used_is_refused_with_its_line_before_the_start() {
 #[test]
 fn a_motion_too_slow_to_be_played_in_ten_times_its_duration_fails_the_run() {
     for (rate, code, finding) in [
-        (0.0, 1, "the motion came to 0.00 of 0.50 s of its own time in 10 times its duration"),
-        (0.02, 1, "the motion came to 0.02 of 0.50 s of its own time in 10 times its duration"),
+        (0.0, 1, "the scenario's motion was not played: it came to 0.00 of 0.50 s of its own time"),
+        (0.02, 1, "the scenario's motion was not played: it came to 0.02 of 0.50 s of its own time"),
         (0.1, 0, "ended in state finished"),
     ] {
         let workspace = Workspace::new(&format!("duration_s = 1.0\n[parameters]\nmotion_rate = {rate}\n"));

@@ -8,6 +8,7 @@ use masseter_shared::control::{Controller, Outcome, Tick};
 use masseter_shared::geometry::Mechanism;
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::{Command, Event, Reading, State};
+use masseter_shared::named::{Declared, PlayedMotion};
 
 use crate::sequencer::{Estimate, Sequencer};
 
@@ -77,6 +78,11 @@ impl Controller for HoldPosition {
 
     fn outcome(&self) -> Option<Outcome> {
         self.sequencer.outcome()
+    }
+
+    /// The scenario's motion is not played.
+    fn declared(&self) -> Declared {
+        Declared { motion: PlayedMotion::Own, ..Declared::default() }
     }
 }
 

@@ -84,7 +84,7 @@ impl PoseLaw for PoseControl {
                 trim_limit_rad,
             ),
         ];
-        Declared { parameters, signals: Vec::new() }
+        Declared { parameters, ..Declared::default() }
     }
 
     fn set_parameter(&mut self, place: usize, value: f64) {

@@ -106,6 +106,10 @@ int masseter_declare_signal(masseter_session *session, const char *name, const c
 int masseter_declare_parameter(masseter_session *session, const char *name, const char *unit, const char *about,
                                double value, double least, double most);
 
+/* Declares, before masseter_start, that the controller plays a motion of its own, not the scenario's: its desired poses are then
+ * not held against the scenario's, and the scenario must require something of the run. Returns MASSETER_OK or MASSETER_ERROR. */
+int masseter_declare_own_motion(masseter_session *session);
+
 /* The value of a parameter in this cycle, by its place. Not a number before the start, and for another place. */
 double masseter_parameter(const masseter_session *session, int parameter);
 

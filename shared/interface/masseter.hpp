@@ -62,6 +62,9 @@ public:
         return check(masseter_declare_parameter(session_, name.c_str(), unit.c_str(), about.c_str(), value, least, most));
     }
 
+    // The controller plays a motion of its own, not the scenario's. Declared before start.
+    void declare_own_motion() { check(masseter_declare_own_motion(session_)); }
+
     // In a session that start has started; a law finds both in its demand.
     double parameter(int place) const { return masseter_parameter(session_, place); }
     void signal(int place, double value) { check(masseter_set_signal(session_, place, value)); }

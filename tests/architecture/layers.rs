@@ -18,7 +18,7 @@ const MAY_USE: [(&str, &[&str]); 18] = [
     ("rig/table", &[]),
     ("rig/plan", &["shared", "controller", "plant"]),
     ("rig/recording", &["shared"]),
-    ("rig/analysis", &["shared/can", "shared", "rig/recording"]),
+    ("rig/analysis", &["shared/can", "shared", "controller", "rig/recording"]),
     (
         "rig/report",
         &[

@@ -1,6 +1,7 @@
 """Runs from Python: laws, controllers of the drives, what they leave, and what goes wrong."""
 
 import contextlib
+import json
 import os
 import signal
 import subprocess
@@ -145,10 +146,10 @@ def start(command: str, name: str, *arguments: str) -> "subprocess.Popen[str]":
     )
 
 
-def attached(name: str, rig: "subprocess.Popen[str]") -> masseter.Session:
+def attached(name: str, rig: "subprocess.Popen[str]", own_motion: bool = False) -> masseter.Session:
     while True:
         try:
-            return masseter.Session(name)
+            return masseter.Session(name, own_motion=own_motion)
         except masseter.MasseterError:
             assert rig.poll() is None, rig.communicate()
 
@@ -183,7 +184,11 @@ def plant_of(folder: Path) -> int:
 
 
 def session_run(
-    masseter_command: str, folder: Path, work: Callable[[masseter.Session], None], *more: str
+    masseter_command: str,
+    folder: Path,
+    work: Callable[[masseter.Session], None],
+    *more: str,
+    own_motion: bool = False,
 ) -> tuple[int, str]:
     clock = more or ("--clock", "lockstep", "--patience", "1s")
     name = rig_name(folder)
@@ -192,7 +197,7 @@ def session_run(
 
     def control() -> None:
         try:
-            with attached(name, rig) as session:
+            with attached(name, rig, own_motion) as session:
                 work(session)
         except masseter.MasseterError as error:
             said.append(str(error))
@@ -218,6 +223,20 @@ def test_a_controller_of_the_drives_is_recorded(masseter_command: str, tmp_path:
     assert list(run.command["cycle"]) == list(range(1, 201))
     # The drives have booted, without voltage.
     assert np.all(run.reading["position_m"][-1, 3:] > 0.2)
+
+
+@pytest.mark.parametrize(("own_motion", "declared"), [(False, "scenario"), (True, "own")])
+def test_an_own_motion_is_declared_before_the_start(
+    masseter_command: str, tmp_path: Path, own_motion: bool, declared: str
+) -> None:
+    def work(session: masseter.Session) -> None:
+        play(session, lambda number, command: None)
+        session.finish()
+
+    code, said = session_run(masseter_command, tmp_path, work, own_motion=own_motion)
+    manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
+    assert manifest["declared"]["motion"] == declared
+    assert code == 1 and ("own motion of the controller" in said) == own_motion, said
 
 
 #: Changes the command of a cycle, which is counted from the moment that all drives were enabled; says whether it is sent.

@@ -127,7 +127,7 @@ impl Trajectory {
     }
 
     /// The platform in the base frame at a time of the motion, s.
-    pub(crate) fn pose_in_motion(&self, motion_s: f64) -> Pose {
+    pub fn pose_in_motion(&self, motion_s: f64) -> Pose {
         self.frame.platform(&self.motion.displacement(motion_s))
     }
 

@@ -19,13 +19,15 @@ use crate::figures::Figures;
 use crate::freshness::Freshness;
 use crate::named::NamedWatch;
 use crate::outage::OutageWatch;
+use crate::played::PlayedWatch;
 use crate::requirements::Requirements;
 use crate::response::Responses;
 use crate::scenario_stalls::ScenarioStalls;
 use crate::sequence::SequenceCheck;
 use crate::shown::Shown;
 use crate::skips::{Counters, Skips};
-use crate::tracking::{PathSample, PoseSource, Tracking};
+use crate::stop::StopWatch;
+use crate::tracking::{PathSample, PoseSource, Tracking, is_moving};
 
 /// Computes the [`Figures`] of a run from its messages, in their order in the recording.
 ///
@@ -76,7 +78,8 @@ pub struct Analysis {
     plant_skips: Skips,
     outage: OutageWatch,
     final_state: Option<Code<ControllerState>>,
-    motion_reached_s: Option<f64>,
+    stop: StopWatch,
+    played: PlayedWatch,
     bite_force_max_n: Option<f64>,
     contact: ContactWatch,
     /// None where the scenario requires nothing.
@@ -116,7 +119,8 @@ impl Analysis {
             plant_skips: Skips::default(),
             outage: OutageWatch::default(),
             final_state: None,
-            motion_reached_s: None,
+            stop: StopWatch::default(),
+            played: PlayedWatch::new(scenario, declared),
             // The robot has no sensor for this force.
             bite_force_max_n: scenario.has_contact().then_some(0.0),
             contact: ContactWatch::default(),
@@ -173,7 +177,10 @@ impl Analysis {
                 self.shown.iter_mut().for_each(|shown| shown.signals(message));
             }
             Recorded::Parameters(message) => self.named.parameters(message),
-            Recorded::Event(event) => self.event(EventRecord::of_run(event, &self.declared)),
+            Recorded::Event(event) => {
+                self.played.event(event);
+                self.event(EventRecord::of_run(event, &self.declared));
+            }
             Recorded::Machine(machine) => {
                 self.shown.iter_mut().for_each(|shown| shown.longest_cycles.machine(machine));
             }
@@ -208,6 +215,9 @@ impl Analysis {
         self.shown.iter_mut().for_each(|shown| shown.reading(reading, skipped));
         self.axes.iter_mut().for_each(|axes| axes.reading(reading));
         self.outage.reading(reading, is_of_scenario);
+        if self.stop.reading(reading) {
+            self.tracking.stop(reading.cycle);
+        }
         self.first_sample_ns.get_or_insert(reading.sampled_ns);
         self.last_sample_ns = reading.sampled_ns;
     }
@@ -225,9 +235,8 @@ impl Analysis {
         self.tracking.state(state, is_fresh, is_disturbed).into_iter().for_each(|sample| self.path(sample));
         self.cycles = self.cycles.max(state.seq);
         self.final_state = Some(state.controller_state.into());
-        if state.motion_time_s >= 0.0 {
-            let reached_s = self.motion_reached_s.get_or_insert(0.0);
-            *reached_s = reached_s.max(state.motion_time_s);
+        if is_moving(state) {
+            self.played.state(state);
         }
     }
 
@@ -244,6 +253,7 @@ impl Analysis {
 
     fn event(&mut self, event: EventRecord) {
         self.faults.event(&event);
+        self.stop.event(&event);
         if let Some(requirements) = &mut self.requirements {
             requirements.event(&event);
         }
@@ -273,6 +283,9 @@ impl Analysis {
         let missing_frames =
             topics.iter().find(|topic| topic.topic == FrameTap::TOPIC).map_or(0, |topic| topic.missing);
         let (signals, parameters) = self.named.finish();
+        let (stopped_by, enabled_cycles) = self.stop.finish();
+        let (reached_s, motion_departure) = self.played.finish();
+        let enabled_s = enabled_cycles as f64 * self.period_ns as f64 / 1e9;
         let (intervals, worst_cycles, over_time, jaw_cycles) =
             self.shown.map_or_else(Default::default, |shown| {
                 let Shown { intervals, longest_cycles, over_time, jaw_cycles, .. } = *shown;
@@ -289,7 +302,10 @@ impl Analysis {
             plant_skips: self.plant_skips.figures,
             readings: self.freshness.figures,
             final_state: self.final_state,
-            motion_reached_s: self.motion_reached_s,
+            stopped_by,
+            enabled_s,
+            motion_reached_s: reached_s.map(|reached_s| reached_s.min(enabled_s)),
+            motion_departure,
             outage: self.outage.finish(self.period_ns),
             tracking,
             faults: self.faults.finish(),

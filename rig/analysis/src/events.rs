@@ -43,7 +43,11 @@ impl EventRecord {
     pub fn begins_stop(&self) -> bool {
         let is_safe_stop = |[_, to]: &[String; 2]| to == ControllerState::SafeStop.name();
         (self.source == Source::Controller && self.transition.as_ref().is_some_and(is_safe_stop))
-            || (self.source == Source::Master && self.kind == EventKind::Fault)
+            || self.is_fault_of_master()
+    }
+
+    pub(crate) fn is_fault_of_master(&self) -> bool {
+        self.source == Source::Master && self.kind == EventKind::Fault
     }
 }
 

@@ -19,9 +19,11 @@ use crate::measured::IntervalFigures;
 use crate::named::{ParameterFigures, SignalFigures};
 use crate::outage::Outage;
 use crate::over_time::OverTime;
+use crate::played::Departure;
 use crate::requirements::RequirementFigures;
 use crate::sequence::TopicFigures;
 use crate::skips::SkipFigures;
+use crate::stop::StoppedBy;
 use crate::tracking::{Track, TrackingFigures};
 
 /// The figures of a run. As JSON: `figures` of `summary.json`.
@@ -43,8 +45,16 @@ pub struct Figures {
     pub overrun_attribution: Option<OverrunAttribution>,
     /// The last state of the controller's sequence; none without a single state message.
     pub final_state: Option<Code<ControllerState>>,
-    /// The furthest motion time that the controller stated, s; none without one.
+    /// What stopped the drives, whatever the controller reports; none where nothing did.
+    pub stopped_by: Option<StoppedBy>,
+    /// For how long all drives were enabled, s.
+    pub enabled_s: f64,
+    /// How far the motion came, s of its own time: what the controller stated, as far as the drives were enabled so long and
+    /// that time did not jump; none where it stated none.
     pub motion_reached_s: Option<f64>,
+    /// How far the stated desired poses are from the scenario's motion; none where they need not be it: in an own motion,
+    /// with force control, and where the amplitude is set.
+    pub motion_departure: Option<Departure>,
     /// Deadlines missed just before a safe stop; none without one.
     pub outage: Option<Outage>,
     /// Distance of the platform from its desired pose, while the motion played.

@@ -113,7 +113,8 @@ mod tests {
     #[test]
     fn signals_have_extremes_and_mean_and_changes_of_parameters_are_counted() {
         let signals = vec![Signal { name: "a".into(), unit: "mm".into(), about: String::new() }];
-        let declared = Declared { signals, parameters: vec![Parameter::new("gain", 1.0)] };
+        let declared =
+            Declared { signals, parameters: vec![Parameter::new("gain", 1.0)], ..Declared::default() };
         let mut watch = NamedWatch::new(&declared);
         for value in [2.0, f64::NAN, -1.0, 5.0] {
             watch.signals(&Signals { signals: values(&[value]), ..Signals::default() });

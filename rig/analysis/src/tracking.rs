@@ -108,7 +108,9 @@ struct Sample {
     cycle: u64,
     /// Whether the state is the first to use its reading.
     is_fresh: bool,
-    /// Whether the platform had a desired pose, also in the cycle that ended the motion.
+    /// Whether the platform had a desired pose.
+    is_moving: bool,
+    /// The same, also in the cycle that ended the motion.
     is_on_path: bool,
     /// Whether a lost cycle may have acted on the jaw.
     is_disturbed: bool,
@@ -133,6 +135,8 @@ pub(super) struct Tracking {
     /// Time and pose of the truths, by the plant's cycle.
     truths: ByCycle<(u64, Option<Pose>)>,
     was_moving: bool,
+    /// The plant's cycle in which the drives were stopped: no desired pose counts any more.
+    stopped: Option<u64>,
     actual: PoseErrorSums,
     estimated: PoseErrorSums,
     undisturbed_actual: PoseErrorSums,
@@ -154,14 +158,19 @@ impl Tracking {
         Self { source, incisal_m, ..Self::default() }
     }
 
+    /// The drives are stopped at the sample of this cycle of the plant.
+    pub(super) fn stop(&mut self, cycle: u64) {
+        self.stopped.get_or_insert(cycle);
+    }
+
     /// The state of a cycle. In one without a fresh reading, the desired pose is that of the sample that failed to come.
     /// `is_disturbed`: a lost cycle may have acted on the jaw.
     pub(super) fn state(&mut self, state: &State, is_fresh: bool, is_disturbed: bool) -> Option<PathSample> {
-        let is_moving = is_moving(state);
+        let cycle = if is_fresh { state.reading_cycle } else { state.cycle.saturating_sub(1) };
+        let is_moving = is_moving(state) && self.stopped.is_none_or(|stopped| cycle < stopped);
         let is_on_path = is_moving || self.was_moving;
         self.was_moving = is_moving;
-        let cycle = if is_fresh { state.reading_cycle } else { state.cycle.saturating_sub(1) };
-        let sample = Sample { state: *state, cycle, is_fresh, is_on_path, is_disturbed };
+        let sample = Sample { state: *state, cycle, is_fresh, is_moving, is_on_path, is_disturbed };
         if self.source == PoseSource::Estimate {
             let estimated = pose(state.estimated_position_m, state.estimated_quaternion_wxyz);
             return is_fresh.then(|| self.compare(&sample, state.sampled_ns, estimated)).flatten();
@@ -187,7 +196,7 @@ impl Tracking {
 
     /// The deviation from the path, where there is one.
     fn compare(&mut self, sample: &Sample, sampled_ns: u64, actual: Option<Pose>) -> Option<PathSample> {
-        let Sample { state, is_fresh, is_on_path, is_disturbed, .. } = sample;
+        let Sample { state, is_fresh, is_moving, is_on_path, is_disturbed, .. } = sample;
         let desired = pose(state.desired_position_m, state.desired_quaternion_wxyz);
         let error = deviation(desired.as_ref(), actual.as_ref(), self.incisal_m);
         if *is_on_path {
@@ -197,10 +206,11 @@ impl Tracking {
                 self.undisturbed_actual.peak(&error);
             }
         }
-        if is_moving(state) && *is_fresh {
+        if *is_moving && *is_fresh {
             self.solution(sample, sampled_ns, desired, actual, &error);
         }
-        if *is_fresh && (is_moving(state) || state.controller_state == ControllerState::SafeStop.code()) {
+        if *is_fresh && (self::is_moving(state) || state.controller_state == ControllerState::SafeStop.code())
+        {
             let estimated = pose(state.estimated_position_m, state.estimated_quaternion_wxyz);
             self.draw(sampled_ns, [self.desired, estimated, actual]);
         }
@@ -283,7 +293,7 @@ impl Tracking {
     }
 }
 
-fn is_moving(state: &State) -> bool {
+pub(super) fn is_moving(state: &State) -> bool {
     MOVING.iter().any(|moving| moving.code() == state.controller_state)
 }
 

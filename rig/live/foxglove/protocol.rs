@@ -194,7 +194,7 @@ mod tests {
     #[test]
     fn channels_are_advertised_as_recordings_define_them() {
         let signal = Signal { name: "grip".into(), unit: "N".into(), about: String::new() };
-        let declared = Declared { signals: vec![signal], parameters: Vec::new() };
+        let declared = Declared { signals: vec![signal], ..Declared::default() };
         let message: Value = serde_json::from_str(&advertise(&declared)).unwrap();
         assert_eq!(message["op"], "advertise");
         assert!(message.to_string().contains("float64 grip"));

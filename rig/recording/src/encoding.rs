@@ -216,7 +216,7 @@ mod tests {
             about: "What\nit is.".into(),
         };
         let declared =
-            Declared { signals: vec![signal("grip", "N"), signal("count", "")], parameters: Vec::new() };
+            Declared { signals: vec![signal("grip", "N"), signal("count", "")], ..Declared::default() };
         let definitions = definitions(&declared);
         let (_, channel) = definitions.iter().find(|(channel, _)| is_named(*channel)).unwrap();
         let definition = str::from_utf8(&channel.schema.as_ref().unwrap().data).unwrap();

@@ -134,6 +134,11 @@ impl Manifest {
         format!("{known:#}\n")
     }
 
+    /// Whether a program controlled the robot, and none of the rig's controllers.
+    pub fn is_of_program(&self) -> bool {
+        self.controller.as_deref().is_some_and(|name| name != "hold")
+    }
+
     /// Whether the clock was the machine's.
     pub fn is_in_real_time(&self) -> bool {
         self.clock == REAL_TIME

@@ -2,16 +2,19 @@
 //!
 //! What the checks come to is the [verdict](super::verdict)'s.
 
-use masseter_shared::config::{ExpectedVerdict, MotionConfig, StimulusConfig};
+use masseter_shared::config::{ExpectedVerdict, StimulusConfig};
 use masseter_shared::messages::codes::{Cause, ControllerState};
 use masseter_shared::wording::counted;
 
 use crate::check::{Check, CheckFigures, CheckResult};
 use crate::motion_checks::{faults, tracking};
+use crate::shortfall::{Shortfall, was_stopped_by_request, whose_motion};
 use crate::text;
 use crate::timing::{Timing, TimingWord};
 use masseter_analysis::requirements::{RequirementFigures, RequirementResult};
-use masseter_analysis::{BusResponse, EventRecord, Figures, ResponseFigures, SkipFigures, TrackingFigures};
+use masseter_analysis::{
+    BusResponse, EventRecord, Figures, ResponseFigures, SkipFigures, StoppedBy, TrackingFigures,
+};
 use masseter_recording::{Ending, Manifest};
 
 /// None in a run that ended before its first cycle.
@@ -63,23 +66,31 @@ fn kept_time(timing: &Timing, limit: u64) -> Option<Check> {
     Some(Check::new("timing", finding, result))
 }
 
-/// The motion must be played to its end, and not be stopped by request, unless the scenario expects that.
+/// The motion must be played to its end, and not be stopped by request, unless the scenario expects that. The facts of master
+/// and drives come before the controller's state.
 fn sequence(manifest: &Manifest, figures: &Figures) -> Check {
+    const NAME: &str = "sequence";
     let (state, expect) = (figures.final_state, manifest.scenario.expect.as_ref());
-    let was_stopped = figures.events.iter().any(|event| event.cause == Cause::StopRequested);
-    let how = if was_stopped { ", stopped by request before the motion's end" } else { "" };
+    let was_stopped = was_stopped_by_request(figures);
+    let how =
+        match figures.stopped_by.filter(|_| state.is_none_or(|state| state != ControllerState::SafeStop)) {
+            Some(StoppedBy::Master) => ", though the master stopped the drives",
+            Some(StoppedBy::QuickStop) => ", though the drives made a quick stop",
+            None if was_stopped => ", stopped by request before the motion's end",
+            None => "",
+        };
     let in_words = state.map_or_else(|| "none".to_owned(), |state| state.to_string());
     let is_in = |expected| state.is_some_and(|state| state == expected);
     let is_expected = |outcome| expect.is_some_and(|expect| expect.accepts(outcome));
     if is_expected(ExpectedVerdict::Died) || is_expected(ExpectedVerdict::Incomplete) {
-        return Check::not_judged("sequence", format!("ended in state {in_words}{how}"));
+        return Check::not_judged(NAME, format!("ended in state {in_words}{how}"));
     }
-    let has_finished = is_in(ControllerState::Finished);
-    if let Some(finding) = given_up(manifest, figures).filter(|_| has_finished && !was_stopped) {
-        return Check::judged("sequence", finding, false);
+    if let Some(shortfall) = Shortfall::of(manifest, figures) {
+        return Check::new(NAME, shortfall.to_string(), shortfall.result());
     }
-    let (is_good, as_expected) = if is_expected(ExpectedVerdict::SafeStop) && is_in(ControllerState::SafeStop)
-    {
+    let has_finished = is_in(ControllerState::Finished) && figures.stopped_by.is_none();
+    let has_stopped = is_in(ControllerState::SafeStop) || figures.stopped_by.is_some();
+    let (is_good, as_expected) = if is_expected(ExpectedVerdict::SafeStop) && has_stopped {
         (true, ", as expected")
     } else if is_expected(ExpectedVerdict::Interrupted) {
         (was_stopped && has_finished, ", as expected")
@@ -87,20 +98,8 @@ fn sequence(manifest: &Manifest, figures: &Figures) -> Check {
         (has_finished && !was_stopped, "")
     };
     let as_expected = if is_good { as_expected } else { "" };
-    Check::judged("sequence", format!("ended in state {in_words}{how}{as_expected}"), is_good)
-}
-
-/// The finding on a motion that did not come to its end: the rig's motion controller gives up what passes too slowly. A
-/// program of the user may have a motion time of its own.
-fn given_up(manifest: &Manifest, figures: &Figures) -> Option<String> {
-    let (end_s, reached_s) = (manifest.motion_end_s?, figures.motion_reached_s?);
-    let is_given_up = manifest.controller.is_none() && reached_s < 0.99 * end_s;
-    let times = MotionConfig::MOST_DURATIONS;
-    is_given_up.then(|| {
-        format!(
-            "the motion came to {reached_s:.2} of {end_s:.2} s of its own time in {times} times its duration"
-        )
-    })
+    let whose = whose_motion(manifest);
+    Check::judged(NAME, format!("ended in state {in_words}{how}{as_expected}{whose}"), is_good)
 }
 
 /// The name of the check of the stimuli.

@@ -3,6 +3,7 @@
 use askama::Template;
 use masseter_analysis::Figures;
 use masseter_recording::Manifest;
+use masseter_shared::named::PlayedMotion;
 use masseter_terminal::Exit;
 
 use crate::check::{Check, CheckFigures, CheckResult};
@@ -130,7 +131,10 @@ fn of_check(check: &Check, is_short: bool) -> CaseResult {
 /// The document of a run.
 pub(crate) fn xml(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> askama::Result<String> {
     let name = format!("masseter.{}", manifest.scenario.name);
-    let properties = vec![("function", verdict.word.to_owned()), ("timing", verdict.timing.to_string())];
+    let mut properties = vec![("function", verdict.word.to_owned()), ("timing", verdict.timing.to_string())];
+    if manifest.declared.motion == PlayedMotion::Own {
+        properties.push(("motion", "own".to_owned()));
+    }
     let run = JunitRun::new(&name, Ok(verdict), verdict.exit_code != Exit::Passed, figures.duration_s);
     let timestamp = Some(manifest.began.trim_end_matches('Z'));
     let run = JunitRun { class: "masseter.run".to_owned(), properties, timestamp, ..run };

@@ -19,6 +19,7 @@ mod outcome;
 mod page;
 mod pressure;
 mod run_report;
+mod shortfall;
 mod summary;
 mod table;
 mod text;

@@ -114,7 +114,10 @@ fn analyse(
     manifest: &Manifest,
 ) -> Result<(Figures, Result<(), WriteError>), AnalysisError> {
     let mut reader = Reader::open(&folder.recording())?;
-    let mut analysis = Analysis::new(&manifest.scenario, &manifest.declared);
+    // The files that it named may have changed since.
+    let mut scenario = manifest.scenario.clone();
+    scenario.files_mut().for_each(|(name, file)| *file = folder.file(&name));
+    let mut analysis = Analysis::new(&scenario, &manifest.declared);
     manifest.process_faults.iter().for_each(|fault| analysis.process_fault(fault));
     let mut logs = Ok(CandumpLogs::new(folder.path(), &manifest.scenario.can.interfaces));
     while let Some(message) = reader.next_message()? {

@@ -6,6 +6,7 @@ use masseter_shared::config::MotionConfig;
 use masseter_shared::messages::codes::{Cause, EventKind};
 
 use crate::full_speed;
+use crate::shortfall::whose_motion;
 use crate::text::{decimals, event_with_cycle, microseconds, or_dash};
 use crate::verdict::Verdict;
 use masseter_analysis::{
@@ -74,8 +75,9 @@ fn write_verdict(
     }
     writeln!(
         text,
-        "{}: {:.1} s of motion at {} Hz ({} clock), {} in {:.1} s of cycle time, seed {}, digest {}",
+        "{}{}: {:.1} s of motion at {} Hz ({} clock), {} in {:.1} s of cycle time, seed {}, digest {}",
         scenario.name,
+        whose_motion(manifest),
         manifest.motion_s,
         scenario.rate_hz,
         manifest.clock,

@@ -2,12 +2,12 @@
 //!
 //! [`Timing`] is judged apart. Lost cycles matter here only where they leave nothing to judge the function by.
 
-use masseter_analysis::{EventRecord, Figures, Outage};
+use masseter_analysis::{EventRecord, Figures, Outage, StoppedBy};
 use masseter_recording::{DmaLatency, Ending, Manifest, RunUsage};
 use masseter_shared::config::{
     CanConfig, ChecksConfig, ExpectConfig, ExpectedVerdict, Scenario, TimingConfig,
 };
-use masseter_shared::messages::codes::{Cause, EventKind};
+use masseter_shared::messages::codes::{Cause, EventKind, Source};
 use masseter_shared::wording::counted;
 use masseter_terminal::Exit;
 use serde::Serialize;
@@ -16,6 +16,7 @@ use crate::check::{Check, CheckResult};
 use crate::checks::{STIMULI, checks};
 use crate::motion_checks::{FAULTS, left_its_path};
 use crate::outcome::Outcome;
+use crate::shortfall::Shortfall;
 use crate::text::{self, grouped};
 use crate::timing::{Timing, TimingWord};
 
@@ -59,7 +60,7 @@ impl Verdict {
         let excuse = excuse(&manifest.ending, &timing, figures.outage);
         let is_too_late = left_its_path(&figures.tracking.actual, &manifest.scenario.checks)
             || checks.iter().any(|check| is_of_faults(check) && check.result == CheckResult::Failed);
-        let (mut outcome, mut reason) = ending(&manifest.ending, &figures.events)
+        let (mut outcome, mut reason) = ending(&manifest.ending, figures.stopped_by, &figures.events)
             .or_else(|| stopped_by_stimulus(&manifest.scenario, &figures.events))
             // The machine caused the stop, or it came only after the jaw had left its path.
             .filter(|(outcome, _)| !(*outcome == Outcome::SafeStop && (excuse.is_some() || is_too_late)))
@@ -70,6 +71,7 @@ impl Verdict {
             })
             .or_else(|| {
                 failed(&checks)
+                    .map(|failure| with_shortfall(failure, manifest, figures))
                     .map(|failure| clock_jump(&manifest.usage, &manifest.scenario.can).unwrap_or(failure))
             })
             .or_else(|| untested(&checks, figures.cycles))
@@ -118,10 +120,11 @@ fn overload(usage: &RunUsage, rate_hz: u32) -> Option<String> {
 
 type OutcomeReason = (Outcome, String);
 
-fn ending(ending: &Ending, events: &[EventRecord]) -> Option<OutcomeReason> {
+/// What master and drives show comes before what the controller reports.
+fn ending(ending: &Ending, stopped_by: Option<StoppedBy>, events: &[EventRecord]) -> Option<OutcomeReason> {
     match ending {
-        Ending::Completed => None,
-        Ending::SafeStop => Some((Outcome::SafeStop, stopped(events))),
+        Ending::Completed => stopped_by.map(|by| (Outcome::SafeStop, stopped(Stopper::Drives(by), events))),
+        Ending::SafeStop => Some((Outcome::SafeStop, stopped(Stopper::Controller, events))),
         Ending::Died { process, how } => Some((Outcome::Died, format!("the {process} died: {how}"))),
         Ending::Interrupted => Some((Outcome::Interrupted, "stopped by the user".to_owned())),
         Ending::NotStarted => Some((Outcome::Invalid, "real time was required and refused".to_owned())),
@@ -140,11 +143,30 @@ fn stopped_by_stimulus(scenario: &Scenario, events: &[EventRecord]) -> Option<Ou
     Some((Outcome::Interrupted, format!("stopped by stimulus {number} of the scenario")))
 }
 
-/// The first fault explains the stop: the controller's own event often names only the master.
-fn stopped(events: &[EventRecord]) -> String {
-    let first = events.iter().find(|event| event.kind == EventKind::Fault);
+/// Who says that the rig was stopped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stopper {
+    /// The controller reports it.
+    Controller,
+    /// Master or drives show it, and the controller reports another end.
+    Drives(StoppedBy),
+}
+
+/// The first fault explains the stop: the controller's own event often names only the master. A controller that reports
+/// another end explains nothing.
+fn stopped(stopper: Stopper, events: &[EventRecord]) -> String {
+    let is_heard = |event: &&EventRecord| {
+        event.kind == EventKind::Fault
+            && (stopper == Stopper::Controller || event.source != Source::Controller)
+    };
+    let first = events.iter().find(is_heard);
     let why = first.map_or_else(String::new, |fault| format!("; first fault: {}", text::event(fault)));
-    format!("the controller stopped the rig{why}")
+    let who = match stopper {
+        Stopper::Controller => "the controller stopped the rig",
+        Stopper::Drives(StoppedBy::Master) => "the master stopped the drives",
+        Stopper::Drives(StoppedBy::QuickStop) => "the drives made a quick stop",
+    };
+    format!("{who}{why}")
 }
 
 fn incomplete(figures: &Figures) -> Option<OutcomeReason> {
@@ -233,6 +255,12 @@ fn excuse(ending: &Ending, timing: &Timing, outage: Option<Outage>) -> Option<St
     })
 }
 
+/// A failure with what is short of the motion, which the names of checks do not say.
+fn with_shortfall((outcome, reason): OutcomeReason, manifest: &Manifest, figures: &Figures) -> OutcomeReason {
+    let short = Shortfall::of(manifest, figures).map(|short| format!("; {short}"));
+    (outcome, reason + &short.unwrap_or_default())
+}
+
 fn failed(checks: &[Check]) -> Option<OutcomeReason> {
     named(checks, CheckResult::Failed).map(|names| (Outcome::Failed, format!("{FAILED}{names}")))
 }
@@ -318,7 +346,6 @@ mod tests {
     mod figures;
 
     use masseter_shared::messages::Event;
-    use masseter_shared::messages::codes::Source;
 
     use super::*;
     use masseter_recording::Usage;
@@ -333,14 +360,34 @@ mod tests {
             event(Source::Controller, EventKind::Fault, Cause::MasterFault),
         ];
         let (outcome, reason) =
-            ending(&Ending::SafeStop, &events.map(|event| EventRecord::from(&event))).unwrap();
+            ending(&Ending::SafeStop, None, &events.map(|event| EventRecord::from(&event))).unwrap();
         assert_eq!(outcome, Outcome::SafeStop);
         assert_eq!(
             reason,
             "the controller stopped the rig; first fault: master: process_data_lost \
              (axis d1 (node 1 on bus 0): process data missing for 4 cycles)"
         );
-        assert_eq!(ending(&Ending::SafeStop, &[]).unwrap().1, "the controller stopped the rig");
+        assert_eq!(ending(&Ending::SafeStop, None, &[]).unwrap().1, "the controller stopped the rig");
+    }
+
+    #[test]
+    fn what_master_and_drives_show_comes_before_what_the_controller_reports() {
+        let fault = |source, cause| EventRecord::from(&Event::new(source, EventKind::Fault, cause));
+        let events = [fault(Source::Controller, Cause::LawFailed), fault(Source::Master, Cause::BadMessage)];
+        let shown = |stopped_by| ending(&Ending::Completed, stopped_by, &events);
+        assert_eq!(shown(None), None);
+        let stopped = |reason: &str| Some((Outcome::SafeStop, reason.to_owned()));
+        assert_eq!(
+            shown(Some(StoppedBy::Master)),
+            stopped("the master stopped the drives; first fault: master: bad_message (value 0, limit 0)")
+        );
+        assert_eq!(
+            ending(&Ending::Completed, Some(StoppedBy::QuickStop), &events[..1]),
+            stopped("the drives made a quick stop")
+        );
+        // The end of a process comes before both.
+        let died = Ending::died("plant", "signal 9".to_owned());
+        assert_eq!(ending(&died, Some(StoppedBy::Master), &events).unwrap().0, Outcome::Died);
     }
 
     #[test]

@@ -16,7 +16,7 @@ use masseter_shared::control::{Outcome, Session, Tick, Waited};
 use masseter_shared::lifecycle::ProcessContext;
 use masseter_shared::lifecycle::attach::attach;
 use masseter_shared::messages::{Command, Event, Reading, State};
-use masseter_shared::named::{Declared, Parameter, Signal};
+use masseter_shared::named::{Declared, Parameter, PlayedMotion, Signal};
 
 use law::{CLaw, LawFunction};
 use outcome::{Failure, OK, SAFE_STOP, TIMED_OUT, guarded};
@@ -164,6 +164,22 @@ pub unsafe extern "C" fn masseter_declare_parameter(
         session.ok_or(NULL)?.declare(|declared| {
             declared.parameters.push(Parameter { name, unit, about, value, range: [least, most] });
             declared.parameters.len()
+        })
+    })
+}
+
+/// Declares that the controller plays a motion of its own, not the scenario's.
+///
+/// # Safety
+/// `session` is null or from [`masseter_attach`].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn masseter_declare_own_motion(session: *mut MasseterSession) -> c_int {
+    guarded(|| {
+        // SAFETY: as this function's.
+        let session = unsafe { session.as_mut() }.ok_or(NULL)?;
+        session.declare(|declared| {
+            declared.motion = PlayedMotion::Own;
+            1
         })
     })
 }

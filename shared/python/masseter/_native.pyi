@@ -58,7 +58,7 @@ class Demand:
 
 class Session:
     def __new__(
-        cls, rig: str | None, signals: list[_Signal], parameters: list[_Parameter]
+        cls, rig: str | None, signals: list[_Signal], parameters: list[_Parameter], has_own_motion: bool
     ) -> Session: ...
     def start(self) -> None: ...
     @property

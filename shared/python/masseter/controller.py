@@ -86,7 +86,8 @@ class Session:
                 session.publish(command, state)
             session.finish()
 
-    An exception within the block ends the run with its message.
+    An exception within the block ends the run with its message. The desired poses of the state are those of the scenario's
+    motion; own_motion declares that they are those of another one.
     """
 
     def __init__(
@@ -94,8 +95,10 @@ class Session:
         rig: str | None = None,
         signals: Sequence[Signal] = (),
         parameters: Sequence[Parameter] = (),
+        *,
+        own_motion: bool = False,
     ) -> None:
-        self._native = _native.Session(rig, _signals(signals), _parameters(parameters))
+        self._native = _native.Session(rig, _signals(signals), _parameters(parameters), own_motion)
         self._is_over = False
         self._parameters = [parameter.name for parameter in parameters]
         #: The signals that go out with each command; a value stays until it is replaced.

@@ -187,6 +187,7 @@ pub(crate) fn declared(
     let declared = Declared {
         signals: signals.into_iter().map(signal).collect(),
         parameters: parameters.into_iter().map(parameter).collect(),
+        ..Declared::default()
     };
     declared.check().map_err(failed)?;
     Ok(declared)

@@ -7,7 +7,7 @@ use masseter_shared::control::{self, Outcome, Tick, Waited};
 use masseter_shared::lifecycle::ProcessContext;
 use masseter_shared::lifecycle::attach::attach;
 use masseter_shared::messages::{Command, Event, Message, State};
-use masseter_shared::named::Declared;
+use masseter_shared::named::{Declared, PlayedMotion};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -40,8 +40,10 @@ impl Session {
         rig: Option<&str>,
         signals: Vec<SignalOfPython>,
         parameters: Vec<ParameterOfPython>,
+        has_own_motion: bool,
     ) -> PyResult<Self> {
-        let declared = declared(signals, parameters)?;
+        let motion = if has_own_motion { PlayedMotion::Own } else { PlayedMotion::Scenario };
+        let declared = Declared { motion, ..declared(signals, parameters)? };
         let context = attach(rig).map_err(failed)?;
         Ok(Self { stage: Some(Stage::Attached(Box::new(context), declared)) })
     }

@@ -182,7 +182,7 @@ mod tests {
 
     fn declared() -> Declared {
         let gain = Parameter { range: [0.0, 9.0], ..Parameter::new("gain", 1.0) };
-        Declared { parameters: vec![gain], signals: Vec::new() }
+        Declared { parameters: vec![gain], ..Declared::default() }
     }
 
     #[test]

@@ -237,7 +237,7 @@ mod tests {
         let domain = ScratchDomain::claim("parameters").unwrap();
         assert!(matches!(list(&domain), Err(AccessError::NoParameters(_))));
         let gain = Parameter { range: [0.0, 9.0], ..Parameter::new("gain", 1.0) };
-        let declared = Declared { parameters: vec![gain], signals: Vec::new() };
+        let declared = Declared { parameters: vec![gain], ..Declared::default() };
         let mut named = NamedValues::new(declared, &BTreeMap::new()).unwrap();
         serve(&domain, Arc::clone(named.settings())).unwrap();
         let value =

@@ -69,7 +69,18 @@ impl Parameter {
     }
 }
 
-/// The signals and parameters of a controller, each in the order of its values.
+/// Which motion a controller plays.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PlayedMotion {
+    /// The scenario's: its desired poses are held against those of the scenario.
+    #[default]
+    Scenario,
+    /// One of its own, of which the rig knows nothing: the scenario must require something of the run.
+    Own,
+}
+
+/// What a controller declares: its signals and parameters, each in the order of its values, and which motion it plays.
 ///
 /// ```
 /// use masseter_shared::named::{Declared, Parameter, Signal};
@@ -77,6 +88,7 @@ impl Parameter {
 /// let declared = Declared {
 ///     signals: vec![Signal { name: "trim".into(), unit: "mm".into(), about: "Length of the correction.".into() }],
 ///     parameters: vec![Parameter { range: [0.0, 10.0], ..Parameter::new("gain", 3.0) }],
+///     ..Declared::default()
 /// };
 /// assert_eq!(declared.check(), Ok(()));
 /// assert_eq!(
@@ -91,6 +103,8 @@ pub struct Declared {
     pub signals: Vec<Signal>,
     /// The parameters.
     pub parameters: Vec<Parameter>,
+    /// The motion.
+    pub motion: PlayedMotion,
 }
 
 /// Why a name or a value is refused.
@@ -272,7 +286,7 @@ mod tests {
     fn with_signals(names: &[&str]) -> Declared {
         let signal =
             |name: &&str| Signal { name: (*name).to_owned(), unit: String::new(), about: String::new() };
-        Declared { signals: names.iter().map(signal).collect(), parameters: Vec::new() }
+        Declared { signals: names.iter().map(signal).collect(), ..Declared::default() }
     }
 
     #[test]

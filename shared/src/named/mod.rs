@@ -7,5 +7,5 @@ pub mod access;
 mod declaration;
 mod values;
 
-pub use declaration::{Declared, NameError, Parameter, Signal};
+pub use declaration::{Declared, NameError, Parameter, PlayedMotion, Signal};
 pub use values::{Change, NamedValues, Settings};

@@ -147,7 +147,7 @@ mod tests {
     #[test]
     fn a_cycle_takes_one_change_over() {
         let parameters = ["a", "b"].map(|name| Parameter { range: [0.0, 9.0], ..Parameter::new(name, 1.0) });
-        let declared = Declared { parameters: parameters.to_vec(), signals: Vec::new() };
+        let declared = Declared { parameters: parameters.to_vec(), ..Declared::default() };
         let mut named = NamedValues::new(declared, &BTreeMap::new()).unwrap();
         assert_eq!(named.take_changed_parameters().unwrap().as_slice(), [1.0, 1.0]);
         assert_eq!((named.take_change(), named.take_changed_parameters()), (None, None));

@@ -37,7 +37,7 @@ impl PoseLaw for IntegralLaw {
         let gain = Parameter { unit: "1/s".into(), range: [0.0, 100.0], ..Parameter::new("gain", 5.0) };
         let about = "Length of the correction.".into();
         let trim = Signal { name: "trim".into(), unit: "mm".into(), about };
-        Declared { signals: vec![trim], parameters: vec![gain] }
+        Declared { signals: vec![trim], parameters: vec![gain], ..Declared::default() }
     }
 
     fn set_parameter(&mut self, _place: usize, value: f64) {

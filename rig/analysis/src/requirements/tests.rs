@@ -360,7 +360,7 @@ fn signals_of_a_controller_are_checked_once_it_has_declared_them() {
     let refusal = check_requirements(&scenario, Some(&Declared::default())).unwrap_err().to_string();
     assert!(refusal.contains("'signal.grip'"), "{refusal}");
     let signal = Signal { name: "grip".into(), unit: "N".into(), about: String::new() };
-    let declared = Declared { signals: vec![signal], parameters: Vec::new() };
+    let declared = Declared { signals: vec![signal], ..Declared::default() };
     check_requirements(&scenario, Some(&declared)).unwrap();
     let found = Requirements::new(&scenario, &Declared::default()).finish();
     assert_eq!(found[0].result, Untested, "the controller has no such signal");

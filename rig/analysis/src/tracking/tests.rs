@@ -165,3 +165,18 @@ fn after_a_safe_stop_the_track_goes_on_beside_the_last_desired_pose() {
     assert_eq!((last.sampled_ns, last.actual.translation.x), (60 * SAMPLE_NS, 0.06));
     assert!((last.desired.translation.x - 0.02).abs() < 1e-12, "the sample that ended the motion");
 }
+
+#[test]
+fn once_the_drives_are_stopped_no_desired_pose_counts_whatever_the_controller_reports() {
+    let mut tracking = Tracking::new(PoseSource::Truth, [0.0; 3]);
+    for cycle in 1..=60 {
+        if cycle == 20 {
+            tracking.stop(cycle);
+        }
+        tracking.state(&state(cycle, cycle as f64 * 1e-3), true, false);
+        // The jaw stands from then on.
+        tracking.truth(&truth(cycle, cycle.min(20) as f64 * 1e-3));
+    }
+    let (figures, _) = tracking.finish();
+    assert_eq!((figures.samples, figures.actual.max_mm), (19, Some(0.0)));
+}

@@ -146,7 +146,7 @@ fn each_thing_that_is_wrong_has_its_verdict() {
                 run.figures.motion_reached_s = Some(8.8);
             },
             Exit::Failed,
-            "failed: sequence",
+            "failed: sequence; the scenario's motion was not played: it came to 8.80 of 9.00 s of its own time",
         ),
         (
             |run| run.figures.final_state = Some(Code::Known(ControllerState::Disabling)),

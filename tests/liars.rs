@@ -1,0 +1,335 @@
+//! Controllers of the drives that report what did not happen. The facts decide: the scenario's motion, the true jaw, master and
+//! drives. Each plays in lockstep, and honest ones pass.
+
+use std::os::unix::net::UnixStream;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use masseter_controller::kinematics::ForwardTracker;
+use masseter_controller::trajectory::Trajectory;
+use masseter_shared::control::{Outcome, Session, Waited};
+use masseter_shared::geometry::{AXES, Actuators, Mechanism, Pose};
+use masseter_shared::lifecycle::attach::{self, socket};
+use masseter_shared::messages::codes::{ControllerState, DriveRequest, DriveState, drive_state};
+use masseter_shared::messages::{Command, Reading, State, pose_fields};
+use masseter_shared::named::{Declared, PlayedMotion};
+use masseter_shared::transport::Domain;
+use serde_json::Value;
+
+use crate::common::{Workspace, stderr, stdout, wait_until};
+
+const PERIOD_S: f64 = 1e-3;
+/// A command is reached so many cycles after its sample.
+const LEAD_S: f64 = 2.0 * PERIOD_S;
+/// Cycles of the move to the first pose.
+const EASE_CYCLES: u32 = 500;
+
+/// A cycle of the motion.
+struct Moment<'a> {
+    motion: &'a Trajectory,
+    mechanism: &'a Mechanism,
+    /// Since the motion began, s.
+    at_s: f64,
+    estimated: Pose,
+}
+
+impl Moment<'_> {
+    fn targets(&self, asked: &Pose) -> [f64; AXES] {
+        self.mechanism.inverse(asked).unwrap().actuators.to_axes()
+    }
+
+    /// Plays the scenario's motion, and says so.
+    fn honest(&self) -> Answer {
+        Answer {
+            target_m: self.targets(&self.motion.pose(self.at_s + LEAD_S)),
+            request: DriveRequest::Enable,
+            desired: self.motion.pose(self.at_s),
+            motion_time_s: self.motion.motion_time_s(self.at_s),
+        }
+    }
+
+    /// Asks for this pose, and says that the one found is the desired one.
+    fn dishonest(&self, asked: &Pose) -> Answer {
+        Answer { target_m: self.targets(asked), desired: self.estimated, ..self.honest() }
+    }
+
+    fn first(&self) -> Pose {
+        self.motion.pose(0.0)
+    }
+
+    /// A share of the motion's way.
+    fn scaled(&self, share: f64) -> Pose {
+        self.first().lerp_slerp(&self.motion.pose(self.at_s + LEAD_S), share)
+    }
+
+    /// The incisal point goes up and down by 2 mm, beside the scenario's motion.
+    fn own(&self, at_s: f64) -> Pose {
+        let mut pose = self.first();
+        let wave = 1.0 - (2.0 * std::f64::consts::PI * at_s).cos();
+        pose.translation.z -= 1e-3 * wave * (at_s / 0.2).min(1.0);
+        pose
+    }
+}
+
+/// What a controller commands and reports in a cycle.
+struct Answer {
+    target_m: [f64; AXES],
+    request: DriveRequest,
+    desired: Pose,
+    motion_time_s: f64,
+}
+
+/// The answer to a moment of the motion; none once the motion is over.
+type Play = fn(&Moment) -> Option<Answer>;
+
+fn until(end_s: f64, moment: &Moment, answer: Answer) -> Option<Answer> {
+    (moment.at_s < end_s).then_some(answer)
+}
+
+/// A controller that enables the drives, eases to the first pose, plays, switches off, and says that it has finished.
+struct Player {
+    mechanism: Mechanism,
+    motion: Trajectory,
+    tracker: ForwardTracker,
+    play: Play,
+    state: ControllerState,
+    cycles_in_state: u32,
+    start_m: [f64; AXES],
+}
+
+impl Player {
+    fn answer(&mut self, reading: &Reading, command: &mut Command, state: &mut State) {
+        let estimated = self.tracker.update(&Actuators::from_axes(reading.position_m)).unwrap().pose;
+        let moment = Moment {
+            motion: &self.motion,
+            mechanism: &self.mechanism,
+            at_s: f64::from(self.cycles_in_state) * PERIOD_S,
+            estimated,
+        };
+        let first_m = moment.targets(&moment.first());
+        let idle = |target_m, request| Answer { target_m, request, desired: estimated, motion_time_s: -1.0 };
+        let share = f64::from(self.cycles_in_state) / f64::from(EASE_CYCLES);
+        let smooth = share.powi(3) * (10.0 - 15.0 * share + 6.0 * share * share);
+        let eased_m: [f64; AXES] =
+            std::array::from_fn(|axis| self.start_m[axis] + smooth * (first_m[axis] - self.start_m[axis]));
+        let answer = match self.state {
+            ControllerState::Easing => Some(idle(eased_m, DriveRequest::Enable)),
+            ControllerState::Running => (self.play)(&moment),
+            ControllerState::Enabling => {
+                self.start_m = reading.position_m;
+                Some(idle(self.start_m, DriveRequest::Enable))
+            }
+            _ => Some(idle(reading.position_m, DriveRequest::Off)),
+        };
+        let is_over = answer.is_none();
+        let answer = answer.unwrap_or_else(|| idle(reading.position_m, DriveRequest::Off));
+        (command.target_m, command.request) = (answer.target_m, answer.request.code());
+        (state.desired_position_m, state.desired_quaternion_wxyz) = pose_fields(&answer.desired);
+        (state.estimated_position_m, state.estimated_quaternion_wxyz) = pose_fields(&estimated);
+        state.motion_time_s = answer.motion_time_s;
+        self.follow(reading, is_over);
+    }
+
+    fn follow(&mut self, reading: &Reading, is_over: bool) {
+        let is_in = |state: DriveState| reading.drive_state.iter().all(|code| *code == state.code());
+        let is_off =
+            |code: &u32| drive_state(*code).is_ok_and(|state| state.is_some_and(|state| !state.is_powered()));
+        let next = match self.state {
+            ControllerState::Enabling if is_in(DriveState::OperationEnabled) => ControllerState::Easing,
+            ControllerState::Easing if self.cycles_in_state == EASE_CYCLES => ControllerState::Running,
+            ControllerState::Running if is_over => ControllerState::Disabling,
+            ControllerState::Disabling if reading.drive_state.iter().all(is_off) => ControllerState::Finished,
+            _ => {
+                self.cycles_in_state += 1;
+                return;
+            }
+        };
+        (self.state, self.cycles_in_state) = (next, 0);
+    }
+
+    /// Plays its part in a run of this rig.
+    fn run(rig: &str, motion: PlayedMotion, play: Play) {
+        let declared = Declared { motion, ..Declared::default() };
+        let mut session = Session::start(attach::attach(Some(rig)).unwrap(), declared).unwrap();
+        let scenario = session.context().scenario.clone();
+        let mechanism = Mechanism::new(&scenario.mechanism).unwrap();
+        let motion =
+            Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s).unwrap();
+        let mut player = Self {
+            tracker: ForwardTracker::new(mechanism.clone()),
+            mechanism,
+            motion,
+            play,
+            state: ControllerState::Enabling,
+            cycles_in_state: 0,
+            start_m: [0.0; AXES],
+        };
+        while player.state != ControllerState::Finished {
+            let Waited::Cycle { tick, reading } = session.wait(None).unwrap() else { continue };
+            let code = player.state.code();
+            let mut command = Command { cycle: tick.cycle, controller_state: code, ..Command::default() };
+            let mut state = State { cycle: tick.cycle, controller_state: code, ..State::default() };
+            if let Some(reading) = reading.filter(|reading| reading.fresh_axes == (1 << AXES) - 1) {
+                (command.reading_cycle, state.reading_cycle) = (reading.cycle, reading.cycle);
+                state.sampled_ns = reading.sampled_ns;
+                player.answer(&reading, &mut command, &mut state);
+                (command.controller_state, state.controller_state) =
+                    (player.state.code(), player.state.code());
+            }
+            session.publish(&command, &state).unwrap();
+        }
+        session.finish(Outcome::Finished).unwrap();
+    }
+}
+
+/// The verdict on a run, which its exit code repeats, with what the documents say.
+struct Judged {
+    word: String,
+    reason: String,
+    sequence: String,
+    documents: [String; 3],
+}
+
+fn judge(scenario: &str, motion: PlayedMotion, play: Play) -> Judged {
+    static NUMBER: AtomicU32 = AtomicU32::new(0);
+    let workspace = Workspace::new(&format!("duration_s = 1.5\n{scenario}"));
+    let name = format!("liar-{}-{}", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed));
+    let rig = workspace.start_lockstep(&["--controller", "external", "--name", &name]);
+    let socket = socket(&Domain::named(&name).unwrap());
+    wait_until("the rig waits", || UnixStream::connect(&socket).is_ok());
+    Player::run(&name, motion, play);
+    let output = rig.wait_with_output().unwrap();
+    let summary = workspace.summary();
+    let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+    let verdict = &summary["verdict"];
+    assert_eq!(output.status.code(), verdict["exit_code"].as_i64().map(|code| code as i32));
+    let checks = verdict["checks"].as_array().unwrap();
+    let sequence = checks.iter().find(|check| check["name"] == "sequence").unwrap();
+    let document = |name: &str| std::fs::read_to_string(workspace.run_folder().join(name)).unwrap();
+    Judged {
+        word: text(&verdict["word"]),
+        reason: text(&verdict["reason"]),
+        sequence: text(&sequence["finding"]),
+        documents: [stdout(&output) + &stderr(&output), document("report.html"), document("junit.xml")],
+    }
+}
+
+#[test]
+fn who_plays_the_scenarios_motion_passes() {
+    let judged = judge("", PlayedMotion::Scenario, |moment| until(1.6, moment, moment.honest()));
+    assert_eq!((judged.word.as_str(), judged.sequence.as_str()), ("PASS", "ended in state finished"));
+}
+
+#[test]
+fn a_motion_that_was_not_played_is_no_pass_whatever_the_controller_reports() {
+    let other = "the desired pose is up to ";
+    let early = "it came to ";
+    let cases: [(&str, Play, &str); 8] = [
+        ("holds still for a moment", |m| until(0.2, m, m.dishonest(&m.first())), other),
+        ("holds still for as long", |m| until(1.6, m, m.dishonest(&m.first())), other),
+        (
+            "holds still in a motion without time",
+            |m| until(1.6, m, Answer { motion_time_s: 0.0, ..m.dishonest(&m.first()) }),
+            early,
+        ),
+        (
+            "holds still, and says that it is at the end",
+            |m| {
+                let (end_s, closed) = (m.motion.motion_time_s(9.0), m.motion.pose(9.0));
+                let answer = Answer { motion_time_s: end_s, desired: closed, ..m.dishonest(&m.first()) };
+                until(1.6, m, answer)
+            },
+            early,
+        ),
+        ("moves a little", |m| until(1.6, m, m.dishonest(&m.scaled(0.01))), other),
+        ("moves half the way", |m| until(1.6, m, m.dishonest(&m.scaled(0.5))), other),
+        (
+            "moves otherwise",
+            |m| until(1.6, m, Answer { desired: m.own(m.at_s), ..m.dishonest(&m.own(m.at_s + LEAD_S)) }),
+            other,
+        ),
+        ("plays half of the motion", |m| until(0.75, m, m.honest()), early),
+    ];
+    for (liar, play, why) in cases {
+        let judged = judge("", PlayedMotion::Scenario, play);
+        let wanted = format!("the scenario's motion was not played: {why}");
+        assert_eq!(judged.word, "FAIL", "{liar}: {}", judged.reason);
+        assert!(
+            judged.reason.contains(&wanted) && judged.sequence.contains(&wanted),
+            "{liar}: {}",
+            judged.reason
+        );
+        for document in judged.documents {
+            assert!(document.contains("s motion was not played"), "{liar}: {document}");
+        }
+    }
+}
+
+#[test]
+fn a_desired_pose_that_the_jaw_never_takes_fails() {
+    let judged = judge("", PlayedMotion::Scenario, |moment| {
+        until(1.6, moment, Answer { target_m: moment.targets(&moment.first()), ..moment.honest() })
+    });
+    assert_eq!(
+        (judged.word.as_str(), judged.reason.as_str()),
+        ("FAIL", "failed: tracking, estimated tracking")
+    );
+}
+
+/// At 0.5 s of the motion.
+fn spoilt(moment: &Moment, spoil: fn(&mut Answer)) -> Option<Answer> {
+    let mut answer = moment.honest();
+    if (0.5..0.5 + PERIOD_S / 2.0).contains(&moment.at_s) {
+        spoil(&mut answer);
+    }
+    until(1.6, moment, answer)
+}
+
+#[test]
+fn a_stop_of_master_or_drives_is_one_whatever_the_controller_reports() {
+    let cases: [(Play, &str); 4] = [
+        (
+            |m| spoilt(m, |answer| answer.target_m[2] = f64::NAN),
+            "the master stopped the drives; first fault: master d3: bad_message",
+        ),
+        (
+            |m| spoilt(m, |answer| answer.target_m[3] *= 1e3),
+            "the master stopped the drives; first fault: master l1: stroke_limit",
+        ),
+        (
+            |m| spoilt(m, |answer| answer.target_m.swap(0, 3)),
+            "the master stopped the drives; first fault: master d1: stroke_limit",
+        ),
+        (|m| spoilt(m, |answer| answer.request = DriveRequest::QuickStop), "the drives made a quick stop"),
+    ];
+    for (play, reason) in cases {
+        let judged = judge("", PlayedMotion::Scenario, play);
+        assert_eq!(judged.word, "SAFE STOP", "{}", judged.reason);
+        assert!(judged.reason.starts_with(reason), "{}", judged.reason);
+        for document in judged.documents {
+            assert!(document.contains(reason), "{reason}: {document}");
+        }
+        let expected = judge("expect.verdict = 'safe_stop'\n", PlayedMotion::Scenario, play);
+        assert_eq!(expected.word, "PASS", "{}", expected.reason);
+        assert!(expected.reason.starts_with("SAFE STOP, as expected: "), "{}", expected.reason);
+    }
+}
+
+#[test]
+fn an_own_motion_is_declared_lasts_as_long_as_the_scenario_says_and_something_is_required_of_it() {
+    let required = "[[require]]\nname = 'opens'\nsignal = 'incisal.z'\nduring = 'running'\nmax = '1 m'\n";
+    let cases: [(&str, f64, &str, &str); 3] = [
+        (required, 1.6, "PASS", "ended in state finished, own motion of the controller"),
+        ("", 1.6, "UNTESTED", "nothing judged the motion, whose desired poses need not be the scenario's: "),
+        (required, 0.4, "FAIL", "the controller's own motion ended early: the drives were enabled for "),
+    ];
+    for (scenario, end_s, word, finding) in cases {
+        let play: Play = if end_s > 1.0 {
+            |m| until(1.6, m, Answer { desired: m.own(m.at_s), ..m.dishonest(&m.own(m.at_s + LEAD_S)) })
+        } else {
+            |m| until(0.4, m, Answer { desired: m.own(m.at_s), ..m.dishonest(&m.own(m.at_s + LEAD_S)) })
+        };
+        let judged = judge(scenario, PlayedMotion::Own, play);
+        assert_eq!(judged.word, word, "{}", judged.reason);
+        assert!(judged.sequence.starts_with(finding), "{}", judged.sequence);
+    }
+}
