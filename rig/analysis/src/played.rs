@@ -137,13 +137,16 @@ mod tests {
     /// How far a motion with these cycles and times came, s.
     fn reached_s(times: &[(u64, f64)]) -> Option<f64> {
         let (mut watch, motion) = watch(&Declared::default());
-        times.iter().for_each(|(cycle, time_s)| watch.state(&state(&motion, *cycle, *time_s)));
+        for (cycle, time_s) in times {
+            watch.state(&state(&motion, *cycle, *time_s));
+        }
         watch.finish().0
     }
 
     #[test]
     fn the_motions_time_passes_no_faster_than_the_cycles() {
-        let cases: [(&[(u64, f64)], Option<f64>); 7] = [
+        type Case = (&'static [(u64, f64)], Option<f64>);
+        let cases: [Case; 7] = [
             (&[], None),
             (&[(1, -1.0), (2, f64::NAN)], None),
             (&[(7, 0.0), (8, 0.001), (9, 0.002)], Some(0.002)),
@@ -184,7 +187,9 @@ mod tests {
         {
             let (mut watch, motion) = watch(declared);
             watch.state(&state(&motion, 1, 0.0));
-            event.iter().for_each(|event| watch.event(event));
+            if let Some(event) = event {
+                watch.event(&event);
+            }
             watch.state(&State { cycle: 2, motion_time_s: 0.001, ..State::default() });
             let departure = watch.finish().1;
             assert_eq!(departure.is_some_and(|departure| departure.incisal_mm.is_infinite()), is_compared);

@@ -100,6 +100,15 @@ const SAMPLE_NS: u64 = SECOND_NS / 60;
 /// Most samples of the track: of more than half a minute every second, fourth … sample stays.
 const MOST_SAMPLES: usize = 2048;
 
+/// Whether the platform has a desired pose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum OnPath {
+    Moving,
+    /// Only because this cycle ended the motion.
+    End,
+    Off,
+}
+
 /// The state of a cycle, and its sample.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
@@ -108,10 +117,7 @@ struct Sample {
     cycle: u64,
     /// Whether the state is the first to use its reading.
     is_fresh: bool,
-    /// Whether the platform had a desired pose.
-    is_moving: bool,
-    /// The same, also in the cycle that ended the motion.
-    is_on_path: bool,
+    on_path: OnPath,
     /// Whether a lost cycle may have acted on the jaw.
     is_disturbed: bool,
 }
@@ -168,9 +174,12 @@ impl Tracking {
     pub(super) fn state(&mut self, state: &State, is_fresh: bool, is_disturbed: bool) -> Option<PathSample> {
         let cycle = if is_fresh { state.reading_cycle } else { state.cycle.saturating_sub(1) };
         let is_moving = is_moving(state) && self.stopped.is_none_or(|stopped| cycle < stopped);
-        let is_on_path = is_moving || self.was_moving;
-        self.was_moving = is_moving;
-        let sample = Sample { state: *state, cycle, is_fresh, is_moving, is_on_path, is_disturbed };
+        let on_path = match std::mem::replace(&mut self.was_moving, is_moving) {
+            _ if is_moving => OnPath::Moving,
+            true => OnPath::End,
+            false => OnPath::Off,
+        };
+        let sample = Sample { state: *state, cycle, is_fresh, on_path, is_disturbed };
         if self.source == PoseSource::Estimate {
             let estimated = pose(state.estimated_position_m, state.estimated_quaternion_wxyz);
             return is_fresh.then(|| self.compare(&sample, state.sampled_ns, estimated)).flatten();
@@ -196,21 +205,21 @@ impl Tracking {
 
     /// The deviation from the path, where there is one.
     fn compare(&mut self, sample: &Sample, sampled_ns: u64, actual: Option<Pose>) -> Option<PathSample> {
-        let Sample { state, is_fresh, is_moving, is_on_path, is_disturbed, .. } = sample;
+        let Sample { state, is_fresh, on_path, is_disturbed, .. } = sample;
+        let is_on_path = *on_path != OnPath::Off;
         let desired = pose(state.desired_position_m, state.desired_quaternion_wxyz);
         let error = deviation(desired.as_ref(), actual.as_ref(), self.incisal_m);
-        if *is_on_path {
+        if is_on_path {
             self.desired = desired;
             self.actual.peak(&error);
             if !is_disturbed {
                 self.undisturbed_actual.peak(&error);
             }
         }
-        if *is_moving && *is_fresh {
+        if *on_path == OnPath::Moving && *is_fresh {
             self.solution(sample, sampled_ns, desired, actual, &error);
         }
-        if *is_fresh && (self::is_moving(state) || state.controller_state == ControllerState::SafeStop.code())
-        {
+        if *is_fresh && (is_moving(state) || state.controller_state == ControllerState::SafeStop.code()) {
             let estimated = pose(state.estimated_position_m, state.estimated_quaternion_wxyz);
             self.draw(sampled_ns, [self.desired, estimated, actual]);
         }
