@@ -362,7 +362,7 @@ fn a_program_that_declares_what_cannot_be_shown_is_refused_and_the_next_one_take
         unit: unit.to_owned(),
         about: about.to_owned(),
     };
-    let of = |signals: Vec<named::Signal>| Declared { signals, parameters: Vec::new() };
+    let of = |signals: Vec<named::Signal>| Declared { signals, ..Declared::default() };
     let reversed = Parameter { range: [9.0, 1.0], ..Parameter::new("gain", 5.0) };
     let scheduling = obtain(SchedulingRequest { core: None, fifo_priority: None, locked_memory: false });
     for (declared, limit) in [
@@ -372,7 +372,7 @@ fn a_program_that_declares_what_cannot_be_shown_is_refused_and_the_next_one_take
         (of(vec![signal("a", "m\nfloat64 evil", "")]), "printable characters"),
         (of(vec![signal("a", "", "\u{1b}]0;evil\u{7}")]), "printable characters"),
         (of(vec![signal("a", "", &"x".repeat(100_000))]), "at most 65536 bytes"),
-        (Declared { parameters: vec![reversed], signals: Vec::new() }, "range of parameter 'gain'"),
+        (Declared { parameters: vec![reversed], ..Declared::default() }, "range of parameter 'gain'"),
     ] {
         let report = Report::Ready { scheduling: scheduling.clone(), declared };
         let answers = answer_to(&name, line(&report).trim_end());

@@ -74,7 +74,9 @@ pub(crate) fn serve(args: &ServeArgs) -> anyhow::Result<Exit> {
             accept_from_ns = now_ns + ACCEPT_INTERVAL_NS;
             let Look { asking, out } = newcomers.look(now_ns, |bytes| bytes.contains(&b'>'));
             clients.extend(asking.into_iter().map(|conversation| Client::new(conversation, now_ns)));
-            out.into_iter().for_each(|left| count(&left.into(), &mut refusals));
+            for left in out {
+                count(&left.into(), &mut refusals);
+            }
         }
         serve_clients(&mut clients, &mut link, now_ns, &stderr, &mut refusals);
         make_room(&mut clients, &mut link, &mut refusals);

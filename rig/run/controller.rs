@@ -18,7 +18,7 @@ use crate::arguments::{ControllerChoice, name_of};
 /// The controller of a run.
 pub(super) enum Controller {
     Own(Process),
-    Program(Program),
+    Program(Box<Program>),
     /// The run lasts as long as the motion, from its start.
     None {
         motion_ns: u64,
@@ -40,10 +40,10 @@ impl Controller {
                 let kind = ["--kind".into(), name_of(kind).into()];
                 Self::Own(Process::spawn(CONTROLLER, &[arguments, kind.to_vec()].concat())?)
             }
-            ControllerChoice::External => Self::Program(Program::external(domain, invitation)?),
+            ControllerChoice::External => Self::Program(Box::new(Program::external(domain, invitation)?)),
             ControllerChoice::None => Self::None { motion_ns: (motion_s * 1e9) as u64, ends_ns: u64::MAX },
             ControllerChoice::Executable(path) => {
-                Self::Program(Program::executable(domain, invitation, path)?)
+                Self::Program(Box::new(Program::executable(domain, invitation, path)?))
             }
         })
     }

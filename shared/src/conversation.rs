@@ -475,12 +475,12 @@ mod tests {
         let (mut peer, mut conversation) = conversation();
         let mut sent = 0;
         while conversation.left(1000).is_none() {
-            conversation.say(&[7; 65_536]);
+            conversation.say(&vec![7; 65_536]);
             sent += 65_536;
             assert!(sent < 8 * MOST_WAITING);
         }
         assert!(matches!(conversation.left(1000), Some(Left::Unread(_))));
-        let mut first = [0; 65_536];
+        let mut first = vec![0; 65_536];
         peer.read_exact(&mut first).unwrap();
         assert!(first.iter().all(|byte| *byte == 7));
     }

@@ -493,7 +493,8 @@ impl Scenario {
 
 /// The JSON pointer to the value of keys within each other.
 fn pointer<const N: usize>(keys: [&str; N]) -> String {
-    keys.iter().filter(|key| !key.is_empty()).map(|key| format!("/{}", key.replace('.', "/"))).collect()
+    let steps = keys.iter().filter(|key| !key.is_empty()).flat_map(|key| key.split('.'));
+    steps.flat_map(|step| ["/", step]).collect()
 }
 
 fn table_of(text: &str) -> Table {

@@ -109,7 +109,9 @@ impl Report {
                 if refusals.len() > MOST_REFUSALS {
                     return Err(ReportError::Refusals(refusals.len()));
                 }
-                refusals.iter_mut().for_each(|refusal| *refusal = sentence(refusal));
+                for refusal in refusals {
+                    *refusal = sentence(refusal);
+                }
             }
             Self::Silence(Silence { silent_s, .. }) if !(0.0..=LONGEST_SILENCE_S).contains(silent_s) => {
                 return Err(ReportError::Silence(*silent_s));

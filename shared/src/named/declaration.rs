@@ -338,7 +338,7 @@ mod tests {
                 unit: "mm".to_owned(),
                 about: "x".repeat(about - 5),
             };
-            Declared { signals: (0..64).map(signal).collect(), parameters: Vec::new() }
+            Declared { signals: (0..64).map(signal).collect(), ..Declared::default() }
         };
         assert_eq!(of(1024).check(), Ok(()));
         assert_eq!(of(1025).check(), Err(NameError::TooLong(65_600)));
