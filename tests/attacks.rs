@@ -7,11 +7,12 @@ use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::common::{
     MASSETER, Workspace, child_of, masseter, stderr, stdout, wait_until, wait_until_it_records,
 };
+use masseter_shared::clock;
 use masseter_shared::lifecycle::attach::socket;
 use masseter_shared::named::access;
 use masseter_shared::transport::Domain;
@@ -54,7 +55,7 @@ impl Attack {
                 let _ = peer.read(&mut [0; 4096]);
             }
             Self::Flood => {
-                let _ = peer.write_all(&[b'x'; 65_536]);
+                let _ = peer.write_all(&b"x".repeat(65_536));
             }
         }
     }
@@ -67,10 +68,10 @@ struct Attackers {
 }
 
 impl Attackers {
-    fn of(attack: Attack, path: PathBuf) -> Self {
+    fn of(attack: Attack, path: &Path) -> Self {
         let is_over = Arc::new(AtomicBool::new(false));
         let threads = (0..3).map(|_| {
-            let (is_over, path) = (Arc::clone(&is_over), path.clone());
+            let (is_over, path) = (Arc::clone(&is_over), path.to_owned());
             thread::spawn(move || {
                 let mut held = Vec::new();
                 while !is_over.load(Ordering::Relaxed) {
@@ -108,12 +109,12 @@ fn ended(attack: Option<Attack>, name: &str, end: impl Fn(&Child)) -> (Option<i3
     let workspace = Workspace::new("");
     let name = format!("{name}-{}", std::process::id());
     let (rig, mut controller, path) = running(&workspace, &name);
-    let attackers = attack.map(|attack| Attackers::of(attack, path));
+    let attackers = attack.map(|attack| Attackers::of(attack, &path));
     thread::sleep(Duration::from_millis(300));
-    let began = Instant::now();
+    let began_ns = clock::now_ns();
     end(&rig);
     let output = rig.wait_with_output().unwrap();
-    let taken = began.elapsed();
+    let taken = Duration::from_nanos(clock::now_ns() - began_ns);
     drop(attackers);
     controller.wait().unwrap();
     (output.status.code(), taken, stdout(&output) + &stderr(&output))
@@ -136,7 +137,7 @@ fn an_interrupt_ends_the_run_under_every_attack_as_without_one() {
 #[test]
 fn the_death_of_the_plant_ends_the_run_under_an_attack() {
     let (code, taken, said) = ended(Some(Attack::Drip), "bereft", |rig| {
-        kill_process(child_of(rig, "plant"), Signal::KILL).unwrap()
+        kill_process(child_of(rig, "plant"), Signal::KILL).unwrap();
     });
     assert_eq!(code, Some(4), "{said}");
     assert!(taken < MOST_MORE, "{taken:?}");

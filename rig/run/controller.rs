@@ -17,7 +17,7 @@ use crate::arguments::{ControllerChoice, name_of};
 
 /// The controller of a run.
 pub(super) enum Controller {
-    Own(Process),
+    Own(Box<Process>),
     Program(Box<Program>),
     /// The run lasts as long as the motion, from its start.
     None {
@@ -38,7 +38,7 @@ impl Controller {
         Ok(match choice {
             ControllerChoice::Own(kind) => {
                 let kind = ["--kind".into(), name_of(kind).into()];
-                Self::Own(Process::spawn(CONTROLLER, &[arguments, kind.to_vec()].concat())?)
+                Self::Own(Box::new(Process::spawn(CONTROLLER, &[arguments, kind.to_vec()].concat())?))
             }
             ControllerChoice::External => Self::Program(Box::new(Program::external(domain, invitation)?)),
             ControllerChoice::None => Self::None { motion_ns: (motion_s * 1e9) as u64, ends_ns: u64::MAX },
