@@ -141,7 +141,7 @@ fn the_death_of_the_plant_ends_the_run_under_an_attack() {
     });
     assert_eq!(code, Some(4), "{said}");
     assert!(taken < MOST_MORE, "{taken:?}");
-    assert!(said.contains("the plant ended (SIGKILL (9))"), "{said}");
+    assert!(said.contains("the plant died: SIGKILL (9)"), "{said}");
 }
 
 #[test]

@@ -18,10 +18,10 @@ fn is_beyond(fault: &Value) -> bool {
     mm > tracking_max_mm || deg > tracking_max_deg
 }
 
-/// Also where the legs move fastest, 3.25 s after switch-on.
+/// Also where the legs move fastest, 3.3 s after switch-on.
 #[test]
 fn a_drive_that_misses_its_targets_is_detected_before_the_jaw_is_far_from_its_path() {
-    for from_s in [2.5, 3.25] {
+    for from_s in [2.551, 3.301] {
         let workspace = Workspace::new(&deaf_drive(from_s, 80));
         let output = workspace.run_virtual(&[]);
         assert_eq!(output.status.code(), Some(5), "{}", stdout(&output));
@@ -39,7 +39,7 @@ fn lax(limit_m: f64) -> Workspace {
         "[can]\nfollowing_limit_m = 1.0\n[controller]\ntracking_limit_m = {limit_m}\ntracking_limit_rad = 1.0\n\
          tracking_rms_limit_m = 1.0\ntracking_rms_limit_rad = 1.0"
     );
-    Workspace::new(&(deaf_drive(2.5, 80) + &limits))
+    Workspace::new(&(deaf_drive(2.551, 80) + &limits))
 }
 
 #[test]
@@ -75,7 +75,7 @@ fn a_safe_stop_that_comes_too_late_fails_the_run() {
 /// The drive interpolates to its next target, as after a late SYNC.
 #[test]
 fn a_single_lost_target_leads_nowhere_and_passes() {
-    let workspace = Workspace::new(&deaf_drive(3.23, 1));
+    let workspace = Workspace::new(&deaf_drive(3.281, 1));
     let output = workspace.run_virtual(&[]);
     assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
     let fault = &workspace.summary()["figures"]["faults"][0];

@@ -3,7 +3,7 @@
 use std::fmt::{self, Display, Formatter};
 
 use masseter_can::canopen::ObjectAddress;
-use masseter_plant::bringup::{Line, LineError, Survey, object_name, value_text};
+use masseter_plant::bringup::{Line, LineError, SdoReason, Survey, object_name, value_text};
 use masseter_plant::wanted::WantedDrive;
 use masseter_shared::config::CanConfig;
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
@@ -158,11 +158,13 @@ impl Known {
     /// What a survey tells of a drive; nothing without all answers.
     pub(crate) fn of_survey(survey: Option<&Survey>, node: u8) -> Self {
         let Some(survey) = survey.filter(|survey| !survey.fell_silent()) else { return Self::NotAsked };
-        let entry = |object| {
-            Ok::<_, std::convert::Infallible>(survey.number(object).map_or(Entry::Absent, Entry::Told))
+        // Only a refusal says that the drive has no such entry.
+        let entry = |object| match (survey.number(object), survey.refusal(object)) {
+            (Some(number), _) => Ok(Entry::Told(number)),
+            (None, Some(SdoReason::Aborted(_))) => Ok(Entry::Absent),
+            (None, _) => Err(()),
         };
-        let Ok(identity) = Identity::of(node, entry);
-        Self::Is(identity)
+        Identity::of(node, entry).map_or(Self::NotAsked, Self::Is)
     }
 
     /// The identity, if it is known.

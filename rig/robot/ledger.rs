@@ -4,8 +4,8 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::ensure;
-use masseter_plant::bringup::{Ledger, Line, OldValue, give_back, object_name, value_text};
+use anyhow::{anyhow, ensure};
+use masseter_plant::bringup::{Ledger, Line, LineError, OldValue, give_back, object_name, value_text};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::{CanConfig, ObjectKey, Scenario};
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
@@ -29,7 +29,8 @@ struct Owed {
     values: Vec<OldValue>,
 }
 
-/// What to do about a damaged file. The drive itself returns to its old values when it restarts: no step stores reduced ones.
+/// What to do about a damaged file, and about one whose values the drive does not keep. The drive itself returns to its
+/// old values when it restarts: no step stores reduced ones.
 const REMEDY: &str =
     "remove it, and switch the drive's supply off and on, which brings its stored values back";
 
@@ -64,7 +65,14 @@ impl Owed {
     fn return_to(self, folder: &Path, line: &mut Line, axis: usize) -> anyhow::Result<()> {
         let (Self { drive, values }, name) = (self, AXIS_NAMES[axis]);
         line.keep_old_values_in(Box::new(Files::new(folder, [drive; AXES])));
-        let refused = give_back(line, axis, &values)?;
+        let refused = give_back(line, axis, &values).map_err(|error| match error {
+            // The value stays owed, and every later try may end in the same way.
+            LineError::NotKept { .. } => {
+                let path = file(folder, axis);
+                anyhow!("{error}; {} keeps this old value: mend the drive, or {REMEDY}", path.display())
+            }
+            error => error.into(),
+        })?;
         status!("{name}: a step was killed; the drive has its old values again:");
         for old in values {
             let OldValue { object: ObjectKey(object), value, .. } = old;
@@ -193,6 +201,15 @@ mod tests {
             assert!(refusal.contains("the file is damaged: remove it"), "{refusal}");
             assert_eq!(owed_axes(folder.path()), [L1]);
         }
+    }
+
+    #[test]
+    fn a_value_that_does_not_return_stays_owed_and_the_refusal_names_the_file() {
+        let liar = "[[drives.quirk]]\naxes = ['l1']\nkind = 'shows'\nobjects = ['6081h']\nvalue = 5";
+        let (folder, scenario, mut line) = robot(liar, VELOCITY);
+        let refusal = settle(folder.path(), &scenario, &mut line, false).unwrap_err().error.to_string();
+        assert!(refusal.contains("shows 5; ") && refusal.contains("borrowed-l1.json keeps"), "{refusal}");
+        assert_eq!(owed_axes(folder.path()), [L1]);
     }
 
     #[test]

@@ -133,7 +133,8 @@ impl Program {
                 _ if is_cancelled() => return Ok(None),
                 // The user may correct it and start it again.
                 Readiness::Closed if self.executable.is_none() => {
-                    status!("the controller ended before it was ready; waiting for the next");
+                    self.reception
+                        .count("it ended before it was ready; the rig waits for the next".to_owned());
                     self.admitted = None;
                 }
                 Readiness::Closed => bail!("the controller ended before it was ready; see its message above"),
@@ -163,7 +164,7 @@ impl Program {
         self.admitted = None;
         match &self.executable {
             Some(Executable { path, .. }) => bail!("the controller {} is refused: {refusal}", path.display()),
-            None => status!("masseter: the controller is refused: {refusal}; waiting for the next"),
+            None => self.reception.count(format!("{refusal}; the rig waits for the next")),
         }
         Ok(())
     }
@@ -249,8 +250,13 @@ impl Program {
         let Some(Admitted { reports, exit_by_ns, .. }) = &mut self.admitted else { return Ok(None) };
         // The reports come before the end of the line.
         let left = reports.left().map(without_report);
-        if let Some(end) = reports.end() {
-            return Ok(Some(end));
+        let end = reports.end();
+        if left.is_some() || matches!(end, Some(End::Failed { .. })) {
+            // Whoever has failed or broken a limit commands the drives no longer.
+            reports.close();
+        }
+        if end.is_some() {
+            return Ok(end);
         }
         let Some(left) = left else { return Ok(None) };
         let now_ns = clock::now_ns();

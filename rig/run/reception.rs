@@ -45,6 +45,11 @@ impl Reception {
         Ok(Self { rig, newcomers, invitation, refusals })
     }
 
+    /// Counts a program that was admitted and is out before the start.
+    pub(super) fn count(&mut self, reason: String) {
+        self.refusals.count(reason);
+    }
+
     /// The rig's name.
     pub(super) fn rig(&self) -> &str {
         &self.rig
@@ -86,6 +91,7 @@ impl Reception {
             ));
         }
         match controller {
+            Some(0) => refused("the rig has its controller: stop that one, or start another rig".to_owned()),
             Some(process_id) => refused(format!(
                 "the rig has its controller, process {process_id}: stop that one, or start another rig"
             )),

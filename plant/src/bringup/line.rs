@@ -18,7 +18,7 @@ use super::ledger::{Ledger, OldValue};
 use super::line_error::{LineError, SdoReason};
 use super::traffic::Traffic;
 use crate::error::PlantError;
-use crate::wanted::shown_bits;
+use crate::wanted::{WantedObject, shown_bits};
 
 /// Silence of a server after which a request is repeated, and how often that is done.
 const TIMEOUT_NS: u64 = 500 * MILLISECOND_NS;
@@ -29,6 +29,9 @@ const ATTEMPTS: u32 = 3;
 const SCAN_NS: u64 = 10 * MILLISECOND_NS;
 /// Longest time for which an answer to SYNC is waited for, ns.
 const SYNC_NS: u64 = 20 * MILLISECOND_NS;
+/// Time that a drive has to show a value that it acknowledged, ns, and the pause between two readings.
+const SHOWN_WITHIN_NS: u64 = 100 * MILLISECOND_NS;
+const READ_AGAIN_NS: u64 = 5 * MILLISECOND_NS;
 /// Bytes of the longest value that is read: no text of an identity is longer.
 const LONGEST_VALUE: usize = 256;
 
@@ -161,8 +164,9 @@ impl Line {
         Ok(value.iter().rfold(0, |number, &byte| number << 8 | u32::from(byte)))
     }
 
-    /// Writes the lowest bytes of a value to an object, and reads it back: a write is believed when the drive shows it. What
-    /// does not show itself is for the caller to prove. The controlword has [its own function](Self::control).
+    /// Writes the lowest bytes of a value to an object, and reads it back: a write is believed when the drive shows it,
+    /// which may take a moment. What does not show itself is for the caller to prove. The controlword has
+    /// [its own function](Self::control).
     ///
     /// # Errors
     /// [`LineError`].
@@ -179,14 +183,22 @@ impl Line {
         assert!(object.index != 0x6040, "controlwords go through control");
         self.download(axis, object, value, bytes)?;
         let Some(bits) = shown_bits(object, value, bytes) else { return Ok(()) };
-        let found = match self.read_number(axis, object) {
-            Err(error) if error.abort_code().is_some() => None,
-            read => Some(read?),
-        };
-        if found.is_some_and(|found| (found ^ value) & bits == 0) {
-            return Ok(());
+        let until_ns = self.now_ns() + SHOWN_WITHIN_NS;
+        loop {
+            let found = match self.read_number(axis, object) {
+                Ok(found) if (found ^ value) & bits == 0 => return Ok(()),
+                Ok(found) => Some(found),
+                Err(error) => match error.abort_code() {
+                    Some(code) if WantedObject::is_write_only(code) => return Ok(()),
+                    Some(_) => None,
+                    None => return Err(error),
+                },
+            };
+            if found.is_none() || self.now_ns() >= until_ns {
+                return Err(LineError::NotKept { axis, object, written: value, found });
+            }
+            self.listen(READ_AGAIN_NS)?;
         }
-        Err(LineError::NotKept { axis, object, written: value, found })
     }
 
     /// Sends a controlword by SDO. One that switches a drive on is refused while another drive is on.

@@ -86,8 +86,12 @@ pub(super) fn read_error_code(line: &mut Line, axis: usize) -> u16 {
 }
 
 /// The limit switches of an axis that stands there; none in a drive without 60FDh.
-fn read_switches(line: &mut Line, axis: usize, place_m: f64) -> Option<Switches> {
-    Some(Switches { bits: line.read_number(axis, INPUTS).ok()?, place_m })
+fn read_switches(line: &mut Line, axis: usize, place_m: f64) -> Result<Option<Switches>, LineError> {
+    match line.read_number(axis, INPUTS) {
+        Err(error) if error.abort_code().is_some() => Ok(None),
+        // Silence does not say that a switch is open.
+        read => Ok(Some(Switches { bits: read?, place_m })),
+    }
 }
 
 impl Watch {
@@ -106,7 +110,7 @@ impl Watch {
             }
             *began_m = read_position(line, axis, &scales[axis])?;
         }
-        let switches = read_switches(line, axis, began_m[axis]);
+        let switches = read_switches(line, axis, began_m[axis])?;
         let emergencies = std::array::from_fn(|axis| line.heard(axis).emergencies.len());
         let boot_ups = BootUps::until_now(line);
         Ok(Self { axis, scales, bounds, began_m, emergencies, boot_ups, switches, next: 0 })
@@ -135,7 +139,7 @@ impl Watch {
     /// The limit switches count again. Those that are closed now end no motion, and allow none in their direction.
     pub(super) fn heed_switches(&mut self, line: &mut Line) -> Result<(), LineError> {
         let place_m = read_position(line, self.axis, &self.scales[self.axis])?;
-        self.switches = read_switches(line, self.axis, place_m);
+        self.switches = read_switches(line, self.axis, place_m)?;
         Ok(())
     }
 

@@ -1,6 +1,6 @@
 //! One object of a drive as the rig needs it.
 
-use masseter_can::canopen::{CobId, ObjectAddress};
+use masseter_can::canopen::{AbortCode, CobId, ObjectAddress};
 use masseter_shared::config::ObjectRule;
 
 use super::process_data::COB_ID_BITS;
@@ -18,6 +18,14 @@ pub struct WantedObject {
     pub rule: ObjectRule,
     /// The key of the scenario that decides the value.
     pub key: &'static str,
+}
+
+impl WantedObject {
+    /// Whether a drive that refuses to show a written object with this code proves the write by its acknowledgement alone.
+    /// Nothing else can prove it: nobody can read a write-only object.
+    pub(crate) fn is_write_only(code: AbortCode) -> bool {
+        code == AbortCode::WRITE_ONLY
+    }
 }
 
 /// Objects that do not show what was written to them, with what proves the write instead.

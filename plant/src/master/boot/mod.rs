@@ -15,7 +15,7 @@ use masseter_shared::config::AccelerationUnit;
 use masseter_shared::messages::codes::{BootPhase, Cause};
 
 use super::failure::Failure;
-use crate::wanted::WantedDrive;
+use crate::wanted::{WantedDrive, WantedObject};
 use plan::{Check, Demand, Step, Write, plan};
 use sdo::{ATTEMPTS, SdoClient, SdoFailure, TIMEOUT_NS};
 
@@ -264,7 +264,8 @@ impl Boot {
         }
     }
 
-    /// Ends the step of a write: the object must show the value, whether the drive took it or had it already.
+    /// Ends the step of a write: the object must show the value, whether the drive took it or had it already. A drive that
+    /// took it may need some time to show it.
     fn judge_shown(
         &mut self,
         written: Result<(), SdoFailure>,
@@ -275,7 +276,13 @@ impl Boot {
         match (written, read.map(|read| number(read) & bits)) {
             (_, Ok(found)) if found == value & bits => self.end_step(0),
             (Err(refused), _) => return Err(refused.into()),
-            (Ok(()), Ok(found)) => return Err(at(Cause::NotKept, object, found, value & bits)),
+            (Ok(()), Ok(found)) => {
+                self.read_again(at(Cause::NotKept, object, found, value & bits))?;
+                self.written = Some(Ok(()));
+            }
+            (Ok(()), Err(SdoFailure::Aborted { code, .. })) if WantedObject::is_write_only(code) => {
+                self.end_step(0);
+            }
             (Ok(()), Err(failure)) => return Err(failure.into()),
         }
         Ok(())
