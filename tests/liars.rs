@@ -52,6 +52,24 @@ impl Moment<'_> {
         Answer { target_m: self.targets(asked), desired: self.estimated, ..self.honest() }
     }
 
+    /// The same cycle at another time of the motion.
+    fn at(&self, at_s: f64) -> Self {
+        Self { at_s, ..*self }
+    }
+
+    /// Holds still at the first pose. The motion's time is at its beginning, then nowhere, and then at its end.
+    fn without_time(&self) -> Answer {
+        let held = Answer { desired: self.first(), ..self.dishonest(&self.first()) };
+        if self.at_s < 0.01 {
+            Answer { motion_time_s: 0.0, ..held }
+        } else if self.at_s < 1.59 {
+            Answer { motion_time_s: f64::NAN, ..held }
+        } else {
+            let (motion_time_s, desired) = (self.motion.motion_time_s(9.0), self.motion.pose(9.0));
+            Answer { motion_time_s, desired, ..held }
+        }
+    }
+
     fn first(&self) -> Pose {
         self.motion.pose(0.0)
     }
@@ -223,7 +241,7 @@ fn who_plays_the_scenarios_motion_passes() {
 fn a_motion_that_was_not_played_is_no_pass_whatever_the_controller_reports() {
     let other = "the desired pose is up to ";
     let early = "it came to ";
-    let cases: [(&str, Play, &str); 8] = [
+    let cases: [(&str, Play, &str); 10] = [
         ("holds still for a moment", |m| until(0.2, m, m.dishonest(&m.first())), other),
         ("holds still for as long", |m| until(1.6, m, m.dishonest(&m.first())), other),
         (
@@ -248,6 +266,8 @@ fn a_motion_that_was_not_played_is_no_pass_whatever_the_controller_reports() {
             other,
         ),
         ("plays half of the motion", |m| until(0.75, m, m.honest()), early),
+        ("holds still, and has no time in between", |m| until(1.6, m, m.without_time()), early),
+        ("plays at twice the speed, and holds", |m| until(1.6, m, m.at(2.0 * m.at_s).honest()), early),
     ];
     for (liar, play, why) in cases {
         let judged = judge("", PlayedMotion::Scenario, play);
@@ -311,6 +331,23 @@ fn a_stop_of_master_or_drives_is_one_whatever_the_controller_reports() {
         let expected = judge("expect.verdict = 'safe_stop'\n", PlayedMotion::Scenario, play);
         assert_eq!(expected.word, "PASS", "{}", expected.reason);
         assert!(expected.reason.starts_with("SAFE STOP, as expected: "), "{}", expected.reason);
+    }
+}
+
+#[test]
+fn drives_that_leave_operation_in_a_pause_of_the_motion_are_no_pass() {
+    let judged = judge("", PlayedMotion::Scenario, |moment| {
+        let mut answer = moment.at((moment.at_s - 0.5).max(0.0)).honest();
+        if (0.1..0.15).contains(&moment.at_s) {
+            answer.request = DriveRequest::Off;
+        }
+        until(2.1, moment, answer)
+    });
+    let why = "a drive left operation while the motion ran";
+    assert_ne!(judged.word, "PASS", "{}", judged.reason);
+    assert!(judged.sequence.contains(why), "{}: {}", judged.reason, judged.sequence);
+    for document in judged.documents {
+        assert!(document.contains(why), "{document}");
     }
 }
 

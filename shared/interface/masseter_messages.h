@@ -197,6 +197,8 @@ enum masseter_cause {
     MASSETER_CAUSE_FOOD_BROKE = 61,
     /* An axis of the mechanism ran into an end stop (m/s). */
     MASSETER_CAUSE_END_STOP_HIT = 62,
+    /* A drive acknowledged a value and shows another one (value that it shows; the limit is the one written). */
+    MASSETER_CAUSE_NOT_KEPT = 63,
 };
 
 enum masseter_no_pose {

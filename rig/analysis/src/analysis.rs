@@ -27,7 +27,7 @@ use crate::sequence::SequenceCheck;
 use crate::shown::Shown;
 use crate::skips::{Counters, Skips};
 use crate::stop::StopWatch;
-use crate::tracking::{PathSample, PoseSource, Tracking, is_moving};
+use crate::tracking::{PathSample, PoseSource, Tracking};
 
 /// Computes the [`Figures`] of a run from its messages, in their order in the recording.
 ///
@@ -235,9 +235,8 @@ impl Analysis {
         self.tracking.state(state, is_fresh, is_disturbed).into_iter().for_each(|sample| self.path(sample));
         self.cycles = self.cycles.max(state.seq);
         self.final_state = Some(state.controller_state.into());
-        if is_moving(state) {
-            self.played.state(state);
-        }
+        self.stop.state(state);
+        self.played.state(state);
     }
 
     fn truth(&mut self, truth: &Truth) {

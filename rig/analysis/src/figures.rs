@@ -50,10 +50,10 @@ pub struct Figures {
     /// For how long all drives were enabled, s.
     pub enabled_s: f64,
     /// How far the motion came, s of its own time: what the controller stated, as far as the drives were enabled so long and
-    /// that time did not jump; none where it stated none.
+    /// that time did not jump, vanish, or pass unseen; none where it stated none.
     pub motion_reached_s: Option<f64>,
     /// How far the stated desired poses are from the scenario's motion; none where they need not be it: in an own motion,
-    /// with force control, and where the amplitude is set.
+    /// with force control, and from where the amplitude is set.
     pub motion_departure: Option<Departure>,
     /// Deadlines missed just before a safe stop; none without one.
     pub outage: Option<Outage>,

@@ -1,10 +1,15 @@
 //! Stops that the drives and their master show, whatever the controller reports.
 
-use masseter_shared::messages::Reading;
-use masseter_shared::messages::codes::DriveState;
+use masseter_shared::geometry::AXES;
+use masseter_shared::messages::codes::{DriveState, NO_DRIVE_STATE};
+use masseter_shared::messages::{Reading, State};
 use serde::Serialize;
 
 use crate::events::EventRecord;
+use crate::tracking::is_moving;
+
+/// States after the reading of a drive that left operation. The controller may miss that reading in the first.
+const STILL_MOVING: u32 = 2;
 
 /// What stopped the drives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -14,12 +19,20 @@ pub enum StoppedBy {
     Master,
     /// A request for a quick stop, which the drives carry out.
     QuickStop,
+    /// A drive left operation while the motion ran.
+    Drives,
 }
 
 /// Watches drives and master for a stop.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct StopWatch {
     stopped: Option<StoppedBy>,
+    was_enabled: [bool; AXES],
+    /// The newest state is one of the motion.
+    is_moving: bool,
+    /// When a drive left operation in the motion, ns, and how many states of the motion came since.
+    left: Option<(u64, u32)>,
+    has_left: bool,
     last_cycle: u64,
     /// Cycles in which all drives were enabled.
     enabled_cycles: u64,
@@ -41,7 +54,38 @@ impl StopWatch {
             _ => Some(StoppedBy::Master),
         };
         self.stopped = self.stopped.or(found);
+        self.leave(reading);
         found.is_some()
+    }
+
+    /// Notes a drive that leaves operation. One that is not heard of shows nothing.
+    fn leave(&mut self, reading: &Reading) {
+        for (code, was_enabled) in reading.drive_state.iter().zip(&mut self.was_enabled) {
+            if *code == NO_DRIVE_STATE {
+                continue;
+            }
+            let is_enabled = *code == DriveState::OperationEnabled.code();
+            let has_left = std::mem::replace(was_enabled, is_enabled) && !is_enabled;
+            if has_left && self.is_moving {
+                self.left.get_or_insert((reading.due_ns, 0));
+            }
+        }
+    }
+
+    /// Takes a state. A controller that ends its motion with the drives is no stop of theirs.
+    pub(super) fn state(&mut self, state: &State) {
+        self.is_moving = is_moving(state);
+        let Some((left_ns, states)) = &mut self.left else { return };
+        // The state of an earlier cycle may come later.
+        if state.due_ns <= *left_ns {
+            return;
+        }
+        *states += 1;
+        if !self.is_moving {
+            self.left = None;
+        } else if *states >= STILL_MOVING {
+            self.has_left = true;
+        }
     }
 
     /// The master's own report, should the run end before the next reading.
@@ -51,15 +95,14 @@ impl StopWatch {
 
     /// What stopped the drives, and for how many cycles all of them were enabled.
     pub(super) fn finish(self) -> (Option<StoppedBy>, u64) {
-        (self.stopped, self.enabled_cycles)
+        (self.stopped.or(self.has_left.then_some(StoppedBy::Drives)), self.enabled_cycles)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::geometry::AXES;
     use masseter_shared::messages::Event;
-    use masseter_shared::messages::codes::{Cause, EventKind, Source};
+    use masseter_shared::messages::codes::{Cause, ControllerState, EventKind, Source};
 
     use super::*;
 
@@ -97,6 +140,40 @@ mod tests {
         let mut one_is_off = enabled;
         one_is_off.drive_state[3] = DriveState::SwitchedOn.code();
         assert_eq!(seen(&[one_is_off, quick]), (None, 0));
+    }
+
+    #[test]
+    fn a_drive_that_leaves_operation_while_the_motion_runs_is_a_stop() {
+        use ControllerState::{Disabling, Enabling, Holding, Running, SafeStop};
+        type Case<'a> = (&'a [(Reading, ControllerState)], Option<StoppedBy>);
+        let enabled = reading(DriveState::OperationEnabled, 0);
+        let quick = reading(DriveState::QuickStopActive, 0);
+        let fault = reading(DriveState::SwitchOnDisabled, 1);
+        let mut left = enabled;
+        left.drive_state[3] = DriveState::SwitchOnDisabled.code();
+        let mut silent = enabled;
+        silent.drive_state[3] = NO_DRIVE_STATE;
+        let cases: [Case<'_>; 8] = [
+            (&[(enabled, Running), (left, Running), (left, Running)], Some(StoppedBy::Drives)),
+            (&[(enabled, Holding), (left, Holding), (enabled, Holding)], Some(StoppedBy::Drives)),
+            // The controller ends the motion, one cycle late at most.
+            (&[(enabled, Running), (enabled, Disabling), (left, Disabling)], None),
+            (&[(enabled, Running), (left, Running), (left, SafeStop)], None),
+            (&[(enabled, Enabling), (left, Enabling), (enabled, Running), (enabled, Running)], None),
+            (&[(enabled, Running), (silent, Running), (enabled, Running)], None),
+            // The first cause of such a state.
+            (&[(enabled, Running), (left, Running), (fault, Running)], Some(StoppedBy::Master)),
+            (&[(enabled, Running), (left, Running), (quick, Running)], Some(StoppedBy::QuickStop)),
+        ];
+        for (messages, expected) in cases {
+            let mut watch = StopWatch::default();
+            for (cycle, (reading, state)) in (1..).zip(messages) {
+                watch.reading(&Reading { cycle, due_ns: 10 * cycle, ..*reading });
+                let controller_state = state.code();
+                watch.state(&State { cycle, due_ns: 10 * cycle + 5, controller_state, ..State::default() });
+            }
+            assert_eq!(watch.finish().0, expected);
+        }
     }
 
     #[test]

@@ -76,6 +76,7 @@ fn sequence(manifest: &Manifest, figures: &Figures) -> Check {
         match figures.stopped_by.filter(|_| state.is_none_or(|state| state != ControllerState::SafeStop)) {
             Some(StoppedBy::Master) => ", though the master stopped the drives",
             Some(StoppedBy::QuickStop) => ", though the drives made a quick stop",
+            Some(StoppedBy::Drives) => ", though a drive left operation while the motion ran",
             None if was_stopped => ", stopped by request before the motion's end",
             None => "",
         };

@@ -52,9 +52,8 @@ impl Shortfall {
         }
         let (end_s, reached_s) = (manifest.motion_end_s?, figures.motion_reached_s.unwrap_or(0.0));
         let early = (reached_s < WHOLE * end_s).then_some(Self::Early { reached_s, end_s });
-        early.or_else(|| {
-            figures.motion_departure.is_none().then(|| Self::unjudged(manifest, figures)).flatten()
-        })
+        let is_compared = figures.motion_departure.is_some_and(|departure| !departure.is_partial);
+        early.or_else(|| if is_compared { None } else { Self::unjudged(manifest, figures) })
     }
 
     fn of_own(manifest: &Manifest, figures: &Figures) -> Option<Self> {
@@ -77,7 +76,7 @@ impl Shortfall {
 impl Display for Shortfall {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Other(Departure { incisal_mm, deg, at_s }) => write!(
+            Self::Other(Departure { incisal_mm, deg, at_s, .. }) => write!(
                 f,
                 "the scenario's motion was not played: the desired pose is up to {incisal_mm:.3} mm (at {at_s:.3} s of the \
                  motion) and {deg:.3}° from it; a controller with a motion of its own declares it"
@@ -125,7 +124,7 @@ mod tests {
 
     use super::*;
 
-    const PLAYED: Departure = Departure { incisal_mm: 0.009, deg: 0.009, at_s: 1.0 };
+    const PLAYED: Departure = Departure { incisal_mm: 0.009, deg: 0.009, at_s: 1.0, is_partial: false };
 
     /// A finished run that played 10 s to the end, with this change.
     fn shortfall(change: impl FnOnce(&mut Manifest, &mut Figures)) -> Option<Shortfall> {
@@ -171,7 +170,10 @@ mod tests {
         assert_eq!(shortfall(|_, figures| figures.motion_reached_s = Some(9.4)), early(9.4));
         assert_eq!(shortfall(|_, figures| figures.motion_reached_s = None), early(0.0));
         // With force control or another amplitude, the desired poses show nothing.
-        assert_eq!(shortfall(|_, figures| figures.motion_departure = None), Some(Shortfall::Unjudged));
+        for departure in [None, Some(Departure { is_partial: true, ..PLAYED })] {
+            let found = shortfall(|_, figures| figures.motion_departure = departure);
+            assert_eq!(found, Some(Shortfall::Unjudged));
+        }
         for departure in [
             Departure { incisal_mm: 0.011, ..PLAYED },
             Departure { deg: 0.011, ..PLAYED },

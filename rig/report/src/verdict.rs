@@ -165,6 +165,7 @@ fn stopped(stopper: Stopper, events: &[EventRecord]) -> String {
         Stopper::Controller => "the controller stopped the rig",
         Stopper::Drives(StoppedBy::Master) => "the master stopped the drives",
         Stopper::Drives(StoppedBy::QuickStop) => "the drives made a quick stop",
+        Stopper::Drives(StoppedBy::Drives) => "a drive left operation while the motion ran",
     };
     format!("{who}{why}")
 }

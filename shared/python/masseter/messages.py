@@ -204,6 +204,8 @@ class Cause(enum.IntEnum):
     FOOD_BROKE = 61
     #: An axis of the mechanism ran into an end stop (m/s).
     END_STOP_HIT = 62
+    #: A drive acknowledged a value and shows another one (value that it shows; the limit is the one written).
+    NOT_KEPT = 63
 
 
 class NoPose(enum.IntEnum):
