@@ -66,7 +66,7 @@ impl Moment<'_> {
             Answer { motion_time_s: f64::NAN, ..held }
         } else {
             let (motion_time_s, desired) = (self.motion.motion_time_s(9.0), self.motion.pose(9.0));
-            Answer { motion_time_s, desired, ..held }
+            Answer { desired, motion_time_s, ..held }
         }
     }
 
