@@ -129,7 +129,7 @@ fn a_loan_that_a_drive_does_not_keep_is_refused_before_power() {
         let mut bench = Bench::new(&quirk);
         let refusal = bench.jog(1e-3).unwrap_err();
         let text = refusal.to_string();
-        let first = if object.ends_with("h") { format!("{object}:00h") } else { format!("{object}h") };
+        let first = if object.ends_with('h') { format!("{object}:00h") } else { format!("{object}h") };
         assert!(text.starts_with(&format!("l1: object {first} (")), "{text}");
         assert!(text.contains(": the drive acknowledged it and shows "), "{text}");
         assert!(!bench.log.controlwords().iter().any(|(_, word)| word.0 & 1 == 1), "{object}: it had power");
