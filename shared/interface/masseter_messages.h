@@ -219,7 +219,7 @@ enum masseter_no_pose {
 };
 
 #define MASSETER_READING_TOPIC "reading"
-#define MASSETER_READING_TYPE_NAME "masseter/Reading/7a9cf3adbffb7059"
+#define MASSETER_READING_TYPE_NAME "masseter/Reading/77fbf2563d374143"
 
 /* Positions, forces and states of the drives, once a cycle. */
 typedef struct masseter_reading {
@@ -294,7 +294,7 @@ static_assert(offsetof(masseter_reading, fresh_axes) == 256, "offset of fresh_ax
 static_assert(offsetof(masseter_reading, master_fault) == 260, "offset of master_fault");
 
 #define MASSETER_COMMAND_TOPIC "command"
-#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/f6bdf7e657686cf9"
+#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/122499e7837b8623"
 
 /* Targets and request for the drives, once a cycle. */
 typedef struct masseter_command {
@@ -330,7 +330,7 @@ static_assert(offsetof(masseter_command, request) == 136, "offset of request");
 static_assert(offsetof(masseter_command, controller_state) == 140, "offset of controller_state");
 
 #define MASSETER_STATE_TOPIC "state"
-#define MASSETER_STATE_TYPE_NAME "masseter/State/015bac90893f58ef"
+#define MASSETER_STATE_TYPE_NAME "masseter/State/222f0a2c6bd98281"
 
 /* The controller's state and its estimate, once a cycle. All float64 fields but `motion_time_s` have 31 significant bits. */
 typedef struct masseter_state {
@@ -417,7 +417,7 @@ static_assert(offsetof(masseter_state, iterations) == 288, "offset of iterations
 static_assert(offsetof(masseter_state, controller_state) == 292, "offset of controller_state");
 
 #define MASSETER_EVENT_TOPIC "event"
-#define MASSETER_EVENT_TYPE_NAME "masseter/Event/04bb9c8121ad78e8"
+#define MASSETER_EVENT_TYPE_NAME "masseter/Event/ddd3c1af3d2bd72a"
 
 /* A single occurrence: a change of state, a fault, an alarm. */
 typedef struct masseter_event {
@@ -474,7 +474,7 @@ static_assert(offsetof(masseter_event, value) == 72, "offset of value");
 static_assert(offsetof(masseter_event, limit) == 80, "offset of limit");
 
 #define MASSETER_TRUTH_TOPIC "truth"
-#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/4fc7cea39aa0c231"
+#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/ef615c1cdf89a4ab"
 
 /* The true state of the mechanism, once a cycle; the controller never reads it. All float64 fields have 31 significant bits. */
 typedef struct masseter_truth {
@@ -522,7 +522,7 @@ static_assert(offsetof(masseter_truth, bite_force_n) == 288, "offset of bite_for
 static_assert(offsetof(masseter_truth, bite_force_sample_n) == 296, "offset of bite_force_sample_n");
 
 #define MASSETER_CONTACT_TOPIC "contact"
-#define MASSETER_CONTACT_TYPE_NAME "masseter/Contact/771c03b7d9b0a3de"
+#define MASSETER_CONTACT_TYPE_NAME "masseter/Contact/f45400510a8a2978"
 
 /* The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads it. All float64 fields have 31 significant bits. */
 typedef struct masseter_contact {

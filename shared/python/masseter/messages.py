@@ -278,7 +278,7 @@ class Reading(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Reading/7a9cf3adbffb7059"
+        return "masseter/Reading/77fbf2563d374143"
 
 
 _check(Reading, 264, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 176, 224, 232, 256, 260])
@@ -311,7 +311,7 @@ class Command(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Command/f6bdf7e657686cf9"
+        return "masseter/Command/122499e7837b8623"
 
 
 _check(Command, 144, [0, 8, 16, 24, 32, 40, 88, 136, 140])
@@ -378,7 +378,7 @@ class State(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/State/015bac90893f58ef"
+        return "masseter/State/222f0a2c6bd98281"
 
 
 _check(State, 296, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 136, 160, 192, 216, 248, 272, 280, 288, 292])
@@ -425,7 +425,7 @@ class Event(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Event/04bb9c8121ad78e8"
+        return "masseter/Event/ddd3c1af3d2bd72a"
 
 
 _check(Event, 88, [0, 8, 16, 24, 32, 40, 44, 48, 52, 56, 60, 62, 64, 68, 72, 80])
@@ -466,7 +466,7 @@ class Truth(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Truth/4fc7cea39aa0c231"
+        return "masseter/Truth/ef615c1cdf89a4ab"
 
 
 _check(Truth, 304, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240, 288, 296])
@@ -497,7 +497,7 @@ class Contact(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Contact/771c03b7d9b0a3de"
+        return "masseter/Contact/f45400510a8a2978"
 
 
 _check(Contact, 872, [0, 8, 16, 24, 32, 40, 104, 488])

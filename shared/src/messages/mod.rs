@@ -38,7 +38,7 @@ pub const MOST_PAIRS: usize = 16;
 
 messages! {
     /// Targets and request for the drives, once a cycle.
-    Command on "command" keeping 2048 as "masseter/Command/f6bdf7e657686cf9" {
+    Command on "command" keeping 2048 as "masseter/Command/122499e7837b8623" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -55,7 +55,7 @@ messages! {
     }
 
     /// Positions, forces and states of the drives, once a cycle.
-    Reading on "reading" keeping 2048 as "masseter/Reading/7a9cf3adbffb7059" {
+    Reading on "reading" keeping 2048 as "masseter/Reading/77fbf2563d374143" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// Cycle of the last command received when the sample was taken; 0 before the first.
@@ -98,7 +98,7 @@ messages! {
     }
 
     /// The controller's state and its estimate, once a cycle. All float64 fields but `motion_time_s` have 31 significant bits.
-    State on "state" keeping 2048 as "masseter/State/015bac90893f58ef" {
+    State on "state" keeping 2048 as "masseter/State/222f0a2c6bd98281" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -152,7 +152,7 @@ messages! {
 
     /// The signals that the controller declares, once a cycle; without any, there is no such message. A recording's
     /// definition of the message has a field for each signal.
-    Signals on "signal" keeping 2048 as "masseter/Signals/7967d39c539e2e98" {
+    Signals on "signal" keeping 2048 as "masseter/Signals/f3f2e46c64618aba" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// The signals, in the order of their declaration.
@@ -161,7 +161,7 @@ messages! {
 
     /// The parameters that the controller declares, in its first cycle and in each that begins with another value. A
     /// recording's definition of the message has a field for each parameter.
-    Parameters on "parameter" keeping 256 as "masseter/Parameters/49aff8ac440bf498" {
+    Parameters on "parameter" keeping 256 as "masseter/Parameters/6e37d0faf79770ba" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// The parameters, in the order of their declaration.
@@ -170,7 +170,7 @@ messages! {
 
     /// The true state of the mechanism, once a cycle; the controller never reads it. All float64 fields have 31
     /// significant bits.
-    Truth on "truth" keeping 2048 as "masseter/Truth/4fc7cea39aa0c231" {
+    Truth on "truth" keeping 2048 as "masseter/Truth/ef615c1cdf89a4ab" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// The instant it describes: that of the reading's sample, ns.
@@ -195,7 +195,7 @@ messages! {
 
     /// The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads
     /// it. All float64 fields have 31 significant bits.
-    Contact on "contact" keeping 2048 as "masseter/Contact/771c03b7d9b0a3de" {
+    Contact on "contact" keeping 2048 as "masseter/Contact/f45400510a8a2978" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// End of the time that it describes: the instant of the reading's sample, ns.
@@ -209,7 +209,7 @@ messages! {
     }
 
     /// An observation of a tap on a CAN wire: a frame, or an error message in the coding of `linux/can/error.h`.
-    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/0e3210e25e1ed031" {
+    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/8e8544a0e0c152ab" {
         /// When its last bit was on the wire, ns.
         time_ns: u64,
         /// When its transmitter had it queued, ns; 0 on real wires.
@@ -226,7 +226,7 @@ messages! {
 
     /// Counters of the kernel for the machine and both loops. The recorder reads and records them; the message is not
     /// published.
-    Machine on "machine" keeping 1 as "masseter/Machine/4a2a0af32cbeddbb" {
+    Machine on "machine" keeping 1 as "masseter/Machine/83c17486fade6f0d" {
         /// Time of the sample, ns.
         time_ns: u64,
         /// Time that the hypervisor had taken from all cores together, as far as the hypervisor reports it, ns.
@@ -238,7 +238,7 @@ messages! {
     }
 
     /// A single occurrence: a change of state, a fault, an alarm.
-    Event on "event" keeping 1024 as "masseter/Event/04bb9c8121ad78e8" {
+    Event on "event" keeping 1024 as "masseter/Event/ddd3c1af3d2bd72a" {
         /// When, ns.
         time_ns: u64,
         /// Cycle of the process that reports it.
