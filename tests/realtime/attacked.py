@@ -1,0 +1,223 @@
+#!/usr/bin/env python3
+"""Rigs under attack that are interrupted, or lose a process, at random moments: the exit code is the documented one, the end
+comes as soon as without an attack, an honest browser is served, and nothing stays.
+
+    tests/realtime/attacked.py target/release/masseter --times 300
+
+Every second rig waits for a program as its controller. The attackers connect to every socket of the rig and to its live
+page, as a user of the machine without the secret can: bytes that drip, silence, reconnections, wrong greetings, floods.
+Only the Python standard library is used.
+"""
+
+import argparse
+import collections
+import contextlib
+import os
+import random
+import re
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import urllib.request
+from pathlib import Path
+
+from rig import children_of, lives, shared_memory_of
+
+HITS = [("supervisor", signal.SIGINT), ("supervisor", signal.SIGTERM), ("supervisor", signal.SIGKILL)]
+HITS += [(role, signal.SIGKILL) for role in ("controller", "plant", "recorder")]
+INTERRUPTED, DIED = 130, 4
+# Time from the hit to the end of all processes, beyond the slowest rig of the same hit without an attack, s.
+MOST_MORE_S = 1.0
+# `masseter run --live` promises a page within this time, s.
+PAGE_S = 1.0
+WAIT_S = 45.0
+ATTACKERS = 4
+HELD = 100
+# The lock that all rigs of a user share stays.
+TURN = ".turn"
+
+
+def peer_of(target):
+    """A connection to a path, or to a port of this machine."""
+    family = socket.AF_UNIX if isinstance(target, Path) else socket.AF_INET
+    peer = socket.socket(family)
+    peer.settimeout(0.5)
+    peer.connect(str(target) if isinstance(target, Path) else ("127.0.0.1", target))
+    return peer
+
+
+def strike(target, held, chance):
+    """One hostile act at a socket. A refusal is what the rig is for."""
+    with contextlib.suppress(OSError):
+        peer = peer_of(target)
+        act = chance.choice(["drip", "silent", "reconnect", "refused", "flood", "request"])
+        words = {"refused": b"hello\n", "flood": b"x" * 65_536, "request": b"GET / HTTP/1.1\r\nHost: x\r\n"}
+        if act in words:
+            peer.sendall(words[act])
+        if act != "reconnect":
+            held.append(peer)
+    for peer in held[:3]:
+        with contextlib.suppress(OSError):
+            peer.send(b"x", socket.MSG_DONTWAIT)
+    if len(held) > HELD:
+        held.pop(0).close()
+
+
+@contextlib.contextmanager
+def attack(targets, seed):
+    """Attacks all targets from threads until the end of the block."""
+    is_over = threading.Event()
+
+    def work(number):
+        chance, held = random.Random(seed + number), []
+        while not is_over.is_set():
+            for target in targets:
+                strike(target, held, chance)
+            time.sleep(0.003)
+
+    threads = [threading.Thread(target=work, args=(number,)) for number in range(ATTACKERS if targets else 0)]
+    for thread in threads:
+        thread.start()
+    try:
+        yield
+    finally:
+        is_over.set()
+        for thread in threads:
+            thread.join()
+
+
+def served_s(address):
+    """The time in which an honest browser has the live page, s."""
+    began = time.monotonic()
+    with urllib.request.urlopen(address, timeout=WAIT_S) as page:
+        if b"<html" not in page.read():
+            raise SystemExit("the live page is no page")
+    return time.monotonic() - began
+
+
+class Trial:
+    """A rig of its own with a live page; every second one has a program as its controller."""
+
+    def __init__(self, masseter, clock, folder, number):
+        self.masseter, self.name, self.said = masseter, f"attacked-{os.getpid()}-{number}", Path(folder) / "said"
+        self.runtime, self.controller = Path(folder) / "runtime", None
+        self.runtime.mkdir(mode=0o700)
+        self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(self.runtime)}
+        words = ["run", "--clock", clock, "--duration", "60s", "--name", self.name, "--out", Path(folder) / "run"]
+        is_external = number % 2 == 1
+        words += ["--live=127.0.0.1:0", "--controller", "external" if is_external else "motion"]
+        with self.said.open("w") as said:
+            self.rig = self.start(words, said)
+        self.wait_for(self.sockets, "sockets")
+        if is_external:
+            self.controller = self.start(["controller", "--rig", self.name], subprocess.DEVNULL)
+        self.wait_for(self.address, "an address of its live page")
+        recording = Path(folder) / "run" / "recording.mcap"
+        self.wait_for(lambda: recording.exists() and recording.stat().st_size > 100_000, "a recording")
+
+    def start(self, words, said):
+        return subprocess.Popen(
+            [self.masseter, *words], env=self.environment, stdin=subprocess.DEVNULL, stdout=said, stderr=said
+        )
+
+    def wait_for(self, what, name):
+        deadline = time.monotonic() + WAIT_S
+        while not what():
+            if time.monotonic() > deadline or self.rig.poll() is not None:
+                raise SystemExit(f"the rig has no {name}: {self.said.read_text()}")
+            time.sleep(0.005)
+
+    def sockets(self):
+        return [path for path in self.runtime.rglob("*") if path.is_socket()]
+
+    def address(self):
+        found = re.search(r"http://127\.0\.0\.1:\d+/\S*", self.said.read_text())
+        return found and found.group()
+
+    def targets(self):
+        return [*self.sockets(), int(self.address().split(":")[2].split("/")[0])]
+
+    def hit(self, role, how):
+        """Hits a process: the exit code of the rig, and the time until all of its processes are over, s."""
+        children = children_of(self.rig)
+        if self.controller:
+            children["controller"] = self.controller.pid
+        victim = self.rig.pid if role == "supervisor" else children[role]
+        os.kill(victim, how)
+        began = time.monotonic()
+        while self.rig.poll() is None or any(lives(child) for child in children.values()):
+            if time.monotonic() > began + WAIT_S:
+                raise SystemExit(f"{role} hit by {how.name}: a process runs after {WAIT_S} s: {self.said.read_text()}")
+            if self.controller:
+                self.controller.poll()
+            time.sleep(0.005)
+        return self.rig.returncode, time.monotonic() - began
+
+    def left(self):
+        """What stays in shared memory and in the folder of sockets."""
+        kept = [path for path in self.runtime.rglob("*") if not path.is_dir() and path.name != TURN]
+        return shared_memory_of(self.rig.pid) + kept
+
+    def clean(self):
+        subprocess.run([self.masseter, "clean"], env=self.environment, check=True, stdout=subprocess.DEVNULL)
+
+
+def run_once(masseter, clock, hit, number, seed, is_attacked):
+    """One rig and one hit: the time to its end and the time of an honest browser, s."""
+    role, how = hit
+    with tempfile.TemporaryDirectory() as folder:
+        trial, chance = Trial(masseter, clock, folder, number), random.Random(seed)
+        with attack(trial.targets() if is_attacked else [], seed):
+            time.sleep(chance.uniform(0.0, 1.5))
+            page_s = served_s(trial.address())
+            code, over_s = trial.hit(role, how)
+        what = f"{role} hit by {how.name}"
+        expected = DIED if role != "supervisor" else -signal.SIGKILL if how == signal.SIGKILL else INTERRUPTED
+        if code != expected:
+            raise SystemExit(f"{what}: exit code {code} instead of {expected}: {trial.said.read_text()}")
+        if code == -signal.SIGKILL:
+            # Nobody is left who could remove anything.
+            trial.clean()
+        if left := trial.left():
+            raise SystemExit(f"{what}: {left} stayed")
+        return over_s, page_s
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("masseter", type=Path)
+    parser.add_argument("--times", type=int, default=300)
+    parser.add_argument("--clock", choices=["rt", "lockstep"], default="rt")
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
+    masseter, numbers = arguments.masseter.resolve(), iter(range(10**9))
+    # Both kinds of controllers meet every hit.
+    once = lambda hit, is_attacked: run_once(
+        masseter, arguments.clock, hit, number := next(numbers), arguments.seed * 10**6 + number, is_attacked
+    )
+    alone_s = {hit: max(once(hit, False)[0] for _ in range(2)) for hit in HITS}
+    over_s, pages_s = collections.defaultdict(list), []
+    for count in range(arguments.times):
+        hit = HITS[count // 2 % len(HITS)]
+        taken_s, page_s = once(hit, True)
+        over_s[hit].append(taken_s)
+        pages_s.append(page_s)
+    late = []
+    for hit, times_s in over_s.items():
+        role, how = hit
+        print(f"{role:<10} {how.name:<7} × {len(times_s):>3}: over after {max(times_s):.2f} s, alone {alone_s[hit]:.2f} s")
+        if max(times_s) > alone_s[hit] + MOST_MORE_S:
+            late.append(f"{role} hit by {how.name}: {max(times_s):.2f} s, alone {alone_s[hit]:.2f} s")
+    print(f"an honest browser has its page after {max(pages_s):.2f} s")
+    if max(pages_s) > PAGE_S:
+        late.append(f"an honest browser waits {max(pages_s):.2f} s for its page")
+    if late:
+        sys.exit("\n".join(late))
+
+
+if __name__ == "__main__":
+    main()
