@@ -155,8 +155,8 @@ def attached(name: str, rig: "subprocess.Popen[str]", own_motion: bool = False) 
 
 
 def play(session: masseter.Session, misbehave: Callable[[int, Command], None]) -> None:
-    """Leaves the drives without voltage for 200 cycles; `misbehave` changes each command."""
-    for _ in range(200):
+    """Leaves the drives without voltage for 300 cycles; `misbehave` changes each command."""
+    for _ in range(300):
         cycle = session.wait()
         assert cycle is not None
         reading_cycle = cycle.reading.cycle if cycle.reading else 0
@@ -220,7 +220,7 @@ def test_a_controller_of_the_drives_is_recorded(masseter_command: str, tmp_path:
     run = masseter.load(tmp_path / "run")
     # The motion was never played, and the verdict says so.
     assert code == 1, said
-    assert list(run.command["cycle"]) == list(range(1, 201))
+    assert list(run.command["cycle"]) == list(range(1, 301))
     # The drives have booted, without voltage.
     assert np.all(run.reading["position_m"][-1, 3:] > 0.2)
 
