@@ -13,18 +13,18 @@ use std::process::{Child, Command, Stdio};
 
 use anyhow::{Context, ensure};
 use hdrhistogram::Histogram;
-use masseter::machine::SystemRoot;
+use masseter_machine::SystemRoot;
+use masseter_model::geometry::Mechanism;
 use masseter_recording::{Reader, Recorded, Recorder, Scene};
-use masseter_shared::clock::{self, SECOND_NS};
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::Mechanism;
-use masseter_shared::lifecycle::Start;
-use masseter_shared::messages::codes::Source;
-use masseter_shared::messages::{Command as CommandMessage, Event, FrameTap, Reading, State, Truth};
-use masseter_shared::named::Declared;
-use masseter_shared::realtime::Cycle;
-use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
-use masseter_shared::transport::{BatchPublisher, Node, Publisher, ScratchDomain};
+use masseter_runtime::clock::{self, SECOND_NS};
+use masseter_runtime::lifecycle::Start;
+use masseter_runtime::messages::codes::Source;
+use masseter_runtime::messages::{Command as CommandMessage, Event, FrameTap, Reading, State, Truth};
+use masseter_runtime::named::Declared;
+use masseter_runtime::realtime::Cycle;
+use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain};
+use masseter_runtime::transport::{FramePublisher, Node, Publisher, ScratchDomain};
+use masseter_scenario::Scenario;
 use rustix::process::{Pid, Signal, kill_process};
 
 const MASSETER: &str = env!("CARGO_BIN_EXE_masseter");
@@ -90,7 +90,7 @@ struct Publishers {
     reading: Publisher<Reading>,
     state: Publisher<State>,
     truth: Publisher<Truth>,
-    frame: BatchPublisher<FrameTap>,
+    frame: FramePublisher,
     /// The controller's, and the plant's.
     events: [Publisher<Event>; 2],
 }
@@ -102,7 +102,7 @@ impl Publishers {
             reading: node.publisher()?,
             state: node.publisher()?,
             truth: node.publisher()?,
-            frame: BatchPublisher::open(node)?,
+            frame: FramePublisher::open(node)?,
             events: [node.publisher()?, node.publisher()?],
         })
     }

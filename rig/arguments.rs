@@ -10,8 +10,8 @@ use clap::{Args, ValueEnum};
 use masseter_controller::hold_position::HoldPosition;
 use masseter_controller::motion_controller::MotionController;
 use masseter_controller::process::BuildController;
-use masseter_shared::lifecycle::{Patience, ProcessArguments};
-use masseter_shared::realtime::scheduling::usable_cores;
+use masseter_runtime::lifecycle::{Patience, ProcessArguments};
+use masseter_runtime::realtime::scheduling::usable_cores;
 
 /// The arguments that the supervisor passes to every process of a run. Some verbs are also a user's, without them.
 #[derive(Debug, Clone, Args)]

@@ -1,7 +1,7 @@
 //! `masseter clean`: removes the shared memory of killed runs. Live runs are not touched.
 
-use masseter_shared::transport::Domain;
-use masseter_shared::wording::counted;
+use masseter_runtime::transport::Domain;
+use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, result_line, status};
 
 /// Sweeps every dead domain of this user and lists all domains.

@@ -7,6 +7,7 @@ use clap::{ColorChoice, Command, CommandFactory, FromArgMatches, Parser, Subcomm
 use masseter_terminal::{Exit, Failure, OrFailure, choose_colour, status};
 use rustix::process::umask;
 
+use crate::arguments::ProcessArgs;
 use crate::bench::ipc::PeerArgs;
 use crate::bench::{self, args::BenchArgs};
 use crate::campaigns::{
@@ -19,7 +20,6 @@ use crate::controller::{self, ControllerArgs};
 use crate::diff::{self, DiffArgs};
 use crate::doctor::{self, DoctorArgs};
 use crate::error_text::in_one_line;
-use crate::export::{self, ExportArgs};
 use crate::faults::{self, FaultsVerb};
 use crate::help::with_overview;
 use crate::init::{self, InitArgs};
@@ -31,8 +31,6 @@ use crate::new::{self, NewVerb};
 use crate::paper_study::{self, KinematicsArgs};
 use crate::param::{self, ParamVerb};
 use crate::plant::{self, PlantArgs};
-use crate::recorder::{self, RecorderArgs};
-use crate::recording_cli::{self, RecordingVerb};
 use crate::replay::{self, ReplayArgs};
 use crate::report_cli::{self, ReportArgs};
 use crate::robot::{self, RobotVerb};
@@ -44,6 +42,8 @@ use crate::run::{
 use crate::signals_cli::{self, SignalsArgs};
 use crate::suite::{self, args::TestArgs};
 use crate::uniqueness::{self, UniquenessVerb};
+use masseter_recorder::RecorderArgs;
+use masseter_recordings::{ExportArgs, RecordingVerb};
 
 const FIRST_STEPS: &str = "\
 First steps:
@@ -156,7 +156,12 @@ enum Verb {
     #[command(hide = true)]
     CampaignCase(CampaignCaseArgs),
     #[command(hide = true)]
-    Recorder(RecorderArgs),
+    Recorder {
+        #[command(flatten)]
+        process: ProcessArgs,
+        #[command(flatten)]
+        recorder: RecorderArgs,
+    },
     #[command(hide = true)]
     ExecProgram(ExecProgramArgs),
 }
@@ -191,7 +196,7 @@ fn parse() -> Cli {
 fn keep_files_private(verb: &Verb) {
     umask(match verb {
         // What init lays down is public.
-        Verb::Controller(_) | Verb::Recorder(_) | Verb::ExecProgram(_) | Verb::Init(_) | Verb::New(_) => {
+        Verb::Controller(_) | Verb::Recorder { .. } | Verb::ExecProgram(_) | Verb::Init(_) | Verb::New(_) => {
             return;
         }
         Verb::Run(args) => args.readable_by.umask(),
@@ -225,8 +230,8 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Uniqueness(verb) => uniqueness::uniqueness(&verb).usage(),
         Verb::Kinematics(args) => paper_study::study(&args).usage(),
         Verb::Doctor(args) => doctor::examine(&args).usage(),
-        Verb::Export(args) => export::export(&args).usage(),
-        Verb::Recording(verb) => recording_cli::execute(&verb).usage(),
+        Verb::Export(args) => masseter_recordings::export(&args).usage(),
+        Verb::Recording(verb) => masseter_recordings::execute(&verb).usage(),
         Verb::Clean => clean::clean().usage(),
         Verb::Completions(args) => manuals::completions(&args, command()).usage(),
         Verb::Man(args) => manuals::manual(&args, command()).usage(),
@@ -235,7 +240,9 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Interface(args) => interface::interface(&args).usage(),
         Verb::Controller(args) => controller::control(args).usage(),
         Verb::Plant(args) => plant::plant(args).usage(),
-        Verb::Recorder(args) => recorder::record(args).usage(),
+        Verb::Recorder { process, recorder } => {
+            masseter_recorder::record(&process.process_arguments(), &recorder).usage()
+        }
         Verb::ExecProgram(args) => exec_program(&args).usage(),
     }
 }

@@ -3,7 +3,7 @@
 
 use clap::Args;
 use masseter_controller::process;
-use masseter_shared::control::Outcome;
+use masseter_runtime::control::Outcome;
 use masseter_terminal::Exit;
 
 use crate::arguments::{ControllerKind, ProcessArgs};

@@ -8,14 +8,14 @@ use masseter_analysis::{Curve, Figures};
 use masseter_charts::{
     Axis, Error, Key, LegendEntry, Line, LineChart, Scale, SeriesLabelPosition, legend, palette, svg,
 };
+use masseter_model::geometry::{AXES, AXIS_NAMES, LEGS};
 use masseter_recording::Manifest;
 use masseter_report::Pressure;
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::{AXES, AXIS_NAMES, LEGS};
-use masseter_shared::messages::codes::ControllerState;
+use masseter_runtime::messages::codes::ControllerState;
+use masseter_scenario::Scenario;
 use masseter_study::{ClaimJudgement, ForceFigure, Forces, PaperClaim};
 
-use crate::machine::interrupts::Interrupts;
+use crate::interrupts::Interrupts;
 use crate::run::shown_figures;
 
 /// Encoders without noise, whose share of the forces would hide that of friction.

@@ -1,7 +1,7 @@
-//! The `masseter` command. [`cli`] dispatches to the modules of verbs.
+//! The `masseter` command. `cli` dispatches to the modules of verbs.
 //!
 //! `run` starts controller, plant and `recorder` as processes of this executable (`run::supervisor`), or steps their
-//! cores in one thread under virtual time (`run::virtual_time`). Figures of a recorded run are computed from its
+//! cores in one thread under virtual time (`masseter_virtual_time`). Figures of a recorded run are computed from its
 //! recording and manifest only (crate `masseter_analysis`), so `report` can compute them again. This crate holds no control, physics,
 //! analysis or file formats.
 
@@ -13,30 +13,25 @@ mod bench;
 mod campaigns;
 mod can;
 mod clean;
-pub mod cli;
+mod cli;
 mod controller;
 mod diff;
 mod doctor;
 mod error_text;
-mod export;
 mod faults;
 mod force_study;
 mod guarded;
 mod help;
 mod init;
 mod interface;
+mod interrupts;
 mod kinematics_cli;
-mod live;
-pub mod machine;
 mod manuals;
 mod motion;
 mod new;
 mod paper_study;
 mod param;
 mod plant;
-mod recorder;
-mod recording_cli;
-mod refusals;
 mod replay;
 mod report_cli;
 mod robot;
@@ -44,6 +39,8 @@ mod run;
 mod shell;
 mod signals_cli;
 mod starter;
-mod stderr_writer;
 mod suite;
 mod uniqueness;
+
+// Only what other crates call is public: derived code that nobody calls is then not compiled.
+pub use cli::main;

@@ -60,7 +60,7 @@ impl Language {
     const fn project(self) -> Project {
         match self {
             Self::Rust => Project {
-                about: "Rust, the crates masseter-controller and masseter-shared",
+                about: "Rust, the crates masseter-controller, masseter-model and masseter-runtime",
                 build: "cargo build --release",
                 program: "target/release/my_controller",
                 files: &[

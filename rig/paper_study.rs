@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use masseter_plan::Overrides;
 use masseter_recording::output::new_folder;
-use masseter_shared::config::Scenario;
+use masseter_scenario::Scenario;
 use masseter_study::{Settings, Study};
 use masseter_terminal::{Exit, result_line, status};
 

@@ -1,8 +1,8 @@
 //! `masseter param`: lists, reads and sets the parameters of a running controller.
 
 use clap::{Args, Subcommand};
-use masseter_shared::named::{Parameter, access};
-use masseter_shared::transport::Domain;
+use masseter_runtime::named::{Parameter, access};
+use masseter_runtime::transport::Domain;
 use masseter_terminal::{Exit, result_line};
 
 use anyhow::{Context, bail};

@@ -7,10 +7,10 @@ use anyhow::{Context, bail};
 use clap::Args;
 use masseter_plant::emulation::{Emulator, EmulatorCounters};
 use masseter_plant::process::{self, Reason};
-use masseter_shared::clock;
-use masseter_shared::config::Scenario;
-use masseter_shared::lifecycle::StopRequest;
-use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
+use masseter_runtime::clock;
+use masseter_runtime::lifecycle::StopRequest;
+use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain};
+use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, result_line, status};
 
 use crate::arguments::{ProcessArgs, Wires, parse_wires};

@@ -16,9 +16,9 @@ PARTS = {
     "check of the motion": ["masseter_plan::", "trajectory::check"],
     "simulated wires": ["masseter_can::"],
     "drives": ["masseter_plant::drive::"],
-    "mechanism": ["masseter_plant::mechanism::", "masseter_shared::dynamics::", "masseter_shared::geometry::",
+    "mechanism": ["masseter_plant::mechanism::", "masseter_model::dynamics::", "masseter_model::geometry::",
                   "Emulation::push", "Emulation::move_mechanism"],
-    "controller": ["masseter_controller::", "masseter_shared::control::"],
+    "controller": ["masseter_controller::", "masseter_runtime::control::"],
     "master, order of events": ["masseter_plant::"],
 }
 

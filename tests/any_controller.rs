@@ -9,16 +9,17 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
+use masseter_runtime::control::Session;
+use masseter_runtime::lifecycle::attach::{self, Hello, socket};
+use masseter_runtime::lifecycle::{Report, line};
+use masseter_runtime::named::{self, Declared, Parameter};
+use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain};
+use masseter_runtime::transport::Domain;
+
 use crate::common::{
     self, Cores, LENIENT, MASSETER, PASSED_OR_INVALID, Workspace, is_dead, masseter, stderr, stdout,
     wait_until,
 };
-use masseter_shared::control::Session;
-use masseter_shared::lifecycle::attach::{self, Hello, socket};
-use masseter_shared::lifecycle::{Report, line};
-use masseter_shared::named::{self, Declared, Parameter};
-use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
-use masseter_shared::transport::Domain;
 use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 
 const SCENARIO: &str = "duration_s = 1.0\n";

@@ -53,21 +53,21 @@ fn every_file_belongs_to_a_module() {
 }
 
 /// Files that read what the kernel serves, a private folder, or the program itself; everything else reads through
-/// `shared::input`, which refuses what has no end.
+/// `masseter_scenario::input`, which refuses what has no end.
 const READERS: [&str; 13] = [
     "rig/bench/played_run.rs",
     "rig/bench/simulated.rs",
     "rig/bench/virtual_time.rs",
     "rig/campaign/src/campaign.rs",
     "rig/campaign/src/folder.rs",
+    "rig/interrupts.rs",
     "rig/kinematics_cli/input.rs",
-    "rig/machine/interrupts.rs",
-    "rig/machine/mod.rs",
-    "rig/machine/system_root.rs",
+    "rig/machine/src/lib.rs",
+    "rig/machine/src/system_root.rs",
     "rig/recording/src/folder.rs",
     "rig/recording/src/writer.rs",
     "rig/robot/ledger.rs",
-    "shared/src/realtime/scheduling.rs",
+    "shared/runtime/src/realtime/scheduling.rs",
 ];
 
 #[test]
@@ -81,7 +81,7 @@ fn files_of_users_are_read_up_to_a_limit() {
     let is_of_system = |name: &String| name.contains("/transport/") || name.contains("/socket_can/");
     readers.retain(|name| !is_of_system(name));
     readers.sort();
-    assert_eq!(readers, READERS, "read through masseter_shared::input, or say here why not");
+    assert_eq!(readers, READERS, "read through masseter_scenario::input, or say here why not");
 }
 
 /// The files whose code outside of tests reads whole files without a limit, or opens devices.
@@ -238,7 +238,9 @@ fn macros_tie_files_and_code_for_tests_does_not() {
 fn planted_violations_of_layers_are_found() {
     let folders = [
         "shared/can",
-        "shared",
+        "shared/model",
+        "shared/scenario",
+        "shared/runtime",
         "controller",
         "plant",
         "rig/terminal",
@@ -267,9 +269,11 @@ fn planted_violations_of_layers_are_found() {
     for (from, to) in [
         ("controller", "plant"),
         ("plant", "controller"),
-        ("shared/can", "shared"),
-        ("shared", "plant"),
-        ("shared", "rig/recording"),
+        ("shared/can", "shared/runtime"),
+        ("shared/model", "shared/scenario"),
+        ("shared/scenario", "shared/runtime"),
+        ("shared/runtime", "plant"),
+        ("shared/runtime", "rig/recording"),
         ("plant", "rig/report"),
         ("rig/recording", "rig/report"),
         ("rig/report", "rig/study"),
@@ -278,19 +282,19 @@ fn planted_violations_of_layers_are_found() {
         ("rig/analysis", "plant"),
         ("rig/report", "plant"),
         ("rig/charts", "rig/terminal"),
-        ("rig/terminal", "shared"),
+        ("rig/terminal", "shared/runtime"),
         ("rig/study", "plant"),
         ("rig/study", "rig/report"),
-        ("rig/unknown", "shared"),
+        ("rig/unknown", "shared/runtime"),
     ] {
         let expected = format!("{} ({from}/) depends on {} ({to}/)", name(from), name(to));
         assert_eq!(depending(from, to), [expected]);
     }
     for (from, to) in [
-        ("shared", "shared/can"),
-        ("controller", "shared"),
+        ("shared/runtime", "shared/can"),
+        ("controller", "shared/runtime"),
         ("plant", "shared/can"),
-        ("rig/recording", "shared"),
+        ("rig/recording", "shared/runtime"),
         ("rig/report", "rig/recording"),
         ("rig/plan", "plant"),
         ("rig/analysis", "rig/recording"),

@@ -9,13 +9,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
+use masseter_runtime::clock;
+use masseter_runtime::lifecycle::attach::socket;
+use masseter_runtime::named::access;
+use masseter_runtime::transport::Domain;
+
 use crate::common::{
     MASSETER, Workspace, child_of, masseter, stderr, stdout, wait_until, wait_until_it_records,
 };
-use masseter_shared::clock;
-use masseter_shared::lifecycle::attach::socket;
-use masseter_shared::named::access;
-use masseter_shared::transport::Domain;
 use rustix::process::{Pid, Signal, kill_process};
 
 /// Time that an attack may add to the end of a run, on a machine that has other work. A supervisor that waits for a peer takes

@@ -5,8 +5,9 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use masseter_runtime::clock;
+
 use crate::common::{Cores, MASSETER, child_of};
-use masseter_shared::clock;
 use rustix::process::{Pid, Signal, kill_process, test_kill_process};
 use serde_json::Value;
 

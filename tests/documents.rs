@@ -61,7 +61,7 @@ fn has_heading(document: &Path, name: &str) -> bool {
 #[test]
 fn every_function_of_the_architecture_is_in_the_file_beside_it() {
     let text = fs::read_to_string(project().join("ARCHITECTURE.md")).unwrap();
-    assert!(text.lines().count() <= 140, "{} lines", text.lines().count());
+    assert!(text.lines().count() <= 145, "{} lines", text.lines().count());
     let (_, walk) = text.split_once("## Follow one cycle through the code").unwrap();
     let (walk, _) = walk.split_once("\n## ").unwrap();
     let mut checked = 0;

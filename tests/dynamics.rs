@@ -1,11 +1,12 @@
 //! The forces that a run records balance the motion that it records.
 
+use masseter_model::dynamics::{Bodies, Equations, Motion};
+use masseter_model::geometry::{Jacobian, Mechanism, MechanismConfig, Pose, Twist};
+use masseter_runtime::messages::{Truth, pose_from_fields};
+use masseter_scenario::DynamicsConfig;
+
 use crate::common::{Workspace, stdout};
 use masseter_recording::{Reader, Recorded};
-use masseter_shared::config::DynamicsConfig;
-use masseter_shared::dynamics::{Bodies, Equations, Motion};
-use masseter_shared::geometry::{Jacobian, Mechanism, MechanismConfig, Pose, Twist};
-use masseter_shared::messages::{Truth, pose_from_fields};
 use nalgebra::Vector6;
 
 /// The greatest imbalance of an axis, rms, N.

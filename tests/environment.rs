@@ -9,14 +9,15 @@ use std::process::{Child, Command, Output, Stdio};
 use std::thread;
 use std::time::Duration;
 
+use masseter_runtime::clock::{self, SECOND_NS};
+use masseter_runtime::messages::State;
+use masseter_runtime::messages::codes::ControllerState::Finished;
+use masseter_runtime::transport::{Domain, Node, Subscriber};
+
 use crate::common::{
     self, Cores, LENIENT, SharedMemory, Workspace, assert_played, cramped, masseter, skip, stderr, stdout,
     wait_until_it_records,
 };
-use masseter_shared::clock::{self, SECOND_NS};
-use masseter_shared::messages::State;
-use masseter_shared::messages::codes::ControllerState::Finished;
-use masseter_shared::transport::{Domain, Node, Subscriber};
 use serde_json::{Value, json};
 
 #[test]

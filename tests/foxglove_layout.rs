@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use masseter_recording::{Channel, Columns, Topic, definitions};
-use masseter_shared::named::Declared;
+use masseter_runtime::named::Declared;
 use serde_json::Value;
 
 /// The keys whose texts are paths to messages or fields.

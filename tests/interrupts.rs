@@ -5,8 +5,9 @@ use std::os::unix::process::CommandExt;
 use std::process::{Child, Stdio};
 use std::time::Duration;
 
+use masseter_runtime::clock;
+
 use crate::common::{Cores, LENIENT, Workspace, child_of, stderr, stdout, wait_until};
-use masseter_shared::clock;
 use rustix::process::{Pid, Signal, kill_process, kill_process_group, test_kill_process};
 
 #[test]

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::process::{Command, Output, Stdio};
 
 use masseter_controller::kinematics::Equations;
-use masseter_shared::geometry::{Actuators, Mechanism, MechanismConfig};
+use masseter_model::geometry::{Actuators, Mechanism, MechanismConfig};
 
 use crate::common::{MASSETER, masseter, stderr, stdout};
 

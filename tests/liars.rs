@@ -6,13 +6,13 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use masseter_controller::kinematics::ForwardTracker;
 use masseter_controller::trajectory::Trajectory;
-use masseter_shared::control::{Outcome, Session, Waited};
-use masseter_shared::geometry::{AXES, Actuators, Mechanism, Pose};
-use masseter_shared::lifecycle::attach::{self, socket};
-use masseter_shared::messages::codes::{ControllerState, DriveRequest, DriveState, drive_state};
-use masseter_shared::messages::{Command, Reading, State, pose_fields};
-use masseter_shared::named::{Declared, PlayedMotion};
-use masseter_shared::transport::Domain;
+use masseter_model::geometry::{AXES, Actuators, Mechanism, Pose};
+use masseter_runtime::control::{Outcome, Session, Waited};
+use masseter_runtime::lifecycle::attach::{self, socket};
+use masseter_runtime::messages::codes::{ControllerState, DriveRequest, DriveState, drive_state};
+use masseter_runtime::messages::{Command, Reading, State, pose_fields};
+use masseter_runtime::named::{Declared, PlayedMotion};
+use masseter_runtime::transport::Domain;
 use serde_json::Value;
 
 use crate::common::{Workspace, stderr, stdout, wait_until};

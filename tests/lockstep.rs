@@ -4,11 +4,12 @@
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
+use masseter_runtime::clock;
+
 use crate::common::{
     self, SharedMemory, Workspace, child_of, has_event, is_dead, masseter, stderr, stdout, wait_until,
     wait_until_it_records,
 };
-use masseter_shared::clock;
 use rustix::process::{Pid, Signal, kill_process};
 
 const ROLES: [&str; 3] = ["controller", "plant", "recorder"];

@@ -3,15 +3,16 @@
 use std::process::{Child, Output};
 use std::thread;
 
+use masseter_model::geometry::Pose;
+use masseter_runtime::control::Outcome;
+use masseter_runtime::lifecycle::attach::{attach, socket};
+use masseter_runtime::named::{self, Declared, Parameter, access};
+use masseter_runtime::transport::Domain;
+
 use crate::common::{Workspace, masseter, stderr, stdout, wait_until, wait_until_it_records};
 use masseter_controller::pose_law::{Demand, LawFailed, PoseLaw};
 use masseter_controller::process::run_with_law;
 use masseter_recording::{Reader, Recorded};
-use masseter_shared::control::Outcome;
-use masseter_shared::geometry::Pose;
-use masseter_shared::lifecycle::attach::{attach, socket};
-use masseter_shared::named::{self, Declared, Parameter, access};
-use masseter_shared::transport::Domain;
 use rustix::process::{Pid, Signal, kill_process};
 
 fn unique(name: &str) -> String {

@@ -4,17 +4,18 @@
 use std::process::{Child, Output};
 use std::time::Duration;
 
+use masseter_runtime::clock::{self, MILLISECOND_NS, SECOND_NS};
+use masseter_runtime::messages::State;
+use masseter_runtime::messages::codes::ControllerState::{
+    self, Disabling, Easing, Enabling, Holding, Running, WaitReadings,
+};
+use masseter_runtime::messages::codes::DriveState::{FaultReactionActive, OperationEnabled, QuickStopActive};
+use masseter_runtime::transport::{Domain, Node, Subscriber};
+
 use crate::common::{
     Cores, LENIENT, SharedMemory, Workspace, assert_played, child_of, has_event, masseter, stderr, stdout,
 };
 use masseter_recording::{Reader, Recorded};
-use masseter_shared::clock::{self, MILLISECOND_NS, SECOND_NS};
-use masseter_shared::messages::State;
-use masseter_shared::messages::codes::ControllerState::{
-    self, Disabling, Easing, Enabling, Holding, Running, WaitReadings,
-};
-use masseter_shared::messages::codes::DriveState::{FaultReactionActive, OperationEnabled, QuickStopActive};
-use masseter_shared::transport::{Domain, Node, Subscriber};
 use rustix::process::{Pid, Signal, kill_process};
 
 /// A cycle of the sequence, counted from 1 in its state.

@@ -3,8 +3,9 @@
 use std::fs;
 use std::process::Output;
 
+use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain};
+
 use crate::common::{self, Cores, LENIENT, Workspace, check, masseter, skip, stderr, stdout};
-use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
 
 /// A busy machine may disturb a run in real time.
 const TRIES: usize = 10;

@@ -6,13 +6,14 @@ use std::path::Path;
 use std::process::Output;
 use std::time::Duration;
 
+use masseter_model::geometry::Mechanism;
+use masseter_runtime::clock::{self, SECOND_NS};
+use masseter_scenario::Scenario;
+
 use crate::common::{
     Cores, LENIENT, Workspace, child_of, cramped, json, masseter, stderr, stdout, wait_until,
 };
 use masseter_recording::{Reader, Recorded, Recorder, Scene};
-use masseter_shared::clock::{self, SECOND_NS};
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::Mechanism;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rustix::process::{Signal, kill_process};

@@ -6,8 +6,9 @@ use std::path::Path;
 use std::process::Output;
 use std::time::Duration;
 
+use masseter_runtime::clock;
+
 use crate::common::{Cores, LENIENT, Workspace, masseter, skip, stderr, stdout, wait_until_it_records};
-use masseter_shared::clock;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 

@@ -5,10 +5,11 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use masseter_runtime::messages::Event;
+use masseter_runtime::messages::codes::{ControllerState, Source};
+
 use crate::common::{Cores, LENIENT, Workspace, skip, stderr};
 use masseter_recording::{Reader, Recorded};
-use masseter_shared::messages::Event;
-use masseter_shared::messages::codes::{ControllerState, Source};
 use serde_json::Value;
 
 const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
@@ -262,9 +263,9 @@ fn every_chart_over_time_has_the_zero_of_the_recording() {
     assert!(later_ns < 1_000_000, "the first message was recorded {later_ns} ns after the charts' zero");
 
     let workspace = Workspace::new(&format!("duration_s = 1.0\n{LENIENT}"));
-    let before_s = masseter_shared::clock::wall_time().as_secs_f64();
+    let before_s = masseter_runtime::clock::wall_time().as_secs_f64();
     let output = workspace.run(&Cores::take(), &[]);
-    let after_s = masseter_shared::clock::wall_time().as_secs_f64();
+    let after_s = masseter_runtime::clock::wall_time().as_secs_f64();
     assert!(workspace.run_folder().join("report.html").exists(), "{}", stderr(&output));
     // Only in real time are there late wake-ups.
     assert_one_zero(&workspace, &[&OVER_TIME[..], &["jitter"]].concat());

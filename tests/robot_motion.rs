@@ -4,8 +4,9 @@ use std::collections::BTreeSet;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use masseter_model::geometry::AXIS_NAMES;
+
 use crate::common::{self, MASSETER, Workspace, masseter, stderr, stdout};
-use masseter_shared::geometry::AXIS_NAMES;
 use serde_json::Value;
 
 /// A rig whose jaw is closed, as check-pose wants it.

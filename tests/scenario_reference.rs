@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
-use masseter_shared::config::{FaultKindConfig, MotionConfig, QuirkKindConfig, Scenario, ScenarioError};
+use masseter_scenario::{FaultKindConfig, MotionConfig, QuirkKindConfig, Scenario, ScenarioError};
 use serde_json::Value;
 
 use crate::common::Workspace;

@@ -4,9 +4,10 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
+use masseter_runtime::messages::codes::Source;
+
 use crate::common::Workspace;
 use masseter_analysis::hop_names;
-use masseter_shared::messages::codes::Source;
 use serde_json::Value;
 
 fn description() -> String {

@@ -1,7 +1,8 @@
 //! Faults that lead the jaw off its path are detected before it is far, or fail the run.
 
+use masseter_scenario::ChecksConfig;
+
 use crate::common::{Cores, Workspace, check, stdout};
-use masseter_shared::config::ChecksConfig;
 use serde_json::Value;
 
 /// Drive l1 misses its targets for so many cycles from `from_s` on.

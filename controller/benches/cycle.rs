@@ -5,11 +5,11 @@
 use divan::Bencher;
 use masseter_controller::motion_controller::MotionController;
 use masseter_controller::trajectory::Trajectory;
-use masseter_shared::config::{ControllerConfig, ForceControlConfig, ForceEstimateConfig, Scenario};
-use masseter_shared::control::{Controller, Tick};
-use masseter_shared::geometry::{AXES, Actuators, LEGS, Mechanism};
-use masseter_shared::messages::codes::{ControllerState, DriveRequest, DriveState};
-use masseter_shared::messages::{Command, Reading};
+use masseter_model::geometry::{AXES, Actuators, LEGS, Mechanism};
+use masseter_runtime::control::{Controller, Tick};
+use masseter_runtime::messages::codes::{ControllerState, DriveRequest, DriveState};
+use masseter_runtime::messages::{Command, Reading};
+use masseter_scenario::{ControllerConfig, ForceControlConfig, ForceEstimateConfig, Scenario};
 
 /// Cycles before the measurement: half a second of the motion.
 const BEFORE: u64 = 500;

@@ -5,7 +5,7 @@ use std::error::Error;
 use std::f64::consts::PI;
 
 use masseter_controller::kinematics::{Assembly, ForwardError, ForwardTracker, Solution, solve_completely};
-use masseter_shared::geometry::{Mechanism, MechanismConfig, Pose, Vec3};
+use masseter_model::geometry::{Mechanism, MechanismConfig, Pose, Vec3};
 use nalgebra::{Translation3, UnitQuaternion};
 
 /// Turns about each axis reach this far.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use masseter_shared::config::{BiteProfile, ForceControlConfig};
+use masseter_scenario::{BiteProfile, ForceControlConfig};
 
 /// Share of a bite in which the force of a hold is reached.
 const RAMP_SHARE: f64 = 0.1;

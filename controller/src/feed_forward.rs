@@ -4,7 +4,7 @@
 //! period. Velocity and acceleration are differences of three desired poses, one period apart. The offsets fade in, since the
 //! drives' own loops carry the weight when the motion begins.
 
-use masseter_shared::geometry::{AXES, Pose, Twist};
+use masseter_model::geometry::{AXES, Pose, Twist};
 
 use crate::model::{Model, twist_between};
 use crate::pose_law::Detour;
@@ -49,8 +49,8 @@ impl FeedForward {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::config::{DynamicsConfig, Scenario};
-    use masseter_shared::geometry::{LEGS, Mechanism, MechanismConfig, Vec3};
+    use masseter_model::geometry::{LEGS, Mechanism, MechanismConfig, Vec3};
+    use masseter_scenario::{DynamicsConfig, Scenario};
 
     use super::*;
 

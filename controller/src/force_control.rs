@@ -9,10 +9,10 @@
 //! jaw waits, or gives way to more than the force of contact, and goes with the motion again when the motion opens. Only the
 //! height is controlled; the other five freedoms keep to the motion. Limit of stability: `docs/dynamics-control.md`.
 
-use masseter_shared::config::{ForceControlConfig, ForceSource, MOST_LEAD_CYCLES, Scenario};
-use masseter_shared::geometry::{Pose, Vec3};
-use masseter_shared::messages::codes::ControllerState;
-use masseter_shared::named::{Declared, Signal};
+use masseter_model::geometry::{Pose, Vec3};
+use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::named::{Declared, Signal};
+use masseter_scenario::{ForceControlConfig, ForceSource, MOST_LEAD_CYCLES, Scenario};
 use nalgebra::Translation3;
 
 use crate::bite_profile::desired_n;

@@ -11,10 +11,10 @@
 //! share, that of an axis near rest only by its largest size. The drives round their forces: twice the standard deviation of
 //! this rounding counts.
 
-use masseter_shared::config::{ForceEstimateConfig, Scenario};
-use masseter_shared::dynamics::{Equations, Motion};
-use masseter_shared::geometry::{AXES, Pose, Twist};
-use masseter_shared::named::Signal;
+use masseter_model::dynamics::{Equations, Motion};
+use masseter_model::geometry::{AXES, Pose, Twist};
+use masseter_runtime::named::Signal;
+use masseter_scenario::{ForceEstimateConfig, Scenario};
 use nalgebra::Vector6;
 
 use crate::model::{Braking, Model, twist_between};
@@ -157,7 +157,7 @@ impl ForceObserver {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::geometry::{LEGS, Mechanism, MechanismConfig, Vec3};
+    use masseter_model::geometry::{LEGS, Mechanism, MechanismConfig, Vec3};
     use nalgebra::UnitQuaternion;
 
     use super::*;
@@ -220,7 +220,7 @@ mod tests {
     fn masses_that_are_wrong_by_a_fifth_shift_the_bite_force_by_a_fifth_of_the_weight() {
         let mut scenario = Scenario::default();
         let right = scenario.dynamics;
-        scenario.controller.model = Some(masseter_shared::config::DynamicsConfig {
+        scenario.controller.model = Some(masseter_scenario::DynamicsConfig {
             platform_mass_kg: 1.2 * right.platform_mass_kg,
             rod_mass_kg: 1.2 * right.rod_mass_kg,
             ..right

@@ -3,12 +3,12 @@
 //! No trajectory, no feedback in pose space, no inverse kinematics: a second, minimal
 //! implementation of [`Controller`].
 
-use masseter_shared::config::Scenario;
-use masseter_shared::control::{Controller, Outcome, Tick};
-use masseter_shared::geometry::Mechanism;
-use masseter_shared::messages::codes::ControllerState;
-use masseter_shared::messages::{Command, Event, Reading, State};
-use masseter_shared::named::{Declared, PlayedMotion};
+use masseter_model::geometry::Mechanism;
+use masseter_runtime::control::{Controller, Outcome, Tick};
+use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::messages::{Command, Event, Reading, State};
+use masseter_runtime::named::{Declared, PlayedMotion};
+use masseter_scenario::Scenario;
 
 use crate::sequencer::{Estimate, Sequencer};
 
@@ -16,11 +16,11 @@ use crate::sequencer::{Estimate, Sequencer};
 ///
 /// ```
 /// use masseter_controller::hold_position::HoldPosition;
-/// use masseter_shared::config::Scenario;
-/// use masseter_shared::control::{Controller, Tick};
-/// use masseter_shared::geometry::{Mechanism, MechanismConfig};
-/// use masseter_shared::messages::Command;
-/// use masseter_shared::messages::codes::DriveRequest;
+/// use masseter_scenario::Scenario;
+/// use masseter_runtime::control::{Controller, Tick};
+/// use masseter_model::geometry::{Mechanism, MechanismConfig};
+/// use masseter_runtime::messages::Command;
+/// use masseter_runtime::messages::codes::DriveRequest;
 ///
 /// let mut controller = HoldPosition::new(&Scenario::default(), Mechanism::new(&MechanismConfig::default())?, 2.0);
 /// controller.observe(None);
@@ -29,7 +29,7 @@ use crate::sequencer::{Estimate, Sequencer};
 /// controller.fill_command(&mut command);
 /// // Without a reading the drives stay off.
 /// assert_eq!((command.cycle, command.request), (1, DriveRequest::Off.code()));
-/// # Ok::<_, masseter_shared::geometry::GeometryError>(())
+/// # Ok::<_, masseter_model::geometry::GeometryError>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct HoldPosition {
@@ -88,10 +88,11 @@ impl Controller for HoldPosition {
 
 #[cfg(test)]
 mod tests {
+    use masseter_model::geometry::AXES;
+    use masseter_runtime::messages::codes::{DriveRequest, DriveState};
+
     use super::*;
     use crate::sequencer::ALL_AXES;
-    use masseter_shared::geometry::AXES;
-    use masseter_shared::messages::codes::{DriveRequest, DriveState};
 
     /// Drives that do at once what they are asked to, at a fixed position.
     struct Bench {

@@ -1,10 +1,10 @@
 //! What the controller believes of the mechanism: inverse dynamics with friction.
 //!
-//! τ = J⁻ᵀ (M V̇ + h − w) + friction, with the [equations](masseter_shared::dynamics) of the rigid bodies.
+//! τ = J⁻ᵀ (M V̇ + h − w) + friction, with the [equations](masseter_model::dynamics) of the rigid bodies.
 
-use masseter_shared::config::Scenario;
-use masseter_shared::dynamics::{Bodies, Equations, Friction, Loads, Motion, Reactions};
-use masseter_shared::geometry::{Mechanism, Pose, Twist};
+use masseter_model::dynamics::{Bodies, Equations, Friction, Loads, Motion, Reactions};
+use masseter_model::geometry::{Mechanism, Pose, Twist};
+use masseter_scenario::Scenario;
 use nalgebra::Vector6;
 
 /// Friction depends on loads, and loads on what friction leaves of the drives' forces: passes until both agree. The first one
@@ -92,7 +92,7 @@ pub(crate) fn twist_between(from: &Pose, to: &Pose, time_s: f64) -> Twist {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::geometry::MechanismConfig;
+    use masseter_model::geometry::MechanismConfig;
 
     use super::*;
 

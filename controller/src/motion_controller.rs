@@ -5,12 +5,12 @@
 
 use std::hint::black_box;
 
-use masseter_shared::config::Scenario;
-use masseter_shared::control::{Controller, Outcome, Tick};
-use masseter_shared::geometry::{AXES, Actuators, Conditioning, Jacobian, Joints, Mechanism, Pose};
-use masseter_shared::messages::codes::ControllerState;
-use masseter_shared::messages::{Command, Event, Reading, State};
-use masseter_shared::named::{Declared, Parameter};
+use masseter_model::geometry::{AXES, Actuators, Conditioning, Jacobian, Joints, Mechanism, Pose};
+use masseter_runtime::control::{Controller, Outcome, Tick};
+use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::messages::{Command, Event, Reading, State};
+use masseter_runtime::named::{Declared, Parameter};
+use masseter_scenario::Scenario;
 use nalgebra::Translation3;
 
 use crate::command_acknowledgement::CommandAcknowledgement;
@@ -42,10 +42,10 @@ const LATE_READING_CYCLES: u64 = 1;
 /// ```
 /// use masseter_controller::motion_controller::MotionController;
 /// use masseter_controller::trajectory::Trajectory;
-/// use masseter_shared::config::Scenario;
-/// use masseter_shared::control::{Controller, Tick};
-/// use masseter_shared::geometry::Mechanism;
-/// use masseter_shared::messages::codes::ControllerState;
+/// use masseter_scenario::Scenario;
+/// use masseter_runtime::control::{Controller, Tick};
+/// use masseter_model::geometry::Mechanism;
+/// use masseter_runtime::messages::codes::ControllerState;
 ///
 /// let scenario = Scenario::default();
 /// let mechanism = Mechanism::new(&scenario.mechanism)?;

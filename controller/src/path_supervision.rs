@@ -5,9 +5,9 @@
 //! that came at another time than planned, the platform is elsewhere on its path. What the motion makes in that time is no
 //! deviation: that is the slack.
 
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::{Deviation, Pose};
-use masseter_shared::messages::codes::Cause;
+use masseter_model::geometry::{Deviation, Pose};
+use masseter_runtime::messages::codes::Cause;
+use masseter_scenario::Scenario;
 
 use crate::safety::Fault;
 use crate::sequencer::Estimate;
@@ -105,8 +105,8 @@ impl PathSupervision {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::config::{ControllerConfig, JawConfig};
-    use masseter_shared::geometry::{Actuators, LEGS, Mechanism, MechanismConfig, Vec3};
+    use masseter_model::geometry::{Actuators, LEGS, Mechanism, MechanismConfig, Vec3};
+    use masseter_scenario::{ControllerConfig, JawConfig};
 
     use super::*;
     use crate::kinematics::ForwardTracker;

@@ -2,8 +2,8 @@
 //! it is stopped halfway. Time comes in as the steps of the motion, so that the motion waits while the drives cannot follow.
 //! Rate and amplitude of the motion may change while it plays.
 
-use masseter_shared::config::MotionConfig;
-use masseter_shared::geometry::Pose;
+use masseter_model::geometry::Pose;
+use masseter_scenario::MotionConfig;
 
 use crate::slew::Slew;
 use crate::trajectory::{Trajectory, interpolate, minimum_jerk};

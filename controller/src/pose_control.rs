@@ -3,9 +3,9 @@
 //! The drives follow fast motion by feed-forward; what remains on average (friction, gravity,
 //! calibration) is corrected here. The trim adds no damping and no feed-forward.
 
-use masseter_shared::config::ControllerConfig;
-use masseter_shared::geometry::{Pose, Vec3};
-use masseter_shared::named::{Declared, Parameter};
+use masseter_model::geometry::{Pose, Vec3};
+use masseter_runtime::named::{Declared, Parameter};
+use masseter_scenario::ControllerConfig;
 use nalgebra::UnitQuaternion;
 
 use crate::pose_law::{Demand, LawFailed, PoseLaw};

@@ -3,9 +3,9 @@
 //! The sequence (enable, ease, run, hold, disable), kinematics, playback and every safety check stay with
 //! [`MotionController`](crate::motion_controller::MotionController), whatever the law is.
 
-use masseter_shared::geometry::{Pose, Vec3};
-use masseter_shared::messages::codes::ControllerState;
-use masseter_shared::named::Declared;
+use masseter_model::geometry::{Pose, Vec3};
+use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::named::Declared;
 
 /// What a pose law needs of a cycle. Poses are those of the platform in the base frame, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -78,8 +78,8 @@ pub struct LawFailed;
 /// use masseter_controller::motion_controller::MotionController;
 /// use masseter_controller::pose_law::{Demand, LawFailed, PoseLaw};
 /// use masseter_controller::trajectory::Trajectory;
-/// use masseter_shared::config::Scenario;
-/// use masseter_shared::geometry::{Mechanism, Pose};
+/// use masseter_scenario::Scenario;
+/// use masseter_model::geometry::{Mechanism, Pose};
 ///
 /// #[derive(Debug)]
 /// struct FeedForward;

@@ -1,10 +1,10 @@
 //! The controller's process: the mechanism and the motion of its scenario, and the controller that is built for them.
 
-use masseter_shared::config::Scenario;
-use masseter_shared::control::{Controller, Outcome, Session};
-use masseter_shared::geometry::{GeometryError, Mechanism};
-use masseter_shared::lifecycle::attach::{AttachError, attach};
-use masseter_shared::lifecycle::{ProcessArguments, ProcessContext, ProcessError};
+use masseter_model::geometry::{GeometryError, Mechanism};
+use masseter_runtime::control::{Controller, Outcome, Session};
+use masseter_runtime::lifecycle::attach::{AttachError, attach};
+use masseter_runtime::lifecycle::{ProcessArguments, ProcessContext, ProcessError};
+use masseter_scenario::Scenario;
 
 use crate::motion_controller::MotionController;
 use crate::pose_law::PoseLaw;

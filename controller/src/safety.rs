@@ -1,8 +1,8 @@
 //! Checks that stop the controller: each fault has a cause, a value and a limit.
 
-use masseter_shared::geometry::{AXES, Actuators, InverseError, LEGS, LimitViolation, Pose};
-use masseter_shared::messages::codes::{Cause, DriveState, NO_AXIS, NoPose, drive_state};
-use masseter_shared::messages::{Event, Reading};
+use masseter_model::geometry::{AXES, Actuators, InverseError, LEGS, LimitViolation, Pose};
+use masseter_runtime::messages::codes::{Cause, DriveState, NO_AXIS, NoPose, drive_state};
+use masseter_runtime::messages::{Event, Reading};
 
 use crate::kinematics::ForwardError;
 use crate::pose_law::LawFailed;

@@ -2,7 +2,7 @@
 //!
 //! The sequencer finds the trigger of a cycle. This module only holds the resulting state and request.
 
-use masseter_shared::messages::codes::{ControllerState as State, DriveRequest};
+use masseter_runtime::messages::codes::{ControllerState as State, DriveRequest};
 
 /// What changes a state. In one cycle only the most urgent trigger counts: the last in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

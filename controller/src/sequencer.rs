@@ -1,13 +1,13 @@
 //! What the controllers have in common: they take readings, follow the sequence of states, stop when a wait takes too
 //! long, and write command and state.
 
-use masseter_shared::config::{ControllerConfig, Scenario};
-use masseter_shared::control::{Outcome, Tick};
-use masseter_shared::geometry::{AXES, Actuators, Mechanism, Pose};
-use masseter_shared::messages::codes::{
+use masseter_model::geometry::{AXES, Actuators, Mechanism, Pose};
+use masseter_runtime::control::{Outcome, Tick};
+use masseter_runtime::messages::codes::{
     Cause, ControllerState, DriveState, EventKind, NO_DRIVE_STATE, Source, drive_state,
 };
-use masseter_shared::messages::{Command, Event, Reading, State, pose_fields};
+use masseter_runtime::messages::{Command, Event, Reading, State, pose_fields};
+use masseter_scenario::{ControllerConfig, Scenario};
 
 use crate::kinematics::{ForwardTracker, Solution};
 use crate::safety::{self, Fault};

@@ -1,7 +1,7 @@
 //! A share, 0 to 1, that follows its target with limited speed and acceleration.
 
-use masseter_shared::config::TrajectoryLimitsConfig;
-use masseter_shared::geometry::AXES;
+use masseter_model::geometry::AXES;
+use masseter_scenario::TrajectoryLimitsConfig;
 
 use crate::trajectory::TrajectoryReport;
 

@@ -1,8 +1,8 @@
 //! Whether the jaw stands near enough to the first pose of the motion to be eased there.
 
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::{Mechanism, Pose, Vec3};
-use masseter_shared::messages::codes::Cause;
+use masseter_model::geometry::{Mechanism, Pose, Vec3};
+use masseter_runtime::messages::codes::Cause;
+use masseter_scenario::Scenario;
 
 use crate::safety::Fault;
 
@@ -37,7 +37,7 @@ impl StartTolerance {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::geometry::MechanismConfig;
+    use masseter_model::geometry::MechanismConfig;
 
     use super::*;
 

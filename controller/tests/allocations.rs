@@ -9,11 +9,11 @@ use std::hint::black_box;
 use masseter_controller::kinematics::{ForwardTracker, Method, Options, Solutions, solve};
 use masseter_controller::motion_controller::MotionController;
 use masseter_controller::trajectory::Trajectory;
-use masseter_shared::config::{ControllerConfig, ForceControlConfig, Scenario};
-use masseter_shared::control::{Controller, Tick};
-use masseter_shared::geometry::{AXES, Actuators, LEGS, Mechanism, MechanismConfig};
-use masseter_shared::messages::codes::{ControllerState, DriveRequest, DriveState};
-use masseter_shared::messages::{Command, Reading, State};
+use masseter_model::geometry::{AXES, Actuators, LEGS, Mechanism, MechanismConfig};
+use masseter_runtime::control::{Controller, Tick};
+use masseter_runtime::messages::codes::{ControllerState, DriveRequest, DriveState};
+use masseter_runtime::messages::{Command, Reading, State};
+use masseter_scenario::{ControllerConfig, ForceControlConfig, Scenario};
 
 struct Counting;
 

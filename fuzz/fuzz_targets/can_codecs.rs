@@ -7,8 +7,8 @@ use libfuzzer_sys::fuzz_target;
 use masseter_can::canopen::{Cob, Emergency, Heartbeat, Nmt, NodeId, SdoRequest, SdoResponse};
 use masseter_can::socketcand::Requests;
 use masseter_can::{CanId, ErrorReport, PdoMapping, Rpdo1, Tpdo1, candump};
-use masseter_shared::messages::tap;
-use masseter_shared::messages::{CanData, FrameTap, Message};
+use masseter_runtime::messages::tap;
+use masseter_runtime::messages::{CanData, FrameTap, Message};
 
 fuzz_target!(|data: &[u8]| {
     canopen(data);

@@ -10,7 +10,7 @@ use libfuzzer_sys::fuzz_target;
 use masseter_controller::kinematics::{
     Certificate, Equations, ForwardError, ForwardTracker, Solution, solve_completely,
 };
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism, MechanismConfig};
+use masseter_model::geometry::{Actuators, LEGS, Mechanism, MechanismConfig};
 use nalgebra::Vector3;
 
 /// Roundings between the solver's corners and those made from its angles.

@@ -8,8 +8,8 @@ use libfuzzer_sys::arbitrary::{Result, Unstructured};
 use libfuzzer_sys::fuzz_target;
 use masseter_controller::trajectory::Trajectory;
 use masseter_fuzz::{assert_proper, file_of};
-use masseter_shared::config::{FileConfig, JawConfig, MotionConfig};
-use masseter_shared::geometry::{Mechanism, MechanismConfig};
+use masseter_model::geometry::{Mechanism, MechanismConfig};
+use masseter_scenario::{FileConfig, JawConfig, MotionConfig};
 
 const POSES: &str = "time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz";
 const MARKERS: &str = "time_s,m1_x_mm,m1_y_mm,m1_z_mm,m2_x_mm,m2_y_mm,m2_z_mm,m3_x_mm,m3_y_mm,m3_z_mm";

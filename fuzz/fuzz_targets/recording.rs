@@ -7,10 +7,10 @@ use std::sync::LazyLock;
 
 use libfuzzer_sys::arbitrary::{Result, Unstructured};
 use libfuzzer_sys::fuzz_target;
+use masseter_model::geometry::{Mechanism, MechanismConfig};
 use masseter_recording::{ReadError, Reader, Recorded, Recorder, Scene, recover};
-use masseter_shared::config::JawConfig;
-use masseter_shared::geometry::{Mechanism, MechanismConfig};
-use masseter_shared::messages::{Message, Reading};
+use masseter_runtime::messages::{Message, Reading};
+use masseter_scenario::JawConfig;
 
 /// Opcode and length of a record, channel, number and two times of a message.
 const LEAST_MESSAGE_BYTES: u64 = 9 + 22;

@@ -9,10 +9,10 @@ use libfuzzer_sys::arbitrary::{Result, Unstructured};
 use libfuzzer_sys::fuzz_target;
 use masseter_controller::trajectory::Trajectory;
 use masseter_fuzz::{assert_proper, file_of};
-use masseter_shared::config::{
+use masseter_model::geometry::Mechanism;
+use masseter_scenario::{
     FaultConfig, FaultKindConfig, LateralConfig, MotionConfig, OpeningConfig, ProtrusionConfig, Scenario,
 };
-use masseter_shared::geometry::Mechanism;
 
 fuzz_target!(|data: &[u8]| {
     // As somebody's file, which the examples are, and as a source of edits.

@@ -7,10 +7,10 @@ use masseter_can::canopen::{NodeId, sync};
 use masseter_can::cia402::{Controlword, Statusword};
 use masseter_can::{Bitrate, Bus, PdoMapping, Rpdo1, Tpdo1, VirtualWire, WireConfig};
 use masseter_plant::core::PlantCore;
-use masseter_shared::config::{FoodConfig, FrictionModel, LoadCellConfig, Scenario, TeethConfig};
-use masseter_shared::messages::codes::DriveRequest;
-use masseter_shared::messages::{Command, LAYOUT_VERSION, Reading};
-use masseter_shared::realtime::Wake;
+use masseter_runtime::messages::codes::DriveRequest;
+use masseter_runtime::messages::{Command, LAYOUT_VERSION, Reading};
+use masseter_runtime::realtime::Wake;
+use masseter_scenario::{FoodConfig, FrictionModel, LoadCellConfig, Scenario, TeethConfig};
 
 const PERIOD_NS: u64 = 1_000_000;
 const BUSES: u8 = 2;

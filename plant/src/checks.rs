@@ -1,8 +1,8 @@
 //! Checks of quantities that drives and bus need to fit each other.
 
-use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::LEGS;
+use masseter_model::geometry::LEGS;
+use masseter_runtime::clock::MILLISECOND_NS;
+use masseter_scenario::Scenario;
 
 use crate::error::PlantError;
 

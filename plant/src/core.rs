@@ -7,9 +7,9 @@ mod wire_events;
 
 use masseter_can::canopen::Cob;
 use masseter_can::{ReceiveError, Tapped};
-use masseter_shared::config::Scenario;
-use masseter_shared::messages::{Command, Contact, Event, FrameTap, Reading, Truth, tap};
-use masseter_shared::realtime::Wake;
+use masseter_runtime::messages::{Command, Contact, Event, FrameTap, Reading, Truth, tap};
+use masseter_runtime::realtime::Wake;
+use masseter_scenario::Scenario;
 
 use crate::emulation::VirtualLink;
 use crate::error::PlantError;
@@ -32,9 +32,9 @@ const TAPPED: usize = 4096;
 ///
 /// ```
 /// use masseter_plant::core::PlantCore;
-/// use masseter_shared::config::Scenario;
-/// use masseter_shared::messages::Reading;
-/// use masseter_shared::realtime::Wake;
+/// use masseter_scenario::Scenario;
+/// use masseter_runtime::messages::Reading;
+/// use masseter_runtime::realtime::Wake;
 ///
 /// let mut plant = PlantCore::new(&Scenario::default(), 0)?;
 /// let mut reading = Reading::default();

@@ -2,9 +2,9 @@
 
 use std::borrow::Borrow;
 
-use masseter_shared::messages::{Command, Contact, Reading, Truth};
-use masseter_shared::realtime::Wake;
-use masseter_shared::schedule::CycleSchedule;
+use masseter_runtime::messages::{Command, Contact, Reading, Truth};
+use masseter_runtime::realtime::Wake;
+use masseter_runtime::schedule::CycleSchedule;
 
 use crate::core::PlantCore;
 use crate::error::PlantError;
@@ -63,8 +63,8 @@ pub trait PlantPorts<L: Link> {
 /// use masseter_plant::core::PlantCore;
 /// use masseter_plant::cycle::{PlantPorts, run_cycle};
 /// use masseter_plant::emulation::VirtualLink;
-/// use masseter_shared::realtime::Wake;
-/// use masseter_shared::schedule::CycleSchedule;
+/// use masseter_runtime::realtime::Wake;
+/// use masseter_runtime::schedule::CycleSchedule;
 ///
 /// /// A second at 1 kHz, in simulated time.
 /// fn run_second<P: PlantPorts<VirtualLink>>(

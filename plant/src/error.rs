@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use masseter_can::NotByPort;
 use masseter_can::canopen::NodeIdError;
 use masseter_can::{BitrateError, OpenError};
-use masseter_shared::geometry::GeometryError;
+use masseter_model::geometry::GeometryError;
 
 use crate::mechanism::DynamicsError;
 

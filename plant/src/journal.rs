@@ -1,7 +1,7 @@
 //! Events that wait to be published: a bounded list that counts the events it has no room for.
 
-use masseter_shared::messages::Event;
-use masseter_shared::messages::codes::{Cause, EventKind, Source};
+use masseter_runtime::messages::Event;
+use masseter_runtime::messages::codes::{Cause, EventKind, Source};
 
 /// Events kept between two drains, of which one follows every cycle.
 const CAPACITY: usize = 256;

@@ -1,15 +1,15 @@
 //! The plant's process: binds the pure core to iceoryx2, and to real time or to lockstep. It decides nothing.
 
-use masseter_shared::clock;
-use masseter_shared::config::Scenario;
-use masseter_shared::lifecycle::{Party, ProcessArguments, ProcessContext, ProcessError, StopRequest};
-use masseter_shared::lockstep::{Clock, Lockstep};
-use masseter_shared::messages::{Command, Contact, Event, FrameTap, Reading, Truth};
-use masseter_shared::realtime::Wake;
-use masseter_shared::schedule::CycleSchedule;
-use masseter_shared::transport::{
-    BatchPublisher, Node, Publisher, ReceivedMessage, Subscriber, TransportError,
+use masseter_runtime::clock;
+use masseter_runtime::lifecycle::{Party, ProcessArguments, ProcessContext, ProcessError, StopRequest};
+use masseter_runtime::lockstep::{Clock, Lockstep};
+use masseter_runtime::messages::{Command, Contact, Event, Reading, Truth};
+use masseter_runtime::realtime::Wake;
+use masseter_runtime::schedule::CycleSchedule;
+use masseter_runtime::transport::{
+    FramePublisher, Node, Publisher, ReceivedMessage, Subscriber, TransportError,
 };
+use masseter_scenario::Scenario;
 
 use crate::core::PlantCore;
 use crate::cycle::{PlantPorts, run_cycle};
@@ -53,7 +53,7 @@ struct Ports {
     readings: Publisher<Reading>,
     truths: Publisher<Truth>,
     contacts: Publisher<Contact>,
-    frames: BatchPublisher<FrameTap>,
+    frames: FramePublisher,
     events: Publisher<Event>,
 }
 
@@ -64,7 +64,7 @@ impl Ports {
             readings: node.publisher()?,
             truths: node.publisher()?,
             contacts: node.publisher()?,
-            frames: BatchPublisher::open(node)?,
+            frames: FramePublisher::open(node)?,
             events: node.publisher()?,
         })
     }
@@ -205,7 +205,7 @@ impl<L: Link> PlantPorts<L> for Binding<'_> {
         let now_ns = || self.clock.now_ns();
         let tapped = plant.drain_frames();
         let mut occurred = 0;
-        self.samples = BatchPublisher::<FrameTap>::samples(tapped.len());
+        self.samples = FramePublisher::samples(tapped.len());
         let mut result = frames.publish_by(now_ns, tapped);
         plant.drain_events(&mut |event| {
             occurred += 1;

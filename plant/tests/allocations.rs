@@ -6,14 +6,14 @@ use std::cell::Cell;
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 
+use masseter_model::geometry::AXIS_NAMES;
 use masseter_plant::core::PlantCore;
-use masseter_shared::config::{
+use masseter_runtime::messages::codes::{DriveRequest, DriveState};
+use masseter_runtime::messages::{Command, LAYOUT_VERSION, Reading};
+use masseter_runtime::realtime::Wake;
+use masseter_scenario::{
     FaultConfig, FaultKindConfig, FaultLayer, FaultPlace, FoodConfig, Scenario, StimulusConfig, TeethConfig,
 };
-use masseter_shared::geometry::AXIS_NAMES;
-use masseter_shared::messages::codes::{DriveRequest, DriveState};
-use masseter_shared::messages::{Command, LAYOUT_VERSION, Reading};
-use masseter_shared::realtime::Wake;
 
 struct Counting;
 

@@ -5,27 +5,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use hdrhistogram::Histogram;
+use masseter_round_trips::Durations;
 use serde::Serialize;
 
 use masseter_report::histogram_log;
 use masseter_study::median;
-
-/// Durations of one round, ns.
-pub(super) type Durations = Histogram<u64>;
-
-/// An empty histogram of durations.
-pub(super) fn no_durations() -> Durations {
-    Histogram::new(3).expect("three digits are allowed")
-}
-
-/// Adds `count` times the same duration.
-pub(super) fn record(durations: &mut Durations, taken_ns: u64, count: u64) {
-    // Recording it zero times would still raise the histogram's maximum.
-    if count > 0 {
-        durations.record_n(taken_ns, count).expect("a histogram that resizes itself takes any value");
-    }
-}
 
 /// The result of one round.
 #[derive(Debug)]
@@ -145,6 +129,8 @@ impl Candidate {
 
 #[cfg(test)]
 mod tests {
+    use masseter_round_trips::{no_durations, record};
+
     use super::*;
 
     fn round(value_ns: u64) -> Round {

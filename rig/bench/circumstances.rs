@@ -4,12 +4,12 @@ use std::collections::BTreeSet;
 
 use anyhow::ensure;
 use masseter_recording::MachineInfo;
-use masseter_shared::realtime::scheduling::{Obtained, usable_cores};
+use masseter_runtime::realtime::scheduling::{Obtained, usable_cores};
 use masseter_terminal::status;
 use serde::Serialize;
 
 use super::args::Kind;
-use super::thread::realtime_on;
+use masseter_round_trips::realtime_on;
 
 /// Written with the results.
 #[derive(Debug, Serialize)]
@@ -30,7 +30,7 @@ impl Circumstances {
         for refusal in refusals {
             status!("  {refusal}");
         }
-        Self { machine: crate::machine::describe(), cores, scheduling }
+        Self { machine: masseter_machine::describe(), cores, scheduling }
     }
 }
 

@@ -79,8 +79,9 @@ impl Comparison {
 
 #[cfg(test)]
 mod tests {
-    use super::super::candidate::{Spread, no_durations};
+    use super::super::candidate::Spread;
     use super::*;
+    use masseter_round_trips::no_durations;
 
     fn round(value_ns: u64) -> Round {
         let mut round = no_durations();

@@ -2,13 +2,13 @@
 
 use std::time::Duration;
 
-use masseter_shared::clock::{self, SECOND_NS};
-use masseter_shared::realtime::Waiter;
+use masseter_runtime::clock::{self, SECOND_NS};
+use masseter_runtime::realtime::Waiter;
 use serde::Serialize;
 
-use super::thread::on_core;
-use crate::machine::SystemRoot;
-use crate::machine::counters::stolen_ns;
+use masseter_machine::SystemRoot;
+use masseter_machine::counters::stolen_ns;
+use masseter_round_trips::on_core;
 
 /// With a greater share of time stolen or standing still, high percentiles come from the machine, %.
 const BOUND_PERCENT: f64 = 1.0;

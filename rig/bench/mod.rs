@@ -9,11 +9,11 @@ mod circumstances;
 mod comparison;
 mod disturbance;
 pub(crate) mod ipc;
+mod peer;
 mod played_run;
 mod rate;
 mod simulated;
 mod table;
-mod thread;
 mod virtual_time;
 mod wake;
 
@@ -21,13 +21,13 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::Context;
+use masseter_scenario::wording::counted;
 use serde::Serialize;
 
 use crate::arguments::name_of;
 use args::{BenchArgs, Kind};
 use circumstances::Circumstances;
 use comparison::Comparison;
-use masseter_shared::wording::counted;
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, status};
 
 /// Version of the form of `results.json`.

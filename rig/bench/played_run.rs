@@ -7,12 +7,12 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use masseter_shared::clock;
-use masseter_shared::config::Scenario;
+use masseter_runtime::clock;
+use masseter_scenario::Scenario;
 use rustix::process::{Pid, Signal, kill_process};
 use tempfile::TempDir;
 
-use crate::machine::interrupts::Interrupts;
+use crate::interrupts::Interrupts;
 
 /// The user stopped the bench.
 #[derive(Debug, thiserror::Error)]

@@ -9,15 +9,16 @@ use std::time::Duration;
 use anyhow::Context;
 use masseter_analysis::{Analysis, Code, Figures};
 use masseter_recording::{Manifest, Reader, RunFolder};
-use masseter_shared::config::Scenario;
-use masseter_shared::messages::codes::ControllerState;
-use masseter_shared::named::Declared;
+use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::named::Declared;
+use masseter_scenario::Scenario;
 use masseter_terminal::Exit;
 
-use super::candidate::{Candidate, Durations, Round, no_durations};
+use super::candidate::{Candidate, Round};
 use super::comparison::{Comparison, take_turns};
 use super::played_run::PlayedRun;
-use crate::machine::interrupts::Interrupts;
+use crate::interrupts::Interrupts;
+use masseter_round_trips::{Durations, no_durations};
 
 /// Rates, Hz; the others are compared with the first.
 const RATES_HZ: [u32; 5] = [1000, 2000, 5000, 10_000, 20_000];
@@ -176,10 +177,10 @@ fn shares(figures: &Figures, manifest: &Manifest) -> Vec<(String, f64)> {
 #[cfg(test)]
 mod tests {
     use masseter_recording::{MachineInfo, Recorded};
-    use masseter_shared::messages::{Reading, State};
+    use masseter_runtime::messages::{Reading, State};
 
     use super::*;
-    use crate::bench::candidate::record;
+    use masseter_round_trips::record;
 
     #[test]
     fn runs_that_stopped_or_lost_messages_are_noted_but_not_measured() {

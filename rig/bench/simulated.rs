@@ -7,16 +7,17 @@ use std::fs;
 use std::time::Duration;
 
 use anyhow::{Context, ensure};
-use masseter_shared::clock;
-use masseter_shared::config::Scenario;
+use masseter_runtime::clock;
+use masseter_scenario::Scenario;
 use masseter_terminal::Exit;
 use serde_json::Value;
 
-use super::candidate::{Candidate, Durations, no_durations, record};
+use super::candidate::Candidate;
 use super::comparison::{Comparison, Turn};
 use super::ipc;
 use super::played_run::PlayedRun;
-use crate::machine::interrupts::Interrupts;
+use crate::interrupts::Interrupts;
+use masseter_round_trips::{Durations, no_durations, record};
 
 /// Motion of a run, s; start and report are a small part of so long a run.
 const MOTION_S: f64 = 30.0;

@@ -1,6 +1,6 @@
 //! A comparison as text for a terminal.
 
-use masseter_shared::wording::counted;
+use masseter_scenario::wording::counted;
 
 use super::candidate::{Ratio, Spread};
 use super::comparison::Comparison;

@@ -4,17 +4,18 @@
 use std::fs;
 
 use anyhow::{Context, ensure};
-use masseter_shared::clock;
-use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
+use masseter_runtime::clock;
+use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain};
 use masseter_terminal::Exit;
 use rustix::mm::munlockall;
 
-use super::candidate::{Candidate, Round, no_durations, record};
+use super::candidate::{Candidate, Round};
 use super::comparison::{Comparison, take_turns};
 use super::played_run::Interrupted;
-use crate::machine::interrupts::Interrupts;
+use crate::interrupts::Interrupts;
 use crate::run::args::{ClockKind, RunArgs};
 use crate::run::judge_unrecorded;
+use masseter_round_trips::{no_durations, record};
 
 /// Motion of a run, ns.
 const MOTION_NS: f64 = 10e9;

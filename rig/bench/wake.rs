@@ -7,15 +7,16 @@
 use std::process::Command;
 
 use anyhow::{Context, bail};
-use masseter_shared::clock::{self, SECOND_NS};
-use masseter_shared::config::{CpuDmaLatency, RealtimeConfig};
-use masseter_shared::realtime::Cycle;
-use masseter_shared::schedule::OFF_TICK_NS;
+use masseter_runtime::clock::{self, SECOND_NS};
+use masseter_runtime::realtime::Cycle;
+use masseter_runtime::schedule::OFF_TICK_NS;
+use masseter_scenario::{CpuDmaLatency, RealtimeConfig};
 
-use super::candidate::{Durations, Round, no_durations, record};
+use super::candidate::Round;
 use super::comparison::{Comparison, Turn};
-use super::thread::on_core;
-use crate::machine::dma_latency::Hold;
+use masseter_machine::dma_latency::Hold;
+use masseter_round_trips::on_core;
+use masseter_round_trips::{Durations, no_durations, record};
 
 const PERIOD_NS: u64 = SECOND_NS / 1000;
 /// Wake-ups per round.

@@ -4,7 +4,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use masseter_campaign::{Campaign, CampaignFolder, CaseResult, StopRules};
-use masseter_shared::clock;
+use masseter_runtime::clock;
 use masseter_terminal::{Failure, status};
 
 use super::player::Player;

@@ -19,11 +19,11 @@ use anyhow::{Context, anyhow};
 use clap::ValueEnum;
 use masseter_campaign::{Campaign, CampaignFile, CampaignFolder, CampaignLock, Report, digest_of_program};
 use masseter_plan::{Overrides, scenario_with_overrides};
-use masseter_shared::clock;
+use masseter_runtime::clock;
 use masseter_terminal::{Exit, Failure, OrFailure, result, status};
 
 use crate::arguments::{ControllerKind, name_of};
-use crate::machine::interrupts::Interrupts;
+use crate::interrupts::Interrupts;
 use crate::run::check_simulated;
 use crate::shell::word;
 use args::{CampaignArgs, EngineKind};

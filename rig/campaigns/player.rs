@@ -3,14 +3,14 @@
 use masseter_analysis::Figures;
 use masseter_campaign::{CampaignFolder, Case, CaseResult};
 use masseter_report::Verdict;
-use masseter_shared::clock;
-use masseter_shared::config::Scenario;
+use masseter_runtime::clock;
+use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure};
 
 use crate::arguments::ControllerKind;
 use crate::error_text::in_one_line;
 use crate::guarded::guarded;
-use crate::machine::interrupts::Interrupts;
+use crate::interrupts::Interrupts;
 use crate::run::figures_unrecorded;
 
 /// Plays cases by one controller.

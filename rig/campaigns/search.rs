@@ -149,12 +149,12 @@ fn value(result: &CaseResult, requirement: Option<&str>) -> Value {
 mod tests {
     use masseter_controller::motion_controller::MotionController;
     use masseter_controller::pose_law::{Demand, LawFailed, PoseLaw};
+    use masseter_model::geometry::{Pose, Vec3};
     use masseter_report::Verdict;
-    use masseter_shared::config::Scenario;
-    use masseter_shared::geometry::{Pose, Vec3};
+    use masseter_scenario::Scenario;
 
     use super::*;
-    use crate::machine::interrupts::Interrupts;
+    use crate::interrupts::Interrupts;
     use crate::run::figures_by;
 
     const SCENARIO: &str = "\
@@ -202,7 +202,7 @@ range = [0.5, 1.0]
 
     impl WeakInACorner {
         fn new(scenario: &Scenario) -> Self {
-            let masseter_shared::config::MotionConfig::Chewing(chewing) = &scenario.motion else {
+            let masseter_scenario::MotionConfig::Chewing(chewing) = &scenario.motion else {
                 panic!("the campaign has one motion")
             };
             let dynamics = &scenario.dynamics;

@@ -8,8 +8,8 @@ use masseter_analysis::Figures;
 use masseter_campaign::Shrink;
 use masseter_plan::{Overrides, scenario_with_overrides};
 use masseter_report::{CheckResult, Verdict};
-use masseter_shared::config::Scenario;
-use masseter_shared::messages::codes::EventKind;
+use masseter_runtime::messages::codes::EventKind;
+use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure, result, status};
 
 use super::args::ShrinkArgs;

@@ -4,14 +4,14 @@ use std::time::Duration;
 
 use anyhow::{Context, ensure};
 use masseter_campaign::{CampaignFolder, Interruption};
-use masseter_shared::clock;
+use masseter_runtime::clock;
 use masseter_terminal::{Exit, Failure, OrFailure};
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 
 use super::args::CampaignCaseArgs;
 use super::player::Player;
 use super::{controller_of, program};
-use crate::machine::interrupts::Interrupts;
+use crate::interrupts::Interrupts;
 
 /// Time between two looks whether the start is interrupted.
 const LOOK_EVERY: Duration = Duration::from_millis(50);

@@ -7,11 +7,11 @@ use std::fmt::Display;
 use masseter_can::socketcand::{ECHO, OK, Request, RequestError, Requests, write_frame};
 use masseter_can::{Bus, ReceiveError};
 use masseter_plant::emulation::{NodePort, OpenLink};
-use masseter_shared::clock::SECOND_NS;
-use masseter_shared::conversation::{Conversation, Left, Limits};
-use masseter_shared::wording::counted;
+use masseter_runtime::clock::SECOND_NS;
+use masseter_runtime::conversation::{Conversation, Left, Limits};
+use masseter_scenario::wording::counted;
 
-use crate::stderr_writer::StderrWriter;
+use masseter_recorder::StderrWriter;
 
 /// Most bytes from a client that has opened no bus.
 const MOST_BYTES: usize = 1 << 16;

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use masseter_model::geometry::AXIS_NAMES;
 use masseter_plan::read_scenario;
 use masseter_plant::description;
-use masseter_shared::geometry::AXIS_NAMES;
 use masseter_terminal::{Exit, result};
 
 /// The arguments of `can eds`.

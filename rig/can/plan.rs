@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use masseter_can::{BusPlan, PlannedMessage};
 use masseter_plant::core as plant;
-use masseter_shared::config::Scenario;
-use masseter_shared::schedule::{CycleSchedule, Room, ScheduleError, plans};
+use masseter_runtime::schedule::{CycleSchedule, Room, ScheduleError, plans};
+use masseter_scenario::Scenario;
 use serde_json::{Value, json};
 
 use masseter_terminal::{Exit, Format, result};

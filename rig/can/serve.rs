@@ -12,19 +12,19 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 use masseter_can::socketcand::GREETING;
+use masseter_model::geometry::AXIS_NAMES;
 use masseter_plant::emulation::OpenLink;
-use masseter_shared::clock;
-use masseter_shared::config::Scenario;
-use masseter_shared::conversation::{Left, Limits, Look, Newcomers};
-use masseter_shared::geometry::AXIS_NAMES;
-use masseter_shared::lifecycle::StopRequest;
+use masseter_runtime::clock;
+use masseter_runtime::conversation::{Left, Limits, Look, Newcomers};
+use masseter_runtime::lifecycle::StopRequest;
+use masseter_scenario::Scenario;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 
 use super::client::{Client, CloseReason};
 use crate::arguments::parse_address;
-use crate::refusals::Refusals;
-use crate::stderr_writer::StderrWriter;
+use masseter_recorder::Refusals;
+use masseter_recorder::StderrWriter;
 use masseter_terminal::Exit;
 
 /// Clients on one bus at a time.

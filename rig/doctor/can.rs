@@ -6,7 +6,7 @@ use masseter_can::{Interface, is_supported};
 
 use super::container::on_host;
 use super::finding::Finding;
-use crate::machine::SystemRoot;
+use masseter_machine::SystemRoot;
 
 /// All findings of this family.
 pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
@@ -56,7 +56,7 @@ mod tests {
 
     use super::super::finding::Level::{Ok as Fine, Warn};
     use super::*;
-    use crate::machine::fixture::Fixture;
+    use masseter_machine::fixture::Fixture;
 
     #[test]
     fn a_kernel_without_can_is_a_warning_only() {

@@ -1,6 +1,6 @@
 //! Containers: the options of their start decide what they may do, and their kernel is the host's.
 
-use crate::machine::SystemRoot;
+use masseter_machine::SystemRoot;
 
 /// The command that starts a container with `options`, or `otherwise` outside of containers.
 pub(super) fn start_with(root: &SystemRoot, options: &str, otherwise: impl Into<String>) -> String {
@@ -22,7 +22,7 @@ fn engine(root: &SystemRoot) -> Option<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine::fixture::Fixture;
+    use masseter_machine::fixture::Fixture;
 
     #[test]
     fn a_container_is_started_anew_by_its_engine() {

@@ -1,9 +1,10 @@
 //! The kernel: preemption, real-time throttling, isolated cores, clock source.
 
+use masseter_scenario::wording::counted;
+
 use super::container::on_host;
 use super::finding::Finding;
-use crate::machine::SystemRoot;
-use masseter_shared::wording::counted;
+use masseter_machine::SystemRoot;
 
 /// Clock sources that are read in tens of nanoseconds, without a system call.
 const FAST_SOURCES: [&str; 4] = ["tsc", "kvm-clock", "arch_sys_counter", "hyperv_clocksource_tsc_page"];
@@ -115,7 +116,7 @@ fn clock_source(root: &SystemRoot) -> Finding {
 mod tests {
     use super::super::finding::Level::{self, Bad, Ok, Warn};
     use super::*;
-    use crate::machine::fixture::Fixture;
+    use masseter_machine::fixture::Fixture;
 
     type Files<'a> = &'a [(&'a str, &'a str)];
 

@@ -1,7 +1,7 @@
 //! Other rigs of this user: running ones, and files of killed ones in shared memory.
 
-use masseter_shared::transport::{Domain, DomainError};
-use masseter_shared::wording::counted;
+use masseter_runtime::transport::{Domain, DomainError};
+use masseter_scenario::wording::counted;
 
 use super::finding::Finding;
 

@@ -4,7 +4,7 @@ use rustix::fs::statvfs;
 
 use super::container::{on_host, start_with};
 use super::finding::Finding;
-use crate::machine::SystemRoot;
+use masseter_machine::SystemRoot;
 
 const SHARED_MEMORY: &str = "/dev/shm";
 /// Three times what a rig's topics need.
@@ -53,7 +53,7 @@ fn room(root: &SystemRoot, shared: Option<(u64, u64)>) -> Finding {
 mod tests {
     use super::super::finding::Level::{Bad, Ok, Warn};
     use super::*;
-    use crate::machine::fixture::Fixture;
+    use masseter_machine::fixture::Fixture;
 
     #[test]
     fn huge_pages_made_behind_the_back_are_warned_of() {

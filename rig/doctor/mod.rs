@@ -20,7 +20,7 @@ use serde::Serialize;
 
 use finding::{Finding, Level};
 
-use crate::machine::SystemRoot;
+use masseter_machine::SystemRoot;
 
 /// The arguments of `doctor`.
 #[derive(Debug, Clone, Args)]

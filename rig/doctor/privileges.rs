@@ -2,12 +2,12 @@
 
 use std::thread;
 
-use masseter_shared::config::RealtimeConfig;
-use masseter_shared::realtime::scheduling::{Obtained, SchedulingRequest, obtain};
+use masseter_runtime::realtime::scheduling::{Obtained, SchedulingRequest, obtain};
+use masseter_scenario::RealtimeConfig;
 
 use super::container;
 use super::finding::Finding;
-use crate::machine::SystemRoot;
+use masseter_machine::SystemRoot;
 
 /// Raises both limits for this user, from the next login on.
 const RAISE_LIMITS: &str = "printf '%s - rtprio 95\\n%s - memlock unlimited\\n' \"$USER\" \"$USER\" \
@@ -59,7 +59,7 @@ fn locked_memory(root: &SystemRoot, obtained: &Obtained) -> Finding {
 mod tests {
     use super::super::finding::Level;
     use super::*;
-    use crate::machine::fixture::Fixture;
+    use masseter_machine::fixture::Fixture;
 
     #[test]
     fn what_counts_is_what_was_read_back() {

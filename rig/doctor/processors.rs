@@ -3,11 +3,11 @@
 use std::env;
 use std::fs::OpenOptions;
 
-use masseter_shared::realtime::scheduling::usable_cores;
+use masseter_runtime::realtime::scheduling::usable_cores;
 
 use super::container::{on_host, start_with};
 use super::finding::Finding;
-use crate::machine::{SystemRoot, dma_latency, is_virtual};
+use masseter_machine::{SystemRoot, dma_latency, is_virtual};
 
 /// Longest exit latency of an idle state that the loops' spin covers, µs.
 const LATEST_EXIT_US: i64 = 200;
@@ -121,7 +121,7 @@ fn hypervisor(root: &SystemRoot) -> Finding {
 mod tests {
     use super::super::finding::Level::{Bad, Ok, Warn};
     use super::*;
-    use crate::machine::fixture::Fixture;
+    use masseter_machine::fixture::Fixture;
 
     #[test]
     fn two_cores_are_needed_and_a_cpuset_that_hides_them_is_left() {

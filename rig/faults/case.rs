@@ -1,7 +1,7 @@
 //! The cases of the matrix: a fault of each kind, at each axis, in each phase, with a size that a real one may have.
 
-use masseter_shared::config::{FaultConfig, FaultKindConfig, FaultLayer, FaultPlace, Quantity, Scenario};
-use masseter_shared::geometry::AXIS_NAMES;
+use masseter_model::geometry::AXIS_NAMES;
+use masseter_scenario::{FaultConfig, FaultKindConfig, FaultLayer, FaultPlace, Quantity, Scenario};
 
 use super::phases::Phase;
 

@@ -16,11 +16,11 @@ use std::fs;
 use std::path::PathBuf;
 
 use masseter_report::Verdict;
-use masseter_shared::config::{ChecksConfig, FaultConfig, FaultKindConfig, Scenario};
+use masseter_scenario::{ChecksConfig, FaultConfig, FaultKindConfig, Scenario};
 use rayon::prelude::*;
 
 use crate::arguments::ControllerKind;
-use crate::machine::interrupts::Interrupts;
+use crate::interrupts::Interrupts;
 use crate::run::figures_unrecorded;
 
 const CYCLES: [u32; 8] = [1, 2, 5, 10, 20, 50, 100, 500];

@@ -7,7 +7,7 @@ use anyhow::Context;
 use masseter_plan::{RunPlan, read_scenario};
 use masseter_recording::output::new_folder;
 use masseter_report::Verdict;
-use masseter_shared::config::Scenario;
+use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure, result, status};
 use rayon::prelude::*;
 
@@ -17,7 +17,7 @@ use super::phases::phases;
 use super::picture;
 use super::table::{Coverage, HEADER, Row};
 use crate::arguments::ControllerKind;
-use crate::machine::interrupts::Interrupts;
+use crate::interrupts::Interrupts;
 use crate::run::figures_unrecorded;
 
 /// Plays the matrix; fails if a fault leads the jaw beyond the limits before somebody detects it.

@@ -11,7 +11,7 @@ mod picture;
 mod table;
 
 use clap::Subcommand;
-use masseter_shared::config::FaultKindConfig;
+use masseter_scenario::FaultKindConfig;
 use masseter_terminal::{Exit, Failure, OrFailure, result};
 
 use args::MatrixArgs;

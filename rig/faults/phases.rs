@@ -1,7 +1,7 @@
 //! The phases of the motion in which the matrix lets faults strike, found from the motion itself.
 
+use masseter_model::geometry::Vec3;
 use masseter_plan::RunPlan;
-use masseter_shared::geometry::Vec3;
 
 /// Where the search for phases begins and ends: the motion has its speed by then, s.
 const SEARCHED_S: [f64; 2] = [1.5, 3.5];

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use masseter_shared::geometry::AXIS_NAMES;
+use masseter_model::geometry::AXIS_NAMES;
 
 use super::table::{Coverage, Row};
 

@@ -1,10 +1,10 @@
 //! A row of the matrix: what a fault did, and who detected it.
 
 use masseter_analysis::Figures;
+use masseter_model::geometry::AXIS_NAMES;
 use masseter_report::Verdict;
-use masseter_shared::config::ChecksConfig;
-use masseter_shared::geometry::AXIS_NAMES;
-use masseter_shared::messages::codes::EventKind;
+use masseter_runtime::messages::codes::EventKind;
+use masseter_scenario::ChecksConfig;
 
 use super::case::Case;
 

@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use masseter_shared::messages::LAYOUT_VERSION;
-use masseter_shared::messages::codes::{NO_AXIS, NO_DRIVE_STATE};
+use masseter_runtime::messages::LAYOUT_VERSION;
+use masseter_runtime::messages::codes::{NO_AXIS, NO_DRIVE_STATE};
 
 use super::description::{Enumeration, Layout, LayoutField, constant, snake_case};
 

@@ -1,9 +1,9 @@
 //! The messages and codes as other languages need them.
 
-use masseter_shared::messages::codes::{
+use masseter_runtime::messages::codes::{
     Cause, ControllerState, DriveRequest, DriveState, EventKind, NoPose, Source,
 };
-use masseter_shared::messages::{Command, Contact, Event, Field, Message, Reading, State, Truth, plain};
+use masseter_runtime::messages::{Command, Contact, Event, Field, Message, Reading, State, Truth, plain};
 
 /// A message as other languages need it.
 pub(super) struct Layout {

@@ -3,8 +3,8 @@
 use std::iter;
 
 use masseter_controller::kinematics::{Assembly, ForwardError, Solution, Solutions, nearest_assembly_m};
-use masseter_shared::geometry::{Actuators, Conditioning, Jacobian, Joints, LEGS, Mechanism};
-use masseter_shared::messages::pose_fields;
+use masseter_model::geometry::{Actuators, Conditioning, Jacobian, Joints, LEGS, Mechanism};
+use masseter_runtime::messages::pose_fields;
 use masseter_terminal::Exit;
 
 use super::table::{ACTUATOR_COLUMNS, Columns, CsvArgs, Lines, convert};

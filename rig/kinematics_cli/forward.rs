@@ -2,8 +2,8 @@
 
 use clap::{Args, ValueEnum};
 use masseter_controller::kinematics::{ForwardError, ForwardTracker, Method, Options, Solution, solve};
-use masseter_shared::geometry::{AXES, Actuators, LEGS, Mechanism, StrokeLimits};
-use masseter_shared::messages::pose_fields;
+use masseter_model::geometry::{AXES, Actuators, LEGS, Mechanism, StrokeLimits};
+use masseter_runtime::messages::pose_fields;
 use masseter_terminal::Exit;
 
 use super::every;

@@ -5,7 +5,7 @@ use std::io::{self, BufReader};
 use std::path::Path;
 
 use anyhow::Context;
-use masseter_shared::rows::{Line, lines};
+use masseter_scenario::rows::{Line, lines};
 
 /// The input with its name in messages.
 pub(super) struct Input {

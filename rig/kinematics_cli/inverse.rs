@@ -1,8 +1,8 @@
 //! `masseter ik`: poses to joint coordinates.
 
 use masseter_controller::kinematics::Assembly;
-use masseter_shared::geometry::{InverseError, Joints, Mechanism, Pose};
-use masseter_shared::messages::pose_from_fields;
+use masseter_model::geometry::{InverseError, Joints, Mechanism, Pose};
+use masseter_runtime::messages::pose_from_fields;
 use masseter_terminal::Exit;
 
 use super::table::{Columns, CsvArgs, convert, mechanism};

@@ -9,10 +9,10 @@ use std::path::PathBuf;
 
 use anyhow::{anyhow, ensure};
 use clap::Args;
-use masseter_shared::geometry::Mechanism;
-use masseter_shared::input::excerpt;
-use masseter_shared::rows::{Line, fields, numbers};
-use masseter_shared::wording::shortest;
+use masseter_model::geometry::Mechanism;
+use masseter_scenario::input::excerpt;
+use masseter_scenario::rows::{Line, fields, numbers};
+use masseter_scenario::wording::shortest;
 use masseter_terminal::{Exit, status, taken};
 use rayon::prelude::*;
 

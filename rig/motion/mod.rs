@@ -15,9 +15,9 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 use masseter_controller::trajectory::survey;
+use masseter_model::geometry::Mechanism;
 use masseter_plan::{Overrides, scenario_with_overrides};
-use masseter_shared::config::{FileConfig, MotionConfig, Scenario};
-use masseter_shared::geometry::Mechanism;
+use masseter_scenario::{FileConfig, MotionConfig, Scenario};
 use masseter_terminal::{Exit, Format, Tone, result, result_with_tones};
 
 use found::Found;

@@ -1,9 +1,9 @@
 //! Whether the rig would play a motion, and what the motion leaves of the strokes.
 
 use masseter_controller::trajectory::{Trajectory, TrajectoryError, TrajectoryReport};
+use masseter_model::geometry::{AXES, AXIS_NAMES, Mechanism};
 use masseter_plan::demands;
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::{AXES, AXIS_NAMES, Mechanism};
+use masseter_scenario::Scenario;
 use serde::Serialize;
 
 /// The axis that comes nearest to an end of its stroke.

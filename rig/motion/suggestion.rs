@@ -1,9 +1,9 @@
 //! Values of the scenario with which a recorded motion fits, tried before they are suggested.
 
 use masseter_controller::trajectory::Trajectory;
+use masseter_model::geometry::Mechanism;
 use masseter_plan::best_placement;
-use masseter_shared::config::{MotionConfig, Scenario};
-use masseter_shared::geometry::Mechanism;
+use masseter_scenario::{MotionConfig, Scenario};
 use serde::Serialize;
 
 use super::strokes::{Strokes, judge, strokes};

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use masseter_controller::trajectory::{PointFigures, Range, RecordingSurvey};
-use masseter_shared::wording::counted;
+use masseter_scenario::wording::counted;
 
 use super::found::Found;
 use super::suggestion::Suggestion;

@@ -6,9 +6,9 @@
 
 use std::collections::VecDeque;
 
-use masseter_shared::geometry::AXES;
-use masseter_shared::messages::codes::ControllerState;
-use masseter_shared::messages::{Reading, State};
+use masseter_model::geometry::AXES;
+use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::messages::{Reading, State};
 
 use super::error::ReplayError;
 

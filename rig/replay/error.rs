@@ -1,7 +1,7 @@
 //! Why a run cannot be replayed.
 
 use masseter_recording::ReadError;
-use masseter_shared::wording::counted;
+use masseter_scenario::wording::counted;
 
 /// The reason, and what to do.
 #[derive(Debug, thiserror::Error)]

@@ -16,20 +16,20 @@ use masseter_controller::process;
 use masseter_plan::{Overrides, scenario_with_overrides};
 use masseter_recording::{Columns, Manifest, Reader, Recorded, RunFolder, definitions};
 use masseter_report::divergence::{Compared, Comparison, Differences, Side};
-use masseter_shared::config::Scenario;
-use masseter_shared::control::{Controller, Duties, Operator, run_cycle, set_parameters};
-use masseter_shared::messages::codes::Cause;
-use masseter_shared::messages::{Event, State};
-use masseter_shared::named::NamedValues;
-use masseter_shared::realtime::{Account, Wake};
-use masseter_shared::schedule::CycleSchedule;
+use masseter_runtime::control::{Controller, Duties, Operator, run_cycle, set_parameters};
+use masseter_runtime::messages::codes::Cause;
+use masseter_runtime::messages::{Event, State};
+use masseter_runtime::named::NamedValues;
+use masseter_runtime::realtime::{Account, Wake};
+use masseter_runtime::schedule::CycleSchedule;
+use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Format, result};
 use serde::Serialize;
 
 use crate::arguments::{ControllerKind, name_of};
-use crate::run::{Log, LoggedPorts, Sink};
 use deliveries::Deliveries;
 use error::ReplayError;
+use masseter_virtual_time::{Log, LoggedPorts, Sink};
 use recorded_run::RecordedRun;
 
 /// The arguments of `replay`.
@@ -116,7 +116,7 @@ impl Replayed {
 struct Replay {
     controller: Box<dyn Controller>,
     duties: Duties,
-    log: Log<Comparison>,
+    log: Log<Answers>,
     run: RecordedRun,
     deliveries: Deliveries,
     /// States whose cycles have not been replayed.
@@ -124,10 +124,12 @@ struct Replay {
     cycles: u64,
 }
 
-/// What the controller answers is the second side.
-impl Sink for Comparison {
+/// What the controller answers is the second side of the comparison.
+struct Answers(Comparison);
+
+impl Sink for Answers {
     fn take(&mut self, message: &Recorded, _: u64) {
-        Self::take(self, Side::B, message);
+        self.0.take(Side::B, message);
     }
 
     fn has_failed(&self) -> bool {
@@ -157,7 +159,7 @@ impl Replay {
         Ok(Self {
             controller,
             duties: Duties { named, operator },
-            log: Log::new(Comparison::new(compared, [run.columns().clone(), own])),
+            log: Log::new(Answers(Comparison::new(compared, [run.columns().clone(), own]))),
             run,
             deliveries: Deliveries::default(),
             waiting: VecDeque::new(),
@@ -170,7 +172,7 @@ impl Replay {
         match message {
             Recorded::Reading(reading) => self.deliveries.push(reading),
             _ if self.run.is_answer(message) => {
-                self.log.sink_mut().take(Side::A, message);
+                self.log.sink_mut().0.take(Side::A, message);
                 if let Recorded::State(state) = message {
                     self.waiting.push_back(*state);
                 }
@@ -191,7 +193,7 @@ impl Replay {
         while let Some(state) = self.waiting.pop_front() {
             self.replay_cycle(&state)?;
         }
-        Ok((self.cycles, self.log.into_sink().finish()))
+        Ok((self.cycles, self.log.into_sink().0.finish()))
     }
 
     fn replay_cycle(&mut self, state: &State) -> Result<(), ReplayError> {

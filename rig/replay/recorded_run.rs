@@ -5,9 +5,9 @@ use std::io::{Read, Seek};
 
 use masseter_analysis::{SequenceCheck, TopicFigures};
 use masseter_recording::{Columns, Ending, Manifest, Reader, Recorded, Topic};
-use masseter_shared::messages::codes::{Cause, Source};
-use masseter_shared::messages::{Event, State};
-use masseter_shared::named::Declared;
+use masseter_runtime::messages::codes::{Cause, Source};
+use masseter_runtime::messages::{Event, State};
+use masseter_runtime::named::Declared;
 
 use super::error::ReplayError;
 

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plan::{Overrides, scenario_with_overrides};
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
+use masseter_scenario::Scenario;
 
 use crate::arguments::{Wires, parse_wires};
 

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use masseter_model::geometry::AXIS_NAMES;
 use masseter_plant::bringup::Settings;
-use masseter_shared::geometry::AXIS_NAMES;
 
 use super::damaged::{Damage, DamagedFile, check_old_value, parse};
 

@@ -4,13 +4,13 @@ use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use masseter_controller::kinematics::Solutions;
 use masseter_controller::trajectory::{closed_jaw_points, closed_pose};
-use masseter_plant::bringup::{MotionError, Stand, stand};
-use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::{
+use masseter_model::geometry::{
     AXES, AXIS_NAMES, Actuators, Conditioning, Jacobian, Joints, Mechanism, Pose, Vec3,
 };
-use masseter_shared::messages::pose_fields;
+use masseter_plant::bringup::{MotionError, Stand, stand};
+use masseter_runtime::clock::MILLISECOND_NS;
+use masseter_runtime::messages::pose_fields;
+use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, result_line};
 use serde_json::{Value, json};
 

@@ -4,7 +4,7 @@
 //! drives after it are not touched, and no drive ever gets power.
 
 use masseter_plant::bringup::{Deviation, Outcome, Settings};
-use masseter_shared::wording::counted;
+use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, Failure, OrFailure, result};
 
 use super::args::WriteArgs;

@@ -4,8 +4,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use masseter_shared::config::ObjectKey;
-use masseter_shared::input::{MOST_KEPT_BYTES, read_text};
+use masseter_scenario::ObjectKey;
+use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 use serde::de::DeserializeOwned;
 
 /// Controlword: no step keeps a value of this object.

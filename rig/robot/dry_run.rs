@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use anyhow::{Context, ensure};
-use masseter_shared::config::{FileConfig, Scenario};
-use masseter_shared::input::read_bytes;
+use masseter_scenario::input::read_bytes;
+use masseter_scenario::{FileConfig, Scenario};
 use serde_json::json;
 
 use super::evidence::StepFolder;

@@ -8,10 +8,10 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
+use masseter_model::geometry::{AXES, AXIS_NAMES, MechanismConfig};
 use masseter_recording::RunFolder;
-use masseter_shared::clock;
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::{AXES, AXIS_NAMES, MechanismConfig};
+use masseter_runtime::clock;
+use masseter_scenario::Scenario;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 

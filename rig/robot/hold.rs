@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 
 use masseter_plant::bringup::Wish;
-use masseter_shared::clock::{MILLISECOND_NS, SECOND_NS};
+use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 
 /// For how long a byte permits motion: longer than the time between two repeats of a key, ns.
 const HELD_NS: u64 = 300 * MILLISECOND_NS;

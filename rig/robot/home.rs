@@ -1,8 +1,8 @@
 //! `masseter robot home`: one axis after the other.
 
 use clap::Args;
+use masseter_model::geometry::AXIS_NAMES;
 use masseter_plant::bringup::{HomeReport, Wish, home as find};
-use masseter_shared::geometry::AXIS_NAMES;
 use masseter_terminal::{Exit, Failure, result_line};
 use serde_json::{Value, json};
 

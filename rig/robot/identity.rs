@@ -3,10 +3,10 @@
 use std::fmt::{self, Display, Formatter};
 
 use masseter_can::canopen::ObjectAddress;
+use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::bringup::{Line, LineError, SdoReason, Survey, object_name, value_text};
 use masseter_plant::wanted::WantedDrive;
-use masseter_shared::config::CanConfig;
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
+use masseter_scenario::CanConfig;
 use masseter_terminal::status;
 use serde::{Deserialize, Serialize};
 

@@ -5,12 +5,12 @@ use std::fmt::Write;
 
 use clap::Args;
 use masseter_can::canopen::ObjectAddress;
+use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::bringup::{
     BootUps, Deviation, LineError, OtherMaster, Outcome, Restarted, Survey, object_name, reason_text,
 };
-use masseter_shared::clock::SECOND_NS;
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
-use masseter_shared::wording::counted;
+use masseter_runtime::clock::SECOND_NS;
+use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, Failure, OrFailure, Tone, result_with_tones};
 use serde::Serialize;
 

@@ -1,7 +1,7 @@
 //! The real interfaces of the buses: what the kernel says of them, and what of it is wrong.
 
 use masseter_can::InterfaceDetails;
-use masseter_shared::config::CanConfig;
+use masseter_scenario::CanConfig;
 use serde::Serialize;
 
 /// An interface, with its faults and its doubts in words.

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use anyhow::anyhow;
 use clap::Args;
+use masseter_model::geometry::AXIS_NAMES;
 use masseter_plant::bringup::{JogOrder, JogReport, Wish, jog as play};
-use masseter_shared::geometry::AXIS_NAMES;
 use masseter_terminal::{Exit, Failure, result_line, status};
 use serde_json::json;
 

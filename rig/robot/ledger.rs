@@ -5,10 +5,10 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, ensure};
+use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::bringup::{Ledger, Line, LineError, OldValue, give_back, object_name, value_text};
-use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::config::{CanConfig, ObjectKey, Scenario};
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
+use masseter_runtime::clock::MILLISECOND_NS;
+use masseter_scenario::{CanConfig, ObjectKey, Scenario};
 use masseter_terminal::{Failure, status};
 use serde::{Deserialize, Serialize};
 

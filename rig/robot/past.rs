@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use masseter_shared::geometry::AXIS_NAMES;
-use masseter_shared::input::{MOST_KEPT_BYTES, read_text};
+use masseter_model::geometry::AXIS_NAMES;
+use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 
 use super::before::{Nameless, before_file};
 use super::evidence::{Basis, Evidence, numbered};
@@ -189,8 +189,8 @@ impl Past {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::config::Scenario;
-    use masseter_shared::geometry::AXES;
+    use masseter_model::geometry::AXES;
+    use masseter_scenario::Scenario;
 
     use super::*;
     use crate::robot::evidence::StepFolder;

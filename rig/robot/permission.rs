@@ -5,8 +5,8 @@ use std::io;
 use std::path::Path;
 
 use anyhow::{Context, bail};
+use masseter_model::geometry::AXES;
 use masseter_plant::bringup::Line;
-use masseter_shared::geometry::AXES;
 use masseter_terminal::status;
 
 use super::dry_run::{FOLDER, Played, check_motion};

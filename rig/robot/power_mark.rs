@@ -5,10 +5,10 @@
 
 use anyhow::Context;
 use masseter_can::canopen::ObjectAddress;
+use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::bringup::{Line, LineError};
-use masseter_shared::clock;
-use masseter_shared::config::{DriveProfile, ObjectConfig, ObjectKey, ObjectRule, Scenario};
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
+use masseter_runtime::clock;
+use masseter_scenario::{DriveProfile, ObjectConfig, ObjectKey, ObjectRule, Scenario};
 use masseter_terminal::{Failure, status};
 use serde::{Deserialize, Serialize};
 

@@ -1,8 +1,8 @@
 //! Whether the drives are at the end of a step those of its beginning: a step may be done with a drive long before it ends.
 
+use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::bringup::{BootUps, Line, LineError, OtherMaster, Restarted};
-use masseter_shared::config::CanConfig;
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
+use masseter_scenario::CanConfig;
 
 use super::identity::{Identity, Known};
 

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use anyhow::anyhow;
+use masseter_model::geometry::AXIS_NAMES;
 use masseter_plant::bringup::Settings;
-use masseter_shared::geometry::AXIS_NAMES;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
 use super::args::WriteArgs;

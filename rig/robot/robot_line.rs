@@ -4,11 +4,11 @@ use std::io::Write;
 
 use anyhow::ensure;
 use masseter_can::canopen::NodeId;
+use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::bringup::{BootUps, Deviation, Line, LineError, Settings, Survey, deviations};
 use masseter_plant::wanted::WantedDrive;
-use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::config::{CanConfig, Scenario};
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
+use masseter_runtime::clock::MILLISECOND_NS;
+use masseter_scenario::{CanConfig, Scenario};
 use masseter_terminal::{Exit, Failure};
 
 use super::identity::{Identity, Known};

@@ -2,12 +2,12 @@
 
 use anyhow::Context;
 use masseter_can::canopen::NodeId;
+use masseter_model::geometry::AXES;
 use masseter_plant::bringup::{BootUps, Line, LineError, MotionError, StopCause};
 use masseter_plant::wanted::WantedDrive;
-use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::AXES;
-use masseter_shared::lifecycle::StopRequest;
+use masseter_runtime::clock::MILLISECOND_NS;
+use masseter_runtime::lifecycle::StopRequest;
+use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 use serde::Serialize;
 use serde_json::json;

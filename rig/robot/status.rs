@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use clap::Args;
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
+use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_terminal::{Exit, Tone, result, result_with_tones};
 
 use super::args::RobotArgs;

@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
+use masseter_model::geometry::{AXES, AXIS_NAMES};
 
 /// A step with evidence of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

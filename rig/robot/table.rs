@@ -1,7 +1,7 @@
 //! Deviations of all drives as one table.
 
+use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::bringup::{Deviation, Outcome};
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
 
 const HEAD: [&str; 6] = ["axis", "object", "wanted", "found", "configure", "decided by"];
 

@@ -3,12 +3,12 @@
 use std::fmt::Write;
 
 use anyhow::{Context, ensure};
+use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::bringup::{
     BootUps, Change, Line, PowerError, Settings, Survey, Writer, prove_no_power, reset, store, take_over,
 };
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
-use masseter_shared::wording::counted;
+use masseter_scenario::Scenario;
+use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, Failure, OrFailure, Tone, result_with_tones};
 use serde::Serialize;
 

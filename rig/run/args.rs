@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use masseter_plan::Overrides;
 use masseter_report::Detail;
-use masseter_shared::lifecycle::Patience;
+use masseter_runtime::lifecycle::Patience;
 use masseter_terminal::Format;
 use rustix::fs::Mode;
 
@@ -15,7 +15,7 @@ use crate::arguments::{
     ControllerChoice, Wires, parse_address, parse_controller, parse_cores, parse_duration, parse_patience,
     parse_wires,
 };
-use crate::live;
+use masseter_recorder::live;
 
 const WHAT: &str = "Choose what to play";
 const HOW: &str = "Choose how it runs";

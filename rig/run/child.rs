@@ -8,14 +8,14 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use masseter_shared::clock;
-use masseter_shared::lifecycle::{Order, Party, Silence, Start, line};
+use masseter_runtime::clock;
+use masseter_runtime::lifecycle::{Order, Party, Silence, Start, line};
 use rustix::process::{
     Pid, PidfdFlags, Resource, Rlimit, Signal, getrlimit, kill_process, pidfd_open, prlimit,
 };
 
 use super::reports::{Due, Readiness, Ready, Reports};
-use crate::machine::interrupts::Interrupts;
+use crate::interrupts::Interrupts;
 
 /// Longest time for a process to open its ports and lock its memory.
 pub(super) const READY_TIMEOUT: Duration = Duration::from_secs(20);

@@ -3,9 +3,9 @@
 use std::thread;
 
 use anyhow::bail;
-use masseter_shared::config::{FaultConfig, FaultKindConfig, FaultLayer, Scenario, StimulusConfig};
-use masseter_shared::control::is_seen_by_controller;
-use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
+use masseter_runtime::control::is_seen_by_controller;
+use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain};
+use masseter_scenario::{FaultConfig, FaultKindConfig, FaultLayer, Scenario, StimulusConfig};
 use masseter_terminal::status;
 
 use crate::arguments::ControllerChoice;

@@ -4,10 +4,10 @@ use std::ffi::OsString;
 use std::io;
 use std::os::fd::OwnedFd;
 
-use masseter_shared::clock;
-use masseter_shared::lifecycle::attach::Invitation;
-use masseter_shared::lifecycle::{End, Silence, Start};
-use masseter_shared::transport::Domain;
+use masseter_runtime::clock;
+use masseter_runtime::lifecycle::attach::Invitation;
+use masseter_runtime::lifecycle::{End, Silence, Start};
+use masseter_runtime::transport::Domain;
 use masseter_terminal::Exit;
 
 use super::child::{CONTROLLER, Process, describe};

@@ -9,20 +9,20 @@ use masseter_controller::process::BuildController;
 use masseter_plan::RunPlan;
 use masseter_recording::{Ending, FullSpeed, Manifest, RunFolder};
 use masseter_report::Judgement;
-use masseter_shared::config::{FileConfig, Scenario};
-use masseter_shared::input::read_text;
-use masseter_shared::transport::{Domain, DomainLock};
+use masseter_runtime::transport::{Domain, DomainLock};
+use masseter_scenario::input::read_text;
+use masseter_scenario::{FileConfig, Scenario};
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
 use super::args::{ClockKind, RunArgs};
 use super::resolve::{resolve, resolve_simulated};
 use super::room::{self, Reserve};
-use super::virtual_time::StartAnalysis;
-use super::{supervisor, virtual_time};
+use super::supervisor;
 use crate::arguments::{ControllerChoice, ControllerKind, name_of};
-use crate::machine::interrupts::Interrupts;
+use crate::interrupts::Interrupts;
 use crate::robot::Played;
-use crate::{doctor, machine, robot};
+use crate::{doctor, robot};
+use masseter_virtual_time::StartAnalysis;
 
 /// Where runs without `--out` go.
 pub(super) const RUNS: &str = "runs";
@@ -89,7 +89,7 @@ impl PreparedRun {
         let ran = match domain {
             None => {
                 let build = args.controller.builder().expect("the clock is checked");
-                virtual_time::record(&plan, &folder, build, &mut manifest, interrupts).incomplete()
+                masseter_virtual_time::record(&plan, &folder, build, &mut manifest, interrupts).incomplete()
             }
             Some(domain) => supervisor::run(domain, &plan, &folder, &args, &mut manifest, interrupts),
         };
@@ -198,14 +198,14 @@ fn unrecorded(
     interrupts: &Interrupts,
 ) -> Result<(Manifest, Figures), Failure> {
     let mut manifest = manifest_of(plan, args);
-    let figures = virtual_time::analyse(plan, build, start, &mut manifest, interrupts).died()?;
+    let figures = masseter_virtual_time::analyse(plan, build, start, &mut manifest, interrupts).died()?;
     Ok((manifest, figures))
 }
 
 /// What is known before the start.
 fn manifest_of(plan: &RunPlan, args: &RunArgs) -> Manifest {
     let (motion_s, clock) = (plan.trajectory.duration_s(), name_of(&args.clock));
-    let mut manifest = Manifest::new(plan.scenario.clone(), motion_s, &clock, machine::describe());
+    let mut manifest = Manifest::new(plan.scenario.clone(), motion_s, &clock, masseter_machine::describe());
     manifest.motion_end_s = Some(plan.trajectory.motion_time_s(motion_s));
     manifest.controller = args.controller.name();
     manifest.full_speed = plan.scenario.dry.is_on.then_some(FullSpeed {

@@ -12,11 +12,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ExitStatus, Stdio};
 
 use anyhow::{Context, bail};
-use masseter_shared::clock::{self, SECOND_NS};
-use masseter_shared::conversation::Left;
-use masseter_shared::lifecycle::attach::{Invitation, RIG_VARIABLE};
-use masseter_shared::lifecycle::{End, Order, ReportError, Silence, Start};
-use masseter_shared::transport::Domain;
+use masseter_runtime::clock::{self, SECOND_NS};
+use masseter_runtime::conversation::Left;
+use masseter_runtime::lifecycle::attach::{Invitation, RIG_VARIABLE};
+use masseter_runtime::lifecycle::{End, Order, ReportError, Silence, Start};
+use masseter_runtime::transport::Domain;
 use masseter_terminal::status;
 use rustix::net::sockopt::socket_peercred;
 use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};

@@ -6,14 +6,14 @@
 use std::os::unix::net::UnixListener;
 
 use anyhow::Context;
-use masseter_shared::clock;
-use masseter_shared::conversation::{Conversation, Left, Limits, Newcomers};
-use masseter_shared::lifecycle::attach::{Answer, Hello, Invitation, socket};
-use masseter_shared::lifecycle::line;
-use masseter_shared::transport::Domain;
+use masseter_runtime::clock;
+use masseter_runtime::conversation::{Conversation, Left, Limits, Newcomers};
+use masseter_runtime::lifecycle::attach::{Answer, Hello, Invitation, socket};
+use masseter_runtime::lifecycle::line;
+use masseter_runtime::transport::Domain;
 use masseter_terminal::status;
 
-use crate::refusals::Refusals;
+use masseter_recorder::Refusals;
 
 /// Bytes of the longest greeting.
 const LONGEST_HELLO: usize = 4096;

@@ -5,11 +5,11 @@ use std::io;
 use std::os::fd::OwnedFd;
 use std::time::Duration;
 
-use masseter_shared::clock;
-use masseter_shared::conversation::{Conversation, Left, Limits};
-use masseter_shared::lifecycle::{End, Order, Report, ReportError, Silence, line};
-use masseter_shared::named::Declared;
-use masseter_shared::realtime::scheduling::Obtained;
+use masseter_runtime::clock;
+use masseter_runtime::conversation::{Conversation, Left, Limits};
+use masseter_runtime::lifecycle::{End, Order, Report, ReportError, Silence, line};
+use masseter_runtime::named::Declared;
+use masseter_runtime::realtime::scheduling::Obtained;
 
 /// Bytes of all reports of a process: a declaration, a fault that is due now and then, and an end.
 const MOST_BYTES: usize = 1 << 20;

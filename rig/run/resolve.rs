@@ -7,15 +7,15 @@ use masseter_analysis::requirements::{RequirementError, check_requirements};
 use masseter_controller::process::BuildController;
 use masseter_plan::RunPlan;
 use masseter_plant::core as plant;
-use masseter_shared::config::Scenario;
-use masseter_shared::control::{Operator, OperatorError};
-use masseter_shared::input::excerpt;
-use masseter_shared::named::{NameError, NamedValues};
+use masseter_runtime::control::{Operator, OperatorError};
+use masseter_runtime::named::{NameError, NamedValues};
+use masseter_scenario::Scenario;
+use masseter_scenario::input::excerpt;
 
 use super::args::RunArgs;
 use super::clock::{self, needs_processes};
 use crate::arguments::{ControllerKind, check_cores};
-use crate::live;
+use masseter_recorder::live;
 
 /// Plans the run and chooses its clock; refuses interfaces and addresses that this machine does not have.
 pub(super) fn resolve(args: &RunArgs) -> anyhow::Result<(RunPlan, RunArgs)> {

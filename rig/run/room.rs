@@ -6,7 +6,7 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow, ensure};
 use masseter_plan::RunPlan;
-use masseter_shared::transport::Domain;
+use masseter_runtime::transport::Domain;
 use rustix::fs::{FallocateFlags, fallocate, statvfs};
 use rustix::process::{Resource, getrlimit};
 
@@ -138,7 +138,7 @@ fn megabytes(bytes: u64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::transport::ScratchDomain;
+    use masseter_runtime::transport::ScratchDomain;
     use masseter_terminal::{Exit, OrFailure};
 
     use super::*;

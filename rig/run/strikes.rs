@@ -12,9 +12,9 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use masseter_recording::{ProcessFault, RunFolder};
-use masseter_shared::clock;
-use masseter_shared::config::{FaultConfig, FaultKindConfig, RealtimeConfig, Scenario};
-use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
+use masseter_runtime::clock;
+use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain};
+use masseter_scenario::{FaultConfig, FaultKindConfig, RealtimeConfig, Scenario};
 use masseter_terminal::status;
 use rustix::process::{Signal, pidfd_send_signal};
 

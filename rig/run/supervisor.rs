@@ -16,15 +16,15 @@ use std::time::Duration;
 use anyhow::Context;
 use masseter_plan::RunPlan;
 use masseter_recording::{DmaLatency, Ending, Manifest, RunFolder};
-use masseter_shared::clock::{self, MILLISECOND_NS, SECOND_NS};
-use masseter_shared::config::Scenario;
-use masseter_shared::lifecycle::attach::Invitation;
-use masseter_shared::lifecycle::{End, Party, Silence, Start};
-use masseter_shared::lockstep;
-use masseter_shared::named::Declared;
-use masseter_shared::realtime::scheduling::Obtained;
-use masseter_shared::schedule::OFF_TICK_NS;
-use masseter_shared::transport::{Domain, DomainError, DomainLock, Swept};
+use masseter_runtime::clock::{self, MILLISECOND_NS, SECOND_NS};
+use masseter_runtime::lifecycle::attach::Invitation;
+use masseter_runtime::lifecycle::{End, Party, Silence, Start};
+use masseter_runtime::lockstep;
+use masseter_runtime::named::Declared;
+use masseter_runtime::realtime::scheduling::Obtained;
+use masseter_runtime::schedule::OFF_TICK_NS;
+use masseter_runtime::transport::{Domain, DomainError, DomainLock, Swept};
+use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
 use super::args::RunArgs;
@@ -35,8 +35,8 @@ use super::room::reserve_shared_memory;
 use super::strikes::{Strikes, Victims};
 use super::usage::UsageMeter;
 use crate::arguments::patience_text;
-use crate::machine::interrupts::Interrupts;
-use crate::machine::{self, SystemRoot, dma_latency};
+use crate::interrupts::Interrupts;
+use masseter_machine::{SystemRoot, dma_latency};
 
 /// Polling interval of the processes.
 const POLL: Duration = Duration::from_millis(2);
@@ -199,7 +199,7 @@ impl Rig {
         interrupts: &Interrupts,
         manifest: &mut Manifest,
     ) -> anyhow::Result<Ending> {
-        let is_virtual = machine::is_virtual(&SystemRoot::of_this_machine());
+        let is_virtual = masseter_machine::is_virtual(&SystemRoot::of_this_machine());
         let hold = dma_latency::Hold::new(plan.scenario.realtime.cpu_dma_latency, is_virtual);
         manifest.cpu_dma_latency = Some(hold.obtained.clone());
         let refusals = print_refusals(&manifest.scheduling, &hold.obtained);

@@ -4,11 +4,11 @@
 //! Counted from the first sample on, when the processes are in their steady state.
 
 use masseter_recording::{RunUsage, Usage};
-use masseter_shared::clock::{self, SECOND_NS};
+use masseter_runtime::clock::{self, SECOND_NS};
 
-use crate::machine::SystemRoot;
-use crate::machine::counters::ProcessCounters;
-use crate::machine::sampler::{Sample, Sampler};
+use masseter_machine::SystemRoot;
+use masseter_machine::counters::ProcessCounters;
+use masseter_machine::sampler::{Sample, Sampler};
 
 const INTERVAL_NS: u64 = SECOND_NS / 2;
 

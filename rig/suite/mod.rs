@@ -15,11 +15,11 @@ use std::time::UNIX_EPOCH;
 
 use anyhow::{Context, ensure};
 use masseter_report::{JunitRun, junit_of_suite};
-use masseter_shared::clock;
+use masseter_runtime::clock;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 use rayon::prelude::*;
 
-use crate::machine::interrupts::Interrupts;
+use crate::interrupts::Interrupts;
 use crate::run::args::ClockKind;
 use crate::run::needs_processes;
 use args::{TestArgs, TestClock};

@@ -1,6 +1,6 @@
 //! The lines of a suite on standard output, in the form of `cargo test`.
 
-use masseter_shared::wording::counted;
+use masseter_scenario::wording::counted;
 use masseter_terminal::{result, result_line};
 
 use super::outcome::{Outcome, Tested};

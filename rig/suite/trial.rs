@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use masseter_report::Judgement;
-use masseter_shared::clock;
+use masseter_runtime::clock;
 use masseter_terminal::{Exit, Failure, status};
 
 use super::args::TestArgs;
@@ -13,7 +13,7 @@ use super::outcome::{Outcome, Tested};
 use crate::arguments::name_of;
 use crate::error_text::in_one_line;
 use crate::guarded::guarded;
-use crate::machine::interrupts::Interrupts;
+use crate::interrupts::Interrupts;
 use crate::run::args::{ClockKind, RunArgs};
 use crate::run::{PreparedRun, judge_unrecorded};
 use crate::shell::word;

@@ -5,25 +5,35 @@ use std::path::Path;
 use super::workspace::{list, metadata, text, within};
 
 /// The crates of the workspace that each crate may use, all by their folders. The root package may use all.
-const MAY_USE: [(&str, &[&str]); 18] = [
+const MAY_USE: [(&str, &[&str]); 26] = [
     ("shared/can", &[]),
-    ("shared", &["shared/can"]),
-    ("controller", &["shared/can", "shared"]),
-    ("shared/c", &["shared", "controller"]),
-    ("shared/python", &["shared", "controller", "rig/recording"]),
-    ("plant", &["shared/can", "shared"]),
+    ("shared/model", &[]),
+    ("shared/scenario", &["shared/can", "shared/model"]),
+    ("shared/runtime", &["shared/can", "shared/model", "shared/scenario"]),
+    // Stands in for a crate of crates.io.
+    ("shared/no_bindgen", &[]),
+    ("controller", &["shared/can", "shared/model", "shared/scenario", "shared/runtime"]),
+    ("shared/c", &["shared/model", "shared/runtime", "controller"]),
+    ("shared/python", &["shared/model", "shared/scenario", "shared/runtime", "controller", "rig/recording"]),
+    ("plant", &["shared/can", "shared/model", "shared/scenario", "shared/runtime"]),
     ("rig/terminal", &[]),
     ("rig/charts", &[]),
     ("rig/page", &[]),
     ("rig/table", &[]),
-    ("rig/plan", &["shared", "controller", "plant"]),
-    ("rig/recording", &["shared"]),
-    ("rig/analysis", &["shared/can", "shared", "controller", "rig/recording"]),
+    ("rig/round_trips", &["shared/scenario", "shared/runtime"]),
+    ("rig/plan", &["shared/model", "shared/scenario", "shared/runtime", "controller", "plant"]),
+    ("rig/recording", &["shared/model", "shared/scenario", "shared/runtime"]),
+    (
+        "rig/analysis",
+        &["shared/can", "shared/model", "shared/scenario", "shared/runtime", "controller", "rig/recording"],
+    ),
     (
         "rig/report",
         &[
             "shared/can",
-            "shared",
+            "shared/model",
+            "shared/scenario",
+            "shared/runtime",
             "controller",
             "rig/recording",
             "rig/analysis",
@@ -32,11 +42,60 @@ const MAY_USE: [(&str, &[&str]); 18] = [
             "rig/terminal",
         ],
     ),
-    ("rig/study", &["shared", "controller", "rig/plan", "rig/charts"]),
-    ("rig/campaign", &["shared", "rig/analysis", "rig/charts", "rig/report", "rig/table"]),
+    ("rig/machine", &["shared/scenario", "shared/runtime", "rig/recording"]),
+    (
+        "rig/recorder",
+        &[
+            "shared/model",
+            "shared/scenario",
+            "shared/runtime",
+            "rig/machine",
+            "rig/recording",
+            "rig/analysis",
+            "rig/report",
+            "rig/page",
+            "rig/terminal",
+        ],
+    ),
+    (
+        "rig/recordings",
+        &[
+            "shared/scenario",
+            "shared/runtime",
+            "rig/recording",
+            "rig/analysis",
+            "rig/report",
+            "rig/table",
+            "rig/terminal",
+        ],
+    ),
+    (
+        "rig/virtual_time",
+        &[
+            "shared/scenario",
+            "shared/runtime",
+            "controller",
+            "plant",
+            "rig/plan",
+            "rig/recording",
+            "rig/analysis",
+            "rig/terminal",
+        ],
+    ),
+    (
+        "rig/study",
+        &["shared/model", "shared/scenario", "shared/runtime", "controller", "rig/plan", "rig/charts"],
+    ),
+    (
+        "rig/campaign",
+        &["shared/scenario", "shared/runtime", "rig/analysis", "rig/charts", "rig/report", "rig/table"],
+    ),
     // Its drive is none of the product's, or errors of master and drive could cancel out.
     ("tests/canopen_node", &["shared/can"]),
-    ("fuzz", &["shared/can", "shared", "controller", "rig/recording"]),
+    (
+        "fuzz",
+        &["shared/can", "shared/model", "shared/scenario", "shared/runtime", "controller", "rig/recording"],
+    ),
 ];
 
 fn may_use(folder: &str, needed: &str) -> bool {

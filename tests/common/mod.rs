@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use std::time::Duration;
 
-use masseter_shared::clock::{self, SECOND_NS};
+use masseter_runtime::clock::{self, SECOND_NS};
 use rustix::process::Pid;
 use serde_json::Value;
 

@@ -3,11 +3,11 @@
 use std::collections::BTreeSet;
 use std::fs;
 
-use masseter_shared::config::Scenario;
-use masseter_shared::messages::codes::Cause;
-use masseter_shared::messages::{
+use masseter_runtime::messages::codes::Cause;
+use masseter_runtime::messages::{
     Command, Contact, Event, Field, FrameTap, Machine, Message, Parameters, Reading, Signals, State, Truth,
 };
+use masseter_scenario::Scenario;
 
 use super::project;
 

@@ -3,7 +3,7 @@
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use masseter_controller::kinematics::Equations;
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
+use masseter_model::geometry::{Actuators, LEGS, Mechanism};
 use nalgebra_0_34::{Matrix3, U3, Vector3};
 
 /// A side that is off by less counts as closed, metres; Newton's iteration ends at the same error.

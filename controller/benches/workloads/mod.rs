@@ -10,7 +10,7 @@ use std::fmt;
 use std::hint::black_box;
 
 use masseter_controller::kinematics::{ForwardTracker, Method, Options, Solutions, solve, solve_completely};
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism, MechanismConfig, Pose};
+use masseter_model::geometry::{Actuators, LEGS, Mechanism, MechanismConfig, Pose};
 use nalgebra::{Translation3, UnitQuaternion};
 
 /// Inputs of a chewing cycle of 0.46 s, one a millisecond.

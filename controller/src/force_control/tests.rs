@@ -1,7 +1,7 @@
 //! The law against food in a world that is only as high as the bite: drives that are two cycles late, and an observer that is
 //! a low-pass.
 
-use masseter_shared::config::{BiteProfile, LoadCellConfig};
+use masseter_scenario::{BiteProfile, LoadCellConfig};
 
 use super::*;
 use crate::pose_law::ExternalForce;

@@ -7,7 +7,7 @@
 //! edge of the strokes about one standing input in 23,000 has two (see
 //! [`uniqueness`](super::uniqueness)), and nothing here relies on there being one.
 
-use masseter_shared::geometry::{Actuators, LEGS, Legs, Mechanism, Pose, Vec3};
+use masseter_model::geometry::{Actuators, LEGS, Legs, Mechanism, Pose, Vec3};
 use nalgebra::Vector3;
 
 use super::Equations;

@@ -28,7 +28,7 @@
 
 use std::f64::consts::PI;
 
-use masseter_shared::geometry::LEGS;
+use masseter_model::geometry::LEGS;
 
 use super::legs::each;
 use super::loop_equations::{LoopEquations, PlatformSide, Residuals};
@@ -97,7 +97,7 @@ fn curvature_bound(side: &PlatformSide) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::geometry::Actuators;
+    use masseter_model::geometry::Actuators;
     use proptest::prelude::*;
 
     use super::*;

@@ -1,6 +1,6 @@
 //! The true solution among all, from the input alone.
 
-use masseter_shared::geometry::{Actuators, Mechanism};
+use masseter_model::geometry::{Actuators, Mechanism};
 
 use super::elimination::SolutionFilter;
 use super::loop_equations::LoopEquations;
@@ -11,7 +11,7 @@ use super::{Condition, ForwardError, Solution};
 ///
 /// ```
 /// use masseter_controller::kinematics::solve_completely;
-/// use masseter_shared::geometry::{Actuators, Mechanism, MechanismConfig};
+/// use masseter_model::geometry::{Actuators, Mechanism, MechanismConfig};
 ///
 /// let mechanism = Mechanism::new(&MechanismConfig::default())?;
 /// let neutral = Actuators { slide_m: [0.0; 3], leg_m: [0.27; 3] };
@@ -87,7 +87,7 @@ fn nearly_true(loops: &LoopEquations<'_>, solutions: &LoopSolutions) -> Option<C
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::geometry::LEGS;
+    use masseter_model::geometry::LEGS;
     use proptest::prelude::*;
 
     use super::*;

@@ -26,7 +26,7 @@
 //! Next to a singularity two solutions lie close together. [`loop_solutions`](super::loop_solutions) looks for the second
 //! from the first. If rounding does not separate the two, both are reported without a certificate.
 
-use masseter_shared::geometry::LEGS;
+use masseter_model::geometry::LEGS;
 
 use super::bernstein::{NODES, Vanishing, Zeros, locate};
 use super::four_bar::{Branches, FourBar, Interval};
@@ -257,7 +257,7 @@ fn narrowed(within: Interval, at_low: f64, at_high: f64, function: impl Fn(f64) 
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::geometry::Actuators;
+    use masseter_model::geometry::Actuators;
     use proptest::prelude::*;
 
     use super::*;

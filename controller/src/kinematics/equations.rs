@@ -3,7 +3,7 @@
 //! fₖ = |Aᵢ − Aⱼ| − Lᵢⱼ for the sides 12, 23, 31 of the platform, each a function of the two leg angles
 //! at its ends. Nothing here searches for a solution.
 
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Vec3};
+use masseter_model::geometry::{Actuators, LEGS, Mechanism, Vec3};
 use nalgebra::{Matrix3, Vector3};
 
 use super::legs::next;

@@ -1,6 +1,6 @@
 //! Why the forward kinematics gives no pose.
 
-use masseter_shared::geometry::AXIS_NAMES;
+use masseter_model::geometry::AXIS_NAMES;
 
 use super::Condition;
 

@@ -108,7 +108,7 @@ fn closest(offset: f64, along: f64, across: f64, norm: f64) -> LegAngle {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::geometry::Actuators;
+    use masseter_model::geometry::Actuators;
     use proptest::prelude::*;
 
     use super::*;

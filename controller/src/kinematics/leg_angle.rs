@@ -1,6 +1,6 @@
 //! A leg's angle as a point on the unit circle, so that iterating needs no sine and no cosine.
 
-use masseter_shared::geometry::LEGS;
+use masseter_model::geometry::LEGS;
 
 use super::legs::each;
 

@@ -1,6 +1,6 @@
 //! The three legs and the three sides of the platform, in their cyclic order.
 
-use masseter_shared::geometry::LEGS;
+use masseter_model::geometry::LEGS;
 
 /// One value for each leg or side. `array::map` and `from_fn` do the same, but are not unrolled here, and
 /// then pass everything through memory: a quarter of a warm solve's time.

@@ -10,7 +10,7 @@
 //! gₖ = 0 exactly where the paper's fₖ = 0 (eq. 1). The module does not choose a
 //! solution. The paper's own form of the equations is [`Equations`](super::Equations).
 
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Vec3};
+use masseter_model::geometry::{Actuators, LEGS, Mechanism, Vec3};
 
 use super::leg_angle::LegAngle;
 use super::legs::{each, next};

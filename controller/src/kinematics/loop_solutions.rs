@@ -3,7 +3,7 @@
 //! The choice of the true solution needs no more. A full description of every solution costs several times as much:
 //! see [`Solutions`](super::Solutions).
 
-use masseter_shared::geometry::{Actuators, LEGS};
+use masseter_model::geometry::{Actuators, LEGS};
 
 use super::elimination::{Elimination, NEARLY_SINGULAR, SolutionFilter};
 use super::leg_angle::{LegAngle, coincide, separation_rad};

@@ -4,7 +4,7 @@
 //! the platform's sides that would be needed. A bounded descent from each of a grid of starts finds an upper
 //! bound: other angles may come a little closer.
 
-use masseter_shared::geometry::{Actuators, Mechanism};
+use masseter_model::geometry::{Actuators, Mechanism};
 use nalgebra::{Matrix3, Vector3};
 
 use super::Equations;
@@ -58,7 +58,7 @@ fn descended_m2(equations: &Equations<'_>, start: Vector3<f64>) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::geometry::LEGS;
+    use masseter_model::geometry::LEGS;
     use proptest::prelude::*;
 
     use super::*;

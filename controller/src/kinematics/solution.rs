@@ -1,6 +1,6 @@
 //! What a solver hands back: leg angles that close the platform's triangle, and what is known of them.
 
-use masseter_shared::geometry::{LEGS, Pose, frame_of_corners};
+use masseter_model::geometry::{LEGS, Pose, frame_of_corners};
 
 use super::leg_angle::LegAngle;
 use super::loop_equations::{LoopEquations, LoopSolution};

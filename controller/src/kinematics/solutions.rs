@@ -1,6 +1,6 @@
 //! All ways in which the mechanism can be assembled for one input.
 
-use masseter_shared::geometry::{Actuators, Mechanism};
+use masseter_model::geometry::{Actuators, Mechanism};
 
 use super::elimination::SolutionFilter;
 use super::loop_equations::{LoopEquations, LoopSolution};
@@ -56,7 +56,7 @@ impl Solutions {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::geometry::LEGS;
+    use masseter_model::geometry::LEGS;
     use proptest::prelude::*;
 
     use super::*;

@@ -1,6 +1,6 @@
 //! Random mechanisms and poses for the tests of this module.
 
-use masseter_shared::geometry::{Actuators, Joints, Mechanism, MechanismConfig, Pose, SlideConfig, Vec3};
+use masseter_model::geometry::{Actuators, Joints, Mechanism, MechanismConfig, Pose, SlideConfig, Vec3};
 use nalgebra::{Translation3, UnitQuaternion};
 use proptest::prelude::*;
 

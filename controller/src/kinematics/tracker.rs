@@ -10,7 +10,7 @@
 //! In every other case the complete method decides. So the guess only saves time; it cannot make the result
 //! wrong.
 
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
+use masseter_model::geometry::{Actuators, LEGS, Mechanism};
 
 use super::complete::choose;
 use super::leg_angle::{Anchor, LegAngle};
@@ -26,7 +26,7 @@ const WARM_ITERATIONS: u32 = 4;
 ///
 /// ```
 /// use masseter_controller::kinematics::ForwardTracker;
-/// use masseter_shared::geometry::{Actuators, Mechanism, MechanismConfig};
+/// use masseter_model::geometry::{Actuators, Mechanism, MechanismConfig};
 ///
 /// let mut tracker = ForwardTracker::new(Mechanism::new(&MechanismConfig::default())?);
 /// for step in 0..10 {
@@ -111,7 +111,7 @@ impl Last {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::geometry::Pose;
+    use masseter_model::geometry::Pose;
     use nalgebra::{Translation3, UnitQuaternion};
     use proptest::prelude::*;
 

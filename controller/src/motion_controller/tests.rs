@@ -1,9 +1,9 @@
 //! Scenarios of the controller alone: a plant that does what it is told, and one thing that goes wrong.
 
-use masseter_shared::config::{ControllerConfig, JawConfig};
-use masseter_shared::geometry::{LEGS, MechanismConfig};
-use masseter_shared::messages::codes::{Cause, DriveRequest, DriveState, EventKind, NO_DRIVE_STATE};
-use masseter_shared::messages::{Command, State};
+use masseter_model::geometry::{LEGS, MechanismConfig};
+use masseter_runtime::messages::codes::{Cause, DriveRequest, DriveState, EventKind, NO_DRIVE_STATE};
+use masseter_runtime::messages::{Command, State};
+use masseter_scenario::{ControllerConfig, JawConfig};
 
 use super::*;
 use crate::sequencer::{ALL_AXES, REPEATED_CYCLES, SAFE_STOP_S};

@@ -1,7 +1,7 @@
 //! The desired pose moves forward on its path, and comes to rest where it is told to.
 
-use masseter_shared::config::{JawConfig, MotionConfig, TrajectoryLimitsConfig};
-use masseter_shared::geometry::{AXES, Mechanism, MechanismConfig, Vec3};
+use masseter_model::geometry::{AXES, Mechanism, MechanismConfig, Vec3};
+use masseter_scenario::{JawConfig, MotionConfig, TrajectoryLimitsConfig};
 
 use super::*;
 

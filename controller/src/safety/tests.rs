@@ -1,6 +1,6 @@
 //! Every check fires beyond its limit and not before it, for every axis, and reports its value.
 
-use masseter_shared::messages::codes::{EventKind, NO_DRIVE_STATE, Source};
+use masseter_runtime::messages::codes::{EventKind, NO_DRIVE_STATE, Source};
 
 use super::*;
 use crate::kinematics::Condition;

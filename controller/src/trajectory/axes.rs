@@ -1,6 +1,6 @@
 //! From a file's axes to the jaw frame's: anterior, left, up.
 
-use masseter_shared::geometry::Vec3;
+use masseter_model::geometry::Vec3;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
 /// A signed permutation of axes that keeps the hand.

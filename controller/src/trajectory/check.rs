@@ -5,10 +5,10 @@
 //! not look at forces, nor at how the rig gets to the first pose, nor at the trim: a target that the trim
 //! carries beyond a stroke is held at its end.
 
-use masseter_shared::config::TrajectoryLimitsConfig;
-use masseter_shared::geometry::{
+use masseter_model::geometry::{
     AXES, AXIS_NAMES, Conditioning, Jacobian, LEGS, Mechanism, Pose, StrokeLimits,
 };
+use masseter_scenario::TrajectoryLimitsConfig;
 
 use crate::kinematics::Assembly;
 
@@ -43,8 +43,8 @@ impl TrajectoryReport {
 ///
 /// ```
 /// use masseter_controller::trajectory::{Trajectory, check};
-/// use masseter_shared::config::Scenario;
-/// use masseter_shared::geometry::Mechanism;
+/// use masseter_scenario::Scenario;
+/// use masseter_model::geometry::Mechanism;
 ///
 /// let scenario = Scenario::default();
 /// let mechanism = Mechanism::new(&scenario.mechanism)?;

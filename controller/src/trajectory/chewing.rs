@@ -9,8 +9,8 @@
 //!
 //! Simplified: every cycle is the same, the sagittal path is a straight line, food does not matter.
 
-use masseter_shared::config::{ChewingConfig, JawConfig};
-use masseter_shared::geometry::Pose;
+use masseter_model::geometry::Pose;
+use masseter_scenario::{ChewingConfig, JawConfig};
 
 use super::TrajectoryError;
 use super::error::require;
@@ -103,7 +103,7 @@ impl Chewing {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::config::JawSide;
+    use masseter_scenario::JawSide;
 
     use super::*;
 

@@ -6,8 +6,8 @@
 //! along the condylar path without turning; in a lateral excursion the balancing condyle advances
 //! alone. Simplified: no tooth guides the jaw near the closed pose.
 
-use masseter_shared::config::{JawConfig, LateralConfig, OpeningConfig, ProtrusionConfig};
-use masseter_shared::geometry::Pose;
+use masseter_model::geometry::Pose;
+use masseter_scenario::{JawConfig, LateralConfig, OpeningConfig, ProtrusionConfig};
 
 use super::TrajectoryError;
 use super::error::require;
@@ -80,8 +80,8 @@ fn farthest(amplitude_mm: f64, highest: f64, travel_m: impl Fn(f64) -> f64) -> R
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::config::JawSide;
-    use masseter_shared::geometry::Vec3;
+    use masseter_model::geometry::Vec3;
+    use masseter_scenario::JawSide;
 
     use super::*;
 

@@ -4,7 +4,7 @@
 //! deviation is above 1 mm and above four times the usual one of the rows around. A jaw that stops at the teeth stops hard,
 //! and is no faster before. Jumps of the orientation alone are not looked for.
 
-use masseter_shared::geometry::Vec3;
+use masseter_model::geometry::Vec3;
 use serde::Serialize;
 
 use super::recorded_rows::Rows;

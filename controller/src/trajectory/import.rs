@@ -3,9 +3,9 @@
 //! Comments start with `#`; the header decides between poses and markers. A file is used whole or
 //! refused with line, reason and remedy: nothing is guessed, skipped or repaired.
 
-use masseter_shared::config::{FileConfig, JawConfig};
-use masseter_shared::geometry::{Pose, Vec3};
-use masseter_shared::input::read_text;
+use masseter_model::geometry::{Pose, Vec3};
+use masseter_scenario::input::read_text;
+use masseter_scenario::{FileConfig, JawConfig};
 
 use super::TrajectoryError;
 use super::axes::Axes;

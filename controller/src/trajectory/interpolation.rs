@@ -1,6 +1,6 @@
 //! The way between two poses.
 
-use masseter_shared::geometry::Pose;
+use masseter_model::geometry::Pose;
 use nalgebra::UnitQuaternion;
 
 /// The pose at a share of the way from one pose to another: position and turn by as much.

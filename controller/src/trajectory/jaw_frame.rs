@@ -3,8 +3,8 @@
 //! Platform = closed · X · T · X⁻¹, where X is the jaw frame in the platform frame at the closed pose:
 //! origin at the incisal point, axes parallel to the base's.
 
-use masseter_shared::config::JawConfig;
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Pose, Vec3};
+use masseter_model::geometry::{Actuators, LEGS, Mechanism, Pose, Vec3};
+use masseter_scenario::JawConfig;
 use nalgebra::Translation3;
 
 use crate::kinematics::solve_completely;

@@ -3,7 +3,7 @@
 //! Then the incisal point goes down, rather back than forward and hardly aside, the jaw turns about the axis that
 //! points left, and the condyles go forward. A recording without an opening shows nothing of that.
 
-use masseter_shared::geometry::{Pose, Vec3};
+use masseter_model::geometry::{Pose, Vec3};
 
 use super::axes::Axes;
 use super::error::Located;

@@ -9,8 +9,8 @@
 //! Simplified: the paths are straight, working and balancing side share their inclination, and
 //! neither discs, muscles nor tooth contacts guide anything.
 
-use masseter_shared::config::{JawConfig, JawSide};
-use masseter_shared::geometry::{Pose, Vec3};
+use masseter_model::geometry::{Pose, Vec3};
+use masseter_scenario::{JawConfig, JawSide};
 use nalgebra::{Quaternion, UnitQuaternion};
 
 use super::TrajectoryError;

@@ -1,6 +1,6 @@
 //! Recordings of three markers on the jaw: their rigid motion from the first row (Kabsch 1976).
 
-use masseter_shared::geometry::{Pose, Vec3};
+use masseter_model::geometry::{Pose, Vec3};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
 use super::axes::Axes;

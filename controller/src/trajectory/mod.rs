@@ -29,8 +29,8 @@ mod spline;
 mod survey;
 mod table;
 
-use masseter_shared::config::{JawConfig, MotionConfig};
-use masseter_shared::geometry::{Mechanism, Pose};
+use masseter_model::geometry::{Mechanism, Pose};
+use masseter_scenario::{JawConfig, MotionConfig};
 
 pub use check::{TrajectoryReport, check};
 pub use error::TrajectoryError;
@@ -54,8 +54,8 @@ const GENERATED_DURATION_S: f64 = 10.0;
 ///
 /// ```
 /// use masseter_controller::trajectory::Trajectory;
-/// use masseter_shared::config::{JawConfig, MotionConfig};
-/// use masseter_shared::geometry::{Mechanism, MechanismConfig};
+/// use masseter_scenario::{JawConfig, MotionConfig};
+/// use masseter_model::geometry::{Mechanism, MechanismConfig};
 ///
 /// let mechanism = Mechanism::new(&MechanismConfig::default())?;
 /// let chewing = Trajectory::new(&MotionConfig::default(), &JawConfig::default(), &mechanism, Some(5.0))?;

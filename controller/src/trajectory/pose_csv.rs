@@ -1,6 +1,6 @@
 //! Recordings of poses: position of a reference point and orientation, relative to the closed pose.
 
-use masseter_shared::geometry::{Pose, Vec3};
+use masseter_model::geometry::{Pose, Vec3};
 use nalgebra::{Quaternion, UnitQuaternion};
 
 use super::axes::Axes;

@@ -1,6 +1,6 @@
 //! The rows of a recording as coordinates, as they were recorded.
 
-use masseter_shared::geometry::Vec3;
+use masseter_model::geometry::Vec3;
 use nalgebra::Vector6;
 
 /// The rows of a recording: translation of the incisal point (m) from the closed pose, and rotation vector (rad) from the

@@ -5,7 +5,7 @@
 
 use std::path::PathBuf;
 
-use masseter_shared::geometry::{Pose, Vec3};
+use masseter_model::geometry::{Pose, Vec3};
 use nalgebra::{UnitQuaternion, Vector6};
 
 use super::error::Located;

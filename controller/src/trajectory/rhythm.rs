@@ -3,7 +3,7 @@
 //! Phases follow the minimum-jerk polynomial, which describes human chewing (Yashiro 2001:
 //! R² 0.85–0.88). Velocity and acceleration vanish at the ends of each, so the whole is C².
 
-use masseter_shared::config::PhaseShares;
+use masseter_scenario::PhaseShares;
 
 use super::TrajectoryError;
 use super::error::require;

@@ -2,8 +2,8 @@
 //!
 //! Everything here describes the file. Whether the mechanism can follow the motion is judged by [`check`](super::check).
 
-use masseter_shared::config::{FileConfig, JawConfig};
-use masseter_shared::geometry::{Pose, Vec3};
+use masseter_model::geometry::{Pose, Vec3};
+use masseter_scenario::{FileConfig, JawConfig};
 use serde::Serialize;
 
 use super::TrajectoryError;

@@ -2,9 +2,9 @@
 //!
 //! Blank lines are ignored. The module reads the columns' names; their meaning is not part of it.
 
-use masseter_shared::input::excerpt;
-use masseter_shared::rows::{Line, fields, lines, numbers};
-use masseter_shared::wording::counted;
+use masseter_scenario::input::excerpt;
+use masseter_scenario::rows::{Line, fields, lines, numbers};
+use masseter_scenario::wording::counted;
 
 use super::error::Located;
 

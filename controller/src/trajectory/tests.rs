@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use masseter_shared::config::{
+use masseter_model::geometry::{AXES, Conditioning, Jacobian, Mechanism, MechanismConfig};
+use masseter_scenario::{
     ChewingConfig, FileConfig, JawConfig, JawSide, LateralConfig, MotionConfig, OpeningConfig,
     ProtrusionConfig, TrajectoryLimitsConfig,
 };
-use masseter_shared::geometry::{AXES, Conditioning, Jacobian, Mechanism, MechanismConfig};
 use nalgebra::SVector;
 
 use super::*;

@@ -3,7 +3,7 @@
 use std::mem;
 
 use masseter_can::canopen::ObjectAddress;
-use masseter_shared::config::{DriveProfile, ObjectKey, ObjectRule};
+use masseter_scenario::{DriveProfile, ObjectKey, ObjectRule};
 
 use super::ledger::OldValue;
 use super::line::Line;

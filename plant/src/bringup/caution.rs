@@ -1,6 +1,6 @@
 //! How carefully an axis is moved, and who may stop it.
 
-use masseter_shared::config::Scenario;
+use masseter_scenario::Scenario;
 
 /// What the person at the machine wants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use masseter_can::canopen::ObjectAddress;
 use masseter_can::cia402::Statusword;
-use masseter_shared::config::{DriveProfile, ObjectRule};
+use masseter_scenario::{DriveProfile, ObjectRule};
 
 use super::deviation::{Deviation, Outcome};
 use super::line_error::reason_text;
@@ -138,8 +138,8 @@ mod tests {
     use std::path::Path;
 
     use masseter_can::canopen::NodeId;
-    use masseter_shared::clock::MILLISECOND_NS;
-    use masseter_shared::config::Scenario;
+    use masseter_runtime::clock::MILLISECOND_NS;
+    use masseter_scenario::Scenario;
 
     use super::*;
     use crate::bringup::Line;

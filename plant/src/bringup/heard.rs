@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use masseter_can::Frame;
 use masseter_can::canopen::{Cob, Emergency, Heartbeat, NmtState, NodeId, SdoResponse};
-use masseter_shared::config::MASTER_NODE;
+use masseter_scenario::MASTER_NODE;
 
 /// Sign of another master that commands nodes.
 pub(super) const NMT: &str = "NMT";

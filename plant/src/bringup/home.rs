@@ -3,8 +3,8 @@
 //! Encoders that keep their position are compared and not moved. The others home twice: the second homing shows the spread.
 
 use masseter_can::cia402::{Controlword, StatusBit};
-use masseter_shared::clock::SECOND_NS;
-use masseter_shared::config::{AxisScale, DriveProfile, HomingConfig, ObjectKey, ObjectRule, Scenario};
+use masseter_runtime::clock::SECOND_NS;
+use masseter_scenario::{AxisScale, DriveProfile, HomingConfig, ObjectKey, ObjectRule, Scenario};
 
 use super::borrowed::Loan;
 use super::caution::{Caution, Operator, Wish};

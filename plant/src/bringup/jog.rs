@@ -3,8 +3,8 @@
 //! Everything goes by SDO in pre-operational, in profile position (mode 1). After that, the drive answers some SYNCs without
 //! power, for the time that its answers take.
 
-use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::config::Scenario;
+use masseter_runtime::clock::MILLISECOND_NS;
+use masseter_scenario::Scenario;
 
 use super::caution::{Caution, Operator};
 use super::line::Line;

@@ -2,7 +2,7 @@
 
 use std::io;
 
-use masseter_shared::config::ObjectKey;
+use masseter_scenario::ObjectKey;
 use serde::{Deserialize, Serialize};
 
 /// A changed object with its old value.

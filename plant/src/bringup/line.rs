@@ -10,8 +10,8 @@ use masseter_can::canopen::{
     AbortCode, Expedited, Nmt, NmtCommand, NmtTarget, NodeId, ObjectAddress, SdoRequest, SdoResponse, sync,
 };
 use masseter_can::cia402::Controlword;
-use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::config::{MASTER_NODE, Scenario};
+use masseter_runtime::clock::MILLISECOND_NS;
+use masseter_scenario::{MASTER_NODE, Scenario};
 
 use super::heard::{Heard, Strangers};
 use super::ledger::{Ledger, OldValue};

@@ -4,7 +4,7 @@ use std::io;
 
 use masseter_can::SendError;
 use masseter_can::canopen::{AbortCode, ObjectAddress};
-use masseter_shared::geometry::AXIS_NAMES;
+use masseter_model::geometry::AXIS_NAMES;
 
 use super::wording::{object_name, value_text};
 use crate::error::PlantError;

@@ -2,7 +2,7 @@
 
 use masseter_can::canopen::{EmergencyCode, ObjectAddress};
 use masseter_can::cia402::DriveState;
-use masseter_shared::geometry::AXIS_NAMES;
+use masseter_model::geometry::AXIS_NAMES;
 
 use super::heard::OtherMaster;
 use super::line_error::LineError;

@@ -2,9 +2,9 @@
 
 use masseter_can::canopen::{NmtCommand, ObjectAddress};
 use masseter_can::cia402::{Controlword, StatusBit};
-use masseter_shared::clock::SECOND_NS;
-use masseter_shared::config::{AxisScale, DriveProfile, MASTER_NODE, ObjectKey, ObjectRule, Scenario};
-use masseter_shared::geometry::AXES;
+use masseter_model::geometry::AXES;
+use masseter_runtime::clock::SECOND_NS;
+use masseter_scenario::{AxisScale, DriveProfile, MASTER_NODE, ObjectKey, ObjectRule, Scenario};
 
 use super::borrowed::{Borrowed, Loan};
 use super::caution::{Caution, Operator, Wish};

@@ -2,8 +2,8 @@
 
 use masseter_can::canopen::ObjectAddress;
 use masseter_can::cia402::{Controlword, Statusword};
-use masseter_shared::clock::{MILLISECOND_NS, SECOND_NS};
-use masseter_shared::geometry::AXIS_NAMES;
+use masseter_model::geometry::AXIS_NAMES;
+use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 
 use super::line::Line;
 use super::line_error::LineError;
@@ -84,7 +84,7 @@ fn motion(line: &mut Line, axis: usize, within_ns: u64) -> Result<u32, LineError
 mod tests {
     use std::io;
 
-    use masseter_shared::config::Scenario;
+    use masseter_scenario::Scenario;
 
     use super::*;
 

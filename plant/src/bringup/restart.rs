@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
+use masseter_model::geometry::{AXES, AXIS_NAMES};
 
 use super::heard::NMT;
 use super::line::Line;

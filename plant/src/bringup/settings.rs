@@ -4,7 +4,7 @@
 
 use masseter_can::EVERY_SYNC;
 use masseter_can::canopen::{CobId, ObjectAddress};
-use masseter_shared::config::{ObjectKey, ObjectRule};
+use masseter_scenario::{ObjectKey, ObjectRule};
 use serde::{Deserialize, Serialize};
 
 use super::survey::Survey;

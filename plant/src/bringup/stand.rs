@@ -1,8 +1,8 @@
 //! Where the robot stands: the positions of all axes, in whatever state their drives are.
 
 use masseter_can::cia402::DriveState;
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::AXES;
+use masseter_model::geometry::AXES;
+use masseter_scenario::Scenario;
 
 use super::line::Line;
 use super::motion_error::MotionError;

@@ -1,6 +1,6 @@
 //! Figures of one way of a jog, from what the drive showed.
 
-use masseter_shared::clock::SECOND_NS;
+use masseter_runtime::clock::SECOND_NS;
 
 use super::watch::Sample;
 

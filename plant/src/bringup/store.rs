@@ -1,9 +1,9 @@
 //! Storing in a drive's non-volatile memory, proved by a reset.
 
 use masseter_can::canopen::{NmtCommand, ObjectAddress};
-use masseter_shared::clock::{MILLISECOND_NS, SECOND_NS};
-use masseter_shared::config::StoreConfig;
-use masseter_shared::geometry::AXIS_NAMES;
+use masseter_model::geometry::AXIS_NAMES;
+use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
+use masseter_scenario::StoreConfig;
 
 use super::line::Line;
 use super::line_error::{LineError, SdoReason};
@@ -97,7 +97,7 @@ fn unless_silent<T>(answer: Result<T, LineError>) -> Result<Option<T>, LineError
 mod tests {
     use std::io;
 
-    use masseter_shared::config::Scenario;
+    use masseter_scenario::Scenario;
 
     use super::*;
 

@@ -2,8 +2,8 @@
 
 use masseter_can::canopen::ObjectAddress;
 use masseter_can::cia402::{Controlword, DriveState};
-use masseter_shared::clock::{MILLISECOND_NS, SECOND_NS};
-use masseter_shared::config::{AxisScale, BrakeConfig};
+use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
+use masseter_scenario::{AxisScale, BrakeConfig};
 
 use super::line::Line;
 use super::motion_error::MotionError;

@@ -1,7 +1,7 @@
 //! The time from SYNC to the process data of one drive, which is off: `can.answer_us` of a scenario.
 
 use masseter_can::canopen::NmtCommand;
-use masseter_shared::clock::MILLISECOND_NS;
+use masseter_runtime::clock::MILLISECOND_NS;
 
 use super::line::Line;
 use super::line_error::LineError;
@@ -27,7 +27,7 @@ pub(super) fn longest_ns(line: &mut Line, axis: usize) -> Result<Option<u64>, Li
 #[cfg(test)]
 mod tests {
     use masseter_can::canopen::ObjectAddress;
-    use masseter_shared::config::Scenario;
+    use masseter_scenario::Scenario;
 
     use super::*;
     use crate::bringup::test_log::Log;

@@ -5,9 +5,9 @@ use std::io::Write;
 use masseter_can::canopen::{Cob, Heartbeat, NmtState, NodeId, SdoResponse};
 use masseter_can::wire::{Bitrate, INTERFRAME_BITS, frame_bits};
 use masseter_can::{Frame, Tapped, TappedFrame, candump};
-use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::config::{MASTER_NODE, Scenario};
-use masseter_shared::geometry::AXES;
+use masseter_model::geometry::AXES;
+use masseter_runtime::clock::MILLISECOND_NS;
+use masseter_scenario::{MASTER_NODE, Scenario};
 
 use super::heard::{Heard, Strangers};
 use super::line_error::LineError;

@@ -1,7 +1,7 @@
 //! Units and ratios of a drive beside those of its profile: a wrong one scales every motion.
 
 use masseter_can::canopen::ObjectAddress;
-use masseter_shared::config::{
+use masseter_scenario::{
     AccelerationUnit, DriveProfile, INCREMENTS, ObjectConfig, ObjectKey, ObjectRule, VelocityUnit,
 };
 
@@ -151,7 +151,7 @@ pub(super) fn of_ratios(survey: &Survey, profile: &DriveProfile, increment_m: f6
 mod tests {
     use std::path::Path;
 
-    use masseter_shared::config::Scenario;
+    use masseter_scenario::Scenario;
 
     use super::*;
 

@@ -2,8 +2,8 @@
 
 use masseter_can::canopen::{EmergencyCode, ObjectAddress};
 use masseter_can::cia402::{DriveState, StatusBit, Statusword};
-use masseter_shared::config::AxisScale;
-use masseter_shared::geometry::AXES;
+use masseter_model::geometry::AXES;
+use masseter_scenario::AxisScale;
 
 use super::line::Line;
 use super::line_error::LineError;

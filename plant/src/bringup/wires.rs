@@ -1,8 +1,8 @@
 //! The buses of a line: simulated ones with the emulated drives, or real interfaces, each with its clock.
 
 use masseter_can::{Frame, Received, SendError, Tapped};
-use masseter_shared::clock;
-use masseter_shared::config::Scenario;
+use masseter_runtime::clock;
+use masseter_scenario::Scenario;
 
 use crate::emulation::VirtualLink;
 use crate::error::PlantError;

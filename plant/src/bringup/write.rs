@@ -1,9 +1,9 @@
 //! Settings into a drive: PDOs by the standard's procedure, objects one by one, every value read back.
 
 use masseter_can::canopen::{AbortCode, CobId, NmtCommand, ObjectAddress};
-use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::config::{DriveProfile, ObjectKey, ObjectRule};
-use masseter_shared::geometry::AXIS_NAMES;
+use masseter_model::geometry::AXIS_NAMES;
+use masseter_runtime::clock::MILLISECOND_NS;
+use masseter_scenario::{DriveProfile, ObjectKey, ObjectRule};
 use serde::Serialize;
 
 use super::line::Line;
@@ -214,7 +214,7 @@ mod tests {
     use std::io;
 
     use masseter_can::canopen::NodeId;
-    use masseter_shared::config::Scenario;
+    use masseter_scenario::Scenario;
 
     use super::*;
     use crate::wanted::WantedDrive;

@@ -1,11 +1,11 @@
 //! Scenarios of the whole plant under virtual time, with a commander that uses inverse kinematics only.
 
 use masseter_can::canopen::{Cob, NodeId};
-use masseter_shared::geometry::{AXES, Mechanism, MechanismConfig, Pose, Vec3};
-use masseter_shared::messages::codes::{
+use masseter_model::geometry::{AXES, Mechanism, MechanismConfig, Pose, Vec3};
+use masseter_runtime::messages::codes::{
     Cause, ControllerState, DriveRequest, DriveState, EventKind, NO_AXIS, Source,
 };
-use masseter_shared::messages::{LAYOUT_VERSION, tap};
+use masseter_runtime::messages::{LAYOUT_VERSION, tap};
 
 use super::*;
 
@@ -291,7 +291,7 @@ fn the_same_seed_gives_the_same_bytes_and_another_seed_other_noise() {
 #[test]
 fn drives_that_never_boot_are_named_each() {
     let mut bench = Bench::new(&Scenario {
-        can: masseter_shared::config::CanConfig { boot_timeout_ms: 10, ..Default::default() },
+        can: masseter_scenario::CanConfig { boot_timeout_ms: 10, ..Default::default() },
         ..Scenario::default()
     });
     for _ in 0..30 {

@@ -4,8 +4,8 @@
 
 use masseter_can::faults::FaultNote;
 use masseter_can::{ErrorKind, ErrorReport, ErrorState};
-use masseter_shared::messages::Event;
-use masseter_shared::messages::codes::{Cause, EventKind, Source};
+use masseter_runtime::messages::Event;
+use masseter_runtime::messages::codes::{Cause, EventKind, Source};
 
 /// The highest error counter of an error active controller, and of an error passive one.
 const ACTIVE_MAX: f64 = 127.0;

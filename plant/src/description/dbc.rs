@@ -5,9 +5,9 @@
 
 use masseter_can::CanId;
 use masseter_can::canopen::{Cob, CobId, NmtCommand, NmtState, NodeId};
-use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::config::{DriveConfig, MASTER_NODE};
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
+use masseter_model::geometry::{AXES, AXIS_NAMES};
+use masseter_runtime::clock::MILLISECOND_NS;
+use masseter_scenario::{DriveConfig, MASTER_NODE};
 
 use crate::drive::DriveSettings;
 use crate::drive::dictionary::{ENTRIES, Objects, PDOS, names};

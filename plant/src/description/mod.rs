@@ -6,8 +6,8 @@
 mod dbc;
 mod eds;
 
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::AXES;
+use masseter_model::geometry::AXES;
+use masseter_scenario::Scenario;
 
 use crate::drive::DriveSettings;
 use crate::error::PlantError;
@@ -18,7 +18,7 @@ use crate::error::PlantError;
 /// [`PlantError`] for drives that cannot be built.
 ///
 /// ```
-/// let [d1, ..] = masseter_plant::description::eds(&masseter_shared::config::Scenario::default())?;
+/// let [d1, ..] = masseter_plant::description::eds(&masseter_scenario::Scenario::default())?;
 /// assert!(d1.contains("ParameterName=Controlword"));
 /// # Ok::<_, masseter_plant::PlantError>(())
 /// ```
@@ -32,7 +32,7 @@ pub fn eds(scenario: &Scenario) -> Result<[String; AXES], PlantError> {
 /// [`PlantError`] for drives that cannot be built.
 ///
 /// ```
-/// let dbc = masseter_plant::description::dbc(&masseter_shared::config::Scenario::default())?;
+/// let dbc = masseter_plant::description::dbc(&masseter_scenario::Scenario::default())?;
 /// assert!(dbc.contains("BO_ 385 d1_TPDO1: 8 d1"));
 /// # Ok::<_, masseter_plant::PlantError>(())
 /// ```
@@ -42,7 +42,7 @@ pub fn dbc(scenario: &Scenario) -> Result<String, PlantError> {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::config::{QuirkConfig, QuirkKindConfig};
+    use masseter_scenario::{QuirkConfig, QuirkKindConfig};
 
     use super::*;
     use crate::drive::dictionary::{Access, ENTRIES, Initial, Mapping, OBJECTS};

@@ -1,8 +1,8 @@
 //! What a drive does otherwise than the standard, from the scenario's quirks: in its dictionary, as a node, as an axis.
 
 use masseter_can::canopen::CobId;
-use masseter_shared::clock::SECOND_NS;
-use masseter_shared::config::{INCREMENTS_PER_TURN, ObjectKey, QuirkConfig, QuirkKindConfig as Kind};
+use masseter_runtime::clock::SECOND_NS;
+use masseter_scenario::{INCREMENTS_PER_TURN, ObjectKey, QuirkConfig, QuirkKindConfig as Kind};
 
 use super::dictionary::{Objects, Overlay, PDOS, RPM_PER_S, find, names};
 use crate::error::PlantError;

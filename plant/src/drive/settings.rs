@@ -1,8 +1,8 @@
 //! The settings of an emulated drive, from the scenario.
 
 use masseter_can::canopen::NodeId;
-use masseter_shared::config::{DriveConfig, DriveProfile, MASTER_NODE, Scenario};
-use masseter_shared::geometry::AXES;
+use masseter_model::geometry::AXES;
+use masseter_scenario::{DriveConfig, DriveProfile, MASTER_NODE, Scenario};
 
 use super::axis::configure;
 use super::dictionary::{Objects, names};

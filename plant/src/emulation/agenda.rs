@@ -5,10 +5,8 @@
 use std::collections::VecDeque;
 use std::ops::Range;
 
-use masseter_shared::config::{
-    FaultConfig, FaultKindConfig, FaultLayer, Scenario, StimulusConfig, ToothConfig,
-};
-use masseter_shared::injection::Injected;
+use masseter_runtime::injection::Injected;
+use masseter_scenario::{FaultConfig, FaultKindConfig, FaultLayer, Scenario, StimulusConfig, ToothConfig};
 use nalgebra::Vector6;
 
 use super::push::Push;
@@ -236,7 +234,7 @@ fn effect_of_stimulus(config: &StimulusConfig, arch: &[ToothConfig]) -> Result<O
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::config::Shape;
+    use masseter_scenario::Shape;
 
     use super::*;
 

@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use masseter_can::canopen::Cob;
 use masseter_can::{CanId, ErrorState, Frame};
-use masseter_shared::config::{FaultConfig, FaultKindConfig, FaultLayer, Scenario};
-use masseter_shared::geometry::{AXES, Mechanism};
-use masseter_shared::injection::{Injected, Injection};
-use masseter_shared::messages::{Contact, Truth, pose_fields};
+use masseter_model::geometry::{AXES, Mechanism};
+use masseter_runtime::injection::{Injected, Injection};
+use masseter_runtime::messages::{Contact, Truth, pose_fields};
+use masseter_scenario::{FaultConfig, FaultKindConfig, FaultLayer, Scenario};
 use nalgebra::Translation3;
 
 use super::agenda::{Agenda, Change, Effect};
@@ -29,7 +29,7 @@ use crate::mechanism::{Dynamics, DynamicsError, Food, MechanismState, Occlusion,
 /// ```
 /// use masseter_plant::emulation::Emulation;
 /// use masseter_can::canopen::{Cob, NodeId};
-/// use masseter_shared::config::Scenario;
+/// use masseter_scenario::Scenario;
 ///
 /// let mut emulation = Emulation::new(&Scenario::default(), 0)?;
 /// let boot_up = loop {

@@ -4,10 +4,10 @@
 //! the steps between them are caught up. The emulator has no master and publishes nothing.
 
 use masseter_can::{Bus, OpenError, Received, SocketCan};
-use masseter_shared::clock::{self, MILLISECOND_NS};
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::AXES;
-use masseter_shared::lifecycle::StopRequest;
+use masseter_model::geometry::AXES;
+use masseter_runtime::clock::{self, MILLISECOND_NS};
+use masseter_runtime::lifecycle::StopRequest;
+use masseter_scenario::Scenario;
 
 use super::co_simulation::Emulation;
 use crate::error::PlantError;
@@ -36,9 +36,9 @@ pub struct EmulatorCounters {
 ///
 /// ```no_run
 /// use masseter_plant::emulation::Emulator;
-/// use masseter_shared::clock;
-/// use masseter_shared::config::Scenario;
-/// use masseter_shared::lifecycle::StopRequest;
+/// use masseter_runtime::clock;
+/// use masseter_scenario::Scenario;
+/// use masseter_runtime::lifecycle::StopRequest;
 ///
 /// let mut scenario = Scenario::default();
 /// scenario.can.interfaces = vec!["vcan0".to_owned(), "vcan1".to_owned()];

@@ -6,8 +6,8 @@
 use std::collections::VecDeque;
 
 use arrayvec::ArrayVec;
-use masseter_shared::clock::SECOND_NS;
-use masseter_shared::config::FaultKindConfig as Kind;
+use masseter_runtime::clock::SECOND_NS;
+use masseter_scenario::FaultKindConfig as Kind;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;

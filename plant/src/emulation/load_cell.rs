@@ -1,6 +1,6 @@
 //! A load cell between the jaws: the bite force behind a low-pass, with offset, noise, and ends of its range.
 
-use masseter_shared::config::LoadCellConfig;
+use masseter_scenario::LoadCellConfig;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;

@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
-use masseter_shared::input::{MOST_KEPT_BYTES, read_text};
+use masseter_model::geometry::{AXES, AXIS_NAMES};
+use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 
 use crate::drive::DriveMemory;
 use crate::error::PlantError;

@@ -1,8 +1,8 @@
 //! The emulated drives on simulated wires, for foreign masters, for tools and for other nodes.
 
 use masseter_can::Bus;
-use masseter_shared::config::Scenario;
-use masseter_shared::messages::Truth;
+use masseter_runtime::messages::Truth;
+use masseter_scenario::Scenario;
 
 use super::virtual_link::VirtualLink;
 use crate::error::PlantError;
@@ -17,7 +17,7 @@ use crate::link::layout::MASTER_PORT;
 /// use masseter_can::canopen::{Cob, NodeId, ObjectAddress, SdoRequest};
 /// use masseter_can::Bus;
 /// use masseter_plant::emulation::OpenLink;
-/// use masseter_shared::config::Scenario;
+/// use masseter_scenario::Scenario;
 ///
 /// let mut link = OpenLink::new(&Scenario::default(), 0, 0)?;
 /// let (node, mut now_ns) = (NodeId::new(1)?, 100_000_000);

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use masseter_shared::clock::SECOND_NS;
-use masseter_shared::config::{Shape, StimulusConfig};
+use masseter_runtime::clock::SECOND_NS;
+use masseter_scenario::{Shape, StimulusConfig};
 use nalgebra::Vector6;
 
 use super::wrench_table::WrenchTable;

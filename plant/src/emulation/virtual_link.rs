@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use masseter_can::faults::{FaultNote, Faults};
 use masseter_can::{Bus, ReceiveError, Tapped, VirtualWire, WireConfig};
-use masseter_shared::config::{MASTER_NODE, Scenario};
-use masseter_shared::geometry::AXES;
-use masseter_shared::injection::Injected;
-use masseter_shared::messages::{Contact, Truth};
-use masseter_shared::realtime::Waiter;
+use masseter_model::geometry::AXES;
+use masseter_runtime::injection::Injected;
+use masseter_runtime::messages::{Contact, Truth};
+use masseter_runtime::realtime::Waiter;
+use masseter_scenario::{MASTER_NODE, Scenario};
 
 use super::co_simulation::Emulation;
 use crate::error::PlantError;

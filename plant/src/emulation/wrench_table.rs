@@ -4,9 +4,9 @@
 
 use std::path::Path;
 
-use masseter_shared::config::StimulusConfig;
-use masseter_shared::input::read_text;
-use masseter_shared::rows::{fields, lines, numbers};
+use masseter_scenario::StimulusConfig;
+use masseter_scenario::input::read_text;
+use masseter_scenario::rows::{fields, lines, numbers};
 use nalgebra::Vector6;
 
 use crate::error::PlantError;

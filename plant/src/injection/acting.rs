@@ -1,7 +1,7 @@
 //! The faults that act on one part of the plant at an instant.
 
 use arrayvec::ArrayVec;
-use masseter_shared::config::FaultKindConfig;
+use masseter_scenario::FaultKindConfig;
 
 /// More kinds than any part has.
 const MOST: usize = 16;

@@ -4,9 +4,9 @@
 
 use std::ops::Range;
 
-use masseter_shared::config::{FaultConfig, FaultKindConfig, FaultLayer};
-use masseter_shared::injection::Injected;
-use masseter_shared::messages::Command;
+use masseter_runtime::injection::Injected;
+use masseter_runtime::messages::Command;
+use masseter_scenario::{FaultConfig, FaultKindConfig, FaultLayer};
 
 use super::occurrence::Occurrence;
 use super::times::acting_ns;

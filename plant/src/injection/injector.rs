@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use masseter_shared::config::{FaultLayer, Scenario};
-use masseter_shared::injection::{Injected, Injection};
-use masseter_shared::messages::codes::ControllerState;
-use masseter_shared::messages::{Command, Event, LAYOUT_VERSION};
+use masseter_runtime::injection::{Injected, Injection};
+use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::messages::{Command, Event, LAYOUT_VERSION};
+use masseter_scenario::{FaultLayer, Scenario};
 
 use super::commands::CommandFaults;
 use super::mishap::Mishap;

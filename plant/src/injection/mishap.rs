@@ -1,7 +1,7 @@
 //! What happens to the emulated mechanism without a fault of the scenario, and the event that reports it.
 
-use masseter_shared::messages::Event;
-use masseter_shared::messages::codes::{Cause, EventKind, Source};
+use masseter_runtime::messages::Event;
+use masseter_runtime::messages::codes::{Cause, EventKind, Source};
 
 /// A piece of food that broke between the teeth.
 #[derive(Debug, Clone, Copy, PartialEq)]

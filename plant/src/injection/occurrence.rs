@@ -1,8 +1,8 @@
 //! The beginning or the end of a fault or a stimulus, and the event that reports it.
 
-use masseter_shared::injection::Injected;
-use masseter_shared::messages::Event;
-use masseter_shared::messages::codes::{Cause, EventKind, Source};
+use masseter_runtime::injection::Injected;
+use masseter_runtime::messages::Event;
+use masseter_runtime::messages::codes::{Cause, EventKind, Source};
 
 /// A fault or a stimulus began to act, or its time is over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use masseter_shared::clock::SECOND_NS;
-use masseter_shared::config::{FaultConfig, FaultKindConfig, Scenario};
-use masseter_shared::injection::{Injected, Injection};
+use masseter_runtime::clock::SECOND_NS;
+use masseter_runtime::injection::{Injected, Injection};
+use masseter_scenario::{FaultConfig, FaultKindConfig, Scenario};
 
 /// The window of a fault, cut where its size says how long the fault lasts.
 pub(crate) fn acting_ns(fault: &FaultConfig, window_ns: Range<u64>) -> Range<u64> {

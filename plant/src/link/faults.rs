@@ -7,9 +7,9 @@ use std::ops::Range;
 use masseter_can::canopen::NodeId;
 use masseter_can::faults::{Fault, FaultKind};
 use masseter_can::{CanId, Frame};
-use masseter_shared::clock::{MILLISECOND_NS, SECOND_NS};
-use masseter_shared::config::{CanConfig, FaultConfig, FaultKindConfig, Scenario};
-use masseter_shared::injection::{Injected, Injection};
+use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
+use masseter_runtime::injection::{Injected, Injection};
+use masseter_scenario::{CanConfig, FaultConfig, FaultKindConfig, Scenario};
 
 use crate::error::PlantError;
 

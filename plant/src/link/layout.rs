@@ -1,8 +1,8 @@
 //! The axes on the buses: port and node id of each, as a scenario declares them.
 
 use masseter_can::canopen::NodeId;
-use masseter_shared::config::{CanConfig, MASTER_NODE};
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
+use masseter_model::geometry::{AXES, AXIS_NAMES};
+use masseter_scenario::{CanConfig, MASTER_NODE};
 
 use crate::error::PlantError;
 

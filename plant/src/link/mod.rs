@@ -7,9 +7,9 @@ use std::ops::Range;
 
 use masseter_can::faults::FaultNote;
 use masseter_can::{Bus, ReceiveError, Tapped};
-use masseter_shared::injection::Injected;
-use masseter_shared::messages::{Contact, Truth};
-use masseter_shared::realtime::Waiter;
+use masseter_runtime::injection::Injected;
+use masseter_runtime::messages::{Contact, Truth};
+use masseter_runtime::realtime::Waiter;
 
 use crate::injection::{Mishap, Occurrence};
 use crate::mechanism::DynamicsError;

@@ -6,11 +6,11 @@ use std::os::unix::net::UnixDatagram;
 use masseter_can::PortFaults;
 use masseter_can::faults::FaultNote;
 use masseter_can::{Bus, ReceiveError, SocketCan, Tapped};
-use masseter_shared::clock;
-use masseter_shared::config::{MASTER_NODE, Scenario};
-use masseter_shared::geometry::AXES;
-use masseter_shared::injection::Injected;
-use masseter_shared::realtime::Waiter;
+use masseter_model::geometry::AXES;
+use masseter_runtime::clock;
+use masseter_runtime::injection::Injected;
+use masseter_runtime::realtime::Waiter;
+use masseter_scenario::{MASTER_NODE, Scenario};
 
 use super::faults::{fault_seed, faults_of_bus, restart_after_ns};
 use super::interface_lock::lock;

@@ -2,7 +2,7 @@
 
 use masseter_can::canopen::NodeId;
 use masseter_can::{ErrorState, SendError};
-use masseter_shared::geometry::AXES;
+use masseter_model::geometry::AXES;
 
 /// Memory of a bus.
 #[derive(Debug, Clone, Copy, Default)]

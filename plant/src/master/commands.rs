@@ -1,9 +1,9 @@
 //! The controller's commands: the newest that passed the [gate](super::gate), and the silence since the last.
 
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::AXES;
-use masseter_shared::messages::codes::{Cause, DriveRequest};
-use masseter_shared::messages::{Command, Reading};
+use masseter_model::geometry::AXES;
+use masseter_runtime::messages::codes::{Cause, DriveRequest};
+use masseter_runtime::messages::{Command, Reading};
+use masseter_scenario::Scenario;
 
 use super::events::Subject;
 use super::failure::Failure;

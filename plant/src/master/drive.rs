@@ -5,10 +5,10 @@
 use masseter_can::canopen::{Cob, EmergencyCode, Nmt, NmtCommand, NmtState, NmtTarget, NodeId, SdoResponse};
 use masseter_can::cia402::{Controlword, DriveRequest, DriveState, Statusword, next_controlword};
 use masseter_can::{CanId, Frame, PdoMapping, Rpdo1, Tpdo1};
-use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::config::{AxisScale, Scenario};
-use masseter_shared::messages::Reading;
-use masseter_shared::messages::codes::{BootPhase, Cause, drive_state_code};
+use masseter_runtime::clock::MILLISECOND_NS;
+use masseter_runtime::messages::Reading;
+use masseter_runtime::messages::codes::{BootPhase, Cause, drive_state_code};
+use masseter_scenario::{AxisScale, Scenario};
 
 use super::boot::{Boot, late};
 use super::failure::Failure;

@@ -1,10 +1,10 @@
 //! The way of the drives to "operation enabled": none is switched on before all are ready for it, and all are enabled within
 //! a time, or none stays on.
 
-use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::config::CanConfig;
-use masseter_shared::geometry::AXES;
-use masseter_shared::messages::codes::{Cause, DriveState, drive_state_code};
+use masseter_model::geometry::AXES;
+use masseter_runtime::clock::MILLISECOND_NS;
+use masseter_runtime::messages::codes::{Cause, DriveState, drive_state_code};
+use masseter_scenario::CanConfig;
 
 use super::failure::Failure;
 

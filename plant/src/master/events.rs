@@ -4,9 +4,9 @@
 
 use masseter_can::CanId;
 use masseter_can::canopen::{Cob, Emergency, LengthError, NodeId};
-use masseter_shared::geometry::AXES;
-use masseter_shared::messages::Event;
-use masseter_shared::messages::codes::{Cause, EventKind, Source};
+use masseter_model::geometry::AXES;
+use masseter_runtime::messages::Event;
+use masseter_runtime::messages::codes::{Cause, EventKind, Source};
 
 use crate::journal::Journal;
 

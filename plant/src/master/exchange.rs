@@ -5,10 +5,10 @@
 use masseter_can::BitrateError;
 use masseter_can::canopen::sync;
 use masseter_can::wire::{INTERFRAME_BITS, frame_bits};
-use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::config::CanConfig;
-use masseter_shared::messages::Reading;
-use masseter_shared::realtime::Wake;
+use masseter_runtime::clock::MILLISECOND_NS;
+use masseter_runtime::messages::Reading;
+use masseter_runtime::realtime::Wake;
+use masseter_scenario::CanConfig;
 
 /// Times of the present cycle.
 #[derive(Debug, Clone)]
@@ -99,7 +99,7 @@ impl Exchange {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::config::Scenario;
+    use masseter_scenario::Scenario;
 
     use super::*;
 

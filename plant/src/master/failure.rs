@@ -1,8 +1,8 @@
 //! The reason of a stop or of a failed boot, with the values that explain the reason.
 
 use masseter_can::canopen::ObjectAddress;
-use masseter_shared::messages::Event;
-use masseter_shared::messages::codes::{Cause, EventKind, Source};
+use masseter_runtime::messages::Event;
+use masseter_runtime::messages::codes::{Cause, EventKind, Source};
 
 /// A reason to stop the drives or to give up a boot, with the object, the value and the limit that explain the reason.
 #[derive(Debug, Clone, Copy, PartialEq)]

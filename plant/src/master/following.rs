@@ -6,8 +6,8 @@
 //! A real drive cannot follow a demand that is uneven: SYNC comes early or late or overtakes the target, or the targets
 //! stop or start at once. For some cycles after that, the drive may be farther away.
 
-use masseter_shared::config::{MOST_LEAD_CYCLES, Scenario};
-use masseter_shared::messages::codes::Cause;
+use masseter_runtime::messages::codes::Cause;
+use masseter_scenario::{MOST_LEAD_CYCLES, Scenario};
 
 use super::failure::Failure;
 

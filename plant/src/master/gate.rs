@@ -6,10 +6,10 @@
 //! A motion waits while a process stalls. So targets may stop at once and go on as before, within twice the time-out of
 //! commands; after that they start from rest.
 
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::AXES;
-use masseter_shared::messages::codes::{Cause, DriveRequest};
-use masseter_shared::messages::{Command, LAYOUT_VERSION};
+use masseter_model::geometry::AXES;
+use masseter_runtime::messages::codes::{Cause, DriveRequest};
+use masseter_runtime::messages::{Command, LAYOUT_VERSION};
+use masseter_scenario::Scenario;
 
 use super::events::Subject;
 use super::failure::Failure;

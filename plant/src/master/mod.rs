@@ -7,7 +7,7 @@
 //!
 //! The master is written against the bus trait alone ([`Buses`]), so that simulated and real wires are the same to it.
 //! SDO takes place only with drives that exchange no process data, with one request a bus and cycle, queued after the
-//! process data. So a bus never carries more than the [time table](masseter_shared::schedule) allows for.
+//! process data. So a bus never carries more than the [time table](masseter_runtime::schedule) allows for.
 
 mod boot;
 mod bus_monitor;
@@ -29,13 +29,13 @@ mod tests;
 use masseter_can::canopen::{Cob, Heartbeat, NmtState, sync};
 use masseter_can::wire::worst_case_bits;
 use masseter_can::{Bus, Frame, ReceiveError, Received};
-use masseter_shared::config::{MASTER_NODE, Scenario};
-use masseter_shared::geometry::AXES;
-use masseter_shared::messages::codes::{
+use masseter_model::geometry::AXES;
+use masseter_runtime::messages::codes::{
     BootPhase, Cause, DriveRequest, DriveState, Source, drive_state_code,
 };
-use masseter_shared::messages::{Command, Event, Reading};
-use masseter_shared::realtime::Wake;
+use masseter_runtime::messages::{Command, Event, Reading};
+use masseter_runtime::realtime::Wake;
+use masseter_scenario::{MASTER_NODE, Scenario};
 
 use crate::error::PlantError;
 use crate::link::Buses;

@@ -1,6 +1,6 @@
 //! The presence of one drive: whether it is received, and whether it answers every SYNC once.
 
-use masseter_shared::messages::codes::Cause;
+use masseter_runtime::messages::codes::Cause;
 
 use super::failure::Failure;
 

@@ -2,7 +2,7 @@
 //!
 //! Other parts find the causes of a stop. The supervision keeps their consequence; the master sends it to the drives.
 
-use masseter_shared::messages::codes::{Cause, DriveRequest};
+use masseter_runtime::messages::codes::{Cause, DriveRequest};
 
 /// How long the drives stay stopped.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

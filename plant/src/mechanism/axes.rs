@@ -3,8 +3,8 @@
 //! Each part states its force in a step as an [`Element`]; their sums enter the equations of motion. The masses of the
 //! axes are not part of this module, but for the drives' sides of loose joints.
 
-use masseter_shared::config::{AxesConfig, FaultKindConfig};
-use masseter_shared::geometry::{AXES, LEGS, Mechanism};
+use masseter_model::geometry::{AXES, LEGS, Mechanism};
+use masseter_scenario::{AxesConfig, FaultKindConfig};
 use nalgebra::Vector6;
 
 use super::coupling::Coupling;

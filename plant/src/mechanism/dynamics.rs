@@ -3,7 +3,7 @@
 //!
 //! The state is the platform's pose and twist. Joint positions come from inverse kinematics and joint
 //! rates from the Jacobian. The forward kinematics is never solved here, so the mechanism is an
-//! independent oracle for it. With the [equations](masseter_shared::dynamics) of the rigid bodies,
+//! independent oracle for it. With the [equations](masseter_model::dynamics) of the rigid bodies,
 //!
 //! M V̇ = Jᵀ(τ − friction) + contact − h.
 //!
@@ -13,11 +13,11 @@
 //!
 //! The parts are rigid: elasticity is left out.
 
-use masseter_shared::config::{DynamicsConfig, FaultKindConfig};
-use masseter_shared::dynamics::{Bodies, Equations, Motion, Reactions};
-use masseter_shared::geometry::{
+use masseter_model::dynamics::{Bodies, Equations, Motion, Reactions};
+use masseter_model::geometry::{
     AXES, Actuators, InverseError, Jacobian, LimitViolation, Mechanism, Pose, Twist, Vec3,
 };
+use masseter_scenario::{DynamicsConfig, FaultKindConfig};
 use nalgebra::{Quaternion, UnitQuaternion, Vector6};
 
 use super::axes::{Axes, AxesForces, AxisMotion};

@@ -1,12 +1,12 @@
 //! Friction of the moving mechanism: what brakes the axes, hinges and ball joints in a step.
 //!
-//! The law of friction is [shared](masseter_shared::dynamics::Friction). This module has the state of friction, which is
+//! The law of friction is [shared](masseter_model::dynamics::Friction). This module has the state of friction, which is
 //! the bristles of axes at rest, and its integration. Each force acts as if the speed stayed, and the change of the force with
 //! the speed acts as a damping (see [`Element`]). So no friction makes a motion grow. The loads are those of the steps before.
 
-use masseter_shared::config::{DynamicsConfig, FrictionConfig, FrictionModel};
-use masseter_shared::dynamics::{Bodies, Friction, Loads, Motion};
-use masseter_shared::geometry::AXES;
+use masseter_model::dynamics::{Bodies, Friction, Loads, Motion};
+use masseter_model::geometry::AXES;
+use masseter_scenario::{DynamicsConfig, FrictionConfig, FrictionModel};
 use nalgebra::{Matrix6, Vector6};
 
 use super::element::Element;

@@ -2,7 +2,7 @@
 
 use std::ops::AddAssign;
 
-use masseter_shared::geometry::{Pose, Twist, Vec3};
+use masseter_model::geometry::{Pose, Twist, Vec3};
 use nalgebra::{Matrix3, Matrix6, Vector6};
 
 /// The wrench of a vertical force (N) at an arm (m) about the platform's origin.

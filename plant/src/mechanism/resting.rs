@@ -2,8 +2,8 @@
 //!
 //! Inverse kinematics alone finds these poses, by bisection.
 
-use masseter_shared::config::JawConfig;
-use masseter_shared::geometry::{LEGS, Mechanism, Pose, frame_of_corners};
+use masseter_model::geometry::{LEGS, Mechanism, Pose, frame_of_corners};
+use masseter_scenario::JawConfig;
 use nalgebra::Translation3;
 
 /// The platform with the mouth closed. The pose is taken as level, which is an approximation for a mechanism of unequal
@@ -30,8 +30,8 @@ pub(crate) fn level(mechanism: &Mechanism, leg_m: f64) -> Pose {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::config::Scenario;
-    use masseter_shared::geometry::Joints;
+    use masseter_model::geometry::Joints;
+    use masseter_scenario::Scenario;
 
     use super::*;
 

@@ -1,7 +1,7 @@
 //! A drive as the rig needs it.
 
 use masseter_can::canopen::NodeId;
-use masseter_shared::config::{AccelerationUnit, ObjectConfig, ObjectKey, Scenario};
+use masseter_scenario::{AccelerationUnit, ObjectConfig, ObjectKey, Scenario};
 
 use super::object::WantedObject;
 use super::objects::objects;
@@ -62,7 +62,7 @@ mod tests {
     use std::path::Path;
 
     use masseter_can::canopen::ObjectAddress;
-    use masseter_shared::config::ObjectRule;
+    use masseter_scenario::ObjectRule;
 
     use super::super::object::OFFSETS;
     use super::*;

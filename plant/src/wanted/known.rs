@@ -2,9 +2,9 @@
 
 use masseter_can::canopen::ObjectAddress;
 use masseter_can::cia402::interpolation_period;
-use masseter_shared::clock::{MILLISECOND_NS, SECOND_NS};
-use masseter_shared::config::{DriveProfile, MASTER_NODE, ObjectKey, Scenario};
-use masseter_shared::geometry::LEGS;
+use masseter_model::geometry::LEGS;
+use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
+use masseter_scenario::{DriveProfile, MASTER_NODE, ObjectKey, Scenario};
 
 use crate::error::PlantError;
 

@@ -1,7 +1,7 @@
 //! One object of a drive as the rig needs it.
 
 use masseter_can::canopen::{AbortCode, CobId, ObjectAddress};
-use masseter_shared::config::ObjectRule;
+use masseter_scenario::ObjectRule;
 
 use super::process_data::COB_ID_BITS;
 

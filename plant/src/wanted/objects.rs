@@ -1,7 +1,7 @@
 //! All objects of a drive as the rig needs them: what the scenario needs, as the drive's profile allows.
 
 use masseter_can::canopen::ObjectAddress;
-use masseter_shared::config::{DriveProfile, ObjectConfig, ObjectKey, ObjectRule, Scenario};
+use masseter_scenario::{DriveProfile, ObjectConfig, ObjectKey, ObjectRule, Scenario};
 
 use super::known::known_objects;
 use super::object::{OFFSETS, TORQUE_OFFSET, WantedObject};

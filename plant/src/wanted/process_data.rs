@@ -2,7 +2,7 @@
 
 use masseter_can::canopen::{Cob, CobId, NodeId, ObjectAddress};
 use masseter_can::{CanId, EVERY_SYNC, PdoMapping};
-use masseter_shared::config::DriveProfile;
+use masseter_scenario::DriveProfile;
 
 /// COB-ID without the bit for remote requests, which the master does not send.
 pub(crate) const COB_ID_BITS: u32 = !CobId::NO_REMOTE_REQUEST;

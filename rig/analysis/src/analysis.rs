@@ -1,11 +1,11 @@
 //! One pass over the messages of a run.
 
 use masseter_recording::{Damage, ProcessFault, Recorded};
-use masseter_shared::config::{FaultKindConfig, FaultLayer, Scenario};
-use masseter_shared::messages::codes::{Cause, ControllerState, EventKind, Source};
-use masseter_shared::messages::tap::{self, TapError};
-use masseter_shared::messages::{Event, FrameTap, Message, Reading, State, Truth};
-use masseter_shared::named::Declared;
+use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind, Source};
+use masseter_runtime::messages::tap::{self, TapError};
+use masseter_runtime::messages::{Event, FrameTap, Message, Reading, State, Truth};
+use masseter_runtime::named::Declared;
+use masseter_scenario::{FaultKindConfig, FaultLayer, Scenario};
 
 use crate::attribution::OverrunAttribution;
 use crate::axes::AxisWatch;
@@ -38,9 +38,9 @@ use crate::tracking::{PathSample, PoseSource, Tracking};
 /// ```
 /// use masseter_analysis::Analysis;
 /// use masseter_recording::Recorded;
-/// use masseter_shared::config::{FaultKindConfig, FaultLayer, Scenario};
-/// use masseter_shared::messages::State;
-/// use masseter_shared::named::Declared;
+/// use masseter_scenario::{FaultKindConfig, FaultLayer, Scenario};
+/// use masseter_runtime::messages::State;
+/// use masseter_runtime::named::Declared;
 ///
 /// let mut analysis = Analysis::new(&Scenario::default(), &Declared::default());
 /// for cycle in 1..=3 {
@@ -48,7 +48,7 @@ use crate::tracking::{PathSample, PoseSource, Tracking};
 /// }
 /// let figures = analysis.finish(false, &[]);
 /// assert_eq!((figures.cycles, figures.missing_messages()), (3, 0));
-/// # Ok::<(), masseter_shared::messages::tap::TapError>(())
+/// # Ok::<(), masseter_runtime::messages::tap::TapError>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct Analysis {

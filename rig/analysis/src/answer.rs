@@ -1,6 +1,6 @@
 //! Reception and sending of a command, from the readings that answer it.
 
-use masseter_shared::messages::Reading;
+use masseter_runtime::messages::Reading;
 
 /// A command that the plant took.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

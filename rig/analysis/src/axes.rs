@@ -1,9 +1,9 @@
 //! How the drives met the demands while the motion played.
 
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::AXES;
-use masseter_shared::messages::codes::ControllerState;
-use masseter_shared::messages::{Command, Reading};
+use masseter_model::geometry::AXES;
+use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::messages::{Command, Reading};
+use masseter_scenario::Scenario;
 
 use crate::by_cycle::ByCycle;
 

@@ -43,7 +43,7 @@ impl<T: fmt::Display> Serialize for Code<T> {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::messages::codes::EventKind;
+    use masseter_runtime::messages::codes::EventKind;
 
     use super::*;
 

@@ -1,6 +1,7 @@
 //! The forces between the jaws: the greatest of each tooth, the moment of the greatest of all together, and their course.
 
-use masseter_shared::messages::{Contact, MOST_PAIRS, ToothContact};
+use masseter_runtime::messages::{Contact, ToothContact};
+use masseter_scenario::MOST_PAIRS;
 use serde::Serialize;
 
 use super::series::{Curve, Extremes, Series};

@@ -3,8 +3,8 @@
 
 use std::collections::VecDeque;
 
-use masseter_shared::geometry::Deviation;
-use masseter_shared::messages::codes::{Cause, Source};
+use masseter_model::geometry::Deviation;
+use masseter_runtime::messages::codes::{Cause, Source};
 use serde::Serialize;
 
 use super::code::Code;
@@ -154,8 +154,8 @@ fn first_stop(stops: &[Stop], struck_ns: u64) -> Option<Stop> {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::messages::Event;
-    use masseter_shared::messages::codes::{ControllerState, EventKind};
+    use masseter_runtime::messages::Event;
+    use masseter_runtime::messages::codes::{ControllerState, EventKind};
 
     use super::*;
 

@@ -50,7 +50,7 @@ impl Digest {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::messages::{Command, Reading, State};
+    use masseter_runtime::messages::{Command, Reading, State};
 
     use super::*;
 

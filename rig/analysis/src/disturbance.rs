@@ -3,7 +3,7 @@
 //! A lost cycle shows in the controller's own messages, whichever process lost the cycle: the controller skipped deadlines,
 //! or ceases to have a reading of its own cycle. Who caused the loss is not decided here.
 
-use masseter_shared::messages::State;
+use masseter_runtime::messages::State;
 
 /// Time after a lost cycle in which the jaw may be off its path for that reason, ns. Drives settle within 12 ms; pose
 /// control then takes back what the drives' lag has added to its integral.

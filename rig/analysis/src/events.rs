@@ -1,11 +1,11 @@
 //! Events with their codes resolved.
 
-use masseter_shared::geometry::AXIS_NAMES;
-use masseter_shared::messages::codes::{
+use masseter_model::geometry::AXIS_NAMES;
+use masseter_runtime::messages::codes::{
     BootPhase, Cause, ControllerState, EventKind, Source, drive_state_name,
 };
-use masseter_shared::messages::{Event, explain};
-use masseter_shared::named::Declared;
+use masseter_runtime::messages::{Event, explain};
+use masseter_runtime::named::Declared;
 use serde::Serialize;
 
 use super::code::Code;

@@ -1,8 +1,8 @@
 //! The figures of a run: everything that a run is reported and judged by.
 
+use masseter_model::geometry::AXES;
 use masseter_recording::Damage;
-use masseter_shared::geometry::AXES;
-use masseter_shared::messages::codes::ControllerState;
+use masseter_runtime::messages::codes::ControllerState;
 use serde::Serialize;
 
 use crate::attribution::OverrunAttribution;

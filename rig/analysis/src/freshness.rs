@@ -1,7 +1,7 @@
 //! Which reading each cycle of the controller used. Without a fresh reading, forward kinematics and control have no new
 //! input.
 
-use masseter_shared::messages::State;
+use masseter_runtime::messages::State;
 use serde::Serialize;
 
 /// The cycles that the controller ran, by the reading they used.

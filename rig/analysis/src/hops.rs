@@ -4,7 +4,7 @@
 //! SYNC on the wire and the waits of the time table lie between the hops, so that a delay counts in one hop alone.
 
 use hdrhistogram::Histogram;
-use masseter_shared::messages::{Reading, State};
+use masseter_runtime::messages::{Reading, State};
 
 use super::measured::histogram;
 

@@ -3,7 +3,7 @@
 //! A skipped deadline has no cycle and so no samples. Only the wake-ups have a second series in which it counts, with
 //! the time until the wake-up that skipped it: corrected for coordinated omission once, by the skips as counted.
 
-use masseter_shared::messages::{Command, Reading, State};
+use masseter_runtime::messages::{Command, Reading, State};
 
 use super::answer::{Answer, Answers};
 use super::by_cycle::ByCycle;

@@ -1,6 +1,6 @@
 //! The kernel's counters around a cycle: the cause of a long cycle is often outside the rig.
 
-use masseter_shared::messages::Machine;
+use masseter_runtime::messages::Machine;
 use serde::Serialize;
 
 /// Growth of the kernel's counters between the samples before and after a cycle.

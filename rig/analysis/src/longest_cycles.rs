@@ -4,7 +4,7 @@
 //! Where a newer command overtook the cycle's own, the path ends with the first later command that went out: the
 //! longest cycles end so. A cycle without a fresh reading has no path.
 
-use masseter_shared::messages::{Command, Machine, Reading, State};
+use masseter_runtime::messages::{Command, Machine, Reading, State};
 use serde::Serialize;
 
 use super::answer::{Answer, Answers};

@@ -2,7 +2,7 @@
 
 use hdrhistogram::Histogram;
 use hdrhistogram::serialization::{Deserializer, Serializer, V2Serializer};
-use masseter_shared::clock::SECOND_NS;
+use masseter_runtime::clock::SECOND_NS;
 use serde::Serialize;
 
 use super::noise::standard_error;

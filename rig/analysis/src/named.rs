@@ -1,7 +1,7 @@
 //! Figures of the signals and parameters that the controller declares.
 
-use masseter_shared::messages::{Parameters, Signals};
-use masseter_shared::named::{Declared, Parameter, Signal};
+use masseter_runtime::messages::{Parameters, Signals};
+use masseter_runtime::named::{Declared, Parameter, Signal};
 use serde::Serialize;
 
 /// A signal over the whole run. Values that are no finite numbers only count.
@@ -100,7 +100,7 @@ impl SignalFigures {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::messages::Values;
+    use masseter_runtime::messages::Values;
 
     use super::*;
 

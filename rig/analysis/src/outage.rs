@@ -5,8 +5,8 @@
 
 use std::collections::VecDeque;
 
-use masseter_shared::messages::codes::ControllerState;
-use masseter_shared::messages::{Reading, State};
+use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::messages::{Reading, State};
 use serde::Serialize;
 
 /// How long before the stop a missed cycle may have led to it.

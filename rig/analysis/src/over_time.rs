@@ -2,8 +2,8 @@
 
 use masseter_can::Tapped;
 use masseter_can::{Bitrate, wire};
-use masseter_shared::geometry::{AXES, Pose, Vec3};
-use masseter_shared::messages::{MOST_VALUES, Reading, Signals, Truth};
+use masseter_model::geometry::{AXES, Pose, Vec3};
+use masseter_runtime::messages::{MOST_VALUES, Reading, Signals, Truth};
 
 use super::series::{Curve, Extremes, Series};
 use super::smoothing::Smoothing;
@@ -224,7 +224,7 @@ impl OverTimeCollector {
 mod tests {
     use masseter_can::TappedFrame;
     use masseter_can::{Bitrate, CanId, Frame};
-    use masseter_shared::geometry::Deviation;
+    use masseter_model::geometry::Deviation;
 
     use super::*;
 

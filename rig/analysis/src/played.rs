@@ -4,11 +4,11 @@
 use std::sync::Arc;
 
 use masseter_controller::trajectory::Trajectory;
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::Mechanism;
-use masseter_shared::messages::codes::Cause;
-use masseter_shared::messages::{Event, State};
-use masseter_shared::named::{Declared, PlayedMotion};
+use masseter_model::geometry::Mechanism;
+use masseter_runtime::messages::codes::Cause;
+use masseter_runtime::messages::{Event, State};
+use masseter_runtime::named::{Declared, PlayedMotion};
+use masseter_scenario::Scenario;
 use serde::Serialize;
 
 use crate::pose_errors::{deviation, pose, worse};
@@ -142,9 +142,9 @@ fn trajectory(scenario: &Scenario) -> Option<Arc<Trajectory>> {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::messages::codes::ControllerState;
-    use masseter_shared::messages::pose_fields;
-    use masseter_shared::named::Parameter;
+    use masseter_runtime::messages::codes::ControllerState;
+    use masseter_runtime::messages::pose_fields;
+    use masseter_runtime::named::Parameter;
 
     use super::*;
 

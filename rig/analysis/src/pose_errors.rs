@@ -1,8 +1,8 @@
 //! Errors of the platform's pose against the desired one: their root mean squares and their peaks. A pose that is none is
 //! infinitely far.
 
-use masseter_shared::geometry::{Deviation, Pose};
-use masseter_shared::messages::pose_from_fields;
+use masseter_model::geometry::{Deviation, Pose};
+use masseter_runtime::messages::pose_from_fields;
 use serde::Serialize;
 
 /// A quaternion's length may differ from 1 by so much: single precision and more.

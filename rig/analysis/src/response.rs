@@ -8,10 +8,10 @@
 
 use masseter_can::canopen::Cob;
 use masseter_can::{BusPlan, CanId, PeriodicMessage, PlannedMessage, Tapped};
-use masseter_shared::config::Scenario;
-use masseter_shared::messages::FrameTap;
-use masseter_shared::schedule::plans;
-use masseter_shared::wording::counted;
+use masseter_runtime::messages::FrameTap;
+use masseter_runtime::schedule::plans;
+use masseter_scenario::Scenario;
+use masseter_scenario::wording::counted;
 
 use super::bus_response::{BusResponse, ResponseFigures};
 

@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use masseter_recording::ProcessFault;
-use masseter_shared::config::FaultKindConfig;
-use masseter_shared::messages::{Reading, State};
+use masseter_runtime::messages::{Reading, State};
+use masseter_scenario::FaultKindConfig;
 
 /// Time after a stall in which its late cycle and the skips behind it follow, ns: a stopped process goes on when the kernel
 /// lets it.

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use masseter_shared::messages::Event;
-use masseter_shared::messages::codes::Source;
+use masseter_runtime::messages::Event;
+use masseter_runtime::messages::codes::Source;
 use serde::Serialize;
 
 use masseter_recording::{Recorded, Topic};
@@ -78,7 +78,7 @@ impl SequenceCheck {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::messages::Reading;
+    use masseter_runtime::messages::Reading;
 
     use super::*;
 

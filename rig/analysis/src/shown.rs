@@ -1,10 +1,10 @@
 //! Figures that no verdict depends on: a report shows them, and a run without a report does without.
 
 use masseter_can::Tapped;
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::Pose;
-use masseter_shared::messages::codes::{ControllerState, NO_DRIVE_STATE};
-use masseter_shared::messages::{Command, FrameTap, Reading, Signals, State, Truth};
+use masseter_model::geometry::Pose;
+use masseter_runtime::messages::codes::{ControllerState, NO_DRIVE_STATE};
+use masseter_runtime::messages::{Command, FrameTap, Reading, Signals, State, Truth};
+use masseter_scenario::Scenario;
 
 use crate::intervals::Intervals;
 use crate::jaw_cycles::JawCycles;

@@ -15,7 +15,7 @@
 //! the time lost in between is not counted as one stall.
 
 use hdrhistogram::Histogram;
-use masseter_shared::messages::{Reading, State};
+use masseter_runtime::messages::{Reading, State};
 use serde::Serialize;
 
 use super::measured::histogram;

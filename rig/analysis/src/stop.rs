@@ -1,8 +1,8 @@
 //! Stops that the drives and their master show, whatever the controller reports.
 
-use masseter_shared::geometry::AXES;
-use masseter_shared::messages::codes::{DriveState, NO_DRIVE_STATE};
-use masseter_shared::messages::{Reading, State};
+use masseter_model::geometry::AXES;
+use masseter_runtime::messages::codes::{DriveState, NO_DRIVE_STATE};
+use masseter_runtime::messages::{Reading, State};
 use serde::Serialize;
 
 use crate::events::EventRecord;
@@ -101,8 +101,8 @@ impl StopWatch {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::messages::Event;
-    use masseter_shared::messages::codes::{Cause, ControllerState, EventKind, Source};
+    use masseter_runtime::messages::Event;
+    use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind, Source};
 
     use super::*;
 

@@ -1,10 +1,10 @@
 //! Distance of the platform from its desired pose. The actual pose is the true one where the mechanism is emulated,
 //! and forward kinematics' estimate on the robot, whose true pose is unknown.
 
-use masseter_shared::clock::SECOND_NS;
-use masseter_shared::geometry::{Deviation, Pose};
-use masseter_shared::messages::codes::ControllerState;
-use masseter_shared::messages::{State, Truth};
+use masseter_model::geometry::{Deviation, Pose};
+use masseter_runtime::clock::SECOND_NS;
+use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::messages::{State, Truth};
 use serde::Serialize;
 
 use super::by_cycle::ByCycle;

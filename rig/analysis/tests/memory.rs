@@ -9,10 +9,10 @@ use masseter_analysis::Analysis;
 use masseter_can::canopen::sync;
 use masseter_can::{Tapped, TappedFrame};
 use masseter_recording::Recorded;
-use masseter_shared::config::Scenario;
-use masseter_shared::messages::codes::ControllerState;
-use masseter_shared::messages::{Command, Reading, State, Truth, tap};
-use masseter_shared::named::Declared;
+use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::messages::{Command, Reading, State, Truth, tap};
+use masseter_runtime::named::Declared;
+use masseter_scenario::Scenario;
 
 struct Counting;
 

@@ -5,8 +5,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
-use masseter_shared::config::{FileConfig, Scenario, ScenarioError};
-use masseter_shared::input::read_bytes;
+use masseter_scenario::input::read_bytes;
+use masseter_scenario::{FileConfig, Scenario, ScenarioError};
 use serde::{Deserialize, Serialize};
 use sha1::{Digest, Sha1};
 use toml::{Table, Value};

@@ -1,6 +1,6 @@
 //! A case: a whole scenario with its number, its identity and the values of its factors.
 
-use masseter_shared::config::Scenario;
+use masseter_scenario::Scenario;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 

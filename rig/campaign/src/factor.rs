@@ -1,7 +1,6 @@
 //! A factor: a key of the scenario that varies, or a fault that is there or not, and the values that it takes.
 
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ContinuousCDF, Normal};
 use toml::Value;
 
 use crate::case::Setting;
@@ -157,11 +156,11 @@ impl Factor {
             }
             Distribution::Uniform => ends[0] + u * (ends[1] - ends[0]),
             Distribution::LogUniform => ends[0] * (ends[1] / ends[0]).powf(u),
-            Distribution::Normal => self.normal().map_or(f64::NAN, |normal| {
-                let [from, to] = ends.map(|end| normal.cdf(end));
+            Distribution::Normal => self.normal().map_or(f64::NAN, |(mean, deviation)| {
+                let [from, to] = ends.map(|end| normal_share((end - mean) / deviation));
                 // The ends of an endless range have no quantile.
-                let number = normal.inverse_cdf((from + u * (to - from)).clamp(1e-12, 1.0 - 1e-12));
-                number.clamp(ends[0], ends[1])
+                let share = (from + u * (to - from)).clamp(1e-12, 1.0 - 1e-12);
+                (mean + deviation * normal_quantile(share)).clamp(ends[0], ends[1])
             }),
         };
         match (&self.unit, self.is_whole()) {
@@ -181,8 +180,9 @@ impl Factor {
         self.range.as_ref().map_or(endless, |ends| ends.each_ref().map(|end| number(end).unwrap_or(f64::NAN)))
     }
 
-    fn normal(&self) -> Option<Normal> {
-        Normal::new(self.mean?, self.deviation?).ok()
+    /// Mean and deviation of a normal distribution.
+    fn normal(&self) -> Option<(f64, f64)> {
+        self.mean.zip(self.deviation).filter(|(_, deviation)| *deviation > 0.0)
     }
 
     /// Checks the factor by itself; its keys are checked with the scenario of each case.
@@ -235,6 +235,22 @@ impl Factor {
         }
         Ok(())
     }
+}
+
+/// The share of a standard normal distribution below a number.
+fn normal_share(number: f64) -> f64 {
+    libm::erfc(-number / std::f64::consts::SQRT_2) / 2.0
+}
+
+/// The number below which a share of a standard normal distribution lies.
+fn normal_quantile(share: f64) -> f64 {
+    let mut between = [-10.0, 10.0];
+    // As long as halving changes anything.
+    for _ in 0..64 {
+        let middle = f64::midpoint(between[0], between[1]);
+        between[usize::from(normal_share(middle) >= share)] = middle;
+    }
+    f64::midpoint(between[0], between[1])
 }
 
 /// Whether every number of a value is finite: other numbers have no form in the files of a campaign.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use masseter_shared::input::read_text;
+use masseter_scenario::input::read_text;
 use serde::{Deserialize, Serialize};
 
 use crate::factor::{Factor, FactorError};

@@ -7,8 +7,8 @@ use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use masseter_shared::config::Scenario;
-use masseter_shared::input::{MOST_KEPT_BYTES, read_text};
+use masseter_scenario::Scenario;
+use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 use rustix::fs::{FlockOperation, flock};
 use tempfile::TempDir;
 

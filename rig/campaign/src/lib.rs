@@ -6,6 +6,7 @@
 
 mod campaign;
 mod case;
+mod covariance;
 mod factor;
 mod file;
 mod folder;

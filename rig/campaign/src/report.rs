@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use masseter_shared::wording::counted;
+use masseter_scenario::wording::counted;
 
 use crate::campaign::Campaign;
 use crate::folder::CampaignFolder;
@@ -155,9 +155,10 @@ impl<'a> Report<'a> {
 
 #[cfg(test)]
 mod tests {
+    use masseter_scenario::Scenario;
+
     use super::*;
     use crate::result::CaseCheck;
-    use masseter_shared::config::Scenario;
 
     fn campaign(text: &str) -> Campaign {
         Campaign {

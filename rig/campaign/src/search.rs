@@ -3,10 +3,12 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use cmaes::{CMAESOptions, DVector};
+use nalgebra::DVector;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
+
+use crate::covariance::Generations;
 
 /// First step of CMA-ES, as a share of each range.
 const STEP: f64 = 0.3;
@@ -72,13 +74,16 @@ impl Search {
         let mut random = Pcg64::seed_from_u64(self.seed);
         let mut start = vec![0.5; self.dimension];
         while !watch.is_over() {
-            let objective = |point: &DVector<f64>| {
-                let inside: Vec<_> = point.iter().map(|x| reflected(*x)).collect();
-                evaluate(&inside)
-            };
-            let options = CMAESOptions::new(start, STEP).seed(random.random());
-            let mut state = options.build(objective).expect("the options are valid");
-            while !watch.is_over() && state.next_parallel().is_none() {}
+            let mut generations = Generations::new(start, STEP);
+            while !watch.is_over() && !generations.has_converged() {
+                let points = generations.points(&mut random);
+                let value = |point: &DVector<f64>| {
+                    let inside: Vec<_> = point.iter().map(|x| reflected(*x)).collect();
+                    evaluate(&inside)
+                };
+                let valued = points.into_par_iter().map(|point| (value(&point), point)).collect();
+                generations.learn(valued);
+            }
             start = (0..self.dimension).map(|_| random.random()).collect();
         }
     }

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use masseter_shared::config::{RequirementConfig, Scenario};
+use masseter_scenario::{RequirementConfig, Scenario};
 use toml::{Table, Value};
 
 /// The lists whose entries are changes of their own.
@@ -324,7 +324,7 @@ for_s = 0.1
     #[test]
     fn a_key_of_the_motion_keeps_the_kind_of_the_motion() {
         let fails = |scenario: &Scenario| {
-            let masseter_shared::config::MotionConfig::Chewing(chewing) = &scenario.motion else {
+            let masseter_scenario::MotionConfig::Chewing(chewing) = &scenario.motion else {
                 return false;
             };
             chewing.cycle_rate_hz > 1.5

@@ -7,10 +7,10 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
 use anyhow::{Context, bail, ensure};
-use masseter_shared::clock;
+use masseter_runtime::clock;
 
 use crate::campaigns::args::HyperqueueArgs;
-use crate::machine::interrupts::Interrupts;
+use crate::interrupts::Interrupts;
 
 /// Time between two looks whether the job has ended.
 const LOOK_EVERY: Duration = Duration::from_millis(50);

@@ -5,11 +5,11 @@ mod job;
 
 use anyhow::Context;
 use masseter_campaign::{Campaign, CampaignFolder, CaseResult, StopRules};
-use masseter_shared::clock;
+use masseter_runtime::clock;
 use masseter_terminal::{Failure, OrFailure, status};
 
 use super::args::HyperqueueArgs;
-use crate::machine::interrupts::Interrupts;
+use crate::interrupts::Interrupts;
 use job::{End, Job};
 
 /// How often cases are submitted that have no result yet.

@@ -1,6 +1,6 @@
 //! The scenario of a dry run.
 
-use masseter_shared::config::Scenario;
+use masseter_scenario::Scenario;
 
 /// Makes a scenario that of its dry run; one that is a dry run already stays as it is.
 pub(crate) fn enter_dry_run(scenario: &mut Scenario) {

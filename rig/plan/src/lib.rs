@@ -21,11 +21,11 @@ use std::time::Duration;
 
 use anyhow::{Context, ensure};
 use masseter_controller::trajectory::{self, Trajectory, TrajectoryError, TrajectoryReport};
+use masseter_model::dynamics::Friction;
+use masseter_model::geometry::Mechanism;
 use masseter_plant::core as plant;
-use masseter_shared::config::{FileConfig, MotionConfig, Scenario};
-use masseter_shared::dynamics::Friction;
-use masseter_shared::geometry::Mechanism;
-use masseter_shared::schedule::CycleSchedule;
+use masseter_runtime::schedule::CycleSchedule;
+use masseter_scenario::{FileConfig, MotionConfig, Scenario};
 
 use dry::enter_dry_run;
 

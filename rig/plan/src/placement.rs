@@ -6,7 +6,7 @@
 use std::cmp::Ordering;
 
 use masseter_controller::trajectory::Trajectory;
-use masseter_shared::geometry::{AXES, AXIS_NAMES, Mechanism, Pose, Vec3};
+use masseter_model::geometry::{AXES, AXIS_NAMES, Mechanism, Pose, Vec3};
 use nalgebra::Translation3;
 use serde::Serialize;
 
@@ -44,7 +44,7 @@ impl Placement {
 ///
 /// ```
 /// use masseter_plan::{RunPlan, best_placement};
-/// use masseter_shared::config::Scenario;
+/// use masseter_scenario::Scenario;
 ///
 /// let plan = RunPlan::new(Scenario::default())?;
 /// let now_m = plan.demands.margin_m(plan.mechanism.strokes()).into_iter().fold(f64::INFINITY, f64::min);
@@ -94,7 +94,7 @@ fn placement(poses: &[Pose], mechanism: &Mechanism, shift: Vec3) -> Option<Place
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::config::Scenario;
+    use masseter_scenario::Scenario;
 
     use super::*;
 

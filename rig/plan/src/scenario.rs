@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use masseter_shared::config::Scenario;
+use masseter_scenario::Scenario;
 
 /// The valid scenario of a file, or the default one.
 ///

@@ -13,8 +13,8 @@ use std::sync::mpsc::{
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use masseter_shared::clock::{self, SECOND_NS};
-use masseter_shared::wording::counted;
+use masseter_runtime::clock::{self, SECOND_NS};
+use masseter_scenario::wording::counted;
 
 use super::topic::Recorded;
 use super::writer::{Medium, Recorder, WriteError};
@@ -78,9 +78,9 @@ impl WriteOutcome {
 ///
 /// ```
 /// use masseter_recording::{Backlog, Pace, Reader, Recorded, Recorder, Scene};
-/// use masseter_shared::config::Scenario;
-/// use masseter_shared::geometry::{Mechanism, MechanismConfig};
-/// use masseter_shared::messages::{Message, State};
+/// use masseter_scenario::Scenario;
+/// use masseter_model::geometry::{Mechanism, MechanismConfig};
+/// use masseter_runtime::messages::{Message, State};
 ///
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("recording.mcap");

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use masseter_shared::config::CpuDmaLatency;
+use masseter_scenario::CpuDmaLatency;
 use serde::{Deserialize, Serialize};
 
 /// Resources that a process used in its steady state: CPU time and page faults of all threads, the rest of the main

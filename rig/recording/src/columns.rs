@@ -6,8 +6,8 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use masseter_shared::messages::{FrameTap, Message};
-use masseter_shared::wording::shortest;
+use masseter_runtime::messages::{FrameTap, Message};
+use masseter_scenario::wording::shortest;
 use mcap::Channel;
 
 use super::frames::FrameBatch;
@@ -244,7 +244,7 @@ impl Columns {
 #[cfg(test)]
 mod tests {
     use data_encoding::HEXUPPER;
-    use masseter_shared::messages::{CanData, FrameTap, Message, Reading};
+    use masseter_runtime::messages::{CanData, FrameTap, Message, Reading};
 
     use super::*;
 

@@ -47,8 +47,8 @@ fn codes(list: &str) -> Option<BTreeMap<u64, String>> {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::messages::codes::{Cause, DriveState};
-    use masseter_shared::messages::{Event, Message, Reading};
+    use masseter_runtime::messages::codes::{Cause, DriveState};
+    use masseter_runtime::messages::{Event, Message, Reading};
 
     use super::*;
 

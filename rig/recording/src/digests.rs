@@ -117,7 +117,7 @@ impl Digester {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::messages::{Command, Reading};
+    use masseter_runtime::messages::{Command, Reading};
 
     use super::*;
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use cdr::{CdrLe, Infinite};
 
-use masseter_shared::named::Declared;
+use masseter_runtime::named::Declared;
 
 use super::encapsulation::CDR_LITTLE_ENDIAN;
 use super::frames::FrameBatch;
@@ -193,8 +193,8 @@ impl Encoder {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::messages::{Message, Signals};
-    use masseter_shared::named::Signal;
+    use masseter_runtime::messages::{Message, Signals};
+    use masseter_runtime::named::Signal;
 
     use super::*;
 

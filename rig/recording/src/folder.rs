@@ -6,8 +6,9 @@ use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
+use masseter_runtime::clock;
+
 use crate::output::{OutputError, new_folder};
-use masseter_shared::clock;
 
 /// The folder of a run.
 ///

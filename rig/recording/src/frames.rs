@@ -6,7 +6,7 @@
 
 use std::array;
 
-use masseter_shared::messages::{CanData, FrameTap};
+use masseter_runtime::messages::{CanData, FrameTap};
 
 use super::encapsulation::CDR_LITTLE_ENDIAN;
 
@@ -119,7 +119,7 @@ pub(super) fn frames(body: &[u8]) -> Option<Vec<FrameTap>> {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::messages::Message;
+    use masseter_runtime::messages::Message;
     use proptest::prelude::*;
 
     use super::*;

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::io;
 use std::time::UNIX_EPOCH;
 
-use masseter_shared::clock;
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::AXES;
-use masseter_shared::input::{MOST_KEPT_BYTES, read_text};
-use masseter_shared::named::Declared;
-use masseter_shared::realtime::scheduling::Obtained;
+use masseter_model::geometry::AXES;
+use masseter_runtime::clock;
+use masseter_runtime::named::Declared;
+use masseter_runtime::realtime::scheduling::Obtained;
+use masseter_scenario::Scenario;
+use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
@@ -30,7 +30,7 @@ const UNJUDGED: &str = "it did not live to judge the run, or could not write how
 ///
 /// ```
 /// use masseter_recording::{MachineInfo, Manifest, RunFolder};
-/// use masseter_shared::config::Scenario;
+/// use masseter_scenario::Scenario;
 ///
 /// let machine = MachineInfo { cpu: "any".into(), cores: 2, kernel: "Linux".into(), is_virtual: false };
 /// let manifest = Manifest::new(Scenario::default(), 10.0, "virtual", machine);
@@ -60,6 +60,7 @@ pub struct Manifest {
     #[serde(default)]
     pub declared: Declared,
     /// The scenario as resolved.
+    #[serde(with = "masseter_scenario::embedded")]
     pub scenario: Scenario,
     /// Duration of the motion, s.
     pub motion_s: f64,

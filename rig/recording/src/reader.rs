@@ -8,8 +8,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::vec;
 
-use masseter_shared::input::open_regular;
-use masseter_shared::messages::{FrameTap, LAYOUT_VERSION};
+use masseter_runtime::messages::{FrameTap, LAYOUT_VERSION};
+use masseter_scenario::input::open_regular;
 use mcap::Attachment;
 use mcap::records::{AttachmentHeader, MessageHeader, Record, op};
 

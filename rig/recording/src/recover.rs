@@ -39,9 +39,9 @@ pub struct Recovered {
 /// use std::io::Cursor;
 ///
 /// use masseter_recording::{Reader, Recorded, Recorder, Scene, recover};
-/// # use masseter_shared::config::Scenario;
-/// # use masseter_shared::geometry::{Mechanism, MechanismConfig};
-/// # use masseter_shared::messages::{Message, State};
+/// # use masseter_scenario::Scenario;
+/// # use masseter_model::geometry::{Mechanism, MechanismConfig};
+/// # use masseter_runtime::messages::{Message, State};
 ///
 /// # let folder = tempfile::tempdir()?;
 /// # let path = folder.path().join("recording.mcap");

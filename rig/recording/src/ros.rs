@@ -1,6 +1,6 @@
 //! The messages of ROS 2 that 3-D views show: `tf2_msgs/msg/TFMessage` and `visualization_msgs/msg/MarkerArray`.
 
-use masseter_shared::clock::SECOND_NS;
+use masseter_runtime::clock::SECOND_NS;
 use serde::Serialize;
 
 /// A message with its type.

@@ -4,10 +4,10 @@
 //! `platform_desired`. Markers: base triangle with its slides, the three legs, the three platforms, and the
 //! jaw's incisal point and condyles, which move with the true platform.
 
-use masseter_shared::clock::SECOND_NS;
-use masseter_shared::config::JawConfig;
-use masseter_shared::geometry::{LEGS, Mechanism, Vec3};
-use masseter_shared::messages::{State, Truth};
+use masseter_model::geometry::{LEGS, Mechanism, Vec3};
+use masseter_runtime::clock::SECOND_NS;
+use masseter_runtime::messages::{State, Truth};
+use masseter_scenario::JawConfig;
 
 use super::ros::{Header, Marker, MarkerArray, Shape, TfMessage, Time, TransformStamped, Unused};
 
@@ -93,7 +93,7 @@ impl Scene {
 
     /// Legs from hinge to platform corner, with the hinges as points.
     fn legs(&self, truth: &Truth) -> Vec<Marker> {
-        let pose = masseter_shared::messages::pose_from_fields(truth.position_m, truth.quaternion_wxyz);
+        let pose = masseter_runtime::messages::pose_from_fields(truth.position_m, truth.quaternion_wxyz);
         let hinges: [Vec3; LEGS] = std::array::from_fn(|leg| self.mechanism.hinge(leg, truth.joint_m[leg]));
         let ends =
             hinges.iter().zip(self.mechanism.corners_at(&pose)).flat_map(|(hinge, corner)| [*hinge, corner]);
@@ -191,7 +191,7 @@ fn marker(shape: Shape, color: [f32; 4], points: impl IntoIterator<Item = Vec3>)
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::geometry::MechanismConfig;
+    use masseter_model::geometry::MechanismConfig;
 
     use super::*;
 

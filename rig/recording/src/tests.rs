@@ -7,9 +7,9 @@ mod lost_definitions;
 use std::io::Cursor;
 use std::sync::LazyLock;
 
-use masseter_shared::config::JawConfig;
-use masseter_shared::geometry::{Mechanism, MechanismConfig};
-use masseter_shared::messages::{CanData, Command, FrameTap, Message, Reading, State, Truth};
+use masseter_model::geometry::{Mechanism, MechanismConfig};
+use masseter_runtime::messages::{CanData, Command, FrameTap, Message, Reading, State, Truth};
+use masseter_scenario::JawConfig;
 use proptest::prelude::*;
 
 use super::*;

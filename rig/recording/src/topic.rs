@@ -1,6 +1,6 @@
 //! The topics of a recording and their messages: one table of both.
 
-use masseter_shared::messages::{
+use masseter_runtime::messages::{
     Command, Contact, Event, FrameTap, Machine, Message, Parameters, Reading, Signals, State, Truth,
 };
 

@@ -12,9 +12,9 @@ use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread::{self, JoinHandle};
 
-use masseter_shared::input::read_bytes;
-use masseter_shared::messages::FrameTap;
-use masseter_shared::named::Declared;
+use masseter_runtime::messages::FrameTap;
+use masseter_runtime::named::Declared;
+use masseter_scenario::input::read_bytes;
 use mcap::records::MessageHeader;
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 
@@ -98,9 +98,9 @@ pub(super) fn add_schema<W: Write + Seek>(
 /// use std::io::Cursor;
 ///
 /// use masseter_recording::{Reader, Recorded, Recorder, Scene};
-/// use masseter_shared::config::Scenario;
-/// use masseter_shared::geometry::Mechanism;
-/// use masseter_shared::messages::{Command, Message};
+/// use masseter_scenario::Scenario;
+/// use masseter_model::geometry::Mechanism;
+/// use masseter_runtime::messages::{Command, Message};
 ///
 /// let scenario = Scenario::default();
 /// let scene = Scene::new(&Mechanism::new(&scenario.mechanism)?, &scenario.jaw);

@@ -2,9 +2,9 @@
 //!
 //! What the checks come to is the [verdict](super::verdict)'s.
 
-use masseter_shared::config::{ExpectedVerdict, StimulusConfig};
-use masseter_shared::messages::codes::{Cause, ControllerState};
-use masseter_shared::wording::counted;
+use masseter_runtime::messages::codes::{Cause, ControllerState};
+use masseter_scenario::wording::counted;
+use masseter_scenario::{ExpectedVerdict, StimulusConfig};
 
 use crate::check::{Check, CheckFigures, CheckResult};
 use crate::motion_checks::{faults, tracking};

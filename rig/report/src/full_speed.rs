@@ -7,8 +7,8 @@
 use std::fmt::Write;
 
 use masseter_analysis::{AxisFigures, Figures};
+use masseter_model::geometry::AXIS_NAMES;
 use masseter_recording::Manifest;
-use masseter_shared::geometry::AXIS_NAMES;
 
 use crate::text::{microseconds, or_dash};
 

@@ -13,8 +13,8 @@ use hdrhistogram::serialization::interval_log::{
 };
 use hdrhistogram::serialization::{Deserializer, V2DeflateSerializer};
 use masseter_analysis::IntervalFigures;
-use masseter_shared::clock::SECOND_NS;
-use masseter_shared::input::{MOST_KEPT_BYTES, read_bytes};
+use masseter_runtime::clock::SECOND_NS;
+use masseter_scenario::input::{MOST_KEPT_BYTES, read_bytes};
 
 use crate::write_error::WriteError;
 

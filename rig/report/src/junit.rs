@@ -3,7 +3,7 @@
 use askama::Template;
 use masseter_analysis::Figures;
 use masseter_recording::Manifest;
-use masseter_shared::named::PlayedMotion;
+use masseter_runtime::named::PlayedMotion;
 use masseter_terminal::Exit;
 
 use crate::check::{Check, CheckFigures, CheckResult};
@@ -161,8 +161,8 @@ pub fn junit_of_suite(runs: &[JunitRun], took_s: f64) -> askama::Result<String> 
 mod tests {
     use masseter_analysis::Analysis;
     use masseter_recording::MachineInfo;
-    use masseter_shared::config::Scenario;
-    use masseter_shared::named::Declared;
+    use masseter_runtime::named::Declared;
+    use masseter_scenario::Scenario;
 
     use super::*;
 

@@ -1,8 +1,8 @@
 //! Whether the platform followed its path: its errors while the motion played, and where each fault led it.
 
 use masseter_analysis::{FaultFigures, PoseErrors};
-use masseter_shared::config::{ChecksConfig, FaultConfig};
-use masseter_shared::wording::counted;
+use masseter_scenario::wording::counted;
+use masseter_scenario::{ChecksConfig, FaultConfig};
 
 use crate::check::{Check, CheckResult};
 
@@ -117,7 +117,7 @@ pub(crate) fn faults(
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::config::FaultKindConfig;
+    use masseter_scenario::FaultKindConfig;
 
     use super::*;
 

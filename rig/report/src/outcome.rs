@@ -1,6 +1,6 @@
 //! What a run comes to: a word in reports, and the exit code of the program.
 
-use masseter_shared::config::ExpectedVerdict;
+use masseter_scenario::ExpectedVerdict;
 use masseter_terminal::Exit;
 
 /// The outcome of a run.

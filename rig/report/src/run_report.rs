@@ -7,7 +7,7 @@ use std::path::Path;
 use anyhow::Context;
 use masseter_analysis::{Analysis, Figures};
 use masseter_recording::{Manifest, ReadError, Reader, Recorded, RunFolder};
-use masseter_shared::messages::tap::{self, TapError};
+use masseter_runtime::messages::tap::{self, TapError};
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, result_with_tones, status};
 
 use crate::candump_logs::CandumpLogs;

@@ -6,8 +6,8 @@ use std::fmt::{self, Display, Formatter};
 use masseter_analysis::requirements::RequirementResult;
 use masseter_analysis::{Departure, Figures};
 use masseter_recording::Manifest;
-use masseter_shared::messages::codes::{Cause, ControllerState};
-use masseter_shared::named::PlayedMotion;
+use masseter_runtime::messages::codes::{Cause, ControllerState};
+use masseter_runtime::named::PlayedMotion;
 
 use crate::check::CheckResult;
 
@@ -117,10 +117,10 @@ mod tests {
     use masseter_analysis::requirements::RequirementFigures;
     use masseter_analysis::{Analysis, Code, EventRecord, StoppedBy};
     use masseter_recording::MachineInfo;
-    use masseter_shared::config::Scenario;
-    use masseter_shared::messages::Event;
-    use masseter_shared::messages::codes::{EventKind, Source};
-    use masseter_shared::named::Declared;
+    use masseter_runtime::messages::Event;
+    use masseter_runtime::messages::codes::{EventKind, Source};
+    use masseter_runtime::named::Declared;
+    use masseter_scenario::Scenario;
 
     use super::*;
 

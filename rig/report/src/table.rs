@@ -2,8 +2,9 @@
 
 use std::fmt::Write;
 
-use masseter_shared::config::MotionConfig;
-use masseter_shared::messages::codes::{Cause, EventKind};
+use masseter_runtime::messages::codes::{Cause, EventKind};
+use masseter_scenario::MotionConfig;
+use masseter_scenario::wording::counted;
 
 use crate::full_speed;
 use crate::shortfall::whose_motion;
@@ -14,7 +15,6 @@ use masseter_analysis::{
     TrackingFigures,
 };
 use masseter_recording::{Manifest, RunUsage, Usage};
-use masseter_shared::wording::counted;
 use masseter_terminal::{Exit, Tone};
 
 /// The words that judge.

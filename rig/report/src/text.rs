@@ -1,8 +1,8 @@
 //! Numbers and events as text, for the table, the checks and the page.
 
 use masseter_analysis::{Code, EventRecord};
-use masseter_shared::config::Dimension;
-use masseter_shared::messages::codes::Cause;
+use masseter_runtime::messages::codes::Cause;
+use masseter_scenario::Dimension;
 
 /// A dash where there is no such figure.
 pub(crate) fn or_dash<T>(figure: Option<T>, format: impl Fn(T) -> String) -> String {

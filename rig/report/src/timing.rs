@@ -6,7 +6,7 @@ use std::fmt::{self, Display, Formatter};
 
 use masseter_analysis::{Figures, OverrunAttribution};
 use masseter_recording::Manifest;
-use masseter_shared::wording::counted;
+use masseter_scenario::wording::counted;
 use serde::Serialize;
 
 use crate::text::grouped;

@@ -4,11 +4,9 @@
 
 use masseter_analysis::{EventRecord, Figures, Outage, StoppedBy};
 use masseter_recording::{DmaLatency, Ending, Manifest, RunUsage};
-use masseter_shared::config::{
-    CanConfig, ChecksConfig, ExpectConfig, ExpectedVerdict, Scenario, TimingConfig,
-};
-use masseter_shared::messages::codes::{Cause, EventKind, Source};
-use masseter_shared::wording::counted;
+use masseter_runtime::messages::codes::{Cause, EventKind, Source};
+use masseter_scenario::wording::counted;
+use masseter_scenario::{CanConfig, ChecksConfig, ExpectConfig, ExpectedVerdict, Scenario, TimingConfig};
 use masseter_terminal::Exit;
 use serde::Serialize;
 
@@ -26,8 +24,8 @@ use crate::timing::{Timing, TimingWord};
 /// use masseter_analysis::Analysis;
 /// use masseter_recording::{MachineInfo, Manifest};
 /// use masseter_report::Verdict;
-/// use masseter_shared::config::Scenario;
-/// use masseter_shared::named::Declared;
+/// use masseter_scenario::Scenario;
+/// use masseter_runtime::named::Declared;
 ///
 /// let machine = MachineInfo { cpu: "any".into(), cores: 2, kernel: "Linux".into(), is_virtual: false };
 /// let manifest = Manifest::new(Scenario::default(), 10.0, "virtual", machine);
@@ -346,7 +344,7 @@ fn named(checks: &[Check], result: CheckResult) -> Option<String> {
 mod tests {
     mod figures;
 
-    use masseter_shared::messages::Event;
+    use masseter_runtime::messages::Event;
 
     use super::*;
     use masseter_recording::Usage;

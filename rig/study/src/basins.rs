@@ -4,7 +4,7 @@
 
 use std::f64::consts::PI;
 
-use masseter_shared::geometry::{LEGS, Mechanism};
+use masseter_model::geometry::{LEGS, Mechanism};
 use rayon::prelude::*;
 
 use super::solution_set::SolutionSet;

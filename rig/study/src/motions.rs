@@ -2,10 +2,10 @@
 
 use masseter_controller::kinematics::ForwardTracker;
 use masseter_controller::trajectory::{Trajectory, TrajectoryReport};
-use masseter_shared::config::{
+use masseter_model::geometry::{Conditioning, Jacobian, LEGS, Mechanism, Pose};
+use masseter_scenario::{
     ChewingConfig, LateralConfig, MotionConfig, OpeningConfig, ProtrusionConfig, Scenario,
 };
-use masseter_shared::geometry::{Conditioning, Jacobian, LEGS, Mechanism, Pose};
 
 use super::sample::distance_rad;
 use super::solver::{COMPARED, CONTROLLER, Solver, Start};

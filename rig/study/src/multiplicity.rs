@@ -1,7 +1,7 @@
 //! How many solutions random inputs have, and how many of them meet the paper's two conditions.
 
 use masseter_controller::kinematics::{Assembly, MOST_SOLUTIONS, Solutions};
-use masseter_shared::geometry::{LEGS, Mechanism};
+use masseter_model::geometry::{LEGS, Mechanism};
 use rayon::prelude::*;
 
 use super::sample::{self, Stream};

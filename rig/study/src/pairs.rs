@@ -1,6 +1,6 @@
 //! Figs. 3 and 4 of the paper: single guesses from which the two iterations behave differently.
 
-use masseter_shared::geometry::{LEGS, Mechanism};
+use masseter_model::geometry::{LEGS, Mechanism};
 use rayon::prelude::*;
 
 use self::Course::{Converges, Diverges, Fails, Oscillates};

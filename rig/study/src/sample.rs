@@ -4,7 +4,7 @@
 use std::f64::consts::{PI, TAU};
 
 use masseter_controller::kinematics::{Solution, Solutions};
-use masseter_shared::geometry::{AXES, Actuators, LEGS, Mechanism};
+use masseter_model::geometry::{AXES, Actuators, LEGS, Mechanism};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -101,7 +101,7 @@ pub(super) fn distance_rad(a: &[f64; LEGS], b: &[f64; LEGS]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::geometry::MechanismConfig;
+    use masseter_model::geometry::MechanismConfig;
 
     use super::*;
 

@@ -2,7 +2,7 @@
 
 use anyhow::Context;
 use masseter_controller::kinematics::{Solution, Solutions};
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
+use masseter_model::geometry::{Actuators, LEGS, Mechanism};
 
 use super::sample::distance_rad;
 use super::table::{csv, degrees, number};
@@ -104,7 +104,7 @@ fn sorted_microdegrees(theta_rad: &[f64; LEGS]) -> [i64; LEGS] {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::geometry::MechanismConfig;
+    use masseter_model::geometry::MechanismConfig;
 
     use super::*;
 

@@ -6,7 +6,7 @@ use masseter_controller::kinematics::{
     ForwardTracker, Iteration, MAX_HALVINGS, MAX_ITERATIONS, Method, Options, Residual, StepRule,
     solve_traced,
 };
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
+use masseter_model::geometry::{Actuators, LEGS, Mechanism};
 
 /// A solver with its choices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,8 +3,8 @@
 use std::hint::black_box;
 
 use masseter_controller::kinematics::{ForwardTracker, solve};
-use masseter_shared::clock;
-use masseter_shared::geometry::Mechanism;
+use masseter_model::geometry::Mechanism;
+use masseter_runtime::clock;
 
 use super::motions::Motion;
 use super::sample::Guesses;

@@ -1,8 +1,8 @@
 //! Everything that the study measures.
 
 use anyhow::ensure;
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::{Mechanism, MechanismConfig};
+use masseter_model::geometry::{Mechanism, MechanismConfig};
+use masseter_scenario::Scenario;
 
 use crate::basins::Basins;
 use crate::motions::{self, Motion};

@@ -1,7 +1,7 @@
 //! Random guesses for random feasible inputs: which solver reaches which solution after how many iterations.
 
 use masseter_controller::kinematics::Assembly;
-use masseter_shared::geometry::{LEGS, Mechanism};
+use masseter_model::geometry::{LEGS, Mechanism};
 use rayon::prelude::*;
 
 use super::sample::{self, GUESSES, Guesses, Stream, distance_rad};

@@ -5,7 +5,7 @@
 //! drawn into it is a projection: it leaves the slice in the other coordinates.
 
 use masseter_controller::kinematics::{Assembly, Solutions};
-use masseter_shared::geometry::{Conditioning, Jacobian, LEGS, Mechanism, Pose, Vec3};
+use masseter_model::geometry::{Conditioning, Jacobian, LEGS, Mechanism, Pose, Vec3};
 use nalgebra::{Translation3, UnitQuaternion};
 use rayon::prelude::*;
 

@@ -3,9 +3,9 @@
 use std::ffi::{c_int, c_void};
 
 use masseter_controller::pose_law::{Demand, LawFailed, PoseLaw};
-use masseter_shared::geometry::Pose;
-use masseter_shared::messages::pose_fields;
-use masseter_shared::named::Declared;
+use masseter_model::geometry::Pose;
+use masseter_runtime::messages::pose_fields;
+use masseter_runtime::named::Declared;
 use nalgebra::{Quaternion, Translation3, Unit};
 
 /// A pose: position in the base frame, m, and unit quaternion.

@@ -12,11 +12,11 @@ use std::ffi::{CStr, c_char, c_int, c_void};
 use std::time::Duration;
 
 use masseter_controller::process;
-use masseter_shared::control::{Outcome, Session, Tick, Waited};
-use masseter_shared::lifecycle::ProcessContext;
-use masseter_shared::lifecycle::attach::attach;
-use masseter_shared::messages::{Command, Event, Reading, State};
-use masseter_shared::named::{Declared, Parameter, PlayedMotion, Signal};
+use masseter_runtime::control::{Outcome, Session, Tick, Waited};
+use masseter_runtime::lifecycle::ProcessContext;
+use masseter_runtime::lifecycle::attach::attach;
+use masseter_runtime::messages::{Command, Event, Reading, State};
+use masseter_runtime::named::{Declared, Parameter, PlayedMotion, Signal};
 
 use law::{CLaw, LawFunction};
 use outcome::{Failure, OK, SAFE_STOP, TIMED_OUT, guarded};

@@ -42,10 +42,10 @@ macro_rules! failures {
 
 failures!(
     masseter_controller::process::ControllerError,
-    masseter_shared::control::SessionError,
-    masseter_shared::lifecycle::ProcessError,
-    masseter_shared::lifecycle::attach::AttachError,
-    masseter_shared::named::NameError
+    masseter_runtime::control::SessionError,
+    masseter_runtime::lifecycle::ProcessError,
+    masseter_runtime::lifecycle::attach::AttachError,
+    masseter_runtime::named::NameError
 );
 
 /// The result of `work`. A panic is an error, since it must not unwind through C.

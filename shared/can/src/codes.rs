@@ -28,6 +28,7 @@ macro_rules! codes {
             pub const ALL: [Self; [$($code),*].len()] = [$(Self::$variant),*];
 
             /// The number of the value.
+            #[inline]
             pub const fn code(self) -> $number {
                 self as $number
             }
@@ -50,6 +51,7 @@ macro_rules! codes {
         impl TryFrom<$number> for $name {
             type Error = $crate::UnknownCode;
 
+            #[inline]
             fn try_from(code: $number) -> Result<Self, Self::Error> {
                 let unknown = $crate::UnknownCode { enumeration: stringify!($name), number: code.into() };
                 Self::ALL.into_iter().find(|value| value.code() == code).ok_or(unknown)

@@ -1,9 +1,9 @@
 //! Forward and inverse kinematics over the rows of an array.
 
 use masseter_controller::kinematics::ForwardTracker;
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::{AXES, Actuators, MechanismConfig};
-use masseter_shared::messages::{pose_fields, pose_from_fields};
+use masseter_model::geometry::{AXES, Actuators, MechanismConfig};
+use masseter_runtime::messages::{pose_fields, pose_from_fields};
+use masseter_scenario::Scenario;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -14,7 +14,7 @@ const POSE: usize = 7;
 
 /// The dimensions of the mechanism.
 #[pyclass(frozen)]
-pub(crate) struct Mechanism(masseter_shared::geometry::Mechanism);
+pub(crate) struct Mechanism(masseter_model::geometry::Mechanism);
 
 #[pymethods]
 impl Mechanism {
@@ -25,7 +25,7 @@ impl Mechanism {
             None => MechanismConfig::default(),
             Some(path) => Scenario::read(&path).map_err(failed)?.mechanism,
         };
-        masseter_shared::geometry::Mechanism::new(&config).map(Self).map_err(failed)
+        masseter_model::geometry::Mechanism::new(&config).map(Self).map_err(failed)
     }
 
     /// Poses of rows of six positions.

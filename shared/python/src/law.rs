@@ -5,11 +5,11 @@ use std::time::Duration;
 
 use masseter_controller::pose_law::{Demand as RigDemand, LawFailed, PoseLaw};
 use masseter_controller::process::run_with_law;
-use masseter_shared::control::Outcome;
-use masseter_shared::geometry;
-use masseter_shared::lifecycle::attach::attach;
-use masseter_shared::messages::pose_fields;
-use masseter_shared::named::{Declared, Parameter, Signal};
+use masseter_model::geometry;
+use masseter_runtime::control::Outcome;
+use masseter_runtime::lifecycle::attach::attach;
+use masseter_runtime::messages::pose_fields;
+use masseter_runtime::named::{Declared, Parameter, Signal};
 use nalgebra::{Quaternion, Translation3, Unit};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

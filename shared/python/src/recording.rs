@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use masseter_recording::{Reader, Recorded};
-use masseter_shared::messages::{
+use masseter_runtime::messages::{
     Command, Contact, Event, Message, Parameters, Reading, Signals, State, Truth,
 };
 use pyo3::prelude::*;

@@ -3,11 +3,11 @@
 use std::cell::RefCell;
 use std::time::Duration;
 
-use masseter_shared::control::{self, Outcome, Tick, Waited};
-use masseter_shared::lifecycle::ProcessContext;
-use masseter_shared::lifecycle::attach::attach;
-use masseter_shared::messages::{Command, Event, Message, State};
-use masseter_shared::named::{Declared, PlayedMotion};
+use masseter_runtime::control::{self, Outcome, Tick, Waited};
+use masseter_runtime::lifecycle::ProcessContext;
+use masseter_runtime::lifecycle::attach::attach;
+use masseter_runtime::messages::{Command, Event, Message, State};
+use masseter_runtime::named::{Declared, PlayedMotion};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 

@@ -14,7 +14,7 @@
 mod options;
 mod search;
 
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
+use masseter_model::geometry::{Actuators, LEGS, Mechanism};
 pub use options::{MAX_HALVINGS, MAX_ITERATIONS, Method, Options, Residual, StepRule};
 pub use search::Iteration;
 use search::Search;
@@ -27,7 +27,7 @@ use super::{Equations, ForwardError, Solution};
 ///
 /// ```
 /// use masseter_controller::kinematics::{Method, Options, solve};
-/// use masseter_shared::geometry::{Actuators, Mechanism, MechanismConfig};
+/// use masseter_model::geometry::{Actuators, Mechanism, MechanismConfig};
 ///
 /// let mechanism = Mechanism::new(&MechanismConfig::default())?;
 /// let neutral = Actuators { slide_m: [0.0; 3], leg_m: [0.27; 3] };

@@ -1,6 +1,6 @@
 //! One step of either iteration after the other. Nothing here decides when to end.
 
-use masseter_shared::geometry::LEGS;
+use masseter_model::geometry::LEGS;
 use nalgebra::{Matrix3, Vector3};
 
 use super::{MAX_HALVINGS, Method, Options, Residual, StepRule};

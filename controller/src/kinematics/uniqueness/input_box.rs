@@ -1,6 +1,6 @@
 //! A box of inputs: an interval for each slide and each leg.
 
-use masseter_shared::geometry::{AXES, LEGS};
+use masseter_model::geometry::{AXES, LEGS};
 
 use super::Enclosure;
 

@@ -15,7 +15,7 @@
 //! [`Slopes`] encloses the derivatives and also the slopes between any two solutions. The mechanism's
 //! dimensions count as exact.
 
-use masseter_shared::geometry::{LEGS, Mechanism, Vec3};
+use masseter_model::geometry::{LEGS, Mechanism, Vec3};
 
 use super::super::legs::next;
 use super::{Enclosure, InputBox};
@@ -125,7 +125,7 @@ impl Platforms {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::geometry::Actuators;
+    use masseter_model::geometry::Actuators;
     use proptest::prelude::*;
 
     use super::*;

@@ -5,7 +5,7 @@
 //! - Krawczyk's operator −Y E(m) + (1 − Y S)(h − m) shrinks a part. It contains every solution, because the
 //!   slopes S contain every difference.
 
-use masseter_shared::geometry::{LEGS, Mechanism};
+use masseter_model::geometry::{LEGS, Mechanism};
 use nalgebra::Matrix3;
 
 use super::platforms::{Platforms, Slopes};
@@ -199,7 +199,7 @@ impl Preconditioned {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::geometry::Actuators;
+    use masseter_model::geometry::Actuators;
 
     use super::*;
     use crate::kinematics::Solutions;

@@ -1,6 +1,6 @@
 //! What goes wrong, and that the controller stops for it with the cause.
 
-use masseter_shared::messages::explain;
+use masseter_runtime::messages::explain;
 
 use super::*;
 

@@ -1,7 +1,7 @@
 //! Pose laws of a user: what they may do, and that whatever they do wrong ends in a safe stop with its cause.
 
-use masseter_shared::geometry::Vec3;
-use masseter_shared::messages::explain;
+use masseter_model::geometry::Vec3;
+use masseter_runtime::messages::explain;
 use nalgebra::{Quaternion, Unit};
 
 use super::*;

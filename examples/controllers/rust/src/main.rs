@@ -4,9 +4,9 @@ use std::process::ExitCode;
 
 use masseter_controller::pose_law::{Demand, LawFailed, PoseLaw};
 use masseter_controller::process::{ControllerError, run_with_law};
-use masseter_shared::geometry::{Pose, Vec3};
-use masseter_shared::lifecycle::attach::attach;
-use masseter_shared::named::{Declared, Parameter, Signal};
+use masseter_model::geometry::{Pose, Vec3};
+use masseter_runtime::lifecycle::attach::attach;
+use masseter_runtime::named::{Declared, Parameter, Signal};
 
 const LIMIT_M: f64 = 1e-3; // the most that is added
 

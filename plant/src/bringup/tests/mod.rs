@@ -7,9 +7,9 @@ use std::path::Path;
 
 use masseter_can::canopen::{NodeId, ObjectAddress};
 use masseter_can::cia402::Controlword;
-use masseter_shared::clock::{MILLISECOND_NS, SECOND_NS};
-use masseter_shared::config::{ObjectKey, Scenario};
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
+use masseter_model::geometry::{AXES, AXIS_NAMES};
+use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
+use masseter_scenario::{ObjectKey, Scenario};
 
 use super::test_log::Log;
 use super::*;

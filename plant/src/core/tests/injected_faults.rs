@@ -1,8 +1,8 @@
 //! Injected faults of encoders, drives, mechanism and commands: each strikes, does what its name says, and ends.
 
 use masseter_can::canopen::EmergencyCode;
-use masseter_shared::config::{FaultConfig, FaultKindConfig as Kind, FaultLayer, FaultPlace};
-use masseter_shared::geometry::AXIS_NAMES;
+use masseter_model::geometry::AXIS_NAMES;
+use masseter_scenario::{FaultConfig, FaultKindConfig as Kind, FaultLayer, FaultPlace};
 
 use super::*;
 

@@ -1,6 +1,6 @@
 //! When injected faults act: since switch-on, since the motion began, and since each other.
 
-use masseter_shared::config::{FaultConfig, FaultKindConfig as Kind};
+use masseter_scenario::{FaultConfig, FaultKindConfig as Kind};
 
 use super::*;
 

@@ -1,6 +1,6 @@
 //! Stimuli that the plant carries out: pushes on the jaw, food, payload.
 
-use masseter_shared::config::{FoodConfig, Shape, StimulusConfig};
+use masseter_scenario::{FoodConfig, Shape, StimulusConfig};
 
 use super::*;
 
@@ -33,7 +33,7 @@ fn wrench(bench: &Bench) -> nalgebra::Vector6<f64> {
     let rotation = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z));
     let pose = Pose::from_parts(Vec3::from(bench.truth.position_m).into(), rotation);
     let joints = bench.mechanism.inverse(&pose).unwrap();
-    let jacobian = masseter_shared::geometry::Jacobian::new(&bench.mechanism, &pose, &joints);
+    let jacobian = masseter_model::geometry::Jacobian::new(&bench.mechanism, &pose, &joints);
     jacobian.actuators.tr_mul(&nalgebra::Vector6::from(bench.truth.force_n))
 }
 

@@ -2,8 +2,8 @@
 
 use masseter_can::canopen::EmergencyCode;
 use masseter_can::{ErrorKind, Tapped};
-use masseter_shared::config::{FaultConfig, FaultKindConfig};
-use masseter_shared::messages::codes::NO_AXIS;
+use masseter_runtime::messages::codes::NO_AXIS;
+use masseter_scenario::{FaultConfig, FaultKindConfig};
 
 use super::*;
 

@@ -1,6 +1,6 @@
 //! From the command of a step to the force on the axis: servo loops, motor, brake and gear.
 
-use masseter_shared::config::{DriveConfig, FaultKindConfig};
+use masseter_scenario::{DriveConfig, FaultKindConfig};
 
 use super::brake::Brake;
 use super::gear::Gear;

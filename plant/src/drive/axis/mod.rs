@@ -21,8 +21,8 @@ mod servo;
 mod switches;
 
 use masseter_can::cia402::{Controlword, DriveState, StateCommand, StatusBit, Statusword};
-use masseter_shared::clock::SECOND_NS;
-use masseter_shared::config::{DriveConfig, FaultKindConfig};
+use masseter_runtime::clock::SECOND_NS;
+use masseter_scenario::{DriveConfig, FaultKindConfig};
 
 use super::quirks::AxisQuirks;
 use crate::drive::dictionary::{Objects, names};

@@ -2,7 +2,7 @@
 //!
 //! Without faults the mechanism gets what the loops ask for.
 
-use masseter_shared::config::FaultKindConfig as Kind;
+use masseter_scenario::FaultKindConfig as Kind;
 
 use super::motion::Motion;
 use super::servo::{BRAKE_DAMPING_N_S_M, BRAKE_STIFFNESS_N_M};

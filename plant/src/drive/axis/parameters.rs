@@ -3,8 +3,8 @@
 //! Nothing here is checked: the dictionary accepts only values that the axis can use.
 
 use masseter_can::cia402::interpolation_period;
-use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::config::DriveConfig;
+use masseter_runtime::clock::MILLISECOND_NS;
+use masseter_scenario::DriveConfig;
 
 use crate::drive::dictionary::{Objects, RPM_PER_S, names};
 use crate::drive::quirks::AxisQuirks;
@@ -192,7 +192,7 @@ pub(crate) fn configure(
 #[cfg(test)]
 mod tests {
     use masseter_can::canopen::NodeId;
-    use masseter_shared::config::DrivesConfig;
+    use masseter_scenario::DrivesConfig;
 
     use super::*;
 

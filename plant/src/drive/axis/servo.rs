@@ -3,7 +3,7 @@
 //!
 //! The loops know nothing of CANopen and of time: the caller gives the command of every step.
 
-use masseter_shared::config::DriveConfig;
+use masseter_scenario::DriveConfig;
 
 use super::motion::{Motion, clamp};
 
@@ -156,7 +156,7 @@ impl Servo {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::config::DrivesConfig;
+    use masseter_scenario::DrivesConfig;
 
     use super::*;
 

@@ -5,7 +5,7 @@
 
 use masseter_can::EVERY_SYNC;
 use masseter_can::canopen::CobId;
-use masseter_shared::config::INCREMENTS_PER_TURN;
+use masseter_scenario::INCREMENTS_PER_TURN;
 
 use super::entry::Access::{Constant, ReadOnly, ReadWrite};
 use super::entry::DataType::{I8, I16, I32, Text, U8, U16, U32};

@@ -3,7 +3,7 @@
 //! The module only decides when a heartbeat is due or lost; the node sends and reacts.
 
 use masseter_can::canopen::NodeId;
-use masseter_shared::clock::MILLISECOND_NS;
+use masseter_runtime::clock::MILLISECOND_NS;
 
 use crate::drive::dictionary::{CONSUMED, Objects, names};
 

@@ -19,8 +19,8 @@ use masseter_can::canopen::{
 };
 use masseter_can::cia402::Controlword;
 use masseter_can::{ErrorState, Frame};
-use masseter_shared::clock::{MILLISECOND_NS, SECOND_NS};
-use masseter_shared::config::FaultKindConfig;
+use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
+use masseter_scenario::FaultKindConfig;
 
 use super::axis::{Axis, AxisSettings, Encoder, Shaft};
 use super::dictionary::{Objects, Overlay, PDOS, names};

@@ -3,7 +3,7 @@
 //! The node decides what a change of state means for the rest of the drive.
 
 use masseter_can::canopen::NmtState;
-use masseter_shared::clock::MILLISECOND_NS;
+use masseter_runtime::clock::MILLISECOND_NS;
 
 /// From power-on to the boot-up message, ns.
 pub(super) const BOOT_NS: u64 = 20 * MILLISECOND_NS;

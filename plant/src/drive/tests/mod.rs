@@ -16,7 +16,7 @@ use masseter_can::canopen::{
 };
 use masseter_can::cia402::{DriveState, StatusBit, Statusword};
 use masseter_can::{CanId, ErrorState, Frame};
-use masseter_shared::config::Scenario;
+use masseter_scenario::Scenario;
 
 use super::dictionary::names;
 use super::{DriveNode, DriveSettings, Encoder, Shaft};

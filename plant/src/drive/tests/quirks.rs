@@ -283,7 +283,7 @@ fn a_memory_that_the_drive_does_not_take_is_refused_with_its_object() {
 
 #[test]
 fn every_kind_leaves_the_drive_readable() {
-    use masseter_shared::config::QuirkKindConfig;
+    use masseter_scenario::QuirkKindConfig;
     for kind in QuirkKindConfig::ALL {
         let value = |key: &&str| match *key {
             "increments_per_turn" => "increments_per_turn = 4096\n".to_owned(),

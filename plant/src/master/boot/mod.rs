@@ -10,9 +10,9 @@ use masseter_can::canopen::{
     AbortCode, CobId, Expedited, NmtCommand, NmtState, ObjectAddress, SdoRequest, SdoResponse,
 };
 use masseter_can::cia402::{DriveState, Statusword};
-use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::config::AccelerationUnit;
-use masseter_shared::messages::codes::{BootPhase, Cause};
+use masseter_runtime::clock::MILLISECOND_NS;
+use masseter_runtime::messages::codes::{BootPhase, Cause};
+use masseter_scenario::AccelerationUnit;
 
 use super::failure::Failure;
 use crate::wanted::{WantedDrive, WantedObject};
@@ -418,7 +418,7 @@ mod tests {
     #[test]
     fn a_drive_that_is_waited_for_is_reset_twice_a_second() {
         let node = masseter_can::canopen::NodeId::new(4).unwrap();
-        let wanted = WantedDrive::of_axis(&masseter_shared::config::Scenario::default(), 3, node).unwrap();
+        let wanted = WantedDrive::of_axis(&masseter_scenario::Scenario::default(), 3, node).unwrap();
         let mut boot = Boot::new(&wanted, false, 0);
         let resets: Vec<_> = (0..1600).filter(|ms| boot.command(ms * MILLISECOND_NS).is_some()).collect();
         assert_eq!(resets, [500, 1000, 1500]);

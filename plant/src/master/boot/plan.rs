@@ -5,8 +5,8 @@
 
 use masseter_can::canopen::ObjectAddress;
 use masseter_can::cia402::Controlword;
-use masseter_shared::config::{AccelerationUnit, ObjectRule};
-use masseter_shared::messages::codes::{BootPhase, Cause};
+use masseter_runtime::messages::codes::{BootPhase, Cause};
+use masseter_scenario::{AccelerationUnit, ObjectRule};
 
 use crate::wanted::{OTHER_PDOS, WantedDrive, WantedIdentity, WantedObject, WantedPdo, may_keep, shown_bits};
 
@@ -207,7 +207,7 @@ fn demand(rule: ObjectRule, object: ObjectAddress) -> Demand {
 #[cfg(test)]
 mod tests {
     use masseter_can::canopen::NodeId;
-    use masseter_shared::config::Scenario;
+    use masseter_scenario::Scenario;
 
     use super::*;
 

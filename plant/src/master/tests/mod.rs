@@ -10,11 +10,11 @@ mod targets;
 
 use masseter_can::canopen::NodeId;
 use masseter_can::cia402::DriveState;
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::AXES;
-use masseter_shared::messages::codes::{BootPhase, Cause, DriveRequest, EventKind, NO_DRIVE_STATE, Source};
-use masseter_shared::messages::{Command, Event, LAYOUT_VERSION, Reading};
-use masseter_shared::realtime::Wake;
+use masseter_model::geometry::AXES;
+use masseter_runtime::messages::codes::{BootPhase, Cause, DriveRequest, EventKind, NO_DRIVE_STATE, Source};
+use masseter_runtime::messages::{Command, Event, LAYOUT_VERSION, Reading};
+use masseter_runtime::realtime::Wake;
+use masseter_scenario::Scenario;
 
 use super::Master;
 use peer::{Peer, Wires};

@@ -11,8 +11,8 @@ use masseter_can::cia402::{Controlword, DriveState, Statusword};
 use masseter_can::{
     Bus, BusStatus, ErrorState, Frame, PdoMapping, ReceiveError, Received, Rpdo1, SendError, Tpdo1,
 };
-use masseter_shared::config::IdentityConfig;
-use masseter_shared::geometry::AXES;
+use masseter_model::geometry::AXES;
+use masseter_scenario::IdentityConfig;
 
 use super::PERIOD_NS;
 use crate::link::Buses;

@@ -3,7 +3,7 @@
 use masseter_can::Frame;
 use masseter_can::canopen::{Cob, Emergency, EmergencyCode, Heartbeat, NmtState, sync};
 
-use masseter_shared::config::MASTER_NODE;
+use masseter_scenario::MASTER_NODE;
 
 use super::peer::POSITION;
 use super::*;

@@ -2,8 +2,8 @@
 //!
 //! The stiffness is an assumption: no measured one is known.
 
-use masseter_shared::config::TeethConfig;
-use masseter_shared::geometry::Vec3;
+use masseter_model::geometry::Vec3;
+use masseter_scenario::TeethConfig;
 
 use super::grip::{Friction, Grip};
 use super::law;

@@ -8,9 +8,9 @@
 use std::sync::Arc;
 
 use arrayvec::ArrayVec;
-use masseter_shared::config::{FoodConfig, Material, ToothConfig};
-use masseter_shared::geometry::Vec3;
-use masseter_shared::messages::MOST_PAIRS;
+use masseter_model::geometry::Vec3;
+use masseter_scenario::MOST_PAIRS;
+use masseter_scenario::{FoodConfig, Material, ToothConfig};
 
 use super::grip::{Friction, Grip};
 use super::law;

@@ -3,7 +3,7 @@
 //! Coulomb's law, regularised by elasticity: the faces hold to each other by a spring, and slide where the spring would pull
 //! more than friction allows (Cundall and Strack, Géotechnique 29, 1979). A contact at rest stays at rest.
 
-use masseter_shared::geometry::Vec3;
+use masseter_model::geometry::Vec3;
 
 use super::pair::Touch;
 

@@ -10,9 +10,10 @@ mod law;
 mod pair;
 
 use arrayvec::ArrayVec;
-use masseter_shared::config::{DynamicsConfig, Scenario};
-use masseter_shared::geometry::{Pose, Twist, Vec3};
-use masseter_shared::messages::{Contact, MOST_PAIRS};
+use masseter_model::geometry::{Pose, Twist, Vec3};
+use masseter_runtime::messages::Contact;
+use masseter_scenario::MOST_PAIRS;
+use masseter_scenario::{DynamicsConfig, Scenario};
 use nalgebra::{Matrix6, Vector6};
 
 use enamel::Enamel;

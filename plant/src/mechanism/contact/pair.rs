@@ -1,7 +1,7 @@
 //! A lower tooth and its antagonist: where they are, and how they move towards and along each other.
 
-use masseter_shared::config::ToothConfig;
-use masseter_shared::geometry::{Pose, Twist, Vec3};
+use masseter_model::geometry::{Pose, Twist, Vec3};
+use masseter_scenario::ToothConfig;
 use nalgebra::{Matrix3x6, Point3};
 
 /// The pair.

@@ -1,6 +1,6 @@
 //! Laws that the contact between the jaws keeps.
 
-use masseter_shared::config::{FoodConfig, TeethConfig, ToothConfig};
+use masseter_scenario::{FoodConfig, TeethConfig, ToothConfig};
 use nalgebra::{Matrix3, Vector3};
 
 use super::*;

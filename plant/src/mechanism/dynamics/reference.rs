@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use masseter_shared::config::Scenario;
-use masseter_shared::dynamics::{Energy, Reactions};
-use masseter_shared::messages::{pose_fields, pose_from_fields};
+use masseter_model::dynamics::{Energy, Reactions};
+use masseter_runtime::messages::{pose_fields, pose_from_fields};
+use masseter_scenario::Scenario;
 
 use super::*;
 

@@ -1,8 +1,8 @@
 //! Laws of mechanics that the dynamics keep.
 
-use masseter_shared::config::{AxesConfig, FrictionConfig, FrictionModel};
-use masseter_shared::dynamics::Energy;
-use masseter_shared::geometry::MechanismConfig;
+use masseter_model::dynamics::Energy;
+use masseter_model::geometry::MechanismConfig;
+use masseter_scenario::{AxesConfig, FrictionConfig, FrictionModel};
 
 use super::*;
 
@@ -20,7 +20,7 @@ fn at_rest(config: &DynamicsConfig) -> Dynamics {
 
 /// Jaws that never touch.
 fn without_contact() -> Occlusion {
-    Occlusion::new(&masseter_shared::config::Scenario::default(), &Pose::identity())
+    Occlusion::new(&masseter_scenario::Scenario::default(), &Pose::identity())
 }
 
 /// Without friction, and with its end stops far away.

@@ -7,7 +7,7 @@ mod cycle;
 mod segments;
 mod statistic;
 
-use masseter_shared::geometry::{Pose, Vec3};
+use masseter_model::geometry::{Pose, Vec3};
 use serde::Serialize;
 
 use cycle::{Cycle, Sample};

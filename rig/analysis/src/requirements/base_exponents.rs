@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use masseter_shared::config::{Dimension, UNITS};
+use masseter_scenario::{Dimension, UNITS};
 
 /// The exponents of metre, kilogram and second.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! Bounds of a signal: every value, or a statistic of its values, within limits.
 
-use masseter_shared::config::{Quantity, RequirementConfig, Scenario, Statistic};
+use masseter_scenario::{Quantity, RequirementConfig, Scenario, Statistic};
 
 use super::expression::Quantified;
 use super::finding::{Finding, RequirementPlot};

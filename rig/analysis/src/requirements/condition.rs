@@ -1,8 +1,8 @@
 //! Conditions on a signal: `bite.force > 5 N`, `controller.state == safe_stop`, or a state of the controller alone.
 
-use masseter_shared::config::{Dimension, Quantity, Unit};
-use masseter_shared::input::excerpt;
-use masseter_shared::messages::codes::ControllerState;
+use masseter_runtime::messages::codes::ControllerState;
+use masseter_scenario::input::excerpt;
+use masseter_scenario::{Dimension, Quantity, Unit};
 
 use super::refusal::Reason;
 use crate::signals::Values;
@@ -118,7 +118,7 @@ fn split(text: &str) -> Option<(&str, Comparison, &str)> {
 
 fn limit_of(text: &str, dimension: Dimension) -> Result<f64, String> {
     let quantity: Quantity =
-        text.parse().map_err(|error: masseter_shared::config::QuantityError| error.to_string())?;
+        text.parse().map_err(|error: masseter_scenario::QuantityError| error.to_string())?;
     quantity.si_of(dimension).map_err(|need| format!("'{}': {need}", excerpt(text)))
 }
 

@@ -1,7 +1,7 @@
 //! How often something occurs.
 
-use masseter_shared::config::{Dimension, RequirementConfig, Scenario};
-use masseter_shared::wording::counted;
+use masseter_scenario::wording::counted;
+use masseter_scenario::{Dimension, RequirementConfig, Scenario};
 
 use super::finding::Finding;
 use super::moment::Moment;

@@ -6,7 +6,7 @@ use std::num::ParseFloatError;
 use std::str::FromStr;
 
 use exmex::{BinOp, Express, FlatEx, MakeOperators, Operator};
-use masseter_shared::config::Dimension;
+use masseter_scenario::Dimension;
 
 use super::base_exponents::BaseExponents;
 

@@ -3,8 +3,8 @@
 //! Expressions are those of the crate `exmex`, in SI units, with signals in braces: `abs({l1.force}) + abs({l2.force})`.
 
 use exmex::{Express, FlatEx};
-use masseter_shared::config::{Dimension, RequirementConfig, Unit};
-use masseter_shared::input::{excerpt, sentence};
+use masseter_scenario::input::{excerpt, sentence};
+use masseter_scenario::{Dimension, RequirementConfig, Unit};
 
 use super::base_exponents::BaseExponents;
 use super::dimension::derived;

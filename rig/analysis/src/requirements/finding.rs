@@ -1,6 +1,6 @@
 //! What a requirement comes to.
 
-use masseter_shared::config::Unit;
+use masseter_scenario::Unit;
 use serde::Serialize;
 
 use crate::series::Curve;

@@ -1,6 +1,6 @@
 //! What must never happen.
 
-use masseter_shared::config::{RequirementConfig, Scenario, Unit};
+use masseter_scenario::{RequirementConfig, Scenario, Unit};
 
 use super::condition::Condition;
 use super::finding::Finding;
@@ -106,7 +106,7 @@ impl Never {
     pub(super) fn unit(&self) -> Unit {
         match &self.what {
             What::Condition(condition) => condition.unit,
-            What::Occurrence(_) => masseter_shared::config::Dimension::One.si_unit(),
+            What::Occurrence(_) => masseter_scenario::Dimension::One.si_unit(),
         }
     }
 }

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use masseter_shared::config::{FaultConfig, FaultLayer, Scenario};
-use masseter_shared::input::excerpt;
-use masseter_shared::messages::codes::{Cause, Source};
-use masseter_shared::wording::nearest;
+use masseter_runtime::messages::codes::{Cause, Source};
+use masseter_scenario::input::excerpt;
+use masseter_scenario::wording::nearest;
+use masseter_scenario::{FaultConfig, FaultLayer, Scenario};
 
 use crate::events::EventRecord;
 

@@ -1,6 +1,6 @@
 //! Occurrences that come in an order.
 
-use masseter_shared::config::{Dimension, RequirementConfig, Scenario};
+use masseter_scenario::{Dimension, RequirementConfig, Scenario};
 
 use super::finding::Finding;
 use super::moment::Moment;

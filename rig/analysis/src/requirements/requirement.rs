@@ -1,6 +1,6 @@
 //! A requirement of any kind.
 
-use masseter_shared::config::{Dimension, RequirementConfig, Scenario};
+use masseter_scenario::{Dimension, RequirementConfig, Scenario};
 
 use super::bounds::Bounds;
 use super::count::Count;
@@ -127,7 +127,7 @@ impl Requirement {
 
 /// A given key that this kind of requirement does not use.
 fn idle_key(config: &RequirementConfig, kind: &str) -> Option<&'static str> {
-    let is_default_statistic = config.statistic == masseter_shared::config::Statistic::default();
+    let is_default_statistic = config.statistic == masseter_scenario::Statistic::default();
     let keys = [
         ("require.unit", config.unit.is_some(), "signal"),
         ("require.statistic", !is_default_statistic, "signal"),

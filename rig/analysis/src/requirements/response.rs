@@ -6,9 +6,9 @@
 
 use std::collections::VecDeque;
 
-use masseter_shared::clock::SECOND_NS;
-use masseter_shared::config::{Dimension, Quantity, RequirementConfig, Scenario, Unit};
-use masseter_shared::wording::counted;
+use masseter_runtime::clock::SECOND_NS;
+use masseter_scenario::wording::counted;
+use masseter_scenario::{Dimension, Quantity, RequirementConfig, Scenario, Unit};
 
 use super::condition::Condition;
 use super::finding::Finding;

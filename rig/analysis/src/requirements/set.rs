@@ -3,10 +3,10 @@
 use std::collections::BTreeSet;
 
 use masseter_recording::Recorded;
-use masseter_shared::config::{RequirementConfig, Scenario};
-use masseter_shared::input::excerpt;
-use masseter_shared::messages::codes::ControllerState;
-use masseter_shared::named::Declared;
+use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::named::Declared;
+use masseter_scenario::input::excerpt;
+use masseter_scenario::{RequirementConfig, Scenario};
 
 use super::finding::RequirementFigures;
 use super::moment::Moment;
@@ -21,10 +21,10 @@ use crate::signals::{Registry, Sample, Timeline, Values};
 /// ```
 /// use masseter_analysis::requirements::{RequirementResult, Requirements};
 /// use masseter_recording::Recorded;
-/// use masseter_shared::config::{RequirementConfig, Scenario};
-/// use masseter_shared::messages::Reading;
-/// use masseter_shared::messages::codes::DriveState;
-/// use masseter_shared::named::Declared;
+/// use masseter_scenario::{RequirementConfig, Scenario};
+/// use masseter_runtime::messages::Reading;
+/// use masseter_runtime::messages::codes::DriveState;
+/// use masseter_runtime::named::Declared;
 ///
 /// let text = "[[require]]\nname = 'first leg'\nsignal = 'l1.position'\nmax = '300 mm'";
 /// let scenario = Scenario::parse("s.toml".as_ref(), text)?;
@@ -36,7 +36,7 @@ use crate::signals::{Registry, Sample, Timeline, Values};
 /// let found = requirements.finish();
 /// assert_eq!(found[0].result, RequirementResult::Passed);
 /// assert_eq!(found[0].margin.map(f64::round), Some(10.0));
-/// # Ok::<(), masseter_shared::config::ScenarioError>(())
+/// # Ok::<(), masseter_scenario::ScenarioError>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct Requirements {

@@ -1,11 +1,11 @@
 //! Requirements over runs of a few samples, a millisecond apart.
 
+use masseter_model::geometry::AXES;
 use masseter_recording::Recorded;
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::AXES;
-use masseter_shared::messages::codes::{Cause, ControllerState, DriveState, EventKind, Source};
-use masseter_shared::messages::{Event, Reading, State};
-use masseter_shared::named::Declared;
+use masseter_runtime::messages::codes::{Cause, ControllerState, DriveState, EventKind, Source};
+use masseter_runtime::messages::{Event, Reading, State};
+use masseter_runtime::named::Declared;
+use masseter_scenario::Scenario;
 
 use super::{RequirementFigures, RequirementResult, Requirements, check_requirements};
 use crate::events::EventRecord;
@@ -353,7 +353,7 @@ fn wrong_requirements_are_refused_with_what_to_write() {
 
 #[test]
 fn signals_of_a_controller_are_checked_once_it_has_declared_them() {
-    use masseter_shared::named::Signal;
+    use masseter_runtime::named::Signal;
     let text = "[[require]]\nname = 'grip'\nsignal = 'signal.grip'\nmax = '3 N'";
     let scenario = Scenario::parse("s.toml".as_ref(), text).unwrap();
     check_requirements(&scenario, None).unwrap();

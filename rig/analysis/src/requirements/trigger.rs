@@ -1,7 +1,7 @@
 //! Triggers: an occurrence, or a condition that begins to hold.
 
-use masseter_shared::config::Scenario;
-use masseter_shared::messages::{self, codes::ControllerState};
+use masseter_runtime::messages::{self, codes::ControllerState};
+use masseter_scenario::Scenario;
 
 use super::condition::Condition;
 use super::moment::Moment;

@@ -1,7 +1,7 @@
 //! The part of a run in which a requirement is judged.
 
-use masseter_shared::clock::SECOND_NS;
-use masseter_shared::config::{During, Scenario, TimeWindow};
+use masseter_runtime::clock::SECOND_NS;
+use masseter_scenario::{During, Scenario, TimeWindow};
 
 use super::condition::Condition;
 use super::moment::Moment;

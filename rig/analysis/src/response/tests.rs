@@ -2,7 +2,7 @@
 
 use masseter_can::{Bitrate, ErrorKind, ErrorReport};
 
-use masseter_shared::messages::tap;
+use masseter_runtime::messages::tap;
 
 use super::*;
 

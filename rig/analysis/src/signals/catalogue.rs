@@ -2,10 +2,10 @@
 //!
 //! Values are SI numbers; states are their codes. A value that a cycle does not have is none, never a guess.
 
-use masseter_shared::config::{Scenario, Unit};
-use masseter_shared::geometry::{AXES, AXIS_NAMES};
-use masseter_shared::messages::codes::{ControllerState, DriveRequest, DriveState, NO_DRIVE_STATE};
-use masseter_shared::named::Declared;
+use masseter_model::geometry::{AXES, AXIS_NAMES};
+use masseter_runtime::messages::codes::{ControllerState, DriveRequest, DriveState, NO_DRIVE_STATE};
+use masseter_runtime::named::Declared;
+use masseter_scenario::{Scenario, Unit};
 
 use super::cycle::CycleMessages;
 use super::derived::{Jaw, JawPoint, desired, estimated, solution};

@@ -1,6 +1,6 @@
 //! The messages of one cycle of the rig, from both loops.
 
-use masseter_shared::messages::{Command, Contact, Parameters, Reading, Signals, State, Truth};
+use masseter_runtime::messages::{Command, Contact, Parameters, Reading, Signals, State, Truth};
 
 /// The messages of a cycle; none where a message is missing.
 #[derive(Debug, Clone, Copy, Default)]

@@ -1,9 +1,9 @@
 //! Signals of the jaw that follow from poses: places of its points, opening, rotation, errors.
 
+use masseter_model::geometry::{Pose, Vec3};
 use masseter_recording::jaw_points;
-use masseter_shared::config::JawConfig;
-use masseter_shared::geometry::{Pose, Vec3};
-use masseter_shared::messages::{State, Truth};
+use masseter_runtime::messages::{State, Truth};
+use masseter_scenario::JawConfig;
 
 use super::cycle::CycleMessages;
 use crate::pose_errors::pose;

@@ -1,9 +1,9 @@
 //! The signals of a run by their names.
 
-use masseter_shared::config::Scenario;
-use masseter_shared::input::excerpt;
-use masseter_shared::named::Declared;
-use masseter_shared::wording::nearest;
+use masseter_runtime::named::Declared;
+use masseter_scenario::Scenario;
+use masseter_scenario::input::excerpt;
+use masseter_scenario::wording::nearest;
 
 use super::catalogue::signals;
 use super::derived::Jaw;
@@ -29,8 +29,8 @@ impl UnknownSignal {
 ///
 /// ```
 /// use masseter_analysis::signals::Registry;
-/// use masseter_shared::config::Scenario;
-/// use masseter_shared::named::Declared;
+/// use masseter_scenario::Scenario;
+/// use masseter_runtime::named::Declared;
 ///
 /// let registry = Registry::new(&Scenario::default(), &Declared::default());
 /// let place = registry.place_of("incisal.error")?;

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use masseter_shared::config::{Dimension, Unit};
-use masseter_shared::geometry::Pose;
+use masseter_model::geometry::Pose;
+use masseter_scenario::{Dimension, Unit};
 use serde::Serialize;
 
 use super::cycle::CycleMessages;

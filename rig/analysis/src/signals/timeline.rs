@@ -5,7 +5,7 @@
 use std::collections::VecDeque;
 
 use masseter_recording::Recorded;
-use masseter_shared::messages::{Parameters, State};
+use masseter_runtime::messages::{Parameters, State};
 
 use super::cpu_share::CpuShare;
 use super::cycle::CycleMessages;
@@ -167,7 +167,7 @@ impl Timeline {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::messages::{Event, Reading, State};
+    use masseter_runtime::messages::{Event, Reading, State};
 
     use super::*;
 

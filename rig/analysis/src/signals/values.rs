@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use masseter_shared::messages::codes::ControllerState;
+use masseter_runtime::messages::codes::ControllerState;
 
 use super::cycle::CycleMessages;
 use super::registry::{Registry, UnknownSignal};

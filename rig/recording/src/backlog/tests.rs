@@ -1,9 +1,9 @@
 use std::io::{self, Cursor, Seek, SeekFrom, Write};
 use std::sync::mpsc::{Receiver, channel};
 
-use masseter_shared::config::JawConfig;
-use masseter_shared::geometry::{Mechanism, MechanismConfig};
-use masseter_shared::messages::Reading;
+use masseter_model::geometry::{Mechanism, MechanismConfig};
+use masseter_runtime::messages::Reading;
+use masseter_scenario::JawConfig;
 
 use super::*;
 use crate::Scene;

@@ -12,7 +12,7 @@ use crate::summary::FORM;
 use super::changes::{flatten, leaves};
 
 use masseter_recording::RunFolder;
-use masseter_shared::input::{MOST_KEPT_BYTES, read_text};
+use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 
 /// Keys of the manifest that must agree for two runs to be comparable.
 const CIRCUMSTANCES: [&str; 4] = ["scenario", "clock", "machine", "masseter"];

@@ -23,8 +23,8 @@ pub enum Side {
 /// ```
 /// use masseter_recording::{Columns, Recorded, definitions};
 /// use masseter_report::divergence::{Compared, Comparison, Side};
-/// use masseter_shared::messages::Command;
-/// use masseter_shared::named::Declared;
+/// use masseter_runtime::messages::Command;
+/// use masseter_runtime::named::Declared;
 ///
 /// let definitions = definitions(&Declared::default());
 /// let columns = || Columns::of_topics(definitions.iter().map(|(_, channel)| channel));

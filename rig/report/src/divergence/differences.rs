@@ -207,9 +207,9 @@ impl Differences {
 #[cfg(test)]
 mod tests {
     use masseter_recording::{Columns, Recorded, definitions};
-    use masseter_shared::messages::codes::ControllerState;
-    use masseter_shared::messages::{CanData, Command, FrameTap, State};
-    use masseter_shared::named::{Declared, Signal};
+    use masseter_runtime::messages::codes::ControllerState;
+    use masseter_runtime::messages::{CanData, Command, FrameTap, State};
+    use masseter_runtime::named::{Declared, Signal};
 
     use super::super::comparison::{Comparison, Side};
     use super::*;
@@ -322,7 +322,7 @@ mod tests {
             ..Declared::default()
         };
         let mut comparison = comparison(Compared::Everything, [&declared("grip"), &declared("trim")]);
-        let signals = Recorded::Signals(masseter_shared::messages::Signals::default());
+        let signals = Recorded::Signals(masseter_runtime::messages::Signals::default());
         comparison.take(Side::A, &signals);
         comparison.take(Side::B, &signals);
         let words = comparison.finish().in_words(["A", "B"]);

@@ -1,8 +1,8 @@
 //! Time since the start of the motion, from the states and events of a recording.
 
 use masseter_recording::Recorded;
-use masseter_shared::messages::State;
-use masseter_shared::messages::codes::{ControllerState, EventKind, Source};
+use masseter_runtime::messages::State;
+use masseter_runtime::messages::codes::{ControllerState, EventKind, Source};
 
 /// What tells the time of a cycle.
 #[derive(Debug, Clone, Copy, Default)]

@@ -1,9 +1,9 @@
 //! Positions, velocities and forces of slides and legs, against their limits.
 
 use masseter_analysis::{Curve, Figures};
+use masseter_model::geometry::{AXES, AXIS_NAMES, LEGS};
 use masseter_page::{Block, Chart, Limit, Points, Section, Series, Style};
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::{AXES, AXIS_NAMES, LEGS};
+use masseter_scenario::Scenario;
 
 use super::charts::{limit, plain};
 

@@ -1,8 +1,8 @@
 //! The recorded motion as data for the 3-D view of the page.
 
-use masseter_shared::config::{Scenario, ToothConfig};
-use masseter_shared::geometry::{LEGS, Mechanism, Pose};
-use masseter_shared::messages::pose_fields;
+use masseter_model::geometry::{LEGS, Mechanism, Pose};
+use masseter_runtime::messages::pose_fields;
+use masseter_scenario::{Scenario, ToothConfig};
 use serde::Serialize;
 use serde_json::Value;
 

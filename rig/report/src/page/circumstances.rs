@@ -2,8 +2,8 @@
 
 use masseter_page::{Block, Cell, Column, Section, Table};
 use masseter_recording::{Manifest, Usage};
-use masseter_shared::config::MotionConfig;
-use masseter_shared::realtime::scheduling::Obtained;
+use masseter_runtime::realtime::scheduling::Obtained;
+use masseter_scenario::MotionConfig;
 
 pub(super) fn section(manifest: &Manifest) -> Section {
     let text = |id: &str, text: String| Block::text(id, text);

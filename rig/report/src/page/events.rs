@@ -2,7 +2,7 @@
 
 use masseter_analysis::{EventRecord, Figures};
 use masseter_page::{Block, Content, EventRow, Events, Section};
-use masseter_shared::messages::codes::{ControllerState, EventKind};
+use masseter_runtime::messages::codes::{ControllerState, EventKind};
 
 use super::times::since_s;
 use crate::text;

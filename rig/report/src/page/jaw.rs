@@ -4,7 +4,7 @@
 
 use masseter_analysis::{CoursePoint, Figures, JawCycleFigures, Statistic};
 use masseter_page::{Block, Content, Section};
-use masseter_shared::config::Scenario;
+use masseter_scenario::Scenario;
 use serde::Serialize;
 
 use super::animation;

@@ -3,7 +3,7 @@
 use masseter_analysis::{Code, Figures, ParameterFigures};
 use masseter_page::{Block, Content, Live, Parameter, Section, Tone};
 use masseter_recording::Manifest;
-use masseter_shared::messages::codes::ControllerState;
+use masseter_runtime::messages::codes::ControllerState;
 
 use super::times::since_s;
 use crate::text::{decimals, or_dash};

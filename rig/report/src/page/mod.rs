@@ -76,10 +76,10 @@ fn about(manifest: &Manifest, figures: &Figures) -> String {
 #[cfg(test)]
 mod tests {
     use masseter_analysis::{Analysis, TrackingSample};
+    use masseter_model::geometry::Pose;
     use masseter_recording::MachineInfo;
-    use masseter_shared::config::Scenario;
-    use masseter_shared::geometry::Pose;
-    use masseter_shared::named::Declared;
+    use masseter_runtime::named::Declared;
+    use masseter_scenario::Scenario;
     use serde_json::Value;
 
     use super::*;

@@ -2,9 +2,9 @@
 
 use masseter_analysis::{Curve, Figures, ToothFigures};
 use masseter_controller::trajectory::closed_pose;
+use masseter_model::geometry::{Mechanism, Vec3};
 use masseter_page::{Block, Chart, Content, Points, Pressure, Section, Series, Style, Tooth};
-use masseter_shared::config::Scenario;
-use masseter_shared::geometry::{Mechanism, Vec3};
+use masseter_scenario::Scenario;
 
 use super::animation;
 use super::charts::{in_unit, plain};

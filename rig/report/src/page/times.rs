@@ -3,8 +3,8 @@
 use masseter_analysis::{EventRecord, FaultFigures, Figures};
 use masseter_page::{Moment, MomentKind, Phase, Time};
 use masseter_recording::Manifest;
-use masseter_shared::config::Scenario;
-use masseter_shared::messages::codes::Source;
+use masseter_runtime::messages::codes::Source;
+use masseter_scenario::Scenario;
 
 /// What the page's times count from.
 pub(super) fn time(manifest: &Manifest, figures: &Figures) -> Time {

@@ -4,8 +4,8 @@ use masseter_analysis::{Curve, Figures, IntervalFigures, WorstCycle};
 use masseter_page::{
     Across, Block, Cell, Chart, Column, Limit, Points, Scale, Section, Series, Style, Table,
 };
-use masseter_shared::config::Scenario;
-use masseter_shared::schedule::CycleSchedule;
+use masseter_runtime::schedule::CycleSchedule;
+use masseter_scenario::Scenario;
 
 use super::charts::limit;
 use super::times::{motion_s, since_s};

@@ -7,7 +7,7 @@ use masseter_charts::{
     Area, Axis, Chart, Error, Line, LineChart, Scale, SeriesLabelPosition, TEXT, TITLE, marks, svg,
 };
 use masseter_controller::kinematics::Solution;
-use masseter_shared::geometry::{LEGS, Vec3};
+use masseter_model::geometry::{LEGS, Vec3};
 use plotters::prelude::*;
 
 use crate::study::Study;

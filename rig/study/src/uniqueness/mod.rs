@@ -3,7 +3,7 @@
 //!
 //! ```
 //! use masseter_controller::kinematics::uniqueness::InputBox;
-//! use masseter_shared::geometry::{Mechanism, MechanismConfig};
+//! use masseter_model::geometry::{Mechanism, MechanismConfig};
 //! use masseter_study::uniqueness::prove;
 //!
 //! let mechanism = Mechanism::new(&MechanismConfig::default())?;
@@ -11,7 +11,7 @@
 //! let inputs = InputBox::uniform([-0.002, 0.002], [0.268, 0.272]);
 //! let proven = prove(&mechanism, vec![inputs], None, 3000, |_, _| {});
 //! assert!(proven.undecided.is_empty());
-//! # Ok::<(), masseter_shared::geometry::GeometryError>(())
+//! # Ok::<(), masseter_model::geometry::GeometryError>(())
 //! ```
 
 mod motion;

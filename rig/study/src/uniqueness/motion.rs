@@ -4,7 +4,7 @@
 //! is the desired one; the width must cover the tracking error.
 
 use masseter_controller::kinematics::uniqueness::{Enclosure, InputBox};
-use masseter_shared::geometry::Actuators;
+use masseter_model::geometry::Actuators;
 
 use masseter_plan::RunPlan;
 
@@ -61,7 +61,7 @@ fn widened(stretch: InputBox, by_m: f64) -> InputBox {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::config::Scenario;
+    use masseter_scenario::Scenario;
 
     use super::*;
 

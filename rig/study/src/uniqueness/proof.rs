@@ -3,7 +3,7 @@
 //! several boxes at the start each counts the same.
 
 use masseter_controller::kinematics::uniqueness::{Finding, InputBox, Proof, Reaches, SolutionKind};
-use masseter_shared::geometry::Mechanism;
+use masseter_model::geometry::Mechanism;
 use rayon::prelude::*;
 
 /// A box of inputs and the known bounds of its solutions' reaches.
@@ -61,7 +61,7 @@ pub fn prove(
 #[cfg(test)]
 mod tests {
     use masseter_controller::kinematics::uniqueness::Enclosure;
-    use masseter_shared::geometry::MechanismConfig;
+    use masseter_model::geometry::MechanismConfig;
 
     use super::*;
 

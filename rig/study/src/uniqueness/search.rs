@@ -3,7 +3,7 @@
 
 use masseter_controller::kinematics::uniqueness::InputBox;
 use masseter_controller::kinematics::{Solution, Solutions};
-use masseter_shared::geometry::{AXES, Actuators, Mechanism};
+use masseter_model::geometry::{AXES, Actuators, Mechanism};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -44,14 +44,14 @@ pub struct Search {
 ///
 /// ```
 /// use masseter_controller::kinematics::uniqueness::InputBox;
-/// use masseter_shared::geometry::{Mechanism, MechanismConfig};
+/// use masseter_model::geometry::{Mechanism, MechanismConfig};
 /// use masseter_study::uniqueness::search;
 ///
 /// let mechanism = Mechanism::new(&MechanismConfig::default())?;
 /// let around_neutral = InputBox::uniform([-0.002, 0.002], [0.268, 0.272]);
 /// let found = search(&mechanism, &around_neutral, 100, 1);
 /// assert_eq!((found.with_one, found.with_two), (100, 0));
-/// # Ok::<(), masseter_shared::geometry::GeometryError>(())
+/// # Ok::<(), masseter_model::geometry::GeometryError>(())
 /// ```
 #[must_use]
 pub fn search(mechanism: &Mechanism, region: &InputBox, inputs: usize, seed: u64) -> Search {

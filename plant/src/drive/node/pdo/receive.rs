@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use masseter_can::CanId;
 use masseter_can::canopen::{CobId, EmergencyCode};
-use masseter_shared::clock::MILLISECOND_NS;
+use masseter_runtime::clock::MILLISECOND_NS;
 
 use super::mapping::{EVENT_DRIVEN, MAX_BYTES, Mapped};
 use crate::drive::axis::NewTargets;

@@ -2,7 +2,7 @@
 
 use masseter_can::canopen::CobId;
 use masseter_can::{CanId, Frame};
-use masseter_shared::clock::MILLISECOND_NS;
+use masseter_runtime::clock::MILLISECOND_NS;
 
 use super::mapping::{EVENT_DRIVEN, MAX_BYTES, Mapped};
 use crate::drive::dictionary::Objects;

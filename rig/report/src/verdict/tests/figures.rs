@@ -5,10 +5,10 @@ use masseter_analysis::{
     TrackingFigures, UndisturbedFigures,
 };
 use masseter_recording::{Damage, MachineInfo};
-use masseter_shared::config::{CpuDmaLatency, FaultConfig, FaultKindConfig, Scenario};
-use masseter_shared::messages::codes::ControllerState;
-use masseter_shared::named::Declared;
-use masseter_shared::realtime::scheduling::{Obtained, SchedulingRequest};
+use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::named::Declared;
+use masseter_runtime::realtime::scheduling::{Obtained, SchedulingRequest};
+use masseter_scenario::{CpuDmaLatency, FaultConfig, FaultKindConfig, Scenario};
 
 use super::*;
 

@@ -1,6 +1,6 @@
 //! Runs that the machine disturbed: what is still judged, what is excused, and the reason in words.
 
-use masseter_shared::config::TimingConfig;
+use masseter_scenario::TimingConfig;
 
 use super::*;
 

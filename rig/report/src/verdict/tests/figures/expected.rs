@@ -1,7 +1,7 @@
 //! Runs that expect an outcome other than a pass.
 
 use masseter_analysis::requirements::{RequirementFigures, RequirementResult};
-use masseter_shared::config::{ExpectConfig, ExpectedVerdict};
+use masseter_scenario::{ExpectConfig, ExpectedVerdict};
 
 use super::*;
 

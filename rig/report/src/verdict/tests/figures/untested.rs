@@ -1,7 +1,8 @@
 //! Runs that tested too little: what each form of the report says of them.
 
+use masseter_runtime::named::Declared;
+
 use crate::{junit, page, table};
-use masseter_shared::named::Declared;
 
 use super::*;
 

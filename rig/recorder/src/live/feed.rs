@@ -1,0 +1,166 @@
+//! The figures of a run that goes on, and how its page changes with them.
+//!
+//! A thread of its own takes the messages. It makes the page ten times a second while somebody watches, and keeps what has
+//! changed as an update. The recorder never waits for it: a message without room is left out of the page, and is counted.
+
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use masseter_analysis::Analysis;
+use masseter_page::{Page, PageError};
+use masseter_recording::{Manifest, Recorded};
+use masseter_runtime::clock::{self, SECOND_NS};
+use masseter_runtime::named::Declared;
+
+use super::changes;
+
+/// Messages that may wait: almost half a second of every topic at 1 kHz.
+const QUEUE: usize = 8192;
+/// Time between two updates: ten a second.
+const INTERVAL: Duration = Duration::from_millis(100);
+/// Tables and the like change with every tenth update.
+const WHOLE: u64 = 10;
+/// Updates kept for pages that lag: five seconds.
+const KEPT: usize = 50;
+/// Somebody watches as long as a page has asked within this time, ns.
+const WATCHED_NS: u64 = SECOND_NS;
+
+/// What a page gets next.
+#[derive(Debug)]
+pub(super) enum Next {
+    /// An update as JSON.
+    Update(Arc<str>),
+    /// Nothing yet.
+    None,
+    /// The update is not kept any more.
+    Lost,
+}
+
+/// The page of a run that goes on.
+#[derive(Debug)]
+pub(super) struct Feed {
+    queue: SyncSender<Recorded>,
+    dropped: AtomicU64,
+    asked_ns: AtomicU64,
+    analysis: Mutex<Analysis>,
+    shown: Mutex<Shown>,
+}
+
+/// The page as it was made last, and the updates that led there.
+#[derive(Debug)]
+struct Shown {
+    manifest: Manifest,
+    page: Page,
+    updates: VecDeque<Arc<str>>,
+    /// Updates made so far.
+    count: u64,
+}
+
+impl Feed {
+    /// Starts its thread.
+    ///
+    /// # Errors
+    /// When the system refuses the thread.
+    pub(super) fn start(manifest: Manifest, declared: &Declared) -> std::io::Result<Arc<Self>> {
+        let analysis = Analysis::while_running(&manifest.scenario, declared);
+        let page = masseter_report::page_so_far(&manifest, &analysis.clone().finish(false, &[]), 0, 0);
+        let (queue, queued) = sync_channel(QUEUE);
+        let shown = Shown { manifest, page, updates: VecDeque::new(), count: 0 };
+        let feed = Arc::new(Self {
+            queue,
+            dropped: AtomicU64::new(0),
+            asked_ns: AtomicU64::new(0),
+            analysis: Mutex::new(analysis),
+            shown: Mutex::new(shown),
+        });
+        let taken = Arc::downgrade(&feed);
+        thread::Builder::new().spawn(move || {
+            while let Some(feed) = taken.upgrade() {
+                feed.take(&queued);
+                if feed.is_watched() {
+                    feed.refresh();
+                }
+            }
+        })?;
+        Ok(feed)
+    }
+
+    /// Queues a message. Never waits.
+    pub(super) fn offer(&self, message: &Recorded) {
+        if let Err(TrySendError::Full(_)) = self.queue.try_send(*message) {
+            self.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Takes messages for the time between two updates.
+    fn take(&self, queued: &Receiver<Recorded>) {
+        let until_ns = clock::now_ns() + INTERVAL.as_nanos() as u64;
+        loop {
+            let left = Duration::from_nanos(until_ns.saturating_sub(clock::now_ns()));
+            match queued.recv_timeout(left) {
+                Ok(message) => {
+                    let mut analysis = lock(&self.analysis);
+                    // A frame that is none is in the recording, whose report names it.
+                    let _ = analysis.take(&message);
+                    while let Ok(message) = queued.try_recv() {
+                        let _ = analysis.take(&message);
+                    }
+                }
+                Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => return,
+            }
+        }
+    }
+
+    fn is_watched(&self) -> bool {
+        clock::now_ns().saturating_sub(self.asked_ns.load(Ordering::Relaxed)) < WATCHED_NS
+    }
+
+    /// Makes the page anew, and an update of what has changed.
+    pub(super) fn refresh(&self) {
+        drop(self.renewed(false));
+    }
+
+    /// `is_asked`: somebody gets the page itself.
+    fn renewed(&self, is_asked: bool) -> MutexGuard<'_, Shown> {
+        let mut shown = lock(&self.shown);
+        let analysis = lock(&self.analysis).clone();
+        let figures = analysis.finish(false, &[]);
+        let count = shown.count + 1;
+        let dropped = self.dropped.load(Ordering::Relaxed);
+        let mut page = masseter_report::page_so_far(&shown.manifest, &figures, count, dropped);
+        let is_whole = is_asked || count.is_multiple_of(WHOLE);
+        let update = changes::between(&shown.page, &mut page, is_whole);
+        shown.updates.push_back(update.to_string().into());
+        if shown.updates.len() > KEPT {
+            shown.updates.pop_front();
+        }
+        (shown.page, shown.count) = (page, count);
+        shown
+    }
+
+    /// The page at this moment, as HTML.
+    pub(super) fn html(&self) -> Result<String, PageError> {
+        self.asked_ns.store(clock::now_ns(), Ordering::Relaxed);
+        self.renewed(true).page.to_html()
+    }
+
+    /// The update after the one of this number.
+    pub(super) fn after(&self, number: u64) -> Next {
+        self.asked_ns.store(clock::now_ns(), Ordering::Relaxed);
+        let shown = lock(&self.shown);
+        let first = shown.count - shown.updates.len() as u64;
+        if number >= shown.count {
+            return Next::None;
+        }
+        let place = number.checked_sub(first).and_then(|place| shown.updates.get(place as usize));
+        place.map_or(Next::Lost, |update| Next::Update(Arc::clone(update)))
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

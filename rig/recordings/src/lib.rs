@@ -1,0 +1,9 @@
+//! Verbs that read recordings: `masseter export` makes tables of them, `masseter recording` examines and mends them.
+//!
+//! The verdict on a run is none of them: `masseter report` judges.
+
+mod export;
+mod recording;
+
+pub use export::{ExportArgs, export};
+pub use recording::{ExtractArgs, RecordingArgs, RecordingVerb, RecoverArgs, ThinArgs, execute};

@@ -1,0 +1,127 @@
+//! The rigid bodies: their masses, centres of mass and inertias.
+
+use nalgebra::{Matrix3, Vector6};
+
+use super::Motion;
+use super::parameters::DynamicsConfig;
+use crate::geometry::{LEGS, Vec3};
+
+/// A part of a leg that turns with its hinge. Its centre of mass lies on the leg's axis, and the slide's direction û is a
+/// principal axis of its inertia.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Link {
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// Centre of mass on the leg's axis, m: of the cylinder above the hinge, of the rod behind the ball.
+    pub centre_m: f64,
+    /// Inertia about the centre of mass, for a turn about û, kg m².
+    pub inertia_kg_m2: f64,
+}
+
+/// The platform with the lower jaw.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Platform {
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// Centre of mass in the platform frame, m.
+    pub centre_m: Vec3,
+    /// Inertia about the centre of mass, platform axes, kg m².
+    pub inertia_kg_m2: Matrix3<f64>,
+}
+
+/// The moving bodies of the mechanism, under gravity along −z of the base. All three legs are equal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bodies {
+    /// What a slide moves and does not turn, kg; its centre of mass is the hinge.
+    pub carriage_kg: f64,
+    /// Turns with the hinge.
+    pub cylinder: Link,
+    /// Turns with the hinge and slides in the cylinder.
+    pub rod: Link,
+    /// The platform.
+    pub platform: Platform,
+    /// Gravity, m/s².
+    pub gravity_m_s2: f64,
+}
+
+/// The equations of one leg alone, cut off at the ball, in the order d, l, θ: Q = masses · q̈ + bias.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LegEquations {
+    /// kg, kg, kg m².
+    pub(super) masses: [f64; 3],
+    /// Centrifugal and Coriolis terms and weight: N, N, N m.
+    pub(super) bias: [f64; 3],
+}
+
+impl From<&DynamicsConfig> for Bodies {
+    fn from(config: &DynamicsConfig) -> Self {
+        let [xx, yy, zz, xy, xz, yz] = config.platform_inertia_kg_m2;
+        Self {
+            carriage_kg: config.carriage_mass_kg,
+            cylinder: Link {
+                mass_kg: config.cylinder_mass_kg,
+                centre_m: config.cylinder_centre_m,
+                inertia_kg_m2: config.cylinder_inertia_kg_m2,
+            },
+            rod: Link {
+                mass_kg: config.rod_mass_kg,
+                centre_m: config.rod_centre_m,
+                inertia_kg_m2: config.rod_inertia_kg_m2,
+            },
+            platform: Platform {
+                mass_kg: config.platform_mass_kg,
+                centre_m: Vec3::from(config.platform_centre_m),
+                inertia_kg_m2: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz),
+            },
+            gravity_m_s2: config.gravity_m_s2,
+        }
+    }
+}
+
+impl Bodies {
+    /// Mass that each axis d₁ d₂ d₃ l₁ l₂ l₃ moves along itself, kg, without the platform.
+    pub fn axis_mass_kg(&self) -> Vector6<f64> {
+        let (slide, leg) = (self.slide_kg(), self.rod.mass_kg);
+        Vector6::new(slide, slide, slide, leg, leg, leg)
+    }
+
+    /// Carriage, cylinder and rod, kg.
+    pub(super) fn slide_kg(&self) -> f64 {
+        self.carriage_kg + self.cylinder.mass_kg + self.rod.mass_kg
+    }
+
+    /// Distance of the rod's centre of mass from the hinge, w = l − b, m.
+    pub(super) fn rod_from_hinge_m(&self, leg_m: f64) -> f64 {
+        leg_m - self.rod.centre_m
+    }
+
+    /// Cylinder's and rod's mass by the distance of the centre from the hinge, kg m.
+    pub(super) fn leg_moment_kg_m(&self, leg_m: f64) -> f64 {
+        self.cylinder.mass_kg * self.cylinder.centre_m + self.rod.mass_kg * self.rod_from_hinge_m(leg_m)
+    }
+
+    /// Inertia of cylinder and rod about the hinge, kg m².
+    pub(super) fn leg_inertia_kg_m2(&self, leg_m: f64) -> f64 {
+        let about_hinge = |link: &Link, arm_m: f64| link.inertia_kg_m2 + link.mass_kg * arm_m * arm_m;
+        about_hinge(&self.cylinder, self.cylinder.centre_m)
+            + about_hinge(&self.rod, self.rod_from_hinge_m(leg_m))
+    }
+
+    /// Q_d = (m_c + m_y + m_r) d̈, Q_l = m_r l̈ − m_r w θ̇² + m_r g sin θ,
+    /// Q_θ = (I_y + m_y a² + I_r + m_r w²) θ̈ + 2 m_r w l̇ θ̇ + g (m_y a + m_r w) cos θ.
+    pub(super) fn leg(&self, motion: &Motion, leg: usize) -> LegEquations {
+        let leg_m = motion.legs.actuators.leg_m[leg];
+        let (sin, cos) = motion.legs.sin_cos[leg];
+        let (stretch_m_s, swing_rad_s) = (motion.rates_m_s[LEGS + leg], motion.swings_rad_s[leg]);
+        let rod_kg_m = self.rod.mass_kg * self.rod_from_hinge_m(leg_m);
+        LegEquations {
+            masses: [self.slide_kg(), self.rod.mass_kg, self.leg_inertia_kg_m2(leg_m)],
+            bias: [
+                0.0,
+                self.rod.mass_kg * self.gravity_m_s2 * sin - rod_kg_m * swing_rad_s * swing_rad_s,
+                2.0 * rod_kg_m * stretch_m_s * swing_rad_s
+                    + self.gravity_m_s2 * self.leg_moment_kg_m(leg_m) * cos,
+            ],
+        }
+    }
+}

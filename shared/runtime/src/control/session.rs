@@ -1,0 +1,425 @@
+//! A controller's part in a run: bound to iceoryx2, and to real time or to lockstep. It decides nothing.
+
+use std::time::Duration;
+
+use masseter_scenario::input::sentence;
+
+use super::cycle::{complete, publish_begin, publish_named, set_parameters};
+use super::operator::{Due, Operator};
+use super::{Controller, ControllerPorts, Duties, Outcome, Tick, run_cycle};
+use crate::clock;
+use crate::lifecycle::{End, Party, ProcessContext, ProcessError, Report, SupervisorLink};
+use crate::lockstep::{Clock, Lockstep};
+use crate::messages::{Command, Event, Parameters, Reading, Signals, State};
+use crate::named::{Declared, NamedValues, access};
+use crate::realtime::Wake;
+use crate::transport::{Publisher, ReceivedMessage, Subscriber, TransportError};
+
+/// A started run, from the side of its controller.
+///
+/// Either [`Self::run`] runs a [`Controller`] to its end; or a program runs the cycles itself: [`Self::wait`],
+/// [`Self::publish`], and at last [`Self::finish`] or [`Self::fail`]. Nothing is published beside the cycle's own time:
+/// a cycle begins with [`Self::wait`] and ends with the next one.
+///
+/// ```no_run
+/// use masseter_runtime::control::{Outcome, Session, Waited};
+/// use masseter_runtime::lifecycle::attach::attach;
+/// use masseter_runtime::messages::codes::DriveRequest;
+/// use masseter_runtime::messages::{Command, State};
+/// use masseter_runtime::named::Declared;
+///
+/// let mut session = Session::start(attach(None)?, Declared::default())?;
+/// while !session.is_stop_requested() {
+///     let Waited::Cycle { tick, reading } = session.wait(None)? else { continue };
+///     let reading_cycle = reading.map_or(0, |reading| reading.cycle);
+///     let request = DriveRequest::Off.code();
+///     let command = Command { cycle: tick.cycle, reading_cycle, request, ..Command::default() };
+///     session.publish(&command, &State { cycle: tick.cycle, reading_cycle, ..State::default() })?;
+/// }
+/// session.finish(Outcome::Finished)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Session {
+    context: ProcessContext,
+    ports: Ports,
+    duties: Duties,
+    /// Whether the operator of the scenario has asked for a stop.
+    is_stopped: bool,
+    /// The cycle whose turn has not ended.
+    cycle: Option<OpenCycle>,
+}
+
+/// A cycle that has begun.
+#[derive(Debug, Clone, Copy)]
+struct OpenCycle {
+    wake: Wake,
+    received_ns: u64,
+    is_published: bool,
+}
+
+/// What a wait led to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "it lives for a moment")]
+pub enum Waited {
+    /// A cycle has begun.
+    Cycle {
+        /// Its number and time.
+        tick: Tick,
+        /// The newest reading; none where no new one arrived in time.
+        reading: Option<Reading>,
+    },
+    /// None has begun within the given time.
+    TimedOut,
+}
+
+/// Why a message was not published.
+#[derive(Debug, thiserror::Error)]
+pub enum SessionError {
+    /// A message before the first cycle.
+    #[error("no cycle has begun: call wait first")]
+    NoCycle,
+    /// A second command.
+    #[error("cycle {cycle} has its command already: call wait for the next cycle")]
+    Published {
+        /// The cycle.
+        cycle: u64,
+    },
+    /// A command of an earlier cycle, or of none: whoever made it may have stopped.
+    #[error("the command is of cycle {given}, but cycle {cycle} has begun: make a command for each cycle")]
+    OtherCycle {
+        /// The cycle that the command names.
+        given: u64,
+        /// The cycle that has begun.
+        cycle: u64,
+    },
+    /// The transport or the supervisor.
+    #[error(transparent)]
+    Process(#[from] ProcessError),
+}
+
+impl Session {
+    /// Opens the ports, reports ready, and waits for the start of the run. The signals and parameters are those of the
+    /// controller; the scenario may give the parameters other values.
+    ///
+    /// # Errors
+    /// [`ProcessError`] when the ports cannot be opened, the start is cancelled, or the declaration does not fit the
+    /// scenario.
+    pub fn start(context: ProcessContext, declared: Declared) -> Result<Self, ProcessError> {
+        let named = NamedValues::new(declared, &context.scenario.parameters)?;
+        if !named.parameters().is_empty() {
+            access::serve(context.node.domain(), named.settings().clone())
+                .map_err(ProcessError::Parameters)?;
+        }
+        let declared = named.settings().declared();
+        // Once before the start, so that what cannot be done is refused in time.
+        Operator::new(&context.scenario, declared, 0)?;
+        let (ports, epoch_ns) = Ports::open(&context, declared)?;
+        let operator = Operator::new(&context.scenario, declared, epoch_ns)?;
+        let duties = Duties { named, operator };
+        Ok(Self { context, ports, duties, is_stopped: false, cycle: None })
+    }
+
+    /// Runs the controller that made the declaration until it is done.
+    ///
+    /// # Errors
+    /// [`ProcessError`] when messages cannot be exchanged.
+    pub fn run(mut self, controller: &mut dyn Controller) -> Result<Outcome, ProcessError> {
+        set_parameters(controller, &self.duties.named);
+        loop {
+            if let Some(outcome) = controller.outcome() {
+                self.finish(outcome)?;
+                return Ok(outcome);
+            }
+            if self.is_stop_requested() {
+                controller.request_stop();
+            }
+            self.end_turn(false)?;
+            let wake = self.ports.begin_cycle(|| controller.warm_up())?;
+            run_cycle(controller, &mut self.duties, &mut self.ports, &wake)?;
+            self.cycle = Some(OpenCycle { wake, received_ns: 0, is_published: true });
+        }
+    }
+
+    /// Whether an orderly end is requested: bring the motion to rest, switch the drives off, then [`Self::finish`].
+    pub fn is_stop_requested(&self) -> bool {
+        self.is_stopped || self.context.stop.is_made()
+    }
+
+    /// The context of the run: its scenario and time table.
+    pub fn context(&self) -> &ProcessContext {
+        &self.context
+    }
+
+    /// Ends the current cycle and waits for the next; with a time-out of zero, only looks whether it has begun.
+    ///
+    /// # Errors
+    /// [`ProcessError`] when messages cannot be exchanged.
+    pub fn wait(&mut self, timeout: Option<Duration>) -> Result<Waited, ProcessError> {
+        self.end_turn(false)?;
+        if let Some(timeout) = timeout
+            && !self.ports.begins_within(timeout)?
+        {
+            return Ok(Waited::TimedOut);
+        }
+        let wake = self.ports.begin_cycle(|| ())?;
+        let reading = self.ports.reading(&wake)?.map(|reading| *reading);
+        let received_ns = self.ports.now_ns();
+        let tick = Tick { cycle: wake.cycle, now_ns: received_ns };
+        self.act(reading.map(|reading| reading.sampled_ns), tick)?;
+        self.cycle = Some(OpenCycle { wake, received_ns, is_published: false });
+        Ok(Waited::Cycle { tick, reading })
+    }
+
+    /// Does what is due, and takes over a parameter that was set.
+    fn act(&mut self, sampled_ns: Option<u64>, tick: Tick) -> Result<(), ProcessError> {
+        let Duties { named, operator } = &mut self.duties;
+        let due = operator.take_due(sampled_ns);
+        match due {
+            Some((_, Due::Set { place, value })) => named.settings().store(place, value),
+            Some((_, Due::Stop)) => self.is_stopped = true,
+            Some((_, Due::Fault(fault))) => self.ports.fault_is_due(fault)?,
+            None => {}
+        }
+        if let Some(change) = named.take_change() {
+            self.ports.publish_event(&change.event(tick.cycle, tick.now_ns))?;
+        }
+        publish_begin(due, &mut self.ports, tick)
+    }
+
+    /// The parameters in force in this cycle, in the order of their declaration.
+    pub fn parameters(&self) -> &[f64] {
+        self.duties.named.parameters()
+    }
+
+    /// The signals that go out with this cycle's command, in the order of their declaration.
+    pub fn signals_mut(&mut self) -> &mut [f64] {
+        self.duties.named.signals_mut()
+    }
+
+    /// Publishes this cycle's command and what the program made of the reading. The session enters the time stamps and
+    /// the use of time into the state.
+    ///
+    /// # Errors
+    /// [`SessionError`] for a second command in one cycle, a command that names another cycle, before the first cycle,
+    /// or when it cannot be sent.
+    pub fn publish(&mut self, command: &Command, state: &State) -> Result<(), SessionError> {
+        let OpenCycle { wake, received_ns, is_published } = self.cycle.ok_or(SessionError::NoCycle)?;
+        if is_published {
+            return Err(SessionError::Published { cycle: wake.cycle });
+        }
+        if command.cycle != wake.cycle {
+            return Err(SessionError::OtherCycle { given: command.cycle, cycle: wake.cycle });
+        }
+        let commanded_ns = self.ports.now_ns();
+        self.ports.publish_command(|message| *message = *command)?;
+        self.ports.publish_state(|message| {
+            *message = *state;
+            self.duties.operator.note_state(state.controller_state);
+            complete(message, &wake, [received_ns, commanded_ns, commanded_ns]);
+        })?;
+        let tick = Tick { cycle: wake.cycle, now_ns: commanded_ns };
+        publish_named(&mut self.duties.named, None, &mut self.ports, tick)?;
+        self.cycle = Some(OpenCycle { wake, received_ns, is_published: true });
+        Ok(())
+    }
+
+    /// Publishes an event.
+    ///
+    /// # Errors
+    /// [`ProcessError`] when it cannot be sent.
+    pub fn publish_event(&mut self, event: &Event) -> Result<(), ProcessError> {
+        self.ports.publish_event(event)
+    }
+
+    /// Ends the work in order.
+    ///
+    /// # Errors
+    /// [`ProcessError`] when the supervisor is gone.
+    pub fn finish(mut self, outcome: Outcome) -> Result<(), ProcessError> {
+        let end = match outcome {
+            Outcome::Finished => End::Finished,
+            Outcome::SafeStop => End::SafeStop,
+        };
+        self.end(end)
+    }
+
+    /// Ends the work because the program cannot go on. The plant's master stops the drives, since no command follows.
+    ///
+    /// # Errors
+    /// [`ProcessError`] when the supervisor is gone.
+    pub fn fail(mut self, reason: &str) -> Result<(), ProcessError> {
+        // The reason first: the turn cannot end where the plant has failed too.
+        self.report_end(End::Failed { reason: sentence(reason) })?;
+        self.end_turn(true)
+    }
+
+    fn end(&mut self, end: End) -> Result<(), ProcessError> {
+        self.end_turn(true)?;
+        self.report_end(end)
+    }
+
+    fn report_end(&self, end: End) -> Result<(), ProcessError> {
+        self.context.link.end(end).map_err(ProcessError::Supervisor)
+    }
+
+    /// Ends the turn of a cycle that has begun, in lockstep.
+    fn end_turn(&mut self, is_last: bool) -> Result<(), ProcessError> {
+        if self.cycle.take().is_some() || is_last {
+            self.ports.end_turn(is_last)?;
+        }
+        Ok(())
+    }
+}
+
+/// The controller's ports on iceoryx2, and the deadlines of its cycles.
+#[derive(Debug)]
+struct Ports {
+    readings: Subscriber<Reading>,
+    commands: Publisher<Command>,
+    states: Publisher<State>,
+    /// None where no signal is declared.
+    signals: Option<Publisher<Signals>>,
+    /// None where no parameter is declared.
+    parameters: Option<Publisher<Parameters>>,
+    events: Publisher<Event>,
+    clock: Clock,
+    link: SupervisorLink,
+    /// From the deadline until the newest reading is used, whichever that is, ns.
+    reading_timeout_ns: u64,
+}
+
+impl Ports {
+    /// Opens the ports, reports ready, and connects to the ports of the other processes before the first cycle, since a
+    /// connection makes and maps files. Returns the time of the first SYNC with them, ns.
+    fn open(context: &ProcessContext, declared: &Declared) -> Result<(Self, u64), ProcessError> {
+        let (node, scenario, schedule) = (&context.node, &context.scenario, &context.schedule);
+        let readings = node.newest_subscriber()?;
+        let (commands, states) = (node.publisher::<Command>()?, node.publisher::<State>()?);
+        let signals = (!declared.signals.is_empty()).then(|| node.publisher::<Signals>()).transpose()?;
+        let parameters =
+            (!declared.parameters.is_empty()).then(|| node.publisher::<Parameters>()).transpose()?;
+        let events = node.publisher::<Event>()?;
+        commands.warm_up()?;
+        states.warm_up()?;
+        signals.as_ref().map_or(Ok(()), Publisher::warm_up)?;
+        parameters.as_ref().map_or(Ok(()), Publisher::warm_up)?;
+        events.warm_up()?;
+        let lockstep = Lockstep::open(context, Party::Controller, Party::Plant)?;
+        let start = context.ready_with(Some(scenario.realtime.cores[0]), declared)?;
+        readings.connect()?;
+        commands.connect()?;
+        states.connect()?;
+        signals.as_ref().map_or(Ok(()), Publisher::connect)?;
+        parameters.as_ref().map_or(Ok(()), Publisher::connect)?;
+        events.connect()?;
+        let first_due_ns = start.epoch_ns + schedule.controller_at_ns;
+        let clock = Clock::start(lockstep, first_due_ns, scenario.period_ns());
+        let ports = Self {
+            readings,
+            commands,
+            states,
+            signals,
+            parameters,
+            events,
+            clock,
+            link: context.link.clone(),
+            reading_timeout_ns: (schedule.command_by_ns - schedule.controller_at_ns) / 2,
+        };
+        Ok((ports, start.epoch_ns))
+    }
+
+    /// Waits for the next deadline. Before it, calls `warm_up` and touches the memory of the next messages.
+    fn begin_cycle(&mut self, warm_up: impl FnOnce()) -> Result<Wake, TransportError> {
+        match &mut self.clock {
+            Clock::RealTime(cycle) => cycle.wait_warm(|| {
+                warm_up();
+                self.commands.warm_up()?;
+                self.states.warm_up()?;
+                self.signals.as_ref().map_or(Ok(()), Publisher::warm_up)
+            }),
+            Clock::Lockstep(lockstep) => Ok(lockstep.begin_cycle()),
+        }
+    }
+
+    /// Whether the next cycle begins within this time. Sleeps for that time otherwise.
+    fn begins_within(&mut self, timeout: Duration) -> Result<bool, ProcessError> {
+        match &mut self.clock {
+            Clock::RealTime(cycle) => {
+                let begins = cycle.next_due_ns() <= clock::now_ns() + timeout.as_nanos() as u64;
+                if !begins {
+                    clock::sleep(timeout);
+                }
+                Ok(begins)
+            }
+            Clock::Lockstep(lockstep) => lockstep.is_turn_within(timeout),
+        }
+    }
+
+    /// Ends the controller's turn in lockstep.
+    fn end_turn(&mut self, is_last: bool) -> Result<(), ProcessError> {
+        match &mut self.clock {
+            Clock::RealTime(_) => Ok(()),
+            Clock::Lockstep(lockstep) => Ok(lockstep.end_turn(is_last)?),
+        }
+    }
+}
+
+impl ControllerPorts for Ports {
+    type Reading = ReceivedMessage<Reading>;
+    type Error = ProcessError;
+
+    fn now_ns(&self) -> u64 {
+        self.clock.now_ns()
+    }
+
+    fn reading(&mut self, wake: &Wake) -> Result<Option<ReceivedMessage<Reading>>, ProcessError> {
+        let is_awaited = |reading: &Reading| reading.cycle >= wake.cycle;
+        let reading = match &mut self.clock {
+            Clock::RealTime(cycle) => {
+                let deadline_ns = wake.due_ns + self.reading_timeout_ns;
+                self.readings.latest_by(deadline_ns, cycle.waiter(), is_awaited)?
+            }
+            Clock::Lockstep(lockstep) => {
+                if !lockstep.await_turn()? {
+                    return Ok(None);
+                }
+                self.readings.latest_by(0, lockstep.waiter(), is_awaited)?
+            }
+        };
+        Ok(reading.map(ReceivedMessage::checked).transpose()?)
+    }
+
+    fn publish_command(&mut self, fill: impl FnOnce(&mut Command)) -> Result<(), ProcessError> {
+        Ok(self.commands.publish_by(|| self.clock.now_ns(), fill)?)
+    }
+
+    fn publish_state(&mut self, fill: impl FnOnce(&mut State)) -> Result<(), ProcessError> {
+        Ok(self.states.publish_by(|| self.clock.now_ns(), fill)?)
+    }
+
+    fn publish_signals(&mut self, fill: impl FnOnce(&mut Signals)) -> Result<(), ProcessError> {
+        let Some(signals) = &mut self.signals else { return Ok(()) };
+        Ok(signals.publish_by(|| self.clock.now_ns(), fill)?)
+    }
+
+    fn publish_parameters(&mut self, fill: impl FnOnce(&mut Parameters)) -> Result<(), ProcessError> {
+        let Some(parameters) = &mut self.parameters else { return Ok(()) };
+        Ok(parameters.publish_by(|| self.clock.now_ns(), fill)?)
+    }
+
+    fn publish_event(&mut self, event: &Event) -> Result<(), ProcessError> {
+        Ok(self.events.publish_by(|| self.clock.now_ns(), |message| *message = *event)?)
+    }
+
+    /// The supervisor carries it out. In lockstep, simulated time stands still until it has, so that the fault strikes
+    /// in this cycle.
+    fn fault_is_due(&mut self, fault: usize) -> Result<(), ProcessError> {
+        let report = Report::Due { fault, now_ns: self.clock.now_ns() };
+        self.link.report(&report).map_err(ProcessError::Supervisor)?;
+        match &self.clock {
+            Clock::RealTime(_) => Ok(()),
+            Clock::Lockstep(_) => self.link.await_struck().map_err(ProcessError::Supervisor),
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! What both sides of the rig run on: messages and their transport, the schedule of the bus, the real-time loop, the life of a
+//! process, and the trait `Controller` with its session.
+//!
+//! Geometry and dynamics are in `masseter-model`, scenarios in `masseter-scenario`. This crate is the same in every process.
+
+pub mod clock;
+pub mod control;
+pub mod conversation;
+pub mod injection;
+pub mod lifecycle;
+pub mod lockstep;
+pub mod messages;
+pub mod named;
+pub mod realtime;
+pub mod schedule;
+pub mod transport;

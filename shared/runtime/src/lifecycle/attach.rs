@@ -1,0 +1,217 @@
+//! How a program of the user attaches to a running rig as its controller.
+//!
+//! The rig listens on a socket in the private folder of its domain, so only the same user's programs reach it. The program
+//! says [`Hello`]; the rig answers with the [`Invitation`] or a refusal. From then on the socket carries [`Report`]s and
+//! [`Order`]s. The cycle itself is in [`control::Session`](crate::control::Session).
+//!
+//! [`Report`]: super::Report
+//! [`Order`]: super::Order
+
+use std::env;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use masseter_scenario::input::excerpt;
+use serde::{Deserialize, Serialize};
+
+use super::{Patience, ProcessArguments, ProcessContext, ProcessError, SupervisorLink, line};
+use crate::clock::SECOND_NS;
+use crate::conversation::{Conversation, Left, Limits};
+use crate::messages::{Command, Event, Message, Reading, State};
+use crate::transport::{Domain, DomainError};
+
+/// The environment variable with the name of the rig. The rig sets it for a program that it starts.
+pub const RIG_VARIABLE: &str = "MASSETER_RIG";
+
+/// Longest wait for the rig's answer, ns.
+const ANSWER_TIMEOUT_NS: u64 = 10 * SECOND_NS;
+/// Bytes of the longest answer.
+const LONGEST_ANSWER: usize = 1 << 16;
+const SOCKET: &str = "attach";
+
+/// The first message of a program.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Hello {
+    /// The layouts of the messages that the program uses, with their hashes.
+    pub layouts: Vec<String>,
+}
+
+impl Hello {
+    /// The greeting of a program that is built from this version.
+    pub fn new() -> Self {
+        let layouts = [
+            Reading::SHARED_MEMORY_NAME,
+            Command::SHARED_MEMORY_NAME,
+            State::SHARED_MEMORY_NAME,
+            Event::SHARED_MEMORY_NAME,
+        ];
+        Self { layouts: layouts.map(str::to_owned).to_vec() }
+    }
+
+    /// The first layout that differs from this version's, as messages quote it, with this version's, if any does.
+    pub fn difference(&self) -> Option<(String, String)> {
+        let own = Self::new().layouts;
+        let theirs = |index: usize| self.layouts.get(index).cloned().unwrap_or_default();
+        own.into_iter()
+            .enumerate()
+            .map(|(index, own)| (theirs(index), own))
+            .find(|(theirs, own)| theirs != own)
+            .map(|(theirs, own)| (excerpt(&theirs), own))
+    }
+}
+
+impl Default for Hello {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The rig's answer.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Answer {
+    /// The program is the rig's controller.
+    Invited(Invitation),
+    /// It is not.
+    Refused {
+        /// Why, and what to do.
+        reason: String,
+    },
+}
+
+/// What a program needs to take part in a run.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Invitation {
+    /// The resolved scenario.
+    pub scenario: PathBuf,
+    /// Whether the run is in lockstep.
+    pub is_lockstep: bool,
+    /// In lockstep, how long a process may be silent; none for ever.
+    pub patience: Option<Duration>,
+}
+
+impl Invitation {
+    /// The invitation to a run with this scenario; in lockstep with a patience.
+    pub fn new(scenario: PathBuf, lockstep: Option<Patience>) -> Self {
+        let patience = lockstep.and_then(|Patience(patience)| patience);
+        Self { scenario, is_lockstep: lockstep.is_some(), patience }
+    }
+}
+
+/// Why a program could not attach.
+#[derive(Debug, thiserror::Error)]
+pub enum AttachError {
+    /// No rig of that name waits for a controller.
+    #[error("no rig named '{name}' takes a controller; {waiting}")]
+    NoSuchRig {
+        /// The name.
+        name: String,
+        /// The rigs that do.
+        waiting: Waiting,
+    },
+    /// Without a name there must be one rig.
+    #[error("there is not one rig to attach to; {waiting}")]
+    NotOneRig {
+        /// The rigs that take a controller.
+        waiting: Waiting,
+    },
+    /// The rig refused the program.
+    #[error("the rig '{rig}' refuses this program: {reason}")]
+    Refused {
+        /// The rig.
+        rig: String,
+        /// Why, and what to do.
+        reason: String,
+    },
+    /// The rig did not answer.
+    #[error("the rig '{rig}' does not answer: {left}")]
+    NoAnswer {
+        /// The rig.
+        rig: String,
+        /// Why no answer is awaited any more.
+        left: Left,
+    },
+    /// The rigs of this user cannot be found.
+    #[error(transparent)]
+    Domain(#[from] DomainError),
+    /// The scenario or the domain cannot be used.
+    #[error(transparent)]
+    Process(#[from] ProcessError),
+}
+
+/// The names of the rigs that take a controller.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Waiting(pub Vec<String>);
+
+impl std::fmt::Display for Waiting {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if self.0.is_empty() {
+            return f.write_str("none runs: start one with 'masseter run --controller external --name NAME'");
+        }
+        write!(f, "those that do: {}; choose one by its name or by {RIG_VARIABLE}", self.0.join(", "))
+    }
+}
+
+/// The socket on which the rig of this domain listens.
+pub fn socket(domain: &Domain) -> PathBuf {
+    domain.root().join(SOCKET)
+}
+
+/// Attaches this process as the controller of a rig: the named one, or that of [`RIG_VARIABLE`], or the only one that takes a
+/// controller. Other threads of the process are not touched; no signal handler is installed.
+///
+/// ```no_run
+/// use masseter_runtime::control::Session;
+/// use masseter_runtime::lifecycle::attach::attach;
+/// use masseter_runtime::named::Declared;
+///
+/// let context = attach(Some("bench"))?;
+/// println!("{} cycles per second", context.scenario.rate_hz);
+/// let mut session = Session::start(context, Declared::default())?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`AttachError`] when there is no such rig, it refuses this program, or its scenario cannot be used.
+pub fn attach(rig: Option<&str>) -> Result<ProcessContext, AttachError> {
+    let named = rig.map(str::to_owned).or_else(|| env::var(RIG_VARIABLE).ok());
+    let rig = named.map_or_else(only_rig, Ok)?;
+    let limits = Limits::answer(ANSWER_TIMEOUT_NS, LONGEST_ANSWER);
+    let Ok(mut conversation) = Conversation::connect(&socket(&Domain::named(&rig)?), limits) else {
+        return Err(AttachError::NoSuchRig { name: rig, waiting: waiting()? });
+    };
+    let invitation = match greet(&mut conversation) {
+        Ok(Answer::Invited(invitation)) => invitation,
+        Ok(Answer::Refused { reason }) => return Err(AttachError::Refused { rig, reason }),
+        Err(left) => return Err(AttachError::NoAnswer { rig, left }),
+    };
+    let lockstep = invitation.is_lockstep.then_some(Patience(invitation.patience));
+    let arguments = ProcessArguments { scenario: invitation.scenario, domain: rig, lockstep };
+    let connection = conversation.into_connection().map_err(ProcessError::Supervisor)?;
+    let (link, stop) = SupervisorLink::over(connection.into()).map_err(ProcessError::Supervisor)?;
+    Ok(ProcessContext::new(&arguments, stop, link)?)
+}
+
+fn greet(conversation: &mut Conversation) -> Result<Answer, Left> {
+    conversation.say(line(&Hello::new()).as_bytes());
+    // The rig sends nothing more before this program is ready.
+    let answer = conversation.await_line()?;
+    serde_json::from_str(&answer).map_err(|error| Left::Failed(error.into()))
+}
+
+fn only_rig() -> Result<String, AttachError> {
+    let mut waiting = waiting()?;
+    match waiting.0.pop() {
+        Some(rig) if waiting.0.is_empty() => Ok(rig),
+        last => {
+            waiting.0.extend(last);
+            Err(AttachError::NotOneRig { waiting })
+        }
+    }
+}
+
+fn waiting() -> Result<Waiting, DomainError> {
+    let domains = Domain::all()?;
+    let takes = |domain: &&Domain| socket(domain).exists() && domain.is_alive().unwrap_or(false);
+    Ok(Waiting(domains.iter().filter(takes).map(|domain| domain.id().to_owned()).collect()))
+}

@@ -1,0 +1,296 @@
+//! The schedule of a cycle, from the worst-case frame lengths on the bus.
+//!
+//! SYNC and the drives' process data (TPDO1) go first, at offset 0. Then the controller computes. Then its targets (RPDO1)
+//! go out, to be on the wire before the next SYNC. Heartbeats use the rest of the cycle; an SDO exchange takes the place of
+//! its drive's process data. Emergencies (EMCY) are not in the schedule: in a cycle with one, reading or command may be
+//! late, as with a disturbed bus.
+
+use std::fmt;
+
+use masseter_scenario::{CanConfig, MASTER_NODE, RATES_HZ, Scenario};
+
+use crate::clock::{MILLISECOND_NS, SECOND_NS};
+use masseter_can::canopen::{Cob, NodeId, NodeIdError};
+use masseter_can::wire::{INTERFRAME_BITS, unstuffed_bits, worst_case_bits};
+use masseter_can::{
+    Bitrate, BitrateError, BusPlan, NoReleaser, Overload, PdoMapping, PeriodicMessage, Release,
+};
+
+/// SYNC and the controller's deadline keep this clear of whole milliseconds, where the kernel's timer
+/// tick falls, ns.
+pub const OFF_TICK_NS: u64 = 230_000;
+
+/// From the latest reading to the controller's deadline, ns: publishing takes some microseconds.
+const PUBLISH_NS: u64 = 15_000;
+/// Data bytes of every SDO message.
+const SDO_LENGTH: u32 = 8;
+/// The least time between the controller's deadline and the latest command, ns.
+const COMPUTE_NS: u64 = 20_000;
+
+/// Offsets from SYNC within one cycle, ns.
+///
+/// # Examples
+/// ```
+/// use masseter_scenario::Scenario;
+/// use masseter_runtime::schedule::CycleSchedule;
+///
+/// let schedule = CycleSchedule::new(&Scenario::default())?;
+/// assert!(schedule.reading_by_ns < schedule.controller_at_ns);
+/// assert!(schedule.controller_at_ns < schedule.command_by_ns);
+/// let refused = CycleSchedule::new(&Scenario { rate_hz: 2000, ..Scenario::default() }).unwrap_err();
+/// assert!(refused.to_string().contains("the highest rate_hz that fits"));
+/// # Ok::<(), masseter_runtime::schedule::ScheduleError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CycleSchedule {
+    /// The earliest arrival of the last process data: frames without stuff bits take this long.
+    pub reading_from_ns: u64,
+    /// The latest arrival of the last process data.
+    pub reading_by_ns: u64,
+    /// When the controller wakes.
+    pub controller_at_ns: u64,
+    /// The latest command whose process data are on the wire before the next SYNC.
+    pub command_by_ns: u64,
+}
+
+/// Why there is no schedule.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ScheduleError {
+    /// Unknown bit rate.
+    #[error("can.bitrate_bps: {0}")]
+    Bitrate(#[from] BitrateError),
+    /// Unknown node id.
+    #[error("can.node_ids: {0}")]
+    NodeId(#[from] NodeIdError),
+    /// A message without a releaser.
+    #[error(transparent)]
+    NoReleaser(#[from] NoReleaser),
+    /// The cycle is too short.
+    #[error("can.buses: {misfit}; {room}")]
+    Misfit {
+        /// The part that does not fit.
+        misfit: Misfit,
+        /// The rate that fits.
+        room: Room,
+    },
+}
+
+/// The part of a cycle that does not fit.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Misfit {
+    /// Messages that do not arrive in time.
+    #[error("the messages of a bus do not fit\n{0}")]
+    Overload(#[from] Overload),
+    /// The frames fit, but leave the controller no time between reading and command.
+    #[error(
+        "the reading may take until {reading_by_ns} ns and the command must be there by {command_by_ns} ns of a cycle \
+         of {period_ns} ns, which leaves the controller no time; use a lower rate_hz or more buses"
+    )]
+    NoTime {
+        /// Offset of the reading.
+        reading_by_ns: u64,
+        /// Offset of the latest command.
+        command_by_ns: u64,
+        /// The cycle.
+        period_ns: u64,
+    },
+}
+
+impl CycleSchedule {
+    /// The schedule of a scenario's cycles, by the busiest bus.
+    ///
+    /// # Errors
+    /// [`ScheduleError`] for cycles that are too short, with the highest rate that fits.
+    pub fn new(scenario: &Scenario) -> Result<Self, ScheduleError> {
+        match Self::fit(scenario, scenario.period_ns())? {
+            Ok(schedule) => Ok(schedule),
+            Err(misfit) => Err(ScheduleError::Misfit { misfit, room: Room::for_link(scenario)? }),
+        }
+    }
+
+    fn fit(scenario: &Scenario, period_ns: u64) -> Result<Result<Self, Misfit>, ScheduleError> {
+        let mut plans =
+            plans_of(scenario, period_ns, false)?.into_iter().chain(plans_of(scenario, period_ns, true)?);
+        if let Some(overload) = plans.find_map(|plan| plan.check().err()) {
+            return Ok(Err(overload.into()));
+        }
+        Ok(Self::offsets(scenario, scenario.can.bitrate()?, period_ns))
+    }
+
+    fn offsets(scenario: &Scenario, bitrate: Bitrate, period_ns: u64) -> Result<Self, Misfit> {
+        let can = &scenario.can;
+        let longest = |length| bitrate.bits_to_ns(worst_case_bits(length, false));
+        let shortest = |length| bitrate.bits_to_ns(unstuffed_bits(length, false));
+        let axes = can.buses.iter().map(Vec::len).max().unwrap_or(0) as u64;
+        let (sync, tpdo) = (0, length(&PdoMapping::TPDO1));
+        // A frame has arrived before the interframe space behind it.
+        let pause_ns = bitrate.bits_to_ns(INTERFRAME_BITS);
+        let reading_from_ns = shortest(sync) + axes * shortest(tpdo) - pause_ns;
+        // A heartbeat may have begun just before SYNC is queued.
+        let heartbeat_ns = heartbeat_ns(bitrate);
+        let up_ns = longest(sync) + axes * longest(tpdo);
+        let rpdos_ns = |axes: &Vec<usize>| {
+            axes.iter().map(|&axis| longest(length(&scenario.profile(axis).pdos.rpdo1()))).sum()
+        };
+        let down_ns = can.buses.iter().map(rpdos_ns).max().unwrap_or(0);
+        let reading_by_ns = heartbeat_ns + up_ns + answer_ns(can, heartbeat_ns);
+        let command_by_ns = period_ns.saturating_sub(heartbeat_ns + down_ns);
+        let controller_at_ns = reading_by_ns + PUBLISH_NS;
+        if controller_at_ns + COMPUTE_NS > command_by_ns {
+            return Err(Misfit::NoTime { reading_by_ns, command_by_ns, period_ns });
+        }
+        Ok(Self { reading_from_ns, reading_by_ns, controller_at_ns, command_by_ns })
+    }
+}
+
+/// The cycle rate that a link has room for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Room {
+    /// The highest rate for which there is a time table, Hz; none where no rate is low enough.
+    pub max_rate_hz: Option<u32>,
+    /// The part of every cycle that the drives take to answer SYNC, ns.
+    pub answer_ns: u64,
+}
+
+impl fmt::Display for Room {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.max_rate_hz {
+            Some(rate_hz) => write!(f, "the highest rate_hz that fits is {rate_hz}")?,
+            None => write!(f, "no rate_hz fits")?,
+        }
+        match self.answer_ns {
+            0 => Ok(()),
+            _ => write!(f, ", since can.answer_us takes {} µs of every cycle", self.answer_ns / 1000),
+        }
+    }
+}
+
+impl Room {
+    /// The room of a scenario's link, by bisection: whatever fits into a cycle fits into a longer one.
+    ///
+    /// # Errors
+    /// [`ScheduleError`] for unknown bit rates and node ids.
+    pub fn for_link(scenario: &Scenario) -> Result<Self, ScheduleError> {
+        let can = &scenario.can;
+        let fits = |rate_hz: u32| {
+            CycleSchedule::fit(scenario, SECOND_NS / u64::from(rate_hz)).map(|fitted| fitted.is_ok())
+        };
+        let answer_ns = answer_ns(can, heartbeat_ns(can.bitrate()?));
+        let (mut max_rate_hz, mut too_high_hz) = (*RATES_HZ.start(), *RATES_HZ.end() + 1);
+        if !fits(max_rate_hz)? {
+            return Ok(Self { max_rate_hz: None, answer_ns });
+        }
+        while too_high_hz - max_rate_hz > 1 {
+            let between_hz = u32::midpoint(max_rate_hz, too_high_hz);
+            if fits(between_hz)? {
+                max_rate_hz = between_hz;
+            } else {
+                too_high_hz = between_hz;
+            }
+        }
+        Ok(Self { max_rate_hz: Some(max_rate_hz), answer_ns })
+    }
+}
+
+/// The longest time of a heartbeat on the wire, ns.
+fn heartbeat_ns(bitrate: Bitrate) -> u64 {
+    bitrate.bits_to_ns(worst_case_bits(HEARTBEAT_LENGTH, false))
+}
+
+/// The delay of the reading by drives that do not answer SYNC at once, ns: a heartbeat may begin while the bus is idle.
+fn answer_ns(can: &CanConfig, heartbeat_ns: u64) -> u64 {
+    if can.answer_us > 0 { u64::from(can.answer_us) * 1000 + heartbeat_ns } else { 0 }
+}
+
+/// Data bytes of a heartbeat.
+const HEARTBEAT_LENGTH: u32 = 1;
+
+/// The plan of every bus: SYNC, process data and heartbeats. SYNC releases the drives' process data. The master releases
+/// SYNC and its own process data once a cycle, here without jitter.
+///
+/// ```
+/// use masseter_scenario::Scenario;
+/// use masseter_runtime::schedule::plans;
+///
+/// for plan in plans(&Scenario::default())? {
+///     plan.check()?;
+///     println!("{:.0} % of the bus in use", plan.utilisation() * 100.0);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`ScheduleError`] for unknown bit rates, node ids and releasers. [`BusPlan::check`] finds messages that do not fit.
+pub fn plans(scenario: &Scenario) -> Result<Vec<BusPlan>, ScheduleError> {
+    plans_of(scenario, scenario.period_ns(), false)
+}
+
+/// The plans while all drives run, or while one of every bus `boots` and the others run: then request and answer of one
+/// SDO exchange take the place of its process data. The worst is the drive with the shortest RPDO1. With more drives
+/// booting there is still one request in a cycle, and each answer is no longer than the process data that its drive
+/// does not send.
+///
+/// The offsets of the schedule hold as well: an SDO frame blocks the bus for longer than a heartbeat, but for no longer than
+/// a heartbeat and the missing process data.
+fn plans_of(scenario: &Scenario, period_ns: u64, boots: bool) -> Result<Vec<BusPlan>, ScheduleError> {
+    let can = &scenario.can;
+    let plan = |(bus, axes): (usize, &Vec<usize>)| {
+        let ids = axes.iter().filter_map(|&axis| Some((*can.node_ids.get(axis)?, axis)));
+        let drives = ids.map(|(id, axis)| Ok((NodeId::new(id)?, scenario.profile(axis).pdos.rpdo1())));
+        let drives = drives.collect::<Result<Vec<_>, NodeIdError>>()?;
+        let messages = messages(&drives, can, period_ns, boots);
+        Ok(BusPlan::new(bus, can.bitrate()?, period_ns, messages)?)
+    };
+    can.buses.iter().enumerate().map(plan).collect()
+}
+
+/// Data bytes of a PDO.
+fn length(mapping: &PdoMapping) -> u32 {
+    mapping.length() as u32
+}
+
+fn messages(
+    drives: &[(NodeId, PdoMapping)],
+    can: &CanConfig,
+    period_ns: u64,
+    boots: bool,
+) -> Vec<PeriodicMessage> {
+    let heartbeat_ns = u64::from(can.heartbeat_producer_ms) * MILLISECOND_NS;
+    let message = |name: String, cob: Cob, data_length: u32, period_ns: u64| PeriodicMessage {
+        name,
+        id: cob.into(),
+        data_length,
+        period_ns,
+        deadline_ns: period_ns,
+        release: None,
+    };
+    let mut messages = vec![message("SYNC".to_owned(), Cob::Sync, 0, period_ns)];
+    let shortest = drives.iter().min_by_key(|(_, rpdo1)| length(rpdo1)).filter(|_| boots);
+    let booting = shortest.map(|&(node, _)| node);
+    for &(node, rpdo1) in drives {
+        if booting == Some(node) {
+            // The answer may take until the end of the next cycle.
+            let sdo = |name: &str, cob| PeriodicMessage {
+                deadline_ns: 2 * period_ns,
+                ..message(format!("{name} {}", node.get()), cob, SDO_LENGTH, period_ns)
+            };
+            messages.push(sdo("SDO request", Cob::SdoRequest(node)));
+            messages.push(sdo("SDO response", Cob::SdoResponse(node)));
+            continue;
+        }
+        let (tpdo, rpdo) = (length(&PdoMapping::TPDO1), length(&rpdo1));
+        messages.push(PeriodicMessage {
+            release: Some(Release { by: Cob::Sync.into(), within_ns: u64::from(can.answer_us) * 1000 }),
+            ..message(format!("TPDO1 {}", node.get()), Cob::Tpdo1(node), tpdo, period_ns)
+        });
+        messages.push(message(format!("RPDO1 {}", node.get()), Cob::Rpdo1(node), rpdo, period_ns));
+    }
+    for node in drives.iter().map(|&(node, _)| node).chain([MASTER_NODE]) {
+        let name = format!("heartbeat {}", node.get());
+        messages.push(message(name, Cob::Heartbeat(node), HEARTBEAT_LENGTH, heartbeat_ns));
+    }
+    messages
+}
+
+#[cfg(test)]
+mod tests;

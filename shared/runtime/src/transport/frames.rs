@@ -1,0 +1,211 @@
+//! The frames of the buses: many small messages a cycle, so several travel in one sample.
+//!
+//! The messages of a sample share the cost of sending and receiving it. Each message keeps a number of its own.
+
+use std::fmt::Debug;
+
+use iceoryx2::port::publisher::Publisher as IceoryxPublisher;
+use iceoryx2::port::subscriber::Subscriber as IceoryxSubscriber;
+use iceoryx2::prelude::{AllocationStrategy, ipc};
+use iceoryx2::sample::Sample;
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+
+use super::error::{Refused, TransportError, check_version, failed};
+use super::ports::{Node, create_publisher, create_subscriber};
+use crate::clock;
+use crate::messages::{FrameTap, Message};
+
+/// Most messages in a sample: those of a cycle of six drives.
+const BATCH: usize = 16;
+
+/// Publishes frames and numbers them.
+#[derive(Debug)]
+pub struct FramePublisher {
+    port: Box<dyn Outgoing>,
+    sent: u64,
+}
+
+/// Receives frames, oldest first. It keeps up to [`Message::DEPTH`] frames, less where batches are not full.
+#[derive(Debug)]
+pub struct FrameSubscriber(Box<dyn Incoming>);
+
+/// Several frames in shared memory.
+type Batch = Sample<ipc::Service, [FrameTap], ()>;
+
+/// What a publisher needs of its port, which is behind a pointer for the reason of [`Topic`](super::Topic).
+trait Outgoing: Debug {
+    /// Sends so many frames: `next` makes each in shared memory, `stamp` completes them.
+    fn send(
+        &self,
+        count: usize,
+        next: &mut dyn FnMut() -> FrameTap,
+        stamp: &mut dyn FnMut(&mut [FrameTap]),
+    ) -> Result<(), TransportError>;
+    fn connect(&self) -> Result<(), TransportError>;
+    fn warm_up(&self) -> Result<(), TransportError>;
+}
+
+/// What a subscriber needs of its port.
+trait Incoming: Debug {
+    fn next(&self) -> Result<Option<Batch>, TransportError>;
+}
+
+#[derive(Debug)]
+struct Outlet {
+    port: IceoryxPublisher<ipc::Service, [FrameTap], ()>,
+    refused: Refused,
+}
+
+#[derive(Debug)]
+struct Inlet {
+    port: IceoryxSubscriber<ipc::Service, [FrameTap], ()>,
+    refused: Refused,
+}
+
+impl Outgoing for Outlet {
+    fn send(
+        &self,
+        count: usize,
+        next: &mut dyn FnMut() -> FrameTap,
+        stamp: &mut dyn FnMut(&mut [FrameTap]),
+    ) -> Result<(), TransportError> {
+        let sample = self.port.loan_slice_uninit(count).map_err(failed("loaning", FrameTap::TOPIC))?;
+        let mut sample = sample.write_from_fn(|_| next());
+        stamp(sample.payload_mut());
+        sample.send().map_err(failed("sending", FrameTap::TOPIC))?;
+        Ok(())
+    }
+
+    fn connect(&self) -> Result<(), TransportError> {
+        self.refused.connect(&self.port, FrameTap::TOPIC)
+    }
+
+    fn warm_up(&self) -> Result<(), TransportError> {
+        let sample = self.port.loan_slice_uninit(BATCH).map_err(failed("loaning", FrameTap::TOPIC))?;
+        drop(sample.write_from_fn(|_| FrameTap::default()));
+        Ok(())
+    }
+}
+
+impl Incoming for Inlet {
+    fn next(&self) -> Result<Option<Batch>, TransportError> {
+        let sample = self.port.receive().map_err(failed("receiving", FrameTap::TOPIC))?;
+        self.refused.check(FrameTap::TOPIC)?;
+        sample.iter().flat_map(|sample| sample.iter()).try_for_each(check_version)?;
+        Ok(sample)
+    }
+}
+
+fn service(node: &Node) -> Result<PortFactory<ipc::Service, [FrameTap], ()>, TransportError> {
+    let builder = node.topic::<FrameTap, [FrameTap]>(FrameTap::DEPTH / BATCH)?;
+    builder.open_or_create().map_err(failed("opening topic", FrameTap::TOPIC))
+}
+
+impl FramePublisher {
+    /// A publisher of the topic of frames.
+    pub fn open(node: &Node) -> Result<Self, TransportError> {
+        let service = service(node)?;
+        let builder = service.publisher_builder().initial_max_slice_len(BATCH);
+        let (port, refused) = create_publisher(builder.allocation_strategy(AllocationStrategy::Static))?;
+        Ok(Self { port: Box::new(Outlet { port, refused }), sent: 0 })
+    }
+
+    /// The number of samples in which so many frames travel.
+    pub fn samples(frames: usize) -> usize {
+        frames.div_ceil(BATCH)
+    }
+
+    /// Connects to the subscribers that are there by now, as [`Publisher::connect`](super::Publisher::connect).
+    pub fn connect(&self) -> Result<(), TransportError> {
+        self.port.connect()
+    }
+
+    /// Writes the frames into shared memory, stamps and publishes them in their order.
+    pub fn publish(
+        &mut self,
+        frames: impl IntoIterator<Item = FrameTap, IntoIter: ExactSizeIterator>,
+    ) -> Result<(), TransportError> {
+        self.publish_by(clock::now_ns, frames)
+    }
+
+    /// The same with the time of another clock in the stamps.
+    pub fn publish_by(
+        &mut self,
+        now_ns: impl Fn() -> u64,
+        frames: impl IntoIterator<Item = FrameTap, IntoIter: ExactSizeIterator>,
+    ) -> Result<(), TransportError> {
+        let mut frames = frames.into_iter();
+        while frames.len() > 0 {
+            let (count, sent) = (frames.len().min(BATCH), &mut self.sent);
+            let mut next = || frames.next().expect("`count` is at most its length");
+            self.port.send(count, &mut next, &mut |batch| {
+                let published_ns = now_ns();
+                for frame in batch {
+                    *sent += 1;
+                    frame.stamp(*sent, published_ns);
+                }
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Touches the memory of the next batch, as the `warm_up` of a publisher of single messages.
+    pub fn warm_up(&self) -> Result<(), TransportError> {
+        self.port.warm_up()
+    }
+}
+
+impl FrameSubscriber {
+    /// A subscriber of the topic of frames.
+    pub fn open(node: &Node) -> Result<Self, TransportError> {
+        let (port, refused) = create_subscriber(service(node)?.subscriber_builder())?;
+        Ok(Self(Box::new(Inlet { port, refused })))
+    }
+
+    /// The oldest batch not yet received; never waits. Refused when a connection to a publisher failed, since its frames
+    /// would be missing.
+    pub fn receive(&self) -> Result<Option<Batch>, TransportError> {
+        self.0.next()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::transport::ScratchDomain;
+
+    #[test]
+    fn messages_arrive_in_order_however_many_come_at_once() {
+        let domain = ScratchDomain::claim("test-batches").unwrap();
+        let node = Node::join(&domain).unwrap();
+        let subscriber = FrameSubscriber::open(&node).unwrap();
+        let mut publisher = FramePublisher::open(&node).unwrap();
+        let mut sent = 0;
+        for count in [0, 1, BATCH, BATCH + 1, 5 * BATCH, 3] {
+            let frames: Vec<_> =
+                (0..count).map(|id| FrameTap { id: id as u32, ..FrameTap::default() }).collect();
+            publisher.publish(frames).unwrap();
+            let mut received = Vec::new();
+            while let Some(batch) = subscriber.receive().unwrap() {
+                received.extend(batch.iter().map(|frame| (frame.seq, frame.id)));
+            }
+            let expected: Vec<_> = (0..count as u32).map(|id| (sent + 1 + u64::from(id), id)).collect();
+            assert_eq!(received, expected);
+            sent += count as u64;
+        }
+    }
+
+    #[test]
+    fn a_slow_subscriber_loses_the_oldest_and_sees_the_gap() {
+        let domain = ScratchDomain::claim("test-behind").unwrap();
+        let node = Node::join(&domain).unwrap();
+        let subscriber = FrameSubscriber::open(&node).unwrap();
+        let mut publisher = FramePublisher::open(&node).unwrap();
+        let frames = [FrameTap::default(); BATCH];
+        for _ in 0..FrameTap::DEPTH / BATCH + 2 {
+            publisher.publish(frames).unwrap();
+        }
+        let oldest = subscriber.receive().unwrap().unwrap();
+        assert_eq!(oldest[0].seq, 2 * BATCH as u64 + 1);
+    }
+}

@@ -1,0 +1,46 @@
+//! Connections that cannot be made. Alone in its file: the limit that refuses them is the whole process's.
+
+use masseter_runtime::messages::Event;
+use masseter_runtime::transport::{FramePublisher, FrameSubscriber, Node, ScratchDomain, TransportError};
+use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+
+/// What `connect` says where no file may be opened.
+fn refused<T>(connect: impl FnOnce() -> Result<T, TransportError>) -> String {
+    let before = getrlimit(Resource::Nofile);
+    setrlimit(Resource::Nofile, Rlimit { current: Some(0), ..before }).unwrap();
+    let result = connect();
+    setrlimit(Resource::Nofile, before).unwrap();
+    result.err().map_or_else(String::new, |error| error.to_string())
+}
+
+fn assert_tells(told: &str, topic: &str) {
+    assert!(
+        told.contains(&format!("connecting '{topic}' failed")) && told.contains("masseter doctor"),
+        "{told}"
+    );
+}
+
+#[test]
+fn a_refused_connection_is_reported() {
+    let domain = ScratchDomain::claim("test-connections").unwrap();
+    {
+        let node = Node::join(&domain).unwrap();
+        let publisher = node.publisher::<Event>().unwrap();
+        let _inlet = node.subscriber::<Event>().unwrap();
+        assert_tells(&refused(|| publisher.connect()), "event");
+    }
+    {
+        let node = Node::join(&domain).unwrap();
+        let subscriber = node.subscriber::<Event>().unwrap();
+        let mut publisher = node.publisher::<Event>().unwrap();
+        assert_tells(&refused(|| subscriber.receive()), "event");
+        publisher.publish(|_| {}).unwrap();
+        assert_tells(&subscriber.receive().unwrap_err().to_string(), "event");
+    }
+    {
+        let node = Node::join(&domain).unwrap();
+        let subscriber = FrameSubscriber::open(&node).unwrap();
+        let _outlet = FramePublisher::open(&node).unwrap();
+        assert_tells(&refused(|| subscriber.receive()), "frame");
+    }
+}

@@ -1,0 +1,127 @@
+//! Single objects of a profile: whether the master writes, compares or leaves them, and within which limits.
+
+use std::fmt::{self, Display, Formatter};
+use std::str::FromStr;
+
+use masseter_can::canopen::ObjectAddress;
+use serde::{Deserialize, Serialize};
+
+use crate::error::ScenarioError;
+
+/// What the master does with an object.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ObjectRule {
+    /// It writes the object.
+    #[default]
+    Write,
+    /// It reads the object, whose value must be right.
+    Expect,
+    /// It writes the object if the drive has one and accepts the value.
+    Optional,
+    /// It leaves the object: the drive has none.
+    Absent,
+}
+
+/// One object of a profile.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ObjectConfig {
+    /// What the master does with it.
+    pub rule: ObjectRule,
+    /// The value in the drive's unit; that of the scenario when absent.
+    pub value: Option<i64>,
+    /// The least value that the drive takes.
+    pub lowest: Option<i64>,
+    /// The greatest value that the drive takes.
+    pub highest: Option<i64>,
+    /// Bytes of the value, 1 to 4; needed with `value` for objects that the rig does not know.
+    pub bytes: Option<u8>,
+}
+
+impl ObjectConfig {
+    /// Whether the drive takes that value.
+    pub fn takes(&self, value: i64) -> bool {
+        self.lowest.is_none_or(|lowest| value >= lowest)
+            && self.highest.is_none_or(|highest| value <= highest)
+    }
+
+    pub(super) fn validate(&self, key: ObjectKey) -> Result<(), ScenarioError> {
+        let is_ordered = self.lowest.zip(self.highest).is_none_or(|(lowest, highest)| lowest <= highest);
+        let need = match self {
+            _ if !is_ordered => "lowest must not be above highest",
+            _ if !self.value.is_none_or(|value| self.takes(value)) => {
+                "value must be within lowest and highest"
+            }
+            _ if !self.bytes.is_none_or(|bytes| matches!(bytes, 1 | 2 | 4)) => "bytes must be 1, 2 or 4",
+            _ => return Ok(()),
+        };
+        Err(ScenarioError::bad("drive_profile.objects", &key, need))
+    }
+}
+
+/// The address of an object in a profile: `6066h`, `60C2h:02`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct ObjectKey(pub ObjectAddress);
+
+/// A text that is no address of an object.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("'{0}' is no object; write four hexadecimal digits as in 6066h, or with a sub-index as in 60C2h:02")]
+pub struct ObjectKeyError(String);
+
+impl FromStr for ObjectKey {
+    type Err = ObjectKeyError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let (index, subindex) = text.split_once(':').unwrap_or((text, "0"));
+        let index = index.strip_suffix(['h', 'H']).unwrap_or(index);
+        let subindex = subindex.strip_suffix(['h', 'H']).unwrap_or(subindex);
+        let number = |digits: &str| u16::from_str_radix(digits, 16).ok().filter(|_| !digits.starts_with('+'));
+        let address = number(index).filter(|_| index.len() == 4).zip(number(subindex));
+        address
+            .and_then(|(index, subindex)| Some(Self(ObjectAddress::new(index, u8::try_from(subindex).ok()?))))
+            .ok_or_else(|| ObjectKeyError(text.to_owned()))
+    }
+}
+
+impl Display for ObjectKey {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let ObjectAddress { index, subindex } = self.0;
+        if subindex == 0 { write!(f, "{index:04X}h") } else { write!(f, "{index:04X}h:{subindex:02X}") }
+    }
+}
+
+impl TryFrom<String> for ObjectKey {
+    type Error = ObjectKeyError;
+
+    fn try_from(text: String) -> Result<Self, Self::Error> {
+        text.parse()
+    }
+}
+
+impl From<ObjectKey> for String {
+    fn from(key: ObjectKey) -> Self {
+        key.to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_address_reads_as_it_is_written() {
+        for (text, index, subindex) in
+            [("6066h", 0x6066, 0), ("60C2h:02", 0x60C2, 2), ("1018h:0A", 0x1018, 10)]
+        {
+            let key: ObjectKey = text.parse().unwrap();
+            assert_eq!(key, ObjectKey(ObjectAddress::new(index, subindex)));
+            assert_eq!(key.to_string(), text);
+        }
+        assert_eq!("60c2:2h".parse(), "60C2h:02".parse::<ObjectKey>());
+        for text in ["", "606h", "60666h", "6066h:100", "+066h", "6066h:", "x066h"] {
+            assert!(text.parse::<ObjectKey>().is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,277 @@
+//! Faults of every layer: `[[faults]]`. On real interfaces, faults of the bus act only on the master's port.
+
+mod kinds;
+
+use std::fmt::{self, Display, Formatter};
+use std::iter;
+
+use masseter_model::geometry::AXIS_NAMES;
+use serde::{Deserialize, Serialize};
+
+use super::can::{CanConfig, MASTER_NODE};
+use super::error::ScenarioError;
+use super::need::require_within;
+use super::quantity::Quantity;
+use super::when::{EntryNames, When, WhenKeys};
+
+pub use kinds::{FaultKindConfig, FaultLayer, FaultPlace, FaultSize};
+
+/// One fault.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FaultConfig {
+    /// The kind of the fault.
+    pub kind: FaultKindConfig,
+    /// Its name in requirements and in `after`; that of its kind when absent.
+    pub name: Option<String>,
+    /// From when on, s since the motion began, or since `after`.
+    pub at_s: Option<f64>,
+    /// What `at_s` counts from: `fault.NAME`, `stimulus.NAME` or `controller.STATE`.
+    pub after: Option<String>,
+    /// For how long, s; to the end when absent.
+    pub for_s: Option<f64>,
+    /// From when on, s since the rig was switched on: instead of `at_s`.
+    pub from_s: Option<f64>,
+    /// Until when, s since the rig was switched on: instead of `for_s`.
+    pub until_s: Option<f64>,
+    /// Bus, from 0.
+    pub bus: Option<usize>,
+    /// Node id concerned: the sender of a frame, the receiver that loses it, or the node itself. All when
+    /// absent; never absent where a node babbles, is cut off or goes off the bus.
+    pub node: Option<u8>,
+    /// COB-ID of the frames concerned, or of those that are babbled (11 bits); all when absent.
+    pub id: Option<u16>,
+    /// Bytes of the frames that are babbled, at most eight.
+    pub data: Option<Vec<u8>>,
+    /// Axis concerned: d1 to l3.
+    pub axis: Option<String>,
+    /// How much, with its unit; what that is depends on the kind.
+    pub size: Option<Quantity>,
+    /// Probability that the fault acts on a frame, above 0 to 1; only for kinds that act on single frames.
+    #[serde(default = "always")]
+    pub probability: f64,
+    /// Activations after which the fault ends; when absent one for bus-off, any number for the others. A disconnection ends by
+    /// its time alone.
+    pub count: Option<u64>,
+}
+
+const fn always() -> f64 {
+    1.0
+}
+
+/// Kind and place: `lose (bus 1, node 4, id 204h)`, `encoder_stuck (l2)`.
+impl Display for FaultConfig {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let parts = [
+            self.bus.map(|bus| format!("bus {bus}")),
+            self.node.map(|node| format!("node {node}")),
+            self.id.map(|id| format!("id {id:03X}h")),
+            self.axis.clone(),
+            self.size.map(|size| size.to_string()),
+        ];
+        let parts: Vec<_> = parts.into_iter().flatten().collect();
+        let place = if parts.is_empty() { String::new() } else { format!(" ({})", parts.join(", ")) };
+        write!(f, "{}{place}", self.kind)
+    }
+}
+
+impl FaultConfig {
+    /// A fault of that kind, with no time and no place yet.
+    pub const fn new(kind: FaultKindConfig) -> Self {
+        Self {
+            kind,
+            name: None,
+            at_s: None,
+            after: None,
+            for_s: None,
+            from_s: None,
+            until_s: None,
+            bus: None,
+            node: None,
+            id: None,
+            data: None,
+            axis: None,
+            size: None,
+            probability: 1.0,
+            count: None,
+        }
+    }
+
+    /// Its name in requirements.
+    pub fn name(&self) -> &str {
+        self.name.as_deref().unwrap_or(self.kind.name())
+    }
+
+    /// The place of its axis; none where it has none.
+    pub fn axis(&self) -> Option<usize> {
+        let name = self.axis.as_deref()?;
+        AXIS_NAMES.iter().position(|axis| *axis == name)
+    }
+
+    /// Its size in SI units; 0 where it has none.
+    pub fn size_si(&self) -> f64 {
+        self.size.map_or(0.0, |size| size.si())
+    }
+
+    /// When it acts.
+    ///
+    /// # Errors
+    /// Where that is missing, contradictory, or names nothing of the scenario.
+    pub fn when(&self, entries: &EntryNames<'_>) -> Result<When, ScenarioError> {
+        let names = ["faults.at_s", "faults.after", "faults.for_s", "faults.from_s", "faults.until_s"];
+        let Self { at_s, after, for_s, from_s, until_s, .. } = self;
+        let after = after.as_deref();
+        WhenKeys { names, at_s: *at_s, after, for_s: *for_s, from_s: *from_s, until_s: *until_s }
+            .resolve(entries)
+    }
+
+    /// Checks one fault of the list.
+    pub(super) fn validate(&self, can: &CanConfig, entries: &EntryNames<'_>) -> Result<(), ScenarioError> {
+        self.when(entries)?;
+        if let Some(name) = &self.name {
+            super::need::require_name("faults.name", name)?;
+        }
+        self.check_keys()?;
+        self.check_axis()?;
+        self.check_size()?;
+        self.check_ranges()?;
+        match self.kind.layer() {
+            FaultLayer::Bus => self.check_bus(can),
+            FaultLayer::Encoder | FaultLayer::Drive | FaultLayer::Mechanism if !can.is_virtual() => refuse(
+                "faults.kind",
+                &self.kind,
+                "leave it away with can.interfaces: real drives take no such fault",
+            ),
+            _ => Ok(()),
+        }
+    }
+
+    /// Refuses keys that have no effect on this kind, and requires those that it needs.
+    fn check_keys(&self) -> Result<(), ScenarioError> {
+        use FaultKindConfig::{Babble, BusOff, Disconnect};
+        use FaultPlace::{Axes, Axis, Frames, Node};
+        let (kind, place) = (self.kind, self.kind.place());
+        let is_of_bus = matches!(place, Frames | Node);
+        let given = [
+            ("faults.bus", self.bus.is_some(), is_of_bus, is_of_bus),
+            ("faults.node", self.node.is_some(), is_of_bus, place == Node),
+            ("faults.id", self.id.is_some(), is_of_bus && !matches!(kind, Disconnect | BusOff), false),
+            ("faults.data", self.data.is_some(), kind == Babble, false),
+            ("faults.axis", self.axis.is_some(), matches!(place, Axis | Axes), place == Axis),
+            ("faults.size", self.size.is_some(), kind.size().is_some(), kind.size().is_some()),
+            ("faults.probability", self.probability < 1.0, place == Frames, false),
+            ("faults.count", self.count.is_some(), matches!(kind, BusOff | Babble) || place == Frames, false),
+        ];
+        for (key, is_given, has_effect, is_needed) in given {
+            if is_given && !has_effect {
+                return refuse(key, &"given", format!("leave it away: it has no effect on {kind}"));
+            }
+            if is_needed && !is_given {
+                return refuse(key, &"none", self.need_of(key));
+            }
+        }
+        Ok(())
+    }
+
+    /// What a missing key must say.
+    fn need_of(&self, key: &str) -> String {
+        match key {
+            "faults.bus" => "name a bus of can.buses, from 0".to_owned(),
+            "faults.node" => "name the node that babbles, is cut off or goes off the bus".to_owned(),
+            "faults.axis" => format!("name an axis: {}", AXIS_NAMES.join(", ")),
+            _ => {
+                let size = self.kind.size().expect("only kinds with a size need one");
+                format!("give {}, such as \"{}\"", size.about, example(size))
+            }
+        }
+    }
+
+    fn check_axis(&self) -> Result<(), ScenarioError> {
+        match &self.axis {
+            Some(name) if self.axis().is_none() => {
+                refuse("faults.axis", name, format!("name an axis: {}", AXIS_NAMES.join(", ")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn check_size(&self) -> Result<(), ScenarioError> {
+        let Some((given, size)) = self.size.zip(self.kind.size()) else { return Ok(()) };
+        let si =
+            given.si_of(size.dimension).map_err(|need| ScenarioError::bad("faults.size", &given, need))?;
+        if (size.min..=size.max).contains(&si) {
+            return Ok(());
+        }
+        let unit = size.dimension.si_unit();
+        let need = format!("use {} to {}: {}", unit.text(size.min), unit.text(size.max), size.about);
+        refuse("faults.size", &given, need)
+    }
+
+    fn check_ranges(&self) -> Result<(), ScenarioError> {
+        require_within(&[("faults.probability", self.probability, 0.0, 1.0)])?;
+        let never_acts = "or leave the fault away: it would never act";
+        if self.probability == 0.0 {
+            return refuse("faults.probability", &0, format!("use more than 0, {never_acts}"));
+        }
+        if self.count == Some(0) {
+            return refuse("faults.count", &0, format!("use at least 1, {never_acts}"));
+        }
+        if let Some(data) = self.data.as_ref().filter(|data| data.len() > 8) {
+            return refuse("faults.data", &format!("{} bytes", data.len()), "a frame has at most 8 bytes");
+        }
+        match self.id {
+            Some(id) if id > 0x7FF => refuse("faults.id", &id, "use an 11-bit identifier, at most 0x7FF"),
+            _ => Ok(()),
+        }
+    }
+
+    fn check_bus(&self, can: &CanConfig) -> Result<(), ScenarioError> {
+        let bus = self.bus.unwrap_or_default();
+        let Some(axes) = can.buses.get(bus) else {
+            return refuse("faults.bus", &bus, "name a bus of can.buses, from 0");
+        };
+        if !can.is_virtual() {
+            self.check_port()?;
+        }
+        let drives = axes.iter().filter_map(|&axis| can.node_ids.get(axis).copied());
+        let nodes: Vec<u8> = iter::once(MASTER_NODE.get()).chain(drives).collect();
+        match self.node.filter(|node| !nodes.contains(node)) {
+            Some(node) => {
+                let nodes = nodes.iter().map(u8::to_string).collect::<Vec<_>>().join(", ");
+                refuse("faults.node", &node, format!("bus {bus} has the nodes {nodes}"))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Refuses faults that the port of a real interface cannot carry out.
+    fn check_port(&self) -> Result<(), ScenarioError> {
+        if self.kind == FaultKindConfig::Corrupt {
+            let need = "leave it away with can.interfaces: only on a simulated bus can frames be destroyed on the wire";
+            return refuse("faults.kind", &"corrupt", need);
+        }
+        if let Some(node) = self.node.filter(|&node| node != MASTER_NODE.get()) {
+            let need =
+                format!("on a real interface only the master (node {MASTER_NODE}) can be given faults");
+            return refuse("faults.node", &node, need);
+        }
+        Ok(())
+    }
+}
+
+/// A valid size in a unit that people use.
+fn example(size: FaultSize) -> &'static str {
+    use super::quantity::Dimension as D;
+    match size.dimension {
+        D::Length => "0.5 mm",
+        D::Velocity => "1 mm/s",
+        D::Mass => "0.2 kg",
+        D::Time => "1 ms",
+        D::Force => "10 N",
+        _ => "0.5",
+    }
+}
+
+fn refuse(key: &'static str, value: &dyn Display, need: impl Into<String>) -> Result<(), ScenarioError> {
+    Err(ScenarioError::bad(key, value, need))
+}

@@ -1,0 +1,160 @@
+//! Input files of limited size, and their text as messages quote it.
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, ErrorKind, Read};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::Path;
+
+use rustix::fs::OFlags;
+
+/// Size of the largest file that the rig reads back of those that it has written, bytes.
+pub const MOST_KEPT_BYTES: u64 = 64 << 20;
+/// Characters of a value that a message quotes.
+const QUOTED: usize = 80;
+/// Characters of a sentence of somebody else that a message quotes.
+const QUOTED_SENTENCE: usize = 200;
+
+/// A regular file, opened for reading. A device or a pipe is refused at once: neither has an end.
+///
+/// # Errors
+/// The system's, and when the file is no regular file.
+pub fn open_regular(path: &Path) -> io::Result<File> {
+    // A pipe would block the opening until somebody writes.
+    let file = OpenOptions::new().read(true).custom_flags(OFlags::NONBLOCK.bits() as i32).open(path)?;
+    if !file.metadata()?.is_file() {
+        return Err(io::Error::other("it is no regular file; copy its content into one"));
+    }
+    Ok(file)
+}
+
+/// The content of a regular file of at most `most_bytes`.
+///
+/// # Errors
+/// Those of [`open_regular`], and when the file is larger.
+pub fn read_bytes(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open_regular(path)?.take(most_bytes + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > most_bytes {
+        return Err(io::Error::other(format!("it is larger than {most_bytes} bytes")));
+    }
+    Ok(bytes)
+}
+
+/// The text of a regular file of at most `most_bytes`.
+///
+/// # Errors
+/// Those of [`read_bytes`], and when the file is not text in UTF-8.
+///
+/// # Examples
+/// ```
+/// use std::path::Path;
+///
+/// use masseter_scenario::input::read_text;
+///
+/// let error = read_text(Path::new("/dev/zero"), 1000).unwrap_err();
+/// assert!(error.to_string().contains("no regular file"));
+/// ```
+pub fn read_text(path: &Path, most_bytes: u64) -> io::Result<String> {
+    String::from_utf8(read_bytes(path, most_bytes)?).map_err(|error| {
+        let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = valid.split(|byte| *byte == b'\n').count();
+        io::Error::new(ErrorKind::InvalidData, format!("line {line} is no text in UTF-8"))
+    })
+}
+
+/// A value as messages quote it: at most 80 characters, without control characters.
+///
+/// # Examples
+/// ```
+/// use masseter_scenario::input::excerpt;
+///
+/// assert_eq!(excerpt("1,\u{1b}[2J"), "1,\\u{1b}[2J");
+/// assert_eq!(excerpt(&"x".repeat(100)).chars().count(), 81);
+/// ```
+pub fn excerpt(text: &str) -> String {
+    quoted(text, QUOTED)
+}
+
+/// A sentence of somebody else as messages quote it: at most 200 characters, without control characters.
+///
+/// # Examples
+/// ```
+/// use masseter_scenario::input::sentence;
+///
+/// assert_eq!(sentence("it's over\n"), "it's over\\n");
+/// assert_eq!(sentence(&"x".repeat(300)).chars().count(), 201);
+/// ```
+pub fn sentence(text: &str) -> String {
+    quoted(text, QUOTED_SENTENCE)
+}
+
+/// Whether a text is at most `most_bytes` long, and none of its characters commands a terminal, ends a line or turns the
+/// direction of reading.
+///
+/// # Examples
+/// ```
+/// use masseter_scenario::input::is_printable;
+///
+/// assert!(is_printable("µm/s²", 48));
+/// assert!(!is_printable("m\nfloat64 evil", 48));
+/// ```
+pub fn is_printable(text: &str, most_bytes: usize) -> bool {
+    let turns_or_ends =
+        |c| matches!(c, '\u{200e}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    text.len() <= most_bytes && !text.chars().any(|c| c.is_control() || turns_or_ends(c))
+}
+
+fn quoted(text: &str, most: usize) -> String {
+    let (mut quoted, mut length) = (String::new(), 0);
+    for character in text.chars() {
+        let plain = matches!(character, '"' | '\'' | '\\').then_some(character);
+        let shown = plain.map_or_else(|| character.escape_debug().to_string(), String::from);
+        length += shown.chars().count();
+        if length > most {
+            quoted.push('…');
+            break;
+        }
+        quoted.push_str(&shown);
+    }
+    quoted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quotation_is_short_and_commands_nothing() {
+        for hostile in ["\u{1b}[31m".repeat(1000), "\u{202e}\n\0".repeat(1000), "ä".repeat(100_000)] {
+            let quoted = sentence(&hostile);
+            assert!(quoted.chars().count() <= 201 && is_printable(&quoted, 1000), "{quoted}");
+        }
+    }
+
+    #[test]
+    fn a_file_beyond_its_limit_is_refused() {
+        let path = std::env::temp_dir().join(format!("masseter-input-{}", std::process::id()));
+        std::fs::write(&path, "12345").unwrap();
+        assert_eq!(read_text(&path, 5).unwrap(), "12345");
+        let error = read_text(&path, 4).unwrap_err().to_string();
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(error, "it is larger than 4 bytes");
+    }
+
+    #[test]
+    fn the_line_that_is_no_text_is_named() {
+        let path = std::env::temp_dir().join(format!("masseter-text-{}", std::process::id()));
+        std::fs::write(&path, b"1\n2\n\xff").unwrap();
+        let error = read_text(&path, 10).unwrap_err().to_string();
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(error, "line 3 is no text in UTF-8");
+    }
+
+    #[test]
+    fn what_is_no_regular_file_is_refused_at_once() {
+        for path in ["/dev/zero", "/dev", "/dev/null"] {
+            let error = read_text(Path::new(path), 10).unwrap_err().to_string();
+            assert!(error.contains("no regular file"), "{path}: {error}");
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! Rows of numbers, as people and their programs write CSV: read the same way wherever the rig takes any.
+//!
+//! A row is a line. Comments begin with `#`. Names and numbers may stand in quotes; neither holds a comma or the end of a
+//! line, so a quote without its other is a part of the field.
+
+use std::io::{self, BufRead, Read};
+
+use crate::input::excerpt;
+use crate::wording::counted;
+
+/// Bytes of the longest line that is read. Numbers of full precision make lines a tenth as long.
+const LONGEST_LINE: usize = 4096;
+const BYTE_ORDER_MARK: char = '\u{feff}';
+
+/// A line, or why it could not be read.
+#[derive(Debug)]
+pub struct Line {
+    /// From 1; comments count.
+    pub number: u64,
+    /// Without surrounding white space.
+    pub text: Result<String, String>,
+}
+
+/// The lines without comments. What is no text in UTF-8 becomes replacement characters. An error of the system is the
+/// last line.
+///
+/// ```
+/// use masseter_scenario::rows::{lines, numbers};
+///
+/// let row = lines(&b"# Time and place\n0.5, \"2\"\n"[..]).next().unwrap();
+/// assert_eq!(row.number, 2);
+/// assert_eq!(numbers(&row.text.unwrap(), &["t_s", "x_m"]), Ok(vec![0.5, 2.0]));
+/// ```
+pub fn lines(source: impl BufRead) -> impl Iterator<Item = Line> {
+    let numbered = (1..).zip(Bounded { source, rest: Rest::NextLine });
+    let lines = numbered.map(|(number, text)| Line { number, text });
+    lines.filter(|line| !line.text.as_ref().is_ok_and(|text| text.starts_with('#')))
+}
+
+/// The fields of a line.
+pub fn fields(line: &str) -> impl Iterator<Item = &str> {
+    line.split(',').map(|field| {
+        let field = field.trim();
+        field.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).unwrap_or(field)
+    })
+}
+
+/// A finite number for each of the columns. The error names what is wrong, with its remedy.
+pub fn numbers(line: &str, columns: &[&str]) -> Result<Vec<f64>, String> {
+    if line.is_empty() {
+        return Err("an empty line".to_owned());
+    }
+    let (found, expected) = (fields(line).count(), columns.len());
+    if found != expected {
+        return Err(format!(
+            "{}, expected {expected}; complete the line or delete it",
+            counted(found as u64, "field")
+        ));
+    }
+    fields(line).zip(columns).map(|(text, column)| number(text, column)).collect()
+}
+
+fn number(text: &str, column: &str) -> Result<f64, String> {
+    let finite = text.parse().ok().filter(|value: &f64| value.is_finite());
+    finite.ok_or_else(|| {
+        let text = excerpt(text);
+        format!(
+            "{column} is '{text}', not a finite number; write it with a decimal point, or delete the line"
+        )
+    })
+}
+
+/// Lines of at most [`LONGEST_LINE`] bytes. A longer one is an error, but for a comment, which is cut.
+struct Bounded<R> {
+    source: R,
+    rest: Rest,
+}
+
+/// What to read next.
+enum Rest {
+    NextLine,
+    /// The line just given goes on: the end is only looked for when the next line is asked for, since there may be none.
+    OfLongLine,
+    Nothing,
+}
+
+impl<R: BufRead> Bounded<R> {
+    fn read(&mut self) -> io::Result<Option<Result<String, String>>> {
+        if matches!(self.rest, Rest::OfLongLine) {
+            self.source.skip_until(b'\n')?;
+        }
+        let mut line = Vec::new();
+        (&mut self.source).take(LONGEST_LINE as u64).read_until(b'\n', &mut line)?;
+        let is_cut = line.len() == LONGEST_LINE && !line.ends_with(b"\n");
+        self.rest = match line.is_empty() {
+            true => Rest::Nothing,
+            false if is_cut => Rest::OfLongLine,
+            false => Rest::NextLine,
+        };
+        let text = String::from_utf8_lossy(&line).trim_start_matches(BYTE_ORDER_MARK).trim().to_owned();
+        let is_refused = is_cut && !text.starts_with('#');
+        let text = if is_refused { Err(format!("longer than {LONGEST_LINE} bytes")) } else { Ok(text) };
+        Ok((!line.is_empty()).then_some(text))
+    }
+}
+
+impl<R: BufRead> Iterator for Bounded<R> {
+    type Item = Result<String, String>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if matches!(self.rest, Rest::Nothing) {
+            return None;
+        }
+        self.read().unwrap_or_else(|error| {
+            self.rest = Rest::Nothing;
+            Some(Err(error.to_string()))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::BufReader;
+
+    use super::*;
+
+    fn read(text: &[u8]) -> Vec<(u64, Result<String, String>)> {
+        lines(text).map(|line| (line.number, line.text)).collect()
+    }
+
+    #[test]
+    fn every_line_but_comments_is_one_whatever_stands_in_it() {
+        let text = |text: &str| Ok(text.to_owned());
+        assert_eq!(
+            read(b"\xef\xbb\xbfa,b\r\n# b\n\n\"1,2\n 3,4 "),
+            [(1, text("a,b")), (3, text("")), (4, text("\"1,2")), (5, text("3,4"))]
+        );
+        assert_eq!(read(b""), []);
+        assert_eq!(read(b"\n"), [(1, text(""))]);
+        assert_eq!(read(b"\xff\n1\n"), [(1, text("\u{fffd}")), (2, text("1"))]);
+    }
+
+    #[test]
+    fn comments_are_passed_over_in_any_encoding_and_of_any_length() {
+        let latin_1 = b"# Gr\xf6\xdfe\n \t# \xff\n1\n";
+        assert_eq!(read(latin_1), [(3, Ok("1".to_owned()))]);
+        let long = [b"\xef\xbb\xbf#", &[b'x'; 10_000][..], b"\n2\n"].concat();
+        assert_eq!(read(&long), [(2, Ok("2".to_owned()))]);
+    }
+
+    #[test]
+    fn a_long_line_is_refused_without_being_read_to_its_end() {
+        let exactly = [&[b'1'; LONGEST_LINE - 1][..], b"\n2"].concat();
+        assert_eq!(read(&exactly).len(), 2);
+        assert!(read(&exactly).iter().all(|(_, text)| text.is_ok()));
+        let longer = [&[b'1'; 3 * LONGEST_LINE][..], b"\n2\n"].concat();
+        let refused = Err("longer than 4096 bytes".to_owned());
+        assert_eq!(read(&longer), [(1, refused.clone()), (2, Ok("2".to_owned()))]);
+        let mut endless = lines(BufReader::new(io::repeat(b'1')));
+        assert_eq!(endless.next().unwrap().text, refused);
+    }
+
+    #[test]
+    fn names_and_numbers_may_stand_in_quotes() {
+        assert_eq!(fields("\"a\" , b,\"c").collect::<Vec<_>>(), ["a", "b", "\"c"]);
+        assert_eq!(numbers("\"1\", \"2.5\"", &["a", "b"]), Ok(vec![1.0, 2.5]));
+    }
+
+    #[test]
+    fn what_is_no_row_of_the_columns_is_refused_with_the_reason() {
+        for (line, reason) in [
+            ("", "an empty line"),
+            ("1", "1 field, expected 2; complete the line or delete it"),
+            ("1,2,3", "3 fields, expected 2"),
+            ("1,zero", "b is 'zero', not a finite number; write it with a decimal point, or delete the line"),
+            ("NaN,1", "a is 'NaN', not a finite number"),
+            ("1,inf", "b is 'inf', not a finite number"),
+        ] {
+            assert!(numbers(line, &["a", "b"]).unwrap_err().starts_with(reason), "{line}");
+        }
+    }
+}

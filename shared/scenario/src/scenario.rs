@@ -1,0 +1,521 @@
+//! A scenario as a whole: read from TOML, checked, and written back as resolved.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use masseter_model::geometry::{AXES, AXIS_NAMES, MechanismConfig};
+use toml::Table;
+
+use super::circle::refuse_circles;
+use super::document::Document;
+use super::drive_profile::over_kinds;
+use super::error::ScenarioError;
+use super::food::over_food;
+use super::malformed::{UNKNOWN_KEY, in_words, malformed};
+use super::merge::merge;
+use super::need::{LONGEST_S, SHORTEST_MOTION_S, require_within};
+use super::when::EntryNames;
+use super::{
+    AxisScale, CanConfig, ChecksConfig, ControllerConfig, DriveProfile, DrivesConfig, DryConfig,
+    DynamicsConfig, ExpectConfig, FaultConfig, FoodConfig, ForceControlConfig, ForceEstimateConfig,
+    ForceSource, JawConfig, LoadCellConfig, MotionConfig, RealtimeConfig, RecordingConfig, RequirementConfig,
+    StimulusConfig, TeethConfig, ToothConfig, TrajectoryLimitsConfig,
+};
+use super::{dynamics, friction, robot_file};
+use crate::input::{excerpt, read_text};
+
+/// Size of the largest scenario file, bytes.
+const MOST_BYTES: u64 = 1 << 20;
+/// The lists whose entries have names.
+const LISTS: [&str; 3] = ["faults", "stimulus", "require"];
+/// Longest time after a safe stop, s.
+const LONGEST_OBSERVATION_S: f64 = 10.0;
+
+/// Nanoseconds in a second.
+const SECOND_NS: u64 = 1_000_000_000;
+
+/// Rates at which the rig can be asked to run, Hz.
+pub const RATES_HZ: std::ops::RangeInclusive<u32> = 10..=20_000;
+
+section! {
+    /// The whole configuration of a run.
+    pub struct Scenario {
+        /// Name of the run, with which the name of its folder ends.
+        pub name: String = "chewing".to_owned(),
+        /// The file of the robot, whose tables this scenario changes; the built-in defaults when absent.
+        #[serde(skip_serializing)]
+        pub robot: Option<PathBuf> = None,
+        /// Seed of every random number.
+        pub seed: u64 = 1,
+        /// Cycles per second, Hz.
+        pub rate_hz: u32 = 1000,
+        /// Duration of the motion, s; when absent a recording's own length, or ten seconds. A generated motion ends
+        /// closed if this holds a cycle and half a second, otherwise on its way.
+        pub duration_s: Option<f64> = None,
+        /// The motion of the jaw.
+        pub motion: MotionConfig = MotionConfig::default(),
+        /// The place of the jaw on the platform.
+        pub jaw: JawConfig = JawConfig::default(),
+        /// Limits of the motion.
+        pub limits: TrajectoryLimitsConfig = TrajectoryLimitsConfig::default(),
+        /// The mechanism's dimensions.
+        pub mechanism: MechanismConfig = MechanismConfig::default(),
+        /// The controller.
+        pub controller: ControllerConfig = ControllerConfig::default(),
+        /// Values of the controller's parameters at the start, by their names.
+        #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+        pub parameters: BTreeMap<String, f64> = BTreeMap::new(),
+        /// The CAN link.
+        pub can: CanConfig = CanConfig::default(),
+        /// The drives.
+        pub drives: DrivesConfig = DrivesConfig::default(),
+        /// What the master expects of each kind of drive; the emulated drives when absent.
+        #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "over_kinds")]
+        pub drive_profile: Vec<DriveProfile> = Vec::new(),
+        /// The dry run.
+        pub dry: DryConfig = DryConfig::default(),
+        /// The emulated mechanism.
+        pub dynamics: DynamicsConfig = DynamicsConfig::default(),
+        /// The teeth of the emulated jaw; when absent they never meet.
+        pub teeth: Option<TeethConfig> = None,
+        /// Food between the teeth of the emulated jaw; none when absent.
+        #[serde(deserialize_with = "over_food")]
+        pub food: Option<FoodConfig> = None,
+        /// The load cell of the emulated jaw; none when absent.
+        pub load_cell: Option<LoadCellConfig> = None,
+        /// Estimate of the bite force; none when absent, unless the bite force is controlled by it.
+        pub force_estimate: Option<ForceEstimateConfig> = None,
+        /// Control of the bite force; position control only when absent.
+        pub force_control: Option<ForceControlConfig> = None,
+        /// The scheduling of the real-time processes.
+        pub realtime: RealtimeConfig = RealtimeConfig::default(),
+        /// What is recorded.
+        pub recording: RecordingConfig = RecordingConfig::default(),
+        /// The limits beyond which the run fails.
+        pub checks: ChecksConfig = ChecksConfig::default(),
+        /// Faults of every layer.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub faults: Vec<FaultConfig> = Vec::new(),
+        /// What happens during the motion.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub stimulus: Vec<StimulusConfig> = Vec::new(),
+        /// What must hold.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub require: Vec<RequirementConfig> = Vec::new(),
+        /// The expected outcome; that every check passes when absent.
+        pub expect: Option<ExpectConfig> = None,
+    }
+}
+
+impl Scenario {
+    /// A refusal with its place in the file of the scenario, if the file alone leads to it: an argument may have
+    /// replaced the value.
+    #[must_use]
+    pub fn place_refusal(mut refusal: ScenarioError, path: &Path) -> ScenarioError {
+        let in_words = refusal.to_string();
+        if let ScenarioError::BadValue { place, entry, key, .. } = &mut refusal {
+            *place = place_of_refusal(path, &in_words, key, *entry);
+        }
+        refusal
+    }
+
+    /// The place in its file of the key with which a refusal of the whole scenario begins; none where the file does not
+    /// have this value: an argument may have replaced it.
+    pub fn place_of(&self, path: &Path, refusal: &str) -> Option<String> {
+        let is_of_key = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '.');
+        self.place_of_key(path, refusal.split(|c| !is_of_key(c)).next()?, None)
+    }
+
+    /// The place in its file of a key, or of the table that would have it; `entry` is the number of the table in a list of
+    /// tables, from 0. None where the file does not have the value of this scenario: an argument may have replaced it.
+    pub fn place_of_key(&self, path: &Path, key: &str, entry: Option<usize>) -> Option<String> {
+        let value_in = |scenario: &Self| {
+            let values = serde_json::to_value(scenario).ok()?;
+            let Some(number) = entry else { return values.pointer(&pointer([key])).cloned() };
+            let (list, key) = key.split_once('.').unwrap_or((key, ""));
+            let entry = values.pointer(&pointer([list, &number.to_string()]))?;
+            Some(entry.pointer(&pointer([key])).cloned().unwrap_or_default())
+        };
+        let text = read_text(path, MOST_BYTES).ok()?;
+        let given = Self::parse(path, &text).ok()?;
+        let is_given = value_in(&given)? == value_in(self)?;
+        is_given.then(|| Some(Document::parse(path, &text).ok()?.place_of(key, entry))).flatten()
+    }
+
+    /// Reads a scenario file. The paths of its files are relative to its folder. The values are not checked
+    /// yet: see [`Self::validate`].
+    ///
+    /// # Errors
+    /// [`ScenarioError`] for a file that cannot be read, is no regular file or is larger than 1 MiB, and those of
+    /// [`Self::parse`].
+    pub fn read(path: &Path) -> Result<Self, ScenarioError> {
+        let text = read_text(path, MOST_BYTES)
+            .map_err(|error| ScenarioError::Unreadable { path: path.to_owned(), error })?;
+        let mut scenario = Self::parse(path, &text)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        if let Some(robot) = &scenario.robot {
+            let mut whole = Self::read_robot(&folder.join(robot))?;
+            merge(&mut whole, table_of(&text)).map_err(|reason| Self::malformed_at(path, reason))?;
+            scenario = Self::parse(path, &whole.to_string())?;
+        }
+        if let Some(memory) = &mut scenario.drives.memory {
+            *memory = folder.join(&*memory);
+        }
+        scenario.files_mut().for_each(|(_, file)| *file = folder.join(&file));
+        scenario.drive_profile.iter_mut().try_for_each(|profile| profile.read_dcf(folder))?;
+        Ok(scenario)
+    }
+
+    /// The tables of a robot's file, each checked by itself.
+    fn read_robot(path: &Path) -> Result<Table, ScenarioError> {
+        let text = read_text(path, MOST_BYTES)
+            .map_err(|error| ScenarioError::Unreadable { path: path.to_owned(), error })?;
+        let alone = Self::parse(path, &text)?;
+        alone.validate().map_err(|refusal| Self::place_refusal(refusal, path))?;
+        robot_file::tables(path, table_of(&text))
+    }
+
+    /// The files that a run reads beside the scenario, each with the name of its copy in the run's folder.
+    pub fn files_mut(&mut self) -> impl Iterator<Item = (String, &mut PathBuf)> {
+        let motion = match &mut self.motion {
+            MotionConfig::File(file) => Some(("motion.csv".to_owned(), &mut file.path)),
+            _ => None,
+        };
+        let tables = self.stimulus.iter_mut().zip(1..).filter_map(|(stimulus, number)| {
+            Some((format!("stimulus_{number}.csv"), stimulus.push_table.as_mut()?))
+        });
+        motion.into_iter().chain(tables)
+    }
+
+    /// Parses the text of a scenario; `path` is for messages only.
+    ///
+    /// # Examples
+    /// ```
+    /// use std::path::Path;
+    ///
+    /// use masseter_scenario::Scenario;
+    ///
+    /// let path = Path::new("slow.toml");
+    /// let scenario = Scenario::parse(path, "rate_hz = 500")?;
+    /// scenario.validate()?;
+    /// assert_eq!(scenario.period_ns(), 2_000_000);
+    /// let error = Scenario::parse(path, "rate_hzz = 500").unwrap_err().to_string();
+    /// assert!(error.starts_with("slow.toml:1:1: unknown key") && error.ends_with("did you mean 'rate_hz'?"));
+    /// # Ok::<(), masseter_scenario::ScenarioError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`ScenarioError::Malformed`] with line, column and key, and with the most similar key for an unknown one. An
+    /// array in place of a table is refused.
+    pub fn parse(path: &Path, text: &str) -> Result<Self, ScenarioError> {
+        let refused = |error| malformed::<Self>(path, text, None, &error);
+        let document = Document::parse(path, text).map_err(refused)?;
+        let unnamed = |scenario: &Self| {
+            let resolved = serde_json::to_value(scenario).expect("every part of a scenario has a JSON form");
+            let (key, place) = document.unnamed_table(&resolved)?;
+            let reason = format!("{key} is an array; write a table, which names its values");
+            Some(ScenarioError::Malformed { place, reason })
+        };
+        let mut scenario: Self = toml::from_str(text).map_err(|error| {
+            let every_table = Self {
+                teeth: Some(TeethConfig::default()),
+                food: Some(FoodConfig::default()),
+                load_cell: Some(LoadCellConfig::default()),
+                force_estimate: Some(ForceEstimateConfig::default()),
+                force_control: Some(ForceControlConfig::default()),
+                expect: Some(ExpectConfig::default()),
+                ..Self::default()
+            };
+            unnamed(&every_table).unwrap_or_else(|| malformed::<Self>(path, text, Some(&document), &error))
+        })?;
+        if let Some(refused) = unnamed(&scenario) {
+            return Err(refused);
+        }
+        scenario.complete_model(text);
+        Ok(scenario)
+    }
+
+    /// A key that `[controller.model]` of the text leaves out gets the value that `[dynamics]` has.
+    fn complete_model(&mut self, text: &str) {
+        let Ok(given) = toml::from_str::<Table>(text) else { return };
+        let model = given.get("controller").and_then(|controller| controller.get("model")?.as_table());
+        let Some(model) = model else { return };
+        let mut whole = Table::try_from(self.dynamics).expect("[dynamics] has a TOML form");
+        merge(&mut whole, model.clone()).expect("[dynamics] has no lists");
+        self.controller.model =
+            Some(whole.try_into().expect("[dynamics] and [controller.model] have been read"));
+    }
+
+    /// The scenario with one value changed: `KEY=VALUE`, with the key and the value as in a file; see
+    /// [`Self::with_table`] for lists. A value that is no TOML is text. A name that is no key of a scenario is that of
+    /// a parameter of the controller. The value is not checked yet: see [`Self::validate`].
+    ///
+    /// ```
+    /// use masseter_scenario::Scenario;
+    ///
+    /// let scenario = Scenario::default().with("controller.integral_gain_per_s=50")?;
+    /// assert_eq!(scenario.controller.integral_gain_per_s, 50.0);
+    /// assert_eq!(scenario.with("stiffness=3")?.parameters["stiffness"], 3.0);
+    /// # Ok::<(), masseter_scenario::ScenarioError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`ScenarioError::Malformed`] for an unknown key or a value of another type.
+    pub fn with(&self, assignment: &str) -> Result<Self, ScenarioError> {
+        let refused = |reason| ScenarioError::Malformed { place: excerpt(assignment), reason };
+        let (key, value) = assignment.split_once('=').ok_or_else(|| refused("write KEY=VALUE".to_owned()))?;
+        if !key.contains('.') && refusal_of(key.trim()).is_some() {
+            return self.with(&format!("parameters.{assignment}"));
+        }
+        let as_toml = toml::from_str::<Table>(&format!("{key} = {value}"));
+        let as_text = || toml::from_str(&format!("{key} = {}", toml::Value::from(value)));
+        let given = as_toml.or_else(|_| as_text()).map_err(|error| refused(error.message().to_owned()))?;
+        self.with_table(given).map_err(|error| match error {
+            // The place is one in the resolved scenario, which the user does not see.
+            ScenarioError::Malformed { reason, .. } => refused(reason),
+            other => other,
+        })
+    }
+
+    /// The scenario with the values of a table in place of its own. A table of another `kind` replaces the one that is
+    /// there, and an entry of a list has the name that `after` and requirements use: `faults.NAME.at_s`.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Malformed`] for an unknown key, a value of another type, or an entry that is not there.
+    pub fn with_table(&self, given: Table) -> Result<Self, ScenarioError> {
+        let changed = Path::new("the changed scenario");
+        let mut whole: Table = toml::from_str(&self.to_toml()).expect("it was written from a scenario");
+        // Empty lists are not written.
+        for list in LISTS {
+            whole.entry(list).or_insert_with(|| toml::Value::Array(Vec::new()));
+        }
+        merge(&mut whole, given).map_err(|reason| Self::malformed_at(changed, reason))?;
+        Self::parse(changed, &whole.to_string())
+    }
+
+    fn malformed_at(path: &Path, reason: String) -> ScenarioError {
+        ScenarioError::Malformed { place: path.display().to_string(), reason }
+    }
+
+    /// The question whether a key of a scenario is meant, for a name that is none but like one.
+    ///
+    /// ```
+    /// use masseter_scenario::Scenario;
+    ///
+    /// assert_eq!(Scenario::question_for("rate_hzz").as_deref(), Some("did you mean 'rate_hz'?"));
+    /// assert_eq!(Scenario::question_for("rate_hz"), None);
+    /// ```
+    pub fn question_for(name: &str) -> Option<String> {
+        let refusal = refusal_of(name)?;
+        refusal.rsplit_once("; ").map(|(_, question)| question.to_owned())
+    }
+
+    /// The scenario with every default filled in, as TOML.
+    pub fn to_toml(&self) -> String {
+        toml::to_string_pretty(self).expect("every part of a scenario has a TOML form")
+    }
+
+    /// Checks every value, and those that need each other.
+    ///
+    /// # Errors
+    /// [`ScenarioError::BadValue`] with key, value and valid values.
+    pub fn validate(&self) -> Result<(), ScenarioError> {
+        self.validate_run()?;
+        self.realtime.validate()?;
+        self.can.validate()?;
+        self.drives.validate()?;
+        DriveProfile::validate_all(&self.drive_profile)?;
+        dynamics::validate(&self.dynamics)?;
+        self.teeth.as_ref().map_or(Ok(()), TeethConfig::validate)?;
+        self.validate_entries()?;
+        self.food.as_ref().map_or(Ok(()), |food| food.validate(&self.arch()))?;
+        self.limits.validate()?;
+        self.dry.validate()?;
+        self.controller.validate(self.rate_hz)?;
+        self.check_torque_offsets()?;
+        self.validate_forces()?;
+        self.checks.validate()
+    }
+
+    fn validate_run(&self) -> Result<(), ScenarioError> {
+        let named = self.name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_');
+        if !named || !(1..=64).contains(&self.name.len()) {
+            let need = "use 1 to 64 letters, digits, '-' or '_'";
+            return Err(ScenarioError::bad("name", &format!("'{}'", self.name), need));
+        }
+        if !RATES_HZ.contains(&self.rate_hz) {
+            let need = format!("use {} to {} Hz", RATES_HZ.start(), RATES_HZ.end());
+            return Err(ScenarioError::bad("rate_hz", &self.rate_hz, need));
+        }
+        let duration_s = self.duration_s.unwrap_or(LONGEST_S);
+        require_within(&[("duration_s", duration_s, SHORTEST_MOTION_S, LONGEST_S)])
+    }
+
+    /// Faults, stimuli and their order by `after`, then requirements and the expected outcome.
+    fn validate_entries(&self) -> Result<(), ScenarioError> {
+        let (arch, entries) = (self.arch(), self.entry_names());
+        for (number, fault) in self.faults.iter().enumerate() {
+            fault.validate(&self.can, &entries).map_err(|error| error.of_entry(number))?;
+        }
+        for (number, stimulus) in self.stimulus.iter().enumerate() {
+            stimulus.validate(&entries, &arch).map_err(|error| error.of_entry(number))?;
+        }
+        let faults = self.faults.iter().map(|fault| fault.when(&entries).map(|when| when.start));
+        let stimuli = self.stimulus.iter().map(|stimulus| stimulus.when(&entries).map(|when| when.start));
+        let [faults, stimuli] = [faults.collect::<Result<Vec<_>, _>>()?, stimuli.collect::<Result<_, _>>()?];
+        refuse_circles(&faults, &stimuli, &entries)?;
+        for (number, requirement) in self.require.iter().enumerate() {
+            requirement.validate().map_err(|error| error.of_entry(number))?;
+        }
+        self.expect.as_ref().map_or(Ok(()), ExpectConfig::validate)
+    }
+
+    /// Load cell, estimate and control of the bite force.
+    fn validate_forces(&self) -> Result<(), ScenarioError> {
+        let estimate = self.force_estimate.unwrap_or_default();
+        estimate.validate()?;
+        if let Some(cell) = &self.load_cell {
+            cell.validate()?;
+            if !self.can.is_virtual() {
+                let need = "leave the table away with can.interfaces: the rig reads no load cell there";
+                return Err(ScenarioError::bad("load_cell", &"given", need));
+            }
+        }
+        if let Some(control) = &self.force_control {
+            let cell = self.check_source(control)?;
+            let source_s = cell.map_or(estimate.observer_time_s, LoadCellConfig::time_s);
+            control.validate(self.controller.lead_cycles * self.period_s(), source_s)?;
+            cell.map_or(Ok(()), |cell| cell.require_for(control))?;
+        }
+        if self.is_force_estimated() {
+            friction::require_open_screws(&self.model().friction)?;
+        }
+        Ok(())
+    }
+
+    /// Control by a load cell needs one, and only the emulated jaw has one. Returns the cell; none for control by the
+    /// estimate.
+    fn check_source(&self, control: &ForceControlConfig) -> Result<Option<&LoadCellConfig>, ScenarioError> {
+        if control.source == ForceSource::Estimate {
+            return Ok(None);
+        }
+        let bad = |need| Err(ScenarioError::bad("force_control.source", &"\"load_cell\"", need));
+        match &self.load_cell {
+            None if self.can.is_virtual() => bad("add the table [load_cell], or use \"estimate\""),
+            None => bad("use \"estimate\": on real interfaces the rig reads no load cell"),
+            cell => Ok(cell.as_ref()),
+        }
+    }
+
+    /// Whether the bite force is estimated: because the scenario asks for the estimate, or controls the force by it.
+    pub fn is_force_estimated(&self) -> bool {
+        self.force_estimate.is_some()
+            || self.force_control.is_some_and(|control| control.source == ForceSource::Estimate)
+    }
+
+    /// Feed-forward needs an object of the process data that carries it.
+    fn check_torque_offsets(&self) -> Result<(), ScenarioError> {
+        let without = (0..AXES).find(|&axis| !self.profile(axis).pdos.rpdo1().has_torque_offset());
+        match without {
+            Some(axis) if self.controller.feed_forward_torque => {
+                let need = format!(
+                    "the drive of {} takes no torque offset; add \"60B2h\" to rpdo1 in [drive_profile.pdos], as far as the \
+                     drive can map the object",
+                    AXIS_NAMES[axis]
+                );
+                Err(ScenarioError::bad("controller.feed_forward_torque", &true, need))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Masses and friction that the controller believes in.
+    pub fn model(&self) -> DynamicsConfig {
+        self.controller.model.unwrap_or(self.dynamics)
+    }
+
+    /// How long a run goes on after a safe stop, so that requirements can see that the rig stays stopped: the longest
+    /// `stays_for`, at most ten seconds, s.
+    pub fn observation_s(&self) -> f64 {
+        let times = self.require.iter().filter_map(|requirement| requirement.stays_for);
+        times.map(|time| time.si()).fold(0.0, f64::max).min(LONGEST_OBSERVATION_S)
+    }
+
+    /// The lower teeth that the jaw has, by their numbers.
+    pub fn arch(&self) -> Vec<ToothConfig> {
+        self.teeth
+            .as_ref()
+            .map_or_else(|| TeethConfig::default().arch(&self.jaw), |teeth| teeth.arch(&self.jaw))
+    }
+
+    /// The foods of the whole run, those of the stimuli too.
+    pub fn foods(&self) -> impl Iterator<Item = &FoodConfig> {
+        self.food.iter().chain(self.stimulus.iter().filter_map(|stimulus| stimulus.food.as_ref()))
+    }
+
+    /// Whether the emulated jaws can touch: by their teeth, or by food.
+    pub fn has_contact(&self) -> bool {
+        self.can.is_virtual() && (self.teeth.is_some() || self.foods().next().is_some())
+    }
+
+    /// What the master expects of the drive of an axis.
+    pub fn profile(&self, axis: usize) -> &DriveProfile {
+        DriveProfile::of_axis(&self.drive_profile, axis)
+    }
+
+    /// From metres to the numbers of the drive of an axis.
+    pub fn scale(&self, axis: usize) -> AxisScale {
+        AxisScale::new(&self.drives.of_axis(axis), self.profile(axis), axis)
+    }
+
+    /// How far the jaw may be from the first pose of the motion at the start, m; none for any distance.
+    pub fn start_tolerance_m(&self) -> Option<f64> {
+        let on_robot_mm = (!self.can.is_virtual()).then_some(ControllerConfig::START_TOLERANCE_MM);
+        self.controller.start_tolerance_mm.or(on_robot_mm).map(|tolerance_mm| tolerance_mm * 1e-3)
+    }
+
+    /// The names of the faults and stimuli.
+    pub fn entry_names(&self) -> EntryNames<'_> {
+        EntryNames::new(
+            self.faults.iter().map(FaultConfig::name).collect(),
+            self.stimulus.iter().map(StimulusConfig::name).collect(),
+        )
+    }
+
+    /// Duration of a cycle, ns.
+    pub fn period_ns(&self) -> u64 {
+        SECOND_NS / u64::from(self.rate_hz)
+    }
+
+    /// Duration of a cycle, s.
+    pub fn period_s(&self) -> f64 {
+        self.period_ns() as f64 / SECOND_NS as f64
+    }
+}
+
+/// The JSON pointer to the value of keys within each other.
+fn pointer<const N: usize>(keys: [&str; N]) -> String {
+    let steps = keys.iter().filter(|key| !key.is_empty()).flat_map(|key| key.split('.'));
+    steps.flat_map(|step| ["/", step]).collect()
+}
+
+fn table_of(text: &str) -> Table {
+    toml::from_str(text).expect("the text is that of a scenario")
+}
+
+/// The message on a key that is none of a scenario.
+fn refusal_of(key: &str) -> Option<String> {
+    let refused = toml::from_str::<Scenario>(&format!("{key} = 0")).err()?;
+    let message = in_words(refused.message());
+    message.starts_with(UNKNOWN_KEY).then_some(message)
+}
+
+fn place_of_refusal(path: &Path, refusal: &str, key: &str, entry: Option<usize>) -> Option<String> {
+    let text = read_text(path, MOST_BYTES).ok()?;
+    let refused_alone = Scenario::parse(path, &text).ok()?.validate().err()?;
+    let document = Document::parse(path, &text).ok()?;
+    (refused_alone.to_string() == refusal).then(|| document.place_of(key, entry))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,220 @@
+//! Stimuli: what happens to the jaw, the food and the controller during the motion: `[[stimulus]]`.
+
+use std::fmt::{self, Display, Formatter};
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use super::error::ScenarioError;
+use super::food::{FoodConfig, over_food};
+use super::need::{require_name, require_within};
+use super::quantity::{Dimension, Quantity};
+use super::teeth::ToothConfig;
+use super::when::{EntryNames, When, WhenKeys};
+
+/// The course of a stimulus between its beginning and its end.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shape {
+    /// Its whole size at once.
+    #[default]
+    Step,
+    /// Growing evenly, up to its whole size at the end.
+    Ramp,
+    /// Half a period of a sine: grows and fades.
+    HalfSine,
+    /// A sine of `frequency_hz`.
+    Sine,
+}
+
+impl Shape {
+    /// The share of the whole size, −1 to 1, after `since_s` of `for_s`.
+    ///
+    /// ```
+    /// use masseter_scenario::Shape;
+    ///
+    /// assert_eq!(Shape::Ramp.at(0.05, 0.2, 0.0), 0.25);
+    /// assert_eq!(Shape::HalfSine.at(0.1, 0.2, 0.0), 1.0);
+    /// ```
+    #[inline]
+    pub fn at(self, since_s: f64, for_s: f64, frequency_hz: f64) -> f64 {
+        use std::f64::consts::PI;
+        match self {
+            Self::Step => 1.0,
+            Self::Ramp => (since_s / for_s).min(1.0),
+            Self::HalfSine => (PI * since_s / for_s).sin(),
+            Self::Sine => (2.0 * PI * frequency_hz * since_s).sin(),
+        }
+    }
+}
+
+/// One stimulus. Exactly one of a push, `food`, `payload`, `parameter` and `stop` says what happens. A push is `push_n`,
+/// `torque_n_m` or both; or `push_table`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StimulusConfig {
+    /// Its name in requirements and in `after`; that of what happens when absent.
+    pub name: Option<String>,
+    /// From when on, s since the motion began, or since `after`.
+    pub at_s: f64,
+    /// What `at_s` counts from: `fault.NAME`, `stimulus.NAME` or `controller.STATE`.
+    pub after: Option<String>,
+    /// For how long, s; to the end when absent.
+    pub for_s: Option<f64>,
+    /// The course in this time.
+    #[serde(default)]
+    pub shape: Shape,
+    /// Frequency of a sine, Hz.
+    pub frequency_hz: Option<f64>,
+    /// A force on the jaw, in base axes, N.
+    pub push_n: Option<[f64; 3]>,
+    /// A torque on the jaw, in base axes, N m.
+    pub torque_n_m: Option<[f64; 3]>,
+    /// A CSV file with the force and the torque over time.
+    pub push_table: Option<PathBuf>,
+    /// Where the force acts, in the platform frame, m; the incisal point when absent.
+    pub point_m: Option<[f64; 3]>,
+    /// Another food from then on.
+    #[serde(default, deserialize_with = "over_food")]
+    pub food: Option<FoodConfig>,
+    /// A mass that the platform carries at the incisal point.
+    pub payload: Option<Quantity>,
+    /// The name of a parameter of the controller, which gets `value`.
+    pub parameter: Option<String>,
+    /// The parameter's value.
+    pub value: Option<f64>,
+    /// The operator asks for an orderly stop, as by Ctrl-C.
+    #[serde(default)]
+    pub stop: bool,
+}
+
+/// What happens, as `push`.
+impl Display for StimulusConfig {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(self.what().unwrap_or("nothing"))
+    }
+}
+
+impl StimulusConfig {
+    /// Size of the largest table, bytes: more than an hour at 50 Hz.
+    pub const MOST_TABLE_BYTES: u64 = 16 << 20;
+
+    /// A stimulus at that time of the motion that does nothing yet.
+    pub const fn at(at_s: f64) -> Self {
+        Self {
+            name: None,
+            at_s,
+            after: None,
+            for_s: None,
+            shape: Shape::Step,
+            frequency_hz: None,
+            push_n: None,
+            torque_n_m: None,
+            push_table: None,
+            point_m: None,
+            food: None,
+            payload: None,
+            parameter: None,
+            value: None,
+            stop: false,
+        }
+    }
+
+    /// Its name in requirements.
+    pub fn name(&self) -> &str {
+        self.name.as_deref().or(self.what()).unwrap_or("nothing")
+    }
+
+    /// What happens; none unless it is exactly one thing.
+    fn what(&self) -> Option<&'static str> {
+        let given = [
+            (self.push_n.is_some() || self.torque_n_m.is_some(), "push"),
+            (self.push_table.is_some(), "push"),
+            (self.food.is_some(), "food"),
+            (self.payload.is_some(), "payload"),
+            (self.parameter.is_some(), "parameter"),
+            (self.stop, "stop"),
+        ];
+        let mut given = given.into_iter().filter(|(is_given, _)| *is_given);
+        given.next().map(|(_, what)| what).filter(|_| given.next().is_none())
+    }
+
+    /// Whether the controller carries it out; otherwise the plant.
+    pub fn is_of_controller(&self) -> bool {
+        self.stop || self.parameter.is_some()
+    }
+
+    /// When it acts.
+    ///
+    /// # Errors
+    /// Where that names nothing of the scenario.
+    pub fn when(&self, entries: &EntryNames<'_>) -> Result<When, ScenarioError> {
+        let names =
+            ["stimulus.at_s", "stimulus.after", "stimulus.for_s", "stimulus.from_s", "stimulus.until_s"];
+        let (at_s, after) = (Some(self.at_s), self.after.as_deref());
+        WhenKeys { names, at_s, after, for_s: self.for_s, from_s: None, until_s: None }.resolve(entries)
+    }
+
+    pub(super) fn validate(
+        &self,
+        entries: &EntryNames<'_>,
+        arch: &[ToothConfig],
+    ) -> Result<(), ScenarioError> {
+        let refuse = |key, value: &str, need: &str| Err(ScenarioError::bad(key, &value, need));
+        self.when(entries)?;
+        if let Some(name) = &self.name {
+            require_name("stimulus.name", name)?;
+        }
+        let Some(what) = self.what() else {
+            let need = "give exactly one of push_n and torque_n_m, push_table, food, payload, parameter, stop = true";
+            return refuse("stimulus.push_n", "none or several", need);
+        };
+        let (has_force, is_table) = (self.push_n.is_some(), self.push_table.is_some());
+        let keys = [
+            ("stimulus.point_m", self.point_m.is_some(), has_force || is_table),
+            ("stimulus.shape", self.shape != Shape::Step, what == "push" && !is_table),
+            ("stimulus.frequency_hz", self.frequency_hz.is_some(), self.shape == Shape::Sine),
+            ("stimulus.value", self.value.is_some(), what == "parameter"),
+            ("stimulus.for_s", self.for_s.is_some(), what != "stop" && what != "parameter"),
+        ];
+        if let Some((key, ..)) = keys.into_iter().find(|(_, is_given, has_effect)| *is_given && !has_effect) {
+            return refuse(key, "given", "leave it away: it has no effect here");
+        }
+        if matches!(self.shape, Shape::Ramp | Shape::HalfSine) && self.for_s.is_none() {
+            return refuse("stimulus.for_s", "none", "give the time in which the shape comes to its end");
+        }
+        if self.shape == Shape::Sine && self.frequency_hz.is_none() {
+            return refuse("stimulus.frequency_hz", "none", "give the frequency of the sine");
+        }
+        if what == "parameter" && self.value.is_none() {
+            return refuse("stimulus.value", "none", "give the value that the parameter gets");
+        }
+        self.check_ranges()?;
+        self.food.as_ref().map_or(Ok(()), |food| food.validate(arch))
+    }
+
+    fn check_ranges(&self) -> Result<(), ScenarioError> {
+        for push_n in self.push_n.into_iter().flatten() {
+            require_within(&[("stimulus.push_n", push_n, -2000.0, 2000.0)])?;
+        }
+        for torque_n_m in self.torque_n_m.into_iter().flatten() {
+            require_within(&[("stimulus.torque_n_m", torque_n_m, -200.0, 200.0)])?;
+        }
+        for point_m in self.point_m.into_iter().flatten() {
+            require_within(&[("stimulus.point_m", point_m, -0.5, 0.5)])?;
+        }
+        if let Some(frequency_hz) = self.frequency_hz {
+            require_within(&[("stimulus.frequency_hz", frequency_hz, 0.01, 1000.0)])?;
+        }
+        if let Some(payload) = self.payload {
+            let kg = payload
+                .si_of(Dimension::Mass)
+                .map_err(|need| ScenarioError::bad("stimulus.payload", &payload, need))?;
+            require_within(&[("stimulus.payload", kg, 0.0, 20.0)])?;
+        }
+        if self.value.is_some_and(|value| !value.is_finite()) {
+            return Err(ScenarioError::bad("stimulus.value", &"not finite", "use a finite number"));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,59 @@
+//! Parts of sentences that many messages share.
+
+/// Bytes of the longest name that may be meant as another.
+const LONGEST: usize = 200;
+/// Likeness from which a name may be meant.
+const LIKELY: f64 = 0.7;
+
+/// A number of things, with the noun in the number that fits.
+///
+/// # Examples
+/// ```
+/// use masseter_scenario::wording::counted;
+///
+/// assert_eq!(counted(1, "cycle"), "1 cycle");
+/// assert_eq!(counted(0, "box"), "0 boxes");
+/// ```
+pub fn counted(number: u64, noun: &str) -> String {
+    let ending = match number {
+        1 => "",
+        _ if noun.ends_with(['x', 'h']) => "es",
+        _ => "s",
+    };
+    format!("{number} {noun}{ending}")
+}
+
+/// The shortest text that is read as the same number. Numbers below 1e-5 and from 1e16 on have an exponent.
+///
+/// # Examples
+/// ```
+/// use masseter_scenario::wording::shortest;
+///
+/// assert_eq!(shortest(0.268), "0.268");
+/// assert_eq!(shortest(-5.23707e-18), "-5.23707e-18");
+/// assert_eq!(shortest(0.0), "0");
+/// ```
+pub fn shortest(number: f64) -> String {
+    let is_plain = number == 0.0 || !number.is_finite() || (1e-5..1e16).contains(&number.abs());
+    if is_plain { number.to_string() } else { format!("{number:e}") }
+}
+
+/// The most similar of the names to one that is none of them, whatever its case; none if all are unlike it.
+///
+/// # Examples
+/// ```
+/// use masseter_scenario::wording::nearest;
+///
+/// let topics = ["reading", "command", "state"];
+/// assert_eq!(nearest("States", topics), Some("state"));
+/// assert_eq!(nearest("jaw", topics), None);
+/// ```
+pub fn nearest<'a>(unknown: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    if unknown.len() > LONGEST {
+        return None;
+    }
+    let unknown = unknown.to_lowercase();
+    let rated = names.into_iter().map(|name| (strsim::jaro_winkler(&unknown, name), name));
+    let likely = rated.filter(|(likeness, _)| *likeness >= LIKELY);
+    likely.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name)
+}
