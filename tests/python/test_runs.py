@@ -154,9 +154,13 @@ def attached(name: str, rig: "subprocess.Popen[str]", own_motion: bool = False) 
             assert rig.poll() is None, rig.communicate()
 
 
+# Cycles in which all drives boot.
+PLAYED = 300
+
+
 def play(session: masseter.Session, misbehave: Callable[[int, Command], None]) -> None:
-    """Leaves the drives without voltage for 300 cycles; `misbehave` changes each command."""
-    for _ in range(300):
+    """Leaves the drives without voltage for some cycles; `misbehave` changes each command."""
+    for _ in range(PLAYED):
         cycle = session.wait()
         assert cycle is not None
         reading_cycle = cycle.reading.cycle if cycle.reading else 0
@@ -220,7 +224,7 @@ def test_a_controller_of_the_drives_is_recorded(masseter_command: str, tmp_path:
     run = masseter.load(tmp_path / "run")
     # The motion was never played, and the verdict says so.
     assert code == 1, said
-    assert list(run.command["cycle"]) == list(range(1, 301))
+    assert list(run.command["cycle"]) == list(range(1, PLAYED + 1))
     # The drives have booted, without voltage.
     assert np.all(run.reading["position_m"][-1, 3:] > 0.2)
 
@@ -439,7 +443,7 @@ def test_a_flood_of_events_costs_the_flooder_alone(masseter_command: str, tmp_pa
     lost = {topic["topic"]: topic["missing"] for topic in run.summary["figures"]["topics"]}
     # What the recorder could not take is counted.
     assert code == 6 and lost["event"] > 10_000 and lost["reading"] == lost["command"] == 0, (said, lost)
-    assert len(run.command) == 400
+    assert len(run.command) == 2 * PLAYED
 
 
 def test_a_controller_that_leaves_is_named(masseter_command: str, tmp_path: Path) -> None:
