@@ -1,7 +1,7 @@
 //! A scenario as a part of another document, for `#[serde(with = "masseter_scenario::embedded")]`.
 //!
-//! The code that reads and writes a scenario is compiled once, in this crate: the derived code is generic, and a third of the
-//! machine code of a crate that embeds a scenario would be the scenario's.
+//! The code that reads and writes a scenario is compiled once, in this crate. The derived code is generic: otherwise each crate
+//! that embeds a scenario compiles it again.
 
 use serde::de::Error;
 use serde::{Deserializer, Serializer};

@@ -112,8 +112,8 @@ impl Node {
     }
 }
 
-/// A message whose ports this crate compiles, once for all crates that use them: iceoryx2 is generic, and half of the machine
-/// code of a crate that makes ports would be iceoryx2.
+/// A message whose ports this crate compiles, once for all crates that use them. iceoryx2 is generic: otherwise each crate that
+/// makes ports compiles it again (docs/realtime-log.md#the-first-build).
 pub trait Topic: Message {
     /// As [`Node::publisher`].
     ///
