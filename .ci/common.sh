@@ -36,6 +36,21 @@ use_python() {
     "$python" -m pip install --quiet --disable-pip-version-check --requirement .ci/requirements.txt
 }
 
+# The README's test command, of all packages but the fuzz targets, which need a foreign library. The compiler is clippy, which
+# compiles as rustc does: its lints and the tests share one build.
+cargo_test() {
+    mkdir -p "$tools/documentation"
+    RUSTC_WORKSPACE_WRAPPER=clippy-driver CLIPPY_ARGS=-D__CLIPPY_HACKERY__warnings \
+        RUSTDOC=$PWD/.ci/rustdoc CI_DOCUMENTATION=$tools/documentation \
+        cargo test --locked --workspace "$@"
+}
+
+# Sets $browser to Chromium.
+install_browser() {
+    has_any chromium chromium-browser google-chrome || install_packages chromium
+    browser=$(command -v chromium || command -v chromium-browser || command -v google-chrome)
+}
+
 # Builds the release and sets $masseter to it.
 use_release() {
     cargo build --release --locked
@@ -44,3 +59,10 @@ use_release() {
 
 # Repeats a line at the end of .ci/run.
 note() { printf '%s\n' "$*" >>"${CI_NOTES:-/dev/null}"; }
+
+# Notes that a shard of scripts/nightly was only sampled, and how its last whole run ended.
+sampled() { # shards, as the beginning of their names; the sample
+    local runs
+    runs=$(sed -n "s/^| \`\($1[^ ]*\)\` | \([^|]*\) | \([^|]*\) | \(.*\) |/\1 of \2 at \3: \4/p" docs/nightly.md | paste -sd ';')
+    note "$1: sampled ($2); whole: ${runs:-never}"
+}
