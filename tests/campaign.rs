@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use crate::common::{MASSETER, json, stderr, stdout};
+use crate::common::{self, MASSETER, json, stderr, stdout};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -44,6 +44,7 @@ fn results(out: &Path) -> Vec<Value> {
 
 #[test]
 fn a_campaign_judges_every_case_and_records_the_worst() {
+    common::demand_parquet();
     let folder = folder(CAMPAIGN);
     let output = masseter(&folder, &["campaign", "friction.toml", "--out", "out", "--record", "2"]);
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
@@ -89,6 +90,27 @@ fn a_campaign_that_has_ended_runs_nothing_again_and_a_changed_one_is_refused() {
     let refused = run();
     assert_eq!(refused.status.code(), Some(2));
     assert!(stderr(&refused).contains("the file of the campaign has changed; choose another --out"));
+}
+
+#[test]
+fn without_the_program_that_writes_parquet_the_table_is_csv_and_one_line_says_why() {
+    let folder = folder(CAMPAIGN);
+    let lone = folder.path().join("masseter");
+    common::copy_program(&lone);
+    let mut command = Command::new(&lone);
+    command.current_dir(folder.path()).args(["campaign", "friction.toml", "--out", "out", "--record", "0"]);
+    let output = command.output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    assert!(stdout(&output).contains("table: out/cases.csv\n"), "{}", stdout(&output));
+    let said = stderr(&output);
+    let lines: Vec<_> = said.lines().filter(|line| line.contains("masseter-parquet")).collect();
+    assert!(
+        matches!(lines[..], [line] if line.contains("cargo build --release") && line.contains("--out out")),
+        "{said}"
+    );
+    let table = fs::read_to_string(folder.path().join("out/cases.csv")).unwrap();
+    assert!(table.starts_with("case,id,") && table.lines().count() == 7, "{table}");
+    assert!(!folder.path().join("out/cases.parquet").exists());
 }
 
 #[test]

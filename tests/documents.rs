@@ -10,6 +10,8 @@ use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 
+use crate::common::demand_parquet;
+
 fn project() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
@@ -93,6 +95,7 @@ fn run(document: &Path) -> usize {
 
 #[test]
 fn every_console_block_shows_what_a_user_sees() {
+    demand_parquet();
     let documents = documents().into_iter().filter(|document| !document.ends_with(OF_CONTROLLERS));
     let commands: usize = documents.map(|document| run(&document)).sum();
     assert!(commands >= 20, "only {commands} commands were found");

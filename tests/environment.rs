@@ -325,6 +325,7 @@ fn a_disk_that_stands_still_for_five_seconds_changes_no_byte_of_a_run_in_lockste
 /// A limit on the size of files stands for the full disk.
 #[test]
 fn a_full_disk_is_exit_6_of_every_verb_that_writes_files() {
+    common::demand_parquet();
     let workspace = Workspace::new("duration_s = 0.5");
     assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     let run = workspace.run_folder();

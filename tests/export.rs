@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
-use std::process::Output;
+use std::process::{Command, Output};
 
-use crate::common::{Workspace, masseter, stderr, stdout};
+use crate::common::{self, Workspace, masseter, stderr, stdout};
 use masseter_recording::{Reader, Recorded};
 
 fn virtual_run(scenario: &str) -> Workspace {
@@ -158,6 +158,7 @@ fn a_signal_of_the_controller_is_a_column_with_its_unit() {
 
 #[test]
 fn the_formats_hold_the_same_rows() {
+    common::demand_parquet();
     let workspace = virtual_run("duration_s = 0.5");
     let (csv, parquet) = (workspace.file("csv"), workspace.file("parquet"));
     assert_eq!(export(&workspace.run_folder(), &csv, &[]).status.code(), Some(0));
@@ -168,6 +169,28 @@ fn the_formats_hold_the_same_rows() {
     let expected = masseter(&["export", &run, "--format", "csv", "--out", &format!("{out}-csv")]);
     assert_eq!(rows(stdout(&output)), rows(stdout(&expected)).replace("csv-csv", "csv"));
     assert!(fs::read(parquet.join("cycles.parquet")).unwrap().starts_with(b"PAR1"));
+}
+
+#[test]
+fn without_the_program_that_writes_parquet_the_default_is_refused_before_any_work_and_csv_is_written() {
+    let workspace = virtual_run("duration_s = 0.5");
+    let (lone, out) = (workspace.file("masseter"), workspace.file("tables"));
+    common::copy_program(&lone);
+    let export = |more: &[&str]| {
+        let mut command = Command::new(&lone);
+        command.arg("export").arg(workspace.run_folder()).arg("--out").arg(&out).args(more).output().unwrap()
+    };
+    let refused = export(&[]);
+    assert_eq!(refused.status.code(), Some(2));
+    let said = stderr(&refused);
+    let program = workspace.file("masseter-parquet").display().to_string();
+    let names =
+        [program.as_str(), "`cargo build --release`", "`cargo install --path rig/parquet`", "--format csv"];
+    assert!(names.iter().all(|name| said.contains(name)) && said.lines().count() == 1, "{said}");
+    assert!(!out.exists());
+    let written = export(&["--format", "csv"]);
+    assert_eq!(written.status.code(), Some(0), "{}", stderr(&written));
+    assert!(out.join("cycles.csv").is_file());
 }
 
 #[test]

@@ -20,6 +20,7 @@ use clap::ValueEnum;
 use masseter_campaign::{Campaign, CampaignFile, CampaignFolder, CampaignLock, Report, digest_of_program};
 use masseter_plan::{Overrides, scenario_with_overrides};
 use masseter_runtime::clock;
+use masseter_table::{Format, ParquetProgram};
 use masseter_terminal::{Exit, Failure, OrFailure, result, status};
 
 use crate::arguments::{ControllerKind, name_of};
@@ -55,7 +56,7 @@ pub(crate) fn campaign(args: &CampaignArgs) -> Result<Exit, Failure> {
         );
         return Ok(Exit::Interrupted);
     }
-    let report = Report::new(&campaign, results);
+    let report = Report::new(&campaign, results, table_format(&out));
     // Whatever becomes of the recordings, the results are there.
     masseter_campaign::write(&report, &folder, &[]).incomplete()?;
     let worst = worst::keep(&report, &campaign, &folder, args.record.unwrap_or(RECORD), &player)?;
@@ -100,6 +101,20 @@ fn program() -> anyhow::Result<String> {
 /// The controller of a campaign that has begun.
 fn controller_of(campaign: &Campaign) -> anyhow::Result<ControllerKind> {
     ControllerKind::from_str(&campaign.controller, false).map_err(|error| anyhow!(error))
+}
+
+/// Parquet; CSV where the program that writes Parquet is missing, since no result may be lost for that.
+fn table_format(out: &Path) -> Format {
+    match ParquetProgram::beside_this_one() {
+        Ok(program) => Format::Parquet(program),
+        Err(missing) => {
+            let out = word(&out.display().to_string());
+            status!(
+                "the table is CSV: {missing}; then the same command with --out {out} writes Parquet, too"
+            );
+            Format::Csv
+        }
+    }
 }
 
 fn folder_by_time(file: &Path) -> PathBuf {

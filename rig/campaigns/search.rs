@@ -10,7 +10,7 @@ use masseter_terminal::{Exit, Failure, OrFailure, result, status};
 
 use super::args::{SearchArgs, SearchMethod};
 use super::player::Player;
-use super::{RECORD, begin, folder_by_time, listen, plan, worst};
+use super::{RECORD, begin, folder_by_time, listen, plan, table_format, worst};
 use crate::shell::word;
 
 /// The value of a case that did not pass although no margin shows it: below every one that does.
@@ -36,7 +36,7 @@ pub(crate) fn search(args: &SearchArgs) -> Result<Exit, Failure> {
         status!("interrupted; the same command with --out {} goes on", word(&out.display().to_string()));
         return Ok(Exit::Interrupted);
     }
-    let report = Report::new(&campaign, seeker.into_results());
+    let report = Report::new(&campaign, seeker.into_results(), table_format(&out));
     // Whatever becomes of the recordings, the results are there.
     masseter_campaign::write(&report, &folder, &[]).incomplete()?;
     let kept = worst::keep(&report, &campaign, &folder, args.record.unwrap_or(RECORD), &player)?;

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::workspace::{list, metadata, text, within};
 
 /// The crates of the workspace that each crate may use, all by their folders. The root package may use all.
-const MAY_USE: [(&str, &[&str]); 26] = [
+const MAY_USE: [(&str, &[&str]); 27] = [
     ("shared/can", &[]),
     ("shared/model", &[]),
     ("shared/scenario", &["shared/can", "shared/model"]),
@@ -20,6 +20,7 @@ const MAY_USE: [(&str, &[&str]); 26] = [
     ("rig/charts", &[]),
     ("rig/page", &[]),
     ("rig/table", &[]),
+    ("rig/parquet", &["rig/table", "rig/terminal"]),
     ("rig/round_trips", &["shared/scenario", "shared/runtime"]),
     ("rig/plan", &["shared/model", "shared/scenario", "shared/runtime", "controller", "plant"]),
     ("rig/recording", &["shared/model", "shared/scenario", "shared/runtime"]),

@@ -225,6 +225,13 @@ pub(crate) fn is_dead(pid: i32) -> bool {
     status.rsplit_once(") ").is_none_or(|(_, rest)| rest.starts_with(['Z', 'X']))
 }
 
+/// Demands the program that writes Parquet files. `cargo test` builds it with the tests of its own package; Cargo knows no way
+/// to demand a program of another package.
+pub(crate) fn demand_parquet() {
+    let program = Path::new(MASSETER).with_file_name("masseter-parquet");
+    assert!(program.is_file(), "{} is missing: cargo build -p masseter-parquet", program.display());
+}
+
 /// Copies the program by another process: a file that this one has open for writing cannot be executed, and a child
 /// that another test starts meanwhile would hold it open.
 pub(crate) fn copy_program(to: &Path) {

@@ -4,14 +4,13 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use masseter_scenario::wording::counted;
+use masseter_table::Format;
 
 use crate::campaign::Campaign;
 use crate::folder::CampaignFolder;
 use crate::result::CaseResult;
 use crate::statistics::SuccessRate;
 
-/// File of the results, a row a case.
-pub(crate) const TABLE: &str = "cases.parquet";
 /// The page.
 pub(crate) const PAGE: &str = "campaign.html";
 
@@ -32,13 +31,15 @@ pub struct Report<'a> {
     pub(crate) campaign: &'a Campaign,
     /// In the order of their numbers.
     pub(crate) results: Vec<CaseResult>,
+    /// Of the table.
+    pub(crate) format: Format,
 }
 
 impl<'a> Report<'a> {
-    /// The report on these results.
-    pub fn new(campaign: &'a Campaign, mut results: Vec<CaseResult>) -> Self {
+    /// The report on these results, with a table in this format.
+    pub fn new(campaign: &'a Campaign, mut results: Vec<CaseResult>, format: Format) -> Self {
         results.sort_by_key(|result| result.number);
-        Self { campaign, results }
+        Self { campaign, results, format }
     }
 
     /// The number of results.
@@ -122,7 +123,12 @@ impl<'a> Report<'a> {
 
     /// Where page and table are, in lines for a terminal.
     pub fn files(&self, folder: &CampaignFolder) -> String {
-        format!("page: {}\ntable: {}\n", folder.file(PAGE).display(), folder.file(TABLE).display())
+        format!("page: {}\ntable: {}\n", folder.file(PAGE).display(), self.table(folder).display())
+    }
+
+    /// File of the results, a row a case.
+    pub(crate) fn table(&self, folder: &CampaignFolder) -> PathBuf {
+        folder.file(&format!("cases.{}", self.format.extension()))
     }
 
     fn rate_in_words(&self) -> String {
@@ -196,7 +202,7 @@ mod tests {
     #[test]
     fn the_worst_cases_are_those_that_failed_then_the_smallest_margins() {
         let campaign = campaign(FOUR);
-        let report = Report::new(&campaign, results(&campaign));
+        let report = Report::new(&campaign, results(&campaign), Format::Csv);
         let worst: Vec<_> = report.worst(3).iter().map(|result| result.number).collect();
         assert_eq!(worst, [1, 2, 0]);
     }
@@ -204,7 +210,7 @@ mod tests {
     #[test]
     fn only_judged_cases_count_towards_the_rate() {
         let campaign = campaign(FOUR);
-        let rate = Report::new(&campaign, results(&campaign)).rate();
+        let rate = Report::new(&campaign, results(&campaign), Format::Csv).rate();
         assert_eq!((rate.passed, rate.judged), (2, 3));
     }
 
@@ -212,7 +218,7 @@ mod tests {
     fn a_campaign_passes_if_all_cases_do_or_the_share_that_it_demands() {
         let passes = |text: &str, results: fn(&Campaign) -> Vec<CaseResult>| {
             let campaign = campaign(&format!("{text}\n{FOUR}"));
-            Report::new(&campaign, results(&campaign)).is_success()
+            Report::new(&campaign, results(&campaign), Format::Csv).is_success()
         };
         assert!(!passes("", results));
         assert!(passes("least_success = 0.6", results));

@@ -3,11 +3,11 @@
 use std::fs::{self, File};
 
 use anyhow::Context;
-use masseter_table::{Format, write_table};
+use masseter_table::write_table;
 
 use crate::folder::CampaignFolder;
 use crate::page;
-use crate::report::{PAGE, Report, TABLE, WorstCase};
+use crate::report::{PAGE, Report, WorstCase};
 use crate::results_table::results_table;
 
 /// Writes table and page into the folder of the campaign.
@@ -15,11 +15,11 @@ use crate::results_table::results_table;
 /// # Errors
 /// When a file cannot be written.
 pub fn write(report: &Report<'_>, folder: &CampaignFolder, worst: &[WorstCase]) -> anyhow::Result<()> {
-    let path = folder.file(TABLE);
+    let path = report.table(folder);
     let unfinished = path.with_extension("part");
     let unwritten = || format!("cannot write {}", path.display());
     let file = File::create(&unfinished).with_context(unwritten)?;
-    write_table(Format::Parquet, file, &results_table(report.campaign, &report.results))?;
+    write_table(&report.format, file, &results_table(report.campaign, &report.results))?;
     fs::rename(&unfinished, &path).with_context(unwritten)?;
     let html = page::html(report, worst).context("cannot make the page")?;
     let path = folder.file(PAGE);

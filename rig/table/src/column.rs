@@ -1,15 +1,11 @@
 //! Columns of a table and their cells.
 
-use std::sync::Arc;
+use std::io::{self, Read, Write};
 
-use parquet::basic::{LogicalType, Repetition, Type as Physical};
-use parquet::column::writer::ColumnWriter;
-use parquet::data_type::ByteArray;
-use parquet::errors::ParquetError;
-use parquet::schema::types::{Type, TypePtr};
+use serde::{Deserialize, Serialize};
 
 /// The values of a column; none where a row has none.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Values {
     /// Real numbers.
     Numbers(Vec<Option<f64>>),
@@ -73,6 +69,37 @@ impl Values {
         }
     }
 
+    /// Writes the values so that [`Self::receive`] reads them bit by bit: a byte that says whether there is a value, then the
+    /// value, little-endian; a text after its length.
+    pub(crate) fn send(&self, to: &mut impl Write) -> io::Result<()> {
+        match self {
+            Self::Numbers(values) => send(values, to, |value, to| to.write_all(&value.to_le_bytes())),
+            Self::Whole(values) => send(values, to, |value, to| to.write_all(&value.to_le_bytes())),
+            Self::Words(values) => send(values, to, |value, to| {
+                to.write_all(&(value.len() as u64).to_le_bytes())?;
+                to.write_all(value.as_bytes())
+            }),
+            Self::Truths(values) => send(values, to, |value, to| to.write_all(&[u8::from(*value)])),
+        }
+    }
+
+    /// Adds so many values of what [`Self::send`] wrote.
+    pub(crate) fn receive(&mut self, count: u64, from: &mut impl Read) -> io::Result<()> {
+        match self {
+            Self::Numbers(values) => {
+                receive(values, count, from, |from| Ok(f64::from_le_bytes(bytes(from)?)))
+            }
+            Self::Whole(values) => receive(values, count, from, |from| Ok(i64::from_le_bytes(bytes(from)?))),
+            Self::Words(values) => receive(values, count, from, |from| {
+                let length = u64::from_le_bytes(bytes(from)?);
+                let mut text = String::new();
+                from.take(length).read_to_string(&mut text)?;
+                Ok(text)
+            }),
+            Self::Truths(values) => receive(values, count, from, |from| Ok(bytes(from)? == [1])),
+        }
+    }
+
     /// The kind of values in words.
     pub(crate) fn kind(&self) -> &'static str {
         match self {
@@ -85,7 +112,7 @@ impl Values {
 }
 
 /// A column.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Column {
     pub(crate) name: String,
     pub(crate) unit: String,
@@ -107,47 +134,55 @@ impl Column {
         self.values.clear();
     }
 
-    pub(crate) fn schema(&self) -> Result<TypePtr, ParquetError> {
-        let (physical, logical) = match self.values {
-            Values::Numbers(_) => (Physical::DOUBLE, None),
-            Values::Whole(_) => (Physical::INT64, None),
-            Values::Words(_) => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
-            Values::Truths(_) => (Physical::BOOLEAN, None),
-        };
-        let column = Type::primitive_type_builder(&self.name, physical)
-            .with_repetition(Repetition::OPTIONAL)
-            .with_logical_type(logical)
-            .build()?;
-        Ok(Arc::new(column))
+    /// Its name.
+    pub fn name(&self) -> &str {
+        &self.name
     }
 
-    pub(crate) fn write(&self, writer: &mut ColumnWriter<'_>) -> Result<(), ParquetError> {
-        let written = match (&self.values, writer) {
-            (Values::Numbers(values), ColumnWriter::DoubleColumnWriter(writer)) => {
-                writer.write_batch(&there(values), Some(&levels(values)), None)
-            }
-            (Values::Whole(values), ColumnWriter::Int64ColumnWriter(writer)) => {
-                writer.write_batch(&there(values), Some(&levels(values)), None)
-            }
-            (Values::Truths(values), ColumnWriter::BoolColumnWriter(writer)) => {
-                writer.write_batch(&there(values), Some(&levels(values)), None)
-            }
-            (Values::Words(values), ColumnWriter::ByteArrayColumnWriter(writer)) => {
-                let words: Vec<_> =
-                    values.iter().flatten().map(|word| ByteArray::from(word.as_str())).collect();
-                writer.write_batch(&words, Some(&levels(values)), None)
-            }
-            _ => Err(ParquetError::General(format!("column {} has another type than its schema", self.name))),
-        };
-        written.map(drop)
+    /// The unit of its values; empty where they have none.
+    pub fn unit(&self) -> &str {
+        &self.unit
+    }
+
+    /// What its values are.
+    pub fn about(&self) -> &str {
+        &self.about
+    }
+
+    /// Its values.
+    pub fn values(&self) -> &Values {
+        &self.values
     }
 }
 
-fn there<T: Clone>(values: &[Option<T>]) -> Vec<T> {
-    values.iter().flatten().cloned().collect()
+fn send<T, W: Write>(
+    values: &[Option<T>],
+    to: &mut W,
+    write: impl Fn(&T, &mut W) -> io::Result<()>,
+) -> io::Result<()> {
+    for value in values {
+        to.write_all(&[u8::from(value.is_some())])?;
+        value.as_ref().map_or(Ok(()), |value| write(value, to))?;
+    }
+    Ok(())
 }
 
-/// 1 where there is a value.
-fn levels<T>(values: &[Option<T>]) -> Vec<i16> {
-    values.iter().map(|value| i16::from(value.is_some())).collect()
+fn receive<T, R: Read>(
+    values: &mut Vec<Option<T>>,
+    count: u64,
+    from: &mut R,
+    read: impl Fn(&mut R) -> io::Result<T>,
+) -> io::Result<()> {
+    for _ in 0..count {
+        let is_there = bytes(from)? == [1];
+        values.push(is_there.then(|| read(from)).transpose()?);
+    }
+    Ok(())
+}
+
+/// The next bytes, as many as the type has.
+pub(crate) fn bytes<const COUNT: usize>(from: &mut impl Read) -> io::Result<[u8; COUNT]> {
+    let mut bytes = [0; COUNT];
+    from.read_exact(&mut bytes)?;
+    Ok(bytes)
 }

@@ -1,5 +1,5 @@
 //! Tables of columns, each with its unit and meaning, written as Parquet or CSV, and their codebook. This crate holds no
-//! figures of its own.
+//! figures of its own. Another program writes Parquet (`rig/parquet`).
 //!
 //! The metadata `units` and `columns` of a Parquet file are JSON objects: from the name of a column to its unit, and to its
 //! meaning. A CSV file has no room for them; the codebook has.
@@ -8,15 +8,17 @@
 //! use masseter_table::{Column, Format, Table, Values, write_table};
 //!
 //! let force_n = Values::Numbers(vec![Some(12.5), None]);
-//! let mut file = Vec::new();
 //! let table = Table::new(vec![Column::new("force_n", "N", "bite force", force_n)]);
-//! write_table(Format::Parquet, &mut file, &table)?;
-//! assert!(file.starts_with(b"PAR1"));
+//! let file = tempfile::NamedTempFile::new()?;
+//! write_table(&Format::Csv, file.reopen()?, &table)?;
+//! assert_eq!(std::fs::read_to_string(file)?, "force_n\n12.5\n\"\"\n");
 //! # Ok::<(), masseter_table::TableError>(())
 //! ```
 
 mod column;
 mod error;
+mod parquet_program;
+mod rows;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -24,5 +26,7 @@ mod writer;
 
 pub use column::{Cell, Column, Values};
 pub use error::TableError;
+pub use parquet_program::ParquetProgram;
+pub use rows::Rows;
 pub use table::Table;
 pub use writer::{Format, TableWriter, write_table};

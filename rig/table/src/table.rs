@@ -1,11 +1,13 @@
 //! Columns of one length.
 
+use std::io::{self, Read};
+
 use crate::column::{Cell, Column, Values};
 
 /// Columns of one length: a table, or the next rows of a long one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    pub(crate) columns: Vec<Column>,
+    columns: Vec<Column>,
 }
 
 impl Table {
@@ -28,6 +30,11 @@ impl Table {
         Self { columns: named }
     }
 
+    /// The columns.
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
     /// The number of rows.
     pub fn rows(&self) -> usize {
         self.columns.first().map_or(0, |column| column.values.len())
@@ -48,6 +55,12 @@ impl Table {
     /// Removes all rows.
     pub fn clear(&mut self) {
         self.columns.iter_mut().for_each(Column::clear);
+    }
+
+    /// Takes the values of so many rows in place of its own.
+    pub(crate) fn receive(&mut self, count: u64, from: &mut impl Read) -> io::Result<()> {
+        self.clear();
+        self.columns.iter_mut().try_for_each(|column| column.values.receive(count, from))
     }
 
     /// The codebook of tables: a row for each of their columns, with its unit, its type and its meaning.

@@ -1,8 +1,9 @@
 //! Tables are read back as they were written.
 
-use parquet::file::reader::{FileReader, SerializedFileReader};
-use parquet::record::RowAccessor;
+use std::fs;
+use std::io::ErrorKind;
 
+use super::rows::{send_columns, send_end, send_part};
 use super::*;
 
 fn table() -> Table {
@@ -14,57 +15,83 @@ fn table() -> Table {
     ])
 }
 
-#[test]
-fn a_table_is_read_back_with_its_gaps_and_units() {
-    let mut file = tempfile::tempfile().unwrap();
-    write_table(Format::Parquet, &mut file, &table()).unwrap();
-    let reader = SerializedFileReader::new(file).unwrap();
-    let metadata = reader.metadata().file_metadata().key_value_metadata().unwrap();
-    let units: serde_json::Value = serde_json::from_str(metadata[0].value.as_ref().unwrap()).unwrap();
-    assert_eq!((metadata[0].key.as_str(), units["margin"].as_str()), ("units", Some("mm")));
-    let rows: Vec<_> = reader.get_row_iter(None).unwrap().map(Result::unwrap).collect();
-    assert_eq!((rows[1].get_long(0).unwrap(), rows[1].get_double(1).unwrap()), (1, 0.5));
-    assert!(rows[0].get_double(1).is_err() && rows[0].get_bool(3).unwrap());
-    assert_eq!(rows[0].get_string(2).unwrap(), "PASS, or not");
-}
-
-#[test]
-fn a_long_table_is_written_in_parts() {
-    let empty = Table::new(vec![
-        Column::new("cycle", "", "number", Values::Whole(Vec::new())),
-        Column::new("force_n", "N", "force", Values::Numbers(Vec::new())),
-    ]);
-    let mut file = tempfile::tempfile().unwrap();
-    let mut writer = TableWriter::new(Format::Parquet, &mut file, &empty).unwrap();
-    let mut part = empty.clone();
-    for cycles in [0..3, 3..5] {
-        part.clear();
-        cycles.for_each(|cycle| part.push([Cell::Whole(Some(cycle)), Cell::Number(Some(cycle as f64))]));
-        writer.write(&part).unwrap();
-    }
-    writer.finish().unwrap();
-    let reader = SerializedFileReader::new(file).unwrap();
-    assert_eq!(reader.num_row_groups(), 2);
-    let cycles = reader.get_row_iter(None).unwrap().map(|row| row.unwrap().get_long(0).unwrap());
-    assert!(cycles.eq(0..5));
+fn as_csv(table: &Table) -> String {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    write_table(&Format::Csv, file.reopen().unwrap(), table).unwrap();
+    fs::read_to_string(file).unwrap()
 }
 
 #[test]
 fn values_as_text_keep_their_digits_and_missing_ones_are_empty() {
-    let mut file = Vec::new();
-    write_table(Format::Csv, &mut file, &table()).unwrap();
-    let text = String::from_utf8(file).unwrap();
-    assert_eq!(text, "case,margin,verdict,passed\n0,,\"PASS, or not\",true\n1,0.5,,false\n");
+    assert_eq!(as_csv(&table()), "case,margin,verdict,passed\n0,,\"PASS, or not\",true\n1,0.5,,false\n");
 }
 
 #[test]
 fn the_codebook_describes_every_column() {
     let table = table();
-    let mut file = Vec::new();
     let codebook = Table::codebook([("cases", &table)]);
-    write_table(Format::Csv, &mut file, &codebook).unwrap();
-    let text = String::from_utf8(file).unwrap();
+    let text = as_csv(&codebook);
     assert!(text.starts_with("table,column,unit,type,meaning\ncases,case,,whole number,number\n"), "{text}");
     assert!(text.contains("\ncases,margin,mm,number,distance from the limit\n"), "{text}");
     assert_eq!(codebook.rows(), 4);
+}
+
+#[test]
+fn rows_arrive_bit_by_bit_with_their_columns() {
+    let numbers = [f64::NAN, -f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -0.0, 5e-324, 0.1 + 0.2];
+    let texts = ["", "two\nlines", "µ\u{0}\"", "1", "2", "3", "4"];
+    let table = Table::new(vec![
+        Column::new("number", "", "", Values::Numbers(numbers.map(Some).to_vec())),
+        Column::new(
+            "text",
+            "",
+            "a \"name\"\nof two lines",
+            Values::Words(texts.map(|text| Some(text.to_owned())).to_vec()),
+        ),
+        Column::new("whole", "", "", Values::Whole([i64::MIN, i64::MAX, 0, -1, 1, 2, 3].map(Some).to_vec())),
+        Column::new("none", "N", "", Values::Words(vec![None; 7])),
+    ]);
+    let mut sent = Vec::new();
+    send_columns(&table, &mut sent).unwrap();
+    send_part(&table, &mut sent).unwrap();
+    send_part(&table, &mut sent).unwrap();
+    send_end(&mut sent).unwrap();
+    let mut rows = Rows::new(sent.as_slice()).unwrap();
+    assert_eq!(
+        rows.columns().iter().map(Column::name).collect::<Vec<_>>(),
+        ["number", "text", "whole", "none"]
+    );
+    for _ in 0..2 {
+        let part = rows.next_part().unwrap().unwrap();
+        let Values::Numbers(received) = part.columns()[0].values() else { panic!("{part:?}") };
+        assert!(received.iter().map(|number| number.unwrap().to_bits()).eq(numbers.map(f64::to_bits)));
+        assert_eq!(part.columns()[1..], table.columns()[1..]);
+    }
+    assert!(rows.next_part().unwrap().is_none());
+}
+
+#[test]
+fn rows_without_their_end_are_an_error() {
+    let mut sent = Vec::new();
+    send_columns(&table(), &mut sent).unwrap();
+    let columns = sent.len();
+    send_part(&table(), &mut sent).unwrap();
+    for length in columns..=sent.len() {
+        let mut rows = Rows::new(&sent[..length]).unwrap();
+        let end = if length < sent.len() {
+            rows.next_part()
+        } else {
+            rows.next_part().unwrap();
+            rows.next_part()
+        };
+        assert_eq!(end.unwrap_err().kind(), ErrorKind::UnexpectedEof, "{length}");
+    }
+    assert_eq!(Rows::new(&b"case,margin,verdict,passed\n0,"[..]).unwrap_err().kind(), ErrorKind::InvalidData);
+}
+
+#[test]
+fn a_missing_program_is_named_with_what_builds_it() {
+    let missing = ParquetProgram::beside_this_one().unwrap_err().to_string();
+    assert!(missing.contains("masseter-parquet, which does not exist"), "{missing}");
+    assert!(missing.contains("`cargo build --release`"), "{missing}");
 }

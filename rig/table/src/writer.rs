@@ -1,59 +1,51 @@
 //! Writes a table part by part, so that its length does not matter for the memory.
 
-use std::io::Write;
-use std::sync::Arc;
+use std::fs::File;
 
-use parquet::basic::{Compression, ZstdLevel};
-use parquet::errors::ParquetError;
-use parquet::file::metadata::KeyValue;
-use parquet::file::properties::WriterProperties;
-use parquet::file::writer::SerializedFileWriter;
-use parquet::schema::types::Type;
-
-use crate::column::Column;
 use crate::error::TableError;
+use crate::parquet_program::{ParquetFile, ParquetProgram};
 use crate::table::Table;
 
 /// The format of a file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub enum Format {
-    /// Apache Parquet.
-    Parquet,
+    /// Apache Parquet, which this program writes.
+    Parquet(ParquetProgram),
     /// Comma-separated values below a line of names.
     Csv,
 }
 
 impl Format {
     /// The ending of files, without the dot.
-    pub fn extension(self) -> &'static str {
+    pub fn extension(&self) -> &'static str {
         match self {
-            Self::Parquet => "parquet",
+            Self::Parquet(_) => "parquet",
             Self::Csv => "csv",
         }
     }
 }
 
 /// A file that a table is written to.
-pub struct TableWriter<W: Write + Send> {
-    sink: Sink<W>,
+pub struct TableWriter {
+    sink: Sink,
 }
 
-enum Sink<W: Write + Send> {
-    Parquet(Box<SerializedFileWriter<W>>),
-    Csv(Box<csv::Writer<W>>),
+enum Sink {
+    Parquet(ParquetFile),
+    Csv(Box<csv::Writer<File>>),
 }
 
-impl<W: Write + Send> TableWriter<W> {
+impl TableWriter {
     /// Begins a file with the columns of a table, and none of its rows.
     ///
     /// # Errors
-    /// Those of the medium.
-    pub fn new(format: Format, to: W, table: &Table) -> Result<Self, TableError> {
+    /// Those of the medium, and of the program that writes Parquet.
+    pub fn new(format: &Format, file: File, table: &Table) -> Result<Self, TableError> {
         let sink = match format {
-            Format::Parquet => Sink::Parquet(Box::new(parquet_writer(to, &table.columns)?)),
+            Format::Parquet(program) => Sink::Parquet(program.begin(file, table)?),
             Format::Csv => {
-                let mut writer = csv::Writer::from_writer(to);
-                writer.write_record(table.columns.iter().map(|column| &column.name))?;
+                let mut writer = csv::Writer::from_writer(file);
+                writer.write_record(table.columns().iter().map(|column| column.name()))?;
                 Sink::Csv(Box::new(writer))
             }
         };
@@ -63,70 +55,37 @@ impl<W: Write + Send> TableWriter<W> {
     /// Appends all rows of a table with the same columns; in Parquet they are a row group.
     ///
     /// # Errors
-    /// Those of the medium.
+    /// Those of the medium, and of the program that writes Parquet.
     pub fn write(&mut self, table: &Table) -> Result<(), TableError> {
         match &mut self.sink {
-            Sink::Parquet(writer) => {
-                let mut rows = writer.next_row_group()?;
-                for column in &table.columns {
-                    let Some(mut writer) = rows.next_column()? else { break };
-                    column.write(writer.untyped())?;
-                    writer.close()?;
-                }
-                rows.close()?;
-            }
+            Sink::Parquet(file) => file.write(table)?,
             Sink::Csv(writer) => {
                 for row in 0..table.rows() {
-                    writer.write_record(table.columns.iter().map(|column| column.values.text(row)))?;
+                    writer.write_record(table.columns().iter().map(|column| column.values().text(row)))?;
                 }
             }
         }
         Ok(())
     }
 
-    /// Ends the file.
+    /// Ends the file. Without this it is no valid Parquet file.
     ///
     /// # Errors
-    /// Those of the medium.
+    /// Those of the medium, and of the program that writes Parquet.
     pub fn finish(self) -> Result<(), TableError> {
         match self.sink {
-            Sink::Parquet(mut writer) => drop(writer.finish()?),
-            Sink::Csv(mut writer) => writer.flush()?,
+            Sink::Parquet(file) => file.finish(),
+            Sink::Csv(mut writer) => Ok(writer.flush()?),
         }
-        Ok(())
     }
 }
 
 /// Writes a whole table.
 ///
 /// # Errors
-/// Those of the medium.
-pub fn write_table(format: Format, to: impl Write + Send, table: &Table) -> Result<(), TableError> {
-    let mut writer = TableWriter::new(format, to, table)?;
+/// Those of the medium, and of the program that writes Parquet.
+pub fn write_table(format: &Format, file: File, table: &Table) -> Result<(), TableError> {
+    let mut writer = TableWriter::new(format, file, table)?;
     writer.write(table)?;
     writer.finish()
-}
-
-fn parquet_writer<W: Write + Send>(
-    to: W,
-    columns: &[Column],
-) -> Result<SerializedFileWriter<W>, ParquetError> {
-    let fields = columns.iter().map(Column::schema).collect::<Result<Vec<_>, _>>()?;
-    let schema = Type::group_type_builder("row").with_fields(fields).build()?;
-    let properties = WriterProperties::builder()
-        .set_compression(Compression::ZSTD(ZstdLevel::default()))
-        .set_key_value_metadata(Some(metadata(columns)))
-        .build();
-    SerializedFileWriter::new(to, Arc::new(schema), Arc::new(properties))
-}
-
-fn metadata(columns: &[Column]) -> Vec<KeyValue> {
-    let by_name = |of: fn(&Column) -> &str| {
-        let entries = columns.iter().map(|column| (column.name.clone(), of(column).into()));
-        serde_json::Value::Object(entries.collect()).to_string()
-    };
-    vec![
-        KeyValue::new("units".to_owned(), by_name(|column| &column.unit)),
-        KeyValue::new("columns".to_owned(), by_name(|column| &column.about)),
-    ]
 }

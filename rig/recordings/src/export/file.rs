@@ -1,7 +1,6 @@
 //! A table on its way to a file: rows are gathered, and written in groups.
 
 use std::fs::File;
-use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -14,17 +13,17 @@ const GROUP_ROWS: usize = 1 << 14;
 pub(super) struct TableFile {
     name: String,
     path: PathBuf,
-    writer: TableWriter<BufWriter<File>>,
+    writer: TableWriter,
     group: Table,
     rows: u64,
 }
 
 impl TableFile {
     /// Creates a file in `folder` for rows of an empty table.
-    pub(super) fn create(folder: &Path, name: &str, format: Format, empty: Table) -> anyhow::Result<Self> {
+    pub(super) fn create(folder: &Path, name: &str, format: &Format, empty: Table) -> anyhow::Result<Self> {
         let path = folder.join(format!("{name}.{}", format.extension()));
         let file = File::create_new(&path).with_context(|| format!("cannot create {}", path.display()))?;
-        let writer = TableWriter::new(format, BufWriter::new(file), &empty);
+        let writer = TableWriter::new(format, file, &empty);
         let writer = writer.with_context(|| path.display().to_string())?;
         Ok(Self { name: name.to_owned(), path, writer, group: empty, rows: 0 })
     }

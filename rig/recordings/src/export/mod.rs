@@ -14,13 +14,13 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
 use masseter_recording::output::new_folder;
 use masseter_recording::{Reader, Recorded, Topic};
 use masseter_report::CandumpLogs;
 use masseter_runtime::messages::tap;
-use masseter_table::{Format, Table, write_table};
+use masseter_table::{Format, ParquetProgram, Table, write_table};
 use masseter_terminal::{Exit, result};
 
 use crate::recording::RecordingArgs;
@@ -63,10 +63,15 @@ enum FileFormat {
 }
 
 impl FileFormat {
-    fn of_tables(self) -> Format {
+    /// A missing program is an error before any work is done.
+    fn of_tables(self) -> anyhow::Result<Format> {
         match self {
-            Self::Parquet => Format::Parquet,
-            Self::Csv => Format::Csv,
+            Self::Parquet => {
+                let program = ParquetProgram::beside_this_one();
+                let program = program.map_err(|error| anyhow!("{error}; or choose --format csv"))?;
+                Ok(Format::Parquet(program))
+            }
+            Self::Csv => Ok(Format::Csv),
         }
     }
 }
@@ -74,6 +79,7 @@ impl FileFormat {
 /// Writes the tables. Ends with 0 if the recording is complete, 6 if messages or its end are missing, and 2 if it holds bytes
 /// that Masseter did not write: what can be read is written all the same.
 pub fn export(args: &ExportArgs) -> anyhow::Result<Exit> {
+    let format = args.format.of_tables()?;
     let path = args.from.path()?;
     let named = || path.display().to_string();
     let mut reader = Reader::open(&path).with_context(named)?;
@@ -81,7 +87,7 @@ pub fn export(args: &ExportArgs) -> anyhow::Result<Exit> {
     let selection = Selection::new(&reader, &survey, &args.tables).with_context(named)?;
     let out = args.out.clone().unwrap_or_else(|| path.with_extension("tables"));
     new_folder(&out)?;
-    let export = Export { format: args.format.of_tables(), out: &out, motion_ns: survey.motion_ns() };
+    let export = Export { format, out: &out, motion_ns: survey.motion_ns() };
     let written = export.write(&path, selection).inspect_err(|_| {
         // The first error is the one to report.
         let _ = fs::remove_dir_all(&out);
@@ -112,13 +118,13 @@ impl Export<'_> {
         let mut topics = BTreeMap::new();
         for (topic, shape) in selection.topics {
             let table = TopicTable::new(topic, shape, self.motion_ns);
-            let file = TableFile::create(self.out, topic.name(), self.format, table.empty())?;
+            let file = TableFile::create(self.out, topic.name(), &self.format, table.empty())?;
             topics.insert(topic, (table, file));
         }
         let mut cycles = match selection.registry {
             Some(registry) => {
                 let table = CycleTable::new(registry, self.motion_ns);
-                let file = TableFile::create(self.out, CYCLES, self.format, table.empty())?;
+                let file = TableFile::create(self.out, CYCLES, &self.format, table.empty())?;
                 Some((table, file))
             }
             None => None,
@@ -167,7 +173,7 @@ impl Export<'_> {
         let path = self.out.join(CODEBOOK);
         let file =
             fs::File::create_new(&path).with_context(|| format!("cannot create {}", path.display()))?;
-        write_table(Format::Csv, file, &codebook).with_context(|| path.display().to_string())?;
+        write_table(&Format::Csv, file, &codebook).with_context(|| path.display().to_string())?;
         written.push((CODEBOOK.to_owned(), codebook.rows() as u64));
         for (bus, lines) in candump.map(CandumpLogs::finish).transpose()?.into_iter().flatten().enumerate() {
             written.push((format!("can{bus}.log"), lines));
