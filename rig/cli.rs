@@ -1,10 +1,12 @@
 //! The command line: dispatches each verb to its module, and prints errors. Arguments are defined beside their verbs.
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 use std::sync::Arc;
 
+use anyhow::anyhow;
 use clap::{ColorChoice, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
-use masseter_terminal::{Exit, Failure, OrFailure, choose_colour, status};
+use masseter_terminal::{Exit, Failure, OrFailure, choose_colour, in_one_line, status};
 use rustix::process::umask;
 
 use crate::arguments::ProcessArgs;
@@ -19,7 +21,6 @@ use crate::clean;
 use crate::controller::{self, ControllerArgs};
 use crate::diff::{self, DiffArgs};
 use crate::doctor::{self, DoctorArgs};
-use crate::error_text::in_one_line;
 use crate::faults::{self, FaultsVerb};
 use crate::help::with_overview;
 use crate::init::{self, InitArgs};
@@ -28,7 +29,6 @@ use crate::kinematics_cli::{self, CsvArgs, FkArgs};
 use crate::manuals::{self, CompletionsArgs, ManArgs};
 use crate::motion::{self, MotionArgs};
 use crate::new::{self, NewVerb};
-use crate::paper_study::{self, KinematicsArgs};
 use crate::param::{self, ParamVerb};
 use crate::plant::{self, PlantArgs};
 use crate::replay::{self, ReplayArgs};
@@ -41,7 +41,6 @@ use crate::run::{
 };
 use crate::signals_cli::{self, SignalsArgs};
 use crate::suite::{self, args::TestArgs};
-use crate::uniqueness::{self, UniquenessVerb};
 use masseter_recorder::RecorderArgs;
 use masseter_recordings::{ExportArgs, RecordingVerb};
 
@@ -138,12 +137,6 @@ enum Verb {
     Can(CanVerb),
     /// Measure parts of the rig, each beside a baseline
     Bench(BenchArgs),
-    /// Prove where the six inputs determine one pose, or search for exceptions
-    #[command(subcommand, after_help = "Example:\n  masseter uniqueness prove --region jaw")]
-    Uniqueness(UniquenessVerb),
-    /// Reproduce the paper's study of the kinematics: figures, data, claims
-    #[command(visible_alias = "paper")]
-    Kinematics(KinematicsArgs),
     /// Remove what killed runs left in shared memory
     #[command(after_help = "Example:\n  masseter clean")]
     Clean,
@@ -151,6 +144,12 @@ enum Verb {
     Completions(CompletionsArgs),
     /// Write manual pages
     Man(ManArgs),
+    /// Verbs of another command
+    #[command(hide = true, aliases = ["paper", "uniqueness"], disable_help_flag = true)]
+    Kinematics {
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        _arguments: Vec<OsString>,
+    },
     #[command(hide = true)]
     BenchPeer(PeerArgs),
     #[command(hide = true)]
@@ -227,8 +226,11 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Ik(args) => kinematics_cli::inverse(&args).usage(),
         Verb::Can(verb) => can::execute(&verb).usage(),
         Verb::Robot(verb) => robot::execute(&verb),
-        Verb::Uniqueness(verb) => uniqueness::uniqueness(&verb).usage(),
-        Verb::Kinematics(args) => paper_study::study(&args).usage(),
+        Verb::Kinematics { .. } => Err(anyhow!(
+            "the paper's study and uniqueness are verbs of another command: \
+             cargo run --release -p masseter-research -- help"
+        ))
+        .usage(),
         Verb::Doctor(args) => doctor::examine(&args).usage(),
         Verb::Export(args) => masseter_recordings::export(&args).usage(),
         Verb::Recording(verb) => masseter_recordings::execute(&verb).usage(),

@@ -12,7 +12,7 @@ const GROUPS: [(&str, &[&str]); 8] = [
     ("Bring your own controller", &["new", "interface", "controller", "param"]),
     ("Prepare this machine", &["doctor", "bench", "clean"]),
     ("Work with CAN and the drives", &["robot", "can", "plant"]),
-    ("Solve the kinematics", &["ik", "fk", "uniqueness", "kinematics"]),
+    ("Solve the kinematics", &["ik", "fk"]),
     ("Set up the shell", &["completions", "man"]),
 ];
 

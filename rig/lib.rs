@@ -17,9 +17,7 @@ mod cli;
 mod controller;
 mod diff;
 mod doctor;
-mod error_text;
 mod faults;
-mod force_study;
 mod guarded;
 mod help;
 mod init;
@@ -29,7 +27,6 @@ mod kinematics_cli;
 mod manuals;
 mod motion;
 mod new;
-mod paper_study;
 mod param;
 mod plant;
 mod replay;
@@ -40,7 +37,6 @@ mod shell;
 mod signals_cli;
 mod starter;
 mod suite;
-mod uniqueness;
 
 // Only what other crates call is public: derived code that nobody calls is then not compiled.
 pub use cli::main;

@@ -296,29 +296,6 @@ fn a_point_that_a_recording_has_no_use_for_is_refused() {
 }
 
 #[test]
-fn a_margin_that_is_no_determinant_is_refused() {
-    for margin in ["nan", "inf", "-inf", "-1"] {
-        let output = masseter(&["uniqueness", "prove", "--boxes", "10", &format!("--margin={margin}")]);
-        assert_eq!(output.status.code(), Some(2), "{margin}: {}", stderr(&output));
-        assert!(stderr(&output).contains("use a finite determinant, 0 or above"), "{}", stderr(&output));
-    }
-}
-
-#[test]
-fn a_file_that_is_there_already_is_never_overwritten_with_inputs() {
-    let workspace = Workspace::new("");
-    let mine = workspace.write("mine.csv", "mine\n");
-    let out = mine.to_str().unwrap();
-    for verb in [&["search", "--inputs", "10"][..], &["prove", "--boxes", "10"]] {
-        let output = masseter(&[&["uniqueness"], verb, &["--out", out]].concat());
-        assert_eq!(output.status.code(), Some(2), "{verb:?}: {}", stderr(&output));
-        assert!(stderr(&output).contains("mine.csv exists and is not overwritten"), "{}", stderr(&output));
-        assert!(stdout(&output).is_empty(), "{verb:?} had begun: {}", stdout(&output));
-        assert_eq!(std::fs::read_to_string(&mine).unwrap(), "mine\n");
-    }
-}
-
-#[test]
 fn interfaces_that_cannot_be_used_are_refused_with_what_to_do() {
     let cases = [
         (
@@ -423,18 +400,6 @@ fn wrong_usage_exits_with_2() {
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
         assert!(said.contains(reason) && !said.contains('`'), "{arguments:?} gave {said}");
     }
-}
-
-/// Proofs are made at a desk, for a robot elsewhere.
-#[test]
-fn a_proof_around_a_motion_needs_no_interface_of_its_robot() {
-    let robot = "duration_s = 0.2\n[can]\ninterfaces = ['no-such-a', 'no-such-b']";
-    let workspace = Workspace::new(robot);
-    let scenario = workspace.file("scenario.toml");
-    let prove = ["uniqueness", "prove", "--around-mm", "1", "--boxes", "1", "--scenario"];
-    let output = masseter(&[&prove[..], &[scenario.to_str().unwrap()]].concat());
-    assert!(stdout(&output).contains("boxes around its inputs"), "{}", stderr(&output));
-    assert_ne!(output.status.code(), Some(2), "{}", stderr(&output));
 }
 
 #[test]

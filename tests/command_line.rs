@@ -48,10 +48,23 @@ fn words_are_coloured_where_that_is_asked_for() {
 }
 
 #[test]
+fn verbs_of_research_are_refused_with_the_command_that_has_them() {
+    for verb in [&["kinematics", "--out", "study"][..], &["paper"], &["uniqueness", "prove", "--help"]] {
+        let output = masseter(verb);
+        assert_eq!(output.status.code(), Some(2), "{verb:?}");
+        assert!(
+            stderr(&output).contains("cargo run --release -p masseter-research --"),
+            "{}",
+            stderr(&output)
+        );
+    }
+}
+
+#[test]
 fn completions_are_a_script_of_their_shell() {
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
         let script = stdout(&masseter(&["completions", shell]));
-        assert!(script.contains("uniqueness") && script.contains("duration"), "{shell}: {script}");
+        assert!(script.contains("campaign") && script.contains("duration"), "{shell}: {script}");
     }
     let mut bash = Command::new("bash").arg("-n").stdin(Stdio::piped()).spawn().unwrap();
     let script = masseter(&["completions", "bash"]).stdout;

@@ -21,7 +21,6 @@ mod foxglove_layout;
 mod golden;
 mod interrupts;
 mod kinematics;
-mod kinematics_study;
 mod liars;
 mod live;
 mod lockstep;

@@ -15,7 +15,7 @@ fn a_full_disk_behind_standard_output_is_exit_6_and_a_closed_pipe_is_no_failure(
     let folder = workspace.run_folder();
     let folder = folder.to_str().unwrap();
     let poses = workspace.write("poses.csv", "x_m,y_m,z_m,qw,qx,qy,qz\n0,0,0.27,1,0,0,0\n");
-    let verbs: [&[&str]; 12] = [
+    let verbs: [&[&str]; 11] = [
         &["interface", "c"],
         &["ik", "--input", poses.to_str().unwrap()],
         &["doctor", "--format", "json"],
@@ -26,7 +26,6 @@ fn a_full_disk_behind_standard_output_is_exit_6_and_a_closed_pipe_is_no_failure(
         &["report", folder, folder],
         &["report", folder, "--format", "json"],
         &["report", folder],
-        &["uniqueness", "search", "--inputs", "10"],
         &["bench", "ipc", "--rounds", "1", "--format", "json"],
     ];
     for verb in verbs {

@@ -9,7 +9,6 @@ use masseter_round_trips::Durations;
 use serde::Serialize;
 
 use masseter_report::histogram_log;
-use masseter_study::median;
 
 /// The result of one round.
 #[derive(Debug)]
@@ -52,10 +51,11 @@ pub(super) struct Spread {
 
 impl Spread {
     /// None without a value.
-    fn from_values(name: &str, values: Vec<f64>) -> Option<Self> {
-        let min = values.iter().copied().reduce(f64::min)?;
-        let max = values.iter().copied().reduce(f64::max)?;
-        Some(Self { name: name.to_owned(), median: median(values), min, max })
+    fn from_values(name: &str, mut values: Vec<f64>) -> Option<Self> {
+        values.sort_by(f64::total_cmp);
+        let (min, max) = (*values.first()?, *values.last()?);
+        let median = f64::midpoint(values[(values.len() - 1) / 2], values[values.len() / 2]);
+        Some(Self { name: name.to_owned(), median, min, max })
     }
 }
 

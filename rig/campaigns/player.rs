@@ -5,10 +5,9 @@ use masseter_campaign::{CampaignFolder, Case, CaseResult};
 use masseter_report::Verdict;
 use masseter_runtime::clock;
 use masseter_scenario::Scenario;
-use masseter_terminal::{Exit, Failure, OrFailure};
+use masseter_terminal::{Exit, Failure, OrFailure, in_one_line};
 
 use crate::arguments::ControllerKind;
-use crate::error_text::in_one_line;
 use crate::guarded::guarded;
 use crate::interrupts::Interrupts;
 use crate::run::figures_unrecorded;

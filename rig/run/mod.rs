@@ -29,7 +29,7 @@ use args::RunArgs;
 pub(crate) use clock::needs_processes;
 #[cfg(test)]
 pub(crate) use prepared::figures_by;
-pub(crate) use prepared::{PreparedRun, figures_unrecorded, judge_unrecorded, shown_figures};
+pub(crate) use prepared::{PreparedRun, figures_unrecorded, judge_unrecorded};
 pub(crate) use resolve::check_simulated;
 
 /// Plays the motion, judges the run, and writes its folder.

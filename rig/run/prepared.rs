@@ -22,7 +22,6 @@ use crate::arguments::{ControllerChoice, ControllerKind, name_of};
 use crate::interrupts::Interrupts;
 use crate::robot::Played;
 use crate::{doctor, robot};
-use masseter_virtual_time::StartAnalysis;
 
 /// Where runs without `--out` go.
 pub(super) const RUNS: &str = "runs";
@@ -145,7 +144,7 @@ pub(crate) fn judge_unrecorded(args: &RunArgs, interrupts: &Interrupts) -> Resul
     let (plan, args) = resolve(args).usage()?;
     let build =
         args.controller.builder().context("virtual time runs controllers of the rig alone").usage()?;
-    let (manifest, figures) = unrecorded(&plan, &args, build, Analysis::without_report, interrupts)?;
+    let (manifest, figures) = unrecorded(&plan, &args, build, interrupts)?;
     Ok(Judgement::new(&manifest, &figures))
 }
 
@@ -155,7 +154,7 @@ pub(crate) fn figures_unrecorded(
     controller: ControllerKind,
     interrupts: &Interrupts,
 ) -> Result<(Manifest, Figures), Failure> {
-    figures_of(scenario, controller, controller.builder(), Analysis::without_report, interrupts)
+    figures_of(scenario, controller, controller.builder(), interrupts)
 }
 
 /// The same by another controller.
@@ -165,39 +164,29 @@ pub(crate) fn figures_by(
     build: BuildController,
     interrupts: &Interrupts,
 ) -> Result<(Manifest, Figures), Failure> {
-    figures_of(scenario, ControllerKind::default(), build, Analysis::without_report, interrupts)
-}
-
-/// Plays a scenario under virtual time by the rig's own controller; all its figures, with the curves of a report.
-pub(crate) fn shown_figures(
-    scenario: &Scenario,
-    interrupts: &Interrupts,
-) -> Result<(Manifest, Figures), Failure> {
-    let controller = ControllerKind::default();
-    figures_of(scenario, controller, controller.builder(), Analysis::new, interrupts)
+    figures_of(scenario, ControllerKind::default(), build, interrupts)
 }
 
 fn figures_of(
     scenario: &Scenario,
     controller: ControllerKind,
     build: BuildController,
-    start: StartAnalysis,
     interrupts: &Interrupts,
 ) -> Result<(Manifest, Figures), Failure> {
     let plan = resolve_simulated(scenario, None, build).usage()?;
     let controller = ControllerChoice::Own(controller);
     let args = RunArgs { clock: ClockKind::Virtual, controller, ..RunArgs::default() };
-    unrecorded(&plan, &args, build, start, interrupts)
+    unrecorded(&plan, &args, build, interrupts)
 }
 
 fn unrecorded(
     plan: &RunPlan,
     args: &RunArgs,
     build: BuildController,
-    start: StartAnalysis,
     interrupts: &Interrupts,
 ) -> Result<(Manifest, Figures), Failure> {
     let mut manifest = manifest_of(plan, args);
+    let start = Analysis::without_report;
     let figures = masseter_virtual_time::analyse(plan, build, start, &mut manifest, interrupts).died()?;
     Ok((manifest, figures))
 }

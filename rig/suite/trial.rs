@@ -5,13 +5,12 @@ use std::path::{Path, PathBuf};
 
 use masseter_report::Judgement;
 use masseter_runtime::clock;
-use masseter_terminal::{Exit, Failure, status};
+use masseter_terminal::{Exit, Failure, in_one_line, status};
 
 use super::args::TestArgs;
 use super::case::Case;
 use super::outcome::{Outcome, Tested};
 use crate::arguments::name_of;
-use crate::error_text::in_one_line;
 use crate::guarded::guarded;
 use crate::interrupts::Interrupts;
 use crate::run::args::{ClockKind, RunArgs};

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use super::workspace::{list, metadata, text, within};
 
-/// The crates of the workspace that each crate may use, all by their folders. The root package may use all.
+/// The crates of the workspace that each crate may use, all by their folders. The root package may use all
+/// but the programs that a run does not need.
 const MAY_USE: [(&str, &[&str]); 27] = [
     ("shared/can", &[]),
     ("shared/model", &[]),
@@ -38,7 +39,6 @@ const MAY_USE: [(&str, &[&str]); 27] = [
             "controller",
             "rig/recording",
             "rig/analysis",
-            "rig/charts",
             "rig/page",
             "rig/terminal",
         ],
@@ -84,8 +84,20 @@ const MAY_USE: [(&str, &[&str]); 27] = [
         ],
     ),
     (
-        "rig/study",
-        &["shared/model", "shared/scenario", "shared/runtime", "controller", "rig/plan", "rig/charts"],
+        "rig/research",
+        &[
+            "shared/model",
+            "shared/scenario",
+            "shared/runtime",
+            "controller",
+            "rig/plan",
+            "rig/machine",
+            "rig/recording",
+            "rig/analysis",
+            "rig/virtual_time",
+            "rig/charts",
+            "rig/terminal",
+        ],
     ),
     (
         "rig/campaign",
@@ -100,8 +112,11 @@ const MAY_USE: [(&str, &[&str]); 27] = [
 ];
 
 fn may_use(folder: &str, needed: &str) -> bool {
+    if folder.is_empty() {
+        return !["rig/parquet", "rig/research"].contains(&needed);
+    }
     let mut rows = MAY_USE.iter();
-    folder.is_empty() || rows.any(|(user, used)| *user == folder && used.contains(&needed))
+    rows.any(|(user, used)| *user == folder && used.contains(&needed))
 }
 
 /// One line for each dependency that the table does not have.

@@ -1,4 +1,4 @@
-//! Exit codes, the same for every verb.
+//! Exit codes, the same for every verb, and errors as text.
 
 use std::error::Error;
 use std::io::{self, ErrorKind};
@@ -79,6 +79,18 @@ impl Failure {
         let exit = if exit == Exit::Usage && is_out_of_room(&error) { Exit::Incomplete } else { exit };
         Self { exit, error }
     }
+}
+
+/// An error and its causes in one line, without causes that the text before quotes.
+pub fn in_one_line(error: &anyhow::Error) -> String {
+    error.chain().fold(String::new(), |text, cause| {
+        let cause = cause.to_string();
+        match text.as_str() {
+            "" => cause,
+            _ if text.contains(&cause) => text,
+            _ => text + ": " + &cause,
+        }
+    })
 }
 
 /// Whether a write failed because the disk is full, or a quota or the maximum file size is reached.

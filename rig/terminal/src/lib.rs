@@ -24,7 +24,7 @@ use clap::ValueEnum;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 pub use colour::{Tone, choose_colour, result_with_tones};
-pub use exit::{Exit, Failure, OrFailure};
+pub use exit::{Exit, Failure, OrFailure, in_one_line};
 pub use wrap::columns;
 
 /// A pipe that takes anything takes as many bytes as one write, bytes.

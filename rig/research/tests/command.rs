@@ -1,11 +1,12 @@
-//! `masseter kinematics`: the folder it leaves.
+//! `masseter-research` as a user has it: the folder of a study, proofs and searches, and what is refused.
 
 use std::collections::BTreeSet;
-use std::fs;
+use std::fs::{self, File};
 use std::path::Path;
-use std::process::Output;
+use std::process::{Command, Output};
 
-use crate::common::{masseter, stderr, stdout};
+/// The executable under test.
+const RESEARCH: &str = env!("CARGO_BIN_EXE_masseter-research");
 
 const FIGURES: [&str; 16] = [
     "fig3_diverging",
@@ -45,9 +46,21 @@ const TABLES: [(&str, &str); 15] = [
     ("workspace_yaw_pitch", "yaw_deg,pitch_deg,condition,"),
 ];
 
+fn research(arguments: &[&str]) -> Output {
+    Command::new(RESEARCH).args(arguments).output().expect("masseter-research starts")
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
 fn study(out: &Path, extra: &[&str]) -> Output {
-    let few = ["kinematics", "--samples", "80", "--cells", "6", "--out", out.to_str().unwrap()];
-    masseter(&[&few, extra].concat())
+    let few = ["study", "--samples", "80", "--cells", "6", "--out", out.to_str().unwrap()];
+    research(&[&few, extra].concat())
 }
 
 fn read(folder: &Path, name: &str) -> String {
@@ -209,4 +222,66 @@ fn folders_and_values_that_cannot_be_used_are_refused() {
         assert_eq!(study(&free, &wrong).status.code(), Some(2), "{wrong:?}");
         assert!(!free.exists());
     }
+}
+
+#[test]
+fn a_margin_that_is_no_determinant_is_refused() {
+    for margin in ["nan", "inf", "-inf", "-1"] {
+        let output = research(&["uniqueness", "prove", "--boxes", "10", &format!("--margin={margin}")]);
+        assert_eq!(output.status.code(), Some(2), "{margin}: {}", stderr(&output));
+        assert!(stderr(&output).contains("use a finite determinant, 0 or above"), "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn a_file_that_is_there_already_is_never_overwritten_with_inputs() {
+    let place = tempfile::tempdir().unwrap();
+    let mine = place.path().join("mine.csv");
+    fs::write(&mine, "mine\n").unwrap();
+    for verb in [&["search", "--inputs", "10"][..], &["prove", "--boxes", "10"]] {
+        let output = research(&[&["uniqueness"], verb, &["--out", mine.to_str().unwrap()]].concat());
+        assert_eq!(output.status.code(), Some(2), "{verb:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains("mine.csv exists and is not overwritten"), "{}", stderr(&output));
+        assert!(stdout(&output).is_empty(), "{verb:?} had begun: {}", stdout(&output));
+        assert_eq!(fs::read_to_string(&mine).unwrap(), "mine\n");
+    }
+}
+
+/// Proofs are made at a desk, for a robot elsewhere.
+#[test]
+fn a_proof_around_a_motion_needs_no_interface_of_its_robot() {
+    let place = tempfile::tempdir().unwrap();
+    let scenario = place.path().join("robot.toml");
+    fs::write(&scenario, "duration_s = 0.2\n[can]\ninterfaces = ['no-such-a', 'no-such-b']").unwrap();
+    let prove = ["uniqueness", "prove", "--around-mm", "1", "--boxes", "1", "--scenario"];
+    let output = research(&[&prove[..], &[scenario.to_str().unwrap()]].concat());
+    assert!(stdout(&output).contains("boxes around its inputs"), "{}", stderr(&output));
+    assert_ne!(output.status.code(), Some(2), "{}", stderr(&output));
+}
+
+/// A limit on the size of files stands for the full disk.
+#[test]
+fn a_full_disk_is_exit_6_and_with_room_the_same_passes() {
+    let place = tempfile::tempdir().unwrap();
+    let verbs = [
+        &["uniqueness", "search", "--inputs", "10", "--out"][..],
+        &["study", "--samples", "10", "--cells", "2", "--out"],
+    ];
+    for (number, verb) in verbs.into_iter().enumerate() {
+        let run = |limit: &str| {
+            let out = place.path().join(format!("{number}-{}", limit.len()));
+            let script = format!("trap '' XFSZ; ulimit -f {limit}; exec \"$@\"");
+            let mut shell = Command::new("sh");
+            shell.args(["-c", &script, "sh", RESEARCH]).args(verb).arg(out).output().expect("a shell starts")
+        };
+        let output = run("0");
+        assert_eq!(output.status.code(), Some(6), "{verb:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains("File too large"), "{verb:?}: {}", stderr(&output));
+        let output = run("unlimited");
+        assert_eq!(output.status.code(), Some(0), "{verb:?}: {}", stderr(&output));
+    }
+    let full = File::options().write(true).open("/dev/full").unwrap();
+    let mut search = Command::new(RESEARCH);
+    let output = search.args(["uniqueness", "search", "--inputs", "10"]).stdout(full).output().unwrap();
+    assert_eq!(output.status.code(), Some(6), "{}", stderr(&output));
 }

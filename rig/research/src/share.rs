@@ -54,7 +54,7 @@ pub(super) fn quantile(sample: impl IntoIterator<Item = f64>, quantile: f64) -> 
 }
 
 /// The middle of a sample; no number for an empty one.
-pub fn median(sample: impl IntoIterator<Item = f64>) -> f64 {
+pub(super) fn median(sample: impl IntoIterator<Item = f64>) -> f64 {
     quantile(sample, 0.5)
 }
 

@@ -18,41 +18,15 @@ struct Page<'a> {
     /// Repeats the study.
     command: &'a str,
     claims: &'a [PaperClaim],
-    forces: &'a Forces,
     version: &'static str,
 }
 
-/// What runs of the emulated rig say of forces: claims after those of the study, and figures.
-#[derive(Debug, Default)]
-pub struct Forces {
-    /// Claims with their judgements.
-    pub claims: Vec<PaperClaim>,
-    /// The figures, in the order of the page.
-    pub figures: Vec<ForceFigure>,
-}
-
-/// A figure of a run.
-#[derive(Debug)]
-pub struct ForceFigure {
-    /// Name of its file, without the extension.
-    pub name: &'static str,
-    /// The drawing.
-    pub svg: String,
-    /// What it shows.
-    pub caption: String,
-}
-
-/// Writes tables, figures and `claims.md` into an existing folder, and returns the claims in the paper's order, those of
-/// `forces` last. `command` is what repeats this study, for the page.
+/// Writes tables, figures and `claims.md` into an existing folder, and returns the claims in the paper's order, those
+/// about forces last. `command` is what repeats this study, for the page.
 ///
 /// # Errors
 /// When a file cannot be written.
-pub fn write(
-    study: &Study,
-    mut forces: Forces,
-    folder: &Path,
-    command: &str,
-) -> anyhow::Result<Vec<PaperClaim>> {
+pub fn write(study: &Study, folder: &Path, command: &str) -> anyhow::Result<Vec<PaperClaim>> {
     let keep = |name: &str, extension: &str, text: &str| {
         let path = folder.join(name).with_extension(extension);
         fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
@@ -64,13 +38,12 @@ pub fn write(
     for (name, svg) in &figures {
         keep(name, "svg", svg)?;
     }
-    for figure in &forces.figures {
+    for figure in &study.forces.figures {
         keep(figure.name, "svg", &figure.svg)?;
     }
-    let mut claims = claims::judge(study);
-    claims.append(&mut forces.claims);
+    let claims = [claims::judge(study), study.forces.claims.clone()].concat();
     let version = env!("CARGO_PKG_VERSION");
-    keep("claims", "md", &Page { study, command, claims: &claims, forces: &forces, version }.render()?)?;
+    keep("claims", "md", &Page { study, command, claims: &claims, version }.render()?)?;
     Ok(claims)
 }
 

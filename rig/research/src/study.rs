@@ -5,6 +5,7 @@ use masseter_model::geometry::{Mechanism, MechanismConfig};
 use masseter_scenario::Scenario;
 
 use crate::basins::Basins;
+use crate::forces::{self, Forces};
 use crate::motions::{self, Motion};
 use crate::multiplicity::Multiplicity;
 use crate::pairs::{self, Disagreement};
@@ -44,6 +45,7 @@ pub struct Study {
     pub(crate) basins: Basins,
     pub(crate) motions: Vec<Motion>,
     pub(crate) maps: [Map; 4],
+    pub(crate) forces: Forces,
 }
 
 impl Study {
@@ -68,7 +70,7 @@ impl PreparedStudy {
     /// Measures on all cores; `progress` receives each stage.
     ///
     /// # Errors
-    /// When the neutral input has no finite set of solutions.
+    /// When the neutral input has no finite set of solutions, or a run of the emulated rig fails.
     pub fn run(self, settings: Settings, progress: impl Fn(&str)) -> anyhow::Result<Study> {
         let Self { mechanism, motions } = self;
         let Settings { seed, samples, cells } = settings;
@@ -83,6 +85,20 @@ impl PreparedStudy {
         let maps = SLICES.map(|slice| Map::compute(&mechanism, slice, &middle, cells));
         progress("times");
         let speed = speed::measure(&mechanism, &trials, &motions[0]);
-        Ok(Study { settings, mechanism, trials, pairs, speed, set, multiplicity, basins, motions, maps })
+        progress("forces of runs");
+        let forces = forces::play()?;
+        Ok(Study {
+            settings,
+            mechanism,
+            trials,
+            pairs,
+            speed,
+            set,
+            multiplicity,
+            basins,
+            motions,
+            maps,
+            forces,
+        })
     }
 }

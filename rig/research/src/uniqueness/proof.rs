@@ -3,8 +3,10 @@
 //! several boxes at the start each counts the same.
 
 use masseter_controller::kinematics::uniqueness::{Finding, InputBox, Proof, Reaches, SolutionKind};
-use masseter_model::geometry::Mechanism;
+use masseter_model::geometry::{AXIS_NAMES, Mechanism};
 use rayon::prelude::*;
+
+use crate::table::{csv, number};
 
 /// A box of inputs and the known bounds of its solutions' reaches.
 type Open = (InputBox, Reaches);
@@ -20,6 +22,15 @@ pub struct Proven {
     pub unique_share: f64,
     /// Boxes that stay undecided; none where all is proven.
     pub undecided: Vec<InputBox>,
+}
+
+impl Proven {
+    /// The undecided boxes as CSV: both ends of each axis, metres.
+    pub fn table(&self) -> String {
+        let header = AXIS_NAMES.map(|axis| format!("{axis}_low_m,{axis}_high_m")).join(",");
+        let row = |inputs: &InputBox| inputs.axes().map(|axis| [axis.low(), axis.high()].map(number));
+        csv(&header, self.undecided.iter().map(row))
+    }
 }
 
 /// Proves by interval arithmetic that no input of `boxes` has two solutions that meet the paper's conditions and, with a

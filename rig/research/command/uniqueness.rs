@@ -1,5 +1,5 @@
-//! `masseter uniqueness`: whether the six inputs determine one pose. `prove` and `search` print the results of
-//! [`masseter_study::uniqueness`] and write them as CSV.
+//! `masseter-research uniqueness`: whether the six inputs determine one pose. `prove` and `search` print the results of
+//! [`masseter_research::uniqueness`] and write them as CSV.
 //!
 //! Both are about the published mechanism; a proof around a motion is about its scenario's mechanism.
 
@@ -10,12 +10,11 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::{Args, Subcommand, ValueEnum};
 use masseter_controller::kinematics::uniqueness::InputBox;
-use masseter_model::geometry::{AXIS_NAMES, Mechanism, MechanismConfig};
+use masseter_model::geometry::{Mechanism, MechanismConfig};
 use masseter_plan::{Overrides, RunPlan};
 use masseter_recording::output::new_file;
+use masseter_research::uniqueness::{Ambiguous, boxes, prove, search};
 use masseter_scenario::wording::counted;
-use masseter_study::table::{csv, number};
-use masseter_study::uniqueness::{Ambiguous, boxes, prove, search};
 use masseter_terminal::{Exit, result_line, status};
 
 /// The verbs of `uniqueness`.
@@ -30,7 +29,7 @@ pub(crate) enum UniquenessVerb {
 /// The arguments of `prove`.
 #[derive(Debug, Clone, Args)]
 #[command(
-    after_help = "Examples:\n  masseter uniqueness prove --region jaw\n  masseter uniqueness prove --around-mm 1 --scenario examples/patient.toml"
+    after_help = "Examples:\n  masseter-research uniqueness prove --region jaw\n  masseter-research uniqueness prove --around-mm 1 --scenario examples/patient.toml"
 )]
 pub(crate) struct ProveArgs {
     /// Which inputs
@@ -58,7 +57,7 @@ pub(crate) struct ProveArgs {
 
 /// The arguments of `search`.
 #[derive(Debug, Clone, Args)]
-#[command(after_help = "Example:\n  masseter uniqueness search --inputs 100000 --out found.csv")]
+#[command(after_help = "Example:\n  masseter-research uniqueness search --inputs 100000 --out found.csv")]
 pub(crate) struct SearchArgs {
     /// Which inputs
     #[arg(long, value_enum, default_value = "box")]
@@ -110,9 +109,7 @@ fn prove_and_print(args: &ProveArgs) -> anyhow::Result<bool> {
     result_line!("no solution          {:.4} % of the volume", 100.0 * proven.unsolvable_share)?;
     result_line!("at most one solution {:.4} % of the volume", 100.0 * proven.unique_share)?;
     result_line!("undecided            {}", counted(proven.undecided.len() as u64, "box"))?;
-    let header = AXIS_NAMES.map(|axis| format!("{axis}_low_m,{axis}_high_m")).join(",");
-    let row = |inputs: &InputBox| inputs.axes().map(|axis| [axis.low(), axis.high()].map(number));
-    write(args.out.as_deref(), file, &csv(&header, proven.undecided.iter().map(row)))?;
+    write(args.out.as_deref(), file, &proven.table())?;
     Ok(proven.undecided.is_empty())
 }
 
@@ -128,9 +125,7 @@ fn search_and_print(args: &SearchArgs) -> anyhow::Result<bool> {
     if let Some(Ambiguous { lesser, axes_m }) = found.climbed.first() {
         result_line!("greatest lesser determinant, after climbing       {lesser:.4} at {axes_m:?}")?;
     }
-    let header = AXIS_NAMES.map(|axis| format!("{axis}_m")).join(",") + ",lesser_determinant";
-    let row = |one: &Ambiguous| (one.axes_m.map(number), number(one.lesser));
-    write(args.out.as_deref(), file, &csv(&header, found.climbed.iter().map(row)))?;
+    write(args.out.as_deref(), file, &found.table())?;
     Ok(found.climbed.iter().all(|one| one.lesser <= 0.0))
 }
 

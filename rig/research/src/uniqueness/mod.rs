@@ -4,7 +4,7 @@
 //! ```
 //! use masseter_controller::kinematics::uniqueness::InputBox;
 //! use masseter_model::geometry::{Mechanism, MechanismConfig};
-//! use masseter_study::uniqueness::prove;
+//! use masseter_research::uniqueness::prove;
 //!
 //! let mechanism = Mechanism::new(&MechanismConfig::default())?;
 //! // Slides within ±2 mm, legs of 268 to 272 mm.

@@ -49,7 +49,7 @@ pub(super) fn conditions_leave_one(study: &Study) -> PaperClaim {
         section: "Abstract and Results, on multiplicity",
         measured: format!("several are left — {}", texts.collect::<Vec<_>>().join("; ")),
         criterion: "holds if no random input keeps several with the plane oriented; partly if fewer than 1 % do. \
-                    A sample cannot prove it: see masseter uniqueness",
+                    A sample cannot prove it: see masseter-research uniqueness",
         judgement: unique(several(ORIENTED)),
         figure: None,
     }

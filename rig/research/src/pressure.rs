@@ -1,4 +1,4 @@
-//! The pressure between the jaws as a drawing for documents: the lower arch from above when the teeth bear most.
+//! The pressure between the jaws as a drawing: the lower arch from above when the teeth bear most.
 
 use masseter_analysis::{ContactFigures, Figures, ToothFigures};
 use masseter_charts::{Axis, ColourScale, Disc, Error, Scale, chart, discs, svg};
@@ -22,16 +22,16 @@ const NONE_N: f64 = 0.05;
 
 /// A drawing and the words to it.
 #[derive(Debug)]
-pub struct Pressure {
+pub(super) struct Pressure {
     /// What the arch shows.
-    pub caption: String,
+    pub(super) caption: String,
     /// The arch.
-    pub arch: String,
+    pub(super) arch: String,
 }
 
 impl Pressure {
     /// None where the jaws cannot touch.
-    pub fn draw(figures: &Figures) -> Option<Self> {
+    pub(super) fn draw(figures: &Figures) -> Option<Self> {
         let contact = figures.contact.as_ref()?;
         let most_n = contact.teeth.iter().fold(0.0, |most_n: f64, tooth| most_n.max(tooth.max_n));
         let scale = ColourScale::new("force, N", [0.0, most_n]);

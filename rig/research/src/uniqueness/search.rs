@@ -3,11 +3,12 @@
 
 use masseter_controller::kinematics::uniqueness::InputBox;
 use masseter_controller::kinematics::{Solution, Solutions};
-use masseter_model::geometry::{AXES, Actuators, Mechanism};
+use masseter_model::geometry::{AXES, AXIS_NAMES, Actuators, Mechanism};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use crate::multiplicity::{CONDITIONS, ORIENTED};
+use crate::table::{csv, number};
 
 /// Inputs from which the search goes uphill.
 const CLIMBS: usize = 40;
@@ -40,12 +41,21 @@ pub struct Search {
     pub climbed: Vec<Ambiguous>,
 }
 
+impl Search {
+    /// The best inputs as CSV: each axis in metres, and the lesser determinant.
+    pub fn table(&self) -> String {
+        let header = AXIS_NAMES.map(|axis| format!("{axis}_m")).join(",") + ",lesser_determinant";
+        let row = |one: &Ambiguous| (one.axes_m.map(number), number(one.lesser));
+        csv(&header, self.climbed.iter().map(row))
+    }
+}
+
 /// Looks for inputs with two solutions that meet the paper's conditions among so many random inputs of a box.
 ///
 /// ```
 /// use masseter_controller::kinematics::uniqueness::InputBox;
 /// use masseter_model::geometry::{Mechanism, MechanismConfig};
-/// use masseter_study::uniqueness::search;
+/// use masseter_research::uniqueness::search;
 ///
 /// let mechanism = Mechanism::new(&MechanismConfig::default())?;
 /// let around_neutral = InputBox::uniform([-0.002, 0.002], [0.268, 0.272]);

@@ -1,20 +1,18 @@
-//! `masseter kinematics`: the paper study as a folder of figures, data and a page of claims.
+//! `masseter-research study`: the paper study as a folder of figures, data and a page of claims.
 
 use std::path::PathBuf;
 
 use clap::Args;
 use masseter_plan::Overrides;
 use masseter_recording::output::new_folder;
+use masseter_research::{Settings, Study};
 use masseter_scenario::Scenario;
-use masseter_study::{Settings, Study};
 use masseter_terminal::{Exit, result_line, status};
 
-use crate::force_study;
-
-/// The arguments of `kinematics`.
+/// The arguments of `study`.
 #[derive(Debug, Clone, Args)]
-#[command(after_help = "Example:\n  masseter kinematics --out study")]
-pub(crate) struct KinematicsArgs {
+#[command(after_help = "Example:\n  masseter-research study --out study")]
+pub(crate) struct StudyArgs {
     /// Folder for figures (SVG), data (CSV) and claims.md; must not exist
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -36,21 +34,19 @@ pub(crate) struct KinematicsArgs {
 }
 
 /// Makes the study. A claim of the paper that does not hold is a result, not a failure.
-pub(crate) fn study(args: &KinematicsArgs) -> anyhow::Result<Exit> {
+pub(crate) fn study(args: &StudyArgs) -> anyhow::Result<Exit> {
     let prepared = Study::prepare(args.own_scenario()?.as_ref())?;
     new_folder(&args.out)?;
     let settings = Settings { seed: args.seed, samples: args.samples as usize, cells: args.cells as usize };
     let study = prepared.run(settings, |stage| status!("{stage}"))?;
-    status!("forces of runs");
-    let forces = force_study::play()?;
-    for claim in masseter_study::write(&study, forces, &args.out, &args.command())? {
+    for claim in masseter_research::write(&study, &args.out, &args.command())? {
         result_line!("{:<13}  {}", claim.judgement.name(), claim.statement)?;
     }
     result_line!("{}", args.out.join("claims.md").display())?;
     Ok(Exit::Passed)
 }
 
-impl KinematicsArgs {
+impl StudyArgs {
     /// The scenario of a motion beside the rig's own, if one is given.
     fn own_scenario(&self) -> anyhow::Result<Option<Scenario>> {
         if self.scenario.is_none() && self.trajectory.is_none() {
@@ -66,7 +62,7 @@ impl KinematicsArgs {
         let options = [("trajectory", trajectory), ("scenario", scenario)].into_iter();
         let option =
             |(name, path): (_, &Option<PathBuf>)| Some(format!(" --{name} {}", path.as_ref()?.display()));
-        format!("masseter kinematics --out DIR --seed {seed} --samples {samples} --cells {cells}")
+        format!("masseter-research study --out DIR --seed {seed} --samples {samples} --cells {cells}")
             + &options.filter_map(option).collect::<String>()
     }
 }

@@ -6,7 +6,7 @@ use serde::Serialize;
 ///
 /// # Panics
 /// When a row has not as many columns as the header.
-pub fn csv(header: &str, rows: impl IntoIterator<Item = impl Serialize>) -> String {
+pub(crate) fn csv(header: &str, rows: impl IntoIterator<Item = impl Serialize>) -> String {
     let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
     let mut written = writer.write_record(header.split(','));
     written = written.and_then(|()| rows.into_iter().try_for_each(|row| writer.serialize(row)));
@@ -15,11 +15,11 @@ pub fn csv(header: &str, rows: impl IntoIterator<Item = impl Serialize>) -> Stri
 }
 
 /// A number as short as it reads back the same; an empty cell where there is none.
-pub fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     if value.is_finite() { value.to_string() } else { String::new() }
 }
 
 /// An angle in degrees.
-pub fn degrees(angle_rad: f64) -> String {
+pub(crate) fn degrees(angle_rad: f64) -> String {
     number(angle_rad.to_degrees())
 }

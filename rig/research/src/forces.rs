@@ -4,19 +4,38 @@
 use std::path::Path;
 
 use anyhow::Context;
-use masseter_analysis::{Curve, Figures};
+use masseter_analysis::{Analysis, Curve, Figures};
 use masseter_charts::{
     Axis, Error, Key, LegendEntry, Line, LineChart, Scale, SeriesLabelPosition, legend, palette, svg,
 };
+use masseter_controller::motion_controller::MotionController;
 use masseter_model::geometry::{AXES, AXIS_NAMES, LEGS};
+use masseter_plan::RunPlan;
 use masseter_recording::Manifest;
-use masseter_report::Pressure;
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_scenario::Scenario;
-use masseter_study::{ClaimJudgement, ForceFigure, Forces, PaperClaim};
+use masseter_virtual_time::Requests;
 
-use crate::interrupts::Interrupts;
-use crate::run::shown_figures;
+use crate::claims::{ClaimJudgement, PaperClaim};
+use crate::pressure::Pressure;
+
+/// What runs of the emulated rig say of forces: claims after those of the study, and figures.
+#[derive(Debug)]
+pub(super) struct Forces {
+    pub claims: Vec<PaperClaim>,
+    /// In the order of the page.
+    pub figures: Vec<ForceFigure>,
+}
+
+/// A figure of a run.
+#[derive(Debug)]
+pub(super) struct ForceFigure {
+    /// Name of its file, without the extension.
+    pub name: &'static str,
+    pub svg: String,
+    /// What it shows.
+    pub caption: String,
+}
 
 /// Encoders without noise, whose share of the forces would hide that of friction.
 const CHEWING: &str = "duration_s = 4.0
@@ -38,9 +57,9 @@ const FRICTIONS: [(&str, &str); 3] = [
 const MATTERS: f64 = 0.1;
 
 const BITES: [(&str, &str); 3] = [
-    ("soft food", include_str!("../examples/suite/bite_soft.toml")),
-    ("gum", include_str!("../examples/suite/bite_gum.toml")),
-    ("peanut", include_str!("../examples/suite/bite_peanut.toml")),
+    ("soft food", include_str!("../../../examples/suite/bite_soft.toml")),
+    ("gum", include_str!("../../../examples/suite/bite_gum.toml")),
+    ("peanut", include_str!("../../../examples/suite/bite_peanut.toml")),
 ];
 const DESIRED: &str = "desired_bite_force_n";
 const ESTIMATED: &str = "bite_force_n";
@@ -48,17 +67,12 @@ const ESTIMATED: &str = "bite_force_n";
 const AROUND_S: f64 = 0.1;
 
 /// The jaws, pressed together by the controller.
-const PRESSED: &str = include_str!("../examples/suite/pressed_teeth.toml");
+const PRESSED: &str = include_str!("../../../examples/suite/pressed_teeth.toml");
 /// Largest difference between the forces of the teeth and the bite force, as a share.
 const BALANCED: f64 = 0.05;
 
 /// Plays the runs.
-pub(crate) fn play() -> anyhow::Result<Forces> {
-    let interrupts = Interrupts::listen().context("cannot listen for signals")?;
-    let run = |text: &str| {
-        let scenario = Scenario::parse(Path::new("study.toml"), text)?;
-        shown_figures(&scenario, &interrupts).map_err(|failure| failure.error)
-    };
+pub(super) fn play() -> anyhow::Result<Forces> {
     let mut chewing = Vec::new();
     for (_, friction) in FRICTIONS {
         chewing.push(cycle_forces(&run(&format!("{CHEWING}{friction}"))?.1)?);
@@ -68,7 +82,6 @@ pub(crate) fn play() -> anyhow::Result<Forces> {
         bites.push((food, bite(&run(text)?)?));
     }
     let (_, pressed) = run(PRESSED)?;
-    interrupts.restore_default_actions();
     let (friction, caption) = friction_claim(&chewing);
     let (jaws, pressure) = pressure_claim(&pressed)?;
     let figure = |name, svg, caption| ForceFigure { name, svg, caption };
@@ -81,6 +94,35 @@ pub(crate) fn play() -> anyhow::Result<Forces> {
             pressure,
         ],
     })
+}
+
+/// Nothing asks a run to end: an interrupt ends the whole program.
+struct Uninterrupted;
+
+impl Requests for Uninterrupted {
+    fn is_stop_requested(&self) -> bool {
+        false
+    }
+
+    fn is_abort_requested(&self) -> bool {
+        false
+    }
+}
+
+/// Plays a scenario under virtual time without a recording.
+fn run(scenario: &str) -> anyhow::Result<(Manifest, Figures)> {
+    let plan = RunPlan::new(Scenario::parse(Path::new("study.toml"), scenario)?)?;
+    let motion_s = plan.trajectory.duration_s();
+    let mut manifest =
+        Manifest::new(plan.scenario.clone(), motion_s, "virtual", masseter_machine::describe());
+    let figures = masseter_virtual_time::analyse(
+        &plan,
+        |scenario, mechanism, motion| Box::new(MotionController::new(scenario, mechanism, motion)),
+        Analysis::new,
+        &mut manifest,
+        &Uninterrupted,
+    )?;
+    Ok((manifest, figures))
 }
 
 /// Force of each axis in the second cycle of the motion, N over s.
