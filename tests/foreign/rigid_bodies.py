@@ -405,4 +405,5 @@ def turns(ours, theirs):
     return max(angles)
 
 
-main(sys.argv[1:])
+if __name__ == "__main__":
+    main(sys.argv[1:])
