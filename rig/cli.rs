@@ -9,6 +9,7 @@ use clap::{ColorChoice, Command, CommandFactory, FromArgMatches, Parser, Subcomm
 use masseter_terminal::{Exit, Failure, OrFailure, choose_colour, in_one_line, status};
 use rustix::process::umask;
 
+use crate::BUILD;
 use crate::arguments::ProcessArgs;
 use crate::bench::ipc::PeerArgs;
 use crate::bench::{self, args::BenchArgs};
@@ -58,7 +59,7 @@ Exit codes of every verb: 0 passed, 1 a check failed or was not tested, 2 wrong 
 #[derive(Debug, Parser)]
 #[command(
     name = "masseter",
-    version,
+    version = BUILD,
     max_term_width = 100,
     after_help = FIRST_STEPS,
     after_long_help = format!("{FIRST_STEPS}\n\n{EXIT_CODES}")

@@ -38,5 +38,8 @@ mod signals_cli;
 mod starter;
 mod suite;
 
+/// The build as `masseter --version` says it: version, commit, and whether the sources differ from it.
+const BUILD: &str = env!("MASSETER_BUILD");
+
 // Only what other crates call is public: derived code that nobody calls is then not compiled.
 pub use cli::main;

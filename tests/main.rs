@@ -47,6 +47,7 @@ mod stdout_errors;
 mod stimuli;
 mod suite;
 mod summary;
+mod version;
 mod virtual_time;
 mod without_frames;
 mod wrong_motion;

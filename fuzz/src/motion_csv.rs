@@ -3,9 +3,9 @@
 
 use std::fmt::Write;
 
+use crate::{assert_proper, file_of};
 use arbitrary::{Result, Unstructured};
 use masseter_controller::trajectory::Trajectory;
-use crate::{assert_proper, file_of};
 use masseter_model::geometry::{Mechanism, MechanismConfig};
 use masseter_scenario::{FileConfig, JawConfig, MotionConfig};
 

@@ -4,9 +4,9 @@
 use std::fs;
 use std::path::Path;
 
+use crate::{assert_proper, file_of};
 use arbitrary::{Result, Unstructured};
 use masseter_controller::trajectory::Trajectory;
-use crate::{assert_proper, file_of};
 use masseter_model::geometry::Mechanism;
 use masseter_scenario::{
     FaultConfig, FaultKindConfig, LateralConfig, MotionConfig, OpeningConfig, ProtrusionConfig, Scenario,

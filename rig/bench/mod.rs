@@ -24,6 +24,7 @@ use anyhow::Context;
 use masseter_scenario::wording::counted;
 use serde::Serialize;
 
+use crate::BUILD;
 use crate::arguments::name_of;
 use args::{BenchArgs, Kind};
 use circumstances::Circumstances;
@@ -49,7 +50,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Exit, Failure> {
     }
     let mut results = Results {
         form: FORM,
-        masseter: env!("CARGO_PKG_VERSION"),
+        masseter: BUILD,
         circumstances: Circumstances::on(args.cores),
         comparisons: Vec::new(),
     };

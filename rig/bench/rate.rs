@@ -226,7 +226,7 @@ mod tests {
             analysis.take(&Recorded::Reading(Reading { seq: cycle, cycle, ..Reading::default() })).unwrap();
         }
         let machine = MachineInfo { cpu: String::new(), cores: 2, kernel: String::new(), is_virtual: false };
-        let manifest = Manifest::new(Scenario::default(), 1.0, "rt", machine);
+        let manifest = Manifest::new("0.1.0", Scenario::default(), 1.0, "rt", machine);
         Run::new(&analysis.finish(false, &[]), &manifest, is_disturbed)
     }
 

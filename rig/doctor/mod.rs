@@ -18,6 +18,7 @@ use clap::Args;
 use masseter_terminal::{Exit, Format, Tone, result, result_with_tones};
 use serde::Serialize;
 
+use crate::BUILD;
 use finding::{Finding, Level};
 
 use masseter_machine::SystemRoot;
@@ -85,11 +86,11 @@ fn findings(root: &SystemRoot) -> Vec<Finding> {
 impl Report {
     fn new(findings: Vec<Finding>) -> Self {
         let level = findings.iter().map(|finding| finding.level).max().unwrap_or(Level::Ok);
-        Self { form: FORM, masseter: env!("CARGO_PKG_VERSION"), level, findings }
+        Self { form: FORM, masseter: BUILD, level, findings }
     }
 
     fn to_text(&self) -> String {
-        let mut text = String::new();
+        let mut text = format!("masseter {}\n\n", self.masseter);
         for finding in &self.findings {
             let mark = match finding.level {
                 Level::Ok => "ok",
@@ -138,7 +139,7 @@ mod tests {
             serde_json::to_value(&report).unwrap(),
             serde_json::json!({
                 "form": 1,
-                "masseter": env!("CARGO_PKG_VERSION"),
+                "masseter": BUILD,
                 "level": "warn",
                 "findings": [
                     { "check": "b", "level": "warn", "found": "odd", "cost": "some", "remedy": "do this" }

@@ -26,6 +26,7 @@ use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Format, result};
 use serde::Serialize;
 
+use crate::BUILD;
 use crate::arguments::{ControllerKind, name_of};
 use deliveries::Deliveries;
 use error::ReplayError;
@@ -101,9 +102,8 @@ pub(crate) fn replay(args: &ReplayArgs) -> anyhow::Result<Exit> {
 impl Replayed {
     fn in_words(&self, manifest: &Manifest) -> String {
         let Self { controller, clock, cycles, differences, .. } = self;
-        let build = env!("CARGO_PKG_VERSION");
-        let other = format!("; recorded by version {}, replayed by {build}", manifest.masseter);
-        let other = if manifest.masseter == build { "" } else { &other };
+        let other = format!("; recorded by masseter {}, replayed by {BUILD}", manifest.masseter);
+        let other = if manifest.masseter == BUILD { "" } else { &other };
         format!(
             "{}{cycles} cycles of the {clock} clock by the controller '{controller}', in open loop: the readings are the recorded \
              ones, whatever the controller answers{other}\n",

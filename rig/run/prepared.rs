@@ -21,7 +21,7 @@ use super::supervisor;
 use crate::arguments::{ControllerChoice, ControllerKind, name_of};
 use crate::interrupts::Interrupts;
 use crate::robot::Played;
-use crate::{doctor, robot};
+use crate::{BUILD, doctor, robot};
 
 /// Where runs without `--out` go.
 pub(super) const RUNS: &str = "runs";
@@ -194,7 +194,8 @@ fn unrecorded(
 /// What is known before the start.
 fn manifest_of(plan: &RunPlan, args: &RunArgs) -> Manifest {
     let (motion_s, clock) = (plan.trajectory.duration_s(), name_of(&args.clock));
-    let mut manifest = Manifest::new(plan.scenario.clone(), motion_s, &clock, masseter_machine::describe());
+    let machine = masseter_machine::describe();
+    let mut manifest = Manifest::new(BUILD, plan.scenario.clone(), motion_s, &clock, machine);
     manifest.motion_end_s = Some(plan.trajectory.motion_time_s(motion_s));
     manifest.controller = args.controller.name();
     manifest.full_speed = plan.scenario.dry.is_on.then_some(FullSpeed {

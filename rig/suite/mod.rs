@@ -19,6 +19,7 @@ use masseter_runtime::clock;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 use rayon::prelude::*;
 
+use crate::BUILD;
 use crate::interrupts::Interrupts;
 use crate::run::args::ClockKind;
 use crate::run::needs_processes;
@@ -45,8 +46,10 @@ pub(crate) fn test(args: &TestArgs) -> Result<Exit, Failure> {
     if let Some(path) = &args.junit {
         let runs = all.iter().map(|tested| tested.junit(args.allow_untested));
         // As errors, since most CI systems show a suite with skipped cases as passed.
-        let unrun =
-            unrun.iter().map(|case| JunitRun::new(&case.name, Err("interrupted before its end"), true, 0.0));
+        let unrun = unrun.iter().map(|case| {
+            JunitRun::new(&case.name, Err("interrupted before its end"), true, 0.0)
+                .with(vec![("masseter", BUILD.to_owned())])
+        });
         let runs: Vec<_> = runs.chain(unrun).collect();
         let xml = junit_of_suite(&runs, took_s).context("cannot make the JUnit document").incomplete()?;
         fs::write(path, xml).with_context(|| format!("cannot write {}", path.display())).incomplete()?;

@@ -6,6 +6,7 @@ use masseter_report::{JunitRun, Verdict};
 use masseter_terminal::Exit;
 
 use super::case::Case;
+use crate::BUILD;
 
 /// The word of a verdict on a run that left something untested.
 const UNTESTED: &str = "UNTESTED";
@@ -33,8 +34,11 @@ impl Tested {
     /// It as a test suite of a JUnit document.
     pub(super) fn junit(&self, allow_untested: bool) -> JunitRun<'_> {
         let verdict = self.verdict.as_ref().ok_or(self.reason.as_str());
-        let properties =
-            vec![("outcome", self.outcome.word().to_owned()), ("retries", self.retries.to_string())];
+        let properties = vec![
+            ("masseter", BUILD.to_owned()),
+            ("outcome", self.outcome.word().to_owned()),
+            ("retries", self.retries.to_string()),
+        ];
         let is_short = self.outcome.is_short(allow_untested);
         JunitRun::new(&self.case.name, verdict, is_short, self.took_s).with(properties)
     }

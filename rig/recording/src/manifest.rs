@@ -33,7 +33,7 @@ const UNJUDGED: &str = "it did not live to judge the run, or could not write how
 /// use masseter_scenario::Scenario;
 ///
 /// let machine = MachineInfo { cpu: "any".into(), cores: 2, kernel: "Linux".into(), is_virtual: false };
-/// let manifest = Manifest::new(Scenario::default(), 10.0, "virtual", machine);
+/// let manifest = Manifest::new("0.1.0", Scenario::default(), 10.0, "virtual", machine);
 /// let parent = tempfile::tempdir()?;
 /// let folder = RunFolder::create(&parent.path().join("run"))?;
 /// manifest.write(&folder)?;
@@ -44,7 +44,7 @@ const UNJUDGED: &str = "it did not live to judge the run, or could not write how
 pub struct Manifest {
     /// Version of this form.
     pub form: u32,
-    /// Version of the program.
+    /// The build of the program, as `masseter --version` says it.
     pub masseter: String,
     /// When the run began, UTC.
     pub began: String,
@@ -98,12 +98,12 @@ pub struct FullSpeed {
 }
 
 impl Manifest {
-    /// The circumstances that are known before the start.
-    pub fn new(scenario: Scenario, motion_s: f64, clock: &str, machine: Machine) -> Self {
+    /// The circumstances that are known before the start of a run by this build of the program.
+    pub fn new(build: &str, scenario: Scenario, motion_s: f64, clock: &str, machine: Machine) -> Self {
         let began = humantime::format_rfc3339_seconds(UNIX_EPOCH + clock::wall_time());
         Self {
             form: FORM,
-            masseter: env!("CARGO_PKG_VERSION").to_owned(),
+            masseter: build.to_owned(),
             began: began.to_string(),
             wall_ahead_ns: if clock == "rt" { clock::wall_ahead_ns() } else { None },
             clock: clock.to_owned(),

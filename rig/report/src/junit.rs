@@ -131,7 +131,11 @@ fn of_check(check: &Check, is_short: bool) -> CaseResult {
 /// The document of a run.
 pub(crate) fn xml(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> askama::Result<String> {
     let name = format!("masseter.{}", manifest.scenario.name);
-    let mut properties = vec![("function", verdict.word.to_owned()), ("timing", verdict.timing.to_string())];
+    let mut properties = vec![
+        ("masseter", manifest.masseter.clone()),
+        ("function", verdict.word.to_owned()),
+        ("timing", verdict.timing.to_string()),
+    ];
     if manifest.declared.motion == PlayedMotion::Own {
         properties.push(("motion", "own".to_owned()));
     }
@@ -169,7 +173,7 @@ mod tests {
     #[test]
     fn a_reason_of_any_characters_leaves_the_document_xml() {
         let machine = MachineInfo { cpu: String::new(), cores: 2, kernel: String::new(), is_virtual: false };
-        let manifest = Manifest::new(Scenario::default(), 10.0, "virtual", machine);
+        let manifest = Manifest::new("0.1.0", Scenario::default(), 10.0, "virtual", machine);
         let figures = Analysis::new(&manifest.scenario, &Declared::default()).finish(false, &[]);
         let verdict =
             Verdict { reason: "<&\u{1b}\u{ffff}\">".to_owned(), ..Verdict::new(&manifest, &figures) };

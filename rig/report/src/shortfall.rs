@@ -129,7 +129,7 @@ mod tests {
     /// A finished run that played 10 s to the end, with this change.
     fn shortfall(change: impl FnOnce(&mut Manifest, &mut Figures)) -> Option<Shortfall> {
         let machine = MachineInfo { cpu: "any".into(), cores: 2, kernel: "Linux".into(), is_virtual: false };
-        let mut manifest = Manifest::new(Scenario::default(), 10.0, "virtual", machine);
+        let mut manifest = Manifest::new("0.1.0", Scenario::default(), 10.0, "virtual", machine);
         (manifest.motion_end_s, manifest.controller) = (Some(9.5), Some("external".to_owned()));
         let mut figures = Analysis::new(&manifest.scenario, &Declared::default()).finish(false, &[]);
         figures.final_state = Some(Code::Known(ControllerState::Finished));

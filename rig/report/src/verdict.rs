@@ -28,7 +28,7 @@ use crate::timing::{Timing, TimingWord};
 /// use masseter_runtime::named::Declared;
 ///
 /// let machine = MachineInfo { cpu: "any".into(), cores: 2, kernel: "Linux".into(), is_virtual: false };
-/// let manifest = Manifest::new(Scenario::default(), 10.0, "virtual", machine);
+/// let manifest = Manifest::new("0.1.0", Scenario::default(), 10.0, "virtual", machine);
 /// let figures = Analysis::new(&manifest.scenario, &Declared::default()).finish(false, &[]);
 /// // The supervisor has not entered yet how the run ended.
 /// assert_eq!(Verdict::new(&manifest, &figures).word, "DIED");

@@ -113,8 +113,13 @@ impl Requests for Uninterrupted {
 fn run(scenario: &str) -> anyhow::Result<(Manifest, Figures)> {
     let plan = RunPlan::new(Scenario::parse(Path::new("study.toml"), scenario)?)?;
     let motion_s = plan.trajectory.duration_s();
-    let mut manifest =
-        Manifest::new(plan.scenario.clone(), motion_s, "virtual", masseter_machine::describe());
+    let mut manifest = Manifest::new(
+        env!("CARGO_PKG_VERSION"),
+        plan.scenario.clone(),
+        motion_s,
+        "virtual",
+        masseter_machine::describe(),
+    );
     let figures = masseter_virtual_time::analyse(
         &plan,
         |scenario, mechanism, motion| Box::new(MotionController::new(scenario, mechanism, motion)),

@@ -93,7 +93,7 @@ mod tests {
         figures.track.samples =
             vec![TrackingSample { sampled_ns: 0, desired: still, estimated: still, actual: still }];
         let machine = MachineInfo { cpu: String::new(), cores: 2, kernel: String::new(), is_virtual: false };
-        let manifest = Manifest::new(scenario, 1.0, "rt", machine);
+        let manifest = Manifest::new("0.1.0", scenario, 1.0, "rt", machine);
         let page = html(&manifest, &figures, &Verdict::new(&manifest, &figures)).unwrap();
         let (_, from) = page.split_once("id=\"data\">").unwrap();
         serde_json::from_str(from.split_once("</script>").unwrap().0).unwrap()

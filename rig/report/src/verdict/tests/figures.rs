@@ -48,7 +48,7 @@ impl Run {
             bound_ns: Some(190_000),
         }];
         let machine = MachineInfo { cpu: "any".into(), cores: 2, kernel: "Linux".into(), is_virtual: false };
-        let mut manifest = Manifest::new(scenario, 10.0, "rt", machine);
+        let mut manifest = Manifest::new("0.1.0", scenario, 10.0, "rt", machine);
         manifest.ending = Ending::Completed;
         Self { manifest, figures }
     }
