@@ -2,6 +2,7 @@
 
 use std::fs::File;
 
+use crate::column::Column;
 use crate::error::TableError;
 use crate::parquet_program::{ParquetFile, ParquetProgram};
 use crate::table::Table;
@@ -45,7 +46,7 @@ impl TableWriter {
             Format::Parquet(program) => Sink::Parquet(program.begin(file, table)?),
             Format::Csv => {
                 let mut writer = csv::Writer::from_writer(file);
-                writer.write_record(table.columns().iter().map(|column| column.name()))?;
+                writer.write_record(table.columns().iter().map(Column::name))?;
                 Sink::Csv(Box::new(writer))
             }
         };

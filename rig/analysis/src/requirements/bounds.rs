@@ -2,9 +2,9 @@
 
 use masseter_scenario::{Quantity, RequirementConfig, Scenario, Statistic};
 
-use super::expression::Quantified;
 use super::finding::{Finding, RequirementPlot};
 use super::moment::Moment;
+use super::quantified::Quantified;
 use super::refusal::{OfKey, Refused};
 use super::window::Window;
 use crate::series::{Extremes, Series};

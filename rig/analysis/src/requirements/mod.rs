@@ -14,6 +14,7 @@ mod moment;
 mod never;
 mod occurrence;
 mod order;
+mod quantified;
 mod refusal;
 mod requirement;
 mod response;
