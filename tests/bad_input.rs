@@ -4,7 +4,7 @@ use std::fs;
 use std::os::unix::fs::symlink;
 use std::process::Command;
 
-use crate::common::{MASSETER, Workspace, masseter, stderr, stdout};
+use crate::common::{MASSETER, Workspace, masseter, stderr};
 use serde_json::{Value, json};
 
 #[test]

@@ -1,5 +1,5 @@
 //! Runs in lockstep: three real processes leave the bytes of virtual time, whatever the machine does to them. A process
-//! that is killed or stays silent ends the run with its name.
+//! that stays silent ends the run with its name; `process_faults.rs` kills them.
 
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
@@ -7,7 +7,7 @@ use std::time::Duration;
 use masseter_runtime::clock;
 
 use crate::common::{
-    self, SharedMemory, Workspace, child_of, has_event, is_dead, masseter, stderr, stdout, wait_until,
+    SharedMemory, Workspace, child_of, ended, is_dead, masseter, stderr, stdout, wait_until,
     wait_until_it_records,
 };
 use rustix::process::{Pid, Signal, kill_process};
@@ -81,90 +81,39 @@ fn three_processes_leave_the_bytes_of_virtual_time() {
 }
 
 #[test]
-fn a_busy_machine_changes_no_byte() {
-    let scenario = "duration_s = 2.0";
+fn a_busy_machine_that_stops_processes_for_moments_changes_no_byte() {
+    let scenario = "duration_s = 10.0";
     let (expected, _) = virtual_run(scenario, &[]);
     let _load = Load::start();
-    for _ in 0..3 {
-        let workspace = Workspace::new(scenario);
-        let output = workspace.start_lockstep(&[]).wait_with_output().unwrap();
-        assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
-        assert!(workspace.recording() == expected);
-    }
-}
-
-#[test]
-fn a_process_that_is_stopped_for_a_moment_changes_no_byte() {
-    let scenario = "duration_s = 60.0";
-    let (expected, _) = virtual_run(scenario, &[]);
-    for role in ROLES {
-        let (workspace, child, _memory) = running(scenario, &[]);
+    let (workspace, child, _memory) = running(scenario, &[]);
+    for role in [ROLES, ROLES].concat() {
         let victim = child_of(&child, role);
-        for _ in 0..3 {
-            kill_process(victim, Signal::STOP).unwrap();
-            clock::sleep(Duration::from_millis(200));
-            kill_process(victim, Signal::CONT).unwrap();
-            clock::sleep(Duration::from_millis(3));
-        }
-        let output = child.wait_with_output().unwrap();
-        let context = format!("{role}: {}{}", stdout(&output), stderr(&output));
-        assert_eq!(output.status.code(), Some(0), "{context}");
-        assert!(workspace.recording() == expected, "{context}");
+        kill_process(victim, Signal::STOP).unwrap();
+        clock::sleep(Duration::from_millis(200));
+        kill_process(victim, Signal::CONT).unwrap();
+        clock::sleep(Duration::from_millis(3));
     }
-}
-
-#[test]
-fn a_process_that_is_killed_ends_the_run_with_its_name() {
-    for role in ROLES {
-        let (workspace, child, memory) = running("duration_s = 60.0", &[]);
-        kill_process(child_of(&child, role), Signal::KILL).unwrap();
-        let output = child.wait_with_output().unwrap();
-        let context = format!("{role}: {}{}", stdout(&output), stderr(&output));
-        assert_eq!(output.status.code(), Some(4), "{context}");
-        let summary = workspace.summary();
-        assert_eq!(summary["verdict"]["reason"], format!("the {role} died: SIGKILL (9)"), "{context}");
-        assert_eq!(memory.files(), Vec::<String>::new(), "{context}");
-        match role {
-            "controller" => assert!(has_event(&summary, "fault", "command_lost"), "{context}"),
-            "plant" => assert!(has_event(&summary, "fault", "stale_reading"), "{context}"),
-            _ => {}
-        }
-    }
-}
-
-#[test]
-fn a_process_that_stays_silent_ends_the_run_with_its_name_and_the_cycle() {
-    for role in ROLES {
-        let (workspace, child, memory) = running("duration_s = 60.0", &["--patience", "1s"]);
-        kill_process(child_of(&child, role), Signal::STOP).unwrap();
-        let output = child.wait_with_output().unwrap();
-        let context = format!("{role}: {}{}", stdout(&output), stderr(&output));
-        assert_eq!(output.status.code(), Some(4), "{context}");
-        let summary = workspace.summary();
-        let reason = summary["verdict"]["reason"].as_str().unwrap();
-        let silent_s = if role == "plant" { "2.0" } else { "1.0" };
-        assert!(reason.starts_with(&format!("the {role} died: it did not answer in cycle ")), "{context}");
-        assert!(reason.contains(&format!("for {silent_s} s (--patience)")), "{context}");
-        assert_eq!(memory.files(), Vec::<String>::new(), "{context}");
-    }
+    let said = ended(child, 0);
+    assert!(workspace.recording() == expected, "{said}");
 }
 
 /// If it went on, it would find the others silent, which have given it up.
 #[test]
-fn a_process_that_stays_silent_is_killed_before_it_can_go_on() {
+fn a_process_that_stays_silent_is_killed_before_it_can_go_on_and_named_with_the_cycle() {
     // Alone, the controller waits for steady readings as long as that.
     let boot = "[controller]\nsteady_readings = 10000000\nstart_timeout_s = 20000.0";
     for role in ROLES {
-        let (workspace, child, _memory) = running(boot, &["--patience", "500ms"]);
+        let (workspace, child, memory) = running(boot, &["--patience", "500ms"]);
         let victim = child_of(&child, role);
         kill_process(victim, Signal::STOP).unwrap();
         wait_until("it is killed", || is_dead(victim.as_raw_nonzero().get()));
-        let output = child.wait_with_output().unwrap();
-        let context = format!("{role}: {}{}", stdout(&output), stderr(&output));
-        assert_eq!(output.status.code(), Some(4), "{context}");
+        ended(child, 4);
         let summary = workspace.summary();
         let reason = summary["verdict"]["reason"].as_str().unwrap();
-        assert!(reason.starts_with(&format!("the {role} died: it did not answer in cycle ")), "{context}");
+        let silent_s = if role == "plant" { "1.0" } else { "0.5" };
+        assert!(reason.starts_with(&format!("the {role} died: it did not answer in cycle ")), "{reason}");
+        assert!(reason.contains(&format!("for {silent_s} s (--patience)")), "{reason}");
+        assert_eq!(memory.files(), Vec::<String>::new());
     }
 }
 
@@ -177,23 +126,11 @@ fn endless_patience_waits_and_the_user_ends_it() {
     clock::sleep(Duration::from_secs(11));
     kill_process(controller, Signal::CONT).unwrap();
     kill_process(Pid::from_child(&child), Signal::INT).unwrap();
-    let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(130), "{}{}", stdout(&output), stderr(&output));
+    ended(child, 130);
     let figures = &workspace.summary()["figures"];
     assert_eq!(figures["final_state"], "finished", "{figures}");
     assert_eq!(figures["cut_short"], false);
     assert_eq!(memory.files(), Vec::<String>::new());
-}
-
-#[test]
-fn the_processes_of_a_killed_supervisor_end() {
-    let (_workspace, mut child, memory) = running("duration_s = 60.0", &[]);
-    child.kill().unwrap();
-    child.wait().unwrap();
-    common::wait_until("all is swept", || {
-        assert_eq!(masseter(&["clean"]).status.code(), Some(0));
-        memory.files().is_empty()
-    });
 }
 
 #[test]

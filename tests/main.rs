@@ -29,7 +29,6 @@ mod operator;
 mod other_users;
 mod parallel_rigs;
 mod parameters;
-mod process_failures;
 mod process_faults;
 mod processes;
 mod recording;

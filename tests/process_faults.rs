@@ -5,7 +5,9 @@ use std::process::Output;
 
 use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain};
 
-use crate::common::{self, Cores, LENIENT, Workspace, check, masseter, skip, stderr, stdout};
+use crate::common::{
+    self, Cores, LENIENT, SharedMemory, Workspace, check, ended, has_event, masseter, skip, stderr, stdout,
+};
 
 /// A busy machine may disturb a run in real time.
 const TRIES: usize = 10;
@@ -15,11 +17,14 @@ fn with_fault(kind: &str, more: &str) -> String {
     format!("duration_s = 1.5\n[[faults]]\nkind = '{kind}'\nat_s = 0.5\n{more}")
 }
 
-fn in_lockstep(scenario: &str) -> (Workspace, Output, String) {
+/// Runs the scenario in lockstep to its end, with this exit code; nothing of the rig stays in shared memory.
+fn in_lockstep(scenario: &str, arguments: &[&str], code: i32) -> (Workspace, String) {
     let workspace = Workspace::new(scenario);
-    let output = workspace.run_simulated("lockstep", &["--quiet"]);
-    let said = format!("{scenario}: {}{}", stdout(&output), stderr(&output));
-    (workspace, output, said)
+    let rig = workspace.start_lockstep(arguments);
+    let memory = SharedMemory::of_running(&format!("{}-", rig.id()));
+    let said = format!("{scenario}: {}", ended(rig, code));
+    assert_eq!(memory.files(), Vec::<String>::new(), "{said}");
+    (workspace, said)
 }
 
 /// A run in real time in which the machine took less than half of the cycles that a stall of 100 ms takes. Were those
@@ -65,51 +70,60 @@ fn struck_in_time(cores: &Cores, scenario: &str) -> (Workspace, Output) {
 }
 
 #[test]
-fn a_killed_process_ends_the_run_with_its_name() {
-    for role in ["controller", "plant", "recorder"] {
-        let (workspace, output, said) = in_lockstep(&with_fault(&format!("{role}_kill"), ""));
-        assert_eq!(output.status.code(), Some(4), "{said}");
+fn a_process_that_is_killed_or_stalls_beyond_the_patience_ends_the_run_with_its_name() {
+    let [killed, silent] = ["SIGKILL (9)", "it did not answer in cycle "];
+    for (role, kind, size, reason) in [
+        ("controller", "kill", "", killed),
+        ("plant", "kill", "", killed),
+        ("recorder", "kill", "", killed),
+        ("plant", "stall", "size = '10 s'\n", silent),
+        ("recorder", "stall", "size = '10 s'\n", silent),
+    ] {
+        let scenario = with_fault(&format!("{role}_{kind}"), size);
+        let (workspace, said) = in_lockstep(&scenario, &["--patience", "500ms"], 4);
         let summary = workspace.summary();
-        assert_eq!(summary["verdict"]["reason"], format!("the {role} died: SIGKILL (9)"), "{said}");
-        let manifest = workspace.manifest();
-        assert_eq!(manifest["process_faults"][0]["number"], 1, "{said}");
-        // A killed recorder takes the newest messages with it, perhaps also the beginning of the motion.
+        let found = summary["verdict"]["reason"].as_str().unwrap();
+        assert!(found.starts_with(&format!("the {role} died: {reason}")), "{found}: {said}");
+        assert_eq!(workspace.manifest()["process_faults"][0]["number"], 1, "{said}");
+        // A lost recorder takes the newest messages with it, perhaps also the beginning of the motion.
         if role != "recorder" {
             assert!((struck_s(&workspace) - 0.5).abs() < 2e-3, "{}: {said}", struck_s(&workspace));
+        }
+        match (role, kind) {
+            ("controller", _) => assert!(has_event(&summary, "fault", "command_lost"), "{said}"),
+            ("plant", "kill") => assert!(has_event(&summary, "fault", "stale_reading"), "{said}"),
+            _ => {}
         }
     }
 }
 
+/// In simulated time the controller's stall withholds commands, under every clock the same; the others' costs only time.
 #[test]
-fn a_short_stall_changes_no_byte_in_lockstep() {
+fn a_short_stall_has_the_bytes_of_virtual_time_in_lockstep() {
+    let figures = |workspace: &Workspace| workspace.summary()["figures"].clone();
+    let in_virtual_time = |scenario: &str| {
+        let workspace = Workspace::new(scenario);
+        assert_eq!(workspace.run_virtual(&["--quiet"]).status.code(), Some(0), "{scenario}");
+        figures(&workspace)
+    };
+    let plain = in_virtual_time("duration_s = 1.5");
     for role in ["plant", "recorder"] {
-        let scenario = with_fault(&format!("{role}_stall"), "size = '300 ms'\n");
-        let (workspace, output, said) = in_lockstep(&scenario);
-        assert_eq!(output.status.code(), Some(0), "{said}");
+        let (workspace, said) =
+            in_lockstep(&with_fault(&format!("{role}_stall"), "size = '300 ms'\n"), &[], 0);
         let summary = workspace.summary();
         assert!(check(&summary, "faults")["finding"].as_str().unwrap().contains("1 of 1"), "{said}");
         assert!((struck_s(&workspace) - 0.5).abs() < 2e-3, "{said}");
-        let plain = Workspace::new("duration_s = 1.5");
-        assert_eq!(plain.run_virtual(&["--quiet"]).status.code(), Some(0));
-        assert_eq!(summary["figures"]["digest"], plain.summary()["figures"]["digest"], "{said}");
+        assert_eq!(figures(&workspace)["digest"], plain["digest"], "{said}");
     }
-}
-
-#[test]
-fn a_stall_beyond_the_patience_ends_the_run_with_the_name_of_the_process() {
-    for role in ["plant", "recorder"] {
-        let workspace = Workspace::new(&with_fault(&format!("{role}_stall"), "size = '10 s'\n"));
-        let output = workspace.run_simulated("lockstep", &["--quiet", "--patience", "500ms"]);
-        assert_eq!(output.status.code(), Some(4), "{}{}", stdout(&output), stderr(&output));
-        let reason = workspace.summary()["verdict"]["reason"].as_str().unwrap().to_owned();
-        assert!(reason.starts_with(&format!("the {role} died: it did not answer")), "{reason}");
-    }
+    let scenario = with_fault("controller_stall", "size = '10 ms'\n");
+    let (workspace, said) = in_lockstep(&scenario, &[], 0);
+    assert_eq!(figures(&workspace), in_virtual_time(&scenario), "{said}");
+    assert_eq!(workspace.manifest()["process_faults"].as_array().unwrap().len(), 0, "{said}");
 }
 
 #[test]
 fn a_full_disk_leaves_an_incomplete_recording() {
-    let (workspace, output, said) = in_lockstep(&with_fault("disk_full", "").replace("1.5", "5.0"));
-    assert_eq!(output.status.code(), Some(6), "{said}");
+    let (workspace, said) = in_lockstep(&with_fault("disk_full", "").replace("1.5", "5.0"), &[], 6);
     assert_eq!(workspace.summary()["verdict"]["word"], "INCOMPLETE", "{said}");
     assert_eq!(workspace.manifest()["process_faults"][0]["number"], 1, "{said}");
 }
@@ -121,8 +135,7 @@ fn stalls_of_the_loops_are_real_in_real_time_and_the_scenarios_own() {
     for (kind, skips) in [("controller_stall", "controller_skips"), ("plant_stall", "plant_skips")] {
         let require = format!(
             "[[require]]\nname = 'once'\nevent = 'fault.{kind}'\nat_least = 1\nat_most = 1\n\
-             [[require]]\nname = 'ends'\nevent = 'fault.{kind}.ended'\nat_least = 1\nat_most = 1\n\
-             "
+             [[require]]\nname = 'ends'\nevent = 'fault.{kind}.ended'\nat_least = 1\nat_most = 1\n"
         );
         let scenario = with_fault(kind, "size = '100 ms'\n") + LENIENT + &require;
         let (workspace, said) = in_quiet_real_time(&cores, &scenario);
@@ -140,38 +153,26 @@ fn stalls_of_the_loops_are_real_in_real_time_and_the_scenarios_own() {
     }
 }
 
-/// In simulated time a stall withholds commands, under every clock the same.
 #[test]
-fn a_stall_of_the_controller_has_the_bytes_of_virtual_time_in_lockstep() {
-    let scenario = with_fault("controller_stall", "size = '10 ms'\n");
-    let (workspace, output, said) = in_lockstep(&scenario);
-    assert_eq!(output.status.code(), Some(0), "{said}");
-    let alone = Workspace::new(&scenario);
-    assert_eq!(alone.run_virtual(&["--quiet"]).status.code(), Some(0));
-    assert_eq!(workspace.summary()["figures"], alone.summary()["figures"], "{said}");
-    assert_eq!(workspace.manifest()["process_faults"].as_array().unwrap().len(), 0, "{said}");
-}
-
-#[test]
-fn a_core_that_another_task_takes_is_judged_in_real_time() {
+fn a_process_is_killed_and_a_core_taken_in_real_time_too() {
     let cores = Cores::take();
+    let (workspace, output) = struck_in_time(&cores, &with_fault("plant_kill", ""));
+    assert_eq!(output.status.code(), Some(4), "{}{}", stdout(&output), stderr(&output));
+    assert_eq!(workspace.summary()["verdict"]["reason"], "the plant died: SIGKILL (9)");
+
     let request = SchedulingRequest { core: Some(0), fifo_priority: Some(81), locked_memory: false };
     let obtained = std::thread::spawn(move || obtain(request)).join().unwrap();
     if let Some(refusal) = obtained.refusals.first() {
         return skip(refusal);
     }
     let (workspace, output) = struck_in_time(&cores, &with_fault("core_stall", "size = '5 ms'\n"));
-    let said = format!("{}{}", stdout(&output), stderr(&output));
-    assert_eq!(workspace.manifest()["process_faults"][0]["number"], 1, "{said}");
-    assert!(common::PASSED_OR_INVALID.contains(&output.status.code()), "{said}");
-}
-
-#[test]
-fn a_process_is_killed_in_real_time_too() {
-    let cores = Cores::take();
-    let (workspace, output) = struck_in_time(&cores, &with_fault("plant_kill", ""));
-    assert_eq!(output.status.code(), Some(4), "{}{}", stdout(&output), stderr(&output));
-    assert_eq!(workspace.summary()["verdict"]["reason"], "the plant died: SIGKILL (9)");
+    assert_eq!(workspace.manifest()["process_faults"][0]["number"], 1);
+    assert!(
+        common::PASSED_OR_INVALID.contains(&output.status.code()),
+        "{}{}",
+        stdout(&output),
+        stderr(&output)
+    );
 }
 
 #[test]

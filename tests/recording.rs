@@ -1,22 +1,17 @@
-//! Recordings as their users meet them: looked at, proved, cut, killed, repaired, converted.
+//! Recordings as their users meet them: looked at, proved, cut, repaired, converted.
 
 use std::fs;
 use std::io::Cursor;
 use std::path::Path;
 use std::process::Output;
-use std::time::Duration;
 
 use masseter_model::geometry::Mechanism;
-use masseter_runtime::clock::{self, SECOND_NS};
 use masseter_scenario::Scenario;
 
-use crate::common::{
-    Cores, LENIENT, Workspace, child_of, cramped, json, masseter, stderr, stdout, wait_until,
-};
+use crate::common::{Workspace, cramped, json, masseter, stderr, stdout};
 use masseter_recording::{Reader, Recorded, Recorder, Scene};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use rustix::process::{Signal, kill_process};
 
 fn virtual_run() -> Workspace {
     let workspace = Workspace::new("duration_s = 1.0");
@@ -276,57 +271,3 @@ fn a_recording_cut_at_any_byte_lacks_its_end_and_nothing_else() {
 
 /// How many times a recording is cut at random.
 const CUTS: usize = 300;
-/// When the recorder is killed, from the beginning of the recording: before, between and right behind flushes.
-const KILLED_AT_MS: [u64; 10] = [0, 70, 180, 310, 440, 500, 730, 990, 1240, 1490];
-/// Tries at killing the recorder before a starved machine makes the rig stop by itself.
-const TRIES: usize = 5;
-
-/// Runs until the recording has begun, kills the recorder some time later, and returns when that was; none if the
-/// rig had come to a safe stop before.
-fn kill_the_recorder(cores: &Cores, workspace: &Workspace, after: Duration) -> Option<u64> {
-    let child = workspace.start(cores, &[]);
-    let recorder = child_of(&child, "recorder");
-    wait_until("the rig records", || workspace.recorded_bytes() > 50_000);
-    clock::sleep(after);
-    let killed_ns = clock::now_ns();
-    kill_process(recorder, Signal::KILL).unwrap();
-    let output = child.wait_with_output().unwrap();
-    match output.status.code() {
-        Some(4) => Some(killed_ns),
-        Some(5) => None,
-        _ => panic!("{}{}", stdout(&output), stderr(&output)),
-    }
-}
-
-#[test]
-fn a_killed_recorder_leaves_a_recording_that_lacks_at_most_its_last_second_and_is_recovered() {
-    let cores = Cores::take();
-    for after_ms in KILLED_AT_MS {
-        let killed = (0..TRIES).find_map(|_| {
-            let workspace = Workspace::new(&format!("duration_s = 30.0\n{LENIENT}"));
-            kill_the_recorder(&cores, &workspace, Duration::from_millis(after_ms))
-                .map(|killed_ns| (workspace, killed_ns))
-        });
-        let (workspace, killed_ns) = killed.expect("a rig that runs until its recorder is killed");
-        let recording = workspace.run_folder().join("recording.mcap");
-        let proof = log("verify", &recording, &[]);
-        assert_eq!(proof.status.code(), Some(6), "{}", stdout(&proof));
-        assert!(stdout(&proof).contains("lacks its end"), "{}", stdout(&proof));
-
-        let saved = messages(&recording);
-        let readings = saved.iter().filter_map(|message| match message {
-            Recorded::Reading(reading) => Some(reading.published_ns),
-            _ => None,
-        });
-        let lost_ns = killed_ns.saturating_sub(readings.max().unwrap_or(0));
-        eprintln!("killed {after_ms} ms after it began: the last {} ms are lost", lost_ns / 1_000_000);
-        assert!(lost_ns <= SECOND_NS, "killed {after_ms} ms after it began: {lost_ns} ns are lost");
-
-        let recovered = workspace.file("recovered.mcap");
-        let output = log("recover", &recording, &["--out", recovered.to_str().unwrap()]);
-        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-        let proof = log("verify", &recovered, &[]);
-        assert!(stdout(&proof).contains("the file has its end"), "{}", stdout(&proof));
-        assert!(!saved.is_empty() && messages(&recovered) == saved);
-    }
-}

@@ -232,6 +232,14 @@ pub(crate) fn demand_parquet() {
     assert!(program.is_file(), "{} is missing: cargo build -p masseter-parquet", program.display());
 }
 
+/// Waits for the end of a process, which exits with this code; returns what it said.
+pub(crate) fn ended(child: Child, code: i32) -> String {
+    let output = child.wait_with_output().expect("it is a child");
+    let said = stdout(&output) + &stderr(&output);
+    assert_eq!(output.status.code(), Some(code), "{said}");
+    said
+}
+
 /// Copies the program by another process: a file that this one has open for writing cannot be executed, and a child
 /// that another test starts meanwhile would hold it open.
 pub(crate) fn copy_program(to: &Path) {

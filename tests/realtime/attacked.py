@@ -25,7 +25,7 @@ import time
 import urllib.request
 from pathlib import Path
 
-from rig import children_of, lives, shared_memory_of
+from rig import END_S, LENIENT, Again, children_of, clean, inside, left_of, wait_for_end
 
 HITS = [("supervisor", signal.SIGINT), ("supervisor", signal.SIGTERM), ("supervisor", signal.SIGKILL)]
 HITS += [(role, signal.SIGKILL) for role in ("controller", "plant", "recorder")]
@@ -34,14 +34,9 @@ INTERRUPTED, DIED, INVALID = 130, 4, 3
 MOST_MORE_S = 1.0
 # Time to a page beyond the slowest one alone, s.
 PAGE_S = 1.0
-WAIT_S = 45.0
 ATTACKERS = 4
 # Connections of each kind and attacker that stay open.
 HELD = 200
-# Any number of cycles may be lost to the machine.
-LENIENT = Path(__file__).parents[1] / "lenient.toml"
-# The lock that all rigs of a user share stays.
-TURN = ".turn"
 
 
 def peer_of(target):
@@ -100,10 +95,6 @@ def attack(targets, seed):
             thread.join()
 
 
-class Disturbed(Exception):
-    """The machine took so much time that the rig ended by itself, as INVALID."""
-
-
 class Trial:
     """A rig of its own with a live page; every second one has a program as its controller."""
 
@@ -111,7 +102,6 @@ class Trial:
         self.masseter, self.name, self.said = masseter, f"attacked-{os.getpid()}-{number}", Path(folder) / "said"
         self.runtime, self.controller, self.ending = Path(folder) / "runtime", None, ending
         self.runtime.mkdir(mode=0o700)
-        self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(self.runtime)}
         words = ["run", LENIENT, "--clock", clock, "--duration", "60s", "--name", self.name, "--out", Path(folder) / "run"]
         is_external = number % 2 == 1
         words += ["--live=127.0.0.1:0", "--controller", "external" if is_external else "motion"]
@@ -126,7 +116,7 @@ class Trial:
 
     def start(self, words, said):
         process = subprocess.Popen(
-            [self.masseter, *words], env=self.environment, stdin=subprocess.DEVNULL, stdout=said, stderr=said
+            [self.masseter, *words], env=inside(self.runtime), stdin=subprocess.DEVNULL, stdout=said, stderr=said
         )
         # Whatever happens to the trial, nothing of it stays.
         self.ending.callback(process.wait)
@@ -134,7 +124,7 @@ class Trial:
         return process
 
     def wait_for(self, what, name):
-        deadline = time.monotonic() + WAIT_S
+        deadline = time.monotonic() + END_S
         while not what():
             self.require_running()
             if time.monotonic() > deadline:
@@ -146,7 +136,7 @@ class Trial:
         if self.rig.poll() is None:
             return
         if self.rig.returncode == INVALID:
-            raise Disturbed
+            raise Again
         raise SystemExit(f"the rig ended by itself with {self.rig.returncode}: {self.said.read_text()}")
 
     def sockets(self):
@@ -163,7 +153,7 @@ class Trial:
         """The time in which an honest browser has the live page, s."""
         began = time.monotonic()
         try:
-            with urllib.request.urlopen(self.address(), timeout=WAIT_S) as page:
+            with urllib.request.urlopen(self.address(), timeout=END_S) as page:
                 is_page = b"<html" in page.read()
         except OSError as error:
             # A rig that ends by itself closes its page first.
@@ -181,22 +171,8 @@ class Trial:
             children["controller"] = self.controller.pid
         self.require_running()
         os.kill(self.rig.pid if role == "supervisor" else children[role], how)
-        began = time.monotonic()
-        while self.rig.poll() is None or any(lives(child) for child in children.values()):
-            if time.monotonic() > began + WAIT_S:
-                raise SystemExit(f"{role} hit by {how.name}: a process runs after {WAIT_S} s: {self.said.read_text()}")
-            if self.controller:
-                self.controller.poll()
-            time.sleep(0.005)
-        return self.rig.returncode, time.monotonic() - began
-
-    def left(self):
-        """What stays in shared memory and in the folder of sockets."""
-        kept = [path for path in self.runtime.rglob("*") if not path.is_dir() and path.name != TURN]
-        return shared_memory_of(self.rig.pid) + kept
-
-    def clean(self):
-        subprocess.run([self.masseter, "clean"], env=self.environment, check=True, stdout=subprocess.DEVNULL)
+        over_s = wait_for_end(self.rig, children.values(), f"{role} hit by {how.name}: {self.said.read_text()}")
+        return self.rig.returncode, over_s
 
 
 def run_once(masseter, clock, hit, number, seed, is_attacked):
@@ -214,8 +190,8 @@ def run_once(masseter, clock, hit, number, seed, is_attacked):
             raise SystemExit(f"{what}: exit code {code} instead of {expected}: {trial.said.read_text()}")
         if code == -signal.SIGKILL:
             # Nobody is left who could remove anything.
-            trial.clean()
-        if left := trial.left():
+            clean(masseter, trial.runtime)
+        if left := left_of(trial.name, trial.runtime):
             raise SystemExit(f"{what}: {left} stayed")
         return over_s, page_s
 
@@ -237,17 +213,17 @@ def main():
             seed = f"{arguments.seed}-{number}"
             try:
                 return run_once(masseter, arguments.clock, hit, number, seed, is_attacked)
-            except Disturbed:
+            except Again:
                 repeated[is_attacked] += 1
         raise SystemExit("the machine is too disturbed: ten rigs in turn ended by themselves")
 
-    alone = {hit: [once(hit, False) for _ in range(2)] for hit in HITS}
+    alone = {hit: [once(hit, False) for _ in range(1 if arguments.times <= len(HITS) else 2)] for hit in HITS}
     alone_s = {hit: max(over_s for over_s, _ in measured) for hit, measured in alone.items()}
     page_alone_s = max(page_s for measured in alone.values() for _, page_s in measured)
     over_s, pages_s = collections.defaultdict(list), []
     for count in range(arguments.times):
-        # Both kinds of controllers meet every hit.
-        hit = HITS[count // 2 % len(HITS)]
+        # Both kinds of controllers meet every hit, one in the first round and the other one in the next.
+        hit = HITS[(count + count // len(HITS)) % len(HITS)]
         taken_s, page_s = once(hit, True)
         over_s[hit].append(taken_s)
         pages_s.append(page_s)

@@ -1,17 +1,38 @@
-"""Common to the scripts here: the processes of a rig, and what it leaves. Only the Python standard library is used."""
+"""Common to the scripts here: the processes of a rig, its end, and what it leaves. Only the Python standard library is
+used."""
 
 import os
 import subprocess
+import time
 from pathlib import Path
 
+# Longest time from a signal to the end of all processes of a rig, s.
+END_S = 45.0
+# Any number of cycles may be lost to the machine.
+LENIENT = Path(__file__).parents[1] / "lenient.toml"
+# The lock that all rigs of a user share stays.
+TURN = ".turn"
 
-def start(masseter, run, clock, *more, runtime=None):
-    """A rig without a terminal. Its locks and sockets are in the folder `runtime`, if given."""
-    environment = {**os.environ, "XDG_RUNTIME_DIR": str(runtime)} if runtime else None
-    words = [masseter, "run", "--clock", clock, "--quiet", "--out", run, *more]
-    return subprocess.Popen(
-        words, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
+
+class Again(Exception):
+    """A trial shows nothing: the machine had ended the rig before, or the process was not there. Another is made."""
+
+
+def inside(runtime):
+    """The environment of a rig whose locks and sockets are in the folder `runtime`."""
+    return {**os.environ, "XDG_RUNTIME_DIR": str(runtime)}
+
+
+def start(masseter, run, clock, *more, runtime):
+    """A rig without a terminal."""
+    words = [masseter, "run", *more, "--clock", clock, "--quiet", "--out", run]
+    nowhere = subprocess.DEVNULL
+    return subprocess.Popen(words, env=inside(runtime), stdin=nowhere, stdout=nowhere, stderr=nowhere)
+
+
+def clean(masseter, runtime):
+    """What a user does after the death of a supervisor."""
+    subprocess.run([masseter, "clean"], env=inside(runtime), check=True, stdout=subprocess.DEVNULL)
 
 
 def children_of(rig):
@@ -41,6 +62,22 @@ def lives(process):
         return False
 
 
-def shared_memory_of(supervisor):
-    """A rig's files in shared memory."""
-    return [name for name in os.listdir("/dev/shm") if name.startswith(f"masseter_{os.getuid()}_{supervisor}-")]
+def wait_for_end(rig, children, what):
+    """Until the rig and the processes `children` have ended: the time that this took, s."""
+    began = time.monotonic()
+    while rig.poll() is None or any(lives(child) for child in children):
+        if time.monotonic() > began + END_S:
+            raise SystemExit(f"{what}: a process still runs after {END_S:.0f} s")
+        time.sleep(0.005)
+    return time.monotonic() - began
+
+
+def shared_memory_of(name):
+    """Files in shared memory of a rig by its name, which begins with the id of its supervisor unless the user gives one."""
+    return [file for file in os.listdir("/dev/shm") if file.startswith(f"masseter_{os.getuid()}_{name}")]
+
+
+def left_of(name, runtime):
+    """What a rig has left in shared memory and in the folder of its locks and sockets."""
+    kept = [path for path in Path(runtime).rglob("*") if not path.is_dir() and path.name != TURN]
+    return shared_memory_of(name) + kept
