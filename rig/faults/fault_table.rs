@@ -1,6 +1,6 @@
 //! Every kind of fault, at every node and message, for several durations, at several instants of the motion: what it does to
-//! the jaw and what detects it, as a table. None may lead the jaw beyond the limits. `cargo test` takes one duration at one
-//! instant; all of them take minutes:
+//! the jaw and what detects it, as a table. None may lead the jaw beyond the limits. The command
+//! `masseter faults matrix` takes a sample of these; the whole table takes minutes:
 //!
 //!     cargo test --release --package masseter --lib -- --ignored fault_table
 //!
@@ -23,10 +23,8 @@ use crate::interrupts::Interrupts;
 use crate::run::figures_unrecorded;
 
 const CYCLES: [u32; 8] = [1, 2, 5, 10, 20, 50, 100, 500];
-const SAMPLE_OF_CYCLES: [u32; 1] = [20];
 /// Since switch-on: while easing, while chewing, and where the legs move fastest.
 const FROM_S: [f64; 4] = [0.7, 2.5, 3.0, 3.25];
-const SAMPLE_OF_FROM_S: [f64; 1] = [3.25];
 /// Every message is sent within so many cycles.
 const SENT_WITHIN: u32 = 100;
 /// While the drives boot.
@@ -135,11 +133,6 @@ fn row(fault: &FaultConfig, cycles: u32, from_s: f64) -> (String, bool) {
     // The negation also counts what is no number.
     let is_within = mm <= tracking_max_mm && deg <= tracking_max_deg;
     (row, !is_typed || !is_within)
-}
-
-#[test]
-fn no_fault_of_a_sample_leads_the_jaw_beyond_the_limits() {
-    judge("fault-table-sample.csv", faults_of_bus, &SAMPLE_OF_CYCLES, &SAMPLE_OF_FROM_S);
 }
 
 #[test]
