@@ -64,5 +64,5 @@ note() { printf '%s\n' "$*" >>"${CI_NOTES:-/dev/null}"; }
 sampled() { # shards, as the beginning of their names; the sample
     local runs
     runs=$(sed -n "s/^| \`\($1[^ ]*\)\` | \([^|]*\) | \([^|]*\) | \(.*\) |/\1 of \2 at \3: \4/p" docs/nightly.md | paste -sd ';')
-    note "$1: sampled ($2); whole: ${runs:-never}"
+    note "${1%-}: sampled ($2); whole: ${runs:-never yet}"
 }

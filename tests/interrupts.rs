@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use masseter_runtime::clock;
 
-use crate::common::{Cores, LENIENT, Workspace, child_of, ended, wait_until};
+use crate::common::{Cores, LENIENT, Workspace, child_of, ended, is_dead, wait_until};
 use rustix::process::{Pid, Signal, kill_process, kill_process_group, test_kill_process};
 
 #[test]
@@ -80,6 +80,8 @@ fn a_second_signal_ends_the_run_at_once_as_interrupted() {
     kill_process(Pid::from_child(&child), Signal::TERM).unwrap();
     wait_until("the plant has ended", || test_kill_process(plant).is_err());
     kill_process(Pid::from_child(&child), Signal::TERM).unwrap();
+    // It would wait for the recorder for a minute.
+    wait_until("the run is over", || is_dead(Pid::from_child(&child).as_raw_nonzero().get()));
     ended(child, 130);
     assert_eq!(workspace.manifest()["ending"]["kind"], "interrupted", "{}", workspace.manifest()["ending"]);
 }

@@ -2,6 +2,7 @@
 cases. Only the Python standard library is used."""
 
 import collections
+import contextlib
 import csv
 import json
 import os
@@ -98,11 +99,14 @@ class Trial:
 
     def __exit__(self, *_):
         # Whatever was wrong, nothing of the trial stays.
-        for process in {**self.children, **children_of(self.rig)}.values():
-            if lives(process):
+        left = [*{**self.children, **children_of(self.rig)}.values(), self.rig.pid]
+        left = [process for process in left if lives(process)]
+        for process in left:
+            with contextlib.suppress(ProcessLookupError):
                 os.kill(process, signal.SIGKILL)
-        self.rig.kill()
-        self.rig.wait()
+        if left:
+            wait_for_end(self.rig, left, self.name)
+            clean(self.rigs.masseter, self.runtime)
         self.folder.cleanup()
 
     # The hit.
@@ -175,11 +179,9 @@ class Trial:
         if how == "KILL":
             return
         time.sleep(self.stop_s())
-        try:
+        with contextlib.suppress(ProcessLookupError):
+            # The supervisor may have killed it.
             os.kill(victims[0], signal.SIGCONT)
-        except ProcessLookupError:
-            # The supervisor has killed it.
-            pass
 
     def stop_s(self):
         """Longest in lockstep: longer than the patience of all processes in turn."""
