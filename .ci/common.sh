@@ -36,8 +36,8 @@ use_python() {
     "$python" -m pip install --quiet --disable-pip-version-check --requirement .ci/requirements.txt
 }
 
-# The README's test command, of all packages but the fuzz targets, which need a foreign library. The compiler is clippy, which
-# compiles as rustc does: its lints and the tests share one build.
+# The README's test command, of every package. The compiler is clippy, which compiles as rustc does: its lints and the tests share
+# one build. The programs of fuzz_targets/ need a foreign library, and scripts/nightly alone compiles them.
 cargo_test() {
     mkdir -p "$tools/documentation"
     RUSTC_WORKSPACE_WRAPPER=clippy-driver CLIPPY_ARGS=-D__CLIPPY_HACKERY__warnings \
