@@ -7,14 +7,17 @@ use std::fs::File;
 use std::io::{self, ErrorKind, IsTerminal};
 use std::os::fd::AsFd;
 use std::process::ExitCode;
+use std::sync::Arc;
 
-use anyhow::{Context, anyhow, bail};
+use anyhow::{anyhow, bail};
 use masseter_table::Rows;
 use masseter_terminal::{Exit, OrFailure, status};
 
 use file::ParquetFile;
 
 fn main() -> ExitCode {
+    // A write beyond the limit on the size of files is then an error, not the end.
+    let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
     match write().usage() {
         Ok(()) => Exit::Passed.into(),
         Err(failure) => {
@@ -39,8 +42,15 @@ fn write() -> anyhow::Result<()> {
     })?;
     let to = File::from(io::stdout().as_fd().try_clone_to_owned()?);
     let mut file = ParquetFile::begin(to, rows.columns())?;
-    while let Some(part) = rows.next_part().context("the rows have no end")? {
+    while let Some(part) = rows.next_part().map_err(unended)? {
         file.write(part.columns())?;
     }
     file.finish()
+}
+
+/// Only a sender that died leaves rows without an end.
+fn unended(error: io::Error) -> anyhow::Error {
+    let is_cut = error.kind() == ErrorKind::UnexpectedEof;
+    let error = anyhow::Error::from(error);
+    if is_cut { error.context("the rows have no end") } else { error }
 }

@@ -94,6 +94,9 @@ impl Values {
                 let length = u64::from_le_bytes(bytes(from)?);
                 let mut text = String::new();
                 from.take(length).read_to_string(&mut text)?;
+                if text.len() as u64 != length {
+                    return Err(io::ErrorKind::UnexpectedEof.into());
+                }
                 Ok(text)
             }),
             Self::Truths(values) => receive(values, count, from, |from| Ok(bytes(from)? == [1])),

@@ -3,6 +3,7 @@
 use std::env;
 use std::fs::File;
 use std::io::{self, BufWriter, ErrorKind, Read, Write};
+use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::{Child, ChildStdin, Command, Stdio};
 
@@ -39,6 +40,8 @@ impl ParquetProgram {
     pub(crate) fn begin(&self, file: File, table: &Table) -> Result<ParquetFile, TableError> {
         let mut command = Command::new(&self.path);
         command.stdin(Stdio::piped()).stdout(file).stderr(Stdio::piped());
+        // Ctrl-C is for the command, which ends this program in order.
+        command.process_group(0);
         let mut child =
             command.spawn().map_err(|source| TableError::NotStarted { path: self.path.clone(), source })?;
         let rows = BufWriter::new(child.stdin.take().expect("its standard input is a pipe"));
@@ -77,11 +80,11 @@ impl ParquetFile {
     }
 
     fn wait(&mut self) -> Result<(), TableError> {
-        let mut said = String::new();
+        let mut said = Vec::new();
         if let Some(stderr) = &mut self.child.stderr {
-            stderr.read_to_string(&mut said)?;
+            stderr.read_to_end(&mut said)?;
         }
-        let said = said.trim().to_owned();
+        let said = String::from_utf8_lossy(&said).trim().to_owned();
         let status = self.child.wait()?;
         match status.code() {
             Some(0) => Ok(()),

@@ -67,8 +67,10 @@ impl<R: BufRead> Rows<R> {
     /// # Errors
     /// Those of reading; [`ErrorKind::UnexpectedEof`] where the sender has not ended the rows.
     pub fn next_part(&mut self) -> io::Result<Option<&Table>> {
-        if bytes(&mut self.from)? == END {
-            return Ok(None);
+        match bytes(&mut self.from)? {
+            END => return Ok(None),
+            PART => {}
+            _ => return Err(ErrorKind::InvalidData.into()),
         }
         let count = u64::from_le_bytes(bytes(&mut self.from)?);
         self.part.receive(count, &mut self.from)?;

@@ -71,6 +71,17 @@ fn rows_arrive_bit_by_bit_with_their_columns() {
 }
 
 #[test]
+fn a_text_that_is_cut_short_is_an_error() {
+    let words = Values::Words(vec![Some("passed".to_owned())]);
+    let table = Table::new(vec![Column::new("verdict", "", "verdict", words)]);
+    let mut sent = Vec::new();
+    send_columns(&table, &mut sent).unwrap();
+    send_part(&table, &mut sent).unwrap();
+    let mut rows = Rows::new(&sent[..sent.len() - 1]).unwrap();
+    assert_eq!(rows.next_part().unwrap_err().kind(), ErrorKind::UnexpectedEof);
+}
+
+#[test]
 fn rows_without_their_end_are_an_error() {
     let mut sent = Vec::new();
     send_columns(&table(), &mut sent).unwrap();
