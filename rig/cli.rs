@@ -11,7 +11,6 @@ use rustix::process::umask;
 
 use crate::BUILD;
 use crate::arguments::ProcessArgs;
-use crate::bench::ipc::PeerArgs;
 use crate::bench::{self, args::BenchArgs};
 use crate::campaigns::{
     self,
@@ -152,8 +151,6 @@ enum Verb {
         _arguments: Vec<OsString>,
     },
     #[command(hide = true)]
-    BenchPeer(PeerArgs),
-    #[command(hide = true)]
     CampaignCase(CampaignCaseArgs),
     #[command(hide = true)]
     Recorder {
@@ -222,7 +219,6 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Replay(args) => replay::replay(&args).usage(),
         Verb::Diff(args) => diff::diff(&args).usage(),
         Verb::Bench(args) => bench::run(&args),
-        Verb::BenchPeer(args) => bench::ipc::answer(&args).map(|()| Exit::Passed).usage(),
         Verb::Fk(args) => kinematics_cli::forward(&args).usage(),
         Verb::Ik(args) => kinematics_cli::inverse(&args).usage(),
         Verb::Can(verb) => can::execute(&verb).usage(),

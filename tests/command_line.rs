@@ -82,7 +82,7 @@ fn every_visible_verb_has_a_manual_page() {
     }
     let has = |name: &str| folder.join(name).exists();
     assert!(has("masseter.1") && has("masseter-run.1") && has("masseter-can-plan.1"));
-    assert!(!has("masseter-recorder.1") && !has("masseter-bench-peer.1"));
+    assert!(!has("masseter-recorder.1") && !has("masseter-campaign-case.1"));
     let page = fs::read_to_string(folder.join("masseter-run.1")).unwrap();
     assert!(
         page.contains("CHOOSE WHAT TO PLAY") && page.contains("masseter run \\-\\-duration 30"),

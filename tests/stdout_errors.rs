@@ -26,7 +26,7 @@ fn a_full_disk_behind_standard_output_is_exit_6_and_a_closed_pipe_is_no_failure(
         &["report", folder, folder],
         &["report", folder, "--format", "json"],
         &["report", folder],
-        &["bench", "ipc", "--rounds", "1", "--format", "json"],
+        &["bench", "virtual", "--rounds", "1", "--format", "json"],
     ];
     for verb in verbs {
         let into = |output: Stdio| {

@@ -10,11 +10,9 @@ use masseter_terminal::Format;
 pub(crate) enum Kind {
     /// Wake-ups of the real-time loop, against cyclictest
     Loop,
-    /// Command and reading between two processes, against bare iceoryx2, a cache line, a socket
-    Ipc,
     /// The whole rig at 1 to 20 kHz without bus delays
     Rate,
-    /// Whole runs in lockstep and in virtual time, against real time and a round trip over bare iceoryx2
+    /// Whole runs in lockstep and in virtual time, per cycle and against each other
     Simulated,
     /// One motion of 10 s in virtual time without a recording, as suites and campaigns play it
     Virtual,
@@ -23,7 +21,7 @@ pub(crate) enum Kind {
 /// The arguments.
 #[derive(Debug, Clone, Args)]
 #[command(
-    after_help = "Examples:\n  masseter bench loop\n  masseter bench loop ipc rate simulated virtual --out figures"
+    after_help = "Examples:\n  masseter bench loop\n  masseter bench loop rate simulated virtual --out figures"
 )]
 pub(crate) struct BenchArgs {
     /// What to measure

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use masseter_round_trips::Durations;
+use super::durations::Durations;
 use serde::Serialize;
 
 use masseter_report::histogram_log;
@@ -129,7 +129,7 @@ impl Candidate {
 
 #[cfg(test)]
 mod tests {
-    use masseter_round_trips::{no_durations, record};
+    use super::super::durations::{no_durations, record};
 
     use super::*;
 

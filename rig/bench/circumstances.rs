@@ -9,7 +9,7 @@ use masseter_terminal::status;
 use serde::Serialize;
 
 use super::args::Kind;
-use masseter_round_trips::realtime_on;
+use super::durations::realtime_on;
 
 /// Written with the results.
 #[derive(Debug, Serialize)]
@@ -44,7 +44,7 @@ fn check(kinds: &[Kind], [own, peer]: [usize; 2], allowed: &[usize]) -> anyhow::
     ensure!(
         kinds.iter().all(|kind| matches!(kind, Kind::Loop | Kind::Virtual))
             || own != peer && [own, peer].iter().all(|core| allowed.contains(core)),
-        "bench ipc, rate and simulated need two cores: choose two among {named} with --cores; 'masseter doctor' shows how to allow \
+        "bench rate and simulated need two cores: choose two among {named} with --cores; 'masseter doctor' shows how to allow \
          other cores. bench loop and virtual need one"
     );
     Ok(())
@@ -58,14 +58,14 @@ mod tests {
     fn two_sides_need_two_cores_that_may_be_used() {
         let refusal =
             |kind, cores, allowed: &[usize]| check(&[kind], cores, allowed).err().map(|e| e.to_string());
-        assert_eq!(refusal(Kind::Ipc, [0, 1], &[0, 1]), None);
+        assert_eq!(refusal(Kind::Rate, [0, 1], &[0, 1]), None);
         for kind in [Kind::Loop, Kind::Virtual] {
             assert_eq!(refusal(kind, [0, 0], &[0]), None, "one side needs one");
         }
         for (kind, cores, allowed, choice) in [
-            (Kind::Ipc, [0, 1], &[3][..], "among 3 with"),
+            (Kind::Rate, [0, 1], &[3][..], "among 3 with"),
             (Kind::Rate, [1, 1], &[0, 1], "among 0, 1 with"),
-            (Kind::Ipc, [0, 4], &[0, 1], "among 0, 1 with"),
+            (Kind::Rate, [0, 4], &[0, 1], "among 0, 1 with"),
         ] {
             let refusal = refusal(kind, cores, allowed).unwrap();
             assert!(refusal.contains(choice), "{refusal}");

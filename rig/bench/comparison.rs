@@ -81,7 +81,7 @@ impl Comparison {
 mod tests {
     use super::super::candidate::Spread;
     use super::*;
-    use masseter_round_trips::no_durations;
+    use super::super::durations::no_durations;
 
     fn round(value_ns: u64) -> Round {
         let mut round = no_durations();

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use masseter_machine::SystemRoot;
 use masseter_machine::counters::stolen_ns;
-use masseter_round_trips::on_core;
+use super::durations::on_core;
 
 /// With a greater share of time stolen or standing still, high percentiles come from the machine, %.
 const BOUND_PERCENT: f64 = 1.0;

@@ -8,8 +8,7 @@ mod candidate;
 mod circumstances;
 mod comparison;
 mod disturbance;
-pub(crate) mod ipc;
-mod peer;
+mod durations;
 mod played_run;
 mod rate;
 mod simulated;
@@ -72,7 +71,6 @@ fn measure_each(args: &BenchArgs, results: &mut Results) -> anyhow::Result<()> {
         status!("bench {name}: {} …", counted(args.rounds.into(), "round"));
         let comparison = match kind {
             Kind::Loop => wake::measure(args.rounds, args.cores[0]),
-            Kind::Ipc => ipc::measure(args.rounds, args.cores),
             Kind::Rate => rate::measure(args.rounds, args.cores),
             Kind::Simulated => simulated::measure(args.rounds, args.cores),
             Kind::Virtual => virtual_time::measure(args.rounds, args.cores[0]),

@@ -18,7 +18,7 @@ use super::candidate::{Candidate, Round};
 use super::comparison::{Comparison, take_turns};
 use super::played_run::PlayedRun;
 use crate::interrupts::Interrupts;
-use masseter_round_trips::{Durations, no_durations};
+use super::durations::{Durations, no_durations};
 
 /// Rates, Hz; the others are compared with the first.
 const RATES_HZ: [u32; 5] = [1000, 2000, 5000, 10_000, 20_000];
@@ -180,7 +180,7 @@ mod tests {
     use masseter_runtime::messages::{Reading, State};
 
     use super::*;
-    use masseter_round_trips::record;
+    use super::super::durations::record;
 
     #[test]
     fn runs_that_stopped_or_lost_messages_are_noted_but_not_measured() {

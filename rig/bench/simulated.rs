@@ -1,7 +1,6 @@
 //! `bench simulated`: how fast runs in simulated time are, from the start of the run to its verdict.
 //!
-//! Each round of a clock is a whole run of the default scenario. Its wall time, divided by its cycles, is compared with one
-//! round trip over bare iceoryx2: the least that a cycle of two processes can take.
+//! Each round of a clock is a whole run of the default scenario; its wall time is divided by its cycles.
 
 use std::fs;
 use std::time::Duration;
@@ -14,10 +13,9 @@ use serde_json::Value;
 
 use super::candidate::Candidate;
 use super::comparison::{Comparison, Turn};
-use super::ipc;
 use super::played_run::PlayedRun;
 use crate::interrupts::Interrupts;
-use masseter_round_trips::{Durations, no_durations, record};
+use super::durations::{Durations, no_durations, record};
 
 /// Motion of a run, s; start and report are a small part of so long a run.
 const MOTION_S: f64 = 30.0;
@@ -27,21 +25,15 @@ const CHECK_EVERY: Duration = Duration::from_millis(2);
 pub(super) fn measure(rounds: u32, cores: [usize; 2]) -> anyhow::Result<Comparison> {
     const LOCKSTEP: &str = "lockstep";
     const VIRTUAL: &str = "virtual";
-    const BARE: &str = "bare iceoryx2, round trip";
     let interrupts = Interrupts::listen().context("cannot listen for signals")?;
     let interrupts_seen = &interrupts;
     let run = |clock| -> Turn { Box::new(move || Ok(per_cycle(clock, cores, interrupts_seen)?.into())) };
-    let turns = vec![
-        (LOCKSTEP, run(LOCKSTEP)),
-        (VIRTUAL, run(VIRTUAL)),
-        (BARE, Box::new(move || Ok(ipc::bare_round_trips(cores)?.into()))),
-    ];
+    let turns = vec![(LOCKSTEP, run(LOCKSTEP)), (VIRTUAL, run(VIRTUAL))];
     let measures = "wall time of a whole run, from its start to its verdict, per cycle";
     let compared = Comparison::by_turns("simulated", measures, rounds, &cores, turns);
     interrupts.restore_default_actions();
-    let mut comparison = compared?.comparing([(LOCKSTEP, VIRTUAL), (LOCKSTEP, BARE), (VIRTUAL, BARE)]);
-    let runs = comparison.candidates.iter().filter(|candidate| candidate.name != BARE);
-    comparison.notes = runs.filter_map(times_real_time).collect();
+    let mut comparison = compared?.comparing([(LOCKSTEP, VIRTUAL)]);
+    comparison.notes = comparison.candidates.iter().filter_map(times_real_time).collect();
     Ok(comparison)
 }
 

@@ -15,7 +15,7 @@ use super::played_run::Interrupted;
 use crate::interrupts::Interrupts;
 use crate::run::args::{ClockKind, RunArgs};
 use crate::run::judge_unrecorded;
-use masseter_round_trips::{no_durations, record};
+use super::durations::{no_durations, record};
 
 /// Motion of a run, ns.
 const MOTION_NS: f64 = 10e9;

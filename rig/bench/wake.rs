@@ -15,8 +15,7 @@ use masseter_scenario::{CpuDmaLatency, RealtimeConfig};
 use super::candidate::Round;
 use super::comparison::{Comparison, Turn};
 use masseter_machine::dma_latency::Hold;
-use masseter_round_trips::on_core;
-use masseter_round_trips::{Durations, no_durations, record};
+use super::durations::{Durations, no_durations, on_core, record};
 
 const PERIOD_NS: u64 = SECOND_NS / 1000;
 /// Wake-ups per round.

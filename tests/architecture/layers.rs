@@ -6,7 +6,7 @@ use super::workspace::{list, metadata, text, within};
 
 /// The crates of the workspace that each crate may use, all by their folders. The root package may use all
 /// but the programs that a run does not need.
-const MAY_USE: [(&str, &[&str]); 27] = [
+const MAY_USE: [(&str, &[&str]); 26] = [
     ("shared/can", &[]),
     ("shared/model", &[]),
     ("shared/scenario", &["shared/can", "shared/model"]),
@@ -22,7 +22,6 @@ const MAY_USE: [(&str, &[&str]); 27] = [
     ("rig/page", &[]),
     ("rig/table", &[]),
     ("rig/parquet", &["rig/table", "rig/terminal"]),
-    ("rig/round_trips", &["shared/scenario", "shared/runtime"]),
     ("rig/plan", &["shared/model", "shared/scenario", "shared/runtime", "controller", "plant"]),
     ("rig/recording", &["shared/model", "shared/scenario", "shared/runtime"]),
     (
