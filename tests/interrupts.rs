@@ -5,7 +5,7 @@ use std::os::unix::process::CommandExt;
 use std::process::{Child, Stdio};
 use std::time::Duration;
 
-use masseter_runtime::clock;
+use masseter_runtime::clock::{self, SECOND_NS};
 
 use crate::common::{Cores, LENIENT, Workspace, child_of, ended, is_dead, wait_until};
 use rustix::process::{Pid, Signal, kill_process, kill_process_group, test_kill_process};
@@ -17,7 +17,15 @@ fn an_interrupted_motion_ends_in_order_and_is_held_for_the_whole_hold_time() {
         Workspace::running(&cores, &LENIENT.replace("[controller]", "[controller]\nhold_s = 6.0"));
     kill_process(Pid::from_child(&child), Signal::INT).unwrap();
     ended(child, 130);
-    assert_eq!(workspace.summary()["figures"]["final_state"], "finished");
+    let summary = workspace.summary();
+    assert_eq!(summary["figures"]["final_state"], "finished");
+    let entered_ns = |state: &str| {
+        let events = summary["figures"]["events"].as_array().unwrap().iter();
+        let mut entries = events.filter(|event| event["transition"][1] == state);
+        entries.next().and_then(|event| event["time_ns"].as_u64()).unwrap_or_else(|| panic!("never {state}"))
+    };
+    let held_ns = entered_ns("disabling") - entered_ns("holding");
+    assert!(held_ns >= 6 * SECOND_NS, "held for {held_ns} ns");
 }
 
 #[test]

@@ -80,8 +80,8 @@ impl Comparison {
 #[cfg(test)]
 mod tests {
     use super::super::candidate::Spread;
-    use super::*;
     use super::super::durations::no_durations;
+    use super::*;
 
     fn round(value_ns: u64) -> Round {
         let mut round = no_durations();

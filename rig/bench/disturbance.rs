@@ -6,9 +6,9 @@ use masseter_runtime::clock::{self, SECOND_NS};
 use masseter_runtime::realtime::Waiter;
 use serde::Serialize;
 
+use super::durations::on_core;
 use masseter_machine::SystemRoot;
 use masseter_machine::counters::stolen_ns;
-use super::durations::on_core;
 
 /// With a greater share of time stolen or standing still, high percentiles come from the machine, %.
 const BOUND_PERCENT: f64 = 1.0;

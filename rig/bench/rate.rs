@@ -16,9 +16,9 @@ use masseter_terminal::Exit;
 
 use super::candidate::{Candidate, Round};
 use super::comparison::{Comparison, take_turns};
+use super::durations::{Durations, no_durations};
 use super::played_run::PlayedRun;
 use crate::interrupts::Interrupts;
-use super::durations::{Durations, no_durations};
 
 /// Rates, Hz; the others are compared with the first.
 const RATES_HZ: [u32; 5] = [1000, 2000, 5000, 10_000, 20_000];
@@ -179,8 +179,8 @@ mod tests {
     use masseter_recording::{MachineInfo, Recorded};
     use masseter_runtime::messages::{Reading, State};
 
-    use super::*;
     use super::super::durations::record;
+    use super::*;
 
     #[test]
     fn runs_that_stopped_or_lost_messages_are_noted_but_not_measured() {

@@ -13,9 +13,9 @@ use serde_json::Value;
 
 use super::candidate::Candidate;
 use super::comparison::{Comparison, Turn};
+use super::durations::{Durations, no_durations, record};
 use super::played_run::PlayedRun;
 use crate::interrupts::Interrupts;
-use super::durations::{Durations, no_durations, record};
 
 /// Motion of a run, s; start and report are a small part of so long a run.
 const MOTION_S: f64 = 30.0;

@@ -11,11 +11,11 @@ use rustix::mm::munlockall;
 
 use super::candidate::{Candidate, Round};
 use super::comparison::{Comparison, take_turns};
+use super::durations::{no_durations, record};
 use super::played_run::Interrupted;
 use crate::interrupts::Interrupts;
 use crate::run::args::{ClockKind, RunArgs};
 use crate::run::judge_unrecorded;
-use super::durations::{no_durations, record};
 
 /// Motion of a run, ns.
 const MOTION_NS: f64 = 10e9;

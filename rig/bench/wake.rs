@@ -14,8 +14,8 @@ use masseter_scenario::{CpuDmaLatency, RealtimeConfig};
 
 use super::candidate::Round;
 use super::comparison::{Comparison, Turn};
-use masseter_machine::dma_latency::Hold;
 use super::durations::{Durations, no_durations, on_core, record};
+use masseter_machine::dma_latency::Hold;
 
 const PERIOD_NS: u64 = SECOND_NS / 1000;
 /// Wake-ups per round.

@@ -34,8 +34,8 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from rig import Again
-from trial import ANY, CLEAN, LACKS, MOTION, REFUSED, ROLES, STALLS, Case, Rigs, Trial, Wrong
+from rig import Again, Wrong
+from trial import ANY, CLEAN, LACKS, MOTION, REFUSED, ROLES, STALLS, Case, Rigs, Trial
 
 CASES = [
     *(Case("rt", "KILL", role, ANY) for role in ROLES),

@@ -18,6 +18,15 @@ class Again(Exception):
     """A trial shows nothing: the machine had ended the rig before, or the process was not there. Another is made."""
 
 
+class Wrong(Exception):
+    """What must not be."""
+
+
+def require(is_so, what):
+    if not is_so:
+        raise Wrong(what)
+
+
 def inside(runtime):
     """The environment of a rig whose locks and sockets are in the folder `runtime`."""
     return {**os.environ, "XDG_RUNTIME_DIR": str(runtime)}
@@ -66,8 +75,7 @@ def wait_for_end(rig, children, what):
     """Until the rig and the processes `children` have ended: the time that this took, s."""
     began = time.monotonic()
     while rig.poll() is None or any(lives(child) for child in children):
-        if time.monotonic() > began + END_S:
-            raise SystemExit(f"{what}: a process still runs after {END_S:.0f} s")
+        require(time.monotonic() < began + END_S, f"{what}: a process still runs after {END_S:.0f} s")
         time.sleep(0.005)
     return time.monotonic() - began
 

@@ -13,7 +13,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from rig import LENIENT, Again, children_of, clean, inside, left_of, lives, shared_memory_of, start, wait_for_end
+from rig import LENIENT, Again, children_of, clean, inside, left_of, lives, require, shared_memory_of, start, wait_for_end
 
 PROCESSES = ("controller", "plant", "recorder")
 ROLES = ("supervisor", *PROCESSES)
@@ -24,6 +24,8 @@ PASSED, DISTURBED, DIED, SAFE_STOP, INCOMPLETE = 0, 3, 4, 5, 6
 TYPED = range(7)
 DURATION = {ANY: "1s", MOTION: "60s"}
 STALLED_RUN = "5s"
+# Longest time from the start of a rig to its recording, and of a stalled run, s.
+START_S, LONGEST_STALLED_S = 45.0, 120.0
 PATIENCE_S = 1.0
 # Half of what the recorder's queues hold at 1 kHz.
 RECORDER_PAUSE_S = 1.0
@@ -40,15 +42,6 @@ BEGUN_BYTES = 500_000
 BEGINNING = 0.1
 STALLS_S, LONGEST_BREAK_S = (0.001, 0.002, 0.004, 0.008), 0.06
 REFUSALS = {"bad_message", "stroke_limit", "velocity_limit", "acceleration_limit"}
-
-
-class Wrong(Exception):
-    """What must not be."""
-
-
-def require(is_so, what):
-    if not is_so:
-        raise Wrong(what)
 
 
 class Rigs:
@@ -149,7 +142,7 @@ class Trial:
 
     def wait_for_recording(self, length):
         """With any length, also zero, there is a recorder."""
-        deadline = time.monotonic() + 45.0
+        deadline = time.monotonic() + START_S
         while self.recorded_bytes() < length or "recorder" not in children_of(self.rig):
             if self.rig.poll() is not None:
                 raise Again
@@ -170,7 +163,7 @@ class Trial:
         victims = list(roles.values()) if role == "all" else [roles[role]] if role in roles else []
         if self.rig.poll() is not None or not victims or not all(lives(victim) for victim in victims):
             raise Again
-        self.hit_ns = time.monotonic_ns()
+        self.hit_ns, self.bytes_at_hit = time.monotonic_ns(), self.recorded_bytes()
         try:
             for victim in victims:
                 os.kill(victim, signal.SIGKILL if how == "KILL" else signal.SIGSTOP)
@@ -200,8 +193,7 @@ class Trial:
             began_ns = time.monotonic_ns()
             clean(self.rigs.masseter, self.runtime)
             self.measures[CLEAN] = (time.monotonic_ns() - began_ns) / 1e6
-        left = left_of(f"{self.rig.pid}-", self.runtime)
-        require(not left, f"{left} stayed")
+        self.require_nothing_left()
         require(code == -signal.SIGKILL if is_killed else code in TYPED, f"exit code {code}")
         if clock == "rt" and (how != "STOP" and code == DISTURBED or self.is_faulty_before()):
             raise Again
@@ -209,12 +201,17 @@ class Trial:
         word, reason = verdict["word"], verdict["reason"]
         what = f"exit {code}, {word}, recording {verified}"
         passed = code == PASSED or word.startswith("PASS")
+        if clock == "lockstep" and how in ("KILL", "STOP") and self.bytes_at_hit == len(self.rigs.recording):
+            # The process had nothing left to do.
+            moment = "end"
         if how == "KILL" and moment != "end" and clock != "virtual":
             # A supervisor that only writes the report may be killed. Under virtual time the bytes show whether it did.
             require(not passed, f"{what}: a run passed whose process was killed")
         if how == "KILL" and not is_killed:
-            require(code == DIED, f"{what}: the death is not the run's end")
+            require(code == DIED or moment == "end" and passed, f"{what}: the death is not the run's end")
             require(reason in ("", f"the {role} died: SIGKILL (9)"), f"{what}: {reason}")
+        if how == "STOP" and role != "supervisor" and moment != "end":
+            require(not passed, f"{what}: a run passed whose process was silent for longer than the patience")
         if how in ("PAUSE", "NONE") or (how == "STOP" and role == "supervisor"):
             require(passed and verified == "complete", f"{what}: the run did not go on: {reason}")
         if clock == "rt":
@@ -225,6 +222,10 @@ class Trial:
                 require(not reason or reason.startswith(f"the {role} died: "), f"{what}: {reason}")
             what += self.judge_bytes(what, passed, summary)
         return what
+
+    def require_nothing_left(self):
+        left = left_of(f"{self.rig.pid}-", self.runtime)
+        require(not left, f"{left} stayed")
 
     def is_faulty_before(self):
         """Whether the machine had stopped the rig before the hit."""
@@ -239,7 +240,11 @@ class Trial:
             # Of the cycles that it cost, the machine may be taken for the cause.
             is_stopped = self.rig.returncode in (SAFE_STOP, DISTURBED) and summary["figures"]["final_state"] == "safe_stop"
             require(is_stopped, f"{what}: no safe stop")
-        if role in REACTION and self.was_moving(summary):
+        if role in REACTION and not self.was_moving(summary):
+            if self.case.moment == MOTION:
+                # The machine had stopped the rig.
+                raise Again
+        elif role in REACTION:
             times_ns = [fault["time_ns"] for fault in self.faults(summary) if fault["cause"] == REACTION[role]]
             require(times_ns, f"{what}: nobody reported {REACTION[role]}")
             self.measures[REACTS] = (times_ns[0] - self.hit_ns) / 1e6
@@ -325,11 +330,15 @@ class Trial:
     # Many short stops.
 
     def stall(self):
+        deadline = time.monotonic() + START_S
         while self.rig.poll() is None and not {"controller", "plant"} <= children_of(self.rig).keys():
+            require(time.monotonic() < deadline, "the rig has no processes")
             time.sleep(0.01)
         self.children = children_of(self.rig)
         victims, stalls = [self.children[role] for role in ("controller", "plant") if role in self.children], 0
+        deadline = time.monotonic() + LONGEST_STALLED_S
         while self.rig.poll() is None and victims:
+            require(time.monotonic() < deadline, "the stalled rig does not end")
             victim = self.chance.choice(victims)
             try:
                 os.kill(victim, signal.SIGSTOP)
@@ -340,6 +349,9 @@ class Trial:
             stalls += 1
             time.sleep(self.chance.uniform(0.002, LONGEST_BREAK_S))
         self.wait()
+        self.require_nothing_left()
+        require(self.rig.returncode in TYPED, f"exit code {self.rig.returncode}")
+        require(self.verify() == "complete", "the recording of a stalled rig is not complete")
         faults, word = self.faults(self.summary()), self.verdict()["word"]
         refused = [fault for fault in faults if fault["cause"] in REFUSALS]
         require(word == "INVALID" or not refused, f"no stall explains that the gate refused a command: {refused}")

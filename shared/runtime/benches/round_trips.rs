@@ -309,7 +309,8 @@ fn main() -> Failable<()> {
     let quantile = |round: &[u64], share: f64| round[(round.len() as f64 * share) as usize] as f64 / 1000.0;
     println!("round trip, µs: median (least–most) of {ROUNDS} rounds");
     for (channel, own) in Channel::ALL.iter().zip(&rounds) {
-        let [p50, p99] = [0.5, 0.99].map(|share| spread(own.iter().map(|round| quantile(round, share)).collect()));
+        let [p50, p99] =
+            [0.5, 0.99].map(|share| spread(own.iter().map(|round| quantile(round, share)).collect()));
         let pairs = rounds[0].iter().zip(own);
         let ratio = spread(pairs.map(|(rig, own)| quantile(rig, 0.5) / quantile(own, 0.5)).collect());
         println!("{:<14} p50 {p50}, p99 {p99}; masseter takes {ratio} times as long", channel.name());
