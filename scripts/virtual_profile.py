@@ -15,9 +15,9 @@ PARTS = {
     "analysis": ["masseter_analysis::"],
     "check of the motion": ["masseter_plan::", "trajectory::check"],
     "simulated wires": ["masseter_can::"],
-    "drives": ["masseter_plant::drive::"],
-    "mechanism": ["masseter_plant::mechanism::", "masseter_model::dynamics::", "masseter_model::geometry::",
-                  "Emulation::push", "Emulation::move_mechanism"],
+    "drives": ["masseter_plant::simulator::drive::"],
+    "mechanism": ["masseter_plant::simulator::mechanism::", "masseter_model::dynamics::",
+                  "masseter_model::geometry::", "Emulation::push", "Emulation::move_mechanism"],
     "controller": ["masseter_controller::", "masseter_runtime::control::"],
     "master, order of events": ["masseter_plant::"],
 }

@@ -55,18 +55,18 @@ fn every_file_belongs_to_a_module() {
 /// Files that read what the kernel serves, a private folder, or the program itself; everything else reads through
 /// `masseter_scenario::input`, which refuses what has no end.
 const READERS: [&str; 13] = [
-    "rig/bench/played_run.rs",
-    "rig/bench/simulated.rs",
-    "rig/bench/virtual_time.rs",
+    "rig/cli/bench/played_run.rs",
+    "rig/cli/bench/simulated.rs",
+    "rig/cli/bench/virtual_time.rs",
     "rig/campaign/src/campaign.rs",
     "rig/campaign/src/folder.rs",
-    "rig/interrupts.rs",
-    "rig/kinematics_cli/input.rs",
+    "rig/cli/kinematics/table.rs",
     "rig/machine/src/lib.rs",
     "rig/machine/src/system_root.rs",
     "rig/recording/src/folder.rs",
     "rig/recording/src/writer.rs",
     "rig/robot/ledger.rs",
+    "rig/run/interrupts.rs",
     "shared/runtime/src/realtime/scheduling.rs",
 ];
 

@@ -4,18 +4,21 @@
 //!
 //! M v̇ + D v = f_desired − f, with M = D times 3 ms.
 //!
-//! The speed begins with that of the motion, so that nothing jumps. The damping D grows where the teeth meet. A bite ends after
-//! its time, where the food breaks, or where the opening motion has come to the jaw. From then on the jaw does not close: the
-//! jaw waits, or gives way to more than the force of contact, and goes with the motion again when the motion opens. Only the
-//! height is controlled; the other five freedoms keep to the motion. Limit of stability: `docs/dynamics-control.md`.
+//! The speed begins with that of the motion, so that nothing jumps. The damping D grows where the teeth meet. A bite
+//! ends after its time, where the food breaks, or where the opening motion has come to the jaw. From then on the jaw
+//! does not close: the jaw waits, or gives way to more than the force of contact, and goes with the motion again when
+//! the motion opens. Only the height is controlled; the other five freedoms keep to the motion. Limit of stability:
+//! `docs/dynamics-control.md`.
+
+use std::f64::consts::PI;
 
 use masseter_model::geometry::{Pose, Vec3};
 use masseter_runtime::messages::codes::ControllerState;
-use masseter_runtime::named::{Declared, Signal};
-use masseter_scenario::{ForceControlConfig, ForceSource, MOST_LEAD_CYCLES, Scenario};
+use masseter_runtime::named::Declared;
+use masseter_scenario::{BiteProfile, ForceControlConfig, ForceSource, MOST_LEAD_CYCLES, Scenario};
 use nalgebra::Translation3;
 
-use crate::bite_profile::desired_n;
+use crate::forces::signal;
 use crate::pose_control::PoseControl;
 use crate::pose_law::{Demand, Detour, LawFailed, PoseLaw};
 
@@ -30,6 +33,8 @@ const CATCH_UP_S: f64 = 0.02;
 /// The jaw is back on the motion when nearer and not faster than this beside it, m and m/s.
 const NEAR_M: f64 = 2e-6;
 const SLOW_M_S: f64 = 2e-3;
+/// Share of a bite in which the force of a hold is reached.
+const RAMP_SHARE: f64 = 0.1;
 
 /// Who moves the jaw up and down.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -97,8 +102,8 @@ impl ForceControl {
         self.bites_n[0]
     }
 
-    /// Takes the newest force and the newest height of the motion. A cycle without a force keeps the last one. A load cell
-    /// that stays at the end of its range hides how hard the jaw bites.
+    /// Takes the newest force and the newest height of the motion. A cycle without a force keeps the last one. A load
+    /// cell that stays at the end of its range hides how hard the jaw bites.
     fn observe(&mut self, demand: &Demand) -> Result<(), LawFailed> {
         let known_n = match self.config.source {
             ForceSource::Estimate => demand.external.map(|external| external.bite_n()),
@@ -217,11 +222,6 @@ impl PoseLaw for ForceControl {
     }
 
     fn declared(&self) -> Declared {
-        let signal = |name: &str, unit: &str, about: &str| Signal {
-            name: name.to_owned(),
-            unit: unit.to_owned(),
-            about: about.to_owned(),
-        };
         let signals = vec![
             signal("desired_bite_force_n", "N", "What the bite force is to be; 0 between bites."),
             signal("force_detour_m", "m", "Height asked for above that of the motion."),
@@ -243,6 +243,16 @@ impl PoseLaw for ForceControl {
         };
         signals.copy_from_slice(&[self.desired_n, self.offsets_m[0], phase]);
     }
+}
+
+/// The desired bite force at a time since the contact (s), N; none after the bite.
+fn desired_n(config: &ForceControlConfig, time_s: f64) -> Option<f64> {
+    let share = time_s / config.bite_s;
+    let raised = match config.profile {
+        BiteProfile::HalfSine => (PI * share).sin(),
+        BiteProfile::Hold => (share / RAMP_SHARE).min(1.0),
+    };
+    (share < 1.0).then_some(config.contact_n + (config.peak_n - config.contact_n) * raised)
 }
 
 #[cfg(test)]

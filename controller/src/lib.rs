@@ -3,14 +3,10 @@
 //! [`motion_controller`] and [`hold_position`] are pure step functions; [`process`] runs one of them. The crate
 //! does not depend on the plant; it uses the plant's messages only.
 
-mod bite_profile;
-mod command_acknowledgement;
-mod feed_forward;
 mod force_control;
-mod force_observer;
+mod forces;
 pub mod hold_position;
 pub mod kinematics;
-mod model;
 pub mod motion_controller;
 mod path_supervision;
 mod playback;
@@ -18,10 +14,8 @@ mod pose_control;
 pub mod pose_law;
 pub mod process;
 mod safety;
-mod sequence;
 mod sequencer;
-mod slew;
-mod start;
+mod targets;
 pub mod trajectory;
 
 pub use safety::Fault;

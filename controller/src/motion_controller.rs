@@ -3,9 +3,7 @@
 //! A pure step function: time and readings come in, messages go out, and nothing is allocated. This module
 //! uses no transport, no clock and no CAN.
 
-use std::hint::black_box;
-
-use masseter_model::geometry::{AXES, Actuators, Conditioning, Jacobian, Joints, Mechanism, Pose};
+use masseter_model::geometry::{Mechanism, Pose};
 use masseter_runtime::control::{Controller, Outcome, Tick};
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::messages::{Command, Event, Reading, State};
@@ -13,29 +11,16 @@ use masseter_runtime::named::{Declared, Parameter};
 use masseter_scenario::Scenario;
 use nalgebra::Translation3;
 
-use crate::command_acknowledgement::CommandAcknowledgement;
-use crate::feed_forward::FeedForward;
 use crate::force_control::ForceControl;
-use crate::force_observer::ForceObserver;
-use crate::model::Model;
-use crate::path_supervision::PathSupervision;
-use crate::playback::Playback;
+use crate::forces::Forces;
+use crate::path_supervision::{PathSupervision, StartTolerance};
+use crate::playback::Progress;
 use crate::pose_control::PoseControl;
 use crate::pose_law::{Demand, PoseLaw};
-use crate::safety::{self, Fault};
+use crate::safety::Fault;
 use crate::sequencer::Sequencer;
-use crate::slew::Slew;
-use crate::start::StartTolerance;
-use crate::trajectory::{self, Trajectory};
-
-/// Time between two looks at the motion for its margins, s.
-const MARGINS_EVERY_S: f64 = 0.005;
-/// Cycles between two condition numbers, which change slowly and take a microsecond each.
-const CYCLES_OF_A_CONDITION: u64 = 10;
-/// How many parameters the controller has beside those of the law.
-const OWN: usize = 2;
-/// Age of a reading that comes late but is used.
-const LATE_READING_CYCLES: u64 = 1;
+use crate::targets::Targets;
+use crate::trajectory::Trajectory;
 
 /// The default controller: plays a trajectory.
 ///
@@ -59,44 +44,44 @@ const LATE_READING_CYCLES: u64 = 1;
 #[derive(Debug)]
 pub struct MotionController {
     sequencer: Sequencer,
-    mechanism: Mechanism,
-    velocity_limit_m_s: [f64; AXES],
-    /// The most that the trim may move an axis.
-    trim_reach_m: f64,
     start: StartTolerance,
-    playback: Playback,
-    acknowledgement: CommandAcknowledgement,
+    progress: Progress,
     law: Box<dyn PoseLaw>,
-    /// What the law declares, then the controller's own parameters.
-    declared: Declared,
-    /// None unless the scenario has forces fed forward.
-    feed_forward: Option<FeedForward>,
-    /// None unless the scenario has the bite force estimated.
-    observer: Option<ForceObserver>,
-    has_load_cell: bool,
-    /// What the load cell showed last, N.
-    load_cell_n: Option<f64>,
+    /// What the law declares; the controller's own parameters and signals come after it.
+    of_law: Declared,
+    forces: Forces,
     supervision: PathSupervision,
-    /// By how many cycles the platform may be earlier or later on its path.
-    slack_cycles: f64,
-    /// Cycles in this state since the desired pose no longer changes.
-    cycles_at_rest: u64,
+    targets: Targets,
     desired: Option<Pose>,
-    /// The pose that the law asked for last.
-    asked: Option<Pose>,
-    target: Option<Actuators>,
-    force_offset_n: [f64; AXES],
-    /// The last condition number, with the cycle that computed it.
-    condition: Option<(u64, f64)>,
+}
+
+/// What the controller adds to the parameters of the law, in this order.
+#[derive(Debug, Clone, Copy)]
+enum OwnParameter {
+    MotionRate,
+    MotionAmplitude,
+}
+
+impl OwnParameter {
+    const ALL: [Self; 2] = [Self::MotionRate, Self::MotionAmplitude];
+
+    fn declared(self) -> Parameter {
+        let (name, about) = match self {
+            Self::MotionRate => ("motion_rate", "Speed of the motion; 1 as written."),
+            Self::MotionAmplitude => {
+                ("motion_amplitude", "Share of the way from the motion's first pose; 1 as written.")
+            }
+        };
+        Parameter { about: about.to_owned(), range: [0.0, 1.0], ..Parameter::new(name, 1.0) }
+    }
 }
 
 impl MotionController {
     /// A controller that plays `trajectory` on `mechanism` once the rig is ready.
     pub fn new(scenario: &Scenario, mechanism: Mechanism, trajectory: Trajectory) -> Self {
+        let closed_m = trajectory.closed_pose().translation.z;
         let law: Box<dyn PoseLaw> = match scenario.force_control {
-            Some(config) => {
-                Box::new(ForceControl::new(scenario, config, trajectory.closed_pose().translation.z))
-            }
+            Some(config) => Box::new(ForceControl::new(scenario, config, closed_m)),
             None => Box::new(PoseControl::new(&scenario.controller, scenario.rate_hz)),
         };
         Self::with_law(scenario, mechanism, trajectory, law)
@@ -109,41 +94,16 @@ impl MotionController {
         trajectory: Trajectory,
         law: Box<dyn PoseLaw>,
     ) -> Self {
-        let config = scenario.controller;
-        let limits = scenario.limits.within(&scenario.drives);
-        // The plan has checked every cycle; the margins that a change of rate needs show in a coarser look.
-        let period_s = scenario.period_s().max(MARGINS_EVERY_S);
-        let demands = trajectory::check(&trajectory, &mechanism, &limits, period_s).ok();
-        let change_s = Slew::change_s(demands.as_ref(), &limits);
-        let model = Model::new(scenario, mechanism.clone());
-        let is_observed = scenario.is_force_estimated();
-        let mut declared = law.declared();
-        declared.parameters.extend(own_parameters());
-        declared.signals.extend(is_observed.then(ForceObserver::declared).into_iter().flatten());
         Self {
             sequencer: Sequencer::new(scenario, mechanism.clone()),
-            velocity_limit_m_s: std::array::from_fn(|axis| scenario.drives.of_axis(axis).max_velocity_m_s),
-            trim_reach_m: config.trim_limit_m + config.trim_limit_rad * mechanism.platform_arm_m(),
             start: StartTolerance::new(scenario, &mechanism),
-            mechanism,
-            playback: Playback::new(trajectory, config.ease_s, config.stop_ramp_s, change_s),
-            acknowledgement: CommandAcknowledgement::default(),
+            progress: Progress::new(scenario, &mechanism, trajectory),
+            of_law: law.declared(),
             law,
-            declared,
-            feed_forward: config
-                .feed_forward_torque
-                .then(|| FeedForward::new(model.clone(), scenario.period_s())),
-            observer: is_observed.then(|| ForceObserver::new(scenario, model)),
-            has_load_cell: scenario.load_cell.is_some(),
-            load_cell_n: None,
+            forces: Forces::new(scenario, &mechanism),
             supervision: PathSupervision::new(scenario),
-            slack_cycles: 0.0,
-            cycles_at_rest: 0,
+            targets: Targets::new(scenario, mechanism),
             desired: None,
-            asked: None,
-            target: None,
-            force_offset_n: [0.0; AXES],
-            condition: None,
         }
     }
 
@@ -159,165 +119,106 @@ impl MotionController {
         }
         let demand = self.demand(desired);
         if let Some(estimated) = &demand.estimated {
-            let detour = Translation3::from(self.law.detour().at_sample_m);
-            let earlier = if self.slack_cycles > 0.0 {
-                self.playback.pose_ahead(-self.sample_age_s() - self.slack_cycles * demand.period_s)
-            } else {
-                desired
-            };
-            self.supervision.check(&(detour * desired), estimated, &(detour * earlier))?;
+            self.supervise(&desired, estimated)?;
         }
         let asked = self.law.command(&demand)?;
-        safety::check_asked(&asked)?;
-        self.asked = Some(asked);
-        let joints = self.mechanism.inverse(&asked)?;
-        // A motion that uses its strokes to the end leaves no room for the trim.
-        let before = self.target.unwrap_or(joints.actuators);
-        let target = self.mechanism.strokes().clamp(&joints.actuators, &before, self.trim_reach_m)?;
-        safety::check_velocity(&target, &before, &self.velocity_limit_m_s, demand.period_s)?;
-        self.target = Some(target);
-        self.feed_forward();
+        self.targets.ask_for(&asked, demand.period_s)?;
+        let Sequencer { period_s, config, .. } = &self.sequencer;
+        self.forces.feed_forward(&*self.law, |before| {
+            self.progress.playback.pose_ahead((config.lead_cycles - before) * period_s)
+        });
         Ok(())
+    }
+
+    /// Compares desired and estimated pose; what the law means and what the slack explains is no deviation.
+    fn supervise(&mut self, desired: &Pose, estimated: &Pose) -> Result<(), Fault> {
+        let detour = Translation3::from(self.law.detour().at_sample_m);
+        let slack_s = self.supervision.slack_cycles * self.sequencer.period_s;
+        let earlier = if slack_s > 0.0 {
+            self.progress.playback.pose_ahead(-self.sequencer.sample_age_s() - slack_s)
+        } else {
+            *desired
+        };
+        self.supervision.check_pose(&(detour * desired), estimated, &(detour * earlier))
     }
 
     /// Before the drives are enabled, the jaw must be near the first pose of the motion.
     fn check_start(&self) -> Result<(), Fault> {
-        if !self.sequencer.has_steady_readings() {
-            return Ok(());
+        match &self.sequencer.estimate {
+            Some(found) if self.sequencer.has_steady_readings() => {
+                self.start.check_way(&found.solution.pose, &self.progress.playback.first_pose())
+            }
+            _ => Ok(()),
         }
-        let found = self.sequencer.estimate.map(|estimate| estimate.solution.pose);
-        found.map_or(Ok(()), |found| self.start.check(&found, &self.playback.first_pose()))
     }
 
     fn demand(&self, desired: Pose) -> Demand {
-        let Sequencer { cycle, period_s, state, config, silent_cycles, estimate, .. } = &self.sequencer;
+        let Sequencer { cycle, period_s, state, config, .. } = &self.sequencer;
+        let playback = &self.progress.playback;
         Demand {
             cycle: *cycle,
             period_s: *period_s,
             state: *state,
-            motion_time_s: self.playback.motion_time_ahead_s(-self.sample_age_s()),
+            motion_time_s: playback.motion_time_ahead_s(-self.sequencer.sample_age_s()),
             desired,
-            estimated: estimate.filter(|_| *silent_cycles == 0).map(|estimate| estimate.solution.pose),
-            ahead: self.playback.pose_ahead(config.lead_cycles * period_s),
-            external: self.observer.as_ref().and_then(ForceObserver::external),
-            load_cell_n: self.load_cell_n,
+            estimated: self.sequencer.fresh_estimate().map(|estimate| estimate.solution.pose),
+            ahead: playback.pose_ahead(config.lead_cycles * period_s),
+            external: self.forces.external(),
+            load_cell_n: self.forces.load_cell_n,
         }
     }
 
-    /// Age of the estimate's sample beyond that of a reading in time, s. The motion waits for readings that are later.
-    fn sample_age_s(&self) -> f64 {
-        let Sequencer { cycle, period_s, estimate, .. } = &self.sequencer;
-        let reading_cycle = estimate.map_or(*cycle, |estimate| estimate.reading_cycle);
-        cycle.saturating_sub(reading_cycle).min(LATE_READING_CYCLES) as f64 * period_s
-    }
-
-    /// The observer of forces takes each fresh sample while the drives carry the jaw.
-    fn observe_force(&mut self, reading: Option<&Reading>) {
-        let Some(observer) = &mut self.observer else { return };
-        match (reading, &self.sequencer.estimate) {
-            _ if !self.sequencer.is_moving() => observer.reset(),
-            (Some(reading), Some(estimate)) if self.sequencer.silent_cycles == 0 => {
-                observer.take(reading.cycle, &estimate.solution.pose, &reading.force_n);
-            }
-            _ => {}
-        }
-    }
-
-    /// The forces that the motion needs while the drives move to the targets of this cycle: they approach a target during the
-    /// last period before it is reached.
-    fn feed_forward(&mut self) {
-        let Some(feed_forward) = &mut self.feed_forward else { return };
-        let Sequencer { period_s, config, .. } = &self.sequencer;
-        let poses = [1.5, 0.5, -0.5]
-            .map(|earlier| self.playback.pose_ahead((config.lead_cycles - earlier) * period_s));
-        self.force_offset_n = feed_forward.offset_n(poses, &self.law.detour());
-    }
-
-    /// Whether the motion of this state is over.
-    fn is_over(&self) -> bool {
-        if self.sequencer.state == ControllerState::Holding {
-            self.cycles_at_rest as f64 * self.sequencer.period_s >= self.sequencer.config.hold_s
-        } else {
-            self.playback.is_over()
-        }
-    }
-
-    /// Prepares playback and target for the state that has been entered.
-    fn enter(&mut self) {
+    /// Prepares the motion and the targets for the state that has been entered.
+    fn enter_state(&mut self) {
+        self.progress.enter_state(&self.sequencer);
+        let measured = self.sequencer.estimate.map(|estimate| estimate.measured);
         match self.sequencer.state {
-            ControllerState::Enabling => {
-                if let Some(estimate) = &self.sequencer.estimate {
-                    self.target = Some(estimate.measured);
-                    self.playback.hold(estimate.solution.pose);
-                }
-            }
-            ControllerState::Easing => {
-                self.playback.ease();
-                self.feed_forward.iter_mut().for_each(FeedForward::begin);
-            }
-            ControllerState::Running => self.playback.play(),
-            ControllerState::Holding => self.playback.stop(),
-            ControllerState::SafeStop => {
-                self.target = self.sequencer.estimate.map(|estimate| estimate.measured);
-            }
+            ControllerState::Enabling => self.targets.actuators = measured.or(self.targets.actuators),
+            ControllerState::Easing => self.forces.begin_motion(),
+            ControllerState::SafeStop => self.targets.actuators = measured,
             _ => {}
         }
-        self.cycles_at_rest = 0;
     }
 }
 
 impl Controller for MotionController {
     fn observe(&mut self, reading: Option<&Reading>) {
         self.sequencer.observe(reading);
-        if let Some(estimate) = &self.sequencer.estimate
-            && self.sequencer.silent_cycles == 0
-        {
-            self.slack_cycles = self.supervision.slack_cycles(estimate);
+        if let Some(estimate) = self.sequencer.fresh_estimate() {
+            self.supervision.update_slack(estimate);
         }
-        self.observe_force(reading);
-        if let Some(reading) = reading.filter(|_| self.has_load_cell) {
-            self.load_cell_n = Some(reading.load_cell_n);
-        }
+        self.forces.observe(reading, &self.sequencer);
     }
 
     fn decide(&mut self, tick: Tick) -> Option<Event> {
-        // A motion that waited goes on at full speed from the target that the drives held: a period's worth, as ever.
-        let answered_cycle = self.sequencer.estimate.map_or(0, |estimate| estimate.answers_cycle);
-        if self.acknowledgement.takes_step(tick.cycle, answered_cycle) {
-            self.playback.advance(self.sequencer.period_s);
-        }
+        self.progress.advance(&self.sequencer, tick.cycle);
         let fault = self.sequencer.begin_cycle(tick);
-        let desired = self.playback.pose_ahead(-self.sample_age_s());
+        let desired = self.progress.playback.pose_ahead(-self.sequencer.sample_age_s());
         self.desired = Some(Translation3::from(self.law.detour().at_sample_m) * desired);
         let fault = fault.or_else(|| self.check_start().err());
         let fault = fault.or_else(|| self.control(desired).err());
-        let event = self.sequencer.follow(fault, self.is_over(), tick);
+        let event = self.sequencer.follow(fault, self.progress.is_over(&self.sequencer), tick);
         if event.is_some() {
-            self.enter();
+            self.enter_state();
         }
-        self.cycles_at_rest = if self.playback.is_at_rest() { self.cycles_at_rest + 1 } else { 0 };
+        self.progress.count_rest();
         event
     }
 
     fn fill_command(&self, command: &mut Command) {
-        *command = self.sequencer.command(self.target);
+        *command = self.sequencer.command(self.targets.actuators);
         if self.sequencer.is_moving() {
-            command.force_offset_n = self.force_offset_n;
+            command.force_offset_n = self.forces.offset_n;
         }
     }
 
     /// Also the conditioning, which is only reported, and so computed after the command has gone out.
     fn fill_state(&mut self, state: &mut State) {
         *state = self.sequencer.state_message(self.desired.as_ref());
-        state.motion_time_s = self.playback.motion_time_ahead_s(-self.sample_age_s());
-        let Some(estimate) = &self.sequencer.estimate else { return };
-        let cycle = self.sequencer.cycle;
-        if self.condition.is_none_or(|(computed, _)| cycle >= computed + CYCLES_OF_A_CONDITION) {
-            let joints = Joints { actuators: estimate.measured, theta_rad: estimate.solution.theta_rad };
-            let jacobian = Jacobian::new(&self.mechanism, &estimate.solution.pose, &joints);
-            self.condition = Some((cycle, Conditioning::new(&jacobian).number()));
+        state.motion_time_s = self.progress.playback.motion_time_ahead_s(-self.sequencer.sample_age_s());
+        if let Some(estimate) = &self.sequencer.estimate {
+            state.condition = self.targets.condition(&self.sequencer, estimate);
         }
-        state.condition = self.condition.map_or(0.0, |(_, number)| number);
     }
 
     fn request_stop(&mut self) {
@@ -329,47 +230,29 @@ impl Controller for MotionController {
     }
 
     fn declared(&self) -> Declared {
-        self.declared.clone()
+        let mut declared = self.of_law.clone();
+        declared.parameters.extend(OwnParameter::ALL.map(OwnParameter::declared));
+        declared.signals.extend(self.forces.signals());
+        declared
     }
 
     fn set_parameter(&mut self, place: usize, value: f64) {
-        // From the end, where the own ones are.
-        match self.declared.parameters.len() - place {
-            OWN => self.playback.set_motion_rate(value),
-            1 => self.playback.set_motion_amplitude(value),
-            _ => self.law.set_parameter(place, value),
+        match place.checked_sub(self.of_law.parameters.len()).map(|own| OwnParameter::ALL[own]) {
+            None => self.law.set_parameter(place, value),
+            Some(OwnParameter::MotionRate) => self.progress.playback.set_motion_rate(value),
+            Some(OwnParameter::MotionAmplitude) => self.progress.playback.set_motion_amplitude(value),
         }
     }
 
     fn fill_signals(&self, signals: &mut [f64]) {
-        let observed = self.observer.as_ref().map_or(0, |_| ForceObserver::SIGNALS);
-        let (of_law, observed) = signals.split_at_mut(signals.len() - observed);
+        let (of_law, of_forces) = signals.split_at_mut(self.of_law.signals.len());
         self.law.fill_signals(of_law);
-        if let Some(observer) = &self.observer {
-            observer.fill_signals(observed);
-        }
+        self.forces.fill_signals(of_forces);
     }
 
     fn warm_up(&self) {
-        if let Some(estimate) = &self.sequencer.estimate {
-            let solution = self.sequencer.tracker.clone().update(&estimate.measured);
-            let joints = self.mechanism.inverse(&self.asked.unwrap_or(estimate.solution.pose));
-            let _ = black_box((solution, joints));
-        }
+        self.targets.warm_up(&self.sequencer);
     }
-}
-
-/// The parameters beside those of the law.
-fn own_parameters() -> [Parameter; OWN] {
-    let share = |name, about: &str| Parameter {
-        about: about.to_owned(),
-        range: [0.0, 1.0],
-        ..Parameter::new(name, 1.0)
-    };
-    [
-        share("motion_rate", "Speed of the motion; 1 as written."),
-        share("motion_amplitude", "Share of the way from the motion's first pose; 1 as written."),
-    ]
 }
 
 #[cfg(test)]

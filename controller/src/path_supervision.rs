@@ -1,19 +1,20 @@
 //! Whether the platform is on its path: distance of the incisal point and angle of the platform, for a moment and on
 //! average.
 //!
-//! The drives interpolate between SYNCs, and hold their targets while a command is missing. So after a SYNC or a command
-//! that came at another time than planned, the platform is elsewhere on its path. What the motion makes in that time is no
-//! deviation: that is the slack.
+//! The drives interpolate between SYNCs, and hold their targets while a command is missing. So after a SYNC or a
+//! command that came at another time than planned, the platform is elsewhere on its path. What the motion makes in that
+//! time is no deviation: that is the slack.
 
-use masseter_model::geometry::{Deviation, Pose};
+use masseter_model::geometry::{Deviation, Mechanism, Pose, Vec3};
 use masseter_runtime::messages::codes::Cause;
 use masseter_scenario::Scenario;
 
 use crate::safety::Fault;
 use crate::sequencer::Estimate;
 
-/// Least readings, and least time, in which a disturbed one still shows: the drives take a target at the next SYNC and reach
-/// it at the second, and the motion makes up for it in the third. The drives' loops need milliseconds, whatever the rate.
+/// Least readings, and least time, in which a disturbed one still shows: the drives take a target at the next SYNC and
+/// reach it at the second, and the motion makes up for it in the third. The drives' loops need milliseconds, whatever
+/// the rate.
 const SHOWS_FOR: usize = 4;
 const SHOWS_FOR_S: f64 = 0.004;
 /// The motion goes on for as long without an answer, or the drives stop as late.
@@ -31,7 +32,7 @@ struct Supervised {
 
 impl Supervised {
     /// Takes a value, of which `slack` is no deviation. What is no number is infinitely far.
-    fn check(&mut self, value: f64, slack: f64, share: f64) -> Result<(), Fault> {
+    fn check_value(&mut self, value: f64, slack: f64, share: f64) -> Result<(), Fault> {
         let beyond_slack = value - slack;
         let deviation = if beyond_slack.is_finite() { beyond_slack.max(0.0) } else { f64::INFINITY };
         self.mean_square += (deviation * deviation - self.mean_square) * share;
@@ -59,30 +60,30 @@ pub(crate) struct PathSupervision {
     most_slack_cycles: f64,
     /// By how much the last readings differ from planned ones, in cycles.
     recent_slack: Vec<f64>,
+    /// By how many cycles the platform may be earlier or later on its path: the largest of these.
+    pub(crate) slack_cycles: f64,
 }
 
 impl PathSupervision {
     pub(crate) fn new(scenario: &Scenario) -> Self {
         let (config, period_s) = (&scenario.controller, scenario.period_s());
+        let (limit_rad, rms_limit_rad) = (config.tracking_limit_rad, config.tracking_rms_limit_rad);
         let supervised = |cause, limit, rms_limit| Supervised { cause, limit, rms_limit, mean_square: 0.0 };
         Self {
             incisal_m: scenario.jaw.reference_point_m,
             period_ns: scenario.period_ns(),
             share: (period_s / config.tracking_rms_time_s).min(1.0),
             position: supervised(Cause::TrackingLost, config.tracking_limit_m, config.tracking_rms_limit_m),
-            orientation: supervised(
-                Cause::OrientationLost,
-                config.tracking_limit_rad,
-                config.tracking_rms_limit_rad,
-            ),
+            orientation: supervised(Cause::OrientationLost, limit_rad, rms_limit_rad),
             last_sampled_ns: 0,
             most_slack_cycles: MOST_SLACK_CYCLES.max(MOST_SLACK_S / period_s),
             recent_slack: vec![0.0; SHOWS_FOR.max((SHOWS_FOR_S / period_s).ceil() as usize)],
+            slack_cycles: 0.0,
         }
     }
 
-    /// The slack in cycles, as a new estimate is taken.
-    pub(crate) fn slack_cycles(&mut self, estimate: &Estimate) -> f64 {
+    /// Updates the slack by the time and the answer of a new estimate.
+    pub(crate) fn update_slack(&mut self, estimate: &Estimate) {
         let Estimate { reading_cycle, answers_cycle, sampled_ns, .. } = *estimate;
         let apart_ns = sampled_ns.saturating_sub(self.last_sampled_ns);
         let late_cycles = apart_ns.abs_diff(self.period_ns) as f64 / self.period_ns as f64;
@@ -90,22 +91,56 @@ impl PathSupervision {
         self.last_sampled_ns = sampled_ns;
         self.recent_slack.rotate_right(1);
         self.recent_slack[0] = late_cycles.max(unanswered).min(self.most_slack_cycles);
-        self.recent_slack.iter().copied().fold(0.0, f64::max)
+        self.slack_cycles = self.recent_slack.iter().copied().fold(0.0, f64::max);
     }
 
     /// Compares desired and estimated pose at one instant; `earlier` is the desired pose by the slack before.
-    pub(crate) fn check(&mut self, desired: &Pose, estimated: &Pose, earlier: &Pose) -> Result<(), Fault> {
+    pub(crate) fn check_pose(
+        &mut self,
+        desired: &Pose,
+        estimated: &Pose,
+        earlier: &Pose,
+    ) -> Result<(), Fault> {
         let between = |to| Deviation::between(desired, to, self.incisal_m);
         let (found, slack) = (between(estimated), between(earlier));
-        let position = self.position.check(found.incisal_m, slack.incisal_m, self.share);
-        let orientation = self.orientation.check(found.angle_rad, slack.angle_rad, self.share);
+        let position = self.position.check_value(found.incisal_m, slack.incisal_m, self.share);
+        let orientation = self.orientation.check_value(found.angle_rad, slack.angle_rad, self.share);
         position.and(orientation)
+    }
+}
+
+/// Whether the jaw stands near enough to the first pose of the motion to be eased there.
+#[derive(Debug)]
+pub(crate) struct StartTolerance {
+    /// None where the way may have any length.
+    limit_m: Option<f64>,
+    /// The incisal point and the corners of the platform, platform frame: no turn leaves all of them in place.
+    points: [Vec3; 4],
+}
+
+impl StartTolerance {
+    pub(crate) fn new(scenario: &Scenario, mechanism: &Mechanism) -> Self {
+        let [a1, a2, a3] = *mechanism.platform_corners();
+        let points = [Vec3::from(scenario.jaw.reference_point_m), a1, a2, a3];
+        Self { limit_m: scenario.start_tolerance_m(), points }
+    }
+
+    /// Refuses a start from a pose of which a point is farther from the first pose than allowed.
+    pub(crate) fn check_way(&self, found: &Pose, first: &Pose) -> Result<(), Fault> {
+        let Some(limit_m) = self.limit_m else { return Ok(()) };
+        let place = |pose: &Pose, point: &Vec3| pose.rotation * point + pose.translation.vector;
+        let distances_m = self.points.iter().map(|point| (place(found, point) - place(first, point)).norm());
+        let farthest_m = distances_m.fold(0.0, f64::max);
+        if farthest_m <= limit_m {
+            return Ok(());
+        }
+        Err(Fault::new(Cause::StartTooFar, farthest_m, limit_m))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use masseter_model::geometry::{Actuators, LEGS, Mechanism, MechanismConfig, Vec3};
+    use masseter_model::geometry::{Actuators, LEGS, MechanismConfig};
     use masseter_scenario::{ControllerConfig, JawConfig};
 
     use super::*;
@@ -146,8 +181,8 @@ mod tests {
         for (cause, displace, limit) in QUANTITIES {
             for direction in [Vec3::x(), -Vec3::x(), Vec3::y(), -Vec3::y(), Vec3::z(), -Vec3::z()] {
                 let mut supervision = supervision();
-                supervision.check(&here, &displace(direction * 0.99), &here).unwrap();
-                let fault = supervision.check(&here, &displace(direction * 1.01), &here).unwrap_err();
+                supervision.check_pose(&here, &displace(direction * 0.99), &here).unwrap();
+                let fault = supervision.check_pose(&here, &displace(direction * 1.01), &here).unwrap_err();
                 assert_eq!((fault.cause, fault.axis, fault.limit), (cause, None, limit));
                 assert!((fault.value / (1.01 * limit) - 1.0).abs() < 1e-9, "{fault:?}");
             }
@@ -164,15 +199,15 @@ mod tests {
                 for [desired, estimated, earlier] in
                     [[&nowhere, &here, &here], [&here, &nowhere, &here], [&here, &here, &nowhere]]
                 {
-                    let fault = supervision().check(desired, estimated, earlier).unwrap_err();
+                    let fault = supervision().check_pose(desired, estimated, earlier).unwrap_err();
                     assert_eq!(fault.cause, Cause::TrackingLost);
                 }
             }
         }
         for (value, slack) in [(f64::NAN, 0.0), (0.0, f64::NAN), (f64::INFINITY, f64::INFINITY)] {
             let PathSupervision { position, orientation, .. } = &mut supervision();
-            position.check(value, slack, 1.0).unwrap_err();
-            orientation.check(value, slack, 1.0).unwrap_err();
+            position.check_value(value, slack, 1.0).unwrap_err();
+            orientation.check_value(value, slack, 1.0).unwrap_err();
         }
     }
 
@@ -180,7 +215,7 @@ mod tests {
     fn at_its_limits_a_value_is_no_fault() {
         let mut supervised =
             Supervised { cause: Cause::TrackingLost, limit: 0.5, rms_limit: 0.5, mean_square: 0.0 };
-        assert_eq!(supervised.check(0.5, 0.0, 1.0), Ok(()));
+        assert_eq!(supervised.check_value(0.5, 0.0, 1.0), Ok(()));
     }
 
     #[test]
@@ -190,7 +225,7 @@ mod tests {
             let cycles_to_fault = |share: f64| {
                 let mut supervision = supervision();
                 (1..=1000).find_map(|cycle| {
-                    Some((cycle, supervision.check(&here, &displace(Vec3::z() * share), &here).err()?))
+                    Some((cycle, supervision.check_pose(&here, &displace(Vec3::z() * share), &here).err()?))
                 })
             };
             assert_eq!(cycles_to_fault(0.99 / 2.0), None);
@@ -207,9 +242,9 @@ mod tests {
         let here = Pose::identity();
         for (cause, displace, limit) in QUANTITIES {
             let mut supervision = supervision();
-            supervision.check(&here, &displace(Vec3::z() * -3.99), &displace(Vec3::z() * 3.0)).unwrap();
+            supervision.check_pose(&here, &displace(Vec3::z() * -3.99), &displace(Vec3::z() * 3.0)).unwrap();
             let fault = supervision
-                .check(&here, &displace(Vec3::z() * -4.01), &displace(Vec3::z() * 3.0))
+                .check_pose(&here, &displace(Vec3::z() * -4.01), &displace(Vec3::z() * 3.0))
                 .unwrap_err();
             assert!(fault.cause == cause && (fault.limit / limit - 4.0).abs() < 1e-9, "{fault:?}");
         }
@@ -222,7 +257,8 @@ mod tests {
         let mut supervision = supervision();
         let mut slack = |reading_cycle: u64, answers_cycle, sampled_cycles: f64| {
             let sampled_ns = (sampled_cycles * 1e6) as u64;
-            supervision.slack_cycles(&estimate(reading_cycle, answers_cycle, sampled_ns))
+            supervision.update_slack(&estimate(reading_cycle, answers_cycle, sampled_ns));
+            supervision.slack_cycles
         };
         for (cycle, sampled_cycles, expected) in readings {
             assert!((slack(cycle, cycle - 1, sampled_cycles) - expected).abs() < 1e-9, "cycle {cycle}");
@@ -238,5 +274,31 @@ mod tests {
         let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
         let solution = ForwardTracker::new(mechanism).update(&measured).unwrap();
         Estimate { reading_cycle, answers_cycle, sampled_ns, measured, solution }
+    }
+
+    fn tolerance(interfaces: &[&str], tolerance_mm: Option<f64>) -> StartTolerance {
+        let mut scenario = Scenario::default();
+        scenario.can.interfaces = interfaces.iter().map(|&name| name.to_owned()).collect();
+        scenario.controller.start_tolerance_mm = tolerance_mm;
+        StartTolerance::new(&scenario, &Mechanism::new(&MechanismConfig::default()).unwrap())
+    }
+
+    #[test]
+    fn the_way_is_limited_on_real_interfaces_and_where_the_scenario_says_so() {
+        let first = Pose::identity();
+        let found = Pose::translation(0.0, 0.0, 3e-3);
+        assert_eq!(tolerance(&[], None).check_way(&found, &first), Ok(()));
+        assert_eq!(tolerance(&["can0", "can1"], Some(3.1)).check_way(&found, &first), Ok(()));
+        for limited in [tolerance(&["can0", "can1"], None), tolerance(&[], Some(2.0))] {
+            let fault = limited.check_way(&found, &first).unwrap_err();
+            assert_eq!((fault.cause, fault.limit), (Cause::StartTooFar, 2e-3));
+            assert!((fault.value - 3e-3).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_turn_counts_too() {
+        let turned = Pose::new(Vec3::zeros(), Vec3::new(0.2, 0.0, 0.0));
+        assert!(tolerance(&[], Some(2.0)).check_way(&turned, &Pose::identity()).is_err());
     }
 }

@@ -1,12 +1,86 @@
-//! Progress of the motion: the move to its first pose, the motion itself, and the ramp to rest when
-//! it is stopped halfway. Time comes in as the steps of the motion, so that the motion waits while the drives cannot follow.
-//! Rate and amplitude of the motion may change while it plays.
+//! Progress of the motion: the move to its first pose, the motion itself, and the ramp to rest when it is stopped
+//! halfway. Time comes in as the steps of the motion, so that the motion waits while the drives cannot follow. Rate and
+//! amplitude of the motion may change while it plays.
 
-use masseter_model::geometry::Pose;
-use masseter_scenario::MotionConfig;
+use masseter_model::geometry::{AXES, Mechanism, Pose};
+use masseter_runtime::messages::codes::ControllerState;
+use masseter_scenario::{ControllerConfig, MotionConfig, Scenario, TrajectoryLimitsConfig};
 
-use crate::slew::Slew;
-use crate::trajectory::{Trajectory, interpolate, minimum_jerk};
+use crate::sequencer::Sequencer;
+use crate::trajectory::{self, Trajectory, TrajectoryReport, interpolate, minimum_jerk};
+
+/// Time between two looks at the motion for its margins, s.
+const MARGINS_EVERY_S: f64 = 0.005;
+/// Cycles until the reading that answers a command: the next one's, and either may be a cycle late.
+const LATEST_ANSWER_CYCLES: u64 = 2;
+/// Shortest and longest time of a change from 0 to 1, s.
+const SHORTEST_S: f64 = 1.0;
+const LONGEST_S: f64 = 60.0;
+/// A change gathers speed and loses it in a third of its time each.
+const SPEED: f64 = 1.5;
+const ACCELERATION: f64 = 4.5;
+/// By how much more than in proportion the axes may move with the share.
+const BEND: f64 = 1.25;
+
+/// The motion under way: its playback, which waits for the drives, and for how long the jaw has been at rest.
+#[derive(Debug)]
+pub(crate) struct Progress {
+    pub(crate) playback: Playback,
+    acknowledgement: CommandAcknowledgement,
+    /// Cycles in this state since the desired pose no longer changes.
+    cycles_at_rest: u64,
+}
+
+impl Progress {
+    pub(crate) fn new(scenario: &Scenario, mechanism: &Mechanism, trajectory: Trajectory) -> Self {
+        let limits = scenario.limits.within(&scenario.drives);
+        // The plan has checked every cycle; the margins that a change of rate needs show in a coarser look.
+        let period_s = scenario.period_s().max(MARGINS_EVERY_S);
+        let demands = trajectory::check(&trajectory, mechanism, &limits, period_s).ok();
+        let change_s = Slew::change_s(demands.as_ref(), &limits);
+        let ControllerConfig { ease_s, stop_ramp_s, .. } = scenario.controller;
+        Self {
+            playback: Playback::new(trajectory, ease_s, stop_ramp_s, change_s),
+            acknowledgement: CommandAcknowledgement::default(),
+            cycles_at_rest: 0,
+        }
+    }
+
+    /// Begins a cycle. A motion that waited goes on at full speed from the target that the drives held: a period's
+    /// worth, as ever.
+    pub(crate) fn advance(&mut self, sequencer: &Sequencer, cycle: u64) {
+        let answered_cycle = sequencer.estimate.map_or(0, |estimate| estimate.answers_cycle);
+        if self.acknowledgement.takes_step(cycle, answered_cycle) {
+            self.playback.advance(sequencer.period_s);
+        }
+    }
+
+    /// Whether the motion of this state is over.
+    pub(crate) fn is_over(&self, sequencer: &Sequencer) -> bool {
+        if sequencer.state == ControllerState::Holding {
+            self.cycles_at_rest as f64 * sequencer.period_s >= sequencer.config.hold_s
+        } else {
+            self.playback.is_over()
+        }
+    }
+
+    /// Prepares the playback for the state that has been entered.
+    pub(crate) fn enter_state(&mut self, sequencer: &Sequencer) {
+        match (sequencer.state, &sequencer.estimate) {
+            (ControllerState::Enabling, Some(estimate)) => self.playback.hold(estimate.solution.pose),
+            (ControllerState::Easing, _) => self.playback.ease(),
+            (ControllerState::Running, _) => self.playback.play(),
+            (ControllerState::Holding, _) => self.playback.stop(),
+            _ => {}
+        }
+        self.cycles_at_rest = 0;
+    }
+
+    /// Ends a cycle.
+    pub(crate) fn count_rest(&mut self) {
+        self.cycles_at_rest = if self.playback.is_at_rest() { self.cycles_at_rest + 1 } else { 0 };
+    }
+}
 
 /// The part that is playing.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -154,14 +228,109 @@ impl Playback {
         self.rate == 0.0 || (self.is_at_end() && !is_changing)
     }
 
-    /// How far the motion has come `ahead_s` from now, in the sense of [`Trajectory::motion_time_s`]; negative before it
-    /// begins.
+    /// How far the motion has come `ahead_s` from now, in the sense of [`Trajectory::motion_time_s`]; negative before
+    /// it begins.
     pub(crate) fn motion_time_ahead_s(&self, ahead_s: f64) -> f64 {
-        if self.part == Part::Motion {
-            self.trajectory.motion_time_s(self.time_ahead_s(ahead_s))
-        } else {
-            -1.0
+        let is_motion = self.part == Part::Motion;
+        if is_motion { self.trajectory.motion_time_s(self.time_ahead_s(ahead_s)) } else { -1.0 }
+    }
+}
+
+/// Acknowledgement of commands: the motion makes its next step after the drives have received the last one.
+///
+/// While either process stalls, the drives hold their last target. If the motion continued meanwhile, it would have to
+/// catch up in one cycle.
+#[derive(Debug, Clone, Default)]
+#[doc(alias("flow control", "stop-and-wait"))]
+struct CommandAcknowledgement {
+    /// The cycle of the last step of the motion.
+    step_cycle: u64,
+}
+
+impl CommandAcknowledgement {
+    /// Whether the motion makes a step in this cycle, when a fresh reading last acknowledged the command of
+    /// `answered_cycle`. Without an acknowledgement the motion waits and repeats its last target until the drives
+    /// acknowledge a later command.
+    fn takes_step(&mut self, cycle: u64, answered_cycle: u64) -> bool {
+        let is_answered = answered_cycle >= self.step_cycle;
+        let is_under_way = cycle.saturating_sub(answered_cycle) <= LATEST_ANSWER_CYCLES;
+        let steps = is_answered || is_under_way;
+        if steps {
+            self.step_cycle = cycle;
         }
+        steps
+    }
+}
+
+/// A share, 0 to 1, that follows its target with limited speed and acceleration.
+#[derive(Debug, Clone)]
+struct Slew {
+    /// The present share.
+    value: f64,
+    target: f64,
+    per_s: f64,
+    most_per_s: f64,
+    most_per_s2: f64,
+}
+
+impl Slew {
+    /// The whole, whose change to nothing takes this long, s.
+    fn of(change_s: f64) -> Self {
+        let (most_per_s, most_per_s2) = (SPEED / change_s, ACCELERATION / (change_s * change_s));
+        Self { value: 1.0, target: 1.0, per_s: 0.0, most_per_s, most_per_s2 }
+    }
+
+    /// The shortest time of a change of rate or amplitude from 0 to 1, of both at once too, that leaves a motion with
+    /// these demands within its limits, s. Without demands it is the longest.
+    fn change_s(demands: Option<&TrajectoryReport>, limits: &TrajectoryLimitsConfig) -> f64 {
+        let Some(demands) = demands else { return LONGEST_S };
+        let of_axis = |axis: usize| {
+            let way_m = BEND * (demands.highest_m[axis] - demands.lowest_m[axis]);
+            let velocity_m_s = demands.velocity_m_s[axis];
+            let left_m_s = (limits.velocity_m_s(axis) - velocity_m_s).max(0.0);
+            let left_m_s2 = (limits.acceleration_m_s2(axis) - demands.acceleration_m_s2[axis]).max(0.0);
+            // Twice for the amplitude's change of a moving axis, once for that of its rate.
+            let moving = 3.0 * SPEED * velocity_m_s;
+            let root = (moving * moving + 4.0 * left_m_s2 * ACCELERATION * way_m).sqrt();
+            (SPEED * way_m / left_m_s).max((moving + root) / (2.0 * left_m_s2))
+        };
+        (0..AXES).map(of_axis).fold(SHORTEST_S, f64::max).min(LONGEST_S)
+    }
+
+    /// Sets where it goes.
+    fn set(&mut self, target: f64) {
+        self.target = target;
+    }
+
+    /// Goes there at once.
+    fn jump(&mut self) {
+        (self.value, self.per_s) = (self.target, 0.0);
+    }
+
+    /// Whether it has arrived.
+    fn is_settled(&self) -> bool {
+        self.value.to_bits() == self.target.to_bits() && self.per_s == 0.0
+    }
+
+    /// What it is in that time.
+    fn ahead(&self, ahead_s: f64) -> f64 {
+        (self.value + self.per_s * ahead_s).clamp(0.0, 1.0)
+    }
+
+    /// Lets `dt_s` pass.
+    fn advance(&mut self, dt_s: f64) {
+        let left = self.target - self.value;
+        let step_per_s = self.most_per_s2 * dt_s;
+        if left.abs() <= step_per_s * dt_s && self.per_s.abs() <= step_per_s {
+            self.jump();
+            return;
+        }
+        // From this speed it comes to rest exactly at the target, in steps of this length.
+        let half_step = step_per_s / 2.0;
+        let arriving_per_s = (half_step * half_step + 2.0 * self.most_per_s2 * left.abs()).sqrt() - half_step;
+        let wanted_per_s = arriving_per_s.min(self.most_per_s).copysign(left);
+        self.per_s += (wanted_per_s - self.per_s).clamp(-step_per_s, step_per_s);
+        self.value += self.per_s * dt_s;
     }
 }
 

@@ -52,37 +52,22 @@ impl PoseLaw for PoseControl {
         Ok(self.correct(&demand.ahead))
     }
 
-    /// The gains of the scenario. A trim limit can only become narrower: the strokes are checked against the scenario's.
+    /// The gains of the scenario. A trim limit can only become narrower: the strokes are checked against the
+    /// scenario's.
     fn declared(&self) -> Declared {
-        let ControllerConfig { integral_gain_per_s, trim_limit_m, trim_limit_rad, .. } = self.config;
+        let ControllerConfig { integral_gain_per_s: gain, trim_limit_m, trim_limit_rad, .. } = self.config;
         let parameter = |name, unit: &str, about: &str, value, most| Parameter {
             unit: unit.to_owned(),
             about: about.to_owned(),
             range: [0.0, most],
             ..Parameter::new(name, value)
         };
+        let (moves, turns) =
+            ("The trim moves the platform by no more.", "The trim turns the platform by no more.");
         let parameters = vec![
-            parameter(
-                "integral_gain_per_s",
-                "1/s",
-                "Integral gain of the trim.",
-                integral_gain_per_s,
-                self.most_gain_per_s,
-            ),
-            parameter(
-                "trim_limit_m",
-                "m",
-                "The trim moves the platform by no more.",
-                trim_limit_m,
-                trim_limit_m,
-            ),
-            parameter(
-                "trim_limit_rad",
-                "rad",
-                "The trim turns the platform by no more.",
-                trim_limit_rad,
-                trim_limit_rad,
-            ),
+            parameter("integral_gain_per_s", "1/s", "Integral gain of the trim.", gain, self.most_gain_per_s),
+            parameter("trim_limit_m", "m", moves, trim_limit_m, trim_limit_m),
+            parameter("trim_limit_rad", "rad", turns, trim_limit_rad, trim_limit_rad),
         ];
         Declared { parameters, ..Declared::default() }
     }

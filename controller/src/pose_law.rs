@@ -98,16 +98,16 @@ pub struct LawFailed;
 /// ```
 #[doc(alias("control law", "regulator"))]
 pub trait PoseLaw: std::fmt::Debug {
-    /// The pose to ask for, so that the desired pose comes about when this cycle's command is reached. It must not block
-    /// or allocate: in real time, the cycle waits for it. A target beyond a stroke by less than the default trim's reach is
-    /// clamped.
+    /// The pose to ask for, so that the desired pose comes about when this cycle's command is reached. It must not
+    /// block or allocate: in real time, the cycle waits for it. A target beyond a stroke by less than the default
+    /// trim's reach is clamped.
     ///
     /// # Errors
     /// When there is no such pose: the controller then stops safely.
     fn command(&mut self, demand: &Demand) -> Result<Pose, LawFailed>;
 
-    /// The law's detour from the desired pose. The supervision of the path and the published state count it as desired, so
-    /// that the limits hold for what the law did not mean. Whoever makes a detour bounds it.
+    /// The law's detour from the desired pose. The supervision of the path and the published state count it as desired,
+    /// so that the limits hold for what the law did not mean. Whoever makes a detour bounds it.
     fn detour(&self) -> Detour {
         Detour::default()
     }

@@ -1,17 +1,17 @@
-//! What the controllers have in common: they take readings, follow the sequence of states, stop when a wait takes too
-//! long, and write command and state.
+//! What the controllers have in common: they take readings, follow the sequence of states (a table), stop when a wait
+//! takes too long, and write command and state.
 
 use masseter_model::geometry::{AXES, Actuators, Mechanism, Pose};
 use masseter_runtime::control::{Outcome, Tick};
 use masseter_runtime::messages::codes::{
-    Cause, ControllerState, DriveState, EventKind, NO_DRIVE_STATE, Source, drive_state,
+    Cause, ControllerState, DriveRequest, DriveState, EventKind, NO_DRIVE_STATE, Source, drive_state,
 };
 use masseter_runtime::messages::{Command, Event, Reading, State, pose_fields};
 use masseter_scenario::{ControllerConfig, Scenario};
 
 use crate::kinematics::{ForwardTracker, Solution};
 use crate::safety::{self, Fault};
-use crate::sequence::{Trigger, next, request};
+use ControllerState::{Disabling, Easing, Enabling, Finished, Holding, Running, SafeStop, WaitReadings};
 
 /// Bits of [`Reading::fresh_axes`] when all axes are fresh.
 pub(crate) const ALL_AXES: u32 = (1 << AXES) - 1;
@@ -19,6 +19,47 @@ pub(crate) const ALL_AXES: u32 = (1 << AXES) - 1;
 pub(crate) const REPEATED_CYCLES: u64 = 5;
 /// Longest wait of a safe stop for drives without voltage, s.
 pub(crate) const SAFE_STOP_S: f64 = 0.3;
+
+/// Age of a reading that comes late but is used.
+const LATE_READING_CYCLES: u64 = 1;
+
+/// What changes a state. In one cycle only the most urgent trigger counts: the last in this order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Trigger {
+    /// The condition that ends the state holds.
+    Done,
+    /// A stop is requested.
+    StopRequested,
+    /// A fault.
+    Fault,
+}
+
+/// The state that follows `state` when `trigger` happens; the same state where nothing changes.
+fn next_state(state: ControllerState, trigger: Trigger) -> ControllerState {
+    let [done, stop_requested] = match state {
+        WaitReadings => [Enabling, Finished],
+        Enabling => [Easing, Disabling],
+        Easing => [Running, Holding],
+        Running => [Holding, Holding],
+        Holding => [Disabling, Holding],
+        Disabling => [Finished, Disabling],
+        Finished | SafeStop => return state,
+    };
+    match trigger {
+        Trigger::Done => done,
+        Trigger::StopRequested => stop_requested,
+        Trigger::Fault => SafeStop,
+    }
+}
+
+/// The request to all drives in that state.
+fn requested(state: ControllerState) -> DriveRequest {
+    match state {
+        WaitReadings | Disabling | Finished => DriveRequest::Off,
+        Enabling | Easing | Running | Holding => DriveRequest::Enable,
+        SafeStop => DriveRequest::QuickStop,
+    }
+}
 
 /// A complete reading and the pose of its positions.
 #[derive(Debug, Clone, Copy)]
@@ -63,7 +104,7 @@ impl Sequencer {
             enable_timeout_s: scenario.controller.start_timeout_s + scenario.can.longest_enabling_s(),
             observation_s: scenario.observation_s(),
             tracker: ForwardTracker::new(mechanism),
-            state: ControllerState::WaitReadings,
+            state: WaitReadings,
             cycles_in_state: 0,
             cycle: 0,
             silent_cycles: 0,
@@ -77,7 +118,7 @@ impl Sequencer {
 
     /// Takes the reading of a cycle, if there is one.
     pub(crate) fn observe(&mut self, reading: Option<&Reading>) {
-        let taken = reading.map_or(Ok(false), |reading| self.take(reading));
+        let taken = reading.map_or(Ok(false), |reading| self.apply_reading(reading));
         if taken == Ok(true) {
             self.silent_cycles = 0;
             self.steady_readings = self.steady_readings.saturating_add(1);
@@ -91,7 +132,7 @@ impl Sequencer {
     }
 
     /// Whether the reading is complete, and so gives an estimate.
-    fn take(&mut self, reading: &Reading) -> Result<bool, Fault> {
+    fn apply_reading(&mut self, reading: &Reading) -> Result<bool, Fault> {
         safety::check_reading(reading)?;
         safety::check_commander(reading, self.cycle)?;
         self.drive_state = reading.drive_state;
@@ -110,8 +151,19 @@ impl Sequencer {
         self.stop_requested = true;
     }
 
+    /// The estimate of this cycle's reading; none if the reading is missing or incomplete.
+    pub(crate) fn fresh_estimate(&self) -> Option<&Estimate> {
+        self.estimate.as_ref().filter(|_| self.silent_cycles == 0)
+    }
+
+    /// Age of the estimate's sample beyond that of a reading in time, s. The motion waits for readings that are later.
+    pub(crate) fn sample_age_s(&self) -> f64 {
+        let reading_cycle = self.estimate.map_or(self.cycle, |estimate| estimate.reading_cycle);
+        self.cycle.saturating_sub(reading_cycle).min(LATE_READING_CYCLES) as f64 * self.period_s
+    }
+
     pub(crate) fn is_moving(&self) -> bool {
-        matches!(self.state, ControllerState::Easing | ControllerState::Running | ControllerState::Holding)
+        matches!(self.state, Easing | Running | Holding)
     }
 
     /// Begins the decision of a cycle: the fault of its reading, or of a wait that took too long.
@@ -128,20 +180,16 @@ impl Sequencer {
         let enable_cycles = self.enable_timeout_s / self.period_s;
         let silence = || over(Cause::StaleReading, self.silent_cycles, self.config.stale_cycles.into());
         match self.state {
-            ControllerState::WaitReadings => over(Cause::StaleReading, self.cycles_in_state, timeout_cycles),
-            ControllerState::Enabling => {
-                over(Cause::EnableTimeout, self.cycles_in_state, enable_cycles).or_else(silence)
-            }
-            ControllerState::Disabling => {
-                over(Cause::EnableTimeout, self.cycles_in_state, timeout_cycles).or_else(silence)
-            }
-            ControllerState::Finished | ControllerState::SafeStop => None,
-            ControllerState::Easing | ControllerState::Running | ControllerState::Holding => silence(),
+            WaitReadings => over(Cause::StaleReading, self.cycles_in_state, timeout_cycles),
+            Enabling => over(Cause::EnableTimeout, self.cycles_in_state, enable_cycles).or_else(silence),
+            Disabling => over(Cause::EnableTimeout, self.cycles_in_state, timeout_cycles).or_else(silence),
+            Finished | SafeStop => None,
+            Easing | Running | Holding => silence(),
         }
     }
 
-    /// Follows the most urgent trigger to the next state, and reports it. `is_over`: whether the controller has moved and
-    /// held for as long as this state takes; a state without motion ignores it.
+    /// Follows the most urgent trigger to the next state, and reports it. `is_over`: whether the controller has moved
+    /// and held for as long as this state takes; a state without motion ignores it.
     pub(crate) fn follow(&mut self, fault: Option<Fault>, is_over: bool, tick: Tick) -> Option<Event> {
         let triggers = [
             (Trigger::Fault, fault.is_some()),
@@ -149,7 +197,7 @@ impl Sequencer {
             (Trigger::Done, self.is_done(is_over)),
         ];
         let moves = triggers.into_iter().filter(|(_, is_active)| *is_active);
-        let mut moves = moves.map(|(trigger, _)| (trigger, next(self.state, trigger)));
+        let mut moves = moves.map(|(trigger, _)| (trigger, next_state(self.state, trigger)));
         let followed = moves.find(|(_, to)| *to != self.state);
         self.cycles_in_state += 1;
         let (trigger, to) = followed?;
@@ -173,18 +221,18 @@ impl Sequencer {
 
     /// Whether the drives are about to be enabled.
     pub(crate) fn has_steady_readings(&self) -> bool {
-        self.state == ControllerState::WaitReadings && self.steady_readings >= self.config.steady_readings
+        self.state == WaitReadings && self.steady_readings >= self.config.steady_readings
     }
 
     /// Whether the condition that ends the state holds.
     fn is_done(&self, is_over: bool) -> bool {
         let enabled = DriveState::OperationEnabled.code();
         match self.state {
-            ControllerState::WaitReadings => self.has_steady_readings(),
-            ControllerState::Enabling => self.drive_state.iter().all(|&code| code == enabled),
-            ControllerState::Easing | ControllerState::Running | ControllerState::Holding => is_over,
-            ControllerState::Disabling => self.drives_are_off(),
-            ControllerState::Finished | ControllerState::SafeStop => false,
+            WaitReadings => self.has_steady_readings(),
+            Enabling => self.drive_state.iter().all(|&code| code == enabled),
+            Easing | Running | Holding => is_over,
+            Disabling => self.drives_are_off(),
+            Finished | SafeStop => false,
         }
     }
 
@@ -198,8 +246,8 @@ impl Sequencer {
     pub(crate) fn outcome(&self) -> Option<Outcome> {
         let is_repeated = self.cycles_in_state >= REPEATED_CYCLES;
         match self.state {
-            ControllerState::Finished => is_repeated.then_some(Outcome::Finished),
-            ControllerState::SafeStop => {
+            Finished => is_repeated.then_some(Outcome::Finished),
+            SafeStop => {
                 let waited_s = self.cycles_in_state as f64 * self.period_s;
                 let is_over = (is_repeated && self.drives_are_off()) || waited_s >= SAFE_STOP_S;
                 (is_over && waited_s >= self.observation_s).then_some(Outcome::SafeStop)
@@ -214,7 +262,7 @@ impl Sequencer {
             cycle: self.cycle,
             reading_cycle: self.estimate.map_or(0, |estimate| estimate.reading_cycle),
             target_m: target.map_or([0.0; AXES], Actuators::to_axes),
-            request: request(self.state).code(),
+            request: requested(self.state).code(),
             controller_state: self.state.code(),
             ..Command::default()
         }
@@ -233,5 +281,53 @@ impl Sequencer {
             (state.residual_m, state.iterations) = (solution.residual_m, solution.iterations);
         }
         state
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TRIGGERS: [Trigger; 3] = [Trigger::Done, Trigger::StopRequested, Trigger::Fault];
+
+    /// Every pair that changes the state; all others must leave it.
+    const MOVES: [(ControllerState, Trigger, ControllerState); 16] = [
+        (WaitReadings, Trigger::Done, Enabling),
+        (WaitReadings, Trigger::StopRequested, Finished),
+        (WaitReadings, Trigger::Fault, SafeStop),
+        (Enabling, Trigger::Done, Easing),
+        (Enabling, Trigger::StopRequested, Disabling),
+        (Enabling, Trigger::Fault, SafeStop),
+        (Easing, Trigger::Done, Running),
+        (Easing, Trigger::StopRequested, Holding),
+        (Easing, Trigger::Fault, SafeStop),
+        (Running, Trigger::Done, Holding),
+        (Running, Trigger::StopRequested, Holding),
+        (Running, Trigger::Fault, SafeStop),
+        (Holding, Trigger::Done, Disabling),
+        (Holding, Trigger::Fault, SafeStop),
+        (Disabling, Trigger::Done, Finished),
+        (Disabling, Trigger::Fault, SafeStop),
+    ];
+
+    #[test]
+    fn every_pair_moves_as_specified_and_no_other_moves() {
+        for state in ControllerState::ALL {
+            for trigger in TRIGGERS {
+                let specified = MOVES.iter().find(|(from, when, _)| (*from, *when) == (state, trigger));
+                let expected = specified.map_or(state, |(_, _, to)| *to);
+                assert_eq!(next_state(state, trigger), expected, "{state} on {trigger:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_safe_stop_is_never_left_and_every_moving_state_reaches_it() {
+        for trigger in TRIGGERS {
+            assert_eq!(next_state(SafeStop, trigger), SafeStop);
+        }
+        for state in [WaitReadings, Enabling, Easing, Running, Holding, Disabling] {
+            assert_eq!(next_state(state, Trigger::Fault), SafeStop);
+        }
     }
 }

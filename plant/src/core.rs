@@ -3,23 +3,26 @@
 //! Time is an argument of every call, exact or as irregular as real time. The core reads no clock and publishes nothing;
 //! the [process](crate::process) does.
 
-mod wire_events;
+#[cfg(test)]
+mod tests;
 
 use masseter_can::canopen::Cob;
-use masseter_can::{ReceiveError, Tapped};
+use masseter_can::faults::FaultNote;
+use masseter_can::{ErrorKind, ErrorReport, ErrorState, ReceiveError, Tapped};
+use masseter_runtime::messages::codes::{Cause, EventKind, Source};
 use masseter_runtime::messages::{Command, Contact, Event, FrameTap, Reading, Truth, tap};
 use masseter_runtime::realtime::Wake;
 use masseter_scenario::Scenario;
 
-use crate::emulation::VirtualLink;
 use crate::error::PlantError;
-use crate::injection::Injector;
-use crate::journal::{Journal, overflow};
-use crate::link::Link;
-use crate::link::layout::node_ids;
-use crate::link::sockets::SocketLink;
-use crate::master::{Master, shortest_boot};
-use crate::wanted::WantedDrive;
+use crate::master::Master;
+use crate::master::boot_plan::shortest_boot;
+use crate::master::events::{Journal, overflow};
+use crate::master::link::{Link, node_ids};
+use crate::master::sockets::SocketLink;
+use crate::master::wanted::WantedDrive;
+use crate::simulator::emulation::virtual_link::VirtualLink;
+use crate::simulator::injection::Injector;
 
 /// Tapped frames kept between two drains, of which one follows every cycle.
 const TAPPED: usize = 4096;
@@ -51,8 +54,9 @@ const TAPPED: usize = 4096;
 /// ```
 #[derive(Debug)]
 pub struct PlantCore<L = VirtualLink> {
-    master: Master,
-    link: L,
+    pub(crate) master: Master,
+    /// The link to the drives.
+    pub(crate) link: L,
     buses: usize,
     cycle: u64,
     /// With the index of its bus.
@@ -186,7 +190,7 @@ impl<L: Link> PlantCore<L> {
             self.injector.note_command(command, sampled_ns);
         }
         self.follow_injections();
-        self.injector.alter(self.cycle, [sampled_ns, now_ns], command)
+        self.injector.alter(self.cycle, sampled_ns, now_ns, command)
     }
 
     /// Takes what the emulation reports, and tells the link the times that have become known.
@@ -197,26 +201,6 @@ impl<L: Link> PlantCore<L> {
         while let Some((injected, window_ns)) = self.injector.next_window() {
             self.link.set_window(injected, window_ns);
         }
-    }
-
-    /// Stops the drives from the next process data on, for the end: commands are not needed any more.
-    pub(crate) fn stop(&mut self) {
-        self.master.stop();
-    }
-
-    /// Cycles since the last command.
-    pub(crate) fn silent_cycles(&self) -> u32 {
-        self.master.silent_cycles()
-    }
-
-    /// Whether no drive reports voltage.
-    pub(crate) fn drives_are_off(&self) -> bool {
-        self.master.drives_are_off()
-    }
-
-    /// The link to the drives.
-    pub(crate) fn link(&mut self) -> &mut L {
-        &mut self.link
     }
 
     /// Hands out the frames and errors tapped since the last drain. They are encoded only now, after the reading.
@@ -235,7 +219,7 @@ impl<L: Link> PlantCore<L> {
         for bus in 0..self.buses {
             while self.tapped.len() < TAPPED {
                 match self.link.tap(bus, now_ns) {
-                    Ok(Some(tapped)) => self.take_tapped(bus, tapped),
+                    Ok(Some(tapped)) => self.note_tapped(bus, tapped),
                     Err(ReceiveError::Overrun { lost }) => {
                         self.wire_events.add(overflow(now_ns, self.cycle, lost));
                     }
@@ -247,7 +231,7 @@ impl<L: Link> PlantCore<L> {
                     self.injector.note_bus_fault(note.fault, note.time_ns);
                 }
                 let axis = note.port.and_then(|port| self.link.axis_at(bus, port));
-                self.wire_events.add(wire_events::from_note(&note, bus, axis, self.cycle));
+                self.wire_events.add(event_of_note(&note, bus, axis, self.cycle));
             }
         }
         while let Some((time_ns, mishap)) = self.link.next_mishap() {
@@ -258,7 +242,7 @@ impl<L: Link> PlantCore<L> {
         }
     }
 
-    fn take_tapped(&mut self, bus: usize, tapped: Tapped) {
+    fn note_tapped(&mut self, bus: usize, tapped: Tapped) {
         match &tapped {
             Tapped::Frame(received) => match Cob::try_from(received.frame.id()) {
                 Ok(Cob::Rpdo1(_)) => self.command_sent_ns = self.command_sent_ns.max(received.time_ns),
@@ -267,7 +251,7 @@ impl<L: Link> PlantCore<L> {
             },
             Tapped::Error(report) => {
                 let axis = self.link.axis_at(bus, usize::from(report.port));
-                if let Some(event) = wire_events::from_report(report, bus, axis, self.cycle) {
+                if let Some(event) = event_of_report(report, bus, axis, self.cycle) {
                     self.wire_events.add(event);
                 }
             }
@@ -276,5 +260,35 @@ impl<L: Link> PlantCore<L> {
     }
 }
 
-#[cfg(test)]
-mod tests;
+/// The highest error counter of an error active controller, and of an error passive one.
+const ACTIVE_MAX: f64 = 127.0;
+const PASSIVE_MAX: f64 = 255.0;
+
+/// The event for a bus report that is a change of state; `axis` is the axis of its port.
+pub(super) fn event_of_report(
+    report: &ErrorReport,
+    bus: usize,
+    axis: Option<usize>,
+    cycle: u64,
+) -> Option<Event> {
+    let ErrorKind::State(state) = report.kind else { return None };
+    let (cause, limit) = match state {
+        ErrorState::Active => (Cause::ErrorActive, ACTIVE_MAX),
+        ErrorState::Passive => (Cause::ErrorPassive, ACTIVE_MAX),
+        ErrorState::BusOff => (Cause::BusOff, PASSIVE_MAX),
+    };
+    let value = f64::from(report.tec);
+    Some(Event { time_ns: report.time_ns, cycle, value, limit, ..notice(cause, bus, axis) })
+}
+
+/// The event for the beginning or the end of a fault on a bus; `axis` is the axis of the node concerned.
+pub(super) fn event_of_note(note: &FaultNote, bus: usize, axis: Option<usize>, cycle: u64) -> Event {
+    let cause = if note.has_ended { Cause::FaultEnded } else { Cause::FaultInjected };
+    let (value, limit) = ((note.fault + 1) as f64, note.activations as f64);
+    Event { time_ns: note.time_ns, cycle, value, limit, ..notice(cause, bus, axis) }
+}
+
+fn notice(cause: Cause, bus: usize, axis: Option<usize>) -> Event {
+    let event = Event::new(Source::Wire, EventKind::Notice, cause);
+    Event { axis: axis.map_or(event.axis, |axis| axis as u32), bus: bus as u16, ..event }
+}

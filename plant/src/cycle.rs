@@ -8,7 +8,7 @@ use masseter_runtime::schedule::CycleSchedule;
 
 use crate::core::PlantCore;
 use crate::error::PlantError;
-use crate::link::Link;
+use crate::master::link::Link;
 
 /// Where the plant's messages come from and go to, and how the plant waits.
 pub trait PlantPorts<L: Link> {
@@ -92,7 +92,7 @@ pub fn run_cycle<L: Link, P: PlantPorts<L>>(
     let reading_by_ns = wake.woke_ns + schedule.reading_by_ns;
     let mut now_ns = ports.wait_until(wake.woke_ns + schedule.reading_from_ns, reading_by_ns);
     while !plant.collect(now_ns)? && now_ns < reading_by_ns {
-        now_ns = ports.wait_for_frames(plant.link(), reading_by_ns);
+        now_ns = ports.wait_for_frames(&mut plant.link, reading_by_ns);
     }
     ports.publish_reading(|reading| plant.fill_reading(reading))?;
     if let Some(truth) = plant.truth() {

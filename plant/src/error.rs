@@ -2,12 +2,10 @@
 
 use std::path::PathBuf;
 
-use masseter_can::NotByPort;
 use masseter_can::canopen::NodeIdError;
-use masseter_can::{BitrateError, OpenError};
-use masseter_model::geometry::GeometryError;
-
-use crate::mechanism::DynamicsError;
+use masseter_can::{BitrateError, NotByPort, OpenError};
+use masseter_model::geometry::{GeometryError, InverseError, LimitViolation};
+use masseter_scenario::DynamicsConfig;
 
 /// A plant that cannot be built or cannot continue.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -54,4 +52,55 @@ pub enum PlantError {
     /// Values of the scenario that cannot be used together: their keys, the reason and the remedy.
     #[error("{0}")]
     Scenario(String),
+}
+
+/// Dynamics that cannot be built or cannot be integrated.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum DynamicsError {
+    /// The pose has no joint coordinates.
+    #[error("the mechanism came to a pose without joint coordinates: {0}")]
+    Inverse(#[from] InverseError),
+    /// The mass matrix cannot be inverted: masses or inertias are not positive.
+    #[error("the mechanism's mass matrix is not positive definite; check [dynamics]")]
+    Mass,
+    /// Contact between the jaws that the integration cannot resolve.
+    #[error(transparent)]
+    Contact(#[from] ContactError),
+    /// Initial legs on which the platform cannot be level within the strokes.
+    #[error(
+        "dynamics.initial_leg_m = {initial_leg_m}: {violation}; choose legs, and an initial_offset_m, with which the level \
+         platform is within its strokes"
+    )]
+    Start {
+        /// Length of the legs, m.
+        initial_leg_m: f64,
+        /// The joint that is outside its stroke.
+        violation: LimitViolation,
+    },
+}
+
+/// A contact that the integration cannot resolve.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum ContactError {
+    /// At the chosen step.
+    #[error(
+        "dynamics.step_ns = {step_ns}: the contact of teeth and food is too stiff for this step; use at most {longest_ns}, or \
+         less teeth.stiff_n_per_m or food.stiffness_n_per_m"
+    )]
+    Step {
+        /// The chosen step, ns.
+        step_ns: u64,
+        /// The longest step that resolves the contact, ns.
+        longest_ns: u64,
+    },
+    /// At every step.
+    #[error(
+        "teeth.stiff_n_per_m, food.stiffness_n_per_m: the contact of teeth and food needs a dynamics.step_ns of {longest_ns}, \
+         which is less than {}; use less stiffness",
+        DynamicsConfig::STEPS_NS.start()
+    )]
+    Stiff {
+        /// The longest step that resolves the contact, ns.
+        longest_ns: u64,
+    },
 }

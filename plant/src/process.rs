@@ -14,7 +14,7 @@ use masseter_scenario::Scenario;
 use crate::core::PlantCore;
 use crate::cycle::{PlantPorts, run_cycle};
 use crate::error::PlantError;
-use crate::link::Link;
+use crate::master::link::Link;
 
 /// Longest time for the drives to stop after the request to end, ns.
 const STOP_WITHIN_NS: u64 = 500_000_000;
@@ -235,7 +235,7 @@ fn serve<L: Link>(
     let clock = Clock::start(lockstep, start.epoch_ns, scenario.period_ns());
     let mut binding = Binding { ports, clock, schedule, takes_commands: true, samples: 0 };
     let most_silent_cycles = most_silent_cycles(context);
-    while binding.goes_on(&context.stop) && u64::from(plant.silent_cycles()) <= most_silent_cycles {
+    while binding.goes_on(&context.stop) && u64::from(plant.master.silent_cycles()) <= most_silent_cycles {
         let wake = binding.wait(&mut plant)?;
         run_cycle(&mut plant, &mut binding, schedule, &wake)?;
     }
@@ -267,10 +267,10 @@ fn stop_drives<L: Link>(
     binding: &mut Binding<'_>,
     period_ns: u64,
 ) -> Result<(), PlantProcessError> {
-    plant.stop();
+    plant.master.stop();
     binding.takes_commands = false;
     let give_up_ns = binding.clock.now_ns() + STOP_WITHIN_NS.max(STOP_WITHIN_CYCLES * period_ns);
-    while !plant.drives_are_off() && binding.clock.now_ns() < give_up_ns {
+    while !plant.master.drives_are_off() && binding.clock.now_ns() < give_up_ns {
         let wake = binding.wait(plant)?;
         run_cycle(plant, binding, binding.schedule, &wake)?;
     }

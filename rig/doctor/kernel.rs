@@ -1,60 +1,61 @@
 //! The kernel: preemption, real-time throttling, isolated cores, clock source.
 
+use masseter_machine::SystemRoot;
 use masseter_scenario::wording::counted;
 
-use super::container::on_host;
-use super::finding::Finding;
-use masseter_machine::SystemRoot;
+use super::finding::{Finding, on_host};
 
 /// Clock sources that are read in tens of nanoseconds, without a system call.
 const FAST_SOURCES: [&str; 4] = ["tsc", "kvm-clock", "arch_sys_counter", "hyperv_clocksource_tsc_page"];
 
-/// All findings of this family.
-pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
-    vec![preemption(root), throttling(root), isolation(root), clock_source(root)]
+const FULL_PREEMPTION: &str = "sudo mount -t debugfs debugfs /sys/kernel/debug; \
+                               echo full | sudo tee /sys/kernel/debug/sched/preempt";
+const REALTIME_KERNEL: &str = "install a kernel with PREEMPT_RT: on Debian 'sudo apt install \
+     linux-image-rt-amd64', on Ubuntu 'sudo pro enable realtime-kernel'; then boot again";
+
+/// The findings about the kernel.
+pub(super) fn examine_kernel(root: &SystemRoot) -> Vec<Finding> {
+    vec![
+        preemption(root).named("preemption model"),
+        throttling(root).named("real-time throttling"),
+        isolation(root).named("isolated cores"),
+        clock_source(root).named("clock source"),
+    ]
 }
 
 fn preemption(root: &SystemRoot) -> Finding {
-    const CHECK: &str = "preemption model";
     let release = root.text("proc/sys/kernel/osrelease").unwrap_or_default();
     let version = root.text("proc/sys/kernel/version").unwrap_or_default();
     let has = |word: &str| version.split_whitespace().any(|found| found == word);
     if root.number("sys/kernel/realtime") == Some(1) || has("PREEMPT_RT") {
-        return Finding::ok(CHECK, format!("{release}: fully preemptible (PREEMPT_RT)"));
+        return Finding::ok(format!("{release}: fully preemptible (PREEMPT_RT)"));
     }
     // The current mode is in brackets: `none voluntary (full) lazy`.
     let modes = root.text("sys/kernel/debug/sched/preempt").unwrap_or_else(|| "not readable".to_owned());
     let (found, remedy) = if has("PREEMPT_DYNAMIC") && !modes.contains("(full)") {
-        let remedy = "sudo mount -t debugfs debugfs /sys/kernel/debug; \
-                    echo full | sudo tee /sys/kernel/debug/sched/preempt";
-        (format!("PREEMPT_DYNAMIC, modes {modes}"), remedy)
+        (format!("PREEMPT_DYNAMIC, modes {modes}"), FULL_PREEMPTION)
+    } else if has("PREEMPT") || has("PREEMPT_DYNAMIC") {
+        ("preemptible (full)".to_owned(), REALTIME_KERNEL)
     } else {
-        let is_preemptible = has("PREEMPT") || has("PREEMPT_DYNAMIC");
-        let remedy = "install a kernel with PREEMPT_RT: on Debian 'sudo apt install linux-image-rt-amd64', on Ubuntu \
-                    'sudo pro enable realtime-kernel'; then boot again";
-        (
-            if is_preemptible { "preemptible (full)" } else { "not preemptible in the kernel" }.to_owned(),
-            remedy,
-        )
+        ("not preemptible in the kernel".to_owned(), REALTIME_KERNEL)
     };
     let cost = "a system call of another task may occupy a core for up to a millisecond";
-    Finding::warn(CHECK, format!("{release}: {found}"), cost).with_remedy(on_host(root, remedy))
+    Finding::warn(format!("{release}: {found}"), cost).with_remedy(on_host(root, remedy))
 }
 
 fn throttling(root: &SystemRoot) -> Finding {
-    const CHECK: &str = "real-time throttling";
     let runtime_us = root.number("proc/sys/kernel/sched_rt_runtime_us");
     let period_us = root.number("proc/sys/kernel/sched_rt_period_us");
     let (Some(runtime_us), Some(period_us)) = (runtime_us, period_us) else {
-        return Finding::ok(CHECK, "none in this kernel");
+        return Finding::ok("none in this kernel");
     };
     let found = format!("{runtime_us} of every {period_us} µs");
     let finding = match runtime_us {
-        ..0 => Finding::warn(CHECK, "off", "a real-time task that never waits blocks its core"),
-        0 => Finding::bad(CHECK, found, "real-time tasks get no CPU time"),
+        ..0 => Finding::warn("off", "a real-time task that never waits blocks its core"),
+        0 => Finding::bad(found, "real-time tasks get no CPU time"),
         // The kernel's default; the loops limit their spinning to stay below it.
-        _ if runtime_us * 100 >= period_us * 95 => return Finding::ok(CHECK, found),
-        _ => Finding::warn(CHECK, found, "the kernel stops fast loops for the rest of the period"),
+        _ if runtime_us * 100 >= period_us * 95 => return Finding::ok(found),
+        _ => Finding::warn(found, "the kernel stops fast loops for the rest of the period"),
     };
     // The kernel's default share of the current period. Setting both values fails in one order or the other.
     let default_us = period_us - period_us / 20;
@@ -62,26 +63,22 @@ fn throttling(root: &SystemRoot) -> Finding {
 }
 
 fn isolation(root: &SystemRoot) -> Finding {
-    const CHECK: &str = "isolated cores";
     let list = |path: &str| root.text(path).filter(|list| !list.is_empty() && list != "(null)");
     if let Some(isolated) = list("sys/devices/system/cpu/isolated") {
         let tickless = list("sys/devices/system/cpu/nohz_full");
         let tickless = tickless.map_or_else(|| "ticking".to_owned(), |list| format!("nohz_full={list}"));
-        return Finding::ok(CHECK, format!("isolcpus={isolated}, {tickless}; choose them with --cores"));
+        return Finding::ok(format!("isolcpus={isolated}, {tickless}; choose them with --cores"));
     }
     let cores = root.online_cores().len();
     let Some([one, other]) = cores_to_spare(root).filter(|_| cores > 2) else {
-        return Finding::ok(
-            CHECK,
-            format!("none; with {} none can be spared", counted(cores as u64, "core")),
-        );
+        return Finding::ok(format!("none; with {} none can be spared", counted(cores as u64, "core")));
     };
     let remedy = format!(
         "add 'isolcpus={one},{other} nohz_full={one},{other}' to the kernel's command line (on Debian and Ubuntu: \
          GRUB_CMDLINE_LINUX_DEFAULT in /etc/default/grub, then 'sudo update-grub'), and boot again; then: masseter run \
          --cores {one},{other}"
     );
-    Finding::warn(CHECK, "none", "other tasks and interrupts also run on the rig's cores")
+    Finding::warn("none", "other tasks and interrupts also run on the rig's cores")
         .with_remedy(on_host(root, remedy))
 }
 
@@ -95,16 +92,15 @@ fn cores_to_spare(root: &SystemRoot) -> Option<[usize; 2]> {
 }
 
 fn clock_source(root: &SystemRoot) -> Finding {
-    const CHECK: &str = "clock source";
     let folder = "sys/devices/system/clocksource/clocksource0";
     let Some(current) = root.text(&format!("{folder}/current_clocksource")) else {
-        return Finding::ok(CHECK, "unknown to this kernel");
+        return Finding::ok("unknown to this kernel");
     };
     if FAST_SOURCES.contains(&current.as_str()) {
-        return Finding::ok(CHECK, current);
+        return Finding::ok(current);
     }
     let available = root.text(&format!("{folder}/available_clocksource")).unwrap_or_default();
-    let finding = Finding::warn(CHECK, current, "reading the clock takes a microsecond or more");
+    let finding = Finding::warn(current, "reading the clock takes a microsecond or more");
     match available.split_whitespace().find(|source| FAST_SOURCES.contains(source)) {
         Some(better) => finding
             .with_remedy(on_host(root, format!("echo {better} | sudo tee /{folder}/current_clocksource"))),
@@ -114,9 +110,10 @@ fn clock_source(root: &SystemRoot) -> Finding {
 
 #[cfg(test)]
 mod tests {
+    use masseter_machine::fixture::Fixture;
+
     use super::super::finding::Level::{self, Bad, Ok, Warn};
     use super::*;
-    use masseter_machine::fixture::Fixture;
 
     type Files<'a> = &'a [(&'a str, &'a str)];
 
@@ -148,7 +145,7 @@ mod tests {
             ("proc/sys/kernel/sched_rt_period_us", "1000000"),
             ("sys/devices/system/cpu/online", "0-7"),
         ];
-        let findings = examine(&Fixture::with_files(&files).root());
+        let findings = examine_kernel(&Fixture::with_files(&files).root());
         for finding in findings.into_iter().filter(|finding| finding.level != Ok) {
             assert!(finding.remedy.unwrap().starts_with("on the host: "), "{}", finding.check);
         }

@@ -1,27 +1,25 @@
 //! `masseter doctor`: whether this machine is fit for real-time runs, and which commands would improve it.
 //!
-//! Each family of checks has a file; a [`Finding`] is a line of the report. The doctor changes nothing on the machine.
+//! A [`Finding`] is a line of the report. The doctor changes nothing on the machine.
 //! `docs/doctor.md` describes the JSON report.
 
-mod can;
-mod container;
 mod finding;
 mod kernel;
-mod leftovers;
-mod memory;
-mod privileges;
 mod processors;
+mod resources;
 
 use std::fmt::Write;
 
 use clap::Args;
+use masseter_machine::SystemRoot;
 use masseter_terminal::{Exit, Format, Tone, result, result_with_tones};
 use serde::Serialize;
 
 use crate::BUILD;
 use finding::{Finding, Level};
-
-use masseter_machine::SystemRoot;
+use kernel::examine_kernel;
+use processors::{examine_cores, examine_privileges};
+use resources::{examine_can, examine_memory, examine_rigs};
 
 /// The arguments of `doctor`.
 #[derive(Debug, Clone, Args)]
@@ -59,28 +57,22 @@ pub(crate) fn examine(args: &DoctorArgs) -> anyhow::Result<Exit> {
 
 /// The command that grants SCHED_FIFO on this machine.
 pub(crate) fn grant_command() -> String {
-    privileges::grant_command(&SystemRoot::of_this_machine())
+    processors::grant_command(&SystemRoot::of_this_machine())
 }
 
 /// The command against what disturbs real-time runs most on this machine; none if the doctor knows none.
 pub(crate) fn mending_command() -> Option<String> {
     let root = &SystemRoot::of_this_machine();
-    let findings = [processors::examine(root), kernel::examine(root)].concat();
+    let findings = [examine_cores(root), examine_kernel(root)].concat();
     let with_command = findings.into_iter().rev().filter(|finding| finding.remedy.is_some());
     // The first of the worst.
     with_command.max_by_key(|finding| finding.level)?.remedy
 }
 
 fn findings(root: &SystemRoot) -> Vec<Finding> {
-    [
-        privileges::examine(root),
-        processors::examine(root),
-        kernel::examine(root),
-        memory::examine(root),
-        can::examine(root),
-        leftovers::examine(),
-    ]
-    .concat()
+    let machine = [examine_privileges(root), examine_cores(root), examine_kernel(root)];
+    let shared = [examine_memory(root), examine_can(root), vec![examine_rigs()]];
+    [machine, shared].concat().concat()
 }
 
 impl Report {
@@ -115,13 +107,15 @@ impl Report {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
 
     #[test]
     fn the_worst_finding_decides() {
-        let fine = || Finding::ok("a", "as it should be");
-        let warned = || Finding::warn("b", "odd", "some").with_remedy("do this");
-        let bad = || Finding::bad("c", "gone", "all");
+        let fine = || Finding::ok("as it should be");
+        let warned = || Finding::warn("odd", "some").with_remedy("do this");
+        let bad = || Finding::bad("gone", "all");
         let cases = [
             (vec![fine()], Level::Ok),
             (vec![warned(), fine()], Level::Warn),
@@ -134,7 +128,7 @@ mod tests {
 
     #[test]
     fn the_form_is_as_documented() {
-        let report = Report::new(vec![Finding::warn("b", "odd", "some").with_remedy("do this")]);
+        let report = Report::new(vec![Finding::warn("odd", "some").with_remedy("do this").named("b")]);
         assert_eq!(
             serde_json::to_value(&report).unwrap(),
             serde_json::json!({
@@ -151,6 +145,10 @@ mod tests {
     #[test]
     fn an_empty_root_is_no_reason_to_fail() {
         let empty = tempfile::tempdir().unwrap();
-        assert!(findings(&SystemRoot::at(empty.path())).len() > 10);
+        let findings = findings(&SystemRoot::at(empty.path()));
+        assert!(findings.len() > 10);
+        let names: BTreeSet<_> = findings.iter().map(|finding| finding.check).collect();
+        assert_eq!(names.len(), findings.len(), "every check has a name of its own");
+        assert!(!names.contains(""));
     }
 }

@@ -1,39 +1,82 @@
-//! The cores: number, frequency governor, idle states, virtualisation.
+//! The cores and what the kernel grants on them: number, frequency governor, idle states, virtualisation; SCHED_FIFO
+//! and locked memory, which are requested from the kernel as a run does.
 
-use std::env;
-use std::fs::OpenOptions;
+use std::{env, fs::OpenOptions, thread};
 
-use masseter_runtime::realtime::scheduling::usable_cores;
-
-use super::container::{on_host, start_with};
-use super::finding::Finding;
 use masseter_machine::{SystemRoot, dma_latency, is_virtual};
+use masseter_runtime::realtime::scheduling::{Obtained, SchedulingRequest, obtain, usable_cores};
+use masseter_scenario::RealtimeConfig;
+
+use super::finding::{Finding, on_host, start_with};
 
 /// Longest exit latency of an idle state that the loops' spin covers, µs.
 const LATEST_EXIT_US: i64 = 200;
+/// Raises both limits for this user, from the next login on.
+const RAISE_LIMITS: &str = "printf '%s - rtprio 95\\n%s - memlock unlimited\\n' \"$USER\" \"$USER\" \
+                            | sudo tee /etc/security/limits.d/masseter.conf  # then log in again";
 
-/// All findings of this family.
-pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
+const SET_GOVERNOR: &str =
+    "echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor";
+
+/// The findings about SCHED_FIFO and locked memory.
+pub(super) fn examine_privileges(root: &SystemRoot) -> Vec<Finding> {
+    let nothing = SchedulingRequest { core: None, fifo_priority: None, locked_memory: false };
+    let priority = RealtimeConfig::default().priority;
+    let fifo_tried = try_out(SchedulingRequest { fifo_priority: Some(priority), ..nothing });
+    let memory_tried = try_out(SchedulingRequest { locked_memory: true, ..nothing });
+    vec![
+        fifo(root, priority, &fifo_tried).named("SCHED_FIFO"),
+        locked_memory(root, &memory_tried).named("locked memory"),
+    ]
+}
+
+/// Requests scheduling in a thread of its own, so that this one keeps its priority.
+fn try_out(request: SchedulingRequest) -> Obtained {
+    thread::spawn(move || obtain(request)).join().expect("asking the kernel does not panic")
+}
+
+fn fifo(root: &SystemRoot, priority: u8, obtained: &Obtained) -> Finding {
+    if obtained.fifo_priority == Some(priority) {
+        return Finding::ok(format!("priority {priority} granted"));
+    }
+    let cost = "every ordinary task can delay a cycle by milliseconds";
+    Finding::bad(format!("priority {priority} refused"), cost).with_remedy(grant_command(root))
+}
+
+/// The command that lets this user have SCHED_FIFO.
+pub(super) fn grant_command(root: &SystemRoot) -> String {
+    start_with(root, "--cap-add SYS_NICE --ulimit rtprio=95", RAISE_LIMITS)
+}
+
+fn locked_memory(root: &SystemRoot, obtained: &Obtained) -> Finding {
+    if obtained.locked_memory {
+        return Finding::ok("granted");
+    }
+    Finding::bad("refused", "a page fault in a cycle takes microseconds, from disk milliseconds")
+        .with_remedy(start_with(root, "--ulimit memlock=-1", RAISE_LIMITS))
+}
+
+/// The findings about the cores.
+pub(super) fn examine_cores(root: &SystemRoot) -> Vec<Finding> {
     // Whether runs may disable idle states.
     let may_hold = OpenOptions::new().write(true).open(dma_latency::DEVICE).is_ok();
     vec![
-        number(root, usable_cores().len(), &root.online_cores()),
-        governor(root),
-        idle(root, may_hold),
-        hypervisor(root),
+        number(root, usable_cores().len(), &root.online_cores()).named("cores"),
+        governor(root).named("frequency governor"),
+        idle(root, may_hold).named("idle states"),
+        hypervisor(root).named("virtual machine"),
     ]
 }
 
 fn number(root: &SystemRoot, usable: usize, online: &[usize]) -> Finding {
-    const CHECK: &str = "cores";
     let found = format!("{usable} of {} usable", online.len());
     match (usable, online) {
-        (2.., _) => Finding::ok(CHECK, found),
+        (2.., _) => Finding::ok(found),
         (_, [one, other, ..]) => {
-            Finding::bad(CHECK, found, "controller and plant share a core and delay each other")
+            Finding::bad(found, "controller and plant share a core and delay each other")
                 .with_remedy(start_with(root, &format!("--cpuset-cpus {one},{other}"), leave_cpuset()))
         }
-        _ => Finding::bad(CHECK, found, "controller and plant share the only core and delay each other"),
+        _ => Finding::bad(found, "controller and plant share the only core and delay each other"),
     }
 }
 
@@ -45,7 +88,6 @@ fn leave_cpuset() -> String {
 }
 
 fn governor(root: &SystemRoot) -> Finding {
-    const CHECK: &str = "frequency governor";
     let path = |core| format!("sys/devices/system/cpu/cpu{core}/cpufreq/scaling_governor");
     let mut governors: Vec<_> =
         root.online_cores().into_iter().filter_map(|core| root.text(&path(core))).collect();
@@ -53,40 +95,30 @@ fn governor(root: &SystemRoot) -> Finding {
     governors.dedup();
     let found = governors.join(", ");
     match governors.as_slice() {
-        [] => Finding::ok(CHECK, "none: this system cannot change the frequency"),
-        [only] if only == "performance" => Finding::ok(CHECK, found),
-        _ => Finding::warn(CHECK, found, "after a sleep the core computes up to several times slower")
-            .with_remedy(on_host(
-                root,
-                "echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor",
-            )),
+        [] => Finding::ok("none: this system cannot change the frequency"),
+        [only] if only == "performance" => Finding::ok(found),
+        _ => Finding::warn(found, "after a sleep the core computes up to several times slower")
+            .with_remedy(on_host(root, SET_GOVERNOR)),
     }
 }
 
 /// Idle states matter only if a run cannot disable them. Any core may be one of the run's, so the deepest state counts.
 fn idle(root: &SystemRoot, may_hold: bool) -> Finding {
-    const CHECK: &str = "idle states";
     let deepest = root.online_cores().into_iter().filter_map(|core| deepest_state(root, core)).max();
-    let Some((exit_us, name)) = deepest else {
-        return Finding::ok(CHECK, "not managed by this system");
-    };
+    let Some((exit_us, name)) = deepest else { return Finding::ok("not managed by this system") };
     let found = format!("deepest {name}, {exit_us} µs to leave");
     if exit_us <= LATEST_EXIT_US {
-        return Finding::ok(CHECK, found);
+        return Finding::ok(found);
     }
     let cost = "a loop that slept wakes after its deadline";
     match (is_virtual(root), may_hold) {
-        (false, true) => Finding::ok(CHECK, format!("{found}; a run disables it")),
+        (false, true) => Finding::ok(format!("{found}; a run disables it")),
         (false, false) => {
             let device = dma_latency::DEVICE;
             let grant = format!("sudo setfacl -m u:\"$USER\":rw {device}");
-            Finding::warn(CHECK, found, cost).with_remedy(start_with(
-                root,
-                &format!("--device {device}"),
-                grant,
-            ))
+            Finding::warn(found, cost).with_remedy(start_with(root, &format!("--device {device}"), grant))
         }
-        (true, _) => Finding::warn(CHECK, found, cost)
+        (true, _) => Finding::warn(found, cost)
             .with_remedy("masseter bench loop  # measures whether realtime.cpu_dma_latency = 'hold' helps"),
     }
 }
@@ -94,11 +126,10 @@ fn idle(root: &SystemRoot, may_hold: bool) -> Finding {
 /// Exit latency, µs, and name of a core's deepest enabled idle state.
 fn deepest_state(root: &SystemRoot, core: usize) -> Option<(i64, String)> {
     let folder = format!("sys/devices/system/cpu/cpu{core}/cpuidle");
-    let states = root.names(&folder);
-    let states = states.iter().filter(|state| {
+    let enabled = root.names(&folder).into_iter().filter(|state| {
         state.starts_with("state") && root.number(&format!("{folder}/{state}/disable")) != Some(1)
     });
-    let latencies = states.filter_map(|state| {
+    let latencies = enabled.filter_map(|state| {
         let latency_us = root.number(&format!("{folder}/{state}/latency"))?;
         Some((latency_us, root.text(&format!("{folder}/{state}/name")).unwrap_or_default()))
     });
@@ -106,22 +137,49 @@ fn deepest_state(root: &SystemRoot, core: usize) -> Option<(i64, String)> {
 }
 
 fn hypervisor(root: &SystemRoot) -> Finding {
-    const CHECK: &str = "virtual machine";
     if !is_virtual(root) {
-        return Finding::ok(CHECK, "no");
+        return Finding::ok("no");
     }
     let ticks = root.core_ticks().unwrap_or_default();
     let (total, [.., stolen]) = (ticks.iter().sum::<u64>(), ticks);
     let percent = 100.0 * stolen as f64 / total.max(1) as f64;
     let cost = "the hypervisor may stop a core for milliseconds; such runs are disturbed";
-    Finding::warn(CHECK, format!("yes; its host stole {percent:.3} % of the time since boot"), cost)
+    Finding::warn(format!("yes; its host stole {percent:.3} % of the time since boot"), cost)
 }
 
 #[cfg(test)]
 mod tests {
+    use masseter_machine::fixture::Fixture;
+
     use super::super::finding::Level::{Bad, Ok, Warn};
     use super::*;
-    use masseter_machine::fixture::Fixture;
+
+    #[test]
+    fn what_counts_is_what_was_read_back() {
+        let requested = SchedulingRequest { core: None, fifo_priority: Some(80), locked_memory: true };
+        let obtained = |fifo_priority, locked_memory| Obtained {
+            requested,
+            core: None,
+            fifo_priority,
+            locked_memory,
+            refusals: Vec::new(),
+        };
+        let machine = Fixture::with_files(&[]);
+        for (granted, level) in [(Some(80), Ok), (Some(10), Bad), (None, Bad)] {
+            assert_eq!(fifo(&machine.root(), 80, &obtained(granted, false)).level, level);
+        }
+        assert_eq!(locked_memory(&machine.root(), &obtained(None, true)).level, Ok);
+        let remedies = |root: &SystemRoot| {
+            [fifo(root, 80, &obtained(None, false)), locked_memory(root, &obtained(None, false))]
+                .map(|finding| finding.remedy.unwrap())
+        };
+        assert!(remedies(&machine.root()).iter().all(|remedy| remedy.contains("limits.d")));
+        let container = Fixture::with_files(&[(".dockerenv", "")]);
+        assert_eq!(
+            remedies(&container.root()),
+            ["docker run --cap-add SYS_NICE --ulimit rtprio=95 …", "docker run --ulimit memlock=-1 …"]
+        );
+    }
 
     #[test]
     fn two_cores_are_needed_and_a_cpuset_that_hides_them_is_left() {

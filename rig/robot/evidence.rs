@@ -1,25 +1,98 @@
-//! What a step of the bring-up leaves behind: a numbered folder with the log of the buses and `result.json`.
+//! What the steps of the bring-up leave behind, and whether a further step may rely on it.
 //!
-//! A result counts for the drives and the profiles with which it was made. It is written as not passed when a step begins,
-//! and replaced when the step ends: a killed step proves nothing.
+//! Each step has a numbered folder with the log of the buses and `result.json`. A result counts for the drives and
+//! the profiles with which it was made. It is written as not passed when a step begins, and replaced when the step
+//! ends: a killed step proves nothing.
 
-use std::fs::File;
+use std::fmt::{self, Display, Formatter};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
-use std::time::UNIX_EPOCH;
+use std::{fs::File, time::UNIX_EPOCH};
 
 use masseter_model::geometry::{AXES, AXIS_NAMES, MechanismConfig};
 use masseter_recording::RunFolder;
 use masseter_runtime::clock;
 use masseter_scenario::Scenario;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
 
-use super::identity::{Known, NOT_ASKED};
-use super::step::Step;
+use super::identity::{Identity, Known, NOT_ASKED};
+use super::ledger::{Nameless, before_file, parse_file};
+
+/// A step with evidence of its own, in the order of the bring-up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub(crate) enum Step {
+    /// All drives were read.
+    Inspect,
+    /// The drives have the rig's objects.
+    Configure,
+    /// The drives have their objects from before `Configure` again, whose evidence counts no more.
+    Restore,
+    /// An axis moved alone.
+    Jog(usize),
+    /// All axes know their zero.
+    Home,
+    /// The pose of the platform is the one that the axes tell.
+    CheckPose,
+    /// The motion was played slowly.
+    DryRun,
+}
+
+impl Step {
+    /// The steps that lead to a run.
+    pub(crate) fn chain() -> Vec<Self> {
+        let jogs = (0..AXES).map(Self::Jog);
+        let (first, last) = ([Self::Inspect, Self::Configure], [Self::Home, Self::CheckPose, Self::DryRun]);
+        first.into_iter().chain(jogs).chain(last).collect()
+    }
+
+    /// The axes that the step must be about.
+    pub(crate) fn axes(self) -> Vec<usize> {
+        if let Self::Jog(axis) = self { vec![axis] } else { (0..AXES).collect() }
+    }
+
+    /// The command of the step.
+    pub(crate) fn command(self) -> String {
+        match self {
+            Self::Jog(axis) => format!("masseter robot jog --axis {} --by 1mm", AXIS_NAMES[axis]),
+            Self::DryRun => "masseter run --dry".to_owned(),
+            _ => format!("masseter robot {self}"),
+        }
+    }
+}
+
+impl Display for Step {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Inspect => f.write_str("inspect"),
+            Self::Configure => f.write_str("configure"),
+            Self::Restore => f.write_str("restore"),
+            Self::Jog(axis) => write!(f, "jog-{}", AXIS_NAMES[*axis]),
+            Self::Home => f.write_str("home"),
+            Self::CheckPose => f.write_str("check-pose"),
+            Self::DryRun => f.write_str("dry-run"),
+        }
+    }
+}
+
+impl From<Step> for String {
+    fn from(step: Step) -> Self {
+        step.to_string()
+    }
+}
+
+impl TryFrom<String> for Step {
+    type Error = String;
+
+    fn try_from(name: String) -> Result<Self, String> {
+        let mut steps = Self::chain().into_iter().chain([Self::Restore]);
+        steps.find(|step| step.to_string() == name).ok_or_else(|| format!("'{name}' is no step"))
+    }
+}
 
 /// What a result depends on: another drive or another profile makes it outdated.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Basis {
     /// Hash of everything that decides the objects and the scales of the drives.
     pub(crate) profile_hash: String,
@@ -28,8 +101,8 @@ pub(crate) struct Basis {
 }
 
 impl Basis {
-    /// Of the scenario's profiles, interfaces, mechanism and jaw, and of these drives. Limits of a run do not count: a run writes
-    /// them itself, and a dry run has others.
+    /// Of the scenario's profiles, interfaces, mechanism and jaw, and of these drives. Limits of a run do not count:
+    /// a run writes them itself, and a dry run has others.
     pub(crate) fn new(scenario: &Scenario, drives: [Known; AXES]) -> Self {
         let mut hasher = crc32fast::Hasher::new();
         let mut mechanism = scenario.mechanism.clone();
@@ -48,17 +121,17 @@ impl Basis {
 /// `result.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Evidence {
-    /// Name of the step.
-    pub(crate) step: String,
-    /// When it began, UTC.
+    /// The folder that it was read from.
+    #[serde(skip)]
+    pub(crate) folder: PathBuf,
+    pub(crate) step: Step,
+    /// When the step began, UTC.
     pub(crate) started: String,
     /// Whether it ended well.
     pub(crate) passed: bool,
-    /// See [`Basis`].
-    pub(crate) profile_hash: String,
-    /// See [`Basis`].
-    pub(crate) drives: [Known; AXES],
-    /// Whether the steps before were there.
+    #[serde(flatten)]
+    pub(crate) basis: Basis,
+    /// Whether the steps before were there. Without them it shows something, but counts for no further step.
     pub(crate) in_order: bool,
     /// The axes of which it is evidence.
     pub(crate) axes: Vec<String>,
@@ -71,13 +144,22 @@ impl Evidence {
     pub(crate) fn is_about(&self, axis: usize) -> bool {
         self.axes.iter().any(|name| name == AXIS_NAMES[axis])
     }
+
+    /// The step's own data.
+    ///
+    /// # Errors
+    /// When it is not what such a step writes.
+    pub(crate) fn result_as<T: DeserializeOwned>(&self) -> serde_json::Result<T> {
+        T::deserialize(&self.result)
+    }
 }
 
 /// The folder of a step under way.
 #[derive(Debug)]
 pub(crate) struct StepFolder {
-    folder: RunFolder,
-    evidence: Evidence,
+    pub(crate) files: RunFolder,
+    /// What is written at the end; the step notes here who the drives are.
+    pub(crate) evidence: Evidence,
 }
 
 impl StepFolder {
@@ -91,23 +173,20 @@ impl StepFolder {
         axes: &[usize],
         scenario: &Scenario,
     ) -> anyhow::Result<Self> {
-        let number = numbered(parent)?.last().map_or(1, |(number, _)| number + 1);
-        let folder = RunFolder::create(&parent.join(format!("{number:02}-{step}")))?;
-        let Basis { profile_hash, drives } = Basis::new(scenario, NOT_ASKED);
-        let begun = Self {
-            folder,
-            evidence: Evidence {
-                step: step.to_string(),
-                started: humantime::format_rfc3339_seconds(UNIX_EPOCH + clock::wall_time()).to_string(),
-                passed: false,
-                profile_hash,
-                drives,
-                in_order: true,
-                axes: axes.iter().map(|&axis| AXIS_NAMES[axis].to_owned()).collect(),
-                result: Value::Null,
-            },
+        let number = numbered_folders(parent)?.last().map_or(1, |(number, _)| number + 1);
+        let files = RunFolder::create(&parent.join(format!("{number:02}-{step}")))?;
+        let evidence = Evidence {
+            folder: PathBuf::new(),
+            step,
+            started: humantime::format_rfc3339_seconds(UNIX_EPOCH + clock::wall_time()).to_string(),
+            passed: false,
+            basis: Basis::new(scenario, NOT_ASKED),
+            in_order: true,
+            axes: axes.iter().map(|&axis| AXIS_NAMES[axis].to_owned()).collect(),
+            result: Value::Null,
         };
-        begun.write()?;
+        let begun = Self { files, evidence };
+        begun.write_result()?;
         Ok(begun)
     }
 
@@ -116,7 +195,7 @@ impl StepFolder {
     /// # Errors
     /// When the file cannot be made.
     pub(crate) fn log(&self) -> io::Result<Box<dyn Write + Send>> {
-        Ok(Box::new(BufWriter::new(File::create(self.folder.file("candump.log"))?)))
+        Ok(Box::new(BufWriter::new(File::create(self.files.file("candump.log"))?)))
     }
 
     /// Writes a further file of the step.
@@ -124,49 +203,25 @@ impl StepFolder {
     /// # Errors
     /// When it cannot be written.
     pub(crate) fn keep(&self, name: &str, text: &str) -> io::Result<()> {
-        self.folder.keep(&self.folder.file(name), text)
-    }
-
-    /// The folder itself.
-    pub(crate) fn path(&self) -> &Path {
-        self.folder.path()
-    }
-
-    /// What this step's result depends on, with the drives as far as they are noted.
-    pub(crate) fn basis(&self) -> Basis {
-        let Evidence { profile_hash, drives, .. } = self.evidence.clone();
-        Basis { profile_hash, drives }
-    }
-
-    /// Notes that the step was made without the steps before: it shows something, but counts for no further step.
-    pub(crate) fn note_out_of_order(&mut self) {
-        self.evidence.in_order = false;
-    }
-
-    /// Notes who the drives are.
-    pub(crate) fn note_drives(&mut self, drives: [Known; AXES]) {
-        self.evidence.drives = drives;
+        self.files.keep(&self.files.file(name), text)
     }
 
     /// Replaces the result by that of the ended step.
     ///
     /// # Errors
     /// When it cannot be written.
-    pub(crate) fn finish(mut self, passed: bool, result: &impl Serialize) -> anyhow::Result<()> {
+    pub(crate) fn finish_step(mut self, passed: bool, result: &impl Serialize) -> anyhow::Result<()> {
         (self.evidence.passed, self.evidence.result) = (passed, serde_json::to_value(result)?);
-        Ok(self.write()?)
+        Ok(self.write_result()?)
     }
 
-    fn write(&self) -> io::Result<()> {
+    fn write_result(&self) -> io::Result<()> {
         self.keep("result.json", &(serde_json::to_string_pretty(&self.evidence)? + "\n"))
     }
 }
 
 /// The folders of past steps with their numbers, the oldest first; none where there is no folder yet.
-///
-/// # Errors
-/// When the folder cannot be read.
-pub(crate) fn numbered(parent: &Path) -> io::Result<Vec<(u32, PathBuf)>> {
+fn numbered_folders(parent: &Path) -> io::Result<Vec<(u32, PathBuf)>> {
     let entries = match parent.read_dir() {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
         entries => entries?,
@@ -178,4 +233,290 @@ pub(crate) fn numbered(parent: &Path) -> io::Result<Vec<(u32, PathBuf)>> {
     let mut found: Vec<_> = entries.filter_map(|entry| number(entry.ok()?.path())).collect();
     found.sort();
     Ok(found)
+}
+
+/// Why a step has no evidence that counts.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum Lack {
+    /// It was never made.
+    #[error("not done")]
+    Missing,
+    /// The newest one did not pass, or was killed.
+    #[error("not passed at {0}")]
+    NotPassed(String),
+    /// The profiles or the values that decide objects are others.
+    #[error("outdated: the profiles changed since {0}")]
+    OtherProfile(String),
+    /// The drive is another one, or tells less or more of itself.
+    #[error("outdated: the drive's {}", .now.differs_from(before))]
+    OtherDrive { before: Identity, now: Identity },
+    /// Nobody asked the drive then.
+    #[error("outdated: nobody knows which drive it was at {0}")]
+    NobodyAsked(String),
+    /// The drives got their old objects again.
+    #[error("outdated: restored at {0}")]
+    Restored(String),
+    /// An earlier step was made again since then.
+    #[error("outdated: {step} again at {at}")]
+    Repeated { step: Step, at: String },
+    /// It was made with `--out-of-order`.
+    #[error("made out of order at {0}")]
+    OutOfOrder(String),
+}
+
+/// A step that must pass first.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "{}: {step} {lack} (evidence in {}); run '{}' first", AXIS_NAMES[*axis], .folder.display(), step.command()
+)]
+pub(crate) struct EarlierStep {
+    axis: usize,
+    step: Step,
+    lack: Lack,
+    folder: PathBuf,
+}
+
+/// All past steps.
+#[derive(Debug)]
+pub(crate) struct Past {
+    folder: PathBuf,
+    /// Oldest first.
+    pub(crate) steps: Vec<Evidence>,
+    /// Folders without a readable result.
+    damaged: Vec<PathBuf>,
+}
+
+impl Past {
+    /// Reads the evidence in a folder. A folder without a readable result proves nothing and is no step.
+    ///
+    /// # Errors
+    /// When the folder itself cannot be read.
+    pub(crate) fn read(parent: &Path) -> anyhow::Result<Self> {
+        let mut past = Self { folder: parent.to_owned(), steps: Vec::new(), damaged: Vec::new() };
+        for (_, folder) in numbered_folders(parent)? {
+            match parse_file::<Evidence>(&folder.join("result.json")) {
+                Ok(evidence) => past.steps.push(Evidence { folder, ..evidence }),
+                Err(_) => past.damaged.push(folder),
+            }
+        }
+        Ok(past)
+    }
+
+    /// Refuses old values of an axis without a readable result: they may be those of another drive.
+    ///
+    /// # Errors
+    /// With the file.
+    pub(super) fn check_old_values(&self, axis: usize) -> Result<(), Nameless> {
+        let mut files = self.damaged.iter().map(|folder| folder.join(before_file(axis)));
+        files.find(|file| file.exists()).map_or(Ok(()), |file| Err(Nameless(file)))
+    }
+
+    /// The newest evidence of a step for an axis.
+    pub(crate) fn newest(&self, step: Step, axis: usize) -> Option<&Evidence> {
+        self.places_of(step, axis).next_back().map(|place| &self.steps[place])
+    }
+
+    /// The places of a step for an axis among all, the oldest first.
+    fn places_of(&self, step: Step, axis: usize) -> impl DoubleEndedIterator<Item = usize> {
+        let is_it = move |evidence: &Evidence| evidence.step == step && evidence.is_about(axis);
+        (0..self.steps.len()).filter(move |&place| is_it(&self.steps[place]))
+    }
+
+    /// Why the evidence at a place is outdated by what came after, if so: positions follow from objects and home.
+    fn outdated(&self, step: Step, axis: usize, place: usize) -> Option<Lack> {
+        let since = |earlier: Step| {
+            // A step that writes keeps the old values first: without them nothing was written to the drive.
+            let may_have_acted = |evidence: &Evidence| {
+                !matches!(earlier, Step::Configure | Step::Restore)
+                    || evidence.folder.join(before_file(axis)).exists()
+            };
+            let newer = self.places_of(earlier, axis).filter(|&newer| newer > place);
+            let mut steps = newer.map(|newer| &self.steps[newer]);
+            Some(steps.rfind(|evidence| may_have_acted(evidence))?.started.clone())
+        };
+        if step >= Step::Configure
+            && let Some(at) = since(Step::Restore)
+        {
+            return Some(Lack::Restored(at));
+        }
+        // A jog takes the mark of power out of the drive, and home sets the zero for good.
+        let earlier: &[Step] = match step {
+            Step::Home => &[Step::Configure],
+            Step::CheckPose => &[Step::Configure, Step::Jog(axis), Step::Home],
+            Step::DryRun => &[Step::Configure, Step::Jog(axis), Step::Home, Step::CheckPose],
+            _ => &[],
+        };
+        earlier.iter().find_map(|&step| Some(Lack::Repeated { step, at: since(step)? }))
+    }
+
+    /// Why the newest evidence of a step does not count for an axis, if so. A drive that is not asked is not compared.
+    ///
+    /// # Errors
+    /// The reason.
+    pub(crate) fn check_step(&self, step: Step, axis: usize, basis: &Basis) -> Result<&Evidence, Lack> {
+        let place = self.places_of(step, axis).next_back().ok_or(Lack::Missing)?;
+        let evidence = &self.steps[place];
+        let at = || evidence.started.clone();
+        if let Some(lack) = self.outdated(step, axis, place) {
+            return Err(lack);
+        }
+        if !evidence.passed {
+            return Err(Lack::NotPassed(at()));
+        }
+        if !evidence.in_order {
+            return Err(Lack::OutOfOrder(at()));
+        }
+        if evidence.basis.profile_hash != basis.profile_hash {
+            return Err(Lack::OtherProfile(at()));
+        }
+        match (evidence.basis.drives[axis], basis.drives[axis]) {
+            (Known::Is(before), Known::Is(now)) if before != now => Err(Lack::OtherDrive { before, now }),
+            (Known::NotAsked, Known::Is(_)) => Err(Lack::NobodyAsked(at())),
+            (_, Known::NotAsked) | (Known::Is(_), Known::Is(_)) => Ok(evidence),
+        }
+    }
+
+    /// Refuses to go on unless an earlier step passed for these axes, with the same drives and profiles.
+    ///
+    /// # Errors
+    /// [`EarlierStep`], which names the command to run first.
+    pub(crate) fn require(&self, step: Step, axes: &[usize], basis: &Basis) -> Result<(), EarlierStep> {
+        axes.iter().try_for_each(|&axis| {
+            let folder = self.folder.clone();
+            self.check_step(step, axis, basis).map(drop).map_err(|lack| EarlierStep {
+                axis,
+                step,
+                lack,
+                folder,
+            })
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{identity::Entry, identity::tests::drives};
+    use super::*;
+
+    const SERIALS: [Entry; AXES] =
+        [Entry::Told(1), Entry::Told(2), Entry::Told(3), Entry::Told(4), Entry::Told(5), Entry::Told(6)];
+    const ALL: [usize; AXES] = [0, 1, 2, 3, 4, 5];
+
+    fn leave_step(parent: &Path, step: Step, axes: &[usize], passed: Option<bool>) {
+        let mut folder = StepFolder::begin(parent, step, axes, &Scenario::default()).unwrap();
+        folder.evidence.basis.drives = drives(SERIALS);
+        if [Step::Configure, Step::Restore].contains(&step) {
+            for &axis in axes {
+                folder.keep(&before_file(axis), "").unwrap();
+            }
+        }
+        if let Some(passed) = passed {
+            folder.finish_step(passed, &"data").unwrap();
+        }
+    }
+
+    fn refusal(parent: &Path, step: Step, axes: &[usize], basis: &Basis) -> Option<String> {
+        Past::read(parent).unwrap().require(step, axes, basis).err().map(|error| error.lack.to_string())
+    }
+
+    #[test]
+    fn evidence_counts_for_the_same_drives_and_profiles_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let parent = folder.path().join("bringup");
+        let basis = Basis::new(&Scenario::default(), drives(SERIALS));
+        let check = |basis: &Basis| refusal(&parent, Step::Inspect, &ALL, basis);
+        let error =
+            Past::read(&parent).unwrap().require(Step::Inspect, &[3], &basis).unwrap_err().to_string();
+        assert!(error.starts_with("l1: inspect not done (evidence in"), "{error}");
+        assert!(error.ends_with("run 'masseter robot inspect' first"), "{error}");
+        leave_step(&parent, Step::Inspect, &ALL, Some(true));
+        assert_eq!(check(&basis), None);
+        let exchanged = |serial| {
+            let serials = [[1, 2, 3, 4, 5].map(Entry::Told).as_slice(), &[serial]].concat();
+            check(&Basis { drives: drives(serials.try_into().unwrap()), ..basis.clone() })
+        };
+        assert_eq!(exchanged(Entry::Told(6)), None);
+        for (serial, says) in [(Entry::Told(7), "7"), (Entry::Absent, "none")] {
+            let says = format!("outdated: the drive's serial number was 6, and is {says}");
+            assert_eq!(exchanged(serial), Some(says));
+        }
+        let faster = Scenario { rate_hz: 500, ..Scenario::default() };
+        assert_eq!(
+            check(&Basis::new(&faster, basis.drives)),
+            None,
+            "a run writes the objects of its rate itself"
+        );
+        let mut changed = Scenario::default();
+        changed.drives.leg.encoder_resolution_m = 2e-6;
+        let changed = Basis::new(&changed, basis.drives);
+        assert!(check(&changed).unwrap().starts_with("outdated: the profiles changed"));
+        leave_step(&parent, Step::Inspect, &ALL, None);
+        assert!(check(&basis).unwrap().starts_with("not passed at "), "a killed step proves nothing");
+        leave_step(&parent, Step::Inspect, &ALL, Some(true));
+        assert_eq!(check(&basis), None);
+        assert!(parent.join("03-inspect/result.json").exists());
+    }
+
+    /// A pose that was checked before the axes were homed again says nothing of the new zeros.
+    #[test]
+    fn a_step_that_is_repeated_outdates_those_after_it_and_one_out_of_order_counts_for_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let basis = Basis::new(&Scenario::default(), NOT_ASKED);
+        let check = |step, axis| refusal(folder.path(), step, &[axis], &basis);
+        leave_step(folder.path(), Step::Home, &ALL, Some(true));
+        leave_step(folder.path(), Step::CheckPose, &ALL, Some(true));
+        assert_eq!(check(Step::CheckPose, 3), None);
+        leave_step(folder.path(), Step::Home, &[3], Some(false));
+        assert!(check(Step::CheckPose, 3).unwrap().starts_with("outdated: home again at "));
+        assert_eq!(check(Step::CheckPose, 4), None, "another axis");
+        leave_step(folder.path(), Step::Home, &ALL, Some(true));
+        for step in [Step::CheckPose, Step::DryRun] {
+            leave_step(folder.path(), step, &ALL, Some(true));
+        }
+        leave_step(folder.path(), Step::Jog(3), &[3], Some(true));
+        assert_eq!(check(Step::Home, 3), None, "a jog returns what it changes");
+        for step in [Step::CheckPose, Step::DryRun] {
+            assert!(check(step, 3).unwrap().starts_with("outdated: jog-l1 again at "));
+            assert_eq!(check(step, 4), None, "another axis");
+        }
+        let mut alone =
+            StepFolder::begin(folder.path(), Step::CheckPose, &ALL, &Scenario::default()).unwrap();
+        alone.evidence.in_order = false;
+        alone.finish_step(true, &"data").unwrap();
+        assert!(check(Step::CheckPose, 3).unwrap().starts_with("made out of order at "));
+    }
+
+    #[test]
+    fn a_step_of_one_axis_says_nothing_of_the_others_and_restore_undoes_configure() {
+        let folder = tempfile::tempdir().unwrap();
+        let basis = Basis::new(&Scenario::default(), NOT_ASKED);
+        let check = |axis| refusal(folder.path(), Step::Configure, &[axis], &basis);
+        leave_step(folder.path(), Step::Configure, &[3], Some(true));
+        assert_eq!((check(3), check(4)), (None, Some("not done".to_owned())));
+        leave_step(folder.path(), Step::Configure, &ALL, Some(true));
+        assert_eq!((check(3), check(4)), (None, None));
+        let refused = StepFolder::begin(folder.path(), Step::Restore, &ALL, &Scenario::default()).unwrap();
+        drop(refused);
+        assert_eq!((check(3), check(4)), (None, None), "a refused step has written nothing");
+        leave_step(folder.path(), Step::Restore, &[3], Some(true));
+        assert!(check(3).unwrap().starts_with("outdated: restored at "));
+        assert_eq!(check(4), None);
+    }
+
+    #[test]
+    fn the_chain_is_in_order_and_every_step_has_a_command() {
+        let chain = Step::chain();
+        assert_eq!(chain.len(), 5 + AXES);
+        assert!(chain.is_sorted());
+        assert_eq!(chain[4].to_string(), "jog-d3");
+        assert_eq!(chain[4].command(), "masseter robot jog --axis d3 --by 1mm");
+    }
+
+    #[test]
+    fn a_step_is_read_by_its_name_and_no_other_word_is_a_step() {
+        for step in Step::chain().into_iter().chain([Step::Restore]) {
+            assert_eq!(Step::try_from(String::from(step)), Ok(step));
+        }
+        assert_eq!(Step::try_from("jog-l4".to_owned()), Err("'jog-l4' is no step".to_owned()));
+    }
 }

@@ -1,19 +1,17 @@
 //! `masseter robot home`: one axis after the other.
 
 use clap::Args;
-use masseter_model::geometry::AXIS_NAMES;
+use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::bringup::{HomeReport, Wish, home as find};
-use masseter_terminal::{Exit, Failure, result_line};
-use serde_json::{Value, json};
+use masseter_terminal::{Exit, Failure, OrFailure, result_line};
+use serde::Serialize;
 
 use super::args::{RobotArgs, parse_axis};
-use super::power_mark;
-use super::robot_line::failed;
-use super::session::Session;
-use super::step::Step;
+use super::power_mark::{Homed, leave_mark};
+use super::{evidence::Step, robot_line::failed, session::Session};
 
 /// The legs come first: a slide moves a leg whose length is known.
-const ORDER: [usize; 6] = [3, 4, 5, 0, 1, 2];
+const ORDER: [usize; AXES] = [3, 4, 5, 0, 1, 2];
 
 /// The arguments of `robot home`.
 #[derive(Debug, Clone, Args)]
@@ -32,58 +30,59 @@ pub(crate) struct HomeArgs {
     out_of_order: bool,
 }
 
+/// What is kept of one axis.
+#[derive(Debug, Serialize)]
+struct AxisResult {
+    #[serde(flatten)]
+    homed: Homed,
+    position_m: f64,
+    way_m: f64,
+    spread_m: Option<f64>,
+}
+
 /// Homes, prints what was found, and keeps it.
 pub(crate) fn home(args: &HomeArgs) -> Result<Exit, Failure> {
     let axes = args.axis.map_or_else(|| ORDER.to_vec(), |axis| vec![axis]);
-    let earlier = |axis| (!args.out_of_order).then_some(Step::Jog(axis));
+    let earlier = (!args.out_of_order).then_some(Step::Jog);
     let mut session = Session::begin(&args.robot, Step::Home, &axes, earlier)?;
     let stop = session.stop.clone();
     let mut operator = |_| if stop.is_made() { Wish::Stop } else { Wish::Move };
-    let mut data = Vec::with_capacity(axes.len());
+    let mut results = Vec::with_capacity(axes.len());
     for &axis in &axes {
-        match find(&mut session.line, &session.scenario, axis, &mut operator) {
-            Ok(report) => {
-                print(axis, &report).map_err(|error| Failure::with(Exit::Incomplete, error))?;
-                data.push(axis_data(axis, &report));
-            }
-            Err(error) => return Err(session.fail(error)),
-        }
+        let report = match find(&mut session.line, &session.scenario, axis, &mut operator) {
+            Ok(report) => report,
+            Err(error) => return Err(session.fail_motion(error)),
+        };
+        print(axis, &report).incomplete()?;
+        let HomeReport { position_m, way_m, spread_m } = report;
+        let homed = Homed { axis: AXIS_NAMES[axis].to_owned(), mark: None };
+        results.push(AxisResult { homed, position_m, way_m, spread_m });
     }
-    let marked = mark(&mut session, &axes, &mut data);
-    session.finish(marked.is_ok(), &data)?;
+    let marked = leave_marks(&mut session, &axes, &mut results);
+    session.finish_session(marked.is_ok(), &results)?;
     marked.map(|()| Exit::Passed).map_err(failed)
 }
 
 /// Leaves a mark in each drive that forgets its position without power.
-fn mark(session: &mut Session, axes: &[usize], data: &mut [Value]) -> anyhow::Result<()> {
-    for (&axis, data) in axes.iter().zip(data) {
-        data["mark"] = json!(power_mark::leave(&session.scenario, &mut session.line, axis)?);
+fn leave_marks(session: &mut Session, axes: &[usize], results: &mut [AxisResult]) -> anyhow::Result<()> {
+    for (&axis, result) in axes.iter().zip(results) {
+        result.homed.mark = leave_mark(&session.scenario, &mut session.line, axis)?;
     }
     Ok(session.check_present()?)
 }
 
 fn print(axis: usize, report: &HomeReport) -> anyhow::Result<()> {
     let HomeReport { position_m, way_m, spread_m } = *report;
-    let name = AXIS_NAMES[axis];
+    let (name, position_mm) = (AXIS_NAMES[axis], position_m * 1e3);
     match spread_m {
-        None => result_line!(
-            "{name}: {:.4} mm, within its stroke; the encoder keeps its position",
-            position_m * 1e3
-        ),
+        None => {
+            result_line!("{name}: {position_mm:.4} mm, within its stroke; the encoder keeps its position")
+        }
         Some(spread_m) => result_line!(
-            "{name}: home after {:.4} mm, 6064h shows {:.4} mm; the second homing is {:.4} mm beside the first",
+            "{name}: home after {:.4} mm, 6064h shows {position_mm:.4} mm; the second homing is {:.4} mm beside \
+             the first",
             way_m * 1e3,
-            position_m * 1e3,
             spread_m * 1e3
         ),
     }
-}
-
-fn axis_data(axis: usize, report: &HomeReport) -> Value {
-    json!({
-        "axis": AXIS_NAMES[axis],
-        "position_m": report.position_m,
-        "way_m": report.way_m,
-        "spread_m": report.spread_m,
-    })
 }

@@ -1,10 +1,13 @@
-//! Who the drive of an axis is: what it says of itself (1018h), and the node that says it.
+//! Who the drive of an axis is: what it says of itself (1018h), and the node that says it; whether it is still the
+//! same drive at the end of a step.
 
 use std::fmt::{self, Display, Formatter};
 
 use masseter_can::canopen::ObjectAddress;
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::bringup::{Line, LineError, SdoReason, Survey, object_name, value_text};
+use masseter_plant::bringup::{
+    BootUps, Line, LineError, OtherMaster, Restarted, SdoReason, Survey, object_name, value_text,
+};
 use masseter_plant::wanted::WantedDrive;
 use masseter_scenario::CanConfig;
 use masseter_terminal::status;
@@ -50,9 +53,9 @@ pub(crate) enum Known {
 /// A drive of another identity than the profile's.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "{}: object {object} ({}) is {}, the profile wants {}; enter this drive's identity in drive_profile.identity, or use \
-     the drive that the profile is for",
-    AXIS_NAMES[*axis], object_name(*object), .found.text(object.subindex), value_text(*object, *wanted)
+    "{}: object {object} ({}) is {}, the profile wants {}; enter this drive's identity in \
+     drive_profile.identity, or use the drive that the profile is for",
+    AXIS_NAMES[*axis], object_name(*object), .found.in_words(object.subindex), value_text(*object, *wanted)
 )]
 pub(crate) struct OtherKind {
     axis: usize,
@@ -63,7 +66,7 @@ pub(crate) struct OtherKind {
 
 impl Entry {
     /// In words: a serial number as on the type plate.
-    fn text(self, subindex: u8) -> String {
+    fn in_words(self, subindex: u8) -> String {
         match self {
             Self::Told(number) if subindex == SERIAL => number.to_string(),
             Self::Told(number) => format!("{number:X}h"),
@@ -100,12 +103,11 @@ impl Identity {
 
     /// Its entries with their sub-indices and names.
     fn entries(&self) -> [(u8, &'static str, Entry); 4] {
-        let Self { vendor, product, revision, serial, .. } = *self;
         [
-            (1, "vendor", vendor),
-            (2, "product code", product),
-            (3, "revision", revision),
-            (SERIAL, "serial number", serial),
+            (1, "vendor", self.vendor),
+            (2, "product code", self.product),
+            (3, "revision", self.revision),
+            (SERIAL, "serial number", self.serial),
         ]
     }
 
@@ -116,13 +118,13 @@ impl Identity {
     pub(crate) fn check_kind(&self, axis: usize, wanted: &WantedDrive) -> Result<(), OtherKind> {
         for (subindex, _, found) in self.entries() {
             let object = ObjectAddress::new(INDEX, subindex);
-            let entry = wanted.identity.iter().find(|wanted| wanted.object == object);
-            let is_right = entry.is_none_or(|wanted| match found {
-                Entry::Told(number) => number & wanted.mask == wanted.value & wanted.mask,
-                Entry::Absent => wanted.mask == 0,
-            });
-            if let (false, Some(wanted)) = (is_right, entry) {
-                return Err(OtherKind { axis, object, found, wanted: wanted.value });
+            let Some(entry) = wanted.identity.iter().find(|entry| entry.object == object) else { continue };
+            let is_right = match found {
+                Entry::Told(number) => number & entry.mask == entry.value & entry.mask,
+                Entry::Absent => entry.mask == 0,
+            };
+            if !is_right {
+                return Err(OtherKind { axis, object, found, wanted: entry.value });
             }
         }
         Ok(())
@@ -133,24 +135,18 @@ impl Identity {
         let entries = before.entries().into_iter().zip(self.entries());
         let others = entries.filter(|((.., before), (.., now))| before != now);
         let others = others.map(|((part, name, before), (.., now))| {
-            format!("{name} was {}, and is {}", before.text(part), now.text(part))
+            format!("{name} was {}, and is {}", before.in_words(part), now.in_words(part))
         });
         let node = format!("node was {}, and is {}", before.node, self.node);
         others.chain((before.node != self.node).then_some(node)).collect::<Vec<_>>().join("; ")
-    }
-
-    /// The entries alone: what another node may tell too.
-    fn told(&self) -> [Entry; 4] {
-        self.entries().map(|(_, _, entry)| entry)
     }
 }
 
 impl Display for Identity {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         write!(f, "node {}", self.node)?;
-        self.entries()
-            .into_iter()
-            .try_for_each(|(part, name, entry)| write!(f, ", {name} {}", entry.text(part)))
+        let mut entries = self.entries().into_iter();
+        entries.try_for_each(|(part, name, entry)| write!(f, ", {name} {}", entry.in_words(part)))
     }
 }
 
@@ -169,11 +165,56 @@ impl Known {
 
     /// The identity, if it is known.
     pub(crate) const fn identity(&self) -> Option<&Identity> {
-        match self {
-            Self::NotAsked => None,
-            Self::Is(identity) => Some(identity),
+        if let Self::Is(identity) = self { Some(identity) } else { None }
+    }
+}
+
+/// Why what a step has read from a drive, or written to it, may not count any more.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum Disturbance {
+    /// It restarted.
+    #[error(transparent)]
+    Restarted(#[from] Restarted),
+    /// Another master may have changed it.
+    #[error(transparent)]
+    OtherMaster(#[from] OtherMaster),
+    /// It does not answer any more.
+    #[error(transparent)]
+    Line(#[from] LineError),
+    /// Another drive answers.
+    #[error(
+        "{}: the drive's {}; leave the drives in their places during a step",
+        AXIS_NAMES[*axis], .now.differs_from(before)
+    )]
+    OtherDrive { axis: usize, before: Identity, now: Identity },
+}
+
+/// Refuses drives of which one restarted since then, or beside which another master was heard. Nothing is sent.
+pub(super) fn check_undisturbed(line: &Line, axes: &[usize], since: BootUps) -> Result<(), Disturbance> {
+    axes.iter().try_for_each(|&axis| since.check_axis(line, axis))?;
+    Ok(line.strangers().refuse_masters()?)
+}
+
+/// The same, and asks the drives again who they are.
+pub(super) fn check_present(
+    line: &mut Line,
+    can: &CanConfig,
+    axes: &[usize],
+    since: BootUps,
+    drives: &[Known; AXES],
+) -> Result<(), Disturbance> {
+    let answers: Vec<_> = axes.iter().map(|&axis| (axis, Identity::read(line, can, axis))).collect();
+    // A restart is the cause of a missing answer, and may become known while the answer is waited for.
+    check_undisturbed(line, axes, since)?;
+    for (axis, now) in answers {
+        let now = now?;
+        if let Known::Is(before) = drives[axis]
+            && before != now
+        {
+            return Err(Disturbance::OtherDrive { axis, before, now });
         }
     }
+    Ok(())
 }
 
 /// What these identities do not tell, one line for each gap.
@@ -187,18 +228,19 @@ pub(crate) fn gaps(drives: &[Known; AXES]) -> Vec<String> {
     let without = names(&|identity| identity.serial == Entry::Absent);
     if !without.is_empty() {
         gaps.push(format!(
-            "{}: no serial number (1018h:04), so that nobody knows whether a drive of the same vendor, product and revision \
-             has taken its place",
+            "{}: no serial number (1018h:04), so that nobody knows whether a drive of the same vendor, product \
+             and revision has taken its place",
             without.join(" ")
         ));
     }
     for (axis, identity) in known().filter(|(_, identity)| identity.serial != Entry::Absent) {
-        let twins = names(&|other| other.told() == identity.told());
+        // Two nodes may tell the same.
+        let twins = names(&|other| other.entries() == identity.entries());
         if twins.len() > 1 && twins[0] == AXIS_NAMES[axis] {
             gaps.push(format!(
                 "{}: one identity, serial number {}: nobody knows which is which when they change places",
                 twins.join(" "),
-                identity.serial.text(SERIAL)
+                identity.serial.in_words(SERIAL)
             ));
         }
     }
@@ -207,9 +249,7 @@ pub(crate) fn gaps(drives: &[Known; AXES]) -> Vec<String> {
 
 /// Says what the identities do not tell.
 pub(crate) fn warn_of_gaps(drives: &[Known; AXES]) {
-    for gap in gaps(drives) {
-        status!("warning: {gap}");
-    }
+    gaps(drives).iter().for_each(|gap| status!("warning: {gap}"));
 }
 
 #[cfg(test)]

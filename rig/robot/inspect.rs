@@ -1,37 +1,39 @@
 //! `masseter robot inspect`: reads all drives, and changes nothing.
+//!
+//! A device configuration file (CiA 306) of each drive holds what was read: other tools read it, and so does
+//! `drive_profile.dcf`.
 
-use std::collections::BTreeMap;
-use std::fmt::Write;
+use std::{collections::BTreeMap, fmt::Write};
 
 use clap::Args;
-use masseter_can::canopen::ObjectAddress;
+use masseter_can::{InterfaceDetails, canopen::ObjectAddress};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::bringup::{
     BootUps, Deviation, LineError, OtherMaster, Outcome, Restarted, Survey, object_name, reason_text,
 };
 use masseter_runtime::clock::SECOND_NS;
-use masseter_scenario::wording::counted;
+use masseter_scenario::{CanConfig, wording::counted};
 use masseter_terminal::{Exit, Failure, OrFailure, Tone, result_with_tones};
 use serde::Serialize;
 
 use super::args::RobotArgs;
-use super::evidence::StepFolder;
-use super::identity::gaps;
-use super::interfaces::{InterfaceResult, interfaces};
-use super::ledger;
-use super::robot_line::{RobotLine, drives, failed};
-use super::snapshot::dcf;
-use super::step::Step;
-use super::table::{axes_text, table};
+use super::evidence::{Step, StepFolder};
+use super::identity::{Identity, gaps};
+use super::ledger::{owed_advice, owed_axes};
+use super::robot_line::{RobotLine, axes_text, deviations_table, drives, failed};
 
 /// For how long the buses are listened to before the first question, ns.
 const LISTEN_NS: u64 = 2 * SECOND_NS;
+/// Objects that CiA 301 makes mandatory.
+const MANDATORY: [u16; 3] = [0x1000, 0x1001, 0x1018];
 
 /// The arguments of `robot inspect`.
 #[derive(Debug, Clone, Args)]
-#[command(
-    after_help = "Example:\n  masseter robot inspect robot.toml --can can0,can1\n\nExit 0: configure can mend every deviation. Exit 1: it cannot, or a drive does not answer."
-)]
+#[command(after_help = "\
+Example:
+  masseter robot inspect robot.toml --can can0,can1
+
+Exit 0: configure can mend every deviation. Exit 1: it cannot, or a drive does not answer.")]
 pub(crate) struct InspectArgs {
     #[command(flatten)]
     robot: RobotArgs,
@@ -72,39 +74,80 @@ struct InspectResult {
     drives: Vec<DriveResult>,
 }
 
+/// An interface, with its faults and its doubts in words.
+#[derive(Debug, Serialize)]
+struct InterfaceResult {
+    name: String,
+    bitrate_bps: Option<u32>,
+    sample_point_permille: Option<u32>,
+    restart_ms: Option<u32>,
+    state: Option<&'static str>,
+    errors: Option<[u16; 2]>,
+    faults: Vec<String>,
+    doubts: Vec<String>,
+}
+
 /// Inspects, and prints one table.
 pub(crate) fn inspect(args: &InspectArgs) -> Result<Exit, Failure> {
     let scenario = args.robot.scenario().usage()?;
-    let all: Vec<usize> = (0..AXES).collect();
-    let mut folder = StepFolder::begin(&args.robot.folder, Step::Inspect, &all, &scenario).usage()?;
-    let interfaces = interfaces(&scenario.can);
+    let parent = &args.robot.folder;
+    let mut folder = StepFolder::begin(parent, Step::Inspect, &Step::Inspect.axes(), &scenario).usage()?;
+    let CanConfig { interfaces, bitrate_bps, .. } = &scenario.can;
+    let details = |name: &String| InterfaceDetails::read(name).unwrap_or_default();
+    let interfaces = interfaces.iter().map(|name| interface(name, details(name), *bitrate_bps)).collect();
     let mut robot = RobotLine::open(scenario, folder.log().usage()?).usage()?;
     let Read { surveys, answer, restarted } = read(&mut robot, args.scan).map_err(failed)?;
+    let (strangers, can) = (robot.line.strangers(), &robot.scenario.can);
+    let masters = strangers.masters.iter().map(|&(bus, sign)| OtherMaster { bus, sign }.to_string());
+    let other_nodes = strangers.nodes.iter().map(|(bus, node)| format!("node {node} on bus {bus}"));
     let result = InspectResult {
         interfaces,
-        masters: masters(&robot),
-        other_nodes: other_nodes(&robot),
+        masters: masters.collect(),
+        other_nodes: other_nodes.collect(),
         restarted: restarted.iter().map(Restarted::to_string).collect(),
-        drives: all.iter().map(|&axis| drive(&robot, axis, surveys[axis].as_ref(), answer[axis])).collect(),
+        drives: (0..AXES).map(|axis| drive(&robot, axis, surveys[axis].as_ref(), answer[axis])).collect(),
     };
-    for (axis, survey) in surveys.iter().enumerate() {
-        let Some(survey) = survey else { continue };
-        let text = dcf(survey, robot.scenario.can.node_ids[axis], AXIS_NAMES[axis]);
-        folder.keep(&format!("{}.dcf", AXIS_NAMES[axis]), &text).incomplete()?;
+    for ((name, survey), node) in AXIS_NAMES.iter().zip(&surveys).zip(can.node_ids) {
+        if let Some(survey) = survey {
+            folder.keep(&format!("{name}.dcf"), &dcf(survey, node, name)).incomplete()?;
+        }
     }
-    let drives = drives(&surveys, &robot.scenario.can);
-    folder.note_drives(drives);
+    let drives = drives(&surveys, can);
+    folder.evidence.basis.drives = drives;
     let (mut text, passed) = describe(&robot, &result);
-    for gap in gaps(&drives) {
-        let _ = writeln!(text, "warning: {gap}");
+    let advice = owed_axes(parent).into_iter().map(|axis| owed_advice(parent, axis));
+    for warning in gaps(&drives).into_iter().chain(advice) {
+        let _ = writeln!(text, "warning: {warning}");
     }
-    for axis in ledger::owed_axes(&args.robot.folder) {
-        let _ = writeln!(text, "warning: {}", ledger::advice(&args.robot.folder, axis));
-    }
-    folder.finish(passed, &result).incomplete()?;
+    folder.finish_step(passed, &result).incomplete()?;
     result_with_tones(&text, &[("passed", Tone::Good), ("failed", Tone::Bad), ("warning", Tone::Doubtful)])
         .usage()?;
     Ok(if passed { Exit::Passed } else { Exit::Failed })
+}
+
+/// What the kernel says of a real interface, and what of it is wrong.
+fn interface(name: &str, details: InterfaceDetails, wanted_bps: u32) -> InterfaceResult {
+    let InterfaceDetails { bitrate_bps, sample_point_permille, restart_ms, state, errors } = details;
+    let (mut faults, mut doubts) = (Vec::new(), Vec::new());
+    if let Some(bps) = bitrate_bps.filter(|&bps| bps != wanted_bps) {
+        faults.push(format!(
+            "{name} has {bps} bit/s, can.bitrate_bps is {wanted_bps}; 'ip link set {name} down' and 'ip link \
+             set {name} up type can bitrate {wanted_bps} restart-ms 100' change it"
+        ));
+    }
+    if let Some(state @ ("bus-off" | "stopped" | "error passive")) = state {
+        faults.push(format!("{name} is {state}; check bit rate, termination and wiring"));
+    }
+    if restart_ms == Some(0) && bitrate_bps.is_some() {
+        doubts.push(format!(
+            "{name} has restart-ms 0: it stays off for good after bus-off; set restart-ms 100"
+        ));
+    }
+    if let Some([sent, received]) = errors.filter(|errors| *errors != [0, 0]) {
+        doubts.push(format!("{name} counts {sent} errors while sending and {received} while receiving"));
+    }
+    let name = name.to_owned();
+    InterfaceResult { name, bitrate_bps, sample_point_permille, restart_ms, state, errors, faults, doubts }
 }
 
 /// Reads all drives, and asks each of them again at the end.
@@ -113,27 +156,19 @@ fn read(robot: &mut RobotLine, scan: bool) -> Result<Read, LineError> {
     let boot_ups = BootUps::until_now(&robot.line);
     let mut surveys = [const { None }; AXES];
     for (axis, place) in surveys.iter_mut().enumerate() {
-        let settings = robot.settings(axis).clone();
+        let settings = robot.settings[axis].clone();
         *place = Some(robot.survey(axis, &settings)?).filter(|survey| !survey.is_silent());
     }
     if scan {
         robot.line.scan()?;
     }
     let is_whole = |survey: &Option<Survey>| survey.as_ref().is_some_and(|survey| !survey.fell_silent());
-    let answer = std::array::from_fn(|axis| is_whole(&surveys[axis]) && robot.answers(axis));
-    robot.line.flush()?;
-    let restarted = (0..AXES).filter_map(|axis| boot_ups.check_axis(&robot.line, axis).err()).collect();
+    let RobotLine { line, scenario, .. } = robot;
+    let mut says_who = |axis| Identity::read(line, &scenario.can, axis).is_ok();
+    let answer = std::array::from_fn(|axis| is_whole(&surveys[axis]) && says_who(axis));
+    line.flush()?;
+    let restarted = (0..AXES).filter_map(|axis| boot_ups.check_axis(line, axis).err()).collect();
     Ok(Read { surveys, answer, restarted })
-}
-
-fn masters(robot: &RobotLine) -> Vec<String> {
-    let masters = &robot.line.strangers().masters;
-    masters.iter().map(|&(bus, sign)| OtherMaster { bus, sign }.to_string()).collect()
-}
-
-fn other_nodes(robot: &RobotLine) -> Vec<String> {
-    let nodes = &robot.line.strangers().nodes;
-    nodes.iter().map(|(bus, node)| format!("node {node} on bus {bus}")).collect()
 }
 
 fn drive(robot: &RobotLine, axis: usize, survey: Option<&Survey>, answers: bool) -> DriveResult {
@@ -143,16 +178,14 @@ fn drive(robot: &RobotLine, axis: usize, survey: Option<&Survey>, answers: bool)
         let reason = reading.as_ref().err()?;
         Some((format!("{object} {}", object_name(object)).trim_end().to_owned(), reason_text(*reason)))
     });
+    // What a drive did not answer says nothing of what it has.
+    let whole = survey.filter(|survey| !survey.fell_silent());
     DriveResult {
         axis: AXIS_NAMES[axis],
         node: robot.scenario.can.node_ids[axis],
         answers,
         device: [0x1008, 0x1009, 0x100A].map(text),
-        // What a drive did not answer says nothing of what it has.
-        deviations: survey
-            .filter(|survey| !survey.fell_silent())
-            .map(|survey| robot.deviations(axis, survey))
-            .unwrap_or_default(),
+        deviations: whole.map_or_else(Vec::new, |survey| robot.deviations(axis, survey)),
         unread: unread.collect(),
     }
 }
@@ -172,9 +205,7 @@ fn describe(robot: &RobotLine, result: &InspectResult) -> (String, bool) {
             let _ = writeln!(text, "warning: {doubt}");
         }
     }
-    for sign in &result.masters {
-        fail(&mut text, sign);
-    }
+    result.masters.iter().for_each(|sign| fail(&mut text, sign));
     for node in &result.other_nodes {
         let _ = writeln!(text, "warning: {node} is not of the scenario");
     }
@@ -182,11 +213,11 @@ fn describe(robot: &RobotLine, result: &InspectResult) -> (String, bool) {
     for (axis, drive) in result.drives.iter().enumerate().filter(|(_, drive)| !drive.answers) {
         fail(&mut text, &format!("{}: {}", drive.axis, robot.silence(axis)));
     }
-    let of_drive = |(axis, drive): (usize, &DriveResult)| {
-        drive.deviations.iter().map(move |deviation| (axis, deviation.clone())).collect::<Vec<_>>()
-    };
-    let deviations: Vec<_> = result.drives.iter().enumerate().flat_map(of_drive).collect();
-    text += &table(&deviations);
+    let drives = result.drives.iter().enumerate();
+    let deviations =
+        drives.flat_map(|(axis, drive)| drive.deviations.iter().map(move |one| (axis, one.clone())));
+    let deviations: Vec<_> = deviations.collect();
+    text += &deviations_table(&deviations);
     let of = |outcome| deviations.iter().filter(|(_, deviation)| deviation.outcome == outcome).count() as u64;
     let (refused, mended) = (of(Outcome::Refused), of(Outcome::Mended));
     if refused > 0 {
@@ -206,14 +237,94 @@ fn devices(drives: &[DriveResult]) -> String {
     let mut groups: BTreeMap<String, Vec<usize>> = BTreeMap::new();
     for (axis, drive) in drives.iter().enumerate().filter(|(_, drive)| drive.answers) {
         let device: Vec<_> = drive.device.iter().flatten().map(String::as_str).collect();
-        let objects: Vec<_> = drive.unread.keys().filter_map(|object| object.split_once(' ')).collect();
-        let mut objects: Vec<_> = objects.into_iter().map(|(object, _)| &object[..5]).collect();
+        let objects = drive.unread.keys().filter_map(|object| object.split_once(' '));
+        let mut objects: Vec<_> = objects.map(|(object, _)| &object[..5]).collect();
         objects.dedup();
-        let without =
-            if objects.is_empty() { String::new() } else { format!("; without {}", objects.join(" ")) };
-        groups.entry(format!("{}{without}", device.join(", "))).or_default().push(axis);
+        let mut device = device.join(", ");
+        if !objects.is_empty() {
+            device += &format!("; without {}", objects.join(" "));
+        }
+        groups.entry(device).or_default().push(axis);
     }
-    let lines: Vec<_> =
-        groups.iter().map(|(device, axes)| format!("{}: {device}", axes_text(axes))).collect();
-    lines.join("\n")
+    let line = |(device, axes): (&String, &Vec<usize>)| format!("{}: {device}", axes_text(axes));
+    groups.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+/// The device configuration file of a drive. It has the objects that were read and no others.
+fn dcf(survey: &Survey, node: u8, name: &str) -> String {
+    let mut objects: BTreeMap<u16, Vec<(u8, &[u8])>> = BTreeMap::new();
+    for (ObjectAddress { index, subindex }, value) in survey.readings() {
+        if let Ok(value) = value {
+            objects.entry(index).or_default().push((subindex, value));
+        }
+    }
+    let mut text = format!(
+        "[FileInfo]\nFileName={name}.dcf\nDescription=Read by masseter robot inspect\n\n\
+         [DeviceComissioning]\nNodeID={node}\nNodeName={name}\n\n"
+    );
+    let is_of_maker = |index: u16| (0x2000..0x6000).contains(&index);
+    for (list, belongs) in [
+        ("MandatoryObjects", &(|index| MANDATORY.contains(&index)) as &dyn Fn(u16) -> bool),
+        ("OptionalObjects", &|index| !MANDATORY.contains(&index) && !is_of_maker(index)),
+        ("ManufacturerObjects", &is_of_maker),
+    ] {
+        let listed: Vec<_> = objects.keys().filter(|&&index| belongs(index)).collect();
+        let _ = writeln!(text, "[{list}]\nSupportedObjects={}", listed.len());
+        for (number, index) in (1..).zip(listed) {
+            let _ = writeln!(text, "{number}=0x{index:04X}");
+        }
+        text.push('\n');
+    }
+    for (index, entries) in objects {
+        if let [(0, value)] = entries[..] {
+            let _ = write!(text, "[{index:04X}]\n{}", dcf_entry(ObjectAddress::new(index, 0), value));
+            continue;
+        }
+        let _ = write!(text, "[{index:04X}]\nParameterName={index:04X}h\nObjectType=0x9\n");
+        let _ = write!(text, "SubNumber={}\n\n", entries.len());
+        for (subindex, value) in entries {
+            let object = ObjectAddress::new(index, subindex);
+            let _ = write!(text, "[{index:04X}sub{subindex:X}]\n{}", dcf_entry(object, value));
+        }
+    }
+    text
+}
+
+fn dcf_entry(object: ObjectAddress, value: &[u8]) -> String {
+    let number = value.iter().rfold(0u64, |number, &byte| number << 8 | u64::from(byte));
+    let (kind, value) = match value.len() {
+        1 => (5, format!("0x{number:02X}")),
+        2 => (6, format!("0x{number:04X}")),
+        4 => (7, format!("0x{number:08X}")),
+        _ => (9, String::from_utf8_lossy(value).trim_end_matches('\0').replace(['\r', '\n'], " ")),
+    };
+    let name = match object_name(object) {
+        "" => object.to_string(),
+        name => name.to_owned(),
+    };
+    format!(
+        "ParameterName={name}\nObjectType=0x7\nDataType=0x{kind:04X}\nAccessType=rw\nPDOMapping=0\n\
+         ParameterValue={value}\n\n"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wrong_bit_rate_is_a_fault_and_no_restart_a_doubt() {
+        let details = InterfaceDetails {
+            bitrate_bps: Some(500_000),
+            restart_ms: Some(0),
+            state: Some("bus-off"),
+            errors: Some([0, 3]),
+            ..InterfaceDetails::default()
+        };
+        let result = interface("can0", details, 1_000_000);
+        assert_eq!((result.faults.len(), result.doubts.len()), (2, 2), "{result:?}");
+        assert!(result.faults[0].starts_with("can0 has 500000 bit/s, can.bitrate_bps is 1000000"));
+        let virtual_one = interface("vcan0", InterfaceDetails::default(), 1_000_000);
+        assert!(virtual_one.faults.is_empty() && virtual_one.doubts.is_empty());
+    }
 }

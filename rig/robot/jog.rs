@@ -1,30 +1,37 @@
-//! `masseter robot jog`: one axis, a short way and back.
+//! `masseter robot jog`: one axis, a short way and back. With the dead man's switch it moves only while input arrives
+//! on standard input, such as the lines of a held Enter key.
 
-use std::time::Duration;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::{io::Read, sync::Arc, thread, time::Duration};
 
 use anyhow::anyhow;
 use clap::Args;
 use masseter_model::geometry::AXIS_NAMES;
 use masseter_plant::bringup::{JogOrder, JogReport, Wish, jog as play};
-use masseter_terminal::{Exit, Failure, result_line, status};
+use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
+use masseter_terminal::{Exit, Failure, OrFailure, result_line, status};
 use serde_json::json;
 
-use super::args::{RobotArgs, parse_axis};
-use super::hold::Hold;
-use super::lengths::{parse_length, parse_speed};
-use super::robot_line::failed;
-use super::session::Session;
-use super::step::Step;
-use crate::arguments::parse_duration;
+use super::args::{RobotArgs, parse_axis, parse_length, parse_speed};
+use super::{evidence::Step, robot_line::failed, session::Session};
+use crate::cli::arguments::parse_duration;
 
+/// For how long a byte permits motion: longer than the time between two repeats of a key, ns.
+const HELD_NS: u64 = 300 * MILLISECOND_NS;
+/// A silence after which the drive is switched off, ns.
+const RELEASED_NS: u64 = 3 * SECOND_NS;
+/// How long the first byte may take, ns.
+const FIRST_NS: u64 = 60 * SECOND_NS;
 /// A ruler's reading may differ by this share from the way that the drive shows.
 const DEVIATION: f64 = 0.02;
 
 /// The arguments of `robot jog`.
 #[derive(Debug, Clone, Args)]
-#[command(
-    after_help = "Examples:\n  masseter robot jog --axis l1 --by 1mm\n  masseter robot jog --axis l1 --by 1mm --dwell 10s\n  masseter robot jog --axis l1 --by 1mm --measured 0.99mm"
-)]
+#[command(after_help = "\
+Examples:
+  masseter robot jog --axis l1 --by 1mm
+  masseter robot jog --axis l1 --by 1mm --dwell 10s
+  masseter robot jog --axis l1 --by 1mm --measured 0.99mm")]
 pub(crate) struct JogArgs {
     #[command(flatten)]
     robot: RobotArgs,
@@ -56,8 +63,8 @@ pub(crate) struct JogArgs {
 
 /// Jogs, prints what was found, and keeps it.
 pub(crate) fn jog(args: &JogArgs) -> Result<Exit, Failure> {
-    let &JogArgs { axis, by, out_of_order, .. } = args;
-    let earlier = |_| (!out_of_order).then_some(Step::Configure);
+    let axis = args.axis;
+    let earlier = (!args.out_of_order).then_some(|_: usize| Step::Configure);
     let mut session = Session::begin(&args.robot, Step::Jog(axis), &[axis], earlier)?;
     let mut hold = args.hold.then(Hold::of_stdin);
     if hold.is_some() {
@@ -72,19 +79,17 @@ pub(crate) fn jog(args: &JogArgs) -> Result<Exit, Failure> {
     };
     let report = match play(&mut session.line, &session.scenario, &order, &mut operator) {
         Ok(report) => report,
-        Err(error) => return Err(session.fail(error)),
+        Err(error) => return Err(session.fail_motion(error)),
     };
     if let Err(disturbance) = session.check_present() {
-        session.finish(false, &json!({ "error": disturbance.to_string() }))?;
-        return Err(failed(disturbance));
+        return Err(session.fail(Exit::Failed, disturbance));
     }
-    let text = text(axis, &report);
     let factor = args.measured.map(|measured_m| measured_m / report.moved_m());
     let is_right = factor.is_some_and(|factor| (factor - 1.0).abs() <= DEVIATION);
-    session.finish(is_right, &data(by, &report, args.measured, factor))?;
-    result_line!("{text}").map_err(|error| Failure::with(Exit::Incomplete, error))?;
+    session.finish_session(is_right, &result(args, &report, factor))?;
+    result_line!("{}", report_text(axis, &report)).incomplete()?;
     match factor {
-        Some(factor) if !is_right => Err(Failure::with(Exit::Failed, wrong_scale(axis, factor))),
+        Some(factor) if !is_right => Err(failed(wrong_scale(axis, factor))),
         Some(_) => Ok(Exit::Passed),
         None => {
             status!("not passed yet: jog again with --measured and what a gauge shows at the far end");
@@ -110,13 +115,13 @@ fn wrong_scale(axis: usize, factor: f64) -> anyhow::Error {
         return anyhow!("{name}: the axis moved the other way; change drive_profile.reversed for {name}");
     }
     anyhow!(
-        "{name}: the gauge shows {factor:.4} times the way of 6064h, more than {:.0} % off; multiply encoder_resolution_m \
-         by this factor, or correct the drive's gear",
+        "{name}: the gauge shows {factor:.4} times the way of 6064h, more than {:.0} % off; multiply \
+         encoder_resolution_m by this factor, or correct the drive's gear",
         DEVIATION * 100.0
     )
 }
 
-fn text(axis: usize, report: &JogReport) -> String {
+fn report_text(axis: usize, report: &JogReport) -> String {
     let [there, back] = report.ways;
     let forces = report.friction_and_load_n().map_or_else(
         || "too few looks for friction; jog further or slower".to_owned(),
@@ -127,8 +132,10 @@ fn text(axis: usize, report: &JogReport) -> String {
         |answer_ns| format!("SYNC answered within {} µs (can.answer_us)", answer_ns.div_ceil(1000)),
     );
     format!(
-        "{}: moved {:.4} mm and back to {:.4} mm; noise ±{:.4} mm\nthere: rise {:.3} s, overshoot {:.4} mm, settled {:.3} s\n\
-         back:  rise {:.3} s, overshoot {:.4} mm, settled {:.3} s\n{forces}; {:.4} mm of motion as the brake closed\n{answer}",
+        "{}: moved {:.4} mm and back to {:.4} mm; noise ±{:.4} mm\n\
+         there: rise {:.3} s, overshoot {:.4} mm, settled {:.3} s\n\
+         back:  rise {:.3} s, overshoot {:.4} mm, settled {:.3} s\n\
+         {forces}; {:.4} mm of motion as the brake closed\n{answer}",
         AXIS_NAMES[axis],
         report.moved_m() * 1e3,
         (report.positions_m[2] - report.positions_m[0]) * 1e3,
@@ -143,10 +150,10 @@ fn text(axis: usize, report: &JogReport) -> String {
     )
 }
 
-fn data(by_m: f64, report: &JogReport, measured_m: Option<f64>, factor: Option<f64>) -> serde_json::Value {
+fn result(args: &JogArgs, report: &JogReport, factor: Option<f64>) -> serde_json::Value {
     let forces = report.friction_and_load_n();
     json!({
-        "by_m": by_m,
+        "by_m": args.by,
         "moved_m": report.moved_m(),
         "positions_m": report.positions_m,
         "noise_m": report.noise_m,
@@ -158,7 +165,84 @@ fn data(by_m: f64, report: &JogReport, measured_m: Option<f64>, factor: Option<f
         "load_n": forces.map(|[_, load_n]| load_n),
         "drop_m": report.drop_m,
         "answer_us": report.sync_answer_ns.map(|answer_ns| answer_ns.div_ceil(1000)),
-        "measured_m": measured_m,
+        "measured_m": args.measured,
         "measured_by_moved": factor,
     })
+}
+
+/// What came on standard input.
+#[derive(Debug, Default)]
+struct Input {
+    bytes: AtomicU64,
+    is_over: AtomicBool,
+}
+
+/// The dead man's switch.
+#[derive(Debug)]
+pub(super) struct Hold {
+    input: Arc<Input>,
+    taken: u64,
+    /// When the newest byte was seen, ns.
+    held_ns: Option<u64>,
+    /// When the switch was asked first, ns.
+    asked_ns: Option<u64>,
+}
+
+impl Hold {
+    /// Reads standard input from now on.
+    pub(super) fn of_stdin() -> Self {
+        let input = Arc::new(Input::default());
+        let reader = Arc::clone(&input);
+        thread::spawn(move || {
+            let mut bytes = [0; 64];
+            while let Ok(count @ 1..) = std::io::stdin().read(&mut bytes) {
+                reader.bytes.fetch_add(count as u64, Ordering::Relaxed);
+            }
+            reader.is_over.store(true, Ordering::Relaxed);
+        });
+        Self::of_input(input)
+    }
+
+    fn of_input(input: Arc<Input>) -> Self {
+        Self { input, taken: 0, held_ns: None, asked_ns: None }
+    }
+
+    /// What the person wants at that time.
+    pub(super) fn wish(&mut self, now_ns: u64) -> Wish {
+        let asked_ns = *self.asked_ns.get_or_insert(now_ns);
+        let bytes = self.input.bytes.load(Ordering::Relaxed);
+        if bytes != self.taken {
+            (self.taken, self.held_ns) = (bytes, Some(now_ns));
+        }
+        if self.input.is_over.load(Ordering::Relaxed) {
+            return Wish::Stop;
+        }
+        match self.held_ns {
+            Some(held_ns) if now_ns - held_ns < HELD_NS => Wish::Move,
+            Some(held_ns) if now_ns - held_ns >= RELEASED_NS => Wish::Stop,
+            None if now_ns - asked_ns >= FIRST_NS => Wish::Stop,
+            _ => Wish::Halt,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_byte_permits_motion_for_a_while_and_the_end_of_input_none() {
+        let input = Arc::new(Input::default());
+        let mut hold = Hold::of_input(Arc::clone(&input));
+        let mut wish = |now_ms: u64| hold.wish(now_ms * MILLISECOND_NS);
+        assert_eq!((wish(0), wish(59_000)), (Wish::Halt, Wish::Halt), "nobody has touched the key");
+        input.bytes.fetch_add(1, Ordering::Relaxed);
+        assert_eq!((wish(59_500), wish(59_799), wish(59_800)), (Wish::Move, Wish::Move, Wish::Halt));
+        input.bytes.fetch_add(1, Ordering::Relaxed);
+        assert_eq!((wish(60_000), wish(62_999), wish(63_000)), (Wish::Move, Wish::Halt, Wish::Stop));
+        input.bytes.fetch_add(1, Ordering::Relaxed);
+        input.is_over.store(true, Ordering::Relaxed);
+        assert_eq!(wish(63_001), Wish::Stop);
+        assert_eq!(Hold::of_input(Arc::default()).wish(0), Wish::Halt);
+    }
 }

@@ -4,68 +4,47 @@
 //! ([`masseter_plant::bringup`]): these modules hold arguments, files and text.
 
 mod args;
-mod before;
 mod check_pose;
 mod configure;
-mod damaged;
-mod dry_run;
 mod evidence;
-mod hold;
 mod home;
 mod identity;
 mod inspect;
-mod interfaces;
 mod jog;
 mod ledger;
-mod lengths;
-mod past;
 mod permission;
 mod power_mark;
-mod presence;
-mod restore;
 mod robot_line;
 mod session;
-mod snapshot;
 mod status;
-mod step;
-mod table;
-mod writing;
 
 use clap::Subcommand;
 use masseter_terminal::{Exit, Failure, OrFailure};
 
-use args::WriteArgs;
-use check_pose::CheckPoseArgs;
-use home::HomeArgs;
-use inspect::InspectArgs;
-use jog::JogArgs;
-use status::StatusArgs;
-
-pub(crate) use dry_run::{Played, keep_dry_run};
-pub(crate) use permission::check_bring_up;
+pub(crate) use permission::{Played, check_bring_up, keep_dry_run};
 
 /// Verbs of `robot`.
 #[derive(Debug, Clone, Subcommand)]
 pub(crate) enum RobotVerb {
     /// Read all drives, and show what is not as the scenario needs it
-    Inspect(InspectArgs),
+    Inspect(inspect::InspectArgs),
     /// Write the scenario's objects to drives without power
     #[command(after_help = "Example:\n  masseter robot configure robot.toml --can can0,can1 --store")]
-    Configure(WriteArgs),
+    Configure(args::WriteArgs),
     /// Write the values from before configure back
     #[command(after_help = "Example:\n  masseter robot restore robot.toml --can can0,can1 --axis l1")]
-    Restore(WriteArgs),
+    Restore(args::WriteArgs),
     /// Move one axis a short way and back, while the others have no power
-    Jog(JogArgs),
+    Jog(jog::JogArgs),
     /// Home the axes, one after the other
-    Home(HomeArgs),
+    Home(home::HomeArgs),
     /// Check whether the axes tell the closed pose
-    CheckPose(CheckPoseArgs),
+    CheckPose(check_pose::CheckPoseArgs),
     /// Show which steps are done, and which is next
-    Status(StatusArgs),
+    Status(status::StatusArgs),
     /// Print the steps and their results as Markdown for a lab book
     #[command(after_help = "Example:\n  masseter robot report robot.toml > lab-book.md")]
-    Report(StatusArgs),
+    Report(status::StatusArgs),
 }
 
 /// Executes a verb.
@@ -73,7 +52,7 @@ pub(crate) fn execute(verb: &RobotVerb) -> Result<Exit, Failure> {
     match verb {
         RobotVerb::Inspect(args) => inspect::inspect(args),
         RobotVerb::Configure(args) => configure::configure(args),
-        RobotVerb::Restore(args) => restore::restore(args),
+        RobotVerb::Restore(args) => configure::restore(args),
         RobotVerb::Jog(args) => jog::jog(args),
         RobotVerb::Home(args) => home::home(args),
         RobotVerb::CheckPose(args) => check_pose::check_pose(args),

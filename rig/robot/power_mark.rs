@@ -1,7 +1,7 @@
 //! Whether a drive has lost its power since its homing: a number in an object that the drive forgets without power.
 //!
-//! The object is the profile velocity (6081h). Only jog and home use it, and both take the mark out first. Home leaves a new one.
-//! Drives whose encoder keeps its position need no mark.
+//! The object is the profile velocity (6081h). Only jog and home use it, and both take the mark out first. Home
+//! leaves a new one. Drives whose encoder keeps its position need no mark.
 
 use anyhow::Context;
 use masseter_can::canopen::ObjectAddress;
@@ -12,11 +12,8 @@ use masseter_scenario::{DriveProfile, ObjectConfig, ObjectKey, ObjectRule, Scena
 use masseter_terminal::{Failure, status};
 use serde::{Deserialize, Serialize};
 
-use super::evidence::Evidence;
-use super::past::Past;
-use super::robot_line::failed;
-use super::step::Step;
-use super::writing::prove_off;
+use super::evidence::{Evidence, Past, Step};
+use super::robot_line::{failed, prove_off};
 
 /// The profile velocity.
 const MARKED: ObjectAddress = ObjectAddress::new(0x6081, 0);
@@ -39,21 +36,28 @@ pub(super) type Marks = [Option<Mark>; AXES];
 #[derive(Debug, thiserror::Error)]
 pub(super) enum MarkError {
     /// No lower velocity is left.
-    #[error("{}: 6081h is {found}, so that no mark fits below it; store a higher profile velocity in the drive", AXIS_NAMES[*axis])]
+    #[error(
+        "{}: 6081h is {found}, so that no mark fits below it; store a higher profile velocity in the drive",
+        AXIS_NAMES[*axis]
+    )]
     NoRoom { axis: usize, found: u32 },
     /// The drive does not keep the mark.
     #[error(
-        "{}: 6081h shows {found} after {value} was written; a drive that takes no mark needs the rule 'absent' for 6081h",
+        "{}: 6081h shows {found} after {value} was written; a drive that takes no mark needs the rule 'absent' for \
+         6081h",
         AXIS_NAMES[*axis]
     )]
     NotTaken { axis: usize, value: u32, found: u32 },
     /// The evidence has none.
-    #[error("{}: the step of {since} left no mark in the drive; home the axis and check the pose again", AXIS_NAMES[*axis])]
+    #[error(
+        "{}: the step of {since} left no mark in the drive; home the axis and check the pose again",
+        AXIS_NAMES[*axis]
+    )]
     Missing { axis: usize, since: String },
     /// The drive has another value.
     #[error(
-        "{}: the drive was without power, reset or jogged since {since} (6081h is {found}, the mark is {value}); home the axis \
-         and check the pose again",
+        "{}: the drive was without power, reset or jogged since {since} (6081h is {found}, the mark is \
+         {value}); home the axis and check the pose again",
         AXIS_NAMES[*axis]
     )]
     Lost { axis: usize, since: String, found: u32, value: u32 },
@@ -63,14 +67,14 @@ pub(super) enum MarkError {
 }
 
 /// What home says of one axis, as far as it matters here.
-#[derive(Deserialize)]
-struct Homed {
-    axis: String,
-    mark: Option<Mark>,
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Homed {
+    pub(super) axis: String,
+    pub(super) mark: Option<Mark>,
 }
 
 /// Whether a drive needs a mark and has room for one. A drive without room is told.
-fn needs(profile: &DriveProfile, axis: usize) -> bool {
+fn needs_mark(profile: &DriveProfile, axis: usize) -> bool {
     let ObjectConfig { rule, value, .. } = profile.object(ObjectKey(MARKED));
     let is_free = matches!(rule, ObjectRule::Write | ObjectRule::Optional) && value.is_none();
     if !profile.homing.absolute && !is_free {
@@ -84,8 +88,12 @@ fn needs(profile: &DriveProfile, axis: usize) -> bool {
 
 /// Leaves a mark in a drive that forgets its position without power: a velocity below the present one, which tells from
 /// another start.
-pub(super) fn leave(scenario: &Scenario, line: &mut Line, axis: usize) -> Result<Option<Mark>, MarkError> {
-    if !needs(scenario.profile(axis), axis) {
+pub(super) fn leave_mark(
+    scenario: &Scenario,
+    line: &mut Line,
+    axis: usize,
+) -> Result<Option<Mark>, MarkError> {
+    if !needs_mark(scenario.profile(axis), axis) {
         return Ok(None);
     }
     let before = line.read_number(axis, MARKED)?;
@@ -100,9 +108,14 @@ pub(super) fn leave(scenario: &Scenario, line: &mut Line, axis: usize) -> Result
 }
 
 /// Writes the velocity from before its mark into a drive that still has the mark of a homing.
-pub(super) fn remove(past: &Past, scenario: &Scenario, line: &mut Line, axis: usize) -> Result<(), Failure> {
-    let homings = past.steps().filter(|(_, evidence)| evidence.step == Step::Home.to_string());
-    let marks: Vec<_> = homings.filter_map(|(_, homed)| of_home(homed, axis).ok().flatten()).collect();
+pub(super) fn remove_mark(
+    past: &Past,
+    scenario: &Scenario,
+    line: &mut Line,
+    axis: usize,
+) -> Result<(), Failure> {
+    let homings = past.steps.iter().filter(|evidence| evidence.step == Step::Home);
+    let marks: Vec<_> = homings.filter_map(|homed| mark_of_home(homed, axis).ok().flatten()).collect();
     if marks.is_empty() {
         return Ok(());
     }
@@ -113,38 +126,39 @@ pub(super) fn remove(past: &Past, scenario: &Scenario, line: &mut Line, axis: us
 }
 
 /// The mark that a homing left in the drive of an axis.
-pub(super) fn of_home(homed: &Evidence, axis: usize) -> anyhow::Result<Option<Mark>> {
-    let all: Vec<Homed> = serde_json::from_value(homed.result.clone())
+pub(super) fn mark_of_home(homed: &Evidence, axis: usize) -> anyhow::Result<Option<Mark>> {
+    let all: Vec<Homed> = homed
+        .result_as()
         .with_context(|| format!("the result of home at {} cannot be read; home again", homed.started))?;
     Ok(all.into_iter().find(|of_axis| of_axis.axis == AXIS_NAMES[axis]).and_then(|of_axis| of_axis.mark))
 }
 
 /// The marks that a pose check found.
-pub(super) fn of_pose_check(checked: &Evidence) -> anyhow::Result<Marks> {
-    serde_json::from_value(checked.result["marks"].clone()).with_context(|| {
+pub(super) fn marks_of_pose_check(checked: &Evidence) -> anyhow::Result<Marks> {
+    Marks::deserialize(&checked.result["marks"]).with_context(|| {
         format!("the marks of the pose check at {} cannot be read; check it again", checked.started)
     })
 }
 
 /// Refuses drives without their marks.
-pub(super) fn check(
+pub(super) fn check_marks(
     scenario: &Scenario,
     marks: &Marks,
     since: &str,
     line: &mut Line,
 ) -> Result<(), MarkError> {
-    (0..AXES).try_for_each(|axis| check_axis(scenario, marks[axis], since, line, axis))
+    (0..AXES).try_for_each(|axis| check_mark(scenario, marks[axis], since, line, axis))
 }
 
 /// Refuses a drive without its mark.
-pub(super) fn check_axis(
+pub(super) fn check_mark(
     scenario: &Scenario,
     mark: Option<Mark>,
     since: &str,
     line: &mut Line,
     axis: usize,
 ) -> Result<(), MarkError> {
-    if !needs(scenario.profile(axis), axis) {
+    if !needs_mark(scenario.profile(axis), axis) {
         return Ok(());
     }
     let since = since.to_owned();
@@ -155,8 +169,7 @@ pub(super) fn check_axis(
 
 #[cfg(test)]
 mod tests {
-    use std::io;
-    use std::path::Path;
+    use std::{io, path::Path};
 
     use masseter_plant::bringup::{JogOrder, Wish, jog, reset};
     use serde_json::{Value, json};
@@ -178,7 +191,7 @@ mod tests {
     }
 
     fn leave_all(scenario: &Scenario, line: &mut Line) -> Marks {
-        std::array::from_fn(|axis| leave(scenario, line, axis).unwrap())
+        std::array::from_fn(|axis| leave_mark(scenario, line, axis).unwrap())
     }
 
     fn velocity(line: &mut Line) -> u32 {
@@ -188,7 +201,7 @@ mod tests {
     /// Evidence of a step with that result.
     fn evidence(folder: &Path, step: Step, result: &Value) -> Past {
         let begun = StepFolder::begin(folder, step, &step.axes(), &Scenario::default()).unwrap();
-        begun.finish(true, result).unwrap();
+        begun.finish_step(true, result).unwrap();
         Past::read(folder).unwrap()
     }
 
@@ -197,9 +210,9 @@ mod tests {
         let (scenario, mut line) = robot("");
         let marks = leave_all(&scenario, &mut line);
         assert_eq!(marks.map(|mark| mark.is_some()), [false, false, false, true, true, false]);
-        check(&scenario, &marks, "today", &mut line).unwrap();
+        check_marks(&scenario, &marks, "today", &mut line).unwrap();
         reset(&mut line, L2).unwrap();
-        let refusal = check(&scenario, &marks, "today", &mut line).unwrap_err().to_string();
+        let refusal = check_marks(&scenario, &marks, "today", &mut line).unwrap_err().to_string();
         assert!(
             refusal.starts_with("l2: the drive was without power, reset or jogged since today"),
             "{refusal}"
@@ -209,16 +222,16 @@ mod tests {
     #[test]
     fn a_missing_mark_is_none_that_a_drive_has() {
         let (scenario, mut line) = robot("");
-        let missing = check(&scenario, &Marks::default(), "today", &mut line).unwrap_err();
+        let missing = check_marks(&scenario, &Marks::default(), "today", &mut line).unwrap_err();
         assert!(matches!(missing, MarkError::Missing { axis: 3, .. }), "{missing}");
         let (scenario, mut line) = robot("objects.6081h = { rule = 'absent' }");
         assert_eq!(leave_all(&scenario, &mut line), Marks::default());
-        check(&scenario, &Marks::default(), "today", &mut line).unwrap();
+        check_marks(&scenario, &Marks::default(), "today", &mut line).unwrap();
         let folder = tempfile::tempdir().unwrap();
         for result in [json!({}), json!({ "marks": [7, 7, 7, 7, 7, 7] }), json!({ "marks": [] })] {
             let past = evidence(folder.path(), Step::CheckPose, &result);
-            let (_, checked) = past.newest(Step::CheckPose, 0).unwrap();
-            assert!(of_pose_check(checked).is_err(), "{result}");
+            let checked = past.newest(Step::CheckPose, 0).unwrap();
+            assert!(marks_of_pose_check(checked).is_err(), "{result}");
         }
     }
 
@@ -226,7 +239,10 @@ mod tests {
     fn a_drive_that_takes_no_mark_is_refused() {
         let (scenario, mut line) = robot("");
         line.write(L2, MARKED, 1, 4).unwrap();
-        assert!(matches!(leave(&scenario, &mut line, L2), Err(MarkError::NoRoom { axis: L2, found: 1 })));
+        assert!(matches!(
+            leave_mark(&scenario, &mut line, L2),
+            Err(MarkError::NoRoom { axis: L2, found: 1 })
+        ));
     }
 
     /// A restart in the middle of a jog: what the jog writes back is no mark.
@@ -235,17 +251,17 @@ mod tests {
         let (scenario, mut line) = robot("");
         let (folder, delivered) = (tempfile::tempdir().unwrap(), velocity(&mut line));
         for _ in 0..2 {
-            let mark = leave(&scenario, &mut line, L2).unwrap();
+            let mark = leave_mark(&scenario, &mut line, L2).unwrap();
             assert_eq!(mark.unwrap().before, delivered);
             let past = evidence(folder.path(), Step::Home, &json!([{ "axis": "l2", "mark": mark }]));
-            let (_, homed) = past.newest(Step::Home, L2).unwrap();
-            assert_eq!(of_home(homed, L2).unwrap(), mark);
+            let homed = past.newest(Step::Home, L2).unwrap();
+            assert_eq!(mark_of_home(homed, L2).unwrap(), mark);
             assert_ne!(velocity(&mut line), delivered);
-            remove(&past, &scenario, &mut line, L2).unwrap();
+            remove_mark(&past, &scenario, &mut line, L2).unwrap();
             let order = JogOrder::usual(&scenario, L2, 1e-3);
             jog(&mut line, &scenario, &order, &mut |_| Wish::Move).unwrap();
             assert_eq!(velocity(&mut line), delivered);
-            assert!(check_axis(&scenario, mark, "today", &mut line, L2).is_err());
+            assert!(check_mark(&scenario, mark, "today", &mut line, L2).is_err());
         }
     }
 }

@@ -1,20 +1,26 @@
-//! The drives of a scenario on their line, with what each of them needs.
+//! The drives of a scenario on their line: what each of them needs, what it is without, and whether it has power.
 
 use std::io::Write;
 
 use anyhow::ensure;
 use masseter_can::canopen::NodeId;
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::bringup::{BootUps, Deviation, Line, LineError, Settings, Survey, deviations};
+use masseter_plant::bringup::{
+    BootUps, Deviation, Line, LineError, Outcome, PowerError, Settings, Survey, deviations, prove_no_power,
+    take_over,
+};
 use masseter_plant::wanted::WantedDrive;
 use masseter_runtime::clock::MILLISECOND_NS;
 use masseter_scenario::{CanConfig, Scenario};
 use masseter_terminal::{Exit, Failure};
 
-use super::identity::{Identity, Known};
+use super::identity::Known;
 
-/// How long the drives may take to boot at power-on before they are read, ns.
-const LISTEN_NS: u64 = 500 * MILLISECOND_NS;
+/// How long a step listens before its first question, ns: drives boot at power-on, and another master shows.
+pub(super) const LISTEN_NS: u64 = 500 * MILLISECOND_NS;
+
+/// Columns of the table of deviations.
+const HEAD: [&str; 6] = ["axis", "object", "wanted", "found", "configure", "decided by"];
 
 /// What each drive said of itself, as far as it was asked.
 pub(crate) type Surveys = [Option<Survey>; AXES];
@@ -25,7 +31,8 @@ pub(crate) struct RobotLine {
     pub(crate) scenario: Scenario,
     pub(crate) line: Line,
     wanted: Vec<WantedDrive>,
-    settings: Vec<Settings>,
+    /// What the rig needs of each drive.
+    pub(crate) settings: Vec<Settings>,
 }
 
 impl RobotLine {
@@ -34,18 +41,9 @@ impl RobotLine {
     /// # Errors
     /// When an interface cannot be opened, or a value is not one that a profile allows.
     pub(crate) fn open(scenario: Scenario, log: Box<dyn Write + Send>) -> anyhow::Result<Self> {
-        let of_axis = |axis: usize| {
-            let node = NodeId::new(scenario.can.node_ids[axis])?;
-            anyhow::Ok(WantedDrive::of_axis(&scenario, axis, node)?)
-        };
-        let wanted = (0..AXES).map(of_axis).collect::<Result<Vec<_>, _>>()?;
+        let wanted = (0..AXES).map(|axis| wanted_drive(&scenario, axis)).collect::<Result<Vec<_>, _>>()?;
         let settings = wanted.iter().map(Settings::wanted).collect();
         Ok(Self { line: Line::open(&scenario, log)?, scenario, wanted, settings })
-    }
-
-    /// What the rig needs of a drive.
-    pub(crate) fn settings(&self, axis: usize) -> &Settings {
-        &self.settings[axis]
     }
 
     /// Listens until all drives may have booted. Returns their boot-ups until then: after a restart a survey is no more
@@ -94,11 +92,6 @@ impl RobotLine {
         Ok(survey)
     }
 
-    /// Whether a drive still says who it is.
-    pub(crate) fn answers(&mut self, axis: usize) -> bool {
-        Identity::read(&mut self.line, &self.scenario.can, axis).is_ok()
-    }
-
     /// Everything of a drive that is not as scenario and profile need it.
     pub(crate) fn deviations(&self, axis: usize, survey: &Survey) -> Vec<Deviation> {
         deviations(survey, &self.wanted[axis], &self.settings[axis], self.scenario.profile(axis))
@@ -107,10 +100,18 @@ impl RobotLine {
     /// What to do about a drive that does not answer.
     pub(crate) fn silence(&self, axis: usize) -> String {
         let node = self.scenario.can.node_ids[axis];
-        format!(
-            "node {node} does not answer; check its power, wiring, bit rate and node id (inspect --scan finds others)"
-        )
+        let remedy = "check its power, wiring, bit rate and node id (inspect --scan finds others)";
+        format!("node {node} does not answer; {remedy}")
     }
+}
+
+/// What a scenario wants of the drive of an axis.
+///
+/// # Errors
+/// When a value is not one that a profile allows.
+pub(super) fn wanted_drive(scenario: &Scenario, axis: usize) -> anyhow::Result<WantedDrive> {
+    let node = NodeId::new(scenario.can.node_ids[axis])?;
+    Ok(WantedDrive::of_axis(scenario, axis, node)?)
 }
 
 /// A drive or a bus that is not as the step needs it: exit code 1.
@@ -121,4 +122,88 @@ pub(crate) fn failed(error: impl Into<anyhow::Error>) -> Failure {
 /// The drives that were surveyed.
 pub(crate) fn drives(surveys: &Surveys, can: &CanConfig) -> [Known; AXES] {
     std::array::from_fn(|axis| Known::of_survey(surveys[axis].as_ref(), can.node_ids[axis]))
+}
+
+/// Proves that a drive has no power; one that has is stopped first if that is allowed.
+pub(super) fn prove_off(
+    line: &mut Line,
+    scenario: &Scenario,
+    axis: usize,
+    may_stop: bool,
+) -> Result<(), Failure> {
+    let noise = scenario.scale(axis).window(scenario.profile(axis).homing.tolerance_m);
+    match prove_no_power(line, axis, noise) {
+        Err(PowerError::Powered { .. }) if may_stop => {
+            take_over(line, axis, noise).map_err(failed)?;
+            // A drive that the rig could not stop is the case of an emergency stop.
+            prove_no_power(line, axis, noise).map_err(|error| Failure::with(Exit::SafeStop, error))
+        }
+        proved => proved.map_err(failed),
+    }
+}
+
+/// Names of axes; all of them in one word.
+pub(crate) fn axes_text(axes: &[usize]) -> String {
+    if axes.len() == AXES {
+        return "all".to_owned();
+    }
+    axes.iter().map(|&axis| AXIS_NAMES[axis]).collect::<Vec<_>>().join(" ")
+}
+
+/// Deviations as a table; equal ones of several drives share a row. Empty without a deviation.
+pub(crate) fn deviations_table(deviations: &[(usize, Deviation)]) -> String {
+    let mut rows: Vec<(Vec<usize>, &Deviation)> = Vec::new();
+    for (axis, deviation) in deviations {
+        match rows.iter_mut().find(|(_, known)| *known == deviation) {
+            Some((axes, _)) => axes.push(*axis),
+            None => rows.push((vec![*axis], deviation)),
+        }
+    }
+    if rows.is_empty() {
+        return String::new();
+    }
+    let cells = rows.iter().map(|(axes, deviation)| {
+        let remedy = match deviation.outcome {
+            Outcome::Mended => deviation.remedy.clone(),
+            Outcome::Doubtful => format!("(look) {}", deviation.remedy),
+            Outcome::Refused => format!("REFUSES: {}", deviation.remedy),
+        };
+        let object = format!("{} {}", deviation.object, deviation.name).trim_end().to_owned();
+        let (wanted, found) = (deviation.wanted.clone(), deviation.found.clone());
+        [axes_text(axes), object, wanted, found, remedy, deviation.key.clone()]
+    });
+    let all: Vec<_> = [HEAD.map(str::to_owned)].into_iter().chain(cells).collect();
+    let width = |column: usize| all.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let widths: [usize; 6] = std::array::from_fn(width);
+    let line = |row: &[String; 6]| {
+        let padded: Vec<_> = row.iter().zip(widths).map(|(cell, width)| format!("{cell:<width$}")).collect();
+        padded.join("  ").trim_end().to_owned() + "\n"
+    };
+    all.iter().map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_deviations_share_a_row() {
+        let deviation = |wanted: &str| Deviation {
+            object: "6066h:00h".to_owned(),
+            name: "Following error time out",
+            wanted: wanted.to_owned(),
+            found: "0".to_owned(),
+            outcome: Outcome::Mended,
+            remedy: format!("write {wanted}"),
+            key: "key".to_owned(),
+        };
+        let mut all: Vec<_> = (0..AXES).map(|axis| (axis, deviation("20"))).collect();
+        all.push((3, deviation("7")));
+        let text = deviations_table(&all);
+        let rows: Vec<_> = text.lines().collect();
+        assert_eq!(rows.len(), 3, "{text}");
+        assert!(rows[1].starts_with("all   6066h:00h Following error time out  20"), "{text}");
+        assert!(rows[2].starts_with("l1 "), "{text}");
+        assert_eq!(deviations_table(&[]), "");
+    }
 }

@@ -1,11 +1,8 @@
 //! A step that moves or reads the drives, from the claimed interfaces to its evidence and exit code.
 
 use anyhow::Context;
-use masseter_can::canopen::NodeId;
 use masseter_model::geometry::AXES;
 use masseter_plant::bringup::{BootUps, Line, LineError, MotionError, StopCause};
-use masseter_plant::wanted::WantedDrive;
-use masseter_runtime::clock::MILLISECOND_NS;
 use masseter_runtime::lifecycle::StopRequest;
 use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
@@ -13,17 +10,14 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::args::RobotArgs;
-use super::evidence::{Basis, StepFolder};
-use super::identity::{Identity, Known, NOT_ASKED, warn_of_gaps};
-use super::ledger::{self, Files};
-use super::past::Past;
-use super::power_mark;
-use super::presence::{Disturbance, check_present, check_undisturbed};
-use super::robot_line::failed;
-use super::step::Step;
+use super::evidence::{Basis, Past, Step, StepFolder};
+use super::identity::{
+    Disturbance, Identity, Known, NOT_ASKED, check_present, check_undisturbed, warn_of_gaps,
+};
+use super::ledger::{OwedFiles, return_owed_values};
+use super::power_mark::remove_mark;
+use super::robot_line::{LISTEN_NS, failed, wanted_drive};
 
-/// How long the step listens for other masters, ns.
-const LISTEN_NS: u64 = 500 * MILLISECOND_NS;
 /// All axes.
 const ALL: [usize; AXES] = [0, 1, 2, 3, 4, 5];
 
@@ -41,26 +35,27 @@ pub(super) struct Session {
 }
 
 impl Session {
-    /// Claims the interfaces, makes the folder, and refuses without the evidence of an earlier step for these axes.
+    /// Claims the interfaces, makes the folder, and refuses without the evidence of the earlier step for each of
+    /// these axes; none for a step out of order.
     pub(super) fn begin(
         args: &RobotArgs,
         step: Step,
         axes: &[usize],
-        earlier: impl Fn(usize) -> Option<Step>,
+        earlier: Option<impl Fn(usize) -> Step>,
     ) -> Result<Self, Failure> {
         let scenario = args.scenario().usage()?;
         let stop = StopRequest::listen_alone().context("cannot listen for signals").died()?;
         let past = Past::read(&args.folder).usage()?;
+        let needed =
+            earlier.map(|earlier| axes.iter().map(|&axis| (earlier(axis), axis)).collect::<Vec<_>>());
         let require = |basis: &Basis| {
-            let mut needed = axes.iter().filter_map(|&axis| Some((earlier(axis)?, axis)));
-            needed.try_for_each(|(earlier, axis)| past.require(earlier, &[axis], basis))
+            let mut needed = needed.iter().flatten();
+            needed.try_for_each(|&(earlier, axis)| past.require(earlier, &[axis], basis))
         };
         // A refused step makes no folder: it would replace the evidence of the same step from before.
         require(&Basis::new(&scenario, NOT_ASKED)).usage()?;
         let mut folder = StepFolder::begin(&args.folder, step, axes, &scenario).usage()?;
-        if axes.iter().any(|&axis| earlier(axis).is_none()) {
-            folder.note_out_of_order();
-        }
+        folder.evidence.in_order = needed.is_some();
         let log = folder.log().context("cannot write the log of the buses").incomplete()?;
         let mut line = Line::open(&scenario, log).usage()?;
         line.listen(LISTEN_NS).died()?;
@@ -68,20 +63,19 @@ impl Session {
         let boot_ups = BootUps::until_now(&line);
         let identities = Identity::read_all(&mut line, &scenario.can).map_err(failed)?;
         let drives = identities.map(Known::Is);
-        folder.note_drives(drives);
-        require(&folder.basis()).usage()?;
+        folder.evidence.basis.drives = drives;
+        require(&folder.evidence.basis).usage()?;
         for &axis in axes {
-            let node = NodeId::new(scenario.can.node_ids[axis]).context("node ids").usage()?;
-            let wanted = WantedDrive::of_axis(&scenario, axis, node).usage()?;
+            let wanted = wanted_drive(&scenario, axis).usage()?;
             identities[axis].check_kind(axis, &wanted).map_err(failed)?;
         }
         warn_of_gaps(&drives);
-        ledger::settle(&args.folder, &scenario, &mut line, false)?;
+        return_owed_values(&args.folder, &scenario, &mut line, false)?;
         // A step that borrows the marked object must not return a mark.
         if matches!(step, Step::Jog(_) | Step::Home) {
-            axes.iter().try_for_each(|&axis| power_mark::remove(&past, &scenario, &mut line, axis))?;
+            axes.iter().try_for_each(|&axis| remove_mark(&past, &scenario, &mut line, axis))?;
         }
-        line.keep_old_values_in(Box::new(Files::new(&args.folder, identities)));
+        line.keep_old_values_in(Box::new(OwedFiles { folder: args.folder.clone(), drives: identities }));
         Ok(Self { scenario, line, stop, past, folder, boot_ups, drives })
     }
 
@@ -97,15 +91,22 @@ impl Session {
     }
 
     /// Writes the result, whether it is evidence, and where it is.
-    pub(super) fn finish(mut self, passed: bool, result: &impl Serialize) -> Result<(), Failure> {
+    pub(super) fn finish_session(mut self, passed: bool, result: &impl Serialize) -> Result<(), Failure> {
         // The log has no value without its end.
         self.line.flush().incomplete()?;
-        status!("evidence in {}", self.folder.path().display());
-        self.folder.finish(passed, result).incomplete()
+        status!("evidence in {}", self.folder.files.path().display());
+        self.folder.finish_step(passed, result).incomplete()
     }
 
     /// Writes that the step failed, and why.
-    pub(super) fn fail(self, error: MotionError) -> Failure {
+    pub(super) fn fail(self, exit: Exit, error: impl Into<anyhow::Error>) -> Failure {
+        let error = error.into();
+        let written = self.finish_session(false, &json!({ "error": error.to_string() }));
+        written.err().unwrap_or_else(|| Failure::with(exit, error))
+    }
+
+    /// The same of a motion.
+    pub(super) fn fail_motion(self, error: MotionError) -> Failure {
         let exit = match &error {
             // No motion begins before its values are in the drive.
             MotionError::Line(LineError::NotKept { .. }) => Exit::Failed,
@@ -119,7 +120,6 @@ impl Session {
             }
             _ => Exit::Failed,
         };
-        let written = self.finish(false, &json!({ "error": error.to_string() }));
-        written.err().unwrap_or_else(|| Failure::with(exit, error))
+        self.fail(exit, error)
     }
 }

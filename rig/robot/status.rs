@@ -7,10 +7,8 @@ use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_terminal::{Exit, Tone, result, result_with_tones};
 
 use super::args::RobotArgs;
-use super::evidence::Basis;
+use super::evidence::{Basis, Past, Step};
 use super::identity::{Identity, Known};
-use super::past::Past;
-use super::step::Step;
 
 /// The arguments of `robot status` and `robot report`.
 #[derive(Debug, Clone, Args)]
@@ -37,8 +35,8 @@ pub(crate) fn status(args: &StatusArgs) -> anyhow::Result<Exit> {
         };
         writeln!(text, "{word:<7} {:<11} {more}", step.to_string())?;
     }
-    let next = next(&links);
-    writeln!(text, "{}", next.as_deref().unwrap_or("every step passed"))?;
+    let next = links.iter().find(|link| link.state.is_err());
+    text += &next.map_or("every step passed\n".to_owned(), |open| format!("next: {}\n", open.step.command()));
     result_with_tones(&text, &[("passed", Tone::Good), ("open", Tone::Doubtful)])?;
     Ok(if next.is_none() { Exit::Passed } else { Exit::Failed })
 }
@@ -55,8 +53,8 @@ pub(crate) fn report(args: &StatusArgs) -> anyhow::Result<Exit> {
     for (name, drive) in AXIS_NAMES.iter().zip(basis.drives) {
         writeln!(text, "| {name} | {} |", drive.identity().map_or_else(String::new, Identity::to_string))?;
     }
-    for (path, evidence) in past.steps() {
-        let folder = path.file_name().unwrap_or_default().display();
+    for evidence in &past.steps {
+        let folder = evidence.folder.file_name().unwrap_or_default().display();
         let passed = if evidence.passed { "passed" } else { "not passed" };
         let data = serde_json::to_string_pretty(&evidence.result)?;
         write!(text, "\n## {folder}\n\n{}, {}: {passed}\n\n", evidence.started, evidence.axes.join(" "))?;
@@ -69,12 +67,12 @@ pub(crate) fn report(args: &StatusArgs) -> anyhow::Result<Exit> {
 fn read(args: &StatusArgs) -> anyhow::Result<(Past, Basis, Vec<Link>)> {
     let past = Past::read(&args.robot.folder)?;
     let newest = |axis: usize| {
-        let mut drives = past.steps().rev().map(|(_, evidence)| evidence.drives[axis]);
+        let mut drives = past.steps.iter().rev().map(|evidence| evidence.basis.drives[axis]);
         drives.find(|drive| *drive != Known::NotAsked).unwrap_or(Known::NotAsked)
     };
     let basis = Basis::new(&args.robot.scenario()?, std::array::from_fn(newest));
-    let links =
-        Step::chain().into_iter().map(|step| Link { step, state: state(&past, &basis, step) }).collect();
+    let link = |step| Link { step, state: state(&past, &basis, step) };
+    let links = Step::chain().into_iter().map(link).collect();
     Ok((past, basis, links))
 }
 
@@ -83,7 +81,7 @@ fn state(past: &Past, basis: &Basis, step: Step) -> Result<String, String> {
     let (mut newest, mut lacks) = (String::new(), Vec::<(String, Vec<&str>)>::new());
     let axes = step.axes();
     for &axis in &axes {
-        match past.check(step, axis, basis) {
+        match past.check_step(step, axis, basis) {
             Ok(evidence) => newest = newest.max(evidence.started.clone()),
             Err(lack) => {
                 let lack = lack.to_string();
@@ -106,9 +104,4 @@ fn state(past: &Past, basis: &Basis, step: Step) -> Result<String, String> {
     } else {
         Err(lacks.iter().map(with_axes).collect::<Vec<_>>().join("; "))
     }
-}
-
-fn next(links: &[Link]) -> Option<String> {
-    let open = links.iter().find(|link| link.state.is_err())?;
-    Some(format!("next: {}", open.step.command()))
 }

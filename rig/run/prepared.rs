@@ -8,28 +8,27 @@ use masseter_analysis::{Analysis, Figures};
 use masseter_controller::process::BuildController;
 use masseter_plan::RunPlan;
 use masseter_recording::{Ending, FullSpeed, Manifest, RunFolder};
-use masseter_report::Judgement;
+use masseter_report::{Detail, Judgement};
 use masseter_runtime::transport::{Domain, DomainLock};
 use masseter_scenario::input::read_text;
 use masseter_scenario::{FileConfig, Scenario};
-use masseter_terminal::{Exit, Failure, OrFailure, status};
+use masseter_terminal::{Exit, Failure, Format, OrFailure, status};
 
-use super::args::{ClockKind, RunArgs};
-use super::resolve::{resolve, resolve_simulated};
+use super::interrupts::Interrupts;
+use super::request::{ClockKind, ControllerChoice, RunRequest, name_of};
+use super::resolve::resolve;
 use super::room::{self, Reserve};
 use super::supervisor;
-use crate::arguments::{ControllerChoice, ControllerKind, name_of};
-use crate::interrupts::Interrupts;
 use crate::robot::Played;
 use crate::{BUILD, doctor, robot};
 
 /// Where runs without `--out` go.
-pub(super) const RUNS: &str = "runs";
+const RUNS: &str = "runs";
 
 /// A run that can start.
 pub(crate) struct PreparedRun {
     plan: RunPlan,
-    args: RunArgs,
+    request: RunRequest,
     /// None under virtual time.
     domain: Option<(Domain, DomainLock)>,
     folder: RunFolder,
@@ -39,7 +38,7 @@ pub(crate) struct PreparedRun {
 
 /// A run that has ended.
 pub(crate) struct PlayedRun {
-    args: RunArgs,
+    request: RunRequest,
     folder: RunFolder,
     manifest: Manifest,
     /// The summary's room on the disk.
@@ -50,47 +49,47 @@ pub(crate) struct PlayedRun {
 
 impl PreparedRun {
     /// Refuses a run that cannot start, and makes the folder of one that can.
-    pub(crate) fn new(args: &RunArgs) -> Result<Self, Failure> {
+    pub(crate) fn new(request: &RunRequest) -> Result<Self, Failure> {
         room::check_memory().usage()?;
-        let (plan, args) = resolve(args).usage()?;
-        let (controller, motion_s) = (args.controller.name(), plan.trajectory.duration_s());
+        let (plan, request) = resolve(request).usage()?;
+        let (controller, motion_s) = (request.controller.name(), plan.trajectory.duration_s());
         let played = Played { scenario: &plan.scenario, controller: controller.as_deref(), motion_s };
-        robot::check_bring_up(&played, args.without_bring_up).usage()?;
-        room::check_disk(args.out.as_deref().unwrap_or(RUNS.as_ref()), &plan).incomplete()?;
-        let domain = match args.clock {
+        robot::check_bring_up(&played, request.without_bring_up).usage()?;
+        room::check_disk(request.out.as_deref().unwrap_or(RUNS.as_ref()), &plan).incomplete()?;
+        let domain = match request.clock {
             ClockKind::Virtual => None,
             ClockKind::Auto | ClockKind::Rt | ClockKind::Lockstep => {
                 // This also removes what killed runs left.
-                let domain = supervisor::reserve_domain(args.name.as_deref()).usage()?;
+                let domain = supervisor::reserve_domain(request.name.as_deref()).usage()?;
                 room::check_shared_memory().usage()?;
                 Some(domain)
             }
         };
-        let folder = match &args.out {
+        let folder = match &request.out {
             Some(path) => RunFolder::create(path).usage()?,
             None => RunFolder::create_in(RUNS.as_ref(), &plan.scenario.name).usage()?,
         };
         keep_scenario(&folder, &plan.scenario).incomplete()?;
-        if !args.quiet {
+        if !request.quiet {
             status!("{}", plan.announcement());
         }
-        let manifest = manifest_of(&plan, &args);
+        let manifest = manifest_of(&plan, &request.controller, request.clock);
         // This one remains if the supervisor is killed.
         write_manifest(&folder, &manifest)?;
         let no_room = || format!("no room in {} for the verdict", folder.path().display());
-        let reserve = Reserve::take(folder.path()).with_context(no_room).incomplete()?;
-        Ok(Self { plan, args, domain, folder, manifest, reserve })
+        let reserve = Reserve::allocate_in(folder.path()).with_context(no_room).incomplete()?;
+        Ok(Self { plan, request, domain, folder, manifest, reserve })
     }
 
     /// Plays the motion to its end.
     pub(crate) fn play(self, interrupts: &Interrupts) -> Result<PlayedRun, Failure> {
-        let Self { plan, args, domain, folder, mut manifest, reserve } = self;
+        let Self { plan, request, domain, folder, mut manifest, reserve } = self;
         let ran = match domain {
             None => {
-                let build = args.controller.builder().expect("the clock is checked");
+                let build = request.controller.builder().expect("the clock is checked");
                 masseter_virtual_time::record(&plan, &folder, build, &mut manifest, interrupts).incomplete()
             }
-            Some(domain) => supervisor::run(domain, &plan, &folder, &args, &mut manifest, interrupts),
+            Some(domain) => supervisor::run(domain, &plan, &folder, &request, &mut manifest, interrupts),
         };
         if let Err(failure) = &ran {
             manifest.ending = Ending::died("rig", format!("{:#}", failure.error));
@@ -98,31 +97,31 @@ impl PreparedRun {
         drop(reserve.manifest);
         let written = write_manifest(&folder, &manifest);
         ran?;
-        Ok(PlayedRun { args, folder, manifest, reserved: reserve.summary, written })
+        Ok(PlayedRun { request, folder, manifest, reserved: reserve.summary, written })
     }
 }
 
 impl PlayedRun {
     /// Judges the run, prints its report and writes it into the folder.
-    pub(super) fn report(self) -> Result<Exit, Failure> {
+    pub(crate) fn report(self, format: Format, detail: Detail) -> Result<Exit, Failure> {
         if self.is_unstarted() {
             let folder = self.folder.path().display();
             status!("masseter: interrupted before the first cycle: nothing is recorded in {folder}");
             return Ok(Exit::Interrupted);
         }
-        let Self { args, folder, manifest, reserved, written } = self;
-        let exit = masseter_report::report_run(&folder, &manifest, args.format, args.detail(), reserved)?;
+        let Self { request, folder, manifest, reserved, written } = self;
+        let exit = masseter_report::report_run(&folder, &manifest, format, detail, reserved)?;
         written?;
-        let controller = args.controller.name();
+        let controller = request.controller.name();
         let Manifest { scenario, motion_s, .. } = &manifest;
         let played = Played { scenario, controller: controller.as_deref(), motion_s: *motion_s };
-        robot::keep_dry_run(&played, folder.path(), exit == Exit::Passed, args.without_bring_up)
+        robot::keep_dry_run(&played, folder.path(), exit == Exit::Passed, request.without_bring_up)
             .incomplete()?;
         Ok(exit)
     }
 
     /// The same without printing; none for a run that was interrupted before anything was recorded.
-    pub(crate) fn judge(self) -> Result<Option<Judgement>, Failure> {
+    pub(crate) fn judge_unseen(self) -> Result<Option<Judgement>, Failure> {
         if self.is_unstarted() {
             return Ok(None);
         }
@@ -134,75 +133,35 @@ impl PlayedRun {
 
     /// Whether it was interrupted before every process was ready: nothing is recorded.
     fn is_unstarted(&self) -> bool {
-        let has_processes = self.args.clock != ClockKind::Virtual;
+        let has_processes = self.request.clock != ClockKind::Virtual;
         self.manifest.ending == Ending::Interrupted && has_processes && self.manifest.scheduling.is_empty()
     }
 }
 
-/// Plays a run under virtual time without a folder, and judges it from its messages.
-pub(crate) fn judge_unrecorded(args: &RunArgs, interrupts: &Interrupts) -> Result<Judgement, Failure> {
-    let (plan, args) = resolve(args).usage()?;
-    let build =
-        args.controller.builder().context("virtual time runs controllers of the rig alone").usage()?;
-    let (manifest, figures) = unrecorded(&plan, &args, build, interrupts)?;
-    Ok(Judgement::new(&manifest, &figures))
-}
-
-/// Plays a scenario under virtual time by a controller of the rig; the figures that its verdict needs, without a folder.
-pub(crate) fn figures_unrecorded(
-    scenario: &Scenario,
-    controller: ControllerKind,
-    interrupts: &Interrupts,
-) -> Result<(Manifest, Figures), Failure> {
-    figures_of(scenario, controller, controller.builder(), interrupts)
-}
-
-/// The same by another controller.
-#[cfg(test)]
-pub(crate) fn figures_by(
-    scenario: &Scenario,
-    build: BuildController,
-    interrupts: &Interrupts,
-) -> Result<(Manifest, Figures), Failure> {
-    figures_of(scenario, ControllerKind::default(), build, interrupts)
-}
-
-fn figures_of(
-    scenario: &Scenario,
-    controller: ControllerKind,
-    build: BuildController,
-    interrupts: &Interrupts,
-) -> Result<(Manifest, Figures), Failure> {
-    let plan = resolve_simulated(scenario, None, build).usage()?;
-    let controller = ControllerChoice::Own(controller);
-    let args = RunArgs { clock: ClockKind::Virtual, controller, ..RunArgs::default() };
-    unrecorded(&plan, &args, build, interrupts)
-}
-
-fn unrecorded(
+/// Plays a run under virtual time without a folder; the figures that its verdict needs.
+pub(super) fn analyse_unrecorded(
     plan: &RunPlan,
-    args: &RunArgs,
+    controller: &ControllerChoice,
     build: BuildController,
     interrupts: &Interrupts,
 ) -> Result<(Manifest, Figures), Failure> {
-    let mut manifest = manifest_of(plan, args);
+    let mut manifest = manifest_of(plan, controller, ClockKind::Virtual);
     let start = Analysis::without_report;
     let figures = masseter_virtual_time::analyse(plan, build, start, &mut manifest, interrupts).died()?;
     Ok((manifest, figures))
 }
 
 /// What is known before the start.
-fn manifest_of(plan: &RunPlan, args: &RunArgs) -> Manifest {
-    let (motion_s, clock) = (plan.trajectory.duration_s(), name_of(&args.clock));
-    let machine = masseter_machine::describe();
-    let mut manifest = Manifest::new(BUILD, plan.scenario.clone(), motion_s, &clock, machine);
+fn manifest_of(plan: &RunPlan, controller: &ControllerChoice, clock: ClockKind) -> Manifest {
+    let (motion_s, machine) = (plan.trajectory.duration_s(), masseter_machine::describe());
+    let mut manifest = Manifest::new(BUILD, plan.scenario.clone(), motion_s, &name_of(&clock), machine);
     manifest.motion_end_s = Some(plan.trajectory.motion_time_s(motion_s));
-    manifest.controller = args.controller.name();
+    manifest.controller = controller.name();
     manifest.full_speed = plan.scenario.dry.is_on.then_some(FullSpeed {
         velocity_m_s: plan.demands.velocity_m_s,
         acceleration_m_s2: plan.demands.acceleration_m_s2,
     });
-    if args.clock == ClockKind::Rt {
+    if clock == ClockKind::Rt {
         manifest.mending_command = doctor::mending_command();
     }
     manifest

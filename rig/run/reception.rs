@@ -1,19 +1,18 @@
 //! Where programs of the user attach: heard without blocking, admitted or refused with the reason.
 //!
-//! The rig has one controller. Refusals are counted and said once a second, so that no number of them fills the screen or
-//! delays the supervisor.
+//! The rig has one controller. Refusals are counted and said once a second, so that no number of them fills the
+//! screen or delays the supervisor.
 
 use std::os::unix::net::UnixListener;
 
 use anyhow::Context;
+use masseter_recorder::Refusals;
 use masseter_runtime::clock;
 use masseter_runtime::conversation::{Conversation, Left, Limits, Newcomers};
 use masseter_runtime::lifecycle::attach::{Answer, Hello, Invitation, socket};
 use masseter_runtime::lifecycle::line;
 use masseter_runtime::transport::Domain;
 use masseter_terminal::status;
-
-use masseter_recorder::Refusals;
 
 /// Bytes of the longest greeting.
 const LONGEST_HELLO: usize = 4096;
@@ -46,7 +45,7 @@ impl Reception {
     }
 
     /// Counts a program that was admitted and is out before the start.
-    pub(super) fn count(&mut self, reason: String) {
+    pub(super) fn count_refusal(&mut self, reason: String) {
         self.refusals.count(reason);
     }
 

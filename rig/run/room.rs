@@ -63,8 +63,8 @@ pub(super) fn check_disk(path: &Path, plan: &RunPlan) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Refuses a rig whose topics have no room in shared memory: the kernel ends a process that touches a page for which there
-/// is none.
+/// Refuses a rig whose topics have no room in shared memory: the kernel ends a process that touches a page for which
+/// there is none.
 pub(super) fn check_shared_memory() -> anyhow::Result<()> {
     let free = free_bytes(SHARED_MEMORY.as_ref())?;
     ensure!(
@@ -107,13 +107,13 @@ pub(super) struct Reserve {
 }
 
 impl Reserve {
-    pub(super) fn take(folder: &Path) -> io::Result<Self> {
-        let take = |bytes| {
+    pub(super) fn allocate_in(folder: &Path) -> io::Result<Self> {
+        let reserve = |bytes| {
             let file = tempfile::tempfile_in(folder)?;
             allocate(&file, bytes)?;
             Ok::<_, io::Error>(file)
         };
-        Ok(Self { manifest: take(128 << 10)?, summary: take(1 << 20)? })
+        Ok(Self { manifest: reserve(128 << 10)?, summary: reserve(1 << 20)? })
     }
 }
 

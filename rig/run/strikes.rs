@@ -1,7 +1,8 @@
 //! The faults of processes, carried out: killed, stopped for a while, robbed of a core, or without room on the disk.
 //!
-//! The controller reports when one is due. A fault that cannot be carried out has not struck; the reason is printed. In real
-//! time the controller's stall is one of them. In simulated time the plant alone makes it, by withholding the commands.
+//! The controller reports when one is due. A fault that cannot be carried out has not struck; the reason is printed.
+//! In real time the controller's stall is one of them. In simulated time the plant alone makes it, by withholding the
+//! commands.
 
 use std::fs;
 use std::os::fd::OwnedFd;
@@ -13,14 +14,14 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use masseter_recording::{ProcessFault, RunFolder};
 use masseter_runtime::clock;
+use masseter_runtime::lifecycle::Order;
 use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain};
 use masseter_scenario::{FaultConfig, FaultKindConfig, RealtimeConfig, Scenario};
 use masseter_terminal::status;
 use rustix::process::{Signal, pidfd_send_signal};
 
-use super::child::Process;
+use super::child::{Due, Process, Reports};
 use super::controller::Controller;
-use super::reports::Due;
 
 /// Where the end of a fault is told, ns.
 type End = Receiver<u64>;
@@ -54,13 +55,14 @@ impl Strikes {
 
     /// Carries out every fault that is due.
     pub(super) fn carry_out(&mut self, victims: &mut Victims<'_>) {
-        while let Some(Due { fault, now_ns }) = victims.controller.due() {
+        while let Some(Due { fault, now_ns }) = victims.controller.reports().and_then(Reports::due) {
             let Some(config) = self.faults.get(fault) else { continue };
             if self.is_lockstep {
                 if config.kind != FaultKindConfig::ControllerStall {
                     self.carry_out_one(fault, now_ns, victims);
                 }
-                victims.controller.go_on();
+                // It may have ended.
+                let _ = victims.controller.order(&Order::Struck);
             } else {
                 self.carry_out_one(fault, clock::now_ns(), victims);
             }
@@ -76,7 +78,7 @@ impl Strikes {
     }
 
     /// The faults that have struck, once the run is over.
-    pub(super) fn finish(self) -> Vec<ProcessFault> {
+    pub(super) fn into_struck(self) -> Vec<ProcessFault> {
         // Simulated time stands still while a process does.
         let end_ns = |struck_ns, ended_ns| if self.is_lockstep { struck_ns } else { ended_ns };
         let ended = |(fault, end): (ProcessFault, Option<End>)| {

@@ -1,9 +1,9 @@
 //! Starts the three processes, monitors them, stops them in order, and removes their shared memory.
 //!
-//! Order of ending: the controller first (it brings the drives to rest), then the plant, then the recorder, which drains
-//! what is left. A process that dies is not restarted: the rig ends in that order, and the watchdogs of the other
-//! processes stop the drives. A process that does not end in time is killed. So is a controller that hangs, which the
-//! plant detects. The supervisor reads no message of the run and judges nothing.
+//! Order of ending: the controller first (it brings the drives to rest), then the plant, then the recorder, which
+//! drains what is left. A process that dies is not restarted: the rig ends in that order, and the watchdogs of the
+//! other processes stop the drives. A process that does not end in time is killed. So is a controller that hangs,
+//! which the plant detects. The supervisor reads no message of the run and judges nothing.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -14,11 +14,12 @@ use std::process::ExitStatus;
 use std::time::Duration;
 
 use anyhow::Context;
+use masseter_machine::{SystemRoot, dma_latency};
 use masseter_plan::RunPlan;
 use masseter_recording::{DmaLatency, Ending, Manifest, RunFolder};
 use masseter_runtime::clock::{self, MILLISECOND_NS, SECOND_NS};
 use masseter_runtime::lifecycle::attach::Invitation;
-use masseter_runtime::lifecycle::{End, Party, Silence, Start};
+use masseter_runtime::lifecycle::{End, Order, Party, Patience, Silence, Start};
 use masseter_runtime::lockstep;
 use masseter_runtime::named::Declared;
 use masseter_runtime::realtime::scheduling::Obtained;
@@ -27,16 +28,13 @@ use masseter_runtime::transport::{Domain, DomainError, DomainLock, Swept};
 use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
-use super::args::RunArgs;
-use super::child::{CONTROLLER, PLANT, Process, RECORDER};
+use super::child::{CONTROLLER, KILLED, PLANT, Process, RECORDER, Reports, describe};
 use super::controller::Controller;
-use super::ending::{NOT_ENDED, died, of_plant_and_recorder, of_run};
+use super::interrupts::Interrupts;
+use super::request::RunRequest;
 use super::room::reserve_shared_memory;
 use super::strikes::{Strikes, Victims};
 use super::usage::UsageMeter;
-use crate::arguments::patience_text;
-use crate::interrupts::Interrupts;
-use masseter_machine::{SystemRoot, dma_latency};
 
 /// Polling interval of the processes.
 const POLL: Duration = Duration::from_millis(2);
@@ -48,6 +46,8 @@ const START_LEAD_NS: u64 = 100_000_000;
 const END_TIMEOUT_NS: u64 = 5 * SECOND_NS;
 /// Longest time for the recorder to write what is left to a slow disk, ns.
 const RECORD_TIMEOUT_NS: u64 = 60 * SECOND_NS;
+/// The cause of death of a process that did not end when it was asked to.
+const NOT_ENDED: &str = "it did not end when it was asked to";
 /// The cause of death of a controller whose commands stopped.
 const SILENT: &str = "it stopped sending commands";
 /// Time for the plant to stop the drives once its master has detected the controller's death, ns.
@@ -69,18 +69,19 @@ pub(super) fn reserve_domain(name: Option<&str>) -> Result<(Domain, DomainLock),
     Ok((domain, claim))
 }
 
-/// Runs the rig in real time or in lockstep, then releases its domain. Enters the circumstances and the ending into the manifest.
+/// Runs the rig in real time or in lockstep, then releases its domain. Enters the circumstances and the ending into
+/// the manifest.
 pub(super) fn run(
     (domain, mut claim): (Domain, DomainLock),
     plan: &RunPlan,
     folder: &RunFolder,
-    args: &RunArgs,
+    request: &RunRequest,
     manifest: &mut Manifest,
     interrupts: &Interrupts,
 ) -> Result<(), Failure> {
     let mut names_left = NAMES;
     let prepared = loop {
-        let prepared = Rig::prepare(plan, folder, &domain, args, interrupts);
+        let prepared = Rig::prepare(plan, folder, &domain, request, interrupts);
         names_left -= 1;
         let squatter = domain.foreign_file().ok().flatten().filter(|_| names_left > 0);
         let (Err(failure), Some(path)) = (&prepared, squatter) else { break prepared };
@@ -100,11 +101,11 @@ pub(super) fn run(
             manifest.declared = rig.declared.clone();
             // The supervisor may be killed: a report of what is recorded then needs the names.
             manifest.write(folder).context("cannot write the manifest").incomplete()?;
-            let ending = match args.lockstep() {
-                None => rig.run(plan, args.require_rt, interrupts, manifest),
+            let ending = match request.lockstep() {
+                None => rig.run(plan, request.require_rt, interrupts, manifest),
                 Some(_) => rig.run_in_lockstep(interrupts),
             };
-            manifest.process_faults = rig.strikes.finish();
+            manifest.process_faults = rig.strikes.into_struck();
             ending.died()
         }
         None => Ok(Ending::Interrupted),
@@ -141,16 +142,21 @@ struct Rig {
 }
 
 impl Rig {
-    fn spawn(plan: &RunPlan, folder: &RunFolder, domain: &Domain, args: &RunArgs) -> anyhow::Result<Self> {
+    fn spawn(
+        plan: &RunPlan,
+        folder: &RunFolder,
+        domain: &Domain,
+        request: &RunRequest,
+    ) -> anyhow::Result<Self> {
         let mut common: Vec<OsString> =
             vec!["--scenario".into(), folder.scenario().into(), "--domain".into(), domain.id().into()];
-        let lockstep = args.lockstep();
+        let lockstep = request.lockstep();
         common.extend(lockstep.map(|patience| format!("--lockstep={}", patience_text(patience)).into()));
         let with = |more: Vec<OsString>| [common.clone(), more].concat();
         let motion = format!("--motion-s={}", plan.trajectory.duration_s()).into();
         let mut recorder_arguments = with(vec!["--recording".into(), folder.recording().into(), motion]);
-        recorder_arguments.extend(args.quiet.then(|| "--quiet".into()));
-        recorder_arguments.extend(args.live.map(|address| format!("--live={address}").into()));
+        recorder_arguments.extend(request.quiet.then(|| "--quiet".into()));
+        recorder_arguments.extend(request.live.map(|address| format!("--live={address}").into()));
         let invitation = Invitation::new(std::path::absolute(folder.scenario())?, lockstep);
         let Scenario { controller, can, .. } = &plan.scenario;
         // It stops the motion, holds it, and switches the drives off.
@@ -168,7 +174,7 @@ impl Rig {
             recorder: Process::spawn(RECORDER, &recorder_arguments)?,
             plant: Process::spawn(PLANT, &common)?,
             controller: Controller::start_process(
-                &args.controller,
+                &request.controller,
                 domain,
                 invitation,
                 common,
@@ -182,10 +188,10 @@ impl Rig {
         plan: &RunPlan,
         folder: &RunFolder,
         domain: &Domain,
-        args: &RunArgs,
+        request: &RunRequest,
         interrupts: &Interrupts,
     ) -> Result<Option<(Self, Scheduling)>, Failure> {
-        let mut rig = Self::spawn(plan, folder, domain, args).died()?;
+        let mut rig = Self::spawn(plan, folder, domain, request).died()?;
         let Some(scheduling) = rig.wait_ready(interrupts).died()? else { return Ok(None) };
         domain.make_private().usage()?;
         reserve_shared_memory(domain).usage()?;
@@ -215,7 +221,7 @@ impl Rig {
             [(RECORDER, self.recorder.id()), (PLANT, self.plant.id()), (CONTROLLER, self.controller.id())];
         let mut meter = UsageMeter::new(epoch_ns, &names_and_ids);
         let ending = self.monitor(interrupts, |now_ns| meter.update(now_ns))?;
-        manifest.usage = meter.finish();
+        manifest.usage = meter.into_usage();
         Ok(ending)
     }
 
@@ -255,10 +261,10 @@ impl Rig {
     /// Sends the start message with the time of the first SYNC, ns.
     fn start(&mut self, epoch_ns: u64) -> io::Result<()> {
         let loops = [self.controller.id(), self.plant.id()];
-        let start = Start { epoch_ns, loops, declared: self.declared.clone() };
-        self.recorder.start(&start)?;
-        self.plant.start(&start)?;
-        self.controller.start(&start)
+        let start = Order::Start(Start { epoch_ns, loops, declared: self.declared.clone() });
+        self.recorder.order(&start)?;
+        self.plant.order(&start)?;
+        self.controller.order(&start)
     }
 
     /// Monitors the processes until the controller has ended, then ends plant and recorder. Calls `at` with the time.
@@ -295,7 +301,7 @@ impl Rig {
         if interrupts.is_abort_requested() {
             return Ok(Ending::Interrupted);
         }
-        Ok(of_run(interruption, controller, of_plant_and_recorder(plant, recorder)))
+        Ok(ending_of_run(interruption, controller, ending_by_plant_or_recorder(plant, recorder)))
     }
 
     /// Carries out the faults of processes that are due.
@@ -304,8 +310,8 @@ impl Rig {
         strikes.carry_out(&mut Victims { controller, plant, recorder });
     }
 
-    /// Asks the controller to end if the user interrupts, or another process was silent or has ended; returns that ending.
-    /// Where the controller has left, the others miss it: only one that was killed has an ending of its own.
+    /// Asks the controller to end if the user interrupts, or another process was silent or has ended; returns that
+    /// ending. Where the controller has left, the others miss it: only one that was killed has an ending of its own.
     fn interrupt_controller(
         &mut self,
         interrupts: &Interrupts,
@@ -338,13 +344,13 @@ impl Rig {
         Some(ending)
     }
 
-    /// Kills the first process that was reported to be silent in lockstep, if any. Were it stopped and went on, it would
-    /// find the others silent.
+    /// Kills the first process that was reported to be silent in lockstep, if any. Were it stopped and went on, it
+    /// would find the others silent.
     fn end_silent(&mut self) -> Option<Ending> {
         if !self.is_lockstep {
             return None;
         }
-        let reports = [self.controller.reported_silence(), self.plant.reported_silence()];
+        let reports = [self.controller.reports().and_then(Reports::silence), self.plant.reports.silence()];
         let Silence { process, cycle, silent_s } = reports.into_iter().flatten().next()?;
         let fate = match process {
             Party::Controller => self.controller.give_up(),
@@ -383,4 +389,65 @@ fn print_refusals(scheduling: &Scheduling, latency: &DmaLatency) -> usize {
     });
     let of_latency = latency.refusal.iter().map(|refusal| format!("  {refusal}"));
     of_processes.chain(of_latency).map(|line| status!("{line}")).count()
+}
+
+/// The patience as the command line reads it.
+fn patience_text(Patience(patience): Patience) -> String {
+    patience.map_or_else(|| "none".to_owned(), |patience| humantime::format_duration(patience).to_string())
+}
+
+/// The ending of the run: the first death of a process, else an incomplete recording, else the interruption, else the
+/// controller's ending.
+fn ending_of_run(interruption: Option<Ending>, controller: Ending, others: Option<Ending>) -> Ending {
+    match (interruption, controller, others) {
+        (Some(died @ Ending::Died { .. }), ..) | (_, died @ Ending::Died { .. }, _) => died,
+        (_, _, Some(others)) => others,
+        (Some(interruption), _, None) => interruption,
+        (None, controller, None) => controller,
+    }
+}
+
+/// The ending that plant or recorder cause, if any. None as a status means that the process was killed.
+fn ending_by_plant_or_recorder(plant: Option<ExitStatus>, recorder: Option<ExitStatus>) -> Option<Ending> {
+    if !plant.is_some_and(|status| status.success()) {
+        return Some(died(PLANT, plant));
+    }
+    match recorder.and_then(|status| status.code()) {
+        Some(code) if code == Exit::Passed as i32 => None,
+        Some(code) if code == Exit::Incomplete as i32 => Some(Ending::RecordingFailed),
+        _ => Some(died(RECORDER, recorder)),
+    }
+}
+
+fn died(role: &str, status: Option<ExitStatus>) -> Ending {
+    let how = status.map_or_else(|| format!("{NOT_ENDED}, and {KILLED}"), describe);
+    Ending::died(role, how)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_death_outranks_an_incomplete_recording_then_an_interruption_then_a_safe_stop() {
+        let died = |role| Ending::died(role, "SIGKILL (9)".to_owned());
+        let (recorder, plant, controller) = (died(RECORDER), died(PLANT), died("controller"));
+        let (completed, interrupted, safe_stop) = (Ending::Completed, Ending::Interrupted, Ending::SafeStop);
+        let gap = Ending::RecordingFailed;
+        for (interruption, by_controller, others, expected) in [
+            (None, &completed, None, &completed),
+            (None, &safe_stop, None, &safe_stop),
+            (None, &safe_stop, Some(&gap), &gap),
+            (None, &controller, Some(&gap), &controller),
+            (Some(&interrupted), &completed, None, &interrupted),
+            (Some(&interrupted), &safe_stop, None, &interrupted),
+            (Some(&interrupted), &completed, Some(&gap), &gap),
+            (Some(&interrupted), &completed, Some(&plant), &plant),
+            (Some(&interrupted), &controller, Some(&plant), &controller),
+            (Some(&recorder), &controller, Some(&plant), &recorder),
+        ] {
+            let found = ending_of_run(interruption.cloned(), by_controller.clone(), others.cloned());
+            assert_eq!(&found, expected, "{interruption:?}, {by_controller:?}, {others:?}");
+        }
+    }
 }

@@ -1,14 +1,13 @@
-//! What the processes of a run used, from samples of the kernel's counters: CPU time, context switches, page faults, and
-//! the time that a hypervisor stole.
+//! What the processes of a run used, from samples of the kernel's counters: CPU time, context switches, page faults,
+//! and the time that a hypervisor stole.
 //!
 //! Counted from the first sample on, when the processes are in their steady state.
-
-use masseter_recording::{RunUsage, Usage};
-use masseter_runtime::clock::{self, SECOND_NS};
 
 use masseter_machine::SystemRoot;
 use masseter_machine::counters::ProcessCounters;
 use masseter_machine::sampler::{Sample, Sampler};
+use masseter_recording::{RunUsage, Usage};
+use masseter_runtime::clock::{self, SECOND_NS};
 
 const INTERVAL_NS: u64 = SECOND_NS / 2;
 
@@ -105,7 +104,7 @@ impl UsageMeter {
         }
     }
 
-    pub(super) fn finish(self) -> RunUsage {
+    pub(super) fn into_usage(self) -> RunUsage {
         let named = |process: &ProcessUsage| Some((process.name.to_owned(), process.usage()?));
         let stolen_ns = self.stolen_ns.map_or(0, |[first_ns, last_ns]| last_ns.saturating_sub(first_ns));
         RunUsage {
@@ -141,7 +140,7 @@ mod tests {
             let processes = counters.to_vec();
             meter.add(&Sample { time_ns: *time_ns, stolen_ns: Some(time_ns / 10), processes });
         }
-        meter.finish()
+        meter.into_usage()
     }
 
     #[test]

@@ -1,7 +1,7 @@
-//! The law against food in a world that is only as high as the bite: drives that are two cycles late, and an observer that is
-//! a low-pass.
+//! The law against food in a world that is only as high as the bite: drives that are two cycles late, and an observer
+//! that is a low-pass.
 
-use masseter_scenario::{BiteProfile, LoadCellConfig};
+use masseter_scenario::LoadCellConfig;
 
 use super::*;
 use crate::pose_law::ExternalForce;
@@ -129,7 +129,8 @@ fn a_half_sine_comes_near_its_peak_and_back() {
     assert!((22.0..33.0).contains(&peak_n), "{peak_n}");
 }
 
-/// The stated limit is that of a pure delay. The world has lags instead, so that its own limit is less than half as high.
+/// The stated limit is that of a pure delay. The world has lags instead, so that its own limit is less than half as
+/// high.
 #[test]
 fn inside_the_limit_of_stability_a_bite_is_quiet_and_far_outside_of_it_the_bite_shakes() {
     for stiffness_n_per_m in [3500.0, 35_000.0, 1.5e5] {
@@ -243,5 +244,23 @@ fn the_detour_at_a_sample_is_what_was_asked_for_lead_cycles_before() {
     for (lead_cycles, expected_m) in [(1.0, 3.0), (2.0, 2.0), (2.5, 1.5), (3.0, 1.0)] {
         law.lead_cycles = lead_cycles;
         assert!((law.detour().at_sample_m.z - expected_m).abs() < 1e-12, "{lead_cycles}");
+    }
+}
+
+#[test]
+fn a_bite_begins_with_the_force_of_contact_and_comes_to_its_peak() {
+    let half_sine = ForceControlConfig { contact_n: 10.0, peak_n: 50.0, bite_s: 0.2, ..Default::default() };
+    let hold = ForceControlConfig { profile: BiteProfile::Hold, ..half_sine };
+    let table = [
+        (half_sine, [Some(10.0), Some(38.284), Some(50.0), Some(38.284), None]),
+        (hold, [Some(10.0), Some(50.0), Some(50.0), Some(50.0), None]),
+    ];
+    for (config, expected_n) in table {
+        for (time_s, expected_n) in [0.0, 0.05, 0.1, 0.15, 0.2].into_iter().zip(expected_n) {
+            let found_n = desired_n(&config, time_s);
+            let is_near =
+                found_n.zip(expected_n).is_none_or(|(found, expected)| (found - expected).abs() < 0.01);
+            assert!(found_n.is_some() == expected_n.is_some() && is_near, "{time_s} s: {found_n:?}");
+        }
     }
 }

@@ -5,8 +5,6 @@
 //! one change proves exactly one, and halving the interval decides the rest, but for places where the
 //! polynomial is smaller than its own rounding error. Those are reported, never dropped.
 
-use super::four_bar::Interval;
-
 /// The elimination's degree in cos θ₁.
 pub(super) const DEGREE: usize = 8;
 /// Chebyshev points (1 − cos kπ/8)/2, between which interpolation grows errors least.
@@ -32,6 +30,28 @@ const ENDS: u32 = 1 | 1 << DEGREE;
 const DEEPEST: u32 = 13;
 /// Intervals looked at before giving up; the neutral input, with its two triple zeros, takes 60.
 const MOST_INTERVALS: u32 = 1000;
+
+/// A closed interval; empty when its ends are not in order.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Interval {
+    pub low: f64,
+    pub high: f64,
+}
+
+impl Interval {
+    pub(super) fn width(&self) -> f64 {
+        self.high - self.low
+    }
+
+    pub(super) fn intersect(self, other: Self) -> Self {
+        Self { low: self.low.max(other.low), high: self.high.min(other.high) }
+    }
+
+    /// The point at a fraction of the way from low to high.
+    pub(super) fn at(&self, fraction: f64) -> f64 {
+        self.low + self.width() * fraction
+    }
+}
 
 /// Where zeros are.
 #[derive(Debug, Clone, Copy, PartialEq)]

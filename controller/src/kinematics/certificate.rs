@@ -101,7 +101,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kinematics::leg_angle::LegAngle;
+    use crate::kinematics::legs::LegAngle;
     use crate::kinematics::tests::{mechanisms, poses, published_mechanism};
 
     fn certify(loops: &LoopEquations<'_>, theta_rad: [f64; LEGS]) -> Option<Certificate> {

@@ -1,5 +1,5 @@
-//! The three loop equations with the sides squared. In this form they are bilinear in the leg angles' cosines and sines:
-//! elimination, fast iteration and certificate use it.
+//! The three loop equations with the sides squared. In this form they are bilinear in the leg angles' cosines and
+//! sines: elimination, fast iteration and certificate use it.
 //!
 //! Side k joins leg i = k to leg j = k + 1. With c = Bᵢ − Bⱼ and v̂ the inward directions,
 //!
@@ -12,8 +12,7 @@
 
 use masseter_model::geometry::{Actuators, LEGS, Mechanism, Vec3};
 
-use super::leg_angle::LegAngle;
-use super::legs::{each, next};
+use super::legs::{LegAngle, each, next};
 
 /// Bound of the error of gₖ and its derivatives, in units of the machine epsilon times the `scale` of
 /// [`PlatformSide::new`].

@@ -10,38 +10,27 @@
 //! Everything is pure, allocates nothing and ends after a fixed number of iterations. Strokes and
 //! speeds are not checked, and the dimensions of the mechanism are taken as given.
 
-mod assembly;
 mod bernstein;
 mod certificate;
-mod complete;
 mod elimination;
+mod enclosure;
 mod equations;
-mod error;
-mod four_bar;
-mod leg_angle;
 mod legs;
 mod loop_equations;
-mod loop_solutions;
-mod nearest;
 mod solution;
 mod solutions;
 mod solver;
 mod tracker;
 pub mod uniqueness;
 
-pub use assembly::{Assembly, Condition};
 pub use certificate::Certificate;
-pub use complete::solve_completely;
 pub use equations::{Equations, Evaluation};
-pub use error::ForwardError;
-pub use loop_solutions::MOST_SOLUTIONS;
-pub use nearest::nearest_assembly_m;
-pub use solution::Solution;
-pub use solutions::Solutions;
+pub use solution::{Assembly, Condition, ForwardError, Solution};
+pub use solutions::{MOST_SOLUTIONS, Solutions, nearest_assembly_m};
 pub use solver::{
     Iteration, MAX_HALVINGS, MAX_ITERATIONS, Method, Options, Residual, StepRule, solve, solve_traced,
 };
-pub use tracker::ForwardTracker;
+pub use tracker::{ForwardTracker, solve_completely};
 
 #[cfg(test)]
 mod tests;

@@ -1,18 +1,192 @@
-//! All ways in which the mechanism can be assembled for one input.
+//! All ways in which the mechanism can be assembled for one input, and how far an input without any is from one with
+//! some.
+//!
+//! [`LoopSolutions`] holds each solution of the loop equations once, before pose and certificate are computed: the
+//! choice of the true solution needs no more. A full description of every solution, [`Solutions`], costs several times
+//! as much.
 
-use masseter_model::geometry::{Actuators, Mechanism};
+use masseter_model::geometry::{Actuators, LEGS, Mechanism};
+use nalgebra::{Matrix3, Vector3};
 
-use super::elimination::SolutionFilter;
+use super::certificate::Certificate;
+use super::elimination::{Elimination, NEARLY_SINGULAR, SolutionFilter};
+use super::equations::Equations;
+use super::legs::{LegAngle, coincide, each, separation_rad};
 use super::loop_equations::{LoopEquations, LoopSolution};
-use super::loop_solutions::{LoopSolutions, MOST_SOLUTIONS, check, nearest_other_rad};
-use super::{ForwardError, Solution};
+use super::solution::{Assembly, Condition, ForwardError, Solution};
+
+/// The most solutions of one input; they come in mirrored pairs.
+pub const MOST_SOLUTIONS: usize = 16;
+
+/// Estimates closer than this are one solution if one of them has a certificate, radians on every leg.
+const MERGED_WITHIN_RAD: f64 = 1e-6;
+/// The same if neither has: rounding alone moves an estimate this far next to a singularity.
+const MERGED_UNCERTIFIED_WITHIN_RAD: f64 = 1e-4;
+/// A second solution is looked for unless the certificate excludes one within this distance, radians.
+pub(super) const CLOSE_RAD: f64 = 3e-4;
+/// How far from a nearly singular solution its neighbour is looked for, radians along the null direction.
+const NEIGHBOUR_DISTANCES_RAD: [f64; 12] =
+    [1e-7, 3e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2];
+/// Iterations to the neighbour; where two solutions meet, each iteration only halves the error.
+const NEIGHBOUR_ITERATIONS: u32 = 40;
+/// A leg shorter than this has no direction, metres.
+const SHORTEST_LEG_M: f64 = 1e-9;
+
+/// Solutions of the loop equations, none twice, mirrored ones next to each other.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LoopSolutions {
+    pub all: [Option<LoopSolution>; MOST_SOLUTIONS],
+    pub count: usize,
+    overflowed: bool,
+}
+
+/// Inputs on which the equations are defined.
+pub(super) fn check_input(actuators: &Actuators) -> Result<(), ForwardError> {
+    if !actuators.is_finite() {
+        return Err(ForwardError::NotFinite);
+    }
+    match (0..LEGS).find(|&leg| actuators.leg_m[leg] < SHORTEST_LEG_M) {
+        Some(leg) => Err(ForwardError::NoLength { leg, leg_m: actuators.leg_m[leg] }),
+        None => Ok(()),
+    }
+}
+
+impl LoopSolutions {
+    /// All that pass the filter, or [`ForwardError::Undecided`].
+    pub(super) fn find(loops: &LoopEquations<'_>, filter: SolutionFilter) -> Result<Self, ForwardError> {
+        let mut solutions = Self { all: [None; MOST_SOLUTIONS], count: 0, overflowed: false };
+        let isolated = Elimination::new(loops).solve(filter, |closed| solutions.add_pair(loops, &closed));
+        solutions.add_neighbours(loops);
+        solutions.double_singular_ones(loops);
+        if isolated.is_err() || solutions.overflowed {
+            return Err(ForwardError::Undecided { solutions: solutions.count });
+        }
+        Ok(solutions)
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = &LoopSolution> {
+        self.all.iter().flatten()
+    }
+
+    /// The solutions in which the mechanism can stand.
+    pub(super) fn true_ones(&self, loops: &LoopEquations<'_>) -> impl Iterator<Item = &LoopSolution> {
+        let is_above = |closed: &&LoopSolution| closed.leg_angles.iter().all(|leg_angle| leg_angle.sin > 0.0);
+        self.iter().filter(is_above).filter(|closed| assembly(loops, closed).is_true())
+    }
+
+    /// A solution that rounding does not separate from another, if the mechanism can stand in one of the two.
+    pub(super) fn singular_one(&self, loops: &LoopEquations<'_>) -> Option<&LoopSolution> {
+        let is_singular = |closed: &&LoopSolution| {
+            loops.determinant(&closed.residuals).abs() <= NEARLY_SINGULAR && !is_certified(loops, closed)
+        };
+        let may_be_true = |closed: &&LoopSolution| {
+            assembly(loops, closed)
+                .violated()
+                .is_none_or(|violated| violated == Condition::PositiveDeterminant)
+        };
+        self.iter().filter(is_singular).find(may_be_true)
+    }
+
+    /// Adds the second solution of every close pair. Solutions meet in pairs, one on either side of the singularity,
+    /// along the null direction of the Jacobian. Newton's iteration reaches the second from beyond it.
+    fn add_neighbours(&mut self, loops: &LoopEquations<'_>) {
+        let mut index = 0;
+        while let Some(closed) = self.all.get(index).copied().flatten() {
+            index += 1;
+            if closed.leg_angles[0].sin < 0.0 || is_alone(loops, &closed) {
+                continue;
+            }
+            let direction = closed.residuals.null_direction();
+            for distance_rad in NEIGHBOUR_DISTANCES_RAD.into_iter().flat_map(|distance| [distance, -distance])
+            {
+                let start = each(|leg| closed.leg_angles[leg].stepped(distance_rad * direction[leg]));
+                if let Some(neighbour) = loops.close(&start, NEIGHBOUR_ITERATIONS) {
+                    self.add_pair(loops, &neighbour);
+                }
+            }
+        }
+    }
+
+    /// Adds the second of two solutions that rounding has made one: a solution at a singularity is at least double.
+    fn double_singular_ones(&mut self, loops: &LoopEquations<'_>) {
+        for index in 0..self.count {
+            let Some(closed) = self.all[index] else { continue };
+            let is_double = loops.determinant(&closed.residuals).abs() <= NEARLY_SINGULAR
+                && !is_certified(loops, &closed)
+                && !(0..self.count).any(|other| {
+                    other != index
+                        && self.all[other]
+                            .is_some_and(|other| coincide(&other.leg_angles, &closed.leg_angles, CLOSE_RAD))
+                });
+            if is_double {
+                self.push(&closed);
+            }
+        }
+    }
+
+    fn add_pair(&mut self, loops: &LoopEquations<'_>, closed: &LoopSolution) {
+        self.add(loops, closed);
+        self.add(loops, &closed.mirrored());
+    }
+
+    /// Adds a solution unless it is known. Two different solutions that lie close together have determinants of
+    /// opposite sign.
+    fn add(&mut self, loops: &LoopEquations<'_>, closed: &LoopSolution) {
+        let is_positive = |closed: &LoopSolution| closed.residuals.determinant() > 0.0;
+        let is_same = |known: &LoopSolution| {
+            coincide(&known.leg_angles, &closed.leg_angles, MERGED_UNCERTIFIED_WITHIN_RAD)
+                && is_positive(known) == is_positive(closed)
+                && (coincide(&known.leg_angles, &closed.leg_angles, MERGED_WITHIN_RAD)
+                    || !(is_certified(loops, known) || is_certified(loops, closed)))
+        };
+        if !self.iter().any(is_same) {
+            self.push(closed);
+        }
+    }
+
+    fn push(&mut self, closed: &LoopSolution) {
+        match self.all.get_mut(self.count) {
+            Some(place) => {
+                *place = Some(*closed);
+                self.count += 1;
+            }
+            None => self.overflowed = true,
+        }
+    }
+}
+
+/// Whether no other solution is closer than [`CLOSE_RAD`].
+fn is_alone(loops: &LoopEquations<'_>, closed: &LoopSolution) -> bool {
+    let is_alone = |proof: Certificate| proof.unique_within_rad > CLOSE_RAD;
+    loops.determinant(&closed.residuals).abs() > NEARLY_SINGULAR
+        || Certificate::new(loops, &closed.residuals).is_some_and(is_alone)
+}
+
+fn is_certified(loops: &LoopEquations<'_>, closed: &LoopSolution) -> bool {
+    Certificate::new(loops, &closed.residuals).is_some()
+}
+
+/// Which conditions of the true solution a platform meets.
+pub(super) fn assembly(loops: &LoopEquations<'_>, closed: &LoopSolution) -> Assembly {
+    let corners = loops.corners(&closed.leg_angles);
+    let determinant = loops.determinant(&closed.residuals);
+    Assembly::from_corners(loops.mechanism, &loops.hinges, &corners, determinant)
+}
+
+/// How far the nearest of the others is, by the largest difference of any leg's angle, radians.
+pub(super) fn nearest_other_rad<'a>(
+    leg_angles: &[LegAngle; LEGS],
+    all: impl Iterator<Item = &'a [LegAngle; LEGS]>,
+) -> Option<f64> {
+    let others = all.filter(|other| *other != leg_angles);
+    others.map(|other| separation_rad(leg_angles, other)).min_by(f64::total_cmp)
+}
 
 /// Every real solution of the equations (the paper, eq. 1) for one input, mirrored ones next to each other.
 #[doc(alias("direct kinematics", "assembly modes"))]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solutions {
     solutions: [Option<Solution>; MOST_SOLUTIONS],
-    count: usize,
 }
 
 impl Solutions {
@@ -24,16 +198,15 @@ impl Solutions {
     /// [`ForwardError::NotFinite`], [`ForwardError::NoLength`], and [`ForwardError::Undecided`] where
     /// solutions form a continuum but for rounding.
     pub fn new(mechanism: &Mechanism, actuators: &Actuators) -> Result<Self, ForwardError> {
-        check(actuators)?;
+        check_input(actuators)?;
         let loops = LoopEquations::new(mechanism, actuators);
         let found = LoopSolutions::find(&loops, SolutionFilter::All)?;
-        let solution = |closed: LoopSolution| Solution::new(&loops, &closed);
-        Ok(Self { solutions: found.all.map(|one| one.map(solution)), count: found.count })
+        Ok(Self { solutions: found.all.map(|one| one.map(|closed| Solution::new(&loops, &closed))) })
     }
 
     /// How many there are.
     pub fn count(&self) -> usize {
-        self.count
+        self.iter().count()
     }
 
     /// All of them.
@@ -54,16 +227,56 @@ impl Solutions {
     }
 }
 
+/// Values of cos θ₁, each with four sets of angles to start from.
+const GRID: u32 = 32;
+/// Steps of one descent at most; it ends before when the error hardly decreases or the step hardly turns a leg.
+const STEPS: u32 = 40;
+/// A step that leaves more than this share of the error is the last.
+const HARDLY_LESS: f64 = 1.0 - 1e-5;
+/// So is one that turns no leg by more, radians.
+const HARDLY_TURNED_RAD: f64 = 1e-7;
+
+/// The least √(f₁² + f₂² + f₃²) found, metres. It takes many times as long as finding that there is no solution.
+pub fn nearest_assembly_m(mechanism: &Mechanism, actuators: &Actuators) -> f64 {
+    let loops = LoopEquations::new(mechanism, actuators);
+    let equations = Equations::new(mechanism, actuators);
+    let elimination = Elimination::new(&loops);
+    let starts =
+        (0..=GRID).flat_map(|index| elimination.leg_angles(2.0 * f64::from(index) / f64::from(GRID) - 1.0));
+    let ends_m2 = starts.map(|leg_angles| descended_m2(&equations, leg_angles.map(LegAngle::to_rad).into()));
+    ends_m2.fold(f64::INFINITY, f64::min).sqrt()
+}
+
+/// Levenberg's and Marquardt's descent: the error at its end, m².
+fn descended_m2(equations: &Equations<'_>, start: Vector3<f64>) -> f64 {
+    let mut at = equations.evaluate(start);
+    let mut damping = 1e-3;
+    for _ in 0..STEPS {
+        let jacobian = equations.jacobian(&at);
+        let normal = jacobian.tr_mul(&jacobian);
+        let damped = normal + Matrix3::identity() * (damping * normal.trace());
+        let Some(factors) = damped.cholesky() else { break };
+        let step = factors.solve(&jacobian.tr_mul(&at.residual_m));
+        let next = equations.evaluate(at.theta_rad - step);
+        let remains = next.error_m2() / at.error_m2();
+        if remains < 1.0 {
+            (at, damping) = (next, damping * 0.2);
+        } else {
+            damping *= 5.0;
+        }
+        if step.amax() < HARDLY_TURNED_RAD || (HARDLY_LESS..1.0).contains(&remains) {
+            break;
+        }
+    }
+    at.error_m2()
+}
+
 #[cfg(test)]
 mod tests {
-    use masseter_model::geometry::LEGS;
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kinematics::elimination::Elimination;
-    use crate::kinematics::leg_angle::{LegAngle, coincide, separation_rad};
-    use crate::kinematics::loop_solutions::CLOSE_RAD;
-    use crate::kinematics::tests::{NearlySingular, mechanisms, nearly_singular, published_mechanism};
+    use crate::kinematics::tests::{NearlySingular, mechanisms, nearly_singular, poses, published_mechanism};
     use crate::kinematics::{Method, Options, solve};
 
     fn boxes() -> impl Strategy<Value = Actuators> {
@@ -166,5 +379,71 @@ mod tests {
             }
             prop_assert_eq!(Solutions::new(&mechanism, &actuators).unwrap().count(), 2 * changes);
         }
+    }
+
+    /// Least error over a grid of all three angles above the base, m.
+    fn on_a_grid_m(equations: &Equations<'_>) -> f64 {
+        let angle = |index: u32| f64::from(index) * std::f64::consts::PI / 60.0;
+        let mut least_m2 = f64::INFINITY;
+        for (i, j, k) in (0..216_000).map(|n| (n % 60, n / 60 % 60, n / 3600)) {
+            let theta_rad = Vector3::new(angle(i), angle(j), angle(k));
+            least_m2 = least_m2.min(equations.evaluate(theta_rad).error_m2());
+        }
+        least_m2.sqrt()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(50))]
+
+        #[test]
+        fn nothing_on_a_grid_comes_closer_by_a_hundredth(
+            slide_m in prop::array::uniform3(-0.03..0.03f64), leg_m in prop::array::uniform3(0.2..0.34f64),
+        ) {
+            let (mechanism, actuators) = (published_mechanism(), Actuators { slide_m, leg_m });
+            let nearest = nearest_assembly_m(&mechanism, &actuators);
+            let on_a_grid = on_a_grid_m(&Equations::new(&mechanism, &actuators));
+            prop_assert!(nearest <= 1.01 * on_a_grid + 1e-12, "{nearest} m, on a grid {on_a_grid} m");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn what_can_be_assembled_is_no_distance_from_it(mechanism in mechanisms(), pose in poses(30.0)) {
+            let actuators = mechanism.inverse(&pose).unwrap().actuators;
+            let found_m = nearest_assembly_m(&mechanism, &actuators);
+            prop_assert!(found_m < 1e-7, "{found_m} m");
+        }
+    }
+
+    /// The start with the least error does not lead to them.
+    #[test]
+    fn solutions_far_from_the_best_start_are_found() {
+        let inputs = [
+            (
+                [0.013_745_080_593, -0.020_808_585_577, -0.015_397_878_121],
+                [0.288_811_952_893, 0.290_133_041_177, 0.309_002_566_259],
+            ),
+            (
+                [0.005_799_786_336, 0.010_761_635_074, 0.005_383_840_607],
+                [0.303_309_286_864, 0.318_823_920_414, 0.296_586_935_017],
+            ),
+            (
+                [-0.016_721_740_924, 0.016_531_109_308, 0.017_909_281_663],
+                [0.256_198_086_386, 0.268_059_167_258, 0.237_177_919_520],
+            ),
+        ];
+        for (slide_m, leg_m) in inputs {
+            let found_m = nearest_assembly_m(&published_mechanism(), &Actuators { slide_m, leg_m });
+            assert!(found_m < 1e-7, "{found_m} m");
+        }
+    }
+
+    /// Two legs so short that they cannot reach each other: their side alone has to give.
+    #[test]
+    fn legs_that_cannot_meet_are_as_far_off_as_they_are_apart() {
+        let actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [0.01, 0.01, 0.06] };
+        let mechanism = published_mechanism();
+        let found_m = nearest_assembly_m(&mechanism, &actuators);
+        assert!(found_m > 0.03 && found_m < 0.05, "{found_m}");
     }
 }

@@ -1,8 +1,7 @@
 //! Scenarios of the controller alone: a plant that does what it is told, and one thing that goes wrong.
 
-use masseter_model::geometry::{LEGS, MechanismConfig};
+use masseter_model::geometry::{AXES, Actuators, Conditioning, Jacobian, LEGS, MechanismConfig};
 use masseter_runtime::messages::codes::{Cause, DriveRequest, DriveState, EventKind, NO_DRIVE_STATE};
-use masseter_runtime::messages::{Command, State};
 use masseter_scenario::{ControllerConfig, JawConfig};
 
 use super::*;
@@ -80,7 +79,7 @@ impl Bench {
     fn cycle(&mut self, disturb: impl FnOnce(Reading) -> Option<Reading>) {
         let reading = disturb(self.reading());
         let command = self.controller_cycle(reading.as_ref());
-        self.take(command);
+        self.drives_take(command);
     }
 
     fn controller_cycle(&mut self, reading: Option<&Reading>) -> Command {
@@ -93,7 +92,7 @@ impl Bench {
         command
     }
 
-    fn take(&mut self, mut command: Command) {
+    fn drives_take(&mut self, mut command: Command) {
         let last = self.commands[1];
         if command.request == DriveRequest::Off.code() {
             command.target_m = last.target_m;
@@ -204,7 +203,7 @@ fn a_condition_number_is_computed_every_ten_cycles_and_held_in_between() {
         if state.condition.to_bits() != before.to_bits() {
             changes.push(bench.controller.sequencer.cycle);
             let estimate = bench.controller.sequencer.estimate.unwrap();
-            let mechanism = &bench.controller.mechanism;
+            let mechanism = &bench.controller.targets.mechanism;
             let legs = mechanism.legs(&estimate.solution.pose).unwrap();
             let here = Conditioning::new(&Jacobian::of_legs(mechanism, &legs)).number();
             assert!((state.condition - here).abs() < 1e-9, "{} {here}", state.condition);

@@ -1,7 +1,8 @@
 //! The desired pose moves forward on its path, and comes to rest where it is told to.
 
-use masseter_model::geometry::{AXES, Mechanism, MechanismConfig, Vec3};
-use masseter_scenario::{JawConfig, MotionConfig, TrajectoryLimitsConfig};
+use masseter_model::geometry::{MechanismConfig, Vec3};
+use masseter_scenario::JawConfig;
+use proptest::prelude::*;
 
 use super::*;
 
@@ -247,4 +248,88 @@ fn a_stop_during_changes_comes_to_rest_within_its_ramp_too() {
     playback.set_motion_amplitude(1.0);
     advance(&mut playback, 1.0);
     assert!(are_near(&playback.pose_ahead(0.1), &rests_at), "nothing moves it any more");
+}
+
+#[test]
+fn the_whole_change_takes_its_time_and_ends_exactly() {
+    let mut slew = Slew::of(2.0);
+    slew.set(0.0);
+    let steps = (1..10_000).find(|_| {
+        slew.advance(PERIOD_S);
+        slew.is_settled()
+    });
+    assert!((1.99..2.01).contains(&(f64::from(steps.unwrap()) * PERIOD_S)), "{steps:?}");
+    assert_eq!(slew.value.to_bits(), 0.0_f64.to_bits());
+}
+
+#[test]
+fn a_motion_that_uses_its_limits_changes_slowly() {
+    let limits = TrajectoryLimitsConfig::default();
+    let demands = |velocity_m_s: f64, acceleration_m_s2: f64| TrajectoryReport {
+        samples: 2,
+        lowest_m: [0.0; AXES],
+        highest_m: [0.02; AXES],
+        velocity_m_s: [velocity_m_s; AXES],
+        acceleration_m_s2: [acceleration_m_s2; AXES],
+    };
+    let change_s = |velocity_m_s, acceleration_m_s2| {
+        Slew::change_s(Some(&demands(velocity_m_s, acceleration_m_s2)), &limits)
+    };
+    assert!((change_s(0.05, 1.0) - SHORTEST_S).abs() < 1e-12);
+    assert!((change_s(0.14, 1.0) - 1.5 * 1.25 * 0.02 / 0.01).abs() < 1e-9);
+    assert!((1.2..1.6).contains(&change_s(0.1, 7.6)), "{}", change_s(0.1, 7.6));
+    for slowest_s in [change_s(0.15, 1.0), change_s(0.05, 8.0), Slew::change_s(None, &limits)] {
+        assert!((slowest_s - LONGEST_S).abs() < 1e-12);
+    }
+}
+
+proptest! {
+    /// Whatever the targets are, and whenever they change.
+    #[test]
+    fn it_stays_within_its_limits(targets in prop::collection::vec((0.0..=1.0f64, 1..800usize), 1..9)) {
+        let mut slew = Slew::of(1.0);
+        let mut last = (slew.value, 0.0);
+        for (target, steps) in targets {
+            slew.set(target);
+            for _ in 0..steps {
+                slew.advance(PERIOD_S);
+                let per_s = (slew.value - last.0) / PERIOD_S;
+                prop_assert!((-1e-9..=1.0 + 1e-9).contains(&slew.value));
+                prop_assert!(per_s.abs() <= SPEED + 1e-6);
+                prop_assert!((per_s - last.1).abs() / PERIOD_S <= 2.0 * ACCELERATION + 1e-6);
+                last = (slew.value, per_s);
+            }
+        }
+    }
+}
+
+/// Cycles, each with the command answered in it, if any, and whether the motion makes a step.
+fn plays(cycles: &[(u64, Option<u64>, bool)]) {
+    let (mut acknowledgement, mut answered_cycle) = (CommandAcknowledgement::default(), 0);
+    for &(cycle, answered, steps) in cycles {
+        answered_cycle = answered.unwrap_or(answered_cycle);
+        assert_eq!(acknowledgement.takes_step(cycle, answered_cycle), steps, "cycle {cycle}");
+    }
+}
+
+#[test]
+fn a_motion_answered_in_time_or_a_cycle_late_goes_on() {
+    plays(&[(1, Some(0), true), (2, Some(1), true), (3, None, true), (4, Some(2), true), (5, Some(3), true)]);
+}
+
+#[test]
+fn a_step_without_answer_is_waited_for_and_made_again_when_the_drives_are_back() {
+    plays(&[
+        (8, Some(7), true),
+        (9, None, true),
+        (10, None, false),
+        (11, None, false),
+        (12, Some(8), false),
+        (13, Some(12), true),
+    ]);
+}
+
+#[test]
+fn skipped_cycles_are_one_step() {
+    plays(&[(8, Some(7), true), (23, Some(8), true), (24, Some(23), true)]);
 }

@@ -10,9 +10,9 @@ use masseter_model::geometry::{
 };
 use masseter_scenario::TrajectoryLimitsConfig;
 
+use super::TrajectoryError;
+use super::motion::Trajectory;
 use crate::kinematics::Assembly;
-
-use super::{Trajectory, TrajectoryError};
 
 /// The demands of a trajectory on the axes, in the order d₁ d₂ d₃ l₁ l₂ l₃.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,7 +63,14 @@ pub fn check(
     period_s: f64,
 ) -> Result<TrajectoryReport, TrajectoryError> {
     let samples = (trajectory.duration_s() / period_s).ceil() as usize + 1;
-    let mut survey = Survey::new(mechanism, limits, period_s);
+    let report = TrajectoryReport {
+        samples: 0,
+        lowest_m: [f64::INFINITY; AXES],
+        highest_m: [f64::NEG_INFINITY; AXES],
+        velocity_m_s: [0.0; AXES],
+        acceleration_m_s2: [0.0; AXES],
+    };
+    let mut survey = Survey { mechanism, limits, period_s, last: Last::default(), report };
     for sample in 0..samples {
         let time_s = sample as f64 * period_s;
         survey.visit(&trajectory.pose(time_s)).map_err(|problem| {
@@ -74,54 +81,37 @@ pub fn check(
     Ok(survey.report)
 }
 
+/// What the last samples leave to the next.
+#[derive(Default)]
+struct Last {
+    axes_m: Option<[f64; AXES]>,
+    velocity_m_s: Option<[f64; AXES]>,
+    /// Of the last pose that needed one of its own.
+    conditioning: Option<Conditioning>,
+}
+
 /// The check under way: the last two samples, and the report so far.
 struct Survey<'a> {
     mechanism: &'a Mechanism,
     limits: &'a TrajectoryLimitsConfig,
     period_s: f64,
-    last_m: Option<[f64; AXES]>,
-    last_velocity_m_s: Option<[f64; AXES]>,
-    /// Of the last pose that needed one of its own.
-    conditioning: Option<Conditioning>,
+    last: Last,
     report: TrajectoryReport,
 }
 
-impl<'a> Survey<'a> {
-    fn new(mechanism: &'a Mechanism, limits: &'a TrajectoryLimitsConfig, period_s: f64) -> Self {
-        let report = TrajectoryReport {
-            samples: 0,
-            lowest_m: [f64::INFINITY; AXES],
-            highest_m: [f64::NEG_INFINITY; AXES],
-            velocity_m_s: [0.0; AXES],
-            acceleration_m_s2: [0.0; AXES],
-        };
-        Self {
-            mechanism,
-            limits,
-            period_s,
-            last_m: None,
-            last_velocity_m_s: None,
-            conditioning: None,
-            report,
-        }
-    }
-
+impl Survey<'_> {
     fn visit(&mut self, pose: &Pose) -> Result<(), String> {
         let axes_m = self.visit_pose(pose)?;
         self.report.samples += 1;
-        let Some(last_m) = self.last_m.replace(axes_m) else { return Ok(()) };
+        let Some(last_m) = self.last.axes_m.replace(axes_m) else { return Ok(()) };
         let velocity_m_s = self.rates(&last_m, &axes_m);
         let limit = |axis| self.limits.velocity_m_s(axis);
         keep_largest(&velocity_m_s, &mut self.report.velocity_m_s, limit, ["move", "m/s", "velocity_m_s"])?;
-        let Some(last_m_s) = self.last_velocity_m_s.replace(velocity_m_s) else { return Ok(()) };
+        let Some(last_m_s) = self.last.velocity_m_s.replace(velocity_m_s) else { return Ok(()) };
         let acceleration_m_s2 = self.rates(&last_m_s, &velocity_m_s);
         let limit = |axis| self.limits.acceleration_m_s2(axis);
-        keep_largest(
-            &acceleration_m_s2,
-            &mut self.report.acceleration_m_s2,
-            limit,
-            ["accelerate", "m/s²", "acceleration_m_s2"],
-        )
+        let words = ["accelerate", "m/s²", "acceleration_m_s2"];
+        keep_largest(&acceleration_m_s2, &mut self.report.acceleration_m_s2, limit, words)
     }
 
     fn visit_pose(&mut self, pose: &Pose) -> Result<[f64; AXES], String> {
@@ -146,10 +136,10 @@ impl<'a> Survey<'a> {
 
     fn check_condition(&mut self, jacobian: &Jacobian) -> Result<(), String> {
         let limit = self.limits.max_condition;
-        if self.conditioning.is_some_and(|nearby| nearby.most(jacobian) <= limit) {
+        if self.last.conditioning.is_some_and(|nearby| nearby.most(jacobian) <= limit) {
             return Ok(());
         }
-        let condition = self.conditioning.insert(Conditioning::new(jacobian)).number();
+        let condition = self.last.conditioning.insert(Conditioning::new(jacobian)).number();
         if condition <= limit {
             return Ok(());
         }

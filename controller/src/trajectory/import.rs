@@ -6,19 +6,26 @@
 use masseter_model::geometry::{Pose, Vec3};
 use masseter_scenario::input::read_text;
 use masseter_scenario::{FileConfig, JawConfig};
+use nalgebra::{Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion};
 
-use super::TrajectoryError;
-use super::axes::Axes;
-use super::error::{Located, require};
 use super::mandible::condylar_middle;
 use super::recording::{Recording, Sample};
-use super::table::{Format, LARGEST_MM, Row, Table};
-use super::{markers, pose_csv};
+use super::table::{Format, LARGEST_MM, Located, Row, Table};
+use super::{TrajectoryError, require};
+
+/// The names of a file's axes, each with its direction.
+pub(super) const SIGNED_AXES: [&str; 6] = ["+x", "-x", "+y", "-y", "+z", "-z"];
+/// Within this of 1 a quaternion counts as rounded, beyond it as wrong.
+const NORM_TOLERANCE: f64 = 1e-3;
+/// A triangle lower than this share of its longest side fixes no orientation.
+const FLATTEST: f64 = 0.05;
+/// Markers on one rigid carrier change their distances by noise only; a jaw tracker's is 0.03 mm.
+const LARGEST_CHANGE_M: f64 = 0.002;
+const SIDES: [(usize, usize); 3] = [(0, 1), (1, 2), (2, 0)];
 
 /// Reads, converts to the jaw frame and smooths.
 pub(super) fn import(config: &FileConfig, jaw: &JawConfig) -> Result<Recording, TrajectoryError> {
-    let source = Source::read(config, jaw)?;
-    source.recording().map(|(_, recording)| recording)
+    Source::read(config, jaw)?.recording().map(|(_, recording)| recording)
 }
 
 /// A file that was read, with what its numbers mean.
@@ -40,12 +47,8 @@ impl<'a> Source<'a> {
         require("motion.lowpass_hz", lowpass_hz, holds, "0 (none) or 0.5 to 50 Hz")?;
         for &coordinate in config.reference_point_mm.iter().chain(&config.marker_origin_mm).flatten() {
             let is_near = coordinate.abs() <= LARGEST_MM;
-            require(
-                "motion.reference_point_mm or motion.marker_origin_mm",
-                coordinate,
-                is_near,
-                "within ±100000 mm",
-            )?;
+            let name = "motion.reference_point_mm or motion.marker_origin_mm";
+            require(name, coordinate, is_near, "within ±100000 mm")?;
         }
         let reference = match config.reference_point_mm {
             Some(point_mm) => Vec3::from(point_mm) / 1000.0,
@@ -56,17 +59,12 @@ impl<'a> Source<'a> {
         read.map(|(axes, table)| Self { config, axes, reference, origin, table })
     }
 
-    /// Whether the markers' centroid stands for the incisal point, because that is not given.
-    pub(super) fn is_of_centroid(&self) -> bool {
-        self.table.format == Format::Markers && self.origin.is_none()
-    }
-
     /// A row's displacement of incisal point and jaw, jaw frame, if the file has these axes.
     pub(super) fn displacement(&self, row: &Row, axes: &Axes) -> Result<Pose, Located> {
         let displacement = match self.table.format {
-            Format::Poses => pose_csv::displacement(&row.values, axes, &self.reference),
+            Format::Poses => displacement_of_pose(&row.values, axes, &self.reference),
             Format::Markers => {
-                markers::displacement(&self.table.rows[0].values, &row.values, axes, self.origin)
+                displacement_of_markers(&self.table.rows[0].values, &row.values, axes, self.origin)
             }
         };
         displacement.map_err(|problem| Located::at(row.line, problem))
@@ -74,24 +72,25 @@ impl<'a> Source<'a> {
 
     /// The rows in the jaw frame, and the smooth motion.
     pub(super) fn recording(&self) -> Result<(Vec<Sample>, Recording), TrajectoryError> {
+        let path = &self.config.path;
         let sample = |row: &Row| {
             let displacement = self.displacement(row, &self.axes)?;
             Ok(Sample { line: row.line, time_s: row.time_s, displacement })
         };
-        let made = self.table.rows.iter().map(sample).collect::<Result<Vec<_>, _>>().and_then(|samples| {
-            let path = self.config.path.clone();
-            let recording = Recording::new(path, &samples, self.is_of_centroid(), self.config.lowpass_hz)?;
-            Ok((samples, recording))
-        });
-        made.map_err(|problem: Located| problem.in_file(&self.config.path))
+        let samples = self.table.rows.iter().map(sample).collect::<Result<Vec<_>, _>>();
+        let samples = samples.map_err(|problem: Located| problem.in_file(path))?;
+        // Without an incisal point, the markers' centroid stands for it.
+        let are_of_centroid = self.table.format == Format::Markers && self.origin.is_none();
+        let recording = Recording::new(path.clone(), &samples, are_of_centroid, self.config.lowpass_hz);
+        Ok((samples, recording.map_err(|problem| problem.in_file(path))?))
     }
 }
 
 fn axes_and_table(config: &FileConfig) -> Result<(Axes, Table), Located> {
     let axes = Axes::parse(&config.axes).map_err(Located::whole)?;
-    let unreadable = |error| format!("cannot be read ({error}); check the path and that it is UTF-8 text");
-    let text =
-        read_text(&config.path, FileConfig::MOST_BYTES).map_err(|error| Located::whole(unreadable(error)))?;
+    let text = read_text(&config.path, FileConfig::MOST_BYTES).map_err(|error| {
+        Located::whole(format!("cannot be read ({error}); check the path and that it is UTF-8 text"))
+    })?;
     let table = Table::parse(&text)?;
     check_points(config, table.format).map_err(Located::whole)?;
     Ok((axes, table))
@@ -106,3 +105,138 @@ fn check_points(config: &FileConfig, format: Format) -> Result<(), String> {
     };
     Err(format!("motion.{key} is for files of {of}, and this one holds {holds}; leave it away"))
 }
+
+/// From a file's axes to the jaw frame's (anterior, left, up): a signed permutation that keeps the hand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Axes(UnitQuaternion<f64>);
+
+impl Axes {
+    /// From names such as "+y": which file axis points anterior, left and up.
+    pub(super) fn parse(names: &[String; 3]) -> Result<Self, String> {
+        let refuse = |reason: &str| {
+            format!(
+                "axes {names:?}: {reason}; name the file's axes that point anterior, left and up, \
+                 such as [\"+x\", \"+y\", \"+z\"]"
+            )
+        };
+        let mut rows = Matrix3::zeros();
+        for (row, name) in names.iter().enumerate() {
+            let axis = direction(name).ok_or_else(|| refuse("an axis is one of +x -x +y -y +z -z"))?;
+            rows.set_row(row, &axis.transpose());
+        }
+        let determinant = rows.determinant();
+        if determinant == 0.0 {
+            return Err(refuse("an axis is named twice"));
+        }
+        if determinant < 0.0 {
+            return Err(refuse("the frame is left-handed; turn one sign, or the file mirrors the jaw"));
+        }
+        Ok(Self(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rows))))
+    }
+
+    /// A vector of the file in the jaw frame.
+    fn vector(&self, in_file: &Vec3) -> Vec3 {
+        self.0 * in_file
+    }
+
+    /// A rotation of the file in the jaw frame.
+    fn rotation(&self, in_file: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+        self.0 * in_file * self.0.inverse()
+    }
+}
+
+fn direction(name: &str) -> Option<Vec3> {
+    let index = SIGNED_AXES.iter().position(|known| *known == name)?;
+    Some(Vec3::ith(index / 2, if index % 2 == 0 { 1.0 } else { -1.0 }))
+}
+
+/// Displacement of the incisal point and the jaw from that of a reference point fixed to the jaw, given in the jaw
+/// frame at the closed pose, metres.
+fn displacement_of_pose(values: &[f64], axes: &Axes, reference: &Vec3) -> Result<Pose, String> {
+    let moved = axes.vector(&(Vec3::from_column_slice(&values[..3]) / 1000.0));
+    let quaternion = Quaternion::new(values[3], values[4], values[5], values[6]);
+    let norm = quaternion.norm();
+    if (norm - 1.0).abs() > NORM_TOLERANCE {
+        return Err(format!(
+            "the quaternion's norm is {norm:.6}, not 1; write unit quaternions in the order qw,qx,qy,qz"
+        ));
+    }
+    let rotation = axes.rotation(&UnitQuaternion::from_quaternion(quaternion));
+    let incisal = reference + moved - rotation * reference;
+    Ok(Pose::from_parts(incisal.into(), rotation))
+}
+
+/// Places of the three markers, m.
+type Markers = [Vec3; 3];
+
+/// Displacement of the jaw since the first row by the rigid motion of three markers (Kabsch 1976); `origin` is the
+/// incisal point at the closed pose in file coordinates, metres, by default the markers' centroid.
+fn displacement_of_markers(
+    first: &[f64],
+    values: &[f64],
+    axes: &Axes,
+    origin: Option<Vec3>,
+) -> Result<Pose, String> {
+    let (closed, now) = (markers_m(first), markers_m(values));
+    check_spread(&closed)?;
+    check_rigid(&closed, &now)?;
+    let origin = origin.unwrap_or_else(|| centroid(&closed));
+    let motion = rigid_motion(&closed, &now);
+    let moved = motion.rotation * origin + motion.translation.vector - origin;
+    Ok(Pose::from_parts(axes.vector(&moved).into(), axes.rotation(&motion.rotation)))
+}
+
+/// The rigid motion that carries one set of points to the other with the least squared error, by
+/// singular value decomposition of their covariance.
+fn rigid_motion(from: &Markers, to: &Markers) -> Pose {
+    let (from_centre, to_centre) = (centroid(from), centroid(to));
+    let covariance: Matrix3<f64> =
+        from.iter().zip(to).map(|(a, b)| (b - to_centre) * (a - from_centre).transpose()).sum();
+    let svd = covariance.svd_unordered(true, true);
+    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return Pose::identity() };
+    // Three points lie in a plane: their least singular value is 0, and its axis may come mirrored.
+    let mut upright = Matrix3::identity();
+    let least = svd.singular_values.imin();
+    upright[(least, least)] = (u * v_t).determinant().signum();
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(u * upright * v_t));
+    Pose::from_parts(Translation3::from(to_centre - rotation * from_centre), rotation)
+}
+
+fn markers_m(values_mm: &[f64]) -> Markers {
+    std::array::from_fn(|marker| Vec3::from_column_slice(&values_mm[3 * marker..][..3]) / 1000.0)
+}
+
+fn centroid(markers: &Markers) -> Vec3 {
+    markers.iter().sum::<Vec3>() / 3.0
+}
+
+fn check_spread(markers: &Markers) -> Result<(), String> {
+    let [a, b, c] = markers;
+    let longest_m = SIDES.map(|(i, j)| (markers[i] - markers[j]).norm()).into_iter().fold(0.0, f64::max);
+    let height_m = (b - a).cross(&(c - a)).norm() / longest_m.max(f64::MIN_POSITIVE);
+    if height_m <= FLATTEST * longest_m {
+        let (height_mm, longest_mm) = (1000.0 * height_m, 1000.0 * longest_m);
+        return Err(format!(
+            "the markers lie on a line (triangle of height {height_mm:.3} mm over {longest_mm:.3} mm); \
+             three points off one line are needed"
+        ));
+    }
+    Ok(())
+}
+
+fn check_rigid(closed: &Markers, now: &Markers) -> Result<(), String> {
+    for (i, j) in SIDES {
+        let change_m = (now[i] - now[j]).norm() - (closed[i] - closed[j]).norm();
+        if change_m.abs() > LARGEST_CHANGE_M {
+            let (i, j, change_mm, limit_mm) = (i + 1, j + 1, 1000.0 * change_m, 1000.0 * LARGEST_CHANGE_M);
+            return Err(format!(
+                "markers {i} and {j} are {change_mm:+.2} mm farther apart than in the first row, limit {limit_mm} mm: \
+                 one is loose or swapped; cut or correct the recording"
+            ));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,4 +1,4 @@
-//! The mandible as a rigid body on two condylar paths.
+//! The mandible as a rigid body on two condylar paths, and its place on the platform.
 //!
 //! Condyles and incisal point form Bonwill's triangle, inclined to the occlusal plane by Balkwill's
 //! angle. A posture is how far both condyles have advanced along the sagittal path, how much further
@@ -9,15 +9,17 @@
 //! Simplified: the paths are straight, working and balancing side share their inclination, and
 //! neither discs, muscles nor tooth contacts guide anything.
 
-use masseter_model::geometry::{Pose, Vec3};
+use masseter_model::geometry::{Actuators, LEGS, Mechanism, Pose, Vec3};
 use masseter_scenario::{JawConfig, JawSide};
-use nalgebra::{Quaternion, UnitQuaternion};
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
-use super::TrajectoryError;
-use super::error::require;
+use super::{TrajectoryError, require, require_within};
+use crate::kinematics::solve_completely;
 
 /// An amplitude that is missed by no more is reached, mm.
 const REACHED_MM: f64 = 1e-6;
+/// Farthest offset on a robot that fits on a table, m.
+const FARTHEST_M: f64 = 1.0;
 
 /// A rigid mandible; jaw frame at the closed pose.
 #[derive(Debug, Clone, Copy)]
@@ -62,11 +64,18 @@ struct CondylarLine {
     direction: Vec3,
 }
 
+/// Incisal point, right and left condyle in the jaw frame at the closed pose, m.
+pub(super) fn jaw_points(jaw: &JawConfig) -> Result<[Vec3; 3], TrajectoryError> {
+    let middle = condylar_middle(jaw)?;
+    let aside = Vec3::new(0.0, jaw.bonwill_side_m / 2.0, 0.0);
+    Ok([Vec3::zeros(), middle - aside, middle + aside])
+}
+
 /// The middle between the condyles in the jaw frame at the closed pose.
 pub(super) fn condylar_middle(jaw: &JawConfig) -> Result<Vec3, TrajectoryError> {
     let side_m = jaw.bonwill_side_m;
     let balkwill_deg = jaw.balkwill_angle_deg;
-    require("jaw.bonwill_side_m", side_m, (0.01..=1.0).contains(&side_m), "0.01 m to 1 m")?;
+    require_within("jaw.bonwill_side_m", side_m, 0.01..=1.0, "0.01 m to 1 m")?;
     require("jaw.balkwill_angle_deg", balkwill_deg, (0.0..90.0).contains(&balkwill_deg), "0 to below 90")?;
     let height_m = side_m * 3f64.sqrt() / 2.0;
     let (sin, cos) = balkwill_deg.to_radians().sin_cos();
@@ -81,20 +90,8 @@ impl Mandible {
         bennett_angle_deg: f64,
         working: JawSide,
     ) -> Result<Self, TrajectoryError> {
-        let range = 0.0..=80.0;
-        require(
-            "motion.condylar_inclination_deg",
-            inclination_deg,
-            range.contains(&inclination_deg),
-            "0 to 80",
-        )?;
-        let range = 0.0..=45.0;
-        require(
-            "motion.bennett_angle_deg",
-            bennett_angle_deg,
-            range.contains(&bennett_angle_deg),
-            "0 to 45",
-        )?;
+        require_within("motion.condylar_inclination_deg", inclination_deg, 0.0..=80.0, "0 to 80")?;
+        require_within("motion.bennett_angle_deg", bennett_angle_deg, 0.0..=45.0, "0 to 45")?;
         let (down, forward) = inclination_deg.to_radians().sin_cos();
         let (inward, straight) = bennett_angle_deg.to_radians().sin_cos();
         let working = working.sign();
@@ -137,8 +134,8 @@ impl Mandible {
         let arm = across(anterior_m - from.x, up_m - from.z);
         let path = across(self.path.x, self.path.z);
         let half = arm.dot(&path);
-        let root_squared =
-            half * half - path.norm_squared() * (arm.norm_squared() - self.middle.norm_squared());
+        let beyond = arm.norm_squared() - self.middle.norm_squared();
+        let root_squared = half * half - path.norm_squared() * beyond;
         if root_squared < 0.0 {
             return None;
         }
@@ -192,6 +189,66 @@ pub(super) fn reach(
         )));
     }
     Ok(below)
+}
+
+/// The jaw on the platform: from displacements of the lower jaw to poses of the platform.
+///
+/// Platform = closed · X · T · X⁻¹, where X is the jaw frame in the platform frame at the closed pose: origin at the
+/// incisal point, axes parallel to the base's.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct JawFrame {
+    /// closed · X: the jaw frame in the base frame.
+    jaw: Pose,
+    /// X⁻¹.
+    platform_in_jaw: Pose,
+}
+
+impl JawFrame {
+    pub(super) fn new(jaw: &JawConfig, mechanism: &Mechanism) -> Result<Self, TrajectoryError> {
+        let closed = closed_pose(jaw, mechanism)?;
+        let jaw_in_platform = jaw_in_platform(jaw, &closed);
+        Ok(Self { jaw: closed * jaw_in_platform, platform_in_jaw: jaw_in_platform.inverse() })
+    }
+
+    /// The platform in the base frame when the jaw is displaced from the closed pose.
+    pub(super) fn platform(&self, displacement: &Pose) -> Pose {
+        self.jaw * displacement * self.platform_in_jaw
+    }
+}
+
+/// X.
+fn jaw_in_platform(jaw: &JawConfig, closed: &Pose) -> Pose {
+    Pose::from_parts(Translation3::from(jaw.reference_point_m), closed.rotation.inverse())
+}
+
+/// The platform in the base frame when the jaw is closed.
+///
+/// # Errors
+/// When a value lies outside its range, or no such pose exists.
+pub fn closed_pose(jaw: &JawConfig, mechanism: &Mechanism) -> Result<Pose, TrajectoryError> {
+    let JawConfig { closed_leg_m, reference_point_m, closed_offset_m, .. } = *jaw;
+    require("jaw.closed_leg_m", closed_leg_m, closed_leg_m > 0.0, "above 0")?;
+    for (name, point) in
+        [("jaw.reference_point_m", reference_point_m), ("jaw.closed_offset_m", closed_offset_m)]
+    {
+        for coordinate in point {
+            require_within(name, coordinate, -FARTHEST_M..=FARTHEST_M, "within ±1 m")?;
+        }
+    }
+    let actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [closed_leg_m; LEGS] };
+    let closed = solve_completely(mechanism, &actuators).map_err(|error| {
+        TrajectoryError(format!("jaw.closed_leg_m = {closed_leg_m:?} m gives no closed pose: {error}"))
+    })?;
+    Ok(Translation3::from(closed_offset_m) * closed.pose)
+}
+
+/// Incisal point, right and left condyle in the platform frame, when the jaw is closed at that pose.
+///
+/// # Errors
+/// When a dimension of the mandible lies outside its range.
+pub fn closed_jaw_points(jaw: &JawConfig, closed: &Pose) -> Result<[Vec3; 3], TrajectoryError> {
+    let jaw_in_platform = jaw_in_platform(jaw, closed);
+    Ok(jaw_points(jaw)?.map(|point| jaw_in_platform.transform_point(&point.into()).coords))
 }
 
 #[cfg(test)]

@@ -3,17 +3,14 @@
 //! Samples become translation and rotation vector (from the first sample's orientation), are spread
 //! to an even grid, low-passed and joined by a spline, twice continuously differentiable.
 
+use std::f64::consts::{PI, SQRT_2};
 use std::path::PathBuf;
 
 use masseter_model::geometry::{Pose, Vec3};
-use nalgebra::{UnitQuaternion, Vector6};
+use nalgebra::{SVector, UnitQuaternion, Vector6};
 
-use super::error::Located;
-use super::glitches::{Glitch, glitches};
-use super::lowpass::lowpass;
-use super::plausibility::doubts;
-use super::recorded_rows::Rows;
-use super::spline::Spline;
+use super::doubts::{Glitch, Rows, doubts, glitches};
+use super::table::Located;
 
 /// Least rate of the even grid, Hz: well above what a jaw does. What is sampled faster keeps its rate, because what a
 /// slower grid cannot hold would return on it as slow motion, which the filter passes.
@@ -23,6 +20,8 @@ const LEAST_GRID_HZ: f64 = 200.0;
 const CENTROID_TURN_DEG: f64 = 2.0;
 /// Beyond this, rotation vectors are no longer a good measure of the way between two poses.
 const LARGEST_TURN_DEG: f64 = 90.0;
+/// How long the reflected ends are, in periods of the corner frequency.
+const MARGIN_PERIODS: f64 = 3.0;
 
 /// A row of the file: jaw displacement in the jaw frame, metres.
 #[derive(Debug)]
@@ -49,8 +48,8 @@ pub(super) struct Recording {
 }
 
 impl Recording {
-    /// From samples at strictly increasing times; a corner of 0 leaves them unfiltered. `are_of_centroid`: whether the samples
-    /// are displacements of the markers' centroid, because the incisal point is not given.
+    /// From samples at strictly increasing times; a corner of 0 leaves them unfiltered. `are_of_centroid`: whether the
+    /// samples are displacements of the markers' centroid, because the incisal point is not given.
     pub(super) fn new(
         path: PathBuf,
         samples: &[Sample],
@@ -107,8 +106,9 @@ fn coordinates(sample: &Sample, first: &UnitQuaternion<f64>) -> Result<Vector6<f
     let turn = (first.inverse() * sample.displacement.rotation).scaled_axis();
     let angle_deg = turn.norm().to_degrees();
     if angle_deg > LARGEST_TURN_DEG {
-        let limit = format!("limit {LARGEST_TURN_DEG}°; is the orientation right?");
-        let problem = format!("turned by {angle_deg:.1}° from the first row, {limit}");
+        let problem = format!(
+            "turned by {angle_deg:.1}° from the first row, limit {LARGEST_TURN_DEG}°; is the orientation right?"
+        );
         return Err(Located::at(sample.line, problem));
     }
     let at = sample.displacement.translation.vector;
@@ -125,68 +125,110 @@ fn smoothed(raw: &Spline<6>, time_s: &[f64], lowpass_hz: f64) -> Spline<6> {
     Spline::through(grid_s, filtered)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// A natural cubic spline through vectors over time: twice continuously differentiable, curvature 0 at the ends.
+#[derive(Debug, Clone)]
+struct Spline<const N: usize> {
+    time_s: Vec<f64>,
+    values: Vec<SVector<f64, N>>,
+    /// Second derivatives at the knots.
+    curvatures: Vec<SVector<f64, N>>,
+}
 
-    fn recorded(poses: impl Fn(f64) -> Pose, lowpass_hz: f64) -> Result<Recording, Located> {
-        recorded_at(50.0, poses, lowpass_hz)
+impl<const N: usize> Spline<N> {
+    /// Through at least two values at strictly increasing times.
+    fn through(time_s: Vec<f64>, values: Vec<SVector<f64, N>>) -> Self {
+        assert!(time_s.len() >= 2 && time_s.len() == values.len(), "a curve needs two knots");
+        let curvatures = curvatures(&time_s, &values);
+        Self { time_s, values, curvatures }
     }
 
-    /// Two seconds.
-    fn recorded_at(rate_hz: f64, poses: impl Fn(f64) -> Pose, lowpass_hz: f64) -> Result<Recording, Located> {
-        let sample = |k: u32| {
-            let t_s = f64::from(k) / rate_hz;
-            Sample { line: u64::from(k) + 3, time_s: 5.0 + t_s, displacement: poses(t_s) }
-        };
-        let samples: Vec<Sample> = (0..=(2.0 * rate_hz) as u32).map(sample).collect();
-        Recording::new("a.csv".into(), &samples, false, lowpass_hz)
-    }
-
-    fn swaying(t_s: f64) -> Pose {
-        let sway = (2.0 * t_s).sin();
-        let rotation = UnitQuaternion::from_scaled_axis(Vec3::new(0.02, 0.3 * sway, 0.1));
-        Pose::from_parts(Vec3::new(0.001, -0.002 * sway, -0.02 * sway).into(), rotation)
-    }
-
-    #[test]
-    fn a_smooth_motion_is_kept_with_and_without_the_filter() {
-        for lowpass_hz in [0.0, 12.0] {
-            let recording = recorded(swaying, lowpass_hz).ok().unwrap();
-            assert!((recording.length_s() - 2.0).abs() < 1e-12);
-            for k in 0..=200 {
-                let t_s = f64::from(k) / 100.0;
-                let (got, desired) = (recording.displacement(t_s), swaying(t_s));
-                assert!((got.translation.vector - desired.translation.vector).norm() < 5e-5, "{t_s}");
-                assert!(got.rotation.angle_to(&desired.rotation) < 5e-4, "{t_s}");
-            }
-        }
-    }
-
-    /// 195 Hz sampled at 200 Hz would be 5 Hz.
-    #[test]
-    fn fast_noise_of_a_fast_recording_does_not_become_slow_motion() {
-        let trembling =
-            |t_s: f64| Pose::translation(0.0, 0.0, 0.001 * (std::f64::consts::TAU * 195.0 * t_s).sin());
-        let recording = recorded_at(1000.0, trembling, 12.0).ok().unwrap();
-        for k in 20..=180 {
-            let height_m = recording.displacement(f64::from(k) / 100.0).translation.z;
-            assert!(height_m.abs() < 2e-5, "{height_m}");
-        }
-    }
-
-    #[test]
-    fn the_nearest_line_is_named() {
-        let recording = recorded(swaying, 12.0).ok().unwrap();
-        for (t_s, line) in [(0.0, 3), (0.009, 3), (0.011, 4), (2.0, 103), (9.0, 103)] {
-            assert_eq!(recording.source_line(t_s), format!("a.csv:{line}"));
-        }
-    }
-
-    #[test]
-    fn a_turn_beyond_what_a_jaw_does_is_refused() {
-        let spinning = |t_s: f64| Pose::rotation(Vec3::y() * t_s);
-        let error = recorded(spinning, 12.0).err().unwrap();
-        assert!(error.problem.starts_with("turned by") && error.line.is_some());
+    /// The value at a time; held beyond the ends. Finds its span in O(log n), allocates nothing.
+    fn at(&self, t_s: f64) -> SVector<f64, N> {
+        let last = self.time_s.len() - 1;
+        let t_s = t_s.clamp(self.time_s[0], self.time_s[last]);
+        let right = self.time_s.partition_point(|&knot| knot <= t_s).clamp(1, last);
+        let left = right - 1;
+        let span = self.time_s[right] - self.time_s[left];
+        let b = (t_s - self.time_s[left]) / span;
+        let a = 1.0 - b;
+        let bend = |x: f64| (x * x * x - x) * span * span / 6.0;
+        self.values[left] * a
+            + self.values[right] * b
+            + self.curvatures[left] * bend(a)
+            + self.curvatures[right] * bend(b)
     }
 }
+
+/// Elimination in the tridiagonal system that equal slopes on both sides of each knot make.
+fn curvatures<const N: usize>(time_s: &[f64], values: &[SVector<f64, N>]) -> Vec<SVector<f64, N>> {
+    let knots = time_s.len();
+    let span = |left: usize| time_s[left + 1] - time_s[left];
+    let slope = |left: usize| (values[left + 1] - values[left]) / span(left);
+    let mut upper = vec![0.0; knots];
+    let mut solution = vec![SVector::zeros(); knots];
+    for knot in 1..knots - 1 {
+        let (before, after) = (span(knot - 1), span(knot));
+        let pivot = 2.0 * (before + after) - before * upper[knot - 1];
+        upper[knot] = after / pivot;
+        solution[knot] = ((slope(knot) - slope(knot - 1)) * 6.0 - solution[knot - 1] * before) / pivot;
+    }
+    for knot in (1..knots - 1).rev() {
+        let next = solution[knot + 1];
+        solution[knot] -= next * upper[knot];
+    }
+    solution
+}
+
+/// A low-pass without delay: a second-order Butterworth filter forwards, then backwards. Both passes together reach −3
+/// dB at the corner, which must lie below half the rate of the evenly spaced values.
+///
+/// Both ends are extended by their own point reflection and the filter starts settled, so that the first and the last
+/// value stay where they are.
+fn lowpass<const N: usize>(values: &[SVector<f64, N>], rate_hz: f64, corner_hz: f64) -> Vec<SVector<f64, N>> {
+    let margin = ((MARGIN_PERIODS * rate_hz / corner_hz).ceil() as usize).min(values.len().saturating_sub(1));
+    let filter = Butterworth::new(rate_hz, corner_hz);
+    let mut extended = with_reflected_ends(values, margin);
+    filter.run(&mut extended);
+    extended.reverse();
+    filter.run(&mut extended);
+    extended.reverse();
+    extended[margin..margin + values.len()].to_vec()
+}
+
+fn with_reflected_ends<const N: usize>(values: &[SVector<f64, N>], margin: usize) -> Vec<SVector<f64, N>> {
+    let (Some(first), Some(last)) = (values.first(), values.last()) else { return Vec::new() };
+    let before = values[1..=margin].iter().rev().map(|value| first * 2.0 - value);
+    let after =
+        values[values.len() - 1 - margin..values.len() - 1].iter().rev().map(|value| last * 2.0 - value);
+    before.chain(values.iter().copied()).chain(after).collect()
+}
+
+/// y = b (x + 2x' + x'') − a₁y' − a₂y'', by the bilinear transform.
+struct Butterworth {
+    b: f64,
+    a1: f64,
+    a2: f64,
+}
+
+impl Butterworth {
+    fn new(rate_hz: f64, corner_hz: f64) -> Self {
+        // Two passes of a second-order filter multiply its attenuation; this moves −3 dB back.
+        let two_passes = (SQRT_2 - 1.0).powf(0.25);
+        let k = (PI * corner_hz / rate_hz).tan() / two_passes;
+        let scale = 1.0 / (1.0 + SQRT_2 * k + k * k);
+        Self { b: k * k * scale, a1: 2.0 * (k * k - 1.0) * scale, a2: (1.0 - SQRT_2 * k + k * k) * scale }
+    }
+
+    fn run<const N: usize>(&self, values: &mut [SVector<f64, N>]) {
+        let Some(&settled) = values.first() else { return };
+        let (mut x1, mut x2, mut y1, mut y2) = (settled, settled, settled, settled);
+        for value in values {
+            let x = *value;
+            *value = (x + x1 * 2.0 + x2) * self.b - y1 * self.a1 - y2 * self.a2;
+            (x2, x1, y2, y1) = (x1, x, y1, *value);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,24 +1,37 @@
 //! What a recorded motion holds, before it is played.
 //!
-//! Everything here describes the file. Whether the mechanism can follow the motion is judged by [`check`](super::check).
+//! Everything here describes the file. Whether the mechanism can follow the motion is judged by
+//! [`check`](super::check).
 
 use masseter_model::geometry::{Pose, Vec3};
 use masseter_scenario::{FileConfig, JawConfig};
 use serde::Serialize;
 
 use super::TrajectoryError;
-use super::glitches::Glitch;
-use super::import::Source;
-use super::likely_axes::likely_axes;
-use super::mandible::condylar_middle;
+use super::doubts::Glitch;
+use super::import::{Axes, SIGNED_AXES, Source};
+use super::mandible::jaw_points;
 use super::recording::{Recording, Sample};
-use super::table::{Format, Table};
+use super::table::{Format, Located, Row, Table};
 
 /// A step longer than this many usual ones is a gap.
 const GAP_STEPS: f64 = 1.5;
 const POINTS: [&str; 3] = ["incisal point", "right condyle", "left condyle"];
 /// Components of the rotation vector: about the axes that point anterior, left and up.
 const TURNS: [&str; 3] = ["roll to the right", "opening", "yaw to the left"];
+/// Rows looked at.
+const ROWS: usize = 200;
+/// A turn that shows the axis of opening fully, rad.
+const CLEAR_RAD: f64 = 0.05;
+/// A jaw reaches so far from the closed place only by opening, m.
+const OPENED_M: f64 = 0.015;
+/// A motion shows its axes from this score on, of less than 2.5, and others than the stated ones only by this much
+/// more.
+const LEAST: f64 = 0.6;
+const BETTER: f64 = 0.5;
+/// Weights of the incisal point's way back, and of the condyles' way forward.
+const BACK: f64 = 0.25;
+const FORWARD: f64 = 0.25;
 
 /// What a recorded motion holds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -129,9 +142,13 @@ pub struct SurveyRow {
 pub fn survey(config: &FileConfig, jaw: &JawConfig) -> Result<RecordingSurvey, TrajectoryError> {
     let source = Source::read(config, jaw)?;
     let (samples, recording) = source.recording()?;
-    let points = jaw_frame_points(jaw)?;
+    let points = jaw_points(jaw)?;
     let table = &source.table;
-    let row = |sample: &Sample| survey_row(&points, sample.time_s - samples[0].time_s, &sample.displacement);
+    let row = |Sample { time_s, displacement, .. }: &Sample| SurveyRow {
+        time_s: time_s - samples[0].time_s,
+        points_m: points.map(|point| moved(displacement, &point)),
+        turn_rad: displacement.rotation.scaled_axis(),
+    };
     let path: Vec<SurveyRow> = samples.iter().map(row).collect();
     let (steps, gaps) = steps_and_gaps(table);
     Ok(RecordingSurvey {
@@ -156,21 +173,6 @@ pub fn survey(config: &FileConfig, jaw: &JawConfig) -> Result<RecordingSurvey, T
         doubts: recording.doubts,
         path,
     })
-}
-
-/// Incisal point, right and left condyle in the jaw frame, m.
-fn jaw_frame_points(jaw: &JawConfig) -> Result<[Vec3; 3], TrajectoryError> {
-    let middle = condylar_middle(jaw)?;
-    let aside = Vec3::new(0.0, jaw.bonwill_side_m / 2.0, 0.0);
-    Ok([Vec3::zeros(), middle - aside, middle + aside])
-}
-
-fn survey_row(points: &[Vec3; 3], time_s: f64, displacement: &Pose) -> SurveyRow {
-    SurveyRow {
-        time_s,
-        points_m: points.map(|point| moved(displacement, &point)),
-        turn_rad: displacement.rotation.scaled_axis(),
-    }
 }
 
 fn moved(displacement: &Pose, point: &Vec3) -> Vec3 {
@@ -247,4 +249,58 @@ fn point_figures(
         farthest_mm: path.iter().map(|row| row.points_m[point].norm() * 1e3).fold(0.0, f64::max),
         fastest_mm_s: path.windows(2).map(speed_m_s).fold(0.0, f64::max) * 1e3,
     }
+}
+
+/// The axes under which the motion opens, where the stated ones do not do so: which axes of the file are likely to
+/// point anterior, left and up, from what a jaw does when it opens widest.
+///
+/// Then the incisal point goes down, rather back than forward and hardly aside, the jaw turns about the axis that
+/// points left, and the condyles go forward. A recording without an opening shows nothing of that.
+fn likely_axes(source: &Source, stated: &[String; 3]) -> Option<[String; 3]> {
+    let (mut best, mut score_of_stated) = (None::<(f64, [String; 3])>, f64::NEG_INFINITY);
+    let pairs = SIGNED_AXES.iter().flat_map(|anterior| SIGNED_AXES.map(|left| (*anterior, left)));
+    for [anterior, left, up] in pairs.flat_map(|(anterior, left)| SIGNED_AXES.map(|up| [anterior, left, up]))
+    {
+        let names = [anterior, left, up].map(String::from);
+        let Ok(axes) = Axes::parse(&names) else { continue };
+        let Ok(score) = score(source, &axes) else { continue };
+        if names == *stated {
+            score_of_stated = score;
+        }
+        if best.as_ref().is_none_or(|(most, _)| score > *most) {
+            best = Some((score, names));
+        }
+    }
+    let (most, names) = best?;
+    (most >= LEAST && most >= score_of_stated + BETTER).then_some(names)
+}
+
+/// How much the widest row looks like an opened jaw.
+fn score(source: &Source, axes: &Axes) -> Result<f64, Located> {
+    let rows = &source.table.rows;
+    let first = source.displacement(&rows[0], axes)?;
+    let away = |row: &Row| -> Result<Pose, Located> {
+        let displacement = source.displacement(row, axes)?;
+        let way = displacement.translation.vector - first.translation.vector;
+        Ok(Pose::from_parts(way.into(), first.rotation.inverse() * displacement.rotation))
+    };
+    let mut widest = Pose::identity();
+    for row in rows.iter().step_by(rows.len().div_ceil(ROWS)) {
+        let pose = away(row)?;
+        if pose.translation.vector.norm() > widest.translation.vector.norm() {
+            widest = pose;
+        }
+    }
+    let share = |along: f64, of: &Vec3| along / of.norm().max(f64::MIN_POSITIVE);
+    let incisal = widest.translation.vector;
+    if incisal.norm() < OPENED_M {
+        return Ok(0.0);
+    }
+    let turn = widest.rotation.scaled_axis();
+    let condyle = incisal + widest.rotation * source.reference - source.reference;
+    let down = share(-incisal.z - incisal.y.abs() - BACK * incisal.x, &incisal);
+    // A small turn is noise, and shows no axis.
+    let clear = (turn.norm() / CLEAR_RAD).min(1.0).powi(2);
+    let opening = share(turn.y, &turn) + FORWARD * share(condyle.x, &condyle);
+    Ok(down + clear * opening)
 }

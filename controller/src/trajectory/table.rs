@@ -2,11 +2,13 @@
 //!
 //! Blank lines are ignored. The module reads the columns' names; their meaning is not part of it.
 
+use std::path::Path;
+
 use masseter_scenario::input::excerpt;
 use masseter_scenario::rows::{Line, fields, lines, numbers};
 use masseter_scenario::wording::counted;
 
-use super::error::Located;
+use super::TrajectoryError;
 
 /// Fewer rows are no motion.
 const FEWEST_ROWS: usize = 4;
@@ -22,6 +24,30 @@ const MARKERS: [&str; 10] = [
     "time_s", "m1_x_mm", "m1_y_mm", "m1_z_mm", "m2_x_mm", "m2_y_mm", "m2_z_mm", "m3_x_mm", "m3_y_mm",
     "m3_z_mm",
 ];
+
+/// A problem of a recording, before its path is known.
+#[derive(Debug)]
+pub(super) struct Located {
+    /// The line, from 1; none where the file as a whole is at fault.
+    pub line: Option<u64>,
+    /// What is wrong, with its remedy: for the person who corrects the file.
+    pub problem: String,
+}
+
+impl Located {
+    pub(super) fn at(line: u64, problem: String) -> Self {
+        Self { line: Some(line), problem }
+    }
+
+    pub(super) fn whole(problem: String) -> Self {
+        Self { line: None, problem }
+    }
+
+    pub(super) fn in_file(self, path: &Path) -> TrajectoryError {
+        let line = self.line.map_or_else(String::new, |line| format!(":{line}"));
+        TrajectoryError(format!("{}{line}: {}", path.display(), self.problem))
+    }
+}
 
 /// What a header announces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,10 +98,8 @@ impl Table {
     pub(super) fn parse(text: &str) -> Result<Self, Located> {
         let mut content = lines(text.as_bytes()).filter(|line| line.text.as_deref() != Ok(""));
         let too_few = |rows| {
-            Located::whole(format!(
-                "{} of data, at least {FEWEST_ROWS} are needed",
-                counted(rows as u64, "row")
-            ))
+            let rows = counted(rows as u64, "row");
+            Located::whole(format!("{rows} of data, at least {FEWEST_ROWS} are needed"))
         };
         let Line { number, text } = content.next().ok_or_else(|| too_few(0))?;
         let format = text.and_then(|header| Format::of_header(&header));
@@ -112,8 +136,9 @@ fn check_time(time_s: f64, previous_s: f64) -> Result<(), String> {
         ));
     }
     if gap_s > LARGEST_GAP_S {
-        let limit = format!("at most {LARGEST_GAP_S} s can be bridged; cut the recording here");
-        return Err(format!("{gap_s:.3} s without a sample, {limit}"));
+        return Err(format!(
+            "{gap_s:.3} s without a sample, at most {LARGEST_GAP_S} s can be bridged; cut the recording here"
+        ));
     }
     Ok(())
 }

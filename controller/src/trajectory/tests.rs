@@ -68,18 +68,13 @@ fn generated_motions_are_twice_continuously_differentiable() {
     }
 }
 
-/// The platform at the closed (intercuspal) pose.
-fn closed_pose(trajectory: &Trajectory) -> Pose {
-    trajectory.frame.platform(&Pose::identity())
-}
-
 #[test]
 fn trajectories_start_and_end_at_rest_in_the_closed_pose() {
     for motion in generators() {
         let trajectory = build(&motion, None);
         assert!((trajectory.duration_s() - 10.0).abs() < 1e-12);
         for t_s in [-1.0, 0.0, 10.0, 12.0] {
-            let away = trajectory.pose(t_s).translation.vector - closed_pose(&trajectory).translation.vector;
+            let away = trajectory.pose(t_s).translation.vector - trajectory.closed_pose().translation.vector;
             assert!(away.norm() < 1e-12, "{motion:?} at {t_s} s");
         }
     }
@@ -120,7 +115,7 @@ fn the_closed_pose_follows_the_jaws_configuration() {
     let jaw = JawConfig { closed_leg_m: 0.28, closed_offset_m: [0.004, 0.0, 0.0], ..Default::default() };
     let trajectory = Trajectory::new(&MotionConfig::default(), &jaw, &mechanism(), None).unwrap();
     let legs =
-        mechanism().inverse(&(nalgebra::Translation3::new(-0.004, 0.0, 0.0) * closed_pose(&trajectory)));
+        mechanism().inverse(&(nalgebra::Translation3::new(-0.004, 0.0, 0.0) * trajectory.closed_pose()));
     assert!(legs.unwrap().actuators.leg_m.iter().all(|leg_m| (leg_m - 0.28).abs() < 1e-12));
     let jaw = JawConfig { closed_leg_m: 0.01, ..Default::default() };
     let error = Trajectory::new(&MotionConfig::default(), &jaw, &mechanism(), None).unwrap_err();
@@ -234,7 +229,7 @@ fn the_tracker_recording_plays_with_its_axes_unless_the_closed_pose_lies_too_far
     let trajectory = displaced(0.005, JawConfig::default().closed_leg_m);
     judge(&trajectory).unwrap();
     let lowest_m = (0..16_000).map(|ms| trajectory.pose(f64::from(ms) / 1000.0).translation.z);
-    let travel_m = closed_pose(&trajectory).translation.z - lowest_m.fold(f64::INFINITY, f64::min);
+    let travel_m = trajectory.closed_pose().translation.z - lowest_m.fold(f64::INFINITY, f64::min);
     assert!((travel_m - 0.0278).abs() < 0.001, "{travel_m}");
 
     let refused = judge(&displaced(-0.026, 0.285)).unwrap_err().to_string();

@@ -1,8 +1,12 @@
 //! One drive as the master sees it: its boot, its presence, and its process data.
 //!
-//! A [`RemoteDrive`] sends nothing; it returns frames and judgements.
+//! A [`RemoteDrive`] sends nothing; it returns frames and judgements. [`Message`] decodes frames; the master decides the
+//! effect of a message.
 
-use masseter_can::canopen::{Cob, EmergencyCode, Nmt, NmtCommand, NmtState, NmtTarget, NodeId, SdoResponse};
+use masseter_can::canopen::{
+    Cob, Emergency, EmergencyCode, Heartbeat, HeartbeatError, LengthError, Nmt, NmtCommand, NmtState,
+    NmtTarget, NodeId, SdoError, SdoResponse,
+};
 use masseter_can::cia402::{Controlword, DriveRequest, DriveState, Statusword, next_controlword};
 use masseter_can::{CanId, Frame, PdoMapping, Rpdo1, Tpdo1};
 use masseter_runtime::clock::MILLISECOND_NS;
@@ -11,39 +15,38 @@ use masseter_runtime::messages::codes::{BootPhase, Cause, drive_state_code};
 use masseter_scenario::{AxisScale, Scenario};
 
 use super::boot::{Boot, late};
-use super::failure::Failure;
+use super::events::Failure;
 use super::following::Following;
 use super::gate::Target;
-use super::presence::{MISSING_CYCLES, Presence};
+use super::link::Address;
+use super::wanted::WantedDrive;
 use crate::error::PlantError;
-use crate::wanted::WantedDrive;
 
 /// One drive.
 #[derive(Debug, Clone)]
 pub(super) struct RemoteDrive {
-    id: NodeId,
-    bus: usize,
+    pub(super) address: Address,
     scale: AxisScale,
     rpdo1: PdoMapping,
-    tpdo1: PdoMapping,
+    pub(super) tpdo1: PdoMapping,
     heartbeat_timeout_ns: u64,
     boot_timeout_ns: u64,
-    boot: Boot,
+    pub(super) boot: Boot,
     /// The phase of the boot that was reported last.
     reported_phase: BootPhase,
-    presence: Presence,
+    pub(super) presence: Presence,
     following: Following,
     nmt: Option<NmtState>,
     /// Whether it was started as a verified drive: only then its process data are used.
-    is_started: bool,
+    pub(super) is_started: bool,
     /// Whether its absence was reported, or it was lost.
     is_absence_known: bool,
     /// The function codes of its objects that had a wrong length, bit i for function code i.
     wrong_lengths: u16,
     power: Option<DriveState>,
-    statusword: Statusword,
+    pub(super) statusword: Statusword,
     /// What its last emergency message reported.
-    emergency: EmergencyCode,
+    pub(super) emergency: EmergencyCode,
     actual_increments: i32,
     torque_permille: i16,
     controlword: Controlword,
@@ -57,22 +60,20 @@ impl RemoteDrive {
     pub(super) fn new(
         scenario: &Scenario,
         axis: usize,
-        id: NodeId,
-        bus: usize,
+        address: Address,
         following: Following,
         now_ns: u64,
     ) -> Result<Self, PlantError> {
         let (can, pdos) = (&scenario.can, &scenario.profile(axis).pdos);
-        let boot = Boot::new(&WantedDrive::of_axis(scenario, axis, id)?, can.reset_faults, now_ns);
+        let boot = Boot::new(&WantedDrive::of_axis(scenario, axis, address.node)?, can.reset_faults, now_ns);
         Ok(Self {
-            id,
-            bus,
+            address,
             scale: scenario.scale(axis),
             rpdo1: pdos.rpdo1(),
             tpdo1: pdos.tpdo1(),
             heartbeat_timeout_ns: u64::from(can.heartbeat_consumer_ms) * MILLISECOND_NS,
             boot_timeout_ns: u64::from(can.boot_timeout_ms) * MILLISECOND_NS,
-            reported_phase: boot.phase(),
+            reported_phase: boot.phase,
             boot,
             presence: Presence::new(now_ns),
             following,
@@ -89,29 +90,9 @@ impl RemoteDrive {
         })
     }
 
-    /// Whether it has that node id, on that bus.
-    pub(super) fn is_at(&self, bus: usize, id: NodeId) -> bool {
-        (self.bus, self.id) == (bus, id)
-    }
-
-    /// The index of its bus.
-    pub(super) fn bus(&self) -> usize {
-        self.bus
-    }
-
-    /// What its process data carry.
-    pub(super) fn tpdo1(&self) -> &PdoMapping {
-        &self.tpdo1
-    }
-
-    /// How far its boot is.
-    pub(super) fn boot_phase(&self) -> BootPhase {
-        self.boot.phase()
-    }
-
     /// The reported phase of its boot and the present one, once after a change.
     pub(super) fn phase_change(&mut self) -> Option<[BootPhase; 2]> {
-        let now = self.boot.phase();
+        let now = self.boot.phase;
         let before = std::mem::replace(&mut self.reported_phase, now);
         (before != now).then_some([before, now])
     }
@@ -121,39 +102,14 @@ impl RemoteDrive {
         self.is_started && self.nmt == Some(NmtState::Operational)
     }
 
-    /// Whether it was started as a verified drive.
-    pub(super) fn is_started(&self) -> bool {
-        self.is_started
-    }
-
-    /// Whether its identity and configuration are verified.
-    pub(super) fn is_verified(&self) -> bool {
-        self.boot.is_verified()
-    }
-
     /// Whether it is verified and exchanges process data.
     pub(super) fn is_ready(&self) -> bool {
-        self.is_operational() && self.boot_phase() == BootPhase::Ready
+        self.is_operational() && self.boot.phase == BootPhase::Ready
     }
 
     /// State of its power stage, as far as it is known.
     pub(super) fn drive_state(&self) -> Option<DriveState> {
         self.power.filter(|_| self.is_operational())
-    }
-
-    /// Statusword and code of its last emergency, which explain why it is not enabled.
-    pub(super) fn power_words(&self) -> [f64; 2] {
-        [self.statusword.0, self.emergency.0].map(f64::from)
-    }
-
-    /// It reported an emergency, or its end.
-    pub(super) fn note_emergency(&mut self, code: EmergencyCode) {
-        self.emergency = code;
-    }
-
-    /// The fault that its boot reset, once.
-    pub(super) fn reset_fault(&mut self) -> Option<Failure> {
-        self.boot.reset_fault()
     }
 
     /// Writes its actual values and its state.
@@ -177,11 +133,6 @@ impl RemoteDrive {
     pub(super) fn begin_cycle(&mut self, now_ns: u64) {
         self.presence.begin_cycle();
         self.following.synchronise(now_ns);
-    }
-
-    /// Whether process data came after that time.
-    pub(super) fn has_answered_since(&self, time_ns: u64) -> bool {
-        self.presence.has_answered_since(time_ns)
     }
 
     /// Takes a heartbeat, given whether drives may be booted now.
@@ -208,7 +159,7 @@ impl RemoteDrive {
     /// Returns its state before and after; none while its process data are not used.
     pub(super) fn take_process_data(&mut self, time_ns: u64, tpdo: Tpdo1) -> Option<[Option<DriveState>; 2]> {
         self.hear_state(time_ns, NmtState::Operational);
-        self.presence.end_missing();
+        self.presence.missing_cycles = 0;
         if !self.is_started {
             return None;
         }
@@ -225,8 +176,8 @@ impl RemoteDrive {
 
     /// Takes an answer of its SDO server.
     pub(super) fn take_sdo_answer(&mut self, time_ns: u64, answer: SdoResponse) -> Result<(), Failure> {
-        self.presence.hear(time_ns);
-        self.boot.take(time_ns, answer)
+        self.presence.heard_ns = time_ns;
+        self.boot.take_answer(time_ns, answer)
     }
 
     /// Whether this object has a wrong length for the first time.
@@ -240,7 +191,7 @@ impl RemoteDrive {
     /// Why the drive counts as absent, once it does: it never came.
     pub(super) fn absence(&mut self, now_ns: u64) -> Option<Failure> {
         let (waited_ns, limit_ns) = (self.boot.waited_ns(now_ns), self.boot_timeout_ns);
-        let is_absent = self.boot_phase() == BootPhase::Waiting && waited_ns > limit_ns;
+        let is_absent = self.boot.phase == BootPhase::Waiting && waited_ns > limit_ns;
         let is_new = is_absent && !std::mem::replace(&mut self.is_absence_known, true);
         is_new.then(|| late(waited_ns, limit_ns))
     }
@@ -248,14 +199,14 @@ impl RemoteDrive {
     /// Why the drive counts as lost, if it does, given whether it has answered SYNC. A verified drive must be received,
     /// and an operational one must answer every SYNC once.
     pub(super) fn loss(&mut self, now_ns: u64, is_fresh: bool) -> Option<Failure> {
-        if !matches!(self.boot_phase(), BootPhase::Configured | BootPhase::Ready) {
+        if !matches!(self.boot.phase, BootPhase::Configured | BootPhase::Ready) {
             return None;
         }
         if !is_fresh && self.is_operational() {
-            self.presence.miss_cycle();
+            self.presence.missing_cycles += 1;
         }
         let may_miss = self.following.may_miss_cycles(MISSING_CYCLES);
-        self.presence.judge(now_ns, self.heartbeat_timeout_ns, may_miss).or_else(|| self.stop_by_itself())
+        self.presence.loss(now_ns, self.heartbeat_timeout_ns, may_miss).or_else(|| self.stop_by_itself())
     }
 
     /// The loss of a started drive that left operational by itself.
@@ -268,7 +219,7 @@ impl RemoteDrive {
     /// Why the drive counts as one that does not follow its targets, once it does, given whether it has answered SYNC.
     pub(super) fn following_error(&mut self, is_fresh: bool) -> Option<Failure> {
         let position_m = self.following_m().filter(|_| is_fresh)?;
-        self.following.judge(position_m)
+        self.following.following_failure(position_m)
     }
 
     /// Discards everything found out about the drive; it has to boot again.
@@ -281,22 +232,17 @@ impl RemoteDrive {
     /// Discards process data until the drive is started anew.
     fn stop_exchange(&mut self) {
         self.following.stop();
-        self.presence.forget_answer();
+        self.presence.answered_ns = 0;
         (self.is_started, self.power) = (false, None);
         (self.controlword, self.emergency) = (Controlword::DISABLE_VOLTAGE, EmergencyCode::RESET);
     }
 
     /// Completes its boot if it was started and has become operational; otherwise continues it after some time.
     pub(super) fn advance_boot(&mut self, now_ns: u64) -> Result<(), Failure> {
-        if self.boot_phase() == BootPhase::Starting && self.is_operational() {
-            self.boot.complete();
+        if self.boot.phase == BootPhase::Starting && self.is_operational() {
+            self.boot.phase = BootPhase::Ready;
         }
         self.boot.expire(now_ns)
-    }
-
-    /// It is not booted any further.
-    pub(super) fn give_up(&mut self) {
-        self.boot.give_up();
     }
 
     /// The message of network management that its boot needs, if any.
@@ -308,19 +254,19 @@ impl RemoteDrive {
 
     /// The SDO request that its boot needs, if one is due.
     pub(super) fn sdo_request(&mut self, now_ns: u64) -> Option<Frame> {
-        self.boot.request(now_ns).map(|request| request.frame(self.id))
+        self.boot.client.poll(now_ns).map(|request| request.frame(self.address.node))
     }
 
     /// The message that starts the drive.
     pub(super) fn start(&mut self, now_ns: u64) -> Frame {
         self.boot.start(now_ns);
-        self.presence.end_missing();
+        self.presence.missing_cycles = 0;
         self.is_started = true;
         self.nmt_frame(NmtCommand::Start)
     }
 
     fn nmt_frame(&self, command: NmtCommand) -> Frame {
-        Nmt { command, target: NmtTarget::Node(self.id) }.frame()
+        Nmt { command, target: NmtTarget::Node(self.address.node) }.frame()
     }
 
     /// The process data for a request and a target, if the drive exchanges any. While the drive may not be switched on, it is
@@ -329,7 +275,8 @@ impl RemoteDrive {
     pub(super) fn process_data(
         &mut self,
         now_ns: u64,
-        (request, may_switch_on): (DriveRequest, bool),
+        request: DriveRequest,
+        may_switch_on: bool,
         target: Option<Target>,
     ) -> Option<Frame> {
         if !self.is_operational() {
@@ -348,27 +295,223 @@ impl RemoteDrive {
             (self.actual_increments, 0)
         };
         let rpdo = Rpdo1 { controlword: self.controlword, target_increments, torque_offset_permille };
-        Some(rpdo.frame(self.id, &self.rpdo1))
+        Some(rpdo.frame(self.address.node, &self.rpdo1))
     }
 
     fn hear_state(&mut self, time_ns: u64, state: NmtState) {
-        self.presence.hear(time_ns);
+        self.presence.heard_ns = time_ns;
         self.nmt = Some(state);
     }
 }
 
+/// Cycles in a row in which an operational drive's process data may be missing at most.
+pub(super) const MISSING_CYCLES: u32 = 3;
+/// New process data beyond one a SYNC that a single node may send: all those that may be missing may come late, at once.
+const SURPLUS: u32 = MISSING_CYCLES + 2;
+
+/// Memory of the supervision.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Presence {
+    /// When the drive sent something.
+    heard_ns: u64,
+    /// Time of the newest process data.
+    answered_ns: u64,
+    /// Cycles in a row without process data.
+    missing_cycles: u32,
+    /// Recent new process data beyond one a SYNC. A late drive makes up for a cycle without any, one that receives a
+    /// repeated SYNC answers twice, and two of one id send one more every cycle.
+    surplus: u32,
+    /// New process data since the last SYNC.
+    new_data: u32,
+}
+
+impl Presence {
+    /// A drive that is expected from `now_ns` on.
+    pub(super) fn new(now_ns: u64) -> Self {
+        Self { heard_ns: now_ns, answered_ns: 0, missing_cycles: 0, surplus: 0, new_data: 0 }
+    }
+
+    /// SYNC demands new process data.
+    pub(super) fn begin_cycle(&mut self) {
+        self.surplus = match std::mem::take(&mut self.new_data) {
+            0 | 1 => self.surplus.saturating_sub(1),
+            several => self.surplus + several - 1,
+        };
+    }
+
+    /// The drive sent process data; a frame that its transmitter had to repeat is not new.
+    pub(super) fn answer(&mut self, time_ns: u64, is_new: bool) {
+        self.answered_ns = time_ns;
+        self.new_data += u32::from(is_new);
+    }
+
+    /// Whether process data came after that time.
+    pub(super) fn has_answered_since(&self, time_ns: u64) -> bool {
+        self.answered_ns > time_ns
+    }
+
+    /// Missing and surplus process data are counted anew.
+    pub(super) fn restart(&mut self) {
+        (self.missing_cycles, self.surplus) = (0, 0);
+    }
+
+    /// The reason why the drive counts as lost, if it does, given how many cycles in a row may be without process data.
+    pub(super) fn loss(&self, now_ns: u64, heartbeat_timeout_ns: u64, may_miss: u32) -> Option<Failure> {
+        let silent_ns = now_ns.saturating_sub(self.heard_ns);
+        if silent_ns > heartbeat_timeout_ns {
+            let times_ms = [silent_ns, heartbeat_timeout_ns].map(|ns| ns as f64 / 1e6);
+            Some(Failure::with(Cause::HeartbeatLost, times_ms))
+        } else if self.surplus > SURPLUS {
+            Some(Failure::with(Cause::DuplicateNode, [self.surplus, SURPLUS].map(f64::from)))
+        } else if self.missing_cycles > may_miss {
+            Some(Failure::with(Cause::ProcessDataLost, [self.missing_cycles, may_miss].map(f64::from)))
+        } else {
+            None
+        }
+    }
+}
+
+/// The contents of an object that the master receives from a node.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Message {
+    Heartbeat(NmtState),
+    ProcessData(Tpdo1),
+    Emergency(Emergency),
+    SdoAnswer(SdoResponse),
+    /// Node guarding of somebody else, or a message of a service that the master does not use.
+    Foreign,
+}
+
+impl Message {
+    /// The node that sends an object; none where the master receives no such object.
+    pub(super) const fn sender(cob: Cob) -> Option<NodeId> {
+        match cob {
+            Cob::Heartbeat(node) | Cob::Tpdo1(node) | Cob::Emergency(node) | Cob::SdoResponse(node) => {
+                Some(node)
+            }
+            Cob::Nmt | Cob::Sync | Cob::Rpdo1(_) | Cob::SdoRequest(_) => None,
+        }
+    }
+
+    /// Decodes the data of an object, process data by that mapping.
+    pub(super) fn decode(cob: Cob, data: &[u8], tpdo1: &PdoMapping) -> Result<Self, LengthError> {
+        match cob {
+            Cob::Heartbeat(_) => match Heartbeat::decode(data) {
+                Ok(Heartbeat { state }) => Ok(Self::Heartbeat(state)),
+                Err(HeartbeatError::Length(error)) => Err(error),
+                Err(HeartbeatError::UnknownState { .. }) => Ok(Self::Foreign),
+            },
+            Cob::Tpdo1(_) => Tpdo1::decode(data, tpdo1).map(Self::ProcessData),
+            Cob::Emergency(_) => Emergency::decode(data).map(Self::Emergency),
+            Cob::SdoResponse(_) => match SdoResponse::decode(data) {
+                Ok(answer) => Ok(Self::SdoAnswer(answer)),
+                Err(SdoError::Length(error)) => Err(error),
+                Err(SdoError::UnknownCommand { .. }) => Ok(Self::Foreign),
+            },
+            _ => Ok(Self::Foreign),
+        }
+    }
+}
+
 #[cfg(test)]
-mod tests {
+mod drive_tests {
     use super::*;
 
     #[test]
     fn a_drive_is_absent_once_beyond_its_time() {
         let scenario = Scenario::default();
-        let (id, following) = (NodeId::new(1).unwrap(), Following::new(&scenario, 0, 0));
-        let mut drive = RemoteDrive::new(&scenario, 0, id, 0, following, 500).unwrap();
+        let address = Address { bus: 0, node: NodeId::new(1).unwrap() };
+        let mut drive =
+            RemoteDrive::new(&scenario, 0, address, Following::new(&scenario, 0, 0), 500).unwrap();
         let limit_ns = u64::from(scenario.can.boot_timeout_ms) * MILLISECOND_NS;
         assert_eq!(drive.absence(500 + limit_ns), None);
         assert_eq!(drive.absence(501 + limit_ns), Some(late(limit_ns + 1, limit_ns)));
         assert_eq!(drive.absence(502 + limit_ns), None);
+    }
+}
+
+#[cfg(test)]
+mod presence_tests {
+    use super::*;
+
+    /// The surplus after a number of SYNCs, each answered by that many new process data.
+    fn surplus(syncs: u32, answers: impl Fn(u32) -> u32) -> u32 {
+        let mut presence = Presence::new(0);
+        for sync in 0..syncs {
+            presence.begin_cycle();
+            (0..answers(sync)).for_each(|_| presence.answer(0, true));
+        }
+        presence.begin_cycle();
+        presence.surplus
+    }
+
+    #[test]
+    fn a_drive_that_answers_late_is_still_one() {
+        assert!(surplus(100, |sync| if sync % 2 == 0 { 0 } else { 2 }) <= 1, "every other cycle");
+        assert!(surplus(100, |sync| if sync % 4 == 3 { 4 } else { 0 }) <= SURPLUS);
+    }
+
+    #[test]
+    fn a_drive_that_answers_a_repeated_sync_again_is_still_one() {
+        assert!(surplus(10_000, |sync| if sync % 3 == 0 { 2 } else { 1 }) <= 1);
+    }
+
+    #[test]
+    fn a_repeated_frame_is_no_second_answer() {
+        let mut presence = Presence::new(0);
+        for _ in 0..100 {
+            presence.begin_cycle();
+            presence.answer(0, true);
+            presence.answer(0, false);
+        }
+        presence.begin_cycle();
+        assert_eq!(presence.loss(0, 1, 0), None);
+        assert_eq!(presence.surplus, 0);
+    }
+
+    #[test]
+    fn two_drives_of_one_id_answer_once_too_often_every_cycle() {
+        assert_eq!(surplus(10, |_| 1), 0);
+        assert_eq!(surplus(10, |_| 2), 10);
+    }
+
+    #[test]
+    fn a_drive_is_lost_beyond_each_limit_and_not_at_it() {
+        let cause = |presence: &Presence, now_ns, may_miss| {
+            presence.loss(now_ns, 1000, may_miss).map(|failure| failure.cause)
+        };
+        let mut presence = Presence::new(500);
+        assert_eq!(cause(&presence, 1500, 0), None);
+        assert_eq!(cause(&presence, 1501, 0), Some(Cause::HeartbeatLost));
+        assert_eq!(cause(&presence, 0, 0), None, "a clock that lags is no silence");
+        presence.heard_ns = 2500;
+        assert_eq!(cause(&presence, 3500, 0), None);
+        let silent = presence.loss(4_002_500, 1_000_000, 0).unwrap();
+        assert_eq!((silent.value, silent.limit), (4.0, 1.0), "ms");
+
+        for (missing, may_miss, is_lost) in [(1, 1, false), (2, 1, true), (3, 3, false), (4, 3, true)] {
+            presence.missing_cycles = 0;
+            (0..missing).for_each(|_| presence.missing_cycles += 1);
+            assert_eq!(cause(&presence, 2500, may_miss), is_lost.then_some(Cause::ProcessDataLost));
+        }
+        for (answers, is_duplicate) in [(1, false), (6, false), (7, true), (9, true)] {
+            presence.restart();
+            presence.begin_cycle();
+            (0..answers).for_each(|_| presence.answer(2500, true));
+            presence.begin_cycle();
+            assert_eq!(cause(&presence, 2500, 0), is_duplicate.then_some(Cause::DuplicateNode), "{answers}");
+        }
+        presence.missing_cycles += 1;
+        presence.restart();
+        assert_eq!(cause(&presence, 2500, 0), None);
+    }
+
+    #[test]
+    fn an_answer_is_one_after_the_time_that_is_asked_for() {
+        let mut presence = Presence::new(0);
+        presence.answer(100, true);
+        assert!(presence.has_answered_since(99) && !presence.has_answered_since(100));
+        presence.answered_ns = 0;
+        assert!(!presence.has_answered_since(0));
     }
 }

@@ -1,14 +1,14 @@
-//! The master's events with time, cycle, and the axis or bus that they concern.
+//! The master's events, and the reasons of a stop or of a failed boot.
 //!
-//! The log decides nothing; it only completes events and keeps them until they are drained.
+//! A [`Journal`] keeps events until they are published, and counts those without room. Nothing here decides anything.
 
 use masseter_can::CanId;
-use masseter_can::canopen::{Cob, Emergency, LengthError, NodeId};
+use masseter_can::canopen::{Cob, Emergency, LengthError, ObjectAddress};
 use masseter_model::geometry::AXES;
 use masseter_runtime::messages::Event;
 use masseter_runtime::messages::codes::{Cause, EventKind, Source};
 
-use crate::journal::Journal;
+use super::link::Address;
 
 /// The subject of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,27 +21,16 @@ pub(super) enum Subject {
 /// The log.
 #[derive(Debug)]
 pub(super) struct EventLog {
-    journal: Journal,
+    pub(super) journal: Journal,
     /// The cycle of new events.
-    cycle: u64,
-    /// Node id and bus of each axis.
-    addresses: [(NodeId, usize); AXES],
+    pub(super) cycle: u64,
+    addresses: [Address; AXES],
 }
 
 impl EventLog {
     /// An empty log for drives with these node ids and buses.
-    pub(super) fn new(addresses: [(NodeId, usize); AXES]) -> Self {
+    pub(super) fn new(addresses: [Address; AXES]) -> Self {
         Self { journal: Journal::new(), cycle: 0, addresses }
-    }
-
-    /// Begins a cycle.
-    pub(super) fn begin_cycle(&mut self, cycle: u64) {
-        self.cycle = cycle;
-    }
-
-    /// Hands out the events since the last drain.
-    pub(super) fn drain(&mut self, out: &mut impl FnMut(Event)) {
-        self.journal.drain(out);
     }
 
     /// Adds an event.
@@ -51,8 +40,8 @@ impl EventLog {
             Subject::Rig => {}
             Subject::Bus(bus) => event.bus = bus as u16,
             Subject::Axis(axis) => {
-                let (id, bus) = self.addresses[axis];
-                (event.axis, event.node, event.bus) = (axis as u32, u16::from(id.get()), bus as u16);
+                let Address { bus, node } = self.addresses[axis];
+                (event.axis, event.node, event.bus) = (axis as u32, u16::from(node.get()), bus as u16);
             }
         }
         self.journal.add(event);
@@ -80,4 +69,108 @@ pub(super) fn emergency(message: Emergency, is_past: bool) -> Event {
 pub(super) fn wrong_length(cob: Cob, error: &LengthError) -> Event {
     let (value, limit) = (error.actual as f64, error.expected as f64);
     Event { object: CanId::from(cob).number(), value, limit, ..notice(Cause::WrongLength) }
+}
+
+/// A reason to stop the drives or to give up a boot, with the object, the value and the limit that explain the reason.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Failure {
+    pub(super) cause: Cause,
+    pub(super) object: Option<ObjectAddress>,
+    pub(super) value: f64,
+    pub(super) limit: f64,
+}
+
+impl Failure {
+    /// A failure that needs no value to explain it.
+    pub(super) const fn new(cause: Cause) -> Self {
+        Self::with(cause, [0.0, 0.0])
+    }
+
+    /// A failure explained by a value and its limit.
+    pub(super) const fn with(cause: Cause, [value, limit]: [f64; 2]) -> Self {
+        Self { cause, object: None, value, limit }
+    }
+
+    /// The event that reports it: a fault, or the same without a reaction.
+    pub(super) fn event(&self, kind: EventKind) -> Event {
+        let Self { cause, object, value, limit } = *self;
+        let object = object.map_or(0, |object| u32::from(object.index) << 8 | u32::from(object.subindex));
+        Event { object, value, limit, ..Event::new(Source::Master, kind, cause) }
+    }
+}
+
+/// Events kept between two drains, of which one follows every cycle.
+const CAPACITY: usize = 256;
+
+/// The list.
+#[derive(Debug)]
+pub(crate) struct Journal {
+    events: Vec<Event>,
+    lost: u64,
+}
+
+impl Journal {
+    /// An empty list.
+    pub(crate) fn new() -> Self {
+        Self { events: Vec::with_capacity(CAPACITY), lost: 0 }
+    }
+
+    /// Adds an event, or counts it.
+    pub(crate) fn add(&mut self, event: Event) {
+        if self.events.len() < CAPACITY {
+            self.events.push(event);
+        } else {
+            self.lost += 1;
+        }
+    }
+
+    /// Hands out the events, and then the number of those without room.
+    pub(crate) fn drain(&mut self, out: &mut impl FnMut(Event)) {
+        let last = self.events.last().copied();
+        self.events.drain(..).for_each(&mut *out);
+        if let (Some(last), 1..) = (last, self.lost) {
+            out(overflow(last.time_ns, last.cycle, self.lost));
+            self.lost = 0;
+        }
+    }
+}
+
+/// The event that a full buffer has lost items.
+pub(crate) fn overflow(time_ns: u64, cycle: u64, lost: u64) -> Event {
+    let value = lost as f64;
+    Event { time_ns, cycle, value, ..Event::new(Source::Master, EventKind::Notice, Cause::Overflow) }
+}
+
+#[cfg(test)]
+mod failure_tests {
+    use super::*;
+
+    #[test]
+    fn a_failure_is_reported_with_its_object_value_and_limit() {
+        let object = Some(ObjectAddress::new(0x1018, 0x02));
+        let event =
+            Failure { object, ..Failure::with(Cause::WrongIdentity, [7.0, 8.0]) }.event(EventKind::Fault);
+        assert_eq!((event.cause, event.object), (Cause::WrongIdentity.code(), 0x10_1802));
+        assert_eq!((event.value, event.limit), (7.0, 8.0));
+        assert_eq!((event.kind, event.source), (EventKind::Fault.code(), Source::Master.code()));
+        assert_eq!(Failure::new(Cause::BusOff).event(EventKind::Fault).object, 0);
+    }
+}
+
+#[cfg(test)]
+mod journal_tests {
+    use super::*;
+
+    #[test]
+    fn events_without_room_are_counted_and_reported() {
+        let mut journal = Journal::new();
+        for cycle in 0..300 {
+            journal.add(Event { cycle, ..Event::new(Source::Master, EventKind::Notice, Cause::Sequence) });
+        }
+        let mut drained = Vec::new();
+        journal.drain(&mut |event| drained.push(event));
+        assert_eq!(drained.len(), CAPACITY + 1);
+        assert_eq!((drained[CAPACITY].cause, drained[CAPACITY].value), (Cause::Overflow.code(), 44.0));
+        journal.drain(&mut |event| panic!("{event:?}"));
+    }
 }

@@ -1,10 +1,12 @@
-//! The times of a cycle's exchange: SYNC, the process data that answer it, and the master's heartbeat.
+//! The times of a cycle's exchange, and the state of each bus as the master sees it.
 //!
-//! The exchange sends nothing. It computes what is due, and the time after which process data are an answer.
+//! SYNC, the process data that answer it, and the master's heartbeat; bus-off, nodes that nobody configured, and turns
+//! for SDO. Nothing is sent here.
 
-use masseter_can::BitrateError;
-use masseter_can::canopen::sync;
+use masseter_can::canopen::{NodeId, sync};
 use masseter_can::wire::{INTERFRAME_BITS, frame_bits};
+use masseter_can::{BitrateError, ErrorState, SendError};
+use masseter_model::geometry::AXES;
 use masseter_runtime::clock::MILLISECOND_NS;
 use masseter_runtime::messages::Reading;
 use masseter_runtime::realtime::Wake;
@@ -17,7 +19,7 @@ pub(super) struct Exchange {
     sync_frame_ns: u64,
     heartbeat_ns: u64,
     next_heartbeat_ns: u64,
-    wake: Wake,
+    pub(super) wake: Wake,
     /// When the tap saw the last SYNC of each bus.
     seen_sync_ns: Vec<u64>,
     /// When the last process data of the cycle arrived.
@@ -47,16 +49,6 @@ impl Exchange {
             self.next_heartbeat_ns = wake.woke_ns + self.heartbeat_ns;
         }
         is_due
-    }
-
-    /// The number of the cycle.
-    pub(super) fn cycle(&self) -> u64 {
-        self.wake.cycle
-    }
-
-    /// When the cycle began, ns.
-    pub(super) fn woke_ns(&self) -> u64 {
-        self.wake.woke_ns
     }
 
     /// When the drives sampled, ns: at the last bit of SYNC.
@@ -97,8 +89,52 @@ impl Exchange {
     }
 }
 
+/// Memory of a bus.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct BusMonitor {
+    /// Whether the master's controller is in bus-off.
+    pub(super) is_off: bool,
+    /// Whether any drive was ever received.
+    pub(super) has_drives: bool,
+    /// The axis whose SDO request was sent last.
+    pub(super) last_served: usize,
+    /// Nodes reported as unknown, bit i for node i.
+    unknown_nodes: u128,
+}
+
+impl BusMonitor {
+    /// Takes the error state of the master's controller; returns whether the bus is off, once after a change.
+    pub(super) fn set_error_state(&mut self, state: ErrorState) -> Option<bool> {
+        let is_off = state == ErrorState::BusOff;
+        (std::mem::replace(&mut self.is_off, is_off) != is_off).then_some(is_off)
+    }
+
+    /// The axes in the order of their turns for SDO.
+    pub(super) fn turns(self) -> impl Iterator<Item = usize> {
+        (1..=AXES).map(move |step| (self.last_served + step) % AXES)
+    }
+
+    /// Whether an unknown node is received for the first time.
+    pub(super) fn is_new_unknown(&mut self, id: NodeId) -> bool {
+        let bit = 1 << id.get();
+        let is_new = self.unknown_nodes & bit == 0;
+        self.unknown_nodes |= bit;
+        is_new
+    }
+
+    /// Whether a refusal to send needs a report of its own. Bus-off has its own; and before any drive is switched on
+    /// nobody acknowledges, so that the queue fills up.
+    pub(super) fn is_unexplained(self, refusal: &SendError) -> bool {
+        match refusal {
+            SendError::BusOff { .. } => false,
+            SendError::QueueFull { .. } => self.has_drives,
+            SendError::Os { .. } => true,
+        }
+    }
+}
+
 #[cfg(test)]
-mod tests {
+mod exchange_tests {
     use masseter_scenario::Scenario;
 
     use super::*;
@@ -116,7 +152,7 @@ mod tests {
         let next_ns = 1000 + u64::from(can.heartbeat_producer_ms) * MILLISECOND_NS;
         assert!(!exchange.begin_cycle(Wake::on_time(3, next_ns - 1)));
         assert!(exchange.begin_cycle(Wake::on_time(4, next_ns)));
-        assert_eq!((exchange.cycle(), exchange.woke_ns()), (4, next_ns));
+        assert_eq!((exchange.wake.cycle, exchange.wake.woke_ns), (4, next_ns));
         // A SYNC seen at the very time it was sent is this cycle's.
         exchange.note_sync(0, next_ns);
         exchange.note_sync(0, next_ns + 5);
@@ -140,5 +176,49 @@ mod tests {
         exchange.begin_cycle(Wake::on_time(8, 6000));
         exchange.fill_reading(&mut reading);
         assert_eq!(reading.complete_ns, 0);
+    }
+}
+
+#[cfg(test)]
+mod bus_monitor_tests {
+    use super::*;
+
+    #[test]
+    fn a_bus_reports_each_change_once_and_each_stranger_once() {
+        let mut bus = BusMonitor::default();
+        let states = [
+            (ErrorState::Active, None, false),
+            (ErrorState::Passive, None, false),
+            (ErrorState::BusOff, Some(true), true),
+            (ErrorState::BusOff, None, true),
+            (ErrorState::Passive, Some(false), false),
+            (ErrorState::Active, None, false),
+        ];
+        for (state, change, is_off) in states {
+            assert_eq!(bus.set_error_state(state), change, "{state:?}");
+            assert_eq!(bus.is_off, is_off);
+        }
+        let strangers = [1, 2, 127, 1, 127, 1, 3, 2].map(|id| bus.is_new_unknown(NodeId::new(id).unwrap()));
+        assert_eq!(strangers, [true, true, true, false, false, false, true, false]);
+    }
+
+    #[test]
+    fn a_refusal_to_send_is_explained_by_bus_off_or_by_drives_that_are_not_there_yet() {
+        let mut bus = BusMonitor::default();
+        let refusals = [
+            SendError::BusOff { tec: 256 },
+            SendError::QueueFull { capacity: 9 },
+            SendError::Os { errno: 100 },
+        ];
+        assert_eq!(refusals.each_ref().map(|refusal| bus.is_unexplained(refusal)), [false, false, true]);
+        bus.has_drives = true;
+        assert_eq!(refusals.each_ref().map(|refusal| bus.is_unexplained(refusal)), [false, true, true]);
+    }
+
+    #[test]
+    fn the_axis_served_last_is_the_last_to_be_served_again() {
+        let mut bus = BusMonitor::default();
+        bus.last_served = 3;
+        assert_eq!(bus.turns().collect::<Vec<_>>(), [4, 5, 0, 1, 2, 3]);
     }
 }

@@ -6,10 +6,13 @@
 //! A real drive cannot follow a demand that is uneven: SYNC comes early or late or overtakes the target, or the targets
 //! stop or start at once. For some cycles after that, the drive may be farther away.
 
+#[cfg(test)]
+mod tests;
+
 use masseter_runtime::messages::codes::Cause;
 use masseter_scenario::{MOST_LEAD_CYCLES, Scenario};
 
-use super::failure::Failure;
+use super::events::Failure;
 
 /// Periods from a target's command until every drive has reached the target: one until SYNC, one for the line.
 const LEAST_LEAD_CYCLES: f64 = 2.0;
@@ -152,7 +155,7 @@ impl Following {
     }
 
     /// Takes the position sampled at the last SYNC; returns the failure once too many in a row are beyond the limit.
-    pub(super) fn judge(&mut self, position_m: f64) -> Option<Failure> {
+    pub(super) fn following_failure(&mut self, position_m: f64) -> Option<Failure> {
         self.line?;
         let (error_m, limit_m) = (self.error_m(position_m), self.limit_m + self.excused_m);
         self.cycles_beyond = if error_m > limit_m { self.cycles_beyond + 1 } else { 0 };
@@ -184,6 +187,3 @@ impl Following {
         duration_ns as f64 / self.period_ns
     }
 }
-
-#[cfg(test)]
-mod tests;

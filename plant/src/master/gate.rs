@@ -1,18 +1,21 @@
 //! The last gate before the wire: no target passes that a drive must not be sent to, whoever commands.
 //!
 //! Strokes, velocities and accelerations are those of targets that drives follow; others are not sent. The gate only
-//! judges; a command passes as a whole or not at all. Only forces are cut, to the limit of the drive.
+//! judges; a command passes as a whole or not at all. Only forces are cut, to the limit of the drive. [`Commands`] has the
+//! newest command that passed, and the silence since.
 //!
 //! A motion waits while a process stalls. So targets may stop at once and go on as before, within twice the time-out of
 //! commands; after that they start from rest.
 
+#[cfg(test)]
+mod tests;
+
 use masseter_model::geometry::AXES;
 use masseter_runtime::messages::codes::{Cause, DriveRequest};
-use masseter_runtime::messages::{Command, LAYOUT_VERSION};
+use masseter_runtime::messages::{Command, LAYOUT_VERSION, Reading};
 use masseter_scenario::Scenario;
 
-use super::events::Subject;
-use super::failure::Failure;
+use super::events::{Failure, Subject};
 
 /// Standard deviations of the encoder by which a position held at the end of a stroke may be beyond it.
 const NOISE_DEVIATIONS: f64 = 6.0;
@@ -250,5 +253,72 @@ impl AxisGate {
     }
 }
 
-#[cfg(test)]
-mod tests;
+/// The received commands.
+#[derive(Debug, Clone)]
+pub(super) struct Commands {
+    timeout_cycles: u32,
+    pub(super) gate: Gate,
+    /// Request of the newest valid command.
+    pub(super) request: DriveRequest,
+    /// Its cycle; none before the first.
+    cycle: Option<u64>,
+    received_ns: u64,
+    /// Cycles since the last command.
+    pub(super) silent_cycles: u32,
+}
+
+impl Commands {
+    /// No command yet.
+    pub(super) fn new(scenario: &Scenario) -> Self {
+        Self {
+            timeout_cycles: scenario.can.command_timeout_cycles,
+            gate: Gate::new(scenario),
+            request: DriveRequest::Off,
+            cycle: None,
+            received_ns: 0,
+            silent_cycles: 0,
+        }
+    }
+
+    /// Whether a command of this cycle switches the drives off.
+    pub(super) fn switch_off(&self) -> bool {
+        self.silent_cycles == 0 && self.request == DriveRequest::Off
+    }
+
+    /// Takes the command of a cycle, if one came; a stale one is none. Silence is a failure only where `needs_command`; a
+    /// command is one if the gate refuses it. `following_m` has the position of every drive that would follow its target.
+    pub(super) fn apply_command(
+        &mut self,
+        cycle: u64,
+        now_ns: u64,
+        command: Option<&Command>,
+        needs_command: bool,
+        following_m: [Option<f64>; AXES],
+    ) -> Result<(), (Subject, Failure)> {
+        self.gate.begin_cycle(cycle, following_m);
+        // A refused command is none.
+        self.silent_cycles = self.silent_cycles.saturating_add(1);
+        let Some(command) = command.filter(|command| !self.is_stale(command)) else {
+            if !needs_command || self.silent_cycles <= self.timeout_cycles {
+                return Ok(());
+            }
+            let cycles = [self.silent_cycles, self.timeout_cycles].map(f64::from);
+            return Err((Subject::Rig, Failure::with(Cause::CommandLost, cycles)));
+        };
+        self.request = self.gate.pass(command, following_m)?;
+        (self.cycle, self.received_ns, self.silent_cycles) = (Some(command.cycle), now_ns, 0);
+        Ok(())
+    }
+
+    /// Whether a command demands motion for a cycle that had its command: nobody may control any more, and the same
+    /// message is only sent again. A request to stop is never stale.
+    fn is_stale(&self, command: &Command) -> bool {
+        self.cycle == Some(command.cycle) && command.request == DriveRequest::Enable.code()
+    }
+
+    /// Writes the command that a reading answers.
+    pub(super) fn fill_reading(&self, reading: &mut Reading) {
+        reading.answers_cycle = self.cycle.unwrap_or(0);
+        reading.command_received_ns = self.received_ns;
+    }
+}

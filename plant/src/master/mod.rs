@@ -2,7 +2,7 @@
 //! and stops them when commands cease.
 //!
 //! [`Master`] sequences its parts: [`boot`] verifies one drive, [`drive`] holds the state of one drive, [`exchange`] the
-//! times of the cycle, [`commands`] the controller's commands, and [`supervision`] decides whether drives may move. The
+//! times of the cycle, [`gate`] the controller's commands, and [`supervision`] decides whether drives may move. The
 //! parts return frames and failures; only the master sends.
 //!
 //! The master is written against the bus trait alone ([`Buses`]), so that simulated and real wires are the same to it.
@@ -10,18 +10,17 @@
 //! process data. So a bus never carries more than the [time table](masseter_runtime::schedule) allows for.
 
 mod boot;
-mod bus_monitor;
-mod commands;
+pub(crate) mod boot_plan;
 mod drive;
-mod enabling;
-mod events;
+pub(crate) mod events;
 mod exchange;
-mod failure;
 mod following;
 mod gate;
-mod incoming;
-mod presence;
+pub(crate) mod link;
+pub(crate) mod sdo;
+pub(crate) mod sockets;
 mod supervision;
+pub mod wanted;
 
 #[cfg(test)]
 mod tests;
@@ -31,27 +30,20 @@ use masseter_can::wire::worst_case_bits;
 use masseter_can::{Bus, Frame, ReceiveError, Received};
 use masseter_model::geometry::AXES;
 use masseter_runtime::messages::codes::{
-    BootPhase, Cause, DriveRequest, DriveState, Source, drive_state_code,
+    BootPhase, Cause, DriveRequest, DriveState, EventKind, Source, drive_state_code,
 };
 use masseter_runtime::messages::{Command, Event, Reading};
 use masseter_runtime::realtime::Wake;
 use masseter_scenario::{MASTER_NODE, Scenario};
 
 use crate::error::PlantError;
-use crate::link::Buses;
-use crate::link::layout::{drive_ports, node_ids};
-use bus_monitor::BusMonitor;
-use commands::Commands;
-use drive::RemoteDrive;
-use enabling::Enabling;
-use events::{EventLog, Subject, notice, transition};
-use exchange::Exchange;
-use failure::Failure;
+use drive::{Message, RemoteDrive};
+use events::{EventLog, Failure, Subject, notice, transition};
+use exchange::{BusMonitor, Exchange};
 use following::Following;
-use incoming::Message;
-use supervision::Supervision;
-
-pub(crate) use boot::shortest_boot;
+use gate::Commands;
+use link::{Address, Buses, addresses};
+use supervision::{Enabling, Supervision};
 
 /// Frames taken from a bus at once, so that a babbling node cannot stop the cycle.
 const FRAMES_AT_ONCE: usize = 512;
@@ -75,17 +67,16 @@ impl Master {
     /// [`PlantError`] for buses, node ids and bit rates that cannot be used.
     pub(crate) fn new(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
         let can = &scenario.can;
-        let (ports, ids) = (drive_ports(can)?, node_ids(can)?);
-        let addresses = std::array::from_fn(|axis| (ids[axis], ports[axis].bus));
+        let addresses = addresses(can)?;
         let bitrate = can.bitrate()?;
         let rpdo_ns = |&axis: &usize| {
             let length = scenario.profile(axis).pdos.rpdo1().length();
             bitrate.bits_to_ns(worst_case_bits(length as u32, false))
         };
         let drive = |axis: usize| {
-            let (id, bus) = addresses[axis];
-            let following = Following::new(scenario, axis, can.buses[bus].iter().map(rpdo_ns).sum());
-            RemoteDrive::new(scenario, axis, id, bus, following, now_ns)
+            let address = addresses[axis];
+            let following = Following::new(scenario, axis, can.buses[address.bus].iter().map(rpdo_ns).sum());
+            RemoteDrive::new(scenario, axis, address, following, now_ns)
         };
         let drives = (0..AXES).map(drive).collect::<Result<Vec<_>, _>>()?;
         Ok(Self {
@@ -102,7 +93,7 @@ impl Master {
     /// Begins a cycle: SYNC on every bus, and the heartbeat when it is due.
     pub(crate) fn begin_cycle(&mut self, wake: Wake, buses: &mut impl Buses) {
         let now_ns = wake.woke_ns;
-        self.events.begin_cycle(wake.cycle);
+        self.events.cycle = wake.cycle;
         let is_heartbeat_due = self.exchange.begin_cycle(wake);
         self.drives.iter_mut().for_each(|drive| drive.begin_cycle(now_ns));
         self.watch_buses(now_ns, buses);
@@ -120,7 +111,7 @@ impl Master {
         for bus in 0..self.buses.len() {
             for _ in 0..FRAMES_AT_ONCE {
                 match buses.port(bus).receive(now_ns) {
-                    Ok(Some(received)) => self.take(bus, &received),
+                    Ok(Some(received)) => self.take_frame(bus, &received),
                     // Lost frames show as missing process data; the others are still there.
                     Err(ReceiveError::Overrun { .. }) => {}
                     Ok(None) | Err(ReceiveError::Os { .. }) => break,
@@ -157,10 +148,10 @@ impl Master {
         self.supervise(now_ns);
         self.take_command(now_ns, command);
         self.restore(now_ns);
-        let (request, targets) = (self.request(), self.commands.targets());
+        let (request, targets) = (self.request(), self.commands.gate.targets());
         let may_switch_on = self.enabling.may_switch_on();
         for (axis, target) in targets.into_iter().enumerate() {
-            if let Some(frame) = self.drives[axis].process_data(now_ns, (request, may_switch_on), target) {
+            if let Some(frame) = self.drives[axis].process_data(now_ns, request, may_switch_on, target) {
                 self.send_to(now_ns, axis, frame, buses);
             }
         }
@@ -169,12 +160,12 @@ impl Master {
 
     /// Stops the drives from the next process data on, for the end: commands are not needed any more.
     pub(crate) fn stop(&mut self) {
-        self.supervision.end();
+        self.supervision.is_ending = true;
     }
 
     /// Cycles since the last command.
     pub(crate) fn silent_cycles(&self) -> u32 {
-        self.commands.silent_cycles()
+        self.commands.silent_cycles
     }
 
     /// Whether no drive reports voltage. A lost drive reports nothing and is not waited for: it stops by itself.
@@ -184,18 +175,18 @@ impl Master {
 
     /// Hands out the events since the last drain.
     pub(crate) fn drain_events(&mut self, out: &mut impl FnMut(Event)) {
-        self.events.drain(out);
+        self.events.journal.drain(out);
     }
 
     /// Whether a drive has answered this cycle's SYNC.
     fn is_fresh(&self, axis: usize) -> bool {
         let drive = &self.drives[axis];
-        drive.has_answered_since(self.exchange.answered_after_ns(drive.bus()))
+        drive.presence.has_answered_since(self.exchange.answered_after_ns(drive.address.bus))
     }
 
     /// The request to the drives.
     fn request(&self) -> DriveRequest {
-        self.supervision.request(self.commands.request(), self.drives.iter().all(RemoteDrive::is_ready))
+        self.supervision.request(self.commands.request, self.drives.iter().all(RemoteDrive::is_ready))
     }
 
     fn supervise(&mut self, now_ns: u64) {
@@ -211,7 +202,7 @@ impl Master {
                 self.report_boot(now_ns, axis, Ok(()));
             }
             let state = self.drives[axis].drive_state();
-            let disobedience = self.enabling.judge(state, is_enable);
+            let disobedience = self.enabling.disobedience(state, is_enable);
             if let Some(failure) = disobedience.or_else(|| self.drives[axis].following_error(is_fresh)) {
                 self.fail(now_ns, Subject::Axis(axis), &failure);
             }
@@ -225,9 +216,12 @@ impl Master {
         let is_enable = is_enable && self.supervision.may_move();
         for (axis, cause) in self.enabling.end_cycle(now_ns, is_enable, states).into_iter().enumerate() {
             let Some(cause) = cause else { continue };
-            let failure = Failure::with(cause, self.drives[axis].power_words());
+            let failure = Failure::with(
+                cause,
+                [self.drives[axis].statusword.0, self.drives[axis].emergency.0].map(f64::from),
+            );
             if cause == Cause::WaitsForDrive {
-                self.events.add(now_ns, Subject::Axis(axis), failure.notice());
+                self.events.add(now_ns, Subject::Axis(axis), failure.event(EventKind::Notice));
             } else {
                 self.name(now_ns, axis, &failure);
             }
@@ -254,8 +248,9 @@ impl Master {
         let needs_command = self.request() == DriveRequest::Enable;
         let may_move = self.supervision.may_move();
         let following_m = self.drives.each_ref().map(|drive| drive.following_m().filter(|_| may_move));
-        let times = [self.exchange.cycle(), now_ns];
-        if let Err((subject, failure)) = self.commands.take(times, command, needs_command, following_m) {
+        let cycle = self.exchange.wake.cycle;
+        let applied = self.commands.apply_command(cycle, now_ns, command, needs_command, following_m);
+        if let Err((subject, failure)) = applied {
             self.fail(now_ns, subject, &failure);
         }
     }
@@ -265,7 +260,7 @@ impl Master {
     fn restore(&mut self, now_ns: u64) {
         let is_restored = self.supervision.awaits_restoration()
             && self.commands.switch_off()
-            && !self.buses.iter().any(|bus| bus.is_off())
+            && !self.buses.iter().any(|bus| bus.is_off)
             && self.drives.iter().all(RemoteDrive::is_ready)
             && self.drives_are_off();
         if is_restored {
@@ -277,14 +272,18 @@ impl Master {
     /// Stops the drives. The first cause and the first refused command are reported, consequences are not.
     fn fail(&mut self, now_ns: u64, subject: Subject, failure: &Failure) {
         if self.supervision.stop(failure.cause) {
-            self.events.add(now_ns, subject, failure.event());
+            self.events.add(now_ns, subject, failure.event(EventKind::Fault));
         }
     }
 
     /// Leaves the drives to another master, permanently.
     fn yield_to_other_master(&mut self, now_ns: u64, bus: usize) {
         if self.supervision.stop_permanently() {
-            self.events.add(now_ns, Subject::Bus(bus), Failure::new(Cause::SecondMaster).event());
+            self.events.add(
+                now_ns,
+                Subject::Bus(bus),
+                Failure::new(Cause::SecondMaster).event(EventKind::Fault),
+            );
         }
     }
 
@@ -316,10 +315,10 @@ impl Master {
     fn send_sdo(&mut self, now_ns: u64, bus: usize, buses: &mut impl Buses) {
         for axis in self.buses[bus].turns() {
             let drive = &mut self.drives[axis];
-            if drive.bus() == bus
+            if drive.address.bus == bus
                 && let Some(frame) = drive.sdo_request(now_ns)
             {
-                self.buses[bus].note_served(axis);
+                self.buses[bus].last_served = axis;
                 return self.send(now_ns, bus, frame, buses);
             }
         }
@@ -327,11 +326,11 @@ impl Master {
 
     /// Starts the drives once all are verified: none moves beside one that is not.
     fn start_drives(&mut self, now_ns: u64, buses: &mut impl Buses) {
-        if !self.drives.iter().all(RemoteDrive::is_verified) {
+        if !self.drives.iter().all(|drive| drive.boot.is_verified()) {
             return;
         }
         for axis in 0..AXES {
-            if self.drives[axis].boot_phase() == BootPhase::Configured {
+            if self.drives[axis].boot.phase == BootPhase::Configured {
                 let frame = self.drives[axis].start(now_ns);
                 self.send_to(now_ns, axis, frame, buses);
                 self.report_boot(now_ns, axis, Ok(()));
@@ -340,19 +339,19 @@ impl Master {
     }
 
     fn send_to(&mut self, now_ns: u64, axis: usize, frame: Frame, buses: &mut impl Buses) {
-        self.send(now_ns, self.drives[axis].bus(), frame, buses);
+        self.send(now_ns, self.drives[axis].address.bus, frame, buses);
     }
 
     fn send(&mut self, now_ns: u64, bus: usize, frame: Frame, buses: &mut impl Buses) {
         if let Err(refusal) = buses.port(bus).send(now_ns, frame)
             && self.buses[bus].is_unexplained(&refusal)
         {
-            self.fail(self.exchange.woke_ns(), Subject::Bus(bus), &Failure::new(Cause::BusRefused));
+            self.fail(self.exchange.wake.woke_ns, Subject::Bus(bus), &Failure::new(Cause::BusRefused));
         }
     }
 
     /// Takes a frame. A malformed one is reported once and has no other effect.
-    fn take(&mut self, bus: usize, received: &Received) {
+    fn take_frame(&mut self, bus: usize, received: &Received) {
         let Ok(cob) = Cob::try_from(received.frame.id()) else { return };
         let time_ns = received.time_ns;
         let sender = Message::sender(cob);
@@ -361,16 +360,17 @@ impl Master {
             return self.yield_to_other_master(time_ns, bus);
         }
         let Some(id) = sender else { return };
-        let Some(axis) = self.drives.iter().position(|drive| drive.is_at(bus, id)) else {
+        let Some(axis) = self.drives.iter().position(|drive| drive.address == Address { bus, node: id })
+        else {
             if self.buses[bus].is_new_unknown(id) {
                 let event = Event { node: u16::from(id.get()), ..notice(Cause::UnknownNode) };
                 self.events.add(time_ns, Subject::Bus(bus), event);
             }
             return;
         };
-        self.buses[bus].note_drive();
+        self.buses[bus].has_drives = true;
         let drive = &mut self.drives[axis];
-        match Message::decode(cob, received.frame.data(), drive.tpdo1()) {
+        match Message::decode(cob, received.frame.data(), &drive.tpdo1) {
             Ok(Message::Heartbeat(state)) => self.take_heartbeat(axis, state, time_ns),
             Ok(Message::ProcessData(tpdo)) => {
                 let Some([before, after]) = drive.take_process_data(time_ns, tpdo) else { return };
@@ -382,8 +382,8 @@ impl Master {
             }
             Ok(Message::Emergency(emergency)) => {
                 // Before its boot-up, a drive reports emergencies of a time before this master, which resets it.
-                let is_past = emergency.is_reset() || drive.boot_phase() == BootPhase::Waiting;
-                drive.note_emergency(emergency.code);
+                let is_past = emergency.is_reset() || drive.boot.phase == BootPhase::Waiting;
+                drive.emergency = emergency.code;
                 self.events.add(time_ns, Subject::Axis(axis), events::emergency(emergency, is_past));
             }
             Ok(Message::SdoAnswer(answer)) => {
@@ -399,7 +399,7 @@ impl Master {
 
     fn take_heartbeat(&mut self, axis: usize, state: NmtState, time_ns: u64) {
         let may_boot = self.may_boot();
-        if state == NmtState::BootUp && self.drives[axis].is_started() {
+        if state == NmtState::BootUp && self.drives[axis].is_started {
             self.fail(time_ns, Subject::Axis(axis), &Failure::new(Cause::NodeRestarted));
         }
         let result = self.drives[axis].take_heartbeat(time_ns, state, may_boot);
@@ -409,11 +409,11 @@ impl Master {
     /// Reports a change of a drive's boot, or its failure.
     fn report_boot(&mut self, time_ns: u64, axis: usize, result: Result<(), Failure>) {
         if let Err(failure) = result {
-            self.drives[axis].give_up();
+            self.drives[axis].boot.phase = BootPhase::Failed;
             self.name(time_ns, axis, &failure);
         }
-        if let Some(reset) = self.drives[axis].reset_fault() {
-            self.events.add(time_ns, Subject::Axis(axis), reset.notice());
+        if let Some(reset) = self.drives[axis].boot.reset_fault.take() {
+            self.events.add(time_ns, Subject::Axis(axis), reset.event(EventKind::Notice));
         }
         if let Some([before, after]) = self.drives[axis].phase_change() {
             let event = transition(Source::Master, before.code(), after.code());
@@ -425,6 +425,6 @@ impl Master {
     /// is reported.
     fn name(&mut self, now_ns: u64, axis: usize, failure: &Failure) {
         self.supervision.stop(failure.cause);
-        self.events.add(now_ns, Subject::Axis(axis), failure.event());
+        self.events.add(now_ns, Subject::Axis(axis), failure.event(EventKind::Fault));
     }
 }

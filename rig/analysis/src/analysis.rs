@@ -1,33 +1,35 @@
-//! One pass over the messages of a run.
+//! One pass over the messages of a run, and the figures that it gives.
+//!
+//! Figures that no verdict depends on are in [`Shown`]: a run without a report does without them.
 
+use masseter_model::geometry::{AXES, Pose};
 use masseter_recording::{Damage, ProcessFault, Recorded};
-use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind, Source};
+use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind, NO_DRIVE_STATE, Source};
 use masseter_runtime::messages::tap::{self, TapError};
-use masseter_runtime::messages::{Event, FrameTap, Message, Reading, State, Truth};
+use masseter_runtime::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
 use masseter_runtime::named::Declared;
 use masseter_scenario::{FaultKindConfig, FaultLayer, Scenario};
+use serde::Serialize;
 
-use crate::attribution::OverrunAttribution;
-use crate::axes::AxisWatch;
-use crate::code::Code;
-use crate::contact::ContactWatch;
-use crate::declared_faults::FaultWatch;
-use crate::digest::Digest;
-use crate::disturbance::Disturbance;
-use crate::events::EventRecord;
-use crate::figures::Figures;
-use crate::freshness::Freshness;
-use crate::named::NamedWatch;
-use crate::outage::OutageWatch;
-use crate::played::PlayedWatch;
-use crate::requirements::Requirements;
-use crate::response::Responses;
-use crate::scenario_stalls::ScenarioStalls;
-use crate::sequence::SequenceCheck;
-use crate::shown::Shown;
-use crate::skips::{Counters, Skips};
-use crate::stop::StopWatch;
-use crate::tracking::{PathSample, PoseSource, Tracking};
+use crate::declared_faults::{FaultFigures, FaultWatch};
+use crate::events::{Code, EventRecord};
+use crate::intervals::Intervals;
+use crate::jaw_cycles::{JawCycleFigures, JawCycles};
+use crate::longest_cycles::{LongestCycles, WorstCycle};
+use crate::lost_cycles::{Disturbance, Freshness, Outage, OutageWatch, ReadingFigures, ScenarioStalls};
+use crate::measured::IntervalFigures;
+use crate::messages::{Digest, NamedWatch, ParameterFigures, SequenceCheck, SignalFigures, TopicFigures};
+use crate::over_time::{
+    AxisFigures, AxisWatch, CONTROLLER, ContactFigures, ContactWatch, OverTime, OverTimeCollector, PLANT,
+    Place,
+};
+use crate::played::{Departure, PlayedWatch, StopWatch, StoppedBy};
+use crate::requirements::{RequirementFigures, Requirements};
+use crate::response::{BusResponse, Responses};
+use crate::skips::{Counters, OverrunAttribution, SkipFigures, Skips};
+use crate::tracking::{
+    PathSample, PoseSource, Track, Tracking, TrackingFigures, estimated_pose, is_running, true_pose,
+};
 
 /// Computes the [`Figures`] of a run from its messages, in their order in the recording.
 ///
@@ -64,11 +66,7 @@ pub struct Analysis {
     fault_kinds: Vec<FaultKindConfig>,
     stalls: ScenarioStalls,
     sequence: SequenceCheck,
-    /// None where the scenario leaves the frames out.
-    frames: Option<Vec<u64>>,
-    events: Vec<EventRecord>,
     responses: Responses,
-    cycles: u64,
     freshness: Freshness,
     disturbance: Disturbance,
     digest: Digest,
@@ -77,13 +75,13 @@ pub struct Analysis {
     controller_skips: Skips,
     plant_skips: Skips,
     outage: OutageWatch,
-    final_state: Option<Code<ControllerState>>,
     stop: StopWatch,
     played: PlayedWatch,
-    bite_force_max_n: Option<f64>,
     contact: ContactWatch,
     /// None where the scenario requires nothing.
     requirements: Option<Requirements>,
+    /// What needs no collector.
+    figures: Figures,
 }
 
 impl Analysis {
@@ -106,10 +104,7 @@ impl Analysis {
             fault_kinds: scenario.faults.iter().map(|fault| fault.kind).collect(),
             stalls: ScenarioStalls::default(),
             sequence: SequenceCheck::default(),
-            frames: scenario.recording.frames.then(Vec::new),
-            events: Vec::new(),
             responses: Responses::for_scenario(scenario),
-            cycles: 0,
             freshness: Freshness::default(),
             disturbance: Disturbance::default(),
             digest: Digest::default(),
@@ -118,13 +113,16 @@ impl Analysis {
             controller_skips: Skips::default(),
             plant_skips: Skips::default(),
             outage: OutageWatch::default(),
-            final_state: None,
             stop: StopWatch::default(),
             played: PlayedWatch::new(scenario, declared),
-            // The robot has no sensor for this force.
-            bite_force_max_n: scenario.has_contact().then_some(0.0),
             contact: ContactWatch::default(),
             requirements: (!requirements.is_empty()).then_some(requirements),
+            figures: Figures {
+                frames: scenario.recording.frames.then(Vec::new),
+                // The robot has no sensor for this force.
+                bite_force_max_n: scenario.has_contact().then_some(0.0),
+                ..Figures::default()
+            },
         }
     }
 
@@ -151,38 +149,38 @@ impl Analysis {
     /// When a message on topic `frame` holds no CAN frame.
     pub fn take(&mut self, message: &Recorded) -> Result<(), TapError> {
         // What no recording has is in no figure: a run has the same ones with and without a recording.
-        if self.frames.is_none() && matches!(message, Recorded::Frame(_)) {
+        if self.figures.frames.is_none() && matches!(message, Recorded::Frame(_)) {
             return Ok(());
         }
         self.sequence.take(message);
-        self.digest.take(message);
+        self.digest.add_message(message);
         if let Some(requirements) = &mut self.requirements {
             requirements.take(message);
         }
         match message {
             Recorded::Command(command) => {
-                self.shown.iter_mut().for_each(|shown| shown.command(command));
-                self.axes.iter_mut().for_each(|axes| axes.command(command));
+                self.shown.iter_mut().for_each(|shown| shown.apply_command(command));
+                self.axes.iter_mut().for_each(|axes| axes.apply_command(command));
             }
-            Recorded::Reading(reading) => self.reading(reading),
-            Recorded::State(state) => self.state(state),
-            Recorded::Truth(truth) => self.truth(truth),
+            Recorded::Reading(reading) => self.apply_reading(reading),
+            Recorded::State(state) => self.apply_state(state),
+            Recorded::Truth(truth) => self.apply_truth(truth),
             Recorded::Contact(contact) => {
                 let since_ns = self.shown.as_mut().map(|shown| shown.over_time.since(contact.sampled_ns));
-                self.contact.take(contact, since_ns);
+                self.contact.add_contact(contact, since_ns);
             }
-            Recorded::Frame(frame) => self.frame(frame)?,
+            Recorded::Frame(frame) => self.apply_frame(frame)?,
             Recorded::Signals(message) => {
-                self.named.signals(message);
-                self.shown.iter_mut().for_each(|shown| shown.signals(message));
+                self.named.add_signals(message);
+                self.shown.iter_mut().for_each(|shown| shown.over_time.apply_signals(message));
             }
-            Recorded::Parameters(message) => self.named.parameters(message),
+            Recorded::Parameters(message) => self.named.add_parameters(message),
             Recorded::Event(event) => {
-                self.played.event(event);
-                self.event(EventRecord::of_run(event, &self.declared));
+                self.played.apply_event(event);
+                self.apply_event(EventRecord::of_run(event, &self.declared));
             }
             Recorded::Machine(machine) => {
-                self.shown.iter_mut().for_each(|shown| shown.longest_cycles.machine(machine));
+                self.shown.iter_mut().for_each(|shown| shown.longest_cycles.apply_machine(machine));
             }
         }
         Ok(())
@@ -209,122 +207,291 @@ impl Analysis {
         }
     }
 
-    fn reading(&mut self, reading: &Reading) {
-        let is_of_scenario = self.stalls.reading(reading);
-        let skipped = self.plant_skips.take(&Counters::from(reading), self.period_ns, is_of_scenario);
-        self.shown.iter_mut().for_each(|shown| shown.reading(reading, skipped));
-        self.axes.iter_mut().for_each(|axes| axes.reading(reading));
-        self.outage.reading(reading, is_of_scenario);
-        if self.stop.reading(reading) {
+    fn apply_reading(&mut self, reading: &Reading) {
+        let is_of_scenario = self.stalls.apply_reading(reading);
+        let skipped = self.plant_skips.account(&Counters::from(reading), self.period_ns, is_of_scenario);
+        self.shown.iter_mut().for_each(|shown| shown.apply_reading(reading, skipped));
+        self.axes.iter_mut().for_each(|axes| axes.apply_reading(reading));
+        self.outage.apply_reading(reading, is_of_scenario);
+        if self.stop.apply_reading(reading) {
             self.tracking.stop(reading.cycle);
         }
         self.first_sample_ns.get_or_insert(reading.sampled_ns);
         self.last_sample_ns = reading.sampled_ns;
     }
 
-    fn state(&mut self, state: &State) {
-        let is_fresh = self.freshness.take(state);
-        let (is_of_scenario, is_path_of_scenario) = self.stalls.state(state);
-        let skipped = self.controller_skips.take(&Counters::from(state), self.period_ns, is_of_scenario);
-        self.shown.iter_mut().for_each(|shown| shown.state(state, is_fresh, skipped));
-        self.outage.state(state, is_of_scenario);
-        let is_disturbed = self.disturbance.take(state, is_fresh, is_path_of_scenario);
+    fn apply_state(&mut self, state: &State) {
+        let is_fresh = self.freshness.is_first_use(state);
+        let (is_of_scenario, is_path_of_scenario) = self.stalls.apply_state(state);
+        let skipped = self.controller_skips.account(&Counters::from(state), self.period_ns, is_of_scenario);
+        self.shown.iter_mut().for_each(|shown| shown.apply_state(state, is_fresh, skipped));
+        self.outage.apply_state(state, is_of_scenario);
+        let is_disturbed = self.disturbance.may_act_in(state, is_fresh, is_path_of_scenario);
         if let Some(requirements) = self.requirements.as_mut().filter(|_| is_disturbed) {
             requirements.disturb(state.cycle);
         }
-        self.tracking.state(state, is_fresh, is_disturbed).into_iter().for_each(|sample| self.path(sample));
-        self.cycles = self.cycles.max(state.seq);
-        self.final_state = Some(state.controller_state.into());
-        self.stop.state(state);
-        self.played.state(state);
+        if let Some(sample) = self.tracking.apply_state(state, is_fresh, is_disturbed) {
+            self.apply_path(sample);
+        }
+        self.figures.cycles = self.figures.cycles.max(state.seq);
+        self.figures.final_state = Some(state.controller_state.into());
+        self.stop.apply_state(state);
+        self.played.apply_state(state);
     }
 
-    fn truth(&mut self, truth: &Truth) {
-        self.tracking.truth(truth).into_iter().flatten().for_each(|sample| self.path(sample));
-        self.bite_force_max_n = self.bite_force_max_n.map(|most_n| most_n.max(truth.bite_force_n));
-        self.shown.iter_mut().for_each(|shown| shown.truth(truth));
+    fn apply_truth(&mut self, truth: &Truth) {
+        self.tracking.apply_truth(truth).into_iter().flatten().for_each(|sample| self.apply_path(sample));
+        self.figures.bite_force_max_n.iter_mut().for_each(|most_n| *most_n = most_n.max(truth.bite_force_n));
+        self.shown.iter_mut().for_each(|shown| shown.apply_truth(truth));
     }
 
-    fn path(&mut self, sample: PathSample) {
-        self.shown.iter_mut().for_each(|shown| shown.over_time.path(&sample));
-        self.faults.sample(sample);
+    fn apply_path(&mut self, sample: PathSample) {
+        self.shown.iter_mut().for_each(|shown| shown.over_time.apply_path(&sample));
+        self.faults.apply_sample(sample);
     }
 
-    fn event(&mut self, event: EventRecord) {
-        self.faults.event(&event);
-        self.stop.event(&event);
+    fn apply_event(&mut self, event: EventRecord) {
+        self.faults.apply_event(&event);
+        self.stop.apply_event(&event);
         if let Some(requirements) = &mut self.requirements {
             requirements.event(&event);
         }
-        self.events.push(event);
+        self.figures.events.push(event);
     }
 
-    fn frame(&mut self, tap: &FrameTap) -> Result<(), TapError> {
+    fn apply_frame(&mut self, tap: &FrameTap) -> Result<(), TapError> {
         let bus = tap::bus_of(tap)?;
         let tapped = tap::decode(tap)?;
-        let Some(frames) = &mut self.frames else { return Ok(()) };
+        let Some(frames) = &mut self.figures.frames else { return Ok(()) };
         if bus >= frames.len() {
             frames.resize(bus + 1, 0);
         }
         frames[bus] += u64::from(tapped.frame().is_some());
-        self.shown.iter_mut().for_each(|shown| shown.frame(tap, bus, &tapped));
-        self.responses.frame(tap, bus, &tapped);
+        self.shown.iter_mut().for_each(|shown| shown.over_time.apply_frame(tap.time_ns, bus, &tapped));
+        self.responses.apply_frame(tap, bus, &tapped);
         Ok(())
     }
 
     /// The figures of all messages so far. `cut_short` and `damage` are what the recording itself lacks, as its
     /// [`Reader`](masseter_recording::Reader) found them.
     pub fn finish(mut self, cut_short: bool, damage: &[Damage]) -> Figures {
-        let (tracking, track) = self.tracking.finish();
+        let (tracking, track) = self.tracking.into_figures();
         let duration_ns =
             self.last_sample_ns.saturating_sub(self.first_sample_ns.unwrap_or(self.last_sample_ns));
         let topics = self.sequence.finish();
         let missing_frames =
             topics.iter().find(|topic| topic.topic == FrameTap::TOPIC).map_or(0, |topic| topic.missing);
-        let (signals, parameters) = self.named.finish();
-        let (stopped_by, enabled_cycles) = self.stop.finish();
-        let (reached_s, motion_departure) = self.played.finish();
+        let (stopped_by, enabled_cycles) = self.stop.into_figures();
+        let (reached_s, motion_departure) = self.played.into_figures();
         let enabled_s = enabled_cycles as f64 * self.period_ns as f64 / 1e9;
         let (intervals, worst_cycles, over_time, jaw_cycles) =
             self.shown.map_or_else(Default::default, |shown| {
                 let Shown { intervals, longest_cycles, over_time, jaw_cycles, .. } = *shown;
-                let over_time = over_time.finish(self.declared.signals.len());
-                (intervals.finish(), longest_cycles.finish(), over_time, jaw_cycles.finish())
+                let over_time = over_time.into_figures(self.declared.signals.len());
+                (
+                    intervals.into_figures(),
+                    longest_cycles.into_figures(),
+                    over_time,
+                    jaw_cycles.into_figures(),
+                )
             });
-        self.events.sort_by_key(|event| event.time_ns);
+        self.figures.events.sort_by_key(|event| event.time_ns);
         Figures {
-            digest: self.digest.finish(),
-            cycles: self.cycles,
+            digest: self.digest.in_hex(),
             duration_s: duration_ns as f64 / 1e9,
             overrun_attribution: OverrunAttribution::new(&[&self.controller_skips, &self.plant_skips]),
             controller_skips: self.controller_skips.figures,
             plant_skips: self.plant_skips.figures,
             readings: self.freshness.figures,
-            final_state: self.final_state,
             stopped_by,
             enabled_s,
             motion_reached_s: reached_s.map(|reached_s| reached_s.min(enabled_s)),
             motion_departure,
-            outage: self.outage.finish(self.period_ns),
+            outage: self.outage.outage(self.period_ns),
             tracking,
-            faults: self.faults.finish(),
+            faults: self.faults.into_figures(),
             requirements: self.requirements.map(Requirements::finish).unwrap_or_default(),
-            signals,
-            parameters,
-            bite_force_max_n: self.bite_force_max_n,
-            contact: self.contact.finish(),
+            signals: self.named.signals,
+            parameters: self.named.parameters,
+            contact: self.contact.into_figures(),
             jaw_cycles,
             worst_cycles,
             intervals,
             topics,
-            frames: self.frames,
-            bus_response: self.responses.finish(missing_frames),
-            events: self.events,
+            bus_response: self.responses.into_figures(missing_frames),
             cut_short,
             damage: damage.to_vec(),
-            axes: self.axes.map(AxisWatch::finish).unwrap_or_default(),
+            axes: self.axes.map(|axes| axes.figures).unwrap_or_default(),
             track,
             over_time,
+            ..self.figures
         }
+    }
+}
+
+/// Collects them.
+#[derive(Debug, Clone)]
+struct Shown {
+    /// Whether the mechanism is emulated, so that its true motion is recorded.
+    has_truth: bool,
+    intervals: Intervals,
+    longest_cycles: LongestCycles,
+    over_time: OverTimeCollector,
+    jaw_cycles: JawCycles,
+}
+
+impl Shown {
+    fn new(scenario: &Scenario) -> Self {
+        Self {
+            has_truth: scenario.can.is_virtual(),
+            intervals: Intervals::new(scenario.period_ns()),
+            longest_cycles: LongestCycles::default(),
+            over_time: OverTimeCollector::new(scenario.jaw.reference_point_m, scenario.can.bitrate().ok()),
+            jaw_cycles: JawCycles::new(scenario.jaw.reference_point_m, scenario.has_contact()),
+        }
+    }
+
+    fn apply_command(&mut self, command: &Command) {
+        self.intervals.apply_command(command);
+        self.longest_cycles.apply_command(command);
+    }
+
+    /// `skipped`: deadlines skipped just before it.
+    fn apply_reading(&mut self, reading: &Reading, skipped: u64) {
+        self.intervals.apply_reading(reading, skipped);
+        self.longest_cycles.apply_reading(reading);
+        self.over_time.wake_up(PLANT, reading.due_ns, reading.woke_ns);
+        if !self.has_truth && reading.drive_state.iter().all(|state| *state != NO_DRIVE_STATE) {
+            self.over_time.reported(reading);
+        }
+    }
+
+    /// `is_fresh`: the state's reading is used for the first time. `skipped`: deadlines skipped just before it.
+    fn apply_state(&mut self, state: &State, is_fresh: bool, skipped: u64) {
+        self.intervals.apply_state(state, is_fresh, skipped);
+        self.longest_cycles.apply_state(state, is_fresh);
+        self.over_time.wake_up(CONTROLLER, state.due_ns, state.woke_ns);
+        if is_fresh {
+            self.solution(state);
+        }
+    }
+
+    fn solution(&mut self, state: &State) {
+        if is_running(state) {
+            self.over_time.running(state.sampled_ns);
+        }
+        let estimated = estimated_pose(state);
+        if self.has_truth {
+            self.over_time.incisal(Place::Estimated, state.sampled_ns, estimated.as_ref());
+        } else {
+            self.actual(state.sampled_ns, estimated.as_ref(), 0.0);
+        }
+    }
+
+    /// The actual pose of the platform, and the vertical force on the jaw.
+    fn actual(&mut self, sampled_ns: u64, actual: Option<&Pose>, force_n: f64) {
+        self.over_time.incisal(Place::Actual, sampled_ns, actual);
+        let since_ns = self.over_time.since(sampled_ns);
+        if let Some(pose) = actual {
+            self.jaw_cycles.add_pose(since_ns, pose, force_n);
+        }
+    }
+
+    fn apply_truth(&mut self, truth: &Truth) {
+        let actual = true_pose(truth);
+        self.over_time.apply_truth(truth);
+        self.actual(truth.sampled_ns, actual.as_ref(), truth.bite_force_n);
+    }
+}
+
+/// The figures of a run. As JSON: `figures` of `summary.json`.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Figures {
+    /// A short number for targets, positions and states by cycle: equal where two runs did the same.
+    pub digest: String,
+    /// Cycles that the controller ran.
+    pub cycles: u64,
+    /// From the first to the last reading, s.
+    pub duration_s: f64,
+    /// Deadlines that the controller skipped after overruns.
+    pub controller_skips: SkipFigures,
+    /// Deadlines that the plant skipped after overruns.
+    pub plant_skips: SkipFigures,
+    /// Which readings the controller's cycles used.
+    pub readings: ReadingFigures,
+    /// Rig or machine as the cause of the overlong stretches of work; none where no such stretch cost a deadline.
+    pub overrun_attribution: Option<OverrunAttribution>,
+    /// The last state of the controller's sequence; none without a single state message.
+    pub final_state: Option<Code<ControllerState>>,
+    /// What stopped the drives, whatever the controller reports; none where nothing did.
+    pub stopped_by: Option<StoppedBy>,
+    /// For how long all drives were enabled, s.
+    pub enabled_s: f64,
+    /// How far the motion came, s of its own time: what the controller stated, as far as the drives were enabled so long and
+    /// that time did not jump, vanish, or pass unseen; none where it stated none.
+    pub motion_reached_s: Option<f64>,
+    /// How far the stated desired poses are from the scenario's motion; none where they need not be it: in an own motion,
+    /// with force control, and from where the amplitude is set.
+    pub motion_departure: Option<Departure>,
+    /// Deadlines missed just before a safe stop; none without one.
+    pub outage: Option<Outage>,
+    /// Distance of the platform from its desired pose, while the motion played.
+    pub tracking: TrackingFigures,
+    /// The scenario's faults, in their order.
+    pub faults: Vec<FaultFigures>,
+    /// The scenario's requirements, in their order, then the events that it expects.
+    pub requirements: Vec<RequirementFigures>,
+    /// The controller's signals.
+    pub signals: Vec<SignalFigures>,
+    /// The controller's parameters.
+    pub parameters: Vec<ParameterFigures>,
+    /// The greatest vertical force of food and upper teeth on the emulated jaw, N; none where the jaws cannot touch,
+    /// and on the robot.
+    pub bite_force_max_n: Option<f64>,
+    /// What the lower teeth bore; none where the jaws cannot touch, and on the robot.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contact: Option<ContactFigures>,
+    /// Cycles of the jaw; none without a report.
+    pub jaw_cycles: JawCycleFigures,
+    /// Measured intervals.
+    pub intervals: Vec<IntervalFigures>,
+    /// The longest cycles, each with the hop furthest above its median.
+    pub worst_cycles: Vec<WorstCycle>,
+    /// Messages and losses of each topic.
+    pub topics: Vec<TopicFigures>,
+    /// Frames on each bus; none where the scenario leaves them out.
+    pub frames: Option<Vec<u64>>,
+    /// Response times of the buses' messages, beside their bounds.
+    pub bus_response: BusResponse,
+    /// Events in the order of their times.
+    pub events: Vec<EventRecord>,
+    /// Whether the recording lacks its end.
+    pub cut_short: bool,
+    /// Stretches of the recording that cannot be read.
+    pub damage: Vec<Damage>,
+    /// How each drive met the demands while the motion played; zeros but in a dry run.
+    #[serde(skip)]
+    pub axes: [AxisFigures; AXES],
+    /// Tracking over time, for plots.
+    #[serde(skip)]
+    pub track: Track,
+    /// Wake-ups, axes and buses over time, for plots.
+    #[serde(skip)]
+    pub over_time: OverTime,
+}
+
+impl Figures {
+    /// Deadlines that the two processes skipped, and those of them that the machine caused: it stalled while they
+    /// waited, or may have stalled while they worked.
+    pub fn skipped(&self) -> (u64, u64) {
+        let (controller, plant) = (&self.controller_skips, &self.plant_skips);
+        let is_machine = self.overrun_attribution.is_some_and(|overruns| overruns.may_be_the_machine());
+        let while_working = if is_machine { controller.while_working + plant.while_working } else { 0 };
+        (controller.skipped + plant.skipped, controller.by_machine + plant.by_machine + while_working)
+    }
+
+    /// Messages that were published and not recorded.
+    pub fn missing_messages(&self) -> u64 {
+        self.topics.iter().map(|topic| topic.missing).sum()
     }
 }

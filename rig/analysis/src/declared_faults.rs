@@ -7,10 +7,8 @@ use masseter_model::geometry::Deviation;
 use masseter_runtime::messages::codes::{Cause, Source};
 use serde::Serialize;
 
-use super::code::Code;
-use super::events::EventRecord;
-use super::pose_errors::worse;
-use super::tracking::PathSample;
+use crate::events::{Code, EventRecord};
+use crate::tracking::{PathSample, worse};
 
 /// A declared fault and its effect.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -74,7 +72,7 @@ impl FaultWatch {
         Self { faults: vec![Effect::default(); declared], stops: Vec::new(), recent }
     }
 
-    pub(super) fn event(&mut self, event: &EventRecord) {
+    pub(super) fn apply_event(&mut self, event: &EventRecord) {
         let EventRecord { time_ns, source, cause, .. } = *event;
         if cause == Cause::FaultInjected {
             self.strike(event.value as usize, time_ns);
@@ -91,20 +89,20 @@ impl FaultWatch {
         }
     }
 
-    pub(super) fn sample(&mut self, sample: PathSample) {
+    pub(super) fn apply_sample(&mut self, sample: PathSample) {
         if self.faults.is_empty() {
             return;
         }
         if self.recent.len() == KEPT
             && let Some(oldest) = self.recent.pop_front()
         {
-            self.settle(&oldest);
+            self.count_sample(&oldest);
         }
         self.recent.push_back(sample);
     }
 
     /// Counts a sample for every fault that had struck, until the stop.
-    fn settle(&mut self, sample: &PathSample) {
+    fn count_sample(&mut self, sample: &PathSample) {
         for fault in &mut self.faults {
             let Some(struck_ns) = fault.struck_ns.filter(|struck_ns| *struck_ns <= sample.sampled_ns) else {
                 continue;
@@ -121,9 +119,9 @@ impl FaultWatch {
         }
     }
 
-    pub(super) fn finish(mut self) -> Vec<FaultFigures> {
+    pub(super) fn into_figures(mut self) -> Vec<FaultFigures> {
         while let Some(sample) = self.recent.pop_front() {
-            self.settle(&sample);
+            self.count_sample(&sample);
         }
         let figures = |(index, fault): (usize, &Effect)| {
             // A fault that strikes during a stop has not begun it.
@@ -184,16 +182,16 @@ mod tests {
         for (sampled_ns, incisal_m) in
             [(0, 9e-3), (1_000_000, 1e-4), (2_000_000, 3e-4), (3_000_000, 2e-4), (4_000_000, 5e-3)]
         {
-            watch.sample(sample(sampled_ns, incisal_m));
+            watch.apply_sample(sample(sampled_ns, incisal_m));
         }
         let emergency = |time_ns| event(time_ns, Source::Drive, EventKind::Fault, Cause::Emergency, 33_792.0);
-        watch.event(&emergency(1_500_000));
-        watch.event(&safe_stop(5_000_000));
-        watch.event(&event(3_500_000, Source::Master, EventKind::Fault, Cause::ProcessDataLost, 4.0));
-        watch.event(&struck(1_000_000, 1.0));
-        watch.event(&struck(4_500_000, 2.0));
-        watch.event(&emergency(6_500_000));
-        let found = watch.finish();
+        watch.apply_event(&emergency(1_500_000));
+        watch.apply_event(&safe_stop(5_000_000));
+        watch.apply_event(&event(3_500_000, Source::Master, EventKind::Fault, Cause::ProcessDataLost, 4.0));
+        watch.apply_event(&struck(1_000_000, 1.0));
+        watch.apply_event(&struck(4_500_000, 2.0));
+        watch.apply_event(&emergency(6_500_000));
+        let found = watch.into_figures();
         assert_eq!(found.iter().map(|figures| figures.number).collect::<Vec<_>>(), [1, 2, 3]);
 
         let first = &found[0];
@@ -210,11 +208,11 @@ mod tests {
     #[test]
     fn the_controllers_safe_stop_is_one_and_its_other_steps_are_not() {
         let mut watch = FaultWatch::new(1);
-        watch.event(&event(5, Source::Wire, EventKind::Notice, Cause::FaultInjected, 1.0));
-        watch.event(&event(7, Source::Controller, EventKind::Fault, Cause::TrackingLost, 1e-3));
-        watch.event(&safe_stop(2_000_000));
-        (0..4).for_each(|i| watch.sample(sample(i * 1_000_000, i as f64 * 1e-3)));
-        let found = watch.finish();
+        watch.apply_event(&event(5, Source::Wire, EventKind::Notice, Cause::FaultInjected, 1.0));
+        watch.apply_event(&event(7, Source::Controller, EventKind::Fault, Cause::TrackingLost, 1e-3));
+        watch.apply_event(&safe_stop(2_000_000));
+        (0..4).for_each(|i| watch.apply_sample(sample(i * 1_000_000, i as f64 * 1e-3)));
+        let found = watch.into_figures();
         assert!((found[0].deviation_mm - 2.0).abs() < 1e-12, "{found:?}");
         assert!(found[0].detection.unwrap().source == Source::Controller, "{found:?}");
     }
@@ -223,9 +221,9 @@ mod tests {
     fn a_deviation_that_is_no_number_is_infinite() {
         for bad in [0, 2] {
             let mut watch = FaultWatch::new(1);
-            watch.event(&event(0, Source::Wire, EventKind::Notice, Cause::FaultInjected, 1.0));
-            (0..3).for_each(|i| watch.sample(sample(i, if i == bad { f64::NAN } else { 1e-5 })));
-            let found = watch.finish();
+            watch.apply_event(&event(0, Source::Wire, EventKind::Notice, Cause::FaultInjected, 1.0));
+            (0..3).for_each(|i| watch.apply_sample(sample(i, if i == bad { f64::NAN } else { 1e-5 })));
+            let found = watch.into_figures();
             assert_eq!((found[0].deviation_mm, found[0].deviation_deg), (f64::INFINITY, f64::INFINITY));
         }
     }
@@ -233,9 +231,9 @@ mod tests {
     #[test]
     fn an_undetected_fault_is_followed_to_the_end_of_a_long_run() {
         let mut watch = FaultWatch::new(1);
-        watch.event(&event(5, Source::Wire, EventKind::Notice, Cause::FaultInjected, 1.0));
-        (0..3 * KEPT as u64).for_each(|i| watch.sample(sample(i, if i == 10 { 2e-3 } else { 1e-5 })));
-        let found = watch.finish();
+        watch.apply_event(&event(5, Source::Wire, EventKind::Notice, Cause::FaultInjected, 1.0));
+        (0..3 * KEPT as u64).for_each(|i| watch.apply_sample(sample(i, if i == 10 { 2e-3 } else { 1e-5 })));
+        let found = watch.into_figures();
         assert!((found[0].deviation_mm - 2.0).abs() < 1e-12, "{found:?}");
     }
 }

@@ -1,4 +1,6 @@
-//! Events with their codes resolved.
+//! Codes and events of messages, resolved. A recording of another version may hold codes that this program does not know.
+
+use std::fmt;
 
 use masseter_model::geometry::AXIS_NAMES;
 use masseter_runtime::messages::codes::{
@@ -6,9 +8,44 @@ use masseter_runtime::messages::codes::{
 };
 use masseter_runtime::messages::{Event, explain};
 use masseter_runtime::named::Declared;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
-use super::code::Code;
+/// The meaning of a code, or its number where the code has no meaning in this version.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Code<T> {
+    /// The meaning.
+    Known(T),
+    /// The number.
+    Unknown(u32),
+}
+
+impl<T: TryFrom<u32>> From<u32> for Code<T> {
+    fn from(code: u32) -> Self {
+        T::try_from(code).map_or(Self::Unknown(code), Self::Known)
+    }
+}
+
+impl<T: PartialEq> PartialEq<T> for Code<T> {
+    fn eq(&self, other: &T) -> bool {
+        matches!(self, Self::Known(known) if known == other)
+    }
+}
+
+impl<T: fmt::Display> fmt::Display for Code<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Known(known) => known.fmt(f),
+            Self::Unknown(code) => write!(f, "code {code}"),
+        }
+    }
+}
+
+/// As its name.
+impl<T: fmt::Display> Serialize for Code<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
 
 /// An event with its codes resolved.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -41,17 +78,19 @@ pub struct EventRecord {
 impl EventRecord {
     /// Whether it begins a safe stop. The master's faults all stop the drives; a drive's emergency alone stops nothing.
     pub fn begins_stop(&self) -> bool {
-        let is_safe_stop = |[_, to]: &[String; 2]| to == ControllerState::SafeStop.name();
-        (self.source == Source::Controller && self.transition.as_ref().is_some_and(is_safe_stop))
-            || self.is_fault_of_master()
+        self.enters(ControllerState::SafeStop) || self.is_fault_of_master()
+    }
+
+    /// Whether the controller enters that state.
+    pub(crate) fn enters(&self, state: ControllerState) -> bool {
+        let is_into = |[_, to]: &[String; 2]| to == state.name();
+        self.source == Source::Controller && self.transition.as_ref().is_some_and(is_into)
     }
 
     pub(crate) fn is_fault_of_master(&self) -> bool {
         self.source == Source::Master && self.kind == EventKind::Fault
     }
-}
 
-impl EventRecord {
     /// The same, of a run whose controller declared these parameters.
     pub(crate) fn of_run(event: &Event, declared: &Declared) -> Self {
         let text = explain(event).or_else(|| change(event, declared));
@@ -91,4 +130,20 @@ fn change(event: &Event, declared: &Declared) -> Option<String> {
     let text =
         format!("{} was set from {} to {} {}", parameter.name, event.limit, event.value, parameter.unit);
     Some(text.trim_end().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_runtime::messages::codes::EventKind;
+
+    use super::*;
+
+    #[test]
+    fn a_code_is_written_as_its_name_and_an_unknown_code_as_its_number() {
+        let fault = Code::<EventKind>::from(EventKind::Fault.code());
+        assert!(fault == EventKind::Fault && fault != EventKind::Transition);
+        let unknown = Code::<EventKind>::from(4000);
+        assert!(EventKind::ALL.iter().all(|kind| unknown != *kind));
+        assert_eq!(serde_json::to_string(&[fault, unknown]).unwrap(), r#"["fault","code 4000"]"#);
+    }
 }

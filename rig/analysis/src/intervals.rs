@@ -5,9 +5,38 @@
 
 use masseter_runtime::messages::{Command, Reading, State};
 
-use super::answer::{Answer, Answers};
-use super::by_cycle::ByCycle;
-use super::measured::{IntervalFigures, Measured};
+use crate::measured::{IntervalFigures, Measured};
+use crate::series::ByCycle;
+
+/// A command that the plant took.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Answer {
+    /// The controller's.
+    pub(super) cycle: u64,
+    pub(super) received_ns: u64,
+    /// None where nothing went out, as before the drives exchange process data.
+    pub(super) sent_ns: Option<u64>,
+}
+
+/// Finds the readings that answer a new command.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Answers {
+    last: u64,
+}
+
+impl Answers {
+    /// Once for each command.
+    pub(super) fn new_answer(&mut self, reading: &Reading) -> Option<Answer> {
+        if reading.answers_cycle <= self.last {
+            return None;
+        }
+        self.last = reading.answers_cycle;
+        let (received_ns, sent_ns) = (reading.command_received_ns, reading.command_sent_ns);
+        // An older instant belongs to an older command, whose times the plant repeats.
+        let is_of_this = sent_ns > 0 && sent_ns >= received_ns;
+        Some(Answer { cycle: self.last, received_ns, sent_ns: is_of_this.then_some(sent_ns) })
+    }
+}
 
 /// An interval that a cycle passes through.
 #[derive(Debug, Clone, Copy)]
@@ -48,7 +77,7 @@ const NAMES: [&str; Interval::RoundTrip as usize + 1] = [
 
 /// All intervals of a run, and the latest messages, between which they lie. The later message completes an interval,
 /// whichever that is.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Intervals {
     period_ns: u64,
     measured: Vec<Measured>,
@@ -65,16 +94,7 @@ pub(super) struct Intervals {
 
 impl Intervals {
     pub(super) fn new(period_ns: u64) -> Self {
-        Self {
-            period_ns,
-            measured: NAMES.map(Measured::new).into(),
-            answers: Answers::default(),
-            readings: ByCycle::default(),
-            received_ns: ByCycle::default(),
-            states: ByCycle::default(),
-            commands: ByCycle::default(),
-            answered: ByCycle::default(),
-        }
+        Self { period_ns, measured: NAMES.map(Measured::new).into(), ..Self::default() }
     }
 
     fn add(&mut self, interval: Interval, from_ns: u64, to_ns: u64) {
@@ -89,7 +109,7 @@ impl Intervals {
     }
 
     /// `skipped`: deadlines skipped just before it.
-    pub(super) fn reading(&mut self, reading: &Reading, skipped: u64) {
+    pub(super) fn apply_reading(&mut self, reading: &Reading, skipped: u64) {
         let wake_up = [Interval::PlantWakeUp, Interval::PlantWakeUpCorrected];
         self.add_wake_up(wake_up, [reading.due_ns, reading.woke_ns], skipped);
         if reading.complete_ns > 0 {
@@ -99,7 +119,7 @@ impl Intervals {
             self.add(Interval::ReadingTransport, reading.published_ns, received_ns);
         }
         self.readings.insert(reading.cycle, *reading);
-        let Some(answer) = self.answers.take(reading) else { return };
+        let Some(answer) = self.answers.new_answer(reading) else { return };
         if let Some(sent_ns) = answer.sent_ns {
             self.add(Interval::CommandToWire, answer.received_ns, sent_ns);
         }
@@ -113,7 +133,7 @@ impl Intervals {
     }
 
     /// `is_fresh`: the state's reading is used for the first time. `skipped`: deadlines skipped just before it.
-    pub(super) fn state(&mut self, state: &State, is_fresh: bool, skipped: u64) {
+    pub(super) fn apply_state(&mut self, state: &State, is_fresh: bool, skipped: u64) {
         let wake_up = [Interval::ControllerWakeUp, Interval::ControllerWakeUpCorrected];
         self.add_wake_up(wake_up, [state.due_ns, state.woke_ns], skipped);
         if !is_fresh {
@@ -134,7 +154,7 @@ impl Intervals {
         self.states.insert(state.cycle, *state);
     }
 
-    pub(super) fn command(&mut self, command: &Command) {
+    pub(super) fn apply_command(&mut self, command: &Command) {
         if let Some(state) = self.states.get(command.cycle).copied() {
             self.add(Interval::ControllerCycle, state.received_ns, command.published_ns);
         }
@@ -163,128 +183,10 @@ impl Intervals {
         }
     }
 
-    pub(super) fn finish(self) -> Vec<IntervalFigures> {
-        self.measured.into_iter().map(Measured::finish).collect()
+    pub(super) fn into_figures(self) -> Vec<IntervalFigures> {
+        self.measured.into_iter().map(Measured::into_figures).collect()
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const PERIOD_NS: u64 = 1_000_000;
-
-    fn intervals() -> Intervals {
-        Intervals::new(PERIOD_NS)
-    }
-
-    /// Samples and largest value of each interval.
-    fn found(intervals: Intervals) -> Vec<(&'static str, u64, Option<u64>)> {
-        let figures = intervals.finish();
-        figures.iter().map(|interval| (interval.name, interval.n, interval.max_ns)).collect()
-    }
-
-    /// Samples and largest value of one interval.
-    fn only(name: &str, intervals: Intervals) -> (u64, Option<u64>) {
-        let (_, n, max_ns) = found(intervals).into_iter().find(|(other, ..)| *other == name).unwrap();
-        (n, max_ns)
-    }
-
-    /// Reading 4 came too late for cycle 4: cycle 5 used it.
-    fn reading() -> Reading {
-        let (sampled_ns, complete_ns, published_ns) = (130, 530, 600);
-        Reading { cycle: 4, woke_ns: 30, sampled_ns, complete_ns, published_ns, ..Reading::default() }
-    }
-
-    fn state() -> State {
-        let (received_ns, solved_ns, commanded_ns) = (1010, 1020, 1050);
-        State { cycle: 5, reading_cycle: 4, received_ns, solved_ns, commanded_ns, ..State::default() }
-    }
-
-    fn command() -> Command {
-        Command { cycle: 5, reading_cycle: 4, published_ns: 1060, ..Command::default() }
-    }
-
-    fn answer() -> Reading {
-        let (command_received_ns, command_sent_ns) = (1100, 1400);
-        Reading { cycle: 6, answers_cycle: 5, command_received_ns, command_sent_ns, ..Reading::default() }
-    }
-
-    #[test]
-    fn a_late_reading_is_followed_to_the_wire_in_whatever_order_the_topics_are_recorded() {
-        let expected = [
-            ("process data", 1, Some(400)),
-            ("reading transport", 1, Some(410)),
-            ("forward kinematics", 1, Some(10)),
-            ("control", 1, Some(30)),
-            ("controller cycle", 1, Some(50)),
-            ("command transport", 1, Some(40)),
-            ("command to wire", 1, Some(300)),
-            ("sample to wire", 1, Some(1270)),
-            // SYNC to the reading's publication 570, its reception to the command's 90.
-            ("round trip", 1, Some(660)),
-        ];
-        let take = |intervals: &mut Intervals, message: char| match message {
-            'r' => intervals.reading(&reading(), 0),
-            's' => intervals.state(&state(), true, 0),
-            'c' => intervals.command(&command()),
-            _ => intervals.reading(&answer(), 0),
-        };
-        for order in ["rsca", "rsac", "rcsa", "rcas", "rasc", "racs", "srca", "crsa", "scra", "csra"] {
-            let mut intervals = intervals();
-            order.chars().for_each(|message| take(&mut intervals, message));
-            let found = found(intervals);
-            for expected in expected {
-                assert!(found.contains(&expected), "{order}: {expected:?} in {found:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn the_longest_round_trip_was_when_the_plant_had_the_command() {
-        let mut intervals = intervals();
-        intervals.reading(&reading(), 0);
-        intervals.state(&state(), true, 0);
-        intervals.reading(&answer(), 0);
-        let figures = intervals.finish();
-        let trip = figures.iter().find(|interval| interval.name == "round trip").unwrap();
-        assert_eq!((trip.max_ns, trip.max_at_ns), (Some(660), Some(1100)));
-    }
-
-    #[test]
-    fn a_reading_used_again_gives_no_samples() {
-        let mut intervals = intervals();
-        intervals.reading(&reading(), 0);
-        intervals.state(&state(), true, 0);
-        intervals.state(&State { cycle: 6, ..state() }, false, 0);
-        assert_eq!(only("forward kinematics", intervals), (1, Some(10)));
-    }
-
-    #[test]
-    fn a_command_that_never_reached_the_wire_has_no_way_there() {
-        let mut intervals = intervals();
-        intervals.reading(&reading(), 0);
-        intervals.command(&command());
-        intervals.reading(&Reading { command_sent_ns: 400, ..answer() }, 0);
-        let found = found(intervals);
-        for expected in
-            [("command transport", 1, Some(40)), ("command to wire", 0, None), ("sample to wire", 0, None)]
-        {
-            assert!(found.contains(&expected), "{expected:?} in {found:?}");
-        }
-    }
-
-    #[test]
-    fn a_skipped_deadline_counts_in_the_corrected_wake_up_only() {
-        let states = || {
-            let mut intervals = intervals();
-            intervals.state(&State::default(), false, 0);
-            // Woken 200 µs after deadline 5; 2 to 4 were skipped.
-            let late = State { due_ns: 5 * PERIOD_NS, woke_ns: 5_200_000, ..State::default() };
-            intervals.state(&late, false, 3);
-            intervals
-        };
-        assert_eq!(only("controller wake-up", states()), (2, Some(200_000)));
-        assert_eq!(only("controller wake-up corrected", states()), (5, Some(3_200_000)));
-    }
-}
+mod tests;

@@ -1,16 +1,142 @@
 //! The cycles that took longest from the plant's deadline to the command on the wire, each with the hop furthest above
-//! its median.
+//! its median and the kernel's counters around it.
 //!
-//! Where a newer command overtook the cycle's own, the path ends with the first later command that went out: the
-//! longest cycles end so. A cycle without a fresh reading has no path.
+//! SYNC on the wire and the waits of the time table lie between the hops, so a delay counts in one hop alone. Where a newer
+//! command overtook the cycle's own, the path ends with the first later command that went out: the longest cycles end so.
+//! A cycle without a fresh reading has no path.
 
+use hdrhistogram::Histogram;
 use masseter_runtime::messages::{Command, Machine, Reading, State};
 use serde::Serialize;
 
-use super::answer::{Answer, Answers};
-use super::by_cycle::ByCycle;
-use super::hops::{CyclePath, TypicalHops, passed_ns};
-use super::kernel_counts::KernelCounts;
+use crate::intervals::{Answer, Answers};
+use crate::measured::{histogram, record};
+use crate::series::ByCycle;
+
+/// A cycle's path, joined from messages of both processes.
+#[derive(Debug, Clone, Copy)]
+struct CyclePath {
+    reading: Reading,
+    state: State,
+    /// Publication of the command.
+    published_ns: u64,
+    /// Reception by the plant of the command that ended the path.
+    received_ns: u64,
+    /// When its last process data were on the wire.
+    sent_ns: u64,
+    /// Time for which the machine stalled meanwhile.
+    stalled_ns: u64,
+}
+
+impl CyclePath {
+    fn total_ns(&self) -> u64 {
+        passed_ns(self.reading.due_ns, self.sent_ns)
+    }
+}
+
+/// The beginning and the end of a hop, ns.
+type Ends = fn(&CyclePath) -> [u64; 2];
+
+/// The hops in the order in which a cycle passes through them.
+const HOPS: [(&str, Ends); 10] = [
+    ("plant wake-up", |path| [path.reading.due_ns, path.reading.woke_ns]),
+    ("process data", |path| [path.reading.sampled_ns, path.reading.complete_ns]),
+    ("reading publication", |path| [path.reading.complete_ns, path.reading.published_ns]),
+    ("controller wake-up", |path| [path.state.due_ns, path.state.woke_ns]),
+    // Until it wakes, the controller does not wait for the reading.
+    ("reading pick-up", |path| [path.reading.published_ns.max(path.state.woke_ns), path.state.received_ns]),
+    ("forward kinematics", |path| [path.state.received_ns, path.state.solved_ns]),
+    ("control", |path| [path.state.solved_ns, path.state.commanded_ns]),
+    ("command publication", |path| [path.state.commanded_ns, path.published_ns]),
+    ("command transport", |path| [path.published_ns, path.received_ns]),
+    ("command to wire", |path| [path.received_ns, path.sent_ns]),
+];
+
+/// The names of the hops, in the order in which a cycle passes through them.
+pub fn hop_names() -> impl Iterator<Item = &'static str> {
+    HOPS.into_iter().map(|(name, _)| name)
+}
+
+/// A hop of one cycle beside its median.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct HopTime {
+    name: &'static str,
+    took_ns: u64,
+    p50_ns: u64,
+}
+
+/// How long the hops typically take.
+#[derive(Debug, Clone)]
+struct TypicalHops([Histogram<u64>; HOPS.len()]);
+
+impl Default for TypicalHops {
+    fn default() -> Self {
+        Self(std::array::from_fn(|_| histogram()))
+    }
+}
+
+impl TypicalHops {
+    fn add(&mut self, path: &CyclePath) {
+        for (histogram, (_, ends)) in self.0.iter_mut().zip(HOPS) {
+            record(histogram, took_ns(ends, path), 1);
+        }
+    }
+
+    /// The hop furthest above its median.
+    fn furthest_above_median(&self, path: &CyclePath) -> HopTime {
+        let hops = HOPS.into_iter().zip(&self.0).map(|((name, ends), histogram)| HopTime {
+            name,
+            took_ns: took_ns(ends, path),
+            p50_ns: histogram.value_at_quantile(0.5).min(histogram.max()),
+        });
+        hops.max_by_key(|hop| hop.took_ns.saturating_sub(hop.p50_ns)).expect("there are hops")
+    }
+}
+
+fn took_ns(ends: Ends, path: &CyclePath) -> u64 {
+    let [from_ns, to_ns] = ends(path);
+    passed_ns(from_ns, to_ns)
+}
+
+/// 0 where the two are in the wrong order, as in a damaged recording.
+fn passed_ns(from_ns: u64, to_ns: u64) -> u64 {
+    to_ns.saturating_sub(from_ns)
+}
+
+/// Growth of the kernel's counters between the samples before and after a cycle.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct KernelCounts {
+    /// From one sample to the other, ns.
+    pub looked_over_ns: Option<u64>,
+    /// Time that the hypervisor took from all cores meanwhile, as far as it reports that, ns.
+    pub stolen_ns: Option<u64>,
+    /// Times that one of the loops lost its core.
+    pub involuntary_switches: Option<u64>,
+    /// Page faults of both processes.
+    pub page_faults: Option<u64>,
+}
+
+impl KernelCounts {
+    /// Growth between the last of all samples before a stretch of time and the first behind it.
+    fn around(samples: &[Machine], from_ns: u64, to_ns: u64) -> Self {
+        let before = samples.partition_point(|sample| sample.time_ns <= from_ns);
+        let after = samples.partition_point(|sample| sample.time_ns < to_ns);
+        match (before.checked_sub(1), samples.get(after)) {
+            (Some(before), Some(after)) => Self::between(&samples[before], after),
+            _ => Self::default(),
+        }
+    }
+
+    fn between(before: &Machine, after: &Machine) -> Self {
+        let growth = |counter: fn(&Machine) -> u64| Some(counter(after).saturating_sub(counter(before)));
+        Self {
+            looked_over_ns: growth(|machine| machine.time_ns),
+            stolen_ns: growth(|machine| machine.stolen_ns),
+            involuntary_switches: growth(|machine| machine.involuntary_switches.iter().sum()),
+            page_faults: growth(|machine| machine.page_faults.iter().sum()),
+        }
+    }
+}
 
 /// Cycles kept.
 const WORST: usize = 10;
@@ -71,13 +197,14 @@ pub(super) struct LongestCycles {
 }
 
 impl LongestCycles {
-    pub(super) fn reading(&mut self, reading: &Reading) {
+    pub(super) fn apply_reading(&mut self, reading: &Reading) {
         let late_ns = reading.woke_ns.saturating_sub(reading.due_ns);
         let stalled_ns = self.plant_stalls.when_due_ns(reading.stalled_ns, late_ns);
         if reading.complete_ns > 0 {
             self.readings.insert(reading.cycle, (*reading, stalled_ns));
         }
-        let Some(Answer { cycle, received_ns, sent_ns: Some(sent_ns) }) = self.answers.take(reading) else {
+        let Some(Answer { cycle, received_ns, sent_ns: Some(sent_ns) }) = self.answers.new_answer(reading)
+        else {
             return;
         };
         // The command also ends the wait for those that it overtook.
@@ -88,7 +215,7 @@ impl LongestCycles {
     }
 
     /// `is_fresh`: the state's reading is used for the first time.
-    pub(super) fn state(&mut self, state: &State, is_fresh: bool) {
+    pub(super) fn apply_state(&mut self, state: &State, is_fresh: bool) {
         let late_ns = state.woke_ns.saturating_sub(state.due_ns);
         let stalled_ns = self.controller_stalls.when_due_ns(state.stalled_ns, late_ns);
         if let Some(last_cycle) = self.last_cycle.replace(state.cycle) {
@@ -99,17 +226,17 @@ impl LongestCycles {
         }
     }
 
-    pub(super) fn command(&mut self, command: &Command) {
+    pub(super) fn apply_command(&mut self, command: &Command) {
         self.add(command.cycle, |parts| parts.published_ns = Some(command.published_ns));
     }
 
-    pub(super) fn machine(&mut self, machine: &Machine) {
+    pub(super) fn apply_machine(&mut self, machine: &Machine) {
         self.kernel.push(*machine);
     }
 
     /// Adds a part; the last one completes the path.
     fn add(&mut self, cycle: u64, put: impl FnOnce(&mut Parts)) {
-        let mut parts = self.parts.take(cycle).unwrap_or_default();
+        let mut parts = self.parts.remove(cycle).unwrap_or_default();
         put(&mut parts);
         match self.path(&parts) {
             Some(path) => self.keep(&path),
@@ -129,7 +256,7 @@ impl LongestCycles {
     }
 
     fn keep(&mut self, path: &CyclePath) {
-        self.typical.take(path);
+        self.typical.add(path);
         let place = self.longest.partition_point(|worse| worse.total_ns() >= path.total_ns());
         if place < WORST {
             self.longest.insert(place, *path);
@@ -138,7 +265,7 @@ impl LongestCycles {
     }
 
     /// The worst cycles, longest first.
-    pub(super) fn finish(self) -> Vec<WorstCycle> {
+    pub(super) fn into_figures(self) -> Vec<WorstCycle> {
         let worst_cycle = |path: &CyclePath| {
             let hop = self.typical.furthest_above_median(path);
             let (due_ns, total_ns) = (path.reading.due_ns, path.total_ns());
@@ -173,159 +300,4 @@ impl Stalls {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::hops::hop_names;
-    use super::*;
-
-    type HopTimes = [u64; 10];
-
-    const PERIOD_NS: u64 = 1_000_000;
-    const SYNC_NS: u64 = 48_000;
-    const CONTROLLER_AT_NS: u64 = 540_000;
-    /// The reading is there 90 µs before the controller wakes.
-    const TYPICAL_NS: HopTimes = [0, 360_000, 42_000, 0, 1_000, 2_000, 500, 500, 2_000, 280_000];
-
-    /// Cycles as the time table has them.
-    #[derive(Default)]
-    struct Rig {
-        longest: LongestCycles,
-        /// Command's cycle, reception and end.
-        answer: [u64; 3],
-        plant_stalled_ns: u64,
-        controller_stalled_ns: u64,
-    }
-
-    impl Rig {
-        /// The messages of a cycle with these hop times.
-        fn cycle(&mut self, cycle: u64, hops_ns: HopTimes) {
-            let [wake_up, data, publication, late, pick_up, solving, control, publishing, transport, to_wire] =
-                hops_ns;
-            let due_ns = cycle * PERIOD_NS;
-            let sampled_ns = due_ns + wake_up + SYNC_NS;
-            let complete_ns = sampled_ns + data;
-            let reading = Reading {
-                cycle,
-                due_ns,
-                woke_ns: due_ns + wake_up,
-                sampled_ns,
-                complete_ns,
-                published_ns: complete_ns + publication,
-                stalled_ns: self.plant_stalled_ns,
-                ..Default::default()
-            };
-            // Readings are drained first: the answer may be there before the state that explains it.
-            let [answers_cycle, command_received_ns, command_sent_ns] = self.answer;
-            self.longest.reading(&Reading { answers_cycle, command_received_ns, command_sent_ns, ..reading });
-
-            let woke_ns = due_ns + CONTROLLER_AT_NS + late;
-            let received_ns = reading.published_ns.max(woke_ns) + pick_up;
-            let commanded_ns = received_ns + solving + control;
-            let published_ns = commanded_ns + publishing;
-            self.longest.command(&Command { cycle, published_ns, ..Default::default() });
-            let state = State {
-                cycle,
-                reading_cycle: cycle,
-                due_ns: due_ns + CONTROLLER_AT_NS,
-                woke_ns,
-                received_ns,
-                solved_ns: received_ns + solving,
-                commanded_ns,
-                stalled_ns: self.controller_stalled_ns,
-                ..Default::default()
-            };
-            self.longest.state(&state, true);
-            let plant_has_it_ns = published_ns + transport;
-            self.answer = [cycle, plant_has_it_ns, plant_has_it_ns + to_wire];
-        }
-    }
-
-    #[test]
-    fn of_the_worst_cycles_the_hop_that_took_unusually_long_is_to_blame_and_no_other() {
-        let mut rig = Rig::default();
-        for cycle in 1..100 {
-            let mut hops_ns = TYPICAL_NS;
-            // Every ninth cycle, one hop after the other; the later ones a little longer.
-            if cycle % 9 == 0 && cycle / 9 <= TYPICAL_NS.len() as u64 {
-                hops_ns[cycle as usize / 9 - 1] += 200_000 + cycle * 1000;
-            }
-            rig.cycle(cycle, hops_ns);
-        }
-        let worst = rig.longest.finish();
-        assert_eq!(worst.len(), WORST);
-        assert!(worst.windows(2).all(|pair| pair[0].total_ns >= pair[1].total_ns));
-        for told in worst {
-            let hop = told.cycle as usize / 9 - 1;
-            let expected = (hop_names().nth(hop).unwrap(), TYPICAL_NS[hop] + 200_000 + told.cycle * 1000);
-            assert_eq!((told.hop, told.hop_ns), expected, "cycle {}", told.cycle);
-            assert!(told.hop_p50_ns.abs_diff(TYPICAL_NS[hop]) <= TYPICAL_NS[hop] / 500, "{told:?}");
-        }
-    }
-
-    #[test]
-    fn time_lost_before_the_next_wake_up_is_attributed_to_the_long_cycle() {
-        let mut rig = Rig::default();
-        for cycle in 1..20 {
-            let mut hops_ns = TYPICAL_NS;
-            match cycle {
-                5 => hops_ns[8] += 300_000,
-                // Counters are read in the next wake-up.
-                6 => rig.plant_stalled_ns += 300_000,
-                10 => hops_ns[4] += 200_000,
-                11 => rig.controller_stalled_ns += 200_000,
-                // A late wake-up is known at once.
-                15 => {
-                    hops_ns[0] += 250_000;
-                    rig.plant_stalled_ns += 250_000;
-                }
-                _ => {}
-            }
-            rig.cycle(cycle, hops_ns);
-        }
-        let told: Vec<_> =
-            rig.longest.finish().iter().map(|worst| (worst.cycle, worst.stalled_ns)).take(4).collect();
-        assert_eq!(told, [(5, 300_000), (10, 200_000), (15, 250_000), (1, 0)]);
-    }
-
-    #[test]
-    fn a_command_that_was_overtaken_ends_with_the_first_later_one_on_the_wire() {
-        let mut rig = Rig::default();
-        (1..7).for_each(|cycle| rig.cycle(cycle, TYPICAL_NS));
-        // The plant stands still behind reading 7, and takes the newest of three commands then.
-        rig.cycle(7, TYPICAL_NS);
-        for cycle in [8, 9] {
-            rig.longest.command(&Command { cycle, published_ns: cycle * PERIOD_NS, ..Default::default() });
-            rig.longest.state(&State { cycle, reading_cycle: 7, ..Default::default() }, false);
-        }
-        let [command_received_ns, command_sent_ns] = [10_300_000, 10_500_000];
-        let reading = Reading { cycle: 10, command_received_ns, command_sent_ns, ..Default::default() };
-        rig.longest.reading(&Reading { answers_cycle: 9, ..reading });
-        let worst = rig.longest.finish();
-        assert_eq!((worst[0].cycle, worst[0].total_ns, worst[0].hop), (7, 3_500_000, "command transport"));
-        assert_eq!(worst.len(), 7);
-    }
-
-    #[test]
-    fn a_cycle_that_used_a_late_reading_is_among_the_longest() {
-        let mut longest = LongestCycles::default();
-        let late = Reading { cycle: 7, due_ns: 7_000_000, complete_ns: 7_900_000, ..Default::default() };
-        longest.reading(&late);
-        longest.state(&State { cycle: 8, reading_cycle: 7, ..Default::default() }, true);
-        longest.command(&Command { cycle: 8, ..Default::default() });
-        let (answers_cycle, command_sent_ns) = (8, 8_900_000);
-        longest.reading(&Reading { cycle: 9, answers_cycle, command_sent_ns, ..Default::default() });
-        longest.state(&State { cycle: 9, reading_cycle: 7, ..Default::default() }, false);
-        let worst = longest.finish();
-        assert_eq!((worst[0].cycle, worst[0].due_ns, worst[0].total_ns), (8, 7_000_000, 1_900_000));
-    }
-
-    #[test]
-    fn a_stall_counts_before_a_deadline_but_for_what_made_the_wake_up_late() {
-        let mut stalls = Stalls::default();
-        // What was counted in a wake-up, how late that was, and what was counted at its deadline.
-        for (counted_ns, late_ns, when_due_ns) in
-            [(0, 20, 0), (300, 0, 300), (1000, 700, 300), (1000, 20, 1000), (1500, 400, 1100)]
-        {
-            assert_eq!(stalls.when_due_ns(counted_ns, late_ns), when_due_ns, "{counted_ns} ns");
-        }
-    }
-}
+mod tests;

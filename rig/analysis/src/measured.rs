@@ -1,11 +1,9 @@
-//! One measured interval: a histogram of the whole run, and one of each second.
+//! One measured interval: a histogram of the whole run, one of each second, and the noise of its percentiles.
 
 use hdrhistogram::Histogram;
 use hdrhistogram::serialization::{Deserializer, Serializer, V2Serializer};
 use masseter_runtime::clock::SECOND_NS;
 use serde::Serialize;
-
-use super::noise::standard_error;
 
 /// Below this many samples the 99.9th percentile rests on fewer than ten of them and is not given.
 const SAMPLES_FOR_P999: u64 = 10_000;
@@ -80,6 +78,10 @@ pub(super) fn histogram() -> Histogram<u64> {
     Histogram::new(DIGITS).expect("three digits are allowed")
 }
 
+pub(super) fn record(histogram: &mut Histogram<u64>, value_ns: u64, times: u64) {
+    histogram.record_n(value_ns, times).expect("a histogram that resizes itself takes any value");
+}
+
 /// Width of the bucket that holds this value, ns: a histogram cannot separate closer values.
 pub fn resolution_ns(value_ns: u64) -> u64 {
     histogram().equivalent_range(value_ns)
@@ -120,15 +122,10 @@ impl Measured {
         while left > 0 {
             // Values of one bucket are recorded at once: a damaged message may count any number of skips.
             let alike = ((self.total.highest_equivalent(value_ns) - value_ns) / step_ns + 1).min(left);
-            self.record(value_ns, alike);
+            record(&mut self.total, value_ns, alike);
+            record(&mut self.second, value_ns, alike);
             left -= alike;
             value_ns = value_ns.saturating_add(alike.saturating_mul(step_ns));
-        }
-    }
-
-    fn record(&mut self, value_ns: u64, times: u64) {
-        for histogram in [&mut self.total, &mut self.second] {
-            histogram.record_n(value_ns, times).expect("a histogram that resizes itself takes any value");
         }
     }
 
@@ -143,7 +140,7 @@ impl Measured {
         self.second.reset();
     }
 
-    pub(super) fn finish(mut self) -> IntervalFigures {
+    pub(super) fn into_figures(mut self) -> IntervalFigures {
         if !self.second.is_empty() {
             self.seconds.push(self.second_began_ns, &self.second);
         }
@@ -180,50 +177,19 @@ impl Measured {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// The spread of fewer seconds is unknown.
+const FEWEST_SECONDS: usize = 3;
 
-    fn measured() -> Measured {
-        Measured::new("control")
+/// Standard error of the mean of one figure's values in each second of a run; none with too few seconds.
+pub(super) fn standard_error(seconds: &[f64]) -> Option<f64> {
+    if seconds.len() < FEWEST_SECONDS {
+        return None;
     }
-
-    #[test]
-    fn the_largest_value_is_exact() {
-        let mut measured = measured();
-        measured.add(410_123, 0);
-        let figures = measured.finish();
-        assert_eq!([figures.p50_ns, figures.p99_ns, figures.max_ns], [Some(410_123); 3]);
-        assert_eq!(figures.curve.last().unwrap().1, 410_123);
-    }
-
-    #[test]
-    fn without_samples_there_are_no_figures() {
-        let measured = measured();
-        let figures = measured.finish();
-        assert_eq!(figures.n, 0);
-        assert_eq!([figures.p50_ns, figures.p99_ns, figures.max_ns, figures.max_at_ns], [None; 4]);
-    }
-
-    #[test]
-    fn the_last_seconds_stub_says_nothing_of_the_noise() {
-        let mut measured = measured();
-        (0..30).for_each(|tenth| measured.add(1_000, tenth * SECOND_NS / 10));
-        measured.add(9_000, 3 * SECOND_NS);
-        let figures = measured.finish();
-        assert_eq!((figures.n, figures.p50_noise_ns), (31, Some(0.0)));
-        let seconds: Vec<_> =
-            figures.seconds.iter().map(|(began_ns, second)| (began_ns, second.len())).collect();
-        assert_eq!(seconds, [(0, 10), (SECOND_NS, 10), (2 * SECOND_NS, 10), (3 * SECOND_NS, 1)]);
-    }
-
-    #[test]
-    fn any_number_of_steps_is_recorded_in_bounded_time() {
-        let mut measured = measured();
-        measured.add_steps(7, 1_000_000, 20_000, 0);
-        assert_eq!(measured.finish().n, 20_001);
-        let mut measured = self::measured();
-        measured.add_steps(7, 1_000_000, u64::MAX, u64::MAX);
-        assert!(measured.finish().max_ns > Some(u64::MAX - 1_100_000));
-    }
+    let n = seconds.len() as f64;
+    let mean = seconds.iter().sum::<f64>() / n;
+    let squares: f64 = seconds.iter().map(|value| (value - mean).powi(2)).sum();
+    Some((squares / (n - 1.0) / n).sqrt())
 }
+
+#[cfg(test)]
+mod tests;

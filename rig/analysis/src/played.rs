@@ -1,18 +1,20 @@
-//! How much of the scenario's motion was played. The controller states its motion time. The judge counts it only as far as
-//! cycles passed, and computes the pose that belongs to it from the scenario.
+//! How much of the scenario's motion was played, and what stopped the drives.
+//!
+//! The controller states its motion time. It counts only as far as cycles passed, and the pose that belongs to it is computed
+//! from the scenario. A stop shows in drives and master, whatever the controller reports.
 
 use std::sync::Arc;
 
 use masseter_controller::trajectory::Trajectory;
-use masseter_model::geometry::Mechanism;
-use masseter_runtime::messages::codes::Cause;
-use masseter_runtime::messages::{Event, State};
+use masseter_model::geometry::{AXES, Mechanism};
+use masseter_runtime::messages::codes::{Cause, DriveState, NO_DRIVE_STATE};
+use masseter_runtime::messages::{Event, Reading, State};
 use masseter_runtime::named::{Declared, PlayedMotion};
 use masseter_scenario::Scenario;
 use serde::Serialize;
 
-use crate::pose_errors::{deviation, pose, worse};
-use crate::tracking::is_moving;
+use crate::events::EventRecord;
+use crate::tracking::{desired_pose, deviation, is_moving, worse};
 
 /// Cycles that the motion's time may catch up: a reading that comes late has the time of the sample before.
 const LATE_CYCLES: f64 = 2.0;
@@ -37,7 +39,7 @@ pub struct Departure {
 }
 
 /// Follows the motion's time.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct PlayedWatch {
     period_s: f64,
     incisal_m: [f64; 3],
@@ -69,17 +71,13 @@ impl PlayedWatch {
             incisal_m: scenario.jaw.reference_point_m,
             scenario: has_poses.then(|| trajectory(scenario)).flatten(),
             amplitude_place: declared.place_of(AMPLITUDE).ok(),
-            last: None,
             credit_s: LATE_CYCLES * scenario.period_s(),
-            has_jumped: false,
-            reached_s: None,
-            unseen_s: 0.0,
-            departure: None,
+            ..Self::default()
         }
     }
 
     /// Takes a state. Once the motion has begun, a state without its time ends it.
-    pub(super) fn state(&mut self, state: &State) {
+    pub(super) fn apply_state(&mut self, state: &State) {
         let time_s = state.motion_time_s;
         if !is_moving(state) || time_s.is_nan() || time_s < 0.0 {
             self.has_jumped |= self.last.is_some();
@@ -100,11 +98,11 @@ impl PlayedWatch {
         }
     }
 
-    /// The stated desired pose, beside the scenario's at this time of the motion.
+    /// The stated desired desired_pose, beside the scenario's at this time of the motion.
     fn compare(&mut self, state: &State) {
         let Some(scenario) = &self.scenario else { return };
         let at_s = state.motion_time_s;
-        let stated = pose(state.desired_position_m, state.desired_quaternion_wxyz);
+        let stated = desired_pose(state);
         let apart = deviation(stated.as_ref(), Some(&scenario.pose_in_motion(at_s)), self.incisal_m);
         let (mm, deg) = (apart.incisal_m * 1e3, apart.angle_rad.to_degrees());
         let greatest =
@@ -116,7 +114,7 @@ impl PlayedWatch {
     }
 
     /// Whoever sets the amplitude wants other poses from then on.
-    pub(super) fn event(&mut self, event: &Event) {
+    pub(super) fn apply_event(&mut self, event: &Event) {
         let is_set = event.cause == Cause::ParameterSet.code();
         if is_set && self.amplitude_place == Some(event.object as usize) {
             self.scenario = None;
@@ -125,7 +123,7 @@ impl PlayedWatch {
     }
 
     /// How far the motion came, s, and how far the desired pose was from it. What passed unseen counts only as a small share.
-    pub(super) fn finish(self) -> (Option<f64>, Option<Departure>) {
+    pub(super) fn into_figures(self) -> (Option<f64>, Option<Departure>) {
         let unseen_s = self.unseen_s;
         let seen_s = |reached_s: f64| {
             if unseen_s > UNSEEN * reached_s { (reached_s - unseen_s).max(0.0) } else { reached_s }
@@ -140,122 +138,96 @@ fn trajectory(scenario: &Scenario) -> Option<Arc<Trajectory>> {
     Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s).ok().map(Arc::new)
 }
 
-#[cfg(test)]
-mod tests {
-    use masseter_runtime::messages::codes::ControllerState;
-    use masseter_runtime::messages::pose_fields;
-    use masseter_runtime::named::Parameter;
+/// States after the reading of a drive that left operation. The controller may miss that reading in the first.
+const STILL_MOVING: u32 = 2;
 
-    use super::*;
+/// What stopped the drives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StoppedBy {
+    /// A fault that the master found: it then stops all drives.
+    Master,
+    /// A request for a quick stop, which the drives carry out.
+    QuickStop,
+    /// A drive left operation while the motion ran.
+    Drives,
+}
 
-    fn watch(declared: &Declared) -> (PlayedWatch, Arc<Trajectory>) {
-        let scenario = Scenario { duration_s: Some(2.0), ..Scenario::default() };
-        (PlayedWatch::new(&scenario, declared), trajectory(&scenario).unwrap())
-    }
+/// Watches drives and master for a stop.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct StopWatch {
+    stopped: Option<StoppedBy>,
+    was_enabled: [bool; AXES],
+    /// The newest state is one of the motion.
+    is_moving: bool,
+    /// When a drive left operation in the motion, ns, and how many states of the motion came since.
+    left: Option<(u64, u32)>,
+    has_left: bool,
+    last_cycle: u64,
+    /// Cycles in which all drives were enabled.
+    enabled_cycles: u64,
+}
 
-    /// A state in the scenario's pose at this time.
-    fn state(motion: &Trajectory, cycle: u64, motion_time_s: f64) -> State {
-        let (desired_position_m, desired_quaternion_wxyz) =
-            pose_fields(&motion.pose_in_motion(motion_time_s));
-        let controller_state = ControllerState::Running.code();
-        State {
-            cycle,
-            motion_time_s,
-            desired_position_m,
-            desired_quaternion_wxyz,
-            controller_state,
-            ..State::default()
+impl StopWatch {
+    /// Takes a reading. Returns whether it is that of a stop.
+    pub(super) fn apply_reading(&mut self, reading: &Reading) -> bool {
+        let is_in = |state: DriveState| move |code: &u32| *code == state.code();
+        let states = &reading.drive_state;
+        let passed = reading.cycle.saturating_sub(self.last_cycle);
+        self.last_cycle = reading.cycle;
+        if states.iter().all(is_in(DriveState::OperationEnabled)) {
+            self.enabled_cycles += passed;
         }
+        let is_quick = self.enabled_cycles > 0 && states.iter().any(is_in(DriveState::QuickStopActive));
+        let found = match reading.master_fault {
+            0 => is_quick.then_some(StoppedBy::QuickStop),
+            _ => Some(StoppedBy::Master),
+        };
+        self.stopped = self.stopped.or(found);
+        self.leave(reading);
+        found.is_some()
     }
 
-    /// How far a motion with these cycles and times came, s.
-    fn reached_s(times: &[(u64, f64)]) -> Option<f64> {
-        let (mut watch, motion) = watch(&Declared::default());
-        for (cycle, time_s) in times {
-            watch.state(&state(&motion, *cycle, *time_s));
-        }
-        watch.finish().0
-    }
-
-    #[test]
-    fn the_motions_time_passes_no_faster_than_the_cycles() {
-        type Case = (&'static [(u64, f64)], Option<f64>);
-        let cases: [Case; 9] = [
-            (&[], None),
-            (&[(1, -1.0), (2, f64::NAN)], None),
-            (&[(7, 0.0), (8, 0.001), (9, 0.002)], Some(0.002)),
-            // A late reading has the time of the sample before.
-            (&[(7, 0.0), (8, 0.0), (9, 0.002)], Some(0.002)),
-            // Twice as fast, and at rest.
-            (&[(7, 0.0), (8, 0.002), (9, 0.004), (10, 0.006), (20, 0.006)], Some(0.004)),
-            // A wait earns nothing.
-            (&[(7, 0.0), (8, 0.0), (9, 0.0), (10, 0.0), (11, 0.004)], Some(0.0)),
-            // The time vanishes.
-            (&[(7, 0.0), (8, f64::NAN), (9, 0.002)], Some(0.0)),
-            (&[(7, 0.0), (8, 1.0), (9, 1.001), (1100, 1.5)], Some(0.0)),
-            (&[(7, 1.5), (2000, 1.5)], Some(0.0)),
-        ];
-        for (times, expected) in cases {
-            assert_eq!(reached_s(times), expected, "{times:?}");
-        }
-    }
-
-    #[test]
-    fn few_lost_cycles_pass_unseen_and_many_are_not_played() {
-        let (mut few, mut many) = (Vec::new(), Vec::new());
-        for cycle in 0..=1000_u32 {
-            let time = (u64::from(cycle), f64::from(cycle) * 1e-3);
-            few.extend((!(500..530).contains(&cycle)).then_some(time));
-            many.extend((!(300..800).contains(&cycle)).then_some(time));
-        }
-        assert_eq!(reached_s(&few), Some(1.0));
-        let seen_s = reached_s(&many).unwrap();
-        assert!((seen_s - 0.502).abs() < 1e-6, "{seen_s}");
-    }
-
-    #[test]
-    fn a_state_without_motion_ends_it() {
-        let (mut watch, motion) = watch(&Declared::default());
-        let off = State { controller_state: ControllerState::Disabling.code(), ..state(&motion, 2, 0.001) };
-        for state in [off, state(&motion, 3, 0.0), state(&motion, 4, 0.001), off, state(&motion, 6, 0.002)] {
-            watch.state(&state);
-        }
-        assert_eq!(watch.finish().0, Some(0.001));
-    }
-
-    #[test]
-    fn another_pose_than_the_scenarios_is_a_departure_with_its_time() {
-        let (mut watch, motion) = watch(&Declared::default());
-        for cycle in 0..1000 {
-            let mut state = state(&motion, cycle, cycle as f64 * 1e-3);
-            if cycle == 700 {
-                state.desired_position_m[2] += 2e-3;
+    /// Notes a drive that leaves operation. One that is not heard of shows nothing.
+    fn leave(&mut self, reading: &Reading) {
+        for (code, was_enabled) in reading.drive_state.iter().zip(&mut self.was_enabled) {
+            if *code == NO_DRIVE_STATE {
+                continue;
             }
-            watch.state(&state);
+            let is_enabled = *code == DriveState::OperationEnabled.code();
+            let has_left = std::mem::replace(was_enabled, is_enabled) && !is_enabled;
+            if has_left && self.is_moving {
+                self.left.get_or_insert((reading.due_ns, 0));
+            }
         }
-        let departure = watch.finish().1.unwrap();
-        assert!((departure.incisal_mm - 2.0).abs() < 1e-6 && departure.deg < 1e-4, "{departure:?}");
-        assert!((departure.at_s - 0.7).abs() < 1e-9);
     }
 
-    #[test]
-    fn own_motions_and_set_amplitudes_have_poses_of_their_own() {
-        let amplitude = Declared { parameters: vec![Parameter::new(AMPLITUDE, 1.0)], ..Declared::default() };
-        let own = Declared { motion: PlayedMotion::Own, ..amplitude.clone() };
-        let set = Event { object: 0, cause: Cause::ParameterSet.code(), ..Event::default() };
-        for (declared, event, is_compared) in
-            [(&amplitude, None, true), (&own, None, false), (&amplitude, Some(set), false)]
-        {
-            let (mut watch, motion) = watch(declared);
-            watch.state(&state(&motion, 1, 0.0));
-            if let Some(event) = event {
-                watch.event(&event);
-            }
-            let controller_state = ControllerState::Running.code();
-            watch.state(&State { cycle: 2, motion_time_s: 0.001, controller_state, ..State::default() });
-            let departure = watch.finish().1;
-            assert_eq!(departure.is_some_and(|departure| departure.is_partial), event.is_some());
-            assert_eq!(departure.is_some_and(|departure| departure.incisal_mm.is_infinite()), is_compared);
+    /// Takes a state. A controller that ends its motion with the drives is no stop of theirs.
+    pub(super) fn apply_state(&mut self, state: &State) {
+        self.is_moving = is_moving(state);
+        let Some((left_ns, states)) = &mut self.left else { return };
+        // The state of an earlier cycle may come later.
+        if state.due_ns <= *left_ns {
+            return;
         }
+        *states += 1;
+        if !self.is_moving {
+            self.left = None;
+        } else if *states >= STILL_MOVING {
+            self.has_left = true;
+        }
+    }
+
+    /// The master's own report, should the run end before the next reading.
+    pub(super) fn apply_event(&mut self, event: &EventRecord) {
+        self.stopped = self.stopped.or(event.is_fault_of_master().then_some(StoppedBy::Master));
+    }
+
+    /// What stopped the drives, and for how many cycles all of them were enabled.
+    pub(super) fn into_figures(self) -> (Option<StoppedBy>, u64) {
+        (self.stopped.or(self.has_left.then_some(StoppedBy::Drives)), self.enabled_cycles)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -12,8 +12,59 @@ use masseter_runtime::messages::FrameTap;
 use masseter_runtime::schedule::plans;
 use masseter_scenario::Scenario;
 use masseter_scenario::wording::counted;
+use serde::Serialize;
 
-use super::bus_response::{BusResponse, ResponseFigures};
+/// The longest response time of a message.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ResponseFigures {
+    /// Index of the bus.
+    pub bus: usize,
+    /// Its name in the plan; `other` for all messages that are in no plan: SDO, NMT, emergencies.
+    pub message: String,
+    /// Frames whose time of queueing is known.
+    pub frames: u64,
+    /// Longest time from being queued to the end of the frame; none without such frames, ns.
+    pub max_ns: Option<u64>,
+    /// The bound by the plan, or by the closest queueing if messages were queued closer together than planned; none
+    /// where there is no bound, and in a run without bounds, ns.
+    pub bound_ns: Option<u64>,
+}
+
+impl ResponseFigures {
+    /// Whether a frame took longer than the bound.
+    pub fn exceeds(&self) -> bool {
+        self.max_ns.zip(self.bound_ns).is_some_and(|(max_ns, bound_ns)| max_ns > bound_ns)
+    }
+
+    /// Share of the bound that was used.
+    pub fn share(&self) -> Option<f64> {
+        self.max_ns.zip(self.bound_ns).map(|(max_ns, bound_ns)| max_ns as f64 / bound_ns as f64)
+    }
+}
+
+/// Response times of all buses.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct BusResponse {
+    /// The messages of each bus, the most urgent first.
+    pub messages: Vec<ResponseFigures>,
+    /// Frames queued off their times by a stall, and those beside them, which are not judged.
+    pub off_time_frames: u64,
+    /// Why there are no bounds for this run; none where there are.
+    pub unbounded: Option<String>,
+}
+
+impl BusResponse {
+    /// Messages that took longer than their bound.
+    pub fn exceeding(&self) -> impl Iterator<Item = &ResponseFigures> {
+        self.messages.iter().filter(|message| message.exceeds())
+    }
+
+    /// The message that used most of its bound.
+    pub fn tightest(&self) -> Option<&ResponseFigures> {
+        let shares = self.messages.iter().filter_map(|message| Some((message, message.share()?)));
+        shares.max_by(|(_, one), (_, other)| one.total_cmp(other)).map(|(message, _)| message)
+    }
+}
 
 /// Share of a cycle by which a message may come early, and SYNC late. The default buses are in use for up to seven eighths.
 const JITTER: f64 = 0.1;
@@ -72,7 +123,7 @@ struct Seen {
 
 impl Seen {
     /// A frame off its time is counted only.
-    fn take(&mut self, queued_ns: u64, arrived_ns: u64, is_off_time: bool) {
+    fn count_frame(&mut self, queued_ns: u64, arrived_ns: u64, is_off_time: bool) {
         self.frames += 1;
         let last_ns = self.last_judged_ns.replace(queued_ns);
         if is_off_time {
@@ -116,7 +167,7 @@ impl Responses {
     }
 
     /// `tapped`: what `tap` holds.
-    pub(super) fn frame(&mut self, tap: &FrameTap, bus: usize, tapped: &Tapped) {
+    pub(super) fn apply_frame(&mut self, tap: &FrameTap, bus: usize, tapped: &Tapped) {
         let Some(bus) = self.buses.get_mut(bus) else { return };
         let planned = bus.plan.messages.iter().position(|planned| planned.message.id.flagged() == tap.id);
         if planned.is_none() && matches!(tapped, Tapped::Error(_)) {
@@ -125,13 +176,13 @@ impl Responses {
         }
         bus.frames += 1;
         if tap.queued_ns > 0 {
-            bus.take(planned, tap.queued_ns, tap.time_ns);
+            bus.add_frame(planned, tap.queued_ns, tap.time_ns);
         }
     }
 
     /// `missing`: frames that were not recorded.
-    pub(super) fn finish(mut self, missing: u64) -> BusResponse {
-        self.buses.iter_mut().for_each(Followed::judge);
+    pub(super) fn into_figures(mut self, missing: u64) -> BusResponse {
+        self.buses.iter_mut().for_each(Followed::judge_cycle);
         let unbounded = self.unbounded(missing);
         let figures = |bus: &Followed| bus.figures(&bus.bounds_ns(unbounded.is_none()));
         let messages = self.buses.iter().flat_map(figures).collect();
@@ -153,13 +204,13 @@ impl Responses {
 
 impl Followed {
     /// Takes a frame of a planned message, by its place in the plan, or another one.
-    fn take(&mut self, planned: Option<usize>, queued_ns: u64, arrived_ns: u64) {
+    fn add_frame(&mut self, planned: Option<usize>, queued_ns: u64, arrived_ns: u64) {
         let is_off_time = planned.is_some_and(|index| self.is_off_time(index, queued_ns));
         if is_off_time {
             self.off_time_until_ns = queued_ns + CROWDED_CYCLES * self.plan.cycle_ns;
         }
         if planned.is_some_and(|index| self.is_sync(index)) {
-            self.judge();
+            self.judge_cycle();
         }
         self.pending.push(Pending { planned, queued_ns, arrived_ns });
         if let Some(index) = planned {
@@ -168,13 +219,13 @@ impl Followed {
     }
 
     /// Judges the frames of a cycle, unless they or the next SYNC are off their times.
-    fn judge(&mut self) {
+    fn judge_cycle(&mut self) {
         let mut pending = std::mem::take(&mut self.pending);
         for Pending { planned, queued_ns, arrived_ns } in pending.drain(..) {
             let is_off_time = queued_ns < self.off_time_until_ns;
             self.off_time += u64::from(is_off_time);
             let seen = planned.map_or(&mut self.others, |index| &mut self.messages[index]);
-            seen.take(queued_ns, arrived_ns, is_off_time);
+            seen.count_frame(queued_ns, arrived_ns, is_off_time);
         }
         self.pending = pending;
     }

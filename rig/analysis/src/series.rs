@@ -1,5 +1,67 @@
-//! Values over time in memory of a fixed size: the longer the run, the wider the stretches of time that share their lowest
-//! and highest value.
+//! Values by cycle and over time, in memory of a fixed size.
+//!
+//! The recorder drains topic after topic, so messages of one cycle lie some tens of cycles apart. The longer a run, the wider
+//! the stretches of time that share their lowest and highest value.
+
+use std::collections::VecDeque;
+
+/// Cycles kept at most; more than a subscriber's queue holds of any topic.
+const MOST_CYCLES: usize = 1 << 13;
+/// Places at first. As long as every value is taken out soon, no more are needed.
+const FEWEST_PLACES: usize = 1 << 6;
+
+/// The latest values by cycle.
+#[derive(Debug, Clone)]
+pub(super) struct ByCycle<T> {
+    /// Empty before the first value: where nothing waits, no memory is used.
+    slots: Vec<Option<(u64, T)>>,
+}
+
+impl<T> Default for ByCycle<T> {
+    fn default() -> Self {
+        Self { slots: Vec::new() }
+    }
+}
+
+impl<T: Copy> ByCycle<T> {
+    /// Keeps a value. While its place holds another cycle, the number of places doubles, up to [`MOST_CYCLES`]. Beyond, the value
+    /// replaces that of the other cycle.
+    pub(super) fn insert(&mut self, cycle: u64, value: T) {
+        if self.slots.is_empty() {
+            self.slots = vec![None; FEWEST_PLACES];
+        }
+        let held_by_another =
+            |slots: &[Option<(u64, T)>]| slots[place(cycle, slots)].is_some_and(|(held, _)| held != cycle);
+        while self.slots.len() < MOST_CYCLES && held_by_another(&self.slots) {
+            let mut slots = vec![None; 2 * self.slots.len()];
+            for kept in self.slots.iter().flatten() {
+                let place = place(kept.0, &slots);
+                slots[place] = Some(*kept);
+            }
+            self.slots = slots;
+        }
+        let place = place(cycle, &self.slots);
+        self.slots[place] = Some((cycle, value));
+    }
+
+    pub(super) fn get(&self, cycle: u64) -> Option<&T> {
+        let (held, value) = self.slots.get(place(cycle, &self.slots))?.as_ref()?;
+        (*held == cycle).then_some(value)
+    }
+
+    /// Takes the value out.
+    pub(super) fn remove(&mut self, cycle: u64) -> Option<T> {
+        let value = *self.get(cycle)?;
+        let place = place(cycle, &self.slots);
+        self.slots[place] = None;
+        Some(value)
+    }
+}
+
+/// The number of places is 0 or a power of two.
+fn place<T>(cycle: u64, slots: &[T]) -> usize {
+    cycle as usize & slots.len().wrapping_sub(1)
+}
 
 /// A point of a curve: seconds since the beginning, and a value.
 type Point = (f64, f64);
@@ -8,7 +70,7 @@ type Point = (f64, f64);
 pub type Curve = Vec<Point>;
 
 /// Stretches kept at most.
-const MOST: usize = 4096;
+const MOST_STRETCHES: usize = 4096;
 /// Width of the first stretches, ns.
 const FIRST_WIDTH_NS: u64 = 1_000_000;
 
@@ -39,7 +101,7 @@ impl<T: Merge> Series<T> {
 
     /// The stretch that holds this time since the beginning.
     pub(super) fn at(&mut self, since_ns: u64) -> &mut T {
-        while since_ns / self.width_ns >= MOST as u64 {
+        while since_ns / self.width_ns >= MOST_STRETCHES as u64 {
             self.join_pairs();
         }
         let place = (since_ns / self.width_ns) as usize;
@@ -67,20 +129,28 @@ impl<T: Merge> Series<T> {
     /// Middle of each stretch, s since the beginning, and its values.
     pub(super) fn iter(&self) -> impl Iterator<Item = (f64, &T)> {
         let width_s = self.width_s();
-        self.stretches
-            .iter()
-            .enumerate()
-            .map(move |(place, stretch)| ((place as f64 + 0.5) * width_s, stretch))
+        let stretches = self.stretches.iter().enumerate();
+        stretches.map(move |(place, stretch)| ((place as f64 + 0.5) * width_s, stretch))
     }
 }
 
 impl<const N: usize> Series<Extremes<N>> {
     /// Takes one of the values of a time since the beginning; what is no finite number is left out.
-    pub(super) fn take(&mut self, since_ns: u64, index: usize, value: f64) {
+    pub(super) fn add(&mut self, since_ns: u64, index: usize, value: f64) {
         if value.is_finite() {
             let point = (since_ns as f64 / 1e9, value);
-            self.at(since_ns).take(index, Span { lowest: point, highest: point });
+            self.at(since_ns).add(index, Span { lowest: point, highest: point });
         }
+    }
+
+    /// Takes the values of a time that stand at `first` and behind.
+    pub(super) fn add_all(&mut self, since_ns: u64, first: usize, values: &[f64]) {
+        (first..).zip(values).for_each(|(index, value)| self.add(since_ns, index, *value));
+    }
+
+    /// The bands at `first` and behind.
+    pub(super) fn bands<const M: usize>(&self, first: usize) -> [Curve; M] {
+        std::array::from_fn(|place| self.band(first + place))
     }
 
     /// Highest value of each stretch.
@@ -123,7 +193,7 @@ impl<const N: usize> Default for Extremes<N> {
 }
 
 impl<const N: usize> Extremes<N> {
-    fn take(&mut self, index: usize, next: Span) {
+    fn add(&mut self, index: usize, next: Span) {
         let span = self.0[index].get_or_insert(next);
         if next.lowest.1 < span.lowest.1 {
             span.lowest = next.lowest;
@@ -138,7 +208,7 @@ impl<const N: usize> Merge for Extremes<N> {
     fn merge(&mut self, next: &Self) {
         for (index, span) in next.0.iter().enumerate() {
             if let Some(span) = span {
-                self.take(index, *span);
+                self.add(index, *span);
             }
         }
     }
@@ -151,60 +221,30 @@ impl Merge for u64 {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// Time that a mean covers, ns.
+const WINDOW_NS: u64 = 20_000_000;
 
-    #[test]
-    fn a_long_run_keeps_its_extremes_at_their_times() {
-        let mut series = Series::<Extremes<1>>::default();
-        for millisecond in 0..100_000u64 {
-            let value = if millisecond == 54_321 { 99.0 } else { (millisecond % 7) as f64 };
-            series.take(millisecond * 1_000_000, 0, value);
-        }
-        let band = series.band(0);
-        assert!(band.len() <= 2 * MOST && band.is_sorted_by(|a, b| a.0 < b.0));
-        assert_eq!(band.iter().filter(|(_, value)| *value > 98.0).collect::<Vec<_>>(), [&(54.321, 99.0)]);
-        assert!(series.highest(0).iter().all(|(_, value)| *value >= 6.0));
-        assert_eq!(series.stretches.len(), band.iter().filter(|(_, value)| *value < 0.5).count());
-    }
+/// Smooths `N` values that come together.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Smoothing<const N: usize> {
+    held: VecDeque<(u64, [f64; N])>,
+}
 
-    /// Chewing, with flanks that fall through many stretches of time.
-    #[test]
-    fn every_point_of_a_curve_is_a_point_of_its_signal() {
-        let signal = |at_s: f64| 20.0 * (std::f64::consts::TAU * at_s / 0.7).cos();
-        let mut series = Series::<Extremes<1>>::default();
-        for millisecond in 0..60_000u64 {
-            series.take(millisecond * 1_000_000, 0, signal(millisecond as f64 / 1e3));
+impl<const N: usize> Smoothing<N> {
+    /// Takes the next values and their time; returns a mean and its time once the window is full.
+    pub(super) fn add(&mut self, time_ns: u64, values: [f64; N]) -> Option<(u64, [f64; N])> {
+        self.held.push_back((time_ns, values));
+        let mut is_full = false;
+        while self.held.front()?.0 + WINDOW_NS <= time_ns {
+            self.held.pop_front();
+            is_full = true;
         }
-        let band = series.band(0);
-        assert!(series.width_ns > 4 * FIRST_WIDTH_NS, "each stretch holds many values");
-        for (at_s, value) in &band {
-            assert!((value - signal(*at_s)).abs() < 1e-9, "{value} at {at_s} s");
-        }
-        // No line between two points leaves the signal further than one across a turn of it does.
-        for ends in band.windows(2) {
-            let [(from_s, from), (to_s, to)] = [ends[0], ends[1]];
-            let off = (from.midpoint(to) - signal(from_s.midpoint(to_s))).abs();
-            assert!(off < 2.5, "{off} between {from_s} s and {to_s} s");
-        }
-        let turns = band.iter().filter(|(_, value)| value.abs() > 19.99).count();
-        assert!(turns >= 2 * 85, "{turns} turns");
-    }
-
-    #[test]
-    fn a_curve_of_one_value_is_a_straight_line_and_no_number_is_left_out() {
-        let mut series = Series::<Extremes<1>>::default();
-        for (microsecond, value) in [(0, 1.0), (1, f64::NAN), (2, f64::INFINITY), (3, 1.0), (1000, 1.0)] {
-            series.take(microsecond * 1000, 0, value);
-        }
-        assert_eq!(series.band(0), [(0.0, 1.0), (0.001, 1.0)]);
-    }
-
-    #[test]
-    fn nothing_is_lost_from_a_sum() {
-        let mut series = Series::<u64>::default();
-        (0..50_000u64).for_each(|millisecond| *series.at(millisecond * 1_000_000) += 3);
-        assert_eq!(series.iter().map(|(_, sum)| sum).sum::<u64>(), 150_000);
+        let (first_ns, _) = self.held.front()?;
+        let count = self.held.len() as f64;
+        let mean = |place: usize| self.held.iter().map(|(_, values)| values[place]).sum::<f64>() / count;
+        is_full.then(|| (first_ns.midpoint(time_ns), std::array::from_fn(mean)))
     }
 }
+
+#[cfg(test)]
+mod tests;

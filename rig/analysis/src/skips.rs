@@ -1,8 +1,7 @@
-//! Skipped deadlines, and what the time before them went to.
+//! Skipped deadlines, what the time before them went to, and whether rig or machine caused them.
 //!
 //! The machine caused a skip that stalls while the process waited explain. A skip that only an overlong stretch of work
-//! explains may have either cause: [`OverrunAttribution`](crate::OverrunAttribution) weighs those of the whole run. The
-//! rig caused all others.
+//! explains may have either cause: [`OverrunAttribution`] weighs those of the whole run. The rig caused all others.
 //!
 //! A process that skips n deadlines comes back at least n + 1 periods after the last one that it kept. A cycle in time
 //! takes one of them at most; the other n were lost, to stalls or to overlong work. Lost time explains as many skips as
@@ -18,7 +17,7 @@ use hdrhistogram::Histogram;
 use masseter_runtime::messages::{Reading, State};
 use serde::Serialize;
 
-use super::measured::histogram;
+use crate::measured::{histogram, record};
 
 /// Skipped deadlines of one process, and the account of its time.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
@@ -57,33 +56,26 @@ pub(super) struct Counters {
     pub(super) late_ns: u64,
 }
 
-impl From<&Reading> for Counters {
-    fn from(reading: &Reading) -> Self {
-        Self {
-            seq: reading.seq,
-            skipped: reading.skipped_cycles,
-            stalled_ns: reading.stalled_ns,
-            spun_ns: reading.spun_ns,
-            worked_ns: reading.worked_ns,
-            overlong_ns: reading.overlong_ns,
-            late_ns: reading.woke_ns.saturating_sub(reading.due_ns),
+/// Readings and states carry the same account.
+macro_rules! counters_from {
+    ($($message:ty),*) => {$(
+        impl From<&$message> for Counters {
+            fn from(message: &$message) -> Self {
+                Self {
+                    seq: message.seq,
+                    skipped: message.skipped_cycles,
+                    stalled_ns: message.stalled_ns,
+                    spun_ns: message.spun_ns,
+                    worked_ns: message.worked_ns,
+                    overlong_ns: message.overlong_ns,
+                    late_ns: message.woke_ns.saturating_sub(message.due_ns),
+                }
+            }
         }
-    }
+    )*};
 }
 
-impl From<&State> for Counters {
-    fn from(state: &State) -> Self {
-        Self {
-            seq: state.seq,
-            skipped: state.skipped_cycles,
-            stalled_ns: state.stalled_ns,
-            spun_ns: state.spun_ns,
-            worked_ns: state.worked_ns,
-            overlong_ns: state.overlong_ns,
-            late_ns: state.woke_ns.saturating_sub(state.due_ns),
-        }
-    }
-}
+counters_from!(Reading, State);
 
 /// Time lost to stalls and to overlong work, ns.
 #[derive(Debug, Clone, Copy, Default)]
@@ -159,7 +151,7 @@ impl Skips {
     /// The process' counters in its next message. Returns how many deadlines were skipped just before its wake-up; none
     /// where messages before it are missing, since which wake-up skipped them is not known. A fault of the scenario may
     /// have stalled the process before: what it lost is no evidence then.
-    pub(super) fn take(&mut self, counters: &Counters, period_ns: u64, is_of_scenario: bool) -> u64 {
+    pub(super) fn account(&mut self, counters: &Counters, period_ns: u64, is_of_scenario: bool) -> u64 {
         let past = self.figures;
         let stall_ns = counters.stalled_ns.saturating_sub(past.stalled_ns);
         let overlong_ns = counters.overlong_ns.saturating_sub(past.overlong_ns);
@@ -168,47 +160,35 @@ impl Skips {
         let is_next = counters.seq == std::mem::replace(&mut self.last_seq, counters.seq).wrapping_add(1);
         // Before its first wait a process keeps no account of what held it up.
         let known = if is_next && counters.seq > 1 { skipped } else { 0 };
-        if is_of_scenario {
-            return self.take_of_scenario(counters, skipped, known);
-        }
-        let (by_machine, while_working) = lost.explains(known, period_ns);
-        let stretch_ns = overlong_ns.max(self.carried_over_stretch_ns);
-        if while_working > 0 {
-            self.shortest_costly_ns =
-                Some(self.shortest_costly_ns.map_or(stretch_ns, |shortest| shortest.min(stretch_ns)));
-        }
         self.figures = SkipFigures {
             skipped: counters.skipped,
-            by_machine: past.by_machine + by_machine,
-            while_working: past.while_working + while_working,
-            unknown_cause: past.unknown_cause + (skipped - known),
-            by_scenario: past.by_scenario,
             stalled_ns: counters.stalled_ns,
             spun_ns: counters.spun_ns,
             worked_ns: counters.worked_ns,
             overlong_ns: counters.overlong_ns,
+            ..past
         };
+        if is_of_scenario {
+            self.figures.by_scenario += skipped;
+            (self.carried_over, self.carried_over_stretch_ns) = (Loss::default(), 0);
+            return known;
+        }
+        let (by_machine, while_working) = lost.explains(known, period_ns);
+        self.figures.by_machine += by_machine;
+        self.figures.while_working += while_working;
+        self.figures.unknown_cause += skipped - known;
+        let stretch_ns = overlong_ns.max(self.carried_over_stretch_ns);
+        if while_working > 0 {
+            let shortest_ns = self.shortest_costly_ns.map_or(stretch_ns, |shortest| shortest.min(stretch_ns));
+            self.shortest_costly_ns = Some(shortest_ns);
+        }
         for (histogram, lost_ns) in [(&mut self.stalls, stall_ns), (&mut self.overlong, overlong_ns)] {
             if is_next && lost_ns > 0 {
-                histogram.record(lost_ns).expect("a histogram that resizes itself takes any value");
+                record(histogram, lost_ns, 1);
             }
         }
         self.carried_over = lost.carried_over(counters.late_ns);
         self.carried_over_stretch_ns = if self.carried_over.working_ns > 0 { stretch_ns } else { 0 };
-        known
-    }
-
-    fn take_of_scenario(&mut self, counters: &Counters, skipped: u64, known: u64) -> u64 {
-        self.figures = SkipFigures {
-            skipped: counters.skipped,
-            by_scenario: self.figures.by_scenario + skipped,
-            stalled_ns: counters.stalled_ns,
-            spun_ns: counters.spun_ns,
-            worked_ns: counters.worked_ns,
-            overlong_ns: counters.overlong_ns,
-            ..self.figures
-        };
-        (self.carried_over, self.carried_over_stretch_ns) = (Loss::default(), 0);
         known
     }
 
@@ -217,6 +197,68 @@ impl Skips {
         let count = |histogram: &Histogram<u64>| histogram.count_between(least_ns, u64::MAX);
         (count(&self.stalls), count(&self.overlong))
     }
+}
+
+/// Least probability at which the machine may be the cause.
+const LEAST_CHANCE: f64 = 0.01;
+
+/// The overlong stretches of work of a run, beside the stalls of the machine.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[doc(alias("root cause", "binomial test"))]
+pub struct OverrunAttribution {
+    /// Stretches of work at least as long as the shortest that cost a deadline.
+    pub while_working: u64,
+    /// Stalls of that length while waiting.
+    pub while_waiting: u64,
+    /// Share of work in the running time, without the stalls.
+    pub work_share: f64,
+    /// Probability that chance puts so many of both into work.
+    pub chance: f64,
+}
+
+impl OverrunAttribution {
+    /// Counts the processes of a run together, since they share the machine. None if no stretch of work cost a deadline.
+    pub(super) fn new(processes: &[&Skips]) -> Option<Self> {
+        let least_ns = processes.iter().filter_map(|skips| skips.shortest_costly_ns).min()?;
+        let counts = processes.iter().map(|skips| skips.as_long_as(least_ns));
+        let (while_waiting, while_working) =
+            counts.fold((0, 0), |sum, count| (sum.0 + count.0, sum.1 + count.1));
+        let sum_ns = |part: fn(&SkipFigures) -> u64| -> u64 {
+            processes.iter().map(|skips| part(&skips.figures)).sum()
+        };
+        let worked_ns = sum_ns(|figures| figures.worked_ns.saturating_sub(figures.overlong_ns));
+        let spun_ns = sum_ns(|figures| figures.spun_ns);
+        let work_share = worked_ns as f64 / (worked_ns + spun_ns).max(1) as f64;
+        let chance = at_least(while_working, while_working + while_waiting, work_share);
+        Some(Self { while_working, while_waiting, work_share, chance })
+    }
+
+    /// Whether the machine may be the cause. A single stretch is no evidence against the rig: the same work took its
+    /// normal time in every other cycle.
+    pub fn may_be_the_machine(&self) -> bool {
+        self.while_working <= 1 || self.chance >= LEAST_CHANCE
+    }
+}
+
+/// Probability that at least `hits` of `n` independent events, each of probability `p`, come true.
+fn at_least(hits: u64, n: u64, p: f64) -> f64 {
+    if hits == 0 || p >= 1.0 {
+        return 1.0;
+    }
+    if p <= 0.0 {
+        return 0.0;
+    }
+    let odds = (p / (1.0 - p)).ln();
+    // Logarithm of the probability of exactly i events, from i = 0 on: the powers alone would underflow.
+    let mut exactly = n as f64 * (1.0 - p).ln();
+    let mut sum = 0.0;
+    for i in 0..=n {
+        if i >= hits {
+            sum += exactly.exp();
+        }
+        exactly += ((n - i) as f64 / (i + 1) as f64).ln() + odds;
+    }
+    sum.min(1.0)
 }
 
 #[cfg(test)]

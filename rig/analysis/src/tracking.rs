@@ -1,15 +1,14 @@
 //! Distance of the platform from its desired pose. The actual pose is the true one where the mechanism is emulated,
-//! and forward kinematics' estimate on the robot, whose true pose is unknown.
+//! and forward kinematics' estimate on the robot, whose true pose is unknown. A pose that is none is infinitely far.
 
 use masseter_model::geometry::{Deviation, Pose};
 use masseter_runtime::clock::SECOND_NS;
 use masseter_runtime::messages::codes::ControllerState;
-use masseter_runtime::messages::{State, Truth};
+use masseter_runtime::messages::{State, Truth, pose_from_fields};
 use serde::Serialize;
 
-use super::by_cycle::ByCycle;
-use super::noise::standard_error;
-use super::pose_errors::{Accumulator, PoseErrorSums, PoseErrors, deviation, pose};
+use crate::measured::standard_error;
+use crate::series::ByCycle;
 
 /// States in which the platform has a desired pose.
 pub const MOVING: [ControllerState; 3] =
@@ -143,10 +142,8 @@ pub(super) struct Tracking {
     was_moving: bool,
     /// The plant's cycle in which the drives were stopped: no desired pose counts any more.
     stopped: Option<u64>,
-    actual: PoseErrorSums,
-    estimated: PoseErrorSums,
-    undisturbed_actual: PoseErrorSums,
-    undisturbed_estimated: PoseErrorSums,
+    errors: Errors,
+    undisturbed: Errors,
     estimates: Accumulator,
     track: Vec<TrackingSample>,
     next_sample_ns: u64,
@@ -171,7 +168,12 @@ impl Tracking {
 
     /// The state of a cycle. In one without a fresh reading, the desired pose is that of the sample that failed to come.
     /// `is_disturbed`: a lost cycle may have acted on the jaw.
-    pub(super) fn state(&mut self, state: &State, is_fresh: bool, is_disturbed: bool) -> Option<PathSample> {
+    pub(super) fn apply_state(
+        &mut self,
+        state: &State,
+        is_fresh: bool,
+        is_disturbed: bool,
+    ) -> Option<PathSample> {
         let cycle = if is_fresh { state.reading_cycle } else { state.cycle.saturating_sub(1) };
         let is_moving = is_moving(state) && self.stopped.is_none_or(|stopped| cycle < stopped);
         let on_path = match std::mem::replace(&mut self.was_moving, is_moving) {
@@ -181,8 +183,9 @@ impl Tracking {
         };
         let sample = Sample { state: *state, cycle, is_fresh, on_path, is_disturbed };
         if self.source == PoseSource::Estimate {
-            let estimated = pose(state.estimated_position_m, state.estimated_quaternion_wxyz);
-            return is_fresh.then(|| self.compare(&sample, state.sampled_ns, estimated)).flatten();
+            return is_fresh
+                .then(|| self.compare(&sample, state.sampled_ns, estimated_pose(state)))
+                .flatten();
         }
         let Some(&(sampled_ns, actual)) = self.truths.get(cycle) else {
             self.waiting.insert(state.cycle, sample);
@@ -192,67 +195,48 @@ impl Tracking {
     }
 
     /// The true pose of a sample, with the states that wait for it: its own cycle's and its neighbours'.
-    pub(super) fn truth(&mut self, truth: &Truth) -> [Option<PathSample>; 3] {
-        let actual = pose(truth.position_m, truth.quaternion_wxyz);
+    pub(super) fn apply_truth(&mut self, truth: &Truth) -> [Option<PathSample>; 3] {
+        let actual = true_pose(truth);
         self.truths.insert(truth.cycle, (truth.sampled_ns, actual));
         let cycles = [truth.cycle.saturating_sub(1), truth.cycle, truth.cycle + 1];
         cycles.map(|cycle| {
             self.waiting.get(cycle).filter(|sample| sample.cycle == truth.cycle)?;
-            let sample = self.waiting.take(cycle)?;
+            let sample = self.waiting.remove(cycle)?;
             self.compare(&sample, truth.sampled_ns, actual)
         })
     }
 
     /// The deviation from the path, where there is one.
     fn compare(&mut self, sample: &Sample, sampled_ns: u64, actual: Option<Pose>) -> Option<PathSample> {
-        let Sample { state, is_fresh, on_path, is_disturbed, .. } = sample;
-        let is_on_path = *on_path != OnPath::Off;
-        let desired = pose(state.desired_position_m, state.desired_quaternion_wxyz);
+        let Sample { ref state, is_fresh, on_path, is_disturbed, .. } = *sample;
+        let is_on_path = on_path != OnPath::Off;
+        let (desired, estimated) = (desired_pose(state), estimated_pose(state));
         let error = deviation(desired.as_ref(), actual.as_ref(), self.incisal_m);
         if is_on_path {
             self.desired = desired;
-            self.actual.peak(&error);
-            if !is_disturbed {
-                self.undisturbed_actual.peak(&error);
+            self.errors(is_disturbed).for_each(|errors| errors.actual.peak(&error));
+        }
+        if on_path == OnPath::Moving && is_fresh {
+            let to_estimate =
+                |from: Option<Pose>| deviation(from.as_ref(), estimated.as_ref(), self.incisal_m);
+            let (estimate, estimate_error) = (to_estimate(desired), to_estimate(actual));
+            self.errors(is_disturbed).for_each(|errors| errors.estimated.peak(&estimate));
+            if is_running(state) {
+                self.errors(is_disturbed).for_each(|errors| errors.add(&error, &estimate));
+                self.estimates.add(estimate_error.origin_m);
+                self.add_to_second(error.origin_m, sampled_ns);
             }
         }
-        if *on_path == OnPath::Moving && *is_fresh {
-            self.solution(sample, sampled_ns, desired, actual, &error);
-        }
-        if *is_fresh && (is_moving(state) || state.controller_state == ControllerState::SafeStop.code()) {
-            let estimated = pose(state.estimated_position_m, state.estimated_quaternion_wxyz);
+        if is_fresh && (is_moving(state) || state.controller_state == ControllerState::SafeStop.code()) {
             self.draw(sampled_ns, [self.desired, estimated, actual]);
         }
         is_on_path.then_some(PathSample { sampled_ns, desired, deviation: error })
     }
 
-    /// A cycle with an estimate of its own.
-    fn solution(
-        &mut self,
-        Sample { state, is_disturbed, .. }: &Sample,
-        sampled_ns: u64,
-        desired: Option<Pose>,
-        actual: Option<Pose>,
-        error: &Deviation,
-    ) {
-        let estimated = pose(state.estimated_position_m, state.estimated_quaternion_wxyz);
-        let to_estimate = |from: Option<Pose>| deviation(from.as_ref(), estimated.as_ref(), self.incisal_m);
-        let (estimate, estimate_error) = (to_estimate(desired), to_estimate(actual));
-        let is_running = state.controller_state == ControllerState::Running.code();
-        self.estimated.peak(&estimate);
-        if !is_disturbed {
-            self.undisturbed_estimated.peak(&estimate);
-        }
-        if is_running && !is_disturbed {
-            self.undisturbed_actual.add(error);
-            self.undisturbed_estimated.add(&estimate);
-        }
-        if is_running {
-            self.actual.add(error);
-            self.estimated.add(&estimate);
-            self.estimates.add(estimate_error.origin_m);
-            self.add_to_second(error.origin_m, sampled_ns);
-        }
+    /// What a cycle counts for: all errors, and the undisturbed ones unless a lost cycle may have acted on the jaw.
+    fn errors(&mut self, is_disturbed: bool) -> impl Iterator<Item = &mut Errors> {
+        let undisturbed = (!is_disturbed).then_some(&mut self.undisturbed);
+        [&mut self.errors].into_iter().chain(undisturbed)
     }
 
     /// Takes a sample with a desired, an estimated and an actual pose into the track.
@@ -282,21 +266,17 @@ impl Tracking {
         self.second.add(distance_m);
     }
 
-    pub(super) fn finish(self) -> (TrackingFigures, Track) {
-        let samples = self.actual.samples();
+    pub(super) fn into_figures(self) -> (TrackingFigures, Track) {
+        let UndisturbedFigures { samples, actual, estimated } = self.errors.figures();
         let has_truth = self.source == PoseSource::Truth;
         let figures = TrackingFigures {
             actual_source: self.source,
             samples,
-            actual: self.actual.finish(),
+            actual,
             rms_noise_mm: standard_error(&self.seconds),
-            estimated: self.estimated.finish(),
+            estimated,
             estimate_rms_mm: (samples > 0 && has_truth).then(|| self.estimates.rms() * 1e3),
-            undisturbed: UndisturbedFigures {
-                samples: self.undisturbed_actual.samples(),
-                actual: self.undisturbed_actual.finish(),
-                estimated: self.undisturbed_estimated.finish(),
-            },
+            undisturbed: self.undisturbed.figures(),
         };
         (figures, Track { samples: self.track })
     }
@@ -304,6 +284,144 @@ impl Tracking {
 
 pub(super) fn is_moving(state: &State) -> bool {
     MOVING.iter().any(|moving| moving.code() == state.controller_state)
+}
+
+pub(super) fn is_running(state: &State) -> bool {
+    state.controller_state == ControllerState::Running.code()
+}
+
+pub(super) fn desired_pose(state: &State) -> Option<Pose> {
+    pose(state.desired_position_m, state.desired_quaternion_wxyz)
+}
+
+pub(super) fn estimated_pose(state: &State) -> Option<Pose> {
+    pose(state.estimated_position_m, state.estimated_quaternion_wxyz)
+}
+
+pub(super) fn true_pose(truth: &Truth) -> Option<Pose> {
+    pose(truth.position_m, truth.quaternion_wxyz)
+}
+
+/// A quaternion's length may differ from 1 by so much: single precision and more.
+const LENGTH_TOLERANCE: f64 = 1e-3;
+
+/// The pose in a message; none where a number is not finite or the quaternion is no rotation.
+fn pose(position_m: [f64; 3], quaternion_wxyz: [f64; 4]) -> Option<Pose> {
+    let length = quaternion_wxyz.iter().map(|part| part * part).sum::<f64>().sqrt();
+    let is_pose = position_m.iter().all(|x| x.is_finite()) && (length - 1.0).abs() <= LENGTH_TOLERANCE;
+    is_pose.then(|| pose_from_fields(position_m, quaternion_wxyz))
+}
+
+/// How far two poses are apart.
+pub(super) fn deviation(a: Option<&Pose>, b: Option<&Pose>, incisal_m: [f64; 3]) -> Deviation {
+    const NOWHERE: Deviation =
+        Deviation { origin_m: f64::INFINITY, incisal_m: f64::INFINITY, angle_rad: f64::INFINITY };
+    a.zip(b).map_or(NOWHERE, |(a, b)| Deviation::between(a, b, incisal_m))
+}
+
+/// The worse of two errors; what is no number is infinite.
+pub(super) fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::INFINITY } else { a.max(b) }
+}
+
+/// Errors of a pose while the motion played; none without samples. The peaks also count the moves to its beginning, the
+/// hold at its end, the sample at which a safe stop began, and cycles without a fresh reading.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct PoseErrors {
+    /// Root mean square distance of the platform's origin, mm.
+    pub rms_mm: Option<f64>,
+    /// Largest distance, mm.
+    pub max_mm: Option<f64>,
+    /// Root mean square distance of the incisal point, mm.
+    pub incisal_rms_mm: Option<f64>,
+    /// Largest distance, mm.
+    pub incisal_max_mm: Option<f64>,
+    /// Root mean square angle, degrees.
+    pub rms_deg: Option<f64>,
+    /// Largest angle, degrees.
+    pub max_deg: Option<f64>,
+}
+
+/// Root mean square and maximum of what is added.
+#[derive(Debug, Clone, Default)]
+struct Accumulator {
+    samples: u64,
+    squares: f64,
+    largest: Option<f64>,
+}
+
+impl Accumulator {
+    /// Takes a value.
+    fn add(&mut self, value: f64) {
+        self.samples += 1;
+        self.squares += worse(value, 0.0).powi(2);
+        self.peak(value);
+    }
+
+    /// Takes a value that counts for the maximum alone.
+    fn peak(&mut self, value: f64) {
+        self.largest = Some(worse(self.largest.unwrap_or(0.0), value));
+    }
+
+    /// The root of the mean square; 0 without values.
+    fn rms(&self) -> f64 {
+        (self.squares / self.samples.max(1) as f64).sqrt()
+    }
+}
+
+/// Errors of the actual and of the estimated pose against the desired one.
+#[derive(Debug, Clone, Default)]
+struct Errors {
+    actual: PoseErrorSums,
+    estimated: PoseErrorSums,
+}
+
+impl Errors {
+    fn add(&mut self, actual: &Deviation, estimated: &Deviation) {
+        self.actual.add(actual);
+        self.estimated.add(estimated);
+    }
+
+    fn figures(&self) -> UndisturbedFigures {
+        let (actual, estimated) = (self.actual.figures(), self.estimated.figures());
+        UndisturbedFigures { samples: self.actual.origin.samples, actual, estimated }
+    }
+}
+
+/// Collects [`PoseErrors`].
+#[derive(Debug, Clone, Default)]
+struct PoseErrorSums {
+    origin: Accumulator,
+    incisal: Accumulator,
+    angle: Accumulator,
+}
+
+impl PoseErrorSums {
+    fn add(&mut self, deviation: &Deviation) {
+        self.each(deviation, Accumulator::add);
+    }
+
+    fn peak(&mut self, deviation: &Deviation) {
+        self.each(deviation, Accumulator::peak);
+    }
+
+    fn each(&mut self, deviation: &Deviation, take: fn(&mut Accumulator, f64)) {
+        take(&mut self.origin, deviation.origin_m * 1e3);
+        take(&mut self.incisal, deviation.incisal_m * 1e3);
+        take(&mut self.angle, deviation.angle_rad.to_degrees());
+    }
+
+    fn figures(&self) -> PoseErrors {
+        let rms = |sum: &Accumulator| (sum.samples > 0).then(|| sum.rms());
+        PoseErrors {
+            rms_mm: rms(&self.origin),
+            max_mm: self.origin.largest,
+            incisal_rms_mm: rms(&self.incisal),
+            incisal_max_mm: self.incisal.largest,
+            rms_deg: rms(&self.angle),
+            max_deg: self.angle.largest,
+        }
+    }
 }
 
 #[cfg(test)]

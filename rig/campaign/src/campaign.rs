@@ -1,24 +1,200 @@
-//! A campaign that can be run: its base scenario, its points, and the case of each.
+//! A campaign: its file, its base scenario, its points, and the case of each.
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
-use masseter_scenario::input::read_bytes;
+use masseter_scenario::input::{read_bytes, read_text};
 use masseter_scenario::{FileConfig, Scenario, ScenarioError};
+use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 use sha1::{Digest, Sha1};
 use toml::{Table, Value};
 
-use crate::case::{Case, Setting};
-use crate::factor::Factor;
-use crate::file::CampaignFile;
-use crate::result::CaseResult;
-use crate::sampler::points;
+use crate::case::{Case, CaseResult};
+use crate::factor::{Factor, FactorError, Setting};
 
+/// Size of the largest file, bytes.
+const MOST_BYTES: u64 = 1 << 20;
+/// The most cases of a campaign.
+const MOST_CASES: usize = 1_000_000;
+/// The columns of every table of results that are no factors.
+const COLUMNS: [&str; 12] = [
+    "case",
+    "id",
+    "more_seed",
+    "verdict",
+    "exit_code",
+    "reason",
+    "digest",
+    "took_s",
+    "incisal_rms_mm",
+    "incisal_max_mm",
+    "rotation_max_deg",
+    "bite_force_max_n",
+];
 /// Keys that name files which only the reading of a scenario's file resolves.
 const FILE_KEYS: [&str; 2] = ["robot", "drive_profile"];
+
+/// How the points of a campaign are chosen.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sampler {
+    /// Every combination of the levels.
+    #[default]
+    Grid,
+    /// Independent points.
+    Random,
+    /// Random points of which every slice of a factor has one.
+    LatinHypercube,
+    /// The Sobol sequence, scrambled by the seed: even in all factors together.
+    Sobol,
+}
+
+impl Sampler {
+    /// The most points of a Sobol sequence.
+    pub const MOST_SOBOL: usize = 1 << 16;
+    /// The most factors of a Sobol sequence.
+    pub const MOST_SOBOL_FACTORS: usize = 256;
+}
+
+/// When a campaign ends before its last case.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct StopRules {
+    /// After this many cases that did not pass.
+    pub failures: Option<usize>,
+    /// After this time, s.
+    pub time_s: Option<f64>,
+}
+
+/// A campaign as it is written.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CampaignFile {
+    /// The scenario that varies, relative to the folder of this file; the default one when absent.
+    pub scenario: Option<PathBuf>,
+    /// How the points are chosen.
+    pub sampler: Sampler,
+    /// The number of points, unless the sampler is a grid.
+    pub runs: Option<usize>,
+    /// The seed of the sampler.
+    pub seed: u64,
+    /// With how many seeds every point is run: those of the scenario and the following numbers.
+    pub seeds: Option<usize>,
+    /// The share of cases that must pass for the campaign to pass.
+    pub least_success: Option<f64>,
+    /// When the campaign ends early.
+    pub stop_after: StopRules,
+    /// What varies.
+    #[serde(rename = "factor")]
+    pub factors: Vec<Factor>,
+}
+
+/// A file of a campaign that is refused.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {reason}", path.display())]
+pub struct FileError {
+    path: PathBuf,
+    reason: Refusal,
+}
+
+/// Why a file is refused.
+#[derive(Debug, thiserror::Error)]
+enum Refusal {
+    #[error("{0}")]
+    Unreadable(io::Error),
+    #[error("{0}")]
+    Malformed(String),
+    #[error("{0}")]
+    Factor(FactorError),
+}
+
+impl CampaignFile {
+    /// Reads and checks a file; the path of the scenario is then one of this process.
+    ///
+    /// # Errors
+    /// [`FileError`] with the place and what to do.
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        Self::read_checked(path).map_err(|reason| FileError { path: path.to_owned(), reason })
+    }
+
+    fn read_checked(path: &Path) -> Result<Self, Refusal> {
+        let text = read_text(path, MOST_BYTES).map_err(Refusal::Unreadable)?;
+        let mut file: Self = toml::from_str(&text).map_err(|error| Refusal::Malformed(error.to_string()))?;
+        file.check_numbers().map_err(|reason| Refusal::Malformed(reason.to_owned()))?;
+        file.factors.iter().try_for_each(Factor::validate).map_err(Refusal::Factor)?;
+        file.refuse_twins().map_err(Refusal::Malformed)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        file.scenario = file.scenario.map(|scenario| folder.join(scenario));
+        Ok(file)
+    }
+
+    /// The number of points.
+    fn point_count(&self) -> usize {
+        match self.sampler {
+            Sampler::Grid => {
+                self.factors.iter().fold(1, |count, factor| count.saturating_mul(factor.level_count()))
+            }
+            _ => self.runs.unwrap_or(0),
+        }
+    }
+
+    /// With how many seeds every point is run.
+    fn seed_count(&self) -> usize {
+        self.seeds.unwrap_or(1)
+    }
+
+    fn check_numbers(&self) -> Result<(), &'static str> {
+        let is_grid = self.sampler == Sampler::Grid;
+        let points = self.point_count();
+        let StopRules { failures, time_s } = self.stop_after;
+        let refusals = [
+            (
+                is_grid && self.runs.is_some(),
+                "runs: a grid has as many points as its levels; give levels, or another sampler",
+            ),
+            (!is_grid && points == 0, "runs: give the number of points"),
+            (self.seeds == Some(0), "seeds: give at least 1"),
+            (
+                points.saturating_mul(self.seed_count()) > MOST_CASES,
+                "the campaign has more than 1000000 cases; give fewer levels, runs or seeds",
+            ),
+            (
+                self.sampler == Sampler::Sobol
+                    && (points > Sampler::MOST_SOBOL || self.factors.len() > Sampler::MOST_SOBOL_FACTORS),
+                "a Sobol sequence has at most 65536 points of 256 factors",
+            ),
+            (
+                self.least_success.is_some_and(|share| !(0.0..=1.0).contains(&share)),
+                "least_success: give a share from 0 to 1",
+            ),
+            (
+                time_s.is_some_and(|time_s| !time_s.is_finite() || time_s <= 0.0),
+                "stop_after.time_s: give a finite time above 0",
+            ),
+            (failures == Some(0), "stop_after.failures: give at least 1"),
+        ];
+        let refusal = refusals.into_iter().find(|(is_wrong, _)| *is_wrong);
+        refusal.map_or(Ok(()), |(_, reason)| Err(reason))
+    }
+
+    /// Refuses two factors of one name, and names of other columns: a table could not tell their values apart.
+    fn refuse_twins(&self) -> Result<(), String> {
+        for (at, factor) in self.factors.iter().enumerate() {
+            let name = factor.name();
+            if COLUMNS.contains(&name) {
+                return Err(format!("'{name}' is the name of another column; give the factor another name"));
+            }
+            if self.factors[..at].iter().any(|other| other.name() == name) {
+                return Err(format!("two factors are called '{name}'; give each a name"));
+            }
+        }
+        Ok(())
+    }
+}
 
 /// A campaign with its resolved scenario.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -51,7 +227,7 @@ impl Campaign {
     ///
     /// # Errors
     /// The scenario's refusal, with the name of the factor.
-    pub fn check(&self) -> anyhow::Result<()> {
+    pub fn check_factors(&self) -> anyhow::Result<()> {
         self.base()?;
         for factor in &self.file.factors {
             let key = factor.key.as_deref().unwrap_or_default();
@@ -89,9 +265,9 @@ impl Campaign {
     }
 
     fn case_with(&self, number: usize, settings: Vec<Setting>, more_seed: u64) -> Case {
-        let scenario = self.scenario(&settings, more_seed);
+        let scenario = self.scenario(&settings, more_seed).map_err(|error| format!("{error:#}"));
         let id = self.id_of(&settings, more_seed, scenario.as_ref().ok());
-        Case { number, id, settings, more_seed, scenario: scenario.map_err(|error| format!("{error:#}")) }
+        Case { number, id, settings, more_seed, scenario }
     }
 
     /// The scenario that varies.
@@ -152,12 +328,54 @@ impl Campaign {
     }
 }
 
+/// The points of a sampler, each in \[0, 1)ⁿ. `levels` has the number of levels of every factor, for the grid alone;
+/// `runs` is the number of points of the others.
+fn points(sampler: Sampler, levels: &[usize], runs: usize, seed: u64) -> Vec<Vec<f64>> {
+    let mut random = Pcg64::seed_from_u64(seed);
+    match sampler {
+        Sampler::Grid => grid(levels),
+        Sampler::Random => (0..runs).map(|_| levels.iter().map(|_| random.random()).collect()).collect(),
+        Sampler::LatinHypercube => latin_hypercube(levels.len(), runs, &mut random),
+        Sampler::Sobol => (0..runs)
+            .map(|number| {
+                let coordinate =
+                    |at: usize| f64::from(sobol_burley::sample(number as u32, at as u32, seed as u32));
+                (0..levels.len()).map(coordinate).collect()
+            })
+            .collect(),
+    }
+}
+
+/// The middle of every level, in the order of an odometer: the last factor changes first.
+fn grid(levels: &[usize]) -> Vec<Vec<f64>> {
+    levels.iter().fold(vec![Vec::new()], |begun, &count| {
+        let extended = begun.iter().flat_map(|point| {
+            (0..count).map(move |level| {
+                let middle = (level as f64 + 0.5) / count as f64;
+                point.iter().copied().chain([middle]).collect()
+            })
+        });
+        extended.collect()
+    })
+}
+
+fn latin_hypercube(factors: usize, runs: usize, random: &mut Pcg64) -> Vec<Vec<f64>> {
+    let columns: Vec<Vec<f64>> = (0..factors)
+        .map(|_| {
+            let mut slices: Vec<usize> = (0..runs).collect();
+            slices.shuffle(random);
+            slices.into_iter().map(|slice| (slice as f64 + random.random::<f64>()) / runs as f64).collect()
+        })
+        .collect();
+    (0..runs).map(|run| columns.iter().map(|column| column[run]).collect()).collect()
+}
+
 /// A digest of a program: of the one that runs the cases.
 ///
 /// # Errors
 /// When the file cannot be read.
 pub fn digest_of_program(path: &Path) -> io::Result<String> {
-    Ok(data_encoding::HEXLOWER.encode(&Sha1::digest(fs::read(path)?)))
+    Ok(data_encoding::HEXLOWER.encode(&Sha1::digest(std::fs::read(path)?)))
 }
 
 #[cfg(test)]
@@ -217,7 +435,7 @@ mod tests {
     fn a_value_out_of_range_is_a_case_without_a_scenario() {
         let campaign = campaign("[[factor]]\nkey = 'rate_hz'\nvalues = [1, 1000]");
         let points = campaign.points();
-        campaign.check().unwrap();
+        campaign.check_factors().unwrap();
         let refusal = campaign.case(&points, 0).scenario.unwrap_err();
         assert!(refusal.contains("rate_hz = 1"), "{refusal}");
         assert_ne!(campaign.case(&points, 0).id, campaign.case(&points, 1).id);
@@ -232,8 +450,49 @@ mod tests {
             ("key = 'robot'\nvalues = ['a.toml']", "a campaign of its own"),
             ("key = 'faults.late.at_s'\nrange = [1.0, 2.0]", "faults has no entry"),
         ] {
-            let refusal = format!("{:#}", campaign(&format!("[[factor]]\n{text}")).check().unwrap_err());
+            let refusal =
+                format!("{:#}", campaign(&format!("[[factor]]\n{text}")).check_factors().unwrap_err());
             assert!(refusal.starts_with("factor '") && refusal.contains(reason), "{refusal}");
+        }
+    }
+
+    const THREE: [usize; 3] = [2, 3, 1];
+
+    #[test]
+    fn a_grid_has_every_combination_once() {
+        let all = points(Sampler::Grid, &THREE, 0, 1);
+        assert_eq!(all.len(), 6);
+        assert_eq!(all[0], [0.25, 0.5 / 3.0, 0.5]);
+        assert_eq!(all[5], [0.75, 2.5 / 3.0, 0.5]);
+        assert_eq!(points(Sampler::Grid, &[], 0, 1), [Vec::<f64>::new()]);
+    }
+
+    #[test]
+    fn every_slice_of_a_latin_hypercube_has_one_point() {
+        let all = points(Sampler::LatinHypercube, &THREE, 20, 7);
+        for factor in 0..3 {
+            let mut slices: Vec<_> = all.iter().map(|point| (point[factor] * 20.0) as usize).collect();
+            slices.sort_unstable();
+            assert_eq!(slices, (0..20).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn a_sobol_sequence_has_one_point_in_every_square_of_a_power_of_two() {
+        let all = points(Sampler::Sobol, &[1, 1], 16, 3);
+        let mut squares: Vec<_> =
+            all.iter().map(|point| (point[0] * 4.0) as usize * 4 + (point[1] * 4.0) as usize).collect();
+        squares.sort_unstable();
+        assert_eq!(squares, (0..16).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_seed_gives_the_same_points_and_another_seed_others() {
+        for sampler in [Sampler::Random, Sampler::LatinHypercube, Sampler::Sobol] {
+            let of_seed = |seed| points(sampler, &THREE, 10, seed);
+            assert_eq!(of_seed(1), of_seed(1));
+            assert_ne!(of_seed(1), of_seed(2));
+            assert!(of_seed(1).iter().flatten().all(|u| (0.0..1.0).contains(u)));
         }
     }
 }

@@ -1,73 +1,11 @@
-//! A case: a whole scenario with its number, its identity and the values of its factors.
+//! A case: a whole scenario with its number and its identity, and what came of it, as it is kept.
 
+use masseter_analysis::Figures;
+use masseter_report::{Check, CheckResult, Verdict};
 use masseter_scenario::Scenario;
 use serde::{Deserialize, Serialize};
-use toml::{Table, Value};
 
-/// The value of a factor in a case.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Setting {
-    /// Name of the factor.
-    pub name: String,
-    /// The key of the scenario; none for a fault.
-    pub key: Option<String>,
-    /// The value of the key; none for a fault.
-    pub value: Option<Value>,
-    /// The fault that is added; none where nothing is.
-    pub fault: Option<Table>,
-}
-
-impl Setting {
-    pub(crate) fn key(name: &str, key: &str, value: Value) -> Self {
-        Self { name: name.to_owned(), key: Some(key.to_owned()), value: Some(value), fault: None }
-    }
-
-    pub(crate) fn fault(name: &str, fault: Option<Table>) -> Self {
-        Self { name: name.to_owned(), key: None, value: None, fault }
-    }
-
-    /// The value as a number, without its unit; none of one that is no number.
-    pub fn number(&self) -> Option<f64> {
-        match self.value.as_ref()? {
-            Value::Float(number) => Some(*number),
-            Value::Integer(whole) => Some(*whole as f64),
-            Value::Boolean(is_true) => Some(f64::from(u8::from(*is_true))),
-            Value::String(text) => text.split_whitespace().next()?.parse().ok(),
-            _ => None,
-        }
-    }
-
-    /// The value in a word: that of a table is its name or kind.
-    pub fn word(&self) -> String {
-        let of_table = |table: &Table| {
-            let named = ["name", "kind"].into_iter().find_map(|key| table.get(key)?.as_str());
-            named.map_or_else(|| table.to_string().replace('\n', " "), str::to_owned)
-        };
-        match &self.value {
-            Some(Value::Table(table)) => of_table(table),
-            Some(Value::String(text)) => text.clone(),
-            Some(value) => value.to_string(),
-            None => self.fault.as_ref().map_or_else(|| "none".to_owned(), of_table),
-        }
-    }
-
-    /// Enters the value into a scenario's table of changes.
-    pub(crate) fn enter(&self, changes: &mut Table) {
-        let (Some(key), Some(value)) = (&self.key, &self.value) else { return };
-        let (folders, name) =
-            key.rsplit_once('.').map_or(("", key.as_str()), |(folders, name)| (folders, name));
-        let folders = folders.split('.').filter(|name| !name.is_empty());
-        let inner = folders.fold(changes, |table, name| {
-            let entry = table.entry(name).or_insert_with(|| Value::Table(Table::new()));
-            if !entry.is_table() {
-                // Another factor gives the whole table as something else; the later factor counts.
-                *entry = Value::Table(Table::new());
-            }
-            entry.as_table_mut().expect("it is one now")
-        });
-        inner.insert(name.to_owned(), value.clone());
-    }
-}
+use crate::factor::Setting;
 
 /// A run of a campaign.
 #[derive(Debug, Clone, PartialEq)]
@@ -84,29 +22,128 @@ pub struct Case {
     pub scenario: Result<Scenario, String>,
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// A requirement or check of a case.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CaseCheck {
+    /// Its name.
+    pub name: String,
+    /// Whether it passed; none where it could not show.
+    pub passed: Option<bool>,
+    /// How far it is from failing; none of a check without a limit in numbers.
+    pub margin: Option<f64>,
+    /// Unit of the margin.
+    pub unit: String,
+    /// The margin as a share of the limit.
+    pub relative_margin: Option<f64>,
+}
 
-    #[test]
-    fn settings_share_the_tables_of_their_keys() {
-        let mut changes = Table::new();
-        for (key, value) in [("a.b.c", 1), ("a.b.d", 2), ("e", 3)] {
-            Setting::key(key, key, Value::Integer(value)).enter(&mut changes);
+/// The result of a case.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CaseResult {
+    /// The case's place in the campaign, from 0.
+    pub number: usize,
+    /// The case's identity.
+    pub id: String,
+    /// The values of the factors.
+    pub settings: Vec<Setting>,
+    /// What is added to the seed of the scenario.
+    pub more_seed: u64,
+    /// The verdict in a word; REFUSED where the values lead to no run.
+    pub word: String,
+    /// The verdict as an exit code.
+    pub exit_code: u8,
+    /// The reason in a sentence.
+    pub reason: String,
+    /// The digest of what the rig did; empty where nothing ran.
+    pub digest: String,
+    /// The checks in their order.
+    pub checks: Vec<CaseCheck>,
+    /// Root mean square distance of the incisal point from its desired place, mm.
+    pub incisal_rms_mm: Option<f64>,
+    /// The largest such distance, mm.
+    pub incisal_max_mm: Option<f64>,
+    /// The largest error of the platform's rotation, degrees.
+    pub rotation_max_deg: Option<f64>,
+    /// The greatest bite force, N.
+    pub bite_force_max_n: Option<f64>,
+    /// The time that it took, s.
+    pub took_s: f64,
+}
+
+impl CaseResult {
+    /// The word of a case that could not run.
+    pub const REFUSED: &str = "REFUSED";
+    /// The word of a case at which the rig itself failed.
+    pub const DIED: &str = "DIED";
+
+    /// The result of a case that ran.
+    pub fn new(case: &Case, verdict: &Verdict, figures: &Figures, took_s: f64) -> Self {
+        let errors = &figures.tracking.actual;
+        Self {
+            checks: verdict.checks.iter().map(case_check).collect(),
+            digest: figures.digest.clone(),
+            incisal_rms_mm: errors.incisal_rms_mm,
+            incisal_max_mm: errors.incisal_max_mm,
+            rotation_max_deg: errors.max_deg,
+            bite_force_max_n: figures.bite_force_max_n,
+            took_s,
+            ..Self::without_run(case, verdict.word, verdict.exit_code as u8, verdict.reason.clone())
         }
-        let wanted: Table = toml::from_str("e = 3\n[a.b]\nc = 1\nd = 2").unwrap();
-        assert_eq!(changes, wanted);
     }
 
-    #[test]
-    fn a_value_has_a_number_and_a_word() {
-        let of = |value: Value| Setting::key("x", "x", value);
-        assert_eq!(of(Value::from("1.5 mm")).number(), Some(1.5));
-        assert_eq!(of(Value::from("chewing")).number(), None);
-        assert_eq!(of(Value::Boolean(true)).number(), Some(1.0));
-        let motion: Table = toml::from_str("kind = 'opening'").unwrap();
-        assert_eq!(of(Value::Table(motion.clone())).word(), "opening");
-        assert_eq!(Setting::fault("fault", Some(motion)).word(), "opening");
-        assert_eq!(Setting::fault("fault", None).word(), "none");
+    /// The result of a case that could not run.
+    pub fn without_run(case: &Case, word: &str, exit_code: u8, reason: String) -> Self {
+        Self {
+            number: case.number,
+            id: case.id.clone(),
+            settings: case.settings.clone(),
+            more_seed: case.more_seed,
+            word: word.to_owned(),
+            exit_code,
+            reason,
+            digest: String::new(),
+            checks: Vec::new(),
+            incisal_rms_mm: None,
+            incisal_max_mm: None,
+            rotation_max_deg: None,
+            bite_force_max_n: None,
+            took_s: 0.0,
+        }
+    }
+
+    /// Whether the case passed.
+    pub fn has_passed(&self) -> bool {
+        self.exit_code == 0
+    }
+
+    /// Whether it says anything about the rig: it passed, failed or stopped. What could not run, was not tested or
+    /// cannot be judged says nothing.
+    pub fn is_judged(&self) -> bool {
+        !matches!(
+            self.word.as_str(),
+            Self::REFUSED | Self::DIED | "UNTESTED" | "INVALID" | "INCOMPLETE" | "INTERRUPTED"
+        )
+    }
+
+    /// The smallest margin of its checks as a share of their limits, with the name of the check.
+    pub fn least_margin(&self) -> Option<(&str, f64)> {
+        let margins =
+            self.checks.iter().filter_map(|check| Some((check.name.as_str(), check.relative_margin?)));
+        margins.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+}
+
+fn case_check(check: &Check) -> CaseCheck {
+    let figures = check.figures.as_ref();
+    CaseCheck {
+        name: check.name.to_string(),
+        passed: match check.result {
+            CheckResult::Passed => Some(true),
+            CheckResult::Failed => Some(false),
+            CheckResult::Excused | CheckResult::Untested | CheckResult::NotJudged => None,
+        },
+        margin: figures.and_then(|figures| figures.margin),
+        unit: figures.map_or_else(String::new, |figures| figures.margin_unit.to_owned()),
+        relative_margin: figures.and_then(|figures| figures.relative_margin),
     }
 }

@@ -1,9 +1,8 @@
-//! A factor: a key of the scenario that varies, or a fault that is there or not, and the values that it takes.
+//! A factor: a key of the scenario that varies, or a fault that is there or not, and the values that it takes. A
+//! [`Setting`] is one of them.
 
 use serde::{Deserialize, Serialize};
-use toml::Value;
-
-use crate::case::Setting;
+use toml::{Table, Value};
 
 /// The word for no fault.
 const NO_FAULT: &str = "none";
@@ -79,26 +78,10 @@ pub struct Factor {
 #[error("factor '{factor}': {reason}")]
 pub struct FactorError {
     factor: String,
-    reason: String,
+    reason: &'static str,
 }
 
 impl Factor {
-    /// A factor with values in a range.
-    pub fn of_range(key: &str, range: [f64; 2]) -> Self {
-        Self {
-            key: Some(key.to_owned()),
-            name: None,
-            range: Some(range.map(Value::Float)),
-            distribution: Distribution::default(),
-            mean: None,
-            deviation: None,
-            unit: None,
-            levels: None,
-            values: None,
-            faults: None,
-        }
-    }
-
     /// The name in results.
     pub fn name(&self) -> &str {
         let faults = self.faults.as_ref().map(|_| "fault");
@@ -187,53 +170,116 @@ impl Factor {
 
     /// Checks the factor by itself; its keys are checked with the scenario of each case.
     pub(crate) fn validate(&self) -> Result<(), FactorError> {
-        let refuse =
-            |reason: &str| Err(FactorError { factor: self.name().to_owned(), reason: reason.to_owned() });
         let is_normal = self.distribution == Distribution::Normal;
+        let is_logarithmic = self.distribution == Distribution::LogUniform;
         let given = [self.range.is_some() || is_normal, self.values.is_some(), self.faults.is_some()];
-        if given.into_iter().filter(|is_given| *is_given).count() != 1 {
-            return refuse("give one of range, values and faults");
-        }
-        if self.faults.is_some() == self.key.is_some() {
-            return refuse("give the key of the scenario that varies, or faults");
-        }
-        if self.values.as_ref().or(self.faults.as_ref()).is_some_and(Vec::is_empty) {
-            return refuse("give at least one value");
-        }
-        if let Some(faults) = &self.faults {
-            let is_fault = |fault: &Value| fault.is_table() || fault.as_str() == Some(NO_FAULT);
-            if !faults.iter().all(is_fault) {
-                return refuse(
-                    "write each fault as a table, such as { kind = \"lose\", at_s = 2.0 }, or \"none\"",
-                );
-            }
-        }
-        if let Some([low, high]) = self.range.as_ref().map(|_| self.ends()) {
-            if !(low.is_finite() && high.is_finite() && low < high) {
-                return refuse("range: give two numbers, the smaller first");
-            }
-            if self.distribution == Distribution::LogUniform && low <= 0.0 {
-                return refuse("range: a log-uniform distribution needs numbers above 0");
-            }
-        }
-        if self.levels.is_some_and(|levels| !(1..=MOST_LEVELS.min(self.most_levels())).contains(&levels)) {
-            return refuse("levels: use 1 to 10000, and no more than a range has whole numbers");
-        }
-        if self.distribution == Distribution::LogUniform && self.range.is_none() {
-            return refuse("distribution: it needs a range");
-        }
-        let listed = [&self.values, &self.faults].into_iter().flatten().flatten();
+        let listed = || self.values.iter().chain(&self.faults);
+        let is_fault = |fault: &Value| fault.is_table() || fault.as_str() == Some(NO_FAULT);
+        let [low, high] = self.ends();
+        let are_ends = low.is_finite() && high.is_finite() && low < high;
+        let most_levels = || MOST_LEVELS.min(self.most_levels());
         let numbers = [self.mean, self.deviation].into_iter().flatten();
-        if !listed.into_iter().all(is_finite) || !numbers.into_iter().all(f64::is_finite) {
-            return refuse("use finite numbers");
+        let refusals = [
+            (given.iter().filter(|is_given| **is_given).count() != 1, "give one of range, values and faults"),
+            (
+                self.faults.is_some() == self.key.is_some(),
+                "give the key of the scenario that varies, or faults",
+            ),
+            (listed().any(Vec::is_empty), "give at least one value"),
+            (
+                !self.faults.iter().flatten().all(is_fault),
+                "write each fault as a table, such as { kind = \"lose\", at_s = 2.0 }, or \"none\"",
+            ),
+            (self.range.is_some() && !are_ends, "range: give two numbers, the smaller first"),
+            (
+                self.range.is_some() && is_logarithmic && low <= 0.0,
+                "range: a log-uniform distribution needs numbers above 0",
+            ),
+            (
+                self.levels.is_some_and(|levels| !(1..=most_levels()).contains(&levels)),
+                "levels: use 1 to 10000, and no more than a range has whole numbers",
+            ),
+            (is_logarithmic && self.range.is_none(), "distribution: it needs a range"),
+            (
+                !listed().flatten().all(is_finite) || !numbers.into_iter().all(f64::is_finite),
+                "use finite numbers",
+            ),
+            (
+                is_normal && self.normal().is_none(),
+                "a normal distribution needs mean, and a deviation above 0",
+            ),
+            (
+                !is_normal && (self.mean.is_some() || self.deviation.is_some()),
+                "mean and deviation need distribution = \"normal\"",
+            ),
+        ];
+        let refusal = refusals.into_iter().find(|(is_wrong, _)| *is_wrong);
+        refusal.map_or(Ok(()), |(_, reason)| Err(FactorError { factor: self.name().to_owned(), reason }))
+    }
+}
+
+/// The value of a factor in a case.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Setting {
+    /// Name of the factor.
+    pub name: String,
+    /// The key of the scenario; none for a fault.
+    pub key: Option<String>,
+    /// The value of the key; none for a fault.
+    pub value: Option<Value>,
+    /// The fault that is added; none where nothing is.
+    pub fault: Option<Table>,
+}
+
+impl Setting {
+    pub(crate) fn key(name: &str, key: &str, value: Value) -> Self {
+        Self { name: name.to_owned(), key: Some(key.to_owned()), value: Some(value), fault: None }
+    }
+
+    pub(crate) fn fault(name: &str, fault: Option<Table>) -> Self {
+        Self { name: name.to_owned(), key: None, value: None, fault }
+    }
+
+    /// The value as a number, without its unit; none of one that is no number.
+    pub fn number(&self) -> Option<f64> {
+        match self.value.as_ref()? {
+            Value::Float(number) => Some(*number),
+            Value::Integer(whole) => Some(*whole as f64),
+            Value::Boolean(is_true) => Some(f64::from(u8::from(*is_true))),
+            Value::String(text) => text.split_whitespace().next()?.parse().ok(),
+            _ => None,
         }
-        if is_normal && self.normal().is_none() {
-            return refuse("a normal distribution needs mean, and a deviation above 0");
+    }
+
+    /// The value in a word: that of a table is its name or kind.
+    pub fn word(&self) -> String {
+        let of_table = |table: &Table| {
+            let named = ["name", "kind"].into_iter().find_map(|key| table.get(key)?.as_str());
+            named.map_or_else(|| table.to_string().replace('\n', " "), str::to_owned)
+        };
+        match &self.value {
+            Some(Value::Table(table)) => of_table(table),
+            Some(Value::String(text)) => text.clone(),
+            Some(value) => value.to_string(),
+            None => self.fault.as_ref().map_or_else(|| "none".to_owned(), of_table),
         }
-        if !is_normal && (self.mean.is_some() || self.deviation.is_some()) {
-            return refuse("mean and deviation need distribution = \"normal\"");
-        }
-        Ok(())
+    }
+
+    /// Enters the value into a scenario's table of changes.
+    pub(crate) fn enter(&self, changes: &mut Table) {
+        let (Some(key), Some(value)) = (&self.key, &self.value) else { return };
+        let (folders, name) =
+            key.rsplit_once('.').map_or(("", key.as_str()), |(folders, name)| (folders, name));
+        let folders = folders.split('.').filter(|name| !name.is_empty());
+        let inner = folders.fold(changes, |table, name| {
+            let entry = table.entry(name).or_insert_with(|| Value::Table(Table::new()));
+            if !entry.is_table() {
+                // Another factor gives the whole table as something else; the later factor counts.
+                *entry = Value::Table(Table::new());
+            }
+            entry.as_table_mut().expect("it is one now")
+        });
+        inner.insert(name.to_owned(), value.clone());
     }
 }
 
@@ -353,5 +399,27 @@ mod tests {
             let refusal = factor(text).validate().unwrap_err().to_string();
             assert!(refusal.contains(reason), "{text}: {refusal}");
         }
+    }
+
+    #[test]
+    fn settings_share_the_tables_of_their_keys() {
+        let mut changes = Table::new();
+        for (key, value) in [("a.b.c", 1), ("a.b.d", 2), ("e", 3)] {
+            Setting::key(key, key, Value::Integer(value)).enter(&mut changes);
+        }
+        let wanted: Table = toml::from_str("e = 3\n[a.b]\nc = 1\nd = 2").unwrap();
+        assert_eq!(changes, wanted);
+    }
+
+    #[test]
+    fn a_value_has_a_number_and_a_word() {
+        let of = |value: Value| Setting::key("x", "x", value);
+        assert_eq!(of(Value::from("1.5 mm")).number(), Some(1.5));
+        assert_eq!(of(Value::from("chewing")).number(), None);
+        assert_eq!(of(Value::Boolean(true)).number(), Some(1.0));
+        let motion: Table = toml::from_str("kind = 'opening'").unwrap();
+        assert_eq!(of(Value::Table(motion.clone())).word(), "opening");
+        assert_eq!(Setting::fault("fault", Some(motion)).word(), "opening");
+        assert_eq!(Setting::fault("fault", None).word(), "none");
     }
 }

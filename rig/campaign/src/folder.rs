@@ -1,7 +1,7 @@
 //! The folder of a campaign: its plan, the result of every case once, and attempts that are under way.
 //!
-//! An attempt has a folder of its own, which is renamed to that of the case when the case has ended. So a case has a result
-//! or none, whenever a process dies. An attempt whose process is gone is swept.
+//! An attempt has a folder of its own, which is renamed to that of the case when the case has ended. So a case has a
+//! result or none, whenever a process dies. An attempt whose process is gone is swept.
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
@@ -10,12 +10,11 @@ use std::path::{Path, PathBuf};
 use masseter_scenario::Scenario;
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 use rustix::fs::{FlockOperation, flock};
+use serde::de::DeserializeOwned;
 use tempfile::TempDir;
 
 use crate::campaign::Campaign;
-use crate::case::Case;
-use crate::interruption::Interruption;
-use crate::result::CaseResult;
+use crate::case::{Case, CaseResult};
 
 const PLAN: &str = "plan.json";
 const CASES: &str = "cases";
@@ -60,7 +59,7 @@ pub enum FolderError {
 }
 
 /// A campaign on the disk.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct CampaignFolder {
     path: PathBuf,
 }
@@ -85,7 +84,7 @@ impl CampaignFolder {
         for inner in [folder.cases_path(), folder.path.join(ATTEMPTS)] {
             fs::create_dir_all(&inner).map_err(system(&inner))?;
         }
-        let lock = folder.lock()?;
+        let lock = CampaignLock { _file: lock(path)? };
         if folder.plan_path().exists() {
             folder.refuse_another(campaign)?;
         } else {
@@ -114,19 +113,24 @@ impl CampaignFolder {
         &self.path
     }
 
+    /// Marks the start with this number as interrupted. An engine may hold cases that it has not begun yet, on other
+    /// machines. Whoever runs a case of that start, or is about to, stops at the mark. Another start has another
+    /// mark, and goes on while cases of this one still wait in a queue.
+    ///
+    /// # Errors
+    /// When the file cannot be made.
+    pub fn mark_interrupted(&self, start: u64) -> io::Result<()> {
+        File::create(self.interruption(start)).map(drop)
+    }
+
     /// Whether the start with this number is interrupted.
-    pub fn interruption(&self, start: u64) -> Interruption {
-        Interruption::of(&self.path, start)
+    pub fn is_interrupted(&self, start: u64) -> bool {
+        self.interruption(start).exists()
     }
 
     /// Another file of this name.
     pub fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)
-    }
-
-    /// Where the scenario of a case is that did not pass.
-    pub fn scenario_of(&self, result: &CaseResult) -> PathBuf {
-        self.cases_path().join(&result.id).join(SCENARIO)
     }
 
     /// The result of a case; none of one that has not ended.
@@ -138,23 +142,6 @@ impl CampaignFolder {
         if path.is_file() { read_result(&path).map(Some) } else { Ok(None) }
     }
 
-    /// The result of every case that has ended.
-    ///
-    /// # Errors
-    /// [`FolderError::Damaged`] for a result that is none.
-    pub fn results(&self) -> Result<Vec<CaseResult>, FolderError> {
-        let path = self.cases_path();
-        let entries = fs::read_dir(&path).map_err(system(&path))?;
-        let mut results = Vec::new();
-        for entry in entries {
-            let result = entry.map_err(system(&path))?.path().join(RESULT);
-            if result.is_file() {
-                results.push(read_result(&result)?);
-            }
-        }
-        Ok(results)
-    }
-
     /// Begins an attempt at a case.
     ///
     /// # Errors
@@ -164,8 +151,7 @@ impl CampaignFolder {
         let prefix = format!("{}.", case.id);
         let folder =
             tempfile::Builder::new().prefix(&prefix).tempdir_in(&attempts).map_err(system(&attempts))?;
-        let lock = locked(&folder.path().join(LOCK))?;
-        let lock = lock.ok_or_else(|| FolderError::InUse(folder.path().to_owned()))?;
+        let lock = lock(folder.path())?;
         Ok(Attempt { folder, target: self.cases_path().join(&case.id), _lock: lock })
     }
 
@@ -183,23 +169,15 @@ impl CampaignFolder {
         Ok(())
     }
 
-    fn lock(&self) -> Result<CampaignLock, FolderError> {
-        let file = locked(&self.path.join(LOCK))?;
-        file.map(|file| CampaignLock { _file: file }).ok_or_else(|| FolderError::InUse(self.path.clone()))
-    }
-
     fn refuse_another(&self, campaign: &Campaign) -> Result<(), FolderError> {
-        let begun = self.read_plan()?;
-        let difference = begun.difference_to(campaign);
-        difference
-            .map_or(Ok(()), |difference| Err(FolderError::OfAnother { path: self.path.clone(), difference }))
+        match self.read_plan()?.difference_to(campaign) {
+            Some(difference) => Err(FolderError::OfAnother { path: self.path.clone(), difference }),
+            None => Ok(()),
+        }
     }
 
     fn read_plan(&self) -> Result<Campaign, FolderError> {
-        let path = self.plan_path();
-        let text = read_text(&path, MOST_KEPT_BYTES).map_err(system(&path))?;
-        serde_json::from_str(&text)
-            .map_err(|error| FolderError::Damaged { path, reason: format!("it is no plan: {error}") })
+        read_json(&self.plan_path(), "plan")
     }
 
     fn write_whole(&self, path: &Path, text: &str) -> Result<(), FolderError> {
@@ -210,6 +188,10 @@ impl CampaignFolder {
             file.persist(path).map_err(|error| error.error)
         };
         write().map(drop).map_err(system(path))
+    }
+
+    fn interruption(&self, start: u64) -> PathBuf {
+        self.file(&format!("interrupted-{start}"))
     }
 
     fn plan_path(&self) -> PathBuf {
@@ -234,7 +216,7 @@ impl Attempt {
     ///
     /// # Errors
     /// When a file cannot be written.
-    pub fn finish(self, result: &CaseResult, scenario: Option<&Scenario>) -> Result<(), FolderError> {
+    pub fn keep_result(self, result: &CaseResult, scenario: Option<&Scenario>) -> Result<(), FolderError> {
         let path = self.folder.path();
         if let Some(scenario) = scenario.filter(|_| !result.has_passed()) {
             let kept = path.join(SCENARIO);
@@ -269,21 +251,26 @@ fn has_more_than_a_lock(entries: fs::ReadDir) -> bool {
     entries.flatten().any(|entry| !ours.iter().any(|name| entry.file_name() == *name))
 }
 
-/// A locked file; none if another process has locked it.
-fn locked(path: &Path) -> Result<Option<File>, FolderError> {
-    let file = File::options().create(true).append(true).open(path).map_err(system(path))?;
+/// The locked file of a folder; refused if another process has locked it.
+fn lock(folder: &Path) -> Result<File, FolderError> {
+    let path = folder.join(LOCK);
+    let file = File::options().create(true).append(true).open(&path).map_err(system(&path))?;
     match flock(&file, FlockOperation::NonBlockingLockExclusive) {
-        Ok(()) => Ok(Some(file)),
-        Err(rustix::io::Errno::WOULDBLOCK) => Ok(None),
-        Err(error) => Err(system(path)(error.into())),
+        Ok(()) => Ok(file),
+        Err(rustix::io::Errno::WOULDBLOCK) => Err(FolderError::InUse(folder.to_owned())),
+        Err(error) => Err(system(&path)(error.into())),
     }
 }
 
 fn read_result(path: &Path) -> Result<CaseResult, FolderError> {
+    read_json(path, "result")
+}
+
+fn read_json<T: DeserializeOwned>(path: &Path, what: &str) -> Result<T, FolderError> {
     let text = read_text(path, MOST_KEPT_BYTES).map_err(system(path))?;
     serde_json::from_str(&text).map_err(|error| FolderError::Damaged {
         path: path.to_owned(),
-        reason: format!("it is no result: {error}"),
+        reason: format!("it is no {what}: {error}"),
     })
 }
 
@@ -314,6 +301,13 @@ mod tests {
         two().case(&two().points(), number)
     }
 
+    /// The result of every case that has ended.
+    fn results(folder: &CampaignFolder) -> Result<Vec<CaseResult>, FolderError> {
+        let cases =
+            fs::read_dir(folder.cases_path()).unwrap().map(|entry| entry.unwrap().path().join(RESULT));
+        cases.filter(|result| result.is_file()).map(|result| read_result(&result)).collect()
+    }
+
     fn failed(case: &Case) -> CaseResult {
         CaseResult::without_run(case, "FAIL", 1, "failed: tracking".to_owned())
     }
@@ -324,18 +318,18 @@ mod tests {
         let path = parent.path().join("campaign");
         let (folder, lock) = CampaignFolder::begin(&path, &two()).unwrap();
         let first = case(0);
-        folder.attempt(&first).unwrap().finish(&failed(&first), first.scenario.as_ref().ok()).unwrap();
+        folder.attempt(&first).unwrap().keep_result(&failed(&first), first.scenario.as_ref().ok()).unwrap();
         // The second attempt comes too late, and does no harm.
         let late = CaseResult { word: "PASS".to_owned(), exit_code: 0, ..failed(&first) };
-        folder.attempt(&first).unwrap().finish(&late, first.scenario.as_ref().ok()).unwrap();
-        folder.interruption(1).mark().unwrap();
+        folder.attempt(&first).unwrap().keep_result(&late, first.scenario.as_ref().ok()).unwrap();
+        folder.mark_interrupted(1).unwrap();
         drop(lock);
 
         let (folder, _lock) = CampaignFolder::begin(&path, &two()).unwrap();
-        assert!(folder.interruption(1).is_marked() && !folder.interruption(2).is_marked());
+        assert!(folder.is_interrupted(1) && !folder.is_interrupted(2));
         assert_eq!(folder.result_of(&case(1)).unwrap(), None);
-        assert_eq!(folder.results().unwrap(), [failed(&first)]);
-        assert!(folder.scenario_of(&failed(&first)).is_file());
+        assert_eq!(results(&folder).unwrap(), [failed(&first)]);
+        assert!(path.join(CASES).join(&first.id).join(SCENARIO).is_file());
         assert_eq!(fs::read_dir(path.join(ATTEMPTS)).unwrap().count(), 0);
     }
 
@@ -382,8 +376,8 @@ mod tests {
         let left = parent.path().join(CASES).join(case(0).id);
         fs::create_dir(&left).unwrap();
         fs::write(left.join(SCENARIO), "").unwrap();
-        folder.attempt(&case(0)).unwrap().finish(&failed(&case(0)), None).unwrap();
-        assert_eq!(folder.results().unwrap(), [failed(&case(0))]);
+        folder.attempt(&case(0)).unwrap().keep_result(&failed(&case(0)), None).unwrap();
+        assert_eq!(results(&folder).unwrap(), [failed(&case(0))]);
     }
 
     #[test]
@@ -407,7 +401,7 @@ mod tests {
         let kept = parent.path().join(CASES).join(case(0).id);
         fs::create_dir(&kept).unwrap();
         fs::write(kept.join(RESULT), "{").unwrap();
-        let refusal = folder.results().unwrap_err().to_string();
+        let refusal = results(&folder).unwrap_err().to_string();
         assert!(refusal.contains("remove its folder, and the rest goes on"), "{refusal}");
     }
 }

@@ -7,12 +7,43 @@ use masseter_scenario::wording::counted;
 use masseter_table::Format;
 
 use crate::campaign::Campaign;
+use crate::case::CaseResult;
 use crate::folder::CampaignFolder;
-use crate::result::CaseResult;
-use crate::statistics::SuccessRate;
 
+/// Quantile of the normal distribution for an interval of 95 %.
+const Z: f64 = 1.959_963_984_540_054;
 /// The page.
 pub(crate) const PAGE: &str = "campaign.html";
+
+/// A share with an interval that covers the true one in 95 of 100 campaigns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SuccessRate {
+    /// Cases that passed.
+    pub passed: usize,
+    /// Cases that were judged.
+    pub judged: usize,
+    /// Ends of the interval.
+    pub interval: [f64; 2],
+}
+
+impl SuccessRate {
+    /// The share with the interval of Wilson (1927), which also holds for few cases and for shares near 0 and 1. It
+    /// means something for random cases; on a grid it is only a measure of their number.
+    pub fn new(passed: usize, judged: usize) -> Self {
+        let n = judged as f64;
+        let share = if judged == 0 { 0.5 } else { passed as f64 / n };
+        let (z_square, n) = (Z * Z, n.max(f64::MIN_POSITIVE));
+        let middle = (share + z_square / (2.0 * n)) / (1.0 + z_square / n);
+        let half = Z * (share * (1.0 - share) / n + z_square / (4.0 * n * n)).sqrt() / (1.0 + z_square / n);
+        let interval = if judged == 0 { [0.0, 1.0] } else { [middle - half, middle + half] };
+        Self { passed, judged, interval: interval.map(|end| end.clamp(0.0, 1.0)) }
+    }
+
+    /// The share; none without a case.
+    pub fn share(&self) -> Option<f64> {
+        (self.judged > 0).then(|| self.passed as f64 / self.judged as f64)
+    }
+}
 
 /// A case with a small margin, and how to see it again.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,15 +73,6 @@ impl<'a> Report<'a> {
         Self { campaign, results, format }
     }
 
-    /// The number of results.
-    #[expect(
-        clippy::len_without_is_empty,
-        reason = "a report is asked for its size, never whether it has one"
-    )]
-    pub fn len(&self) -> usize {
-        self.results.len()
-    }
-
     /// The share of judged cases that passed.
     pub fn rate(&self) -> SuccessRate {
         // Equal cases are one trial.
@@ -60,8 +82,8 @@ impl<'a> Report<'a> {
         SuccessRate::new(passed.count(), judged.count())
     }
 
-    /// Whether enough cases passed: all, or the share that the file demands. Only judged cases count towards that share; without
-    /// any, nothing was shown. A defect of the rig fails the campaign.
+    /// Whether enough cases passed: all, or the share that the file demands. Only judged cases count towards that
+    /// share; without any, nothing was shown. A defect of the rig fails the campaign.
     pub fn is_success(&self) -> bool {
         if self.results.iter().any(|result| result.word == CaseResult::DIED) {
             return false;
@@ -98,16 +120,13 @@ impl<'a> Report<'a> {
     }
 
     /// The result in lines for a terminal.
-    pub fn text(&self, folder: &CampaignFolder) -> String {
+    pub fn in_words(&self, folder: &CampaignFolder) -> String {
         let counts: Vec<_> = self.counts().iter().map(|(word, count)| format!("{count} {word}")).collect();
         let worst = self.worst(1);
         let worst = worst.first().and_then(|result| {
             let (name, margin) = result.least_margin()?;
-            Some(format!(
-                "smallest margin: {:.1} % of its limit, {name}, case {}\n",
-                margin * 100.0,
-                result.number
-            ))
+            let margin = percent(margin);
+            Some(format!("smallest margin: {margin} of its limit, {name}, case {}\n", result.number))
         });
         let word = if self.is_success() { "PASS" } else { "FAIL" };
         format!(
@@ -123,11 +142,11 @@ impl<'a> Report<'a> {
 
     /// Where page and table are, in lines for a terminal.
     pub fn files(&self, folder: &CampaignFolder) -> String {
-        format!("page: {}\ntable: {}\n", folder.file(PAGE).display(), self.table(folder).display())
+        format!("page: {}\ntable: {}\n", folder.file(PAGE).display(), self.table_path(folder).display())
     }
 
     /// File of the results, a row a case.
-    pub(crate) fn table(&self, folder: &CampaignFolder) -> PathBuf {
+    pub(crate) fn table_path(&self, folder: &CampaignFolder) -> PathBuf {
         folder.file(&format!("cases.{}", self.format.extension()))
     }
 
@@ -136,11 +155,10 @@ impl<'a> Report<'a> {
         let Some(share) = rate.share() else { return "no case was judged\n".to_owned() };
         let [low, high] = rate.interval.map(|end| end * 100.0);
         let demanded = self.campaign.file.least_success;
-        let demanded =
-            demanded.map_or_else(String::new, |least| format!(", demanded {:.1} %", least * 100.0));
+        let demanded = demanded.map_or_else(String::new, |least| format!(", demanded {}", percent(least)));
         format!(
-            "success rate: {:.1} % of {} judged, 95 % interval {low:.1} to {high:.1} %{demanded}\n{}",
-            share * 100.0,
+            "success rate: {} of {} judged, 95 % interval {low:.1} to {high:.1} %{demanded}\n{}",
+            percent(share),
             rate.judged,
             self.unjudged_in_words()
         )
@@ -159,12 +177,17 @@ impl<'a> Report<'a> {
     }
 }
 
+/// A share in percent.
+pub(crate) fn percent(share: f64) -> String {
+    format!("{:.1} %", share * 100.0)
+}
+
 #[cfg(test)]
 mod tests {
     use masseter_scenario::Scenario;
 
     use super::*;
-    use crate::result::CaseCheck;
+    use crate::case::CaseCheck;
 
     fn campaign(text: &str) -> Campaign {
         Campaign {
@@ -225,5 +248,16 @@ mod tests {
         assert!(!passes("least_success = 0.7", results));
         assert!(passes("", |campaign| vec![result(campaign, 0, "PASS", 0, 0.5)]));
         assert!(!passes("least_success = 0.0", |campaign| vec![result(campaign, 0, "UNTESTED", 1, 0.5)]));
+    }
+
+    #[test]
+    fn the_interval_is_wilsons() {
+        // Newcombe (1998), table I: 81 of 263, and 0 of 20.
+        let rate = SuccessRate::new(81, 263);
+        assert!((rate.interval[0] - 0.2553).abs() < 5e-5 && (rate.interval[1] - 0.3662).abs() < 5e-5);
+        let none = SuccessRate::new(0, 20);
+        assert!(none.interval[0] <= 0.0 && (none.interval[1] - 0.1611).abs() < 5e-5);
+        let [low, high] = SuccessRate::new(0, 0).interval;
+        assert!(low <= 0.0 && high >= 1.0 && SuccessRate::new(0, 0).share().is_none());
     }
 }

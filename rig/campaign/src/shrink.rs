@@ -1,5 +1,5 @@
-//! Reduction of a failing scenario to a minimal one that still fails: fewer changes to the default scenario, values nearer to
-//! the defaults, fewer digits, a shorter run.
+//! Reduction of a failing scenario to a minimal one that still fails: fewer changes to the default scenario, values
+//! nearer to the defaults, fewer digits, a shorter run.
 //!
 //! The changes are reduced by delta debugging (Zeller and Hildebrandt, 2002). The result depends on the scenario alone.
 
@@ -61,7 +61,7 @@ impl<F: FnMut(&Scenario) -> bool> Shrink<F> {
                 break;
             }
         }
-        shrink.text(&changes)
+        shrink.scenario_text(&changes)
     }
 
     /// Delta debugging: removes parts of the changes, halves first.
@@ -162,11 +162,11 @@ impl<F: FnMut(&Scenario) -> bool> Shrink<F> {
     }
 
     fn does_fail(&mut self, changes: &[Change]) -> bool {
-        let scenario = Scenario::parse(Path::new("shrink"), &self.text(changes));
+        let scenario = Scenario::parse(Path::new("shrink"), &self.scenario_text(changes));
         scenario.is_ok_and(|scenario| scenario.validate().is_ok() && (self.fails)(&scenario))
     }
 
-    fn text(&self, changes: &[Change]) -> String {
+    fn scenario_text(&self, changes: &[Change]) -> String {
         let mut whole = Table::from_iter([("name".to_owned(), self.name.clone())]);
         for Change { path, value, is_entry, .. } in changes {
             let [folders @ .., name] = path.as_slice() else { continue };

@@ -20,7 +20,7 @@ pub struct Hold {
 impl Hold {
     /// Opens the device if `requested` demands that for this kind of machine.
     pub fn new(requested: CpuDmaLatency, is_virtual: bool) -> Self {
-        let opened = is_to_be_held(requested, is_virtual).then(open);
+        let opened = is_to_be_held(requested, is_virtual).then(open_device);
         let (device, limit_us, refusal) = match opened {
             Some(Ok((device, limit_us))) => (Some(device), Some(limit_us), None),
             Some(Err(error)) if requested == CpuDmaLatency::Hold => {
@@ -44,7 +44,7 @@ fn is_to_be_held(requested: CpuDmaLatency, is_virtual: bool) -> bool {
 }
 
 /// Writes a latency of 0 µs, in native byte order, and reads the limit back.
-fn open() -> io::Result<(File, i32)> {
+fn open_device() -> io::Result<(File, i32)> {
     let mut device = OpenOptions::new().read(true).write(true).open(DEVICE)?;
     device.write_all(&0_i32.to_ne_bytes())?;
     device.rewind()?;

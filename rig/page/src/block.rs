@@ -3,10 +3,7 @@
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::chart::Chart;
-use crate::live::{Live, Parameter};
-use crate::pressure::Pressure;
-use crate::tone::Tone;
+use crate::chart::{Chart, Points};
 
 /// A section of the page.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -195,6 +192,20 @@ pub struct Table {
     pub rows: Vec<Vec<Cell>>,
 }
 
+impl Table {
+    /// A table whose first column holds text, and whose others hold numbers.
+    #[must_use]
+    pub fn of_numbers<const N: usize>(
+        label: &str,
+        first: &str,
+        numbers: [&str; N],
+        rows: impl IntoIterator<Item = Vec<Cell>>,
+    ) -> Self {
+        let columns = [Column::text(first)].into_iter().chain(numbers.map(Column::number)).collect();
+        Self { label: label.to_owned(), columns, rows: rows.into_iter().collect() }
+    }
+}
+
 /// The events of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Events {
@@ -215,4 +226,72 @@ pub struct EventRow {
     pub is_fault: bool,
     /// What happened.
     pub text: String,
+}
+
+/// The state of a run that goes on. Its block has a button that ends the run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Live {
+    /// The update that the page shows; the next ones follow from it.
+    pub number: u64,
+    /// The controller's state in a word.
+    pub state: String,
+    /// The state as a colour.
+    pub tone: Tone,
+    /// How far the run has come, in a sentence.
+    pub progress: String,
+    /// Figures that matter most, each with its name.
+    pub figures: Vec<[String; 2]>,
+}
+
+/// A parameter of the controller, which the page can change.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Parameter {
+    /// Its name.
+    pub name: String,
+    /// The name of its unit; may be empty.
+    pub unit: String,
+    /// What it is.
+    pub about: String,
+    /// The value that the controller reported last.
+    pub value: f64,
+    /// The least and the greatest value.
+    pub range: [f64; 2],
+}
+
+/// The lower teeth, with the greatest force of all.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Pressure {
+    /// In any order.
+    pub teeth: Vec<Tooth>,
+    /// The greatest force on a tooth, N.
+    pub most_n: f64,
+    /// When all teeth together bear most, s since the first SYNC. The page shows this moment first.
+    pub at_s: f64,
+}
+
+/// A tooth.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Tooth {
+    /// FDI number.
+    pub number: u32,
+    /// Where its force acts, seen from above: to the right of the picture, which is the jaw's right side, mm.
+    pub across_mm: f64,
+    /// The same forward, mm.
+    pub forward_mm: f64,
+    /// The force by time, N.
+    pub points: Points,
+}
+
+/// Whether something is as it should be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Tone {
+    /// It is.
+    Good,
+    /// It may not be.
+    Doubtful,
+    /// It is not.
+    Bad,
+    /// It is not judged.
+    Plain,
 }

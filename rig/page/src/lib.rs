@@ -18,18 +18,11 @@
 
 mod block;
 mod chart;
-mod live;
 mod page;
-mod points;
-mod pressure;
-mod time;
-mod tone;
 
-pub use block::{Block, Cell, Column, Content, EventRow, Events, Section, Table, Verdict};
-pub use chart::{Across, Chart, Limit, Scale, Series, Style};
-pub use live::{Live, Parameter};
+pub use block::{
+    Block, Cell, Column, Content, EventRow, Events, Live, Parameter, Pressure, Section, Table, Tone, Tooth,
+    Verdict,
+};
+pub use chart::{Across, Chart, Limit, Moment, MomentKind, Phase, Points, Scale, Series, Style, Time};
 pub use page::{Life, Page, PageError};
-pub use points::Points;
-pub use pressure::{Pressure, Tooth};
-pub use time::{Moment, MomentKind, Phase, Time};
-pub use tone::Tone;

@@ -4,7 +4,7 @@ use askama::Template;
 use serde::Serialize;
 
 use crate::block::Section;
-use crate::time::{Moment, Phase, Time};
+use crate::chart::{Moment, Phase, Time};
 
 /// Whether the run is over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

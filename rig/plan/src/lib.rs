@@ -12,9 +12,7 @@
 //! # Ok::<(), anyhow::Error>(())
 //! ```
 
-mod dry;
 mod placement;
-mod scenario;
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -27,10 +25,7 @@ use masseter_plant::core as plant;
 use masseter_runtime::schedule::CycleSchedule;
 use masseter_scenario::{FileConfig, MotionConfig, Scenario};
 
-use dry::enter_dry_run;
-
 pub use placement::{Placement, best_placement};
-pub use scenario::{read_scenario, read_scenario_with};
 
 /// A run that fits its mechanism, drives and buses.
 #[derive(Debug)]
@@ -112,7 +107,12 @@ impl RunPlan {
         let cut = cut.map_or_else(String::new, |whole_s| {
             format!("; cut short: the whole motion takes {whole_s:.1} s")
         });
-        let centroid = self.trajectory.centroid_turn_deg().map_or_else(String::new, of_centroid);
+        let centroid = self.trajectory.centroid_turn_deg().map_or_else(String::new, |turn_deg| {
+            format!(
+                "\n  the jaw turns by up to {turn_deg:.1}°, so the markers' centroid does not follow the incisal point; \
+                 set motion.marker_origin_mm"
+            )
+        });
         let doubts =
             self.trajectory.doubts().into_iter().map(|doubt| format!("\n  warning: the motion's {doubt}"));
         let doubts: String = doubts.collect();
@@ -146,19 +146,38 @@ impl RunPlan {
     }
 }
 
+/// The valid scenario of a file, or the default one.
+///
+/// # Errors
+/// When the file cannot be read or a value is out of range.
+pub fn read_scenario(path: Option<&Path>) -> anyhow::Result<Scenario> {
+    read_scenario_with(path, |_| Ok(()))
+}
+
+/// The same after `change`, which applies the arguments of a verb. Only the result must be valid.
+///
+/// # Errors
+/// When the file cannot be read, `change` fails, or a value is out of range.
+pub fn read_scenario_with(
+    path: Option<&Path>,
+    change: impl FnOnce(&mut Scenario) -> anyhow::Result<()>,
+) -> anyhow::Result<Scenario> {
+    let mut scenario = path.map_or_else(|| Ok(Scenario::default()), Scenario::read)?;
+    change(&mut scenario)?;
+    let checked = scenario.validate();
+    checked.map_err(|error| match path {
+        Some(path) => Scenario::place_refusal(error, path),
+        None => error,
+    })?;
+    Ok(scenario)
+}
+
 /// The scenario of a file, or the default one, with every override applied and each value checked by itself.
 ///
 /// # Errors
 /// When the file or the motion cannot be read, or a value lies outside its range.
 pub fn scenario_with_overrides(path: Option<&Path>, overrides: &Overrides) -> anyhow::Result<Scenario> {
-    read_scenario_with(path, |scenario| apply(overrides, scenario))
-}
-
-fn of_centroid(turn_deg: f64) -> String {
-    format!(
-        "\n  the jaw turns by up to {turn_deg:.1}°, so the markers' centroid does not follow the incisal point; \
-         set motion.marker_origin_mm"
-    )
+    read_scenario_with(path, |scenario| apply_overrides(overrides, scenario))
 }
 
 /// The largest demands of a motion on the axes of a scenario.
@@ -174,7 +193,7 @@ pub fn demands(
     trajectory::check(trajectory, mechanism, &limits, scenario.period_s())
 }
 
-fn apply(overrides: &Overrides, scenario: &mut Scenario) -> anyhow::Result<()> {
+fn apply_overrides(overrides: &Overrides, scenario: &mut Scenario) -> anyhow::Result<()> {
     for assignment in &overrides.set {
         *scenario = scenario.with(assignment).context("--set")?;
     }
@@ -208,8 +227,21 @@ fn apply(overrides: &Overrides, scenario: &mut Scenario) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Makes a scenario that of its dry run; one that is a dry run already stays as it is.
+fn enter_dry_run(scenario: &mut Scenario) {
+    if std::mem::replace(&mut scenario.dry.is_on, true) {
+        return;
+    }
+    let margin_m = scenario.dry.stroke_margin_mm * 1e-3;
+    let strokes = &mut scenario.mechanism.strokes;
+    for [low_m, high_m] in [&mut strokes.slide_m, &mut strokes.leg_m] {
+        (*low_m, *high_m) = (*low_m + margin_m, *high_m - margin_m);
+    }
+    scenario.controller.ease_s /= scenario.dry.speed;
+}
+
 /// Replaces the motion of a scenario by a file. A scenario that already plays a file keeps its axes and filter.
-pub fn play_file(path: &Path, scenario: &mut Scenario) {
+fn play_file(path: &Path, scenario: &mut Scenario) {
     match &mut scenario.motion {
         MotionConfig::File(file) => path.clone_into(&mut file.path),
         motion => *motion = MotionConfig::File(FileConfig::new(path)),
@@ -225,4 +257,25 @@ fn absolute(path: &Path) -> anyhow::Result<PathBuf> {
     let is_text = absolute.to_str().is_some();
     ensure!(is_text, "{}: use folders and a file whose names are UTF-8", path.display());
     Ok(absolute)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dry_run_keeps_from_the_ends_and_is_entered_once() {
+        let normal = Scenario::default();
+        let mut dry = normal.clone();
+        (0..2).for_each(|_| enter_dry_run(&mut dry));
+        let ends =
+            |scenario: &Scenario| [scenario.mechanism.strokes.slide_m, scenario.mechanism.strokes.leg_m];
+        for ([low_m, high_m], [dry_low_m, dry_high_m]) in ends(&normal).into_iter().zip(ends(&dry)) {
+            assert!((dry_low_m - low_m - 1e-3).abs() < 1e-12 && (high_m - dry_high_m - 1e-3).abs() < 1e-12);
+        }
+        assert!((dry.controller.ease_s - 10.0).abs() < 1e-12);
+        assert_eq!((dry.dry.speed_now(), dry.dry.force_now()), (0.1, 0.3));
+        assert_eq!((normal.dry.speed_now(), normal.dry.force_now()), (1.0, 1.0));
+        dry.validate().unwrap();
+    }
 }

@@ -8,7 +8,7 @@
 mod tests;
 
 use std::sync::mpsc::{
-    Receiver, RecvTimeoutError, Sender, SyncSender, TryRecvError, TrySendError, channel, sync_channel,
+    Receiver, RecvTimeoutError, SyncSender, TryRecvError, TrySendError, channel, sync_channel,
 };
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
@@ -16,8 +16,8 @@ use std::time::Duration;
 use masseter_runtime::clock::{self, SECOND_NS};
 use masseter_scenario::wording::counted;
 
-use super::topic::Recorded;
-use super::writer::{Medium, Recorder, WriteError};
+use crate::topic::Recorded;
+use crate::writer::{Medium, Recorder, WriteError};
 
 /// Whether the caller may wait for the disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -115,7 +115,14 @@ impl Backlog {
         let (give_back, emptied) = sync_channel(2);
         give_back.try_send(Batch::default()).expect("the channel is new");
         let (failed, failures) = channel();
-        let disk = thread::spawn(move || write_batches(recorder, &batches, &give_back, &failed, pace));
+        let disk = thread::spawn(move || {
+            let mut safe = 0;
+            if let Err(error) = write_batches(recorder, &batches, &give_back, pace, &mut safe) {
+                // The caller may have gone.
+                let _ = failed.send(error);
+            }
+            safe
+        });
         let pending = Batch::default();
         Self { pace, pending, to_disk, emptied, disk, failures, error: None, offered: 0, dropped: 0 }
     }
@@ -200,24 +207,8 @@ impl Backlog {
     }
 }
 
-/// The disk's thread. Returns how many messages are safe.
-fn write_batches<W: Medium>(
-    recorder: Recorder<W>,
-    batches: &Receiver<Batch>,
-    give_back: &SyncSender<Batch>,
-    failed: &Sender<WriteError>,
-    pace: Pace,
-) -> u64 {
-    let mut safe = 0;
-    if let Err(error) = write_all(recorder, batches, give_back, pace, &mut safe) {
-        // The caller may have gone.
-        let _ = failed.send(error);
-    }
-    safe
-}
-
 /// Writes, flushes at intervals, and ends the file when the caller has finished. Counts the messages that are `safe`.
-fn write_all<W: Medium>(
+fn write_batches<W: Medium>(
     mut recorder: Recorder<W>,
     batches: &Receiver<Batch>,
     give_back: &SyncSender<Batch>,

@@ -1,14 +1,13 @@
-//! The folder of a run, and the names of its files.
+//! The folder of a run and the names of its files; and new files and folders for the output of a command, which creates them
+//! before it computes. Existing ones are never overwritten.
 
 use std::fs::{self, File};
-use std::io::{self, Write};
+use std::io::{self, ErrorKind, Write};
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
 use masseter_runtime::clock;
-
-use crate::output::{OutputError, new_folder};
 
 /// The folder of a run.
 ///
@@ -78,7 +77,7 @@ impl RunFolder {
         let folder = Self(path.to_owned());
         match fs::metadata(folder.recording()) {
             Ok(file) if file.is_file() => Ok(folder),
-            Err(error) if error.kind() == io::ErrorKind::PermissionDenied => {
+            Err(error) if error.kind() == ErrorKind::PermissionDenied => {
                 Err(FolderError::Unreadable { path: path.to_owned(), error })
             }
             _ => Err(FolderError::NoRun(path.to_owned())),
@@ -136,4 +135,50 @@ impl RunFolder {
 /// Makes the names in a folder survive a power cut, on file systems that support it.
 fn secure_names(folder: &Path) {
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
+}
+
+/// Why a file or folder cannot be created.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    /// It exists.
+    #[error("{} exists and is not overwritten; choose another --out", .0.display())]
+    Exists(PathBuf),
+    /// The system refused to create it.
+    #[error("cannot create {}: {error}", path.display())]
+    Create {
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's error.
+        #[source]
+        error: io::Error,
+    },
+}
+
+impl OutputError {
+    /// Converts the system's error for `path`.
+    pub fn creating(path: &Path) -> impl Fn(io::Error) -> Self {
+        move |error| match error.kind() {
+            ErrorKind::AlreadyExists => Self::Exists(path.to_owned()),
+            _ => Self::Create { path: path.to_owned(), error },
+        }
+    }
+}
+
+/// Creates an empty file.
+///
+/// # Errors
+/// When it exists, or the system refuses it.
+pub fn new_file(path: &Path) -> Result<File, OutputError> {
+    File::create_new(path).map_err(OutputError::creating(path))
+}
+
+/// Creates a folder, and missing folders above it.
+///
+/// # Errors
+/// When it exists, or the system refuses it.
+pub fn new_folder(path: &Path) -> Result<(), OutputError> {
+    if let Some(parent) = path.parent() {
+        fs::create_dir_all(parent).map_err(|error| OutputError::Create { path: path.to_owned(), error })?;
+    }
+    fs::create_dir(path).map_err(OutputError::creating(path))
 }

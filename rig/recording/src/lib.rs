@@ -10,42 +10,34 @@
 //! damaged ones. This crate computes no figures; see `masseter-analysis`.
 
 mod backlog;
-mod chunk;
-mod circumstances;
 mod columns;
-mod definitions;
-mod description;
-mod digests;
-mod encapsulation;
 mod encoding;
 mod folder;
-mod frames;
 mod manifest;
-pub mod output;
 mod reader;
-mod recover;
-mod ros;
+mod rewrite;
 mod scene;
 #[cfg(test)]
 mod tests;
-mod thin;
 mod topic;
 mod walk;
 mod writer;
 
 pub use backlog::{Backlog, Pace, WriteOutcome};
-pub use circumstances::{DmaLatency, Ending, Machine as MachineInfo, ProcessFault, RunUsage, Usage};
-pub use columns::{Columns, Field, Number};
-pub use description::Description;
-pub use digests::{Digester, Digests};
-pub use encapsulation::CDR_LITTLE_ENDIAN;
+pub use columns::{Columns, Description, Field, Number};
 pub use encoding::{Channel, Encoded, Encoder, SCHEMA_ENCODING, definitions};
 pub use folder::{FolderError, RunFolder};
-pub use manifest::{FullSpeed, Manifest};
+pub use manifest::{
+    DmaLatency, Ending, FullSpeed, Machine as MachineInfo, Manifest, ProcessFault, RunUsage, Usage,
+};
 pub use reader::{Chunks, Entry, ReadError, Reader};
-pub use recover::{RecoverError, Recovered, recover};
+pub use rewrite::{Digester, Digests, RecoverError, Recovered, ThinError, is_kept, recover, thin};
 pub use scene::{Scene, jaw_points};
-pub use thin::{ThinError, is_kept, thin};
-pub use topic::{Recorded, Topic};
+pub use topic::{CDR_LITTLE_ENDIAN, Recorded, Topic};
 pub use walk::Damage;
 pub use writer::{DurableFile, Medium, Recorder, WriteError};
+
+/// New files and folders for the output of a command.
+pub mod output {
+    pub use crate::folder::{OutputError, new_file, new_folder};
+}

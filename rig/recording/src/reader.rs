@@ -2,6 +2,7 @@
 //! read, and every stretch that cannot be read is reported with its place.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek};
 use std::path::Path;
@@ -10,16 +11,13 @@ use std::vec;
 
 use masseter_runtime::messages::{FrameTap, LAYOUT_VERSION};
 use masseter_scenario::input::open_regular;
-use mcap::Attachment;
-use mcap::records::{AttachmentHeader, MessageHeader, Record, op};
+use mcap::records::{AttachmentHeader, MessageHeader, Record, SchemaHeader, op};
+use mcap::{Attachment, Channel, Schema};
 
-use super::chunk;
-use super::definitions::Definitions;
-use super::encapsulation::CDR_LITTLE_ENDIAN;
-use super::frames::{self, FrameBatch};
-use super::manifest::{AT_START, Manifest};
-use super::topic::{Recorded, Stamps, Topic};
-use super::walk::{Damage, Step, Walk};
+use crate::encoding::{FrameBatch, frames_of};
+use crate::manifest::{AT_START, Manifest};
+use crate::topic::{CDR_LITTLE_ENDIAN, Recorded, Stamps, Topic};
+use crate::walk::{Damage, Step, Walk, unpack_chunk};
 
 /// Why a recording cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -54,7 +52,7 @@ pub enum ReadError {
 #[derive(Debug)]
 pub struct Entry {
     /// Its channel; none when the definition of that channel is lost.
-    pub channel: Option<Arc<mcap::Channel<'static>>>,
+    pub channel: Option<Arc<Channel<'static>>>,
     /// Its number and times.
     pub header: MessageHeader,
     /// Its bytes as recorded.
@@ -141,14 +139,14 @@ impl<R: Read + Seek> Reader<R> {
     }
 
     /// The channels defined so far, by their id.
-    pub fn channels(&self) -> impl Iterator<Item = &mcap::Channel<'static>> {
+    pub fn channels(&self) -> impl Iterator<Item = &Channel<'static>> {
         self.definitions.channels.values().map(Arc::as_ref)
     }
 
     /// Whether the definitions so far are those of a recording with CAN frames.
     pub fn has_frames(&self) -> bool {
-        self.channels()
-            .any(|channel| [FrameBatch::TOPIC, Topic::Frame.name()].contains(&channel.topic.as_str()))
+        let names = [FrameBatch::TOPIC, Topic::Frame.name()];
+        self.channels().any(|channel| names.contains(&channel.topic.as_str()))
     }
 
     /// The files attached so far.
@@ -196,23 +194,29 @@ impl<R: Read + Seek> Reader<R> {
                     let channel = self.definitions.channels.get(&header.channel_id).cloned();
                     return Ok(Some(Entry { channel, header, data: data.into_owned() }));
                 }
-                Some(record) => self.definitions.take(record),
-                None if self.step()? => {}
+                Some(record) => self.definitions.add_definition(record),
+                None if self.read_record()? => {}
                 None => return Ok(None),
             }
         }
     }
 
     /// Damage that follows right behind other damage is part of it.
-    fn add(&mut self, damage: Damage) {
+    fn note_damage(&mut self, damage: Damage) {
         match self.damage.last_mut() {
             Some(last) if last.to == damage.from => last.to = damage.to,
             _ => self.damage.push(damage),
         }
     }
 
+    /// Notes that the current record is damaged.
+    fn note_record(&mut self, reason: &str) {
+        let damage = self.walk.damaged(reason.to_owned());
+        self.note_damage(damage);
+    }
+
     /// Takes the next record of the file. False at the end.
-    fn step(&mut self) -> Result<bool, ReadError> {
+    fn read_record(&mut self) -> Result<bool, ReadError> {
         match self.walk.step()? {
             Step::End if self.records == 0 => return Err(self.no_mcap()),
             Step::End => return Ok(false),
@@ -224,13 +228,11 @@ impl<R: Read + Seek> Reader<R> {
                     op::ATTACHMENT => self.take_attachment(),
                     // Damage can turn other records into messages, and no checksum covers a single record.
                     op::MESSAGE => {
-                        let reason = "messages outside of chunks ('mcap compress' packs them)";
-                        let damage = self.walk.damaged(reason.to_owned());
-                        self.add(damage);
+                        self.note_record("messages outside of chunks ('mcap compress' packs them)")
                     }
                     // No message follows, and only the footer's checksum reveals damage here.
                     _ if self.walk.is_in_index => {}
-                    _ => self.definitions.parse(opcode, self.walk.body()),
+                    _ => self.definitions.parse_definition(opcode, self.walk.body()),
                 }
             }
         }
@@ -240,7 +242,7 @@ impl<R: Read + Seek> Reader<R> {
     /// Unpacks a chunk and checks it as a whole; a damaged one is skipped.
     fn open_chunk(&mut self) -> Result<(), ReadError> {
         let header = mcap::parse_record(op::CHUNK, self.walk.body());
-        match header.and_then(|header| Ok((header, chunk::unpack(&self.walk.record)?))) {
+        match header.and_then(|header| Ok((header, unpack_chunk(&self.walk.record)?))) {
             Ok((Record::Chunk { header, .. }, (records, bytes))) => {
                 self.chunks.count += 1;
                 self.chunks.uncompressed_bytes += bytes;
@@ -268,18 +270,17 @@ impl<R: Read + Seek> Reader<R> {
             let data = Cow::Owned(data.into_owned());
             self.attachments.push(Attachment { log_time, create_time, name, media_type, data });
         } else {
-            let damage = self.walk.damaged("an attached file that cannot be read".to_owned());
-            self.add(damage);
+            self.note_record("an attached file that cannot be read");
         }
     }
 
     /// Notes damage. Lost definitions are taken from the index.
     fn skip(&mut self, damage: Damage) -> Result<(), ReadError> {
-        self.add(damage);
+        self.note_damage(damage);
         if self.definitions.channels.is_empty() && !self.index_is_known {
             self.index_is_known = true;
             self.definitions = Definitions::from_index(self.walk.ahead())?;
-            self.walk.go_on()?;
+            self.walk.seek_next()?;
         }
         Ok(())
     }
@@ -290,31 +291,75 @@ impl<R: Read + Seek> Reader<R> {
     }
 }
 
+/// The definitions of channels, which the beginning of a recording holds, and its index again.
+#[derive(Debug, Default)]
+struct Definitions {
+    schemas: BTreeMap<u16, Arc<Schema<'static>>>,
+    channels: BTreeMap<u16, Arc<Channel<'static>>>,
+}
+
+impl Definitions {
+    /// Those in the index behind the place of `walk`. Only the checksum in the footer covers them, so either all or none
+    /// are taken.
+    fn from_index<R: Read + Seek>(mut walk: Walk<R>) -> io::Result<Self> {
+        let mut found = Self::default();
+        loop {
+            match walk.step()? {
+                Step::Record(op::FOOTER) => return Ok(found),
+                Step::Record(opcode) if walk.is_in_index => found.parse_definition(opcode, walk.body()),
+                Step::Record(_) => {}
+                Step::Damage(_) => found = Self::default(),
+                Step::End => return Ok(Self::default()),
+            }
+        }
+    }
+
+    /// Takes a schema or a channel; a damaged one counts as missing.
+    fn parse_definition(&mut self, opcode: u8, body: &[u8]) {
+        if let (op::SCHEMA | op::CHANNEL, Ok(record)) = (opcode, mcap::parse_record(opcode, body)) {
+            self.add_definition(record.into_owned());
+        }
+    }
+
+    /// Takes a record, if it is a schema or a channel.
+    fn add_definition(&mut self, record: Record<'static>) {
+        match record {
+            Record::Schema { header: SchemaHeader { id, name, encoding }, data } => {
+                let data = Cow::Owned(data.into_owned());
+                self.schemas.insert(id, Arc::new(Schema { id, name, encoding, data }));
+            }
+            Record::Channel(mcap::records::Channel { id, schema_id, topic, message_encoding, metadata }) => {
+                let schema = self.schemas.get(&schema_id).cloned();
+                let channel = Channel { id, topic, schema, message_encoding, metadata };
+                self.channels.insert(id, Arc::new(channel));
+            }
+            _ => {}
+        }
+    }
+}
+
 impl Entry {
     /// The message, or why this program cannot read it; none on topics that are not the rig's, and for [frames](Self::frames).
     pub fn recorded(&self) -> Option<Result<Recorded, ReadError>> {
         let topic = Topic::named(&self.channel.as_ref()?.topic)?;
-        Some(read(topic, &self.data))
+        Some(decoded(topic.name(), &self.data, |body| Recorded::read(topic, body)))
     }
 
     /// The CAN frames, or why this program cannot read them; none where it holds something else.
     pub fn frames(&self) -> Option<Result<Vec<FrameTap>, ReadError>> {
-        (self.channel.as_ref()?.topic == FrameBatch::TOPIC).then(|| read_frames(&self.data))
+        let has_frames = self.channel.as_ref()?.topic == FrameBatch::TOPIC;
+        has_frames.then(|| decoded(FrameBatch::TOPIC, &self.data, frames_of))
     }
 }
 
-/// The frames of a message, if they have this version's layout.
-fn read_frames(data: &[u8]) -> Result<Vec<FrameTap>, ReadError> {
+/// What a message of a topic holds behind the CDR header, if it has this version's layout.
+fn decoded<T>(
+    topic: &'static str,
+    data: &[u8],
+    read: impl FnOnce(&[u8]) -> Option<T>,
+) -> Result<T, ReadError> {
     let body = data.strip_prefix(&CDR_LITTLE_ENDIAN);
     let version = body.and_then(Stamps::read).map_or(0, |stamps| stamps.version);
-    let frames = body.filter(|_| version == LAYOUT_VERSION).and_then(frames::frames);
-    frames.ok_or(ReadError::Foreign { topic: FrameBatch::TOPIC, found: data.len(), version })
-}
-
-/// The message of a topic behind the CDR header, if it has this version's layout.
-fn read(topic: Topic, data: &[u8]) -> Result<Recorded, ReadError> {
-    let body = data.strip_prefix(&CDR_LITTLE_ENDIAN);
-    let version = body.and_then(Stamps::read).map_or(0, |stamps| stamps.version);
-    let message = body.filter(|_| version == LAYOUT_VERSION).and_then(|body| Recorded::read(topic, body));
-    message.ok_or_else(|| ReadError::Foreign { topic: topic.name(), found: data.len(), version })
+    let found = body.filter(|_| version == LAYOUT_VERSION).and_then(read);
+    found.ok_or(ReadError::Foreign { topic, found: data.len(), version })
 }

@@ -1,4 +1,5 @@
-//! The mechanism for 3-D views: transforms of frames and markers of ROS 2, made from `truth` and `state` at 60 Hz.
+//! The mechanism for 3-D views, made from `truth` and `state` at 60 Hz: `tf2_msgs/msg/TFMessage` and
+//! `visualization_msgs/msg/MarkerArray` of ROS 2.
 //!
 //! Frames: `base`; in it `platform` (true), `platform_estimated` (by forward kinematics) and
 //! `platform_desired`. Markers: base triangle with its slides, the three legs, the three platforms, and the
@@ -8,8 +9,7 @@ use masseter_model::geometry::{LEGS, Mechanism, Vec3};
 use masseter_runtime::clock::SECOND_NS;
 use masseter_runtime::messages::{State, Truth};
 use masseter_scenario::JawConfig;
-
-use super::ros::{Header, Marker, MarkerArray, Shape, TfMessage, Time, TransformStamped, Unused};
+use serde::Serialize;
 
 /// Time between two updates, ns: the 60 Hz of a screen.
 const EVERY_NS: u64 = SECOND_NS / 60;
@@ -61,7 +61,7 @@ impl Scene {
     }
 
     /// The true platform and the legs, if an update is due.
-    pub(super) fn truth(&mut self, truth: &Truth) -> Option<Shown> {
+    pub(super) fn show_truth(&mut self, truth: &Truth) -> Option<Shown> {
         let time_ns = truth.sampled_ns;
         if !is_due(&mut self.next_truth_ns, time_ns, EVERY_NS) {
             return None;
@@ -79,7 +79,7 @@ impl Scene {
     }
 
     /// The estimated and the desired platform, if an update is due.
-    pub(super) fn state(&mut self, state: &State) -> Option<Shown> {
+    pub(super) fn show_state(&mut self, state: &State) -> Option<Shown> {
         let time_ns = state.sampled_ns;
         if state.reading_cycle == 0 || !is_due(&mut self.next_state_ns, time_ns, EVERY_NS) {
             return None;
@@ -99,7 +99,7 @@ impl Scene {
             hinges.iter().zip(self.mechanism.corners_at(&pose)).flat_map(|(hinge, corner)| [*hinge, corner]);
         let legs = marker(Shape::LineList, GREY, ends);
         let hinges = marker(Shape::SphereList, GREY, hinges);
-        part("legs", BASE, truth.sampled_ns, vec![legs, hinges])
+        numbered_part("legs", BASE, truth.sampled_ns, vec![legs, hinges])
     }
 
     /// The parts that do not move in their frames.
@@ -108,14 +108,14 @@ impl Scene {
         let slides = (0..LEGS).flat_map(|leg| [lowest, highest].map(|end| self.mechanism.hinge(leg, end)));
         let centres = std::array::from_fn(|leg| self.mechanism.hinge(leg, 0.0));
         let slides = marker(Shape::LineList, BLUE, slides);
-        let base = part("base", BASE, time_ns, vec![closed_line(centres, GREY), slides]);
+        let base = numbered_part("base", BASE, time_ns, vec![closed_line(centres, GREY), slides]);
         let corners = *self.mechanism.platform_corners();
         let platform = |frame, colour| {
             let shapes = vec![marker(Shape::TriangleList, colour, corners), closed_line(corners, colour)];
-            part(frame, frame, time_ns, shapes)
+            numbered_part(frame, frame, time_ns, shapes)
         };
         let jaw = vec![marker(Shape::SphereList, RED, self.jaw_points), closed_line(self.jaw_points, RED)];
-        let jaw = part("jaw", TRUE, time_ns, jaw);
+        let jaw = numbered_part("jaw", TRUE, time_ns, jaw);
         [base, platform(TRUE, BLUE), platform(ESTIMATED, ORANGE), platform(DESIRED, GREEN), jaw].concat()
     }
 }
@@ -155,7 +155,7 @@ fn transform(time_ns: u64, child: &str, translation: [f64; 3], [w, x, y, z]: [f6
 }
 
 /// The shapes of a part of the mechanism, numbered.
-fn part(name: &str, frame: &str, time_ns: u64, mut shapes: Vec<Marker>) -> Vec<Marker> {
+fn numbered_part(name: &str, frame: &str, time_ns: u64, mut shapes: Vec<Marker>) -> Vec<Marker> {
     for (id, shape) in (0..).zip(&mut shapes) {
         (shape.ns, shape.id, shape.header) = (name.to_owned(), id, header(time_ns, frame));
     }
@@ -173,20 +173,112 @@ fn marker(shape: Shape, color: [f32; 4], points: impl IntoIterator<Item = Vec3>)
         Shape::TriangleList => 1.0,
     };
     Marker {
-        header: Header::default(),
-        ns: String::new(),
-        id: 0,
         shape: shape as i32,
-        action: 0,
-        position: [0.0; 3],
         orientation_xyzw: [0.0, 0.0, 0.0, 1.0],
         scale: [scale; 3],
         color,
-        lifetime: Time::default(),
         frame_locked: true,
         points: points.into_iter().map(Into::into).collect(),
-        unused: Unused::default(),
+        ..Marker::default()
     }
+}
+
+/// A message with its type.
+pub(super) trait RosMessage: Serialize {
+    const TYPE_NAME: &str;
+    const DEFINITION: &str;
+}
+
+impl RosMessage for TfMessage {
+    const TYPE_NAME: &str = "tf2_msgs/msg/TFMessage";
+    const DEFINITION: &str = include_str!("../schemas/TFMessage.msg");
+}
+
+impl RosMessage for MarkerArray {
+    const TYPE_NAME: &str = "visualization_msgs/msg/MarkerArray";
+    const DEFINITION: &str = include_str!("../schemas/MarkerArray.msg");
+}
+
+/// A time, or a duration.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub(super) struct Time {
+    sec: i32,
+    nanosec: u32,
+}
+
+impl Time {
+    /// The time wraps after 68 years.
+    fn from_ns(time_ns: u64) -> Self {
+        Self { sec: (time_ns / SECOND_NS) as i32, nanosec: (time_ns % SECOND_NS) as u32 }
+    }
+}
+
+#[derive(Debug, Clone, Default, Serialize)]
+pub(super) struct Header {
+    pub stamp: Time,
+    pub frame_id: String,
+}
+
+/// Poses of frames.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct TfMessage {
+    pub transforms: Vec<TransformStamped>,
+}
+
+/// The pose of a frame in its parent, which the header names.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct TransformStamped {
+    pub header: Header,
+    pub child_frame_id: String,
+    pub translation: [f64; 3],
+    pub rotation_xyzw: [f64; 4],
+}
+
+/// Shapes in frames. A shape replaces the earlier one with its name and number.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct MarkerArray {
+    pub markers: Vec<Marker>,
+}
+
+/// The shape of a marker.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Shape {
+    LineStrip = 4,
+    LineList = 5,
+    SphereList = 7,
+    TriangleList = 11,
+}
+
+/// A shape in the frame of its header, for ever.
+#[derive(Debug, Clone, Default, Serialize)]
+pub(super) struct Marker {
+    pub header: Header,
+    pub ns: String,
+    pub id: i32,
+    pub shape: i32,
+    pub action: i32,
+    pub position: [f64; 3],
+    pub orientation_xyzw: [f64; 4],
+    /// Width of lines, or diameters.
+    pub scale: [f64; 3],
+    pub color: [f32; 4],
+    pub lifetime: Time,
+    pub frame_locked: bool,
+    pub points: Vec<[f64; 3]>,
+    pub unused: Unused,
+}
+
+/// What only textures, texts and meshes need.
+#[derive(Debug, Clone, Default, Serialize)]
+pub(super) struct Unused {
+    colors: Vec<[f32; 4]>,
+    texture_resource: String,
+    texture: (Header, String, Vec<u8>),
+    uv_coordinates: Vec<[f32; 2]>,
+    text: String,
+    mesh_resource: String,
+    mesh_file: (String, Vec<u8>),
+    mesh_use_embedded_materials: bool,
 }
 
 #[cfg(test)]
@@ -203,7 +295,7 @@ mod tests {
     fn a_thousand_cycles_a_second_are_shown_sixty_times() {
         let mut scene = scene();
         let shown = (0..1000).filter_map(|cycle| {
-            scene.truth(&Truth {
+            scene.show_truth(&Truth {
                 cycle,
                 sampled_ns: SECOND_NS + cycle * 1_000_000,
                 quaternion_wxyz: [1.0, 0.0, 0.0, 0.0],
@@ -226,7 +318,7 @@ mod tests {
             quaternion_wxyz: [1.0, 0.0, 0.0, 0.0],
             ..Default::default()
         };
-        let shown = scene.truth(&truth).unwrap();
+        let shown = scene.show_truth(&truth).unwrap();
         let points = &shown.markers.unwrap().markers[0].points;
         for ends in points.chunks(2) {
             let [from, to] = [ends[0], ends[1]].map(Vec3::from);

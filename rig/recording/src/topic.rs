@@ -4,6 +4,9 @@ use masseter_runtime::messages::{
     Command, Contact, Event, FrameTap, Machine, Message, Parameters, Reading, Signals, State, Truth,
 };
 
+/// Encapsulation header of plain little-endian CDR (version 1, OMG CDR), before the body of every message.
+pub const CDR_LITTLE_ENDIAN: [u8; 4] = [0x00, 0x01, 0x00, 0x00];
+
 macro_rules! topics {
     ($($(#[$doc:meta])* $name:ident: $message:ty),* $(,)?) => {
         /// One of the rig's topics.

@@ -7,14 +7,15 @@
 use std::io::{self, Read, Seek, SeekFrom};
 
 use crc32fast::Hasher;
-use mcap::MAGIC;
-use mcap::records::op;
+use mcap::records::{Record, op};
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{MAGIC, McapError};
 use serde::Serialize;
 
 /// A record longer than this is taken for damage, bytes; chunks stay far below.
-pub(super) const LONGEST_RECORD: u64 = 64 << 20;
+const LONGEST_RECORD: u64 = 64 << 20;
 /// Opcode and length.
-pub(super) const HEAD: usize = 9;
+const HEAD: usize = 9;
 /// Chunk header up to the compression's name: two times, size, checksum, length of the name.
 const CHUNK_FIXED: usize = 8 + 8 + 8 + 4 + 4;
 /// Longest name of a compression that is accepted.
@@ -79,12 +80,12 @@ impl<R: Read + Seek> Walk<R> {
         Self { source, size, at: next, next, is_in_index, is_end_due, section, record: Vec::new(), end: None }
     }
 
-    /// Another walk from here on; [`Self::go_on`] continues this one.
+    /// Another walk from here on; [`Self::seek_next`] continues this one.
     pub(super) fn ahead(&mut self) -> Walk<&mut R> {
         Walk::from(&mut self.source, self.size, self.next, None)
     }
 
-    pub(super) fn go_on(&mut self) -> io::Result<()> {
+    pub(super) fn seek_next(&mut self) -> io::Result<()> {
         self.source.seek(SeekFrom::Start(self.next)).map(|_| ())
     }
 
@@ -113,15 +114,15 @@ impl<R: Read + Seek> Walk<R> {
         self.record.resize(left.min(HEAD as u64) as usize, 0);
         self.source.read_exact(&mut self.record)?;
         if self.at == 0 {
-            return self.begin();
+            return self.pass_opening_magic();
         }
         if self.record.starts_with(MAGIC) || self.is_end_due && left >= MAGIC.len() as u64 {
-            return self.close();
+            return self.pass_closing_magic();
         }
         if left < HEAD as u64 {
             return self.resynchronise("the file ends in the middle of a record");
         }
-        let length = u64::from_le_bytes(self.record[1..].try_into().expect("eight bytes"));
+        let length = u64_at(&self.record, 1).expect("the head holds nine bytes");
         if length > left - HEAD as u64 {
             return self.resynchronise("a record that is longer than the rest of the file");
         }
@@ -160,7 +161,7 @@ impl<R: Read + Seek> Walk<R> {
     }
 
     /// The eight bytes that begin every file.
-    fn begin(&mut self) -> io::Result<Step> {
+    fn pass_opening_magic(&mut self) -> io::Result<Step> {
         if !self.record.starts_with(MAGIC) {
             return self.resynchronise("no MCAP file begins like this");
         }
@@ -172,7 +173,7 @@ impl<R: Read + Seek> Walk<R> {
     }
 
     /// The eight bytes that end every file behind its footer; one of both may be damaged.
-    fn close(&mut self) -> io::Result<Step> {
+    fn pass_closing_magic(&mut self) -> io::Result<Step> {
         self.pass_magic()?;
         self.end = Some(self.next);
         if !self.is_end_due || !self.record.starts_with(MAGIC) {
@@ -183,14 +184,14 @@ impl<R: Read + Seek> Walk<R> {
 
     fn pass_magic(&mut self) -> io::Result<()> {
         self.next = self.at + MAGIC.len() as u64;
-        self.go_on()
+        self.seek_next()
     }
 
     /// Everything from here to the next landmark is damage; without one, to the end of the file.
     fn resynchronise(&mut self, reason: &str) -> io::Result<Step> {
         self.next = self.find_landmark(self.at + 1)?.unwrap_or(self.size);
         (self.is_in_index, self.is_end_due, self.section) = (false, false, None);
-        self.go_on()?;
+        self.seek_next()?;
         Ok(Step::Damage(self.stretch(reason.to_owned())))
     }
 
@@ -228,44 +229,44 @@ impl<R: Read + Seek> Walk<R> {
 
 /// Whether a chunk of at most `rest` bytes begins with these bytes.
 fn begins_chunk(bytes: &[u8], rest: u64) -> bool {
-    let Some(head) = bytes.get(1..HEAD) else { return false };
-    let length = u64::from_le_bytes(head.try_into().expect("eight bytes"));
+    let Some(length) = u64_at(bytes, 1) else { return false };
     length <= LONGEST_RECORD && HEAD as u64 + length <= rest && chunk_length(&bytes[HEAD..]) == Some(length)
+}
+
+fn u32_at(bytes: &[u8], at: usize) -> Option<usize> {
+    Some(u32::from_le_bytes(*bytes.get(at..)?.first_chunk()?) as usize)
+}
+
+fn u64_at(bytes: &[u8], at: usize) -> Option<u64> {
+    Some(u64::from_le_bytes(*bytes.get(at..)?.first_chunk()?))
 }
 
 /// Length of a chunk by its header and the compressed data it announces.
 fn chunk_length(body: &[u8]) -> Option<u64> {
-    let name = u32::from_le_bytes(body.get(CHUNK_FIXED - 4..CHUNK_FIXED)?.try_into().ok()?) as usize;
-    if name > LONGEST_NAME {
-        return None;
-    }
+    let name = u32_at(body, CHUNK_FIXED - 4).filter(|name| *name <= LONGEST_NAME)?;
     let header = CHUNK_FIXED + name + 8;
-    let data = u64::from_le_bytes(body.get(header - 8..header)?.try_into().ok()?);
-    data.checked_add(header as u64)
+    u64_at(body, header - 8)?.checked_add(header as u64)
 }
 
 /// Length of an attachment by those of its name, its media type and its data.
 fn attachment_length(body: &[u8]) -> Option<u64> {
-    let name = u32::from_le_bytes(*body.get(16..)?.first_chunk()?) as usize;
-    let media_type = u32::from_le_bytes(*body.get(name.checked_add(20)?..)?.first_chunk()?) as usize;
+    let name = u32_at(body, 16)?;
+    let media_type = u32_at(body, name.checked_add(20)?)?;
     let head = name.checked_add(media_type)?.checked_add(24)?;
-    let data = u64::from_le_bytes(*body.get(head..)?.first_chunk()?);
-    data.checked_add(head as u64 + 12)
+    u64_at(body, head)?.checked_add(head as u64 + 12)
 }
 
 /// Whether the lengths inside a record agree with its own. Only records between chunks and before the footer are
 /// checked: a wrong length there would hide the chunks behind, or the end.
 fn is_consistent(opcode: u8, body: &[u8]) -> bool {
-    let length_at = |at: usize| {
-        let bytes = body.get(at..at + 4)?;
-        Some(u32::from_le_bytes(bytes.try_into().expect("four bytes")) as usize)
+    let header_length = || {
+        let profile = u32_at(body, 0)?;
+        Some(profile + u32_at(body, profile.checked_add(4)?)? + 8)
     };
     match opcode {
         op::CHUNK => chunk_length(body) == Some(body.len() as u64),
-        op::MESSAGE_INDEX => length_at(2).is_some_and(|entries| entries + 6 == body.len()),
-        op::HEADER => length_at(0)
-            .and_then(|profile| Some(profile + length_at(profile.checked_add(4)?)? + 8))
-            .is_some_and(|length| length == body.len()),
+        op::MESSAGE_INDEX => u32_at(body, 2).is_some_and(|entries| entries + 6 == body.len()),
+        op::HEADER => header_length() == Some(body.len()),
         op::ATTACHMENT => attachment_length(body) == Some(body.len() as u64),
         op::FOOTER => body.len() == 20,
         op::DATA_END => body.len() == 4,
@@ -273,4 +274,35 @@ fn is_consistent(opcode: u8, body: &[u8]) -> bool {
         op::SCHEMA..op::SUMMARY_OFFSET => true,
         _ => false,
     }
+}
+
+/// The records of a chunk, and the bytes that they take unpacked. It counts as a whole: unpacked and checked before any of
+/// them is read.
+pub(super) fn unpack_chunk(chunk: &[u8]) -> Result<(Vec<Record<'static>>, u64), McapError> {
+    let options = LinearReaderOptions::default()
+        .with_skip_start_magic(true)
+        .with_skip_end_magic(true)
+        .with_prevalidate_chunk_crcs(true)
+        .with_record_length_limit(LONGEST_RECORD as usize);
+    let mut reader = LinearReader::new_with_options(options);
+    let (mut records, mut bytes, mut rest) = (Vec::new(), 0, chunk);
+    while let Some(event) = reader.next_event() {
+        match event? {
+            LinearReadEvent::ReadRequest(most) => {
+                let (given, behind) = rest.split_at(most.min(rest.len()));
+                reader.insert(given.len()).copy_from_slice(given);
+                reader.notify_read(given.len());
+                rest = behind;
+            }
+            LinearReadEvent::Record { data, opcode } => {
+                bytes += (HEAD + data.len()) as u64;
+                // The size in the header is checked only beside a checksum, and a few bytes can unpack to any size.
+                if bytes > LONGEST_RECORD {
+                    return Err(McapError::ChunkTooLarge(bytes));
+                }
+                records.push(mcap::parse_record(opcode, data)?.into_owned());
+            }
+        }
+    }
+    Ok((records, bytes))
 }

@@ -10,7 +10,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Cursor, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
-use std::thread::{self, JoinHandle};
+use std::thread;
 
 use masseter_runtime::messages::FrameTap;
 use masseter_runtime::named::Declared;
@@ -18,12 +18,11 @@ use masseter_scenario::input::read_bytes;
 use mcap::records::MessageHeader;
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 
-use super::encoding::{Channel, Encoded, Encoder, recorded_definitions};
-use super::folder::RunFolder;
-use super::frames::FrameBatch;
-use super::manifest::{AT_START, Manifest};
-use super::scene::Scene;
-use super::topic::Recorded;
+use crate::encoding::{Channel, Encoded, Encoder, FrameBatch, recorded_definitions};
+use crate::folder::RunFolder;
+use crate::manifest::{AT_START, Manifest};
+use crate::scene::Scene;
+use crate::topic::Recorded;
 
 /// Bytes of messages in a chunk: what is compressed together, and read together by a tool that seeks. Twice as many save 0.4 %.
 const CHUNK_BYTES: u64 = 1 << 20;
@@ -81,11 +80,24 @@ pub(super) fn options() -> WriteOptions {
         .library(LIBRARY)
 }
 
-/// Adds the schema of a channel to a file. Returns its number; 0 means no schema.
-pub(super) fn add_schema<W: Write + Seek>(
+/// A file to attach. It has no time, since runs in simulated time leave the same bytes whenever they are made.
+pub(super) fn timeless<'a>(name: &str, media_type: &str, data: &'a [u8]) -> Attachment<'a> {
+    let (name, media_type, data) = (name.to_owned(), media_type.to_owned(), Cow::Borrowed(data));
+    Attachment { log_time: 0, create_time: 0, name, media_type, data }
+}
+
+/// Adds a channel of another file under its number there.
+pub(super) fn copy_channel<W: Write + Seek>(
     writer: &mut Writer<W>,
     channel: &mcap::Channel,
-) -> Result<u16, McapError> {
+) -> Result<(), McapError> {
+    let schema = add_schema(writer, channel)?;
+    let mcap::Channel { id, topic, message_encoding, metadata, .. } = channel;
+    writer.add_channel_with_id(*id, schema, topic, message_encoding, metadata).map(drop)
+}
+
+/// Adds the schema of a channel to a file. Returns its number; 0 means no schema.
+fn add_schema<W: Write + Seek>(writer: &mut Writer<W>, channel: &mcap::Channel) -> Result<u16, McapError> {
     match &channel.schema {
         Some(schema) => writer.add_schema(&schema.name, &schema.encoding, &schema.data),
         None => Ok(0),
@@ -131,7 +143,7 @@ struct Channels<W: Medium> {
 }
 
 impl<W: Medium> Channels<W> {
-    fn write(&mut self, message: &Encoded, log_time_ns: u64) -> Result<(), WriteError> {
+    fn write_message(&mut self, message: &Encoded, log_time_ns: u64) -> Result<(), WriteError> {
         // Nobody declared what it holds.
         let Some(channel_id) = self.ids[message.channel.place()] else { return Ok(()) };
         let header = MessageHeader {
@@ -155,12 +167,9 @@ impl Recorder {
     pub fn of_run(folder: &RunFolder, scene: Scene) -> Result<Self, WriteError> {
         let mut manifest = Manifest::read(folder)?;
         let frames = manifest.scenario.recording.frames.then(FrameBatch::default);
-        let mut recorder = Self::with(DurableFile::create(&folder.recording())?, scene, frames)?;
-        recorder.attach(
-            "scenario.toml",
-            "application/toml",
-            &read_bytes(&folder.scenario(), LONGEST_FILE)?,
-        )?;
+        let mut recorder = Self::with_frames(DurableFile::create(&folder.recording())?, scene, frames)?;
+        let scenario = read_bytes(&folder.scenario(), LONGEST_FILE)?;
+        recorder.attach("scenario.toml", "application/toml", &scenario)?;
         for (name, _) in manifest.scenario.files_mut() {
             let path = folder.file(&name);
             if fs::metadata(&path).is_ok_and(|file| file.len() <= LONGEST_FILE) {
@@ -177,10 +186,10 @@ impl<W: Medium> Recorder<W> {
     /// Begins a recording with the definitions of all channels, which are flushed at once: without them no message can be
     /// read.
     pub fn new(medium: W, scene: Scene) -> Result<Self, WriteError> {
-        Self::with(medium, scene, Some(FrameBatch::default()))
+        Self::with_frames(medium, scene, Some(FrameBatch::default()))
     }
 
-    fn with(medium: W, scene: Scene, frames: Option<FrameBatch>) -> Result<Self, WriteError> {
+    fn with_frames(medium: W, scene: Scene, frames: Option<FrameBatch>) -> Result<Self, WriteError> {
         let channels = Channels { writer: options().create(medium)?, ids: [None; Channel::COUNT] };
         let mut recorder = Self { channels, encoder: Encoder::new(scene), frames };
         recorder.declare(&Declared::default())?;
@@ -205,17 +214,9 @@ impl<W: Medium> Recorder<W> {
         Ok(writer.flush()?)
     }
 
-    /// Attaches a file. It has no time, since runs in simulated time leave the same bytes whenever they are made.
+    /// Attaches a file.
     pub fn attach(&mut self, name: &str, media_type: &str, data: &[u8]) -> Result<(), WriteError> {
-        let (name, media_type) = (name.to_owned(), media_type.to_owned());
-        let data = Cow::Borrowed(data);
-        Ok(self.channels.writer.attach(&Attachment {
-            log_time: 0,
-            create_time: 0,
-            name,
-            media_type,
-            data,
-        })?)
+        Ok(self.channels.writer.attach(&timeless(name, media_type, data))?)
     }
 
     /// Appends a message that was received at `log_time_ns`, and its view in 3-D.
@@ -225,7 +226,7 @@ impl<W: Medium> Recorder<W> {
         }
         self.end_frames()?;
         let Self { channels, encoder, .. } = self;
-        encoder.encode(message, |message| channels.write(&message, log_time_ns))
+        encoder.encode(message, |message| channels.write_message(&message, log_time_ns))
     }
 
     fn record_frame(&mut self, frame: &FrameTap, log_time_ns: u64) -> Result<(), WriteError> {
@@ -233,7 +234,7 @@ impl<W: Medium> Recorder<W> {
             self.end_frames()?;
         }
         if let Some(frames) = &mut self.frames {
-            frames.push(frame, log_time_ns);
+            frames.push_frame(frame, log_time_ns);
         }
         Ok(())
     }
@@ -242,14 +243,14 @@ impl<W: Medium> Recorder<W> {
     fn end_frames(&mut self) -> Result<(), WriteError> {
         let Some(frames) = &mut self.frames else { return Ok(()) };
         let log_time_ns = frames.log_time_ns;
-        let Some((first, bytes)) = frames.end() else { return Ok(()) };
+        let Some((first, bytes)) = frames.end_batch() else { return Ok(()) };
         let message = Encoded {
             channel: Channel::Frames,
             sequence: first.seq as u32,
             publish_time_ns: first.published_ns,
             bytes,
         };
-        self.channels.write(&message, log_time_ns)
+        self.channels.write_message(&message, log_time_ns)
     }
 
     /// Ends the chunk and hands everything recorded so far to the medium.
@@ -276,7 +277,6 @@ pub struct DurableFile {
     file: BufWriter<File>,
     requests: Option<SyncSender<()>>,
     done: Receiver<io::Result<()>>,
-    disk: Option<JoinHandle<()>>,
 }
 
 impl DurableFile {
@@ -286,44 +286,42 @@ impl DurableFile {
         if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
             File::open(folder)?.sync_all()?;
         }
-        Self::on(file)
+        Self::syncing(file)
     }
 
-    fn on(file: File) -> io::Result<Self> {
+    fn syncing(file: File) -> io::Result<Self> {
         // One request may wait while another is carried out: it covers all that came before it.
         let (request, requests) = sync_channel(1);
         let (report, done) = channel();
         let for_disk = file.try_clone()?;
-        let disk = thread::spawn(move || {
+        thread::spawn(move || {
             for () in requests {
                 let _ = report.send(for_disk.sync_data());
             }
         });
         let file = BufWriter::with_capacity(BUFFER_BYTES, file);
-        Ok(Self { file, requests: Some(request), done, disk: Some(disk) })
+        Ok(Self { file, requests: Some(request), done })
     }
 
     /// Waits until the disk has taken, or refused, everything that was flushed.
-    fn settle(&mut self) -> io::Result<()> {
+    fn await_disk(&mut self) -> io::Result<()> {
         self.requests = None;
-        if let Some(disk) = self.disk.take() {
-            disk.join().expect("the thread that waits for the disk does not panic");
-        }
-        self.done.try_iter().collect()
+        // Until the thread has ended.
+        self.done.iter().fold(Ok(()), io::Result::and)
     }
 }
 
 impl Medium for DurableFile {
     fn close(mut self) -> io::Result<()> {
         self.flush()?;
-        self.settle()
+        self.await_disk()
     }
 }
 
 impl Drop for DurableFile {
     fn drop(&mut self) {
         // The error of a file that was not closed is reported elsewhere.
-        let _ = self.settle();
+        let _ = self.await_disk();
     }
 }
 
@@ -335,9 +333,7 @@ impl Write for DurableFile {
     /// Also reports an earlier flush that the disk refused.
     fn flush(&mut self) -> io::Result<()> {
         self.file.flush()?;
-        for earlier in self.done.try_iter() {
-            earlier?;
-        }
+        self.done.try_iter().collect::<io::Result<()>>()?;
         if let Some(request) = &self.requests {
             // A request that waits already covers this one too.
             let _ = request.try_send(());
@@ -364,7 +360,7 @@ mod tests {
     fn a_disk_that_refuses_the_last_bytes_is_reported() {
         // It accepts writes and refuses to sync.
         let null = File::options().write(true).open("/dev/null").unwrap();
-        let error = DurableFile::on(null).unwrap().close().unwrap_err();
+        let error = DurableFile::syncing(null).unwrap().close().unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::InvalidInput);
     }
 }

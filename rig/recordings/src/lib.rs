@@ -3,7 +3,9 @@
 //! The verdict on a run is none of them: `masseter report` judges.
 
 mod export;
-mod recording;
+mod survey;
+mod tables;
+mod verbs;
 
 pub use export::{ExportArgs, export};
-pub use recording::{ExtractArgs, RecordingArgs, RecordingVerb, RecoverArgs, ThinArgs, execute};
+pub use verbs::{ExtractArgs, RecordingArgs, RecordingVerb, RecoverArgs, ThinArgs, execute};

@@ -1,7 +1,11 @@
-//! One thing that a run is checked for: its finding, and whether that is as it should be.
+//! One thing that a run is checked for: its finding, and whether that is as it should be. And whether the platform followed
+//! its path: its errors while the motion played, and where each fault led it.
 
 use std::borrow::Cow;
 
+use masseter_analysis::{FaultFigures, PoseErrors};
+use masseter_scenario::wording::counted;
+use masseter_scenario::{ChecksConfig, FaultConfig};
 use serde::Serialize;
 
 /// Whether what was checked is as it should be.
@@ -50,9 +54,6 @@ pub struct CheckFigures {
     pub worst_at_s: Option<f64>,
     /// The longest time from a trigger to its response, ms.
     pub latency_ms: Option<f64>,
-    /// Whether it is an event that `[expect]` names.
-    #[serde(skip)]
-    pub(crate) is_expected_event: bool,
 }
 
 /// One thing that was judged.
@@ -67,21 +68,32 @@ pub struct Check {
     /// The figures, where it is a requirement of the scenario.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub figures: Option<CheckFigures>,
+    #[serde(skip)]
+    pub(crate) subject: Subject,
+}
+
+/// What a check is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Subject {
+    Rig,
+    /// The faults that the scenario declares.
+    Faults,
+    /// The stimuli that the scenario declares.
+    Stimuli,
+    /// A requirement of the scenario.
+    Requirement,
+    /// An event that the scenario expects of the run.
+    ExpectedEvent,
 }
 
 impl Check {
     pub(crate) fn new(name: impl Into<Cow<'static, str>>, finding: String, result: CheckResult) -> Self {
-        Self { name: name.into(), finding, result, figures: None }
+        Self { name: name.into(), finding, result, figures: None, subject: Subject::Rig }
     }
 
-    /// Whether it is a requirement of the scenario.
+    /// Whether it is a requirement of the scenario, or an event that it expects.
     pub(crate) fn is_requirement(&self) -> bool {
-        self.figures.is_some()
-    }
-
-    /// Whether it is an event that the scenario expects of the run.
-    pub(crate) fn is_expected_event(&self) -> bool {
-        self.figures.as_ref().is_some_and(|figures| figures.is_expected_event)
+        matches!(self.subject, Subject::Requirement | Subject::ExpectedEvent)
     }
 
     pub(crate) fn judged(name: &'static str, finding: String, passed: bool) -> Self {
@@ -106,23 +118,106 @@ impl Check {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// Fewer samples of a motion show nothing.
+const FEWEST_SAMPLES: u64 = 10;
 
-    #[test]
-    fn what_is_untested_has_not_failed() {
-        use CheckResult::{Excused, Failed, NotJudged, Passed, Untested};
-        let results = [Passed, Failed, Excused, Untested, NotJudged];
-        assert_eq!(results.map(CheckResult::is_failed), [false, true, false, false, false]);
-    }
+/// What is no number is within no limit.
+fn is_within(value: f64, limit: f64) -> bool {
+    value <= limit
+}
 
-    #[test]
-    fn only_a_failure_is_excused() {
-        let check = |passed| Check::judged("tracking", String::new(), passed);
-        let cases = [(false, true, "lost"), (false, false, "FAIL"), (true, true, "ok"), (true, false, "ok")];
-        for (passed, excused, mark) in cases {
-            assert_eq!(check(passed).unless(excused).result.mark(), mark);
+/// Whether the jaw left its path by more than the limits for a moment, before a safe stop or without one.
+pub(crate) fn left_its_path(errors: &PoseErrors, limits: &ChecksConfig) -> bool {
+    let ChecksConfig { tracking_max_mm, tracking_max_deg, .. } = *limits;
+    let peaks = [
+        (errors.incisal_max_mm, tracking_max_mm),
+        (errors.max_mm, tracking_max_mm),
+        (errors.max_deg, tracking_max_deg),
+    ];
+    peaks.into_iter().any(|(value, limit)| value.is_some_and(|value| !is_within(value, limit)))
+}
+
+/// The worst error against its limit, or all that exceed theirs; untested if the motion left too little to compare.
+pub(crate) fn tracking(
+    name: &'static str,
+    samples: u64,
+    errors: &PoseErrors,
+    limits: &ChecksConfig,
+) -> Check {
+    let ChecksConfig { tracking_rms_mm, tracking_max_mm, tracking_rms_deg, tracking_max_deg, .. } = *limits;
+    let figures = [
+        ("incisal point rms", errors.incisal_rms_mm, tracking_rms_mm, " mm"),
+        ("incisal point max", errors.incisal_max_mm, tracking_max_mm, " mm"),
+        ("platform rms", errors.rms_mm, tracking_rms_mm, " mm"),
+        ("platform max", errors.max_mm, tracking_max_mm, " mm"),
+        ("platform rms", errors.rms_deg, tracking_rms_deg, "°"),
+        ("platform max", errors.max_deg, tracking_max_deg, "°"),
+    ];
+    let mut found: Vec<_> = figures
+        .into_iter()
+        .filter_map(|(what, value, limit, unit)| {
+            let value = value?;
+            Some((value, limit, format!("{what} {value:.4}{unit}, limit {limit}{unit}")))
+        })
+        .collect();
+    found.sort_by(|(a, of_a, _), (b, of_b, _)| (b / of_b).total_cmp(&(a / of_a)));
+    let exceeding = found.iter().filter(|(value, limit, _)| !is_within(*value, *limit));
+    let exceeding: Vec<_> = exceeding.map(|(.., text)| text.as_str()).collect();
+    match found.first() {
+        _ if !exceeding.is_empty() => Check::judged(name, exceeding.join("; "), false),
+        Some((_, _, closest)) if samples >= FEWEST_SAMPLES => {
+            Check::judged(name, format!("closest of {samples} samples: {closest}"), true)
+        }
+        _ => {
+            let samples = counted(samples, "sample");
+            let why =
+                format!("{samples} to compare, at least {FEWEST_SAMPLES} needed: play more of the motion");
+            Check::untested(name, why)
         }
     }
 }
+
+/// A test with faults that passes without them has tested nothing, and a fault that leads the jaw beyond the limits must be
+/// detected before. None where no fault is declared.
+pub(crate) fn faults(
+    declared: &[FaultConfig],
+    found: &[FaultFigures],
+    limits: &ChecksConfig,
+) -> Option<Check> {
+    let ChecksConfig { tracking_max_mm, tracking_max_deg, .. } = *limits;
+    let idle = found.iter().filter(|fault| fault.struck_ns.is_none());
+    let idle: Vec<_> = idle.map(|fault| fault.number.to_string()).collect();
+    let beyond: Vec<_> = declared
+        .iter()
+        .zip(found)
+        .filter(|(_, found)| {
+            !is_within(found.deviation_mm, tracking_max_mm) || !is_within(found.deviation_deg, tracking_max_deg)
+        })
+        .map(|(fault, FaultFigures { number, deviation_mm, deviation_deg, detection, .. })| {
+            let until = if detection.is_some() { "before it was detected" } else { "undetected" };
+            format!(
+                "; number {number}, {fault}, led {deviation_mm:.3} mm and {deviation_deg:.3}° from the path {until}, limit \
+                 {tracking_max_mm} mm and {tracking_max_deg}°"
+            )
+        })
+        .collect();
+    let which = match idle.as_slice() {
+        [] => String::new(),
+        idle => format!(
+            ", number {} never: raise its probability, or let the fault act earlier or longer",
+            idle.join(", ")
+        ),
+    };
+    let struck =
+        format!("{} of {} declared faults acted{which}", declared.len() - idle.len(), declared.len());
+    let result = match (beyond.is_empty(), idle.is_empty()) {
+        (true, true) => CheckResult::Passed,
+        (true, false) => CheckResult::Untested,
+        (false, _) => CheckResult::Failed,
+    };
+    let check = Check::new("faults", struck + &beyond.concat(), result);
+    (!declared.is_empty()).then_some(Check { subject: Subject::Faults, ..check })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,21 +1,23 @@
-//! What a finished run is checked for, each with its finding and its limit.
+//! What a finished run is checked for, each with its finding and its limit. And whether the motion was played that the run
+//! was to play, by the facts: the scenario's motion, the time for which the drives were enabled, and how far the motion came.
 //!
 //! What the checks come to is the [verdict](super::verdict)'s.
 
+use std::fmt::{self, Display, Formatter};
+
+use masseter_analysis::requirements::{RequirementFigures, RequirementResult};
+use masseter_analysis::{
+    BusResponse, Departure, EventRecord, Figures, ResponseFigures, SkipFigures, StoppedBy, TrackingFigures,
+};
+use masseter_recording::{Ending, Manifest};
 use masseter_runtime::messages::codes::{Cause, ControllerState};
+use masseter_runtime::named::PlayedMotion;
 use masseter_scenario::wording::counted;
 use masseter_scenario::{ExpectedVerdict, StimulusConfig};
 
-use crate::check::{Check, CheckFigures, CheckResult};
-use crate::motion_checks::{faults, tracking};
-use crate::shortfall::{Shortfall, was_stopped_by_request, whose_motion};
+use crate::check::{Check, CheckFigures, CheckResult, Subject, faults, tracking};
 use crate::text;
 use crate::timing::{Timing, TimingWord};
-use masseter_analysis::requirements::{RequirementFigures, RequirementResult};
-use masseter_analysis::{
-    BusResponse, EventRecord, Figures, ResponseFigures, SkipFigures, StoppedBy, TrackingFigures,
-};
-use masseter_recording::{Ending, Manifest};
 
 /// None in a run that ended before its first cycle.
 pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) -> Vec<Check> {
@@ -103,9 +105,6 @@ fn sequence(manifest: &Manifest, figures: &Figures) -> Check {
     Check::judged(NAME, format!("ended in state {in_words}{how}{as_expected}{whose}"), is_good)
 }
 
-/// The name of the check of the stimuli.
-pub(crate) const STIMULI: &str = "stimuli";
-
 /// A test with stimuli of which one never began has not tested what it should. None where there are none.
 fn stimuli(declared: &[StimulusConfig], events: &[EventRecord]) -> Option<Check> {
     let is_begin =
@@ -116,15 +115,13 @@ fn stimuli(declared: &[StimulusConfig], events: &[EventRecord]) -> Option<Check>
         .collect();
     let began = format!("{} of {} stimuli began", declared.len() - idle.len(), declared.len());
     let check = if idle.is_empty() {
-        Check::judged(STIMULI, began, true)
+        Check::judged("stimuli", began, true)
     } else {
         let which = idle.join(", ");
-        Check::untested(
-            STIMULI,
-            format!("{began}, number {which} never: let the stimulus begin earlier, or play longer"),
-        )
+        let why = format!("{began}, number {which} never: let the stimulus begin earlier, or play longer");
+        Check::untested("stimuli", why)
     };
-    (!declared.is_empty()).then_some(check)
+    (!declared.is_empty()).then_some(Check { subject: Subject::Stimuli, ..check })
 }
 
 /// A requirement of the scenario. The machine excuses a failure where a lost cycle may have caused it.
@@ -146,10 +143,10 @@ fn requirement(found: &RequirementFigures, is_disturbed: bool) -> Check {
         relative_margin: found.relative_margin,
         worst_at_s: found.worst_at_s,
         latency_ms: found.latency_ms,
-        is_expected_event: found.is_expected_event,
     };
     let finding = finding.into_iter().flatten().collect::<String>();
-    let check = Check { figures: Some(figures), ..Check::new(found.name.clone(), finding, result) };
+    let subject = if found.is_expected_event { Subject::ExpectedEvent } else { Subject::Requirement };
+    let check = Check { figures: Some(figures), subject, ..Check::new(found.name.clone(), finding, result) };
     check.unless(is_disturbed && found.may_be_disturbed)
 }
 
@@ -175,8 +172,7 @@ fn bus_response(response: &BusResponse, plant: &SkipFigures) -> Check {
         return Check::not_judged(NAME, why.clone());
     }
     let in_words = |message: &ResponseFigures| {
-        let [max_us, bound_us] =
-            [message.max_ns, message.bound_ns].map(|ns| text::or_dash(ns, text::microseconds));
+        let (max_us, bound_us) = (text::us(message.max_ns), text::us(message.bound_ns));
         format!("{} on bus {} took {max_us} µs, bound {bound_us} µs", message.message, message.bus)
     };
     let unjudged = match response.off_time_frames {
@@ -204,59 +200,106 @@ fn longest_excess_ns(response: &BusResponse) -> u64 {
     response.exceeding().filter_map(excess_ns).max().unwrap_or(0)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// Share of the motion that must be played; the last ramp moves nothing any more.
+const WHOLE: f64 = 0.99;
+/// A stated desired pose farther from the scenario's motion is that of another motion, mm and degrees. A program that computes
+/// the motion itself rounds otherwise.
+const SAME_POSE: f64 = 0.01;
 
-    #[test]
-    fn no_gap_in_a_part_of_a_recording_says_nothing_of_the_rest() {
-        let cases = [
-            (Ending::Completed, false, false, 0, "ok"),
-            (Ending::Completed, false, false, 1, "FAIL"),
-            (Ending::Completed, true, false, 0, "skip"),
-            (Ending::Completed, false, true, 0, "skip"),
-            (Ending::RecordingFailed, false, false, 0, "skip"),
-            (Ending::RecordingFailed, true, true, 1, "FAIL"),
-        ];
-        for (ending, is_cut_short, is_damaged, missing, mark) in cases {
-            let check = dropped_messages(missing, &ending, is_cut_short, is_damaged);
-            assert_eq!(check.result.mark(), mark, "{ending:?} {check:?}");
+/// By what a finished motion is not the one that the run was to play.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Shortfall {
+    /// The desired poses are not those of the scenario's motion.
+    Other(Departure),
+    /// The scenario's motion did not come to its end.
+    Early { reached_s: f64, end_s: f64 },
+    /// The drives were not enabled for as long as an own motion is to last.
+    OwnEarly { enabled_s: f64, duration_s: f64 },
+    /// A program's desired poses need not be the scenario's, and no requirement judges the run.
+    Unjudged,
+}
+
+impl Shortfall {
+    /// None where the motion was played, and where a stop ended it, which has a verdict of its own. A motion that was stopped by
+    /// request is short, but none other.
+    pub(crate) fn of(manifest: &Manifest, figures: &Figures) -> Option<Self> {
+        let has_finished = figures.final_state.is_some_and(|state| state == ControllerState::Finished);
+        if !has_finished || figures.stopped_by.is_some() {
+            return None;
         }
-    }
-
-    fn response(max_ns: u64, unbounded: Option<&str>) -> BusResponse {
-        let sync = ResponseFigures {
-            bus: 1,
-            message: "SYNC".to_owned(),
-            frames: 1,
-            max_ns: Some(max_ns),
-            bound_ns: unbounded.is_none().then_some(190_000),
+        let found = match manifest.declared.motion {
+            PlayedMotion::Own => Self::of_own(manifest, figures),
+            PlayedMotion::Scenario => Self::of_scenario(manifest, figures),
         };
-        BusResponse { messages: vec![sync], off_time_frames: 0, unbounded: unbounded.map(str::to_owned) }
+        found.filter(|found| matches!(found, Self::Other(_)) || !was_stopped_by_request(figures))
     }
 
-    #[test]
-    fn a_message_beyond_its_bound_fails_unless_the_bound_does_not_hold() {
-        let cases =
-            [(190_000, None, "ok"), (191_000, None, "FAIL"), (191_000, Some("bus 0 had 1 errors"), "skip")];
-        for (max_ns, unbounded, mark) in cases {
-            let check = bus_response(&response(max_ns, unbounded), &SkipFigures::default());
-            assert_eq!(check.result.mark(), mark, "{check:?}");
+    fn of_scenario(manifest: &Manifest, figures: &Figures) -> Option<Self> {
+        let is_same = |departure: &Departure| departure.incisal_mm <= SAME_POSE && departure.deg <= SAME_POSE;
+        if let Some(departure) = figures.motion_departure.filter(|departure| !is_same(departure)) {
+            return Some(Self::Other(departure));
         }
-        let failed = bus_response(&response(191_000, None), &SkipFigures::default());
-        assert_eq!(failed.finding, "SYNC on bus 1 took 191.00 µs, bound 190.00 µs");
-        let off_time = BusResponse { off_time_frames: 7, ..response(150_000, None) };
-        let check = bus_response(&off_time, &SkipFigures::default());
-        assert_eq!(check.result.mark(), "ok");
-        assert!(check.finding.ends_with("; 7 frames off their times not judged"), "{check:?}");
+        let (end_s, reached_s) = (manifest.motion_end_s?, figures.motion_reached_s.unwrap_or(0.0));
+        let early = (reached_s < WHOLE * end_s).then_some(Self::Early { reached_s, end_s });
+        let is_compared = figures.motion_departure.is_some_and(|departure| !departure.is_partial);
+        early.or_else(|| if is_compared { None } else { Self::unjudged(manifest, figures) })
     }
 
-    #[test]
-    fn a_message_beyond_its_bound_by_no_more_than_the_plant_stalled_is_not_judged() {
-        for (stalled_ns, overlong_ns, mark) in [(999, 0, "FAIL"), (1000, 0, "skip"), (500, 500, "skip")] {
-            let plant = SkipFigures { stalled_ns, overlong_ns, ..SkipFigures::default() };
-            let check = bus_response(&response(191_000, None), &plant);
-            assert_eq!(check.result.mark(), mark, "{check:?}");
+    fn of_own(manifest: &Manifest, figures: &Figures) -> Option<Self> {
+        let (enabled_s, duration_s) = (figures.enabled_s, manifest.motion_s);
+        let early = (enabled_s < WHOLE * duration_s).then_some(Self::OwnEarly { enabled_s, duration_s });
+        early.or_else(|| Self::unjudged(manifest, figures))
+    }
+
+    fn unjudged(manifest: &Manifest, figures: &Figures) -> Option<Self> {
+        let mut required = figures.requirements.iter().filter(|required| !required.is_expected_event);
+        let is_judged = required.any(|required| required.result != RequirementResult::Untested);
+        (manifest.is_of_program() && !is_judged).then_some(Self::Unjudged)
+    }
+
+    pub(crate) fn result(self) -> CheckResult {
+        if self == Self::Unjudged { CheckResult::Untested } else { CheckResult::Failed }
+    }
+}
+
+impl Display for Shortfall {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Other(Departure { incisal_mm, deg, at_s, .. }) => write!(
+                f,
+                "the scenario's motion was not played: the desired pose is up to {incisal_mm:.3} mm (at {at_s:.3} s of the \
+                 motion) and {deg:.3}° from it; a controller with a motion of its own declares it"
+            ),
+            Self::Early { reached_s, end_s } => write!(
+                f,
+                "the scenario's motion was not played: it came to {reached_s:.2} of {end_s:.2} s of its own time"
+            ),
+            Self::OwnEarly { enabled_s, duration_s } => write!(
+                f,
+                "the controller's own motion ended early: the drives were enabled for {enabled_s:.2} of {duration_s:.2} s; \
+                 --duration declares its end"
+            ),
+            Self::Unjudged => write!(
+                f,
+                "nothing judged the motion, whose desired poses need not be the scenario's: require something of the jaw in \
+                 [[require]]"
+            ),
         }
     }
 }
+
+/// Whether the motion was to end early: by the operator, the scenario, or the controller itself.
+pub(crate) fn was_stopped_by_request(figures: &Figures) -> bool {
+    figures.events.iter().any(|event| event.cause == Cause::StopRequested)
+}
+
+/// What is added where the motion is not the scenario's.
+pub(crate) fn whose_motion(manifest: &Manifest) -> &'static str {
+    match manifest.declared.motion {
+        PlayedMotion::Scenario => "",
+        PlayedMotion::Own => ", own motion of the controller",
+    }
+}
+
+#[cfg(test)]
+mod tests;

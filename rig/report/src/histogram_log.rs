@@ -16,7 +16,7 @@ use masseter_analysis::IntervalFigures;
 use masseter_runtime::clock::SECOND_NS;
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_bytes};
 
-use crate::write_error::WriteError;
+use crate::logs::WriteError;
 
 /// Time that one line covers, ns.
 pub const INTERVAL_NS: u64 = SECOND_NS;

@@ -9,13 +9,12 @@ use masseter_analysis::{Analysis, Figures};
 use masseter_recording::{Manifest, ReadError, Reader, Recorded, RunFolder};
 use masseter_runtime::messages::tap::{self, TapError};
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, result_with_tones, status};
+use serde::Serialize;
 
-use crate::candump_logs::CandumpLogs;
-use crate::judgement::Judgement;
-use crate::table::Detail;
-use crate::verdict::Verdict;
-use crate::write_error::WriteError;
-use crate::{event_log, histogram_log, junit, page, summary, table};
+use crate::logs::{CandumpLogs, WriteError, write_events};
+use crate::table::{self, Detail};
+use crate::verdict::{Judgement, Verdict};
+use crate::{histogram_log, junit, page};
 
 /// Why the recording of a run could not be analysed.
 #[derive(Debug, thiserror::Error)]
@@ -145,7 +144,7 @@ fn show_and_write(
     let documents = Documents::new(manifest, figures, &verdict)?;
     let shown = match format {
         Format::Human => {
-            let table = table::text(manifest, figures, &verdict, detail);
+            let table = table::table_in_words(manifest, figures, &verdict, detail);
             let more = if detail == Detail::Brief { "; --verbose shows every figure" } else { "" };
             let text = format!("{table}\nreport: {}{more}\n", folder.file("report.html").display());
             result_with_tones(&text, &table::TONES)
@@ -168,7 +167,7 @@ struct Documents {
 impl Documents {
     fn new(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Result<Self, Failure> {
         Ok(Self {
-            summary: summary::json(verdict, figures).context("cannot write the summary").incomplete()?,
+            summary: summary_json(verdict, figures).context("cannot write the summary").incomplete()?,
             page: page::html(manifest, figures, verdict).context("cannot write the page").incomplete()?,
             junit: junit::xml(manifest, figures, verdict).context("cannot write junit.xml").incomplete()?,
         })
@@ -184,9 +183,24 @@ impl Documents {
         fs::write(folder.summary(), self.summary).map_err(WriteError::for_file(&folder.summary()))?;
         logged?;
         histogram_log::write_all(&folder.file("hist"), &figures.intervals)?;
-        event_log::write(&folder.file("events.jsonl"), &figures.events)?;
+        write_events(&folder.file("events.jsonl"), &figures.events)?;
         [(folder.file("junit.xml"), self.junit), (folder.file("report.html"), self.page)]
             .into_iter()
             .try_for_each(|(path, text)| fs::write(&path, text).map_err(WriteError::for_file(&path)))
     }
+}
+
+/// Version of the summary's form.
+pub(crate) const SUMMARY_FORM: u32 = 2;
+
+#[derive(Serialize)]
+struct Summary<'a> {
+    form: u32,
+    verdict: &'a Verdict,
+    figures: &'a Figures,
+}
+
+/// The file's content.
+pub(crate) fn summary_json(verdict: &Verdict, figures: &Figures) -> serde_json::Result<String> {
+    Ok(serde_json::to_string_pretty(&Summary { form: SUMMARY_FORM, verdict, figures })? + "\n")
 }

@@ -2,20 +2,20 @@
 
 use std::fmt::Write;
 
+use masseter_analysis::{
+    AxisFigures, BusResponse, EventRecord, Figures, IntervalFigures, PoseErrors, ReadingFigures,
+    ResponseFigures, TopicFigures, TrackingFigures,
+};
+use masseter_model::geometry::AXIS_NAMES;
+use masseter_recording::{Manifest, RunUsage, Usage};
 use masseter_runtime::messages::codes::{Cause, EventKind};
 use masseter_scenario::MotionConfig;
 use masseter_scenario::wording::counted;
-
-use crate::full_speed;
-use crate::shortfall::whose_motion;
-use crate::text::{decimals, event_with_cycle, microseconds, or_dash};
-use crate::verdict::Verdict;
-use masseter_analysis::{
-    BusResponse, EventRecord, Figures, IntervalFigures, PoseErrors, ReadingFigures, ResponseFigures,
-    TrackingFigures,
-};
-use masseter_recording::{Manifest, RunUsage, Usage};
 use masseter_terminal::{Exit, Tone};
+
+use crate::checks::whose_motion;
+use crate::text::{columns, decimals, event_with_cycle, or_dash, us};
+use crate::verdict::Verdict;
 
 /// The words that judge.
 pub(crate) const TONES: [(&str, Tone); 12] = [
@@ -43,14 +43,19 @@ pub enum Detail {
 }
 
 /// Verdict, checks and faults; with every detail also latencies and losses.
-pub(crate) fn text(manifest: &Manifest, figures: &Figures, verdict: &Verdict, detail: Detail) -> String {
+pub(crate) fn table_in_words(
+    manifest: &Manifest,
+    figures: &Figures,
+    verdict: &Verdict,
+    detail: Detail,
+) -> String {
     let mut text = String::new();
     let mut write = || -> std::fmt::Result {
         write_verdict(&mut text, manifest, figures, verdict)?;
         if detail == Detail::Whole {
             write_figures(&mut text, manifest, figures)?;
         }
-        full_speed::write(&mut text, manifest, figures)?;
+        write_full_speed(&mut text, manifest, figures)?;
         write_start(&mut text, figures)?;
         if detail == Detail::Whole || verdict.exit_code != Exit::Passed {
             write_faults(&mut text, figures)?;
@@ -128,22 +133,11 @@ fn write_figures(text: &mut String, manifest: &Manifest, figures: &Figures) -> s
 }
 
 fn latencies(text: &mut String, intervals: &[IntervalFigures]) -> std::fmt::Result {
-    writeln!(
-        text,
-        "{:<28} {:>8} {:>10} {:>10} {:>10} {:>10}",
-        "interval, µs", "n", "p50", "p99", "p99.9", "max"
-    )?;
-    for interval in intervals {
-        writeln!(
-            text,
-            "{:<28} {:>8} {:>10} {:>10} {:>10} {:>10}",
-            interval.name,
-            interval.n,
-            or_dash(interval.p50_ns, microseconds),
-            or_dash(interval.p99_ns, microseconds),
-            or_dash(interval.p999_ns, microseconds),
-            or_dash(interval.max_ns, microseconds),
-        )?;
+    const WIDTHS: [usize; 6] = [28, 8, 10, 10, 10, 10];
+    writeln!(text, "{}", columns(WIDTHS, ["interval, µs", "n", "p50", "p99", "p99.9", "max"]))?;
+    for IntervalFigures { name, n, p50_ns, p99_ns, p999_ns, max_ns, .. } in intervals {
+        let [p50, p99, p999, max] = [*p50_ns, *p99_ns, *p999_ns, *max_ns].map(us);
+        writeln!(text, "{}", columns(WIDTHS, [(*name).to_owned(), n.to_string(), p50, p99, p999, max]))?;
     }
     Ok(())
 }
@@ -175,16 +169,14 @@ fn responses(text: &mut String, response: &BusResponse) -> std::fmt::Result {
     if closest.is_empty() {
         return Ok(());
     }
-    writeln!(text, "\n{:<20} {:>4} {:>8} {:>10} {:>10}", "response, µs", "bus", "n", "max", "bound")?;
-    for message in closest {
+    const WIDTHS: [usize; 5] = [20, 4, 8, 10, 10];
+    writeln!(text, "\n{}", columns(WIDTHS, ["response, µs", "bus", "n", "max", "bound"]))?;
+    for ResponseFigures { bus, message, frames, max_ns, bound_ns } in closest {
+        let [max, bound] = [*max_ns, *bound_ns].map(us);
         writeln!(
             text,
-            "{:<20} {:>4} {:>8} {:>10} {:>10}",
-            message.message,
-            message.bus,
-            message.frames,
-            or_dash(message.max_ns, microseconds),
-            or_dash(message.bound_ns, microseconds)
+            "{}",
+            columns(WIDTHS, [message.clone(), bus.to_string(), frames.to_string(), max, bound])
         )?;
     }
     Ok(())
@@ -217,11 +209,9 @@ fn usage(text: &mut String, usage: &RunUsage) -> std::fmt::Result {
 }
 
 fn losses(text: &mut String, figures: &Figures) -> std::fmt::Result {
-    let topics: Vec<_> = figures
-        .topics
-        .iter()
-        .map(|topic| format!("{} {} ({} dropped)", topic.topic, topic.messages, topic.missing))
-        .collect();
+    let topic =
+        |topic: &TopicFigures| format!("{} {} ({} dropped)", topic.topic, topic.messages, topic.missing);
+    let topics: Vec<_> = figures.topics.iter().map(topic).collect();
     writeln!(text, "messages: {}", topics.join(", "))?;
     let Some(frames) = &figures.frames else {
         return writeln!(text, "frames: not recorded (recording.frames = false)");
@@ -252,4 +242,59 @@ fn write_faults(text: &mut String, figures: &Figures) -> std::fmt::Result {
         writeln!(text, "  {}", event_with_cycle(event))?;
     }
     Ok(())
+}
+
+/// The table; nothing of a run that is no dry one.
+pub(crate) fn write_full_speed(
+    text: &mut String,
+    manifest: &Manifest,
+    figures: &Figures,
+) -> std::fmt::Result {
+    const WIDTHS: [usize; 7] = [4, 15, 15, 17, 17, 11, 19];
+    let scenario = &manifest.scenario;
+    let (dry, Some(planned)) = (scenario.dry, manifest.full_speed) else { return Ok(()) };
+    let limits = scenario.limits.within(&scenario.drives);
+    let percent = dry.speed * 100.0;
+    writeln!(text, "\nat full speed, predicted from this run at {percent:.0} % (limit in brackets):")?;
+    let heads = [
+        "axis",
+        "velocity, m/s",
+        "acc., m/s²",
+        "following, µm",
+        "force slow, N",
+        "mass, kg",
+        "TPDO1 here, µs",
+    ];
+    writeln!(text, "{}", columns(WIDTHS, heads))?;
+    for (axis, name) in AXIS_NAMES.into_iter().enumerate() {
+        let AxisFigures { following_error_m, force_n } = figures.axes[axis];
+        let (velocity_m_s, acceleration_m_s2) = (planned.velocity_m_s[axis], planned.acceleration_m_s2[axis]);
+        let most_n = scenario.drives.of_axis(axis).max_force_n;
+        let most_m_s = limits.velocity_m_s(axis);
+        let most_m_s2 = limits.acceleration_m_s2(axis);
+        let following_um = following_error_m / dry.speed * 1e6;
+        let most_um = scenario.can.following_limit_m * 1e6;
+        let cells = [
+            name.to_owned(),
+            format!("{velocity_m_s:.3} ({most_m_s:.3})"),
+            format!("{acceleration_m_s2:.2} ({most_m_s2:.1})"),
+            format!("{following_um:.1} ({most_um:.1})"),
+            format!("{force_n:.1} ({most_n:.0})"),
+            format!("{:.1}", (most_n - force_n).max(0.0) / acceleration_m_s2),
+            process_data(figures, scenario.can.node_ids[axis]),
+        ];
+        writeln!(text, "{}", columns(WIDTHS, cells))?;
+    }
+    writeln!(
+        text,
+        "  following: if it grows with the velocity; mass: what the rest of the force accelerates, compare it with what the \
+         axis moves"
+    )
+}
+
+/// Longest response of a drive's process data, and its bound by the plan of the bus. Neither depends on the speed.
+fn process_data(figures: &Figures, node: u8) -> String {
+    let name = format!("TPDO1 {node}");
+    let response = figures.bus_response.messages.iter().find(|response| response.message == name);
+    or_dash(response, |response| format!("{} ({})", us(response.max_ns), us(response.bound_ns)))
 }

@@ -1,5 +1,7 @@
 //! Numbers and events as text, for the table, the checks and the page.
 
+use std::fmt::Display;
+
 use masseter_analysis::{Code, EventRecord};
 use masseter_runtime::messages::codes::Cause;
 use masseter_scenario::Dimension;
@@ -24,6 +26,25 @@ pub(crate) fn microseconds(ns: u64) -> String {
     format!("{:.2}", ns as f64 / 1e3)
 }
 
+/// [`microseconds`], or a dash.
+pub(crate) fn us(ns: Option<u64>) -> String {
+    or_dash(ns, microseconds)
+}
+
+/// Millimetres with four decimals, or a dash.
+pub(crate) fn mm(value: Option<f64>) -> String {
+    or_dash(value, |mm| format!("{} mm", decimals(mm)))
+}
+
+/// A row of a table: the first cell to the left, the others to the right, each as wide as given.
+pub(crate) fn columns<const N: usize>(widths: [usize; N], cells: [impl Display; N]) -> String {
+    let cells = widths.into_iter().zip(cells).enumerate().map(|(place, (width, cell))| match place {
+        0 => format!("{cell:<width$}"),
+        _ => format!(" {cell:>width$}"),
+    });
+    cells.collect()
+}
+
 /// A number with its digits in groups of three.
 pub(crate) fn grouped(number: u64) -> String {
     let digits = number.to_string();
@@ -35,11 +56,11 @@ pub(crate) fn grouped(number: u64) -> String {
 
 /// An event with its cycle.
 pub(crate) fn event_with_cycle(record: &EventRecord) -> String {
-    format!("cycle {:>6} {}", record.cycle, event(record))
+    format!("cycle {:>6} {}", record.cycle, event_in_words(record))
 }
 
 /// An event without its time.
-pub(crate) fn event(event: &EventRecord) -> String {
+pub(crate) fn event_in_words(event: &EventRecord) -> String {
     let EventRecord { source, cause, .. } = event;
     if let Some(text) = &event.text {
         return format!("{source}: {cause} ({text})");

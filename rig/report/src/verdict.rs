@@ -10,11 +10,8 @@ use masseter_scenario::{CanConfig, ChecksConfig, ExpectConfig, ExpectedVerdict, 
 use masseter_terminal::Exit;
 use serde::Serialize;
 
-use crate::check::{Check, CheckResult};
-use crate::checks::{STIMULI, checks};
-use crate::motion_checks::{FAULTS, left_its_path};
-use crate::outcome::Outcome;
-use crate::shortfall::Shortfall;
+use crate::check::{Check, CheckResult, Subject, left_its_path};
+use crate::checks::{Shortfall, checks};
 use crate::text::{self, grouped};
 use crate::timing::{Timing, TimingWord};
 
@@ -45,6 +42,8 @@ pub struct Verdict {
     pub timing: Timing,
     /// Every check, also those that passed.
     pub checks: Vec<Check>,
+    #[serde(skip)]
+    pub(crate) outcome: Outcome,
 }
 
 impl Verdict {
@@ -57,7 +56,9 @@ impl Verdict {
         let (beside, checks): (Vec<_>, Vec<_>) = all.iter().cloned().partition(is_beside);
         let excuse = excuse(&manifest.ending, &timing, figures.outage);
         let is_too_late = left_its_path(&figures.tracking.actual, &manifest.scenario.checks)
-            || checks.iter().any(|check| is_of_faults(check) && check.result == CheckResult::Failed);
+            || checks
+                .iter()
+                .any(|check| check.subject == Subject::Faults && check.result == CheckResult::Failed);
         let (mut outcome, mut reason) = ending(&manifest.ending, figures.stopped_by, &figures.events)
             .or_else(|| stopped_by_stimulus(&manifest.scenario, &figures.events))
             // The machine caused the stop, or it came only after the jaw had left its path.
@@ -80,7 +81,7 @@ impl Verdict {
         if outcome != Outcome::Passed {
             reason += &overload(&manifest.usage, manifest.scenario.rate_hz).unwrap_or_default();
         }
-        Self { word: outcome.word(), reason, exit_code: outcome.exit(), timing, checks: all }
+        Self { word: outcome.word(), reason, exit_code: outcome.exit(), timing, checks: all, outcome }
     }
 
     /// What to do about the machine; none where the machine disturbed nothing.
@@ -92,12 +93,9 @@ impl Verdict {
 
     /// Whether checks alone decided it, so that their findings are the reason.
     pub(crate) fn is_by_checks(&self) -> bool {
-        self.word == Outcome::Untested.word() || self.reason.starts_with(FAILED)
+        matches!(self.outcome, Outcome::Untested | Outcome::ChecksFailed)
     }
 }
-
-/// What the reason of a run begins with that failed by its checks.
-const FAILED: &str = "failed: ";
 
 /// Share of its core above which a real-time process is too busy: the kernel throttles at 95 %, by default.
 const TOO_BUSY: f64 = 0.9;
@@ -158,7 +156,8 @@ fn stopped(stopper: Stopper, events: &[EventRecord]) -> String {
             && (stopper == Stopper::Controller || event.source != Source::Controller)
     };
     let first = events.iter().find(is_heard);
-    let why = first.map_or_else(String::new, |fault| format!("; first fault: {}", text::event(fault)));
+    let why =
+        first.map_or_else(String::new, |fault| format!("; first fault: {}", text::event_in_words(fault)));
     let who = match stopper {
         Stopper::Controller => "the controller stopped the rig",
         Stopper::Drives(StoppedBy::Master) => "the master stopped the drives",
@@ -261,16 +260,13 @@ fn with_shortfall((outcome, reason): OutcomeReason, manifest: &Manifest, figures
 }
 
 fn failed(checks: &[Check]) -> Option<OutcomeReason> {
-    named(checks, CheckResult::Failed).map(|names| (Outcome::Failed, format!("{FAILED}{names}")))
+    named(checks, CheckResult::Failed).map(|names| (Outcome::ChecksFailed, format!("failed: {names}")))
 }
 
 /// What was not tested, with what to do. Without a cycle that was everything.
 fn untested(checks: &[Check], cycles: u64) -> Option<OutcomeReason> {
-    let findings: Vec<_> = checks
-        .iter()
-        .filter(|check| check.result == CheckResult::Untested)
-        .map(|check| format!("{}: {}", check.name, check.finding))
-        .collect();
+    let idle = checks.iter().filter(|check| check.result == CheckResult::Untested);
+    let findings: Vec<_> = idle.map(|check| format!("{}: {}", check.name, check.finding)).collect();
     let why = if cycles == 0 { "no cycle ran".to_owned() } else { findings.join("; ") };
     (!why.is_empty()).then_some((Outcome::Untested, why))
 }
@@ -280,7 +276,7 @@ fn untested(checks: &[Check], cycles: u64) -> Option<OutcomeReason> {
 fn stands_beside(check: &Check, expect: &ExpectConfig) -> bool {
     use ExpectedVerdict::{Fail, Pass, Untested};
     let is_by_checks = [Pass, Fail, Untested].into_iter().any(|outcome| expect.accepts(outcome));
-    check.is_expected_event() || (check.is_requirement() && !is_by_checks)
+    check.subject == Subject::ExpectedEvent || (check.is_requirement() && !is_by_checks)
 }
 
 /// The outcome of a run that expects one: passed if the outcome is this one, and what stands beside it holds. A run that the
@@ -323,14 +319,9 @@ fn wanted(expect: &ExpectConfig) -> String {
     words.join(" or ")
 }
 
-/// Whether it is the check of the declared faults.
-fn is_of_faults(check: &Check) -> bool {
-    check.name == FAULTS && !check.is_requirement()
-}
-
 /// Whether it is a check of what the scenario lets happen.
 fn is_of_scenario(check: &Check) -> bool {
-    is_of_faults(check) || (check.name == STIMULI && !check.is_requirement())
+    matches!(check.subject, Subject::Faults | Subject::Stimuli)
 }
 
 /// The checks of a result by their names; none without such checks.
@@ -340,75 +331,80 @@ fn named(checks: &[Check], result: CheckResult) -> Option<String> {
     (!names.is_empty()).then(|| names.join(", "))
 }
 
-#[cfg(test)]
-mod tests {
-    mod figures;
+/// The outcome of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Outcome {
+    Passed,
+    Failed,
+    /// Failed, by checks alone: their findings are the reason.
+    ChecksFailed,
+    /// Nothing failed, and something that the scenario asks for was not tested.
+    Untested,
+    Invalid,
+    Died,
+    SafeStop,
+    Incomplete,
+    Interrupted,
+}
 
-    use masseter_runtime::messages::Event;
-
-    use super::*;
-    use masseter_recording::Usage;
-
-    #[test]
-    fn a_safe_stop_is_explained_by_what_went_wrong_first() {
-        let event = |source, kind, cause| Event::new(source, kind, cause);
-        let lost = event(Source::Master, EventKind::Fault, Cause::ProcessDataLost);
-        let events = [
-            event(Source::Wire, EventKind::Notice, Cause::FaultInjected),
-            Event { axis: 0, node: 1, value: 4.0, ..lost },
-            event(Source::Controller, EventKind::Fault, Cause::MasterFault),
-        ];
-        let (outcome, reason) =
-            ending(&Ending::SafeStop, None, &events.map(|event| EventRecord::from(&event))).unwrap();
-        assert_eq!(outcome, Outcome::SafeStop);
-        assert_eq!(
-            reason,
-            "the controller stopped the rig; first fault: master: process_data_lost \
-             (axis d1 (node 1 on bus 0): process data missing for 4 cycles)"
-        );
-        assert_eq!(ending(&Ending::SafeStop, None, &[]).unwrap().1, "the controller stopped the rig");
+impl Outcome {
+    /// The outcome that a scenario expects.
+    fn of(expected: ExpectedVerdict) -> Self {
+        match expected {
+            ExpectedVerdict::Pass => Self::Passed,
+            ExpectedVerdict::Fail => Self::Failed,
+            ExpectedVerdict::SafeStop => Self::SafeStop,
+            ExpectedVerdict::Died => Self::Died,
+            ExpectedVerdict::Interrupted => Self::Interrupted,
+            ExpectedVerdict::Incomplete => Self::Incomplete,
+            ExpectedVerdict::Untested => Self::Untested,
+        }
     }
 
-    #[test]
-    fn what_master_and_drives_show_comes_before_what_the_controller_reports() {
-        let fault = |source, cause| EventRecord::from(&Event::new(source, EventKind::Fault, cause));
-        let events = [fault(Source::Controller, Cause::LawFailed), fault(Source::Master, Cause::BadMessage)];
-        let shown = |stopped_by| ending(&Ending::Completed, stopped_by, &events);
-        assert_eq!(shown(None), None);
-        let stopped = |reason: &str| Some((Outcome::SafeStop, reason.to_owned()));
-        assert_eq!(
-            shown(Some(StoppedBy::Master)),
-            stopped("the master stopped the drives; first fault: master: bad_message (value 0, limit 0)")
-        );
-        assert_eq!(
-            ending(&Ending::Completed, Some(StoppedBy::QuickStop), &events[..1]),
-            stopped("the drives made a quick stop")
-        );
-        // The end of a process comes before both.
-        let died = Ending::died("plant", "signal 9".to_owned());
-        assert_eq!(ending(&died, Some(StoppedBy::Master), &events).unwrap().0, Outcome::Died);
+    /// The name of the outcome in `[expect]`. No scenario expects a run that cannot be judged.
+    fn named(self) -> Option<ExpectedVerdict> {
+        let plain = if self == Self::ChecksFailed { Self::Failed } else { self };
+        ExpectedVerdict::ALL.into_iter().find(|expected| Self::of(*expected) == plain)
     }
 
-    #[test]
-    fn a_process_that_hardly_sleeps_is_named_with_what_to_do() {
-        let usage = |cpu_s| {
-            let plant = Usage { observed_s: 2.0, cpu_s, ..Usage::default() };
-            RunUsage { processes: [("plant".to_owned(), plant)].into(), ..RunUsage::default() }
-        };
-        assert_eq!(overload(&usage(1.0), 20_000), None);
-        let said = overload(&usage(1.9), 20_000).unwrap();
-        assert!(said.contains("plant kept its core busy for 95 %") && said.contains("below 20000"), "{said}");
+    fn word(self) -> &'static str {
+        self.word_and_exit().0
     }
 
-    #[test]
-    fn a_jump_of_the_clock_excuses_runs_on_real_interfaces_alone() {
-        let simulated = CanConfig::default();
-        let real = CanConfig { interfaces: vec!["can0".to_owned()], ..simulated.clone() };
-        let jump = |clock_jump_s, can| clock_jump(&RunUsage { clock_jump_s, ..RunUsage::default() }, can);
-        assert_eq!(jump(0.0, &real), None);
-        assert_eq!(jump(-3.5, &simulated), None);
-        let (outcome, reason) = jump(-3.5, &real).unwrap();
-        assert_eq!(outcome, Outcome::Invalid);
-        assert!(reason.contains("jumped by -3.500 s"), "{reason}");
+    fn exit(self) -> Exit {
+        self.word_and_exit().1
+    }
+
+    /// The word in reports, and the exit code of the program. A test that tested nothing is as red as one that failed.
+    fn word_and_exit(self) -> (&'static str, Exit) {
+        match self {
+            Self::Passed => ("PASS", Exit::Passed),
+            Self::Failed | Self::ChecksFailed => ("FAIL", Exit::Failed),
+            Self::Untested => ("UNTESTED", Exit::Failed),
+            Self::Invalid => ("INVALID", Exit::Invalid),
+            Self::Died => ("DIED", Exit::Died),
+            Self::SafeStop => ("SAFE STOP", Exit::SafeStop),
+            Self::Incomplete => ("INCOMPLETE", Exit::Incomplete),
+            Self::Interrupted => ("INTERRUPTED", Exit::Interrupted),
+        }
     }
 }
+
+/// The verdict on a run, and the digest of what the rig did.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Judgement {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The digest: equal for runs in which the rig did the same.
+    pub digest: String,
+}
+
+impl Judgement {
+    /// Judges a run.
+    pub fn new(manifest: &Manifest, figures: &Figures) -> Self {
+        Self { verdict: Verdict::new(manifest, figures), digest: figures.digest.clone() }
+    }
+}
+
+#[cfg(test)]
+mod tests;

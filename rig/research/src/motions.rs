@@ -7,9 +7,8 @@ use masseter_scenario::{
     ChewingConfig, LateralConfig, MotionConfig, OpeningConfig, ProtrusionConfig, Scenario,
 };
 
-use super::sample::distance_rad;
-use super::solver::{COMPARED, CONTROLLER, Solver, Start};
-use super::table::{csv, number};
+use crate::evidence::{csv, number};
+use crate::solver::{COMPARED, CONTROLLER, Solver, Start, distance_rad};
 
 /// A cycle of the rig, s.
 const CYCLE_S: f64 = 1e-3;
@@ -18,7 +17,7 @@ const TRUE_WITHIN_RAD: f64 = 1e-6;
 
 /// A motion of the jaw on the platform.
 #[derive(Debug, Clone)]
-pub(super) struct Motion {
+pub(crate) struct Motion {
     pub name: String,
     pub trajectory: Trajectory,
     /// The strokes and velocities that it needs, or why the mechanism cannot follow.
@@ -31,7 +30,7 @@ pub(super) struct Motion {
 
 /// How a solver followed a motion, each step from its last solution.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Followed {
+pub(crate) struct Followed {
     pub steps: usize,
     /// Steps at which it was not at the true leg angles.
     pub lost: usize,
@@ -47,7 +46,7 @@ const HUMAN_OPENINGS_MM: [f64; 2] = [44.3, 56.1];
 ///
 /// # Errors
 /// When its recording cannot be used, or a value of it lies outside its range.
-pub(super) fn motions(mechanism: &Mechanism, own: Option<&Scenario>) -> anyhow::Result<Vec<Motion>> {
+pub(crate) fn motions(mechanism: &Mechanism, own: Option<&Scenario>) -> anyhow::Result<Vec<Motion>> {
     let opening =
         |amplitude_mm| MotionConfig::Opening(OpeningConfig { amplitude_mm, ..OpeningConfig::default() });
     let generated = [
@@ -81,7 +80,7 @@ impl Motion {
     }
 
     /// The platform's poses, every 10 ms.
-    pub(super) fn poses(&self) -> impl Iterator<Item = Pose> {
+    pub(crate) fn poses(&self) -> impl Iterator<Item = Pose> {
         poses(&self.trajectory)
     }
 }
@@ -103,8 +102,8 @@ fn follow(solver: Solver, mechanism: &Mechanism, trajectory: &Trajectory) -> Fol
         } else {
             // The first pose is known, as the paper supposes.
             let guess_rad = last_rad.unwrap_or(joints.theta_rad);
-            let found = solver.attempt(mechanism, &Start { actuators: joints.actuators, guess_rad }).ok();
-            found.map(|found| (found.theta_rad, found.iterations))
+            let found = solver.attempt(mechanism, &Start { actuators: joints.actuators, guess_rad });
+            found.ok().map(|found| (found.theta_rad, found.iterations))
         };
         followed.steps += 1;
         let is_true = |(found_rad, _)| distance_rad(&found_rad, &joints.theta_rad) < TRUE_WITHIN_RAD;
@@ -119,7 +118,7 @@ fn follow(solver: Solver, mechanism: &Mechanism, trajectory: &Trajectory) -> Fol
 }
 
 /// A row for each motion and solver.
-pub(super) fn table(motions: &[Motion], mechanism: &Mechanism) -> String {
+pub(crate) fn table(motions: &[Motion], mechanism: &Mechanism) -> String {
     let rows = motions.iter().flat_map(|motion| {
         let needs = motion.demands.as_ref().map_or([f64::NAN; 3], |demands| {
             let margins_m = demands.margin_m(mechanism.strokes());

@@ -1,14 +1,12 @@
 //! Figs. 3 and 4 of the paper: single guesses from which the two iterations behave differently.
 
-use masseter_model::geometry::{LEGS, Mechanism};
+use masseter_model::geometry::Mechanism;
 use rayon::prelude::*;
 
 use self::Course::{Converges, Diverges, Fails, Oscillates};
-use super::sample::Guesses;
-use super::share::Share;
-use super::solver::{NEWTON, PUBLISHED, Start};
-use super::table::{csv, degrees, number};
-use super::trials::{Trial, Trials};
+use crate::evidence::{Share, csv, degrees, number};
+use crate::solver::{NEWTON, PUBLISHED, Start};
+use crate::trials::{Guesses, Trial, Trials};
 
 /// Errors in which a cycle is looked for, the last ones of a trace.
 const TAIL: usize = 40;
@@ -24,7 +22,7 @@ const RISEN_BY: f64 = 10.0;
 
 /// How an iteration ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Course {
+pub(crate) enum Course {
     /// It reaches a solution.
     Converges,
     /// It repeats the same errors for ever.
@@ -37,21 +35,21 @@ pub(super) enum Course {
 
 /// The errors (eq. 2) of the guess and after every iteration.
 #[derive(Debug, Clone)]
-pub(super) struct Trace {
+pub(crate) struct Trace {
     pub errors_cm2: Vec<f64>,
     course: Course,
 }
 
 /// A guess with the traces of the paper's solver and of Newton–Raphson.
 #[derive(Debug, Clone)]
-pub(super) struct Pair {
+pub(crate) struct Pair {
     start: Start,
     pub traces: [Trace; 2],
 }
 
 /// A way in which the two iterations disagree.
 #[derive(Debug, Clone)]
-pub(super) struct Disagreement {
+pub(crate) struct Disagreement {
     /// Its table and its figure.
     pub name: &'static str,
     pub title: &'static str,
@@ -65,12 +63,12 @@ pub(super) struct Disagreement {
 
 /// Fig. 3: the paper's converges, Newton–Raphson falls at first and then diverges. Fig. 4: the paper's converges,
 /// Newton–Raphson oscillates. Not in the paper: Newton–Raphson converges, the paper's stalls.
-pub(super) fn disagreements(mechanism: &Mechanism, trials: &Trials) -> [Disagreement; 3] {
+pub(crate) fn disagreements(mechanism: &Mechanism, trials: &Trials) -> [Disagreement; 3] {
     let trials = trials.with(Guesses::AboveBase).par_iter();
     let pairs: Vec<_> = trials.map(|trial| Pair::trace(mechanism, trial)).collect();
     let disagreement = |name, title, courses: [Course; 2], clearness: fn(&[f64]) -> f64| {
-        let matching =
-            || pairs.iter().filter(|pair| pair.traces.each_ref().map(|trace| trace.course) == courses);
+        let courses_of = |pair: &Pair| pair.traces.each_ref().map(|trace| trace.course);
+        let matching = || pairs.iter().filter(|pair| courses_of(pair) == courses);
         let clearness = |pair: &Pair| clearness(&pair.traces[1].errors_cm2);
         let clearest = matching().max_by(|a, b| clearness(a).total_cmp(&clearness(b))).cloned();
         let share = Share { hits: matching().count(), of: pairs.len() };
@@ -85,7 +83,7 @@ pub(super) fn disagreements(mechanism: &Mechanism, trials: &Trials) -> [Disagree
 
 impl Disagreement {
     /// Without rows where no such pair was found.
-    pub(super) fn table(&self) -> String {
+    pub(crate) fn table(&self) -> String {
         let mut rows = Vec::new();
         if let Some(Pair { start, traces }) = &self.clearest {
             for (solver, trace) in [PUBLISHED, NEWTON].iter().zip(traces) {
@@ -109,15 +107,12 @@ impl Pair {
     }
 
     /// The guess and its input, for the page.
-    pub(super) fn described(&self) -> String {
-        let list =
-            |values: [f64; LEGS], scale: f64| values.map(|value| format!("{:.1}", value * scale)).join(", ");
-        format!(
-            "d = ({}) mm, l = ({}) mm, guess θ = ({})°",
-            list(self.start.actuators.slide_m, 1e3),
-            list(self.start.actuators.leg_m, 1e3),
-            list(self.start.guess_rad, 1f64.to_degrees())
-        )
+    pub(crate) fn described(&self) -> String {
+        let Start { actuators, guess_rad } = self.start;
+        let [slides_mm, legs_mm, guess_deg] =
+            [(actuators.slide_m, 1e3), (actuators.leg_m, 1e3), (guess_rad, 1f64.to_degrees())]
+                .map(|(values, scale)| values.map(|value| format!("{:.1}", value * scale)).join(", "));
+        format!("d = ({slides_mm}) mm, l = ({legs_mm}) mm, guess θ = ({guess_deg})°")
     }
 }
 

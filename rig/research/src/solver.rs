@@ -1,5 +1,7 @@
 //! The solvers that are compared, and single attempts.
 
+use std::f64::consts::{PI, TAU};
+
 use masseter_controller::kinematics::Residual::{Distance, SquaredDistance};
 use masseter_controller::kinematics::StepRule::{CautiousHalving, Halving, QuadraticBacktracking};
 use masseter_controller::kinematics::{
@@ -10,7 +12,7 @@ use masseter_model::geometry::{Actuators, LEGS, Mechanism};
 
 /// A solver with its choices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Solver {
+pub(crate) struct Solver {
     /// The full name.
     pub name: &'static str,
     /// The name in a legend of [`COMPARED`].
@@ -31,16 +33,16 @@ const fn newton(name: &'static str, residual: Residual) -> Solver {
 }
 
 /// The paper's algorithm as printed: distances (eq. 1), the increment halved until the error decreases.
-pub(super) const PUBLISHED: Solver = published("published, distances, halving", Distance, Halving);
+pub(crate) const PUBLISHED: Solver = published("published, distances, halving", Distance, Halving);
 /// Newton–Raphson on the equations as printed.
-pub(super) const NEWTON: Solver = newton("Newton–Raphson, distances", Distance);
+pub(crate) const NEWTON: Solver = newton("Newton–Raphson, distances", Distance);
 const NEWTON_SQUARED: Solver = newton("Newton–Raphson, squared distances", SquaredDistance);
 /// The controller's certified solver.
-pub(super) const CONTROLLER: Solver =
+pub(crate) const CONTROLLER: Solver =
     Solver { name: "controller", short_name: "controller", iteration: None };
 
 /// All of them.
-pub(super) const SOLVERS: [Solver; 9] = [
+pub(crate) const SOLVERS: [Solver; 9] = [
     PUBLISHED,
     published("published, distances, cautious halving", Distance, CautiousHalving),
     published("published, distances, quadratic backtracking", Distance, QuadraticBacktracking),
@@ -52,11 +54,11 @@ pub(super) const SOLVERS: [Solver; 9] = [
     CONTROLLER,
 ];
 /// The three that the figures show, in this order.
-pub(super) const COMPARED: [Solver; 3] = [PUBLISHED, NEWTON, CONTROLLER];
+pub(crate) const COMPARED: [Solver; 3] = [PUBLISHED, NEWTON, CONTROLLER];
 
 /// What a solver starts with.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Start {
+pub(crate) struct Start {
     pub actuators: Actuators,
     /// Leg angles.
     pub guess_rad: [f64; LEGS],
@@ -64,7 +66,7 @@ pub(super) struct Start {
 
 /// What a solver found from one guess.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Found {
+pub(crate) struct Found {
     pub theta_rad: [f64; LEGS],
     pub iterations: u32,
     /// How often the residuals were evaluated; 0 where the solver does not count them.
@@ -73,12 +75,12 @@ pub(super) struct Found {
 
 impl Solver {
     /// Whether it is the paper's, with any choices.
-    pub(super) fn is_published(self) -> bool {
+    pub(crate) fn is_published(self) -> bool {
         matches!(self.iteration, Some((Method::Published, ..)))
     }
 
     /// Newton–Raphson with the same residual.
-    pub(super) fn rival(self) -> Self {
+    pub(crate) fn rival(self) -> Self {
         match self.iteration {
             Some((_, SquaredDistance, _)) => NEWTON_SQUARED,
             _ => NEWTON,
@@ -86,7 +88,7 @@ impl Solver {
     }
 
     /// Solves. The error is that of `ForwardError::reason`.
-    pub(super) fn attempt(self, mechanism: &Mechanism, start: &Start) -> Result<Found, &'static str> {
+    pub(crate) fn attempt(self, mechanism: &Mechanism, start: &Start) -> Result<Found, &'static str> {
         let Start { actuators, guess_rad } = start;
         let mut evaluations = 0;
         let observe = |step: &Iteration| evaluations += 1 + step.halvings;
@@ -101,7 +103,7 @@ impl Solver {
     }
 
     /// The error (eq. 2, cm²) of the guess and after every iteration; nothing for the controller.
-    pub(super) fn errors_cm2(self, mechanism: &Mechanism, start: &Start) -> Vec<f64> {
+    pub(crate) fn errors_cm2(self, mechanism: &Mechanism, start: &Start) -> Vec<f64> {
         let mut errors_cm2 = Vec::new();
         if let Some((method, options)) = self.iteration() {
             let observe = |step: &Iteration| errors_cm2.push(step.evaluation.error_cm2());
@@ -112,10 +114,26 @@ impl Solver {
     }
 
     /// With the greatest possible numbers of iterations and reductions, so that it does not fail by a bound.
-    pub(super) fn iteration(self) -> Option<(Method, Options)> {
+    pub(crate) fn iteration(self) -> Option<(Method, Options)> {
         let (method, residual, step) = self.iteration?;
         let bounds =
             Options { max_iterations: MAX_ITERATIONS, max_halvings: MAX_HALVINGS, ..Options::default() };
         Some((method, Options { residual, step, ..bounds }))
+    }
+}
+
+/// The largest difference of any leg's angle, around the circle, radians.
+pub(crate) fn distance_rad(a: &[f64; LEGS], b: &[f64; LEGS]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| ((a - b + PI).rem_euclid(TAU) - PI).abs()).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_go_the_short_way_round() {
+        let distance = distance_rad(&[3.1, 0.0, 1.0], &[-3.1, 0.01, 1.0]);
+        assert!((distance - (TAU - 6.2)).abs() < 1e-12);
     }
 }

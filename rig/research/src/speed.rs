@@ -6,12 +6,10 @@ use masseter_controller::kinematics::{ForwardTracker, solve};
 use masseter_model::geometry::Mechanism;
 use masseter_runtime::clock;
 
-use super::motions::Motion;
-use super::sample::Guesses;
-use super::share::{median, quantile};
-use super::solver::{COMPARED, Solver, Start};
-use super::table::{csv, number};
-use super::trials::{Trial, Trials};
+use crate::evidence::{csv, number, quantile};
+use crate::motions::Motion;
+use crate::solver::{COMPARED, Solver, Start};
+use crate::trials::{Guesses, Trial, Trials};
 
 /// Cases timed in each situation.
 const CASES: usize = 2000;
@@ -22,7 +20,7 @@ const CYCLE_S: f64 = 1e-3;
 
 /// The time of one solver in one situation.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Timing {
+pub(crate) struct Timing {
     pub median_ns: f64,
     pub p99_ns: f64,
     /// Its median over Newton–Raphson's in the same situation.
@@ -31,7 +29,7 @@ pub(super) struct Timing {
 
 /// A start of the iteration.
 #[derive(Debug, Clone)]
-pub(super) struct Situation {
+pub(crate) struct Situation {
     pub name: &'static str,
     cases: usize,
     /// Of [`COMPARED`].
@@ -40,7 +38,7 @@ pub(super) struct Situation {
 
 /// From random guesses above the base from which all three solvers reach a solution; and from the solution one
 /// millisecond of chewing before. Takes one core; nothing else of the study runs meanwhile.
-pub(super) fn measure(mechanism: &Mechanism, trials: &Trials, chewing: &Motion) -> [Situation; 2] {
+pub(crate) fn measure(mechanism: &Mechanism, trials: &Trials, chewing: &Motion) -> [Situation; 2] {
     let random = trials.with(Guesses::AboveBase).iter();
     let all_arrive = |trial: &&Trial| COMPARED.into_iter().all(|solver| trial.by(solver).is_ok());
     let random: Vec<_> = random.filter(all_arrive).take(CASES).map(|trial| trial.start).collect();
@@ -50,7 +48,7 @@ pub(super) fn measure(mechanism: &Mechanism, trials: &Trials, chewing: &Motion) 
     ]
 }
 
-pub(super) fn table(situations: &[Situation]) -> String {
+pub(crate) fn table(situations: &[Situation]) -> String {
     let rows = situations.iter().flat_map(|situation| {
         COMPARED.into_iter().zip(situation.timings).map(|(solver, timing)| {
             let times = [timing.median_ns, timing.p99_ns, timing.to_newton].map(number);
@@ -75,10 +73,12 @@ fn in_turns(mechanism: &Mechanism, name: &'static str, cases: &[Start]) -> Situa
             taken_ns.push(time_ns(solver, mechanism, start));
         }
     }
-    let [_, newton_ns, _] = taken_ns.clone().map(median);
-    let timings = taken_ns.map(|sample| {
-        let [median_ns, p99_ns] = [0.5, 0.99].map(|share| quantile(sample.iter().copied(), share));
-        Timing { median_ns, p99_ns, to_newton: median_ns / newton_ns }
+    let [medians_ns, p99s_ns] =
+        [0.5, 0.99].map(|share| taken_ns.each_ref().map(|sample| quantile(sample.iter().copied(), share)));
+    let timings = std::array::from_fn(|solver| Timing {
+        median_ns: medians_ns[solver],
+        p99_ns: p99s_ns[solver],
+        to_newton: medians_ns[solver] / medians_ns[1],
     });
     Situation { name, cases: cases.len(), timings }
 }

@@ -4,15 +4,13 @@ use anyhow::ensure;
 use masseter_model::geometry::{Mechanism, MechanismConfig};
 use masseter_scenario::Scenario;
 
-use crate::basins::Basins;
 use crate::forces::{self, Forces};
+use crate::maps::{Basins, Map, SLICES};
 use crate::motions::{self, Motion};
-use crate::multiplicity::Multiplicity;
 use crate::pairs::{self, Disagreement};
-use crate::solution_set::SolutionSet;
+use crate::solutions::{Multiplicity, SolutionSet};
 use crate::speed::{self, Situation};
 use crate::trials::Trials;
-use crate::workspace::{Map, SLICES};
 
 /// The extent of a study.
 #[derive(Debug, Clone, Copy)]

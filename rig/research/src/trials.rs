@@ -1,20 +1,68 @@
 //! Random guesses for random feasible inputs: which solver reaches which solution after how many iterations.
+//!
+//! Each case draws from a generator of its own, so that the order in which cores take them changes nothing.
+
+use std::f64::consts::PI;
 
 use masseter_controller::kinematics::Assembly;
 use masseter_model::geometry::{LEGS, Mechanism};
+use rand::RngExt;
+use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
-use super::sample::{self, GUESSES, Guesses, Stream, distance_rad};
-use super::share::{Share, median, quantile};
-use super::solver::{Found, NEWTON, PUBLISHED, SOLVERS, Solver, Start};
-use super::table::{csv, number};
+use self::Guesses::{AboveBase, Within};
+use crate::evidence::{Share, csv, number, quantile};
+use crate::solutions::{SolutionSet, Stream, generator};
+use crate::solver::{Found, NEWTON, PUBLISHED, SOLVERS, Solver, Start, distance_rad};
 
 /// A root counts as the closest when no other is closer by more than this, radians.
 const TIE_RAD: f64 = 1e-6;
 
+/// Where guesses come from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Guesses {
+    /// Every leg within so many degrees of the true angle.
+    Within(f64),
+    /// Every leg anywhere above the base.
+    AboveBase,
+}
+
+/// The origins of the trials' guesses, nearest first.
+pub(crate) const GUESSES: [Guesses; 8] = [
+    Within(2.0),
+    Within(5.0),
+    Within(10.0),
+    Within(15.0),
+    Within(20.0),
+    Within(30.0),
+    Within(60.0),
+    AboveBase,
+];
+
+impl Guesses {
+    /// The name in tables.
+    pub(crate) fn name(self) -> String {
+        match self {
+            Within(deg) => format!("±{deg}°"),
+            AboveBase => "above base".to_owned(),
+        }
+    }
+
+    /// Leg angles, radians.
+    pub(crate) fn draw(self, true_rad: &[f64; LEGS], random: &mut Pcg64Mcg) -> [f64; LEGS] {
+        match self {
+            Within(deg) => true_rad.map(|angle| {
+                let off: f64 = random.random_range(-1.0..=1.0);
+                angle + off * deg.to_radians()
+            }),
+            AboveBase => std::array::from_fn(|_| random.random_range(0.0..PI)),
+        }
+    }
+}
+
 /// A solution that a solver reached, judged against all solutions of its input.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Reached {
+pub(crate) struct Reached {
     pub found: Found,
     /// Whether the mechanism can take it.
     pub is_true: bool,
@@ -27,7 +75,7 @@ type TrialResult = Result<Reached, &'static str>;
 
 /// One guess for one input, given to every solver.
 #[derive(Debug, Clone)]
-pub(super) struct Trial {
+pub(crate) struct Trial {
     pub start: Start,
     /// In the order of [`SOLVERS`].
     outcomes: [TrialResult; SOLVERS.len()],
@@ -35,7 +83,7 @@ pub(super) struct Trial {
 
 impl Trial {
     /// The outcome of one solver.
-    pub(super) fn by(&self, solver: Solver) -> TrialResult {
+    pub(crate) fn by(&self, solver: Solver) -> TrialResult {
         let place = SOLVERS.iter().position(|&other| other == solver);
         self.outcomes[place.expect("every solver takes part")]
     }
@@ -43,20 +91,20 @@ impl Trial {
 
 /// All trials: `samples` for each of [`GUESSES`].
 #[derive(Debug, Clone)]
-pub(super) struct Trials {
+pub(crate) struct Trials {
     sets: Vec<Vec<Trial>>,
 }
 
 impl Trials {
-    pub(super) fn run(mechanism: &Mechanism, samples: usize, seed: u64) -> Self {
+    pub(crate) fn run(mechanism: &Mechanism, samples: usize, seed: u64) -> Self {
         let trial = |guesses: Guesses, case| {
-            let mut random = sample::generator(seed, Stream::Trials, case);
-            let input = sample::feasible(mechanism, &mut random);
+            let mut random = generator(seed, Stream::Trials, case);
+            let input = SolutionSet::feasible(mechanism, &mut random);
             let guess_rad = guesses.draw(&input.true_one.theta_rad, &mut random);
             let start = Start { actuators: input.actuators, guess_rad };
             let outcomes = SOLVERS.map(|solver| {
                 let found = solver.attempt(mechanism, &start)?;
-                Ok(judge(mechanism, &input, &guess_rad, found))
+                Ok(reached(mechanism, &input, &guess_rad, found))
             });
             Trial { start, outcomes }
         };
@@ -68,7 +116,7 @@ impl Trials {
     ///
     /// # Panics
     /// When [`GUESSES`] lacks the origin.
-    pub(super) fn with(&self, guesses: Guesses) -> &[Trial] {
+    pub(crate) fn with(&self, guesses: Guesses) -> &[Trial] {
         let set = GUESSES.iter().position(|&set| set == guesses);
         &self.sets[set.expect("guesses are drawn from there")]
     }
@@ -79,28 +127,28 @@ impl Trials {
     }
 
     /// How often any solution was reached.
-    pub(super) fn solved(&self, solver: Solver, guesses: Guesses) -> Share {
+    pub(crate) fn solved(&self, solver: Solver, guesses: Guesses) -> Share {
         Share::count(self.outcomes(solver, guesses).map(|outcome| outcome.is_ok()))
     }
 
     /// How often the true solution was reached.
-    pub(super) fn true_ones(&self, solver: Solver, guesses: Guesses) -> Share {
+    pub(crate) fn true_ones(&self, solver: Solver, guesses: Guesses) -> Share {
         Share::count(self.outcomes(solver, guesses).map(|outcome| outcome.is_ok_and(|one| one.is_true)))
     }
 
     /// Share of the solutions reached that are the closest to the guess.
-    pub(super) fn closest(&self, solver: Solver, guesses: Guesses) -> Share {
+    pub(crate) fn closest(&self, solver: Solver, guesses: Guesses) -> Share {
         Share::count(self.outcomes(solver, guesses).flatten().map(|reached| reached.is_closest))
     }
 
     /// What a solver and Newton–Raphson (same residual) find where both reach a solution.
-    pub(super) fn against_newton(&self, solver: Solver, guesses: Guesses) -> Vec<[Found; 2]> {
+    pub(crate) fn against_newton(&self, solver: Solver, guesses: Guesses) -> Vec<[Found; 2]> {
         let both = self.outcomes(solver, guesses).zip(self.outcomes(solver.rival(), guesses));
         both.filter_map(|(a, b)| Some([a.ok()?.found, b.ok()?.found])).collect()
     }
 
     /// Success rates, one row for each solver and origin of guesses.
-    pub(super) fn success_table(&self) -> String {
+    pub(crate) fn success_table(&self) -> String {
         let row = |(guesses, solver): (Guesses, Solver)| {
             let count = |end: &str| {
                 self.outcomes(solver, guesses).filter(|outcome| outcome.is_err_and(|why| why == end)).count()
@@ -119,7 +167,7 @@ impl Trials {
     }
 
     /// Distribution of iterations from guesses anywhere above the base.
-    pub(super) fn iterations_table(&self) -> String {
+    pub(crate) fn iterations_table(&self) -> String {
         let rows = SOLVERS.into_iter().flat_map(|solver| {
             let counts = self.histogram(solver).into_iter().enumerate();
             counts.map(move |(iterations, count)| (solver.name, iterations, count))
@@ -128,7 +176,7 @@ impl Trials {
     }
 
     /// How many solved trials took 0, 1, 2 … iterations, from guesses anywhere above the base.
-    pub(super) fn histogram(&self, solver: Solver) -> Vec<usize> {
+    pub(crate) fn histogram(&self, solver: Solver) -> Vec<usize> {
         let reached = self.outcomes(solver, Guesses::AboveBase).flatten();
         let taken: Vec<_> = reached.map(|reached| reached.found.iterations).collect();
         let end = taken.iter().max().map_or(0, |most| most + 1);
@@ -136,13 +184,14 @@ impl Trials {
     }
 
     /// Iterations of the paper's variants and of Newton–Raphson where both reach a solution.
-    pub(super) fn cost_table(&self) -> String {
+    pub(crate) fn cost_table(&self) -> String {
         let row = |(guesses, solver): (Guesses, Solver)| {
             let both = self.against_newton(solver, guesses);
             let costs = [0, 1].map(|side| {
                 let iterations = || both.iter().map(|pair| f64::from(pair[side].iterations));
                 let evaluations = both.iter().map(|pair| f64::from(pair[side].evaluations));
-                [median(iterations()), quantile(iterations(), 0.9), median(evaluations)].map(number)
+                [quantile(iterations(), 0.5), quantile(iterations(), 0.9), quantile(evaluations, 0.5)]
+                    .map(number)
             });
             (guesses.name(), solver.name, both.len(), costs)
         };
@@ -155,12 +204,10 @@ impl Trials {
 
     /// Trials above the base in which only one of the two reaches a solution:
     /// the paper's solver alone, Newton–Raphson alone.
-    pub(super) fn alone(&self) -> [Share; 2] {
+    pub(crate) fn alone(&self) -> [Share; 2] {
         [[true, false], [false, true]].map(|wanted| {
-            let trials = self.with(Guesses::AboveBase).iter();
-            Share::count(
-                trials.map(|trial| [PUBLISHED, NEWTON].map(|solver| trial.by(solver).is_ok()) == wanted),
-            )
+            let solved = |trial: &Trial| [PUBLISHED, NEWTON].map(|solver| trial.by(solver).is_ok());
+            Share::count(self.with(Guesses::AboveBase).iter().map(|trial| solved(trial) == wanted))
         })
     }
 }
@@ -169,12 +216,32 @@ fn every_combination() -> impl Iterator<Item = (Guesses, Solver)> {
     GUESSES.into_iter().flat_map(|guesses| SOLVERS.map(|solver| (guesses, solver)))
 }
 
-fn judge(mechanism: &Mechanism, input: &sample::Feasible, guess_rad: &[f64; LEGS], found: Found) -> Reached {
+fn reached(mechanism: &Mechanism, input: &SolutionSet, guess_rad: &[f64; LEGS], found: Found) -> Reached {
     let from_guess = |theta_rad: &[f64; LEGS]| distance_rad(theta_rad, guess_rad);
     let least = input.solutions.iter().map(|one| from_guess(&one.theta_rad)).fold(f64::INFINITY, f64::min);
     Reached {
         found,
         is_true: Assembly::new(mechanism, &input.actuators, &found.theta_rad).is_true(),
         is_closest: from_guess(&found.theta_rad) <= least + TIE_RAD,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn guesses_stay_within_their_range() {
+        let mut random = generator(1, Stream::Trials, 0);
+        let truth = [1.4, 1.5, 1.6];
+        for guesses in GUESSES {
+            for _ in 0..100 {
+                let guess = guesses.draw(&truth, &mut random);
+                match guesses {
+                    Within(deg) => assert!(distance_rad(&guess, &truth) <= deg.to_radians() + 1e-12),
+                    AboveBase => assert!(guess.iter().all(|angle| angle.sin() >= 0.0)),
+                }
+            }
+        }
     }
 }

@@ -67,8 +67,8 @@ fn read(folder: &Path, name: &str) -> String {
     fs::read_to_string(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
-/// A figure has data and text, and all of it lies on the page: a coordinate that is no number, or a curve beside the page,
-/// fails.
+/// A figure has data and text, and all of it lies on the page: a coordinate that is no number, or a curve beside the
+/// page, fails.
 fn check_figure(name: &str, svg: &str) {
     let attributes = |key: &str| {
         let values: Vec<_> = svg.split(&format!(" {key}=\"")).skip(1).collect();

@@ -15,18 +15,12 @@
 //! # Ok::<(), masseter_table::TableError>(())
 //! ```
 
-mod column;
-mod error;
-mod parquet_program;
 mod rows;
 mod table;
 #[cfg(test)]
 mod tests;
 mod writer;
 
-pub use column::{Cell, Column, Values};
-pub use error::TableError;
-pub use parquet_program::ParquetProgram;
 pub use rows::Rows;
-pub use table::Table;
-pub use writer::{Format, TableWriter, write_table};
+pub use table::{Cell, Column, Table, Values};
+pub use writer::{Format, ParquetProgram, TableError, TableWriter, write_table};

@@ -3,10 +3,9 @@
 //! A line names this form, and a line of JSON the columns. Each part is the byte 1, its number of rows, and the values of one
 //! column after the other. The byte 0 ends the rows: without it their sender died, and the file must not look whole.
 
-use std::io::{self, BufRead, ErrorKind, Write};
+use std::io::{self, BufRead, ErrorKind, Read, Write};
 
-use crate::column::{Column, bytes};
-use crate::table::Table;
+use crate::table::{Column, Table, Values};
 
 /// Another build may have another form.
 const FORM: &[u8; 22] = b"rows of masseter, v. 1";
@@ -26,7 +25,7 @@ pub(crate) fn send_columns(table: &Table, to: &mut impl Write) -> io::Result<()>
 pub(crate) fn send_part(table: &Table, to: &mut impl Write) -> io::Result<()> {
     to.write_all(&PART)?;
     to.write_all(&(table.rows() as u64).to_le_bytes())?;
-    table.columns().iter().try_for_each(|column| column.values().send(to))
+    table.columns().iter().try_for_each(|column| send_values(&column.values, to))
 }
 
 /// Ends the rows.
@@ -73,7 +72,71 @@ impl<R: BufRead> Rows<R> {
             _ => return Err(ErrorKind::InvalidData.into()),
         }
         let count = u64::from_le_bytes(bytes(&mut self.from)?);
-        self.part.receive(count, &mut self.from)?;
+        self.part.clear();
+        self.part.values_mut().try_for_each(|values| receive_values(values, count, &mut self.from))?;
         Ok(Some(&self.part))
     }
+}
+
+/// Writes each value as a byte that says whether there is one, and the value, little-endian; a text after its length.
+fn send_values(values: &Values, to: &mut impl Write) -> io::Result<()> {
+    match values {
+        Values::Numbers(values) => send(values, to, |value, to| to.write_all(&value.to_le_bytes())),
+        Values::Whole(values) => send(values, to, |value, to| to.write_all(&value.to_le_bytes())),
+        Values::Words(values) => send(values, to, |value, to| {
+            to.write_all(&(value.len() as u64).to_le_bytes())?;
+            to.write_all(value.as_bytes())
+        }),
+        Values::Truths(values) => send(values, to, |value, to| to.write_all(&[u8::from(*value)])),
+    }
+}
+
+/// Adds so many values, bit by bit as [`send_values`] wrote them.
+fn receive_values(values: &mut Values, count: u64, from: &mut impl Read) -> io::Result<()> {
+    match values {
+        Values::Numbers(values) => receive(values, count, from, |from| Ok(f64::from_le_bytes(bytes(from)?))),
+        Values::Whole(values) => receive(values, count, from, |from| Ok(i64::from_le_bytes(bytes(from)?))),
+        Values::Words(values) => receive(values, count, from, |from| {
+            let length = u64::from_le_bytes(bytes(from)?);
+            let mut text = String::new();
+            from.take(length).read_to_string(&mut text)?;
+            if text.len() as u64 != length {
+                return Err(ErrorKind::UnexpectedEof.into());
+            }
+            Ok(text)
+        }),
+        Values::Truths(values) => receive(values, count, from, |from| Ok(bytes(from)? == [1])),
+    }
+}
+
+fn send<T, W: Write>(
+    values: &[Option<T>],
+    to: &mut W,
+    write: impl Fn(&T, &mut W) -> io::Result<()>,
+) -> io::Result<()> {
+    for value in values {
+        to.write_all(&[u8::from(value.is_some())])?;
+        value.as_ref().map_or(Ok(()), |value| write(value, to))?;
+    }
+    Ok(())
+}
+
+fn receive<T, R: Read>(
+    values: &mut Vec<Option<T>>,
+    count: u64,
+    from: &mut R,
+    read: impl Fn(&mut R) -> io::Result<T>,
+) -> io::Result<()> {
+    for _ in 0..count {
+        let is_there = bytes(from)? == [1];
+        values.push(is_there.then(|| read(from)).transpose()?);
+    }
+    Ok(())
+}
+
+/// The next bytes, as many as the type has.
+fn bytes<const COUNT: usize>(from: &mut impl Read) -> io::Result<[u8; COUNT]> {
+    let mut bytes = [0; COUNT];
+    from.read_exact(&mut bytes)?;
+    Ok(bytes)
 }

@@ -1,7 +1,8 @@
 //! Tables are read back as they were written.
 
-use std::fs;
+use std::fs::{self, File, Permissions};
 use std::io::ErrorKind;
+use std::os::unix::fs::PermissionsExt;
 
 use super::rows::{send_columns, send_end, send_part};
 use super::*;
@@ -58,12 +59,12 @@ fn rows_arrive_bit_by_bit_with_their_columns() {
     send_end(&mut sent).unwrap();
     let mut rows = Rows::new(sent.as_slice()).unwrap();
     assert_eq!(
-        rows.columns().iter().map(Column::name).collect::<Vec<_>>(),
+        rows.columns().iter().map(|column| &*column.name).collect::<Vec<_>>(),
         ["number", "text", "whole", "none"]
     );
     for _ in 0..2 {
         let part = rows.next_part().unwrap().unwrap();
-        let Values::Numbers(received) = part.columns()[0].values() else { panic!("{part:?}") };
+        let Values::Numbers(received) = &part.columns()[0].values else { panic!("{part:?}") };
         assert!(received.iter().map(|number| number.unwrap().to_bits()).eq(numbers.map(f64::to_bits)));
         assert_eq!(part.columns()[1..], table.columns()[1..]);
     }
@@ -105,4 +106,29 @@ fn a_missing_program_is_named_with_what_builds_it() {
     let missing = ParquetProgram::beside_this_one().unwrap_err().to_string();
     assert!(missing.contains("masseter-parquet, which does not exist"), "{missing}");
     assert!(missing.contains("`cargo build --release`"), "{missing}");
+}
+
+#[test]
+fn a_program_that_says_much_before_it_takes_rows_blocks_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("program");
+    fs::write(&path, "#!/bin/sh\nhead -c 200000 /dev/zero >&2\nhead -c 500000 > /dev/null\nexit 3\n")
+        .unwrap();
+    fs::set_permissions(&path, Permissions::from_mode(0o700)).unwrap();
+    let table = Table::new(vec![Column::new("case", "", "", Values::Whole(vec![Some(1); 100_000]))]);
+    let format = Format::Parquet(ParquetProgram::at(path));
+    let written = write_table(&format, tempfile::tempfile().unwrap(), &table);
+    let Err(TableError::Program { status, said }) = written else { panic!("{written:?}") };
+    assert_eq!((status.code(), said.len()), (Some(3), 200_000));
+}
+
+#[test]
+fn a_full_disk_is_an_error_of_that_kind_in_csv_too() {
+    for rows in [1, 100_000] {
+        let table = Table::new(vec![Column::new("case", "", "", Values::Whole(vec![Some(1); rows]))]);
+        let full = File::options().write(true).open("/dev/full").unwrap();
+        let written = write_table(&Format::Csv, full, &table);
+        let Err(TableError::File(error)) = written else { panic!("{written:?}") };
+        assert_eq!(error.kind(), ErrorKind::StorageFull);
+    }
 }

@@ -1,11 +1,17 @@
-//! Colour for the words that judge.
+//! Lines on a terminal: colour for the words that judge, and breaks to its width. What follows a break stands below the
+//! last column of the line.
 
 use std::io::{self, Write};
+use std::os::fd::AsFd;
 
 use anstream::AutoStream;
 use anstyle::{AnsiColor, Style};
+use rustix::termios::{isatty, tcgetwinsize};
 
-use crate::{escaped, taken, wrap};
+use crate::{escaped, taken};
+
+/// Narrower terminals get lines as they are: their users would see one word a line.
+const LEAST: usize = 40;
 
 /// What a word means for who reads it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,7 +67,8 @@ pub fn result_with_tones(text: &str, tones: &[(&str, Tone)]) -> anyhow::Result<(
 }
 
 fn coloured(text: &str, tones: &[(&str, Tone)]) -> String {
-    let text = wrap::for_stdout(&escaped(text));
+    let width = columns(io::stdout()).unwrap_or(0);
+    let text: String = escaped(text).split_inclusive('\n').map(|line| wrapped(line, width)).collect();
     text.split_inclusive('\n').map(|line| coloured_line(line, tones)).collect()
 }
 
@@ -74,6 +81,40 @@ fn coloured_line(line: &str, tones: &[(&str, Tone)]) -> String {
     let (indent, rest) = (&line[..line.len() - start.len()], &start[word.len()..]);
     let style = tone.style();
     format!("{indent}{style}{word}{style:#}{rest}")
+}
+
+/// Characters in a line of a terminal; none where the stream is no terminal, or one of unknown width.
+pub fn columns(stream: impl AsFd) -> Option<usize> {
+    let size = isatty(&stream).then(|| tcgetwinsize(&stream).ok()).flatten()?;
+    (size.ws_col > 0).then_some(size.ws_col.into())
+}
+
+/// A line with breaks where it is wider than the terminal.
+fn wrapped(line: &str, width: usize) -> String {
+    let indent = hanging_indent(line);
+    if width < LEAST || line.trim_end().chars().count() <= width || indent + LEAST / 2 > width {
+        return line.to_owned();
+    }
+    let (mut text, mut used) = (String::new(), 0);
+    for word in line.trim_end().split_inclusive(' ') {
+        let length = word.trim_end().chars().count();
+        if used + length > width && used > indent {
+            text.truncate(text.trim_end().len());
+            text.push('\n');
+            text.push_str(&" ".repeat(indent));
+            used = indent;
+        }
+        text.push_str(word);
+        used += word.chars().count();
+    }
+    text + "\n"
+}
+
+/// Where the last column of a line begins: after the last gap of several spaces, or two places in.
+fn hanging_indent(line: &str) -> usize {
+    let text = line.trim_end();
+    let gap = text.rfind("  ").map_or(0, |gap| gap + 2);
+    if text[gap..].contains(' ') { text[..gap].chars().count().max(2) } else { 2 }
 }
 
 #[cfg(test)]
@@ -99,5 +140,34 @@ mod tests {
     #[test]
     fn control_characters_of_the_text_stay_codes() {
         assert_eq!(coloured("jaw\u{1b}[2J", &TONES), "jaw\\u{1b}[2J");
+    }
+
+    #[test]
+    fn the_rest_of_a_line_stands_below_its_last_column() {
+        let line =
+            "  ok   tracking           closest of 10001 samples: incisal point rms 0.0064 mm, limit 0.1 mm\n";
+        let below = " ".repeat(26);
+        let expected = format!(
+            "  ok   tracking           closest of 10001\n{below}samples: incisal\n{below}point rms 0.0064 mm,\n{below}limit 0.1 mm\n"
+        );
+        assert_eq!(wrapped(line, 46), expected);
+        assert!(expected.lines().all(|line| line.chars().count() <= 46));
+        assert_eq!(wrapped(line, 100), line);
+        assert_eq!(wrapped(line, 0), line);
+    }
+
+    #[test]
+    fn a_line_without_columns_goes_on_two_places_in() {
+        let line = "masseter doctor lists what disturbs this machine, and what to do\n";
+        assert_eq!(
+            wrapped(line, 50),
+            "masseter doctor lists what disturbs this machine,\n  and what to do\n"
+        );
+    }
+
+    #[test]
+    fn a_word_that_is_too_long_stays_whole() {
+        let word = "x".repeat(90);
+        assert_eq!(wrapped(&format!("see {word}\n"), 60), format!("see\n  {word}\n"));
     }
 }

@@ -1,6 +1,5 @@
 //! Exit codes, the same for every verb, and errors as text.
 
-use std::error::Error;
 use std::io::{self, ErrorKind};
 use std::process::ExitCode;
 
@@ -95,17 +94,7 @@ pub fn in_one_line(error: &anyhow::Error) -> String {
 
 /// Whether a write failed because the disk is full, or a quota or the maximum file size is reached.
 fn is_out_of_room(error: &anyhow::Error) -> bool {
-    error.chain().filter_map(io_kind).any(|kind| {
+    error.chain().filter_map(|cause| cause.downcast_ref().map(io::Error::kind)).any(|kind| {
         matches!(kind, ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge)
     })
-}
-
-fn io_kind(cause: &(dyn Error + 'static)) -> Option<ErrorKind> {
-    // An error of `csv` does not have its cause as a source.
-    let in_csv = |error: &csv::Error| match error.kind() {
-        csv::ErrorKind::Io(error) => Some(error.kind()),
-        _ => None,
-    };
-    let in_io = cause.downcast_ref().map(io::Error::kind);
-    in_io.or_else(|| cause.downcast_ref().and_then(in_csv))
 }

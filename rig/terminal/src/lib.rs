@@ -14,7 +14,7 @@
 
 mod colour;
 mod exit;
-mod wrap;
+mod stderr_writer;
 
 use std::fmt::Write as _;
 use std::io::{self, ErrorKind, Write};
@@ -23,9 +23,9 @@ use anyhow::Context;
 use clap::ValueEnum;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-pub use colour::{Tone, choose_colour, result_with_tones};
+pub use colour::{Tone, choose_colour, columns, result_with_tones};
 pub use exit::{Exit, Failure, OrFailure, in_one_line};
-pub use wrap::columns;
+pub use stderr_writer::{Refusals, StderrWriter};
 
 /// A pipe that takes anything takes as many bytes as one write, bytes.
 const PIPE_PART: usize = 4096;

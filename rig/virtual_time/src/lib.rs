@@ -7,8 +7,6 @@
 //! latest: what varies is the bus.
 
 mod log;
-mod logged_ports;
-mod sink;
 
 use anyhow::Context;
 use masseter_analysis::{Analysis, Figures};
@@ -29,9 +27,9 @@ use masseter_runtime::schedule::CycleSchedule;
 use masseter_scenario::Scenario;
 use masseter_terminal::status;
 
-pub use log::{Log, Publisher};
-pub use logged_ports::LoggedPorts;
-pub use sink::{Sink, Stream};
+use log::{Publisher, Stream};
+
+pub use log::{Log, LoggedPorts, Sink};
 
 /// What the user asks of a run.
 pub trait Requests {
@@ -82,7 +80,7 @@ pub fn analyse(
     let stream = Stream::new(start(&plan.scenario, &manifest.declared));
     let (stream, ending) = run.play(plan, stream, interrupts)?;
     manifest.ending = ending;
-    stream.finish().context("a message on topic 'frame' holds no CAN frame")
+    stream.figures().context("a message on topic 'frame' holds no CAN frame")
 }
 
 /// The controller of a run that has not begun.
@@ -118,7 +116,7 @@ impl Run {
         let (mut cycle, mut plant_error) = (0, None);
         while plant_error.is_none()
             && rig.controller.outcome().is_none()
-            && !rig.log.sink().has_failed()
+            && !rig.log.sink_mut().has_failed()
             && !interrupts.is_abort_requested()
         {
             cycle += 1;

@@ -1,15 +1,70 @@
-//! The messages of a run in one thread, on their way to a [`Sink`], each with the number and the time that its publisher
-//! would give it.
+//! The messages of a run in one thread: numbered and stamped as their publishers would, on their way into a recording or
+//! directly into the analysis; and the ports of a controller in this thread.
 
+use std::cell::Cell;
+use std::convert::Infallible;
+
+use masseter_analysis::{Analysis, Figures};
 use masseter_plant::core::PlantCore;
-use masseter_recording::Recorded;
-use masseter_runtime::messages::Message;
+use masseter_recording::{Backlog, Recorded};
+use masseter_runtime::control::ControllerPorts;
+use masseter_runtime::messages::tap::TapError;
+use masseter_runtime::messages::{Command, Event, Message, Parameters, Reading, Signals, State};
+use masseter_runtime::realtime::Wake;
 
-use crate::sink::Sink;
+/// Takes every message of a run.
+pub trait Sink {
+    /// Takes a message that was published at `now_ns`.
+    fn take(&mut self, message: &Recorded, now_ns: u64);
+
+    /// Whether it lacks a message, so that the run is useless from here on.
+    fn has_failed(&self) -> bool;
+}
+
+impl Sink for Backlog {
+    fn take(&mut self, message: &Recorded, now_ns: u64) {
+        self.record(message, now_ns);
+    }
+
+    fn has_failed(&self) -> bool {
+        self.dropped() > 0
+    }
+}
+
+/// The analysis of a run that is not recorded.
+#[derive(Debug)]
+pub(crate) struct Stream {
+    analysis: Analysis,
+    error: Option<TapError>,
+}
+
+impl Stream {
+    /// A stream into an analysis that has no message yet.
+    pub(crate) fn new(analysis: Analysis) -> Self {
+        Self { analysis, error: None }
+    }
+
+    /// The figures of all messages; the error of a frame that is none.
+    pub(crate) fn figures(self) -> Result<Figures, TapError> {
+        self.error.map_or_else(|| Ok(self.analysis.finish(false, &[])), Err)
+    }
+}
+
+impl Sink for Stream {
+    fn take(&mut self, message: &Recorded, _: u64) {
+        if let Err(error) = self.analysis.take(message) {
+            self.error.get_or_insert(error);
+        }
+    }
+
+    fn has_failed(&self) -> bool {
+        self.error.is_some()
+    }
+}
 
 /// The publishers of a run. Each numbers its own messages.
 #[derive(Debug, Clone, Copy)]
-pub enum Publisher {
+pub(crate) enum Publisher {
     /// Commands to the actuators.
     Command,
     /// Readings of the encoders.
@@ -46,11 +101,6 @@ impl<S: Sink> Log<S> {
     }
 
     /// Where the messages go.
-    pub fn sink(&self) -> &S {
-        &self.sink
-    }
-
-    /// Where the messages go.
     pub fn sink_mut(&mut self) -> &mut S {
         &mut self.sink
     }
@@ -61,7 +111,7 @@ impl<S: Sink> Log<S> {
     }
 
     /// Numbers a message, as its publisher would, and hands it on.
-    pub fn record<M: Message + Into<Recorded>>(
+    pub(crate) fn record<M: Message + Into<Recorded>>(
         &mut self,
         publisher: Publisher,
         now_ns: u64,
@@ -77,12 +127,78 @@ impl<S: Sink> Log<S> {
     }
 
     /// Hands on the frames and events of a cycle.
-    pub fn drain(&mut self, plant: &mut PlantCore, now_ns: u64) {
+    pub(crate) fn drain(&mut self, plant: &mut PlantCore, now_ns: u64) {
         for frame in plant.drain_frames() {
             self.record(Publisher::Frame, now_ns, |message| *message = frame);
         }
         plant.drain_events(&mut |event| {
             self.record(Publisher::PlantEvent, now_ns, |message| *message = event);
         });
+    }
+}
+
+/// The ports of a controller that runs in one thread, with a given reading and given times.
+#[derive(Debug)]
+pub struct LoggedPorts<'a, S> {
+    log: &'a mut Log<S>,
+    times_ns: [u64; 3],
+    /// How often the time was asked for.
+    asked: Cell<usize>,
+    reading: Option<Reading>,
+    command: Option<Command>,
+}
+
+impl<'a, S> LoggedPorts<'a, S> {
+    /// The ports of a cycle with this reading, whose parts end at these times: reception, pose, command.
+    pub fn new(log: &'a mut Log<S>, times_ns: [u64; 3], reading: Option<&Reading>) -> Self {
+        Self { log, times_ns, asked: Cell::new(0), reading: reading.copied(), command: None }
+    }
+
+    /// The command that the controller published.
+    pub fn into_command(self) -> Option<Command> {
+        self.command
+    }
+
+    fn published_ns(&self) -> u64 {
+        self.times_ns[2]
+    }
+}
+
+impl<S: Sink> ControllerPorts for LoggedPorts<'_, S> {
+    type Reading = Reading;
+    type Error = Infallible;
+
+    fn now_ns(&self) -> u64 {
+        let asked = self.asked.replace(self.asked.get() + 1);
+        self.times_ns[asked.min(2)]
+    }
+
+    fn reading(&mut self, _: &Wake) -> Result<Option<Reading>, Infallible> {
+        Ok(self.reading.take())
+    }
+
+    fn publish_command(&mut self, fill: impl FnOnce(&mut Command)) -> Result<(), Infallible> {
+        self.command = Some(self.log.record(Publisher::Command, self.published_ns(), fill));
+        Ok(())
+    }
+
+    fn publish_state(&mut self, fill: impl FnOnce(&mut State)) -> Result<(), Infallible> {
+        self.log.record(Publisher::State, self.published_ns(), fill);
+        Ok(())
+    }
+
+    fn publish_signals(&mut self, fill: impl FnOnce(&mut Signals)) -> Result<(), Infallible> {
+        self.log.record(Publisher::Signals, self.published_ns(), fill);
+        Ok(())
+    }
+
+    fn publish_parameters(&mut self, fill: impl FnOnce(&mut Parameters)) -> Result<(), Infallible> {
+        self.log.record(Publisher::Parameters, self.published_ns(), fill);
+        Ok(())
+    }
+
+    fn publish_event(&mut self, event: &Event) -> Result<(), Infallible> {
+        self.log.record(Publisher::ControllerEvent, self.published_ns(), |message| *message = *event);
+        Ok(())
     }
 }

@@ -58,7 +58,18 @@ impl CLaw {
 impl PoseLaw for CLaw {
     fn command(&mut self, demand: &Demand) -> Result<Pose, LawFailed> {
         let mut asked = MasseterPose::from(&demand.ahead);
-        let demand = self.demand(demand);
+        let demand = MasseterDemand {
+            cycle: demand.cycle,
+            period_s: demand.period_s,
+            motion_time_s: demand.motion_time_s,
+            controller_state: demand.state.code(),
+            has_estimate: demand.estimated.is_some().into(),
+            desired: (&demand.desired).into(),
+            estimated: demand.estimated.as_ref().map(MasseterPose::from).unwrap_or_default(),
+            ahead: asked,
+            parameters: self.parameters.as_ptr(),
+            signals: self.signals.as_mut_ptr(),
+        };
         // SAFETY: the caller of masseter_run passes a function and its argument that are valid until it returns.
         let failed = unsafe { (self.function)(&raw const demand, &raw mut asked, self.user) };
         if failed == 0 { Ok(asked.into()) } else { Err(LawFailed) }
@@ -74,23 +85,6 @@ impl PoseLaw for CLaw {
 
     fn fill_signals(&self, signals: &mut [f64]) {
         signals.copy_from_slice(&self.signals);
-    }
-}
-
-impl CLaw {
-    fn demand(&mut self, demand: &Demand) -> MasseterDemand {
-        MasseterDemand {
-            cycle: demand.cycle,
-            period_s: demand.period_s,
-            motion_time_s: demand.motion_time_s,
-            controller_state: demand.state.code(),
-            has_estimate: demand.estimated.is_some().into(),
-            desired: (&demand.desired).into(),
-            estimated: demand.estimated.as_ref().map_or_else(MasseterPose::default, MasseterPose::from),
-            ahead: (&demand.ahead).into(),
-            parameters: self.parameters.as_ptr(),
-            signals: self.signals.as_mut_ptr(),
-        }
     }
 }
 

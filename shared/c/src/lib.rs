@@ -1,14 +1,16 @@
 //! The rig's interface for controllers in C and C++; `shared/interface/masseter.h` documents every function.
 //!
 //! Each function returns a result and keeps its message for [`masseter_error`]. No panic leaves this library: it becomes an
-//! error. A session belongs to the thread that attached.
+//! error. A session belongs to the thread that attached. A reference that may be absent is a pointer in C, which is null or
+//! valid for the call; a boxed session is one from [`masseter_attach`], which C does not use again.
 #![allow(unsafe_code, reason = "C passes pointers")]
 
 mod law;
-mod outcome;
 
 use std::borrow::Cow;
-use std::ffi::{CStr, c_char, c_int, c_void};
+use std::cell::RefCell;
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
 use masseter_controller::process;
@@ -19,7 +21,44 @@ use masseter_runtime::messages::{Command, Event, Reading, State};
 use masseter_runtime::named::{Declared, Parameter, PlayedMotion, Signal};
 
 use law::{CLaw, LawFunction};
-use outcome::{Failure, OK, SAFE_STOP, TIMED_OUT, guarded};
+
+const OK: c_int = 0;
+const TIMED_OUT: c_int = 1;
+const SAFE_STOP: c_int = 2;
+const ERROR: c_int = -1;
+
+const NULL: Failure = Failure::of("a pointer is null");
+
+thread_local! {
+    /// The message of the last error of the thread; empty before the first.
+    static MESSAGE: RefCell<CString> = RefCell::default();
+}
+
+/// Why a function failed.
+struct Failure(Cow<'static, str>);
+
+impl Failure {
+    const fn of(text: &'static str) -> Self {
+        Self(Cow::Borrowed(text))
+    }
+}
+
+impl<E: std::error::Error> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Self(Cow::Owned(error.to_string()))
+    }
+}
+
+/// The result of `work`. A panic is an error, since it must not unwind through C.
+fn guarded(work: impl FnOnce() -> Result<c_int, Failure>) -> c_int {
+    let Failure(text) = match catch_unwind(AssertUnwindSafe(work)) {
+        Ok(Ok(result)) => return result,
+        Ok(Err(failure)) => failure,
+        Err(_) => Failure::of("a fault of Masseter itself; standard error has its place"),
+    };
+    MESSAGE.set(CString::new(text.replace('\0', " ")).unwrap_or_default());
+    ERROR
+}
 
 /// An attached program.
 #[derive(Debug)]
@@ -51,7 +90,7 @@ impl MasseterSession {
     /// Adds to what is declared before the start; `add` returns how many there are then. Returns the place of the last.
     fn declare(&mut self, add: impl FnOnce(&mut Declared) -> usize) -> Result<c_int, Failure> {
         let Stage::Attached(_) = self.stage else {
-            return Err("the session is started: declare before".into());
+            return Err(Failure::of("the session is started: declare before"));
         };
         let mut declared = self.declared.clone();
         let count = add(&mut declared);
@@ -64,7 +103,7 @@ impl MasseterSession {
         match &mut self.stage {
             Stage::Started(session) => Ok(session),
             Stage::Attached(_) | Stage::Over => {
-                Err("the session is not started: call masseter_start first".into())
+                Err(Failure::of("the session is not started: call masseter_start first"))
             }
         }
     }
@@ -73,42 +112,34 @@ impl MasseterSession {
 /// The message of the last error in this thread; it lasts until the next call.
 #[unsafe(no_mangle)]
 pub extern "C" fn masseter_error() -> *const c_char {
-    outcome::message()
+    MESSAGE.with_borrow(|message| message.as_ptr())
 }
 
 /// Attaches to a rig.
 ///
 /// # Safety
-/// `rig` is null or a string; `session` is a valid pointer.
+/// `rig` is null or a string.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn masseter_attach(rig: *const c_char, session: *mut *mut MasseterSession) -> c_int {
+pub unsafe extern "C" fn masseter_attach(
+    rig: *const c_char,
+    session: Option<&mut *mut MasseterSession>,
+) -> c_int {
     guarded(|| {
-        // SAFETY: a string, by the contract of this function.
-        let rig = unsafe { text(rig) }?;
-        let context = attach(rig)?;
+        // SAFETY: as this function's.
+        let context = attach(unsafe { text_of(rig) }?)?;
         let period_ns = context.scenario.period_ns();
-        let attached = MasseterSession {
-            stage: Stage::Attached(Box::new(context)),
-            period_ns,
-            declared: Declared::default(),
-        };
-        // SAFETY: valid by the contract of this function.
-        unsafe { session.as_mut() }
-            .map(|session| *session = Box::into_raw(Box::new(attached)))
-            .ok_or(NULL)?;
+        let stage = Stage::Attached(Box::new(context));
+        let attached = MasseterSession { stage, period_ns, declared: Declared::default() };
+        *session.ok_or(NULL)? = Box::into_raw(Box::new(attached));
         Ok(OK)
     })
 }
 
 /// Opens the ports, reports ready, waits for the start.
-///
-/// # Safety
-/// `session` is null or from [`masseter_attach`].
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn masseter_start(session: *mut MasseterSession) -> c_int {
+pub extern "C" fn masseter_start(session: Option<&mut MasseterSession>) -> c_int {
     guarded(|| {
-        // SAFETY: as this function's.
-        let session = unsafe { session.as_mut() }.ok_or(NULL)?;
+        let session = session.ok_or(NULL)?;
         match std::mem::replace(&mut session.stage, Stage::Over) {
             Stage::Attached(context) => {
                 let declared = std::mem::take(&mut session.declared);
@@ -117,7 +148,7 @@ pub unsafe extern "C" fn masseter_start(session: *mut MasseterSession) -> c_int 
             }
             stage => {
                 session.stage = stage;
-                Err("the session is started already".into())
+                Err(Failure::of("the session is started already"))
             }
         }
     })
@@ -126,17 +157,17 @@ pub unsafe extern "C" fn masseter_start(session: *mut MasseterSession) -> c_int 
 /// Declares a signal; returns its place.
 ///
 /// # Safety
-/// `session` is null or from [`masseter_attach`]; the texts are null or strings.
+/// The texts are null or strings.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn masseter_declare_signal(
-    session: *mut MasseterSession,
+    session: Option<&mut MasseterSession>,
     name: *const c_char,
     unit: *const c_char,
     about: *const c_char,
 ) -> c_int {
     guarded(|| {
         // SAFETY: as this function's.
-        let (session, [name, unit, about]) = unsafe { (session.as_mut(), texts([name, unit, about])?) };
+        let [name, unit, about] = unsafe { texts([name, unit, about]) }?;
         session.ok_or(NULL)?.declare(|declared| {
             declared.signals.push(Signal { name, unit, about });
             declared.signals.len()
@@ -147,10 +178,10 @@ pub unsafe extern "C" fn masseter_declare_signal(
 /// Declares a parameter; returns its place.
 ///
 /// # Safety
-/// `session` is null or from [`masseter_attach`]; the texts are null or strings.
+/// The texts are null or strings.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn masseter_declare_parameter(
-    session: *mut MasseterSession,
+    session: Option<&mut MasseterSession>,
     name: *const c_char,
     unit: *const c_char,
     about: *const c_char,
@@ -160,7 +191,7 @@ pub unsafe extern "C" fn masseter_declare_parameter(
 ) -> c_int {
     guarded(|| {
         // SAFETY: as this function's.
-        let (session, [name, unit, about]) = unsafe { (session.as_mut(), texts([name, unit, about])?) };
+        let [name, unit, about] = unsafe { texts([name, unit, about]) }?;
         session.ok_or(NULL)?.declare(|declared| {
             declared.parameters.push(Parameter { name, unit, about, value, range: [least, most] });
             declared.parameters.len()
@@ -169,15 +200,10 @@ pub unsafe extern "C" fn masseter_declare_parameter(
 }
 
 /// Declares that the controller plays a motion of its own, not the scenario's.
-///
-/// # Safety
-/// `session` is null or from [`masseter_attach`].
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn masseter_declare_own_motion(session: *mut MasseterSession) -> c_int {
+pub extern "C" fn masseter_declare_own_motion(session: Option<&mut MasseterSession>) -> c_int {
     guarded(|| {
-        // SAFETY: as this function's.
-        let session = unsafe { session.as_mut() }.ok_or(NULL)?;
-        session.declare(|declared| {
+        session.ok_or(NULL)?.declare(|declared| {
             declared.motion = PlayedMotion::Own;
             1
         })
@@ -185,34 +211,22 @@ pub unsafe extern "C" fn masseter_declare_own_motion(session: *mut MasseterSessi
 }
 
 /// A parameter in force; no number for a place without a parameter, and before the start.
-///
-/// # Safety
-/// `session` is null or from [`masseter_attach`].
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn masseter_parameter(session: *const MasseterSession, parameter: c_int) -> f64 {
-    // SAFETY: as this function's.
-    let session = unsafe { session.as_ref() };
+pub extern "C" fn masseter_parameter(session: Option<&MasseterSession>, parameter: c_int) -> f64 {
+    let Some(Stage::Started(session)) = session.map(|session| &session.stage) else { return f64::NAN };
     let place = usize::try_from(parameter).ok();
-    let value = session.zip(place).and_then(|(session, place)| match &session.stage {
-        Stage::Started(session) => session.parameters().get(place).copied(),
-        Stage::Attached(_) | Stage::Over => None,
-    });
-    value.unwrap_or(f64::NAN)
+    place.and_then(|place| session.parameters().get(place).copied()).unwrap_or(f64::NAN)
 }
 
 /// Gives a signal its value of this cycle.
-///
-/// # Safety
-/// `session` is null or from [`masseter_attach`].
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn masseter_set_signal(
-    session: *mut MasseterSession,
+pub extern "C" fn masseter_set_signal(
+    session: Option<&mut MasseterSession>,
     signal: c_int,
     value: f64,
 ) -> c_int {
     guarded(|| {
-        // SAFETY: as this function's.
-        let session = unsafe { session.as_mut() }.ok_or(NULL)?.started()?;
+        let session = session.ok_or(NULL)?.started()?;
         let place = usize::try_from(signal).ok().and_then(|place| session.signals_mut().get_mut(place));
         *place.ok_or(Failure::of("no signal of this place is declared"))? = value;
         Ok(OK)
@@ -220,29 +234,20 @@ pub unsafe extern "C" fn masseter_set_signal(
 }
 
 /// Time from one cycle to the next, ns; 0 without a session.
-///
-/// # Safety
-/// `session` is null or from [`masseter_attach`].
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn masseter_period_ns(session: *const MasseterSession) -> u64 {
-    // SAFETY: as this function's.
-    unsafe { session.as_ref() }.map_or(0, |session| session.period_ns)
+pub extern "C" fn masseter_period_ns(session: Option<&MasseterSession>) -> u64 {
+    session.map_or(0, |session| session.period_ns)
 }
 
 /// Waits for the next cycle.
-///
-/// # Safety
-/// `session` is null or from [`masseter_attach`]; `cycle` and `reading` are valid pointers.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn masseter_wait(
-    session: *mut MasseterSession,
+pub extern "C" fn masseter_wait(
+    session: Option<&mut MasseterSession>,
     timeout_ns: i64,
-    cycle: *mut MasseterCycle,
-    reading: *mut Reading,
+    cycle: Option<&mut MasseterCycle>,
+    reading: Option<&mut Reading>,
 ) -> c_int {
     guarded(|| {
-        // SAFETY: as this function's.
-        let (session, cycle, reading) = unsafe { (session.as_mut(), cycle.as_mut(), reading.as_mut()) };
         let session = session.ok_or(NULL)?.started()?;
         let (cycle, reading) = (cycle.ok_or(NULL)?, reading.ok_or(NULL)?);
         let timeout = u64::try_from(timeout_ns).ok().map(Duration::from_nanos);
@@ -257,45 +262,34 @@ pub unsafe extern "C" fn masseter_wait(
 }
 
 /// Publishes this cycle's command and state.
-///
-/// # Safety
-/// `session` is null or from [`masseter_attach`]; `command` and `state` are valid.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn masseter_publish(
-    session: *mut MasseterSession,
-    command: *const Command,
-    state: *const State,
+pub extern "C" fn masseter_publish(
+    session: Option<&mut MasseterSession>,
+    command: Option<&Command>,
+    state: Option<&State>,
 ) -> c_int {
     guarded(|| {
-        // SAFETY: as this function's.
-        let (session, command, state) = unsafe { (session.as_mut(), command.as_ref(), state.as_ref()) };
         session.ok_or(NULL)?.started()?.publish(command.ok_or(NULL)?, state.ok_or(NULL)?)?;
         Ok(OK)
     })
 }
 
 /// Publishes an event.
-///
-/// # Safety
-/// `session` is null or from [`masseter_attach`]; `event` is valid.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn masseter_publish_event(session: *mut MasseterSession, event: *const Event) -> c_int {
+pub extern "C" fn masseter_publish_event(
+    session: Option<&mut MasseterSession>,
+    event: Option<&Event>,
+) -> c_int {
     guarded(|| {
-        // SAFETY: as this function's.
-        let (session, event) = unsafe { (session.as_mut(), event.as_ref()) };
         session.ok_or(NULL)?.started()?.publish_event(event.ok_or(NULL)?)?;
         Ok(OK)
     })
 }
 
 /// 1 once the rig wants an orderly end.
-///
-/// # Safety
-/// `session` is null or from [`masseter_attach`].
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn masseter_is_stop_requested(session: *const MasseterSession) -> c_int {
-    // SAFETY: as this function's.
-    match unsafe { session.as_ref() }.map(|session| &session.stage) {
+pub extern "C" fn masseter_is_stop_requested(session: Option<&MasseterSession>) -> c_int {
+    match session.map(|session| &session.stage) {
         Some(Stage::Started(session)) => c_int::from(session.is_stop_requested()),
         Some(Stage::Attached(context)) => c_int::from(context.stop.is_made()),
         Some(Stage::Over) | None => 1,
@@ -303,30 +297,28 @@ pub unsafe extern "C" fn masseter_is_stop_requested(session: *const MasseterSess
 }
 
 /// Ends the work in order, and frees the session.
-///
-/// # Safety
-/// `session` is null or from [`masseter_attach`], and not used again.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn masseter_finish(session: *mut MasseterSession, is_safe_stop: c_int) -> c_int {
+pub extern "C" fn masseter_finish(session: Option<Box<MasseterSession>>, is_safe_stop: c_int) -> c_int {
     let outcome = if is_safe_stop == 0 { Outcome::Finished } else { Outcome::SafeStop };
-    // SAFETY: as this function's.
-    guarded(|| match unsafe { owned(session) }?.stage {
+    guarded(|| match session.ok_or(NULL)?.stage {
         Stage::Started(session) => Ok(session.finish(outcome).map(|()| OK)?),
-        Stage::Attached(_) | Stage::Over => Err("the session is not started".into()),
+        Stage::Attached(_) | Stage::Over => Err(Failure::of("the session is not started")),
     })
 }
 
 /// Ends the work with a reason, and frees the session.
 ///
 /// # Safety
-/// `session` is null or from [`masseter_attach`], and not used again; `reason` is null or a string.
+/// `reason` is null or a string.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn masseter_fail(session: *mut MasseterSession, reason: *const c_char) -> c_int {
+pub unsafe extern "C" fn masseter_fail(
+    session: Option<Box<MasseterSession>>,
+    reason: *const c_char,
+) -> c_int {
     guarded(|| {
-        // SAFETY: as this function's.
-        let (session, reason) = unsafe { (owned(session)?, lossy(reason)) };
-        if let Stage::Started(session) = session.stage {
-            session.fail(&reason)?;
+        if let Stage::Started(session) = session.ok_or(NULL)?.stage {
+            // SAFETY: as this function's.
+            session.fail(&unsafe { reason_of(reason) })?;
         }
         Ok(OK)
     })
@@ -335,34 +327,25 @@ pub unsafe extern "C" fn masseter_fail(session: *mut MasseterSession, reason: *c
 /// Runs the rig's own controller with a pose law, to its end, and frees the session.
 ///
 /// # Safety
-/// `session` is null or from [`masseter_attach`], and not used again; `law` may be called with `user` until this returns.
+/// `law` may be called with `user` until this returns.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn masseter_run(
-    session: *mut MasseterSession,
+    session: Option<Box<MasseterSession>>,
     law: Option<LawFunction>,
     user: *mut c_void,
 ) -> c_int {
     guarded(|| {
-        // SAFETY: as this function's.
-        let session = unsafe { owned(session) }?;
+        let session = session.ok_or(NULL)?;
         let law = CLaw::new(law.ok_or(NULL)?, user, session.declared);
         let Stage::Attached(context) = session.stage else {
-            return Err("the session is started already: call masseter_run instead of masseter_start".into());
+            let remedy = "the session is started already: call masseter_run instead of masseter_start";
+            return Err(Failure::of(remedy));
         };
         Ok(match process::run_with_law(*context, Box::new(law))? {
             Outcome::Finished => OK,
             Outcome::SafeStop => SAFE_STOP,
         })
     })
-}
-
-const NULL: Failure = Failure::of("a pointer is null");
-
-/// # Safety
-/// `session` is null or from [`masseter_attach`], and not used again.
-unsafe fn owned(session: *mut MasseterSession) -> Result<MasseterSession, Failure> {
-    // SAFETY: made by Box::into_raw, by the contract of this function.
-    if session.is_null() { Err(NULL) } else { Ok(*unsafe { Box::from_raw(session) }) }
 }
 
 /// Three strings of C; empty ones for null.
@@ -373,7 +356,7 @@ unsafe fn texts(given: [*const c_char; 3]) -> Result<[String; 3], Failure> {
     let mut texts = [const { String::new() }; 3];
     for (text, given) in texts.iter_mut().zip(given) {
         // SAFETY: as this function's.
-        unsafe { self::text(given) }?.unwrap_or_default().clone_into(text);
+        unsafe { text_of(given) }?.unwrap_or_default().clone_into(text);
     }
     Ok(texts)
 }
@@ -382,7 +365,7 @@ unsafe fn texts(given: [*const c_char; 3]) -> Result<[String; 3], Failure> {
 ///
 /// # Safety
 /// `text` is null or ends with a zero.
-unsafe fn text<'a>(text: *const c_char) -> Result<Option<&'a str>, Failure> {
+unsafe fn text_of<'a>(text: *const c_char) -> Result<Option<&'a str>, Failure> {
     if text.is_null() {
         return Ok(None);
     }
@@ -395,7 +378,7 @@ unsafe fn text<'a>(text: *const c_char) -> Result<Option<&'a str>, Failure> {
 ///
 /// # Safety
 /// `text` is null or ends with a zero.
-unsafe fn lossy<'a>(text: *const c_char) -> Cow<'a, str> {
+unsafe fn reason_of<'a>(text: *const c_char) -> Cow<'a, str> {
     if text.is_null() {
         return "no reason is given".into();
     }
@@ -411,9 +394,9 @@ mod tests {
     fn a_reason_that_is_no_utf_8_is_a_reason_all_the_same() {
         for (given, expected) in [(c"over", "over"), (c"\xff over", "\u{fffd} over"), (c"", "")] {
             // SAFETY: strings of C.
-            assert_eq!(unsafe { lossy(given.as_ptr()) }, expected);
+            assert_eq!(unsafe { reason_of(given.as_ptr()) }, expected);
         }
         // SAFETY: null is allowed.
-        assert_eq!(unsafe { lossy(std::ptr::null()) }, "no reason is given");
+        assert_eq!(unsafe { reason_of(std::ptr::null()) }, "no reason is given");
     }
 }

@@ -36,7 +36,7 @@ impl Drive {
                 Ok(read(SdoRequest::decode(frame.data())?).map(|answer| answer.frame(node)))
             }
             Cob::Rpdo1(node) if node == self.node => {
-                self.take(Rpdo1::decode(frame.data(), &PdoMapping::RPDO1)?);
+                self.apply_process_data(Rpdo1::decode(frame.data(), &PdoMapping::RPDO1)?);
                 Ok(None)
             }
             _ => Ok(None),
@@ -48,7 +48,7 @@ impl Drive {
         Tpdo1 { statusword, actual_increments: self.increments, torque_permille: 0 }
     }
 
-    fn take(&mut self, Rpdo1 { controlword, target_increments, .. }: Rpdo1) {
+    fn apply_process_data(&mut self, Rpdo1 { controlword, target_increments, .. }: Rpdo1) {
         self.state = self.state.after(controlword.command(self.controlword, self.state));
         self.controlword = controlword;
         if self.state == DriveState::OperationEnabled {

@@ -6,7 +6,7 @@
 
 use std::io;
 
-use super::frame::Frame;
+use crate::frame::Frame;
 
 /// One node's port onto a wire.
 pub trait Bus {

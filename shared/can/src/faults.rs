@@ -9,8 +9,7 @@ use std::ops::Range;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg32;
 
-use super::frame::Frame;
-use super::id::CanId;
+use crate::frame::{CanId, Frame};
 
 /// What a fault does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,14 +75,14 @@ pub struct FaultNote {
 
 /// A frame with the number by which faults select frames.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct NumberedFrame {
+pub(crate) struct NumberedFrame {
     /// Time at which a fault would act on the frame, ns.
-    pub(super) at_ns: u64,
+    pub(crate) at_ns: u64,
     /// The port concerned.
-    pub(super) port: usize,
-    pub(super) id: CanId,
+    pub(crate) port: usize,
+    pub(crate) id: CanId,
     /// Unique among the frames of the same query.
-    pub(super) number: u64,
+    pub(crate) number: u64,
 }
 
 /// The faults of one bus, and their activations so far.
@@ -156,36 +155,36 @@ impl Faults {
     }
 
     /// Sets when a fault acts, where that is known only later. A number of none of these faults has no effect.
-    pub(super) fn set_window(&mut self, number: usize, window_ns: Range<u64>) {
+    pub(crate) fn set_window(&mut self, number: usize, window_ns: Range<u64>) {
         for listed in self.list.iter_mut().filter(|listed| listed.fault.number == number) {
             (listed.fault.from_ns, listed.fault.until_ns) = (window_ns.start, window_ns.end);
         }
     }
 
     /// Whether there are none.
-    pub(super) fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.list.is_empty()
     }
 
     /// The fault that destroys a frame.
-    pub(super) fn corrupts(&self, frame: NumberedFrame) -> Option<FaultActivation> {
+    pub(crate) fn corrupts(&self, frame: NumberedFrame) -> Option<FaultActivation> {
         self.on_frame(frame, |kind| kind == FaultKind::Corrupt)
     }
 
     /// The fault that makes a transmitter send the frame twice.
-    pub(super) fn duplicates(&self, frame: NumberedFrame) -> Option<FaultActivation> {
+    pub(crate) fn duplicates(&self, frame: NumberedFrame) -> Option<FaultActivation> {
         self.on_frame(frame, |kind| kind == FaultKind::Duplicate)
     }
 
     /// The fault that holds a frame back, and for how long, ns.
-    pub(super) fn delays(&self, frame: NumberedFrame) -> Option<(FaultActivation, u64)> {
+    pub(crate) fn delays(&self, frame: NumberedFrame) -> Option<(FaultActivation, u64)> {
         let activation = self.on_frame(frame, |kind| matches!(kind, FaultKind::Delay { .. }))?;
         let FaultKind::Delay { by_ns } = self.list[activation.place].fault.kind else { return None };
         Some((activation, by_ns))
     }
 
     /// Whether a fault makes the receiving port lose the frame. The activation is recorded.
-    pub(super) fn loses(&mut self, frame: NumberedFrame) -> bool {
+    pub(crate) fn loses(&mut self, frame: NumberedFrame) -> bool {
         let activation = self.on_frame(frame, |kind| kind == FaultKind::Lose);
         activation.inspect(|&activation| self.record(activation)).is_some()
     }
@@ -204,14 +203,14 @@ impl Faults {
     }
 
     /// A number from 0 to `below` − 1 for a fault and a frame.
-    pub(super) fn pick(&self, activation: FaultActivation, number: u64, below: u32) -> u32 {
+    pub(crate) fn pick(&self, activation: FaultActivation, number: u64, below: u32) -> u32 {
         let mut chance = self.chance(activation.place, number);
         let _: f64 = chance.random();
         chance.random_range(0..below.max(1))
     }
 
     /// Whether a node is disconnected at that time.
-    pub(super) fn is_disconnected(&self, now_ns: u64, port: usize) -> bool {
+    pub(crate) fn is_disconnected(&self, now_ns: u64, port: usize) -> bool {
         self.disconnection(now_ns, port).is_some()
     }
 
@@ -220,12 +219,12 @@ impl Faults {
     }
 
     /// The fault that puts a node into bus-off at that time.
-    pub(super) fn puts_off(&self, now_ns: u64, port: usize) -> Option<FaultActivation> {
+    pub(crate) fn puts_off(&self, now_ns: u64, port: usize) -> Option<FaultActivation> {
         self.on_node(now_ns, port, |kind| kind == FaultKind::BusOff)
     }
 
     /// The fault that makes a node babble at that time, and the babbled frame.
-    pub(super) fn makes_babble(&self, now_ns: u64, port: usize) -> Option<(FaultActivation, Frame)> {
+    pub(crate) fn makes_babble(&self, now_ns: u64, port: usize) -> Option<(FaultActivation, Frame)> {
         let activation = self.on_node(now_ns, port, |kind| matches!(kind, FaultKind::Babble { .. }))?;
         let FaultKind::Babble { frame } = self.list[activation.place].fault.kind else { return None };
         Some((activation, frame))
@@ -246,7 +245,7 @@ impl Faults {
 
     /// The first time from `from_ns` on at which the node is connected.
     #[inline]
-    pub(super) fn connected_from_ns(&self, from_ns: u64, port: usize) -> u64 {
+    pub(crate) fn connected_from_ns(&self, from_ns: u64, port: usize) -> u64 {
         let mut connected_ns = from_ns;
         // Each turn leaves one disconnection behind.
         while let Some(off) = self.disconnection(connected_ns, port) {
@@ -257,7 +256,7 @@ impl Faults {
 
     /// The next time at which a fault makes a node babble; the node can send from `able_ns` on.
     #[inline]
-    pub(super) fn babbles_from_ns(&self, able_ns: u64, port: usize) -> Option<u64> {
+    pub(crate) fn babbles_from_ns(&self, able_ns: u64, port: usize) -> Option<u64> {
         self.unless_empty(|list| {
             let babbles = of_port(list, port, |kind| matches!(kind, FaultKind::Babble { .. }));
             let starts_ns = babbles.filter_map(|(_, listed)| {
@@ -269,14 +268,14 @@ impl Faults {
     }
 
     /// Records an activation.
-    pub(super) fn record(&mut self, activation: FaultActivation) {
+    pub(crate) fn record(&mut self, activation: FaultActivation) {
         let listed = &mut self.list[activation.place];
         listed.began_ns.get_or_insert(activation.at_ns);
         listed.activations += 1;
     }
 
     /// The next forced bus-off of a node that is on the bus from `from_ns` on.
-    pub(super) fn next_bus_off(&self, from_ns: u64, port: usize) -> Option<FaultActivation> {
+    pub(crate) fn next_bus_off(&self, from_ns: u64, port: usize) -> Option<FaultActivation> {
         let bus_offs = of_port(&self.list, port, |kind| kind == FaultKind::BusOff);
         let next = bus_offs.filter_map(|(place, listed)| {
             let at_ns = listed.fault.from_ns.max(from_ns);
@@ -286,7 +285,7 @@ impl Faults {
     }
 
     /// Marks disconnections as begun. The frames they suppress are not counted.
-    pub(super) fn begin_disconnections(&mut self, now_ns: u64) {
+    pub(crate) fn begin_disconnections(&mut self, now_ns: u64) {
         let off = self.list.iter_mut().filter(|listed| listed.fault.kind == FaultKind::Disconnect);
         for listed in off.filter(|listed| listed.fault.from_ns <= now_ns && listed.fault.count > 0) {
             listed.began_ns.get_or_insert(listed.fault.from_ns);
@@ -343,10 +342,10 @@ fn of_port(
 
 /// A fault that acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct FaultActivation {
+pub(crate) struct FaultActivation {
     /// Place of the fault in the list.
-    pub(super) place: usize,
-    pub(super) at_ns: u64,
+    pub(crate) place: usize,
+    pub(crate) at_ns: u64,
 }
 
 #[cfg(test)]

@@ -1,11 +1,126 @@
-//! Data frames of classical CAN, valid by construction.
+//! Data frames of classical CAN and their identifiers, valid by construction.
 //!
-//! Remote frames are not represented. [`ErrorReport`](super::ErrorReport) represents an error frame.
+//! Remote frames are not represented. [`ErrorReport`](crate::ErrorReport) represents an error frame.
 
 use std::fmt;
 
-use super::frame_error::FrameError;
-use super::id::CanId;
+const STANDARD_MAX: u32 = 0x7FF;
+const EXTENDED_MAX: u32 = 0x1FFF_FFFF;
+const EXTENSION_BITS: u32 = 18;
+const EXTENSION_MASK: u32 = (1 << EXTENSION_BITS) - 1;
+const IDE: u32 = 1 << EXTENSION_BITS;
+const EXTENDED_FLAG: u32 = 1 << 31;
+
+/// A frame identifier: 11 bits (standard) or 29 bits (extended).
+///
+/// The order is that of bus arbitration (ISO 11898-1): the smaller identifier wins.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct CanId {
+    /// The arbitration field as it goes over the wire, without RTR: 11 bits of base, IDE, 18 bits of
+    /// extension. Dominant is 0, so comparing these numbers is arbitrating.
+    arbitration: u32,
+}
+
+impl CanId {
+    /// An 11-bit identifier.
+    ///
+    /// # Errors
+    /// [`FrameError::StandardId`] above 7FFh.
+    pub const fn standard(id: u16) -> Result<Self, FrameError> {
+        let id = id as u32;
+        if id > STANDARD_MAX {
+            return Err(FrameError::StandardId { id });
+        }
+        Ok(Self { arbitration: id << (EXTENSION_BITS + 1) })
+    }
+
+    /// A 29-bit identifier.
+    ///
+    /// # Errors
+    /// [`FrameError::ExtendedId`] above 1FFFFFFFh.
+    pub const fn extended(id: u32) -> Result<Self, FrameError> {
+        if id > EXTENDED_MAX {
+            return Err(FrameError::ExtendedId { id });
+        }
+        let base = id >> EXTENSION_BITS;
+        Ok(Self { arbitration: base << (EXTENSION_BITS + 1) | IDE | id & EXTENSION_MASK })
+    }
+
+    /// From the form of `SocketCAN`: bit 31 is set for a 29-bit identifier.
+    ///
+    /// # Errors
+    /// [`FrameError`] where the number is too large. The flags of remote and error frames (bits 30 and 29) are
+    /// refused in this way too.
+    pub const fn from_flagged(flagged: u32) -> Result<Self, FrameError> {
+        match flagged {
+            ..=STANDARD_MAX => Self::standard(flagged as u16),
+            EXTENDED_FLAG.. => Self::extended(flagged & !EXTENDED_FLAG),
+            _ => Err(FrameError::StandardId { id: flagged }),
+        }
+    }
+
+    /// The identifier with bit 31 set for a 29-bit one.
+    pub const fn flagged(self) -> u32 {
+        if self.is_extended() { self.number() | EXTENDED_FLAG } else { self.number() }
+    }
+
+    /// Whether it has 29 bits.
+    pub const fn is_extended(self) -> bool {
+        self.arbitration & IDE != 0
+    }
+
+    /// The identifier's number, 11 or 29 bits.
+    pub const fn number(self) -> u32 {
+        if self.is_extended() { self.base() << EXTENSION_BITS | self.extension() } else { self.base() }
+    }
+
+    /// The first 11 bits on the wire.
+    pub(crate) const fn base(self) -> u32 {
+        self.arbitration >> (EXTENSION_BITS + 1)
+    }
+
+    /// The last 18 bits of a 29-bit identifier.
+    pub(crate) const fn extension(self) -> u32 {
+        self.arbitration & EXTENSION_MASK
+    }
+}
+
+impl fmt::Display for CanId {
+    /// The form of candump: 3 hexadecimal digits, or 8 for a 29-bit identifier.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let digits = if self.is_extended() { 8 } else { 3 };
+        write!(f, "{:0digits$X}", self.number())
+    }
+}
+
+impl fmt::Debug for CanId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "CanId({self})")
+    }
+}
+
+/// An identifier or a frame that CAN cannot carry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum FrameError {
+    /// More than 11 bits in a standard identifier.
+    #[error("identifier {id:X}h does not fit into 11 bits (at most 7FFh)")]
+    StandardId {
+        /// The identifier asked for.
+        id: u32,
+    },
+    /// More than 29 bits in an extended identifier.
+    #[error("identifier {id:X}h does not fit into 29 bits (at most 1FFFFFFFh)")]
+    ExtendedId {
+        /// The identifier asked for.
+        id: u32,
+    },
+    /// More data than a classical frame carries.
+    #[error("{length} data bytes: a classical frame carries at most 8")]
+    DataLength {
+        /// Bytes asked for.
+        length: usize,
+    },
+}
 
 /// A data frame.
 ///
@@ -93,64 +208,4 @@ impl fmt::Debug for Frame {
 }
 
 #[cfg(test)]
-pub(super) mod strategies {
-    use super::super::id::strategies::any_id;
-    use super::*;
-    use proptest::prelude::*;
-
-    /// Also of the runs of equal bits that are stuffed most.
-    pub(crate) fn any_frame() -> impl Strategy<Value = Frame> {
-        let byte = prop_oneof![Just(0_u8), Just(0xFF), any::<u8>()];
-        (any_id(), prop::collection::vec(byte, 0..=Frame::MAX_DATA))
-            .prop_map(|(id, data)| Frame::new(id, &data).unwrap())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::strategies::any_frame;
-    use super::*;
-    use proptest::prelude::*;
-
-    fn id() -> CanId {
-        CanId::standard(0x123).unwrap()
-    }
-
-    #[test]
-    fn a_frame_carries_at_most_eight_bytes() {
-        for length in 0..=9 {
-            let frame = Frame::new(id(), &vec![1; length]).map(|frame| frame.data().len());
-            assert_eq!(frame, if length <= 8 { Ok(length) } else { Err(FrameError::DataLength { length }) });
-        }
-        assert_eq!(
-            FrameError::DataLength { length: 9 }.to_string(),
-            "9 data bytes: a classical frame carries at most 8"
-        );
-    }
-
-    #[test]
-    fn bytes_behind_the_length_are_no_data() {
-        for length in 0..=9 {
-            let frame = Frame::of_padded(id(), length, [0xA5; 8]);
-            let expected = if length <= 8 {
-                Frame::new(id(), &vec![0xA5; length])
-            } else {
-                Err(FrameError::DataLength { length })
-            };
-            assert_eq!(frame, expected);
-        }
-    }
-
-    #[test]
-    fn frames_show_as_in_a_candump_log() {
-        assert_eq!(Frame::fixed(id(), [0x11, 0x22]).to_string(), "123#1122");
-        assert_eq!(Frame::fixed(CanId::extended(0x123).unwrap(), []).to_string(), "00000123#");
-    }
-
-    proptest! {
-        #[test]
-        fn a_frame_keeps_what_it_was_made_of(frame in any_frame()) {
-            prop_assert_eq!(Frame::new(frame.id(), frame.data()), Ok(frame));
-        }
-    }
-}
+pub(crate) mod tests;

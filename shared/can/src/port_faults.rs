@@ -6,9 +6,8 @@
 
 use std::ops::Range;
 
-use crate::bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
 use crate::faults::{Fault, FaultKind, FaultNote, Faults, NumberedFrame};
-use crate::frame::Frame;
+use crate::{Bus, BusStatus, ErrorState, Frame, ReceiveError, Received, SendError};
 
 /// Frames that may be held back at one time.
 const HELD: usize = 64;
@@ -141,7 +140,11 @@ impl PortFaults {
 
     /// Whether the node is off the bus or disconnected at that time.
     fn is_cut_off(&mut self, now_ns: u64) -> bool {
-        self.restart_when_due(now_ns);
+        if let (Some(since_ns), Some(after_ns)) = (self.off_since_ns, self.restart_after_ns)
+            && now_ns >= since_ns.saturating_add(after_ns)
+        {
+            self.off_since_ns = None;
+        }
         self.faults.begin_disconnections(now_ns);
         if self.off_since_ns.is_none()
             && let Some(activation) = self.faults.puts_off(now_ns, self.port)
@@ -153,14 +156,6 @@ impl PortFaults {
         self.off_since_ns.is_some() || self.faults.is_disconnected(now_ns, self.port)
     }
 
-    fn restart_when_due(&mut self, now_ns: u64) {
-        if let (Some(since_ns), Some(after_ns)) = (self.off_since_ns, self.restart_after_ns)
-            && now_ns >= since_ns.saturating_add(after_ns)
-        {
-            self.off_since_ns = None;
-        }
-    }
-
     /// A frame that the node babbles at that time.
     fn babbled(&mut self, now_ns: u64) -> Option<Frame> {
         let (activation, frame) = self.faults.makes_babble(now_ns, self.port)?;
@@ -169,7 +164,7 @@ impl PortFaults {
     }
 
     /// The next frame that was held back until then.
-    fn due(&mut self, now_ns: u64) -> Option<Frame> {
+    fn release_held(&mut self, now_ns: u64) -> Option<Frame> {
         let due = self.held.iter().position(|held| held.due_ns <= now_ns)?;
         Some(self.held.remove(due).frame)
     }
@@ -186,7 +181,7 @@ impl<B: Bus> Faulty<'_, B> {
     /// Sends babbled and delayed frames. A frame that the port refuses is lost.
     fn send_own(&mut self, now_ns: u64) {
         let babbled = self.faults.babbled(now_ns);
-        for frame in babbled.into_iter().chain(std::iter::from_fn(|| self.faults.due(now_ns))) {
+        for frame in babbled.into_iter().chain(std::iter::from_fn(|| self.faults.release_held(now_ns))) {
             let _ = self.bus.send(now_ns, frame);
         }
     }
@@ -195,13 +190,11 @@ impl<B: Bus> Faulty<'_, B> {
 impl<B: Bus> Bus for Faulty<'_, B> {
     fn send(&mut self, now_ns: u64, frame: Frame) -> Result<(), SendError> {
         if self.faults.is_cut_off(now_ns) {
+            if self.faults.off_since_ns.is_some() {
+                return Err(SendError::BusOff { tec: OFF_TEC });
+            }
             // A disconnected controller keeps a frame until its queue is full; here it is full at once.
-            let refused = SendError::QueueFull { capacity: 0 };
-            return Err(if self.faults.off_since_ns.is_some() {
-                SendError::BusOff { tec: OFF_TEC }
-            } else {
-                refused
-            });
+            return Err(SendError::QueueFull { capacity: 0 });
         }
         self.send_own(now_ns);
         let number = self.faults.sent;

@@ -8,10 +8,7 @@
 
 use std::fmt::{self, Write};
 
-use super::bus::Received;
-use super::frame::Frame;
-use super::frame_error::FrameError;
-use super::id::CanId;
+use crate::{CanId, Frame, FrameError, Received};
 
 /// The first message of the server.
 pub const GREETING: &str = "< hi >";
@@ -116,20 +113,17 @@ impl Requests {
             };
             let bytes: Vec<u8> = self.pending.drain(..=end).collect();
             if !std::mem::take(&mut self.is_overlong) {
-                return Some(read(&bytes[..end]));
+                return Some(parse_request(&bytes[..end]));
             }
         }
     }
 }
 
 /// A request from the bytes up to its closing bracket.
-fn read(bytes: &[u8]) -> Result<Request, RequestError> {
+fn parse_request(bytes: &[u8]) -> Result<Request, RequestError> {
     let text = str::from_utf8(bytes).ok();
     let text = text.and_then(|text| text.trim_start().strip_prefix('<')).ok_or(RequestError::Stray)?;
-    parse(text.trim())
-}
-
-fn parse(text: &str) -> Result<Request, RequestError> {
+    let text = text.trim();
     let words: Vec<&str> = text.split_whitespace().collect();
     match words[..] {
         ["open", bus] => Ok(Request::Open(bus.to_owned())),
@@ -181,8 +175,8 @@ pub fn write_frame(out: &mut impl Write, received: &Received) -> fmt::Result {
 
 #[cfg(test)]
 mod tests {
-    use super::super::frame::strategies::any_frame;
     use super::*;
+    use crate::frame::tests::any_frame;
     use proptest::prelude::*;
 
     fn requests(text: &str) -> Vec<Result<Request, RequestError>> {

@@ -1,8 +1,12 @@
-//! Frames and error reports of a tap on a bus, each with its time.
+//! What a tap on a bus sees: frames and errors, each with its time; and the lines of their log.
+//!
+//! The coding of errors is that of `SocketCAN`'s error messages (`linux/can/error.h`): identifier flag 2000_0000h with the
+//! class, details in the data bytes, error counters in bytes 6 and 7. Byte 5, which the kernel leaves to the driver, holds
+//! the port. Overload frames, lost arbitration and line faults are not represented.
 
-use super::bus::Received;
-use super::error_frame::ErrorReport;
-use super::frame::Frame;
+use libc::{CAN_ERR_ACK, CAN_ERR_BUSERROR, CAN_ERR_BUSOFF, CAN_ERR_CNT, CAN_ERR_CRTL, CAN_ERR_PROT};
+
+use crate::{BusStatus, ErrorState, Frame, Received};
 
 /// An observation of a tap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,5 +49,180 @@ impl Tapped {
             Self::Frame(tapped) => Some(tapped),
             Self::Error(_) => None,
         }
+    }
+}
+
+/// Identifier flag of an error message.
+pub const ERROR_FLAG: u32 = 1 << 29;
+
+const RECEIVE_PASSIVE: u8 = 0x10;
+const TRANSMIT_PASSIVE: u8 = 0x20;
+const ACTIVE: u8 = 0x40;
+const BIT_ERROR_IN_TRANSMISSION: u8 = 0x81;
+
+/// The kind of an error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ErrorKind {
+    /// A frame was destroyed by an error frame.
+    Bit,
+    /// No node acknowledged a frame, which ended in an error frame.
+    Acknowledge,
+    /// A controller changed its error state.
+    State(ErrorState),
+}
+
+/// An error as a tap reports it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ErrorReport {
+    /// Time of the error: the end of an error frame's delimiter, or the change of state, ns.
+    pub time_ns: u64,
+    /// The port: of the transmitter, or of the controller whose state changed.
+    pub port: u8,
+    /// The kind of the error.
+    pub kind: ErrorKind,
+    /// Transmit error counter after the error, at most 255.
+    pub tec: u8,
+    /// Receive error counter after the error.
+    pub rec: u8,
+}
+
+/// An error message of an unsupported class.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("error message {id:X}h is of an unsupported class")]
+pub struct ErrorReportError {
+    /// The identifier with its flag.
+    pub id: u32,
+}
+
+impl ErrorReport {
+    /// A report on a port of that status.
+    pub fn new(time_ns: u64, port: u8, kind: ErrorKind, status: BusStatus) -> Self {
+        let byte = |counter: u16| counter.min(u16::from(u8::MAX)) as u8;
+        Self { time_ns, port, kind, tec: byte(status.tec), rec: byte(status.rec) }
+    }
+
+    /// Identifier with flag, and data bytes.
+    pub fn encode(&self) -> (u32, [u8; 8]) {
+        let (class, controller, protocol) = match self.kind {
+            ErrorKind::Bit => (CAN_ERR_PROT | CAN_ERR_BUSERROR, 0, BIT_ERROR_IN_TRANSMISSION),
+            ErrorKind::Acknowledge => (CAN_ERR_ACK | CAN_ERR_BUSERROR, 0, 0),
+            ErrorKind::State(ErrorState::Active) => (CAN_ERR_CRTL, ACTIVE, 0),
+            ErrorKind::State(ErrorState::Passive) if self.tec > 127 => (CAN_ERR_CRTL, TRANSMIT_PASSIVE, 0),
+            ErrorKind::State(ErrorState::Passive) => (CAN_ERR_CRTL, RECEIVE_PASSIVE, 0),
+            ErrorKind::State(ErrorState::BusOff) => (CAN_ERR_BUSOFF, 0, 0),
+        };
+        let data = [0, controller, protocol, 0, 0, self.port, self.tec, self.rec];
+        (ERROR_FLAG | CAN_ERR_CNT | class, data)
+    }
+
+    /// Reads identifier and data bytes.
+    ///
+    /// # Errors
+    /// [`ErrorReportError`] for classes that are not represented.
+    pub fn decode(time_ns: u64, id: u32, data: [u8; 8]) -> Result<Self, ErrorReportError> {
+        let [_, controller, _, _, _, port, tec, rec] = data;
+        let has = |class| id & ERROR_FLAG != 0 && id & class != 0;
+        let kind = if has(CAN_ERR_BUSOFF) {
+            ErrorKind::State(ErrorState::BusOff)
+        } else if has(CAN_ERR_CRTL) && controller & (TRANSMIT_PASSIVE | RECEIVE_PASSIVE) != 0 {
+            ErrorKind::State(ErrorState::Passive)
+        } else if has(CAN_ERR_CRTL) && controller & ACTIVE != 0 {
+            ErrorKind::State(ErrorState::Active)
+        } else if has(CAN_ERR_ACK) {
+            ErrorKind::Acknowledge
+        } else if has(CAN_ERR_PROT) {
+            ErrorKind::Bit
+        } else {
+            return Err(ErrorReportError { id });
+        };
+        Ok(Self { time_ns, port, kind, tec, rec })
+    }
+}
+
+/// Log lines of candump: `(1436509052.249713) vcan0 123#11223344`.
+///
+/// Time stamps have whole microseconds, as in the format. Logs are written and not read.
+pub mod candump {
+    use std::fmt::{self, Write};
+
+    use super::Tapped;
+
+    /// Writes one line without line end. Fractions of a microsecond are cut off. An error report becomes the error
+    /// message that a `SocketCAN` interface would give.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    ///
+    /// # Examples
+    /// ```
+    /// use masseter_can::{CanId, Frame, Received, Tapped, candump};
+    ///
+    /// let frame = Frame::fixed(CanId::standard(0x123)?, [0x11, 0x22]);
+    /// let mut line = String::new();
+    /// candump::write(&mut line, "can0", &Tapped::Frame(Received { frame, time_ns: 1_500_000 }.into()))?;
+    /// assert_eq!(line, "(0.001500) can0 123#1122");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn write(out: &mut impl Write, interface: &str, tapped: &Tapped) -> fmt::Result {
+        let micros = tapped.time_ns() / 1000;
+        write!(out, "({}.{:06}) {interface} ", micros / 1_000_000, micros % 1_000_000)?;
+        match tapped {
+            Tapped::Frame(tapped) => write!(out, "{}", tapped.frame),
+            Tapped::Error(report) => {
+                let (id, data) = report.encode();
+                write!(out, "{id:08X}#")?;
+                data.iter().try_for_each(|byte| write!(out, "{byte:02X}"))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::CanId;
+
+    #[test]
+    fn reports_are_coded_as_the_kernel_does() {
+        let report = |kind, tec| ErrorReport { time_ns: 7, port: 3, kind, tec, rec: 1 };
+        let table = [
+            (report(ErrorKind::Bit, 8), 0x2000_0288, [0, 0, 0x81, 0, 0, 3, 8, 1]),
+            (report(ErrorKind::Acknowledge, 8), 0x2000_02A0, [0, 0, 0, 0, 0, 3, 8, 1]),
+            (report(ErrorKind::State(ErrorState::Active), 0), 0x2000_0204, [0, 0x40, 0, 0, 0, 3, 0, 1]),
+            (report(ErrorKind::State(ErrorState::Passive), 128), 0x2000_0204, [0, 0x20, 0, 0, 0, 3, 128, 1]),
+            (report(ErrorKind::State(ErrorState::BusOff), 255), 0x2000_0240, [0, 0, 0, 0, 0, 3, 255, 1]),
+        ];
+        for (report, id, data) in table {
+            assert_eq!(report.encode(), (id, data));
+            assert_eq!(ErrorReport::decode(7, id, data), Ok(report));
+        }
+        assert_eq!(ErrorReport::decode(7, 0x2000_0001, [0; 8]), Err(ErrorReportError { id: 0x2000_0001 }));
+    }
+
+    fn line(time_ns: u64, frame: Frame) -> String {
+        let mut line = String::new();
+        candump::write(&mut line, "vcan0", &Tapped::Frame(Received { frame, time_ns }.into())).unwrap();
+        line
+    }
+
+    #[test]
+    fn the_example_of_can_utils_is_written() {
+        let frame = Frame::fixed(CanId::standard(0x123).unwrap(), [0x11, 0x22, 0x33, 0x44]);
+        assert_eq!(line(1_436_509_052_249_713_999, frame), "(1436509052.249713) vcan0 123#11223344");
+    }
+
+    #[test]
+    fn extended_and_empty_frames_are_written_as_candump_does() {
+        let extended = CanId::extended(0x123).unwrap();
+        assert_eq!(line(0, Frame::fixed(extended, [])), "(0.000000) vcan0 00000123#");
+    }
+
+    #[test]
+    fn an_error_report_becomes_the_message_of_the_kernel() {
+        let kind = ErrorKind::State(ErrorState::BusOff);
+        let report = ErrorReport { time_ns: 5000, port: 2, kind, tec: 255, rec: 3 };
+        let mut line = String::new();
+        candump::write(&mut line, "can1", &Tapped::Error(report)).unwrap();
+        assert_eq!(line, "(0.000005) can1 20000240#000000000002FF03");
     }
 }

@@ -46,7 +46,7 @@ def _parameters(parameters: Sequence[Parameter]) -> list[tuple[str, str, str, fl
 
 def check_declaration(signals: Sequence[Signal], parameters: Sequence[Parameter]) -> None:
     """Raises MasseterError for names that no recording can have, and values beyond their range."""
-    _native.check(_signals(signals), _parameters(parameters))
+    _native.check_declaration(_signals(signals), _parameters(parameters))
 
 
 def control(

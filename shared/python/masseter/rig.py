@@ -127,7 +127,5 @@ def _control(rig: "subprocess.Popen[str]", control: Callable[[], bool]) -> None:
         try:
             control()
             return
-        except _native.MasseterError as error:
-            if "takes a controller" not in str(error):
-                raise
+        except _native.NoRigError:
             time.sleep(_POLL_S)

@@ -1,5 +1,6 @@
 //! A pose law that is a function of Python.
 
+use std::sync::mpsc;
 use std::thread;
 use std::time::Duration;
 
@@ -14,7 +15,7 @@ use nalgebra::{Quaternion, Translation3, Unit};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::failed;
+use crate::{failed, not_attached};
 
 /// Time between two looks at Ctrl-C.
 const POLL: Duration = Duration::from_millis(20);
@@ -72,22 +73,6 @@ pub(crate) struct Demand {
     signals: Py<PyDict>,
 }
 
-impl PythonLaw {
-    fn demand(&self, py: Python<'_>, demand: &RigDemand) -> Demand {
-        Demand {
-            cycle: demand.cycle,
-            period_s: demand.period_s,
-            motion_time_s: demand.motion_time_s,
-            controller_state: demand.state.code(),
-            desired: (&demand.desired).into(),
-            estimated: demand.estimated.as_ref().map(Pose::from),
-            ahead: (&demand.ahead).into(),
-            parameters: self.parameters.clone_ref(py),
-            signals: self.signals.clone_ref(py),
-        }
-    }
-}
-
 #[derive(Debug)]
 struct PythonLaw {
     function: Py<PyAny>,
@@ -97,18 +82,24 @@ struct PythonLaw {
     signals: Py<PyDict>,
     filled: Vec<f64>,
     /// Where the exception goes that ends the motion.
-    exception: std::sync::mpsc::Sender<PyErr>,
+    exception: mpsc::Sender<PyErr>,
 }
 
 impl PoseLaw for PythonLaw {
     fn command(&mut self, demand: &RigDemand) -> Result<geometry::Pose, LawFailed> {
         Python::attach(|py| {
-            let demand = self.demand(py, demand);
-            let pose: PyResult<Pose> = self
-                .function
-                .call1(py, (demand,))
-                .and_then(|pose| pose.extract(py).map_err(|_| failed("the law returned no masseter.Pose")));
-            pose.and_then(|pose| self.take_signals(py).map(|()| pose.into())).map_err(|error| {
+            let demand = Demand {
+                cycle: demand.cycle,
+                period_s: demand.period_s,
+                motion_time_s: demand.motion_time_s,
+                controller_state: demand.state.code(),
+                desired: (&demand.desired).into(),
+                estimated: demand.estimated.as_ref().map(Pose::from),
+                ahead: (&demand.ahead).into(),
+                parameters: self.parameters.clone_ref(py),
+                signals: self.signals.clone_ref(py),
+            };
+            self.asked_pose(py, demand).map_err(|error| {
                 // Nobody waits for it once the caller was interrupted.
                 let _ = self.exception.send(error);
                 LawFailed
@@ -132,29 +123,10 @@ impl PoseLaw for PythonLaw {
 }
 
 impl PythonLaw {
-    fn new(
-        py: Python<'_>,
-        function: Py<PyAny>,
-        declared: Declared,
-        exception: std::sync::mpsc::Sender<PyErr>,
-    ) -> PyResult<Self> {
-        let (parameters, signals) = (PyDict::new(py), PyDict::new(py));
-        for signal in &declared.signals {
-            signals.set_item(&signal.name, 0.0)?;
-        }
-        let filled = vec![0.0; declared.signals.len()];
-        Ok(Self {
-            function,
-            declared,
-            parameters: parameters.into(),
-            signals: signals.into(),
-            filled,
-            exception,
-        })
-    }
-
-    /// Takes the values that the law has filled.
-    fn take_signals(&mut self, py: Python<'_>) -> PyResult<()> {
+    /// The pose that the law returns; keeps the signals that the law fills.
+    fn asked_pose(&mut self, py: Python<'_>, demand: Demand) -> PyResult<geometry::Pose> {
+        let pose = self.function.call1(py, (demand,))?;
+        let pose: Pose = pose.extract(py).map_err(|_| failed("the law returned no masseter.Pose"))?;
         let signals = self.signals.bind(py);
         for (filled, signal) in self.filled.iter_mut().zip(&self.declared.signals) {
             *filled = signals.as_any().get_item(&signal.name)?.extract()?;
@@ -162,7 +134,7 @@ impl PythonLaw {
         if signals.len() > self.filled.len() {
             return Err(failed(format!("the law fills signals that are not declared: {}", signals.keys())));
         }
-        Ok(())
+        Ok(pose.into())
     }
 }
 
@@ -173,7 +145,10 @@ pub(crate) type ParameterOfPython = (String, String, String, f64, [f64; 2]);
 
 /// Refuses what a recording could not contain.
 #[pyfunction]
-pub(crate) fn check(signals: Vec<SignalOfPython>, parameters: Vec<ParameterOfPython>) -> PyResult<()> {
+pub(crate) fn check_declaration(
+    signals: Vec<SignalOfPython>,
+    parameters: Vec<ParameterOfPython>,
+) -> PyResult<()> {
     declared(signals, parameters).map(drop)
 }
 
@@ -202,12 +177,19 @@ pub(crate) fn control(
     signals: Vec<SignalOfPython>,
     parameters: Vec<ParameterOfPython>,
 ) -> PyResult<bool> {
-    let (exception, exceptions) = std::sync::mpsc::channel();
-    let law = PythonLaw::new(py, law, declared(signals, parameters)?, exception)?;
+    let (exception, exceptions) = mpsc::channel();
+    let declared = declared(signals, parameters)?;
+    let signals = PyDict::new(py);
+    for signal in &declared.signals {
+        signals.set_item(&signal.name, 0.0)?;
+    }
+    let filled = vec![0.0; declared.signals.len()];
+    let (parameters, signals) = (PyDict::new(py).into(), signals.into());
+    let law = PythonLaw { function: law, declared, parameters, signals, filled, exception };
     // A thread of its own: real-time priority and core end with it.
     let running = thread::spawn(move || {
-        let context = attach(rig.as_deref()).map_err(|error| error.to_string())?;
-        run_with_law(context, Box::new(law)).map_err(|error| error.to_string())
+        let context = attach(rig.as_deref()).map_err(not_attached)?;
+        run_with_law(context, Box::new(law)).map_err(failed)
     });
     while !running.is_finished() {
         py.detach(|| thread::sleep(POLL));
@@ -217,5 +199,5 @@ pub(crate) fn control(
     if let Ok(exception) = exceptions.try_recv() {
         return Err(exception);
     }
-    ran.map(|outcome| outcome == Outcome::Finished).map_err(failed)
+    ran.map(|outcome| outcome == Outcome::Finished)
 }

@@ -3,31 +3,146 @@
 //! Arrays cross the border as bytes of 64-bit floats, so that this crate needs no array library.
 #![allow(clippy::needless_pass_by_value, reason = "Python passes values")]
 
-mod kinematics;
 mod law;
-mod recording;
 mod session;
 
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use masseter_controller::kinematics::ForwardTracker;
+use masseter_model::geometry::{self, AXES, Actuators, MechanismConfig};
+use masseter_recording::{ReadError, Reader, Topic};
+use masseter_runtime::lifecycle::attach::AttachError;
+use masseter_runtime::messages::{pose_fields, pose_from_fields};
+use masseter_scenario::Scenario;
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 
 create_exception!(masseter, MasseterError, PyException, "The message of the rig, with what to do.");
+create_exception!(masseter, NoRigError, MasseterError, "No rig of that name takes a controller.");
 
 /// The error of Python with the message of `error`.
 fn failed(error: impl std::fmt::Display) -> PyErr {
     MasseterError::new_err(error.to_string())
 }
 
+/// The same for an error of attaching: whoever starts a rig waits for it to take a controller.
+fn not_attached(error: AttachError) -> PyErr {
+    match error {
+        AttachError::NoSuchRig { .. } => NoRigError::new_err(error.to_string()),
+        _ => failed(error),
+    }
+}
+
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("MasseterError", module.py().get_type::<MasseterError>())?;
-    module.add_class::<kinematics::Mechanism>()?;
+    module.add("NoRigError", module.py().get_type::<NoRigError>())?;
+    module.add_class::<Mechanism>()?;
     module.add_class::<law::Demand>()?;
     module.add_class::<law::Pose>()?;
     module.add_class::<session::Session>()?;
-    module.add_function(wrap_pyfunction!(law::check, module)?)?;
+    module.add_function(wrap_pyfunction!(law::check_declaration, module)?)?;
     module.add_function(wrap_pyfunction!(law::control, module)?)?;
-    module.add_function(wrap_pyfunction!(recording::topics, module)?)?;
+    module.add_function(wrap_pyfunction!(topics, module)?)?;
     Ok(())
+}
+
+/// Numbers of a pose: position, then quaternion w x y z.
+const POSE: usize = 7;
+
+/// Forward and inverse kinematics over the rows of an array, of a mechanism with these dimensions.
+#[pyclass(frozen)]
+struct Mechanism(geometry::Mechanism);
+
+#[pymethods]
+impl Mechanism {
+    #[new]
+    #[pyo3(signature = (scenario=None))]
+    fn new(scenario: Option<PathBuf>) -> PyResult<Self> {
+        let config = match scenario {
+            None => MechanismConfig::default(),
+            Some(path) => Scenario::read(&path).map_err(failed)?.mechanism,
+        };
+        geometry::Mechanism::new(&config).map(Self).map_err(failed)
+    }
+
+    /// Poses of rows of six positions.
+    fn forward<'py>(&self, py: Python<'py>, positions: &[u8]) -> PyResult<Bound<'py, PyBytes>> {
+        let mut tracker = ForwardTracker::new(self.0.clone());
+        let solved = py.detach(|| {
+            solve_rows(rows::<AXES>(positions), |axes| {
+                let solution = tracker.update(&Actuators::from_axes(axes));
+                let pose = solution.map_err(|error| error.to_string())?.pose;
+                let ([px, py, pz], [w, x, y, z]) = pose_fields(&pose);
+                Ok([px, py, pz, w, x, y, z])
+            })
+        });
+        rows_to_python(py, solved)
+    }
+
+    /// Positions of rows of poses.
+    fn inverse<'py>(&self, py: Python<'py>, poses: &[u8]) -> PyResult<Bound<'py, PyBytes>> {
+        let solved = py.detach(|| {
+            solve_rows(rows::<POSE>(poses), |[px, py, pz, quaternion @ ..]: [f64; POSE]| {
+                let norm = quaternion.iter().map(|part| part * part).sum::<f64>().sqrt();
+                if (norm - 1.0).abs() > 1e-6 {
+                    return Err(format!("the quaternion has the length {norm}, not 1"));
+                }
+                let pose = pose_from_fields([px, py, pz], quaternion);
+                let joints = self.0.inverse(&pose).map_err(|error| error.to_string())?;
+                Ok(joints.actuators.to_axes())
+            })
+        });
+        rows_to_python(py, solved)
+    }
+}
+
+fn rows<const N: usize>(bytes: &[u8]) -> impl Iterator<Item = [f64; N]> {
+    let number = |bytes: &[u8]| f64::from_ne_bytes(bytes.try_into().expect("eight bytes"));
+    bytes
+        .chunks_exact(8 * N)
+        .map(move |row| std::array::from_fn(|index| number(&row[8 * index..8 * index + 8])))
+}
+
+/// The rows that `solve` gives, as bytes; or the first row that has none, and why.
+fn solve_rows<const N: usize, const M: usize>(
+    rows: impl Iterator<Item = [f64; N]>,
+    mut solve: impl FnMut([f64; N]) -> Result<[f64; M], String>,
+) -> Result<Vec<u8>, (usize, String)> {
+    let mut bytes = Vec::with_capacity(rows.size_hint().0 * 8 * M);
+    for (index, row) in rows.enumerate() {
+        let solved = solve(row).map_err(|error| (index, error))?;
+        bytes.extend(solved.iter().flat_map(|number| number.to_ne_bytes()));
+    }
+    Ok(bytes)
+}
+
+fn rows_to_python(py: Python<'_>, solved: Result<Vec<u8>, (usize, String)>) -> PyResult<Bound<'_, PyBytes>> {
+    let refused = |(row, error)| MasseterError::new_err(format!("row {row}: {error}"));
+    solved.map(|bytes| PyBytes::new(py, &bytes)).map_err(refused)
+}
+
+/// The messages of each topic that controllers use, in order, as the bytes of their structures; and whether the recording is
+/// whole.
+#[pyfunction]
+fn topics(py: Python<'_>, path: PathBuf) -> PyResult<(BTreeMap<&'static str, Bound<'_, PyBytes>>, bool)> {
+    let read = py.detach(|| read_topics(&path));
+    let (topics, is_whole) = read.map_err(|error| failed(format!("{}: {error}", path.display())))?;
+    Ok((topics.into_iter().map(|(name, bytes)| (name, PyBytes::new(py, &bytes))).collect(), is_whole))
+}
+
+fn read_topics(path: &Path) -> Result<(BTreeMap<&'static str, Vec<u8>>, bool), ReadError> {
+    let mut reader = Reader::open(path)?;
+    let of_controllers = |topic: &Topic| !matches!(topic, Topic::Frame | Topic::Machine);
+    let names = Topic::ALL.into_iter().filter(of_controllers).map(Topic::name);
+    let mut topics: BTreeMap<_, _> = names.map(|name| (name, Vec::new())).collect();
+    while let Some(message) = reader.next_message()? {
+        if let Some(bytes) = topics.get_mut(message.topic().name()) {
+            bytes.extend_from_slice(message.body());
+        }
+    }
+    Ok((topics, reader.damage().is_empty() && !reader.was_cut_short()))
 }

@@ -11,8 +11,8 @@ use masseter_runtime::named::{Declared, PlayedMotion};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::failed;
 use crate::law::{ParameterOfPython, SignalOfPython, declared};
+use crate::{failed, not_attached};
 
 /// A part in a run. It belongs to the thread that made it.
 #[pyclass(unsendable)]
@@ -44,7 +44,7 @@ impl Session {
     ) -> PyResult<Self> {
         let motion = if has_own_motion { PlayedMotion::Own } else { PlayedMotion::Scenario };
         let declared = Declared { motion, ..declared(signals, parameters)? };
-        let context = attach(rig).map_err(failed)?;
+        let context = attach(rig).map_err(not_attached)?;
         Ok(Self { stage: Some(Stage::Attached(Box::new(context), declared)) })
     }
 
@@ -97,19 +97,19 @@ impl Session {
     }
 
     fn parameters(&mut self) -> PyResult<Vec<f64>> {
-        Ok(self.started()?.parameters().to_vec())
+        Ok(started(&mut self.stage)?.parameters().to_vec())
     }
 
     fn publish(&mut self, command: &[u8], state: &[u8], signals: Vec<f64>) -> PyResult<()> {
         let (command, state) = (message::<Command>(command)?, message::<State>(state)?);
-        let session = self.started()?;
+        let session = started(&mut self.stage)?;
         session.signals_mut().iter_mut().zip(signals).for_each(|(place, value)| *place = value);
         session.publish(&command, &state).map_err(failed)
     }
 
     fn publish_event(&mut self, event: &[u8]) -> PyResult<()> {
         let event = message::<Event>(event)?;
-        self.started()?.publish_event(&event).map_err(failed)
+        started(&mut self.stage)?.publish_event(&event).map_err(failed)
     }
 
     fn finish(&mut self, is_safe_stop: bool) -> PyResult<()> {
@@ -131,12 +131,8 @@ impl Session {
         result
     }
 
-    fn started(&mut self) -> PyResult<&mut control::Session> {
-        started(&mut self.stage)
-    }
-
     fn end(&mut self) -> PyResult<control::Session> {
-        self.started()?;
+        started(&mut self.stage)?;
         match self.stage.take() {
             Some(Stage::Started(session)) => Ok(*session),
             _ => Err(over()),

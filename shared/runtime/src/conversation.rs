@@ -16,6 +16,7 @@ use rustix::net::{
     AddressFamily, SendFlags, Shutdown, SocketAddrUnix, SocketFlags, SocketType, accept_with, connect,
     listen, send, shutdown, socket_with,
 };
+use serde::Serialize;
 
 use crate::clock::{self, MILLISECOND_NS, SECOND_NS};
 
@@ -260,7 +261,7 @@ impl Conversation {
 
     /// Waits until there is something to hear or room to send, for at most `timeout`.
     pub fn wait(&self, timeout: Duration) {
-        wait_for([self], None, timeout);
+        wait_for_peers([self], None, timeout);
     }
 
     /// Waits for a line, within the limits of the conversation. For clients, which have nothing else to do.
@@ -305,6 +306,14 @@ impl AsFd for Conversation {
     }
 }
 
+/// A message as its line.
+///
+/// # Panics
+/// Never: messages are plain data.
+pub fn line(message: &impl Serialize) -> String {
+    serde_json::to_string(message).expect("plain data") + "\n"
+}
+
 /// What a look at the newcomers found.
 #[derive(Debug, Default)]
 pub struct Look {
@@ -346,7 +355,7 @@ impl Newcomers {
     pub fn look(&mut self, now_ns: u64, is_whole: impl Fn(&[u8]) -> bool) -> Look {
         let mut look = Look::default();
         for conversation in std::mem::take(&mut self.waiting) {
-            self.sort(conversation, now_ns, &is_whole, &mut look);
+            self.sort_peer(conversation, now_ns, &is_whole, &mut look);
         }
         for _ in 0..MOST_ACCEPTED {
             let flags = SocketFlags::NONBLOCK | SocketFlags::CLOEXEC;
@@ -355,7 +364,7 @@ impl Newcomers {
             match Conversation::begin(connection, self.limits, now_ns) {
                 Ok(mut conversation) => {
                     conversation.say(self.greeting);
-                    self.sort(conversation, now_ns, &is_whole, &mut look);
+                    self.sort_peer(conversation, now_ns, &is_whole, &mut look);
                 }
                 Err(error) => look.out.push(error.into()),
             }
@@ -363,7 +372,7 @@ impl Newcomers {
         look
     }
 
-    fn sort(
+    fn sort_peer(
         &mut self,
         mut conversation: Conversation,
         now_ns: u64,
@@ -390,11 +399,11 @@ impl Newcomers {
     pub fn wait(&self, timeout: Duration) {
         let first_byte = Duration::from_nanos(self.limits.first_byte_ns);
         let timeout = if self.waiting.is_empty() { timeout } else { timeout.min(first_byte) };
-        wait_for(&self.waiting, Some(&self.listener), timeout);
+        wait_for_peers(&self.waiting, Some(&self.listener), timeout);
     }
 }
 
-fn wait_for<'a>(
+fn wait_for_peers<'a>(
     conversations: impl IntoIterator<Item = &'a Conversation>,
     listener: Option<&OwnedFd>,
     timeout: Duration,

@@ -1,13 +1,18 @@
-//! The times of faults and stimuli in a run, from the occurrences that they count from.
+//! The times of faults and stimuli in a run, from the occurrences that they count from; and the operator of a scenario, who
+//! sets parameters of the controller, asks for a stop, and says when the faults of processes are due.
 //!
-//! It acts on nothing: plant, controller and supervisor ask for the windows of what they carry out.
+//! [`Injection`] acts on nothing: plant, controller and supervisor ask for the windows of what they carry out. The
+//! [`Operator`] sees what the controller sees, readings and its states, and acts on nothing either.
 
+use std::fmt::{self, Display, Formatter};
 use std::ops::Range;
 
-use masseter_scenario::{Scenario, ScenarioError, Start, When};
+use masseter_scenario::{FaultKindConfig, FaultLayer, Scenario, ScenarioError, Start, StimulusConfig, When};
 
 use crate::clock::SECOND_NS;
-use crate::messages::codes::ControllerState;
+use crate::messages::Event;
+use crate::messages::codes::{Cause, ControllerState, EventKind, OF_OPERATOR, Source};
+use crate::named::{Declared, NameError};
 
 /// A fault or a stimulus, with its place in the scenario's list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,6 +21,15 @@ pub enum Injected {
     Fault(usize),
     /// A stimulus.
     Stimulus(usize),
+}
+
+impl Display for Injected {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Fault(place) => write!(f, "[[faults]] number {}", place + 1),
+            Self::Stimulus(place) => write!(f, "[[stimulus]] number {}", place + 1),
+        }
+    }
 }
 
 /// The times of every fault and stimulus of a run.
@@ -79,13 +93,11 @@ impl Injection {
 
     /// A fault or a stimulus acts for the first time, ns.
     pub fn note_begin(&mut self, injected: Injected, now_ns: u64) {
-        self.occur(
-            match injected {
-                Injected::Fault(place) => Start::Fault(place),
-                Injected::Stimulus(place) => Start::Stimulus(place),
-            },
-            now_ns,
-        );
+        let start = match injected {
+            Injected::Fault(place) => Start::Fault(place),
+            Injected::Stimulus(place) => Start::Stimulus(place),
+        };
+        self.occur(start, now_ns);
     }
 
     /// The time in which it acts, ns; none until the occurrence that the time counts from.
@@ -113,11 +125,211 @@ impl Injection {
     }
 }
 
+/// Why the operator cannot do what the scenario says.
+#[derive(Debug, thiserror::Error)]
+pub enum OperatorError {
+    /// A time names nothing of the scenario.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// The controller has no such parameter, or refuses the value.
+    #[error("{}: {error}", Injected::Stimulus(*stimulus))]
+    Parameter {
+        /// The place of the stimulus in the scenario's list.
+        stimulus: usize,
+        /// The refusal.
+        error: NameError,
+    },
+    /// A time counts from what the controller does not see.
+    #[error(
+        "{0}: its time counts from an occurrence in the plant, which the controller does not see: count from the motion \
+         (at_s alone), or from controller.STATE"
+    )]
+    Unseen(Injected),
+}
+
+impl OperatorError {
+    /// The key in the scenario, and the number of its entry in the list, from 0.
+    pub fn key(&self) -> Option<(&'static str, usize)> {
+        match self {
+            Self::Scenario(_) => None,
+            Self::Parameter { stimulus, error: NameError::OutOfRange { .. } } => {
+                Some(("stimulus.value", *stimulus))
+            }
+            Self::Parameter { stimulus, .. } => Some(("stimulus.parameter", *stimulus)),
+            Self::Unseen(Injected::Fault(place)) => Some(("faults.after", *place)),
+            Self::Unseen(Injected::Stimulus(place)) => Some(("stimulus.after", *place)),
+        }
+    }
+}
+
+/// What is due.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Due {
+    /// A parameter gets a value.
+    Set { place: usize, value: f64 },
+    /// An orderly stop is asked for.
+    Stop,
+    /// A fault of a process, with its place in the scenario's list. The supervisor knows whether it is to carry it out.
+    Fault(usize),
+}
+
+/// The operator of a run.
+///
+/// ```
+/// use masseter_scenario::{Scenario, StimulusConfig};
+/// use masseter_runtime::injection::Operator;
+/// use masseter_runtime::named::Declared;
+///
+/// let set = StimulusConfig { parameter: Some("gain".into()), value: Some(3.0), ..StimulusConfig::at(1.0) };
+/// let scenario = Scenario { stimulus: vec![set], ..Scenario::default() };
+/// // The controller declares no such parameter.
+/// assert!(Operator::new(&scenario, &Declared::default(), 0).is_err());
+/// ```
+#[derive(Debug)]
+pub struct Operator {
+    injection: Injection,
+    /// What has not been due yet.
+    waiting: Vec<(Injected, Due)>,
+    /// When the newest reading was sampled, ns.
+    sampled_ns: u64,
+}
+
+impl Operator {
+    /// The operator of a scenario that is switched on at `now_ns`, for a controller that declares these parameters.
+    ///
+    /// # Errors
+    /// [`OperatorError`].
+    pub fn new(scenario: &Scenario, declared: &Declared, now_ns: u64) -> Result<Self, OperatorError> {
+        let (mut waiting, entries) = (Vec::new(), scenario.entry_names());
+        for (place, stimulus) in scenario.stimulus.iter().enumerate() {
+            if !stimulus.is_of_controller() {
+                continue;
+            }
+            let when = stimulus.when(&entries)?;
+            if !is_seen_by_controller(when, scenario) {
+                return Err(OperatorError::Unseen(Injected::Stimulus(place)));
+            }
+            let refused = |error| OperatorError::Parameter { stimulus: place, error };
+            waiting.push((Injected::Stimulus(place), due_of(stimulus, declared).map_err(refused)?));
+        }
+        for (place, fault) in scenario.faults.iter().enumerate() {
+            let is_of_process = fault.kind.layer() == FaultLayer::Process;
+            if !is_of_process && fault.kind != FaultKindConfig::ControllerStall {
+                continue;
+            }
+            let when = fault.when(&entries)?;
+            if !is_seen_by_controller(when, scenario) {
+                // In simulated time the plant alone stalls the commands; real time refuses this before the start.
+                if !is_of_process {
+                    continue;
+                }
+                return Err(OperatorError::Unseen(Injected::Fault(place)));
+            }
+            waiting.push((Injected::Fault(place), Due::Fault(place)));
+        }
+        Ok(Self { injection: Injection::new(scenario, now_ns)?, waiting, sampled_ns: 0 })
+    }
+
+    /// What is due in a cycle that uses a reading sampled at this time, ns: at most one thing, so that the work of a cycle is
+    /// bounded. None stands for a cycle without a new reading.
+    pub(crate) fn take_due(&mut self, sampled_ns: Option<u64>) -> Option<(Injected, Due)> {
+        self.sampled_ns = sampled_ns.unwrap_or(self.sampled_ns);
+        let (injection, now_ns) = (&self.injection, self.sampled_ns);
+        let place = self.waiting.iter().position(|(injected, _)| injection.is_active(*injected, now_ns))?;
+        let (injected, due) = self.waiting.swap_remove(place);
+        self.injection.note_begin(injected, now_ns);
+        Some((injected, due))
+    }
+
+    /// The controller was in this state in the cycle of the newest reading.
+    pub(crate) fn note_state(&mut self, state: u32) {
+        if self.waiting.is_empty() {
+            return;
+        }
+        if let Ok(state) = ControllerState::try_from(state) {
+            self.injection.note_state(state, self.sampled_ns);
+        }
+    }
+}
+
+/// The event of a stimulus that began; none for a fault, which whoever carries it out enters.
+pub(crate) fn begin_event(injected: Injected, cycle: u64, time_ns: u64) -> Option<Event> {
+    let Injected::Stimulus(place) = injected else { return None };
+    let value = (place + 1) as f64;
+    let event = Event::new(Source::Scenario, EventKind::Notice, Cause::StimulusBegan);
+    Some(Event { time_ns, cycle, value, object: OF_OPERATOR, ..event })
+}
+
+/// Whether the controller sees what the time counts from.
+pub fn is_seen_by_controller(when: When, scenario: &Scenario) -> bool {
+    match when.start {
+        Start::SwitchOn | Start::State(_) => true,
+        Start::Stimulus(place) => scenario.stimulus.get(place).is_some_and(StimulusConfig::is_of_controller),
+        Start::Fault(place) => {
+            scenario.faults.get(place).is_some_and(|fault| fault.kind.layer() == FaultLayer::Process)
+        }
+    }
+}
+
+fn due_of(stimulus: &StimulusConfig, declared: &Declared) -> Result<Due, NameError> {
+    let Some(name) = &stimulus.parameter else { return Ok(Due::Stop) };
+    let (place, value) = (declared.place_of(name)?, stimulus.value.unwrap_or_default());
+    declared.parameters[place].check(value)?;
+    Ok(Due::Set { place, value })
+}
+
 #[cfg(test)]
 mod tests {
-    use masseter_scenario::{FaultConfig, FaultKindConfig};
+    use masseter_scenario::FaultConfig;
 
     use super::*;
+    use crate::named::Parameter;
+
+    const RUNNING: u32 = ControllerState::Running.code();
+
+    fn set(at_s: f64, value: f64) -> StimulusConfig {
+        StimulusConfig { parameter: Some("gain".to_owned()), value: Some(value), ..StimulusConfig::at(at_s) }
+    }
+
+    fn declared() -> Declared {
+        let gain = Parameter { range: [0.0, 9.0], ..Parameter::new("gain", 1.0) };
+        Declared { parameters: vec![gain], ..Declared::default() }
+    }
+
+    #[test]
+    fn one_thing_a_cycle_is_due_from_its_time_of_the_motion_on() {
+        let kill = FaultConfig { at_s: Some(2.0), ..FaultConfig::new(FaultKindConfig::PlantKill) };
+        let stop = StimulusConfig {
+            stop: true,
+            after: Some("stimulus.parameter".to_owned()),
+            ..StimulusConfig::at(0.5)
+        };
+        let scenario =
+            Scenario { stimulus: vec![set(1.0, 3.0), stop], faults: vec![kill], ..Scenario::default() };
+        let mut operator = Operator::new(&scenario, &declared(), 0).unwrap();
+        let s = |seconds: f64| Some((seconds * 1e9) as u64);
+        assert_eq!(operator.take_due(s(5.0)), None, "nothing runs yet");
+        operator.note_state(RUNNING);
+        assert_eq!(operator.take_due(s(5.999)), None);
+        let expected = (Injected::Stimulus(0), Due::Set { place: 0, value: 3.0 });
+        assert_eq!(operator.take_due(s(6.0)), Some(expected));
+        assert_eq!(operator.take_due(None), None, "time stands still without readings");
+        assert_eq!(operator.take_due(s(6.5)), Some((Injected::Stimulus(1), Due::Stop)));
+        assert_eq!(operator.take_due(s(7.0)), Some((Injected::Fault(0), Due::Fault(0))));
+        assert_eq!(operator.take_due(s(8.0)), None);
+    }
+
+    #[test]
+    fn what_the_controller_cannot_do_or_see_is_refused() {
+        let refusal = |scenario: &Scenario| Operator::new(scenario, &declared(), 0).unwrap_err().to_string();
+        let with = |stimulus| Scenario { stimulus, ..Scenario::default() };
+        assert!(refusal(&with(vec![set(1.0, 10.0)])).contains("number 1: parameter 'gain' cannot be 10"));
+        let unknown = StimulusConfig { parameter: Some("gian".to_owned()), ..set(1.0, 1.0) };
+        assert!(refusal(&with(vec![set(0.0, 1.0), unknown])).contains("did you mean 'gain'"));
+        let push = StimulusConfig { push_n: Some([1.0; 3]), ..StimulusConfig::at(0.0) };
+        let late = StimulusConfig { after: Some("stimulus.push".to_owned()), ..set(1.0, 1.0) };
+        assert!(refusal(&with(vec![push, late])).contains("[[stimulus]] number 2: its time counts from"));
+    }
 
     #[test]
     fn times_count_from_switch_on_from_the_motion_and_from_each_other() {

@@ -30,6 +30,8 @@ const SLICE: Duration = Duration::from_millis(20);
 const STOP_PATIENCE_NS: u64 = clock::SECOND_NS;
 /// Longest wait for the request to end, after the last turn, ns.
 const STOP_REQUEST_NS: u64 = 10 * clock::SECOND_NS;
+/// Polling interval of the request to end.
+const STOP_POLL: Duration = Duration::from_millis(1);
 /// Messages of the plant between two requests to the recorder. The recorder has room for more than two such windows and
 /// everything that a cycle may add.
 const WINDOW_MESSAGES: usize = 256;
@@ -46,9 +48,10 @@ pub enum Clock {
 impl Clock {
     /// The clock of a loop whose first cycle is due at this time, ns.
     pub fn start(lockstep: Option<Lockstep>, first_due_ns: u64, period_ns: u64) -> Self {
-        let Some(mut lockstep) = lockstep else { return Self::RealTime(Cycle::new(first_due_ns, period_ns)) };
-        lockstep.start(first_due_ns);
-        Self::Lockstep(Box::new(lockstep))
+        match lockstep {
+            None => Self::RealTime(Cycle::new(first_due_ns, period_ns)),
+            Some(lockstep) => Self::Lockstep(Box::new(Lockstep { first_due_ns, ..lockstep })),
+        }
     }
 
     /// Now, ns.
@@ -134,11 +137,6 @@ impl Lockstep {
             unrecorded: 0,
             is_recording: false,
         }))
-    }
-
-    /// Begins the first cycle at this time, ns.
-    pub fn start(&mut self, first_due_ns: u64) {
-        self.first_due_ns = first_due_ns;
     }
 
     /// Begins the next cycle, in time.
@@ -282,16 +280,13 @@ impl Lockstep {
         if !self.patience.lasts(silent_ns / waits) {
             self.lost = Some(process);
             let silence = Silence { process, cycle: self.cycle, silent_s: silent_ns as f64 / 1e9 };
-            self.supervisor.report(&Report::Silence(silence)).map_err(ProcessError::Supervisor)?;
+            self.supervisor.report(&Report::Silence(silence))?;
         } else if since_stop_ns / waits >= STOP_PATIENCE_NS {
             self.lost = Some(process);
         }
         Ok(())
     }
 }
-
-/// Polling interval of the request to end.
-const STOP_POLL: Duration = Duration::from_millis(1);
 
 /// The recorder's end: it learns when the plant wants to be sure that everything is received.
 #[derive(Debug)]

@@ -109,9 +109,9 @@ impl CycleSchedule {
     }
 
     fn fit(scenario: &Scenario, period_ns: u64) -> Result<Result<Self, Misfit>, ScheduleError> {
-        let mut plans =
-            plans_of(scenario, period_ns, false)?.into_iter().chain(plans_of(scenario, period_ns, true)?);
-        if let Some(overload) = plans.find_map(|plan| plan.check().err()) {
+        let mut plans = plans_of(scenario, period_ns, Drives::AllRun)?;
+        plans.extend(plans_of(scenario, period_ns, Drives::OneBoots)?);
+        if let Some(overload) = plans.iter().find_map(|plan| plan.check().err()) {
             return Ok(Err(overload.into()));
         }
         Ok(Self::offsets(scenario, scenario.can.bitrate()?, period_ns))
@@ -122,7 +122,7 @@ impl CycleSchedule {
         let longest = |length| bitrate.bits_to_ns(worst_case_bits(length, false));
         let shortest = |length| bitrate.bits_to_ns(unstuffed_bits(length, false));
         let axes = can.buses.iter().map(Vec::len).max().unwrap_or(0) as u64;
-        let (sync, tpdo) = (0, length(&PdoMapping::TPDO1));
+        let (sync, tpdo) = (0, pdo_bytes(&PdoMapping::TPDO1));
         // A frame has arrived before the interframe space behind it.
         let pause_ns = bitrate.bits_to_ns(INTERFRAME_BITS);
         let reading_from_ns = shortest(sync) + axes * shortest(tpdo) - pause_ns;
@@ -130,7 +130,7 @@ impl CycleSchedule {
         let heartbeat_ns = heartbeat_ns(bitrate);
         let up_ns = longest(sync) + axes * longest(tpdo);
         let rpdos_ns = |axes: &Vec<usize>| {
-            axes.iter().map(|&axis| longest(length(&scenario.profile(axis).pdos.rpdo1()))).sum()
+            axes.iter().map(|&axis| longest(pdo_bytes(&scenario.profile(axis).pdos.rpdo1()))).sum()
         };
         let down_ns = can.buses.iter().map(rpdos_ns).max().unwrap_or(0);
         let reading_by_ns = heartbeat_ns + up_ns + answer_ns(can, heartbeat_ns);
@@ -222,38 +222,48 @@ const HEARTBEAT_LENGTH: u32 = 1;
 /// # Errors
 /// [`ScheduleError`] for unknown bit rates, node ids and releasers. [`BusPlan::check`] finds messages that do not fit.
 pub fn plans(scenario: &Scenario) -> Result<Vec<BusPlan>, ScheduleError> {
-    plans_of(scenario, scenario.period_ns(), false)
+    plans_of(scenario, scenario.period_ns(), Drives::AllRun)
 }
 
-/// The plans while all drives run, or while one of every bus `boots` and the others run: then request and answer of one
+/// What the drives of every bus do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Drives {
+    AllRun,
+    OneBoots,
+}
+
+/// The plans while all drives run, or while one of every bus boots and the others run: then request and answer of one
 /// SDO exchange take the place of its process data. The worst is the drive with the shortest RPDO1. With more drives
 /// booting there is still one request in a cycle, and each answer is no longer than the process data that its drive
 /// does not send.
 ///
 /// The offsets of the schedule hold as well: an SDO frame blocks the bus for longer than a heartbeat, but for no longer than
 /// a heartbeat and the missing process data.
-fn plans_of(scenario: &Scenario, period_ns: u64, boots: bool) -> Result<Vec<BusPlan>, ScheduleError> {
+fn plans_of(scenario: &Scenario, period_ns: u64, drives: Drives) -> Result<Vec<BusPlan>, ScheduleError> {
     let can = &scenario.can;
     let plan = |(bus, axes): (usize, &Vec<usize>)| {
         let ids = axes.iter().filter_map(|&axis| Some((*can.node_ids.get(axis)?, axis)));
-        let drives = ids.map(|(id, axis)| Ok((NodeId::new(id)?, scenario.profile(axis).pdos.rpdo1())));
-        let drives = drives.collect::<Result<Vec<_>, NodeIdError>>()?;
-        let messages = messages(&drives, can, period_ns, boots);
+        let nodes = ids.map(|(id, axis)| Ok((NodeId::new(id)?, scenario.profile(axis).pdos.rpdo1())));
+        let nodes = nodes.collect::<Result<Vec<_>, NodeIdError>>()?;
+        let shortest = nodes.iter().min_by_key(|(_, rpdo1)| pdo_bytes(rpdo1));
+        let booting = shortest.filter(|_| drives == Drives::OneBoots).map(|&(node, _)| node);
+        let messages = bus_messages(&nodes, can, period_ns, booting);
         Ok(BusPlan::new(bus, can.bitrate()?, period_ns, messages)?)
     };
     can.buses.iter().enumerate().map(plan).collect()
 }
 
 /// Data bytes of a PDO.
-fn length(mapping: &PdoMapping) -> u32 {
+fn pdo_bytes(mapping: &PdoMapping) -> u32 {
     mapping.length() as u32
 }
 
-fn messages(
+/// The messages of a bus with these drives, of which one may be booting.
+fn bus_messages(
     drives: &[(NodeId, PdoMapping)],
     can: &CanConfig,
     period_ns: u64,
-    boots: bool,
+    booting: Option<NodeId>,
 ) -> Vec<PeriodicMessage> {
     let heartbeat_ns = u64::from(can.heartbeat_producer_ms) * MILLISECOND_NS;
     let message = |name: String, cob: Cob, data_length: u32, period_ns: u64| PeriodicMessage {
@@ -265,8 +275,6 @@ fn messages(
         release: None,
     };
     let mut messages = vec![message("SYNC".to_owned(), Cob::Sync, 0, period_ns)];
-    let shortest = drives.iter().min_by_key(|(_, rpdo1)| length(rpdo1)).filter(|_| boots);
-    let booting = shortest.map(|&(node, _)| node);
     for &(node, rpdo1) in drives {
         if booting == Some(node) {
             // The answer may take until the end of the next cycle.
@@ -278,7 +286,7 @@ fn messages(
             messages.push(sdo("SDO response", Cob::SdoResponse(node)));
             continue;
         }
-        let (tpdo, rpdo) = (length(&PdoMapping::TPDO1), length(&rpdo1));
+        let (tpdo, rpdo) = (pdo_bytes(&PdoMapping::TPDO1), pdo_bytes(&rpdo1));
         messages.push(PeriodicMessage {
             release: Some(Release { by: Cob::Sync.into(), within_ns: u64::from(can.answer_us) * 1000 }),
             ..message(format!("TPDO1 {}", node.get()), Cob::Tpdo1(node), tpdo, period_ns)

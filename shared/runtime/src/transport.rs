@@ -2,7 +2,8 @@
 //!
 //! Readings, commands and states are written directly into the loaned sample. Truth, events and the frames of a cycle are
 //! copied there once. No publisher waits for a subscriber: a slow subscriber loses its oldest messages and sees the gap in
-//! the sequence numbers. Two rigs share no topic, because each [`Domain`] has names of its own.
+//! the sequence numbers. Two rigs share no topic, because each [`Domain`] has names of its own. iceoryx2 continues without a
+//! connection that it could not make; a port of this module refuses to.
 //!
 //! # Examples
 //! ```
@@ -20,15 +21,459 @@
 //! ```
 
 mod domain;
-mod error;
 mod frames;
-mod ports;
 mod runtime;
 mod signals;
 
+use std::borrow::Borrow;
+use std::fmt::Debug;
+use std::ops::Deref;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Duration;
+
+use iceoryx2::config::Config;
+use iceoryx2::node::{Node as IceoryxNode, NodeBuilder};
+use iceoryx2::port::backpressure_strategy::BackpressureStrategy;
+use iceoryx2::port::publisher::Publisher as IceoryxPublisher;
+use iceoryx2::port::subscriber::Subscriber as IceoryxSubscriber;
+use iceoryx2::port::update_connections::UpdateConnections;
+use iceoryx2::port::{DegradationAction, DegradationFn};
+use iceoryx2::prelude::{IceoryxSend, LogLevel, SemanticString, SignalHandlingMode, ipc, set_log_level};
+use iceoryx2::sample::Sample;
+use iceoryx2::service::builder::publish_subscribe::Builder;
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use iceoryx2::service::port_factory::publisher::PortFactoryPublisher;
+use iceoryx2::service::port_factory::subscriber::PortFactorySubscriber;
+
+use crate::clock;
+use crate::messages::{
+    Command, Contact, Event, LAYOUT_VERSION, Machine, Message, Parameters, Reading, Signals, State, Truth,
+};
+use crate::realtime::Waiter;
+
 pub use domain::{Domain, DomainLock, ScratchDomain, Swept};
-pub use error::{DomainError, TransportError};
 pub use frames::{FramePublisher, FrameSubscriber};
-pub use ports::{Node, Publisher, ReceivedMessage, Subscriber, Topic};
-pub use runtime::secret;
+pub use runtime::{DomainError, secret};
 pub use signals::{SignalReceiver, SignalSender};
+
+/// Publishers a topic may have: every process may publish events.
+const MAX_PUBLISHERS: usize = 4;
+/// Subscribers a topic may have: the counterpart, the recorder, and two observers. Shared memory is
+/// reserved, and locked, for all of them.
+const MAX_SUBSCRIBERS: usize = 4;
+/// Messages that a subscriber of the newest message keeps.
+const KEPT_FOR_THE_NEWEST: usize = 4;
+/// Messages a subscriber may hold at once: while it looks for a newer one than it has, it holds the one
+/// it has, the newest found so far, and the next.
+const MAX_HELD: usize = 3;
+/// Longest wait for another process that makes the same part of the domain: that process may be stopped for a moment, or
+/// starved. Shorter than the time in which a process must end.
+const CREATION_TIMEOUT: Duration = Duration::from_secs(3);
+
+/// Why a port could not be made or used.
+#[derive(Debug, thiserror::Error)]
+#[error("iceoryx2: {action} failed ({reason}); {help}", help = remedy(reason))]
+pub struct TransportError {
+    action: String,
+    reason: String,
+}
+
+/// What helps against the refusals users meet.
+fn remedy(reason: &str) -> &'static str {
+    if reason.contains("Permission") {
+        "another user has made a file of this name in /dev/shm; start the rig again"
+    } else if reason.contains("NotFound") {
+        "no rig of this name runs"
+    } else if reason.contains("Incompatible") {
+        "a process of another version uses this topic; stop it"
+    } else if reason.contains("ConnectionsRefused") {
+        "/dev/shm is full, or too little memory may be locked ('masseter doctor'), or too few files opened ('ulimit -n')"
+    } else {
+        "'masseter clean' removes what killed runs left behind"
+    }
+}
+
+/// Formats the error only after a failure and outside of the hot path: the formatting code within the hot path made a
+/// round trip a tenth slower.
+fn failed<E: Debug>(verb: &'static str, what: &str) -> impl FnOnce(E) -> TransportError {
+    #[cold]
+    fn error(verb: &str, what: &str, cause: &dyn Debug) -> TransportError {
+        TransportError { action: format!("{verb} '{what}'"), reason: format!("{cause:?}") }
+    }
+    move |cause| error(verb, what, &cause)
+}
+
+/// Refuses a message that does not carry this program's version: a sender need not be this program.
+fn check_version<M: Message>(message: &M) -> Result<(), TransportError> {
+    match message.version() {
+        LAYOUT_VERSION => Ok(()),
+        version => {
+            let reason = format_args!("IncompatibleVersion({version}, this program has {LAYOUT_VERSION})");
+            Err(failed("receiving", M::TOPIC)(reason))
+        }
+    }
+}
+
+/// Connections that a port could not make: iceoryx2 continues without them, and reports them in its log only.
+#[derive(Debug, Clone, Default)]
+struct Refused(Arc<AtomicU32>);
+
+impl Refused {
+    /// For the port's builder.
+    fn counter(&self) -> impl DegradationFn + use<> {
+        let Self(count) = self.clone();
+        move |_, _| {
+            count.fetch_add(1, Ordering::Relaxed);
+            DegradationAction::Warn
+        }
+    }
+
+    /// Makes a port's connections to the ports that are there by now.
+    fn connect(&self, port: &impl UpdateConnections, topic: &str) -> Result<(), TransportError> {
+        port.update_connections().map_err(failed("connecting", topic))?;
+        self.require_none(topic)
+    }
+
+    /// Refuses a port with missing connections: they leave no gap in any sequence, so a receiver must check.
+    fn require_none(&self, topic: &str) -> Result<(), TransportError> {
+        match self.0.load(Ordering::Relaxed) {
+            0 => Ok(()),
+            count => Err(failed("connecting", topic)(format_args!("ConnectionsRefused({count})"))),
+        }
+    }
+}
+
+/// A process's access to a domain.
+#[derive(Debug)]
+pub struct Node {
+    node: IceoryxNode<ipc::Service>,
+    domain: Domain,
+}
+
+impl Node {
+    /// Joins the domain. iceoryx2 installs no signal handlers.
+    pub fn join(domain: &Domain) -> Result<Self, TransportError> {
+        set_log_level(LogLevel::Fatal);
+        let id = domain.id();
+        let mut config = Config::default();
+        let prefix = domain.prefix().map_err(failed("joining domain", id))?;
+        config.global.prefix = prefix.as_str().try_into().map_err(failed("joining domain", id))?;
+        let root = iceoryx2::prelude::Path::new(domain.root().as_os_str().as_encoded_bytes());
+        config.global.creation_timeout = CREATION_TIMEOUT;
+        config.global.set_root_path(&root.map_err(failed("joining domain", id))?);
+        let builder = NodeBuilder::new().config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
+        let node = builder.create().map_err(failed("joining domain", id))?;
+        domain.make_private().map_err(failed("joining domain", id))?;
+        Ok(Self { node, domain: domain.clone() })
+    }
+
+    /// Refuses shared memory of another user beneath a port of this process.
+    ///
+    /// # Errors
+    /// As [`Domain::check_mapped`].
+    pub fn check_mapped(&self) -> Result<(), DomainError> {
+        self.domain.check_mapped()
+    }
+
+    pub(crate) fn domain(&self) -> &Domain {
+        &self.domain
+    }
+
+    /// The iceoryx2 node beneath, for measurements against bare iceoryx2.
+    pub fn iceoryx(&self) -> &IceoryxNode<ipc::Service> {
+        &self.node
+    }
+
+    /// The service of `M`'s topic, to be opened; it carries messages, or slices of them.
+    fn topic<M: Message, P: Debug + IceoryxSend + ?Sized>(
+        &self,
+        depth: usize,
+    ) -> Result<Builder<P, (), ipc::Service>, TransportError> {
+        let name = M::TOPIC.try_into().map_err(failed("opening topic", M::TOPIC))?;
+        let builder = self.node.service_builder(&name).publish_subscribe();
+        Ok(builder
+            .enable_safe_overflow(true)
+            .max_publishers(MAX_PUBLISHERS)
+            .max_subscribers(MAX_SUBSCRIBERS)
+            .subscriber_max_buffer_size(depth)
+            .subscriber_max_borrowed_samples(MAX_HELD))
+    }
+
+    /// A publisher of a topic.
+    pub fn publisher<M: Topic>(&self) -> Result<Publisher<M>, TransportError> {
+        M::publisher(self)
+    }
+
+    /// A subscriber of a topic that keeps up to [`Message::DEPTH`] messages.
+    pub fn subscriber<M: Topic>(&self) -> Result<Subscriber<M>, TransportError> {
+        M::subscriber(self, M::DEPTH)
+    }
+
+    /// A subscriber for the newest message only. Its queue is short: entries of a long queue are not in the cache, and old
+    /// messages are of no use after a stall.
+    pub fn newest_subscriber<M: Topic>(&self) -> Result<Subscriber<M>, TransportError> {
+        M::subscriber(self, KEPT_FOR_THE_NEWEST)
+    }
+}
+
+/// A message whose ports this crate compiles, once for all crates that use them. iceoryx2 is generic: otherwise each crate that
+/// makes ports compiles it again (docs/realtime-log.md#the-first-build).
+pub trait Topic: Message {
+    /// As [`Node::publisher`].
+    ///
+    /// # Errors
+    /// When the port cannot be made.
+    fn publisher(node: &Node) -> Result<Publisher<Self>, TransportError>;
+
+    /// A subscriber that keeps so many messages.
+    ///
+    /// # Errors
+    /// When the port cannot be made.
+    fn subscriber(node: &Node, buffer: usize) -> Result<Subscriber<Self>, TransportError>;
+}
+
+macro_rules! topics {
+    ($($message:ident)+) => {$(
+        impl Topic for $message {
+            fn publisher(node: &Node) -> Result<Publisher<Self>, TransportError> {
+                let outlet = Outlet::create(service::<Self>(node)?.publisher_builder())?;
+                Ok(Publisher { port: Box::new(outlet), sent: 0 })
+            }
+
+            fn subscriber(node: &Node, buffer: usize) -> Result<Subscriber<Self>, TransportError> {
+                let inlet = Inlet::create(service::<Self>(node)?.subscriber_builder().buffer_size(buffer))?;
+                Ok(Subscriber { port: Box::new(inlet) })
+            }
+        }
+    )+};
+}
+
+topics!(Command Reading State Signals Parameters Truth Contact Machine Event);
+
+fn service<M: Message>(node: &Node) -> Result<PortFactory<ipc::Service, M, ()>, TransportError> {
+    node.topic::<M, M>(M::DEPTH)?.open_or_create().map_err(failed("opening topic", M::TOPIC))
+}
+
+/// The contents of a sample: one message, or a slice of several.
+trait Payload: IceoryxSend + Debug + 'static {
+    /// The topic of the messages.
+    const TOPIC: &'static str;
+}
+
+impl<M: Message> Payload for M {
+    const TOPIC: &'static str = M::TOPIC;
+}
+
+impl<M: Message> Payload for [M] {
+    const TOPIC: &'static str = M::TOPIC;
+}
+
+/// A port that connects to the ports of other processes.
+trait Connecting: Debug {
+    /// Makes the connections to the ports that are there by now.
+    fn connect(&self) -> Result<(), TransportError>;
+}
+
+/// A publishing port, with the connections that it could not make.
+#[derive(Debug)]
+struct Outlet<P: Payload + ?Sized> {
+    port: IceoryxPublisher<ipc::Service, P, ()>,
+    refused: Refused,
+}
+
+impl<P: Payload + ?Sized> Outlet<P> {
+    fn create(builder: PortFactoryPublisher<'_, ipc::Service, P, ()>) -> Result<Self, TransportError> {
+        let refused = Refused::default();
+        let builder = builder.backpressure_strategy(BackpressureStrategy::DiscardData);
+        let port = builder.set_degradation_handler(refused.counter()).create();
+        Ok(Self { port: port.map_err(failed("publishing", P::TOPIC))?, refused })
+    }
+}
+
+impl<P: Payload + ?Sized> Connecting for Outlet<P> {
+    fn connect(&self) -> Result<(), TransportError> {
+        self.refused.connect(&self.port, P::TOPIC)
+    }
+}
+
+/// A receiving port, with the connections that it could not make.
+#[derive(Debug)]
+struct Inlet<P: Payload + ?Sized> {
+    port: IceoryxSubscriber<ipc::Service, P, ()>,
+    refused: Refused,
+}
+
+impl<P: Payload + ?Sized> Inlet<P> {
+    fn create(builder: PortFactorySubscriber<'_, ipc::Service, P, ()>) -> Result<Self, TransportError> {
+        let refused = Refused::default();
+        let port = builder.set_degradation_handler(refused.counter()).create();
+        Ok(Self { port: port.map_err(failed("subscribing to", P::TOPIC))?, refused })
+    }
+}
+
+impl<P: Payload + ?Sized> Connecting for Inlet<P> {
+    fn connect(&self) -> Result<(), TransportError> {
+        self.refused.connect(&self.port, P::TOPIC)
+    }
+}
+
+/// What a publisher needs of its port.
+trait Outgoing<M>: Connecting {
+    /// Lets `write` fill the next message in shared memory, and sends it.
+    fn send(&self, write: &mut dyn FnMut(&mut M)) -> Result<(), TransportError>;
+    fn warm_up(&self) -> Result<(), TransportError>;
+}
+
+impl<M: Message> Outgoing<M> for Outlet<M> {
+    fn send(&self, write: &mut dyn FnMut(&mut M)) -> Result<(), TransportError> {
+        let mut sample = self.port.loan().map_err(failed("loaning", M::TOPIC))?;
+        write(sample.payload_mut());
+        sample.send().map_err(failed("sending", M::TOPIC))?;
+        Ok(())
+    }
+
+    fn warm_up(&self) -> Result<(), TransportError> {
+        drop(self.port.loan().map_err(failed("loaning", M::TOPIC))?);
+        Ok(())
+    }
+}
+
+/// Publishes one message type and numbers its messages.
+#[doc(alias("writer", "data writer"))]
+#[derive(Debug)]
+pub struct Publisher<M: Message> {
+    port: Box<dyn Outgoing<M>>,
+    sent: u64,
+}
+
+impl<M: Message> Publisher<M> {
+    /// Connects to the subscribers that are there by now. Otherwise the first message makes the connections, which create
+    /// and map files.
+    pub fn connect(&self) -> Result<(), TransportError> {
+        self.port.connect()
+    }
+
+    /// Lets `fill` write the message into shared memory, then stamps and publishes the message.
+    pub fn publish(&mut self, fill: impl FnOnce(&mut M)) -> Result<(), TransportError> {
+        self.publish_by(clock::now_ns, fill)
+    }
+
+    /// The same with the time of another clock in the stamp.
+    pub fn publish_by(
+        &mut self,
+        now_ns: impl FnOnce() -> u64,
+        fill: impl FnOnce(&mut M),
+    ) -> Result<(), TransportError> {
+        let (mut given, sent) = (Some((now_ns, fill)), &mut self.sent);
+        self.port.send(&mut |message| {
+            let (now_ns, fill) = given.take().expect("a port writes a message once");
+            fill(message);
+            *sent += 1;
+            message.stamp(*sent, now_ns());
+        })
+    }
+
+    /// Touches the memory of the next message: the first message of the loop then costs no page fault, and later ones find
+    /// the memory in the caches.
+    pub fn warm_up(&self) -> Result<(), TransportError> {
+        self.port.warm_up()
+    }
+}
+
+/// What a subscriber needs of its port.
+trait Incoming<M: Message>: Connecting {
+    /// The oldest message not yet received.
+    fn next(&self) -> Result<Option<ReceivedMessage<M>>, TransportError>;
+    /// Messages that the port keeps.
+    fn buffer(&self) -> usize;
+}
+
+impl<M: Message> Incoming<M> for Inlet<M> {
+    fn next(&self) -> Result<Option<ReceivedMessage<M>>, TransportError> {
+        let sample = self.port.receive().map_err(failed("receiving", M::TOPIC))?;
+        self.refused.require_none(M::TOPIC)?;
+        Ok(sample.map(ReceivedMessage))
+    }
+
+    fn buffer(&self) -> usize {
+        self.port.buffer_size()
+    }
+}
+
+/// Receives one message type, oldest first.
+#[doc(alias("reader", "data reader"))]
+#[derive(Debug)]
+pub struct Subscriber<M: Message> {
+    port: Box<dyn Incoming<M>>,
+}
+
+/// A message in shared memory.
+#[derive(Debug)]
+pub struct ReceivedMessage<M: Message>(Sample<ipc::Service, M, ()>);
+
+impl<M: Message> ReceivedMessage<M> {
+    /// The message, unless it has another version.
+    ///
+    /// # Errors
+    /// For another version.
+    pub fn checked(self) -> Result<Self, TransportError> {
+        check_version(&*self.0).map(|()| self)
+    }
+}
+
+impl<M: Message> Deref for ReceivedMessage<M> {
+    type Target = M;
+
+    fn deref(&self) -> &M {
+        &self.0
+    }
+}
+
+impl<M: Message> Borrow<M> for ReceivedMessage<M> {
+    fn borrow(&self) -> &M {
+        self
+    }
+}
+
+impl<M: Message> Subscriber<M> {
+    /// Connects to the publishers that exist by now; otherwise the first call of `receive` does, as in
+    /// [`Publisher::connect`].
+    pub fn connect(&self) -> Result<(), TransportError> {
+        self.port.connect()
+    }
+
+    /// The oldest message not yet received; never waits. Refused when a connection to a publisher failed, since its messages
+    /// would be missing.
+    pub fn receive(&self) -> Result<Option<ReceivedMessage<M>>, TransportError> {
+        self.port.next()?.map(ReceivedMessage::checked).transpose()
+    }
+
+    /// The first message that `is_awaited`, or the newest there is when `deadline_ns` has passed. Polls without
+    /// sleeping: for waits of microseconds. The version of the message is the caller's to check.
+    pub fn latest_by(
+        &self,
+        deadline_ns: u64,
+        waiter: &mut Waiter,
+        is_awaited: impl Fn(&M) -> bool,
+    ) -> Result<Option<ReceivedMessage<M>>, TransportError> {
+        let (mut newest, buffer) = (None, self.port.buffer());
+        let mut spin = waiter.spin();
+        loop {
+            for _ in 0..=buffer {
+                let Some(message) = self.port.next()? else { break };
+                let is_here = is_awaited(&message);
+                newest = Some(message);
+                if is_here {
+                    return Ok(newest);
+                }
+            }
+            if spin.now_ns() >= deadline_ns {
+                return Ok(newest);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -6,8 +6,7 @@ use masseter_can::canopen::NodeId;
 use masseter_can::{Bitrate, BitrateError};
 use masseter_model::geometry::AXES;
 
-use super::error::ScenarioError;
-use super::need::{keyed, require_positive};
+use super::error::{Checked, ScenarioError, keyed, require, require_positive};
 use crate::wording::counted;
 
 /// The node id of the rig's master.
@@ -81,34 +80,25 @@ impl CanConfig {
         Ok(if self.ideal { Bitrate::IDEAL } else { bitrate })
     }
 
-    pub(super) fn validate(&self) -> Result<(), ScenarioError> {
-        if self.heartbeat_producer_ms == 0 {
-            let need = "use at least 1 ms: a heartbeat shows that a node works";
-            return Err(ScenarioError::bad("can.heartbeat_producer_ms", &0, need));
-        }
+    pub(super) fn validate(&self) -> Checked {
+        let need = "use at least 1 ms: a heartbeat shows that a node works";
+        require(self.heartbeat_producer_ms > 0, "can.heartbeat_producer_ms", &0, need)?;
         require_positive(&keyed!("can", self,
             heartbeat_consumer_ms boot_timeout_ms ready_timeout_ms enable_timeout_ms command_timeout_cycles following_limit_m
             following_limit_cycles
         ))?;
         for (axis, id) in self.node_ids.iter().enumerate() {
-            if !(1..MASTER_NODE.get()).contains(id) || self.node_ids[..axis].contains(id) {
-                let need = format!("use 1 to 126, none twice; {MASTER_NODE} is the master");
-                return Err(ScenarioError::bad("can.node_ids", id, need));
-            }
+            let is_free = (1..MASTER_NODE.get()).contains(id) && !self.node_ids[..axis].contains(id);
+            let need = format!("use 1 to 126, none twice; {MASTER_NODE} is the master");
+            require(is_free, "can.node_ids", id, need)?;
         }
-        if self.ideal && !self.is_virtual() {
-            let need = "leave it away with can.interfaces: it replaces their bit rate";
-            return Err(ScenarioError::bad("can.ideal", &true, need));
-        }
-        if let Err(error) = self.bitrate() {
-            return Err(ScenarioError::bad("can.bitrate_bps", &self.bitrate_bps, error.to_string()));
-        }
+        let need = "leave it away with can.interfaces: it replaces their bit rate";
+        require(self.is_virtual() || !self.ideal, "can.ideal", &true, need)?;
+        self.bitrate().map_err(|error| ScenarioError::bad("can.bitrate_bps", &self.bitrate_bps, error))?;
         let distinct = self.interfaces.iter().collect::<BTreeSet<_>>().len();
-        if self.is_virtual() || [self.interfaces.len(), distinct] == [self.buses.len(); 2] {
-            return Ok(());
-        }
-        let need =
-            format!("name {}, one for each of can.buses", counted(self.buses.len() as u64, "interface"));
-        Err(ScenarioError::bad("can.interfaces", &self.interfaces.join(","), need))
+        let is_one_a_bus = [self.interfaces.len(), distinct] == [self.buses.len(); 2];
+        let buses = counted(self.buses.len() as u64, "interface");
+        let need = format!("name {buses}, one for each of can.buses");
+        require(self.is_virtual() || is_one_a_bus, "can.interfaces", &self.interfaces.join(","), need)
     }
 }

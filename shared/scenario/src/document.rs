@@ -1,15 +1,25 @@
-//! A scenario's text as a tree of TOML: where its keys stand, and which arrays stand for tables.
+//! A scenario's text as a tree of TOML: where its keys stand, which arrays stand for tables, and the refusal of a malformed
+//! file with place and key, in the words of the documents.
 
 use std::borrow::Cow;
 use std::path::Path;
 
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
 use serde_json::Value;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer, Error};
 
+use super::error::ScenarioError;
+use crate::input::excerpt;
+use crate::wording::question;
+
 /// More keys than any table has.
 const MOST_SUSPECTS: usize = 100;
+/// What a message on an unknown key begins with.
+pub(super) const UNKNOWN_KEY: &str = "unknown key";
+/// Characters of the longest message of the TOML reader.
+const LONGEST_REASON: usize = 2000;
 
 /// A parsed text with its name in messages.
 pub(super) struct Document<'a> {
@@ -33,7 +43,7 @@ impl<'a> Document<'a> {
             found = Some(in_list.map_or(key_there.span().start, |value| value.span().start));
             table = in_list.unwrap_or(value).get_ref().as_table();
         }
-        found.map_or_else(|| self.path.display().to_string(), |offset| place(self.path, self.text, offset))
+        found.map_or_else(|| self.path.display().to_string(), |offset| place_in(self.path, self.text, offset))
     }
 
     /// The key whose value stands at an offset, with the tables around it.
@@ -68,12 +78,12 @@ impl<'a> Document<'a> {
     /// a table without names.
     pub(super) fn unnamed_table(&self, resolved: &Value) -> Option<(String, String)> {
         let (key, offset) = unnamed_in(&self.root, resolved)?;
-        Some((key, place(self.path, self.text, offset)))
+        Some((key, place_in(self.path, self.text, offset)))
     }
 }
 
 /// File, line and column, from 1.
-pub(super) fn place(path: &Path, text: &str, offset: usize) -> String {
+pub(super) fn place_in(path: &Path, text: &str, offset: usize) -> String {
     let before = text.get(..offset).unwrap_or(text);
     let line = before.matches('\n').count() + 1;
     let column = before.rsplit('\n').next().unwrap_or_default().chars().count() + 1;
@@ -115,4 +125,52 @@ fn unnamed(given: &Spanned<DeValue<'_>>, resolved: &Value) -> Option<(String, us
         }
         _ => None,
     }
+}
+
+/// The refusal of a text that is no `T`. With a document, the text is TOML, and the message names the key.
+pub(super) fn malformed<T: DeserializeOwned>(
+    path: &Path,
+    text: &str,
+    document: Option<&Document>,
+    error: &Error,
+) -> ScenarioError {
+    let offset = error.span().map_or(0, |span| span.start);
+    let mut place = place_in(path, text, offset);
+    let mut reason = in_words(error.message().lines().next().unwrap_or_default());
+    if let Some(twice) = error.span().filter(|_| reason == "duplicate key").and_then(|span| text.get(span)) {
+        reason = format!("{}: the key is there already", excerpt(twice));
+    }
+    let key = document.and_then(|document| {
+        let key = document.key_at(offset)?;
+        let culprit = document.culprit::<T>(&key);
+        if let Some(culprit) = &culprit {
+            place = document.place_of(culprit, None);
+        }
+        Some(culprit.unwrap_or(key))
+    });
+    if let Some(key) = key.filter(|_| !reason.starts_with(UNKNOWN_KEY)) {
+        reason = format!("{}: {reason}", excerpt(&key));
+    }
+    ScenarioError::Malformed { place, reason }
+}
+
+/// A message of the TOML reader in the words of the documents, with the most similar of the keys or values that it
+/// expects.
+pub(super) fn in_words(message: &str) -> String {
+    let message = cut_quotations(message);
+    let known = [("unknown field", UNKNOWN_KEY), ("unknown variant", "unknown value")];
+    let known = known.iter().find_map(|(of_reader, ours)| Some((*ours, message.strip_prefix(of_reader)?)));
+    let Some((ours, rest)) = known else { return message.replace('`', "'") };
+    let mut names = rest.split('`').skip(1).step_by(2);
+    let question = names.next().map_or_else(String::new, |unknown| question(unknown, names));
+    format!("{ours}{}{question}", rest.replace('`', "'"))
+}
+
+/// A message of the TOML reader with every quotation cut.
+fn cut_quotations(message: &str) -> String {
+    let quotations = message.split_inclusive(['`', '"']).map(|part| match part.chars().next_back() {
+        Some(mark @ ('`' | '"')) => excerpt(&part[..part.len() - 1]) + mark.encode_utf8(&mut [0; 4]),
+        _ => excerpt(part),
+    });
+    quotations.collect::<String>().chars().take(LONGEST_REASON).collect()
 }

@@ -1,9 +1,12 @@
-//! Why a scenario is refused.
+//! Why a scenario is refused, and the checks that many of its values share.
 
-use std::fmt;
-use std::path::PathBuf;
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
 
-use crate::input::excerpt;
+use crate::input::{excerpt, read_text};
+
+/// Longest run, s.
+pub(super) const LONGEST_S: f64 = 86_400.0;
 
 /// Why a scenario was refused.
 #[derive(Debug, thiserror::Error)]
@@ -41,9 +44,13 @@ pub enum ScenarioError {
 }
 
 impl ScenarioError {
-    pub(super) fn bad(key: &'static str, value: &dyn fmt::Display, need: impl Into<String>) -> Self {
+    pub(super) fn bad(key: &'static str, value: &dyn Display, need: impl Display) -> Self {
         let value = excerpt(&value.to_string());
-        Self::BadValue { place: None, entry: None, key, value, need: need.into() }
+        Self::BadValue { place: None, entry: None, key, value, need: need.to_string() }
+    }
+
+    pub(super) fn malformed_file(path: &Path, reason: String) -> Self {
+        Self::Malformed { place: path.display().to_string(), reason }
     }
 
     /// The same of a table that has the keys of another one.
@@ -61,4 +68,72 @@ impl ScenarioError {
         }
         self
     }
+}
+
+/// What a check leads to.
+pub(super) type Checked = Result<(), ScenarioError>;
+
+/// The text of a file of at most `most_bytes`.
+pub(super) fn read_limited(path: &Path, most_bytes: u64) -> Result<String, ScenarioError> {
+    read_text(path, most_bytes).map_err(|error| ScenarioError::Unreadable { path: path.to_owned(), error })
+}
+
+/// The values of a table, each with its whole key.
+macro_rules! keyed {
+    ($table:literal, $config:expr, $($field:ident)+) => {
+        [$((concat!($table, ".", stringify!($field)), f64::from($config.$field))),+]
+    };
+}
+
+/// The values of a table, each with its whole key, its least and its greatest value.
+macro_rules! bounded {
+    ($table:literal, $config:expr, $($field:ident [$least:expr, $most:expr])+) => {
+        [$((concat!($table, ".", stringify!($field)), $config.$field, $least, $most)),+]
+    };
+}
+pub(super) use {bounded, keyed};
+
+/// Refuses a value that is not good.
+pub(super) fn require(is_good: bool, key: &'static str, value: &dyn Display, need: impl Display) -> Checked {
+    if is_good { Ok(()) } else { Err(ScenarioError::bad(key, value, need)) }
+}
+
+/// Refuses the first of `values` that is not a finite number above 0.
+pub(super) fn require_positive(values: &[(&'static str, f64)]) -> Checked {
+    values.iter().try_for_each(|&(key, value)| {
+        require(value.is_finite() && value > 0.0, key, &value, "use a finite number above 0")
+    })
+}
+
+/// Refuses a value that is not a finite number, or below 0.
+pub(super) fn require_not_negative(key: &'static str, value: f64) -> Checked {
+    require(value.is_finite() && value >= 0.0, key, &value, "use a finite number not below 0")
+}
+
+/// Refuses the first of `durations` (s) that is not above 0, or longer than a run may be.
+pub(super) fn require_duration(durations: &[(&'static str, f64)]) -> Checked {
+    durations.iter().try_for_each(|&(key, duration_s)| {
+        let is_good = duration_s > 0.0 && duration_s <= LONGEST_S;
+        require(is_good, key, &duration_s, format_args!("use more than 0 and at most {LONGEST_S} s"))
+    })
+}
+
+/// Refuses the first of `values` outside of its two bounds, or not a number. Each value comes with its bounds.
+pub(super) fn require_within(values: &[(&'static str, f64, f64, f64)]) -> Checked {
+    values.iter().try_for_each(|&(key, value, least, most)| {
+        require((least..=most).contains(&value), key, &value, format_args!("use {least} to {most}"))
+    })
+}
+
+/// Checks every entry of a list of tables. A refusal names the entry.
+pub(super) fn require_each<T>(entries: &[T], mut check: impl FnMut(&T) -> Checked) -> Checked {
+    let mut numbered = entries.iter().enumerate();
+    numbered.try_for_each(|(number, entry)| check(entry).map_err(|error| error.of_entry(number)))
+}
+
+/// Refuses a name that cannot be a part of a signal's.
+pub(super) fn require_name(key: &'static str, name: &str) -> Checked {
+    let is_good = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_';
+    let is_name = (1..=64).contains(&name.len()) && name.bytes().all(is_good);
+    require(is_name, key, &format_args!("'{name}'"), "use 1 to 64 lower-case letters, digits or '_'")
 }

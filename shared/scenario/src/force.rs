@@ -1,11 +1,10 @@
-//! Estimate and control of the bite force: `[force_estimate]` and `[force_control]`.
+//! Estimate, measurement and control of the bite force: `[force_estimate]`, `[load_cell]` and `[force_control]`.
 
-use std::f64::consts::FRAC_2_PI;
+use std::f64::consts::{FRAC_2_PI, TAU};
 
 use serde::{Deserialize, Serialize};
 
-use super::error::ScenarioError;
-use super::need::{require_positive, require_within};
+use super::error::{Checked, bounded, keyed, require, require_positive, require_within};
 
 section! {
     /// The estimate of the external force on the platform from the forces of the drives.
@@ -74,12 +73,10 @@ section! {
 }
 
 impl ForceEstimateConfig {
-    pub(super) fn validate(&self) -> Result<(), ScenarioError> {
-        require_within(&[
-            ("force_estimate.observer_time_s", self.observer_time_s, 0.0, 1.0),
-            ("force_estimate.friction_uncertainty", self.friction_uncertainty, 0.0, 10.0),
-            ("force_estimate.rest_speed_m_s", self.rest_speed_m_s, 0.0, 0.1),
-        ])
+    pub(super) fn validate(&self) -> Checked {
+        require_within(&bounded!("force_estimate", self,
+            observer_time_s [0.0, 1.0] friction_uncertainty [0.0, 10.0] rest_speed_m_s [0.0, 0.1]
+        ))
     }
 }
 
@@ -95,39 +92,76 @@ impl ForceControlConfig {
 
     /// Refuses values without use, and a damping below the limit of stability for the delays of lead and of the
     /// observer or the load cell (s).
-    pub(super) fn validate(&self, lead_s: f64, source_s: f64) -> Result<(), ScenarioError> {
-        require_positive(&[
-            ("force_control.contact_n", self.contact_n),
-            ("force_control.bite_s", self.bite_s),
-            ("force_control.tooth_zone_m", self.tooth_zone_m),
-            ("force_control.closing_m_s", self.closing_m_s),
-            ("force_control.food_stiffness_n_per_m", self.food_stiffness_n_per_m),
-            ("force_control.tooth_stiffness_n_per_m", self.tooth_stiffness_n_per_m),
-        ])?;
-        require_within(&[
-            ("force_control.peak_n", self.peak_n, self.contact_n, 1000.0),
-            ("force_control.reach_m", self.reach_m, 1e-6, 0.05),
-        ])?;
+    pub(super) fn validate(&self, lead_s: f64, source_s: f64) -> Checked {
+        require_positive(&keyed!("force_control", self,
+            contact_n bite_s tooth_zone_m closing_m_s food_stiffness_n_per_m tooth_stiffness_n_per_m
+        ))?;
+        require_within(
+            &bounded!("force_control", self, peak_n [self.contact_n, 1000.0] reach_m [1e-6, 0.05]),
+        )?;
         let delay_s = lead_s + source_s + Self::MASS_TIME_S;
-        for (key, damping, stiffness) in [
-            ("force_control.damping_n_s_per_m", self.damping_n_s_per_m, self.food_stiffness_n_per_m),
-            (
-                "force_control.tooth_damping_n_s_per_m",
-                self.tooth_damping_n_s_per_m,
-                self.tooth_stiffness_n_per_m,
-            ),
-        ] {
+        let dampings = keyed!("force_control", self, damping_n_s_per_m tooth_damping_n_s_per_m);
+        let stiffnesses = [self.food_stiffness_n_per_m, self.tooth_stiffness_n_per_m];
+        for ((key, damping), stiffness) in dampings.into_iter().zip(stiffnesses) {
             let least = Self::least_damping_n_s_per_m(stiffness, delay_s);
-            if !(damping >= least && damping.is_finite()) {
-                let need = format!(
-                    "use at least {least:.1}: with less, the loop is not stable against {stiffness} N/m with a delay of \
-                     {:.1} ms; or state a smaller stiffness",
-                    delay_s * 1e3
-                );
-                return Err(ScenarioError::bad(key, &damping, need));
-            }
+            let need = format!(
+                "use at least {least:.1}: with less, the loop is not stable against {stiffness} N/m with a delay of \
+                 {:.1} ms; or state a smaller stiffness",
+                delay_s * 1e3
+            );
+            require(damping >= least && damping.is_finite(), key, &damping, need)?;
         }
         Ok(())
+    }
+}
+
+section! {
+    /// The load cell.
+    #[derive(Copy)]
+    pub struct LoadCellConfig {
+        /// Bandwidth of its amplifier, a low-pass of first order, Hz.
+        pub bandwidth_hz: f64 = 500.0,
+        /// Noise of a sample, rms, N.
+        pub noise_n: f64 = 0.1,
+        /// What the cell shows without load, N.
+        pub offset_n: f64 = 0.0,
+        /// Ends of its range on both sides, N: beyond them the cell shows these.
+        pub range_n: f64 = 1000.0,
+    }
+}
+
+impl LoadCellConfig {
+    /// Time constant of the low-pass, s.
+    pub fn time_s(&self) -> f64 {
+        1.0 / (TAU * self.bandwidth_hz)
+    }
+
+    pub(super) fn validate(&self) -> Checked {
+        require_within(&bounded!("load_cell", self,
+            bandwidth_hz [1.0, 1e5] noise_n [0.0, 1000.0] offset_n [-1000.0, 1000.0] range_n [0.1, 1e5]
+        ))
+    }
+
+    /// Refuses a cell by which this control cannot tell a bite: one that is full below the peak, or that shows a contact
+    /// without one.
+    pub(super) fn require_for(&self, control: &ForceControlConfig) -> Checked {
+        let Self { noise_n, offset_n, range_n, .. } = *self;
+        let [most_offset_n, most_noise_n] = [control.contact_n / 2.0, control.contact_n / 5.0];
+        let least_range_n = 1.2 * control.peak_n + offset_n.abs() + 5.0 * noise_n;
+        let need = format!(
+            "use less than {most_offset_n} N on both sides, half of force_control.contact_n: with more, the controller \
+             takes the offset for a contact, or misses one"
+        );
+        require(offset_n.abs() < most_offset_n, "load_cell.offset_n", &offset_n, need)?;
+        let need = format!(
+            "use at most {most_noise_n} N, a fifth of force_control.contact_n: with more, noise looks like a contact"
+        );
+        require(noise_n <= most_noise_n, "load_cell.noise_n", &noise_n, need)?;
+        let need = format!(
+            "use at least {least_range_n} N, 1.2 times force_control.peak_n with offset and five times the noise: a \
+             cell at the end of its range hides the force"
+        );
+        require(range_n >= least_range_n, "load_cell.range_n", &range_n, need)
     }
 }
 
@@ -157,5 +191,15 @@ mod tests {
                 Some(reason) => assert!(said.as_ref().is_err_and(|said| said.contains(reason)), "{said:?}"),
             }
         }
+    }
+
+    #[test]
+    fn a_load_cell_at_the_bounds_of_control_is_accepted() {
+        let control = ForceControlConfig { peak_n: 60.0, ..ForceControlConfig::default() };
+        let cell =
+            LoadCellConfig { noise_n: 2.0, offset_n: -4.0, range_n: 86.0, ..LoadCellConfig::default() };
+        assert!(cell.require_for(&control).is_ok());
+        let narrow = LoadCellConfig { range_n: 85.9, ..cell };
+        assert!(narrow.require_for(&control).is_err());
     }
 }

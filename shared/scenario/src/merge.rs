@@ -1,6 +1,18 @@
-//! Merging of TOML tables.
+//! Tables in place of others: over the values of a kind that comes with the rig, over the file of a robot, and over a
+//! scenario.
 
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Deserialize;
+use serde::de::{DeserializeOwned, Error};
+use toml::de::Error as TomlError;
 use toml::{Table, Value};
+
+use super::error::ScenarioError;
+
+/// The tables that describe a robot and not what is done with it. All scenarios that name its file in `robot` share them.
+const TABLES: [&str; 7] = ["mechanism", "jaw", "limits", "can", "drives", "drive_profile", "dynamics"];
 
 /// Replaces the values that are given, and leaves the others of their tables. A table of another `kind` is replaced whole. A
 /// table given for a list changes the entries of the list by their names.
@@ -47,6 +59,74 @@ fn merge_entries(list_name: &str, list: &mut [Value], given: Table) -> Result<()
 fn entry_name(entry: &Value) -> Option<&str> {
     let entry = entry.as_table()?;
     ["name", "kind"].into_iter().find_map(|key| entry.get(key)?.as_str())
+}
+
+/// The kinds of one sort of table: names, and TOML texts with their values. The first is that of a table without a `kind`.
+pub(super) type Kinds = [(&'static str, &'static str)];
+
+/// A table as it is given. In the manifest's JSON a key that is not given is null.
+#[derive(Deserialize)]
+#[serde(transparent)]
+pub(super) struct Given(BTreeMap<String, Option<GivenValue>>);
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum GivenValue {
+    Table(Given),
+    Value(Value),
+}
+
+impl Given {
+    /// The values of its kind, replaced by those that are given.
+    pub(super) fn over<T: DeserializeOwned>(self, kinds: &Kinds) -> Result<T, TomlError> {
+        over_kind(kinds, self.into_table())
+    }
+
+    fn into_table(self) -> Table {
+        let value = |given| match given {
+            GivenValue::Table(table) => Value::Table(table.into_table()),
+            GivenValue::Value(value) => value,
+        };
+        self.0.into_iter().filter_map(|(key, given)| Some((key, value(given?)))).collect()
+    }
+}
+
+/// The values of the kind that a table names, replaced by the other values of the table.
+pub(super) fn over_kind<T: DeserializeOwned>(kinds: &Kinds, given: Table) -> Result<T, TomlError> {
+    let kind = given.get("kind").and_then(Value::as_str).unwrap_or(kinds[0].0);
+    let Some((_, text)) = kinds.iter().find(|(name, _)| *name == kind) else {
+        let names = kinds.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+        return Err(TomlError::custom(format!("there is no kind '{kind}'; use {names}")));
+    };
+    let mut whole: Table = toml::from_str(text).expect("the rig's kinds are TOML");
+    merge(&mut whole, given).map_err(TomlError::custom)?;
+    whole.try_into()
+}
+
+/// The tables of the robot's file at `path`, whose paths are relative to its folder. The values are not checked here.
+pub(super) fn robot_tables(path: &Path, mut given: Table) -> Result<Table, ScenarioError> {
+    if let Some(other) = given.keys().find(|key| !TABLES.contains(&key.as_str())) {
+        let reason = format!("{other} does not describe a robot; a robot's file has {}", TABLES.join(", "));
+        return Err(ScenarioError::malformed_file(path, reason));
+    }
+    let folder = path.parent().unwrap_or(Path::new(""));
+    if let Some(file) = given.get_mut("drives").and_then(|drives| drives.get_mut("memory")) {
+        make_absolute(folder, file);
+    }
+    let profiles = given.get_mut("drive_profile").and_then(Value::as_array_mut);
+    for file in profiles.into_iter().flatten().filter_map(|profile| profile.get_mut("dcf")) {
+        make_absolute(folder, file);
+    }
+    Ok(given)
+}
+
+/// Makes a file's path independent of the folder that the path is relative to.
+fn make_absolute(folder: &Path, file: &mut Value) {
+    if let Some(name) = file.as_str() {
+        let whole = folder.join(name);
+        let whole = std::path::absolute(&whole).unwrap_or(whole);
+        *file = Value::from(whole.to_string_lossy().into_owned());
+    }
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::input::excerpt;
-use crate::wording::nearest;
+use crate::wording::question;
 
 /// The kind of a quantity. Values of different kinds cannot be compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -218,8 +218,7 @@ impl FromStr for Quantity {
             number.ok_or_else(|| refused("write a number and its unit, such as \"50 um\"".to_owned()))?;
         let name = unit.trim();
         let unit = Unit::named(name).ok_or_else(|| {
-            let question = nearest(name, UNITS.iter().map(|unit| unit.name))
-                .map_or_else(String::new, |likely| format!("; did you mean '{likely}'?"));
+            let question = question(name, UNITS.iter().map(|unit| unit.name));
             refused(format!("the unit '{}' is unknown{question}", excerpt(name)))
         })?;
         if !(number * unit.si).is_finite() {

@@ -52,15 +52,13 @@ pub fn numbers(line: &str, columns: &[&str]) -> Result<Vec<f64>, String> {
     }
     let (found, expected) = (fields(line).count(), columns.len());
     if found != expected {
-        return Err(format!(
-            "{}, expected {expected}; complete the line or delete it",
-            counted(found as u64, "field")
-        ));
+        let found = counted(found as u64, "field");
+        return Err(format!("{found}, expected {expected}; complete the line or delete it"));
     }
-    fields(line).zip(columns).map(|(text, column)| number(text, column)).collect()
+    fields(line).zip(columns).map(|(text, column)| finite_number(text, column)).collect()
 }
 
-fn number(text: &str, column: &str) -> Result<f64, String> {
+fn finite_number(text: &str, column: &str) -> Result<f64, String> {
     let finite = text.parse().ok().filter(|value: &f64| value.is_finite());
     finite.ok_or_else(|| {
         let text = excerpt(text);

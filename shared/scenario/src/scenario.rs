@@ -6,22 +6,18 @@ use std::path::{Path, PathBuf};
 use masseter_model::geometry::{AXES, AXIS_NAMES, MechanismConfig};
 use toml::Table;
 
-use super::circle::refuse_circles;
-use super::document::Document;
+use super::document::{Document, UNKNOWN_KEY, in_words, malformed};
 use super::drive_profile::over_kinds;
-use super::error::ScenarioError;
-use super::food::over_food;
-use super::malformed::{UNKNOWN_KEY, in_words, malformed};
-use super::merge::merge;
-use super::need::{LONGEST_S, SHORTEST_MOTION_S, require_within};
-use super::when::EntryNames;
+use super::error::{Checked, LONGEST_S, ScenarioError, read_limited, require, require_each, require_within};
+use super::jaw::over_food;
+use super::merge::{merge, robot_tables};
+use super::when::{EntryNames, refuse_circles};
 use super::{
     AxisScale, CanConfig, ChecksConfig, ControllerConfig, DriveProfile, DrivesConfig, DryConfig,
     DynamicsConfig, ExpectConfig, FaultConfig, FoodConfig, ForceControlConfig, ForceEstimateConfig,
     ForceSource, JawConfig, LoadCellConfig, MotionConfig, RealtimeConfig, RecordingConfig, RequirementConfig,
-    StimulusConfig, TeethConfig, ToothConfig, TrajectoryLimitsConfig,
+    StimulusConfig, TeethConfig, ToothConfig, TrajectoryLimitsConfig, dynamics,
 };
-use super::{dynamics, friction, robot_file};
 use crate::input::{excerpt, read_text};
 
 /// Size of the largest scenario file, bytes.
@@ -30,6 +26,8 @@ const MOST_BYTES: u64 = 1 << 20;
 const LISTS: [&str; 3] = ["faults", "stimulus", "require"];
 /// Longest time after a safe stop, s.
 const LONGEST_OBSERVATION_S: f64 = 10.0;
+/// Shortest motion, s: a hundred samples at 1 kHz.
+const SHORTEST_MOTION_S: f64 = 0.1;
 
 /// Nanoseconds in a second.
 const SECOND_NS: u64 = 1_000_000_000;
@@ -149,13 +147,13 @@ impl Scenario {
     /// [`ScenarioError`] for a file that cannot be read, is no regular file or is larger than 1 MiB, and those of
     /// [`Self::parse`].
     pub fn read(path: &Path) -> Result<Self, ScenarioError> {
-        let text = read_text(path, MOST_BYTES)
-            .map_err(|error| ScenarioError::Unreadable { path: path.to_owned(), error })?;
+        let text = read_limited(path, MOST_BYTES)?;
         let mut scenario = Self::parse(path, &text)?;
         let folder = path.parent().unwrap_or(Path::new(""));
         if let Some(robot) = &scenario.robot {
             let mut whole = Self::read_robot(&folder.join(robot))?;
-            merge(&mut whole, table_of(&text)).map_err(|reason| Self::malformed_at(path, reason))?;
+            merge(&mut whole, table_of(&text))
+                .map_err(|reason| ScenarioError::malformed_file(path, reason))?;
             scenario = Self::parse(path, &whole.to_string())?;
         }
         if let Some(memory) = &mut scenario.drives.memory {
@@ -168,11 +166,10 @@ impl Scenario {
 
     /// The tables of a robot's file, each checked by itself.
     fn read_robot(path: &Path) -> Result<Table, ScenarioError> {
-        let text = read_text(path, MOST_BYTES)
-            .map_err(|error| ScenarioError::Unreadable { path: path.to_owned(), error })?;
+        let text = read_limited(path, MOST_BYTES)?;
         let alone = Self::parse(path, &text)?;
         alone.validate().map_err(|refusal| Self::place_refusal(refusal, path))?;
-        robot_file::tables(path, table_of(&text))
+        robot_tables(path, table_of(&text))
     }
 
     /// The files that a run reads beside the scenario, each with the name of its copy in the run's folder.
@@ -289,12 +286,8 @@ impl Scenario {
         for list in LISTS {
             whole.entry(list).or_insert_with(|| toml::Value::Array(Vec::new()));
         }
-        merge(&mut whole, given).map_err(|reason| Self::malformed_at(changed, reason))?;
+        merge(&mut whole, given).map_err(|reason| ScenarioError::malformed_file(changed, reason))?;
         Self::parse(changed, &whole.to_string())
-    }
-
-    fn malformed_at(path: &Path, reason: String) -> ScenarioError {
-        ScenarioError::Malformed { place: path.display().to_string(), reason }
     }
 
     /// The question whether a key of a scenario is meant, for a name that is none but like one.
@@ -332,70 +325,56 @@ impl Scenario {
         self.limits.validate()?;
         self.dry.validate()?;
         self.controller.validate(self.rate_hz)?;
-        self.check_torque_offsets()?;
+        self.require_torque_offsets()?;
         self.validate_forces()?;
         self.checks.validate()
     }
 
-    fn validate_run(&self) -> Result<(), ScenarioError> {
-        let named = self.name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_');
-        if !named || !(1..=64).contains(&self.name.len()) {
-            let need = "use 1 to 64 letters, digits, '-' or '_'";
-            return Err(ScenarioError::bad("name", &format!("'{}'", self.name), need));
-        }
-        if !RATES_HZ.contains(&self.rate_hz) {
-            let need = format!("use {} to {} Hz", RATES_HZ.start(), RATES_HZ.end());
-            return Err(ScenarioError::bad("rate_hz", &self.rate_hz, need));
-        }
+    fn validate_run(&self) -> Checked {
+        let is_good = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_';
+        let is_name = (1..=64).contains(&self.name.len()) && self.name.bytes().all(is_good);
+        let name = format!("'{}'", self.name);
+        require(is_name, "name", &name, "use 1 to 64 letters, digits, '-' or '_'")?;
+        let need = format!("use {} to {} Hz", RATES_HZ.start(), RATES_HZ.end());
+        require(RATES_HZ.contains(&self.rate_hz), "rate_hz", &self.rate_hz, need)?;
         let duration_s = self.duration_s.unwrap_or(LONGEST_S);
         require_within(&[("duration_s", duration_s, SHORTEST_MOTION_S, LONGEST_S)])
     }
 
     /// Faults, stimuli and their order by `after`, then requirements and the expected outcome.
-    fn validate_entries(&self) -> Result<(), ScenarioError> {
+    fn validate_entries(&self) -> Checked {
         let (arch, entries) = (self.arch(), self.entry_names());
-        for (number, fault) in self.faults.iter().enumerate() {
-            fault.validate(&self.can, &entries).map_err(|error| error.of_entry(number))?;
-        }
-        for (number, stimulus) in self.stimulus.iter().enumerate() {
-            stimulus.validate(&entries, &arch).map_err(|error| error.of_entry(number))?;
-        }
+        require_each(&self.faults, |fault| fault.validate(&self.can, &entries))?;
+        require_each(&self.stimulus, |stimulus| stimulus.validate(&entries, &arch))?;
         let faults = self.faults.iter().map(|fault| fault.when(&entries).map(|when| when.start));
         let stimuli = self.stimulus.iter().map(|stimulus| stimulus.when(&entries).map(|when| when.start));
         let [faults, stimuli] = [faults.collect::<Result<Vec<_>, _>>()?, stimuli.collect::<Result<_, _>>()?];
         refuse_circles(&faults, &stimuli, &entries)?;
-        for (number, requirement) in self.require.iter().enumerate() {
-            requirement.validate().map_err(|error| error.of_entry(number))?;
-        }
+        require_each(&self.require, RequirementConfig::validate)?;
         self.expect.as_ref().map_or(Ok(()), ExpectConfig::validate)
     }
 
     /// Load cell, estimate and control of the bite force.
-    fn validate_forces(&self) -> Result<(), ScenarioError> {
+    fn validate_forces(&self) -> Checked {
         let estimate = self.force_estimate.unwrap_or_default();
         estimate.validate()?;
         if let Some(cell) = &self.load_cell {
             cell.validate()?;
-            if !self.can.is_virtual() {
-                let need = "leave the table away with can.interfaces: the rig reads no load cell there";
-                return Err(ScenarioError::bad("load_cell", &"given", need));
-            }
+            let need = "leave the table away with can.interfaces: the rig reads no load cell there";
+            require(self.can.is_virtual(), "load_cell", &"given", need)?;
         }
         if let Some(control) = &self.force_control {
-            let cell = self.check_source(control)?;
+            let cell = self.source_of(control)?;
             let source_s = cell.map_or(estimate.observer_time_s, LoadCellConfig::time_s);
             control.validate(self.controller.lead_cycles * self.period_s(), source_s)?;
             cell.map_or(Ok(()), |cell| cell.require_for(control))?;
         }
-        if self.is_force_estimated() {
-            friction::require_open_screws(&self.model().friction)?;
-        }
-        Ok(())
+        if self.is_force_estimated() { dynamics::require_open_screws(&self.model().friction) } else { Ok(()) }
     }
 
     /// Control by a load cell needs one, and only the emulated jaw has one. Returns the cell; none for control by the
     /// estimate.
-    fn check_source(&self, control: &ForceControlConfig) -> Result<Option<&LoadCellConfig>, ScenarioError> {
+    fn source_of(&self, control: &ForceControlConfig) -> Result<Option<&LoadCellConfig>, ScenarioError> {
         if control.source == ForceSource::Estimate {
             return Ok(None);
         }
@@ -414,19 +393,15 @@ impl Scenario {
     }
 
     /// Feed-forward needs an object of the process data that carries it.
-    fn check_torque_offsets(&self) -> Result<(), ScenarioError> {
-        let without = (0..AXES).find(|&axis| !self.profile(axis).pdos.rpdo1().has_torque_offset());
-        match without {
-            Some(axis) if self.controller.feed_forward_torque => {
-                let need = format!(
-                    "the drive of {} takes no torque offset; add \"60B2h\" to rpdo1 in [drive_profile.pdos], as far as the \
-                     drive can map the object",
-                    AXIS_NAMES[axis]
-                );
-                Err(ScenarioError::bad("controller.feed_forward_torque", &true, need))
-            }
-            _ => Ok(()),
-        }
+    fn require_torque_offsets(&self) -> Checked {
+        let takes_none = |axis: &usize| !self.profile(*axis).pdos.rpdo1().has_torque_offset();
+        let Some(axis) = (0..AXES).find(takes_none) else { return Ok(()) };
+        let need = format!(
+            "the drive of {} takes no torque offset; add \"60B2h\" to rpdo1 in [drive_profile.pdos], as far as the \
+             drive can map the object",
+            AXIS_NAMES[axis]
+        );
+        require(!self.controller.feed_forward_torque, "controller.feed_forward_torque", &true, need)
     }
 
     /// Masses and friction that the controller believes in.
@@ -443,9 +418,7 @@ impl Scenario {
 
     /// The lower teeth that the jaw has, by their numbers.
     pub fn arch(&self) -> Vec<ToothConfig> {
-        self.teeth
-            .as_ref()
-            .map_or_else(|| TeethConfig::default().arch(&self.jaw), |teeth| teeth.arch(&self.jaw))
+        self.teeth.clone().unwrap_or_default().arch(&self.jaw)
     }
 
     /// The foods of the whole run, those of the stimuli too.

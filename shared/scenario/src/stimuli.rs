@@ -5,11 +5,9 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::error::ScenarioError;
-use super::food::{FoodConfig, over_food};
-use super::need::{require_name, require_within};
+use super::error::{Checked, ScenarioError, require, require_name, require_within};
+use super::jaw::{FoodConfig, ToothConfig, over_food};
 use super::quantity::{Dimension, Quantity};
-use super::teeth::ToothConfig;
 use super::when::{EntryNames, When, WhenKeys};
 
 /// The course of a stimulus between its beginning and its end.
@@ -50,7 +48,7 @@ impl Shape {
 
 /// One stimulus. Exactly one of a push, `food`, `payload`, `parameter` and `stop` says what happens. A push is `push_n`,
 /// `torque_n_m` or both; or `push_table`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StimulusConfig {
     /// Its name in requirements and in `after`; that of what happens when absent.
@@ -100,24 +98,8 @@ impl StimulusConfig {
     pub const MOST_TABLE_BYTES: u64 = 16 << 20;
 
     /// A stimulus at that time of the motion that does nothing yet.
-    pub const fn at(at_s: f64) -> Self {
-        Self {
-            name: None,
-            at_s,
-            after: None,
-            for_s: None,
-            shape: Shape::Step,
-            frequency_hz: None,
-            push_n: None,
-            torque_n_m: None,
-            push_table: None,
-            point_m: None,
-            food: None,
-            payload: None,
-            parameter: None,
-            value: None,
-            stop: false,
-        }
+    pub fn at(at_s: f64) -> Self {
+        Self { at_s, ..Self::default() }
     }
 
     /// Its name in requirements.
@@ -155,19 +137,12 @@ impl StimulusConfig {
         WhenKeys { names, at_s, after, for_s: self.for_s, from_s: None, until_s: None }.resolve(entries)
     }
 
-    pub(super) fn validate(
-        &self,
-        entries: &EntryNames<'_>,
-        arch: &[ToothConfig],
-    ) -> Result<(), ScenarioError> {
-        let refuse = |key, value: &str, need: &str| Err(ScenarioError::bad(key, &value, need));
+    pub(super) fn validate(&self, entries: &EntryNames<'_>, arch: &[ToothConfig]) -> Checked {
         self.when(entries)?;
-        if let Some(name) = &self.name {
-            require_name("stimulus.name", name)?;
-        }
+        self.name.as_ref().map_or(Ok(()), |name| require_name("stimulus.name", name))?;
         let Some(what) = self.what() else {
             let need = "give exactly one of push_n and torque_n_m, push_table, food, payload, parameter, stop = true";
-            return refuse("stimulus.push_n", "none or several", need);
+            return Err(ScenarioError::bad("stimulus.push_n", &"none or several", need));
         };
         let (has_force, is_table) = (self.push_n.is_some(), self.push_table.is_some());
         let keys = [
@@ -177,44 +152,37 @@ impl StimulusConfig {
             ("stimulus.value", self.value.is_some(), what == "parameter"),
             ("stimulus.for_s", self.for_s.is_some(), what != "stop" && what != "parameter"),
         ];
-        if let Some((key, ..)) = keys.into_iter().find(|(_, is_given, has_effect)| *is_given && !has_effect) {
-            return refuse(key, "given", "leave it away: it has no effect here");
-        }
-        if matches!(self.shape, Shape::Ramp | Shape::HalfSine) && self.for_s.is_none() {
-            return refuse("stimulus.for_s", "none", "give the time in which the shape comes to its end");
-        }
-        if self.shape == Shape::Sine && self.frequency_hz.is_none() {
-            return refuse("stimulus.frequency_hz", "none", "give the frequency of the sine");
-        }
-        if what == "parameter" && self.value.is_none() {
-            return refuse("stimulus.value", "none", "give the value that the parameter gets");
-        }
-        self.check_ranges()?;
+        keys.into_iter().try_for_each(|(key, is_given, has_effect)| {
+            require(has_effect || !is_given, key, &"given", "leave it away: it has no effect here")
+        })?;
+        let has_end = matches!(self.shape, Shape::Step | Shape::Sine) || self.for_s.is_some();
+        let need = "give the time in which the shape comes to its end";
+        require(has_end, "stimulus.for_s", &"none", need)?;
+        let has_frequency = self.shape != Shape::Sine || self.frequency_hz.is_some();
+        require(has_frequency, "stimulus.frequency_hz", &"none", "give the frequency of the sine")?;
+        let has_value = what != "parameter" || self.value.is_some();
+        require(has_value, "stimulus.value", &"none", "give the value that the parameter gets")?;
+        self.require_ranges()?;
         self.food.as_ref().map_or(Ok(()), |food| food.validate(arch))
     }
 
-    fn check_ranges(&self) -> Result<(), ScenarioError> {
-        for push_n in self.push_n.into_iter().flatten() {
-            require_within(&[("stimulus.push_n", push_n, -2000.0, 2000.0)])?;
-        }
-        for torque_n_m in self.torque_n_m.into_iter().flatten() {
-            require_within(&[("stimulus.torque_n_m", torque_n_m, -200.0, 200.0)])?;
-        }
-        for point_m in self.point_m.into_iter().flatten() {
-            require_within(&[("stimulus.point_m", point_m, -0.5, 0.5)])?;
+    fn require_ranges(&self) -> Checked {
+        for (key, vector, most) in [
+            ("stimulus.push_n", self.push_n, 2000.0),
+            ("stimulus.torque_n_m", self.torque_n_m, 200.0),
+            ("stimulus.point_m", self.point_m, 0.5),
+        ] {
+            require_within(&vector.unwrap_or_default().map(|part| (key, part, -most, most)))?;
         }
         if let Some(frequency_hz) = self.frequency_hz {
             require_within(&[("stimulus.frequency_hz", frequency_hz, 0.01, 1000.0)])?;
         }
         if let Some(payload) = self.payload {
-            let kg = payload
-                .si_of(Dimension::Mass)
-                .map_err(|need| ScenarioError::bad("stimulus.payload", &payload, need))?;
+            let kg = payload.si_of(Dimension::Mass);
+            let kg = kg.map_err(|need| ScenarioError::bad("stimulus.payload", &payload, need))?;
             require_within(&[("stimulus.payload", kg, 0.0, 20.0)])?;
         }
-        if self.value.is_some_and(|value| !value.is_finite()) {
-            return Err(ScenarioError::bad("stimulus.value", &"not finite", "use a finite number"));
-        }
-        Ok(())
+        let is_number = self.value.is_none_or(f64::is_finite);
+        require(is_number, "stimulus.value", &"not finite", "use a finite number")
     }
 }

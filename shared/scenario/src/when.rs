@@ -1,14 +1,14 @@
 //! When a fault or a stimulus acts: from an instant on, for a time.
 //!
-//! Times count from switch-on, from the beginning of the motion, or from another occurrence. This module resolves names;
-//! the runtime's `Injection` follows the occurrences of a run.
+//! Times count from switch-on, from the beginning of the motion, or from another occurrence. This module resolves names, and
+//! refuses times that count from each other; the runtime's `Injection` follows the occurrences of a run.
 
 use std::collections::BTreeMap;
+use std::iter::successors;
 
-use super::error::ScenarioError;
-use super::need::{require_duration, require_not_negative};
-use crate::controller_state::ControllerState;
-use crate::wording::nearest;
+use super::control::ControllerState;
+use super::error::{Checked, ScenarioError, require, require_duration, require_not_negative};
+use crate::wording::question;
 
 /// What the time of a fault or a stimulus counts from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,8 +56,7 @@ impl<'a> EntryNames<'a> {
             Some(Some(start)) => Ok(*start),
             Some(None) => Err("several entries have this name: give each a name of its own".to_owned()),
             None => {
-                let question = nearest(name, self.starts.keys().map(String::as_str))
-                    .map_or_else(String::new, |likely| format!("; did you mean '{likely}'?"));
+                let question = question(name, self.starts.keys().map(String::as_str));
                 Err(format!("use fault.NAME, stimulus.NAME or controller.STATE{question}"))
             }
         }
@@ -90,45 +89,95 @@ impl WhenKeys<'_> {
     /// Resolves the keys.
     pub(super) fn resolve(&self, entries: &EntryNames<'_>) -> Result<When, ScenarioError> {
         let [at, after, for_s, from, until] = self.names;
-        let refuse = |key, value: &str, need: &str| Err(ScenarioError::bad(key, &value, need));
+        let duration_s = self.for_s.map(|given_s| (for_s, given_s));
         match (self.at_s, self.from_s) {
-            (None, None) => return refuse(at, "none", "say when: at_s, in seconds of the motion"),
+            (None, None) => Err(ScenarioError::bad(at, &"none", "say when: at_s, in seconds of the motion")),
             (Some(_), Some(_)) => {
-                return refuse(
-                    from,
-                    "given",
-                    "give at_s (seconds of the motion) or from_s (since switch-on), not both",
-                );
+                let need = "give at_s (seconds of the motion) or from_s (since switch-on), not both";
+                Err(ScenarioError::bad(from, &"given", need))
             }
-            (Some(at_s), None) => require_not_negative(&[(at, at_s)])?,
-            (None, Some(from_s)) => require_not_negative(&[(from, from_s)])?,
+            (Some(at_s), None) => {
+                require_not_negative(at, at_s)?;
+                require_duration(duration_s.as_slice())?;
+                let need = "give for_s with at_s; until_s goes with from_s";
+                require(self.until_s.is_none(), until, &"given", need)?;
+                let refused =
+                    |name: &str, need: String| ScenarioError::bad(after, &format!("'{name}'"), need);
+                let named = self.after.map(|name| entries.start(name).map_err(|need| refused(name, need)));
+                let start = named.unwrap_or(Ok(Start::State(ControllerState::Running)))?;
+                Ok(When { start, begin_s: at_s, for_s: self.for_s })
+            }
+            (None, Some(from_s)) => {
+                require_not_negative(from, from_s)?;
+                require_duration(duration_s.as_slice())?;
+                let need = "give it with at_s, which then counts from there";
+                require(self.after.is_none(), after, &"given", need)?;
+                let is_one = self.for_s.is_none() || self.until_s.is_none();
+                require(is_one, for_s, &"given", "give for_s or until_s, not both")?;
+                let left_s = self.until_s.map(|until_s| until_s - from_s);
+                let is_left = left_s.is_none_or(|left_s| left_s.is_finite() && left_s > 0.0);
+                let until_s = self.until_s.unwrap_or_default();
+                require(is_left, until, &until_s, "use a finite number above from_s")?;
+                Ok(When { start: Start::SwitchOn, begin_s: from_s, for_s: self.for_s.or(left_s) })
+            }
         }
-        if let Some(given) = self.for_s {
-            require_duration(&[(for_s, given)])?;
+    }
+}
+
+/// Refuses entries whose times count from each other, or from themselves. The starts are those of the faults and of the
+/// stimuli, in their order.
+pub(super) fn refuse_circles(faults: &[Start], stimuli: &[Start], entries: &EntryNames<'_>) -> Checked {
+    let before = |start: Start| match start {
+        Start::Fault(place) => faults.get(place).copied(),
+        Start::Stimulus(place) => stimuli.get(place).copied(),
+        Start::SwitchOn | Start::State(_) => None,
+    };
+    let place = |start: Start| match start {
+        Start::Fault(place) => Some(place),
+        Start::Stimulus(place) => Some(faults.len() + place),
+        Start::SwitchOn | Start::State(_) => None,
+    };
+    let all = (0..faults.len()).map(Start::Fault).chain((0..stimuli.len()).map(Start::Stimulus));
+    // The walk that first came to each entry: every entry is looked at once.
+    let mut first_walk = vec![None; faults.len() + stimuli.len()];
+    for (walk, entry) in all.enumerate() {
+        for start in successors(Some(entry), |start| before(*start)) {
+            let Some(there) = place(start).map(|place| &mut first_walk[place]) else { break };
+            match there {
+                None => *there = Some(walk),
+                Some(first) if *first == walk => return Err(refuse_circle(start, before, place, entries)),
+                Some(_) => break,
+            }
         }
-        if let Some(from_s) = self.from_s {
-            if self.after.is_some() {
-                return refuse(after, "given", "give it with at_s, which then counts from there");
-            }
-            if self.for_s.is_some() && self.until_s.is_some() {
-                return refuse(for_s, "given", "give for_s or until_s, not both");
-            }
-            let left_s = self.until_s.map(|until_s| until_s - from_s);
-            if left_s.is_some_and(|left_s| !(left_s.is_finite() && left_s > 0.0)) {
-                let value = self.until_s.unwrap_or_default();
-                return Err(ScenarioError::bad(until, &value, "use a finite number above from_s"));
-            }
-            return Ok(When { start: Start::SwitchOn, begin_s: from_s, for_s: self.for_s.or(left_s) });
-        }
-        if self.until_s.is_some() {
-            return refuse(until, "given", "give for_s with at_s; until_s goes with from_s");
-        }
-        let start = match self.after {
-            None => Start::State(ControllerState::Running),
-            Some(name) => {
-                entries.start(name).map_err(|need| ScenarioError::bad(after, &format!("'{name}'"), need))?
-            }
-        };
-        Ok(When { start, begin_s: self.at_s.unwrap_or_default(), for_s: self.for_s })
+    }
+    Ok(())
+}
+
+/// The refusal of a circle, told from its first entry on.
+fn refuse_circle(
+    on_it: Start,
+    before: impl Fn(Start) -> Option<Start> + Copy,
+    place: impl Fn(Start) -> Option<usize>,
+    entries: &EntryNames<'_>,
+) -> ScenarioError {
+    let round = |from| successors(Some(from), move |start| before(*start).filter(|next| *next != from));
+    let first = round(on_it).min_by_key(|start| place(*start)).unwrap_or(on_it);
+    let names = round(first).chain([first]).map(|start| start_name(start, entries));
+    let circle = names.collect::<Vec<_>>().join(" after ");
+    let need = "these times count from each other, so nothing of them begins: let one count from the motion";
+    let (key, number) = match first {
+        Start::Stimulus(number) => ("stimulus.after", number),
+        Start::Fault(number) => ("faults.after", number),
+        Start::SwitchOn | Start::State(_) => ("faults.after", 0),
+    };
+    ScenarioError::bad(key, &circle, need).of_entry(number)
+}
+
+fn start_name(start: Start, entries: &EntryNames<'_>) -> String {
+    match start {
+        Start::Fault(place) => format!("fault.{}", entries.faults[place]),
+        Start::Stimulus(place) => format!("stimulus.{}", entries.stimuli[place]),
+        Start::SwitchOn => "switch-on".to_owned(),
+        Start::State(state) => format!("controller.{}", state.name()),
     }
 }

@@ -57,3 +57,16 @@ pub fn nearest<'a>(unknown: &str, names: impl IntoIterator<Item = &'a str>) -> O
     let likely = rated.filter(|(likeness, _)| *likeness >= LIKELY);
     likely.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name)
 }
+
+/// The question whether the most similar of the names is meant, as the end of a sentence; empty if all are unlike it.
+///
+/// # Examples
+/// ```
+/// use masseter_scenario::wording::question;
+///
+/// assert_eq!(question("stat", ["command", "state"]), "; did you mean 'state'?");
+/// assert_eq!(question("jaw", ["command", "state"]), "");
+/// ```
+pub fn question<'a>(unknown: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+    nearest(unknown, names).map_or_else(String::new, |likely| format!("; did you mean '{likely}'?"))
+}

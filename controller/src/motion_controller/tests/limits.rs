@@ -42,7 +42,7 @@ fn an_axis_that_would_pass_its_velocity_limit_stops_the_controller() {
     for (axis, highest_m_s) in highest_speed_m_s().into_iter().enumerate() {
         let run_with = |limit_m_s: f64| {
             let mut bench = Bench::new();
-            bench.controller.velocity_limit_m_s[axis] = limit_m_s;
+            bench.controller.targets.velocity_limit_m_s[axis] = limit_m_s;
             (0..5000).for_each(|_| bench.cycle(Some));
             bench
         };

@@ -53,7 +53,7 @@ impl Bench {
 
     fn cycle(&mut self, interval_ns: u64, is_lost: bool) -> Option<Failure> {
         let position_m = self.sync(interval_ns);
-        let failure = self.monitor.judge(position_m);
+        let failure = self.monitor.following_failure(position_m);
         self.send(position_m, is_lost);
         failure
     }
@@ -76,7 +76,7 @@ fn a_lost_target_is_noticed_when_the_drive_should_be_there() {
     // Sent in cycle 0, taken in cycle 1, reached in cycle 2.
     assert_eq!(bench.cycles_until_failure(), Some(2));
     let position_m = bench.sync(MS);
-    let failure = bench.monitor.judge(position_m).unwrap();
+    let failure = bench.monitor.following_failure(position_m).unwrap();
     assert_eq!((failure.cause, failure.limit), (Cause::FollowingError, 7.5e-5));
     assert!((failure.value - 2.0 * STEP_M).abs() < 1e-9, "{}", failure.value);
 }
@@ -125,7 +125,7 @@ fn targets_that_miss_their_sync_are_none_either() {
     bench.received_m = Some(bench.sent_m - STEP_M);
     for _ in 0..20 {
         let position_m = bench.sync(MS);
-        assert_eq!(bench.monitor.judge(position_m), None);
+        assert_eq!(bench.monitor.following_failure(position_m), None);
         bench.send_after(MS - SENDING_NS + 1, position_m, true);
         bench.received_m = Some(bench.sent_m - STEP_M);
     }
@@ -161,7 +161,7 @@ fn at_high_rates_an_uneven_demand_excuses_the_way_of_a_millisecond_and_12_ms() {
 fn so_many_in_a_row_must_be_beyond_the_limit() {
     let mut bench = Bench::new(|scenario| scenario.can.following_limit_m = 0.25);
     bench.monitor.follow(0, 0.5, 0.5);
-    assert_eq!(bench.monitor.judge(0.75), None, "at the limit");
+    assert_eq!(bench.monitor.following_failure(0.75), None, "at the limit");
     let mut bench = Bench::new(|scenario| scenario.can.following_limit_cycles = 3);
     bench.run();
     assert_eq!(bench.cycles_until_failure(), Some(4));
@@ -170,15 +170,15 @@ fn so_many_in_a_row_must_be_beyond_the_limit() {
 #[test]
 fn a_drive_that_follows_nothing_may_be_anywhere() {
     let mut bench = Bench::new(|_| {});
-    assert_eq!(bench.monitor.judge(0.0), None, "before the drives are enabled");
+    assert_eq!(bench.monitor.following_failure(0.0), None, "before the drives are enabled");
     bench.run();
     bench.monitor.stop();
-    assert_eq!(bench.monitor.judge(0.0), None);
+    assert_eq!(bench.monitor.following_failure(0.0), None);
     bench.monitor.synchronise(bench.now_ns + MS);
     bench.monitor.follow(bench.now_ns + MS, 0.1, 0.1);
     bench.monitor.synchronise(bench.now_ns + 2 * MS);
-    assert_eq!(bench.monitor.judge(0.1), None, "the demand begins where the drive is");
-    assert!(bench.monitor.judge(START_M).is_some());
+    assert_eq!(bench.monitor.following_failure(0.1), None, "the demand begins where the drive is");
+    assert!(bench.monitor.following_failure(START_M).is_some());
 }
 
 #[test]
@@ -197,7 +197,7 @@ fn a_drive_that_smooths_its_targets_lags_by_the_lead() {
         for _ in 0..50 {
             positions_m.rotate_right(1);
             positions_m[0] = bench.sync(interval_ns);
-            failures += usize::from(bench.monitor.judge(positions_m[lag]).is_some());
+            failures += usize::from(bench.monitor.following_failure(positions_m[lag]).is_some());
             bench.send(positions_m[lag], false);
         }
         assert_eq!(failures == 0, follows, "{lead_cycles} cycles, late by {lag}");
@@ -213,6 +213,6 @@ fn a_target_far_away_is_approached_at_the_drives_speed() {
         bench.now_ns += MS;
         bench.monitor.synchronise(bench.now_ns);
         let way_m = f64::from(cycle) * drive.max_velocity_m_s * 1e-3;
-        assert_eq!(bench.monitor.judge(START_M + way_m), None, "cycle {cycle}");
+        assert_eq!(bench.monitor.following_failure(START_M + way_m), None, "cycle {cycle}");
     }
 }

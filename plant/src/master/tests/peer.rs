@@ -15,7 +15,7 @@ use masseter_model::geometry::AXES;
 use masseter_scenario::IdentityConfig;
 
 use super::PERIOD_NS;
-use crate::link::Buses;
+use crate::master::link::Buses;
 
 const HEARTBEAT_NS: u64 = 50 * PERIOD_NS;
 /// Position of every drive as it is switched on, increments.

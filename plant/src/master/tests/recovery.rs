@@ -2,7 +2,6 @@
 
 use masseter_can::Frame;
 use masseter_can::canopen::{Cob, Emergency, EmergencyCode, Heartbeat, NmtState, sync};
-
 use masseter_scenario::MASTER_NODE;
 
 use super::peer::POSITION;
@@ -72,11 +71,11 @@ fn a_drive_that_boots_again_during_a_stop_is_configured_from_the_first_object_on
         bench.drive(5).cycle_power();
         bench.drive(5).objects.remove(&(0x1016, 1));
         bench.cycles(5, DriveRequest::Off);
-        assert_eq!(bench.master.drives[5].boot_phase(), BootPhase::Waiting);
+        assert_eq!(bench.master.drives[5].boot.phase, BootPhase::Waiting);
         (bench.drive(0).is_dead, bench.drive(2).is_reacting) = (false, false);
         bench.cycles(1500, DriveRequest::Off);
         assert_eq!(bench.drive(5).written(0x1016, 1), 0x007F_0096);
-        assert_eq!(bench.master.drives[5].boot_phase(), BootPhase::Ready);
+        assert_eq!(bench.master.drives[5].boot.phase, BootPhase::Ready);
     }
 }
 

@@ -3,19 +3,14 @@
 //! [docs/jaw-cycles.md](../../../../docs/jaw-cycles.md) states the definition and its sources. Which motion was played does not
 //! matter, nor do its rows: a robot's estimated path is cut like a true one.
 
-mod cycle;
 mod segments;
-mod statistic;
 
 use masseter_model::geometry::{Pose, Vec3};
 use serde::Serialize;
 
-use cycle::{Cycle, Sample};
-use segments::Segments;
-use statistic::Moments;
+use self::segments::{Cycle, Sample, Segments};
 
-pub use cycle::{COURSE_POINTS, CoursePoint, JawCycle};
-pub use statistic::Statistic;
+pub use segments::{COURSE_POINTS, CoursePoint, JawCycle};
 
 /// Time between samples, ns.
 const SAMPLE_NS: u64 = 4_000_000;
@@ -88,7 +83,7 @@ impl JawCycles {
     }
 
     /// The pose of the platform at a time since the first SYNC, with the vertical force on the jaw.
-    pub(super) fn take(&mut self, since_ns: u64, pose: &Pose, force_n: f64) {
+    pub(super) fn add_pose(&mut self, since_ns: u64, pose: &Pose, force_n: f64) {
         self.force_n = self.force_n.max(force_n);
         let place = pose.translation.vector + pose.rotation * self.incisal_m;
         if since_ns < self.next_ns || !place.iter().all(|coordinate| coordinate.is_finite()) {
@@ -97,12 +92,12 @@ impl JawCycles {
         self.next_ns = (since_ns / SAMPLE_NS + 1) * SAMPLE_NS;
         let force_n = std::mem::take(&mut self.force_n);
         let sample = Sample { at_s: since_ns as f64 / 1e9, place_m: place.into(), force_n };
-        if let Some(cycle) = self.segments.take(sample) {
-            self.add(cycle);
+        if let Some(cycle) = self.segments.add_sample(sample) {
+            self.add_cycle(cycle);
         }
     }
 
-    fn add(&mut self, Cycle { mut figures, course }: Cycle) {
+    fn add_cycle(&mut self, Cycle { mut figures, course }: Cycle) {
         figures.force_n = figures.force_n.filter(|_| self.has_force);
         self.found.count += 1;
         for (moments, value) in self.moments.iter_mut().zip(quantities(&figures)) {
@@ -124,13 +119,13 @@ impl JawCycles {
     }
 
     /// The figures of all cycles.
-    pub(super) fn finish(mut self) -> JawCycleFigures {
-        if let Some(last) = std::mem::take(&mut self.segments).finish() {
-            self.add(last);
+    pub(super) fn into_figures(mut self) -> JawCycleFigures {
+        if let Some(last) = std::mem::take(&mut self.segments).last_cycle() {
+            self.add_cycle(last);
         }
         let has_course = !self.found.courses.is_empty();
         let [duration_s, opening_s, closing_s, opening_mm, lateral_mm, opening_mm_s, closing_mm_s, force_n] =
-            self.moments.map(Moments::finish);
+            self.moments.map(Moments::statistic);
         JawCycleFigures {
             duration_s,
             opening_s,
@@ -161,13 +156,46 @@ fn quantities(cycle: &JawCycle) -> [Option<f64>; QUANTITIES] {
 }
 
 fn mean_and_sd(moments: &[Moments; 3]) -> [CoursePoint; 2] {
-    let [opening, lateral, force] = moments.map(Moments::finish);
+    let [opening, lateral, force] = moments.map(Moments::statistic);
     let point = |of: fn(Statistic) -> Option<f64>| CoursePoint {
         opening_mm: of(opening).unwrap_or_default(),
         lateral_mm: of(lateral).unwrap_or_default(),
         force_n: of(force).unwrap_or_default(),
     };
     [point(|statistic| statistic.mean), point(|statistic| statistic.sd)]
+}
+
+/// Mean and standard deviation.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Statistic {
+    /// Values.
+    pub count: u64,
+    /// Their mean; none without a value.
+    pub mean: Option<f64>,
+    /// Their standard deviation, as of a sample; none with fewer than two.
+    pub sd: Option<f64>,
+}
+
+/// Collects them (Welford 1962).
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Moments {
+    count: u64,
+    mean: f64,
+    squares: f64,
+}
+
+impl Moments {
+    pub(super) fn add(&mut self, value: f64) {
+        self.count += 1;
+        let from_mean = value - self.mean;
+        self.mean += from_mean / self.count as f64;
+        self.squares += from_mean * (value - self.mean);
+    }
+
+    fn statistic(self) -> Statistic {
+        let sd = (self.count > 1).then(|| (self.squares / (self.count - 1) as f64).sqrt());
+        Statistic { count: self.count, mean: (self.count > 0).then_some(self.mean), sd }
+    }
 }
 
 #[cfg(test)]

@@ -12,9 +12,9 @@ fn found(seconds: f64, motion: impl Fn(f64) -> ([f64; 3], f64)) -> JawCycleFigur
     for cycle in 0..(seconds * 1e3) as u64 {
         let ([x, y, z], force_n) = motion(cycle as f64 / 1e3);
         let pose = Pose::translation(x / 1e3, y / 1e3, 0.2 + z / 1e3);
-        cycles.take(cycle * 1_000_000, &pose, force_n);
+        cycles.add_pose(cycle * 1_000_000, &pose, force_n);
     }
-    cycles.finish()
+    cycles.into_figures()
 }
 
 /// A cycle: 0.3 s down by 18 mm, 0.28 s up, closed for 0.12 s; 4 mm to the left while it closes; a bite of 80 N.

@@ -1,14 +1,100 @@
-//! Bounds of a signal: every value, or a statistic of its values, within limits.
+//! Bounds of a signal or an expression of signals: every value, or a statistic of its values, within limits.
 
-use masseter_scenario::{Quantity, RequirementConfig, Scenario, Statistic};
+use std::fmt::Display;
 
-use super::finding::{Finding, RequirementPlot};
-use super::moment::Moment;
-use super::quantified::Quantified;
-use super::refusal::{OfKey, Refused};
-use super::window::Window;
+use masseter_scenario::input::excerpt;
+use masseter_scenario::{Quantity, RequirementConfig, Statistic, Unit};
+
+use super::condition::{Lookup, Moment};
+use super::dimension::BaseExponents;
+use super::expression::Expression;
+use super::finding::{Finding, OfKey, Reason, Refused, RequirementPlot};
+use super::trigger::Window;
 use crate::series::{Extremes, Series};
 use crate::signals::Values;
+
+/// A signal or an expression.
+#[derive(Debug, Clone)]
+pub(super) struct Quantified {
+    /// As written.
+    pub(super) text: String,
+    /// The unit in which it is shown.
+    pub(super) unit: Unit,
+    /// Why it may have no value in a whole run; empty where nothing is known.
+    pub(super) absence: &'static str,
+    source: ValueSource,
+}
+
+#[derive(Debug, Clone)]
+enum ValueSource {
+    Signal(usize),
+    Expression { expression: Expression, signals: Vec<usize> },
+}
+
+impl Quantified {
+    pub(super) fn new(config: &RequirementConfig, values: &mut Values) -> Result<Self, Refused> {
+        match (&config.signal, &config.expression) {
+            (Some(name), None) => Self::of_signal(name, values).of_key("require.signal"),
+            (None, Some(text)) => {
+                let name = config.unit.as_deref().unwrap_or_default();
+                let unknown =
+                    || Refused::new("require.unit", format!("'{}': the unit is unknown", excerpt(name)));
+                let unit = Unit::named(name).ok_or_else(unknown)?;
+                Self::of_expression(text, unit, values).of_key("require.expression")
+            }
+            _ => Err(Refused::new("require.expression", "give a signal or an expression")),
+        }
+    }
+
+    fn of_signal(name: &str, values: &mut Values) -> Result<Self, Reason> {
+        let signal = values.choose(name)?;
+        let named = values.signal(signal);
+        if named.states().is_some() {
+            return Err(Reason::wrong(format!(
+                "{name} is a state, which has no bounds; use never, or when and then"
+            )));
+        }
+        let (unit, absence) = (named.shown(), named.absence);
+        Ok(Self { text: name.to_owned(), unit, absence, source: ValueSource::Signal(signal) })
+    }
+
+    fn of_expression(text: &str, unit: Unit, values: &mut Values) -> Result<Self, Reason> {
+        let quoted = |reason: &dyn Display| format!("'{}': {reason}", excerpt(text));
+        let expression = Expression::read(text).map_err(|error| quoted(&error))?;
+        let names = expression.signals.iter();
+        let signals: Vec<_> = names.map(|name| values.choose(name)).collect::<Result<_, _>>()?;
+        if signals.is_empty() {
+            return Err(quoted(&"write signals in braces, such as {l1.force}").into());
+        }
+        let named: Vec<_> = signals.iter().map(|signal| values.signal(*signal)).collect();
+        if let Some(state) = named.iter().find(|signal| signal.states().is_some()) {
+            return Err(quoted(&format_args!("{} is a state, no number", state.name)).into());
+        }
+        let derived = expression.dimension(|place| named[place].shown().dimension);
+        let derived = derived.map_err(|error| quoted(&error))?;
+        if derived != BaseExponents::of(unit.dimension) {
+            return Err(quoted(&format_args!("its unit is {derived}, not '{}'", unit.name)).into());
+        }
+        let absences = named.iter().map(|signal| signal.absence);
+        Ok(Self {
+            text: text.to_owned(),
+            unit,
+            absence: absences.into_iter().find(|absence| !absence.is_empty()).unwrap_or_default(),
+            source: ValueSource::Expression { expression, signals },
+        })
+    }
+
+    /// The value in SI units; none where a signal is missing.
+    pub(super) fn value(&mut self, values: &[f64]) -> Option<f64> {
+        match &mut self.source {
+            ValueSource::Signal(signal) => Some(values[*signal]).filter(|value| !value.is_nan()),
+            ValueSource::Expression { expression, signals } => {
+                let has_all = signals.iter().all(|signal| !values[*signal].is_nan());
+                has_all.then(|| expression.value(|place| values[signals[place]]))
+            }
+        }
+    }
+}
 
 /// Judges bounds.
 #[derive(Debug, Clone)]
@@ -59,16 +145,12 @@ impl Limits {
 }
 
 impl Bounds {
-    pub(super) fn new(
-        config: &RequirementConfig,
-        scenario: &Scenario,
-        values: &mut Values,
-    ) -> Result<Self, Refused> {
-        let of = Quantified::new(config, values)?;
+    pub(super) fn new(config: &RequirementConfig, lookup: &mut Lookup<'_>) -> Result<Self, Refused> {
+        let of = Quantified::new(config, lookup.values)?;
         let limit = |key: &'static str, given: Option<Quantity>| {
             let si =
-                |given: Quantity| given.si_of(of.unit.dimension).map_err(|need| format!("{given}: {need}"));
-            given.map(si).transpose().of_key(key)
+                given.map(|given| given.si_of(of.unit.dimension).map_err(|need| format!("{given}: {need}")));
+            si.transpose().of_key(key)
         };
         let limits =
             Limits { min: limit("require.min", config.min)?, max: limit("require.max", config.max)? };
@@ -91,7 +173,7 @@ impl Bounds {
             (_, None) => 0.0,
         };
         Ok(Self {
-            window: Window::new(config.during.as_ref(), scenario, values)?,
+            window: Window::new(config, lookup)?,
             of,
             statistic: config.statistic,
             percentile,
@@ -120,29 +202,27 @@ impl Bounds {
             Statistic::PeakToPeak => format!("peak to peak of {text}"),
             Statistic::Percentile => format!("percentile {} of {text}", self.percentile),
         };
+        let in_unit = |limit: f64| self.of.unit.text(limit);
         let limits = match (self.limits.min, self.limits.max) {
-            (Some(min), Some(max)) => {
-                format!("within {} and {}", self.of.unit.text(min), self.of.unit.text(max))
-            }
-            (Some(min), None) => format!("at least {}", self.of.unit.text(min)),
-            (None, max) => format!("at most {}", self.of.unit.text(max.unwrap_or(f64::NAN))),
+            (Some(min), Some(max)) => format!("within {} and {}", in_unit(min), in_unit(max)),
+            (Some(min), None) => format!("at least {}", in_unit(min)),
+            (None, max) => format!("at most {}", in_unit(max.unwrap_or(f64::NAN))),
         };
         format!("{what} {limits}{}", self.window.text)
     }
 
-    pub(super) fn take(&mut self, moment: &Moment<'_>) {
+    pub(super) fn judge_moment(&mut self, moment: &Moment<'_>) {
         let value = self.of.value(moment.values);
-        let (value, is_missing) = (value.unwrap_or(f64::NAN), value.is_none());
         let began_ns = *self.began_ns.get_or_insert(moment.time_ns);
         if !self.window.contains(moment) || moment.is_closing {
             return;
         }
-        if is_missing {
+        let Some(value) = value else {
             self.missing += 1;
             return;
-        }
+        };
         // What the requirement does not judge would only spoil the scale of the plot.
-        self.series.take(moment.time_ns - began_ns, 0, value / self.of.unit.si);
+        self.series.add(moment.time_ns - began_ns, 0, value / self.of.unit.si);
         let value = if self.statistic == Statistic::Abs { value.abs() } else { value };
         self.samples += 1;
         self.sum += value;
@@ -158,29 +238,25 @@ impl Bounds {
         }
     }
 
-    pub(super) fn finish(mut self) -> (Finding, Option<RequirementPlot>) {
-        let finding = self.finding();
+    /// The signal over time, with its limits.
+    pub(super) fn plot(&self) -> RequirementPlot {
         let limits = [self.limits.min, self.limits.max].into_iter().flatten();
-        let plot = RequirementPlot {
+        RequirementPlot {
             signal: self.of.text.clone(),
             unit: self.of.unit.name,
             began_ns: self.began_ns.unwrap_or(0),
             curve: self.series.band(0),
             limits: limits.map(|limit| limit / self.of.unit.si).collect(),
-        };
-        (finding, Some(plot))
+        }
     }
 
-    fn finding(&mut self) -> Finding {
+    pub(super) fn finding(&mut self) -> Finding {
         let unit = self.of.unit;
         let Some(worst) = self.worst else {
-            let why = if self.missing > 0 {
-                format!(
-                    "{} has no value{}: all {} samples are missing{}",
-                    self.of.text, self.window.text, self.missing, self.of.absence
-                )
-            } else {
-                format!("no sample{}", self.window.text)
+            let (text, window) = (&self.of.text, &self.window.text);
+            let why = match self.missing {
+                0 => format!("no sample{window}"),
+                n => format!("{text} has no value{window}: all {n} samples are missing{}", self.of.absence),
             };
             return Finding::untested(why, unit);
         };

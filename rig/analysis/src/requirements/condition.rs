@@ -2,10 +2,34 @@
 
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_scenario::input::excerpt;
-use masseter_scenario::{Dimension, Quantity, Unit};
+use masseter_scenario::{Dimension, Quantity, QuantityError, Scenario, Unit};
 
-use super::refusal::Reason;
+use super::finding::{Finding, Reason};
+use crate::events::EventRecord;
 use crate::signals::Values;
+
+/// What a requirement is read from: the scenario, and the signals, of which it chooses some.
+pub(super) struct Lookup<'a> {
+    pub(super) scenario: &'a Scenario,
+    pub(super) values: &'a mut Values,
+}
+
+/// The values and events of one sample.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Moment<'a> {
+    /// When, ns of the run's clock.
+    pub(super) time_ns: u64,
+    /// Since the motion began, s; none before.
+    pub(super) motion_s: Option<f64>,
+    /// The chosen signals; NaN where one is missing.
+    pub(super) values: &'a [f64],
+    /// The events since the sample before.
+    pub(super) events: &'a [EventRecord],
+    /// Whether a lost cycle may have acted on the jaw.
+    pub(super) is_disturbed: bool,
+    /// Whether it is no sample, but holds the events after the last one.
+    pub(super) is_closing: bool,
+}
 
 /// The comparison of a condition. `<` and `<=` are alike, since no measured value is exactly a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,6 +38,13 @@ enum Comparison {
     AtLeast,
     Equal,
     Unequal,
+}
+
+impl Comparison {
+    /// Whether it compares numbers, so that there is a margin.
+    fn is_of_order(self) -> bool {
+        matches!(self, Self::AtMost | Self::AtLeast)
+    }
 }
 
 /// The comparisons as they are written, the longer ones first.
@@ -42,47 +73,36 @@ impl Condition {
     /// Reads a condition, and chooses its signal.
     pub(super) fn parse(text: &str, values: &mut Values) -> Result<Self, Reason> {
         let text = text.trim();
-        if ControllerState::ALL.iter().any(|state| state.name() == text) {
+        if state_of_controller(text).is_some() {
             return Self::parse(&format!("controller.state == {text}"), values);
         }
-        let (name, comparison, limit) = split(text).ok_or_else(|| {
-            format!(
-                "'{}' is no condition: write such as \"bite.force > 5 N\" or \"controller.state == running\"",
-                excerpt(text)
-            )
-        })?;
+        let compared = COMPARISONS.into_iter().find_map(|(sign, comparison)| {
+            let (name, limit) = text.split_once(sign)?;
+            Some((name.trim(), comparison, limit.trim()))
+        });
+        let example = "write such as \"bite.force > 5 N\" or \"controller.state == running\"";
+        let no_condition = || format!("'{}' is no condition: {example}", excerpt(text));
+        let (name, comparison, limit) = compared.ok_or_else(no_condition)?;
         let signal = values.choose(name)?;
         let named = values.signal(signal);
-        let unit = named.shown();
-        let limit = match named.states() {
-            Some(states) => state_code(limit, &states)?,
+        let (unit, states) = (named.shown(), named.states());
+        let limit = match &states {
+            Some(states) => state_code(limit, states)?,
             None => limit_of(limit, unit.dimension)?,
         };
-        let is_state = named.states().is_some();
-        if is_state && matches!(comparison, Comparison::AtMost | Comparison::AtLeast) {
-            return Err(format!("'{}': states have no order; use == or !=", excerpt(text)).into());
-        }
-        if !is_state
-            && unit.dimension != Dimension::One
-            && matches!(comparison, Comparison::Equal | Comparison::Unequal)
-        {
-            return Err(format!(
-                "'{}': a measured value is never exactly a number; use < or >",
-                excerpt(text)
-            )
-            .into());
-        }
-        Ok(Self { text: text.to_owned(), signal, comparison, limit, unit })
-    }
-
-    /// The controller is in that state.
-    pub(super) fn of_state(state: ControllerState, values: &mut Values) -> Result<Self, Reason> {
-        Self::parse(state.name(), values)
+        let misfit = match states {
+            Some(_) if comparison.is_of_order() => "states have no order; use == or !=",
+            None if !comparison.is_of_order() && unit.dimension != Dimension::One => {
+                "a measured value is never exactly a number; use < or >"
+            }
+            _ => return Ok(Self { text: text.to_owned(), signal, comparison, limit, unit }),
+        };
+        Err(format!("'{}': {misfit}", excerpt(text)).into())
     }
 
     /// Whether the robustness is a number of the signal's unit.
     pub(super) fn is_numeric(&self) -> bool {
-        matches!(self.comparison, Comparison::AtMost | Comparison::AtLeast)
+        self.comparison.is_of_order()
     }
 
     /// How far the condition is from failing, in the signal's SI unit; infinite for states. None where the signal is
@@ -105,20 +125,26 @@ impl Condition {
 
     /// The share of a margin in the limit.
     pub(super) fn share(&self, margin: f64) -> Option<f64> {
-        super::finding::Finding::share(margin, self.limit)
+        Finding::share(margin, self.limit)
     }
 }
 
-fn split(text: &str) -> Option<(&str, Comparison, &str)> {
-    COMPARISONS.into_iter().find_map(|(sign, comparison)| {
-        let (name, limit) = text.split_once(sign)?;
-        Some((name.trim(), comparison, limit.trim()))
-    })
+/// The state of the controller with this name.
+pub(super) fn state_of_controller(name: &str) -> Option<ControllerState> {
+    ControllerState::ALL.iter().copied().find(|state| state.name() == name)
+}
+
+/// Whether the text is written as a condition: a comparison, or a state of the controller alone.
+pub(super) fn is_condition(text: &str) -> bool {
+    has_comparison(text) || state_of_controller(text.trim()).is_some()
+}
+
+pub(super) fn has_comparison(text: &str) -> bool {
+    text.contains(['<', '>', '='])
 }
 
 fn limit_of(text: &str, dimension: Dimension) -> Result<f64, String> {
-    let quantity: Quantity =
-        text.parse().map_err(|error: masseter_scenario::QuantityError| error.to_string())?;
+    let quantity: Quantity = text.parse().map_err(|error: QuantityError| error.to_string())?;
     quantity.si_of(dimension).map_err(|need| format!("'{}': {need}", excerpt(text)))
 }
 

@@ -1,14 +1,96 @@
-//! How often something occurs.
+//! What must never happen, how often something occurs, and in which order.
 
 use masseter_scenario::wording::counted;
-use masseter_scenario::{Dimension, RequirementConfig, Scenario};
+use masseter_scenario::{Dimension, RequirementConfig};
 
-use super::finding::Finding;
-use super::moment::Moment;
-use super::refusal::{OfKey, Refused};
-use super::trigger::Trigger;
-use super::window::Window;
-use crate::signals::Values;
+use super::condition::{Condition, Lookup, Moment, is_condition};
+use super::finding::{Finding, OfKey, Refused};
+use super::trigger::{Trigger, Window};
+
+/// Judges that something never happens.
+#[derive(Debug, Clone)]
+pub(super) struct Never {
+    what: What,
+    window: Window,
+    samples: u64,
+    times: u64,
+    first_ns: Option<u64>,
+    /// The smallest margin and its moment.
+    worst: Option<(f64, u64)>,
+}
+
+#[derive(Debug, Clone)]
+enum What {
+    Condition(Condition),
+    Occurrence(Trigger),
+}
+
+impl Never {
+    pub(super) fn new(config: &RequirementConfig, of: &mut Lookup<'_>) -> Result<Self, Refused> {
+        let text = config.never.as_deref().unwrap_or_default();
+        let what = if is_condition(text) {
+            What::Condition(Condition::parse(text, of.values).of_key("require.never")?)
+        } else {
+            What::Occurrence(Trigger::parse(text, of).of_key("require.never")?)
+        };
+        let window = Window::new(config, of)?;
+        Ok(Self { what, window, samples: 0, times: 0, first_ns: None, worst: None })
+    }
+
+    /// What must hold, in words.
+    pub(super) fn must(&self) -> String {
+        let what = match &self.what {
+            What::Condition(condition) => &condition.text,
+            What::Occurrence(trigger) => &trigger.text,
+        };
+        format!("never {what}{}", self.window.text)
+    }
+
+    pub(super) fn judge_moment(&mut self, moment: &Moment<'_>) {
+        let is_inside = self.window.contains(moment);
+        let (times, margin) = match &mut self.what {
+            What::Condition(condition) => {
+                let Some(robustness) = condition.robustness(moment.values) else { return };
+                (u64::from(robustness >= 0.0), -robustness)
+            }
+            What::Occurrence(trigger) => (trigger.times_ns(moment).len() as u64, f64::INFINITY),
+        };
+        if !is_inside {
+            return;
+        }
+        self.samples += 1;
+        self.times += times;
+        if times > 0 {
+            self.first_ns.get_or_insert(moment.time_ns);
+        }
+        if self.worst.is_none_or(|(worst, _)| margin < worst) {
+            self.worst = Some((margin, moment.time_ns));
+        }
+    }
+
+    pub(super) fn finding(&self) -> Finding {
+        let worst = self.worst.filter(|(margin, _)| margin.is_finite());
+        let (unit, relative_margin) = match &self.what {
+            What::Condition(condition) => {
+                (condition.unit, worst.and_then(|(margin, _)| condition.share(margin)))
+            }
+            What::Occurrence(_) => (Dimension::One.si_unit(), None),
+        };
+        if self.samples == 0 {
+            return Finding::untested(format!("no sample{}", self.window.text), unit);
+        }
+        let text = match self.times {
+            0 => format!("never in {} samples", self.samples),
+            times => format!("in {times} of {} samples", self.samples),
+        };
+        Finding {
+            margin: worst.map(|(margin, _)| margin),
+            relative_margin,
+            worst_ns: self.first_ns.or(worst.map(|(_, time_ns)| time_ns)),
+            ..Finding::new(self.times == 0, text, unit)
+        }
+    }
+}
 
 /// Judges a number of occurrences.
 #[derive(Debug, Clone)]
@@ -23,11 +105,7 @@ pub(super) struct Count {
 }
 
 impl Count {
-    pub(super) fn new(
-        config: &RequirementConfig,
-        scenario: &Scenario,
-        values: &mut Values,
-    ) -> Result<Self, Refused> {
+    pub(super) fn new(config: &RequirementConfig, of: &mut Lookup<'_>) -> Result<Self, Refused> {
         let RequirementConfig { at_least, at_most, .. } = *config;
         if at_least.is_none() && at_most.is_none() {
             return Err(Refused::new("require.at_least", "give at_least, at_most or both"));
@@ -36,8 +114,8 @@ impl Count {
             return Err(Refused::new("require.at_least", "at_least is above at_most"));
         }
         let event = config.event.as_deref().unwrap_or_default();
-        let trigger = Trigger::parse(event, scenario, values).of_key("require.event")?;
-        let window = Window::new(config.during.as_ref(), scenario, values)?;
+        let trigger = Trigger::parse(event, of).of_key("require.event")?;
+        let window = Window::new(config, of)?;
         Ok(Self { trigger, window, at_least, at_most, samples: 0, times: 0, last_ns: None })
     }
 
@@ -49,8 +127,8 @@ impl Count {
         format!("{} {} times{}", self.trigger.text, limits.join(" and "), self.window.text)
     }
 
-    pub(super) fn take(&mut self, moment: &Moment<'_>) {
-        let times = self.trigger.take(moment).len() as u64;
+    pub(super) fn judge_moment(&mut self, moment: &Moment<'_>) {
+        let times = self.trigger.times_ns(moment).len() as u64;
         if self.window.contains(moment) {
             self.samples += 1;
             self.times += times;
@@ -60,7 +138,7 @@ impl Count {
         }
     }
 
-    pub(super) fn finish(self) -> Finding {
+    pub(super) fn finding(&self) -> Finding {
         let unit = Dimension::One.si_unit();
         if self.samples == 0 {
             return Finding::untested(format!("no sample{}", self.window.text), unit);
@@ -70,5 +148,53 @@ impl Count {
         let margin = above.into_iter().chain(below).fold(f64::INFINITY, f64::min);
         let text = counted(self.times, "time");
         Finding { margin: Some(margin), worst_ns: self.last_ns, ..Finding::new(margin >= 0.0, text, unit) }
+    }
+}
+
+/// Judges the order of the first occurrences.
+#[derive(Debug, Clone)]
+pub(super) struct Order {
+    /// Each with the time of its first occurrence, ns.
+    steps: Vec<(Trigger, Option<u64>)>,
+}
+
+impl Order {
+    pub(super) fn new(config: &RequirementConfig, of: &mut Lookup<'_>) -> Result<Self, Refused> {
+        if config.order.len() < 2 {
+            return Err(Refused::new("require.order", "give at least two occurrences in order"));
+        }
+        let step = |name: &String| Ok((Trigger::parse(name, of).of_key("require.order")?, None));
+        Ok(Self { steps: config.order.iter().map(step).collect::<Result<_, Refused>>()? })
+    }
+
+    /// What must hold, in words.
+    pub(super) fn must(&self) -> String {
+        let names: Vec<_> = self.steps.iter().map(|(trigger, _)| trigger.text.as_str()).collect();
+        names.join(", then ")
+    }
+
+    pub(super) fn judge_moment(&mut self, moment: &Moment<'_>) {
+        for (trigger, first_ns) in &mut self.steps {
+            if let Some(time_ns) = trigger.times_ns(moment).first() {
+                first_ns.get_or_insert(*time_ns);
+            }
+        }
+    }
+
+    pub(super) fn finding(&self) -> Finding {
+        let unit = Dimension::One.si_unit();
+        if let Some((missing, _)) = self.steps.iter().find(|(_, first_ns)| first_ns.is_none()) {
+            let text = format!("{} never came", missing.text);
+            let has_begun = self.steps[0].1.is_some();
+            return if has_begun { Finding::new(false, text, unit) } else { Finding::untested(text, unit) };
+        }
+        let wrong = self.steps.windows(2).find(|pair| pair[1].1 < pair[0].1);
+        match wrong {
+            Some([(early, _), (late, late_ns)]) => {
+                let text = format!("{} came before {}", late.text, early.text);
+                Finding { worst_ns: *late_ns, ..Finding::new(false, text, unit) }
+            }
+            _ => Finding::new(true, "in this order".to_owned(), unit),
+        }
     }
 }

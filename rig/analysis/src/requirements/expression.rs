@@ -9,8 +9,7 @@ use std::f64::consts::{E, PI, TAU};
 use masseter_scenario::Dimension;
 use masseter_scenario::input::excerpt;
 
-use super::base_exponents::BaseExponents;
-use super::dimension::{Misfit, Term};
+use super::dimension::{BaseExponents, Misfit, Term};
 
 /// Bytes of the longest expression.
 const MOST_BYTES: usize = 4096;

@@ -3,28 +3,303 @@
 //! All are judged in one pass over the samples of the run, in the order of time. `docs/requirements.md` fixes the meaning
 //! of windows, missing samples and the run's end. What the outcomes mean for the verdict is the report's.
 
-mod base_exponents;
 mod bounds;
 mod condition;
 mod count;
 mod dimension;
 mod expression;
 mod finding;
-mod moment;
-mod never;
-mod occurrence;
-mod order;
-mod quantified;
-mod refusal;
-mod requirement;
 mod response;
-mod set;
+mod trigger;
+
+use std::collections::BTreeSet;
+
+use masseter_recording::Recorded;
+use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::named::Declared;
+use masseter_scenario::input::excerpt;
+use masseter_scenario::{Dimension, RequirementConfig, Scenario, Statistic};
+
+use self::bounds::Bounds;
+use self::condition::{Lookup, Moment};
+use self::count::{Count, Never, Order};
+use self::finding::{Finding, Reason, Refused};
+use self::response::Response;
+use self::trigger::Trigger;
+use crate::events::EventRecord;
+use crate::signals::{Registry, Sample, Timeline, Values};
+
+pub use finding::{RequirementError, RequirementFigures, RequirementPlot, RequirementResult};
+pub use trigger::event_names;
+
+/// Judges every requirement of a scenario.
+///
+/// ```
+/// use masseter_analysis::requirements::{RequirementResult, Requirements};
+/// use masseter_recording::Recorded;
+/// use masseter_scenario::{RequirementConfig, Scenario};
+/// use masseter_runtime::messages::Reading;
+/// use masseter_runtime::messages::codes::DriveState;
+/// use masseter_runtime::named::Declared;
+///
+/// let text = "[[require]]\nname = 'first leg'\nsignal = 'l1.position'\nmax = '300 mm'";
+/// let scenario = Scenario::parse("s.toml".as_ref(), text)?;
+/// let mut requirements = Requirements::new(&scenario, &Declared::default());
+/// let mut reading = Reading { cycle: 1, sampled_ns: 1000, ..Reading::default() };
+/// reading.position_m[3] = 0.29;
+/// reading.drive_state = [DriveState::OperationEnabled.code(); 6];
+/// requirements.take(&Recorded::Reading(reading));
+/// let found = requirements.finish();
+/// assert_eq!(found[0].result, RequirementResult::Passed);
+/// assert_eq!(found[0].margin.map(f64::round), Some(10.0));
+/// # Ok::<(), masseter_scenario::ScenarioError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Requirements {
+    list: Vec<Requirement>,
+    values: Values,
+    timeline: Timeline,
+    row: Vec<f64>,
+    state: usize,
+    motion_ns: Option<u64>,
+}
+
+/// Refuses a scenario with a requirement that cannot be judged. Without `declared`, the controller's own signals and
+/// parameters are unknown yet and not checked.
+///
+/// # Errors
+/// [`RequirementError`] with the key in the scenario.
+pub fn check_requirements(scenario: &Scenario, declared: Option<&Declared>) -> Result<(), RequirementError> {
+    let values = &mut Values::new(Registry::new(scenario, declared.unwrap_or(&Declared::default())));
+    let mut of = Lookup { scenario, values };
+    let may_come = |reason: &Reason| match reason {
+        Reason::Unknown(signal) => declared.is_none() && signal.is_of_controller(),
+        Reason::Wrong(_) => false,
+    };
+    let mut names = BTreeSet::new();
+    for (place, config) in scenario.require.iter().enumerate() {
+        let refused = |Refused { key, reason }| RequirementError {
+            key,
+            entry: Some(place),
+            of: format!("require '{}'", excerpt(&config.name)),
+            reason: reason.to_string(),
+        };
+        if !names.insert(&config.name) {
+            return Err(refused(Refused::new("require.name", "another requirement has this name")));
+        }
+        if let Err(error) = Requirement::new(config, &mut of)
+            && !may_come(&error.reason)
+        {
+            return Err(refused(error));
+        }
+    }
+    for name in scenario.expect.iter().flat_map(|expect| &expect.events) {
+        Trigger::parse(name, &mut of).map_err(|reason| RequirementError {
+            key: "expect.events",
+            entry: None,
+            of: "expect.events".to_owned(),
+            reason: reason.to_string(),
+        })?;
+    }
+    Ok(())
+}
+
+impl Requirements {
+    /// The requirements of a scenario whose controller declares these signals and parameters, and the events that it expects.
+    pub fn new(scenario: &Scenario, declared: &Declared) -> Self {
+        let mut values = Values::new(Registry::new(scenario, declared));
+        let mut of = Lookup { scenario, values: &mut values };
+        let mut read = |config: &RequirementConfig| {
+            Requirement::new(config, &mut of).unwrap_or_else(|refused| {
+                Requirement::of_kind(config, Kind::Unknown(refused.reason.to_string()))
+            })
+        };
+        let mut list: Vec<_> = scenario.require.iter().map(&mut read).collect();
+        let expected = scenario.expect.iter().flat_map(|expect| &expect.events).map(expected_event);
+        list.extend(expected.map(|config| Requirement { is_expected_event: true, ..read(&config) }));
+        let state = values.choose("controller.state").expect("every run has this signal");
+        Self { list, values, timeline: Timeline::default(), row: Vec::new(), state, motion_ns: None }
+    }
+
+    /// The same for messages that come while the run goes on, each soon after its cycle.
+    #[must_use]
+    pub fn while_running(scenario: &Scenario, declared: &Declared) -> Self {
+        Self { timeline: Timeline::while_running(), ..Self::new(scenario, declared) }
+    }
+
+    /// Whether there are none: then nothing has to be taken.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// Takes the next message of the recording.
+    pub fn take(&mut self, message: &Recorded) {
+        if let Some(sample) = self.timeline.take(message) {
+            self.judge_sample(&sample);
+        }
+    }
+
+    /// Takes an event of the run.
+    pub fn event(&mut self, event: &EventRecord) {
+        self.timeline.event(event);
+    }
+
+    /// A lost cycle may have acted on the jaw in this cycle.
+    pub fn disturb(&mut self, cycle: u64) {
+        self.timeline.disturb(cycle);
+    }
+
+    /// What every requirement comes to.
+    pub fn finish(mut self) -> Vec<RequirementFigures> {
+        while let Some(sample) = self.timeline.finish() {
+            self.judge_sample(&sample);
+        }
+        self.list.into_iter().map(|requirement| requirement.into_figures(self.motion_ns)).collect()
+    }
+
+    fn judge_sample(&mut self, Sample { time_ns, messages, events, is_closing }: &Sample) {
+        self.values.take(messages, &mut self.row);
+        if self.row[self.state].to_bits() == f64::from(ControllerState::Running.code()).to_bits() {
+            self.motion_ns.get_or_insert(*time_ns);
+        }
+        let motion_s = self.motion_ns.map(|motion_ns| (time_ns - motion_ns) as f64 / 1e9);
+        let (values, is_disturbed) = (self.row.as_slice(), messages.is_disturbed);
+        let moment =
+            Moment { time_ns: *time_ns, motion_s, values, events, is_disturbed, is_closing: *is_closing };
+        self.list.iter_mut().for_each(|requirement| requirement.judge_moment(&moment));
+    }
+}
+
+/// The requirement that an expected event occurs.
+fn expected_event(name: &String) -> RequirementConfig {
+    RequirementConfig {
+        name: format!("expected event {name}"),
+        event: Some(name.clone()),
+        at_least: Some(1),
+        ..Default::default()
+    }
+}
+
+/// A requirement while the run is read.
+#[derive(Debug, Clone)]
+struct Requirement {
+    name: String,
+    is_expected_event: bool,
+    kind: Kind,
+}
+
+#[derive(Debug, Clone)]
+enum Kind {
+    Bounds(Box<Bounds>),
+    Response(Box<Response>),
+    Never(Never),
+    Count(Count),
+    Order(Order),
+    /// A signal that the controller turns out not to have.
+    Unknown(String),
+}
+
+/// The forms of a requirement, by the keys that make it one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Form {
+    Signal,
+    When,
+    Never,
+    Event,
+    Order,
+}
+
+impl Requirement {
+    fn of_kind(config: &RequirementConfig, kind: Kind) -> Self {
+        Self { name: config.name.clone(), is_expected_event: false, kind }
+    }
+
+    /// Reads a requirement, and chooses its signals.
+    fn new(config: &RequirementConfig, of: &mut Lookup<'_>) -> Result<Self, Refused> {
+        let forms = [
+            (Form::Signal, "signal", config.signal.is_some() || config.expression.is_some()),
+            (Form::When, "when", config.when.is_some() || config.then.is_some()),
+            (Form::Never, "never", config.never.is_some()),
+            (Form::Event, "event", config.event.is_some()),
+            (Form::Order, "order", !config.order.is_empty()),
+        ];
+        let mut given = forms.into_iter().filter(|(.., is_given)| *is_given);
+        let (Some((form, key, _)), None) = (given.next(), given.next()) else {
+            let need = "give exactly one of signal (or expression), when with then, never, event, order";
+            return Err(Refused::new("require", need));
+        };
+        let kind = match form {
+            Form::Signal => Kind::Bounds(Box::new(Bounds::new(config, of)?)),
+            Form::When => Kind::Response(Box::new(Response::new(config, of)?)),
+            Form::Never => Kind::Never(Never::new(config, of)?),
+            Form::Event => Kind::Count(Count::new(config, of)?),
+            Form::Order => Kind::Order(Order::new(config, of)?),
+        };
+        match idle_key(config, form) {
+            Some(idle) => Err(Refused::new(idle, format!("it has no effect with {key}"))),
+            None => Ok(Self::of_kind(config, kind)),
+        }
+    }
+
+    fn judge_moment(&mut self, moment: &Moment<'_>) {
+        match &mut self.kind {
+            Kind::Bounds(bounds) => bounds.judge_moment(moment),
+            Kind::Response(response) => response.judge_moment(moment),
+            Kind::Never(never) => never.judge_moment(moment),
+            Kind::Count(count) => count.judge_moment(moment),
+            Kind::Order(order) => order.judge_moment(moment),
+            Kind::Unknown(_) => {}
+        }
+    }
+
+    /// What it comes to. `motion_ns` is when the motion began.
+    fn into_figures(self, motion_ns: Option<u64>) -> RequirementFigures {
+        let (must, finding, plot) = match self.kind {
+            Kind::Bounds(mut bounds) => (bounds.must(), bounds.finding(), Some(bounds.plot())),
+            Kind::Response(response) => (response.must(), response.into_finding(), None),
+            Kind::Never(never) => (never.must(), never.finding(), None),
+            Kind::Count(count) => (count.must(), count.finding(), None),
+            Kind::Order(order) => (order.must(), order.finding(), None),
+            Kind::Unknown(why) => (String::new(), Finding::untested(why, Dimension::One.si_unit()), None),
+        };
+        let since_motion_s = |ns: u64| Some((ns as f64 - motion_ns? as f64) / 1e9);
+        RequirementFigures {
+            name: self.name,
+            must,
+            result: finding.result,
+            finding: finding.text,
+            margin: finding.margin.map(|margin| margin / finding.unit.si),
+            margin_unit: finding.unit.name,
+            relative_margin: finding.relative_margin,
+            worst_at_s: finding.worst_ns.and_then(since_motion_s),
+            worst_ns: finding.worst_ns,
+            latency_ms: finding.latency_s.map(|seconds| seconds * 1e3),
+            may_be_disturbed: finding.may_be_disturbed,
+            is_expected_event: self.is_expected_event,
+            plot,
+        }
+    }
+}
+
+/// A given key that this form of a requirement does not use.
+fn idle_key(config: &RequirementConfig, form: Form) -> Option<&'static str> {
+    let keys = [
+        ("require.unit", config.unit.is_some(), Form::Signal),
+        ("require.statistic", config.statistic != Statistic::default(), Form::Signal),
+        ("require.percentile", config.percentile.is_some(), Form::Signal),
+        ("require.min", config.min.is_some(), Form::Signal),
+        ("require.max", config.max.is_some(), Form::Signal),
+        ("require.delay", config.delay.is_some(), Form::When),
+        ("require.within", config.within.is_some(), Form::When),
+        ("require.stays_for", config.stays_for.is_some(), Form::When),
+        ("require.at_least", config.at_least.is_some(), Form::Event),
+        ("require.at_most", config.at_most.is_some(), Form::Event),
+    ];
+    let idle = keys.into_iter().find(|(_, is_given, of)| *is_given && *of != form);
+    let of_order = || (config.during.is_some() && form == Form::Order).then_some("require.during");
+    let of_signal = || (config.unit.is_some() && config.signal.is_some()).then_some("require.unit");
+    idle.map(|(key, ..)| key).or_else(of_order).or_else(of_signal)
+}
+
 #[cfg(test)]
 mod tests;
-mod trigger;
-mod window;
-
-pub use finding::{RequirementFigures, RequirementPlot, RequirementResult};
-pub use occurrence::event_names;
-pub use refusal::RequirementError;
-pub use set::{Requirements, check_requirements};

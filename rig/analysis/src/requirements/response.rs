@@ -8,15 +8,11 @@ use std::collections::VecDeque;
 
 use masseter_runtime::clock::SECOND_NS;
 use masseter_scenario::wording::counted;
-use masseter_scenario::{Dimension, Quantity, RequirementConfig, Scenario, Unit};
+use masseter_scenario::{Dimension, Quantity, RequirementConfig, Unit};
 
-use super::condition::Condition;
-use super::finding::Finding;
-use super::moment::Moment;
-use super::refusal::{OfKey, Refused};
-use super::trigger::Trigger;
-use super::window::Window;
-use crate::signals::Values;
+use super::condition::{Condition, Lookup, Moment};
+use super::finding::{Finding, OfKey, Refused};
+use super::trigger::{Trigger, Window};
 
 /// Triggers that are followed at a time. More are counted, not judged.
 const MOST_OPEN: usize = 1000;
@@ -41,8 +37,6 @@ pub(super) struct Response {
     worst: Option<Answer>,
     longest_s: Option<f64>,
     last_ns: u64,
-    /// The whole of `stays_for`, ns.
-    full_ns: u64,
     /// Triggers whose time lies beyond the end of the run.
     beyond: u64,
 }
@@ -71,22 +65,17 @@ impl Answer {
 }
 
 impl Response {
-    pub(super) fn new(
-        config: &RequirementConfig,
-        scenario: &Scenario,
-        values: &mut Values,
-    ) -> Result<Self, Refused> {
+    pub(super) fn new(config: &RequirementConfig, of: &mut Lookup<'_>) -> Result<Self, Refused> {
         let missing = |key| Refused::new(key, "give when and then: it is missing");
         let when = config.when.as_deref().ok_or_else(|| missing("require.when"))?;
         let then = config.then.as_deref().ok_or_else(|| missing("require.then"))?;
         let time_ns = |key: &'static str, time: Option<Quantity>| {
             let seconds =
-                time.map(|time| time.si_of(Dimension::Time).map_err(|need| format!("{time}: {need}")));
-            let seconds = seconds.transpose().of_key(key)?;
-            if seconds.is_some_and(|seconds| seconds < 0.0) {
-                return Err(Refused::new(key, "use a time not below 0"));
+                |time: Quantity| time.si_of(Dimension::Time).map_err(|need| format!("{time}: {need}"));
+            match time.map(seconds).transpose().of_key(key)? {
+                Some(seconds) if seconds < 0.0 => Err(Refused::new(key, "use a time not below 0")),
+                seconds => Ok(seconds.map(|seconds| (seconds * SECOND_NS as f64).round() as u64)),
             }
-            Ok(seconds.map(|seconds| (seconds * SECOND_NS as f64).round() as u64))
         };
         let delay_ns = time_ns("require.delay", config.delay)?.unwrap_or(0);
         let within_ns = time_ns("require.within", config.within)?;
@@ -95,9 +84,9 @@ impl Response {
             return Err(Refused::new("require.within", "it is shorter than delay"));
         }
         Ok(Self {
-            trigger: Trigger::parse(when, scenario, values).of_key("require.when")?,
-            then: Condition::parse(then, values).of_key("require.then")?,
-            window: Window::new(config.during.as_ref(), scenario, values)?,
+            trigger: Trigger::parse(when, of).of_key("require.when")?,
+            then: Condition::parse(then, of.values).of_key("require.then")?,
+            window: Window::new(config, of)?,
             delay_ns,
             within_ns,
             stays_for_ns,
@@ -110,7 +99,6 @@ impl Response {
             worst: None,
             longest_s: None,
             last_ns: 0,
-            full_ns: stays_for_ns,
             beyond: 0,
         })
     }
@@ -126,20 +114,20 @@ impl Response {
         format!("after {}: {}{delay}{within}{stays}{}", self.trigger.text, self.then.text, self.window.text)
     }
 
-    pub(super) fn take(&mut self, moment: &Moment<'_>) {
+    pub(super) fn judge_moment(&mut self, moment: &Moment<'_>) {
         if !moment.is_closing {
-            self.sample(moment);
+            self.add_sample(moment);
         }
-        let occurred = self.trigger.take(moment);
+        let occurred = self.trigger.times_ns(moment);
         if self.window.contains(moment) {
             for occurred_ns in occurred {
-                self.begin(moment.time_ns, occurred_ns);
+                self.open_answer(moment.time_ns, occurred_ns);
             }
         }
     }
 
-    fn sample(&mut self, moment: &Moment<'_>) {
-        self.settle(moment.time_ns);
+    fn add_sample(&mut self, moment: &Moment<'_>) {
+        self.judge_ended(Some(moment.time_ns));
         let robustness = self.then.robustness(moment.values).unwrap_or(f64::NEG_INFINITY);
         self.waiting.push_back((moment.time_ns, robustness));
         while self.smallest.back().is_some_and(|(_, last)| *last >= robustness) {
@@ -149,38 +137,32 @@ impl Response {
         self.last_ns = moment.time_ns;
     }
 
-    fn begin(&mut self, at_ns: u64, occurred_ns: u64) {
+    fn open_answer(&mut self, at_ns: u64, occurred_ns: u64) {
         self.triggers += 1;
         if self.open.len() == MOST_OPEN {
             self.not_followed += 1;
         } else {
-            self.open.push(Answer {
-                at_ns,
-                occurred_ns,
-                best: f64::NEG_INFINITY,
-                answered_ns: None,
-                is_judged: false,
-                observed_ns: None,
-            });
+            let (best, answered_ns, is_judged, observed_ns) = (f64::NEG_INFINITY, None, false, None);
+            self.open.push(Answer { at_ns, occurred_ns, best, answered_ns, is_judged, observed_ns });
         }
     }
 
-    /// Judges the samples whose windows end before `now_ns`.
-    fn settle(&mut self, now_ns: u64) {
+    /// Judges the samples whose windows end before `now_ns`. Without it, at the end of the run, all are judged that are left.
+    fn judge_ended(&mut self, now_ns: Option<u64>) {
         while let Some(&(time_ns, _)) = self.waiting.front()
-            && time_ns.saturating_add(self.stays_for_ns) < now_ns
+            && now_ns.is_none_or(|now_ns| time_ns.saturating_add(self.stays_for_ns) < now_ns)
         {
             self.waiting.pop_front();
             while self.smallest.front().is_some_and(|(at_ns, _)| *at_ns < time_ns) {
                 self.smallest.pop_front();
             }
             let robustness = self.smallest.front().map_or(f64::NEG_INFINITY, |(_, smallest)| *smallest);
-            self.judge(time_ns, robustness);
+            self.judge_sample(time_ns, robustness);
         }
     }
 
-    fn judge(&mut self, time_ns: u64, robustness: f64) {
-        let observed_ns = Some(self.last_ns.saturating_sub(time_ns)).filter(|ns| *ns < self.full_ns);
+    fn judge_sample(&mut self, time_ns: u64, robustness: f64) {
+        let observed_ns = Some(self.last_ns.saturating_sub(time_ns)).filter(|ns| *ns < self.stays_for_ns);
         let (delay_ns, within_ns) = (self.delay_ns, self.within_ns);
         for answer in self.open.iter_mut().filter(|answer| time_ns >= answer.at_ns.saturating_add(delay_ns)) {
             if within_ns.is_none_or(|within_ns| time_ns <= answer.at_ns.saturating_add(within_ns)) {
@@ -194,17 +176,15 @@ impl Response {
             }
         }
         // An answer is known once its time is over and the condition has held.
-        let is_known = |answer: &Answer| {
+        let is_known = |answer: &mut Answer| {
             let is_over = within_ns.is_none_or(|within_ns| time_ns > answer.at_ns.saturating_add(within_ns));
             is_over && answer.answered_ns.is_some()
         };
-        let known: Vec<_> = self.open.extract_if(.., |answer| is_known(answer)).collect();
-        for answer in known {
-            self.close(answer);
-        }
+        let known: Vec<_> = self.open.extract_if(.., is_known).collect();
+        known.into_iter().for_each(|answer| self.close_answer(answer));
     }
 
-    fn close(&mut self, answer: Answer) {
+    fn close_answer(&mut self, answer: Answer) {
         if !answer.is_judged {
             self.beyond += 1;
             return;
@@ -215,10 +195,8 @@ impl Response {
         if worst.is_none_or(|worst| margin < worst) {
             self.worst = Some(answer);
         }
-        self.longest_s = match (self.longest_s, answer.latency_s()) {
-            (Some(longest_s), Some(latency_s)) => Some(latency_s.max(longest_s)),
-            (longest_s, latency_s) => longest_s.or(latency_s),
-        };
+        let latency_s = answer.latency_s().into_iter().chain(self.longest_s);
+        self.longest_s = latency_s.reduce(f64::max);
     }
 
     /// Of a signal its robustness; of a state the time left, s.
@@ -231,45 +209,43 @@ impl Response {
         Some(left_ns(self.within_ns?)? / SECOND_NS as f64)
     }
 
-    pub(super) fn finish(mut self) -> Finding {
+    pub(super) fn into_finding(mut self) -> Finding {
         // The windows that are left end with the run.
-        let stays_for_ns = std::mem::replace(&mut self.stays_for_ns, 0);
-        self.settle(u64::MAX);
-        self.stays_for_ns = stays_for_ns;
-        for answer in std::mem::take(&mut self.open) {
-            self.close(answer);
-        }
-        let unit = self.unit();
+        self.judge_ended(None);
+        std::mem::take(&mut self.open).into_iter().for_each(|answer| self.close_answer(answer));
+        let is_numeric = self.then.is_numeric();
+        let unit = if is_numeric { self.then.unit } else { Unit::named("ms").expect("a unit of time") };
         let Some(worst) = self.worst else {
+            let (trigger, window) = (&self.trigger.text, &self.window.text);
             let why = match self.triggers {
-                0 if self.window.text.is_empty() => format!("{} never came", self.trigger.text),
-                0 => format!("{} never came{}", self.trigger.text, self.window.text),
-                _ => format!("the run ended before the time after {}", self.trigger.text),
+                0 => format!("{trigger} never came{window}"),
+                _ => format!("the run ended before the time after {trigger}"),
             };
             return Finding::untested(why, unit);
         };
         let margin = self.margin(&worst).filter(|margin| margin.is_finite());
         let relative_margin = margin.and_then(|margin| {
             let within_s = self.within_ns.map(|ns| ns as f64 / SECOND_NS as f64);
-            if self.then.is_numeric() { self.then.share(margin) } else { Finding::share(margin, within_s?) }
+            if is_numeric { self.then.share(margin) } else { Finding::share(margin, within_s?) }
         });
         Finding {
             margin,
             relative_margin,
             worst_ns: Some(worst.at_ns),
             latency_s: self.longest_s,
-            ..Finding::new(self.answered == self.triggers - self.beyond, self.text(&worst), unit)
+            ..Finding::new(self.answered == self.triggers - self.beyond, self.in_words(&worst), unit)
         }
     }
 
-    fn text(&self, worst: &Answer) -> String {
+    fn in_words(&self, worst: &Answer) -> String {
         let latency = match self.longest_s {
             Some(longest_s) => format!("; longest latency {:.3} ms", longest_s * 1e3),
             None => "; never followed".to_owned(),
         };
         let ms = |ns: u64| ns as f64 / 1e6;
+        let whole_ms = ms(self.stays_for_ns);
         let observed = worst.observed_ns.map_or_else(String::new, |ns| {
-            format!("; the run ended after {:.0} ms of {:.0} ms", ms(ns), ms(self.full_ns))
+            format!("; the run ended after {:.0} ms of {whole_ms:.0} ms", ms(ns))
         });
         let beyond = match self.beyond {
             0 => String::new(),
@@ -279,15 +255,7 @@ impl Response {
             0 => String::new(),
             more => format!("; {more} more not followed, as {MOST_OPEN} were open"),
         };
-        format!(
-            "{} of {} answered{latency}{observed}{beyond}{cut}",
-            self.answered,
-            counted(self.triggers, "trigger")
-        )
-    }
-
-    /// The unit of the margin.
-    pub(super) fn unit(&self) -> Unit {
-        if self.then.is_numeric() { self.then.unit } else { Unit::named("ms").expect("a unit of time") }
+        let triggers = counted(self.triggers, "trigger");
+        format!("{} of {triggers} answered{latency}{observed}{beyond}{cut}", self.answered)
     }
 }

@@ -1,5 +1,6 @@
 //! Requirements over runs of a few samples, a millisecond apart.
 
+use RequirementResult::{Failed, Passed, Untested};
 use masseter_model::geometry::AXES;
 use masseter_recording::Recorded;
 use masseter_runtime::messages::codes::{Cause, ControllerState, DriveState, EventKind, Source};
@@ -7,8 +8,8 @@ use masseter_runtime::messages::{Event, Reading, State};
 use masseter_runtime::named::Declared;
 use masseter_scenario::Scenario;
 
-use super::{RequirementFigures, RequirementResult, Requirements, check_requirements};
 use crate::events::EventRecord;
+use crate::requirements::{RequirementFigures, RequirementResult, Requirements, check_requirements};
 
 const MS: u64 = 1_000_000;
 
@@ -80,8 +81,6 @@ fn found(figures: &RequirementFigures) -> (RequirementResult, Option<f64>, Optio
     let rounded = |value: f64| (value * 1e6).round() / 1e6;
     (figures.result, figures.margin.map(rounded), figures.worst_at_s.map(|at_s| rounded(at_s * 1e3)))
 }
-
-use RequirementResult::{Failed, Passed, Untested};
 
 #[test]
 fn bounds_have_the_smallest_margin_and_its_moment() {

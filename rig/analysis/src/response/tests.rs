@@ -1,7 +1,6 @@
 //! Messages of made-up buses beside the bounds of their plan.
 
 use masseter_can::{Bitrate, ErrorKind, ErrorReport};
-
 use masseter_runtime::messages::tap;
 
 use super::*;
@@ -36,11 +35,11 @@ fn followed_without_faults(frames: impl IntoIterator<Item = FrameTap>) -> BusRes
 
 fn followed(mut responses: Responses, frames: impl IntoIterator<Item = FrameTap>) -> BusResponse {
     frames.into_iter().for_each(|frame| take(&mut responses, &frame));
-    responses.finish(0)
+    responses.into_figures(0)
 }
 
 fn take(responses: &mut Responses, frame: &FrameTap) {
-    responses.frame(frame, tap::bus_of(frame).unwrap(), &tap::decode(frame).unwrap());
+    responses.apply_frame(frame, tap::bus_of(frame).unwrap(), &tap::decode(frame).unwrap());
 }
 
 #[test]
@@ -128,7 +127,7 @@ fn frames_beside_a_stall_are_not_judged_and_the_others_are() {
 fn of_a_part_of_the_frames_nothing_is_judged() {
     let mut responses = responses(false);
     take(&mut responses, &seen(0x080, 1000, 191));
-    let found = responses.finish(3);
+    let found = responses.into_figures(3);
     assert_eq!(found.unbounded.as_deref(), Some("the recording lacks 3 frames"));
     assert_eq!(found.exceeding().count(), 0);
 }

@@ -7,10 +7,8 @@ use masseter_runtime::messages::codes::{ControllerState, DriveRequest, DriveStat
 use masseter_runtime::named::Declared;
 use masseter_scenario::{Scenario, Unit};
 
-use super::cycle::CycleMessages;
-use super::derived::{Jaw, JawPoint, desired, estimated, solution};
-use super::list::SignalList;
-use super::signal::NamedSignal;
+use super::signal::{Jaw, JawPoint, NamedSignal, SignalList, desired, estimated, solution};
+use super::timeline::CycleMessages;
 
 /// The signals of a run of this scenario with this jaw, whose controller declares these.
 pub(super) fn signals(scenario: &Scenario, jaw: Jaw, declared: &Declared) -> Vec<NamedSignal> {
@@ -18,15 +16,15 @@ pub(super) fn signals(scenario: &Scenario, jaw: Jaw, declared: &Declared) -> Vec
     add_jaw(&mut list, jaw);
     add_contact(&mut list, scenario);
     if scenario.load_cell.is_some() {
-        list.add("load_cell.force", "N", "Bite force that the load cell shows.", |messages| {
-            Some(messages.reading?.load_cell_n)
+        list.add("load_cell.force", "N", "Bite force that the load cell shows.", |of| {
+            Some(of.reading?.load_cell_n)
         });
     }
     add_axes(&mut list);
     add_controller(&mut list);
     add_timing(&mut list);
     add_declared(&mut list, declared);
-    list.into_signals()
+    list.0
 }
 
 fn add_jaw(list: &mut SignalList, jaw: Jaw) {
@@ -41,61 +39,56 @@ fn add_jaw(list: &mut SignalList, jaw: Jaw) {
                 format!("{name}.{axis}"),
                 "mm",
                 format!("Place of the point along {axis} of the base: the true one, on the robot the estimated one."),
-                move |messages| Some(jaw.place(point, &jaw.actual(messages)?)[at]),
+                move |of| Some(jaw.place(point, &jaw.actual(of)?)[at]),
             );
         }
-        list.add(
-            format!("{name}.error"),
-            "mm",
-            "Distance of the point from its desired place.",
-            move |messages| Some(jaw.distance(point, &jaw.actual(messages)?, &desired(messages)?)),
-        );
+        list.add(format!("{name}.error"), "mm", "Distance of the point from its desired place.", move |of| {
+            Some(jaw.distance(point, &jaw.actual(of)?, &desired(of)?))
+        });
     }
     for (at, axis) in ["x", "y", "z"].into_iter().enumerate() {
         list.add(
             format!("incisal.desired.{axis}"),
             "mm",
             format!("Desired place of the incisal point along {axis} of the base."),
-            move |messages| Some(jaw.place(JawPoint::Incisal, &desired(messages)?)[at]),
+            move |of| Some(jaw.place(JawPoint::Incisal, &desired(of)?)[at]),
         );
     }
     list.add(
         "incisal.estimated_error",
         "mm",
         "Distance of the incisal point from its desired place, by forward kinematics.",
-        move |messages| Some(jaw.distance(JawPoint::Incisal, &estimated(messages)?, &desired(messages)?)),
+        move |of| Some(jaw.distance(JawPoint::Incisal, &estimated(of)?, &desired(of)?)),
     );
     list.add_from(
         "jaw.opening",
         "mm",
         "Distance of the incisal point from its place when the motion began.",
-        move |messages, start| Some(jaw.distance(JawPoint::Incisal, &jaw.actual(messages)?, &start.pose?)),
+        move |of, start| Some(jaw.distance(JawPoint::Incisal, &jaw.actual(of)?, start?)),
     );
     list.add_from(
         "jaw.rotation",
         "deg",
         "Angle of the jaw from its orientation when the motion began.",
-        move |messages, start| Some(jaw.actual(messages)?.rotation.angle_to(&start.pose?.rotation)),
+        move |of, start| Some(jaw.actual(of)?.rotation.angle_to(&start?.rotation)),
     );
     list.add(
         "platform.error",
         "mm",
         "Distance of the platform's origin from its desired place.",
-        move |messages| {
-            Some((jaw.actual(messages)?.translation.vector - desired(messages)?.translation.vector).norm())
-        },
+        move |of| Some((jaw.actual(of)?.translation.vector - desired(of)?.translation.vector).norm()),
     );
     list.add(
         "platform.angle_error",
         "deg",
         "Angle of the platform from its desired orientation.",
-        move |messages| Some(jaw.actual(messages)?.rotation.angle_to(&desired(messages)?.rotation)),
+        move |of| Some(jaw.actual(of)?.rotation.angle_to(&desired(of)?.rotation)),
     );
     list.add(
         "bite.force",
         "N",
         "Vertical force of food and upper teeth on the emulated jaw, mean over the cycle.",
-        |messages| Some(messages.truth?.bite_force_n),
+        |of| Some(of.truth?.bite_force_n),
     );
 }
 
@@ -109,11 +102,11 @@ fn add_contact(list: &mut SignalList, scenario: &Scenario) {
             format!("contact.{tooth}"),
             "N",
             format!("Force of antagonist and food on tooth {tooth}, mean over a cycle."),
-            move |messages| loads_n(messages)?.find(|(number, _)| *number == tooth).map(|(_, load_n)| load_n),
+            move |of| loads_n(of)?.find(|(number, _)| *number == tooth).map(|(_, load_n)| load_n),
         );
     }
-    list.add("contact.total", "N", "Sum of the forces on all teeth.", |messages| {
-        Some(loads_n(messages)?.map(|(_, load_n)| load_n).sum())
+    list.add("contact.total", "N", "Sum of the forces on all teeth.", |of| {
+        Some(loads_n(of)?.map(|(_, load_n)| load_n).sum())
     });
 }
 
@@ -121,58 +114,55 @@ fn add_axes(list: &mut SignalList) {
     for (axis, name) in AXIS_NAMES.into_iter().enumerate() {
         let at = move |values: [f64; AXES]| values[axis];
         // Before the first process data of a drive, and after its loss, a reading has no values of the drive.
-        let reading = move |messages: &CycleMessages| {
-            messages.reading.filter(|reading| reading.drive_state[axis] != NO_DRIVE_STATE)
+        let reading = move |of: &CycleMessages| {
+            of.reading.filter(|reading| reading.drive_state[axis] != NO_DRIVE_STATE)
         };
         // Without a request to the drives a command has no targets.
-        let command = |messages: &CycleMessages| {
-            messages.command.filter(|command| command.request != DriveRequest::Off.code())
-        };
-        list.add(format!("{name}.position"), "mm", "Position that the encoder reports.", move |messages| {
-            Some(at(reading(messages)?.position_m))
+        let command =
+            |of: &CycleMessages| of.command.filter(|command| command.request != DriveRequest::Off.code());
+        list.add(format!("{name}.position"), "mm", "Position that the encoder reports.", move |of| {
+            Some(at(reading(of)?.position_m))
         });
-        list.add(format!("{name}.true_position"), "mm", "True position of the axis.", move |messages| {
-            Some(at(messages.truth?.joint_m))
+        list.add(format!("{name}.true_position"), "mm", "True position of the axis.", move |of| {
+            Some(at(of.truth?.joint_m))
         });
-        list.add(format!("{name}.velocity"), "mm/s", "True velocity of the axis.", move |messages| {
-            Some(at(messages.truth?.joint_m_s))
+        list.add(format!("{name}.velocity"), "mm/s", "True velocity of the axis.", move |of| {
+            Some(at(of.truth?.joint_m_s))
         });
         list.add(
             format!("{name}.force"),
             "N",
             "Force that the drive reports; of an emulated one the mean over the cycle.",
-            move |messages| Some(at(reading(messages)?.force_n)),
+            move |of| Some(at(reading(of)?.force_n)),
         );
-        list.add(format!("{name}.target"), "mm", "Target of the cycle's command.", move |messages| {
-            Some(at(command(messages)?.target_m))
+        list.add(format!("{name}.target"), "mm", "Target of the cycle's command.", move |of| {
+            Some(at(command(of)?.target_m))
         });
-        list.add_state(format!("{name}.drive"), "State of the drive.", drive_states, move |messages| {
-            Some(reading(messages)?.drive_state[axis])
+        list.add_state(format!("{name}.drive"), "State of the drive.", drive_states, move |of| {
+            Some(reading(of)?.drive_state[axis])
         });
     }
 }
 
 fn add_controller(list: &mut SignalList) {
-    list.add_state("controller.state", "State of the controller.", controller_states, |messages| {
-        Some(messages.state?.controller_state)
+    list.add_state("controller.state", "State of the controller.", controller_states, |of| {
+        Some(of.state?.controller_state)
     });
-    list.add("motion.time", "s", "How far the motion has come.", |messages| {
-        Some(messages.state?.motion_time_s)
-    });
-    list.add("fk.residual", "um", "Largest difference of a platform side from its length.", |messages| {
-        Some(solution(messages)?.residual_m)
+    list.add("motion.time", "s", "How far the motion has come.", |of| Some(of.state?.motion_time_s));
+    list.add("fk.residual", "um", "Largest difference of a platform side from its length.", |of| {
+        Some(solution(of)?.residual_m)
     });
     list.add(
         "fk.condition",
         "",
         "Condition number of the Jacobian, computed every ten cycles and held in between.",
-        |messages| Some(solution(messages)?.condition),
+        |of| Some(solution(of)?.condition),
     );
-    list.add("fk.iterations", "", "Iterations of the forward kinematics.", |messages| {
-        Some(f64::from(solution(messages)?.iterations))
+    list.add("fk.iterations", "", "Iterations of the forward kinematics.", |of| {
+        Some(f64::from(solution(of)?.iterations))
     });
-    list.add("master.fault", "", "1 once the master refuses to move anything.", |messages| {
-        Some(f64::from(messages.reading?.master_fault))
+    list.add("master.fault", "", "1 once the master refuses to move anything.", |of| {
+        Some(f64::from(of.reading?.master_fault))
     });
 }
 
@@ -181,58 +171,52 @@ fn add_timing(list: &mut SignalList) {
         let about = format!(
             "Share of its core that the {role}'s loop took since its message before, by work and by spinning."
         );
-        let cpu = NamedSignal::new(format!("{role}.cpu"), "%", about, move |messages, _| messages.cpu[place]);
-        list.push(cpu.with_absence("; simulated time takes no share of a core: use --clock rt"));
+        let cpu = list.add(format!("{role}.cpu"), "%", about, move |of| of.cpu[place]);
+        cpu.absence = "; simulated time takes no share of a core: use --clock rt";
     }
     let seconds =
         |from_ns: u64, to_ns: u64| (from_ns > 0 && to_ns > 0).then(|| (to_ns as f64 - from_ns as f64) / 1e9);
-    list.add("plant.wake_up", "us", "Wake-up of the plant after its deadline.", move |messages| {
-        messages.reading.and_then(|reading| seconds(reading.due_ns, reading.woke_ns))
+    list.add("plant.wake_up", "us", "Wake-up of the plant after its deadline.", move |of| {
+        of.reading.and_then(|reading| seconds(reading.due_ns, reading.woke_ns))
     });
-    list.add("controller.wake_up", "us", "Wake-up of the controller after its deadline.", move |messages| {
-        messages.state.and_then(|state| seconds(state.due_ns, state.woke_ns))
+    list.add("controller.wake_up", "us", "Wake-up of the controller after its deadline.", move |of| {
+        of.state.and_then(|state| seconds(state.due_ns, state.woke_ns))
     });
-    list.add("controller.work", "us", "Time from the reading to the ready command.", move |messages| {
-        solution(messages).and_then(|state| seconds(state.received_ns, state.commanded_ns))
+    list.add("controller.work", "us", "Time from the reading to the ready command.", move |of| {
+        solution(of).and_then(|state| seconds(state.received_ns, state.commanded_ns))
     });
-    list.add("fk.time", "us", "Time that the forward kinematics takes.", move |messages| {
-        solution(messages).and_then(|state| seconds(state.received_ns, state.solved_ns))
+    list.add("fk.time", "us", "Time that the forward kinematics takes.", move |of| {
+        solution(of).and_then(|state| seconds(state.received_ns, state.solved_ns))
     });
-    list.add("process_data.time", "us", "Time from SYNC to the last process data.", move |messages| {
-        messages.reading.and_then(|reading| seconds(reading.sampled_ns, reading.complete_ns))
+    list.add("process_data.time", "us", "Time from SYNC to the last process data.", move |of| {
+        of.reading.and_then(|reading| seconds(reading.sampled_ns, reading.complete_ns))
     });
-    list.add("plant.skipped", "", "Deadlines that the plant has skipped since the start.", |messages| {
-        Some(messages.reading?.skipped_cycles as f64)
+    list.add("plant.skipped", "", "Deadlines that the plant has skipped since the start.", |of| {
+        Some(of.reading?.skipped_cycles as f64)
     });
-    list.add(
-        "controller.skipped",
-        "",
-        "Deadlines that the controller has skipped since the start.",
-        |messages| Some(messages.state?.skipped_cycles as f64),
-    );
+    list.add("controller.skipped", "", "Deadlines that the controller has skipped since the start.", |of| {
+        Some(of.state?.skipped_cycles as f64)
+    });
 }
 
 fn add_declared(list: &mut SignalList, declared: &Declared) {
     for (place, signal) in declared.signals.iter().enumerate() {
         let si = Unit::named(&signal.unit).map_or(1.0, |unit| unit.si);
-        list.add(format!("signal.{}", signal.name), &signal.unit, &signal.about, move |messages| {
-            Some(messages.signals.as_ref()?.signals.as_slice().get(place)? * si)
+        list.add(format!("signal.{}", signal.name), &signal.unit, &signal.about, move |of| {
+            Some(of.signals.as_ref()?.signals.as_slice().get(place)? * si)
         });
     }
     for (place, parameter) in declared.parameters.iter().enumerate() {
         let si = Unit::named(&parameter.unit).map_or(1.0, |unit| unit.si);
-        list.add(
-            format!("parameter.{}", parameter.name),
-            &parameter.unit,
-            &parameter.about,
-            move |messages| Some(messages.parameters.as_ref()?.parameters.as_slice().get(place)? * si),
-        );
+        list.add(format!("parameter.{}", parameter.name), &parameter.unit, &parameter.about, move |of| {
+            Some(of.parameters.as_ref()?.parameters.as_slice().get(place)? * si)
+        });
     }
 }
 
 /// The force on each tooth, N.
-fn loads_n(messages: &CycleMessages) -> Option<impl Iterator<Item = (u32, f64)>> {
-    Some(messages.contact.as_ref()?.teeth().map(|tooth| (tooth.number, tooth.load_n())))
+fn loads_n(of: &CycleMessages) -> Option<impl Iterator<Item = (u32, f64)>> {
+    Some(of.contact.as_ref()?.teeth().map(|tooth| (tooth.number, tooth.load_n())))
 }
 
 fn controller_states() -> Vec<(&'static str, u32)> {

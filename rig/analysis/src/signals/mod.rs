@@ -4,17 +4,132 @@
 //! judges nothing: see [`requirements`](crate::requirements).
 
 mod catalogue;
-mod cpu_share;
-mod cycle;
-mod derived;
-mod list;
-mod registry;
 mod signal;
 mod timeline;
-mod values;
 
-pub use cycle::CycleMessages;
-pub use registry::{Registry, UnknownSignal};
+use std::sync::Arc;
+
+use masseter_model::geometry::Pose;
+use masseter_runtime::named::Declared;
+use masseter_scenario::Scenario;
+use masseter_scenario::input::excerpt;
+use masseter_scenario::wording::nearest;
+
+use self::catalogue::signals;
+use self::signal::Jaw;
+use crate::tracking::is_running;
+
 pub use signal::NamedSignal;
-pub use timeline::{Sample, Timeline};
-pub use values::Values;
+pub use timeline::{CycleMessages, Sample, Timeline};
+
+/// There is no signal of that name.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("there is no signal '{}'; masseter signals lists them{question}", excerpt(.name))]
+pub struct UnknownSignal {
+    name: String,
+    /// The most similar name, as a question.
+    question: String,
+}
+
+impl UnknownSignal {
+    /// Whether the controller may declare it: a signal or a parameter of its own.
+    pub fn is_of_controller(&self) -> bool {
+        self.name.starts_with("signal.") || self.name.starts_with("parameter.")
+    }
+}
+
+/// The signals of a run.
+///
+/// ```
+/// use masseter_analysis::signals::Registry;
+/// use masseter_scenario::Scenario;
+/// use masseter_runtime::named::Declared;
+///
+/// let registry = Registry::new(&Scenario::default(), &Declared::default());
+/// let place = registry.place_of("incisal.error")?;
+/// assert_eq!(registry.signals()[place].unit, "mm");
+/// let refusal = registry.place_of("incisal.eror").unwrap_err().to_string();
+/// assert!(refusal.ends_with("did you mean 'incisal.error'?"));
+/// # Ok::<(), masseter_analysis::signals::UnknownSignal>(())
+/// ```
+#[derive(Debug)]
+pub struct Registry {
+    signals: Vec<NamedSignal>,
+    jaw: Jaw,
+}
+
+impl Registry {
+    /// The signals of a run of this scenario whose controller declares these.
+    pub fn new(scenario: &Scenario, declared: &Declared) -> Self {
+        let jaw = Jaw::new(&scenario.jaw, scenario.can.is_virtual());
+        Self { signals: signals(scenario, jaw, declared), jaw }
+    }
+
+    /// Every signal.
+    pub fn signals(&self) -> &[NamedSignal] {
+        &self.signals
+    }
+
+    /// The place of the signal of that name.
+    ///
+    /// # Errors
+    /// [`UnknownSignal`] with the most similar name.
+    pub fn place_of(&self, name: &str) -> Result<usize, UnknownSignal> {
+        self.signals.iter().position(|signal| signal.name == name).ok_or_else(|| {
+            let question = nearest(name, self.signals.iter().map(|signal| signal.name.as_str()))
+                .map_or_else(String::new, |likely| format!("; did you mean '{likely}'?"));
+            UnknownSignal { name: name.to_owned(), question }
+        })
+    }
+}
+
+/// The values of chosen signals, cycle by cycle.
+#[derive(Debug, Clone)]
+pub struct Values {
+    registry: Arc<Registry>,
+    /// The places of the chosen signals.
+    chosen: Vec<usize>,
+    /// The pose of the jaw in the first cycle of the motion.
+    start: Option<Pose>,
+}
+
+impl Values {
+    /// None chosen yet.
+    pub fn new(registry: Registry) -> Self {
+        Self { registry: Arc::new(registry), chosen: Vec::new(), start: None }
+    }
+
+    /// Every signal, at its place in the registry.
+    pub fn of_all(registry: Registry) -> Self {
+        let chosen = (0..registry.signals().len()).collect();
+        Self { chosen, ..Self::new(registry) }
+    }
+
+    /// Chooses the signal of that name; returns its place among the chosen ones.
+    ///
+    /// # Errors
+    /// As [`Registry::place_of`].
+    pub fn choose(&mut self, name: &str) -> Result<usize, UnknownSignal> {
+        let place = self.registry.place_of(name)?;
+        Ok(self.chosen.iter().position(|chosen| *chosen == place).unwrap_or_else(|| {
+            self.chosen.push(place);
+            self.chosen.len() - 1
+        }))
+    }
+
+    /// The chosen signal at that place.
+    pub fn signal(&self, chosen: usize) -> &NamedSignal {
+        &self.registry.signals()[self.chosen[chosen]]
+    }
+
+    /// The values of the chosen signals in a cycle; NaN where the cycle does not have one.
+    pub fn take(&mut self, messages: &CycleMessages, values: &mut Vec<f64>) {
+        if self.start.is_none() && messages.state.as_ref().is_some_and(is_running) {
+            self.start = self.registry.jaw.actual(messages);
+        }
+        values.clear();
+        let signals = self.registry.signals();
+        let value = |&place: &usize| signals[place].value(messages, self.start.as_ref()).unwrap_or(f64::NAN);
+        values.extend(self.chosen.iter().map(value));
+    }
+}

@@ -1,24 +1,23 @@
-//! A signal: its name, its unit, its meaning, and how its value follows from the messages of a cycle.
+//! A signal: its name, its unit, its meaning, and how its value follows from the messages of a cycle. And the jaw, from
+//! whose poses many signals follow.
 
 use std::fmt;
 
-use masseter_model::geometry::Pose;
-use masseter_scenario::{Dimension, Unit};
+use masseter_model::geometry::{Pose, Vec3};
+use masseter_recording::jaw_points;
+use masseter_runtime::messages::State;
+use masseter_scenario::{Dimension, JawConfig, Unit};
 use serde::Serialize;
 
-use super::cycle::CycleMessages;
+use super::timeline::CycleMessages;
+use crate::tracking::{desired_pose, estimated_pose, true_pose};
 
-/// How a signal's value follows from a cycle; none where the cycle does not have it.
-type Extract = Box<dyn Fn(&CycleMessages, &Start) -> Option<f64> + Send + Sync>;
-
-/// What some signals count from: the pose of the jaw in the first cycle of the motion.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Start {
-    pub(super) pose: Option<Pose>,
-}
+/// How a signal's value follows from a cycle, and from the pose of the jaw in the first cycle of the motion; none where the
+/// cycle does not have it.
+type Extract = Box<dyn Fn(&CycleMessages, Option<&Pose>) -> Option<f64> + Send + Sync>;
 
 /// The names of the values of a state.
-pub(super) type StateNames = fn() -> Vec<(&'static str, u32)>;
+type StateNames = fn() -> Vec<(&'static str, u32)>;
 
 /// A signal.
 #[derive(Serialize)]
@@ -33,9 +32,9 @@ pub struct NamedSignal {
     shown: Unit,
     #[serde(skip)]
     states: Option<StateNames>,
-    /// Why it may have no value in a whole run.
+    /// Why it may have no value in a whole run; empty where nothing is known.
     #[serde(skip)]
-    absence: &'static str,
+    pub(crate) absence: &'static str,
     #[serde(skip)]
     extract: Extract,
 }
@@ -47,30 +46,8 @@ impl fmt::Debug for NamedSignal {
 }
 
 impl NamedSignal {
-    /// A signal whose value this function gives.
-    pub(super) fn new(
-        name: String,
-        unit: &str,
-        about: String,
-        extract: impl Fn(&CycleMessages, &Start) -> Option<f64> + Send + Sync + 'static,
-    ) -> Self {
-        let shown = Unit::named(unit).unwrap_or_else(|| Dimension::One.si_unit());
-        let extract = Box::new(extract);
-        Self { name, unit: unit.to_owned(), about, shown, states: None, absence: "", extract }
-    }
-
-    /// Its values are states with these names.
-    pub(super) fn with_states(self, states: StateNames) -> Self {
-        Self { states: Some(states), ..self }
-    }
-
-    /// Why it may have no value in a whole run.
-    pub(super) fn with_absence(self, absence: &'static str) -> Self {
-        Self { absence, ..self }
-    }
-
-    /// Its value in a cycle of a run with this start.
-    pub(super) fn value(&self, messages: &CycleMessages, start: &Start) -> Option<f64> {
+    /// Its value in a cycle of a run whose motion began with this pose of the jaw.
+    pub(super) fn value(&self, messages: &CycleMessages, start: Option<&Pose>) -> Option<f64> {
         (self.extract)(messages, start)
     }
 
@@ -79,13 +56,105 @@ impl NamedSignal {
         self.shown
     }
 
-    /// Why it may have no value in a whole run; empty where nothing is known.
-    pub(crate) fn absence(&self) -> &'static str {
-        self.absence
-    }
-
     /// The names of its values, where it is a state.
     pub fn states(&self) -> Option<Vec<(&'static str, u32)>> {
         self.states.map(|names| names())
     }
+}
+
+/// Signals, in the order in which they are listed.
+#[derive(Debug, Default)]
+pub(super) struct SignalList(pub(super) Vec<NamedSignal>);
+
+impl SignalList {
+    /// Adds a signal whose value a cycle alone gives.
+    pub(super) fn add(
+        &mut self,
+        name: impl Into<String>,
+        unit: &str,
+        about: impl Into<String>,
+        extract: impl Fn(&CycleMessages) -> Option<f64> + Send + Sync + 'static,
+    ) -> &mut NamedSignal {
+        self.add_from(name, unit, about, move |messages, _| extract(messages))
+    }
+
+    /// Adds a signal whose value counts from the start of the motion.
+    pub(super) fn add_from(
+        &mut self,
+        name: impl Into<String>,
+        unit: &str,
+        about: impl Into<String>,
+        extract: impl Fn(&CycleMessages, Option<&Pose>) -> Option<f64> + Send + Sync + 'static,
+    ) -> &mut NamedSignal {
+        let shown = Unit::named(unit).unwrap_or_else(|| Dimension::One.si_unit());
+        let (name, about, extract) = (name.into(), about.into(), Box::new(extract));
+        let signal =
+            NamedSignal { name, unit: unit.to_owned(), about, shown, states: None, absence: "", extract };
+        self.0.push(signal);
+        self.0.last_mut().expect("it was just added")
+    }
+
+    /// Adds a state, whose values have these names.
+    pub(super) fn add_state(
+        &mut self,
+        name: impl Into<String>,
+        about: &str,
+        states: StateNames,
+        extract: impl Fn(&CycleMessages) -> Option<u32> + Send + Sync + 'static,
+    ) {
+        let extract = move |messages: &CycleMessages| extract(messages).map(f64::from);
+        self.add(name, "", about, extract).states = Some(states);
+    }
+}
+
+/// A point of the jaw.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum JawPoint {
+    Incisal,
+    LeftCondyle,
+    RightCondyle,
+}
+
+/// The jaw on the platform, and where its pose comes from.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Jaw {
+    /// Its points in the platform frame, m.
+    points_m: [Vec3; 3],
+    has_truth: bool,
+}
+
+impl Jaw {
+    pub(super) fn new(jaw: &JawConfig, has_truth: bool) -> Self {
+        Self { points_m: jaw_points(jaw), has_truth }
+    }
+
+    /// The pose that the jaw has: the true one where the mechanism is emulated, otherwise the estimated one.
+    pub(super) fn actual(&self, messages: &CycleMessages) -> Option<Pose> {
+        if self.has_truth { true_pose(messages.truth.as_ref()?) } else { estimated(messages) }
+    }
+
+    /// Where a point is in the base frame, m.
+    pub(super) fn place(&self, point: JawPoint, pose: &Pose) -> Vec3 {
+        pose.translation.vector + pose.rotation * self.points_m[point as usize]
+    }
+
+    /// How far a point is in one pose from where it is in another, m.
+    pub(super) fn distance(&self, point: JawPoint, a: &Pose, b: &Pose) -> f64 {
+        (self.place(point, a) - self.place(point, b)).norm()
+    }
+}
+
+/// The pose that forward kinematics found.
+pub(super) fn estimated(messages: &CycleMessages) -> Option<Pose> {
+    estimated_pose(&solution(messages)?)
+}
+
+/// The pose that the jaw should have.
+pub(super) fn desired(messages: &CycleMessages) -> Option<Pose> {
+    desired_pose(&solution(messages)?)
+}
+
+/// The state, where it was computed from the cycle's sample: only then are its poses those of the sample.
+pub(super) fn solution(messages: &CycleMessages) -> Option<State> {
+    messages.state.filter(|_| messages.has_solution)
 }

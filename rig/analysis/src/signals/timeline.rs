@@ -5,11 +5,45 @@
 use std::collections::VecDeque;
 
 use masseter_recording::Recorded;
-use masseter_runtime::messages::{Parameters, State};
+use masseter_runtime::messages::{Command, Contact, Parameters, Reading, Signals, State, Truth};
 
-use super::cpu_share::CpuShare;
-use super::cycle::CycleMessages;
 use crate::events::EventRecord;
+
+/// The messages of a cycle; none where a message is missing.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct CycleMessages {
+    /// Number of the cycle, from 1: that of both loops, which count deadlines from one epoch.
+    pub cycle: u64,
+    /// Whether a lost cycle may have acted on the jaw.
+    pub is_disturbed: bool,
+    /// The plant's sample.
+    pub reading: Option<Reading>,
+    /// The true motion at the sample.
+    pub truth: Option<Truth>,
+    /// The forces between the jaws in the cycle before.
+    pub contact: Option<Contact>,
+    /// What the controller made of the sample; without a new sample, its state alone.
+    pub state: Option<State>,
+    /// Whether the state was computed from this sample.
+    pub has_solution: bool,
+    /// The controller's command.
+    pub command: Option<Command>,
+    /// The signals that the controller declares.
+    pub signals: Option<Signals>,
+    /// Shares of their cores that the loops of controller and plant took since the message before.
+    pub cpu: [Option<f64>; 2],
+    /// The controller's parameters, which hold until they change.
+    pub parameters: Option<Parameters>,
+}
+
+impl CycleMessages {
+    /// When the drives sampled, ns; without a sample the controller's deadline.
+    pub fn time_ns(&self) -> Option<u64> {
+        let sampled =
+            self.reading.map(|reading| reading.sampled_ns).or(self.truth.map(|truth| truth.sampled_ns));
+        sampled.filter(|ns| *ns > 0).or(self.state.map(|state| state.due_ns))
+    }
+}
 
 /// Cycles kept; more than a subscriber's queue holds of any topic.
 const KEPT: usize = 1 << 13;
@@ -30,9 +64,9 @@ pub struct Sample {
 }
 
 /// Joins the messages of each cycle.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Timeline {
-    kept: usize,
+    pace: Pace,
     cycles: VecDeque<CycleMessages>,
     /// Events that were not handed out yet.
     events: Vec<EventRecord>,
@@ -45,31 +79,19 @@ pub struct Timeline {
     is_closed: bool,
 }
 
-impl Default for Timeline {
-    fn default() -> Self {
-        Self::keeping(KEPT)
-    }
+/// How far apart messages of one cycle come.
+#[derive(Debug, Clone, Copy, Default)]
+enum Pace {
+    #[default]
+    Recorded,
+    Live,
 }
 
 impl Timeline {
     /// For messages that come soon after their cycle: a message that comes 256
     /// cycles late is left out.
     pub fn while_running() -> Self {
-        Self::keeping(KEPT_WHILE_RUNNING)
-    }
-
-    fn keeping(kept: usize) -> Self {
-        Self {
-            kept,
-            cycles: VecDeque::new(),
-            events: Vec::new(),
-            parameters: None,
-            controller_cpu: CpuShare::default(),
-            plant_cpu: CpuShare::default(),
-            newest_reading: 0,
-            last_ns: 0,
-            is_closed: false,
-        }
+        Self { pace: Pace::Live, ..Self::default() }
     }
 
     /// Takes a message of a cycle; hands out a cycle that is complete now.
@@ -84,7 +106,11 @@ impl Timeline {
             Recorded::Parameters(parameters) => self.at(parameters.cycle)?.parameters = Some(*parameters),
             Recorded::Event(_) | Recorded::Frame(_) | Recorded::Machine(_) => {}
         }
-        if self.cycles.len() > self.kept { self.hand_out() } else { None }
+        let kept = match self.pace {
+            Pace::Recorded => KEPT,
+            Pace::Live => KEPT_WHILE_RUNNING,
+        };
+        if self.cycles.len() > kept { self.hand_out() } else { None }
     }
 
     /// A state belongs to the sample that it was computed from, which may be late. Without a new sample it belongs to its own
@@ -152,7 +178,7 @@ impl Timeline {
         messages.parameters = self.parameters;
         let controller = messages.state.map(|state| [state.woke_ns, state.worked_ns + state.spun_ns]);
         let plant = messages.reading.map(|reading| [reading.woke_ns, reading.worked_ns + reading.spun_ns]);
-        messages.cpu = [self.controller_cpu.take(controller), self.plant_cpu.take(plant)];
+        messages.cpu = [self.controller_cpu.of_next(controller), self.plant_cpu.of_next(plant)];
         let time_ns = messages.time_ns().filter(|time_ns| *time_ns > self.last_ns)?;
         self.last_ns = time_ns;
         let mut events = Vec::new();
@@ -165,60 +191,22 @@ impl Timeline {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use masseter_runtime::messages::{Event, Reading, State};
+/// Follows the account of a loop.
+#[derive(Debug, Clone, Default)]
+struct CpuShare {
+    last: Option<[u64; 2]>,
+}
 
-    use super::*;
-
-    fn reading(cycle: u64) -> Recorded {
-        Recorded::Reading(Reading { cycle, sampled_ns: cycle * 1000, ..Reading::default() })
-    }
-
-    #[test]
-    fn messages_of_a_cycle_come_together_in_the_order_of_time_with_the_events_before_them() {
-        let mut timeline = Timeline::default();
-        for cycle in [1, 2, 4] {
-            assert!(timeline.take(&reading(cycle)).is_none());
-        }
-        for cycle in 1..=4 {
-            timeline.take(&Recorded::State(State { cycle, due_ns: cycle * 1000 + 500, ..State::default() }));
-        }
-        for time_ns in [2000, 1500, 9000] {
-            timeline.event(&EventRecord::from(&Event { time_ns, ..Event::default() }));
-        }
-        let samples: Vec<_> = std::iter::from_fn(|| timeline.finish()).collect();
-        let times: Vec<_> = samples.iter().map(|sample| sample.time_ns).collect();
-        assert_eq!(times, [1000, 2000, 3500, 4000, 9000], "cycle 3 has no reading; the last one closes");
-        let (closing, cycles) = samples.split_last().unwrap();
-        assert!(closing.is_closing);
-        assert!(cycles.iter().all(|sample| sample.messages.state.unwrap().cycle == sample.messages.cycle));
-        let events: Vec<Vec<_>> =
-            samples.iter().map(|sample| sample.events.iter().map(|event| event.time_ns).collect()).collect();
-        assert_eq!(events, [vec![], vec![1500, 2000], vec![], vec![], vec![9000]]);
-    }
-
-    #[test]
-    fn a_state_belongs_to_the_sample_that_it_was_computed_from() {
-        let mut timeline = Timeline::default();
-        (1..=4).for_each(|cycle| drop(timeline.take(&reading(cycle))));
-        // Reading 2 comes too late for cycle 2: cycle 3 uses it, and cycle 4 has its own again.
-        for (cycle, reading_cycle) in [(1, 1), (2, 1), (3, 2), (4, 4)] {
-            timeline.take(&Recorded::State(State { cycle, reading_cycle, ..State::default() }));
-        }
-        let found: Vec<_> = std::iter::from_fn(|| timeline.finish())
-            .map(|Sample { messages, .. }| (messages.state.map(|state| state.cycle), messages.has_solution))
-            .collect();
-        assert_eq!(found, [(Some(1), true), (Some(3), true), (None, false), (Some(4), true), (None, false)]);
-    }
-
-    #[test]
-    fn a_long_run_is_handed_out_while_it_goes_on() {
-        let mut timeline = Timeline::default();
-        let total = 3 * KEPT as u64;
-        let early = (1..=total).filter_map(|cycle| timeline.take(&reading(cycle))).count() as u64;
-        assert_eq!(early, total - KEPT as u64);
-        assert!(timeline.take(&reading(1)).is_none(), "too old");
-        assert_eq!(std::iter::from_fn(|| timeline.finish()).count(), KEPT + 1);
+impl CpuShare {
+    /// The share since the message before, from the time of this one's wake-up and the time that the loop has worked and spun
+    /// since the start, ns. None in simulated time, which has no account.
+    fn of_next(&mut self, account: Option<[u64; 2]>) -> Option<f64> {
+        let [woke_ns, busy_ns] = account.filter(|[_, busy_ns]| *busy_ns > 0)?;
+        let [before_ns, busy_before_ns] = self.last.replace([woke_ns, busy_ns])?;
+        let elapsed_ns = woke_ns.checked_sub(before_ns).filter(|elapsed_ns| *elapsed_ns > 0)?;
+        Some(busy_ns.saturating_sub(busy_before_ns) as f64 / elapsed_ns as f64)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -13,7 +13,7 @@ fn skips_of(messages: Messages) -> Skips {
     let mut skips = Skips::default();
     for (seq, &[skipped, stalled_ns, overlong_ns, late_ns]) in (1..).zip(messages) {
         let counters = Counters { seq, skipped, stalled_ns, overlong_ns, late_ns, ..Counters::default() };
-        skips.take(&counters, PERIOD_NS, false);
+        skips.account(&counters, PERIOD_NS, false);
     }
     skips
 }
@@ -95,7 +95,7 @@ impl Process {
         }
         self.counters.late_ns = self.now_ns - due_ns;
         self.counters.seq += 1;
-        self.skips.take(&self.counters, PERIOD_NS, false);
+        self.skips.account(&self.counters, PERIOD_NS, false);
     }
 }
 
@@ -143,8 +143,8 @@ proptest! {
 fn skips_belong_to_a_wake_up_only_if_the_message_before_it_is_known() {
     let skipped_before = |seq| {
         let mut skips = Skips::default();
-        skips.take(&Counters { seq: 1, ..Counters::default() }, PERIOD_NS, false);
-        skips.take(&Counters { seq, skipped: 3, ..Counters::default() }, PERIOD_NS, false)
+        skips.account(&Counters { seq: 1, ..Counters::default() }, PERIOD_NS, false);
+        skips.account(&Counters { seq, skipped: 3, ..Counters::default() }, PERIOD_NS, false)
     };
     assert_eq!((skipped_before(2), skipped_before(3)), (3, 0));
 }
@@ -168,7 +168,7 @@ fn what_the_scenario_stalls_is_no_skip_of_machine_or_rig() {
         [(1, 0, 0, false), (2, 0, 60_000_000, true), (3, 60, 60_000_000, true), (4, 61, 61_000_000, false)];
     for (seq, skipped, stalled_ns, is_of_scenario) in stalls {
         let counters = Counters { seq, skipped, stalled_ns, ..Counters::default() };
-        skips.take(&counters, PERIOD_NS, is_of_scenario);
+        skips.account(&counters, PERIOD_NS, is_of_scenario);
     }
     let figures = skips.figures;
     assert_eq!((figures.skipped, figures.by_scenario, figures.by_machine), (61, 60, 1));
@@ -187,4 +187,87 @@ fn stretches_are_counted_from_the_shortest_that_cost_a_deadline() {
     // What is left of a stretch is not a shorter one.
     let skips = skips_of(&[[0, 0, 5_000_000, 2_000_000], [2, 0, 5_000_000, 0]]);
     assert_eq!(skips.shortest_costly_ns, Some(5_000_000));
+}
+
+mod attribution {
+    use super::*;
+    use crate::skips::Counters;
+
+    const PERIOD_NS: u64 = 1_000_000;
+    const STALL_NS: u64 = 3_000_000;
+
+    /// A process of 10,000 cycles that works a tenth of its running time; some cycles bring a stall of the
+    /// machine, some a stretch of work of the same length.
+    fn process(stalls: impl Fn(u64) -> bool, slow: impl Fn(u64) -> bool) -> Skips {
+        let mut skips = Skips::default();
+        let mut counters = Counters::default();
+        for cycle in 0..10_000 {
+            counters.worked_ns += PERIOD_NS / 40;
+            counters.spun_ns += 9 * PERIOD_NS / 40;
+            if stalls(cycle) {
+                counters.stalled_ns += STALL_NS;
+                counters.skipped += 2;
+            }
+            if slow(cycle) {
+                counters.overlong_ns += STALL_NS;
+                counters.worked_ns += STALL_NS;
+                counters.skipped += 2;
+            }
+            counters.seq += 1;
+            skips.account(&counters, PERIOD_NS, false);
+        }
+        skips
+    }
+
+    #[test]
+    fn a_rig_that_is_too_slow_is_distinguished_from_a_machine_that_stalls() {
+        // Every how many cycles the machine stalls while waiting, and work takes too long; whether the
+        // machine may have done the latter.
+        let cases = [
+            ("one stretch, machine quiet", 0, 9_000, true),
+            ("one in ten stalls hits work", 500, 4_000, true),
+            ("stalls hit work twice as often as they should", 500, 2_000, true),
+            ("a slow cycle a second, machine quiet", 0, 1_000, false),
+            ("a slow cycle a second, machine restless", 1_000, 999, false),
+            ("always slow", 0, 1, false),
+            ("always slow, machine restless", 100, 2, false),
+        ];
+        for (name, stall_every, slow_every, expected) in cases {
+            let stalls = |cycle: u64| stall_every > 0 && cycle % stall_every == 7;
+            let slow = |cycle: u64| cycle % slow_every == slow_every - 1;
+            let attribution = OverrunAttribution::new(&[&process(stalls, slow)]).unwrap();
+            assert_eq!(attribution.may_be_the_machine(), expected, "{name}: {attribution:?}");
+        }
+    }
+
+    #[test]
+    fn stalls_seen_by_either_process_speak_for_the_machine() {
+        let slow_thrice = process(|_| false, |cycle| cycle % 3_000 == 2_999);
+        assert!(!OverrunAttribution::new(&[&slow_thrice]).unwrap().may_be_the_machine());
+        let restless = process(|cycle| cycle % 500 == 7, |_| false);
+        assert!(OverrunAttribution::new(&[&slow_thrice, &restless]).unwrap().may_be_the_machine());
+    }
+
+    #[test]
+    fn without_a_costly_stretch_there_is_nothing_to_attribute() {
+        assert_eq!(OverrunAttribution::new(&[&process(|cycle| cycle % 100 == 3, |_| false)]), None);
+    }
+
+    #[test]
+    fn chances_are_those_of_the_binomial_distribution() {
+        let cases = [
+            (0, 5, 0.3, 1.0),
+            (1, 1, 0.03, 0.03),
+            (2, 3, 0.5, 0.5),
+            (2, 2, 0.1, 0.01),
+            (5, 5, 0.0, 0.0),
+            (3, 5, 1.0, 1.0),
+            (1, 10, 0.1, 1.0 - 0.9_f64.powi(10)),
+        ];
+        for (hits, n, p, expected) in cases {
+            assert!((at_least(hits, n, p) - expected).abs() < 1e-12, "{hits} of {n} at {p}");
+        }
+        assert!(at_least(100_000, 100_000, 0.3) < 1e-100);
+        assert!((at_least(30_000, 100_000, 0.3) - 0.5).abs() < 0.01);
+    }
 }

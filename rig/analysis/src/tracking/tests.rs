@@ -23,8 +23,8 @@ fn truth(cycle: u64, x: f64) -> Truth {
 #[test]
 fn without_truth_the_estimate_takes_its_place() {
     let mut tracking = Tracking::new(PoseSource::Estimate, [0.0; 3]);
-    tracking.state(&State { estimated_position_m: [0.001, 0.0, 0.0], ..state(1, 0.003) }, true, false);
-    let (figures, track) = tracking.finish();
+    tracking.apply_state(&State { estimated_position_m: [0.001, 0.0, 0.0], ..state(1, 0.003) }, true, false);
+    let (figures, track) = tracking.into_figures();
     assert_eq!((figures.samples, figures.estimate_rms_mm), (1, None));
     assert!((figures.actual.rms_mm.unwrap() - 2.0).abs() < 1e-9);
     assert!((track.samples[0].actual.translation.x - 0.001).abs() < 1e-12);
@@ -33,9 +33,13 @@ fn without_truth_the_estimate_takes_its_place() {
 #[test]
 fn a_platform_that_never_ran_has_no_tracking_error() {
     let mut tracking = Tracking::new(PoseSource::Truth, [0.0; 3]);
-    tracking.state(&State { controller_state: ControllerState::Easing.code(), ..state(1, 0.0) }, true, false);
-    tracking.truth(&truth(1, 0.0));
-    let (figures, _) = tracking.finish();
+    tracking.apply_state(
+        &State { controller_state: ControllerState::Easing.code(), ..state(1, 0.0) },
+        true,
+        false,
+    );
+    tracking.apply_truth(&truth(1, 0.0));
+    let (figures, _) = tracking.into_figures();
     let moved =
         |peak| PoseErrors { max_mm: peak, incisal_max_mm: peak, max_deg: peak, ..PoseErrors::default() };
     let peaks = (figures.actual, figures.estimated);
@@ -49,10 +53,10 @@ fn a_long_run_keeps_samples_from_its_beginning_to_its_end() {
     for cycle in 0..100_000 {
         // To and fro in 0.7 s, as fast as chewing.
         let x = (cycle as f64 / 700.0 * std::f64::consts::TAU).sin();
-        tracking.state(&state(cycle, x), true, false);
-        tracking.truth(&Truth { sampled_ns: cycle * PERIOD_NS, ..truth(cycle, x) });
+        tracking.apply_state(&state(cycle, x), true, false);
+        tracking.apply_truth(&Truth { sampled_ns: cycle * PERIOD_NS, ..truth(cycle, x) });
     }
-    let (_, track) = tracking.finish();
+    let (_, track) = tracking.into_figures();
     let longest_ns = 4 * (SAMPLE_NS + PERIOD_NS);
     assert!(track.samples.windows(2).all(|pair| pair[1].sampled_ns - pair[0].sampled_ns <= longest_ns));
     assert_eq!(track.samples[0].sampled_ns, 0);
@@ -63,12 +67,12 @@ fn a_long_run_keeps_samples_from_its_beginning_to_its_end() {
 #[test]
 fn poses_are_compared_by_cycle_in_whatever_order_they_come() {
     let mut tracking = Tracking::new(PoseSource::Truth, [0.0; 3]);
-    tracking.state(&state(1, 0.003), true, false);
-    tracking.state(&state(2, 0.000), true, false);
-    tracking.truth(&truth(2, 0.004));
-    tracking.truth(&truth(1, 0.000));
-    tracking.truth(&truth(3, 9.000));
-    let (figures, _) = tracking.finish();
+    tracking.apply_state(&state(1, 0.003), true, false);
+    tracking.apply_state(&state(2, 0.000), true, false);
+    tracking.apply_truth(&truth(2, 0.004));
+    tracking.apply_truth(&truth(1, 0.000));
+    tracking.apply_truth(&truth(3, 9.000));
+    let (figures, _) = tracking.into_figures();
     assert_eq!(figures.samples, 2);
     assert!((figures.actual.max_mm.unwrap() - 4.0).abs() < 1e-9);
     assert!((figures.actual.rms_mm.unwrap() - (12.5f64).sqrt()).abs() < 1e-9);
@@ -82,18 +86,18 @@ fn cycles_without_a_reading_and_the_last_one_have_a_deviation_too() {
     let stopped = |cycle| State { controller_state: ControllerState::SafeStop.code(), ..state(cycle, 0.0) };
     let mut deviations = Vec::new();
     let found = [
-        tracking.state(&state(1, 0.0), true, false),
-        tracking.state(&stale, false, false),
-        tracking.state(&stopped(4), true, false),
-        tracking.state(&stopped(5), true, false),
+        tracking.apply_state(&state(1, 0.0), true, false),
+        tracking.apply_state(&stale, false, false),
+        tracking.apply_state(&stopped(4), true, false),
+        tracking.apply_state(&stopped(5), true, false),
     ];
     assert!(found.iter().all(Option::is_none), "{found:?}");
     for (cycle, x) in [(1, 0.001), (2, 0.003), (4, 0.004), (5, 0.005)] {
-        deviations.extend(tracking.truth(&truth(cycle, x)).into_iter().flatten());
+        deviations.extend(tracking.apply_truth(&truth(cycle, x)).into_iter().flatten());
     }
     let deviations: Vec<_> = deviations.iter().map(|sample| sample.deviation.origin_m).collect();
     assert_eq!(deviations, [0.001, 0.003, 0.004]);
-    let (figures, _) = tracking.finish();
+    let (figures, _) = tracking.into_figures();
     assert_eq!((figures.samples, figures.actual.max_mm), (1, Some(4.0)));
     assert!((figures.actual.rms_mm.unwrap() - 1.0).abs() < 1e-12);
 }
@@ -126,10 +130,10 @@ fn a_pose_that_is_none_is_infinitely_far_from_its_path() {
                     if is_spoiled(cycle) {
                         field(&mut state, &mut truth)[index] = number;
                     }
-                    tracking.state(&state, true, false);
-                    deviations.extend(tracking.truth(&truth).into_iter().flatten());
+                    tracking.apply_state(&state, true, false);
+                    deviations.extend(tracking.apply_truth(&truth).into_iter().flatten());
                 }
-                let (figures, _) = tracking.finish();
+                let (figures, _) = tracking.into_figures();
                 let TrackingFigures { samples, actual, estimated, estimate_rms_mm, .. } = figures;
                 let place = format!("{index} {number} {figures:?}");
                 assert_eq!(samples, 100, "{place}");
@@ -156,10 +160,10 @@ fn after_a_safe_stop_the_track_goes_on_beside_the_last_desired_pose() {
         let x = cycle as f64 * 1e-3;
         let name = if cycle < 20 { ControllerState::Running } else { ControllerState::SafeStop };
         let state = State { controller_state: name.code(), ..state(cycle, x) };
-        tracking.state(&state, true, false);
-        tracking.truth(&Truth { sampled_ns: cycle * SAMPLE_NS, ..truth(cycle, x) });
+        tracking.apply_state(&state, true, false);
+        tracking.apply_truth(&Truth { sampled_ns: cycle * SAMPLE_NS, ..truth(cycle, x) });
     }
-    let (figures, track) = tracking.finish();
+    let (figures, track) = tracking.into_figures();
     assert_eq!(figures.samples, 19);
     let last = track.samples.last().unwrap();
     assert_eq!((last.sampled_ns, last.actual.translation.x), (60 * SAMPLE_NS, 0.06));
@@ -173,10 +177,10 @@ fn once_the_drives_are_stopped_no_desired_pose_counts_whatever_the_controller_re
         if cycle == 20 {
             tracking.stop(cycle);
         }
-        tracking.state(&state(cycle, cycle as f64 * 1e-3), true, false);
+        tracking.apply_state(&state(cycle, cycle as f64 * 1e-3), true, false);
         // The jaw stands from then on.
-        tracking.truth(&truth(cycle, cycle.min(20) as f64 * 1e-3));
+        tracking.apply_truth(&truth(cycle, cycle.min(20) as f64 * 1e-3));
     }
-    let (figures, _) = tracking.finish();
+    let (figures, _) = tracking.into_figures();
     assert_eq!((figures.samples, figures.actual.max_mm), (19, Some(0.0)));
 }

@@ -6,23 +6,18 @@
 //! controller, by the client's thread. Who connects must name the secret of the URL: before that, a connection gets a small
 //! buffer and neither a thread nor a queue.
 
-mod admission;
-mod changes;
-mod client;
+mod connection;
 mod feed;
 mod foxglove;
-mod host;
 mod page;
-mod queue;
 mod request;
-mod socket;
-mod supervisor;
 #[cfg(test)]
 mod tests;
 
 use std::io;
-use std::net::{SocketAddr, TcpListener};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicBool, AtomicU16, AtomicU64, Ordering};
+use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
@@ -32,14 +27,11 @@ use masseter_runtime::clock;
 use masseter_runtime::conversation::{Conversation, Limits, Newcomers};
 use masseter_runtime::named::Declared;
 use masseter_runtime::transport::{Domain, secret};
-
 use tungstenite::http::StatusCode;
 
-use client::Client;
+use connection::{Host, INTERVAL, QUEUE, Queued, Socket, Supervisor, bit};
 use feed::Feed;
-use host::Host;
-use request::Wish;
-use supervisor::Supervisor;
+use request::{Protocol, Wish};
 
 /// The default address: this machine only, on Foxglove's usual port.
 pub const DEFAULT_ADDRESS: &str = "127.0.0.1:8765";
@@ -81,9 +73,11 @@ const MAX_PAGES: usize = 4;
 /// Most connections that have not named the secret; anybody may begin one.
 const MAX_NEWCOMERS: usize = 32;
 /// Longest wait between two looks whether the server closes.
-const INTERVAL: Duration = Duration::from_millis(50);
+const CLOSE_INTERVAL: Duration = Duration::from_millis(50);
 /// Least time between two looks for new connections, which bounds what they cost.
 const ACCEPT_INTERVAL: Duration = Duration::from_millis(5);
+/// A client that takes nothing for this long is disconnected.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
 /// Time that clients have to read the rest.
 const CLOSING: Duration = Duration::from_millis(500);
 /// Time between two looks whether all have read it.
@@ -102,9 +96,11 @@ impl Listener {
     /// # Errors
     /// When the system refuses the address.
     pub(crate) fn bind(address: SocketAddr) -> Result<Self, ListenError> {
-        let listener = bind(address)?;
-        let address = listener.local_addr().map_err(|error| ListenError { address, error })?;
-        Ok(Self { listener, address })
+        let bound = TcpListener::bind(address).and_then(|listener| {
+            listener.set_nonblocking(true)?;
+            Ok(Self { address: listener.local_addr()?, listener })
+        });
+        bound.map_err(|error| ListenError { address, error })
     }
 }
 
@@ -117,6 +113,74 @@ pub(crate) struct LiveServer {
     clients: Arc<Clients>,
     dropped: AtomicU64,
     accepting: JoinHandle<()>,
+}
+
+/// One admitted client: the recorder's end of its queue, and the thread that serves it.
+#[derive(Debug)]
+struct Client {
+    stream: TcpStream,
+    /// None once the server closes.
+    queue: Option<SyncSender<Queued>>,
+    /// One bit per topic that it subscribes to.
+    subscribed: Arc<AtomicU16>,
+    serving: JoinHandle<()>,
+}
+
+impl Client {
+    /// Opens the WebSocket of an admitted client and serves it in a thread. `conversation` contains what the client has
+    /// sent behind its request.
+    fn start(
+        mut conversation: Conversation,
+        protocol: Protocol,
+        opening: &[u8],
+        host: Host,
+    ) -> io::Result<Self> {
+        conversation.say(opening);
+        let behind = conversation.heard().to_vec();
+        let stream = TcpStream::from(conversation.into_connection()?);
+        stream.set_nodelay(true)?;
+        stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
+        stream.set_read_timeout(Some(INTERVAL))?;
+        let socket = Socket::new(stream.try_clone()?, behind);
+        let (queue, queued) = sync_channel(QUEUE);
+        let subscribed = Arc::new(AtomicU16::new(0));
+        let published = Arc::clone(&subscribed);
+        let serve = move || {
+            // A client may leave at any time.
+            let _ = match protocol {
+                Protocol::Foxglove => foxglove::Session::new(socket, published, host).serve(&queued),
+                Protocol::Page { after } => page::Session::new(socket, after, host).serve(&queued),
+            };
+        };
+        let serving = thread::Builder::new().spawn(serve)?;
+        Ok(Self { stream, queue: Some(queue), subscribed, serving })
+    }
+
+    /// Queues a message if the client subscribes to its topic. False if the message is dropped for want of room.
+    fn offer(&self, message: &Recorded, log_time_ns: u64) -> bool {
+        let is_subscribed = self.subscribed.load(Ordering::Relaxed) & bit(message.topic()) != 0;
+        let Some(queue) = self.queue.as_ref().filter(|_| is_subscribed) else { return true };
+        !matches!(queue.try_send((log_time_ns, *message)), Err(TrySendError::Full(_)))
+    }
+
+    fn is_subscribed(&self) -> bool {
+        self.subscribed.load(Ordering::Relaxed) != 0
+    }
+
+    fn is_gone(&self) -> bool {
+        self.serving.is_finished()
+    }
+
+    /// Ends the queue: the thread sends the rest and closes the connection.
+    fn end_queue(&mut self) {
+        self.queue = None;
+    }
+
+    /// Disconnects the client.
+    fn cut_off(&self) {
+        // It fails where the client has just left.
+        let _ = self.stream.shutdown(Shutdown::Both);
+    }
 }
 
 #[derive(Debug, Default)]
@@ -134,7 +198,7 @@ impl Clients {
     fn accept(&self, newcomers: &mut Newcomers, host: &Host) {
         let mut pages = Vec::new();
         while !self.is_closing.load(Ordering::Relaxed) {
-            newcomers.wait(INTERVAL);
+            newcomers.wait(CLOSE_INTERVAL);
             for conversation in newcomers.look(clock::now_ns(), request::is_whole).asking {
                 self.admit(conversation, host, &mut pages);
             }
@@ -156,7 +220,7 @@ impl Clients {
         match wish {
             Wish::Page if pages.len() < MAX_PAGES => {
                 let host = host.clone();
-                let send = move || page::send_text(conversation, &host);
+                let send = move || page::send_page(conversation, &host);
                 // Without a thread for it, the client is disconnected.
                 pages.extend(thread::Builder::new().spawn(send));
             }
@@ -167,7 +231,7 @@ impl Clients {
             }
             Wish::Page | Wish::Socket { .. } => {
                 let full = "as many clients watch this run as it shows itself to: close another one";
-                conversation.say(&request::answer(StatusCode::SERVICE_UNAVAILABLE, "text/plain", &full));
+                conversation.say(&request::http_answer(StatusCode::SERVICE_UNAVAILABLE, "text/plain", &full));
             }
         }
     }
@@ -178,15 +242,7 @@ impl Clients {
 /// # Errors
 /// When the system refuses the address.
 pub fn check(address: SocketAddr) -> Result<(), ListenError> {
-    bind(address).map(drop)
-}
-
-fn bind(address: SocketAddr) -> Result<TcpListener, ListenError> {
-    let bound = TcpListener::bind(address).and_then(|listener| {
-        listener.set_nonblocking(true)?;
-        Ok(listener)
-    });
-    bound.map_err(|error| ListenError { address, error })
+    Listener::bind(address).map(drop)
 }
 
 impl LiveServer {
@@ -248,16 +304,16 @@ impl LiveServer {
     }
 
     /// Sends what is queued, gives clients half a second to read it, and closes; returns what they missed.
-    pub(crate) fn finish(self) -> ClientLosses {
-        self.finish_within(CLOSING)
+    pub(crate) fn close(self) -> ClientLosses {
+        self.close_within(CLOSING)
     }
 
-    fn finish_within(self, time: Duration) -> ClientLosses {
+    fn close_within(self, time: Duration) -> ClientLosses {
         self.clients.is_closing.store(true, Ordering::Relaxed);
         // A panic of this thread is on standard error already, and does not concern the recording.
         let _ = self.accepting.join();
         let mut clients = self.clients.connected();
-        clients.iter_mut().for_each(Client::close);
+        clients.iter_mut().for_each(Client::end_queue);
         for _ in 0..time.as_millis() / CLOSING_POLL.as_millis() {
             clients.retain(|client| !client.is_gone());
             if clients.is_empty() {

@@ -12,20 +12,18 @@ use serde::Deserialize;
 use serde_json::json;
 use tungstenite::http::StatusCode;
 
+use super::connection::{Disconnected, Host, Queued, Socket};
 use super::feed::Next;
-use super::host::Host;
-use super::queue::{Disconnected, Queued};
-use super::request::answer;
-use super::socket::Socket;
+use super::request::http_answer;
 
 /// Time in which a browser takes the page's text, however it divides it, ns.
 const TEXT_NS: u64 = 10 * SECOND_NS;
 
 /// Answers a request for the page's text.
-pub(super) fn send_text(mut conversation: Conversation, host: &Host) {
+pub(super) fn send_page(mut conversation: Conversation, host: &Host) {
     let answer = match host.feed.html() {
-        Ok(html) => answer(StatusCode::OK, "text/html", &html),
-        Err(error) => answer(StatusCode::INTERNAL_SERVER_ERROR, "text/plain", &error),
+        Ok(html) => http_answer(StatusCode::OK, "text/html", &html),
+        Err(error) => http_answer(StatusCode::INTERNAL_SERVER_ERROR, "text/plain", &error),
     };
     conversation.say(&answer);
     conversation.send_rest(clock::now_ns() + TEXT_NS);
@@ -59,7 +57,7 @@ impl Session {
     pub(super) fn serve(mut self, queue: &Receiver<Queued>) -> Result<(), Disconnected> {
         loop {
             if let Some(text) = self.socket.receive()? {
-                self.answer(&text)?;
+                self.answer_request(&text)?;
             }
             let is_over = matches!(queue.try_recv(), Err(TryRecvError::Disconnected));
             if is_over {
@@ -67,8 +65,8 @@ impl Session {
             }
             self.send_updates()?;
             if is_over {
-                self.socket.text(&json!({ "over": true }).to_string())?;
-                return self.socket.close();
+                self.socket.send_text(&json!({ "over": true }).to_string())?;
+                return self.socket.close_after_all();
             }
         }
     }
@@ -76,18 +74,18 @@ impl Session {
     fn send_updates(&mut self) -> Result<(), Disconnected> {
         loop {
             match self.host.feed.after(self.shown) {
-                Next::Update(text) => self.socket.text(&text)?,
+                Next::Update(text) => self.socket.send_text(&text)?,
                 Next::None => return Ok(()),
                 Next::Lost => {
-                    self.socket.text(&json!({ "reload": true }).to_string())?;
-                    return self.socket.close();
+                    self.socket.send_text(&json!({ "reload": true }).to_string())?;
+                    return self.socket.close_after_all();
                 }
             }
             self.shown += 1;
         }
     }
 
-    fn answer(&mut self, text: &str) -> Result<(), Disconnected> {
+    fn answer_request(&mut self, text: &str) -> Result<(), Disconnected> {
         let refused = match serde_json::from_str(text) {
             Ok(Wish::Set { name, value }) => {
                 access::set(&self.host.domain, &name, value).err().map(|error| error.to_string())
@@ -98,7 +96,7 @@ impl Session {
             }
             Err(error) => Some(format!("the request is not valid: {error}")),
         };
-        refused.map_or(Ok(()), |refused| self.socket.text(&json!({ "refused": refused }).to_string()))
+        refused.map_or(Ok(()), |refused| self.socket.send_text(&json!({ "refused": refused }).to_string()))
     }
 }
 

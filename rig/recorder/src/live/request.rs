@@ -1,12 +1,17 @@
-//! What a new connection wants: the page or a WebSocket; and the answer to one that gets neither.
+//! What a new connection wants, the page or a WebSocket; and the answer to one that gets neither.
+//!
+//! A browser lets any page of the world connect to this machine, and other users reach its ports. So a client names the
+//! secret of the URL. A web page is Foxglove's or one of this machine. The host is an address: a name could be another
+//! site's that now leads here.
 
 use std::fmt::Display;
+use std::net::IpAddr;
 
 use tungstenite::handshake::server::{Request, create_response, write_response};
-use tungstenite::http::header::{SEC_WEBSOCKET_PROTOCOL, UPGRADE};
-use tungstenite::http::{HeaderValue, StatusCode};
+use tungstenite::http::header::{HOST, ORIGIN, SEC_WEBSOCKET_PROTOCOL, UPGRADE};
+use tungstenite::http::uri::{Authority, Uri};
+use tungstenite::http::{HeaderValue, Method, StatusCode};
 
-use super::admission::admit;
 use super::foxglove::choose_subprotocol;
 
 /// Longest request, bytes.
@@ -43,27 +48,27 @@ pub(super) enum Wish {
 
 /// Whether the bytes begin with a whole request, or with none at all.
 pub(super) fn is_whole(bytes: &[u8]) -> bool {
-    !matches!(parse(bytes), Ok(None))
+    !matches!(parse_request(bytes), Ok(None))
 }
 
 /// The wish of a whole request, and the request's length; or the answer to a client that is refused, empty for what is no
 /// request.
 pub(super) fn wish(bytes: &[u8], secret: &str) -> Result<(Wish, usize), Vec<u8>> {
-    let Ok(Some((request, length))) = parse(bytes) else { return Err(Vec::new()) };
-    admit(&request, secret).map_err(|refusal| answer(StatusCode::FORBIDDEN, "text/plain", &refusal))?;
+    let Ok(Some((request, length))) = parse_request(bytes) else { return Err(Vec::new()) };
+    admit(&request, secret).map_err(|refusal| http_answer(StatusCode::FORBIDDEN, "text/plain", &refusal))?;
     let upgrade = request.headers().get(UPGRADE).and_then(|upgrade| upgrade.to_str().ok());
     if upgrade.is_some_and(|upgrade| upgrade.eq_ignore_ascii_case("websocket")) {
-        let refused = |reason: &dyn Display| answer(StatusCode::BAD_REQUEST, "text/plain", reason);
-        let (protocol, name) =
-            choose(&request).ok_or_else(|| refused(&"offer a protocol of Foxglove or of the page"))?;
-        let opening = open(&request, name).map_err(|error| refused(&error))?;
+        let refused = |reason: &dyn Display| http_answer(StatusCode::BAD_REQUEST, "text/plain", reason);
+        let (protocol, name) = choose_protocol(&request)
+            .ok_or_else(|| refused(&"offer a protocol of Foxglove or of the page"))?;
+        let opening = opening(&request, name).map_err(|error| refused(&error))?;
         return Ok((Wish::Socket { protocol, opening }, length));
     }
     Ok((Wish::Page, length))
 }
 
 /// A whole answer of HTTP, after which the connection ends.
-pub(super) fn answer(status: StatusCode, kind: &str, text: &dyn Display) -> Vec<u8> {
+pub(super) fn http_answer(status: StatusCode, kind: &str, text: &dyn Display) -> Vec<u8> {
     let text = format!("{text}\n");
     let head = format!(
         "HTTP/1.1 {status}\r\nContent-Type: {kind}; charset=utf-8\r\nContent-Length: {}\r\nCache-Control: no-store\r\n\
@@ -74,7 +79,7 @@ pub(super) fn answer(status: StatusCode, kind: &str, text: &dyn Display) -> Vec<
 }
 
 /// None where the request has not come completely.
-fn parse(bytes: &[u8]) -> Result<Option<(Request, usize)>, NoRequest> {
+fn parse_request(bytes: &[u8]) -> Result<Option<(Request, usize)>, NoRequest> {
     let mut headers = [httparse::EMPTY_HEADER; HEADERS];
     let mut parsed = httparse::Request::new(&mut headers);
     let httparse::Status::Complete(length) = parsed.parse(bytes).map_err(|_| NoRequest)? else {
@@ -92,7 +97,7 @@ fn parse(bytes: &[u8]) -> Result<Option<(Request, usize)>, NoRequest> {
 struct NoRequest;
 
 /// The first offered protocol that this server speaks, and its name.
-fn choose(request: &Request) -> Option<(Protocol, &'static str)> {
+fn choose_protocol(request: &Request) -> Option<(Protocol, &'static str)> {
     let query = request.uri().query().unwrap_or("");
     let after = query.strip_prefix("after=").and_then(|number| number.parse().ok());
     let mut offers = request.headers().get_all(SEC_WEBSOCKET_PROTOCOL).iter();
@@ -104,12 +109,70 @@ fn choose(request: &Request) -> Option<(Protocol, &'static str)> {
     })
 }
 
-fn open(request: &Request, protocol: &'static str) -> tungstenite::Result<Vec<u8>> {
+fn opening(request: &Request, protocol: &'static str) -> tungstenite::Result<Vec<u8>> {
     let mut response = create_response(request)?;
     response.headers_mut().insert(SEC_WEBSOCKET_PROTOCOL, HeaderValue::from_static(protocol));
     let mut bytes = Vec::new();
     write_response(&mut bytes, &response)?;
     Ok(bytes)
+}
+
+/// Why a client is refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+enum Refusal {
+    #[error("ask with GET: nothing can be sent here")]
+    Method,
+    #[error("connect to an IP address or to localhost")]
+    Host,
+    #[error("only pages of foxglove.dev and of this machine may watch")]
+    Origin,
+    #[error("the address contains a secret: use the one that 'masseter run --live' prints")]
+    Secret,
+}
+
+/// Checks method, host, origin and secret of a request.
+fn admit(request: &Request, secret: &str) -> Result<(), Refusal> {
+    let header = |name| request.headers().get(name).map(|value| value.to_str().unwrap_or_default());
+    if request.method() != Method::GET {
+        Err(Refusal::Method)
+    } else if !header(HOST).is_some_and(is_address) {
+        Err(Refusal::Host)
+    } else if !header(ORIGIN).is_none_or(is_allowed) {
+        Err(Refusal::Origin)
+    } else if request.uri().path().strip_prefix('/') != Some(secret) {
+        Err(Refusal::Secret)
+    } else {
+        Ok(())
+    }
+}
+
+fn is_address(host: &str) -> bool {
+    // `user@host` is no host.
+    !host.contains('@') && host.parse().is_ok_and(|host: Authority| is_local(&host) || ip(&host).is_some())
+}
+
+/// Pages have the scheme http or https, or the origin null; other schemes are those of programs.
+fn is_allowed(origin: &str) -> bool {
+    if let Some(("http" | "https", authority)) = origin.split_once("://") {
+        return origin.parse::<Uri>().is_ok()
+            && !authority.contains('@')
+            && authority.parse().is_ok_and(|host: Authority| {
+                is_local(&host) || (origin.starts_with("https:") && is_of_foxglove(&host))
+            });
+    }
+    origin.contains("://")
+}
+
+fn is_of_foxglove(host: &Authority) -> bool {
+    host.host() == "foxglove.dev" || host.host().ends_with(".foxglove.dev")
+}
+
+fn is_local(host: &Authority) -> bool {
+    host.host() == "localhost" || ip(host).is_some_and(|ip| ip.is_loopback())
+}
+
+fn ip(host: &Authority) -> Option<IpAddr> {
+    host.host().trim_matches(['[', ']']).parse().ok()
 }
 
 #[cfg(test)]
@@ -155,5 +218,76 @@ mod tests {
     #[test]
     fn without_the_secret_nothing_is_given() {
         assert!(wish(&asking(""), "other").unwrap_err().starts_with(b"HTTP/1.1 403"));
+    }
+
+    fn ask(path: &str, host: &str, origin: Option<&str>) -> Result<(), Refusal> {
+        let request = Request::builder().uri(path).header(HOST, host);
+        let request = origin.into_iter().fold(request, |request, origin| request.header(ORIGIN, origin));
+        admit(&request.body(()).unwrap(), "5ec7e7")
+    }
+
+    #[test]
+    fn only_the_whole_secret_opens() {
+        assert_eq!(ask("/5ec7e7", "127.0.0.1:8765", None), Ok(()));
+        for path in ["/", "/5ec7e", "/5ec7e7/", "/5ec7e77", "//5ec7e7"] {
+            assert_eq!(ask(path, "127.0.0.1:8765", None), Err(Refusal::Secret), "{path}");
+        }
+    }
+
+    #[test]
+    fn only_what_asks_is_answered() {
+        let ask = |method: &str| {
+            let request = Request::builder().method(method).uri("/5ec7e7").header(HOST, "127.0.0.1");
+            admit(&request.body(()).unwrap(), "5ec7e7")
+        };
+        assert_eq!(ask("GET"), Ok(()));
+        for method in ["POST", "PUT", "DELETE", "HEAD", "OPTIONS", "CONNECT", "BREW"] {
+            assert_eq!(ask(method), Err(Refusal::Method), "{method}");
+        }
+    }
+
+    #[test]
+    fn a_name_is_no_address() {
+        for host in ["127.0.0.1", "[::1]:8765", "localhost:8765", "192.168.1.5:9000"] {
+            assert_eq!(ask("/5ec7e7", host, None), Ok(()), "{host}");
+        }
+        for host in [
+            "",
+            "evil.example:8765",
+            "127.0.0.1.evil.example",
+            "localhost.evil.example",
+            "a b",
+            "user@127.0.0.1",
+            "user:word@localhost:8765",
+        ] {
+            assert_eq!(ask("/5ec7e7", host, None), Err(Refusal::Host), "{host}");
+        }
+    }
+
+    #[test]
+    fn pages_of_other_sites_are_refused() {
+        for origin in [
+            "https://app.foxglove.dev",
+            "http://localhost:8080",
+            "http://127.0.0.1:8080",
+            "file://",
+            "app://x",
+        ] {
+            assert_eq!(ask("/5ec7e7", "localhost:8765", Some(origin)), Ok(()), "{origin}");
+        }
+        for origin in [
+            "null",
+            "",
+            "http://localhost@evil.example",
+            "http://evil@localhost",
+            "http://app.foxglove.dev",
+            "https://evil.example",
+            "https://foxglove.dev.evil.example",
+            "https://evilfoxglove.dev",
+            "http://localhost.evil.example",
+            "https://evil.example/https://app.foxglove.dev",
+        ] {
+            assert_eq!(ask("/5ec7e7", "localhost:8765", Some(origin)), Err(Refusal::Origin), "{origin}");
+        }
     }
 }

@@ -207,7 +207,7 @@ fn a_client_that_reads_in_the_end_gets_everything_but_the_counted_drops() {
             }
         }
     });
-    let losses = server.finish_within(Duration::from_secs(10));
+    let losses = server.close_within(Duration::from_secs(10));
     assert_eq!(losses.cut_off, 0);
     assert_eq!(reading.join().unwrap() + losses.dropped, offered);
 }
@@ -217,5 +217,5 @@ fn a_client_that_never_reads_is_counted_and_delays_no_end() {
     let server = server();
     let _client = client_of(&server);
     offer_until_one_is_dropped(&server);
-    assert_eq!(server.finish().cut_off, 1);
+    assert_eq!(server.close().cut_off, 1);
 }

@@ -2,15 +2,14 @@
 
 use std::fmt::Write;
 
-use masseter_recording::Topic;
+use masseter_recording::{Recorded, Topic};
+use masseter_runtime::messages::State;
+use masseter_runtime::messages::codes::{ControllerState, EventKind, Source};
 use masseter_terminal::Exit;
 use serde::Serialize;
 
-use super::compared::Compared;
-use super::field_growth::FieldGrowth;
-use super::lane::{Lane, Missing};
-use super::motion_clock::MotionClock;
-use crate::text::or_dash;
+use super::lane::{FieldGrowth, Lane, Missing};
+use crate::text::{columns, or_dash};
 
 /// Version of the form as JSON.
 const FORM: u32 = 1;
@@ -64,28 +63,22 @@ pub struct Differences {
 }
 
 impl Differences {
-    pub(super) fn new(compared: Compared, clock: MotionClock, unrecorded: &[Topic]) -> Self {
-        Self {
-            form: FORM,
-            is_equal: true,
-            messages: 0,
-            fields: Vec::new(),
-            one_sided: Vec::new(),
-            redefined: Vec::new(),
-            unrecorded: unrecorded.iter().map(|topic| topic.name()).collect(),
-            digests: Vec::new(),
-            compared,
-            clock,
-        }
-    }
-
-    pub(super) fn add_digests(&mut self, differences: Vec<(Topic, u64)>) {
-        self.is_equal &= differences.is_empty();
-        self.digests = differences
-            .into_iter()
-            .map(|(topic, first_cycle)| DigestDifference { topic: topic.name(), first_cycle })
-            .collect();
-        self.digests.sort_by_key(|difference| difference.first_cycle);
+    /// Of streams without common messages yet, whose digests differ by topic from these cycles on.
+    pub(super) fn new(
+        compared: Compared,
+        clock: MotionClock,
+        unrecorded: &[Topic],
+        digests: Vec<(Topic, u64)>,
+    ) -> Self {
+        let digest =
+            |(topic, first_cycle): (Topic, u64)| DigestDifference { topic: topic.name(), first_cycle };
+        let mut digests: Vec<_> = digests.into_iter().map(digest).collect();
+        digests.sort_by_key(|difference| difference.first_cycle);
+        let unrecorded = unrecorded.iter().map(|topic| topic.name()).collect();
+        let (is_equal, fields, one_sided, redefined) =
+            (digests.is_empty(), Vec::new(), Vec::new(), Vec::new());
+        let (form, messages) = (FORM, 0);
+        Self { form, is_equal, messages, fields, one_sided, redefined, unrecorded, digests, compared, clock }
     }
 
     pub(super) fn add(&mut self, topic: Topic, has_same_fields: bool, lane: Lane) {
@@ -94,7 +87,7 @@ impl Differences {
         // Each source of a topic has a lane.
         let is_redefined = lane.messages > 0 && !has_same_fields && !self.redefined.contains(&topic);
         self.redefined.extend(is_redefined.then_some(topic));
-        let (growths, missing) = lane.finish();
+        let (growths, missing) = lane.into_differences();
         for growth in growths {
             let motion_s = self.clock.motion_s(growth.first_cycle);
             self.fields.push(FieldDifference { topic, motion_s, growth });
@@ -114,6 +107,7 @@ impl Differences {
 
     /// The first difference and a table of all, with the names of both streams.
     pub fn in_words(&self, names: [&str; 2]) -> String {
+        const WIDTHS: [usize; 8] = [36, 8, 9, 13, 9, 13, 9, 13];
         let mut text = self.verdict(names);
         text.push('\n');
         let left_out = self.compared.left_out();
@@ -121,9 +115,7 @@ impl Differences {
             let _ = writeln!(text, "{left_out}");
         }
         if !self.fields.is_empty() {
-            let _ = writeln!(
-                text,
-                "\n{:<36} {:>8} {:>9} {:>13} {:>9} {:>13} {:>9} {:>13}",
+            let heads = [
                 "differing field",
                 "cycle",
                 "motion, s",
@@ -131,22 +123,22 @@ impl Differences {
                 "> 1 unit",
                 "largest",
                 "in cycle",
-                "at the end"
-            );
+                "at the end",
+            ];
+            let _ = writeln!(text, "\n{}", columns(WIDTHS, heads));
         }
         for FieldDifference { topic, motion_s, growth } in &self.fields {
-            let _ = writeln!(
-                text,
-                "{:<36} {:>8} {:>9} {:>13} {:>9} {:>13} {:>9} {:>13}",
+            let cells = [
                 format!("{topic}.{}", growth.name()),
-                growth.first_cycle,
+                growth.first_cycle.to_string(),
                 or_dash(*motion_s, |motion_s| format!("{motion_s:.3}")),
                 growth.sized(growth.first),
                 or_dash(growth.beyond_one_cycle, |cycle| cycle.to_string()),
                 growth.sized(growth.largest),
-                growth.largest_cycle,
+                growth.largest_cycle.to_string(),
                 growth.sized(growth.at_end),
-            );
+            ];
+            let _ = writeln!(text, "{}", columns(WIDTHS, cells));
         }
         for OneSided { topic, only_in_b, missing } in &self.one_sided {
             let Missing { first_cycle, messages } = missing;
@@ -174,10 +166,8 @@ impl Differences {
         }
         let field = self.fields.first().map(|field| {
             let [in_a, in_b] = &field.growth.values;
-            let size = field
-                .growth
-                .first
-                .map_or_else(String::new, |size| format!(" ({} apart)", field.growth.sized(Some(size))));
+            let size = field.growth.first.map(|size| format!(" ({} apart)", field.growth.sized(Some(size))));
+            let size = size.unwrap_or_default();
             let what =
                 format!("{}.{} is {in_a} in {a}, {in_b} in {b}{size}", field.topic, field.growth.name());
             (field.growth.first_cycle, what)
@@ -204,6 +194,86 @@ impl Differences {
     }
 }
 
+/// Which fields two streams can have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Compared {
+    /// All, in simulated time.
+    Everything,
+    /// All but the number and the time of publication: a replay of a run in real time.
+    WithoutStamps,
+    /// Neither numbers nor times, nor the frames: two runs, at least one of them in real time.
+    WithoutTimes,
+}
+
+impl Compared {
+    pub(super) fn has_topic(self, topic: Topic) -> bool {
+        topic != Topic::Machine && (self != Self::WithoutTimes || topic != Topic::Frame)
+    }
+
+    pub(super) fn has_field(self, field: &str) -> bool {
+        match self {
+            Self::Everything => true,
+            Self::WithoutStamps => !["seq", "published_ns"].contains(&field),
+            Self::WithoutTimes => field != "seq" && !field.ends_with("_ns"),
+        }
+    }
+
+    /// What is left out, in words; empty for nothing.
+    pub(super) fn left_out(self) -> &'static str {
+        match self {
+            Self::Everything => "",
+            Self::WithoutStamps => "not compared, since the clock was real: number and time of publication",
+            Self::WithoutTimes => "not compared, since a clock was real: times, numbers of messages, frames",
+        }
+    }
+}
+
+/// What tells the time of a cycle.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct MotionClock {
+    /// Cycle and deadline of the first state, ns.
+    first: Option<(u64, u64)>,
+    period_ns: Option<u64>,
+    /// The cycle in which the motion began.
+    running_from: Option<u64>,
+    /// The newest cycle.
+    pub(super) cycle: u64,
+}
+
+impl MotionClock {
+    pub(super) fn add_message(&mut self, message: &Recorded) {
+        match message {
+            Recorded::State(state) => self.add_state(state),
+            // A thinned recording has all events, and few states.
+            Recorded::Event(event)
+                if event.source == Source::Controller.code()
+                    && event.kind == EventKind::Transition.code()
+                    && event.to == ControllerState::Running.code() =>
+            {
+                self.running_from.get_or_insert(event.cycle);
+            }
+            _ => {}
+        }
+    }
+
+    fn add_state(&mut self, state: &State) {
+        self.cycle = state.cycle;
+        let (first_cycle, first_ns) = *self.first.get_or_insert((state.cycle, state.due_ns));
+        let cycles = state.cycle.saturating_sub(first_cycle);
+        self.period_ns =
+            self.period_ns.or_else(|| (state.due_ns.saturating_sub(first_ns)).checked_div(cycles));
+        if state.controller_state == ControllerState::Running.code() {
+            self.running_from.get_or_insert(state.cycle);
+        }
+    }
+
+    /// The time of a cycle since the motion began, s; negative before. None without a motion.
+    pub(super) fn motion_s(&self, cycle: u64) -> Option<f64> {
+        let cycles = cycle as f64 - self.running_from? as f64;
+        Some(cycles * self.period_ns? as f64 / 1e9)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use masseter_recording::{Columns, Recorded, definitions};
@@ -211,8 +281,8 @@ mod tests {
     use masseter_runtime::messages::{CanData, Command, FrameTap, State};
     use masseter_runtime::named::{Declared, Signal};
 
-    use super::super::comparison::{Comparison, Side};
     use super::*;
+    use crate::divergence::{Comparison, Side};
 
     fn comparison(compared: Compared, declared: [&Declared; 2]) -> Comparison {
         let columns = |declared: &Declared| {

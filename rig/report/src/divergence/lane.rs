@@ -1,13 +1,13 @@
-//! The messages of one publisher on one topic, side by side.
+//! The messages of one publisher on one topic side by side, and how the difference of each field grows.
 
 use std::array;
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, VecDeque};
 
-use masseter_recording::{Columns, Recorded, Topic};
+use masseter_recording::{Columns, Field, Number, Recorded, Topic};
 use serde::Serialize;
 
-use super::field_growth::FieldGrowth;
+use crate::text::or_dash;
 
 /// Topics in the order of a cycle, so that a cause comes before its effects.
 const ORDER: [Topic; Topic::ALL.len()] = [
@@ -69,7 +69,7 @@ impl Lane {
     }
 
     /// Compares what has a partner, in all fields of `columns` that `is_compared`.
-    pub(super) fn settle(&mut self, columns: Option<&Columns>, is_compared: impl Fn(&str) -> bool) {
+    pub(super) fn compare_partners(&mut self, columns: Option<&Columns>, is_compared: impl Fn(&str) -> bool) {
         while let [Some((cycle_a, a)), Some((cycle_b, b))] = self.waiting.each_ref().map(VecDeque::front) {
             // Events and frames have partners by their order: a cycle has any number of them.
             let is_by_order = matches!(a.topic(), Topic::Event | Topic::Frame | Topic::Machine);
@@ -104,7 +104,7 @@ impl Lane {
                 let growth = self.growths.entry(place);
                 growth
                     .or_insert_with(|| FieldGrowth::new(field, cycle, bodies))
-                    .take(cycle, FieldGrowth::size(field, bodies));
+                    .add_difference(cycle, FieldGrowth::size(field, bodies));
             }
         }
         let tails = bodies.map(|body| columns.split(body).map_or(body, |(_, tail)| tail));
@@ -113,7 +113,7 @@ impl Lane {
         {
             let values = tails.map(|tail| data_encoding::HEXUPPER.encode(tail));
             let growth = self.growths.entry(columns.fields().len());
-            growth.or_insert_with(|| FieldGrowth::of(name, "", cycle, values)).take(cycle, None);
+            growth.or_insert_with(|| FieldGrowth::of(name, "", cycle, values)).add_difference(cycle, None);
         }
     }
 
@@ -124,14 +124,211 @@ impl Lane {
     }
 
     /// Ends the comparison: what still waits has no partner. Returns the differing fields, and what only one side has.
-    pub(super) fn finish(mut self) -> (Vec<FieldGrowth>, [Option<Missing>; 2]) {
+    pub(super) fn into_differences(mut self) -> (Vec<FieldGrowth>, [Option<Missing>; 2]) {
         for side in 0..2 {
             while !self.waiting[side].is_empty() {
                 self.drop_front(side);
             }
         }
         let last_cycle = self.last_cycle;
-        let growths = self.growths.into_values().map(|growth| growth.finish(last_cycle));
+        let growths = self.growths.into_values().map(|growth| growth.ended(last_cycle));
         (growths.collect(), array::from_fn(|side| self.missing[side]))
+    }
+}
+
+/// What is small, in the unit of the difference: 1 µm, 1 mrad, 1 N, …
+const SMALL: f64 = 1.0;
+
+/// The differences of one field.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub(super) struct FieldGrowth {
+    pub(super) field: String,
+    /// The unit of all sizes; empty where the field has none.
+    unit: &'static str,
+    pub(super) first_cycle: u64,
+    /// The first element that differs there; none where the field is a single number.
+    pub(super) element: Option<usize>,
+    /// Its values.
+    pub(super) values: [String; 2],
+    /// The size of the first difference of the whole field.
+    pub(super) first: Option<f64>,
+    /// The first cycle with a difference beyond one of the unit.
+    pub(super) beyond_one_cycle: Option<u64>,
+    pub(super) largest: Option<f64>,
+    pub(super) largest_cycle: u64,
+    /// Messages that differ in it.
+    messages: u64,
+    /// The last cycle that differs, and the size there.
+    #[serde(skip)]
+    last: (u64, Option<f64>),
+    pub(super) at_end: Option<f64>,
+}
+
+impl FieldGrowth {
+    fn new(field: &Field, cycle: u64, [a, b]: [&[u8]; 2]) -> Self {
+        let bits = |number: &Number| (number.to_string(), number.to_f64().to_bits());
+        let differing = field.numbers(a).zip(field.numbers(b)).enumerate();
+        let first = differing.map(|(place, (a, b))| (place, [a, b])).find(|(_, [a, b])| bits(a) != bits(b));
+        let (place, values) = first.expect("the field differs");
+        let (unit, values) = (Self::measure(field, a).unit(), values.map(|value| value.to_string()));
+        let element = field.is_array().then_some(place);
+        Self { element, ..Self::of(field.name(), unit, cycle, values) }
+    }
+
+    /// The first difference of a field without numbers.
+    fn of(field: &str, unit: &'static str, cycle: u64, values: [String; 2]) -> Self {
+        let (field, last) = (field.to_owned(), (cycle, None));
+        Self { field, unit, first_cycle: cycle, values, largest_cycle: cycle, last, ..Self::default() }
+    }
+
+    fn measure(field: &Field, body: &[u8]) -> Measure {
+        Measure::of(field, field.numbers(body).count())
+    }
+
+    /// The size of the difference of a field.
+    fn size(field: &Field, [a, b]: [&[u8]; 2]) -> Option<f64> {
+        let numbers = |body| field.numbers(body).map(Number::to_f64).collect::<Vec<_>>();
+        Self::measure(field, a).size(&numbers(a), &numbers(b))
+    }
+
+    /// Takes the difference of a cycle.
+    fn add_difference(&mut self, cycle: u64, size: Option<f64>) {
+        if self.messages == 0 {
+            self.first = size;
+        }
+        self.messages += 1;
+        self.last = (cycle, size);
+        let Some(size) = size else { return };
+        if !self.unit.is_empty() && size > SMALL {
+            self.beyond_one_cycle.get_or_insert(cycle);
+        }
+        if self.largest.is_none_or(|largest| size > largest) {
+            (self.largest, self.largest_cycle) = (Some(size), cycle);
+        }
+    }
+
+    /// Ends a comparison whose last message of the topic was of this cycle.
+    fn ended(mut self, last_cycle: u64) -> Self {
+        let (cycle, size) = self.last;
+        self.at_end = if cycle == last_cycle { size } else { self.largest.map(|_| 0.0) };
+        self
+    }
+
+    /// The field with its element: `target_m[3]`.
+    pub(super) fn name(&self) -> String {
+        self.element.map_or_else(|| self.field.clone(), |element| format!("{}[{element}]", self.field))
+    }
+
+    /// A size with its unit.
+    pub(super) fn sized(&self, size: Option<f64>) -> String {
+        let number = |size: f64| match size.abs() {
+            0.0 => "0".to_owned(),
+            1e-3..1e5 => format!("{size:.3}"),
+            _ => format!("{size:.2e}"),
+        };
+        or_dash(size, |size| format!("{} {}", number(size), self.unit).trim_end().to_owned())
+    }
+}
+
+/// What the name of a field ends with, the unit for its differences, and how many of these make one of the field's unit.
+/// The longest ends come first.
+const UNITS: [(&str, &str, f64); 7] = [
+    ("_per_s", "1/s", 1.0),
+    ("_m_s", "mm/s", 1e3),
+    ("_rad", "mrad", 1e3),
+    ("_ns", "µs", 1e-3),
+    ("_m", "µm", 1e6),
+    ("_n", "N", 1.0),
+    ("_s", "ms", 1e3),
+];
+
+/// How differences of a field are measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Measure {
+    /// The largest difference of an element, by a unit and its number in the field's unit.
+    Elements(&'static str, f64),
+    /// The distance of two points, µm.
+    Distance,
+    /// The angle between two orientations, mrad.
+    Turn,
+    /// Codes and counts have no measure.
+    None,
+}
+
+impl Measure {
+    fn of(field: &Field, elements: usize) -> Self {
+        let name = field.name();
+        let unit = UNITS.iter().find(|(end, _, _)| name.ends_with(end));
+        match (name, unit) {
+            (name, _) if name.ends_with("quaternion_wxyz") => Self::Turn,
+            (name, _) if name.ends_with("position_m") && elements == 3 => Self::Distance,
+            (_, Some((_, unit, factor))) => Self::Elements(unit, *factor),
+            (_, None) if field.is_integer() => Self::None,
+            (_, None) => Self::Elements("", 1.0),
+        }
+    }
+
+    fn unit(self) -> &'static str {
+        match self {
+            Self::Elements(unit, _) => unit,
+            Self::Distance => "µm",
+            Self::Turn => "mrad",
+            Self::None => "",
+        }
+    }
+
+    /// The size of the difference; none where it has no measure, or a value is no number.
+    fn size(self, a: &[f64], b: &[f64]) -> Option<f64> {
+        let differences = || a.iter().zip(b).map(|(a, b)| b - a);
+        let norm = |sign: f64| a.iter().zip(b).map(|(a, b)| (sign * b - a).powi(2)).sum::<f64>().sqrt();
+        let size = match self {
+            Self::Elements(_, factor) => {
+                // Unlike `max`, this keeps what is no number.
+                factor
+                    * differences()
+                        .map(f64::abs)
+                        .fold(0.0, |most, size| if size <= most { most } else { size })
+            }
+            Self::Distance => 1e6 * norm(1.0),
+            // A quaternion and its negative are one orientation; the chord between two is twice the sine of a quarter.
+            Self::Turn => 1e3 * 4.0 * (norm(1.0).min(norm(-1.0)) / 2.0).min(1.0).asin(),
+            Self::None => return None,
+        };
+        size.is_finite().then_some(size)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_recording::Columns;
+
+    use super::*;
+
+    fn sized(definition: &str, a: &[f64], b: &[f64]) -> (Option<String>, &'static str) {
+        let columns = Columns::from_definition(definition).unwrap();
+        let measure = Measure::of(&columns.fields()[0], a.len());
+        (measure.size(a, b).map(|size| format!("{size:.3}")), measure.unit())
+    }
+
+    #[test]
+    fn lengths_are_in_micrometres_angles_in_milliradians_and_codes_without_a_measure() {
+        let text = |size: &str| Some(size.to_owned());
+        assert_eq!(sized("float64[6] target_m", &[0.1, 0.2], &[0.1, 0.2 + 2e-6]), (text("2.000"), "µm"));
+        assert_eq!(sized("float64[3] position_m", &[0.0; 3], &[3e-6, 4e-6, 0.0]), (text("5.000"), "µm"));
+        assert_eq!(sized("float64[3] leg_angle_rad", &[1.0], &[1.002]), (text("2.000"), "mrad"));
+        assert_eq!(sized("float64[6] joint_m_s", &[1.0], &[1.5]), (text("500.000"), "mm/s"));
+        assert_eq!(sized("float64 gain", &[1.0], &[1.5]), (text("0.500"), ""));
+        assert_eq!(sized("uint32 request", &[1.0], &[2.0]), (None, ""));
+        assert_eq!(sized("float64[6] force_n", &[1.0], &[f64::NAN]), (None, "N"));
+    }
+
+    #[test]
+    fn the_turn_between_two_quaternions_is_their_angle_whatever_their_signs() {
+        let about_x = |angle: f64| [(angle / 2.0).cos(), (angle / 2.0).sin(), 0.0, 0.0];
+        let negative = about_x(0.003).map(|part| -part);
+        for other in [about_x(0.003), negative] {
+            let found = sized("float64[4] quaternion_wxyz", &about_x(0.0), &other);
+            assert_eq!(found, (Some("3.000".to_owned()), "mrad"));
+        }
     }
 }

@@ -1,29 +1,23 @@
 //! `report.html`: one page that needs no network. Each module fills a section of it; `masseter-page` draws them.
 
-mod actuators;
-mod animation;
-mod buses;
-mod charts;
-mod circumstances;
-mod events;
-mod jaw;
-mod live;
 mod motion;
-mod named;
-mod requirements;
 mod result;
+mod rig;
 mod times;
-mod timing;
 
 use masseter_analysis::Figures;
 use masseter_page::{Life, Page, PageError, Section};
 use masseter_recording::Manifest;
 
+use self::motion::{actuators_section, jaw_section, mechanism_section, motion_section, pressure_section};
+use self::result::{events_section, live_sections, named_section, requirements_section, result_section};
+use self::rig::{buses_section, circumstances_section, timing_section};
+use self::times::{moments, phases, time};
 use crate::verdict::Verdict;
 
 /// The page.
 pub(crate) fn html(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Result<String, PageError> {
-    let first = vec![result::section(manifest, figures, verdict)];
+    let first = vec![result_section(manifest, figures, verdict)];
     page(Life::Finished, first, manifest, figures, verdict).to_html()
 }
 
@@ -31,31 +25,31 @@ pub(crate) fn html(manifest: &Manifest, figures: &Figures, verdict: &Verdict) ->
 /// not in the figures.
 pub fn so_far(manifest: &Manifest, figures: &Figures, number: u64, left_out: u64) -> Page {
     let verdict = Verdict::new(manifest, figures);
-    let first = live::sections(manifest, figures, number, left_out);
+    let first = live_sections(manifest, figures, number, left_out);
     page(Life::Live, first, manifest, figures, &verdict)
 }
 
 fn page(life: Life, first: Vec<Section>, manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Page {
     let scenario = &manifest.scenario;
     let others: [Option<Section>; 11] = [
-        requirements::section(figures, verdict),
-        motion::mechanism(scenario, figures),
-        jaw::section(scenario, figures),
-        Some(motion::section(scenario, figures)),
-        motion::pressure(figures),
-        Some(actuators::section(scenario, figures)),
-        named::section(figures),
-        Some(timing::section(scenario, figures)),
-        Some(buses::section(figures)),
-        Some(events::section(figures)),
-        Some(circumstances::section(manifest)),
+        requirements_section(figures, verdict),
+        mechanism_section(scenario, figures),
+        jaw_section(scenario, figures),
+        Some(motion_section(scenario, figures)),
+        pressure_section(figures),
+        Some(actuators_section(scenario, figures)),
+        named_section(figures),
+        Some(timing_section(scenario, figures)),
+        Some(buses_section(figures)),
+        Some(events_section(figures)),
+        Some(circumstances_section(manifest)),
     ];
     Page {
         about: about(manifest, figures),
-        moments: times::moments(scenario, figures),
-        phases: times::phases(figures),
+        moments: moments(scenario, figures),
+        phases: phases(figures),
         sections: first.into_iter().chain(others.into_iter().flatten()).collect(),
-        ..Page::new(&scenario.name, life, times::time(manifest, figures))
+        ..Page::new(&scenario.name, life, time(manifest, figures))
     }
 }
 

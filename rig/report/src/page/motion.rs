@@ -1,14 +1,23 @@
-//! The mechanism in three dimensions, the motion of the jaw, and the pressure between the jaws.
+//! The mechanism in three dimensions, the motion of the jaw, the pressure between the jaws, and the actuators.
+//!
+//! `jaw.js` takes the poses from the data of the 3-D view, and the cycles from here.
 
-use masseter_analysis::{Curve, Figures, ToothFigures};
+use std::ops::Range;
+
+use masseter_analysis::{
+    CoursePoint, Curve, Figures, JawCycleFigures, PoseSource, Statistic, ToothFigures, ToothLoads,
+    TrackingSample,
+};
 use masseter_controller::trajectory::closed_pose;
-use masseter_model::geometry::{Mechanism, Vec3};
-use masseter_page::{Block, Chart, Content, Points, Pressure, Section, Series, Style, Tooth};
-use masseter_scenario::Scenario;
+use masseter_model::geometry::{AXES, AXIS_NAMES, LEGS, Mechanism, Pose, Vec3};
+use masseter_page::{Block, Chart, Content, Limit, Points, Pressure, Section, Series, Style, Tooth};
+use masseter_recording::jaw_points;
+use masseter_runtime::messages::pose_fields;
+use masseter_scenario::{Scenario, ToothConfig};
+use serde::Serialize;
+use serde_json::Value;
 
-use super::animation;
-use super::charts::{in_unit, plain};
-use super::times::since_s;
+use super::times::{in_unit, limit, plain, since_s};
 use crate::table;
 
 /// Directions of the base, and where they point.
@@ -18,14 +27,14 @@ const DIRECTIONS: [[&str; 2]; 3] = [["x", "forward"], ["y", "to the left"], ["z"
 const LEAST_N: f64 = 0.1;
 
 /// None without a motion.
-pub(super) fn mechanism(scenario: &Scenario, figures: &Figures) -> Option<Section> {
-    let scene = Content::Scene(animation::data(scenario, figures)?);
+pub(super) fn mechanism_section(scenario: &Scenario, figures: &Figures) -> Option<Section> {
+    let scene = Content::Scene(animation_data(scenario, figures)?);
     Some(Section::new("mechanism", "Mechanism", vec![Block::new("scene", scene)]))
 }
 
-pub(super) fn section(scenario: &Scenario, figures: &Figures) -> Section {
+pub(super) fn motion_section(scenario: &Scenario, figures: &Figures) -> Section {
     let over_time = &figures.over_time;
-    let mut blocks = vec![Block::text("motion-in-words", in_words(figures))];
+    let mut blocks = vec![Block::text("motion-in-words", motion_in_words(figures))];
     if let Some(closed_m) = closed_incisal_m(scenario) {
         let along = |axis: usize| {
             let chart = displacement(figures, axis, closed_m[axis]);
@@ -78,7 +87,7 @@ fn displacement(figures: &Figures, axis: usize, closed_m: f64) -> Chart {
     }
 }
 
-fn in_words(figures: &Figures) -> String {
+fn motion_in_words(figures: &Figures) -> String {
     let tracking = &figures.tracking;
     let estimate = tracking.estimate_rms_mm.map(|rms| format!("Estimated against true: rms {rms:.4} mm."));
     let bite = figures.bite_force_max_n.map(|most_n| format!("Bite force: at most {most_n:.1} N."));
@@ -96,7 +105,7 @@ fn closed_incisal_m(scenario: &Scenario) -> Option<[f64; 3]> {
 }
 
 /// None where the jaws cannot touch.
-pub(super) fn pressure(figures: &Figures) -> Option<Section> {
+pub(super) fn pressure_section(figures: &Figures) -> Option<Section> {
     let contact = figures.contact.as_ref()?;
     let tooth = |tooth: &ToothFigures| Tooth {
         number: tooth.number,
@@ -118,3 +127,218 @@ pub(super) fn pressure(figures: &Figures) -> Option<Section> {
         vec![Block::text("pressure-in-words", words), Block::new("pressure", Content::Pressure(pressure))];
     Some(Section::new("pressure-between-jaws", "Pressure between the jaws", blocks))
 }
+
+/// Positions to the micrometre and quaternions to a millionth are finer than any screen.
+const DIGITS: f64 = 1e6;
+
+/// Mechanism and motion; metres, base frame.
+#[derive(Serialize)]
+struct Animation {
+    /// Middle of each slide.
+    centres: [[f64; 3]; LEGS],
+    /// Direction of each slide.
+    along: [[f64; 3]; LEGS],
+    /// Ends of the slides' strokes.
+    slide_ends: [f64; 2],
+    /// Platform corners in the platform frame.
+    corners: [[f64; 3]; LEGS],
+    /// Incisal point and condyles in the platform frame.
+    jaw: [[f64; 3]; 3],
+    /// The platform when the jaw is closed, x y z, w x y z.
+    closed: Vec<f64>,
+    /// Numbers and places of the lower teeth in the platform frame.
+    teeth: Vec<(u8, [f64; 3])>,
+    /// Forces on the teeth. A row begins with the time since the run's first SYNC, s. Four numbers follow for each
+    /// tooth with a force: the place in `teeth`, and the force along x, y and z of the base, N.
+    forces: Vec<Vec<f64>>,
+    /// What the actual pose is called.
+    actual_name: &'static str,
+    /// Time since the run's first SYNC, s, then the actual and the desired pose of the platform, each as x y z, w x y z.
+    /// The estimated pose follows where the actual one is the true one.
+    frames: Vec<Vec<f64>>,
+}
+
+/// The animation; none without a motion or without a mechanism.
+pub(super) fn animation_data(scenario: &Scenario, figures: &Figures) -> Option<Value> {
+    let mechanism = Mechanism::new(&scenario.mechanism).ok()?;
+    let samples = &figures.track.samples;
+    samples.first()?;
+    let source = figures.tracking.actual_source;
+    let frame = |sample| frame(sample, figures.over_time.began_ns, source);
+    let contact = figures.contact.as_ref();
+    let tooth = |tooth: &ToothConfig| (tooth.number, tooth.point_m.map(rounded));
+    let animation = Animation {
+        centres: std::array::from_fn(|leg| mechanism.hinge(leg, 0.0).into()),
+        along: std::array::from_fn(|leg| mechanism.slide_direction(leg).into()),
+        slide_ends: mechanism.strokes().slide_m,
+        corners: mechanism.platform_corners().map(Into::into),
+        jaw: jaw_points(&scenario.jaw).map(Into::into),
+        closed: numbers(&closed_pose(&scenario.jaw, &mechanism).ok()?).collect(),
+        teeth: scenario.arch().iter().map(tooth).collect(),
+        forces: contact.map(|contact| contact.moments.iter().map(tooth_forces).collect()).unwrap_or_default(),
+        actual_name: source.adjective(),
+        frames: samples.iter().map(frame).collect(),
+    };
+    serde_json::to_value(&animation).ok()
+}
+
+fn frame(sample: &TrackingSample, began_ns: u64, source: PoseSource) -> Vec<f64> {
+    let mut frame = vec![rounded(sample.sampled_ns.saturating_sub(began_ns) as f64 / 1e9)];
+    frame.extend(numbers(&sample.actual).chain(numbers(&sample.desired)));
+    if source == PoseSource::Truth {
+        frame.extend(numbers(&sample.estimated));
+    }
+    frame
+}
+
+fn tooth_forces(moment: &ToothLoads) -> Vec<f64> {
+    let to_tenth = |force_n: f64| (force_n * 10.0).round() / 10.0;
+    let forces = moment.forces_n.iter();
+    let of_teeth =
+        forces.flat_map(|(place, force_n)| [*place as f64].into_iter().chain(force_n.map(to_tenth)));
+    [rounded(moment.at_s)].into_iter().chain(of_teeth).collect()
+}
+
+fn numbers(pose: &Pose) -> impl Iterator<Item = f64> {
+    let (position_m, quaternion) = pose_fields(pose);
+    position_m.into_iter().chain(quaternion).map(rounded)
+}
+
+fn rounded(value: f64) -> f64 {
+    (value * DIGITS).round() / DIGITS
+}
+
+/// Values of a course to a thousandth: a micrometre, a millinewton.
+const COURSE_DIGITS: f64 = 1e3;
+
+#[derive(Serialize)]
+struct Cycles<'a> {
+    statistics: Vec<Quantity>,
+    rows: &'a [masseter_analysis::JawCycle],
+    /// Of each point: opening, lateral, mm, force, N, then their standard deviations.
+    mean: Vec<[f64; 6]>,
+    /// Opening, lateral and force of each point of a cycle, one after the other.
+    courses: Vec<Vec<f64>>,
+    has_force: bool,
+    count: u64,
+}
+
+/// A row of the table of statistics.
+#[derive(Serialize)]
+struct Quantity {
+    name: &'static str,
+    unit: &'static str,
+    decimals: u32,
+    #[serde(flatten)]
+    statistic: Statistic,
+}
+
+/// None without a motion.
+pub(super) fn jaw_section(scenario: &Scenario, figures: &Figures) -> Option<Section> {
+    animation_data(scenario, figures)?;
+    let data = serde_json::to_value(cycles(&figures.jaw_cycles)).ok()?;
+    Some(Section::new("jaw", "Jaw", vec![Block::new("jaw", Content::Jaw(data))]))
+}
+
+fn cycles(found: &JawCycleFigures) -> Cycles<'_> {
+    let rounded = |value: f64| (value * COURSE_DIGITS).round() / COURSE_DIGITS;
+    let values = |point: &CoursePoint| [point.opening_mm, point.lateral_mm, point.force_n].map(rounded);
+    let mean_and_sd = |[mean, sd]: &[CoursePoint; 2]| {
+        let ([a, b, c], [d, e, f]) = (values(mean), values(sd));
+        [a, b, c, d, e, f]
+    };
+    Cycles {
+        statistics: statistics(found),
+        rows: &found.cycles,
+        mean: found.mean_course.iter().map(mean_and_sd).collect(),
+        courses: found.courses.iter().map(|course| course.iter().flat_map(values).collect()).collect(),
+        has_force: found.force_n.count > 0,
+        count: found.count,
+    }
+}
+
+fn statistics(found: &JawCycleFigures) -> Vec<Quantity> {
+    let quantity = |name, unit, decimals, statistic| Quantity { name, unit, decimals, statistic };
+    let all = [
+        quantity("duration, opening to opening", "s", 3, found.duration_s),
+        quantity("duration of the opening", "s", 3, found.opening_s),
+        quantity("duration of the closing", "s", 3, found.closing_s),
+        quantity("opening", "mm", 2, found.opening_mm),
+        quantity("lateral width", "mm", 2, found.lateral_mm),
+        quantity("peak opening velocity", "mm/s", 1, found.opening_mm_s),
+        quantity("peak closing velocity", "mm/s", 1, found.closing_mm_s),
+        quantity("peak bite force", "N", 1, found.force_n),
+    ];
+    all.into_iter().filter(|quantity| quantity.statistic.count > 0).collect()
+}
+
+/// Three axes of one kind.
+#[derive(Clone, Copy)]
+enum Kind {
+    Slides,
+    Legs,
+}
+
+impl Kind {
+    /// In words and in the page's ids.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Slides => "slides",
+            Self::Legs => "legs",
+        }
+    }
+
+    fn axes(self) -> Range<usize> {
+        let first = self as usize * LEGS;
+        first..first + LEGS
+    }
+}
+
+pub(super) fn actuators_section(scenario: &Scenario, figures: &Figures) -> Section {
+    const KINDS: [Kind; 2] = [Kind::Slides, Kind::Legs];
+    let over_time = &figures.over_time;
+    let strokes_m = [scenario.mechanism.strokes.slide_m, scenario.mechanism.strokes.leg_m];
+    let drives = [&scenario.drives.slide, &scenario.drives.leg];
+    let both_ways = |most: f64| vec![limit("limit", &[most, -most])];
+    let position = |kind: Kind| {
+        let [low, high] = strokes_m[kind as usize].map(|end_m| end_m * 1e3);
+        let limits = vec![limit("lower end", &[low]), limit("upper end", &[high])];
+        Block::chart(kind.name(), curve_chart(kind, "Position", "mm", &over_time.position_m, limits)).half()
+    };
+    let velocity = |kind: Kind| {
+        let limits = both_ways(drives[kind as usize].max_velocity_m_s * 1e3);
+        let chart = curve_chart(kind, "Velocity", "mm/s", &over_time.velocity_m_s, limits);
+        Block::chart(format!("velocity-{}", kind.name()), chart).half()
+    };
+    let force = |kind: Kind| {
+        let limits = both_ways(drives[kind as usize].max_force_n);
+        Block::chart(format!("force-{}", kind.name()), force_chart(kind, figures, limits)).half()
+    };
+    let charts = [KINDS.map(position), KINDS.map(velocity), KINDS.map(force)];
+    let blocks = charts.into_iter().flatten().collect();
+    Section::new("actuators", "Actuators", blocks)
+}
+
+fn curve_chart(kind: Kind, quantity: &str, unit: &str, si: &[Curve; AXES], limits: Vec<Limit>) -> Chart {
+    let series = kind.axes().map(|axis| plain(AXIS_NAMES[axis], &si[axis], 1e3)).collect();
+    Chart { series, limits, ..Chart::over_time(format!("{quantity} of the {}", kind.name()), unit) }
+}
+
+/// Pale raw forces under their moving means.
+fn force_chart(kind: Kind, figures: &Figures, limits: Vec<Limit>) -> Chart {
+    let over_time = &figures.over_time;
+    let series = |name: String, style: Style, place: usize, curve: &Curve| {
+        Series::new(name, style, Points::over_time(curve)).coloured(place)
+    };
+    let raw = kind.axes().enumerate().map(|(place, axis)| {
+        series(format!("{} raw", AXIS_NAMES[axis]), Style::Raw, place, &over_time.force_n[axis])
+    });
+    let smooth = kind.axes().enumerate().map(|(place, axis)| {
+        series(AXIS_NAMES[axis].to_owned(), Style::Smoothed, place, &over_time.smooth_force_n[axis])
+    });
+    let title = format!("Force of the {}, raw and mean of 20 ms", kind.name());
+    Chart { series: raw.chain(smooth).collect(), limits, ..Chart::over_time(title, "N") }
+}
+
+#[cfg(test)]
+mod tests;

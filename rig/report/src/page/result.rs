@@ -1,16 +1,22 @@
-//! The verdict, the figures that matter most, and the checks.
+//! What came out: verdict, checks, requirements, events, the controller's signals and parameters; and a run that goes on.
 
-use masseter_analysis::Figures;
-use masseter_page::{Block, Column, Content, Section, Table, Tone};
+use masseter_analysis::requirements::{RequirementFigures, RequirementPlot};
+use masseter_analysis::{Code, Curve, EventRecord, Figures, ParameterFigures, SignalFigures};
+use masseter_page::{
+    Block, Cell, Chart, Column, Content, EventRow, Events, Live, Moment, MomentKind, Parameter, Points,
+    Section, Series, Style, Table, Tone,
+};
 use masseter_recording::Manifest;
+use masseter_runtime::messages::codes::{ControllerState, EventKind};
 use masseter_terminal::Exit;
 
+use super::times::{limit, plain, since_s};
 use crate::check::{Check, CheckResult};
-use crate::text::{decimals, microseconds, or_dash};
+use crate::text::{self, microseconds, mm, or_dash, significant};
 use crate::timing::TimingWord;
 use crate::verdict::Verdict;
 
-pub(super) fn section(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Section {
+pub(super) fn result_section(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Section {
     let row = |check: &Check| {
         let Check { name, finding, result, .. } = check;
         vec![name.to_string().into(), mark(*result), finding.clone().into()]
@@ -67,14 +73,11 @@ fn panel(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> masseter_
 
 fn figures_in_words(figures: &Figures) -> Vec<[String; 2]> {
     let errors = figures.tracking.actual;
-    let mm = |value: Option<f64>| or_dash(value, |mm| format!("{} mm", decimals(mm)));
     let longest = figures.worst_cycles.first().map(|cycle| cycle.total_ns);
-    let mut all = [
-        ["incisal point from desired, rms", &mm(errors.incisal_rms_mm)],
-        ["incisal point from desired, most", &mm(errors.incisal_max_mm)],
-    ]
-    .map(|pair| pair.map(str::to_owned))
-    .to_vec();
+    let mut all = vec![
+        ["incisal point from desired, rms".to_owned(), mm(errors.incisal_rms_mm)],
+        ["incisal point from desired, most".to_owned(), mm(errors.incisal_max_mm)],
+    ];
     if let Some(longest_ns) = longest {
         all.push(["longest cycle".to_owned(), format!("{} µs", microseconds(longest_ns))]);
     }
@@ -82,4 +85,239 @@ fn figures_in_words(figures: &Figures) -> Vec<[String; 2]> {
         all.push(["greatest bite force".to_owned(), format!("{most_n:.1} N")]);
     }
     all
+}
+
+/// Height of a small plot, px.
+const SMALL: u32 = 34;
+
+/// None where the scenario requires nothing.
+pub(super) fn requirements_section(figures: &Figures, verdict: &Verdict) -> Option<Section> {
+    let checks = verdict.checks.iter().filter(|check| check.is_requirement());
+    let rows = figures.requirements.iter().zip(checks);
+    let rows: Vec<_> = rows.map(|(found, check)| requirement_row(figures, found, check)).collect();
+    if rows.is_empty() {
+        return None;
+    }
+    let columns = vec![
+        Column::text("requirement"),
+        Column::text("result"),
+        Column::text("signal and limit"),
+        Column::text("must hold"),
+        Column::text("found"),
+        Column::number("margin"),
+        Column::number("smallest at, s"),
+        Column::number("latency, ms"),
+    ];
+    let table = Table { label: "Requirements".to_owned(), columns, rows };
+    let charts = figures.requirements.iter().enumerate().filter_map(|(place, found)| {
+        Some(Block::chart(format!("requirement-{place}"), requirement_chart(figures, found)?))
+    });
+    let blocks = [Block::table("requirements", table)].into_iter().chain(charts).collect();
+    Some(Section::new("requirements", "Requirements", blocks))
+}
+
+fn requirement_row(figures: &Figures, found: &RequirementFigures, check: &Check) -> Vec<Cell> {
+    let margin = or_dash(found.margin, |margin| format!("{} {}", significant(margin), found.margin_unit));
+    let share = found.relative_margin.map(|share| format!(" ({:.0} %)", share * 100.0)).unwrap_or_default();
+    let plot = requirement_chart(figures, found)
+        .map_or_else(|| "".into(), |chart| Cell::Plot { plot: Box::new(Chart { height: SMALL, ..chart }) });
+    vec![
+        found.name.clone().into(),
+        mark(check.result),
+        plot,
+        found.must.clone().into(),
+        found.finding.clone().into(),
+        format!("{}{share}", margin.trim_end()).into(),
+        or_dash(found.worst_at_s, |at_s| format!("{at_s:.3}")).into(),
+        or_dash(found.latency_ms, |ms| format!("{ms:.3}")).into(),
+    ]
+}
+
+/// The signal, its limits, and the moment of the smallest margin; none without a signal.
+fn requirement_chart(figures: &Figures, of: &RequirementFigures) -> Option<Chart> {
+    let RequirementPlot { signal, unit, began_ns, curve, limits } = of.plot.as_ref()?;
+    let shift_s = since_s(figures, *began_ns);
+    let points: Vec<_> = curve.iter().map(|&(at_s, value)| (at_s + shift_s, value)).collect();
+    let smallest = of.worst_ns.map(|ns| Moment {
+        at_s: since_s(figures, ns),
+        kind: MomentKind::Note,
+        name: "smallest margin".to_owned(),
+        text: format!("smallest margin of {}", of.name),
+    });
+    Some(Chart {
+        series: vec![Series::new(signal, Style::Plain, Points::over_time(&points))],
+        limits: if limits.is_empty() { Vec::new() } else { vec![limit("limit", limits)] },
+        moments: smallest.into_iter().collect(),
+        otherwise: "The signal has no value.".to_owned(),
+        ..Chart::over_time(format!("{}: {signal}", of.name), *unit)
+    })
+}
+
+pub(super) fn events_section(figures: &Figures) -> Section {
+    let row = |event: &EventRecord| {
+        let source = event.source.to_string();
+        let text = text::event_in_words(event);
+        let text = text.strip_prefix(&source).map_or(&*text, |rest| rest.trim_start_matches([':', ' ']));
+        EventRow {
+            at_s: since_s(figures, event.time_ns),
+            is_fault: event.kind == EventKind::Fault,
+            text: text.to_owned(),
+            source,
+        }
+    };
+    let (start, rest) = phases(&figures.events);
+    let events = Events { start: start.iter().map(row).collect(), rest: rest.iter().map(row).collect() };
+    Section::new("what-happened", "Events", vec![Block::new("events", Content::Events(events))])
+}
+
+/// The events until the controller first moves the jaw, and those from then on.
+fn phases(events: &[EventRecord]) -> (&[EventRecord], &[EventRecord]) {
+    let moves = |event: &EventRecord| {
+        event.transition.as_ref().is_some_and(|[_, to]| to == ControllerState::Easing.name())
+    };
+    events.split_at(events.iter().position(moves).unwrap_or(0))
+}
+
+/// None where the controller declares nothing.
+pub(super) fn named_section(figures: &Figures) -> Option<Section> {
+    let mut blocks = Vec::new();
+    if !figures.signals.is_empty() {
+        blocks.push(Block::table("signals", signals(&figures.signals)));
+        blocks.extend(signal_charts(figures));
+    }
+    if !figures.parameters.is_empty() {
+        blocks.push(Block::table("parameters", parameters(&figures.parameters)));
+    }
+    let title = match (figures.signals.is_empty(), figures.parameters.is_empty()) {
+        (false, true) => "Signals of the controller",
+        (true, false) => "Parameters of the controller",
+        _ => "Signals of the controller and its parameters",
+    };
+    (!blocks.is_empty()).then(|| Section::new("named", title, blocks))
+}
+
+fn signals(signals: &[SignalFigures]) -> Table {
+    let row = |named: &SignalFigures| -> Vec<Cell> {
+        let values = [named.min, named.mean, named.max, named.last].map(value_in_words);
+        let not_finite = match named.not_finite {
+            0 => String::new(),
+            count => format!(" ({count} values were no finite numbers)"),
+        };
+        let words = [named.signal.name.clone(), named.signal.unit.clone()];
+        let about = format!("{}{not_finite}", named.signal.about);
+        words.into_iter().chain(values).chain([about]).map(Cell::from).collect()
+    };
+    let numbers = ["smallest", "mean", "largest", "last"].map(Column::number);
+    let columns = [Column::text("signal"), Column::text("unit")].into_iter().chain(numbers);
+    let columns = columns.chain([Column::text("meaning")]).collect();
+    Table { label: "Signals of the controller".to_owned(), columns, rows: signals.iter().map(row).collect() }
+}
+
+/// One chart for each unit, in the order of the signals' declaration.
+fn signal_charts(figures: &Figures) -> Vec<Block> {
+    let mut units: Vec<(&str, Vec<Series>)> = Vec::new();
+    for (SignalFigures { signal, .. }, curve) in figures.signals.iter().zip(&figures.over_time.signals) {
+        let curve: &Curve = curve;
+        let series = plain(&signal.name, curve, 1.0);
+        match units.iter_mut().find(|(unit, _)| *unit == signal.unit) {
+            Some((_, all)) => all.push(series),
+            None => units.push((&signal.unit, vec![series])),
+        }
+    }
+    let chart = |(number, (unit, series)): (usize, (&str, Vec<Series>))| {
+        let title = if let [only] = &series[..] { only.name.clone() } else { "Signals".to_owned() };
+        let otherwise = "No finite value came.".to_owned();
+        let chart = Chart { series, otherwise, ..Chart::over_time(title, unit) };
+        Block::chart(format!("signals-{number}"), chart)
+    };
+    units.into_iter().enumerate().map(chart).collect()
+}
+
+fn parameters(parameters: &[ParameterFigures]) -> Table {
+    let row = |named: &ParameterFigures| -> Vec<Cell> {
+        let parameter = &named.parameter;
+        let [low, high] = parameter.range;
+        let cells = [
+            parameter.name.clone(),
+            parameter.unit.clone(),
+            parameter.value.to_string(),
+            named.last.to_string(),
+            named.changes.to_string(),
+            format!("{low} to {high}"),
+            parameter.about.clone(),
+        ];
+        cells.map(Cell::from).into()
+    };
+    let columns = vec![
+        Column::text("parameter"),
+        Column::text("unit"),
+        Column::number("at the start"),
+        Column::number("at the end"),
+        Column::number("changes"),
+        Column::number("range"),
+        Column::text("meaning"),
+    ];
+    let rows = parameters.iter().map(row).collect();
+    Table { label: "Parameters of the controller".to_owned(), columns, rows }
+}
+
+fn value_in_words(value: Option<f64>) -> String {
+    or_dash(value, |value| format!("{value:.6}").trim_end_matches('0').trim_end_matches('.').to_owned())
+}
+
+pub(super) fn live_sections(
+    manifest: &Manifest,
+    figures: &Figures,
+    number: u64,
+    left_out: u64,
+) -> Vec<Section> {
+    let now = Block::new("now", Content::Live(now(manifest, figures, number, left_out)));
+    let mut sections = vec![Section::new("now", "Now", vec![now])];
+    if !figures.parameters.is_empty() {
+        let parameters = figures.parameters.iter().map(parameter).collect();
+        let block = Block::new("set-parameters", Content::Parameters(parameters));
+        sections.push(Section::new("set", "Change parameters", vec![block]));
+    }
+    sections
+}
+
+fn now(manifest: &Manifest, figures: &Figures, number: u64, left_out: u64) -> Live {
+    let state = figures.final_state.map_or_else(|| "starting".to_owned(), |state: Code<_>| state.to_string());
+    let tone = match figures.final_state {
+        Some(Code::Known(ControllerState::SafeStop)) => Tone::Bad,
+        Some(Code::Known(ControllerState::Running | ControllerState::Finished)) => Tone::Good,
+        _ => Tone::Plain,
+    };
+    let over_time = &figures.over_time;
+    let began_s = over_time.motion_began_ns.map(|began_ns| since_s(figures, began_ns));
+    let progress = match began_s {
+        Some(began_s) => {
+            let gone_s = (over_time.duration_s - began_s).clamp(0.0, manifest.motion_s);
+            format!("{gone_s:.1} s of {:.1} s of the motion", manifest.motion_s)
+        }
+        None => "The motion has not begun.".to_owned(),
+    };
+    let errors = figures.tracking.actual;
+    let missed = figures.controller_skips.skipped + figures.plant_skips.skipped;
+    let mut shown = vec![
+        ["incisal point from desired, rms".to_owned(), mm(errors.incisal_rms_mm)],
+        ["the same, greatest".to_owned(), mm(errors.incisal_max_mm)],
+        ["cycles".to_owned(), figures.cycles.to_string()],
+        ["missed".to_owned(), missed.to_string()],
+    ];
+    if left_out > 0 {
+        shown.push(["messages left out of this page".to_owned(), left_out.to_string()]);
+    }
+    Live { number, state: state.replace('_', " "), tone, progress, figures: shown }
+}
+
+fn parameter(figures: &ParameterFigures) -> Parameter {
+    let ParameterFigures { parameter, last, .. } = figures;
+    Parameter {
+        name: parameter.name.clone(),
+        unit: parameter.unit.clone(),
+        about: parameter.about.clone(),
+        value: *last,
+        range: parameter.range,
+    }
 }

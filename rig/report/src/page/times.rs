@@ -1,7 +1,7 @@
-//! The times of a run as the page has them: seconds since its first SYNC.
+//! What sections of the page have in common: times as seconds since the run's first SYNC, and curves.
 
-use masseter_analysis::{EventRecord, FaultFigures, Figures};
-use masseter_page::{Moment, MomentKind, Phase, Time};
+use masseter_analysis::{Curve, EventRecord, FaultFigures, Figures};
+use masseter_page::{Limit, Moment, MomentKind, Phase, Points, Series, Style, Time};
 use masseter_recording::Manifest;
 use masseter_runtime::messages::codes::Source;
 use masseter_scenario::Scenario;
@@ -65,4 +65,18 @@ pub(super) fn phases(figures: &Figures) -> Vec<Phase> {
 /// When the motion began; the first SYNC where it did not.
 pub(super) fn motion_s(figures: &Figures) -> f64 {
     figures.over_time.motion_began_ns.map_or(0.0, |began_ns| since_s(figures, began_ns))
+}
+
+/// A curve of several alike, in another unit.
+pub(super) fn plain(name: &str, curve: &Curve, unit: f64) -> Series {
+    Series::new(name, Style::Plain, Points::over_time(&in_unit(curve, 0.0, unit)))
+}
+
+pub(super) fn limit(name: &str, values: &[f64]) -> Limit {
+    Limit { name: name.to_owned(), values: values.to_vec() }
+}
+
+/// A curve in another unit, from another zero.
+pub(super) fn in_unit(curve: &Curve, zero: f64, unit: f64) -> Vec<(f64, f64)> {
+    curve.iter().map(|&(at_s, value)| (at_s, (value - zero) * unit)).collect()
 }

@@ -1,8 +1,8 @@
 //! The conformance suite through injected faults, and each kind of fault.
 
 use super::*;
-use crate::conformance::{self, End, Pair};
 use crate::faults::{Fault, FaultKind};
+use crate::laws::{self, End, Pair};
 use crate::{Bitrate, Bus, CanId, ErrorState, Frame, SendError, VirtualWire, WireConfig};
 
 const FAULT: Fault = Fault {
@@ -50,7 +50,7 @@ impl Faulted {
 
     /// First bytes of the frames that have arrived at the other end.
     fn received(&mut self) -> Vec<u8> {
-        self.settle();
+        self.wait_for_arrivals();
         let now_ns = self.now_ns;
         let mut port = self.end(End::B);
         std::iter::from_fn(|| port.receive(now_ns).unwrap())
@@ -69,7 +69,7 @@ impl Pair for Faulted {
         self.now_ns
     }
 
-    fn settle(&mut self) {
+    fn wait_for_arrivals(&mut self) {
         while let Some(event_ns) = self.wire.next_event_ns() {
             self.wire.advance(event_ns);
             self.now_ns = event_ns;
@@ -84,8 +84,8 @@ fn frame(byte: u8) -> Frame {
 #[test]
 fn ports_under_faults_conform() {
     let new = || Faulted::new(Vec::new(), Vec::new());
-    assert_eq!(conformance::check(new), Ok(()));
-    assert_eq!(conformance::check_arbitration(new), Ok(()));
+    assert_eq!(laws::check_every_law(new), Ok(()));
+    assert_eq!(laws::check_arbitration(new), Ok(()));
 }
 
 #[test]

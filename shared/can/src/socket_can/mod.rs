@@ -1,9 +1,8 @@
 //! A node's port on a real wire: a raw `SocketCAN` socket that never blocks.
 //!
 //! Frames leave through the queue of the interface (`txqueuelen`) in the order of sending: a caller sends urgent frames
-//! first. Frames of other sockets on the same interface are received
-//! like those of other nodes, and in the order in which they were on the wire; so a second port on the
-//! interface is a tap.
+//! first. Frames of other sockets on the same interface are received like those of other nodes, and in the order in which
+//! they were on the wire; so a second port on the interface is a tap.
 //!
 //! # Time stamps
 //! The kernel stamps a frame when the driver hands it over, in wall-clock time; the stamp is converted to
@@ -28,14 +27,382 @@
 //! An adapter that is unplugged is gone for good: its port reports [`ReceiveError::Os`](crate::ReceiveError::Os) until it
 //! is opened anew; one that was only taken down works again when it is up.
 
-mod clock;
-mod confinement;
-mod conversion;
-mod details;
-mod errno;
-mod interface;
-mod port;
+use std::io;
+use std::time::{Duration, SystemTime};
 
-pub use details::InterfaceDetails;
-pub use interface::{Interface, OpenError, is_supported};
-pub use port::SocketCan;
+use libc::{
+    CAN_ERR_ACK, CAN_ERR_BUSERROR, CAN_ERR_BUSOFF, CAN_ERR_CNT, CAN_ERR_CRTL, CAN_ERR_PROT, CAN_ERR_RESTARTED,
+};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::time::{ClockId, clock_gettime};
+use socketcan::errors::ControllerProblems;
+use socketcan::{
+    CanDataFrame, CanFrame, CanSocket, EmbeddedFrame as _, ExtendedId, Frame as _, Id, Socket, SocketOptions,
+    StandardId,
+};
+
+use crate::{
+    Bus, BusStatus, CanId, ErrorKind, ErrorReport, ErrorState, Frame, ReceiveError, Received, SendError,
+    Tapped, TappedFrame,
+};
+
+mod interface;
+
+pub use interface::{Interface, InterfaceDetails, OpenError, is_supported};
+use interface::{errno, usable_transmit_capacity};
+
+/// Frames looked at in one call of [`Bus::receive`]: error and remote frames must not hold a cycle up.
+const FRAMES_AT_ONCE: usize = 64;
+/// Receive buffer asked for, bytes; the kernel grants at most `net.core.rmem_max`.
+const RECEIVE_BUFFER: i32 = 1 << 20;
+/// The port of every error report: the controller of this machine, which all sockets of an interface share.
+const OWN_PORT: u8 = 0;
+/// Fields of `SO_MEMINFO` (`linux/sock_diag.h`), 32 bits each, and which of them counts dropped frames.
+const MEMINFO_FIELDS: usize = 9;
+const MEMINFO_DROPS: usize = 8;
+/// Transmit error counter at which a controller is bus-off; error frames have no room for more than 255.
+const BUS_OFF_TEC: u16 = 256;
+/// An older stamp shows that the wall clock was set.
+const MAX_AGE: Duration = Duration::from_secs(60);
+const PASSIVE: ControllerProblems = ControllerProblems::RX_PASSIVE.union(ControllerProblems::TX_PASSIVE);
+/// A warning is no state of ISO 11898-1: below passive a controller is active.
+const ACTIVE: ControllerProblems =
+    ControllerProblems::ACTIVE.union(ControllerProblems::RX_WARNING).union(ControllerProblems::TX_WARNING);
+/// Status of a port until the first error frame.
+const UNDISTURBED: BusStatus = BusStatus { state: ErrorState::Active, tec: 0, rec: 0 };
+
+/// A port on a real wire.
+///
+/// # Examples
+/// ```no_run
+/// use masseter_can::{Bus, CanId, Frame, SocketCan};
+///
+/// let mut port = SocketCan::open("can0")?;
+/// port.send(SocketCan::now_ns(), Frame::new(CanId::standard(0x123)?, &[1, 2])?)?;
+/// while let Some(received) = port.receive(SocketCan::now_ns())? {
+///     println!("{} at {} ns", received.frame, received.time_ns);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct SocketCan {
+    socket: CanSocket,
+    transmit_capacity: usize,
+    status: BusStatus,
+    last_ns: u64,
+    /// Frames were fetched since the drop counter was looked at.
+    drained: bool,
+    /// The kernel's drop counter as last reported.
+    dropped: u32,
+}
+
+impl SocketCan {
+    /// Opens a port on an interface that is there and up.
+    ///
+    /// # Errors
+    /// [`OpenError`], with the remedy.
+    pub fn open(interface: &str) -> Result<Self, OpenError> {
+        let transmit_capacity = usable_transmit_capacity(interface)?;
+        let failed = |error| OpenError::from_errno(interface, errno(&error));
+        let socket = CanSocket::open(interface).map_err(failed)?;
+        configure(&socket).map_err(failed)?;
+        Ok(Self { socket, transmit_capacity, status: UNDISTURBED, last_ns: 0, drained: false, dropped: 0 })
+    }
+
+    /// Now on the clock of the time stamps, ns of `CLOCK_MONOTONIC`.
+    #[allow(clippy::disallowed_methods, reason = "the port's own clock")]
+    pub fn now_ns() -> u64 {
+        let time = clock_gettime(ClockId::Monotonic);
+        time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64
+    }
+
+    /// Blocks until one of the first `N` ports has something to fetch, or until `deadline_ns`; a signal ends the wait
+    /// early.
+    pub fn wait<const N: usize>(ports: &[Self], deadline_ns: u64) {
+        let Some(last) = ports.last() else { return };
+        let left = Duration::from_nanos(deadline_ns.saturating_sub(Self::now_ns()));
+        let left = Timespec { tv_sec: left.as_secs() as i64, tv_nsec: left.subsec_nanos() as _ };
+        // Fewer ports than `N` are filled up with the last one, so that nothing is allocated.
+        let port = |index| ports.get(index).unwrap_or(last);
+        let mut watched: [_; N] =
+            std::array::from_fn(|index| PollFd::new(&port(index).socket, PollFlags::IN));
+        // A failed wait ends at once: the caller looks at the ports either way.
+        let _ = poll(&mut watched, Some(&left));
+    }
+
+    /// The next frame or error on the wire, for an observer; `None` when there is none.
+    ///
+    /// # Errors
+    /// As those of [`Bus::receive`].
+    pub fn tap(&mut self) -> Result<Option<Tapped>, ReceiveError> {
+        self.next_observation(Some)
+    }
+
+    /// The next observation that `select` accepts.
+    fn next_observation<T>(
+        &mut self,
+        select: impl Fn(Tapped) -> Option<T>,
+    ) -> Result<Option<T>, ReceiveError> {
+        for _ in 0..FRAMES_AT_ONCE {
+            match self.socket.read_frame_with_timestamps() {
+                Ok((frame, stamps)) => {
+                    let tapped = self.observe(&frame, stamps.socket)?;
+                    if let Some(selected) = tapped.and_then(&select) {
+                        return Ok(Some(selected));
+                    }
+                }
+                Err(error) => return self.receive_failed(&error).map(|()| None),
+            }
+        }
+        Ok(None)
+    }
+
+    /// Converts a fetched frame: a frame or an error on the wire, a loss, or nothing.
+    fn observe(
+        &mut self,
+        frame: &CanFrame,
+        stamp: Option<SystemTime>,
+    ) -> Result<Option<Tapped>, ReceiveError> {
+        self.drained = true;
+        let time_ns = stamp.map_or_else(Self::now_ns, monotonic_ns).max(self.last_ns);
+        self.last_ns = time_ns;
+        let tapped = |frame| Tapped::Frame(Received { frame, time_ns }.into());
+        match frame {
+            CanFrame::Data(data) => Ok(from_kernel(data).map(tapped)),
+            CanFrame::Error(error) => {
+                let kind = apply_error(&mut self.status, error.error_bits(), error.data())?;
+                let report = |kind| ErrorReport::new(time_ns, OWN_PORT, kind, self.status);
+                Ok(kind.map(report).map(Tapped::Error))
+            }
+            CanFrame::Remote(_) => Ok(None),
+        }
+    }
+
+    /// Reports the frames dropped since the last time that the socket was empty.
+    fn report_dropped(&mut self) -> Result<(), ReceiveError> {
+        if !std::mem::take(&mut self.drained) {
+            return Ok(());
+        }
+        let dropped = self.count_dropped().map_err(|error| ReceiveError::Os { errno: errno(&error) })?;
+        match dropped.wrapping_sub(std::mem::replace(&mut self.dropped, dropped)) {
+            0 => Ok(()),
+            lost => Err(ReceiveError::Overrun { lost: u64::from(lost) }),
+        }
+    }
+
+    /// Frames that the kernel dropped since the socket was opened.
+    fn count_dropped(&self) -> io::Result<u32> {
+        let mut fields = [0; MEMINFO_FIELDS * size_of::<u32>()];
+        self.socket.get_socket_option_bytes(libc::SOL_SOCKET, libc::SO_MEMINFO, &mut fields)?;
+        let (fields, _) = fields.as_chunks();
+        Ok(u32::from_ne_bytes(fields[MEMINFO_DROPS]))
+    }
+
+    fn receive_failed(&mut self, error: &io::Error) -> Result<(), ReceiveError> {
+        match error.kind() {
+            io::ErrorKind::WouldBlock => self.report_dropped(),
+            io::ErrorKind::Interrupted => Ok(()),
+            _ => {
+                let errno = errno(error);
+                if matches!(errno, libc::ENETDOWN | libc::ENODEV | libc::ENXIO) {
+                    self.status = UNDISTURBED;
+                }
+                Err(ReceiveError::Os { errno })
+            }
+        }
+    }
+}
+
+impl Bus for SocketCan {
+    fn send(&mut self, _: u64, frame: Frame) -> Result<(), SendError> {
+        let BusStatus { state, tec, .. } = self.status;
+        if state == ErrorState::BusOff {
+            return Err(SendError::BusOff { tec });
+        }
+        self.socket.write_frame(&to_kernel(&frame)).map_err(|error| match errno(&error) {
+            // ENOBUFS: the interface's queue; EAGAIN: the socket's own share of it.
+            libc::ENOBUFS | libc::EAGAIN => SendError::QueueFull { capacity: self.transmit_capacity },
+            errno => SendError::Os { errno },
+        })
+    }
+
+    fn receive(&mut self, _: u64) -> Result<Option<Received>, ReceiveError> {
+        self.next_observation(|tapped| {
+            tapped.frame().map(|&TappedFrame { frame, time_ns, .. }| Received { frame, time_ns })
+        })
+    }
+
+    fn status(&self) -> BusStatus {
+        self.status
+    }
+}
+
+fn configure(socket: &CanSocket) -> io::Result<()> {
+    socket.set_nonblocking(true)?;
+    socket.set_recv_own_msgs(false)?;
+    socket.set_error_filter_accept_all()?;
+    socket.set_recv_timestamp(true)?;
+    socket.set_socket_option_int(libc::SOL_SOCKET, libc::SO_RCVBUF, RECEIVE_BUFFER)
+}
+
+/// Changes a port's status by an error frame of its driver (`linux/can/error.h`). Most drivers report every change of
+/// state; newer ones also report both counters. Gives a change of state, otherwise an error on the wire; `None` for
+/// anything else.
+///
+/// # Errors
+/// [`ReceiveError::Overrun`] where the controller lost frames; it does not count them.
+fn apply_error(status: &mut BusStatus, classes: u32, data: &[u8]) -> Result<Option<ErrorKind>, ReceiveError> {
+    let has = |class| classes & class != 0;
+    let before = status.state;
+    let [_, problems, _, _, _, _, tec, rec] = *data else { return Ok(None) };
+    let problems = ControllerProblems::from_bits_truncate(problems);
+    if has(CAN_ERR_RESTARTED) {
+        *status = UNDISTURBED;
+    }
+    if has(CAN_ERR_CNT) {
+        (status.tec, status.rec) = (u16::from(tec), u16::from(rec));
+    }
+    if has(CAN_ERR_CRTL) && problems.intersects(PASSIVE) {
+        status.state = ErrorState::Passive;
+    } else if has(CAN_ERR_CRTL) && problems.intersects(ACTIVE) {
+        status.state = ErrorState::Active;
+    }
+    if has(CAN_ERR_BUSOFF) {
+        (status.state, status.tec) = (ErrorState::BusOff, BUS_OFF_TEC);
+    }
+    if has(CAN_ERR_CRTL) && problems.contains(ControllerProblems::RX_OVERFLOW) {
+        return Err(ReceiveError::Overrun { lost: 1 });
+    }
+    Ok(match status.state {
+        state if state != before => Some(ErrorKind::State(state)),
+        _ if has(CAN_ERR_ACK) => Some(ErrorKind::Acknowledge),
+        _ if has(CAN_ERR_PROT | CAN_ERR_BUSERROR) => Some(ErrorKind::Bit),
+        _ => None,
+    })
+}
+
+/// The kernel's form of a frame.
+fn to_kernel(frame: &Frame) -> CanDataFrame {
+    let number = frame.id().number();
+    let id = if frame.id().is_extended() {
+        ExtendedId::new(number).map(Id::Extended)
+    } else {
+        StandardId::new(number as u16).map(Id::Standard)
+    };
+    let kernels = id.and_then(|id| CanDataFrame::new(id, frame.data()));
+    kernels.expect("an identifier of 11 or 29 bits, and at most 8 bytes")
+}
+
+/// The frame of the kernel's form; `None` for a frame that CAN does not have.
+fn from_kernel(frame: &CanDataFrame) -> Option<Frame> {
+    Frame::new(CanId::from_flagged(frame.id_word()).ok()?, frame.data()).ok()
+}
+
+/// The instant of `CLOCK_MONOTONIC` at which the wall clock showed `stamp`, ns. A stamp in the future or more than a
+/// minute old gives the present: the wall clock was set in between. The result never lies before the true instant,
+/// unless the wall clock is set.
+#[allow(
+    clippy::disallowed_methods,
+    reason = "stamps must be comparable with the times that a user passes in"
+)]
+fn monotonic_ns(stamp: SystemTime) -> u64 {
+    // In this order, time between the two readings makes the result later, but never later than now.
+    let wall = SystemTime::now();
+    let now_ns = SocketCan::now_ns();
+    match wall.duration_since(stamp) {
+        Ok(age) if age < MAX_AGE => now_ns.saturating_sub(age.as_nanos() as u64),
+        _ => now_ns,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::disallowed_methods, reason = "stamps are compared with the clocks themselves")]
+
+    use std::time::UNIX_EPOCH;
+
+    use proptest::prelude::*;
+    use socketcan::errors::CAN_ERR_LOSTARB;
+
+    use super::*;
+    use crate::frame::tests::any_frame;
+
+    const TX_PASSIVE: u8 = ControllerProblems::TX_PASSIVE.bits();
+    const TX_WARNING: u8 = ControllerProblems::TX_WARNING.bits();
+    const BACK: u8 = ControllerProblems::ACTIVE.bits();
+
+    #[test]
+    fn a_port_goes_through_warning_passive_bus_off_and_restart_as_the_driver_reports() {
+        let mut port = UNDISTURBED;
+        let table = [
+            (CAN_ERR_CRTL | CAN_ERR_CNT, [0, TX_WARNING, 0, 0, 0, 0, 96, 0], ErrorState::Active, 96, 0),
+            (CAN_ERR_CRTL | CAN_ERR_CNT, [0, TX_PASSIVE, 0, 0, 0, 0, 128, 7], ErrorState::Passive, 128, 7),
+            (CAN_ERR_CNT, [0, 0, 0, 0, 0, 0, 248, 7], ErrorState::Passive, 248, 7),
+            (CAN_ERR_BUSOFF, [0; 8], ErrorState::BusOff, 256, 7),
+            (CAN_ERR_RESTARTED, [0; 8], ErrorState::Active, 0, 0),
+            (CAN_ERR_CRTL, [0, TX_PASSIVE, 0, 0, 0, 0, 0, 0], ErrorState::Passive, 0, 0),
+            (CAN_ERR_CRTL, [0, BACK, 0, 0, 0, 0, 0, 0], ErrorState::Active, 0, 0),
+        ];
+        for (classes, data, state, tec, rec) in table {
+            let before = port.state;
+            let kind = (state != before).then_some(ErrorKind::State(state));
+            assert_eq!(apply_error(&mut port, classes, &data), Ok(kind));
+            assert_eq!(port, BusStatus { state, tec, rec }, "{classes:x} {data:?}");
+        }
+    }
+
+    #[test]
+    fn a_controller_that_lost_frames_changes_no_state_and_reports_one() {
+        let mut port = UNDISTURBED;
+        let data = [0, ControllerProblems::RX_OVERFLOW.bits(), 0, 0, 0, 0, 0, 0];
+        assert_eq!(apply_error(&mut port, CAN_ERR_CRTL, &data), Err(ReceiveError::Overrun { lost: 1 }));
+        assert_eq!(port.state, ErrorState::Active);
+    }
+
+    #[test]
+    fn an_error_on_the_wire_is_reported_unless_it_changes_the_state() {
+        let passive = [0, TX_PASSIVE, 0, 0, 0, 0, 128, 0];
+        let table = [
+            (CAN_ERR_PROT | CAN_ERR_BUSERROR, [0; 8], Some(ErrorKind::Bit)),
+            (CAN_ERR_ACK | CAN_ERR_BUSERROR, [0; 8], Some(ErrorKind::Acknowledge)),
+            (CAN_ERR_LOSTARB, [0; 8], None),
+            (CAN_ERR_ACK | CAN_ERR_CRTL, passive, Some(ErrorKind::State(ErrorState::Passive))),
+            (CAN_ERR_ACK | CAN_ERR_CRTL, passive, Some(ErrorKind::Acknowledge)),
+        ];
+        let mut port = UNDISTURBED;
+        for (classes, data, kind) in table {
+            assert_eq!(apply_error(&mut port, classes, &data), Ok(kind), "{classes:x}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn every_frame_survives_the_form_of_the_kernel(frame in any_frame()) {
+            prop_assert_eq!(from_kernel(&to_kernel(&frame)), Some(frame));
+        }
+    }
+
+    #[test]
+    fn a_stamp_of_the_wall_clock_lies_between_the_monotonic_readings_around_it() {
+        let before_ns = SocketCan::now_ns();
+        let stamp = SystemTime::now();
+        let after_ns = SocketCan::now_ns();
+        assert!(monotonic_ns(stamp) >= before_ns);
+        assert!(monotonic_ns(SystemTime::now()) >= after_ns, "a later stamp lies later");
+    }
+
+    #[test]
+    fn an_old_stamp_is_converted_by_its_age() {
+        let stamp = SystemTime::now() - Duration::from_secs(30);
+        let found_ns = monotonic_ns(stamp);
+        assert!(found_ns + 20_000_000_000 < SocketCan::now_ns(), "{found_ns}");
+    }
+
+    #[test]
+    fn a_stamp_of_a_clock_that_was_set_meanwhile_counts_as_now() {
+        for stamp in [UNIX_EPOCH, SystemTime::now() + Duration::from_secs(3600)] {
+            let before_ns = SocketCan::now_ns();
+            assert!(monotonic_ns(stamp) >= before_ns);
+        }
+    }
+}

@@ -26,15 +26,259 @@
 //! - Errors that only some nodes see, and overload frames.
 //! - The traffic of a disconnected node on its end of the wire.
 
-mod completion;
-mod confinement;
-mod nodes;
-mod queue;
-mod transmission;
-mod wire;
+use std::ops::Range;
 
+use crate::faults::{FaultActivation, FaultNote, Faults, NumberedFrame};
+use crate::{Bus, BusStatus, ErrorState, Frame, ReceiveError, Received, SendError, Tapped};
+
+mod controller;
+mod nodes;
 #[cfg(test)]
 mod tests;
 
+use controller::{Confinement, Queued, SEQUENCE_BITS};
 pub use nodes::WireConfig;
-pub use wire::{Port, VirtualWire};
+use nodes::{Nodes, PortSet, Station, Transmission};
+
+/// A simulated wire and the ports on it.
+#[derive(Debug)]
+pub struct VirtualWire {
+    nodes: Nodes,
+    traffic: Traffic,
+    advanced_to_ns: u64,
+    /// Frames that ports took for transmission. Faults select the frames to delay by this number.
+    queued: u64,
+}
+
+/// A port, borrowed from its wire for as long as it is used.
+///
+/// A port does not move time: frames arrive when the caller [advances](VirtualWire::advance) the wire.
+#[derive(Debug)]
+pub struct Port<'a> {
+    wire: &'a mut VirtualWire,
+    port: usize,
+}
+
+/// The present or next transmission.
+#[derive(Debug)]
+enum Traffic {
+    /// The wire is idle, and the next transmission is not computed yet.
+    Unknown,
+    /// The wire is idle, and no node has a frame to send.
+    Nothing,
+    /// The transmission is on the wire, or will be; until then the wire is idle.
+    Coming { transmission: Transmission, is_on_wire: bool },
+}
+
+/// A node leaves the bus by a fault, or comes back.
+#[derive(Debug, Clone, Copy)]
+struct NodeChange {
+    at_ns: u64,
+    port: usize,
+    bus_off: Option<FaultActivation>,
+}
+
+impl VirtualWire {
+    /// An idle wire at time 0. Nothing is allocated after this.
+    pub fn new(config: &WireConfig) -> Self {
+        Self::with_faults(config, Faults::default())
+    }
+
+    /// An idle wire with these faults.
+    ///
+    /// # Panics
+    /// With more than 64 ports.
+    pub fn with_faults(config: &WireConfig, faults: Faults) -> Self {
+        assert!(config.ports <= PortSet::CAPACITY, "{} ports", config.ports);
+        Self { nodes: Nodes::new(config, faults), traffic: Traffic::Unknown, advanced_to_ns: 0, queued: 0 }
+    }
+
+    /// One port, to be used as a [`Bus`].
+    ///
+    /// # Panics
+    /// If no port has that index.
+    pub fn port(&mut self, port: usize) -> Port<'_> {
+        let ports = self.nodes.stations.len();
+        assert!(port < ports, "port {port} of a wire with {ports}");
+        Port { wire: self, port }
+    }
+
+    /// The next frame or error that was on the wire up to `now_ns`, of any port.
+    ///
+    /// # Errors
+    /// [`ReceiveError::Overrun`] where the tap missed frames because its queue was full; no other.
+    pub fn tap(&mut self, now_ns: u64) -> Result<Option<Tapped>, ReceiveError> {
+        self.nodes.tap.pop(now_ns)
+    }
+
+    /// The next note on the wire's faults up to `now_ns`.
+    pub fn next_note(&mut self, now_ns: u64) -> Option<FaultNote> {
+        self.nodes.faults.next_note(now_ns)
+    }
+
+    /// Sets when a fault acts, from now on at the earliest: the wire's past stays. A number of no fault has no effect.
+    pub fn set_fault_window(&mut self, number: usize, window_ns: Range<u64>) {
+        let from_ns = window_ns.start.max(self.advanced_to_ns);
+        self.nodes.faults.set_window(number, from_ns..window_ns.end);
+        self.invalidate_traffic();
+    }
+
+    /// When the frame on the wire, or the next one, will have ended if nothing else is queued until then,
+    /// ns; `None` when nothing is on the way.
+    pub fn next_event_ns(&mut self) -> Option<u64> {
+        self.update_traffic();
+        match &self.traffic {
+            Traffic::Coming { transmission, .. } => Some(transmission.end_ns),
+            Traffic::Nothing | Traffic::Unknown => None,
+        }
+    }
+
+    /// Lets time pass: all arbitrations before `until_ns` and all endings up to and including it, in the
+    /// order of time. A time already passed changes nothing.
+    pub fn advance(&mut self, until_ns: u64) {
+        while self.start_before(until_ns) && self.end_until(until_ns) {}
+        self.advanced_to_ns = self.advanced_to_ns.max(until_ns);
+    }
+
+    /// Puts the next frame on the wire if it starts before `until_ns`; whether one is on it now. Until then
+    /// nodes come back from bus-off, or are sent there.
+    fn start_before(&mut self, until_ns: u64) -> bool {
+        if self.is_busy() {
+            return true;
+        }
+        // Behind a frame nothing can start yet, and what its receivers answer would have to be looked at again.
+        if self.nodes.idle_from_ns > until_ns {
+            return false;
+        }
+        loop {
+            self.update_traffic();
+            let idle_until_ns = match &self.traffic {
+                Traffic::Coming { transmission, .. } => transmission.start_ns.min(until_ns),
+                _ => until_ns,
+            };
+            if self.has_node_changes() {
+                let sequence_ns = self.nodes.config.bitrate.bits_to_ns(SEQUENCE_BITS);
+                let change = self.next_node_change(sequence_ns);
+                if let Some(change) = change.filter(|change| change.at_ns <= idle_until_ns) {
+                    self.apply_change(change);
+                    continue;
+                }
+                for station in &mut self.nodes.stations {
+                    station.confinement.saw_idle(idle_until_ns, sequence_ns);
+                }
+                self.nodes.faults.begin_disconnections(idle_until_ns);
+            }
+            return match &mut self.traffic {
+                Traffic::Coming { transmission, is_on_wire } if transmission.start_ns < until_ns => {
+                    self.nodes.transmissions += 1;
+                    *is_on_wire = true;
+                    true
+                }
+                _ => false,
+            };
+        }
+    }
+
+    /// Computes the next transmission, unless it is known: callers ask far more often than the state changes.
+    #[inline]
+    fn update_traffic(&mut self) {
+        if let Traffic::Unknown = self.traffic {
+            self.traffic = match self.nodes.next_transmission() {
+                Some(transmission) => Traffic::Coming { transmission, is_on_wire: false },
+                None => Traffic::Nothing,
+            };
+        }
+    }
+
+    /// Discards the computed next transmission after a change. A transmission on the wire stays.
+    fn invalidate_traffic(&mut self) {
+        if !self.is_busy() {
+            self.traffic = Traffic::Unknown;
+        }
+    }
+
+    /// Ends the frame on the wire if its end is not after `until_ns`; whether it did.
+    fn end_until(&mut self, until_ns: u64) -> bool {
+        match self.traffic {
+            Traffic::Coming { transmission, is_on_wire: true } if transmission.end_ns <= until_ns => {
+                self.traffic = Traffic::Unknown;
+                self.nodes.end_transmission(&transmission);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    fn is_busy(&self) -> bool {
+        matches!(self.traffic, Traffic::Coming { is_on_wire: true, .. })
+    }
+
+    /// Whether a node may leave the bus or come back while the wire is idle.
+    fn has_node_changes(&self) -> bool {
+        !self.nodes.faults.is_empty()
+            || self.nodes.stations.iter().any(|station| station.confinement.is_off())
+    }
+
+    /// The next change of a node while the wire stays idle.
+    fn next_node_change(&self, sequence_ns: u64) -> Option<NodeChange> {
+        let idle_from_ns = self.nodes.idle_from_ns;
+        let change = |(port, station): (usize, &Station)| {
+            if let Some(at_ns) = station.confinement.back_at_ns(sequence_ns) {
+                return Some(NodeChange { at_ns: at_ns.max(idle_from_ns), port, bus_off: None });
+            }
+            if station.confinement.is_off() {
+                return None;
+            }
+            let from_ns = station.on_bus_from_ns.max(idle_from_ns);
+            let activation = self.nodes.faults.next_bus_off(from_ns, port)?;
+            Some(NodeChange { at_ns: activation.at_ns, port, bus_off: Some(activation) })
+        };
+        let changes = self.nodes.stations.iter().enumerate().filter_map(change);
+        changes.min_by_key(|change| change.at_ns)
+    }
+
+    fn apply_change(&mut self, NodeChange { at_ns, port, bus_off }: NodeChange) {
+        if let Some(activation) = bus_off {
+            self.nodes.faults.record(activation);
+            let restart_after_ns = self.nodes.config.restart_after_ns;
+            self.nodes.confine(port, at_ns, |node| node.leave_bus(at_ns, restart_after_ns));
+        } else {
+            self.nodes.stations[port].on_bus_from_ns = at_ns;
+            self.nodes.confine(port, at_ns, Confinement::come_back);
+        }
+        self.invalidate_traffic();
+    }
+}
+
+impl Bus for Port<'_> {
+    /// # Errors
+    /// [`SendError::QueueFull`] and [`SendError::BusOff`]; no other.
+    fn send(&mut self, now_ns: u64, frame: Frame) -> Result<(), SendError> {
+        let VirtualWire { nodes, queued: number, advanced_to_ns, .. } = self.wire;
+        let station = &mut nodes.stations[self.port];
+        let status = station.confinement.status();
+        if status.state == ErrorState::BusOff {
+            return Err(SendError::BusOff { tec: status.tec });
+        }
+        let numbered = NumberedFrame { at_ns: now_ns, port: self.port, id: frame.id(), number: *number };
+        let delay = nodes.faults.delays(numbered);
+        let queued_ns = now_ns.max(*advanced_to_ns) + delay.map_or(0, |(_, by_ns)| by_ns);
+        station.transmit.push(Queued::new(frame, nodes.config.bitrate, queued_ns))?;
+        if let Some((activation, _)) = delay {
+            nodes.faults.record(activation);
+        }
+        *number += 1;
+        self.wire.invalidate_traffic();
+        Ok(())
+    }
+
+    /// # Errors
+    /// [`ReceiveError::Overrun`] where frames were lost because the port's queue was full; no other.
+    fn receive(&mut self, now_ns: u64) -> Result<Option<Received>, ReceiveError> {
+        self.wire.nodes.stations[self.port].receive.pop(now_ns)
+    }
+
+    fn status(&self) -> BusStatus {
+        self.wire.nodes.stations[self.port].confinement.status()
+    }
+}

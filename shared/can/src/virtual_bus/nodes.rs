@@ -1,12 +1,18 @@
-//! The nodes of a simulated wire, and everything else that decides about the next transmission.
+//! The nodes of a simulated wire: which of them sends next, what comes of the transmission, and what its end changes.
+//!
+//! The next transmission is a function of the present state, so a caller can ask for it without changing the state.
 
-use super::confinement::Confinement;
-use super::queue::{ReceiveQueue, TransmitQueue};
-use crate::bus::{ErrorState, Received};
-use crate::error_frame::{ErrorKind, ErrorReport};
-use crate::faults::Faults;
-use crate::tap::Tapped;
-use crate::wire::{Bitrate, INTERFRAME_BITS};
+use super::controller::{Confinement, Queued, ReceiveQueue, TransmitQueue};
+use crate::faults::{FaultActivation, Faults, NumberedFrame};
+use crate::wire::{BEHIND_ACKNOWLEDGE_BITS, INTERFRAME_BITS, first_difference, frame_bits};
+use crate::{Bitrate, CanId, ErrorKind, ErrorReport, ErrorState, Frame, Received, Tapped, TappedFrame};
+
+const ERROR_FLAG_BITS: u32 = 6;
+const ERROR_DELIMITER_BITS: u32 = 8;
+/// A dominant bit behind the end of frame is answered one bit later by overload flags.
+const LATE_FLAG_BITS: u32 = 7;
+/// Pause of an error passive transmitter before it may send again, behind the interframe space.
+const SUSPEND_BITS: u32 = 8;
 
 /// What a wire is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,7 +38,7 @@ pub(super) struct Station {
     /// The time from which the node takes part on the bus, ns.
     pub(super) on_bus_from_ns: u64,
     /// A passive transmitter sends nothing before this time, ns.
-    pub(super) suspended_until_ns: u64,
+    suspended_until_ns: u64,
 }
 
 /// All nodes, their faults, and the state and the tap of the wire between them.
@@ -46,21 +52,116 @@ pub(super) struct Nodes {
     pub(super) transmissions: u64,
     pub(super) idle_from_ns: u64,
     /// Duration of the interframe space, ns.
-    pub(super) interframe_ns: u64,
+    interframe_ns: u64,
+}
+
+/// A set of ports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct PortSet(u64);
+
+impl PortSet {
+    /// Ports a wire may have.
+    pub(super) const CAPACITY: usize = u64::BITS as usize;
+
+    fn contains(self, port: usize) -> bool {
+        self.0 >> port & 1 == 1
+    }
+
+    fn add(&mut self, port: usize) {
+        self.0 |= 1 << port;
+    }
+
+    /// The ports behind that one.
+    fn above(self, port: usize) -> Self {
+        Self(self.0 & (u64::MAX - 1) << port)
+    }
+
+    fn iter(self) -> impl Iterator<Item = usize> {
+        let mut rest = self.0;
+        std::iter::from_fn(move || {
+            let port = rest.trailing_zeros() as usize;
+            rest &= rest.wrapping_sub(1);
+            (port < Self::CAPACITY).then_some(port)
+        })
+    }
+}
+
+/// A transmission of a frame, which stays queued until the transmission has ended.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Transmission {
+    frame: Frame,
+    queued_ns: u64,
+    pub(super) start_ns: u64,
+    /// When the last end-of-frame bit is, or would have been, over.
+    received_ns: u64,
+    /// End of the frame, or of the delimiter of the error frame, ns.
+    pub(super) end_ns: u64,
+    /// When the next frame may start.
+    idle_from_ns: u64,
+    arbitration: ArbitrationResult,
+    outcome: TransmissionOutcome,
+    activation: Option<FaultActivation>,
+}
+
+/// How a transmission ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum TransmissionOutcome {
+    /// All nodes receive the frame.
+    Received,
+    /// All nodes receive the frame, and the transmitter repeats it.
+    ReceivedAndRepeated,
+    /// An error frame ends the transmission.
+    Destroyed(ErrorKind),
+}
+
+/// The result of an arbitration: ports that send one identifier at once.
+#[derive(Debug, Clone, Copy, Default)]
+struct ArbitrationResult {
+    /// All ports with the same frame.
+    senders: PortSet,
+    /// The senders that babble.
+    babbling: PortSet,
+    /// Ports that sent another frame and detected the difference.
+    losers: PortSet,
+    /// The bit at which a difference destroys the frame.
+    destroyed_at: Option<u32>,
+}
+
+/// The frame that a port would send.
+#[derive(Clone, Copy)]
+struct Candidate {
+    port: usize,
+    queued: Queued,
+    babbles: Option<FaultActivation>,
+}
+
+impl Candidate {
+    fn id(&self) -> CanId {
+        self.queued.frame.id()
+    }
+}
+
+impl ArbitrationResult {
+    fn admit(&mut self, candidate: Candidate) {
+        self.senders.add(candidate.port);
+        if candidate.babbles.is_some() {
+            self.babbling.add(candidate.port);
+        }
+    }
 }
 
 impl Nodes {
     pub(super) fn new(config: &WireConfig, faults: Faults) -> Self {
-        let station = || Station {
+        let station = |_| Station {
             transmit: TransmitQueue::new(config.transmit_capacity),
             receive: ReceiveQueue::new(config.receive_capacity),
-            confinement: Confinement::new(),
+            confinement: Confinement::default(),
             on_bus_from_ns: 0,
             suspended_until_ns: 0,
         };
         Self {
             config: *config,
-            stations: (0..config.ports).map(|_| station()).collect(),
+            stations: (0..config.ports).map(station).collect(),
             faults,
             tap: ReceiveQueue::new(config.receive_capacity * config.ports),
             transmissions: 0,
@@ -70,9 +171,10 @@ impl Nodes {
     }
 
     /// Whether a port takes part in the traffic.
-    pub(super) fn is_on_bus(&self, port: usize, now_ns: u64) -> bool {
+    fn is_on_bus(&self, port: usize, now_ns: u64) -> bool {
         !self.stations[port].confinement.is_off() && !self.faults.is_disconnected(now_ns, port)
     }
+
     /// Changes a port's fault confinement. The tap gets a change of state, and a port that leaves the bus discards its queue.
     pub(super) fn confine(&mut self, port: usize, now_ns: u64, change: impl FnOnce(&mut Confinement)) {
         let station = &mut self.stations[port];
@@ -85,7 +187,247 @@ impl Nodes {
         let kind = ErrorKind::State(status.state);
         self.tap.push(now_ns, Tapped::Error(ErrorReport::new(now_ns, port as u8, kind, status)));
         if status.state == ErrorState::BusOff {
-            station.transmit.clear();
+            station.transmit.frames.clear();
         }
+    }
+
+    /// The next transmission if no other frame is queued until then.
+    pub(super) fn next_transmission(&self) -> Option<Transmission> {
+        let ports = self.candidate_ports();
+        // As soon as the bus is idle and a node has something to send.
+        let start_ns = ports.iter().filter_map(|port| self.ready_ns(port)).min()?;
+        let (arbitration, strongest) = self.arbitrate(ports, start_ns)?;
+        let Queued { frame, duration_ns, since_ns: queued_ns } = strongest.queued;
+        let (port, id, number) = (strongest.port, frame.id(), self.transmissions);
+        let numbered = NumberedFrame { at_ns: start_ns, port, id, number };
+        let end_ns = start_ns + duration_ns - self.interframe_ns;
+        let mut transmission = Transmission {
+            frame,
+            queued_ns,
+            start_ns,
+            received_ns: end_ns,
+            end_ns,
+            idle_from_ns: start_ns + duration_ns,
+            arbitration,
+            outcome: TransmissionOutcome::Received,
+            activation: strongest.babbles,
+        };
+        if let Some(bit) = arbitration.destroyed_at {
+            transmission.destroy(self, bit, ErrorKind::Bit);
+        } else if let Some(activation) = self.faults.corrupts(numbered) {
+            let last = frame_bits(&frame) - INTERFRAME_BITS;
+            let bit = 1 + self.faults.pick(activation, number, last);
+            transmission.activation = Some(activation);
+            transmission.destroy(self, bit, ErrorKind::Bit);
+        } else if !self.is_acknowledged(&transmission) {
+            let slot = frame_bits(&frame) - INTERFRAME_BITS - BEHIND_ACKNOWLEDGE_BITS;
+            transmission.destroy(self, slot, ErrorKind::Acknowledge);
+        } else if let Some(activation) = self.faults.duplicates(numbered) {
+            // The transmitter alone signals an error in the last bit of the frame.
+            transmission.activation = Some(activation);
+            transmission.outcome = TransmissionOutcome::ReceivedAndRepeated;
+            transmission.end_in_error_frame(self.config.bitrate, end_ns, LATE_FLAG_BITS);
+        }
+        Some(transmission)
+    }
+
+    /// The ports that may have a frame to send, now or later.
+    fn candidate_ports(&self) -> PortSet {
+        let mut ports = PortSet::default();
+        for (port, station) in self.stations.iter().enumerate() {
+            // A node that babbles needs no queue.
+            if !station.transmit.frames.is_empty() || !self.faults.is_empty() {
+                ports.add(port);
+            }
+        }
+        ports
+    }
+
+    /// When a port can next take part in an arbitration, if at all.
+    fn ready_ns(&self, port: usize) -> Option<u64> {
+        let station = &self.stations[port];
+        if station.confinement.is_off() {
+            return None;
+        }
+        let may_ns = station.suspended_until_ns.max(station.on_bus_from_ns).max(self.idle_from_ns);
+        let queued_ns = station.transmit.earliest_ns();
+        let sends_ns = queued_ns.map(|since_ns| self.faults.connected_from_ns(may_ns.max(since_ns), port));
+        let babbles_ns = self.faults.babbles_from_ns(may_ns, port);
+        let at_ns = sends_ns.unwrap_or(u64::MAX).min(babbles_ns.unwrap_or(u64::MAX));
+        (at_ns < u64::MAX).then_some(at_ns)
+    }
+
+    /// The frame that each of those ports would send at that time.
+    fn candidates(&self, ports: PortSet, start_ns: u64) -> impl Iterator<Item = Candidate> {
+        ports.iter().filter_map(move |port| {
+            let candidate = self.candidate(port, start_ns)?;
+            let may = self.stations[port].suspended_until_ns <= start_ns && self.is_on_bus(port, start_ns);
+            may.then_some(candidate)
+        })
+    }
+
+    fn candidate(&self, port: usize, start_ns: u64) -> Option<Candidate> {
+        let queued = self.stations[port].transmit.most_urgent(start_ns);
+        let queued = queued.map(|&queued| Candidate { port, queued, babbles: None });
+        match self.babbled(port, start_ns) {
+            Some(babbled) if queued.is_none_or(|queued| babbled.id() < queued.id()) => Some(babbled),
+            _ => queued,
+        }
+    }
+
+    fn babbled(&self, port: usize, start_ns: u64) -> Option<Candidate> {
+        let (activation, frame) = self.faults.makes_babble(start_ns, port)?;
+        let queued = Queued::new(frame, self.config.bitrate, start_ns);
+        Some(Candidate { port, queued, babbles: Some(activation) })
+    }
+
+    /// Whether a port that does not send the frame receives it.
+    fn is_acknowledged(&self, transmission: &Transmission) -> bool {
+        (0..self.stations.len())
+            .any(|port| !transmission.is_from(port) && self.is_on_bus(port, transmission.start_ns))
+    }
+
+    /// The lowest port with the most urgent identifier of all wins. The frames of later ports that send the same
+    /// identifier are compared with its frame; the result has the one that stays on the bus.
+    fn arbitrate(&self, ports: PortSet, start_ns: u64) -> Option<(ArbitrationResult, Candidate)> {
+        let winner = self.candidates(ports, start_ns).min_by_key(Candidate::id)?;
+        let (mut arbitration, mut strongest) = (ArbitrationResult::default(), winner);
+        arbitration.admit(winner);
+        let rivals = self.candidates(ports.above(winner.port), start_ns);
+        for rival in rivals.filter(|rival| rival.id() == winner.id()) {
+            let difference = first_difference(&strongest.queued.frame, &rival.queued.frame);
+            let Some(difference) = difference else {
+                arbitration.admit(rival);
+                continue;
+            };
+            let loser = if difference.first_is_dominant { rival } else { strongest };
+            if self.stations[loser.port].confinement.state() == ErrorState::Active {
+                arbitration.admit(rival);
+                arbitration.destroyed_at =
+                    Some(arbitration.destroyed_at.map_or(difference.bit, |bit| bit.min(difference.bit)));
+            } else if difference.first_is_dominant {
+                // A passive error flag is recessive: the dominant frame goes on.
+                arbitration.losers.add(rival.port);
+            } else {
+                arbitration.losers.0 |= arbitration.senders.0;
+                (arbitration.senders, arbitration.babbling) = (PortSet::default(), PortSet::default());
+                arbitration.admit(rival);
+                strongest = rival;
+            }
+        }
+        Some((arbitration, strongest))
+    }
+
+    /// Changes ports and tap by a transmission that has just ended.
+    pub(super) fn end_transmission(&mut self, transmission: &Transmission) {
+        self.idle_from_ns = transmission.idle_from_ns;
+        if let Some(activation) = transmission.activation {
+            self.faults.record(activation);
+        }
+        match transmission.outcome {
+            TransmissionOutcome::Received => self.complete(transmission),
+            TransmissionOutcome::ReceivedAndRepeated => {
+                self.deliver(transmission);
+                self.fail(transmission, ErrorKind::Bit);
+            }
+            TransmissionOutcome::Destroyed(kind) => self.fail(transmission, kind),
+        }
+        for (port, station) in self.stations.iter_mut().enumerate() {
+            if transmission.is_from(port) && station.confinement.state() == ErrorState::Passive {
+                let pause_ns = self.config.bitrate.bits_to_ns(SUSPEND_BITS);
+                station.suspended_until_ns = transmission.idle_from_ns + pause_ns;
+            }
+            station.confinement.saw_end(transmission.idle_from_ns);
+        }
+    }
+
+    /// The frame has arrived, and its senders are done with it.
+    fn complete(&mut self, transmission: &Transmission) {
+        let &Transmission { arbitration, end_ns, .. } = transmission;
+        self.deliver(transmission);
+        for port in 0..self.stations.len() {
+            if arbitration.senders.contains(port) {
+                self.confine(port, end_ns, Confinement::transmitted);
+                if !arbitration.babbling.contains(port) {
+                    self.stations[port].transmit.remove_most_urgent(transmission.start_ns);
+                }
+            } else if arbitration.losers.contains(port) {
+                let restart_after_ns = self.config.restart_after_ns;
+                self.confine(port, end_ns, |node| node.transmit_error(end_ns, restart_after_ns));
+            }
+        }
+    }
+
+    /// Delivers the frame to all receivers.
+    fn deliver(&mut self, transmission: &Transmission) {
+        let &Transmission { frame, queued_ns, start_ns, received_ns: time_ns, .. } = transmission;
+        let tapped = TappedFrame { frame, time_ns, queued_ns: Some(queued_ns) };
+        self.tap.push(time_ns, Tapped::Frame(tapped));
+        for port in 0..self.stations.len() {
+            if transmission.is_from(port) || !self.is_on_bus(port, start_ns) {
+                continue;
+            }
+            self.confine(port, time_ns, Confinement::received);
+            // Every receiver has numbers of its own, so receivers lose frames independently.
+            let number = self.transmissions ^ (port as u64 + 1) << 48;
+            if !self.faults.loses(NumberedFrame { at_ns: start_ns, port, id: frame.id(), number }) {
+                self.stations[port].receive.push(time_ns, Received { frame, time_ns });
+            }
+        }
+    }
+
+    /// An error frame has ended the transmission; the frame stays queued, to be sent again.
+    fn fail(&mut self, transmission: &Transmission, kind: ErrorKind) {
+        let is_received = transmission.outcome == TransmissionOutcome::ReceivedAndRepeated;
+        for port in 0..self.stations.len() {
+            if transmission.is_from(port) {
+                self.fail_to_send(transmission, port, kind);
+            } else if !is_received && self.is_on_bus(port, transmission.start_ns) {
+                self.confine(port, transmission.end_ns, Confinement::receive_error);
+            }
+        }
+    }
+
+    /// Counts the error at a sender. The tap gets the error frame once, with the counters of the first sender after
+    /// the error, and before the resulting change of state.
+    fn fail_to_send(&mut self, transmission: &Transmission, port: usize, kind: ErrorKind) {
+        let (now_ns, restart_after_ns) = (transmission.end_ns, self.config.restart_after_ns);
+        let count = |node: &mut Confinement| match kind {
+            ErrorKind::Acknowledge => node.unacknowledged(now_ns, restart_after_ns),
+            _ => node.transmit_error(now_ns, restart_after_ns),
+        };
+        if !(0..port).any(|other| transmission.is_from(other)) {
+            let mut counted = self.stations[port].confinement;
+            count(&mut counted);
+            let report = ErrorReport::new(now_ns, port as u8, kind, counted.status());
+            self.tap.push(now_ns, Tapped::Error(report));
+        }
+        self.confine(port, now_ns, count);
+    }
+}
+
+impl Transmission {
+    /// Whether the port sent that identifier. A loser has signalled an error and does not receive the frame.
+    fn is_from(&self, port: usize) -> bool {
+        self.arbitration.senders.contains(port) || self.arbitration.losers.contains(port)
+    }
+
+    /// An error flag begins behind bit number `bit` of the frame.
+    fn destroy(&mut self, nodes: &Nodes, bit: u32, kind: ErrorKind) {
+        let is_echoed = (0..nodes.stations.len()).any(|port| {
+            !self.arbitration.senders.contains(port)
+                && nodes.is_on_bus(port, self.start_ns)
+                && nodes.stations[port].confinement.state() == ErrorState::Active
+        });
+        let flag_bits = if is_echoed { 2 * ERROR_FLAG_BITS } else { ERROR_FLAG_BITS };
+        let bitrate = nodes.config.bitrate;
+        self.end_in_error_frame(bitrate, self.start_ns + bitrate.bits_to_ns(bit), flag_bits);
+        self.outcome = TransmissionOutcome::Destroyed(kind);
+    }
+
+    fn end_in_error_frame(&mut self, bitrate: Bitrate, error_ns: u64, flag_bits: u32) {
+        let bits = flag_bits + ERROR_DELIMITER_BITS;
+        self.end_ns = error_ns + bitrate.bits_to_ns(bits);
+        self.idle_from_ns = error_ns + bitrate.bits_to_ns(bits + INTERFRAME_BITS);
     }
 }

@@ -3,13 +3,10 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::bus::{BusStatus, ReceiveError, Received, SendError};
-use crate::conformance::{self, End, Pair};
-use crate::error_frame::{ErrorKind, ErrorReport};
-use crate::frame::Frame;
-use crate::tap::Tapped;
-use crate::wire::{Bitrate, INTERFRAME_BITS, frame_bits};
-use crate::{Bus, CanId, canopen::sync};
+use crate::canopen::sync;
+use crate::laws::{self, End, Pair};
+use crate::wire::{INTERFRAME_BITS, frame_bits};
+use crate::{Bitrate, CanId, ErrorKind, ErrorReport};
 
 mod errors;
 mod injected;
@@ -201,7 +198,7 @@ impl Pair for TwoPorts {
         self.now_ns
     }
 
-    fn settle(&mut self) {
+    fn wait_for_arrivals(&mut self) {
         while let Some(event_ns) = self.wire.next_event_ns() {
             self.wire.advance(event_ns);
             self.now_ns = event_ns;
@@ -212,8 +209,8 @@ impl Pair for TwoPorts {
 #[test]
 fn the_wire_conforms() {
     let new = || TwoPorts { wire: wire(), now_ns: 0 };
-    assert_eq!(conformance::check(new), Ok(()));
-    assert_eq!(conformance::check_arbitration(new), Ok(()));
+    assert_eq!(laws::check_every_law(new), Ok(()));
+    assert_eq!(laws::check_arbitration(new), Ok(()));
 }
 
 proptest! {

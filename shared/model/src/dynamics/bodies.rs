@@ -1,10 +1,10 @@
-//! The rigid bodies: their masses, centres of mass and inertias.
+//! The rigid bodies: their masses, centres of mass and inertias; their motion with all that kinematics makes of it; and their
+//! mechanical energy.
 
-use nalgebra::{Matrix3, Vector6};
+use nalgebra::{Matrix3, Vector3, Vector6};
 
-use super::Motion;
 use super::parameters::DynamicsConfig;
-use crate::geometry::{LEGS, Vec3};
+use crate::geometry::{InverseError, Jacobian, LEGS, Legs, Mechanism, Pose, Twist, Vec3};
 
 /// A part of a leg that turns with its hinge. Its centre of mass lies on the leg's axis, and the slide's direction û is a
 /// principal axis of its inertia.
@@ -86,7 +86,7 @@ impl Bodies {
     }
 
     /// Carriage, cylinder and rod, kg.
-    pub(super) fn slide_kg(&self) -> f64 {
+    fn slide_kg(&self) -> f64 {
         self.carriage_kg + self.cylinder.mass_kg + self.rod.mass_kg
     }
 
@@ -96,12 +96,12 @@ impl Bodies {
     }
 
     /// Cylinder's and rod's mass by the distance of the centre from the hinge, kg m.
-    pub(super) fn leg_moment_kg_m(&self, leg_m: f64) -> f64 {
+    fn leg_moment_kg_m(&self, leg_m: f64) -> f64 {
         self.cylinder.mass_kg * self.cylinder.centre_m + self.rod.mass_kg * self.rod_from_hinge_m(leg_m)
     }
 
     /// Inertia of cylinder and rod about the hinge, kg m².
-    pub(super) fn leg_inertia_kg_m2(&self, leg_m: f64) -> f64 {
+    fn leg_inertia_kg_m2(&self, leg_m: f64) -> f64 {
         let about_hinge = |link: &Link, arm_m: f64| link.inertia_kg_m2 + link.mass_kg * arm_m * arm_m;
         about_hinge(&self.cylinder, self.cylinder.centre_m)
             + about_hinge(&self.rod, self.rod_from_hinge_m(leg_m))
@@ -123,5 +123,123 @@ impl Bodies {
                     + self.gravity_m_s2 * self.leg_moment_kg_m(leg_m) * cos,
             ],
         }
+    }
+}
+
+/// A motion of the mechanism at an instant: positions and rates of platform and joints.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion {
+    /// The platform in the base frame.
+    pub pose: Pose,
+    /// Twist V of the platform's origin, base axes, m/s and rad/s.
+    pub twist: Twist,
+    /// Positions of slides and legs, and the legs' directions.
+    pub legs: Legs,
+    /// Joint rates as linear functions of the twist.
+    pub jacobian: Jacobian,
+    /// Rates of the axes d₁ d₂ d₃ l₁ l₂ l₃, m/s.
+    pub rates_m_s: Vector6<f64>,
+    /// Rates of the hinges θ₁ θ₂ θ₃, rad/s.
+    pub swings_rad_s: Vector3<f64>,
+    /// J̇V: the joints' accelerations while the twist stays constant.
+    pub bias: JointAccelerations,
+}
+
+/// Accelerations of the joints.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct JointAccelerations {
+    /// Of the axes d₁ d₂ d₃ l₁ l₂ l₃, m/s².
+    pub axes_m_s2: Vector6<f64>,
+    /// Of the hinges θ₁ θ₂ θ₃, rad/s².
+    pub hinges_rad_s2: Vector3<f64>,
+}
+
+impl Motion {
+    /// The motion at a pose and a twist of the platform.
+    ///
+    /// # Errors
+    /// [`InverseError`] for a pose without joint coordinates.
+    pub fn new(mechanism: &Mechanism, pose: &Pose, twist: &Twist) -> Result<Self, InverseError> {
+        let legs = mechanism.legs(pose)?;
+        let jacobian = Jacobian::of_legs(mechanism, &legs);
+        let (rates_m_s, swings_rad_s) = (jacobian.actuators * twist, jacobian.hinges * twist);
+        let bias = JointAccelerations::default();
+        let mut motion = Self { pose: *pose, twist: *twist, legs, jacobian, rates_m_s, swings_rad_s, bias };
+        motion.bias = motion.constant_twist_accelerations();
+        Ok(motion)
+    }
+
+    /// Accelerations of the joints while the twist changes by that much a second, m/s² and rad/s²: J V̇ + J̇V.
+    pub fn accelerations(&self, acceleration: &Twist) -> JointAccelerations {
+        JointAccelerations {
+            axes_m_s2: self.jacobian.actuators * acceleration + self.bias.axes_m_s2,
+            hinges_rad_s2: self.jacobian.hinges * acceleration + self.bias.hinges_rad_s2,
+        }
+    }
+
+    /// The platform's angular velocity ω in base axes, rad/s.
+    pub(super) fn omega(&self) -> Vec3 {
+        self.twist.fixed_rows::<3>(3).into()
+    }
+
+    /// Under a constant twist a corner is accelerated by ω×(ω×r) alone. Slide and leg see their component of this vector,
+    /// the leg also the centrifugal lθ̇², the hinge the Coriolis −2l̇θ̇/l. The first three columns of a row of the Jacobian
+    /// are the direction to project on.
+    fn constant_twist_accelerations(&self) -> JointAccelerations {
+        let (omega, mut bias) = (self.omega(), self.bias);
+        let along_axes = self.jacobian.actuators.fixed_columns::<3>(0);
+        let about_hinges = self.jacobian.hinges.fixed_columns::<3>(0);
+        for (leg, arm) in self.legs.arms_m.iter().enumerate() {
+            let corner = omega.cross(&omega.cross(arm));
+            let (leg_m, swing) = (self.legs.actuators.leg_m[leg], self.swings_rad_s[leg]);
+            let stretch = self.rates_m_s[LEGS + leg];
+            bias.axes_m_s2[leg] = (along_axes.row(leg) * corner).x;
+            bias.axes_m_s2[LEGS + leg] = (along_axes.row(LEGS + leg) * corner).x + leg_m * swing * swing;
+            bias.hinges_rad_s2[leg] = (about_hinges.row(leg) * corner).x - 2.0 * stretch * swing / leg_m;
+        }
+        bias
+    }
+}
+
+/// Energy of all bodies, J.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Energy {
+    /// Energy of motion, J.
+    pub kinetic_j: f64,
+    /// Energy of height; 0 with every centre of mass in the base plane, J.
+    pub potential_j: f64,
+}
+
+impl Energy {
+    /// The energy of bodies in a motion, body by body.
+    pub fn new(bodies: &Bodies, motion: &Motion) -> Self {
+        let mut energy = Self::of_platform(bodies, motion);
+        for leg in 0..LEGS {
+            let leg_m = motion.legs.actuators.leg_m[leg];
+            let rates = [motion.rates_m_s[leg], motion.rates_m_s[LEGS + leg], motion.swings_rad_s[leg]];
+            let masses = [bodies.slide_kg(), bodies.rod.mass_kg, bodies.leg_inertia_kg_m2(leg_m)];
+            let squares = masses.iter().zip(rates).map(|(mass, rate)| mass * rate * rate);
+            energy.kinetic_j += 0.5 * squares.sum::<f64>();
+            let (sin, _) = motion.legs.sin_cos[leg];
+            energy.potential_j += bodies.gravity_m_s2 * bodies.leg_moment_kg_m(leg_m) * sin;
+        }
+        energy
+    }
+
+    /// Kinetic and potential energy together, J.
+    pub fn total_j(&self) -> f64 {
+        self.kinetic_j + self.potential_j
+    }
+
+    fn of_platform(bodies: &Bodies, motion: &Motion) -> Self {
+        let platform = &bodies.platform;
+        let (rotation, omega) = (motion.pose.rotation, motion.omega());
+        let centre = rotation * platform.centre_m;
+        let velocity = Vec3::from(motion.twist.fixed_rows::<3>(0)) + omega.cross(&centre);
+        let turn = rotation.inverse() * omega;
+        let kinetic_j =
+            0.5 * (platform.mass_kg * velocity.norm_squared() + turn.dot(&(platform.inertia_kg_m2 * turn)));
+        let height_m = motion.pose.translation.z + centre.z;
+        Self { kinetic_j, potential_j: platform.mass_kg * bodies.gravity_m_s2 * height_m }
     }
 }

@@ -1,9 +1,10 @@
-//! The equations of motion M V̇ + h = Jᵀ τ + w at one instant, and their two solutions.
+//! The equations of motion M V̇ + h = Jᵀ τ + w at one instant, their two solutions, and the forces and moments that the joints
+//! of each leg carry.
 
 use nalgebra::{Matrix3, Matrix6, Vector6};
 
-use super::bodies::LegEquations;
-use super::{Bodies, Motion};
+use super::bodies::{Bodies, JointAccelerations, LegEquations, Link, Motion};
+use super::friction::Loads;
 use crate::geometry::{LEGS, Twist, Vec3};
 
 /// The equations of motion at a pose and a twist of the platform.
@@ -50,7 +51,7 @@ impl Equations {
             // A row of the Jacobian is (d, arm × d), so a leg acts as a body in its ball.
             sums.add_at(&motion.legs.arms_m[leg], &inertia, &force);
         }
-        Self { mass: sums.mass(), bias: sums.bias(), actuators: motion.jacobian.actuators }
+        sums.into_equations(motion.jacobian.actuators)
     }
 
     /// The platform's acceleration V̇ (m/s², rad/s²) under forces of the axes (N) and a wrench on the platform. None where
@@ -115,17 +116,118 @@ impl Sums {
         self.moment += arm.cross(force);
     }
 
-    fn mass(&self) -> Matrix6<f64> {
+    fn into_equations(self, actuators: Matrix6<f64>) -> Equations {
+        let Self { linear, coupling, angular, force, moment } = self;
         let mut mass = Matrix6::zeros();
-        mass.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.linear);
-        mass.fixed_view_mut::<3, 3>(3, 0).copy_from(&self.coupling);
-        mass.fixed_view_mut::<3, 3>(0, 3).copy_from(&self.coupling.transpose());
-        mass.fixed_view_mut::<3, 3>(3, 3).copy_from(&self.angular);
-        mass
+        mass.fixed_view_mut::<3, 3>(0, 0).copy_from(&linear);
+        mass.fixed_view_mut::<3, 3>(3, 0).copy_from(&coupling);
+        mass.fixed_view_mut::<3, 3>(0, 3).copy_from(&coupling.transpose());
+        mass.fixed_view_mut::<3, 3>(3, 3).copy_from(&angular);
+        let bias = Vector6::new(force.x, force.y, force.z, moment.x, moment.y, moment.z);
+        Equations { mass, bias, actuators }
+    }
+}
+
+/// A force and a moment at a leg's hinge, in the leg's axes: û along the slide, v̂ inward, ẑ up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointWrench {
+    /// Force along û, v̂, ẑ, N.
+    pub force_n: Vec3,
+    /// Moment about û, v̂, ẑ, for the point of the hinge, N m.
+    pub moment_nm: Vec3,
+}
+
+/// What the joints of a leg carry.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LegReactions {
+    /// Force of the rod on the platform at the ball, along û, v̂, ẑ, N.
+    pub ball_n: Vec3,
+    /// Of the cylinder on the rod, the force of the leg's axis along the rod included.
+    pub rod: JointWrench,
+    /// Of the carriage on the cylinder; the hinge has no moment about û.
+    pub hinge: JointWrench,
+    /// Of the base on the carriage. Its force along û is that of the slide's axis; the guide carries the rest.
+    pub guide: JointWrench,
+}
+
+/// What the joints of all legs carry.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reactions {
+    /// Legs 1, 2, 3.
+    pub legs: [LegReactions; LEGS],
+}
+
+impl Reactions {
+    /// The reactions in a motion in which the platform has an acceleration V̇ (m/s², rad/s²) under these forces of the axes
+    /// (N): those of [`Equations::inverse`], or those that [`forward`](Equations::forward)
+    /// made the acceleration of. Friction of an axis is a part of its force.
+    pub fn new(bodies: &Bodies, motion: &Motion, acceleration: &Twist, force_n: &Vector6<f64>) -> Self {
+        Self::of_joints(bodies, motion, &motion.accelerations(acceleration), force_n)
     }
 
-    fn bias(&self) -> Vector6<f64> {
-        let (force, moment) = (&self.force, &self.moment);
-        Vector6::new(force.x, force.y, force.z, moment.x, moment.y, moment.z)
+    /// The same where the joints' accelerations are known.
+    pub fn of_joints(
+        bodies: &Bodies,
+        motion: &Motion,
+        accelerations: &JointAccelerations,
+        force_n: &Vector6<f64>,
+    ) -> Self {
+        let (axes, hinges) = (&accelerations.axes_m_s2, &accelerations.hinges_rad_s2);
+        let legs = std::array::from_fn(|leg| {
+            let joints = [axes[leg], axes[LEGS + leg], hinges[leg]];
+            LegReactions::new(bodies, motion, leg, joints, [force_n[leg], force_n[LEGS + leg]])
+        });
+        Self { legs }
+    }
+
+    /// What friction depends on, with the forces of the axes (N) that these reactions are of.
+    pub fn loads(&self, force_n: &Vector6<f64>) -> Loads {
+        let across = |load: &Vec3| load.yz().norm();
+        Loads {
+            guide_n: self.legs.map(|leg| across(&leg.guide.force_n)),
+            guide_nm: self.legs.map(|leg| across(&leg.guide.moment_nm)),
+            screw_n: force_n.abs().into(),
+            hinge_n: self.legs.map(|leg| leg.hinge.force_n.norm()),
+            ball_n: self.legs.map(|leg| leg.ball_n.norm()),
+        }
+    }
+}
+
+impl LegReactions {
+    /// By Newton and Euler from the ball down to the guide, with accelerations in the order d, l, θ and the forces of the
+    /// leg's two axes, N.
+    fn new(bodies: &Bodies, motion: &Motion, leg: usize, accelerations: [f64; 3], axes_n: [f64; 2]) -> Self {
+        let [slide_m_s2, stretch_m_s2, swing_rad_s2] = accelerations;
+        let (leg_m, (sin, cos)) = (motion.legs.actuators.leg_m[leg], motion.legs.sin_cos[leg]);
+        let (stretch_m_s, swing_rad_s) = (motion.rates_m_s[LEGS + leg], motion.swings_rad_s[leg]);
+        let (along, across) = (Vec3::new(0.0, cos, sin), Vec3::new(0.0, -sin, cos));
+        let carried_m_s2 = Vec3::new(slide_m_s2, 0.0, bodies.gravity_m_s2);
+        // What a link needs to move so against its weight, with its centre at a distance from the hinge that grows at a speed
+        // and with an acceleration along the leg.
+        let needed_by = |link: &Link, arm_m: f64, speed_m_s: f64, acceleration_m_s2: f64| {
+            let acceleration = carried_m_s2
+                + along * (acceleration_m_s2 - arm_m * swing_rad_s * swing_rad_s)
+                + across * (arm_m * swing_rad_s2 + 2.0 * speed_m_s * swing_rad_s);
+            let force_n = acceleration * link.mass_kg;
+            let turn_nm = Vec3::x() * (link.inertia_kg_m2 * swing_rad_s2);
+            JointWrench { force_n, moment_nm: (along * arm_m).cross(&force_n) + turn_nm }
+        };
+        let LegEquations { masses, bias } = bodies.leg(motion, leg);
+        let inertial = |place: usize, joint: f64| masses[place] * joint + bias[place];
+        let ball_n = Vec3::x() * (axes_n[0] - inertial(0, slide_m_s2))
+            + along * (axes_n[1] - inertial(1, stretch_m_s2))
+            - across * (inertial(2, swing_rad_s2) / leg_m);
+        let at_ball = JointWrench { force_n: ball_n, moment_nm: (along * leg_m).cross(&ball_n) };
+        let rod_m = bodies.rod_from_hinge_m(leg_m);
+        let rod = needed_by(&bodies.rod, rod_m, stretch_m_s, stretch_m_s2).with(&at_ball);
+        let hinge = needed_by(&bodies.cylinder, bodies.cylinder.centre_m, 0.0, 0.0).with(&rod);
+        let guide = JointWrench { force_n: hinge.force_n + carried_m_s2 * bodies.carriage_kg, ..hinge };
+        Self { ball_n, rod, hinge, guide }
+    }
+}
+
+impl JointWrench {
+    fn with(self, other: &Self) -> Self {
+        Self { force_n: self.force_n + other.force_n, moment_nm: self.moment_nm + other.moment_nm }
     }
 }

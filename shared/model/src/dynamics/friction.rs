@@ -5,7 +5,7 @@
 
 use nalgebra::Matrix6;
 
-use super::Motion;
+use super::bodies::Motion;
 use super::parameters::{DynamicsConfig, FrictionConfig, FrictionModel};
 use crate::geometry::{AXES, LEGS};
 
@@ -70,26 +70,15 @@ pub struct Friction {
 impl Friction {
     /// The friction that a scenario describes.
     pub fn new(dynamics: &DynamicsConfig) -> Self {
+        let mut config = dynamics.friction;
+        if config.model == FrictionModel::None {
+            (config.guide_coefficient, config.joint_coefficient) = (0.0, 0.0);
+            (config.slide_screw_efficiency, config.leg_screw_efficiency) = (1.0, 1.0);
+            return Self { config, unloaded_n: [0.0; AXES], viscous_n_s_per_m: 0.0 };
+        }
         let share = |axis: usize| if axis < LEGS { 1.0 } else { LEG_SHARE };
-        if dynamics.friction.model == FrictionModel::None {
-            return Self::none(&dynamics.friction);
-        }
-        Self {
-            config: dynamics.friction,
-            unloaded_n: std::array::from_fn(|axis| dynamics.slide_friction_n * share(axis)),
-            viscous_n_s_per_m: dynamics.viscous_friction_n_s_per_m,
-        }
-    }
-
-    fn none(config: &FrictionConfig) -> Self {
-        let config = FrictionConfig {
-            guide_coefficient: 0.0,
-            slide_screw_efficiency: 1.0,
-            leg_screw_efficiency: 1.0,
-            joint_coefficient: 0.0,
-            ..*config
-        };
-        Self { config, unloaded_n: [0.0; AXES], viscous_n_s_per_m: 0.0 }
+        let unloaded_n = std::array::from_fn(|axis| dynamics.slide_friction_n * share(axis));
+        Self { config, unloaded_n, viscous_n_s_per_m: dynamics.viscous_friction_n_s_per_m }
     }
 
     /// Coulomb friction of the axes d₁ d₂ d₃ l₁ l₂ l₃, N: seals, screws, and for slides the guides,

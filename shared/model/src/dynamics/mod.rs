@@ -41,20 +41,14 @@
 //! ```
 
 mod bodies;
-mod energy;
 mod equations;
 mod friction;
-mod motion;
 mod parameters;
-mod reactions;
 
-pub use bodies::{Bodies, Link, Platform};
-pub use energy::Energy;
-pub use equations::Equations;
+pub use bodies::{Bodies, Energy, JointAccelerations, Link, Motion, Platform};
+pub use equations::{Equations, JointWrench, LegReactions, Reactions};
 pub use friction::{Friction, Loads};
-pub use motion::{JointAccelerations, Motion};
 pub use parameters::{AxesConfig, DynamicsConfig, FrictionConfig, FrictionModel};
-pub use reactions::{JointWrench, LegReactions, Reactions};
 
 #[cfg(test)]
 mod tests;

@@ -224,13 +224,13 @@ impl Mechanism {
         self.resolve(&self.corners_at(pose), |_, _, _| {})
     }
 
-    /// Slides and legs for the corners in the base frame. `take` gets each leg: its number, its reach upwards and inwards, and
+    /// Slides and legs for the corners in the base frame. `set_leg` gets each leg: its number, its reach upwards and inwards, and
     /// its length, m.
     #[inline]
     fn resolve(
         &self,
         corners: &[Vec3; LEGS],
-        mut take: impl FnMut(usize, [f64; 2], f64),
+        mut set_leg: impl FnMut(usize, [f64; 2], f64),
     ) -> Result<Actuators, InverseError> {
         let mut actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [0.0; LEGS] };
         for (leg, corner) in corners.iter().enumerate() {
@@ -247,7 +247,7 @@ impl Mechanism {
             }
             actuators.slide_m[leg] = from_centre.dot(&slide.along);
             actuators.leg_m[leg] = leg_m;
-            take(leg, [from_centre.z, horizontal], leg_m);
+            set_leg(leg, [from_centre.z, horizontal], leg_m);
         }
         Ok(actuators)
     }

@@ -1,18 +1,19 @@
 //! The seam between the rig and a controller: the trait, the order of a cycle, and a controller's part in a run.
 //!
-//! A [`Controller`] is a pure step function. Only [`run_cycle`] orders a cycle. [`Session::run`] calls it in
+//! A [`Controller`] is a pure step function. Only [`run_cycle`] orders a cycle, for every clock. [`Session::run`] calls it in
 //! real time and in lockstep; the runner of virtual time calls it in one thread. Kinematics, trajectories and safety of a
 //! particular controller are not here.
 
-mod cycle;
-mod operator;
 mod session;
 
-use crate::messages::{Command, Event, Reading, State};
-use crate::named::Declared;
+use std::borrow::Borrow;
 
-pub use cycle::{ControllerPorts, Duties, run_cycle, set_parameters};
-pub use operator::{Operator, OperatorError, is_seen_by_controller};
+use crate::injection::{Due, Injected, begin_event};
+use crate::messages::{Command, Event, Parameters, Reading, Signals, State};
+use crate::named::{Change, Declared, NamedValues};
+use crate::realtime::Wake;
+
+pub use crate::injection::{Operator, OperatorError, is_seen_by_controller};
 pub use session::{Session, SessionError, Waited};
 
 /// A cycle's place in time.
@@ -112,4 +113,169 @@ pub trait Controller {
 
     /// Does work of the next cycle once in advance and without effect, so that its code and data are in the caches.
     fn warm_up(&self) {}
+}
+
+/// The source and the destinations of a controller's messages, and the clock of its stamps.
+pub trait ControllerPorts {
+    /// A reading, owned or in shared memory.
+    type Reading: Borrow<Reading>;
+    /// Why a message could not be exchanged.
+    type Error;
+
+    /// Now, ns.
+    fn now_ns(&self) -> u64;
+
+    /// The reading of this cycle, or the newest reading when a longer wait would miss the deadline.
+    ///
+    /// # Errors
+    /// When the messages cannot be received.
+    fn reading(&mut self, wake: &Wake) -> Result<Option<Self::Reading>, Self::Error>;
+
+    /// Publishes the command that `fill` writes.
+    ///
+    /// # Errors
+    /// When the message cannot be sent.
+    fn publish_command(&mut self, fill: impl FnOnce(&mut Command)) -> Result<(), Self::Error>;
+
+    /// Publishes the state that `fill` writes.
+    ///
+    /// # Errors
+    /// When the message cannot be sent.
+    fn publish_state(&mut self, fill: impl FnOnce(&mut State)) -> Result<(), Self::Error>;
+
+    /// Publishes the signals that `fill` writes.
+    ///
+    /// # Errors
+    /// When the message cannot be sent.
+    fn publish_signals(&mut self, fill: impl FnOnce(&mut Signals)) -> Result<(), Self::Error>;
+
+    /// Publishes the parameters that `fill` writes.
+    ///
+    /// # Errors
+    /// When the message cannot be sent.
+    fn publish_parameters(&mut self, fill: impl FnOnce(&mut Parameters)) -> Result<(), Self::Error>;
+
+    /// Publishes an event.
+    ///
+    /// # Errors
+    /// When the message cannot be sent.
+    fn publish_event(&mut self, event: &Event) -> Result<(), Self::Error>;
+
+    /// A fault of a process, with its place in the scenario's list, is due. Without processes there is nothing to do.
+    ///
+    /// # Errors
+    /// When the supervisor is gone.
+    fn fault_is_due(&mut self, _fault: usize) -> Result<(), Self::Error> {
+        Ok(())
+    }
+}
+
+/// What accompanies a controller through a run: the values of its named numbers, and the operator of the scenario.
+#[derive(Debug)]
+pub struct Duties {
+    /// The signals and parameters.
+    pub named: NamedValues,
+    /// Who sets parameters and asks for a stop.
+    pub operator: Operator,
+}
+
+/// Runs one cycle: reading, decision, command; then state, signals, parameters and events, which no other loop waits for.
+///
+/// ```
+/// use masseter_runtime::control::{Controller, ControllerPorts, Duties, run_cycle};
+/// use masseter_runtime::realtime::Wake;
+///
+/// /// A second at 1 kHz, in simulated time.
+/// fn run_second<P: ControllerPorts>(
+///     controller: &mut dyn Controller,
+///     duties: &mut Duties,
+///     ports: &mut P,
+/// ) -> Result<(), P::Error> {
+///     for cycle in 1..=1000 {
+///         run_cycle(controller, duties, ports, &Wake::on_time(cycle, (cycle - 1) * 1_000_000 + 540_000))?;
+///     }
+///     Ok(())
+/// }
+/// ```
+///
+/// # Errors
+/// Those of the ports.
+pub fn run_cycle<P: ControllerPorts>(
+    controller: &mut dyn Controller,
+    Duties { named, operator }: &mut Duties,
+    ports: &mut P,
+    wake: &Wake,
+) -> Result<(), P::Error> {
+    let reading = ports.reading(wake)?;
+    let received_ns = ports.now_ns();
+    let due = operator.take_due(reading.as_ref().map(|reading| reading.borrow().sampled_ns));
+    match due {
+        Some((_, Due::Set { place, value })) => named.settings().store(place, value),
+        Some((_, Due::Stop)) => controller.request_stop(),
+        Some((_, Due::Fault(fault))) => ports.fault_is_due(fault)?,
+        None => {}
+    }
+    let change = named.take_change();
+    if let Some(change) = &change {
+        controller.set_parameter(change.place, change.to);
+    }
+    controller.observe(reading.as_ref().map(Borrow::borrow));
+    let solved_ns = ports.now_ns();
+    let event = controller.decide(Tick { cycle: wake.cycle, now_ns: solved_ns });
+    let commanded_ns = ports.now_ns();
+    ports.publish_command(|command| controller.fill_command(command))?;
+    ports.publish_state(|state| {
+        controller.fill_state(state);
+        operator.note_state(state.controller_state);
+        complete_state(state, wake, [received_ns, solved_ns, commanded_ns]);
+    })?;
+    controller.fill_signals(named.signals_mut());
+    let tick = Tick { cycle: wake.cycle, now_ns: commanded_ns };
+    publish_named(named, change, ports, tick)?;
+    publish_begin(due, ports, tick)?;
+    event.map_or(Ok(()), |event| ports.publish_event(&event))
+}
+
+/// Gives a controller the values of its parameters at the start.
+pub fn set_parameters(controller: &mut dyn Controller, named: &NamedValues) {
+    named.parameters().iter().enumerate().for_each(|(place, value)| controller.set_parameter(place, *value));
+}
+
+/// Publishes the signals of a cycle, and its change of a parameter.
+fn publish_named<P: ControllerPorts>(
+    named: &mut NamedValues,
+    change: Option<Change>,
+    ports: &mut P,
+    Tick { cycle, now_ns }: Tick,
+) -> Result<(), P::Error> {
+    if let Some(signals) = named.signals() {
+        ports.publish_signals(|message| *message = Signals { cycle, signals, ..Signals::default() })?;
+    }
+    if let Some(parameters) = named.take_changed_parameters() {
+        ports.publish_parameters(|message| {
+            *message = Parameters { cycle, parameters, ..Parameters::default() }
+        })?;
+    }
+    change.map_or(Ok(()), |change| ports.publish_event(&change.event(cycle, now_ns)))
+}
+
+/// Reports a stimulus that began in a cycle.
+fn publish_begin<P: ControllerPorts>(
+    due: Option<(Injected, Due)>,
+    ports: &mut P,
+    Tick { cycle, now_ns }: Tick,
+) -> Result<(), P::Error> {
+    let event = due.and_then(|(injected, _)| begin_event(injected, cycle, now_ns));
+    event.map_or(Ok(()), |event| ports.publish_event(&event))
+}
+
+/// Makes a state ready to be published: rounds its figures, and enters the use of time and the cycle's times, when the reading
+/// was received, the pose was found, and the command was ready.
+fn complete_state(state: &mut State, wake: &Wake, [received_ns, solved_ns, commanded_ns]: [u64; 3]) {
+    (state.due_ns, state.woke_ns) = (wake.due_ns, wake.woke_ns);
+    (state.received_ns, state.solved_ns, state.commanded_ns) = (received_ns, solved_ns, commanded_ns);
+    (state.skipped_cycles, state.stalled_ns) = (wake.skipped, wake.account.stalled_ns);
+    (state.spun_ns, state.worked_ns) = (wake.account.spun_ns, wake.account.worked_ns);
+    state.overlong_ns = wake.account.overlong_ns;
+    state.round();
 }

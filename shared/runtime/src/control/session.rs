@@ -4,10 +4,12 @@ use std::time::Duration;
 
 use masseter_scenario::input::sentence;
 
-use super::cycle::{complete, publish_begin, publish_named, set_parameters};
-use super::operator::{Due, Operator};
-use super::{Controller, ControllerPorts, Duties, Outcome, Tick, run_cycle};
+use super::{
+    Controller, ControllerPorts, Duties, Outcome, Tick, complete_state, publish_begin, publish_named,
+    run_cycle, set_parameters,
+};
 use crate::clock;
+use crate::injection::{Due, Operator};
 use crate::lifecycle::{End, Party, ProcessContext, ProcessError, Report, SupervisorLink};
 use crate::lockstep::{Clock, Lockstep};
 use crate::messages::{Command, Event, Parameters, Reading, Signals, State};
@@ -80,11 +82,8 @@ pub enum SessionError {
     #[error("no cycle has begun: call wait first")]
     NoCycle,
     /// A second command.
-    #[error("cycle {cycle} has its command already: call wait for the next cycle")]
-    Published {
-        /// The cycle.
-        cycle: u64,
-    },
+    #[error("cycle {0} has its command already: call wait for the next cycle")]
+    Published(u64),
     /// A command of an earlier cycle, or of none: whoever made it may have stopped.
     #[error("the command is of cycle {given}, but cycle {cycle} has begun: make a command for each cycle")]
     OtherCycle {
@@ -206,7 +205,7 @@ impl Session {
     pub fn publish(&mut self, command: &Command, state: &State) -> Result<(), SessionError> {
         let OpenCycle { wake, received_ns, is_published } = self.cycle.ok_or(SessionError::NoCycle)?;
         if is_published {
-            return Err(SessionError::Published { cycle: wake.cycle });
+            return Err(SessionError::Published(wake.cycle));
         }
         if command.cycle != wake.cycle {
             return Err(SessionError::OtherCycle { given: command.cycle, cycle: wake.cycle });
@@ -216,7 +215,7 @@ impl Session {
         self.ports.publish_state(|message| {
             *message = *state;
             self.duties.operator.note_state(state.controller_state);
-            complete(message, &wake, [received_ns, commanded_ns, commanded_ns]);
+            complete_state(message, &wake, [received_ns, commanded_ns, commanded_ns]);
         })?;
         let tick = Tick { cycle: wake.cycle, now_ns: commanded_ns };
         publish_named(&mut self.duties.named, None, &mut self.ports, tick)?;
@@ -237,11 +236,11 @@ impl Session {
     /// # Errors
     /// [`ProcessError`] when the supervisor is gone.
     pub fn finish(mut self, outcome: Outcome) -> Result<(), ProcessError> {
-        let end = match outcome {
+        self.end_turn(true)?;
+        self.context.link.end(match outcome {
             Outcome::Finished => End::Finished,
             Outcome::SafeStop => End::SafeStop,
-        };
-        self.end(end)
+        })
     }
 
     /// Ends the work because the program cannot go on. The plant's master stops the drives, since no command follows.
@@ -250,17 +249,8 @@ impl Session {
     /// [`ProcessError`] when the supervisor is gone.
     pub fn fail(mut self, reason: &str) -> Result<(), ProcessError> {
         // The reason first: the turn cannot end where the plant has failed too.
-        self.report_end(End::Failed { reason: sentence(reason) })?;
+        self.context.link.end(End::Failed { reason: sentence(reason) })?;
         self.end_turn(true)
-    }
-
-    fn end(&mut self, end: End) -> Result<(), ProcessError> {
-        self.end_turn(true)?;
-        self.report_end(end)
-    }
-
-    fn report_end(&self, end: End) -> Result<(), ProcessError> {
-        self.context.link.end(end).map_err(ProcessError::Supervisor)
     }
 
     /// Ends the turn of a cycle that has begun, in lockstep.
@@ -296,9 +286,9 @@ impl Ports {
         let (node, scenario, schedule) = (&context.node, &context.scenario, &context.schedule);
         let readings = node.newest_subscriber()?;
         let (commands, states) = (node.publisher::<Command>()?, node.publisher::<State>()?);
-        let signals = (!declared.signals.is_empty()).then(|| node.publisher::<Signals>()).transpose()?;
+        let signals = if declared.signals.is_empty() { None } else { Some(node.publisher::<Signals>()?) };
         let parameters =
-            (!declared.parameters.is_empty()).then(|| node.publisher::<Parameters>()).transpose()?;
+            if declared.parameters.is_empty() { None } else { Some(node.publisher::<Parameters>()?) };
         let events = node.publisher::<Event>()?;
         commands.warm_up()?;
         states.warm_up()?;
@@ -416,10 +406,10 @@ impl ControllerPorts for Ports {
     /// in this cycle.
     fn fault_is_due(&mut self, fault: usize) -> Result<(), ProcessError> {
         let report = Report::Due { fault, now_ns: self.clock.now_ns() };
-        self.link.report(&report).map_err(ProcessError::Supervisor)?;
+        self.link.report(&report)?;
         match &self.clock {
             Clock::RealTime(_) => Ok(()),
-            Clock::Lockstep(_) => self.link.await_struck().map_err(ProcessError::Supervisor),
+            Clock::Lockstep(_) => self.link.await_struck(),
         }
     }
 }

@@ -7,9 +7,9 @@
 //! [`Report`]: super::Report
 //! [`Order`]: super::Order
 
-use std::env;
 use std::path::PathBuf;
 use std::time::Duration;
+use std::{env, iter};
 
 use masseter_scenario::input::excerpt;
 use serde::{Deserialize, Serialize};
@@ -50,13 +50,10 @@ impl Hello {
 
     /// The first layout that differs from this version's, as messages quote it, with this version's, if any does.
     pub fn difference(&self) -> Option<(String, String)> {
-        let own = Self::new().layouts;
-        let theirs = |index: usize| self.layouts.get(index).cloned().unwrap_or_default();
-        own.into_iter()
-            .enumerate()
-            .map(|(index, own)| (theirs(index), own))
-            .find(|(theirs, own)| theirs != own)
-            .map(|(theirs, own)| (excerpt(&theirs), own))
+        let theirs = self.layouts.iter().map(String::as_str).chain(iter::repeat(""));
+        let mut pairs = theirs.zip(Self::new().layouts);
+        let (theirs, own) = pairs.find(|(theirs, own)| theirs != own)?;
+        Some((excerpt(theirs), own))
     }
 }
 
@@ -110,11 +107,8 @@ pub enum AttachError {
         waiting: Waiting,
     },
     /// Without a name there must be one rig.
-    #[error("there is not one rig to attach to; {waiting}")]
-    NotOneRig {
-        /// The rigs that take a controller.
-        waiting: Waiting,
-    },
+    #[error("there is not one rig to attach to; {0}")]
+    NotOneRig(Waiting),
     /// The rig refused the program.
     #[error("the rig '{rig}' refuses this program: {reason}")]
     Refused {
@@ -200,18 +194,14 @@ fn greet(conversation: &mut Conversation) -> Result<Answer, Left> {
 }
 
 fn only_rig() -> Result<String, AttachError> {
-    let mut waiting = waiting()?;
-    match waiting.0.pop() {
-        Some(rig) if waiting.0.is_empty() => Ok(rig),
-        last => {
-            waiting.0.extend(last);
-            Err(AttachError::NotOneRig { waiting })
-        }
+    let waiting = waiting()?;
+    match &waiting.0[..] {
+        [rig] => Ok(rig.clone()),
+        _ => Err(AttachError::NotOneRig(waiting)),
     }
 }
 
 fn waiting() -> Result<Waiting, DomainError> {
-    let domains = Domain::all()?;
-    let takes = |domain: &&Domain| socket(domain).exists() && domain.is_alive().unwrap_or(false);
-    Ok(Waiting(domains.iter().filter(takes).map(|domain| domain.id().to_owned()).collect()))
+    let domains = Domain::serving(SOCKET)?;
+    Ok(Waiting(domains.iter().map(|domain| domain.id().to_owned()).collect()))
 }

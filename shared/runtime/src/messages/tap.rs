@@ -19,11 +19,8 @@ pub enum TapError {
     #[error(transparent)]
     Error(#[from] ErrorReportError),
     /// An index that no bus has.
-    #[error("a frame on bus {bus}, of {MAX_BUSES} that a link may have")]
-    Bus {
-        /// The index.
-        bus: u32,
-    },
+    #[error("a frame on bus {0}, of {MAX_BUSES} that a link may have")]
+    Bus(u32),
 }
 
 /// The message for an observation on the bus with that index. The header is stamped at publication.
@@ -51,7 +48,7 @@ pub fn encode(bus: u16, tapped: &Tapped) -> FrameTap {
 /// [`TapError::Bus`] where no link has that many.
 pub fn bus_of(tap: &FrameTap) -> Result<usize, TapError> {
     let bus = tap.bus as usize;
-    if bus < MAX_BUSES { Ok(bus) } else { Err(TapError::Bus { bus: tap.bus }) }
+    if bus < MAX_BUSES { Ok(bus) } else { Err(TapError::Bus(tap.bus)) }
 }
 
 /// Whether a message holds an error report, not a frame.
@@ -112,7 +109,7 @@ mod tests {
         let of = |bus| bus_of(&FrameTap { bus, ..Default::default() });
         assert_eq!((of(0), of(63)), (Ok(0), Ok(63)));
         for bus in [64, u32::MAX] {
-            assert_eq!(of(bus), Err(TapError::Bus { bus }));
+            assert_eq!(of(bus), Err(TapError::Bus(bus)));
         }
     }
 

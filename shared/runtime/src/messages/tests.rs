@@ -1,3 +1,5 @@
+use proptest::prelude::*;
+
 use super::codes::{BootPhase, ControllerState, DriveRequest, DriveState, NoPose};
 use super::*;
 
@@ -68,7 +70,7 @@ fn check_rounding<M: Message>(round: fn(&mut M), exact: &[&str]) {
     for field in fields.iter().filter(is_figure) {
         for at in of_figures(field) {
             let figure = u64::from_le_bytes(bytes_of(&message)[at..at + 8].try_into().unwrap());
-            let is_rounded = figure % (1 << precision::ZERO_BITS) == 0;
+            let is_rounded = figure % (1 << ZERO_BITS) == 0;
             assert_eq!(is_rounded, !exact.contains(&field.name), "{} {}", M::TYPE_NAME, field.name);
         }
     }
@@ -79,4 +81,31 @@ fn every_figure_of_state_truth_and_contact_is_rounded_but_for_the_time() {
     check_rounding(State::round, &["motion_time_s"]);
     check_rounding(Truth::round, &[]);
     check_rounding(Contact::round, &[]);
+}
+
+fn rounded(value: f64) -> f64 {
+    let mut values = [value];
+    round_figures(&mut values);
+    values[0]
+}
+
+proptest! {
+    #[test]
+    fn the_nearest_number_of_nine_digits(value in prop::num::f64::NORMAL) {
+        let rounded = rounded(value);
+        prop_assume!(value.abs() < f64::MAX / 2.0);
+        prop_assert_eq!(rounded.to_bits() % (1 << ZERO_BITS), 0);
+        prop_assert!((rounded - value).abs() <= value.abs() * 2.0_f64.powi(-31));
+    }
+}
+
+#[test]
+fn what_is_exact_or_no_number_stays() {
+    for value in [0.0, -0.0, 1.0, -0.25, 1e9, f64::MAX, f64::MIN, f64::INFINITY, f64::NEG_INFINITY] {
+        assert_eq!(rounded(value).to_bits(), value.to_bits());
+    }
+    for nan in [u64::MAX, i64::MAX as u64, f64::NAN.to_bits(), f64::INFINITY.to_bits() + 1] {
+        assert_eq!(rounded(f64::from_bits(nan)).to_bits(), nan);
+    }
+    assert_eq!(rounded(2.0 - f64::EPSILON).to_bits(), 2.0_f64.to_bits(), "a carry into the exponent");
 }

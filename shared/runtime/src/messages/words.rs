@@ -13,10 +13,10 @@ pub fn explain(event: &Event) -> Option<String> {
     let cause = Cause::try_from(event.cause).ok().filter(|_| event.kind != EventKind::Transition.code())?;
     let what = complaint(cause, event)?;
     let remedy = remedy(cause).map_or_else(String::new, |remedy| format!("; {remedy}"));
-    Some(format!("{}: {what}{remedy}", place(event)))
+    Some(format!("{}: {what}{remedy}", place_of(event)))
 }
 
-fn place(event: &Event) -> String {
+fn place_of(event: &Event) -> String {
     let Event { node, bus, .. } = event;
     match (AXIS_NAMES.get(event.axis as usize), node) {
         _ if event.cause == Cause::LawFailed.code() => "the pose law".to_owned(),
@@ -52,17 +52,17 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
         Cause::DuplicateNode => "different process data after one SYNC, again and again".to_owned(),
         Cause::NodeRestarted => "booted although the master did not reset it".to_owned(),
         Cause::FaultAtStart => {
-            format!("in fault, and a fault reset does not help; {}", fault(value, limit))
+            format!("in fault, and a fault reset does not help; {}", fault_words(value, limit))
         }
-        Cause::FaultFound => format!("was found in fault; {}", fault(value, limit)),
-        Cause::FaultReset => format!("was found in fault, which was reset; {}", fault(value, limit)),
-        Cause::WaitsForDrive => format!("the other drives wait for this one: {}", power(value, limit)),
+        Cause::FaultFound => format!("was found in fault; {}", fault_words(value, limit)),
+        Cause::FaultReset => format!("was found in fault, which was reset; {}", fault_words(value, limit)),
+        Cause::WaitsForDrive => format!("the other drives wait for this one: {}", power_words(value, limit)),
         Cause::NotReady => {
-            format!("not ready to switch on within can.ready_timeout_ms: {}", power(value, limit))
+            format!("not ready to switch on within can.ready_timeout_ms: {}", power_words(value, limit))
         }
         Cause::NotEnabled => format!(
             "not enabled within can.enable_timeout_ms, so all drives are switched off: {}",
-            power(value, limit)
+            power_words(value, limit)
         ),
         Cause::StartTooFar => format!(
             "the jaw is {:.3} mm from the first pose of the motion, limit {:.3} mm",
@@ -113,12 +113,12 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
 }
 
 /// Error code and state of a drive in fault.
-fn fault(code: u32, statusword: u32) -> String {
+fn fault_words(code: u32, statusword: u32) -> String {
     format!("error code {}, statusword {statusword:04X}h", EmergencyCode(code as u16))
 }
 
 /// State of a drive that is not enabled, and its emergency code if it has reported one.
-fn power(statusword: u32, code: u32) -> String {
+fn power_words(statusword: u32, code: u32) -> String {
     let state = Statusword(statusword as u16).state();
     let name = state.map_or_else(|_| "unknown state".to_owned(), |state| state.name().replace('_', " "));
     let guess = if state == Ok(DriveState::SwitchOnDisabled) { "; safe torque off?" } else { "" };

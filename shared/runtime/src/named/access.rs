@@ -3,21 +3,18 @@
 //! The controller's process listens on a socket in the private folder of its domain, so only the same user's programs reach
 //! it. A request and its answer are a line of JSON each. A thread of its own serves them, never the loop.
 
-use std::fs;
-use std::io;
 use std::os::unix::net::UnixListener;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::thread;
 use std::time::Duration;
+use std::{fs, io, thread};
 
 use masseter_scenario::input::sentence;
 use serde::{Deserialize, Serialize};
 
 use super::{Declared, Parameter, Settings};
 use crate::clock::{self, MILLISECOND_NS, SECOND_NS};
-use crate::conversation::{Conversation, Left, Limits, Newcomers};
-use crate::lifecycle::line;
+use crate::conversation::{Conversation, Left, Limits, Newcomers, line};
 use crate::transport::{Domain, DomainError};
 
 const SOCKET: &str = "parameters";
@@ -93,7 +90,7 @@ pub enum AccessError {
     },
 }
 
-fn socket(domain: &Domain) -> PathBuf {
+fn parameter_socket(domain: &Domain) -> PathBuf {
     domain.root().join(SOCKET)
 }
 
@@ -102,7 +99,7 @@ fn socket(domain: &Domain) -> PathBuf {
 /// # Errors
 /// When the socket or the thread cannot be made.
 pub(crate) fn serve(domain: &Domain, settings: Arc<Settings>) -> io::Result<()> {
-    let path = socket(domain);
+    let path = parameter_socket(domain);
     // That of a program which ended before the start of the run.
     let _ = fs::remove_file(&path);
     let listener = UnixListener::bind(path)?;
@@ -113,7 +110,7 @@ pub(crate) fn serve(domain: &Domain, settings: Arc<Settings>) -> io::Result<()> 
             newcomers.wait(if reading.is_empty() { IDLE } else { INTERVAL });
             let now_ns = clock::now_ns();
             let mut look = newcomers.look(now_ns, |bytes| bytes.contains(&b'\n'));
-            look.asking.iter_mut().for_each(|conversation| answer(conversation, &settings));
+            look.asking.iter_mut().for_each(|conversation| answer_request(conversation, &settings));
             reading.append(&mut look.asking);
             reading.iter_mut().for_each(Conversation::hear);
             reading.retain_mut(|conversation| !conversation.is_sent() && conversation.left(now_ns).is_none());
@@ -125,7 +122,7 @@ pub(crate) fn serve(domain: &Domain, settings: Arc<Settings>) -> io::Result<()> 
 }
 
 /// Answers a request, unless its sender has left or waits no longer: a value that was said to be refused is not set later.
-fn answer(conversation: &mut Conversation, settings: &Settings) {
+fn answer_request(conversation: &mut Conversation, settings: &Settings) {
     let request = conversation.next_line().unwrap_or_default();
     conversation.hear();
     let now_ns = clock::now_ns();
@@ -140,18 +137,14 @@ fn answer(conversation: &mut Conversation, settings: &Settings) {
         Ok(Request::Set { name, value, .. }) => settings.set(&name, value).map_err(|error| error.to_string()),
         Err(error) => Err(format!("it is no request: {error}")),
     };
+    let parameters = settings.declared().parameters.iter().enumerate();
+    let present =
+        parameters.map(|(place, known)| Parameter { value: settings.value(place), ..known.clone() });
     let answer = match set {
-        Ok(()) => Answer::Parameters(present(settings)),
+        Ok(()) => Answer::Parameters(present.collect()),
         Err(reason) => Answer::Refused { reason },
     };
     conversation.say(line(&answer).as_bytes());
-}
-
-fn present(settings: &Settings) -> Vec<Parameter> {
-    let parameters = settings.declared().parameters.iter().enumerate();
-    parameters
-        .map(|(place, parameter)| Parameter { value: settings.value(place), ..parameter.clone() })
-        .collect()
 }
 
 /// The parameters of a rig's controller, with the values that are set.
@@ -159,7 +152,7 @@ fn present(settings: &Settings) -> Vec<Parameter> {
 /// # Errors
 /// [`AccessError`] when no controller with parameters runs there.
 pub fn list(domain: &Domain) -> Result<Vec<Parameter>, AccessError> {
-    ask(domain, &Request::List).map_err(|failure| failure.into_error(domain, None))
+    ask_controller(domain, &Request::List)
 }
 
 /// Sets a parameter of a rig's controller, which takes it over in its next cycle. Returns all parameters.
@@ -171,8 +164,7 @@ pub fn set(domain: &Domain, name: &str, value: f64) -> Result<Vec<Parameter>, Ac
         return Err(AccessError::Refused(format!("parameter '{name}' cannot be {value}")));
     }
     let expires_ns = clock::now_ns() + EXPIRY_NS;
-    let request = Request::Set { name: name.to_owned(), value, expires_ns };
-    ask(domain, &request).map_err(|failure| failure.into_error(domain, Some(name)))
+    ask_controller(domain, &Request::Set { name: name.to_owned(), value, expires_ns })
 }
 
 /// The rigs whose controllers have parameters.
@@ -180,45 +172,29 @@ pub fn set(domain: &Domain, name: &str, value: f64) -> Result<Vec<Parameter>, Ac
 /// # Errors
 /// When the domains of this user cannot be listed.
 pub fn rigs() -> Result<Vec<Domain>, DomainError> {
-    let serves = |domain: &Domain| socket(domain).exists() && domain.is_alive().unwrap_or(false);
-    Ok(Domain::all()?.into_iter().filter(serves).collect())
+    Domain::serving(SOCKET)
 }
 
-/// Why a request has not succeeded.
-enum Failure {
-    NobodyListens,
-    Refused(String),
-    NoAnswer(Left),
-}
-
-impl Failure {
-    /// The error of a request to set the parameter `set`, or to list them.
-    fn into_error(self, domain: &Domain, set: Option<&str>) -> AccessError {
-        let rig = domain.id().to_owned();
-        match (self, set.map(str::to_owned)) {
-            (Self::NobodyListens, _) => AccessError::NoParameters(rig),
-            (Self::Refused(reason), _) => AccessError::Refused(reason),
-            (Self::NoAnswer(left), None) => AccessError::NoAnswer { rig, left },
-            (Self::NoAnswer(left), Some(name)) => AccessError::NotConfirmed { rig, name, left },
-        }
-    }
-}
-
-fn ask(domain: &Domain, request: &Request) -> Result<Vec<Parameter>, Failure> {
+fn ask_controller(domain: &Domain, request: &Request) -> Result<Vec<Parameter>, AccessError> {
+    let rig = || domain.id().to_owned();
+    let no_answer = |left| match request {
+        Request::List => AccessError::NoAnswer { rig: rig(), left },
+        Request::Set { name, .. } => AccessError::NotConfirmed { rig: rig(), name: name.clone(), left },
+    };
     let limits = Limits::answer(EXPIRY_NS + GRACE_NS, LONGEST_ANSWER);
-    let mut conversation =
-        Conversation::connect(&socket(domain), limits).map_err(|_| Failure::NobodyListens)?;
+    let connected = Conversation::connect(&parameter_socket(domain), limits);
+    let mut conversation = connected.map_err(|_| AccessError::NoParameters(rig()))?;
     conversation.say(line(request).as_bytes());
-    let answer = conversation.await_line().map_err(Failure::NoAnswer)?;
+    let answer = conversation.await_line().map_err(no_answer)?;
     match serde_json::from_str(&answer) {
         Ok(Answer::Parameters(parameters)) => {
             // Pages and terminals show them.
             let declared = Declared { parameters, ..Declared::default() };
-            declared.check().map_err(|error| Failure::Refused(error.to_string()))?;
+            declared.check().map_err(|error| AccessError::Refused(error.to_string()))?;
             Ok(declared.parameters)
         }
-        Ok(Answer::Refused { reason }) => Err(Failure::Refused(sentence(&reason))),
-        Err(error) => Err(Failure::NoAnswer(Left::Failed(error.into()))),
+        Ok(Answer::Refused { reason }) => Err(AccessError::Refused(sentence(&reason))),
+        Err(error) => Err(no_answer(Left::Failed(error.into()))),
     }
 }
 
@@ -250,7 +226,7 @@ mod tests {
             assert!(matches!(set(&domain, name, value), Err(AccessError::Refused(_))));
         }
         // What is no request concerns its own connection only.
-        UnixStream::connect(socket(&domain)).unwrap().write_all(b"hello\n").unwrap();
+        UnixStream::connect(parameter_socket(&domain)).unwrap().write_all(b"hello\n").unwrap();
         assert_eq!(value(list(&domain)), Some([3.0]));
     }
 
@@ -268,7 +244,7 @@ mod tests {
             peer.write_all(line(&request).as_bytes()).unwrap();
             let peer = is_there.then_some(peer);
             conversation.hear();
-            answer(&mut conversation, &settings);
+            answer_request(&mut conversation, &settings);
             drop(peer);
             named.take_change().is_some()
         };
@@ -284,7 +260,8 @@ mod tests {
         let declared = Declared { parameters: vec![Parameter::new("gain", 1.0)], ..Declared::default() };
         let named = NamedValues::new(declared, &BTreeMap::new()).unwrap();
         serve(&domain, Arc::clone(named.settings())).unwrap();
-        let mut peers: Vec<_> = (0..100).map(|_| UnixStream::connect(socket(&domain)).unwrap()).collect();
+        let mut peers: Vec<_> =
+            (0..100).map(|_| UnixStream::connect(parameter_socket(&domain)).unwrap()).collect();
         for _ in 0..10 {
             // It fails once the server has closed the connection.
             for peer in &mut peers {

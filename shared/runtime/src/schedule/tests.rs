@@ -43,11 +43,11 @@ fn a_drive_booted_beside_running_ones_keeps_to_the_offsets() {
     let bits = |length| worst_case_bits(length, false);
     for axes in 1..=6 {
         let [sdo, heartbeat] = [SDO_LENGTH, HEARTBEAT_LENGTH].map(bits);
-        let [tpdo, rpdo] = [PdoMapping::TPDO1, PdoMapping::RPDO1].map(|mapping| bits(length(&mapping)));
+        let [tpdo, rpdo] = [PdoMapping::TPDO1, PdoMapping::RPDO1].map(|mapping| bits(pdo_bytes(&mapping)));
         assert!(sdo + (axes - 1) * tpdo <= heartbeat + axes * tpdo);
         assert!(sdo + (axes - 1) * rpdo <= heartbeat + axes * rpdo);
     }
-    for plan in plans_of(&Scenario::default(), 1_000_000, true).unwrap() {
+    for plan in plans_of(&Scenario::default(), 1_000_000, Drives::OneBoots).unwrap() {
         assert_eq!(plan.check(), Ok(()));
     }
 }
@@ -57,7 +57,7 @@ fn a_drive_booted_beside_running_ones_keeps_to_the_offsets() {
 fn the_drive_with_the_shortest_process_data_boots() {
     let text = "rate_hz = 500\n[[drive_profile]]\naxes = ['l1']\npdos.rpdo1 = ['6040h', '607Ah', '60B2h']";
     let scenario = Scenario::parse(std::path::Path::new("robot.toml"), text).unwrap();
-    let plan = plans_of(&scenario, 2_000_000, true).unwrap().pop().unwrap();
+    let plan = plans_of(&scenario, 2_000_000, Drives::OneBoots).unwrap().pop().unwrap();
     let has = |name: &str| plan.messages.iter().any(|planned| planned.message.name == name);
     assert_eq!(["RPDO1 4", "RPDO1 5", "SDO request 5"].map(has), [true, false, true]);
 }

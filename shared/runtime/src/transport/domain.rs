@@ -15,8 +15,7 @@ use rustix::fs::{major, minor};
 use rustix::io::{FdFlags, fcntl_setfd};
 use rustix::process::getuid;
 
-use super::error::{DomainError, file_error};
-use super::runtime;
+use super::runtime::{self, DomainError, file_error};
 use crate::clock::{self, SECOND_NS};
 
 const SHARED_MEMORY: &str = "/dev/shm";
@@ -50,11 +49,10 @@ pub struct Swept {
 }
 
 impl Swept {
-    fn remove(&mut self, path: &Path, remove: impl FnOnce(&Path) -> io::Result<()>) -> bool {
-        let removed = remove(path);
-        let is_gone =
-            removed.as_ref().map_or_else(|error| error.kind() == io::ErrorKind::NotFound, |()| true);
-        self.remaining.extend(removed.err().filter(|_| !is_gone).map(file_error("remove", path)));
+    fn remove_path(&mut self, path: &Path, remove: impl FnOnce(&Path) -> io::Result<()>) -> bool {
+        let error = remove(path).err().filter(|error| error.kind() != io::ErrorKind::NotFound);
+        let is_gone = error.is_none();
+        self.remaining.extend(error.map(file_error("remove", path)));
         is_gone
     }
 }
@@ -97,7 +95,7 @@ impl Domain {
         if is_id(id) {
             Ok(Self { id: id.to_owned(), root: runtime::folder()?.join(id) })
         } else {
-            Err(DomainError::BadName { id: id.to_owned() })
+            Err(DomainError::BadName(id.to_owned()))
         }
     }
 
@@ -124,9 +122,9 @@ impl Domain {
     pub fn claim(&self) -> Result<DomainLock, DomainError> {
         let _turn = self.take_turn()?;
         if self.is_locked() {
-            return Err(DomainError::InUse { id: self.id.clone() });
+            return Err(DomainError::InUse(self.id.clone()));
         }
-        self.remove()?;
+        self.remove_files()?;
         let path = self.root.join(LOCK);
         runtime::make(&self.root).map_err(file_error("create", &self.root))?;
         let mut lock = runtime::open(&path)?;
@@ -149,15 +147,15 @@ impl Domain {
     /// alive.
     pub fn sweep(&self) -> Result<Option<Swept>, DomainError> {
         let _turn = self.take_turn()?;
-        if self.is_locked() { Ok(None) } else { self.remove().map(Some) }
+        if self.is_locked() { Ok(None) } else { self.remove_files().map(Some) }
     }
 
-    fn remove(&self) -> Result<Swept, DomainError> {
+    fn remove_files(&self) -> Result<Swept, DomainError> {
         let mut swept = Swept::default();
         for path in self.shared_memory()? {
-            swept.removed += usize::from(swept.remove(&path, |path| fs::remove_file(path)));
+            swept.removed += usize::from(swept.remove_path(&path, |path| fs::remove_file(path)));
         }
-        swept.remove(&self.root, |path| fs::remove_dir_all(path));
+        swept.remove_path(&self.root, |path| fs::remove_dir_all(path));
         Ok(swept)
     }
 
@@ -210,7 +208,7 @@ impl Domain {
         let prefix = self.prefix().map_err(file_error("read", &self.root))?;
         let prefix = format!("{SHARED_MEMORY}/{prefix}");
         let mut mapped = text.lines().filter_map(|line| Some((line, &line[line.find(&prefix)?..])));
-        mapped.try_for_each(|(line, path)| check_mapped(line, path))
+        mapped.try_for_each(|(line, path)| check_mapped_file(line, path))
     }
 
     /// Asking takes the lock for a moment, which only one may do at a time.
@@ -229,6 +227,12 @@ impl Domain {
         Ok(domains)
     }
 
+    /// Those with a living process that has made a file of this name, such as a socket, in the root folder.
+    pub(crate) fn serving(name: &str) -> Result<Vec<Self>, DomainError> {
+        let serves = |domain: &Self| domain.root.join(name).exists() && domain.is_alive().unwrap_or(false);
+        Ok(Self::all()?.into_iter().filter(serves).collect())
+    }
+
     /// Waits until no other process of this user claims or sweeps a domain: a lock not yet taken must not look like one
     /// that was let go. The turn ends with the file.
     fn take_turn(&self) -> Result<File, DomainError> {
@@ -241,7 +245,7 @@ impl Domain {
                 Err(TryLockError::Error(error)) => return Err(file_error("lock", &path)(error)),
                 Err(TryLockError::WouldBlock) if clock::now_ns() < give_up_ns => clock::sleep(TURN_POLL),
                 Err(TryLockError::WouldBlock) => {
-                    let holder = turn.metadata().ok().and_then(|file| holder(&file));
+                    let holder = turn.metadata().ok().and_then(|file| lock_holder(&file));
                     let holder = holder.unwrap_or_else(|| "an unknown process".to_owned());
                     return Err(DomainError::Busy { path, holder });
                 }
@@ -255,19 +259,19 @@ fn is_id(id: &str) -> bool {
 }
 
 /// Refuses a line of `/proc/self/maps` whose file is not this user's: `7f00-7f01 rw-s 00000000 00:1a 12345 /dev/shm/…`.
-fn check_mapped(line: &str, path: &str) -> Result<(), DomainError> {
+fn check_mapped_file(line: &str, path: &str) -> Result<(), DomainError> {
     let inode = line.split_whitespace().nth(4).and_then(|inode| inode.parse().ok());
     // The kernel marks what has been removed.
     let (path, is_removed) = path.strip_suffix(" (deleted)").map_or((path, false), |path| (path, true));
     match fs::symlink_metadata(path) {
         Ok(found) if runtime::is_own(&found) && Some(found.ino()) == inode && !is_removed => Ok(()),
-        Ok(found) if !runtime::is_own(&found) => Err(DomainError::Foreign { path: path.into() }),
-        _ => Err(DomainError::Gone { path: path.into() }),
+        Ok(found) if !runtime::is_own(&found) => Err(DomainError::Foreign(path.into())),
+        _ => Err(DomainError::Gone(path.into())),
     }
 }
 
 /// The process that locked the file, by its id and name.
-fn holder(file: &Metadata) -> Option<String> {
+fn lock_holder(file: &Metadata) -> Option<String> {
     let locks = fs::read_to_string("/proc/locks").ok()?;
     // 1: FLOCK  ADVISORY  WRITE 4711 00:1a:12345 0 EOF
     let place = format!("{:02x}:{:02x}:{}", major(file.dev()), minor(file.dev()), file.ino());

@@ -2,16 +2,11 @@
 //!
 //! The messages of a sample share the cost of sending and receiving it. Each message keeps a number of its own.
 
-use std::fmt::Debug;
-
-use iceoryx2::port::publisher::Publisher as IceoryxPublisher;
-use iceoryx2::port::subscriber::Subscriber as IceoryxSubscriber;
 use iceoryx2::prelude::{AllocationStrategy, ipc};
 use iceoryx2::sample::Sample;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
-use super::error::{Refused, TransportError, check_version, failed};
-use super::ports::{Node, create_publisher, create_subscriber};
+use super::{Connecting, Inlet, Node, Outlet, TransportError, check_version, failed};
 use crate::clock;
 use crate::messages::{FrameTap, Message};
 
@@ -33,7 +28,7 @@ pub struct FrameSubscriber(Box<dyn Incoming>);
 type Batch = Sample<ipc::Service, [FrameTap], ()>;
 
 /// What a publisher needs of its port, which is behind a pointer for the reason of [`Topic`](super::Topic).
-trait Outgoing: Debug {
+trait Outgoing: Connecting {
     /// Sends so many frames: `next` makes each in shared memory, `stamp` completes them.
     fn send(
         &self,
@@ -41,28 +36,15 @@ trait Outgoing: Debug {
         next: &mut dyn FnMut() -> FrameTap,
         stamp: &mut dyn FnMut(&mut [FrameTap]),
     ) -> Result<(), TransportError>;
-    fn connect(&self) -> Result<(), TransportError>;
     fn warm_up(&self) -> Result<(), TransportError>;
 }
 
 /// What a subscriber needs of its port.
-trait Incoming: Debug {
+trait Incoming: Connecting {
     fn next(&self) -> Result<Option<Batch>, TransportError>;
 }
 
-#[derive(Debug)]
-struct Outlet {
-    port: IceoryxPublisher<ipc::Service, [FrameTap], ()>,
-    refused: Refused,
-}
-
-#[derive(Debug)]
-struct Inlet {
-    port: IceoryxSubscriber<ipc::Service, [FrameTap], ()>,
-    refused: Refused,
-}
-
-impl Outgoing for Outlet {
+impl Outgoing for Outlet<[FrameTap]> {
     fn send(
         &self,
         count: usize,
@@ -76,10 +58,6 @@ impl Outgoing for Outlet {
         Ok(())
     }
 
-    fn connect(&self) -> Result<(), TransportError> {
-        self.refused.connect(&self.port, FrameTap::TOPIC)
-    }
-
     fn warm_up(&self) -> Result<(), TransportError> {
         let sample = self.port.loan_slice_uninit(BATCH).map_err(failed("loaning", FrameTap::TOPIC))?;
         drop(sample.write_from_fn(|_| FrameTap::default()));
@@ -87,10 +65,10 @@ impl Outgoing for Outlet {
     }
 }
 
-impl Incoming for Inlet {
+impl Incoming for Inlet<[FrameTap]> {
     fn next(&self) -> Result<Option<Batch>, TransportError> {
         let sample = self.port.receive().map_err(failed("receiving", FrameTap::TOPIC))?;
-        self.refused.check(FrameTap::TOPIC)?;
+        self.refused.require_none(FrameTap::TOPIC)?;
         sample.iter().flat_map(|sample| sample.iter()).try_for_each(check_version)?;
         Ok(sample)
     }
@@ -106,8 +84,8 @@ impl FramePublisher {
     pub fn open(node: &Node) -> Result<Self, TransportError> {
         let service = service(node)?;
         let builder = service.publisher_builder().initial_max_slice_len(BATCH);
-        let (port, refused) = create_publisher(builder.allocation_strategy(AllocationStrategy::Static))?;
-        Ok(Self { port: Box::new(Outlet { port, refused }), sent: 0 })
+        let outlet = Outlet::create(builder.allocation_strategy(AllocationStrategy::Static))?;
+        Ok(Self { port: Box::new(outlet), sent: 0 })
     }
 
     /// The number of samples in which so many frames travel.
@@ -158,8 +136,7 @@ impl FramePublisher {
 impl FrameSubscriber {
     /// A subscriber of the topic of frames.
     pub fn open(node: &Node) -> Result<Self, TransportError> {
-        let (port, refused) = create_subscriber(service(node)?.subscriber_builder())?;
-        Ok(Self(Box::new(Inlet { port, refused })))
+        Ok(Self(Box::new(Inlet::create(service(node)?.subscriber_builder())?)))
     }
 
     /// The oldest batch not yet received; never waits. Refused when a connection to a publisher failed, since its frames

@@ -1,4 +1,5 @@
-//! The private folder of locks and iceoryx2's files: no other user may hold a lock, squat a name or read a file in it.
+//! The private folder of locks and iceoryx2's files: no other user may hold a lock, squat a name or read a file in it. And
+//! what can go wrong with a domain and its files.
 //!
 //! It is `masseter` below the session's `XDG_RUNTIME_DIR`, `/run/masseter` of root, or `/dev/shm/masseter-UID`. Where another
 //! user has taken that name, it is `/dev/shm/masseter-UID-1`, or one of the next.
@@ -14,8 +15,6 @@ use masseter_scenario::input::excerpt;
 use rustix::fs::Mode;
 use rustix::process::geteuid;
 
-use super::error::{DomainError, file_error};
-
 const ONLY_OWNER: Mode = Mode::RWXU;
 /// Permissions of group and others.
 const OF_OTHERS: u32 = 0o077;
@@ -24,6 +23,57 @@ const WRITE_OF_OTHERS: u32 = 0o022;
 pub(super) const LONGEST_SESSION_FOLDER: usize = 40;
 /// Folders of a user in `/dev/shm`, so that nobody stops another user by taking one name.
 const FOLDERS: usize = 8;
+
+/// Why a domain could not be claimed or removed.
+#[derive(Debug, thiserror::Error)]
+pub enum DomainError {
+    /// Another run uses the name.
+    #[error("a rig named '{0}' is running; wait for it, stop it, or give this one another --name")]
+    InUse(String),
+    /// The id cannot be a file name.
+    #[error("'{0}' cannot name a rig: use 1 to 32 letters, digits, '-' or '_'")]
+    BadName(String),
+    /// Another process claims or sweeps domains for longer than that takes.
+    #[error("{holder} holds the lock {path} for more than 5 s; end it, or let it go on")]
+    Busy {
+        /// The lock.
+        path: PathBuf,
+        /// The process that holds it.
+        holder: String,
+    },
+    /// Other users could read or replace the files of a run.
+    #[error(
+        "{path} is not a private folder of this user (mode 0700): remove it, or have root remove it, or set XDG_RUNTIME_DIR to a private folder{passed_over}"
+    )]
+    NotPrivate {
+        /// The folder, or what has its name.
+        path: PathBuf,
+        /// Why the session's folder is of no use, if there is one.
+        passed_over: String,
+    },
+    /// This process uses a file that is not this user's.
+    #[error("another user has made {0}: start the rig again, whose files then have other names")]
+    Foreign(PathBuf),
+    /// This process uses a file that has been removed: nobody knows any more whose it was.
+    #[error(
+        "{0} was removed while the rig started, as when one of its processes is killed: start the rig again"
+    )]
+    Gone(PathBuf),
+    /// The file system refused.
+    #[error("cannot {action} {path}: {error}")]
+    File {
+        /// What was tried.
+        action: &'static str,
+        /// Where.
+        path: PathBuf,
+        /// What the system said.
+        error: io::Error,
+    },
+}
+
+pub(super) fn file_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> DomainError {
+    move |error| DomainError::File { action, path: path.to_owned(), error }
+}
 
 /// The folder, made if it does not exist, and verified.
 ///
@@ -50,43 +100,40 @@ fn choose(session: Option<PathBuf>, of_user: &[PathBuf]) -> Result<Vec<PathBuf>,
     let passed_over = session.as_deref().and_then(unusable);
     let of_session = session.filter(|_| passed_over.is_none()).map(|session| session.join("masseter"));
     let of_root = geteuid().is_root().then(|| PathBuf::from("/run/masseter"));
-    if let Some(preferred) = of_session.or(of_root).filter(|path| make(path).is_ok()) {
-        return if take(&preferred)? {
-            Ok(vec![preferred])
-        } else {
-            Err(not_private(&preferred, passed_over))
-        };
+    let preferred = of_session.or(of_root).filter(|path| make(path).is_ok());
+    let found: Vec<_> = match &preferred {
+        Some(path) => make_folder_private(path)?.then(|| path.clone()).into_iter().collect(),
+        None => private_ones(of_user)?,
+    };
+    if found.is_empty() {
+        let path = preferred.unwrap_or_else(|| of_user[0].clone());
+        return Err(DomainError::NotPrivate { path, passed_over: passed_over.unwrap_or_default() });
     }
-    let found = private_ones(of_user)?;
-    if found.is_empty() { Err(not_private(&of_user[0], passed_over)) } else { Ok(found) }
+    Ok(found)
 }
 
 /// The private ones of these folders, or else the first that can be made; none if all names are taken.
 fn private_ones(folders: &[PathBuf]) -> Result<Vec<PathBuf>, DomainError> {
     let mut found = Vec::new();
     for path in folders {
-        found.extend(take(path)?.then(|| path.clone()));
+        found.extend(make_folder_private(path)?.then(|| path.clone()));
     }
     for path in folders {
         if found.is_empty() {
             make(path).map_err(file_error("create", path))?;
-            found.extend(take(path)?.then(|| path.clone()));
+            found.extend(make_folder_private(path)?.then(|| path.clone()));
         }
     }
     Ok(found)
 }
 
 /// Whether a folder is private, after the rights of others who could only look into it are taken.
-fn take(folder: &Path) -> Result<bool, DomainError> {
+fn make_folder_private(folder: &Path) -> Result<bool, DomainError> {
     if is_own_folder_without(WRITE_OF_OTHERS, folder) {
         fs::set_permissions(folder, PermissionsExt::from_mode(0o700))
             .map_err(file_error("make private", folder))?;
     }
     Ok(is_private(folder))
-}
-
-fn not_private(folder: &Path, passed_over: Option<String>) -> DomainError {
-    DomainError::NotPrivate { path: folder.to_owned(), passed_over: passed_over.unwrap_or_default() }
 }
 
 /// Why a session's folder is passed over, if it is.

@@ -1,7 +1,7 @@
 //! Signals from one process to another, which wake a process that sleeps: datagrams of one byte in the domain's root
 //! folder. iceoryx2's events would need longer paths than sockets may have.
 
-use std::io::{self, ErrorKind};
+use std::io::ErrorKind;
 use std::os::unix::net::UnixDatagram;
 use std::path::PathBuf;
 use std::thread;
@@ -11,8 +11,8 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 use rustix::net::{RecvFlags, recv};
 
-use super::error::{DomainError, file_error};
-use super::ports::Node;
+use super::Node;
+use super::runtime::{DomainError, file_error};
 use crate::clock;
 
 /// Longest wait for room in the receiver's queue, which holds more signals than processes leave there.
@@ -139,14 +139,13 @@ impl SignalSender {
     /// When the socket fails.
     pub fn send(&self, signal: u8) -> Result<(), DomainError> {
         match self.socket.send_to(&[signal], &self.path) {
-            Err(error) if !is_gone(&error) => Err(file_error("send to", &self.path)(error)),
-            _ => Ok(()),
+            Ok(_) => Ok(()),
+            Err(error) => match error.kind() {
+                ErrorKind::ConnectionRefused | ErrorKind::NotFound => Ok(()),
+                _ => Err(file_error("send to", &self.path)(error)),
+            },
         }
     }
-}
-
-fn is_gone(error: &io::Error) -> bool {
-    matches!(error.kind(), ErrorKind::ConnectionRefused | ErrorKind::NotFound)
 }
 
 #[cfg(test)]

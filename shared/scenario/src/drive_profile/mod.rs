@@ -3,32 +3,29 @@
 //! A profile is data: identity, units, objects, storing, brake and homing. Nothing here talks to a drive. What an
 //! emulated drive takes from its profile is in the plant.
 
-mod dcf;
-mod homing;
-mod identity;
-mod kind;
 mod object;
-mod pdos;
-mod scale;
-mod units;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
+use masseter_can::canopen::ObjectAddress;
+use masseter_can::{PdoMapping, PdoMappingError};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 
-use super::error::ScenarioError;
-use super::need::{require_not_negative, require_positive};
+use super::error::{
+    Checked, ScenarioError, keyed, require, require_each, require_not_negative, require_positive,
+};
+use super::merge::Given;
+use object::add_dcf_objects;
 
-pub use homing::HomingConfig;
-pub use identity::IdentityConfig;
-pub(super) use kind::over_kinds;
 pub use object::{ObjectConfig, ObjectKey, ObjectRule};
-pub use pdos::PdosConfig;
-pub use scale::AxisScale;
-pub use units::{AccelerationUnit, INCREMENTS, UnitsConfig, VelocityUnit};
 
+/// The kinds with their profiles.
+const KINDS: [(&str, &str); 3] =
+    [("emulated", ""), ("epos4", include_str!("kinds/epos4.toml")), ("n5", include_str!("kinds/n5.toml"))];
 /// The profile of axes that no `[[drive_profile]]` names.
 static EMULATED: LazyLock<DriveProfile> = LazyLock::new(DriveProfile::default);
 
@@ -92,8 +89,8 @@ impl DriveProfile {
     }
 
     /// Replaces `dcf`, whose path is relative to a folder, by the objects of its file.
-    pub(super) fn read_dcf(&mut self, folder: &Path) -> Result<(), ScenarioError> {
-        self.dcf.take().map_or(Ok(()), |path| dcf::add_objects(&mut self.objects, &folder.join(path)))
+    pub(super) fn read_dcf(&mut self, folder: &Path) -> Checked {
+        self.dcf.take().map_or(Ok(()), |path| add_dcf_objects(&mut self.objects, &folder.join(path)))
     }
 
     /// What the profile says of an object; nothing in particular when absent.
@@ -107,15 +104,12 @@ impl DriveProfile {
     }
 
     /// Checks all profiles.
-    pub(super) fn validate_all(profiles: &[Self]) -> Result<(), ScenarioError> {
+    pub(super) fn validate_all(profiles: &[Self]) -> Checked {
         let mut taken = [false; AXES];
-        for (number, profile) in profiles.iter().enumerate() {
-            profile.validate(&mut taken).map_err(|error| error.of_entry(number))?;
-        }
-        Ok(())
+        require_each(profiles, |profile| profile.validate(&mut taken))
     }
 
-    fn validate(&self, taken: &mut [bool; AXES]) -> Result<(), ScenarioError> {
+    fn validate(&self, taken: &mut [bool; AXES]) -> Checked {
         for (key, names) in [("drive_profile.axes", &self.axes), ("drive_profile.reversed", &self.reversed)] {
             if let Some(name) = names.iter().find(|name| !AXIS_NAMES.contains(&name.as_str())) {
                 let need = format!("name axes: {}", AXIS_NAMES.join(", "));
@@ -123,32 +117,255 @@ impl DriveProfile {
             }
         }
         for (axis, name) in AXIS_NAMES.iter().enumerate() {
-            if self.axes.iter().any(|named| named == name) && std::mem::replace(&mut taken[axis], true) {
-                let need = "give each axis one profile";
-                return Err(ScenarioError::bad("drive_profile.axes", &format!("'{name}'"), need));
-            }
+            let is_twice =
+                self.axes.iter().any(|named| named == name) && std::mem::replace(&mut taken[axis], true);
+            let name = format!("'{name}'");
+            require(!is_twice, "drive_profile.axes", &name, "give each axis one profile")?;
         }
-        for (key, object) in &self.objects {
-            object.validate(*key)?;
-        }
+        self.objects.iter().try_for_each(|(key, object)| object.validate(*key))?;
         self.pdos.validate()?;
         self.units.validate()?;
         self.homing.validate()?;
-        let BrakeConfig { open_s, close_s } = self.brake;
-        require_not_negative(&[
-            ("drive_profile.brake.open_s", open_s),
-            ("drive_profile.brake.close_s", close_s),
-        ])?;
-        require_positive(&[("drive_profile.store.timeout_ms", f64::from(self.store.timeout_ms))])
+        require_not_negative("drive_profile.brake.open_s", self.brake.open_s)?;
+        require_not_negative("drive_profile.brake.close_s", self.brake.close_s)?;
+        require_positive(&keyed!("drive_profile.store", self.store, timeout_ms))
+    }
+}
+
+/// Reads profiles: what a table has replaces the values of its kind.
+pub(super) fn over_kinds<'de, D: Deserializer<'de>>(list: D) -> Result<Vec<DriveProfile>, D::Error> {
+    let tables = Vec::<Given>::deserialize(list)?;
+    tables.into_iter().map(|table| table.over(&KINDS).map_err(D::Error::custom)).collect()
+}
+
+section! {
+    /// The identity that the master checks before it writes to a drive.
+    #[derive(Copy, Eq)]
+    pub struct IdentityConfig {
+        /// Device type (object 1000).
+        pub device_type: u32 = Self::EMULATED.device_type,
+        /// Vendor (object 1018:01).
+        pub vendor_id: u32 = Self::EMULATED.vendor_id,
+        /// Product (object 1018:02).
+        pub product_code: u32 = Self::EMULATED.product_code,
+        /// The bits of the product code that must be equal.
+        pub product_mask: u32 = u32::MAX,
+        /// Revision (object 1018:03).
+        pub revision: u32 = Self::EMULATED.revision,
+        /// The bits of the revision that must be equal.
+        pub revision_mask: u32 = u32::MAX,
+    }
+}
+
+impl IdentityConfig {
+    /// The emulated drives: servo drives of CiA 402. The vendor number is not registered with
+    /// CiA.
+    pub const EMULATED: Self = Self {
+        device_type: 0x0002_0192,
+        vendor_id: 0x004D_5354,
+        product_code: 0x0000_0402,
+        product_mask: u32::MAX,
+        revision: 0x0001_0000,
+        revision_mask: u32::MAX,
+    };
+}
+
+/// Unit of the drive's velocities (6081h, 6099h).
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum VelocityUnit {
+    /// Increments of 6064h a second.
+    #[default]
+    IncrementsS,
+    /// Tenths of an increment a second.
+    #[serde(rename = "0.1_increments_s")]
+    TenthIncrementsS,
+    /// Turns of the motor a minute.
+    Rpm,
+}
+
+/// Unit of the drive's accelerations (6083h to 6085h, 609Ah).
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AccelerationUnit {
+    /// Increments of 6064h a second squared.
+    #[default]
+    IncrementsS2,
+    /// Turns of the motor a minute, per second.
+    #[serde(rename = "rpm_s")]
+    RpmPerS,
+}
+
+/// Increments in 60A8h (CiA 303-2: prefix, numerator, denominator).
+pub const INCREMENTS: u32 = 0x00B5_0000;
+
+impl VelocityUnit {
+    /// The unit in 60A9h (CiA 303-2: prefix, numerator, denominator).
+    pub const fn code(self) -> u32 {
+        match self {
+            Self::IncrementsS => 0x00B5_0300,
+            Self::TenthIncrementsS => 0xFFB5_0300,
+            Self::Rpm => 0x00B4_4700,
+        }
+    }
+}
+
+impl AccelerationUnit {
+    /// Every unit.
+    pub const ALL: [Self; 2] = [Self::IncrementsS2, Self::RpmPerS];
+
+    /// The unit in 60AAh (CiA 303-2: prefix, numerator, denominator).
+    pub const fn code(self) -> u32 {
+        match self {
+            Self::IncrementsS2 => 0x00B5_5700,
+            Self::RpmPerS => 0x00C0_0300,
+        }
+    }
+}
+
+section! {
+    /// What the drive's numbers count. Positions are always increments of 6064h.
+    #[derive(Copy)]
+    pub struct UnitsConfig {
+        /// Unit of velocities.
+        pub velocity: VelocityUnit = VelocityUnit::default(),
+        /// Unit of accelerations.
+        pub acceleration: AccelerationUnit = AccelerationUnit::default(),
+        /// Turns of the motor for one of the screw (6091h).
+        pub gear_ratio: f64 = 1.0,
+        /// Travel of the axis for one turn of the screw (6092h), m; needed where the drive counts turns.
+        pub lead_m: Option<f64> = None,
+    }
+}
+
+impl UnitsConfig {
+    /// Travel of the axis for a turn of the motor, m; none where the profile has no lead.
+    pub fn travel_per_turn_m(&self) -> Option<f64> {
+        Some(self.lead_m? / self.gear_ratio)
+    }
+
+    fn validate(&self) -> Checked {
+        require_positive(&keyed!("drive_profile.units", self, gear_ratio))?;
+        let counts_turns =
+            self.velocity == VelocityUnit::Rpm || self.acceleration == AccelerationUnit::RpmPerS;
+        let need = "enter the travel of a turn of the screw: the drive counts turns of the motor";
+        match self.lead_m {
+            Some(lead_m) => require_positive(&[("drive_profile.units.lead_m", lead_m)]),
+            None => require(!counts_turns, "drive_profile.units.lead_m", &"none", need),
+        }
+    }
+}
+
+section! {
+    /// The objects of the process data in their order. RPDO1 may also carry the torque offset (60B2h).
+    pub struct PdosConfig {
+        /// Objects of RPDO1.
+        pub rpdo1: Vec<ObjectKey> = object_keys(&PdoMapping::RPDO1),
+        /// Objects of TPDO1.
+        pub tpdo1: Vec<ObjectKey> = object_keys(&PdoMapping::TPDO1),
+    }
+}
+
+fn object_keys(mapping: &PdoMapping) -> Vec<ObjectKey> {
+    mapping.entries().iter().map(|entry| ObjectKey(ObjectAddress::new((entry >> 16) as u16, 0))).collect()
+}
+
+type Constructor = fn(&[ObjectAddress]) -> Result<PdoMapping, PdoMappingError>;
+
+fn mapping_of(keys: &[ObjectKey], of: Constructor) -> Result<PdoMapping, PdoMappingError> {
+    of(&keys.iter().map(|&ObjectKey(object)| object).collect::<Vec<_>>())
+}
+
+impl PdosConfig {
+    /// The mapping of RPDO1; the usual one where the objects are not valid.
+    pub fn rpdo1(&self) -> PdoMapping {
+        mapping_of(&self.rpdo1, PdoMapping::rpdo1).unwrap_or(PdoMapping::RPDO1)
+    }
+
+    /// The mapping of TPDO1; the usual one where the objects are not valid.
+    pub fn tpdo1(&self) -> PdoMapping {
+        mapping_of(&self.tpdo1, PdoMapping::tpdo1).unwrap_or(PdoMapping::TPDO1)
+    }
+
+    fn validate(&self) -> Checked {
+        let places: [(_, _, Constructor); 2] = [
+            ("drive_profile.pdos.rpdo1", &self.rpdo1, PdoMapping::rpdo1),
+            ("drive_profile.pdos.tpdo1", &self.tpdo1, PdoMapping::tpdo1),
+        ];
+        for (key, objects, of) in places {
+            let shown = objects.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+            mapping_of(objects, of).map_err(|error| ScenarioError::bad(key, &shown, error.to_string()))?;
+        }
+        Ok(())
+    }
+}
+
+section! {
+    /// How a drive finds its zero, and what 6064h must show there.
+    #[derive(Copy)]
+    pub struct HomingConfig {
+        /// Homing method (6098h).
+        pub method: i8 = 37,
+        /// Whether the encoder keeps its position without power: then the drive is compared and not moved.
+        pub absolute: bool = true,
+        /// d or l at the home position, m; absent where the drive's own zero is right.
+        pub home_position_m: Option<f64> = None,
+        /// The object that sets 6064h at home.
+        pub home_object: ObjectKey = ObjectKey(ObjectAddress::new(0x607C, 0)),
+        /// Its sign: −1 for the standard's, where 6064h becomes minus the offset.
+        pub home_sign: i8 = -1,
+        /// Whether the software limits (607Dh) count from home; otherwise from the zero of 6064h.
+        pub limits_from_home: bool = true,
+        /// Speed of the search for the switch (6099h:01), m/s.
+        pub speed_m_s: f64 = 0.02,
+        /// Speed of the search for the zero (6099h:02), m/s.
+        pub zero_speed_m_s: f64 = 0.004,
+        /// Acceleration (609Ah), m/s².
+        pub acceleration_m_s2: f64 = 0.5,
+        /// How far a second homing may be from the first, m.
+        pub tolerance_m: f64 = 5e-5,
+    }
+}
+
+impl HomingConfig {
+    /// What `home_object` must be, in increments of a scale with that many metres an increment.
+    pub fn home_increments(&self, increment_m: f64) -> i32 {
+        let home_m = self.home_position_m.unwrap_or(0.0);
+        (f64::from(self.home_sign) * home_m / increment_m).round() as i32
+    }
+
+    /// What the drive subtracts from software limits (607Dh), m.
+    pub fn limit_offset_m(&self) -> f64 {
+        self.home_position_m.filter(|_| self.limits_from_home).unwrap_or(0.0)
+    }
+
+    fn validate(&self) -> Checked {
+        require_positive(&keyed!("drive_profile.homing", self,
+            speed_m_s zero_speed_m_s acceleration_m_s2 tolerance_m
+        ))?;
+        let need = "use -1 (6064h becomes minus the offset) or 1";
+        require(matches!(self.home_sign, -1 | 1), "drive_profile.homing.home_sign", &self.home_sign, need)?;
+        let is_number = self.home_position_m.is_none_or(f64::is_finite);
+        require(is_number, "drive_profile.homing.home_position_m", &f64::NAN, "use a finite number")
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use masseter_can::canopen::ObjectAddress;
-
     use super::*;
     use crate::Scenario;
+    use crate::merge::over_kind;
+
+    #[test]
+    fn every_kind_has_its_own_name_and_a_source() {
+        for (name, _) in KINDS {
+            let table = format!("kind = '{name}'\nunits.lead_m = 0.005").parse().unwrap();
+            let profile: DriveProfile = over_kind(&KINDS, table).unwrap();
+            assert_eq!(profile.kind, name);
+            assert!(!profile.source.is_empty());
+            DriveProfile::validate_all(&[profile]).unwrap();
+        }
+    }
 
     fn read(text: &str) -> Scenario {
         Scenario::parse(std::path::Path::new("robot.toml"), text).unwrap()

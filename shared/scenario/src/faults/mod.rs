@@ -9,9 +9,8 @@ use masseter_model::geometry::AXIS_NAMES;
 use serde::{Deserialize, Serialize};
 
 use super::can::{CanConfig, MASTER_NODE};
-use super::error::ScenarioError;
-use super::need::require_within;
-use super::quantity::Quantity;
+use super::error::{Checked, ScenarioError, bounded, require, require_name, require_within};
+use super::quantity::{Dimension, Quantity};
 use super::when::{EntryNames, When, WhenKeys};
 
 pub use kinds::{FaultKindConfig, FaultLayer, FaultPlace, FaultSize};
@@ -126,31 +125,29 @@ impl FaultConfig {
     }
 
     /// Checks one fault of the list.
-    pub(super) fn validate(&self, can: &CanConfig, entries: &EntryNames<'_>) -> Result<(), ScenarioError> {
+    pub(super) fn validate(&self, can: &CanConfig, entries: &EntryNames<'_>) -> Checked {
         self.when(entries)?;
-        if let Some(name) = &self.name {
-            super::need::require_name("faults.name", name)?;
-        }
-        self.check_keys()?;
-        self.check_axis()?;
-        self.check_size()?;
-        self.check_ranges()?;
+        self.name.as_ref().map_or(Ok(()), |name| require_name("faults.name", name))?;
+        self.require_keys()?;
+        let (name, is_axis) = (self.axis.as_deref().unwrap_or_default(), self.axis().is_some());
+        require(is_axis || self.axis.is_none(), "faults.axis", &name, self.need_of("faults.axis"))?;
+        self.require_size()?;
+        self.require_ranges()?;
         match self.kind.layer() {
-            FaultLayer::Bus => self.check_bus(can),
-            FaultLayer::Encoder | FaultLayer::Drive | FaultLayer::Mechanism if !can.is_virtual() => refuse(
-                "faults.kind",
-                &self.kind,
-                "leave it away with can.interfaces: real drives take no such fault",
-            ),
-            _ => Ok(()),
+            FaultLayer::Bus => self.require_bus(can),
+            FaultLayer::Encoder | FaultLayer::Drive | FaultLayer::Mechanism => {
+                let need = "leave it away with can.interfaces: real drives take no such fault";
+                require(can.is_virtual(), "faults.kind", &self.kind, need)
+            }
+            FaultLayer::Command | FaultLayer::Process => Ok(()),
         }
     }
 
     /// Refuses keys that have no effect on this kind, and requires those that it needs.
-    fn check_keys(&self) -> Result<(), ScenarioError> {
+    fn require_keys(&self) -> Checked {
         use FaultKindConfig::{Babble, BusOff, Disconnect};
         use FaultPlace::{Axes, Axis, Frames, Node};
-        let (kind, place) = (self.kind, self.kind.place());
+        let (kind, place, has_size) = (self.kind, self.kind.place(), self.kind.size().is_some());
         let is_of_bus = matches!(place, Frames | Node);
         let given = [
             ("faults.bus", self.bus.is_some(), is_of_bus, is_of_bus),
@@ -158,16 +155,15 @@ impl FaultConfig {
             ("faults.id", self.id.is_some(), is_of_bus && !matches!(kind, Disconnect | BusOff), false),
             ("faults.data", self.data.is_some(), kind == Babble, false),
             ("faults.axis", self.axis.is_some(), matches!(place, Axis | Axes), place == Axis),
-            ("faults.size", self.size.is_some(), kind.size().is_some(), kind.size().is_some()),
+            ("faults.size", self.size.is_some(), has_size, has_size),
             ("faults.probability", self.probability < 1.0, place == Frames, false),
             ("faults.count", self.count.is_some(), matches!(kind, BusOff | Babble) || place == Frames, false),
         ];
         for (key, is_given, has_effect, is_needed) in given {
-            if is_given && !has_effect {
-                return refuse(key, &"given", format!("leave it away: it has no effect on {kind}"));
-            }
+            let need = format!("leave it away: it has no effect on {kind}");
+            require(has_effect || !is_given, key, &"given", need)?;
             if is_needed && !is_given {
-                return refuse(key, &"none", self.need_of(key));
+                return Err(ScenarioError::bad(key, &"none", self.need_of(key)));
             }
         }
         Ok(())
@@ -186,82 +182,58 @@ impl FaultConfig {
         }
     }
 
-    fn check_axis(&self) -> Result<(), ScenarioError> {
-        match &self.axis {
-            Some(name) if self.axis().is_none() => {
-                refuse("faults.axis", name, format!("name an axis: {}", AXIS_NAMES.join(", ")))
-            }
-            _ => Ok(()),
-        }
-    }
-
-    fn check_size(&self) -> Result<(), ScenarioError> {
+    fn require_size(&self) -> Checked {
         let Some((given, size)) = self.size.zip(self.kind.size()) else { return Ok(()) };
         let si =
             given.si_of(size.dimension).map_err(|need| ScenarioError::bad("faults.size", &given, need))?;
-        if (size.min..=size.max).contains(&si) {
-            return Ok(());
-        }
         let unit = size.dimension.si_unit();
         let need = format!("use {} to {}: {}", unit.text(size.min), unit.text(size.max), size.about);
-        refuse("faults.size", &given, need)
+        require((size.min..=size.max).contains(&si), "faults.size", &given, need)
     }
 
-    fn check_ranges(&self) -> Result<(), ScenarioError> {
-        require_within(&[("faults.probability", self.probability, 0.0, 1.0)])?;
-        let never_acts = "or leave the fault away: it would never act";
-        if self.probability == 0.0 {
-            return refuse("faults.probability", &0, format!("use more than 0, {never_acts}"));
-        }
-        if self.count == Some(0) {
-            return refuse("faults.count", &0, format!("use at least 1, {never_acts}"));
-        }
-        if let Some(data) = self.data.as_ref().filter(|data| data.len() > 8) {
-            return refuse("faults.data", &format!("{} bytes", data.len()), "a frame has at most 8 bytes");
-        }
-        match self.id {
-            Some(id) if id > 0x7FF => refuse("faults.id", &id, "use an 11-bit identifier, at most 0x7FF"),
-            _ => Ok(()),
-        }
+    fn require_ranges(&self) -> Checked {
+        require_within(&bounded!("faults", self, probability [0.0, 1.0]))?;
+        let need = "use more than 0, or leave the fault away: it would never act";
+        require(self.probability > 0.0, "faults.probability", &0, need)?;
+        let need = "use at least 1, or leave the fault away: it would never act";
+        require(self.count != Some(0), "faults.count", &0, need)?;
+        let bytes = self.data.as_ref().map_or(0, Vec::len);
+        let need = "a frame has at most 8 bytes";
+        require(bytes <= 8, "faults.data", &format_args!("{bytes} bytes"), need)?;
+        let id = self.id.unwrap_or_default();
+        require(id <= 0x7FF, "faults.id", &id, "use an 11-bit identifier, at most 0x7FF")
     }
 
-    fn check_bus(&self, can: &CanConfig) -> Result<(), ScenarioError> {
+    fn require_bus(&self, can: &CanConfig) -> Checked {
         let bus = self.bus.unwrap_or_default();
         let Some(axes) = can.buses.get(bus) else {
-            return refuse("faults.bus", &bus, "name a bus of can.buses, from 0");
+            return Err(ScenarioError::bad("faults.bus", &bus, self.need_of("faults.bus")));
         };
         if !can.is_virtual() {
-            self.check_port()?;
+            self.require_port()?;
         }
+        let Some(node) = self.node else { return Ok(()) };
         let drives = axes.iter().filter_map(|&axis| can.node_ids.get(axis).copied());
         let nodes: Vec<u8> = iter::once(MASTER_NODE.get()).chain(drives).collect();
-        match self.node.filter(|node| !nodes.contains(node)) {
-            Some(node) => {
-                let nodes = nodes.iter().map(u8::to_string).collect::<Vec<_>>().join(", ");
-                refuse("faults.node", &node, format!("bus {bus} has the nodes {nodes}"))
-            }
-            None => Ok(()),
-        }
+        let names = nodes.iter().map(u8::to_string).collect::<Vec<_>>().join(", ");
+        let need = format!("bus {bus} has the nodes {names}");
+        require(nodes.contains(&node), "faults.node", &node, need)
     }
 
     /// Refuses faults that the port of a real interface cannot carry out.
-    fn check_port(&self) -> Result<(), ScenarioError> {
-        if self.kind == FaultKindConfig::Corrupt {
-            let need = "leave it away with can.interfaces: only on a simulated bus can frames be destroyed on the wire";
-            return refuse("faults.kind", &"corrupt", need);
-        }
-        if let Some(node) = self.node.filter(|&node| node != MASTER_NODE.get()) {
-            let need =
-                format!("on a real interface only the master (node {MASTER_NODE}) can be given faults");
-            return refuse("faults.node", &node, need);
-        }
-        Ok(())
+    fn require_port(&self) -> Checked {
+        let need =
+            "leave it away with can.interfaces: only on a simulated bus can frames be destroyed on the wire";
+        require(self.kind != FaultKindConfig::Corrupt, "faults.kind", &self.kind, need)?;
+        let node = self.node.unwrap_or(MASTER_NODE.get());
+        let need = format!("on a real interface only the master (node {MASTER_NODE}) can be given faults");
+        require(node == MASTER_NODE.get(), "faults.node", &node, need)
     }
 }
 
 /// A valid size in a unit that people use.
 fn example(size: FaultSize) -> &'static str {
-    use super::quantity::Dimension as D;
+    use Dimension as D;
     match size.dimension {
         D::Length => "0.5 mm",
         D::Velocity => "1 mm/s",
@@ -270,8 +242,4 @@ fn example(size: FaultSize) -> &'static str {
         D::Force => "10 N",
         _ => "0.5",
     }
-}
-
-fn refuse(key: &'static str, value: &dyn Display, need: impl Into<String>) -> Result<(), ScenarioError> {
-    Err(ScenarioError::bad(key, value, need))
 }

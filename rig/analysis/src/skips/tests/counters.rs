@@ -32,7 +32,7 @@ fn counters_are_those_of_the_messages() {
         let found = [seq, skipped, stalled_ns, spun_ns, worked_ns, overlong_ns, late_ns];
         assert_eq!(found, std::array::from_fn(|place| first + place as u64));
         let mut skips = Skips::default();
-        skips.take(&counters, PERIOD_NS, false);
+        skips.account(&counters, PERIOD_NS, false);
         let figures = skips.figures;
         let found =
             [figures.skipped, figures.stalled_ns, figures.spun_ns, figures.worked_ns, figures.overlong_ns];
@@ -59,7 +59,7 @@ fn every_skip_is_counted_once() {
     ];
     for (seq, skipped, stalled_ns, overlong_ns) in messages {
         let counters = Counters { seq, skipped, stalled_ns, overlong_ns, ..Counters::default() };
-        skips.take(&counters, PERIOD_NS, false);
+        skips.account(&counters, PERIOD_NS, false);
     }
     let figures = skips.figures;
     let by_cause = [figures.by_machine, figures.while_working, figures.unknown_cause];

@@ -4,18 +4,277 @@
 //! file, on bit rates and on dummy mapping are passed over. The texts of other code pages than UTF-8 are the caller's:
 //! `String::from_utf8_lossy` changes names alone.
 
-mod data_type;
-mod entry;
-mod error;
-mod file;
-mod ini;
-mod value;
+use std::collections::{BTreeMap, HashMap};
+
+use super::{NodeId, ObjectAddress};
 
 #[cfg(test)]
 mod tests;
+mod text;
 
-pub use data_type::DataType;
-pub use entry::{Access, Entry};
-pub use error::{DcfError, Problem};
-pub use file::Dcf;
-pub use value::Value;
+use text::Section;
+pub use text::{DataType, DcfError, Problem, Value};
+
+const VARIABLES: [u16; 4] = [0x2, 0x5, 0x6, 0x7];
+const COLLECTIONS: [u16; 2] = [0x8, 0x9];
+
+/// A description of a device.
+///
+/// # Examples
+/// ```
+/// use masseter_can::canopen::ObjectAddress;
+/// use masseter_can::canopen::dcf::{Dcf, Value};
+///
+/// let dcf = Dcf::parse("[6065]\nParameterName=Window\nDataType=0x7\nAccessType=rw\nDefaultValue=2000\n")?;
+/// let window = dcf.entry(ObjectAddress::new(0x6065, 0)).expect("it is there");
+/// assert_eq!(window.value(), Some(&Value::Number(2000)));
+///
+/// let error = Dcf::parse("[6065]\nParameterName=Window\nDataType=seven\n").unwrap_err();
+/// assert_eq!(error.line, 3);
+/// # Ok::<(), masseter_can::canopen::dcf::DcfError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Dcf {
+    entries: BTreeMap<ObjectAddress, Entry>,
+    node_id: Option<u8>,
+}
+
+impl Dcf {
+    /// Reads a description.
+    ///
+    /// # Errors
+    /// [`DcfError`] with the first line that cannot be read.
+    pub fn parse(text: &str) -> Result<Self, DcfError> {
+        let sections = Section::read_all(text)?;
+        let by_name: HashMap<_, _> =
+            sections.iter().map(|section| (section.name.to_ascii_lowercase(), section)).collect();
+        let mut dcf = Self::default();
+        for section in &sections {
+            if let Some(index) = index(section.name) {
+                dcf.add_object(index, section, &by_name)?;
+            } else if let Some((index, subindex)) = sub_index(section.name) {
+                if !by_name.contains_key(&format!("{index:04x}")) {
+                    return Err(Problem::NoObject { index, subindex }.at(section.line));
+                }
+                dcf.add(Entry::read(section, ObjectAddress::new(index, subindex))?);
+            }
+        }
+        // The name of this section has one m in CiA 306.
+        if let Some(section) = by_name.get("devicecomissioning") {
+            dcf.node_id = section.number("NodeID", 0xFF)?.map(|id| id as u8);
+        }
+        Ok(dcf)
+    }
+
+    /// All entries, in the order of addresses.
+    pub fn entries(&self) -> impl ExactSizeIterator<Item = &Entry> {
+        self.entries.values()
+    }
+
+    /// The entry of that address.
+    pub fn entry(&self, address: ObjectAddress) -> Option<&Entry> {
+        self.entries.get(&address)
+    }
+
+    /// The node id that a DCF gives the device; 255 where the device has none.
+    pub const fn node_id(&self) -> Option<u8> {
+        self.node_id
+    }
+
+    fn add(&mut self, entry: Entry) {
+        self.entries.insert(entry.address, entry);
+    }
+
+    /// Adds an object without sub-indices, or the entries of a compact array. Others have sections of their own.
+    fn add_object(
+        &mut self,
+        index: u16,
+        section: &Section<'_>,
+        by_name: &HashMap<String, &Section<'_>>,
+    ) -> Result<(), DcfError> {
+        let kind = section.number("ObjectType", 0xFF)?.unwrap_or(0x7);
+        if VARIABLES.contains(&kind) {
+            self.add(Entry::read(section, ObjectAddress::new(index, 0))?);
+        } else if !COLLECTIONS.contains(&kind) {
+            return Err(Problem::UnknownObjectType { code: kind as u8 }.at(section.line));
+        } else if let Some(count @ 1..) = section.number("CompactSubObj", 0xFE)? {
+            self.add_compact(index, count as u8, section, by_name)?;
+        }
+        Ok(())
+    }
+
+    /// The entries of an array that is described once for all of them.
+    fn add_compact(
+        &mut self,
+        index: u16,
+        count: u8,
+        section: &Section<'_>,
+        by_name: &HashMap<String, &Section<'_>>,
+    ) -> Result<(), DcfError> {
+        let part = |suffix| by_name.get(&format!("{index:04x}{suffix}"));
+        let (names, values) = (part("name"), part("value"));
+        let common = Entry::read(section, ObjectAddress::new(index, 0))?;
+        self.add(Entry {
+            name: "Highest sub-index supported".to_owned(),
+            data_type: DataType::U8,
+            access: Access::ReadOnly,
+            default: Some(Value::Number(count.into())),
+            parameter: None,
+            lowest: None,
+            highest: None,
+            is_mappable: false,
+            ..common.clone()
+        });
+        for subindex in 1..=count {
+            let key = subindex.to_string();
+            let name = names.and_then(|names| names.get(&key)).map(|field| field.text.to_owned());
+            let value = values.and_then(|values| values.get(&key));
+            let value = value.map(|field| Value::read(&key, field, common.data_type)).transpose()?;
+            self.add(Entry {
+                address: ObjectAddress::new(index, subindex),
+                name: name.unwrap_or_else(|| format!("{}{key}", common.name)),
+                default: value.or_else(|| common.default.clone()),
+                ..common.clone()
+            });
+        }
+        Ok(())
+    }
+}
+
+/// The index in the name of an object's section.
+fn index(name: &str) -> Option<u16> {
+    (name.len() == 4).then(|| hexadecimal(name)).flatten()
+}
+
+/// Index and sub-index in the name of an entry's section.
+fn sub_index(name: &str) -> Option<(u16, u8)> {
+    let name = name.to_ascii_lowercase();
+    let (object, subindex) = name.split_once("sub")?;
+    Some((index(object)?, u8::try_from(hexadecimal(subindex)?).ok()?))
+}
+
+fn hexadecimal(digits: &str) -> Option<u16> {
+    // The parser itself would take a sign.
+    let is_plain = digits.bytes().all(|digit| digit.is_ascii_hexdigit());
+    is_plain.then(|| u16::from_str_radix(digits, 16).ok()).flatten()
+}
+
+/// `ObjectType` of a domain.
+const DOMAIN_OBJECT: u16 = 0x2;
+
+/// Who may access an entry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Access {
+    /// Nobody changes it, not even the device.
+    Constant,
+    /// Clients may read it.
+    ReadOnly,
+    /// Clients may write it.
+    WriteOnly,
+    /// Clients may read and write it.
+    ReadWrite,
+    /// As [`ReadWrite`](Self::ReadWrite), and a TPDO may carry it.
+    ReadWriteTpdo,
+    /// As [`ReadWrite`](Self::ReadWrite), and an RPDO may carry it.
+    ReadWriteRpdo,
+}
+
+/// An entry.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// Index and sub-index.
+    pub address: ObjectAddress,
+    /// `ParameterName`.
+    pub name: String,
+    /// `DataType`.
+    pub data_type: DataType,
+    /// `AccessType`.
+    pub access: Access,
+    /// `DefaultValue`: the value as delivered.
+    pub default: Option<Value>,
+    /// `ParameterValue`: the value that a DCF gives the device.
+    pub parameter: Option<Value>,
+    /// `LowLimit`.
+    pub lowest: Option<Value>,
+    /// `HighLimit`.
+    pub highest: Option<Value>,
+    /// `PDOMapping`.
+    pub is_mappable: bool,
+    /// Line of its section.
+    pub line: usize,
+}
+
+impl Access {
+    /// Whether a client may read the entry.
+    pub const fn is_readable(self) -> bool {
+        !matches!(self, Self::WriteOnly)
+    }
+
+    /// Whether a client may write the entry.
+    pub const fn is_writable(self) -> bool {
+        !matches!(self, Self::Constant | Self::ReadOnly)
+    }
+}
+
+impl Entry {
+    /// The value of the device: that of the configuration, else that as delivered.
+    pub fn value(&self) -> Option<&Value> {
+        self.parameter.as_ref().or(self.default.as_ref())
+    }
+
+    /// The bytes of a value on the bus, little endian. None where the type and the value do not fit.
+    pub fn encode(&self, value: &Value, node: NodeId) -> Option<Vec<u8>> {
+        let bytes = self.data_type.bits().map(|bits| bits as usize / 8);
+        match (value, bytes) {
+            (Value::Real(real), Some(4)) => Some((*real as f32).to_le_bytes().to_vec()),
+            (Value::Real(real), _) => Some(real.to_le_bytes().to_vec()),
+            (Value::Text(text), None) => Some(text.as_bytes().to_vec()),
+            (value, Some(bytes)) => Some(value.number(node)?.to_le_bytes()[..bytes].to_vec()),
+            (Value::Number(_) | Value::OfNode(_), None) => None,
+        }
+    }
+
+    /// Reads the section of an entry.
+    fn read(section: &Section<'_>, address: ObjectAddress) -> Result<Self, DcfError> {
+        let kind = section.number("ObjectType", 0xFF)?;
+        // CiA 306 lets a domain leave out what is the same for all of them.
+        let may_omit = |key| kind == Some(DOMAIN_OBJECT) && section.get(key).is_none();
+        let data_type = if may_omit("DataType") {
+            DataType::DOMAIN
+        } else {
+            DataType(section.require("DataType")?.number("DataType", u16::MAX)?)
+        };
+        let access = if may_omit("AccessType") {
+            Access::ReadWrite
+        } else {
+            let field = section.require("AccessType")?;
+            access_type(field.text).map_err(|problem| problem.at(field.line))?
+        };
+        let value = |key| section.get(key).map(|field| Value::read(key, field, data_type)).transpose();
+        let is_mappable = section.number("PDOMapping", 1)? == Some(1);
+        Ok(Self {
+            address,
+            name: section.require("ParameterName")?.text.to_owned(),
+            data_type,
+            access,
+            default: value("DefaultValue")?,
+            parameter: value("ParameterValue")?,
+            lowest: value("LowLimit")?,
+            highest: value("HighLimit")?,
+            is_mappable,
+            line: section.line,
+        })
+    }
+}
+
+fn access_type(text: &str) -> Result<Access, Problem> {
+    Ok(match text.to_ascii_lowercase().as_str() {
+        "const" => Access::Constant,
+        "ro" => Access::ReadOnly,
+        "wo" => Access::WriteOnly,
+        "rw" => Access::ReadWrite,
+        "rwr" => Access::ReadWriteTpdo,
+        "rww" => Access::ReadWriteRpdo,
+        _ => return Err(Problem::UnknownAccess { text: text.to_owned() }),
+    })
+}

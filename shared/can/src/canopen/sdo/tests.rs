@@ -2,8 +2,6 @@
 
 use proptest::prelude::*;
 
-use super::super::NodeId;
-use super::payload::LENGTH;
 use super::*;
 
 const HEARTBEAT: ObjectAddress = ObjectAddress::new(0x1017, 0);

@@ -1,8 +1,6 @@
 //! Errors without injected faults: missing acknowledgement, one identifier sent twice, bus-off.
 
-use super::super::queue::Queued;
 use super::*;
-use crate::bus::ErrorState;
 
 fn with(change: impl FnOnce(&mut WireConfig)) -> VirtualWire {
     let mut config = CONFIG;
@@ -110,7 +108,7 @@ fn a_node_in_bus_off_sends_and_receives_nothing_until_its_restart_and_the_wait_a
         .push(Queued { frame: sync::frame(), duration_ns: 51_000, since_ns: 9_000_000 })
         .unwrap();
     wire.nodes.confine(0, 0, |node| node.leave_bus(0, Some(10_000_000)));
-    assert!(wire.nodes.stations[0].transmit.is_empty(), "both frames are discarded");
+    assert!(wire.nodes.stations[0].transmit.frames.is_empty(), "both frames are discarded");
     assert_eq!(wire.port(0).send(0, sync::frame()), Err(SendError::BusOff { tec: 256 }));
     wire.port(1).send(0, frame(0x181, &[])).unwrap();
     wire.advance(10_000_000);

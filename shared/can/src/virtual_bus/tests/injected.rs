@@ -1,8 +1,7 @@
 //! Injected faults: what each kind does to the frames and to the counters.
 
 use super::*;
-use crate::bus::ErrorState;
-use crate::faults::{Fault, FaultKind, Faults};
+use crate::faults::{Fault, FaultKind};
 
 const ANY: Fault = Fault {
     number: 0,

@@ -91,7 +91,7 @@ fn memory_whose_file_is_gone_is_told_from_that_of_another_user() {
     fs::write(&own, "").unwrap();
     std::os::unix::fs::symlink("/dev/null", &link).unwrap();
     let judged = |path: &str, inode: u64| {
-        check_mapped(&format!("7f00-7f01 rw-s 00000000 00:1a {inode}    {path}"), path)
+        check_mapped_file(&format!("7f00-7f01 rw-s 00000000 00:1a {inode}    {path}"), path)
     };
     let (path, inode) = (own.to_str().unwrap(), fs::metadata(&own).unwrap().ino());
     let (same, other) = (judged(path, inode), judged(path, inode + 1));

@@ -2,9 +2,8 @@
 
 use masseter_runtime::named::Declared;
 
-use crate::{junit, page, table};
-
 use super::*;
+use crate::{junit, page, table};
 
 #[test]
 fn what_was_not_tested_is_neither_passed_nor_failed() {
@@ -28,7 +27,7 @@ fn what_was_not_tested_is_neither_passed_nor_failed() {
         assert!(xml.contains("<failure type=\"untested\" message=\"not tested: "), "{xml}");
         let written = serde_json::to_value(&verdict).unwrap();
         assert!(written["checks"].as_array().unwrap().iter().any(|check| check["result"] == "untested"));
-        let text = table::text(&run.manifest, &run.figures, &verdict, table::Detail::Brief);
+        let text = table::table_in_words(&run.manifest, &run.figures, &verdict, table::Detail::Brief);
         assert!(text.starts_with("UNTESTED: ") && text.contains("\n  UNTESTED "), "{text}");
         let page = page::html(&run.manifest, &run.figures, &verdict).unwrap();
         assert!(page.contains("\"word\":\"UNTESTED\"") && page.contains("\"tone\":\"bad\""), "{page}");
@@ -75,7 +74,7 @@ fn a_run_without_a_cycle_claims_nothing() {
         let verdict = Verdict::new(&run.manifest, &run.figures);
         assert_eq!((verdict.word, verdict.reason.as_str()), (word, reason));
         assert_eq!((verdict.timing.word, verdict.checks.len()), (TimingWord::Unknown, 0));
-        let text = table::text(&run.manifest, &run.figures, &verdict, table::Detail::Brief);
+        let text = table::table_in_words(&run.manifest, &run.figures, &verdict, table::Detail::Brief);
         assert!(
             text.contains("\ntiming: unknown, because no cycle ran\n") && !text.contains("FAIL"),
             "{text}"

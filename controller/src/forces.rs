@@ -1,0 +1,355 @@
+//! Forces as the controller knows them: the model of the mechanism, the observer of external forces, and feed-forward.
+
+use masseter_model::dynamics::{Bodies, Equations, Friction, Loads, Motion, Reactions};
+use masseter_model::geometry::{AXES, Mechanism, Pose, Twist};
+use masseter_runtime::messages::Reading;
+use masseter_runtime::named::Signal;
+use masseter_scenario::{ForceEstimateConfig, Scenario};
+use nalgebra::Vector6;
+
+use crate::pose_law::{Detour, ExternalForce, PoseLaw};
+use crate::sequencer::Sequencer;
+
+/// Friction depends on loads, and loads on what friction leaves of the drives' forces: passes until both agree. The
+/// first one is exact for the screws of sliding axes; the others are for guides, and for axes near rest.
+const LOAD_PASSES: usize = 5;
+/// Drives report forces in thousandths of the rated force.
+const STEPS: f64 = 1000.0;
+/// Variance of a value within a step of 1: 1/12.
+const ROUNDING_VARIANCE: f64 = 1.0 / 12.0;
+/// Time from no offset to the whole one, s: the loops of a drive take a tenth of it.
+const FADE_IN_S: f64 = 0.3;
+
+/// The forces of the rig: estimated, measured, and fed forward.
+#[derive(Debug)]
+pub(crate) struct Forces {
+    /// None unless the scenario has the bite force estimated.
+    observer: Option<ForceObserver>,
+    has_load_cell: bool,
+    /// What the load cell showed last, N.
+    pub(crate) load_cell_n: Option<f64>,
+    /// None unless the scenario has forces fed forward.
+    feed_forward: Option<FeedForward>,
+    /// What is fed forward in this cycle, N.
+    pub(crate) offset_n: [f64; AXES],
+}
+
+impl Forces {
+    pub(crate) fn new(scenario: &Scenario, mechanism: &Mechanism) -> Self {
+        let model = || Model::new(scenario, mechanism.clone());
+        let feed_forward = || FeedForward::new(model(), scenario.period_s());
+        Self {
+            observer: scenario.is_force_estimated().then(|| ForceObserver::new(scenario, model())),
+            has_load_cell: scenario.load_cell.is_some(),
+            load_cell_n: None,
+            feed_forward: scenario.controller.feed_forward_torque.then(feed_forward),
+            offset_n: [0.0; AXES],
+        }
+    }
+
+    /// Takes what a reading shows. The observer takes each fresh sample while the drives carry the jaw.
+    pub(crate) fn observe(&mut self, reading: Option<&Reading>, sequencer: &Sequencer) {
+        if let Some(observer) = &mut self.observer {
+            match (reading, sequencer.fresh_estimate()) {
+                _ if !sequencer.is_moving() => observer.reset(),
+                (Some(reading), Some(estimate)) => {
+                    observer.take_sample(reading.cycle, &estimate.solution.pose, &reading.force_n);
+                }
+                _ => {}
+            }
+        }
+        if let Some(reading) = reading.filter(|_| self.has_load_cell) {
+            self.load_cell_n = Some(reading.load_cell_n);
+        }
+    }
+
+    /// The external force on the platform, once there is an estimate.
+    pub(crate) fn external(&self) -> Option<ExternalForce> {
+        self.observer.as_ref().and_then(ForceObserver::external)
+    }
+
+    /// The motion begins anew.
+    pub(crate) fn begin_motion(&mut self) {
+        self.feed_forward.iter_mut().for_each(FeedForward::begin);
+    }
+
+    /// The forces that the motion needs while the drives move to the targets of this cycle: they approach a target
+    /// during the last period before it is reached. `before` is the desired pose so many periods before that.
+    pub(crate) fn feed_forward(&mut self, law: &dyn PoseLaw, before: impl Fn(f64) -> Pose) {
+        if let Some(feed_forward) = &mut self.feed_forward {
+            self.offset_n = feed_forward.offset_n([1.5, 0.5, -0.5].map(before), &law.detour());
+        }
+    }
+
+    /// The signals of the estimate.
+    pub(crate) fn signals(&self) -> impl Iterator<Item = Signal> {
+        self.observer.iter().flat_map(|_| ForceObserver::declared())
+    }
+
+    /// Writes these signals.
+    pub(crate) fn fill_signals(&self, signals: &mut [f64]) {
+        if let Some(observer) = &self.observer {
+            observer.fill_signals(signals);
+        }
+    }
+}
+
+/// A signal with its unit and what it is.
+pub(crate) fn signal(name: &str, unit: &str, about: &str) -> Signal {
+    Signal { name: name.to_owned(), unit: unit.to_owned(), about: about.to_owned() }
+}
+
+/// Masses and friction of a mechanism as the controller believes in them: inverse dynamics with friction.
+///
+/// τ = J⁻ᵀ (M V̇ + h − w) + friction, with the [equations](masseter_model::dynamics) of the rigid bodies.
+#[derive(Debug, Clone)]
+struct Model {
+    mechanism: Mechanism,
+    bodies: Bodies,
+    friction: Friction,
+}
+
+/// Friction in a motion.
+#[derive(Debug, Clone, Copy)]
+struct Braking {
+    /// What the drives overcome on the axes, N.
+    axes_n: Vector6<f64>,
+    /// The largest friction of an axis at rest but for its breakaway, N.
+    coulomb_n: Vector6<f64>,
+    /// Wrench of hinges and ball joints on the platform, N and N m.
+    joints: Vector6<f64>,
+}
+
+impl Model {
+    /// The model in which the controller of a scenario believes.
+    fn new(scenario: &Scenario, mechanism: Mechanism) -> Self {
+        let config = scenario.model();
+        Self { mechanism, bodies: Bodies::from(&config), friction: Friction::new(&config) }
+    }
+
+    /// The motion of a pose and a twist (m/s, rad/s); none for a pose without joint coordinates.
+    fn motion(&self, pose: &Pose, twist: &Twist) -> Option<Motion> {
+        Motion::new(&self.mechanism, pose, twist).ok()
+    }
+
+    /// Forces of the axes d₁ d₂ d₃ l₁ l₂ l₃ (N) that give a motion the acceleration V̇ (m/s², rad/s²) against an
+    /// external wrench on the platform (N, N m); none in a singular pose.
+    fn force_n(&self, motion: &Motion, acceleration: &Twist, wrench: &Vector6<f64>) -> Option<Vector6<f64>> {
+        let equations = Equations::new(&self.bodies, motion);
+        let moved_n = equations.inverse(acceleration, wrench)?;
+        let loads = Reactions::new(&self.bodies, motion, acceleration, &moved_n).loads(&moved_n);
+        let in_joints = self.friction.joint_damping(&loads, motion) * motion.twist;
+        let moved_n = equations.inverse(acceleration, &(wrench - in_joints))?;
+        Some(moved_n + self.drag_n(&loads, motion))
+    }
+
+    /// Friction in a motion in which the drives have these forces, N. The loads leave out that the motion accelerates.
+    fn braking(&self, motion: &Motion, driven_n: &Vector6<f64>) -> Braking {
+        let (mut axes_n, mut loads) = (Vector6::zeros(), Loads::default());
+        for _ in 0..LOAD_PASSES {
+            let moved_n = driven_n - axes_n;
+            loads = Reactions::new(&self.bodies, motion, &Twist::zeros(), &moved_n).loads(&moved_n);
+            // A screw takes a share of what is left: the whole step would overshoot by it.
+            let missing_n = self.drag_n(&loads, motion) - axes_n;
+            axes_n += Vector6::from_fn(|axis, _| missing_n[axis] / (1.0 + self.friction.screw_loss(axis)));
+        }
+        Braking {
+            axes_n,
+            coulomb_n: self.friction.coulomb_n(&loads).into(),
+            joints: self.friction.joint_damping(&loads, motion) * -motion.twist,
+        }
+    }
+
+    /// Forces that overcome the friction of the axes, N.
+    fn drag_n(&self, loads: &Loads, motion: &Motion) -> Vector6<f64> {
+        Vector6::from(self.friction.coulomb_n(loads)).zip_map(&motion.rates_m_s, |coulomb_n, speed_m_s| {
+            self.friction.drag_n_s_per_m(coulomb_n, speed_m_s) * speed_m_s
+        })
+    }
+}
+
+/// The constant twist that leads from one pose to another in a time (s), base axes, m/s and rad/s.
+fn twist_between(from: &Pose, to: &Pose, time_s: f64) -> Twist {
+    let way = to.translation.vector - from.translation.vector;
+    let turn = (to.rotation * from.rotation.inverse()).scaled_axis();
+    Twist::new(way.x, way.y, way.z, turn.x, turn.y, turn.z) / time_s
+}
+
+/// What was measured between the last two samples.
+#[derive(Debug, Clone, Copy)]
+struct Interval {
+    cycle: u64,
+    pose: Pose,
+    /// None before the second sample.
+    driven: Option<Driven>,
+}
+
+/// Mean motion between two samples.
+#[derive(Debug, Clone, Copy)]
+struct Driven {
+    twist: Twist,
+    /// Jᵀ(τ − friction): N, N m.
+    wrench: Vector6<f64>,
+}
+
+/// Observer of the external wrench on the platform: generalised momentum in task space (De Luca and Mattone 2005).
+///
+/// With the momentum p = M V, the forces τ of the drives, and friction, the residual
+///
+/// r = 1/T ∫ (ṗ − Ṁ V − Jᵀ(τ − friction) + h − r) dt
+///
+/// is the external wrench behind a low-pass of the time constant T. No acceleration is needed. Between two samples the
+/// twist is the difference of the poses, and the force of a drive is the mean of that time.
+///
+/// The bite force is the vertical component. Its uncertainty is a bound. The friction of a moving axis is known except
+/// for a share, that of an axis near rest only by its largest size. The drives round their forces: twice the standard
+/// deviation of this rounding counts.
+#[derive(Debug, Clone)]
+struct ForceObserver {
+    model: Model,
+    config: ForceEstimateConfig,
+    period_s: f64,
+    /// A step of the reported force, N.
+    step_n: Vector6<f64>,
+    last: Option<Interval>,
+    /// r: force (N) and moment (N m) on the platform, base axes.
+    residual: Vector6<f64>,
+    uncertainty_n: f64,
+}
+
+impl ForceObserver {
+    /// How many signals the observer has.
+    const SIGNALS: usize = 5;
+
+    /// The signals that the controller publishes of the observer.
+    fn declared() -> [Signal; Self::SIGNALS] {
+        [
+            ("external_force_x_n", "External force on the platform along x of the base."),
+            ("external_force_y_n", "External force on the platform along y of the base."),
+            ("external_force_z_n", "External force on the platform along z of the base."),
+            ("bite_force_n", "Estimated bite force: what pushes the platform downwards."),
+            ("bite_force_uncertainty_n", "Bound of the error of the estimated bite force."),
+        ]
+        .map(|(name, about)| signal(name, "N", about))
+    }
+
+    /// Writes these signals; no numbers before there is an estimate.
+    fn fill_signals(&self, signals: &mut [f64]) {
+        let values = self.external().map(|external| {
+            let [x, y, z] = external.force_n;
+            [x, y, z, external.bite_n(), external.uncertainty_n]
+        });
+        signals.copy_from_slice(&values.unwrap_or([f64::NAN; Self::SIGNALS]));
+    }
+
+    fn new(scenario: &Scenario, model: Model) -> Self {
+        Self {
+            model,
+            config: scenario.force_estimate.unwrap_or_default(),
+            period_s: scenario.period_s(),
+            step_n: Vector6::from_fn(|axis, _| scenario.drives.of_axis(axis).rated_force_n / STEPS),
+            last: None,
+            residual: Vector6::zeros(),
+            uncertainty_n: f64::INFINITY,
+        }
+    }
+
+    /// Forgets everything: the drives' forces say nothing while brakes hold the axes.
+    fn reset(&mut self) {
+        (self.last, self.residual, self.uncertainty_n) = (None, Vector6::zeros(), f64::INFINITY);
+    }
+
+    /// The estimate; none before two intervals have been seen.
+    fn external(&self) -> Option<ExternalForce> {
+        let [x, y, z, moment_x, moment_y, moment_z] = self.residual.into();
+        let is_known = self.uncertainty_n.is_finite();
+        is_known.then_some(ExternalForce {
+            force_n: [x, y, z],
+            moment_nm: [moment_x, moment_y, moment_z],
+            uncertainty_n: self.uncertainty_n,
+        })
+    }
+
+    /// Takes the sample of a cycle: the pose, and the drives' mean forces (N) since the sample before. A gap between
+    /// the cycles begins a new interval.
+    fn take_sample(&mut self, cycle: u64, pose: &Pose, force_n: &[f64; AXES]) {
+        let last = self.last.replace(Interval { cycle, pose: *pose, driven: None });
+        let Some(last) = last.filter(|last| last.cycle + 1 == cycle) else { return };
+        let twist = twist_between(&last.pose, pose, self.period_s);
+        let Some(motion) = self.model.motion(pose, &twist) else { return };
+        let force_n = Vector6::from(*force_n);
+        let braking = self.model.braking(&motion, &force_n);
+        let wrench = motion.jacobian.actuators.tr_mul(&(force_n - braking.axes_n)) + braking.joints;
+        let driven = Driven { twist, wrench };
+        self.last = Some(Interval { cycle, pose: *pose, driven: Some(driven) });
+        if let Some(before) = last.driven {
+            self.observe(&motion, &before, &driven);
+            self.uncertainty_n = self.bite_uncertainty_n(&motion, &braking);
+        }
+    }
+
+    /// Between the middles of two intervals the momentum gains M ΔV.
+    fn observe(&mut self, motion: &Motion, before: &Driven, driven: &Driven) {
+        let Equations { mass, bias, .. } = Equations::new(&self.model.bodies, motion);
+        let gained = mass * (driven.twist - before.twist) / self.period_s;
+        let acting = (before.wrench + driven.wrench) / 2.0 - bias;
+        let share = self.period_s / (self.period_s + self.config.observer_time_s);
+        self.residual += (gained - acting - self.residual) * share;
+    }
+
+    fn bite_uncertainty_n(&self, motion: &Motion, braking: &Braking) -> f64 {
+        let Self { config, step_n, .. } = self;
+        let vertical = motion.jacobian.actuators.column(2);
+        let (mut friction, mut variance) = (0.0, 0.0);
+        for axis in 0..AXES {
+            let is_at_rest = motion.rates_m_s[axis].abs() < config.rest_speed_m_s;
+            let moving_n = config.friction_uncertainty * braking.axes_n[axis].abs();
+            let doubt_n = if is_at_rest { braking.coulomb_n[axis] } else { moving_n };
+            friction += vertical[axis].abs() * doubt_n;
+            variance += (vertical[axis] * step_n[axis]).powi(2) * ROUNDING_VARIANCE;
+        }
+        friction + 2.0 * variance.sqrt()
+    }
+}
+
+/// Feed-forward of forces: what the desired motion needs of each axis while the drives move to the targets of a cycle.
+///
+/// A target acts from the next SYNC on and is reached one period later: the offset of this cycle is that of the middle
+/// of this period. Velocity and acceleration are differences of three desired poses, one period apart. The offsets fade
+/// in, since the drives' own loops carry the weight when the motion begins.
+#[derive(Debug, Clone)]
+struct FeedForward {
+    model: Model,
+    period_s: f64,
+    /// Share of the forces that is fed forward.
+    share: f64,
+}
+
+impl FeedForward {
+    fn new(model: Model, period_s: f64) -> Self {
+        Self { model, period_s, share: 0.0 }
+    }
+
+    /// The motion begins anew.
+    fn begin(&mut self) {
+        self.share = 0.0;
+    }
+
+    /// The forces for the middle one of three desired poses, one period apart, N. A law's detour changes the velocity;
+    /// its acceleration, and its way from the pose, are left out. Zeros in a singular pose.
+    fn offset_n(&mut self, poses: [Pose; 3], detour: &Detour) -> [f64; AXES] {
+        let [before, here, after] = poses;
+        let to = twist_between(&before, &here, self.period_s);
+        let from = twist_between(&here, &after, self.period_s);
+        let mut twist = (to + from) / 2.0;
+        twist.fixed_rows_mut::<3>(0).zip_apply(&detour.ahead_m_s, |mean, more| *mean += more);
+        let acceleration: Twist = (from - to) / self.period_s;
+        let motion = self.model.motion(&here, &twist);
+        let force_n = motion.and_then(|motion| self.model.force_n(&motion, &acceleration, &Twist::zeros()));
+        self.share = (self.share + self.period_s / FADE_IN_S).min(1.0);
+        force_n.map_or([0.0; AXES], |force_n| (force_n * self.share).into())
+    }
+}
+
+#[cfg(test)]
+mod tests;

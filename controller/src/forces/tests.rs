@@ -1,0 +1,193 @@
+//! The model against itself, the observer on a platform that swings, and feed-forward along simple ways.
+
+use masseter_model::geometry::{LEGS, MechanismConfig, Vec3};
+use masseter_scenario::DynamicsConfig;
+use nalgebra::UnitQuaternion;
+
+use super::*;
+
+const PERIOD_S: f64 = 1e-3;
+
+fn model(scenario: &Scenario) -> Model {
+    Model::new(scenario, Mechanism::new(&MechanismConfig::default()).unwrap())
+}
+
+/// A platform that swings, 5 mm and 2° at 1.5 Hz.
+fn pose(time_s: f64) -> Pose {
+    let phase = std::f64::consts::TAU * 1.5 * time_s;
+    Pose::from_parts(
+        Vec3::new(0.001 * phase.cos(), 0.0, 0.27 + 0.005 * phase.sin()).into(),
+        UnitQuaternion::from_scaled_axis(Vec3::new(0.0, 0.035 * phase.sin(), 0.0)),
+    )
+}
+
+/// The mean force of the drives in the period before `time_s`, against a wrench on the platform.
+fn force_n(model: &Model, time_s: f64, wrench: &Vector6<f64>) -> [f64; AXES] {
+    let here_s = time_s - PERIOD_S / 2.0;
+    let twist = |at_s: f64| twist_between(&pose(at_s - 1e-4), &pose(at_s + 1e-4), 2e-4);
+    let acceleration = (twist(here_s + 1e-4) - twist(here_s - 1e-4)) / 2e-4;
+    let motion = model.motion(&pose(here_s), &twist(here_s)).unwrap();
+    model.force_n(&motion, &acceleration, wrench).unwrap().into()
+}
+
+/// Runs from 0 on; returns the estimate of each cycle.
+fn observe(scenario: &Scenario, wrench: impl Fn(f64) -> Vector6<f64>, cycles: u64) -> Vec<Vector6<f64>> {
+    let truth = model(&Scenario::default());
+    let mut observer = ForceObserver::new(scenario, model(scenario));
+    let after = (1..=cycles).map(|cycle| {
+        let time_s = cycle as f64 * PERIOD_S;
+        observer.take_sample(cycle, &pose(time_s), &force_n(&truth, time_s, &wrench(time_s)));
+        observer.residual
+    });
+    after.collect()
+}
+
+#[test]
+fn a_constant_wrench_is_found_in_motion_whatever_its_direction() {
+    let wrench = Vector6::new(5.0, -8.0, -40.0, 0.3, -0.6, 0.1);
+    let found = observe(&Scenario::default(), |_| wrench, 1000);
+    let worst = found[100..].iter().map(|found| (found - wrench).abs()).reduce(|a, b| a.sup(&b)).unwrap();
+    assert!(worst.fixed_rows::<3>(0).amax() < 0.1 && worst.fixed_rows::<3>(3).amax() < 0.01, "{worst}");
+}
+
+#[test]
+fn a_step_is_seen_behind_a_low_pass_of_the_observers_time() {
+    let step = |time_s: f64| if time_s > 0.5 { Vector6::z() * -40.0 } else { Vector6::zeros() };
+    let found = observe(&Scenario::default(), step, 600);
+    // After 3 ms of low-pass and half a period of the mean: 1 − 1/e.
+    let share = found[502][2] / -40.0;
+    assert!((0.45..0.75).contains(&share), "{share}");
+    assert!((found[520][2] + 40.0).abs() < 0.5, "{}", found[520][2]);
+}
+
+#[test]
+fn masses_that_are_wrong_by_a_fifth_shift_the_bite_force_by_a_fifth_of_the_weight() {
+    let mut scenario = Scenario::default();
+    let right = scenario.dynamics;
+    scenario.controller.model = Some(DynamicsConfig {
+        platform_mass_kg: 1.2 * right.platform_mass_kg,
+        rod_mass_kg: 1.2 * right.rod_mass_kg,
+        ..right
+    });
+    let found = observe(&scenario, |_| Vector6::zeros(), 300);
+    let mean_n = found[100..].iter().map(|found| found[2]).sum::<f64>() / 200.0;
+    assert!((mean_n - 0.2 * 1.7 * 9.81).abs() < 0.4, "{mean_n}");
+}
+
+#[test]
+fn near_rest_the_uncertainty_has_the_whole_coulomb_friction_of_the_legs() {
+    let scenario = Scenario::default();
+    let mut observer = ForceObserver::new(&scenario, model(&scenario));
+    let uncertainty_n = |observer: &ForceObserver| observer.external().map(|external| external.uncertainty_n);
+    for cycle in 1..=3 {
+        assert_eq!(uncertainty_n(&observer), None, "cycle {cycle}");
+        observer.take_sample(cycle, &Pose::translation(0.0, 0.0, 0.27), &[0.0; AXES]);
+    }
+    let at_rest_n = uncertainty_n(&observer).unwrap();
+    // 1.25 N a leg, and two standard deviations of three forces in steps of 0.5 N.
+    assert!((at_rest_n - LEGS as f64 * 1.25 - 0.5).abs() < 0.1, "{at_rest_n}");
+    for cycle in 4..=6 {
+        observer.take_sample(cycle, &Pose::translation(0.0, 0.0, 0.27 + 5e-5 * cycle as f64), &[0.0; AXES]);
+    }
+    let moving_n = uncertainty_n(&observer).unwrap();
+    // 1.25 N, 20 N s/m at 50 mm/s, and a ninth of that in the screw.
+    assert!((moving_n - 0.1 * LEGS as f64 * 2.5 - 0.5).abs() < 0.05, "{moving_n}");
+}
+
+#[test]
+fn a_gap_in_the_readings_begins_anew_without_a_jump() {
+    let scenario = Scenario::default();
+    let truth = model(&scenario);
+    let mut observer = ForceObserver::new(&scenario, model(&scenario));
+    for cycle in (1..=200).chain(205..=400) {
+        let time_s = cycle as f64 * PERIOD_S;
+        observer.take_sample(cycle, &pose(time_s), &force_n(&truth, time_s, &Vector6::zeros()));
+        assert!(observer.residual[2].abs() < 1.0 || cycle < 5, "cycle {cycle}: {}", observer.residual[2]);
+    }
+}
+
+fn offset_n(
+    dynamics: &DynamicsConfig,
+    velocity_m_s: f64,
+    acceleration_m_s2: f64,
+    detour: &Detour,
+) -> [f64; AXES] {
+    let scenario = Scenario { dynamics: *dynamics, ..Scenario::default() };
+    let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
+    let mut feed = FeedForward { share: 1.0, ..FeedForward::new(Model::new(&scenario, mechanism), PERIOD_S) };
+    let at = |time_s: f64| {
+        let way_m = velocity_m_s * time_s + acceleration_m_s2 * time_s * time_s / 2.0;
+        Pose::translation(0.0, 0.0, 0.268_452_355 + way_m)
+    };
+    feed.offset_n([at(-PERIOD_S), at(0.0), at(PERIOD_S)], detour)
+}
+
+fn legs_n(forces_n: [f64; AXES]) -> f64 {
+    forces_n[LEGS..].iter().sum()
+}
+
+#[test]
+fn at_rest_the_legs_carry_the_weight_of_platform_and_rods() {
+    let still = offset_n(&DynamicsConfig::default(), 0.0, 0.0, &Detour::default());
+    let weight_n = (0.5 + 3.0 * 0.4) * 9.81;
+    assert!((legs_n(still) - weight_n).abs() < 0.3, "{still:?}");
+    assert!(still[..LEGS].iter().all(|slide_n| slide_n.abs() < 0.5), "{still:?}");
+}
+
+#[test]
+fn friction_changes_its_sign_with_the_motion_and_mass_adds_with_the_acceleration() {
+    let frictionless = DynamicsConfig::default().without_friction();
+    let none = Detour::default();
+    let [up, down] =
+        [0.05, -0.05].map(|speed| legs_n(offset_n(&DynamicsConfig::default(), speed, 0.0, &none)));
+    // Each leg: 1.25 N and 20 N s/m · 50 mm/s, in both directions; and the screws lose a ninth of the weight.
+    let screws_n = 2.0 * (0.5 + 3.0 * 0.4) * 9.81 / 9.0;
+    assert!((up - down - 13.5 - screws_n).abs() < 0.2, "{up} {down}");
+    let [still, gains] = [0.0, 2.0].map(|gain| legs_n(offset_n(&frictionless, 0.0, gain, &none)));
+    assert!((gains - still - 2.0 * 1.7).abs() < 0.2, "{still} {gains}");
+}
+
+#[test]
+fn the_forces_fade_in_after_a_beginning() {
+    let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
+    let mut feed = FeedForward::new(Model::new(&Scenario::default(), mechanism), PERIOD_S);
+    let mut weight_n = || legs_n(feed.offset_n([Pose::translation(0.0, 0.0, 0.27); 3], &Detour::default()));
+    let first_n = weight_n();
+    let most_n = (0..400).map(|_| weight_n()).fold(0.0, f64::max);
+    assert!(first_n < 0.1 && (most_n - 1.7 * 9.81).abs() < 0.3, "{first_n} {most_n}");
+    feed.begin();
+    assert!(feed.share <= 0.0);
+}
+
+#[test]
+fn a_law_that_holds_the_platform_back_takes_the_friction_back() {
+    let held = Detour { ahead_m_s: Vec3::new(0.0, 0.0, -0.05), ..Detour::default() };
+    let [still, held] = [(0.0, Detour::default()), (0.05, held)]
+        .map(|(speed, detour)| legs_n(offset_n(&DynamicsConfig::default(), speed, 0.0, &detour)));
+    assert!((still - held).abs() < 1e-6, "{still} {held}");
+}
+
+#[test]
+fn friction_is_found_in_the_forces_of_the_drives_whatever_the_screws_lose() {
+    let wrench = Vector6::z() * -40.0;
+    // A load that drives is hidden by a screw that locks itself.
+    for (leg_screw_efficiency, speeds_m_s) in
+        [(0.9, [0.05, -0.05]), (0.8, [0.05, -0.05]), (0.3, [0.05, 0.02])]
+    {
+        let mut scenario = Scenario::default();
+        scenario.dynamics.friction.leg_screw_efficiency = leg_screw_efficiency;
+        let model = Model::new(&scenario, Mechanism::new(&MechanismConfig::default()).unwrap());
+        for speed_m_s in speeds_m_s {
+            let twist = Vector6::z() * speed_m_s;
+            let motion = model.motion(&Pose::translation(0.0, 0.0, 0.268), &twist).unwrap();
+            let driven_n = model.force_n(&motion, &Twist::zeros(), &wrench).unwrap();
+            let braking = model.braking(&motion, &driven_n);
+            let found = motion.jacobian.actuators.tr_mul(&(driven_n - braking.axes_n)) + braking.joints;
+            let needed = Equations::new(&model.bodies, &motion).bias - wrench;
+            assert!(
+                (found - needed).amax() < 0.5,
+                "{leg_screw_efficiency} at {speed_m_s} m/s: {found} {needed}"
+            );
+        }
+    }
+}

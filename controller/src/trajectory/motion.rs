@@ -1,0 +1,271 @@
+//! A motion of the jaw on the platform, and its own clock: it starts and stops smoothly, so that any motion starts and
+//! ends at rest while its path stays what it is.
+
+use masseter_model::geometry::{Mechanism, Pose};
+use masseter_scenario::{JawConfig, MotionConfig};
+
+use super::doubts::jumps;
+use super::generators::{Chewing, Excursion, minimum_jerk_integral};
+use super::import::import;
+use super::mandible::JawFrame;
+use super::recording::Recording;
+use super::{TrajectoryError, interpolate, require};
+
+/// How long the clock takes to reach full speed, and to stop, s.
+const RAMP_S: f64 = 0.5;
+
+/// Less is rounding, s.
+const SHORTEST_CUT_S: f64 = 1e-6;
+
+/// Duration of a generated motion without `duration_s`, s.
+const GENERATED_DURATION_S: f64 = 10.0;
+
+/// The desired pose of the platform as a function of time.
+///
+/// ```
+/// use masseter_controller::trajectory::Trajectory;
+/// use masseter_scenario::{JawConfig, MotionConfig};
+/// use masseter_model::geometry::{Mechanism, MechanismConfig};
+///
+/// let mechanism = Mechanism::new(&MechanismConfig::default())?;
+/// let chewing = Trajectory::new(&MotionConfig::default(), &JawConfig::default(), &mechanism, Some(5.0))?;
+/// assert!(chewing.pose(0.3).translation.z < chewing.pose(0.0).translation.z);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Trajectory {
+    motion: Motion,
+    clock: MotionClock,
+    frame: JawFrame,
+}
+
+#[derive(Debug, Clone)]
+enum Motion {
+    Chewing(Chewing),
+    Excursion(Excursion),
+    Recording(Recording),
+}
+
+impl Trajectory {
+    /// Builds the motion. `duration_s` cuts it or holds its last pose; by default a generator runs
+    /// for 10 s and a recording to its end.
+    ///
+    /// # Errors
+    /// When a value lies outside its range, the file cannot be used, or no closed pose exists.
+    pub fn new(
+        config: &MotionConfig,
+        jaw: &JawConfig,
+        mechanism: &Mechanism,
+        duration_s: Option<f64>,
+    ) -> Result<Self, TrajectoryError> {
+        if let Some(duration_s) = duration_s {
+            require("duration_s", duration_s, duration_s > 0.0, "above 0")?;
+        }
+        let frame = JawFrame::new(jaw, mechanism)?;
+        let motion = match config {
+            MotionConfig::Chewing(config) => Motion::Chewing(Chewing::new(config, jaw)?),
+            MotionConfig::Opening(config) => Motion::Excursion(Excursion::opening(config, jaw)?),
+            MotionConfig::Protrusion(config) => Motion::Excursion(Excursion::protrusion(config, jaw)?),
+            MotionConfig::Lateral(config) => Motion::Excursion(Excursion::lateral(config, jaw)?),
+            MotionConfig::File(config) => Motion::Recording(import(config, jaw)?),
+        };
+        let clock = motion.clock(duration_s);
+        Ok(Self { motion, clock, frame })
+    }
+
+    /// The same motion at a share of its speed.
+    #[must_use]
+    pub fn slowed(mut self, speed: f64) -> Self {
+        self.clock = self.clock.slowed(speed);
+        self
+    }
+
+    /// The platform in the base frame `t_s` seconds after the start; at rest before 0 and after
+    /// [`duration_s`](Self::duration_s).
+    pub fn pose(&self, t_s: f64) -> Pose {
+        self.pose_in_motion(self.motion_time_s(t_s))
+    }
+
+    /// The same with a share of the jaw's way from its first pose.
+    pub(crate) fn scaled_pose(&self, t_s: f64, amplitude: f64) -> Pose {
+        if amplitude >= 1.0 {
+            return self.pose(t_s);
+        }
+        let [first, there] =
+            [0.0, self.motion_time_s(t_s)].map(|motion_s| self.motion.displacement(motion_s));
+        self.frame.platform(&interpolate(&first, &there, amplitude))
+    }
+
+    /// The platform in the base frame at a time of the motion, s.
+    pub fn pose_in_motion(&self, motion_s: f64) -> Pose {
+        self.frame.platform(&self.motion.displacement(motion_s))
+    }
+
+    /// The platform in the base frame when the mouth is closed.
+    pub(crate) fn closed_pose(&self) -> Pose {
+        self.frame.platform(&Pose::identity())
+    }
+
+    /// How far the motion has come `t_s` seconds after the start, s: of a recording, the time since its first row. It
+    /// passes more slowly while the motion gathers speed and while it comes to rest.
+    pub fn motion_time_s(&self, t_s: f64) -> f64 {
+        self.clock.motion_time_s(t_s)
+    }
+
+    /// How long the trajectory lasts, s.
+    pub fn duration_s(&self) -> f64 {
+        self.clock.duration_s
+    }
+
+    /// How long the whole motion would take, s, where the duration cuts it: it then ends somewhere on its way.
+    pub fn cut_from_s(&self) -> Option<f64> {
+        self.clock.cut_from_s()
+    }
+
+    /// The largest turn of the jaw, degrees, if a recording of markers gives no incisal point and the turn makes their
+    /// centroid a bad substitute.
+    pub fn centroid_turn_deg(&self) -> Option<f64> {
+        let Motion::Recording(recording) = &self.motion else { return None };
+        recording.centroid_turn_deg
+    }
+
+    /// What is doubtful in a recording, each with its line; nothing for a generator.
+    pub fn doubts(&self) -> Vec<String> {
+        let Motion::Recording(recording) = &self.motion else { return Vec::new() };
+        recording.doubts.iter().cloned().chain(jumps(&recording.glitches)).collect()
+    }
+
+    /// File and line, `motion.csv:7`, of the recording nearest to a time of the trajectory; none for a generator.
+    pub fn source_line(&self, t_s: f64) -> Option<String> {
+        let Motion::Recording(recording) = &self.motion else { return None };
+        Some(recording.source_line(self.motion_time_s(t_s)))
+    }
+}
+
+impl Motion {
+    /// Generators play whole cycles only, so that they end closed, but for a duration in which not even one fits.
+    fn clock(&self, duration_s: Option<f64>) -> MotionClock {
+        let cycle = match self {
+            Self::Chewing(chewing) => &chewing.cycle,
+            Self::Excursion(excursion) => &excursion.cycle,
+            Self::Recording(recording) => {
+                let length_s = recording.length_s();
+                return MotionClock::new(length_s, duration_s.unwrap_or(length_s + RAMP_S));
+            }
+        };
+        let duration_s = duration_s.unwrap_or(GENERATED_DURATION_S);
+        MotionClock::new(cycle.whole_cycles_s(duration_s - RAMP_S), duration_s)
+    }
+
+    /// Displacement of the lower jaw from the closed pose, jaw frame.
+    fn displacement(&self, motion_s: f64) -> Pose {
+        match self {
+            Self::Chewing(chewing) => chewing.displacement(motion_s),
+            Self::Excursion(excursion) => excursion.displacement(motion_s),
+            Self::Recording(recording) => recording.displacement(motion_s),
+        }
+    }
+}
+
+/// Maps the trajectory's time to the motion's time.
+#[derive(Debug, Clone, Copy)]
+struct MotionClock {
+    /// Share of real time at which it runs.
+    speed: f64,
+    ramp_s: f64,
+    stopped_s: f64,
+    duration_s: f64,
+    /// What the motion takes to its end.
+    whole_s: f64,
+}
+
+impl MotionClock {
+    /// A clock for a motion of some length in a trajectory of some duration, both above 0.
+    ///
+    /// A ramp covers half its time, so a motion takes one ramp longer than its length. What is left
+    /// of the duration is held; what does not fit into it is cut.
+    fn new(length_s: f64, duration_s: f64) -> Self {
+        let ramp_s = RAMP_S.min(length_s).min(duration_s / 2.0);
+        let whole_s = length_s + RAMP_S.min(length_s);
+        Self { speed: 1.0, ramp_s, stopped_s: duration_s.min(length_s + ramp_s), duration_s, whole_s }
+    }
+
+    /// The same clock at a share of its speed.
+    fn slowed(self, speed: f64) -> Self {
+        Self {
+            speed: self.speed * speed,
+            duration_s: self.duration_s / speed,
+            whole_s: self.whole_s / speed,
+            ..self
+        }
+    }
+
+    /// What the motion would take to its end, s, where the duration cuts it by more than rounding.
+    fn cut_from_s(&self) -> Option<f64> {
+        (self.duration_s < self.whole_s - SHORTEST_CUT_S).then_some(self.whole_s)
+    }
+
+    /// The motion's time, s.
+    fn motion_time_s(&self, t_s: f64) -> f64 {
+        let t_s = t_s * self.speed;
+        let ramped = |t_s: f64| self.ramp_s * minimum_jerk_integral(t_s / self.ramp_s);
+        let to_stop_s = self.stopped_s - t_s;
+        if t_s < self.ramp_s {
+            ramped(t_s)
+        } else if to_stop_s < self.ramp_s {
+            self.stopped_s - self.ramp_s - ramped(to_stop_s)
+        } else {
+            t_s - self.ramp_s / 2.0
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn a_motion_is_played_to_its_end_and_held_there() {
+        let table = [
+            (3.0, 3.5, 3.0),
+            (3.0, 5.0, 3.0),
+            (3.0, 2.0, 1.5),
+            (0.1, 1.0, 0.1),
+            (3.0, 0.2, 0.1),
+            (0.1, 0.15, 0.075),
+        ];
+        for (length_s, duration_s, end_s) in table {
+            let clock = MotionClock::new(length_s, duration_s);
+            assert!((clock.motion_time_s(duration_s) - end_s).abs() < 1e-12);
+            assert!((clock.motion_time_s(duration_s + 9.0) - end_s).abs() < 1e-12);
+            assert_eq!(clock.cut_from_s().is_some(), end_s < length_s);
+            assert!(clock.motion_time_s(-1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_slowed_motion_passes_the_same_times_later() {
+        let clock = MotionClock::new(3.0, 3.2);
+        let slow = clock.slowed(0.1);
+        assert!((slow.duration_s - 32.0).abs() < 1e-9);
+        assert!(slow.cut_from_s().is_some_and(|whole_s| (whole_s - 35.0).abs() < 1e-9));
+        for t_s in [0.1, 1.0, 3.0, 9.0] {
+            assert!((slow.motion_time_s(10.0 * t_s) - clock.motion_time_s(t_s)).abs() < 1e-9);
+        }
+    }
+
+    proptest! {
+        /// Never backwards, never faster than real time, never a jump.
+        #[test]
+        fn the_clock_runs_between_standstill_and_real_time(
+            length_s in 0.05..20.0f64, duration_s in 0.05..20.0f64, share in 0.0..1.0f64,
+        ) {
+            let clock = MotionClock::new(length_s, duration_s);
+            let (t_s, step_s) = (share * duration_s, 1e-4);
+            let passed_s = clock.motion_time_s(t_s + step_s) - clock.motion_time_s(t_s);
+            prop_assert!((-1e-12..=step_s + 1e-12).contains(&passed_s));
+        }
+    }
+}

@@ -1,0 +1,522 @@
+//! Every deviation of one drive from what scenario and profile need, and what would mend it.
+//!
+//! Units and ratios of a drive stand beside those of its profile: a wrong one scales every motion.
+
+use masseter_can::canopen::{CobId, ObjectAddress};
+use masseter_can::cia402::Statusword;
+use masseter_scenario::{
+    AccelerationUnit, DriveProfile, INCREMENTS, ObjectConfig, ObjectKey, ObjectRule, VelocityUnit,
+};
+use serde::Serialize;
+
+use super::errors::{object_name, reason_text, value_text};
+use super::settings::{Difference, Settings, Survey};
+use crate::master::wanted::{WantedDrive, WantedIdentity};
+
+/// Bit of 6502h: cyclic synchronous position.
+const CYCLIC_POSITION: u32 = 1 << 7;
+
+/// Every deviation of a drive.
+pub fn deviations(
+    survey: &Survey,
+    wanted: &WantedDrive,
+    settings: &Settings,
+    profile: &DriveProfile,
+) -> Vec<Deviation> {
+    let mut all: Vec<_> =
+        wanted.identity.iter().filter_map(|&identity| of_identity(survey, identity)).collect();
+    all.extend(of_state(survey));
+    all.extend(of_units(survey, profile, wanted.increment_m));
+    let differences = settings.differences(survey);
+    // A unit that the profile writes is mended; one that it expects is told in words.
+    all.retain(|found| {
+        let mut written = differences.iter().filter(|difference| difference.rule != ObjectRule::Expect);
+        !written.any(|difference| difference.object == found.object)
+    });
+    all.extend(of_ratios(survey, profile, wanted.increment_m));
+    let is_told = |difference: &&Difference| all.iter().any(|found| found.object == difference.object);
+    let others: Vec<_> = differences.iter().filter(|difference| !is_told(difference)).collect();
+    all.extend(others.into_iter().map(|difference| of_object(survey, difference)));
+    all.into_iter().map(|found| found.deviation).collect()
+}
+
+/// A value, or why there is none.
+fn found_text(survey: &Survey, object: ObjectAddress) -> String {
+    let refusal = || survey.refusal(object).map_or_else(|| "not there".to_owned(), reason_text);
+    survey.number(object).map_or_else(refusal, |value| value_text(object, value))
+}
+
+fn of_identity(survey: &Survey, WantedIdentity { object, mask, value }: WantedIdentity) -> Option<Found> {
+    let is_right = survey.number(object).is_some_and(|found| found & mask == value & mask);
+    let key = match object {
+        ObjectAddress { index: 0x1000, .. } => "drive_profile.identity.device_type",
+        ObjectAddress { subindex: 1, .. } => "drive_profile.identity.vendor_id",
+        ObjectAddress { subindex: 2, .. } => "drive_profile.identity.product_code",
+        _ => "drive_profile.identity.revision",
+    };
+    let values = [value_text(object, value & mask), found_text(survey, object)];
+    let remedy = "enter this drive's identity, or use the drive that the profile is for";
+    (!is_right).then(|| Found::new(object, values, Outcome::Refused, remedy, key))
+}
+
+fn of_state(survey: &Survey) -> Vec<Found> {
+    let (modes, status) = (ObjectAddress::new(0x6502, 0), ObjectAddress::new(0x6041, 0));
+    let mut all = Vec::new();
+    if survey.number(modes).is_some_and(|modes| modes & CYCLIC_POSITION == 0) {
+        let values = ["bit 7".to_owned(), found_text(survey, modes)];
+        let remedy = "the drive has no cyclic synchronous position mode: the rig cannot use it";
+        all.push(Found::new(modes, values, Outcome::Refused, remedy, ""));
+    }
+    let state = survey.number(status).map(|word| Statusword(word as u16).state());
+    if let Some(Ok(state)) = state
+        && state.is_powered()
+    {
+        let values = ["no voltage".to_owned(), format!("{state:?}")];
+        let remedy = "configure refuses unless --take-over may stop the drive";
+        all.push(Found::new(status, values, Outcome::Doubtful, remedy, ""));
+    }
+    let error = ObjectAddress::new(0x603F, 0);
+    if survey.number(error).is_some_and(|code| code != 0) {
+        let values = ["0h".to_owned(), found_text(survey, error)];
+        all.push(Found::new(error, values, Outcome::Doubtful, "find the cause in the drive's manual", ""));
+    }
+    all.extend(of_switches(survey));
+    all
+}
+
+/// A limit switch that is closed while the axis stands.
+fn of_switches(survey: &Survey) -> Option<Found> {
+    let inputs = ObjectAddress::new(0x60FD, 0);
+    let closed = match survey.number(inputs)? & 0b11 {
+        0 => return None,
+        0b01 => "negative closed",
+        0b10 => "positive closed",
+        _ => "both closed",
+    };
+    let remedy =
+        "a limit switch: the axis is at its end, or its wire is broken; no jog goes in its direction";
+    let values = ["open", closed].map(str::to_owned);
+    Some(Found::new(inputs, values, Outcome::Doubtful, remedy, ""))
+}
+
+fn of_object(survey: &Survey, difference: &Difference) -> Found {
+    let Difference { object, wanted, found, rule, key } = difference;
+    let is_pdo = (0x1400..0x1C00).contains(&object.index);
+    let is_communication = matches!(object.index, 0x1400..0x1600 | 0x1800..0x1A00);
+    let is_off = is_communication && object.subindex == 1 && !CobId(*wanted).is_valid();
+    let (outcome, remedy) = match (rule, found) {
+        (ObjectRule::Expect, _) => (Outcome::Refused, "the profile expects another value".to_owned()),
+        (ObjectRule::Optional, None) => (Outcome::Doubtful, "left".to_owned()),
+        (_, None) if !is_pdo => {
+            let remedy = "the drive has no such object: give it the rule 'absent' or 'optional'";
+            (Outcome::Refused, remedy.to_owned())
+        }
+        (_, None) if is_communication => (Outcome::Refused, "the drive has no such PDO".to_owned()),
+        (_, None) => (Outcome::Mended, "map".to_owned()),
+        (_, Some(_)) if is_off => (Outcome::Mended, "switch off".to_owned()),
+        (_, Some(_)) => (Outcome::Mended, format!("write {}", value_text(*object, *wanted))),
+    };
+    let wanted = if is_off { "off".to_owned() } else { value_text(*object, *wanted) };
+    let is_missing = outcome == Outcome::Refused && found.is_none() && !is_pdo;
+    let key = if is_missing { "drive_profile.objects" } else { key };
+    Found::new(*object, [wanted, found_text(survey, *object)], outcome, &remedy, key)
+}
+
+/// What becomes of a deviation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// `configure` mends it.
+    Mended,
+    /// Somebody should look at it; it stops nothing.
+    Doubtful,
+    /// `configure` cannot mend it and refuses.
+    Refused,
+}
+
+/// One deviation.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Deviation {
+    /// The object, such as `6066h:00h`.
+    pub object: String,
+    /// Its name.
+    pub name: &'static str,
+    /// The value that the rig needs.
+    pub wanted: String,
+    /// The value of the drive.
+    pub found: String,
+    /// What becomes of it.
+    pub outcome: Outcome,
+    /// What `configure` would do, or what the user should.
+    pub remedy: String,
+    /// The key of the scenario that decides.
+    pub key: String,
+}
+
+/// A deviation with the object that it is of.
+struct Found {
+    object: ObjectAddress,
+    deviation: Deviation,
+}
+
+impl Found {
+    /// A deviation of an object: its value as wanted and as found, in words.
+    fn new(
+        object: ObjectAddress,
+        [wanted, found]: [String; 2],
+        outcome: Outcome,
+        remedy: &str,
+        key: &str,
+    ) -> Self {
+        let (name, remedy, key) = (object_name(object), remedy.to_owned(), key.to_owned());
+        let deviation = Deviation { object: object.to_string(), name, wanted, found, outcome, remedy, key };
+        Self { object, deviation }
+    }
+}
+
+/// Degrees, tenths of a degree and turns of the screw; millimetres and micrometres (CiA 303-2).
+const DEGREES: u32 = 0x0041_0000;
+const TENTH_DEGREES: u32 = 0xFF41_0000;
+const TURNS: u32 = 0x00B4_0000;
+const MILLIMETRES: u32 = 0xFD01_0000;
+const MICROMETRES: u32 = 0xFA01_0000;
+
+/// The unit of a code in words.
+fn unit_name(code: u32) -> Option<&'static str> {
+    const NAMES: [(u32, &str); 11] = [
+        (INCREMENTS, "increments"),
+        (DEGREES, "degrees"),
+        (TENTH_DEGREES, "0.1 degrees"),
+        (TURNS, "turns"),
+        (MILLIMETRES, "mm"),
+        (MICROMETRES, "µm"),
+        (AccelerationUnit::IncrementsS2.code(), "increments/s²"),
+        (AccelerationUnit::RpmPerS.code(), "rpm/s"),
+        (VelocityUnit::IncrementsS.code(), "increments/s"),
+        (VelocityUnit::TenthIncrementsS.code(), "0.1 increments/s"),
+        (VelocityUnit::Rpm.code(), "rpm"),
+    ];
+    NAMES.iter().find(|(known, _)| *known == code).map(|(_, name)| *name)
+}
+
+/// Way of a unit of position, m; none without the lead of the screw where that decides, and for other units.
+fn way_m(code: u32, lead_m: Option<f64>) -> Option<f64> {
+    match code {
+        MICROMETRES => Some(1e-6),
+        MILLIMETRES => Some(1e-3),
+        TENTH_DEGREES => lead_m.map(|lead_m| lead_m / 3600.0),
+        DEGREES => lead_m.map(|lead_m| lead_m / 360.0),
+        TURNS => lead_m,
+        _ => None,
+    }
+}
+
+/// The unit of 6064h (60A8h): one as long as the rig's increment is as good as increments.
+fn of_position(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Option<Found> {
+    let object = ObjectAddress::new(0x60A8, 0);
+    let code = told(survey, profile, object).filter(|&code| code != INCREMENTS)?;
+    let values = |found: &str| ["increments".to_owned(), found.to_owned()];
+    let Some(unit) = unit_name(code) else {
+        let (found, key) = (value_text(object, code), "drive_profile.objects");
+        let remedy =
+            format!("the drive counts position in {found}, the profile declares increments: change one");
+        return Some(Found::new(object, values(&found), Outcome::Doubtful, &remedy, key));
+    };
+    let (remedy, key) = match way_m(code, profile.units.lead_m) {
+        Some(way_m) if (way_m / increment_m - 1.0).abs() < 1e-6 => return None,
+        Some(way_m) => {
+            let [way_um, increment_um] = [way_m, increment_m].map(|length_m| (length_m * 1e9).round() / 1e3);
+            let remedy = format!(
+                "the drive counts position in {unit} ({way_um} µm), an increment of the scenario is {increment_um} µm: change one"
+            );
+            (remedy, "encoder_resolution_m")
+        }
+        None => {
+            let remedy = format!(
+                "the drive counts position in {unit}: enter the lead of the screw, or let the drive count increments"
+            );
+            (remedy, "drive_profile.units.lead_m")
+        }
+    };
+    Some(Found::new(object, values(unit), Outcome::Refused, &remedy, key))
+}
+
+/// Units as far as the drive tells them (60A8h to 60AAh). A value that configure writes counts, and not the one that it replaces.
+fn of_units(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Found> {
+    let units = &profile.units;
+    let declared = [
+        (0x60A9, units.velocity.code(), "velocity", "drive_profile.units.velocity"),
+        (0x60AA, units.acceleration.code(), "acceleration", "drive_profile.units.acceleration"),
+    ];
+    let of_code = |(index, declared, quantity, key)| {
+        let object = ObjectAddress::new(index, 0);
+        let code = told(survey, profile, object).filter(|&code| code != declared)?;
+        let declared = unit_name(declared).expect("every unit of a profile has a name");
+        // Drives use codes of their own for units that the rig has: such a code proves nothing.
+        let (found, outcome) = match unit_name(code) {
+            Some(name) => (name.to_owned(), Outcome::Refused),
+            None => (value_text(object, code), Outcome::Doubtful),
+        };
+        let remedy =
+            format!("the drive counts {quantity} in {found}, the profile declares {declared}: change one");
+        Some(Found::new(object, [declared.to_owned(), found], outcome, &remedy, key))
+    };
+    of_position(survey, profile, increment_m)
+        .into_iter()
+        .chain(declared.into_iter().filter_map(of_code))
+        .collect()
+}
+
+/// The value of an object after `configure`: one that it writes counts, and not the one that it replaces. None where
+/// the drive has no such object, and where the profile says so.
+fn told(survey: &Survey, profile: &DriveProfile, object: ObjectAddress) -> Option<u32> {
+    let ObjectConfig { rule, value, .. } = profile.object(ObjectKey(object));
+    let found = || survey.number(object);
+    match rule {
+        ObjectRule::Absent => None,
+        ObjectRule::Write => value.map(|value| value as u32).or_else(found),
+        ObjectRule::Expect | ObjectRule::Optional => found(),
+    }
+}
+
+/// Ratios by which the drive counts its way, as far as the drive has them: gear, feed and encoder. A wrong one scales
+/// every motion. Without a lead the profile declares no travel, so that a gear is only to be looked at. A feed decides
+/// the unit of 6064h; the encoder decides without one.
+fn of_ratios(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Found> {
+    let units = &profile.units;
+    let part = |index, subindex| told(survey, profile, ObjectAddress::new(index, subindex)).map(f64::from);
+    let ratio = |index| Some(part(index, 1)? / part(index, 2).filter(|&turns| turns > 0.0)?);
+    let feed = units.lead_m.map(|lead_m| lead_m / increment_m);
+    let encoder = feed.map(|feed| feed / units.gear_ratio);
+    let decides = |decides| if decides { Outcome::Refused } else { Outcome::Doubtful };
+    let lead_key = "drive_profile.units.lead_m";
+    let ratios = [
+        (
+            0x6091,
+            Some(units.gear_ratio),
+            "motor turns/screw turn",
+            decides(units.lead_m.is_some()),
+            "drive_profile.units.gear_ratio",
+        ),
+        (0x6092, feed, "increments/screw turn", Outcome::Refused, lead_key),
+        (0x608F, encoder, "increments/motor turn", decides(ratio(0x6092).is_none()), lead_key),
+    ];
+    let of_ratio = |(index, wanted, unit, outcome, key)| {
+        let object = ObjectAddress::new(index, 1);
+        let (wanted, found): (f64, f64) = (wanted?, ratio(index)?);
+        let text = |ratio: f64| format!("{} {unit}", (ratio * 1e6).round() / 1e6);
+        let remedy = format!("the drive has {}, the profile {}: change one", text(found), text(wanted));
+        let is_right = (found / wanted - 1.0).abs() < 1e-6;
+        (!is_right).then(|| Found::new(object, [text(wanted), text(found)], outcome, &remedy, key))
+    };
+    ratios.into_iter().filter_map(of_ratio).collect()
+}
+
+#[cfg(test)]
+mod deviations_tests {
+    use std::io;
+    use std::path::Path;
+
+    use masseter_can::canopen::NodeId;
+    use masseter_runtime::clock::MILLISECOND_NS;
+    use masseter_scenario::Scenario;
+
+    use super::*;
+    use crate::commissioning::line::Line;
+
+    /// What emulated drives lack of what this profile needs.
+    fn of_profile(text: &str) -> Vec<(String, Outcome, String)> {
+        let scenario = Scenario::parse(Path::new("robot.toml"), text).unwrap();
+        let mut line = Line::open(&Scenario::default(), Box::new(io::sink())).unwrap();
+        line.listen(100 * MILLISECOND_NS).unwrap();
+        let wanted = WantedDrive::of_axis(&scenario, 3, NodeId::new(4).unwrap()).unwrap();
+        let settings = Settings::wanted(&wanted);
+        let survey = Survey::take(&mut line, 3, settings.addresses()).unwrap();
+        let all = deviations(&survey, &wanted, &settings, scenario.profile(3));
+        all.into_iter().map(|one| (one.object, one.outcome, one.remedy)).collect()
+    }
+
+    #[test]
+    fn an_emulated_drive_has_all_that_the_rig_needs_but_the_event_timer() {
+        let timer = ("1400h:05h".to_owned(), Outcome::Mended, "write 150".to_owned());
+        assert_eq!(of_profile(""), [timer]);
+    }
+
+    #[test]
+    fn every_deviation_is_found_at_once_with_what_becomes_of_it() {
+        let all = of_profile(
+            "[[drive_profile]]\nidentity.revision = 7\nobjects.6066h = { value = 9 }\n\
+         objects.6007h = { rule = 'expect', value = 1 }\nobjects.2222h = { value = 1, bytes = 1 }\n\
+         homing = { home_object = '30B0h', home_position_m = 0.1 }",
+        );
+        let of = |object: &str| {
+            let found = all.iter().find(|(at, ..)| at == object);
+            found.map(|(_, outcome, remedy)| (*outcome, remedy.as_str()))
+        };
+        assert_eq!(of("6066h:00h"), Some((Outcome::Mended, "write 9")));
+        assert_eq!(of("6007h:00h"), Some((Outcome::Refused, "the profile expects another value")));
+        for object in ["1018h:03h", "2222h:00h", "30B0h:00h"] {
+            assert_eq!(of(object).map(|(outcome, _)| outcome), Some(Outcome::Refused), "{object}: {all:?}");
+        }
+    }
+
+    /// Emulated drives have a gear of 1: a profile that writes another one is told of its own mistake.
+    #[test]
+    fn a_ratio_that_the_profile_itself_makes_wrong_is_refused() {
+        let all = of_profile(
+            "[[drive_profile]]\nunits = { gear_ratio = 2.5, lead_m = 0.025 }\n\
+         objects.'6091h:01' = { value = 26, bytes = 4 }",
+        );
+        let gear: Vec<_> = all.iter().filter(|(object, ..)| object == "6091h:01h").collect();
+        assert!(matches!(gear[..], [(_, Outcome::Refused, _)]), "{all:?}");
+    }
+
+    #[test]
+    fn a_limit_switch_that_is_closed_is_worth_a_look() {
+        for (bits, found) in [(0b100, None), (0b110, Some("positive closed")), (0b011, Some("both closed"))] {
+            let mut survey = Survey::default();
+            survey.insert(ObjectAddress::new(0x60FD, 0), bits);
+            let deviation = of_switches(&survey).map(|found| found.deviation);
+            assert_eq!(deviation.as_ref().map(|one| one.found.as_str()), found);
+            assert!(deviation.is_none_or(|one| one.outcome == Outcome::Doubtful));
+        }
+        assert!(of_switches(&Survey::default()).is_none(), "a drive without that object");
+    }
+}
+
+#[cfg(test)]
+mod units_tests {
+    use std::path::Path;
+
+    use masseter_scenario::Scenario;
+
+    use super::*;
+
+    #[test]
+    fn a_unit_is_told_in_words() {
+        let mut survey = Survey::default();
+        survey.insert(ObjectAddress::new(0x60AA, 0), 0x00C0_0300);
+        let all = of_units(&survey, &DriveProfile::default(), 1e-6);
+        assert_eq!(
+            all[0].deviation.remedy,
+            "the drive counts acceleration in rpm/s, the profile declares increments/s²: change one"
+        );
+        assert_eq!(all[0].deviation.outcome, Outcome::Refused);
+    }
+
+    /// A drive of the default profile too: as delivered some count tenths of a degree.
+    #[test]
+    fn units_of_every_profile_are_those_of_the_drive() {
+        let units = |found: &[(u16, u32)], profile: &str| {
+            let mut survey = Survey::default();
+            for &(index, code) in found {
+                survey.insert(ObjectAddress::new(index, 0), code);
+            }
+            let scenario = Scenario::parse(Path::new("robot.toml"), profile).unwrap();
+            let all = of_units(&survey, scenario.profile(3), 1e-6);
+            all.into_iter()
+                .map(|found| found.deviation)
+                .map(|one| (one.object, one.outcome, one.remedy))
+                .collect::<Vec<_>>()
+        };
+        let profile = |keys: &str| format!("[[drive_profile]]\n{keys}");
+        let right = [(0x60A8, 0x00B5_0000), (0x60A9, 0x00B5_0300), (0x60AA, 0x00B5_5700)];
+        for keys in ["", &profile("kind = 'n5'")] {
+            assert_eq!(units(&right, keys), []);
+            assert_eq!(units(&[], keys), [], "a drive need not tell its units");
+            let degrees = units(&[(0x60A8, 0xFF41_0000)], keys);
+            let remedy = "the drive counts position in 0.1 degrees: enter the lead of the screw, or let the drive count \
+                      increments";
+            assert_eq!(degrees, [("60A8h:00h".to_owned(), Outcome::Refused, remedy.to_owned())]);
+            let wrong = units(&[(0x60A8, 0x0001_0000), (0x60A9, 0x00B4_4700), (0x60AA, 0x00C0_0300)], keys);
+            let outcomes: Vec<_> = wrong.iter().map(|(.., outcome, _)| *outcome).collect();
+            assert_eq!(outcomes, [Outcome::Doubtful, Outcome::Refused, Outcome::Refused], "{wrong:?}");
+        }
+        let degrees = [(0x60A8, 0xFF41_0000)];
+        assert_eq!(units(&degrees, &profile("objects.60A8h = { rule = 'absent' }")), []);
+        let written = "objects.60A8h = { value = 0x00B5_0000, bytes = 4 }";
+        assert_eq!(units(&degrees, &profile(written)), [], "configure writes it");
+    }
+
+    /// An increment of 1 µm, or of a tenth of a degree of a screw, is what the drive calls µm or 0.1°.
+    #[test]
+    fn a_unit_as_long_as_an_increment_is_as_good_as_increments() {
+        let units = |code, increment_m, keys: &str| {
+            let mut survey = Survey::default();
+            survey.insert(ObjectAddress::new(0x60A8, 0), code);
+            let profile = format!("[[drive_profile]]\n{keys}");
+            let scenario = Scenario::parse(Path::new("robot.toml"), &profile).unwrap();
+            let all = of_units(&survey, scenario.profile(3), increment_m);
+            all.into_iter()
+                .map(|found| found.deviation)
+                .map(|one| (one.outcome, one.remedy))
+                .collect::<Vec<_>>()
+        };
+        let lead = "units = { lead_m = 0.003 }";
+        for (code, increment_m) in [
+            (0xFA01_0000, 1e-6),
+            (0xFD01_0000, 1e-3),
+            (0xFF41_0000, 0.003 / 3600.0),
+            (0x0041_0000, 0.003 / 360.0),
+        ] {
+            assert_eq!(units(code, increment_m, lead), []);
+            let [(outcome, remedy)] = &units(code, 2.0 * increment_m, lead)[..] else { panic!("{code:X}") };
+            assert_eq!(*outcome, Outcome::Refused);
+            assert!(remedy.ends_with(" µm: change one"), "{remedy}");
+        }
+        assert_eq!(
+            units(0xFA01_0000, 5e-7, "")[0].1,
+            "the drive counts position in µm (1 µm), an increment of the scenario is 0.5 µm: change one"
+        );
+    }
+
+    /// Where 6092h decides the unit of 6064h, 608Fh is only to be looked at.
+    #[test]
+    fn ratios_of_the_drive_are_those_of_the_profile() {
+        let ratios = |found: &[(u16, u32, u32)], profile: &str| {
+            let mut survey = Survey::default();
+            for &(index, many, turns) in found {
+                survey.insert(ObjectAddress::new(index, 1), many);
+                survey.insert(ObjectAddress::new(index, 2), turns);
+            }
+            let text = format!("[[drive_profile]]\n{profile}");
+            let scenario = Scenario::parse(Path::new("robot.toml"), &text).unwrap();
+            let all = of_ratios(&survey, scenario.profile(3), 1e-6);
+            all.into_iter()
+                .map(|found| found.deviation)
+                .map(|one| (one.outcome, one.remedy))
+                .collect::<Vec<_>>()
+        };
+        let lead = "units = { gear_ratio = 2.5, lead_m = 0.01 }";
+        let right = [(0x6091, 5, 2), (0x6092, 10_000, 1), (0x608F, 4000, 1)];
+        assert_eq!(ratios(&right, lead), []);
+        let [(gear, gear_text), (feed, feed_text), (encoder, _)] =
+            &ratios(&[(0x6091, 26, 1), (0x6092, 6000, 1), (0x608F, 2048, 1)], lead)[..]
+        else {
+            panic!("three ratios differ")
+        };
+        assert_eq!([gear, feed, encoder], [&Outcome::Refused, &Outcome::Refused, &Outcome::Doubtful]);
+        assert_eq!(
+            gear_text,
+            "the drive has 26 motor turns/screw turn, the profile 2.5 motor turns/screw turn: change one"
+        );
+        assert!(feed_text.contains("6000 increments/screw turn, the profile 10000"), "{feed_text}");
+        assert_eq!(ratios(&[(0x608F, 2048, 1)], lead)[0].0, Outcome::Refused);
+        assert_eq!(
+            ratios(&[(0x6091, 26, 1), (0x6092, 6000, 1)], "")[..],
+            [(
+                Outcome::Doubtful,
+                "the drive has 26 motor turns/screw turn, the profile 1 motor turns/screw turn: change one"
+                    .to_owned()
+            )]
+        );
+        let left = format!("{lead}\nobjects.'608Fh:01' = {{ rule = 'absent' }}");
+        assert_eq!(ratios(&[(0x608F, 2048, 1)], &left), []);
+        let written = format!("{lead}\nobjects.'6091h:01' = {{ value = 5, bytes = 4 }}");
+        assert_eq!(ratios(&[(0x6091, 26, 2)], &written), [], "configure writes it");
+        assert_eq!(ratios(&[(0x6091, 5, 1)], &written)[0].0, Outcome::Refused, "what it writes is wrong");
+        let absent = format!("{lead}\nobjects.'6092h:01' = {{ rule = 'absent' }}");
+        let found = [(0x6092, 10_000, 1), (0x608F, 2048, 1)];
+        assert_eq!(ratios(&found, &absent)[0].0, Outcome::Refused, "without a feed the encoder decides");
+    }
+}

@@ -1,0 +1,487 @@
+//! Why a line to the drives cannot go on, and why a motion did not begin or ended early; objects and values in words.
+
+use std::fmt::{self, Display, Formatter};
+use std::io;
+
+use masseter_can::SendError;
+use masseter_can::canopen::{AbortCode, EmergencyCode, ObjectAddress};
+use masseter_can::cia402::DriveState;
+use masseter_model::geometry::AXIS_NAMES;
+
+use crate::error::PlantError;
+use crate::simulator::drive::dictionary::{ENTRIES, find};
+
+/// Why a question had no answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum SdoReason {
+    /// The drive refused the transfer.
+    #[error("{0}")]
+    Aborted(AbortCode),
+    /// Nothing came.
+    #[error("no answer; check its power, wiring, bit rate and node id")]
+    Silent,
+    /// The answers do not follow the protocol, or never end.
+    #[error("answers beside the protocol; check whether two nodes have this id")]
+    Malformed,
+}
+
+/// Why an object could not be read.
+pub fn reason_text(reason: SdoReason) -> String {
+    match reason {
+        SdoReason::Aborted(AbortCode::NO_OBJECT | AbortCode::NO_SUBINDEX) => "not there".to_owned(),
+        reason => reason.to_string(),
+    }
+}
+
+/// Why a line cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum LineError {
+    /// A transfer failed.
+    #[error("{}: object {object}: {reason}", AXIS_NAMES[*axis])]
+    Sdo {
+        /// The axis.
+        axis: usize,
+        /// The object.
+        object: ObjectAddress,
+        /// The reason.
+        reason: SdoReason,
+    },
+    /// The drive acknowledged a value and shows another one, or none.
+    #[error(
+        "{}: object {object} ({}) := {}: the drive acknowledged it and shows {}",
+        AXIS_NAMES[*axis], object_name(*object), value_text(*object, *written),
+        found.map_or_else(|| "nothing".to_owned(), |found| value_text(*object, found))
+    )]
+    NotKept {
+        /// The axis.
+        axis: usize,
+        /// The object.
+        object: ObjectAddress,
+        /// The value that was written.
+        written: u32,
+        /// The value that the drive shows; none where it refuses to show the object.
+        found: Option<u32>,
+    },
+    /// A second drive would be switched on.
+    #[error("{}: not switched on, because {} still is; end that step first", AXIS_NAMES[*axis], AXIS_NAMES[*other])]
+    SecondAxis {
+        /// The axis to be switched on.
+        axis: usize,
+        /// The axis that is.
+        other: usize,
+    },
+    /// A frame could not be sent.
+    #[error("bus {bus}: {error}")]
+    Send {
+        /// The bus.
+        bus: usize,
+        /// The reason.
+        error: SendError,
+    },
+    /// The emulated mechanism failed, or the memory of emulated drives cannot be written.
+    #[error(transparent)]
+    Emulation(#[from] PlantError),
+    /// Old values could not be kept.
+    #[error("old values of {} cannot be kept, so that no further value is written: {source}; free the disk", AXIS_NAMES[*axis])]
+    Ledger {
+        /// The axis.
+        axis: usize,
+        /// The reason.
+        source: io::Error,
+    },
+    /// The log could not be written.
+    #[error("the log of the bus cannot be written: {0}")]
+    Log(#[from] io::Error),
+}
+
+impl LineError {
+    /// The code with which a drive refused a transfer.
+    pub fn abort_code(&self) -> Option<AbortCode> {
+        match self {
+            Self::Sdo { reason: SdoReason::Aborted(code), .. } => Some(*code),
+            _ => None,
+        }
+    }
+}
+
+/// A drive that restarted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{} restarted during the step; {} (values that are not stored are lost)",
+    AXIS_NAMES[*axis], if *by_master { "end the other master, which sends NMT" } else { "check its supply" }
+)]
+pub struct Restarted {
+    /// Its axis.
+    pub axis: usize,
+    /// Whether another master was heard, which may have reset it.
+    pub by_master: bool,
+}
+
+/// What only another master sends, in the order in which signs are listed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum MasterSign {
+    /// Network management.
+    Nmt,
+    /// SDO requests to a drive.
+    SdoRequests,
+    /// SYNC.
+    Sync,
+    /// A heartbeat of the master's node id.
+    Heartbeat,
+    /// Process data for a drive.
+    ProcessData,
+}
+
+impl Display for MasterSign {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Nmt => "NMT",
+            Self::SdoRequests => "SDO requests",
+            Self::Sync => "SYNC",
+            Self::Heartbeat => "a heartbeat of node 127",
+            Self::ProcessData => "process data",
+        })
+    }
+}
+
+/// Another master, which may control the drives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("bus {bus}: another master sends {sign}; end that program")]
+pub struct OtherMaster {
+    /// The bus.
+    pub bus: usize,
+    /// What it sends.
+    pub sign: MasterSign,
+}
+
+/// What stopped a motion.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum StopCause {
+    /// The person stopped it.
+    #[error("stopped on request")]
+    Requested,
+    /// The axis did not follow its demand.
+    #[error("following error beyond {:.3} mm; check motor, brake and gains", .window_m * 1e3)]
+    FollowingError {
+        /// The window (6065h), m.
+        window_m: f64,
+    },
+    /// The motor's force was too high.
+    #[error("force {force_n:.1} N above {limit_n:.1} N; check brake and guides, or allow more with --torque")]
+    Force {
+        /// The force, N.
+        force_n: f64,
+        /// What is allowed, N.
+        limit_n: f64,
+    },
+    /// A limit switch closed.
+    #[error("limit switch (60FDh = {bits:08X}h); move the axis the other way")]
+    LimitSwitch {
+        /// 60FDh.
+        bits: u32,
+    },
+    /// The axis moved against its target.
+    #[error("moved {:.4} mm against its target; check the phases of the motor and the sign of the encoder", .moved_m * 1e3)]
+    WrongDirection {
+        /// How far, m.
+        moved_m: f64,
+    },
+    /// The axis went past its target.
+    #[error("went {:.3} mm past its target; check the scale and the gains", .beyond_m * 1e3)]
+    Overrun {
+        /// How far, m.
+        beyond_m: f64,
+    },
+    /// The axis does not stand still with power on.
+    #[error("moved {:.3} mm with power on and no target; check brake and gains", .moved_m * 1e3)]
+    Restless {
+        /// How far within a second, m.
+        moved_m: f64,
+    },
+    /// Another axis moved, though it is braked.
+    #[error("{} moved {:.3} mm, though it is off; check its brake", AXIS_NAMES[*other], .moved_m * 1e3)]
+    OtherAxis {
+        /// The other axis.
+        other: usize,
+        /// How far, m.
+        moved_m: f64,
+    },
+    /// Another drive has power, which this step did not give.
+    #[error("{} went to {state}, and this step did not switch it on; end the program that controls it", AXIS_NAMES[*other])]
+    OtherPowered {
+        /// The axis of the other drive.
+        other: usize,
+        /// The state of that drive.
+        state: DriveState,
+    },
+    /// Another master was heard.
+    #[error(transparent)]
+    OtherMaster(#[from] OtherMaster),
+    /// A drive sent an emergency.
+    #[error("{} sent emergency {:04X}h; see the drive's manual", AXIS_NAMES[*sender], .code.0)]
+    Emergency {
+        /// The axis of the drive.
+        sender: usize,
+        /// The code.
+        code: EmergencyCode,
+    },
+    /// The drive left "operation enabled".
+    #[error("the drive went to {state} (error code {error_code:04X}h); see the drive's manual")]
+    LeftOperation {
+        /// Where it went.
+        state: DriveState,
+        /// 603Fh.
+        error_code: u16,
+    },
+    /// A drive restarted.
+    #[error(transparent)]
+    Restarted(#[from] Restarted),
+    /// The motion took too long.
+    #[error("not done within {:.1} s; check whether the drive takes set-points, or its unit of velocity", .limit_s)]
+    TimedOut {
+        /// What was allowed, s.
+        limit_s: f64,
+    },
+    /// It did not end in time, and the drive reports a limit.
+    #[error(
+        "not done within {limit_s:.1} s, and the drive reports a limit (statusword bit 11); check what 607Dh counts from: \
+         drive_profile.homing.limits_from_home or home_sign"
+    )]
+    Limited {
+        /// What was allowed, s.
+        limit_s: f64,
+    },
+    /// The drive shows the homing before.
+    #[error(
+        "homing did not begin: statusword bit 12 stays from the homing before; check mode 6 and the start bit"
+    )]
+    NotBegun,
+    /// The drive could not home.
+    #[error("homing failed (statusword bit 13); check method, switches and index")]
+    Homing,
+}
+
+/// Why a motion did not begin, or ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum MotionError {
+    /// The line failed.
+    #[error(transparent)]
+    Line(#[from] LineError),
+    /// The axis was stopped and switched off.
+    #[error("{}: {cause}; the axis is off", AXIS_NAMES[*axis])]
+    Stopped {
+        /// The axis.
+        axis: usize,
+        /// Why.
+        cause: StopCause,
+    },
+    /// A drive has power that this step did not give.
+    #[error("{}: {state} already; end the program that controls it, and switch the drive off", AXIS_NAMES[*axis])]
+    Powered {
+        /// The axis.
+        axis: usize,
+        /// The state of its drive.
+        state: DriveState,
+    },
+    /// The drive does not go to "operation enabled".
+    #[error("{}: stays in {state} (error code {error_code:04X}h); check safe torque off, supply and faults", AXIS_NAMES[*axis])]
+    NotEnabled {
+        /// The axis.
+        axis: usize,
+        /// The state of its drive.
+        state: DriveState,
+        /// 603Fh.
+        error_code: u16,
+    },
+    /// The drive does not take a mode of operation.
+    #[error("{}: mode {wanted} was asked for, 6061h shows {found}; check 6502h", AXIS_NAMES[*axis])]
+    Mode {
+        /// The axis.
+        axis: usize,
+        /// The mode.
+        wanted: i8,
+        /// 6061h.
+        found: i8,
+    },
+    /// A statusword of no state.
+    #[error("{}: {source}", AXIS_NAMES[*axis])]
+    Statusword {
+        /// The axis.
+        axis: usize,
+        /// The statusword.
+        source: masseter_can::cia402::StatuswordError,
+    },
+    /// The drive did not confirm that it is off.
+    #[error("{}: NOT PROVED OFF ({reason}); press the emergency stop. The next step that writes gives the old limits back", AXIS_NAMES[*axis])]
+    StaysOn {
+        /// The axis.
+        axis: usize,
+        /// What is known.
+        reason: String,
+    },
+    /// The drive did not answer, or with no state, and the axis was switched off afterwards.
+    #[error("{source}; {} is off", AXIS_NAMES[*axis])]
+    Unread {
+        /// The axis.
+        axis: usize,
+        /// What ended the motion.
+        source: Box<MotionError>,
+    },
+    /// Objects of the drive kept the values of this step.
+    #[error(
+        "{}: {}not every old value returned ({source}); the next step that writes tries again",
+        AXIS_NAMES[*axis], cause.as_ref().map(|cause| format!("{cause}; ")).unwrap_or_default()
+    )]
+    NotRestored {
+        /// The axis.
+        axis: usize,
+        /// Why the motion ended early, if so.
+        cause: Option<String>,
+        /// Why the value did not return.
+        source: LineError,
+    },
+    /// An object that the profile keeps from being written is not careful enough.
+    #[error("{}: object {object} is {found}, and its rule in drive_profile.objects lets nobody reduce it; change the rule", AXIS_NAMES[*axis])]
+    Careless {
+        /// The axis.
+        axis: usize,
+        /// The object.
+        object: ObjectAddress,
+        /// Its value.
+        found: u32,
+    },
+    /// A limit switch in the direction of the way is closed before it begins.
+    #[error(
+        "{}: a limit switch is closed (60FDh = {bits:08X}h), and the way goes in its direction; move the axis the other way, \
+         or check the switch and its wire",
+        AXIS_NAMES[*axis]
+    )]
+    OnSwitch {
+        /// The axis.
+        axis: usize,
+        /// 60FDh.
+        bits: u32,
+    },
+    /// The axis moved after its power went.
+    #[error(
+        "{}: moved {:.3} mm after its power went; support the axis, and let the drive close the brake before it takes the current away",
+        AXIS_NAMES[*axis], .moved_m * 1e3
+    )]
+    Dropped {
+        /// The axis.
+        axis: usize,
+        /// How far, m.
+        moved_m: f64,
+    },
+    /// A way that is not for this step.
+    #[error("{}: {:.3} mm is no way for a jog; give up to {:.0} mm, at least ten increments", AXIS_NAMES[*axis], .by_m * 1e3, .most_m * 1e3)]
+    Way {
+        /// The axis.
+        axis: usize,
+        /// The way, m.
+        by_m: f64,
+        /// The longest, m.
+        most_m: f64,
+    },
+    /// An incremental encoder whose home has no position.
+    #[error("{}: enter drive_profile.homing.home_position_m: what d or l is at the home position", AXIS_NAMES[*axis])]
+    NoHomePosition {
+        /// The axis.
+        axis: usize,
+    },
+    /// 6064h at home is not what the profile says.
+    #[error(
+        "{}: 6064h shows {:.3} mm at home, the profile says {:.3} mm; check drive_profile.homing.home_sign, home_object and reversed",
+        AXIS_NAMES[*axis], .found_m * 1e3, .expected_m * 1e3
+    )]
+    HomePosition {
+        /// The axis.
+        axis: usize,
+        /// What 6064h shows, m.
+        found_m: f64,
+        /// What the profile says, m.
+        expected_m: f64,
+    },
+    /// A second homing found another place.
+    #[error("{}: a second homing is {:.3} mm beside the first, allowed are {:.3} mm (drive_profile.homing.tolerance_m)", AXIS_NAMES[*axis], .spread_m * 1e3, .tolerance_m * 1e3)]
+    Spread {
+        /// The axis.
+        axis: usize,
+        /// The distance, m.
+        spread_m: f64,
+        /// What is allowed, m.
+        tolerance_m: f64,
+    },
+    /// An absolute encoder shows a position beyond the stroke.
+    #[error(
+        "{}: 6064h shows {:.3} mm, the stroke is {:.1} to {:.1} mm; check the stored home, drive_profile.reversed and encoder_resolution_m",
+        AXIS_NAMES[*axis], .found_m * 1e3, .stroke_m[0] * 1e3, .stroke_m[1] * 1e3
+    )]
+    BeyondStroke {
+        /// The axis.
+        axis: usize,
+        /// What 6064h shows, m.
+        found_m: f64,
+        /// The stroke, m.
+        stroke_m: [f64; 2],
+    },
+}
+
+/// Objects that the emulated drives do not have.
+const FURTHER: [(u16, u8, &str); 2] =
+    [(0x30B0, 0, "Home position"), (0x30B1, 0, "Home offset move distance")];
+
+/// Name of an object; empty where the rig knows none.
+pub fn object_name(object: ObjectAddress) -> &'static str {
+    let further =
+        || FURTHER.iter().find(|(index, subindex, _)| ObjectAddress::new(*index, *subindex) == object);
+    match find(object) {
+        Ok(place) => ENTRIES[place].name,
+        Err(_) => further().map_or("", |(_, _, name)| name),
+    }
+}
+
+/// An object's value as its type shows it: identifiers and units in hexadecimal digits, quantities in decimal ones.
+pub fn value_text(object: ObjectAddress, value: u32) -> String {
+    if is_code(object) {
+        return format!("{value:X}h");
+    }
+    match find(object) {
+        Ok(place) => ENTRIES[place].kind.number(value).to_string(),
+        Err(_) if object.index == 0x30B0 => (value as i32).to_string(),
+        Err(_) => value.to_string(),
+    }
+}
+
+fn is_code(ObjectAddress { index, subindex }: ObjectAddress) -> bool {
+    match index {
+        0x1400..=0x15FF | 0x1800..=0x19FF => subindex == 1,
+        0x1600..=0x17FF | 0x1A00..=0x1BFF => subindex > 0,
+        0x1017 => false,
+        0x1000..=0x1FFF | 0x603F | 0x6041 | 0x60A8..=0x60AA | 0x6502 => true,
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_show_as_what_they_are() {
+        for (index, subindex, value, text) in [
+            (0x1800, 1, 0x4000_0181, "40000181h"),
+            (0x1800, 2, 255, "255"),
+            (0x1A00, 1, 0x6041_0010, "60410010h"),
+            (0x607D, 1, -5i32 as u32, "-5"),
+            (0x60C2, 2, 0xFD, "-3"),
+            (0x60AA, 0, 0x00C0_0300, "C00300h"),
+            (0x30B0, 0, u32::MAX, "-1"),
+        ] {
+            assert_eq!(value_text(ObjectAddress::new(index, subindex), value), text);
+        }
+        assert_eq!(object_name(ObjectAddress::new(0x6066, 0)), "Following error time out");
+        assert_eq!(object_name(ObjectAddress::new(0x6091, 1)), "Motor revolutions");
+        assert_eq!(object_name(ObjectAddress::new(0x2000, 0)), "");
+    }
+}

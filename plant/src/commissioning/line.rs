@@ -1,0 +1,426 @@
+//! A line to all drives: SDO, NMT and the heartbeat, one question at a time.
+//!
+//! The line keeps one promise for every step of the bring-up: while it has switched on one drive, it refuses to switch
+//! on another.
+
+use std::fmt::{self, Debug, Formatter};
+use std::io;
+use std::io::Write;
+
+use masseter_can::canopen::{
+    AbortCode, Expedited, Nmt, NmtCommand, NmtTarget, NodeId, ObjectAddress, SdoRequest, SdoResponse, sync,
+};
+use masseter_can::cia402::Controlword;
+use masseter_model::geometry::AXES;
+use masseter_runtime::clock::MILLISECOND_NS;
+use masseter_scenario::{MASTER_NODE, ObjectKey, Scenario};
+use serde::{Deserialize, Serialize};
+
+use super::errors::{LineError, MasterSign, Restarted, SdoReason};
+use super::traffic::{Heard, Strangers, Traffic};
+use crate::error::PlantError;
+use crate::master::link::Address;
+use crate::master::sdo::number;
+use crate::master::wanted::{WantedObject, shown_bits};
+
+/// Silence of a server after which a request is repeated, and how often that is done.
+const TIMEOUT_NS: u64 = 500 * MILLISECOND_NS;
+/// The same while a drive has power: a motion nobody sees must be short.
+const POWERED_TIMEOUT_NS: u64 = 100 * MILLISECOND_NS;
+const ATTEMPTS: u32 = 3;
+/// Time that a node has to answer a scan, ns.
+const SCAN_NS: u64 = 10 * MILLISECOND_NS;
+/// Longest time for which an answer to SYNC is waited for, ns.
+const SYNC_NS: u64 = 20 * MILLISECOND_NS;
+/// Time that a drive has to show a value that it acknowledged, ns, and the pause between two readings.
+const SHOWN_WITHIN_NS: u64 = 100 * MILLISECOND_NS;
+const READ_AGAIN_NS: u64 = 5 * MILLISECOND_NS;
+/// Bytes of the longest value that is read: no text of an identity is longer.
+const LONGEST_VALUE: usize = 256;
+
+/// The line.
+pub struct Line {
+    traffic: Traffic,
+    /// The axis whose drive this line has switched on.
+    switched_on: Option<usize>,
+    /// Where old values are kept; none where nobody needs them after a kill.
+    ledger: Option<Box<dyn Ledger>>,
+}
+
+impl Debug for Line {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Line")
+            .field("names", &self.traffic.names)
+            .field("switched_on", &self.switched_on)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Line {
+    /// A line on the scenario's interfaces, or on simulated buses where it names none. Every frame on the buses goes to `log`, in
+    /// the format of candump. The line sends nothing yet.
+    ///
+    /// # Errors
+    /// [`PlantError`] for interfaces that cannot be opened and for buses that cannot be built.
+    pub fn open(scenario: &Scenario, log: Box<dyn Write + Send>) -> Result<Self, PlantError> {
+        Ok(Self { traffic: Traffic::open(scenario, log)?, switched_on: None, ledger: None })
+    }
+
+    /// Keeps old values of drives in this ledger from now on.
+    pub fn keep_old_values_in(&mut self, ledger: Box<dyn Ledger>) {
+        self.ledger = Some(ledger);
+    }
+
+    /// Keeps the old values of a drive.
+    pub(super) fn keep_old_values(&mut self, axis: usize, values: &[OldValue]) -> Result<(), LineError> {
+        let Some(ledger) = &mut self.ledger else { return Ok(()) };
+        ledger.keep(axis, values).map_err(|source| LineError::Ledger { axis, source })
+    }
+
+    /// The present time, ns: simulated from 0, or the machine's.
+    pub fn now_ns(&self) -> u64 {
+        self.traffic.wires.now_ns()
+    }
+
+    /// What was heard of a drive.
+    pub fn heard(&self, axis: usize) -> &Heard {
+        &self.traffic.heard[axis]
+    }
+
+    /// Who else was heard.
+    pub fn strangers(&self) -> &Strangers {
+        &self.traffic.strangers
+    }
+
+    /// Sends the master's heartbeat from now on, with that interval.
+    pub fn beat_every(&mut self, interval_ms: u16) {
+        self.traffic.beat_every(interval_ms);
+    }
+
+    /// Listens for that long.
+    ///
+    /// # Errors
+    /// [`LineError`] except those of transfers.
+    pub fn listen(&mut self, for_ns: u64) -> Result<(), LineError> {
+        let until_ns = self.now_ns() + for_ns;
+        while self.now_ns() < until_ns {
+            self.traffic.step()?;
+        }
+        Ok(())
+    }
+
+    /// Listens until a condition holds; returns whether it did within that time.
+    ///
+    /// # Errors
+    /// [`LineError`] except those of transfers.
+    pub fn listen_until(
+        &mut self,
+        within_ns: u64,
+        mut holds: impl FnMut(&Self) -> bool,
+    ) -> Result<bool, LineError> {
+        let until_ns = self.now_ns() + within_ns;
+        while !holds(self) {
+            if self.now_ns() >= until_ns {
+                return Ok(false);
+            }
+            self.traffic.step()?;
+        }
+        Ok(true)
+    }
+
+    /// Reads an object, however long.
+    ///
+    /// # Errors
+    /// [`LineError`].
+    pub fn read(&mut self, axis: usize, object: ObjectAddress) -> Result<Vec<u8>, LineError> {
+        let failed = |reason| LineError::Sdo { axis, object, reason };
+        match self.ask(axis, object, SdoRequest::InitiateUpload { object })? {
+            SdoResponse::Upload { data, .. } => return Ok(data.data().to_vec()),
+            SdoResponse::InitiateUpload { .. } => {}
+            _ => return Err(failed(SdoReason::Malformed)),
+        }
+        let (mut value, mut toggle) = (Vec::new(), false);
+        for _ in 0..LONGEST_VALUE {
+            match self.ask(axis, object, SdoRequest::UploadSegment { toggle })? {
+                SdoResponse::UploadSegment { toggle: answered, data, is_last } if answered == toggle => {
+                    value.extend_from_slice(data.data());
+                    if is_last {
+                        return Ok(value);
+                    }
+                    toggle = !toggle;
+                }
+                _ => return Err(failed(SdoReason::Malformed)),
+            }
+        }
+        Err(failed(SdoReason::Malformed))
+    }
+
+    /// Reads an object of at most four bytes as a number without a sign.
+    ///
+    /// # Errors
+    /// [`LineError`].
+    pub fn read_number(&mut self, axis: usize, object: ObjectAddress) -> Result<u32, LineError> {
+        let value = self.read(axis, object)?;
+        if value.len() > Expedited::MAX {
+            return Err(LineError::Sdo { axis, object, reason: SdoReason::Malformed });
+        }
+        Ok(number(&value))
+    }
+
+    /// The same; none where the drive refuses, as one without the object does.
+    ///
+    /// # Errors
+    /// [`LineError`].
+    pub(super) fn read_if_there(
+        &mut self,
+        axis: usize,
+        object: ObjectAddress,
+    ) -> Result<Option<u32>, LineError> {
+        match self.read_number(axis, object) {
+            Err(error) if error.abort_code().is_some() => Ok(None),
+            read => read.map(Some),
+        }
+    }
+
+    /// Writes the lowest bytes of a value to an object, and reads it back: a write is believed when the drive shows it,
+    /// which may take a moment. What does not show itself is for the caller to prove. The controlword has
+    /// [its own function](Self::control).
+    ///
+    /// # Errors
+    /// [`LineError`].
+    ///
+    /// # Panics
+    /// For 6040h, and for other than one to four bytes.
+    pub fn write(
+        &mut self,
+        axis: usize,
+        object: ObjectAddress,
+        value: u32,
+        bytes: usize,
+    ) -> Result<(), LineError> {
+        assert!(object.index != 0x6040, "controlwords go through control");
+        self.download(axis, object, value, bytes)?;
+        let Some(bits) = shown_bits(object, value, bytes) else { return Ok(()) };
+        let until_ns = self.now_ns() + SHOWN_WITHIN_NS;
+        loop {
+            let found = match self.read_number(axis, object) {
+                Ok(found) if (found ^ value) & bits == 0 => return Ok(()),
+                Ok(found) => Some(found),
+                Err(error) => match error.abort_code() {
+                    Some(code) if WantedObject::is_write_only(code) => return Ok(()),
+                    Some(_) => None,
+                    None => return Err(error),
+                },
+            };
+            if found.is_none() || self.now_ns() >= until_ns {
+                return Err(LineError::NotKept { axis, object, written: value, found });
+            }
+            self.listen(READ_AGAIN_NS)?;
+        }
+    }
+
+    /// Sends a controlword by SDO. One that switches a drive on is refused while another drive is on.
+    ///
+    /// # Errors
+    /// [`LineError`].
+    pub fn control(&mut self, axis: usize, word: Controlword) -> Result<(), LineError> {
+        let switches_on = word.0 & Controlword::SWITCH_ON.0 == Controlword::SWITCH_ON.0;
+        match self.switched_on {
+            Some(other) if other != axis && switches_on => return Err(LineError::SecondAxis { axis, other }),
+            _ if switches_on => self.switched_on = Some(axis),
+            _ => {}
+        }
+        self.download(axis, ObjectAddress::new(0x6040, 0), word.0.into(), 2)
+    }
+
+    /// The drive of an axis has no voltage any more, as its statusword showed: another one may be switched on.
+    pub fn note_off(&mut self, axis: usize) {
+        self.switched_on = self.switched_on.filter(|&on| on != axis);
+    }
+
+    /// Sends a command of network management to the node of an axis.
+    ///
+    /// # Errors
+    /// [`LineError::Send`].
+    pub fn command(&mut self, axis: usize, command: NmtCommand) -> Result<(), LineError> {
+        let Address { bus, node } = self.traffic.addresses[axis];
+        self.traffic.send(bus, Nmt { command, target: NmtTarget::Node(node) }.frame())
+    }
+
+    /// Asks every node id for its device type. Nodes that are none of the scenario's show as [strangers](Self::strangers).
+    ///
+    /// # Errors
+    /// [`LineError`] except those of transfers.
+    pub fn scan(&mut self) -> Result<(), LineError> {
+        let request = SdoRequest::InitiateUpload { object: ObjectAddress::new(0x1000, 0) };
+        for id in 1..=MASTER_NODE.get() {
+            let node = NodeId::new(id).expect("the id is in range");
+            for bus in 0..self.traffic.names.len() {
+                self.traffic.send(bus, request.frame(node))?;
+            }
+            self.listen(SCAN_NS)?;
+        }
+        Ok(())
+    }
+
+    /// Sends SYNC to the bus of an axis. Returns the time from its end until the drive began to transmit its process data, ns;
+    /// none where nothing came.
+    pub(super) fn sync_answer_ns(&mut self, axis: usize) -> Result<Option<u64>, LineError> {
+        let Address { bus, .. } = self.traffic.addresses[axis];
+        (self.traffic.sync_ns, self.traffic.heard[axis].process_data_ns) = (None, None);
+        self.traffic.send(bus, sync::frame())?;
+        self.listen_until(SYNC_NS, |line| line.heard(axis).process_data_ns.is_some())?;
+        Ok(self.traffic.sync_answer_ns(axis))
+    }
+
+    /// Everything of the log is on its way to its file.
+    ///
+    /// # Errors
+    /// [`LineError::Log`].
+    pub fn flush(&mut self) -> Result<(), LineError> {
+        Ok(self.traffic.log.flush()?)
+    }
+
+    fn download(
+        &mut self,
+        axis: usize,
+        object: ObjectAddress,
+        value: u32,
+        bytes: usize,
+    ) -> Result<(), LineError> {
+        let data = Expedited::new(&value.to_le_bytes()[..bytes]).expect("one to four bytes");
+        match self.ask(axis, object, SdoRequest::Download { object, data })? {
+            SdoResponse::Download { .. } => Ok(()),
+            _ => Err(LineError::Sdo { axis, object, reason: SdoReason::Malformed }),
+        }
+    }
+
+    /// Sends a request and waits for its answer. A segment is not asked for twice: its answer would be another one.
+    fn ask(
+        &mut self,
+        axis: usize,
+        object: ObjectAddress,
+        request: SdoRequest,
+    ) -> Result<SdoResponse, LineError> {
+        let Address { bus, node } = self.traffic.addresses[axis];
+        let failed = |reason| LineError::Sdo { axis, object, reason };
+        let attempts = if matches!(request, SdoRequest::UploadSegment { .. }) { 1 } else { ATTEMPTS };
+        let timeout_ns = if self.switched_on.is_some() { POWERED_TIMEOUT_NS } else { TIMEOUT_NS };
+        for _ in 0..attempts {
+            self.traffic.heard[axis].answer.take();
+            self.traffic.send(bus, request.frame(node))?;
+            self.listen_until(timeout_ns, |line| line.heard(axis).answer.is_some())?;
+            match self.traffic.heard[axis].answer.take() {
+                Some(SdoResponse::Abort { code, .. }) => return Err(failed(SdoReason::Aborted(code))),
+                Some(answer) if answers(&answer, object) => return Ok(answer),
+                // An answer to an earlier request: this one is repeated.
+                _ => {}
+            }
+        }
+        let code = AbortCode::TIMED_OUT;
+        self.traffic.send(bus, SdoRequest::Abort { object, code }.frame(node))?;
+        Err(failed(SdoReason::Silent))
+    }
+}
+
+/// Whether an answer belongs to a request for that object. Segments name no object.
+fn answers(answer: &SdoResponse, asked: ObjectAddress) -> bool {
+    match answer {
+        SdoResponse::Download { object }
+        | SdoResponse::Upload { object, .. }
+        | SdoResponse::InitiateUpload { object, .. } => *object == asked,
+        _ => true,
+    }
+}
+
+/// A changed object with its old value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct OldValue {
+    /// The object.
+    pub object: ObjectKey,
+    /// Its value before the change.
+    pub value: u32,
+    /// Bytes of the value.
+    pub bytes: usize,
+}
+
+/// Where old values are kept.
+pub trait Ledger: Send {
+    /// Replaces what is kept of the drive of an axis by these values, the oldest change first; by nothing without values.
+    ///
+    /// # Errors
+    /// When the values cannot be kept.
+    fn keep(&mut self, axis: usize, values: &[OldValue]) -> io::Result<()>;
+}
+
+/// The boot-up messages that were heard until a moment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BootUps([u32; AXES]);
+
+impl BootUps {
+    /// Those until now.
+    pub fn until_now(line: &Line) -> Self {
+        Self(std::array::from_fn(|axis| line.heard(axis).boot_ups))
+    }
+
+    /// Refuses a drive that has restarted since then.
+    ///
+    /// # Errors
+    /// The drive of this axis.
+    pub fn check_axis(&self, line: &Line, axis: usize) -> Result<(), Restarted> {
+        let by_master = line.strangers().masters.iter().any(|(_, sign)| *sign == MasterSign::Nmt);
+        let is_same = line.heard(axis).boot_ups == self.0[axis];
+        if is_same { Ok(()) } else { Err(Restarted { axis, by_master }) }
+    }
+
+    /// The same for all drives.
+    ///
+    /// # Errors
+    /// The first such drive.
+    pub fn check(&self, line: &Line) -> Result<(), Restarted> {
+        (0..AXES).try_for_each(|axis| self.check_axis(line, axis))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commissioning::tests::Log;
+
+    fn line() -> (Line, Log) {
+        let log = Log::default();
+        (Line::open(&Scenario::default(), Box::new(log.clone())).unwrap(), log)
+    }
+
+    #[test]
+    fn objects_of_every_length_are_read_and_written() {
+        let (mut line, _) = line();
+        line.listen(100 * MILLISECOND_NS).unwrap();
+        let name = line.read(3, ObjectAddress::new(0x1008, 0)).unwrap();
+        assert_eq!(String::from_utf8(name).unwrap(), "Masseter emulated drive");
+        let window = ObjectAddress::new(0x6065, 0);
+        line.write(3, window, 123, 4).unwrap();
+        assert_eq!(line.read_number(3, window).unwrap(), 123);
+        let missing = line.read(3, ObjectAddress::new(0x2000, 0)).unwrap_err();
+        assert_eq!(missing.abort_code(), Some(AbortCode::NO_OBJECT));
+        assert_eq!(missing.to_string(), "l1: object 2000h:00h: 06020000h (object does not exist)");
+        assert_eq!((line.heard(3).boot_ups, line.strangers().is_empty()), (1, true));
+    }
+
+    #[test]
+    fn a_second_drive_is_not_switched_on() {
+        let (mut line, log) = line();
+        line.listen(100 * MILLISECOND_NS).unwrap();
+        for word in [Controlword::SHUTDOWN, Controlword::SWITCH_ON] {
+            line.control(3, word).unwrap();
+        }
+        line.control(4, Controlword::SHUTDOWN).unwrap();
+        let refusal = line.control(4, Controlword::ENABLE_OPERATION).unwrap_err().to_string();
+        assert_eq!(refusal, "l2: not switched on, because l1 still is; end that step first");
+        line.control(3, Controlword::DISABLE_VOLTAGE).unwrap();
+        line.note_off(3);
+        line.control(4, Controlword::SWITCH_ON).unwrap();
+        let log = log.text();
+        assert_eq!(log.matches(" can1 605#2B40600007").count(), 1, "{log}");
+    }
+}

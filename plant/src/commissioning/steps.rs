@@ -1,0 +1,294 @@
+//! Steps that move nothing: proof that a drive has no power, positions of all axes, storing, answers to SYNC.
+
+use masseter_can::canopen::{NmtCommand, ObjectAddress};
+use masseter_can::cia402::{Controlword, DriveState, Statusword};
+use masseter_model::geometry::{AXES, AXIS_NAMES};
+use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
+use masseter_scenario::{Scenario, StoreConfig};
+
+use super::errors::{LineError, MotionError, SdoReason};
+use super::line::Line;
+use super::watch::{read_position, read_state};
+
+/// For how long an axis is watched, ns.
+const WATCH_NS: u64 = 200 * MILLISECOND_NS;
+/// How long a drive may take to lose its power after it was told to, ns.
+const POWER_OFF_NS: u64 = 5 * SECOND_NS;
+const POSITION: ObjectAddress = ObjectAddress::new(0x6064, 0);
+const STATUS: ObjectAddress = ObjectAddress::new(0x6041, 0);
+
+/// Why nothing may be written to a drive.
+#[derive(Debug, thiserror::Error)]
+pub enum PowerError {
+    /// The statusword tells of power, or of nothing.
+    #[error(
+        "{}: statusword {word:04X}h does not show that the drive is without power; switch it off, or use --take-over",
+        AXIS_NAMES[*axis]
+    )]
+    Powered {
+        /// The axis.
+        axis: usize,
+        /// Its statusword.
+        word: u16,
+    },
+    /// The axis moves.
+    #[error(
+        "{}: the axis moved by {increments} increments in {} ms, and at most {noise} are noise; hold it still",
+        AXIS_NAMES[*axis], WATCH_NS / MILLISECOND_NS
+    )]
+    Moves {
+        /// The axis.
+        axis: usize,
+        /// How far it moved.
+        increments: u32,
+        /// What counts as noise.
+        noise: u32,
+    },
+    /// The line.
+    #[error(transparent)]
+    Line(#[from] LineError),
+}
+
+/// Proves that a drive has no power and its axis stands, up to that many increments of noise.
+///
+/// # Errors
+/// [`PowerError`].
+pub fn prove_no_power(line: &mut Line, axis: usize, noise: u32) -> Result<(), PowerError> {
+    let word = line.read_number(axis, STATUS)? as u16;
+    if !Statusword(word).state().is_ok_and(|state| !state.is_powered()) {
+        return Err(PowerError::Powered { axis, word });
+    }
+    let moved = motion(line, axis, WATCH_NS)?;
+    if moved > noise { Err(PowerError::Moves { axis, increments: moved, noise }) } else { Ok(()) }
+}
+
+/// Stops a drive that somebody else left with power: quick stop, and no voltage once it stands. Whether it worked is for
+/// [`prove_no_power`] to say.
+///
+/// # Errors
+/// [`LineError`].
+pub fn take_over(line: &mut Line, axis: usize, noise: u32) -> Result<(), LineError> {
+    line.control(axis, Controlword::QUICK_STOP)?;
+    let until_ns = line.now_ns() + POWER_OFF_NS;
+    // An axis that cannot be read may move.
+    while motion(line, axis, WATCH_NS / 4).map_or(true, |moved| moved > noise) && line.now_ns() < until_ns {}
+    line.control(axis, Controlword::DISABLE_VOLTAGE)
+}
+
+/// How far an axis moves in that time, increments.
+fn motion(line: &mut Line, axis: usize, within_ns: u64) -> Result<u32, LineError> {
+    let before = line.read_number(axis, POSITION)? as i32;
+    line.listen(within_ns)?;
+    Ok((line.read_number(axis, POSITION)? as i32).abs_diff(before))
+}
+
+/// All axes at one moment, as far as one question after the other is one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stand {
+    /// d1 to l3 by 6064h, m.
+    pub positions_m: [f64; AXES],
+    /// How far each axis moved between two readings, m.
+    pub moved_m: [f64; AXES],
+    /// The states of the drives.
+    pub states: [DriveState; AXES],
+}
+
+/// Reads all axes twice. Nothing is written.
+///
+/// # Errors
+/// [`MotionError::Line`] and [`MotionError::Statusword`].
+pub fn stand(line: &mut Line, scenario: &Scenario, between_ns: u64) -> Result<Stand, MotionError> {
+    let mut stand = Stand {
+        positions_m: [0.0; AXES],
+        moved_m: [0.0; AXES],
+        states: [DriveState::NotReadyToSwitchOn; AXES],
+    };
+    for axis in 0..AXES {
+        stand.moved_m[axis] = -read_position(line, axis, &scenario.scale(axis))?;
+        stand.states[axis] = read_state(line, axis)?;
+    }
+    line.listen(between_ns)?;
+    for axis in 0..AXES {
+        stand.positions_m[axis] = read_position(line, axis, &scenario.scale(axis))?;
+        stand.moved_m[axis] += stand.positions_m[axis];
+    }
+    Ok(stand)
+}
+
+/// "save", the last letter in the highest byte (CiA 301, 7.5.2.13).
+const SAVE: u32 = 0x6576_6173;
+/// Time between two looks at a drive that stores, ns.
+const LOOK_NS: u64 = 100 * MILLISECOND_NS;
+/// How long a drive may take to boot, ns.
+const BOOT_NS: u64 = 10 * SECOND_NS;
+/// Silence after a boot-up message that ends the boot: a boot loader sends a message of its own before, ns.
+const SETTLED_NS: u64 = SECOND_NS;
+
+/// Why a drive did not store.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// It is not done in time.
+    #[error(
+        "{}: {object} did not show within {timeout_ms} ms that the drive stored; raise drive_profile.store.timeout_ms",
+        AXIS_NAMES[*axis]
+    )]
+    Late {
+        /// The axis.
+        axis: usize,
+        /// The object that stores.
+        object: ObjectAddress,
+        /// The time that it had, ms.
+        timeout_ms: u32,
+    },
+    /// No boot-up message after the reset.
+    #[error("{}: no boot-up message within {} s of the reset; check the drive", AXIS_NAMES[*axis], BOOT_NS / SECOND_NS)]
+    NoBoot {
+        /// The axis.
+        axis: usize,
+    },
+    /// The line.
+    #[error(transparent)]
+    Line(#[from] LineError),
+}
+
+/// Stores, and waits until the drive is done.
+///
+/// # Errors
+/// [`StoreError`].
+pub fn store(line: &mut Line, axis: usize, config: StoreConfig) -> Result<(), StoreError> {
+    let (object, timeout_ms) = (ObjectAddress::new(0x1010, config.subindex), config.timeout_ms);
+    let until_ns = line.now_ns() + u64::from(timeout_ms) * MILLISECOND_NS;
+    // Some drives answer nothing until they are done.
+    unless_silent(line.write(axis, object, SAVE, 4))?;
+    loop {
+        let read = line.read_number(axis, object);
+        if matches!(read, Ok(word) if word & 1 == 1) {
+            return Ok(());
+        }
+        if line.now_ns() >= until_ns {
+            read?;
+            return Err(StoreError::Late { axis, object, timeout_ms });
+        }
+        unless_silent(read)?;
+        line.listen(LOOK_NS)?;
+    }
+}
+
+/// Resets a drive, so that it starts from its memory, and waits for the last of its boot-up messages.
+///
+/// # Errors
+/// [`StoreError`].
+pub fn reset(line: &mut Line, axis: usize) -> Result<(), StoreError> {
+    let boot_ups = |line: &Line| line.heard(axis).boot_ups;
+    let before = boot_ups(line);
+    line.command(axis, NmtCommand::ResetNode)?;
+    if !line.listen_until(BOOT_NS, |line| boot_ups(line) > before)? {
+        return Err(StoreError::NoBoot { axis });
+    }
+    let mut heard = boot_ups(line);
+    while line.listen_until(SETTLED_NS, |line| boot_ups(line) > heard)? {
+        heard = boot_ups(line);
+    }
+    Ok(())
+}
+
+/// A value, or none from a drive that is silent.
+fn unless_silent<T>(answer: Result<T, LineError>) -> Result<Option<T>, LineError> {
+    match answer {
+        Err(LineError::Sdo { reason: SdoReason::Silent, .. }) => Ok(None),
+        answer => answer.map(Some),
+    }
+}
+
+/// How many SYNCs a drive answers.
+const SYNCS: usize = 50;
+/// Time that a node takes to become operational, ns.
+const START_NS: u64 = 50 * MILLISECOND_NS;
+
+/// The longest time from the end of a SYNC until the drive began to transmit its process data, ns; none where it left a
+/// SYNC without an answer. The drive is operational meanwhile, and pre-operational before and after.
+///
+/// # Errors
+/// [`LineError`] except those of transfers.
+pub(super) fn longest_sync_answer_ns(line: &mut Line, axis: usize) -> Result<Option<u64>, LineError> {
+    line.command(axis, NmtCommand::Start)?;
+    line.listen(START_NS)?;
+    let answers = (0..SYNCS).map(|_| line.sync_answer_ns(axis)).collect::<Result<Option<Vec<_>>, _>>();
+    line.command(axis, NmtCommand::EnterPreOperational)?;
+    Ok(answers?.and_then(|answers| answers.into_iter().max()))
+}
+
+#[cfg(test)]
+mod power_tests {
+    use std::io;
+
+    use masseter_scenario::Scenario;
+
+    use super::*;
+
+    #[test]
+    fn a_drive_with_power_is_refused_until_it_is_taken_over() {
+        let mut line = Line::open(&Scenario::default(), Box::new(io::sink())).unwrap();
+        line.listen(100 * MILLISECOND_NS).unwrap();
+        prove_no_power(&mut line, 3, 50).unwrap();
+        for word in [Controlword::SHUTDOWN, Controlword::SWITCH_ON] {
+            line.control(3, word).unwrap();
+        }
+        line.listen(10 * MILLISECOND_NS).unwrap();
+        let refusal = prove_no_power(&mut line, 3, 50).unwrap_err().to_string();
+        assert!(refusal.starts_with("l1: statusword ") && refusal.ends_with("--take-over"), "{refusal}");
+        take_over(&mut line, 3, 50).unwrap();
+        prove_no_power(&mut line, 3, 50).unwrap();
+    }
+}
+
+#[cfg(test)]
+mod store_tests {
+    use std::io;
+
+    use masseter_scenario::Scenario;
+
+    use super::*;
+
+    #[test]
+    fn a_stored_value_survives_the_reset_and_another_does_not() {
+        let mut line = Line::open(&Scenario::default(), Box::new(io::sink())).unwrap();
+        line.listen(100 * MILLISECOND_NS).unwrap();
+        let window = ObjectAddress::new(0x6065, 0);
+        let delivered = line.read_number(3, window).unwrap();
+        line.write(3, window, 77, 4).unwrap();
+        reset(&mut line, 3).unwrap();
+        assert_eq!(line.read_number(3, window).unwrap(), delivered);
+        line.write(3, window, 77, 4).unwrap();
+        store(&mut line, 3, StoreConfig::default()).unwrap();
+        reset(&mut line, 3).unwrap();
+        assert_eq!(line.read_number(3, window).unwrap(), 77);
+    }
+}
+
+#[cfg(test)]
+mod sync_answer_tests {
+    use masseter_can::canopen::ObjectAddress;
+    use masseter_scenario::Scenario;
+
+    use super::*;
+    use crate::commissioning::tests::Log;
+
+    #[test]
+    fn a_drive_answers_every_sync_and_gets_no_controlword() {
+        let log = Log::default();
+        let mut line = Line::open(&Scenario::default(), Box::new(log.clone())).unwrap();
+        line.listen(100 * MILLISECOND_NS).unwrap();
+        let found_ns = longest_sync_answer_ns(&mut line, 3).unwrap().unwrap();
+        assert!(found_ns < 10_000, "emulated drives answer at once: {found_ns} ns");
+        line.write(3, ObjectAddress::new(0x1800, 1), 0xC000_0184, 4).unwrap();
+        assert_eq!(longest_sync_answer_ns(&mut line, 3).unwrap(), None, "TPDO1 is off");
+        assert_eq!(log.controlwords(), []);
+        let log = log.text();
+        assert_eq!(
+            (log.matches(" can1 184#").count(), log.matches(" can0 080#").count()),
+            (SYNCS, 0),
+            "{log}"
+        );
+    }
+}

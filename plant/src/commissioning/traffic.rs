@@ -1,0 +1,285 @@
+//! The frames on the buses of all drives: sent, heard and logged. Nothing here waits for an answer.
+//!
+//! The buses are simulated ones with the emulated drives, or real interfaces, each with its clock.
+
+use std::collections::BTreeSet;
+use std::io::Write;
+
+use masseter_can::canopen::{Cob, Emergency, Heartbeat, NmtState, NodeId, SdoResponse};
+use masseter_can::wire::{Bitrate, INTERFRAME_BITS, frame_bits};
+use masseter_can::{Frame, Received, SendError, Tapped, TappedFrame, candump};
+use masseter_model::geometry::AXES;
+use masseter_runtime::clock::{self, MILLISECOND_NS};
+use masseter_scenario::{MASTER_NODE, Scenario};
+
+use super::errors::{LineError, MasterSign, OtherMaster};
+use crate::error::PlantError;
+use crate::master::link::{Address, Buses, Link, addresses};
+use crate::master::sockets::SocketLink;
+use crate::simulator::emulation::virtual_link::VirtualLink;
+
+/// Time between two looks at the buses, ns.
+const STEP_NS: u64 = MILLISECOND_NS;
+
+/// The heartbeat of this node: drives that watch it stop without it.
+#[derive(Debug, Clone, Copy)]
+struct Beat {
+    every_ns: u64,
+    next_ns: u64,
+}
+
+/// The buses, and what was heard on them.
+pub(super) struct Traffic {
+    pub(super) wires: Wires,
+    /// Names of the buses in the log.
+    pub(super) names: Vec<String>,
+    pub(super) addresses: [Address; AXES],
+    pub(super) heard: [Heard; AXES],
+    /// Who else was heard.
+    pub(super) strangers: Strangers,
+    beat: Option<Beat>,
+    /// When the last SYNC was on its bus, ns.
+    pub(super) sync_ns: Option<u64>,
+    bitrate: Bitrate,
+    pub(super) log: Box<dyn Write + Send>,
+}
+
+impl Traffic {
+    /// On the scenario's interfaces, or on simulated buses where it names none.
+    ///
+    /// # Errors
+    /// [`PlantError`] for interfaces that cannot be opened and for buses that cannot be built.
+    pub(super) fn open(scenario: &Scenario, log: Box<dyn Write + Send>) -> Result<Self, PlantError> {
+        let can = &scenario.can;
+        let addresses = addresses(can)?;
+        let simulated = (0..can.buses.len()).map(|bus| format!("can{bus}")).collect();
+        Ok(Self {
+            wires: Wires::open(scenario)?,
+            names: if can.is_virtual() { simulated } else { can.interfaces.clone() },
+            addresses,
+            heard: Default::default(),
+            strangers: Strangers::default(),
+            beat: None,
+            sync_ns: None,
+            bitrate: Bitrate::new(can.bitrate_bps)?,
+            log,
+        })
+    }
+
+    /// Time from the end of the last SYNC until a drive began to transmit process data, ns; none where one of them was not heard.
+    pub(super) fn sync_answer_ns(&self, axis: usize) -> Option<u64> {
+        let (begin_ns, sync_ns) = self.heard[axis].process_data_ns.zip(self.sync_ns)?;
+        Some(begin_ns.saturating_sub(sync_ns))
+    }
+
+    /// Sends the master's heartbeat from now on, with that interval.
+    pub(super) fn beat_every(&mut self, interval_ms: u16) {
+        self.beat =
+            Some(Beat { every_ns: u64::from(interval_ms) * MILLISECOND_NS, next_ns: self.wires.now_ns() });
+    }
+
+    /// Sends a frame to a bus.
+    pub(super) fn send(&mut self, bus: usize, frame: Frame) -> Result<(), LineError> {
+        self.wires.send(bus, frame).map_err(|error| LineError::Send { bus, error })
+    }
+
+    /// A step of time: the heartbeat, and every frame that has come.
+    pub(super) fn step(&mut self) -> Result<(), LineError> {
+        self.wires.pass(STEP_NS)?;
+        self.send_heartbeat()?;
+        for bus in 0..self.names.len() {
+            while let Some(tapped) = self.wires.tap(bus) {
+                let mut text = String::new();
+                candump::write(&mut text, &self.names[bus], &tapped).expect("a text takes everything");
+                writeln!(self.log, "{text}")?;
+                if let Tapped::Frame(tapped) = tapped {
+                    self.note_time(bus, &tapped);
+                }
+            }
+            while let Some(received) = self.wires.receive(bus) {
+                self.note_frame(bus, &received.frame);
+            }
+        }
+        Ok(())
+    }
+
+    /// Notes the times of SYNC and of process data.
+    fn note_time(&mut self, bus: usize, tapped: &TappedFrame) {
+        match Cob::try_from(tapped.frame.id()) {
+            Ok(Cob::Sync) => self.sync_ns = Some(tapped.time_ns),
+            Ok(Cob::Tpdo1(node)) => {
+                let bits = frame_bits(&tapped.frame) - INTERFRAME_BITS;
+                let begin_ns = tapped.time_ns.saturating_sub(self.bitrate.bits_to_ns(bits));
+                let axis = self.addresses.iter().position(|at| *at == Address { bus, node });
+                if let Some(axis) = axis {
+                    self.heard[axis].process_data_ns = Some(begin_ns);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn send_heartbeat(&mut self) -> Result<(), LineError> {
+        let now_ns = self.wires.now_ns();
+        let Some(beat) = self.beat.as_mut().filter(|beat| now_ns >= beat.next_ns) else { return Ok(()) };
+        beat.next_ns = now_ns + beat.every_ns;
+        let frame = Heartbeat { state: NmtState::Operational }.frame(MASTER_NODE);
+        (0..self.names.len()).try_for_each(|bus| self.send(bus, frame))
+    }
+
+    fn note_frame(&mut self, bus: usize, frame: &Frame) {
+        let Ok(cob) = Cob::try_from(frame.id()) else { return };
+        let sender = match cob {
+            Cob::Heartbeat(node) | Cob::Emergency(node) | Cob::SdoResponse(node) | Cob::Tpdo1(node) => {
+                Some(node)
+            }
+            _ => None,
+        };
+        match self.addresses.iter().position(|at| at.bus == bus && Some(at.node) == sender) {
+            Some(axis) => self.heard[axis].note_frame(cob, frame),
+            None => self.strangers.note_sender(bus, cob),
+        }
+    }
+}
+
+/// What was heard of one drive.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Heard {
+    /// State of its heartbeat.
+    pub nmt: Option<NmtState>,
+    /// Boot-up messages.
+    pub boot_ups: u32,
+    /// Its emergencies, the oldest first.
+    pub emergencies: Vec<Emergency>,
+    /// When it began to transmit process data last, ns.
+    pub(super) process_data_ns: Option<u64>,
+    /// An answer of its SDO server that nobody has taken.
+    pub(super) answer: Option<SdoResponse>,
+}
+
+impl Heard {
+    /// Takes a frame of the drive. Malformed frames have no effect; the log has them.
+    pub(super) fn note_frame(&mut self, cob: Cob, frame: &Frame) {
+        match cob {
+            Cob::Heartbeat(_) => {
+                if let Ok(Heartbeat { state }) = Heartbeat::decode(frame.data()) {
+                    self.boot_ups += u32::from(state == NmtState::BootUp);
+                    self.nmt = Some(state);
+                }
+            }
+            Cob::Emergency(_) => self.emergencies.extend(Emergency::decode(frame.data())),
+            Cob::SdoResponse(_) => self.answer = SdoResponse::decode(frame.data()).ok(),
+            _ => {}
+        }
+    }
+}
+
+/// Signs of other masters and of nodes that the scenario does not have.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Strangers {
+    /// SYNC, NMT, process data or SDO requests to a drive, or a heartbeat of the master's node id: with the bus.
+    pub masters: BTreeSet<(usize, MasterSign)>,
+    /// Node ids that are none of the scenario, with their bus.
+    pub nodes: BTreeSet<(usize, NodeId)>,
+}
+
+impl Strangers {
+    /// Whether nobody else was heard.
+    pub fn is_empty(&self) -> bool {
+        self.masters.is_empty() && self.nodes.is_empty()
+    }
+
+    /// Refuses to go on where another master was heard.
+    ///
+    /// # Errors
+    /// [`OtherMaster`].
+    pub fn refuse_masters(&self) -> Result<(), OtherMaster> {
+        self.masters.first().map_or(Ok(()), |&(bus, sign)| Err(OtherMaster { bus, sign }))
+    }
+
+    /// Takes a frame of a node that is no drive of the scenario.
+    pub(super) fn note_sender(&mut self, bus: usize, cob: Cob) {
+        let sign = match cob {
+            Cob::Sync => MasterSign::Sync,
+            Cob::Nmt => MasterSign::Nmt,
+            Cob::SdoRequest(_) => MasterSign::SdoRequests,
+            Cob::Rpdo1(_) => MasterSign::ProcessData,
+            Cob::Heartbeat(node) if node == MASTER_NODE => MasterSign::Heartbeat,
+            Cob::Heartbeat(node) | Cob::Emergency(node) | Cob::SdoResponse(node) | Cob::Tpdo1(node) => {
+                self.nodes.insert((bus, node));
+                return;
+            }
+        };
+        self.masters.insert((bus, sign));
+    }
+}
+
+/// The buses with their time.
+#[derive(Debug)]
+pub(super) enum Wires {
+    /// Simulated, up to a time, ns.
+    Simulated(Box<VirtualLink>, u64),
+    Real(SocketLink),
+}
+
+/// The same call on either kind of buses.
+macro_rules! on_link {
+    ($wires:expr, $link:ident => $call:expr) => {
+        match $wires {
+            Wires::Simulated($link, _) => $call,
+            Wires::Real($link) => $call,
+        }
+    };
+}
+
+impl Wires {
+    /// The scenario's interfaces, or simulated buses where it names none.
+    pub(super) fn open(scenario: &Scenario) -> Result<Self, PlantError> {
+        Ok(if scenario.can.is_virtual() {
+            Self::Simulated(Box::new(VirtualLink::new(scenario, 0, 0)?), 0)
+        } else {
+            Self::Real(SocketLink::open(scenario, clock::now_ns())?)
+        })
+    }
+
+    pub(super) fn now_ns(&self) -> u64 {
+        match self {
+            Self::Simulated(_, now_ns) => *now_ns,
+            Self::Real(_) => clock::now_ns(),
+        }
+    }
+
+    /// Lets time pass. What emulated drives store meanwhile goes to the file of their memory.
+    pub(super) fn pass(&mut self, for_ns: u64) -> Result<(), PlantError> {
+        match self {
+            Self::Simulated(link, now_ns) => {
+                *now_ns += for_ns;
+                link.advance(*now_ns)?;
+                link.emulation.save_memory()
+            }
+            Self::Real(_) => {
+                clock::sleep_until(clock::now_ns() + for_ns);
+                Ok(())
+            }
+        }
+    }
+
+    pub(super) fn send(&mut self, bus: usize, frame: Frame) -> Result<(), SendError> {
+        use masseter_can::Bus;
+        let now_ns = self.now_ns();
+        on_link!(self, link => link.port(bus).send(now_ns, frame))
+    }
+
+    /// The next frame of another node. Lost frames show as missing answers.
+    pub(super) fn receive(&mut self, bus: usize) -> Option<Received> {
+        use masseter_can::Bus;
+        let now_ns = self.now_ns();
+        on_link!(self, link => link.port(bus).receive(now_ns)).ok().flatten()
+    }
+
+    /// The next frame of any node, this one too.
+    pub(super) fn tap(&mut self, bus: usize) -> Option<Tapped> {
+        let now_ns = self.now_ns();
+        on_link!(self, link => link.tap(bus, now_ns)).ok().flatten()
+    }
+}

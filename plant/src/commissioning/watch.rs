@@ -1,0 +1,348 @@
+//! The watch over a motion, and the switching of one drive with the times of its brake.
+//!
+//! One look reads the moved axis and one of the others, and says what must stop the motion.
+
+use masseter_can::canopen::{EmergencyCode, ObjectAddress};
+use masseter_can::cia402::{Controlword, DriveState, StatusBit, Statusword};
+use masseter_model::geometry::AXES;
+use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
+use masseter_scenario::{AxisScale, BrakeConfig};
+
+use super::errors::{LineError, MotionError, StopCause};
+use super::line::{BootUps, Line};
+
+/// Digital inputs (60FDh): limit switches.
+const INPUTS: ObjectAddress = ObjectAddress::new(0x60FD, 0);
+const NEGATIVE_SWITCH: u32 = 0b01;
+const POSITIVE_SWITCH: u32 = 0b10;
+
+/// What is allowed while one axis moves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Bounds {
+    /// Force of the motor, N.
+    pub(super) force_n: f64,
+    /// The following error window, m.
+    pub(super) window_m: f64,
+    /// Motion of an axis that shall stand, m.
+    pub(super) still_m: f64,
+}
+
+/// The limit switches at the beginning of a motion.
+#[derive(Debug, Clone, Copy)]
+struct Switches {
+    /// 60FDh.
+    bits: u32,
+    /// Where the axis stood, m.
+    place_m: f64,
+}
+
+/// The moved axis at one look.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// When, ns.
+    pub at_ns: u64,
+    /// 6064h, m.
+    pub position_m: f64,
+    /// 6077h, N.
+    pub force_n: f64,
+    /// 6041h.
+    pub status: Statusword,
+}
+
+/// The watch.
+#[derive(Debug)]
+pub(super) struct Watch {
+    axis: usize,
+    scales: [AxisScale; AXES],
+    /// What is allowed.
+    pub(super) bounds: Bounds,
+    /// Where every axis stood at the beginning, m.
+    began_m: [f64; AXES],
+    /// Emergencies heard before.
+    emergencies: [usize; AXES],
+    boot_ups: BootUps,
+    /// None in a drive without 60FDh, and while they do not count.
+    switches: Option<Switches>,
+    /// The other axis that is looked at next.
+    next: usize,
+}
+
+/// 6041h.
+pub(super) fn read_status(line: &mut Line, axis: usize) -> Result<Statusword, LineError> {
+    Ok(Statusword(line.read_number(axis, ObjectAddress::new(0x6041, 0))? as u16))
+}
+
+/// The state in 6041h.
+pub(super) fn read_state(line: &mut Line, axis: usize) -> Result<DriveState, MotionError> {
+    read_status(line, axis)?.state().map_err(|source| MotionError::Statusword { axis, source })
+}
+
+/// 6064h, m.
+pub(super) fn read_position(line: &mut Line, axis: usize, scale: &AxisScale) -> Result<f64, LineError> {
+    Ok(scale.metres(line.read_number(axis, ObjectAddress::new(0x6064, 0))? as i32))
+}
+
+/// 603Fh, or 0 in a drive that does not tell it.
+pub(super) fn read_error_code(line: &mut Line, axis: usize) -> u16 {
+    line.read_number(axis, ObjectAddress::new(0x603F, 0)).unwrap_or(0) as u16
+}
+
+/// The limit switches of an axis that stands there; none in a drive without 60FDh.
+fn read_switches(line: &mut Line, axis: usize, place_m: f64) -> Result<Option<Switches>, LineError> {
+    // Silence does not say that a switch is open.
+    Ok(line.read_if_there(axis, INPUTS)?.map(|bits| Switches { bits, place_m }))
+}
+
+impl Watch {
+    /// Begins; refuses if a drive has power.
+    pub(super) fn begin(
+        line: &mut Line,
+        axis: usize,
+        scales: [AxisScale; AXES],
+        bounds: Bounds,
+    ) -> Result<Self, MotionError> {
+        let mut began_m = [0.0; AXES];
+        for (axis, began_m) in began_m.iter_mut().enumerate() {
+            let state = read_state(line, axis)?;
+            if state.is_powered() {
+                return Err(MotionError::Powered { axis, state });
+            }
+            *began_m = read_position(line, axis, &scales[axis])?;
+        }
+        let switches = read_switches(line, axis, began_m[axis])?;
+        let emergencies = std::array::from_fn(|axis| line.heard(axis).emergencies.len());
+        let boot_ups = BootUps::until_now(line);
+        Ok(Self { axis, scales, bounds, began_m, emergencies, boot_ups, switches, next: 0 })
+    }
+
+    /// Refuses to go on after a restart of a drive, whose reduced limits are lost, and beside another master.
+    ///
+    /// # Errors
+    /// [`MotionError::Stopped`].
+    pub(super) fn check_undisturbed(&self, line: &Line) -> Result<(), MotionError> {
+        let stopped = |cause| MotionError::Stopped { axis: self.axis, cause };
+        self.boot_ups.check(line).map_err(|restarted| stopped(restarted.into()))?;
+        line.strangers().refuse_masters().map_err(|master| stopped(master.into()))
+    }
+
+    /// The limit switches count no more: homing looks for them.
+    pub(super) fn ignore_switches(&mut self) {
+        self.switches = None;
+    }
+
+    /// The limit switches count again. Those that are closed now end no motion, and allow none in their direction.
+    pub(super) fn heed_switches(&mut self, line: &mut Line) -> Result<(), LineError> {
+        let place_m = read_position(line, self.axis, &self.scales[self.axis])?;
+        self.switches = read_switches(line, self.axis, place_m)?;
+        Ok(())
+    }
+
+    /// Refuses a target beyond the place where the axis stood, in the direction of a switch that was closed there: the axis
+    /// is at its end, or the switch or its wire is broken. Positions within the noise are one place.
+    ///
+    /// # Errors
+    /// [`MotionError::OnSwitch`].
+    pub(super) fn check_way(&self, target_m: f64, noise_m: f64) -> Result<(), MotionError> {
+        let (axis, Some(Switches { bits, place_m })) = (self.axis, self.switches) else { return Ok(()) };
+        // The drive counts the other way on a reversed axis.
+        let beyond_m = (target_m - place_m) * self.scales[axis].increment_m.signum();
+        let blocks = |switch, beyond_m| bits & switch != 0 && beyond_m > noise_m;
+        if blocks(POSITIVE_SWITCH, beyond_m) || blocks(NEGATIVE_SWITCH, -beyond_m) {
+            return Err(MotionError::OnSwitch { axis, bits });
+        }
+        Ok(())
+    }
+
+    /// Looks once. The position comes before the statusword: a statusword without "homed" proves an old position.
+    ///
+    /// # Errors
+    /// [`MotionError::Stopped`] for what must stop the motion.
+    pub(super) fn look(&mut self, line: &mut Line) -> Result<Sample, MotionError> {
+        let (axis, scale) = (self.axis, self.scales[self.axis]);
+        let at_ns = line.now_ns();
+        let position_m = read_position(line, axis, &scale)?;
+        let status = read_status(line, axis)?;
+        let permille = line.read_number(axis, ObjectAddress::new(0x6077, 0))? as i16;
+        let sample = Sample { at_ns, position_m, force_n: f64::from(permille) * scale.permille_n, status };
+        self.check_undisturbed(line)?;
+        let cause = match self.stop_cause(line, &sample)? {
+            Some(cause) => Some(cause),
+            None => self.look_at_switches(line)?.or(self.look_at_another(line)?),
+        };
+        cause.map_or(Ok(sample), |cause| Err(MotionError::Stopped { axis, cause }))
+    }
+
+    fn stop_cause(&self, line: &mut Line, sample: &Sample) -> Result<Option<StopCause>, MotionError> {
+        let (axis, Bounds { force_n: limit_n, window_m, .. }) = (self.axis, self.bounds);
+        let Sample { status, force_n, .. } = *sample;
+        // In homing the same bit is a homing error, which the caller judges.
+        let state = status.state().map_err(|source| MotionError::Statusword { axis, source })?;
+        let fails = state != DriveState::OperationEnabled;
+        if fails && status.has(StatusBit::FollowingError) {
+            return Ok(Some(StopCause::FollowingError { window_m }));
+        }
+        for (sender, &before) in self.emergencies.iter().enumerate() {
+            let new = line.heard(sender).emergencies[before..].iter().find(|emergency| !emergency.is_reset());
+            if let Some(emergency) = new {
+                let is_following = sender == axis && emergency.code == EmergencyCode::FOLLOWING_ERROR;
+                let emergency = StopCause::Emergency { sender, code: emergency.code };
+                let following = StopCause::FollowingError { window_m };
+                return Ok(Some(if is_following { following } else { emergency }));
+            }
+        }
+        if fails {
+            return Ok(Some(StopCause::LeftOperation { state, error_code: read_error_code(line, axis) }));
+        }
+        Ok((force_n.abs() > limit_n).then_some(StopCause::Force { force_n, limit_n }))
+    }
+
+    /// A switch that was closed at the beginning may be left.
+    fn look_at_switches(&self, line: &mut Line) -> Result<Option<StopCause>, MotionError> {
+        let Some(before) = self.switches else { return Ok(None) };
+        let bits = line.read_number(self.axis, INPUTS)?;
+        let closed = bits & !before.bits & (NEGATIVE_SWITCH | POSITIVE_SWITCH);
+        Ok((closed != 0).then_some(StopCause::LimitSwitch { bits }))
+    }
+
+    fn look_at_another(&mut self, line: &mut Line) -> Result<Option<StopCause>, MotionError> {
+        let other = self.next;
+        self.next = (other + 1) % AXES;
+        if other == self.axis {
+            return Ok(None);
+        }
+        let state = read_state(line, other)?;
+        // A drive in fault reacts without power too, and its emergency tells more.
+        if state.is_powered() && state != DriveState::FaultReactionActive {
+            return Ok(Some(StopCause::OtherPowered { other, state }));
+        }
+        let moved_m = read_position(line, other, &self.scales[other])? - self.began_m[other];
+        Ok((moved_m.abs() > self.bounds.still_m).then_some(StopCause::OtherAxis { other, moved_m }))
+    }
+}
+
+/// How long a drive may take from one state to the next, ns.
+const TRANSITION_NS: u64 = SECOND_NS;
+/// How long an axis is watched after its power went, ns.
+const SETTLING_NS: u64 = SECOND_NS;
+/// How far an axis may move as its brake closes, m: some turns of play, and not a fall.
+const MOST_DROP_M: f64 = 5e-4;
+/// How long a stop is tried, and after which time its command is repeated, ns.
+const STOP_NS: u64 = SECOND_NS;
+const REPEAT_NS: u64 = 200 * MILLISECOND_NS;
+
+/// Switches a drive on, up to "operation enabled". The brake is opening then: the axis may not move yet. A drive that
+/// restarted has lost its reduced limits: it gets no power. One that restarts later is no longer ready to switch on,
+/// and takes no further word.
+pub(super) fn switch_on_drive(line: &mut Line, axis: usize, watch: &Watch) -> Result<(), MotionError> {
+    for (word, wanted) in [
+        (Controlword::SHUTDOWN, DriveState::ReadyToSwitchOn),
+        (Controlword::SWITCH_ON, DriveState::SwitchedOn),
+        (Controlword::ENABLE_OPERATION, DriveState::OperationEnabled),
+    ] {
+        line.control(axis, word)?;
+        let state = wait_for_state(line, axis, TRANSITION_NS, |state| state == wanted)?;
+        if state != wanted {
+            let error_code = read_error_code(line, axis);
+            return Err(MotionError::NotEnabled { axis, state, error_code });
+        }
+        watch.check_undisturbed(line)?;
+    }
+    Ok(())
+}
+
+/// Switches off an axis that stands: "disable operation" closes the brake, and the voltage goes once the brake holds. Returns
+/// how far the axis moved until a second later, m.
+///
+/// # Errors
+/// [`MotionError::Dropped`] for an axis that nothing holds without power.
+pub(super) fn switch_off_drive(
+    line: &mut Line,
+    axis: usize,
+    scale: &AxisScale,
+    brake: &BrakeConfig,
+) -> Result<f64, MotionError> {
+    let before_m = read_position(line, axis, scale)?;
+    line.control(axis, Controlword::SWITCH_ON)?;
+    line.listen(seconds(brake.close_s))?;
+    disable_voltage(line, axis)?;
+    line.listen(SETTLING_NS)?;
+    let moved_m = read_position(line, axis, scale)? - before_m;
+    if moved_m.abs() > MOST_DROP_M { Err(MotionError::Dropped { axis, moved_m }) } else { Ok(moved_m) }
+}
+
+/// Stops an axis in whatever it does: quick stop, then voltage off. Neither word can enable a drive, whatever its
+/// state. Commands that are lost are repeated.
+///
+/// # Errors
+/// [`MotionError::StaysOn`] unless the statusword proves that the drive is off.
+pub(super) fn stop_drive(line: &mut Line, axis: usize, brake: &BrakeConfig) -> Result<(), MotionError> {
+    // The drive may stay in the quick stop (605Ah = 5 or 6): the voltage goes after the same time.
+    let _ = repeat(line, axis, Controlword::QUICK_STOP);
+    disable_voltage(line, axis)?;
+    Ok(line.listen(seconds(brake.close_s))?)
+}
+
+fn disable_voltage(line: &mut Line, axis: usize) -> Result<(), MotionError> {
+    match repeat(line, axis, Controlword::DISABLE_VOLTAGE) {
+        Ok(()) => {
+            line.note_off(axis);
+            Ok(())
+        }
+        Err(reason) => Err(MotionError::StaysOn { axis, reason }),
+    }
+}
+
+/// Sends a controlword again and again until the drive shows no voltage, for a limited time; returns why that is not proved.
+fn repeat(line: &mut Line, axis: usize, word: Controlword) -> Result<(), String> {
+    let until_ns = line.now_ns() + STOP_NS;
+    loop {
+        let sent = line.control(axis, word);
+        let reason = match wait_for_state(line, axis, REPEAT_NS, |state| !state.is_powered()) {
+            Ok(state) if !state.is_powered() => return Ok(()),
+            Ok(state) => format!("it shows {state}"),
+            Err(error) => error.to_string(),
+        };
+        if line.now_ns() >= until_ns {
+            return Err(sent.err().map_or(reason, |error| error.to_string()));
+        }
+        // Time passes also where nothing can be sent.
+        let _ = line.listen(MILLISECOND_NS);
+    }
+}
+
+/// Waits until a drive shows a mode of operation (6061h).
+pub(super) fn wait_for_mode(line: &mut Line, axis: usize, wanted: i8) -> Result<(), MotionError> {
+    let until_ns = line.now_ns() + TRANSITION_NS;
+    loop {
+        let found = line.read_number(axis, ObjectAddress::new(0x6061, 0))? as i8;
+        if found == wanted {
+            return Ok(());
+        }
+        if line.now_ns() >= until_ns {
+            return Err(MotionError::Mode { axis, wanted, found });
+        }
+        line.listen(MILLISECOND_NS)?;
+    }
+}
+
+/// The state that a drive has when the condition holds, or at the end of the time.
+fn wait_for_state(
+    line: &mut Line,
+    axis: usize,
+    within_ns: u64,
+    holds: impl Fn(DriveState) -> bool,
+) -> Result<DriveState, MotionError> {
+    let until_ns = line.now_ns() + within_ns;
+    loop {
+        let state = read_state(line, axis)?;
+        if holds(state) || line.now_ns() >= until_ns {
+            return Ok(state);
+        }
+        line.listen(MILLISECOND_NS)?;
+    }
+}
+
+/// Seconds in ns.
+pub(super) fn seconds(time_s: f64) -> u64 {
+    (time_s * SECOND_NS as f64) as u64
+}

@@ -1,0 +1,493 @@
+//! Settings into a drive: PDOs by the standard's procedure, objects one by one, every value read back.
+//!
+//! [`Borrowed`] has the objects of one drive that a step changes for its own duration.
+
+use std::mem;
+
+use masseter_can::canopen::{AbortCode, CobId, NmtCommand, ObjectAddress};
+use masseter_model::geometry::AXIS_NAMES;
+use masseter_runtime::clock::MILLISECOND_NS;
+use masseter_scenario::{DriveProfile, ObjectKey, ObjectRule};
+use serde::Serialize;
+
+use super::errors::{LineError, object_name, value_text};
+use super::line::{Line, OldValue};
+use super::settings::{PdoSetting, Setting, Settings, Survey, same};
+use crate::master::wanted::{COB_ID_BITS, may_keep};
+
+/// The time that a drive gets to become pre-operational, ns.
+const ENTER_NS: u64 = 100 * MILLISECOND_NS;
+
+/// A value that was written.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Change {
+    /// The object, such as `6066h:00h`.
+    pub object: String,
+    /// Its name.
+    pub name: &'static str,
+    /// Its value before; none where it could not be read.
+    pub before: Option<String>,
+    /// Its value now.
+    pub after: String,
+}
+
+/// Why a drive does not have its settings.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// The drive refused a value.
+    #[error(
+        "{}: object {object} ({}) := {}: {code}{limits}; change {key}",
+        AXIS_NAMES[*axis], object_name(*object), value_text(*object, *value)
+    )]
+    Refused {
+        /// The axis.
+        axis: usize,
+        /// The object.
+        object: ObjectAddress,
+        /// The value.
+        value: u32,
+        /// The drive's reason.
+        code: AbortCode,
+        /// The limits of the profile in words; may be empty.
+        limits: String,
+        /// The key of the scenario that decides the value.
+        key: String,
+    },
+    /// The drive acknowledged a value and shows another one.
+    #[error("{source}; change {key}")]
+    NotKept {
+        /// The object with its values.
+        source: LineError,
+        /// The key of the scenario that decides the value.
+        key: String,
+    },
+    /// The line.
+    #[error(transparent)]
+    Line(#[from] LineError),
+}
+
+/// Writes settings to one drive, and knows what it changed.
+#[derive(Debug)]
+pub struct Writer<'a> {
+    line: &'a mut Line,
+    axis: usize,
+    profile: &'a DriveProfile,
+    changes: Vec<Change>,
+}
+
+impl<'a> Writer<'a> {
+    /// For the drive of an axis.
+    pub fn new(line: &'a mut Line, axis: usize, profile: &'a DriveProfile) -> Self {
+        Self { line, axis, profile, changes: Vec::new() }
+    }
+
+    /// Every value that was written.
+    pub fn into_changes(self) -> Vec<Change> {
+        self.changes
+    }
+
+    /// Makes the drive pre-operational, since many drives take PDO parameters in no other state, and writes what differs from
+    /// the survey. The first refusal ends it.
+    ///
+    /// # Errors
+    /// [`WriteError`].
+    pub fn apply(&mut self, settings: &Settings, survey: &Survey) -> Result<(), WriteError> {
+        self.line.command(self.axis, NmtCommand::EnterPreOperational)?;
+        self.line.listen(ENTER_NS)?;
+        for pdo in &settings.pdos {
+            self.pdo(pdo, survey)?;
+        }
+        for setting in in_order(&settings.objects, survey) {
+            self.object(setting, survey)?;
+        }
+        Ok(())
+    }
+
+    /// The PDO ceases to exist while it changes (CiA 301, 7.5.2.36).
+    fn pdo(&mut self, pdo: &PdoSetting, survey: &Survey) -> Result<(), WriteError> {
+        let alone = Settings { pdos: vec![pdo.clone()], objects: Vec::new() };
+        let (cob_id, Some(found)) = (pdo.part(1), survey.number(pdo.part(1))) else { return Ok(()) };
+        if alone.differences(survey).is_empty() {
+            return Ok(());
+        }
+        let key = "can.node_ids";
+        let invalid = CobId(found).invalidated();
+        if CobId(found).is_valid() {
+            self.write(cob_id, invalid.0, 4, key, Some(found))?;
+        }
+        if let Some(layout) = &pdo.layout {
+            self.write(pdo.mapped(0), 0, 1, key, survey.number(pdo.mapped(0)))?;
+            for (place, &object) in (1..).zip(&layout.mapping) {
+                let before = survey.number(pdo.mapped(place));
+                if before != Some(object) {
+                    self.write(pdo.mapped(place), object, 4, key, before)?;
+                }
+            }
+            self.write(pdo.mapped(0), layout.mapping.len() as u32, 1, key, Some(0))?;
+            let parts = [(2, Some(layout.transmission), 1), (3, layout.inhibit, 2), (5, layout.event, 2)];
+            for (part, value, bytes) in parts {
+                let before = survey.number(pdo.part(part));
+                if let (Some(value), Some(before)) = (value, before)
+                    && value != before
+                {
+                    self.write(pdo.part(part), value, bytes, key, Some(before))?;
+                }
+            }
+        }
+        if CobId(pdo.cob_id).is_valid() {
+            // The drive keeps its bit for remote requests, which nobody sends.
+            let value = pdo.cob_id & COB_ID_BITS | found & !COB_ID_BITS;
+            self.write(cob_id, value, 4, key, Some(invalid.0))?;
+        }
+        Ok(())
+    }
+
+    fn object(&mut self, setting: &Setting, survey: &Survey) -> Result<(), WriteError> {
+        let Setting { object: ObjectKey(object), value, bytes, rule, key } = setting;
+        let before = survey.number(*object);
+        let is_right = before.is_some_and(|before| same(before, *value, *bytes));
+        let is_left = *rule == ObjectRule::Expect || (*rule == ObjectRule::Optional && before.is_none());
+        if is_right || is_left {
+            return Ok(());
+        }
+        match self.write(*object, *value, *bytes, key, before) {
+            Err(WriteError::Refused { .. }) if may_keep(*rule, *object) => Ok(()),
+            written => written,
+        }
+    }
+
+    fn write(
+        &mut self,
+        object: ObjectAddress,
+        value: u32,
+        bytes: usize,
+        key: &str,
+        before: Option<u32>,
+    ) -> Result<(), WriteError> {
+        let (axis, key) = (self.axis, key.to_owned());
+        let written = self.line.write(axis, object, value, bytes);
+        let shown = match written {
+            Ok(()) => Some(value),
+            Err(LineError::NotKept { found, .. }) => found,
+            Err(_) => None,
+        };
+        self.changes.extend(shown.map(|shown| Change {
+            object: object.to_string(),
+            name: object_name(object),
+            before: before.map(|before| value_text(object, before)),
+            after: value_text(object, shown),
+        }));
+        written.map_err(|error| match error.abort_code() {
+            Some(code) => WriteError::Refused { axis, object, value, code, limits: self.limits(object), key },
+            None if matches!(error, LineError::NotKept { .. }) => WriteError::NotKept { source: error, key },
+            None => error.into(),
+        })
+    }
+
+    fn limits(&self, object: ObjectAddress) -> String {
+        let config = self.profile.object(ObjectKey(object));
+        let end = |end: Option<i64>| end.map_or_else(|| "any".to_owned(), |end| end.to_string());
+        match (config.lowest, config.highest) {
+            (None, None) => String::new(),
+            (lowest, highest) => format!("; the profile takes {} to {}", end(lowest), end(highest)),
+        }
+    }
+}
+
+/// Drives refuse software limits that cross: the one that moves away from the other comes first.
+fn in_order<'s>(settings: &'s [Setting], survey: &Survey) -> Vec<&'s Setting> {
+    let mut settings: Vec<_> = settings.iter().collect();
+    let place = |subindex| {
+        let limit = ObjectKey(ObjectAddress::new(0x607D, subindex));
+        settings.iter().position(|setting| setting.object == limit)
+    };
+    if let (Some(lower), Some(upper)) = (place(1), place(2)) {
+        let old_upper = survey.number(ObjectAddress::new(0x607D, 2)).unwrap_or(0) as i32;
+        let is_upper_first = settings[lower].value as i32 > old_upper;
+        if is_upper_first != (upper < lower) {
+            settings.swap(lower, upper);
+        }
+    }
+    settings
+}
+
+/// A value for the duration of a step.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Loan {
+    pub(super) object: ObjectAddress,
+    pub(super) value: u32,
+    pub(super) bytes: usize,
+    /// Whether the drive may lack the object or refuse the value, whatever its profile says.
+    pub(super) may_lack: bool,
+}
+
+impl Loan {
+    /// The lowest bytes of a value.
+    pub(super) const fn new(index: u16, subindex: u8, value: u32, bytes: usize) -> Self {
+        Self { object: ObjectAddress::new(index, subindex), value, bytes, may_lack: false }
+    }
+}
+
+/// The changed objects of a drive, in the order of their changes.
+#[derive(Debug)]
+pub(super) struct Borrowed<'a> {
+    axis: usize,
+    profile: &'a DriveProfile,
+    old: Vec<OldValue>,
+}
+
+impl<'a> Borrowed<'a> {
+    /// Nothing is changed yet.
+    pub(super) const fn of_axis(axis: usize, profile: &'a DriveProfile) -> Self {
+        Self { axis, profile, old: Vec::new() }
+    }
+
+    /// Writes values as the profile's rules allow. All old values are kept at once, before the first write.
+    pub(super) fn set_all(&mut self, line: &mut Line, loans: &[Loan]) -> Result<(), LineError> {
+        let mut writes = Vec::new();
+        for loan in loans {
+            if let Some(may_lack) = self.may_lack(loan)
+                && let Some(old) = self.read(line, loan, may_lack)?
+            {
+                writes.push((loan, may_lack, old));
+            }
+        }
+        if writes.is_empty() {
+            return Ok(());
+        }
+        // A kill may come between.
+        self.old.extend(writes.iter().map(|(.., old)| *old));
+        line.keep_old_values(self.axis, &self.old)?;
+        for (loan, may_lack, old) in writes {
+            match line.write(self.axis, loan.object, loan.value, loan.bytes) {
+                // The drive has refused, so that nothing is changed. Without an answer it may have taken the value.
+                Err(error) if error.abort_code().is_some() => {
+                    let place = self.old.iter().rposition(|kept| *kept == old);
+                    self.old.remove(place.expect("it was kept"));
+                    line.keep_old_values(self.axis, &self.old)?;
+                    if !may_lack {
+                        return Err(error);
+                    }
+                }
+                written => written?,
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the drive may lack the object or refuse the value; none where the profile leaves the object.
+    fn may_lack(&self, loan: &Loan) -> Option<bool> {
+        match self.profile.object(ObjectKey(loan.object)).rule {
+            _ if loan.may_lack => Some(true),
+            ObjectRule::Absent | ObjectRule::Expect => None,
+            ObjectRule::Optional => Some(true),
+            ObjectRule::Write => Some(false),
+        }
+    }
+
+    /// The old value; none where nothing is to be written. An equal value is not written: some objects are constant.
+    fn read(&self, line: &mut Line, loan: &Loan, may_lack: bool) -> Result<Option<OldValue>, LineError> {
+        let &Loan { object, value, bytes, .. } = loan;
+        match line.read_number(self.axis, object) {
+            Err(error) if may_lack && error.abort_code().is_some() => Ok(None),
+            Err(error) => Err(error),
+            Ok(before) if same(before, value, bytes) => Ok(None),
+            Ok(before) => Ok(Some(OldValue { object: ObjectKey(object), value: before, bytes })),
+        }
+    }
+
+    /// Sets the software limits (607Dh) to positions as 6064h shows them, in increments; never the lower one above the upper one.
+    pub(super) fn set_limits(&mut self, line: &mut Line, ends: [i32; 2]) -> Result<(), LineError> {
+        let offset = self.limit_offset(line)?;
+        let [lowest, highest] = ends.map(|end| end.saturating_sub(offset) as u32);
+        let mut limits = [(1, lowest), (2, highest)].map(|(end, value)| Loan::new(0x607D, end, value, 4));
+        if lowest as i32 > line.read_number(self.axis, limits[1].object)? as i32 {
+            limits.reverse();
+        }
+        self.set_all(line, &limits)
+    }
+
+    /// What the drive adds to its software limits, increments: the position at home as the drive has it now.
+    fn limit_offset(&self, line: &mut Line) -> Result<i32, LineError> {
+        let homing = self.profile.homing;
+        if !homing.limits_from_home {
+            return Ok(0);
+        }
+        // Without such an object the drive has no offset.
+        let home = line.read_if_there(self.axis, homing.home_object.0)?.unwrap_or(0);
+        Ok((home as i32).saturating_mul(homing.home_sign.into()))
+    }
+
+    /// Writes every old value back, the last change first. A failure does not keep the others from their old values.
+    pub(super) fn restore(&mut self, line: &mut Line) -> Result<(), LineError> {
+        let failures = write_back(line, self.axis, &mem::take(&mut self.old));
+        let left: Vec<_> = failures.iter().rev().map(|(old, _)| *old).collect();
+        let kept = line.keep_old_values(self.axis, &left);
+        failures.into_iter().next().map_or(kept, |(_, error)| Err(error))
+    }
+}
+
+/// Writes old values back that a killed step left, the last change first. Returns those that the drive refuses: it never takes
+/// them, so that it is owed them no more.
+///
+/// # Errors
+/// The first failure; the other values have returned nevertheless.
+pub fn give_back(line: &mut Line, axis: usize, old: &[OldValue]) -> Result<Vec<OldValue>, LineError> {
+    let failures = write_back(line, axis, old);
+    let (refused, lost): (Vec<_>, Vec<_>) =
+        failures.into_iter().partition(|(_, error)| error.abort_code().is_some());
+    let left: Vec<_> = lost.iter().rev().map(|(old, _)| *old).collect();
+    line.keep_old_values(axis, &left)?;
+    let refused = refused.into_iter().map(|(old, _)| old).collect();
+    lost.into_iter().next().map_or(Ok(refused), |(_, error)| Err(error))
+}
+
+/// Writes the oldest value of each object, the last one first. Returns those that failed, in this order. A refused one
+/// is tried again after the others: the software limits of a drive that restarted must not cross either.
+fn write_back(line: &mut Line, axis: usize, old: &[OldValue]) -> Vec<(OldValue, LineError)> {
+    let mut write = |old: &OldValue| {
+        let OldValue { object: ObjectKey(object), value, bytes } = *old;
+        Some((*old, line.write(axis, object, value, bytes).err()?))
+    };
+    let is_oldest =
+        |(place, one): &(usize, &OldValue)| old[..*place].iter().all(|other| other.object != one.object);
+    let oldest: Vec<_> = old.iter().enumerate().filter(is_oldest).map(|(_, one)| one).collect();
+    let failed: Vec<_> = oldest.into_iter().rev().filter_map(&mut write).collect();
+    let again = |(old, error): (OldValue, LineError)| match error.abort_code() {
+        Some(_) => write(&old),
+        None => Some((old, error)),
+    };
+    failed.into_iter().filter_map(again).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+
+    use masseter_can::canopen::NodeId;
+    use masseter_scenario::Scenario;
+
+    use super::*;
+    use crate::master::wanted::WantedDrive;
+
+    const AXIS: usize = 3;
+
+    fn line(scenario: &Scenario) -> (Line, Settings) {
+        let mut line = Line::open(scenario, Box::new(io::sink())).unwrap();
+        line.listen(100 * MILLISECOND_NS).unwrap();
+        let node = NodeId::new(scenario.can.node_ids[AXIS]).unwrap();
+        (line, Settings::wanted(&WantedDrive::of_axis(scenario, AXIS, node).unwrap()))
+    }
+
+    fn survey(line: &mut Line, settings: &Settings) -> Survey {
+        Survey::take(line, AXIS, settings.addresses()).unwrap()
+    }
+
+    fn set(line: &mut Line, index: u16, subindex: u8, value: u32, bytes: usize) {
+        line.write(AXIS, ObjectAddress::new(index, subindex), value, bytes).unwrap();
+    }
+
+    /// The drive of an EPOS4 as delivered: one object in each PDO, other types, a further PDO.
+    fn as_delivered(line: &mut Line) {
+        for (communication, object) in [(0x1400, 0x6040_0010), (0x1800, 0x6041_0010)] {
+            let cob_id = line.read_number(AXIS, ObjectAddress::new(communication, 1)).unwrap();
+            set(line, communication, 1, CobId(cob_id).invalidated().0, 4);
+            set(line, communication + 0x200, 0, 0, 1);
+            set(line, communication + 0x200, 1, object, 4);
+            set(line, communication + 0x200, 0, 1, 1);
+            set(line, communication, 2, 255, 1);
+            set(line, communication, 1, cob_id, 4);
+        }
+        set(line, 0x1601, 1, 0x6040_0010, 4);
+        set(line, 0x1601, 0, 1, 1);
+        set(line, 0x1401, 1, 0x304, 4);
+        set(line, 0x6066, 0, 7, 2);
+    }
+
+    #[test]
+    fn a_drive_as_delivered_gets_the_rigs_objects_and_its_own_back() {
+        let scenario = Scenario::default();
+        let (mut line, wanted) = line(&scenario);
+        as_delivered(&mut line);
+        let delivered = survey(&mut line, &wanted);
+        assert_eq!(wanted.differences(&delivered).len(), 10, "{:?}", wanted.differences(&delivered));
+        let before = wanted.found(&delivered);
+        let profile = scenario.profile(AXIS);
+        let mut writer = Writer::new(&mut line, AXIS, profile);
+        writer.apply(&wanted, &delivered).unwrap();
+        let changes = writer.into_changes();
+        assert_eq!(changes.last().unwrap().after, "20", "{changes:?}");
+        let configured = survey(&mut line, &wanted);
+        assert_eq!(wanted.differences(&configured), []);
+        let mut writer = Writer::new(&mut line, AXIS, profile);
+        writer.apply(&wanted, &configured).unwrap();
+        assert_eq!(writer.into_changes(), [], "equal values are not written again");
+        Writer::new(&mut line, AXIS, profile).apply(&before, &configured).unwrap();
+        assert_eq!(survey(&mut line, &wanted), delivered);
+    }
+
+    #[test]
+    fn a_refusal_names_object_value_limits_and_key() {
+        let text = "[[drive_profile]]\nobjects.60C2h = { rule = 'absent' }\n\
+                objects.'60C2h:01' = { rule = 'absent' }\nobjects.'60C2h:02' = { value = -9, lowest = -9 }";
+        let scenario = Scenario::parse(std::path::Path::new("robot.toml"), text).unwrap();
+        let (mut line, wanted) = line(&scenario);
+        let found = survey(&mut line, &wanted);
+        let mut writer = Writer::new(&mut line, AXIS, scenario.profile(AXIS));
+        let refusal = writer.apply(&wanted, &found).unwrap_err().to_string();
+        assert_eq!(
+            refusal,
+            "l1: object 60C2h:02h (Interpolation time index) := -9: 06090032h (value is too low); the profile takes -9 to \
+         any; change rate_hz"
+        );
+    }
+
+    /// A drive may lack the torque offset, but not keep one: another node answers in its place with "read-only".
+    #[test]
+    fn an_offset_that_a_drive_keeps_is_refused_and_another_optional_value_is_left() {
+        for (index, is_refused) in [(0x60B2_u16, true), (0x6072, false)] {
+            let [high, low] = index.to_be_bytes();
+            let faults = format!(
+                "[[faults]]\nkind = 'lose'\nbus = 1\nnode = 4\nid = 0x604\nfrom_s = 0.15\n\
+             [[faults]]\nkind = 'babble'\nbus = 1\nnode = 5\nid = 0x584\ncount = 1\nfrom_s = 0.2005\n\
+             data = [0x80, {low}, {high}, 0, 2, 0, 1, 6]\n"
+            );
+            let scenario = Scenario::parse(std::path::Path::new("robot.toml"), &faults).unwrap();
+            let (mut line, _) = line(&scenario);
+            let object = ObjectAddress::new(index, 0);
+            let mut found = Survey::default();
+            found.insert(object, 55);
+            let rule = ObjectRule::Optional;
+            let zero =
+                Setting { object: ObjectKey(object), value: 0, bytes: 2, rule, key: "profile".to_owned() };
+            let settings = Settings { pdos: vec![], objects: vec![zero] };
+            let applied = Writer::new(&mut line, AXIS, scenario.profile(AXIS)).apply(&settings, &found);
+            let refused = matches!(applied, Err(WriteError::Refused { code: AbortCode::READ_ONLY, .. }));
+            assert_eq!((applied.is_err(), refused), (is_refused, is_refused), "{index:X}: {applied:?}");
+            assert_eq!(settings.differences(&found)[0].may_stay(), !is_refused);
+        }
+    }
+
+    #[test]
+    fn software_limits_never_cross() {
+        let scenario = Scenario::default();
+        let (mut line, wanted) = line(&scenario);
+        let values = |subindex| {
+            let limit = ObjectKey(ObjectAddress::new(0x607D, subindex));
+            wanted.objects.iter().find(|setting| setting.object == limit).unwrap().value as i32
+        };
+        let [low, high] = [values(1), values(2)];
+        for [old_low, old_high] in [[low - 900, low - 800], [high + 800, high + 900], [low + 1, high - 1]] {
+            // The emulated drive refuses limits that cross.
+            set(&mut line, 0x607D, 1, i32::MIN as u32, 4);
+            set(&mut line, 0x607D, 2, old_high as u32, 4);
+            set(&mut line, 0x607D, 1, old_low as u32, 4);
+            let found = survey(&mut line, &wanted);
+            let mut writer = Writer::new(&mut line, AXIS, scenario.profile(AXIS));
+            writer.apply(&wanted, &found).unwrap();
+            let changes = writer.into_changes();
+            let limits = changes.iter().filter(|change| change.object.starts_with("607Dh"));
+            assert_eq!(limits.count(), 2, "{changes:?}");
+        }
+    }
+}

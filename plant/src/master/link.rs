@@ -1,0 +1,330 @@
+//! The connection between master and drives, as the plant sees it: [`Buses`] for the master, [`Link`] for the core.
+//!
+//! A scenario assigns drives to buses here, and faults to wires: node ids become ports, seconds become the wire's time.
+//! Nothing is sent or injected here.
+
+use std::ops::Range;
+
+use masseter_can::canopen::NodeId;
+use masseter_can::faults::{Fault, FaultKind, FaultNote};
+use masseter_can::{Bus, CanId, Frame, ReceiveError, Tapped};
+use masseter_model::geometry::{AXES, AXIS_NAMES, LEGS};
+use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
+use masseter_runtime::injection::{Injected, Injection};
+use masseter_runtime::messages::codes::{Cause, EventKind, Source};
+use masseter_runtime::messages::{Contact, Event, Truth};
+use masseter_runtime::realtime::Waiter;
+use masseter_scenario::{CanConfig, FaultConfig, FaultKindConfig, MASTER_NODE, Scenario};
+
+use crate::error::{DynamicsError, PlantError};
+
+/// The wires that a master serves.
+pub trait Buses {
+    /// The master's port on a wire.
+    fn port(&mut self, bus: usize) -> impl Bus;
+}
+
+/// The wires of a plant: the master's ports, taps, and the truth of emulated drives.
+pub trait Link: Buses {
+    /// Simulates everything up to `until_ns`; real wires need no such call.
+    fn advance(&mut self, _until_ns: u64) -> Result<(), DynamicsError> {
+        Ok(())
+    }
+
+    /// The next frame or error on a wire up to `now_ns`, from any node.
+    fn tap(&mut self, bus: usize, now_ns: u64) -> Result<Option<Tapped>, ReceiveError>;
+
+    /// The next beginning or end of an injected fault up to `now_ns`.
+    fn next_note(&mut self, bus: usize, now_ns: u64) -> Option<FaultNote>;
+
+    /// The time in which a fault or a stimulus acts has become known.
+    fn set_window(&mut self, injected: Injected, window_ns: Range<u64>);
+
+    /// The next beginning or end of what the emulation carries out; the wires have notes instead.
+    fn next_occurrence(&mut self) -> Option<Occurrence> {
+        None
+    }
+
+    /// The next mishap of the mechanism, with its time, ns.
+    fn next_mishap(&mut self) -> Option<(u64, Mishap)> {
+        None
+    }
+
+    /// The axis whose drive is at a port of a simulated wire; none at the master's.
+    fn axis_at(&self, _bus: usize, _port: usize) -> Option<usize> {
+        None
+    }
+
+    /// Waits in real time until frames may have arrived, but not beyond `latest_ns`; returns the time.
+    fn wait(&mut self, latest_ns: u64, waiter: &mut Waiter) -> u64;
+
+    /// The mechanism's true motion at the last SYNC, where it is emulated here.
+    fn truth(&self) -> Option<Truth> {
+        None
+    }
+
+    /// What the load cell showed at the last SYNC, N; 0 where there is none.
+    fn load_cell_n(&self) -> f64 {
+        0.0
+    }
+
+    /// The forces between the jaws in the cycle before the last SYNC, where they are emulated here and can touch.
+    fn contact(&self) -> Option<Contact> {
+        None
+    }
+}
+
+/// The master's port on every wire.
+pub(crate) const MASTER_PORT: usize = 0;
+
+/// The port of an axis' drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct DrivePort {
+    pub(crate) bus: usize,
+    pub(crate) port: usize,
+}
+
+/// The port of each axis' drive; those of a bus follow [`MASTER_PORT`].
+pub(crate) fn drive_ports(can: &CanConfig) -> Result<[DrivePort; AXES], PlantError> {
+    if let Some(bus) = can.buses.iter().position(Vec::is_empty) {
+        return Err(PlantError::Scenario(format!(
+            "can.buses: bus {bus} has no drive, so no node would acknowledge the master's frames; remove this bus"
+        )));
+    }
+    let named = || can.buses.iter().flatten().copied();
+    let times = |axis: usize| named().filter(|&other| other == axis).count();
+    let unknown = named().find(|&axis| axis >= AXES);
+    if let Some(axis) = unknown.or_else(|| (0..AXES).find(|&axis| times(axis) != 1)) {
+        let (times, names) = (times(axis), AXIS_NAMES.join(" "));
+        return Err(PlantError::Scenario(format!(
+            "can.buses: axis {axis} is named {times} times; name each of the axes 0 to 5 ({names}) once"
+        )));
+    }
+    let mut ports = [DrivePort { bus: 0, port: MASTER_PORT }; AXES];
+    for (bus, axes) in can.buses.iter().enumerate() {
+        for (index, &axis) in axes.iter().enumerate() {
+            ports[axis] = DrivePort { bus, port: MASTER_PORT + 1 + index };
+        }
+    }
+    Ok(ports)
+}
+
+/// The node id of each axis' drive.
+pub(crate) fn node_ids(can: &CanConfig) -> Result<[NodeId; AXES], PlantError> {
+    let mut ids = [MASTER_NODE; AXES];
+    for (axis, &id) in can.node_ids.iter().enumerate() {
+        let is_taken = id == MASTER_NODE.get() || can.node_ids[..axis].contains(&id);
+        if is_taken {
+            let reason = format!("node {id} is listed twice, or is the master's ({MASTER_NODE})");
+            return Err(PlantError::Scenario(format!("can.node_ids: {reason}; give every drive its own")));
+        }
+        ids[axis] = NodeId::new(id)?;
+    }
+    Ok(ids)
+}
+
+/// Where a drive is reached.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Address {
+    pub(crate) bus: usize,
+    pub(crate) node: NodeId,
+}
+
+/// The address of each axis' drive.
+pub(crate) fn addresses(can: &CanConfig) -> Result<[Address; AXES], PlantError> {
+    let (ports, ids) = (drive_ports(can)?, node_ids(can)?);
+    Ok(std::array::from_fn(|axis| Address { bus: ports[axis].bus, node: ids[axis] }))
+}
+
+/// Identifier and data of a babbling node, unless the scenario sets others: only NMT has a higher priority.
+const BABBLE_ID: u16 = 0x001;
+const BABBLE_DATA: [u8; 8] = [0x55; 8];
+
+/// Seed of a bus' faults: each bus makes choices of its own.
+pub(crate) fn fault_seed(scenario: &Scenario, bus: usize) -> u64 {
+    scenario.seed.wrapping_add(bus as u64)
+}
+
+/// Time after which a controller in bus-off is restarted; none where it is not, ns.
+pub(crate) fn restart_after_ns(can: &CanConfig) -> Option<u64> {
+    (can.restart_ms > 0).then(|| u64::from(can.restart_ms) * MILLISECOND_NS)
+}
+
+/// The faults of a bus whose ports have these nodes, switched on at `now_ns`. A fault's number is its index in the
+/// scenario's list. A fault whose time is not known at switch-on does not act before it is set.
+pub(crate) fn faults_of_bus(
+    scenario: &Scenario,
+    bus: usize,
+    nodes: &[NodeId],
+    now_ns: u64,
+) -> Result<Vec<Fault>, PlantError> {
+    let injection =
+        Injection::new(scenario, now_ns).map_err(|error| PlantError::Scenario(error.to_string()))?;
+    let of_bus = scenario.faults.iter().enumerate().filter(|(_, config)| config.bus == Some(bus));
+    let fault = |(number, config): (usize, &FaultConfig)| {
+        let window_ns = injection.window_ns(Injected::Fault(number)).unwrap_or(u64::MAX..u64::MAX);
+        Ok(fault(number, config, port_of(config, nodes)?, window_ns))
+    };
+    of_bus.map(fault).collect()
+}
+
+fn fault(number: usize, config: &FaultConfig, port: Option<usize>, window_ns: Range<u64>) -> Fault {
+    Fault {
+        number,
+        kind: kind(config),
+        from_ns: window_ns.start,
+        until_ns: window_ns.end,
+        id: config.id.filter(|_| config.kind != FaultKindConfig::Babble).map(standard),
+        port,
+        probability: config.probability,
+        count: config.count.unwrap_or(if config.kind == FaultKindConfig::BusOff { 1 } else { u64::MAX }),
+    }
+}
+
+fn kind(config: &FaultConfig) -> FaultKind {
+    match config.kind {
+        FaultKindConfig::Corrupt => FaultKind::Corrupt,
+        FaultKindConfig::Delay => {
+            FaultKind::Delay { by_ns: (config.size_si() * SECOND_NS as f64).round() as u64 }
+        }
+        FaultKindConfig::Duplicate => FaultKind::Duplicate,
+        FaultKindConfig::Babble => {
+            let (id, data) = (standard(config.id.unwrap_or(BABBLE_ID)), config.data.as_deref());
+            let frame = Frame::new(id, data.unwrap_or(&BABBLE_DATA)).expect("at most 8 bytes");
+            FaultKind::Babble { frame }
+        }
+        FaultKindConfig::Disconnect => FaultKind::Disconnect,
+        FaultKindConfig::BusOff => FaultKind::BusOff,
+        // The other kinds have no bus.
+        _ => FaultKind::Lose,
+    }
+}
+
+fn standard(id: u16) -> CanId {
+    CanId::standard(id & 0x7FF).expect("11 bits")
+}
+
+fn port_of(config: &FaultConfig, nodes: &[NodeId]) -> Result<Option<usize>, PlantError> {
+    let Some(node) = config.node else { return Ok(None) };
+    if let Some(port) = nodes.iter().position(|id| id.get() == node) {
+        return Ok(Some(port));
+    }
+    let present = nodes.iter().map(|id| id.get().to_string()).collect::<Vec<_>>().join(", ");
+    let bus = config.bus.unwrap_or_default();
+    Err(PlantError::Scenario(format!("faults.node = {node}: bus {bus} has the nodes {present}")))
+}
+
+/// Refuses the first quantity that contradicts others.
+pub(crate) fn check_quantities(scenario: &Scenario) -> Result<(), PlantError> {
+    check_counts(scenario)?;
+    check_heartbeats(scenario)?;
+    check_process_data(scenario)
+}
+
+/// A drive counts increments in 32 bits (objects 6064h and 607Ah).
+fn check_counts(scenario: &Scenario) -> Result<(), PlantError> {
+    let Scenario { drives, mechanism, .. } = scenario;
+    for (key, axis) in [("drives.slide", 0), ("drives.leg", LEGS)] {
+        let increment_m = drives.of_axis(axis).encoder_resolution_m;
+        let [low_m, high_m] = mechanism.strokes.of_axis(axis);
+        if low_m.abs().max(high_m.abs()) / increment_m > f64::from(i32::MAX) {
+            let need = "use more: the end of the stroke does not fit into 32 bits";
+            return Err(PlantError::Scenario(format!("{key}.encoder_resolution_m = {increment_m}: {need}")));
+        }
+    }
+    Ok(())
+}
+
+/// The time-out of a heartbeat must be longer than its longest interval.
+fn check_heartbeats(scenario: &Scenario) -> Result<(), PlantError> {
+    let timeout_ms = scenario.can.heartbeat_consumer_ms;
+    if u64::from(timeout_ms) * MILLISECOND_NS > longest_heartbeat_ns(scenario) {
+        return Ok(());
+    }
+    let need = "use more than can.heartbeat_producer_ms and a cycle (1000 / rate_hz) together";
+    Err(PlantError::Scenario(format!("can.heartbeat_consumer_ms = {timeout_ms}: {need}")))
+}
+
+/// The time-out of process data must be longer than two cycles, between which jitter may leave that much.
+fn check_process_data(scenario: &Scenario) -> Result<(), PlantError> {
+    match scenario.can.rpdo_timeout_ms {
+        Some(timeout_ms @ 1..) if u64::from(timeout_ms) * MILLISECOND_NS <= 2 * scenario.period_ns() => {
+            let need = "use 0 for none, or more than two cycles (2000 / rate_hz)";
+            Err(PlantError::Scenario(format!("can.rpdo_timeout_ms = {timeout_ms}: {need}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The master sends its heartbeat with the first SYNC after the interval, whose end jitter may delay by a cycle.
+fn longest_heartbeat_ns(scenario: &Scenario) -> u64 {
+    let interval_ns = u64::from(scenario.can.heartbeat_producer_ms) * MILLISECOND_NS;
+    (interval_ns / scenario.period_ns() + 1) * scenario.period_ns()
+}
+
+/// A fault or a stimulus began to act, or its time is over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Occurrence {
+    /// Which.
+    pub injected: Injected,
+    /// When, ns.
+    pub time_ns: u64,
+    /// The axis concerned, if there is one.
+    pub axis: Option<usize>,
+    /// Whether it is over.
+    pub has_ended: bool,
+}
+
+impl Occurrence {
+    /// The event that reports it.
+    pub(crate) fn event(&self, cycle: u64) -> Event {
+        let Self { injected, time_ns, axis, has_ended } = *self;
+        let (place, cause) = match (injected, has_ended) {
+            (Injected::Fault(place), false) => (place, Cause::FaultInjected),
+            (Injected::Fault(place), true) => (place, Cause::FaultEnded),
+            (Injected::Stimulus(place), false) => (place, Cause::StimulusBegan),
+            (Injected::Stimulus(place), true) => (place, Cause::StimulusEnded),
+        };
+        let event = Event::new(Source::Scenario, EventKind::Notice, cause);
+        let axis = axis.map_or(event.axis, |axis| axis as u32);
+        Event { time_ns, cycle, axis, value: (place + 1) as f64, limit: 1.0, ..event }
+    }
+}
+
+/// A mishap of the mechanism.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Mishap {
+    /// A piece of food broke between the teeth.
+    FoodBroke {
+        /// FDI number of the first of the teeth on which the piece lay.
+        tooth: u8,
+        /// The piece's elastic force before, N.
+        force_n: f64,
+        /// Its strength, N.
+        strength_n: f64,
+    },
+    /// An axis ran into an end stop.
+    EndStopHit {
+        /// The axis.
+        axis: usize,
+        /// Its speed, m/s.
+        speed_m_s: f64,
+    },
+}
+
+impl Mishap {
+    /// The event that reports it, at that time.
+    pub(crate) fn event(&self, time_ns: u64, cycle: u64) -> Event {
+        let notice =
+            |cause| Event { time_ns, cycle, ..Event::new(Source::Scenario, EventKind::Notice, cause) };
+        match *self {
+            Self::FoodBroke { tooth, force_n, strength_n } => {
+                let event = notice(Cause::FoodBroke);
+                Event { object: tooth.into(), value: force_n, limit: strength_n, ..event }
+            }
+            Self::EndStopHit { axis, speed_m_s } => {
+                Event { axis: axis as u32, value: speed_m_s, ..notice(Cause::EndStopHit) }
+            }
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! The link to real drives: SocketCAN interfaces. It has no truth of the mechanism.
+//!
+//! An interface has one master, since two masters would stop each other's drives. The lock is a name among the abstract
+//! sockets. Abstract sockets belong to a network namespace, as interfaces do, and end with their process. The lock does
+//! not exclude masters of other programs or other computers; the master notices those by their frames.
+
+use std::io::ErrorKind;
+use std::ops::Range;
+use std::os::linux::net::SocketAddrExt;
+use std::os::unix::net::{SocketAddr, UnixDatagram};
+
+use masseter_can::faults::FaultNote;
+use masseter_can::{Bus, OpenError, PortFaults, ReceiveError, SocketCan, Tapped};
+use masseter_model::geometry::AXES;
+use masseter_runtime::clock;
+use masseter_runtime::injection::Injected;
+use masseter_runtime::realtime::Waiter;
+use masseter_scenario::{MASTER_NODE, Scenario};
+
+use super::link::{Buses, Link, MASTER_PORT, check_quantities, fault_seed, faults_of_bus, restart_after_ns};
+use crate::error::PlantError;
+
+/// How long a wait for a real frame may take at most, ns: a fault may hold frames back that are due before the next
+/// frame arrives.
+const LONGEST_BLOCK_NS: u64 = 100_000;
+
+/// The master's port, the faults laid over it, and a tap on every wire.
+#[derive(Debug)]
+pub struct SocketLink {
+    ports: Vec<SocketCan>,
+    faults: Vec<PortFaults>,
+    taps: Vec<SocketCan>,
+    _locks: Vec<UnixDatagram>,
+}
+
+impl SocketLink {
+    /// Opens the scenario's interfaces, one a bus, each with the faults of the master's port there from `now_ns` on.
+    pub(crate) fn open(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
+        check_quantities(scenario)?;
+        let can = &scenario.can;
+        let faults_of_port = |bus: usize| {
+            let faults = faults_of_bus(scenario, bus, &[MASTER_NODE], now_ns)?;
+            let (seed, restart_after_ns) = (fault_seed(scenario, bus), restart_after_ns(can));
+            Ok(PortFaults::new(faults, MASTER_PORT, seed, restart_after_ns)?)
+        };
+        let faults = (0..can.buses.len()).map(faults_of_port).collect::<Result<_, PlantError>>()?;
+        let port = |interface: &String| SocketCan::open(interface);
+        let open = || can.interfaces.iter().map(port).collect::<Result<_, _>>();
+        let (ports, taps) = (open()?, open()?);
+        let locks = can.interfaces.iter().map(|interface| lock(interface)).collect::<Result<_, _>>()?;
+        Ok(Self { ports, faults, taps, _locks: locks })
+    }
+}
+
+impl Buses for SocketLink {
+    fn port(&mut self, bus: usize) -> impl Bus {
+        self.faults[bus].over(&mut self.ports[bus])
+    }
+}
+
+impl Link for SocketLink {
+    fn tap(&mut self, bus: usize, _: u64) -> Result<Option<Tapped>, ReceiveError> {
+        self.taps[bus].tap()
+    }
+
+    fn next_note(&mut self, bus: usize, now_ns: u64) -> Option<FaultNote> {
+        self.faults[bus].next_note(now_ns)
+    }
+
+    fn set_window(&mut self, injected: Injected, window_ns: Range<u64>) {
+        if let Injected::Fault(number) = injected {
+            self.faults.iter_mut().for_each(|port| port.set_fault_window(number, window_ns.clone()));
+        }
+    }
+
+    fn wait(&mut self, latest_ns: u64, waiter: &mut Waiter) -> u64 {
+        let until_ns = latest_ns.min(clock::now_ns() + LONGEST_BLOCK_NS);
+        waiter.until_woken(until_ns, latest_ns, |until_ns| SocketCan::wait::<AXES>(&self.ports, until_ns))
+    }
+}
+
+/// Locks an interface: the right to be its master, until the socket is dropped.
+pub(super) fn lock(interface: &str) -> Result<UnixDatagram, PlantError> {
+    let name = SocketAddr::from_abstract_name(format!("masseter-master-{interface}"));
+    name.and_then(|name| UnixDatagram::bind_addr(&name)).map_err(|error| {
+        let interface = interface.to_owned();
+        match error.kind() {
+            ErrorKind::AddrInUse => PlantError::MasterHere(interface),
+            _ => OpenError::Os { interface, errno: error.raw_os_error().unwrap_or_default() }.into(),
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interface_has_one_master_until_it_is_gone() {
+        let interface = format!("test{}", std::process::id());
+        let first = lock(&interface).unwrap();
+        let refused = lock(&interface).unwrap_err();
+        assert_eq!(refused, PlantError::MasterHere(interface.clone()));
+        assert!(lock(&format!("{interface}b")).is_ok());
+        drop(first);
+        assert!(lock(&interface).is_ok());
+    }
+}

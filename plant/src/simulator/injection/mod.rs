@@ -1,0 +1,297 @@
+//! Faults and stimuli that the plant carries out: when each acts, and the events of its beginning and its end.
+//!
+//! [`Injector`] follows the times for the core and acts on commands itself. The
+//! [`Agenda`](agenda::Agenda) has what acts on drives and mechanism, which know nothing of times and scenarios.
+//!
+//! A command is altered between its receipt and the master. The master judges what comes out, as it would judge a bad
+//! controller: nothing here detects anything.
+
+pub(crate) mod agenda;
+pub(crate) mod encoder_faults;
+mod push;
+
+use std::ops::Range;
+
+use masseter_runtime::clock::SECOND_NS;
+use masseter_runtime::injection::{Injected, Injection};
+use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::messages::{Command, Event, LAYOUT_VERSION};
+use masseter_scenario::{FaultConfig, FaultKindConfig, FaultLayer, Scenario};
+
+use crate::error::PlantError;
+use crate::master::events::Journal;
+use crate::master::link::{Mishap, Occurrence};
+
+/// Follows the occurrences from which times count, tells every window once, and alters commands.
+#[derive(Debug)]
+pub(crate) struct Injector {
+    injection: Injection,
+    /// Those whose window is not told yet.
+    untold: Vec<Untold>,
+    /// Whether a window may have become known since the last look.
+    has_news: bool,
+    commands: CommandFaults,
+    events: Journal,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Untold {
+    injected: Injected,
+    /// Whether the controller or the supervisor carries it out. It begins when its window does.
+    is_of_others: bool,
+}
+
+impl Injector {
+    /// The faults and stimuli of a scenario that is switched on at `now_ns`.
+    pub(crate) fn new(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
+        let faults = scenario.faults.iter().enumerate().map(|(place, fault)| Untold {
+            injected: Injected::Fault(place),
+            is_of_others: fault.kind.layer() == FaultLayer::Process,
+        });
+        let stimuli = scenario.stimulus.iter().enumerate().map(|(place, stimulus)| Untold {
+            injected: Injected::Stimulus(place),
+            is_of_others: stimulus.is_of_controller(),
+        });
+        Ok(Self {
+            injection: Injection::new(scenario, now_ns)
+                .map_err(|error| PlantError::Scenario(error.to_string()))?,
+            untold: faults.chain(stimuli).collect(),
+            has_news: true,
+            commands: CommandFaults::new(&scenario.faults),
+            events: Journal::new(),
+        })
+    }
+
+    /// Whether there are neither faults nor stimuli.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.injection.is_empty()
+    }
+
+    /// A command was received in the cycle that sampled at `sampled_ns`: it has the controller's state.
+    pub(crate) fn note_command(&mut self, command: &Command, sampled_ns: u64) {
+        if command.version == LAYOUT_VERSION
+            && let Ok(state) = ControllerState::try_from(command.controller_state)
+        {
+            self.injection.note_state(state, sampled_ns);
+            self.has_news = true;
+        }
+    }
+
+    /// A fault of a bus strikes; the wire reports that itself.
+    pub(crate) fn note_bus_fault(&mut self, place: usize, time_ns: u64) {
+        self.injection.note_begin(Injected::Fault(place), time_ns);
+        self.has_news = true;
+    }
+
+    /// Takes the beginning or the end of what the emulation carries out.
+    pub(crate) fn note(&mut self, occurrence: &Occurrence, cycle: u64) {
+        if !occurrence.has_ended {
+            self.injection.note_begin(occurrence.injected, occurrence.time_ns);
+            self.has_news = true;
+        }
+        self.events.add(occurrence.event(cycle));
+    }
+
+    /// Takes a mishap of the mechanism.
+    pub(crate) fn note_mishap(&mut self, time_ns: u64, mishap: &Mishap, cycle: u64) {
+        self.events.add(mishap.event(time_ns, cycle));
+    }
+
+    /// The next window that has become known.
+    pub(crate) fn next_window(&mut self) -> Option<(Injected, Range<u64>)> {
+        if !self.has_news {
+            return None;
+        }
+        let injection = &self.injection;
+        let known = self.untold.iter().position(|untold| injection.window_ns(untold.injected).is_some());
+        let Some(place) = known else {
+            self.has_news = false;
+            return None;
+        };
+        let Untold { injected, is_of_others } = self.untold.swap_remove(place);
+        let window_ns = self.injection.window_ns(injected)?;
+        if is_of_others {
+            self.injection.note_begin(injected, window_ns.start);
+        }
+        self.commands.set_window(injected, &window_ns);
+        Some((injected, window_ns))
+    }
+
+    /// The command that reaches the master in a cycle in place of the one received at `now_ns`.
+    pub(crate) fn alter(
+        &mut self,
+        cycle: u64,
+        sampled_ns: u64,
+        now_ns: u64,
+        command: Option<&Command>,
+    ) -> Option<Command> {
+        let Self { commands, injection, events, has_news, .. } = self;
+        commands.alter(sampled_ns, now_ns, command.copied(), |occurrence| {
+            if !occurrence.has_ended {
+                injection.note_begin(occurrence.injected, now_ns);
+                *has_news = true;
+            }
+            events.add(occurrence.event(cycle));
+        })
+    }
+
+    /// Hands out the events since the last drain.
+    pub(crate) fn drain_events(&mut self, out: &mut impl FnMut(Event)) {
+        self.events.drain(out);
+    }
+}
+
+/// How far ahead of this controller another one counts its cycles: further than any run takes.
+const FOREIGN_CYCLES: u64 = 1 << 40;
+
+/// The faults of the commands.
+#[derive(Debug)]
+pub(super) struct CommandFaults {
+    faults: Vec<CommandFault>,
+}
+
+#[derive(Debug)]
+struct CommandFault {
+    injected: Injected,
+    config: FaultConfig,
+    window_ns: Range<u64>,
+    has_begun: bool,
+    is_over: bool,
+}
+
+impl CommandFaults {
+    /// Those of a scenario's list, none of which acts before its window is set.
+    pub(super) fn new(list: &[FaultConfig]) -> Self {
+        let of_commands =
+            list.iter().enumerate().filter(|(_, config)| config.kind.layer() == FaultLayer::Command);
+        let fault = |(place, config): (usize, &FaultConfig)| CommandFault {
+            injected: Injected::Fault(place),
+            config: config.clone(),
+            window_ns: u64::MAX..u64::MAX,
+            has_begun: false,
+            is_over: false,
+        };
+        Self { faults: of_commands.map(fault).collect() }
+    }
+
+    /// Sets when a fault acts.
+    pub(super) fn set_window(&mut self, injected: Injected, window_ns: &Range<u64>) {
+        for fault in self.faults.iter_mut().filter(|fault| fault.injected == injected) {
+            fault.window_ns = acting_ns(&fault.config, window_ns.clone());
+        }
+    }
+
+    /// The command that reaches the master in the cycle that sampled at `sampled_ns`, in place of the one received at
+    /// `now_ns`. Tells `report` what began or ended.
+    pub(super) fn alter(
+        &mut self,
+        sampled_ns: u64,
+        now_ns: u64,
+        mut command: Option<Command>,
+        mut report: impl FnMut(Occurrence),
+    ) -> Option<Command> {
+        for fault in &mut self.faults {
+            let axis = fault.config.axis();
+            let mut tell =
+                |has_ended| report(Occurrence { injected: fault.injected, time_ns: now_ns, axis, has_ended });
+            if fault.window_ns.contains(&sampled_ns) {
+                if let Some(given) = command.take() {
+                    if !std::mem::replace(&mut fault.has_begun, true) {
+                        tell(false);
+                    }
+                    command = altered(given, &fault.config);
+                }
+            } else if fault.has_begun && !std::mem::replace(&mut fault.is_over, true) {
+                tell(true);
+            }
+        }
+        command
+    }
+}
+
+/// What a fault makes of a command.
+fn altered(mut command: Command, fault: &FaultConfig) -> Option<Command> {
+    match fault.kind {
+        FaultKindConfig::ControllerStall => return None,
+        FaultKindConfig::CommandNan => command.target_m.fill(f64::NAN),
+        FaultKindConfig::CommandJump => {
+            command.target_m[fault.axis().unwrap_or_default()] += fault.size_si();
+        }
+        FaultKindConfig::CommandVersion => command.version += 1,
+        FaultKindConfig::CommandForeign => command.cycle += FOREIGN_CYCLES,
+        // The other kinds act elsewhere.
+        _ => {}
+    }
+    Some(command)
+}
+
+/// The window of a fault, cut where its size says how long the fault lasts.
+pub(crate) fn acting_ns(fault: &FaultConfig, window_ns: Range<u64>) -> Range<u64> {
+    let is_for_its_size =
+        matches!(fault.kind, FaultKindConfig::DriveReboot | FaultKindConfig::ControllerStall);
+    let longest_ns = (fault.size_si() * SECOND_NS as f64).round() as u64;
+    let end_ns = if is_for_its_size { window_ns.start.saturating_add(longest_ns) } else { u64::MAX };
+    window_ns.start..window_ns.end.min(end_ns)
+}
+
+#[cfg(test)]
+mod commands_tests {
+    use super::*;
+
+    fn alter(kind: FaultKindConfig, size: Option<&str>) -> Option<Command> {
+        let size = size.map(|size| size.parse().unwrap());
+        let axis = (kind == FaultKindConfig::CommandJump).then(|| "l2".to_owned());
+        let mut faults = CommandFaults::new(&[FaultConfig { size, axis, ..FaultConfig::new(kind) }]);
+        faults.set_window(Injected::Fault(0), &(0..u64::MAX));
+        let command = Command { cycle: 3, target_m: [0.1; 6], version: 10, ..Command::default() };
+        faults.alter(5, 6, Some(command), |_| {})
+    }
+
+    #[test]
+    fn each_kind_changes_what_its_name_says_and_nothing_else() {
+        use FaultKindConfig::{CommandForeign, CommandJump, CommandNan, CommandVersion, ControllerStall};
+        assert_eq!(alter(ControllerStall, Some("1 s")), None);
+        assert!(alter(CommandNan, None).unwrap().target_m.iter().all(|target_m| target_m.is_nan()));
+        let jump = alter(CommandJump, Some("1 mm")).unwrap();
+        assert_eq!((jump.target_m, jump.cycle), ([0.1, 0.1, 0.1, 0.1, 0.101, 0.1], 3));
+        assert_eq!(alter(CommandVersion, None).unwrap().version, 11);
+        let foreign = alter(CommandForeign, None).unwrap();
+        assert_eq!((foreign.cycle > 1_000_000, foreign.target_m), (true, [0.1; 6]));
+    }
+
+    #[test]
+    fn a_stall_begins_with_the_first_command_that_is_withheld_and_ends_after_its_size() {
+        let size = Some("2 ms".parse().unwrap());
+        let mut faults =
+            CommandFaults::new(&[FaultConfig { size, ..FaultConfig::new(FaultKindConfig::ControllerStall) }]);
+        faults.set_window(Injected::Fault(0), &(2_000_000..u64::MAX));
+        let mut told = Vec::new();
+        let arrived: Vec<_> = (1..7)
+            .map(|cycle| {
+                let command = (cycle != 2).then(Command::default);
+                let sampled_ns = cycle * 1_000_000;
+                faults
+                    .alter(sampled_ns, sampled_ns + 5, command, |occurrence| told.push(occurrence))
+                    .is_some()
+            })
+            .collect();
+        assert_eq!(arrived, [true, false, false, true, true, true]);
+        let told: Vec<_> = told.iter().map(|told| (told.time_ns, told.has_ended)).collect();
+        assert_eq!(told, [(3_000_005, false), (4_000_005, true)], "nothing came in the second cycle");
+    }
+}
+
+#[cfg(test)]
+mod times_tests {
+    use super::*;
+
+    #[test]
+    fn a_dip_of_the_supply_lasts_as_long_as_its_size_says_and_no_longer_than_its_window() {
+        let size = Some("20 ms".parse().unwrap());
+        let dip = FaultConfig { size, ..FaultConfig::new(FaultKindConfig::DriveReboot) };
+        assert_eq!(acting_ns(&dip, 1000..u64::MAX), 1000..20_001_000);
+        assert_eq!(acting_ns(&dip, 1000..5000), 1000..5000);
+        let slow = FaultConfig { kind: FaultKindConfig::DriveSlowEnable, ..dip };
+        assert_eq!(acting_ns(&slow, 1000..u64::MAX), 1000..u64::MAX);
+    }
+}

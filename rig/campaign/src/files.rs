@@ -1,0 +1,270 @@
+//! The files of a campaign's report: the page, which needs no network, and the table, a row a case.
+
+use std::fs::{self, File};
+
+use anyhow::Context;
+use askama::Template;
+use masseter_charts::palette::{BLUE, GREY, VERMILION};
+use masseter_charts::{Axis, Error, Scale, chart, marks, svg};
+use masseter_table::{Column, Table, Values, write_table};
+
+use crate::campaign::Campaign;
+use crate::case::{CaseCheck, CaseResult};
+use crate::factor::{Distribution, Factor, Setting};
+use crate::folder::CampaignFolder;
+use crate::report::{PAGE, Report, WorstCase, percent};
+
+/// Size of a plot, px.
+const SIZE: (u32, u32) = (360, 260);
+/// Radius of a dot, px.
+const DOT: u32 = 3;
+/// Room above and below the dots, as a share of their height.
+const ROOM: f64 = 0.08;
+
+/// Writes page and table into the folder of the campaign.
+///
+/// # Errors
+/// When a file cannot be written.
+pub fn write(report: &Report<'_>, folder: &CampaignFolder, worst: &[WorstCase]) -> anyhow::Result<()> {
+    // The page first: it needs no other program.
+    let html = html(report, worst).context("cannot make the page")?;
+    let path = folder.file(PAGE);
+    fs::write(&path, html).with_context(|| format!("cannot write {}", path.display()))?;
+    let path = report.table_path(folder);
+    let unfinished = path.with_extension("part");
+    let unwritten = || format!("cannot write {}", path.display());
+    let file = File::create(&unfinished).with_context(unwritten)?;
+    write_table(&report.format, file, &results_table(report.campaign, &report.results))?;
+    fs::rename(&unfinished, &path).with_context(unwritten)
+}
+
+#[derive(Template)]
+#[template(path = "campaign.html")]
+struct Page<'a> {
+    report: &'a Report<'a>,
+    rate: String,
+    rows: Vec<WorstRow<'a>>,
+    plots: Vec<(String, Vec<String>)>,
+}
+
+/// A line of the table of worst cases.
+struct WorstRow<'a> {
+    result: &'a CaseResult,
+    kept: &'a WorstCase,
+    link: Option<String>,
+}
+
+fn html(report: &Report<'_>, worst: &[WorstCase]) -> anyhow::Result<String> {
+    let rows = worst.iter().filter_map(|kept| {
+        let result = report.results.iter().find(|result| result.number == kept.number)?;
+        let name = kept.run.as_ref().and_then(|run| Some(run.file_name()?.to_string_lossy().into_owned()));
+        let link = name.map(|name| format!("worst/{name}/report.html"));
+        Some(WorstRow { result, kept, link })
+    });
+    let page = Page { report, rate: rate_in_words(report), rows: rows.collect(), plots: plots(report)? };
+    Ok(page.render()?)
+}
+
+/// For every check with a margin, a plot a factor.
+fn plots(report: &Report<'_>) -> Result<Vec<(String, Vec<String>)>, Error> {
+    let mut plots = Vec::new();
+    for name in names(&report.results) {
+        let points = |at| points(&report.results, &name, at);
+        if points(0).is_empty() {
+            continue;
+        }
+        let factors = report.campaign.file.factors.iter().enumerate();
+        let drawn: Result<Vec<_>, _> =
+            factors.map(|(at, factor)| plot(factor, &report.results, at, &points(at))).collect();
+        plots.push((name, drawn?));
+    }
+    Ok(plots)
+}
+
+/// A case in a plot: the value of a factor, the margin in percent, and whether the case passed.
+struct Point {
+    x: f64,
+    margin_percent: f64,
+    has_passed: bool,
+}
+
+fn points(results: &[CaseResult], check: &str, factor: usize) -> Vec<Point> {
+    let categories = categories(results, factor);
+    let point = |result: &CaseResult| {
+        let check = result.checks.iter().find(|found| found.name == check)?;
+        let setting = result.settings.get(factor)?;
+        let place = || categories.iter().position(|word| *word == setting.word()).map(|place| place as f64);
+        let x = if categories.is_empty() { setting.number() } else { place() }?;
+        let margin_percent = check.relative_margin.filter(|margin| margin.is_finite())? * 100.0;
+        Some(Point { x, margin_percent, has_passed: result.has_passed() })
+    };
+    results.iter().filter_map(point).collect()
+}
+
+/// The values of a factor that are not all numbers, in the order in which they appear; empty for numbers.
+fn categories(results: &[CaseResult], factor: usize) -> Vec<String> {
+    let settings = || results.iter().filter_map(|result| result.settings.get(factor));
+    if settings().all(|setting| setting.number().is_some()) {
+        return Vec::new();
+    }
+    in_order_of_appearance(settings().map(Setting::word))
+}
+
+fn plot(factor: &Factor, results: &[CaseResult], at: usize, points: &[Point]) -> Result<String, Error> {
+    let unit = factor.unit();
+    let label = if unit.is_empty() { factor.name().to_owned() } else { format!("{}, {unit}", factor.name()) };
+    let categories = categories(results, at);
+    let x = if categories.is_empty() {
+        Axis::new(&label, scale(factor), ends(points.iter().map(|point| point.x), 0.0))
+    } else {
+        Axis::of_names(&label, categories)
+    };
+    let y_ends = ends(points.iter().map(|point| point.margin_percent).chain([0.0]), ROOM);
+    svg(SIZE, |area| {
+        let mut chart = chart(area, "", x, Axis::new("margin, % of limit", Scale::Linear, y_ends))?;
+        let x_ends = chart.x_range();
+        let zero = [(x_ends.start, 0.0), (x_ends.end, 0.0)];
+        chart.draw_series(plotters::prelude::LineSeries::new(zero, GREY))?;
+        for (has_passed, colour) in [(true, BLUE), (false, VERMILION)] {
+            let dots = points.iter().filter(|point| point.has_passed == has_passed);
+            marks(&mut chart, dots.map(|point| (point.x, point.margin_percent)), DOT, colour)?;
+        }
+        Ok(())
+    })
+}
+
+fn scale(factor: &Factor) -> Scale {
+    if factor.distribution == Distribution::LogUniform { Scale::Log } else { Scale::Linear }
+}
+
+fn ends(values: impl Iterator<Item = f64> + Clone, room: f64) -> [f64; 2] {
+    let low = values.clone().fold(f64::INFINITY, f64::min);
+    let high = values.fold(f64::NEG_INFINITY, f64::max);
+    let room = (high - low) * room;
+    [low - room, high + room]
+}
+
+/// The rate with its interval, and the demanded one.
+fn rate_in_words(report: &Report<'_>) -> String {
+    let rate = report.rate();
+    let Some(share) = rate.share() else { return "No case was judged.".to_owned() };
+    let [low, high] = rate.interval.map(percent);
+    let demanded = report.campaign.file.least_success;
+    let demanded = demanded.map_or_else(String::new, |least| format!("; {} demanded", percent(least)));
+    format!(
+        "Success rate {} of {} judged cases, 95 % interval {low} to {high}{demanded}.",
+        percent(share),
+        rate.judged
+    )
+}
+
+fn least_margin(result: &CaseResult) -> String {
+    let margin = result.least_margin();
+    margin.map_or_else(|| "–".to_owned(), |(name, margin)| format!("{}, {name}", percent(margin)))
+}
+
+fn values(result: &CaseResult) -> String {
+    let value = |setting: &Setting| {
+        let number = setting.number().filter(|_| !matches!(setting.value, Some(toml::Value::String(_))));
+        let word = number.map_or_else(|| setting.word(), |number| format!("{number:.4}"));
+        format!("{} = {word}", setting.name)
+    };
+    result.settings.iter().map(value).collect::<Vec<_>>().join(", ")
+}
+
+/// The table: case, factors, verdict, margins, figures.
+fn results_table(campaign: &Campaign, results: &[CaseResult]) -> Table {
+    let rows = Rows(results);
+    let identity = [
+        rows.whole("case", "place in the campaign", |result| result.number as i64),
+        rows.words("id", "identity by content", |result| &result.id),
+        rows.whole("more_seed", "added to the seed of the scenario", |result| result.more_seed as i64),
+    ];
+    let verdict = [
+        rows.words("verdict", "verdict in a word", |result| &result.word),
+        rows.whole("exit_code", "verdict as exit code", |result| result.exit_code.into()),
+        rows.words("reason", "reason of the verdict", |result| &result.reason),
+        rows.words("digest", "what the rig did", |result| &result.digest),
+        rows.numbers("took_s", "s", "time that the case took", |result| Some(result.took_s)),
+    ];
+    let figures = [
+        rows.numbers("incisal_rms_mm", "mm", "error of the incisal point, root mean square", |result| {
+            result.incisal_rms_mm
+        }),
+        rows.numbers("incisal_max_mm", "mm", "largest error of the incisal point", |result| {
+            result.incisal_max_mm
+        }),
+        rows.numbers("rotation_max_deg", "deg", "largest error of the rotation", |result| {
+            result.rotation_max_deg
+        }),
+        rows.numbers("bite_force_max_n", "N", "greatest bite force", |result| result.bite_force_max_n),
+    ];
+    let factors = campaign.file.factors.iter().enumerate().map(|(at, factor)| rows.factor(at, factor));
+    let checks = names(results).into_iter().flat_map(|name| rows.check_columns(&name));
+    let columns = identity.into_iter().chain(factors).chain(verdict).chain(checks).chain(figures);
+    Table::new(columns.collect())
+}
+
+/// Makes the columns of a table whose rows are the results.
+#[derive(Clone, Copy)]
+struct Rows<'a>(&'a [CaseResult]);
+
+impl<'a> Rows<'a> {
+    fn numbers(self, name: &str, unit: &str, about: &str, of: impl Fn(&CaseResult) -> Option<f64>) -> Column {
+        Column::new(name, unit, about, Values::Numbers(self.0.iter().map(of).collect()))
+    }
+
+    fn whole(self, name: &str, about: &str, of: impl Fn(&CaseResult) -> i64) -> Column {
+        Column::new(name, "", about, Values::Whole(self.0.iter().map(|result| Some(of(result))).collect()))
+    }
+
+    fn words(self, name: &str, about: &str, of: impl Fn(&'a CaseResult) -> &'a String) -> Column {
+        let words = self.0.iter().map(|result| Some(of(result).clone()));
+        Column::new(name, "", about, Values::Words(words.collect()))
+    }
+
+    /// Numbers where all values of the factor are numbers, otherwise words.
+    fn factor(self, at: usize, factor: &Factor) -> Column {
+        let settings = || self.0.iter().map(|result| &result.settings[at]);
+        let values = if settings().all(|setting| setting.number().is_some()) {
+            Values::Numbers(settings().map(Setting::number).collect())
+        } else {
+            Values::Words(settings().map(|setting| Some(setting.word())).collect())
+        };
+        Column::new(factor.name(), factor.unit(), "factor", values)
+    }
+
+    /// Whether the check passed, and its margin where it has one.
+    fn check_columns(self, name: &str) -> Vec<Column> {
+        let of = |result: &'a CaseResult| result.checks.iter().find(|check| check.name == name);
+        let passed = self.0.iter().map(|result| of(result)?.passed).collect();
+        let about = "whether the check passed";
+        let mut columns = vec![Column::new(&format!("{name}.passed"), "", about, Values::Truths(passed))];
+        let with_margin = self.0.iter().filter_map(of).find(|check| check.margin.is_some());
+        if let Some(CaseCheck { unit, .. }) = with_margin {
+            let column = |ending: &str, unit: &str, about: &str, of_check: fn(&CaseCheck) -> Option<f64>| {
+                let numbers = self.0.iter().map(|result| of_check(of(result)?)).collect();
+                Column::new(&format!("{name}.{ending}"), unit, about, Values::Numbers(numbers))
+            };
+            columns.push(column("margin", unit, "distance from failing", |check| check.margin));
+            let about = "distance from failing as a share of the limit";
+            columns.push(column("relative_margin", "", about, |check| check.relative_margin));
+        }
+        columns
+    }
+}
+
+/// The names of all checks, in the order in which they first appear.
+fn names(results: &[CaseResult]) -> Vec<String> {
+    in_order_of_appearance(results.iter().flat_map(|result| &result.checks).map(|check| check.name.clone()))
+}
+
+fn in_order_of_appearance(words: impl Iterator<Item = String>) -> Vec<String> {
+    let mut seen = Vec::new();
+    for word in words {
+        if !seen.contains(&word) {
+            seen.push(word);
+        }
+    }
+    seen
+}

@@ -1,0 +1,167 @@
+//! The verbs for one's own controller: `masseter controller` attaches one of the rig's to a rig, or is the
+//! controller's process of a run; `masseter param` lists, reads and sets the parameters of a running one; `masseter
+//! signals` lists what `[[require]]` can use. Signals that your own program declares are known only once it runs: a
+//! run's manifest has them.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use clap::{Args, Subcommand};
+use masseter_analysis::requirements::event_names;
+use masseter_analysis::signals::Registry;
+use masseter_controller::process;
+use masseter_plan::{RunPlan, read_scenario};
+use masseter_runtime::control::Outcome;
+use masseter_runtime::named::{Parameter, access};
+use masseter_runtime::transport::Domain;
+use masseter_terminal::{Exit, Format, result, result_line};
+
+use super::arguments::ProcessArgs;
+use crate::run::request::ControllerKind;
+
+/// The arguments of `controller`.
+#[derive(Debug, Clone, Args)]
+#[command(
+    after_help = "Example:\n  masseter run --controller external --name bench\n  masseter controller --rig bench"
+)]
+pub(super) struct ControllerArgs {
+    /// Name of the rig [default: that of MASSETER_RIG, or the only rig that takes a controller]
+    #[arg(long, value_name = "NAME")]
+    rig: Option<String>,
+    /// Which controller
+    #[arg(long, value_enum, default_value_t)]
+    kind: ControllerKind,
+    #[command(flatten)]
+    process: Option<ProcessArgs>,
+}
+
+/// Runs the controller to the end of its motion or a safe stop.
+pub(super) fn control(args: ControllerArgs) -> anyhow::Result<Exit> {
+    let build = args.kind.builder();
+    let outcome = match args.process {
+        Some(process) => process::run(&process.process_arguments(), build)?,
+        None => process::run_attached(args.rig.as_deref(), build)?,
+    };
+    Ok(match outcome {
+        Outcome::Finished => Exit::Passed,
+        Outcome::SafeStop => Exit::SafeStop,
+    })
+}
+
+/// The verbs of `param`.
+#[derive(Debug, Clone, Subcommand)]
+pub(super) enum ParamVerb {
+    /// List the parameters with their values, units and ranges
+    #[command(after_help = "Example:\n  masseter param list")]
+    List(RigArgs),
+    /// Print the value of a parameter
+    #[command(after_help = "Example:\n  masseter param get integral_gain_per_s")]
+    Get {
+        /// Name of the parameter
+        name: String,
+        #[command(flatten)]
+        rig: RigArgs,
+    },
+    /// Set a parameter; the controller takes the value over in its next cycle
+    #[command(after_help = "Example:\n  masseter param set integral_gain_per_s=8")]
+    Set {
+        /// Name and value
+        #[arg(value_name = "NAME=VALUE")]
+        assignment: String,
+        #[command(flatten)]
+        rig: RigArgs,
+    },
+}
+
+/// Which rig.
+#[derive(Debug, Clone, Args)]
+pub(super) struct RigArgs {
+    /// Name of the rig [default: the only one whose controller has parameters]
+    #[arg(long, value_name = "NAME")]
+    rig: Option<String>,
+}
+
+/// Executes a verb.
+pub(super) fn param(verb: &ParamVerb) -> anyhow::Result<Exit> {
+    match verb {
+        ParamVerb::List(rig) => {
+            for parameter in access::list(&rig.domain()?)? {
+                result_line!("{}", describe(&parameter))?;
+            }
+        }
+        ParamVerb::Get { name, rig } => {
+            let parameters = access::list(&rig.domain()?)?;
+            result_line!("{}", find(&parameters, name)?.value)?;
+        }
+        ParamVerb::Set { assignment, rig } => {
+            let (name, value) = assignment.split_once('=').context("write NAME=VALUE")?;
+            let value = value.trim().parse().with_context(|| format!("'{value}' is no number"))?;
+            let parameters = access::set(&rig.domain()?, name.trim(), value)?;
+            result_line!("{}", describe(find(&parameters, name.trim())?))?;
+        }
+    }
+    Ok(Exit::Passed)
+}
+
+impl RigArgs {
+    fn domain(&self) -> anyhow::Result<Domain> {
+        if let Some(name) = &self.rig {
+            return Ok(Domain::named(name)?);
+        }
+        let mut rigs = access::rigs()?;
+        match (rigs.pop(), &rigs[..]) {
+            (Some(only), []) => Ok(only),
+            (None, _) => {
+                bail!("no rig with a parameter runs; start one, such as: masseter run --duration 60")
+            }
+            (Some(last), others) => {
+                let names: Vec<_> = others.iter().chain([&last]).map(Domain::id).collect();
+                bail!("several rigs run: choose one by --rig: {}", names.join(", "))
+            }
+        }
+    }
+}
+
+fn find<'a>(parameters: &'a [Parameter], name: &str) -> anyhow::Result<&'a Parameter> {
+    let found = parameters.iter().find(|parameter| parameter.name == name);
+    found.with_context(|| {
+        let names: Vec<_> = parameters.iter().map(|parameter| &*parameter.name).collect();
+        format!("the controller has no parameter '{name}', but: {}", names.join(", "))
+    })
+}
+
+fn describe(Parameter { name, unit, about, value, range: [least, most] }: &Parameter) -> String {
+    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    format!("{name} = {value}{unit}  ({least} to {most})  {about}").trim_end().to_owned()
+}
+
+/// The arguments of `signals`.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = "Example:\n  masseter signals | grep incisal")]
+pub(super) struct SignalsArgs {
+    /// Scenario file [default: ten seconds of chewing]
+    scenario: Option<PathBuf>,
+    /// Format of standard output
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+/// Prints every signal with its unit and its meaning.
+pub(super) fn signals(args: &SignalsArgs) -> anyhow::Result<Exit> {
+    let plan = RunPlan::of_file(read_scenario(args.scenario.as_deref())?, args.scenario.as_deref())?;
+    let build = ControllerKind::default().builder();
+    let declared = build(&plan.scenario, plan.mechanism.clone(), plan.trajectory.clone()).declared();
+    let registry = Registry::new(&plan.scenario, &declared);
+    let text = match args.format {
+        Format::Json => serde_json::to_string_pretty(registry.signals())? + "\n",
+        Format::Human => {
+            let signals = registry.signals().iter().fold(String::new(), |text, signal| {
+                text + &format!("{:<26} {:<6} {}\n", signal.name, signal.unit, signal.about)
+            });
+            let names: Vec<_> = event_names().collect();
+            format!("{signals}\nevents: {}\n", names.join(", "))
+        }
+    };
+    result(&text)?;
+    Ok(Exit::Passed)
+}

@@ -1,0 +1,83 @@
+//! `masseter faults`: the kinds of faults, and the coverage of the rig: what detects each fault, and how far the jaw
+//! leaves its path until then.
+
+use std::fs;
+use std::path::PathBuf;
+
+use anyhow::anyhow;
+use clap::{Args, Subcommand};
+use masseter_plan::{RunPlan, read_scenario};
+use masseter_recording::output::new_folder;
+use masseter_scenario::FaultKindConfig;
+use masseter_terminal::{Exit, Failure, OrFailure, result, status};
+
+use crate::run::interrupts::Interrupts;
+use crate::run::request::ControllerChoice;
+use crate::run::runner::Runner;
+use crate::vary::matrix::{self, Row};
+
+/// The verbs of `faults`.
+#[derive(Debug, Clone, Subcommand)]
+pub(super) enum FaultsVerb {
+    /// List the kinds of faults with what they stand for
+    #[command(after_help = "Example:\n  masseter faults list")]
+    List,
+    /// Play every kind at every axis and phase of the motion: what detects it, how fast, how far the jaw leaves its
+    /// path
+    #[command(after_help = "Example:\n  masseter faults matrix --out faults")]
+    Matrix(MatrixArgs),
+}
+
+/// The arguments of `faults matrix`.
+#[derive(Debug, Clone, Args)]
+pub(super) struct MatrixArgs {
+    /// Scenario file [default: chewing]
+    scenario: Option<PathBuf>,
+    /// Folder for matrix.csv and matrix.svg; must not exist
+    #[arg(long, value_name = "DIR", default_value = "faults")]
+    out: PathBuf,
+    /// Only kinds with this text in their names
+    #[arg(long, value_name = "TEXT")]
+    filter: Option<String>,
+}
+
+/// Lists the kinds, or plays the matrix.
+pub(super) fn execute(verb: &FaultsVerb) -> Result<Exit, Failure> {
+    match verb {
+        FaultsVerb::List => list().usage(),
+        FaultsVerb::Matrix(args) => play_matrix(args),
+    }
+}
+
+fn list() -> anyhow::Result<Exit> {
+    let line = |kind: &FaultKindConfig| {
+        format!("{:<22} {:<10} {}\n", kind.name(), kind.layer().name(), kind.about())
+    };
+    result(&FaultKindConfig::ALL.iter().map(line).collect::<String>())?;
+    Ok(Exit::Passed)
+}
+
+/// Plays the matrix; fails if a fault leads the jaw beyond the limits before somebody detects it.
+fn play_matrix(MatrixArgs { scenario, out, filter }: &MatrixArgs) -> Result<Exit, Failure> {
+    let read = read_scenario(scenario.as_deref()).usage()?;
+    let plan = RunPlan::of_file(read, scenario.as_deref()).usage()?;
+    let cases = matrix::cases(&plan, filter.as_deref());
+    if cases.is_empty() {
+        return Err(anyhow!("no kind has this text in its name; see masseter faults list")).usage();
+    }
+    new_folder(out).usage()?;
+    let interrupts = Interrupts::of_verb()?;
+    status!("{} runs", cases.len());
+    let runner = Runner { controller: &ControllerChoice::default(), interrupts: &interrupts };
+    let rows = matrix::play(&plan.scenario, cases, runner)?;
+    interrupts.restore_default_actions();
+    if interrupts.is_stop_requested() {
+        // Empty as it is, it would only be in the way of the next matrix.
+        let _ = fs::remove_dir(out);
+        status!("masseter: interrupted: no table is written");
+        return Ok(Exit::Interrupted);
+    }
+    matrix::write(out, &rows).incomplete()?;
+    result(&matrix::summary(out, &rows)).incomplete()?;
+    Ok(if rows.iter().any(Row::is_bad) { Exit::Failed } else { Exit::Passed })
+}

@@ -1,0 +1,349 @@
+//! The command line: dispatches each verb to its module, and prints errors. Arguments are defined beside their verbs.
+
+pub(crate) mod arguments;
+mod bench;
+mod campaign;
+mod can;
+mod controller;
+mod faults;
+mod help;
+mod interface;
+mod kinematics;
+mod motion;
+mod plant;
+mod report;
+mod run;
+mod starter;
+mod test;
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use anyhow::anyhow;
+use clap::{ColorChoice, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
+use masseter_recorder::RecorderArgs;
+use masseter_recordings::{ExportArgs, RecordingVerb};
+use masseter_runtime::transport::Domain;
+use masseter_scenario::wording::counted;
+use masseter_terminal::{Exit, Failure, OrFailure, choose_colour, in_one_line, result_line, status};
+use rustix::process::umask;
+
+use crate::BUILD;
+use crate::doctor::{self, DoctorArgs};
+use crate::robot::{self, RobotVerb};
+use crate::run::exec_program;
+use arguments::ProcessArgs;
+use bench::args::BenchArgs;
+use campaign::{CampaignArgs, CampaignCaseArgs, SearchArgs, ShrinkArgs};
+use can::CanVerb;
+use controller::{ControllerArgs, ParamVerb, SignalsArgs};
+use faults::FaultsVerb;
+use help::{CompletionsArgs, ManArgs, with_overview};
+use interface::InterfaceArgs;
+use kinematics::{CsvArgs, FkArgs};
+use motion::MotionArgs;
+use plant::PlantArgs;
+use report::{DiffArgs, ReplayArgs, ReportArgs};
+use run::{Readers, RunArgs};
+use starter::{InitArgs, NewVerb};
+use test::TestArgs;
+
+const FIRST_STEPS: &str = "\
+First steps:
+  masseter run
+  masseter init DIR
+  masseter doctor
+  masseter help run";
+const EXIT_CODES: &str = "\
+Exit codes of every verb: 0 passed, 1 a check failed or was not tested, 2 wrong usage or input,
+3 cannot be judged, 4 a process died, 5 unexpected safe stop, 6 files incomplete, 130 interrupted.";
+
+/// A hardware-in-the-loop rig for a 6-DOF mastication robot
+#[derive(Debug, Parser)]
+#[command(
+    name = "masseter",
+    version = BUILD,
+    max_term_width = 100,
+    after_help = FIRST_STEPS,
+    after_long_help = format!("{FIRST_STEPS}\n\n{EXIT_CODES}")
+)]
+struct Cli {
+    /// Colour: auto (on a terminal, unless NO_COLOR is set), always or never
+    #[arg(
+        long,
+        global = true,
+        value_name = "WHEN",
+        default_value_t,
+        hide_default_value = true,
+        hide_possible_values = true
+    )]
+    color: ColorChoice,
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// Run a jaw motion through controller, plant and recorder, and judge it
+    Run(RunArgs),
+    /// Run the scenarios of a folder as a suite of tests
+    Test(TestArgs),
+    /// Run a scenario with many values of its keys, faults and motions
+    Campaign(CampaignArgs),
+    /// Search for the values of a campaign's factors that come nearest to a failure
+    Search(SearchArgs),
+    /// Make a failing scenario as small as it can be and still fail
+    Shrink(ShrinkArgs),
+    /// Describe a recorded jaw motion, and whether the rig can play it
+    Motion(MotionArgs),
+    /// Lay down a scenario, a motion and a CI workflow to start from
+    Init(InitArgs),
+    /// Forward kinematics of a CSV file: actuator positions to poses
+    Fk(FkArgs),
+    /// Inverse kinematics of a CSV file: poses to actuator positions
+    #[command(after_help = "Example:\n  masseter ik < poses.csv > joints.csv")]
+    Ik(CsvArgs),
+    /// Attach a controller of the rig to a rig that waits for one
+    Controller(ControllerArgs),
+    /// Lay down a project for your own controller
+    #[command(subcommand, after_help = "Example:\n  masseter new controller --lang cpp my_controller")]
+    New(NewVerb),
+    /// List, read and set the parameters of a running controller
+    #[command(subcommand, after_help = "Example:\n  masseter param set integral_gain_per_s=8")]
+    Param(ParamVerb),
+    /// List the kinds of faults, or play them all: what detects each
+    #[command(subcommand, after_help = "Example:\n  masseter faults matrix")]
+    Faults(FaultsVerb),
+    /// List the signals that requirements can use
+    Signals(SignalsArgs),
+    /// Print the messages as types of C or Python
+    Interface(InterfaceArgs),
+    /// Bring up a robot in steps: inspect, configure, and what follows
+    #[command(subcommand, after_help = "Example:\n  masseter robot inspect robot.toml --can can0,can1")]
+    Robot(RobotVerb),
+    /// Emulate the six drives and the mechanism on real CAN interfaces
+    Plant(PlantArgs),
+    /// Write the report of a run again, or compare two runs
+    Report(ReportArgs),
+    /// Give the recorded readings of a run to its controller again, and compare the answers
+    Replay(ReplayArgs),
+    /// Find the first message in which two recordings differ
+    Diff(DiffArgs),
+    /// Check whether this machine is fit for real-time runs
+    Doctor(DoctorArgs),
+    /// Write a recording as tables: Parquet or CSV, with a codebook
+    Export(ExportArgs),
+    /// Inspect, verify, recover and thin recordings
+    #[command(subcommand, alias = "log", after_help = "Example:\n  masseter recording info runs/latest")]
+    Recording(RecordingVerb),
+    /// Plan the buses, describe the drives (EDS, DBC), serve simulated buses
+    #[command(subcommand, after_help = "Example:\n  masseter can plan --rate-hz 1500")]
+    Can(CanVerb),
+    /// Measure parts of the rig, each beside a baseline
+    Bench(BenchArgs),
+    /// Remove what killed runs left in shared memory
+    #[command(after_help = "Example:\n  masseter clean")]
+    Clean,
+    /// Print the completions of the command line for a shell
+    Completions(CompletionsArgs),
+    /// Write manual pages
+    Man(ManArgs),
+    /// Verbs of another command
+    #[command(hide = true, aliases = ["paper", "uniqueness"], disable_help_flag = true)]
+    Kinematics {
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        _arguments: Vec<OsString>,
+    },
+    #[command(hide = true)]
+    CampaignCase(CampaignCaseArgs),
+    #[command(hide = true)]
+    Recorder {
+        #[command(flatten)]
+        process: ProcessArgs,
+        #[command(flatten)]
+        recorder: RecorderArgs,
+    },
+    #[command(hide = true)]
+    ExecProgram {
+        /// Process id of the supervisor
+        supervisor: i32,
+        /// The program
+        path: PathBuf,
+    },
+}
+
+/// Parses the arguments, executes the verb, and prints its error.
+pub fn main() -> ExitCode {
+    // A write beyond the limit on the size of files is then an error, not the end.
+    let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
+    let Cli { color, verb } =
+        Cli::from_arg_matches(&command().get_matches()).unwrap_or_else(|error| error.exit());
+    choose_colour(color);
+    keep_files_private(&verb);
+    match execute(verb) {
+        Ok(exit) => exit.into(),
+        Err(Failure { exit, error }) => {
+            status!("masseter: {}", in_one_line(&error));
+            exit.into()
+        }
+    }
+}
+
+/// The whole command line.
+fn command() -> Command {
+    with_overview(Cli::command())
+}
+
+/// Lets no other user read new files, unless `run --readable-by` allows it. The processes of a run inherit that, and
+/// its reports take it from the folder.
+fn keep_files_private(verb: &Verb) {
+    umask(match verb {
+        // What init lays down is public.
+        Verb::Controller(_)
+        | Verb::Recorder { .. }
+        | Verb::ExecProgram { .. }
+        | Verb::Init(_)
+        | Verb::New(_) => {
+            return;
+        }
+        Verb::Run(args) => args.readable_by.umask(),
+        Verb::Report(args) => args.umask(),
+        _ => Readers::Owner.umask(),
+    });
+}
+
+/// Errors lead to exit code 2 unless the verb itself chooses another.
+fn execute(verb: Verb) -> Result<Exit, Failure> {
+    match verb {
+        Verb::Run(args) => run::run(args),
+        Verb::Test(args) => test::test(&args),
+        Verb::Campaign(args) => campaign::campaign(&args),
+        Verb::Search(args) => campaign::search(&args),
+        Verb::Shrink(args) => campaign::shrink(&args),
+        Verb::CampaignCase(args) => campaign::run_case(&args),
+        Verb::Motion(args) => motion::motion(&args).usage(),
+        Verb::Init(args) => starter::init(&args).usage(),
+        Verb::Faults(verb) => faults::execute(&verb),
+        Verb::Signals(args) => controller::signals(&args).usage(),
+        Verb::Report(args) => report::report(&args),
+        Verb::Replay(args) => report::replay(&args).usage(),
+        Verb::Diff(args) => report::diff(&args).usage(),
+        Verb::Bench(args) => bench::run(&args),
+        Verb::Fk(args) => kinematics::forward(&args).usage(),
+        Verb::Ik(args) => kinematics::inverse(&args).usage(),
+        Verb::Can(verb) => can::execute(&verb).usage(),
+        Verb::Robot(verb) => robot::execute(&verb),
+        Verb::Kinematics { .. } => Err(anyhow!(
+            "the paper's study and uniqueness are verbs of another command: \
+             cargo run --release -p masseter-research -- help"
+        ))
+        .usage(),
+        Verb::Doctor(args) => doctor::examine(&args).usage(),
+        Verb::Export(args) => masseter_recordings::export(&args).usage(),
+        Verb::Recording(verb) => masseter_recordings::execute(&verb).usage(),
+        Verb::Clean => clean().usage(),
+        Verb::Completions(args) => help::completions(&args, &command()).usage(),
+        Verb::Man(args) => help::manual(&args, command()).usage(),
+        Verb::New(verb) => starter::new(&verb).usage(),
+        Verb::Param(verb) => controller::param(&verb).usage(),
+        Verb::Interface(args) => interface::interface(&args).usage(),
+        Verb::Controller(args) => controller::control(args).usage(),
+        Verb::Plant(args) => plant::plant(args).usage(),
+        Verb::Recorder { process, recorder } => {
+            masseter_recorder::record(&process.process_arguments(), &recorder).usage()
+        }
+        Verb::ExecProgram { supervisor, path } => exec_program(supervisor, &path).usage(),
+    }
+}
+
+/// Removes the shared memory of killed runs, and lists all domains of this user. Live runs are not touched.
+fn clean() -> anyhow::Result<Exit> {
+    let domains = Domain::all()?;
+    for domain in &domains {
+        match domain.sweep()? {
+            Some(swept) => {
+                result_line!(
+                    "{}: {} removed from shared memory",
+                    domain.id(),
+                    counted(swept.removed as u64, "file")
+                )?;
+                swept.remaining.iter().for_each(|error| status!("masseter: {error}"));
+            }
+            None => result_line!("{}: running, not removed", domain.id())?,
+        }
+    }
+    if domains.is_empty() {
+        result_line!("nothing to clean")?;
+    }
+    Ok(Exit::Passed)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::iter;
+
+    use super::*;
+
+    /// Every command that a user meets, with its names from the verb on.
+    fn visible(command: &Command, names: &str) -> Vec<(String, Command)> {
+        let verbs = command.get_subcommands().filter(|verb| !verb.is_hide_set());
+        verbs
+            .flat_map(|verb| {
+                let name = format!("{names} {}", verb.get_name());
+                let inner = visible(verb, &name);
+                iter::once((name, verb.clone())).chain(inner)
+            })
+            .collect()
+    }
+
+    /// The command lines of a text, without what the shell takes from them, or what explains them.
+    fn command_lines(text: &str) -> impl Iterator<Item = &str> {
+        let lines = text.lines().map(str::trim_start).filter(|line| line.starts_with("masseter "));
+        lines.map(|line| line.split(['<', '>', '|', '#', '(']).next().unwrap_or_default())
+    }
+
+    fn assert_parsed(line: &str) {
+        let parsed = command().try_get_matches_from(line.split_whitespace());
+        assert!(parsed.is_ok(), "{line}: {}", parsed.unwrap_err());
+    }
+
+    #[test]
+    fn every_verb_has_an_example_that_is_right_and_a_help_without_marks_of_markup() {
+        let verbs = visible(&command(), "masseter");
+        assert!(verbs.len() > 20, "{verbs:?}");
+        for (name, mut verb) in verbs {
+            let help = verb.render_long_help().to_string();
+            let (_, examples) =
+                help.split_once("\nExample").unwrap_or_else(|| panic!("{name}: no example in {help}"));
+            let example = format!("  {name}");
+            assert!(examples.lines().any(|line| line.starts_with(&example)), "{name}: {examples}");
+            assert!(!help.contains('`'), "{name}: {help}");
+            command_lines(&help).for_each(assert_parsed);
+        }
+    }
+
+    #[test]
+    fn every_command_line_of_the_readme_and_the_workflow_is_right() {
+        let workflow = include_str!("../../examples/workflow.yml").replace("run: masseter", "masseter");
+        let workflow: Vec<_> = command_lines(&workflow).collect();
+        assert!(!workflow.is_empty());
+        workflow.into_iter().for_each(assert_parsed);
+        let readme = include_str!("../../README.md").lines().filter(|line| line.starts_with("    "));
+        let readme: Vec<_> = readme.flat_map(command_lines).collect();
+        assert!(readme.len() > 10, "{readme:?}");
+        readme.into_iter().for_each(assert_parsed);
+    }
+
+    #[test]
+    fn the_overview_shows_every_visible_verb_once() {
+        let command = command();
+        let help = command.clone().render_help().to_string();
+        for verb in command.get_subcommands() {
+            let entries = help.lines().filter(|line| line.starts_with(&format!("  {} ", verb.get_name())));
+            assert_eq!(entries.count(), usize::from(!verb.is_hide_set()), "{}: {help}", verb.get_name());
+        }
+        assert!(help.lines().all(|line| line.chars().count() <= 100), "{help}");
+    }
+}

@@ -1,0 +1,306 @@
+//! `masseter motion`: what a recorded jaw motion holds, and whether the rig would play it.
+//!
+//! The file is read and the motion judged as `masseter run` does. What differs is the answer: a description, and the
+//! values of the scenario with which the motion would fit.
+
+mod picture;
+
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use clap::Args;
+use masseter_controller::trajectory::{
+    Gap, Glitch, PointFigures, Range, RecordingSurvey, Trajectory, TrajectoryError, survey,
+};
+use masseter_model::geometry::{AXES, AXIS_NAMES, Mechanism};
+use masseter_plan::{Overrides, best_placement, demands, scenario_with_overrides};
+use masseter_scenario::{MotionConfig, Scenario, wording::counted};
+use masseter_terminal::{Exit, Format, Tone, result, result_with_tones};
+use serde::Serialize;
+
+const TONES: [(&str, Tone); 4] =
+    [("PLAYS", Tone::Good), ("suggest", Tone::Good), ("warning", Tone::Doubtful), ("REFUSED", Tone::Bad)];
+
+/// With less left of a stroke another place is suggested, mm: the trim and a slow stop need some.
+const TIGHT_MM: f64 = 1.0;
+/// Gaps and glitches that are listed.
+const MOST: usize = 8;
+
+/// The arguments of `motion`.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = "\
+Examples:
+  masseter motion examples/patient.csv --svg patient.svg
+  masseter motion examples/tracker.csv --scenario examples/markers.toml")]
+pub(crate) struct MotionArgs {
+    /// CSV file of a recorded jaw motion, as for run --trajectory
+    file: PathBuf,
+    /// Scenario with the file's axes, the jaw and the mechanism [default: the default one]
+    #[arg(long, value_name = "SCENARIO.toml")]
+    scenario: Option<PathBuf>,
+    /// Set a key of the scenario
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Write a picture of the motion
+    #[arg(long, value_name = "FILE.svg")]
+    svg: Option<PathBuf>,
+    /// Format of standard output
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+/// Describes the file. [`Exit::Failed`] where the rig would refuse to play it.
+pub(crate) fn motion(args: &MotionArgs) -> anyhow::Result<Exit> {
+    let overrides =
+        Overrides { set: args.set.clone(), trajectory: Some(args.file.clone()), ..Overrides::default() };
+    let scenario = scenario_with_overrides(args.scenario.as_deref(), &overrides)?;
+    let found = Found::new(&scenario, &args.file)?;
+    if let Some(path) = &args.svg {
+        let drawn = picture::svg(&found.survey).context("cannot draw the motion")?;
+        fs::write(path, drawn).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    match args.format {
+        Format::Json => result(&(serde_json::to_string_pretty(&found)? + "\n"))?,
+        Format::Human => result_with_tones(&describe(&found), &TONES)?,
+    }
+    Ok(if found.judged.refused.is_none() { Exit::Passed } else { Exit::Failed })
+}
+
+/// What the verb finds.
+#[derive(Debug, Serialize)]
+struct Found {
+    file: PathBuf,
+    #[serde(flatten)]
+    survey: RecordingSurvey,
+    #[serde(flatten)]
+    judged: Judged,
+    suggestion: Option<Suggestion>,
+}
+
+/// Whether the rig would play a motion.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct Judged {
+    /// What is then left of the strokes; negative where the motion is too large.
+    strokes: Option<Strokes>,
+    /// Why the rig would not play it.
+    refused: Option<String>,
+}
+
+/// The axis that comes nearest to an end of its stroke.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+struct Strokes {
+    axis: &'static str,
+    margin_mm: f64,
+}
+
+/// Keys of the scenario.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct Suggestion {
+    /// `motion.axes`; none where the stated ones are likely.
+    axes: Option<[String; 3]>,
+    /// `jaw.closed_offset_m`; none where the stated one is good.
+    closed_offset_m: Option<[f64; 3]>,
+    /// Whether the rig would play the motion with them.
+    #[serde(flatten)]
+    judged: Judged,
+}
+
+impl Found {
+    /// What the file of a scenario's motion holds.
+    fn new(scenario: &Scenario, path: &Path) -> anyhow::Result<Self> {
+        let MotionConfig::File(file) = &scenario.motion else { bail!("the scenario plays no file") };
+        let survey = survey(file, &scenario.jaw)?;
+        let mechanism = Mechanism::new(&scenario.mechanism)?;
+        let judged = Judged::new(scenario, &mechanism);
+        let suggestion = suggest(scenario, &mechanism, survey.likely_axes.as_ref(), &judged);
+        Ok(Self { file: path.to_owned(), survey, judged, suggestion })
+    }
+}
+
+impl Judged {
+    fn new(scenario: &Scenario, mechanism: &Mechanism) -> Self {
+        match Strokes::left(scenario, mechanism) {
+            Ok(strokes) => Self { strokes: Some(strokes), refused: None },
+            Err(error) => Self { strokes: None, refused: Some(error.to_string()) },
+        }
+    }
+
+    fn fits(&self) -> bool {
+        self.strokes.is_some_and(|strokes| strokes.margin_mm >= TIGHT_MM)
+    }
+}
+
+impl Strokes {
+    /// What a motion leaves of the strokes, if the rig would play it.
+    fn left(scenario: &Scenario, mechanism: &Mechanism) -> Result<Self, TrajectoryError> {
+        let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, mechanism, scenario.duration_s)?;
+        let margin_m = demands(scenario, &trajectory, mechanism)?.margin_m(mechanism.strokes());
+        let axis = (0..AXES).min_by(|&a, &b| margin_m[a].total_cmp(&margin_m[b])).unwrap_or_default();
+        Ok(Self { axis: AXIS_NAMES[axis], margin_mm: margin_m[axis] * 1e3 })
+    }
+}
+
+/// What to change; nothing where the motion fits as it is.
+fn suggest(
+    scenario: &Scenario,
+    mechanism: &Mechanism,
+    axes: Option<&[String; 3]>,
+    now: &Judged,
+) -> Option<Suggestion> {
+    if axes.is_none() && now.fits() {
+        return None;
+    }
+    let mut changed = scenario.clone();
+    if let (Some(axes), MotionConfig::File(file)) = (axes, &mut changed.motion) {
+        file.axes.clone_from(axes);
+    }
+    let is_turned_enough = axes.is_some() && Judged::new(&changed, mechanism).fits();
+    let closed_offset_m = if is_turned_enough { None } else { better_offset(&changed, mechanism) };
+    if axes.is_none() && closed_offset_m.is_none() {
+        return None;
+    }
+    changed.jaw.closed_offset_m = closed_offset_m.unwrap_or(changed.jaw.closed_offset_m);
+    let judged = Judged::new(&changed, mechanism);
+    Some(Suggestion { axes: axes.cloned(), closed_offset_m, judged })
+}
+
+/// The offset with the most left of every stroke, to half a millimetre; none where there is no better one.
+fn better_offset(scenario: &Scenario, mechanism: &Mechanism) -> Option<[f64; 3]> {
+    let jaw = &scenario.jaw;
+    let trajectory = Trajectory::new(&scenario.motion, jaw, mechanism, scenario.duration_s).ok()?;
+    let best = best_placement(&trajectory, mechanism)?;
+    if best.shift_m.iter().all(|shift_m| shift_m.abs() < 1e-9) {
+        return None;
+    }
+    let at = |axis: usize| ((jaw.closed_offset_m[axis] + best.shift_m[axis]) * 1e4).round() / 1e4;
+    Some(std::array::from_fn(at))
+}
+
+/// The description as text: no line is longer than a terminal, but for those with a path.
+fn describe(found: &Found) -> String {
+    let survey = &found.survey;
+    let mut text = format!("{}: {}\n", found.file.display(), head(survey));
+    let _ = writeln!(text, "follows {}\n", survey.follows);
+    text += &columns(&survey.columns);
+    text += &points(&survey.points);
+    text += &turns(survey);
+    text += &listed("gap", &survey.gaps, gap);
+    text += &listed("glitch", &survey.glitches, glitch);
+    for doubt in &survey.doubts {
+        let _ = writeln!(text, "warning {doubt}");
+    }
+    text += &judgement(&found.judged);
+    text + &found.suggestion.as_ref().map_or_else(String::new, suggested)
+}
+
+fn head(survey: &RecordingSurvey) -> String {
+    let [first, last] = survey.lines;
+    let gaps = match survey.gaps.len() {
+        0 => "no gaps".to_owned(),
+        gaps => counted(gaps as u64, "gap"),
+    };
+    format!(
+        "{} of {}, lines {first} to {last}\n{:.3} s at {:.2} Hz, steps {:.2} to {:.2} ms, jitter {:.3} ms, {gaps}",
+        counted(survey.rows as u64, "row"),
+        survey.format,
+        survey.duration_s,
+        survey.steps.rate_hz(),
+        survey.steps.shortest_s * 1e3,
+        survey.steps.longest_s * 1e3,
+        survey.steps.jitter_s * 1e3,
+    )
+}
+
+fn columns(columns: &[Range]) -> String {
+    let mut text = format!("{:<10} {:>11} {:>11} {:>11}\n", "column", "least", "greatest", "range");
+    for Range { name, least, greatest } in columns {
+        let _ = writeln!(text, "{name:<10} {least:>11.4} {greatest:>11.4} {:>11.4}", greatest - least);
+    }
+    text + "\n"
+}
+
+fn points(points: &[PointFigures]) -> String {
+    let mut text = format!(
+        "{:<14} {:>15} {:>15} {:>15} {:>9} {:>8}\n",
+        "mm from closed", "anterior", "left", "up", "farthest", "mm/s"
+    );
+    for point in points {
+        let _ = write!(text, "{:<14}", point.name);
+        for axis in 0..3 {
+            let along =
+                format!("{:.1} to {:.1}", plain(point.least_mm[axis]), plain(point.greatest_mm[axis]));
+            let _ = write!(text, " {along:>15}");
+        }
+        let _ = writeln!(text, " {:>9.1} {:>8.0}", point.farthest_mm, point.fastest_mm_s);
+    }
+    text
+}
+
+fn turns(survey: &RecordingSurvey) -> String {
+    let [roll, opening, yaw] = &survey.turns_deg;
+    let turns = [opening, yaw, roll]
+        .map(|turn| format!("{} {:.1}° to {:.1}°", turn.name, plain(turn.least), plain(turn.greatest)));
+    format!("turns by {:.1}° at most: {}\n\n", survey.turn_deg, turns.join(", "))
+}
+
+/// To a tenth, without a minus before zero.
+fn plain(value: f64) -> f64 {
+    (value * 10.0).round() / 10.0 + 0.0
+}
+
+fn gap(gap: &Gap) -> String {
+    format!("line {}: {:.0} ms since the row before", gap.line, gap.lasts_s * 1e3)
+}
+
+fn glitch(glitch: &Glitch) -> String {
+    let &Glitch { line, time_s, jump_m, within_s } = glitch;
+    let (jump_mm, within_ms) = (jump_m * 1e3, within_s * 1e3);
+    format!("line {line}, {time_s:.3} s: {jump_mm:.1} mm within {within_ms:.0} ms")
+}
+
+fn listed<T>(name: &str, entries: &[T], describe: impl Fn(&T) -> String) -> String {
+    let mut text = String::new();
+    for entry in entries.iter().take(MOST) {
+        let _ = writeln!(text, "{name:<7} {}", describe(entry));
+    }
+    if entries.len() > MOST {
+        let _ = writeln!(text, "{name:<7} and {} more (--format json has all)", entries.len() - MOST);
+    }
+    text
+}
+
+fn judgement(judged: &Judged) -> String {
+    match (&judged.refused, &judged.strokes) {
+        (Some(reason), _) => format!("REFUSED: {reason}\n"),
+        (None, Some(strokes)) => {
+            format!("PLAYS: {} has {:.1} mm left of its stroke\n", strokes.axis, strokes.margin_mm)
+        }
+        (None, None) => String::new(),
+    }
+}
+
+fn suggested(suggestion: &Suggestion) -> String {
+    let mut text = String::from("suggest for the scenario:\n");
+    if let Some([anterior, left, up]) = &suggestion.axes {
+        let _ = writeln!(text, "  [motion]\n  axes = [\"{anterior}\", \"{left}\", \"{up}\"]");
+    }
+    if let Some([x, y, z]) = suggestion.closed_offset_m {
+        let _ = writeln!(text, "  [jaw]\n  closed_offset_m = [{x:?}, {y:?}, {z:?}]");
+    }
+    match (&suggestion.judged.strokes, &suggestion.judged.refused) {
+        (Some(strokes), _) => {
+            let _ = writeln!(
+                text,
+                "with that the motion plays, and {} has {:.1} mm left of its stroke",
+                strokes.axis, strokes.margin_mm
+            );
+        }
+        (None, Some(reason)) => {
+            let _ = writeln!(text, "even then the motion is refused: {reason}");
+        }
+        (None, None) => {}
+    }
+    text
+}

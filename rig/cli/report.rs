@@ -1,0 +1,128 @@
+//! The verbs for past runs: `masseter report` writes a report again or compares two runs, `masseter replay` repeats the
+//! decisions of a controller, `masseter diff` compares two recordings message by message.
+
+use std::fs;
+use std::os::unix::fs::MetadataExt;
+use std::path::PathBuf;
+
+use clap::Args;
+use masseter_recording::Manifest;
+use masseter_report::divergence::{self, Differences};
+use masseter_terminal::{Exit, Failure, Format, OrFailure, result};
+use rustix::fs::Mode;
+use serde::Serialize;
+
+use super::run::Readers;
+use crate::BUILD;
+use crate::record::replay::{self, Outcome};
+use crate::run::request::{ControllerKind, name_of};
+
+/// The arguments of `report`.
+#[derive(Debug, Clone, Args)]
+#[command(
+    after_help = "Examples:\n  masseter report\n  masseter report runs/before runs/after --format json"
+)]
+pub(super) struct ReportArgs {
+    /// Run folder
+    #[arg(default_value = "runs/latest")]
+    folder: PathBuf,
+    /// Second run folder, to compare with the first
+    against: Option<PathBuf>,
+    /// Format of standard output
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+impl ReportArgs {
+    /// The rights that new files do not get: who may not read the folder may not read them.
+    pub(super) fn umask(&self) -> Mode {
+        let folder = fs::metadata(&self.folder).map_or(0, |folder| folder.mode());
+        Readers::Owner.umask() & (Readers::All.umask() | Mode::from_bits_truncate(!folder))
+    }
+}
+
+/// Judges a run again, or compares two runs.
+pub(super) fn report(args: &ReportArgs) -> Result<Exit, Failure> {
+    match &args.against {
+        None => masseter_report::report_past_run(&args.folder, args.format),
+        Some(against) => masseter_report::compare::runs(&args.folder, against, args.format).usage(),
+    }
+}
+
+/// The arguments of `diff`.
+#[derive(Debug, Clone, Args)]
+#[command(
+    after_help = "Examples:\n  masseter diff runs/before runs/after\n  masseter diff golden.mcap runs/latest"
+)]
+pub(super) struct DiffArgs {
+    /// Run folder, or recording; also a thinned one
+    a: PathBuf,
+    /// Another one
+    b: PathBuf,
+    /// Format of standard output
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+/// Prints the first message in which two recordings differ, and how each difference grows.
+pub(super) fn diff(args: &DiffArgs) -> anyhow::Result<Exit> {
+    divergence::recordings(&args.a, &args.b, args.format)
+}
+
+/// The arguments of `replay`.
+#[derive(Debug, Clone, Args)]
+#[command(
+    after_help = "Examples:\n  masseter replay runs/latest\n  masseter replay runs/latest --set controller.integral_gain_per_s=7.00001"
+)]
+pub(super) struct ReplayArgs {
+    /// Run folder
+    #[arg(default_value = "runs/latest")]
+    run: PathBuf,
+    /// Which controller answers [default: that of the run]
+    #[arg(long, value_enum)]
+    controller: Option<ControllerKind>,
+    /// Change a key of the scenario; may be given several times
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Format of standard output
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+/// A replay as JSON.
+#[derive(Debug, Serialize)]
+struct Replayed {
+    controller: String,
+    clock: String,
+    cycles: u64,
+    open_loop: bool,
+    #[serde(flatten)]
+    differences: Differences,
+}
+
+/// Replays a run, and prints where its controller answers otherwise.
+pub(super) fn replay(args: &ReplayArgs) -> anyhow::Result<Exit> {
+    let Outcome { kind, manifest, cycles, differences } =
+        replay::replay(&args.run, args.controller, &args.set)?;
+    let exit = differences.exit();
+    let (controller, clock) = (name_of(&kind), manifest.clock.clone());
+    let replayed = Replayed { controller, clock, cycles, open_loop: true, differences };
+    result(&match args.format {
+        Format::Human => replayed.in_words(&manifest),
+        Format::Json => serde_json::to_string_pretty(&replayed)? + "\n",
+    })?;
+    Ok(exit)
+}
+
+impl Replayed {
+    fn in_words(&self, manifest: &Manifest) -> String {
+        let Self { controller, clock, cycles, differences, .. } = self;
+        let other = format!("; recorded by masseter {}, replayed by {BUILD}", manifest.masseter);
+        let other = if manifest.masseter == BUILD { "" } else { &other };
+        format!(
+            "{}{cycles} cycles of the {clock} clock by the controller '{controller}', in open loop: the readings are the recorded \
+             ones, whatever the controller answers{other}\n",
+            differences.in_words(["the recording", "the replay"])
+        )
+    }
+}

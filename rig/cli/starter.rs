@@ -1,0 +1,244 @@
+//! Folders to start from: `masseter init` lays down a scenario, a motion and a CI workflow, `masseter new controller` a
+//! project with a working pose controller in the user's language. Nothing is replaced, and nothing is built here.
+
+use std::fs::{self, File};
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail, ensure};
+use clap::{Args, Subcommand, ValueEnum};
+use masseter_terminal::{Exit, result_line};
+
+use crate::run::runner::word;
+
+/// The scenario, as a path within the folder.
+const SCENARIO: &str = "scenario.toml";
+/// Path within the folder, content, and what a user needs to know about the file.
+const INIT_FILES: [(&str, &str, &str); 3] = [
+    (SCENARIO, include_str!("../../examples/start.toml"), "the motion, a gain and the limits of a run"),
+    ("jaw.csv", include_str!("../../examples/jaw.csv"), "the motion, made up"),
+    (
+        ".github/workflows/masseter.yml",
+        include_str!("../../examples/workflow.yml"),
+        "the run in CI; enter where Masseter's source is",
+    ),
+];
+
+/// The arguments of `init`.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = "Example:\n  masseter init rig\n  masseter run rig/scenario.toml")]
+pub(super) struct InitArgs {
+    /// New or empty folder
+    folder: PathBuf,
+}
+
+/// Writes every file, and prints the next command.
+pub(super) fn init(InitArgs { folder }: &InitArgs) -> anyhow::Result<Exit> {
+    lay_down(
+        folder,
+        &INIT_FILES.map(|(path, content, _)| StarterFile { path, content: content.to_owned() }),
+    )?;
+    for (name, _, about) in INIT_FILES {
+        result_line!("{}: {about}", folder.join(name).display())?;
+    }
+    result_line!("next: masseter run {}", quoted(&folder.join(SCENARIO)))?;
+    Ok(Exit::Passed)
+}
+
+/// What to make.
+#[derive(Debug, Clone, Subcommand)]
+pub(super) enum NewVerb {
+    /// A project with a working pose controller
+    Controller(NewControllerArgs),
+}
+
+/// The arguments of `new controller`.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = "Example:\n  masseter new controller --lang cpp my_controller")]
+pub(super) struct NewControllerArgs {
+    /// New or empty folder
+    folder: PathBuf,
+    /// Language
+    #[arg(long, value_enum)]
+    lang: Language,
+    /// Masseter's source [default: that of this program]
+    #[arg(long, value_name = "DIR")]
+    source: Option<PathBuf>,
+}
+
+/// A language with a project.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Language {
+    /// Rust, with Cargo
+    Rust,
+    /// C++17, with CMake
+    Cpp,
+    /// C11, with CMake
+    C,
+    /// Python 3.11 or later, with pip
+    Python,
+}
+
+/// A project: what it is, how it is built in its folder, what is built, and its files; the first one has the law.
+struct Project {
+    about: &'static str,
+    build: &'static str,
+    program: &'static str,
+    files: &'static [(&'static str, &'static str)],
+}
+
+const README: &str = include_str!("../../examples/controllers/README.md");
+const CMAKE: &str = "cmake -S . -B build && cmake --build build";
+
+const PIP: &str =
+    "python3 -m venv .venv && .venv/bin/pip install @SOURCE@/shared/python && chmod +x controller.py";
+
+impl Language {
+    const fn project(self) -> Project {
+        match self {
+            Self::Rust => Project {
+                about: "Rust, the crates masseter-controller, masseter-model and masseter-runtime",
+                build: "cargo build --release",
+                program: "target/release/my_controller",
+                files: &[
+                    ("src/main.rs", include_str!("../../examples/controllers/rust/src/main.rs")),
+                    ("Cargo.toml", include_str!("../../examples/controllers/rust/Cargo.toml")),
+                    // Two versions of iceoryx2 do not understand each other.
+                    ("Cargo.lock", include_str!("../../Cargo.lock")),
+                ],
+            },
+            Self::Cpp => Project {
+                about: "C++17, the header masseter.hpp",
+                build: CMAKE,
+                program: "build/my_controller",
+                files: &[
+                    ("controller.cpp", include_str!("../../examples/controllers/cpp/controller.cpp")),
+                    ("CMakeLists.txt", include_str!("../../examples/controllers/cpp/CMakeLists.txt")),
+                ],
+            },
+            Self::C => Project {
+                about: "C11, the header masseter.h",
+                build: CMAKE,
+                program: "build/my_controller",
+                files: &[
+                    ("controller.c", include_str!("../../examples/controllers/c/controller.c")),
+                    ("CMakeLists.txt", include_str!("../../examples/controllers/c/CMakeLists.txt")),
+                ],
+            },
+            Self::Python => Project {
+                about: "Python, the package masseter",
+                build: PIP,
+                program: "controller.py",
+                files: &[
+                    ("controller.py", include_str!("../../examples/controllers/python/controller.py")),
+                    ("pyproject.toml", include_str!("../../examples/controllers/python/pyproject.toml")),
+                ],
+            },
+        }
+    }
+}
+
+/// Writes the project, and prints the next commands.
+pub(super) fn new(NewVerb::Controller(args): &NewVerb) -> anyhow::Result<Exit> {
+    let source = args.source.clone().unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into());
+    ensure!(
+        source.join("shared/interface/masseter.h").is_file(),
+        "{} is not Masseter's source: give it by --source",
+        source.display()
+    );
+    let (source, folder) = (std::path::absolute(source)?, std::path::absolute(&args.folder)?);
+    let project = args.lang.project();
+    lay_down(&args.folder, &files_of(&project, &source, &folder))?;
+    result_line!(
+        "{}: the controller; README.md has the next steps\n\
+         next: (cd {} && {}) && masseter run --controller {}",
+        args.folder.join(project.files[0].0).display(),
+        quoted(&args.folder),
+        project.build.replace("@SOURCE@", &quoted(&source)),
+        quoted(&as_program(&args.folder.join(project.program)))
+    )?;
+    Ok(Exit::Passed)
+}
+
+fn files_of(project: &Project, source: &Path, folder: &Path) -> Vec<StarterFile> {
+    let readme = README
+        .replace("@ABOUT@", project.about)
+        .replace("@BUILD@", project.build)
+        .replace("@PROGRAM@", &format!("./{}", project.program))
+        .replace("@FILE@", project.files[0].0);
+    let files = project.files.iter().map(|&(path, content)| (path, content.to_owned()));
+    let in_place = |(path, content): (_, String)| StarterFile {
+        path,
+        content: content
+            .replace("@SOURCE@", &source.display().to_string())
+            .replace("@TARGET@", &source.join("target").display().to_string())
+            .replace("@FOLDER@", &folder.display().to_string()),
+    };
+    files.chain([("README.md", readme)]).map(in_place).collect()
+}
+
+/// A file of such a folder: its path within, and its content.
+struct StarterFile {
+    path: &'static str,
+    content: String,
+}
+
+/// Writes every file, or none.
+fn lay_down(folder: &Path, files: &[StarterFile]) -> anyhow::Result<()> {
+    refuse_content(folder)?;
+    for (index, StarterFile { path, content }) in files.iter().enumerate() {
+        let path = folder.join(path);
+        if let Err(error) = write_new(&path, content) {
+            // So that the same command can be given again.
+            files[..=index].iter().for_each(|file| drop(fs::remove_file(folder.join(file.path))));
+            return Err(error).with_context(|| format!("cannot write {}", path.display()));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a folder with anything in it.
+fn refuse_content(folder: &Path) -> anyhow::Result<()> {
+    match fs::read_dir(folder) {
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(error).with_context(|| format!("cannot read the folder {}", folder.display())),
+        Ok(mut entries) => match entries.next() {
+            None => Ok(()),
+            Some(_) => bail!("{} is not empty, and nothing is replaced; name a new folder", folder.display()),
+        },
+    }
+}
+
+/// Writes a new file, and the folders above it.
+fn write_new(path: &Path, content: &str) -> std::io::Result<()> {
+    path.parent().map_or(Ok(()), fs::create_dir_all)?;
+    File::create_new(path)?.write_all(content.as_bytes())
+}
+
+/// A path as a shell takes it for one word that is no option.
+fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    word(&if text.starts_with('-') { format!("./{text}") } else { text })
+}
+
+/// A path as a program in this folder: a shell searches PATH for a name alone.
+fn as_program(path: &Path) -> PathBuf {
+    if path.is_absolute() { path.to_owned() } else { Path::new(".").join(path) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_next_command_is_one_that_a_shell_runs() {
+        for (path, expected) in [
+            ("rig/scenario.toml", "rig/scenario.toml"),
+            ("my rig; rm -x/s.toml", "'my rig; rm -x/s.toml'"),
+            ("it's/s.toml", "'it'\\''s/s.toml'"),
+            ("-dash/s.toml", "./-dash/s.toml"),
+        ] {
+            assert_eq!(quoted(Path::new(path)), expected);
+        }
+    }
+}

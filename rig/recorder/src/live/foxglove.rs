@@ -1,0 +1,394 @@
+//! A Foxglove program as client: the channels, schemas and bytes of the recording, and the parameters of the controller, by
+//! the Foxglove WebSocket protocol. There are no services, assets or publishing clients.
+//!
+//! Text messages are JSON objects with an `op`. Messages of channels are binary and little-endian: opcode, subscription
+//! id, time, bytes.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU16, Ordering};
+use std::sync::mpsc::{Receiver, TryRecvError};
+
+use masseter_recording::{Channel, Encoded, Encoder, Recorded, Topic, definitions};
+use masseter_runtime::messages::Parameters;
+use masseter_runtime::named::{Declared, Parameter, access};
+use serde::{Deserialize, Serialize};
+
+use super::connection::{Disconnected, Host, QUEUE, Queued, Socket, bit};
+
+/// Why a request is not fulfilled.
+type Refusal = (Level, String);
+
+/// A client's connection.
+pub(super) struct Session {
+    socket: Socket,
+    encoder: Encoder,
+    /// The client's subscription id of each channel.
+    subscriptions: [Option<u32>; Channel::COUNT],
+    subscribed: Arc<AtomicU16>,
+    host: Host,
+    /// Whether it wants the changes of parameters.
+    wants_parameters: bool,
+}
+
+impl Session {
+    /// Publishes in `subscribed` which topics the recorder should queue.
+    pub(super) fn new(socket: Socket, subscribed: Arc<AtomicU16>, host: Host) -> Self {
+        let subscriptions = [None; Channel::COUNT];
+        let encoder = Encoder::new(host.scene.clone());
+        Self { socket, encoder, subscriptions, subscribed, host, wants_parameters: false }
+    }
+
+    /// Serves the client until the queue has ended and the client has read everything.
+    pub(super) fn serve(mut self, queue: &Receiver<Queued>) -> Result<(), Disconnected> {
+        self.socket.send_text(&server_info(self.host.domain.id(), &self.host.declared))?;
+        self.socket.send_text(&advertise(&self.host.declared))?;
+        loop {
+            if let Some(text) = self.socket.receive()? {
+                self.answer_request(&text)?;
+            }
+            for _ in 0..QUEUE {
+                match queue.try_recv() {
+                    Ok((log_time_ns, message)) => self.send(log_time_ns, &message)?,
+                    Err(TryRecvError::Empty) => break,
+                    Err(TryRecvError::Disconnected) => return self.socket.close_after_all(),
+                }
+            }
+            self.socket.flush()?;
+        }
+    }
+
+    /// Sends the parameters of these names, or all.
+    fn send_parameters(
+        &mut self,
+        names: &[String],
+        id: Option<&str>,
+    ) -> Result<Option<Refusal>, Disconnected> {
+        match access::list(&self.host.domain) {
+            Ok(parameters) => {
+                let is_asked = |parameter: &&Parameter| names.is_empty() || names.contains(&parameter.name);
+                let asked = parameters.iter().filter(is_asked).map(|parameter| (parameter, parameter.value));
+                self.socket.send_text(&parameter_values(asked, id))?;
+                Ok(None)
+            }
+            Err(error) => Ok(Some((Level::Error, error.to_string()))),
+        }
+    }
+
+    /// Sets parameters at the controller, and answers if there is an id: with what holds now.
+    fn set_parameters(
+        &mut self,
+        wanted: &[WantedValue],
+        id: Option<&str>,
+    ) -> Result<Option<Refusal>, Disconnected> {
+        let mut refused = None;
+        for WantedValue { name, value } in wanted {
+            let set = match value.as_f64() {
+                Some(number) => {
+                    access::set(&self.host.domain, name, number).map_err(|error| error.to_string())
+                }
+                None => Err(format!("parameter '{name}' is a number, not {value}")),
+            };
+            refused = set.err().map(|error| (Level::Error, error)).or(refused);
+        }
+        if id.is_none() && refused.is_none() {
+            return Ok(None);
+        }
+        // A refused value must not remain on the client's screen.
+        let names: Vec<_> = wanted.iter().map(|WantedValue { name, .. }| name.clone()).collect();
+        let unanswered = self.send_parameters(&names, id)?;
+        Ok(refused.or(unanswered))
+    }
+
+    fn answer_request(&mut self, text: &str) -> Result<(), Disconnected> {
+        let mut refused = None;
+        match serde_json::from_str(text) {
+            Ok(ClientMessage::Subscribe { subscriptions }) => {
+                for subscription in subscriptions {
+                    match subscription.channel_index() {
+                        Some(index) => self.subscriptions[index] = Some(subscription.id),
+                        None => refused = Some((Level::Error, "the channel does not exist".to_owned())),
+                    }
+                }
+            }
+            Ok(ClientMessage::Unsubscribe { subscription_ids }) => {
+                for id in &mut self.subscriptions {
+                    *id = id.filter(|id| !subscription_ids.contains(id));
+                }
+            }
+            Ok(ClientMessage::GetParameters { parameter_names, id }) => {
+                refused = self.send_parameters(&parameter_names, id.as_deref())?;
+            }
+            Ok(ClientMessage::SetParameters { parameters, id }) => {
+                refused = self.set_parameters(&parameters, id.as_deref())?;
+            }
+            Ok(ClientMessage::SubscribeParameterUpdates { .. }) => self.wants_parameters = true,
+            Ok(ClientMessage::UnsubscribeParameterUpdates { .. }) => self.wants_parameters = false,
+            Ok(ClientMessage::Unsupported) => {
+                let offered = "the server offers subscriptions and parameters only".to_owned();
+                refused = Some((Level::Warning, offered));
+            }
+            Err(error) => refused = Some((Level::Error, format!("the request is not valid: {error}"))),
+        }
+        self.publish_subscriptions();
+        if let Some((level, text)) = refused {
+            self.socket.send_text(&status(level, &text))?;
+        }
+        Ok(())
+    }
+
+    /// Publishes which topics the recorder should queue.
+    fn publish_subscriptions(&self) {
+        let is_subscribed = |channel: Channel| self.subscriptions[channel.place()].is_some();
+        let topics =
+            Topic::ALL.into_iter().filter(|topic| Channel::for_topic(*topic).into_iter().any(is_subscribed));
+        let parameters = if self.wants_parameters { bit(Topic::Parameters) } else { 0 };
+        self.subscribed.store(topics.fold(parameters, |bits, topic| bits | bit(topic)), Ordering::Relaxed);
+    }
+
+    /// Sends a message on those of its channels that the client subscribes to, and changed parameters to a client that
+    /// wants them.
+    fn send(&mut self, log_time_ns: u64, message: &Recorded) -> Result<(), Disconnected> {
+        if let Recorded::Parameters(Parameters { parameters, .. }) = message
+            && self.wants_parameters
+        {
+            let values = parameters.as_slice().iter().copied();
+            let named = self.host.declared.parameters.iter().zip(values);
+            self.socket.send_text(&parameter_values(named, None))?;
+        }
+        let Self { socket, encoder, subscriptions, .. } = self;
+        encoder.encode(message, |message: Encoded| match subscriptions[message.channel.place()] {
+            Some(id) => socket.write_bytes(message_data(id, log_time_ns, &message)),
+            None => Ok(()),
+        })
+    }
+}
+
+/// Supported subprotocols, the newest first. The messages used here are the same in both.
+const SUBPROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
+const MESSAGE_DATA: u8 = 1;
+/// Bytes of opcode, subscription id and time.
+const MESSAGE_HEAD: usize = 1 + 4 + 8;
+
+/// The newest supported subprotocol of a client's offer, a list separated by commas.
+pub(super) fn choose_subprotocol(offered: &str) -> Option<&'static str> {
+    let offers = |name: &&str| offered.split(',').any(|offer| offer.trim() == *name);
+    SUBPROTOCOLS.into_iter().find(offers)
+}
+
+/// The level of a status message, by its number in the protocol.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Level {
+    Warning = 1,
+    Error = 2,
+}
+
+#[derive(Serialize)]
+#[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
+enum ServerMessage<'a> {
+    ServerInfo {
+        name: &'a str,
+        capabilities: &'a [&'a str],
+        session_id: &'a str,
+    },
+    Advertise {
+        channels: Vec<Advertised>,
+    },
+    Status {
+        level: u8,
+        message: &'a str,
+    },
+    ParameterValues {
+        parameters: Vec<ParameterValue>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        id: Option<&'a str>,
+    },
+}
+
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+struct Advertised {
+    id: u64,
+    topic: String,
+    encoding: String,
+    schema_name: String,
+    schema_encoding: String,
+    schema: String,
+}
+
+/// A parameter with its value. Without a type, a client takes a whole number for an integer.
+#[derive(Serialize)]
+struct ParameterValue {
+    name: String,
+    value: f64,
+    r#type: &'static str,
+}
+
+/// A value that a client gives to a parameter; something else than a number is refused.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+struct WantedValue {
+    name: String,
+    #[serde(default)]
+    value: serde_json::Value,
+}
+
+/// A request of a client.
+#[derive(Debug, PartialEq, Deserialize)]
+#[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
+enum ClientMessage {
+    /// Subscribes to channels.
+    Subscribe { subscriptions: Vec<Subscription> },
+    /// Ends subscriptions.
+    Unsubscribe { subscription_ids: Vec<u32> },
+    /// Asks for parameters: those named, or all.
+    GetParameters {
+        parameter_names: Vec<String>,
+        #[serde(default)]
+        id: Option<String>,
+    },
+    /// Gives values to parameters; an answer is wanted if there is an id.
+    SetParameters {
+        parameters: Vec<WantedValue>,
+        #[serde(default)]
+        id: Option<String>,
+    },
+    /// Asks for changes of parameters.
+    SubscribeParameterUpdates { parameter_names: Vec<String> },
+    /// Ends that.
+    UnsubscribeParameterUpdates { parameter_names: Vec<String> },
+    /// An operation that this server does not offer.
+    #[serde(other)]
+    Unsupported,
+}
+
+/// A channel, and the client's id for its messages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Subscription {
+    id: u32,
+    channel_id: u64,
+}
+
+impl Subscription {
+    /// Index of the channel in [`definitions`], if it exists.
+    fn channel_index(self) -> Option<usize> {
+        usize::try_from(self.channel_id).ok().filter(|index| *index < Channel::COUNT)
+    }
+}
+
+/// The first message to a client. `session` differs between runs, so that clients discard data of an earlier run.
+fn server_info(session: &str, declared: &Declared) -> String {
+    let capabilities: &[_] =
+        if declared.parameters.is_empty() { &[] } else { &["parameters", "parametersSubscribe"] };
+    to_json(&ServerMessage::ServerInfo { name: "masseter", capabilities, session_id: session })
+}
+
+/// Parameters with their values; `id` is that of the request, if they answer one.
+fn parameter_values<'a>(parameters: impl Iterator<Item = (&'a Parameter, f64)>, id: Option<&str>) -> String {
+    let value = |(parameter, value): (&Parameter, f64)| ParameterValue {
+        name: parameter.name.clone(),
+        value,
+        r#type: "float64",
+    };
+    to_json(&ServerMessage::ParameterValues { parameters: parameters.map(value).collect(), id })
+}
+
+/// All channels, each with its place as id.
+fn advertise(declared: &Declared) -> String {
+    let channels = definitions(declared);
+    let advertised = |(place, channel): &(Channel, mcap::Channel<'static>)| {
+        let schema = channel.schema.as_ref().expect("every channel of the rig has a schema");
+        Advertised {
+            id: place.place() as u64,
+            topic: channel.topic.clone(),
+            encoding: channel.message_encoding.clone(),
+            schema_name: schema.name.clone(),
+            schema_encoding: schema.encoding.clone(),
+            schema: String::from_utf8_lossy(&schema.data).into_owned(),
+        }
+    };
+    to_json(&ServerMessage::Advertise { channels: channels.iter().map(advertised).collect() })
+}
+
+/// A message for the client's user.
+fn status(level: Level, message: &str) -> String {
+    to_json(&ServerMessage::Status { level: level as u8, message })
+}
+
+/// A message of a subscribed channel.
+fn message_data(subscription: u32, log_time_ns: u64, message: &Encoded) -> Vec<u8> {
+    let mut data = Vec::with_capacity(MESSAGE_HEAD + message.bytes.len());
+    data.push(MESSAGE_DATA);
+    data.extend_from_slice(&subscription.to_le_bytes());
+    data.extend_from_slice(&log_time_ns.to_le_bytes());
+    data.extend_from_slice(message.bytes);
+    data
+}
+
+fn to_json(message: &ServerMessage) -> String {
+    serde_json::to_string(message).expect("the message holds only strings, numbers and lists")
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_runtime::named::Signal;
+    use serde_json::{Value, json};
+
+    use super::*;
+
+    #[test]
+    fn the_newest_common_subprotocol_is_chosen() {
+        assert_eq!(choose_subprotocol("foxglove.websocket.v1, foxglove.sdk.v1"), Some("foxglove.sdk.v1"));
+        assert_eq!(choose_subprotocol("foxglove.websocket.v1"), Some("foxglove.websocket.v1"));
+        assert_eq!(choose_subprotocol("foxglove.sdk.v1.1,chat"), None);
+    }
+
+    #[test]
+    fn channels_are_advertised_as_recordings_define_them() {
+        let signal = Signal { name: "grip".into(), unit: "N".into(), about: String::new() };
+        let declared = Declared { signals: vec![signal], ..Declared::default() };
+        let message: Value = serde_json::from_str(&advertise(&declared)).unwrap();
+        assert_eq!(message["op"], "advertise");
+        assert!(message.to_string().contains("float64 grip"));
+        for (index, (place, definition)) in definitions(&declared).iter().enumerate() {
+            let (channel, defined) = (&message["channels"][index], definition.schema.as_ref().unwrap());
+            assert_eq!(channel["id"], place.place());
+            assert_eq!(channel["topic"], definition.topic);
+            assert_eq!(channel["encoding"], *definition.message_encoding);
+            assert_eq!(channel["schemaName"], *defined.name);
+            assert_eq!(channel["schemaEncoding"], "ros2msg");
+            assert_eq!(channel["schema"].as_str().unwrap().as_bytes(), &*defined.data);
+        }
+    }
+
+    #[test]
+    fn requests_are_parsed() {
+        let parse = |text: &str| serde_json::from_str::<ClientMessage>(text);
+        let subscribe = json!({"op": "subscribe", "subscriptions": [{"id": 7, "channelId": 2}]});
+        let Ok(ClientMessage::Subscribe { subscriptions }) = parse(&subscribe.to_string()) else { panic!() };
+        assert_eq!((subscriptions[0].id, subscriptions[0].channel_index()), (7, Some(2)));
+        let beyond = Subscription { id: 7, channel_id: Channel::COUNT as u64 };
+        assert_eq!(beyond.channel_index(), None);
+        let unsubscribe = r#"{"op": "unsubscribe", "subscriptionIds": [7]}"#;
+        assert_eq!(parse(unsubscribe).unwrap(), ClientMessage::Unsubscribe { subscription_ids: vec![7] });
+        let set = json!({"op": "setParameters", "parameters": [{"name": "gain", "value": 3}], "id": "7"});
+        let Ok(ClientMessage::SetParameters { parameters, id }) = parse(&set.to_string()) else { panic!() };
+        assert_eq!(
+            (&*parameters[0].name, parameters[0].value.as_f64(), id.as_deref()),
+            ("gain", Some(3.0), Some("7"))
+        );
+        assert_eq!(parse(r#"{"op": "fetchAsset", "uri": "x"}"#).unwrap(), ClientMessage::Unsupported);
+        assert!(parse("{}").is_err() && parse("chat").is_err());
+    }
+
+    #[test]
+    fn a_message_is_opcode_subscription_id_time_and_bytes() {
+        let message = Encoded {
+            channel: Channel::Topic(Topic::State),
+            sequence: 1,
+            publish_time_ns: 2,
+            bytes: &[0xaa, 0xbb],
+        };
+        let data = message_data(0x0102_0304, 5, &message);
+        assert_eq!(data, [1, 4, 3, 2, 1, 5, 0, 0, 0, 0, 0, 0, 0, 0xaa, 0xbb]);
+    }
+}

@@ -1,0 +1,204 @@
+//! `masseter recording` (alias `log`): inspects, verifies and recovers recordings; `masseter export` makes tables of them.
+//!
+//! `info`, `verify` and `extract` end with 0 if the recording is complete, 6 if messages or its end are missing, and 2 if it
+//! holds bytes that Masseter did not write. `recover` ends with 0 once it has saved what is readable. No verb changes
+//! the recording it reads.
+
+use std::ffi::OsStr;
+use std::fmt::{self, Write as _};
+use std::fs::{self, File};
+use std::io::{BufWriter, Write as _};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, ensure};
+use clap::{Args, Subcommand};
+use masseter_recording::{Reader, RunFolder, recover, thin};
+use masseter_scenario::wording::counted;
+use masseter_terminal::{Exit, result, result_with_tones};
+use mcap::Attachment;
+
+use crate::survey::{Survey, TONES};
+
+/// Verbs of `recording`.
+#[derive(Debug, Clone, Subcommand)]
+pub enum RecordingVerb {
+    /// Print topics, schemas, message counts, times and sizes
+    #[command(after_help = "Example:\n  masseter recording info runs/latest")]
+    Info(RecordingArgs),
+    /// Check checksums and the sequence numbers of every topic
+    #[command(after_help = "Example:\n  masseter recording verify runs/latest")]
+    Verify(RecordingArgs),
+    /// Save the readable messages of a damaged recording in a new one
+    Recover(RecoverArgs),
+    /// Keep few messages and the digests of all: a golden run, small enough for a repository
+    Thin(ThinArgs),
+    /// Write the attached files: the scenario, and the recorded motion that it plays
+    Extract(ExtractArgs),
+}
+
+/// The recording to read.
+#[derive(Debug, Clone, Args)]
+pub struct RecordingArgs {
+    /// Recording, or run folder
+    #[arg(default_value = "runs/latest")]
+    recording: PathBuf,
+}
+
+/// The arguments of `recover`.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = "Example:\n  masseter recording recover killed/recording.mcap --out whole.mcap")]
+pub struct RecoverArgs {
+    #[command(flatten)]
+    from: RecordingArgs,
+    /// New recording; must not exist [default: beside the old one, with '.recovered' in its name]
+    #[arg(long, value_name = "FILE.mcap")]
+    out: Option<PathBuf>,
+}
+
+/// The arguments of `thin`.
+#[derive(Debug, Clone, Args)]
+#[command(
+    after_help = "Example:\n  masseter recording thin runs/latest --out golden.mcap\n\n'masseter diff golden.mcap RUN' compares a later run with it."
+)]
+pub struct ThinArgs {
+    #[command(flatten)]
+    from: RecordingArgs,
+    /// New recording; must not exist
+    #[arg(long, value_name = "FILE.mcap")]
+    out: PathBuf,
+}
+
+/// The arguments of `extract`.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = "Example:\n  masseter recording extract recording.mcap --out /tmp/again")]
+pub struct ExtractArgs {
+    #[command(flatten)]
+    from: RecordingArgs,
+    /// Folder for the files; must not exist
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+impl RecordingArgs {
+    /// The file.
+    pub(crate) fn path(&self) -> anyhow::Result<PathBuf> {
+        if self.recording.is_dir() {
+            Ok(RunFolder::open(&self.recording)?.recording())
+        } else {
+            Ok(self.recording.clone())
+        }
+    }
+}
+
+/// Executes a verb.
+pub fn execute(verb: &RecordingVerb) -> anyhow::Result<Exit> {
+    match verb {
+        RecordingVerb::Info(args) => inspect(args, Survey::info),
+        RecordingVerb::Verify(args) => inspect(args, Survey::verification),
+        RecordingVerb::Recover(args) => save_readable(args),
+        RecordingVerb::Thin(args) => keep_few(args),
+        RecordingVerb::Extract(args) => extract(args),
+    }
+}
+
+fn inspect(
+    args: &RecordingArgs,
+    to_text: impl FnOnce(&Survey) -> Result<String, fmt::Error>,
+) -> anyhow::Result<Exit> {
+    let path = args.path()?;
+    let survey = Survey::of_file(&path)?;
+    result_with_tones(&format!("{}\n{}", path.display(), to_text(&survey)?), &TONES)?;
+    Ok(survey.exit())
+}
+
+fn save_readable(args: &RecoverArgs) -> anyhow::Result<Exit> {
+    let path = args.from.path()?;
+    let out = args.out.clone().unwrap_or_else(|| path.with_extension("recovered.mcap"));
+    // An unreadable recording must leave no new file behind.
+    let survey = Survey::of_file(&path)?;
+    let recovered = write_new(&out, |medium| Ok(recover(&mut Reader::open(&path)?, medium)?))?;
+    let mut text = format!("{}\n{} saved\n", out.display(), counted(recovered.messages, "message"));
+    if recovered.undefined > 0 {
+        writeln!(text, "{} not saved: the definition of their channel is lost", recovered.undefined)?;
+    }
+    for line in survey.loss()?.lines() {
+        writeln!(text, "{}: {line}", path.display())?;
+    }
+    result(&text)?;
+    Ok(Exit::Passed)
+}
+
+fn keep_few(args: &ThinArgs) -> anyhow::Result<Exit> {
+    let (path, out) = (args.from.path()?, &args.out);
+    let named = || path.display().to_string();
+    let mut reader = Reader::open(&path).with_context(named)?;
+    let kept = write_new(out, |medium| thin(&mut reader, medium).with_context(named))?;
+    result(&format!("{}\n{} and the digests of all\n", out.display(), counted(kept, "message")))?;
+    Ok(Exit::Passed)
+}
+
+/// Writes a new file, which is removed again where that fails. The first error is the one to report.
+fn write_new<T>(path: &Path, write: impl FnOnce(BufWriter<File>) -> anyhow::Result<T>) -> anyhow::Result<T> {
+    let file = File::create_new(path).with_context(|| format!("cannot create {}", path.display()))?;
+    write(BufWriter::new(file)).inspect_err(|_| {
+        let _ = fs::remove_file(path);
+    })
+}
+
+fn extract(args: &ExtractArgs) -> anyhow::Result<Exit> {
+    let path = args.from.path()?;
+    let survey = Survey::of_file(&path)?;
+    for (name, bytes) in write_attached(survey.reader.attachments(), &args.out)? {
+        result(&format!("{bytes:>10}  {}\n", args.out.join(name).display()))?;
+    }
+    result(&survey.loss_with_advice()?)?;
+    Ok(survey.exit())
+}
+
+/// Writes all attached files into a new folder. Returns their names and lengths, bytes. Refuses names that lead out of the
+/// folder.
+fn write_attached<'a>(
+    attachments: &'a [Attachment<'static>],
+    folder: &Path,
+) -> anyhow::Result<Vec<(&'a str, usize)>> {
+    ensure!(!attachments.is_empty(), "no file is attached to the recording");
+    for Attachment { name, .. } in attachments {
+        let is_plain = Path::new(name).file_name() == Some(OsStr::new(name));
+        ensure!(is_plain, "a file is attached as '{name}', which is not the plain name of a file");
+    }
+    fs::create_dir(folder).with_context(|| format!("cannot create {}", folder.display()))?;
+    let write = |file: &'a Attachment<'static>| {
+        let path = folder.join(&file.name);
+        let written = File::create_new(&path).and_then(|mut created| created.write_all(&file.data));
+        written.with_context(|| format!("cannot write {}", path.display()))?;
+        Ok((file.name.as_str(), file.data.len()))
+    };
+    attachments.iter().map(write).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::borrow::Cow;
+
+    use super::*;
+
+    #[test]
+    fn no_name_leads_out_of_the_folder_and_nothing_is_written_then() {
+        let parent = tempfile::tempdir().unwrap();
+        let folder = parent.path().join("new");
+        let attached = |name: &str| Attachment {
+            log_time: 0,
+            create_time: 0,
+            name: name.to_owned(),
+            media_type: String::new(),
+            data: Cow::Borrowed(b"any"),
+        };
+        for name in ["", ".", "..", "/etc/any", "../any", "any/", "any/..", "a/b"] {
+            let error = write_attached(&[attached("good"), attached(name)], &folder).unwrap_err().to_string();
+            assert!(error.contains(&format!("'{name}'")), "{error}");
+            assert!(!folder.exists(), "{name}");
+        }
+        assert_eq!(write_attached(&[attached("good")], &folder).unwrap(), [("good", 3)]);
+        assert_eq!(fs::read(folder.join("good")).unwrap(), b"any");
+    }
+}

@@ -1,0 +1,151 @@
+use super::*;
+
+mod check {
+    use super::*;
+
+    #[test]
+    fn what_is_untested_has_not_failed() {
+        use CheckResult::{Excused, Failed, NotJudged, Passed, Untested};
+        let results = [Passed, Failed, Excused, Untested, NotJudged];
+        assert_eq!(results.map(CheckResult::is_failed), [false, true, false, false, false]);
+    }
+
+    #[test]
+    fn only_a_failure_is_excused() {
+        let check = |passed| Check::judged("tracking", String::new(), passed);
+        let cases = [(false, true, "lost"), (false, false, "FAIL"), (true, true, "ok"), (true, false, "ok")];
+        for (passed, excused, mark) in cases {
+            assert_eq!(check(passed).unless(excused).result.mark(), mark);
+        }
+    }
+}
+
+mod motion_checks {
+    use masseter_scenario::FaultKindConfig;
+
+    use super::*;
+
+    type Spoil = fn(&mut PoseErrors, Option<f64>);
+
+    #[test]
+    fn every_error_has_its_own_limit_and_the_closest_is_shown() {
+        let limits = ChecksConfig::default();
+        let good = PoseErrors {
+            rms_mm: Some(0.01),
+            max_mm: Some(0.02),
+            incisal_rms_mm: Some(0.01),
+            incisal_max_mm: Some(0.1),
+            rms_deg: Some(0.01),
+            max_deg: Some(0.02),
+        };
+        let check = tracking("tracking", 10, &good, &limits);
+        assert_eq!(
+            (check.result.mark(), check.finding.as_str()),
+            ("ok", "closest of 10 samples: incisal point max 0.1000 mm, limit 0.5 mm")
+        );
+        let rms_is_closest = PoseErrors { rms_mm: Some(0.05), incisal_max_mm: Some(0.2), ..good };
+        let check = tracking("tracking", 10, &rms_is_closest, &limits);
+        assert_eq!(check.finding, "closest of 10 samples: platform rms 0.0500 mm, limit 0.1 mm");
+        let mm = |share: f64, limit: f64| Some(share * limit);
+        let each: [(Spoil, f64); 6] = [
+            (|errors, value| errors.rms_mm = value, limits.tracking_rms_mm),
+            (|errors, value| errors.max_mm = value, limits.tracking_max_mm),
+            (|errors, value| errors.incisal_rms_mm = value, limits.tracking_rms_mm),
+            (|errors, value| errors.incisal_max_mm = value, limits.tracking_max_mm),
+            (|errors, value| errors.rms_deg = value, limits.tracking_rms_deg),
+            (|errors, value| errors.max_deg = value, limits.tracking_max_deg),
+        ];
+        for (spoil, limit) in each {
+            for (share, mark) in [
+                (0.99, "ok"),
+                (1.0, "ok"),
+                (1.01, "FAIL"),
+                (f64::INFINITY, "FAIL"),
+                (f64::NAN, "FAIL"),
+                (-f64::NAN, "FAIL"),
+            ] {
+                let mut errors = good;
+                spoil(&mut errors, mm(share, limit));
+                for samples in [10, 1, 0] {
+                    let check = tracking("tracking", samples, &errors, &limits);
+                    let expected = if mark == "ok" && samples < 10 { "UNTESTED" } else { mark };
+                    assert_eq!(check.result.mark(), expected, "{check:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_motion_that_hardly_began_is_untested() {
+        let still = PoseErrors::default();
+        let eased = PoseErrors { max_mm: Some(0.02), ..still };
+        let begun = PoseErrors { rms_mm: Some(0.01), ..eased };
+        let cases = [
+            (0, still, "UNTESTED", "0 samples to compare, at least 10 needed: play more of the motion"),
+            (0, eased, "UNTESTED", "0 samples to compare, at least 10 needed: play more of the motion"),
+            (9, begun, "UNTESTED", "9 samples to compare, at least 10 needed: play more of the motion"),
+            (10, begun, "ok", "closest of 10 samples: platform rms 0.0100 mm, limit 0.1 mm"),
+        ];
+        for (samples, errors, mark, finding) in cases {
+            let check = tracking("tracking", samples, &errors, &ChecksConfig::default());
+            assert_eq!((check.result.mark(), check.finding.as_str()), (mark, finding));
+        }
+    }
+
+    fn fault() -> FaultConfig {
+        FaultConfig {
+            bus: Some(1),
+            from_s: Some(2.5),
+            node: Some(4),
+            id: Some(0x204),
+            ..FaultConfig::new(FaultKindConfig::Lose)
+        }
+    }
+
+    fn figures(number: usize, struck_ns: Option<u64>, deviation_mm: f64) -> FaultFigures {
+        FaultFigures { number, struck_ns, deviation_mm, deviation_deg: 0.1, detection: None }
+    }
+
+    #[test]
+    fn a_declared_fault_that_never_acted_tested_nothing() {
+        let what_to_do = ": raise its probability, or let the fault act earlier or longer";
+        let cases = [
+            (0, None),
+            (1, Some(("ok", "1 of 1 declared faults acted".to_owned()))),
+            (2, Some(("UNTESTED", format!("1 of 2 declared faults acted, number 2 never{what_to_do}")))),
+            (3, Some(("UNTESTED", format!("1 of 3 declared faults acted, number 2, 3 never{what_to_do}")))),
+        ];
+        for (declared, expected) in cases {
+            let found: Vec<_> =
+                (1..=declared).map(|number| figures(number, (number == 1).then_some(5), 0.0)).collect();
+            let check = faults(&vec![fault(); declared], &found, &ChecksConfig::default());
+            assert_eq!(check.map(|check| (check.result.mark(), check.finding)), expected);
+        }
+        let found = [figures(1, None, 0.0), figures(2, Some(5), 0.6)];
+        let check = faults(&[fault(), fault()], &found, &ChecksConfig::default()).unwrap();
+        assert_eq!(check.result.mark(), "FAIL", "one fault led the jaw too far: {check:?}");
+    }
+
+    #[test]
+    fn a_fault_that_leads_the_jaw_beyond_the_limit_fails_the_run_with_its_name() {
+        for (deviation_mm, mark) in [(0.5, "ok"), (0.51, "FAIL")] {
+            let found = [figures(1, Some(5), deviation_mm)];
+            let check = faults(&[fault()], &found, &ChecksConfig::default()).unwrap();
+            assert_eq!(check.result.mark(), mark, "{check:?}");
+            let named = "number 1, lose (bus 1, node 4, id 204h), led 0.510 mm and 0.100° from the path undetected, \
+                         limit 0.5 mm and 0.5°";
+            assert_eq!(check.finding.contains(named), mark == "FAIL", "{check:?}");
+        }
+        let turned = FaultFigures { deviation_deg: 0.5, ..figures(1, Some(5), 0.1) };
+        let check = faults(&[fault()], &[turned], &ChecksConfig::default()).unwrap();
+        assert_eq!(check.result.mark(), "ok", "{check:?}");
+        for deviation_deg in [0.51, f64::INFINITY, f64::NAN] {
+            let turned = FaultFigures { deviation_deg, ..figures(1, Some(5), 0.1) };
+            let shifted = FaultFigures { deviation_mm: deviation_deg, ..figures(1, Some(5), 0.1) };
+            for found in [turned, shifted] {
+                let check = faults(&[fault()], &[found], &ChecksConfig::default()).unwrap();
+                assert_eq!(check.result.mark(), "FAIL", "{check:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,188 @@
+use super::*;
+
+mod checks {
+    use super::*;
+
+    #[test]
+    fn no_gap_in_a_part_of_a_recording_says_nothing_of_the_rest() {
+        let cases = [
+            (Ending::Completed, false, false, 0, "ok"),
+            (Ending::Completed, false, false, 1, "FAIL"),
+            (Ending::Completed, true, false, 0, "skip"),
+            (Ending::Completed, false, true, 0, "skip"),
+            (Ending::RecordingFailed, false, false, 0, "skip"),
+            (Ending::RecordingFailed, true, true, 1, "FAIL"),
+        ];
+        for (ending, is_cut_short, is_damaged, missing, mark) in cases {
+            let check = dropped_messages(missing, &ending, is_cut_short, is_damaged);
+            assert_eq!(check.result.mark(), mark, "{ending:?} {check:?}");
+        }
+    }
+
+    fn response(max_ns: u64, unbounded: Option<&str>) -> BusResponse {
+        let sync = ResponseFigures {
+            bus: 1,
+            message: "SYNC".to_owned(),
+            frames: 1,
+            max_ns: Some(max_ns),
+            bound_ns: unbounded.is_none().then_some(190_000),
+        };
+        BusResponse { messages: vec![sync], off_time_frames: 0, unbounded: unbounded.map(str::to_owned) }
+    }
+
+    #[test]
+    fn a_message_beyond_its_bound_fails_unless_the_bound_does_not_hold() {
+        let cases =
+            [(190_000, None, "ok"), (191_000, None, "FAIL"), (191_000, Some("bus 0 had 1 errors"), "skip")];
+        for (max_ns, unbounded, mark) in cases {
+            let check = bus_response(&response(max_ns, unbounded), &SkipFigures::default());
+            assert_eq!(check.result.mark(), mark, "{check:?}");
+        }
+        let failed = bus_response(&response(191_000, None), &SkipFigures::default());
+        assert_eq!(failed.finding, "SYNC on bus 1 took 191.00 µs, bound 190.00 µs");
+        let off_time = BusResponse { off_time_frames: 7, ..response(150_000, None) };
+        let check = bus_response(&off_time, &SkipFigures::default());
+        assert_eq!(check.result.mark(), "ok");
+        assert!(check.finding.ends_with("; 7 frames off their times not judged"), "{check:?}");
+    }
+
+    #[test]
+    fn a_message_beyond_its_bound_by_no_more_than_the_plant_stalled_is_not_judged() {
+        for (stalled_ns, overlong_ns, mark) in [(999, 0, "FAIL"), (1000, 0, "skip"), (500, 500, "skip")] {
+            let plant = SkipFigures { stalled_ns, overlong_ns, ..SkipFigures::default() };
+            let check = bus_response(&response(191_000, None), &plant);
+            assert_eq!(check.result.mark(), mark, "{check:?}");
+        }
+    }
+}
+
+mod shortfall {
+    use masseter_analysis::requirements::RequirementFigures;
+    use masseter_analysis::{Analysis, Code, EventRecord, StoppedBy};
+    use masseter_recording::MachineInfo;
+    use masseter_runtime::messages::Event;
+    use masseter_runtime::messages::codes::{EventKind, Source};
+    use masseter_runtime::named::Declared;
+    use masseter_scenario::Scenario;
+
+    use super::*;
+
+    const PLAYED: Departure = Departure { incisal_mm: 0.009, deg: 0.009, at_s: 1.0, is_partial: false };
+
+    /// A finished run that played 10 s to the end, with this change.
+    fn shortfall(change: impl FnOnce(&mut Manifest, &mut Figures)) -> Option<Shortfall> {
+        let machine = MachineInfo { cpu: "any".into(), cores: 2, kernel: "Linux".into(), is_virtual: false };
+        let mut manifest = Manifest::new("0.1.0", Scenario::default(), 10.0, "virtual", machine);
+        (manifest.motion_end_s, manifest.controller) = (Some(9.5), Some("external".to_owned()));
+        let mut figures = Analysis::new(&manifest.scenario, &Declared::default()).finish(false, &[]);
+        figures.final_state = Some(Code::Known(ControllerState::Finished));
+        (figures.enabled_s, figures.motion_reached_s) = (11.0, Some(9.5));
+        figures.motion_departure = Some(PLAYED);
+        change(&mut manifest, &mut figures);
+        Shortfall::of(&manifest, &figures)
+    }
+
+    fn stop_by_request(figures: &mut Figures) {
+        let stop = Event::new(Source::Controller, EventKind::Transition, Cause::StopRequested);
+        figures.events.push(EventRecord::from(&stop));
+    }
+
+    fn require(figures: &mut Figures, result: RequirementResult, is_expected_event: bool) {
+        figures.requirements.push(RequirementFigures {
+            name: "opens".to_owned(),
+            must: String::new(),
+            result,
+            finding: String::new(),
+            margin: None,
+            margin_unit: "mm",
+            relative_margin: None,
+            worst_at_s: None,
+            worst_ns: None,
+            latency_ms: None,
+            may_be_disturbed: false,
+            is_expected_event,
+            plot: None,
+        });
+    }
+
+    #[test]
+    fn the_scenarios_motion_is_played_along_its_path_and_to_its_end() {
+        assert_eq!(shortfall(|_, _| ()), None);
+        assert_eq!(shortfall(|_, figures| figures.motion_reached_s = Some(9.41)), None);
+        let early = |reached_s| Some(Shortfall::Early { reached_s, end_s: 9.5 });
+        assert_eq!(shortfall(|_, figures| figures.motion_reached_s = Some(9.4)), early(9.4));
+        assert_eq!(shortfall(|_, figures| figures.motion_reached_s = None), early(0.0));
+        // With force control or another amplitude, the desired poses show nothing.
+        for departure in [None, Some(Departure { is_partial: true, ..PLAYED })] {
+            let found = shortfall(|_, figures| figures.motion_departure = departure);
+            assert_eq!(found, Some(Shortfall::Unjudged));
+        }
+        for departure in [
+            Departure { incisal_mm: 0.011, ..PLAYED },
+            Departure { deg: 0.011, ..PLAYED },
+            Departure { incisal_mm: f64::INFINITY, ..PLAYED },
+        ] {
+            let found = shortfall(|_, figures| figures.motion_departure = Some(departure));
+            assert_eq!(found, Some(Shortfall::Other(departure)));
+        }
+    }
+
+    #[test]
+    fn a_request_excuses_an_early_end_and_no_other_motion() {
+        let early = |figures: &mut Figures| figures.motion_reached_s = Some(3.0);
+        assert!(shortfall(|_, figures| early(figures)).is_some());
+        let stopped = shortfall(|_, figures| {
+            early(figures);
+            stop_by_request(figures);
+        });
+        assert_eq!(stopped, None);
+        let other = Departure { incisal_mm: 7.0, ..PLAYED };
+        let stopped = shortfall(|_, figures| {
+            figures.motion_departure = Some(other);
+            stop_by_request(figures);
+        });
+        assert_eq!(stopped, Some(Shortfall::Other(other)));
+    }
+
+    #[test]
+    fn a_stop_and_an_end_in_another_state_are_told_otherwise() {
+        let never_moved = |figures: &mut Figures| figures.motion_reached_s = None;
+        let stopped = shortfall(|_, figures| {
+            never_moved(figures);
+            figures.stopped_by = Some(StoppedBy::Master);
+        });
+        let unfinished = shortfall(|_, figures| {
+            never_moved(figures);
+            figures.final_state = Some(Code::Known(ControllerState::Running));
+        });
+        assert_eq!([stopped, unfinished], [None, None]);
+    }
+
+    #[test]
+    fn an_own_motion_lasts_as_long_as_the_scenario_says_and_is_judged_by_a_requirement() {
+        let own = |change: fn(&mut Manifest, &mut Figures)| {
+            shortfall(|manifest, figures| {
+                manifest.declared.motion = PlayedMotion::Own;
+                // Nothing that the scenario's motion would have to be.
+                (figures.motion_reached_s, figures.motion_departure) = (None, None);
+                change(manifest, figures);
+            })
+        };
+        assert_eq!(own(|_, _| ()), Some(Shortfall::Unjudged));
+        assert_eq!(own(|manifest, _| manifest.controller = Some("hold".to_owned())), None);
+        for (result, is_expected_event, expected) in [
+            (RequirementResult::Passed, false, None),
+            (RequirementResult::Failed, false, None),
+            (RequirementResult::Untested, false, Some(Shortfall::Unjudged)),
+            (RequirementResult::Passed, true, Some(Shortfall::Unjudged)),
+        ] {
+            let found = shortfall(|manifest, figures| {
+                manifest.declared.motion = PlayedMotion::Own;
+                require(figures, result, is_expected_event);
+            });
+            assert_eq!(found, expected, "{result:?}");
+        }
+        let early = Shortfall::OwnEarly { enabled_s: 4.3, duration_s: 10.0 };
+        assert_eq!(own(|_, figures| figures.enabled_s = 4.3), Some(early));
+    }
+}

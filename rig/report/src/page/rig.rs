@@ -1,0 +1,274 @@
+//! How the rig ran: latencies with their budgets, messages and buses, machine and scheduling.
+
+use std::collections::BTreeMap;
+
+use masseter_analysis::{
+    BusResponse, Curve, Figures, IntervalFigures, ResponseFigures, TopicFigures, WorstCycle,
+};
+use masseter_page::{
+    Across, Block, Cell, Chart, Column, Limit, Points, Scale, Section, Series, Style, Table, Tone,
+};
+use masseter_recording::{Manifest, Usage};
+use masseter_runtime::realtime::scheduling::Obtained;
+use masseter_runtime::schedule::CycleSchedule;
+use masseter_scenario::{MotionConfig, Scenario};
+
+use super::times::{limit, motion_s, plain, since_s};
+use crate::table;
+use crate::text::{grouped, microseconds, or_dash, us};
+
+/// The least latency that a logarithmic axis shows, µs.
+const LEAST_US: f64 = 0.01;
+
+const P999: &str = "p99.9 needs 10,000 samples. A skipped deadline has a sample only in the two wake-ups named corrected (for \
+coordinated omission): the time until the wake-up that skipped it.";
+
+const LONGEST: &str = "The longest cycles, from the plant's deadline to the command on the wire, or to the first later command \
+where a newer one overtook it. The hop is the one furthest above its median. The last three columns are the kernel's counters \
+between two samples, a tenth of a second apart: time that the hypervisor took (in steps of 10 ms), times that a loop lost its \
+core, and page faults of both processes.";
+
+pub(super) fn timing_section(scenario: &Scenario, figures: &Figures) -> Section {
+    let blocks = vec![
+        Block::chart("percentiles", percentiles(scenario, figures)),
+        Block::table("latencies", latencies(&figures.intervals)).folded("Latencies in numbers"),
+        Block::text("percentiles-in-words", P999),
+        Block::text("skipped", skipped(figures)),
+        wake_ups(figures),
+        Block::text("worst-in-words", LONGEST),
+        Block::table("worst", longest(figures)),
+    ];
+    Section::new("timing", "Timing", blocks)
+}
+
+/// Percentiles of every interval, with the cycle's budgets.
+fn percentiles(scenario: &Scenario, figures: &Figures) -> Chart {
+    let measured = figures.intervals.iter().filter(|interval| interval.max_ns > Some(0));
+    let series = |interval: &IntervalFigures| {
+        let points: Vec<_> =
+            interval.curve.iter().map(|&(x, value_ns)| (x, in_us(value_ns as f64))).collect();
+        Series::new(interval.name, Style::Plain, Points::plain(&points))
+    };
+    Chart {
+        across: Across::Percentile,
+        scale: Scale::Log,
+        series: measured.map(series).collect(),
+        limits: budgets(scenario),
+        height: 330,
+        otherwise: "No interval was measured.".to_owned(),
+        ..Chart::over_time("Latency by percentile", "µs")
+    }
+}
+
+/// What the time table leaves: the period, and from the controller's deadline to the latest command.
+fn budgets(scenario: &Scenario) -> Vec<Limit> {
+    let period_ns = scenario.period_ns();
+    let mut budgets = vec![limit("budget: the period", &[period_ns as f64 / 1e3])];
+    if let Ok(schedule) = CycleSchedule::new(scenario) {
+        let controller_us = (schedule.command_by_ns - schedule.controller_at_ns) as f64 / 1e3;
+        budgets.push(limit("budget: controller", &[controller_us]));
+    }
+    budgets
+}
+
+/// The latest wake-ups over time; words under virtual time, where no wake-up is late.
+fn wake_ups(figures: &Figures) -> Block {
+    let over_time = &figures.over_time;
+    let curves = [("controller", &over_time.controller_late_ns), ("plant", &over_time.plant_late_ns)];
+    let is_late = |curve: &Curve| curve.iter().any(|(_, late_ns)| *late_ns > 0.0);
+    if !curves.iter().any(|(_, curve)| is_late(curve)) {
+        return Block::text("jitter", "Under virtual time no wake-up is late.");
+    }
+    let late = |(name, curve): (&str, &Curve)| {
+        let points: Vec<_> = curve.iter().map(|&(at_s, late_ns)| (at_s, in_us(late_ns))).collect();
+        Series::new(name, Style::Plain, Points::over_time(&points))
+    };
+    let chart = Chart {
+        scale: Scale::Log,
+        series: curves.map(late).into(),
+        ..Chart::over_time("Latest wake-up after its deadline", "µs")
+    };
+    Block::chart("jitter", chart)
+}
+
+fn in_us(ns: f64) -> f64 {
+    (ns / 1e3).max(LEAST_US)
+}
+
+fn latencies(intervals: &[IntervalFigures]) -> Table {
+    let row = |interval: &IntervalFigures| -> Vec<Cell> {
+        let values = [interval.p50_ns, interval.p99_ns, interval.p999_ns, interval.max_ns].map(us);
+        let words = [interval.name.to_owned(), interval.n.to_string()];
+        words.into_iter().chain(values).map(Cell::from).collect()
+    };
+    let numbers = ["n", "p50, µs", "p99, µs", "p99.9, µs", "max, µs"];
+    Table::of_numbers("Latencies", "interval", numbers, intervals.iter().map(row))
+}
+
+fn skipped(figures: &Figures) -> String {
+    let [controller, plant] = [&figures.controller_skips, &figures.plant_skips];
+    format!(
+        "Skipped cycles: controller {}, plant {}; stalls of the machine while waiting: controller {:.2} ms, plant {:.2} ms. \
+         Controller's {}.",
+        controller.skipped,
+        plant.skipped,
+        controller.stalled_ns as f64 / 1e6,
+        plant.stalled_ns as f64 / 1e6,
+        table::readings(&figures.readings)
+    )
+}
+
+fn longest(figures: &Figures) -> Table {
+    let row = |worst: &WorstCycle| -> Vec<Cell> {
+        let count = |count: Option<u64>| or_dash(count, |count| count.to_string());
+        let at_s = since_s(figures, worst.due_ns) - motion_s(figures);
+        let cells = [
+            worst.cycle.to_string(),
+            format!("{at_s:.3}"),
+            microseconds(worst.total_ns),
+            worst.hop.to_owned(),
+            microseconds(worst.hop_ns),
+            microseconds(worst.hop_p50_ns),
+            microseconds(worst.stalled_ns),
+            us(worst.around.stolen_ns),
+            count(worst.around.involuntary_switches),
+            count(worst.around.page_faults),
+        ];
+        cells.map(Cell::from).into()
+    };
+    let columns = vec![
+        Column::text("cycle"),
+        Column::number("at, s of the motion"),
+        Column::number("took, µs"),
+        Column::text("hop"),
+        Column::number("hop took, µs"),
+        Column::number("median, µs"),
+        Column::number("stalls while waiting, µs"),
+        Column::number("stolen, µs"),
+        Column::number("preempted"),
+        Column::number("page faults"),
+    ];
+    let rows = figures.worst_cycles.iter().map(row).collect();
+    Table { label: "Longest cycles".to_owned(), columns, rows }
+}
+
+/// What stands in the place of all that the frames would show.
+const WITHOUT_FRAMES: &str = "The CAN frames are not recorded (recording.frames = false): the run has no load of the buses, no \
+     response times and no candump logs.";
+
+pub(super) fn buses_section(figures: &Figures) -> Section {
+    let mut blocks = match figures.frames {
+        Some(_) => of_frames(figures),
+        None => vec![Block::text("buses", WITHOUT_FRAMES.to_owned())],
+    };
+    blocks.push(Block::table("topics", topics(&figures.topics)).folded(topics_in_words(&figures.topics)));
+    Section::new("messages", "Messages and buses", blocks)
+}
+
+fn of_frames(figures: &Figures) -> Vec<Block> {
+    let response = &figures.bus_response;
+    let mut blocks = vec![
+        Block::chart("buses", load(figures)),
+        Block::table("responses", responses(&response.messages)).folded(responses_in_words(response)),
+    ];
+    if let Some(why) = &response.unbounded {
+        blocks.push(Block::text("unbounded", format!("No bounds hold for this run: {why}.")));
+    }
+    blocks
+}
+
+fn responses_in_words(response: &BusResponse) -> String {
+    let tightest = response.tightest().map_or_else(String::new, |message| {
+        let (max, bound) = (us(message.max_ns), us(message.bound_ns));
+        format!("; closest to its bound: {} on can{} with {max} of {bound} µs", message.message, message.bus)
+    });
+    format!(
+        "Response times from the queueing to the end of a frame, beside the worst case by the plan{tightest}"
+    )
+}
+
+fn topics_in_words(topics: &[TopicFigures]) -> String {
+    let sum = |count: fn(&TopicFigures) -> u64| grouped(topics.iter().map(count).sum());
+    format!("Messages: {} recorded, {} dropped", sum(|topic| topic.messages), sum(|topic| topic.missing))
+}
+
+/// Share of each bus in use.
+fn load(figures: &Figures) -> Chart {
+    let loads = figures.over_time.bus_load.iter().enumerate();
+    Chart {
+        series: loads.map(|(bus, load)| plain(&format!("can{bus}"), load, 100.0)).collect(),
+        limits: vec![limit("full", &[100.0])],
+        otherwise: "No frame was recorded.".to_owned(),
+        ..Chart::over_time("Load of the buses", "%")
+    }
+}
+
+fn responses(messages: &[ResponseFigures]) -> Table {
+    let row = |message: &ResponseFigures| -> Vec<Cell> {
+        let max = us(message.max_ns);
+        let max = if message.exceeds() { Cell::Mark { mark: max, tone: Tone::Bad } } else { max.into() };
+        let name = format!("can{} {}", message.bus, message.message);
+        vec![name.into(), message.frames.to_string().into(), max, us(message.bound_ns).into()]
+    };
+    let label = "Response times of the buses' messages";
+    Table::of_numbers(label, "message", ["frames", "max, µs", "bound, µs"], messages.iter().map(row))
+}
+
+fn topics(topics: &[TopicFigures]) -> Table {
+    let row = |topic: &TopicFigures| -> Vec<Cell> {
+        vec![topic.topic.into(), topic.messages.to_string().into(), topic.missing.to_string().into()]
+    };
+    Table::of_numbers("Messages of the topics", "topic", ["messages", "dropped"], topics.iter().map(row))
+}
+
+pub(super) fn circumstances_section(manifest: &Manifest) -> Section {
+    let Manifest { masseter, clock, machine, usage, .. } = manifest;
+    let began = manifest.began.trim_end_matches('Z').replace('T', " ");
+    let of_machine = format!("{}, {} cores, {}", machine.cpu, machine.cores, machine.kernel);
+    let again = format!(
+        "The same run again: `masseter run scenario.toml --clock {clock}` with the scenario of this folder."
+    );
+    let mut blocks = vec![
+        Block::text("machine", format!("{began} UTC, masseter {masseter}, {clock} clock. {of_machine}.")),
+        Block::text("again", again),
+    ];
+    if let MotionConfig::File(file) = &manifest.scenario.motion {
+        blocks.push(Block::text("played", format!("Recording played: `{}`.", file.path.display())));
+    }
+    for (process, obtained) in &manifest.scheduling {
+        blocks.push(Block::text(format!("scheduling-{process}"), scheduling(process, obtained)));
+    }
+    if !usage.processes.is_empty() {
+        let stolen = "Stolen from the machine by its hypervisor, as far as it reports that";
+        blocks.push(Block::table("usage", resources(&usage.processes)));
+        blocks.push(Block::text("stolen", format!("{stolen}: {:.2} s.", usage.stolen_s)));
+    }
+    Section::new("circumstances", "Circumstances", blocks)
+}
+
+fn scheduling(process: &str, obtained: &Obtained) -> String {
+    let core = obtained.core.map_or_else(|| "any core".to_owned(), |core| format!("core {core}"));
+    let policy = obtained.fifo_priority.map(|priority| format!("SCHED_FIFO {priority}"));
+    let policy = policy.unwrap_or_else(|| "ordinary scheduling".to_owned());
+    let memory = if obtained.locked_memory { "locked" } else { "pageable" };
+    let refusals = obtained.refusals.iter().map(|refusal| format!(" {refusal}"));
+    format!("{process}: {core}, {policy}, {memory} memory.{}", refusals.collect::<String>())
+}
+
+fn resources(processes: &BTreeMap<String, Usage>) -> Table {
+    let row = |(process, usage): (&String, &Usage)| -> Vec<Cell> {
+        let cells = [
+            process.clone(),
+            format!("{:.1}", usage.share() * 100.0),
+            usage.voluntary_switches.to_string(),
+            usage.involuntary_switches.to_string(),
+            usage.minor_faults.to_string(),
+            usage.major_faults.to_string(),
+        ];
+        cells.map(Cell::from).into()
+    };
+    let numbers =
+        ["CPU, % of a core", "waits", "times its core was taken", "page faults, memory", "page faults, disk"];
+    let label = "Resources of the processes in their steady state";
+    Table::of_numbers(label, "process, in its steady state", numbers, processes.iter().map(row))
+}

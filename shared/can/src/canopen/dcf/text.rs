@@ -1,0 +1,259 @@
+//! The text of a description: sections and keys with the line of each, which a crate for INI files would lose; numbers in
+//! the notations of CiA 306, numbers that follow from the node id, and texts.
+
+use std::collections::HashMap;
+
+use crate::canopen::NodeId;
+
+/// A section and its keys; names are compared without regard to case.
+#[derive(Debug)]
+pub(super) struct Section<'a> {
+    pub(super) name: &'a str,
+    pub(super) line: usize,
+    keys: HashMap<String, Field<'a>>,
+}
+
+/// The value of a key.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Field<'a> {
+    pub(super) text: &'a str,
+    pub(super) line: usize,
+}
+
+impl<'a> Section<'a> {
+    /// All sections of a text, in its order.
+    pub(super) fn read_all(text: &'a str) -> Result<Vec<Self>, DcfError> {
+        let mut sections: Vec<Self> = Vec::new();
+        let mut first_lines = HashMap::new();
+        let text = text.strip_prefix('\u{FEFF}').unwrap_or(text);
+        for (line, content) in (1..).zip(text.lines().map(str::trim)) {
+            if content.is_empty() || content.starts_with([';', '#']) {
+                continue;
+            }
+            if let Some(name) = content.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')) {
+                let name = name.trim();
+                if let Some(first) = first_lines.insert(name.to_ascii_lowercase(), line) {
+                    return Err(Problem::SecondSection { section: name.to_owned(), first }.at(line));
+                }
+                sections.push(Self { name, line, keys: HashMap::new() });
+                continue;
+            }
+            let Some((key, value)) = content.split_once('=') else {
+                return Err(Problem::NoEntry { text: content.to_owned() }.at(line));
+            };
+            let (key, text) = (key.trim(), value.trim());
+            let Some(section) = sections.last_mut() else {
+                return Err(Problem::OutsideSections { key: key.to_owned() }.at(line));
+            };
+            let former = section.keys.insert(key.to_ascii_lowercase(), Field { text, line });
+            if let Some(Field { line: first, .. }) = former {
+                return Err(Problem::SecondKey { key: key.to_owned(), first }.at(line));
+            }
+        }
+        Ok(sections)
+    }
+
+    /// The value of a key; none if it is absent or empty.
+    pub(super) fn get(&self, key: &str) -> Option<Field<'a>> {
+        self.keys.get(&key.to_ascii_lowercase()).copied().filter(|field| !field.text.is_empty())
+    }
+
+    /// The number of a key that is no value of an entry, such as an object type; none if it is absent or empty.
+    pub(super) fn number(&self, key: &str, highest: u16) -> Result<Option<u16>, DcfError> {
+        self.get(key).map(|field| field.number(key, highest)).transpose()
+    }
+
+    /// The value of a key that the section needs.
+    pub(super) fn require(&self, key: &'static str) -> Result<Field<'a>, DcfError> {
+        let missing = || Problem::Missing { section: self.name.to_owned(), key }.at(self.line);
+        self.get(key).ok_or_else(missing)
+    }
+}
+
+impl Field<'_> {
+    /// A number of at most `highest`.
+    pub(super) fn number(self, key: &str, highest: u16) -> Result<u16, DcfError> {
+        let number = integer(self.text).ok_or_else(|| self.no_number(key))?;
+        Ok(self.within(key, number, (0, highest.into()))? as u16)
+    }
+
+    fn no_number(self, key: &str) -> DcfError {
+        Problem::NoNumber { key: key.to_owned(), text: self.text.to_owned() }.at(self.line)
+    }
+
+    fn within(self, key: &str, number: i128, (lowest, highest): (i128, i128)) -> Result<i128, DcfError> {
+        if (lowest..=highest).contains(&number) {
+            return Ok(number);
+        }
+        let (key, text) = (key.to_owned(), self.text.to_owned());
+        Err(Problem::OutOfRange { key, text, lowest, highest }.at(self.line))
+    }
+}
+
+const NODE_ID: &str = "$NODEID";
+
+/// A value of an entry, or one of its limits.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// An integer.
+    Number(i128),
+    /// `$NODEID+number`.
+    OfNode(i128),
+    /// A floating-point number.
+    Real(f64),
+    /// A text, or any value of a type without numbers.
+    Text(String),
+}
+
+impl Value {
+    /// The integer that it is for that node; none for texts and floating-point numbers.
+    pub fn number(&self, node: NodeId) -> Option<i128> {
+        match self {
+            Self::Number(number) => Some(*number),
+            Self::OfNode(base) => Some(base + i128::from(node.get())),
+            Self::Real(_) | Self::Text(_) => None,
+        }
+    }
+
+    /// Reads a value of a data type.
+    pub(super) fn read(key: &str, field: Field<'_>, data_type: DataType) -> Result<Self, DcfError> {
+        let Some((lowest, highest)) = data_type.range() else {
+            if data_type.is_real()
+                && let Ok(real) = field.text.parse()
+            {
+                return Ok(Self::Real(real));
+            }
+            return Ok(Self::Text(field.text.to_owned()));
+        };
+        let text = field.text.to_ascii_uppercase();
+        if let Some((before, after)) = text.split_once(NODE_ID) {
+            let base = beside_node_id(before.trim(), after.trim());
+            return base.map(Self::OfNode).ok_or_else(|| field.no_number(key));
+        }
+        let mut number = integer(field.text).ok_or_else(|| field.no_number(key))?;
+        // A signed number may be written by its bits, in hexadecimal or octal.
+        let modulus = highest - lowest + 1;
+        if lowest < 0 && field.text.starts_with('0') && number > highest && number < modulus {
+            number -= modulus;
+        }
+        field.within(key, number, (lowest, highest)).map(Self::Number)
+    }
+}
+
+/// The number beside `$NODEID`, on either side of the plus.
+fn beside_node_id(before: &str, after: &str) -> Option<i128> {
+    match (before, after) {
+        ("", "") => Some(0),
+        ("", after) => integer(after.strip_prefix('+')?.trim()),
+        (before, "") => integer(before.strip_suffix('+')?.trim()),
+        _ => None,
+    }
+}
+
+fn integer(text: &str) -> Option<i128> {
+    let (sign, digits) = text.strip_prefix('-').map_or((1, text), |digits| (-1, digits));
+    let (radix, digits) = match digits.as_bytes() {
+        [b'0', b'x' | b'X', ..] => (16, &digits[2..]),
+        [b'0', _, ..] => (8, &digits[1..]),
+        _ => (10, digits),
+    };
+    // The parser itself would take a second sign.
+    let number = digits.starts_with(|digit: char| digit.is_digit(radix)).then_some(digits)?;
+    i128::from_str_radix(number, radix).ok().map(|number| sign * number)
+}
+
+/// Data type by its index in the object dictionary (CiA 301, table 44).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct DataType(pub u16);
+
+impl DataType {
+    /// `UNSIGNED8`, as every sub-index 0 is.
+    pub const U8: Self = Self(0x5);
+    /// Bytes of any number.
+    pub const DOMAIN: Self = Self(0xF);
+
+    /// Bits of a value; none for a type of any length and for unknown types.
+    pub const fn bits(self) -> Option<u32> {
+        Some(match self.0 {
+            0x1 | 0x2 | 0x5 => 8,
+            0x3 | 0x6 => 16,
+            0x10 | 0x16 => 24,
+            0x4 | 0x7 | 0x8 => 32,
+            0x12 | 0x18 => 40,
+            0x13 | 0x19 | 0xC | 0xD => 48,
+            0x14 | 0x1A => 56,
+            0x11 | 0x15 | 0x1B => 64,
+            _ => return None,
+        })
+    }
+
+    /// Whether values are integers that may be negative.
+    pub const fn is_signed(self) -> bool {
+        matches!(self.0, 0x2..=0x4 | 0x10 | 0x12..=0x15)
+    }
+
+    /// Whether values are floating-point numbers.
+    pub const fn is_real(self) -> bool {
+        matches!(self.0, 0x8 | 0x11)
+    }
+
+    /// The integers that the type holds; none for a type of no integers.
+    fn range(self) -> Option<(i128, i128)> {
+        let bits = self.bits().filter(|_| !self.is_real())?;
+        let count = 1_i128 << bits;
+        Some(if self.is_signed() { (-count / 2, count / 2 - 1) } else { (0, count - 1) })
+    }
+}
+
+/// A line that cannot be read.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("line {line}: {problem}")]
+pub struct DcfError {
+    /// Number of the line, from 1.
+    pub line: usize,
+    /// What is wrong there.
+    pub problem: Problem,
+}
+
+/// What is wrong in a line.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message of a variant has its fields")]
+pub enum Problem {
+    /// Neither a section, nor a key with a value, nor a comment.
+    #[error("{text:?} is neither [section] nor key=value; start a comment with a semicolon")]
+    NoEntry { text: String },
+    /// A value before the first section.
+    #[error("{key} stands before the first [section]")]
+    OutsideSections { key: String },
+    /// A section that occurred before.
+    #[error("[{section}] occurs twice, first in line {first}; remove one of them")]
+    SecondSection { section: String, first: usize },
+    /// A key that occurred in its section before.
+    #[error("{key} occurs twice in its section, first in line {first}; remove one of them")]
+    SecondKey { key: String, first: usize },
+    /// A section without a key that it needs.
+    #[error("[{section}] has no {key}; add it")]
+    Missing { section: String, key: &'static str },
+    /// A sub-index whose object has no section.
+    #[error("[{index:04X}sub{subindex:X}] has no section [{index:04X}] of its object; add it")]
+    NoObject { index: u16, subindex: u8 },
+    /// No number of CiA 306.
+    #[error("{key}={text} is no number; write decimal, 0x hexadecimal, 0 octal or $NODEID+number")]
+    NoNumber { key: String, text: String },
+    /// A number that its place or its data type cannot hold.
+    #[error("{key}={text} is not within {lowest} to {highest}")]
+    OutOfRange { key: String, text: String, lowest: i128, highest: i128 },
+    /// An access type that CiA 306 does not define.
+    #[error("AccessType={text} is none of ro, wo, rw, rwr, rww, const")]
+    UnknownAccess { text: String },
+    /// An object type without entries that could be read.
+    #[error("ObjectType={code:#X} is none of 2 (domain), 5, 6, 7 (variable), 8 (array), 9 (record)")]
+    UnknownObjectType { code: u8 },
+}
+
+impl Problem {
+    /// The problem in that line.
+    pub(super) const fn at(self, line: usize) -> DcfError {
+        DcfError { line, problem: self }
+    }
+}

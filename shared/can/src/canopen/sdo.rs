@@ -1,0 +1,448 @@
+//! Service data objects (CiA 301, 7.2.4): one entry of a node's object dictionary read or written,
+//! confirmed, expedited (at most 4 bytes) or in segments of 7.
+//!
+//! A client sends an [`SdoRequest`], a server answers with an [`SdoResponse`]; both have eight bytes. This module only
+//! encodes and decodes: client and server keep the order of a transfer, its toggle bits and its time-outs. Block
+//! transfer and network indication are not represented.
+
+use std::fmt;
+
+use super::{Cob, LengthError, NodeId, ObjectAddress, exactly};
+use crate::frame::Frame;
+
+#[cfg(test)]
+mod tests;
+
+/// Bytes of every SDO message.
+const LENGTH: usize = 8;
+/// "Size indicated", in initiate messages.
+const SIZED: u8 = 1 << 0;
+/// "Expedited transfer", in initiate messages.
+const EXPEDITED: u8 = 1 << 1;
+/// The toggle bit of segment messages.
+const TOGGLE: u8 = 1 << 4;
+/// "No more segments", in segment messages with data.
+const LAST: u8 = 1 << 0;
+/// Command specifier of an abort, in both directions.
+const ABORT: u8 = 4;
+
+/// A request to the SDO server of a node.
+///
+/// # Examples
+/// Writes 1 to object 1400h:02h of node 5:
+///
+/// ```
+/// use masseter_can::canopen::{Expedited, NodeId, ObjectAddress, SdoRequest};
+///
+/// let object = ObjectAddress::new(0x1400, 2);
+/// let request = SdoRequest::Download { object, data: Expedited::new(&[1]).expect("1 to 4 bytes") };
+/// let frame = request.frame(NodeId::new(5)?);
+/// assert_eq!(frame.to_string(), "605#2F00140201000000");
+/// assert_eq!(SdoRequest::decode(frame.data())?, request);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SdoRequest {
+    /// Write an object of at most 4 bytes (2Xh).
+    Download {
+        /// The object.
+        object: ObjectAddress,
+        /// Its value.
+        data: Expedited,
+    },
+    /// Begin to write an object in segments (20h, 21h).
+    InitiateDownload {
+        /// The object.
+        object: ObjectAddress,
+        /// Number of bytes that follow, if known.
+        size: Option<u32>,
+    },
+    /// The next bytes to write (0Xh, 1Xh).
+    DownloadSegment {
+        /// Alternates, beginning with `false`.
+        toggle: bool,
+        /// The bytes.
+        data: Segment,
+        /// Whether this segment is the last.
+        is_last: bool,
+    },
+    /// Read an object (40h).
+    InitiateUpload {
+        /// The object.
+        object: ObjectAddress,
+    },
+    /// Read the next bytes (60h, 70h).
+    UploadSegment {
+        /// Alternates, beginning with `false`.
+        toggle: bool,
+    },
+    /// End the transfer with an error (80h).
+    Abort {
+        /// The transfer's object.
+        object: ObjectAddress,
+        /// The reason.
+        code: AbortCode,
+    },
+}
+
+impl SdoRequest {
+    const DOWNLOAD_SEGMENT: u8 = 0;
+    const INITIATE_DOWNLOAD: u8 = 1;
+    const INITIATE_UPLOAD: u8 = 2;
+    const UPLOAD_SEGMENT: u8 = 3;
+
+    /// The frame that carries the request to that node's server.
+    pub fn frame(self, node: NodeId) -> Frame {
+        Frame::fixed(Cob::SdoRequest(node).into(), self.encode())
+    }
+
+    /// The data bytes.
+    pub fn encode(self) -> [u8; LENGTH] {
+        match self {
+            Self::Download { object, data } => initiate(Self::INITIATE_DOWNLOAD, object, data.field()),
+            Self::InitiateDownload { object, size } => {
+                initiate(Self::INITIATE_DOWNLOAD, object, size_field(size))
+            }
+            Self::DownloadSegment { toggle, data, is_last } => {
+                segment(Self::DOWNLOAD_SEGMENT, toggle, data.field(is_last))
+            }
+            Self::InitiateUpload { object } => initiate(Self::INITIATE_UPLOAD, object, (0, [0; 4])),
+            Self::UploadSegment { toggle } => segment(Self::UPLOAD_SEGMENT, toggle, (0, [0; 7])),
+            Self::Abort { object, code } => initiate(ABORT, object, (0, code.0.to_le_bytes())),
+        }
+    }
+
+    /// Reads the data bytes. Bits and bytes that a message does not use are ignored.
+    ///
+    /// # Errors
+    /// [`SdoError`] for another length than 8 or an unknown command specifier.
+    pub fn decode(data: &[u8]) -> Result<Self, SdoError> {
+        let message = Message(exactly("SDO request", data)?);
+        let (object, toggle) = (message.object(), message.has(TOGGLE));
+        Ok(match message.specifier() {
+            Self::DOWNLOAD_SEGMENT => {
+                Self::DownloadSegment { toggle, data: message.segment(), is_last: message.has(LAST) }
+            }
+            Self::INITIATE_DOWNLOAD if message.has(EXPEDITED) => {
+                Self::Download { object, data: message.expedited() }
+            }
+            Self::INITIATE_DOWNLOAD => Self::InitiateDownload { object, size: message.size() },
+            Self::INITIATE_UPLOAD => Self::InitiateUpload { object },
+            Self::UPLOAD_SEGMENT => Self::UploadSegment { toggle },
+            ABORT => Self::Abort { object, code: AbortCode(message.number()) },
+            _ => return Err(message.unknown()),
+        })
+    }
+}
+
+/// An answer of a node's SDO server.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SdoResponse {
+    /// The object was written, or its segments may come (60h).
+    Download {
+        /// The object.
+        object: ObjectAddress,
+    },
+    /// The segment was taken (20h, 30h).
+    DownloadSegment {
+        /// As in the request.
+        toggle: bool,
+    },
+    /// The value of an object of at most 4 bytes (4Xh).
+    Upload {
+        /// The object.
+        object: ObjectAddress,
+        /// Its value.
+        data: Expedited,
+    },
+    /// The object's value comes in segments (40h, 41h).
+    InitiateUpload {
+        /// The object.
+        object: ObjectAddress,
+        /// Number of bytes that follow, if known.
+        size: Option<u32>,
+    },
+    /// The next bytes (0Xh, 1Xh).
+    UploadSegment {
+        /// As in the request.
+        toggle: bool,
+        /// The bytes.
+        data: Segment,
+        /// Whether this segment is the last.
+        is_last: bool,
+    },
+    /// The transfer failed (80h).
+    Abort {
+        /// The transfer's object.
+        object: ObjectAddress,
+        /// The reason.
+        code: AbortCode,
+    },
+}
+
+impl SdoResponse {
+    const UPLOAD_SEGMENT: u8 = 0;
+    const DOWNLOAD_SEGMENT: u8 = 1;
+    const INITIATE_UPLOAD: u8 = 2;
+    const INITIATE_DOWNLOAD: u8 = 3;
+
+    /// The frame in which that node's server sends the response.
+    pub fn frame(self, node: NodeId) -> Frame {
+        Frame::fixed(Cob::SdoResponse(node).into(), self.encode())
+    }
+
+    /// The data bytes.
+    pub fn encode(self) -> [u8; LENGTH] {
+        match self {
+            Self::Download { object } => initiate(Self::INITIATE_DOWNLOAD, object, (0, [0; 4])),
+            Self::DownloadSegment { toggle } => segment(Self::DOWNLOAD_SEGMENT, toggle, (0, [0; 7])),
+            Self::Upload { object, data } => initiate(Self::INITIATE_UPLOAD, object, data.field()),
+            Self::InitiateUpload { object, size } => {
+                initiate(Self::INITIATE_UPLOAD, object, size_field(size))
+            }
+            Self::UploadSegment { toggle, data, is_last } => {
+                segment(Self::UPLOAD_SEGMENT, toggle, data.field(is_last))
+            }
+            Self::Abort { object, code } => initiate(ABORT, object, (0, code.0.to_le_bytes())),
+        }
+    }
+
+    /// Reads the data bytes. Bits and bytes that a message does not use are ignored.
+    ///
+    /// # Errors
+    /// [`SdoError`] for another length than 8 or an unknown command specifier.
+    pub fn decode(data: &[u8]) -> Result<Self, SdoError> {
+        let message = Message(exactly("SDO response", data)?);
+        let (object, toggle) = (message.object(), message.has(TOGGLE));
+        Ok(match message.specifier() {
+            Self::UPLOAD_SEGMENT => {
+                Self::UploadSegment { toggle, data: message.segment(), is_last: message.has(LAST) }
+            }
+            Self::DOWNLOAD_SEGMENT => Self::DownloadSegment { toggle },
+            Self::INITIATE_UPLOAD if message.has(EXPEDITED) => {
+                Self::Upload { object, data: message.expedited() }
+            }
+            Self::INITIATE_UPLOAD => Self::InitiateUpload { object, size: message.size() },
+            Self::INITIATE_DOWNLOAD => Self::Download { object },
+            ABORT => Self::Abort { object, code: AbortCode(message.number()) },
+            _ => return Err(message.unknown()),
+        })
+    }
+}
+
+/// Data that is not an SDO message of this direction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum SdoError {
+    /// Wrong length.
+    #[error(transparent)]
+    Length(#[from] LengthError),
+    /// An unsupported command specifier; a server aborts with
+    /// [`AbortCode::UNKNOWN_COMMAND`].
+    #[error(
+        "command {command:02X}h for {object} is not a supported SDO service (block transfer is not supported)"
+    )]
+    UnknownCommand {
+        /// The first byte.
+        command: u8,
+        /// The bytes at the place of the object.
+        object: ObjectAddress,
+    },
+}
+
+/// A message of a command specifier with an object, and flags and four bytes.
+fn initiate(specifier: u8, object: ObjectAddress, (flags, data): (u8, [u8; 4])) -> [u8; LENGTH] {
+    let [index_low, index_high] = object.index.to_le_bytes();
+    let [d0, d1, d2, d3] = data;
+    [specifier << 5 | flags, index_low, index_high, object.subindex, d0, d1, d2, d3]
+}
+
+/// A message of a command specifier with its toggle bit, and a segment's flags and data.
+fn segment(specifier: u8, toggle: bool, (flags, data): (u8, [u8; Segment::MAX])) -> [u8; LENGTH] {
+    let mut bytes = [0; LENGTH];
+    bytes[0] = specifier << 5 | flags | if toggle { TOGGLE } else { 0 };
+    bytes[1..].copy_from_slice(&data);
+    bytes
+}
+
+/// The size of a transfer in an initiate message: flags and data.
+fn size_field(size: Option<u32>) -> (u8, [u8; 4]) {
+    size.map_or((0, [0; 4]), |size| (SIZED, size.to_le_bytes()))
+}
+
+/// A received message. Which of its parts it has depends on its command specifier.
+struct Message([u8; LENGTH]);
+
+impl Message {
+    /// The top three bits of the first byte.
+    fn specifier(&self) -> u8 {
+        self.0[0] >> 5
+    }
+
+    fn has(&self, flag: u8) -> bool {
+        self.0[0] & flag != 0
+    }
+
+    fn object(&self) -> ObjectAddress {
+        let [_, low, high, subindex, ..] = self.0;
+        ObjectAddress { index: u16::from_le_bytes([low, high]), subindex }
+    }
+
+    fn number(&self) -> u32 {
+        let [.., d0, d1, d2, d3] = self.0;
+        u32::from_le_bytes([d0, d1, d2, d3])
+    }
+
+    fn size(&self) -> Option<u32> {
+        self.has(SIZED).then(|| self.number())
+    }
+
+    fn expedited(&self) -> Expedited {
+        let bytes = self.number().to_le_bytes();
+        if !self.has(SIZED) {
+            return Expedited::of_unknown_size(bytes);
+        }
+        let unused = usize::from(self.0[0] >> 2 & 0b11);
+        Expedited::new(&bytes[..Expedited::MAX - unused]).expect("two bits leave 1 to 4 bytes")
+    }
+
+    fn segment(&self) -> Segment {
+        let unused = usize::from(self.0[0] >> 1 & 0b111);
+        Segment::new(&self.0[1..LENGTH - unused]).expect("three bits leave 0 to 7 bytes")
+    }
+
+    fn unknown(&self) -> SdoError {
+        SdoError::UnknownCommand { command: self.0[0], object: self.object() }
+    }
+}
+
+/// The value in an expedited message: 1 to 4 bytes. Without a size in the message there are 4 bytes, and the receiver
+/// must know how many of them are the value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Expedited {
+    /// Bytes beyond `length` are zero.
+    bytes: [u8; Self::MAX],
+    length: u8,
+    is_sized: bool,
+}
+
+impl Expedited {
+    /// The most bytes the message carries.
+    pub const MAX: usize = 4;
+
+    /// A value of that many bytes; `None` with none or more than 4.
+    pub fn new(data: &[u8]) -> Option<Self> {
+        let mut bytes = [0; Self::MAX];
+        bytes.get_mut(..data.len()).filter(|_| !data.is_empty())?.copy_from_slice(data);
+        Some(Self { bytes, length: data.len() as u8, is_sized: true })
+    }
+
+    /// Four bytes without a size.
+    pub const fn of_unknown_size(bytes: [u8; Self::MAX]) -> Self {
+        Self { bytes, length: Self::MAX as u8, is_sized: false }
+    }
+
+    /// The bytes; all four when the message has no size.
+    pub fn data(&self) -> &[u8] {
+        &self.bytes[..usize::from(self.length)]
+    }
+
+    /// Whether the message has a size.
+    pub const fn is_sized(&self) -> bool {
+        self.is_sized
+    }
+
+    /// Flags and data of the message.
+    fn field(self) -> (u8, [u8; Self::MAX]) {
+        let unused = Self::MAX as u8 - self.length;
+        (EXPEDITED | if self.is_sized { SIZED | unused << 2 } else { 0 }, self.bytes)
+    }
+}
+
+/// The data in a segment: 0 to 7 bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Segment {
+    /// Bytes beyond `length` are zero.
+    bytes: [u8; Self::MAX],
+    length: u8,
+}
+
+impl Segment {
+    /// The most bytes the message carries.
+    pub const MAX: usize = 7;
+
+    /// A segment of that data; `None` with more than 7 bytes.
+    pub fn new(data: &[u8]) -> Option<Self> {
+        let mut bytes = [0; Self::MAX];
+        bytes.get_mut(..data.len())?.copy_from_slice(data);
+        Some(Self { bytes, length: data.len() as u8 })
+    }
+
+    /// The data.
+    pub fn data(&self) -> &[u8] {
+        &self.bytes[..usize::from(self.length)]
+    }
+
+    /// Flags and data of the message.
+    fn field(self, is_last: bool) -> (u8, [u8; Self::MAX]) {
+        let unused = Self::MAX as u8 - self.length;
+        (unused << 1 | if is_last { LAST } else { 0 }, self.bytes)
+    }
+}
+
+/// Abort code. Every number is a valid code; the codes of the standard have names and meanings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct AbortCode(pub u32);
+
+macro_rules! abort_codes {
+    ($($name:ident = $code:literal, $meaning:literal;)*) => {
+        impl AbortCode {
+            $(#[doc = concat!("The ", $meaning, ".")] pub const $name: Self = Self($code);)*
+
+            /// The meaning in the standard; `None` for a code of a manufacturer.
+            pub const fn meaning(self) -> Option<&'static str> {
+                match self.0 {
+                    $($code => Some($meaning),)*
+                    _ => None,
+                }
+            }
+        }
+    };
+}
+
+abort_codes! {
+    TOGGLE = 0x0503_0000, "toggle bit did not alternate";
+    TIMED_OUT = 0x0504_0000, "SDO protocol timed out";
+    UNKNOWN_COMMAND = 0x0504_0001, "command specifier is not valid or unknown";
+    OUT_OF_MEMORY = 0x0504_0005, "memory does not suffice";
+    UNSUPPORTED_ACCESS = 0x0601_0000, "access to the object is not supported";
+    WRITE_ONLY = 0x0601_0001, "object is write-only";
+    READ_ONLY = 0x0601_0002, "object is read-only";
+    NO_OBJECT = 0x0602_0000, "object does not exist";
+    NOT_MAPPABLE = 0x0604_0041, "object cannot be mapped to the PDO";
+    PDO_LENGTH = 0x0604_0042, "mapped objects would exceed the PDO's length";
+    PARAMETER_INCOMPATIBLE = 0x0604_0043, "parameter is incompatible, or its object is in use";
+    INTERNAL_INCOMPATIBILITY = 0x0604_0047, "device is internally incompatible";
+    HARDWARE = 0x0606_0000, "hardware failed";
+    LENGTH = 0x0607_0010, "length does not match the data type";
+    TOO_LONG = 0x0607_0012, "data is longer than its type";
+    TOO_SHORT = 0x0607_0013, "data is shorter than its type";
+    NO_SUBINDEX = 0x0609_0011, "sub-index does not exist";
+    INVALID_VALUE = 0x0609_0030, "value is invalid";
+    TOO_HIGH = 0x0609_0031, "value is too high";
+    TOO_LOW = 0x0609_0032, "value is too low";
+    MAXIMUM_BELOW_MINIMUM = 0x0609_0036, "maximum is below the minimum";
+    NOT_AVAILABLE = 0x060A_0023, "resource is not available: no SDO connection";
+    GENERAL = 0x0800_0000, "transfer failed";
+    NOT_STORED = 0x0800_0020, "data cannot be transferred or stored";
+    LOCAL_CONTROL = 0x0800_0021, "data cannot be transferred or stored because of local control";
+    DEVICE_STATE = 0x0800_0022, "device's present state does not allow it";
+    NO_DICTIONARY = 0x0800_0023, "object dictionary is missing or could not be generated";
+    NO_DATA = 0x0800_0024, "object has no data";
+}
+
+impl fmt::Display for AbortCode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:08X}h", self.0)?;
+        self.meaning().map_or(Ok(()), |meaning| write!(f, " ({meaning})"))
+    }
+}
