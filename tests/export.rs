@@ -184,8 +184,12 @@ fn without_the_program_that_writes_parquet_the_default_is_refused_before_any_wor
     assert_eq!(refused.status.code(), Some(2));
     let said = stderr(&refused);
     let program = workspace.file("masseter-parquet").display().to_string();
-    let names =
-        [program.as_str(), "`cargo build --release`", "`cargo install --path rig/parquet`", "--format csv"];
+    let names = [
+        program.as_str(),
+        "`cargo build --release`",
+        "`cargo install --path rig/record/parquet`",
+        "--format csv",
+    ];
     assert!(names.iter().all(|name| said.contains(name)) && said.lines().count() == 1, "{said}");
     assert!(!out.exists());
     let written = export(&["--format", "csv"]);

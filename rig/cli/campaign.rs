@@ -14,8 +14,8 @@ use super::arguments::time_in_names;
 use crate::run::interrupts::Interrupts;
 use crate::run::request::{ControllerChoice, ControllerKind};
 use crate::run::runner::{Runner, word};
-use crate::vary::campaign::{Player, plan};
 use crate::vary::hyperqueue::{self, HyperQueue};
+use crate::vary::play::{Player, plan};
 use crate::vary::search::{self, Found};
 use crate::vary::shrink::{self, Reason};
 

@@ -91,7 +91,7 @@ const README: &str = include_str!("../../examples/controllers/README.md");
 const CMAKE: &str = "cmake -S . -B build && cmake --build build";
 
 const PIP: &str =
-    "python3 -m venv .venv && .venv/bin/pip install @SOURCE@/shared/python && chmod +x controller.py";
+    "python3 -m venv .venv && .venv/bin/pip install @SOURCE@/rig/bindings/python && chmod +x controller.py";
 
 impl Language {
     const fn project(self) -> Project {
@@ -142,7 +142,7 @@ impl Language {
 pub(super) fn new(NewVerb::Controller(args): &NewVerb) -> anyhow::Result<Exit> {
     let source = args.source.clone().unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into());
     ensure!(
-        source.join("shared/interface/masseter.h").is_file(),
+        source.join("rig/bindings/interface/masseter.h").is_file(),
         "{} is not Masseter's source: give it by --source",
         source.display()
     );

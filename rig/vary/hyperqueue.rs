@@ -13,7 +13,7 @@ use masseter_runtime::clock;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 
-use super::campaign::{Player, controller_of, this_program};
+use super::play::{Player, controller_of, this_program};
 use crate::run::interrupts::Interrupts;
 use crate::run::request::ControllerChoice;
 use crate::run::runner::Runner;

@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use masseter_campaign::{Campaign, CaseResult, Search, Value};
 use masseter_terminal::Failure;
 
-use super::campaign::{Player, lock};
+use super::play::{Player, lock};
 
 /// The value of a case that did not pass although no margin shows it: below every one that does.
 const STOPPED: f64 = -1.0;

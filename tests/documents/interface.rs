@@ -125,7 +125,8 @@ fn the_meaning_of_every_field_names_the_unit_in_its_name() {
 fn every_field_function_cause_and_key_that_the_document_names_exists() {
     let text = document();
     let layouts = layouts();
-    let headers = file("shared/interface/masseter.h") + &file("shared/interface/masseter_messages.h");
+    let headers =
+        file("rig/bindings/interface/masseter.h") + &file("rig/bindings/interface/masseter_messages.h");
     let scenario = Scenario::default().to_toml();
     let causes: Vec<_> = Cause::ALL.iter().map(|cause| cause.name()).collect();
     let [mut fields, mut functions, mut named_causes, mut named_keys] = [0; 4];

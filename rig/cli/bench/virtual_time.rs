@@ -14,8 +14,8 @@ use super::comparison::{Comparison, take_turns};
 use super::durations::{no_durations, record};
 use super::played_run::Interrupted;
 use crate::run::interrupts::Interrupts;
-use crate::run::request::{ClockKind, RunRequest};
 use crate::run::judge_unrecorded;
+use crate::run::request::{ClockKind, RunRequest};
 
 /// Motion of a run, ns.
 const MOTION_NS: f64 = 10e9;

@@ -265,12 +265,12 @@ mod tests {
     #[test]
     fn the_kept_copies_are_what_the_table_of_messages_gives() {
         let (layouts, enumerations) = (layouts(), enumerations());
-        let header = include_str!("../../../shared/interface/masseter_messages.h");
+        let header = include_str!("../../../rig/bindings/interface/masseter_messages.h");
         let is_kept = header == c_header(&layouts, &enumerations);
-        assert!(is_kept, "cargo run -- interface c > shared/interface/masseter_messages.h");
-        let module = include_str!("../../../shared/python/masseter/messages.py");
+        assert!(is_kept, "cargo run -- interface c > rig/bindings/interface/masseter_messages.h");
+        let module = include_str!("../../../rig/bindings/python/masseter/messages.py");
         let is_kept = module == python_module(&layouts, &enumerations);
-        assert!(is_kept, "cargo run -- interface python > shared/python/masseter/messages.py");
+        assert!(is_kept, "cargo run -- interface python > rig/bindings/python/masseter/messages.py");
     }
 
     #[test]

@@ -22,7 +22,7 @@ pub enum TableError {
     /// The program that writes Parquet was not built.
     #[error(
         "Parquet files need {}, which does not exist: build it with `cargo build --release`, or install it with \
-         `cargo install --path rig/parquet`",
+         `cargo install --path rig/record/parquet`",
         path.display()
     )]
     NoProgram {

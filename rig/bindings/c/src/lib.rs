@@ -1,4 +1,4 @@
-//! The rig's interface for controllers in C and C++; `shared/interface/masseter.h` documents every function.
+//! The rig's interface for controllers in C and C++; `rig/bindings/interface/masseter.h` documents every function.
 //!
 //! Each function returns a result and keeps its message for [`masseter_error`]. No panic leaves this library: it becomes an
 //! error. A session belongs to the thread that attached. A reference that may be absent is a pointer in C, which is null or

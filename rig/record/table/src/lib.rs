@@ -1,5 +1,5 @@
 //! Tables of columns, each with its unit and meaning, written as Parquet or CSV, and their codebook. This crate holds no
-//! figures of its own. Another program writes Parquet (`rig/parquet`).
+//! figures of its own. Another program writes Parquet (`rig/record/parquet`).
 //!
 //! The metadata `units` and `columns` of a Parquet file are JSON objects: from the name of a column to its unit, and to its
 //! meaning. A CSV file has no room for them; the codebook has.
