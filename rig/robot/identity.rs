@@ -249,7 +249,9 @@ pub(crate) fn gaps(drives: &[Known; AXES]) -> Vec<String> {
 
 /// Says what the identities do not tell.
 pub(crate) fn warn_of_gaps(drives: &[Known; AXES]) {
-    gaps(drives).iter().for_each(|gap| status!("warning: {gap}"));
+    for gap in gaps(drives) {
+        status!("warning: {gap}");
+    }
 }
 
 #[cfg(test)]

@@ -242,7 +242,7 @@ fn devices(drives: &[DriveResult]) -> String {
         objects.dedup();
         let mut device = device.join(", ");
         if !objects.is_empty() {
-            device += &format!("; without {}", objects.join(" "));
+            device = format!("{device}; without {}", objects.join(" "));
         }
         groups.entry(device).or_default().push(axis);
     }

@@ -103,7 +103,7 @@ impl Controller {
             (Self::Own(process), order) => process.order(order)?,
             (Self::Program(program), order) => program.order(order),
             (Self::None { motion_ns, ends_ns }, Order::Start(start)) => {
-                *ends_ns = start.epoch_ns + *motion_ns
+                *ends_ns = start.epoch_ns + *motion_ns;
             }
             (Self::None { .. }, _) => {}
         }

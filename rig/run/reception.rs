@@ -6,13 +6,12 @@
 use std::os::unix::net::UnixListener;
 
 use anyhow::Context;
-use masseter_recorder::Refusals;
 use masseter_runtime::clock;
 use masseter_runtime::conversation::{Conversation, Left, Limits, Newcomers};
 use masseter_runtime::lifecycle::attach::{Answer, Hello, Invitation, socket};
 use masseter_runtime::lifecycle::line;
 use masseter_runtime::transport::Domain;
-use masseter_terminal::status;
+use masseter_terminal::{Refusals, status};
 
 /// Bytes of the longest greeting.
 const LONGEST_HELLO: usize = 4096;

@@ -5,7 +5,7 @@
 
 use masseter_machine::SystemRoot;
 use masseter_machine::counters::ProcessCounters;
-use masseter_machine::sampler::{Sample, Sampler};
+use masseter_machine::counters::{Sample, Sampler};
 use masseter_recording::{RunUsage, Usage};
 use masseter_runtime::clock::{self, SECOND_NS};
 

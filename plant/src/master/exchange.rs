@@ -217,8 +217,7 @@ mod bus_monitor_tests {
 
     #[test]
     fn the_axis_served_last_is_the_last_to_be_served_again() {
-        let mut bus = BusMonitor::default();
-        bus.last_served = 3;
+        let bus = BusMonitor { last_served: 3, ..BusMonitor::default() };
         assert_eq!(bus.turns().collect::<Vec<_>>(), [4, 5, 0, 1, 2, 3]);
     }
 }

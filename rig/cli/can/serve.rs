@@ -16,12 +16,11 @@ use masseter_can::{Bus, ReceiveError};
 use masseter_model::geometry::AXIS_NAMES;
 use masseter_plan::read_scenario;
 use masseter_plant::emulation::{NodePort, OpenLink};
-use masseter_recorder::{Refusals, StderrWriter};
 use masseter_runtime::clock::{self, SECOND_NS};
 use masseter_runtime::conversation::{Conversation, Left, Limits, Look, Newcomers};
 use masseter_runtime::lifecycle::StopRequest;
 use masseter_scenario::{Scenario, wording::counted};
-use masseter_terminal::Exit;
+use masseter_terminal::{Exit, Refusals, StderrWriter};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 
@@ -129,7 +128,9 @@ impl Server {
     /// Takes in the newcomers that have sent a request.
     fn admit(&mut self, Look { asking, out }: Look, now_ns: u64) {
         self.clients.extend(asking.into_iter().map(|conversation| Client::new(conversation, now_ns)));
-        out.into_iter().for_each(|left| self.count_refusal(&left.into()));
+        for left in out {
+            self.count_refusal(&left.into());
+        }
     }
 
     /// Serves every client, and disconnects those that have left or broken the rules.

@@ -107,7 +107,9 @@ fn quirks(on_axis: &[&QuirkConfig]) -> Result<Quirks, PlantError> {
             }
             Kind::InterpolationInMs => overlay.lock(names::PERIOD_INDEX.place),
             Kind::MissingObjects => {
-                [0x6007, 0x6066, 0x6085].into_iter().for_each(|index| overlay.hide(index))
+                for index in [0x6007, 0x6066, 0x6085] {
+                    overlay.hide(index);
+                }
             }
             Kind::PdosLockedInOperation => node.locks_pdos = true,
             Kind::TwoBootUps => node.boot_ups = 2,

@@ -181,7 +181,9 @@ impl Response {
             is_over && answer.answered_ns.is_some()
         };
         let known: Vec<_> = self.open.extract_if(.., is_known).collect();
-        known.into_iter().for_each(|answer| self.close_answer(answer));
+        for answer in known {
+            self.close_answer(answer);
+        }
     }
 
     fn close_answer(&mut self, answer: Answer) {
@@ -212,7 +214,9 @@ impl Response {
     pub(super) fn into_finding(mut self) -> Finding {
         // The windows that are left end with the run.
         self.judge_ended(None);
-        std::mem::take(&mut self.open).into_iter().for_each(|answer| self.close_answer(answer));
+        for answer in std::mem::take(&mut self.open) {
+            self.close_answer(answer);
+        }
         let is_numeric = self.then.is_numeric();
         let unit = if is_numeric { self.then.unit } else { Unit::named("ms").expect("a unit of time") };
         let Some(worst) = self.worst else {

@@ -228,7 +228,7 @@ impl<R: Read + Seek> Reader<R> {
                     op::ATTACHMENT => self.take_attachment(),
                     // Damage can turn other records into messages, and no checksum covers a single record.
                     op::MESSAGE => {
-                        self.note_record("messages outside of chunks ('mcap compress' packs them)")
+                        self.note_record("messages outside of chunks ('mcap compress' packs them)");
                     }
                     // No message follows, and only the footer's checksum reveals damage here.
                     _ if self.walk.is_in_index => {}

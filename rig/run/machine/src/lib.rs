@@ -11,7 +11,6 @@ use std::fs;
 use masseter_recording::MachineInfo;
 use masseter_runtime::realtime::scheduling::allowed_cores;
 
-pub use counters as sampler;
 pub use system_root::SystemRoot;
 #[cfg(any(test, feature = "fixture"))]
 pub use system_root::fixture;

@@ -29,12 +29,10 @@ use masseter_runtime::messages::{
 };
 use masseter_runtime::realtime::scheduling::keep_off;
 use masseter_runtime::transport::{Domain, FrameSubscriber, Node, Topic, TransportError};
-use masseter_terminal::Exit;
+use masseter_terminal::{Exit, StderrWriter};
 
 use live::{Listener, LiveServer};
 use sinks::{Progress, Sinks};
-
-pub use masseter_terminal::{Refusals, StderrWriter};
 
 /// Time between two drains of the topics; a fraction of what their buffers hold.
 const DRAIN_INTERVAL: Duration = Duration::from_millis(10);

@@ -152,6 +152,7 @@ pub(crate) fn readings(readings: &ReadingFigures) -> String {
 
 /// Of each kind of message the one that used most of its bound, or took longest where it has none.
 fn responses(text: &mut String, response: &BusResponse) -> std::fmt::Result {
+    const WIDTHS: [usize; 5] = [20, 4, 8, 10, 10];
     let measured = response.messages.iter().filter(|message| message.frames > 0);
     let kind = |message: &ResponseFigures| {
         let name = message.message.split(' ').next().unwrap_or_default().to_owned();
@@ -169,7 +170,6 @@ fn responses(text: &mut String, response: &BusResponse) -> std::fmt::Result {
     if closest.is_empty() {
         return Ok(());
     }
-    const WIDTHS: [usize; 5] = [20, 4, 8, 10, 10];
     writeln!(text, "\n{}", columns(WIDTHS, ["response, µs", "bus", "n", "max", "bound"]))?;
     for ResponseFigures { bus, message, frames, max_ns, bound_ns } in closest {
         let [max, bound] = [*max_ns, *bound_ns].map(us);

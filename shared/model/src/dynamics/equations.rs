@@ -51,7 +51,7 @@ impl Equations {
             // A row of the Jacobian is (d, arm × d), so a leg acts as a body in its ball.
             sums.add_at(&motion.legs.arms_m[leg], &inertia, &force);
         }
-        sums.into_equations(motion.jacobian.actuators)
+        sums.into_equations(&motion.jacobian.actuators)
     }
 
     /// The platform's acceleration V̇ (m/s², rad/s²) under forces of the axes (N) and a wrench on the platform. None where
@@ -116,7 +116,7 @@ impl Sums {
         self.moment += arm.cross(force);
     }
 
-    fn into_equations(self, actuators: Matrix6<f64>) -> Equations {
+    fn into_equations(self, actuators: &Matrix6<f64>) -> Equations {
         let Self { linear, coupling, angular, force, moment } = self;
         let mut mass = Matrix6::zeros();
         mass.fixed_view_mut::<3, 3>(0, 0).copy_from(&linear);
@@ -124,7 +124,7 @@ impl Sums {
         mass.fixed_view_mut::<3, 3>(0, 3).copy_from(&coupling.transpose());
         mass.fixed_view_mut::<3, 3>(3, 3).copy_from(&angular);
         let bias = Vector6::new(force.x, force.y, force.z, moment.x, moment.y, moment.z);
-        Equations { mass, bias, actuators }
+        Equations { mass, bias, actuators: *actuators }
     }
 }
 

@@ -180,9 +180,12 @@ impl NameError {
     /// The signal or parameter, where one is at fault.
     pub fn name(&self) -> Option<&str> {
         match self {
-            Self::BadName(name) | Self::Twice(name) | Self::BadRange(name) => Some(name),
-            Self::Unprintable { name, .. } | Self::OutOfRange { name, .. } => Some(name),
-            Self::Unknown { name, .. } => Some(name),
+            Self::BadName(name)
+            | Self::Twice(name)
+            | Self::BadRange(name)
+            | Self::Unprintable { name, .. }
+            | Self::OutOfRange { name, .. }
+            | Self::Unknown { name, .. } => Some(name),
             Self::TooMany(..) | Self::TooLong(_) => None,
         }
     }
