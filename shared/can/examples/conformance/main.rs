@@ -11,6 +11,9 @@ use laws::{End, Pair};
 use masseter_can::{
     Bus, BusStatus, CanId, Frame, OpenError, PortFaults, ReceiveError, Received, SendError, SocketCan,
 };
+// For the tests of the laws.
+#[cfg(test)]
+use masseter_can::ErrorState;
 
 #[allow(dead_code, reason = "two real interfaces may send by priority or in order")]
 mod laws;
