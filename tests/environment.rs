@@ -131,7 +131,14 @@ impl<'a> SmallDisk<'a> {
 
 impl Drop for SmallDisk<'_> {
     fn drop(&mut self) {
-        let unmounted = Command::new("umount").arg(self.0).status().is_ok_and(|status| status.success());
+        // The kernel closes the files of a process that has ended a moment later.
+        let unmounts = || Command::new("umount").arg(self.0).status().is_ok_and(|status| status.success());
+        let unmounted = (0..20).any(|_| {
+            unmounts() || {
+                clock::sleep(Duration::from_millis(100));
+                false
+            }
+        });
         assert!(unmounted || thread::panicking(), "{} is left mounted", self.0.display());
     }
 }
