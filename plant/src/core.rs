@@ -52,7 +52,7 @@ const TAPPED: usize = 4096;
 /// assert_eq!((reading.cycle, truth.cycle), (100, 100));
 /// # Ok::<_, masseter_plant::PlantError>(())
 /// ```
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct PlantCore<L = VirtualLink> {
     pub(crate) master: Master,
     /// The link to the drives.

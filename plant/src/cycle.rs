@@ -87,6 +87,20 @@ pub fn run_cycle<L: Link, P: PlantPorts<L>>(
     schedule: &CycleSchedule,
     wake: &Wake,
 ) -> Result<(), P::Error> {
+    begin_cycle(plant, ports, schedule, wake)?;
+    end_cycle(plant, ports, wake)
+}
+
+/// The first half of a cycle: SYNC, process data, reading, truth and contact.
+///
+/// # Errors
+/// Those of the plant and of the ports.
+pub fn begin_cycle<L: Link, P: PlantPorts<L>>(
+    plant: &mut PlantCore<L>,
+    ports: &mut P,
+    schedule: &CycleSchedule,
+    wake: &Wake,
+) -> Result<(), P::Error> {
     plant.begin_cycle(*wake)?;
     // Counted from the SYNC as sent, so that a late SYNC gives a late but complete reading.
     let reading_by_ns = wake.woke_ns + schedule.reading_by_ns;
@@ -101,6 +115,18 @@ pub fn run_cycle<L: Link, P: PlantPorts<L>>(
     if let Some(contact) = plant.contact() {
         ports.publish_contact(&contact)?;
     }
+    Ok(())
+}
+
+/// The second half of a cycle: the command, if one came; then frames and events, for which nobody waits.
+///
+/// # Errors
+/// Those of the plant and of the ports.
+pub fn end_cycle<L: Link, P: PlantPorts<L>>(
+    plant: &mut PlantCore<L>,
+    ports: &mut P,
+    wake: &Wake,
+) -> Result<(), P::Error> {
     let applied = ports
         .command(wake)
         .and_then(|command| Ok(plant.apply(ports.now_ns(), command.as_ref().map(Borrow::borrow))?));

@@ -19,7 +19,7 @@ pub(super) enum Subject {
 }
 
 /// The log.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct EventLog {
     pub(super) journal: Journal,
     /// The cycle of new events.
@@ -103,7 +103,7 @@ impl Failure {
 const CAPACITY: usize = 256;
 
 /// The list.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Journal {
     events: Vec<Event>,
     lost: u64,

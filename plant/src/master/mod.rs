@@ -49,7 +49,7 @@ use supervision::{Enabling, Supervision};
 const FRAMES_AT_ONCE: usize = 512;
 
 /// The master.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Master {
     drives: [RemoteDrive; AXES],
     buses: Vec<BusMonitor>,

@@ -201,7 +201,7 @@ fn set_factory_pdos(objects: &mut Objects) {
 }
 
 /// The memory of all drives and its file.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct MemoryFile {
     path: PathBuf,
     pub(super) drives: [DriveMemory; AXES],

@@ -58,7 +58,7 @@ pub use virtual_link::{NodePort, OpenLink, VirtualLink};
 /// assert_eq!(Cob::try_from(boot_up.id())?, Cob::Heartbeat(NodeId::new(1)?));
 /// # Ok::<_, Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Emulation {
     /// In the order of the axes.
     pub(crate) drives: Vec<DriveNode>,

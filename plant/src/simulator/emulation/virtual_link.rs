@@ -22,7 +22,7 @@ const TRANSMIT_CAPACITY: usize = 64;
 const RECEIVE_CAPACITY: usize = 256;
 
 /// Simulated wires and the emulated drives on them, co-simulated event by event in the order of time.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct VirtualLink {
     wires: Vec<VirtualWire>,
     ports: [DrivePort; AXES],

@@ -103,7 +103,7 @@ pub(crate) struct Change {
     pub(crate) is_begin: bool,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Entry {
     injected: Injected,
     effect: Effect,
@@ -115,7 +115,7 @@ struct Entry {
 }
 
 /// The agenda.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Agenda {
     entries: Vec<Entry>,
     /// Before then no entry begins or ends, ns.

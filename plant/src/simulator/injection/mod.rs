@@ -23,7 +23,7 @@ use crate::master::events::Journal;
 use crate::master::link::{Mishap, Occurrence};
 
 /// Follows the occurrences from which times count, tells every window once, and alters commands.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Injector {
     injection: Injection,
     /// Those whose window is not told yet.
@@ -145,12 +145,12 @@ impl Injector {
 const FOREIGN_CYCLES: u64 = 1 << 40;
 
 /// The faults of the commands.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct CommandFaults {
     faults: Vec<CommandFault>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct CommandFault {
     injected: Injected,
     config: FaultConfig,

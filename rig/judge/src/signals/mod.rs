@@ -81,6 +81,15 @@ impl Registry {
             UnknownSignal { name: name.to_owned(), question }
         })
     }
+
+    /// The value of the signal of that name in a cycle, in its unit; none where the cycle lacks a message, and where the signal
+    /// counts from the start of the motion.
+    ///
+    /// # Errors
+    /// As [`Self::place_of`].
+    pub fn value(&self, name: &str, messages: &CycleMessages) -> Result<Option<f64>, UnknownSignal> {
+        Ok(self.signals[self.place_of(name)?].value(messages, None))
+    }
 }
 
 /// The values of chosen signals, cycle by cycle.

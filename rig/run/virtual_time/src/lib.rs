@@ -1,35 +1,27 @@
-//! The run under virtual time: the same cores in one thread, as fast as they go. Its messages go to a [`Sink`].
+//! The [`Rig`] that steps, and the run under virtual time: a loop over it in one thread, as fast as it goes. The messages of a
+//! run go to a [`Sink`].
 //!
 //! A crate of its own, since the whole cycle is compiled where its ports are known: here, fully optimised.
-//!
-//! Every step happens exactly when the time table has it, so the same scenario and seed leave the
-//! same bytes. Computing takes no time here, and readings and commands go out when the time table has them at the
-//! latest: what varies is the bus.
 
 mod log;
+mod rig;
 
 use anyhow::Context;
 use masseter_analysis::{Analysis, Figures};
 use masseter_controller::process::BuildController;
 use masseter_plan::RunPlan;
-use masseter_plant::PlantError;
-use masseter_plant::core::PlantCore;
-use masseter_plant::cycle::PlantPorts;
-use masseter_plant::emulation::VirtualLink;
 use masseter_recording::{Backlog, Ending, Manifest, Pace, Recorder, RunFolder, Scene};
 use masseter_runtime::control::{Controller, Duties, Operator, Outcome, set_parameters};
 use masseter_runtime::lifecycle::Party;
 use masseter_runtime::lockstep::EPOCH_NS;
-use masseter_runtime::messages::{Command, Contact, Reading, Truth};
 use masseter_runtime::named::{Declared, NamedValues};
-use masseter_runtime::realtime::Wake;
-use masseter_runtime::schedule::CycleSchedule;
 use masseter_scenario::Scenario;
 use masseter_terminal::status;
 
-use log::{Publisher, Stream};
+use log::Stream;
 
 pub use log::{Log, LoggedPorts, Sink};
+pub use rig::{Latest, Rig, RigError, Snapshot};
 
 /// What the user asks of a run.
 pub trait Requests {
@@ -106,91 +98,25 @@ impl Run {
         sink: S,
         interrupts: &dyn Requests,
     ) -> anyhow::Result<(S, Ending)> {
-        let Self { controller, duties } = self;
-        let scenario = &plan.scenario;
-        let mut plant = PlantCore::new(scenario, EPOCH_NS)?;
-        let log = Log::new(sink);
-        let mut rig =
-            VirtualRig { controller, duties, schedule: &plan.schedule, log, now_ns: EPOCH_NS, reading: None };
-
-        let (mut cycle, mut plant_error) = (0, None);
+        let Self { mut controller, mut duties } = self;
+        let mut rig = Rig::with_sink(&plan.scenario, plan.schedule, sink)?;
+        let mut plant_error = None;
         while plant_error.is_none()
-            && rig.controller.outcome().is_none()
-            && !rig.log.sink_mut().has_failed()
+            && controller.outcome().is_none()
+            && !rig.sink_mut().has_failed()
             && !interrupts.is_abort_requested()
         {
-            cycle += 1;
             if interrupts.is_stop_requested() {
-                rig.controller.request_stop();
+                controller.request_stop();
             }
-            let sync = Wake::on_time(cycle, EPOCH_NS + (cycle - 1) * scenario.period_ns());
-            plant_error = masseter_plant::cycle::run_cycle(&mut plant, &mut rig, &plan.schedule, &sync).err();
+            plant_error = rig.play_cycle(&mut *controller, &mut duties).err();
         }
-        let ending = match (plant_error, rig.controller.outcome()) {
+        let ending = match (plant_error, controller.outcome()) {
             (Some(error), _) => Ending::died(Party::Plant.name(), error.to_string()),
             _ if interrupts.is_stop_requested() => Ending::Interrupted,
             (None, Some(Outcome::SafeStop)) => Ending::SafeStop,
             (None, _) => Ending::Completed,
         };
-        Ok((rig.log.into_sink(), ending))
-    }
-}
-
-/// Both sides of the rig in one thread: the controller's cycle runs where the plant waits for its command.
-struct VirtualRig<'a, S> {
-    controller: Box<dyn Controller>,
-    duties: Duties,
-    schedule: &'a CycleSchedule,
-    log: Log<S>,
-    now_ns: u64,
-    /// The reading of this cycle, as published.
-    reading: Option<Reading>,
-}
-
-impl<S: Sink> PlantPorts<VirtualLink> for VirtualRig<'_, S> {
-    type Command = Command;
-    type Error = PlantError;
-
-    fn now_ns(&self) -> u64 {
-        self.now_ns
-    }
-
-    fn wait_until(&mut self, _: u64, latest_ns: u64) -> u64 {
-        self.now_ns = latest_ns;
-        latest_ns
-    }
-
-    fn wait_for_frames(&mut self, _: &mut VirtualLink, latest_ns: u64) -> u64 {
-        latest_ns
-    }
-
-    fn publish_reading(&mut self, fill: impl FnOnce(&mut Reading)) -> Result<(), PlantError> {
-        self.reading = Some(self.log.record(Publisher::Reading, self.now_ns, fill));
-        Ok(())
-    }
-
-    fn publish_truth(&mut self, truth: &Truth) -> Result<(), PlantError> {
-        self.log.record(Publisher::Truth, self.now_ns, |message| *message = *truth);
-        Ok(())
-    }
-
-    fn publish_contact(&mut self, contact: &Contact) -> Result<(), PlantError> {
-        self.log.record(Publisher::Contact, self.now_ns, |message| *message = *contact);
-        Ok(())
-    }
-
-    fn command(&mut self, sync: &Wake) -> Result<Option<Command>, PlantError> {
-        self.now_ns = sync.due_ns + self.schedule.controller_at_ns;
-        let wake = Wake::on_time(sync.cycle, self.now_ns);
-        let (reading, now_ns) = (self.reading.take(), self.now_ns);
-        let mut ports = LoggedPorts::new(&mut self.log, [now_ns; 3], reading.as_ref());
-        let Ok(()) =
-            masseter_runtime::control::run_cycle(&mut *self.controller, &mut self.duties, &mut ports, &wake);
-        Ok(ports.into_command())
-    }
-
-    fn publish_frames_and_events(&mut self, plant: &mut PlantCore) -> Result<(), PlantError> {
-        self.log.drain(plant, self.now_ns);
-        Ok(())
+        Ok((rig.into_sink(), ending))
     }
 }

@@ -88,7 +88,7 @@ pub(crate) enum Publisher {
 }
 
 /// The sink, and how many messages of each publisher it took.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Log<S> {
     sink: S,
     published: [u64; Publisher::PlantEvent as usize + 1],
@@ -98,6 +98,10 @@ impl<S: Sink> Log<S> {
     /// The log of a run that begins.
     pub fn new(sink: S) -> Self {
         Self { sink, published: Default::default() }
+    }
+
+    pub(crate) fn sink(&self) -> &S {
+        &self.sink
     }
 
     /// Where the messages go.

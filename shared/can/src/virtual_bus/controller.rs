@@ -146,7 +146,7 @@ impl Queued {
 }
 
 /// Frames in the order of priority; those of one identifier in the order they were queued.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct TransmitQueue {
     pub(super) frames: Vec<Queued>,
     capacity: usize,
@@ -185,7 +185,7 @@ impl TransmitQueue {
 }
 
 /// Received items that are not fetched yet, oldest first. An item that does not fit is lost and counted.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct ReceiveQueue<T> {
     /// Items with their times of arrival, ns.
     arrived: VecDeque<(u64, T)>,

@@ -30,7 +30,7 @@ pub struct WireConfig {
 }
 
 /// A port with its controller.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Station {
     pub(super) transmit: TransmitQueue,
     pub(super) receive: ReceiveQueue<Received>,
@@ -42,7 +42,7 @@ pub(super) struct Station {
 }
 
 /// All nodes, their faults, and the state and the tap of the wire between them.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Nodes {
     pub(super) config: WireConfig,
     pub(super) stations: Vec<Station>,

@@ -1,0 +1,144 @@
+//! A rig that steps does what a run does; from a snapshot it goes on as it went on before.
+
+use std::path::Path;
+
+use masseter_controller::motion_controller::MotionController;
+use masseter_runtime::control::{Operator, set_parameters};
+use masseter_runtime::named::NamedValues;
+use proptest::prelude::*;
+
+use super::*;
+
+/// Keeps every message.
+#[derive(Debug, Clone, Default)]
+struct Kept(Vec<Recorded>);
+
+impl Sink for Kept {
+    fn take(&mut self, message: &Recorded, _: u64) {
+        self.0.push(*message);
+    }
+
+    fn has_failed(&self) -> bool {
+        false
+    }
+}
+
+/// The messages of the first cycles of a run.
+fn played(scenario: &Scenario, cycles: usize) -> Vec<Recorded> {
+    let plan = RunPlan::new(scenario.clone()).unwrap();
+    let mut controller =
+        MotionController::new(&plan.scenario, plan.mechanism.clone(), plan.trajectory.clone());
+    let named = NamedValues::new(controller.declared(), &plan.scenario.parameters).unwrap();
+    set_parameters(&mut controller, &named);
+    let operator = Operator::new(&plan.scenario, named.settings().declared(), EPOCH_NS).unwrap();
+    let mut duties = Duties { named, operator };
+    let mut rig = Rig::with_sink(&plan.scenario, plan.schedule, Kept::default()).unwrap();
+    for _ in 0..cycles {
+        rig.play_cycle(&mut controller, &mut duties).unwrap();
+    }
+    rig.into_sink().0
+}
+
+fn commands(messages: &[Recorded]) -> Vec<Command> {
+    let command =
+        |message: &Recorded| if let Recorded::Command(command) = message { Some(*command) } else { None };
+    messages.iter().filter_map(command).collect()
+}
+
+fn with_keys(keys: &str) -> Scenario {
+    Scenario::parse(Path::new("test.toml"), keys).unwrap()
+}
+
+/// Readings, truths and numbers of events of the steps with these commands.
+fn steps(rig: &mut Rig, commands: &[Command]) -> Vec<(Reading, Option<Truth>, Vec<Event>)> {
+    let step = |command| {
+        let reading = *rig.step(command).unwrap();
+        (reading, rig.truth().copied(), rig.events().to_vec())
+    };
+    commands.iter().map(step).collect()
+}
+
+#[test]
+fn the_steps_with_a_runs_commands_are_the_run() {
+    let scenario = with_keys("seed = 3");
+    let run = played(&scenario, 2000);
+    let mut rig = Rig::new(&scenario, 3).unwrap();
+    let mut readings = vec![*rig.reset().unwrap()];
+    readings.extend(steps(&mut rig, &commands(&run)).into_iter().map(|(reading, ..)| reading));
+    let of_run: Vec<_> = run
+        .iter()
+        .filter_map(|message| if let Recorded::Reading(reading) = message { Some(*reading) } else { None })
+        .collect();
+    // The last step begins a cycle more.
+    assert_eq!(readings[..of_run.len()], of_run[..]);
+    assert!(of_run.last().unwrap().answers_cycle > 0, "the drives move");
+}
+
+#[test]
+fn a_reset_rig_is_new() {
+    let mut rig = Rig::new(&Scenario::default(), 1).unwrap();
+    let commands = commands(&played(&Scenario::default(), 1200));
+    let first = *rig.reset().unwrap();
+    let before = steps(&mut rig, &commands);
+    assert_eq!(*rig.reset().unwrap(), first);
+    assert_eq!(steps(&mut rig, &commands), before);
+}
+
+#[test]
+fn signals_have_names_and_values() {
+    let mut rig = Rig::new(&Scenario::default(), 1).unwrap();
+    rig.reset().unwrap();
+    let height = rig.signal("incisal.z").unwrap().expect("the jaw has a height");
+    assert!(height.abs() < 1000.0, "{height}");
+    assert_eq!(rig.signal("controller.state").unwrap(), None, "a rig alone has no controller");
+    let refusal = rig.signal("incisal.zz").unwrap_err().to_string();
+    assert!(refusal.contains("did you mean"), "{refusal}");
+}
+
+#[test]
+fn a_snapshot_of_another_scenario_or_seed_is_refused() {
+    let of_one = Rig::new(&Scenario::default(), 1).unwrap().snapshot();
+    let mut other = Rig::new(&Scenario::default(), 2).unwrap();
+    let refusal = other.restore(&of_one).unwrap_err().to_string();
+    assert!(refusal.contains("seed 1") && refusal.contains("seed 2"), "{refusal}");
+    let mut same = Rig::new(&Scenario::default(), 1).unwrap();
+    same.restore(&of_one).unwrap();
+}
+
+/// Faults of drives, encoders, buses and mechanism, which begin at a random time.
+fn any_fault() -> impl Strategy<Value = String> {
+    let kinds = [
+        "kind = 'encoder_noise'\naxis = 'l1'\nsize = '20 um'\nat_s",
+        "kind = 'drive_torque_loss'\naxis = 'd2'\nsize = '50 %'\nat_s",
+        "kind = 'jam'\naxis = 'l3'\nat_s",
+        "kind = 'disconnect'\nbus = 1\nnode = 5\nfrom_s",
+        "kind = 'drive_reboot'\naxis = 'd1'\nsize = '100 ms'\nat_s",
+        "kind = 'play'\naxis = 'l2'\nsize = '0.3 mm'\nat_s",
+    ];
+    (0..kinds.len(), 0.4..1.6)
+        .prop_map(move |(kind, time_s): (usize, f64)| format!("[[faults]]\n{} = {time_s:.3}\n", kinds[kind]))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+
+    #[test]
+    fn going_on_from_a_snapshot_is_going_on(
+        seed in 1_u64..1000, fault in any_fault(), at in 0_usize..1500, more in 1_usize..600,
+    ) {
+        let scenario = with_keys(&format!("seed = {seed}\n{fault}"));
+        let commands = commands(&played(&scenario, at + more));
+        let mut rig = Rig::new(&scenario, seed).unwrap();
+        rig.reset().unwrap();
+        let (before, after) = commands.split_at(at.min(commands.len()));
+        steps(&mut rig, before);
+        let branch = rig.snapshot();
+        let went_on = steps(&mut rig, after);
+
+        rig.restore(&branch).unwrap();
+        prop_assert_eq!(&steps(&mut rig, after), &went_on);
+        let mut other = Rig::new(&scenario, seed).unwrap();
+        other.restore(&branch).unwrap();
+        prop_assert_eq!(&steps(&mut other, after), &went_on);
+    }
+}
