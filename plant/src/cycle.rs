@@ -1,4 +1,5 @@
-//! The order of the plant's cycle, for every clock.
+//! The order of the plant's cycle, the same in real time, in lockstep and under virtual time. The clock and the
+//! transport are the caller's: see [`PlantPorts`].
 
 use std::borrow::Borrow;
 
@@ -20,7 +21,7 @@ pub trait PlantPorts<L: Link> {
     /// Now, ns.
     fn now_ns(&self) -> u64;
 
-    /// Waits until `due_ns`, or longer where that saves spinning, but not beyond `latest_ns`; returns the time.
+    /// Waits until `due_ns`, or longer if that saves spinning, but not beyond `latest_ns`; returns the time then.
     fn wait_until(&mut self, due_ns: u64, latest_ns: u64) -> u64;
 
     /// Waits until frames may have arrived, but not beyond `latest_ns`; returns the time.
@@ -44,7 +45,8 @@ pub trait PlantPorts<L: Link> {
     /// When the message cannot be sent.
     fn publish_contact(&mut self, contact: &Contact) -> Result<(), Self::Error>;
 
-    /// The command of this cycle, or the newest there is once waiting any longer would cost the deadline.
+    /// The command of this cycle. If it does not come in time, the newest that there is; none if there is none.
+    /// `wake` is the cycle's SYNC.
     ///
     /// # Errors
     /// When the messages cannot be received.
@@ -91,7 +93,7 @@ pub fn run_cycle<L: Link, P: PlantPorts<L>>(
     end_cycle(plant, ports, wake)
 }
 
-/// The first half of a cycle: SYNC, process data, reading, truth and contact.
+/// The first half of a cycle: SYNC, process data, reading, truth and contact. [`end_cycle`] must follow, once.
 ///
 /// # Errors
 /// Those of the plant and of the ports.
@@ -118,7 +120,8 @@ pub fn begin_cycle<L: Link, P: PlantPorts<L>>(
     Ok(())
 }
 
-/// The second half of a cycle: the command, if one came; then frames and events, for which nobody waits.
+/// The second half of a cycle that [`begin_cycle`] began: the command, if one came; then frames and events, for which
+/// nobody waits.
 ///
 /// # Errors
 /// Those of the plant and of the ports.

@@ -1,7 +1,8 @@
-//! The [`Rig`] that steps, and the run under virtual time: a loop over it in one thread, as fast as it goes. The messages of a
-//! run go to a [`Sink`].
+//! The [`Rig`] that steps, and the run under virtual time: a loop over a rig in one thread, as fast as it goes. The
+//! messages of a run go to a [`Sink`]. No process, no transport and no clock of the machine is involved.
 //!
-//! A crate of its own, since the whole cycle is compiled where its ports are known: here, fully optimised.
+//! This is a crate of its own because the compiler makes the code of a cycle where the ports are known. That is here,
+//! fully optimised.
 
 mod log;
 mod rig;
@@ -35,8 +36,8 @@ pub trait Requests {
 /// Makes the analysis of a run: with everything that a report shows, or with what a verdict needs alone.
 pub type StartAnalysis = fn(&Scenario, &Declared) -> Analysis;
 
-/// Runs the rig and records the run; it ends as the processes would, also when the user stops it. Enters the ending and what
-/// the controller declares into the manifest.
+/// Plays a run and records it. The run ends as one with processes does, also when the user stops it. Enters the
+/// ending and what the controller declares into the manifest.
 pub fn record(
     plan: &RunPlan,
     folder: &RunFolder,
@@ -60,7 +61,8 @@ pub fn record(
     Ok(())
 }
 
-/// The same without a recording: the figures of the run.
+/// Plays a run without recording it, and returns its figures. Enters the ending and what the controller declares into
+/// the manifest.
 pub fn analyse(
     plan: &RunPlan,
     build: BuildController,
@@ -91,7 +93,8 @@ impl Run {
         Ok(Self { controller, duties: Duties { named, operator } })
     }
 
-    /// Plays the motion; returns the sink, and how the run ended if the sink took everything.
+    /// Plays the run to its end; returns the sink and the ending. The ending counts only if the sink took every
+    /// message.
     fn play<S: Sink>(
         self,
         plan: &RunPlan,

@@ -1,5 +1,7 @@
-//! The messages of a run in one thread: numbered and stamped as their publishers would, on their way into a recording or
-//! directly into the analysis; and the ports of a controller in this thread.
+//! The messages of a run in one thread, on their way to a [`Sink`]: a recording, the analysis, or the caller of a
+//! rig. They get the numbers and times that their publishers would give them.
+//!
+//! [`LoggedPorts`] are the ports of a controller in this thread. Nothing here steps the plant.
 
 use std::cell::Cell;
 use std::convert::Infallible;
@@ -17,7 +19,7 @@ pub trait Sink {
     /// Takes a message that was published at `now_ns`.
     fn take(&mut self, message: &Recorded, now_ns: u64);
 
-    /// Whether it lacks a message, so that the run is useless from here on.
+    /// Whether a message was lost, so that the rest of the run is useless.
     fn has_failed(&self) -> bool;
 }
 
@@ -44,7 +46,10 @@ impl Stream {
         Self { analysis, error: None }
     }
 
-    /// The figures of all messages; the error of a frame that is none.
+    /// The figures of all messages.
+    ///
+    /// # Errors
+    /// When a message of the topic `frame` held no CAN frame.
     pub(crate) fn figures(self) -> Result<Figures, TapError> {
         self.error.map_or_else(|| Ok(self.analysis.finish(false, &[])), Err)
     }
@@ -130,7 +135,7 @@ impl<S: Sink> Log<S> {
         message
     }
 
-    /// Hands on the frames and events of a cycle.
+    /// Hands on the frames and events that the plant has kept since the last call.
     pub(crate) fn drain(&mut self, plant: &mut PlantCore, now_ns: u64) {
         for frame in plant.drain_frames() {
             self.record(Publisher::Frame, now_ns, |message| *message = frame);

@@ -1,8 +1,10 @@
-//! The rig as an object that steps: master, buses, drives and mechanism of a scenario, owned by nobody's clock.
+//! The rig as an object that steps: master, simulated buses, emulated drives and mechanism of a scenario. Its caller
+//! decides when the next step comes.
 //!
-//! Every step happens exactly when the time table has it, so the same scenario, seed and commands leave the same bytes.
-//! Computing takes no time here, and readings and commands go out when the time table has them at the latest: what varies is
-//! the bus. The rig has no controller: its commands come from outside.
+//! Every step happens exactly when the time table has it, so the same scenario, seed and commands leave the same
+//! bytes. Computing takes no time here: readings and commands go out at the latest times that the time table allows.
+//! Only the buses vary. A rig has no controller and no operator: commands come from outside, and nobody sets
+//! parameters or requests a stop. Interfaces that the scenario names are not used.
 
 #[cfg(test)]
 mod tests;
@@ -52,7 +54,7 @@ pub enum RigError {
     },
 }
 
-/// What the rig published since the last command.
+/// What a rig published last: reading, truth and contact of the present cycle, and the events of the last step.
 #[derive(Debug, Clone, Default)]
 pub struct Latest {
     cycle: CycleMessages,
@@ -76,6 +78,8 @@ impl Sink for Latest {
 }
 
 /// Master, buses, drives and mechanism of a scenario. A cycle begins with a reading and ends with a command.
+///
+/// After an error a cycle is incomplete: go on by [`reset`](Self::reset) or [`restore`](Self::restore) alone.
 ///
 /// ```
 /// use masseter_runtime::messages::Command;
@@ -107,8 +111,12 @@ pub struct Rig<S = Latest> {
     cycle: u64,
 }
 
-/// The state of a rig at an instant, to go on from there again and again. It holds mechanism, drives, buses with their error
-/// counters, master, faults and random streams; a controller outside of the rig is not part of it.
+/// The state of a rig at an instant, to go on from there again and again. It holds mechanism, drives, buses with
+/// their error counters, master, faults and random streams, and what the rig published last.
+///
+/// It does not hold the caller's controller, nor any file. A rig reads tables of pushes and the memory of the drives
+/// when it is made and at a reset. It writes no file, so what drives store stays in the rig. A snapshot lives in
+/// memory; it cannot be saved.
 #[derive(Debug, Clone)]
 pub struct Snapshot {
     scenario: Arc<Scenario>,
@@ -118,7 +126,8 @@ pub struct Snapshot {
 }
 
 impl Rig {
-    /// A rig of the scenario with this seed, before its first cycle.
+    /// A rig of the scenario with this seed instead of the scenario's, before its first cycle. The values of the
+    /// scenario are expected to be valid: [`Scenario::validate`] is not called.
     ///
     /// # Errors
     /// When the scenario does not fit its mechanism, drives or buses.
@@ -130,7 +139,8 @@ impl Rig {
         Ok(rig)
     }
 
-    /// Switches the rig off and on, as it was when new, and begins the first cycle; returns its reading.
+    /// Makes the rig new and begins the first cycle; returns its reading. The plant's files (tables of pushes, memory
+    /// of the drives) are read again.
     ///
     /// # Errors
     /// When the plant fails.
@@ -142,11 +152,11 @@ impl Rig {
         Ok(&self.ports.reading)
     }
 
-    /// Ends the cycle with a command and begins the next one; returns its reading. Number and time of the command are set here.
-    /// Without a [reset](Self::reset) before, the first call begins the first cycle and ends that.
+    /// Ends the cycle with a command and begins the next one; returns its reading. Number, cycle and time of the
+    /// command are set here. In a new rig without a [reset](Self::reset), the first call also begins the first cycle.
     ///
     /// # Errors
-    /// When the plant fails, such as by a command that is no number.
+    /// When the plant fails. A command that the master refuses is no error: the drives stop, and an event says why.
     pub fn step(&mut self, command: &Command) -> Result<&Reading, RigError> {
         if self.cycle == 0 {
             self.begin_next_cycle()?;
@@ -167,20 +177,21 @@ impl Rig {
         &self.ports.reading
     }
 
-    /// The mechanism's true motion at the SYNC of this cycle.
+    /// The mechanism's true motion at the SYNC of this cycle; none before the first cycle.
     pub fn truth(&self) -> Option<&Truth> {
         self.ports.log.sink().cycle.truth.as_ref()
     }
 
-    /// Events since the command before.
+    /// Events that the last step published. Those since the SYNC of the present cycle come with the next step.
     pub fn events(&self) -> &[Event] {
         &self.ports.log.sink().events
     }
 
-    /// The value of a signal in this cycle, in its unit (`masseter signals`). None where it has none, as all of a controller's.
+    /// The value of a signal in this cycle, in its unit (`masseter signals` lists them). It is none for signals of
+    /// the controller and for those that count from the start of the motion.
     ///
     /// # Errors
-    /// Where there is no signal of that name, with the most similar one.
+    /// When there is no signal of that name; the message names the most similar one.
     pub fn signal(&self, name: &str) -> Result<Option<f64>, UnknownSignal> {
         let registry = self.registry.as_ref().expect("a rig that is new has a registry");
         registry.value(name, &self.ports.log.sink().cycle)
@@ -192,10 +203,10 @@ impl Rig {
         Snapshot { scenario: scenario.clone(), plant: plant.clone(), ports: ports.clone(), cycle: *cycle }
     }
 
-    /// Goes back, or on, to a snapshot. The steps that follow are those that followed it.
+    /// Goes to the state of a snapshot. The same commands then give the same steps as they did from there.
     ///
     /// # Errors
-    /// Where the snapshot is one of another scenario or seed.
+    /// When the snapshot is one of another scenario or seed. Contents of files are not compared.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), RigError> {
         if !Arc::ptr_eq(&self.scenario, &snapshot.scenario) && self.scenario != snapshot.scenario {
             return Err(RigError::OtherScenario {
@@ -213,7 +224,7 @@ impl Rig {
 }
 
 impl<S: Sink> Rig<S> {
-    /// A rig of a scenario that was planned; its messages go to the sink.
+    /// A rig of a planned scenario; its messages go to the sink. It has no signals.
     pub(crate) fn with_sink(
         scenario: &Scenario,
         schedule: CycleSchedule,
@@ -229,7 +240,8 @@ impl<S: Sink> Rig<S> {
         })
     }
 
-    /// One cycle whose command a controller gives.
+    /// Plays a whole cycle, whose command comes from a controller. Not to be mixed with `step`, which begins the next
+    /// cycle.
     pub(crate) fn play_cycle(
         &mut self,
         controller: &mut dyn Controller,
@@ -274,7 +286,7 @@ impl<S: Sink> Rig<S> {
     }
 }
 
-/// The plant's messages and its time, which passes from one entry of the time table to the next.
+/// The ports of the plant: its messages, and the time, which jumps from one entry of the time table to the next.
 #[derive(Debug, Clone)]
 struct Ports<S> {
     log: Log<S>,
