@@ -26,7 +26,7 @@ use crate::pose_law::{Demand, Detour, LawFailed, PoseLaw};
 const BREAK_CYCLES: usize = 10;
 /// Share of the force that is left then.
 const BREAK_SHARE: f64 = 0.5;
-/// Cycles at the end of its range after which a load cell tells nothing.
+/// Cycles at the end of its range after which a load cell counts as useless.
 const FULL_CYCLES: usize = 3;
 /// Time constant with which the jaw catches up with the opening motion, s.
 const CATCH_UP_S: f64 = 0.02;

@@ -1,4 +1,5 @@
-//! Forces as the controller knows them: the model of the mechanism, the observer of external forces, and feed-forward.
+//! Forces by the controller's own model of the mechanism: the model, the observer of external forces, and
+//! feed-forward. Nothing here controls a force.
 
 use masseter_model::dynamics::{Bodies, Equations, Friction, Loads, Motion, Reactions};
 use masseter_model::geometry::{AXES, Mechanism, Pose, Twist};
@@ -99,7 +100,7 @@ pub(crate) fn signal(name: &str, unit: &str, about: &str) -> Signal {
     Signal { name: name.to_owned(), unit: unit.to_owned(), about: about.to_owned() }
 }
 
-/// Masses and friction of a mechanism as the controller believes in them: inverse dynamics with friction.
+/// Inverse dynamics with friction, by the masses and the friction that the controller assumes.
 ///
 /// τ = J⁻ᵀ (M V̇ + h − w) + friction, with the [equations](masseter_model::dynamics) of the rigid bodies.
 #[derive(Debug, Clone)]
@@ -121,7 +122,7 @@ struct Braking {
 }
 
 impl Model {
-    /// The model in which the controller of a scenario believes.
+    /// The model that the controller of a scenario assumes.
     fn new(scenario: &Scenario, mechanism: Mechanism) -> Self {
         let config = scenario.model();
         Self { mechanism, bodies: Bodies::from(&config), friction: Friction::new(&config) }
@@ -132,8 +133,8 @@ impl Model {
         Motion::new(&self.mechanism, pose, twist).ok()
     }
 
-    /// Forces of the axes d₁ d₂ d₃ l₁ l₂ l₃ (N) that give a motion the acceleration V̇ (m/s², rad/s²) against an
-    /// external wrench on the platform (N, N m); none in a singular pose.
+    /// Forces of the axes d₁ d₂ d₃ l₁ l₂ l₃ (N) that give a motion the acceleration V̇ (m/s², rad/s²). They act
+    /// against an external wrench on the platform (N, N m). None in a singular pose.
     fn force_n(&self, motion: &Motion, acceleration: &Twist, wrench: &Vector6<f64>) -> Option<Vector6<f64>> {
         let equations = Equations::new(&self.bodies, motion);
         let moved_n = equations.inverse(acceleration, wrench)?;

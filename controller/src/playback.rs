@@ -280,8 +280,8 @@ impl Slew {
         Self { value: 1.0, target: 1.0, per_s: 0.0, most_per_s, most_per_s2 }
     }
 
-    /// The shortest time of a change of rate or amplitude from 0 to 1, of both at once too, that leaves a motion with
-    /// these demands within its limits, s. Without demands it is the longest.
+    /// The shortest time, s, in which rate and amplitude may change from 0 to 1, also both at once. The motion has
+    /// these demands, and stays within its limits. Without demands the time is the longest one.
     fn change_s(demands: Option<&TrajectoryReport>, limits: &TrajectoryLimitsConfig) -> f64 {
         let Some(demands) = demands else { return LONGEST_S };
         let of_axis = |axis: usize| {

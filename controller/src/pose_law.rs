@@ -64,7 +64,7 @@ impl Default for Detour {
     }
 }
 
-/// A law gave no pose. The program itself says why; the event of the safe stop has the cause `law_failed`.
+/// A law gave no pose. The law's program reports the reason; the event of the safe stop has the cause `law_failed`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the pose law failed")]
 pub struct LawFailed;

@@ -76,7 +76,7 @@ pub(crate) struct Estimate {
 pub(crate) struct Sequencer {
     pub(crate) config: ControllerConfig,
     pub(crate) period_s: f64,
-    /// How long the drives may take to be enabled, s: the master, which knows more of them, gives up first.
+    /// How long the drives may take to be enabled, s. The master, which has more of their state, gives up first.
     enable_timeout_s: f64,
     /// How long a safe stop is observed, s.
     observation_s: f64,

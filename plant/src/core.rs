@@ -193,7 +193,7 @@ impl<L: Link> PlantCore<L> {
         self.injector.alter(self.cycle, sampled_ns, now_ns, command)
     }
 
-    /// Takes what the emulation reports, and tells the link the times that have become known.
+    /// Takes what the emulation reports, and gives the link the times that have become known.
     fn follow_injections(&mut self) {
         while let Some(occurrence) = self.link.next_occurrence() {
             self.injector.note(&occurrence, self.cycle);

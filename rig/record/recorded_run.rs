@@ -1,4 +1,4 @@
-//! What must be known of a recorded run to replay its cycles, and which reading its controller received in each.
+//! A recorded run, prepared for its replay: its cycles, and the reading that its controller received in each.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::io::{Read, Seek};
@@ -136,7 +136,7 @@ fn is_intervention(event: &Event) -> bool {
     event.source == Source::Controller.code() && causes.contains(&event.cause)
 }
 
-/// The readings that the controller has not received yet. They tell which reading it received in each recorded cycle.
+/// The readings that the controller has not received yet. They show which reading it received in each recorded cycle.
 ///
 /// A state names the last complete reading that was used, and when the wait for a reading ended. A reading that moved
 /// the former on was received. A complete one that did not was late, unless the controller refused it, which stops

@@ -170,7 +170,7 @@ fn intervene(event: &Event, controller: &mut dyn Controller, duties: &Duties, ru
     }
 }
 
-/// The wake-up that a state tells of.
+/// The wake-up that a state holds.
 fn wake_of(state: &State) -> Wake {
     Wake {
         cycle: state.cycle,

@@ -1,4 +1,4 @@
-//! `masseter robot check-pose`: whether the six positions tell the closed pose.
+//! `masseter robot check-pose`: whether the six positions give the closed pose.
 
 use anyhow::{Context, anyhow, bail, ensure};
 use clap::Args;
@@ -44,7 +44,7 @@ pub(crate) struct CheckPoseArgs {
     out_of_order: bool,
 }
 
-/// What six positions tell.
+/// What follows from six positions.
 #[derive(Debug, Serialize)]
 struct Found {
     positions_m: [f64; AXES],

@@ -19,7 +19,7 @@ use super::identity::{Identity, Known, NOT_ASKED, check_present, check_undisturb
 use super::ledger::{before_file, read_before, return_owed_values};
 use super::robot_line::{RobotLine, Surveys, deviations_table, drives, failed, prove_off};
 
-/// Configures, and tells what was changed.
+/// Configures the drives, and lists the changes.
 pub(crate) fn configure(args: &WriteArgs) -> Result<Exit, Failure> {
     let (scenario, axes) = (args.robot.scenario().usage()?, args.axes());
     let past = Past::read(&args.robot.folder).usage()?;
@@ -49,7 +49,7 @@ fn refused(robot: &RobotLine, surveys: &Surveys) -> Vec<(usize, Deviation)> {
     surveyed.flat_map(of_drive).filter(|(_, deviation)| deviation.outcome == Outcome::Refused).collect()
 }
 
-/// Restores, and tells what was changed.
+/// Restores the old objects, and lists the changes.
 pub(crate) fn restore(args: &WriteArgs) -> Result<Exit, Failure> {
     let scenario = args.robot.scenario().usage()?;
     let past = Past::read(&args.robot.folder).usage()?;

@@ -31,9 +31,9 @@ pub(crate) enum Step {
     Restore,
     /// An axis moved alone.
     Jog(usize),
-    /// All axes know their zero.
+    /// All axes have their zero.
     Home,
-    /// The pose of the platform is the one that the axes tell.
+    /// The pose of the platform is the one that follows from the axes' positions.
     CheckPose,
     /// The motion was played slowly.
     DryRun,
@@ -247,7 +247,7 @@ pub(crate) enum Lack {
     /// The profiles or the values that decide objects are others.
     #[error("outdated: the profiles changed since {0}")]
     OtherProfile(String),
-    /// The drive is another one, or tells less or more of itself.
+    /// The drive is another one, or its identity has fewer or more numbers.
     #[error("outdated: the drive's {}", .now.differs_from(before))]
     OtherDrive { before: Identity, now: Identity },
     /// Nobody asked the drive then.
@@ -457,7 +457,7 @@ mod tests {
         assert!(parent.join("03-inspect/result.json").exists());
     }
 
-    /// A pose that was checked before the axes were homed again says nothing of the new zeros.
+    /// A pose that was checked before the axes were homed again is no evidence for the new zeros.
     #[test]
     fn a_step_that_is_repeated_outdates_those_after_it_and_one_out_of_order_counts_for_nothing() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! Who the drive of an axis is: what it says of itself (1018h), and the node that says it; whether it is still the
-//! same drive at the end of a step.
+//! The identity of an axis' drive: its identity object (1018h) and its node id. It shows whether an axis still has
+//! the same drive at the end of a step.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -23,13 +23,13 @@ pub(crate) const NOT_ASKED: [Known; AXES] = [Known::NotAsked; AXES];
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Entry {
-    /// The drive tells this number.
+    /// The drive has this number.
     Told(u32),
-    /// The drive was asked and refuses to tell one: it has none.
+    /// The drive refused the request: it has no such number.
     Absent,
 }
 
-/// The identity of a drive. Equal ones are one drive, as far as it tells.
+/// The identity of a drive. Two drives without serial numbers may have equal ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Identity {
     /// The node id at which it answers.
@@ -130,7 +130,7 @@ impl Identity {
         Ok(())
     }
 
-    /// What tells it from another one, such as "product code was 402h, and is 7h".
+    /// Its differences from an earlier identity, such as "product code was 402h, and is 7h".
     pub(crate) fn differs_from(&self, before: &Self) -> String {
         let entries = before.entries().into_iter().zip(self.entries());
         let others = entries.filter(|((.., before), (.., now))| before != now);
@@ -151,10 +151,10 @@ impl Display for Identity {
 }
 
 impl Known {
-    /// What a survey tells of a drive; nothing without all answers.
+    /// The identity in a survey; `NotAsked` unless all answers came.
     pub(crate) fn of_survey(survey: Option<&Survey>, node: u8) -> Self {
         let Some(survey) = survey.filter(|survey| !survey.fell_silent()) else { return Self::NotAsked };
-        // Only a refusal says that the drive has no such entry.
+        // Only a refusal shows that the drive has no such entry.
         let entry = |object| match (survey.number(object), survey.refusal(object)) {
             (Some(number), _) => Ok(Entry::Told(number)),
             (None, Some(SdoReason::Aborted(_))) => Ok(Entry::Absent),
@@ -195,7 +195,7 @@ pub(super) fn check_undisturbed(line: &Line, axes: &[usize], since: BootUps) -> 
     Ok(line.strangers().refuse_masters()?)
 }
 
-/// The same, and asks the drives again who they are.
+/// The same, and reads the identities of the drives again.
 pub(super) fn check_present(
     line: &mut Line,
     can: &CanConfig,
@@ -217,7 +217,7 @@ pub(super) fn check_present(
     Ok(())
 }
 
-/// What these identities do not tell, one line for each gap.
+/// What these identities leave open, one line for each gap.
 pub(crate) fn gaps(drives: &[Known; AXES]) -> Vec<String> {
     let known = || drives.iter().enumerate().filter_map(|(axis, known)| Some((axis, known.identity()?)));
     let names = |alike: &dyn Fn(&Identity) -> bool| {
@@ -234,7 +234,7 @@ pub(crate) fn gaps(drives: &[Known; AXES]) -> Vec<String> {
         ));
     }
     for (axis, identity) in known().filter(|(_, identity)| identity.serial != Entry::Absent) {
-        // Two nodes may tell the same.
+        // Two nodes may have the same numbers.
         let twins = names(&|other| other.entries() == identity.entries());
         if twins.len() > 1 && twins[0] == AXIS_NAMES[axis] {
             gaps.push(format!(
@@ -247,7 +247,7 @@ pub(crate) fn gaps(drives: &[Known; AXES]) -> Vec<String> {
     gaps
 }
 
-/// Says what the identities do not tell.
+/// Warns of what the identities leave open.
 pub(crate) fn warn_of_gaps(drives: &[Known; AXES]) {
     for gap in gaps(drives) {
         status!("warning: {gap}");

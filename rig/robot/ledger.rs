@@ -1,5 +1,5 @@
-//! Files with old values of drives. `configure` keeps those from before it; a jog or a homing owes those that it
-//! reduces to the drive, in a file for each axis that only a killed step leaves.
+//! Files with old values of drives. `configure` keeps the values from before it. A jog or a homing reduces some
+//! values for its own duration, and keeps the old ones in a file for each axis. Only a killed step leaves that file.
 //!
 //! Other programs and people may have changed such a file: what is read is checked before anything is sent.
 

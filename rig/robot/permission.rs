@@ -43,8 +43,8 @@ struct DryRun {
 }
 
 /// Notes in the folder of the bring-up, if there is one, whether a dry run passed. The drives are those of the pose
-/// check, which a dry run on real interfaces has compared; one without bring-up has compared nothing and counts for
-/// nothing.
+/// check, with which a dry run on real interfaces has compared them. A dry run without bring-up has compared nothing,
+/// and counts for nothing.
 pub(crate) fn keep_dry_run(
     played: &Played<'_>,
     run: &Path,

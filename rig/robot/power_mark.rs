@@ -66,14 +66,14 @@ pub(super) enum MarkError {
     Line(#[from] LineError),
 }
 
-/// What home says of one axis, as far as it matters here.
+/// The part of home's result for one axis that matters here.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Homed {
     pub(super) axis: String,
     pub(super) mark: Option<Mark>,
 }
 
-/// Whether a drive needs a mark and has room for one. A drive without room is told.
+/// Whether a drive needs a mark and has room for one. Warns of a drive without room.
 fn needs_mark(profile: &DriveProfile, axis: usize) -> bool {
     let ObjectConfig { rule, value, .. } = profile.object(ObjectKey(MARKED));
     let is_free = matches!(rule, ObjectRule::Write | ObjectRule::Optional) && value.is_none();
@@ -86,8 +86,8 @@ fn needs_mark(profile: &DriveProfile, axis: usize) -> bool {
     !profile.homing.absolute && is_free
 }
 
-/// Leaves a mark in a drive that forgets its position without power: a velocity below the present one, which tells from
-/// another start.
+/// Leaves a mark in a drive that loses its position without power: a velocity below the present one. Another start
+/// does not have it.
 pub(super) fn leave_mark(
     scenario: &Scenario,
     line: &mut Line,

@@ -85,7 +85,7 @@ impl Session {
         check_undisturbed(&self.line, &ALL, self.boot_ups)
     }
 
-    /// The same before the step is judged, and asks every drive whether it is still there.
+    /// The same before the step is judged, and checks that every drive still answers.
     pub(super) fn check_present(&mut self) -> Result<(), Disturbance> {
         check_present(&mut self.line, &self.scenario.can, &ALL, self.boot_ups, &self.drives)
     }

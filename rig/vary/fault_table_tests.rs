@@ -102,8 +102,8 @@ fn or_none(value: Option<impl Display>) -> String {
     value.map_or_else(String::new, |value| value.to_string())
 }
 
-/// A row, and whether the fault never struck although its message was due, led the jaw beyond the limits, or ended
-/// otherwise than with a pass or a safe stop.
+/// A row, and whether it is wrong. It is wrong if the fault never struck although its message was due, or led the jaw
+/// beyond the limits. So is a row that ends otherwise than with a pass or a safe stop.
 fn row(fault: &FaultConfig, cycles: u32, from_s: f64) -> (String, bool) {
     let until_s = Some(from_s + f64::from(cycles) * 1e-3);
     let faults = vec![FaultConfig { from_s: Some(from_s), until_s, ..fault.clone() }];

@@ -1,5 +1,5 @@
-//! The cases of a campaign on the workers of a HyperQueue server. HyperQueue schedules; the folder of the campaign
-//! knows what has ended. So a worker or the server may die at any time, and the same command goes on.
+//! The cases of a campaign on the workers of a HyperQueue server. HyperQueue schedules them; the folder of the
+//! campaign holds what has ended. So a worker or the server may die at any time, and the same command goes on.
 
 use std::io::{self, Write};
 use std::os::unix::process::CommandExt;

@@ -241,7 +241,8 @@ fn of_position(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Opt
     Some(Found::new(object, values(unit), Outcome::Refused, &remedy, key))
 }
 
-/// Units as far as the drive tells them (60A8h to 60AAh). A value that configure writes counts, and not the one that it replaces.
+/// Units of the drive, as far as it has objects for them (60A8h to 60AAh). A value that `configure` writes counts,
+/// not the one that it replaces.
 fn of_units(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Found> {
     let units = &profile.units;
     let declared = [
@@ -267,8 +268,8 @@ fn of_units(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Fo
         .collect()
 }
 
-/// The value of an object after `configure`: one that it writes counts, and not the one that it replaces. None where
-/// the drive has no such object, and where the profile says so.
+/// The value of an object after `configure`: one that it writes counts, and not the one that it replaces. None if the
+/// drive or its profile has no such object.
 fn told(survey: &Survey, profile: &DriveProfile, object: ObjectAddress) -> Option<u32> {
     let ObjectConfig { rule, value, .. } = profile.object(ObjectKey(object));
     let found = || survey.number(object);

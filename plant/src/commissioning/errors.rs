@@ -389,7 +389,7 @@ pub enum MotionError {
         /// The axis.
         axis: usize,
     },
-    /// 6064h at home is not what the profile says.
+    /// 6064h at home is not the value in the profile.
     #[error(
         "{}: 6064h shows {:.3} mm at home, the profile says {:.3} mm; check drive_profile.homing.home_sign, home_object and reversed",
         AXIS_NAMES[*axis], .found_m * 1e3, .expected_m * 1e3
@@ -399,7 +399,7 @@ pub enum MotionError {
         axis: usize,
         /// What 6064h shows, m.
         found_m: f64,
-        /// What the profile says, m.
+        /// The value in the profile, m.
         expected_m: f64,
     },
     /// A second homing found another place.
@@ -431,7 +431,7 @@ pub enum MotionError {
 const FURTHER: [(u16, u8, &str); 2] =
     [(0x30B0, 0, "Home position"), (0x30B1, 0, "Home offset move distance")];
 
-/// Name of an object; empty where the rig knows none.
+/// Name of an object; empty for one that the rig does not use.
 pub fn object_name(object: ObjectAddress) -> &'static str {
     let further =
         || FURTHER.iter().find(|(index, subindex, _)| ObjectAddress::new(*index, *subindex) == object);

@@ -1,7 +1,6 @@
 //! A line to all drives: SDO, NMT and the heartbeat, one question at a time.
 //!
-//! The line keeps one promise for every step of the bring-up: while it has switched on one drive, it refuses to switch
-//! on another.
+//! For every step of the bring-up, the line refuses to switch on a drive while another one is switched on.
 
 use std::fmt::{self, Debug, Formatter};
 use std::io;

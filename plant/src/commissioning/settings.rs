@@ -1,7 +1,6 @@
-//! What a drive shall have, or has: its PDOs and its objects.
+//! The PDOs and objects of a drive: wanted, found, or to be restored.
 //!
-//! The same form serves for the rig's needs, for what was found, and for what is to be restored. A [`Survey`] is what a
-//! drive says of itself: uploads and nothing else.
+//! One form serves all three. A [`Survey`] holds what was read from a drive. This module sends nothing but uploads.
 
 use std::collections::BTreeMap;
 

@@ -20,7 +20,7 @@ const STATUS: ObjectAddress = ObjectAddress::new(0x6041, 0);
 /// Why nothing may be written to a drive.
 #[derive(Debug, thiserror::Error)]
 pub enum PowerError {
-    /// The statusword tells of power, or of nothing.
+    /// The statusword shows power, or cannot be read.
     #[error(
         "{}: statusword {word:04X}h does not show that the drive is without power; switch it off, or use --take-over",
         AXIS_NAMES[*axis]
@@ -205,8 +205,8 @@ const SYNCS: usize = 50;
 /// Time that a node takes to become operational, ns.
 const START_NS: u64 = 50 * MILLISECOND_NS;
 
-/// The longest time from the end of a SYNC until the drive began to transmit its process data, ns; none where it left a
-/// SYNC without an answer. The drive is operational meanwhile, and pre-operational before and after.
+/// The longest time from the end of a SYNC until the drive began to transmit its process data, ns. It is none if a
+/// SYNC had no answer. The drive is operational meanwhile, and pre-operational before and after.
 ///
 /// # Errors
 /// [`LineError`] except those of transfers.

@@ -1,6 +1,6 @@
 //! The watch over a motion, and the switching of one drive with the times of its brake.
 //!
-//! One look reads the moved axis and one of the others, and says what must stop the motion.
+//! One look reads the moved axis and one of the others, and returns what must stop the motion.
 
 use masseter_can::canopen::{EmergencyCode, ObjectAddress};
 use masseter_can::cia402::{Controlword, DriveState, StatusBit, Statusword};
@@ -82,7 +82,7 @@ pub(super) fn read_position(line: &mut Line, axis: usize, scale: &AxisScale) -> 
     Ok(scale.metres(line.read_number(axis, ObjectAddress::new(0x6064, 0))? as i32))
 }
 
-/// 603Fh, or 0 in a drive that does not tell it.
+/// The error code (603Fh), or 0 for a drive without one.
 pub(super) fn read_error_code(line: &mut Line, axis: usize) -> u16 {
     line.read_number(axis, ObjectAddress::new(0x603F, 0)).unwrap_or(0) as u16
 }

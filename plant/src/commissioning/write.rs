@@ -66,7 +66,7 @@ pub enum WriteError {
     Line(#[from] LineError),
 }
 
-/// Writes settings to one drive, and knows what it changed.
+/// Writes settings to one drive, and keeps a list of the changes.
 #[derive(Debug)]
 pub struct Writer<'a> {
     line: &'a mut Line,
@@ -217,7 +217,7 @@ pub(super) struct Loan {
     pub(super) object: ObjectAddress,
     pub(super) value: u32,
     pub(super) bytes: usize,
-    /// Whether the drive may lack the object or refuse the value, whatever its profile says.
+    /// Whether the drive may lack the object or refuse the value, whatever is in its profile.
     pub(super) may_lack: bool,
 }
 

@@ -117,7 +117,7 @@ pub(super) fn plan(wanted: &WantedDrive, resets_faults: bool) -> Vec<Step> {
     steps.extend(HOLD_POSITION);
     steps.push(write(0x6060, 0, CYCLIC_POSITION, 1));
     steps.push(expect(0x6061, 0, CYCLIC_POSITION, Cause::NotAccepted));
-    // A fault tells what somebody has to look at, so it is reset only on request: by an edge, if its cause is gone.
+    // Somebody has to look at a fault, so it is reset only on request: by an edge, if its cause is gone.
     let error_code = ObjectAddress::new(0x603F, 0);
     let with_fault = if resets_faults {
         vec![

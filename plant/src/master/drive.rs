@@ -318,8 +318,8 @@ pub(super) struct Presence {
     answered_ns: u64,
     /// Cycles in a row without process data.
     missing_cycles: u32,
-    /// Recent new process data beyond one a SYNC. A late drive makes up for a cycle without any, one that receives a
-    /// repeated SYNC answers twice, and two of one id send one more every cycle.
+    /// Recent new process data beyond one a SYNC. A late drive makes up for a cycle without any. A drive that
+    /// receives a repeated SYNC answers twice. Two drives of one id send one more every cycle.
     surplus: u32,
     /// New process data since the last SYNC.
     new_data: u32,

@@ -1,7 +1,8 @@
 //! The following error of one drive: the distance of its position from where its targets should have taken the drive.
 //!
-//! A drive takes its newest target at SYNC and reaches the target on a straight line within a period, or later by as much
-//! as `controller.lead_cycles` says. So the master knows the demand at every SYNC, when the drive samples its position.
+//! A drive takes its newest target at SYNC and reaches the target on a straight line within a period. It may lag
+//! behind by the time that `controller.lead_cycles` allows. So the demand at every SYNC, when the drive samples its
+//! position, follows from the targets.
 //!
 //! A real drive cannot follow a demand that is uneven: SYNC comes early or late or overtakes the target, or the targets
 //! stop or start at once. For some cycles after that, the drive may be farther away.

@@ -198,8 +198,8 @@ impl RecentVelocities {
         velocity_m_s.clamp(low.min(older_low), high.max(older_high))
     }
 
-    /// With one more. A motion that has turned back does not go on in its old direction; pose control moves the targets of
-    /// one that waits by less than `slow_m_s`.
+    /// With one more. A motion that has turned back does not go on in its old direction. While a motion waits, pose
+    /// control moves its targets by less than `slow_m_s`.
     fn with(mut self, velocity_m_s: f64, slow_m_s: f64) -> Self {
         for range_m_s in &mut self.ranges_m_s {
             if velocity_m_s > slow_m_s {

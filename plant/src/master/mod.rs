@@ -1,9 +1,9 @@
 //! The CAN master: boots the drives and verifies them, exchanges process data with them every cycle, supervises them,
 //! and stops them when commands cease.
 //!
-//! [`Master`] sequences its parts: [`boot`] verifies one drive, [`drive`] holds the state of one drive, [`exchange`] the
-//! times of the cycle, [`gate`] the controller's commands, and [`supervision`] decides whether drives may move. The
-//! parts return frames and failures; only the master sends.
+//! [`Master`] sequences its parts. [`boot`] verifies one drive, [`drive`] holds the state of one drive, and
+//! [`exchange`] the times of the cycle. [`gate`] judges the controller's commands, and [`supervision`] decides
+//! whether drives may move. The parts return frames and failures; only the master sends.
 //!
 //! The master is written against the bus trait alone ([`Buses`]), so that simulated and real wires are the same to it.
 //! SDO takes place only with drives that exchange no process data, with one request a bus and cycle, queued after the

@@ -197,7 +197,8 @@ fn beyond(
     ))
 }
 
-/// What the profile says of an object, in a dry run with less force: no rule may keep that from the drive.
+/// The profile's rule for an object, in a dry run with less force. A rule that keeps the reduced force from the drive
+/// is refused.
 fn in_this_run(
     config: ObjectConfig,
     object: ObjectAddress,
@@ -214,9 +215,9 @@ fn in_this_run(
     Ok(ObjectConfig { rule: ObjectRule::Write, value, ..config })
 }
 
-/// Whether a drive may lack an object of which the profile says nothing. Many have no event timer for RPDOs; heartbeat
-/// and master supervise these drives too. A bring-up that was killed may have left another fault reaction (605Eh). Only
-/// a dry run needs the limit of force.
+/// Whether a drive may lack an object that the profile does not mention. Many have no event timer for RPDOs;
+/// heartbeat and master supervise these drives too. A bring-up that was killed may have left another fault reaction
+/// (605Eh). Only a dry run needs the limit of force.
 fn may_lack(object: ObjectAddress, scenario: &Scenario) -> bool {
     match (object.index, object.subindex) {
         (0x1400, 5) | (0x605E, 0) => true,

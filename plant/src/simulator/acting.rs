@@ -1,4 +1,5 @@
-//! The faults that act on one part of the plant at an instant.
+//! The faults that act on one part of the plant at an instant: a list that never allocates, one for each part.
+//! [`injection`](super::injection) decides when faults begin and end.
 
 use std::fmt::Debug;
 

@@ -1,4 +1,5 @@
-//! The emulated robot: drives and mechanism, which know nothing of each other, and what injects faults into them.
+//! The emulated robot: drives and mechanism, neither of which depends on the other, and what injects faults into
+//! them.
 //!
 //! [`emulation`] steps drives and mechanism together, on simulated wires or on real interfaces.
 

@@ -1,8 +1,8 @@
 //! `bench loop`: wake-up latency of the real-time loop at 1 kHz, against cyclictest.
 //!
-//! Both run twice: with `/dev/cpu_dma_latency` held, as cyclictest does by default, and with idle states allowed. Which of
-//! the two is better depends on the machine, and on a virtual machine on its host. cyclictest's histogram has a resolution
-//! of 1 µs. Where cyclictest does not run, the loop is measured alone.
+//! Both run twice: with `/dev/cpu_dma_latency` held, as cyclictest does by default, and with idle states allowed.
+//! Which of the two is better depends on the machine; for a virtual machine, it depends on the host. cyclictest's
+//! histogram has a resolution of 1 µs. Where cyclictest does not run, the loop is measured alone.
 
 use std::process::Command;
 

@@ -142,8 +142,8 @@ impl Server {
         }
     }
 
-    /// Disconnects, for each client that waits for a place on a bus, the one there that has asked for nothing for
-    /// longest, and the oldest of too many newcomers.
+    /// For each client that waits for a place on a bus, disconnects the client there whose last request is the
+    /// oldest. Of too many newcomers, disconnects the oldest.
     fn make_room(&mut self) {
         let awaited: Vec<_> = self.clients.iter().filter_map(Client::awaited).collect();
         for bus in awaited {

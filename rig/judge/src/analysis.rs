@@ -427,8 +427,8 @@ pub struct Figures {
     pub stopped_by: Option<StoppedBy>,
     /// For how long all drives were enabled, s.
     pub enabled_s: f64,
-    /// How far the motion came, s of its own time: what the controller stated, as far as the drives were enabled so long and
-    /// that time did not jump, vanish, or pass unseen; none where it stated none.
+    /// How far the motion came, s of its own time, as the controller stated. It counts only while the drives were
+    /// enabled, and the stated time neither jumped nor was missing. None if nothing was stated.
     pub motion_reached_s: Option<f64>,
     /// How far the stated desired poses are from the scenario's motion; none where they need not be it: in an own motion,
     /// with force control, and from where the amplitude is set.

@@ -1,4 +1,5 @@
-//! Codes and events of messages, resolved. A recording of another version may hold codes that this program does not know.
+//! Codes and events of messages, resolved. A recording of another version may hold codes that this program does not
+//! have.
 
 use std::fmt;
 

@@ -1,5 +1,5 @@
-//! The cycles that took longest from the plant's deadline to the command on the wire, each with the hop furthest above
-//! its median and the kernel's counters around it.
+//! The cycles that took longest from the plant's deadline to the command on the wire. Each has the hop furthest above
+//! its median, and the kernel's counters around it.
 //!
 //! SYNC on the wire and the waits of the time table lie between the hops, so a delay counts in one hop alone. Where a newer
 //! command overtook the cycle's own, the path ends with the first later command that went out: the longest cycles end so.

@@ -113,7 +113,7 @@ impl PlayedWatch {
         greatest.deg = worse(greatest.deg, deg);
     }
 
-    /// Whoever sets the amplitude wants other poses from then on.
+    /// Once the amplitude is set, other poses are desired.
     pub(super) fn apply_event(&mut self, event: &Event) {
         let is_set = event.cause == Cause::ParameterSet.code();
         if is_set && self.amplitude_place == Some(event.object as usize) {

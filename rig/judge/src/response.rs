@@ -3,8 +3,8 @@
 //! A bound holds for undisturbed buses. A late process may queue messages closer together than planned; then the plan
 //! is worked out again for the closest queueing. Real interfaces do not report when a frame was queued.
 //!
-//! A stall queues messages far off their times. The bound does not hold for these frames, those of the cycle of the stall and
-//! of the next two, so that they are counted and not judged.
+//! A stall queues messages far off their times. The bound does not hold for the frames of that cycle and of the next
+//! two. They are counted and not judged.
 
 use masseter_can::canopen::Cob;
 use masseter_can::{BusPlan, CanId, PeriodicMessage, PlannedMessage, Tapped};
@@ -25,8 +25,8 @@ pub struct ResponseFigures {
     pub frames: u64,
     /// Longest time from being queued to the end of the frame; none without such frames, ns.
     pub max_ns: Option<u64>,
-    /// The bound by the plan, or by the closest queueing if messages were queued closer together than planned; none
-    /// where there is no bound, and in a run without bounds, ns.
+    /// The bound, ns: by the plan, or by the closest queueing if messages were queued closer together than planned.
+    /// None without a bound.
     pub bound_ns: Option<u64>,
 }
 

@@ -1,5 +1,6 @@
 //! Distance of the platform from its desired pose. The actual pose is the true one where the mechanism is emulated,
-//! and forward kinematics' estimate on the robot, whose true pose is unknown. A pose that is none is infinitely far.
+//! and forward kinematics' estimate on the robot, whose true pose is unknown. A pose with a value that is no number
+//! is infinitely far.
 
 use masseter_model::geometry::{Deviation, Pose};
 use masseter_runtime::clock::SECOND_NS;

@@ -1,5 +1,5 @@
-//! The times of faults and stimuli in a run, from the occurrences that they count from; and the operator of a scenario, who
-//! sets parameters of the controller, asks for a stop, and says when the faults of processes are due.
+//! The times of faults and stimuli in a run, from the occurrences that they count from. And the operator of a
+//! scenario, who sets parameters of the controller and requests a stop, and when the faults of processes are due.
 //!
 //! [`Injection`] acts on nothing: plant, controller and supervisor ask for the windows of what they carry out. The
 //! [`Operator`] sees what the controller sees, readings and its states, and acts on nothing either.

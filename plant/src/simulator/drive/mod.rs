@@ -1,8 +1,8 @@
 //! An emulated servo drive: a CANopen node (CiA 301) with the profile of servo drives (CiA 402) and an encoder.
 //!
-//! [`node`] implements CiA 301, [`axis`] is the profile behind it, and the object [`dictionary`] lies between them: the node
-//! counts in increments, the axis works in SI units. The drive has no bus and no mechanism; its caller delivers
-//! frames and positions. It knows neither scenario nor transport.
+//! [`node`] implements CiA 301, [`axis`] is the profile behind it, and the object [`dictionary`] lies between them:
+//! the node counts in increments, the axis works in SI units. The drive has no bus and no mechanism; its caller
+//! delivers frames and positions. It depends on neither scenario nor transport.
 
 pub(crate) mod axis;
 pub(crate) mod dictionary;

@@ -1,7 +1,6 @@
 //! The emulated drives of a scenario: their settings, what they do otherwise than the standard, their memory.
 //!
-//! The file is JSON, by the names of the axes. A drive that a file does not name, and one without a file, has stored
-//! nothing.
+//! The file of the memory is JSON, by the names of the axes. A drive that has no entry there has stored nothing.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -232,7 +231,7 @@ impl MemoryFile {
         self.is_stale = true;
     }
 
-    /// The refusal of what the file says of a drive.
+    /// The refusal of a drive's values in the file.
     pub(super) fn refuse(&self, axis: usize, reason: &str) -> PlantError {
         refused(&self.path, &format!("{}: {reason}", AXIS_NAMES[axis]))
     }

@@ -1,6 +1,6 @@
 //! What a scenario does to drives and mechanism, and when: the entries that begin and end, in the order of time.
 //!
-//! The agenda acts on nothing. It tells each change once, and it keeps what the emulation reports.
+//! The agenda acts on nothing. It hands out each change once, and keeps what the emulation reports.
 
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -274,7 +274,8 @@ impl Effect {
         }
     }
 
-    /// Whether it changes something as soon as it begins. What breaks a drive, an encoder or an axis says so itself.
+    /// Whether it changes something as soon as it begins. Faults of a drive, an encoder or an axis report that
+    /// themselves.
     fn strikes_at_once(&self) -> bool {
         match self {
             Self::Fault { .. } => false,

@@ -1,7 +1,7 @@
 //! Faults and stimuli that the plant carries out: when each acts, and the events of its beginning and its end.
 //!
-//! [`Injector`] follows the times for the core and acts on commands itself. The
-//! [`Agenda`](agenda::Agenda) has what acts on drives and mechanism, which know nothing of times and scenarios.
+//! [`Injector`] follows the times for the core and acts on commands itself. The [`Agenda`](agenda::Agenda) has what
+//! acts on drives and mechanism, which depend on neither times nor scenarios.
 //!
 //! A command is altered between its receipt and the master. The master judges what comes out, as it would judge a bad
 //! controller: nothing here detects anything.
@@ -22,7 +22,7 @@ use crate::error::PlantError;
 use crate::master::events::Journal;
 use crate::master::link::{Mishap, Occurrence};
 
-/// Follows the occurrences from which times count, tells every window once, and alters commands.
+/// Follows the occurrences from which times count, hands out every window once, and alters commands.
 #[derive(Debug, Clone)]
 pub(crate) struct Injector {
     injection: Injection,

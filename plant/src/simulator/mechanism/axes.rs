@@ -335,8 +335,8 @@ impl DriveSide {
         Element { force_n, damping_n_s_per_m }
     }
 
-    /// By how much the play is closed, positive where the drive pushes upwards, and the contact's damping in the step; zeros
-    /// where the sides do not touch before its end.
+    /// By how much the play is closed, and the contact's damping in the step. The first is positive if the drive
+    /// pushes upwards. Both are zero if the sides do not touch before the end of the step.
     fn contact(&self, ahead_m: f64, joint_m_s: f64, step_s: f64) -> (f64, f64) {
         let next_m = ahead_m + step_s * (self.speed_m_s - joint_m_s);
         if next_m.abs() <= self.half_m {

@@ -153,7 +153,7 @@ impl Dynamics {
         Ok(())
     }
 
-    /// Ends a step that began with these speeds of the axes: what remembers something learns the new speeds and the loads.
+    /// Ends a step that began with these speeds of the axes: parts with a state get the new speeds and the loads.
     fn end_step(&mut self, motion: &Motion, speeds_m_s: &Vector6<f64>, forces: &AxesForces) {
         let step_s = self.step_s();
         let accelerations = motion.accelerations(&self.acceleration);

@@ -1,8 +1,8 @@
 //! The rig's interface for controllers in C and C++; `rig/bindings/interface/masseter.h` documents every function.
 //!
-//! Each function returns a result and keeps its message for [`masseter_error`]. No panic leaves this library: it becomes an
-//! error. A session belongs to the thread that attached. A reference that may be absent is a pointer in C, which is null or
-//! valid for the call; a boxed session is one from [`masseter_attach`], which C does not use again.
+//! Each function returns a result and keeps its message for [`masseter_error`]. No panic leaves this library: it
+//! becomes an error. A session belongs to the thread that attached. A reference that may be absent is a pointer in C,
+//! which is null or valid for the call. A boxed session is one from [`masseter_attach`], which C does not use again.
 #![allow(unsafe_code, reason = "C passes pointers")]
 
 mod law;

@@ -14,7 +14,7 @@ pub enum RequirementResult {
     Passed,
     /// It does not.
     Failed,
-    /// What it needs did not happen; the finding says what.
+    /// What it needs did not happen; the finding names it.
     Untested,
 }
 

@@ -1,5 +1,6 @@
-//! What requirements wait for: occurrences in the events of a run (`fault.NAME`, `stimulus.NAME`, their ends, and
-//! `SOURCE.CAUSE`), conditions that begin to hold, and the part of a run that begins with them.
+//! Triggers of requirements: occurrences in the events of a run, and conditions that begin to hold. Occurrences are
+//! `fault.NAME`, `stimulus.NAME`, their ends, and `SOURCE.CAUSE`. A trigger may also begin the part of a run for
+//! which a requirement counts.
 
 use std::collections::BTreeSet;
 

@@ -82,8 +82,8 @@ impl Registry {
         })
     }
 
-    /// The value of the signal of that name in a cycle, in its unit; none where the cycle lacks a message, and where the signal
-    /// counts from the start of the motion.
+    /// The value of the signal of that name in a cycle, in its unit. None if the cycle lacks a message, or if the
+    /// signal counts from the start of the motion.
     ///
     /// # Errors
     /// As [`Self::place_of`].

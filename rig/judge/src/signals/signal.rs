@@ -1,5 +1,5 @@
-//! A signal: its name, its unit, its meaning, and how its value follows from the messages of a cycle. And the jaw, from
-//! whose poses many signals follow.
+//! A signal: its name, its unit, its meaning, and how its value follows from the messages of a cycle. The jaw is here
+//! too, since many signals follow from its pose.
 
 use std::fmt;
 
@@ -12,8 +12,8 @@ use serde::Serialize;
 use super::timeline::CycleMessages;
 use crate::tracking::{desired_pose, estimated_pose, true_pose};
 
-/// How a signal's value follows from a cycle, and from the pose of the jaw in the first cycle of the motion; none where the
-/// cycle does not have it.
+/// How a signal's value follows from a cycle, and from the pose of the jaw in the first cycle of the motion. None if
+/// the cycle lacks it.
 type Extract = Box<dyn Fn(&CycleMessages, Option<&Pose>) -> Option<f64> + Send + Sync>;
 
 /// The names of the values of a state.

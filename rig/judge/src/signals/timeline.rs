@@ -137,8 +137,8 @@ impl Timeline {
         self.events.push(event.clone());
     }
 
-    /// The next cycle of those that are left once every message has come; after the last one, a closing sample without
-    /// messages, which holds the events that came later.
+    /// The next of the cycles that are left once every message has come. After the last one comes a closing sample
+    /// without messages, which holds the later events.
     pub fn finish(&mut self) -> Option<Sample> {
         while !self.cycles.is_empty() {
             if let Some(sample) = self.hand_out() {
@@ -198,8 +198,8 @@ struct CpuShare {
 }
 
 impl CpuShare {
-    /// The share since the message before, from the time of this one's wake-up and the time that the loop has worked and spun
-    /// since the start, ns. None in simulated time, which has no account.
+    /// The share since the message before. `account` has this one's wake-up, and the time that the loop has worked
+    /// and spun since the start, ns. None in simulated time, which has no account.
     fn of_next(&mut self, account: Option<[u64; 2]>) -> Option<f64> {
         let [woke_ns, busy_ns] = account.filter(|[_, busy_ns]| *busy_ns > 0)?;
         let [before_ns, busy_before_ns] = self.last.replace([woke_ns, busy_ns])?;

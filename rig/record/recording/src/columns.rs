@@ -1,5 +1,5 @@
-//! The numbers in a message, by the ROS 2 message definition in the recording, so that recordings of other versions work too;
-//! and what the definition's comments say of them.
+//! The numbers in a message, by the ROS 2 message definition in the recording. So recordings of other versions work
+//! too. The definition's comments give units and meanings.
 //!
 //! A definition may hold numbers, arrays of fixed length, and one byte sequence at its end. Other definitions, and those
 //! of messages longer than any of the rig's, are refused.

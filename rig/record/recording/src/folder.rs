@@ -1,5 +1,5 @@
-//! The folder of a run and the names of its files; and new files and folders for the output of a command, which creates them
-//! before it computes. Existing ones are never overwritten.
+//! The folder of a run and the names of its files. Also new files and folders for the output of a command, which
+//! creates them before it computes. Existing ones are never overwritten.
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};

@@ -1,11 +1,12 @@
 //! New recordings from old ones: the readable part of a damaged one, or a thinned one.
 //!
-//! A recovered recording is whole. Messages, channels and attached files keep their bytes, numbers and times; schemas are
-//! numbered anew, since damage may have given two of them the same number. Metadata, which Masseter does not write, are not
-//! carried over.
+//! A recovered recording is whole. Messages, channels and attached files keep their bytes, numbers and times. Schemas
+//! are numbered anew, since damage may have given two of them the same number. Metadata, which Masseter does not
+//! write, are not carried over.
 //!
-//! A thinned recording has whole messages of a few cycles, and the digests of all. So it is small enough for a repository,
-//! still tells in which cycle and topic another run first differs from it, and soon after that by how much.
+//! A thinned recording has whole messages of a few cycles, and the digests of all. So it is small enough for a
+//! repository. It still shows in which cycle and topic another run first differs from it, and soon after that by how
+//! much.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Read, Seek, Write};

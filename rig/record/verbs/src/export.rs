@@ -1,5 +1,5 @@
-//! `masseter export`: a recording as tables, one for each topic and one with the named signals of each cycle, with a codebook;
-//! and its CAN frames as candump logs.
+//! `masseter export`: a recording as tables with a codebook, and its CAN frames as candump logs. Each topic has a
+//! table; one more has the named signals of each cycle.
 //!
 //! Everything comes from the recording alone: a run folder is not needed. The recording is read twice, first for its gaps and
 //! the start of its motion. Rows are written in groups, so that its length does not matter for the memory.

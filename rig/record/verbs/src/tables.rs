@@ -1,5 +1,5 @@
-//! The tables of `export`: for a topic a row for each message, in the order of the recording; and `cycles`, a row for each
-//! cycle with the values of all named signals, those of requirements.
+//! The tables of `export`. That of a topic has a row for each message, in the order of the recording. `cycles` has a
+//! row for each cycle, with the values of all named signals, those of requirements.
 
 use std::collections::BTreeMap;
 use std::iter;

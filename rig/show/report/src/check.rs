@@ -1,5 +1,5 @@
-//! One thing that a run is checked for: its finding, and whether that is as it should be. And whether the platform followed
-//! its path: its errors while the motion played, and where each fault led it.
+//! One thing that a run is checked for: its finding, and whether that is as it should be. Among the checks of this
+//! file is whether the platform followed its path: its errors while the motion played, and where each fault led it.
 
 use std::borrow::Cow;
 
@@ -18,9 +18,9 @@ pub enum CheckResult {
     Failed,
     /// It is not, and the machine may be the cause.
     Excused,
-    /// It could not show: what it needs did not happen. The finding says what to do.
+    /// It could not show: what it needs did not happen. The finding names the remedy.
     Untested,
-    /// It does not apply to this run; the finding says why.
+    /// It does not apply to this run; the finding has the reason.
     NotJudged,
 }
 

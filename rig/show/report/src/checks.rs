@@ -1,5 +1,6 @@
-//! What a finished run is checked for, each with its finding and its limit. And whether the motion was played that the run
-//! was to play, by the facts: the scenario's motion, the time for which the drives were enabled, and how far the motion came.
+//! What a finished run is checked for, each with its finding and its limit. One check is whether the intended motion
+//! was played. It depends on the scenario's motion, the time for which the drives were enabled, and how far the
+//! motion came.
 //!
 //! What the checks come to is the [verdict](super::verdict)'s.
 

@@ -44,7 +44,7 @@ pub struct Search {
 
 impl Search {
     /// Evaluates points until the runs are spent, or a value lies below zero. `evaluate` gets the number of the
-    /// evaluation and the point; it returns none where the point says nothing, and is called on all cores at once.
+    /// evaluation and the point. It returns none if the point has no value, and is called on all cores at once.
     /// Returns the number of evaluations up to the first value below zero, if there is one.
     pub fn run(&self, evaluate: impl Fn(usize, &[f64]) -> Value + Sync) -> Option<usize> {
         let watch = Watch {

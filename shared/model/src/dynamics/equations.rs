@@ -202,7 +202,7 @@ impl LegReactions {
         let (stretch_m_s, swing_rad_s) = (motion.rates_m_s[LEGS + leg], motion.swings_rad_s[leg]);
         let (along, across) = (Vec3::new(0.0, cos, sin), Vec3::new(0.0, -sin, cos));
         let carried_m_s2 = Vec3::new(slide_m_s2, 0.0, bodies.gravity_m_s2);
-        // What a link needs to move so against its weight, with its centre at a distance from the hinge that grows at a speed
+        // What a link needs to move so against its weight. The distance of its centre from the hinge grows at a speed
         // and with an acceleration along the leg.
         let needed_by = |link: &Link, arm_m: f64, speed_m_s: f64, acceleration_m_s2: f64| {
             let acceleration = carried_m_s2

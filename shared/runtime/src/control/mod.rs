@@ -269,8 +269,8 @@ fn publish_begin<P: ControllerPorts>(
     event.map_or(Ok(()), |event| ports.publish_event(&event))
 }
 
-/// Makes a state ready to be published: rounds its figures, and enters the use of time and the cycle's times, when the reading
-/// was received, the pose was found, and the command was ready.
+/// Makes a state ready to be published: rounds its figures, and enters the use of time and the times of the cycle.
+/// Those are when the reading was received, the pose was found, and the command was ready.
 fn complete_state(state: &mut State, wake: &Wake, [received_ns, solved_ns, commanded_ns]: [u64; 3]) {
     (state.due_ns, state.woke_ns) = (wake.due_ns, wake.woke_ns);
     (state.received_ns, state.solved_ns, state.commanded_ns) = (received_ns, solved_ns, commanded_ns);

@@ -1,5 +1,5 @@
-//! What every message has, the macro that makes a message of its fields, the types that a field may have, and the ROS 2
-//! definition of a message. The messages themselves are in the [parent module](super).
+//! What messages have in common: the macro that makes a message of its fields, the types that a field may have, and
+//! the ROS 2 definition. The messages themselves are in the [parent module](super).
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;

@@ -42,7 +42,7 @@ impl Drivetrain {
         [self.motor_n.value <= -threshold_n, self.motor_n.value >= threshold_n]
     }
 
-    /// The distance of what the drive sees from the shaft, where its gear ratio is or was wrong.
+    /// The distance of the position that the drive counts from the shaft's, where its gear ratio is or was wrong.
     pub(super) fn gear_error_m(&mut self, demand_m: Option<f64>, faults: &mut Acting<DriveFault>) -> f64 {
         let error_m = self.gear.error_m(faults.size(DriveFault::Scale), demand_m);
         if error_m != 0.0 {
@@ -133,8 +133,8 @@ pub(super) struct Gear {
 }
 
 impl Gear {
-    /// The distance from where the shaft is to where the drive sees it, m, with a ratio while it is wrong and with the
-    /// drive's demand.
+    /// The distance from the shaft's true position to the one that the drive counts, m. `ratio` is given while the
+    /// gear ratio is wrong; `demand_m` is the drive's demand.
     pub(super) fn error_m(&mut self, ratio: Option<f64>, demand_m: Option<f64>) -> f64 {
         let demand_m = demand_m.filter(|_| ratio.is_some());
         if let (Some(ratio), Some(from_m), Some(to_m)) = (ratio, self.demand_m, demand_m) {

@@ -1,7 +1,7 @@
 //! The encoder of an axis, where the dictionary's zero lies in its counts, and the switches (60FDh).
 //!
-//! Three zeros differ. The encoder counts from its own; an incremental drive counts from where it was switched on; the
-//! dictionary's positions count from the zero that homing has set.
+//! There are three zeros. The encoder counts from its own. An incremental drive counts from where it was switched on.
+//! The dictionary's positions count from the zero that homing has set.
 //!
 //! The limit switches close 1 mm before the ends of the stroke and stay closed beyond. The home switch is closed from 1 mm
 //! below to 1 mm above the middle of the stroke. The mechanism's stops are 2 mm beyond the stroke.

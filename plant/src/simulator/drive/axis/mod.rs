@@ -311,7 +311,7 @@ impl Axis {
         }
     }
 
-    /// What homing sees.
+    /// The inputs of homing.
     fn sensed(&self, counts: [i32; 2], is_at_rest: bool) -> Sensed {
         let pushes = self.drivetrain.pushes();
         let (actual, limits) = (self.coordinates.actual(), self.switches.limits);

@@ -67,7 +67,7 @@ impl Search {
     }
 }
 
-/// What homing sees of its axis in a step.
+/// The inputs of homing in a step.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sensed {
     /// The encoder's count before and its present one.

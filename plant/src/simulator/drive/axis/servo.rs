@@ -1,8 +1,8 @@
 //! The servo loops of a drive: P position loop with velocity feed-forward, PI velocity loop, force
 //! limit; force control within a range of velocities; and the holding brake.
 //!
-//! The loops know nothing of CANopen and of time: the caller gives the command of every step. The monitor of the following
-//! error (6065h, 6066h) only judges; the reaction is the axis' matter.
+//! The loops depend on neither CANopen nor time: the caller gives the command of every step. The monitor of the
+//! following error (6065h, 6066h) only judges; the reaction is the axis' matter.
 
 use super::motion::{Motion, ServoCommand, clamp};
 use crate::simulator::drive::Ratings;

@@ -160,8 +160,8 @@ const TEMPERATURE: u8 = 0x08;
 /// The number of errors that the drive can report: room for each of them once.
 const COUNT: usize = 11;
 
-/// The errors that put the drive into fault and last until a reset: the axis was outside the following window for longer
-/// than the time out; nobody controls the drive, and 6007h makes that a fault; the logic supply is too low.
+/// The errors that put the drive into fault and last until a reset. The axis was outside the following window for
+/// longer than the time out. Nobody controls the drive, and 6007h makes that a fault. The logic supply is too low.
 const FAULTS: [EmergencyCode; 3] =
     [EmergencyCode::FOLLOWING_ERROR, EmergencyCode::COMMUNICATION, EmergencyCode::LOGIC_SUPPLY];
 

@@ -1,9 +1,9 @@
 //! Food between teeth: a piece that is bitten, gives way, is chewed to a thinner one, and is swallowed.
 //!
-//! Each of its teeth bears an equal share of the piece: a column, which the tooth compresses by itself. A chew closes the
-//! teeth to less than half of the piece's thickness, and opens them again. The tongue then collects the food: in the next
-//! bite the piece has `left_by_chew` of its thickness. Below `swallowed_m` the food is swallowed, and a fresh piece
-//! follows once the mouth is open wide enough.
+//! Each of its teeth presses on an equal share of the piece: a column, which the tooth compresses by itself. A chew
+//! closes the teeth to less than half of the piece's thickness, and opens them again. The tongue then collects the
+//! food: in the next bite the piece has `left_by_chew` of its thickness. Below `swallowed_m` the food is swallowed,
+//! and a fresh piece follows once the mouth is open wide enough.
 
 #[cfg(test)]
 mod tests;

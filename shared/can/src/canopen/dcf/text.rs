@@ -1,5 +1,5 @@
-//! The text of a description: sections and keys with the line of each, which a crate for INI files would lose; numbers in
-//! the notations of CiA 306, numbers that follow from the node id, and texts.
+//! The text of a description: sections and keys with their lines, and the values of CiA 306. Values are texts,
+//! numbers, and numbers that follow from the node id. A crate for INI files would lose the lines.
 
 use std::collections::HashMap;
 
