@@ -44,6 +44,7 @@ CASES = [
     Case("rt", "PAUSE", "recorder", ANY),
     Case("rt", "STALLS", "loops", MOTION),
     *(Case("lockstep", how, role, ANY) for how in ("KILL", "PAUSE", "STOP") for role in ROLES),
+    *(Case("lockstep", "STOP", role, MOTION) for role in ("controller", "plant")),
     Case("lockstep", "NONE", "none", ANY),
     Case("virtual", "KILL", "supervisor", ANY),
 ]

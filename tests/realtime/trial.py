@@ -201,7 +201,7 @@ class Trial:
         word, reason = verdict["word"], verdict["reason"]
         what = f"exit {code}, {word}, recording {verified}"
         passed = code == PASSED or word.startswith("PASS")
-        if clock == "lockstep" and how in ("KILL", "STOP") and self.bytes_at_hit == len(self.rigs.recording):
+        if clock == "lockstep" and how == "KILL" and self.bytes_at_hit == len(self.rigs.recording):
             # The process had nothing left to do.
             moment = "end"
         if how == "KILL" and moment != "end" and clock != "virtual":
@@ -210,8 +210,8 @@ class Trial:
         if how == "KILL" and not is_killed:
             require(code == DIED or moment == "end" and passed, f"{what}: the death is not the run's end")
             require(reason in ("", f"the {role} died: SIGKILL (9)"), f"{what}: {reason}")
-        if how == "STOP" and role != "supervisor" and moment != "end":
-            require(not passed, f"{what}: a run passed whose process was silent for longer than the patience")
+        if clock == "lockstep" and how == "STOP" and self.case.moment == MOTION:
+            require(code == DIED and reason.startswith(f"the {role} died: "), f"{what}: the silent {role} was not given up: {reason}")
         if how in ("PAUSE", "NONE") or (how == "STOP" and role == "supervisor"):
             require(passed and verified == "complete", f"{what}: the run did not go on: {reason}")
         if clock == "rt":

@@ -239,8 +239,8 @@ impl Agenda {
     }
 
     fn report(&mut self, occurrence: Occurrence) {
-        // Nothing is allocated in a cycle, should nobody take the occurrences.
-        if self.occurrences.len() < self.occurrences.capacity() {
+        // The queue keeps its room, should nobody take the occurrences: nothing is allocated in a cycle.
+        if self.occurrences.len() < 2 * self.entries.len() {
             self.occurrences.push_back(occurrence);
         }
     }
@@ -315,6 +315,7 @@ mod tests {
         let stuck = |size: &str| FaultConfig {
             axis: Some("l1".to_owned()),
             size: Some(size.parse().unwrap()),
+            at_s: Some(0.0),
             ..FaultConfig::new(FaultKindConfig::EncoderOffset)
         };
         let faults = vec![stuck("1 mm"), stuck("2 mm")];

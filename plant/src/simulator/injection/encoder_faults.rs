@@ -40,8 +40,16 @@ pub(crate) enum EncoderFault {
 pub(crate) struct EncoderFaults {
     faults: ArrayVec<ActingFault, KINDS>,
     random: Pcg64Mcg,
-    /// Times (ns) and positions (m) that a slow interface has not shown yet, the oldest first.
-    past: VecDeque<(u64, f64)>,
+    past: Past,
+}
+
+/// Positions that a slow interface has not shown yet.
+#[derive(Debug, Clone)]
+struct Past {
+    /// Times (ns) and positions (m), the oldest first.
+    positions: VecDeque<(u64, f64)>,
+    /// Most positions. A clone of the queue has less room than the queue.
+    room: usize,
 }
 
 /// One fault that acts.
@@ -71,7 +79,8 @@ impl EncoderFaults {
         // Odd multiples keep the streams of the axes apart from each other and from those of the encoders' own noise.
         let stream = seed ^ (axis as u64 + 1).wrapping_mul(0xD1B5_4A32_D192_ED03);
         let random = Pcg64Mcg::seed_from_u64(stream);
-        Self { faults: ArrayVec::new(), random, past: VecDeque::with_capacity(past) }
+        let past = Past { positions: VecDeque::with_capacity(past), room: past };
+        Self { faults: ArrayVec::new(), random, past }
     }
 
     /// A fault begins. One of its kind that acts already is replaced.
@@ -85,7 +94,7 @@ impl EncoderFaults {
     pub(crate) fn end(&mut self, kind: EncoderFault) {
         self.faults.retain(|fault| fault.kind != kind);
         if kind == EncoderFault::Delay {
-            self.past.clear();
+            self.past.positions.clear();
         }
     }
 
@@ -107,13 +116,7 @@ impl EncoderFaults {
 }
 
 impl ActingFault {
-    fn seen_m(
-        &mut self,
-        now_ns: u64,
-        position_m: f64,
-        random: &mut Pcg64Mcg,
-        past: &mut VecDeque<(u64, f64)>,
-    ) -> f64 {
+    fn seen_m(&mut self, now_ns: u64, position_m: f64, random: &mut Pcg64Mcg, past: &mut Past) -> f64 {
         let size = self.size;
         let (from_ns, from_m) = *self.from.get_or_insert((now_ns, position_m));
         match self.kind {
@@ -129,21 +132,24 @@ impl ActingFault {
             EncoderFault::Steps => (position_m / size).round() * size,
             EncoderFault::Sign => 2.0 * from_m - position_m,
             EncoderFault::Loses => from_m + (1.0 - size) * (position_m - from_m),
-            EncoderFault::Delay => delayed_m(past, now_ns, (size * SECOND_NS as f64) as u64, position_m),
+            EncoderFault::Delay => past.delayed_m(now_ns, (size * SECOND_NS as f64) as u64, position_m),
         }
     }
 }
 
-/// The newest position that is as old as the delay; the oldest one before that.
-fn delayed_m(past: &mut VecDeque<(u64, f64)>, now_ns: u64, delay_ns: u64, position_m: f64) -> f64 {
-    if past.len() < past.capacity() {
-        past.push_back((now_ns, position_m));
+impl Past {
+    /// The newest position that is as old as the delay; the oldest one before that.
+    fn delayed_m(&mut self, now_ns: u64, delay_ns: u64, position_m: f64) -> f64 {
+        let Self { positions, room } = self;
+        if positions.len() < *room {
+            positions.push_back((now_ns, position_m));
+        }
+        let is_old = |(time_ns, _): &(u64, f64)| time_ns.saturating_add(delay_ns) <= now_ns;
+        while positions.len() > 1 && positions.get(1).is_some_and(is_old) {
+            positions.pop_front();
+        }
+        positions.front().map_or(position_m, |(_, position_m)| *position_m)
     }
-    let is_old = |(time_ns, _): &(u64, f64)| time_ns.saturating_add(delay_ns) <= now_ns;
-    while past.len() > 1 && past.get(1).is_some_and(is_old) {
-        past.pop_front();
-    }
-    past.front().map_or(position_m, |(_, position_m)| *position_m)
 }
 
 /// Room for the past of a delay of that many seconds, with steps and SYNCs of these durations, ns.

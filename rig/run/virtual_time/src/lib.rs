@@ -20,9 +20,10 @@ use masseter_scenario::Scenario;
 use masseter_terminal::status;
 
 use log::Stream;
+use rig::Stepper;
 
 pub use log::{Log, LoggedPorts, Sink};
-pub use rig::{Latest, Rig, RigError, Snapshot};
+pub use rig::{Rig, RigError, Snapshot};
 
 /// What the user asks of a run.
 pub trait Requests {
@@ -102,7 +103,7 @@ impl Run {
         interrupts: &dyn Requests,
     ) -> anyhow::Result<(S, Ending)> {
         let Self { mut controller, mut duties } = self;
-        let mut rig = Rig::with_sink(&plan.scenario, plan.schedule, sink)?;
+        let mut rig = Stepper::new(&plan.scenario, plan.schedule, sink)?;
         let mut plant_error = None;
         while plant_error.is_none()
             && controller.outcome().is_none()

@@ -4,11 +4,12 @@
 //! Every step happens exactly when the time table has it, so the same scenario, seed and commands leave the same
 //! bytes. Computing takes no time here: readings and commands go out at the latest times that the time table allows.
 //! Only the buses vary. A rig has no controller and no operator: commands come from outside, and nobody sets
-//! parameters or requests a stop. Interfaces that the scenario names are not used.
+//! parameters or requests a stop. A scenario of real interfaces is refused.
 
 #[cfg(test)]
 mod tests;
 
+use std::error::Error;
 use std::sync::Arc;
 
 use masseter_analysis::signals::{CycleMessages, Registry, UnknownSignal};
@@ -28,35 +29,212 @@ use masseter_scenario::Scenario;
 
 use crate::log::{Log, LoggedPorts, Publisher, Sink};
 
-/// Why a rig cannot be made or restored.
+/// Why a rig cannot be made, stepped or restored.
 #[derive(Debug, thiserror::Error)]
 pub enum RigError {
-    /// The scenario does not fit its mechanism, drives or buses.
-    #[error("{0:#}")]
-    Scenario(anyhow::Error),
-    /// The plant cannot be built.
+    /// A value of the scenario is wrong, or the scenario does not fit its mechanism, drives or buses.
+    #[error("the scenario cannot be played: {0:#}")]
+    Scenario(#[source] Box<dyn Error + Send + Sync>),
+    /// The scenario names real interfaces.
+    #[error("the scenario has the interfaces {}; a rig that steps has simulated buses: leave can.interfaces out", .0.join(", "))]
+    Interfaces(Vec<String>),
+    /// The plant failed.
     #[error(transparent)]
     Plant(#[from] PlantError),
+    /// A step failed before, in the middle of a cycle.
+    #[error("the rig failed in cycle {cycle}; reset it, or restore a snapshot")]
+    Failed {
+        /// That cycle.
+        cycle: u64,
+    },
     /// The snapshot is one of another scenario or seed.
     #[error(
-        "the snapshot is one of scenario '{snapshot}' with seed {of_seed}, the rig plays '{rig}' with seed {seed}, or other \
-             values of their keys; restore it on a rig of its own scenario"
+        "the snapshot is of scenario '{snapshot}', seed {snapshot_seed}, the rig of scenario '{rig}', seed {rig_seed}"
     )]
     OtherScenario {
         /// Name of the snapshot's scenario.
         snapshot: String,
-        /// Seed of the snapshot's scenario.
-        of_seed: u64,
+        /// Its seed.
+        snapshot_seed: u64,
         /// Name of the rig's scenario.
         rig: String,
-        /// Seed of the rig's scenario.
-        seed: u64,
+        /// Its seed.
+        rig_seed: u64,
     },
+    /// The scenarios have the same name and seed.
+    #[error("the snapshot is of a scenario '{name}' with other values of its keys than the rig's")]
+    OtherKeys {
+        /// Name of both scenarios.
+        name: String,
+    },
+}
+
+/// Master, buses, drives and mechanism of a scenario. A cycle begins with a reading and ends with a command.
+///
+/// ```
+/// use masseter_runtime::messages::Command;
+/// use masseter_scenario::Scenario;
+/// use masseter_virtual_time::Rig;
+///
+/// let mut rig = Rig::new(&Scenario::default(), 7)?;
+/// let command = Command::default();
+/// for _ in 0..100 {
+///     rig.step(&command)?;
+/// }
+/// let branch = rig.snapshot();
+/// let reading = *rig.step(&command)?;
+///
+/// rig.restore(&branch)?;
+/// assert_eq!(*rig.step(&command)?, reading);
+/// assert!(rig.signal("incisal.z")?.is_some());
+/// # Ok::<(), anyhow::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct Rig {
+    scenario: Arc<Scenario>,
+    registry: Registry,
+    stepper: Stepper<Latest>,
+    has_failed: bool,
+}
+
+/// The state of a rig at an instant, to go on from there again and again. It holds mechanism, drives, buses with
+/// their error counters, master, faults and random streams, and what the rig published last.
+///
+/// It does not hold the caller's controller, nor any file. A rig reads tables of pushes and the memory of the drives
+/// when it is made and at a reset. It writes no file, so what drives store stays in the rig. A snapshot lives in
+/// memory; it cannot be saved.
+#[derive(Debug, Clone)]
+pub struct Snapshot {
+    scenario: Arc<Scenario>,
+    plant: PlantCore,
+    ports: Ports<Latest>,
+    cycle: u64,
+    has_failed: bool,
+}
+
+impl Rig {
+    /// A rig of the scenario with this seed instead of the scenario's, in its first cycle.
+    ///
+    /// # Errors
+    /// When the scenario has real interfaces, a wrong value, or does not fit its mechanism, drives or buses.
+    pub fn new(scenario: &Scenario, seed: u64) -> Result<Self, RigError> {
+        if !scenario.can.is_virtual() {
+            return Err(RigError::Interfaces(scenario.can.interfaces.clone()));
+        }
+        let scenario = Scenario { seed, ..scenario.clone() };
+        scenario.validate().map_err(|error| RigError::Scenario(error.into()))?;
+        let plan = RunPlan::new(scenario).map_err(|error| RigError::Scenario(error.into()))?;
+        let stepper = Stepper::new(&plan.scenario, plan.schedule, Latest::default())?;
+        let registry = Registry::new(&plan.scenario, &Declared::default());
+        let mut rig = Self { scenario: Arc::new(plan.scenario), registry, stepper, has_failed: false };
+        rig.stepper.begin_next_cycle()?;
+        Ok(rig)
+    }
+
+    /// Switches the rig off and on, as it was when new, and begins the first cycle; returns its reading.
+    ///
+    /// # Errors
+    /// When the plant fails.
+    pub fn reset(&mut self) -> Result<&Reading, RigError> {
+        self.has_failed = true;
+        self.stepper = Stepper::new(&self.scenario, self.stepper.schedule, Latest::default())?;
+        self.stepper.begin_next_cycle()?;
+        self.has_failed = false;
+        Ok(self.reading())
+    }
+
+    /// Ends the cycle with a command and begins the next one; returns its reading. Number and time of the command are
+    /// set here. The master refuses a command as it does in a run, such as one that is no number.
+    ///
+    /// # Errors
+    /// When the plant fails. The cycle is then incomplete, and the rig refuses further steps until a
+    /// [`reset`](Self::reset) or [`restore`](Self::restore).
+    pub fn step(&mut self, command: &Command) -> Result<&Reading, RigError> {
+        let Self { stepper, has_failed, .. } = self;
+        if *has_failed {
+            return Err(RigError::Failed { cycle: stepper.cycle });
+        }
+        *has_failed = true;
+        stepper.ports.log.sink_mut().events.clear();
+        let (cycle, now_ns) = (stepper.cycle, stepper.controller_at_ns());
+        let command = stepper.ports.log.record(Publisher::Command, now_ns, |message: &mut Command| {
+            *message = Command { cycle, ..*command };
+        });
+        stepper.end_cycle(Some(command))?;
+        stepper.begin_next_cycle()?;
+        *has_failed = false;
+        Ok(self.reading())
+    }
+
+    /// The reading of this cycle.
+    pub fn reading(&self) -> &Reading {
+        &self.stepper.ports.reading
+    }
+
+    /// The mechanism's true motion at the SYNC of this cycle.
+    pub fn truth(&self) -> Option<&Truth> {
+        self.latest().cycle.truth.as_ref()
+    }
+
+    /// The events of the last step, in the order of their sources.
+    pub fn events(&self) -> &[Event] {
+        &self.latest().events
+    }
+
+    /// The value of a signal in this cycle, in its unit (`masseter signals`). None where it has none, as all of a
+    /// controller's, and those that count from the start of the motion.
+    ///
+    /// # Errors
+    /// Where there is no signal of that name, with the most similar one.
+    pub fn signal(&self, name: &str) -> Result<Option<f64>, UnknownSignal> {
+        self.registry.value(name, &self.latest().cycle)
+    }
+
+    /// The state of the rig, to be [restored](Self::restore) later, also on another rig of the same scenario and seed.
+    pub fn snapshot(&self) -> Snapshot {
+        let Stepper { plant, ports, cycle, .. } = &self.stepper;
+        Snapshot {
+            scenario: self.scenario.clone(),
+            plant: plant.clone(),
+            ports: ports.clone(),
+            cycle: *cycle,
+            has_failed: self.has_failed,
+        }
+    }
+
+    /// Goes back, or on, to a snapshot. The steps that follow are those that followed it.
+    ///
+    /// # Errors
+    /// Where the snapshot is one of another scenario or seed.
+    pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), RigError> {
+        let (own, other) = (&self.scenario, &snapshot.scenario);
+        if !Arc::ptr_eq(own, other) && own != other {
+            return Err(if (&own.name, own.seed) == (&other.name, other.seed) {
+                RigError::OtherKeys { name: own.name.clone() }
+            } else {
+                RigError::OtherScenario {
+                    snapshot: other.name.clone(),
+                    snapshot_seed: other.seed,
+                    rig: own.name.clone(),
+                    rig_seed: own.seed,
+                }
+            });
+        }
+        self.stepper.plant = snapshot.plant.clone();
+        self.stepper.ports = snapshot.ports.clone();
+        self.stepper.cycle = snapshot.cycle;
+        self.has_failed = snapshot.has_failed;
+        Ok(())
+    }
+
+    fn latest(&self) -> &Latest {
+        self.stepper.ports.log.sink()
+    }
 }
 
 /// What a rig published last: reading, truth and contact of the present cycle, and the events of the last step.
 #[derive(Debug, Clone, Default)]
-pub struct Latest {
+struct Latest {
     cycle: CycleMessages,
     events: Vec<Event>,
 }
@@ -77,171 +255,25 @@ impl Sink for Latest {
     }
 }
 
-/// Master, buses, drives and mechanism of a scenario. A cycle begins with a reading and ends with a command.
-///
-/// After an error a cycle is incomplete: go on by [`reset`](Self::reset) or [`restore`](Self::restore) alone.
-///
-/// ```
-/// use masseter_runtime::messages::Command;
-/// use masseter_scenario::Scenario;
-/// use masseter_virtual_time::Rig;
-///
-/// let mut rig = Rig::new(&Scenario::default(), 7)?;
-/// rig.reset()?;
-/// let command = Command::default();
-/// for _ in 0..100 {
-///     rig.step(&command)?;
-/// }
-/// let branch = rig.snapshot();
-/// let reading = *rig.step(&command)?;
-///
-/// rig.restore(&branch)?;
-/// assert_eq!(*rig.step(&command)?, reading);
-/// assert!(rig.signal("incisal.z")?.is_some());
-/// # Ok::<(), anyhow::Error>(())
-/// ```
+/// The plant of a planned scenario, from one half of a cycle to the next; its messages go to a sink.
 #[derive(Debug)]
-pub struct Rig<S = Latest> {
-    scenario: Arc<Scenario>,
+pub(crate) struct Stepper<S> {
     schedule: CycleSchedule,
-    registry: Option<Registry>,
+    period_ns: u64,
     plant: PlantCore,
     ports: Ports<S>,
     /// The number of the cycle, from 1 on.
     cycle: u64,
 }
 
-/// The state of a rig at an instant, to go on from there again and again. It holds mechanism, drives, buses with
-/// their error counters, master, faults and random streams, and what the rig published last.
-///
-/// It does not hold the caller's controller, nor any file. A rig reads tables of pushes and the memory of the drives
-/// when it is made and at a reset. It writes no file, so what drives store stays in the rig. A snapshot lives in
-/// memory; it cannot be saved.
-#[derive(Debug, Clone)]
-pub struct Snapshot {
-    scenario: Arc<Scenario>,
-    plant: PlantCore,
-    ports: Ports<Latest>,
-    cycle: u64,
-}
-
-impl Rig {
-    /// A rig of the scenario with this seed instead of the scenario's, before its first cycle. The values of the
-    /// scenario are expected to be valid: [`Scenario::validate`] is not called.
-    ///
-    /// # Errors
-    /// When the scenario does not fit its mechanism, drives or buses.
-    pub fn new(scenario: &Scenario, seed: u64) -> Result<Self, RigError> {
-        let scenario = Scenario { seed, ..scenario.clone() };
-        let plan = RunPlan::new(scenario).map_err(RigError::Scenario)?;
-        let mut rig = Self::with_sink(&plan.scenario, plan.schedule, Latest::default())?;
-        rig.registry = Some(Registry::new(&plan.scenario, &Declared::default()));
-        Ok(rig)
+impl<S: Sink> Stepper<S> {
+    /// Before the first cycle.
+    pub(crate) fn new(scenario: &Scenario, schedule: CycleSchedule, sink: S) -> Result<Self, PlantError> {
+        let plant = PlantCore::new(scenario, EPOCH_NS)?;
+        Ok(Self { schedule, period_ns: scenario.period_ns(), plant, ports: Ports::new(sink), cycle: 0 })
     }
 
-    /// Makes the rig new and begins the first cycle; returns its reading. The plant's files (tables of pushes, memory
-    /// of the drives) are read again.
-    ///
-    /// # Errors
-    /// When the plant fails.
-    pub fn reset(&mut self) -> Result<&Reading, RigError> {
-        self.plant = PlantCore::new(&self.scenario, EPOCH_NS)?;
-        self.ports = Ports::new(Latest::default());
-        self.cycle = 0;
-        self.begin_next_cycle()?;
-        Ok(&self.ports.reading)
-    }
-
-    /// Ends the cycle with a command and begins the next one; returns its reading. Number, cycle and time of the
-    /// command are set here. In a new rig without a [reset](Self::reset), the first call also begins the first cycle.
-    ///
-    /// # Errors
-    /// When the plant fails. A command that the master refuses is no error: the drives stop, and an event says why.
-    pub fn step(&mut self, command: &Command) -> Result<&Reading, RigError> {
-        if self.cycle == 0 {
-            self.begin_next_cycle()?;
-        }
-        self.ports.sink_mut().events.clear();
-        self.ports.now_ns = self.controller_at_ns();
-        let (cycle, now_ns) = (self.cycle, self.ports.now_ns);
-        let command = self.ports.log.record(Publisher::Command, now_ns, |message: &mut Command| {
-            *message = Command { cycle, ..*command };
-        });
-        self.end_cycle(Some(command))?;
-        self.begin_next_cycle()?;
-        Ok(&self.ports.reading)
-    }
-
-    /// The reading of this cycle.
-    pub fn reading(&self) -> &Reading {
-        &self.ports.reading
-    }
-
-    /// The mechanism's true motion at the SYNC of this cycle; none before the first cycle.
-    pub fn truth(&self) -> Option<&Truth> {
-        self.ports.log.sink().cycle.truth.as_ref()
-    }
-
-    /// Events that the last step published. Those since the SYNC of the present cycle come with the next step.
-    pub fn events(&self) -> &[Event] {
-        &self.ports.log.sink().events
-    }
-
-    /// The value of a signal in this cycle, in its unit (`masseter signals` lists them). It is none for signals of
-    /// the controller and for those that count from the start of the motion.
-    ///
-    /// # Errors
-    /// When there is no signal of that name; the message names the most similar one.
-    pub fn signal(&self, name: &str) -> Result<Option<f64>, UnknownSignal> {
-        let registry = self.registry.as_ref().expect("a rig that is new has a registry");
-        registry.value(name, &self.ports.log.sink().cycle)
-    }
-
-    /// The state of the rig, to be [restored](Self::restore) later, also on another rig of the same scenario and seed.
-    pub fn snapshot(&self) -> Snapshot {
-        let Self { scenario, plant, ports, cycle, .. } = self;
-        Snapshot { scenario: scenario.clone(), plant: plant.clone(), ports: ports.clone(), cycle: *cycle }
-    }
-
-    /// Goes to the state of a snapshot. The same commands then give the same steps as they did from there.
-    ///
-    /// # Errors
-    /// When the snapshot is one of another scenario or seed. Contents of files are not compared.
-    pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), RigError> {
-        if !Arc::ptr_eq(&self.scenario, &snapshot.scenario) && self.scenario != snapshot.scenario {
-            return Err(RigError::OtherScenario {
-                snapshot: snapshot.scenario.name.clone(),
-                of_seed: snapshot.scenario.seed,
-                rig: self.scenario.name.clone(),
-                seed: self.scenario.seed,
-            });
-        }
-        self.plant.clone_from(&snapshot.plant);
-        self.ports.clone_from(&snapshot.ports);
-        self.cycle = snapshot.cycle;
-        Ok(())
-    }
-}
-
-impl<S: Sink> Rig<S> {
-    /// A rig of a planned scenario; its messages go to the sink. It has no signals.
-    pub(crate) fn with_sink(
-        scenario: &Scenario,
-        schedule: CycleSchedule,
-        sink: S,
-    ) -> Result<Self, PlantError> {
-        Ok(Self {
-            scenario: Arc::new(scenario.clone()),
-            schedule,
-            registry: None,
-            plant: PlantCore::new(scenario, EPOCH_NS)?,
-            ports: Ports::new(sink),
-            cycle: 0,
-        })
-    }
-
-    /// Plays a whole cycle, whose command comes from a controller. Not to be mixed with `step`, which begins the next
-    /// cycle.
+    /// One cycle whose command a controller gives.
     pub(crate) fn play_cycle(
         &mut self,
         controller: &mut dyn Controller,
@@ -249,7 +281,6 @@ impl<S: Sink> Rig<S> {
     ) -> Result<(), PlantError> {
         self.begin_next_cycle()?;
         let now_ns = self.controller_at_ns();
-        self.ports.now_ns = now_ns;
         let wake = Wake::on_time(self.cycle, now_ns);
         let mut ports = LoggedPorts::new(&mut self.ports.log, [now_ns; 3], Some(&self.ports.reading));
         let Ok(()) = masseter_runtime::control::run_cycle(controller, duties, &mut ports, &wake);
@@ -258,7 +289,7 @@ impl<S: Sink> Rig<S> {
     }
 
     pub(crate) fn sink_mut(&mut self) -> &mut S {
-        self.ports.sink_mut()
+        self.ports.log.sink_mut()
     }
 
     pub(crate) fn into_sink(self) -> S {
@@ -272,13 +303,14 @@ impl<S: Sink> Rig<S> {
     }
 
     fn end_cycle(&mut self, command: Option<Command>) -> Result<(), PlantError> {
+        self.ports.now_ns = self.controller_at_ns();
         self.ports.command = command;
         let sync = self.sync();
         end_cycle(&mut self.plant, &mut self.ports, &sync)
     }
 
     fn sync(&self) -> Wake {
-        Wake::on_time(self.cycle, EPOCH_NS + (self.cycle - 1) * self.scenario.period_ns())
+        Wake::on_time(self.cycle, EPOCH_NS + (self.cycle - 1) * self.period_ns)
     }
 
     fn controller_at_ns(&self) -> u64 {
@@ -286,7 +318,6 @@ impl<S: Sink> Rig<S> {
     }
 }
 
-/// The ports of the plant: its messages, and the time, which jumps from one entry of the time table to the next.
 #[derive(Debug, Clone)]
 struct Ports<S> {
     log: Log<S>,
@@ -300,10 +331,6 @@ struct Ports<S> {
 impl<S: Sink> Ports<S> {
     fn new(sink: S) -> Self {
         Self { log: Log::new(sink), now_ns: EPOCH_NS, reading: Reading::default(), command: None }
-    }
-
-    fn sink_mut(&mut self) -> &mut S {
-        self.log.sink_mut()
     }
 }
 

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use masseter_controller::motion_controller::MotionController;
 use masseter_runtime::control::{Operator, set_parameters};
+use masseter_runtime::messages::codes::Cause;
 use masseter_runtime::named::NamedValues;
 use proptest::prelude::*;
 
@@ -32,7 +33,7 @@ fn played(scenario: &Scenario, cycles: usize) -> Vec<Recorded> {
     set_parameters(&mut controller, &named);
     let operator = Operator::new(&plan.scenario, named.settings().declared(), EPOCH_NS).unwrap();
     let mut duties = Duties { named, operator };
-    let mut rig = Rig::with_sink(&plan.scenario, plan.schedule, Kept::default()).unwrap();
+    let mut rig = Stepper::new(&plan.scenario, plan.schedule, Kept::default()).unwrap();
     for _ in 0..cycles {
         rig.play_cycle(&mut controller, &mut duties).unwrap();
     }
@@ -63,7 +64,7 @@ fn the_steps_with_a_runs_commands_are_the_run() {
     let scenario = with_keys("seed = 3");
     let run = played(&scenario, 2000);
     let mut rig = Rig::new(&scenario, 3).unwrap();
-    let mut readings = vec![*rig.reset().unwrap()];
+    let mut readings = vec![*rig.reading()];
     readings.extend(steps(&mut rig, &commands(&run)).into_iter().map(|(reading, ..)| reading));
     let of_run: Vec<_> = run
         .iter()
@@ -78,7 +79,7 @@ fn the_steps_with_a_runs_commands_are_the_run() {
 fn a_reset_rig_is_new() {
     let mut rig = Rig::new(&Scenario::default(), 1).unwrap();
     let commands = commands(&played(&Scenario::default(), 1200));
-    let first = *rig.reset().unwrap();
+    let first = *rig.reading();
     let before = steps(&mut rig, &commands);
     assert_eq!(*rig.reset().unwrap(), first);
     assert_eq!(steps(&mut rig, &commands), before);
@@ -86,8 +87,7 @@ fn a_reset_rig_is_new() {
 
 #[test]
 fn signals_have_names_and_values() {
-    let mut rig = Rig::new(&Scenario::default(), 1).unwrap();
-    rig.reset().unwrap();
+    let rig = Rig::new(&Scenario::default(), 1).unwrap();
     let height = rig.signal("incisal.z").unwrap().expect("the jaw has a height");
     assert!(height.abs() < 1000.0, "{height}");
     assert_eq!(rig.signal("controller.state").unwrap(), None, "a rig alone has no controller");
@@ -101,13 +101,39 @@ fn a_snapshot_of_another_scenario_or_seed_is_refused() {
     let mut other = Rig::new(&Scenario::default(), 2).unwrap();
     let refusal = other.restore(&of_one).unwrap_err().to_string();
     assert!(refusal.contains("seed 1") && refusal.contains("seed 2"), "{refusal}");
+    let mut other = Rig::new(&with_keys("rate_hz = 500"), 1).unwrap();
+    let refusal = other.restore(&of_one).unwrap_err().to_string();
+    assert!(refusal.contains("other values of its keys"), "{refusal}");
     let mut same = Rig::new(&Scenario::default(), 1).unwrap();
     same.restore(&of_one).unwrap();
+}
+
+#[test]
+fn a_scenario_that_cannot_be_played_is_refused() {
+    let wrong = Scenario { rate_hz: 0, ..Scenario::default() };
+    assert!(matches!(Rig::new(&wrong, 1), Err(RigError::Scenario(_))));
+    let mut real = Scenario::default();
+    real.can.interfaces = vec!["can0".to_owned(), "can1".to_owned()];
+    let refusal = Rig::new(&real, 1).unwrap_err().to_string();
+    assert!(refusal.contains("can0, can1"), "{refusal}");
+}
+
+#[test]
+fn a_command_that_is_no_number_is_the_masters_to_refuse() {
+    let scenario = Scenario::default();
+    let mut commands = commands(&played(&scenario, 1500));
+    commands.last_mut().unwrap().target_m[0] = f64::NAN;
+    let mut rig = Rig::new(&scenario, 1).unwrap();
+    let last = steps(&mut rig, &commands).pop().unwrap();
+    assert!(last.2.iter().any(|event| event.cause == Cause::BadMessage.code()), "{:?}", last.2);
 }
 
 /// Faults of drives, encoders, buses and mechanism, which begin at a random time.
 fn any_fault() -> impl Strategy<Value = String> {
     let kinds = [
+        "kind = 'encoder_delay'\naxis = 'l1'\nsize = '2 ms'\nat_s",
+        "kind = 'encoder_noise'\naxis = 'l1'\nsize = '5 um'\nfor_s = 0.1\nat_s = 0.3\nname = 'first'\n\
+         [[faults]]\nkind = 'jam'\naxis = 'l2'\nafter = 'fault.first'\nat_s = 0.05\n[[faults]]\nkind = 'jam'\naxis = 'd1'\nat_s",
         "kind = 'encoder_noise'\naxis = 'l1'\nsize = '20 um'\nat_s",
         "kind = 'drive_torque_loss'\naxis = 'd2'\nsize = '50 %'\nat_s",
         "kind = 'jam'\naxis = 'l3'\nat_s",
@@ -129,7 +155,6 @@ proptest! {
         let scenario = with_keys(&format!("seed = {seed}\n{fault}"));
         let commands = commands(&played(&scenario, at + more));
         let mut rig = Rig::new(&scenario, seed).unwrap();
-        rig.reset().unwrap();
         let (before, after) = commands.split_at(at.min(commands.len()));
         steps(&mut rig, before);
         let branch = rig.snapshot();
