@@ -9,7 +9,7 @@ use arbitrary::{Result, Unstructured};
 use masseter_controller::trajectory::Trajectory;
 use masseter_model::geometry::Mechanism;
 use masseter_scenario::{
-    FaultConfig, FaultKindConfig, LateralConfig, MotionConfig, OpeningConfig, ProtrusionConfig, Scenario,
+    BusFault, FaultConfig, LateralConfig, MotionConfig, OpeningConfig, ProtrusionConfig, Scenario,
 };
 
 /// Feeds the target with these bytes.
@@ -84,7 +84,7 @@ fn any_kind(bytes: &mut Unstructured<'_>) -> Result<Scenario> {
         probability: 0.5,
         count: Some(3),
         size: Some("100 us".parse().expect("a time")),
-        ..FaultConfig::new(FaultKindConfig::Delay)
+        ..FaultConfig::new(BusFault::Delay)
     };
     let faults = if bytes.arbitrary()? { vec![fault] } else { Vec::new() };
     let duration_s = bytes.arbitrary::<bool>()?.then_some(3.0);

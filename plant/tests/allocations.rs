@@ -12,7 +12,7 @@ use masseter_runtime::messages::codes::{DriveRequest, DriveState};
 use masseter_runtime::messages::{Command, LAYOUT_VERSION, Reading};
 use masseter_runtime::realtime::Wake;
 use masseter_scenario::{
-    FaultConfig, FaultKindConfig, FaultLayer, FaultPlace, FoodConfig, Scenario, StimulusConfig, TeethConfig,
+    CommandFault, FaultConfig, FaultKindConfig, FoodConfig, Scenario, StimulusConfig, TeethConfig,
 };
 
 struct Counting;
@@ -77,16 +77,17 @@ fn table() -> PathBuf {
 fn injected() -> Scenario {
     let mut scenario = Scenario { teeth: Some(TeethConfig::default()), ..Scenario::default() };
     let of_plant = |kind: &FaultKindConfig| {
-        !matches!(kind.layer(), FaultLayer::Bus | FaultLayer::Process | FaultLayer::Command)
+        use FaultKindConfig::{Bus, Command, Process};
+        !matches!(kind, Bus(_) | Process(_) | Command(_))
     };
     for (place, &kind) in FaultKindConfig::ALL.iter().filter(|kind| of_plant(kind)).enumerate() {
-        let size = kind.size().map(|size| size.dimension.si_unit().text(size.min.max(0.001).min(size.max)));
-        let has_axis = kind.place() != FaultPlace::Fixed;
+        let size = kind.declared().size;
+        let size = size.map(|size| size.dimension.si_unit().text(size.min.max(0.001).min(size.max)));
         scenario.faults.push(FaultConfig {
             name: Some(format!("fault_{place}")),
             from_s: Some(0.4 + 0.005 * place as f64),
             for_s: Some(0.1),
-            axis: has_axis.then(|| AXIS_NAMES[place % AXIS_NAMES.len()].to_owned()),
+            axis: kind.takes("axis").then(|| AXIS_NAMES[place % AXIS_NAMES.len()].to_owned()),
             size: size.map(|text| text.parse().unwrap()),
             ..FaultConfig::new(kind)
         });
@@ -94,7 +95,7 @@ fn injected() -> Scenario {
     scenario.faults.push(FaultConfig {
         at_s: Some(0.1),
         after: Some("fault.fault_1".to_owned()),
-        ..FaultConfig::new(FaultKindConfig::CommandNan)
+        ..FaultConfig::new(CommandFault::Nan)
     });
     let at = |after: &str| StimulusConfig {
         after: Some(after.to_owned()),

@@ -8,7 +8,7 @@ use anyhow::anyhow;
 use clap::{Args, Subcommand};
 use masseter_plan::{RunPlan, read_scenario};
 use masseter_recording::output::new_folder;
-use masseter_scenario::FaultKindConfig;
+use masseter_scenario::{FaultDeclaration, FaultKindConfig};
 use masseter_terminal::{Exit, Failure, OrFailure, result, status};
 
 use crate::run::interrupts::Interrupts;
@@ -51,7 +51,8 @@ pub(super) fn execute(verb: &FaultsVerb) -> Result<Exit, Failure> {
 
 fn list() -> anyhow::Result<Exit> {
     let line = |kind: &FaultKindConfig| {
-        format!("{:<22} {:<10} {}\n", kind.name(), kind.layer().name(), kind.about())
+        let FaultDeclaration { name, layer, about, .. } = kind.declared();
+        format!("{name:<22} {layer:<10} {about}\n")
     };
     result(&FaultKindConfig::ALL.iter().map(line).collect::<String>())?;
     Ok(Exit::Passed)

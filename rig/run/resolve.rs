@@ -13,7 +13,7 @@ use masseter_runtime::control::{Operator, OperatorError, is_seen_by_controller};
 use masseter_runtime::named::{NameError, NamedValues};
 use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain, usable_cores};
 use masseter_scenario::input::excerpt;
-use masseter_scenario::{FaultKindConfig, FaultLayer, Scenario, StimulusConfig};
+use masseter_scenario::{CommandFault, FaultKindConfig, ProcessFault, Scenario, StimulusConfig};
 use masseter_terminal::status;
 
 use super::request::{ClockKind, ControllerChoice, RunRequest};
@@ -173,7 +173,7 @@ fn refusal(scenario: &Scenario) -> Option<String> {
 /// The first fault of a process, which exists only where there are processes.
 fn fault_of_process(scenario: &Scenario) -> Option<FaultKindConfig> {
     let mut kinds = scenario.faults.iter().map(|fault| fault.kind);
-    kinds.find(|kind| kind.layer() == FaultLayer::Process)
+    kinds.find(|kind| kind.is_of_process())
 }
 
 /// Whether the scenario cannot run in one thread.
@@ -220,7 +220,7 @@ fn check_clock(request: &RunRequest, scenario: &Scenario) -> anyhow::Result<()> 
 
 /// Refuses a stall of the controller that real time cannot have: there its process really stops.
 fn check_controller_stall(request: &RunRequest, scenario: &Scenario) -> anyhow::Result<()> {
-    let stall = FaultKindConfig::ControllerStall;
+    let stall = FaultKindConfig::from(CommandFault::ControllerStall);
     if request.clock != ClockKind::Rt || request.controller == ControllerChoice::None {
         return Ok(());
     }
@@ -243,8 +243,9 @@ fn check_controller_stall(request: &RunRequest, scenario: &Scenario) -> anyhow::
 fn check_process_faults(request: &RunRequest, scenario: &Scenario) -> anyhow::Result<()> {
     let Some(first) = fault_of_process(scenario) else { return Ok(()) };
     let RunRequest { clock, controller, .. } = request;
-    let has = |kind| scenario.faults.iter().any(|fault| fault.kind == kind);
-    let (stall, kill) = (FaultKindConfig::CoreStall, FaultKindConfig::ControllerKill);
+    let has = |kind: FaultKindConfig| scenario.faults.iter().any(|fault| fault.kind == kind);
+    let (stall, kill): (FaultKindConfig, FaultKindConfig) =
+        (ProcessFault::CoreStall.into(), ProcessFault::ControllerKill.into());
     ensure!(
         *clock != ClockKind::Virtual,
         "faults.kind = {first}: virtual time has no processes: use --clock lockstep, or rt"

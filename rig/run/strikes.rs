@@ -16,7 +16,9 @@ use masseter_recording::{ProcessFault, RunFolder};
 use masseter_runtime::clock;
 use masseter_runtime::lifecycle::Order;
 use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain};
-use masseter_scenario::{FaultConfig, FaultKindConfig, RealtimeConfig, Scenario};
+use masseter_scenario::{
+    CommandFault, FaultConfig, FaultKindConfig, ProcessFault as Kind, RealtimeConfig, Scenario,
+};
 use masseter_terminal::status;
 use rustix::process::{Signal, pidfd_send_signal};
 
@@ -58,7 +60,7 @@ impl Strikes {
         while let Some(Due { fault, now_ns }) = victims.controller.reports().and_then(Reports::due) {
             let Some(config) = self.faults.get(fault) else { continue };
             if self.is_lockstep {
-                if config.kind != FaultKindConfig::ControllerStall {
+                if config.kind != CommandFault::ControllerStall.into() {
                     self.carry_out_one(fault, now_ns, victims);
                 }
                 // It may have ended.
@@ -90,27 +92,33 @@ impl Strikes {
 
     /// Carries out a fault. Returns where its end is told, if it has one.
     fn strike(&self, fault: &FaultConfig, victims: &mut Victims<'_>) -> anyhow::Result<Option<End>> {
-        use FaultKindConfig as Kind;
         let size = Duration::from_secs_f64(fault.size_si());
-        match fault.kind {
+        let kind = match fault.kind {
+            FaultKindConfig::Process(kind) => kind,
+            FaultKindConfig::Command(CommandFault::ControllerStall) => {
+                let Some(handle) = victims.controller.handle()? else {
+                    bail!("the rig stops only a controller that it has started")
+                };
+                return stall(handle, size).map(Some);
+            }
+            FaultKindConfig::Command(_)
+            | FaultKindConfig::Bus(_)
+            | FaultKindConfig::Encoder(_)
+            | FaultKindConfig::Drive(_)
+            | FaultKindConfig::Axis(_)
+            | FaultKindConfig::Platform(_) => bail!("it is no fault of a process"),
+        };
+        match kind {
             Kind::ControllerKill if !victims.controller.kill() => {
                 bail!("the rig kills only a controller that it has started: use --controller with its path")
             }
             Kind::ControllerKill => {}
             Kind::PlantKill => victims.plant.kill(),
             Kind::RecorderKill => victims.recorder.kill(),
-            Kind::ControllerStall => {
-                let handle = victims.controller.handle()?;
-                let Some(handle) = handle else {
-                    bail!("the rig stops only a controller that it has started")
-                };
-                return stall(handle, size).map(Some);
-            }
             Kind::PlantStall => return stall(victims.plant.handle()?, size).map(Some),
             Kind::RecorderStall => return stall(victims.recorder.handle()?, size).map(Some),
             Kind::CoreStall => return stall_core(&self.realtime, size).map(Some),
             Kind::DiskFull => fill_disk(&self.recording, victims.recorder)?,
-            _ => bail!("it is no fault of a process"),
         }
         Ok(None)
     }

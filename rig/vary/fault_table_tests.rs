@@ -15,7 +15,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use masseter_report::Verdict;
-use masseter_scenario::{ChecksConfig, FaultConfig, FaultKindConfig, Scenario};
+use masseter_scenario::{BusFault, ChecksConfig, FaultConfig, Scenario};
 use rayon::prelude::*;
 
 use crate::run::interrupts::Interrupts;
@@ -71,14 +71,14 @@ fn boot_messages(nodes: &[u8]) -> Vec<(u8, u8, u16)> {
     nodes.iter().flat_map(of_node).collect()
 }
 
-fn fault(kind: FaultKindConfig, bus: usize, node: u8, id: Option<u16>) -> FaultConfig {
-    let size = (kind == FaultKindConfig::Delay).then(|| "1500 us".parse().expect("a time"));
+fn fault(kind: BusFault, bus: usize, node: u8, id: Option<u16>) -> FaultConfig {
+    let size = (kind == BusFault::Delay).then(|| "1500 us".parse().expect("a time"));
     FaultConfig { bus: Some(bus), node: Some(node), id, size, ..FaultConfig::new(kind) }
 }
 
 /// Every fault of a bus, without its time.
 fn faults_of_bus(bus: usize, nodes: &[u8]) -> Vec<FaultConfig> {
-    use FaultKindConfig::{Babble, BusOff, Disconnect};
+    use BusFault::{Babble, BusOff, Disconnect};
     let gone = nodes
         .iter()
         .chain([&MASTER])
@@ -87,7 +87,7 @@ fn faults_of_bus(bus: usize, nodes: &[u8]) -> Vec<FaultConfig> {
 }
 
 fn faults_of_messages(bus: usize, messages: &[(u8, u8, u16)]) -> Vec<FaultConfig> {
-    use FaultKindConfig::{Corrupt, Delay, Duplicate, Lose};
+    use BusFault::{Corrupt, Delay, Duplicate, Lose};
     let lost = messages.iter().map(|&(_, receiver, id)| fault(Lose, bus, receiver, Some(id)));
     let mut sent: Vec<_> = messages.iter().map(|&(sender, _, id)| (sender, id)).collect();
     sent.sort_unstable();

@@ -10,9 +10,7 @@ use anyhow::Context;
 use masseter_model::geometry::{AXIS_NAMES, Vec3};
 use masseter_plan::RunPlan;
 use masseter_runtime::messages::codes::EventKind;
-use masseter_scenario::{
-    ChecksConfig, FaultConfig, FaultKindConfig, FaultLayer, FaultPlace, Quantity, Scenario,
-};
+use masseter_scenario::{ChecksConfig, DriveFault, FaultConfig, FaultKindConfig, Quantity, Scenario};
 use masseter_terminal::Failure;
 use rayon::prelude::*;
 
@@ -57,17 +55,15 @@ pub(crate) fn cases(plan: &RunPlan, filter: Option<&str>) -> Vec<Case> {
 }
 
 fn cases_in(scenario: &Scenario, phases: &[Phase], filter: Option<&str>) -> Vec<Case> {
-    let kinds = FaultKindConfig::ALL.iter().filter(|kind| {
-        kind.layer() != FaultLayer::Process && filter.is_none_or(|text| kind.name().contains(text))
-    });
+    let kinds = FaultKindConfig::ALL
+        .iter()
+        .filter(|kind| !kind.is_of_process() && filter.is_none_or(|text| kind.name().contains(text)));
     kinds.flat_map(|kind| of_kind(*kind, scenario, phases)).collect()
 }
 
 fn of_kind(kind: FaultKindConfig, scenario: &Scenario, phases: &[Phase]) -> Vec<Case> {
-    let axes: Vec<_> = match kind.place() {
-        FaultPlace::Fixed => vec![None],
-        _ => (0..AXIS_NAMES.len()).map(Some).collect(),
-    };
+    let has_axis = ["axis", "node"].iter().any(|key| kind.takes(key));
+    let axes: Vec<_> = if has_axis { (0..AXIS_NAMES.len()).map(Some).collect() } else { vec![None] };
     let case = |axis: Option<usize>, phase: &Phase| Case {
         fault: fault(kind, axis, scenario, phase),
         axis,
@@ -75,50 +71,25 @@ fn of_kind(kind: FaultKindConfig, scenario: &Scenario, phases: &[Phase]) -> Vec<
     };
     // Only at the beginning of the run is a drive enabled.
     let boot = Phase { name: "enabling", at_s: 0.0 };
-    let phases = if kind == FaultKindConfig::DriveSlowEnable { &[boot] } else { phases };
+    let phases = if kind == DriveFault::SlowEnable.into() { &[boot] } else { phases };
     axes.iter().flat_map(|axis| phases.iter().map(|phase| case(*axis, phase))).collect()
 }
 
 fn fault(kind: FaultKindConfig, axis: Option<usize>, scenario: &Scenario, phase: &Phase) -> FaultConfig {
-    let is_at_boot = kind == FaultKindConfig::DriveSlowEnable;
-    let name = axis.map(|axis| AXIS_NAMES[axis].to_owned());
-    let of_bus = |value: Option<usize>| value.filter(|_| kind.layer() == FaultLayer::Bus);
-    let bus = axis.and_then(|axis| scenario.can.buses.iter().position(|axes| axes.contains(&axis)));
-    let node = axis.map(|axis| scenario.can.node_ids[axis]);
+    let is_at_boot = kind == DriveFault::SlowEnable.into();
+    let axis_if = |key| axis.filter(|_| kind.takes(key));
+    let bus_of = |axis| scenario.can.buses.iter().position(|axes| axes.contains(&axis));
+    let example = kind.declared().size.map(|size| size.example);
     FaultConfig {
         at_s: (!is_at_boot).then_some(phase.at_s),
         from_s: is_at_boot.then_some(0.0),
         for_s: (!is_at_boot).then_some(FOR_S),
-        bus: of_bus(bus),
-        node: node.filter(|_| kind.layer() == FaultLayer::Bus),
-        axis: name.filter(|_| kind.layer() != FaultLayer::Bus),
-        size: size(kind)
-            .map(|text| text.parse::<Quantity>().expect("the sizes of this table are quantities")),
+        bus: axis_if("bus").and_then(bus_of),
+        node: axis_if("node").map(|axis| scenario.can.node_ids[axis]),
+        axis: axis_if("axis").map(|axis| AXIS_NAMES[axis].to_owned()),
+        size: example.map(|text| text.parse::<Quantity>().expect("the examples are quantities")),
         ..FaultConfig::new(kind)
     }
-}
-
-/// A size that a real fault may have.
-fn size(kind: FaultKindConfig) -> Option<&'static str> {
-    use FaultKindConfig as Kind;
-    Some(match kind {
-        Kind::Delay => "1500 us",
-        Kind::EncoderOffset | Kind::CommandJump | Kind::EndStop => "1 mm",
-        Kind::EncoderDrift => "5 mm/s",
-        Kind::EncoderNoise => "50 um",
-        Kind::EncoderSteps => "0.1 mm",
-        Kind::EncoderLoses => "5 %",
-        Kind::EncoderDelay | Kind::EmcyStorm => "5 ms",
-        Kind::DriveTorqueLoss => "50 %",
-        Kind::DriveSlowEnable => "1 s",
-        Kind::DriveReboot => "200 ms",
-        Kind::DriveScale => "1.05",
-        Kind::Friction => "5",
-        Kind::Payload => "0.5 kg",
-        Kind::Play => "0.2 mm",
-        Kind::ControllerStall => "50 ms",
-        _ => return None,
-    })
 }
 
 /// The scenario of a case: long enough for the fault and what it leads to.
@@ -288,7 +259,7 @@ fn csv_line(row: &Row) -> String {
     format!(
         "{},{},{},{phase},{size},{},{source},{cause},{latency},{:.4},{:.4},{},{}\n",
         fault.kind,
-        fault.kind.layer().name(),
+        fault.kind.declared().layer,
         row.axis(),
         row.coverage != Coverage::Idle,
         row.deviation_mm,
@@ -405,8 +376,7 @@ mod tests {
         let phases = [Phase { name: "opening", at_s: 1.6 }];
         let cases = cases_in(&base, &phases, None);
         let kinds: std::collections::BTreeSet<_> = cases.iter().map(|case| case.fault.kind).collect();
-        let of_processes =
-            FaultKindConfig::ALL.iter().filter(|kind| kind.layer() == FaultLayer::Process).count();
+        let of_processes = FaultKindConfig::ALL.iter().filter(|kind| kind.is_of_process()).count();
         assert_eq!(kinds.len(), FaultKindConfig::ALL.len() - of_processes);
         for case in &cases {
             scenario_of(&base, case).validate().unwrap_or_else(|error| panic!("{case:?}: {error}"));

@@ -14,7 +14,7 @@ use masseter_runtime::injection::{Injected, Injection};
 use masseter_runtime::messages::codes::{Cause, EventKind, Source};
 use masseter_runtime::messages::{Contact, Event, Truth};
 use masseter_runtime::realtime::Waiter;
-use masseter_scenario::{CanConfig, FaultConfig, FaultKindConfig, MASTER_NODE, Scenario};
+use masseter_scenario::{BusFault, CanConfig, FaultConfig, FaultKindConfig, MASTER_NODE, Scenario};
 
 use crate::error::{DynamicsError, PlantError};
 
@@ -160,43 +160,39 @@ pub(crate) fn faults_of_bus(
 ) -> Result<Vec<Fault>, PlantError> {
     let injection =
         Injection::new(scenario, now_ns).map_err(|error| PlantError::Scenario(error.to_string()))?;
-    let of_bus = scenario.faults.iter().enumerate().filter(|(_, config)| config.bus == Some(bus));
-    let fault = |(number, config): (usize, &FaultConfig)| {
+    let of_bus = scenario.faults.iter().enumerate().filter_map(|(number, config)| {
+        let FaultKindConfig::Bus(kind) = config.kind else { return None };
+        (config.bus == Some(bus)).then_some((number, kind, config))
+    });
+    let fault = |(number, kind, config): (usize, BusFault, &FaultConfig)| {
         let window_ns = injection.window_ns(Injected::Fault(number)).unwrap_or(u64::MAX..u64::MAX);
-        Ok(fault(number, config, port_of(config, nodes)?, window_ns))
+        Ok(Fault {
+            number,
+            kind: kind_on_wire(kind, config),
+            from_ns: window_ns.start,
+            until_ns: window_ns.end,
+            id: config.id.filter(|_| kind != BusFault::Babble).map(standard),
+            port: port_of(config, nodes)?,
+            probability: config.probability,
+            count: config.count.unwrap_or(if kind == BusFault::BusOff { 1 } else { u64::MAX }),
+        })
     };
     of_bus.map(fault).collect()
 }
 
-fn fault(number: usize, config: &FaultConfig, port: Option<usize>, window_ns: Range<u64>) -> Fault {
-    Fault {
-        number,
-        kind: kind(config),
-        from_ns: window_ns.start,
-        until_ns: window_ns.end,
-        id: config.id.filter(|_| config.kind != FaultKindConfig::Babble).map(standard),
-        port,
-        probability: config.probability,
-        count: config.count.unwrap_or(if config.kind == FaultKindConfig::BusOff { 1 } else { u64::MAX }),
-    }
-}
-
-fn kind(config: &FaultConfig) -> FaultKind {
-    match config.kind {
-        FaultKindConfig::Corrupt => FaultKind::Corrupt,
-        FaultKindConfig::Delay => {
-            FaultKind::Delay { by_ns: (config.size_si() * SECOND_NS as f64).round() as u64 }
-        }
-        FaultKindConfig::Duplicate => FaultKind::Duplicate,
-        FaultKindConfig::Babble => {
+fn kind_on_wire(kind: BusFault, config: &FaultConfig) -> FaultKind {
+    match kind {
+        BusFault::Corrupt => FaultKind::Corrupt,
+        BusFault::Lose => FaultKind::Lose,
+        BusFault::Delay => FaultKind::Delay { by_ns: (config.size_si() * SECOND_NS as f64).round() as u64 },
+        BusFault::Duplicate => FaultKind::Duplicate,
+        BusFault::Babble => {
             let (id, data) = (standard(config.id.unwrap_or(BABBLE_ID)), config.data.as_deref());
             let frame = Frame::new(id, data.unwrap_or(&BABBLE_DATA)).expect("at most 8 bytes");
             FaultKind::Babble { frame }
         }
-        FaultKindConfig::Disconnect => FaultKind::Disconnect,
-        FaultKindConfig::BusOff => FaultKind::BusOff,
-        // The other kinds have no bus.
-        _ => FaultKind::Lose,
+        BusFault::Disconnect => FaultKind::Disconnect,
+        BusFault::BusOff => FaultKind::BusOff,
     }
 }
 

@@ -8,7 +8,7 @@ use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind, NO_DR
 use masseter_runtime::messages::tap::{self, TapError};
 use masseter_runtime::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
 use masseter_runtime::named::Declared;
-use masseter_scenario::{FaultKindConfig, FaultLayer, Scenario};
+use masseter_scenario::{FaultKindConfig, Scenario};
 use serde::Serialize;
 
 use crate::declared_faults::{FaultFigures, FaultWatch};
@@ -40,7 +40,7 @@ use crate::tracking::{
 /// ```
 /// use masseter_analysis::Analysis;
 /// use masseter_recording::Recorded;
-/// use masseter_scenario::{FaultKindConfig, FaultLayer, Scenario};
+/// use masseter_scenario::Scenario;
 /// use masseter_runtime::messages::State;
 /// use masseter_runtime::named::Declared;
 ///
@@ -192,7 +192,7 @@ impl Analysis {
         let Some(kind) = kind else { return };
         self.stalls.add(*kind, fault);
         // The plant reports the others itself.
-        if kind.layer() != FaultLayer::Process {
+        if !kind.is_of_process() {
             return;
         }
         self.faults.strike(fault.number, fault.struck_ns);

@@ -9,7 +9,7 @@ use std::ops::Range;
 use masseter_recording::ProcessFault;
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::messages::{Reading, State};
-use masseter_scenario::FaultKindConfig;
+use masseter_scenario::{CommandFault, FaultKindConfig, ProcessFault as Kind};
 use serde::Serialize;
 
 /// The cycles that the controller ran, by the reading they used.
@@ -196,9 +196,24 @@ impl ScenarioStalls {
     /// A fault that the supervisor carried out. One without an end lasted longer than the run.
     pub(super) fn add(&mut self, kind: FaultKindConfig, fault: &ProcessFault) {
         let stalled = match kind {
-            FaultKindConfig::PlantStall => &mut self.plant,
-            FaultKindConfig::ControllerStall | FaultKindConfig::CoreStall => &mut self.controller,
-            _ => return,
+            FaultKindConfig::Process(Kind::PlantStall) => &mut self.plant,
+            FaultKindConfig::Process(Kind::CoreStall)
+            | FaultKindConfig::Command(CommandFault::ControllerStall) => &mut self.controller,
+            FaultKindConfig::Process(
+                Kind::ControllerKill
+                | Kind::PlantKill
+                | Kind::RecorderKill
+                | Kind::RecorderStall
+                | Kind::DiskFull,
+            )
+            | FaultKindConfig::Command(
+                CommandFault::Nan | CommandFault::Jump | CommandFault::Version | CommandFault::Foreign,
+            )
+            | FaultKindConfig::Bus(_)
+            | FaultKindConfig::Encoder(_)
+            | FaultKindConfig::Drive(_)
+            | FaultKindConfig::Axis(_)
+            | FaultKindConfig::Platform(_) => return,
         };
         let end_ns = fault.ended_ns.map_or(u64::MAX, |ended_ns| ended_ns.saturating_add(AFTER_NS));
         stalled.windows_ns.push(fault.struck_ns..end_ns);

@@ -7,7 +7,7 @@
 use std::fmt::{self, Display, Formatter};
 use std::ops::Range;
 
-use masseter_scenario::{FaultKindConfig, FaultLayer, Scenario, ScenarioError, Start, StimulusConfig, When};
+use masseter_scenario::{CommandFault, Scenario, ScenarioError, Start, StimulusConfig, When};
 
 use crate::clock::SECOND_NS;
 use crate::messages::Event;
@@ -213,8 +213,8 @@ impl Operator {
             waiting.push((Injected::Stimulus(place), due_of(stimulus, declared).map_err(refused)?));
         }
         for (place, fault) in scenario.faults.iter().enumerate() {
-            let is_of_process = fault.kind.layer() == FaultLayer::Process;
-            if !is_of_process && fault.kind != FaultKindConfig::ControllerStall {
+            let is_of_process = fault.kind.is_of_process();
+            if !is_of_process && fault.kind != CommandFault::ControllerStall.into() {
                 continue;
             }
             let when = fault.when(&entries)?;
@@ -265,9 +265,7 @@ pub fn is_seen_by_controller(when: When, scenario: &Scenario) -> bool {
     match when.start {
         Start::SwitchOn | Start::State(_) => true,
         Start::Stimulus(place) => scenario.stimulus.get(place).is_some_and(StimulusConfig::is_of_controller),
-        Start::Fault(place) => {
-            scenario.faults.get(place).is_some_and(|fault| fault.kind.layer() == FaultLayer::Process)
-        }
+        Start::Fault(place) => scenario.faults.get(place).is_some_and(|fault| fault.kind.is_of_process()),
     }
 }
 
@@ -280,7 +278,7 @@ fn due_of(stimulus: &StimulusConfig, declared: &Declared) -> Result<Due, NameErr
 
 #[cfg(test)]
 mod tests {
-    use masseter_scenario::FaultConfig;
+    use masseter_scenario::{EncoderFault, FaultConfig, ProcessFault};
 
     use super::*;
     use crate::named::Parameter;
@@ -298,7 +296,7 @@ mod tests {
 
     #[test]
     fn one_thing_a_cycle_is_due_from_its_time_of_the_motion_on() {
-        let kill = FaultConfig { at_s: Some(2.0), ..FaultConfig::new(FaultKindConfig::PlantKill) };
+        let kill = FaultConfig { at_s: Some(2.0), ..FaultConfig::new(ProcessFault::PlantKill) };
         let stop = StimulusConfig {
             stop: true,
             after: Some("stimulus.parameter".to_owned()),
@@ -338,7 +336,7 @@ mod tests {
             at_s,
             after: after.map(str::to_owned),
             axis: Some("l2".to_owned()),
-            ..FaultConfig::new(FaultKindConfig::EncoderStuck)
+            ..FaultConfig::new(EncoderFault::Stuck)
         };
         let named = |name: &str, fault: FaultConfig| FaultConfig { name: Some(name.to_owned()), ..fault };
         let faults = vec![

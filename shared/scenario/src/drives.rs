@@ -11,7 +11,8 @@ use toml::Table;
 
 use super::drive_profile::{AccelerationUnit, DriveProfile, ObjectKey, VelocityUnit};
 use super::error::{
-    Checked, LONGEST_S, ScenarioError, keyed, require, require_each, require_positive, require_within,
+    Checked, LONGEST_S, ScenarioError, keyed, require, require_each, require_keys, require_positive,
+    require_within,
 };
 
 /// Increments of encoders: with a coarser one the drives are never as near to their targets as the following limit
@@ -217,7 +218,7 @@ impl AxisScale {
 }
 
 macro_rules! quirk_kinds {
-    ($($(#[doc = $doc:literal])+ $kind:ident $name:literal [$($key:literal),*];)*) => {
+    ($($(#[doc = $doc:literal])+ $kind:ident $name:literal [$($need:ident)*] $([$($take:ident)*])?;)*) => {
         /// What is different.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
         #[serde(rename_all = "snake_case")]
@@ -234,9 +235,9 @@ macro_rules! quirk_kinds {
                 match self { $(Self::$kind => $name),* }
             }
 
-            /// The keys that have an effect on it, beside `kind` and `axes`.
-            pub const fn keys(self) -> &'static [&'static str] {
-                match self { $(Self::$kind => &[$($key),*]),* }
+            /// The keys that it needs, and those that it may have as well, beside `kind` and `axes`.
+            pub const fn keys(self) -> [&'static [&'static str]; 2] {
+                match self { $(Self::$kind => [&[$(stringify!($need)),*], &[$($(stringify!($take)),*)?]]),* }
             }
 
             /// What it does.
@@ -253,7 +254,7 @@ quirk_kinds! {
     /// 6066h takes 0 alone, and 60C2h:01 takes 1 to 100.
     NarrowLimits "narrow_limits" [];
     /// 6083h, 6084h, 6085h and 609Ah count in rpm/s; 60AAh says so and takes no other unit.
-    AccelerationInRpmS "acceleration_in_rpm_s" ["increments_per_turn"];
+    AccelerationInRpmS "acceleration_in_rpm_s" [] [increments_per_turn];
     /// 60C2h:02 is −3 and cannot be written, so that 60C2h:01 counts in ms.
     InterpolationInMs "interpolation_in_ms" [];
     /// The drive has no 6007h, 6066h and 6085h, and no cyclic synchronous position in 6502h.
@@ -263,9 +264,9 @@ quirk_kinds! {
     /// The boot loader sends a boot-up message of its own before the drive's.
     TwoBootUps "two_boot_ups" [];
     /// Saving takes `for_s`; 1010h:01 reads 0 until then, and a reset before then loses the values.
-    SlowSave "slow_save" ["for_s"];
+    SlowSave "slow_save" [for_s];
     /// The brake opens and closes late; targets count once it is open.
-    SlowBrake "slow_brake" ["open_s", "close_s"];
+    SlowBrake "slow_brake" [] [open_s close_s];
     /// The axis has no brake: without power it coasts, and a leg falls.
     NoBrake "no_brake" [];
     /// The position at home is the home offset (607Ch) instead of its negative.
@@ -273,17 +274,17 @@ quirk_kinds! {
     /// The software limits (607Dh) count from zero instead of from the home position.
     LimitsFromZero "limits_from_zero" [];
     /// Safe torque off is active at power-on, for `for_s` or for ever: the drive stays in "switch on disabled".
-    StoAtPowerOn "sto_at_power_on" ["for_s"];
+    StoAtPowerOn "sto_at_power_on" [] [for_s];
     /// The encoder is incremental: 6064h is 0 at power-on, wherever the axis stands.
     IncrementalEncoder "incremental_encoder" [];
     /// The drive is in fault at power-on, with `code` in 603Fh, until it is reset.
-    FaultAtPowerOn "fault_at_power_on" ["code"];
+    FaultAtPowerOn "fault_at_power_on" [code];
     /// The drive restarts by itself once, `after_s` after power-on.
-    Restarts "restarts" ["after_s"];
+    Restarts "restarts" [after_s];
     /// SDO shows `value` in each of `objects`; writes are acknowledged, and change nothing.
-    Shows "shows" ["objects", "value"];
+    Shows "shows" [objects value];
     /// The drive has none of `objects`.
-    Lacks "lacks" ["objects"];
+    Lacks "lacks" [objects];
 }
 
 impl Display for QuirkKindConfig {
@@ -370,27 +371,21 @@ impl QuirkConfig {
 
     /// Refuses keys that have no effect on this kind, and requires those that it needs.
     fn require_keys(&self) -> Checked {
-        use QuirkKindConfig::{FaultAtPowerOn, Lacks, Restarts, Shows, SlowBrake, SlowSave};
-        let kind = self.kind;
         let given = [
-            ("drives.quirk.for_s", self.for_s.is_some(), kind == SlowSave),
-            ("drives.quirk.after_s", self.after_s.is_some(), kind == Restarts),
-            ("drives.quirk.open_s", self.open_s.is_some(), false),
-            ("drives.quirk.close_s", self.close_s.is_some(), false),
-            ("drives.quirk.increments_per_turn", self.increments_per_turn.is_some(), false),
-            ("drives.quirk.code", self.code.is_some(), kind == FaultAtPowerOn),
-            ("drives.quirk.objects", self.objects.is_some(), matches!(kind, Shows | Lacks)),
-            ("drives.quirk.value", self.value.is_some(), kind == Shows),
+            ("drives.quirk.for_s", self.for_s.is_some()),
+            ("drives.quirk.after_s", self.after_s.is_some()),
+            ("drives.quirk.open_s", self.open_s.is_some()),
+            ("drives.quirk.close_s", self.close_s.is_some()),
+            ("drives.quirk.increments_per_turn", self.increments_per_turn.is_some()),
+            ("drives.quirk.code", self.code.is_some()),
+            ("drives.quirk.objects", self.objects.is_some()),
+            ("drives.quirk.value", self.value.is_some()),
         ];
-        for (key, is_given, is_needed) in given {
-            let has_effect = kind.keys().iter().any(|&name| key.rsplit('.').next() == Some(name));
-            let need = format!("leave it away: it has no effect on {kind}");
-            require(has_effect || !is_given, key, &"given", need)?;
-            require(is_given || !is_needed, key, &"none", format_args!("give it: {}", kind.about()))?;
-        }
+        let kind = self.kind;
+        require_keys(kind.name(), kind.keys(), &given, |_| format!("give it: {}", kind.about()))?;
         let is_brake_timed = self.open_s.is_some() || self.close_s.is_some();
         let need = "give open_s, close_s or both";
-        require(kind != SlowBrake || is_brake_timed, "drives.quirk.open_s", &"none", need)
+        require(kind != QuirkKindConfig::SlowBrake || is_brake_timed, "drives.quirk.open_s", &"none", need)
     }
 }
 
@@ -444,7 +439,7 @@ mod tests {
     #[test]
     fn every_kind_is_read_by_its_name_with_its_keys() {
         for kind in QuirkKindConfig::ALL {
-            let values = kind.keys().iter().map(|key| match *key {
+            let values = kind.keys().concat().into_iter().map(|key| match key {
                 "increments_per_turn" => "increments_per_turn = 4096\n".to_owned(),
                 "code" => "code = 0x7305\n".to_owned(),
                 "objects" => "objects = ['60C2h:01']\n".to_owned(),

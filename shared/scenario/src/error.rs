@@ -125,6 +125,22 @@ pub(super) fn require_within(values: &[(&'static str, f64, f64, f64)]) -> Checke
     })
 }
 
+/// Refuses keys of a table that its kind neither needs nor takes, and requires those that it needs. Each key comes with
+/// whether it is given; `need_of` says what a missing one must say.
+pub(super) fn require_keys(
+    kind: &str,
+    [needs, takes]: [&[&str]; 2],
+    given: &[(&'static str, bool)],
+    need_of: impl Fn(&str) -> String,
+) -> Checked {
+    given.iter().try_for_each(|&(key, is_given)| {
+        let has = |names: &[&str]| names.iter().any(|name| key.rsplit('.').next() == Some(name));
+        let need = format_args!("leave it away: it has no effect on {kind}");
+        require(!is_given || has(needs) || has(takes), key, &"given", need)?;
+        if is_given || !has(needs) { Ok(()) } else { Err(ScenarioError::bad(key, &"none", need_of(key))) }
+    })
+}
+
 /// Checks every entry of a list of tables. A refusal names the entry.
 pub(super) fn require_each<T>(entries: &[T], mut check: impl FnMut(&T) -> Checked) -> Checked {
     let mut numbered = entries.iter().enumerate();

@@ -39,7 +39,10 @@ pub use drive_profile::{
 };
 pub use drives::{AxisScale, DriveConfig, DrivesConfig, INCREMENTS_PER_TURN, QuirkConfig, QuirkKindConfig};
 pub use error::ScenarioError;
-pub use faults::{FaultConfig, FaultKindConfig, FaultLayer, FaultPlace, FaultSize};
+pub use faults::{
+    AxisFault, BusFault, CommandFault, DriveFault, EncoderFault, FaultConfig, FaultDeclaration,
+    FaultKindConfig, FaultSize, PlatformFault, ProcessFault,
+};
 pub use force::{BiteProfile, ForceControlConfig, ForceEstimateConfig, ForceSource, LoadCellConfig};
 pub use jaw::{FoodConfig, JawConfig, MOST_PAIRS, Material, TeethConfig, ToothConfig};
 pub use masseter_model::dynamics::{AxesConfig, DynamicsConfig, FrictionConfig, FrictionModel};

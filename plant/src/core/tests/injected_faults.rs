@@ -2,7 +2,9 @@
 
 use masseter_can::canopen::EmergencyCode;
 use masseter_model::geometry::AXIS_NAMES;
-use masseter_scenario::{FaultConfig, FaultKindConfig as Kind, FaultLayer, FaultPlace};
+use masseter_scenario::{
+    AxisFault, CommandFault, DriveFault, EncoderFault, FaultConfig, FaultKindConfig as Kind, PlatformFault,
+};
 
 use super::*;
 
@@ -11,17 +13,17 @@ const FROM_S: f64 = 0.5;
 /// The axis l2.
 const L2: usize = 4;
 
-fn fault(kind: Kind, size: Option<&str>, axis: usize) -> FaultConfig {
-    let has_axis = matches!(kind.place(), FaultPlace::Axis | FaultPlace::Axes);
+fn fault(kind: impl Into<Kind>, size: Option<&str>, axis: usize) -> FaultConfig {
+    let kind = kind.into();
     FaultConfig {
         from_s: Some(FROM_S),
-        axis: has_axis.then(|| AXIS_NAMES[axis].to_owned()),
+        axis: kind.takes("axis").then(|| AXIS_NAMES[axis].to_owned()),
         size: size.map(|size| size.parse().unwrap()),
         ..FaultConfig::new(kind)
     }
 }
 
-fn on_l2(kind: Kind, size: Option<&str>) -> FaultConfig {
+fn on_l2(kind: impl Into<Kind>, size: Option<&str>) -> FaultConfig {
     fault(kind, size, L2)
 }
 
@@ -66,18 +68,19 @@ fn since_switch_on_s(event: &Event) -> f64 {
 
 /// A size with which a kind shows in the motion of the tests.
 fn size_of(kind: Kind) -> Option<&'static str> {
-    kind.size()?;
+    kind.declared().size?;
     Some(match kind {
-        Kind::EncoderOffset | Kind::CommandJump => "2 mm",
-        Kind::EncoderDrift => "20 mm/s",
-        Kind::EncoderNoise => "0.1 mm",
-        Kind::EncoderSteps | Kind::EndStop => "0.05 mm",
-        Kind::EncoderDelay => "5 ms",
-        Kind::DriveSlowEnable | Kind::DriveReboot | Kind::ControllerStall => "30 ms",
-        Kind::EmcyStorm => "1 ms",
-        Kind::Payload => "0.5 kg",
-        Kind::Play => "0.5 mm",
-        Kind::Friction => "5",
+        Kind::Encoder(EncoderFault::Offset) | Kind::Command(CommandFault::Jump) => "2 mm",
+        Kind::Encoder(EncoderFault::Drift) => "20 mm/s",
+        Kind::Encoder(EncoderFault::Noise) => "0.1 mm",
+        Kind::Encoder(EncoderFault::Steps) | Kind::Axis(AxisFault::EndStop) => "0.05 mm",
+        Kind::Encoder(EncoderFault::Delay) => "5 ms",
+        Kind::Drive(DriveFault::SlowEnable | DriveFault::Reboot)
+        | Kind::Command(CommandFault::ControllerStall) => "30 ms",
+        Kind::Drive(DriveFault::EmcyStorm) => "1 ms",
+        Kind::Platform(PlatformFault::Payload) => "0.5 kg",
+        Kind::Axis(AxisFault::Play) => "0.5 mm",
+        Kind::Axis(AxisFault::Friction) => "5",
         _ => "0.5",
     })
 }
@@ -85,12 +88,12 @@ fn size_of(kind: Kind) -> Option<&'static str> {
 /// Every kind on every axis: the event names it, comes when the fault acts, and another one ends it.
 #[test]
 fn every_kind_strikes_on_every_axis_in_its_time_and_ends() {
-    let of_others = |kind: &Kind| matches!(kind.layer(), FaultLayer::Bus | FaultLayer::Process);
+    let of_others = |kind: &Kind| matches!(kind, Kind::Bus(_) | Kind::Process(_));
     for &kind in Kind::ALL.iter().filter(|kind| !of_others(kind)) {
         for (axis, name) in AXIS_NAMES.into_iter().enumerate() {
-            let is_of_start = kind == Kind::DriveSlowEnable;
+            let is_of_start = kind == Kind::Drive(DriveFault::SlowEnable);
             // A brake that does not close shows only once the drives are switched off.
-            let for_s = if kind == Kind::BrakeOpen { 0.3 } else { 0.1 };
+            let for_s = if kind == Kind::Drive(DriveFault::BrakeOpen) { 0.3 } else { 0.1 };
             let from_s = if is_of_start { 0.0 } else { FROM_S };
             let for_s = if is_of_start { 0.6 } else { for_s };
             let given = fault(kind, size_of(kind), axis);
@@ -110,7 +113,10 @@ fn every_kind_strikes_on_every_axis_in_its_time_and_ends() {
             assert!(window_s.contains(&since_switch_on_s(&injected[0])), "{place}: {injected:?}");
             let ended = told(&bench, Cause::FaultEnded);
             assert_eq!((ended.len(), ended.first().map(|event| event.value)), (1, Some(1.0)), "{place}");
-            let lasts_its_size = matches!(kind, Kind::DriveReboot | Kind::ControllerStall);
+            let lasts_its_size = matches!(
+                kind,
+                Kind::Drive(DriveFault::Reboot) | Kind::Command(CommandFault::ControllerStall)
+            );
             let end_s = from_s + if lasts_its_size { 0.03 } else { for_s };
             assert!((since_switch_on_s(&ended[0]) - end_s).abs() < 0.0016, "{place}: {ended:?}");
             assert!(bench.truth.joint_m.iter().all(|joint_m| joint_m.is_finite()), "{place}");
@@ -121,13 +127,13 @@ fn every_kind_strikes_on_every_axis_in_its_time_and_ends() {
 #[test]
 fn a_fault_that_changes_nothing_reports_nothing() {
     for (kind, size) in [
-        (Kind::EncoderOffset, Some("0 mm")),
-        (Kind::EndStop, Some("50 mm")),
-        (Kind::DriveTorqueLoss, Some("0")),
-        (Kind::DriveSlowEnable, Some("1 s")),
-        (Kind::BrakeOpen, None),
-        (Kind::Friction, Some("1")),
-        (Kind::Payload, Some("0 kg")),
+        (Kind::Encoder(EncoderFault::Offset), Some("0 mm")),
+        (Kind::Axis(AxisFault::EndStop), Some("50 mm")),
+        (Kind::Drive(DriveFault::TorqueLoss), Some("0")),
+        (Kind::Drive(DriveFault::SlowEnable), Some("1 s")),
+        (Kind::Drive(DriveFault::BrakeOpen), None),
+        (Kind::Axis(AxisFault::Friction), Some("1")),
+        (Kind::Platform(PlatformFault::Payload), Some("0 kg")),
     ] {
         let mut bench = bench_with(FaultConfig { for_s: Some(0.05), ..on_l2(kind, size) });
         play_until(&mut bench, 0.6);
@@ -140,7 +146,7 @@ fn a_fault_that_changes_nothing_reports_nothing() {
 #[test]
 fn the_same_seed_gives_the_same_faults() {
     let run = |seed| {
-        let faults = vec![on_l2(Kind::EncoderNoise, Some("5 um"))];
+        let faults = vec![on_l2(EncoderFault::Noise, Some("5 um"))];
         let mut bench = Bench::new(&Scenario { seed, faults, ..Scenario::default() });
         play_until(&mut bench, 0.6);
         (bench.reading, bench.truth)
@@ -151,7 +157,8 @@ fn the_same_seed_gives_the_same_faults() {
 
 #[test]
 fn an_encoder_with_an_offset_leads_the_axis_away_and_back() {
-    let mut bench = bench_with(FaultConfig { for_s: Some(0.1), ..on_l2(Kind::EncoderOffset, Some("50 um")) });
+    let mut bench =
+        bench_with(FaultConfig { for_s: Some(0.1), ..on_l2(EncoderFault::Offset, Some("50 um")) });
     hold_until(&mut bench, 0.49);
     let (seen_m, is_m) = (bench.reading.position_m[L2], bench.truth.joint_m[L2]);
     let held_m = bench.reading.position_m;
@@ -164,7 +171,7 @@ fn an_encoder_with_an_offset_leads_the_axis_away_and_back() {
 
 #[test]
 fn the_brake_holds_the_axis_though_its_encoder_drifts() {
-    let mut bench = bench_with(on_l2(Kind::EncoderDrift, Some("50 mm/s")));
+    let mut bench = bench_with(on_l2(EncoderFault::Drift, Some("50 mm/s")));
     hold_until(&mut bench, 0.55);
     let mut switch_off = || {
         (0..100).for_each(|_| bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Off))));
@@ -179,7 +186,7 @@ fn the_brake_holds_the_axis_though_its_encoder_drifts() {
 
 #[test]
 fn a_drive_with_a_low_supply_is_in_fault_and_says_so() {
-    let mut bench = bench_with(on_l2(Kind::DriveFault, None));
+    let mut bench = bench_with(on_l2(DriveFault::Fault, None));
     play_until(&mut bench, 0.6);
     let emergency = told(&bench, Cause::Emergency)[0];
     assert_eq!((EmergencyCode(emergency.value as u16), emergency.axis), (EmergencyCode::LOGIC_SUPPLY, 4));
@@ -190,14 +197,14 @@ fn a_drive_with_a_low_supply_is_in_fault_and_says_so() {
 
 #[test]
 fn a_drive_that_ignores_its_targets_stands_and_is_found_by_its_distance() {
-    let mut bench = bench_with(on_l2(Kind::DriveIgnoresTargets, None));
+    let mut bench = bench_with(on_l2(DriveFault::IgnoresTargets, None));
     play_until(&mut bench, 0.6);
     assert_eq!(first_failure(&bench), Some((Cause::FollowingError, 4)));
 }
 
 #[test]
 fn without_force_a_leg_sinks_under_the_weight_of_the_platform() {
-    let mut bench = bench_with(FaultConfig { for_s: Some(0.01), ..on_l2(Kind::DriveTorqueLoss, Some("1")) });
+    let mut bench = bench_with(FaultConfig { for_s: Some(0.01), ..on_l2(DriveFault::TorqueLoss, Some("1")) });
     hold_until(&mut bench, 0.5);
     let before_m = bench.truth.joint_m[L2];
     hold_until(&mut bench, 0.51);
@@ -206,7 +213,7 @@ fn without_force_a_leg_sinks_under_the_weight_of_the_platform() {
 
 #[test]
 fn a_drive_that_runs_away_pushes_with_full_force_until_the_window_ends_whatever_it_is_told() {
-    let mut bench = bench_with(FaultConfig { for_s: Some(0.3), ..on_l2(Kind::DriveRunaway, None) });
+    let mut bench = bench_with(FaultConfig { for_s: Some(0.3), ..on_l2(DriveFault::Runaway, None) });
     hold_until(&mut bench, 0.5);
     let before_m = bench.truth.joint_m[L2];
     hold_until(&mut bench, 0.52);
@@ -224,7 +231,7 @@ fn a_drive_that_runs_away_pushes_with_full_force_until_the_window_ends_whatever_
 
 #[test]
 fn safe_torque_off_takes_the_drive_to_switch_on_disabled_and_keeps_it_there() {
-    let mut bench = bench_with(on_l2(Kind::DriveSto, None));
+    let mut bench = bench_with(on_l2(DriveFault::Sto, None));
     play_until(&mut bench, 0.6);
     assert_eq!(first_failure(&bench), Some((Cause::DriveFault, 4)));
     assert_eq!(bench.reading.drive_state[L2], DriveState::SwitchOnDisabled.code());
@@ -235,7 +242,7 @@ fn safe_torque_off_takes_the_drive_to_switch_on_disabled_and_keeps_it_there() {
 fn a_drive_enables_later_by_as_much_as_the_fault_says() {
     let enabled_after = |size: &str| {
         let mut bench =
-            bench_with(FaultConfig { from_s: Some(0.0), ..on_l2(Kind::DriveSlowEnable, Some(size)) });
+            bench_with(FaultConfig { from_s: Some(0.0), ..on_l2(DriveFault::SlowEnable, Some(size)) });
         bench.enable();
         bench.cycle
     };
@@ -244,7 +251,7 @@ fn a_drive_enables_later_by_as_much_as_the_fault_says() {
 
 #[test]
 fn a_brake_that_never_closes_lets_a_switched_off_leg_sink_to_its_end() {
-    let mut bench = bench_with(on_l2(Kind::BrakeOpen, None));
+    let mut bench = bench_with(on_l2(DriveFault::BrakeOpen, None));
     hold_until(&mut bench, 0.51);
     let before_m = bench.truth.joint_m;
     for _ in 0..600 {
@@ -259,14 +266,14 @@ fn a_brake_that_never_closes_lets_a_switched_off_leg_sink_to_its_end() {
 
 #[test]
 fn a_brake_that_does_not_open_holds_the_axis_against_its_motor() {
-    let mut bench = bench_with(on_l2(Kind::BrakeClosed, None));
+    let mut bench = bench_with(on_l2(DriveFault::BrakeClosed, None));
     play_until(&mut bench, 0.6);
     assert_eq!(first_failure(&bench), Some((Cause::FollowingError, 4)));
 }
 
 #[test]
 fn a_dip_of_the_supply_silences_the_drive_which_boots_anew() {
-    let mut bench = bench_with(on_l2(Kind::DriveReboot, Some("50 ms")));
+    let mut bench = bench_with(on_l2(DriveFault::Reboot, Some("50 ms")));
     hold_until(&mut bench, 0.54);
     assert_eq!(first_failure(&bench), Some((Cause::ProcessDataLost, 4)));
     let silent = bench.frames.iter().filter(|frame| {
@@ -286,7 +293,7 @@ fn a_dip_of_the_supply_silences_the_drive_which_boots_anew() {
 
 #[test]
 fn with_a_wrong_scale_the_axis_moves_by_a_multiple_and_the_drive_does_not_see_it() {
-    let mut bench = bench_with(on_l2(Kind::DriveScale, Some("0.5")));
+    let mut bench = bench_with(on_l2(DriveFault::Scale, Some("0.5")));
     bench.enable();
     let held_m = bench.reading.position_m;
     hold_at(&mut bench, held_m, 0.55);
@@ -304,7 +311,8 @@ fn with_a_wrong_scale_the_axis_moves_by_a_multiple_and_the_drive_does_not_see_it
 
 #[test]
 fn a_storm_sends_an_emergency_every_so_often() {
-    let mut bench = bench_with(FaultConfig { for_s: Some(0.05), ..on_l2(Kind::EmcyStorm, Some("2 ms")) });
+    let mut bench =
+        bench_with(FaultConfig { for_s: Some(0.05), ..on_l2(DriveFault::EmcyStorm, Some("2 ms")) });
     hold_until(&mut bench, 0.6);
     let sent = bench.frames.iter().filter(|frame| {
         let tapped = tap::decode(frame).unwrap();
@@ -317,7 +325,7 @@ fn a_storm_sends_an_emergency_every_so_often() {
 
 #[test]
 fn a_jam_stops_the_axis_at_once_and_holds_it() {
-    let mut bench = bench_with(FaultConfig { for_s: Some(0.2), ..on_l2(Kind::Jam, None) });
+    let mut bench = bench_with(FaultConfig { for_s: Some(0.2), ..on_l2(AxisFault::Jam, None) });
     play_until(&mut bench, 0.505);
     let stuck_m = bench.truth.joint_m[L2];
     assert!(bench.truth.joint_m_s[L2].abs() < 1e-3, "{}", bench.truth.joint_m_s[L2]);
@@ -330,7 +338,7 @@ fn a_jam_stops_the_axis_at_once_and_holds_it() {
 #[test]
 fn dry_guides_take_more_force_for_the_same_motion() {
     let force_n = |factor: &str| {
-        let mut bench = bench_with(fault(Kind::Friction, Some(factor), 0));
+        let mut bench = bench_with(fault(AxisFault::Friction, Some(factor), 0));
         // About where the slide moves fastest.
         play_until(&mut bench, 0.69);
         assert_eq!(first_failure(&bench), None);
@@ -343,7 +351,7 @@ fn dry_guides_take_more_force_for_the_same_motion() {
 
 #[test]
 fn with_play_the_platform_drops_by_half_of_it_and_the_encoder_does_not_see_that() {
-    let mut bench = bench_with(on_l2(Kind::Play, Some("0.4 mm")));
+    let mut bench = bench_with(on_l2(AxisFault::Play, Some("0.4 mm")));
     hold_until(&mut bench, 0.49);
     let (seen_m, is_m) = (bench.reading.position_m[L2], bench.truth.joint_m[L2]);
     hold_until(&mut bench, 0.8);
@@ -354,7 +362,7 @@ fn with_play_the_platform_drops_by_half_of_it_and_the_encoder_does_not_see_that(
 
 #[test]
 fn a_broken_rod_drops_the_leg_while_its_drive_stands() {
-    let mut bench = bench_with(on_l2(Kind::BrokenRod, None));
+    let mut bench = bench_with(on_l2(AxisFault::BrokenRod, None));
     hold_until(&mut bench, 0.49);
     let (seen_m, is_m) = (bench.reading.position_m[L2], bench.truth.joint_m[L2]);
     hold_until(&mut bench, 1.0);
@@ -364,7 +372,7 @@ fn a_broken_rod_drops_the_leg_while_its_drive_stands() {
 
 #[test]
 fn an_axis_that_falls_on_its_end_stop_is_an_event() {
-    let mut scenario = Scenario { faults: vec![on_l2(Kind::BrokenRod, None)], ..Scenario::default() };
+    let mut scenario = Scenario { faults: vec![on_l2(AxisFault::BrokenRod, None)], ..Scenario::default() };
     scenario.mechanism.strokes.leg_m = [0.288, 0.3];
     scenario.dynamics.axes.stop_beyond_m = 0.0;
     let mut bench = Bench::new(&scenario);
@@ -384,7 +392,7 @@ fn a_hard_stop_ends_the_axis_way() {
     let mut sound = Bench::new(&Scenario::default());
     play_until(&mut sound, 0.501);
     let from_m = sound.truth.joint_m[L2];
-    let mut bench = bench_with(on_l2(Kind::EndStop, Some("0.5 mm")));
+    let mut bench = bench_with(on_l2(AxisFault::EndStop, Some("0.5 mm")));
     play_until(&mut bench, 0.8);
     assert_eq!(first_failure(&bench), Some((Cause::FollowingError, 4)));
     let way_m = (bench.truth.joint_m[L2] - from_m).abs();
@@ -395,10 +403,10 @@ fn a_hard_stop_ends_the_axis_way() {
 #[test]
 fn a_bad_command_stops_the_rig_by_the_path_that_refuses_it() {
     for (kind, size, cause, axis) in [
-        (Kind::CommandNan, None, Cause::BadMessage, 0),
-        (Kind::CommandVersion, None, Cause::BadMessage, NO_AXIS),
-        (Kind::CommandJump, Some("2 mm"), Cause::VelocityLimit, 4),
-        (Kind::ControllerStall, Some("100 ms"), Cause::CommandLost, NO_AXIS),
+        (Kind::Command(CommandFault::Nan), None, Cause::BadMessage, 0),
+        (Kind::Command(CommandFault::Version), None, Cause::BadMessage, NO_AXIS),
+        (Kind::Command(CommandFault::Jump), Some("2 mm"), Cause::VelocityLimit, 4),
+        (Kind::Command(CommandFault::ControllerStall), Some("100 ms"), Cause::CommandLost, NO_AXIS),
     ] {
         let mut bench = bench_with(on_l2(kind, size));
         hold_until(&mut bench, 0.7);
@@ -410,7 +418,7 @@ fn a_bad_command_stops_the_rig_by_the_path_that_refuses_it() {
 /// The controller detects this one: a reading answers a cycle that it has not reached.
 #[test]
 fn a_foreign_command_shows_in_the_readings() {
-    let mut bench = bench_with(on_l2(Kind::CommandForeign, None));
+    let mut bench = bench_with(on_l2(CommandFault::Foreign, None));
     hold_until(&mut bench, 0.55);
     assert!(bench.reading.answers_cycle > bench.cycle);
 }
@@ -418,7 +426,9 @@ fn a_foreign_command_shows_in_the_readings() {
 mod injected_times {
     //! When injected faults act: since switch-on, since the motion began, and since each other.
 
-    use masseter_scenario::{FaultConfig, FaultKindConfig as Kind};
+    use masseter_scenario::{
+        AxisFault, BusFault, CommandFault, DriveFault, EncoderFault, FaultConfig, FaultKindConfig as Kind,
+    };
 
     use crate::core::tests::*;
 
@@ -426,7 +436,7 @@ mod injected_times {
         FaultConfig { name: Some(name.to_owned()), ..fault }
     }
 
-    fn on_l1(kind: Kind) -> FaultConfig {
+    fn on_l1(kind: impl Into<Kind>) -> FaultConfig {
         FaultConfig { axis: Some("l1".to_owned()), ..FaultConfig::new(kind) }
     }
 
@@ -460,7 +470,7 @@ mod injected_times {
             id: Some(0x204),
             at_s: Some(0.05),
             for_s: Some(0.003),
-            ..FaultConfig::new(Kind::Lose)
+            ..FaultConfig::new(BusFault::Lose)
         };
         let mut bench = bench_with(vec![lose]);
         let began_ns = run(&mut bench, 100);
@@ -478,13 +488,13 @@ mod injected_times {
             ..fault
         };
         let lose =
-            FaultConfig { bus: Some(1), node: Some(4), count: Some(1), ..FaultConfig::new(Kind::Lose) };
+            FaultConfig { bus: Some(1), node: Some(4), count: Some(1), ..FaultConfig::new(BusFault::Lose) };
         let size = Some("1 um".parse().unwrap());
         let mut bench = bench_with(vec![
-            named("third", after("fault.second", 0.02, FaultConfig { size, ..on_l1(Kind::EncoderOffset) })),
-            named("first", FaultConfig { at_s: Some(0.03), ..on_l1(Kind::EncoderStuck) }),
+            named("third", after("fault.second", 0.02, FaultConfig { size, ..on_l1(EncoderFault::Offset) })),
+            named("first", FaultConfig { at_s: Some(0.03), ..on_l1(EncoderFault::Stuck) }),
             named("second", after("fault.first", 0.01, lose)),
-            named("fourth", after("fault.third", 0.005, FaultConfig::new(Kind::CommandForeign))),
+            named("fourth", after("fault.third", 0.005, FaultConfig::new(CommandFault::Foreign))),
         ]);
         let began_ns = run(&mut bench, 100);
         let struck = times_ns(&bench, Cause::FaultInjected);
@@ -500,8 +510,8 @@ mod injected_times {
     #[test]
     fn a_fault_of_a_state_that_never_comes_never_acts() {
         let mut bench = bench_with(vec![
-            FaultConfig { at_s: Some(0.0), ..on_l1(Kind::DriveFault) },
-            FaultConfig { at_s: Some(0.5), ..on_l1(Kind::Jam) },
+            FaultConfig { at_s: Some(0.0), ..on_l1(DriveFault::Fault) },
+            FaultConfig { at_s: Some(0.5), ..on_l1(AxisFault::Jam) },
         ]);
         bench.enable();
         (0..100).for_each(|_| bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable))));

@@ -3,12 +3,12 @@
 use masseter_can::canopen::EmergencyCode;
 use masseter_can::{ErrorKind, Tapped};
 use masseter_runtime::messages::codes::NO_AXIS;
-use masseter_scenario::{FaultConfig, FaultKindConfig};
+use masseter_scenario::{BusFault, FaultConfig};
 
 use super::*;
 
 fn base() -> FaultConfig {
-    FaultConfig { bus: Some(0), from_s: Some(0.5), ..FaultConfig::new(FaultKindConfig::Corrupt) }
+    FaultConfig { bus: Some(0), from_s: Some(0.5), ..FaultConfig::new(BusFault::Corrupt) }
 }
 
 fn bench_with(fault: FaultConfig) -> Bench {
@@ -53,7 +53,7 @@ fn the_same_seed_corrupts_the_same_frames_and_another_one_others() {
 
 #[test]
 fn a_babbling_node_makes_a_safe_stop() {
-    let mut bench = bench_with(FaultConfig { kind: FaultKindConfig::Babble, node: Some(2), ..base() });
+    let mut bench = bench_with(FaultConfig { kind: BusFault::Babble.into(), node: Some(2), ..base() });
     play_until(&mut bench, 1.0);
     assert_eq!(bench.reading.master_fault, 1);
     assert_eq!(bench.causes(EventKind::Fault)[0], Cause::ProcessDataLost);
@@ -68,7 +68,7 @@ fn a_babbling_node_makes_a_safe_stop() {
 
 #[test]
 fn a_disconnected_node_is_detected_and_all_drives_stop() {
-    let fault = FaultConfig { kind: FaultKindConfig::Disconnect, bus: Some(1), node: Some(5), ..base() };
+    let fault = FaultConfig { kind: BusFault::Disconnect.into(), bus: Some(1), node: Some(5), ..base() };
     let mut bench = bench_with(fault);
     play_until(&mut bench, 1.0);
     let fault = bench.events.iter().find(|event| event.kind == EventKind::Fault.code()).unwrap();
@@ -80,7 +80,7 @@ fn a_disconnected_node_is_detected_and_all_drives_stop() {
 /// 0x204 for drive 4, which stands still: no position shows the loss.
 fn deaf(until_s: Option<f64>) -> FaultConfig {
     FaultConfig {
-        kind: FaultKindConfig::Lose,
+        kind: BusFault::Lose.into(),
         bus: Some(1),
         node: Some(4),
         id: Some(0x204),
@@ -132,7 +132,7 @@ fn a_moving_drive_that_misses_its_targets_stops_all_within_three_cycles_of_the_s
 
 #[test]
 fn a_drive_in_bus_off_is_reported_and_stops_the_rig() {
-    let fault = FaultConfig { kind: FaultKindConfig::BusOff, node: Some(3), ..base() };
+    let fault = FaultConfig { kind: BusFault::BusOff.into(), node: Some(3), ..base() };
     let mut bench = bench_with(fault);
     play_until(&mut bench, 1.0);
     let told = bench.events.iter().find(|event| event.cause == Cause::BusOff.code()).unwrap();
@@ -147,7 +147,7 @@ fn a_drive_in_bus_off_is_reported_and_stops_the_rig() {
 #[test]
 fn the_masters_own_controller_in_bus_off_is_reported_with_the_bus() {
     let mut bench =
-        bench_with(FaultConfig { kind: FaultKindConfig::BusOff, bus: Some(1), node: Some(127), ..base() });
+        bench_with(FaultConfig { kind: BusFault::BusOff.into(), bus: Some(1), node: Some(127), ..base() });
     play_until(&mut bench, 0.6);
     let told = bench.events.iter().find(|event| event.cause == Cause::BusOff.code()).unwrap();
     assert_eq!((told.source, told.bus, told.axis), (Source::Wire.code(), 1, NO_AXIS));
@@ -157,7 +157,7 @@ fn the_masters_own_controller_in_bus_off_is_reported_with_the_bus() {
 fn drives_boot_though_one_frame_in_a_hundred_comes_twice() {
     for seed in 0..20 {
         let fault = |bus| FaultConfig {
-            kind: FaultKindConfig::Duplicate,
+            kind: BusFault::Duplicate.into(),
             bus: Some(bus),
             from_s: Some(0.0),
             probability: 0.01,
@@ -173,7 +173,7 @@ fn drives_boot_though_one_frame_in_a_hundred_comes_twice() {
 #[test]
 fn a_lost_synchronisation_costs_one_drive_one_cycle() {
     let fault =
-        FaultConfig { kind: FaultKindConfig::Lose, node: Some(1), id: Some(0x080), count: Some(1), ..base() };
+        FaultConfig { kind: BusFault::Lose.into(), node: Some(1), id: Some(0x080), count: Some(1), ..base() };
     let mut bench = bench_with(fault);
     play_until(&mut bench, 1.0);
     assert_eq!(bench.causes(EventKind::Fault), []);
@@ -187,7 +187,7 @@ fn a_lost_synchronisation_costs_one_drive_one_cycle() {
 fn process_data_of_the_cycle_before_are_no_answer_however_late_they_come() {
     for delay_us in [600, 700, 855] {
         let fault = FaultConfig {
-            kind: FaultKindConfig::Delay,
+            kind: BusFault::Delay.into(),
             id: Some(0x181),
             node: Some(1),
             size: Some(format!("{delay_us} us").parse().unwrap()),
@@ -202,7 +202,7 @@ fn process_data_of_the_cycle_before_are_no_answer_however_late_they_come() {
 #[test]
 fn drives_that_are_switched_on_after_the_master_are_waited_for() {
     let faults = [1, 2, 3].map(|node| FaultConfig {
-        kind: FaultKindConfig::Disconnect,
+        kind: BusFault::Disconnect.into(),
         node: Some(node),
         from_s: Some(0.0),
         until_s: Some(0.5),
@@ -216,7 +216,7 @@ fn drives_that_are_switched_on_after_the_master_are_waited_for() {
 
 #[test]
 fn a_fault_of_an_absent_node_is_refused() {
-    let fault = FaultConfig { kind: FaultKindConfig::Disconnect, node: Some(5), ..base() };
+    let fault = FaultConfig { kind: BusFault::Disconnect.into(), node: Some(5), ..base() };
     let scenario = Scenario { faults: vec![fault], ..Scenario::default() };
     let error = PlantCore::new(&scenario, 0).unwrap_err().to_string();
     assert_eq!(error, "faults.node = 5: bus 0 has the nodes 127, 1, 2, 3");

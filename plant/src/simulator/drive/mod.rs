@@ -73,32 +73,6 @@ impl Ratings {
     }
 }
 
-/// A fault of a drive, and what its size is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum DriveFault {
-    /// The logic supply is too low.
-    Fault,
-    IgnoresTargets,
-    /// The share of the force that is lost.
-    TorqueLoss,
-    /// The motor pushes with all its force.
-    Runaway,
-    /// Safe torque off.
-    Sto,
-    /// How late "operation enabled" comes, s.
-    SlowEnable,
-    /// The brake does not close.
-    BrakeOpen,
-    /// The brake does not open.
-    BrakeClosed,
-    /// The supply is gone.
-    Reboot,
-    /// Millimetres that the shaft moves for each that it is asked to.
-    Scale,
-    /// Time between two emergencies, s.
-    EmcyStorm,
-}
-
 /// Everything that a drive does otherwise than the standard.
 #[derive(Debug, Clone)]
 pub(crate) struct Quirks {

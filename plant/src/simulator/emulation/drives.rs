@@ -51,11 +51,10 @@ fn settings_of_axis(scenario: &Scenario, axis: usize, node: NodeId) -> Result<Dr
     objects.set(names::CONSUMER_HEARTBEAT_TIME, watched);
     objects.set(names::PRODUCER_HEARTBEAT_TIME_MS, scenario.can.heartbeat_producer_ms);
     let on_axis: Vec<_> = scenario.drives.quirk.iter().filter(|quirk| quirk.is_on(axis)).collect();
-    let mut quirks = quirks(&on_axis)?;
     // The units come first: quantities are written in them.
-    set_units(&on_axis, &mut objects, &mut quirks.overlay);
+    set_units(&on_axis, &mut objects);
     configure(&mut objects, &drive, scenario.period_ns(), position_limits);
-    set_values(&on_axis, scenario.period_ns(), &mut objects);
+    let quirks = quirks(&on_axis, scenario.period_ns(), &mut objects)?;
     let (step_s, memory) = (scenario.dynamics.step_ns as f64 * 1e-9, DriveMemory::default());
     Ok(DriveSettings { node, drive, step_s, objects, memory, quirks, stroke_m })
 }
@@ -87,25 +86,40 @@ const GENERIC: [[Option<u32>; 2]; 3] =
 const NARROW_PERIOD: u8 = 100;
 /// Milliseconds in 60C2h:02.
 const MILLISECONDS: i8 = -3;
+/// Cyclic synchronous position in 6502h.
+const CYCLIC_POSITION: u32 = 1 << 7;
 
-/// What a drive does otherwise than the standard, but for the values of its dictionary.
+/// What a drive does otherwise than the standard. Writes the values that it is delivered with into its dictionary.
 ///
 /// # Errors
 /// [`PlantError::Scenario`] for an object that no emulated drive has.
-fn quirks(on_axis: &[&QuirkConfig]) -> Result<Quirks, PlantError> {
+fn quirks(on_axis: &[&QuirkConfig], period_ns: u64, objects: &mut Objects) -> Result<Quirks, PlantError> {
     let ns = |time_s: Option<f64>| time_s.map(|time_s| (time_s * SECOND_NS as f64) as u64);
     let mut node = NodeQuirks { boot_ups: 1, locks_pdos: false, save_ns: 0, fault: None, restart_ns: None };
     let mut axis = AxisQuirks { closing_ns: Some(0), ..AxisQuirks::default() };
     let mut overlay = Overlay::default();
     for quirk in on_axis {
         match quirk.kind {
-            Kind::FactoryPdos | Kind::AccelerationInRpmS => {}
+            Kind::FactoryPdos => set_factory_pdos(objects),
+            Kind::AccelerationInRpmS => {
+                overlay.limit(names::ACCELERATION_UNIT.place, i64::from(RPM_PER_S), i64::from(RPM_PER_S));
+            }
             Kind::NarrowLimits => {
+                objects.set(names::FOLLOWING_TIMEOUT_MS, 0);
+                objects.set(names::PERIOD_VALUE, objects.get(names::PERIOD_VALUE).min(NARROW_PERIOD));
                 overlay.limit(names::FOLLOWING_TIMEOUT_MS.place, 0, 0);
                 overlay.limit(names::PERIOD_VALUE.place, 1, i64::from(NARROW_PERIOD));
             }
-            Kind::InterpolationInMs => overlay.lock(names::PERIOD_INDEX.place),
+            Kind::InterpolationInMs => {
+                let period_ms = (period_ns as f64 * 1e-6).round().clamp(1.0, 255.0);
+                objects.set(names::PERIOD_VALUE, period_ms as u8);
+                objects.set(names::PERIOD_INDEX, MILLISECONDS);
+                overlay.lock(names::PERIOD_INDEX.place);
+            }
             Kind::MissingObjects => {
+                let modes = objects.get(names::SUPPORTED_MODES);
+                objects.set(names::SUPPORTED_MODES, modes & !CYCLIC_POSITION);
+                objects.set(names::MODE, 1);
                 for index in [0x6007, 0x6066, 0x6085] {
                     overlay.hide(index);
                 }
@@ -141,39 +155,13 @@ fn quirks(on_axis: &[&QuirkConfig]) -> Result<Quirks, PlantError> {
 }
 
 /// Writes the units that the drive counts in into its dictionary.
-fn set_units(on_axis: &[&QuirkConfig], objects: &mut Objects, overlay: &mut Overlay) {
+fn set_units(on_axis: &[&QuirkConfig], objects: &mut Objects) {
     let quirk = on_axis.iter().find(|quirk| quirk.kind == Kind::AccelerationInRpmS);
     let Some(quirk) = quirk else { return };
     let per_turn = quirk.increments_per_turn.unwrap_or(INCREMENTS_PER_TURN);
     objects.set(names::ACCELERATION_UNIT, RPM_PER_S);
     objects.set(names::INCREMENTS_PER_TURN, per_turn);
     objects.set(names::FEED_PER_TURN, per_turn);
-    overlay.limit(names::ACCELERATION_UNIT.place, i64::from(RPM_PER_S), i64::from(RPM_PER_S));
-}
-
-/// Writes the values that the drive is delivered with into its dictionary.
-fn set_values(on_axis: &[&QuirkConfig], period_ns: u64, objects: &mut Objects) {
-    for quirk in on_axis {
-        match quirk.kind {
-            Kind::FactoryPdos => set_factory_pdos(objects),
-            Kind::NarrowLimits => {
-                objects.set(names::FOLLOWING_TIMEOUT_MS, 0);
-                objects.set(names::PERIOD_VALUE, objects.get(names::PERIOD_VALUE).min(NARROW_PERIOD));
-            }
-            Kind::InterpolationInMs => {
-                let period_ms = (period_ns as f64 * 1e-6).round().clamp(1.0, 255.0);
-                objects.set(names::PERIOD_VALUE, period_ms as u8);
-                objects.set(names::PERIOD_INDEX, MILLISECONDS);
-            }
-            Kind::MissingObjects => {
-                const CYCLIC_POSITION: u32 = 1 << 7;
-                let modes = objects.get(names::SUPPORTED_MODES);
-                objects.set(names::SUPPORTED_MODES, modes & !CYCLIC_POSITION);
-                objects.set(names::MODE, 1);
-            }
-            _ => {}
-        }
-    }
 }
 
 /// A drive without a scale of its own counts as the scenario says.

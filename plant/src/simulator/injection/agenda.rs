@@ -6,16 +6,16 @@ use std::collections::VecDeque;
 use std::ops::Range;
 
 use masseter_runtime::injection::{Injected, Injection};
-use masseter_scenario::{FaultConfig, FaultKindConfig, Scenario, StimulusConfig, ToothConfig};
+use masseter_scenario::{
+    AxisFault, DriveFault, EncoderFault, FaultConfig, FaultKindConfig, PlatformFault, Scenario,
+    StimulusConfig, ToothConfig,
+};
 use nalgebra::Vector6;
 
 use super::acting_ns;
-use super::encoder_faults::EncoderFault;
 use super::push::Push;
 use crate::error::PlantError;
 use crate::master::link::Occurrence;
-use crate::simulator::drive::DriveFault;
-use crate::simulator::mechanism::axes::AxisFault;
 use crate::simulator::mechanism::contact::food::Food;
 
 /// What an entry does.
@@ -39,59 +39,6 @@ pub(crate) enum PartFault {
     Encoder(EncoderFault),
     Drive(DriveFault),
     Axis(AxisFault),
-}
-
-impl PartFault {
-    /// What a fault of a scenario is to a part of an axis; none where it acts elsewhere.
-    fn of(kind: FaultKindConfig) -> Option<Self> {
-        use FaultKindConfig as Kind;
-        Some(match kind {
-            Kind::EncoderStuck => Self::Encoder(EncoderFault::Stuck),
-            Kind::EncoderOffset => Self::Encoder(EncoderFault::Offset),
-            Kind::EncoderDrift => Self::Encoder(EncoderFault::Drift),
-            Kind::EncoderNoise => Self::Encoder(EncoderFault::Noise),
-            Kind::EncoderSteps => Self::Encoder(EncoderFault::Steps),
-            Kind::EncoderSign => Self::Encoder(EncoderFault::Sign),
-            Kind::EncoderLoses => Self::Encoder(EncoderFault::Loses),
-            Kind::EncoderDelay => Self::Encoder(EncoderFault::Delay),
-            Kind::DriveFault => Self::Drive(DriveFault::Fault),
-            Kind::DriveIgnoresTargets => Self::Drive(DriveFault::IgnoresTargets),
-            Kind::DriveTorqueLoss => Self::Drive(DriveFault::TorqueLoss),
-            Kind::DriveRunaway => Self::Drive(DriveFault::Runaway),
-            Kind::DriveSto => Self::Drive(DriveFault::Sto),
-            Kind::DriveSlowEnable => Self::Drive(DriveFault::SlowEnable),
-            Kind::BrakeOpen => Self::Drive(DriveFault::BrakeOpen),
-            Kind::BrakeClosed => Self::Drive(DriveFault::BrakeClosed),
-            Kind::DriveReboot => Self::Drive(DriveFault::Reboot),
-            Kind::DriveScale => Self::Drive(DriveFault::Scale),
-            Kind::EmcyStorm => Self::Drive(DriveFault::EmcyStorm),
-            Kind::Jam => Self::Axis(AxisFault::Jam),
-            Kind::Friction => Self::Axis(AxisFault::Friction),
-            Kind::Play => Self::Axis(AxisFault::Play),
-            Kind::BrokenRod => Self::Axis(AxisFault::BrokenRod),
-            Kind::EndStop => Self::Axis(AxisFault::EndStop),
-            Kind::Corrupt
-            | Kind::Lose
-            | Kind::Delay
-            | Kind::Duplicate
-            | Kind::Babble
-            | Kind::Disconnect
-            | Kind::BusOff
-            | Kind::Payload
-            | Kind::ControllerStall
-            | Kind::CommandNan
-            | Kind::CommandJump
-            | Kind::CommandVersion
-            | Kind::CommandForeign
-            | Kind::ControllerKill
-            | Kind::PlantStall
-            | Kind::PlantKill
-            | Kind::RecorderStall
-            | Kind::RecorderKill
-            | Kind::CoreStall
-            | Kind::DiskFull => return None,
-        })
-    }
 }
 
 /// An entry begins or ends.
@@ -285,12 +232,17 @@ impl Effect {
     }
 }
 
+/// What a fault does to drives and mechanism; none where it acts elsewhere.
 fn effect_of_fault(config: &FaultConfig) -> Option<Effect> {
     let size = config.size_si();
-    if config.kind == FaultKindConfig::Payload {
-        return Some(Effect::FaultyPayload { kg: size });
-    }
-    Some(Effect::Fault { kind: PartFault::of(config.kind)?, size, axis: config.axis() })
+    let kind = match config.kind {
+        FaultKindConfig::Encoder(kind) => PartFault::Encoder(kind),
+        FaultKindConfig::Drive(kind) => PartFault::Drive(kind),
+        FaultKindConfig::Axis(kind) => PartFault::Axis(kind),
+        FaultKindConfig::Platform(PlatformFault::Payload) => return Some(Effect::FaultyPayload { kg: size }),
+        FaultKindConfig::Bus(_) | FaultKindConfig::Command(_) | FaultKindConfig::Process(_) => return None,
+    };
+    Some(Effect::Fault { kind, size, axis: config.axis() })
 }
 
 fn effect_of_stimulus(config: &StimulusConfig, arch: &[ToothConfig]) -> Result<Option<Effect>, PlantError> {
@@ -316,7 +268,7 @@ mod tests {
             axis: Some("l1".to_owned()),
             size: Some(size.parse().unwrap()),
             at_s: Some(0.0),
-            ..FaultConfig::new(FaultKindConfig::EncoderOffset)
+            ..FaultConfig::new(EncoderFault::Offset)
         };
         let faults = vec![stuck("1 mm"), stuck("2 mm")];
         let mut agenda = agenda(&Scenario { faults, ..Scenario::default() });

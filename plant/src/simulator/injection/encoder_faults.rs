@@ -8,32 +8,13 @@ use std::collections::VecDeque;
 use arrayvec::ArrayVec;
 use masseter_model::geometry::AXES;
 use masseter_runtime::clock::SECOND_NS;
-use masseter_scenario::{FaultConfig, FaultKindConfig, Scenario};
+use masseter_scenario::{EncoderFault, FaultConfig, Scenario};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 
 /// The number of kinds.
 const KINDS: usize = 8;
-
-/// A kind of fault, and what its size is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum EncoderFault {
-    Stuck,
-    /// The jump, m.
-    Offset,
-    /// The speed, m/s.
-    Drift,
-    /// The standard deviation, m.
-    Noise,
-    /// The step, m.
-    Steps,
-    Sign,
-    /// The share that is lost.
-    Loses,
-    /// How old positions are, s.
-    Delay,
-}
 
 /// The faults of one encoder.
 #[derive(Debug, Clone)]
@@ -67,7 +48,7 @@ impl EncoderFaults {
     pub(crate) fn of_axes(scenario: &Scenario) -> [Self; AXES] {
         let durations_ns = [scenario.dynamics.step_ns, scenario.period_ns()];
         std::array::from_fn(|axis| {
-            let delays = scenario.faults.iter().filter(|fault| fault.kind == FaultKindConfig::EncoderDelay);
+            let delays = scenario.faults.iter().filter(|fault| fault.kind == EncoderFault::Delay.into());
             let of_axis = delays.filter(|fault| fault.axis() == Some(axis)).map(FaultConfig::size_si);
             let past = of_axis.reduce(f64::max).map_or(0, |delay_s| past_of(delay_s, durations_ns));
             Self::new(scenario.seed, axis, past)

@@ -16,7 +16,7 @@ use masseter_runtime::clock::SECOND_NS;
 use masseter_runtime::injection::{Injected, Injection};
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::messages::{Command, Event, LAYOUT_VERSION};
-use masseter_scenario::{FaultConfig, FaultKindConfig, FaultLayer, Scenario};
+use masseter_scenario::{CommandFault, DriveFault, FaultConfig, FaultKindConfig, Scenario};
 
 use crate::error::PlantError;
 use crate::master::events::Journal;
@@ -46,7 +46,7 @@ impl Injector {
     pub(crate) fn new(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
         let faults = scenario.faults.iter().enumerate().map(|(place, fault)| Untold {
             injected: Injected::Fault(place),
-            is_of_others: fault.kind.layer() == FaultLayer::Process,
+            is_of_others: matches!(fault.kind, FaultKindConfig::Process(_)),
         });
         let stimuli = scenario.stimulus.iter().enumerate().map(|(place, stimulus)| Untold {
             injected: Injected::Stimulus(place),
@@ -147,12 +147,13 @@ const FOREIGN_CYCLES: u64 = 1 << 40;
 /// The faults of the commands.
 #[derive(Debug, Clone)]
 pub(super) struct CommandFaults {
-    faults: Vec<CommandFault>,
+    faults: Vec<AlteringFault>,
 }
 
 #[derive(Debug, Clone)]
-struct CommandFault {
+struct AlteringFault {
     injected: Injected,
+    kind: CommandFault,
     config: FaultConfig,
     window_ns: Range<u64>,
     has_begun: bool,
@@ -162,16 +163,18 @@ struct CommandFault {
 impl CommandFaults {
     /// Those of a scenario's list, none of which acts before its window is set.
     pub(super) fn new(list: &[FaultConfig]) -> Self {
-        let of_commands =
-            list.iter().enumerate().filter(|(_, config)| config.kind.layer() == FaultLayer::Command);
-        let fault = |(place, config): (usize, &FaultConfig)| CommandFault {
-            injected: Injected::Fault(place),
-            config: config.clone(),
-            window_ns: u64::MAX..u64::MAX,
-            has_begun: false,
-            is_over: false,
+        let altering = |(place, config): (usize, &FaultConfig)| {
+            let FaultKindConfig::Command(kind) = config.kind else { return None };
+            Some(AlteringFault {
+                injected: Injected::Fault(place),
+                kind,
+                config: config.clone(),
+                window_ns: u64::MAX..u64::MAX,
+                has_begun: false,
+                is_over: false,
+            })
         };
-        Self { faults: of_commands.map(fault).collect() }
+        Self { faults: list.iter().enumerate().filter_map(altering).collect() }
     }
 
     /// Sets when a fault acts.
@@ -199,7 +202,7 @@ impl CommandFaults {
                     if !std::mem::replace(&mut fault.has_begun, true) {
                         tell(false);
                     }
-                    command = altered(given, &fault.config);
+                    command = altered(given, fault.kind, &fault.config);
                 }
             } else if fault.has_begun && !std::mem::replace(&mut fault.is_over, true) {
                 tell(true);
@@ -210,25 +213,21 @@ impl CommandFaults {
 }
 
 /// What a fault makes of a command.
-fn altered(mut command: Command, fault: &FaultConfig) -> Option<Command> {
-    match fault.kind {
-        FaultKindConfig::ControllerStall => return None,
-        FaultKindConfig::CommandNan => command.target_m.fill(f64::NAN),
-        FaultKindConfig::CommandJump => {
-            command.target_m[fault.axis().unwrap_or_default()] += fault.size_si();
-        }
-        FaultKindConfig::CommandVersion => command.version += 1,
-        FaultKindConfig::CommandForeign => command.cycle += FOREIGN_CYCLES,
-        // The other kinds act elsewhere.
-        _ => {}
+fn altered(mut command: Command, kind: CommandFault, fault: &FaultConfig) -> Option<Command> {
+    match kind {
+        CommandFault::ControllerStall => return None,
+        CommandFault::Nan => command.target_m.fill(f64::NAN),
+        CommandFault::Jump => command.target_m[fault.axis().unwrap_or_default()] += fault.size_si(),
+        CommandFault::Version => command.version += 1,
+        CommandFault::Foreign => command.cycle += FOREIGN_CYCLES,
     }
     Some(command)
 }
 
 /// The window of a fault, cut where its size says how long the fault lasts.
 pub(crate) fn acting_ns(fault: &FaultConfig, window_ns: Range<u64>) -> Range<u64> {
-    let is_for_its_size =
-        matches!(fault.kind, FaultKindConfig::DriveReboot | FaultKindConfig::ControllerStall);
+    let for_its_size = [DriveFault::Reboot.into(), CommandFault::ControllerStall.into()];
+    let is_for_its_size = for_its_size.contains(&fault.kind);
     let longest_ns = (fault.size_si() * SECOND_NS as f64).round() as u64;
     let end_ns = if is_for_its_size { window_ns.start.saturating_add(longest_ns) } else { u64::MAX };
     window_ns.start..window_ns.end.min(end_ns)
@@ -238,9 +237,9 @@ pub(crate) fn acting_ns(fault: &FaultConfig, window_ns: Range<u64>) -> Range<u64
 mod commands_tests {
     use super::*;
 
-    fn alter(kind: FaultKindConfig, size: Option<&str>) -> Option<Command> {
+    fn alter(kind: CommandFault, size: Option<&str>) -> Option<Command> {
         let size = size.map(|size| size.parse().unwrap());
-        let axis = (kind == FaultKindConfig::CommandJump).then(|| "l2".to_owned());
+        let axis = (kind == CommandFault::Jump).then(|| "l2".to_owned());
         let mut faults = CommandFaults::new(&[FaultConfig { size, axis, ..FaultConfig::new(kind) }]);
         faults.set_window(Injected::Fault(0), &(0..u64::MAX));
         let command = Command { cycle: 3, target_m: [0.1; 6], version: 10, ..Command::default() };
@@ -249,13 +248,13 @@ mod commands_tests {
 
     #[test]
     fn each_kind_changes_what_its_name_says_and_nothing_else() {
-        use FaultKindConfig::{CommandForeign, CommandJump, CommandNan, CommandVersion, ControllerStall};
+        use CommandFault::{ControllerStall, Foreign, Jump, Nan, Version};
         assert_eq!(alter(ControllerStall, Some("1 s")), None);
-        assert!(alter(CommandNan, None).unwrap().target_m.iter().all(|target_m| target_m.is_nan()));
-        let jump = alter(CommandJump, Some("1 mm")).unwrap();
+        assert!(alter(Nan, None).unwrap().target_m.iter().all(|target_m| target_m.is_nan()));
+        let jump = alter(Jump, Some("1 mm")).unwrap();
         assert_eq!((jump.target_m, jump.cycle), ([0.1, 0.1, 0.1, 0.1, 0.101, 0.1], 3));
-        assert_eq!(alter(CommandVersion, None).unwrap().version, 11);
-        let foreign = alter(CommandForeign, None).unwrap();
+        assert_eq!(alter(Version, None).unwrap().version, 11);
+        let foreign = alter(Foreign, None).unwrap();
         assert_eq!((foreign.cycle > 1_000_000, foreign.target_m), (true, [0.1; 6]));
     }
 
@@ -263,7 +262,7 @@ mod commands_tests {
     fn a_stall_begins_with_the_first_command_that_is_withheld_and_ends_after_its_size() {
         let size = Some("2 ms".parse().unwrap());
         let mut faults =
-            CommandFaults::new(&[FaultConfig { size, ..FaultConfig::new(FaultKindConfig::ControllerStall) }]);
+            CommandFaults::new(&[FaultConfig { size, ..FaultConfig::new(CommandFault::ControllerStall) }]);
         faults.set_window(Injected::Fault(0), &(2_000_000..u64::MAX));
         let mut told = Vec::new();
         let arrived: Vec<_> = (1..7)
@@ -288,10 +287,10 @@ mod times_tests {
     #[test]
     fn a_dip_of_the_supply_lasts_as_long_as_its_size_says_and_no_longer_than_its_window() {
         let size = Some("20 ms".parse().unwrap());
-        let dip = FaultConfig { size, ..FaultConfig::new(FaultKindConfig::DriveReboot) };
+        let dip = FaultConfig { size, ..FaultConfig::new(DriveFault::Reboot) };
         assert_eq!(acting_ns(&dip, 1000..u64::MAX), 1000..20_001_000);
         assert_eq!(acting_ns(&dip, 1000..5000), 1000..5000);
-        let slow = FaultConfig { kind: FaultKindConfig::DriveSlowEnable, ..dip };
+        let slow = FaultConfig { kind: DriveFault::SlowEnable.into(), ..dip };
         assert_eq!(acting_ns(&slow, 1000..u64::MAX), 1000..u64::MAX);
     }
 }

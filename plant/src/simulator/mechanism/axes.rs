@@ -4,24 +4,11 @@
 //! axes are not part of this module, but for the drives' sides of loose joints.
 
 use masseter_model::geometry::{AXES, LEGS, Mechanism};
-use masseter_scenario::AxesConfig;
+use masseter_scenario::{AxesConfig, AxisFault};
 use nalgebra::Vector6;
 
 use super::friction::{Braking, CONTACT, Element, Spring};
 use crate::simulator::acting::Acting;
-
-/// A fault of an axis, and what its size is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum AxisFault {
-    Jam,
-    /// The factor on the axis' friction.
-    Friction,
-    /// The play, m.
-    Play,
-    BrokenRod,
-    /// The way left to either side, m.
-    EndStop,
-}
 
 /// The axes d₁ d₂ d₃ l₁ l₂ l₃.
 #[derive(Debug, Clone)]

@@ -22,10 +22,10 @@ use masseter_model::dynamics::{Bodies, Equations, Motion, Reactions};
 use masseter_model::geometry::{
     AXES, Actuators, Jacobian, LEGS, Mechanism, Pose, Twist, Vec3, frame_of_corners,
 };
-use masseter_scenario::{DynamicsConfig, JawConfig};
+use masseter_scenario::{AxisFault, DynamicsConfig, JawConfig};
 use nalgebra::{Matrix3, Matrix6, Quaternion, Translation3, UnitQuaternion, Vector6};
 
-use super::axes::{Axes, AxesForces, AxisFault, AxisMotion};
+use super::axes::{Axes, AxesForces, AxisMotion};
 use super::contact::Occlusion;
 use super::friction::Braking;
 use crate::error::DynamicsError;

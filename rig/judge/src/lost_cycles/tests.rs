@@ -119,8 +119,8 @@ mod scenario_stalls {
     fn a_stall_takes_the_cycles_of_its_own_loop_until_the_skips_behind_it() {
         let mut stalls = ScenarioStalls::default();
         let fault = |ended_ns| ProcessFault { number: 1, struck_ns: 5_000_000, ended_ns };
-        stalls.add(FaultKindConfig::PlantStall, &fault(Some(25_000_000)));
-        stalls.add(FaultKindConfig::RecorderStall, &fault(None));
+        stalls.add(Kind::PlantStall.into(), &fault(Some(25_000_000)));
+        stalls.add(Kind::RecorderStall.into(), &fault(None));
         let mut reading = |woke_ns| stalls.apply_reading(&Reading { woke_ns, ..Reading::default() });
         assert_eq!(
             [4_500_000, 5_000_000, 26_000_000, 27_000_000, 35_000_000, 36_000_000].map(&mut reading),
@@ -131,7 +131,7 @@ mod scenario_stalls {
             [4_000_000, 6_000_000, 40_000_000].map(&mut state),
             [(false, false), (false, true), (false, false)]
         );
-        stalls.add(FaultKindConfig::CoreStall, &fault(None));
+        stalls.add(Kind::CoreStall.into(), &fault(None));
         assert_eq!(stalls.apply_state(&State { woke_ns: u64::MAX - 1, ..State::default() }), (true, true));
     }
 }

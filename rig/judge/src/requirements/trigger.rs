@@ -8,7 +8,7 @@ use masseter_runtime::clock::SECOND_NS;
 use masseter_runtime::messages::codes::{Cause, ControllerState, Source};
 use masseter_scenario::input::excerpt;
 use masseter_scenario::wording::nearest;
-use masseter_scenario::{During, FaultConfig, FaultLayer, RequirementConfig, Scenario, TimeWindow};
+use masseter_scenario::{During, RequirementConfig, Scenario, TimeWindow};
 
 use super::condition::{Condition, Lookup, Moment, has_comparison, state_of_controller};
 use super::finding::{OfKey, Reason, Refused};
@@ -157,8 +157,8 @@ const REPORTS: [(Source, &[Cause]); 5] = [
 
 /// The ends of stimuli and faults that have none.
 fn endless(scenario: &Scenario) -> BTreeSet<String> {
-    let is_of_process = |fault: &&FaultConfig| fault.kind.layer() == FaultLayer::Process;
-    let faults = scenario.faults.iter().filter(is_of_process).filter(|fault| fault.kind.size().is_none());
+    let faults =
+        scenario.faults.iter().filter(|fault| fault.kind.is_of_process() && !fault.kind.takes("size"));
     let stimuli = scenario.stimulus.iter().filter(|stimulus| stimulus.is_of_controller());
     faults
         .map(|fault| format!("fault.{}.ended", fault.name()))

@@ -1,58 +1,31 @@
 //! The kinds of faults: the layer that they act in, the keys that they take, and what they stand for.
 
+use std::borrow::Cow;
 use std::fmt::{self, Display, Formatter};
 
-use serde::{Deserialize, Serialize};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::quantity::Dimension;
 
-/// The part of the rig that a fault acts in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum FaultLayer {
-    /// The frames of a bus, or a node on it.
-    Bus,
-    /// What an encoder counts.
-    Encoder,
-    /// A drive.
-    Drive,
-    /// The emulated mechanism.
-    Mechanism,
-    /// The commands of the controller.
-    Command,
-    /// A process of the rig, or the machine under it.
-    Process,
+/// What is declared of a kind.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FaultDeclaration {
+    /// Its name in scenarios.
+    pub name: &'static str,
+    /// The name of the layer that it acts in.
+    pub layer: &'static str,
+    /// The keys that it needs, beside those of the time.
+    pub needs: &'static [&'static str],
+    /// The keys that it may have as well.
+    pub takes: &'static [&'static str],
+    /// Its size; none where it has no size.
+    pub size: Option<FaultSize>,
+    /// What it stands for.
+    pub about: &'static str,
 }
 
-impl FaultLayer {
-    /// Its name.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Bus => "bus",
-            Self::Encoder => "encoder",
-            Self::Drive => "drive",
-            Self::Mechanism => "mechanism",
-            Self::Command => "command",
-            Self::Process => "process",
-        }
-    }
-}
-
-/// What a fault acts on, and with that the keys that say where.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FaultPlace {
-    /// Frames of a bus: `bus`, and where wanted `node`, `id`, `probability`, `count`.
-    Frames,
-    /// A node of a bus: `bus`, `node`.
-    Node,
-    /// An axis: `axis`.
-    Axis,
-    /// All axes, or one: `axis` where wanted.
-    Axes,
-    /// A fixed place.
-    Fixed,
-}
-
-/// The size of a fault: what it measures, its range in SI units, and its value by default.
+/// The size of a fault: what it measures, its range in SI units, and a size that a real one may have.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FaultSize {
     /// What it measures.
@@ -61,157 +34,219 @@ pub struct FaultSize {
     pub min: f64,
     /// The largest valid size.
     pub max: f64,
+    /// A size that a real fault may have.
+    pub example: &'static str,
     /// What it is, in words.
     pub about: &'static str,
 }
 
+/// Declares layers and kinds: name, needed keys, other keys, and where it has one the size.
 macro_rules! fault_kinds {
-    ($($(#[doc = $doc:literal])+ $kind:ident $name:literal: $layer:ident, $place:ident
-        $(, $dimension:ident $min:literal to $max:literal $about:literal)?;)*) => {
-        /// The kind of a fault.
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-        #[serde(rename_all = "snake_case")]
+    ($($(#[doc = $part:literal])+ $layer:ident $layer_name:literal: $faults:ident {
+        $($(#[doc = $doc:literal])+ $kind:ident $name:literal [$($need:ident)*] $([$($take:ident)*])?
+            $(, $dimension:ident $min:literal to $max:literal, $example:literal $about:literal)?;)*
+    })*) => {
+        /// The kind of a fault, by the part of the rig that it acts in.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
         pub enum FaultKindConfig {
-            $($(#[doc = $doc])+ $kind,)*
+            $($(#[doc = $part])+ $layer($faults),)*
         }
+
+        $(
+            $(#[doc = $part])+
+            #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+            pub enum $faults {
+                $($(#[doc = $doc])+ $kind,)*
+            }
+
+            impl From<$faults> for FaultKindConfig {
+                fn from(kind: $faults) -> Self {
+                    Self::$layer(kind)
+                }
+            }
+        )*
 
         impl FaultKindConfig {
             /// Every kind.
-            pub const ALL: &'static [Self] = &[$(Self::$kind),*];
+            pub const ALL: &'static [Self] = &[$($(Self::$layer($faults::$kind),)*)*];
 
-            /// Its name in scenarios.
-            pub const fn name(self) -> &'static str {
-                match self { $(Self::$kind => $name),* }
-            }
+            /// The names of all kinds.
+            pub const NAMES: &'static [&'static str] = &[$($($name,)*)*];
 
-            /// The layer that it acts in.
-            pub const fn layer(self) -> FaultLayer {
-                match self { $(Self::$kind => FaultLayer::$layer),* }
-            }
-
-            /// What it acts on.
-            pub const fn place(self) -> FaultPlace {
-                match self { $(Self::$kind => FaultPlace::$place),* }
-            }
-
-            /// Its size; none where it has no size.
-            pub const fn size(self) -> Option<FaultSize> {
+            /// What is declared of it.
+            pub const fn declared(self) -> &'static FaultDeclaration {
                 match self {
-                    $(Self::$kind => fault_kinds!(@size $($dimension $min to $max $about)?),)*
+                    $($(Self::$layer($faults::$kind) => const {
+                        &FaultDeclaration {
+                            name: $name,
+                            layer: $layer_name,
+                            needs: &[$(stringify!($need),)* $(fault_kinds!(@key $dimension))?],
+                            takes: &[$($(stringify!($take)),*)?],
+                            size: fault_kinds!(@size $($dimension $min to $max, $example $about)?),
+                            about: concat!($($doc),+).trim_ascii_start(),
+                        }
+                    },)*)*
                 }
-            }
-
-            /// What it stands for.
-            pub const fn about(self) -> &'static str {
-                match self { $(Self::$kind => concat!($($doc),+).trim_ascii_start()),* }
             }
         }
     };
+    (@key $dimension:ident) => { "size" };
     (@size) => { None };
-    (@size $dimension:ident $min:literal to $max:literal $about:literal) => {
-        Some(FaultSize { dimension: Dimension::$dimension, min: $min, max: $max, about: $about })
+    (@size $dimension:ident $min:literal to $max:literal, $example:literal $about:literal) => {
+        Some(FaultSize {
+            dimension: Dimension::$dimension, min: $min, max: $max, example: $example, about: $about,
+        })
     };
 }
 
 fault_kinds! {
-    /// Frames are destroyed on the wire and repeated by their transmitter.
-    Corrupt "corrupt": Bus, Frames;
-    /// A receiver loses frames without an error on the wire.
-    Lose "lose": Bus, Frames;
-    /// Frames are held back before they are queued for transmission.
-    Delay "delay": Bus, Frames, Time 0.0 to 10.0 "how long";
-    /// Frames arrive, and their transmitter repeats them.
-    Duplicate "duplicate": Bus, Frames;
-    /// A node sends `data` (8 bytes of 55h unless given) with identifier `id` (001h unless given) whenever the bus is idle.
-    Babble "babble": Bus, Node;
-    /// A node is disconnected.
-    Disconnect "disconnect": Bus, Node;
-    /// A node's controller goes off the bus.
-    BusOff "bus_off": Bus, Node;
+    /// The frames of a bus, or a node on it.
+    Bus "bus": BusFault {
+        /// Frames are destroyed on the wire and repeated by their transmitter.
+        Corrupt "corrupt" [bus] [node id probability count];
+        /// A receiver loses frames without an error on the wire.
+        Lose "lose" [bus] [node id probability count];
+        /// Frames are held back before they are queued for transmission.
+        Delay "delay" [bus] [node id probability count], Time 0.0 to 10.0, "1500 us" "how long";
+        /// Frames arrive, and their transmitter repeats them.
+        Duplicate "duplicate" [bus] [node id probability count];
+        /// A node sends `data` (8 bytes of 55h unless given) with identifier `id` (001h unless given) whenever the bus
+        /// is idle.
+        Babble "babble" [bus node] [id data count];
+        /// A node is disconnected.
+        Disconnect "disconnect" [bus node];
+        /// A node's controller goes off the bus.
+        BusOff "bus_off" [bus node] [count];
+    }
+    /// What an encoder counts.
+    Encoder "encoder": EncoderFault {
+        /// The encoder repeats its last position: a broken disc or a hung interface.
+        Stuck "encoder_stuck" [axis];
+        /// The position jumps by a constant: a slipped coupling.
+        Offset "encoder_offset" [axis], Length -0.1 to 0.1, "1 mm" "the jump";
+        /// The position drifts away at a constant speed: a coupling that slips.
+        Drift "encoder_drift" [axis], Velocity -1.0 to 1.0, "5 mm/s" "the speed";
+        /// Gaussian noise on the position: bad shielding.
+        Noise "encoder_noise" [axis], Length 0.0 to 0.01, "50 um" "its standard deviation";
+        /// The position has coarser steps: lost low bits.
+        Steps "encoder_steps" [axis], Length 1e-9 to 0.01, "0.1 mm" "the step";
+        /// The position counts the other way from where it is: swapped tracks.
+        Sign "encoder_sign" [axis];
+        /// A share of every movement is not counted: dirt on the scale.
+        Loses "encoder_loses" [axis], One 0.0 to 1.0, "5 %" "the share that is lost";
+        /// The position is an old one: a filter or a slow interface.
+        Delay "encoder_delay" [axis], Time 0.0 to 0.1, "5 ms" "how old";
+    }
+    /// A drive.
+    Drive "drive": DriveFault {
+        /// The drive goes into fault by itself, EMCY 5112h: its logic supply is too low.
+        Fault "drive_fault" [axis];
+        /// The drive acknowledges targets and does not follow them.
+        IgnoresTargets "drive_ignores_targets" [axis];
+        /// The motor gives less force than the drive asks for: demagnetised, or a phase lost.
+        TorqueLoss "drive_torque_loss" [axis], One 0.0 to 1.0, "50 %" "the share that is lost";
+        /// The drive runs away at full current towards larger positions, whatever it is asked to do.
+        Runaway "drive_runaway" [axis];
+        /// Safe torque off: the motor has no current and the drive goes to "switch on disabled".
+        Sto "drive_sto" [axis];
+        /// "Operation enabled" comes late.
+        SlowEnable "drive_slow_enable" [axis], Time 0.0 to 60.0, "1 s" "how late";
+        /// The brake never closes: without current the axis is free.
+        BrakeOpen "brake_open" [axis];
+        /// The brake does not open: the motor works against it.
+        BrakeClosed "brake_closed" [axis];
+        /// The supply dips: the drive is off for a while, then boots with its stored values.
+        Reboot "drive_reboot" [axis], Time 0.0 to 10.0, "200 ms" "how long the drive is off";
+        /// The drive moves by a wrong scale from where it is: a wrong gear ratio.
+        Scale "drive_scale" [axis], One 0.0 to 3.0, "1.05" "millimetres that it moves for each that it is asked to";
+        /// The drive sends emergency messages again and again.
+        EmcyStorm "emcy_storm" [axis], Time 1e-4 to 1.0, "5 ms" "the time between two";
+    }
+    /// An axis of the emulated mechanism.
+    Axis "mechanism": AxisFault {
+        /// The axis jams: a guide seizes and holds it, up to 2 kN.
+        Jam "jam" [axis];
+        /// Friction grows: dry guides.
+        Friction "friction" [] [axis], One 0.0 to 100.0, "5" "the factor on the axis' friction";
+        /// The joint has play between drive and platform.
+        Play "play" [axis], Length 0.0 to 0.02, "0.2 mm" "the play";
+        /// The rod is broken: the axis moves freely, without force of the drive.
+        BrokenRod "broken_rod" [axis];
+        /// A hard stop stands in the axis' way, on both sides of where it is.
+        EndStop "end_stop" [axis], Length 0.0 to 0.1, "1 mm" "the way left to either side";
+    }
+    /// The platform of the emulated mechanism.
+    Platform "mechanism": PlatformFault {
+        /// The platform carries more mass, at the incisal point.
+        Payload "payload" [], Mass 0.0 to 20.0, "0.5 kg" "the mass";
+    }
+    /// The commands of the controller.
+    Command "command": CommandFault {
+        /// The controller's commands stop coming, while it stands still: a stalled process.
+        ControllerStall "controller_stall" [], Time 0.0 to 10.0, "50 ms" "how long";
+        /// The targets of a command are no numbers.
+        Nan "command_nan" [];
+        /// One target jumps.
+        Jump "command_jump" [axis], Length -0.1 to 0.1, "1 mm" "the jump";
+        /// Commands carry another version of the layout.
+        Version "command_version" [];
+        /// Commands are those of another controller.
+        Foreign "command_foreign" [];
+    }
+    /// A process of the rig, or the machine under it.
+    Process "process": ProcessFault {
+        /// The controller is killed.
+        ControllerKill "controller_kill" [];
+        /// The plant is stopped for a while, then goes on.
+        PlantStall "plant_stall" [], Time 0.0 to 10.0, "50 ms" "how long";
+        /// The plant is killed.
+        PlantKill "plant_kill" [];
+        /// The recorder is stopped for a while, then goes on.
+        RecorderStall "recorder_stall" [], Time 0.0 to 10.0, "50 ms" "how long";
+        /// The recorder is killed.
+        RecorderKill "recorder_kill" [];
+        /// Another task of higher priority takes the controller's core.
+        CoreStall "core_stall" [], Time 0.0 to 1.0, "50 ms" "how long";
+        /// The recording can grow no further.
+        DiskFull "disk_full" [];
+    }
+}
 
-    /// The encoder repeats its last position: a broken disc or a hung interface.
-    EncoderStuck "encoder_stuck": Encoder, Axis;
-    /// The position jumps by a constant: a slipped coupling.
-    EncoderOffset "encoder_offset": Encoder, Axis, Length -0.1 to 0.1 "the jump";
-    /// The position drifts away at a constant speed: a coupling that slips.
-    EncoderDrift "encoder_drift": Encoder, Axis, Velocity -1.0 to 1.0 "the speed";
-    /// Gaussian noise on the position: bad shielding.
-    EncoderNoise "encoder_noise": Encoder, Axis, Length 0.0 to 0.01 "its standard deviation";
-    /// The position has coarser steps: lost low bits.
-    EncoderSteps "encoder_steps": Encoder, Axis, Length 1e-9 to 0.01 "the step";
-    /// The position counts the other way from where it is: swapped tracks.
-    EncoderSign "encoder_sign": Encoder, Axis;
-    /// A share of every movement is not counted: dirt on the scale.
-    EncoderLoses "encoder_loses": Encoder, Axis, One 0.0 to 1.0 "the share that is lost";
-    /// The position is an old one: a filter or a slow interface.
-    EncoderDelay "encoder_delay": Encoder, Axis, Time 0.0 to 0.1 "how old";
+impl FaultKindConfig {
+    /// Its name in scenarios.
+    pub const fn name(self) -> &'static str {
+        self.declared().name
+    }
 
-    /// The drive goes into fault by itself, EMCY 5112h: its logic supply is too low.
-    DriveFault "drive_fault": Drive, Axis;
-    /// The drive acknowledges targets and does not follow them.
-    DriveIgnoresTargets "drive_ignores_targets": Drive, Axis;
-    /// The motor gives less force than the drive asks for: demagnetised, or a phase lost.
-    DriveTorqueLoss "drive_torque_loss": Drive, Axis, One 0.0 to 1.0 "the share that is lost";
-    /// The drive runs away at full current towards larger positions, whatever it is asked to do.
-    DriveRunaway "drive_runaway": Drive, Axis;
-    /// Safe torque off: the motor has no current and the drive goes to "switch on disabled".
-    DriveSto "drive_sto": Drive, Axis;
-    /// "Operation enabled" comes late.
-    DriveSlowEnable "drive_slow_enable": Drive, Axis, Time 0.0 to 60.0 "how late";
-    /// The brake never closes: without current the axis is free.
-    BrakeOpen "brake_open": Drive, Axis;
-    /// The brake does not open: the motor works against it.
-    BrakeClosed "brake_closed": Drive, Axis;
-    /// The supply dips: the drive is off for a while, then boots with its stored values.
-    DriveReboot "drive_reboot": Drive, Axis, Time 0.0 to 10.0 "how long the drive is off";
-    /// The drive moves by a wrong scale from where it is: a wrong gear ratio.
-    DriveScale "drive_scale": Drive, Axis, One 0.0 to 3.0 "millimetres that it moves for each that it is asked to";
-    /// The drive sends emergency messages again and again.
-    EmcyStorm "emcy_storm": Drive, Axis, Time 1e-4 to 1.0 "the time between two";
+    /// Whether it acts on a process, so that the supervisor carries it out.
+    pub const fn is_of_process(self) -> bool {
+        matches!(self, Self::Process(_))
+    }
 
-    /// The axis jams: a guide seizes and holds it, up to 2 kN.
-    Jam "jam": Mechanism, Axis;
-    /// Friction grows: dry guides.
-    Friction "friction": Mechanism, Axes, One 0.0 to 100.0 "the factor on the axis' friction";
-    /// The platform carries more mass, at the incisal point.
-    Payload "payload": Mechanism, Fixed, Mass 0.0 to 20.0 "the mass";
-    /// The joint has play between drive and platform.
-    Play "play": Mechanism, Axis, Length 0.0 to 0.02 "the play";
-    /// The rod is broken: the axis moves freely, without force of the drive.
-    BrokenRod "broken_rod": Mechanism, Axis;
-    /// A hard stop stands in the axis' way, on both sides of where it is.
-    EndStop "end_stop": Mechanism, Axis, Length 0.0 to 0.1 "the way left to either side";
-
-    /// The controller's commands stop coming, while it stands still: a stalled process.
-    ControllerStall "controller_stall": Command, Fixed, Time 0.0 to 10.0 "how long";
-    /// The targets of a command are no numbers.
-    CommandNan "command_nan": Command, Fixed;
-    /// One target jumps.
-    CommandJump "command_jump": Command, Axis, Length -0.1 to 0.1 "the jump";
-    /// Commands carry another version of the layout.
-    CommandVersion "command_version": Command, Fixed;
-    /// Commands are those of another controller.
-    CommandForeign "command_foreign": Command, Fixed;
-
-    /// The controller is killed.
-    ControllerKill "controller_kill": Process, Fixed;
-    /// The plant is stopped for a while, then goes on.
-    PlantStall "plant_stall": Process, Fixed, Time 0.0 to 10.0 "how long";
-    /// The plant is killed.
-    PlantKill "plant_kill": Process, Fixed;
-    /// The recorder is stopped for a while, then goes on.
-    RecorderStall "recorder_stall": Process, Fixed, Time 0.0 to 10.0 "how long";
-    /// The recorder is killed.
-    RecorderKill "recorder_kill": Process, Fixed;
-    /// Another task of higher priority takes the controller's core.
-    CoreStall "core_stall": Process, Fixed, Time 0.0 to 1.0 "how long";
-    /// The recording can grow no further.
-    DiskFull "disk_full": Process, Fixed;
+    /// Whether a key has an effect on it.
+    pub fn takes(self, key: &str) -> bool {
+        let FaultDeclaration { needs, takes, .. } = self.declared();
+        needs.contains(&key) || takes.contains(&key)
+    }
 }
 
 impl Display for FaultKindConfig {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
+    }
+}
+
+impl Serialize for FaultKindConfig {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+impl<'de> Deserialize<'de> for FaultKindConfig {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let name = Cow::<str>::deserialize(deserializer)?;
+        let kind = Self::ALL.iter().find(|kind| kind.name() == name);
+        kind.copied().ok_or_else(|| D::Error::unknown_variant(&name, Self::NAMES))
     }
 }
 
@@ -224,7 +259,7 @@ mod tests {
         for kind in FaultKindConfig::ALL {
             let read: FaultKindConfig = serde_json::from_str(&format!("\"{}\"", kind.name())).unwrap();
             assert_eq!(read, *kind);
-            assert!(kind.about().ends_with('.'), "{kind}");
+            assert!(kind.declared().about.ends_with('.'), "{kind}");
         }
     }
 }

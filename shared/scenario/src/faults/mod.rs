@@ -9,11 +9,14 @@ use masseter_model::geometry::AXIS_NAMES;
 use serde::{Deserialize, Serialize};
 
 use super::can::{CanConfig, MASTER_NODE};
-use super::error::{Checked, ScenarioError, bounded, require, require_name, require_within};
-use super::quantity::{Dimension, Quantity};
+use super::error::{Checked, ScenarioError, bounded, require, require_keys, require_name, require_within};
+use super::quantity::Quantity;
 use super::when::{EntryNames, When, WhenKeys};
 
-pub use kinds::{FaultKindConfig, FaultLayer, FaultPlace, FaultSize};
+pub use kinds::{
+    AxisFault, BusFault, CommandFault, DriveFault, EncoderFault, FaultDeclaration, FaultKindConfig,
+    FaultSize, PlatformFault, ProcessFault,
+};
 
 /// One fault.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -76,9 +79,9 @@ impl Display for FaultConfig {
 
 impl FaultConfig {
     /// A fault of that kind, with no time and no place yet.
-    pub const fn new(kind: FaultKindConfig) -> Self {
+    pub fn new(kind: impl Into<FaultKindConfig>) -> Self {
         Self {
-            kind,
+            kind: kind.into(),
             name: None,
             at_s: None,
             after: None,
@@ -133,57 +136,47 @@ impl FaultConfig {
         require(is_axis || self.axis.is_none(), "faults.axis", &name, self.need_of("faults.axis"))?;
         self.require_size()?;
         self.require_ranges()?;
-        match self.kind.layer() {
-            FaultLayer::Bus => self.require_bus(can),
-            FaultLayer::Encoder | FaultLayer::Drive | FaultLayer::Mechanism => {
+        match self.kind {
+            FaultKindConfig::Bus(kind) => self.require_bus(kind, can),
+            FaultKindConfig::Encoder(_)
+            | FaultKindConfig::Drive(_)
+            | FaultKindConfig::Axis(_)
+            | FaultKindConfig::Platform(_) => {
                 let need = "leave it away with can.interfaces: real drives take no such fault";
                 require(can.is_virtual(), "faults.kind", &self.kind, need)
             }
-            FaultLayer::Command | FaultLayer::Process => Ok(()),
+            FaultKindConfig::Command(_) | FaultKindConfig::Process(_) => Ok(()),
         }
     }
 
     /// Refuses keys that have no effect on this kind, and requires those that it needs.
     fn require_keys(&self) -> Checked {
-        use FaultKindConfig::{Babble, BusOff, Disconnect};
-        use FaultPlace::{Axes, Axis, Frames, Node};
-        let (kind, place, has_size) = (self.kind, self.kind.place(), self.kind.size().is_some());
-        let is_of_bus = matches!(place, Frames | Node);
         let given = [
-            ("faults.bus", self.bus.is_some(), is_of_bus, is_of_bus),
-            ("faults.node", self.node.is_some(), is_of_bus, place == Node),
-            ("faults.id", self.id.is_some(), is_of_bus && !matches!(kind, Disconnect | BusOff), false),
-            ("faults.data", self.data.is_some(), kind == Babble, false),
-            ("faults.axis", self.axis.is_some(), matches!(place, Axis | Axes), place == Axis),
-            ("faults.size", self.size.is_some(), has_size, has_size),
-            ("faults.probability", self.probability < 1.0, place == Frames, false),
-            ("faults.count", self.count.is_some(), matches!(kind, BusOff | Babble) || place == Frames, false),
+            ("faults.bus", self.bus.is_some()),
+            ("faults.node", self.node.is_some()),
+            ("faults.id", self.id.is_some()),
+            ("faults.data", self.data.is_some()),
+            ("faults.axis", self.axis.is_some()),
+            ("faults.size", self.size.is_some()),
+            ("faults.probability", self.probability < 1.0),
+            ("faults.count", self.count.is_some()),
         ];
-        for (key, is_given, has_effect, is_needed) in given {
-            let need = format!("leave it away: it has no effect on {kind}");
-            require(has_effect || !is_given, key, &"given", need)?;
-            if is_needed && !is_given {
-                return Err(ScenarioError::bad(key, &"none", self.need_of(key)));
-            }
-        }
-        Ok(())
+        let FaultDeclaration { name, needs, takes, .. } = self.kind.declared();
+        require_keys(name, [needs, takes], &given, |key| self.need_of(key))
     }
 
     /// What a missing key must say.
     fn need_of(&self, key: &str) -> String {
-        match key {
-            "faults.bus" => "name a bus of can.buses, from 0".to_owned(),
-            "faults.node" => "name the node that babbles, is cut off or goes off the bus".to_owned(),
-            "faults.axis" => format!("name an axis: {}", AXIS_NAMES.join(", ")),
-            _ => {
-                let size = self.kind.size().expect("only kinds with a size need one");
-                format!("give {}, such as \"{}\"", size.about, example(size))
-            }
+        match (key, self.kind.declared().size) {
+            ("faults.bus", _) => "name a bus of can.buses, from 0".to_owned(),
+            ("faults.node", _) => "name the node that babbles, is cut off or goes off the bus".to_owned(),
+            ("faults.size", Some(size)) => format!("give {}, such as \"{}\"", size.about, size.example),
+            _ => format!("name an axis: {}", AXIS_NAMES.join(", ")),
         }
     }
 
     fn require_size(&self) -> Checked {
-        let Some((given, size)) = self.size.zip(self.kind.size()) else { return Ok(()) };
+        let Some((given, size)) = self.size.zip(self.kind.declared().size) else { return Ok(()) };
         let si =
             given.si_of(size.dimension).map_err(|need| ScenarioError::bad("faults.size", &given, need))?;
         let unit = size.dimension.si_unit();
@@ -204,13 +197,13 @@ impl FaultConfig {
         require(id <= 0x7FF, "faults.id", &id, "use an 11-bit identifier, at most 0x7FF")
     }
 
-    fn require_bus(&self, can: &CanConfig) -> Checked {
+    fn require_bus(&self, kind: BusFault, can: &CanConfig) -> Checked {
         let bus = self.bus.unwrap_or_default();
         let Some(axes) = can.buses.get(bus) else {
             return Err(ScenarioError::bad("faults.bus", &bus, self.need_of("faults.bus")));
         };
         if !can.is_virtual() {
-            self.require_port()?;
+            self.require_port(kind)?;
         }
         let Some(node) = self.node else { return Ok(()) };
         let drives = axes.iter().filter_map(|&axis| can.node_ids.get(axis).copied());
@@ -221,25 +214,12 @@ impl FaultConfig {
     }
 
     /// Refuses faults that the port of a real interface cannot carry out.
-    fn require_port(&self) -> Checked {
+    fn require_port(&self, kind: BusFault) -> Checked {
         let need =
             "leave it away with can.interfaces: only on a simulated bus can frames be destroyed on the wire";
-        require(self.kind != FaultKindConfig::Corrupt, "faults.kind", &self.kind, need)?;
+        require(kind != BusFault::Corrupt, "faults.kind", &self.kind, need)?;
         let node = self.node.unwrap_or(MASTER_NODE.get());
         let need = format!("on a real interface only the master (node {MASTER_NODE}) can be given faults");
         require(node == MASTER_NODE.get(), "faults.node", &node, need)
-    }
-}
-
-/// A valid size in a unit that people use.
-fn example(size: FaultSize) -> &'static str {
-    use Dimension as D;
-    match size.dimension {
-        D::Length => "0.5 mm",
-        D::Velocity => "1 mm/s",
-        D::Mass => "0.2 kg",
-        D::Time => "1 ms",
-        D::Force => "10 N",
-        _ => "0.5",
     }
 }

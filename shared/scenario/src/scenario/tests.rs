@@ -215,7 +215,7 @@ const WRONG: &[(&str, &str)] = &[
     ("[[faults]]\nkind = 'lose'\nbus = 0\nfrom_s = 0.0\ndata = [1]", "faults.data = given: leave it away"),
     (
         "[[faults]]\nkind = 'delay'\nbus = 0\nfrom_s = 0.0",
-        "faults.size = none: give how long, such as \"1 ms\"",
+        "faults.size = none: give how long, such as \"1500 us\"",
     ),
     ("[[faults]]\nkind = 'lose'\nbus = 0\nfrom_s = 1.0\nuntil_s = 1.0", "faults.until_s = 1"),
     ("[[faults]]\nkind = 'lose'\nbus = 0\nfrom_s = 1.0\nprobability = 1.5", "faults.probability"),

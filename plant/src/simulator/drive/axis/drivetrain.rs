@@ -6,7 +6,8 @@
 use super::motion::{Motion, ServoCommand};
 use super::servo::{BRAKE_DAMPING_N_S_M, BRAKE_STIFFNESS_N_M, Servo, ServoLimits};
 use crate::simulator::acting::Acting;
-use crate::simulator::drive::{AxisQuirks, DriveFault, Ratings};
+use crate::simulator::drive::{AxisQuirks, Ratings};
+use masseter_scenario::DriveFault;
 
 /// Share of the rated force at which a motor counts as pushing against a stop.
 const STOP_SHARE: f64 = 0.2;

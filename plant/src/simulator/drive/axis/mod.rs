@@ -16,9 +16,10 @@ use masseter_can::cia402::{Controlword, DriveState, StateCommand, StatusBit, Sta
 use super::dictionary::Objects;
 use super::names;
 use crate::simulator::acting::Acting;
-use crate::simulator::drive::{AxisQuirks, DriveFault, DriveSettings, Ratings, SECOND_NS};
+use crate::simulator::drive::{AxisQuirks, DriveSettings, Ratings, SECOND_NS};
 use drivetrain::Drivetrain;
 use encoder::{Coordinates, Encoder, Switches};
+use masseter_scenario::DriveFault;
 use modes::{Homing, Positioning, Sensed};
 use motion::{
     Demand, Mode, Motion, MotionCommand, NewTargets, PositionView, Profile, ServoCommand, Shaft, clamp,

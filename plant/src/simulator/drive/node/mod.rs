@@ -20,9 +20,8 @@ use super::names;
 use super::table::PDOS;
 use crate::simulator::drive::axis::encoder::Encoder;
 use crate::simulator::drive::axis::motion::Shaft;
-use crate::simulator::drive::{
-    DriveFault, DriveMemory, DriveSettings, MILLISECOND_NS, NodeQuirks, Quirks, SECOND_NS,
-};
+use crate::simulator::drive::{DriveMemory, DriveSettings, MILLISECOND_NS, NodeQuirks, Quirks, SECOND_NS};
+use masseter_scenario::DriveFault;
 use pdo::{Effects, Outbox, ProcessData, Rpdo, Tpdo};
 use sdo::{DictionaryAccess, SdoServer, Storage};
 use state::{BOOT_NS, Consumer, Errors, Nmt, Producer, clear_history};

@@ -292,8 +292,10 @@ fn every_kind_leaves_the_drive_readable() {
             "value" => "value = 7\n".to_owned(),
             time => format!("{time} = 0.5\n"),
         };
-        let mut bench =
-            bench(&format!("kind = '{kind}'\n{}", kind.keys().iter().map(value).collect::<String>()));
+        let mut bench = bench(&format!(
+            "kind = '{kind}'\n{}",
+            kind.keys().concat().iter().map(value).collect::<String>()
+        ));
         bench.run_ms(100);
         let readable = ENTRIES.iter().filter(|entry| {
             let object = entry.address;

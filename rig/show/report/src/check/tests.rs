@@ -21,7 +21,7 @@ mod check {
 }
 
 mod motion_checks {
-    use masseter_scenario::FaultKindConfig;
+    use masseter_scenario::BusFault;
 
     use super::*;
 
@@ -98,7 +98,7 @@ mod motion_checks {
             from_s: Some(2.5),
             node: Some(4),
             id: Some(0x204),
-            ..FaultConfig::new(FaultKindConfig::Lose)
+            ..FaultConfig::new(BusFault::Lose)
         }
     }
 

@@ -8,7 +8,7 @@ use masseter_recording::{Damage, MachineInfo};
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::named::Declared;
 use masseter_runtime::realtime::scheduling::{Obtained, SchedulingRequest};
-use masseter_scenario::{CpuDmaLatency, FaultConfig, FaultKindConfig, Scenario};
+use masseter_scenario::{BusFault, CpuDmaLatency, FaultConfig, Scenario};
 
 use super::*;
 
@@ -91,7 +91,7 @@ impl Run {
         self.manifest.scenario.faults.push(FaultConfig {
             bus: Some(0),
             from_s: Some(1.0),
-            ..FaultConfig::new(FaultKindConfig::Lose)
+            ..FaultConfig::new(BusFault::Lose)
         });
     }
 
