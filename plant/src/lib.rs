@@ -5,7 +5,7 @@
 //! | `master` | boot, exchange, supervision of the drives; [`wanted`] objects; link, layout of the buses | |
 //! | `simulator::mechanism` | dynamics, axes with friction and stops, contact of teeth and food, poses at rest | |
 //! | `simulator::drive` | an emulated drive: node (CiA 301), axis (CiA 402), object dictionary | |
-//! | `simulator::injection` | times and events of faults and stimuli, what they do | mechanism, drive, `master` |
+//! | `simulator::injection` | when faults and stimuli act, and what they do | mechanism, drive, `master` |
 //! | [`emulation`] | drives and mechanism on simulated wires or real interfaces | all above |
 //! | [`commissioning`] | a client of single drives that inspects, configures and moves them | `master`, [`emulation`] |
 //! | [`description`] | EDS and DBC of the emulated drives | [`emulation`] |
@@ -24,7 +24,6 @@ mod master;
 pub mod process;
 mod simulator;
 
-pub use commissioning as bringup;
 pub use error::{ContactError, DynamicsError, PlantError};
 pub use master::wanted;
 pub use simulator::emulation;

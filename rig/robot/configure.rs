@@ -8,7 +8,9 @@ use std::fmt::Write;
 
 use anyhow::{Context, anyhow, ensure};
 use masseter_model::geometry::AXIS_NAMES;
-use masseter_plant::bringup::{BootUps, Change, Deviation, Outcome, Settings, Survey, Writer, reset, store};
+use masseter_plant::commissioning::{
+    BootUps, Change, Deviation, Outcome, Settings, Survey, Writer, reset, store,
+};
 use masseter_scenario::{Scenario, wording::counted};
 use masseter_terminal::{Exit, Failure, OrFailure, Tone, result, result_with_tones, status};
 use serde::{Deserialize, Serialize};

@@ -2,7 +2,7 @@
 
 use clap::Args;
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::bringup::{HomeReport, Wish, home as find};
+use masseter_plant::commissioning::{HomeReport, Wish, home as find};
 use masseter_terminal::{Exit, Failure, OrFailure, result_line};
 use serde::Serialize;
 

@@ -5,7 +5,7 @@ use std::fmt::{self, Display, Formatter};
 
 use masseter_can::canopen::ObjectAddress;
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::bringup::{
+use masseter_plant::commissioning::{
     BootUps, Line, LineError, OtherMaster, Restarted, SdoReason, Survey, object_name, value_text,
 };
 use masseter_plant::wanted::WantedDrive;

@@ -8,7 +8,7 @@ use std::{collections::BTreeMap, fmt::Write};
 use clap::Args;
 use masseter_can::{InterfaceDetails, canopen::ObjectAddress};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::bringup::{
+use masseter_plant::commissioning::{
     BootUps, Deviation, LineError, OtherMaster, Outcome, Restarted, Survey, object_name, reason_text,
 };
 use masseter_runtime::clock::SECOND_NS;

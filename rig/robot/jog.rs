@@ -7,7 +7,7 @@ use std::{io::Read, sync::Arc, thread, time::Duration};
 use anyhow::anyhow;
 use clap::Args;
 use masseter_model::geometry::AXIS_NAMES;
-use masseter_plant::bringup::{JogOrder, JogReport, Wish, jog as play};
+use masseter_plant::commissioning::{JogOrder, JogReport, Wish, jog as play};
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_terminal::{Exit, Failure, OrFailure, result_line, status};
 use serde_json::json;

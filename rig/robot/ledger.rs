@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, ensure};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::bringup::{
+use masseter_plant::commissioning::{
     Ledger, Line, LineError, OldValue, Settings, give_back, object_name, value_text,
 };
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};

@@ -6,7 +6,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
-use masseter_plant::bringup::Line;
+use masseter_plant::commissioning::Line;
 use masseter_scenario::{FileConfig, Scenario, input::read_bytes};
 use masseter_terminal::status;
 use serde::{Deserialize, Serialize};

@@ -6,7 +6,7 @@
 use anyhow::Context;
 use masseter_can::canopen::ObjectAddress;
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::bringup::{Line, LineError};
+use masseter_plant::commissioning::{Line, LineError};
 use masseter_runtime::clock;
 use masseter_scenario::{DriveProfile, ObjectConfig, ObjectKey, ObjectRule, Scenario};
 use masseter_terminal::{Failure, status};
@@ -171,7 +171,7 @@ pub(super) fn check_mark(
 mod tests {
     use std::{io, path::Path};
 
-    use masseter_plant::bringup::{JogOrder, Wish, jog, reset};
+    use masseter_plant::commissioning::{JogOrder, Wish, jog, reset};
     use serde_json::{Value, json};
 
     use super::super::evidence::StepFolder;

@@ -5,7 +5,7 @@ use std::io::Write;
 use anyhow::ensure;
 use masseter_can::canopen::NodeId;
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::bringup::{
+use masseter_plant::commissioning::{
     BootUps, Deviation, Line, LineError, Outcome, PowerError, Settings, Survey, deviations, prove_no_power,
     take_over,
 };

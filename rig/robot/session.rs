@@ -2,7 +2,7 @@
 
 use anyhow::Context;
 use masseter_model::geometry::AXES;
-use masseter_plant::bringup::{BootUps, Line, LineError, MotionError, StopCause};
+use masseter_plant::commissioning::{BootUps, Line, LineError, MotionError, StopCause};
 use masseter_runtime::lifecycle::StopRequest;
 use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure, status};

@@ -61,10 +61,11 @@ pub(super) enum SolutionFilter {
 
 /// One of the two four-bar chains that leg 1 drives: base, leg 1, side 12, leg 2, or base, leg 1, side 31, leg 3.
 ///
-/// With x = cos θ₁ and y = sin θ₁ the side's equation reads A + B cos θ + C sin θ = 0, where A and B are affine in x
-/// and C = −y: a line in the plane of the driven leg. It cuts the unit circle where D = B² + C² − A² ≥ 0. D is a
-/// quadratic in x whose leading coefficient ω² − 1 − p² is never positive, so the angles at which a chain closes are
-/// *one* interval of x.
+/// The angles at which a chain closes are *one* interval of x = cos θ₁.
+///
+/// The side's equation is A + B cos θ + C sin θ = 0: a line in the plane of the driven leg. A and B are affine in x, and
+/// C = −y = −sin θ₁. The line cuts the unit circle where D = B² + C² − A² ≥ 0. D is a quadratic in x. Its leading
+/// coefficient ω² − 1 − p² is never positive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct FourBar {
     /// A at x = 0, and its slope.

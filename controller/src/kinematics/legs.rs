@@ -1,5 +1,5 @@
-//! The three legs and the three sides of the platform in their cyclic order, and a leg's angle as a point on the unit
-//! circle, so that iterating needs no sine and no cosine.
+//! The three legs and the three sides of the platform, in cyclic order. A leg's angle is a point on the unit circle, so an
+//! iteration needs no sine and no cosine.
 
 use masseter_model::geometry::LEGS;
 

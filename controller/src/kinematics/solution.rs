@@ -1,11 +1,11 @@
-//! What a solver hands back: leg angles that close the platform's triangle and whether the mechanism can stand there,
-//! or why there are none.
+//! The result of a solver: leg angles that close the platform's triangle, or why there are none.
 //!
 //! The paper selects the true solution by two conditions: every Bᵢ below the plane of A₁A₂A₃, and A₂ beyond A₃ along
-//! slide 1. Read without a sign for the plane they leave several candidates, so the plane is oriented here by
-//! (A₂−A₁)×(A₃−A₁), the legs must stand above the base, and the Jacobian's determinant must be positive. These together
-//! do *not* always leave one solution: near the edge of the strokes about one standing input in 23,000 has two (see
-//! [`uniqueness`](super::uniqueness)), and nothing here relies on there being one.
+//! slide 1. Without a sign for the plane these leave several candidates. So three conditions are added: the plane is
+//! oriented by (A₂−A₁)×(A₃−A₁), the legs stand above the base, and the Jacobian's determinant is positive.
+//!
+//! All five together do *not* always leave one solution. Near the edge of the strokes about one standing input in 23,000
+//! has two (see [`uniqueness`](super::uniqueness)). Nothing here relies on a single solution.
 
 use masseter_model::geometry::{AXIS_NAMES, Actuators, LEGS, Legs, Mechanism, Pose, Vec3, frame_of_corners};
 use nalgebra::Vector3;

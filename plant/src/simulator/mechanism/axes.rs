@@ -306,8 +306,10 @@ impl Coupling {
 }
 
 impl DriveSide {
-    /// With the contact's force k g + d (v′ − q̇′), for a gap closed by g, the drive's side obeys
-    /// m (v′ − v)/h = F − b v′ − k g − d (v′ − q̇′). That gives v′ as a linear function of the joint's speed q̇′.
+    /// The speed v′ of the drive's side is a linear function of the joint's speed q̇′.
+    ///
+    /// The drive's side obeys m (v′ − v)/h = F − b v′ − c. The force of the contact is c = k g + d (v′ − q̇′), where g is
+    /// by how much the gap is closed.
     fn push(&mut self, drive_n: f64, joint_m: f64, joint_m_s: f64, step_s: f64) -> Element {
         let middle_m = self.position_m + 0.5 * step_s * self.speed_m_s;
         let (closed_m, damping) = self.contact(middle_m - joint_m, joint_m_s, step_s);

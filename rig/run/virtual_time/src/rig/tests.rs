@@ -88,8 +88,10 @@ fn a_reset_rig_is_new() {
 #[test]
 fn signals_have_names_and_values() {
     let rig = Rig::new(&Scenario::default(), 1).unwrap();
-    let height = rig.signal("incisal.z").unwrap().expect("the jaw has a height");
-    assert!(height.abs() < 1000.0, "{height}");
+    let shown_mm = rig.signal("d1.position").unwrap().expect("the encoder reports");
+    assert!((shown_mm - 1e3 * rig.reading().position_m[0]).abs() < 1e-9, "{shown_mm}");
+    let true_mm = rig.signal("d1.true_position").unwrap().expect("the mechanism is emulated");
+    assert!((true_mm - 1e3 * rig.truth().unwrap().joint_m[0]).abs() < 1e-9, "{true_mm}");
     assert_eq!(rig.signal("controller.state").unwrap(), None, "a rig alone has no controller");
     let refusal = rig.signal("incisal.zz").unwrap_err().to_string();
     assert!(refusal.contains("did you mean"), "{refusal}");

@@ -1,9 +1,10 @@
 //! A peer on a socket, heard and answered without blocking: one deadline and one byte budget hold for the whole exchange.
 //!
-//! Every server of the rig meets its peers through [`Newcomers`], which holds a small buffer for each and a bounded
-//! number of them. The module does not decide who is admitted, and reads no clock.
+//! Every server of the rig meets its peers through [`Newcomers`]. The module does not decide who is admitted. Time is an
+//! argument, but for clients that wait for an answer.
 
-use std::collections::VecDeque;
+mod newcomers;
+
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::path::Path;
@@ -13,21 +14,19 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use rustix::io::{Errno, read};
 use rustix::net::{
-    AddressFamily, SendFlags, Shutdown, SocketAddrUnix, SocketFlags, SocketType, accept_with, connect,
-    listen, send, shutdown, socket_with,
+    AddressFamily, SendFlags, Shutdown, SocketAddrUnix, SocketFlags, SocketType, connect, send, shutdown,
+    socket_with,
 };
 use serde::Serialize;
 
 use crate::clock::{self, MILLISECOND_NS, SECOND_NS};
 
+pub use newcomers::{Look, Newcomers};
+
 /// Bytes of one read.
 const READ_BYTES: usize = 16_384;
 /// Most bytes that wait in either direction.
 const MOST_WAITING: usize = 1 << 20;
-/// Connections that one look accepts, so that a look takes a bounded time.
-const MOST_ACCEPTED: usize = 64;
-/// Connections that wait to be accepted: nobody waits behind thousands.
-const BACKLOG: i32 = 128;
 /// Time between two attempts at a server whose queue of connections is full.
 const RETRY: Duration = Duration::from_millis(5);
 
@@ -314,95 +313,6 @@ pub fn line(message: &impl Serialize) -> String {
     serde_json::to_string(message).expect("plain data") + "\n"
 }
 
-/// What a look at the newcomers found.
-#[derive(Debug, Default)]
-pub struct Look {
-    /// Peers whose request is whole.
-    pub asking: Vec<Conversation>,
-    /// Why others are out.
-    pub out: Vec<Left>,
-}
-
-/// The peers of a server that have not asked for anything yet: at most a fixed number, the oldest of which goes when
-/// another one comes.
-#[derive(Debug)]
-pub struct Newcomers {
-    listener: OwnedFd,
-    limits: Limits,
-    most: usize,
-    greeting: &'static [u8],
-    waiting: VecDeque<Conversation>,
-}
-
-impl Newcomers {
-    /// The peers that connect to `listener`; at most `most` of them wait.
-    ///
-    /// # Errors
-    /// When the system refuses a listener that does not block.
-    pub fn at(listener: OwnedFd, most: usize, limits: Limits) -> io::Result<Self> {
-        set_blocking(&listener, false)?;
-        listen(&listener, BACKLOG)?;
-        Ok(Self { listener, limits, most, greeting: &[], waiting: VecDeque::new() })
-    }
-
-    /// Says this to each peer first.
-    #[must_use]
-    pub fn greeted_with(self, greeting: &'static [u8]) -> Self {
-        Self { greeting, ..self }
-    }
-
-    /// Hears those that wait, and accepts a bounded number of others. `is_whole` recognises a whole request. Never blocks.
-    pub fn look(&mut self, now_ns: u64, is_whole: impl Fn(&[u8]) -> bool) -> Look {
-        let mut look = Look::default();
-        for conversation in std::mem::take(&mut self.waiting) {
-            self.sort_peer(conversation, now_ns, &is_whole, &mut look);
-        }
-        for _ in 0..MOST_ACCEPTED {
-            let flags = SocketFlags::NONBLOCK | SocketFlags::CLOEXEC;
-            // A peer that has left meanwhile, or a machine without descriptors: the next look tries again.
-            let Ok(connection) = accept_with(&self.listener, flags) else { break };
-            match Conversation::begin(connection, self.limits, now_ns) {
-                Ok(mut conversation) => {
-                    conversation.say(self.greeting);
-                    self.sort_peer(conversation, now_ns, &is_whole, &mut look);
-                }
-                Err(error) => look.out.push(error.into()),
-            }
-        }
-        look
-    }
-
-    fn sort_peer(
-        &mut self,
-        mut conversation: Conversation,
-        now_ns: u64,
-        is_whole: impl Fn(&[u8]) -> bool,
-        look: &mut Look,
-    ) {
-        conversation.hear();
-        if is_whole(conversation.heard()) {
-            look.asking.push(conversation);
-            return;
-        }
-        if let Some(left) = conversation.left(now_ns) {
-            look.out.push(left);
-            return;
-        }
-        if self.waiting.len() == self.most {
-            self.waiting.pop_front();
-            look.out.push(Left::Displaced);
-        }
-        self.waiting.push_back(conversation);
-    }
-
-    /// Waits until a peer connects, or one that waits sends something or has had its time, for at most `timeout`.
-    pub fn wait(&self, timeout: Duration) {
-        let first_byte = Duration::from_nanos(self.limits.first_byte_ns);
-        let timeout = if self.waiting.is_empty() { timeout } else { timeout.min(first_byte) };
-        wait_for_peers(&self.waiting, Some(&self.listener), timeout);
-    }
-}
-
 fn wait_for_peers<'a>(
     conversations: impl IntoIterator<Item = &'a Conversation>,
     listener: Option<&OwnedFd>,
@@ -432,6 +342,8 @@ fn set_blocking(connection: &OwnedFd, is_blocking: bool) -> io::Result<()> {
 mod tests {
     use std::io::{Read, Write};
     use std::os::unix::net::{UnixListener, UnixStream};
+
+    use rustix::net::listen;
 
     use super::*;
 
@@ -513,52 +425,6 @@ mod tests {
         assert!(matches!(conversation.await_line(), Err(Left::Late(_))));
         drop(conversation);
         dripping.join().unwrap();
-    }
-
-    /// A server with room for three newcomers, at a path of its own.
-    fn newcomers() -> (tempfile::TempDir, std::path::PathBuf, Newcomers) {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("socket");
-        let listener = UnixListener::bind(&path).unwrap();
-        (folder, path, Newcomers::at(listener.into(), 3, LIMITS).unwrap())
-    }
-
-    fn is_line(bytes: &[u8]) -> bool {
-        bytes.contains(&b'\n')
-    }
-
-    #[test]
-    fn a_whole_request_is_found_behind_silent_peers_and_the_oldest_of_these_goes() {
-        let (_folder, path, mut newcomers) = newcomers();
-        let silent: Vec<_> = (0..5).map(|_| UnixStream::connect(&path).unwrap()).collect();
-        UnixStream::connect(&path).unwrap().write_all(b"hello\n").unwrap();
-        let mut look = newcomers.look(1000, is_line);
-        assert_eq!(look.asking.len(), 1);
-        assert_eq!(look.asking[0].next_line().as_deref(), Some("hello"));
-        assert!(matches!(look.out[..], [Left::Displaced, Left::Displaced]));
-        // Their time is over: a peer that sends nothing holds nothing.
-        let look = newcomers.look(1300, is_line);
-        assert!(look.asking.is_empty() && look.out.len() == 3);
-        drop(silent);
-    }
-
-    #[test]
-    fn a_peer_that_sends_a_part_and_leaves_is_noticed_at_once() {
-        let (_folder, path, mut newcomers) = newcomers();
-        for _ in 0..100 {
-            UnixStream::connect(&path).unwrap().write_all(b"G").unwrap();
-            newcomers.look(1000, is_line);
-        }
-        newcomers.look(1000, is_line);
-        assert!(newcomers.waiting.is_empty());
-    }
-
-    #[test]
-    fn a_look_accepts_a_bounded_number() {
-        let (_folder, path, mut newcomers) = newcomers();
-        let _peers: Vec<_> = (0..=MOST_ACCEPTED).map(|_| UnixStream::connect(&path).unwrap()).collect();
-        assert_eq!(newcomers.look(1000, is_line).out.len(), MOST_ACCEPTED - 3);
-        assert_eq!(newcomers.look(1000, is_line).out.len(), 1);
     }
 
     #[test]
