@@ -88,7 +88,8 @@ impl Registry {
     /// # Errors
     /// As [`Self::place_of`].
     pub fn value(&self, name: &str, messages: &CycleMessages) -> Result<Option<f64>, UnknownSignal> {
-        Ok(self.signals[self.place_of(name)?].value(messages, None))
+        let signal = &self.signals[self.place_of(name)?];
+        Ok(signal.value(messages, None).map(|si| si / signal.shown().si))
     }
 }
 

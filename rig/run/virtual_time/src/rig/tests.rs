@@ -87,7 +87,9 @@ fn a_reset_rig_is_new() {
 
 #[test]
 fn signals_have_names_and_values() {
-    let rig = Rig::new(&Scenario::default(), 1).unwrap();
+    let mut rig = Rig::new(&Scenario::default(), 1).unwrap();
+    assert_eq!(rig.signal("d1.position").unwrap(), None, "a drive reports once it has booted");
+    steps(&mut rig, &commands(&played(&Scenario::default(), 1200)));
     let shown_mm = rig.signal("d1.position").unwrap().expect("the encoder reports");
     assert!((shown_mm - 1e3 * rig.reading().position_m[0]).abs() < 1e-9, "{shown_mm}");
     let true_mm = rig.signal("d1.true_position").unwrap().expect("the mechanism is emulated");
