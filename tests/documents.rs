@@ -9,6 +9,9 @@ mod interface;
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::thread;
 
 use crate::common::demand_parquet;
 
@@ -97,7 +100,19 @@ fn run(document: &Path) -> usize {
 fn every_console_block_shows_what_a_user_sees() {
     demand_parquet();
     let documents = documents().into_iter().filter(|document| !document.ends_with(OF_CONTROLLERS));
-    let commands: usize = documents.map(|document| run(&document)).sum();
+    let documents = Mutex::new(documents);
+    let commands = AtomicUsize::new(0);
+    // Two at a time: each document has a folder of its own.
+    thread::scope(|scope| {
+        for _ in 0..2 {
+            scope.spawn(|| {
+                while let Some(document) = { documents.lock().unwrap().next() } {
+                    commands.fetch_add(run(&document), Relaxed);
+                }
+            });
+        }
+    });
+    let commands = commands.into_inner();
     assert!(commands >= 20, "only {commands} commands were found");
 }
 

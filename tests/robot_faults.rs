@@ -17,7 +17,7 @@ const DIP: &str = "kind = 'drive_reboot'\naxis = 'l1'\nsize = '10 ms'";
 const RESET: &str = "kind = 'babble'\nbus = 1\nnode = 5\nid = 0\ndata = [0x81, 4]\ncount = 1";
 /// SYNC, as another master on the place of d2 sends it.
 const SYNC: &str = "kind = 'babble'\nbus = 0\nnode = 2\nid = 0x80\ndata = []\ncount = 1";
-const SOUND: &str = "duration_s = 0.5\n[drives]\nmemory = 'memory.json'\n[[drives.quirk]]\nkind = 'slow_save'\nfor_s = 1.0\n\
+const SOUND: &str = "duration_s = 0.5\n[controller]\nease_s = 0.2\n[drives]\nmemory = 'memory.json'\n[[drives.quirk]]\nkind = 'slow_save'\nfor_s = 1.0\n\
                      [dynamics]\ninitial_leg_m = 0.2974\n[[drive_profile]]\naxes = ['l1', 'l2', 'l3']\n\
                      homing = { absolute = false, method = 33, home_position_m = 0.2974 }\n";
 const OFF: &str = "the axis is off";
