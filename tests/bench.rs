@@ -1,67 +1,36 @@
 //! `masseter bench` as its users meet it.
 
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::process::Command;
 
-use masseter_runtime::clock;
-
-use crate::common::{Cores, MASSETER, child_of};
-use rustix::process::{Pid, Signal, kill_process, test_kill_process};
+use masseter_report::histogram_log;
 use serde_json::Value;
 
-/// Waits until a run in one of the folders there is under way.
-fn wait_for_a_run(place: &Path) {
-    let records = || {
-        let mut folders = fs::read_dir(place).unwrap();
-        folders.any(|folder| folder.unwrap().path().join("run/recording.mcap").exists())
-    };
-    for _ in 0..1000 {
-        if records() {
-            return;
-        }
-        clock::sleep(Duration::from_millis(10));
-    }
-    panic!("no run was under way");
-}
+use crate::common::{Cores, MASSETER};
 
 #[test]
-fn an_interrupted_bench_ends_after_its_run_and_leaves_nothing() {
+fn the_bench_of_the_loop_leaves_its_results_and_a_histogram_of_every_candidate() {
     let _cores = Cores::take();
-    for signal in [Signal::INT, Signal::TERM] {
-        let place = tempfile::tempdir().unwrap();
-        let mut bench = Command::new(MASSETER)
-            .args(["bench", "rate", "--rounds", "1"])
-            .env("TMPDIR", place.path())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        let run = child_of(&bench, "run");
-        wait_for_a_run(place.path());
-        kill_process(Pid::from_child(&bench), signal).unwrap();
-        assert_eq!(bench.wait().unwrap().code(), Some(130), "{signal:?}");
-        assert!(test_kill_process(run).is_err(), "{signal:?}: its run still plays");
-        assert_eq!(fs::read_dir(place.path()).unwrap().count(), 0, "{signal:?}: its folder is still there");
-    }
-}
-
-#[test]
-fn a_run_without_a_recording_is_measured_by_time_and_memory() {
-    let _cores = Cores::take();
+    let place = tempfile::tempdir().unwrap();
     let output = Command::new(MASSETER)
-        .args(["bench", "virtual", "--rounds", "1", "--format", "json"])
+        .args(["bench", "loop", "--rounds", "1", "--format", "json", "--out"])
+        .arg(place.path())
         .output()
         .unwrap();
     // The machine may be too disturbed for a bench.
     assert!(matches!(output.status.code(), Some(0 | 3)), "{output:?}");
     let results: Value = serde_json::from_slice(&output.stdout).unwrap();
-    let virtual_time = &results["comparisons"][0];
-    let names = [0, 1].map(|place| &virtual_time["candidates"][place]["name"]);
-    assert_eq!(names, ["wall time", "CPU time"]);
-    let notes: Vec<_> = virtual_time["notes"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
-    let [wall, cpu, memory] = notes[..] else { panic!("{notes:?}") };
-    assert!(wall.ends_with("times real time") && cpu.ends_with("times real time"), "{notes:?}");
-    assert!(memory.ends_with(" MB"), "{memory}");
+    assert_eq!(output.stdout, fs::read(place.path().join("results.json")).unwrap());
+    assert_eq!(results["disturbed"], output.status.code() == Some(3), "{results}");
+    let candidates = results["candidates"].as_array().unwrap();
+    assert_eq!(candidates[0]["name"], "masseter");
+    for candidate in candidates {
+        let name = candidate["name"].as_str().unwrap();
+        let log = format!("loop-{}.hlog", name.replace(|c: char| !c.is_ascii_alphanumeric(), "-"));
+        assert!(histogram_log::read(&place.path().join(log)).unwrap().len() >= 10_000, "{name}");
+        let percentiles = candidate["percentiles"].as_array().unwrap();
+        let names: Vec<_> =
+            percentiles.iter().map(|percentile| percentile["name"].as_str().unwrap()).collect();
+        assert_eq!(names, ["p50", "p99", "p99.9", "max"], "{name}");
+    }
 }

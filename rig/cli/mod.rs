@@ -35,7 +35,7 @@ use crate::doctor::{self, DoctorArgs};
 use crate::robot::{self, RobotVerb};
 use crate::run::exec_program;
 use arguments::ProcessArgs;
-use bench::args::BenchArgs;
+use bench::BenchVerb;
 use campaign::{CampaignArgs, CampaignCaseArgs, SearchArgs, ShrinkArgs};
 use can::CanVerb;
 use controller::{ControllerArgs, ParamVerb, SignalsArgs};
@@ -141,8 +141,9 @@ enum Verb {
     /// Plan the buses, describe the drives (EDS, DBC), serve simulated buses
     #[command(subcommand, after_help = "Example:\n  masseter can plan --rate-hz 1500")]
     Can(CanVerb),
-    /// Measure parts of the rig, each beside a baseline
-    Bench(BenchArgs),
+    /// Measure the real-time loop beside a baseline
+    #[command(subcommand, after_help = "Example:\n  masseter bench loop")]
+    Bench(BenchVerb),
     /// Remove what killed runs left in shared memory
     #[command(after_help = "Example:\n  masseter clean")]
     Clean,
@@ -230,7 +231,7 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Report(args) => report::report(&args),
         Verb::Replay(args) => report::replay(&args).usage(),
         Verb::Diff(args) => report::diff(&args).usage(),
-        Verb::Bench(args) => bench::run(&args),
+        Verb::Bench(verb) => bench::execute(&verb),
         Verb::Fk(args) => kinematics::forward(&args).usage(),
         Verb::Ik(args) => kinematics::inverse(&args).usage(),
         Verb::Can(verb) => can::execute(&verb).usage(),

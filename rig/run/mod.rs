@@ -20,4 +20,3 @@ mod usage;
 pub(crate) use controller::exec_program;
 pub(crate) use prepared::PreparedRun;
 pub(crate) use resolve::{needs_processes, resolve_simulated};
-pub(crate) use runner::judge_unrecorded;

@@ -113,11 +113,6 @@ impl Runner<'_> {
     }
 }
 
-/// Plays a run under virtual time, for `bench`.
-pub(crate) fn judge_unrecorded(request: &RunRequest, interrupts: &Interrupts) -> Result<Judged, Failure> {
-    Runner { controller: &request.controller, interrupts }.play(Source::File(request.scenario.as_deref()))
-}
-
 /// Plays one run; a panic is its failure.
 fn guarded<T>(run: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
     // What it leaves half done belongs to this run alone.

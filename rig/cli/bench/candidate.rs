@@ -1,171 +1,175 @@
-//! A candidate of a comparison: the durations of its rounds, their percentiles, and the ratios to another candidate's.
-//!
-//! The order of the rounds is decided by [`comparison`](super::comparison).
+//! A candidate of the bench: the durations of its rounds, their percentiles, and the ratios to another candidate's.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::durations::Durations;
+use hdrhistogram::Histogram;
+use masseter_report::histogram_log;
 use serde::Serialize;
 
-use masseter_report::histogram_log;
+/// Durations of one round, ns.
+pub(super) type Durations = Histogram<u64>;
+
+/// Measures one round.
+pub(super) type Turn<'a> = Box<dyn FnMut() -> anyhow::Result<Round> + 'a>;
+
+/// Percentiles, each with the fewest samples of a round that it is given for: ten lie above the 99th and the 99.9th.
+const PERCENTILES: [(&str, f64, u64); 3] = [("p50", 0.5, 1), ("p99", 0.99, 1000), ("p99.9", 0.999, 10_000)];
+
+/// An empty histogram of durations.
+pub(super) fn no_durations() -> Durations {
+    Histogram::new(3).expect("three digits are allowed")
+}
+
+/// Adds `count` times the same duration.
+pub(super) fn add_durations(durations: &mut Durations, taken_ns: u64, count: u64) {
+    // Recording it zero times would still raise the histogram's maximum.
+    if count > 0 {
+        durations.record_n(taken_ns, count).expect("a histogram that resizes itself takes any value");
+    }
+}
 
 /// The result of one round.
 #[derive(Debug)]
 pub(super) struct Round {
-    /// Empty if the round does not count.
     pub(super) durations: Durations,
-    /// Shares that were measured with them: name and %.
-    pub(super) shares: Vec<(String, f64)>,
-}
-
-impl From<Durations> for Round {
-    fn from(durations: Durations) -> Self {
-        Self { durations, shares: Vec::new() }
-    }
+    /// Deadlines that passed before the loop could wait for them, %; none where nobody counts them.
+    pub(super) skipped_percent: Option<f64>,
 }
 
 /// A candidate with the results of its rounds.
 #[derive(Debug, Serialize)]
 pub(super) struct Candidate {
-    pub(super) name: String,
+    name: &'static str,
     #[serde(skip)]
-    pub(super) rounds: Vec<Durations>,
-    /// Rounds that count.
-    pub(super) n: usize,
-    /// Over the rounds that count, ns.
-    pub(super) percentiles: Vec<Spread>,
-    /// Over the rounds that gave them, %.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub(super) shares: Vec<Spread>,
+    rounds: Vec<Durations>,
+    /// ns.
+    percentiles: Vec<Spread>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    skipped_percent: Option<Spread>,
 }
 
 /// A value that varies from round to round.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Spread {
-    pub(super) name: String,
-    pub(super) median: f64,
-    pub(super) min: f64,
-    pub(super) max: f64,
-}
-
-impl Spread {
-    /// None without a value.
-    fn from_values(name: &str, mut values: Vec<f64>) -> Option<Self> {
-        values.sort_by(f64::total_cmp);
-        let (min, max) = (*values.first()?, *values.last()?);
-        let median = f64::midpoint(values[(values.len() - 1) / 2], values[values.len() / 2]);
-        Some(Self { name: name.to_owned(), median, min, max })
-    }
+    name: &'static str,
+    median: f64,
+    min: f64,
+    max: f64,
 }
 
 /// One candidate's percentiles over another's, round by round.
 #[derive(Debug, Serialize)]
 pub(super) struct Ratio {
-    pub(super) of: String,
-    pub(super) to: String,
-    /// Rounds that count for both.
-    pub(super) n: usize,
-    pub(super) percentiles: Vec<Spread>,
+    of: &'static str,
+    to: &'static str,
+    percentiles: Vec<Spread>,
 }
 
-/// Percentiles, each with the fewest samples of a round that it is given for: ten lie above the 99th and the 99.9th.
-const PERCENTILES: [(&str, f64, u64); 3] = [("p50", 0.5, 1), ("p99", 0.99, 1000), ("p99.9", 0.999, 10_000)];
+impl Spread {
+    /// None without a value.
+    fn from_values(name: &'static str, values: impl Iterator<Item = f64>) -> Option<Self> {
+        let mut values: Vec<_> = values.collect();
+        values.sort_by(f64::total_cmp);
+        let (min, max) = (*values.first()?, *values.last()?);
+        let median = f64::midpoint(values[(values.len() - 1) / 2], values[values.len() / 2]);
+        Some(Self { name, median, min, max })
+    }
+
+    /// Median (minimum–maximum), each by this factor.
+    fn in_words(&self, factor: f64) -> String {
+        let [median, min, max] = [self.median, self.min, self.max].map(|value| three_digits(value * factor));
+        format!("{median} ({min}–{max})")
+    }
+}
 
 impl Candidate {
-    pub(super) fn from_rounds(name: &str, rounds: Vec<Round>) -> Self {
-        let mut shares: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-        for (share, percent) in rounds.iter().flat_map(|round| round.shares.clone()) {
-            shares.entry(share).or_default().push(percent);
-        }
+    pub(super) fn new(name: &'static str, rounds: Vec<Round>) -> Self {
+        let skipped = rounds.iter().filter_map(|round| round.skipped_percent);
+        let skipped_percent = Spread::from_values("skipped deadlines", skipped);
         let rounds: Vec<_> = rounds.into_iter().map(|round| round.durations).collect();
-        let counted: Vec<_> = rounds.iter().filter(|round| !round.is_empty()).collect();
-        let percentiles = PERCENTILES.iter().filter_map(|&(name, quantile, samples)| {
-            let is_reached = counted.iter().all(|round| round.len() >= samples);
-            let values = counted.iter().map(|round| round.value_at_quantile(quantile) as f64);
-            is_reached.then(|| Spread::from_values(name, values.collect()))?
+        let mut percentiles = percentiles_of(&rounds, Durations::len, |round, quantile| {
+            round.value_at_quantile(quantile) as f64
         });
-        let max = Spread::from_values("max", counted.iter().map(|round| round.max() as f64).collect());
-        Self {
-            name: name.to_owned(),
-            n: counted.len(),
-            percentiles: percentiles.chain(max).collect(),
-            shares: shares
-                .into_iter()
-                .filter_map(|(name, values)| Spread::from_values(&name, values))
-                .collect(),
-            rounds,
-        }
+        percentiles.extend(Spread::from_values("max", rounds.iter().map(|round| round.max() as f64)));
+        Self { name, rounds, percentiles, skipped_percent }
     }
 
-    /// This candidate's percentiles over another's, in the rounds that count for both. Maxima are not compared: they come
-    /// from the machine.
+    pub(super) fn round_count(&self) -> usize {
+        self.rounds.len()
+    }
+
+    /// This candidate's percentiles over another's, round by round. Maxima are not compared: they come from the machine.
     pub(super) fn ratio_to(&self, other: &Self) -> Ratio {
-        let pairs = self.rounds.iter().zip(&other.rounds);
-        let both: Vec<_> = pairs.filter(|(mine, its)| !mine.is_empty() && !its.is_empty()).collect();
-        let percentiles = PERCENTILES.iter().filter_map(|&(name, quantile, samples)| {
-            let is_reached = both.iter().all(|(mine, its)| mine.len().min(its.len()) >= samples);
-            let of = |round: &Durations| round.value_at_quantile(quantile) as f64;
-            is_reached.then(|| {
-                Spread::from_values(name, both.iter().map(|(mine, its)| of(mine) / of(its)).collect())
-            })?
-        });
-        Ratio {
-            of: self.name.clone(),
-            to: other.name.clone(),
-            n: both.len(),
-            percentiles: percentiles.collect(),
-        }
+        let rounds: Vec<_> = self.rounds.iter().zip(&other.rounds).collect();
+        let percentiles = percentiles_of(
+            &rounds,
+            |(mine, its)| mine.len().min(its.len()),
+            |(mine, its), quantile| {
+                mine.value_at_quantile(quantile) as f64 / its.value_at_quantile(quantile) as f64
+            },
+        );
+        Ratio { of: self.name, to: other.name, percentiles }
     }
 
-    pub(super) fn write_log(&self, bench: &str, folder: &Path) -> std::io::Result<()> {
-        let name = self.name.replace(|c: char| !c.is_ascii_alphanumeric(), "-");
-        let comment = format!("masseter bench {bench}: {}, ns, one line per round", self.name);
-        let starts_ns = (0..).step_by(histogram_log::INTERVAL_NS as usize);
-        let counted = starts_ns.zip(&self.rounds).filter(|(_, round)| !round.is_empty());
-        histogram_log::write(&folder.join(format!("{bench}-{name}.hlog")), &comment, counted)
+    /// The name, and the percentiles in µs.
+    pub(super) fn row(&self) -> (String, String) {
+        let skipped = self.skipped_percent.as_ref();
+        let skipped = skipped.map(|share| format!("  {}, %: {}", share.name, share.in_words(1.0)));
+        (self.name.to_owned(), cells(&self.percentiles, 1e-3) + &skipped.unwrap_or_default())
     }
+
+    pub(super) fn write_log(&self, folder: &Path) -> std::io::Result<()> {
+        let name = self.name.replace(|c: char| !c.is_ascii_alphanumeric(), "-");
+        let comment = format!("masseter bench loop: {}, ns, one line per round", self.name);
+        let starts_ns = (0..).step_by(histogram_log::INTERVAL_NS as usize);
+        histogram_log::write(&folder.join(format!("loop-{name}.hlog")), &comment, starts_ns.zip(&self.rounds))
+    }
+}
+
+impl Ratio {
+    pub(super) fn row(&self) -> (String, String) {
+        (format!("{} / {}", self.of, self.to), cells(&self.percentiles, 1.0))
+    }
+}
+
+/// Each percentile for which all rounds have enough samples.
+fn percentiles_of<R>(
+    rounds: &[R],
+    samples: impl Fn(&R) -> u64,
+    value: impl Fn(&R, f64) -> f64,
+) -> Vec<Spread> {
+    let reached =
+        PERCENTILES.iter().filter(|(.., least)| rounds.iter().all(|round| samples(round) >= *least));
+    let spread = |&(name, quantile, _): &(&'static str, f64, u64)| {
+        Spread::from_values(name, rounds.iter().map(|round| value(round, quantile)))
+    };
+    reached.filter_map(spread).collect()
+}
+
+fn cells(spreads: &[Spread], factor: f64) -> String {
+    let cell = |spread: &Spread| format!("{:<5} {:<20}", spread.name, spread.in_words(factor));
+    spreads.iter().map(cell).collect::<Vec<_>>().join("  ").trim_end().to_owned()
+}
+
+fn three_digits(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let whole_digits = value.abs().max(1e-9).log10().floor() as i32 + 1;
+    format!("{value:.*}", (3 - whole_digits).clamp(0, 5) as usize)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::durations::{no_durations, record};
-
     use super::*;
-
-    fn round(value_ns: u64) -> Round {
-        let mut round = no_durations();
-        round.record(value_ns).unwrap();
-        round.into()
-    }
-
-    fn figure(median: f64, min: f64, max: f64) -> Spread {
-        Spread { name: "p50".to_owned(), median, min, max }
-    }
-
-    #[test]
-    fn rounds_that_do_not_count_change_neither_percentiles_nor_ratios() {
-        let uncounted = || Round::from(no_durations());
-        let own = [round(100), uncounted(), uncounted(), round(300)];
-        let other = [round(200), round(1), round(1), uncounted()];
-        let [own, other] = [own, other].map(|rounds| Candidate::from_rounds("", rounds.into()));
-        assert_eq!((own.n, other.n), (2, 3));
-        assert_eq!(own.percentiles[0], figure(200.0, 100.0, 300.0));
-        let ratio = own.ratio_to(&other);
-        assert_eq!(ratio.n, 1);
-        assert_eq!(ratio.percentiles[0], figure(0.5, 0.5, 0.5));
-        let none = Candidate::from_rounds("", vec![uncounted()]);
-        assert!(none.percentiles.is_empty() && none.ratio_to(&own).percentiles.is_empty());
-    }
 
     #[test]
     fn a_percentile_that_fewer_than_ten_samples_exceed_is_not_given() {
         let of = |samples| {
-            let mut round = no_durations();
-            record(&mut round, 100, samples);
-            let candidate = Candidate::from_rounds("", vec![round.into()]);
-            let names =
-                |figures: &[Spread]| figures.iter().map(|figure| figure.name.clone()).collect::<Vec<_>>();
+            let mut durations = no_durations();
+            add_durations(&mut durations, 100, samples);
+            let candidate = Candidate::new("", vec![Round { durations, skipped_percent: None }]);
+            let names = |spreads: &[Spread]| spreads.iter().map(|spread| spread.name).collect::<Vec<_>>();
             (names(&candidate.percentiles), names(&candidate.ratio_to(&candidate).percentiles))
         };
         assert_eq!(of(9_999).0, ["p50", "p99", "max"]);
@@ -176,7 +180,25 @@ mod tests {
 
     #[test]
     fn the_median_of_an_even_number_lies_between() {
-        assert_eq!(Spread::from_values("p50", vec![4.0, 1.0, 3.0, 2.0]), Some(figure(2.5, 1.0, 4.0)));
-        assert_eq!(Spread::from_values("p50", vec![3.0, 1.0, 2.0]), Some(figure(2.0, 1.0, 3.0)));
+        let of = |values: &[f64]| Spread::from_values("p50", values.iter().copied());
+        let spread = |median, min, max| Some(Spread { name: "p50", median, min, max });
+        assert_eq!(of(&[4.0, 1.0, 3.0, 2.0]), spread(2.5, 1.0, 4.0));
+        assert_eq!(of(&[3.0, 1.0, 2.0]), spread(2.0, 1.0, 3.0));
+        assert_eq!(of(&[]), None);
+    }
+
+    #[test]
+    fn three_digits_count() {
+        let cases = [
+            (0.0, "0"),
+            (0.001_234, "0.00123"),
+            (0.5, "0.500"),
+            (1.234, "1.23"),
+            (123.4, "123"),
+            (1234.0, "1234"),
+        ];
+        for (value, expected) in cases {
+            assert_eq!(three_digits(value), expected);
+        }
     }
 }

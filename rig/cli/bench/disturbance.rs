@@ -2,13 +2,13 @@
 
 use std::time::Duration;
 
+use masseter_machine::SystemRoot;
+use masseter_machine::counters::stolen_ns;
 use masseter_runtime::clock::{self, SECOND_NS};
 use masseter_runtime::realtime::Waiter;
 use serde::Serialize;
 
-use super::durations::on_core;
-use masseter_machine::SystemRoot;
-use masseter_machine::counters::stolen_ns;
+use super::on_core;
 
 /// With a greater share of time stolen or standing still, high percentiles come from the machine, %.
 const BOUND_PERCENT: f64 = 1.0;
@@ -19,9 +19,9 @@ const OBSERVED: Duration = Duration::from_millis(50);
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Disturbance {
     /// Of all cores' time, as the kernel counts it.
-    pub(super) stolen_percent: f64,
-    /// Of the time observed, on the core that lost most.
-    pub(super) stalled_percent: f64,
+    stolen_percent: f64,
+    /// Of the time observed.
+    stalled_percent: f64,
     pub(super) disturbed: bool,
     /// The figures in a sentence, if it is disturbed.
     pub(super) reason: Option<String>,
@@ -38,63 +38,45 @@ impl Disturbance {
     }
 }
 
-/// Observes whether the machine stands still.
+/// Observes on the core of the bench whether the machine stands still.
 #[derive(Debug)]
 pub(super) struct Stillness {
-    cores: Vec<ObservedCore>,
+    core: usize,
+    observed_ns: u64,
+    stalled_ns: u64,
     began_ns: u64,
     stolen_before_ns: u64,
 }
 
-/// A core and the time observed on it, ns.
-#[derive(Debug)]
-struct ObservedCore {
-    core: usize,
-    observed_ns: u64,
-    stalled_ns: u64,
-}
-
 impl Stillness {
-    /// On the cores of the bench.
-    pub(super) fn begin(cores: &[usize]) -> Self {
-        let observed = |&core: &usize| ObservedCore { core, observed_ns: 0, stalled_ns: 0 };
-        Self {
-            cores: cores.iter().map(observed).collect(),
-            began_ns: clock::now_ns(),
-            stolen_before_ns: stolen_ns(&SystemRoot::of_this_machine()).unwrap_or(0),
-        }
+    pub(super) fn begin(core: usize) -> Self {
+        let stolen_before_ns = stolen_ns(&SystemRoot::of_this_machine()).unwrap_or(0);
+        Self { core, observed_ns: 0, stalled_ns: 0, began_ns: clock::now_ns(), stolen_before_ns }
     }
 
-    /// Spins on one core after the other, with the priority of the rig, and counts the gaps.
+    /// Spins with the priority of the rig, and counts the gaps.
     pub(super) fn observe(&mut self) {
-        for core in &mut self.cores {
-            let account = on_core(core.core, || {
-                let mut waiter = Waiter::new(SECOND_NS);
-                let until_ns = clock::now_ns() + OBSERVED.as_nanos() as u64;
-                let mut spin = waiter.spin();
-                while spin.now_ns() < until_ns {}
-                waiter.account()
-            });
-            core.observed_ns += account.spun_ns + account.stalled_ns;
-            core.stalled_ns += account.stalled_ns;
-        }
+        let account = on_core(self.core, || {
+            let mut waiter = Waiter::new(SECOND_NS);
+            let until_ns = clock::now_ns() + OBSERVED.as_nanos() as u64;
+            let mut spin = waiter.spin();
+            while spin.now_ns() < until_ns {}
+            waiter.account()
+        });
+        self.observed_ns += account.spun_ns + account.stalled_ns;
+        self.stalled_ns += account.stalled_ns;
     }
 
     pub(super) fn end(self) -> Disturbance {
         let root = SystemRoot::of_this_machine();
         let passed_ns = (clock::now_ns() - self.began_ns) * root.online_cores().len().max(1) as u64;
         let stolen_ns = stolen_ns(&root).unwrap_or(0).saturating_sub(self.stolen_before_ns);
-        Disturbance::from_percentages(percent(stolen_ns, passed_ns), worst_percent(&self.cores))
+        let percent = |part_ns: u64, of_ns: u64| 100.0 * part_ns as f64 / of_ns.max(1) as f64;
+        Disturbance::from_percentages(
+            percent(stolen_ns, passed_ns),
+            percent(self.stalled_ns, self.observed_ns),
+        )
     }
-}
-
-/// A bench on two cores waits for the slower one.
-fn worst_percent(cores: &[ObservedCore]) -> f64 {
-    cores.iter().map(|core| percent(core.stalled_ns, core.observed_ns)).fold(0.0, f64::max)
-}
-
-fn percent(part_ns: u64, of_ns: u64) -> f64 {
-    100.0 * part_ns as f64 / of_ns.max(1) as f64
 }
 
 #[cfg(test)]
@@ -113,20 +95,10 @@ mod tests {
     }
 
     #[test]
-    fn every_core_in_use_is_observed() {
-        let mut stillness = Stillness::begin(&[0, 1]);
+    fn the_core_is_observed_before_every_round() {
+        let mut stillness = Stillness::begin(0);
         stillness.observe();
-        for core in &stillness.cores {
-            assert!(u128::from(core.observed_ns) > OBSERVED.as_nanos() / 2, "{stillness:?}");
-            assert!(core.stalled_ns <= core.observed_ns, "{stillness:?}");
-        }
-        assert_eq!(stillness.cores.len(), 2);
-    }
-
-    #[test]
-    fn of_two_cores_the_one_that_lost_most_counts() {
-        let observed = |core, stalled_ns| ObservedCore { core, observed_ns: 1000, stalled_ns };
-        assert!((worst_percent(&[observed(0, 0), observed(1, 30)]) - 3.0).abs() < 1e-9);
-        assert!((worst_percent(&[observed(0, 30), observed(1, 0)]) - 3.0).abs() < 1e-9);
+        assert!(u128::from(stillness.observed_ns) > OBSERVED.as_nanos() / 2, "{stillness:?}");
+        assert!(stillness.stalled_ns <= stillness.observed_ns, "{stillness:?}");
     }
 }

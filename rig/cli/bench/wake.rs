@@ -7,15 +7,14 @@
 use std::process::Command;
 
 use anyhow::{Context, bail};
+use masseter_machine::dma_latency::Hold;
 use masseter_runtime::clock::{self, SECOND_NS};
 use masseter_runtime::realtime::Cycle;
 use masseter_runtime::schedule::OFF_TICK_NS;
 use masseter_scenario::{CpuDmaLatency, RealtimeConfig};
 
-use super::candidate::Round;
-use super::comparison::{Comparison, Turn};
-use super::durations::{Durations, no_durations, on_core, record};
-use masseter_machine::dma_latency::Hold;
+use super::candidate::{Durations, Round, Turn, add_durations, no_durations};
+use super::{Results, on_core};
 
 const PERIOD_NS: u64 = SECOND_NS / 1000;
 /// Wake-ups per round.
@@ -23,37 +22,32 @@ const WAKE_UPS: u64 = 10_000;
 /// Highest lateness in cyclictest's histogram, µs.
 const CYCLICTEST_UP_TO_US: u64 = 20_000;
 
-pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Comparison> {
-    const MEASURES: &str = "wake-up latency at 1 kHz, one SCHED_FIFO thread on one core";
+pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Results> {
     let own = |wanted: CpuDmaLatency| -> Turn {
         Box::new(move || {
             let _hold = Hold::new(wanted, false);
             Ok(on_core(core, own_loop))
         })
     };
-    let cyclictest = |more: &'static [&'static str]| -> Turn {
-        Box::new(move || Ok(cyclictest(core, WAKE_UPS, more)?.into()))
-    };
+    let other =
+        |more: &'static [&'static str]| -> Turn { Box::new(move || cyclictest(core, WAKE_UPS, more)) };
     let mut notes = Vec::new();
     let mut own_turns = vec![("masseter", own(CpuDmaLatency::Leave))];
-    let mut others = vec![("cyclictest --laptop", cyclictest(&["--laptop"]))];
+    let mut others = vec![("cyclictest --laptop", other(&["--laptop"]))];
     if let Some(refusal) = &Hold::new(CpuDmaLatency::Hold, false).obtained.refusal {
         notes.push(format!("/dev/cpu_dma_latency is not held: {refusal}"));
     } else {
         own_turns.push(("masseter, latency held", own(CpuDmaLatency::Hold)));
-        others.push(("cyclictest", cyclictest(&[])));
+        others.push(("cyclictest", other(&[])));
     }
-    if let Err(why) = try_cyclictest(core) {
+    // Whether it runs here with the rights of this process.
+    if let Err(why) = cyclictest(core, 10, &["--laptop"]) {
         notes.push(format!("{why:#}: nothing to compare with"));
         others.clear();
     } else {
         notes.push("cyclictest does not count the deadlines that it skips".to_owned());
     }
-    let pairs: Vec<_> =
-        own_turns.iter().flat_map(|(own, _)| others.iter().map(|(other, _)| (*own, *other))).collect();
-    let turns = own_turns.into_iter().chain(others).collect();
-    let comparison = Comparison::by_turns("loop", MEASURES, rounds, &[core], turns)?;
-    Ok(Comparison { notes, ..comparison.comparing(pairs) })
+    Ok(Results { notes, ..Results::by_turns(rounds, core, own_turns, others)? })
 }
 
 /// A round with the share of its deadlines that passed before the loop could wait for them.
@@ -64,19 +58,13 @@ fn own_loop() -> Round {
     let mut cycle = Cycle::new(first_ns, PERIOD_NS);
     for _ in 0..WAKE_UPS {
         let wake = cycle.wait();
-        record(&mut durations, wake.woke_ns - wake.due_ns, 1);
+        add_durations(&mut durations, wake.woke_ns - wake.due_ns, 1);
         skipped = wake.skipped;
     }
-    let percent = 100.0 * skipped as f64 / (skipped + WAKE_UPS) as f64;
-    Round { durations, shares: vec![("skipped deadlines".to_owned(), percent)] }
+    Round { durations, skipped_percent: Some(100.0 * skipped as f64 / (skipped + WAKE_UPS) as f64) }
 }
 
-/// Whether cyclictest runs here with the rights of this process.
-fn try_cyclictest(core: usize) -> anyhow::Result<()> {
-    cyclictest(core, 10, &["--laptop"]).map(drop)
-}
-
-fn cyclictest(core: usize, loops: u64, more: &[&str]) -> anyhow::Result<Durations> {
+fn cyclictest(core: usize, loops: u64, more: &[&str]) -> anyhow::Result<Round> {
     let output = Command::new("cyclictest")
         .args(["--quiet", "--mlockall", "--threads=1", "--interval=1000"])
         .arg(format!("--priority={}", RealtimeConfig::default().priority))
@@ -90,7 +78,8 @@ fn cyclictest(core: usize, loops: u64, more: &[&str]) -> anyhow::Result<Duration
         let said = String::from_utf8_lossy(&output.stderr);
         bail!("cyclictest failed: {}", said.lines().find(|line| !line.is_empty()).unwrap_or("no message"));
     }
-    histogram_of(&String::from_utf8_lossy(&output.stdout))
+    let durations = histogram_of(&String::from_utf8_lossy(&output.stdout))?;
+    Ok(Round { durations, skipped_percent: None })
 }
 
 /// Reads lines `µs count`; a comment counts the samples beyond the last line.
@@ -98,11 +87,11 @@ fn histogram_of(output: &str) -> anyhow::Result<Durations> {
     let mut late = no_durations();
     for line in output.lines() {
         if let Some(beyond) = line.strip_prefix("# Histogram Overflows:") {
-            record(&mut late, CYCLICTEST_UP_TO_US * 1000, beyond.trim().parse()?);
+            add_durations(&mut late, CYCLICTEST_UP_TO_US * 1000, beyond.trim().parse()?);
         }
         let mut fields = line.split_whitespace().map(str::parse::<u64>);
         if let (Some(Ok(late_us)), Some(Ok(count)), None) = (fields.next(), fields.next(), fields.next()) {
-            record(&mut late, late_us * 1000, count);
+            add_durations(&mut late, late_us * 1000, count);
         }
     }
     if late.is_empty() {
