@@ -81,7 +81,7 @@ pub(super) fn run(
 ) -> Result<(), Failure> {
     let mut names_left = NAMES;
     let prepared = loop {
-        let prepared = Rig::prepare(plan, folder, &domain, request, interrupts);
+        let prepared = Processes::prepare(plan, folder, &domain, request, interrupts);
         names_left -= 1;
         let squatter = domain.foreign_file().ok().flatten().filter(|_| names_left > 0);
         let (Err(failure), Some(path)) = (&prepared, squatter) else { break prepared };
@@ -95,17 +95,17 @@ pub(super) fn run(
         // The processes that have not started have recorded nothing.
         let _ = fs::remove_file(folder.recording());
     };
-    let result = prepared.and_then(|rig| match rig {
-        Some((mut rig, scheduling)) => {
+    let result = prepared.and_then(|prepared| match prepared {
+        Some((mut processes, scheduling)) => {
             manifest.scheduling = scheduling;
-            manifest.declared = rig.declared.clone();
+            manifest.declared = processes.declared.clone();
             // The supervisor may be killed: a report of what is recorded then needs the names.
             manifest.write(folder).context("cannot write the manifest").incomplete()?;
             let ending = match request.lockstep() {
-                None => rig.run(plan, request.require_rt, interrupts, manifest),
-                Some(_) => rig.run_in_lockstep(interrupts),
+                None => processes.run(plan, request.require_rt, interrupts, manifest),
+                Some(_) => processes.run_in_lockstep(interrupts),
             };
-            manifest.process_faults = rig.strikes.into_struck();
+            manifest.process_faults = processes.strikes.into_struck();
             ending.died()
         }
         None => Ok(Ending::Interrupted),
@@ -127,7 +127,7 @@ fn report_remaining(swept: &Swept) {
 type Scheduling = BTreeMap<String, Obtained>;
 
 /// The three processes, in the order of their start.
-struct Rig {
+struct Processes {
     /// Longest time for the controller to end after SIGTERM, ns.
     stop_timeout_ns: u64,
     /// Time for the plant to stop the drives without the controller, ns.
@@ -141,7 +141,7 @@ struct Rig {
     controller: Controller,
 }
 
-impl Rig {
+impl Processes {
     fn spawn(
         plan: &RunPlan,
         folder: &RunFolder,
@@ -191,11 +191,11 @@ impl Rig {
         request: &RunRequest,
         interrupts: &Interrupts,
     ) -> Result<Option<(Self, Scheduling)>, Failure> {
-        let mut rig = Self::spawn(plan, folder, domain, request).died()?;
-        let Some(scheduling) = rig.wait_ready(interrupts).died()? else { return Ok(None) };
+        let mut processes = Self::spawn(plan, folder, domain, request).died()?;
+        let Some(scheduling) = processes.wait_ready(interrupts).died()? else { return Ok(None) };
         domain.make_private().usage()?;
         reserve_shared_memory(domain).usage()?;
-        Ok(Some((rig, scheduling)))
+        Ok(Some((processes, scheduling)))
     }
 
     fn run(
