@@ -13,17 +13,7 @@ const FULL_PREEMPTION: &str = "sudo mount -t debugfs debugfs /sys/kernel/debug; 
 const REALTIME_KERNEL: &str = "install a kernel with PREEMPT_RT: on Debian 'sudo apt install \
      linux-image-rt-amd64', on Ubuntu 'sudo pro enable realtime-kernel'; then boot again";
 
-/// The findings about the kernel.
-pub(super) fn examine_kernel(root: &SystemRoot) -> Vec<Finding> {
-    vec![
-        preemption(root).named("preemption model"),
-        throttling(root).named("real-time throttling"),
-        isolation(root).named("isolated cores"),
-        clock_source(root).named("clock source"),
-    ]
-}
-
-fn preemption(root: &SystemRoot) -> Finding {
+pub(super) fn preemption(root: &SystemRoot) -> Finding {
     let release = root.text("proc/sys/kernel/osrelease").unwrap_or_default();
     let version = root.text("proc/sys/kernel/version").unwrap_or_default();
     let has = |word: &str| version.split_whitespace().any(|found| found == word);
@@ -43,7 +33,7 @@ fn preemption(root: &SystemRoot) -> Finding {
     Finding::warn(format!("{release}: {found}"), cost).with_remedy(on_host(root, remedy))
 }
 
-fn throttling(root: &SystemRoot) -> Finding {
+pub(super) fn throttling(root: &SystemRoot) -> Finding {
     let runtime_us = root.number("proc/sys/kernel/sched_rt_runtime_us");
     let period_us = root.number("proc/sys/kernel/sched_rt_period_us");
     let (Some(runtime_us), Some(period_us)) = (runtime_us, period_us) else {
@@ -62,7 +52,7 @@ fn throttling(root: &SystemRoot) -> Finding {
     finding.with_remedy(on_host(root, format!("sudo sysctl kernel.sched_rt_runtime_us={default_us}")))
 }
 
-fn isolation(root: &SystemRoot) -> Finding {
+pub(super) fn isolation(root: &SystemRoot) -> Finding {
     let list = |path: &str| root.text(path).filter(|list| !list.is_empty() && list != "(null)");
     if let Some(isolated) = list("sys/devices/system/cpu/isolated") {
         let tickless = list("sys/devices/system/cpu/nohz_full");
@@ -91,7 +81,7 @@ fn cores_to_spare(root: &SystemRoot) -> Option<[usize; 2]> {
     Some([other, last])
 }
 
-fn clock_source(root: &SystemRoot) -> Finding {
+pub(super) fn clock_source(root: &SystemRoot) -> Finding {
     let folder = "sys/devices/system/clocksource/clocksource0";
     let Some(current) = root.text(&format!("{folder}/current_clocksource")) else {
         return Finding::ok("unknown to this kernel");
@@ -145,9 +135,10 @@ mod tests {
             ("proc/sys/kernel/sched_rt_period_us", "1000000"),
             ("sys/devices/system/cpu/online", "0-7"),
         ];
-        let findings = examine_kernel(&Fixture::with_files(&files).root());
-        for finding in findings.into_iter().filter(|finding| finding.level != Ok) {
-            assert!(finding.remedy.unwrap().starts_with("on the host: "), "{}", finding.check);
+        let fixture = Fixture::with_files(&files);
+        let findings = [preemption, throttling, isolation, clock_source].map(|check| check(&fixture.root()));
+        for finding in findings.iter().filter(|finding| finding.level != Ok) {
+            assert!(finding.remedy.as_ref().unwrap().starts_with("on the host: "), "{finding:?}");
         }
     }
 

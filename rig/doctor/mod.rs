@@ -9,17 +9,22 @@ mod processors;
 mod resources;
 
 use std::fmt::Write;
+use std::fs::OpenOptions;
 
 use clap::Args;
-use masseter_machine::SystemRoot;
+use masseter_can::is_supported;
+use masseter_machine::{SystemRoot, dma_latency};
+use masseter_runtime::realtime::scheduling::{SchedulingRequest, usable_cores};
+use masseter_scenario::RealtimeConfig;
 use masseter_terminal::{Exit, Format, Tone, result, result_with_tones};
+use rustix::fs::statvfs;
 use serde::Serialize;
 
 use crate::BUILD;
 use finding::{Finding, Level};
-use kernel::examine_kernel;
-use processors::{examine_cores, examine_privileges};
-use resources::{examine_can, examine_memory, examine_rigs};
+use kernel::{clock_source, isolation, preemption, throttling};
+use processors::{fifo, governor, hypervisor, idle, locked_memory, number, try_out};
+use resources::{SHARED_MEMORY, count_rigs, huge_pages, interfaces, other_rigs, room, unsupported};
 
 /// The arguments of `doctor`.
 #[derive(Debug, Clone, Args)]
@@ -62,17 +67,49 @@ pub(crate) fn grant_command() -> String {
 
 /// The command against what disturbs real-time runs most on this machine; none if the doctor knows none.
 pub(crate) fn mending_command() -> Option<String> {
-    let root = &SystemRoot::of_this_machine();
-    let findings = [examine_cores(root), examine_kernel(root)].concat();
+    let findings = of_machine(&SystemRoot::of_this_machine());
     let with_command = findings.into_iter().rev().filter(|finding| finding.remedy.is_some());
     // The first of the worst.
     with_command.max_by_key(|finding| finding.level)?.remedy
 }
 
+/// Everything: what the kernel grants, the machine, and what a run shares with others.
 fn findings(root: &SystemRoot) -> Vec<Finding> {
-    let machine = [examine_privileges(root), examine_cores(root), examine_kernel(root)];
-    let shared = [examine_memory(root), examine_can(root), vec![examine_rigs()]];
-    [machine, shared].concat().concat()
+    let nothing = SchedulingRequest { core: None, fifo_priority: None, locked_memory: false };
+    let priority = RealtimeConfig::default().priority;
+    let fifo_tried = try_out(SchedulingRequest { fifo_priority: Some(priority), ..nothing });
+    let memory_tried = try_out(SchedulingRequest { locked_memory: true, ..nothing });
+    let shared = statvfs(SHARED_MEMORY).map(|of| (of.f_blocks, of.f_bavail * of.f_frsize));
+    let granted = [
+        fifo(root, priority, &fifo_tried).named("SCHED_FIFO"),
+        locked_memory(root, &memory_tried).named("locked memory"),
+    ];
+    let memory = [huge_pages(root).named("huge pages"), room(root, shared.ok()).named("shared memory")];
+    let can = match is_supported() {
+        Ok(()) => vec![
+            Finding::ok("supported by the kernel").named("SocketCAN"),
+            interfaces(root).named("CAN interfaces"),
+        ],
+        Err(error) => vec![unsupported(root, &error).named("SocketCAN")],
+    };
+    let rigs = other_rigs(&count_rigs()).named("other rigs");
+    granted.into_iter().chain(of_machine(root)).chain(memory).chain(can).chain([rigs]).collect()
+}
+
+/// The cores and the kernel.
+fn of_machine(root: &SystemRoot) -> Vec<Finding> {
+    // Whether runs may disable idle states.
+    let may_hold = OpenOptions::new().write(true).open(dma_latency::DEVICE).is_ok();
+    vec![
+        number(root, usable_cores().len(), &root.online_cores()).named("cores"),
+        governor(root).named("frequency governor"),
+        idle(root, may_hold).named("idle states"),
+        hypervisor(root).named("virtual machine"),
+        preemption(root).named("preemption model"),
+        throttling(root).named("real-time throttling"),
+        isolation(root).named("isolated cores"),
+        clock_source(root).named("clock source"),
+    ]
 }
 
 impl Report {

@@ -1,11 +1,10 @@
 //! The cores and what the kernel grants on them: number, frequency governor, idle states, virtualisation; SCHED_FIFO
 //! and locked memory, which are requested from the kernel as a run does.
 
-use std::{env, fs::OpenOptions, thread};
+use std::{env, thread};
 
 use masseter_machine::{SystemRoot, dma_latency, is_virtual};
-use masseter_runtime::realtime::scheduling::{Obtained, SchedulingRequest, obtain, usable_cores};
-use masseter_scenario::RealtimeConfig;
+use masseter_runtime::realtime::scheduling::{Obtained, SchedulingRequest, obtain};
 
 use super::finding::{Finding, on_host, start_with};
 
@@ -18,24 +17,12 @@ const RAISE_LIMITS: &str = "printf '%s - rtprio 95\\n%s - memlock unlimited\\n' 
 const SET_GOVERNOR: &str =
     "echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor";
 
-/// The findings about SCHED_FIFO and locked memory.
-pub(super) fn examine_privileges(root: &SystemRoot) -> Vec<Finding> {
-    let nothing = SchedulingRequest { core: None, fifo_priority: None, locked_memory: false };
-    let priority = RealtimeConfig::default().priority;
-    let fifo_tried = try_out(SchedulingRequest { fifo_priority: Some(priority), ..nothing });
-    let memory_tried = try_out(SchedulingRequest { locked_memory: true, ..nothing });
-    vec![
-        fifo(root, priority, &fifo_tried).named("SCHED_FIFO"),
-        locked_memory(root, &memory_tried).named("locked memory"),
-    ]
-}
-
 /// Requests scheduling in a thread of its own, so that this one keeps its priority.
-fn try_out(request: SchedulingRequest) -> Obtained {
+pub(super) fn try_out(request: SchedulingRequest) -> Obtained {
     thread::spawn(move || obtain(request)).join().expect("asking the kernel does not panic")
 }
 
-fn fifo(root: &SystemRoot, priority: u8, obtained: &Obtained) -> Finding {
+pub(super) fn fifo(root: &SystemRoot, priority: u8, obtained: &Obtained) -> Finding {
     if obtained.fifo_priority == Some(priority) {
         return Finding::ok(format!("priority {priority} granted"));
     }
@@ -48,7 +35,7 @@ pub(super) fn grant_command(root: &SystemRoot) -> String {
     start_with(root, "--cap-add SYS_NICE --ulimit rtprio=95", RAISE_LIMITS)
 }
 
-fn locked_memory(root: &SystemRoot, obtained: &Obtained) -> Finding {
+pub(super) fn locked_memory(root: &SystemRoot, obtained: &Obtained) -> Finding {
     if obtained.locked_memory {
         return Finding::ok("granted");
     }
@@ -56,19 +43,7 @@ fn locked_memory(root: &SystemRoot, obtained: &Obtained) -> Finding {
         .with_remedy(start_with(root, "--ulimit memlock=-1", RAISE_LIMITS))
 }
 
-/// The findings about the cores.
-pub(super) fn examine_cores(root: &SystemRoot) -> Vec<Finding> {
-    // Whether runs may disable idle states.
-    let may_hold = OpenOptions::new().write(true).open(dma_latency::DEVICE).is_ok();
-    vec![
-        number(root, usable_cores().len(), &root.online_cores()).named("cores"),
-        governor(root).named("frequency governor"),
-        idle(root, may_hold).named("idle states"),
-        hypervisor(root).named("virtual machine"),
-    ]
-}
-
-fn number(root: &SystemRoot, usable: usize, online: &[usize]) -> Finding {
+pub(super) fn number(root: &SystemRoot, usable: usize, online: &[usize]) -> Finding {
     let found = format!("{usable} of {} usable", online.len());
     match (usable, online) {
         (2.., _) => Finding::ok(found),
@@ -87,7 +62,7 @@ fn leave_cpuset() -> String {
     format!("sudo systemd-run --scope --uid=\"$(id -u)\" '{}' run", masseter.display())
 }
 
-fn governor(root: &SystemRoot) -> Finding {
+pub(super) fn governor(root: &SystemRoot) -> Finding {
     let path = |core| format!("sys/devices/system/cpu/cpu{core}/cpufreq/scaling_governor");
     let mut governors: Vec<_> =
         root.online_cores().into_iter().filter_map(|core| root.text(&path(core))).collect();
@@ -103,7 +78,7 @@ fn governor(root: &SystemRoot) -> Finding {
 }
 
 /// Idle states matter only if a run cannot disable them. Any core may be one of the run's, so the deepest state counts.
-fn idle(root: &SystemRoot, may_hold: bool) -> Finding {
+pub(super) fn idle(root: &SystemRoot, may_hold: bool) -> Finding {
     let deepest = root.online_cores().into_iter().filter_map(|core| deepest_state(root, core)).max();
     let Some((exit_us, name)) = deepest else { return Finding::ok("not managed by this system") };
     let found = format!("deepest {name}, {exit_us} µs to leave");
@@ -136,7 +111,7 @@ fn deepest_state(root: &SystemRoot, core: usize) -> Option<(i64, String)> {
     latencies.max()
 }
 
-fn hypervisor(root: &SystemRoot) -> Finding {
+pub(super) fn hypervisor(root: &SystemRoot) -> Finding {
     if !is_virtual(root) {
         return Finding::ok("no");
     }

@@ -2,25 +2,19 @@
 
 use std::io;
 
-use masseter_can::{Interface, is_supported};
+use masseter_can::Interface;
 use masseter_machine::SystemRoot;
 use masseter_runtime::transport::{Domain, DomainError};
 use masseter_scenario::wording::counted;
-use rustix::fs::statvfs;
 
 use super::finding::{Finding, on_host, start_with};
 
-const SHARED_MEMORY: &str = "/dev/shm";
+pub(super) const SHARED_MEMORY: &str = "/dev/shm";
 /// Three times what a rig's topics need.
 const ENOUGH_BYTES: u64 = 64 << 20;
 
-/// The findings about transparent huge pages, and room in /dev/shm.
-pub(super) fn examine_memory(root: &SystemRoot) -> Vec<Finding> {
-    let shared = statvfs(SHARED_MEMORY).map(|of| (of.f_blocks, of.f_bavail * of.f_frsize));
-    vec![huge_pages(root).named("huge pages"), room(root, shared.ok()).named("shared memory")]
-}
-
-fn huge_pages(root: &SystemRoot) -> Finding {
+/// The finding about transparent huge pages.
+pub(super) fn huge_pages(root: &SystemRoot) -> Finding {
     const MODES: &str = "sys/kernel/mm/transparent_hugepage/enabled";
     let modes = root.text(MODES).unwrap_or_else(|| "none".to_owned());
     if !modes.contains("[always]") {
@@ -32,7 +26,7 @@ fn huge_pages(root: &SystemRoot) -> Finding {
 }
 
 /// Judges blocks and free bytes of the file system of shared memory; none if there is none.
-fn room(root: &SystemRoot, shared: Option<(u64, u64)>) -> Finding {
+pub(super) fn room(root: &SystemRoot, shared: Option<(u64, u64)>) -> Finding {
     let enlarge =
         |mount: &str| start_with(root, "--shm-size 1g", format!("sudo mount {mount} {SHARED_MEMORY}"));
     let free = shared.map_or(0, |(_, free)| free);
@@ -48,23 +42,12 @@ fn room(root: &SystemRoot, shared: Option<(u64, u64)>) -> Finding {
     }
 }
 
-/// The findings about CAN: kernel support and interfaces. Simulated buses need neither.
-pub(super) fn examine_can(root: &SystemRoot) -> Vec<Finding> {
-    match is_supported() {
-        Ok(()) => vec![
-            Finding::ok("supported by the kernel").named("SocketCAN"),
-            interfaces(root).named("CAN interfaces"),
-        ],
-        Err(error) => vec![unsupported(root, &error).named("SocketCAN")],
-    }
-}
-
-fn unsupported(root: &SystemRoot, error: &io::Error) -> Finding {
+pub(super) fn unsupported(root: &SystemRoot, error: &io::Error) -> Finding {
     Finding::warn(format!("not supported ({error})"), "runs can only use simulated buses")
         .with_remedy(on_host(root, "sudo modprobe can-raw"))
 }
 
-fn interfaces(root: &SystemRoot) -> Finding {
+pub(super) fn interfaces(root: &SystemRoot) -> Finding {
     let interfaces = Interface::list(root.path());
     let names = interfaces.iter().map(|interface| interface.name.as_str()).collect::<Vec<_>>().join(", ");
     if names.is_empty() {
@@ -90,18 +73,14 @@ fn obstacle(Interface { name, is_up, is_bus_off, is_virtual, .. }: &Interface) -
     is_bus_off.then(|| (format!("{name} bus-off"), restart))
 }
 
-/// The finding about other rigs: running ones, and files of killed ones in shared memory.
-pub(super) fn examine_rigs() -> Finding {
-    other_rigs(&count_rigs()).named("other rigs")
-}
-
 /// Running and killed ones.
-fn count_rigs() -> Result<[usize; 2], DomainError> {
+pub(super) fn count_rigs() -> Result<[usize; 2], DomainError> {
     let alive = Domain::all()?.iter().map(Domain::is_alive).collect::<Result<Vec<_>, _>>()?;
     Ok([true, false].map(|wanted| alive.iter().filter(|&&is_alive| is_alive == wanted).count()))
 }
 
-fn other_rigs(count: &Result<[usize; 2], DomainError>) -> Finding {
+/// The finding about other rigs: running ones, and files of killed ones in shared memory.
+pub(super) fn other_rigs(count: &Result<[usize; 2], DomainError>) -> Finding {
     match count {
         Ok([0, 0]) => Finding::ok("none running, no files of killed ones"),
         Ok([alive, 0]) => {
@@ -118,6 +97,7 @@ fn other_rigs(count: &Result<[usize; 2], DomainError>) -> Finding {
 
 #[cfg(test)]
 mod tests {
+    use masseter_can::is_supported;
     use masseter_machine::fixture::Fixture;
     use rustix::io::Errno;
 
