@@ -16,6 +16,7 @@ mod dynamics;
 mod environment;
 mod examples;
 mod export;
+mod fault_table;
 mod force_control;
 mod foxglove_layout;
 mod golden;

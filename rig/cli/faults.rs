@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use anyhow::anyhow;
 use clap::{Args, Subcommand};
+use masseter_campaign::{FaultRow, fault_matrix_in_words, write_fault_matrix};
 use masseter_plan::{RunPlan, read_scenario};
 use masseter_recording::output::new_folder;
 use masseter_scenario::{FaultDeclaration, FaultKindConfig};
@@ -14,7 +15,7 @@ use masseter_terminal::{Exit, Failure, OrFailure, result, status};
 use crate::run::interrupts::Interrupts;
 use crate::run::request::ControllerChoice;
 use crate::run::runner::Runner;
-use crate::vary::matrix::{self, Row};
+use crate::vary::matrix;
 
 /// The verbs of `faults`.
 #[derive(Debug, Clone, Subcommand)]
@@ -78,7 +79,7 @@ fn play_matrix(MatrixArgs { scenario, out, filter }: &MatrixArgs) -> Result<Exit
         status!("masseter: interrupted: no table is written");
         return Ok(Exit::Interrupted);
     }
-    matrix::write(out, &rows).incomplete()?;
-    result(&matrix::summary(out, &rows)).incomplete()?;
-    Ok(if rows.iter().any(Row::is_bad) { Exit::Failed } else { Exit::Passed })
+    write_fault_matrix(out, &rows).incomplete()?;
+    result(&fault_matrix_in_words(out, &rows)).incomplete()?;
+    Ok(if rows.iter().any(FaultRow::is_bad) { Exit::Failed } else { Exit::Passed })
 }

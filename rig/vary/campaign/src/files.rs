@@ -259,11 +259,11 @@ fn names(results: &[CaseResult]) -> Vec<String> {
     in_order_of_appearance(results.iter().flat_map(|result| &result.checks).map(|check| check.name.clone()))
 }
 
-fn in_order_of_appearance(words: impl Iterator<Item = String>) -> Vec<String> {
+pub(crate) fn in_order_of_appearance<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
     let mut seen = Vec::new();
-    for word in words {
-        if !seen.contains(&word) {
-            seen.push(word);
+    for value in values {
+        if !seen.contains(&value) {
+            seen.push(value);
         }
     }
     seen

@@ -2,7 +2,7 @@
 //! does to the jaw and what detects it, as a table. None may lead the jaw beyond the limits. The command `masseter
 //! faults matrix` takes a sample of these; the whole table takes minutes:
 //!
-//!     cargo test --release --package masseter --lib -- --ignored fault_table
+//!     cargo test --release --package masseter --test rig -- --ignored fault_table
 //!
 //! The tables stay in the folder FAULT_TABLES, else in that for temporary files.
 //!
@@ -14,13 +14,14 @@ use std::fmt::Display;
 use std::fs;
 use std::path::PathBuf;
 
+use masseter_analysis::{Analysis, Figures};
+use masseter_controller::motion_controller::MotionController;
+use masseter_plan::RunPlan;
+use masseter_recording::Manifest;
 use masseter_report::Verdict;
 use masseter_scenario::{BusFault, ChecksConfig, FaultConfig, Scenario};
+use masseter_virtual_time::Requests;
 use rayon::prelude::*;
-
-use crate::run::interrupts::Interrupts;
-use crate::run::request::ControllerChoice;
-use crate::run::runner::{Judged, Runner, Source};
 
 const CYCLES: [u32; 8] = [1, 2, 5, 10, 20, 50, 100, 500];
 /// Since switch-on: while easing, while chewing, and where the legs move fastest.
@@ -102,16 +103,44 @@ fn or_none(value: Option<impl Display>) -> String {
     value.map_or_else(String::new, |value| value.to_string())
 }
 
+/// Nobody interrupts.
+struct Uninterrupted;
+
+impl Requests for Uninterrupted {
+    fn is_stop_requested(&self) -> bool {
+        false
+    }
+
+    fn is_abort_requested(&self) -> bool {
+        false
+    }
+}
+
+/// Plays a scenario by the rig's own controller, and judges it.
+fn play(scenario: Scenario) -> (Verdict, Figures) {
+    let plan = RunPlan::new(scenario).expect("every fault can be planned");
+    let motion_s = plan.trajectory.duration_s();
+    let machine = masseter_machine::describe();
+    let mut manifest = Manifest::new("test", plan.scenario.clone(), motion_s, "virtual", machine);
+    manifest.motion_end_s = Some(plan.trajectory.motion_time_s(motion_s));
+    let figures = masseter_virtual_time::analyse(
+        &plan,
+        |scenario, mechanism, motion| Box::new(MotionController::new(scenario, mechanism, motion)),
+        Analysis::without_report,
+        &mut manifest,
+        &Uninterrupted,
+    )
+    .expect("every fault can be played");
+    (Verdict::new(&manifest, &figures), figures)
+}
+
 /// A row, and whether it is wrong. It is wrong if the fault never struck although its message was due, or led the jaw
 /// beyond the limits. So is a row that ends otherwise than with a pass or a safe stop.
 fn row(fault: &FaultConfig, cycles: u32, from_s: f64) -> (String, bool) {
     let until_s = Some(from_s + f64::from(cycles) * 1e-3);
     let faults = vec![FaultConfig { from_s: Some(from_s), until_s, ..fault.clone() }];
     let scenario = Scenario { duration_s: Some(4.0), faults, ..Scenario::default() };
-    let runner = Runner { controller: &ControllerChoice::default(), interrupts: &Interrupts::default() };
-    let played = runner.play(Source::Scenario(&scenario));
-    let Judged { verdict: Verdict { word, .. }, figures } =
-        played.map_err(|failure| failure.error).expect("every fault can be played");
+    let (Verdict { word, .. }, figures) = play(scenario);
     let found = &figures.faults[0];
     let (mm, deg) = (found.deviation_mm, found.deviation_deg);
     let verdict = if found.struck_ns.is_none() { NEVER_STRUCK } else { word };
