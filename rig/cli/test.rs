@@ -113,7 +113,7 @@ pub(super) fn test(args: &TestArgs) -> Result<Exit, Failure> {
         status!("masseter: interrupted after {} of {} tests", all.len(), chosen.len());
         return Ok(Exit::Interrupted);
     }
-    let has_failed = all.iter().any(|tested| tested.outcome.is_short(args.allow_untested));
+    let has_failed = all.iter().any(|tested| tested.outcome().is_short(args.allow_untested));
     Ok(if has_failed { Exit::Failed } else { Exit::Passed })
 }
 
@@ -132,13 +132,13 @@ fn out_folder(args: &TestArgs) -> anyhow::Result<PathBuf> {
 
 /// A scenario as a test suite of a JUnit document.
 fn junit_run(tested: &Tested, allow_untested: bool) -> JunitRun<'_> {
-    let verdict = tested.verdict.as_ref().ok_or(tested.reason.as_str());
+    let verdict = tested.verdict.as_ref().map_err(String::as_str);
     let properties = vec![
         ("masseter", BUILD.to_owned()),
-        ("outcome", tested.outcome.word().to_owned()),
+        ("outcome", tested.outcome().word().to_owned()),
         ("retries", tested.retries.to_string()),
     ];
-    let is_short = tested.outcome.is_short(allow_untested);
+    let is_short = tested.outcome().is_short(allow_untested);
     JunitRun::new(&tested.case.name, verdict, is_short, tested.took_s).with(properties)
 }
 
@@ -146,12 +146,12 @@ fn junit_run(tested: &Tested, allow_untested: bool) -> JunitRun<'_> {
 fn print_tested(tested: &Tested) -> anyhow::Result<()> {
     let times =
         if tested.retries == 1 { "1 retry".to_owned() } else { format!("{} retries", tested.retries) };
-    let retried = match (tested.outcome, tested.retries) {
+    let retried = match (tested.outcome(), tested.retries) {
         (_, 0) => String::new(),
         (Outcome::Passed, _) => format!(" (only after {times})"),
         _ => format!(" (also after {times})"),
     };
-    result_line!("test {} ... {}{retried}", tested.case.name, tested.outcome.word())
+    result_line!("test {} ... {}{retried}", tested.case.name, tested.outcome().word())
 }
 
 /// The numbers of scenarios without a result.
@@ -164,14 +164,14 @@ struct Others {
 
 /// What failed and why, then the result of the suite.
 fn summary(all: &[Tested], others: Others, allow_untested: bool, took_s: f64) -> String {
-    let short: Vec<_> = all.iter().filter(|tested| tested.outcome.is_short(allow_untested)).collect();
+    let short: Vec<_> = all.iter().filter(|tested| tested.outcome().is_short(allow_untested)).collect();
     let mut text = String::from("\n");
     if !short.is_empty() {
         let details: Vec<_> = short.iter().map(|tested| details(tested)).collect();
         let names: Vec<_> = short.iter().map(|tested| format!("    {}\n", tested.case.name)).collect();
         text = format!("\nfailures:\n\n{}\nfailures:\n{}\n", details.join("\n"), names.concat());
     }
-    let count = |outcome| all.iter().filter(|tested| tested.outcome == outcome).count();
+    let count = |outcome| all.iter().filter(|tested| tested.outcome() == outcome).count();
     let word = match (short.is_empty(), others.unrun) {
         (false, _) => "FAILED",
         (true, 0) => "ok",
@@ -192,5 +192,9 @@ fn details(tested: &Tested) -> String {
         .folder
         .as_ref()
         .map_or_else(String::new, |folder| format!("report: {}\n", folder.join("report.html").display()));
-    format!("---- {} ----\n{}\nagain: {}\n{report}", tested.case.name, tested.reason, tested.command)
+    let reason = match &tested.verdict {
+        Ok(verdict) => &format!("{}: {}", verdict.word, verdict.reason),
+        Err(reason) => reason,
+    };
+    format!("---- {} ----\n{reason}\nagain: {}\n{report}", tested.case.name, tested.command)
 }

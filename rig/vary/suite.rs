@@ -112,11 +112,8 @@ fn named(files: Vec<PathBuf>) -> Vec<Case> {
 #[derive(Debug)]
 pub(crate) struct Tested {
     pub(crate) case: Case,
-    pub(crate) outcome: Outcome,
-    /// Its verdict and reason, or why it could not run.
-    pub(crate) reason: String,
-    /// None of a scenario that could not run.
-    pub(crate) verdict: Option<Verdict>,
+    /// Its verdict, or why it could not run.
+    pub(crate) verdict: Result<Verdict, String>,
     /// The command that shows the run again.
     pub(crate) command: String,
     /// The folder of the run, if it was kept.
@@ -125,6 +122,12 @@ pub(crate) struct Tested {
     pub(crate) retries: u32,
     /// The time that it took, s.
     pub(crate) took_s: f64,
+}
+
+impl Tested {
+    pub(crate) fn outcome(&self) -> Outcome {
+        self.verdict.as_ref().map_or(Outcome::Failed, Outcome::of)
+    }
 }
 
 /// How a scenario counts.
@@ -155,11 +158,7 @@ impl Outcome {
 
     /// Whether a suite with it does not pass.
     pub(crate) fn is_short(self, allow_untested: bool) -> bool {
-        match self {
-            Self::Passed => false,
-            Self::Failed => true,
-            Self::Untested => !allow_untested,
-        }
+        self == Self::Failed || self == Self::Untested && !allow_untested
     }
 }
 
@@ -221,19 +220,12 @@ impl Suite<'_> {
             return None;
         }
         let took_s = (clock::now_ns() - began_ns) as f64 / 1e9;
+        let (verdict, folder, retries) = match tried {
+            Ok((verdict, folder, retries)) => (Ok(verdict), folder, retries),
+            Err(failure) => (Err(in_one_line(&failure.error)), None, 0),
+        };
         let command = self.runner.command(&case.path, clock);
-        let case = case.clone();
-        Some(match tried {
-            Ok((verdict, folder, retries)) => {
-                let outcome = Outcome::of(&verdict);
-                let reason = format!("{}: {}", verdict.word, verdict.reason);
-                Tested { case, outcome, reason, verdict: Some(verdict), command, folder, retries, took_s }
-            }
-            Err(failure) => {
-                let (outcome, reason) = (Outcome::Failed, in_one_line(&failure.error));
-                Tested { case, outcome, reason, verdict: None, command, folder: None, retries: 0, took_s }
-            }
-        })
+        Some(Tested { case: case.clone(), verdict, command, folder, retries, took_s })
     }
 
     /// Runs a scenario without a recording. One that does not pass is run again with a recording: the same bytes.
