@@ -43,6 +43,30 @@ fn results(out: &Path) -> Vec<Value> {
 }
 
 #[test]
+fn a_scheduler_runs_the_cases_of_a_plan_and_the_campaign_reports_them() {
+    let folder = folder(CAMPAIGN);
+    let plan = || {
+        let output = masseter(&folder, &["campaign", "friction.toml", "--out", "out", "--plan"]);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        stdout(&output)
+    };
+    let case = |number: &str| masseter(&folder, &["campaign-case", "out", number]).status.code();
+    assert_eq!(plan(), "0\n1\n2\n3\n4\n5\n");
+    assert_eq!(["4", "0", "2"].map(case), [Some(0); 3]);
+    assert_eq!(plan(), "1\n3\n5\n");
+    assert_eq!(case("6"), Some(2), "there is none");
+    // What no scheduler has run is run here.
+    let output = masseter(&folder, &["campaign", "friction.toml", "--out", "out", "--record", "0"]);
+    assert!(stdout(&output).starts_with("FAIL: 6 cases of 6: "), "{}{}", stdout(&output), stderr(&output));
+    assert_eq!(plan(), "");
+    fs::write(folder.path().join("friction.toml"), format!("{CAMPAIGN}[stop_after]\nfailures = 1\n"))
+        .unwrap();
+    let refused = masseter(&folder, &["campaign", "friction.toml", "--out", "other", "--plan"]);
+    assert_eq!(refused.status.code(), Some(2), "{}", stderr(&refused));
+    assert!(stderr(&refused).contains("stop_after"), "{}", stderr(&refused));
+}
+
+#[test]
 fn a_campaign_judges_every_case_and_records_the_worst() {
     common::demand_parquet();
     let folder = folder(CAMPAIGN);

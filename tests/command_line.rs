@@ -61,6 +61,14 @@ fn verbs_of_research_are_refused_with_the_command_that_has_them() {
 }
 
 #[test]
+fn help_for_a_verb_of_another_command_names_the_command() {
+    for verb in ["kinematics", "uniqueness"] {
+        let said = stdout(&masseter(&["help", verb]));
+        assert!(said.contains("cargo run --release -p masseter-research -- help"), "{said}");
+    }
+}
+
+#[test]
 fn completions_are_a_script_of_their_shell() {
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
         let script = stdout(&masseter(&["completions", shell]));

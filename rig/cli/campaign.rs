@@ -3,10 +3,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, ensure};
-use clap::{Args, ValueEnum};
-use masseter_campaign::{Campaign, CampaignFolder, Factor, Method, Sampler, Search};
+use anyhow::{Context, anyhow, ensure};
+use clap::Args;
+use masseter_campaign::{
+    Campaign, CampaignFile, CampaignFolder, CampaignLock, CaseResult, Factor, Method, Report, Sampler,
+    Search, StopRules, WorstCase,
+};
 use masseter_plan::{Overrides, scenario_with_overrides};
+use masseter_scenario::wording::counted;
 use masseter_table::{Format, ParquetProgram};
 use masseter_terminal::{Exit, Failure, OrFailure, result, status};
 
@@ -14,13 +18,76 @@ use super::arguments::time_in_names;
 use crate::run::interrupts::Interrupts;
 use crate::run::request::{ControllerChoice, ControllerKind};
 use crate::run::runner::{Runner, word};
-use crate::vary::hyperqueue::{self, HyperQueue};
-use crate::vary::play::{Player, plan};
+use crate::vary::play::{Player, open_cases, plan};
 use crate::vary::search::{self, Found};
 use crate::vary::shrink::{self, Reason};
 
 /// How many of the worst cases are recorded.
 const RECORD: usize = 10;
+
+/// What campaigns and searches share.
+#[derive(Debug, Clone, Args)]
+struct PlayArgs {
+    /// Folder of the results; what was begun in it goes on [default: campaigns/UTC_TIME-NAME]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Who controls the robot
+    #[arg(long, value_enum, default_value_t, hide_default_value = true)]
+    controller: ControllerKind,
+    /// Record this many of the cases with the smallest margins
+    #[arg(long, value_name = "N", default_value_t = RECORD)]
+    record: usize,
+}
+
+/// A campaign in its folder, in which nobody else plays.
+struct Begun {
+    campaign: Campaign,
+    out: PathBuf,
+    folder: CampaignFolder,
+    _lock: CampaignLock,
+    controller: ControllerChoice,
+    interrupts: Interrupts,
+    record: usize,
+}
+
+impl Begun {
+    fn new(campaign: Campaign, file: &Path, args: &PlayArgs) -> Result<Self, Failure> {
+        let by_time = || {
+            let name = file.file_stem().unwrap_or_default().to_string_lossy();
+            Path::new("campaigns").join(format!("{}-{name}", time_in_names()))
+        };
+        let out = args.out.clone().unwrap_or_else(by_time);
+        let (folder, lock) = CampaignFolder::begin(&out, &campaign).usage()?;
+        let (controller, interrupts) = (ControllerChoice::Own(args.controller), Interrupts::of_verb()?);
+        Ok(Self { campaign, out, folder, _lock: lock, controller, interrupts, record: args.record })
+    }
+
+    fn player(&self) -> Player<'_> {
+        let runner = Runner { controller: &self.controller, interrupts: &self.interrupts };
+        Player { runner, folder: &self.folder }
+    }
+
+    /// The report on the results, and the worst cases; none if the user interrupts.
+    fn report(&self, results: Vec<CaseResult>) -> Result<Option<(Report<'_>, Vec<WorstCase>)>, Failure> {
+        let out = word(&self.out.display().to_string());
+        if self.interrupts.is_stop_requested() {
+            let ended = counted(results.len() as u64, "case");
+            status!("interrupted after {ended}; the same command with --out {out} goes on");
+            return Ok(None);
+        }
+        // CSV where the program that writes Parquet is missing, since no result may be lost for that.
+        let format = ParquetProgram::beside_this_one().map_or_else(
+            |missing| {
+                status!(
+                    "the table is CSV: {missing}; then the same command with --out {out} writes Parquet, too"
+                );
+                Format::Csv
+            },
+            Format::Parquet,
+        );
+        self.player().report(&self.campaign, results, format, self.record).map(Some)
+    }
+}
 
 /// The arguments of `campaign`.
 #[derive(Debug, Clone, Args)]
@@ -30,82 +97,30 @@ const RECORD: usize = 10;
 pub(super) struct CampaignArgs {
     /// File of the campaign: scenario, sampler, runs, and a [[factor]] for everything that varies
     file: PathBuf,
-    /// Folder of the results; a campaign that was begun in it goes on [default: campaigns/UTC_TIME-NAME]
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Who controls the robot
-    #[arg(long, value_enum, default_value_t, hide_default_value = true)]
-    controller: ControllerKind,
-    /// Where the cases run
-    #[arg(long, value_enum, default_value_t)]
-    engine: EngineKind,
-    /// Folder of HyperQueue's server [default: the one that HyperQueue uses]
-    #[arg(long, value_name = "DIR")]
-    server_dir: Option<PathBuf>,
-    /// Python that has the package hyperqueue [default: python3]
-    #[arg(long, value_name = "FILE")]
-    python: Option<PathBuf>,
-    /// Record this many of the cases with the smallest margins [default: 10]
-    #[arg(long, value_name = "N")]
-    record: Option<usize>,
-}
-
-/// Where the cases of a campaign run.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-enum EngineKind {
-    /// On all cores of this machine
-    #[default]
-    Local,
-    /// On the workers of a HyperQueue server, also under Slurm and PBS
-    Hyperqueue,
+    #[command(flatten)]
+    play: PlayArgs,
+    /// Only print the numbers of the cases without a result: a scheduler runs each by 'masseter campaign-case DIR NUMBER'
+    #[arg(long, requires = "out")]
+    plan: bool,
 }
 
 /// Runs the campaign, or what is left of it; [`Exit::Passed`] if enough cases passed.
 pub(super) fn campaign(args: &CampaignArgs) -> Result<Exit, Failure> {
-    let campaign = plan(&args.file, args.controller).usage()?;
-    let out = args.out.clone().unwrap_or_else(|| folder_by_time(&args.file));
-    let (folder, _lock) = CampaignFolder::begin(&out, &campaign).usage()?;
-    let (controller, interrupts) = (ControllerChoice::Own(args.controller), Interrupts::of_verb()?);
-    status!("{} cases; results in {}", campaign.case_count(), out.display());
-    let runner = Runner { controller: &controller, interrupts: &interrupts };
-    let player = Player { runner, folder: &folder };
-    let results = match args.engine {
-        EngineKind::Local => player.play_all(&campaign),
-        EngineKind::Hyperqueue => {
-            let hyperqueue =
-                HyperQueue { server_dir: args.server_dir.as_deref(), python: args.python.as_deref() };
-            hyperqueue::run(&campaign, &folder, hyperqueue, &interrupts)
-        }
-    }?;
-    if interrupts.is_stop_requested() {
-        status!(
-            "interrupted after {} of {} cases; the same command with --out {} goes on",
-            results.len(),
-            campaign.case_count(),
-            word(&out.display().to_string())
-        );
-        return Ok(Exit::Interrupted);
+    let campaign = plan(&args.file, args.play.controller).usage()?;
+    if args.plan && campaign.file.stop_after != StopRules::default() {
+        return Err(anyhow!("stop_after: a scheduler runs every case; leave the rule away")).usage();
     }
-    let most = args.record.unwrap_or(RECORD);
-    let (report, _) = player.report(&campaign, results, table_format(&out), most)?;
-    result(&report.in_words(&folder)).incomplete()?;
+    let begun = Begun::new(campaign, &args.file, &args.play)?;
+    if args.plan {
+        let open = open_cases(&begun.campaign, &begun.folder).incomplete()?;
+        result(&open.iter().map(|number| format!("{number}\n")).collect::<String>()).incomplete()?;
+        return Ok(Exit::Passed);
+    }
+    status!("{} cases; results in {}", begun.campaign.case_count(), begun.out.display());
+    let results = begun.player().play_all(&begun.campaign)?;
+    let Some((report, _)) = begun.report(results)? else { return Ok(Exit::Interrupted) };
+    result(&report.in_words(&begun.folder)).incomplete()?;
     Ok(if report.is_success() { Exit::Passed } else { Exit::Failed })
-}
-
-/// The arguments of the hidden verb that runs one case.
-#[derive(Debug, Clone, Args)]
-pub(super) struct CampaignCaseArgs {
-    /// Folder of the campaign
-    folder: PathBuf,
-    /// Number of the case
-    number: usize,
-    /// Number of the start of the campaign, at whose interruption the case stops
-    start: Option<u64>,
-}
-
-/// Runs one case in a process of its own, for engines that start processes.
-pub(super) fn run_case(args: &CampaignCaseArgs) -> Result<Exit, Failure> {
-    hyperqueue::run_case(&args.folder, args.number, args.start)
 }
 
 /// The arguments of `search`.
@@ -124,22 +139,15 @@ pub(super) struct SearchArgs {
     runs: usize,
     /// How the next values are chosen
     #[arg(long, value_enum, default_value_t)]
-    method: SearchMethod,
+    method: Method,
     /// Seed of the chosen values
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Go on after the first margin below zero
     #[arg(long)]
     go_on: bool,
-    /// Folder of the results; a search that was begun in it goes on [default: campaigns/UTC_TIME-NAME]
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Who controls the robot
-    #[arg(long, value_enum, default_value_t, hide_default_value = true)]
-    controller: ControllerKind,
-    /// Record this many of the cases with the smallest margins [default: 10]
-    #[arg(long, value_name = "N")]
-    record: Option<usize>,
+    #[command(flatten)]
+    play: PlayArgs,
 }
 
 impl SearchArgs {
@@ -150,53 +158,26 @@ impl SearchArgs {
     }
 }
 
-/// How a search chooses the next values.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-enum SearchMethod {
-    /// By the covariance of the best values so far
-    #[default]
-    CmaEs,
-    /// At random
-    Random,
-}
-
 /// Searches; [`Exit::Failed`] if a margin below zero was found.
 pub(super) fn search(args: &SearchArgs) -> Result<Exit, Failure> {
-    let mut campaign = plan(&args.file, args.controller).usage()?;
+    let mut campaign = plan(&args.file, args.play.controller).usage()?;
     // The archive is that of a random campaign, whose points the search chooses.
-    campaign.file.sampler = Sampler::Random;
-    campaign.file.runs = None;
-    campaign.file.seeds = None;
+    campaign.file = CampaignFile { sampler: Sampler::Random, runs: None, seeds: None, ..campaign.file };
     check_search(&campaign, args).usage()?;
-    let out = args.out.clone().unwrap_or_else(|| folder_by_time(&args.file));
-    let (folder, _lock) = CampaignFolder::begin(&out, &campaign).usage()?;
-    let (controller, interrupts) = (ControllerChoice::Own(args.controller), Interrupts::of_verb()?);
-    status!("at most {} runs; results in {}", args.runs, out.display());
-    let runner = Runner { controller: &controller, interrupts: &interrupts };
-    let player = Player { runner, folder: &folder };
-    let search = Search {
-        method: match args.method {
-            SearchMethod::CmaEs => Method::CmaEs,
-            SearchMethod::Random => Method::Random,
-        },
-        dimension: campaign.file.factors.len(),
-        runs: args.runs,
-        seed: args.seed,
-        goes_on: args.go_on,
-    };
-    let Found { first, results } = search::search(&search, args.requirement(), &campaign, player)?;
-    if interrupts.is_stop_requested() {
-        status!("interrupted; the same command with --out {} goes on", word(&out.display().to_string()));
-        return Ok(Exit::Interrupted);
-    }
-    let (runs, most) = (results.len(), args.record.unwrap_or(RECORD));
-    let (report, worst) = player.report(&campaign, results, table_format(&out), most)?;
+    let begun = Begun::new(campaign, &args.file, &args.play)?;
+    status!("at most {} runs; results in {}", args.runs, begun.out.display());
+    let SearchArgs { method, runs, seed, go_on: goes_on, .. } = *args;
+    let search = Search { method, dimension: begun.campaign.file.factors.len(), runs, seed, goes_on };
+    let Found { first, results } =
+        search::search(&search, args.requirement(), &begun.campaign, begun.player())?;
+    let runs = results.len();
+    let Some((report, worst)) = begun.report(results)? else { return Ok(Exit::Interrupted) };
     let found = first.map_or_else(
         || format!("nothing below zero in {runs} runs\n"),
         |first| format!("below zero after {first} runs\n"),
     );
     let again = worst.first().map_or_else(String::new, |worst| format!("again: {}\n", worst.command));
-    result(&(found + &again + &report.files(&folder))).incomplete()?;
+    result(&(found + &again + &report.files(&begun.folder))).incomplete()?;
     Ok(if first.is_some() { Exit::Failed } else { Exit::Passed })
 }
 
@@ -262,23 +243,4 @@ fn scenario_of(path: &Path) -> anyhow::Result<PathBuf> {
     let inside = path.join("scenario.toml");
     ensure!(!path.is_dir() || inside.is_file(), "{} has no scenario.toml", path.display());
     Ok(if path.is_dir() { inside } else { path.to_owned() })
-}
-
-/// Parquet; CSV where the program that writes Parquet is missing, since no result may be lost for that.
-fn table_format(out: &Path) -> Format {
-    match ParquetProgram::beside_this_one() {
-        Ok(program) => Format::Parquet(program),
-        Err(missing) => {
-            let out = word(&out.display().to_string());
-            status!(
-                "the table is CSV: {missing}; then the same command with --out {out} writes Parquet, too"
-            );
-            Format::Csv
-        }
-    }
-}
-
-fn folder_by_time(file: &Path) -> PathBuf {
-    let name = file.file_stem().unwrap_or_default().to_string_lossy();
-    Path::new("campaigns").join(format!("{}-{name}", time_in_names()))
 }

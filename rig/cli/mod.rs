@@ -34,9 +34,10 @@ use crate::BUILD;
 use crate::doctor::{self, DoctorArgs};
 use crate::robot::{self, RobotVerb};
 use crate::run::exec_program;
+use crate::vary::play::play_case;
 use arguments::ProcessArgs;
 use bench::BenchVerb;
-use campaign::{CampaignArgs, CampaignCaseArgs, SearchArgs, ShrinkArgs};
+use campaign::{CampaignArgs, SearchArgs, ShrinkArgs};
 use can::CanVerb;
 use controller::{ControllerArgs, ParamVerb, SignalsArgs};
 use faults::FaultsVerb;
@@ -59,6 +60,9 @@ First steps:
 const EXIT_CODES: &str = "\
 Exit codes of every verb: 0 passed, 1 a check failed or was not tested, 2 wrong usage or input,
 3 cannot be judged, 4 a process died, 5 unexpected safe stop, 6 files incomplete, 130 interrupted.";
+
+const ELSEWHERE: &str = "the paper's study and uniqueness are verbs of another command: \
+                         cargo run --release -p masseter-research -- help";
 
 /// A hardware-in-the-loop rig for a 6-DOF mastication robot
 #[derive(Debug, Parser)]
@@ -152,13 +156,24 @@ enum Verb {
     /// Write manual pages
     Man(ManArgs),
     /// Verbs of another command
-    #[command(hide = true, aliases = ["paper", "uniqueness"], disable_help_flag = true)]
+    #[command(
+        hide = true,
+        aliases = ["paper", "uniqueness"],
+        disable_help_flag = true,
+        override_help = ELSEWHERE
+    )]
     Kinematics {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         _arguments: Vec<OsString>,
     },
+    /// Run one case of a campaign, for a scheduler
     #[command(hide = true)]
-    CampaignCase(CampaignCaseArgs),
+    CampaignCase {
+        /// Folder of the campaign
+        folder: PathBuf,
+        /// Number of the case
+        number: usize,
+    },
     #[command(hide = true)]
     Recorder {
         #[command(flatten)]
@@ -223,7 +238,7 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Campaign(args) => campaign::campaign(&args),
         Verb::Search(args) => campaign::search(&args),
         Verb::Shrink(args) => campaign::shrink(&args),
-        Verb::CampaignCase(args) => campaign::run_case(&args),
+        Verb::CampaignCase { folder, number } => play_case(&folder, number),
         Verb::Motion(args) => motion::motion(&args).usage(),
         Verb::Init(args) => starter::init(&args).usage(),
         Verb::Faults(verb) => faults::execute(&verb),
@@ -236,11 +251,7 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Ik(args) => kinematics::inverse(&args).usage(),
         Verb::Can(verb) => can::execute(&verb).usage(),
         Verb::Robot(verb) => robot::execute(&verb),
-        Verb::Kinematics { .. } => Err(anyhow!(
-            "the paper's study and uniqueness are verbs of another command: \
-             cargo run --release -p masseter-research -- help"
-        ))
-        .usage(),
+        Verb::Kinematics { .. } => Err(anyhow!(ELSEWHERE)).usage(),
         Verb::Doctor(args) => doctor::examine(&args).usage(),
         Verb::Export(args) => masseter_recordings::export(&args).usage(),
         Verb::Recording(verb) => masseter_recordings::execute(&verb).usage(),

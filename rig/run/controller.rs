@@ -427,6 +427,17 @@ fn tied_to_this_process(path: &Path) -> io::Result<Command> {
     Ok(command)
 }
 
+/// Lets the kernel kill this process when its parent dies.
+///
+/// # Errors
+/// When the parent is another one already: its death would give no signal any more.
+pub(crate) fn end_with_parent(parent: Option<Pid>) -> anyhow::Result<()> {
+    set_parent_process_death_signal(Some(Signal::KILL))
+        .context("the process cannot be tied to its parent")?;
+    ensure!(getppid() == parent, "the process that started this one is gone");
+    Ok(())
+}
+
 /// The step between the supervisor and a program: ties this process to the supervisor, then becomes the program.
 /// Returns only where that fails.
 ///
@@ -434,10 +445,7 @@ fn tied_to_this_process(path: &Path) -> io::Result<Command> {
 /// it with the supervisor. Only the process itself can ask for that, before it executes the program, which keeps the
 /// request. The kernel drops the request for an executable with the set-user-ID bit or with capabilities of its own.
 pub(crate) fn exec_program(supervisor: i32, path: &Path) -> anyhow::Result<Exit> {
-    set_parent_process_death_signal(Some(Signal::KILL))
-        .context("the controller cannot be tied to the rig")?;
-    // A supervisor that died before the request gives no signal any more.
-    ensure!(getppid() == Pid::from_raw(supervisor), "the rig died before its controller was started");
+    end_with_parent(Pid::from_raw(supervisor))?;
     let error = Command::new(path).exec();
     Err(error).with_context(|| format!("the controller {} cannot be started", path.display()))
 }

@@ -51,11 +51,6 @@ impl Interrupts {
         Self::listen().context("cannot listen for signals").died()
     }
 
-    /// Requests an orderly stop, as a signal does.
-    pub(crate) fn request_stop(&self) {
-        self.count.fetch_add(1, Ordering::Relaxed);
-    }
-
     /// Whether an orderly stop is requested.
     pub(crate) fn is_stop_requested(&self) -> bool {
         self.is_requested.load(Ordering::Relaxed) || self.count.load(Ordering::Relaxed) > 0

@@ -17,6 +17,6 @@ mod strikes;
 mod supervisor;
 mod usage;
 
-pub(crate) use controller::exec_program;
+pub(crate) use controller::{end_with_parent, exec_program};
 pub(crate) use prepared::PreparedRun;
 pub(crate) use resolve::{needs_processes, resolve_simulated};

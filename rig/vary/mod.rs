@@ -1,7 +1,6 @@
 //! One scenario in many variants, or many scenarios: suite, campaign, search, shrinking, and the matrix of faults.
 //! All of them play their runs by the [`Runner`](crate::run::runner::Runner); their verbs are in [`cli`](crate::cli).
 
-pub(crate) mod hyperqueue;
 pub(crate) mod matrix;
 pub(crate) mod play;
 pub(crate) mod search;

@@ -10,16 +10,19 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use anyhow::{Context, anyhow};
 use clap::ValueEnum;
 use masseter_campaign::{
-    Campaign, CampaignFile, CampaignFolder, Case, CaseResult, Report, StopRules, WorstCase, digest_of_program,
+    Campaign, CampaignFile, CampaignFolder, Case, CaseResult, FolderError, Report, StopRules, WorstCase,
+    digest_of_program,
 };
 use masseter_plan::{Overrides, scenario_with_overrides};
 use masseter_runtime::clock;
 use masseter_table::Format;
 use masseter_terminal::{Exit, Failure, OrFailure, in_one_line, status};
+use rustix::process::getppid;
 
-use crate::run::request::{ClockKind, ControllerKind, name_of};
-use crate::run::resolve_simulated;
+use crate::run::interrupts::Interrupts;
+use crate::run::request::{ClockKind, ControllerChoice, ControllerKind, name_of};
 use crate::run::runner::{Judged, Runner, Source};
+use crate::run::{end_with_parent, resolve_simulated};
 
 /// Time between two lines of progress, ns.
 const PROGRESS_EVERY_NS: u64 = 5_000_000_000;
@@ -46,14 +49,42 @@ pub(crate) fn plan(file: &Path, controller: ControllerKind) -> anyhow::Result<Ca
 }
 
 /// The digest of this program.
-pub(super) fn this_program() -> anyhow::Result<String> {
+fn this_program() -> anyhow::Result<String> {
     let digest = std::env::current_exe().and_then(|path| digest_of_program(&path));
     digest.context("cannot read this program")
 }
 
-/// The controller of a campaign that has begun.
-pub(super) fn controller_of(campaign: &Campaign) -> anyhow::Result<ControllerKind> {
-    ControllerKind::from_str(&campaign.controller, false).map_err(|error| anyhow!(error))
+/// Plays a case of a campaign in this process, for a scheduler, unless its result is there. Any result is success: the
+/// campaign judges.
+pub(crate) fn play_case(folder: &Path, number: usize) -> Result<Exit, Failure> {
+    // A worker that is killed takes its case along: no orphan computes what the next worker computes again.
+    end_with_parent(getppid()).died()?;
+    let (folder, campaign) = CampaignFolder::open(folder).usage()?;
+    let kind =
+        ControllerKind::from_str(&campaign.controller, false).map_err(|error| anyhow!(error)).usage()?;
+    if this_program().usage()? != campaign.program {
+        return Err(anyhow!("another build of masseter began the campaign; begin another one")).usage();
+    }
+    let count = campaign.case_count();
+    if number >= count {
+        return Err(anyhow!("the campaign has cases 0 to {}", count.saturating_sub(1))).usage();
+    }
+    let (controller, interrupts) = (ControllerChoice::Own(kind), Interrupts::of_verb()?);
+    let runner = Runner { controller: &controller, interrupts: &interrupts };
+    let result = Player { runner, folder: &folder }.result_of(&campaign.case(&campaign.points(), number))?;
+    Ok(if result.is_some() { Exit::Passed } else { Exit::Interrupted })
+}
+
+/// The numbers of the cases without a result.
+pub(crate) fn open_cases(campaign: &Campaign, folder: &CampaignFolder) -> Result<Vec<usize>, FolderError> {
+    let points = campaign.points();
+    let mut open = Vec::new();
+    for number in 0..campaign.case_count() {
+        if folder.result_of(&campaign.case(&points, number))?.is_none() {
+            open.push(number);
+        }
+    }
+    Ok(open)
 }
 
 /// Plays cases, and keeps their results in the folder of the campaign.

@@ -1,6 +1,6 @@
 """Reads the results of a campaign with polars and DuckDB, and kills what runs it. Every case must have one result, whatever
-dies: the campaign itself, a case, or a whole HyperQueue cluster; and so after interrupts, which leave no case behind. In the package from PyPI, the workers of a cluster are threads
-of its server, so a worker cannot be killed alone here.
+dies: the campaign itself, a case, or a whole HyperQueue cluster; and so after interrupts, which leave no case behind. In the package
+from PyPI, the workers of a cluster are threads of its server, so a worker cannot be killed alone here.
 
     campaign.py MASSETER FOLDER
 """
@@ -19,6 +19,7 @@ import duckdb
 import polars
 
 program, folder = sys.argv[1], pathlib.Path(sys.argv[2])
+SCRIPT = pathlib.Path(__file__).resolve().parents[2] / "examples/campaign/on_hyperqueue.py"
 folder.mkdir()
 (folder / "chewing.toml").write_text(
     "duration_s = 1.0\n[[require]]\nname = 'incisal'\nsignal = 'incisal.error'\nduring = 'running'\nmax = '60 um'\n"
@@ -64,13 +65,23 @@ Client(sys.argv[1]).connection.wait_for_jobs([int(sys.argv[2])], lambda status: 
 """
 
 
-def command(out, *more):
-    return [program, "campaign", "friction.toml", "--out", out, "--record", str(RECORDED), *more]
+def command(out):
+    return [program, "campaign", "friction.toml", "--out", out, "--record", str(RECORDED)]
 
 
-def start(out, *more):
+def on_hyperqueue(out, server):
+    more = ["--masseter", program, "--server-dir", server, "--", "--record", str(RECORDED)]
+    return [sys.executable, SCRIPT, "friction.toml", out, *more]
+
+
+def start(out, server=None):
+    """The campaign on this machine, or on the workers of a server."""
     return subprocess.Popen(
-        command(out, *more), cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        command(out) if server is None else on_hyperqueue(out, server),
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
 
 
@@ -186,19 +197,15 @@ def cluster():
     return started
 
 
-def engine(server):
-    return ["--engine", "hyperqueue", "--server-dir", server, "--python", sys.executable]
-
-
 first = cluster()
-campaign = start("case", *engine(server))
+campaign = start("case", server)
 wait_until("a case dies", kill_a_case)
 _, said = campaign.communicate()
-assert campaign.returncode == 1 and f"1 of {CASES} cases to HyperQueue" in said, (campaign.returncode, said)
+assert campaign.returncode == 1 and "\n1 cases to HyperQueue" in said, (campaign.returncode, said)
 # What the killed case left goes with the next start of the command.
-start("case", *engine(server)).communicate()
+start("case", server).communicate()
 check_complete("case")
-campaign = start("cluster", *engine(server))
+campaign = start("cluster", server)
 wait_until("some cases have ended", lambda: (folder / "cluster/cases").is_dir() and len(results("cluster")) > 5)
 first.kill()
 first.wait()
@@ -207,7 +214,7 @@ _, said = campaign.communicate()
 assert campaign.returncode == 4 and "the same command goes on" in said, (campaign.returncode, said)
 assert len(results("cluster")) < CASES
 second = cluster()
-campaign = start("cluster", *engine(server))
+campaign = start("cluster", server)
 said = campaign.communicate()
 second.kill()
 assert campaign.returncode == 1, said
@@ -218,7 +225,7 @@ server = folder / "another"
 third = cluster()
 for signalled in (signal.SIGINT, signal.SIGTERM):
     before = len(results("interrupted"))
-    campaign = start("interrupted", *engine(server))
+    campaign = start("interrupted", server)
     wait_until("some cases have ended", lambda: len(results("interrupted")) > before + 5)
     campaign.send_signal(signalled)
     _, said = campaign.communicate()
@@ -228,7 +235,7 @@ for signalled in (signal.SIGINT, signal.SIGTERM):
         subprocess.run([sys.executable, "-c", AWAIT_JOB, server, str(job)], check=True, timeout=30.0)
         wait_until("no case outlives its job", lambda: not cases_alive(), 5.0)
     assert before < len(results("interrupted")) < CASES
-campaign = start("interrupted", *engine(server))
+campaign = start("interrupted", server)
 said = campaign.communicate()
 third.kill()
 assert campaign.returncode == 1, said

@@ -113,21 +113,6 @@ impl CampaignFolder {
         &self.path
     }
 
-    /// Marks the start with this number as interrupted. An engine may hold cases that it has not begun yet, on other
-    /// machines. Whoever runs a case of that start, or is about to, stops at the mark. Another start has another
-    /// mark, and goes on while cases of this one still wait in a queue.
-    ///
-    /// # Errors
-    /// When the file cannot be made.
-    pub fn mark_interrupted(&self, start: u64) -> io::Result<()> {
-        File::create(self.interruption(start)).map(drop)
-    }
-
-    /// Whether the start with this number is interrupted.
-    pub fn is_interrupted(&self, start: u64) -> bool {
-        self.interruption(start).exists()
-    }
-
     /// Another file of this name.
     pub fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)
@@ -188,10 +173,6 @@ impl CampaignFolder {
             file.persist(path).map_err(|error| error.error)
         };
         write().map(drop).map_err(system(path))
-    }
-
-    fn interruption(&self, start: u64) -> PathBuf {
-        self.file(&format!("interrupted-{start}"))
     }
 
     fn plan_path(&self) -> PathBuf {
@@ -322,11 +303,9 @@ mod tests {
         // The second attempt comes too late, and does no harm.
         let late = CaseResult { word: "PASS".to_owned(), exit_code: 0, ..failed(&first) };
         folder.attempt(&first).unwrap().keep_result(&late, first.scenario.as_ref().ok()).unwrap();
-        folder.mark_interrupted(1).unwrap();
         drop(lock);
 
         let (folder, _lock) = CampaignFolder::begin(&path, &two()).unwrap();
-        assert!(folder.is_interrupted(1) && !folder.is_interrupted(2));
         assert_eq!(folder.result_of(&case(1)).unwrap(), None);
         assert_eq!(results(&folder).unwrap(), [failed(&first)]);
         assert!(path.join(CASES).join(&first.id).join(SCENARIO).is_file());

@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
+use clap::ValueEnum;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -19,11 +20,14 @@ const SMALLEST: f64 = 1e-10;
 const NARROWEST: f64 = 1e-7;
 
 /// How the next points are chosen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 pub enum Method {
-    /// By the covariance of the best points so far (Hansen, 2016). It begins again elsewhere where it has converged.
+    /// By the covariance of the best values so far
+    // Hansen, 2016. It begins again elsewhere where it has converged.
+    #[default]
     CmaEs,
-    /// Independently: the baseline of every other method.
+    /// At random
+    // The baseline of every other method.
     Random,
 }
 
