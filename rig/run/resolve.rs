@@ -26,7 +26,7 @@ const HIGHEST_PRIORITY: u8 = 99;
 pub(super) fn resolve(request: &RunRequest) -> anyhow::Result<(RunPlan, RunRequest)> {
     let overrides = &request.overrides;
     let scenario = masseter_plan::scenario_with_overrides(request.scenario.as_deref(), overrides)?;
-    overrides.cores.map_or(Ok(()), |cores| check_cores(&cores))?;
+    overrides.cores.map_or(Ok(()), |cores| check_cores(&cores, &usable_cores()))?;
     let request = RunRequest { clock: choose_clock(request, &scenario), ..request.clone() };
     check_clock(&request, &scenario)?;
     request.live.map_or(Ok(()), live::check)?;
@@ -105,13 +105,9 @@ fn question(error: &NameError) -> String {
     question.map_or_else(String::new, |question| format!("; of the keys of a scenario, {question}"))
 }
 
-/// Refuses cores of the command line to which the kernel pins no thread.
-fn check_cores(cores: &[usize]) -> anyhow::Result<()> {
-    check_among(cores, &usable_cores())
-}
-
-/// Where no pinning is allowed at all, the refusal of the kernel says so later.
-fn check_among(cores: &[usize], usable: &[usize]) -> anyhow::Result<()> {
+/// Refuses cores of the command line to which the kernel pins no thread. Where no pinning is allowed at all, the refusal
+/// of the kernel says so later.
+fn check_cores(cores: &[usize], usable: &[usize]) -> anyhow::Result<()> {
     match cores.iter().find(|core| !usable.contains(core)) {
         Some(core) if !usable.is_empty() => {
             let choice: Vec<_> = usable.iter().map(usize::to_string).collect();
@@ -303,7 +299,7 @@ mod tests {
     #[test]
     fn cores_that_cannot_be_used_are_refused_with_those_that_can() {
         let refusal = |cores: &[usize], usable: &[usize]| {
-            check_among(cores, usable).err().map(|error| error.to_string())
+            check_cores(cores, usable).err().map(|error| error.to_string())
         };
         assert_eq!(refusal(&[0, 1], &[0, 1]), None);
         assert_eq!(refusal(&[0, 9], &[]), None, "nothing is known");

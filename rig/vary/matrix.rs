@@ -39,27 +39,21 @@ pub(crate) struct Case {
 /// Every case of a plan, of kinds with this text in their names. Faults of processes are left out: they exist only
 /// with processes.
 pub(crate) fn cases(plan: &RunPlan, filter: Option<&str>) -> Vec<Case> {
-    cases_in(&plan.scenario, &phases(plan), filter)
-}
-
-fn cases_in(scenario: &Scenario, phases: &[Phase], filter: Option<&str>) -> Vec<Case> {
+    let phases = phases(plan);
     let kinds = FaultKindConfig::ALL
         .iter()
         .filter(|kind| !kind.is_of_process() && filter.is_none_or(|text| kind.name().contains(text)));
-    kinds.flat_map(|kind| of_kind(*kind, scenario, phases)).collect()
+    kinds.flat_map(|kind| of_kind(*kind, &plan.scenario, &phases)).collect()
 }
 
 fn of_kind(kind: FaultKindConfig, scenario: &Scenario, phases: &[Phase]) -> Vec<Case> {
     let has_axis = ["axis", "node"].iter().any(|key| kind.takes(key));
     let axes: Vec<_> = if has_axis { (0..AXIS_NAMES.len()).map(Some).collect() } else { vec![None] };
-    let case = |axis: Option<usize>, phase: &Phase| Case {
-        fault: fault(kind, axis, scenario, phase),
-        axis,
-        phase: phase.name,
-    };
     // Only at the beginning of the run is a drive enabled.
-    let boot = Phase { name: "enabling", at_s: 0.0 };
-    let phases = if kind == DriveFault::SlowEnable.into() { &[boot] } else { phases };
+    let boot = [Phase { name: "enabling", at_s: 0.0 }];
+    let phases = if kind == DriveFault::SlowEnable.into() { &boot } else { phases };
+    let case =
+        |axis, phase: &Phase| Case { fault: fault(kind, axis, scenario, phase), axis, phase: phase.name };
     axes.iter().flat_map(|axis| phases.iter().map(|phase| case(*axis, phase))).collect()
 }
 
@@ -160,14 +154,13 @@ mod tests {
 
     #[test]
     fn every_case_is_a_valid_scenario() {
-        let base = Scenario::default();
-        let phases = [Phase { name: "opening", at_s: 1.6 }];
-        let cases = cases_in(&base, &phases, None);
+        let plan = RunPlan::new(Scenario::default()).unwrap();
+        let cases = cases(&plan, None);
         let kinds: std::collections::BTreeSet<_> = cases.iter().map(|case| case.fault.kind).collect();
         let of_processes = FaultKindConfig::ALL.iter().filter(|kind| kind.is_of_process()).count();
         assert_eq!(kinds.len(), FaultKindConfig::ALL.len() - of_processes);
         for case in &cases {
-            scenario_of(&base, case).validate().unwrap_or_else(|error| panic!("{case:?}: {error}"));
+            scenario_of(&plan.scenario, case).validate().unwrap_or_else(|error| panic!("{case:?}: {error}"));
         }
     }
 }

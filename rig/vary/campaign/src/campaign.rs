@@ -13,28 +13,13 @@ use serde::{Deserialize, Serialize};
 use sha1::{Digest, Sha1};
 use toml::{Table, Value};
 
-use crate::case::{Case, CaseResult};
-use crate::factor::{Factor, FactorError, Setting};
+use crate::case::{COLUMNS, Case, CaseResult};
+use crate::factor::{Factor, Setting};
 
 /// Size of the largest file, bytes.
 const MOST_BYTES: u64 = 1 << 20;
 /// The most cases of a campaign.
 const MOST_CASES: usize = 1_000_000;
-/// The columns of every table of results that are no factors.
-const COLUMNS: [&str; 12] = [
-    "case",
-    "id",
-    "more_seed",
-    "verdict",
-    "exit_code",
-    "reason",
-    "digest",
-    "took_s",
-    "incisal_rms_mm",
-    "incisal_max_mm",
-    "rotation_max_deg",
-    "bite_force_max_n",
-];
 /// Keys that name files which only the reading of a scenario's file resolves.
 const FILE_KEYS: [&str; 2] = ["robot", "drive_profile"];
 
@@ -98,18 +83,7 @@ pub struct CampaignFile {
 #[error("{}: {reason}", path.display())]
 pub struct FileError {
     path: PathBuf,
-    reason: Refusal,
-}
-
-/// Why a file is refused.
-#[derive(Debug, thiserror::Error)]
-enum Refusal {
-    #[error("{0}")]
-    Unreadable(io::Error),
-    #[error("{0}")]
-    Malformed(String),
-    #[error("{0}")]
-    Factor(FactorError),
+    reason: String,
 }
 
 impl CampaignFile {
@@ -121,12 +95,12 @@ impl CampaignFile {
         Self::read_checked(path).map_err(|reason| FileError { path: path.to_owned(), reason })
     }
 
-    fn read_checked(path: &Path) -> Result<Self, Refusal> {
-        let text = read_text(path, MOST_BYTES).map_err(Refusal::Unreadable)?;
-        let mut file: Self = toml::from_str(&text).map_err(|error| Refusal::Malformed(error.to_string()))?;
-        file.check_numbers().map_err(|reason| Refusal::Malformed(reason.to_owned()))?;
-        file.factors.iter().try_for_each(Factor::validate).map_err(Refusal::Factor)?;
-        file.refuse_twins().map_err(Refusal::Malformed)?;
+    fn read_checked(path: &Path) -> Result<Self, String> {
+        let text = read_text(path, MOST_BYTES).map_err(|error| error.to_string())?;
+        let mut file: Self = toml::from_str(&text).map_err(|error| error.to_string())?;
+        file.check_numbers()?;
+        file.factors.iter().try_for_each(Factor::validate)?;
+        file.refuse_twins()?;
         let folder = path.parent().unwrap_or(Path::new(""));
         file.scenario = file.scenario.map(|scenario| folder.join(scenario));
         Ok(file)
@@ -185,7 +159,7 @@ impl CampaignFile {
     fn refuse_twins(&self) -> Result<(), String> {
         for (at, factor) in self.factors.iter().enumerate() {
             let name = factor.name();
-            if COLUMNS.contains(&name) {
+            if COLUMNS.iter().copied().flatten().any(|(column, ..)| *column == name) {
                 return Err(format!("'{name}' is the name of another column; give the factor another name"));
             }
             if self.factors[..at].iter().any(|other| other.name() == name) {

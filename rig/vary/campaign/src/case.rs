@@ -3,9 +3,55 @@
 use masseter_analysis::Figures;
 use masseter_report::{Check, CheckResult, Verdict};
 use masseter_scenario::Scenario;
+use masseter_table::Values;
 use serde::{Deserialize, Serialize};
 
 use crate::factor::Setting;
+
+/// A column of a table of results: name, unit, meaning and values.
+type ResultColumn = (&'static str, &'static str, &'static str, fn(&[CaseResult]) -> Values);
+
+/// The columns of every table of results before its factors, before its checks, and after them.
+pub(crate) const COLUMNS: [&[ResultColumn]; 3] = [
+    &[
+        ("case", "", "place in the campaign", |all| whole(all, |case| case.number as i64)),
+        ("id", "", "identity by content", |all| words(all, |case| &case.id)),
+        ("more_seed", "", "added to the seed of the scenario", |all| {
+            whole(all, |case| case.more_seed as i64)
+        }),
+    ],
+    &[
+        ("verdict", "", "verdict in a word", |all| words(all, |case| &case.word)),
+        ("exit_code", "", "verdict as exit code", |all| whole(all, |case| case.exit_code.into())),
+        ("reason", "", "reason of the verdict", |all| words(all, |case| &case.reason)),
+        ("digest", "", "what the rig did", |all| words(all, |case| &case.digest)),
+        ("took_s", "s", "time that the case took", |all| numbers(all, |case| Some(case.took_s))),
+    ],
+    &[
+        ("incisal_rms_mm", "mm", "error of the incisal point, root mean square", |all| {
+            numbers(all, |case| case.incisal_rms_mm)
+        }),
+        ("incisal_max_mm", "mm", "largest error of the incisal point", |all| {
+            numbers(all, |case| case.incisal_max_mm)
+        }),
+        ("rotation_max_deg", "deg", "largest error of the rotation", |all| {
+            numbers(all, |case| case.rotation_max_deg)
+        }),
+        ("bite_force_max_n", "N", "greatest bite force", |all| numbers(all, |case| case.bite_force_max_n)),
+    ],
+];
+
+fn numbers(all: &[CaseResult], of: fn(&CaseResult) -> Option<f64>) -> Values {
+    Values::Numbers(all.iter().map(of).collect())
+}
+
+fn whole(all: &[CaseResult], of: fn(&CaseResult) -> i64) -> Values {
+    Values::Whole(all.iter().map(|case| Some(of(case))).collect())
+}
+
+fn words(all: &[CaseResult], of: fn(&CaseResult) -> &String) -> Values {
+    Values::Words(all.iter().map(|case| Some(of(case).clone())).collect())
+}
 
 /// A run of a campaign.
 #[derive(Debug, Clone, PartialEq)]

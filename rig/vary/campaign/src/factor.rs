@@ -73,14 +73,6 @@ pub struct Factor {
     pub faults: Option<Vec<Value>>,
 }
 
-/// Why a factor is refused.
-#[derive(Debug, thiserror::Error)]
-#[error("factor '{factor}': {reason}")]
-pub struct FactorError {
-    factor: String,
-    reason: &'static str,
-}
-
 impl Factor {
     /// The name in results.
     pub fn name(&self) -> &str {
@@ -169,7 +161,7 @@ impl Factor {
     }
 
     /// Checks the factor by itself; its keys are checked with the scenario of each case.
-    pub(crate) fn validate(&self) -> Result<(), FactorError> {
+    pub(crate) fn validate(&self) -> Result<(), String> {
         let is_normal = self.distribution == Distribution::Normal;
         let is_logarithmic = self.distribution == Distribution::LogUniform;
         let given = [self.range.is_some() || is_normal, self.values.is_some(), self.faults.is_some()];
@@ -214,7 +206,7 @@ impl Factor {
             ),
         ];
         let refusal = refusals.into_iter().find(|(is_wrong, _)| *is_wrong);
-        refusal.map_or(Ok(()), |(_, reason)| Err(FactorError { factor: self.name().to_owned(), reason }))
+        refusal.map_or(Ok(()), |(_, reason)| Err(format!("factor '{}': {reason}", self.name())))
     }
 }
 
@@ -396,7 +388,7 @@ mod tests {
             ("key = 'a'\nvalues = [nan]", "use finite numbers"),
             ("faults = [{ kind = 'lose', at_s = inf }]", "use finite numbers"),
         ] {
-            let refusal = factor(text).validate().unwrap_err().to_string();
+            let refusal = factor(text).validate().unwrap_err();
             assert!(refusal.contains(reason), "{text}: {refusal}");
         }
     }

@@ -9,7 +9,7 @@ use masseter_charts::{Axis, Error, Scale, chart, marks, svg};
 use masseter_table::{Column, Table, Values, write_table};
 
 use crate::campaign::Campaign;
-use crate::case::{CaseCheck, CaseResult};
+use crate::case::{COLUMNS, CaseCheck, CaseResult};
 use crate::factor::{Distribution, Factor, Setting};
 use crate::folder::CampaignFolder;
 use crate::report::{PAGE, Report, WorstCase, percent};
@@ -174,35 +174,13 @@ fn values(result: &CaseResult) -> String {
 
 /// The table: case, factors, verdict, margins, figures.
 fn results_table(campaign: &Campaign, results: &[CaseResult]) -> Table {
+    let [identity, verdict, figures] = COLUMNS.map(|columns| {
+        columns.iter().map(|&(name, unit, about, values)| Column::new(name, unit, about, values(results)))
+    });
     let rows = Rows(results);
-    let identity = [
-        rows.whole("case", "place in the campaign", |result| result.number as i64),
-        rows.words("id", "identity by content", |result| &result.id),
-        rows.whole("more_seed", "added to the seed of the scenario", |result| result.more_seed as i64),
-    ];
-    let verdict = [
-        rows.words("verdict", "verdict in a word", |result| &result.word),
-        rows.whole("exit_code", "verdict as exit code", |result| result.exit_code.into()),
-        rows.words("reason", "reason of the verdict", |result| &result.reason),
-        rows.words("digest", "what the rig did", |result| &result.digest),
-        rows.numbers("took_s", "s", "time that the case took", |result| Some(result.took_s)),
-    ];
-    let figures = [
-        rows.numbers("incisal_rms_mm", "mm", "error of the incisal point, root mean square", |result| {
-            result.incisal_rms_mm
-        }),
-        rows.numbers("incisal_max_mm", "mm", "largest error of the incisal point", |result| {
-            result.incisal_max_mm
-        }),
-        rows.numbers("rotation_max_deg", "deg", "largest error of the rotation", |result| {
-            result.rotation_max_deg
-        }),
-        rows.numbers("bite_force_max_n", "N", "greatest bite force", |result| result.bite_force_max_n),
-    ];
     let factors = campaign.file.factors.iter().enumerate().map(|(at, factor)| rows.factor(at, factor));
     let checks = names(results).into_iter().flat_map(|name| rows.check_columns(&name));
-    let columns = identity.into_iter().chain(factors).chain(verdict).chain(checks).chain(figures);
-    Table::new(columns.collect())
+    Table::new(identity.chain(factors).chain(verdict).chain(checks).chain(figures).collect())
 }
 
 /// Makes the columns of a table whose rows are the results.
@@ -210,19 +188,6 @@ fn results_table(campaign: &Campaign, results: &[CaseResult]) -> Table {
 struct Rows<'a>(&'a [CaseResult]);
 
 impl<'a> Rows<'a> {
-    fn numbers(self, name: &str, unit: &str, about: &str, of: impl Fn(&CaseResult) -> Option<f64>) -> Column {
-        Column::new(name, unit, about, Values::Numbers(self.0.iter().map(of).collect()))
-    }
-
-    fn whole(self, name: &str, about: &str, of: impl Fn(&CaseResult) -> i64) -> Column {
-        Column::new(name, "", about, Values::Whole(self.0.iter().map(|result| Some(of(result))).collect()))
-    }
-
-    fn words(self, name: &str, about: &str, of: impl Fn(&'a CaseResult) -> &'a String) -> Column {
-        let words = self.0.iter().map(|result| Some(of(result).clone()));
-        Column::new(name, "", about, Values::Words(words.collect()))
-    }
-
     /// Numbers where all values of the factor are numbers, otherwise words.
     fn factor(self, at: usize, factor: &Factor) -> Column {
         let settings = || self.0.iter().map(|result| &result.settings[at]);

@@ -26,36 +26,21 @@ const SCENARIO: &str = "scenario.toml";
 /// Why the folder of a campaign cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
-    /// It is that of another campaign.
-    #[error("{} belongs to another campaign: {difference}; choose another --out", path.display())]
-    OfAnother {
-        /// The folder.
-        path: PathBuf,
-        /// What differs.
-        difference: &'static str,
-    },
+    /// It is that of another campaign, which differs in this.
+    #[error("{} belongs to another campaign: {}; choose another --out", .0.display(), .1)]
+    OfAnother(PathBuf, &'static str),
     /// A process runs this campaign.
     #[error("another masseter runs the campaign in {}", .0.display())]
     InUse(PathBuf),
     /// It holds files, but no campaign.
     #[error("{} exists and is no folder of a campaign; choose another --out", .0.display())]
     NoCampaign(PathBuf),
-    /// A file in it has been damaged.
-    #[error("{}: {reason}; remove its folder, and the rest goes on", path.display())]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        reason: String,
-    },
-    /// The system refuses an operation.
-    #[error("{}: {error}", path.display())]
-    System {
-        /// The file or folder.
-        path: PathBuf,
-        /// The error of the operating system.
-        error: io::Error,
-    },
+    /// A file in it has been damaged, for this reason.
+    #[error("{}: {}; remove its folder, and the rest goes on", .0.display(), .1)]
+    Damaged(PathBuf, String),
+    /// The system refuses an operation on a file or folder in it.
+    #[error("{}: {}", .0.display(), .1)]
+    System(PathBuf, io::Error),
 }
 
 /// A campaign on the disk.
@@ -108,11 +93,6 @@ impl CampaignFolder {
         Ok((folder, campaign))
     }
 
-    /// The folder itself.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
     /// Another file of this name.
     pub fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)
@@ -155,10 +135,8 @@ impl CampaignFolder {
     }
 
     fn refuse_another(&self, campaign: &Campaign) -> Result<(), FolderError> {
-        match self.read_plan()?.difference_to(campaign) {
-            Some(difference) => Err(FolderError::OfAnother { path: self.path.clone(), difference }),
-            None => Ok(()),
-        }
+        let difference = self.read_plan()?.difference_to(campaign);
+        difference.map_or(Ok(()), |words| Err(FolderError::OfAnother(self.path.clone(), words)))
     }
 
     fn read_plan(&self) -> Result<Campaign, FolderError> {
@@ -176,11 +154,11 @@ impl CampaignFolder {
     }
 
     fn plan_path(&self) -> PathBuf {
-        self.path.join(PLAN)
+        self.file(PLAN)
     }
 
     fn cases_path(&self) -> PathBuf {
-        self.path.join(CASES)
+        self.file(CASES)
     }
 }
 
@@ -249,15 +227,13 @@ fn read_result(path: &Path) -> Result<CaseResult, FolderError> {
 
 fn read_json<T: DeserializeOwned>(path: &Path, what: &str) -> Result<T, FolderError> {
     let text = read_text(path, MOST_KEPT_BYTES).map_err(system(path))?;
-    serde_json::from_str(&text).map_err(|error| FolderError::Damaged {
-        path: path.to_owned(),
-        reason: format!("it is no {what}: {error}"),
-    })
+    serde_json::from_str(&text)
+        .map_err(|error| FolderError::Damaged(path.to_owned(), format!("it is no {what}: {error}")))
 }
 
 fn system(path: &Path) -> impl FnOnce(io::Error) -> FolderError {
     let path = path.to_owned();
-    |error| FolderError::System { path, error }
+    |error| FolderError::System(path, error)
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ mod shrink;
 
 pub use campaign::{Campaign, CampaignFile, FileError, Sampler, StopRules, digest_of_program};
 pub use case::{Case, CaseCheck, CaseResult};
-pub use factor::{Distribution, Factor, FactorError, Setting};
+pub use factor::{Distribution, Factor, Setting};
 pub use fault_matrix::{Coverage, FaultRow, fault_matrix_in_words, write_fault_matrix};
 pub use files::write;
 pub use folder::{Attempt, CampaignFolder, CampaignLock, FolderError};
