@@ -20,6 +20,7 @@ mod fault_table;
 mod force_control;
 mod foxglove_layout;
 mod golden;
+mod interface;
 mod interrupts;
 mod kinematics;
 mod liars;

@@ -1,16 +1,19 @@
-//! `masseter interface`: the messages and codes between the rig and a controller in other languages, from the one
-//! table of the messages. Frames and counters are not among them, since no controller uses them.
+//! The messages and codes between the rig and a controller in C and Python, made from the one table of the messages: the
+//! files that users include, and that `masseter interface` prints. Frames and counters are not among them, since no
+//! controller uses them.
 
 use std::fmt::Write;
+use std::fs;
+use std::path::Path;
 
-use clap::{Args, ValueEnum};
 use masseter_runtime::messages::codes::{
     Cause, ControllerState, DriveRequest, DriveState, EventKind, NO_AXIS, NO_DRIVE_STATE, NoPose, Source,
 };
 use masseter_runtime::messages::{
     Command, Contact, Event, Field, LAYOUT_VERSION, Message, Reading, State, Truth, plain,
 };
-use masseter_terminal::{Exit, result};
+
+use crate::common::{masseter, stdout};
 
 /// A machine that lays structures out otherwise cannot use them.
 const PYTHON_CHECK: &str = r#"
@@ -20,35 +23,6 @@ def _check(layout: type[ctypes.Structure], size: int, offsets: list[int]) -> Non
     if ctypes.sizeof(layout) != size or found != offsets:
         raise ImportError(f"{layout.__name__} has another layout on this machine: {found}, expected {offsets}")
 "#;
-
-/// The arguments of `interface`.
-#[derive(Debug, Clone, Args)]
-#[command(after_help = "Example:\n  masseter interface c > masseter_messages.h")]
-pub(crate) struct InterfaceArgs {
-    /// Language
-    #[arg(value_enum)]
-    language: Language,
-}
-
-/// A language with generated types.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Language {
-    /// C header, for C++ too
-    C,
-    /// Python module: ctypes, NumPy types, enumerations
-    Python,
-}
-
-/// Prints the types.
-pub(crate) fn interface(args: &InterfaceArgs) -> anyhow::Result<Exit> {
-    let (layouts, enumerations) = (layouts(), enumerations());
-    let text = match args.language {
-        Language::C => c_header(&layouts, &enumerations),
-        Language::Python => python_module(&layouts, &enumerations),
-    };
-    result(&text)?;
-    Ok(Exit::Passed)
-}
 
 /// A message as other languages need it.
 struct Layout {
@@ -257,39 +231,35 @@ fn python_ctype(LayoutField { element, count, .. }: &LayoutField) -> String {
     count.map_or_else(|| element.clone(), |count| format!("{element} * {count}"))
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The copies that users include are those of this version.
-    #[test]
-    fn the_kept_copies_are_what_the_table_of_messages_gives() {
-        let (layouts, enumerations) = (layouts(), enumerations());
-        let header = include_str!("../../../rig/bindings/interface/masseter_messages.h");
-        let is_kept = header == c_header(&layouts, &enumerations);
-        assert!(is_kept, "cargo run -- interface c > rig/bindings/interface/masseter_messages.h");
-        let module = include_str!("../../../rig/bindings/python/masseter/messages.py");
-        let is_kept = module == python_module(&layouts, &enumerations);
-        assert!(is_kept, "cargo run -- interface python > rig/bindings/python/masseter/messages.py");
-    }
-
-    #[test]
-    fn every_field_has_a_meaning_and_the_fields_fill_the_message() {
-        for layout in layouts() {
-            let mut end = 0;
-            for field in &layout.fields {
-                assert!(
-                    !field.about.is_empty() && !field.about.contains('['),
-                    "{}: {}",
-                    field.name,
-                    field.about
-                );
-                assert_eq!(field.offset, end, "{}.{}", layout.name, field.name);
-                let bytes =
-                    field.element.trim_start_matches(char::is_alphabetic).parse::<usize>().unwrap() / 8;
-                end += bytes * field.count.unwrap_or(1);
-            }
-            assert_eq!(end, layout.size, "{}", layout.name);
+/// With RENEW_INTERFACE=1, the files are written instead.
+#[test]
+fn the_files_that_users_include_are_what_the_table_of_messages_gives() {
+    let (layouts, enumerations) = (layouts(), enumerations());
+    for (language, file, text) in [
+        ("c", "rig/bindings/interface/masseter_messages.h", c_header(&layouts, &enumerations)),
+        ("python", "rig/bindings/python/masseter/messages.py", python_module(&layouts, &enumerations)),
+    ] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
+        if std::env::var_os("RENEW_INTERFACE").is_some() {
+            fs::write(path, text).unwrap();
+            continue;
         }
+        let is_made = fs::read_to_string(path).unwrap() == text;
+        assert!(is_made, "{file} is old: RENEW_INTERFACE=1 cargo test --test rig interface");
+        assert!(stdout(&masseter(&["interface", language])) == text, "{language}: another file is printed");
+    }
+}
+
+#[test]
+fn every_field_has_a_meaning_and_the_fields_fill_the_message() {
+    for layout in layouts() {
+        let mut end = 0;
+        for field in &layout.fields {
+            assert!(!field.about.is_empty() && !field.about.contains('['), "{}: {}", field.name, field.about);
+            assert_eq!(field.offset, end, "{}.{}", layout.name, field.name);
+            let bytes = field.element.trim_start_matches(char::is_alphabetic).parse::<usize>().unwrap() / 8;
+            end += bytes * field.count.unwrap_or(1);
+        }
+        assert_eq!(end, layout.size, "{}", layout.name);
     }
 }
