@@ -3,10 +3,9 @@
 use std::net::{Ipv4Addr, SocketAddr};
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
-use std::time::{Duration, UNIX_EPOCH};
+use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use masseter_runtime::clock;
 use masseter_runtime::lifecycle::{Patience, ProcessArguments};
 
 use crate::run::request::{ControllerChoice, ControllerKind};
@@ -51,12 +50,6 @@ pub(crate) fn parse_controller(text: &str) -> Result<ControllerChoice, String> {
             Err(format!("use motion, hold, external, none, or the path of an executable file ({error})"))
         }
     }
-}
-
-/// The time as names of folders have it, such as 20260131T093000.000Z.
-pub(crate) fn time_in_names() -> String {
-    let time = humantime::format_rfc3339_millis(UNIX_EPOCH + clock::wall_time()).to_string();
-    time.replace([':', '-'], "")
 }
 
 /// The real CAN interface of each bus; none for simulated buses.

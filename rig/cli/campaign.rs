@@ -10,11 +10,11 @@ use masseter_campaign::{
     Search, StopRules, WorstCase,
 };
 use masseter_plan::{Overrides, scenario_with_overrides};
+use masseter_recording::time_in_names;
 use masseter_scenario::wording::counted;
 use masseter_table::{Format, ParquetProgram};
 use masseter_terminal::{Exit, Failure, OrFailure, result, status};
 
-use super::arguments::time_in_names;
 use crate::run::interrupts::Interrupts;
 use crate::run::request::{ControllerChoice, ControllerKind};
 use crate::run::runner::{Runner, word};

@@ -4,13 +4,15 @@ use std::fs;
 use std::path::PathBuf;
 
 use anyhow::{Context, ensure};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
+use masseter_recording::time_in_names;
 use masseter_report::{JunitRun, junit_of_suite};
 use masseter_runtime::clock;
 use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, Failure, OrFailure, result, result_line, status};
 
-use super::arguments::{parse_controller, time_in_names};
+use super::arguments::parse_controller;
 use crate::BUILD;
 use crate::run::interrupts::Interrupts;
 use crate::run::request::{ClockKind, ControllerChoice};
@@ -27,8 +29,8 @@ pub(super) struct TestArgs {
     #[arg(required = true, value_name = "DIR|FILE")]
     paths: Vec<PathBuf>,
     /// Clock of the runs
-    #[arg(long, value_enum, default_value_t)]
-    clock: TestClock,
+    #[arg(long, default_value = "virtual", value_parser = test_clocks())]
+    clock: ClockKind,
     /// Who controls the robot: motion, hold, or the path of your own program
     #[arg(
         long,
@@ -55,26 +57,16 @@ pub(super) struct TestArgs {
     out: Option<PathBuf>,
 }
 
-/// The clock of the runs of a suite.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-enum TestClock {
-    /// Virtual time, on all cores; what needs processes runs in lockstep
-    #[default]
-    Virtual,
-    /// Simulated time in three processes, one scenario after the other
-    Lockstep,
-    /// Real time, one scenario after the other
-    Rt,
-}
-
-impl From<TestClock> for ClockKind {
-    fn from(clock: TestClock) -> Self {
-        match clock {
-            TestClock::Virtual => Self::Virtual,
-            TestClock::Lockstep => Self::Lockstep,
-            TestClock::Rt => Self::Rt,
-        }
-    }
+/// The clocks of a suite: all that a run can have, but for the choice by the machine.
+fn test_clocks() -> impl TypedValueParser<Value = ClockKind> {
+    PossibleValuesParser::new([
+        PossibleValue::new("virtual")
+            .help("Virtual time, on all cores; what needs processes runs in lockstep"),
+        PossibleValue::new("lockstep")
+            .help("Simulated time in three processes, one scenario after the other"),
+        PossibleValue::new("rt").help("Real time, one scenario after the other"),
+    ])
+    .map(|name| ClockKind::from_str(&name, false).expect("each is the name of a clock"))
 }
 
 /// Runs the suite; [`Exit::Passed`] only if every scenario passed.
@@ -87,7 +79,7 @@ pub(super) fn test(args: &TestArgs) -> Result<Exit, Failure> {
     result_line!("\nrunning {}", counted(chosen.len() as u64, "test")).incomplete()?;
     let suite = Suite {
         runner: Runner { controller: &args.controller, interrupts: &interrupts },
-        clock: args.clock.into(),
+        clock: args.clock,
         retries: args.retries,
         allow_untested: args.allow_untested,
         out: &out,

@@ -44,11 +44,16 @@ pub enum FolderError {
     New(#[from] OutputError),
 }
 
+/// The time as names of folders have it, such as 20260131T093000.000Z.
+pub fn time_in_names() -> String {
+    let time = humantime::format_rfc3339_millis(UNIX_EPOCH + clock::wall_time()).to_string();
+    time.replace([':', '-'], "")
+}
+
 impl RunFolder {
     /// Creates `<parent>/<UTC time>-<name>/` and points `<parent>/latest` at it.
     pub fn create_in(parent: &Path, name: &str) -> Result<Self, FolderError> {
-        let time = humantime::format_rfc3339_millis(UNIX_EPOCH + clock::wall_time()).to_string();
-        let file_name = format!("{}-{name}", time.replace([':', '-'], ""));
+        let file_name = format!("{}-{name}", time_in_names());
         let folder = Self::create(&parent.join(&file_name))?;
         let latest = parent.join("latest");
         // A folder of the user under that name stays; the report names the run.

@@ -26,7 +26,7 @@ mod writer;
 pub use backlog::{Backlog, Pace, WriteOutcome};
 pub use columns::{Columns, Description, Field, Number};
 pub use encoding::{Channel, Encoded, Encoder, SCHEMA_ENCODING, definitions};
-pub use folder::{FolderError, RunFolder};
+pub use folder::{FolderError, RunFolder, time_in_names};
 pub use manifest::{
     DmaLatency, Ending, FullSpeed, Machine as MachineInfo, Manifest, ProcessFault, RunUsage, Usage,
 };
