@@ -8,6 +8,8 @@
 
 #[path = "architecture/circles.rs"]
 mod circles;
+#[path = "architecture/features.rs"]
+mod features;
 #[path = "architecture/impls.rs"]
 mod impls;
 #[path = "architecture/imports.rs"]
@@ -23,14 +25,34 @@ use std::fs;
 use std::path::Path;
 
 use circles::circles;
+use features::other_features;
 use impls::split_types;
-use layers::layer_violations;
+use layers::{dependencies_of, layer_violations};
 use orphans::orphans;
 
 #[test]
 fn crates_keep_their_layers() {
     let violations = layer_violations(project());
     assert!(violations.is_empty(), "\n{}", violations.join("\n"));
+}
+
+/// Frames, buses and emulated wires are of use without this rig: neither its mechanism, nor its scenarios, nor iceoryx2.
+#[test]
+fn the_crate_of_can_stands_alone() {
+    let used = dependencies_of(project(), "masseter-can");
+    assert_eq!(used, ["libc", "rand", "rand_pcg", "rustix", "socketcan", "thiserror"]);
+}
+
+#[test]
+fn the_command_and_its_bindings_share_the_compiled_crates_of_others() {
+    for binding in ["masseter-c", "masseter-python"] {
+        let differing = other_features(project(), binding);
+        assert!(
+            differing.is_empty(),
+            "ask for these in shared/features/Cargo.toml:\n{}",
+            differing.join("\n")
+        );
+    }
 }
 
 #[test]

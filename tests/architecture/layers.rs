@@ -6,11 +6,13 @@ use super::workspace::{list, metadata, text, within};
 
 /// The crates of the workspace that each crate may use, all by their folders. The root package may use all
 /// but the programs that a run does not need.
-const MAY_USE: [(&str, &[&str]); 26] = [
+const MAY_USE: [(&str, &[&str]); 27] = [
     ("shared/can", &[]),
     ("shared/model", &[]),
     ("shared/scenario", &["shared/can", "shared/model"]),
-    ("shared/runtime", &["shared/can", "shared/model", "shared/scenario"]),
+    // Asks for features of crates of others, and has no code.
+    ("shared/features", &[]),
+    ("shared/runtime", &["shared/can", "shared/features", "shared/model", "shared/scenario"]),
     // Stands in for a crate of crates.io.
     ("shared/no_bindgen", &[]),
     ("controller", &["shared/can", "shared/model", "shared/scenario", "shared/runtime"]),
@@ -159,4 +161,13 @@ pub(super) fn layer_violations(workspace: &Path) -> Vec<String> {
         }
     }
     violations
+}
+
+/// What a crate depends on outside of its tests.
+pub(super) fn dependencies_of(workspace: &Path, crate_name: &str) -> Vec<String> {
+    let metadata = metadata(workspace);
+    let mut packages = list(&metadata["packages"]).iter();
+    let package = packages.find(|package| package["name"] == crate_name).expect("a crate of the workspace");
+    let for_use = list(&package["dependencies"]).iter().filter(|dependency| dependency["kind"] != "dev");
+    for_use.map(|dependency| text(&dependency["name"]).to_owned()).collect()
 }

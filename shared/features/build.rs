@@ -1,0 +1,3 @@
+//! Nothing: without a build script, cargo leaves out what it depends on.
+
+fn main() {}
