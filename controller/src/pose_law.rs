@@ -3,9 +3,12 @@
 //! The sequence (enable, ease, run, hold, disable), kinematics, playback and every safety check stay with
 //! [`MotionController`](crate::motion_controller::MotionController), whatever the law is.
 
+use std::fmt;
+
 use masseter_model::geometry::{Pose, Vec3};
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::named::Declared;
+use nalgebra::{Quaternion, Translation3, Unit};
 
 /// What a pose law needs of a cycle. Poses are those of the platform in the base frame, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -122,4 +125,50 @@ pub trait PoseLaw: std::fmt::Debug {
 
     /// Writes the declared signals, also in cycles in which the law is not asked.
     fn fill_signals(&self, _signals: &mut [f64]) {}
+}
+
+/// A law that is one function: of a demand, the parameters in force, and the signals that it fills. Both are in the order of
+/// their declaration, and signals keep their values until they are filled again.
+pub struct FunctionLaw<F> {
+    declared: Declared,
+    parameters: Vec<f64>,
+    signals: Vec<f64>,
+    function: F,
+}
+
+impl<F: FnMut(&Demand, &[f64], &mut [f64]) -> Result<Pose, LawFailed>> FunctionLaw<F> {
+    /// The law with these signals and parameters.
+    pub fn new(declared: Declared, function: F) -> Self {
+        let (parameters, signals) = (vec![0.0; declared.parameters.len()], vec![0.0; declared.signals.len()]);
+        Self { declared, parameters, signals, function }
+    }
+}
+
+impl<F> fmt::Debug for FunctionLaw<F> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("FunctionLaw").field("declared", &self.declared).finish_non_exhaustive()
+    }
+}
+
+impl<F: FnMut(&Demand, &[f64], &mut [f64]) -> Result<Pose, LawFailed>> PoseLaw for FunctionLaw<F> {
+    fn command(&mut self, demand: &Demand) -> Result<Pose, LawFailed> {
+        (self.function)(demand, &self.parameters, &mut self.signals)
+    }
+
+    fn declared(&self) -> Declared {
+        self.declared.clone()
+    }
+
+    fn set_parameter(&mut self, place: usize, value: f64) {
+        self.parameters[place] = value;
+    }
+
+    fn fill_signals(&self, signals: &mut [f64]) {
+        signals.copy_from_slice(&self.signals);
+    }
+}
+
+/// The pose that a foreign law asks for, as it is: the controller refuses what is no pose.
+pub fn asked_pose(position_m: [f64; 3], [w, x, y, z]: [f64; 4]) -> Pose {
+    Pose::from_parts(Translation3::from(position_m), Unit::new_unchecked(Quaternion::new(w, x, y, z)))
 }

@@ -1,7 +1,7 @@
 //! The model against itself, the observer on a platform that swings, and feed-forward along simple ways.
 
 use masseter_model::geometry::{LEGS, MechanismConfig, Vec3};
-use masseter_scenario::DynamicsConfig;
+use masseter_scenario::{DynamicsConfig, FrictionModel};
 use nalgebra::UnitQuaternion;
 
 use super::*;
@@ -136,7 +136,8 @@ fn at_rest_the_legs_carry_the_weight_of_platform_and_rods() {
 
 #[test]
 fn friction_changes_its_sign_with_the_motion_and_mass_adds_with_the_acceleration() {
-    let frictionless = DynamicsConfig::default().without_friction();
+    let mut frictionless = DynamicsConfig::default();
+    frictionless.friction.model = FrictionModel::None;
     let none = Detour::default();
     let [up, down] =
         [0.05, -0.05].map(|speed| legs_n(offset_n(&DynamicsConfig::default(), speed, 0.0, &none)));

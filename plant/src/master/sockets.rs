@@ -86,7 +86,7 @@ pub(super) fn lock(interface: &str) -> Result<UnixDatagram, PlantError> {
         let interface = interface.to_owned();
         match error.kind() {
             ErrorKind::AddrInUse => PlantError::MasterHere(interface),
-            _ => OpenError::Os { interface, errno: error.raw_os_error().unwrap_or_default() }.into(),
+            _ => OpenError::Os(interface, error.raw_os_error().unwrap_or_default()).into(),
         }
     })
 }

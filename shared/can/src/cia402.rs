@@ -162,11 +162,8 @@ pub struct Statusword(pub u16);
 
 /// A statusword whose bits encode no state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("statusword {bits:04X}h encodes no state of CiA 402")]
-pub struct StatuswordError {
-    /// The statusword.
-    pub bits: u16,
-}
+#[error("statusword {0:04X}h encodes no state of CiA 402")]
+pub struct StatuswordError(pub u16);
 
 impl Statusword {
     /// The statusword of a state, all other bits 0.
@@ -196,7 +193,7 @@ impl Statusword {
     pub fn state(self) -> Result<DriveState, StatuswordError> {
         let mut patterns = PATTERNS.into_iter();
         let pattern = patterns.find(|&(mask, bits, _)| self.0 & mask == bits);
-        pattern.map(|(_, _, state)| state).ok_or(StatuswordError { bits: self.0 })
+        pattern.map(|(_, _, state)| state).ok_or(StatuswordError(self.0))
     }
 }
 

@@ -29,7 +29,7 @@ impl CanId {
     pub const fn standard(id: u16) -> Result<Self, FrameError> {
         let id = id as u32;
         if id > STANDARD_MAX {
-            return Err(FrameError::StandardId { id });
+            return Err(FrameError::StandardId(id));
         }
         Ok(Self { arbitration: id << (EXTENSION_BITS + 1) })
     }
@@ -40,7 +40,7 @@ impl CanId {
     /// [`FrameError::ExtendedId`] above 1FFFFFFFh.
     pub const fn extended(id: u32) -> Result<Self, FrameError> {
         if id > EXTENDED_MAX {
-            return Err(FrameError::ExtendedId { id });
+            return Err(FrameError::ExtendedId(id));
         }
         let base = id >> EXTENSION_BITS;
         Ok(Self { arbitration: base << (EXTENSION_BITS + 1) | IDE | id & EXTENSION_MASK })
@@ -55,7 +55,7 @@ impl CanId {
         match flagged {
             ..=STANDARD_MAX => Self::standard(flagged as u16),
             EXTENDED_FLAG.. => Self::extended(flagged & !EXTENDED_FLAG),
-            _ => Err(FrameError::StandardId { id: flagged }),
+            _ => Err(FrameError::StandardId(flagged)),
         }
     }
 
@@ -103,23 +103,14 @@ impl fmt::Debug for CanId {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum FrameError {
     /// More than 11 bits in a standard identifier.
-    #[error("identifier {id:X}h does not fit into 11 bits (at most 7FFh)")]
-    StandardId {
-        /// The identifier asked for.
-        id: u32,
-    },
+    #[error("identifier {0:X}h does not fit into 11 bits (at most 7FFh)")]
+    StandardId(u32),
     /// More than 29 bits in an extended identifier.
-    #[error("identifier {id:X}h does not fit into 29 bits (at most 1FFFFFFFh)")]
-    ExtendedId {
-        /// The identifier asked for.
-        id: u32,
-    },
+    #[error("identifier {0:X}h does not fit into 29 bits (at most 1FFFFFFFh)")]
+    ExtendedId(u32),
     /// More data than a classical frame carries.
-    #[error("{length} data bytes: a classical frame carries at most 8")]
-    DataLength {
-        /// Bytes asked for.
-        length: usize,
-    },
+    #[error("{0} data bytes: a classical frame carries at most 8")]
+    DataLength(usize),
 }
 
 /// A data frame.
@@ -153,7 +144,7 @@ impl Frame {
     pub fn new(id: CanId, data: &[u8]) -> Result<Self, FrameError> {
         let mut bytes = [0; Self::MAX_DATA];
         let length = data.len();
-        bytes.get_mut(..length).ok_or(FrameError::DataLength { length })?.copy_from_slice(data);
+        bytes.get_mut(..length).ok_or(FrameError::DataLength(length))?.copy_from_slice(data);
         Ok(Self { id, length: length as u8, bytes })
     }
 
@@ -181,7 +172,7 @@ impl Frame {
     /// [`FrameError::DataLength`] with more than 8 bytes.
     pub fn of_padded(id: CanId, length: usize, bytes: [u8; Self::MAX_DATA]) -> Result<Self, FrameError> {
         if length > Self::MAX_DATA {
-            return Err(FrameError::DataLength { length });
+            return Err(FrameError::DataLength(length));
         }
         let used = u64::MAX.unbounded_shr(8 * (Self::MAX_DATA - length) as u32);
         Ok(Self { id, length: length as u8, bytes: (u64::from_le_bytes(bytes) & used).to_le_bytes() })

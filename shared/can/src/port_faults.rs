@@ -16,11 +16,8 @@ const OFF_TEC: u16 = 256;
 
 /// A fault that no port can carry out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("fault {number}: a frame is corrupted on the wire; inject that into a simulated one")]
-pub struct NotByPort {
-    /// Its number.
-    pub number: usize,
-}
+#[error("fault {0}: a frame is corrupted on the wire; inject that into a simulated one")]
+pub struct NotByPort(pub usize);
 
 /// The faults of one port.
 ///
@@ -87,7 +84,7 @@ impl PortFaults {
         restart_after_ns: Option<u64>,
     ) -> Result<Self, NotByPort> {
         if let Some(fault) = faults.iter().find(|fault| fault.kind == FaultKind::Corrupt) {
-            return Err(NotByPort { number: fault.number });
+            return Err(NotByPort(fault.number));
         }
         let held = Vec::with_capacity(HELD);
         let faults = Faults::new(faults, seed);

@@ -42,11 +42,8 @@ pub enum Request {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum RequestError {
     /// No request of raw mode.
-    #[error("unknown command '{text}': expected open, rawmode, send or echo")]
-    Unknown {
-        /// The text between the brackets.
-        text: String,
-    },
+    #[error("unknown command '{0}': expected open, rawmode, send or echo")]
+    Unknown(String),
     /// The bytes sent are not as many as announced.
     #[error("data bytes announced: {announced}, sent: {sent}")]
     Length {
@@ -56,11 +53,8 @@ pub enum RequestError {
         sent: usize,
     },
     /// An identifier or a data byte is not a number.
-    #[error("'{text}' is no number in hexadecimal digits")]
-    Number {
-        /// The word.
-        text: String,
-    },
+    #[error("'{0}' is no number in hexadecimal digits")]
+    Number(String),
     /// The frame cannot exist.
     #[error(transparent)]
     Frame(#[from] FrameError),
@@ -130,7 +124,7 @@ fn parse_request(bytes: &[u8]) -> Result<Request, RequestError> {
         ["rawmode"] => Ok(Request::RawMode),
         ["echo"] => Ok(Request::Echo),
         ["send", id, length, ref data @ ..] => parse_send(id, length, data),
-        _ => Err(RequestError::Unknown { text: text.to_owned() }),
+        _ => Err(RequestError::Unknown(text.to_owned())),
     }
 }
 
@@ -147,7 +141,7 @@ fn parse_send(id: &str, length: &str, data: &[&str]) -> Result<Request, RequestE
 /// Clients need not write leading zeros, so that fewer digits than those of a 29-bit identifier mean one of 11 bits.
 fn parse_id(text: &str) -> Result<CanId, RequestError> {
     let number = parse_number(text)?;
-    let number = u32::try_from(number).map_err(|_| RequestError::Number { text: text.to_owned() })?;
+    let number = u32::try_from(number).map_err(|_| RequestError::Number(text.to_owned()))?;
     match text.len() {
         EXTENDED_DIGITS => Ok(CanId::extended(number & !EXTENDED_FLAG)?),
         _ => Ok(CanId::from_flagged(number)?),
@@ -158,7 +152,7 @@ fn parse_id(text: &str) -> Result<CanId, RequestError> {
 fn parse_number(text: &str) -> Result<u64, RequestError> {
     let is_number = text.chars().all(|digit| digit.is_ascii_hexdigit());
     let number = is_number.then(|| u64::from_str_radix(text, 16).ok()).flatten();
-    number.ok_or_else(|| RequestError::Number { text: text.to_owned() })
+    number.ok_or_else(|| RequestError::Number(text.to_owned()))
 }
 
 /// Writes a received frame. Its time keeps whole microseconds, as the format does.

@@ -88,11 +88,8 @@ pub struct ErrorReport {
 
 /// An error message of an unsupported class.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("error message {id:X}h is of an unsupported class")]
-pub struct ErrorReportError {
-    /// The identifier with its flag.
-    pub id: u32,
-}
+#[error("error message {0:X}h is of an unsupported class")]
+pub struct ErrorReportError(pub u32);
 
 impl ErrorReport {
     /// A report on a port of that status.
@@ -133,7 +130,7 @@ impl ErrorReport {
         } else if has(CAN_ERR_PROT) {
             ErrorKind::Bit
         } else {
-            return Err(ErrorReportError { id });
+            return Err(ErrorReportError(id));
         };
         Ok(Self { time_ns, port, kind, tec, rec })
     }
@@ -196,7 +193,7 @@ mod tests {
             assert_eq!(report.encode(), (id, data));
             assert_eq!(ErrorReport::decode(7, id, data), Ok(report));
         }
-        assert_eq!(ErrorReport::decode(7, 0x2000_0001, [0; 8]), Err(ErrorReportError { id: 0x2000_0001 }));
+        assert_eq!(ErrorReport::decode(7, 0x2000_0001, [0; 8]), Err(ErrorReportError(0x2000_0001)));
     }
 
     fn line(time_ns: u64, frame: Frame) -> String {

@@ -6,40 +6,35 @@ use crate::frame::{CanId, Frame};
 
 /// A bit rate that CAN does not have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("bit rate {bps} bit/s is outside classical CAN (1 to 1000000 bit/s)")]
-pub struct BitrateError {
-    /// Bit rate asked for, bit/s.
-    pub bps: u32,
-}
+#[error("bit rate {0} bit/s is outside classical CAN (1 to 1000000 bit/s)")]
+pub struct BitrateError(pub u32);
 
 /// Bit rate of a bus, bit/s.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Bitrate {
-    bps: u32,
-}
+pub struct Bitrate(u32);
 
 impl Bitrate {
     /// The fastest of classical CAN, 1 Mbit/s.
-    pub const MAX: Self = Self { bps: 1_000_000 };
+    pub const MAX: Self = Self(1_000_000);
     /// One bit a nanosecond, which no CAN has. A frame takes about 0.14 µs, so the time of a run is that of the software.
-    pub const IDEAL: Self = Self { bps: 1_000_000_000 };
+    pub const IDEAL: Self = Self(1_000_000_000);
 
     /// That many bits a second, 1 to 1 000 000.
     ///
     /// # Errors
     /// [`BitrateError`] for 0 and for more than 1 Mbit/s.
     pub const fn new(bps: u32) -> Result<Self, BitrateError> {
-        if bps == 0 || bps > Self::MAX.bps { Err(BitrateError { bps }) } else { Ok(Self { bps }) }
+        if bps == 0 || bps > Self::MAX.0 { Err(BitrateError(bps)) } else { Ok(Self(bps)) }
     }
 
     /// Bits a second.
     pub const fn bps(self) -> u32 {
-        self.bps
+        self.0
     }
 
     /// Duration of that many bits, rounded up, ns.
     pub const fn bits_to_ns(self, bits: u32) -> u64 {
-        (bits as u64 * 1_000_000_000).div_ceil(self.bps as u64)
+        (bits as u64 * 1_000_000_000).div_ceil(self.0 as u64)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Stimuli that the plant carries out: pushes on the jaw, food, payload.
 
-use masseter_scenario::{FoodConfig, Shape, StimulusConfig};
+use masseter_scenario::{FoodConfig, FrictionModel, Shape, StimulusConfig};
 
 use super::*;
 
@@ -13,7 +13,8 @@ fn stimulus() -> StimulusConfig {
 }
 
 fn bench_with(stimulus: StimulusConfig) -> (Bench, [f64; AXES]) {
-    let dynamics = Scenario::default().dynamics.without_friction();
+    let mut dynamics = Scenario::default().dynamics;
+    dynamics.friction.model = FrictionModel::None;
     let scenario = Scenario { stimulus: vec![stimulus], dynamics, ..Scenario::default() };
     scenario.validate().unwrap();
     let mut bench = Bench::new(&scenario);

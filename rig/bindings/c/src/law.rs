@@ -2,11 +2,10 @@
 
 use std::ffi::{c_int, c_void};
 
-use masseter_controller::pose_law::{Demand, LawFailed, PoseLaw};
+use masseter_controller::pose_law::{FunctionLaw, LawFailed, PoseLaw, asked_pose};
 use masseter_model::geometry::Pose;
 use masseter_runtime::messages::pose_fields;
 use masseter_runtime::named::Declared;
-use nalgebra::{Quaternion, Translation3, Unit};
 
 /// A pose: position in the base frame, m, and unit quaternion.
 #[repr(C)]
@@ -16,7 +15,7 @@ pub struct MasseterPose {
     quaternion_wxyz: [f64; 4],
 }
 
-/// A [`Demand`].
+/// A [`Demand`](masseter_controller::pose_law::Demand).
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MasseterDemand {
@@ -39,24 +38,9 @@ const _: () = assert!(size_of::<MasseterPose>() == 56 && size_of::<MasseterDeman
 pub(crate) type LawFunction =
     unsafe extern "C" fn(*const MasseterDemand, *mut MasseterPose, *mut c_void) -> c_int;
 
-#[derive(Debug)]
-pub(crate) struct CLaw {
-    function: LawFunction,
-    user: *mut c_void,
-    declared: Declared,
-    parameters: Vec<f64>,
-    signals: Vec<f64>,
-}
-
-impl CLaw {
-    pub(crate) fn new(function: LawFunction, user: *mut c_void, declared: Declared) -> Self {
-        let (parameters, signals) = (vec![0.0; declared.parameters.len()], vec![0.0; declared.signals.len()]);
-        Self { function, user, declared, parameters, signals }
-    }
-}
-
-impl PoseLaw for CLaw {
-    fn command(&mut self, demand: &Demand) -> Result<Pose, LawFailed> {
+/// The law that calls a function of C.
+pub(crate) fn law_of_c(function: LawFunction, user: *mut c_void, declared: Declared) -> impl PoseLaw {
+    FunctionLaw::new(declared, move |demand, parameters, signals| {
         let mut asked = MasseterPose::from(&demand.ahead);
         let demand = MasseterDemand {
             cycle: demand.cycle,
@@ -67,37 +51,18 @@ impl PoseLaw for CLaw {
             desired: (&demand.desired).into(),
             estimated: demand.estimated.as_ref().map(MasseterPose::from).unwrap_or_default(),
             ahead: asked,
-            parameters: self.parameters.as_ptr(),
-            signals: self.signals.as_mut_ptr(),
+            parameters: parameters.as_ptr(),
+            signals: signals.as_mut_ptr(),
         };
         // SAFETY: the caller of masseter_run passes a function and its argument that are valid until it returns.
-        let failed = unsafe { (self.function)(&raw const demand, &raw mut asked, self.user) };
-        if failed == 0 { Ok(asked.into()) } else { Err(LawFailed) }
-    }
-
-    fn declared(&self) -> Declared {
-        self.declared.clone()
-    }
-
-    fn set_parameter(&mut self, place: usize, value: f64) {
-        self.parameters[place] = value;
-    }
-
-    fn fill_signals(&self, signals: &mut [f64]) {
-        signals.copy_from_slice(&self.signals);
-    }
+        let failed = unsafe { function(&raw const demand, &raw mut asked, user) };
+        if failed == 0 { Ok(asked_pose(asked.position_m, asked.quaternion_wxyz)) } else { Err(LawFailed) }
+    })
 }
 
 impl From<&Pose> for MasseterPose {
     fn from(pose: &Pose) -> Self {
         let (position_m, quaternion_wxyz) = pose_fields(pose);
         Self { position_m, quaternion_wxyz }
-    }
-}
-
-impl From<MasseterPose> for Pose {
-    /// As it is: the controller refuses what is no pose.
-    fn from(MasseterPose { position_m, quaternion_wxyz: [w, x, y, z] }: MasseterPose) -> Self {
-        Pose::from_parts(Translation3::from(position_m), Unit::new_unchecked(Quaternion::new(w, x, y, z)))
     }
 }

@@ -20,7 +20,7 @@ use masseter_runtime::lifecycle::attach::attach;
 use masseter_runtime::messages::{Command, Event, Reading, State};
 use masseter_runtime::named::{Declared, Parameter, PlayedMotion, Signal};
 
-use law::{CLaw, LawFunction};
+use law::{LawFunction, law_of_c};
 
 const OK: c_int = 0;
 const TIMED_OUT: c_int = 1;
@@ -336,7 +336,7 @@ pub unsafe extern "C" fn masseter_run(
 ) -> c_int {
     guarded(|| {
         let session = session.ok_or(NULL)?;
-        let law = CLaw::new(law.ok_or(NULL)?, user, session.declared);
+        let law = law_of_c(law.ok_or(NULL)?, user, session.declared);
         let Stage::Attached(context) = session.stage else {
             let remedy = "the session is started already: call masseter_run instead of masseter_start";
             return Err(Failure::of(remedy));
@@ -353,12 +353,9 @@ pub unsafe extern "C" fn masseter_run(
 /// # Safety
 /// Each is null or ends with a zero.
 unsafe fn texts(given: [*const c_char; 3]) -> Result<[String; 3], Failure> {
-    let mut texts = [const { String::new() }; 3];
-    for (text, given) in texts.iter_mut().zip(given) {
-        // SAFETY: as this function's.
-        unsafe { text_of(given) }?.unwrap_or_default().clone_into(text);
-    }
-    Ok(texts)
+    // SAFETY: as this function's.
+    let [name, unit, about] = given.map(|text| unsafe { text_of(text) });
+    Ok([name?, unit?, about?].map(|text| text.unwrap_or_default().to_owned()))
 }
 
 /// A string of C; none for null.

@@ -4,14 +4,13 @@ use std::sync::mpsc;
 use std::thread;
 use std::time::Duration;
 
-use masseter_controller::pose_law::{Demand as RigDemand, LawFailed, PoseLaw};
+use masseter_controller::pose_law::{Demand as RigDemand, FunctionLaw, LawFailed, asked_pose};
 use masseter_controller::process::run_with_law;
 use masseter_model::geometry;
 use masseter_runtime::control::Outcome;
 use masseter_runtime::lifecycle::attach::attach;
 use masseter_runtime::messages::pose_fields;
 use masseter_runtime::named::{Declared, Parameter, Signal};
-use nalgebra::{Quaternion, Translation3, Unit};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -50,14 +49,6 @@ impl From<&geometry::Pose> for Pose {
     }
 }
 
-impl From<Pose> for geometry::Pose {
-    /// As it is: the controller refuses what is no pose.
-    fn from(Pose { position_m: (px, py, pz), quaternion_wxyz: (w, x, y, z) }: Pose) -> Self {
-        let rotation = Unit::new_unchecked(Quaternion::new(w, x, y, z));
-        geometry::Pose::from_parts(Translation3::new(px, py, pz), rotation)
-    }
-}
-
 /// What a pose law needs of a cycle.
 #[pyclass(frozen, get_all)]
 #[derive(Debug)]
@@ -73,21 +64,21 @@ pub(crate) struct Demand {
     signals: Py<PyDict>,
 }
 
-#[derive(Debug)]
+/// A function of Python, and what it gets and fills.
 struct PythonLaw {
     function: Py<PyAny>,
     declared: Declared,
     parameters: Py<PyDict>,
-    /// What the law fills.
     signals: Py<PyDict>,
-    filled: Vec<f64>,
-    /// Where the exception goes that ends the motion.
-    exception: mpsc::Sender<PyErr>,
 }
 
-impl PoseLaw for PythonLaw {
-    fn command(&mut self, demand: &RigDemand) -> Result<geometry::Pose, LawFailed> {
+impl PythonLaw {
+    /// The pose that the law returns; takes over the signals that the law fills.
+    fn ask(&self, demand: &RigDemand, parameters: &[f64], filled: &mut [f64]) -> PyResult<geometry::Pose> {
         Python::attach(|py| {
+            for (parameter, value) in self.declared.parameters.iter().zip(parameters) {
+                self.parameters.bind(py).set_item(&parameter.name, value)?;
+            }
             let demand = Demand {
                 cycle: demand.cycle,
                 period_s: demand.period_s,
@@ -99,42 +90,21 @@ impl PoseLaw for PythonLaw {
                 parameters: self.parameters.clone_ref(py),
                 signals: self.signals.clone_ref(py),
             };
-            self.asked_pose(py, demand).map_err(|error| {
-                // Nobody waits for it once the caller was interrupted.
-                let _ = self.exception.send(error);
-                LawFailed
-            })
+            let pose = self.function.call1(py, (demand,))?;
+            let pose: Pose = pose.extract(py).map_err(|_| failed("the law returned no masseter.Pose"))?;
+            let signals = self.signals.bind(py);
+            for (filled, signal) in filled.iter_mut().zip(&self.declared.signals) {
+                *filled = signals.as_any().get_item(&signal.name)?.extract()?;
+            }
+            if signals.len() > filled.len() {
+                return Err(failed(format!(
+                    "the law fills signals that are not declared: {}",
+                    signals.keys()
+                )));
+            }
+            let ((px, py, pz), (w, x, y, z)) = (pose.position_m, pose.quaternion_wxyz);
+            Ok(asked_pose([px, py, pz], [w, x, y, z]))
         })
-    }
-
-    fn declared(&self) -> Declared {
-        self.declared.clone()
-    }
-
-    fn set_parameter(&mut self, place: usize, value: f64) {
-        let name = &self.declared.parameters[place].name;
-        Python::attach(|py| self.parameters.bind(py).set_item(name, value))
-            .expect("a dictionary takes a text");
-    }
-
-    fn fill_signals(&self, signals: &mut [f64]) {
-        signals.copy_from_slice(&self.filled);
-    }
-}
-
-impl PythonLaw {
-    /// The pose that the law returns; keeps the signals that the law fills.
-    fn asked_pose(&mut self, py: Python<'_>, demand: Demand) -> PyResult<geometry::Pose> {
-        let pose = self.function.call1(py, (demand,))?;
-        let pose: Pose = pose.extract(py).map_err(|_| failed("the law returned no masseter.Pose"))?;
-        let signals = self.signals.bind(py);
-        for (filled, signal) in self.filled.iter_mut().zip(&self.declared.signals) {
-            *filled = signals.as_any().get_item(&signal.name)?.extract()?;
-        }
-        if signals.len() > self.filled.len() {
-            return Err(failed(format!("the law fills signals that are not declared: {}", signals.keys())));
-        }
-        Ok(pose.into())
     }
 }
 
@@ -183,9 +153,15 @@ pub(crate) fn control(
     for signal in &declared.signals {
         signals.set_item(&signal.name, 0.0)?;
     }
-    let filled = vec![0.0; declared.signals.len()];
     let (parameters, signals) = (PyDict::new(py).into(), signals.into());
-    let law = PythonLaw { function: law, declared, parameters, signals, filled, exception };
+    let python = PythonLaw { function: law, declared: declared.clone(), parameters, signals };
+    let law = FunctionLaw::new(declared, move |demand, parameters, signals| {
+        python.ask(demand, parameters, signals).map_err(|error| {
+            // Nobody waits for it once the caller was interrupted.
+            let _ = exception.send(error);
+            LawFailed
+        })
+    });
     // A thread of its own: real-time priority and core end with it.
     let running = thread::spawn(move || {
         let context = attach(rig.as_deref()).map_err(not_attached)?;

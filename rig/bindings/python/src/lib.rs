@@ -9,6 +9,7 @@ mod session;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use bytemuck::{AnyBitPattern, NoUninit, cast_slice, pod_read_unaligned};
 use masseter_controller::kinematics::ForwardTracker;
 use masseter_model::geometry::{self, AXES, Actuators, MechanismConfig};
 use masseter_recording::{ReadError, Reader, Topic};
@@ -72,57 +73,43 @@ impl Mechanism {
     /// Poses of rows of six positions.
     fn forward<'py>(&self, py: Python<'py>, positions: &[u8]) -> PyResult<Bound<'py, PyBytes>> {
         let mut tracker = ForwardTracker::new(self.0.clone());
-        let solved = py.detach(|| {
-            solve_rows(rows::<AXES>(positions), |axes| {
-                let solution = tracker.update(&Actuators::from_axes(axes));
-                let pose = solution.map_err(|error| error.to_string())?.pose;
-                let ([px, py, pz], [w, x, y, z]) = pose_fields(&pose);
-                Ok([px, py, pz, w, x, y, z])
-            })
-        });
-        rows_to_python(py, solved)
+        solve_rows(py, positions, |axes: [f64; AXES]| {
+            let solution = tracker.update(&Actuators::from_axes(axes));
+            let pose = solution.map_err(|error| error.to_string())?.pose;
+            let ([px, py, pz], [w, x, y, z]) = pose_fields(&pose);
+            Ok([px, py, pz, w, x, y, z])
+        })
     }
 
     /// Positions of rows of poses.
     fn inverse<'py>(&self, py: Python<'py>, poses: &[u8]) -> PyResult<Bound<'py, PyBytes>> {
-        let solved = py.detach(|| {
-            solve_rows(rows::<POSE>(poses), |[px, py, pz, quaternion @ ..]: [f64; POSE]| {
-                let norm = quaternion.iter().map(|part| part * part).sum::<f64>().sqrt();
-                if (norm - 1.0).abs() > 1e-6 {
-                    return Err(format!("the quaternion has the length {norm}, not 1"));
-                }
-                let pose = pose_from_fields([px, py, pz], quaternion);
-                let joints = self.0.inverse(&pose).map_err(|error| error.to_string())?;
-                Ok(joints.actuators.to_axes())
-            })
-        });
-        rows_to_python(py, solved)
+        solve_rows(py, poses, |[px, py, pz, quaternion @ ..]: [f64; POSE]| {
+            let norm = quaternion.iter().map(|part| part * part).sum::<f64>().sqrt();
+            if (norm - 1.0).abs() > 1e-6 {
+                return Err(format!("the quaternion has the length {norm}, not 1"));
+            }
+            let joints = self.0.inverse(&pose_from_fields([px, py, pz], quaternion));
+            Ok(joints.map_err(|error| error.to_string())?.actuators.to_axes())
+        })
     }
 }
 
-fn rows<const N: usize>(bytes: &[u8]) -> impl Iterator<Item = [f64; N]> {
-    let number = |bytes: &[u8]| f64::from_ne_bytes(bytes.try_into().expect("eight bytes"));
-    bytes
-        .chunks_exact(8 * N)
-        .map(move |row| std::array::from_fn(|index| number(&row[8 * index..8 * index + 8])))
-}
-
-/// The rows that `solve` gives, as bytes; or the first row that has none, and why.
-fn solve_rows<const N: usize, const M: usize>(
-    rows: impl Iterator<Item = [f64; N]>,
-    mut solve: impl FnMut([f64; N]) -> Result<[f64; M], String>,
-) -> Result<Vec<u8>, (usize, String)> {
-    let mut bytes = Vec::with_capacity(rows.size_hint().0 * 8 * M);
-    for (index, row) in rows.enumerate() {
-        let solved = solve(row).map_err(|error| (index, error))?;
-        bytes.extend(solved.iter().flat_map(|number| number.to_ne_bytes()));
-    }
-    Ok(bytes)
-}
-
-fn rows_to_python(py: Python<'_>, solved: Result<Vec<u8>, (usize, String)>) -> PyResult<Bound<'_, PyBytes>> {
-    let refused = |(row, error)| MasseterError::new_err(format!("row {row}: {error}"));
-    solved.map(|bytes| PyBytes::new(py, &bytes)).map_err(refused)
+/// The rows that `solve` makes of rows of numbers, while other threads of Python run. The error names the first row that has
+/// none.
+fn solve_rows<'py, const N: usize, const M: usize>(
+    py: Python<'py>,
+    rows: &[u8],
+    mut solve: impl FnMut([f64; N]) -> Result<[f64; M], String> + Send,
+) -> PyResult<Bound<'py, PyBytes>>
+where
+    [f64; N]: AnyBitPattern,
+    [f64; M]: NoUninit,
+{
+    let solved: Result<Vec<_>, _> = py.detach(|| {
+        let rows = rows.chunks_exact(size_of::<[f64; N]>()).map(pod_read_unaligned).enumerate();
+        rows.map(|(row, numbers)| solve(numbers).map_err(|error| format!("row {row}: {error}"))).collect()
+    });
+    Ok(PyBytes::new(py, cast_slice(&solved.map_err(failed)?)))
 }
 
 /// The messages of each topic that controllers use, in order, as the bytes of their structures; and whether the recording is

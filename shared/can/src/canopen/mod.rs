@@ -19,11 +19,8 @@ pub use sdo::{AbortCode, Expedited, SdoError, SdoRequest, SdoResponse, Segment};
 
 /// A number that is no node id.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{id} is no CANopen node id (1 to 127)")]
-pub struct NodeIdError {
-    /// The number.
-    pub id: u8,
-}
+#[error("{0} is no CANopen node id (1 to 127)")]
+pub struct NodeIdError(pub u8);
 
 /// A CANopen node id, 1 to 127.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -35,7 +32,7 @@ impl NodeId {
     /// # Errors
     /// [`NodeIdError`] outside 1 to 127.
     pub const fn new(id: u8) -> Result<Self, NodeIdError> {
-        if matches!(id, 1..=127) { Ok(Self(id)) } else { Err(NodeIdError { id }) }
+        if matches!(id, 1..=127) { Ok(Self(id)) } else { Err(NodeIdError(id)) }
     }
 
     /// The number, 1 to 127.
@@ -136,11 +133,8 @@ pub enum Cob {
 
 /// An identifier outside the supported part of the predefined connection set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("identifier {id} is not in the supported part of the predefined connection set")]
-pub struct CobError {
-    /// The identifier.
-    pub id: CanId,
-}
+#[error("identifier {0} is not in the supported part of the predefined connection set")]
+pub struct CobError(pub CanId);
 
 const NMT: u16 = 0x000;
 const SYNC: u16 = 0x080;
@@ -174,7 +168,7 @@ impl TryFrom<CanId> for Cob {
     type Error = CobError;
 
     fn try_from(id: CanId) -> Result<Self, CobError> {
-        let unknown = CobError { id };
+        let unknown = CobError(id);
         if id.is_extended() {
             return Err(unknown);
         }
@@ -260,7 +254,7 @@ mod tests {
             .filter(|&id| match Cob::try_from(id) {
                 Ok(cob) => CanId::from(cob) == id,
                 Err(error) => {
-                    assert_eq!(error, CobError { id });
+                    assert_eq!(error, CobError(id));
                     false
                 }
             })

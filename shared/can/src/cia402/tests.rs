@@ -93,8 +93,8 @@ fn a_state_survives_any_flags() {
 
 #[test]
 fn bits_of_no_state_are_refused() {
-    assert_eq!(Statusword(0x0001).state(), Err(StatuswordError { bits: 0x0001 }));
-    assert_eq!(StatuswordError { bits: 0x61 }.to_string(), "statusword 0061h encodes no state of CiA 402");
+    assert_eq!(Statusword(0x0001).state(), Err(StatuswordError(0x0001)));
+    assert_eq!(StatuswordError(0x61).to_string(), "statusword 0061h encodes no state of CiA 402");
 }
 
 #[test]

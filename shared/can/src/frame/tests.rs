@@ -26,8 +26,8 @@ fn extended(id: u32) -> CanId {
 
 #[test]
 fn an_identifier_that_is_too_large_is_refused_with_its_value() {
-    assert_eq!(CanId::standard(0x800), Err(FrameError::StandardId { id: 0x800 }));
-    assert_eq!(CanId::extended(0x2000_0000), Err(FrameError::ExtendedId { id: 0x2000_0000 }));
+    assert_eq!(CanId::standard(0x800), Err(FrameError::StandardId(0x800)));
+    assert_eq!(CanId::extended(0x2000_0000), Err(FrameError::ExtendedId(0x2000_0000)));
 }
 
 #[test]
@@ -60,12 +60,9 @@ fn id() -> CanId {
 fn a_frame_carries_at_most_eight_bytes() {
     for length in 0..=9 {
         let frame = Frame::new(id(), &vec![1; length]).map(|frame| frame.data().len());
-        assert_eq!(frame, if length <= 8 { Ok(length) } else { Err(FrameError::DataLength { length }) });
+        assert_eq!(frame, if length <= 8 { Ok(length) } else { Err(FrameError::DataLength(length)) });
     }
-    assert_eq!(
-        FrameError::DataLength { length: 9 }.to_string(),
-        "9 data bytes: a classical frame carries at most 8"
-    );
+    assert_eq!(FrameError::DataLength(9).to_string(), "9 data bytes: a classical frame carries at most 8");
 }
 
 #[test]
@@ -75,7 +72,7 @@ fn bytes_behind_the_length_are_no_data() {
         let expected = if length <= 8 {
             Frame::new(id(), &vec![0xA5; length])
         } else {
-            Err(FrameError::DataLength { length })
+            Err(FrameError::DataLength(length))
         };
         assert_eq!(frame, expected);
     }

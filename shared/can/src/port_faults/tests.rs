@@ -181,7 +181,7 @@ fn a_copy_without_room_does_not_fail_the_frame() {
 #[test]
 fn corruption_needs_a_wire() {
     let corrupt = Fault { kind: FaultKind::Corrupt, number: 5, ..FAULT };
-    assert_eq!(PortFaults::new(vec![FAULT, corrupt], 0, 1, None).unwrap_err(), NotByPort { number: 5 });
+    assert_eq!(PortFaults::new(vec![FAULT, corrupt], 0, 1, None).unwrap_err(), NotByPort(5));
 }
 
 #[test]

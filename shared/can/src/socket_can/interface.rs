@@ -14,18 +14,14 @@ const CAN_TYPE: u32 = 280;
 /// Flag of an interface that is up (`IFF_UP`).
 const UP: u32 = 1;
 
-/// Why an interface cannot be used.
+/// Why an interface, whose name comes first, cannot be used; with the number of the system's error.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum OpenError {
     /// The kernel has no CAN.
     #[error(
-        "{interface}: this kernel has no CAN (no AF_CAN); load its modules with 'modprobe can-raw', or use \
-         --can virtual"
+        "{0}: this kernel has no CAN (no AF_CAN); load its modules with 'modprobe can-raw', or use --can virtual"
     )]
-    NoCan {
-        /// The interface asked for.
-        interface: String,
-    },
+    NoCan(String),
     /// No CAN interface of that name.
     #[error("no CAN interface '{interface}'; there {}", existing(.there))]
     NoInterface {
@@ -35,31 +31,18 @@ pub enum OpenError {
         there: Vec<String>,
     },
     /// The interface is down.
-    #[error("{interface} is down; 'ip link set {interface} up type can bitrate …' brings it up")]
-    Down {
-        /// The interface.
-        interface: String,
-    },
+    #[error("{0} is down; 'ip link set {0} up type can bitrate …' brings it up")]
+    Down(String),
     /// The kernel forbids it.
     #[error(
-        "{interface}: no permission for raw CAN sockets ({}); run where the network namespace of the \
+        "{0}: no permission for raw CAN sockets ({error}); run where the network namespace of the \
          interface is yours, or as root",
-        io::Error::from_raw_os_error(*.errno)
+        error = io::Error::from_raw_os_error(*.1)
     )]
-    Forbidden {
-        /// The interface.
-        interface: String,
-        /// Error number of the operating system.
-        errno: i32,
-    },
+    Forbidden(String, i32),
     /// Anything else.
-    #[error("{interface} cannot be opened: {}", io::Error::from_raw_os_error(*.errno))]
-    Os {
-        /// The interface.
-        interface: String,
-        /// Error number of the operating system.
-        errno: i32,
-    },
+    #[error("{0} cannot be opened: {error}", error = io::Error::from_raw_os_error(*.1))]
+    Os(String, i32),
 }
 
 impl OpenError {
@@ -67,14 +50,14 @@ impl OpenError {
     pub(super) fn from_errno(interface: &str, errno: i32) -> Self {
         let interface = interface.to_owned();
         match errno {
-            libc::EAFNOSUPPORT | libc::EPROTONOSUPPORT => Self::NoCan { interface },
+            libc::EAFNOSUPPORT | libc::EPROTONOSUPPORT => Self::NoCan(interface),
             libc::ENODEV | libc::ENXIO => {
                 let there = Interface::list(Path::new("/"));
                 Self::NoInterface { interface, there: there.into_iter().map(|one| one.name).collect() }
             }
-            libc::ENETDOWN => Self::Down { interface },
-            libc::EPERM | libc::EACCES => Self::Forbidden { interface, errno },
-            _ => Self::Os { interface, errno },
+            libc::ENETDOWN => Self::Down(interface),
+            libc::EPERM | libc::EACCES => Self::Forbidden(interface, errno),
+            _ => Self::Os(interface, errno),
         }
     }
 }

@@ -38,8 +38,8 @@ impl Stuffer {
 fn durations_are_exact_at_one_megabit_and_rounded_up_elsewhere() {
     assert_eq!(Bitrate::MAX.bits_to_ns(135), 135_000);
     assert_eq!(Bitrate::new(300_000).unwrap().bits_to_ns(1), 3334);
-    assert_eq!(Bitrate::new(0), Err(BitrateError { bps: 0 }));
-    assert_eq!(Bitrate::new(1_000_001), Err(BitrateError { bps: 1_000_001 }));
+    assert_eq!(Bitrate::new(0), Err(BitrateError(0)));
+    assert_eq!(Bitrate::new(1_000_001), Err(BitrateError(1_000_001)));
 }
 
 fn frame(id: u16, data: &[u8]) -> Frame {

@@ -1,4 +1,4 @@
-//! Rigid-body dynamics of the mechanism in closed form: forward, inverse, energy, and the reactions in its joints.
+//! Rigid-body dynamics of the mechanism in closed form: forward, inverse, and the reactions in its joints.
 //!
 //! The [bodies](Bodies) are, in each leg, a carriage on the slide, a cylinder that turns with the hinge, and a rod that
 //! slides in the cylinder and ends in the ball; and the platform with the lower jaw. With V the platform's twist, τ the
@@ -45,7 +45,7 @@ mod equations;
 mod friction;
 mod parameters;
 
-pub use bodies::{Bodies, Energy, JointAccelerations, Link, Motion, Platform};
+pub use bodies::{Bodies, JointAccelerations, Link, Motion, Platform};
 pub use equations::{Equations, JointWrench, LegReactions, Reactions};
 pub use friction::{Friction, Loads};
 pub use parameters::{AxesConfig, DynamicsConfig, FrictionConfig, FrictionModel};

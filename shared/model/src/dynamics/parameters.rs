@@ -114,10 +114,4 @@ section! {
 impl DynamicsConfig {
     /// Valid integration steps: short enough for the stiffest parts, long enough for the computing time, ns.
     pub const STEPS_NS: RangeInclusive<u64> = 10_000..=250_000;
-
-    /// The same mechanism without friction.
-    #[must_use]
-    pub fn without_friction(self) -> Self {
-        Self { friction: FrictionConfig { model: FrictionModel::None, ..self.friction }, ..self }
-    }
 }

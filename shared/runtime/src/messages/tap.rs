@@ -95,13 +95,13 @@ mod tests {
     #[test]
     fn what_is_no_frame_is_refused() {
         let tap = FrameTap { data: of_length(9), ..Default::default() };
-        assert_eq!(decode(&tap), Err(FrameError::DataLength { length: 9 }.into()));
+        assert_eq!(decode(&tap), Err(FrameError::DataLength(9).into()));
         let tap = FrameTap { data: of_length(65), ..Default::default() };
-        assert_eq!(decode(&tap), Err(FrameError::DataLength { length: 65 }.into()));
+        assert_eq!(decode(&tap), Err(FrameError::DataLength(65).into()));
         let tap = FrameTap { id: 0x800, ..Default::default() };
-        assert_eq!(decode(&tap), Err(FrameError::StandardId { id: 0x800 }.into()));
+        assert_eq!(decode(&tap), Err(FrameError::StandardId(0x800).into()));
         let tap = FrameTap { id: ERROR_FLAG, ..Default::default() };
-        assert_eq!(decode(&tap), Err(ErrorReportError { id: ERROR_FLAG }.into()));
+        assert_eq!(decode(&tap), Err(ErrorReportError(ERROR_FLAG).into()));
     }
 
     #[test]

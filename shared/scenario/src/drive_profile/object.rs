@@ -130,7 +130,7 @@ impl From<ObjectKey> for String {
 pub(super) fn add_dcf_objects(objects: &mut BTreeMap<ObjectKey, ObjectConfig>, path: &Path) -> Checked {
     let dcf = Dcf::parse(&read_limited(path, MOST_BYTES)?).map_err(|error| ScenarioError::Malformed {
         place: format!("{}:{}", path.display(), error.line),
-        reason: error.problem.to_string(),
+        reason: error.problem,
     })?;
     for (address, object) in objects_of(&dcf) {
         objects.entry(ObjectKey(address)).or_insert(object);

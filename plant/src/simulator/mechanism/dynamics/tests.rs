@@ -1,10 +1,14 @@
 //! Laws of mechanics that the dynamics keep.
 
-use masseter_model::dynamics::Energy;
 use masseter_model::geometry::MechanismConfig;
 use masseter_scenario::{AxesConfig, FrictionConfig, FrictionModel};
 
 use super::*;
+
+#[path = "../../../../../shared/model/tests/energy/mod.rs"]
+mod energy;
+
+use energy::Energy;
 
 fn at_rest(config: &DynamicsConfig) -> Dynamics {
     let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
@@ -26,7 +30,8 @@ fn without_contact() -> Occlusion {
 /// Without friction, and with its end stops far away.
 fn free() -> DynamicsConfig {
     let axes = AxesConfig { stop_beyond_m: 0.1, ..AxesConfig::default() };
-    DynamicsConfig { axes, ..DynamicsConfig::default() }.without_friction()
+    let friction = FrictionConfig { model: FrictionModel::None, ..FrictionConfig::default() };
+    DynamicsConfig { axes, friction, ..DynamicsConfig::default() }
 }
 
 /// One step of the configured length.
@@ -215,7 +220,7 @@ mod reference {
     use std::fs;
     use std::path::{Path, PathBuf};
 
-    use masseter_model::dynamics::{Energy, Reactions};
+    use masseter_model::dynamics::Reactions;
     use masseter_runtime::messages::{pose_fields, pose_from_fields};
     use masseter_scenario::Scenario;
 

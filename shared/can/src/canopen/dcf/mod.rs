@@ -12,8 +12,8 @@ use super::{NodeId, ObjectAddress};
 mod tests;
 mod text;
 
-use text::Section;
-pub use text::{DataType, DcfError, Problem, Value};
+pub use text::{DataType, DcfError, Value};
+use text::{Field, Section};
 
 const VARIABLES: [u16; 4] = [0x2, 0x5, 0x6, 0x7];
 const COLLECTIONS: [u16; 2] = [0x8, 0x9];
@@ -54,7 +54,8 @@ impl Dcf {
                 dcf.add_object(index, section, &by_name)?;
             } else if let Some((index, subindex)) = sub_index(section.name) {
                 if !by_name.contains_key(&format!("{index:04x}")) {
-                    return Err(Problem::NoObject { index, subindex }.at(section.line));
+                    let of = format!("[{index:04X}sub{subindex:X}] has no section [{index:04X}]");
+                    return Err(section.refused(format!("{of} of its object; add it")));
                 }
                 dcf.add(Entry::read(section, ObjectAddress::new(index, subindex))?);
             }
@@ -96,7 +97,8 @@ impl Dcf {
         if VARIABLES.contains(&kind) {
             self.add(Entry::read(section, ObjectAddress::new(index, 0))?);
         } else if !COLLECTIONS.contains(&kind) {
-            return Err(Problem::UnknownObjectType { code: kind as u8 }.at(section.line));
+            let known = "2 (domain), 5, 6, 7 (variable), 8 (array), 9 (record)";
+            return Err(section.refused(format!("ObjectType={kind:#X} is none of {known}")));
         } else if let Some(count @ 1..) = section.number("CompactSubObj", 0xFE)? {
             self.add_compact(index, count as u8, section, by_name)?;
         }
@@ -129,7 +131,7 @@ impl Dcf {
             let key = subindex.to_string();
             let name = names.and_then(|names| names.get(&key)).map(|field| field.text.to_owned());
             let value = values.and_then(|values| values.get(&key));
-            let value = value.map(|field| Value::read(&key, field, common.data_type)).transpose()?;
+            let value = value.map(|field| Value::read(field, common.data_type)).transpose()?;
             self.add(Entry {
                 address: ObjectAddress::new(index, subindex),
                 name: name.unwrap_or_else(|| format!("{}{key}", common.name)),
@@ -242,15 +244,14 @@ impl Entry {
         let data_type = if may_omit("DataType") {
             DataType::DOMAIN
         } else {
-            DataType(section.require("DataType")?.number("DataType", u16::MAX)?)
+            DataType(section.require("DataType")?.number(u16::MAX)?)
         };
         let access = if may_omit("AccessType") {
             Access::ReadWrite
         } else {
-            let field = section.require("AccessType")?;
-            access_type(field.text).map_err(|problem| problem.at(field.line))?
+            access_type(section.require("AccessType")?)?
         };
-        let value = |key| section.get(key).map(|field| Value::read(key, field, data_type)).transpose();
+        let value = |key| section.get(key).map(|field| Value::read(field, data_type)).transpose();
         let is_mappable = section.number("PDOMapping", 1)? == Some(1);
         Ok(Self {
             address,
@@ -267,14 +268,14 @@ impl Entry {
     }
 }
 
-fn access_type(text: &str) -> Result<Access, Problem> {
-    Ok(match text.to_ascii_lowercase().as_str() {
+fn access_type(field: Field<'_>) -> Result<Access, DcfError> {
+    Ok(match field.text.to_ascii_lowercase().as_str() {
         "const" => Access::Constant,
         "ro" => Access::ReadOnly,
         "wo" => Access::WriteOnly,
         "rw" => Access::ReadWrite,
         "rwr" => Access::ReadWriteTpdo,
         "rww" => Access::ReadWriteRpdo,
-        _ => return Err(Problem::UnknownAccess { text: text.to_owned() }),
+        _ => return Err(field.refused("none of ro, wo, rw, rwr, rww, const")),
     })
 }

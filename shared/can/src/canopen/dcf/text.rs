@@ -13,9 +13,10 @@ pub(super) struct Section<'a> {
     keys: HashMap<String, Field<'a>>,
 }
 
-/// The value of a key.
+/// A key with its value, as written.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Field<'a> {
+    pub(super) key: &'a str,
     pub(super) text: &'a str,
     pub(super) line: usize,
 }
@@ -27,27 +28,32 @@ impl<'a> Section<'a> {
         let mut first_lines = HashMap::new();
         let text = text.strip_prefix('\u{FEFF}').unwrap_or(text);
         for (line, content) in (1..).zip(text.lines().map(str::trim)) {
+            let refuse = |problem| Err(DcfError { line, problem });
             if content.is_empty() || content.starts_with([';', '#']) {
                 continue;
             }
             if let Some(name) = content.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')) {
                 let name = name.trim();
                 if let Some(first) = first_lines.insert(name.to_ascii_lowercase(), line) {
-                    return Err(Problem::SecondSection { section: name.to_owned(), first }.at(line));
+                    return refuse(format!(
+                        "[{name}] occurs twice, first in line {first}; remove one of them"
+                    ));
                 }
                 sections.push(Self { name, line, keys: HashMap::new() });
                 continue;
             }
-            let Some((key, value)) = content.split_once('=') else {
-                return Err(Problem::NoEntry { text: content.to_owned() }.at(line));
+            let Some((key, text)) = content.split_once('=') else {
+                let remedy = "start a comment with a semicolon";
+                return refuse(format!("{content:?} is neither [section] nor key=value; {remedy}"));
             };
-            let (key, text) = (key.trim(), value.trim());
+            let (key, text) = (key.trim(), text.trim());
             let Some(section) = sections.last_mut() else {
-                return Err(Problem::OutsideSections { key: key.to_owned() }.at(line));
+                return refuse(format!("{key} stands before the first [section]"));
             };
-            let former = section.keys.insert(key.to_ascii_lowercase(), Field { text, line });
+            let former = section.keys.insert(key.to_ascii_lowercase(), Field { key, text, line });
             if let Some(Field { line: first, .. }) = former {
-                return Err(Problem::SecondKey { key: key.to_owned(), first }.at(line));
+                let remedy = "remove one of them";
+                return refuse(format!("{key} occurs twice in its section, first in line {first}; {remedy}"));
             }
         }
         Ok(sections)
@@ -60,33 +66,39 @@ impl<'a> Section<'a> {
 
     /// The number of a key that is no value of an entry, such as an object type; none if it is absent or empty.
     pub(super) fn number(&self, key: &str, highest: u16) -> Result<Option<u16>, DcfError> {
-        self.get(key).map(|field| field.number(key, highest)).transpose()
+        self.get(key).map(|field| field.number(highest)).transpose()
     }
 
     /// The value of a key that the section needs.
-    pub(super) fn require(&self, key: &'static str) -> Result<Field<'a>, DcfError> {
-        let missing = || Problem::Missing { section: self.name.to_owned(), key }.at(self.line);
-        self.get(key).ok_or_else(missing)
+    pub(super) fn require(&self, key: &str) -> Result<Field<'a>, DcfError> {
+        self.get(key).ok_or_else(|| self.refused(format!("[{}] has no {key}; add it", self.name)))
+    }
+
+    /// The section is wrong as a whole.
+    pub(super) fn refused(&self, problem: String) -> DcfError {
+        DcfError { line: self.line, problem }
     }
 }
 
 impl Field<'_> {
     /// A number of at most `highest`.
-    pub(super) fn number(self, key: &str, highest: u16) -> Result<u16, DcfError> {
-        let number = integer(self.text).ok_or_else(|| self.no_number(key))?;
-        Ok(self.within(key, number, (0, highest.into()))? as u16)
+    pub(super) fn number(self, highest: u16) -> Result<u16, DcfError> {
+        let number = integer(self.text).ok_or_else(|| self.no_number())?;
+        Ok(self.within(number, (0, highest.into()))? as u16)
     }
 
-    fn no_number(self, key: &str) -> DcfError {
-        Problem::NoNumber { key: key.to_owned(), text: self.text.to_owned() }.at(self.line)
+    /// The value is wrong.
+    pub(super) fn refused(self, reason: &str) -> DcfError {
+        DcfError { line: self.line, problem: format!("{}={} is {reason}", self.key, self.text) }
     }
 
-    fn within(self, key: &str, number: i128, (lowest, highest): (i128, i128)) -> Result<i128, DcfError> {
-        if (lowest..=highest).contains(&number) {
-            return Ok(number);
-        }
-        let (key, text) = (key.to_owned(), self.text.to_owned());
-        Err(Problem::OutOfRange { key, text, lowest, highest }.at(self.line))
+    fn no_number(self) -> DcfError {
+        self.refused("no number; write decimal, 0x hexadecimal, 0 octal or $NODEID+number")
+    }
+
+    fn within(self, number: i128, (lowest, highest): (i128, i128)) -> Result<i128, DcfError> {
+        let is_within = (lowest..=highest).contains(&number);
+        if is_within { Ok(number) } else { Err(self.refused(&format!("not within {lowest} to {highest}"))) }
     }
 }
 
@@ -116,27 +128,23 @@ impl Value {
     }
 
     /// Reads a value of a data type.
-    pub(super) fn read(key: &str, field: Field<'_>, data_type: DataType) -> Result<Self, DcfError> {
+    pub(super) fn read(field: Field<'_>, data_type: DataType) -> Result<Self, DcfError> {
         let Some((lowest, highest)) = data_type.range() else {
-            if data_type.is_real()
-                && let Ok(real) = field.text.parse()
-            {
-                return Ok(Self::Real(real));
-            }
-            return Ok(Self::Text(field.text.to_owned()));
+            let real = field.text.parse().ok().filter(|_| data_type.is_real());
+            return Ok(real.map_or_else(|| Self::Text(field.text.to_owned()), Self::Real));
         };
         let text = field.text.to_ascii_uppercase();
         if let Some((before, after)) = text.split_once(NODE_ID) {
             let base = beside_node_id(before.trim(), after.trim());
-            return base.map(Self::OfNode).ok_or_else(|| field.no_number(key));
+            return base.map(Self::OfNode).ok_or_else(|| field.no_number());
         }
-        let mut number = integer(field.text).ok_or_else(|| field.no_number(key))?;
+        let mut number = integer(field.text).ok_or_else(|| field.no_number())?;
         // A signed number may be written by its bits, in hexadecimal or octal.
         let modulus = highest - lowest + 1;
         if lowest < 0 && field.text.starts_with('0') && number > highest && number < modulus {
             number -= modulus;
         }
-        field.within(key, number, (lowest, highest)).map(Self::Number)
+        field.within(number, (lowest, highest)).map(Self::Number)
     }
 }
 
@@ -211,49 +219,6 @@ impl DataType {
 pub struct DcfError {
     /// Number of the line, from 1.
     pub line: usize,
-    /// What is wrong there.
-    pub problem: Problem,
-}
-
-/// What is wrong in a line.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[expect(missing_docs, reason = "the message of a variant has its fields")]
-pub enum Problem {
-    /// Neither a section, nor a key with a value, nor a comment.
-    #[error("{text:?} is neither [section] nor key=value; start a comment with a semicolon")]
-    NoEntry { text: String },
-    /// A value before the first section.
-    #[error("{key} stands before the first [section]")]
-    OutsideSections { key: String },
-    /// A section that occurred before.
-    #[error("[{section}] occurs twice, first in line {first}; remove one of them")]
-    SecondSection { section: String, first: usize },
-    /// A key that occurred in its section before.
-    #[error("{key} occurs twice in its section, first in line {first}; remove one of them")]
-    SecondKey { key: String, first: usize },
-    /// A section without a key that it needs.
-    #[error("[{section}] has no {key}; add it")]
-    Missing { section: String, key: &'static str },
-    /// A sub-index whose object has no section.
-    #[error("[{index:04X}sub{subindex:X}] has no section [{index:04X}] of its object; add it")]
-    NoObject { index: u16, subindex: u8 },
-    /// No number of CiA 306.
-    #[error("{key}={text} is no number; write decimal, 0x hexadecimal, 0 octal or $NODEID+number")]
-    NoNumber { key: String, text: String },
-    /// A number that its place or its data type cannot hold.
-    #[error("{key}={text} is not within {lowest} to {highest}")]
-    OutOfRange { key: String, text: String, lowest: i128, highest: i128 },
-    /// An access type that CiA 306 does not define.
-    #[error("AccessType={text} is none of ro, wo, rw, rwr, rww, const")]
-    UnknownAccess { text: String },
-    /// An object type without entries that could be read.
-    #[error("ObjectType={code:#X} is none of 2 (domain), 5, 6, 7 (variable), 8 (array), 9 (record)")]
-    UnknownObjectType { code: u8 },
-}
-
-impl Problem {
-    /// The problem in that line.
-    pub(super) const fn at(self, line: usize) -> DcfError {
-        DcfError { line, problem: self }
-    }
+    /// What is wrong there, with its remedy: for the person who corrects the file.
+    pub problem: String,
 }
