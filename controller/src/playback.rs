@@ -131,12 +131,12 @@ impl Playback {
 
     /// Sets the rate of the motion, 0 to 1.
     pub(crate) fn set_motion_rate(&mut self, rate: f64) {
-        self.tempo.set(rate);
+        self.tempo.target = rate;
     }
 
     /// Sets the share of the way from the motion's first pose that is played, 0 to 1.
     pub(crate) fn set_motion_amplitude(&mut self, amplitude: f64) {
-        self.amplitude.set(amplitude);
+        self.amplitude.target = amplitude;
     }
 
     /// The first pose of the motion.
@@ -295,11 +295,6 @@ impl Slew {
             (SPEED * way_m / left_m_s).max((moving + root) / (2.0 * left_m_s2))
         };
         (0..AXES).map(of_axis).fold(SHORTEST_S, f64::max).min(LONGEST_S)
-    }
-
-    /// Sets where it goes.
-    fn set(&mut self, target: f64) {
-        self.target = target;
     }
 
     /// Goes there at once.

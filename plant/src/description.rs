@@ -316,13 +316,15 @@ mod tests {
                     |value: &Option<dcf::Value>| value.as_ref().and_then(|v| v.number(settings.node));
                 let limits = entry.limits.map(|(lowest, highest)| (lowest.into(), highest.into()));
                 assert_eq!(number(&read.lowest).zip(number(&read.highest)), limits, "{at}");
-                let value = match entry.initial {
-                    Initial::Text(text) => text.as_bytes().to_vec(),
-                    _ => settings.objects.at(at.index, at.subindex).to_le_bytes()[..entry.kind.bytes()]
-                        .to_vec(),
-                };
                 let default = read.default.as_ref().unwrap();
-                assert_eq!(read.encode(default, settings.node), Some(value), "{at}");
+                if let Initial::Text(text) = entry.initial {
+                    assert_eq!(default, &dcf::Value::Text(text.to_owned()), "{at}");
+                } else {
+                    let written = settings.objects.at(at.index, at.subindex).to_le_bytes();
+                    let bytes = default.number(settings.node).unwrap().to_le_bytes();
+                    let length = entry.kind.bytes();
+                    assert_eq!(bytes[..length], written[..length], "{at}");
+                }
             }
         }
     }

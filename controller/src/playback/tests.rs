@@ -253,7 +253,7 @@ fn a_stop_during_changes_comes_to_rest_within_its_ramp_too() {
 #[test]
 fn the_whole_change_takes_its_time_and_ends_exactly() {
     let mut slew = Slew::of(2.0);
-    slew.set(0.0);
+    slew.target = 0.0;
     let steps = (1..10_000).find(|_| {
         slew.advance(PERIOD_S);
         slew.is_settled()
@@ -290,7 +290,7 @@ proptest! {
         let mut slew = Slew::of(1.0);
         let mut last = (slew.value, 0.0);
         for (target, steps) in targets {
-            slew.set(target);
+            slew.target = target;
             for _ in 0..steps {
                 slew.advance(PERIOD_S);
                 let per_s = (slew.value - last.0) / PERIOD_S;

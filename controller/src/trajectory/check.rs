@@ -70,7 +70,8 @@ pub fn check(
         velocity_m_s: [0.0; AXES],
         acceleration_m_s2: [0.0; AXES],
     };
-    let mut survey = Survey { mechanism, limits, period_s, last: Last::default(), report };
+    let [last_m, last_m_s] = [None; 2];
+    let mut survey = Survey { mechanism, limits, period_s, last_m, last_m_s, conditioning: None, report };
     for sample in 0..samples {
         let time_s = sample as f64 * period_s;
         survey.visit(&trajectory.pose(time_s)).map_err(|problem| {
@@ -81,21 +82,15 @@ pub fn check(
     Ok(survey.report)
 }
 
-/// What the last samples leave to the next.
-#[derive(Default)]
-struct Last {
-    axes_m: Option<[f64; AXES]>,
-    velocity_m_s: Option<[f64; AXES]>,
-    /// Of the last pose that needed one of its own.
-    conditioning: Option<Conditioning>,
-}
-
 /// The check under way: the last two samples, and the report so far.
 struct Survey<'a> {
     mechanism: &'a Mechanism,
     limits: &'a TrajectoryLimitsConfig,
     period_s: f64,
-    last: Last,
+    last_m: Option<[f64; AXES]>,
+    last_m_s: Option<[f64; AXES]>,
+    /// Of the last pose that needed one of its own.
+    conditioning: Option<Conditioning>,
     report: TrajectoryReport,
 }
 
@@ -103,11 +98,11 @@ impl Survey<'_> {
     fn visit(&mut self, pose: &Pose) -> Result<(), String> {
         let axes_m = self.visit_pose(pose)?;
         self.report.samples += 1;
-        let Some(last_m) = self.last.axes_m.replace(axes_m) else { return Ok(()) };
+        let Some(last_m) = self.last_m.replace(axes_m) else { return Ok(()) };
         let velocity_m_s = self.rates(&last_m, &axes_m);
         let limit = |axis| self.limits.velocity_m_s(axis);
         keep_largest(&velocity_m_s, &mut self.report.velocity_m_s, limit, ["move", "m/s", "velocity_m_s"])?;
-        let Some(last_m_s) = self.last.velocity_m_s.replace(velocity_m_s) else { return Ok(()) };
+        let Some(last_m_s) = self.last_m_s.replace(velocity_m_s) else { return Ok(()) };
         let acceleration_m_s2 = self.rates(&last_m_s, &velocity_m_s);
         let limit = |axis| self.limits.acceleration_m_s2(axis);
         let words = ["accelerate", "m/s²", "acceleration_m_s2"];
@@ -136,10 +131,10 @@ impl Survey<'_> {
 
     fn check_condition(&mut self, jacobian: &Jacobian) -> Result<(), String> {
         let limit = self.limits.max_condition;
-        if self.last.conditioning.is_some_and(|nearby| nearby.most(jacobian) <= limit) {
+        if self.conditioning.is_some_and(|nearby| nearby.most(jacobian) <= limit) {
             return Ok(());
         }
-        let condition = self.last.conditioning.insert(Conditioning::new(jacobian)).number();
+        let condition = self.conditioning.insert(Conditioning::new(jacobian)).number();
         if condition <= limit {
             return Ok(());
         }

@@ -127,8 +127,15 @@ struct Listed {
     fault: Fault,
     activations: u64,
     began_ns: Option<u64>,
-    is_begin_reported: bool,
-    is_end_reported: bool,
+    noted: Noted,
+}
+
+/// What the notes have said of a fault.
+#[derive(Debug, Clone, Copy)]
+enum Noted {
+    Nothing,
+    Begin,
+    End,
 }
 
 impl Listed {
@@ -144,13 +151,7 @@ impl Listed {
 impl Faults {
     /// These faults; the same seed makes the same choices.
     pub fn new(faults: Vec<Fault>, seed: u64) -> Self {
-        let listed = |fault| Listed {
-            fault,
-            activations: 0,
-            began_ns: None,
-            is_begin_reported: false,
-            is_end_reported: false,
-        };
+        let listed = |fault| Listed { fault, activations: 0, began_ns: None, noted: Noted::Nothing };
         Self { list: faults.into_iter().map(listed).collect(), seed }
     }
 
@@ -297,16 +298,13 @@ impl Faults {
         self.list.iter_mut().find_map(|listed| {
             let began_ns = listed.began_ns?;
             let Fault { number: fault, port, .. } = listed.fault;
-            if !listed.is_begin_reported {
-                listed.is_begin_reported = true;
-                return Some(FaultNote { time_ns: began_ns, fault, port, activations: 0, has_ended: false });
-            }
-            if !listed.is_end_reported && !listed.is_live(now_ns) {
-                listed.is_end_reported = true;
-                let activations = listed.activations;
-                return Some(FaultNote { time_ns: now_ns, fault, port, activations, has_ended: true });
-            }
-            None
+            let (noted, time_ns, activations) = match listed.noted {
+                Noted::Nothing => (Noted::Begin, began_ns, 0),
+                Noted::Begin if !listed.is_live(now_ns) => (Noted::End, now_ns, listed.activations),
+                Noted::Begin | Noted::End => return None,
+            };
+            listed.noted = noted;
+            Some(FaultNote { time_ns, fault, port, activations, has_ended: matches!(noted, Noted::End) })
         })
     }
 

@@ -157,11 +157,8 @@ impl BusPlan {
     /// # Errors
     /// [`Overload`], which shows the plan, where one does not.
     pub fn check(&self) -> Result<(), Overload> {
-        if self.messages.iter().all(PlannedMessage::fits) {
-            Ok(())
-        } else {
-            Err(Overload(Box::new(self.clone())))
-        }
+        let fits = self.messages.iter().all(PlannedMessage::fits);
+        if fits { Ok(()) } else { Err(Overload(Box::new(self.clone()))) }
     }
 }
 

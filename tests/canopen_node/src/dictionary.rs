@@ -29,7 +29,7 @@ impl Dictionary {
     pub(crate) fn new(dcf: &Dcf, node: NodeId) -> Self {
         let entry = |description: &dcf::Entry| {
             let zero = || vec![0; size(description).unwrap_or(0)];
-            let value = description.value().and_then(|value| description.encode(value, node));
+            let value = description.value().and_then(|value| encode(description, value, node));
             let value = value.unwrap_or_else(zero);
             let number = |limit: &Option<dcf::Value>| limit.as_ref().and_then(|limit| limit.number(node));
             let (lowest, highest) = (number(&description.lowest), number(&description.highest));
@@ -147,4 +147,35 @@ fn number(description: &dcf::Entry, bytes: &[u8]) -> i64 {
     let is_negative = description.data_type.is_signed() && bytes.last().is_some_and(|last| last & 0x80 != 0);
     let start = if is_negative { -1 } else { 0 };
     bytes.iter().take(8).rfold(start, |number, byte| number << 8 | i64::from(*byte))
+}
+
+/// The bytes of a value on the bus, little endian. None where the type and the value do not fit.
+fn encode(description: &dcf::Entry, value: &dcf::Value, node: NodeId) -> Option<Vec<u8>> {
+    match (value, size(description)) {
+        (dcf::Value::Real(real), Some(4)) => Some((*real as f32).to_le_bytes().to_vec()),
+        (dcf::Value::Real(real), _) => Some(real.to_le_bytes().to_vec()),
+        (dcf::Value::Text(text), None) => Some(text.as_bytes().to_vec()),
+        (value, Some(bytes)) => Some(value.number(node)?.to_le_bytes()[..bytes].to_vec()),
+        (dcf::Value::Number(_) | dcf::Value::OfNode(_), None) => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_has_the_bytes_that_the_bus_carries() {
+        let bytes = |data_type: &str, text: &str| {
+            let entry =
+                format!("ParameterName=Some\nAccessType=rw\nDataType={data_type}\nDefaultValue={text}");
+            let dcf = Dcf::parse(&format!("[2000]\n{entry}")).unwrap();
+            let entry = dcf.entries().next().unwrap();
+            encode(entry, entry.value().unwrap(), NodeId::new(5).unwrap()).unwrap()
+        };
+        assert_eq!(bytes("7", "$NODEID+0x180"), [0x85, 1, 0, 0]);
+        assert_eq!(bytes("2", "-3"), [0xFD]);
+        assert_eq!(bytes("9", "Kiefer"), b"Kiefer");
+        assert_eq!(bytes("8", "1.0"), [0, 0, 0x80, 0x3F]);
+    }
 }

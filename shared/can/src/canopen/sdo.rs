@@ -85,56 +85,6 @@ pub enum SdoRequest {
     },
 }
 
-impl SdoRequest {
-    const DOWNLOAD_SEGMENT: u8 = 0;
-    const INITIATE_DOWNLOAD: u8 = 1;
-    const INITIATE_UPLOAD: u8 = 2;
-    const UPLOAD_SEGMENT: u8 = 3;
-
-    /// The frame that carries the request to that node's server.
-    pub fn frame(self, node: NodeId) -> Frame {
-        Frame::fixed(Cob::SdoRequest(node).into(), self.encode())
-    }
-
-    /// The data bytes.
-    pub fn encode(self) -> [u8; LENGTH] {
-        match self {
-            Self::Download { object, data } => initiate(Self::INITIATE_DOWNLOAD, object, data.field()),
-            Self::InitiateDownload { object, size } => {
-                initiate(Self::INITIATE_DOWNLOAD, object, size_field(size))
-            }
-            Self::DownloadSegment { toggle, data, is_last } => {
-                segment(Self::DOWNLOAD_SEGMENT, toggle, data.field(is_last))
-            }
-            Self::InitiateUpload { object } => initiate(Self::INITIATE_UPLOAD, object, (0, [0; 4])),
-            Self::UploadSegment { toggle } => segment(Self::UPLOAD_SEGMENT, toggle, (0, [0; 7])),
-            Self::Abort { object, code } => initiate(ABORT, object, (0, code.0.to_le_bytes())),
-        }
-    }
-
-    /// Reads the data bytes. Bits and bytes that a message does not use are ignored.
-    ///
-    /// # Errors
-    /// [`SdoError`] for another length than 8 or an unknown command specifier.
-    pub fn decode(data: &[u8]) -> Result<Self, SdoError> {
-        let message = Message(exactly("SDO request", data)?);
-        let (object, toggle) = (message.object(), message.has(TOGGLE));
-        Ok(match message.specifier() {
-            Self::DOWNLOAD_SEGMENT => {
-                Self::DownloadSegment { toggle, data: message.segment(), is_last: message.has(LAST) }
-            }
-            Self::INITIATE_DOWNLOAD if message.has(EXPEDITED) => {
-                Self::Download { object, data: message.expedited() }
-            }
-            Self::INITIATE_DOWNLOAD => Self::InitiateDownload { object, size: message.size() },
-            Self::INITIATE_UPLOAD => Self::InitiateUpload { object },
-            Self::UPLOAD_SEGMENT => Self::UploadSegment { toggle },
-            ABORT => Self::Abort { object, code: AbortCode(message.number()) },
-            _ => return Err(message.unknown()),
-        })
-    }
-}
-
 /// An answer of a node's SDO server.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SdoResponse {
@@ -180,55 +130,54 @@ pub enum SdoResponse {
     },
 }
 
-impl SdoResponse {
-    const UPLOAD_SEGMENT: u8 = 0;
-    const DOWNLOAD_SEGMENT: u8 = 1;
-    const INITIATE_UPLOAD: u8 = 2;
-    const INITIATE_DOWNLOAD: u8 = 3;
-
-    /// The frame in which that node's server sends the response.
-    pub fn frame(self, node: NodeId) -> Frame {
-        Frame::fixed(Cob::SdoResponse(node).into(), self.encode())
-    }
-
-    /// The data bytes.
-    pub fn encode(self) -> [u8; LENGTH] {
-        match self {
-            Self::Download { object } => initiate(Self::INITIATE_DOWNLOAD, object, (0, [0; 4])),
-            Self::DownloadSegment { toggle } => segment(Self::DOWNLOAD_SEGMENT, toggle, (0, [0; 7])),
-            Self::Upload { object, data } => initiate(Self::INITIATE_UPLOAD, object, data.field()),
-            Self::InitiateUpload { object, size } => {
-                initiate(Self::INITIATE_UPLOAD, object, size_field(size))
+/// Coding of the messages of one direction. The direction that carries the data uses three forms of message, the other one
+/// two; the forms are the same in both, with other command specifiers.
+macro_rules! sdo_messages {
+    ($message:ident, $name:literal: $value:ident or $sized:ident = $initiate:literal,
+     $bytes:ident = $segment:literal, $bare:ident = $object:literal, $toggled:ident = $next:literal) => {
+        impl $message {
+            #[doc = concat!("The frame that carries the ", $name, " from or to that node's server.")]
+            pub fn frame(self, node: NodeId) -> Frame {
+                Frame::fixed(Cob::$message(node).into(), self.encode())
             }
-            Self::UploadSegment { toggle, data, is_last } => {
-                segment(Self::UPLOAD_SEGMENT, toggle, data.field(is_last))
+
+            /// The data bytes.
+            pub fn encode(self) -> [u8; LENGTH] {
+                match self {
+                    Self::$value { object, data } => initiate($initiate, object, data.field()),
+                    Self::$sized { object, size } => initiate($initiate, object, size_field(size)),
+                    Self::$bytes { toggle, data, is_last } => segment($segment, toggle, data.field(is_last)),
+                    Self::$bare { object } => initiate($object, object, (0, [0; 4])),
+                    Self::$toggled { toggle } => segment($next, toggle, (0, [0; 7])),
+                    Self::Abort { object, code } => initiate(ABORT, object, (0, code.0.to_le_bytes())),
+                }
             }
-            Self::Abort { object, code } => initiate(ABORT, object, (0, code.0.to_le_bytes())),
+
+            /// Reads the data bytes. Bits and bytes that a message does not use are ignored.
+            ///
+            /// # Errors
+            /// [`SdoError`] for another length than 8 or an unknown command specifier.
+            pub fn decode(data: &[u8]) -> Result<Self, SdoError> {
+                let message = Message(exactly($name, data)?);
+                let (object, toggle) = (message.object(), message.has(TOGGLE));
+                Ok(match message.specifier() {
+                    $initiate if message.has(EXPEDITED) => Self::$value { object, data: message.expedited() },
+                    $initiate => Self::$sized { object, size: message.size() },
+                    $segment => Self::$bytes { toggle, data: message.segment(), is_last: message.has(LAST) },
+                    $object => Self::$bare { object },
+                    $next => Self::$toggled { toggle },
+                    ABORT => Self::Abort { object, code: AbortCode(message.number()) },
+                    _ => return Err(message.unknown()),
+                })
+            }
         }
-    }
-
-    /// Reads the data bytes. Bits and bytes that a message does not use are ignored.
-    ///
-    /// # Errors
-    /// [`SdoError`] for another length than 8 or an unknown command specifier.
-    pub fn decode(data: &[u8]) -> Result<Self, SdoError> {
-        let message = Message(exactly("SDO response", data)?);
-        let (object, toggle) = (message.object(), message.has(TOGGLE));
-        Ok(match message.specifier() {
-            Self::UPLOAD_SEGMENT => {
-                Self::UploadSegment { toggle, data: message.segment(), is_last: message.has(LAST) }
-            }
-            Self::DOWNLOAD_SEGMENT => Self::DownloadSegment { toggle },
-            Self::INITIATE_UPLOAD if message.has(EXPEDITED) => {
-                Self::Upload { object, data: message.expedited() }
-            }
-            Self::INITIATE_UPLOAD => Self::InitiateUpload { object, size: message.size() },
-            Self::INITIATE_DOWNLOAD => Self::Download { object },
-            ABORT => Self::Abort { object, code: AbortCode(message.number()) },
-            _ => return Err(message.unknown()),
-        })
-    }
+    };
 }
+
+sdo_messages!(SdoRequest, "SDO request": Download or InitiateDownload = 1, DownloadSegment = 0,
+    InitiateUpload = 2, UploadSegment = 3);
+sdo_messages!(SdoResponse, "SDO response": Upload or InitiateUpload = 2, UploadSegment = 0,
+    Download = 3, DownloadSegment = 1);
 
 /// Data that is not an SDO message of this direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

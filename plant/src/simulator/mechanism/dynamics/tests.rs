@@ -225,6 +225,7 @@ mod reference {
     use masseter_scenario::Scenario;
 
     use super::super::*;
+    use super::Energy;
 
     /// Steps in which one row of forces acts: 1 ms.
     const STEPS_PER_ROW: usize = 8;

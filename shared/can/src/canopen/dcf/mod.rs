@@ -1,12 +1,12 @@
 //! Device descriptions: electronic data sheets (EDS) and device configuration files (DCF), as CiA 306-1 lays them out.
 //!
 //! [`Dcf::parse`] reads the entries of the object dictionary with their types, access, limits and values. Sections on the
-//! file, on bit rates and on dummy mapping are passed over. The texts of other code pages than UTF-8 are the caller's:
+//! file, on its device, on bit rates and on dummy mapping are passed over. The texts of other code pages than UTF-8 are the caller's:
 //! `String::from_utf8_lossy` changes names alone.
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::{NodeId, ObjectAddress};
+use super::ObjectAddress;
 
 #[cfg(test)]
 mod tests;
@@ -34,10 +34,7 @@ const COLLECTIONS: [u16; 2] = [0x8, 0x9];
 /// # Ok::<(), masseter_can::canopen::dcf::DcfError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Dcf {
-    entries: BTreeMap<ObjectAddress, Entry>,
-    node_id: Option<u8>,
-}
+pub struct Dcf(BTreeMap<ObjectAddress, Entry>);
 
 impl Dcf {
     /// Reads a description.
@@ -60,30 +57,21 @@ impl Dcf {
                 dcf.add(Entry::read(section, ObjectAddress::new(index, subindex))?);
             }
         }
-        // The name of this section has one m in CiA 306.
-        if let Some(section) = by_name.get("devicecomissioning") {
-            dcf.node_id = section.number("NodeID", 0xFF)?.map(|id| id as u8);
-        }
         Ok(dcf)
     }
 
     /// All entries, in the order of addresses.
     pub fn entries(&self) -> impl ExactSizeIterator<Item = &Entry> {
-        self.entries.values()
+        self.0.values()
     }
 
     /// The entry of that address.
     pub fn entry(&self, address: ObjectAddress) -> Option<&Entry> {
-        self.entries.get(&address)
-    }
-
-    /// The node id that a DCF gives the device; 255 where the device has none.
-    pub const fn node_id(&self) -> Option<u8> {
-        self.node_id
+        self.0.get(&address)
     }
 
     fn add(&mut self, entry: Entry) {
-        self.entries.insert(entry.address, entry);
+        self.0.insert(entry.address, entry);
     }
 
     /// Adds an object without sub-indices, or the entries of a compact array. Others have sections of their own.
@@ -202,8 +190,6 @@ pub struct Entry {
     pub highest: Option<Value>,
     /// `PDOMapping`.
     pub is_mappable: bool,
-    /// Line of its section.
-    pub line: usize,
 }
 
 impl Access {
@@ -222,18 +208,6 @@ impl Entry {
     /// The value of the device: that of the configuration, else that as delivered.
     pub fn value(&self) -> Option<&Value> {
         self.parameter.as_ref().or(self.default.as_ref())
-    }
-
-    /// The bytes of a value on the bus, little endian. None where the type and the value do not fit.
-    pub fn encode(&self, value: &Value, node: NodeId) -> Option<Vec<u8>> {
-        let bytes = self.data_type.bits().map(|bits| bits as usize / 8);
-        match (value, bytes) {
-            (Value::Real(real), Some(4)) => Some((*real as f32).to_le_bytes().to_vec()),
-            (Value::Real(real), _) => Some(real.to_le_bytes().to_vec()),
-            (Value::Text(text), None) => Some(text.as_bytes().to_vec()),
-            (value, Some(bytes)) => Some(value.number(node)?.to_le_bytes()[..bytes].to_vec()),
-            (Value::Number(_) | Value::OfNode(_), None) => None,
-        }
     }
 
     /// Reads the section of an entry.
@@ -263,7 +237,6 @@ impl Entry {
             lowest: value("LowLimit")?,
             highest: value("HighLimit")?,
             is_mappable,
-            line: section.line,
         })
     }
 }

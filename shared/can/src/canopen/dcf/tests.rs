@@ -8,10 +8,6 @@ fn read(lines: &str) -> Result<Entry, DcfError> {
     Ok(dcf.entry(ObjectAddress::new(0x2000, 0)).unwrap().clone())
 }
 
-fn node(id: u8) -> NodeId {
-    NodeId::new(id).unwrap()
-}
-
 #[test]
 fn numbers_are_decimal_hexadecimal_octal_or_follow_from_the_node() {
     let table = [
@@ -93,24 +89,10 @@ fn a_compact_array_has_all_its_entries() {
 }
 
 #[test]
-fn a_value_has_the_bytes_that_the_bus_carries() {
-    let bytes = |data_type: &str, text: &str| {
-        let entry = read(&format!("DataType={data_type}\nDefaultValue={text}")).unwrap();
-        entry.encode(entry.value().unwrap(), node(5)).unwrap()
-    };
-    assert_eq!(bytes("7", "$NODEID+0x180"), [0x85, 1, 0, 0]);
-    assert_eq!(bytes("2", "-3"), [0xFD]);
-    assert_eq!(bytes("9", "Kiefer"), b"Kiefer");
-    assert_eq!(bytes("8", "1.0"), [0, 0, 0x80, 0x3F]);
-}
-
-#[test]
 fn a_configuration_takes_the_place_of_the_value_as_delivered() {
     let entry = read("DataType=7\nDefaultValue=1\nParameterValue=\nLowLimit=\n").unwrap();
     assert_eq!((entry.value(), entry.lowest.clone()), (Some(&Value::Number(1)), None), "empty is absent");
     let entry = read("DataType=7\nDefaultValue=1\nParameterValue=2\nLowLimit=0x1\nHighLimit=3").unwrap();
     assert_eq!(entry.value(), Some(&Value::Number(2)));
     assert_eq!([entry.lowest, entry.highest], [1, 3].map(|number| Some(Value::Number(number))));
-    let dcf = Dcf::parse("[DeviceComissioning]\nNodeID=0x7\n").unwrap();
-    assert_eq!(dcf.node_id(), Some(7));
 }
