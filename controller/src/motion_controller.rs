@@ -14,7 +14,7 @@ use nalgebra::Translation3;
 use crate::force_control::ForceControl;
 use crate::forces::Forces;
 use crate::path_supervision::{PathSupervision, StartTolerance};
-use crate::playback::Progress;
+use crate::playback::{Playback, Progress};
 use crate::pose_control::PoseControl;
 use crate::pose_law::{Demand, PoseLaw};
 use crate::safety::Fault;
@@ -55,26 +55,15 @@ pub struct MotionController {
     desired: Option<Pose>,
 }
 
-/// What the controller adds to the parameters of the law, in this order.
-#[derive(Debug, Clone, Copy)]
-enum OwnParameter {
-    MotionRate,
-    MotionAmplitude,
-}
-
-impl OwnParameter {
-    const ALL: [Self; 2] = [Self::MotionRate, Self::MotionAmplitude];
-
-    fn declared(self) -> Parameter {
-        let (name, about) = match self {
-            Self::MotionRate => ("motion_rate", "Speed of the motion; 1 as written."),
-            Self::MotionAmplitude => {
-                ("motion_amplitude", "Share of the way from the motion's first pose; 1 as written.")
-            }
-        };
-        Parameter { about: about.to_owned(), range: [0.0, 1.0], ..Parameter::new(name, 1.0) }
-    }
-}
+/// What the controller adds to the parameters of the law: name, meaning, and what takes the value, 0 to 1.
+const OWN_PARAMETERS: [(&str, &str, fn(&mut Playback, f64)); 2] = [
+    ("motion_rate", "Speed of the motion; 1 as written.", Playback::set_motion_rate),
+    (
+        "motion_amplitude",
+        "Share of the way from the motion's first pose; 1 as written.",
+        Playback::set_motion_amplitude,
+    ),
+];
 
 impl MotionController {
     /// A controller that plays `trajectory` on `mechanism` once the rig is ready.
@@ -231,16 +220,19 @@ impl Controller for MotionController {
 
     fn declared(&self) -> Declared {
         let mut declared = self.of_law.clone();
-        declared.parameters.extend(OwnParameter::ALL.map(OwnParameter::declared));
+        declared.parameters.extend(OWN_PARAMETERS.map(|(name, about, _)| Parameter {
+            about: about.to_owned(),
+            range: [0.0, 1.0],
+            ..Parameter::new(name, 1.0)
+        }));
         declared.signals.extend(self.forces.signals());
         declared
     }
 
     fn set_parameter(&mut self, place: usize, value: f64) {
-        match place.checked_sub(self.of_law.parameters.len()).map(|own| OwnParameter::ALL[own]) {
+        match place.checked_sub(self.of_law.parameters.len()) {
             None => self.law.set_parameter(place, value),
-            Some(OwnParameter::MotionRate) => self.progress.playback.set_motion_rate(value),
-            Some(OwnParameter::MotionAmplitude) => self.progress.playback.set_motion_amplitude(value),
+            Some(own) => (OWN_PARAMETERS[own].2)(&mut self.progress.playback, value),
         }
     }
 
