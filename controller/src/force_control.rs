@@ -13,6 +13,7 @@
 use std::f64::consts::PI;
 
 use masseter_model::geometry::{Pose, Vec3};
+use masseter_runtime::control::NoBranch;
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::named::Declared;
 use masseter_scenario::{BiteProfile, ForceControlConfig, ForceSource, MOST_LEAD_CYCLES, Scenario};
@@ -242,6 +243,10 @@ impl PoseLaw for ForceControl {
             Phase::Broken => 3.0,
         };
         signals.copy_from_slice(&[self.desired_n, self.offsets_m[0], phase]);
+    }
+
+    fn branch(&self) -> Result<Box<dyn PoseLaw>, NoBranch> {
+        Ok(Box::new(self.clone()))
     }
 }
 

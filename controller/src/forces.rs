@@ -22,7 +22,7 @@ const ROUNDING_VARIANCE: f64 = 1.0 / 12.0;
 const FADE_IN_S: f64 = 0.3;
 
 /// The forces of the rig: estimated, measured, and fed forward.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Forces {
     /// None unless the scenario has the bite force estimated.
     observer: Option<ForceObserver>,

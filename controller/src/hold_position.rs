@@ -4,7 +4,7 @@
 //! implementation of [`Controller`].
 
 use masseter_model::geometry::Mechanism;
-use masseter_runtime::control::{Controller, Outcome, Tick};
+use masseter_runtime::control::{Controller, NoBranch, Outcome, Tick};
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::messages::{Command, Event, Reading, State};
 use masseter_runtime::named::{Declared, PlayedMotion};
@@ -83,6 +83,10 @@ impl Controller for HoldPosition {
     /// The scenario's motion is not played.
     fn declared(&self) -> Declared {
         Declared { motion: PlayedMotion::Own, ..Declared::default() }
+    }
+
+    fn branch(&self) -> Result<Box<dyn Controller>, NoBranch> {
+        Ok(Box::new(self.clone()))
     }
 }
 

@@ -4,7 +4,7 @@
 //! uses no transport, no clock and no CAN.
 
 use masseter_model::geometry::{Mechanism, Pose};
-use masseter_runtime::control::{Controller, Outcome, Tick};
+use masseter_runtime::control::{Controller, NoBranch, Outcome, Tick};
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::messages::{Command, Event, Reading, State};
 use masseter_runtime::named::{Declared, Parameter};
@@ -55,8 +55,11 @@ pub struct MotionController {
     desired: Option<Pose>,
 }
 
-/// What the controller adds to the parameters of the law: name, meaning, and what takes the value, 0 to 1.
-const OWN_PARAMETERS: [(&str, &str, fn(&mut Playback, f64)); 2] = [
+/// Takes the value of a parameter, 0 to 1.
+type SetShare = fn(&mut Playback, f64);
+
+/// What the controller adds to the parameters of the law: name, meaning, and what takes the value.
+const OWN_PARAMETERS: [(&str, &str, SetShare); 2] = [
     ("motion_rate", "Speed of the motion; 1 as written.", Playback::set_motion_rate),
     (
         "motion_amplitude",
@@ -244,6 +247,20 @@ impl Controller for MotionController {
 
     fn warm_up(&self) {
         self.targets.warm_up(&self.sequencer);
+    }
+
+    fn branch(&self) -> Result<Box<dyn Controller>, NoBranch> {
+        Ok(Box::new(Self {
+            sequencer: self.sequencer.clone(),
+            start: self.start.clone(),
+            progress: self.progress.clone(),
+            law: self.law.branch()?,
+            of_law: self.of_law.clone(),
+            forces: self.forces.clone(),
+            supervision: self.supervision.clone(),
+            targets: self.targets.clone(),
+            desired: self.desired,
+        }))
     }
 }
 

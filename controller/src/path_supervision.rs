@@ -110,7 +110,7 @@ impl PathSupervision {
 }
 
 /// Whether the jaw stands near enough to the first pose of the motion to be eased there.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct StartTolerance {
     /// None where the way may have any length.
     limit_m: Option<f64>,

@@ -23,7 +23,7 @@ const ACCELERATION: f64 = 4.5;
 const BEND: f64 = 1.25;
 
 /// The motion under way: its playback, which waits for the drives, and for how long the jaw has been at rest.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Progress {
     pub(crate) playback: Playback,
     acknowledgement: CommandAcknowledgement,
@@ -94,7 +94,7 @@ enum Part {
 }
 
 /// The desired pose, as a function of the time since playing began.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Playback {
     trajectory: Trajectory,
     ease_s: f64,

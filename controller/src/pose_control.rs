@@ -4,6 +4,7 @@
 //! calibration) is corrected here. The trim adds no damping and no feed-forward.
 
 use masseter_model::geometry::{Pose, Vec3};
+use masseter_runtime::control::NoBranch;
 use masseter_runtime::named::{Declared, Parameter};
 use masseter_scenario::ControllerConfig;
 use nalgebra::UnitQuaternion;
@@ -78,6 +79,10 @@ impl PoseLaw for PoseControl {
             1 => self.config.trim_limit_m = value,
             _ => self.config.trim_limit_rad = value,
         }
+    }
+
+    fn branch(&self) -> Result<Box<dyn PoseLaw>, NoBranch> {
+        Ok(Box::new(self.clone()))
     }
 }
 

@@ -6,6 +6,7 @@
 use std::fmt;
 
 use masseter_model::geometry::{Pose, Vec3};
+use masseter_runtime::control::NoBranch;
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::named::Declared;
 use nalgebra::{Quaternion, Translation3, Unit};
@@ -125,6 +126,14 @@ pub trait PoseLaw: std::fmt::Debug {
 
     /// Writes the declared signals, also in cycles in which the law is not asked.
     fn fill_signals(&self, _signals: &mut [f64]) {}
+
+    /// A copy of the law with its whole state. Not part of a cycle.
+    ///
+    /// # Errors
+    /// [`NoBranch`] for a law that has none.
+    fn branch(&self) -> Result<Box<dyn PoseLaw>, NoBranch> {
+        Err(NoBranch::of::<Self>())
+    }
 }
 
 /// A law that is one function: of a demand, the parameters in force, and the signals that it fills. Both are in the order of

@@ -12,7 +12,7 @@ use crate::sequencer::{Estimate, Sequencer};
 const CYCLES_OF_A_CONDITION: u64 = 10;
 
 /// The targets of the axes, and what bounds them.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Targets {
     pub(crate) mechanism: Mechanism,
     pub(crate) velocity_limit_m_s: [f64; AXES],

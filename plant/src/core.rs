@@ -23,6 +23,7 @@ use crate::master::sockets::SocketLink;
 use crate::master::wanted::WantedDrive;
 use crate::simulator::emulation::virtual_link::VirtualLink;
 use crate::simulator::injection::Injector;
+use crate::state::state;
 
 /// Tapped frames kept between two drains, of which one follows every cycle.
 const TAPPED: usize = 4096;
@@ -66,6 +67,12 @@ pub struct PlantCore<L = VirtualLink> {
     command_sent_ns: u64,
 }
 
+state!(PlantCore {
+    values: master cycle tapped wire_events command_sent_ns;
+    parts: link injector;
+    constant: buses;
+});
+
 impl PlantCore {
     /// The scenario's plant with emulated drives on simulated wires, switched on at `now_ns`.
     pub fn new(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
@@ -81,7 +88,7 @@ impl PlantCore<SocketLink> {
 }
 
 /// Refuses a scenario whose plant cannot be built or booted, on simulated or real wires.
-pub fn check(scenario: &Scenario) -> Result<(), PlantError> {
+pub fn check_scenario(scenario: &Scenario) -> Result<(), PlantError> {
     PlantCore::new(scenario, 0)?;
     check_boot_time(scenario)
 }

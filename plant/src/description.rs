@@ -1,15 +1,19 @@
-//! Descriptions of the emulated drives for other tools: the electronic data sheet of a drive (EDS, CiA 306) and
-//! the messages of all buses (DBC). Both follow from the drives' object dictionary.
+//! Descriptions of drives for other tools: the electronic data sheet of an emulated drive (EDS, CiA 306), the messages
+//! of all buses (DBC), and what was read from a drive as a device configuration file (DCF, CiA 306). The first two follow
+//! from the emulated drives' object dictionary.
 //!
 //! A description is that of one scenario: the scenario's values are its default values, scales and identifiers.
 //! Positions in the DBC are in metres, forces in newtons; segments of SDO are not decoded.
 
+use std::collections::BTreeMap;
+
 use masseter_can::CanId;
-use masseter_can::canopen::{Cob, CobId, NmtCommand, NmtState, NodeId};
+use masseter_can::canopen::{Cob, CobId, NmtCommand, NmtState, NodeId, ObjectAddress};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_runtime::clock::MILLISECOND_NS;
 use masseter_scenario::{MASTER_NODE, Scenario};
 
+use crate::commissioning::{Survey, object_name};
 use crate::error::PlantError;
 use crate::simulator::drive::dictionary::{ENTRIES, Objects, Overlay, find};
 use crate::simulator::drive::names;
@@ -201,15 +205,9 @@ const MANDATORY: [u16; 3] = [0x1000, 0x1001, 0x1018];
 fn write_eds(settings: &DriveSettings) -> String {
     let overlay = &settings.quirks.overlay;
     let there: Vec<_> = OBJECTS.iter().filter(|object| !entries(object, overlay).is_empty()).collect();
-    let (mandatory, optional): (Vec<_>, Vec<_>) =
-        there.iter().partition(|object| MANDATORY.contains(&object.index()));
-    let lists = [
-        list("MandatoryObjects", &mandatory),
-        list("OptionalObjects", &optional),
-        list("ManufacturerObjects", &[]),
-    ];
+    let lists = lists(there.iter().map(|object| object.index()));
     let sections = there.iter().map(|object| section(object, &entries(object, overlay), &settings.objects));
-    [head(settings.node, &settings.objects)].into_iter().chain(lists).chain(sections).collect()
+    [head(settings.node, &settings.objects), lists].into_iter().chain(sections).collect()
 }
 
 /// The sections on the file and the device.
@@ -225,10 +223,19 @@ fn head(node: NodeId, objects: &Objects) -> String {
     )
 }
 
-fn list(section: &str, objects: &[&Object]) -> String {
-    let line = |(number, object): (usize, &&Object)| format!("{number}=0x{:04X}\n", object.index());
-    let lines: String = (1..).zip(objects).map(line).collect();
-    format!("[{section}]\nSupportedObjects={}\n{lines}\n", objects.len())
+/// The three lists of objects.
+fn lists(indices: impl Iterator<Item = u16>) -> String {
+    let (of_maker, standard): (Vec<_>, Vec<_>) = indices.partition(|index| (0x2000..0x6000).contains(index));
+    let (mandatory, optional): (Vec<_>, Vec<_>) =
+        standard.into_iter().partition(|index| MANDATORY.contains(index));
+    let list = |(section, indices): (&str, Vec<u16>)| {
+        let line = |(number, index): (usize, &u16)| format!("{number}=0x{index:04X}\n");
+        let lines: String = (1..).zip(&indices).map(line).collect();
+        format!("[{section}]\nSupportedObjects={}\n{lines}\n", indices.len())
+    };
+    [("MandatoryObjects", mandatory), ("OptionalObjects", optional), ("ManufacturerObjects", of_maker)]
+        .map(list)
+        .concat()
 }
 
 /// The entries of an object that the drive has.
@@ -270,6 +277,50 @@ fn describe(entry: &Entry, objects: &Objects) -> String {
     format!(
         "ParameterName={name}\nObjectType=0x7\nDataType=0x{kind:04X}\nAccessType={access}\nDefaultValue={value}\n\
          PDOMapping={mapping}\n{limits}\n"
+    )
+}
+
+/// What was read from a drive as a device configuration file (CiA 306), which has no other objects.
+pub fn dcf(survey: &Survey, node: u8, name: &str) -> String {
+    let mut objects: BTreeMap<u16, Vec<(ObjectAddress, &[u8])>> = BTreeMap::new();
+    for (object, value) in survey.readings() {
+        if let Ok(value) = value {
+            objects.entry(object.index).or_default().push((object, value));
+        }
+    }
+    let head = format!(
+        "[FileInfo]\nFileName={name}.dcf\nDescription=Read by masseter robot inspect\n\n\
+         [DeviceComissioning]\nNodeID={node}\nNodeName={name}\n\n"
+    );
+    let lists = lists(objects.keys().copied());
+    let sections = objects.iter().map(|(index, entries)| match entries[..] {
+        [(object, value)] if object.subindex == 0 => format!("[{index:04X}]\n{}", read_entry(object, value)),
+        _ => {
+            let sub = |&(object, value): &(ObjectAddress, &[u8])| {
+                format!("[{index:04X}sub{:X}]\n{}", object.subindex, read_entry(object, value))
+            };
+            let (count, subs) = (entries.len(), entries.iter().map(sub).collect::<String>());
+            format!("[{index:04X}]\nParameterName={index:04X}h\nObjectType=0x9\nSubNumber={count}\n\n{subs}")
+        }
+    });
+    [head, lists].into_iter().chain(sections).collect()
+}
+
+fn read_entry(object: ObjectAddress, value: &[u8]) -> String {
+    let number = value.iter().rfold(0u64, |number, &byte| number << 8 | u64::from(byte));
+    let (kind, value) = match value.len() {
+        1 => (5, format!("0x{number:02X}")),
+        2 => (6, format!("0x{number:04X}")),
+        4 => (7, format!("0x{number:08X}")),
+        _ => (9, String::from_utf8_lossy(value).trim_end_matches('\0').replace(['\r', '\n'], " ")),
+    };
+    let name = match object_name(object) {
+        "" => object.to_string(),
+        name => name.to_owned(),
+    };
+    format!(
+        "ParameterName={name}\nObjectType=0x7\nDataType=0x{kind:04X}\nAccessType=rw\nPDOMapping=0\n\
+         ParameterValue={value}\n\n"
     )
 }
 

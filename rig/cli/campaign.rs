@@ -113,7 +113,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<Exit, Failure> {
     let begun = Begun::new(campaign, &args.file, &args.play)?;
     if args.plan {
         let open = open_cases(&begun.campaign, &begun.folder).incomplete()?;
-        result(&open.iter().map(|number| format!("{number}\n")).collect::<String>()).incomplete()?;
+        result(&open.iter().map(|number| number.to_string() + "\n").collect::<String>()).incomplete()?;
         return Ok(Exit::Passed);
     }
     status!("{} cases; results in {}", begun.campaign.case_count(), begun.out.display());

@@ -9,7 +9,8 @@ use std::fmt::Write;
 use anyhow::{Context, anyhow, ensure};
 use masseter_model::geometry::AXIS_NAMES;
 use masseter_plant::commissioning::{
-    BootUps, Change, Deviation, Outcome, Settings, Survey, Writer, reset, store,
+    BootUps, Change, Deviation, Identity, Known, NOT_ASKED, Outcome, Settings, Survey, Writer, check_present,
+    check_undisturbed, reset, store,
 };
 use masseter_scenario::{Scenario, wording::counted};
 use masseter_terminal::{Exit, Failure, OrFailure, Tone, result, result_with_tones, status};
@@ -17,9 +18,8 @@ use serde::{Deserialize, Serialize};
 
 use super::args::WriteArgs;
 use super::evidence::{Basis, Evidence, Past, Step, StepFolder};
-use super::identity::{Identity, Known, NOT_ASKED, check_present, check_undisturbed};
 use super::ledger::{before_file, read_before, return_owed_values};
-use super::robot_line::{RobotLine, Surveys, deviations_table, drives, failed, prove_off};
+use super::robot_line::{LISTEN_NS, RobotLine, Surveys, deviations_table, drives, failed, prove_off};
 
 /// Configures the drives, and lists the changes.
 pub(crate) fn configure(args: &WriteArgs) -> Result<Exit, Failure> {
@@ -145,7 +145,9 @@ impl<'a> Writing<'a> {
         let folder = StepFolder::begin(&args.robot.folder, step, &args.axes(), &scenario).usage()?;
         let mut robot = RobotLine::open(scenario, folder.log().usage()?).usage()?;
         return_owed_values(&args.robot.folder, &robot.scenario, &mut robot.line, args.take_over)?;
-        let boot_ups = robot.listen().map_err(failed)?;
+        // All drives may boot until then. After a restart a survey is no more than a memory.
+        robot.line.listen(LISTEN_NS).map_err(failed)?;
+        let boot_ups = BootUps::until_now(&robot.line);
         Ok(Self { args, folder, robot, boot_ups })
     }
 
@@ -215,7 +217,7 @@ impl<'a> Writing<'a> {
         let differences = target.differences(&self.robot.whole_survey(axis, target)?);
         // An optional object may keep a value of its own.
         let wrong = differences.iter().filter(|difference| !difference.may_stay());
-        let wrong: Vec<_> = wrong.map(|difference| difference.object.to_string()).collect();
+        let wrong: Vec<_> = wrong.map(|difference| difference.wanted.object.0.to_string()).collect();
         ensure!(wrong.is_empty(), "{}: {} differ {when}", AXIS_NAMES[axis], wrong.join(", "));
         Ok(())
     }

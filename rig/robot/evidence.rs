@@ -10,13 +10,13 @@ use std::path::{Path, PathBuf};
 use std::{fs::File, time::UNIX_EPOCH};
 
 use masseter_model::geometry::{AXES, AXIS_NAMES, MechanismConfig};
+use masseter_plant::commissioning::{Identity, Known, NOT_ASKED};
 use masseter_recording::RunFolder;
 use masseter_runtime::clock;
 use masseter_scenario::Scenario;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
 
-use super::identity::{Identity, Known, NOT_ASKED};
 use super::ledger::{Nameless, before_file, parse_file};
 
 /// A step with evidence of its own, in the order of the bring-up.
@@ -395,12 +395,21 @@ impl Past {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{identity::Entry, identity::tests::drives};
+    use masseter_plant::commissioning::Entry;
+
     use super::*;
 
     const SERIALS: [Entry; AXES] =
         [Entry::Told(1), Entry::Told(2), Entry::Told(3), Entry::Told(4), Entry::Told(5), Entry::Told(6)];
     const ALL: [usize; AXES] = [0, 1, 2, 3, 4, 5];
+
+    /// Six drives with these serial numbers.
+    fn drives(serials: [Entry; AXES]) -> [Known; AXES] {
+        let [vendor, product, revision] = [0x004D_5354, 0x402, 0x1_0000].map(Entry::Told);
+        let drive =
+            |axis| Identity { node: axis as u8 + 1, vendor, product, revision, serial: serials[axis] };
+        std::array::from_fn(|axis| Known::Is(drive(axis)))
+    }
 
     fn leave_step(parent: &Path, step: Step, axes: &[usize], passed: Option<bool>) {
         let mut folder = StepFolder::begin(parent, step, axes, &Scenario::default()).unwrap();

@@ -20,11 +20,8 @@ pub(crate) struct HomeArgs {
     #[command(flatten)]
     robot: RobotArgs,
     /// The axis: d1 to l3 [default: all, the legs first]
-    #[arg(long, value_parser = parse_axis, conflicts_with = "all")]
+    #[arg(long, value_parser = parse_axis)]
     axis: Option<usize>,
-    /// All axes, one after the other, the legs first: the default
-    #[arg(long)]
-    all: bool,
     /// Go on without the evidence of the earlier steps
     #[arg(long)]
     out_of_order: bool,
@@ -35,9 +32,8 @@ pub(crate) struct HomeArgs {
 struct AxisResult {
     #[serde(flatten)]
     homed: Homed,
-    position_m: f64,
-    way_m: f64,
-    spread_m: Option<f64>,
+    #[serde(flatten)]
+    report: HomeReport,
 }
 
 /// Homes, prints what was found, and keeps it.
@@ -54,9 +50,7 @@ pub(crate) fn home(args: &HomeArgs) -> Result<Exit, Failure> {
             Err(error) => return Err(session.fail_motion(error)),
         };
         print(axis, &report).incomplete()?;
-        let HomeReport { position_m, way_m, spread_m } = report;
-        let homed = Homed { axis: AXIS_NAMES[axis].to_owned(), mark: None };
-        results.push(AxisResult { homed, position_m, way_m, spread_m });
+        results.push(AxisResult { homed: Homed { axis: AXIS_NAMES[axis].to_owned(), mark: None }, report });
     }
     let marked = leave_marks(&mut session, &axes, &mut results);
     session.finish_session(marked.is_ok(), &results)?;

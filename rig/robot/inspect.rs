@@ -9,8 +9,10 @@ use clap::Args;
 use masseter_can::{InterfaceDetails, canopen::ObjectAddress};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::commissioning::{
-    BootUps, Deviation, LineError, OtherMaster, Outcome, Restarted, Survey, object_name, reason_text,
+    Address, BootUps, Deviation, Identity, LineError, OtherMaster, Outcome, Restarted, Survey, gaps,
+    object_name, reason_text,
 };
+use masseter_plant::description;
 use masseter_runtime::clock::SECOND_NS;
 use masseter_scenario::{CanConfig, wording::counted};
 use masseter_terminal::{Exit, Failure, OrFailure, Tone, result_with_tones};
@@ -18,14 +20,11 @@ use serde::Serialize;
 
 use super::args::RobotArgs;
 use super::evidence::{Step, StepFolder};
-use super::identity::{Identity, gaps};
 use super::ledger::{owed_advice, owed_axes};
 use super::robot_line::{RobotLine, axes_text, deviations_table, drives, failed};
 
 /// For how long the buses are listened to before the first question, ns.
 const LISTEN_NS: u64 = 2 * SECOND_NS;
-/// Objects that CiA 301 makes mandatory.
-const MANDATORY: [u16; 3] = [0x1000, 0x1001, 0x1018];
 
 /// The arguments of `robot inspect`.
 #[derive(Debug, Clone, Args)]
@@ -98,18 +97,17 @@ pub(crate) fn inspect(args: &InspectArgs) -> Result<Exit, Failure> {
     let mut robot = RobotLine::open(scenario, folder.log().usage()?).usage()?;
     let Read { surveys, answer, restarted } = read(&mut robot, args.scan).map_err(failed)?;
     let (strangers, can) = (robot.line.strangers(), &robot.scenario.can);
-    let masters = strangers.masters.iter().map(|&(bus, sign)| OtherMaster { bus, sign }.to_string());
-    let other_nodes = strangers.nodes.iter().map(|(bus, node)| format!("node {node} on bus {bus}"));
+    let other_nodes = strangers.nodes.iter().map(|Address { bus, node }| format!("node {node} on bus {bus}"));
     let result = InspectResult {
         interfaces,
-        masters: masters.collect(),
+        masters: strangers.masters.iter().map(OtherMaster::to_string).collect(),
         other_nodes: other_nodes.collect(),
         restarted: restarted.iter().map(Restarted::to_string).collect(),
         drives: (0..AXES).map(|axis| drive(&robot, axis, surveys[axis].as_ref(), answer[axis])).collect(),
     };
     for ((name, survey), node) in AXIS_NAMES.iter().zip(&surveys).zip(can.node_ids) {
         if let Some(survey) = survey {
-            folder.keep(&format!("{name}.dcf"), &dcf(survey, node, name)).incomplete()?;
+            folder.keep(&format!("{name}.dcf"), &description::dcf(survey, node, name)).incomplete()?;
         }
     }
     let drives = drives(&surveys, can);
@@ -156,8 +154,8 @@ fn read(robot: &mut RobotLine, scan: bool) -> Result<Read, LineError> {
     let boot_ups = BootUps::until_now(&robot.line);
     let mut surveys = [const { None }; AXES];
     for (axis, place) in surveys.iter_mut().enumerate() {
-        let settings = robot.settings[axis].clone();
-        *place = Some(robot.survey(axis, &settings)?).filter(|survey| !survey.is_silent());
+        let survey = Survey::of_drive(&mut robot.line, axis, robot.settings[axis].addresses())?;
+        *place = Some(survey).filter(|survey| !survey.is_silent());
     }
     if scan {
         robot.line.scan()?;
@@ -172,7 +170,7 @@ fn read(robot: &mut RobotLine, scan: bool) -> Result<Read, LineError> {
 }
 
 fn drive(robot: &RobotLine, axis: usize, survey: Option<&Survey>, answers: bool) -> DriveResult {
-    let text = |index| survey?.text(ObjectAddress::new(index, 0));
+    let text = |index| survey?.string(ObjectAddress::new(index, 0));
     let unread = survey.into_iter().flat_map(Survey::readings);
     let unread = unread.filter_map(|(object, reading)| {
         let reason = reading.as_ref().err()?;
@@ -248,64 +246,6 @@ fn devices(drives: &[DriveResult]) -> String {
     }
     let line = |(device, axes): (&String, &Vec<usize>)| format!("{}: {device}", axes_text(axes));
     groups.iter().map(line).collect::<Vec<_>>().join("\n")
-}
-
-/// The device configuration file of a drive. It has the objects that were read and no others.
-fn dcf(survey: &Survey, node: u8, name: &str) -> String {
-    let mut objects: BTreeMap<u16, Vec<(u8, &[u8])>> = BTreeMap::new();
-    for (ObjectAddress { index, subindex }, value) in survey.readings() {
-        if let Ok(value) = value {
-            objects.entry(index).or_default().push((subindex, value));
-        }
-    }
-    let mut text = format!(
-        "[FileInfo]\nFileName={name}.dcf\nDescription=Read by masseter robot inspect\n\n\
-         [DeviceComissioning]\nNodeID={node}\nNodeName={name}\n\n"
-    );
-    let is_of_maker = |index: u16| (0x2000..0x6000).contains(&index);
-    for (list, belongs) in [
-        ("MandatoryObjects", &(|index| MANDATORY.contains(&index)) as &dyn Fn(u16) -> bool),
-        ("OptionalObjects", &|index| !MANDATORY.contains(&index) && !is_of_maker(index)),
-        ("ManufacturerObjects", &is_of_maker),
-    ] {
-        let listed: Vec<_> = objects.keys().filter(|&&index| belongs(index)).collect();
-        let _ = writeln!(text, "[{list}]\nSupportedObjects={}", listed.len());
-        for (number, index) in (1..).zip(listed) {
-            let _ = writeln!(text, "{number}=0x{index:04X}");
-        }
-        text.push('\n');
-    }
-    for (index, entries) in objects {
-        if let [(0, value)] = entries[..] {
-            let _ = write!(text, "[{index:04X}]\n{}", dcf_entry(ObjectAddress::new(index, 0), value));
-            continue;
-        }
-        let _ = write!(text, "[{index:04X}]\nParameterName={index:04X}h\nObjectType=0x9\n");
-        let _ = write!(text, "SubNumber={}\n\n", entries.len());
-        for (subindex, value) in entries {
-            let object = ObjectAddress::new(index, subindex);
-            let _ = write!(text, "[{index:04X}sub{subindex:X}]\n{}", dcf_entry(object, value));
-        }
-    }
-    text
-}
-
-fn dcf_entry(object: ObjectAddress, value: &[u8]) -> String {
-    let number = value.iter().rfold(0u64, |number, &byte| number << 8 | u64::from(byte));
-    let (kind, value) = match value.len() {
-        1 => (5, format!("0x{number:02X}")),
-        2 => (6, format!("0x{number:04X}")),
-        4 => (7, format!("0x{number:08X}")),
-        _ => (9, String::from_utf8_lossy(value).trim_end_matches('\0').replace(['\r', '\n'], " ")),
-    };
-    let name = match object_name(object) {
-        "" => object.to_string(),
-        name => name.to_owned(),
-    };
-    format!(
-        "ParameterName={name}\nObjectType=0x7\nDataType=0x{kind:04X}\nAccessType=rw\nPDOMapping=0\n\
-         ParameterValue={value}\n\n"
-    )
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! `masseter robot jog`: one axis, a short way and back. With the dead man's switch it moves only while input arrives
 //! on standard input, such as the lines of a held Enter key.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::{io::Read, sync::Arc, thread, time::Duration};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::{io::Read, thread, time::Duration};
 
 use anyhow::anyhow;
 use clap::Args;
@@ -10,7 +10,7 @@ use masseter_model::geometry::AXIS_NAMES;
 use masseter_plant::commissioning::{JogOrder, JogReport, Wish, jog as play};
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_terminal::{Exit, Failure, OrFailure, result_line, status};
-use serde_json::json;
+use serde::Serialize;
 
 use super::args::{RobotArgs, parse_axis, parse_length, parse_speed};
 use super::{evidence::Step, robot_line::failed, session::Session};
@@ -86,7 +86,7 @@ pub(crate) fn jog(args: &JogArgs) -> Result<Exit, Failure> {
     }
     let factor = args.measured.map(|measured_m| measured_m / report.moved_m());
     let is_right = factor.is_some_and(|factor| (factor - 1.0).abs() <= DEVIATION);
-    session.finish_session(is_right, &result(args, &report, factor))?;
+    session.finish_session(is_right, &JogResult::new(args, report, factor))?;
     result_line!("{}", report_text(axis, &report)).incomplete()?;
     match factor {
         Some(factor) if !is_right => Err(failed(wrong_scale(axis, factor))),
@@ -122,7 +122,10 @@ fn wrong_scale(axis: usize, factor: f64) -> anyhow::Error {
 }
 
 fn report_text(axis: usize, report: &JogReport) -> String {
-    let [there, back] = report.ways;
+    let [there, back] = report.ways.map(|way| {
+        let (rise_s, overshoot_mm, settled_s) = (way.rise_s, way.overshoot_m * 1e3, way.settled_s);
+        format!("rise {rise_s:.3} s, overshoot {overshoot_mm:.4} mm, settled {settled_s:.3} s")
+    });
     let forces = report.friction_and_load_n().map_or_else(
         || "too few looks for friction; jog further or slower".to_owned(),
         |[friction_n, load_n]| format!("friction {friction_n:.1} N, load {load_n:.1} N"),
@@ -131,58 +134,45 @@ fn report_text(axis: usize, report: &JogReport) -> String {
         || "no answer to a SYNC".to_owned(),
         |answer_ns| format!("SYNC answered within {} µs (can.answer_us)", answer_ns.div_ceil(1000)),
     );
+    let positions_m = report.positions_m;
+    let [moved_mm, back_mm] = [1, 2].map(|place| (positions_m[place] - positions_m[0]) * 1e3);
     format!(
-        "{}: moved {:.4} mm and back to {:.4} mm; noise ±{:.4} mm\n\
-         there: rise {:.3} s, overshoot {:.4} mm, settled {:.3} s\n\
-         back:  rise {:.3} s, overshoot {:.4} mm, settled {:.3} s\n\
-         {forces}; {:.4} mm of motion as the brake closed\n{answer}",
+        "{}: moved {moved_mm:.4} mm and back to {back_mm:.4} mm; noise ±{:.4} mm\n\
+         there: {there}\nback:  {back}\n{forces}; {:.4} mm of motion as the brake closed\n{answer}",
         AXIS_NAMES[axis],
-        report.moved_m() * 1e3,
-        (report.positions_m[2] - report.positions_m[0]) * 1e3,
         report.noise_m * 1e3,
-        there.rise_s,
-        there.overshoot_m * 1e3,
-        there.settled_s,
-        back.rise_s,
-        back.overshoot_m * 1e3,
-        back.settled_s,
         report.drop_m * 1e3,
     )
 }
 
-fn result(args: &JogArgs, report: &JogReport, factor: Option<f64>) -> serde_json::Value {
-    let forces = report.friction_and_load_n();
-    json!({
-        "by_m": args.by,
-        "moved_m": report.moved_m(),
-        "positions_m": report.positions_m,
-        "noise_m": report.noise_m,
-        "rise_s": report.ways.map(|way| way.rise_s),
-        "overshoot_m": report.ways.map(|way| way.overshoot_m),
-        "settled_s": report.ways.map(|way| way.settled_s),
-        "force_n": report.ways.map(|way| way.force_n),
-        "friction_n": forces.map(|[friction_n, _]| friction_n),
-        "load_n": forces.map(|[_, load_n]| load_n),
-        "drop_m": report.drop_m,
-        "answer_us": report.sync_answer_ns.map(|answer_ns| answer_ns.div_ceil(1000)),
-        "measured_m": args.measured,
-        "measured_by_moved": factor,
-    })
+/// What is kept of a jog.
+#[derive(Debug, Serialize)]
+struct JogResult {
+    by_m: f64,
+    moved_m: f64,
+    #[serde(flatten)]
+    report: JogReport,
+    friction_n: Option<f64>,
+    load_n: Option<f64>,
+    measured_m: Option<f64>,
+    measured_by_moved: Option<f64>,
 }
 
-/// What came on standard input.
-#[derive(Debug, Default)]
-struct Input {
-    bytes: AtomicU64,
-    is_over: AtomicBool,
+impl JogResult {
+    fn new(args: &JogArgs, report: JogReport, measured_by_moved: Option<f64>) -> Self {
+        let (friction_n, load_n) =
+            report.friction_and_load_n().map(|[friction_n, load_n]| (friction_n, load_n)).unzip();
+        let (by_m, moved_m, measured_m) = (args.by, report.moved_m(), args.measured);
+        Self { by_m, moved_m, report, friction_n, load_n, measured_m, measured_by_moved }
+    }
 }
 
 /// The dead man's switch.
 #[derive(Debug)]
-pub(super) struct Hold {
-    input: Arc<Input>,
-    taken: u64,
-    /// When the newest byte was seen, ns.
+struct Hold {
+    /// A message for what was read at once; closed at the end of standard input.
+    input: Receiver<()>,
+    /// When the newest input was seen, ns.
     held_ns: Option<u64>,
     /// When the switch was asked first, ns.
     asked_ns: Option<u64>,
@@ -190,32 +180,30 @@ pub(super) struct Hold {
 
 impl Hold {
     /// Reads standard input from now on.
-    pub(super) fn of_stdin() -> Self {
-        let input = Arc::new(Input::default());
-        let reader = Arc::clone(&input);
+    fn of_stdin() -> Self {
+        let (sender, input) = channel();
         thread::spawn(move || {
             let mut bytes = [0; 64];
-            while let Ok(count @ 1..) = std::io::stdin().read(&mut bytes) {
-                reader.bytes.fetch_add(count as u64, Ordering::Relaxed);
-            }
-            reader.is_over.store(true, Ordering::Relaxed);
+            while let Ok(1..) = std::io::stdin().read(&mut bytes)
+                && sender.send(()).is_ok()
+            {}
         });
         Self::of_input(input)
     }
 
-    fn of_input(input: Arc<Input>) -> Self {
-        Self { input, taken: 0, held_ns: None, asked_ns: None }
+    fn of_input(input: Receiver<()>) -> Self {
+        Self { input, held_ns: None, asked_ns: None }
     }
 
     /// What the person wants at that time.
-    pub(super) fn wish(&mut self, now_ns: u64) -> Wish {
+    fn wish(&mut self, now_ns: u64) -> Wish {
         let asked_ns = *self.asked_ns.get_or_insert(now_ns);
-        let bytes = self.input.bytes.load(Ordering::Relaxed);
-        if bytes != self.taken {
-            (self.taken, self.held_ns) = (bytes, Some(now_ns));
-        }
-        if self.input.is_over.load(Ordering::Relaxed) {
-            return Wish::Stop;
+        loop {
+            match self.input.try_recv() {
+                Ok(()) => self.held_ns = Some(now_ns),
+                Err(TryRecvError::Empty) => break,
+                Err(TryRecvError::Disconnected) => return Wish::Stop,
+            }
         }
         match self.held_ns {
             Some(held_ns) if now_ns - held_ns < HELD_NS => Wish::Move,
@@ -232,17 +220,16 @@ mod tests {
 
     #[test]
     fn a_byte_permits_motion_for_a_while_and_the_end_of_input_none() {
-        let input = Arc::new(Input::default());
-        let mut hold = Hold::of_input(Arc::clone(&input));
+        let (key, input) = channel();
+        let mut hold = Hold::of_input(input);
         let mut wish = |now_ms: u64| hold.wish(now_ms * MILLISECOND_NS);
         assert_eq!((wish(0), wish(59_000)), (Wish::Halt, Wish::Halt), "nobody has touched the key");
-        input.bytes.fetch_add(1, Ordering::Relaxed);
+        key.send(()).unwrap();
         assert_eq!((wish(59_500), wish(59_799), wish(59_800)), (Wish::Move, Wish::Move, Wish::Halt));
-        input.bytes.fetch_add(1, Ordering::Relaxed);
+        key.send(()).unwrap();
         assert_eq!((wish(60_000), wish(62_999), wish(63_000)), (Wish::Move, Wish::Halt, Wish::Stop));
-        input.bytes.fetch_add(1, Ordering::Relaxed);
-        input.is_over.store(true, Ordering::Relaxed);
+        key.send(()).unwrap();
+        drop(key);
         assert_eq!(wish(63_001), Wish::Stop);
-        assert_eq!(Hold::of_input(Arc::default()).wish(0), Wish::Halt);
     }
 }

@@ -10,14 +10,13 @@ use std::path::{Path, PathBuf};
 use anyhow::{anyhow, ensure};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::commissioning::{
-    Ledger, Line, LineError, OldValue, Settings, give_back, object_name, value_text,
+    Identity, Ledger, Line, LineError, OldValue, Settings, give_back, object_name, value_text,
 };
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 use masseter_scenario::{CanConfig, ObjectKey, Scenario};
 use masseter_terminal::{Failure, status};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-use super::identity::Identity;
 use super::robot_line::{LISTEN_NS, failed, prove_off};
 
 /// Controlword: no step keeps a value of this object.

@@ -8,7 +8,6 @@ mod check_pose;
 mod configure;
 mod evidence;
 mod home;
-mod identity;
 mod inspect;
 mod jog;
 mod ledger;
@@ -21,7 +20,7 @@ mod status;
 use clap::Subcommand;
 use masseter_terminal::{Exit, Failure, OrFailure};
 
-pub(crate) use permission::{Played, check_bring_up, keep_dry_run};
+pub(crate) use permission::Played;
 
 /// Verbs of `robot`.
 #[derive(Debug, Clone, Subcommand)]

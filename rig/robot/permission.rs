@@ -6,15 +6,15 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
-use masseter_plant::commissioning::Line;
+use masseter_plant::commissioning::{Identity, Known, Line, NOT_ASKED};
 use masseter_scenario::{FileConfig, Scenario, input::read_bytes};
 use masseter_terminal::status;
 use serde::{Deserialize, Serialize};
 
 use super::evidence::{Basis, Past, Step, StepFolder};
-use super::identity::{Identity, Known, NOT_ASKED, warn_of_gaps};
 use super::ledger::{owed_advice, owed_axes};
 use super::power_mark::{check_marks, marks_of_pose_check};
+use super::robot_line::warn_of_gaps;
 
 /// Where the evidence of a run's robot is.
 const FOLDER: &str = "bringup";
@@ -29,6 +29,8 @@ pub(crate) struct Played<'a> {
     pub(crate) controller: Option<&'a str>,
     /// Duration of the motion in this run, s.
     pub(crate) motion_s: f64,
+    /// Whether the robot moves without the evidence of a bring-up.
+    pub(crate) is_waived: bool,
 }
 
 /// What a dry run keeps.
@@ -40,28 +42,6 @@ struct DryRun {
     motion: String,
     /// How much of the motion it played, in seconds at full speed.
     motion_s: f64,
-}
-
-/// Notes in the folder of the bring-up, if there is one, whether a dry run passed. The drives are those of the pose
-/// check, with which a dry run on real interfaces has compared them. A dry run without bring-up has compared nothing,
-/// and counts for nothing.
-pub(crate) fn keep_dry_run(
-    played: &Played<'_>,
-    run: &Path,
-    passed: bool,
-    is_waived: bool,
-) -> anyhow::Result<()> {
-    let (parent, scenario) = (Path::new(FOLDER), played.scenario);
-    if !scenario.dry.is_on || is_waived || !parent.is_dir() {
-        return Ok(());
-    }
-    let past = Past::read(parent)?;
-    let checked = |axis| past.newest(Step::CheckPose, axis);
-    let drive = |axis| checked(axis).map_or(Known::NotAsked, |checked| checked.basis.drives[axis]);
-    let mut folder = StepFolder::begin(parent, Step::DryRun, &Step::DryRun.axes(), scenario)?;
-    folder.evidence.basis.drives = std::array::from_fn(drive);
-    let (motion, motion_s) = (played.hash(Some(run))?, played.full_speed_s());
-    folder.finish_step(passed, &DryRun { run: run.to_owned(), motion, motion_s })
 }
 
 /// Refuses another motion than that of the newest dry run, and a longer one.
@@ -89,6 +69,62 @@ fn check_motion(past: &Past, played: &Played<'_>) -> anyhow::Result<()> {
 }
 
 impl Played<'_> {
+    /// Refuses a run on real interfaces without its earlier steps. The files are read before anything is sent; then the
+    /// drives tell who they are.
+    pub(crate) fn check_bring_up(&self) -> anyhow::Result<()> {
+        let scenario = self.scenario;
+        if scenario.can.is_virtual() {
+            return Ok(());
+        }
+        if self.is_waived {
+            status!(
+                "WITHOUT BRING-UP: signs, scales and zeros are not proved, and a wrong one can drive an axis into its end"
+            );
+            return Ok(());
+        }
+        let refused = "a run needs a passed pose check of this robot, and at full speed also a passed dry run; \
+                       --without-bring-up skips both: a wrong sign, scale or zero can then drive an axis into its end";
+        let folder = Path::new(FOLDER);
+        if let Some(&axis) = owed_axes(folder).first() {
+            bail!(owed_advice(folder, axis));
+        }
+        let past = Past::read(folder)?;
+        let unknown = Basis::new(scenario, NOT_ASKED);
+        let steps: &[Step] =
+            if scenario.dry.is_on { &[Step::CheckPose] } else { &[Step::CheckPose, Step::DryRun] };
+        let require = |basis: &Basis| {
+            steps.iter().try_for_each(|&step| past.require(step, &Step::DryRun.axes(), basis))
+        };
+        require(&unknown).context(refused)?;
+        if !scenario.dry.is_on {
+            check_motion(&past, self).context(refused)?;
+        }
+        let mut line = Line::open(scenario, Box::new(io::sink()))?;
+        let drives = Identity::read_all(&mut line, &scenario.can).context(refused)?.map(Known::Is);
+        require(&Basis { drives, ..unknown }).context(refused)?;
+        warn_of_gaps(&drives);
+        let checked = past.newest(Step::CheckPose, 0).context("there is no pose check")?;
+        let marks = marks_of_pose_check(checked).context(refused)?;
+        check_marks(scenario, &marks, &checked.started, &mut line).context(refused)
+    }
+
+    /// Notes in the folder of the bring-up, if there is one, whether a dry run passed. The drives are those of the pose
+    /// check, with which a dry run on real interfaces has compared them. A dry run without bring-up has compared nothing,
+    /// and counts for nothing.
+    pub(crate) fn keep_dry_run(&self, run: &Path, passed: bool) -> anyhow::Result<()> {
+        let (parent, scenario) = (Path::new(FOLDER), self.scenario);
+        if !scenario.dry.is_on || self.is_waived || !parent.is_dir() {
+            return Ok(());
+        }
+        let past = Past::read(parent)?;
+        let checked = |axis| past.newest(Step::CheckPose, axis);
+        let drive = |axis| checked(axis).map_or(Known::NotAsked, |checked| checked.basis.drives[axis]);
+        let mut folder = StepFolder::begin(parent, Step::DryRun, &Step::DryRun.axes(), scenario)?;
+        folder.evidence.basis.drives = std::array::from_fn(drive);
+        let (motion, motion_s) = (self.hash(Some(run))?, self.full_speed_s());
+        folder.finish_step(passed, &DryRun { run: run.to_owned(), motion, motion_s })
+    }
+
     /// Duration of the motion at full speed, s.
     fn full_speed_s(&self) -> f64 {
         self.motion_s * self.scenario.dry.speed_now()
@@ -116,44 +152,6 @@ impl Played<'_> {
     }
 }
 
-/// Refuses a run on real interfaces without its earlier steps. The files are read before anything is sent; then the
-/// drives tell who they are.
-pub(crate) fn check_bring_up(played: &Played<'_>, is_waived: bool) -> anyhow::Result<()> {
-    let scenario = played.scenario;
-    if scenario.can.is_virtual() {
-        return Ok(());
-    }
-    if is_waived {
-        status!(
-            "WITHOUT BRING-UP: signs, scales and zeros are not proved, and a wrong one can drive an axis into its end"
-        );
-        return Ok(());
-    }
-    let refused = "a run needs a passed pose check of this robot, and at full speed also a passed dry run; \
-                   --without-bring-up skips both: a wrong sign, scale or zero can then drive an axis into its end";
-    let folder = Path::new(FOLDER);
-    if let Some(&axis) = owed_axes(folder).first() {
-        bail!(owed_advice(folder, axis));
-    }
-    let past = Past::read(folder)?;
-    let unknown = Basis::new(scenario, NOT_ASKED);
-    let steps: &[Step] =
-        if scenario.dry.is_on { &[Step::CheckPose] } else { &[Step::CheckPose, Step::DryRun] };
-    let require =
-        |basis: &Basis| steps.iter().try_for_each(|&step| past.require(step, &Step::DryRun.axes(), basis));
-    require(&unknown).context(refused)?;
-    if !scenario.dry.is_on {
-        check_motion(&past, played).context(refused)?;
-    }
-    let mut line = Line::open(scenario, Box::new(io::sink()))?;
-    let drives = Identity::read_all(&mut line, &scenario.can).context(refused)?.map(Known::Is);
-    require(&Basis { drives, ..unknown }).context(refused)?;
-    warn_of_gaps(&drives);
-    let checked = past.newest(Step::CheckPose, 0).context("there is no pose check")?;
-    let marks = marks_of_pose_check(checked).context(refused)?;
-    check_marks(scenario, &marks, &checked.started, &mut line).context(refused)
-}
-
 #[cfg(test)]
 mod tests {
     use std::fs;
@@ -161,7 +159,7 @@ mod tests {
     use super::*;
 
     const fn played(scenario: &Scenario) -> Played<'_> {
-        Played { scenario, controller: None, motion_s: 3.0 }
+        Played { scenario, controller: None, motion_s: 3.0, is_waived: false }
     }
 
     fn hash(text: &str) -> String {

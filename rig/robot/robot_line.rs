@@ -6,15 +6,13 @@ use anyhow::ensure;
 use masseter_can::canopen::NodeId;
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::commissioning::{
-    BootUps, Deviation, Line, LineError, Outcome, PowerError, Settings, Survey, deviations, prove_no_power,
+    BootUps, Deviation, Known, Line, Outcome, PowerError, Settings, Survey, deviations, gaps, prove_no_power,
     take_over,
 };
 use masseter_plant::wanted::WantedDrive;
 use masseter_runtime::clock::MILLISECOND_NS;
 use masseter_scenario::{CanConfig, Scenario};
-use masseter_terminal::{Exit, Failure};
-
-use super::identity::Known;
+use masseter_terminal::{Exit, Failure, status};
 
 /// How long a step listens before its first question, ns: drives boot at power-on, and another master shows.
 pub(super) const LISTEN_NS: u64 = 500 * MILLISECOND_NS;
@@ -46,16 +44,6 @@ impl RobotLine {
         Ok(Self { line: Line::open(&scenario, log)?, scenario, wanted, settings })
     }
 
-    /// Listens until all drives may have booted. Returns their boot-ups until then: after a restart a survey is no more
-    /// than a memory.
-    ///
-    /// # Errors
-    /// When the bus or the log fails.
-    pub(crate) fn listen(&mut self) -> Result<BootUps, LineError> {
-        self.line.listen(LISTEN_NS)?;
-        Ok(BootUps::until_now(&self.line))
-    }
-
     /// Surveys of the drives that are to be written.
     ///
     /// # Errors
@@ -74,20 +62,12 @@ impl RobotLine {
         Ok(surveys)
     }
 
-    /// What a drive says of itself, and of the objects of these settings.
-    ///
-    /// # Errors
-    /// When the bus or the log fails.
-    pub(crate) fn survey(&mut self, axis: usize, settings: &Settings) -> Result<Survey, LineError> {
-        Survey::take(&mut self.line, axis, settings.addresses())
-    }
-
-    /// The same of a drive that answers to the end.
+    /// What a drive says of itself, and of the objects of these settings, to the end.
     ///
     /// # Errors
     /// When the bus or the log fails, or the drive does not answer.
     pub(crate) fn whole_survey(&mut self, axis: usize, settings: &Settings) -> anyhow::Result<Survey> {
-        let survey = self.survey(axis, settings)?;
+        let survey = Survey::of_drive(&mut self.line, axis, settings.addresses())?;
         ensure!(!survey.fell_silent(), "{}: {}", AXIS_NAMES[axis], self.silence(axis));
         Ok(survey)
     }
@@ -122,6 +102,13 @@ pub(crate) fn failed(error: impl Into<anyhow::Error>) -> Failure {
 /// The drives that were surveyed.
 pub(crate) fn drives(surveys: &Surveys, can: &CanConfig) -> [Known; AXES] {
     std::array::from_fn(|axis| Known::of_survey(surveys[axis].as_ref(), can.node_ids[axis]))
+}
+
+/// Warns of what the identities of drives leave open.
+pub(crate) fn warn_of_gaps(drives: &[Known; AXES]) {
+    for gap in gaps(drives) {
+        status!("warning: {gap}");
+    }
 }
 
 /// Proves that a drive has no power; one that has is stopped first if that is allowed.
@@ -184,12 +171,14 @@ pub(crate) fn deviations_table(deviations: &[(usize, Deviation)]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use masseter_can::canopen::ObjectAddress;
+
     use super::*;
 
     #[test]
     fn equal_deviations_share_a_row() {
         let deviation = |wanted: &str| Deviation {
-            object: "6066h:00h".to_owned(),
+            object: ObjectAddress::new(0x6066, 0),
             name: "Following error time out",
             wanted: wanted.to_owned(),
             found: "0".to_owned(),

@@ -2,7 +2,10 @@
 
 use anyhow::Context;
 use masseter_model::geometry::AXES;
-use masseter_plant::commissioning::{BootUps, Line, LineError, MotionError, StopCause};
+use masseter_plant::commissioning::{
+    AxisError, BootUps, Disturbance, Identity, Known, Line, LineError, MotionError, NOT_ASKED, StopCause,
+    check_present, check_undisturbed,
+};
 use masseter_runtime::lifecycle::StopRequest;
 use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
@@ -11,12 +14,9 @@ use serde_json::json;
 
 use super::args::RobotArgs;
 use super::evidence::{Basis, Past, Step, StepFolder};
-use super::identity::{
-    Disturbance, Identity, Known, NOT_ASKED, check_present, check_undisturbed, warn_of_gaps,
-};
 use super::ledger::{OwedFiles, return_owed_values};
 use super::power_mark::remove_mark;
-use super::robot_line::{LISTEN_NS, failed, wanted_drive};
+use super::robot_line::{LISTEN_NS, failed, wanted_drive, warn_of_gaps};
 
 /// All axes.
 const ALL: [usize; AXES] = [0, 1, 2, 3, 4, 5];
@@ -110,15 +110,13 @@ impl Session {
         let exit = match &error {
             // No motion begins before its values are in the drive.
             MotionError::Line(LineError::NotKept { .. }) => Exit::Failed,
-            MotionError::Stopped { cause: StopCause::Requested, .. } => Exit::Interrupted,
-            MotionError::Stopped { .. }
-            | MotionError::StaysOn { .. }
-            | MotionError::Unread { .. }
-            | MotionError::Line(_) => Exit::SafeStop,
-            MotionError::Way { .. } | MotionError::NoHomePosition { .. } | MotionError::Powered { .. } => {
-                Exit::Usage
-            }
-            _ => Exit::Failed,
+            MotionError::Line(_) | MotionError::Unread { .. } => Exit::SafeStop,
+            MotionError::OfAxis { reason, .. } => match reason {
+                AxisError::Stopped(StopCause::Requested) => Exit::Interrupted,
+                AxisError::Stopped(_) | AxisError::StaysOn(_) => Exit::SafeStop,
+                AxisError::Way { .. } | AxisError::NoHomePosition | AxisError::Powered(_) => Exit::Usage,
+                _ => Exit::Failed,
+            },
         };
         self.fail(exit, error)
     }

@@ -4,11 +4,11 @@ use std::fmt::Write;
 
 use clap::Args;
 use masseter_model::geometry::{AXES, AXIS_NAMES};
+use masseter_plant::commissioning::{Identity, Known};
 use masseter_terminal::{Exit, Tone, result, result_with_tones};
 
 use super::args::RobotArgs;
 use super::evidence::{Basis, Past, Step};
-use super::identity::{Identity, Known};
 
 /// The arguments of `robot status` and `robot report`.
 #[derive(Debug, Clone, Args)]

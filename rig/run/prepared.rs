@@ -20,7 +20,7 @@ use super::resolve::resolve;
 use super::room::{self, Reserve};
 use super::supervisor;
 use crate::robot::Played;
-use crate::{BUILD, doctor, robot};
+use crate::{BUILD, doctor};
 
 /// Where runs without `--out` go.
 const RUNS: &str = "runs";
@@ -53,8 +53,9 @@ impl PreparedRun {
         room::check_memory().usage()?;
         let (plan, request) = resolve(request).usage()?;
         let (controller, motion_s) = (request.controller.name(), plan.trajectory.duration_s());
-        let played = Played { scenario: &plan.scenario, controller: controller.as_deref(), motion_s };
-        robot::check_bring_up(&played, request.without_bring_up).usage()?;
+        let (scenario, is_waived) = (&plan.scenario, request.without_bring_up);
+        let played = Played { scenario, controller: controller.as_deref(), motion_s, is_waived };
+        played.check_bring_up().usage()?;
         room::check_disk(request.out.as_deref().unwrap_or(RUNS.as_ref()), &plan).incomplete()?;
         let domain = match request.clock {
             ClockKind::Virtual => None,
@@ -114,9 +115,9 @@ impl PlayedRun {
         written?;
         let controller = request.controller.name();
         let Manifest { scenario, motion_s, .. } = &manifest;
-        let played = Played { scenario, controller: controller.as_deref(), motion_s: *motion_s };
-        robot::keep_dry_run(&played, folder.path(), exit == Exit::Passed, request.without_bring_up)
-            .incomplete()?;
+        let (controller, is_waived) = (controller.as_deref(), request.without_bring_up);
+        let played = Played { scenario, controller, motion_s: *motion_s, is_waived };
+        played.keep_dry_run(folder.path(), exit == Exit::Passed).incomplete()?;
         Ok(exit)
     }
 

@@ -106,7 +106,6 @@ const MAY_USE: [(&str, &[&str]); 27] = [
             "rig/record/recording",
             "rig/judge",
             "rig/run/virtual_time",
-            "rig/show/charts",
             "rig/show/terminal",
         ],
     ),

@@ -13,7 +13,6 @@
 mod bernstein;
 mod certificate;
 mod elimination;
-mod enclosure;
 mod equations;
 mod legs;
 mod loop_equations;
@@ -21,7 +20,6 @@ mod solution;
 mod solutions;
 mod solver;
 mod tracker;
-pub mod uniqueness;
 
 pub use certificate::Certificate;
 pub use equations::{Equations, Evaluation};

@@ -5,7 +5,7 @@
 //! oriented by (A₂−A₁)×(A₃−A₁), the legs stand above the base, and the Jacobian's determinant is positive.
 //!
 //! All five together do *not* always leave one solution. Near the edge of the strokes about one standing input in 23,000
-//! has two (see [`uniqueness`](super::uniqueness)). Nothing here relies on a single solution.
+//! has two (`docs/uniqueness.md`). Nothing here relies on a single solution.
 
 use masseter_model::geometry::{AXIS_NAMES, Actuators, LEGS, Legs, Mechanism, Pose, Vec3, frame_of_corners};
 use nalgebra::Vector3;

@@ -6,7 +6,7 @@ use masseter_scenario::{
 };
 
 use super::mandible::{Mandible, Posture, reach};
-use super::{TrajectoryError, require, require_within};
+use super::{TrajectoryError, ranges_of};
 
 /// Share of the opening after which a swing to the side begins: the jaw opens near the midline.
 const SWING_BEGINS: f64 = 0.3;
@@ -45,9 +45,7 @@ pub(super) struct Chewing {
 impl Chewing {
     pub(super) fn new(config: &ChewingConfig, jaw: &JawConfig) -> Result<Self, TrajectoryError> {
         let ChewingConfig { vertical_mm, lateral_mm, anterior_posterior_mm, side, .. } = *config;
-        require_within("motion.vertical_mm", vertical_mm, 0.0..=60.0, "0 to 60 mm")?;
-        require_within("motion.lateral_mm", lateral_mm, 0.0..=15.0, "0 to 15 mm")?;
-        require_within("motion.anterior_posterior_mm", anterior_posterior_mm, -15.0..=40.0, "-15 to 40 mm")?;
+        config.check_ranges(ranges_of("motion"))?;
         let mut chewing = Self {
             mandible: Mandible::new(jaw, config.condylar_inclination_deg, config.bennett_angle_deg, side)?,
             cycle: MotionRhythm::new(config.cycle_rate_hz, &config.phases)?,
@@ -120,6 +118,7 @@ pub(super) struct Excursion {
 
 impl Excursion {
     pub(super) fn opening(config: &OpeningConfig, jaw: &JawConfig) -> Result<Self, TrajectoryError> {
+        config.check_ranges(ranges_of("motion"))?;
         let mandible = Mandible::symmetric(jaw, config.condylar_inclination_deg)?;
         let cycle = MotionRhythm::new(config.cycle_rate_hz, &config.phases)?;
         let posture = |pitch_rad| {
@@ -133,14 +132,15 @@ impl Excursion {
     }
 
     pub(super) fn protrusion(config: &ProtrusionConfig, jaw: &JawConfig) -> Result<Self, TrajectoryError> {
+        config.check_ranges(ranges_of("motion"))?;
         let mandible = Mandible::symmetric(jaw, config.condylar_inclination_deg)?;
         let cycle = MotionRhythm::new(config.cycle_rate_hz, &config.phases)?;
-        require_within("motion.amplitude_mm", config.amplitude_mm, 0.0..=15.0, "0 to 15 mm")?;
         let farthest = Posture { advance_m: config.amplitude_mm / 1000.0, ..Default::default() };
         Ok(Self { mandible, cycle, farthest })
     }
 
     pub(super) fn lateral(config: &LateralConfig, jaw: &JawConfig) -> Result<Self, TrajectoryError> {
+        config.check_ranges(ranges_of("motion"))?;
         let LateralConfig { condylar_inclination_deg, bennett_angle_deg, side, .. } = *config;
         let mandible = Mandible::new(jaw, condylar_inclination_deg, bennett_angle_deg, side)?;
         let cycle = MotionRhythm::new(config.cycle_rate_hz, &config.phases)?;
@@ -160,7 +160,6 @@ impl Excursion {
 
 /// The coordinate at which the incisal point's travel, metres, is the amplitude.
 fn farthest(amplitude_mm: f64, highest: f64, travel_m: impl Fn(f64) -> f64) -> Result<f64, TrajectoryError> {
-    require("motion.amplitude_mm", amplitude_mm, amplitude_mm >= 0.0, "0 or above")?;
     reach("motion.amplitude_mm", amplitude_mm, highest, |coordinate| Some(travel_m(coordinate)))
 }
 
@@ -179,11 +178,7 @@ pub(super) struct MotionRhythm {
 impl MotionRhythm {
     fn new(rate_hz: f64, phases: &PhaseShares) -> Result<Self, TrajectoryError> {
         let PhaseShares { opening, closing, occlusion } = *phases;
-        let is_possible = rate_hz > 0.0 && rate_hz <= 10.0;
-        require("motion.cycle_rate_hz", rate_hz, is_possible, "above 0 and at most 10 Hz")?;
-        require("motion.phases.opening", opening, opening > 0.0, "above 0")?;
-        require("motion.phases.closing", closing, closing > 0.0, "above 0")?;
-        require("motion.phases.occlusion", occlusion, occlusion >= 0.0, "0 or above")?;
+        phases.check_ranges(ranges_of("motion.phases"))?;
         let sum = opening + closing + occlusion;
         if (sum - 1.0).abs() > 1e-6 {
             let problem = "opening, closing and occlusion must add up to 1";
@@ -360,7 +355,8 @@ mod tests {
             MotionRhythm::new(1.0, &phases).unwrap_err().to_string().starts_with("motion.phases add up to ")
         );
         for rate_hz in [0.0, -1.0, f64::NAN, 11.0] {
-            assert!(MotionRhythm::new(rate_hz, &PhaseShares::default()).is_err());
+            let config = ProtrusionConfig { cycle_rate_hz: rate_hz, ..Default::default() };
+            assert!(Excursion::protrusion(&config, &JawConfig::default()).is_err());
         }
     }
 

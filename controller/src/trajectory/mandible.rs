@@ -13,13 +13,11 @@ use masseter_model::geometry::{Actuators, LEGS, Mechanism, Pose, Vec3};
 use masseter_scenario::{JawConfig, JawSide};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
-use super::{TrajectoryError, require, require_within};
+use super::{TrajectoryError, ranges_of, require};
 use crate::kinematics::solve_completely;
 
 /// An amplitude that is missed by no more is reached, mm.
 const REACHED_MM: f64 = 1e-6;
-/// Farthest offset on a robot that fits on a table, m.
-const FARTHEST_M: f64 = 1.0;
 
 /// A rigid mandible; jaw frame at the closed pose.
 #[derive(Debug, Clone, Copy)]
@@ -75,7 +73,7 @@ pub(super) fn jaw_points(jaw: &JawConfig) -> Result<[Vec3; 3], TrajectoryError> 
 pub(super) fn condylar_middle(jaw: &JawConfig) -> Result<Vec3, TrajectoryError> {
     let side_m = jaw.bonwill_side_m;
     let balkwill_deg = jaw.balkwill_angle_deg;
-    require_within("jaw.bonwill_side_m", side_m, 0.01..=1.0, "0.01 m to 1 m")?;
+    jaw.check_ranges(ranges_of("jaw"))?;
     require("jaw.balkwill_angle_deg", balkwill_deg, (0.0..90.0).contains(&balkwill_deg), "0 to below 90")?;
     let height_m = side_m * 3f64.sqrt() / 2.0;
     let (sin, cos) = balkwill_deg.to_radians().sin_cos();
@@ -90,8 +88,6 @@ impl Mandible {
         bennett_angle_deg: f64,
         working: JawSide,
     ) -> Result<Self, TrajectoryError> {
-        require_within("motion.condylar_inclination_deg", inclination_deg, 0.0..=80.0, "0 to 80")?;
-        require_within("motion.bennett_angle_deg", bennett_angle_deg, 0.0..=45.0, "0 to 45")?;
         let (down, forward) = inclination_deg.to_radians().sin_cos();
         let (inward, straight) = bennett_angle_deg.to_radians().sin_cos();
         let working = working.sign();
@@ -226,15 +222,8 @@ fn jaw_in_platform(jaw: &JawConfig, closed: &Pose) -> Pose {
 /// # Errors
 /// When a value lies outside its range, or no such pose exists.
 pub fn closed_pose(jaw: &JawConfig, mechanism: &Mechanism) -> Result<Pose, TrajectoryError> {
-    let JawConfig { closed_leg_m, reference_point_m, closed_offset_m, .. } = *jaw;
-    require("jaw.closed_leg_m", closed_leg_m, closed_leg_m > 0.0, "above 0")?;
-    for (name, point) in
-        [("jaw.reference_point_m", reference_point_m), ("jaw.closed_offset_m", closed_offset_m)]
-    {
-        for coordinate in point {
-            require_within(name, coordinate, -FARTHEST_M..=FARTHEST_M, "within ±1 m")?;
-        }
-    }
+    let JawConfig { closed_leg_m, closed_offset_m, .. } = *jaw;
+    jaw.check_ranges(ranges_of("jaw"))?;
     let actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [closed_leg_m; LEGS] };
     let closed = solve_completely(mechanism, &actuators).map_err(|error| {
         TrajectoryError(format!("jaw.closed_leg_m = {closed_leg_m:?} m gives no closed pose: {error}"))
@@ -269,7 +258,7 @@ mod tests {
         };
         assert!([(0.01, 0.0), (1.0, 89.9)].into_iter().all(|(side_m, deg)| of(side_m, deg).is_ok()));
         for side_m in [0.0099, 1.01, 3.8e173, f64::NAN] {
-            assert!(of(side_m, 22.5).is_err_and(|error| error.contains("0.01 m to 1 m")), "{side_m}");
+            assert!(of(side_m, 22.5).is_err_and(|error| error.contains("0.01 to 1 m")), "{side_m}");
         }
         for deg in [-0.1, 90.0] {
             assert!(of(0.1, deg).is_err_and(|error| error.contains("0 to below 90")), "{deg}");

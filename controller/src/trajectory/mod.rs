@@ -16,9 +16,8 @@ mod recording;
 mod survey;
 mod table;
 
-use std::ops::RangeInclusive;
-
 use masseter_model::geometry::Pose;
+use masseter_model::section;
 use nalgebra::UnitQuaternion;
 
 pub use check::{TrajectoryReport, check};
@@ -40,14 +39,14 @@ fn require(name: &str, value: f64, holds: bool, need: &str) -> Result<(), Trajec
     if holds && value.is_finite() { Ok(()) } else { Err(problem()) }
 }
 
-/// Refuses a value outside a range.
-fn require_within(
-    name: &str,
-    value: f64,
-    range: RangeInclusive<f64>,
-    need: &str,
-) -> Result<(), TrajectoryError> {
-    require(name, value, range.contains(&value), need)
+/// Refuses a number out of the range that is declared beside its key, in this table.
+fn ranges_of(table: &str) -> impl Fn(&str, section::Range, f64) -> Result<(), TrajectoryError> {
+    move |key, range, number| {
+        if range.contains(number) {
+            return Ok(());
+        }
+        Err(TrajectoryError(format!("{table}.{key} is {number:?}; it must be {}", range.of_key(key))))
+    }
 }
 
 /// The pose at a share of the way from one pose to another: position and turn by as much.

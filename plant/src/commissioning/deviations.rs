@@ -2,16 +2,18 @@
 //!
 //! Units and ratios of a drive stand beside those of its profile: a wrong one scales every motion.
 
+use std::fmt::Display;
+
 use masseter_can::canopen::{CobId, ObjectAddress};
 use masseter_can::cia402::Statusword;
 use masseter_scenario::{
     AccelerationUnit, DriveProfile, INCREMENTS, ObjectConfig, ObjectKey, ObjectRule, VelocityUnit,
 };
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::errors::{object_name, reason_text, value_text};
 use super::settings::{Difference, Settings, Survey};
-use crate::master::wanted::{WantedDrive, WantedIdentity};
+use crate::master::wanted::{Setting, WantedDrive, WantedIdentity};
 
 /// Bit of 6502h: cyclic synchronous position.
 const CYCLIC_POSITION: u32 = 1 << 7;
@@ -30,14 +32,15 @@ pub fn deviations(
     let differences = settings.differences(survey);
     // A unit that the profile writes is mended; one that it expects is told in words.
     all.retain(|found| {
-        let mut written = differences.iter().filter(|difference| difference.rule != ObjectRule::Expect);
-        !written.any(|difference| difference.object == found.object)
+        let mut written = differences.iter().filter(|one| one.wanted.rule != ObjectRule::Expect);
+        !written.any(|one| one.wanted.object.0 == found.object)
     });
     all.extend(of_ratios(survey, profile, wanted.increment_m));
-    let is_told = |difference: &&Difference| all.iter().any(|found| found.object == difference.object);
-    let others: Vec<_> = differences.iter().filter(|difference| !is_told(difference)).collect();
-    all.extend(others.into_iter().map(|difference| of_object(survey, difference)));
-    all.into_iter().map(|found| found.deviation).collect()
+    let is_told = |one: &&Difference| all.iter().any(|found| found.object == one.wanted.object.0);
+    let others: Vec<_> =
+        differences.iter().filter(|one| !is_told(one)).map(|one| of_object(survey, one)).collect();
+    all.extend(others);
+    all
 }
 
 /// A value, or why there is none.
@@ -46,7 +49,7 @@ fn found_text(survey: &Survey, object: ObjectAddress) -> String {
     survey.number(object).map_or_else(refusal, |value| value_text(object, value))
 }
 
-fn of_identity(survey: &Survey, WantedIdentity { object, mask, value }: WantedIdentity) -> Option<Found> {
+fn of_identity(survey: &Survey, WantedIdentity { object, mask, value }: WantedIdentity) -> Option<Deviation> {
     let is_right = survey.number(object).is_some_and(|found| found & mask == value & mask);
     let key = match object {
         ObjectAddress { index: 0x1000, .. } => "drive_profile.identity.device_type",
@@ -54,38 +57,38 @@ fn of_identity(survey: &Survey, WantedIdentity { object, mask, value }: WantedId
         ObjectAddress { subindex: 2, .. } => "drive_profile.identity.product_code",
         _ => "drive_profile.identity.revision",
     };
-    let values = [value_text(object, value & mask), found_text(survey, object)];
+    let (wanted, found) = (value_text(object, value & mask), found_text(survey, object));
     let remedy = "enter this drive's identity, or use the drive that the profile is for";
-    (!is_right).then(|| Found::new(object, values, Outcome::Refused, remedy, key))
+    (!is_right).then(|| Deviation::new(object, wanted, found, Outcome::Refused, remedy, key))
 }
 
-fn of_state(survey: &Survey) -> Vec<Found> {
+fn of_state(survey: &Survey) -> Vec<Deviation> {
     let (modes, status) = (ObjectAddress::new(0x6502, 0), ObjectAddress::new(0x6041, 0));
     let mut all = Vec::new();
     if survey.number(modes).is_some_and(|modes| modes & CYCLIC_POSITION == 0) {
-        let values = ["bit 7".to_owned(), found_text(survey, modes)];
         let remedy = "the drive has no cyclic synchronous position mode: the rig cannot use it";
-        all.push(Found::new(modes, values, Outcome::Refused, remedy, ""));
+        let found = found_text(survey, modes);
+        all.push(Deviation::new(modes, "bit 7", found, Outcome::Refused, remedy, ""));
     }
     let state = survey.number(status).map(|word| Statusword(word as u16).state());
     if let Some(Ok(state)) = state
         && state.is_powered()
     {
-        let values = ["no voltage".to_owned(), format!("{state:?}")];
         let remedy = "configure refuses unless --take-over may stop the drive";
-        all.push(Found::new(status, values, Outcome::Doubtful, remedy, ""));
+        let found = format!("{state:?}");
+        all.push(Deviation::new(status, "no voltage", found, Outcome::Doubtful, remedy, ""));
     }
     let error = ObjectAddress::new(0x603F, 0);
     if survey.number(error).is_some_and(|code| code != 0) {
-        let values = ["0h".to_owned(), found_text(survey, error)];
-        all.push(Found::new(error, values, Outcome::Doubtful, "find the cause in the drive's manual", ""));
+        let (found, remedy) = (found_text(survey, error), "find the cause in the drive's manual");
+        all.push(Deviation::new(error, "0h", found, Outcome::Doubtful, remedy, ""));
     }
     all.extend(of_switches(survey));
     all
 }
 
 /// A limit switch that is closed while the axis stands.
-fn of_switches(survey: &Survey) -> Option<Found> {
+fn of_switches(survey: &Survey) -> Option<Deviation> {
     let inputs = ObjectAddress::new(0x60FD, 0);
     let closed = match survey.number(inputs)? & 0b11 {
         0 => return None,
@@ -95,31 +98,31 @@ fn of_switches(survey: &Survey) -> Option<Found> {
     };
     let remedy =
         "a limit switch: the axis is at its end, or its wire is broken; no jog goes in its direction";
-    let values = ["open", closed].map(str::to_owned);
-    Some(Found::new(inputs, values, Outcome::Doubtful, remedy, ""))
+    Some(Deviation::new(inputs, "open", closed, Outcome::Doubtful, remedy, ""))
 }
 
-fn of_object(survey: &Survey, difference: &Difference) -> Found {
-    let Difference { object, wanted, found, rule, key } = difference;
+fn of_object(survey: &Survey, difference: &Difference) -> Deviation {
+    let Difference { wanted: Setting { object: ObjectKey(object), value, rule, key, .. }, found } =
+        difference;
     let is_pdo = (0x1400..0x1C00).contains(&object.index);
     let is_communication = matches!(object.index, 0x1400..0x1600 | 0x1800..0x1A00);
-    let is_off = is_communication && object.subindex == 1 && !CobId(*wanted).is_valid();
+    let is_off = is_communication && object.subindex == 1 && !CobId(*value).is_valid();
+    let wanted = if is_off { "off".to_owned() } else { value_text(*object, *value) };
+    let write = format!("write {wanted}");
     let (outcome, remedy) = match (rule, found) {
-        (ObjectRule::Expect, _) => (Outcome::Refused, "the profile expects another value".to_owned()),
-        (ObjectRule::Optional, None) => (Outcome::Doubtful, "left".to_owned()),
+        (ObjectRule::Expect, _) => (Outcome::Refused, "the profile expects another value"),
+        (ObjectRule::Optional, None) => (Outcome::Doubtful, "left"),
         (_, None) if !is_pdo => {
-            let remedy = "the drive has no such object: give it the rule 'absent' or 'optional'";
-            (Outcome::Refused, remedy.to_owned())
+            (Outcome::Refused, "the drive has no such object: give it the rule 'absent' or 'optional'")
         }
-        (_, None) if is_communication => (Outcome::Refused, "the drive has no such PDO".to_owned()),
-        (_, None) => (Outcome::Mended, "map".to_owned()),
-        (_, Some(_)) if is_off => (Outcome::Mended, "switch off".to_owned()),
-        (_, Some(_)) => (Outcome::Mended, format!("write {}", value_text(*object, *wanted))),
+        (_, None) if is_communication => (Outcome::Refused, "the drive has no such PDO"),
+        (_, None) => (Outcome::Mended, "map"),
+        (_, Some(_)) if is_off => (Outcome::Mended, "switch off"),
+        (_, Some(_)) => (Outcome::Mended, write.as_str()),
     };
-    let wanted = if is_off { "off".to_owned() } else { value_text(*object, *wanted) };
     let is_missing = outcome == Outcome::Refused && found.is_none() && !is_pdo;
     let key = if is_missing { "drive_profile.objects" } else { key };
-    Found::new(*object, [wanted, found_text(survey, *object)], outcome, &remedy, key)
+    Deviation::new(*object, wanted, found_text(survey, *object), outcome, remedy, key)
 }
 
 /// What becomes of a deviation.
@@ -137,8 +140,9 @@ pub enum Outcome {
 /// One deviation.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Deviation {
-    /// The object, such as `6066h:00h`.
-    pub object: String,
+    /// The object.
+    #[serde(serialize_with = "as_text")]
+    pub object: ObjectAddress,
     /// Its name.
     pub name: &'static str,
     /// The value that the rig needs.
@@ -153,25 +157,24 @@ pub struct Deviation {
     pub key: String,
 }
 
-/// A deviation with the object that it is of.
-struct Found {
-    object: ObjectAddress,
-    deviation: Deviation,
-}
-
-impl Found {
-    /// A deviation of an object: its value as wanted and as found, in words.
+impl Deviation {
+    /// Of an object: its value as wanted and as found, in words.
     fn new(
         object: ObjectAddress,
-        [wanted, found]: [String; 2],
+        wanted: impl Into<String>,
+        found: impl Into<String>,
         outcome: Outcome,
-        remedy: &str,
+        remedy: impl Into<String>,
         key: &str,
     ) -> Self {
-        let (name, remedy, key) = (object_name(object), remedy.to_owned(), key.to_owned());
-        let deviation = Deviation { object: object.to_string(), name, wanted, found, outcome, remedy, key };
-        Self { object, deviation }
+        let (name, wanted, found) = (object_name(object), wanted.into(), found.into());
+        Self { object, name, wanted, found, outcome, remedy: remedy.into(), key: key.to_owned() }
     }
+}
+
+/// Serialises a value as it prints, such as `6066h:00h`.
+pub(super) fn as_text<S: Serializer>(value: &impl Display, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(value)
 }
 
 /// Degrees, tenths of a degree and turns of the screw; millimetres and micrometres (CiA 303-2).
@@ -212,15 +215,14 @@ fn way_m(code: u32, lead_m: Option<f64>) -> Option<f64> {
 }
 
 /// The unit of 6064h (60A8h): one as long as the rig's increment is as good as increments.
-fn of_position(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Option<Found> {
+fn of_position(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Option<Deviation> {
     let object = ObjectAddress::new(0x60A8, 0);
     let code = told(survey, profile, object).filter(|&code| code != INCREMENTS)?;
-    let values = |found: &str| ["increments".to_owned(), found.to_owned()];
     let Some(unit) = unit_name(code) else {
         let (found, key) = (value_text(object, code), "drive_profile.objects");
         let remedy =
             format!("the drive counts position in {found}, the profile declares increments: change one");
-        return Some(Found::new(object, values(&found), Outcome::Doubtful, &remedy, key));
+        return Some(Deviation::new(object, "increments", found, Outcome::Doubtful, remedy, key));
     };
     let (remedy, key) = match way_m(code, profile.units.lead_m) {
         Some(way_m) if (way_m / increment_m - 1.0).abs() < 1e-6 => return None,
@@ -238,12 +240,12 @@ fn of_position(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Opt
             (remedy, "drive_profile.units.lead_m")
         }
     };
-    Some(Found::new(object, values(unit), Outcome::Refused, &remedy, key))
+    Some(Deviation::new(object, "increments", unit, Outcome::Refused, remedy, key))
 }
 
 /// Units of the drive, as far as it has objects for them (60A8h to 60AAh). A value that `configure` writes counts,
 /// not the one that it replaces.
-fn of_units(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Found> {
+fn of_units(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Deviation> {
     let units = &profile.units;
     let declared = [
         (0x60A9, units.velocity.code(), "velocity", "drive_profile.units.velocity"),
@@ -260,7 +262,7 @@ fn of_units(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Fo
         };
         let remedy =
             format!("the drive counts {quantity} in {found}, the profile declares {declared}: change one");
-        Some(Found::new(object, [declared.to_owned(), found], outcome, &remedy, key))
+        Some(Deviation::new(object, declared, found, outcome, remedy, key))
     };
     of_position(survey, profile, increment_m)
         .into_iter()
@@ -283,7 +285,7 @@ fn told(survey: &Survey, profile: &DriveProfile, object: ObjectAddress) -> Optio
 /// Ratios by which the drive counts its way, as far as the drive has them: gear, feed and encoder. A wrong one scales
 /// every motion. Without a lead the profile declares no travel, so that a gear is only to be looked at. A feed decides
 /// the unit of 6064h; the encoder decides without one.
-fn of_ratios(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Found> {
+fn of_ratios(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Deviation> {
     let units = &profile.units;
     let part = |index, subindex| told(survey, profile, ObjectAddress::new(index, subindex)).map(f64::from);
     let ratio = |index| Some(part(index, 1)? / part(index, 2).filter(|&turns| turns > 0.0)?);
@@ -308,7 +310,7 @@ fn of_ratios(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<F
         let text = |ratio: f64| format!("{} {unit}", (ratio * 1e6).round() / 1e6);
         let remedy = format!("the drive has {}, the profile {}: change one", text(found), text(wanted));
         let is_right = (found / wanted - 1.0).abs() < 1e-6;
-        (!is_right).then(|| Found::new(object, [text(wanted), text(found)], outcome, &remedy, key))
+        (!is_right).then(|| Deviation::new(object, text(wanted), text(found), outcome, remedy, key))
     };
     ratios.into_iter().filter_map(of_ratio).collect()
 }
@@ -332,9 +334,9 @@ mod deviations_tests {
         line.listen(100 * MILLISECOND_NS).unwrap();
         let wanted = WantedDrive::of_axis(&scenario, 3, NodeId::new(4).unwrap()).unwrap();
         let settings = Settings::wanted(&wanted);
-        let survey = Survey::take(&mut line, 3, settings.addresses()).unwrap();
+        let survey = Survey::of_drive(&mut line, 3, settings.addresses()).unwrap();
         let all = deviations(&survey, &wanted, &settings, scenario.profile(3));
-        all.into_iter().map(|one| (one.object, one.outcome, one.remedy)).collect()
+        all.into_iter().map(|one| (one.object.to_string(), one.outcome, one.remedy)).collect()
     }
 
     #[test]
@@ -377,7 +379,7 @@ mod deviations_tests {
         for (bits, found) in [(0b100, None), (0b110, Some("positive closed")), (0b011, Some("both closed"))] {
             let mut survey = Survey::default();
             survey.insert(ObjectAddress::new(0x60FD, 0), bits);
-            let deviation = of_switches(&survey).map(|found| found.deviation);
+            let deviation = of_switches(&survey);
             assert_eq!(deviation.as_ref().map(|one| one.found.as_str()), found);
             assert!(deviation.is_none_or(|one| one.outcome == Outcome::Doubtful));
         }
@@ -399,10 +401,10 @@ mod units_tests {
         survey.insert(ObjectAddress::new(0x60AA, 0), 0x00C0_0300);
         let all = of_units(&survey, &DriveProfile::default(), 1e-6);
         assert_eq!(
-            all[0].deviation.remedy,
+            all[0].remedy,
             "the drive counts acceleration in rpm/s, the profile declares increments/s²: change one"
         );
-        assert_eq!(all[0].deviation.outcome, Outcome::Refused);
+        assert_eq!(all[0].outcome, Outcome::Refused);
     }
 
     /// A drive of the default profile too: as delivered some count tenths of a degree.
@@ -415,10 +417,7 @@ mod units_tests {
             }
             let scenario = Scenario::parse(Path::new("robot.toml"), profile).unwrap();
             let all = of_units(&survey, scenario.profile(3), 1e-6);
-            all.into_iter()
-                .map(|found| found.deviation)
-                .map(|one| (one.object, one.outcome, one.remedy))
-                .collect::<Vec<_>>()
+            all.into_iter().map(|one| (one.object.to_string(), one.outcome, one.remedy)).collect::<Vec<_>>()
         };
         let profile = |keys: &str| format!("[[drive_profile]]\n{keys}");
         let right = [(0x60A8, 0x00B5_0000), (0x60A9, 0x00B5_0300), (0x60AA, 0x00B5_5700)];
@@ -448,10 +447,7 @@ mod units_tests {
             let profile = format!("[[drive_profile]]\n{keys}");
             let scenario = Scenario::parse(Path::new("robot.toml"), &profile).unwrap();
             let all = of_units(&survey, scenario.profile(3), increment_m);
-            all.into_iter()
-                .map(|found| found.deviation)
-                .map(|one| (one.outcome, one.remedy))
-                .collect::<Vec<_>>()
+            all.into_iter().map(|one| (one.outcome, one.remedy)).collect::<Vec<_>>()
         };
         let lead = "units = { lead_m = 0.003 }";
         for (code, increment_m) in [
@@ -483,10 +479,7 @@ mod units_tests {
             let text = format!("[[drive_profile]]\n{profile}");
             let scenario = Scenario::parse(Path::new("robot.toml"), &text).unwrap();
             let all = of_ratios(&survey, scenario.profile(3), 1e-6);
-            all.into_iter()
-                .map(|found| found.deviation)
-                .map(|one| (one.outcome, one.remedy))
-                .collect::<Vec<_>>()
+            all.into_iter().map(|one| (one.outcome, one.remedy)).collect::<Vec<_>>()
         };
         let lead = "units = { gear_ratio = 2.5, lead_m = 0.01 }";
         let right = [(0x6091, 5, 2), (0x6092, 10_000, 1), (0x608F, 4000, 1)];

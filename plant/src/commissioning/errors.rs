@@ -5,7 +5,7 @@ use std::io;
 
 use masseter_can::SendError;
 use masseter_can::canopen::{AbortCode, EmergencyCode, ObjectAddress};
-use masseter_can::cia402::DriveState;
+use masseter_can::cia402::{DriveState, StatuswordError};
 use masseter_model::geometry::AXIS_NAMES;
 
 use crate::error::PlantError;
@@ -20,9 +20,6 @@ pub enum SdoReason {
     /// Nothing came.
     #[error("no answer; check its power, wiring, bit rate and node id")]
     Silent,
-    /// The answers do not follow the protocol, or never end.
-    #[error("answers beside the protocol; check whether two nodes have this id")]
-    Malformed,
 }
 
 /// Why an object could not be read.
@@ -145,7 +142,7 @@ impl Display for MasterSign {
 }
 
 /// Another master, which may control the drives.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 #[error("bus {bus}: another master sends {sign}; end that program")]
 pub struct OtherMaster {
     /// The bus.
@@ -267,58 +264,6 @@ pub enum MotionError {
     /// The line failed.
     #[error(transparent)]
     Line(#[from] LineError),
-    /// The axis was stopped and switched off.
-    #[error("{}: {cause}; the axis is off", AXIS_NAMES[*axis])]
-    Stopped {
-        /// The axis.
-        axis: usize,
-        /// Why.
-        cause: StopCause,
-    },
-    /// A drive has power that this step did not give.
-    #[error("{}: {state} already; end the program that controls it, and switch the drive off", AXIS_NAMES[*axis])]
-    Powered {
-        /// The axis.
-        axis: usize,
-        /// The state of its drive.
-        state: DriveState,
-    },
-    /// The drive does not go to "operation enabled".
-    #[error("{}: stays in {state} (error code {error_code:04X}h); check safe torque off, supply and faults", AXIS_NAMES[*axis])]
-    NotEnabled {
-        /// The axis.
-        axis: usize,
-        /// The state of its drive.
-        state: DriveState,
-        /// 603Fh.
-        error_code: u16,
-    },
-    /// The drive does not take a mode of operation.
-    #[error("{}: mode {wanted} was asked for, 6061h shows {found}; check 6502h", AXIS_NAMES[*axis])]
-    Mode {
-        /// The axis.
-        axis: usize,
-        /// The mode.
-        wanted: i8,
-        /// 6061h.
-        found: i8,
-    },
-    /// A statusword of no state.
-    #[error("{}: {source}", AXIS_NAMES[*axis])]
-    Statusword {
-        /// The axis.
-        axis: usize,
-        /// The statusword.
-        source: masseter_can::cia402::StatuswordError,
-    },
-    /// The drive did not confirm that it is off.
-    #[error("{}: NOT PROVED OFF ({reason}); press the emergency stop. The next step that writes gives the old limits back", AXIS_NAMES[*axis])]
-    StaysOn {
-        /// The axis.
-        axis: usize,
-        /// What is known.
-        reason: String,
-    },
     /// The drive did not answer, or with no state, and the axis was switched off afterwards.
     #[error("{source}; {} is off", AXIS_NAMES[*axis])]
     Unread {
@@ -327,24 +272,65 @@ pub enum MotionError {
         /// What ended the motion.
         source: Box<MotionError>,
     },
+    /// An axis or its drive.
+    #[error("{}: {reason}", AXIS_NAMES[*axis])]
+    OfAxis {
+        /// The axis.
+        axis: usize,
+        /// The reason.
+        reason: AxisError,
+    },
+}
+
+/// Why one axis did not begin a motion, or ended one early.
+#[derive(Debug, thiserror::Error)]
+pub enum AxisError {
+    /// It was stopped and switched off.
+    #[error("{0}; the axis is off")]
+    Stopped(StopCause),
+    /// The drive has power that this step did not give.
+    #[error("{0} already; end the program that controls it, and switch the drive off")]
+    Powered(DriveState),
+    /// The drive does not go to "operation enabled".
+    #[error("stays in {state} (error code {error_code:04X}h); check safe torque off, supply and faults")]
+    NotEnabled {
+        /// The state of the drive.
+        state: DriveState,
+        /// 603Fh.
+        error_code: u16,
+    },
+    /// The drive does not take a mode of operation.
+    #[error("mode {wanted} was asked for, 6061h shows {found}; check 6502h")]
+    Mode {
+        /// The mode.
+        wanted: i8,
+        /// 6061h.
+        found: i8,
+    },
+    /// A statusword of no state.
+    #[error("{0}")]
+    Statusword(StatuswordError),
+    /// The drive did not confirm that it is off.
+    #[error(
+        "NOT PROVED OFF ({0}); press the emergency stop. The next step that writes gives the old limits back"
+    )]
+    StaysOn(Unproved),
     /// Objects of the drive kept the values of this step.
     #[error(
-        "{}: {}not every old value returned ({source}); the next step that writes tries again",
-        AXIS_NAMES[*axis], cause.as_ref().map(|cause| format!("{cause}; ")).unwrap_or_default()
+        "{}not every old value returned ({why}); the next step that writes tries again",
+        cause.as_ref().map(|cause| format!("{cause}; ")).unwrap_or_default()
     )]
     NotRestored {
-        /// The axis.
-        axis: usize,
         /// Why the motion ended early, if so.
-        cause: Option<String>,
+        cause: Option<Box<MotionError>>,
         /// Why the value did not return.
-        source: LineError,
+        why: LineError,
     },
     /// An object that the profile keeps from being written is not careful enough.
-    #[error("{}: object {object} is {found}, and its rule in drive_profile.objects lets nobody reduce it; change the rule", AXIS_NAMES[*axis])]
+    #[error(
+        "object {object} is {found}, and its rule in drive_profile.objects lets nobody reduce it; change the rule"
+    )]
     Careless {
-        /// The axis.
-        axis: usize,
         /// The object.
         object: ObjectAddress,
         /// Its value.
@@ -352,61 +338,52 @@ pub enum MotionError {
     },
     /// A limit switch in the direction of the way is closed before it begins.
     #[error(
-        "{}: a limit switch is closed (60FDh = {bits:08X}h), and the way goes in its direction; move the axis the other way, \
-         or check the switch and its wire",
-        AXIS_NAMES[*axis]
+        "a limit switch is closed (60FDh = {bits:08X}h), and the way goes in its direction; move the axis the other way, \
+         or check the switch and its wire"
     )]
     OnSwitch {
-        /// The axis.
-        axis: usize,
         /// 60FDh.
         bits: u32,
     },
     /// The axis moved after its power went.
     #[error(
-        "{}: moved {:.3} mm after its power went; support the axis, and let the drive close the brake before it takes the current away",
-        AXIS_NAMES[*axis], .moved_m * 1e3
+        "moved {:.3} mm after its power went; support the axis, and let the drive close the brake before it takes the \
+         current away",
+        .moved_m * 1e3
     )]
     Dropped {
-        /// The axis.
-        axis: usize,
         /// How far, m.
         moved_m: f64,
     },
     /// A way that is not for this step.
-    #[error("{}: {:.3} mm is no way for a jog; give up to {:.0} mm, at least ten increments", AXIS_NAMES[*axis], .by_m * 1e3, .most_m * 1e3)]
+    #[error("{:.3} mm is no way for a jog; give up to {:.0} mm, at least ten increments", .by_m * 1e3, .most_m * 1e3)]
     Way {
-        /// The axis.
-        axis: usize,
         /// The way, m.
         by_m: f64,
         /// The longest, m.
         most_m: f64,
     },
     /// An incremental encoder whose home has no position.
-    #[error("{}: enter drive_profile.homing.home_position_m: what d or l is at the home position", AXIS_NAMES[*axis])]
-    NoHomePosition {
-        /// The axis.
-        axis: usize,
-    },
+    #[error("enter drive_profile.homing.home_position_m: what d or l is at the home position")]
+    NoHomePosition,
     /// 6064h at home is not the value in the profile.
     #[error(
-        "{}: 6064h shows {:.3} mm at home, the profile says {:.3} mm; check drive_profile.homing.home_sign, home_object and reversed",
-        AXIS_NAMES[*axis], .found_m * 1e3, .expected_m * 1e3
+        "6064h shows {:.3} mm at home, the profile says {:.3} mm; check drive_profile.homing.home_sign, home_object and \
+         reversed",
+        .found_m * 1e3, .expected_m * 1e3
     )]
     HomePosition {
-        /// The axis.
-        axis: usize,
         /// What 6064h shows, m.
         found_m: f64,
         /// The value in the profile, m.
         expected_m: f64,
     },
     /// A second homing found another place.
-    #[error("{}: a second homing is {:.3} mm beside the first, allowed are {:.3} mm (drive_profile.homing.tolerance_m)", AXIS_NAMES[*axis], .spread_m * 1e3, .tolerance_m * 1e3)]
+    #[error(
+        "a second homing is {:.3} mm beside the first, allowed are {:.3} mm (drive_profile.homing.tolerance_m)",
+        .spread_m * 1e3, .tolerance_m * 1e3
+    )]
     Spread {
-        /// The axis.
-        axis: usize,
         /// The distance, m.
         spread_m: f64,
         /// What is allowed, m.
@@ -414,17 +391,34 @@ pub enum MotionError {
     },
     /// An absolute encoder shows a position beyond the stroke.
     #[error(
-        "{}: 6064h shows {:.3} mm, the stroke is {:.1} to {:.1} mm; check the stored home, drive_profile.reversed and encoder_resolution_m",
-        AXIS_NAMES[*axis], .found_m * 1e3, .stroke_m[0] * 1e3, .stroke_m[1] * 1e3
+        "6064h shows {:.3} mm, the stroke is {:.1} to {:.1} mm; check the stored home, drive_profile.reversed and \
+         encoder_resolution_m",
+        .found_m * 1e3, .stroke_m[0] * 1e3, .stroke_m[1] * 1e3
     )]
     BeyondStroke {
-        /// The axis.
-        axis: usize,
         /// What 6064h shows, m.
         found_m: f64,
         /// The stroke, m.
         stroke_m: [f64; 2],
     },
+}
+
+impl AxisError {
+    /// The error of a motion of that axis.
+    pub(super) const fn of(self, axis: usize) -> MotionError {
+        MotionError::OfAxis { axis, reason: self }
+    }
+}
+
+/// What is known of a drive that did not confirm that it is off.
+#[derive(Debug, thiserror::Error)]
+pub enum Unproved {
+    /// It has another state.
+    #[error("it shows {0}")]
+    Shows(DriveState),
+    /// Its state cannot be read, or nothing can be sent.
+    #[error(transparent)]
+    Unread(Box<MotionError>),
 }
 
 /// Objects that the emulated drives do not have.

@@ -7,7 +7,7 @@ use masseter_runtime::clock::SECOND_NS;
 use masseter_scenario::{HomingConfig, ObjectKey, ObjectRule, Scenario};
 use serde::Serialize;
 
-use super::errors::{MotionError, StopCause};
+use super::errors::{AxisError, MotionError, StopCause};
 use super::line::Line;
 use super::mover::{Caution, HOMING, Mover, Operator, POSITIONING, Wish};
 use super::watch::{read_position, seconds};
@@ -63,7 +63,7 @@ pub fn home(
     if homing.absolute {
         return compare(line, scenario, axis);
     }
-    let home_m = homing.home_position_m.ok_or(MotionError::NoHomePosition { axis })?;
+    let home_m = homing.home_position_m.ok_or(AxisError::NoHomePosition.of(axis))?;
     let mut mover = Mover::prepare(line, scenario, axis, Caution::usual(scenario, axis), operator)?;
     let stroke_m = scenario.mechanism.strokes.of_axis(axis);
     let done = home_twice(&mut mover, home_m, stroke_m[1] - stroke_m[0]);
@@ -75,7 +75,7 @@ fn compare(line: &mut Line, scenario: &Scenario, axis: usize) -> Result<HomeRepo
     let HomingConfig { tolerance_m, .. } = scenario.profile(axis).homing;
     let found_m = read_position(line, axis, &scale)?;
     if found_m < stroke_m[0] - tolerance_m || found_m > stroke_m[1] + tolerance_m {
-        return Err(MotionError::BeyondStroke { axis, found_m, stroke_m });
+        return Err(AxisError::BeyondStroke { found_m, stroke_m }.of(axis));
     }
     Ok(HomeReport { position_m: found_m, way_m: 0.0, spread_m: None })
 }
@@ -91,7 +91,7 @@ fn home_twice(mover: &mut Mover<'_>, home_m: f64, stroke_m: f64) -> Result<HomeR
     let behind_m = zero_speed_m_s.powi(2) / (2.0 * acceleration_m_s2) + zero_speed_m_s * REACTION_S;
     if (first.position_m - home_m).abs() > tolerance_m + behind_m {
         let found_m = first.position_m;
-        return Err(MotionError::HomePosition { axis, found_m, expected_m: home_m });
+        return Err(AxisError::HomePosition { found_m, expected_m: home_m }.of(axis));
     }
     // The limits count from the new home.
     open_limits(mover, stroke_m)?;
@@ -106,7 +106,7 @@ fn home_twice(mover: &mut Mover<'_>, home_m: f64, stroke_m: f64) -> Result<HomeR
     let second = search(mover, stroke_m)?;
     let spread_m = second.shift_m.abs();
     if spread_m > tolerance_m {
-        return Err(MotionError::Spread { axis, spread_m, tolerance_m });
+        return Err(AxisError::Spread { spread_m, tolerance_m }.of(axis));
     }
     Ok(HomeReport { position_m: second.position_m, way_m: first.way_m, spread_m: Some(spread_m) })
 }

@@ -5,8 +5,9 @@
 
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_scenario::Scenario;
+use serde::Serialize;
 
-use super::errors::MotionError;
+use super::errors::{AxisError, MotionError};
 use super::line::Line;
 use super::mover::{Caution, Mover, Operator, POSITIONING};
 use super::steps::longest_sync_answer_ns;
@@ -31,7 +32,7 @@ pub struct JogOrder {
 }
 
 /// What a jog found.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct JogReport {
     /// Where it began, at the far end, and where it ended by 6064h, m.
     pub positions_m: [f64; 3],
@@ -80,7 +81,7 @@ pub fn jog(
     let &JogOrder { axis, by_m, caution, .. } = order;
     let increment_m = scenario.scale(axis).increment_m.abs();
     if !(10.0 * increment_m..=MOST_M).contains(&by_m.abs()) {
-        return Err(MotionError::Way { axis, by_m, most_m: MOST_M });
+        return Err(AxisError::Way { by_m, most_m: MOST_M }.of(axis));
     }
     let mut mover = Mover::prepare(line, scenario, axis, caution, operator)?;
     let done = there_and_back(&mut mover, order);
@@ -129,7 +130,7 @@ const RAMP: f64 = 0.2;
 const FEWEST: usize = 3;
 
 /// How an axis went one way. SDO answers are milliseconds apart, so the times are no finer than that.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StepResponse {
     /// From 10 to 90 % of the way, s.
     pub rise_s: f64,

@@ -1,13 +1,13 @@
 //! A line to all drives: SDO, NMT and the heartbeat, one question at a time.
 //!
-//! For every step of the bring-up, the line refuses to switch on a drive while another one is switched on.
+//! In every step of the commissioning, the line refuses to switch on a drive while another one is switched on.
 
 use std::fmt::{self, Debug, Formatter};
 use std::io;
 use std::io::Write;
 
 use masseter_can::canopen::{
-    AbortCode, Expedited, Nmt, NmtCommand, NmtTarget, NodeId, ObjectAddress, SdoRequest, SdoResponse, sync,
+    AbortCode, Expedited, Nmt, NmtCommand, NmtTarget, NodeId, ObjectAddress, SdoRequest, sync,
 };
 use masseter_can::cia402::Controlword;
 use masseter_model::geometry::AXES;
@@ -19,14 +19,13 @@ use super::errors::{LineError, MasterSign, Restarted, SdoReason};
 use super::traffic::{Heard, Strangers, Traffic};
 use crate::error::PlantError;
 use crate::master::link::Address;
-use crate::master::sdo::number;
-use crate::master::wanted::{WantedObject, shown_bits};
+use crate::master::sdo::{SdoClient, SdoFailure, number};
+use crate::master::wanted::{is_write_only, shown_bits};
 
-/// Silence of a server after which a request is repeated, and how often that is done.
+/// Silence of a server after which a request is repeated.
 const TIMEOUT_NS: u64 = 500 * MILLISECOND_NS;
 /// The same while a drive has power: a motion nobody sees must be short.
 const POWERED_TIMEOUT_NS: u64 = 100 * MILLISECOND_NS;
-const ATTEMPTS: u32 = 3;
 /// Time that a node has to answer a scan, ns.
 const SCAN_NS: u64 = 10 * MILLISECOND_NS;
 /// Longest time for which an answer to SYNC is waited for, ns.
@@ -34,8 +33,6 @@ const SYNC_NS: u64 = 20 * MILLISECOND_NS;
 /// Time that a drive has to show a value that it acknowledged, ns, and the pause between two readings.
 const SHOWN_WITHIN_NS: u64 = 100 * MILLISECOND_NS;
 const READ_AGAIN_NS: u64 = 5 * MILLISECOND_NS;
-/// Bytes of the longest value that is read: no text of an identity is longer.
-const LONGEST_VALUE: usize = 256;
 
 /// The line.
 pub struct Line {
@@ -127,31 +124,30 @@ impl Line {
         Ok(true)
     }
 
+    /// Looks every so often, until what was seen is right or the time is over; returns what was seen last.
+    pub(super) fn look_until<T: Copy, E: From<LineError>>(
+        &mut self,
+        within_ns: u64,
+        every_ns: u64,
+        mut look: impl FnMut(&mut Self) -> Result<T, E>,
+        is_right: impl Fn(T) -> bool,
+    ) -> Result<T, E> {
+        let until_ns = self.now_ns() + within_ns;
+        loop {
+            let seen = look(self)?;
+            if is_right(seen) || self.now_ns() >= until_ns {
+                return Ok(seen);
+            }
+            self.listen(every_ns)?;
+        }
+    }
+
     /// Reads an object, however long.
     ///
     /// # Errors
     /// [`LineError`].
     pub fn read(&mut self, axis: usize, object: ObjectAddress) -> Result<Vec<u8>, LineError> {
-        let failed = |reason| LineError::Sdo { axis, object, reason };
-        match self.ask(axis, object, SdoRequest::InitiateUpload { object })? {
-            SdoResponse::Upload { data, .. } => return Ok(data.data().to_vec()),
-            SdoResponse::InitiateUpload { .. } => {}
-            _ => return Err(failed(SdoReason::Malformed)),
-        }
-        let (mut value, mut toggle) = (Vec::new(), false);
-        for _ in 0..LONGEST_VALUE {
-            match self.ask(axis, object, SdoRequest::UploadSegment { toggle })? {
-                SdoResponse::UploadSegment { toggle: answered, data, is_last } if answered == toggle => {
-                    value.extend_from_slice(data.data());
-                    if is_last {
-                        return Ok(value);
-                    }
-                    toggle = !toggle;
-                }
-                _ => return Err(failed(SdoReason::Malformed)),
-            }
-        }
-        Err(failed(SdoReason::Malformed))
+        self.transfer(axis, object, None)
     }
 
     /// Reads an object of at most four bytes as a number without a sign.
@@ -161,7 +157,7 @@ impl Line {
     pub fn read_number(&mut self, axis: usize, object: ObjectAddress) -> Result<u32, LineError> {
         let value = self.read(axis, object)?;
         if value.len() > Expedited::MAX {
-            return Err(LineError::Sdo { axis, object, reason: SdoReason::Malformed });
+            return Err(LineError::Sdo { axis, object, reason: SdoReason::Aborted(AbortCode::LENGTH) });
         }
         Ok(number(&value))
     }
@@ -200,22 +196,16 @@ impl Line {
         assert!(object.index != 0x6040, "controlwords go through control");
         self.download(axis, object, value, bytes)?;
         let Some(bits) = shown_bits(object, value, bytes) else { return Ok(()) };
-        let until_ns = self.now_ns() + SHOWN_WITHIN_NS;
-        loop {
-            let found = match self.read_number(axis, object) {
-                Ok(found) if (found ^ value) & bits == 0 => return Ok(()),
-                Ok(found) => Some(found),
-                Err(error) => match error.abort_code() {
-                    Some(code) if WantedObject::is_write_only(code) => return Ok(()),
-                    Some(_) => None,
-                    None => return Err(error),
-                },
-            };
-            if found.is_none() || self.now_ns() >= until_ns {
-                return Err(LineError::NotKept { axis, object, written: value, found });
-            }
-            self.listen(READ_AGAIN_NS)?;
-        }
+        let is_shown = |found: u32| (found ^ value) & bits == 0;
+        let look = |line: &mut Self| match line.read_number(axis, object) {
+            Err(error) if error.abort_code().is_some_and(is_write_only) => Ok(Some(value)),
+            Err(error) if error.abort_code().is_some() => Ok(None),
+            read => read.map(Some),
+        };
+        let found =
+            self.look_until(SHOWN_WITHIN_NS, READ_AGAIN_NS, look, |found| found.is_none_or(is_shown))?;
+        let is_kept = found.is_some_and(is_shown);
+        if is_kept { Ok(()) } else { Err(LineError::NotKept { axis, object, written: value, found }) }
     }
 
     /// Sends a controlword by SDO. One that switches a drive on is refused while another drive is on.
@@ -288,47 +278,45 @@ impl Line {
         bytes: usize,
     ) -> Result<(), LineError> {
         let data = Expedited::new(&value.to_le_bytes()[..bytes]).expect("one to four bytes");
-        match self.ask(axis, object, SdoRequest::Download { object, data })? {
-            SdoResponse::Download { .. } => Ok(()),
-            _ => Err(LineError::Sdo { axis, object, reason: SdoReason::Malformed }),
-        }
+        self.transfer(axis, object, Some(data)).map(drop)
     }
 
-    /// Sends a request and waits for its answer. A segment is not asked for twice: its answer would be another one.
-    fn ask(
+    /// Reads an object, or writes a value to it; returns that value.
+    fn transfer(
         &mut self,
         axis: usize,
         object: ObjectAddress,
-        request: SdoRequest,
-    ) -> Result<SdoResponse, LineError> {
+        written: Option<Expedited>,
+    ) -> Result<Vec<u8>, LineError> {
         let Address { bus, node } = self.traffic.addresses[axis];
-        let failed = |reason| LineError::Sdo { axis, object, reason };
-        let attempts = if matches!(request, SdoRequest::UploadSegment { .. }) { 1 } else { ATTEMPTS };
         let timeout_ns = if self.switched_on.is_some() { POWERED_TIMEOUT_NS } else { TIMEOUT_NS };
-        for _ in 0..attempts {
-            self.traffic.heard[axis].answer.take();
-            self.traffic.send(bus, request.frame(node))?;
-            self.listen_until(timeout_ns, |line| line.heard(axis).answer.is_some())?;
-            match self.traffic.heard[axis].answer.take() {
-                Some(SdoResponse::Abort { code, .. }) => return Err(failed(SdoReason::Aborted(code))),
-                Some(answer) if answers(&answer, object) => return Ok(answer),
-                // An answer to an earlier request: this one is repeated.
-                _ => {}
+        let (mut client, mut long) = (SdoClient::default(), Vec::new());
+        client.begin(object, written);
+        self.traffic.heard[axis].answers.clear();
+        let failure = 'transfer: loop {
+            if let Some(request) = client.poll(self.now_ns()) {
+                self.traffic.send(bus, request.frame(node))?;
             }
+            self.traffic.step()?;
+            for answer in std::mem::take(&mut self.traffic.heard[axis].answers) {
+                match client.take_answer(answer, Some(&mut long)) {
+                    Some(Ok(short)) => return Ok(short.map_or(long, |short| short.data().to_vec())),
+                    Some(Err(failure)) => break 'transfer failure,
+                    None => {}
+                }
+            }
+            if let Err(failure) = client.expire(self.now_ns(), timeout_ns) {
+                break failure;
+            }
+        };
+        if let Some(abort) = client.poll(self.now_ns()) {
+            self.traffic.send(bus, abort.frame(node))?;
         }
-        let code = AbortCode::TIMED_OUT;
-        self.traffic.send(bus, SdoRequest::Abort { object, code }.frame(node))?;
-        Err(failed(SdoReason::Silent))
-    }
-}
-
-/// Whether an answer belongs to a request for that object. Segments name no object.
-fn answers(answer: &SdoResponse, asked: ObjectAddress) -> bool {
-    match answer {
-        SdoResponse::Download { object }
-        | SdoResponse::Upload { object, .. }
-        | SdoResponse::InitiateUpload { object, .. } => *object == asked,
-        _ => true,
+        let reason = match failure {
+            SdoFailure::Aborted { code, .. } => SdoReason::Aborted(code),
+            SdoFailure::Silent { .. } => SdoReason::Silent,
+        };
+        Err(LineError::Sdo { axis, object, reason })
     }
 }
 
@@ -367,17 +355,9 @@ impl BootUps {
     /// # Errors
     /// The drive of this axis.
     pub fn check_axis(&self, line: &Line, axis: usize) -> Result<(), Restarted> {
-        let by_master = line.strangers().masters.iter().any(|(_, sign)| *sign == MasterSign::Nmt);
+        let by_master = line.strangers().masters.iter().any(|master| master.sign == MasterSign::Nmt);
         let is_same = line.heard(axis).boot_ups == self.0[axis];
         if is_same { Ok(()) } else { Err(Restarted { axis, by_master }) }
-    }
-
-    /// The same for all drives.
-    ///
-    /// # Errors
-    /// The first such drive.
-    pub fn check(&self, line: &Line) -> Result<(), Restarted> {
-        (0..AXES).try_for_each(|axis| self.check_axis(line, axis))
     }
 }
 
@@ -403,7 +383,7 @@ mod tests {
         let missing = line.read(3, ObjectAddress::new(0x2000, 0)).unwrap_err();
         assert_eq!(missing.abort_code(), Some(AbortCode::NO_OBJECT));
         assert_eq!(missing.to_string(), "l1: object 2000h:00h: 06020000h (object does not exist)");
-        assert_eq!((line.heard(3).boot_ups, line.strangers().is_empty()), (1, true));
+        assert_eq!((line.heard(3).boot_ups, *line.strangers() == Strangers::default()), (1, true));
     }
 
     #[test]

@@ -7,6 +7,7 @@
 mod deviations;
 mod errors;
 mod home;
+mod identity;
 mod jog;
 mod line;
 mod mover;
@@ -18,16 +19,20 @@ mod traffic;
 mod watch;
 mod write;
 
+pub use crate::master::link::Address;
 pub use deviations::{Deviation, Outcome, deviations};
 pub use errors::{
-    LineError, MasterSign, MotionError, OtherMaster, Restarted, SdoReason, StopCause, object_name,
-    reason_text, value_text,
+    AxisError, LineError, MasterSign, MotionError, OtherMaster, Restarted, SdoReason, StopCause, Unproved,
+    object_name, reason_text, value_text,
 };
 pub use home::{HomeReport, home};
+pub use identity::{
+    Disturbance, Entry, Identity, Known, NOT_ASKED, OtherKind, check_present, check_undisturbed, gaps,
+};
 pub use jog::{JogOrder, JogReport, StepResponse, jog};
 pub use line::{BootUps, Ledger, Line, OldValue};
 pub use mover::{Caution, Operator, Wish};
-pub use settings::{Difference, PdoLayout, PdoSetting, Setting, Settings, Survey};
+pub use settings::{Difference, Settings, Survey};
 pub use steps::{PowerError, Stand, StoreError, prove_no_power, reset, stand, store, take_over};
 pub use traffic::{Heard, Strangers};
 pub use watch::Sample;

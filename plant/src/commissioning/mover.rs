@@ -6,7 +6,7 @@ use masseter_model::geometry::AXES;
 use masseter_runtime::clock::SECOND_NS;
 use masseter_scenario::{AxisScale, DriveProfile, MASTER_NODE, ObjectKey, ObjectRule, Scenario};
 
-use super::errors::{LineError, MotionError, StopCause};
+use super::errors::{AxisError, LineError, MotionError, StopCause};
 use super::line::Line;
 use super::watch::{
     Bounds, Sample, Watch, read_position, seconds, stop_drive, switch_off_drive, switch_on_drive,
@@ -129,7 +129,7 @@ impl<'a> Mover<'a> {
     ) -> Result<(), MotionError> {
         let (axis, object) = (self.axis, ObjectAddress::new(index, subindex));
         let found = self.line.read_number(axis, object)?;
-        if is_good(found) { Ok(()) } else { Err(MotionError::Careless { axis, object, found }) }
+        if is_good(found) { Ok(()) } else { Err(AxisError::Careless { object, found }.of(axis)) }
     }
 
     /// Changes objects until the end.
@@ -174,7 +174,7 @@ impl<'a> Mover<'a> {
 
     /// Ends the motion for that reason.
     pub(super) fn stopped<T>(&self, cause: StopCause) -> Result<T, MotionError> {
-        Err(MotionError::Stopped { axis: self.axis, cause })
+        Err(AxisError::Stopped(cause).of(self.axis))
     }
 
     /// Switches on in a mode, with the place of the axis as its target, and waits until brake and axis are ready.
@@ -314,7 +314,7 @@ impl<'a> Mover<'a> {
         }
         let done = done.map_err(|error| match error {
             MotionError::Line(LineError::NotKept { .. }) => error,
-            MotionError::Line(_) | MotionError::Statusword { .. } => {
+            MotionError::Line(_) | MotionError::OfAxis { reason: AxisError::Statusword(_), .. } => {
                 MotionError::Unread { axis, source: Box::new(error) }
             }
             error => error,
@@ -327,9 +327,9 @@ impl<'a> Mover<'a> {
     fn give_back<T>(&mut self, done: Result<T, MotionError>) -> Result<T, MotionError> {
         let restored = self.borrowed.restore(self.line);
         let done = self.watch.check_undisturbed(self.line).and(done);
-        let Err(source) = restored else { return done };
-        let cause = done.err().map(|error| error.to_string());
-        Err(MotionError::NotRestored { axis: self.axis, cause, source })
+        let Err(why) = restored else { return done };
+        let cause = done.err().map(Box::new);
+        Err(AxisError::NotRestored { cause, why }.of(self.axis))
     }
 }
 

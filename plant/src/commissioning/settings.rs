@@ -4,57 +4,14 @@
 
 use std::collections::BTreeMap;
 
-use masseter_can::EVERY_SYNC;
-use masseter_can::canopen::{CobId, Expedited, ObjectAddress};
+use masseter_can::canopen::{Expedited, ObjectAddress};
 use masseter_scenario::{ObjectKey, ObjectRule};
 use serde::{Deserialize, Serialize};
 
 use super::errors::{LineError, SdoReason};
 use super::line::Line;
 use crate::master::sdo::number;
-use crate::master::wanted::{COB_ID_BITS, OTHER_PDOS, WantedDrive, may_keep};
-
-/// The COB-ID of a PDO that does not exist.
-const NO_PDO: u32 = CobId(0).invalidated().0;
-
-/// One object.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Setting {
-    /// Its address.
-    pub object: ObjectKey,
-    /// Its value.
-    pub value: u32,
-    /// Bytes of the value.
-    pub bytes: usize,
-    /// Whether it is written or compared.
-    pub rule: ObjectRule,
-    /// The key of the scenario that decides the value.
-    pub key: String,
-}
-
-/// One PDO.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct PdoSetting {
-    /// Index of its communication parameter; that of its mapping is 200h higher.
-    pub communication: u16,
-    /// Its COB-ID. Without [`layout`](Self::layout) only its validity counts.
-    pub cob_id: u32,
-    /// What it carries and when; none where that does not matter.
-    pub layout: Option<PdoLayout>,
-}
-
-/// What a PDO carries and when.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct PdoLayout {
-    /// Transmission type.
-    pub transmission: u32,
-    /// Inhibit time; none for RPDOs and for drives that have none.
-    pub inhibit: Option<u32>,
-    /// Event timer of a TPDO, like `inhibit`.
-    pub event: Option<u32>,
-    /// The mapped objects: index, sub-index, bits.
-    pub mapping: Vec<u32>,
-}
+use crate::master::wanted::{PdoLayout, PdoSetting, Setting, WantedDrive, may_keep};
 
 /// PDOs and objects of a drive.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -68,92 +25,29 @@ pub struct Settings {
 /// An object that is not as it shall be.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Difference {
-    /// Its address.
-    pub object: ObjectAddress,
-    /// Its value as it shall be.
-    pub wanted: u32,
+    /// As it shall be.
+    pub wanted: Setting,
     /// Its value; none where the drive has no such object.
     pub found: Option<u32>,
-    /// Whether it is written or compared.
-    pub rule: ObjectRule,
-    /// The key of the scenario that decides the value.
-    pub key: String,
 }
 
 impl Difference {
     /// Whether the drive may keep its value.
     pub fn may_stay(&self) -> bool {
-        may_keep(self.rule, self.object)
-    }
-}
-
-impl PdoSetting {
-    /// Address of a part of the communication parameter.
-    pub const fn part(&self, subindex: u8) -> ObjectAddress {
-        ObjectAddress::new(self.communication, subindex)
-    }
-
-    /// Address of a part of the mapping.
-    pub const fn mapped(&self, place: u8) -> ObjectAddress {
-        ObjectAddress::new(self.communication + 0x200, place)
-    }
-
-    /// Whether it is sent by the drive.
-    pub const fn is_transmitted(&self) -> bool {
-        self.communication >= 0x1800
-    }
-
-    /// Whether a COB-ID is right: the number counts for a PDO that exists.
-    pub(super) fn has_cob_id(&self, found: u32) -> bool {
-        if CobId(self.cob_id).is_valid() {
-            (self.cob_id ^ found) & COB_ID_BITS == 0
-        } else {
-            !CobId(found).is_valid()
-        }
-    }
-
-    /// The parts but the COB-ID with their values.
-    fn parts(&self) -> Vec<(ObjectAddress, u32)> {
-        let Some(PdoLayout { transmission, inhibit, event, mapping }) = &self.layout else {
-            return Vec::new();
-        };
-        let timers = [(3, *inhibit), (5, *event)];
-        let timers = timers.into_iter().filter_map(|(part, value)| Some((self.part(part), value?)));
-        let mapped = (1..).zip(mapping).map(|(place, &object)| (self.mapped(place), object));
-        [(self.part(2), *transmission), (self.mapped(0), mapping.len() as u32)]
-            .into_iter()
-            .chain(timers)
-            .chain(mapped)
-            .collect()
+        may_keep(self.wanted.rule, self.wanted.object.0)
     }
 }
 
 impl Settings {
     /// What the rig needs.
     pub fn wanted(wanted: &WantedDrive) -> Self {
-        let pdos = wanted.pdos.iter().map(|pdo| {
-            let timer = (pdo.communication >= 0x1800).then_some(0);
-            let transmission = EVERY_SYNC.into();
-            let layout = PdoLayout {
-                transmission,
-                inhibit: timer,
-                event: timer,
-                mapping: pdo.mapping.entries().to_vec(),
-            };
-            PdoSetting { communication: pdo.communication, cob_id: pdo.cob_id, layout: Some(layout) }
-        });
-        let others =
-            OTHER_PDOS.map(|communication| PdoSetting { communication, cob_id: NO_PDO, layout: None });
-        let home = Some(wanted.home).filter(|home| home.rule != ObjectRule::Absent);
-        let objects = home.iter().chain(&wanted.objects).map(|wanted| Setting {
-            object: ObjectKey(wanted.object),
-            value: wanted.value,
-            bytes: wanted.bytes,
-            // A drive without the object has its home at its own zero.
-            rule: if home == Some(*wanted) && wanted.value == 0 { ObjectRule::Optional } else { wanted.rule },
-            key: wanted.key.to_owned(),
-        });
-        Self { pdos: pdos.chain(others).collect(), objects: objects.collect() }
+        let mut home = Some(&wanted.home).filter(|home| home.rule != ObjectRule::Absent).cloned();
+        // A drive without the object has its home at its own zero.
+        if let Some(home) = home.as_mut().filter(|home| home.value == 0) {
+            home.rule = ObjectRule::Optional;
+        }
+        let objects = home.into_iter().chain(wanted.objects.iter().cloned()).collect();
+        Self { pdos: wanted.pdos.clone(), objects }
     }
 
     /// The addresses of the objects.
@@ -192,9 +86,10 @@ impl Settings {
     pub fn differences(&self, survey: &Survey) -> Vec<Difference> {
         let mut differences = Vec::new();
         for pdo in &self.pdos {
-            let mut add = |object, wanted, found| {
-                let key = "can.node_ids".to_owned();
-                differences.push(Difference { object, wanted, found, rule: ObjectRule::Write, key });
+            let mut add = |object, value, found| {
+                let (rule, key) = (ObjectRule::Write, "can.node_ids".to_owned());
+                let wanted = Setting { object: ObjectKey(object), value, bytes: 4, rule, key };
+                differences.push(Difference { wanted, found });
             };
             let (cob_id, found) = (pdo.part(1), survey.number(pdo.part(1)));
             let is_missing = found.is_none() && pdo.layout.is_some();
@@ -203,53 +98,28 @@ impl Settings {
             }
             for (object, wanted) in pdo.parts() {
                 let found = survey.number(object);
-                let is_timer = object.index < 0x1A00 && object.subindex > 2;
-                if found.is_some_and(|found| found != wanted) || (found.is_none() && !is_timer) {
+                if found.map_or(!pdo.is_timer(object), |found| found != wanted) {
                     add(object, wanted, found);
                 }
             }
         }
-        for Setting { object: ObjectKey(object), value, bytes, rule, key } in &self.objects {
-            let found = survey.number(*object);
-            let is_right = found.map_or(*rule == ObjectRule::Optional, |found| same(found, *value, *bytes));
-            if !is_right {
-                let (object, wanted) = (*object, *value);
-                differences.push(Difference { object, wanted, found, rule: *rule, key: key.clone() });
-            }
-        }
+        differences.extend(self.objects.iter().filter_map(|wanted| {
+            let found = survey.number(wanted.object.0);
+            let is_right =
+                found.map_or(wanted.rule == ObjectRule::Optional, |found| wanted.is_shown_by(found));
+            (!is_right).then(|| Difference { wanted: wanted.clone(), found })
+        }));
         differences
     }
 }
 
-/// Whether two values have the same lowest bytes.
-pub(super) fn same(one: u32, other: u32, bytes: usize) -> bool {
-    (one ^ other) & (u32::MAX >> (32 - 8 * bytes)) == 0
-}
-
-/// Device, state and units: index and sub-indices.
-const OF_EVERY_DRIVE: [(u16, &[u8]); 21] = [
-    (0x1000, &[0]),
-    (0x1001, &[0]),
-    (0x1003, &[0]),
-    (0x1008, &[0]),
-    (0x1009, &[0]),
-    (0x100A, &[0]),
-    (0x1010, &[1]),
-    (0x1018, &[1, 2, 3, 4]),
-    (0x6502, &[0]),
-    (0x6041, &[0]),
-    (0x6061, &[0]),
-    (0x603F, &[0]),
-    (0x6064, &[0]),
-    (0x60FD, &[0]),
-    (0x608F, &[1, 2]),
-    (0x6091, &[1, 2]),
-    (0x6092, &[1, 2]),
-    (0x60A8, &[0]),
-    (0x60A9, &[0]),
-    (0x60AA, &[0]),
-    (0x607D, &[1, 2]),
+/// Device, state and units: objects of one value, and objects of several with their last sub-index.
+const SINGLE: [u16; 15] = [
+    0x1000, 0x1001, 0x1003, 0x1008, 0x1009, 0x100A, 0x6502, 0x6041, 0x6061, 0x603F, 0x6064, 0x60FD, 0x60A8,
+    0x60A9, 0x60AA,
 ];
+const SEVERAL: [(u16, u8); 6] =
+    [(0x1010, 1), (0x1018, 4), (0x608F, 2), (0x6091, 2), (0x6092, 2), (0x607D, 2)];
 /// Most objects of a PDO.
 const MAPPED_MAX: u32 = 64;
 /// Most errors of the history (1003h) that are read.
@@ -268,16 +138,15 @@ impl Survey {
     ///
     /// # Errors
     /// [`LineError`] except those of transfers, which are part of the survey.
-    pub fn take(
+    pub fn of_drive(
         line: &mut Line,
         axis: usize,
         objects: impl IntoIterator<Item = ObjectAddress>,
     ) -> Result<Self, LineError> {
         let mut survey = Self::default();
-        for (index, subindices) in OF_EVERY_DRIVE {
-            for &subindex in subindices {
-                survey.read(line, axis, ObjectAddress::new(index, subindex))?;
-            }
+        let several = SEVERAL.iter().flat_map(|&(index, last)| (1..=last).map(move |part| (index, part)));
+        for (index, subindex) in SINGLE.map(|index| (index, 0)).into_iter().chain(several) {
+            survey.read(line, axis, ObjectAddress::new(index, subindex))?;
         }
         let errors = survey.number(ObjectAddress::new(0x1003, 0)).unwrap_or(0).min(ERRORS_MAX);
         for place in 1..=errors as u8 {
@@ -345,7 +214,7 @@ impl Survey {
     }
 
     /// A text.
-    pub fn text(&self, object: ObjectAddress) -> Option<String> {
+    pub fn string(&self, object: ObjectAddress) -> Option<String> {
         let value = self.readings.get(&object)?.as_ref().ok()?;
         Some(String::from_utf8_lossy(value).trim_end_matches('\0').to_owned())
     }

@@ -96,7 +96,7 @@ pub struct Stand {
 /// Reads all axes twice. Nothing is written.
 ///
 /// # Errors
-/// [`MotionError::Line`] and [`MotionError::Statusword`].
+/// [`MotionError::Line`] and [`AxisError::Statusword`](super::errors::AxisError::Statusword).
 pub fn stand(line: &mut Line, scenario: &Scenario, between_ns: u64) -> Result<Stand, MotionError> {
     let mut stand = Stand {
         positions_m: [0.0; AXES],

@@ -5,7 +5,7 @@
 use std::collections::BTreeSet;
 use std::io::Write;
 
-use masseter_can::canopen::{Cob, Emergency, Heartbeat, NmtState, NodeId, SdoResponse};
+use masseter_can::canopen::{Cob, Emergency, Heartbeat, NmtState, SdoResponse};
 use masseter_can::wire::{Bitrate, INTERFRAME_BITS, frame_bits};
 use masseter_can::{Frame, Received, SendError, Tapped, TappedFrame, candump};
 use masseter_model::geometry::AXES;
@@ -14,7 +14,7 @@ use masseter_scenario::{MASTER_NODE, Scenario};
 
 use super::errors::{LineError, MasterSign, OtherMaster};
 use crate::error::PlantError;
-use crate::master::link::{Address, Buses, Link, addresses};
+use crate::master::link::{Address, Buses, Link, addresses, sender};
 use crate::master::sockets::SocketLink;
 use crate::simulator::emulation::virtual_link::VirtualLink;
 
@@ -129,12 +129,7 @@ impl Traffic {
 
     fn note_frame(&mut self, bus: usize, frame: &Frame) {
         let Ok(cob) = Cob::try_from(frame.id()) else { return };
-        let sender = match cob {
-            Cob::Heartbeat(node) | Cob::Emergency(node) | Cob::SdoResponse(node) | Cob::Tpdo1(node) => {
-                Some(node)
-            }
-            _ => None,
-        };
+        let sender = sender(cob);
         match self.addresses.iter().position(|at| at.bus == bus && Some(at.node) == sender) {
             Some(axis) => self.heard[axis].note_frame(cob, frame),
             None => self.strangers.note_sender(bus, cob),
@@ -153,8 +148,8 @@ pub struct Heard {
     pub emergencies: Vec<Emergency>,
     /// When it began to transmit process data last, ns.
     pub(super) process_data_ns: Option<u64>,
-    /// An answer of its SDO server that nobody has taken.
-    pub(super) answer: Option<SdoResponse>,
+    /// Answers of its SDO server since the last transfer.
+    pub(super) answers: Vec<SdoResponse>,
 }
 
 impl Heard {
@@ -168,7 +163,7 @@ impl Heard {
                 }
             }
             Cob::Emergency(_) => self.emergencies.extend(Emergency::decode(frame.data())),
-            Cob::SdoResponse(_) => self.answer = SdoResponse::decode(frame.data()).ok(),
+            Cob::SdoResponse(_) => self.answers.extend(SdoResponse::decode(frame.data())),
             _ => {}
         }
     }
@@ -177,24 +172,19 @@ impl Heard {
 /// Signs of other masters and of nodes that the scenario does not have.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Strangers {
-    /// SYNC, NMT, process data or SDO requests to a drive, or a heartbeat of the master's node id: with the bus.
-    pub masters: BTreeSet<(usize, MasterSign)>,
-    /// Node ids that are none of the scenario, with their bus.
-    pub nodes: BTreeSet<(usize, NodeId)>,
+    /// SYNC, NMT, process data or SDO requests to a drive, or a heartbeat of the master's node id.
+    pub masters: BTreeSet<OtherMaster>,
+    /// Nodes that are none of the scenario.
+    pub nodes: BTreeSet<Address>,
 }
 
 impl Strangers {
-    /// Whether nobody else was heard.
-    pub fn is_empty(&self) -> bool {
-        self.masters.is_empty() && self.nodes.is_empty()
-    }
-
     /// Refuses to go on where another master was heard.
     ///
     /// # Errors
     /// [`OtherMaster`].
     pub fn refuse_masters(&self) -> Result<(), OtherMaster> {
-        self.masters.first().map_or(Ok(()), |&(bus, sign)| Err(OtherMaster { bus, sign }))
+        self.masters.first().map_or(Ok(()), |&master| Err(master))
     }
 
     /// Takes a frame of a node that is no drive of the scenario.
@@ -206,11 +196,11 @@ impl Strangers {
             Cob::Rpdo1(_) => MasterSign::ProcessData,
             Cob::Heartbeat(node) if node == MASTER_NODE => MasterSign::Heartbeat,
             Cob::Heartbeat(node) | Cob::Emergency(node) | Cob::SdoResponse(node) | Cob::Tpdo1(node) => {
-                self.nodes.insert((bus, node));
+                self.nodes.insert(Address { bus, node });
                 return;
             }
         };
-        self.masters.insert((bus, sign));
+        self.masters.insert(OtherMaster { bus, sign });
     }
 }
 

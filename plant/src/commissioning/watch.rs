@@ -8,7 +8,7 @@ use masseter_model::geometry::AXES;
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_scenario::{AxisScale, BrakeConfig};
 
-use super::errors::{LineError, MotionError, StopCause};
+use super::errors::{AxisError, LineError, MotionError, StopCause, Unproved};
 use super::line::{BootUps, Line};
 
 /// Digital inputs (60FDh): limit switches.
@@ -74,7 +74,7 @@ pub(super) fn read_status(line: &mut Line, axis: usize) -> Result<Statusword, Li
 
 /// The state in 6041h.
 pub(super) fn read_state(line: &mut Line, axis: usize) -> Result<DriveState, MotionError> {
-    read_status(line, axis)?.state().map_err(|source| MotionError::Statusword { axis, source })
+    read_status(line, axis)?.state().map_err(|error| AxisError::Statusword(error).of(axis))
 }
 
 /// 6064h, m.
@@ -105,7 +105,7 @@ impl Watch {
         for (axis, began_m) in began_m.iter_mut().enumerate() {
             let state = read_state(line, axis)?;
             if state.is_powered() {
-                return Err(MotionError::Powered { axis, state });
+                return Err(AxisError::Powered(state).of(axis));
             }
             *began_m = read_position(line, axis, &scales[axis])?;
         }
@@ -118,10 +118,11 @@ impl Watch {
     /// Refuses to go on after a restart of a drive, whose reduced limits are lost, and beside another master.
     ///
     /// # Errors
-    /// [`MotionError::Stopped`].
+    /// [`AxisError::Stopped`].
     pub(super) fn check_undisturbed(&self, line: &Line) -> Result<(), MotionError> {
-        let stopped = |cause| MotionError::Stopped { axis: self.axis, cause };
-        self.boot_ups.check(line).map_err(|restarted| stopped(restarted.into()))?;
+        let stopped = |cause| AxisError::Stopped(cause).of(self.axis);
+        let mut all = 0..AXES;
+        all.try_for_each(|axis| self.boot_ups.check_axis(line, axis)).map_err(|one| stopped(one.into()))?;
         line.strangers().refuse_masters().map_err(|master| stopped(master.into()))
     }
 
@@ -141,14 +142,14 @@ impl Watch {
     /// is at its end, or the switch or its wire is broken. Positions within the noise are one place.
     ///
     /// # Errors
-    /// [`MotionError::OnSwitch`].
+    /// [`AxisError::OnSwitch`].
     pub(super) fn check_way(&self, target_m: f64, noise_m: f64) -> Result<(), MotionError> {
         let (axis, Some(Switches { bits, place_m })) = (self.axis, self.switches) else { return Ok(()) };
         // The drive counts the other way on a reversed axis.
         let beyond_m = (target_m - place_m) * self.scales[axis].increment_m.signum();
         let blocks = |switch, beyond_m| bits & switch != 0 && beyond_m > noise_m;
         if blocks(POSITIVE_SWITCH, beyond_m) || blocks(NEGATIVE_SWITCH, -beyond_m) {
-            return Err(MotionError::OnSwitch { axis, bits });
+            return Err(AxisError::OnSwitch { bits }.of(axis));
         }
         Ok(())
     }
@@ -156,7 +157,7 @@ impl Watch {
     /// Looks once. The position comes before the statusword: a statusword without "homed" proves an old position.
     ///
     /// # Errors
-    /// [`MotionError::Stopped`] for what must stop the motion.
+    /// [`AxisError::Stopped`] for what must stop the motion.
     pub(super) fn look(&mut self, line: &mut Line) -> Result<Sample, MotionError> {
         let (axis, scale) = (self.axis, self.scales[self.axis]);
         let at_ns = line.now_ns();
@@ -169,14 +170,14 @@ impl Watch {
             Some(cause) => Some(cause),
             None => self.look_at_switches(line)?.or(self.look_at_another(line)?),
         };
-        cause.map_or(Ok(sample), |cause| Err(MotionError::Stopped { axis, cause }))
+        cause.map_or(Ok(sample), |cause| Err(AxisError::Stopped(cause).of(axis)))
     }
 
     fn stop_cause(&self, line: &mut Line, sample: &Sample) -> Result<Option<StopCause>, MotionError> {
         let (axis, Bounds { force_n: limit_n, window_m, .. }) = (self.axis, self.bounds);
         let Sample { status, force_n, .. } = *sample;
         // In homing the same bit is a homing error, which the caller judges.
-        let state = status.state().map_err(|source| MotionError::Statusword { axis, source })?;
+        let state = status.state().map_err(|error| AxisError::Statusword(error).of(axis))?;
         let fails = state != DriveState::OperationEnabled;
         if fails && status.has(StatusBit::FollowingError) {
             return Ok(Some(StopCause::FollowingError { window_m }));
@@ -243,7 +244,7 @@ pub(super) fn switch_on_drive(line: &mut Line, axis: usize, watch: &Watch) -> Re
         let state = wait_for_state(line, axis, TRANSITION_NS, |state| state == wanted)?;
         if state != wanted {
             let error_code = read_error_code(line, axis);
-            return Err(MotionError::NotEnabled { axis, state, error_code });
+            return Err(AxisError::NotEnabled { state, error_code }.of(axis));
         }
         watch.check_undisturbed(line)?;
     }
@@ -254,7 +255,7 @@ pub(super) fn switch_on_drive(line: &mut Line, axis: usize, watch: &Watch) -> Re
 /// how far the axis moved until a second later, m.
 ///
 /// # Errors
-/// [`MotionError::Dropped`] for an axis that nothing holds without power.
+/// [`AxisError::Dropped`] for an axis that nothing holds without power.
 pub(super) fn switch_off_drive(
     line: &mut Line,
     axis: usize,
@@ -267,14 +268,14 @@ pub(super) fn switch_off_drive(
     disable_voltage(line, axis)?;
     line.listen(SETTLING_NS)?;
     let moved_m = read_position(line, axis, scale)? - before_m;
-    if moved_m.abs() > MOST_DROP_M { Err(MotionError::Dropped { axis, moved_m }) } else { Ok(moved_m) }
+    if moved_m.abs() > MOST_DROP_M { Err(AxisError::Dropped { moved_m }.of(axis)) } else { Ok(moved_m) }
 }
 
 /// Stops an axis in whatever it does: quick stop, then voltage off. Neither word can enable a drive, whatever its
 /// state. Commands that are lost are repeated.
 ///
 /// # Errors
-/// [`MotionError::StaysOn`] unless the statusword proves that the drive is off.
+/// [`AxisError::StaysOn`] unless the statusword proves that the drive is off.
 pub(super) fn stop_drive(line: &mut Line, axis: usize, brake: &BrakeConfig) -> Result<(), MotionError> {
     // The drive may stay in the quick stop (605Ah = 5 or 6): the voltage goes after the same time.
     let _ = repeat(line, axis, Controlword::QUICK_STOP);
@@ -283,27 +284,23 @@ pub(super) fn stop_drive(line: &mut Line, axis: usize, brake: &BrakeConfig) -> R
 }
 
 fn disable_voltage(line: &mut Line, axis: usize) -> Result<(), MotionError> {
-    match repeat(line, axis, Controlword::DISABLE_VOLTAGE) {
-        Ok(()) => {
-            line.note_off(axis);
-            Ok(())
-        }
-        Err(reason) => Err(MotionError::StaysOn { axis, reason }),
-    }
+    repeat(line, axis, Controlword::DISABLE_VOLTAGE).map_err(|reason| AxisError::StaysOn(reason).of(axis))?;
+    line.note_off(axis);
+    Ok(())
 }
 
 /// Sends a controlword again and again until the drive shows no voltage, for a limited time; returns why that is not proved.
-fn repeat(line: &mut Line, axis: usize, word: Controlword) -> Result<(), String> {
+fn repeat(line: &mut Line, axis: usize, word: Controlword) -> Result<(), Unproved> {
     let until_ns = line.now_ns() + STOP_NS;
     loop {
         let sent = line.control(axis, word);
         let reason = match wait_for_state(line, axis, REPEAT_NS, |state| !state.is_powered()) {
             Ok(state) if !state.is_powered() => return Ok(()),
-            Ok(state) => format!("it shows {state}"),
-            Err(error) => error.to_string(),
+            Ok(state) => Unproved::Shows(state),
+            Err(error) => Unproved::Unread(Box::new(error)),
         };
         if line.now_ns() >= until_ns {
-            return Err(sent.err().map_or(reason, |error| error.to_string()));
+            return Err(sent.err().map_or(reason, |error| Unproved::Unread(Box::new(error.into()))));
         }
         // Time passes also where nothing can be sent.
         let _ = line.listen(MILLISECOND_NS);
@@ -312,17 +309,12 @@ fn repeat(line: &mut Line, axis: usize, word: Controlword) -> Result<(), String>
 
 /// Waits until a drive shows a mode of operation (6061h).
 pub(super) fn wait_for_mode(line: &mut Line, axis: usize, wanted: i8) -> Result<(), MotionError> {
-    let until_ns = line.now_ns() + TRANSITION_NS;
-    loop {
-        let found = line.read_number(axis, ObjectAddress::new(0x6061, 0))? as i8;
-        if found == wanted {
-            return Ok(());
-        }
-        if line.now_ns() >= until_ns {
-            return Err(MotionError::Mode { axis, wanted, found });
-        }
-        line.listen(MILLISECOND_NS)?;
-    }
+    let mode = |line: &mut Line| {
+        let mode = line.read_number(axis, ObjectAddress::new(0x6061, 0))?;
+        Ok::<_, LineError>(mode as i8)
+    };
+    let found = line.look_until(TRANSITION_NS, MILLISECOND_NS, mode, |found| found == wanted)?;
+    if found == wanted { Ok(()) } else { Err(AxisError::Mode { wanted, found }.of(axis)) }
 }
 
 /// The state that a drive has when the condition holds, or at the end of the time.
@@ -332,14 +324,7 @@ fn wait_for_state(
     within_ns: u64,
     holds: impl Fn(DriveState) -> bool,
 ) -> Result<DriveState, MotionError> {
-    let until_ns = line.now_ns() + within_ns;
-    loop {
-        let state = read_state(line, axis)?;
-        if holds(state) || line.now_ns() >= until_ns {
-            return Ok(state);
-        }
-        line.listen(MILLISECOND_NS)?;
-    }
+    line.look_until(within_ns, MILLISECOND_NS, |line| read_state(line, axis), holds)
 }
 
 /// Seconds in ns.

@@ -10,10 +10,11 @@ use masseter_runtime::clock::MILLISECOND_NS;
 use masseter_scenario::{DriveProfile, ObjectKey, ObjectRule};
 use serde::Serialize;
 
+use super::deviations::as_text;
 use super::errors::{LineError, object_name, value_text};
 use super::line::{Line, OldValue};
-use super::settings::{PdoSetting, Setting, Settings, Survey, same};
-use crate::master::wanted::{COB_ID_BITS, may_keep};
+use super::settings::{Settings, Survey};
+use crate::master::wanted::{COB_ID_BITS, PdoSetting, Setting, may_keep, value_bits};
 
 /// The time that a drive gets to become pre-operational, ns.
 const ENTER_NS: u64 = 100 * MILLISECOND_NS;
@@ -21,8 +22,9 @@ const ENTER_NS: u64 = 100 * MILLISECOND_NS;
 /// A value that was written.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Change {
-    /// The object, such as `6066h:00h`.
-    pub object: String,
+    /// The object.
+    #[serde(serialize_with = "as_text")]
+    pub object: ObjectAddress,
     /// Its name.
     pub name: &'static str,
     /// Its value before; none where it could not be read.
@@ -95,16 +97,16 @@ impl<'a> Writer<'a> {
         self.line.command(self.axis, NmtCommand::EnterPreOperational)?;
         self.line.listen(ENTER_NS)?;
         for pdo in &settings.pdos {
-            self.pdo(pdo, survey)?;
+            self.write_pdo(pdo, survey)?;
         }
         for setting in in_order(&settings.objects, survey) {
-            self.object(setting, survey)?;
+            self.write_object(setting, survey)?;
         }
         Ok(())
     }
 
     /// The PDO ceases to exist while it changes (CiA 301, 7.5.2.36).
-    fn pdo(&mut self, pdo: &PdoSetting, survey: &Survey) -> Result<(), WriteError> {
+    fn write_pdo(&mut self, pdo: &PdoSetting, survey: &Survey) -> Result<(), WriteError> {
         let alone = Settings { pdos: vec![pdo.clone()], objects: Vec::new() };
         let (cob_id, Some(found)) = (pdo.part(1), survey.number(pdo.part(1))) else { return Ok(()) };
         if alone.differences(survey).is_empty() {
@@ -142,16 +144,16 @@ impl<'a> Writer<'a> {
         Ok(())
     }
 
-    fn object(&mut self, setting: &Setting, survey: &Survey) -> Result<(), WriteError> {
-        let Setting { object: ObjectKey(object), value, bytes, rule, key } = setting;
-        let before = survey.number(*object);
-        let is_right = before.is_some_and(|before| same(before, *value, *bytes));
-        let is_left = *rule == ObjectRule::Expect || (*rule == ObjectRule::Optional && before.is_none());
+    fn write_object(&mut self, setting: &Setting, survey: &Survey) -> Result<(), WriteError> {
+        let Setting { object: ObjectKey(object), value, bytes, rule, ref key } = *setting;
+        let before = survey.number(object);
+        let is_right = before.is_some_and(|before| setting.is_shown_by(before));
+        let is_left = rule == ObjectRule::Expect || (rule == ObjectRule::Optional && before.is_none());
         if is_right || is_left {
             return Ok(());
         }
-        match self.write(*object, *value, *bytes, key, before) {
-            Err(WriteError::Refused { .. }) if may_keep(*rule, *object) => Ok(()),
+        match self.write(object, value, bytes, key, before) {
+            Err(WriteError::Refused { .. }) if may_keep(rule, object) => Ok(()),
             written => written,
         }
     }
@@ -172,7 +174,7 @@ impl<'a> Writer<'a> {
             Err(_) => None,
         };
         self.changes.extend(shown.map(|shown| Change {
-            object: object.to_string(),
+            object,
             name: object_name(object),
             before: before.map(|before| value_text(object, before)),
             after: value_text(object, shown),
@@ -291,7 +293,7 @@ impl<'a> Borrowed<'a> {
         match line.read_number(self.axis, object) {
             Err(error) if may_lack && error.abort_code().is_some() => Ok(None),
             Err(error) => Err(error),
-            Ok(before) if same(before, value, bytes) => Ok(None),
+            Ok(before) if (before ^ value) & value_bits(bytes) == 0 => Ok(None),
             Ok(before) => Ok(Some(OldValue { object: ObjectKey(object), value: before, bytes })),
         }
     }
@@ -380,7 +382,7 @@ mod tests {
     }
 
     fn survey(line: &mut Line, settings: &Settings) -> Survey {
-        Survey::take(line, AXIS, settings.addresses()).unwrap()
+        Survey::of_drive(line, AXIS, settings.addresses()).unwrap()
     }
 
     fn set(line: &mut Line, index: u16, subindex: u8, value: u32, bytes: usize) {
@@ -486,7 +488,7 @@ mod tests {
             let mut writer = Writer::new(&mut line, AXIS, scenario.profile(AXIS));
             writer.apply(&wanted, &found).unwrap();
             let changes = writer.into_changes();
-            let limits = changes.iter().filter(|change| change.object.starts_with("607Dh"));
+            let limits = changes.iter().filter(|change| change.object.index == 0x607D);
             assert_eq!(limits.count(), 2, "{changes:?}");
         }
     }

@@ -11,9 +11,12 @@ use masseter_scenario::AccelerationUnit;
 
 use super::boot_plan::{Check, Demand, Step, Write, plan};
 use super::events::Failure;
-use super::sdo::{ATTEMPTS, SdoClient, SdoFailure, TIMEOUT_NS, number};
-use super::wanted::{WantedDrive, WantedObject};
+use super::sdo::{ATTEMPTS, SdoClient, SdoFailure, number};
+use super::wanted::{WantedDrive, is_write_only};
 
+/// Silence of a server after which a transfer begins anew, ns. Drives that store parameters or boot take seconds, and
+/// nothing that moves waits for them.
+const TIMEOUT_NS: u64 = 1_000_000_000;
 /// Silence after which the communication of a drive is reset: it may be alive without a heartbeat, ns.
 const RESET_EVERY_NS: u64 = 500_000_000;
 /// The time that a drive may take to become operational, ns.
@@ -27,12 +30,12 @@ const RESTARTS: u32 = 3;
 
 /// A drive that took longer than it may.
 pub(super) fn late(waited_ns: u64, limit_ns: u64) -> Failure {
-    Failure::with(Cause::BootTimeout, [waited_ns, limit_ns].map(|ns| ns as f64 / 1e6))
+    Failure::with(Cause::BootTimeout, waited_ns as f64 / 1e6, limit_ns as f64 / 1e6)
 }
 
 /// A failure at an object.
 fn at(cause: Cause, object: ObjectAddress, value: u32, limit: u32) -> Failure {
-    Failure { object: Some(object), ..Failure::with(cause, [value, limit].map(f64::from)) }
+    Failure { object: Some(object), ..Failure::with(cause, value, limit) }
 }
 
 impl From<SdoFailure> for Failure {
@@ -48,7 +51,7 @@ impl From<SdoFailure> for Failure {
 }
 
 /// Progress of a boot.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Boot {
     /// How far the boot is.
     pub(super) phase: BootPhase,
@@ -161,8 +164,8 @@ impl Boot {
             return Ok(());
         }
         self.has_repeated |= self.client.is_repeating();
-        if let Some(outcome) = self.client.take_answer(response) {
-            self.end_transfer(outcome)?;
+        if let Some(outcome) = self.client.take_answer(response, None) {
+            self.end_transfer(outcome.map(|value| value.expect("no value of a boot is long")))?;
             self.begin_next(now_ns);
             return Ok(());
         }
@@ -173,7 +176,7 @@ impl Boot {
     /// Checks the time-outs.
     pub(super) fn expire(&mut self, now_ns: u64) -> Result<(), Failure> {
         if self.is_under_way() {
-            self.client.expire(now_ns)?;
+            self.client.expire(now_ns, TIMEOUT_NS)?;
             return Ok(());
         }
         let is_late = self.phase == BootPhase::Starting && self.waited_ns(now_ns) > START_WITHIN_NS;
@@ -249,9 +252,7 @@ impl Boot {
                 self.read_again(at(Cause::NotKept, object, found, value & bits))?;
                 self.written = Some(Ok(()));
             }
-            (Ok(()), Err(SdoFailure::Aborted { code, .. })) if WantedObject::is_write_only(code) => {
-                self.end_step(0);
-            }
+            (Ok(()), Err(SdoFailure::Aborted { code, .. })) if is_write_only(code) => self.end_step(0),
             (Ok(()), Err(failure)) => return Err(failure.into()),
         }
         Ok(())

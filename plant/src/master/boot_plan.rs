@@ -6,10 +6,10 @@
 use masseter_can::canopen::ObjectAddress;
 use masseter_can::cia402::Controlword;
 use masseter_runtime::messages::codes::{BootPhase, Cause};
-use masseter_scenario::{AccelerationUnit, ObjectRule};
+use masseter_scenario::{AccelerationUnit, ObjectKey, ObjectRule};
 
 use crate::master::wanted::{
-    OTHER_PDOS, WantedDrive, WantedIdentity, WantedObject, WantedPdo, may_keep, shown_bits,
+    PdoSetting, Setting, WantedDrive, WantedIdentity, may_keep, shown_bits, value_bits,
 };
 
 /// 6041h.
@@ -21,7 +21,7 @@ const HOLD_POSITION: [Step; 2] =
     [Step::Read(ObjectAddress::new(0x6064, 0), Check::Keep), Step::WriteKept(ObjectAddress::new(0x607A, 0))];
 
 /// One step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(super) enum Step {
     /// The drive enters a phase.
     Enter(BootPhase),
@@ -34,7 +34,7 @@ pub(super) enum Step {
 }
 
 /// A value for an object.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Write {
     pub(super) object: ObjectAddress,
     pub(super) value: u32,
@@ -43,7 +43,7 @@ pub(super) struct Write {
 }
 
 /// What a write must achieve. A drive that acknowledges a value and does not keep it is never enabled.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(super) enum Demand {
     /// The drive has the value. A constant object may have it already.
     Kept,
@@ -64,7 +64,7 @@ impl Write {
 }
 
 /// The use of a value that was read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(super) enum Check {
     /// The bits of `mask` must be those of `value`, now or after repetitions.
     Equals { mask: u32, value: u32, otherwise: Cause },
@@ -91,32 +91,33 @@ pub(super) fn plan(wanted: &WantedDrive, resets_faults: bool) -> Vec<Step> {
     let mut steps = vec![Step::Enter(BootPhase::Identifying)];
     steps.extend(wanted.identity.iter().map(|&wanted| compare(wanted, Cause::WrongIdentity)));
     steps.push(Step::Enter(BootPhase::CheckingPdos));
-    let pdos = wanted.pdos.iter().flat_map(WantedPdo::entries);
+    let pdos = wanted.pdos.iter().flat_map(PdoSetting::compared);
     steps.extend(pdos.map(|entry| compare(entry, Cause::WrongPdo)));
     steps.push(Step::Enter(BootPhase::Configuring));
     // Another master may have left the drive enabled, and a reset of the communication does not change that. The drive
     // stops along its quick-stop ramp, if it allows that option.
-    let is_written =
-        |wanted: &&WantedObject| wanted.object.index == 0x605A && wanted.rule != ObjectRule::Expect;
-    if let Some(&WantedObject { object, value, bytes, .. }) = wanted.objects.iter().find(is_written) {
+    let is_written = |wanted: &&Setting| wanted.object.0.index == 0x605A && wanted.rule != ObjectRule::Expect;
+    if let Some(&Setting { object: ObjectKey(object), value, bytes, .. }) =
+        wanted.objects.iter().find(is_written)
+    {
         steps.push(Step::Write(Write { object, value, bytes, demand: Demand::Nothing }));
     }
     steps.extend([control(Controlword::QUICK_STOP), Step::Read(STATUSWORD, Check::NoVoltage)]);
-    for communication in OTHER_PDOS {
-        let cob_id = ObjectAddress::new(communication, 1);
-        steps.extend([Step::Read(cob_id, Check::PdoElseSkip(1)), Step::WriteKept(cob_id)]);
+    for other in wanted.pdos.iter().filter(|pdo| pdo.layout.is_none()) {
+        steps.extend([Step::Read(other.part(1), Check::PdoElseSkip(1)), Step::WriteKept(other.part(1))]);
     }
     // Software position limits count from the home position. With another home offset they are not those of the rig.
     if wanted.home.rule != ObjectRule::Absent {
         let check = Check::EqualsIfPresent { value: wanted.home.value, otherwise: Cause::HomeOffset };
-        steps.push(Step::Read(wanted.home.object, check));
+        steps.push(Step::Read(wanted.home.object.0, check));
     }
     steps.push(Step::Read(ObjectAddress::new(0x60AA, 0), Check::Unit(wanted.acceleration_unit)));
     steps.extend(configure(&wanted.objects));
     // A drive may begin to follow its target with the mode, and may have moved before the last step.
     steps.extend(HOLD_POSITION);
     steps.push(write(0x6060, 0, CYCLIC_POSITION, 1));
-    steps.push(expect(0x6061, 0, CYCLIC_POSITION, Cause::NotAccepted));
+    let mode = WantedIdentity::new(0x6061, 0, u32::MAX, CYCLIC_POSITION);
+    steps.push(compare(mode, Cause::NotAccepted));
     // Somebody has to look at a fault, so it is reset only on request: by an edge, if its cause is gone.
     let error_code = ObjectAddress::new(0x603F, 0);
     let with_fault = if resets_faults {
@@ -161,11 +162,6 @@ const fn compare(WantedIdentity { object, mask, value }: WantedIdentity, otherwi
     Step::Read(object, Check::Equals { mask, value, otherwise })
 }
 
-const fn expect(index: u16, subindex: u8, value: u32, otherwise: Cause) -> Step {
-    let check = Check::Equals { mask: u32::MAX, value, otherwise };
-    Step::Read(ObjectAddress::new(index, subindex), check)
-}
-
 const fn write(index: u16, subindex: u8, value: u32, bytes: usize) -> Step {
     let object = ObjectAddress::new(index, subindex);
     Step::Write(Write { object, value, bytes, demand: Demand::Kept })
@@ -177,22 +173,20 @@ const fn control(word: Controlword) -> Step {
 
 /// Writes and comparisons of the objects. Drives refuse software limits that cross, and the old ones are unknown: the lower
 /// one is opened first.
-fn configure(objects: &[WantedObject]) -> Vec<Step> {
+fn configure(objects: &[Setting]) -> Vec<Step> {
     let mut steps = Vec::with_capacity(objects.len() + 1);
-    let is_lower_written = |wanted: &WantedObject| {
-        wanted.object == ObjectAddress::new(0x607D, 1) && wanted.rule != ObjectRule::Expect
+    let is_lower_written = |wanted: &Setting| {
+        wanted.object.0 == ObjectAddress::new(0x607D, 1) && wanted.rule != ObjectRule::Expect
     };
-    for &WantedObject { object, value, bytes, rule, .. } in objects {
+    for &Setting { object: ObjectKey(object), value, bytes, rule, .. } in objects {
         if object == ObjectAddress::new(0x607D, 2) && objects.iter().any(is_lower_written) {
             let (object, value) = (ObjectAddress::new(0x607D, 1), i32::MIN as u32);
             steps.push(Step::Write(Write { object, value, bytes: 4, demand: Demand::Nothing }));
         }
-        steps.push(match rule {
-            ObjectRule::Expect => {
-                let mask = u32::MAX >> (32 - 8 * bytes);
-                Step::Read(object, Check::Equals { mask, value, otherwise: Cause::WrongObject })
-            }
-            rule => Step::Write(Write { object, value, bytes, demand: demand(rule, object) }),
+        steps.push(if rule == ObjectRule::Expect {
+            compare(WantedIdentity { object, mask: value_bits(bytes), value }, Cause::WrongObject)
+        } else {
+            Step::Write(Write { object, value, bytes, demand: demand(rule, object) })
         });
     }
     steps

@@ -5,7 +5,7 @@
 
 use masseter_can::canopen::{
     Cob, Emergency, EmergencyCode, Heartbeat, HeartbeatError, LengthError, Nmt, NmtCommand, NmtState,
-    NmtTarget, NodeId, SdoError, SdoResponse,
+    NmtTarget, SdoError, SdoResponse,
 };
 use masseter_can::cia402::{Controlword, DriveRequest, DriveState, Statusword, next_controlword};
 use masseter_can::{CanId, Frame, PdoMapping, Rpdo1, Tpdo1};
@@ -23,7 +23,7 @@ use super::wanted::WantedDrive;
 use crate::error::PlantError;
 
 /// One drive.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct RemoteDrive {
     pub(super) address: Address,
     scale: AxisScale,
@@ -91,10 +91,10 @@ impl RemoteDrive {
     }
 
     /// The reported phase of its boot and the present one, once after a change.
-    pub(super) fn phase_change(&mut self) -> Option<[BootPhase; 2]> {
-        let now = self.boot.phase;
-        let before = std::mem::replace(&mut self.reported_phase, now);
-        (before != now).then_some([before, now])
+    pub(super) fn phase_change(&mut self) -> Option<Change<BootPhase>> {
+        let after = self.boot.phase;
+        let before = std::mem::replace(&mut self.reported_phase, after);
+        (before != after).then_some(Change { before, after })
     }
 
     /// Whether it exchanges process data.
@@ -157,7 +157,11 @@ impl RemoteDrive {
 
     /// Takes process data, which only an operational drive sends; a statusword without a meaning keeps the last state.
     /// Returns its state before and after; none while its process data are not used.
-    pub(super) fn take_process_data(&mut self, time_ns: u64, tpdo: Tpdo1) -> Option<[Option<DriveState>; 2]> {
+    pub(super) fn take_process_data(
+        &mut self,
+        time_ns: u64,
+        tpdo: Tpdo1,
+    ) -> Option<Change<Option<DriveState>>> {
         self.hear_state(time_ns, NmtState::Operational);
         self.presence.missing_cycles = 0;
         if !self.is_started {
@@ -171,7 +175,7 @@ impl RemoteDrive {
         let data = (tpdo.actual_increments, tpdo.torque_permille);
         self.presence.answer(time_ns, data != (self.actual_increments, self.torque_permille));
         (self.actual_increments, self.torque_permille) = data;
-        Some([before, self.drive_state()])
+        Some(Change { before, after: self.drive_state() })
     }
 
     /// Takes an answer of its SDO server.
@@ -212,8 +216,7 @@ impl RemoteDrive {
     /// The loss of a started drive that left operational by itself.
     fn stop_by_itself(&self) -> Option<Failure> {
         let state = self.nmt.filter(|&state| self.is_started && state != NmtState::Operational)?;
-        let states = [state, NmtState::Operational].map(|state| f64::from(state.code()));
-        Some(Failure::with(Cause::NodeStopped, states))
+        Some(Failure::with(Cause::NodeStopped, state.code(), NmtState::Operational.code()))
     }
 
     /// Why the drive counts as one that does not follow its targets, once it does, given whether it has answered SYNC.
@@ -304,13 +307,20 @@ impl RemoteDrive {
     }
 }
 
+/// What was, and what is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Change<T> {
+    pub(super) before: T,
+    pub(super) after: T,
+}
+
 /// Cycles in a row in which an operational drive's process data may be missing at most.
 pub(super) const MISSING_CYCLES: u32 = 3;
 /// New process data beyond one a SYNC that a single node may send: all those that may be missing may come late, at once.
 const SURPLUS: u32 = MISSING_CYCLES + 2;
 
 /// Memory of the supervision.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(super) struct Presence {
     /// When the drive sent something.
     heard_ns: u64,
@@ -359,12 +369,12 @@ impl Presence {
     pub(super) fn loss(&self, now_ns: u64, heartbeat_timeout_ns: u64, may_miss: u32) -> Option<Failure> {
         let silent_ns = now_ns.saturating_sub(self.heard_ns);
         if silent_ns > heartbeat_timeout_ns {
-            let times_ms = [silent_ns, heartbeat_timeout_ns].map(|ns| ns as f64 / 1e6);
-            Some(Failure::with(Cause::HeartbeatLost, times_ms))
+            let [silent_ms, limit_ms] = [silent_ns, heartbeat_timeout_ns].map(|ns| ns as f64 / 1e6);
+            Some(Failure::with(Cause::HeartbeatLost, silent_ms, limit_ms))
         } else if self.surplus > SURPLUS {
-            Some(Failure::with(Cause::DuplicateNode, [self.surplus, SURPLUS].map(f64::from)))
+            Some(Failure::with(Cause::DuplicateNode, self.surplus, SURPLUS))
         } else if self.missing_cycles > may_miss {
-            Some(Failure::with(Cause::ProcessDataLost, [self.missing_cycles, may_miss].map(f64::from)))
+            Some(Failure::with(Cause::ProcessDataLost, self.missing_cycles, may_miss))
         } else {
             None
         }
@@ -383,16 +393,6 @@ pub(super) enum Message {
 }
 
 impl Message {
-    /// The node that sends an object; none where the master receives no such object.
-    pub(super) const fn sender(cob: Cob) -> Option<NodeId> {
-        match cob {
-            Cob::Heartbeat(node) | Cob::Tpdo1(node) | Cob::Emergency(node) | Cob::SdoResponse(node) => {
-                Some(node)
-            }
-            Cob::Nmt | Cob::Sync | Cob::Rpdo1(_) | Cob::SdoRequest(_) => None,
-        }
-    }
-
     /// Decodes the data of an object, process data by that mapping.
     pub(super) fn decode(cob: Cob, data: &[u8], tpdo1: &PdoMapping) -> Result<Self, LengthError> {
         match cob {
@@ -415,6 +415,8 @@ impl Message {
 
 #[cfg(test)]
 mod drive_tests {
+    use masseter_can::canopen::NodeId;
+
     use super::*;
 
     #[test]

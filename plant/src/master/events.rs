@@ -19,7 +19,7 @@ pub(super) enum Subject {
 }
 
 /// The log.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct EventLog {
     pub(super) journal: Journal,
     /// The cycle of new events.
@@ -72,7 +72,7 @@ pub(super) fn wrong_length(cob: Cob, error: &LengthError) -> Event {
 }
 
 /// A reason to stop the drives or to give up a boot, with the object, the value and the limit that explain the reason.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Failure {
     pub(super) cause: Cause,
     pub(super) object: Option<ObjectAddress>,
@@ -83,12 +83,12 @@ pub(super) struct Failure {
 impl Failure {
     /// A failure that needs no value to explain it.
     pub(super) const fn new(cause: Cause) -> Self {
-        Self::with(cause, [0.0, 0.0])
+        Self { cause, object: None, value: 0.0, limit: 0.0 }
     }
 
     /// A failure explained by a value and its limit.
-    pub(super) const fn with(cause: Cause, [value, limit]: [f64; 2]) -> Self {
-        Self { cause, object: None, value, limit }
+    pub(super) fn with(cause: Cause, value: impl Into<f64>, limit: impl Into<f64>) -> Self {
+        Self { cause, object: None, value: value.into(), limit: limit.into() }
     }
 
     /// The event that reports it: a fault, or the same without a reaction.
@@ -103,7 +103,7 @@ impl Failure {
 const CAPACITY: usize = 256;
 
 /// The list.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Journal {
     events: Vec<Event>,
     lost: u64,
@@ -149,7 +149,7 @@ mod failure_tests {
     fn a_failure_is_reported_with_its_object_value_and_limit() {
         let object = Some(ObjectAddress::new(0x1018, 0x02));
         let event =
-            Failure { object, ..Failure::with(Cause::WrongIdentity, [7.0, 8.0]) }.event(EventKind::Fault);
+            Failure { object, ..Failure::with(Cause::WrongIdentity, 7.0, 8.0) }.event(EventKind::Fault);
         assert_eq!((event.cause, event.object), (Cause::WrongIdentity.code(), 0x10_1802));
         assert_eq!((event.value, event.limit), (7.0, 8.0));
         assert_eq!((event.kind, event.source), (EventKind::Fault.code(), Source::Master.code()));

@@ -13,7 +13,7 @@ use masseter_runtime::realtime::Wake;
 use masseter_scenario::CanConfig;
 
 /// Times of the present cycle.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Exchange {
     /// From the first to the last bit of SYNC, at which the drives sample.
     sync_frame_ns: u64,
@@ -90,7 +90,7 @@ impl Exchange {
 }
 
 /// Memory of a bus.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct BusMonitor {
     /// Whether the master's controller is in bus-off.
     pub(super) is_off: bool,

@@ -34,7 +34,7 @@ const UNSEEN_LIMITS: f64 = 4.0;
 const KEPT: usize = 2 * MOST_LEAD_CYCLES;
 
 /// The demand between two SYNCs.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Line {
     from_m: f64,
     to_m: f64,
@@ -46,14 +46,14 @@ struct Line {
 }
 
 /// The demand at a SYNC.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 struct Demand {
     sync_ns: u64,
     position_m: f64,
 }
 
 /// The monitor of one drive.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Following {
     limit_m: f64,
     limit_cycles: u32,
@@ -161,7 +161,7 @@ impl Following {
         let (error_m, limit_m) = (self.error_m(position_m), self.limit_m + self.excused_m);
         self.cycles_beyond = if error_m > limit_m { self.cycles_beyond + 1 } else { 0 };
         (self.cycles_beyond >= self.limit_cycles)
-            .then(|| Failure::with(Cause::FollowingError, [error_m, limit_m]))
+            .then(|| Failure::with(Cause::FollowingError, error_m, limit_m))
     }
 
     /// Cycles in a row in which the drive's position may be missing, up to `most`: an unseen drive may stand still.

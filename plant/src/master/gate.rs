@@ -33,7 +33,7 @@ pub(super) struct Target {
 }
 
 /// The target that a drive follows.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Followed {
     target_m: f64,
     /// Within the force limit of the drive.
@@ -43,7 +43,7 @@ struct Followed {
 }
 
 /// The velocities of late: between these a motion stops at once and goes on.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 struct RecentVelocities {
     /// When the newer of two stretches of cycles began.
     since_cycle: u64,
@@ -52,7 +52,7 @@ struct RecentVelocities {
 }
 
 /// What one axis may be asked for.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct AxisGate {
     stroke_m: [f64; 2],
     max_velocity_m_s: f64,
@@ -71,7 +71,7 @@ struct Step {
 }
 
 /// The gate.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Gate {
     period_s: f64,
     timeout_cycles: u64,
@@ -161,7 +161,7 @@ impl Gate {
 
 /// The request of a command, if its version is this program's, its numbers are finite, and its request is known.
 fn check_message(command: &Command) -> Result<DriveRequest, (Subject, Failure)> {
-    let bad = |subject, value, limit| Err((subject, Failure::with(Cause::BadMessage, [value, limit])));
+    let bad = |subject, value, limit| Err((subject, Failure::with(Cause::BadMessage, value, limit)));
     if command.version != LAYOUT_VERSION {
         return bad(Subject::Rig, command.version as f64, LAYOUT_VERSION as f64);
     }
@@ -176,7 +176,7 @@ fn check_message(command: &Command) -> Result<DriveRequest, (Subject, Failure)> 
 
 /// Refuses a value above its limit.
 fn check_limit(cause: Cause, value: f64, limit: f64) -> Result<(), Failure> {
-    if value <= limit { Ok(()) } else { Err(Failure::with(cause, [value, limit])) }
+    if value <= limit { Ok(()) } else { Err(Failure::with(cause, value, limit)) }
 }
 
 impl RecentVelocities {
@@ -249,12 +249,12 @@ impl AxisGate {
     fn check_stroke(&self, target_m: f64) -> Result<(), Failure> {
         let [low_m, high_m] = self.stroke_m;
         check_limit(Cause::StrokeLimit, target_m, high_m)?;
-        if target_m >= low_m { Ok(()) } else { Err(Failure::with(Cause::StrokeLimit, [target_m, low_m])) }
+        if target_m >= low_m { Ok(()) } else { Err(Failure::with(Cause::StrokeLimit, target_m, low_m)) }
     }
 }
 
 /// The received commands.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Commands {
     timeout_cycles: u32,
     pub(super) gate: Gate,
@@ -302,8 +302,8 @@ impl Commands {
             if !needs_command || self.silent_cycles <= self.timeout_cycles {
                 return Ok(());
             }
-            let cycles = [self.silent_cycles, self.timeout_cycles].map(f64::from);
-            return Err((Subject::Rig, Failure::with(Cause::CommandLost, cycles)));
+            let lost = Failure::with(Cause::CommandLost, self.silent_cycles, self.timeout_cycles);
+            return Err((Subject::Rig, lost));
         };
         self.request = self.gate.pass(command, following_m)?;
         (self.cycle, self.received_ns, self.silent_cycles) = (Some(command.cycle), now_ns, 0);

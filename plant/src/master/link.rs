@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use masseter_can::canopen::NodeId;
+use masseter_can::canopen::{Cob, NodeId};
 use masseter_can::faults::{Fault, FaultKind, FaultNote};
 use masseter_can::{Bus, CanId, Frame, ReceiveError, Tapped};
 use masseter_model::geometry::{AXES, AXIS_NAMES, LEGS};
@@ -123,11 +123,21 @@ pub(crate) fn node_ids(can: &CanConfig) -> Result<[NodeId; AXES], PlantError> {
     Ok(ids)
 }
 
-/// Where a drive is reached.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Address {
-    pub(crate) bus: usize,
-    pub(crate) node: NodeId,
+/// Where a node is reached.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+pub struct Address {
+    /// Index of the bus.
+    pub bus: usize,
+    /// The node on it.
+    pub node: NodeId,
+}
+
+/// The node that sends an object; none for an object that only a master sends.
+pub(crate) const fn sender(cob: Cob) -> Option<NodeId> {
+    match cob {
+        Cob::Heartbeat(node) | Cob::Tpdo1(node) | Cob::Emergency(node) | Cob::SdoResponse(node) => Some(node),
+        Cob::Nmt | Cob::Sync | Cob::Rpdo1(_) | Cob::SdoRequest(_) => None,
+    }
 }
 
 /// The address of each axis' drive.
@@ -212,54 +222,36 @@ fn port_of(config: &FaultConfig, nodes: &[NodeId]) -> Result<Option<usize>, Plan
 
 /// Refuses the first quantity that contradicts others.
 pub(crate) fn check_quantities(scenario: &Scenario) -> Result<(), PlantError> {
-    check_counts(scenario)?;
-    check_heartbeats(scenario)?;
-    check_process_data(scenario)
-}
-
-/// A drive counts increments in 32 bits (objects 6064h and 607Ah).
-fn check_counts(scenario: &Scenario) -> Result<(), PlantError> {
-    let Scenario { drives, mechanism, .. } = scenario;
+    let Scenario { drives, mechanism, can, .. } = scenario;
+    let (period_ns, refuse) = (scenario.period_ns(), |text| Err(PlantError::Scenario(text)));
+    // A drive counts increments in 32 bits (objects 6064h and 607Ah).
     for (key, axis) in [("drives.slide", 0), ("drives.leg", LEGS)] {
         let increment_m = drives.of_axis(axis).encoder_resolution_m;
         let [low_m, high_m] = mechanism.strokes.of_axis(axis);
         if low_m.abs().max(high_m.abs()) / increment_m > f64::from(i32::MAX) {
             let need = "use more: the end of the stroke does not fit into 32 bits";
-            return Err(PlantError::Scenario(format!("{key}.encoder_resolution_m = {increment_m}: {need}")));
+            return refuse(format!("{key}.encoder_resolution_m = {increment_m}: {need}"));
         }
     }
-    Ok(())
-}
-
-/// The time-out of a heartbeat must be longer than its longest interval.
-fn check_heartbeats(scenario: &Scenario) -> Result<(), PlantError> {
-    let timeout_ms = scenario.can.heartbeat_consumer_ms;
-    if u64::from(timeout_ms) * MILLISECOND_NS > longest_heartbeat_ns(scenario) {
-        return Ok(());
+    // The master sends its heartbeat with the first SYNC after the interval, whose end jitter may delay by a cycle.
+    let interval_ns = u64::from(can.heartbeat_producer_ms) * MILLISECOND_NS;
+    let longest_ns = (interval_ns / period_ns + 1) * period_ns;
+    if u64::from(can.heartbeat_consumer_ms) * MILLISECOND_NS <= longest_ns {
+        let need = "use more than can.heartbeat_producer_ms and a cycle (1000 / rate_hz) together";
+        return refuse(format!("can.heartbeat_consumer_ms = {}: {need}", can.heartbeat_consumer_ms));
     }
-    let need = "use more than can.heartbeat_producer_ms and a cycle (1000 / rate_hz) together";
-    Err(PlantError::Scenario(format!("can.heartbeat_consumer_ms = {timeout_ms}: {need}")))
-}
-
-/// The time-out of process data must be longer than two cycles, between which jitter may leave that much.
-fn check_process_data(scenario: &Scenario) -> Result<(), PlantError> {
-    match scenario.can.rpdo_timeout_ms {
-        Some(timeout_ms @ 1..) if u64::from(timeout_ms) * MILLISECOND_NS <= 2 * scenario.period_ns() => {
+    // Jitter may leave two cycles between two process data.
+    match can.rpdo_timeout_ms {
+        Some(timeout_ms @ 1..) if u64::from(timeout_ms) * MILLISECOND_NS <= 2 * period_ns => {
             let need = "use 0 for none, or more than two cycles (2000 / rate_hz)";
-            Err(PlantError::Scenario(format!("can.rpdo_timeout_ms = {timeout_ms}: {need}")))
+            refuse(format!("can.rpdo_timeout_ms = {timeout_ms}: {need}"))
         }
         _ => Ok(()),
     }
 }
 
-/// The master sends its heartbeat with the first SYNC after the interval, whose end jitter may delay by a cycle.
-fn longest_heartbeat_ns(scenario: &Scenario) -> u64 {
-    let interval_ns = u64::from(scenario.can.heartbeat_producer_ms) * MILLISECOND_NS;
-    (interval_ns / scenario.period_ns() + 1) * scenario.period_ns()
-}
-
 /// A fault or a stimulus began to act, or its time is over.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Occurrence {
     /// Which.
     pub injected: Injected,
@@ -288,7 +280,7 @@ impl Occurrence {
 }
 
 /// A mishap of the mechanism.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Mishap {
     /// A piece of food broke between the teeth.
     FoodBroke {

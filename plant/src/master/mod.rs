@@ -37,19 +37,19 @@ use masseter_runtime::realtime::Wake;
 use masseter_scenario::{MASTER_NODE, Scenario};
 
 use crate::error::PlantError;
-use drive::{Message, RemoteDrive};
+use drive::{Change, Message, RemoteDrive};
 use events::{EventLog, Failure, Subject, notice, transition};
 use exchange::{BusMonitor, Exchange};
 use following::Following;
 use gate::Commands;
-use link::{Address, Buses, addresses};
+use link::{Address, Buses, addresses, sender};
 use supervision::{Enabling, Supervision};
 
 /// Frames taken from a bus at once, so that a babbling node cannot stop the cycle.
 const FRAMES_AT_ONCE: usize = 512;
 
 /// The master.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Master {
     drives: [RemoteDrive; AXES],
     buses: Vec<BusMonitor>,
@@ -216,10 +216,8 @@ impl Master {
         let is_enable = is_enable && self.supervision.may_move();
         for (axis, cause) in self.enabling.end_cycle(now_ns, is_enable, states).into_iter().enumerate() {
             let Some(cause) = cause else { continue };
-            let failure = Failure::with(
-                cause,
-                [self.drives[axis].statusword.0, self.drives[axis].emergency.0].map(f64::from),
-            );
+            let RemoteDrive { statusword, emergency, .. } = &self.drives[axis];
+            let failure = Failure::with(cause, statusword.0, emergency.0);
             if cause == Cause::WaitsForDrive {
                 self.events.add(now_ns, Subject::Axis(axis), failure.event(EventKind::Notice));
             } else {
@@ -234,7 +232,7 @@ impl Master {
             let status = buses.port(bus).status();
             let (subject, value) = (Subject::Bus(bus), f64::from(status.tec));
             match self.buses[bus].set_error_state(status.state) {
-                Some(true) => self.fail(now_ns, subject, &Failure::with(Cause::BusOff, [value, 0.0])),
+                Some(true) => self.fail(now_ns, subject, &Failure::with(Cause::BusOff, value, 0.0)),
                 Some(false) => {
                     self.events.add(now_ns, subject, Event { value, ..notice(Cause::Recovered) });
                 }
@@ -354,7 +352,7 @@ impl Master {
     fn take_frame(&mut self, bus: usize, received: &Received) {
         let Ok(cob) = Cob::try_from(received.frame.id()) else { return };
         let time_ns = received.time_ns;
-        let sender = Message::sender(cob);
+        let sender = sender(cob);
         // Only a master sends SYNC and NMT, and this master does not receive its own frames.
         if matches!(cob, Cob::Sync | Cob::Nmt) || sender == Some(MASTER_NODE) {
             return self.yield_to_other_master(time_ns, bus);
@@ -373,7 +371,7 @@ impl Master {
         match Message::decode(cob, received.frame.data(), &drive.tpdo1) {
             Ok(Message::Heartbeat(state)) => self.take_heartbeat(axis, state, time_ns),
             Ok(Message::ProcessData(tpdo)) => {
-                let Some([before, after]) = drive.take_process_data(time_ns, tpdo) else { return };
+                let Some(Change { before, after }) = drive.take_process_data(time_ns, tpdo) else { return };
                 self.exchange.note_process_data(time_ns);
                 if before != after {
                     let event = transition(Source::Drive, drive_state_code(before), drive_state_code(after));
@@ -415,7 +413,7 @@ impl Master {
         if let Some(reset) = self.drives[axis].boot.reset_fault.take() {
             self.events.add(time_ns, Subject::Axis(axis), reset.event(EventKind::Notice));
         }
-        if let Some([before, after]) = self.drives[axis].phase_change() {
+        if let Some(Change { before, after }) = self.drives[axis].phase_change() {
             let event = transition(Source::Master, before.code(), after.code());
             self.events.add(time_ns, Subject::Axis(axis), event);
         }

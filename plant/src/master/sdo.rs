@@ -1,5 +1,5 @@
-//! The SDO client (CiA 301, 7.2.4): one entry of one drive's object dictionary read or written at a
-//! time. Only expedited transfers are used, because no object of a boot has more than four bytes.
+//! The SDO client (CiA 301, 7.2.4) of master and commissioning: one entry of one drive's object dictionary read or
+//! written at a time. Values of more than four bytes are read in segments where the caller has room for them.
 //!
 //! A pure state machine: [`SdoClient::poll`] returns the request to send, [`SdoClient::take_answer`] takes the answer.
 //! Frames and buses are not part of it.
@@ -9,61 +9,69 @@ mod tests;
 
 use masseter_can::canopen::{AbortCode, Expedited, ObjectAddress, SdoRequest, SdoResponse};
 
-/// Silence of a server after which a transfer begins anew, ns. Drives that store parameters or boot take seconds, and
-/// nothing that moves waits for them.
-pub(super) const TIMEOUT_NS: u64 = 1_000_000_000;
 /// Attempts of a transfer before the server counts as silent.
-pub(super) const ATTEMPTS: u32 = 3;
+pub(crate) const ATTEMPTS: u32 = 3;
+/// Bytes of the longest value that is read.
+const LONGEST_VALUE: usize = 1792;
 
 /// Why a transfer failed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum SdoFailure {
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub(crate) enum SdoFailure {
     /// One side gave it up.
     Aborted { object: ObjectAddress, code: AbortCode },
     /// Nothing came.
     Silent { object: ObjectAddress },
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// What a transfer does next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+enum Action {
+    Read,
+    ReadSegment { toggle: bool },
+    Write(Expedited),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 struct Transfer {
     object: ObjectAddress,
-    /// The value to be written; none in a read.
-    written: Option<Expedited>,
+    action: Action,
     /// Time of the last request; none while one is due.
     sent_ns: Option<u64>,
     attempt: u32,
 }
 
 /// The client's memory: at most one transfer, and an abort that is still to be sent.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct SdoClient {
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub(crate) struct SdoClient {
     transfer: Option<Transfer>,
     abort: Option<(ObjectAddress, AbortCode)>,
 }
 
 impl SdoClient {
     /// Begins to read an object, or to write a value to it; a transfer under way is forgotten.
-    pub(super) fn begin(&mut self, object: ObjectAddress, written: Option<Expedited>) {
-        self.transfer = Some(Transfer { object, written, sent_ns: None, attempt: 1 });
+    pub(crate) fn begin(&mut self, object: ObjectAddress, written: Option<Expedited>) {
+        let action = written.map_or(Action::Read, Action::Write);
+        self.transfer = Some(Transfer { object, action, sent_ns: None, attempt: 1 });
     }
 
     /// Whether nothing is under way.
-    pub(super) fn is_idle(&self) -> bool {
+    pub(crate) fn is_idle(&self) -> bool {
         self.transfer.is_none()
     }
 
     /// Whether the transfer under way has begun more than once, so that an answer may come twice.
-    pub(super) fn is_repeating(&self) -> bool {
+    pub(crate) fn is_repeating(&self) -> bool {
         self.transfer.is_some_and(|transfer| transfer.attempt > 1)
     }
 
-    /// Begins a transfer anew after the time-out, and gives it up after [`ATTEMPTS`].
-    pub(super) fn expire(&mut self, now_ns: u64) -> Result<(), SdoFailure> {
+    /// Begins a transfer anew after a silence of more than `timeout_ns`, and gives it up after [`ATTEMPTS`].
+    pub(crate) fn expire(&mut self, now_ns: u64, timeout_ns: u64) -> Result<(), SdoFailure> {
         let Some(transfer) = &mut self.transfer else { return Ok(()) };
-        if transfer.sent_ns.is_none_or(|sent_ns| now_ns.saturating_sub(sent_ns) <= TIMEOUT_NS) {
+        if transfer.sent_ns.is_none_or(|sent_ns| now_ns.saturating_sub(sent_ns) <= timeout_ns) {
             return Ok(());
         }
-        if transfer.attempt < ATTEMPTS {
+        // A segment is not asked for twice: its answer would be another one.
+        if transfer.attempt < ATTEMPTS && !matches!(transfer.action, Action::ReadSegment { .. }) {
             transfer.attempt += 1;
             transfer.sent_ns = None;
             return Ok(());
@@ -74,38 +82,73 @@ impl SdoClient {
     }
 
     /// The request that is due, if any.
-    pub(super) fn poll(&mut self, now_ns: u64) -> Option<SdoRequest> {
+    pub(crate) fn poll(&mut self, now_ns: u64) -> Option<SdoRequest> {
         if let Some((object, code)) = self.abort.take() {
             return Some(SdoRequest::Abort { object, code });
         }
         let transfer = self.transfer.as_mut().filter(|transfer| transfer.sent_ns.is_none())?;
         transfer.sent_ns = Some(now_ns);
         let object = transfer.object;
-        Some(match transfer.written {
-            None => SdoRequest::InitiateUpload { object },
-            Some(data) => SdoRequest::Download { object, data },
+        Some(match transfer.action {
+            Action::Read => SdoRequest::InitiateUpload { object },
+            Action::ReadSegment { toggle } => SdoRequest::UploadSegment { toggle },
+            Action::Write(data) => SdoRequest::Download { object, data },
         })
     }
 
     /// Takes an answer of the server; returns the value read or written, or why the transfer failed. None for an unasked
     /// answer: there are some after a transfer begun twice, in a frame that came twice, and from a second server with the
-    /// same node id.
-    pub(super) fn take_answer(&mut self, response: SdoResponse) -> Option<Result<Expedited, SdoFailure>> {
-        let Transfer { object, written, .. } = self.transfer.filter(|transfer| transfer.sent_ns.is_some())?;
-        let outcome = match (response, written) {
+    /// same node id. The segments of a longer value go to `long`, and none is its value; without `long` it is refused.
+    pub(crate) fn take_answer(
+        &mut self,
+        response: SdoResponse,
+        mut long: Option<&mut Vec<u8>>,
+    ) -> Option<Result<Option<Expedited>, SdoFailure>> {
+        let Transfer { object, action, attempt, .. } =
+            self.transfer.filter(|transfer| transfer.sent_ns.is_some())?;
+        let is_long = long.as_ref().is_some_and(|long| long.len() <= LONGEST_VALUE);
+        let next =
+            |toggle| Transfer { object, action: Action::ReadSegment { toggle }, sent_ns: None, attempt };
+        let outcome = match (response, action) {
             (SdoResponse::Abort { object: answered, code }, _) if answered == object => {
                 Err(SdoFailure::Aborted { object, code })
             }
-            (SdoResponse::Download { object: answered }, Some(data)) if answered == object => Ok(data),
-            (SdoResponse::Upload { object: answered, data }, None) if answered == object => Ok(data),
-            (SdoResponse::InitiateUpload { object: answered, .. }, None) if answered == object => {
-                self.abort = Some((object, AbortCode::LENGTH));
-                Err(SdoFailure::Aborted { object, code: AbortCode::LENGTH })
+            (SdoResponse::Download { object: answered }, Action::Write(data)) if answered == object => {
+                Ok(Some(data))
+            }
+            (SdoResponse::Upload { object: answered, data }, Action::Read) if answered == object => {
+                Ok(Some(data))
+            }
+            (SdoResponse::InitiateUpload { object: answered, .. }, Action::Read) if answered == object => {
+                if is_long {
+                    self.transfer = Some(next(false));
+                    return None;
+                }
+                Err(self.abort(object))
+            }
+            (
+                SdoResponse::UploadSegment { toggle: answered, data, is_last },
+                Action::ReadSegment { toggle },
+            ) if answered == toggle => {
+                if let Some(long) = &mut long {
+                    long.extend_from_slice(data.data());
+                }
+                if !is_last && is_long {
+                    self.transfer = Some(next(!toggle));
+                    return None;
+                }
+                if is_last { Ok(None) } else { Err(self.abort(object)) }
             }
             _ => return None,
         };
         self.transfer = None;
         Some(outcome)
+    }
+
+    /// Gives up a value that is too long.
+    fn abort(&mut self, object: ObjectAddress) -> SdoFailure {
+        self.abort = Some((object, AbortCode::LENGTH));
+        SdoFailure::Aborted { object, code: AbortCode::LENGTH }
     }
 }
 

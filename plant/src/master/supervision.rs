@@ -11,7 +11,7 @@ use masseter_scenario::CanConfig;
 use super::events::Failure;
 
 /// How long the drives stay stopped.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 enum Stop {
     #[default]
     None,
@@ -21,7 +21,7 @@ enum Stop {
 }
 
 /// The supervision of all drives.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Supervision {
     stop: Stop,
     /// Whether the drives stop for the end of the run.
@@ -108,7 +108,7 @@ fn is_refusal(cause: Cause) -> bool {
 const NAMED_AFTER_NS: u64 = 500_000_000;
 
 /// How far the drives are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 enum Phase {
     /// They are not to be enabled.
     Off,
@@ -121,7 +121,7 @@ enum Phase {
 }
 
 /// The progress of all drives.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Enabling {
     ready_timeout_ns: u64,
     enable_timeout_ns: u64,
@@ -155,7 +155,7 @@ impl Enabling {
             Phase::Enabled => state != Some(DriveState::OperationEnabled),
         };
         (is_enable && (is_in_fault || has_left))
-            .then(|| Failure::with(Cause::DriveFault, [f64::from(drive_state_code(state)), 0.0]))
+            .then(|| Failure::with(Cause::DriveFault, drive_state_code(state), 0.0))
     }
 
     /// Ends the judgement of a cycle; returns what there is to say of each drive.
@@ -358,10 +358,9 @@ mod enabling_tests {
             enabling.end_cycle(0, true, [Some(state); AXES]);
             assert_eq!(enabling.disobedience(Some(DriveState::OperationEnabled), true), None);
             for state in left {
-                let explanation = [f64::from(drive_state_code(state)), 0.0];
                 assert_eq!(
                     enabling.disobedience(state, true),
-                    Some(Failure::with(Cause::DriveFault, explanation))
+                    Some(Failure::with(Cause::DriveFault, drive_state_code(state), 0.0))
                 );
                 assert_eq!(enabling.disobedience(state, false), None);
             }

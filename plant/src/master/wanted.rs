@@ -3,6 +3,9 @@
 //!
 //! Nothing here talks to a drive.
 
+#[cfg(test)]
+mod tests;
+
 use masseter_can::canopen::{AbortCode, Cob, CobId, NodeId, ObjectAddress};
 use masseter_can::cia402::interpolation_period;
 use masseter_can::{CanId, EVERY_SYNC, PdoMapping};
@@ -12,6 +15,8 @@ use masseter_scenario::{
     AccelerationUnit, DriveProfile, MASTER_NODE, ObjectConfig, ObjectKey, ObjectRule, Scenario,
 };
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::PlantError;
 
 /// A drive as the rig needs it.
@@ -19,16 +24,16 @@ use crate::error::PlantError;
 pub struct WantedDrive {
     /// Device type and identity.
     pub identity: [WantedIdentity; 4],
-    /// The two PDOs of the process data.
-    pub pdos: [WantedPdo; 2],
+    /// The two PDOs of the process data, then those that must be off.
+    pub pdos: Vec<PdoSetting>,
     /// The object that sets 6064h at home, with its value; 0 where the drive's own zero is right.
-    pub home: WantedObject,
+    pub home: Setting,
     /// Length of an increment of 6064h, m.
     pub increment_m: f64,
     /// Unit of the drive's accelerations (60AAh).
     pub acceleration_unit: AccelerationUnit,
     /// The objects to write or to compare, in the order in which they are written.
-    pub objects: Vec<WantedObject>,
+    pub objects: Vec<Setting>,
 }
 
 impl WantedDrive {
@@ -49,41 +54,127 @@ impl WantedDrive {
     }
 }
 
-fn home(scenario: &Scenario, axis: usize) -> WantedObject {
-    let profile = scenario.profile(axis);
-    let increments = profile.homing.home_increments(scenario.scale(axis).increment_m);
-    let ObjectKey(object) = profile.homing.home_object;
-    let ObjectConfig { rule, .. } = profile.object(profile.homing.home_object);
-    WantedObject {
-        object,
-        value: increments as u32,
-        bytes: 4,
-        rule,
-        key: "drive_profile.homing.home_position_m",
-    }
+fn home(scenario: &Scenario, axis: usize) -> Setting {
+    let (profile, object) = (scenario.profile(axis), scenario.profile(axis).homing.home_object);
+    let value = profile.homing.home_increments(scenario.scale(axis).increment_m) as u32;
+    let (rule, key) = (profile.object(object).rule, "drive_profile.homing.home_position_m".to_owned());
+    Setting { object, value, bytes: 4, rule, key }
 }
 
-/// One object as it must be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct WantedObject {
+/// One object as it must be, or as it was.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Setting {
     /// Its address.
-    pub object: ObjectAddress,
+    pub object: ObjectKey,
     /// Its value, as the lowest bytes in the drive's order.
     pub value: u32,
     /// Bytes of the value.
     pub bytes: usize,
-    /// What the master does with it; never [`ObjectRule::Absent`].
+    /// Whether it is written or compared; never [`ObjectRule::Absent`].
     pub rule: ObjectRule,
     /// The key of the scenario that decides the value.
-    pub key: &'static str,
+    pub key: String,
 }
 
-impl WantedObject {
-    /// Whether a drive that refuses to show a written object with this code proves the write by its acknowledgement alone.
-    /// Nothing else can prove it: nobody can read a write-only object.
-    pub(crate) fn is_write_only(code: AbortCode) -> bool {
-        code == AbortCode::WRITE_ONLY
+impl Setting {
+    /// Whether a value has the same lowest bytes.
+    pub(crate) fn is_shown_by(&self, found: u32) -> bool {
+        (self.value ^ found) & value_bits(self.bytes) == 0
     }
+}
+
+/// The bits of a value of that many bytes.
+pub(crate) const fn value_bits(bytes: usize) -> u32 {
+    u32::MAX >> (32 - 8 * bytes)
+}
+
+/// One PDO as it must be, or as it was.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PdoSetting {
+    /// Index of its communication parameter; that of its mapping is 200h higher.
+    pub communication: u16,
+    /// Its COB-ID. Without [`layout`](Self::layout) only its validity counts.
+    pub cob_id: u32,
+    /// What it carries and when; none where that does not matter.
+    pub layout: Option<PdoLayout>,
+}
+
+/// What a PDO carries and when.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PdoLayout {
+    /// Transmission type.
+    pub transmission: u32,
+    /// Inhibit time; none for RPDOs and for drives that have none.
+    pub inhibit: Option<u32>,
+    /// Event timer of a TPDO, like `inhibit`.
+    pub event: Option<u32>,
+    /// The mapped objects: index, sub-index, bits.
+    pub mapping: Vec<u32>,
+}
+
+impl PdoSetting {
+    /// A PDO that does not exist.
+    const fn off(communication: u16) -> Self {
+        Self { communication, cob_id: CobId(0).invalidated().0, layout: None }
+    }
+
+    /// Address of a part of the communication parameter.
+    pub const fn part(&self, subindex: u8) -> ObjectAddress {
+        ObjectAddress::new(self.communication, subindex)
+    }
+
+    /// Address of a part of the mapping.
+    pub const fn mapped(&self, place: u8) -> ObjectAddress {
+        ObjectAddress::new(self.communication + 0x200, place)
+    }
+
+    /// Whether it is sent by the drive.
+    pub const fn is_transmitted(&self) -> bool {
+        self.communication >= 0x1800
+    }
+
+    /// Whether an object is one of its timers, which not every drive has.
+    pub(crate) fn is_timer(&self, object: ObjectAddress) -> bool {
+        object.index == self.communication && object.subindex > 2
+    }
+
+    /// Whether a COB-ID is right: the number counts for a PDO that exists.
+    pub(crate) fn has_cob_id(&self, found: u32) -> bool {
+        if CobId(self.cob_id).is_valid() {
+            (self.cob_id ^ found) & COB_ID_BITS == 0
+        } else {
+            !CobId(found).is_valid()
+        }
+    }
+
+    /// The parts but the COB-ID with their values.
+    pub(crate) fn parts(&self) -> Vec<(ObjectAddress, u32)> {
+        let Some(PdoLayout { transmission, inhibit, event, mapping }) = &self.layout else {
+            return Vec::new();
+        };
+        let timers = [(3, *inhibit), (5, *event)];
+        let timers = timers.into_iter().filter_map(|(part, value)| Some((self.part(part), value?)));
+        let mapped = (1..).zip(mapping).map(|(place, &object)| (self.mapped(place), object));
+        [(self.part(2), *transmission), (self.mapped(0), mapping.len() as u32)]
+            .into_iter()
+            .chain(timers)
+            .chain(mapped)
+            .collect()
+    }
+
+    /// What the master compares, in this order: COB-ID, transmission type and mapping of a PDO that must exist.
+    pub(crate) fn compared(&self) -> impl Iterator<Item = WantedIdentity> {
+        let cob_id = WantedIdentity { object: self.part(1), mask: COB_ID_BITS, value: self.cob_id };
+        let parts = self.parts().into_iter().filter(move |(object, _)| !self.is_timer(*object));
+        let parts = parts.map(|(object, value)| WantedIdentity { object, mask: u32::MAX, value });
+        self.layout.iter().map(move |_| cob_id).chain(parts)
+    }
+}
+
+/// Whether a drive that refuses to show a written object with this code proves the write by its acknowledgement alone.
+/// Nothing else can prove it: nobody can read a write-only object.
+pub(crate) fn is_write_only(code: AbortCode) -> bool {
+    code == AbortCode::WRITE_ONLY
 }
 
 /// Objects that do not show what was written to them, with what proves the write instead.
@@ -103,7 +194,7 @@ pub(crate) fn shown_bits(object: ObjectAddress, value: u32, bytes: usize) -> Opt
         None if is_cob_id && !CobId(value).is_valid() => Some(CobId::NOT_VALID),
         // A drive decides itself whether it answers remote requests, which nobody sends.
         None if is_cob_id => Some(COB_ID_BITS),
-        None => Some(u32::MAX >> (32 - 8 * bytes)),
+        None => Some(value_bits(bytes)),
     }
 }
 
@@ -119,7 +210,7 @@ pub(crate) fn may_keep(rule: ObjectRule, object: ObjectAddress) -> bool {
 }
 
 /// Where the profile has a value of its own, that one; the profile's further objects come last.
-fn objects(scenario: &Scenario, axis: usize) -> Result<Vec<WantedObject>, PlantError> {
+fn objects(scenario: &Scenario, axis: usize) -> Result<Vec<Setting>, PlantError> {
     let profile = scenario.profile(axis);
     let known = known_objects(scenario, axis)?;
     let mut wanted = Vec::with_capacity(known.len());
@@ -138,47 +229,44 @@ fn objects(scenario: &Scenario, axis: usize) -> Result<Vec<WantedObject>, PlantE
         } else {
             config.rule
         };
-        wanted.push(WantedObject { object, value: value as u32, bytes, rule, key });
+        wanted.push(Setting {
+            object: ObjectKey(object),
+            value: value as u32,
+            bytes,
+            rule,
+            key: key.to_owned(),
+        });
     }
     wanted.extend(offsets(profile));
-    for (&ObjectKey(object), config) in &profile.objects {
+    for (&object, config) in &profile.objects {
         let is_known = wanted.iter().any(|known| known.object == object);
         let (Some(value), false, false) = (config.value, is_known, config.rule == ObjectRule::Absent) else {
             continue;
         };
         let Some(bytes) = config.bytes else {
             let reason = "enter bytes = 1, 2 or 4: the rig does not know the object";
-            return Err(PlantError::Scenario(format!(
-                "drive_profile.objects.{}: {reason}",
-                ObjectKey(object)
-            )));
+            return Err(PlantError::Scenario(format!("drive_profile.objects.{object}: {reason}")));
         };
-        let key = "drive_profile.objects";
-        wanted.push(WantedObject {
-            object,
-            value: value as u32,
-            bytes: bytes.into(),
-            rule: config.rule,
-            key,
-        });
+        let (value, bytes, key) = (value as u32, bytes.into(), "drive_profile.objects".to_owned());
+        wanted.push(Setting { object, value, bytes, rule: config.rule, key });
     }
     Ok(wanted)
 }
 
 /// Offsets that the process data do not carry: 0, instead of the last value of other process data. The torque offset of
 /// an earlier run acts in every drive that has the object; the others are those that the profile names.
-fn offsets(profile: &DriveProfile) -> impl Iterator<Item = WantedObject> + '_ {
+fn offsets(profile: &DriveProfile) -> impl Iterator<Item = Setting> + '_ {
     let mapping = profile.pdos.rpdo1();
     OFFSETS.into_iter().filter_map(move |(index, bytes)| {
-        let object = ObjectAddress::new(index, 0);
+        let object = ObjectKey(ObjectAddress::new(index, 0));
         let may_lack = ObjectConfig { rule: ObjectRule::Optional, ..ObjectConfig::default() };
-        let named = profile.objects.get(&ObjectKey(object)).copied();
+        let named = profile.objects.get(&object).copied();
         let of_every_profile = ((index, bytes) == TORQUE_OFFSET).then_some(may_lack);
         let ObjectConfig { rule, value, .. } = named.or(of_every_profile)?;
         let is_mapped = mapping.entries().iter().any(|entry| entry >> 16 == u32::from(index));
         let is_left = is_mapped || rule == ObjectRule::Absent;
-        let value = value.unwrap_or(0) as u32;
-        (!is_left).then_some(WantedObject { object, value, bytes, rule, key: "drive_profile.objects" })
+        let (value, key) = (value.unwrap_or(0) as u32, "drive_profile.objects".to_owned());
+        (!is_left).then_some(Setting { object, value, bytes, rule, key })
     })
 }
 
@@ -216,7 +304,7 @@ fn in_this_run(
 }
 
 /// Whether a drive may lack an object that the profile does not mention. Many have no event timer for RPDOs;
-/// heartbeat and master supervise these drives too. A bring-up that was killed may have left another fault reaction
+/// heartbeat and master supervise these drives too. A step of the commissioning that was killed may have left another fault reaction
 /// (605Eh). Only a dry run needs the limit of force.
 fn may_lack(object: ObjectAddress, scenario: &Scenario) -> bool {
     match (object.index, object.subindex) {
@@ -308,7 +396,7 @@ fn rpdo_timeout_ms(scenario: &Scenario) -> u16 {
 pub(crate) const COB_ID_BITS: u32 = !CobId::NO_REMOTE_REQUEST;
 /// Communication parameters of the other PDOs with identifiers of CiA 301. Many drives send them as delivered, but the
 /// plan of the bus does not include them.
-pub(crate) const OTHER_PDOS: [u16; 6] = [0x1401, 0x1402, 0x1403, 0x1801, 0x1802, 0x1803];
+const OTHER_PDOS: [u16; 6] = [0x1401, 0x1402, 0x1403, 0x1801, 0x1802, 0x1803];
 
 /// A value of the identity: the bits of `mask` must be equal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -322,20 +410,9 @@ pub struct WantedIdentity {
 }
 
 impl WantedIdentity {
-    const fn new(index: u16, subindex: u8, mask: u32, value: u32) -> Self {
+    pub(crate) const fn new(index: u16, subindex: u8, mask: u32, value: u32) -> Self {
         Self { object: ObjectAddress::new(index, subindex), mask, value }
     }
-}
-
-/// A PDO as the rig exchanges it: sent or taken with every SYNC.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct WantedPdo {
-    /// Index of its communication parameter; that of its mapping is 200h higher.
-    pub communication: u16,
-    /// Its COB-ID.
-    pub cob_id: u32,
-    /// The mapped objects: index, sub-index, bits.
-    pub mapping: PdoMapping,
 }
 
 /// The identity of a drive with this profile.
@@ -349,150 +426,14 @@ fn identity(profile: &DriveProfile) -> [WantedIdentity; 4] {
     ]
 }
 
-/// The PDOs of a node with this profile.
-fn pdos(profile: &DriveProfile, node: NodeId) -> [WantedPdo; 2] {
-    let pdo = |communication, cob: Cob, mapping| {
-        let cob_id = CanId::from(cob).number();
-        WantedPdo { communication, cob_id, mapping }
+/// The PDOs of a node with this profile: two are sent or taken with every SYNC, the others are off.
+fn pdos(profile: &DriveProfile, node: NodeId) -> Vec<PdoSetting> {
+    let pdo = |communication, cob: Cob, mapping: PdoMapping, timer| {
+        let (transmission, mapping) = (EVERY_SYNC.into(), mapping.entries().to_vec());
+        let layout = Some(PdoLayout { transmission, inhibit: timer, event: timer, mapping });
+        PdoSetting { communication, cob_id: CanId::from(cob).number(), layout }
     };
-    [pdo(0x1400, Cob::Rpdo1(node), profile.pdos.rpdo1()), pdo(0x1800, Cob::Tpdo1(node), profile.pdos.tpdo1())]
-}
-
-impl WantedPdo {
-    /// Every object of the PDO with the bits that count and their value, in the order in which the master compares them.
-    pub fn entries(&self) -> impl Iterator<Item = WantedIdentity> {
-        let Self { communication, cob_id, .. } = *self;
-        let mapping = self.mapping.entries();
-        let entry = WantedIdentity::new;
-        let head = [
-            entry(communication, 1, COB_ID_BITS, cob_id),
-            entry(communication, 2, u32::MAX, u32::from(EVERY_SYNC)),
-            entry(communication + 0x200, 0, u32::MAX, mapping.len() as u32),
-        ];
-        let mapped = (1..).zip(mapping);
-        head.into_iter()
-            .chain(mapped.map(move |(place, &object)| entry(communication + 0x200, place, u32::MAX, object)))
-    }
-}
-
-#[cfg(test)]
-mod drive_tests {
-    use std::path::Path;
-
-    use masseter_can::canopen::ObjectAddress;
-    use masseter_scenario::ObjectRule;
-
-    use super::{OFFSETS, *};
-
-    fn wanted(text: &str, axis: usize) -> Result<WantedDrive, PlantError> {
-        let scenario = Scenario::parse(Path::new("robot.toml"), text).unwrap();
-        scenario.validate().unwrap();
-        WantedDrive::of_axis(&scenario, axis, NodeId::new(1).unwrap())
-    }
-
-    fn find(wanted: &WantedDrive, index: u16, subindex: u8) -> Option<WantedObject> {
-        wanted.objects.iter().find(|wanted| wanted.object == ObjectAddress::new(index, subindex)).copied()
-    }
-
-    /// The drive that takes 10⁷ as rpm/s gets 10 m/s² in rpm/s: with 3 mm a turn 200 000.
-    #[test]
-    fn a_profile_decides_units_limits_and_objects() {
-        let epos4 = "[[drive_profile]]\nkind = 'epos4'\nunits = { lead_m = 0.003 }";
-        let wanted = wanted(epos4, 3).unwrap();
-        let value = |index, subindex| find(&wanted, index, subindex).map(|wanted| wanted.value);
-        assert_eq!(value(0x6085, 0), Some(200_000));
-        assert_eq!(
-            (value(0x6066, 0), value(0x60C2, 1), value(0x60C2, 2)),
-            (Some(0), Some(1), Some(-3i32 as u32))
-        );
-        assert_eq!(find(&wanted, 0x60AA, 0).unwrap().rule, ObjectRule::Expect);
-        assert_eq!(wanted.identity[3].mask, 0xFFFF_0000);
-        assert_eq!((wanted.home.object, wanted.home.value), (ObjectAddress::new(0x30B0, 0), 0));
-    }
-
-    #[test]
-    fn what_a_drive_cannot_take_is_refused_with_the_key_that_decides_it() {
-        for (text, refusal) in [
-            (
-                "objects.6066h = { highest = 0 }",
-                "drives.leg.following_error_timeout_ms: object 6066h:00h would be 20",
-            ),
-            (
-                "objects.6085h = { lowest = 20_000_000 }",
-                "drives.leg.quick_stop_deceleration_m_s2: object 6085h",
-            ),
-            ("objects.3000h = { value = 1 }", "drive_profile.objects.3000h: enter bytes"),
-            ("objects.'60C2h:02' = { value = -2 }", "rate_hz = 1000: the drive counts its cycle in 10^-2 s"),
-        ] {
-            let error = wanted(&format!("[[drive_profile]]\n{text}"), 4).unwrap_err().to_string();
-            assert!(error.starts_with(refusal), "{error}");
-        }
-    }
-
-    #[test]
-    fn an_absent_object_is_left_and_an_optional_one_may_be_refused() {
-        let text =
-            "[[drive_profile]]\nobjects.6007h = { rule = 'absent' }\nobjects.6065h = { rule = 'optional' }";
-        let wanted = wanted(text, 0).unwrap();
-        assert_eq!(find(&wanted, 0x6007, 0), None);
-        assert_eq!(find(&wanted, 0x6065, 0).unwrap().rule, ObjectRule::Optional);
-        assert_eq!(find(&wanted, 0x1400, 5).unwrap().rule, ObjectRule::Optional);
-    }
-
-    /// A drive keeps the last force of process data that no longer carry it.
-    #[test]
-    fn offsets_are_0_unless_they_are_process_data() {
-        let offset = |text: &str, index| {
-            let wanted = wanted(&format!("[[drive_profile]]\n{text}"), 3).unwrap();
-            find(&wanted, index, 0).map(|wanted| (wanted.value, wanted.bytes, wanted.rule))
-        };
-        assert_eq!(offset("", 0x60B2), Some((0, 2, ObjectRule::Optional)));
-        assert_eq!(offset("", 0x60B1), None, "no process data of the rig carry it");
-        assert_eq!(offset("objects.60B2h = { rule = 'absent' }", 0x60B2), None);
-        for kind in ["kind = 'epos4'\nunits = { lead_m = 0.003 }", "kind = 'n5'"] {
-            for (index, bytes) in OFFSETS {
-                assert_eq!(offset(kind, index), Some((0, bytes, ObjectRule::Optional)), "{kind}");
-            }
-        }
-        let mapped = "kind = 'n5'\npdos.rpdo1 = ['6040h', '607Ah', '60B2h']";
-        assert_eq!(offset(mapped, 0x60B2), None);
-        assert!(offset(mapped, 0x60B1).is_some());
-        assert_eq!(offset("objects.60B2h = { value = 5 }", 0x60B2), Some((5, 2, ObjectRule::Write)));
-    }
-
-    /// A leg of 0.2 m at home whose limits count from there, and the same on a drive that counts the other way.
-    #[test]
-    fn software_limits_count_from_home_and_ascend_on_a_reversed_axis() {
-        let limits = |text: &str| {
-            let wanted = wanted(&format!("[[drive_profile]]\n{text}"), 3).unwrap();
-            let limit = |subindex| find(&wanted, 0x607D, subindex).unwrap().value as i32;
-            ([limit(1), limit(2)], wanted.home.value as i32)
-        };
-        let ([low, high], _) = limits("");
-        let moved = [low - 200_000, high - 200_000];
-        assert_eq!(limits("homing.home_position_m = 0.2"), (moved, -200_000));
-        assert_eq!(
-            limits("homing = { home_position_m = 0.2, limits_from_home = false, home_sign = 1 }"),
-            ([low, high], 200_000)
-        );
-        let back = moved.map(|end: i32| -end);
-        assert_eq!(limits("homing.home_position_m = 0.2\nreversed = ['l1']"), ([back[1], back[0]], 200_000));
-    }
-}
-
-#[cfg(test)]
-mod known_tests {
-    use super::*;
-
-    #[test]
-    fn process_data_may_be_silent_as_long_as_commands_or_the_heartbeat() {
-        let timeout_ms = |rate_hz, configured| {
-            let mut scenario = Scenario { rate_hz, ..Scenario::default() };
-            scenario.can.rpdo_timeout_ms = configured;
-            rpdo_timeout_ms(&scenario)
-        };
-        assert_eq!(timeout_ms(100, None), 200, "20 cycles");
-        assert_eq!(timeout_ms(1000, None), Scenario::default().can.heartbeat_consumer_ms);
-        assert_eq!(timeout_ms(1000, Some(0)), 0);
-    }
+    let rpdo1 = pdo(0x1400, Cob::Rpdo1(node), profile.pdos.rpdo1(), None);
+    let tpdo1 = pdo(0x1800, Cob::Tpdo1(node), profile.pdos.tpdo1(), Some(0));
+    [rpdo1, tpdo1].into_iter().chain(OTHER_PDOS.map(PdoSetting::off)).collect()
 }

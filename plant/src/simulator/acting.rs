@@ -9,12 +9,12 @@ use arrayvec::ArrayVec;
 const MOST: usize = 16;
 
 /// The kinds of faults that act on a part, each with its size, and whether it has really changed something.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Acting<K> {
     acts: ArrayVec<Act<K>, MOST>,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Act<K> {
     kind: K,
     size: f64,

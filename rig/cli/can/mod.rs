@@ -116,7 +116,7 @@ fn refusal(scenario: &Scenario, plans: &[BusPlan], room: &Room) -> Option<String
         return Some(format!("bus {} does not fit; {room}", overload.0.bus));
     }
     let schedule = CycleSchedule::new(scenario).map_err(|error| error.to_string());
-    let plant = plant::check(scenario).map_err(|error| error.to_string());
+    let plant = plant::check_scenario(scenario).map_err(|error| error.to_string());
     schedule.and(plant).err()
 }
 

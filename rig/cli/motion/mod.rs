@@ -58,8 +58,8 @@ pub(crate) fn motion(args: &MotionArgs) -> anyhow::Result<Exit> {
     let scenario = scenario_with_overrides(args.scenario.as_deref(), &overrides)?;
     let found = Found::new(&scenario, &args.file)?;
     if let Some(path) = &args.svg {
-        let drawn = picture::svg(&found.survey).context("cannot draw the motion")?;
-        fs::write(path, drawn).with_context(|| format!("cannot write {}", path.display()))?;
+        fs::write(path, picture::svg(&found.survey))
+            .with_context(|| format!("cannot write {}", path.display()))?;
     }
     match args.format {
         Format::Json => result(&(serde_json::to_string_pretty(&found)? + "\n"))?,
@@ -272,13 +272,11 @@ fn listed<T>(name: &str, entries: &[T], describe: impl Fn(&T) -> String) -> Stri
 }
 
 fn judgement(judged: &Judged) -> String {
-    match (&judged.refused, &judged.strokes) {
-        (Some(reason), _) => format!("REFUSED: {reason}\n"),
-        (None, Some(strokes)) => {
-            format!("PLAYS: {} has {:.1} mm left of its stroke\n", strokes.axis, strokes.margin_mm)
-        }
-        (None, None) => String::new(),
-    }
+    let refused = judged.refused.iter().map(|reason| format!("REFUSED: {reason}\n"));
+    let plays = judged.strokes.iter().map(|Strokes { axis, margin_mm }| {
+        format!("PLAYS: {axis} has {margin_mm:.1} mm left of its stroke\n")
+    });
+    refused.chain(plays).collect()
 }
 
 fn suggested(suggestion: &Suggestion) -> String {
@@ -289,18 +287,13 @@ fn suggested(suggestion: &Suggestion) -> String {
     if let Some([x, y, z]) = suggestion.closed_offset_m {
         let _ = writeln!(text, "  [jaw]\n  closed_offset_m = [{x:?}, {y:?}, {z:?}]");
     }
-    match (&suggestion.judged.strokes, &suggestion.judged.refused) {
-        (Some(strokes), _) => {
-            let _ = writeln!(
-                text,
-                "with that the motion plays, and {} has {:.1} mm left of its stroke",
-                strokes.axis, strokes.margin_mm
-            );
-        }
-        (None, Some(reason)) => {
-            let _ = writeln!(text, "even then the motion is refused: {reason}");
-        }
-        (None, None) => {}
+    let Judged { strokes, refused } = &suggestion.judged;
+    if let Some(Strokes { axis, margin_mm }) = strokes {
+        let _ =
+            writeln!(text, "with that the motion plays, and {axis} has {margin_mm:.1} mm left of its stroke");
+    }
+    if let Some(reason) = refused {
+        let _ = writeln!(text, "even then the motion is refused: {reason}");
     }
     text
 }

@@ -1,15 +1,15 @@
 //! The motion as a picture: paths of the incisal point and the condyles, and their course.
 
-use masseter_charts::{Axis, Error, Line, LineChart, Scale, SeriesLabelPosition, palette, svg as draw_svg};
+use masseter_charts::{Axis, BLUE, Chart, GREEN, Look, RED, ROOM, Scale, Series, VERMILION, drawing, extent};
 use masseter_controller::trajectory::{Glitch, RecordingSurvey, SurveyRow};
 
-const WIDTH: u32 = 960;
-const PATHS: u32 = 400;
-const COURSE: u32 = 260;
-/// Height over width of the plot of a path, without its labels and title.
-const PLOT: f64 = 316.0 / 386.0;
+const COLOURS: [&str; 3] = [BLUE, VERMILION, GREEN];
+/// Size of the chart of a path, px.
+const PATH: [f64; 2] = [480.0, 400.0];
+/// Size of the chart of a course, px.
+const COURSE: [f64; 2] = [960.0, 260.0];
 /// Room around a path, as a share of its size.
-const ROOM: f64 = 1.15;
+const AROUND: f64 = 1.15;
 /// Glitches that are marked.
 const MOST_MARKS: usize = 5;
 /// The component on which they are marked.
@@ -17,87 +17,65 @@ const UP: usize = 2;
 /// A path of no size is drawn in a box of this size, mm.
 const LEAST_MM: f64 = 1.0;
 
-/// A plane through the jaw: its title, and its axes with their names.
-struct Plane {
-    title: &'static str,
-    axes: [usize; 2],
-    names: [&'static str; 2],
-}
-
-const SAGITTAL: Plane = Plane { title: "Sagittal", axes: [0, 2], names: ["anterior, mm", "up, mm"] };
-const FRONTAL: Plane = Plane { title: "Frontal", axes: [1, 2], names: ["left, mm", "up, mm"] };
-
 /// Sagittal and frontal paths over displacements and turns.
-pub(super) fn svg(survey: &RecordingSurvey) -> Result<String, Error> {
-    draw_svg((WIDTH, PATHS + 2 * COURSE), |area| {
-        let (paths, courses) = area.split_vertically(PATHS);
-        let (sagittal, frontal) = paths.split_horizontally(WIDTH / 2);
-        path(survey, &SAGITTAL).draw_on(&sagittal)?;
-        path(survey, &FRONTAL).draw_on(&frontal)?;
-        let (way, turn) = courses.split_vertically(COURSE);
-        course(survey, "incisal point, mm", ["anterior", "left", "up"], |row| row.points_m[0] * 1e3)
-            .draw_on(&way)?;
-        let turns = |row: &SurveyRow| row.turn_rad.map(f64::to_degrees);
-        course(survey, "turn, degrees", ["roll", "opening", "yaw"], turns).draw_on(&turn)
-    })
+pub(super) fn svg(survey: &RecordingSurvey) -> String {
+    let way_mm = |row: &SurveyRow| row.points_m[0] * 1e3;
+    let turn_deg = |row: &SurveyRow| row.turn_rad.map(f64::to_degrees);
+    let below = PATH[1] + COURSE[1];
+    let charts = [
+        path(survey, 0.0, "sagittal", 0, "anterior, mm"),
+        path(survey, PATH[0], "frontal", 1, "left, mm"),
+        course(survey, PATH[1], "incisal point, mm", ["anterior", "left", "up"], way_mm),
+        course(survey, below, "turn, degrees", ["roll", "opening", "yaw"], turn_deg),
+    ];
+    drawing([COURSE[0], below + COURSE[1]], &charts)
 }
 
 /// The three points in a plane, in one scale along both axes.
-fn path(survey: &RecordingSurvey, plane: &Plane) -> LineChart {
-    let names = ["incisal point", "right condyle", "left condyle"];
-    let of = |point: usize| {
-        let place = |row: &SurveyRow| {
-            let [across, up] = plane.axes.map(|axis| row.points_m[point][axis] * 1e3);
-            (across, up)
-        };
-        Line::new(names[point], survey.path.iter().map(place).collect())
+fn path(survey: &RecordingSurvey, left: f64, title: &str, across: usize, label: &str) -> Chart {
+    let names = ["incisal point", "right condyle", "left condyle"].into_iter().zip(COLOURS).enumerate();
+    let of = |(point, (name, colour)): (usize, (&str, _))| {
+        let place = |row: &SurveyRow| (row.points_m[point][across] * 1e3, row.points_m[point][UP] * 1e3);
+        let points = survey.path.iter().map(place).collect();
+        Series { name: name.to_owned(), colour, look: Look::Line, points }
     };
-    let lines: Vec<Line> = (0..3).map(of).collect();
-    let points = || lines.iter().flat_map(|line| &line.points);
-    let [x, y] = [span(points().map(|point| point.0)), span(points().map(|point| point.1))];
-    let width = ROOM * (x[1] - x[0]).max((y[1] - y[0]) / PLOT).max(LEAST_MM);
-    let ends = |[low, high]: [f64; 2], length: f64| {
-        let middle = f64::midpoint(low, high);
-        [middle - length / 2.0, middle + length / 2.0]
+    let series: Vec<Series> = names.map(of).collect();
+    let points = || series.iter().flat_map(|series| &series.points);
+    let extents = [extent(points().map(|point| point.0)), extent(points().map(|point| point.1))];
+    let plot = [PATH[0] - ROOM[0] - ROOM[2], PATH[1] - ROOM[1] - ROOM[3]];
+    let sizes_mm = extents.map(|[low, high]| high - low);
+    let mm_a_px =
+        (AROUND * sizes_mm[0] / plot[0]).max(AROUND * sizes_mm[1] / plot[1]).max(LEAST_MM / plot[0]);
+    let axis = |of: usize, label: &str| {
+        let [low, high] = extents[of];
+        let (middle, half) = (f64::midpoint(low, high), mm_a_px * plot[of] / 2.0);
+        Axis { label: label.to_owned(), scale: Scale::Linear, ends: [middle - half, middle + half] }
     };
-    LineChart {
-        title: plane.title.to_owned(),
-        x: Axis::new(plane.names[0], Scale::Linear, ends(x, width)),
-        y: Axis::new(plane.names[1], Scale::Linear, ends(y, width * PLOT)),
-        lines,
-        legend: SeriesLabelPosition::LowerRight,
-    }
-}
-
-fn span(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
+    let (x, y) = (axis(0, label), axis(1, "up, mm"));
+    Chart { frame: [left, 0.0, PATH[0], PATH[1]], title: title.to_owned(), x, y, series }
 }
 
 /// Three components over time, with the glitches.
 fn course(
     survey: &RecordingSurvey,
+    top: f64,
     label: &str,
     names: [&str; 3],
     of: impl Fn(&SurveyRow) -> nalgebra::Vector3<f64>,
-) -> LineChart {
-    let line = |(axis, name): (usize, &str)| {
-        Line::new(name, survey.path.iter().map(|row| (row.time_s, of(row)[axis])).collect())
+) -> Chart {
+    let component = |(axis, (name, colour)): (usize, (&str, _))| {
+        let points = survey.path.iter().map(|row| (row.time_s, of(row)[axis])).collect();
+        Series { name: name.to_owned(), colour, look: Look::Line, points }
     };
     let mark = |glitch: &Glitch| {
         let row = survey.path.partition_point(|row| row.time_s < glitch.time_s).min(survey.path.len() - 1);
-        let at = (glitch.time_s, of(&survey.path[row])[UP]);
-        Line::new(&format!("glitch, line {}", glitch.line), vec![at]).marked().coloured(palette::RED)
+        let points = vec![(glitch.time_s, of(&survey.path[row])[UP])];
+        Series { name: format!("glitch, line {}", glitch.line), colour: RED, look: Look::Dots, points }
     };
-    LineChart {
-        title: String::new(),
-        x: Axis::fitted("time, s", Scale::Linear).including(0.0),
-        y: Axis::fitted(label, Scale::Linear),
-        lines: names
-            .into_iter()
-            .enumerate()
-            .map(line)
-            .chain(survey.glitches.iter().take(MOST_MARKS).map(mark))
-            .collect(),
-        legend: SeriesLabelPosition::LowerRight,
-    }
+    let components = names.into_iter().zip(COLOURS).enumerate().map(component);
+    let series: Vec<_> = components.chain(survey.glitches.iter().take(MOST_MARKS).map(mark)).collect();
+    let points = || series.iter().flat_map(|series| &series.points);
+    let x = Axis::around("time, s", points().map(|point| point.0).chain([0.0]), 0.0);
+    let y = Axis::around(label, points().map(|point| point.1), 0.05);
+    Chart { frame: [0.0, top, COURSE[0], COURSE[1]], title: String::new(), x, y, series }
 }

@@ -5,10 +5,12 @@
 
 mod uniqueness;
 
+use std::fs;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
+use anyhow::Context;
 use clap::{Args, Parser, Subcommand};
 use masseter_plan::Overrides;
 use masseter_recording::output::new_folder;
@@ -20,7 +22,7 @@ use rustix::process::umask;
 
 use uniqueness::{UniquenessVerb, uniqueness};
 
-/// Research on the published mechanism: the paper's claims measured again, and proofs
+/// Research on the published mechanism: what the paper claims measured again, and proofs
 ///
 /// Exits with 0 where all went well, 1 where uniqueness is not shown, 2 for wrong usage or input, 6 for a full disk.
 #[derive(Debug, Parser)]
@@ -32,7 +34,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// Reproduce the paper's study of the kinematics: figures, data, claims
+    /// Reproduce the paper's study of the kinematics as tables
     Study(StudyArgs),
     /// Prove where the six inputs determine one pose, or search for exceptions
     #[command(subcommand, after_help = "Example:\n  masseter-research uniqueness prove --region jaw")]
@@ -61,7 +63,7 @@ fn main() -> ExitCode {
 #[derive(Debug, Clone, Args)]
 #[command(after_help = "Example:\n  masseter-research study --out study")]
 struct StudyArgs {
-    /// Folder for figures (SVG), data (CSV) and claims.md; must not exist
+    /// Folder for the tables (CSV); must not exist
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Seed of every random number
@@ -73,7 +75,7 @@ struct StudyArgs {
     /// Cells along each side of a map
     #[arg(long, value_name = "N", default_value_t = 160, value_parser = clap::value_parser!(u32).range(2..=1000))]
     cells: u32,
-    /// Recorded jaw motion (CSV of poses or markers) to judge and to draw into the workspace as well
+    /// Recorded jaw motion (CSV of poses or markers) to judge as well
     #[arg(long, value_name = "FILE.csv")]
     trajectory: Option<PathBuf>,
     /// Scenario with a motion to judge as well; for a recording its axes, jaw and limits
@@ -81,16 +83,18 @@ struct StudyArgs {
     scenario: Option<PathBuf>,
 }
 
-/// Makes the study. A claim of the paper that does not hold is a result, not a failure.
+/// Makes the study.
 fn study(args: &StudyArgs) -> anyhow::Result<Exit> {
-    let prepared = Study::prepare(args.own_scenario()?.as_ref())?;
+    let study = Study::prepare(args.own_scenario()?.as_ref())?;
     new_folder(&args.out)?;
     let settings = Settings { seed: args.seed, samples: args.samples as usize, cells: args.cells as usize };
-    let study = prepared.run(settings, |stage| status!("{stage}"))?;
-    for claim in masseter_research::write(&study, &args.out, &args.command())? {
-        result_line!("{:<13}  {}", claim.judgement.name(), claim.statement)?;
+    let mut tables = study.run(settings, |stage| status!("{stage}"))?;
+    tables.push(("settings", args.settings_table()));
+    for (name, table) in tables {
+        let path = args.out.join(name).with_extension("csv");
+        fs::write(&path, table).with_context(|| format!("cannot write {}", path.display()))?;
     }
-    result_line!("{}", args.out.join("claims.md").display())?;
+    result_line!("{}", args.out.display())?;
     Ok(Exit::Passed)
 }
 
@@ -104,14 +108,21 @@ impl StudyArgs {
         Ok(Some(masseter_plan::scenario_with_overrides(self.scenario.as_deref(), &overrides)?))
     }
 
-    /// The command line that repeats the study.
-    fn command(&self) -> String {
+    /// The version, the settings, and the command line that repeats the study.
+    fn settings_table(&self) -> String {
         let Self { seed, samples, cells, trajectory, scenario, .. } = self;
         let options = [("trajectory", trajectory), ("scenario", scenario)].into_iter();
         let option =
             |(name, path): (_, &Option<PathBuf>)| Some(format!(" --{name} {}", path.as_ref()?.display()));
-        format!("masseter-research study --out DIR --seed {seed} --samples {samples} --cells {cells}")
-            + &options.filter_map(option).collect::<String>()
+        let options: String = options.filter_map(option).collect();
+        let command = format!(
+            "masseter-research study --out DIR --seed {seed} --samples {samples} --cells {cells}{options}"
+        );
+        let version = env!("CARGO_PKG_VERSION");
+        format!(
+            "version,seed,samples,command\n{version},{seed},{samples},\"{}\"\n",
+            command.replace('"', "\"\"")
+        )
     }
 }
 

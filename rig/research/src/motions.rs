@@ -7,8 +7,9 @@ use masseter_scenario::{
     ChewingConfig, LateralConfig, MotionConfig, OpeningConfig, ProtrusionConfig, Scenario,
 };
 
-use crate::evidence::{csv, number};
+use crate::maps::COORDINATES;
 use crate::solver::{COMPARED, CONTROLLER, Solver, Start, distance_rad};
+use crate::tables::{csv, number};
 
 /// A cycle of the rig, s.
 const CYCLE_S: f64 = 1e-3;
@@ -18,23 +19,23 @@ const TRUE_WITHIN_RAD: f64 = 1e-6;
 /// A motion of the jaw on the platform.
 #[derive(Debug, Clone)]
 pub(crate) struct Motion {
-    pub name: String,
+    name: String,
     pub trajectory: Trajectory,
     /// The strokes and velocities that it needs, or why the mechanism cannot follow.
-    pub demands: Result<TrajectoryReport, String>,
+    demands: Result<TrajectoryReport, String>,
     /// Largest condition number of its poses every 10 ms.
-    pub condition: f64,
+    condition: f64,
     /// How each of [`COMPARED`] followed it, 1 ms a step.
-    pub followed: [Followed; COMPARED.len()],
+    followed: [Followed; COMPARED.len()],
 }
 
 /// How a solver followed a motion, each step from its last solution.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Followed {
-    pub steps: usize,
+struct Followed {
+    steps: usize,
     /// Steps at which it was not at the true leg angles.
-    pub lost: usize,
-    pub iterations_mean: f64,
+    lost: usize,
+    iterations_mean: f64,
 }
 
 /// Opening of adults at the incisal point, mean and 95th percentile of 259, mm (Kordass et al., Int J Comput Dent 17
@@ -78,13 +79,9 @@ impl Motion {
         let condition = conditions.fold(0.0, f64::max);
         Ok(Self { name: name.to_owned(), trajectory, demands, condition, followed })
     }
-
-    /// The platform's poses, every 10 ms.
-    pub(crate) fn poses(&self) -> impl Iterator<Item = Pose> {
-        poses(&self.trajectory)
-    }
 }
 
+/// The platform's poses, every 10 ms.
 fn poses(trajectory: &Trajectory) -> impl Iterator<Item = Pose> {
     let steps = (trajectory.duration_s() / (10.0 * CYCLE_S)) as usize;
     (0..=steps).map(|step| trajectory.pose(step as f64 * 10.0 * CYCLE_S))
@@ -117,6 +114,14 @@ fn follow(solver: Solver, mechanism: &Mechanism, trajectory: &Trajectory) -> Fol
     followed
 }
 
+/// The platform's coordinates along each motion.
+pub(crate) fn paths_table(motions: &[Motion]) -> String {
+    let rows = motions.iter().flat_map(|motion| {
+        poses(&motion.trajectory).map(|pose| (&motion.name, COORDINATES.map(|axis| number(axis.at(&pose)))))
+    });
+    csv("motion,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg", rows)
+}
+
 /// A row for each motion and solver.
 pub(crate) fn table(motions: &[Motion], mechanism: &Mechanism) -> String {
     let rows = motions.iter().flat_map(|motion| {
@@ -128,13 +133,14 @@ pub(crate) fn table(motions: &[Motion], mechanism: &Mechanism) -> String {
         COMPARED.into_iter().zip(motion.followed).map(move |(solver, followed)| {
             let Followed { steps, lost, iterations_mean } = followed;
             let is_within = u8::from(motion.demands.is_ok());
-            let name = solver.short_name;
-            (&motion.name, is_within, needs.map(number), name, steps, lost, number(iterations_mean))
+            let refused = motion.demands.as_ref().err();
+            let followed = (solver.short_name, steps, lost, number(iterations_mean));
+            (&motion.name, is_within, needs.map(number), followed, refused)
         })
     });
     csv(
         "motion,within_limits,least_slide_margin_m,least_leg_margin_m,greatest_condition,solver,steps_of_1ms,\
-         steps_lost,iterations_mean",
+         steps_lost,iterations_mean,refused",
         rows,
     )
 }

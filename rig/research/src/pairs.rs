@@ -4,8 +4,8 @@ use masseter_model::geometry::Mechanism;
 use rayon::prelude::*;
 
 use self::Course::{Converges, Diverges, Fails, Oscillates};
-use crate::evidence::{Share, csv, degrees, number};
 use crate::solver::{NEWTON, PUBLISHED, Start};
+use crate::tables::{csv, degrees, number};
 use crate::trials::{Guesses, Trial, Trials};
 
 /// Errors in which a cycle is looked for, the last ones of a trace.
@@ -22,7 +22,7 @@ const RISEN_BY: f64 = 10.0;
 
 /// How an iteration ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Course {
+enum Course {
     /// It reaches a solution.
     Converges,
     /// It repeats the same errors for ever.
@@ -35,16 +35,16 @@ pub(crate) enum Course {
 
 /// The errors (eq. 2) of the guess and after every iteration.
 #[derive(Debug, Clone)]
-pub(crate) struct Trace {
-    pub errors_cm2: Vec<f64>,
+struct Trace {
+    errors_cm2: Vec<f64>,
     course: Course,
 }
 
 /// A guess with the traces of the paper's solver and of Newton–Raphson.
 #[derive(Debug, Clone)]
-pub(crate) struct Pair {
+struct Pair {
     start: Start,
-    pub traces: [Trace; 2],
+    traces: [Trace; 2],
 }
 
 /// A way in which the two iterations disagree.
@@ -52,13 +52,10 @@ pub(crate) struct Pair {
 pub(crate) struct Disagreement {
     /// Its table and its figure.
     pub name: &'static str,
-    pub title: &'static str,
-    /// How the paper's solver and Newton–Raphson end.
-    pub courses: [Course; 2],
     /// The guess that shows it most clearly, if any shows it.
-    pub clearest: Option<Pair>,
-    /// How often it happens.
-    pub share: Share,
+    clearest: Option<Pair>,
+    /// How many guesses show it.
+    trials: usize,
 }
 
 /// Fig. 3: the paper's converges, Newton–Raphson falls at first and then diverges. Fig. 4: the paper's converges,
@@ -66,19 +63,26 @@ pub(crate) struct Disagreement {
 pub(crate) fn disagreements(mechanism: &Mechanism, trials: &Trials) -> [Disagreement; 3] {
     let trials = trials.with(Guesses::AboveBase).par_iter();
     let pairs: Vec<_> = trials.map(|trial| Pair::trace(mechanism, trial)).collect();
-    let disagreement = |name, title, courses: [Course; 2], clearness: fn(&[f64]) -> f64| {
+    let disagreement = |name, courses: [Course; 2], clearness: fn(&[f64]) -> f64| {
         let courses_of = |pair: &Pair| pair.traces.each_ref().map(|trace| trace.course);
         let matching = || pairs.iter().filter(|pair| courses_of(pair) == courses);
         let clearness = |pair: &Pair| clearness(&pair.traces[1].errors_cm2);
         let clearest = matching().max_by(|a, b| clearness(a).total_cmp(&clearness(b))).cloned();
-        let share = Share { hits: matching().count(), of: pairs.len() };
-        Disagreement { name, title, courses, clearest, share }
+        Disagreement { name, clearest, trials: matching().count() }
     };
     [
-        disagreement("fig3_diverging", "Fig. 3: Newton–Raphson diverges", [Converges, Diverges], fall),
-        disagreement("fig4_oscillating", "Fig. 4: Newton–Raphson oscillates", [Converges, Oscillates], swing),
-        disagreement("fig3b_stalling", "Beside Fig. 3: the paper's solver stalls", [Fails, Converges], fall),
+        disagreement("fig3_diverging", [Converges, Diverges], fall),
+        disagreement("fig4_oscillating", [Converges, Oscillates], swing),
+        disagreement("fig3b_stalling", [Fails, Converges], fall),
     ]
+}
+
+/// How many trials show each, and in how many only one of the two reaches a solution.
+pub(crate) fn disagreements_table(disagreements: &[Disagreement], trials: &Trials) -> String {
+    let of = trials.with(Guesses::AboveBase).len();
+    let alone = ["published_alone", "newton_alone"].into_iter().zip(trials.alone());
+    let all = disagreements.iter().map(|one| (one.name, one.trials)).chain(alone);
+    csv("disagreement,trials,of", all.map(|(name, trials)| (name, trials, of)))
 }
 
 impl Disagreement {
@@ -104,15 +108,6 @@ impl Pair {
             Trace { course: course(&errors_cm2, trial.by(solver).is_ok()), errors_cm2 }
         });
         Self { start: trial.start, traces }
-    }
-
-    /// The guess and its input, for the page.
-    pub(crate) fn described(&self) -> String {
-        let Start { actuators, guess_rad } = self.start;
-        let [slides_mm, legs_mm, guess_deg] =
-            [(actuators.slide_m, 1e3), (actuators.leg_m, 1e3), (guess_rad, 1f64.to_degrees())]
-                .map(|(values, scale)| values.map(|value| format!("{:.1}", value * scale)).join(", "));
-        format!("d = ({slides_mm}) mm, l = ({legs_mm}) mm, guess θ = ({guess_deg})°")
     }
 }
 

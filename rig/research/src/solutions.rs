@@ -8,8 +8,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
-use crate::evidence::{Share, csv, degrees, number};
 use crate::solver::distance_rad;
+use crate::tables::{csv, degrees, number};
 
 /// Angles closer than this are one, radians: two legs' as much as two solutions'.
 const SAME_RAD: f64 = 1e-6;
@@ -69,18 +69,11 @@ impl SolutionSet {
     }
 
     /// Those above the base: the true one first, then by their angles.
-    pub(crate) fn above_base(&self) -> Vec<&Solution> {
+    fn above_base(&self) -> Vec<&Solution> {
         let above = |solution: &&Solution| solution.assembly.legs_above_base == [true; LEGS];
         let mut solutions: Vec<_> = self.solutions.iter().filter(above).collect();
         solutions.sort_by_key(|one| (!one.assembly.is_true(), sorted_microdegrees(&one.theta_rad)));
         solutions
-    }
-
-    /// Fig. 6: the solution that differs from the true one in corner A₁ alone.
-    pub(crate) fn corner_folded(&self) -> Option<&Solution> {
-        let truth = self.true_one.theta_rad;
-        let is_same = |one: &Solution, leg: usize| (one.theta_rad[leg] - truth[leg]).abs() < SAME_RAD;
-        self.solutions.iter().find(|one| is_same(one, 1) && is_same(one, 2) && !is_same(one, 0))
     }
 
     /// The class of leg angles found by a solver: equal but for the order of the legs. 0 is the true
@@ -109,8 +102,10 @@ impl SolutionSet {
         self.classes().iter().enumerate().map(name).collect()
     }
 
-    pub(crate) fn table(&self) -> String {
+    pub(crate) fn table(&self, mechanism: &Mechanism) -> String {
         let row = |one: &Solution| {
+            let corners = mechanism.corners_from_angles(&self.actuators, &one.theta_rad);
+            let corners_m = corners.map(|corner| [corner.x, corner.y, corner.z].map(number));
             let assembly = &one.assembly;
             let conditions = [
                 assembly.legs_above_base == [true; LEGS],
@@ -121,11 +116,11 @@ impl SolutionSet {
             ];
             let separation = self.solutions.separation_rad(one).map(degrees);
             let measures = [one.determinant, one.residual_m].map(number);
-            (one.theta_rad.map(degrees), conditions.map(u8::from), measures, separation)
+            (one.theta_rad.map(degrees), conditions.map(u8::from), measures, separation, corners_m)
         };
         csv(
             "theta1_deg,theta2_deg,theta3_deg,above_base,hinges_below_platform,corners_in_order,positive_determinant,\
-             true,determinant,residual_m,separation_deg",
+             true,determinant,residual_m,separation_deg,a1_x_m,a1_y_m,a1_z_m,a2_x_m,a2_y_m,a2_z_m,a3_x_m,a3_y_m,a3_z_m",
             self.solutions.iter().map(row),
         )
     }
@@ -168,45 +163,23 @@ fn stands(assembly: Assembly) -> bool {
     assembly.legs_above_base == [true; LEGS] && assembly.corners_in_order
 }
 
-/// Counts over random inputs anywhere in the strokes.
-#[derive(Debug, Clone)]
-pub(crate) struct Multiplicity {
-    /// The solutions of each input, in the order of [`CONDITIONS`].
-    counts: Vec<[usize; CONDITIONS.len()]>,
-}
-
-impl Multiplicity {
-    /// Inputs whose solutions form a continuum but for rounding are left out; random ones do not.
-    pub(crate) fn count(mechanism: &Mechanism, inputs: usize, seed: u64) -> Self {
-        let counts = |case| {
-            let actuators = random_input(mechanism, &mut generator(seed, Stream::Inputs, case));
-            let all = Solutions::new(mechanism, &actuators).ok()?;
-            let count = |admit: fn(&Assembly) -> bool| all.iter().filter(|one| admit(&one.assembly)).count();
-            Some(CONDITIONS.map(|conditions| count(conditions.admit)))
-        };
-        Self { counts: (0..inputs).into_par_iter().filter_map(counts).collect() }
-    }
-
-    /// How many inputs have so many solutions.
-    pub(crate) fn with_solutions(&self, solutions: usize) -> Share {
-        Share::count(self.counts.iter().map(|[all, ..]| *all == solutions))
-    }
-
-    /// Of the inputs to which conditions leave any solution: to how many they leave more than so many.
-    pub(crate) fn with_more_than(&self, solutions: usize, conditions: usize) -> Share {
-        let left = self.counts.iter().map(|counts| counts[conditions]).filter(|&left| left > 0);
-        Share::count(left.map(|left| left > solutions))
-    }
-
-    pub(crate) fn table(&self) -> String {
-        let rows = CONDITIONS.iter().enumerate().flat_map(|(place, conditions)| {
-            (0..=MOST_SOLUTIONS).map(move |solutions| {
-                let inputs = self.counts.iter().filter(|counts| counts[place] == solutions).count();
-                (conditions.name, solutions, inputs)
-            })
-        });
-        csv("counted,solutions,inputs", rows)
-    }
+/// How many random inputs anywhere in the strokes have how many solutions, by [`CONDITIONS`]. Inputs whose solutions form a
+/// continuum but for rounding are left out; random ones do not.
+pub(crate) fn multiplicity_table(mechanism: &Mechanism, inputs: usize, seed: u64) -> String {
+    let solutions = |case| {
+        let actuators = random_input(mechanism, &mut generator(seed, Stream::Inputs, case));
+        let all = Solutions::new(mechanism, &actuators).ok()?;
+        let count = |admit: fn(&Assembly) -> bool| all.iter().filter(|one| admit(&one.assembly)).count();
+        Some(CONDITIONS.map(|conditions| count(conditions.admit)))
+    };
+    let counts: Vec<_> = (0..inputs).into_par_iter().filter_map(solutions).collect();
+    let rows = CONDITIONS.iter().enumerate().flat_map(|(place, conditions)| {
+        let counts = counts.iter().map(move |counts| counts[place]);
+        (0..=MOST_SOLUTIONS).map(move |solutions| {
+            (conditions.name, solutions, counts.clone().filter(|one| *one == solutions).count())
+        })
+    });
+    csv("counted,solutions,inputs", rows)
 }
 
 #[cfg(test)]
@@ -226,14 +199,6 @@ mod tests {
         assert_eq!(set.classes().len(), 4);
         assert_eq!(set.class_of(&set.true_one.theta_rad), Some(0));
         assert_eq!(set.class_of(&[-1.0; LEGS]), None);
-    }
-
-    #[test]
-    fn the_folded_corner_is_the_one_of_the_paper() {
-        let set = set();
-        let folded = set.corner_folded().unwrap();
-        assert!((folded.theta_rad[0].to_degrees() - 66.04).abs() < 0.01);
-        assert!(folded.assembly.legs_above_base == [true; LEGS] && !folded.assembly.is_true());
     }
 
     #[test]

@@ -6,9 +6,9 @@ use masseter_controller::kinematics::{ForwardTracker, solve};
 use masseter_model::geometry::Mechanism;
 use masseter_runtime::clock;
 
-use crate::evidence::{csv, number, quantile};
 use crate::motions::Motion;
 use crate::solver::{COMPARED, Solver, Start};
+use crate::tables::{csv, number, quantile};
 use crate::trials::{Guesses, Trial, Trials};
 
 /// Cases timed in each situation.
@@ -18,41 +18,21 @@ const CALLS: u32 = 8;
 /// A trajectory's cycle, s.
 const CYCLE_S: f64 = 1e-3;
 
-/// The time of one solver in one situation.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Timing {
-    pub median_ns: f64,
-    pub p99_ns: f64,
-    /// Its median over Newton–Raphson's in the same situation.
-    pub to_newton: f64,
-}
-
-/// A start of the iteration.
-#[derive(Debug, Clone)]
-pub(crate) struct Situation {
-    pub name: &'static str,
-    cases: usize,
-    /// Of [`COMPARED`].
-    pub timings: [Timing; COMPARED.len()],
-}
-
 /// From random guesses above the base from which all three solvers reach a solution; and from the solution one
 /// millisecond of chewing before. Takes one core; nothing else of the study runs meanwhile.
-pub(crate) fn measure(mechanism: &Mechanism, trials: &Trials, chewing: &Motion) -> [Situation; 2] {
+pub(crate) fn table(mechanism: &Mechanism, trials: &Trials, chewing: &Motion) -> String {
     let random = trials.with(Guesses::AboveBase).iter();
     let all_arrive = |trial: &&Trial| COMPARED.into_iter().all(|solver| trial.by(solver).is_ok());
     let random: Vec<_> = random.filter(all_arrive).take(CASES).map(|trial| trial.start).collect();
-    [
-        in_turns(mechanism, "random guess above the base", &random),
-        in_turns(mechanism, "solution 1 ms before, chewing", &warm(mechanism, chewing)),
-    ]
-}
-
-pub(crate) fn table(situations: &[Situation]) -> String {
-    let rows = situations.iter().flat_map(|situation| {
-        COMPARED.into_iter().zip(situation.timings).map(|(solver, timing)| {
-            let times = [timing.median_ns, timing.p99_ns, timing.to_newton].map(number);
-            (situation.name, solver.name, situation.cases, times)
+    let situations = [
+        ("random guess above the base", random),
+        ("solution 1 ms before, chewing", warm(mechanism, chewing)),
+    ];
+    let rows = situations.into_iter().flat_map(|(name, cases)| {
+        let times = in_turns(mechanism, &cases);
+        let [_, [newton_ns, _], _] = times;
+        COMPARED.into_iter().zip(times).map(move |(solver, [median_ns, p99_ns])| {
+            (name, solver.name, cases.len(), [median_ns, p99_ns, median_ns / newton_ns].map(number))
         })
     });
     csv("start,solver,cases,median_ns,p99_ns,ratio_of_medians_to_newton", rows)
@@ -65,22 +45,15 @@ fn warm(mechanism: &Mechanism, motion: &Motion) -> Vec<Start> {
     steps.map(|(now, before)| Start { actuators: now.actuators, guess_rad: before.theta_rad }).collect()
 }
 
-/// Every case goes to every solver before the next case.
-fn in_turns(mechanism: &Mechanism, name: &'static str, cases: &[Start]) -> Situation {
+/// Median and 99th percentile of each solver, ns. Every case goes to every solver before the next case.
+fn in_turns(mechanism: &Mechanism, cases: &[Start]) -> [[f64; 2]; COMPARED.len()] {
     let mut taken_ns = COMPARED.map(|_| Vec::with_capacity(cases.len()));
     for start in cases {
         for (solver, taken_ns) in COMPARED.into_iter().zip(&mut taken_ns) {
             taken_ns.push(time_ns(solver, mechanism, start));
         }
     }
-    let [medians_ns, p99s_ns] =
-        [0.5, 0.99].map(|share| taken_ns.each_ref().map(|sample| quantile(sample.iter().copied(), share)));
-    let timings = std::array::from_fn(|solver| Timing {
-        median_ns: medians_ns[solver],
-        p99_ns: p99s_ns[solver],
-        to_newton: medians_ns[solver] / medians_ns[1],
-    });
-    Situation { name, cases: cases.len(), timings }
+    taken_ns.map(|sample| [0.5, 0.99].map(|share| quantile(sample.iter().copied(), share)))
 }
 
 /// Time of one solution, ns, without an observer.

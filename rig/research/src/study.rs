@@ -1,16 +1,15 @@
-//! Everything that the study measures.
+//! What the study measures: a table each.
 
 use anyhow::ensure;
-use masseter_model::geometry::{Mechanism, MechanismConfig};
+use masseter_model::geometry::{LEGS, Mechanism, MechanismConfig};
 use masseter_scenario::Scenario;
 
-use crate::forces::{self, Forces};
-use crate::maps::{Basins, Map, SLICES};
-use crate::motions::{self, Motion};
-use crate::pairs::{self, Disagreement};
-use crate::solutions::{Multiplicity, SolutionSet};
-use crate::speed::{self, Situation};
+use crate::maps::{SLICES, Slice, basins_table, workspace_table};
+use crate::motions::Motion;
+use crate::solutions::{SolutionSet, multiplicity_table};
+use crate::tables::{csv, number};
 use crate::trials::Trials;
+use crate::{forces, motions, pairs, speed};
 
 /// The extent of a study.
 #[derive(Debug, Clone, Copy)]
@@ -25,25 +24,9 @@ pub struct Settings {
 
 /// A study whose inputs are checked.
 #[derive(Debug)]
-pub struct PreparedStudy {
+pub struct Study {
     mechanism: Mechanism,
     motions: Vec<Motion>,
-}
-
-/// The measurements.
-#[derive(Debug)]
-pub struct Study {
-    pub(crate) settings: Settings,
-    pub(crate) mechanism: Mechanism,
-    pub(crate) trials: Trials,
-    pub(crate) pairs: [Disagreement; 3],
-    pub(crate) speed: [Situation; 2],
-    pub(crate) set: SolutionSet,
-    pub(crate) multiplicity: Multiplicity,
-    pub(crate) basins: Basins,
-    pub(crate) motions: Vec<Motion>,
-    pub(crate) maps: [Map; 4],
-    pub(crate) forces: Forces,
 }
 
 impl Study {
@@ -52,7 +35,7 @@ impl Study {
     /// # Errors
     /// When the scenario has another mechanism than the published one, its recording cannot be used, or a value of its
     /// motion lies outside its range.
-    pub fn prepare(scenario: Option<&Scenario>) -> anyhow::Result<PreparedStudy> {
+    pub fn prepare(scenario: Option<&Scenario>) -> anyhow::Result<Self> {
         let published = MechanismConfig::default();
         ensure!(
             scenario.is_none_or(|scenario| scenario.mechanism == published),
@@ -60,43 +43,57 @@ impl Study {
         );
         let mechanism = Mechanism::new(&published)?;
         let motions = motions::motions(&mechanism, scenario)?;
-        Ok(PreparedStudy { mechanism, motions })
+        Ok(Self { mechanism, motions })
     }
-}
 
-impl PreparedStudy {
-    /// Measures on all cores; `progress` receives each stage.
+    /// Measures on all cores; `progress` receives each stage. Returns names and tables, as CSV.
     ///
     /// # Errors
     /// When the neutral input has no finite set of solutions, or a run of the emulated rig fails.
-    pub fn run(self, settings: Settings, progress: impl Fn(&str)) -> anyhow::Result<Study> {
+    pub fn run(
+        &self,
+        settings: Settings,
+        progress: impl Fn(&str),
+    ) -> anyhow::Result<Vec<(&'static str, String)>> {
         let Self { mechanism, motions } = self;
         let Settings { seed, samples, cells } = settings;
         progress(&format!("{samples} random guesses of each kind"));
-        let trials = Trials::run(&mechanism, samples, seed);
-        let pairs = pairs::disagreements(&mechanism, &trials);
-        let set = SolutionSet::neutral(&mechanism)?;
-        let multiplicity = Multiplicity::count(&mechanism, samples, seed);
+        let trials = Trials::run(mechanism, samples, seed);
+        let pairs = pairs::disagreements(mechanism, &trials);
+        let set = SolutionSet::neutral(mechanism)?;
+        let mut tables = vec![
+            ("success", trials.success_table()),
+            ("iterations", trials.iterations_table()),
+            ("cost", trials.cost_table()),
+            ("disagreements", pairs::disagreements_table(&pairs, &trials)),
+            ("fig8_solutions", set.table(mechanism)),
+            ("mechanism", slides_table(mechanism, &set)),
+            ("multiplicity", multiplicity_table(mechanism, samples, seed)),
+            ("motions", motions::table(motions, mechanism)),
+            ("motion_paths", motions::paths_table(motions)),
+        ];
+        tables.extend(pairs.iter().map(|one| (one.name, one.table())));
         progress(&format!("maps of {cells} by {cells} cells"));
-        let basins = Basins::map(&mechanism, &set, cells);
+        tables.push(("basins", basins_table(mechanism, &set, cells)));
         let middle = set.true_one.pose.translation.vector;
-        let maps = SLICES.map(|slice| Map::compute(&mechanism, slice, &middle, cells));
+        let map = |slice: Slice| (slice.name, workspace_table(mechanism, slice, &middle, cells));
+        tables.extend(SLICES.map(map));
         progress("times");
-        let speed = speed::measure(&mechanism, &trials, &motions[0]);
+        tables.push(("speed", speed::table(mechanism, &trials, &motions[0])));
         progress("forces of runs");
-        let forces = forces::play()?;
-        Ok(Study {
-            settings,
-            mechanism,
-            trials,
-            pairs,
-            speed,
-            set,
-            multiplicity,
-            basins,
-            motions,
-            maps,
-            forces,
-        })
+        tables.extend(forces::play()?);
+        Ok(tables)
     }
+}
+
+/// The legs' hinges at the ends of the slides, and where they are in the neutral input.
+fn slides_table(mechanism: &Mechanism, set: &SolutionSet) -> String {
+    let [low_m, high_m] = mechanism.strokes().slide_m;
+    let rows = (0..LEGS).flat_map(|leg| {
+        [("low", low_m), ("neutral", set.actuators.slide_m[leg]), ("high", high_m)].map(|(slide, at_m)| {
+            let hinge = mechanism.hinge(leg, at_m);
+            (leg + 1, slide, [hinge.x, hinge.y, hinge.z].map(number))
+        })
+    });
+    csv("leg,slide,x_m,y_m,z_m", rows)
 }

@@ -11,9 +11,9 @@ use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
 use self::Guesses::{AboveBase, Within};
-use crate::evidence::{Share, csv, number, quantile};
 use crate::solutions::{SolutionSet, Stream, generator};
 use crate::solver::{Found, NEWTON, PUBLISHED, SOLVERS, Solver, Start, distance_rad};
+use crate::tables::{csv, number, quantile};
 
 /// A root counts as the closest when no other is closer by more than this, radians.
 const TIE_RAD: f64 = 1e-6;
@@ -126,23 +126,8 @@ impl Trials {
         self.with(guesses).iter().map(move |trial| trial.by(solver))
     }
 
-    /// How often any solution was reached.
-    pub(crate) fn solved(&self, solver: Solver, guesses: Guesses) -> Share {
-        Share::count(self.outcomes(solver, guesses).map(|outcome| outcome.is_ok()))
-    }
-
-    /// How often the true solution was reached.
-    pub(crate) fn true_ones(&self, solver: Solver, guesses: Guesses) -> Share {
-        Share::count(self.outcomes(solver, guesses).map(|outcome| outcome.is_ok_and(|one| one.is_true)))
-    }
-
-    /// Share of the solutions reached that are the closest to the guess.
-    pub(crate) fn closest(&self, solver: Solver, guesses: Guesses) -> Share {
-        Share::count(self.outcomes(solver, guesses).flatten().map(|reached| reached.is_closest))
-    }
-
     /// What a solver and Newton–Raphson (same residual) find where both reach a solution.
-    pub(crate) fn against_newton(&self, solver: Solver, guesses: Guesses) -> Vec<[Found; 2]> {
+    fn against_newton(&self, solver: Solver, guesses: Guesses) -> Vec<[Found; 2]> {
         let both = self.outcomes(solver, guesses).zip(self.outcomes(solver.rival(), guesses));
         both.filter_map(|(a, b)| Some([a.ok()?.found, b.ok()?.found])).collect()
     }
@@ -150,15 +135,15 @@ impl Trials {
     /// Success rates, one row for each solver and origin of guesses.
     pub(crate) fn success_table(&self) -> String {
         let row = |(guesses, solver): (Guesses, Solver)| {
-            let count = |end: &str| {
-                self.outcomes(solver, guesses).filter(|outcome| outcome.is_err_and(|why| why == end)).count()
-            };
-            let [Share { hits: solved, of: trials }, true_ones, closest] =
-                [Self::solved, Self::true_ones, Self::closest].map(|share| share(self, solver, guesses));
-            let known = ["stalled", "singular", "no_convergence"].map(count);
+            let reached =
+                |is: fn(&Reached) -> bool| self.outcomes(solver, guesses).flatten().filter(is).count();
+            let failed = |end: &str| self.outcomes(solver, guesses).filter(|one| *one == Err(end)).count();
+            let (trials, solved, is_true) =
+                (self.with(guesses).len(), reached(|_| true), reached(|one| one.is_true));
+            let known = ["stalled", "singular", "no_convergence"].map(failed);
             let refused = trials - solved - known.iter().sum::<usize>();
-            let reached = [true_ones.hits, solved - true_ones.hits];
-            (guesses.name(), solver.name, trials, reached, known, refused, closest.hits)
+            let closest = reached(|one| one.is_closest);
+            (guesses.name(), solver.name, trials, [is_true, solved - is_true], known, refused, closest)
         };
         csv(
             "guesses,solver,trials,reached_true,reached_other,stalled,singular,no_convergence,refused,reached_closest",
@@ -169,18 +154,14 @@ impl Trials {
     /// Distribution of iterations from guesses anywhere above the base.
     pub(crate) fn iterations_table(&self) -> String {
         let rows = SOLVERS.into_iter().flat_map(|solver| {
-            let counts = self.histogram(solver).into_iter().enumerate();
-            counts.map(move |(iterations, count)| (solver.name, iterations, count))
+            let reached = self.outcomes(solver, AboveBase).flatten();
+            let taken: Vec<_> = reached.map(|reached| reached.found.iterations).collect();
+            let end = taken.iter().max().map_or(0, |most| most + 1);
+            (0..end).map(move |iterations| {
+                (solver.name, iterations, taken.iter().filter(|&&one| one == iterations).count())
+            })
         });
         csv("solver,iterations,trials", rows)
-    }
-
-    /// How many solved trials took 0, 1, 2 … iterations, from guesses anywhere above the base.
-    pub(crate) fn histogram(&self, solver: Solver) -> Vec<usize> {
-        let reached = self.outcomes(solver, Guesses::AboveBase).flatten();
-        let taken: Vec<_> = reached.map(|reached| reached.found.iterations).collect();
-        let end = taken.iter().max().map_or(0, |most| most + 1);
-        (0..end).map(|iterations| taken.iter().filter(|&&one| one == iterations).count()).collect()
     }
 
     /// Iterations of the paper's variants and of Newton–Raphson where both reach a solution.
@@ -204,10 +185,11 @@ impl Trials {
 
     /// Trials above the base in which only one of the two reaches a solution:
     /// the paper's solver alone, Newton–Raphson alone.
-    pub(crate) fn alone(&self) -> [Share; 2] {
+    pub(crate) fn alone(&self) -> [usize; 2] {
         [[true, false], [false, true]].map(|wanted| {
-            let solved = |trial: &Trial| [PUBLISHED, NEWTON].map(|solver| trial.by(solver).is_ok());
-            Share::count(self.with(Guesses::AboveBase).iter().map(|trial| solved(trial) == wanted))
+            let solved =
+                |trial: &&Trial| [PUBLISHED, NEWTON].map(|solver| trial.by(solver).is_ok()) == wanted;
+            self.with(AboveBase).iter().filter(solved).count()
         })
     }
 }

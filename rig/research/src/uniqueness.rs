@@ -2,9 +2,8 @@
 //! solutions that meet the paper's conditions.
 //!
 //! ```
-//! use masseter_controller::kinematics::uniqueness::InputBox;
 //! use masseter_model::geometry::{Mechanism, MechanismConfig};
-//! use masseter_research::uniqueness::prove;
+//! use masseter_research::uniqueness::{InputBox, prove};
 //!
 //! let mechanism = Mechanism::new(&MechanismConfig::default())?;
 //! // Slides within ±2 mm, legs of 268 to 272 mm.
@@ -15,17 +14,16 @@
 //! ```
 
 use masseter_controller::kinematics::Solutions;
-use masseter_controller::kinematics::uniqueness::{
-    Enclosure, Finding, InputBox, Proof, Reaches, SolutionKind,
-};
 use masseter_model::geometry::{AXES, AXIS_NAMES, Actuators, Mechanism};
 use masseter_plan::RunPlan;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
-use crate::evidence::{csv, number};
+pub use crate::proof::InputBox;
+use crate::proof::{Finding, Proof, Reaches, any_reaches};
 use crate::solutions::{CONDITIONS, ORIENTED};
+use crate::tables::{csv, number};
 
 /// Inputs from which the search goes uphill.
 const CLIMBS: usize = 40;
@@ -56,7 +54,7 @@ impl Proven {
     /// The undecided boxes as CSV: both ends of each axis, metres.
     pub fn table(&self) -> String {
         let header = AXIS_NAMES.map(|axis| format!("{axis}_low_m,{axis}_high_m")).join(",");
-        let row = |inputs: &InputBox| inputs.axes().map(|axis| [axis.low(), axis.high()].map(number));
+        let row = |inputs: &InputBox| inputs.axes.map(|axis| [axis.low, axis.high].map(number));
         csv(&header, self.undecided.iter().map(row))
     }
 }
@@ -76,10 +74,9 @@ pub fn prove(
     most: usize,
     progress: impl Fn(usize, f64),
 ) -> Proven {
-    let kind = margin.map_or(SolutionKind::PaperConditions, SolutionKind::DeterminantAtLeast);
-    let proof = Proof::new(mechanism, kind);
+    let proof = Proof { mechanism, margin };
     let mut share_of_one = 1.0 / boxes.len() as f64;
-    let mut open: Vec<Open> = boxes.into_iter().map(|whole| (whole, Proof::any_reaches(&whole))).collect();
+    let mut open: Vec<Open> = boxes.into_iter().map(|whole| (whole, any_reaches(&whole))).collect();
     let mut proven = Proven::default();
     while !open.is_empty() && proven.examined + open.len() <= most {
         proven.examined += open.len();
@@ -135,9 +132,8 @@ impl Search {
 /// best of them uphill to where both determinants are greatest. A search proves nothing.
 ///
 /// ```
-/// use masseter_controller::kinematics::uniqueness::InputBox;
 /// use masseter_model::geometry::{Mechanism, MechanismConfig};
-/// use masseter_research::uniqueness::search;
+/// use masseter_research::uniqueness::{InputBox, search};
 ///
 /// let mechanism = Mechanism::new(&MechanismConfig::default())?;
 /// let around_neutral = InputBox::uniform([-0.002, 0.002], [0.268, 0.272]);
@@ -147,7 +143,7 @@ impl Search {
 /// ```
 #[must_use]
 pub fn search(mechanism: &Mechanism, region: &InputBox, inputs: usize, seed: u64) -> Search {
-    let limits: [[f64; 2]; AXES] = region.axes().map(|axis| [axis.low(), axis.high()]);
+    let limits: [[f64; 2]; AXES] = region.axes.map(|axis| [axis.low, axis.high]);
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let (mut with_one, mut found) = (0_usize, Vec::new());
     for _ in 0..inputs {
@@ -210,45 +206,29 @@ pub fn boxes(plan: &RunPlan, around_m: f64) -> anyhow::Result<Vec<InputBox>> {
     let path = (0..=cycles)
         .map(|cycle| Ok(plan.mechanism.inverse(&plan.trajectory.pose(cycle as f64 * period_s))?.actuators))
         .collect::<anyhow::Result<Vec<_>>>()?;
-    Ok(stretches(&path, around_m).map(|stretch| widened(stretch, around_m)).collect())
+    let around = |stretch: &[Actuators]| {
+        let boxes = stretch.iter().map(|input| InputBox::around(input, around_m));
+        boxes.reduce(|a, b| a.hull(&b)).expect("a stretch has inputs")
+    };
+    Ok(stretches(&path, around_m).map(around).collect())
 }
 
-/// The path cut where a stretch of it would be wider than what it is widened by. Each begins with the end of the one
-/// before, so that nothing between them is left out.
-fn stretches(path: &[Actuators], longest_m: f64) -> impl Iterator<Item = InputBox> {
+/// The path cut where a stretch of it would be wider than this. Each stretch begins with the end of the one before, so that
+/// nothing between them is left out.
+fn stretches(path: &[Actuators], longest_m: f64) -> impl Iterator<Item = &[Actuators]> {
     let mut rest = path;
     std::iter::from_fn(move || {
-        let [first, ref others @ ..] = *rest else { return None };
-        let mut stretch = point(&first);
-        let mut taken = 0;
-        for input in others {
-            let longer = hull(&stretch, &point(input));
-            let is_too_long = longer.axes().iter().any(|axis| axis.width() > longest_m);
-            if is_too_long && taken > 0 {
-                break;
-            }
-            stretch = longer;
-            taken += 1;
-        }
-        rest = if taken == others.len() { &[] } else { &rest[taken..] };
+        let first = InputBox::around(rest.first()?, 0.0);
+        let hulls = rest[1..].iter().scan(first, |hull, input| {
+            *hull = hull.hull(&InputBox::around(input, 0.0));
+            Some(*hull)
+        });
+        // A long step is a stretch of its own.
+        let steps = hulls.take_while(|hull| hull.width_m() <= longest_m).count().max(1).min(rest.len() - 1);
+        let stretch = &rest[..=steps];
+        rest = if steps + 1 == rest.len() { &[] } else { &rest[steps..] };
         Some(stretch)
     })
-}
-
-fn point(input: &Actuators) -> InputBox {
-    InputBox { slide_m: input.slide_m.map(Enclosure::point), leg_m: input.leg_m.map(Enclosure::point) }
-}
-
-fn hull(a: &InputBox, b: &InputBox) -> InputBox {
-    InputBox {
-        slide_m: std::array::from_fn(|leg| a.slide_m[leg].hull(b.slide_m[leg])),
-        leg_m: std::array::from_fn(|leg| a.leg_m[leg].hull(b.leg_m[leg])),
-    }
-}
-
-fn widened(stretch: InputBox, by_m: f64) -> InputBox {
-    let wider = |axis: Enclosure| Enclosure::new(axis.low() - by_m, axis.high() + by_m);
-    InputBox { slide_m: stretch.slide_m.map(wider), leg_m: stretch.leg_m.map(wider) }
 }
 
 #[cfg(test)]
@@ -259,8 +239,7 @@ mod tests {
     use super::*;
 
     fn bounded(slide_m: [f64; 3], leg_m: [f64; 3], radius_m: f64, most: usize) -> Proven {
-        let around = |value_m: f64| Enclosure::new(value_m - radius_m, value_m + radius_m);
-        let whole = InputBox { slide_m: slide_m.map(around), leg_m: leg_m.map(around) };
+        let whole = InputBox::around(&Actuators { slide_m, leg_m }, radius_m);
         let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
         prove(&mechanism, vec![whole], None, most, |_, _| {})
     }
@@ -280,18 +259,15 @@ mod tests {
         let leg_m = [0.246_449_456_1, 0.287_523_749_3, 0.270_252_791_5];
         let undecided = bounded(slide_m, leg_m, 1e-3, 200).undecided;
         let holds = |inputs: &InputBox| {
-            let axes = inputs.axes().into_iter().zip(slide_m.into_iter().chain(leg_m));
+            let axes = inputs.axes.into_iter().zip(slide_m.into_iter().chain(leg_m));
             axes.into_iter().all(|(axis, value_m)| axis.contains(value_m))
         };
         assert!(undecided.iter().any(holds));
     }
 
     fn contains(whole: &InputBox, part: &InputBox) -> bool {
-        whole
-            .axes()
-            .iter()
-            .zip(part.axes())
-            .all(|(whole, part)| whole.low() <= part.low() && part.high() <= whole.high())
+        let axes = whole.axes.iter().zip(&part.axes);
+        axes.into_iter().all(|(whole, part)| whole.low <= part.low && part.high <= whole.high)
     }
 
     /// Every straight piece of the path, with all that is around it, lies in one box.
@@ -302,10 +278,10 @@ mod tests {
         let boxes = boxes(&plan, around_m).unwrap();
         let at = |cycle: u32| {
             let pose = plan.trajectory.pose(f64::from(cycle) * plan.scenario.period_s());
-            point(&plan.mechanism.inverse(&pose).unwrap().actuators)
+            InputBox::around(&plan.mechanism.inverse(&pose).unwrap().actuators, 0.999 * around_m)
         };
         for cycle in 0..10_000 {
-            let piece = widened(hull(&at(cycle), &at(cycle + 1)), 0.999 * around_m);
+            let piece = at(cycle).hull(&at(cycle + 1));
             assert!(boxes.iter().any(|whole| contains(whole, &piece)), "cycle {cycle}");
         }
         assert!(boxes.len() < 5_000, "{} boxes", boxes.len());
@@ -316,7 +292,7 @@ mod tests {
         let at = |mm: f64| Actuators { slide_m: [mm * 1e-3; 3], leg_m: [0.27; 3] };
         let path = [0.0, 0.4, 0.8, 1.2, 5.0, 5.1].map(at);
         let ends: Vec<_> = stretches(&path, 1e-3)
-            .map(|stretch| [stretch.slide_m[0].low() * 1e3, stretch.slide_m[0].high() * 1e3])
+            .map(|stretch| [0, stretch.len() - 1].map(|end| stretch[end].slide_m[0] * 1e3))
             .collect();
         assert_eq!(ends, [[0.0, 0.8], [0.8, 1.2], [1.2, 5.0], [5.0, 5.1]]);
         assert_eq!(stretches(&path[..1], 1e-3).count(), 1);

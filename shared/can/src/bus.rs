@@ -43,7 +43,7 @@ impl<B: Bus + ?Sized> Bus for &mut B {
 }
 
 /// A frame with the time it was received.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Received {
     /// The frame.
     pub frame: Frame,
@@ -92,7 +92,7 @@ pub enum ReceiveError {
 }
 
 /// State of fault confinement (ISO 11898-1).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum ErrorState {
     /// The node sends, receives, and signals errors with dominant flags.
     Active,

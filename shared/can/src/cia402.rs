@@ -157,7 +157,7 @@ impl StatusBit {
 }
 
 /// Object 6041 as it is on the wire.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub struct Statusword(pub u16);
 
 /// A statusword whose bits encode no state.
@@ -209,7 +209,7 @@ const FAULT_RESET: u16 = 1 << 7;
 const HALT: u16 = 1 << 8;
 
 /// Object 6040 as it is on the wire.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub struct Controlword(pub u16);
 
 impl Controlword {

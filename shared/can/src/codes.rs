@@ -17,7 +17,7 @@ macro_rules! codes {
         $($(#[doc = $variant_doc:literal])* $variant:ident = $code:literal $text:literal,)*
     })*) => {$(
         $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
         #[repr($number)]
         pub enum $name {
             $($(#[doc = $variant_doc])* $variant = $code,)*

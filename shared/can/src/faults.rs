@@ -12,7 +12,7 @@ use rand_pcg::Pcg32;
 use crate::frame::{CanId, Frame};
 
 /// What a fault does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum FaultKind {
     /// Destroys a frame on the wire: an error frame follows, then the transmitter repeats.
     Corrupt,
@@ -38,7 +38,7 @@ pub enum FaultKind {
 }
 
 /// One fault.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Fault {
     /// Number of the fault in reports and for its random choices; unique in the link.
     pub number: usize,
@@ -116,13 +116,13 @@ pub(crate) struct NumberedFrame {
 /// assert!(wire.port(1).receive(1_000_000)?.is_some(), "its sender has repeated it");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Faults {
     list: Vec<Listed>,
     seed: u64,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Listed {
     fault: Fault,
     activations: u64,
@@ -131,7 +131,7 @@ struct Listed {
 }
 
 /// What the notes have said of a fault.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 enum Noted {
     Nothing,
     Begin,
@@ -339,7 +339,7 @@ fn of_port(
 }
 
 /// A fault that acts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct FaultActivation {
     /// Place of the fault in the list.
     pub(crate) place: usize,

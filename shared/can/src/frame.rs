@@ -14,7 +14,7 @@ const EXTENDED_FLAG: u32 = 1 << 31;
 /// A frame identifier: 11 bits (standard) or 29 bits (extended).
 ///
 /// The order is that of bus arbitration (ISO 11898-1): the smaller identifier wins.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub struct CanId {
     /// The arbitration field as it goes over the wire, without RTR: 11 bits of base, IDE, 18 bits of
     /// extension. Dominant is 0, so comparing these numbers is arbitrating.
@@ -125,7 +125,7 @@ pub enum FrameError {
 /// assert!(Frame::new(id, &[0; 9]).is_err(), "a frame carries at most 8 bytes");
 /// # Ok::<(), masseter_can::FrameError>(())
 /// ```
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub struct Frame {
     id: CanId,
     length: u8,

@@ -114,7 +114,7 @@ const TPDO1_NEEDS: [u32; 3] = [0x6041_0010, 0x6064_0020, 0x6077_0010];
 /// assert!(PdoMapping::rpdo1(&objects[..1]).is_err(), "there is no target position");
 /// # Ok::<(), masseter_can::PdoMappingError>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct PdoMapping {
     entries: [u32; MOST],
     count: usize,

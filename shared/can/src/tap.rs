@@ -9,7 +9,7 @@ use libc::{CAN_ERR_ACK, CAN_ERR_BUSERROR, CAN_ERR_BUSOFF, CAN_ERR_CNT, CAN_ERR_C
 use crate::{BusStatus, ErrorState, Frame, Received};
 
 /// An observation of a tap.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Tapped {
     /// A frame.
     Frame(TappedFrame),
@@ -18,7 +18,7 @@ pub enum Tapped {
 }
 
 /// A frame with its times.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct TappedFrame {
     /// The frame.
     pub frame: Frame,
@@ -61,7 +61,7 @@ const ACTIVE: u8 = 0x40;
 const BIT_ERROR_IN_TRANSMISSION: u8 = 0x81;
 
 /// The kind of an error.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum ErrorKind {
     /// A frame was destroyed by an error frame.
     Bit,
@@ -72,7 +72,7 @@ pub enum ErrorKind {
 }
 
 /// An error as a tap reports it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct ErrorReport {
     /// Time of the error: the end of an error frame's delimiter, or the change of state, ns.
     pub time_ns: u64,

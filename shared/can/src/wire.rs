@@ -10,7 +10,7 @@ use crate::frame::{CanId, Frame};
 pub struct BitrateError(pub u32);
 
 /// Bit rate of a bus, bit/s.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Bitrate(u32);
 
 impl Bitrate {

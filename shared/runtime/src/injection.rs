@@ -15,7 +15,7 @@ use crate::messages::codes::{Cause, ControllerState, EventKind, OF_OPERATOR, Sou
 use crate::named::{Declared, NameError};
 
 /// A fault or a stimulus, with its place in the scenario's list.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Injected {
     /// A fault.
     Fault(usize),
@@ -46,14 +46,14 @@ impl Display for Injected {
 /// assert_eq!(injection.window_ns(Injected::Stimulus(0)), Some(3_000_000_000..3_500_000_000));
 /// # Ok::<(), masseter_scenario::ScenarioError>(())
 /// ```
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Injection {
     faults: Vec<Timed>,
     stimuli: Vec<Timed>,
     state: Option<ControllerState>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 struct Timed {
     when: When,
     window_ns: Option<Range<u64>>,
@@ -185,7 +185,7 @@ pub(crate) enum Due {
 /// // The controller declares no such parameter.
 /// assert!(Operator::new(&scenario, &Declared::default(), 0).is_err());
 /// ```
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Operator {
     injection: Injection,
     /// What has not been due yet.

@@ -6,9 +6,7 @@ use masseter_model::dynamics::DynamicsConfig;
 use masseter_model::geometry::LEGS;
 use serde::{Deserialize, Serialize};
 
-use super::error::{
-    Checked, LONGEST_S, bounded, keyed, require, require_duration, require_positive, require_within,
-};
+use super::error::{Checked, LONGEST_S, ranges_of, require};
 use super::{DrivesConfig, dynamics};
 
 /// SYNC takes one cycle and the drives' interpolation one; drives that smooth their targets take some more. The
@@ -47,50 +45,44 @@ section! {
     /// Sequence, pose control and safety of the controller.
     #[derive(Copy)]
     pub struct ControllerConfig {
-        /// Complete readings in a row before the drives are switched on.
-        pub steady_readings: u32 = 10,
-        /// How long the first readings, and at the end the switching off of the drives, may take each, s. The enabling may
-        /// take longer by `can.ready_timeout_ms` and `can.enable_timeout_ms`.
-        pub start_timeout_s: f64 = 5.0,
-        /// Duration of the move from the measured pose to the first pose of the motion, s.
-        pub ease_s: f64 = 1.0,
-        /// Distance of the jaw from the first pose of the motion from which on it does not start, mm: the largest of the
-        /// incisal point and the corners of the platform. By default 2 mm on real interfaces, and any on simulated buses.
-        pub start_tolerance_mm: Option<f64> = None,
-        /// How long the last pose is held before the drives are switched off, s.
-        pub hold_s: f64 = 0.2,
-        /// How long a motion takes to come to rest when it is stopped halfway, s.
-        pub stop_ramp_s: f64 = 0.3,
-        /// Time from a command's reading to the moment its targets are reached, in cycles: one until SYNC
-        /// makes the drives take the targets, one for their interpolation. At most 10: the motion is looked ahead by as
-        /// much.
-        pub lead_cycles: f64 = 2.0,
-        /// Integral gain of the pose control, 1/s. At most `rate_hz` / `lead_cycles`: with more, an error would be corrected
-        /// more than once before the first correction shows.
-        pub integral_gain_per_s: f64 = 5.0,
-        /// The most that pose control may add to the desired position, m.
-        pub trim_limit_m: f64 = 1e-3,
-        /// The most that pose control may add to the desired orientation, rad.
-        pub trim_limit_rad: f64 = 0.02,
-        /// Cycles without a fresh, complete reading after which the controller stops safely.
-        pub stale_cycles: u32 = 20,
-        /// Distance of the incisal point from its desired position at which the controller stops safely, m.
-        /// Six times the largest of the default motions and of the default food, 0.036 mm. A drive that
-        /// misses its targets in the fastest motion adds 0.14 mm a cycle at 1 kHz, so the stop comes before 0.5 mm. From
-        /// 300 Hz on a first missed target stays below 0.5 mm and 0.5° too, at 100 Hz it leads to 1.1 mm and 1.5°.
-        pub tracking_limit_m: f64 = 0.2e-3,
-        /// Angle of the platform to its desired orientation at which the controller stops safely, rad.
-        /// 0.2°, four times the largest of the default food, 0.053°; such a drive adds up to 0.18° a cycle at
-        /// 1 kHz.
-        pub tracking_limit_rad: f64 = 3.5e-3,
-        /// Time constant of the mean squares of that distance and that angle, s.
-        pub tracking_rms_time_s: f64 = 0.05,
-        /// Root mean square distance at which the controller stops safely, m. Half of the limit for a moment.
-        pub tracking_rms_limit_m: f64 = 0.1e-3,
-        /// Root mean square angle at which the controller stops safely, rad. Half of the limit for a moment.
-        pub tracking_rms_limit_rad: f64 = 1.75e-3,
+        /// Consecutive complete readings before the drives are switched on.
+        pub steady_readings: u32 = 10 => Positive,
+        /// Longest time for each of: the first readings, switching the drives off. Switching them on may take
+        /// `can.ready_timeout_ms` and `can.enable_timeout_ms` more.
+        pub start_timeout_s: f64 = 5.0 => UpTo(LONGEST_S) "more than the drives take to boot at `rate_hz`",
+        /// Duration of the move from the measured pose to the first one of the motion.
+        pub ease_s: f64 = 1.0 => Within(SHORTEST_EASE_S, LONGEST_S),
+        /// Distance from the first pose of the motion beyond which the run does not start: the largest of the incisal
+        /// point and the corners of the platform. By default 2 mm on real interfaces, and any on simulated buses.
+        pub start_tolerance_mm: Option<f64> = None => Positive,
+        /// Time in the last pose before the drives are switched off.
+        pub hold_s: f64 = 0.2 => UpTo(LONGEST_S),
+        /// Time in which an interrupted motion comes to rest.
+        pub stop_ramp_s: f64 = 0.3 => UpTo(LONGEST_S),
+        /// From the sample of a reading to the instant at which the targets of its command are reached: a cycle until
+        /// SYNC, and what the drives interpolate over.
+        pub lead_cycles: f64 = 2.0 => Within(LEAST_LEAD_CYCLES, MOST_LEAD_CYCLES as f64),
+        /// Integral gain of the pose control. With more than `rate_hz` / `lead_cycles` an error would be corrected more
+        /// than once before the first correction shows.
+        pub integral_gain_per_s: f64 = 5.0 => Positive "at most `rate_hz` / `lead_cycles`",
+        /// The most that pose control may add to the desired position.
+        pub trim_limit_m: f64 = 1e-3 => Positive,
+        /// The most that pose control may add to the desired orientation.
+        pub trim_limit_rad: f64 = 0.02 => Positive,
+        /// Cycles without a fresh, complete reading before the controller stops safely.
+        pub stale_cycles: u32 = 20 => Positive,
+        /// Distance of the incisal point from its desired position at which the controller stops safely.
+        pub tracking_limit_m: f64 = 0.2e-3 => Positive,
+        /// Angle of the platform to its desired orientation at which the controller stops safely.
+        pub tracking_limit_rad: f64 = 3.5e-3 => Positive,
+        /// Time constant of the mean squares of that distance and that angle.
+        pub tracking_rms_time_s: f64 = 0.05 => Positive,
+        /// Root mean square distance at which the controller stops safely.
+        pub tracking_rms_limit_m: f64 = 0.1e-3 => Positive,
+        /// Root mean square angle at which the controller stops safely.
+        pub tracking_rms_limit_rad: f64 = 1.75e-3 => Positive,
         /// Whether the drives are sent the forces that the desired motion needs (60B2h).
-        pub feed_forward_torque: bool = false,
+        pub feed_forward_torque: bool = false => "`true` needs 60B2h in `drive_profile.pdos.rpdo1` of every drive",
         /// Masses and friction that the controller believes in. A key that is absent is that of `[dynamics]`.
         pub model: Option<DynamicsConfig> = None,
     }
@@ -107,27 +99,8 @@ impl ControllerConfig {
     }
 
     pub(super) fn validate(&self, rate_hz: u32) -> Checked {
-        require_duration(&keyed!("controller", self, start_timeout_s hold_s stop_ramp_s))?;
-        require_within(&bounded!("controller", self, ease_s [SHORTEST_EASE_S, LONGEST_S]))?;
-        require_positive(&keyed!("controller", self,
-            steady_readings lead_cycles integral_gain_per_s trim_limit_m trim_limit_rad stale_cycles
-            tracking_limit_m tracking_limit_rad tracking_rms_time_s tracking_rms_limit_m tracking_rms_limit_rad
-        ))?;
-        if let Some(tolerance_mm) = self.start_tolerance_mm {
-            require_positive(&[("controller.start_tolerance_mm", tolerance_mm)])?;
-        }
-        if let Some(model) = &self.model {
-            dynamics::validate(model).map_err(|error| error.of_table("controller.model"))?;
-        }
-        // The lead is no longer than a drive needs, and an error is corrected only once within the lead.
-        require(
-            (LEAST_LEAD_CYCLES..=MOST_LEAD_CYCLES as f64).contains(&self.lead_cycles),
-            "controller.lead_cycles",
-            &self.lead_cycles,
-            format_args!(
-                "use {LEAST_LEAD_CYCLES} to {MOST_LEAD_CYCLES}: one until SYNC, and what the drives interpolate over"
-            ),
-        )?;
+        self.check_ranges(ranges_of("controller"))?;
+        self.model.as_ref().map_or(Ok(()), |model| dynamics::validate("controller.model", model))?;
         let most_per_s = self.most_integral_gain_per_s(rate_hz);
         require(
             self.integral_gain_per_s <= most_per_s,
@@ -150,16 +123,16 @@ section! {
     /// both, and refuses what is no jaw motion.
     #[derive(Copy)]
     pub struct TrajectoryLimitsConfig {
-        /// Speed of a slide, m/s.
-        pub slide_velocity_m_s: f64 = 0.15,
-        /// Speed of a leg, m/s.
-        pub leg_velocity_m_s: f64 = 0.30,
-        /// Acceleration of a slide, m/s².
-        pub slide_acceleration_m_s2: f64 = 8.0,
-        /// Acceleration of a leg, m/s².
-        pub leg_acceleration_m_s2: f64 = 8.0,
-        /// Condition number of the 6×6 Jacobian, angular velocities scaled by the platform's side A₁A₂.
-        pub max_condition: f64 = 10.0,
+        /// Speed of a slide.
+        pub slide_velocity_m_s: f64 = 0.15 => Positive,
+        /// Speed of a leg.
+        pub leg_velocity_m_s: f64 = 0.30 => Positive,
+        /// Acceleration of a slide.
+        pub slide_acceleration_m_s2: f64 = 8.0 => Positive,
+        /// Acceleration of a leg.
+        pub leg_acceleration_m_s2: f64 = 8.0 => Positive,
+        /// Condition number of the 6×6 Jacobian; angular velocities are scaled by the platform's side A₁A₂.
+        pub max_condition: f64 = 10.0 => Positive,
     }
 }
 
@@ -185,26 +158,21 @@ impl TrajectoryLimitsConfig {
             ..self
         }
     }
-
-    pub(super) fn validate(&self) -> Checked {
-        require_positive(&keyed!("limits", self,
-            slide_velocity_m_s leg_velocity_m_s slide_acceleration_m_s2 leg_acceleration_m_s2 max_condition
-        ))
-    }
 }
 
 section! {
     /// How a dry run differs from the run that it prepares. `masseter run --dry` switches it on.
     #[derive(Copy)]
     pub struct DryConfig {
-        /// Whether the run is a dry one. `--dry` sets it, and then also shortens the strokes and lengthens `controller.ease_s`.
+        /// Whether the run is a dry one. `masseter run --dry` sets it; it then also shortens `mechanism.strokes` by the
+        /// margin and divides `controller.ease_s` by the speed.
         pub is_on: bool = false,
-        /// Speed of the motion, as a share of its own.
-        pub speed: f64 = 0.1,
-        /// Limit of force (object 6072), as a share of the drives' own.
-        pub force: f64 = 0.3,
-        /// Distance that targets keep from the ends of the strokes, mm.
-        pub stroke_margin_mm: f64 = 1.0,
+        /// Share of the motion's speed.
+        pub speed: f64 = 0.1 => Within(0.01, 0.25),
+        /// Share of `max_force_n` that the master writes as the drives' limit of force (6072h).
+        pub force: f64 = 0.3 => Within(0.01, 0.5),
+        /// Distance that targets keep from the ends of the strokes.
+        pub stroke_margin_mm: f64 = 1.0 => Within(0.0, 100.0),
     }
 }
 
@@ -218,12 +186,6 @@ impl DryConfig {
     pub fn force_now(&self) -> f64 {
         if self.is_on { self.force } else { 1.0 }
     }
-
-    pub(super) fn validate(&self) -> Checked {
-        require_within(
-            &bounded!("dry", self, speed [0.01, 0.25] force [0.01, 0.5] stroke_margin_mm [0.0, 100.0]),
-        )
-    }
 }
 
 section! {
@@ -231,12 +193,13 @@ section! {
     #[derive(Copy, Eq)]
     pub struct RealtimeConfig {
         /// Cores of the controller and of the plant.
-        pub cores: [usize; 2] = [0, 1],
+        pub cores: [usize; 2] = [0, 1] => "two different ones",
         /// SCHED_FIFO priority of both.
-        pub priority: u8 = 80,
+        pub priority: u8 = 80 => Within(1.0, 99.0),
         /// Whether their memory is locked.
         pub lock_memory: bool = true,
-        /// Whether the cores are kept from idle states for the duration of the run.
+        /// `/dev/cpu_dma_latency` during a run: held at 0, so that cores poll instead of idling, or left alone; `auto`
+        /// holds it on a real machine only.
         pub cpu_dma_latency: CpuDmaLatency = CpuDmaLatency::default(),
     }
 }
@@ -259,21 +222,20 @@ section! {
     /// The limits beyond which a run fails.
     #[derive(Copy)]
     pub struct ChecksConfig {
-        /// Largest rms distance of the platform's origin, and of the incisal point, from the desired position while the
-        /// motion plays, mm. True and estimated pose are each held against it, as against the next three limits.
-        pub tracking_rms_mm: f64 = 0.1,
-        /// Largest such distance, mm. No fault may lead further before it is detected.
-        pub tracking_max_mm: f64 = 0.5,
-        /// Largest rms angle of the platform to its desired orientation, degrees.
-        pub tracking_rms_deg: f64 = 0.1,
-        /// Largest such angle, degrees. No fault may turn the platform further before it is detected.
-        pub tracking_max_deg: f64 = 0.5,
-        /// Most cycles that the rig itself, controller and plant together, may miss.
+        /// Largest rms distance of the platform's origin and of the incisal point from the desired position during the
+        /// motion.
+        pub tracking_rms_mm: f64 = 0.1 => Positive,
+        /// Largest such distance; no declared fault may lead the incisal point further before it is detected.
+        pub tracking_max_mm: f64 = 0.5 => Positive,
+        /// Largest rms angle of the platform to its desired orientation during the motion.
+        pub tracking_rms_deg: f64 = 0.1 => Positive,
+        /// Largest such angle; no declared fault may turn the platform further before it is detected.
+        pub tracking_max_deg: f64 = 0.5 => Positive,
+        /// Largest number of cycles that the rig itself, controller and plant together, may miss.
         pub missed_cycles: u64 = 0,
-        /// Largest share of the cycles that the machine may lose before nothing is left to judge the function by, %. In
-        /// a run of ten seconds, 5 % are half a second.
-        pub machine_lost_percent: f64 = 5.0,
-        /// Whether the machine may lose any cycle.
+        /// Largest share of the cycles that the machine may lose; beyond it the run is INVALID.
+        pub machine_lost_percent: f64 = 5.0 => Within(0.0, 100.0),
+        /// Use of a run whose cycles the machine lost: judged by its function, or INVALID.
         pub timing: TimingConfig = TimingConfig::default(),
     }
 }
@@ -293,28 +255,19 @@ section! {
     /// What the recording of a run contains.
     #[derive(Copy, Eq)]
     pub struct RecordingConfig {
-        /// The CAN frames. Without them a run has no response times and no load of the buses, and no candump
-        /// logs.
+        /// Record the CAN frames. Without them a recording is a tenth smaller; the check `bus response` is not judged,
+        /// and reports, exports and `masseter diff` say that the frames are not recorded. Runs without a recording do
+        /// not judge the check either.
         pub frames: bool = true,
     }
 }
 
 impl RealtimeConfig {
     pub(super) fn validate(&self) -> Checked {
-        let is_priority = (1..=99).contains(&self.priority);
-        require(is_priority, "realtime.priority", &self.priority, "use 1 to 99 (SCHED_FIFO)")?;
+        self.check_ranges(ranges_of("realtime"))?;
         let [controller, plant] = self.cores;
         let need = "name two: controller and plant wait for each other by spinning";
         require(controller != plant, "realtime.cores", &format_args!("{controller},{plant}"), need)
-    }
-}
-
-impl ChecksConfig {
-    pub(super) fn validate(&self) -> Checked {
-        require_positive(&keyed!("checks", self,
-            tracking_rms_mm tracking_max_mm tracking_rms_deg tracking_max_deg
-        ))?;
-        require_within(&bounded!("checks", self, machine_lost_percent [0.0, 100.0]))
     }
 }
 

@@ -17,7 +17,7 @@ use crate::wording::question;
 /// More keys than any table has.
 const MOST_SUSPECTS: usize = 100;
 /// What a message on an unknown key begins with.
-pub(super) const UNKNOWN_KEY: &str = "unknown key";
+const UNKNOWN_KEY: &str = "unknown key";
 /// Characters of the longest message of the TOML reader.
 const LONGEST_REASON: usize = 2000;
 
@@ -156,7 +156,7 @@ pub(super) fn malformed<T: DeserializeOwned>(
 
 /// A message of the TOML reader in the words of the documents, with the most similar of the keys or values that it
 /// expects.
-pub(super) fn in_words(message: &str) -> String {
+fn in_words(message: &str) -> String {
     let message = cut_quotations(message);
     let known = [("unknown field", UNKNOWN_KEY), ("unknown variant", "unknown value")];
     let known = known.iter().find_map(|(of_reader, ours)| Some((*ours, message.strip_prefix(of_reader)?)));

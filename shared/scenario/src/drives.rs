@@ -5,14 +5,15 @@ use std::fmt::{self, Display, Formatter};
 use std::path::PathBuf;
 
 use masseter_model::geometry::{AXIS_NAMES, LEGS};
+use masseter_model::section::Range;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::json;
 use toml::Table;
 
 use super::drive_profile::{AccelerationUnit, DriveProfile, ObjectKey, VelocityUnit};
 use super::error::{
-    Checked, LONGEST_S, ScenarioError, keyed, require, require_each, require_keys, require_positive,
-    require_within,
+    Checked, LONGEST_S, ranges_of, require, require_axes, require_each, require_keys, require_range,
 };
 
 /// Increments of encoders: with a coarser one the drives are never as near to their targets as the following limit
@@ -27,37 +28,41 @@ pub const INCREMENTS_PER_TURN: u32 = 10_000;
 /// The slowest save that is worth a test, and the slowest brake, s.
 const SLOWEST_S: f64 = 60.0;
 
-/// A servo drive with its encoder. Scales and limits hold for real ones too, gains and noise for emulated ones.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct DriveConfig {
-    /// Force at 1000 ‰ of the torque objects (6077), N.
-    pub rated_force_n: f64,
-    /// Force limit of the drive, N.
-    pub max_force_n: f64,
-    /// Velocity limit of the drive, m/s.
-    pub max_velocity_m_s: f64,
-    /// Largest change of the targets' velocity that the master sends, m/s².
-    pub max_acceleration_m_s2: f64,
-    /// Deceleration of the quick-stop ramp (6085), m/s². The drive's unit of acceleration is taken to be one increment of
-    /// its position a second squared.
-    pub quick_stop_deceleration_m_s2: f64,
-    /// Following error window (6065), m.
-    #[doc(alias("position deviation", "contouring error", "lag error"))]
-    pub following_error_m: f64,
-    /// How long the window may be exceeded (6066), ms.
-    #[doc(alias = "following error time out")]
-    pub following_error_timeout_ms: u16,
-    /// Gain of the position loop, 1/s.
-    pub position_gain_per_s: f64,
-    /// Gain of the velocity loop, N per m/s.
-    pub velocity_gain_n_s_per_m: f64,
-    /// Integral time of the velocity loop, s.
-    pub velocity_integral_time_s: f64,
-    /// One increment of the encoder, m.
-    pub encoder_resolution_m: f64,
-    /// Standard deviation of the encoder's noise, m.
-    pub encoder_noise_m: f64,
+keys! {
+    /// A servo drive with its encoder. Scales and limits hold for real ones too, gains and noise for emulated ones.
+    #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct DriveConfig {
+        /// Force at 1000 ‰ of the torque objects (6077).
+        pub rated_force_n: f64 => Positive,
+        /// Force limit of the drive.
+        pub max_force_n: f64 => Positive,
+        /// Velocity limit of the drive; the master refuses commands beyond it.
+        pub max_velocity_m_s: f64 => Positive,
+        /// Acceleration beyond which the master refuses commands. The default motions take 1.3 m/s², and pose control up to
+        /// 41 m/s² after stalls of the machine. Targets may stop at once and go on as before within twice the time-out of
+        /// commands.
+        pub max_acceleration_m_s2: f64 => Positive,
+        /// Deceleration of the quick-stop ramp (6085). The drive's unit of acceleration is taken to be one increment of its
+        /// position a second squared.
+        pub quick_stop_deceleration_m_s2: f64 => Positive,
+        /// Following error window (6065).
+        #[doc(alias("position deviation", "contouring error", "lag error"))]
+        pub following_error_m: f64 => Positive,
+        /// Longest time outside the window (6066).
+        #[doc(alias = "following error time out")]
+        pub following_error_timeout_ms: u16,
+        /// Gain of the position loop.
+        pub position_gain_per_s: f64 => Positive,
+        /// Gain of the velocity loop.
+        pub velocity_gain_n_s_per_m: f64 => Positive,
+        /// Integral time of the velocity loop.
+        pub velocity_integral_time_s: f64 => Positive,
+        /// One increment of the encoder.
+        pub encoder_resolution_m: f64 => Within(FINEST_M, COARSEST_M) "a stroke's end must fit into 32 bits",
+        /// Standard deviation of the encoder's noise.
+        pub encoder_noise_m: f64 => Within(0.0, NOISIEST_M),
+    }
 }
 
 impl DriveConfig {
@@ -67,21 +72,25 @@ impl DriveConfig {
     }
 }
 
-/// The drives of slides and of legs; a key that a table does not have keeps its default.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct DrivesConfig {
-    /// File with the non-volatile memory of the emulated drives; when absent they forget everything at the end.
-    pub memory: Option<PathBuf>,
-    /// Drives of d₁ d₂ d₃.
-    #[serde(deserialize_with = "slide")]
-    pub slide: DriveConfig,
-    /// Drives of l₁ l₂ l₃.
-    #[serde(deserialize_with = "leg")]
-    pub leg: DriveConfig,
-    /// What emulated drives do otherwise than the standard.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub quirk: Vec<QuirkConfig>,
+keys! {
+    /// The drives of slides and of legs; a key that a table does not have keeps its default.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields, default)]
+    pub struct DrivesConfig {
+        /// File with the non-volatile memory of the emulated drives: what 1010h has stored, and the serial numbers. It is
+        /// read when the drives are switched on. Tools and `masseter plant --emulate` write it once a drive has saved; a
+        /// run only reads it.
+        pub memory: Option<PathBuf> => "a path, relative to the scenario's folder",
+        /// Drives of d₁ d₂ d₃.
+        #[serde(deserialize_with = "slide")]
+        pub slide: DriveConfig,
+        /// Drives of l₁ l₂ l₃.
+        #[serde(deserialize_with = "leg")]
+        pub leg: DriveConfig,
+        /// What emulated drives do otherwise than the standard.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub quirk: Vec<QuirkConfig>,
+    }
 }
 
 fn slide<'de, D: Deserializer<'de>>(table: D) -> Result<DriveConfig, D::Error> {
@@ -132,24 +141,14 @@ impl DrivesConfig {
     }
 
     pub(super) fn validate(&self) -> Checked {
-        macro_rules! of_both {
-            ($($field:ident)+) => {
-                [keyed!("drives.slide", self.slide, $($field)+), keyed!("drives.leg", self.leg, $($field)+)]
-            };
-        }
-        let positive = of_both!(
-            rated_force_n max_force_n max_velocity_m_s max_acceleration_m_s2 quick_stop_deceleration_m_s2
-            following_error_m position_gain_per_s velocity_gain_n_s_per_m velocity_integral_time_s
-        );
-        require_positive(positive.as_flattened())?;
-        require_within(&of_both!(encoder_resolution_m).map(|[(key, m)]| (key, m, FINEST_M, COARSEST_M)))?;
-        require_within(&of_both!(encoder_noise_m).map(|[(key, m)]| (key, m, 0.0, NOISIEST_M)))?;
+        self.slide.check_ranges(ranges_of("drives.slide"))?;
+        self.leg.check_ranges(ranges_of("drives.leg"))?;
         require_each(&self.quirk, QuirkConfig::validate)
     }
 }
 
 /// The scales of one axis. Positions have the axis' sign; velocities and accelerations of profiles and limits have none.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct AxisScale {
     /// d or l for an increment of 6064h, m: negative on an axis that counts the other way.
     pub increment_m: f64,
@@ -293,47 +292,38 @@ impl Display for QuirkKindConfig {
     }
 }
 
-/// A quirk of some drives.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct QuirkConfig {
-    /// What is different.
-    pub kind: QuirkKindConfig,
-    /// The axes whose drives have it, d1 to l3; all when absent.
-    pub axes: Option<Vec<String>>,
-    /// How long it lasts, s.
-    pub for_s: Option<f64>,
-    /// How long after power-on it happens, s.
-    pub after_s: Option<f64>,
-    /// How long the brake takes to open, s; 0 when absent.
-    pub open_s: Option<f64>,
-    /// How long the brake takes to close, s; 0 when absent.
-    pub close_s: Option<f64>,
-    /// Increments of a turn of the motor; [`INCREMENTS_PER_TURN`] when absent.
-    pub increments_per_turn: Option<u32>,
-    /// Error code (603Fh).
-    pub code: Option<u16>,
-    /// The objects that it is about.
-    pub objects: Option<Vec<ObjectKey>>,
-    /// What they show.
-    pub value: Option<u32>,
+keys! {
+    /// A quirk of some drives.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct QuirkConfig {
+        /// What is different.
+        pub kind: QuirkKindConfig => "as above",
+        /// The axes whose drives have it; by default all.
+        pub axes: Option<Vec<String>> => "`d1` to `l3`, at least one",
+        /// How long it lasts.
+        pub for_s: Option<f64> => Within(0.0, LONGEST_S) "at most 60 of `slow_save`",
+        /// Time from power-on to the restart.
+        pub after_s: Option<f64> => Within(0.0, LONGEST_S),
+        /// From "operation enabled" until the brake is open; by default 0.
+        pub open_s: Option<f64> => Within(0.0, SLOWEST_S) "this or `close_s` is required",
+        /// From the loss of current until the brake is closed; by default 0.
+        pub close_s: Option<f64> => Within(0.0, SLOWEST_S),
+        /// Increments of a turn of the motor (608Fh, 6092h); by default 10000.
+        pub increments_per_turn: Option<u32> => "above 0",
+        /// Error code (603Fh).
+        pub code: Option<u16> => "1 to 0xFFFF",
+        /// The objects that it is about.
+        pub objects: Option<Vec<ObjectKey>> => "such as `[\"6065h\", \"60C2h:01\"]`, at least one",
+        /// What they show, of which each has its lowest bytes.
+        pub value: Option<u32> => "0 to 0xFFFFFFFF",
+    }
 }
 
 impl QuirkConfig {
     /// A quirk of all drives, without values.
-    pub const fn new(kind: QuirkKindConfig) -> Self {
-        Self {
-            kind,
-            axes: None,
-            for_s: None,
-            after_s: None,
-            open_s: None,
-            close_s: None,
-            increments_per_turn: None,
-            code: None,
-            objects: None,
-            value: None,
-        }
+    pub fn new(kind: QuirkKindConfig) -> Self {
+        serde_json::from_value(json!({ "kind": kind })).expect("a kind alone is a quirk")
     }
 
     /// Whether the drive of an axis has it.
@@ -343,11 +333,8 @@ impl QuirkConfig {
 
     fn validate(&self) -> Checked {
         self.require_keys()?;
-        let Self { kind, axes, for_s, after_s, open_s, close_s, objects, .. } = self;
-        if let Some(name) = axes.iter().flatten().find(|name| !AXIS_NAMES.contains(&name.as_str())) {
-            let need = format!("name axes: {}", AXIS_NAMES.join(", "));
-            return Err(ScenarioError::bad("drives.quirk.axes", name, need));
-        }
+        let Self { kind, axes, for_s, objects, .. } = self;
+        require_axes("drives.quirk.axes", axes.as_deref().unwrap_or_default())?;
         let is_empty = axes.as_ref().is_some_and(Vec::is_empty);
         let need = "name at least one axis, or leave it away for all";
         require(!is_empty, "drives.quirk.axes", &"[]", need)?;
@@ -357,32 +344,21 @@ impl QuirkConfig {
         require(is_turn, "drives.quirk.increments_per_turn", &0, "use at least 1")?;
         let need = "use an error code of CiA 402: 0 is no error";
         require(self.code != Some(0), "drives.quirk.code", &0, need)?;
-        let longest_s = if *kind == QuirkKindConfig::SlowSave { SLOWEST_S } else { LONGEST_S };
-        let times = [
-            ("drives.quirk.for_s", for_s, longest_s),
-            ("drives.quirk.after_s", after_s, LONGEST_S),
-            ("drives.quirk.open_s", open_s, SLOWEST_S),
-            ("drives.quirk.close_s", close_s, SLOWEST_S),
-        ];
-        let given =
-            times.into_iter().filter_map(|(key, time_s, most_s)| Some((key, (*time_s)?, 0.0, most_s)));
-        require_within(&given.collect::<Vec<_>>())
+        self.check_ranges(ranges_of("drives.quirk"))?;
+        let save_s = for_s.filter(|_| *kind == QuirkKindConfig::SlowSave);
+        save_s.map_or(Ok(()), |save_s| {
+            require_range("drives.quirk.for_s", Range::Within(0.0, SLOWEST_S), save_s)
+        })
     }
 
     /// Refuses keys that have no effect on this kind, and requires those that it needs.
     fn require_keys(&self) -> Checked {
-        let given = [
-            ("drives.quirk.for_s", self.for_s.is_some()),
-            ("drives.quirk.after_s", self.after_s.is_some()),
-            ("drives.quirk.open_s", self.open_s.is_some()),
-            ("drives.quirk.close_s", self.close_s.is_some()),
-            ("drives.quirk.increments_per_turn", self.increments_per_turn.is_some()),
-            ("drives.quirk.code", self.code.is_some()),
-            ("drives.quirk.objects", self.objects.is_some()),
-            ("drives.quirk.value", self.value.is_some()),
-        ];
         let kind = self.kind;
-        require_keys(kind.name(), kind.keys(), &given, |_| format!("give it: {}", kind.about()))?;
+        let of_any = |key: &&str| QuirkKindConfig::ALL.iter().any(|kind| kind.keys().concat().contains(key));
+        let keys = Self::KEYS.iter().map(|key| key.name).filter(of_any);
+        let need_of = |_: &str| format!("give it: {}", kind.about());
+        require_keys(kind.name(), kind.keys(), keys, [self, &Self::new(kind)], need_of)
+            .map_err(|refusal| refusal.in_table("drives.quirk"))?;
         let is_brake_timed = self.open_s.is_some() || self.close_s.is_some();
         let need = "give open_s, close_s or both";
         require(kind != QuirkKindConfig::SlowBrake || is_brake_timed, "drives.quirk.open_s", &"none", need)
@@ -459,7 +435,7 @@ mod tests {
             ("kind = 'slow_save'", "quirk.for_s = none: give it"),
             ("kind = 'slow_save'\nfor_s = 61.0", "quirk.for_s = 61: use 0 to 60"),
             ("kind = 'slow_brake'", "quirk.open_s = none: give open_s, close_s or both"),
-            ("kind = 'no_brake'\naxes = ['x']", "quirk.axes = x: name axes: d1"),
+            ("kind = 'no_brake'\naxes = ['x']", "quirk.axes = 'x': name axes: d1"),
             ("kind = 'no_brake'\naxes = []", "quirk.axes = []: name at least one"),
             ("kind = 'fault_at_power_on'\ncode = 0", "quirk.code = 0: use an error code"),
             ("kind = 'acceleration_in_rpm_s'\nincrements_per_turn = 0", "use at least 1"),

@@ -3,6 +3,10 @@
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
+use masseter_model::geometry::AXIS_NAMES;
+use masseter_model::section::Range;
+use serde::Serialize;
+
 use crate::input::{excerpt, read_text};
 
 /// Longest run, s.
@@ -35,7 +39,7 @@ pub enum ScenarioError {
         /// The number of the table in a list of tables, from 0.
         entry: Option<usize>,
         /// The key, with its table.
-        key: &'static str,
+        key: String,
         /// The given value.
         value: String,
         /// The valid values.
@@ -44,19 +48,19 @@ pub enum ScenarioError {
 }
 
 impl ScenarioError {
-    pub(super) fn bad(key: &'static str, value: &dyn Display, need: impl Display) -> Self {
+    pub(super) fn bad(key: &str, value: &dyn Display, need: impl Display) -> Self {
         let value = excerpt(&value.to_string());
-        Self::BadValue { place: None, entry: None, key, value, need: need.to_string() }
+        Self::BadValue { place: None, entry: None, key: key.to_owned(), value, need: need.to_string() }
     }
 
     pub(super) fn malformed_file(path: &Path, reason: String) -> Self {
         Self::Malformed { place: path.display().to_string(), reason }
     }
 
-    /// The same of a table that has the keys of another one.
-    pub(super) fn of_table(mut self, table: &str) -> Self {
-        if let Self::BadValue { need, .. } = &mut self {
-            *need = format!("{need}; the value is that of [{table}]");
+    /// The same of a key of this table.
+    pub(super) fn in_table(mut self, table: &str) -> Self {
+        if let Self::BadValue { key, .. } = &mut self {
+            *key = format!("{table}.{key}");
         }
         self
     }
@@ -78,67 +82,52 @@ pub(super) fn read_limited(path: &Path, most_bytes: u64) -> Result<String, Scena
     read_text(path, most_bytes).map_err(|error| ScenarioError::Unreadable { path: path.to_owned(), error })
 }
 
-/// The values of a table, each with its whole key.
-macro_rules! keyed {
-    ($table:literal, $config:expr, $($field:ident)+) => {
-        [$((concat!($table, ".", stringify!($field)), f64::from($config.$field))),+]
-    };
-}
-
-/// The values of a table, each with its whole key, its least and its greatest value.
-macro_rules! bounded {
-    ($table:literal, $config:expr, $($field:ident [$least:expr, $most:expr])+) => {
-        [$((concat!($table, ".", stringify!($field)), $config.$field, $least, $most)),+]
-    };
-}
-pub(super) use {bounded, keyed};
-
 /// Refuses a value that is not good.
-pub(super) fn require(is_good: bool, key: &'static str, value: &dyn Display, need: impl Display) -> Checked {
+pub(super) fn require(is_good: bool, key: &str, value: &dyn Display, need: impl Display) -> Checked {
     if is_good { Ok(()) } else { Err(ScenarioError::bad(key, value, need)) }
 }
 
-/// Refuses the first of `values` that is not a finite number above 0.
-pub(super) fn require_positive(values: &[(&'static str, f64)]) -> Checked {
-    values.iter().try_for_each(|&(key, value)| {
-        require(value.is_finite() && value > 0.0, key, &value, "use a finite number above 0")
-    })
+/// Refuses a number out of a range.
+pub(super) fn require_range(key: &str, range: Range, number: f64) -> Checked {
+    if range.contains(number) {
+        return Ok(());
+    }
+    Err(ScenarioError::bad(key, &number, format_args!("use {}", range.of_key(key))))
 }
 
-/// Refuses a value that is not a finite number, or below 0.
-pub(super) fn require_not_negative(key: &'static str, value: f64) -> Checked {
-    require(value.is_finite() && value >= 0.0, key, &value, "use a finite number not below 0")
+/// Refuses a number out of the range that is declared beside its key, in this table.
+pub(super) fn ranges_of(table: &str) -> impl Fn(&str, Range, f64) -> Checked {
+    move |key, range, number| require_range(key, range, number).map_err(|error| error.in_table(table))
 }
 
-/// Refuses the first of `durations` (s) that is not above 0, or longer than a run may be.
-pub(super) fn require_duration(durations: &[(&'static str, f64)]) -> Checked {
-    durations.iter().try_for_each(|&(key, duration_s)| {
-        let is_good = duration_s > 0.0 && duration_s <= LONGEST_S;
-        require(is_good, key, &duration_s, format_args!("use more than 0 and at most {LONGEST_S} s"))
-    })
-}
-
-/// Refuses the first of `values` outside of its two bounds, or not a number. Each value comes with its bounds.
-pub(super) fn require_within(values: &[(&'static str, f64, f64, f64)]) -> Checked {
-    values.iter().try_for_each(|&(key, value, least, most)| {
-        require((least..=most).contains(&value), key, &value, format_args!("use {least} to {most}"))
-    })
-}
-
-/// Refuses keys of a table that its kind neither needs nor takes, and requires those that it needs. Each key comes with
-/// whether it is given; `need_of` says what a missing one must say.
-pub(super) fn require_keys(
+/// Refuses keys that the kind of an entry neither needs nor takes, and requires those that it needs. The keys are those of
+/// all kinds; one is given where the entry differs from one that has its kind alone. `need_of` says what a missing one must
+/// say.
+pub(super) fn require_keys<T: Serialize>(
     kind: &str,
     [needs, takes]: [&[&str]; 2],
-    given: &[(&'static str, bool)],
+    mut keys: impl Iterator<Item = &'static str>,
+    [entry, alone]: [&T; 2],
     need_of: impl Fn(&str) -> String,
 ) -> Checked {
-    given.iter().try_for_each(|&(key, is_given)| {
-        let has = |names: &[&str]| names.iter().any(|name| key.rsplit('.').next() == Some(name));
-        let need = format_args!("leave it away: it has no effect on {kind}");
-        require(!is_given || has(needs) || has(takes), key, &"given", need)?;
-        if is_given || !has(needs) { Ok(()) } else { Err(ScenarioError::bad(key, &"none", need_of(key))) }
+    let [entry, alone] =
+        [entry, alone].map(|entry| serde_json::to_value(entry).expect("an entry has a JSON form"));
+    keys.try_for_each(|key| match entry[key] != alone[key] {
+        true if needs.contains(&key) || takes.contains(&key) => Ok(()),
+        true => {
+            let need = format_args!("leave it away: it has no effect on {kind}");
+            Err(ScenarioError::bad(key, &"given", need))
+        }
+        false if needs.contains(&key) => Err(ScenarioError::bad(key, &"none", need_of(key))),
+        false => Ok(()),
     })
+}
+
+/// Refuses names that are none of an axis.
+pub(super) fn require_axes(key: &str, names: &[String]) -> Checked {
+    let unknown = names.iter().find(|name| !AXIS_NAMES.contains(&name.as_str()));
+    let need = || format!("name axes: {}", AXIS_NAMES.join(", "));
+    unknown.map_or(Ok(()), |name| Err(ScenarioError::bad(key, &format_args!("'{name}'"), need())))
 }
 
 /// Checks every entry of a list of tables. A refusal names the entry.
@@ -148,7 +137,7 @@ pub(super) fn require_each<T>(entries: &[T], mut check: impl FnMut(&T) -> Checke
 }
 
 /// Refuses a name that cannot be a part of a signal's.
-pub(super) fn require_name(key: &'static str, name: &str) -> Checked {
+pub(super) fn require_name(key: &str, name: &str) -> Checked {
     let is_good = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_';
     let is_name = (1..=64).contains(&name.len()) && name.bytes().all(is_good);
     require(is_name, key, &format_args!("'{name}'"), "use 1 to 64 lower-case letters, digits or '_'")

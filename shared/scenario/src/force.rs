@@ -2,20 +2,23 @@
 
 use std::f64::consts::{FRAC_2_PI, TAU};
 
+use masseter_model::section::Range;
 use serde::{Deserialize, Serialize};
 
-use super::error::{Checked, bounded, keyed, require, require_positive, require_within};
+use super::error::{Checked, ranges_of, require, require_range};
 
 section! {
     /// The estimate of the external force on the platform from the forces of the drives.
     #[derive(Copy)]
     pub struct ForceEstimateConfig {
-        /// Time constant of the observer, s.
-        pub observer_time_s: f64 = 0.003,
-        /// By which share the friction of a moving axis may differ from the model's.
-        pub friction_uncertainty: f64 = 0.1,
-        /// Speed of an axis below which its friction is not known but for its largest size, m/s.
-        pub rest_speed_m_s: f64 = 0.002,
+        /// Time constant of the observer.
+        pub observer_time_s: f64 = 0.003 => Within(0.0, 1.0),
+        /// Share by which the friction of a moving axis may differ from the model's; only for the published
+        /// uncertainty.
+        pub friction_uncertainty: f64 = 0.1 => Within(0.0, 10.0),
+        /// Speed of an axis below which its friction may have any value up to Coulomb friction; only for the published
+        /// uncertainty.
+        pub rest_speed_m_s: f64 = 0.002 => Within(0.0, 0.1),
     }
 }
 
@@ -45,38 +48,31 @@ section! {
     /// Control of the bite force, between contact and opening of the mouth.
     #[derive(Copy)]
     pub struct ForceControlConfig {
-        /// Where the bite force is known from.
+        /// Where the bite force is known from; `load_cell` needs `[load_cell]` and emulated drives.
         pub source: ForceSource = ForceSource::Estimate,
-        /// The course of the desired force.
+        /// Course of the desired force; `hold` comes to the peak within a tenth of the bite.
         pub profile: BiteProfile = BiteProfile::HalfSine,
-        /// Bite force at which force control takes over from position control, N.
-        pub contact_n: f64 = 10.0,
-        /// Largest desired bite force, N.
-        pub peak_n: f64 = 30.0,
-        /// Duration of a bite, s.
-        pub bite_s: f64 = 0.3,
-        /// Admittance: force per closing speed while there is food between the teeth, N per m/s.
-        pub damping_n_s_per_m: f64 = 100.0,
-        /// The stiffest food that this damping is for, N/m.
-        pub food_stiffness_n_per_m: f64 = 3500.0,
-        /// Admittance where the teeth meet, N per m/s.
-        pub tooth_damping_n_s_per_m: f64 = 2000.0,
-        /// Stiffness of teeth, their holder and the drives in series, N/m.
-        pub tooth_stiffness_n_per_m: f64 = 3.6e5,
-        /// Opening of the mouth below which the damping grows towards that of the teeth, m.
-        pub tooth_zone_m: f64 = 5e-4,
-        /// Largest speed of closing on food, and of giving way after a bite, m/s.
-        pub closing_m_s: f64 = 0.06,
-        /// Largest distance of the platform from the motion, m.
-        pub reach_m: f64 = 0.012,
-    }
-}
-
-impl ForceEstimateConfig {
-    pub(super) fn validate(&self) -> Checked {
-        require_within(&bounded!("force_estimate", self,
-            observer_time_s [0.0, 1.0] friction_uncertainty [0.0, 10.0] rest_speed_m_s [0.0, 0.1]
-        ))
+        /// Bite force at which force control takes over.
+        pub contact_n: f64 = 10.0 => Positive,
+        /// Largest desired bite force.
+        pub peak_n: f64 = 30.0 => "`contact_n` to 1000",
+        /// Duration of a bite.
+        pub bite_s: f64 = 0.3 => Positive,
+        /// Admittance: force error per closing speed, with food between the teeth.
+        pub damping_n_s_per_m: f64 = 100.0 => "from the limit of stability on",
+        /// The stiffest food that this damping is for.
+        pub food_stiffness_n_per_m: f64 = 3500.0 => Positive,
+        /// Admittance where the teeth meet.
+        pub tooth_damping_n_s_per_m: f64 = 2000.0 => "from the limit of stability on",
+        /// Stiffness of teeth, holder and drives in series.
+        pub tooth_stiffness_n_per_m: f64 = 3.6e5 => Positive,
+        /// Opening, at the platform's origin, below which the damping grows towards that of the teeth.
+        pub tooth_zone_m: f64 = 5e-4 => Positive,
+        /// Largest speed of closing on food, and of giving way after a bite.
+        pub closing_m_s: f64 = 0.06 => Positive,
+        /// Largest distance of the platform from the motion. Closing stops there; food that keeps the mouth further
+        /// open ends the run in a safe stop (`law_failed`).
+        pub reach_m: f64 = 0.012 => Within(0.000_001, 0.05),
     }
 }
 
@@ -93,16 +89,17 @@ impl ForceControlConfig {
     /// Refuses values without use, and a damping below the limit of stability for the delays of lead and of the
     /// observer or the load cell (s).
     pub(super) fn validate(&self, lead_s: f64, source_s: f64) -> Checked {
-        require_positive(&keyed!("force_control", self,
-            contact_n bite_s tooth_zone_m closing_m_s food_stiffness_n_per_m tooth_stiffness_n_per_m
-        ))?;
-        require_within(
-            &bounded!("force_control", self, peak_n [self.contact_n, 1000.0] reach_m [1e-6, 0.05]),
-        )?;
+        self.check_ranges(ranges_of("force_control"))?;
+        require_range("force_control.peak_n", Range::Within(self.contact_n, 1000.0), self.peak_n)?;
         let delay_s = lead_s + source_s + Self::MASS_TIME_S;
-        let dampings = keyed!("force_control", self, damping_n_s_per_m tooth_damping_n_s_per_m);
-        let stiffnesses = [self.food_stiffness_n_per_m, self.tooth_stiffness_n_per_m];
-        for ((key, damping), stiffness) in dampings.into_iter().zip(stiffnesses) {
+        for (key, damping, stiffness) in [
+            ("force_control.damping_n_s_per_m", self.damping_n_s_per_m, self.food_stiffness_n_per_m),
+            (
+                "force_control.tooth_damping_n_s_per_m",
+                self.tooth_damping_n_s_per_m,
+                self.tooth_stiffness_n_per_m,
+            ),
+        ] {
             let least = Self::least_damping_n_s_per_m(stiffness, delay_s);
             let need = format!(
                 "use at least {least:.1}: with less, the loop is not stable against {stiffness} N/m with a delay of \
@@ -119,14 +116,14 @@ section! {
     /// The load cell.
     #[derive(Copy)]
     pub struct LoadCellConfig {
-        /// Bandwidth of its amplifier, a low-pass of first order, Hz.
-        pub bandwidth_hz: f64 = 500.0,
-        /// Noise of a sample, rms, N.
-        pub noise_n: f64 = 0.1,
-        /// What the cell shows without load, N.
-        pub offset_n: f64 = 0.0,
-        /// Ends of its range on both sides, N: beyond them the cell shows these.
-        pub range_n: f64 = 1000.0,
+        /// Bandwidth of its amplifier, a low-pass of first order.
+        pub bandwidth_hz: f64 = 500.0 => Within(1.0, 100_000.0),
+        /// Noise of a sample, rms.
+        pub noise_n: f64 = 0.1 => Within(0.0, 1000.0),
+        /// What the cell shows without load.
+        pub offset_n: f64 = 0.0 => Within(-1000.0, 1000.0),
+        /// Ends of its range on both sides; beyond them the cell shows these.
+        pub range_n: f64 = 1000.0 => Within(0.1, 100_000.0),
     }
 }
 
@@ -134,12 +131,6 @@ impl LoadCellConfig {
     /// Time constant of the low-pass, s.
     pub fn time_s(&self) -> f64 {
         1.0 / (TAU * self.bandwidth_hz)
-    }
-
-    pub(super) fn validate(&self) -> Checked {
-        require_within(&bounded!("load_cell", self,
-            bandwidth_hz [1.0, 1e5] noise_n [0.0, 1000.0] offset_n [-1000.0, 1000.0] range_n [0.1, 1e5]
-        ))
     }
 
     /// Refuses a cell by which this control cannot tell a bite: one that is full below the peak, or that shows a contact

@@ -1,16 +1,19 @@
 //! The lower jaw, its teeth, and food between them: `[jaw]`, `[teeth]` and `[food]`.
 //!
 //! The default arch is a parabola through the incisal point and both first molars. Teeth stand along it by their
-//! mesiodistal widths. The trajectory checks the values of `[jaw]`.
+//! mesiodistal widths. The trajectory checks the ranges of `[jaw]`.
 
 use std::collections::BTreeSet;
 
+use masseter_model::section::Range;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::error::{Checked, ScenarioError, bounded, require, require_each, require_within};
+use super::error::{Checked, ScenarioError, ranges_of, require, require_each, require_range};
 use super::merge::{Given, over_kind};
 
+/// Farthest offset on a robot that fits on a table, m.
+const FARTHEST_M: f64 = 1.0;
 /// The default first molar on the left, platform frame, m: ArtiSynth's jaw, scaled to the paper's platform.
 const FIRST_MOLAR_M: [f64; 3] = [0.0024, 0.0248, 0.0];
 /// Teeth of a side from the middle on, by the last digit of their FDI numbers, without third molars.
@@ -40,33 +43,34 @@ section! {
     /// The place of the lower jaw on the platform, and the dimensions of the mandible.
     #[derive(Copy)]
     pub struct JawConfig {
-        /// Length of all three legs at the closed pose, slides in the middle, metres.
-        pub closed_leg_m: f64 = 0.2974,
-        /// Shift of the closed pose from there, base frame, metres. A jaw that opens far back gains
-        /// stroke by being closed further forward.
-        pub closed_offset_m: [f64; 3] = [0.0; 3],
-        /// The incisal point (origin of the jaw frame) in the platform frame, metres.
-        /// By default corner A₁ of the paper's platform.
-        pub reference_point_m: [f64; 3] = [0.05 / 3f64.sqrt(), 0.0, 0.0],
-        /// Side of Bonwill's triangle (both condyles and the incisal point), metres.
-        pub bonwill_side_m: f64 = 0.100,
-        /// Balkwill angle between Bonwill's triangle and the occlusal plane, degrees.
-        pub balkwill_angle_deg: f64 = 22.5,
+        /// Length of all three legs at the closed pose, slides in the middle.
+        pub closed_leg_m: f64 = 0.2974 => Positive,
+        /// Offset of the closed pose, base frame: a jaw that opens far back gains stroke if its closed pose is further
+        /// forward.
+        pub closed_offset_m: [f64; 3] = [0.0; 3] => Within(-FARTHEST_M, FARTHEST_M),
+        /// The incisal point in the platform frame; by default corner A₁.
+        pub reference_point_m: [f64; 3] = [0.05 / 3f64.sqrt(), 0.0, 0.0] => Within(-FARTHEST_M, FARTHEST_M),
+        /// Side of Bonwill's triangle; its corners are both condyles and the incisal point.
+        pub bonwill_side_m: f64 = 0.100 => Within(0.01, 1.0),
+        /// Balkwill angle between Bonwill's triangle and the occlusal plane.
+        pub balkwill_angle_deg: f64 = 22.5 => "0 to below 90",
     }
 }
 
-/// A lower tooth and its antagonist.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ToothConfig {
-    /// FDI number: 31 to 38 on the left, 41 to 48 on the right.
-    pub number: u8,
-    /// Where the lower tooth meets its antagonist in the closed mouth, platform frame, m.
-    pub point_m: [f64; 3],
-    /// Normal of the face on which they meet, from the lower tooth to its antagonist, platform frame of the closed mouth. That
-    /// of the occlusal plane when absent; a cusp leans it.
-    #[serde(default = "occlusal")]
-    pub normal: [f64; 3],
+keys! {
+    /// A lower tooth and its antagonist.
+    #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct ToothConfig {
+        /// FDI number: 31 to 38 on the left, 41 to 48 on the right.
+        pub number: u8 => "31 to 38, 41 to 48, none twice",
+        /// Where the tooth meets its antagonist in the closed mouth, platform frame.
+        pub point_m: [f64; 3] => Within(-0.5, 0.5),
+        /// Normal of the face on which they meet, from the lower tooth to its antagonist, platform frame of the closed
+        /// mouth. That of the occlusal plane when absent; a cusp leans it.
+        #[serde(default = "occlusal")]
+        pub normal: [f64; 3] => "within 60° of the platform's normal",
+    }
 }
 
 const fn occlusal() -> [f64; 3] {
@@ -76,20 +80,20 @@ const fn occlusal() -> [f64; 3] {
 section! {
     /// The lower arch, and the contact of its teeth with their antagonists.
     pub struct TeethConfig {
-        /// FDI numbers of the lower teeth that the jaw lacks.
-        pub missing: Vec<u8> = Vec::new(),
-        /// Distance of the teeth from their antagonists in the closed mouth, m; below 0 they are pressed together there.
-        pub clearance_m: f64 = 1e-4,
-        /// Stiffness of a tooth in its ligament under small forces, N/m.
-        pub soft_n_per_m: f64 = 2e5,
-        /// Force up to which that holds, N.
-        pub soft_up_to_n: f64 = 4.0,
-        /// Stiffness under larger forces, N/m.
-        pub stiff_n_per_m: f64 = 2e6,
-        /// Damping of Hunt and Crossley: growth of the force by the speed of compression, s/m.
-        pub damping_s_per_m: f64 = 2.5,
+        /// Lower teeth that the jaw lacks.
+        pub missing: Vec<u8> = Vec::new() => "31 to 38, 41 to 48",
+        /// Distance of the teeth from their antagonists in the closed mouth; below 0 they are pressed together there.
+        pub clearance_m: f64 = 1e-4 => Within(-0.0005, 0.02),
+        /// Stiffness of a tooth under small forces (assumption).
+        pub soft_n_per_m: f64 = 2e5 => Within(1000.0, 10_000_000.0),
+        /// Force up to which that holds.
+        pub soft_up_to_n: f64 = 4.0 => Within(0.0, 100.0),
+        /// Stiffness under larger forces (assumption).
+        pub stiff_n_per_m: f64 = 2e6 => Within(1000.0, 10_000_000.0) "as `dynamics.step_ns` allows",
+        /// Damping of Hunt and Crossley: growth of the force by the speed of compression (assumption).
+        pub damping_s_per_m: f64 = 2.5 => Within(0.0, 20.0),
         /// Friction of enamel on enamel.
-        pub friction: f64 = 0.23,
+        pub friction: f64 = 0.23 => Within(0.0, 2.0),
         /// Teeth at other places than those of the default arch.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         pub tooth: Vec<ToothConfig> = Vec::new(),
@@ -120,14 +124,11 @@ impl TeethConfig {
         require_each(&self.tooth, |tooth| {
             let is_new = placed.insert(tooth.number);
             require(is_new, "teeth.tooth.number", &tooth.number, "give each tooth one place")?;
-            require_within(&tooth.point_m.map(|m| ("teeth.tooth.point_m", m, -0.5, 0.5)))?;
+            tooth.check_ranges(ranges_of("teeth.tooth"))?;
             // A steeper face would catch the tooth on its way up.
-            require_within(&[("teeth.tooth.normal", tooth.rise(), 0.5, 1.0)])
+            require_range("teeth.tooth.normal", Range::Within(0.5, 1.0), tooth.rise())
         })?;
-        require_within(&bounded!("teeth", self,
-            clearance_m [-5e-4, 0.02] soft_n_per_m [1e3, 1e7] soft_up_to_n [0.0, 100.0]
-            stiff_n_per_m [1e3, 1e7] damping_s_per_m [0.0, 20.0] friction [0.0, 2.0]
-        ))
+        self.check_ranges(ranges_of("teeth"))
     }
 }
 
@@ -190,40 +191,44 @@ pub enum Material {
     Viscoelastic,
 }
 
-/// A piece of food that resists the bite.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FoodConfig {
-    /// The kind whose values the other keys replace.
-    pub kind: String,
-    /// Where the values come from.
-    pub source: String,
-    /// The lower teeth that it lies on, by their FDI numbers. They carry it in equal shares.
-    pub teeth: Vec<u8>,
-    /// How it gives way.
-    pub material: Material,
-    /// Thickness of a fresh piece, m.
-    pub thickness_m: f64,
-    /// Elastic force by compression of a fresh piece, N/m: at full compression, where the exponent is not 1.
-    pub stiffness_n_per_m: f64,
-    /// Exponent of the compression in the elastic force.
-    pub exponent: f64,
-    /// Damping of Hunt and Crossley: growth of the force by the speed of compression, s/m.
-    pub damping_s_per_m: f64,
-    /// Elastic force at which it flows or breaks, N.
-    pub strength_n: f64,
-    /// Share of stiffness and strength that its fragments keep.
-    pub residual: f64,
-    /// The spring that relaxes, N/m.
-    pub relaxing_n_per_m: f64,
-    /// In which time it relaxes, s.
-    pub relaxation_s: f64,
-    /// Largest lateral force on a tooth, as a share of the normal one.
-    pub friction: f64,
-    /// Share of its thickness that the food keeps from one chew to the next.
-    pub left_by_chew: f64,
-    /// Thickness below which it is swallowed, m. A fresh piece follows.
-    pub swallowed_m: f64,
+keys! {
+    /// A piece of food that resists the bite.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct FoodConfig {
+        /// The food whose values the other keys replace. The defaults here are those of `soft`;
+        /// `shared/scenario/src/food/kinds` has all, with their sources.
+        pub kind: String,
+        /// Where the values come from.
+        pub source: String,
+        /// The teeth that it lies on; they carry equal shares of it.
+        pub teeth: Vec<u8> => "lower teeth that the jaw has, none twice",
+        /// How it gives way: it flows at its strength; breaks at its strength, whereupon its fragments flow at a share of
+        /// it; or is a standard linear solid.
+        pub material: Material,
+        /// Thickness of a fresh piece.
+        pub thickness_m: f64 => Within(0.001, 0.05),
+        /// Elastic force by compression, at full compression where `exponent` is not 1.
+        pub stiffness_n_per_m: f64 => Within(1.0, 1_000_000.0) "as `dynamics.step_ns` allows",
+        /// Exponent of the compression in the elastic force.
+        pub exponent: f64 => Within(1.0, 1.5),
+        /// Damping of Hunt and Crossley: growth of the force by the speed of compression.
+        pub damping_s_per_m: f64 => Within(0.0, 10.0),
+        /// Elastic force at which it flows or breaks; the most that a viscoelastic one bears.
+        pub strength_n: f64 => Within(0.1, 1500.0),
+        /// Share of stiffness and strength that fragments keep.
+        pub residual: f64 => Within(0.01, 1.0),
+        /// Spring of a viscoelastic food that relaxes.
+        pub relaxing_n_per_m: f64 => Within(0.0, 1_000_000.0),
+        /// In which time it relaxes.
+        pub relaxation_s: f64 => Within(0.001, 100.0),
+        /// Largest lateral force as a share of the normal one.
+        pub friction: f64 => Within(0.0, 2.0),
+        /// Share of its thickness that it keeps from one chew to the next.
+        pub left_by_chew: f64 => Within(0.1, 1.0),
+        /// Thickness below which it is swallowed; a fresh piece follows.
+        pub swallowed_m: f64 => Within(0.0002, 0.05) "at most `thickness_m`",
+    }
 }
 
 impl Default for FoodConfig {
@@ -259,13 +264,8 @@ impl FoodConfig {
         let is_once = (1..=distinct).contains(&self.teeth.len());
         let teeth = format!("{:?}", self.teeth);
         require(is_once, "food.teeth", &teeth, "name at least one tooth, none twice")?;
-        require_within(&bounded!("food", self,
-            thickness_m [1e-3, 0.05] stiffness_n_per_m [1.0, 1e6] exponent [1.0, 1.5]
-            damping_s_per_m [0.0, 10.0] strength_n [0.1, 1500.0] residual [0.01, 1.0]
-            relaxing_n_per_m [0.0, 1e6] relaxation_s [1e-3, 100.0] friction [0.0, 2.0]
-            left_by_chew [0.1, 1.0] swallowed_m [2e-4, 0.05]
-        ))?;
-        require_within(&bounded!("food", self, swallowed_m [0.0, self.thickness_m]))
+        self.check_ranges(ranges_of("food"))?;
+        require_range("food.swallowed_m", Range::Within(0.0, self.thickness_m), self.swallowed_m)
     }
 }
 

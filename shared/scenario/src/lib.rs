@@ -3,7 +3,7 @@
 //! A scenario is TOML. Every key has a default, so an empty file is the default run. This crate checks values
 //! within the scenario; checks against other parts, such as a trajectory against the strokes, are made where these parts are built.
 
-#[macro_use(section)]
+#[macro_use(keys, section)]
 extern crate masseter_model;
 
 mod can;
@@ -46,6 +46,7 @@ pub use faults::{
 pub use force::{BiteProfile, ForceControlConfig, ForceEstimateConfig, ForceSource, LoadCellConfig};
 pub use jaw::{FoodConfig, JawConfig, MOST_PAIRS, Material, TeethConfig, ToothConfig};
 pub use masseter_model::dynamics::{AxesConfig, DynamicsConfig, FrictionConfig, FrictionModel};
+pub use masseter_model::section::{Key, Range, unit_of};
 pub use motion::*;
 pub use quantity::{Dimension, Quantity, QuantityError, UNITS, Unit};
 pub use requirements::{During, ExpectConfig, ExpectedVerdict, RequirementConfig, Statistic, TimeWindow};

@@ -2,7 +2,7 @@
 //!
 //! Jaw frame: origin at the incisal point, x anterior, y left, z up, upper jaw fixed; every motion
 //! is a displacement from the closed (intercuspal) pose. The
-//! trajectory checks the values. Defaults are figures of published studies; the generators name them.
+//! trajectory checks the ranges. Defaults are figures of published studies; the generators name them.
 
 use std::path::PathBuf;
 
@@ -59,22 +59,22 @@ section! {
     /// Chewing: a tear-drop loop of the incisal point, once a cycle.
     #[derive(Copy)]
     pub struct ChewingConfig {
-        /// Chewing cycles per second, Hz.
-        pub cycle_rate_hz: f64 = 1.43,
+        /// Chewing cycles per second.
+        pub cycle_rate_hz: f64 = 1.43 => UpTo(10.0),
         /// Shares of a cycle; together 1.
         pub phases: PhaseShares = PhaseShares::default(),
-        /// How far the incisal point goes down, mm.
-        pub vertical_mm: f64 = 18.0,
-        /// How far the incisal point swings to the working side, mm.
-        pub lateral_mm: f64 = 4.0,
-        /// How far the incisal point goes back while it goes down, mm.
-        pub anterior_posterior_mm: f64 = 5.0,
-        /// The working side.
+        /// Downward amplitude of the incisal point.
+        pub vertical_mm: f64 = 18.0 => Within(0.0, 60.0),
+        /// Amplitude towards the working side.
+        pub lateral_mm: f64 = 4.0 => Within(0.0, 15.0),
+        /// Backward movement on the way down.
+        pub anterior_posterior_mm: f64 = 5.0 => Within(-15.0, 40.0),
+        /// Working side, from the patient's view.
         pub side: JawSide = JawSide::Left,
-        /// Inclination of the condylar path below the horizontal, degrees.
-        pub condylar_inclination_deg: f64 = 40.0,
-        /// Inward turn of the balancing condyle's path, degrees.
-        pub bennett_angle_deg: f64 = 8.0,
+        /// Inclination of the condylar path below the horizontal.
+        pub condylar_inclination_deg: f64 = 40.0 => Within(0.0, 80.0),
+        /// Inward turn of the balancing condyle's path.
+        pub bennett_angle_deg: f64 = 8.0 => Within(0.0, 45.0),
     }
 }
 
@@ -83,11 +83,11 @@ section! {
     #[derive(Copy)]
     pub struct PhaseShares {
         /// Share of the cycle in which the jaw leaves the closed pose.
-        pub opening: f64 = 0.43,
+        pub opening: f64 = 0.43 => Positive,
         /// Share of the cycle in which it returns.
-        pub closing: f64 = 0.40,
+        pub closing: f64 = 0.40 => Positive,
         /// Share of the cycle in which it stays closed.
-        pub occlusion: f64 = 0.17,
+        pub occlusion: f64 = 0.17 => NotNegative,
     }
 }
 
@@ -95,14 +95,14 @@ section! {
     /// Symmetric opening: the condyles glide forward in proportion to the opening angle.
     #[derive(Copy)]
     pub struct OpeningConfig {
-        /// Distance of the incisal point from its closed place at the widest, mm.
-        pub amplitude_mm: f64 = 35.0,
-        /// Openings per second, Hz.
-        pub cycle_rate_hz: f64 = 0.5,
+        /// Largest distance of the incisal point from its closed position.
+        pub amplitude_mm: f64 = 35.0 => NotNegative "as far as the jaw opens",
+        /// Openings per second.
+        pub cycle_rate_hz: f64 = 0.5 => UpTo(10.0),
         /// Shares of a cycle; together 1.
         pub phases: PhaseShares = PhaseShares::default(),
-        /// Inclination of the condylar path below the horizontal, degrees.
-        pub condylar_inclination_deg: f64 = 40.0,
+        /// Inclination of the condylar path below the horizontal.
+        pub condylar_inclination_deg: f64 = 40.0 => Within(0.0, 80.0),
     }
 }
 
@@ -110,14 +110,14 @@ section! {
     /// Protrusion: the jaw glides along the condylar path without turning.
     #[derive(Copy)]
     pub struct ProtrusionConfig {
-        /// Length of the glide, mm.
-        pub amplitude_mm: f64 = 9.0,
-        /// Protrusions per second, Hz.
-        pub cycle_rate_hz: f64 = 0.5,
+        /// Length of the glide.
+        pub amplitude_mm: f64 = 9.0 => Within(0.0, 15.0),
+        /// Protrusions per second.
+        pub cycle_rate_hz: f64 = 0.5 => UpTo(10.0),
         /// Shares of a cycle; together 1.
         pub phases: PhaseShares = PhaseShares::default(),
-        /// Inclination of the condylar path below the horizontal, degrees.
-        pub condylar_inclination_deg: f64 = 40.0,
+        /// Inclination of the condylar path below the horizontal.
+        pub condylar_inclination_deg: f64 = 40.0 => Within(0.0, 80.0),
     }
 }
 
@@ -125,42 +125,44 @@ section! {
     /// Lateral excursion: the balancing condyle advances, the working condyle only shifts sideways.
     #[derive(Copy)]
     pub struct LateralConfig {
-        /// How far the incisal point goes to the side, mm.
-        pub amplitude_mm: f64 = 8.0,
-        /// The working side, to which the jaw goes.
+        /// Sideways amplitude of the incisal point.
+        pub amplitude_mm: f64 = 8.0 => NotNegative "as far as the jaw turns",
+        /// Working side: the jaw moves to it.
         pub side: JawSide = JawSide::Left,
-        /// Excursions per second, Hz.
-        pub cycle_rate_hz: f64 = 0.5,
+        /// Excursions per second.
+        pub cycle_rate_hz: f64 = 0.5 => UpTo(10.0),
         /// Shares of a cycle; together 1.
         pub phases: PhaseShares = PhaseShares::default(),
-        /// Inclination of the condylar path below the horizontal, degrees.
-        pub condylar_inclination_deg: f64 = 40.0,
-        /// Inward turn of the balancing condyle's path, degrees.
-        pub bennett_angle_deg: f64 = 8.0,
+        /// Inclination of the condylar path below the horizontal.
+        pub condylar_inclination_deg: f64 = 40.0 => Within(0.0, 80.0),
+        /// Inward turn of the balancing condyle's path.
+        pub bennett_angle_deg: f64 = 8.0 => Within(0.0, 45.0),
     }
 }
 
-/// A recorded motion of the lower jaw, as CSV.
-///
-/// The header decides the format: `time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz` (pose relative to the closed
-/// pose) or `time_s,m1_x_mm,…,m3_z_mm` (three markers, the first row closed).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FileConfig {
-    /// The CSV file.
-    pub path: PathBuf,
-    /// Which signed axis of the file points anterior, left and up; right-handed.
-    #[serde(default = "FileConfig::default_axes")]
-    pub axes: [String; 3],
-    /// Pose files: where the recorded reference point lies in the jaw frame at the closed pose, mm.
-    /// By default the middle between the condyles, about which trackers of the hinge axis report.
-    pub reference_point_mm: Option<[f64; 3]>,
-    /// Marker files: where the incisal point lies in file coordinates at the closed pose, mm.
-    /// By default the markers' centroid.
-    pub marker_origin_mm: Option<[f64; 3]>,
-    /// Corner of the zero-phase low-pass, Hz; 0 for none.
-    #[serde(default = "FileConfig::default_lowpass_hz")]
-    pub lowpass_hz: f64,
+keys! {
+    /// A recorded motion of the lower jaw, as CSV.
+    ///
+    /// The header decides the format: `time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz` (pose relative to the closed
+    /// pose) or `time_s,m1_x_mm,…,m3_z_mm` (three markers, the first row closed).
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct FileConfig {
+        /// The file, relative to the scenario's folder.
+        pub path: PathBuf => "UTF-8",
+        /// The file's axes that point anterior, left and up.
+        #[serde(default = "FileConfig::default_axes")]
+        pub axes: [String; 3] => "signed axes, right-handed",
+        /// Only for poses: their point of reference, in the jaw frame at the closed pose; by default the midpoint between
+        /// the condyles.
+        pub reference_point_mm: Option<[f64; 3]> => "finite",
+        /// Only for markers: the incisal point at the closed pose, in the file's coordinates; by default the markers'
+        /// centroid.
+        pub marker_origin_mm: Option<[f64; 3]> => "finite",
+        /// Cut-off frequency of the zero-phase low-pass filter; 0 for none.
+        #[serde(default = "FileConfig::default_lowpass_hz")]
+        pub lowpass_hz: f64 => "0, or 0.5 to 50",
+    }
 }
 
 impl FileConfig {

@@ -49,37 +49,39 @@ pub struct Unit {
     pub si: f64,
 }
 
+/// Radians in a degree.
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+
 /// Every unit. The first of a kind is its SI unit.
 pub const UNITS: [Unit; 30] = {
     use Dimension as D;
     const fn unit(name: &'static str, dimension: Dimension, si: f64) -> Unit {
         Unit { name, dimension, si }
     }
-    const DEGREE: f64 = std::f64::consts::PI / 180.0;
     [
-        unit("", D::One, 1.0),
-        unit("%", D::One, 0.01),
+        Unit::ONE,
+        Unit::PERCENT,
         unit("m", D::Length, 1.0),
-        unit("mm", D::Length, 1e-3),
-        unit("um", D::Length, 1e-6),
+        Unit::MM,
+        Unit::UM,
         unit("µm", D::Length, 1e-6),
         unit("nm", D::Length, 1e-9),
         unit("m/s", D::Velocity, 1.0),
-        unit("mm/s", D::Velocity, 1e-3),
+        Unit::MM_S,
         unit("um/s", D::Velocity, 1e-6),
         unit("m/s2", D::Acceleration, 1.0),
         unit("mm/s2", D::Acceleration, 1e-3),
-        unit("N", D::Force, 1.0),
+        Unit::N,
         unit("mN", D::Force, 1e-3),
         unit("kN", D::Force, 1e3),
-        unit("s", D::Time, 1.0),
-        unit("ms", D::Time, 1e-3),
-        unit("us", D::Time, 1e-6),
+        Unit::S,
+        Unit::MS,
+        Unit::US,
         unit("µs", D::Time, 1e-6),
         unit("ns", D::Time, 1e-9),
         unit("rad", D::Angle, 1.0),
         unit("mrad", D::Angle, 1e-3),
-        unit("deg", D::Angle, DEGREE),
+        Unit::DEG,
         unit("°", D::Angle, DEGREE),
         unit("rad/s", D::AngularVelocity, 1.0),
         unit("deg/s", D::AngularVelocity, DEGREE),
@@ -91,6 +93,27 @@ pub const UNITS: [Unit; 30] = {
 };
 
 impl Unit {
+    /// A number.
+    pub const ONE: Self = Self { name: "", dimension: Dimension::One, si: 1.0 };
+    /// A share in hundredths.
+    pub const PERCENT: Self = Self { name: "%", dimension: Dimension::One, si: 0.01 };
+    /// Millimetres.
+    pub const MM: Self = Self { name: "mm", dimension: Dimension::Length, si: 1e-3 };
+    /// Millimetres per second.
+    pub const MM_S: Self = Self { name: "mm/s", dimension: Dimension::Velocity, si: 1e-3 };
+    /// Micrometres.
+    pub const UM: Self = Self { name: "um", dimension: Dimension::Length, si: 1e-6 };
+    /// Newtons.
+    pub const N: Self = Self { name: "N", dimension: Dimension::Force, si: 1.0 };
+    /// Seconds.
+    pub const S: Self = Self { name: "s", dimension: Dimension::Time, si: 1.0 };
+    /// Milliseconds.
+    pub const MS: Self = Self { name: "ms", dimension: Dimension::Time, si: 1e-3 };
+    /// Microseconds.
+    pub const US: Self = Self { name: "us", dimension: Dimension::Time, si: 1e-6 };
+    /// Degrees.
+    pub const DEG: Self = Self { name: "deg", dimension: Dimension::Angle, si: DEGREE };
+
     /// The unit of that name.
     pub fn named(name: &str) -> Option<Self> {
         UNITS.into_iter().find(|unit| unit.name == name)
@@ -268,7 +291,7 @@ impl<'de> Deserialize<'de> for Quantity {
             }
 
             fn visit_f64<E: Error>(self, number: f64) -> Result<Quantity, E> {
-                let quantity = Quantity::new(number, Dimension::One.si_unit());
+                let quantity = Quantity::new(number, Unit::ONE);
                 if number.is_finite() { Ok(quantity) } else { Err(E::custom("use a finite number")) }
             }
 

@@ -51,49 +51,51 @@ pub enum Statistic {
     Percentile,
 }
 
-/// One requirement: bounds of a signal, a response, a condition that must never hold, a number of occurrences, or their
-/// order.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct RequirementConfig {
-    /// Its name in reports.
-    pub name: String,
-    /// Bounds: the signal.
-    pub signal: Option<String>,
-    /// Bounds: an expression of signals in SI units, instead of a signal.
-    pub expression: Option<String>,
-    /// Unit of the expression.
-    pub unit: Option<String>,
-    /// When it is judged; the whole run when absent.
-    pub during: Option<During>,
-    /// Bounds: what of the signal.
-    pub statistic: Statistic,
-    /// Bounds: the percentile, 0 to 100.
-    pub percentile: Option<f64>,
-    /// Bounds: the smallest allowed value.
-    pub min: Option<Quantity>,
-    /// Bounds: the largest allowed value.
-    pub max: Option<Quantity>,
-    /// Response: the trigger.
-    pub when: Option<String>,
-    /// Response: the condition that must follow.
-    pub then: Option<String>,
-    /// Response: not before so long after the trigger.
-    pub delay: Option<Quantity>,
-    /// Response: at the latest so long after the trigger.
-    pub within: Option<Quantity>,
-    /// Response: holds for so long.
-    pub stays_for: Option<Quantity>,
-    /// The condition that must never hold.
-    pub never: Option<String>,
-    /// Count: the occurrence.
-    pub event: Option<String>,
-    /// Count: the smallest allowed number.
-    pub at_least: Option<u64>,
-    /// Count: the largest allowed number.
-    pub at_most: Option<u64>,
-    /// Occurrences whose first ones must come in this order.
-    pub order: Vec<String>,
+keys! {
+    /// One requirement: bounds of a signal, a response, a condition that must never hold, a number of occurrences, or their
+    /// order.
+    #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields, default)]
+    pub struct RequirementConfig {
+        /// Name in reports.
+        pub name: String => "1 to 120 characters, required",
+        /// Bounds: the signal.
+        pub signal: Option<String> => "a line of `masseter signals`",
+        /// Bounds: an expression of signals in SI units, instead of `signal`.
+        pub expression: Option<String>,
+        /// Unit of the expression.
+        pub unit: Option<String> => "with `expression`",
+        /// When it is judged; by default the whole run.
+        pub during: Option<During> => "a state, a condition, or a table",
+        /// Bounds: what of the signal.
+        pub statistic: Statistic,
+        /// Bounds: the percentile, 0 to 100.
+        pub percentile: Option<f64> => Within(0.0, 100.0) "with `statistic = \"percentile\"`",
+        /// Bounds: smallest allowed value.
+        pub min: Option<Quantity> => "with its unit, such as `\"0.5 mm\"`",
+        /// Bounds: largest allowed value.
+        pub max: Option<Quantity> => "with its unit",
+        /// Response: the trigger.
+        pub when: Option<String> => "a condition or an occurrence",
+        /// Response: what must follow.
+        pub then: Option<String> => "a condition",
+        /// Response: not before so long after the trigger.
+        pub delay: Option<Quantity> => "a time, such as `\"5 ms\"`",
+        /// Response: at the latest so long after the trigger.
+        pub within: Option<Quantity> => "a time",
+        /// Response: holds for so long.
+        pub stays_for: Option<Quantity> => "a time",
+        /// The condition that must never hold.
+        pub never: Option<String> => "a condition or an occurrence",
+        /// Count: the occurrence.
+        pub event: Option<String> => "an occurrence",
+        /// Count: smallest allowed number.
+        pub at_least: Option<u64>,
+        /// Count: largest allowed number.
+        pub at_most: Option<u64>,
+        /// Occurrences whose first ones come in this order.
+        pub order: Vec<String> => "occurrences",
+    }
 }
 
 impl RequirementConfig {
@@ -153,12 +155,12 @@ impl ExpectedVerdict {
 section! {
     /// The expected outcome. The run passes if the outcome is this one.
     pub struct ExpectConfig {
-        /// The outcome without this table; any when absent.
+        /// Outcome that makes the run pass.
         pub verdict: Option<ExpectedVerdict> = None,
-        /// The exit code without this table; any when absent.
-        pub exit_code: Option<u8> = None,
+        /// Exit code that makes the run pass: that which the run would have without this table.
+        pub exit_code: Option<u8> = None => "0, 1, 4, 5, 6, 130; that of `verdict`, if both are given",
         /// Occurrences that the run must have.
-        pub events: Vec<String> = Vec::new(),
+        pub events: Vec<String> = Vec::new() => "occurrences",
     }
 }
 

@@ -6,9 +6,11 @@ use std::path::{Path, PathBuf};
 use masseter_model::geometry::{AXES, AXIS_NAMES, MechanismConfig};
 use toml::Table;
 
-use super::document::{Document, UNKNOWN_KEY, in_words, malformed};
+use super::document::{Document, malformed};
 use super::drive_profile::over_kinds;
-use super::error::{Checked, LONGEST_S, ScenarioError, read_limited, require, require_each, require_within};
+use super::error::{
+    Checked, LONGEST_S, ScenarioError, ranges_of, read_limited, require, require_each, require_range,
+};
 use super::jaw::over_food;
 use super::merge::{merge, robot_tables};
 use super::when::{EntryNames, refuse_circles};
@@ -19,6 +21,7 @@ use super::{
     StimulusConfig, TeethConfig, ToothConfig, TrajectoryLimitsConfig, dynamics,
 };
 use crate::input::{excerpt, read_text};
+use crate::wording::nearest;
 
 /// Size of the largest scenario file, bytes.
 const MOST_BYTES: u64 = 1 << 20;
@@ -38,18 +41,18 @@ pub const RATES_HZ: std::ops::RangeInclusive<u32> = 10..=20_000;
 section! {
     /// The whole configuration of a run.
     pub struct Scenario {
-        /// Name of the run, with which the name of its folder ends.
-        pub name: String = "chewing".to_owned(),
+        /// Name of the run; the name of its folder ends with it.
+        pub name: String = "chewing".to_owned() => "1 to 64 letters, digits, `-`, `_`",
         /// The file of the robot, whose tables this scenario changes; the built-in defaults when absent.
         #[serde(skip_serializing)]
         pub robot: Option<PathBuf> = None,
-        /// Seed of every random number.
+        /// Seed of every random number: encoder noise, frames that a fault acts on.
         pub seed: u64 = 1,
-        /// Cycles per second, Hz.
-        pub rate_hz: u32 = 1000,
-        /// Duration of the motion, s; when absent a recording's own length, or ten seconds. A generated motion ends
-        /// closed if this holds a cycle and half a second, otherwise on its way.
-        pub duration_s: Option<f64> = None,
+        /// Cycles per second.
+        pub rate_hz: u32 = 1000 => Within(*RATES_HZ.start() as f64, *RATES_HZ.end() as f64),
+        /// Duration of the motion; by default that of a recorded motion, otherwise ten seconds. A generated motion ends
+        /// in the closed pose if the duration has room for a cycle and half a second, otherwise within a cycle.
+        pub duration_s: Option<f64> = None => Within(SHORTEST_MOTION_S, LONGEST_S),
         /// The motion of the jaw.
         pub motion: MotionConfig = MotionConfig::default(),
         /// The place of the jaw on the platform.
@@ -261,7 +264,7 @@ impl Scenario {
     pub fn with(&self, assignment: &str) -> Result<Self, ScenarioError> {
         let refused = |reason| ScenarioError::Malformed { place: excerpt(assignment), reason };
         let (key, value) = assignment.split_once('=').ok_or_else(|| refused("write KEY=VALUE".to_owned()))?;
-        if !key.contains('.') && refusal_of(key.trim()).is_some() {
+        if !key.contains('.') && !Self::is_key(key.trim()) {
             return self.with(&format!("parameters.{assignment}"));
         }
         let as_toml = toml::from_str::<Table>(&format!("{key} = {value}"));
@@ -299,8 +302,13 @@ impl Scenario {
     /// assert_eq!(Scenario::question_for("rate_hz"), None);
     /// ```
     pub fn question_for(name: &str) -> Option<String> {
-        let refusal = refusal_of(name)?;
-        refusal.rsplit_once("; ").map(|(_, question)| question.to_owned())
+        let names = Self::KEYS.iter().map(|key| key.name);
+        let likely = nearest(name, names).filter(|_| !Self::is_key(name))?;
+        Some(format!("did you mean '{likely}'?"))
+    }
+
+    fn is_key(name: &str) -> bool {
+        Self::KEYS.iter().any(|key| key.name == name)
     }
 
     /// The scenario with every default filled in, as TOML.
@@ -318,16 +326,16 @@ impl Scenario {
         self.can.validate()?;
         self.drives.validate()?;
         DriveProfile::validate_all(&self.drive_profile)?;
-        dynamics::validate(&self.dynamics)?;
+        dynamics::validate("dynamics", &self.dynamics)?;
         self.teeth.as_ref().map_or(Ok(()), TeethConfig::validate)?;
         self.validate_entries()?;
         self.food.as_ref().map_or(Ok(()), |food| food.validate(&self.arch()))?;
-        self.limits.validate()?;
-        self.dry.validate()?;
+        self.limits.check_ranges(ranges_of("limits"))?;
+        self.dry.check_ranges(ranges_of("dry"))?;
         self.controller.validate(self.rate_hz)?;
         self.require_torque_offsets()?;
         self.validate_forces()?;
-        self.checks.validate()
+        self.checks.check_ranges(ranges_of("checks"))
     }
 
     fn validate_run(&self) -> Checked {
@@ -335,10 +343,7 @@ impl Scenario {
         let is_name = (1..=64).contains(&self.name.len()) && self.name.bytes().all(is_good);
         let name = format!("'{}'", self.name);
         require(is_name, "name", &name, "use 1 to 64 letters, digits, '-' or '_'")?;
-        let need = format!("use {} to {} Hz", RATES_HZ.start(), RATES_HZ.end());
-        require(RATES_HZ.contains(&self.rate_hz), "rate_hz", &self.rate_hz, need)?;
-        let duration_s = self.duration_s.unwrap_or(LONGEST_S);
-        require_within(&[("duration_s", duration_s, SHORTEST_MOTION_S, LONGEST_S)])
+        self.check_ranges(require_range)
     }
 
     /// Faults, stimuli and their order by `after`, then requirements and the expected outcome.
@@ -357,9 +362,9 @@ impl Scenario {
     /// Load cell, estimate and control of the bite force.
     fn validate_forces(&self) -> Checked {
         let estimate = self.force_estimate.unwrap_or_default();
-        estimate.validate()?;
+        estimate.check_ranges(ranges_of("force_estimate"))?;
         if let Some(cell) = &self.load_cell {
-            cell.validate()?;
+            cell.check_ranges(ranges_of("load_cell"))?;
             let need = "leave the table away with can.interfaces: the rig reads no load cell there";
             require(self.can.is_virtual(), "load_cell", &"given", need)?;
         }
@@ -474,13 +479,6 @@ fn pointer<const N: usize>(keys: [&str; N]) -> String {
 
 fn table_of(text: &str) -> Table {
     toml::from_str(text).expect("the text is that of a scenario")
-}
-
-/// The message on a key that is none of a scenario.
-fn refusal_of(key: &str) -> Option<String> {
-    let refused = toml::from_str::<Scenario>(&format!("{key} = 0")).err()?;
-    let message = in_words(refused.message());
-    message.starts_with(UNKNOWN_KEY).then_some(message)
 }
 
 fn place_of_refusal(path: &Path, refusal: &str, key: &str, entry: Option<usize>) -> Option<String> {

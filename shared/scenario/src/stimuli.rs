@@ -5,7 +5,9 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::error::{Checked, ScenarioError, require, require_name, require_within};
+use masseter_model::section::Range;
+
+use super::error::{Checked, LONGEST_S, ScenarioError, ranges_of, require, require_name, require_range};
 use super::jaw::{FoodConfig, ToothConfig, over_food};
 use super::quantity::{Dimension, Quantity};
 use super::when::{EntryNames, When, WhenKeys};
@@ -46,44 +48,46 @@ impl Shape {
     }
 }
 
-/// One stimulus. Exactly one of a push, `food`, `payload`, `parameter` and `stop` says what happens. A push is `push_n`,
-/// `torque_n_m` or both; or `push_table`.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct StimulusConfig {
-    /// Its name in requirements and in `after`; that of what happens when absent.
-    pub name: Option<String>,
-    /// From when on, s since the motion began, or since `after`.
-    pub at_s: f64,
-    /// What `at_s` counts from: `fault.NAME`, `stimulus.NAME` or `controller.STATE`.
-    pub after: Option<String>,
-    /// For how long, s; to the end when absent.
-    pub for_s: Option<f64>,
-    /// The course in this time.
-    #[serde(default)]
-    pub shape: Shape,
-    /// Frequency of a sine, Hz.
-    pub frequency_hz: Option<f64>,
-    /// A force on the jaw, in base axes, N.
-    pub push_n: Option<[f64; 3]>,
-    /// A torque on the jaw, in base axes, N m.
-    pub torque_n_m: Option<[f64; 3]>,
-    /// A CSV file with the force and the torque over time.
-    pub push_table: Option<PathBuf>,
-    /// Where the force acts, in the platform frame, m; the incisal point when absent.
-    pub point_m: Option<[f64; 3]>,
-    /// Another food from then on.
-    #[serde(default, deserialize_with = "over_food")]
-    pub food: Option<FoodConfig>,
-    /// A mass that the platform carries at the incisal point.
-    pub payload: Option<Quantity>,
-    /// The name of a parameter of the controller, which gets `value`.
-    pub parameter: Option<String>,
-    /// The parameter's value.
-    pub value: Option<f64>,
-    /// The operator asks for an orderly stop, as by Ctrl-C.
-    #[serde(default)]
-    pub stop: bool,
+keys! {
+    /// One stimulus. Exactly one of a push, `food`, `payload`, `parameter` and `stop` says what happens. A push is `push_n`,
+    /// `torque_n_m` or both; or `push_table`.
+    #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct StimulusConfig {
+        /// Name in requirements and in `after`; by default `push`, `food`, `payload`, `parameter` or `stop`.
+        pub name: Option<String> => "1 to 64 lower-case letters, digits, `_`",
+        /// Beginning, since the motion began or since `after`.
+        pub at_s: f64 => NotNegative,
+        /// What `at_s` counts from.
+        pub after: Option<String> => "`fault.NAME`, `stimulus.NAME`, `controller.STATE`; no circle",
+        /// How long; by default to the end of the run, or of the table.
+        pub for_s: Option<f64> => UpTo(LONGEST_S) "not of `parameter`, `stop`",
+        /// Course of a push.
+        #[serde(default)]
+        pub shape: Shape => "not of `push_table`",
+        /// Frequency of a sine.
+        pub frequency_hz: Option<f64> => Within(0.01, 1000.0) "of a `sine`",
+        /// Force on the jaw, in base axes.
+        pub push_n: Option<[f64; 3]> => Within(-2000.0, 2000.0),
+        /// Torque on the jaw, in base axes.
+        pub torque_n_m: Option<[f64; 3]> => Within(-200.0, 200.0),
+        /// File with the force, or force and torque, over time; relative to the scenario's folder.
+        pub push_table: Option<PathBuf> => "UTF-8",
+        /// Where the force acts, in the platform frame; by default the incisal point.
+        pub point_m: Option<[f64; 3]> => Within(-0.5, 0.5) "of a force",
+        /// Another food from then on.
+        #[serde(default, deserialize_with = "over_food")]
+        pub food: Option<FoodConfig> => "the keys of `[food]`",
+        /// Mass that the platform carries at the incisal point.
+        pub payload: Option<Quantity> => "0 to 20 kg, such as `\"0.2 kg\"`",
+        /// The name of a parameter of the controller, which gets `value`.
+        pub parameter: Option<String> => "a parameter of the controller",
+        /// The parameter's value.
+        pub value: Option<f64> => "the parameter's range; required of `parameter`",
+        /// The operator asks for an orderly stop, as by Ctrl-C.
+        #[serde(default)]
+        pub stop: bool,
+    }
 }
 
 /// What happens, as `push`.
@@ -131,10 +135,9 @@ impl StimulusConfig {
     /// # Errors
     /// Where that names nothing of the scenario.
     pub fn when(&self, entries: &EntryNames<'_>) -> Result<When, ScenarioError> {
-        let names =
-            ["stimulus.at_s", "stimulus.after", "stimulus.for_s", "stimulus.from_s", "stimulus.until_s"];
         let (at_s, after) = (Some(self.at_s), self.after.as_deref());
-        WhenKeys { names, at_s, after, for_s: self.for_s, from_s: None, until_s: None }.resolve(entries)
+        let keys = WhenKeys { at_s, after, for_s: self.for_s, from_s: None, until_s: None };
+        keys.resolve(entries).map_err(|refusal| refusal.in_table("stimulus"))
     }
 
     pub(super) fn validate(&self, entries: &EntryNames<'_>, arch: &[ToothConfig]) -> Checked {
@@ -167,20 +170,11 @@ impl StimulusConfig {
     }
 
     fn require_ranges(&self) -> Checked {
-        for (key, vector, most) in [
-            ("stimulus.push_n", self.push_n, 2000.0),
-            ("stimulus.torque_n_m", self.torque_n_m, 200.0),
-            ("stimulus.point_m", self.point_m, 0.5),
-        ] {
-            require_within(&vector.unwrap_or_default().map(|part| (key, part, -most, most)))?;
-        }
-        if let Some(frequency_hz) = self.frequency_hz {
-            require_within(&[("stimulus.frequency_hz", frequency_hz, 0.01, 1000.0)])?;
-        }
+        self.check_ranges(ranges_of("stimulus"))?;
         if let Some(payload) = self.payload {
             let kg = payload.si_of(Dimension::Mass);
             let kg = kg.map_err(|need| ScenarioError::bad("stimulus.payload", &payload, need))?;
-            require_within(&[("stimulus.payload", kg, 0.0, 20.0)])?;
+            require_range("stimulus.payload", Range::Within(0.0, 20.0), kg)?;
         }
         let is_number = self.value.is_none_or(f64::is_finite);
         require(is_number, "stimulus.value", &"not finite", "use a finite number")

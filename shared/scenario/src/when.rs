@@ -7,11 +7,11 @@ use std::collections::BTreeMap;
 use std::iter::successors;
 
 use super::control::ControllerState;
-use super::error::{Checked, ScenarioError, require, require_duration, require_not_negative};
+use super::error::{Checked, ScenarioError, require};
 use crate::wording::question;
 
 /// What the time of a fault or a stimulus counts from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Start {
     /// The rig is switched on.
     SwitchOn,
@@ -64,7 +64,7 @@ impl<'a> EntryNames<'a> {
 }
 
 /// When something acts.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct When {
     /// What the time counts from.
     pub start: Start,
@@ -76,8 +76,6 @@ pub struct When {
 
 /// The keys of an entry that say when, as given.
 pub(super) struct WhenKeys<'a> {
-    /// The keys' names in messages.
-    pub(super) names: [&'static str; 5],
     pub(super) at_s: Option<f64>,
     pub(super) after: Option<&'a str>,
     pub(super) for_s: Option<f64>,
@@ -86,38 +84,34 @@ pub(super) struct WhenKeys<'a> {
 }
 
 impl WhenKeys<'_> {
-    /// Resolves the keys.
+    /// Resolves the keys, whose ranges stand beside them. A refusal has the name of the key alone.
     pub(super) fn resolve(&self, entries: &EntryNames<'_>) -> Result<When, ScenarioError> {
-        let [at, after, for_s, from, until] = self.names;
-        let duration_s = self.for_s.map(|given_s| (for_s, given_s));
         match (self.at_s, self.from_s) {
-            (None, None) => Err(ScenarioError::bad(at, &"none", "say when: at_s, in seconds of the motion")),
+            (None, None) => {
+                Err(ScenarioError::bad("at_s", &"none", "say when: at_s, in seconds of the motion"))
+            }
             (Some(_), Some(_)) => {
                 let need = "give at_s (seconds of the motion) or from_s (since switch-on), not both";
-                Err(ScenarioError::bad(from, &"given", need))
+                Err(ScenarioError::bad("from_s", &"given", need))
             }
             (Some(at_s), None) => {
-                require_not_negative(at, at_s)?;
-                require_duration(duration_s.as_slice())?;
                 let need = "give for_s with at_s; until_s goes with from_s";
-                require(self.until_s.is_none(), until, &"given", need)?;
+                require(self.until_s.is_none(), "until_s", &"given", need)?;
                 let refused =
-                    |name: &str, need: String| ScenarioError::bad(after, &format!("'{name}'"), need);
+                    |name: &str, need: String| ScenarioError::bad("after", &format!("'{name}'"), need);
                 let named = self.after.map(|name| entries.start(name).map_err(|need| refused(name, need)));
                 let start = named.unwrap_or(Ok(Start::State(ControllerState::Running)))?;
                 Ok(When { start, begin_s: at_s, for_s: self.for_s })
             }
             (None, Some(from_s)) => {
-                require_not_negative(from, from_s)?;
-                require_duration(duration_s.as_slice())?;
                 let need = "give it with at_s, which then counts from there";
-                require(self.after.is_none(), after, &"given", need)?;
+                require(self.after.is_none(), "after", &"given", need)?;
                 let is_one = self.for_s.is_none() || self.until_s.is_none();
-                require(is_one, for_s, &"given", "give for_s or until_s, not both")?;
+                require(is_one, "for_s", &"given", "give for_s or until_s, not both")?;
                 let left_s = self.until_s.map(|until_s| until_s - from_s);
                 let is_left = left_s.is_none_or(|left_s| left_s.is_finite() && left_s > 0.0);
                 let until_s = self.until_s.unwrap_or_default();
-                require(is_left, until, &until_s, "use a finite number above from_s")?;
+                require(is_left, "until_s", &until_s, "use a finite number above from_s")?;
                 Ok(When { start: Start::SwitchOn, begin_s: from_s, for_s: self.for_s.or(left_s) })
             }
         }

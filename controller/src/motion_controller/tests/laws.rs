@@ -134,3 +134,10 @@ fn a_law_that_drifts_away_is_stopped_by_the_tracking_limit() {
         bench.last_cause()
     );
 }
+
+#[test]
+fn a_controller_is_branched_with_its_law_and_refused_with_a_law_that_has_no_branch() {
+    let refusal = bench(|demand| Ok(demand.ahead)).controller.branch().err().unwrap();
+    assert!(refusal.0.ends_with("::Law"), "{refusal}");
+    assert!(Bench::new().controller.branch().is_ok());
+}

@@ -1,5 +1,8 @@
 //! Injected faults of encoders, drives, mechanism and commands: each strikes, does what its name says, and ends.
 
+mod injected_times;
+mod mechanism;
+
 use masseter_can::canopen::EmergencyCode;
 use masseter_model::geometry::AXIS_NAMES;
 use masseter_scenario::{
@@ -322,83 +325,6 @@ fn a_storm_sends_an_emergency_every_so_often() {
     });
     assert_eq!(sent.count(), 25);
 }
-
-#[test]
-fn a_jam_stops_the_axis_at_once_and_holds_it() {
-    let mut bench = bench_with(FaultConfig { for_s: Some(0.2), ..on_l2(AxisFault::Jam, None) });
-    play_until(&mut bench, 0.505);
-    let stuck_m = bench.truth.joint_m[L2];
-    assert!(bench.truth.joint_m_s[L2].abs() < 1e-3, "{}", bench.truth.joint_m_s[L2]);
-    for _ in 0..100 {
-        bench.cycle(Some(&|_| ([0.0; AXES], DriveRequest::Off)));
-        assert!((bench.truth.joint_m[L2] - stuck_m).abs() < 2e-4);
-    }
-}
-
-#[test]
-fn dry_guides_take_more_force_for_the_same_motion() {
-    let force_n = |factor: &str| {
-        let mut bench = bench_with(fault(AxisFault::Friction, Some(factor), 0));
-        // About where the slide moves fastest.
-        play_until(&mut bench, 0.69);
-        assert_eq!(first_failure(&bench), None);
-        bench.truth.force_n[0].abs()
-    };
-    let (usual_n, more_n) = (force_n("1"), force_n("3"));
-    // Twice 5 N more, the screw, and some viscous friction.
-    assert!((12.0..25.0).contains(&(more_n - usual_n)), "{usual_n} N became {more_n} N");
-}
-
-#[test]
-fn with_play_the_platform_drops_by_half_of_it_and_the_encoder_does_not_see_that() {
-    let mut bench = bench_with(on_l2(AxisFault::Play, Some("0.4 mm")));
-    hold_until(&mut bench, 0.49);
-    let (seen_m, is_m) = (bench.reading.position_m[L2], bench.truth.joint_m[L2]);
-    hold_until(&mut bench, 0.8);
-    assert_eq!(first_failure(&bench), None);
-    assert!((bench.reading.position_m[L2] - seen_m).abs() < 2e-5);
-    assert!((is_m - bench.truth.joint_m[L2] - 2e-4).abs() < 2e-5, "{}", is_m - bench.truth.joint_m[L2]);
-}
-
-#[test]
-fn a_broken_rod_drops_the_leg_while_its_drive_stands() {
-    let mut bench = bench_with(on_l2(AxisFault::BrokenRod, None));
-    hold_until(&mut bench, 0.49);
-    let (seen_m, is_m) = (bench.reading.position_m[L2], bench.truth.joint_m[L2]);
-    hold_until(&mut bench, 1.0);
-    assert!((bench.reading.position_m[L2] - seen_m).abs() < 1e-4);
-    assert!(is_m - bench.truth.joint_m[L2] > 0.005, "{}", is_m - bench.truth.joint_m[L2]);
-}
-
-#[test]
-fn an_axis_that_falls_on_its_end_stop_is_an_event() {
-    let mut scenario = Scenario { faults: vec![on_l2(AxisFault::BrokenRod, None)], ..Scenario::default() };
-    scenario.mechanism.strokes.leg_m = [0.288, 0.3];
-    scenario.dynamics.axes.stop_beyond_m = 0.0;
-    let mut bench = Bench::new(&scenario);
-    bench.enable();
-    bench.controller_state = ControllerState::Running;
-    hold_until(&mut bench, 1.5);
-    let hits = bench.events.iter().filter(|event| event.cause == Cause::EndStopHit.code());
-    let hit = hits.clone().next().expect("the leg falls on its stop");
-    assert_eq!((hit.axis, hit.source), (L2 as u32, Source::Scenario.code()));
-    let speeds: Vec<_> = hits.map(|hit| hit.value).collect();
-    assert!(hit.value < 0.0 && speeds.len() <= 3, "the leg rests after a bounce: {speeds:?}");
-    assert!((bench.truth.joint_m[L2] - 0.288).abs() < 1e-4, "{}", bench.truth.joint_m[L2]);
-}
-
-#[test]
-fn a_hard_stop_ends_the_axis_way() {
-    let mut sound = Bench::new(&Scenario::default());
-    play_until(&mut sound, 0.501);
-    let from_m = sound.truth.joint_m[L2];
-    let mut bench = bench_with(on_l2(AxisFault::EndStop, Some("0.5 mm")));
-    play_until(&mut bench, 0.8);
-    assert_eq!(first_failure(&bench), Some((Cause::FollowingError, 4)));
-    let way_m = (bench.truth.joint_m[L2] - from_m).abs();
-    assert!((0.3e-3..0.75e-3).contains(&way_m), "{way_m}");
-}
-
 /// The master judges a bad command as it judges that of any controller.
 #[test]
 fn a_bad_command_stops_the_rig_by_the_path_that_refuses_it() {
@@ -421,103 +347,4 @@ fn a_foreign_command_shows_in_the_readings() {
     let mut bench = bench_with(on_l2(CommandFault::Foreign, None));
     hold_until(&mut bench, 0.55);
     assert!(bench.reading.answers_cycle > bench.cycle);
-}
-
-mod injected_times {
-    //! When injected faults act: since switch-on, since the motion began, and since each other.
-
-    use masseter_scenario::{
-        AxisFault, BusFault, CommandFault, DriveFault, EncoderFault, FaultConfig, FaultKindConfig as Kind,
-    };
-
-    use crate::core::tests::*;
-
-    fn named(name: &str, fault: FaultConfig) -> FaultConfig {
-        FaultConfig { name: Some(name.to_owned()), ..fault }
-    }
-
-    fn on_l1(kind: impl Into<Kind>) -> FaultConfig {
-        FaultConfig { axis: Some("l1".to_owned()), ..FaultConfig::new(kind) }
-    }
-
-    fn bench_with(faults: Vec<FaultConfig>) -> Bench {
-        let scenario = Scenario { faults, ..Scenario::default() };
-        scenario.validate().unwrap();
-        Bench::new(&scenario)
-    }
-
-    /// Enables the drives, begins the motion and holds for so many cycles; returns when the motion began, ns.
-    fn run(bench: &mut Bench, cycles: u64) -> u64 {
-        bench.enable();
-        bench.controller_state = ControllerState::Running;
-        let held_m = bench.reading.position_m;
-        bench.cycle(Some(&|_| (held_m, DriveRequest::Enable)));
-        let began_ns = bench.reading.sampled_ns;
-        (1..cycles).for_each(|_| bench.cycle(Some(&|_| (held_m, DriveRequest::Enable))));
-        began_ns
-    }
-
-    fn times_ns(bench: &Bench, cause: Cause) -> Vec<(f64, u64)> {
-        let told = bench.events.iter().filter(|event| event.cause == cause.code());
-        told.map(|event| (event.value, event.time_ns)).collect()
-    }
-
-    #[test]
-    fn a_fault_of_a_bus_acts_in_the_time_of_the_motion() {
-        let lose = FaultConfig {
-            bus: Some(1),
-            node: Some(4),
-            id: Some(0x204),
-            at_s: Some(0.05),
-            for_s: Some(0.003),
-            ..FaultConfig::new(BusFault::Lose)
-        };
-        let mut bench = bench_with(vec![lose]);
-        let began_ns = run(&mut bench, 100);
-        let [(1.0, struck_ns)] = times_ns(&bench, Cause::FaultInjected)[..] else { panic!() };
-        assert!((50_000_000..51_500_000).contains(&(struck_ns - began_ns)), "{}", struck_ns - began_ns);
-        let ended = bench.events.iter().find(|event| event.cause == Cause::FaultEnded.code()).unwrap();
-        assert_eq!((ended.source, ended.limit), (Source::Wire.code(), 3.0), "three process data were lost");
-    }
-
-    #[test]
-    fn faults_follow_each_other_over_every_layer() {
-        let after = |name: &str, at_s: f64, fault: FaultConfig| FaultConfig {
-            after: Some(name.to_owned()),
-            at_s: Some(at_s),
-            ..fault
-        };
-        let lose =
-            FaultConfig { bus: Some(1), node: Some(4), count: Some(1), ..FaultConfig::new(BusFault::Lose) };
-        let size = Some("1 um".parse().unwrap());
-        let mut bench = bench_with(vec![
-            named("third", after("fault.second", 0.02, FaultConfig { size, ..on_l1(EncoderFault::Offset) })),
-            named("first", FaultConfig { at_s: Some(0.03), ..on_l1(EncoderFault::Stuck) }),
-            named("second", after("fault.first", 0.01, lose)),
-            named("fourth", after("fault.third", 0.005, FaultConfig::new(CommandFault::Foreign))),
-        ]);
-        let began_ns = run(&mut bench, 100);
-        let struck = times_ns(&bench, Cause::FaultInjected);
-        let order: Vec<_> = struck.iter().map(|(number, _)| *number).collect();
-        assert_eq!(order, [2.0, 3.0, 1.0, 4.0]);
-        let after_ms = |index: usize, from_ns: u64| (struck[index].1 - from_ns) as f64 * 1e-6;
-        assert!((30.0..30.2).contains(&after_ms(0, began_ns)), "{struck:?}");
-        assert!((10.0..11.1).contains(&after_ms(1, struck[0].1)), "the next frame to that node: {struck:?}");
-        assert!((20.0..20.2).contains(&after_ms(2, struck[1].1)), "{struck:?}");
-        assert!((5.0..6.6).contains(&after_ms(3, struck[2].1)), "the next command: {struck:?}");
-    }
-
-    #[test]
-    fn a_fault_of_a_state_that_never_comes_never_acts() {
-        let mut bench = bench_with(vec![
-            FaultConfig { at_s: Some(0.0), ..on_l1(DriveFault::Fault) },
-            FaultConfig { at_s: Some(0.5), ..on_l1(AxisFault::Jam) },
-        ]);
-        bench.enable();
-        (0..100).for_each(|_| bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable))));
-        assert!(times_ns(&bench, Cause::FaultInjected).is_empty());
-        run(&mut bench, 100);
-        let struck = times_ns(&bench, Cause::FaultInjected);
-        assert_eq!(struck.iter().map(|(number, _)| *number).collect::<Vec<_>>(), [1.0]);
-    }
 }

@@ -150,9 +150,9 @@ fn what_is_no_command_is_refused_whatever_it_asks_for() {
             [f64::NEG_INFINITY, 0.0],
         ),
     ];
-    for (change, subject, explanation) in cases {
+    for (change, subject, [value, limit]) in cases {
         let refused = Bench::new().send(change).unwrap_err();
-        assert_eq!(refused, (subject, Failure::with(Cause::BadMessage, explanation)));
+        assert_eq!(refused, (subject, Failure::with(Cause::BadMessage, value, limit)));
     }
     let nan = Bench::new().send(|command| command.target_m[0] = f64::NAN).unwrap_err();
     assert_eq!((nan.0, nan.1.cause), (Subject::Axis(0), Cause::BadMessage));

@@ -91,9 +91,10 @@ pub(crate) fn find(address: ObjectAddress) -> Result<usize, AbortCode> {
 }
 
 /// The values of a drive's object dictionary.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Objects {
     /// One word for each of [`ENTRIES`], whatever its access.
+    #[serde(with = "crate::state::as_list")]
     pub(crate) words: [u32; COUNT],
 }
 

@@ -43,7 +43,7 @@ pub(crate) struct DriveSettings {
 }
 
 /// What a drive can do, and the gains of its loops.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(crate) struct Ratings {
     /// Force at 1000 ‰ of the torque objects (6077h), N.
     pub(crate) rated_force_n: f64,
@@ -97,7 +97,7 @@ pub(crate) struct NodeQuirks {
 }
 
 /// What the axis does otherwise.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct AxisQuirks {
     /// Whether the position at home is the home offset instead of its negative.
     pub(crate) is_offset_inverted: bool,

@@ -22,6 +22,7 @@ use crate::simulator::drive::dictionary::{Objects, Overlay, find};
 use crate::simulator::drive::names;
 use crate::simulator::drive::table::{self, PDOS, RPM_PER_S};
 use crate::simulator::drive::{AxisQuirks, DriveMemory, DriveSettings, NodeQuirks, Quirks, Ratings};
+use crate::state::state;
 
 /// The settings of a scenario's drives, in the order of the axes.
 ///
@@ -195,6 +196,11 @@ pub(super) struct MemoryFile {
     /// Whether the file does not have the present values.
     is_stale: bool,
 }
+
+state!(MemoryFile {
+    values: drives is_stale;
+    constant: path;
+});
 
 impl MemoryFile {
     /// Reads a file; one that does not exist is that of drives that have stored nothing.

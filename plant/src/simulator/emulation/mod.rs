@@ -33,6 +33,7 @@ use crate::simulator::injection::encoder_faults::EncoderFaults;
 use crate::simulator::mechanism::contact::Occlusion;
 use crate::simulator::mechanism::contact::food::{Food, FoodBreak};
 use crate::simulator::mechanism::dynamics::{Dynamics, MechanismState, closed_mouth, level};
+use crate::state::state;
 use drives::{MemoryFile, drive_settings};
 
 pub use emulator::{Emulator, EmulatorCounters};
@@ -86,8 +87,15 @@ pub struct Emulation {
     memory: Option<MemoryFile>,
 }
 
+state!(Emulation {
+    values: next_step_ns moved_to_ns force_n bite_force_n sample synchronised encoder_faults mishaps
+        contact;
+    parts: drives dynamics load_cell agenda memory;
+    constant: step_ns food;
+});
+
 /// State of the mechanism at a SYNC. The truth is computed from it later, once the reading is on its way.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Sample {
     time_ns: u64,
     state: MechanismState,
@@ -398,6 +406,11 @@ struct LoadCell {
     passed_n: f64,
     random: Pcg64Mcg,
 }
+
+state!(LoadCell {
+    values: passed_n random;
+    constant: config;
+});
 
 impl LoadCell {
     /// Without load so far.

@@ -16,6 +16,7 @@ use crate::master::link::{
     Buses, DrivePort, Link, MASTER_PORT, Mishap, Occurrence, drive_ports, fault_seed, faults_of_bus,
     node_ids, restart_after_ns,
 };
+use crate::state::state;
 
 /// Frames that a port can hold for sending, and for receiving between two looks; a millisecond holds 21.
 const TRANSMIT_CAPACITY: usize = 64;
@@ -28,6 +29,12 @@ pub struct VirtualLink {
     ports: [DrivePort; AXES],
     pub(crate) emulation: Emulation,
 }
+
+state!(VirtualLink {
+    values: wires;
+    parts: emulation;
+    constant: ports;
+});
 
 impl Buses for VirtualLink {
     fn port(&mut self, bus: usize) -> impl Bus {

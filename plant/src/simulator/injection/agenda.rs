@@ -17,9 +17,10 @@ use super::push::Push;
 use crate::error::PlantError;
 use crate::master::link::Occurrence;
 use crate::simulator::mechanism::contact::food::Food;
+use crate::state::state;
 
 /// What an entry does.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub(crate) enum Effect {
     /// A fault of one axis, or of all.
     Fault { kind: PartFault, size: f64, axis: Option<usize> },
@@ -34,7 +35,7 @@ pub(crate) enum Effect {
 }
 
 /// A fault of what belongs to an axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub(crate) enum PartFault {
     Encoder(EncoderFault),
     Drive(DriveFault),
@@ -61,6 +62,12 @@ struct Entry {
     has_struck: bool,
 }
 
+state!(Entry {
+    values: window_ns is_active has_struck;
+    bound: effect;
+    constant: injected fault;
+});
+
 /// The agenda.
 #[derive(Debug, Clone)]
 pub(crate) struct Agenda {
@@ -70,6 +77,11 @@ pub(crate) struct Agenda {
     /// What began or ended, the oldest first.
     pub(crate) occurrences: VecDeque<Occurrence>,
 }
+
+state!(Agenda {
+    values: next_change_ns occurrences;
+    parts: entries;
+});
 
 impl Agenda {
     /// The entries of a scenario that drives and mechanism carry out, switched on at `now_ns`. One whose window is not known

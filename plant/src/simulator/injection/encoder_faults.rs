@@ -17,7 +17,7 @@ use rand_pcg::Pcg64Mcg;
 const KINDS: usize = 8;
 
 /// The faults of one encoder.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct EncoderFaults {
     faults: ArrayVec<ActingFault, KINDS>,
     random: Pcg64Mcg,
@@ -25,7 +25,7 @@ pub(crate) struct EncoderFaults {
 }
 
 /// Positions that a slow interface has not shown yet.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 struct Past {
     /// Times (ns) and positions (m), the oldest first.
     positions: VecDeque<(u64, f64)>,
@@ -34,7 +34,7 @@ struct Past {
 }
 
 /// One fault that acts.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct ActingFault {
     kind: EncoderFault,
     size: f64,

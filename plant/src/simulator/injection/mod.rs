@@ -21,6 +21,7 @@ use masseter_scenario::{CommandFault, DriveFault, FaultConfig, FaultKindConfig, 
 use crate::error::PlantError;
 use crate::master::events::Journal;
 use crate::master::link::{Mishap, Occurrence};
+use crate::state::state;
 
 /// Follows the occurrences from which times count, hands out every window once, and alters commands.
 #[derive(Debug, Clone)]
@@ -34,7 +35,12 @@ pub(crate) struct Injector {
     events: Journal,
 }
 
-#[derive(Debug, Clone, Copy)]
+state!(Injector {
+    values: injection untold has_news events;
+    parts: commands;
+});
+
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Untold {
     injected: Injected,
     /// Whether the controller or the supervisor carries it out. It begins when its window does.
@@ -150,6 +156,10 @@ pub(super) struct CommandFaults {
     faults: Vec<AlteringFault>,
 }
 
+state!(CommandFaults {
+    parts: faults;
+});
+
 #[derive(Debug, Clone)]
 struct AlteringFault {
     injected: Injected,
@@ -159,6 +169,11 @@ struct AlteringFault {
     has_begun: bool,
     is_over: bool,
 }
+
+state!(AlteringFault {
+    values: window_ns has_begun is_over;
+    constant: injected kind config;
+});
 
 impl CommandFaults {
     /// Those of a scenario's list, none of which acts before its window is set.

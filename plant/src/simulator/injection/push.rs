@@ -14,14 +14,14 @@ use nalgebra::Vector6;
 use crate::error::PlantError;
 
 /// A push.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub(crate) struct Push {
     course: Course,
     /// Where the force acts, m in the platform frame; the incisal point when absent.
     pub(crate) point_m: Option<[f64; 3]>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 enum Course {
     Shaped { whole: Vector6<f64>, shape: Shape, for_s: f64, frequency_hz: f64 },
     Table(WrenchTable),
@@ -79,7 +79,7 @@ const OF_FORCES: usize = 4;
 const LARGEST: [f64; 7] = [86_400.0, 2000.0, 2000.0, 2000.0, 200.0, 200.0, 200.0];
 
 /// The rows of a table.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub(super) struct WrenchTable {
     /// Strictly increasing from 0.
     time_s: Vec<f64>,

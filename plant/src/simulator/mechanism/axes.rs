@@ -11,13 +11,13 @@ use super::friction::{Braking, CONTACT, Element, Spring};
 use crate::simulator::acting::Acting;
 
 /// The axes d₁ d₂ d₃ l₁ l₂ l₃.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Axes {
     pub(crate) each: [Axis; AXES],
 }
 
 /// One axis.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Axis {
     /// The faults that act on it, and which of them have struck.
     pub(crate) acting: Acting<AxisFault>,
@@ -217,7 +217,7 @@ const DRIVE_SHARE: f64 = 0.75;
 const DRIVE_DAMPING_N_S_PER_M: f64 = 20.0;
 
 /// The joint.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(super) enum Coupling {
     /// The drive's side is that far beyond the joint, m.
     Rigid { beyond_m: f64 },
@@ -226,7 +226,7 @@ pub(super) enum Coupling {
 }
 
 /// The drive's side of a loose joint.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(super) struct DriveSide {
     /// Half of the play, m; infinite where nothing connects the sides.
     half_m: f64,
@@ -239,7 +239,7 @@ pub(super) struct DriveSide {
 }
 
 /// The drive's acceleration in a step is `free_m_s2` plus `per_speed` times the joint's speed at the end of the step.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 struct Step {
     free_m_s2: f64,
     per_speed_per_s: f64,
@@ -340,7 +340,7 @@ impl DriveSide {
 const MOST_N: f64 = 2000.0;
 
 /// A seized guide.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(super) struct Seizure {
     held_at_m: f64,
 }
@@ -368,7 +368,7 @@ impl Seizure {
 }
 
 /// Two stops.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(super) struct Stops {
     low_m: f64,
     high_m: f64,

@@ -29,9 +29,10 @@ use super::axes::{Axes, AxesForces, AxisMotion};
 use super::contact::Occlusion;
 use super::friction::Braking;
 use crate::error::DynamicsError;
+use crate::state::state;
 
 /// Pose, twist and joint coordinates of the mechanism.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(crate) struct MechanismState {
     /// The platform in the base frame.
     pub(crate) pose: Pose,
@@ -60,6 +61,12 @@ pub(crate) struct Dynamics {
     pub(crate) axes: Axes,
     pub(crate) load: Load,
 }
+
+state!(Dynamics {
+    values: state acceleration occlusion axes load;
+    parts: braking;
+    constant: mechanism config bodies;
+});
 
 impl Dynamics {
     /// The mechanism at rest in a pose of the platform, which must be within the strokes.
@@ -217,7 +224,7 @@ pub(super) fn vertical(force_n: f64, arm: &Vec3) -> Vector6<f64> {
 }
 
 /// The load.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Load {
     /// The incisal point in the platform frame, m.
     incisal_m: Vec3,

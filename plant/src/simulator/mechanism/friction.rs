@@ -14,6 +14,8 @@ use masseter_model::geometry::AXES;
 use masseter_scenario::{DynamicsConfig, FrictionConfig, FrictionModel};
 use nalgebra::{Matrix6, Vector6};
 
+use crate::state::state;
+
 /// Time in which friction follows the loads, s. Without it, a guide that can lock itself would shake.
 const LOAD_TIME_S: f64 = 1e-3;
 
@@ -27,9 +29,14 @@ pub(super) struct Braking {
     bristles: [Bristles; AXES],
 }
 
+state!(Braking {
+    values: loads bristles;
+    constant: law config masses_kg;
+});
+
 /// The bristles of an axis (LuGre; Canudas de Wit et al., IEEE Trans. Automatic Control 40, 1995), whose stiffness grows
 /// with the load as Coulomb friction does.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 struct Bristles {
     deflection_m: f64,
 }
@@ -145,7 +152,7 @@ impl AddAssign for Element {
 }
 
 /// A spring with a damper.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Spring {
     pub(super) stiffness_n_per_m: f64,
     pub(super) damping_n_s_per_m: f64,

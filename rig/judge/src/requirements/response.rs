@@ -218,7 +218,7 @@ impl Response {
             self.close_answer(answer);
         }
         let is_numeric = self.then.is_numeric();
-        let unit = if is_numeric { self.then.unit } else { Unit::named("ms").expect("a unit of time") };
+        let unit = if is_numeric { self.then.unit } else { Unit::MS };
         let Some(worst) = self.worst else {
             let (trigger, window) = (&self.trigger.text, &self.window.text);
             let why = match self.triggers {

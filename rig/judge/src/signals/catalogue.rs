@@ -16,7 +16,7 @@ pub(super) fn signals(scenario: &Scenario, jaw: Jaw, declared: &Declared) -> Vec
     add_jaw(&mut list, jaw);
     add_contact(&mut list, scenario);
     if scenario.load_cell.is_some() {
-        list.add("load_cell.force", "N", "Bite force that the load cell shows.", |of| {
+        list.add("load_cell.force", Unit::N, "Bite force that the load cell shows.", |of| {
             Some(of.reading?.load_cell_n)
         });
     }
@@ -37,56 +37,59 @@ fn add_jaw(list: &mut SignalList, jaw: Jaw) {
         for (at, axis) in ["x", "y", "z"].into_iter().enumerate() {
             list.add(
                 format!("{name}.{axis}"),
-                "mm",
+                Unit::MM,
                 format!("Place of the point along {axis} of the base: the true one, on the robot the estimated one."),
                 move |of| Some(jaw.place(point, &jaw.actual(of)?)[at]),
             );
         }
-        list.add(format!("{name}.error"), "mm", "Distance of the point from its desired place.", move |of| {
-            Some(jaw.distance(point, &jaw.actual(of)?, &desired(of)?))
-        });
+        list.add(
+            format!("{name}.error"),
+            Unit::MM,
+            "Distance of the point from its desired place.",
+            move |of| Some(jaw.distance(point, &jaw.actual(of)?, &desired(of)?)),
+        );
     }
     for (at, axis) in ["x", "y", "z"].into_iter().enumerate() {
         list.add(
             format!("incisal.desired.{axis}"),
-            "mm",
+            Unit::MM,
             format!("Desired place of the incisal point along {axis} of the base."),
             move |of| Some(jaw.place(JawPoint::Incisal, &desired(of)?)[at]),
         );
     }
     list.add(
         "incisal.estimated_error",
-        "mm",
+        Unit::MM,
         "Distance of the incisal point from its desired place, by forward kinematics.",
         move |of| Some(jaw.distance(JawPoint::Incisal, &estimated(of)?, &desired(of)?)),
     );
     list.add_from(
         "jaw.opening",
-        "mm",
+        Unit::MM,
         "Distance of the incisal point from its place when the motion began.",
         move |of, start| Some(jaw.distance(JawPoint::Incisal, &jaw.actual(of)?, start?)),
     );
     list.add_from(
         "jaw.rotation",
-        "deg",
+        Unit::DEG,
         "Angle of the jaw from its orientation when the motion began.",
         move |of, start| Some(jaw.actual(of)?.rotation.angle_to(&start?.rotation)),
     );
     list.add(
         "platform.error",
-        "mm",
+        Unit::MM,
         "Distance of the platform's origin from its desired place.",
         move |of| Some((jaw.actual(of)?.translation.vector - desired(of)?.translation.vector).norm()),
     );
     list.add(
         "platform.angle_error",
-        "deg",
+        Unit::DEG,
         "Angle of the platform from its desired orientation.",
         move |of| Some(jaw.actual(of)?.rotation.angle_to(&desired(of)?.rotation)),
     );
     list.add(
         "bite.force",
-        "N",
+        Unit::N,
         "Vertical force of food and upper teeth on the emulated jaw, mean over the cycle.",
         |of| Some(of.truth?.bite_force_n),
     );
@@ -100,12 +103,12 @@ fn add_contact(list: &mut SignalList, scenario: &Scenario) {
     for tooth in scenario.arch().into_iter().map(|tooth| u32::from(tooth.number)) {
         list.add(
             format!("contact.{tooth}"),
-            "N",
+            Unit::N,
             format!("Force of antagonist and food on tooth {tooth}, mean over a cycle."),
             move |of| loads_n(of)?.find(|(number, _)| *number == tooth).map(|(_, load_n)| load_n),
         );
     }
-    list.add("contact.total", "N", "Sum of the forces on all teeth.", |of| {
+    list.add("contact.total", Unit::N, "Sum of the forces on all teeth.", |of| {
         Some(loads_n(of)?.map(|(_, load_n)| load_n).sum())
     });
 }
@@ -120,22 +123,22 @@ fn add_axes(list: &mut SignalList) {
         // Without a request to the drives a command has no targets.
         let command =
             |of: &CycleMessages| of.command.filter(|command| command.request != DriveRequest::Off.code());
-        list.add(format!("{name}.position"), "mm", "Position that the encoder reports.", move |of| {
+        list.add(format!("{name}.position"), Unit::MM, "Position that the encoder reports.", move |of| {
             Some(at(reading(of)?.position_m))
         });
-        list.add(format!("{name}.true_position"), "mm", "True position of the axis.", move |of| {
+        list.add(format!("{name}.true_position"), Unit::MM, "True position of the axis.", move |of| {
             Some(at(of.truth?.joint_m))
         });
-        list.add(format!("{name}.velocity"), "mm/s", "True velocity of the axis.", move |of| {
+        list.add(format!("{name}.velocity"), Unit::MM_S, "True velocity of the axis.", move |of| {
             Some(at(of.truth?.joint_m_s))
         });
         list.add(
             format!("{name}.force"),
-            "N",
+            Unit::N,
             "Force that the drive reports; of an emulated one the mean over the cycle.",
             move |of| Some(at(reading(of)?.force_n)),
         );
-        list.add(format!("{name}.target"), "mm", "Target of the cycle's command.", move |of| {
+        list.add(format!("{name}.target"), Unit::MM, "Target of the cycle's command.", move |of| {
             Some(at(command(of)?.target_m))
         });
         list.add_state(format!("{name}.drive"), "State of the drive.", drive_states, move |of| {
@@ -148,20 +151,20 @@ fn add_controller(list: &mut SignalList) {
     list.add_state("controller.state", "State of the controller.", controller_states, |of| {
         Some(of.state?.controller_state)
     });
-    list.add("motion.time", "s", "How far the motion has come.", |of| Some(of.state?.motion_time_s));
-    list.add("fk.residual", "um", "Largest difference of a platform side from its length.", |of| {
+    list.add("motion.time", Unit::S, "How far the motion has come.", |of| Some(of.state?.motion_time_s));
+    list.add("fk.residual", Unit::UM, "Largest difference of a platform side from its length.", |of| {
         Some(solution(of)?.residual_m)
     });
     list.add(
         "fk.condition",
-        "",
+        Unit::ONE,
         "Condition number of the Jacobian, computed every ten cycles and held in between.",
         |of| Some(solution(of)?.condition),
     );
-    list.add("fk.iterations", "", "Iterations of the forward kinematics.", |of| {
+    list.add("fk.iterations", Unit::ONE, "Iterations of the forward kinematics.", |of| {
         Some(f64::from(solution(of)?.iterations))
     });
-    list.add("master.fault", "", "1 once the master refuses to move anything.", |of| {
+    list.add("master.fault", Unit::ONE, "1 once the master refuses to move anything.", |of| {
         Some(f64::from(of.reading?.master_fault))
     });
 }
@@ -171,46 +174,46 @@ fn add_timing(list: &mut SignalList) {
         let about = format!(
             "Share of its core that the {role}'s loop took since its message before, by work and by spinning."
         );
-        let cpu = list.add(format!("{role}.cpu"), "%", about, move |of| of.cpu[place]);
+        let cpu = list.add(format!("{role}.cpu"), Unit::PERCENT, about, move |of| of.cpu[place]);
         cpu.absence = "; simulated time takes no share of a core: use --clock rt";
     }
     let seconds =
         |from_ns: u64, to_ns: u64| (from_ns > 0 && to_ns > 0).then(|| (to_ns as f64 - from_ns as f64) / 1e9);
-    list.add("plant.wake_up", "us", "Wake-up of the plant after its deadline.", move |of| {
+    list.add("plant.wake_up", Unit::US, "Wake-up of the plant after its deadline.", move |of| {
         of.reading.and_then(|reading| seconds(reading.due_ns, reading.woke_ns))
     });
-    list.add("controller.wake_up", "us", "Wake-up of the controller after its deadline.", move |of| {
+    list.add("controller.wake_up", Unit::US, "Wake-up of the controller after its deadline.", move |of| {
         of.state.and_then(|state| seconds(state.due_ns, state.woke_ns))
     });
-    list.add("controller.work", "us", "Time from the reading to the ready command.", move |of| {
+    list.add("controller.work", Unit::US, "Time from the reading to the ready command.", move |of| {
         solution(of).and_then(|state| seconds(state.received_ns, state.commanded_ns))
     });
-    list.add("fk.time", "us", "Time that the forward kinematics takes.", move |of| {
+    list.add("fk.time", Unit::US, "Time that the forward kinematics takes.", move |of| {
         solution(of).and_then(|state| seconds(state.received_ns, state.solved_ns))
     });
-    list.add("process_data.time", "us", "Time from SYNC to the last process data.", move |of| {
+    list.add("process_data.time", Unit::US, "Time from SYNC to the last process data.", move |of| {
         of.reading.and_then(|reading| seconds(reading.sampled_ns, reading.complete_ns))
     });
-    list.add("plant.skipped", "", "Deadlines that the plant has skipped since the start.", |of| {
+    list.add("plant.skipped", Unit::ONE, "Deadlines that the plant has skipped since the start.", |of| {
         Some(of.reading?.skipped_cycles as f64)
     });
-    list.add("controller.skipped", "", "Deadlines that the controller has skipped since the start.", |of| {
-        Some(of.state?.skipped_cycles as f64)
-    });
+    list.add(
+        "controller.skipped",
+        Unit::ONE,
+        "Deadlines that the controller has skipped since the start.",
+        |of| Some(of.state?.skipped_cycles as f64),
+    );
 }
 
 fn add_declared(list: &mut SignalList, declared: &Declared) {
     for (place, signal) in declared.signals.iter().enumerate() {
-        let si = Unit::named(&signal.unit).map_or(1.0, |unit| unit.si);
-        list.add(format!("signal.{}", signal.name), &signal.unit, &signal.about, move |of| {
-            Some(of.signals.as_ref()?.signals.as_slice().get(place)? * si)
-        });
+        let value = move |of: &CycleMessages| of.signals.as_ref()?.signals.as_slice().get(place).copied();
+        list.add_declared(format!("signal.{}", signal.name), &signal.unit, &signal.about, value);
     }
     for (place, parameter) in declared.parameters.iter().enumerate() {
-        let si = Unit::named(&parameter.unit).map_or(1.0, |unit| unit.si);
-        list.add(format!("parameter.{}", parameter.name), &parameter.unit, &parameter.about, move |of| {
-            Some(of.parameters.as_ref()?.parameters.as_slice().get(place)? * si)
-        });
+        let value =
+            move |of: &CycleMessages| of.parameters.as_ref()?.parameters.as_slice().get(place).copied();
+        list.add_declared(format!("parameter.{}", parameter.name), &parameter.unit, &parameter.about, value);
     }
 }
 

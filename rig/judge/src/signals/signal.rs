@@ -6,7 +6,7 @@ use std::fmt;
 use masseter_model::geometry::{Pose, Vec3};
 use masseter_recording::jaw_points;
 use masseter_runtime::messages::State;
-use masseter_scenario::{Dimension, JawConfig, Unit};
+use masseter_scenario::{JawConfig, Unit};
 use serde::Serialize;
 
 use super::timeline::CycleMessages;
@@ -71,7 +71,7 @@ impl SignalList {
     pub(super) fn add(
         &mut self,
         name: impl Into<String>,
-        unit: &str,
+        unit: Unit,
         about: impl Into<String>,
         extract: impl Fn(&CycleMessages) -> Option<f64> + Send + Sync + 'static,
     ) -> &mut NamedSignal {
@@ -82,16 +82,27 @@ impl SignalList {
     pub(super) fn add_from(
         &mut self,
         name: impl Into<String>,
-        unit: &str,
+        shown: Unit,
         about: impl Into<String>,
         extract: impl Fn(&CycleMessages, Option<&Pose>) -> Option<f64> + Send + Sync + 'static,
     ) -> &mut NamedSignal {
-        let shown = Unit::named(unit).unwrap_or_else(|| Dimension::One.si_unit());
-        let (name, about, extract) = (name.into(), about.into(), Box::new(extract));
-        let signal =
-            NamedSignal { name, unit: unit.to_owned(), about, shown, states: None, absence: "", extract };
-        self.0.push(signal);
+        let (name, unit, about, extract) =
+            (name.into(), shown.name.to_owned(), about.into(), Box::new(extract));
+        self.0.push(NamedSignal { name, unit, about, shown, states: None, absence: "", extract });
         self.0.last_mut().expect("it was just added")
+    }
+
+    /// Adds what a controller declares, with values in its unit. Where that is none of Masseter's, the value counts as a
+    /// number.
+    pub(super) fn add_declared(
+        &mut self,
+        name: String,
+        unit: &str,
+        about: &str,
+        value: impl Fn(&CycleMessages) -> Option<f64> + Send + Sync + 'static,
+    ) {
+        let shown = Unit::named(unit).unwrap_or(Unit::ONE);
+        unit.clone_into(&mut self.add(name, shown, about, move |of| Some(value(of)? * shown.si)).unit);
     }
 
     /// Adds a state, whose values have these names.
@@ -103,7 +114,7 @@ impl SignalList {
         extract: impl Fn(&CycleMessages) -> Option<u32> + Send + Sync + 'static,
     ) {
         let extract = move |messages: &CycleMessages| extract(messages).map(f64::from);
-        self.add(name, "", about, extract).states = Some(states);
+        self.add(name, Unit::ONE, about, extract).states = Some(states);
     }
 }
 

@@ -75,7 +75,7 @@ impl RunPlan {
     pub fn new(scenario: Scenario) -> anyhow::Result<Self> {
         let mechanism = Mechanism::new(&scenario.mechanism)?;
         let schedule = CycleSchedule::new(&scenario)?;
-        plant::check(&scenario)?;
+        plant::check_scenario(&scenario)?;
         let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
         // Also a dry run is one of a motion that the mechanism can follow at full speed.
         let demands = demands(&scenario, &trajectory, &mechanism)?;

@@ -6,12 +6,14 @@
 use std::cell::Cell;
 use std::convert::Infallible;
 
+use masseter_analysis::signals::CycleMessages;
 use masseter_analysis::{Analysis, Figures};
 use masseter_plant::core::PlantCore;
+use masseter_plant::state::{Archive, State};
 use masseter_recording::{Backlog, Recorded};
 use masseter_runtime::control::ControllerPorts;
 use masseter_runtime::messages::tap::TapError;
-use masseter_runtime::messages::{Command, Event, Message, Parameters, Reading, Signals, State};
+use masseter_runtime::messages::{self, Command, Event, Message, Parameters, Reading, Signals};
 use masseter_runtime::realtime::Wake;
 
 /// Takes every message of a run.
@@ -67,6 +69,40 @@ impl Sink for Stream {
     }
 }
 
+/// What a rig published last: reading, truth and contact of the present cycle, and the events of the last step.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Latest {
+    pub(crate) cycle: CycleMessages,
+    pub(crate) events: Vec<Event>,
+}
+
+impl Sink for Latest {
+    fn take(&mut self, message: &Recorded, _: u64) {
+        match message {
+            Recorded::Reading(reading) => self.cycle.reading = Some(*reading),
+            Recorded::Truth(truth) => self.cycle.truth = Some(*truth),
+            Recorded::Contact(contact) => self.cycle.contact = Some(*contact),
+            Recorded::Event(event) => self.events.push(*event),
+            _ => {}
+        }
+    }
+
+    fn has_failed(&self) -> bool {
+        false
+    }
+}
+
+impl State for Latest {
+    fn exchange<A: Archive>(&mut self, archive: &mut A) -> Result<(), A::Error> {
+        // It takes no other message of a cycle.
+        let CycleMessages { reading, truth, contact, .. } = &mut self.cycle;
+        archive.value(reading)?;
+        archive.value(truth)?;
+        archive.value(contact)?;
+        archive.value(&mut self.events)
+    }
+}
+
 /// The publishers of a run. Each numbers its own messages.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Publisher {
@@ -92,11 +128,14 @@ pub(crate) enum Publisher {
     PlantEvent,
 }
 
+/// How many messages each publisher has published.
+pub(crate) type Published = [u64; Publisher::PlantEvent as usize + 1];
+
 /// The sink, and how many messages of each publisher it took.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Log<S> {
     sink: S,
-    published: [u64; Publisher::PlantEvent as usize + 1],
+    published: Published,
 }
 
 impl<S: Sink> Log<S> {
@@ -107,6 +146,14 @@ impl<S: Sink> Log<S> {
 
     pub(crate) fn sink(&self) -> &S {
         &self.sink
+    }
+
+    pub(crate) fn published(&self) -> Published {
+        self.published
+    }
+
+    pub(crate) fn set_published(&mut self, published: Published) {
+        self.published = published;
     }
 
     /// Where the messages go.
@@ -191,7 +238,7 @@ impl<S: Sink> ControllerPorts for LoggedPorts<'_, S> {
         Ok(())
     }
 
-    fn publish_state(&mut self, fill: impl FnOnce(&mut State)) -> Result<(), Infallible> {
+    fn publish_state(&mut self, fill: impl FnOnce(&mut messages::State)) -> Result<(), Infallible> {
         self.log.record(Publisher::State, self.published_ns(), fill);
         Ok(())
     }

@@ -10,24 +10,19 @@
 mod tests;
 
 use std::error::Error;
+use std::path::Path;
 use std::sync::Arc;
 
-use masseter_analysis::signals::{CycleMessages, Registry, UnknownSignal};
+use masseter_analysis::signals::{Registry, UnknownSignal};
 use masseter_plan::RunPlan;
 use masseter_plant::PlantError;
-use masseter_plant::core::PlantCore;
-use masseter_plant::cycle::{PlantPorts, begin_cycle, end_cycle};
-use masseter_plant::emulation::VirtualLink;
-use masseter_recording::Recorded;
-use masseter_runtime::control::{Controller, Duties};
-use masseter_runtime::lockstep::EPOCH_NS;
-use masseter_runtime::messages::{Command, Contact, Event, Reading, Truth};
+use masseter_runtime::messages::{Command, Event, Reading, Truth};
 use masseter_runtime::named::Declared;
-use masseter_runtime::realtime::Wake;
-use masseter_runtime::schedule::CycleSchedule;
 use masseter_scenario::Scenario;
 
-use crate::log::{Log, LoggedPorts, Publisher, Sink};
+use crate::log::Latest;
+use crate::snapshot::{OtherScenario, Snapshot, SnapshotError};
+use crate::stepper::Stepper;
 
 /// Why a rig cannot be made, stepped or restored.
 #[derive(Debug, thiserror::Error)]
@@ -48,25 +43,8 @@ pub enum RigError {
         cycle: u64,
     },
     /// The snapshot is one of another scenario or seed.
-    #[error(
-        "the snapshot is of scenario '{snapshot}', seed {snapshot_seed}, the rig of scenario '{rig}', seed {rig_seed}"
-    )]
-    OtherScenario {
-        /// Name of the snapshot's scenario.
-        snapshot: String,
-        /// Its seed.
-        snapshot_seed: u64,
-        /// Name of the rig's scenario.
-        rig: String,
-        /// Its seed.
-        rig_seed: u64,
-    },
-    /// The scenarios have the same name and seed.
-    #[error("the snapshot is of a scenario '{name}' with other values of its keys than the rig's")]
-    OtherKeys {
-        /// Name of both scenarios.
-        name: String,
-    },
+    #[error(transparent)]
+    OtherScenario(#[from] OtherScenario),
 }
 
 /// Master, buses, drives and mechanism of a scenario. A cycle begins with a reading and ends with a command.
@@ -97,21 +75,6 @@ pub struct Rig {
     has_failed: bool,
 }
 
-/// The state of a rig at an instant, to go on from there again and again. It holds mechanism, drives, buses with
-/// their error counters, master, faults and random streams, and what the rig published last.
-///
-/// It does not hold the caller's controller, nor any file. A rig reads tables of pushes and the memory of the drives
-/// when it is made and at a reset. It writes no file, so what drives store stays in the rig. A snapshot lives in
-/// memory; it cannot be saved.
-#[derive(Debug, Clone)]
-pub struct Snapshot {
-    scenario: Arc<Scenario>,
-    plant: PlantCore,
-    ports: Ports<Latest>,
-    cycle: u64,
-    has_failed: bool,
-}
-
 impl Rig {
     /// A rig of the scenario with this seed instead of the scenario's, in its first cycle.
     ///
@@ -137,7 +100,7 @@ impl Rig {
     /// When the plant fails.
     pub fn reset(&mut self) -> Result<&Reading, RigError> {
         self.has_failed = true;
-        self.stepper = Stepper::new(&self.scenario, self.stepper.schedule, Latest::default())?;
+        self.stepper.renew(&self.scenario, Latest::default())?;
         self.stepper.begin_next_cycle()?;
         self.has_failed = false;
         Ok(self.reading())
@@ -152,15 +115,11 @@ impl Rig {
     pub fn step(&mut self, command: &Command) -> Result<&Reading, RigError> {
         let Self { stepper, has_failed, .. } = self;
         if *has_failed {
-            return Err(RigError::Failed { cycle: stepper.cycle });
+            return Err(RigError::Failed { cycle: stepper.cycle() });
         }
         *has_failed = true;
-        stepper.ports.log.sink_mut().events.clear();
-        let (cycle, now_ns) = (stepper.cycle, stepper.controller_at_ns());
-        let command = stepper.ports.log.record(Publisher::Command, now_ns, |message: &mut Command| {
-            *message = Command { cycle, ..*command };
-        });
-        stepper.end_cycle(Some(command))?;
+        stepper.sink_mut().events.clear();
+        stepper.end_with(command)?;
         stepper.begin_next_cycle()?;
         *has_failed = false;
         Ok(self.reading())
@@ -168,7 +127,7 @@ impl Rig {
 
     /// The reading of this cycle.
     pub fn reading(&self) -> &Reading {
-        &self.stepper.ports.reading
+        self.stepper.reading()
     }
 
     /// The mechanism's true motion at the SYNC of this cycle.
@@ -192,14 +151,20 @@ impl Rig {
 
     /// The state of the rig, to be [restored](Self::restore) later, also on another rig of the same scenario and seed.
     pub fn snapshot(&self) -> Snapshot {
-        let Stepper { plant, ports, cycle, .. } = &self.stepper;
         Snapshot {
             scenario: self.scenario.clone(),
-            plant: plant.clone(),
-            ports: ports.clone(),
-            cycle: *cycle,
+            stepper: self.stepper.state(),
+            latest: self.latest().clone(),
             has_failed: self.has_failed,
         }
+    }
+
+    /// The snapshot in a file, which the same build of the rig has [written](Snapshot::write_to).
+    ///
+    /// # Errors
+    /// Where there is no such file, the file is damaged, or it is of another build, scenario or seed.
+    pub fn read_snapshot(&self, path: &Path) -> Result<Snapshot, SnapshotError> {
+        self.snapshot().replaced_by(path)
     }
 
     /// Goes back, or on, to a snapshot. The steps that follow are those that followed it.
@@ -207,171 +172,15 @@ impl Rig {
     /// # Errors
     /// Where the snapshot is one of another scenario or seed.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), RigError> {
-        let (own, other) = (&self.scenario, &snapshot.scenario);
-        if !Arc::ptr_eq(own, other) && own != other {
-            return Err(if (&own.name, own.seed) == (&other.name, other.seed) {
-                RigError::OtherKeys { name: own.name.clone() }
-            } else {
-                RigError::OtherScenario {
-                    snapshot: other.name.clone(),
-                    snapshot_seed: other.seed,
-                    rig: own.name.clone(),
-                    rig_seed: own.seed,
-                }
-            });
-        }
-        self.stepper.plant = snapshot.plant.clone();
-        self.stepper.ports = snapshot.ports.clone();
-        self.stepper.cycle = snapshot.cycle;
-        self.has_failed = snapshot.has_failed;
+        let Snapshot { scenario, stepper, latest, has_failed } = snapshot;
+        OtherScenario::refuse(&self.scenario, scenario)?;
+        self.stepper.set_state(stepper);
+        self.stepper.sink_mut().clone_from(latest);
+        self.has_failed = *has_failed;
         Ok(())
     }
 
     fn latest(&self) -> &Latest {
-        self.stepper.ports.log.sink()
-    }
-}
-
-/// What a rig published last: reading, truth and contact of the present cycle, and the events of the last step.
-#[derive(Debug, Clone, Default)]
-struct Latest {
-    cycle: CycleMessages,
-    events: Vec<Event>,
-}
-
-impl Sink for Latest {
-    fn take(&mut self, message: &Recorded, _: u64) {
-        match message {
-            Recorded::Reading(reading) => self.cycle.reading = Some(*reading),
-            Recorded::Truth(truth) => self.cycle.truth = Some(*truth),
-            Recorded::Contact(contact) => self.cycle.contact = Some(*contact),
-            Recorded::Event(event) => self.events.push(*event),
-            _ => {}
-        }
-    }
-
-    fn has_failed(&self) -> bool {
-        false
-    }
-}
-
-/// The plant of a planned scenario, from one half of a cycle to the next; its messages go to a sink.
-#[derive(Debug)]
-pub(crate) struct Stepper<S> {
-    schedule: CycleSchedule,
-    period_ns: u64,
-    plant: PlantCore,
-    ports: Ports<S>,
-    /// The number of the cycle, from 1 on.
-    cycle: u64,
-}
-
-impl<S: Sink> Stepper<S> {
-    /// Before the first cycle.
-    pub(crate) fn new(scenario: &Scenario, schedule: CycleSchedule, sink: S) -> Result<Self, PlantError> {
-        let plant = PlantCore::new(scenario, EPOCH_NS)?;
-        Ok(Self { schedule, period_ns: scenario.period_ns(), plant, ports: Ports::new(sink), cycle: 0 })
-    }
-
-    /// One cycle whose command a controller gives.
-    pub(crate) fn play_cycle(
-        &mut self,
-        controller: &mut dyn Controller,
-        duties: &mut Duties,
-    ) -> Result<(), PlantError> {
-        self.begin_next_cycle()?;
-        let now_ns = self.controller_at_ns();
-        let wake = Wake::on_time(self.cycle, now_ns);
-        let mut ports = LoggedPorts::new(&mut self.ports.log, [now_ns; 3], Some(&self.ports.reading));
-        let Ok(()) = masseter_runtime::control::run_cycle(controller, duties, &mut ports, &wake);
-        let command = ports.into_command();
-        self.end_cycle(command)
-    }
-
-    pub(crate) fn sink_mut(&mut self) -> &mut S {
-        self.ports.log.sink_mut()
-    }
-
-    pub(crate) fn into_sink(self) -> S {
-        self.ports.log.into_sink()
-    }
-
-    fn begin_next_cycle(&mut self) -> Result<(), PlantError> {
-        self.cycle += 1;
-        let sync = self.sync();
-        begin_cycle(&mut self.plant, &mut self.ports, &self.schedule, &sync)
-    }
-
-    fn end_cycle(&mut self, command: Option<Command>) -> Result<(), PlantError> {
-        self.ports.now_ns = self.controller_at_ns();
-        self.ports.command = command;
-        let sync = self.sync();
-        end_cycle(&mut self.plant, &mut self.ports, &sync)
-    }
-
-    fn sync(&self) -> Wake {
-        Wake::on_time(self.cycle, EPOCH_NS + (self.cycle - 1) * self.period_ns)
-    }
-
-    fn controller_at_ns(&self) -> u64 {
-        self.sync().due_ns + self.schedule.controller_at_ns
-    }
-}
-
-#[derive(Debug, Clone)]
-struct Ports<S> {
-    log: Log<S>,
-    now_ns: u64,
-    /// The reading of this cycle, as published.
-    reading: Reading,
-    /// The command of this cycle.
-    command: Option<Command>,
-}
-
-impl<S: Sink> Ports<S> {
-    fn new(sink: S) -> Self {
-        Self { log: Log::new(sink), now_ns: EPOCH_NS, reading: Reading::default(), command: None }
-    }
-}
-
-impl<S: Sink> PlantPorts<VirtualLink> for Ports<S> {
-    type Command = Command;
-    type Error = PlantError;
-
-    fn now_ns(&self) -> u64 {
-        self.now_ns
-    }
-
-    fn wait_until(&mut self, _: u64, latest_ns: u64) -> u64 {
-        self.now_ns = latest_ns;
-        latest_ns
-    }
-
-    fn wait_for_frames(&mut self, _: &mut VirtualLink, latest_ns: u64) -> u64 {
-        latest_ns
-    }
-
-    fn publish_reading(&mut self, fill: impl FnOnce(&mut Reading)) -> Result<(), PlantError> {
-        self.reading = self.log.record(Publisher::Reading, self.now_ns, fill);
-        Ok(())
-    }
-
-    fn publish_truth(&mut self, truth: &Truth) -> Result<(), PlantError> {
-        self.log.record(Publisher::Truth, self.now_ns, |message| *message = *truth);
-        Ok(())
-    }
-
-    fn publish_contact(&mut self, contact: &Contact) -> Result<(), PlantError> {
-        self.log.record(Publisher::Contact, self.now_ns, |message| *message = *contact);
-        Ok(())
-    }
-
-    fn command(&mut self, _: &Wake) -> Result<Option<Command>, PlantError> {
-        Ok(self.command.take())
-    }
-
-    fn publish_frames_and_events(&mut self, plant: &mut PlantCore) -> Result<(), PlantError> {
-        self.log.drain(plant, self.now_ns);
-        Ok(())
+        self.stepper.sink()
     }
 }

@@ -1,77 +1,273 @@
-//! Charts as SVG: lines, bars, grids of colours, with axes, ticks, legends and one palette.
+//! Charts as SVG: lines and dots over two axes, with round ticks and one palette.
 //!
-//! Drawing itself is done by `plotters`; this crate fixes what all charts of the rig have in common. Which data a chart
-//! shows is decided by its users: the studies and the page of a campaign. The page of a run draws itself (`masseter-page`).
+//! Pictures that stand without a browser's scripts are drawn here: plots of a campaign, and recorded motions. The page of a
+//! run draws itself (`masseter-page`).
 //!
 //! ```
-//! use masseter_charts::{Axis, Line, LineChart, Scale, SeriesLabelPosition, svg};
+//! use masseter_charts::{Axis, BLUE, Chart, Look, Scale, Series, drawing};
 //!
-//! let chart = LineChart {
+//! let points = vec![(0.0, 0.0), (0.1, 4.0), (0.2, 5.0)];
+//! let chart = Chart {
+//!     frame: [0.0, 0.0, 960.0, 260.0],
 //!     title: "Step response".to_owned(),
-//!     x: Axis::fitted("time, s", Scale::Linear).including(0.0),
-//!     y: Axis::fitted("stroke, mm", Scale::Linear),
-//!     lines: vec![Line::new("slide 1", vec![(0.0, 0.0), (0.1, 4.0), (0.2, 5.0)])],
-//!     legend: SeriesLabelPosition::LowerRight,
+//!     x: Axis { label: "time, s".to_owned(), scale: Scale::Linear, ends: [0.0, 0.2] },
+//!     y: Axis { label: "stroke, mm".to_owned(), scale: Scale::Linear, ends: [0.0, 5.0] },
+//!     series: vec![Series { name: "slide 1".to_owned(), colour: BLUE, look: Look::Line, points }],
 //! };
-//! let drawn = svg((960, 260), |area| chart.draw_on(area))?;
+//! let drawn = drawing([960.0, 260.0], &[chart]);
 //! assert!(drawn.starts_with("<svg") && drawn.contains("time, s"));
-//! # Ok::<(), masseter_charts::Error>(())
 //! ```
 
-mod axis;
-mod canvas;
-mod line_chart;
+mod ticks;
 
-pub use axis::{Axis, Scale};
-pub use canvas::{
-    Area, Bar, Chart, ColourScale, Disc, Error, Key, LegendEntry, TEXT, TITLE, bars, cells, chart, discs,
-    legend, marks, svg,
-};
-pub use line_chart::{Line, LineChart};
-pub use plotters::chart::SeriesLabelPosition;
+use std::fmt::Write;
 
-/// Colours that colour-blind people can tell apart (Okabe and Ito).
-pub mod palette {
-    use plotters::style::RGBColor;
+use ticks::{label_of_step, linear_ticks, log_ticks, plain_label, tick_step};
 
-    /// Blue.
-    pub const BLUE: RGBColor = RGBColor(0x00, 0x72, 0xb2);
-    /// Vermilion.
-    pub const VERMILION: RGBColor = RGBColor(0xd5, 0x5e, 0x00);
-    /// Green.
-    pub const GREEN: RGBColor = RGBColor(0x00, 0x9e, 0x73);
-    /// Purple.
-    pub const PURPLE: RGBColor = RGBColor(0xcc, 0x79, 0xa7);
-    /// Orange.
-    pub const ORANGE: RGBColor = RGBColor(0xe6, 0x9f, 0x00);
-    /// Sky.
-    pub const SKY: RGBColor = RGBColor(0x56, 0xb4, 0xe9);
-    /// Grey, for what stays in the background.
-    pub const GREY: RGBColor = RGBColor(0x99, 0x99, 0x99);
-    /// Red, for limits and faults.
-    pub const RED: RGBColor = RGBColor(0xb0, 0x00, 0x20);
+// Colours that colour-blind people can tell apart (Okabe and Ito), and one for what stays in the background.
+/// Blue.
+pub const BLUE: &str = "#0072b2";
+/// Vermilion.
+pub const VERMILION: &str = "#d55e00";
+/// Green.
+pub const GREEN: &str = "#009e73";
+/// Red, for limits and faults.
+pub const RED: &str = "#b00020";
+/// Grey.
+pub const GREY: &str = "#999999";
 
-    const SERIES: [RGBColor; 8] =
-        [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, RGBColor(0x66, 0x66, 0x66), RGBColor(0x9a, 0x7d, 0x0a)];
+/// Room around a plot for title, labels and numbers, px: left, above, right, below.
+pub const ROOM: [f64; 4] = [64.0, 30.0, 20.0, 46.0];
+/// Radius of a dot, px.
+const DOT: f64 = 3.0;
+/// Least length of an axis, and the same as a share of its greatest value: ticks must differ from each other.
+const LEAST: f64 = 1e-6;
+const LEAST_SHARE: f64 = 1e-9;
 
-    /// Colour of a line by its number in a chart.
-    pub(crate) fn series(line: usize) -> RGBColor {
-        SERIES[line % SERIES.len()]
+/// What stands along an axis.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Scale {
+    /// Values, evenly.
+    Linear,
+    /// Positive values, by their logarithm.
+    Log,
+    /// Names: the first at 0, the next at 1.
+    Names(Vec<String>),
+}
+
+/// An axis.
+#[derive(Debug, Clone)]
+pub struct Axis {
+    /// What it shows, with the unit.
+    pub label: String,
+    /// What stands along it.
+    pub scale: Scale,
+    /// The values at its ends.
+    pub ends: [f64; 2],
+}
+
+impl Axis {
+    /// Evenly over all of these values, with so much room beyond them, as a share of their extent.
+    #[must_use]
+    pub fn around(label: &str, values: impl IntoIterator<Item = f64>, room: f64) -> Self {
+        let [low, high] = extent(values);
+        let room = room * (high - low);
+        Self { label: label.to_owned(), scale: Scale::Linear, ends: [low - room, high + room] }
     }
 
-    /// Every second round of the colours is dashed, so that its lines differ from the first round's.
-    pub(crate) fn is_dashed(line: usize) -> bool {
-        line / SERIES.len() % 2 == 1
+    /// Both ends, along which places are even.
+    fn places(&self) -> [f64; 2] {
+        let [low, high] = self.ends.map(|end| self.place(end));
+        let least = LEAST.max(LEAST_SHARE * low.abs().max(high.abs()));
+        if low.is_finite() && high.is_finite() { [low, high.max(low + least)] } else { [0.0, 1.0] }
     }
+
+    fn place(&self, value: f64) -> f64 {
+        if self.scale == Scale::Log { value.log10() } else { value }
+    }
+
+    /// Where a value lies: 0 at the lower end, 1 at the upper one.
+    fn share(&self, value: f64) -> f64 {
+        let [low, high] = self.places();
+        (self.place(value) - low) / (high - low)
+    }
+
+    /// Labelled values.
+    fn ticks(&self) -> Vec<(f64, String)> {
+        let [low, high] = self.places();
+        match &self.scale {
+            Scale::Names(names) => (0..).map(f64::from).zip(names.iter().cloned()).collect(),
+            Scale::Log => {
+                let values = log_ticks(low, high).into_iter().map(|place| 10f64.powf(place));
+                values.map(|value| (value, plain_label(value))).collect()
+            }
+            Scale::Linear => {
+                let step = tick_step(high - low);
+                let values = linear_ticks(low, high).into_iter();
+                values.map(|value| (value, label_of_step(value, step))).collect()
+            }
+        }
+    }
+}
+
+/// Least and greatest of some values; from +∞ to −∞ without any.
+#[must_use]
+pub fn extent(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
+    let none = [f64::INFINITY, f64::NEG_INFINITY];
+    values.into_iter().fold(none, |[low, high], value| [low.min(value), high.max(value)])
+}
+
+/// How points are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Look {
+    /// Joined.
+    Line,
+    /// One by one.
+    Dots,
+}
+
+/// Points of one colour.
+#[derive(Debug, Clone)]
+pub struct Series {
+    /// Above the plot, in the series' colour; may be empty.
+    pub name: String,
+    /// As in a style sheet.
+    pub colour: &'static str,
+    /// How they are drawn.
+    pub look: Look,
+    /// In values of the axes.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// A chart.
+#[derive(Debug, Clone)]
+pub struct Chart {
+    /// Left, top, width and height in the drawing, px.
+    pub frame: [f64; 4],
+    /// Above the plot; may be empty.
+    pub title: String,
+    /// From left to right.
+    pub x: Axis,
+    /// From bottom to top.
+    pub y: Axis,
+    /// The first is drawn first.
+    pub series: Vec<Series>,
+}
+
+/// Charts on white, in a drawing of this width and height, px.
+#[must_use]
+pub fn drawing([width, height]: [f64; 2], charts: &[Chart]) -> String {
+    let charts: String = charts.iter().map(Chart::svg).collect();
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" \
+         font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n{charts}</svg>\n"
+    )
+}
+
+impl Chart {
+    fn svg(&self) -> String {
+        let [left, top, width, height] = self.frame;
+        let (right, bottom) = (left + width - ROOM[2], top + height - ROOM[3]);
+        let (left, top) = (left + ROOM[0], top + ROOM[1]);
+        let x = |value: f64| left + (right - left) * self.x.share(value);
+        let y = |value: f64| bottom - (bottom - top) * self.y.share(value);
+        let mut svg = String::new();
+        for (at, name) in self.x.ticks().into_iter().map(|(value, name)| (x(value), name)) {
+            svg += &line([at, top], [at, bottom]);
+            svg += &text([at, bottom + 16.0], "middle", &name);
+        }
+        for (at, name) in self.y.ticks().into_iter().map(|(value, name)| (y(value), name)) {
+            svg += &line([left, at], [right, at]);
+            svg += &text([left - 6.0, at + 4.0], "end", &name);
+        }
+        svg += &text([f64::midpoint(left, right), bottom + 36.0], "middle", &self.x.label);
+        svg += &text([left, top - 8.0], "start", &format!("{}  {}", self.y.label, self.title));
+        let names = self.series.iter().map(|Series { name, colour, .. }| {
+            format!("<tspan fill=\"{colour}\">\u{2003}{}</tspan>", escaped(name))
+        });
+        let _ = writeln!(
+            svg,
+            "<text x=\"{right:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+            top - 8.0,
+            names.collect::<String>()
+        );
+        for Series { colour, look, points, .. } in &self.series {
+            let points = points.iter().map(|&(across, up)| (x(across), y(up)));
+            let points = points.filter(|(x, y)| x.is_finite() && y.is_finite());
+            let _ = match look {
+                Look::Line => {
+                    let points: Vec<_> = points.map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
+                    let points = points.join(" ");
+                    writeln!(
+                        svg,
+                        "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>"
+                    )
+                }
+                Look::Dots => points.into_iter().try_for_each(|(x, y)| {
+                    writeln!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{DOT}\" fill=\"{colour}\"/>")
+                }),
+            };
+        }
+        svg
+    }
+}
+
+/// A line of the mesh.
+fn line([x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) -> String {
+    format!("<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" stroke=\"#e4e4e4\"/>\n")
+}
+
+fn text([x, y]: [f64; 2], anchor: &str, text: &str) -> String {
+    format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{}</text>\n", escaped(text))
+}
+
+/// Without characters that are markup.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;")
 }
 
 #[cfg(test)]
 mod tests {
-    use super::palette::{is_dashed, series};
+    use super::*;
+
+    fn attributes(svg: &str, key: &str) -> Vec<f64> {
+        let key = format!(" {key}=\"");
+        let values = svg.split(&key).skip(1).filter_map(|rest| rest.split('"').next());
+        values.filter_map(|value| value.parse().ok()).collect()
+    }
 
     #[test]
-    fn no_two_of_sixteen_lines_look_the_same() {
-        let looks = (0..16).map(|line| (series(line).0, series(line).1, series(line).2, is_dashed(line)));
-        assert_eq!(looks.collect::<std::collections::BTreeSet<_>>().len(), 16);
+    fn every_finite_point_lies_in_the_plot_and_others_are_left_out() {
+        let points = vec![(1.0, -2.0), (10.0, f64::NAN), (100.0, 3.0), (-1.0, 0.0)];
+        let chart = Chart {
+            frame: [10.0, 20.0, 400.0, 300.0],
+            title: "a < b".to_owned(),
+            x: Axis { label: "x".to_owned(), scale: Scale::Log, ends: [1.0, 100.0] },
+            y: Axis::around("y", points.iter().map(|point| point.1), 0.1),
+            series: vec![Series { name: "dots".to_owned(), colour: BLUE, look: Look::Dots, points }],
+        };
+        let svg = drawing([500.0, 400.0], &[chart]);
+        assert_eq!(attributes(&svg, "cx"), [10.0 + ROOM[0], 410.0 - ROOM[2]]);
+        let plot = (20.0 + ROOM[1])..=(320.0 - ROOM[3]);
+        let up = attributes(&svg, "cy");
+        assert!(up.len() == 2 && up.iter().all(|y| plot.contains(y)) && up[0] > up[1], "{up:?}");
+        assert!(svg.contains("a &lt; b") && svg.contains(">10<"), "{svg}");
+    }
+
+    #[test]
+    fn an_axis_without_values_or_without_length_has_a_place_for_everything() {
+        for axis in [Axis::around("", [], 0.1), Axis::around("", [3.0], 0.1)] {
+            assert!(axis.share(3.0).is_finite(), "{axis:?}");
+            assert!(axis.ticks().iter().all(|(value, _)| value.is_finite()), "{axis:?}");
+        }
+    }
+
+    #[test]
+    fn names_stand_at_their_places() {
+        let names = ["none", "all"].map(str::to_owned).to_vec();
+        let axis = Axis { label: String::new(), scale: Scale::Names(names), ends: [-0.5, 1.5] };
+        let shares = [0.0, 1.0].map(|place| (axis.share(place) * 100.0).round() as u32);
+        assert_eq!(shares, [25, 75]);
+        assert_eq!(axis.ticks(), [(0.0, "none".to_owned()), (1.0, "all".to_owned())]);
     }
 }

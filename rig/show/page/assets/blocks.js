@@ -1,4 +1,4 @@
-// Blocks that are no charts: text, the verdict, tables, events, drawings.
+// Blocks that are no charts: text, the verdict, tables, events.
 {
   const { element, svg, rich } = Masseter;
 
@@ -33,16 +33,6 @@
       const rows = now.rows.map((row) => element('tr', {}, ...row.map((content, at) => cell(content, now.columns[at], at === 0))));
       holder.replaceChildren(element('div', { class: 'table', tabindex: 0, role: 'region', 'aria-label': now.label },
         element('table', {}, element('thead', {}, element('tr', {}, ...head)), element('tbody', {}, ...rows))));
-    };
-    update(data);
-    return { update };
-  });
-
-  Masseter.block('picture', (holder, data) => {
-    const update = ({ svg: text, label }) => {
-      const figure = element('div', { class: 'picture', role: 'img', 'aria-label': label });
-      figure.append(...new DOMParser().parseFromString(text, 'image/svg+xml').childNodes);
-      holder.replaceChildren(figure);
     };
     update(data);
     return { update };

@@ -31,7 +31,7 @@
 
   Masseter.block('parameters', (holder, data) => {
     const inputs = new Map();
-    const row = ({ name, unit, about, value, range: [least, most] }) => {
+    const row = ({ name, unit, about, last: value, range: [least, most] }) => {
       const input = element('input', { type: 'number', id: `parameter-${name}`, min: least, max: most, step: 'any', value,
         onchange: () => ask({ op: 'set', name, value: Number(input.value) }) });
       inputs.set(name, input);
@@ -44,7 +44,7 @@
     return {
       // Another value came from the controller; what the user types stays.
       update(now) {
-        for (const { name, value } of now) {
+        for (const { name, last: value } of now) {
           const input = inputs.get(name);
           if (input && input !== document.activeElement) input.value = value;
         }

@@ -94,13 +94,6 @@ pub enum Content {
     Events(Events),
     /// The page's moments in words.
     Moments,
-    /// A drawing as SVG, and what it shows.
-    Picture {
-        /// The drawing.
-        svg: String,
-        /// What it shows, for those who cannot see it.
-        label: String,
-    },
     /// The force on each lower tooth.
     Pressure(Pressure),
     /// The mechanism in three dimensions; `scene.js` knows the data.
@@ -109,8 +102,8 @@ pub enum Content {
     Jaw(Value),
     /// The state of a run that goes on.
     Live(Live),
-    /// Parameters to change.
-    Parameters(Vec<Parameter>),
+    /// Parameters to change; `live.js` knows the data.
+    Parameters(Value),
 }
 
 /// The judgement of a run: of its function, and of its timing.
@@ -241,21 +234,6 @@ pub struct Live {
     pub progress: String,
     /// Figures that matter most, each with its name.
     pub figures: Vec<[String; 2]>,
-}
-
-/// A parameter of the controller, which the page can change.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Parameter {
-    /// Its name.
-    pub name: String,
-    /// The name of its unit; may be empty.
-    pub unit: String,
-    /// What it is.
-    pub about: String,
-    /// The value that the controller reported last.
-    pub value: f64,
-    /// The least and the greatest value.
-    pub range: [f64; 2],
 }
 
 /// The lower teeth, with the greatest force of all.

@@ -21,8 +21,7 @@ mod chart;
 mod page;
 
 pub use block::{
-    Block, Cell, Column, Content, EventRow, Events, Live, Parameter, Pressure, Section, Table, Tone, Tooth,
-    Verdict,
+    Block, Cell, Column, Content, EventRow, Events, Live, Pressure, Section, Table, Tone, Tooth, Verdict,
 };
 pub use chart::{Across, Chart, Limit, Moment, MomentKind, Phase, Points, Scale, Series, Style, Time};
 pub use page::{Life, Page, PageError};

@@ -77,19 +77,19 @@ impl Comparison {
         }
         write!(text, "\n{LEGEND}\n{:<50} {:>14} {:>14} {:>9}\n", "figure", "A", "B", "change")?;
         let of = |judgement| self.changes.iter().filter(move |change| change.judgement == judgement);
-        let changed = ChangeJudgement::CHANGED.into_iter().flat_map(of);
-        changed.into_iter().try_for_each(|change| row(&mut text, change))?;
+        for (judgement, word) in CHANGED {
+            of(judgement).try_for_each(|change| row(&mut text, change, word))?;
+        }
         writeln!(text, "{} figures are the same", of(ChangeJudgement::Same).count())?;
         Ok(text)
     }
 }
 
-fn row(text: &mut String, change: &Change) -> std::fmt::Result {
-    let Change { figure, a, b, judgement, .. } = change;
+fn row(text: &mut String, Change { figure, a, b, .. }: &Change, word: &str) -> std::fmt::Result {
     let share = a.zip(*b).filter(|(a, _)| *a != 0.0).map(|(a, b)| b / a - 1.0);
     let share = or_dash(share, |share| format!("{:+.1} %", share * 100.0));
     let [a, b] = [a, b].map(|value| or_dash(*value, number));
-    writeln!(text, "{figure:<50} {a:>14} {b:>14} {share:>9}  {}", judgement.in_words())
+    writeln!(text, "{figure:<50} {a:>14} {b:>14} {share:>9}  {word}")
 }
 
 fn number(value: f64) -> String {
@@ -101,7 +101,7 @@ const CIRCUMSTANCES: [&str; 4] = ["scenario", "clock", "machine", "masseter"];
 
 /// One run.
 #[derive(Debug, Serialize)]
-pub(super) struct ComparedRun {
+struct ComparedRun {
     pub path: String,
     pub verdict: StoredVerdict,
     #[serde(skip)]
@@ -112,21 +112,21 @@ pub(super) struct ComparedRun {
 
 /// The verdict in a summary.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct StoredVerdict {
+struct StoredVerdict {
     pub word: String,
     pub reason: String,
 }
 
 /// A circumstance in which two runs differ; none where one has no such key.
 #[derive(Debug, PartialEq, Serialize)]
-pub(super) struct Difference {
+struct Difference {
     pub key: String,
     pub a: Option<String>,
     pub b: Option<String>,
 }
 
 impl ComparedRun {
-    pub(super) fn read(path: &Path) -> anyhow::Result<Self> {
+    fn read(path: &Path) -> anyhow::Result<Self> {
         let folder = RunFolder::open(path)?;
         let summary = folder.summary();
         let help = || format!("{}; 'masseter report {}' writes it", summary.display(), path.display());
@@ -136,7 +136,7 @@ impl ComparedRun {
         Self::new(&path.display().to_string(), &found, &circumstances).with_context(help)
     }
 
-    pub(super) fn new(path: &str, summary: &Value, manifest: &Value) -> anyhow::Result<Self> {
+    fn new(path: &str, summary: &Value, manifest: &Value) -> anyhow::Result<Self> {
         let form = &summary["form"];
         ensure!(*form == SUMMARY_FORM, "it has form {form}, this program compares form {SUMMARY_FORM}");
         let Value::Object(_) = &summary["figures"] else { bail!("it has no figures") };
@@ -157,7 +157,7 @@ fn json(path: &Path) -> anyhow::Result<Value> {
     Ok(serde_json::from_str(&read_text(path, MOST_KEPT_BYTES)?)?)
 }
 
-pub(super) fn differences(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>) -> Vec<Difference> {
+fn differences(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>) -> Vec<Difference> {
     let keys: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
     let differing = keys.into_iter().filter(|key| a.get(*key) != b.get(*key));
     let difference =
@@ -173,7 +173,7 @@ const NO_RESULTS: [&str; 6] = ["_noise_", "_at_ns", "events", "worst_cycles", "d
 /// The weight of a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum ChangeJudgement {
+enum ChangeJudgement {
     BeyondSpread,
     WithinSpread,
     SpreadUnknown,
@@ -182,26 +182,18 @@ pub(super) enum ChangeJudgement {
     Same,
 }
 
-impl ChangeJudgement {
-    /// Those of changes, the surest first.
-    pub(super) const CHANGED: [Self; 5] =
-        [Self::BeyondSpread, Self::OnlyInA, Self::OnlyInB, Self::SpreadUnknown, Self::WithinSpread];
-
-    pub(super) fn in_words(self) -> &'static str {
-        match self {
-            Self::BeyondSpread => "beyond spread",
-            Self::WithinSpread => "within spread",
-            Self::SpreadUnknown => "spread unknown",
-            Self::OnlyInA => "only in A",
-            Self::OnlyInB => "only in B",
-            Self::Same => "same",
-        }
-    }
-}
+/// Judgements of changes in words, the surest first.
+const CHANGED: [(ChangeJudgement, &str); 5] = [
+    (ChangeJudgement::BeyondSpread, "beyond spread"),
+    (ChangeJudgement::OnlyInA, "only in A"),
+    (ChangeJudgement::OnlyInB, "only in B"),
+    (ChangeJudgement::SpreadUnknown, "spread unknown"),
+    (ChangeJudgement::WithinSpread, "within spread"),
+];
 
 /// One figure of two runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Change {
+struct Change {
     pub figure: String,
     /// None where the run has no such figure.
     pub a: Option<f64>,
@@ -212,13 +204,13 @@ pub(super) struct Change {
 }
 
 /// Every number by its path.
-pub(super) fn flatten(value: &Value) -> BTreeMap<String, f64> {
+fn flatten(value: &Value) -> BTreeMap<String, f64> {
     let numbers = leaves(value).into_iter().filter(|(_, value)| value.is_number());
     numbers.map(|(path, value)| (path, value.as_f64().unwrap_or(f64::NAN))).collect()
 }
 
 /// Everything that is neither a list nor an object by its path.
-pub(super) fn leaves(value: &Value) -> BTreeMap<String, Value> {
+fn leaves(value: &Value) -> BTreeMap<String, Value> {
     let mut found = BTreeMap::new();
     gather(String::new(), value, &mut found);
     found
@@ -246,7 +238,7 @@ fn name_of(item: &Value) -> Option<String> {
     text("name").or_else(|| text("topic")).or_else(message)
 }
 
-pub(super) fn changes(a: &BTreeMap<String, f64>, b: &BTreeMap<String, f64>) -> Vec<Change> {
+fn changes(a: &BTreeMap<String, f64>, b: &BTreeMap<String, f64>) -> Vec<Change> {
     let names: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
     let results = names.into_iter().filter(|name| !NO_RESULTS.iter().any(|part| name.contains(part)));
     results

@@ -1,4 +1,4 @@
-//! HdrHistogram's interval logs (`*.hlog`): a line for each second, written in format V2 and read as one histogram.
+//! HdrHistogram's interval logs (`*.hlog`): a line for each second, written in format V2.
 
 use std::borrow::Borrow;
 use std::fs::{self, File};
@@ -6,15 +6,11 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 use std::time::Duration;
 
-use data_encoding::BASE64;
 use hdrhistogram::Histogram;
-use hdrhistogram::serialization::interval_log::{
-    IntervalLogIterator, IntervalLogWriterBuilder, IntervalLogWriterError, LogEntry,
-};
-use hdrhistogram::serialization::{Deserializer, V2DeflateSerializer};
+use hdrhistogram::serialization::V2DeflateSerializer;
+use hdrhistogram::serialization::interval_log::{IntervalLogWriterBuilder, IntervalLogWriterError};
 use masseter_analysis::IntervalFigures;
 use masseter_runtime::clock::SECOND_NS;
-use masseter_scenario::input::{MOST_KEPT_BYTES, read_bytes};
 
 use crate::logs::WriteError;
 
@@ -43,7 +39,7 @@ pub(crate) fn write_all(folder: &Path, intervals: &[IntervalFigures]) -> Result<
 /// let mut second = Histogram::new(3)?;
 /// second.record(1000)?;
 /// histogram_log::write(&path, "latency, ns", [(0, &second)])?;
-/// assert_eq!(histogram_log::read(&path)?, second);
+/// assert!(std::fs::read_to_string(&path)?.contains("latency, ns"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn write<H: Borrow<Histogram<u64>>>(
@@ -68,28 +64,33 @@ pub fn write<H: Borrow<Histogram<u64>>>(
     file.flush()
 }
 
-/// Reads all seconds of a log into one histogram.
-pub fn read(path: &Path) -> io::Result<Histogram<u64>> {
-    let text = read_bytes(path, MOST_KEPT_BYTES)?;
-    let mut all = Histogram::new(3).expect("three digits are allowed");
-    for entry in IntervalLogIterator::new(&text) {
-        let entry = entry.map_err(|error| invalid(format!("a line holds no interval: {error:?}")))?;
-        let LogEntry::Interval(interval) = entry else { continue };
-        let bytes = BASE64.decode(interval.encoded_histogram().as_bytes()).map_err(invalid)?;
-        let interval: Histogram<u64> =
-            Deserializer::new().deserialize(&mut bytes.as_slice()).map_err(invalid)?;
-        all.add(interval).map_err(invalid)?;
-    }
-    Ok(all)
-}
-
-fn invalid(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> io::Error {
-    io::Error::new(io::ErrorKind::InvalidData, error)
-}
-
 #[cfg(test)]
 mod tests {
+    use data_encoding::BASE64;
+    use hdrhistogram::serialization::Deserializer;
+    use hdrhistogram::serialization::interval_log::{IntervalLogIterator, LogEntry};
+    use masseter_scenario::input::{MOST_KEPT_BYTES, read_bytes};
+
     use super::*;
+
+    /// Reads all seconds of a log into one histogram.
+    fn read(path: &Path) -> io::Result<Histogram<u64>> {
+        let text = read_bytes(path, MOST_KEPT_BYTES)?;
+        let mut all = Histogram::new(3).expect("three digits are allowed");
+        for entry in IntervalLogIterator::new(&text) {
+            let entry = entry.map_err(|error| invalid(format!("a line holds no interval: {error:?}")))?;
+            let LogEntry::Interval(interval) = entry else { continue };
+            let bytes = BASE64.decode(interval.encoded_histogram().as_bytes()).map_err(invalid)?;
+            let interval: Histogram<u64> =
+                Deserializer::new().deserialize(&mut bytes.as_slice()).map_err(invalid)?;
+            all.add(interval).map_err(invalid)?;
+        }
+        Ok(all)
+    }
+
+    fn invalid(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> io::Error {
+        io::Error::new(io::ErrorKind::InvalidData, error)
+    }
 
     fn seconds() -> [(u64, Histogram<u64>); 2] {
         [(0, 1000), (SECOND_NS, 2000)].map(|(start_ns, value_ns)| {

@@ -119,15 +119,7 @@ fn write_figures(text: &mut String, manifest: &Manifest, figures: &Figures) -> s
     text.push('\n');
     latencies(text, &figures.intervals)?;
     responses(text, &figures.bus_response)?;
-    writeln!(
-        text,
-        "\nskipped cycles: controller {}, plant {}; stalls of the machine while waiting: controller {:.2} ms, plant {:.2} ms",
-        figures.controller_skips.skipped,
-        figures.plant_skips.skipped,
-        figures.controller_skips.stalled_ns as f64 / 1e6,
-        figures.plant_skips.stalled_ns as f64 / 1e6
-    )?;
-    writeln!(text, "{}", readings(&figures.readings))?;
+    writeln!(text, "\nskipped {}\n{}", skips(figures), readings(&figures.readings))?;
     usage(text, &manifest.usage)?;
     losses(text, figures)
 }
@@ -140,6 +132,18 @@ fn latencies(text: &mut String, intervals: &[IntervalFigures]) -> std::fmt::Resu
         writeln!(text, "{}", columns(WIDTHS, [(*name).to_owned(), n.to_string(), p50, p99, p999, max]))?;
     }
     Ok(())
+}
+
+/// Cycles that the loops skipped, and stalls of the machine.
+pub(crate) fn skips(figures: &Figures) -> String {
+    let [controller, plant] = [&figures.controller_skips, &figures.plant_skips];
+    format!(
+        "cycles: controller {}, plant {}; stalls of the machine while waiting: controller {:.2} ms, plant {:.2} ms",
+        controller.skipped,
+        plant.skipped,
+        controller.stalled_ns as f64 / 1e6,
+        plant.stalled_ns as f64 / 1e6
+    )
 }
 
 /// Which readings the controller's cycles used.

@@ -1,6 +1,7 @@
 //! A factor: a key of the scenario that varies, or a fault that is there or not, and the values that it takes. A
 //! [`Setting`] is one of them.
 
+use masseter_scenario::unit_of;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
@@ -10,28 +11,6 @@ const NO_FAULT: &str = "none";
 const LEVELS: usize = 5;
 /// The most levels of a factor.
 const MOST_LEVELS: usize = 10_000;
-
-/// Endings of keys with their units; the longer ending first.
-const ENDINGS: [(&str, &str); 18] = [
-    ("_n_per_m", "N/m"),
-    ("_n_s_per_m", "N s/m"),
-    ("_m_per_s", "m/s"),
-    ("_m_s2", "m/s²"),
-    ("_m_s", "m/s"),
-    ("_per_s", "1/s"),
-    ("_kg", "kg"),
-    ("_hz", "Hz"),
-    ("_deg", "°"),
-    ("_rad", "rad"),
-    ("_mm", "mm"),
-    ("_ms", "ms"),
-    ("_us", "µs"),
-    ("_ns", "ns"),
-    ("_percent", "%"),
-    ("_n", "N"),
-    ("_s", "s"),
-    ("_m", "m"),
-];
 
 /// How the values of a range are spread.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -82,12 +61,7 @@ impl Factor {
 
     /// The unit of its numbers: the given one, or the one with which the key ends.
     pub fn unit(&self) -> &str {
-        let of_key = || {
-            let key = self.key.as_deref()?;
-            let ending = |(ending, unit): &(&str, &'static str)| key.ends_with(ending).then_some(*unit);
-            ENDINGS.iter().find_map(ending)
-        };
-        self.unit.as_deref().or_else(of_key).unwrap_or_default()
+        self.unit.as_deref().or_else(|| unit_of(self.key.as_deref()?)).unwrap_or_default()
     }
 
     /// Whether its values are numbers between two ends, as a search needs them.

@@ -4,8 +4,7 @@ use std::fs::{self, File};
 
 use anyhow::Context;
 use askama::Template;
-use masseter_charts::palette::{BLUE, GREY, VERMILION};
-use masseter_charts::{Axis, Error, Scale, chart, marks, svg};
+use masseter_charts::{Axis, BLUE, Chart, GREY, Look, Scale, Series, VERMILION, drawing};
 use masseter_table::{Column, Table, Values, write_table};
 
 use crate::campaign::Campaign;
@@ -15,9 +14,7 @@ use crate::folder::CampaignFolder;
 use crate::report::{PAGE, Report, WorstCase, percent};
 
 /// Size of a plot, px.
-const SIZE: (u32, u32) = (360, 260);
-/// Radius of a dot, px.
-const DOT: u32 = 3;
+const SIZE: [f64; 2] = [360.0, 260.0];
 /// Room above and below the dots, as a share of their height.
 const ROOM: f64 = 0.08;
 
@@ -61,24 +58,20 @@ fn html(report: &Report<'_>, worst: &[WorstCase]) -> anyhow::Result<String> {
         let link = name.map(|name| format!("worst/{name}/report.html"));
         Some(WorstRow { result, kept, link })
     });
-    let page = Page { report, rate: rate_in_words(report), rows: rows.collect(), plots: plots(report)? };
+    let page = Page { report, rate: rate_in_words(report), rows: rows.collect(), plots: plots(report) };
     Ok(page.render()?)
 }
 
 /// For every check with a margin, a plot a factor.
-fn plots(report: &Report<'_>) -> Result<Vec<(String, Vec<String>)>, Error> {
-    let mut plots = Vec::new();
-    for name in names(&report.results) {
-        let points = |at| points(&report.results, &name, at);
-        if points(0).is_empty() {
-            continue;
-        }
-        let factors = report.campaign.file.factors.iter().enumerate();
-        let drawn: Result<Vec<_>, _> =
-            factors.map(|(at, factor)| plot(factor, &report.results, at, &points(at))).collect();
-        plots.push((name, drawn?));
-    }
-    Ok(plots)
+fn plots(report: &Report<'_>) -> Vec<(String, Vec<String>)> {
+    let results = &report.results;
+    let factors = || report.campaign.file.factors.iter().enumerate();
+    let has_points = |name: &String| !points(results, name, 0).is_empty();
+    let drawn = |name: &str| {
+        let plots = factors().map(|(at, factor)| plot(factor, results, at, &points(results, name, at)));
+        plots.collect()
+    };
+    names(results).into_iter().filter(has_points).map(|name| (name.clone(), drawn(&name))).collect()
 }
 
 /// A case in a plot: the value of a factor, the margin in percent, and whether the case passed.
@@ -110,38 +103,32 @@ fn categories(results: &[CaseResult], factor: usize) -> Vec<String> {
     in_order_of_appearance(settings().map(Setting::word))
 }
 
-fn plot(factor: &Factor, results: &[CaseResult], at: usize, points: &[Point]) -> Result<String, Error> {
+fn plot(factor: &Factor, results: &[CaseResult], at: usize, points: &[Point]) -> String {
     let unit = factor.unit();
     let label = if unit.is_empty() { factor.name().to_owned() } else { format!("{}, {unit}", factor.name()) };
     let categories = categories(results, at);
-    let x = if categories.is_empty() {
-        Axis::new(&label, scale(factor), ends(points.iter().map(|point| point.x), 0.0))
-    } else {
-        Axis::of_names(&label, categories)
+    let mut x = Axis::around(&label, points.iter().map(|point| point.x), 0.0);
+    if !categories.is_empty() {
+        let ends = [-0.5, categories.len() as f64 - 0.5];
+        x = Axis { scale: Scale::Names(categories), ends, ..x };
+    } else if factor.distribution == Distribution::LogUniform {
+        x.scale = Scale::Log;
+    }
+    let margins = points.iter().map(|point| point.margin_percent);
+    let dots = |has_passed: bool, colour| {
+        let dots = points.iter().filter(|point| point.has_passed == has_passed);
+        let points = dots.map(|point| (point.x, point.margin_percent)).collect();
+        Series { name: String::new(), colour, look: Look::Dots, points }
     };
-    let y_ends = ends(points.iter().map(|point| point.margin_percent).chain([0.0]), ROOM);
-    svg(SIZE, |area| {
-        let mut chart = chart(area, "", x, Axis::new("margin, % of limit", Scale::Linear, y_ends))?;
-        let x_ends = chart.x_range();
-        let zero = [(x_ends.start, 0.0), (x_ends.end, 0.0)];
-        chart.draw_series(plotters::prelude::LineSeries::new(zero, GREY))?;
-        for (has_passed, colour) in [(true, BLUE), (false, VERMILION)] {
-            let dots = points.iter().filter(|point| point.has_passed == has_passed);
-            marks(&mut chart, dots.map(|point| (point.x, point.margin_percent)), DOT, colour)?;
-        }
-        Ok(())
-    })
-}
-
-fn scale(factor: &Factor) -> Scale {
-    if factor.distribution == Distribution::LogUniform { Scale::Log } else { Scale::Linear }
-}
-
-fn ends(values: impl Iterator<Item = f64> + Clone, room: f64) -> [f64; 2] {
-    let low = values.clone().fold(f64::INFINITY, f64::min);
-    let high = values.fold(f64::NEG_INFINITY, f64::max);
-    let room = (high - low) * room;
-    [low - room, high + room]
+    let zero = x.ends.map(|end| (end, 0.0)).to_vec();
+    let series = vec![
+        Series { name: String::new(), colour: GREY, look: Look::Line, points: zero },
+        dots(true, BLUE),
+        dots(false, VERMILION),
+    ];
+    let [width, height] = SIZE;
+    let y = Axis::around("margin, % of limit", margins.chain([0.0]), ROOM);
+    drawing(SIZE, &[Chart { frame: [0.0, 0.0, width, height], title: String::new(), x, y, series }])
 }
 
 /// The rate with its interval, and the demanded one.

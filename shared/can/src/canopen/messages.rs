@@ -119,7 +119,7 @@ impl Heartbeat {
 }
 
 /// Emergency error code. Every number is a valid code; the constants are common codes of CiA 301 and 402.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub struct EmergencyCode(pub u16);
 
 impl EmergencyCode {

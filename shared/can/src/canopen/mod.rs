@@ -23,7 +23,7 @@ pub use sdo::{AbortCode, Expedited, SdoError, SdoRequest, SdoResponse, Segment};
 pub struct NodeIdError(pub u8);
 
 /// A CANopen node id, 1 to 127.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub struct NodeId(u8);
 
 impl NodeId {
@@ -48,7 +48,7 @@ impl fmt::Display for NodeId {
 }
 
 /// Index and sub-index (the "multiplexer" of CiA 301).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub struct ObjectAddress {
     /// Index.
     pub index: u16,

@@ -266,7 +266,7 @@ impl Message {
 
 /// The value in an expedited message: 1 to 4 bytes. Without a size in the message there are 4 bytes, and the receiver
 /// must know how many of them are the value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Expedited {
     /// Bytes beyond `length` are zero.
     bytes: [u8; Self::MAX],
@@ -339,7 +339,7 @@ impl Segment {
 }
 
 /// Abort code. Every number is a valid code; the codes of the standard have names and meanings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub struct AbortCode(pub u32);
 
 macro_rules! abort_codes {

@@ -21,7 +21,7 @@ pub(super) const SEQUENCE_BITS: u32 = 11;
 ///
 /// Not counted: the receiver's +8 for a dominant bit behind its own error flag, which distinguishes the disturbing node
 /// from the others; a simulated receiver never disturbs by itself.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Confinement {
     tec: u16,
     rec: u16,
@@ -29,7 +29,7 @@ pub(super) struct Confinement {
 }
 
 /// Off the bus.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Off {
     /// When the host restarts, or did restart, the controller; `None` without a restart.
     restart_ns: Option<u64>,
@@ -131,7 +131,7 @@ impl Confinement {
 }
 
 /// A frame waiting for the wire.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(super) struct Queued {
     pub(super) frame: Frame,
     /// Its duration on the wire, interframe space included, computed once, since arbitration needs it many times.
@@ -146,7 +146,7 @@ impl Queued {
 }
 
 /// Frames in the order of priority; those of one identifier in the order they were queued.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct TransmitQueue {
     pub(super) frames: Vec<Queued>,
     capacity: usize,
@@ -185,7 +185,7 @@ impl TransmitQueue {
 }
 
 /// Received items that are not fetched yet, oldest first. An item that does not fit is lost and counted.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct ReceiveQueue<T> {
     /// Items with their times of arrival, ns.
     arrived: VecDeque<(u64, T)>,

@@ -41,7 +41,7 @@ pub use nodes::WireConfig;
 use nodes::{Nodes, PortSet, Station, Transmission};
 
 /// A simulated wire and the ports on it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct VirtualWire {
     nodes: Nodes,
     traffic: Traffic,
@@ -60,7 +60,7 @@ pub struct Port<'a> {
 }
 
 /// The present or next transmission.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 enum Traffic {
     /// The wire is idle, and the next transmission is not computed yet.
     Unknown,

@@ -15,7 +15,7 @@ const LATE_FLAG_BITS: u32 = 7;
 const SUSPEND_BITS: u32 = 8;
 
 /// What a wire is made of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct WireConfig {
     /// Bit rate.
     pub bitrate: Bitrate,
@@ -30,7 +30,7 @@ pub struct WireConfig {
 }
 
 /// A port with its controller.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Station {
     pub(super) transmit: TransmitQueue,
     pub(super) receive: ReceiveQueue<Received>,
@@ -42,7 +42,7 @@ pub(super) struct Station {
 }
 
 /// All nodes, their faults, and the state and the tap of the wire between them.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Nodes {
     pub(super) config: WireConfig,
     pub(super) stations: Vec<Station>,
@@ -56,7 +56,7 @@ pub(super) struct Nodes {
 }
 
 /// A set of ports.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct PortSet(u64);
 
 impl PortSet {
@@ -87,7 +87,7 @@ impl PortSet {
 }
 
 /// A transmission of a frame, which stays queued until the transmission has ended.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(super) struct Transmission {
     frame: Frame,
     queued_ns: u64,
@@ -104,7 +104,7 @@ pub(super) struct Transmission {
 }
 
 /// How a transmission ends.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 enum TransmissionOutcome {
     /// All nodes receive the frame.
     Received,
@@ -115,7 +115,7 @@ enum TransmissionOutcome {
 }
 
 /// The result of an arbitration: ports that send one identifier at once.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 struct ArbitrationResult {
     /// All ports with the same frame.
     senders: PortSet,

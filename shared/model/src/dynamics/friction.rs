@@ -15,7 +15,7 @@ const LEG_SHARE: f64 = 0.25;
 const TURN_RAD_S: f64 = 0.01;
 
 /// Forces and moments that joints carry, all of them not negative.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Loads {
     /// Normal force on the guide of each slide, N.
     pub guide_n: [f64; LEGS],

@@ -6,28 +6,33 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 use super::{Actuators, Joints, LEGS, Legs, Pose, StrokeLimits, Vec3};
+use crate::section::Range;
 
-/// One slide in the base plane.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SlideConfig {
-    /// The middle of the slide (hinge Bᵢ at dᵢ = 0), x and y in the base plane, metres.
-    pub centre_m: [f64; 2],
-    /// Direction of positive displacement ûᵢ, degrees from the base's x axis, counter-clockwise.
-    /// The leg swings in the vertical plane perpendicular to it; inward is 90° further on.
-    pub azimuth_deg: f64,
+keys! {
+    /// One slide in the base plane.
+    #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct SlideConfig {
+        /// The middle of the slide (hinge Bᵢ at dᵢ = 0), x and y in the base plane.
+        pub centre_m: [f64; 2] => Within(-LONGEST_M, LONGEST_M) "not all on a line",
+        /// Direction of positive displacement ûᵢ from the base's x axis, counter-clockwise. The leg swings in the vertical
+        /// plane perpendicular to it; inward is 90° further on.
+        pub azimuth_deg: f64 => "the leg must lean inward",
+    }
 }
 
-/// The dimensions in a scenario. The default is the paper's mechanism.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct MechanismConfig {
-    /// Slides 1, 2, 3.
-    pub slides: [SlideConfig; LEGS],
-    /// Sides of the platform triangle: A₁A₂, A₂A₃, A₃A₁, metres.
-    pub platform_sides_m: [f64; LEGS],
-    /// Strokes of slides and legs.
-    pub strokes: StrokeLimits,
+keys! {
+    /// The dimensions in a scenario. The default is the paper's mechanism.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields, default)]
+    pub struct MechanismConfig {
+        /// Slides 1, 2, 3.
+        pub slides: [SlideConfig; LEGS],
+        /// Sides of the platform triangle: A₁A₂, A₂A₃, A₃A₁.
+        pub platform_sides_m: [f64; LEGS] => Within(SHORTEST_SIDE_M, LONGEST_M) "a triangle",
+        /// Strokes of slides and legs.
+        pub strokes: StrokeLimits,
+    }
 }
 
 impl Default for MechanismConfig {
@@ -265,17 +270,18 @@ pub fn frame_of_corners([a1, a2, a3]: &[Vec3; LEGS]) -> Pose {
 }
 
 fn check_sizes(config: &MechanismConfig) -> Result<(), GeometryError> {
-    let MechanismConfig { slides, platform_sides_m, strokes } = config;
-    let centres = slides.iter().flat_map(|slide| slide.centre_m.map(|m| ("slides.centre_m", m, -LONGEST_M)));
-    let ends = strokes.slide_m.into_iter().chain(strokes.leg_m).map(|end_m| ("strokes", end_m, -LONGEST_M));
-    let sides = platform_sides_m.map(|side_m| ("platform_sides_m", side_m, SHORTEST_SIDE_M));
-    for (name, value_m, least_m) in centres.chain(ends).chain(sides) {
-        if !(least_m..=LONGEST_M).contains(&value_m) {
-            let range = format!("use {least_m} to {LONGEST_M} m");
-            return Err(GeometryError(format!("{name}: {value_m:e} m; {range}")));
-        }
-    }
-    Ok(())
+    let strokes = &config.strokes;
+    let require = |name: &str, range: Range, value_m: f64| {
+        let refusal = || GeometryError(format!("{name}: {value_m:e} m; use {range} m"));
+        if range.contains(value_m) { Ok(()) } else { Err(refusal()) }
+    };
+    config
+        .slides
+        .iter()
+        .try_for_each(|slide| slide.check_ranges(|_, range, m| require("slides.centre_m", range, m)))?;
+    let mut ends_m = strokes.slide_m.into_iter().chain(strokes.leg_m);
+    ends_m.try_for_each(|end_m| require("strokes", Range::Within(-LONGEST_M, LONGEST_M), end_m))?;
+    config.check_ranges(require)
 }
 
 fn check_strokes(strokes: &StrokeLimits) -> Result<(), GeometryError> {

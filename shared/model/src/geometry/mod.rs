@@ -33,7 +33,7 @@ pub const AXES: usize = 2 * LEGS;
 pub const AXIS_NAMES: [&str; AXES] = ["d1", "d2", "d3", "l1", "l2", "l3"];
 
 /// The inputs of the forward kinematics: slide displacements and leg lengths.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Actuators {
     /// dᵢ: displacement of hinge Bᵢ from the middle of its slide, metres.
     pub slide_m: [f64; LEGS],
@@ -81,14 +81,16 @@ pub struct Legs {
     pub arms_m: [Vec3; LEGS],
 }
 
-/// The strokes of slides and legs, both ends included.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct StrokeLimits {
-    /// Slide displacement, lowest and highest, metres.
-    pub slide_m: [f64; 2],
-    /// Leg length, lowest and highest, metres.
-    pub leg_m: [f64; 2],
+keys! {
+    /// The strokes of slides and legs, both ends included.
+    #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct StrokeLimits {
+        /// Lowest and highest displacement of a slide.
+        pub slide_m: [f64; 2] => "the first below the second",
+        /// Shortest and longest leg.
+        pub leg_m: [f64; 2] => "above 0, the first below the second",
+    }
 }
 
 /// An axis outside its stroke.

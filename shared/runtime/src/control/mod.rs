@@ -34,6 +34,20 @@ pub enum Outcome {
     SafeStop,
 }
 
+/// A controller, or a pose law, whose state cannot be copied: it has no `branch`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{0} cannot be branched, since nobody but itself can copy its state; write its `branch`, or use a controller of the rig"
+)]
+pub struct NoBranch(pub &'static str);
+
+impl NoBranch {
+    /// The refusal of that type.
+    pub fn of<T: ?Sized>() -> Self {
+        Self(std::any::type_name::<T>())
+    }
+}
+
 /// A controller of the robot. Time and messages come in as arguments; no method may block, allocate or do I/O.
 ///
 /// Each cycle calls, in this order: [`observe`](Self::observe), [`decide`](Self::decide),
@@ -113,6 +127,14 @@ pub trait Controller {
 
     /// Does work of the next cycle once in advance and without effect, so that its code and data are in the caches.
     fn warm_up(&self) {}
+
+    /// A copy of the controller with its whole state, which goes on by itself as this one would. Not part of a cycle.
+    ///
+    /// # Errors
+    /// [`NoBranch`] for a controller that has none.
+    fn branch(&self) -> Result<Box<dyn Controller>, NoBranch> {
+        Err(NoBranch::of::<Self>())
+    }
 }
 
 /// The source and the destinations of a controller's messages, and the clock of its stamps.
@@ -171,7 +193,8 @@ pub trait ControllerPorts {
 }
 
 /// What accompanies a controller through a run: the values of its named numbers, and the operator of the scenario.
-#[derive(Debug)]
+/// A clone has settings of its own.
+#[derive(Debug, Clone)]
 pub struct Duties {
     /// The signals and parameters.
     pub named: NamedValues,

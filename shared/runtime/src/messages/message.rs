@@ -70,6 +70,19 @@ macro_rules! messages {
             $($(#[doc = $field_doc])* pub $field: $type,)*
         }
 
+        impl serde::Serialize for $name {
+            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                self.body().serialize(serializer)
+            }
+        }
+
+        impl<'de> serde::Deserialize<'de> for $name {
+            fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                let body = Vec::<u8>::deserialize(deserializer)?;
+                Self::from_body(&body).ok_or_else(|| serde::de::Error::custom("no body of this message"))
+            }
+        }
+
         impl Default for $name {
             /// All zeros.
             fn default() -> Self {

@@ -364,6 +364,16 @@ pub struct NamedValues {
     is_changed: bool,
 }
 
+impl Clone for NamedValues {
+    /// The same values, with settings of their own: whoever sets these sets no others.
+    fn clone(&self) -> Self {
+        let Self { settings, parameters, signals, is_changed } = self;
+        let wanted = array::from_fn(|place| AtomicU64::new(settings.value(place).to_bits()));
+        let settings = Arc::new(Settings { declared: settings.declared.clone(), wanted });
+        Self { settings, parameters: *parameters, signals: *signals, is_changed: *is_changed }
+    }
+}
+
 impl NamedValues {
     /// The values at the start: the declared ones, or those given for parameters by their names.
     ///

@@ -59,7 +59,7 @@ pub struct Cycle {
 }
 
 /// A reached deadline.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Wake {
     /// Number of the deadline, from 1.
     pub cycle: u64,
@@ -131,7 +131,7 @@ impl Cycle {
 }
 
 /// The use of a task's time since its first wait, ns.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Account {
     /// Stalls of the machine while waiting: late ends of sleeps, and gaps while spinning.
     pub stalled_ns: u64,

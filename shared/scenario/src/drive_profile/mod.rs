@@ -15,9 +15,7 @@ use masseter_model::geometry::{AXES, AXIS_NAMES};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::error::{
-    Checked, ScenarioError, keyed, require, require_each, require_not_negative, require_positive,
-};
+use super::error::{Checked, ScenarioError, ranges_of, require, require_axes, require_each};
 use super::merge::Given;
 use object::add_dcf_objects;
 
@@ -32,24 +30,25 @@ static EMULATED: LazyLock<DriveProfile> = LazyLock::new(DriveProfile::default);
 section! {
     /// One kind of drive, and the axes that have such a drive.
     pub struct DriveProfile {
-        /// The kind whose values the other keys replace: `emulated`, `epos4` or `n5`.
+        /// The profile whose values the other keys replace.
         pub kind: String = "emulated".to_owned(),
         /// Where the values come from.
         pub source: String = "the emulated drives".to_owned(),
-        /// The axes with this drive: d1 to l3.
-        pub axes: Vec<String> = AXIS_NAMES.map(str::to_owned).to_vec(),
+        /// The axes with this drive.
+        pub axes: Vec<String> = AXIS_NAMES.map(str::to_owned).to_vec() => "each axis in one profile",
         /// The axes whose 6064h falls where d or l grows.
-        pub reversed: Vec<String> = Vec::new(),
-        /// A device configuration file, whose `ParameterValue`s and limits become `objects`. Relative to the scenario.
-        pub dcf: Option<PathBuf> = None,
+        pub reversed: Vec<String> = Vec::new() => "axes",
+        /// A device configuration file (CiA 306), relative to the scenario: its `ParameterValue`s and limits become
+        /// `objects`.
+        pub dcf: Option<PathBuf> = None => "path",
         /// What the drive reports of itself.
-        pub identity: IdentityConfig = IdentityConfig::EMULATED,
+        pub identity: IdentityConfig = IdentityConfig::default(),
         /// What the drive's numbers count.
         pub units: UnitsConfig = UnitsConfig::default(),
         /// What the process data carry.
         pub pdos: PdosConfig = PdosConfig::default(),
         /// Single objects, such as `"6066h" = { rule = "absent" }`.
-        pub objects: BTreeMap<ObjectKey, ObjectConfig> = BTreeMap::new(),
+        pub objects: BTreeMap<ObjectKey, ObjectConfig> = BTreeMap::new() => "see below",
         /// How the drive stores its objects.
         pub store: StoreConfig = StoreConfig::default(),
         /// The brake.
@@ -63,10 +62,10 @@ section! {
     /// Storing in the drive's non-volatile memory (1010h).
     #[derive(Copy, Eq)]
     pub struct StoreConfig {
-        /// Sub-index of 1010h that stores all.
+        /// The sub-index of 1010h that stores everything.
         pub subindex: u8 = 1,
-        /// How long storing may take, ms.
-        pub timeout_ms: u32 = 10_000,
+        /// How long storing may take.
+        pub timeout_ms: u32 = 10_000 => Positive,
     }
 }
 
@@ -74,10 +73,10 @@ section! {
     /// The brake that the drive operates.
     #[derive(Copy)]
     pub struct BrakeConfig {
-        /// From "operation enabled" to the moment when the axis may move, s.
-        pub open_s: f64 = 0.0,
-        /// From the end of "operation enabled" to the moment when the brake holds, s.
-        pub close_s: f64 = 0.0,
+        /// From "operation enabled" until the axis may move.
+        pub open_s: f64 = 0.0 => NotNegative,
+        /// From the end of "operation enabled" until the brake holds.
+        pub close_s: f64 = 0.0 => NotNegative,
     }
 }
 
@@ -110,12 +109,8 @@ impl DriveProfile {
     }
 
     fn validate(&self, taken: &mut [bool; AXES]) -> Checked {
-        for (key, names) in [("drive_profile.axes", &self.axes), ("drive_profile.reversed", &self.reversed)] {
-            if let Some(name) = names.iter().find(|name| !AXIS_NAMES.contains(&name.as_str())) {
-                let need = format!("name axes: {}", AXIS_NAMES.join(", "));
-                return Err(ScenarioError::bad(key, &format!("'{name}'"), need));
-            }
-        }
+        require_axes("drive_profile.axes", &self.axes)?;
+        require_axes("drive_profile.reversed", &self.reversed)?;
         for (axis, name) in AXIS_NAMES.iter().enumerate() {
             let is_twice =
                 self.axes.iter().any(|named| named == name) && std::mem::replace(&mut taken[axis], true);
@@ -126,9 +121,8 @@ impl DriveProfile {
         self.pdos.validate()?;
         self.units.validate()?;
         self.homing.validate()?;
-        require_not_negative("drive_profile.brake.open_s", self.brake.open_s)?;
-        require_not_negative("drive_profile.brake.close_s", self.brake.close_s)?;
-        require_positive(&keyed!("drive_profile.store", self.store, timeout_ms))
+        self.brake.check_ranges(ranges_of("drive_profile.brake"))?;
+        self.store.check_ranges(ranges_of("drive_profile.store"))
     }
 }
 
@@ -139,35 +133,23 @@ pub(super) fn over_kinds<'de, D: Deserializer<'de>>(list: D) -> Result<Vec<Drive
 }
 
 section! {
-    /// The identity that the master checks before it writes to a drive.
+    /// The identity that the master checks before it writes to a drive. The default is that of the emulated drives, servo
+    /// drives of CiA 402; the number of their vendor is not registered with CiA.
     #[derive(Copy, Eq)]
     pub struct IdentityConfig {
         /// Device type (object 1000).
-        pub device_type: u32 = Self::EMULATED.device_type,
+        pub device_type: u32 = 0x0002_0192,
         /// Vendor (object 1018:01).
-        pub vendor_id: u32 = Self::EMULATED.vendor_id,
+        pub vendor_id: u32 = 0x004D_5354,
         /// Product (object 1018:02).
-        pub product_code: u32 = Self::EMULATED.product_code,
+        pub product_code: u32 = 0x0000_0402,
         /// The bits of the product code that must be equal.
         pub product_mask: u32 = u32::MAX,
         /// Revision (object 1018:03).
-        pub revision: u32 = Self::EMULATED.revision,
+        pub revision: u32 = 0x0001_0000,
         /// The bits of the revision that must be equal.
         pub revision_mask: u32 = u32::MAX,
     }
-}
-
-impl IdentityConfig {
-    /// The emulated drives: servo drives of CiA 402. The vendor number is not registered with
-    /// CiA.
-    pub const EMULATED: Self = Self {
-        device_type: 0x0002_0192,
-        vendor_id: 0x004D_5354,
-        product_code: 0x0000_0402,
-        product_mask: u32::MAX,
-        revision: 0x0001_0000,
-        revision_mask: u32::MAX,
-    };
 }
 
 /// Unit of the drive's velocities (6081h, 6099h).
@@ -227,14 +209,14 @@ section! {
     /// What the drive's numbers count. Positions are always increments of 6064h.
     #[derive(Copy)]
     pub struct UnitsConfig {
-        /// Unit of velocities.
+        /// Unit of velocities: 6081h and 6099h (60A9h).
         pub velocity: VelocityUnit = VelocityUnit::default(),
-        /// Unit of accelerations.
+        /// Unit of accelerations: 6083h to 6085h and 609Ah (60AAh).
         pub acceleration: AccelerationUnit = AccelerationUnit::default(),
         /// Turns of the motor for one of the screw (6091h).
-        pub gear_ratio: f64 = 1.0,
-        /// Travel of the axis for one turn of the screw (6092h), m; needed where the drive counts turns.
-        pub lead_m: Option<f64> = None,
+        pub gear_ratio: f64 = 1.0 => Positive,
+        /// Travel of the axis for one turn of the screw (6092h); needed where the drive counts turns.
+        pub lead_m: Option<f64> = None => Positive,
     }
 }
 
@@ -245,24 +227,22 @@ impl UnitsConfig {
     }
 
     fn validate(&self) -> Checked {
-        require_positive(&keyed!("drive_profile.units", self, gear_ratio))?;
+        self.check_ranges(ranges_of("drive_profile.units"))?;
         let counts_turns =
             self.velocity == VelocityUnit::Rpm || self.acceleration == AccelerationUnit::RpmPerS;
         let need = "enter the travel of a turn of the screw: the drive counts turns of the motor";
-        match self.lead_m {
-            Some(lead_m) => require_positive(&[("drive_profile.units.lead_m", lead_m)]),
-            None => require(!counts_turns, "drive_profile.units.lead_m", &"none", need),
-        }
+        let is_known = self.lead_m.is_some() || !counts_turns;
+        require(is_known, "drive_profile.units.lead_m", &"none", need)
     }
 }
 
 section! {
     /// The objects of the process data in their order. RPDO1 may also carry the torque offset (60B2h).
     pub struct PdosConfig {
-        /// Objects of RPDO1.
-        pub rpdo1: Vec<ObjectKey> = object_keys(&PdoMapping::RPDO1),
-        /// Objects of TPDO1.
-        pub tpdo1: Vec<ObjectKey> = object_keys(&PdoMapping::TPDO1),
+        /// Objects of RPDO1: controlword, target position, torque offset.
+        pub rpdo1: Vec<ObjectKey> = object_keys(&PdoMapping::RPDO1) => "6040h and 607Ah; 60B2h too",
+        /// Objects of TPDO1: statusword, position, torque.
+        pub tpdo1: Vec<ObjectKey> = object_keys(&PdoMapping::TPDO1) => "these three",
     }
 }
 
@@ -308,22 +288,22 @@ section! {
         pub method: i8 = 37,
         /// Whether the encoder keeps its position without power: then the drive is compared and not moved.
         pub absolute: bool = true,
-        /// d or l at the home position, m; absent where the drive's own zero is right.
+        /// d or l at the home position; absent where the drive's own zero is right.
         pub home_position_m: Option<f64> = None,
         /// The object that sets 6064h at home.
         pub home_object: ObjectKey = ObjectKey(ObjectAddress::new(0x607C, 0)),
-        /// Its sign: −1 for the standard's, where 6064h becomes minus the offset.
-        pub home_sign: i8 = -1,
+        /// Its sign: by the standard 6064h becomes minus the offset.
+        pub home_sign: i8 = -1 => "-1 or 1",
         /// Whether the software limits (607Dh) count from home; otherwise from the zero of 6064h.
         pub limits_from_home: bool = true,
-        /// Speed of the search for the switch (6099h:01), m/s.
-        pub speed_m_s: f64 = 0.02,
-        /// Speed of the search for the zero (6099h:02), m/s.
-        pub zero_speed_m_s: f64 = 0.004,
-        /// Acceleration (609Ah), m/s².
-        pub acceleration_m_s2: f64 = 0.5,
-        /// How far a second homing may be from the first, m.
-        pub tolerance_m: f64 = 5e-5,
+        /// Speed of the search for the switch (6099h:01).
+        pub speed_m_s: f64 = 0.02 => Positive,
+        /// Speed of the search for the zero (6099h:02).
+        pub zero_speed_m_s: f64 = 0.004 => Positive,
+        /// Acceleration (609Ah).
+        pub acceleration_m_s2: f64 = 0.5 => Positive,
+        /// How far a second homing may be from the first.
+        pub tolerance_m: f64 = 5e-5 => Positive,
     }
 }
 
@@ -340,9 +320,7 @@ impl HomingConfig {
     }
 
     fn validate(&self) -> Checked {
-        require_positive(&keyed!("drive_profile.homing", self,
-            speed_m_s zero_speed_m_s acceleration_m_s2 tolerance_m
-        ))?;
+        self.check_ranges(ranges_of("drive_profile.homing"))?;
         let need = "use -1 (6064h becomes minus the offset) or 1";
         require(matches!(self.home_sign, -1 | 1), "drive_profile.homing.home_sign", &self.home_sign, need)?;
         let is_number = self.home_position_m.is_none_or(f64::is_finite);

@@ -54,7 +54,7 @@ macro_rules! fault_kinds {
 
         $(
             $(#[doc = $part])+
-            #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+            #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
             pub enum $faults {
                 $($(#[doc = $doc])+ $kind,)*
             }

@@ -7,9 +7,10 @@ use std::iter;
 
 use masseter_model::geometry::AXIS_NAMES;
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use super::can::{CanConfig, MASTER_NODE};
-use super::error::{Checked, ScenarioError, bounded, require, require_keys, require_name, require_within};
+use super::error::{Checked, LONGEST_S, ScenarioError, ranges_of, require, require_keys, require_name};
 use super::quantity::Quantity;
 use super::when::{EntryNames, When, WhenKeys};
 
@@ -18,43 +19,44 @@ pub use kinds::{
     FaultSize, PlatformFault, ProcessFault,
 };
 
-/// One fault.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FaultConfig {
-    /// The kind of the fault.
-    pub kind: FaultKindConfig,
-    /// Its name in requirements and in `after`; that of its kind when absent.
-    pub name: Option<String>,
-    /// From when on, s since the motion began, or since `after`.
-    pub at_s: Option<f64>,
-    /// What `at_s` counts from: `fault.NAME`, `stimulus.NAME` or `controller.STATE`.
-    pub after: Option<String>,
-    /// For how long, s; to the end when absent.
-    pub for_s: Option<f64>,
-    /// From when on, s since the rig was switched on: instead of `at_s`.
-    pub from_s: Option<f64>,
-    /// Until when, s since the rig was switched on: instead of `for_s`.
-    pub until_s: Option<f64>,
-    /// Bus, from 0.
-    pub bus: Option<usize>,
-    /// Node id concerned: the sender of a frame, the receiver that loses it, or the node itself. All when
-    /// absent; never absent where a node babbles, is cut off or goes off the bus.
-    pub node: Option<u8>,
-    /// COB-ID of the frames concerned, or of those that are babbled (11 bits); all when absent.
-    pub id: Option<u16>,
-    /// Bytes of the frames that are babbled, at most eight.
-    pub data: Option<Vec<u8>>,
-    /// Axis concerned: d1 to l3.
-    pub axis: Option<String>,
-    /// How much, with its unit; what that is depends on the kind.
-    pub size: Option<Quantity>,
-    /// Probability that the fault acts on a frame, above 0 to 1; only for kinds that act on single frames.
-    #[serde(default = "always")]
-    pub probability: f64,
-    /// Activations after which the fault ends; when absent one for bus-off, any number for the others. A disconnection ends by
-    /// its time alone.
-    pub count: Option<u64>,
+keys! {
+    /// One fault.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct FaultConfig {
+        /// The kind of fault.
+        pub kind: FaultKindConfig => "as above",
+        /// Name in requirements and in `after`; by default that of the kind.
+        pub name: Option<String> => "1 to 64 lower-case letters, digits, `_`",
+        /// Beginning, since the motion began or since `after`; this or `from_s` is required.
+        pub at_s: Option<f64> => NotNegative,
+        /// What `at_s` counts from.
+        pub after: Option<String> => "`fault.NAME`, `stimulus.NAME`, `controller.STATE`; no circle",
+        /// How long the fault acts; by default to the end of the run.
+        pub for_s: Option<f64> => UpTo(LONGEST_S),
+        /// Beginning, since the rig was switched on, instead of `at_s`.
+        pub from_s: Option<f64> => NotNegative,
+        /// End, since the rig was switched on, instead of `for_s`.
+        pub until_s: Option<f64> => "above `from_s`",
+        /// The bus.
+        pub bus: Option<usize> => "a bus of `can.buses`, from 0",
+        /// The sender of a frame, the receiver that loses it, or the node itself; by default all.
+        pub node: Option<u8> => "a node of the bus",
+        /// COB-ID of the frames, by default all; for `babble` that of its frames, by default 001h.
+        pub id: Option<u16> => "0 to 0x7FF",
+        /// Bytes of the frames of `babble`. With `id = 0`, `count = 1` and the bytes `[0x81, 4]` another master resets node
+        /// 4.
+        pub data: Option<Vec<u8>> => "up to 8 bytes, such as `[0x81, 4]`",
+        /// The axis.
+        pub axis: Option<String> => "`d1` to `l3`",
+        /// How much.
+        pub size: Option<Quantity> => "as above, with its unit, such as `\"0.5 mm\"`",
+        /// Chance that the fault acts on a frame.
+        #[serde(default = "always")]
+        pub probability: f64 => UpTo(1.0),
+        /// Activations after which the fault ends; by default one for `bus_off`, unlimited for the others.
+        pub count: Option<u64> => "above 0",
+    }
 }
 
 const fn always() -> f64 {
@@ -80,23 +82,8 @@ impl Display for FaultConfig {
 impl FaultConfig {
     /// A fault of that kind, with no time and no place yet.
     pub fn new(kind: impl Into<FaultKindConfig>) -> Self {
-        Self {
-            kind: kind.into(),
-            name: None,
-            at_s: None,
-            after: None,
-            for_s: None,
-            from_s: None,
-            until_s: None,
-            bus: None,
-            node: None,
-            id: None,
-            data: None,
-            axis: None,
-            size: None,
-            probability: 1.0,
-            count: None,
-        }
+        let kind: FaultKindConfig = kind.into();
+        serde_json::from_value(json!({ "kind": kind })).expect("a kind alone is a fault")
     }
 
     /// Its name in requirements.
@@ -120,11 +107,9 @@ impl FaultConfig {
     /// # Errors
     /// Where that is missing, contradictory, or names nothing of the scenario.
     pub fn when(&self, entries: &EntryNames<'_>) -> Result<When, ScenarioError> {
-        let names = ["faults.at_s", "faults.after", "faults.for_s", "faults.from_s", "faults.until_s"];
-        let Self { at_s, after, for_s, from_s, until_s, .. } = self;
-        let after = after.as_deref();
-        WhenKeys { names, at_s: *at_s, after, for_s: *for_s, from_s: *from_s, until_s: *until_s }
-            .resolve(entries)
+        let Self { at_s, ref after, for_s, from_s, until_s, .. } = *self;
+        let keys = WhenKeys { at_s, after: after.as_deref(), for_s, from_s, until_s };
+        keys.resolve(entries).map_err(|refusal| refusal.in_table("faults"))
     }
 
     /// Checks one fault of the list.
@@ -133,7 +118,7 @@ impl FaultConfig {
         self.name.as_ref().map_or(Ok(()), |name| require_name("faults.name", name))?;
         self.require_keys()?;
         let (name, is_axis) = (self.axis.as_deref().unwrap_or_default(), self.axis().is_some());
-        require(is_axis || self.axis.is_none(), "faults.axis", &name, self.need_of("faults.axis"))?;
+        require(is_axis || self.axis.is_none(), "faults.axis", &name, self.need_of("axis"))?;
         self.require_size()?;
         self.require_ranges()?;
         match self.kind {
@@ -151,26 +136,19 @@ impl FaultConfig {
 
     /// Refuses keys that have no effect on this kind, and requires those that it needs.
     fn require_keys(&self) -> Checked {
-        let given = [
-            ("faults.bus", self.bus.is_some()),
-            ("faults.node", self.node.is_some()),
-            ("faults.id", self.id.is_some()),
-            ("faults.data", self.data.is_some()),
-            ("faults.axis", self.axis.is_some()),
-            ("faults.size", self.size.is_some()),
-            ("faults.probability", self.probability < 1.0),
-            ("faults.count", self.count.is_some()),
-        ];
         let FaultDeclaration { name, needs, takes, .. } = self.kind.declared();
-        require_keys(name, [needs, takes], &given, |key| self.need_of(key))
+        let of_any = |key: &&str| FaultKindConfig::ALL.iter().any(|kind| kind.takes(key));
+        let keys = Self::KEYS.iter().map(|key| key.name).filter(of_any);
+        require_keys(name, [needs, takes], keys, [self, &Self::new(self.kind)], |key| self.need_of(key))
+            .map_err(|refusal| refusal.in_table("faults"))
     }
 
     /// What a missing key must say.
     fn need_of(&self, key: &str) -> String {
         match (key, self.kind.declared().size) {
-            ("faults.bus", _) => "name a bus of can.buses, from 0".to_owned(),
-            ("faults.node", _) => "name the node that babbles, is cut off or goes off the bus".to_owned(),
-            ("faults.size", Some(size)) => format!("give {}, such as \"{}\"", size.about, size.example),
+            ("bus", _) => "name a bus of can.buses, from 0".to_owned(),
+            ("node", _) => "name the node that babbles, is cut off or goes off the bus".to_owned(),
+            ("size", Some(size)) => format!("give {}, such as \"{}\"", size.about, size.example),
             _ => format!("name an axis: {}", AXIS_NAMES.join(", ")),
         }
     }
@@ -185,9 +163,7 @@ impl FaultConfig {
     }
 
     fn require_ranges(&self) -> Checked {
-        require_within(&bounded!("faults", self, probability [0.0, 1.0]))?;
-        let need = "use more than 0, or leave the fault away: it would never act";
-        require(self.probability > 0.0, "faults.probability", &0, need)?;
+        self.check_ranges(ranges_of("faults"))?;
         let need = "use at least 1, or leave the fault away: it would never act";
         require(self.count != Some(0), "faults.count", &0, need)?;
         let bytes = self.data.as_ref().map_or(0, Vec::len);
@@ -200,7 +176,7 @@ impl FaultConfig {
     fn require_bus(&self, kind: BusFault, can: &CanConfig) -> Checked {
         let bus = self.bus.unwrap_or_default();
         let Some(axes) = can.buses.get(bus) else {
-            return Err(ScenarioError::bad("faults.bus", &bus, self.need_of("faults.bus")));
+            return Err(ScenarioError::bad("faults.bus", &bus, self.need_of("bus")));
         };
         if !can.is_virtual() {
             self.require_port(kind)?;

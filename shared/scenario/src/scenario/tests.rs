@@ -158,10 +158,7 @@ const WRONG: &[(&str, &str)] = &[
         "[controller]\nfeed_forward_torque = true",
         "controller.feed_forward_torque = true: the drive of d1 takes no torque offset; add \"60B2h\" to rpdo1",
     ),
-    (
-        "[controller.model]\nplatform_mass_kg = 0.0",
-        "dynamics.platform_mass_kg = 0: use 0.001 to 100; the value is that of [controller.model]",
-    ),
+    ("[controller.model]\nplatform_mass_kg = 0.0", "controller.model.platform_mass_kg = 0: use 0.001 to 100"),
     ("[force_estimate]\nobserver_time_s = -1.0", "force_estimate.observer_time_s = -1: use 0 to 1"),
     (
         "[force_control]\ndamping_n_s_per_m = 1.0",

@@ -13,7 +13,7 @@ use masseter_scenario::DriveFault;
 const STOP_SHARE: f64 = 0.2;
 
 /// Loops, motor, brake and gear of an axis.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Drivetrain {
     config: Ratings,
     pub(super) servo: Servo,
@@ -84,7 +84,7 @@ impl Drivetrain {
 }
 
 /// The brake.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 #[expect(clippy::struct_field_names, reason = "each name ends with its unit")]
 pub(super) struct Brake {
     opening_ns: u64,
@@ -126,7 +126,7 @@ impl Brake {
 }
 
 /// The way that the shaft missed so far.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Gear {
     missed_m: f64,
     /// The demand at the last step with a wrong ratio.
@@ -158,7 +158,7 @@ pub(super) struct Asked {
 }
 
 /// Motor and brake.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Motor {
     /// Where a brake closed that does not open.
     stuck_at_m: Option<f64>,
@@ -214,7 +214,7 @@ fn motor_n(asked: Asked, faults: &mut Acting<DriveFault>) -> f64 {
 }
 
 /// A held value, and its mean since it was taken last.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(crate) struct HeldMean {
     /// The present value.
     pub(crate) value: f64,

@@ -29,7 +29,7 @@ pub(super) fn mark_between(from: i32, to: i32) -> Option<i32> {
 }
 
 /// One axis' encoder.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Encoder {
     resolution_m: f64,
     noise_m: f64,
@@ -62,7 +62,7 @@ impl Encoder {
 }
 
 /// The encoder with its last count.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Coordinates {
     pub(super) encoder: Encoder,
     pub(super) counts: i32,
@@ -138,7 +138,7 @@ const BEFORE_END_M: f64 = 1e-3;
 const ABOUT_MIDDLE_M: f64 = 1e-3;
 
 /// The switches of an axis.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(super) struct Switches {
     stroke_m: [f64; 2],
     /// Which limit switches are closed: the negative one, the positive one.

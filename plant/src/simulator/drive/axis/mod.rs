@@ -28,7 +28,7 @@ use parameters::{Offsets, Parameters};
 use servo::{FollowingErrorMonitor, ServoLimits};
 
 /// One axis.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Axis {
     config: Ratings,
     quirks: AxisQuirks,

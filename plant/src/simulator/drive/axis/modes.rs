@@ -26,7 +26,7 @@ use super::motion::{MotionCommand, PositionView};
 const FAR: i32 = 1 << 30;
 
 /// What ends a search.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 enum Target {
     /// A reference mark.
     Mark,
@@ -37,7 +37,7 @@ enum Target {
 }
 
 /// A search as its method says.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Search {
     target: Target,
     /// Whether it begins towards larger positions.
@@ -83,7 +83,7 @@ pub(super) struct Sensed {
 }
 
 /// Progress of homing.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) enum Homing {
     /// Not started, or interrupted.
     #[default]
@@ -227,7 +227,7 @@ impl Homing {
 }
 
 /// The set-points, increments of the dictionary.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Positioning {
     /// Under way, or interrupted by a halt.
     running: Option<i32>,

@@ -8,7 +8,7 @@ use crate::simulator::drive::dictionary::Objects;
 use crate::simulator::drive::names;
 
 /// Position and velocity of an axis at an instant.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Motion {
     /// Position, m.
     pub(crate) position_m: f64,
@@ -39,7 +39,7 @@ pub(super) fn clamp(asked: f64, [low, high]: [f64; 2]) -> (f64, bool) {
 }
 
 /// Mode of operation (6060h).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) enum Mode {
     ProfilePosition = 1,
     Homing = 6,
@@ -67,7 +67,7 @@ impl Mode {
 }
 
 /// The cyclic targets that are new at a SYNC.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct NewTargets {
     /// Target position (607Ah).
     pub(crate) position: bool,
@@ -106,14 +106,14 @@ pub(super) enum MotionCommand {
 }
 
 /// A stretch of constant acceleration.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 struct Phase {
     duration_s: f64,
     acceleration_m_s2: f64,
 }
 
 /// Positions on one line over time; at rest at the end.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Profile {
     from_ns: u64,
     start: Motion,
@@ -210,7 +210,7 @@ pub(super) enum ServoCommand {
 }
 
 /// The demand of an axis.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) enum Demand {
     /// No demand: the brake is closed.
     Brake,

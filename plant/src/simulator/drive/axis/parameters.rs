@@ -13,7 +13,7 @@ use crate::simulator::drive::{AxisQuirks, MILLISECOND_NS, Ratings};
 const NO_WINDOW: u32 = u32::MAX;
 
 /// Bounds of a profile.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct MotionLimits {
     pub(super) velocity_m_s: f64,
     pub(super) acceleration_m_s2: f64,
@@ -21,7 +21,7 @@ pub(super) struct MotionLimits {
 }
 
 /// Offsets of the cyclic modes.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Offsets {
     /// Added to the target position (60B0h), increments.
     pub(super) position: i32,
@@ -55,7 +55,7 @@ fn acceleration_unit_m_s2(objects: &Objects, drive: &Ratings) -> f64 {
 }
 
 /// The configuration of an axis.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Parameters {
     /// Time from one cyclic target to the next (60C2h), s.
     pub(super) period_s: f64,

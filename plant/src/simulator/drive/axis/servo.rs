@@ -27,7 +27,7 @@ pub(super) struct ServoLimits {
 }
 
 /// The loops' memory.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Servo {
     config: Ratings,
     step_s: f64,
@@ -126,7 +126,7 @@ impl Servo {
 }
 
 /// Memory of the supervision.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct FollowingErrorMonitor {
     /// Since when the error has been outside its window, ns.
     outside_since_ns: Option<u64>,

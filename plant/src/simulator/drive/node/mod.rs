@@ -21,6 +21,7 @@ use super::table::PDOS;
 use crate::simulator::drive::axis::encoder::Encoder;
 use crate::simulator::drive::axis::motion::Shaft;
 use crate::simulator::drive::{DriveMemory, DriveSettings, MILLISECOND_NS, NodeQuirks, Quirks, SECOND_NS};
+use crate::state::state;
 use masseter_scenario::DriveFault;
 use pdo::{Effects, Outbox, ProcessData, Rpdo, Tpdo};
 use sdo::{DictionaryAccess, SdoServer, Storage};
@@ -56,6 +57,12 @@ pub(crate) struct DriveNode {
     /// When the next message of a storm of emergencies is due, ns.
     next_storm_ns: u64,
 }
+
+state!(DriveNode {
+    values: objects due_fault restarts_at_ns storage axis nmt errors error_state producer consumer
+        process_data sdo outbox is_off next_storm_ns;
+    constant: id overlay quirks;
+});
 
 impl DriveNode {
     /// A drive that is switched on at `now_ns` with its axis at a position.

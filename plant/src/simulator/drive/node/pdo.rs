@@ -17,7 +17,7 @@ use crate::simulator::drive::dictionary::{ENTRIES, Objects};
 use crate::simulator::drive::table::{MAPPED_MAX, PDOS};
 
 /// The PDOs of both directions.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct ProcessData {
     pub(super) rpdos: [Rpdo; PDOS],
     pub(super) tpdos: [Tpdo; PDOS],
@@ -91,7 +91,7 @@ pub(super) const EVENT_DRIVEN: u8 = 254;
 pub(super) const MAX_BYTES: usize = Frame::MAX_DATA;
 
 /// A mapped object: its place in the dictionary and its length.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Part {
     place: usize,
     bits: u32,
@@ -109,7 +109,7 @@ impl Part {
 }
 
 /// A compiled mapping.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Mapped(ArrayVec<Part, MAPPED_MAX>);
 
 impl Mapped {
@@ -166,7 +166,7 @@ const LONG: usize = 1;
 const OVERDUE: usize = 2;
 
 /// A receive PDO.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Rpdo {
     /// Its identifier; none where the PDO does not exist.
     id: Option<CanId>,
@@ -182,7 +182,7 @@ pub(crate) struct Rpdo {
 }
 
 /// Effects of written objects beyond the dictionary.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Effects {
     /// Cyclic targets (607Ah, 6071h).
     pub(crate) targets: NewTargets,
@@ -275,7 +275,7 @@ const INHIBIT_UNIT_NS: u64 = MILLISECOND_NS / 10;
 const SAMPLED: [u16; 6] = [0x6062, 0x6063, 0x6064, 0x606C, 0x6077, 0x60F4];
 
 /// The condition for sending a TPDO.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 enum Trigger {
     /// At the next SYNC after a change.
     ChangeThenSync,
@@ -286,7 +286,7 @@ enum Trigger {
 }
 
 /// A transmit PDO.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Tpdo {
     id: Option<CanId>,
     trigger: Trigger,
@@ -390,7 +390,7 @@ impl Tpdo {
 const CAPACITY: usize = 12;
 
 /// The frames.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Outbox(pub(super) VecDeque<Frame>);
 
 impl Outbox {

@@ -25,14 +25,14 @@ const TIMEOUT_NS: u64 = 1_000_000_000;
 const WRITABLE_BYTES: usize = 4;
 
 /// What is left of a transfer.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 enum Progress {
-    Upload { rest: &'static [u8] },
+    Upload { sent: usize },
     Download { received: ArrayVec<u8, WRITABLE_BYTES>, announced: Option<u32> },
 }
 
 /// A transfer in segments that has begun.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 struct Transfer {
     object: ObjectAddress,
     /// The toggle bit that the next segment must have.
@@ -59,7 +59,7 @@ impl Transfer {
 type Answer = Result<(SdoResponse, Option<Transfer>), AbortCode>;
 
 /// The server's memory.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct SdoServer {
     transfer: Option<Transfer>,
 }
@@ -83,7 +83,7 @@ impl SdoServer {
             SdoRequest::Abort { .. } => return None,
             SdoRequest::InitiateUpload { object } => (object, begin_upload(object, access)),
             SdoRequest::UploadSegment { toggle } => {
-                (running, continued(toggle).and_then(|transfer| upload(transfer, toggle)))
+                (running, continued(toggle).and_then(|transfer| upload(transfer, toggle, access)))
             }
             SdoRequest::Download { object, data } => {
                 let written = access.write(object, data.data(), data.is_sized());
@@ -113,17 +113,18 @@ fn begin_upload(object: ObjectAddress, access: &mut DictionaryAccess<'_>) -> Ans
         Value::Number(data) => (SdoResponse::Upload { object, data }, None),
         Value::Text(text) => {
             let response = SdoResponse::InitiateUpload { object, size: Some(text.len() as u32) };
-            let progress = Progress::Upload { rest: text.as_bytes() };
-            (response, Some(Transfer::begin(access.now_ns, object, progress)))
+            (response, Some(Transfer::begin(access.now_ns, object, Progress::Upload { sent: 0 })))
         }
     })
 }
 
-fn upload(mut transfer: Transfer, toggle: bool) -> Answer {
-    let Progress::Upload { rest } = &mut transfer.progress else { return Err(AbortCode::UNKNOWN_COMMAND) };
-    let (now, later) = rest.split_at(rest.len().min(Segment::MAX));
-    *rest = later;
-    let is_last = later.is_empty();
+fn upload(mut transfer: Transfer, toggle: bool, access: &mut DictionaryAccess<'_>) -> Answer {
+    let Progress::Upload { sent } = &mut transfer.progress else { return Err(AbortCode::UNKNOWN_COMMAND) };
+    let Value::Text(text) = access.read(transfer.object)? else { return Err(AbortCode::UNKNOWN_COMMAND) };
+    let rest = &text.as_bytes()[*sent..];
+    let now = &rest[..rest.len().min(Segment::MAX)];
+    *sent += now.len();
+    let is_last = now.len() == rest.len();
     let data = Segment::new(now).expect("no more than a segment holds");
     Ok((SdoResponse::UploadSegment { toggle, data, is_last }, (!is_last).then_some(transfer)))
 }
@@ -366,7 +367,7 @@ const BUSY: u32 = 0;
 const SAVES_ON_COMMAND: u32 = 1;
 
 /// Dictionaries that outlast a reset.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Storage {
     /// The values that a reset restores.
     pub(super) stored: Objects,

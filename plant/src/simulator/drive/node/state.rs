@@ -16,7 +16,7 @@ use crate::simulator::drive::table::{CONSUMED, HISTORY};
 pub(super) const BOOT_NS: u64 = 20 * MILLISECOND_NS;
 
 /// The state.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(super) struct Nmt {
     /// None while the node boots.
     pub(super) state: Option<NmtState>,
@@ -54,7 +54,7 @@ impl Nmt {
 }
 
 /// The drive's own heartbeat.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Producer {
     interval_ns: u64,
     next_ns: u64,
@@ -95,7 +95,7 @@ pub(super) fn consumed_node(word: u32) -> Option<NodeId> {
 }
 
 /// A consumed heartbeat.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 struct ConsumedHeartbeat {
     node: Option<NodeId>,
     timeout_ns: u64,
@@ -105,7 +105,7 @@ struct ConsumedHeartbeat {
 }
 
 /// The consumed heartbeats.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Consumer {
     entries: [ConsumedHeartbeat; CONSUMED],
 }
@@ -166,7 +166,7 @@ const FAULTS: [EmergencyCode; 3] =
     [EmergencyCode::FOLLOWING_ERROR, EmergencyCode::COMMUNICATION, EmergencyCode::LOGIC_SUPPLY];
 
 /// The present errors, the newest first.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Errors {
     /// The fault that is present at power-on.
     at_power_on: Option<EmergencyCode>,

@@ -17,7 +17,7 @@ use masseter_scenario::{FoodConfig, MOST_PAIRS, Material, ToothConfig};
 use super::teeth::{Friction, Grip, Touch, contact_force_n};
 
 /// A piece of food that broke between the teeth.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct FoodBreak {
     /// FDI number of the first of the teeth on which the piece lay.
     pub(crate) tooth: u8,
@@ -28,7 +28,7 @@ pub(crate) struct FoodBreak {
 }
 
 /// A piece of food.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Food {
     /// Shared, so that another serving of the food allocates nothing.
     config: Arc<FoodConfig>,
@@ -40,7 +40,7 @@ pub(crate) struct Food {
 }
 
 /// The part of a piece on one tooth.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Column {
     /// The place of its tooth among the pairs.
     pair: usize,

@@ -20,7 +20,7 @@ use food::{Food, FoodBreak};
 use teeth::{Enamel, Pair};
 
 /// What acts between the jaws.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Occlusion {
     /// By the numbers of their teeth; none where the jaws never touch.
     pairs: ArrayVec<Pair, MOST_PAIRS>,

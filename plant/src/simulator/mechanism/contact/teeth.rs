@@ -13,7 +13,7 @@ use masseter_scenario::{TeethConfig, ToothConfig};
 use nalgebra::{Matrix3x6, Point3};
 
 /// The pair.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(super) struct Pair {
     /// FDI number of the lower tooth.
     pub(super) number: u8,
@@ -76,7 +76,7 @@ impl Pair {
 }
 
 /// The contact of a pair of teeth.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Enamel {
     clearance_m: f64,
     soft_n_per_m: f64,
@@ -121,7 +121,7 @@ impl Enamel {
 }
 
 /// The friction of a contact.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(super) struct Friction {
     /// Largest lateral force as a share of the normal one.
     pub(super) coefficient: f64,
@@ -130,7 +130,7 @@ pub(super) struct Friction {
 }
 
 /// Where a lower tooth holds to the other face.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Grip {
     /// Where the spring would be slack, base frame, m; none without contact.
     anchor_m: Option<Vec3>,

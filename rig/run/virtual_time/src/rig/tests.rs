@@ -1,43 +1,20 @@
 //! A rig that steps does what a run does; from a snapshot it goes on as it went on before.
 
-use std::path::Path;
+use std::env;
 
-use masseter_controller::motion_controller::MotionController;
-use masseter_runtime::control::{Operator, set_parameters};
+use masseter_recording::Recorded;
+use masseter_runtime::messages::Message;
 use masseter_runtime::messages::codes::Cause;
-use masseter_runtime::named::NamedValues;
 use proptest::prelude::*;
 
 use super::*;
-
-/// Keeps every message.
-#[derive(Debug, Clone, Default)]
-struct Kept(Vec<Recorded>);
-
-impl Sink for Kept {
-    fn take(&mut self, message: &Recorded, _: u64) {
-        self.0.push(*message);
-    }
-
-    fn has_failed(&self) -> bool {
-        false
-    }
-}
+use crate::run::tests::{run_of, with_keys};
 
 /// The messages of the first cycles of a run.
 fn played(scenario: &Scenario, cycles: usize) -> Vec<Recorded> {
-    let plan = RunPlan::new(scenario.clone()).unwrap();
-    let mut controller =
-        MotionController::new(&plan.scenario, plan.mechanism.clone(), plan.trajectory.clone());
-    let named = NamedValues::new(controller.declared(), &plan.scenario.parameters).unwrap();
-    set_parameters(&mut controller, &named);
-    let operator = Operator::new(&plan.scenario, named.settings().declared(), EPOCH_NS).unwrap();
-    let mut duties = Duties { named, operator };
-    let mut rig = Stepper::new(&plan.scenario, plan.schedule, Kept::default()).unwrap();
-    for _ in 0..cycles {
-        rig.play_cycle(&mut controller, &mut duties).unwrap();
-    }
-    rig.into_sink().0
+    let mut run = run_of(scenario);
+    (0..cycles).for_each(|_| run.play_cycle().unwrap());
+    run.into_sink().0
 }
 
 fn commands(messages: &[Recorded]) -> Vec<Command> {
@@ -46,15 +23,25 @@ fn commands(messages: &[Recorded]) -> Vec<Command> {
     messages.iter().filter_map(command).collect()
 }
 
-fn with_keys(keys: &str) -> Scenario {
-    Scenario::parse(Path::new("test.toml"), keys).unwrap()
+/// What a step shows, to the bit.
+#[derive(Debug, Clone, PartialEq)]
+struct Shown {
+    reading: Reading,
+    events: Vec<Event>,
+    bits: Vec<u8>,
 }
 
-/// Readings, truths and numbers of events of the steps with these commands.
-fn steps(rig: &mut Rig, commands: &[Command]) -> Vec<(Reading, Option<Truth>, Vec<Event>)> {
+/// What the steps with these commands show.
+fn steps(rig: &mut Rig, commands: &[Command]) -> Vec<Shown> {
     let step = |command| {
-        let reading = *rig.step(command).unwrap();
-        (reading, rig.truth().copied(), rig.events().to_vec())
+        let (reading, events) = (*rig.step(command).unwrap(), rig.events().to_vec());
+        let mut bits = reading.body().to_vec();
+        bits.extend(rig.truth().unwrap().body());
+        rig.latest().cycle.contact.iter().for_each(|contact| bits.extend(contact.body()));
+        for event in &events {
+            bits.extend(event.body());
+        }
+        Shown { reading, events, bits }
     };
     commands.iter().map(step).collect()
 }
@@ -65,7 +52,7 @@ fn the_steps_with_a_runs_commands_are_the_run() {
     let run = played(&scenario, 2000);
     let mut rig = Rig::new(&scenario, 3).unwrap();
     let mut readings = vec![*rig.reading()];
-    readings.extend(steps(&mut rig, &commands(&run)).into_iter().map(|(reading, ..)| reading));
+    readings.extend(steps(&mut rig, &commands(&run)).into_iter().map(|shown| shown.reading));
     let of_run: Vec<_> = run
         .iter()
         .filter_map(|message| if let Recorded::Reading(reading) = message { Some(*reading) } else { None })
@@ -129,7 +116,8 @@ fn a_command_that_is_no_number_is_the_masters_to_refuse() {
     commands.last_mut().unwrap().target_m[0] = f64::NAN;
     let mut rig = Rig::new(&scenario, 1).unwrap();
     let last = steps(&mut rig, &commands).pop().unwrap();
-    assert!(last.2.iter().any(|event| event.cause == Cause::BadMessage.code()), "{:?}", last.2);
+    let events = last.events;
+    assert!(events.iter().any(|event| event.cause == Cause::BadMessage.code()), "{events:?}");
 }
 
 /// Faults of drives, encoders, buses and mechanism, up to the time at which the last one begins.
@@ -150,21 +138,52 @@ fn with_fault(seed: u64, fault: &str, time_s: f64) -> Scenario {
     with_keys(&format!("seed = {seed}\n[[faults]]\n{fault} = {time_s:.3}\n"))
 }
 
-/// The events after a snapshot at that cycle. Both this rig and another one go on from the snapshot as the rig went on.
+/// Other faults, which need not strike.
+const OTHER_FAULTS: [&str; 12] = [
+    "kind = 'corrupt'\nbus = 0\nprobability = 0.1\nat_s",
+    "kind = 'lose'\nbus = 1\nprobability = 0.1\nat_s",
+    "kind = 'delay'\nbus = 0\nsize = '1500 us'\nprobability = 0.05\nat_s",
+    "kind = 'babble'\nbus = 0\nnode = 2\nfor_s = 0.01\nat_s",
+    "kind = 'bus_off'\nbus = 1\nnode = 4\nat_s",
+    "kind = 'encoder_stuck'\naxis = 'l3'\nfor_s = 0.02\nat_s",
+    "kind = 'drive_sto'\naxis = 'd3'\nat_s",
+    "kind = 'emcy_storm'\naxis = 'l1'\nsize = '5 ms'\nat_s",
+    "kind = 'end_stop'\naxis = 'l1'\nsize = '1 mm'\nat_s",
+    "kind = 'payload'\nsize = '0.5 kg'\nat_s",
+    "kind = 'command_jump'\naxis = 'l2'\nsize = '1 mm'\nfor_s = 0.02\nat_s",
+    "kind = 'controller_stall'\nsize = '50 ms'\nat_s",
+];
+
+/// What a scenario has beside a fault.
+const FURNISHED: [&str; 6] = [
+    "",
+    "[food]\n[teeth]\n",
+    "[food]\nkind = 'peanut'\n[load_cell]\n[dynamics.friction]\nmodel = 'lugre'\n",
+    "[food]\n[[stimulus]]\nat_s = 0.1\nfood = { stiffness_n_per_m = 5000.0, strength_n = 50.0 }\n",
+    "[[drives.quirk]]\nkind = 'two_boot_ups'\n[[drives.quirk]]\nkind = 'restarts'\nafter_s = 0.7\naxes = ['l2']\n",
+    "[[stimulus]]\nat_s = 0.05\nfor_s = 0.3\nshape = 'half_sine'\npush_n = [0.0, 0.0, -4.0]\n",
+];
+
+/// The events after a snapshot at that cycle. Both this rig and another one, which reads the snapshot from a file, go on
+/// as the rig went on.
 fn events_after_a_snapshot(scenario: &Scenario, at: usize, more: usize) -> Vec<Event> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("branch.snapshot");
     let commands = commands(&played(scenario, at + more));
     let mut rig = Rig::new(scenario, scenario.seed).unwrap();
     let (before, after) = commands.split_at(at.min(commands.len()));
     steps(&mut rig, before);
     let branch = rig.snapshot();
+    branch.write_to(&path).unwrap();
     let went_on = steps(&mut rig, after);
 
     rig.restore(&branch).unwrap();
-    assert_eq!(steps(&mut rig, after), went_on);
+    assert!(steps(&mut rig, after) == went_on);
     let mut other = Rig::new(scenario, scenario.seed).unwrap();
-    other.restore(&branch).unwrap();
-    assert_eq!(steps(&mut other, after), went_on);
-    went_on.into_iter().flat_map(|(.., events)| events).collect()
+    let read = other.read_snapshot(&path).unwrap();
+    other.restore(&read).unwrap();
+    assert!(steps(&mut other, after) == went_on);
+    went_on.into_iter().flat_map(|shown| shown.events).collect()
 }
 
 #[test]
@@ -176,14 +195,24 @@ fn faults_that_begin_after_a_snapshot_begin_in_every_branch() {
     }
 }
 
+/// How many random snapshots are taken: `scripts/nightly` takes a thousand.
+fn cases() -> u32 {
+    env::var("SNAPSHOT_CASES").map_or(100, |cases| cases.parse().expect("SNAPSHOT_CASES is a number"))
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(), ..ProptestConfig::default() })]
 
     #[test]
     fn going_on_from_a_snapshot_is_going_on(
-        seed in 1_u64..1000, fault in prop::sample::select(&FAULTS[..]), time_s in 0.4..1.6,
-        at in 0_usize..1500, more in 1_usize..600,
+        seed in 1_u64..1000, rate_hz in prop::sample::select(&[500, 1000][..]),
+        fault in prop::sample::select([&FAULTS[..], &OTHER_FAULTS[..]].concat()), time_s in 0.0..0.2,
+        furnished in prop::sample::select(&FURNISHED[..]),
+        at in 0_usize..1200, more in 1_usize..100,
     ) {
-        events_after_a_snapshot(&with_fault(seed, fault, time_s), at, more);
+        let scenario = with_keys(&format!(
+            "seed = {seed}\nrate_hz = {rate_hz}\nduration_s = 2.0\n[controller]\nease_s = 0.1\n[[faults]]\n{fault} = {time_s:.3}\n{furnished}"
+        ));
+        events_after_a_snapshot(&scenario, at, more);
     }
 }

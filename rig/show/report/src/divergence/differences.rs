@@ -8,98 +8,61 @@ use masseter_runtime::messages::codes::{ControllerState, EventKind, Source};
 use masseter_terminal::Exit;
 use serde::Serialize;
 
-use super::lane::{FieldGrowth, Lane, Missing};
+use super::lane::{FieldGrowth, Missing};
 use crate::text::{columns, or_dash};
 
 /// Version of the form as JSON.
-const FORM: u32 = 1;
+pub(super) const FORM: u32 = 1;
 
 /// A field that differs.
 #[derive(Debug, Serialize)]
-struct FieldDifference {
-    topic: &'static str,
+pub(super) struct FieldDifference {
+    pub(super) topic: &'static str,
     /// The time of the first difference since the motion began, s.
-    motion_s: Option<f64>,
+    pub(super) motion_s: Option<f64>,
     #[serde(flatten)]
-    growth: FieldGrowth,
+    pub(super) growth: FieldGrowth,
 }
 
 /// Messages without a partner.
 #[derive(Debug, Serialize)]
-struct OneSided {
-    topic: &'static str,
+pub(super) struct OneSided {
+    pub(super) topic: &'static str,
     /// Whether the second stream has them.
-    only_in_b: bool,
+    pub(super) only_in_b: bool,
     #[serde(flatten)]
-    missing: Missing,
+    pub(super) missing: Missing,
 }
 
 /// A topic whose digest differs.
 #[derive(Debug, Serialize)]
-struct DigestDifference {
-    topic: &'static str,
-    first_cycle: u64,
+pub(super) struct DigestDifference {
+    pub(super) topic: &'static str,
+    pub(super) first_cycle: u64,
 }
 
 /// What differs between two streams.
 #[derive(Debug, Serialize)]
 pub struct Differences {
-    form: u32,
-    is_equal: bool,
+    pub(super) form: u32,
+    pub(super) is_equal: bool,
     /// Messages that had a partner.
-    messages: u64,
+    pub(super) messages: u64,
     /// By their first cycle, then in the order of a cycle.
-    fields: Vec<FieldDifference>,
-    one_sided: Vec<OneSided>,
+    pub(super) fields: Vec<FieldDifference>,
+    pub(super) one_sided: Vec<OneSided>,
     /// Topics whose messages have other fields.
-    redefined: Vec<&'static str>,
+    pub(super) redefined: Vec<&'static str>,
     /// Topics that one side has not recorded, which are not compared.
-    unrecorded: Vec<&'static str>,
-    digests: Vec<DigestDifference>,
+    pub(super) unrecorded: Vec<&'static str>,
+    pub(super) digests: Vec<DigestDifference>,
     #[serde(skip)]
-    compared: Compared,
+    pub(super) compared: Compared,
     #[serde(skip)]
-    clock: MotionClock,
+    pub(super) clock: MotionClock,
 }
 
 impl Differences {
-    /// Of streams without common messages yet, whose digests differ by topic from these cycles on.
-    pub(super) fn new(
-        compared: Compared,
-        clock: MotionClock,
-        unrecorded: &[Topic],
-        digests: Vec<(Topic, u64)>,
-    ) -> Self {
-        let digest =
-            |(topic, first_cycle): (Topic, u64)| DigestDifference { topic: topic.name(), first_cycle };
-        let mut digests: Vec<_> = digests.into_iter().map(digest).collect();
-        digests.sort_by_key(|difference| difference.first_cycle);
-        let unrecorded = unrecorded.iter().map(|topic| topic.name()).collect();
-        let (is_equal, fields, one_sided, redefined) =
-            (digests.is_empty(), Vec::new(), Vec::new(), Vec::new());
-        let (form, messages) = (FORM, 0);
-        Self { form, is_equal, messages, fields, one_sided, redefined, unrecorded, digests, compared, clock }
-    }
-
-    pub(super) fn add(&mut self, topic: Topic, has_same_fields: bool, lane: Lane) {
-        let topic = topic.name();
-        self.messages += lane.messages;
-        // Each source of a topic has a lane.
-        let is_redefined = lane.messages > 0 && !has_same_fields && !self.redefined.contains(&topic);
-        self.redefined.extend(is_redefined.then_some(topic));
-        let (growths, missing) = lane.into_differences();
-        for growth in growths {
-            let motion_s = self.clock.motion_s(growth.first_cycle);
-            self.fields.push(FieldDifference { topic, motion_s, growth });
-        }
-        self.fields.sort_by_key(|field| field.growth.first_cycle);
-        for (missing, only_in_b) in missing.into_iter().zip([false, true]) {
-            self.one_sided.extend(missing.map(|missing| OneSided { topic, only_in_b, missing }));
-        }
-        self.one_sided.sort_by_key(|messages| messages.missing.first_cycle);
-        self.is_equal &= self.fields.is_empty() && self.one_sided.is_empty() && self.redefined.is_empty();
-    }
-
     /// The exit code: 0 for equal streams, 1 for others.
     pub fn exit(&self) -> Exit {
         if self.is_equal { Exit::Passed } else { Exit::Failed }
@@ -243,7 +206,16 @@ pub(super) struct MotionClock {
 impl MotionClock {
     pub(super) fn add_message(&mut self, message: &Recorded) {
         match message {
-            Recorded::State(state) => self.add_state(state),
+            Recorded::State(State { cycle, due_ns, controller_state, .. }) => {
+                self.cycle = *cycle;
+                let (first_cycle, first_ns) = *self.first.get_or_insert((*cycle, *due_ns));
+                let period_ns =
+                    || due_ns.saturating_sub(first_ns).checked_div(cycle.saturating_sub(first_cycle));
+                self.period_ns = self.period_ns.or_else(period_ns);
+                if *controller_state == ControllerState::Running.code() {
+                    self.running_from.get_or_insert(*cycle);
+                }
+            }
             // A thinned recording has all events, and few states.
             Recorded::Event(event)
                 if event.source == Source::Controller.code()
@@ -253,17 +225,6 @@ impl MotionClock {
                 self.running_from.get_or_insert(event.cycle);
             }
             _ => {}
-        }
-    }
-
-    fn add_state(&mut self, state: &State) {
-        self.cycle = state.cycle;
-        let (first_cycle, first_ns) = *self.first.get_or_insert((state.cycle, state.due_ns));
-        let cycles = state.cycle.saturating_sub(first_cycle);
-        self.period_ns =
-            self.period_ns.or_else(|| (state.due_ns.saturating_sub(first_ns)).checked_div(cycles));
-        if state.controller_state == ControllerState::Running.code() {
-            self.running_from.get_or_insert(state.cycle);
         }
     }
 

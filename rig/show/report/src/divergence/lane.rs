@@ -101,10 +101,12 @@ impl Lane {
         for (place, field) in columns.fields().iter().enumerate() {
             let [a, b] = bodies.map(|body| field.bytes(body));
             if a != b && is_compared(field.name()) {
+                let numbers = bodies.map(|body| field.numbers(body).collect::<Vec<_>>());
+                let (unit, size) = difference(field, &numbers);
                 let growth = self.growths.entry(place);
                 growth
-                    .or_insert_with(|| FieldGrowth::new(field, cycle, bodies))
-                    .add_difference(cycle, FieldGrowth::size(field, bodies));
+                    .or_insert_with(|| FieldGrowth::new(field, unit, cycle, &numbers))
+                    .add_difference(cycle, size);
             }
         }
         let tails = bodies.map(|body| columns.split(body).map_or(body, |(_, tail)| tail));
@@ -165,30 +167,18 @@ pub(super) struct FieldGrowth {
 }
 
 impl FieldGrowth {
-    fn new(field: &Field, cycle: u64, [a, b]: [&[u8]; 2]) -> Self {
+    fn new(field: &Field, unit: &'static str, cycle: u64, [a, b]: &[Vec<Number>; 2]) -> Self {
         let bits = |number: &Number| (number.to_string(), number.to_f64().to_bits());
-        let differing = field.numbers(a).zip(field.numbers(b)).enumerate();
-        let first = differing.map(|(place, (a, b))| (place, [a, b])).find(|(_, [a, b])| bits(a) != bits(b));
-        let (place, values) = first.expect("the field differs");
-        let (unit, values) = (Self::measure(field, a).unit(), values.map(|value| value.to_string()));
+        let mut differing = a.iter().zip(b).enumerate().filter(|(_, (a, b))| bits(a) != bits(b));
+        let (place, (a, b)) = differing.next().expect("the field differs");
         let element = field.is_array().then_some(place);
-        Self { element, ..Self::of(field.name(), unit, cycle, values) }
+        Self { element, ..Self::of(field.name(), unit, cycle, [a.to_string(), b.to_string()]) }
     }
 
     /// The first difference of a field without numbers.
     fn of(field: &str, unit: &'static str, cycle: u64, values: [String; 2]) -> Self {
         let (field, last) = (field.to_owned(), (cycle, None));
         Self { field, unit, first_cycle: cycle, values, largest_cycle: cycle, last, ..Self::default() }
-    }
-
-    fn measure(field: &Field, body: &[u8]) -> Measure {
-        Measure::of(field, field.numbers(body).count())
-    }
-
-    /// The size of the difference of a field.
-    fn size(field: &Field, [a, b]: [&[u8]; 2]) -> Option<f64> {
-        let numbers = |body| field.numbers(body).map(Number::to_f64).collect::<Vec<_>>();
-        Self::measure(field, a).size(&numbers(a), &numbers(b))
     }
 
     /// Takes the difference of a cycle.
@@ -242,60 +232,27 @@ const UNITS: [(&str, &str, f64); 7] = [
     ("_s", "ms", 1e3),
 ];
 
-/// How differences of a field are measured.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Measure {
-    /// The largest difference of an element, by a unit and its number in the field's unit.
-    Elements(&'static str, f64),
-    /// The distance of two points, µm.
-    Distance,
-    /// The angle between two orientations, mrad.
-    Turn,
-    /// Codes and counts have no measure.
-    None,
-}
-
-impl Measure {
-    fn of(field: &Field, elements: usize) -> Self {
-        let name = field.name();
-        let unit = UNITS.iter().find(|(end, _, _)| name.ends_with(end));
-        match (name, unit) {
-            (name, _) if name.ends_with("quaternion_wxyz") => Self::Turn,
-            (name, _) if name.ends_with("position_m") && elements == 3 => Self::Distance,
-            (_, Some((_, unit, factor))) => Self::Elements(unit, *factor),
-            (_, None) if field.is_integer() => Self::None,
-            (_, None) => Self::Elements("", 1.0),
+/// The unit of the differences of a field, and the size of the one between two values: the distance of two points, the angle
+/// between two orientations, otherwise the largest of the elements. None for codes and counts, which have no measure, and
+/// where a value is no number.
+fn difference(field: &Field, values: &[Vec<Number>; 2]) -> (&'static str, Option<f64>) {
+    let [a, b] = values.each_ref().map(|numbers| numbers.iter().map(|number| number.to_f64()));
+    let norm = |sign: f64| a.clone().zip(b.clone()).map(|(a, b)| (sign * b - a).powi(2)).sum::<f64>().sqrt();
+    // Unlike `max`, this keeps what is no number.
+    let larger = |most, size| if size <= most { most } else { size };
+    let largest = || a.clone().zip(b.clone()).map(|(a, b)| (b - a).abs()).fold(0.0, larger);
+    let name = field.name();
+    let (unit, size) = match UNITS.iter().find(|(end, _, _)| name.ends_with(end)) {
+        // A quaternion and its negative are one orientation; the chord between two is twice the sine of a quarter.
+        _ if name.ends_with("quaternion_wxyz") => {
+            ("mrad", 1e3 * 4.0 * (norm(1.0).min(norm(-1.0)) / 2.0).min(1.0).asin())
         }
-    }
-
-    fn unit(self) -> &'static str {
-        match self {
-            Self::Elements(unit, _) => unit,
-            Self::Distance => "µm",
-            Self::Turn => "mrad",
-            Self::None => "",
-        }
-    }
-
-    /// The size of the difference; none where it has no measure, or a value is no number.
-    fn size(self, a: &[f64], b: &[f64]) -> Option<f64> {
-        let differences = || a.iter().zip(b).map(|(a, b)| b - a);
-        let norm = |sign: f64| a.iter().zip(b).map(|(a, b)| (sign * b - a).powi(2)).sum::<f64>().sqrt();
-        let size = match self {
-            Self::Elements(_, factor) => {
-                // Unlike `max`, this keeps what is no number.
-                factor
-                    * differences()
-                        .map(f64::abs)
-                        .fold(0.0, |most, size| if size <= most { most } else { size })
-            }
-            Self::Distance => 1e6 * norm(1.0),
-            // A quaternion and its negative are one orientation; the chord between two is twice the sine of a quarter.
-            Self::Turn => 1e3 * 4.0 * (norm(1.0).min(norm(-1.0)) / 2.0).min(1.0).asin(),
-            Self::None => return None,
-        };
-        size.is_finite().then_some(size)
-    }
+        _ if name.ends_with("position_m") && a.len() == 3 => ("µm", 1e6 * norm(1.0)),
+        Some((_, unit, factor)) => (*unit, factor * largest()),
+        None if field.is_integer() => return ("", None),
+        None => ("", largest()),
+    };
+    (unit, size.is_finite().then_some(size))
 }
 
 #[cfg(test)]
@@ -306,8 +263,9 @@ mod tests {
 
     fn sized(definition: &str, a: &[f64], b: &[f64]) -> (Option<String>, &'static str) {
         let columns = Columns::from_definition(definition).unwrap();
-        let measure = Measure::of(&columns.fields()[0], a.len());
-        (measure.size(a, b).map(|size| format!("{size:.3}")), measure.unit())
+        let values = [a, b].map(|values| values.iter().copied().map(Number::Double).collect());
+        let (unit, size) = difference(&columns.fields()[0], &values);
+        (size.map(|size| format!("{size:.3}")), unit)
     }
 
     #[test]

@@ -15,7 +15,7 @@ use anyhow::{Context, ensure};
 use masseter_recording::{Columns, Digester, Digests, Reader, Recorded, RunFolder, Topic, is_kept};
 use masseter_terminal::{Exit, Format, result};
 
-use self::differences::MotionClock;
+use self::differences::{DigestDifference, FORM, FieldDifference, MotionClock, OneSided};
 use self::lane::{Lane, LaneKey};
 
 pub use differences::{Compared, Differences};
@@ -65,11 +65,6 @@ impl Comparison {
         Self { compared, columns, lanes, clock, unrecorded }
     }
 
-    /// Leaves a topic out that one side has not recorded. The differences name it.
-    pub(super) fn leave_out(&mut self, topic: Topic) {
-        self.unrecorded.extend(self.compared.has_topic(topic).then_some(topic));
-    }
-
     /// Takes the next message of one side, and compares what has a partner.
     pub fn take(&mut self, side: Side, message: &Recorded) {
         let compared = self.compared;
@@ -89,19 +84,51 @@ impl Comparison {
 
     /// The differences of all messages.
     pub fn finish(self) -> Differences {
-        self.finish_with(&Digests::default(), &Digests::default())
+        self.finish_with(Vec::new())
     }
 
-    /// The same, with the digests of messages that were not compared.
-    pub(super) fn finish_with(self, a: &Digests, b: &Digests) -> Differences {
+    /// The same, where digests of messages that were not compared differ by topic from these cycles on.
+    fn finish_with(self, mut digests: Vec<(Topic, u64)>) -> Differences {
         let Self { compared, columns, lanes, clock, unrecorded } = self;
-        let mut digests = a.differences(b);
         digests.retain(|(topic, _)| !unrecorded.contains(topic));
-        let mut differences = Differences::new(compared, clock, &unrecorded, digests);
+        digests.sort_by_key(|(_, first_cycle)| *first_cycle);
+        let digests = digests.into_iter().map(|(topic, cycle)| (topic.name(), cycle));
+        let digests: Vec<_> =
+            digests.map(|(topic, first_cycle)| DigestDifference { topic, first_cycle }).collect();
+        let unrecorded = unrecorded.iter().map(|topic| topic.name()).collect();
+        let (mut messages, mut fields, mut one_sided, mut redefined) =
+            (0, Vec::new(), Vec::new(), Vec::new());
         for (key, lane) in lanes {
-            differences.add(key.topic(), columns.contains_key(&key.topic()), lane);
+            let topic = key.topic().name();
+            messages += lane.messages;
+            if lane.messages > 0 && !columns.contains_key(&key.topic()) {
+                redefined.push(topic);
+            }
+            let (growths, missing) = lane.into_differences();
+            fields.extend(growths.into_iter().map(|growth| {
+                let motion_s = clock.motion_s(growth.first_cycle);
+                FieldDifference { topic, motion_s, growth }
+            }));
+            for (missing, only_in_b) in missing.into_iter().zip([false, true]) {
+                one_sided.extend(missing.map(|missing| OneSided { topic, only_in_b, missing }));
+            }
         }
-        differences
+        // Each source of a topic has a lane.
+        redefined.dedup();
+        fields.sort_by_key(|field| field.growth.first_cycle);
+        one_sided.sort_by_key(|messages| messages.missing.first_cycle);
+        Differences {
+            form: FORM,
+            is_equal: fields.is_empty() && one_sided.is_empty() && redefined.is_empty() && digests.is_empty(),
+            messages,
+            fields,
+            one_sided,
+            redefined,
+            unrecorded,
+            digests,
+            compared,
+            clock,
+        }
     }
 }
 
@@ -133,10 +160,6 @@ impl Stream {
     /// Whether it has the CAN frames, or their digest.
     fn has_frames(&self) -> bool {
         self.reader.has_frames() || self.digests.has(Topic::Frame)
-    }
-
-    fn is_thinned(&self) -> bool {
-        !self.digests.is_empty()
     }
 
     fn next_message(&mut self) -> anyhow::Result<Option<Recorded>> {
@@ -181,10 +204,10 @@ fn compare(mut a: Stream, mut b: Stream) -> anyhow::Result<Differences> {
     let compared = if is_in_real_time { Compared::WithoutTimes } else { Compared::Everything };
     let columns = [&a, &b].map(|stream| Columns::of_topics(stream.reader.channels()));
     let mut comparison = Comparison::new(compared, columns);
-    if a.has_frames() != b.has_frames() {
-        comparison.leave_out(Topic::Frame);
+    if a.has_frames() != b.has_frames() && compared.has_topic(Topic::Frame) {
+        comparison.unrecorded.push(Topic::Frame);
     }
-    let is_thinned = a.is_thinned() || b.is_thinned();
+    let is_thinned = [&a, &b].iter().any(|stream| !stream.digests.is_empty());
     // In turn, so that few messages wait for their partners.
     let mut has_more = true;
     while has_more {
@@ -199,5 +222,5 @@ fn compare(mut a: Stream, mut b: Stream) -> anyhow::Result<Differences> {
         }
     }
     let [a, b] = [a.into_digests()?, b.into_digests()?];
-    Ok(if is_thinned { comparison.finish_with(&a, &b) } else { comparison.finish() })
+    Ok(comparison.finish_with(if is_thinned { a.differences(&b) } else { Vec::new() }))
 }

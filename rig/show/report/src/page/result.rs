@@ -3,8 +3,8 @@
 use masseter_analysis::requirements::{RequirementFigures, RequirementPlot};
 use masseter_analysis::{Code, Curve, EventRecord, Figures, ParameterFigures, SignalFigures};
 use masseter_page::{
-    Block, Cell, Chart, Column, Content, EventRow, Events, Live, Moment, MomentKind, Parameter, Points,
-    Section, Series, Style, Table, Tone,
+    Block, Cell, Chart, Column, Content, EventRow, Events, Live, Moment, MomentKind, Points, Section, Series,
+    Style, Table, Tone,
 };
 use masseter_recording::Manifest;
 use masseter_runtime::messages::codes::{ControllerState, EventKind};
@@ -274,7 +274,7 @@ pub(super) fn live_sections(
     let now = Block::new("now", Content::Live(now(manifest, figures, number, left_out)));
     let mut sections = vec![Section::new("now", "Now", vec![now])];
     if !figures.parameters.is_empty() {
-        let parameters = figures.parameters.iter().map(parameter).collect();
+        let parameters = serde_json::to_value(&figures.parameters).unwrap_or_default();
         let block = Block::new("set-parameters", Content::Parameters(parameters));
         sections.push(Section::new("set", "Change parameters", vec![block]));
     }
@@ -309,15 +309,4 @@ fn now(manifest: &Manifest, figures: &Figures, number: u64, left_out: u64) -> Li
         shown.push(["messages left out of this page".to_owned(), left_out.to_string()]);
     }
     Live { number, state: state.replace('_', " "), tone, progress, figures: shown }
-}
-
-fn parameter(figures: &ParameterFigures) -> Parameter {
-    let ParameterFigures { parameter, last, .. } = figures;
-    Parameter {
-        name: parameter.name.clone(),
-        unit: parameter.unit.clone(),
-        about: parameter.about.clone(),
-        value: *last,
-        range: parameter.range,
-    }
 }

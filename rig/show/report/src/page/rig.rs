@@ -29,11 +29,13 @@ between two samples, a tenth of a second apart: time that the hypervisor took (i
 core, and page faults of both processes.";
 
 pub(super) fn timing_section(scenario: &Scenario, figures: &Figures) -> Section {
+    let (skips, readings) = (table::skips(figures), table::readings(&figures.readings));
+    let skipped = format!("Skipped {skips}. Controller's {readings}.");
     let blocks = vec![
         Block::chart("percentiles", percentiles(scenario, figures)),
         Block::table("latencies", latencies(&figures.intervals)).folded("Latencies in numbers"),
         Block::text("percentiles-in-words", P999),
-        Block::text("skipped", skipped(figures)),
+        Block::text("skipped", skipped),
         wake_ups(figures),
         Block::text("worst-in-words", LONGEST),
         Block::table("worst", longest(figures)),
@@ -103,19 +105,6 @@ fn latencies(intervals: &[IntervalFigures]) -> Table {
     };
     let numbers = ["n", "p50, µs", "p99, µs", "p99.9, µs", "max, µs"];
     Table::of_numbers("Latencies", "interval", numbers, intervals.iter().map(row))
-}
-
-fn skipped(figures: &Figures) -> String {
-    let [controller, plant] = [&figures.controller_skips, &figures.plant_skips];
-    format!(
-        "Skipped cycles: controller {}, plant {}; stalls of the machine while waiting: controller {:.2} ms, plant {:.2} ms. \
-         Controller's {}.",
-        controller.skipped,
-        plant.skipped,
-        controller.stalled_ns as f64 / 1e6,
-        plant.stalled_ns as f64 / 1e6,
-        table::readings(&figures.readings)
-    )
 }
 
 fn longest(figures: &Figures) -> Table {

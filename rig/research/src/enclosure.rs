@@ -8,87 +8,77 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 /// The real numbers from `low` to `high`, both included.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Enclosure {
-    low: f64,
-    high: f64,
+pub(crate) struct Enclosure {
+    pub low: f64,
+    pub high: f64,
 }
 
 impl Enclosure {
     /// The interval between two ends, which must be finite and in order.
-    pub fn new(low: f64, high: f64) -> Self {
+    pub(crate) fn new(low: f64, high: f64) -> Self {
         debug_assert!(low <= high && low.is_finite() && high.is_finite(), "[{low}, {high}]");
         Self { low, high }
     }
 
     /// A single number.
-    pub fn point(value: f64) -> Self {
+    pub(crate) fn point(value: f64) -> Self {
         Self::new(value, value)
     }
 
-    /// The lower end.
-    pub fn low(self) -> f64 {
-        self.low
-    }
-
-    /// The upper end.
-    pub fn high(self) -> f64 {
-        self.high
-    }
-
     /// A number about halfway between the ends, never outside them.
-    pub fn middle(self) -> f64 {
+    pub(crate) fn middle(self) -> f64 {
         (0.5 * (self.low + self.high)).clamp(self.low, self.high)
     }
 
     /// About the distance of the ends.
-    pub fn width(self) -> f64 {
+    pub(crate) fn width(self) -> f64 {
         self.high - self.low
     }
 
     /// The largest absolute value.
-    pub fn magnitude(self) -> f64 {
+    pub(crate) fn magnitude(self) -> f64 {
         self.low.abs().max(self.high.abs())
     }
 
     /// Whether a number lies within.
-    pub fn contains(self, value: f64) -> bool {
+    pub(crate) fn contains(self, value: f64) -> bool {
         self.low <= value && value <= self.high
     }
 
     /// The smallest interval that contains both.
     #[must_use]
-    pub fn hull(self, other: Self) -> Self {
+    pub(crate) fn hull(self, other: Self) -> Self {
         Self::new(self.low.min(other.low), self.high.max(other.high))
     }
 
     /// The intersection.
-    pub fn intersection(self, other: Self) -> Option<Self> {
+    pub(crate) fn intersection(self, other: Self) -> Option<Self> {
         let (low, high) = (self.low.max(other.low), self.high.min(other.high));
         (low <= high).then(|| Self::new(low, high))
     }
 
     /// Both halves; they share the middle.
-    pub fn halves(self) -> [Self; 2] {
+    pub(crate) fn halves(self) -> [Self; 2] {
         let middle = self.middle();
         [Self::new(self.low, middle), Self::new(middle, self.high)]
     }
 
     /// x².
     #[must_use]
-    pub fn square(self) -> Self {
+    pub(crate) fn square(self) -> Self {
         let (a, b) = (self.low * self.low, self.high * self.high);
         let low = if self.contains(0.0) { 0.0 } else { a.min(b).next_down().max(0.0) };
         Self::new(low, a.max(b).next_up())
     }
 
     /// √x of the part that is not negative; none when all of the interval is negative.
-    pub fn square_root(self) -> Option<Self> {
+    pub(crate) fn square_root(self) -> Option<Self> {
         let low = self.low.max(0.0).sqrt().next_down().max(0.0);
         (self.high >= 0.0).then(|| Self::new(low, self.high.sqrt().next_up()))
     }
 
     /// 1/x; the interval must be positive.
-    pub fn reciprocal(self) -> Option<Self> {
+    pub(crate) fn reciprocal(self) -> Option<Self> {
         (self.low > 0.0).then(|| Self::new((1.0 / self.high).next_down(), (1.0 / self.low).next_up()))
     }
 }
@@ -161,7 +151,7 @@ mod tests {
             if x >= 0.0 {
                 prop_assert!(a.square_root().is_some_and(|root| root.contains(x.sqrt())));
             }
-            if a.low() > 1e-3 {
+            if a.low > 1e-3 {
                 prop_assert!(a.reciprocal().is_some_and(|inverse| inverse.contains(1.0 / x)));
             }
             prop_assert!(a.hull(b).contains(x) && a.hull(b).contains(y));
@@ -175,11 +165,11 @@ mod tests {
     fn results_that_no_double_holds_are_enclosed() {
         let tenth = Enclosure::point(0.1);
         let third = Enclosure::point(3.0).reciprocal().unwrap();
-        assert!(third.low() < 1.0 / 3.0 && third.high() > 1.0 / 3.0);
+        assert!(third.low < 1.0 / 3.0 && third.high > 1.0 / 3.0);
         let hundredth = tenth * tenth;
-        assert!(hundredth.low() < 0.1 * 0.1 && hundredth.high() > 0.1 * 0.1);
+        assert!(hundredth.low < 0.1 * 0.1 && hundredth.high > 0.1 * 0.1);
         let root = Enclosure::point(2.0).square_root().unwrap();
-        assert!(root.low() * root.low() < 2.0 && root.high() * root.high() > 2.0);
+        assert!(root.low * root.low < 2.0 && root.high * root.high > 2.0);
     }
 
     #[test]

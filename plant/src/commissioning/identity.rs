@@ -5,24 +5,24 @@ use std::fmt::{self, Display, Formatter};
 
 use masseter_can::canopen::ObjectAddress;
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::commissioning::{
-    BootUps, Line, LineError, OtherMaster, Restarted, SdoReason, Survey, object_name, value_text,
-};
-use masseter_plant::wanted::WantedDrive;
 use masseter_scenario::CanConfig;
-use masseter_terminal::status;
 use serde::{Deserialize, Serialize};
+
+use super::errors::{LineError, OtherMaster, Restarted, SdoReason, object_name, value_text};
+use super::line::{BootUps, Line};
+use super::settings::Survey;
+use crate::master::wanted::WantedDrive;
 
 /// The identity object.
 const INDEX: u16 = 0x1018;
 const SERIAL: u8 = 4;
 /// Drives of which nothing is known.
-pub(crate) const NOT_ASKED: [Known; AXES] = [Known::NotAsked; AXES];
+pub const NOT_ASKED: [Known; AXES] = [Known::NotAsked; AXES];
 
 /// One entry of the identity object, all but the first of which are optional (CiA 301, 7.5.2.19).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Entry {
+pub enum Entry {
     /// The drive has this number.
     Told(u32),
     /// The drive refused the request: it has no such number.
@@ -31,19 +31,23 @@ pub(crate) enum Entry {
 
 /// The identity of a drive. Two drives without serial numbers may have equal ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Identity {
+pub struct Identity {
     /// The node id at which it answers.
-    node: u8,
-    vendor: Entry,
-    product: Entry,
-    revision: Entry,
-    serial: Entry,
+    pub node: u8,
+    /// 1018h:01h.
+    pub vendor: Entry,
+    /// 1018h:02h.
+    pub product: Entry,
+    /// 1018h:03h.
+    pub revision: Entry,
+    /// 1018h:04h.
+    pub serial: Entry,
 }
 
 /// What is known of the drive of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Known {
+pub enum Known {
     /// Nobody asked it, or it did not answer.
     NotAsked,
     /// It is this one.
@@ -57,7 +61,7 @@ pub(crate) enum Known {
      drive_profile.identity, or use the drive that the profile is for",
     AXIS_NAMES[*axis], object_name(*object), .found.in_words(object.subindex), value_text(*object, *wanted)
 )]
-pub(crate) struct OtherKind {
+pub struct OtherKind {
     axis: usize,
     object: ObjectAddress,
     found: Entry,
@@ -80,10 +84,9 @@ impl Identity {
     ///
     /// # Errors
     /// [`LineError`], also for a drive that is silent: it may be any drive.
-    pub(crate) fn read(line: &mut Line, can: &CanConfig, axis: usize) -> Result<Self, LineError> {
-        Self::of(can.node_ids[axis], |object| match line.read_number(axis, object) {
-            Err(error) if error.abort_code().is_some() => Ok(Entry::Absent),
-            read => read.map(Entry::Told),
+    pub fn read(line: &mut Line, can: &CanConfig, axis: usize) -> Result<Self, LineError> {
+        Self::of(can.node_ids[axis], |object| {
+            Ok(line.read_if_there(axis, object)?.map_or(Entry::Absent, Entry::Told))
         })
     }
 
@@ -91,7 +94,7 @@ impl Identity {
     ///
     /// # Errors
     /// Those of [`Self::read`], for the first drive that does not answer.
-    pub(crate) fn read_all(line: &mut Line, can: &CanConfig) -> Result<[Self; AXES], LineError> {
+    pub fn read_all(line: &mut Line, can: &CanConfig) -> Result<[Self; AXES], LineError> {
         let all = (0..AXES).map(|axis| Self::read(line, can, axis)).collect::<Result<Vec<_>, _>>()?;
         Ok(all.try_into().expect("one for each axis"))
     }
@@ -115,7 +118,7 @@ impl Identity {
     ///
     /// # Errors
     /// [`OtherKind`].
-    pub(crate) fn check_kind(&self, axis: usize, wanted: &WantedDrive) -> Result<(), OtherKind> {
+    pub fn check_kind(&self, axis: usize, wanted: &WantedDrive) -> Result<(), OtherKind> {
         for (subindex, _, found) in self.entries() {
             let object = ObjectAddress::new(INDEX, subindex);
             let Some(entry) = wanted.identity.iter().find(|entry| entry.object == object) else { continue };
@@ -131,7 +134,7 @@ impl Identity {
     }
 
     /// Its differences from an earlier identity, such as "product code was 402h, and is 7h".
-    pub(crate) fn differs_from(&self, before: &Self) -> String {
+    pub fn differs_from(&self, before: &Self) -> String {
         let entries = before.entries().into_iter().zip(self.entries());
         let others = entries.filter(|((.., before), (.., now))| before != now);
         let others = others.map(|((part, name, before), (.., now))| {
@@ -152,7 +155,7 @@ impl Display for Identity {
 
 impl Known {
     /// The identity in a survey; `NotAsked` unless all answers came.
-    pub(crate) fn of_survey(survey: Option<&Survey>, node: u8) -> Self {
+    pub fn of_survey(survey: Option<&Survey>, node: u8) -> Self {
         let Some(survey) = survey.filter(|survey| !survey.fell_silent()) else { return Self::NotAsked };
         // Only a refusal shows that the drive has no such entry.
         let entry = |object| match (survey.number(object), survey.refusal(object)) {
@@ -164,14 +167,14 @@ impl Known {
     }
 
     /// The identity, if it is known.
-    pub(crate) const fn identity(&self) -> Option<&Identity> {
+    pub const fn identity(&self) -> Option<&Identity> {
         if let Self::Is(identity) = self { Some(identity) } else { None }
     }
 }
 
 /// Why what a step has read from a drive, or written to it, may not count any more.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum Disturbance {
+pub enum Disturbance {
     /// It restarted.
     #[error(transparent)]
     Restarted(#[from] Restarted),
@@ -186,17 +189,24 @@ pub(super) enum Disturbance {
         "{}: the drive's {}; leave the drives in their places during a step",
         AXIS_NAMES[*axis], .now.differs_from(before)
     )]
-    OtherDrive { axis: usize, before: Identity, now: Identity },
+    OtherDrive {
+        /// The axis.
+        axis: usize,
+        /// The drive at the beginning of the step.
+        before: Identity,
+        /// The present drive.
+        now: Identity,
+    },
 }
 
 /// Refuses drives of which one restarted since then, or beside which another master was heard. Nothing is sent.
-pub(super) fn check_undisturbed(line: &Line, axes: &[usize], since: BootUps) -> Result<(), Disturbance> {
+pub fn check_undisturbed(line: &Line, axes: &[usize], since: BootUps) -> Result<(), Disturbance> {
     axes.iter().try_for_each(|&axis| since.check_axis(line, axis))?;
     Ok(line.strangers().refuse_masters()?)
 }
 
 /// The same, and reads the identities of the drives again.
-pub(super) fn check_present(
+pub fn check_present(
     line: &mut Line,
     can: &CanConfig,
     axes: &[usize],
@@ -218,7 +228,7 @@ pub(super) fn check_present(
 }
 
 /// What these identities leave open, one line for each gap.
-pub(crate) fn gaps(drives: &[Known; AXES]) -> Vec<String> {
+pub fn gaps(drives: &[Known; AXES]) -> Vec<String> {
     let known = || drives.iter().enumerate().filter_map(|(axis, known)| Some((axis, known.identity()?)));
     let names = |alike: &dyn Fn(&Identity) -> bool| {
         let alike = known().filter(|(_, identity)| alike(identity));
@@ -247,25 +257,18 @@ pub(crate) fn gaps(drives: &[Known; AXES]) -> Vec<String> {
     gaps
 }
 
-/// Warns of what the identities leave open.
-pub(crate) fn warn_of_gaps(drives: &[Known; AXES]) {
-    for gap in gaps(drives) {
-        status!("warning: {gap}");
-    }
-}
-
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use super::*;
 
     /// A drive of the rig's kind at a node.
-    pub(crate) fn drive(node: u8, serial: Entry) -> Identity {
+    fn drive(node: u8, serial: Entry) -> Identity {
         let [vendor, product, revision] = [0x004D_5354, 0x402, 0x1_0000].map(Entry::Told);
         Identity { node, vendor, product, revision, serial }
     }
 
     /// Six drives with these serial numbers.
-    pub(crate) fn drives(serials: [Entry; AXES]) -> [Known; AXES] {
+    fn drives(serials: [Entry; AXES]) -> [Known; AXES] {
         std::array::from_fn(|axis| Known::Is(drive(axis as u8 + 1, serials[axis])))
     }
 

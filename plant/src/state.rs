@@ -1,0 +1,88 @@
+//! The state of a plant on its way into an [`Archive`] and back.
+//!
+//! A scenario builds a plant, and its cycles change it. Only what they change is the state. The rest is not archived:
+//! mechanism, dictionaries, tables of pushes. So a state is read into a plant of the same scenario.
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+/// Where the values of a state are written to, or where they are read from, one after the other.
+pub trait Archive {
+    /// Why a value cannot be written or read.
+    type Error;
+
+    /// Writes the value, or replaces it by the one that is read.
+    ///
+    /// # Errors
+    /// When there is no such value.
+    fn value<T: Serialize + DeserializeOwned>(&mut self, value: &mut T) -> Result<(), Self::Error>;
+
+    /// Binds the archive to a constant of the plant.
+    ///
+    /// # Errors
+    /// When the archive that is read was bound to another constant.
+    fn constant<T: Serialize>(&mut self, constant: &T) -> Result<(), Self::Error>;
+}
+
+/// What cycles change.
+pub trait State {
+    /// Exchanges the state with an archive. A state that is read leaves nothing of the one before.
+    ///
+    /// # Errors
+    /// Those of the archive. A state of which a part is read is useless.
+    fn exchange<A: Archive>(&mut self, archive: &mut A) -> Result<(), A::Error>;
+}
+
+/// The state of a struct: fields that are values, and fields that have a state of their own. Of its constant fields,
+/// an archive is bound to some. A field that is not named does not compile.
+macro_rules! state {
+    ($type:ty {
+        $(values: $($value:ident)*;)?
+        $(parts: $($part:ident)*;)?
+        $(bound: $($bound:ident)*;)?
+        $(constant: $($constant:ident)*;)?
+    }) => {
+        impl $crate::state::State for $type {
+            fn exchange<A: $crate::state::Archive>(&mut self, archive: &mut A) -> Result<(), A::Error> {
+                let Self { $($($value,)*)? $($($part,)*)? $($($bound,)*)? $($($constant: _,)*)? } = self;
+                $($(archive.value($value)?;)*)?
+                $($($crate::state::State::exchange($part, archive)?;)*)?
+                $($(archive.constant($bound)?;)*)?
+                Ok(())
+            }
+        }
+    };
+}
+pub(crate) use state;
+
+/// The parts that a scenario has, of which there are always as many.
+impl<T: State> State for Vec<T> {
+    fn exchange<A: Archive>(&mut self, archive: &mut A) -> Result<(), A::Error> {
+        self.iter_mut().try_for_each(|part| part.exchange(archive))
+    }
+}
+
+/// The part that a scenario has or lacks.
+impl<T: State> State for Option<T> {
+    fn exchange<A: Archive>(&mut self, archive: &mut A) -> Result<(), A::Error> {
+        self.iter_mut().try_for_each(|part| part.exchange(archive))
+    }
+}
+
+/// An array of more elements than serde takes, as a list.
+pub(crate) mod as_list {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
+
+    pub(crate) fn serialize<T: Serialize, S: Serializer>(array: &[T], to: S) -> Result<S::Ok, S::Error> {
+        array.serialize(to)
+    }
+
+    pub(crate) fn deserialize<'de, T, D, const N: usize>(from: D) -> Result<[T; N], D::Error>
+    where
+        T: Deserialize<'de>,
+        D: Deserializer<'de>,
+    {
+        let list = Vec::deserialize(from)?;
+        list.try_into().map_err(|list: Vec<T>| D::Error::invalid_length(list.len(), &"another length"))
+    }
+}

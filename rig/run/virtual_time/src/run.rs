@@ -1,0 +1,189 @@
+//! A run under virtual time: a loop over a rig, with a controller that gives the commands.
+
+#[cfg(test)]
+pub(crate) mod tests;
+
+use std::sync::Arc;
+
+use masseter_controller::process::BuildController;
+use masseter_plan::RunPlan;
+use masseter_plant::PlantError;
+use masseter_recording::Ending;
+use masseter_runtime::control::{Controller, Duties, NoBranch, Operator, Outcome, set_parameters};
+use masseter_runtime::lifecycle::Party;
+use masseter_runtime::lockstep::EPOCH_NS;
+use masseter_runtime::named::{Declared, NamedValues};
+use masseter_scenario::Scenario;
+
+use crate::log::Sink;
+use crate::snapshot::OtherScenario;
+use crate::stepper::{Stepper, StepperState};
+
+/// What the user asks of a run.
+pub trait Requests {
+    /// Whether an orderly stop is requested.
+    fn is_stop_requested(&self) -> bool;
+
+    /// Whether an immediate end is requested.
+    fn is_abort_requested(&self) -> bool;
+}
+
+/// The controller of a run, and what accompanies it.
+pub(crate) struct Control {
+    controller: Box<dyn Controller>,
+    duties: Duties,
+}
+
+impl Control {
+    /// The controller of a run that has not begun. Tells what it declares.
+    pub(crate) fn new(
+        plan: &RunPlan,
+        build: BuildController,
+        declared: &mut Declared,
+    ) -> anyhow::Result<Self> {
+        let mut controller = build(&plan.scenario, plan.mechanism.clone(), plan.trajectory.clone());
+        let named = NamedValues::new(controller.declared(), &plan.scenario.parameters)?;
+        set_parameters(&mut *controller, &named);
+        *declared = named.settings().declared().clone();
+        let operator = Operator::new(&plan.scenario, declared, EPOCH_NS)?;
+        Ok(Self { controller, duties: Duties { named, operator } })
+    }
+
+    fn branch(&self) -> Result<Self, NoBranch> {
+        Ok(Self { controller: self.controller.branch()?, duties: self.duties.clone() })
+    }
+}
+
+/// A rig and its controller, cycle by cycle. The messages go to a [`Sink`].
+///
+/// ```
+/// use masseter_controller::motion_controller::MotionController;
+/// use masseter_plan::RunPlan;
+/// use masseter_recording::Recorded;
+/// use masseter_scenario::Scenario;
+/// use masseter_virtual_time::{Run, Sink};
+///
+/// /// Counts the readings.
+/// #[derive(Default)]
+/// struct Readings(usize);
+///
+/// impl Sink for Readings {
+///     fn take(&mut self, message: &Recorded, _: u64) {
+///         self.0 += usize::from(matches!(message, Recorded::Reading(_)));
+///     }
+///
+///     fn has_failed(&self) -> bool {
+///         false
+///     }
+/// }
+///
+/// let plan = RunPlan::new(Scenario::default())?;
+/// let mut run = Run::new(
+///     &plan,
+///     |scenario, mechanism, motion| Box::new(MotionController::new(scenario, mechanism, motion)),
+///     Readings::default(),
+/// )?;
+/// (0..100).try_for_each(|_| run.play_cycle())?;
+/// let branch = run.snapshot()?;
+/// (0..100).try_for_each(|_| run.play_cycle())?;
+/// run.restore(&branch)?;
+/// (0..50).try_for_each(|_| run.play_cycle())?;
+/// assert_eq!(run.into_sink().0, 250);
+/// # Ok::<(), anyhow::Error>(())
+/// ```
+pub struct Run<S> {
+    scenario: Arc<Scenario>,
+    stepper: Stepper<S>,
+    control: Control,
+}
+
+/// The state of a run at an instant: that of the rig, and that of the controller with its parameters and its operator.
+/// It lives in memory. The state of a rig alone goes [into a file](crate::Snapshot::write_to).
+pub struct RunSnapshot {
+    scenario: Arc<Scenario>,
+    stepper: StepperState,
+    control: Control,
+}
+
+/// Why a run cannot go to a snapshot.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum RestoreError {
+    /// The snapshot is one of another scenario or seed.
+    #[error(transparent)]
+    OtherScenario(#[from] OtherScenario),
+    /// The snapshot has a controller that cannot be copied.
+    #[error(transparent)]
+    Controller(#[from] NoBranch),
+}
+
+impl<S: Sink> Run<S> {
+    /// A planned run before its first cycle.
+    ///
+    /// # Errors
+    /// When the scenario does not fit the plant, or what the controller declares.
+    pub fn new(plan: &RunPlan, build: BuildController, sink: S) -> anyhow::Result<Self> {
+        Self::of_control(plan, Control::new(plan, build, &mut Declared::default())?, sink)
+    }
+
+    pub(crate) fn of_control(plan: &RunPlan, control: Control, sink: S) -> anyhow::Result<Self> {
+        let stepper = Stepper::new(&plan.scenario, plan.schedule, sink)?;
+        Ok(Self { scenario: Arc::new(plan.scenario.clone()), stepper, control })
+    }
+
+    /// Plays one cycle.
+    ///
+    /// # Errors
+    /// When the plant fails.
+    pub fn play_cycle(&mut self) -> Result<(), PlantError> {
+        let Control { controller, duties } = &mut self.control;
+        self.stepper.play_cycle(&mut **controller, duties)
+    }
+
+    /// Plays the run to its end; returns the sink and the ending. The ending counts only if the sink took every
+    /// message.
+    pub(crate) fn play(mut self, interrupts: &dyn Requests) -> (S, Ending) {
+        let mut plant_error = None;
+        while plant_error.is_none()
+            && self.control.controller.outcome().is_none()
+            && !self.stepper.sink().has_failed()
+            && !interrupts.is_abort_requested()
+        {
+            if interrupts.is_stop_requested() {
+                self.control.controller.request_stop();
+            }
+            plant_error = self.play_cycle().err();
+        }
+        let ending = match (plant_error, self.control.controller.outcome()) {
+            (Some(error), _) => Ending::died(Party::Plant.name(), error.to_string()),
+            _ if interrupts.is_stop_requested() => Ending::Interrupted,
+            (None, Some(Outcome::SafeStop)) => Ending::SafeStop,
+            (None, _) => Ending::Completed,
+        };
+        (self.into_sink(), ending)
+    }
+
+    /// The state of the run between two cycles, to be [restored](Self::restore) again and again.
+    ///
+    /// # Errors
+    /// Where the controller or its pose law is not the rig's, and has no `branch`.
+    pub fn snapshot(&self) -> Result<RunSnapshot, NoBranch> {
+        let (scenario, stepper) = (self.scenario.clone(), self.stepper.state());
+        Ok(RunSnapshot { scenario, stepper, control: self.control.branch()? })
+    }
+
+    /// Goes back, or on, to a snapshot. The cycles that follow are those that followed it. The sink keeps what it took.
+    ///
+    /// # Errors
+    /// Where the snapshot is one of another scenario or seed. The run then goes on as it was.
+    pub fn restore(&mut self, snapshot: &RunSnapshot) -> Result<(), RestoreError> {
+        OtherScenario::refuse(&self.scenario, &snapshot.scenario)?;
+        self.control = snapshot.control.branch()?;
+        self.stepper.set_state(&snapshot.stepper);
+        Ok(())
+    }
+
+    /// The sink, with what it took.
+    pub fn into_sink(self) -> S {
+        self.stepper.into_sink()
+    }
+}

@@ -1,0 +1,208 @@
+//! The plant of a scenario that steps from one half of a cycle to the next, in exact time; and its state between them.
+
+use masseter_plant::PlantError;
+use masseter_plant::core::PlantCore;
+use masseter_plant::cycle::{PlantPorts, begin_cycle, end_cycle};
+use masseter_plant::emulation::VirtualLink;
+use masseter_plant::state::{Archive, State};
+use masseter_runtime::control::{Controller, Duties};
+use masseter_runtime::lockstep::EPOCH_NS;
+use masseter_runtime::messages::{Command, Contact, Reading, Truth};
+use masseter_runtime::realtime::Wake;
+use masseter_runtime::schedule::CycleSchedule;
+use masseter_scenario::Scenario;
+
+use crate::log::{Log, LoggedPorts, Published, Publisher, Sink};
+
+/// The plant of a planned scenario; its messages go to a sink.
+#[derive(Debug)]
+pub(crate) struct Stepper<S> {
+    schedule: CycleSchedule,
+    period_ns: u64,
+    plant: PlantCore,
+    ports: Ports<S>,
+    /// The number of the cycle, from 1 on.
+    cycle: u64,
+}
+
+/// All of it that cycles change, but for the sink.
+#[derive(Debug, Clone)]
+pub(crate) struct StepperState {
+    plant: PlantCore,
+    published: Published,
+    now_ns: u64,
+    reading: Reading,
+    command: Option<Command>,
+    cycle: u64,
+}
+
+impl State for StepperState {
+    fn exchange<A: Archive>(&mut self, archive: &mut A) -> Result<(), A::Error> {
+        let Self { plant, published, now_ns, reading, command, cycle } = self;
+        plant.exchange(archive)?;
+        archive.value(published)?;
+        archive.value(now_ns)?;
+        archive.value(reading)?;
+        archive.value(command)?;
+        archive.value(cycle)
+    }
+}
+
+impl<S: Sink> Stepper<S> {
+    /// Before the first cycle.
+    pub(crate) fn new(scenario: &Scenario, schedule: CycleSchedule, sink: S) -> Result<Self, PlantError> {
+        let plant = PlantCore::new(scenario, EPOCH_NS)?;
+        Ok(Self { schedule, period_ns: scenario.period_ns(), plant, ports: Ports::new(sink), cycle: 0 })
+    }
+
+    /// The same before the first cycle again, with another sink.
+    pub(crate) fn renew(&mut self, scenario: &Scenario, sink: S) -> Result<(), PlantError> {
+        *self = Self::new(scenario, self.schedule, sink)?;
+        Ok(())
+    }
+
+    /// One cycle whose command a controller gives.
+    pub(crate) fn play_cycle(
+        &mut self,
+        controller: &mut dyn Controller,
+        duties: &mut Duties,
+    ) -> Result<(), PlantError> {
+        self.begin_next_cycle()?;
+        let now_ns = self.controller_at_ns();
+        let wake = Wake::on_time(self.cycle, now_ns);
+        let mut ports = LoggedPorts::new(&mut self.ports.log, [now_ns; 3], Some(&self.ports.reading));
+        let Ok(()) = masseter_runtime::control::run_cycle(controller, duties, &mut ports, &wake);
+        let command = ports.into_command();
+        self.end_cycle(command)
+    }
+
+    /// Ends a cycle with this command, under the cycle's number and time.
+    pub(crate) fn end_with(&mut self, command: &Command) -> Result<(), PlantError> {
+        let (cycle, now_ns) = (self.cycle, self.controller_at_ns());
+        let command = self.ports.log.record(Publisher::Command, now_ns, |message: &mut Command| {
+            *message = Command { cycle, ..*command };
+        });
+        self.end_cycle(Some(command))
+    }
+
+    pub(crate) fn begin_next_cycle(&mut self) -> Result<(), PlantError> {
+        self.cycle += 1;
+        let sync = self.sync();
+        begin_cycle(&mut self.plant, &mut self.ports, &self.schedule, &sync)
+    }
+
+    fn end_cycle(&mut self, command: Option<Command>) -> Result<(), PlantError> {
+        self.ports.now_ns = self.controller_at_ns();
+        self.ports.command = command;
+        let sync = self.sync();
+        end_cycle(&mut self.plant, &mut self.ports, &sync)
+    }
+
+    /// The state between two calls.
+    pub(crate) fn state(&self) -> StepperState {
+        let Self { plant, ports: Ports { log, now_ns, reading, command }, cycle, .. } = self;
+        StepperState {
+            plant: plant.clone(),
+            published: log.published(),
+            now_ns: *now_ns,
+            reading: *reading,
+            command: *command,
+            cycle: *cycle,
+        }
+    }
+
+    /// Goes to a state of the same scenario and seed.
+    pub(crate) fn set_state(&mut self, state: &StepperState) {
+        let StepperState { plant, published, now_ns, reading, command, cycle } = state;
+        self.plant = plant.clone();
+        self.ports.log.set_published(*published);
+        (self.ports.now_ns, self.ports.reading, self.ports.command) = (*now_ns, *reading, *command);
+        self.cycle = *cycle;
+    }
+
+    pub(crate) fn cycle(&self) -> u64 {
+        self.cycle
+    }
+
+    /// The reading of this cycle, as published.
+    pub(crate) fn reading(&self) -> &Reading {
+        &self.ports.reading
+    }
+
+    pub(crate) fn sink(&self) -> &S {
+        self.ports.log.sink()
+    }
+
+    pub(crate) fn sink_mut(&mut self) -> &mut S {
+        self.ports.log.sink_mut()
+    }
+
+    pub(crate) fn into_sink(self) -> S {
+        self.ports.log.into_sink()
+    }
+
+    fn sync(&self) -> Wake {
+        Wake::on_time(self.cycle, EPOCH_NS + (self.cycle - 1) * self.period_ns)
+    }
+
+    fn controller_at_ns(&self) -> u64 {
+        self.sync().due_ns + self.schedule.controller_at_ns
+    }
+}
+
+#[derive(Debug)]
+struct Ports<S> {
+    log: Log<S>,
+    now_ns: u64,
+    reading: Reading,
+    /// The command of this cycle.
+    command: Option<Command>,
+}
+
+impl<S: Sink> Ports<S> {
+    fn new(sink: S) -> Self {
+        Self { log: Log::new(sink), now_ns: EPOCH_NS, reading: Reading::default(), command: None }
+    }
+}
+
+impl<S: Sink> PlantPorts<VirtualLink> for Ports<S> {
+    type Command = Command;
+    type Error = PlantError;
+
+    fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
+    fn wait_until(&mut self, _: u64, latest_ns: u64) -> u64 {
+        self.now_ns = latest_ns;
+        latest_ns
+    }
+
+    fn wait_for_frames(&mut self, _: &mut VirtualLink, latest_ns: u64) -> u64 {
+        latest_ns
+    }
+
+    fn publish_reading(&mut self, fill: impl FnOnce(&mut Reading)) -> Result<(), PlantError> {
+        self.reading = self.log.record(Publisher::Reading, self.now_ns, fill);
+        Ok(())
+    }
+
+    fn publish_truth(&mut self, truth: &Truth) -> Result<(), PlantError> {
+        self.log.record(Publisher::Truth, self.now_ns, |message| *message = *truth);
+        Ok(())
+    }
+
+    fn publish_contact(&mut self, contact: &Contact) -> Result<(), PlantError> {
+        self.log.record(Publisher::Contact, self.now_ns, |message| *message = *contact);
+        Ok(())
+    }
+
+    fn command(&mut self, _: &Wake) -> Result<Option<Command>, PlantError> {
+        Ok(self.command.take())
+    }
+
+    fn publish_frames_and_events(&mut self, plant: &mut PlantCore) -> Result<(), PlantError> {
+        self.log.drain(plant, self.now_ns);
+        Ok(())
+    }
+}

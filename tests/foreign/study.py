@@ -1,0 +1,71 @@
+"""The paper's claims and figures of a study with 80 samples: python tests/foreign/study.py STUDY
+
+A figure has data and text, and all of it lies on the page: a coordinate that is no number, or a mark beside the page, fails. The
+same tables give the same bytes.
+"""
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+SCRIPTS = Path(__file__).parents[2] / "scripts"
+sys.path.insert(0, str(SCRIPTS))
+from study_claims import Share, cannot_be_predicted, faster, reaches_the_closest, unique, wider  # noqa: E402
+
+study = Path(sys.argv[1])
+HOLDS, PARTLY, NOT = "holds", "holds partly", "does not hold"
+share = lambda hits: Share(hits, 1000)
+
+# The same figures never fulfil both claims of one solver.
+for anywhere, close, reaches, unpredictable in ((995, 999, HOLDS, NOT), (300, 999, PARTLY, PARTLY), (300, 980, NOT, HOLDS)):
+    closest = share(anywhere), share(close)
+    assert (reaches_the_closest(*closest), cannot_be_predicted(*closest)) == (reaches, unpredictable)
+# A wider range is one that another sample would show as well.
+assert wider(share(900), share(600), share(900)) == HOLDS
+assert wider(share(605), share(600), share(900)) == PARTLY
+assert wider(share(500), share(600), share(605)) == NOT
+# One exception refutes uniqueness, and an empty sample shows nothing.
+assert [unique(one) for one in (share(0), share(1), share(10), Share(0, 0))] == [HOLDS, PARTLY, NOT, NOT]
+# Many more iterations are twice as many.
+nan = float("nan")
+assert [faster(7, newton) for newton in (14, 13, 7)] + [faster(nan, nan)] == [HOLDS, PARTLY, NOT, NOT]
+# A small difference of small samples is not clear.
+assert not Share(6, 10).clearly_exceeds(Share(5, 10)) and Share(6000, 10_000).clearly_exceeds(Share(5000, 10_000))
+assert not Share(5, 10).clearly_exceeds(Share(5, 10)) and not Share(0, 0).clearly_exceeds(Share(0, 0))
+# Nearly all does not read as all.
+assert [str(one) for one in (Share(9999, 10_000), Share(10, 10), Share(1, 10_000))] == ["99.990 %", "100.0 %", "0.010 %"]
+
+
+def made() -> dict:
+    subprocess.run([sys.executable, SCRIPTS / "study.py", study], check=True, stdout=subprocess.PIPE)
+    return {path.name: path.read_text() for path in study.iterdir() if path.suffix in (".svg", ".md")}
+
+
+files = made()
+assert made() == files, "the same tables give other bytes"
+page = files.pop("claims.md")
+claims = {cells[2].strip(): cells[6].strip(" *") for cells in (line.split("|") for line in page.splitlines()) if len(cells) == 8}
+claims.pop("The paper's claim"), claims.pop("---")
+assert len(claims) == 18 and set(claims.values()) <= {HOLDS, PARTLY, NOT} and not re.search(r"\bnan\b", page), claims
+# Whatever this sample gives: these follow from the mechanism.
+verdict = lambda part: next(verdict for claim, verdict in claims.items() if part in claim)
+assert verdict("10⁻¹⁰ s on a Pentium") == NOT and verdict("whatever the initial guess") != HOLDS
+assert verdict("A₁ has two positions") == HOLDS and verdict("several sets of leg angles") == HOLDS
+assert "66.04°" in page, "the folded corner is the one of the paper"
+
+shown = re.findall(r"!\[(\w+)\]\((\1\.svg)\)", page)
+assert len(shown) == 16 and sorted(file for _, file in shown) == sorted(files), (shown, sorted(files))
+for name, text in files.items():
+    assert not re.search(r'"[^"]*\bnan\b', text), name
+    svg = ElementTree.fromstring(text)
+    width, height = (float(number) for number in svg.attrib["viewBox"].split()[2:])
+    texts = [element for element in svg.iter() if element.tag.endswith("}text")]
+    shapes = [element for element in svg.iter() if element.tag.endswith(("}path", "}use", "}image"))]
+    assert width >= 500 and len(shapes) >= 15 and len(texts) >= 15, (name, width, len(shapes), len(texts))
+    for use in (element for element in shapes if element.tag.endswith("}use")):
+        assert 0 <= float(use.attrib["x"]) <= width and 0 <= float(use.attrib["y"]) <= height, (name, use.attrib)
+# Teeth with their forces, angles of the solutions, and names of the solvers stand in the figures.
+assert re.search(r">\d\d: \d+\.\d N<", files["pressure.svg"]) and "true: " in files["fig8_solutions.svg"]
+assert all(solver in files["success.svg"] for solver in ("published", "Newton–Raphson", "controller"))
+print(f"{len(claims)} claims are judged and {len(files)} figures drawn from the study's tables")
