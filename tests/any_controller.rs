@@ -10,8 +10,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
 use masseter_runtime::control::Session;
+use masseter_runtime::conversation::line;
+use masseter_runtime::lifecycle::Report;
 use masseter_runtime::lifecycle::attach::{self, Hello, socket};
-use masseter_runtime::lifecycle::{Report, line};
 use masseter_runtime::named::{self, Declared, Parameter};
 use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain};
 use masseter_runtime::transport::Domain;

@@ -14,11 +14,10 @@ use std::fmt::Display;
 use std::fs;
 use std::path::PathBuf;
 
-use masseter_analysis::{Analysis, Figures};
+use masseter_analysis::{Analysis, Figures, Verdict};
 use masseter_controller::motion_controller::MotionController;
 use masseter_plan::RunPlan;
 use masseter_recording::Manifest;
-use masseter_report::Verdict;
 use masseter_scenario::{BusFault, ChecksConfig, FaultConfig, Scenario};
 use masseter_virtual_time::Requests;
 use rayon::prelude::*;
@@ -122,7 +121,6 @@ fn play(scenario: Scenario) -> (Verdict, Figures) {
     let motion_s = plan.trajectory.duration_s();
     let machine = masseter_machine::describe();
     let mut manifest = Manifest::new("test", plan.scenario.clone(), motion_s, "virtual", machine);
-    manifest.motion_end_s = Some(plan.trajectory.motion_time_s(motion_s));
     let figures = masseter_virtual_time::analyse(
         &plan,
         |scenario, mechanism, motion| Box::new(MotionController::new(scenario, mechanism, motion)),

@@ -7,7 +7,7 @@ use std::process::{Child, ChildStderr, ExitStatus, Stdio};
 use std::thread;
 
 use crate::common::{Cores, LENIENT, Workspace, assert_played, has_event, masseter, stderr, stdout};
-use masseter_recording::{CDR_LITTLE_ENDIAN, Reader, Recorded, Topic};
+use masseter_recording::{CDR_LITTLE_ENDIAN, Reader, Topic};
 use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::http::HeaderValue;
@@ -110,8 +110,8 @@ fn recorded(workspace: &Workspace) -> BTreeMap<String, HashSet<Vec<u8>>> {
     let mut recorded: BTreeMap<String, HashSet<Vec<u8>>> = BTreeMap::new();
     while let Some(entry) = reader.next_entry().unwrap() {
         // Live, each frame is a message of its own.
-        for frame in entry.frames().into_iter().flat_map(Result::unwrap) {
-            let bytes = [&CDR_LITTLE_ENDIAN, Recorded::Frame(frame).body()].concat();
+        for frame in entry.messages().unwrap().iter().filter(|message| message.topic() == Topic::Frame) {
+            let bytes = [&CDR_LITTLE_ENDIAN, frame.body()].concat();
             recorded.entry(Topic::Frame.name().to_owned()).or_default().insert(bytes);
         }
         let topic = entry.channel.unwrap().topic.clone();

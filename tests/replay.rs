@@ -167,7 +167,7 @@ fn what_cannot_be_replayed_is_refused_with_the_reason() {
     fs::write(&recording, &bytes[..bytes.len() / 2]).unwrap();
     refused("the recording is incomplete");
     fs::remove_file(&recording).unwrap();
-    refused("no folder with a recording");
+    refused("recording.mcap does not exist: the run ended before its recorder wrote");
 }
 
 #[test]

@@ -195,11 +195,13 @@ impl Times {
         let (mut zero_ns, mut first_ns, mut end_ns, mut events) = (u64::MAX, u64::MAX, 0, Vec::new());
         while let Some(entry) = reader.next_entry().unwrap() {
             first_ns = first_ns.min(entry.header.log_time);
-            match entry.recorded() {
-                Some(Ok(Recorded::Reading(reading))) => zero_ns = zero_ns.min(reading.due_ns),
-                Some(Ok(Recorded::Truth(truth))) => end_ns = end_ns.max(truth.sampled_ns),
-                Some(Ok(Recorded::Event(event))) => events.push(event),
-                _ => {}
+            for message in entry.messages().unwrap() {
+                match message {
+                    Recorded::Reading(reading) => zero_ns = zero_ns.min(reading.due_ns),
+                    Recorded::Truth(truth) => end_ns = end_ns.max(truth.sampled_ns),
+                    Recorded::Event(event) => events.push(event),
+                    _ => {}
+                }
             }
         }
         Self { zero_ns, first_ns, end_s: (end_ns - zero_ns) as f64 / 1e9, events }

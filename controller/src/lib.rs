@@ -9,7 +9,7 @@ pub mod hold_position;
 pub mod kinematics;
 pub mod motion_controller;
 mod path_supervision;
-mod playback;
+pub mod playback;
 mod pose_control;
 pub mod pose_law;
 pub mod process;

@@ -1,6 +1,8 @@
 //! Progress of the motion: the move to its first pose, the motion itself, and the ramp to rest when it is stopped
 //! halfway. Time comes in as the steps of the motion, so that the motion waits while the drives cannot follow. Rate and
-//! amplitude of the motion may change while it plays.
+//! amplitude of the motion may change while it plays. The controller plays one [`Playback`], the judge of a run another.
+
+use std::sync::Arc;
 
 use masseter_model::geometry::{AXES, Mechanism, Pose};
 use masseter_runtime::messages::codes::ControllerState;
@@ -19,6 +21,8 @@ const LONGEST_S: f64 = 60.0;
 /// A change gathers speed and loses it in a third of its time each.
 const SPEED: f64 = 1.5;
 const ACCELERATION: f64 = 4.5;
+/// Nearer times of a motion are the same, s.
+const SAME_TIME_S: f64 = 1e-9;
 /// By how much more than in proportion the axes may move with the share.
 const BEND: f64 = 1.25;
 
@@ -33,14 +37,8 @@ pub(crate) struct Progress {
 
 impl Progress {
     pub(crate) fn new(scenario: &Scenario, mechanism: &Mechanism, trajectory: Trajectory) -> Self {
-        let limits = scenario.limits.within(&scenario.drives);
-        // The plan has checked every cycle; the margins that a change of rate needs show in a coarser look.
-        let period_s = scenario.period_s().max(MARGINS_EVERY_S);
-        let demands = trajectory::check(&trajectory, mechanism, &limits, period_s).ok();
-        let change_s = Slew::change_s(demands.as_ref(), &limits);
-        let ControllerConfig { ease_s, stop_ramp_s, .. } = scenario.controller;
         Self {
-            playback: Playback::new(trajectory, ease_s, stop_ramp_s, change_s),
+            playback: Playback::of_scenario(scenario, mechanism, trajectory),
             acknowledgement: CommandAcknowledgement::default(),
             cycles_at_rest: 0,
         }
@@ -95,8 +93,8 @@ enum Part {
 
 /// The desired pose, as a function of the time since playing began.
 #[derive(Debug, Clone)]
-pub(crate) struct Playback {
-    trajectory: Trajectory,
+pub struct Playback {
+    trajectory: Arc<Trajectory>,
     ease_s: f64,
     stop_ramp_s: f64,
     part: Part,
@@ -113,11 +111,21 @@ pub(crate) struct Playback {
 }
 
 impl Playback {
+    /// Of a scenario's motion on its mechanism, as its limits let rate and amplitude change.
+    pub fn of_scenario(scenario: &Scenario, mechanism: &Mechanism, trajectory: Trajectory) -> Self {
+        let limits = scenario.limits.within(&scenario.drives);
+        // The plan has checked every cycle; the margins that a change of rate needs show in a coarser look.
+        let period_s = scenario.period_s().max(MARGINS_EVERY_S);
+        let demands = trajectory::check(&trajectory, mechanism, &limits, period_s).ok();
+        let ControllerConfig { ease_s, stop_ramp_s, .. } = scenario.controller;
+        Self::new(trajectory, ease_s, stop_ramp_s, Slew::change_s(demands.as_ref(), &limits))
+    }
+
     /// A change of rate or amplitude by 1 takes `change_s`.
     pub(crate) fn new(trajectory: Trajectory, ease_s: f64, stop_ramp_s: f64, change_s: f64) -> Self {
         Self {
             part: Part::Hold(trajectory.pose(0.0)),
-            trajectory,
+            trajectory: Arc::new(trajectory),
             ease_s,
             stop_ramp_s,
             elapsed_s: 0.0,
@@ -130,12 +138,12 @@ impl Playback {
     }
 
     /// Sets the rate of the motion, 0 to 1.
-    pub(crate) fn set_motion_rate(&mut self, rate: f64) {
+    pub fn set_motion_rate(&mut self, rate: f64) {
         self.tempo.target = rate;
     }
 
     /// Sets the share of the way from the motion's first pose that is played, 0 to 1.
-    pub(crate) fn set_motion_amplitude(&mut self, amplitude: f64) {
+    pub fn set_motion_amplitude(&mut self, amplitude: f64) {
         self.amplitude.target = amplitude;
     }
 
@@ -155,12 +163,12 @@ impl Playback {
     }
 
     /// Begins the motion.
-    pub(crate) fn play(&mut self) {
+    pub fn play(&mut self) {
         self.begin(Part::Motion);
     }
 
     /// Lets the part come to rest on its own path.
-    pub(crate) fn stop(&mut self) {
+    pub fn stop(&mut self) {
         self.stopping = true;
     }
 
@@ -173,7 +181,7 @@ impl Playback {
     }
 
     /// Lets `dt_s` pass.
-    pub(crate) fn advance(&mut self, dt_s: f64) {
+    pub fn advance(&mut self, dt_s: f64) {
         let (before, speed_before) = (self.rate, self.speed());
         if self.stopping {
             self.rate = (before - dt_s / self.stop_ramp_s).max(0.0);
@@ -208,6 +216,11 @@ impl Playback {
         }
     }
 
+    /// What is left of the motion, s of the trajectory's time.
+    pub fn rest_s(&self) -> f64 {
+        (self.trajectory.duration_s() - self.elapsed_s).max(0.0)
+    }
+
     /// Whether the current part has reached its end, or a motion has taken too long.
     pub(crate) fn is_over(&self) -> bool {
         let most_s = MotionConfig::MOST_DURATIONS * self.trajectory.duration_s();
@@ -226,6 +239,26 @@ impl Playback {
     pub(crate) fn is_at_rest(&self) -> bool {
         let is_changing = self.part == Part::Motion && !self.amplitude.is_settled();
         self.rate == 0.0 || (self.is_at_end() && !is_changing)
+    }
+
+    /// By how much a motion that has come to `motion_s` is behind this one, s of the trajectory's time; 0 where it is level or
+    /// ahead.
+    pub fn lag_s(&self, motion_s: f64) -> f64 {
+        let is_beyond = |at_s: f64| self.trajectory.motion_time_s(at_s) > motion_s + SAME_TIME_S;
+        if !is_beyond(self.elapsed_s) {
+            return 0.0;
+        }
+        let (mut before_s, mut after_s) = (0.0, self.elapsed_s);
+        while after_s - before_s > SAME_TIME_S {
+            let middle_s = f64::midpoint(before_s, after_s);
+            if is_beyond(middle_s) { after_s = middle_s } else { before_s = middle_s }
+        }
+        self.elapsed_s - after_s
+    }
+
+    /// The pose of the motion so long before, or later if negative, s of the trajectory's time.
+    pub fn earlier_pose(&self, lag_s: f64) -> Pose {
+        self.trajectory.scaled_pose(self.elapsed_s - lag_s, self.amplitude.value)
     }
 
     /// How far the motion has come `ahead_s` from now, in the sense of [`Trajectory::motion_time_s`]; negative before

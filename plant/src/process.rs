@@ -4,6 +4,7 @@ use masseter_runtime::clock;
 use masseter_runtime::lifecycle::{Party, ProcessArguments, ProcessContext, ProcessError, StopRequest};
 use masseter_runtime::lockstep::{Clock, Lockstep};
 use masseter_runtime::messages::{Command, Contact, Event, Reading, Truth};
+use masseter_runtime::named::Declared;
 use masseter_runtime::realtime::Wake;
 use masseter_runtime::schedule::CycleSchedule;
 use masseter_runtime::transport::{
@@ -228,7 +229,7 @@ fn serve<L: Link>(
     let ports = Ports::open(&context.node)?;
     ports.warm_up()?;
     let lockstep = Lockstep::open(context, Party::Plant, Party::Controller).map_err(ProcessError::from)?;
-    let start = context.ready(Some(scenario.realtime.cores[1]))?;
+    let start = context.ready(Some(scenario.realtime.cores[1]), Declared::default())?;
     ports.connect()?;
 
     let mut plant = build(scenario, start.epoch_ns)?;

@@ -10,7 +10,7 @@ use masseter_campaign::{
     Search, StopRules, WorstCase,
 };
 use masseter_plan::{Overrides, scenario_with_overrides};
-use masseter_recording::time_in_names;
+use masseter_recording::{RunFolder, time_in_names};
 use masseter_scenario::wording::counted;
 use masseter_table::{Format, ParquetProgram};
 use masseter_terminal::{Exit, Failure, OrFailure, result, status};
@@ -203,7 +203,7 @@ fn check_search(campaign: &Campaign, args: &SearchArgs) -> anyhow::Result<()> {
 #[derive(Debug, Clone, Args)]
 #[command(after_help = "Example:\n  masseter shrink campaigns/friction/worst/case-173 --out smallest.toml")]
 pub(super) struct ShrinkArgs {
-    /// A scenario that fails, or the folder of its run
+    /// A scenario that fails, or its run: folder, recording.mcap, or a link to either
     path: PathBuf,
     /// Keep the failure of this check [default: the first that fails, or the cause of a safe stop]
     #[arg(long, value_name = "NAME")]
@@ -238,8 +238,11 @@ pub(super) fn shrink(args: &ShrinkArgs) -> Result<Exit, Failure> {
     Ok(Exit::Passed)
 }
 
-/// The scenario of a file, or of a folder of a run or a case.
+/// The scenario of a file, of a run under any of its names, or of the folder of a case.
 fn scenario_of(path: &Path) -> anyhow::Result<PathBuf> {
+    if let Ok(run) = RunFolder::open(path) {
+        return Ok(run.scenario());
+    }
     let inside = path.join("scenario.toml");
     ensure!(!path.is_dir() || inside.is_file(), "{} has no scenario.toml", path.display());
     Ok(if path.is_dir() { inside } else { path.to_owned() })

@@ -8,7 +8,7 @@ use anyhow::anyhow;
 use clap::{Args, Subcommand};
 use masseter_campaign::{FaultRow, fault_matrix_in_words, write_fault_matrix};
 use masseter_plan::{RunPlan, read_scenario};
-use masseter_recording::output::new_folder;
+use masseter_recording::new_folder;
 use masseter_scenario::{FaultDeclaration, FaultKindConfig};
 use masseter_terminal::{Exit, Failure, OrFailure, result, status};
 

@@ -6,7 +6,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::PathBuf;
 
 use clap::Args;
-use masseter_recording::Manifest;
+use masseter_recording::{Manifest, RunFolder};
 use masseter_report::divergence::{self, Differences};
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result};
 use rustix::fs::Mode;
@@ -23,10 +23,10 @@ use crate::run::request::{ControllerKind, name_of};
     after_help = "Examples:\n  masseter report\n  masseter report runs/before runs/after --format json"
 )]
 pub(super) struct ReportArgs {
-    /// Run folder
+    /// Run folder, its recording.mcap, or a link to either
     #[arg(default_value = "runs/latest")]
     folder: PathBuf,
-    /// Second run folder, to compare with the first
+    /// Second run, to compare with the first
     against: Option<PathBuf>,
     /// Format of standard output
     #[arg(long, value_enum, default_value_t)]
@@ -36,7 +36,8 @@ pub(super) struct ReportArgs {
 impl ReportArgs {
     /// The rights that new files do not get: who may not read the folder may not read them.
     pub(super) fn umask(&self) -> Mode {
-        let folder = fs::metadata(&self.folder).map_or(0, |folder| folder.mode());
+        let folder = RunFolder::open(&self.folder).ok().and_then(|run| fs::metadata(run.path()).ok());
+        let folder = folder.map_or(0, |folder| folder.mode());
         Readers::Owner.umask() & (Readers::All.umask() | Mode::from_bits_truncate(!folder))
     }
 }
@@ -75,7 +76,7 @@ pub(super) fn diff(args: &DiffArgs) -> anyhow::Result<Exit> {
     after_help = "Examples:\n  masseter replay runs/latest\n  masseter replay runs/latest --set controller.integral_gain_per_s=7.00001"
 )]
 pub(super) struct ReplayArgs {
-    /// Run folder
+    /// Run folder, its recording.mcap, or a link to either
     #[arg(default_value = "runs/latest")]
     run: PathBuf,
     /// Which controller answers [default: that of the run]

@@ -11,8 +11,8 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use masseter_runtime::clock;
-use masseter_runtime::conversation::{Conversation, Left, Limits};
-use masseter_runtime::lifecycle::{End, Order, Party, Report, ReportError, Silence, line};
+use masseter_runtime::conversation::{Conversation, Left, Limits, line};
+use masseter_runtime::lifecycle::{End, Order, Party, Report, ReportError, Silence};
 use masseter_runtime::named::Declared;
 use masseter_runtime::realtime::scheduling::Obtained;
 use rustix::process::{

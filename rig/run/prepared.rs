@@ -4,11 +4,11 @@ use std::fs::File;
 use std::path::Path;
 
 use anyhow::Context;
-use masseter_analysis::{Analysis, Figures};
+use masseter_analysis::{Analysis, Figures, Judgement};
 use masseter_controller::process::BuildController;
 use masseter_plan::RunPlan;
 use masseter_recording::{Ending, FullSpeed, Manifest, RunFolder};
-use masseter_report::{Detail, Judgement};
+use masseter_report::Detail;
 use masseter_runtime::transport::{Domain, DomainLock};
 use masseter_scenario::input::read_text;
 use masseter_scenario::{FileConfig, Scenario};
@@ -156,7 +156,6 @@ pub(super) fn analyse_unrecorded(
 fn manifest_of(plan: &RunPlan, controller: &ControllerChoice, clock: ClockKind) -> Manifest {
     let (motion_s, machine) = (plan.trajectory.duration_s(), masseter_machine::describe());
     let mut manifest = Manifest::new(BUILD, plan.scenario.clone(), motion_s, &name_of(&clock), machine);
-    manifest.motion_end_s = Some(plan.trajectory.motion_time_s(motion_s));
     manifest.controller = controller.name();
     manifest.full_speed = plan.scenario.dry.is_on.then_some(FullSpeed {
         velocity_m_s: plan.demands.velocity_m_s,

@@ -7,9 +7,8 @@ use std::os::unix::net::UnixListener;
 
 use anyhow::Context;
 use masseter_runtime::clock;
-use masseter_runtime::conversation::{Conversation, Left, Limits, Newcomers};
+use masseter_runtime::conversation::{Conversation, Left, Limits, Newcomers, line};
 use masseter_runtime::lifecycle::attach::{Answer, Hello, Invitation, socket};
-use masseter_runtime::lifecycle::line;
 use masseter_runtime::transport::Domain;
 use masseter_terminal::{Refusals, status};
 

@@ -9,7 +9,7 @@ use masseter_controller::process::BuildController;
 use masseter_plan::RunPlan;
 use masseter_plant::core as plant;
 use masseter_recorder::live;
-use masseter_runtime::control::{Operator, OperatorError, is_seen_by_controller};
+use masseter_runtime::injection::{Operator, OperatorError, is_seen_by_controller};
 use masseter_runtime::named::{NameError, NamedValues};
 use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain, usable_cores};
 use masseter_scenario::input::excerpt;
@@ -29,7 +29,7 @@ pub(super) fn resolve(request: &RunRequest) -> anyhow::Result<(RunPlan, RunReque
     overrides.cores.map_or(Ok(()), |cores| check_cores(&cores, &usable_cores()))?;
     let request = RunRequest { clock: choose_clock(request, &scenario), ..request.clone() };
     check_clock(&request, &scenario)?;
-    request.live.map_or(Ok(()), live::check)?;
+    request.live.map(live::listen_on).transpose()?;
     let plan = RunPlan::of_file(scenario, request.scenario.as_deref())?;
     plant::check_interfaces(&plan.scenario)?;
     let checked = match request.controller.builder() {

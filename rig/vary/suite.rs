@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail, ensure};
-use masseter_report::Verdict;
+use masseter_analysis::Verdict;
 use masseter_runtime::clock;
 use masseter_terminal::{Exit, Failure, in_one_line, status};
 use rayon::prelude::*;

@@ -38,6 +38,8 @@ const MAY_USE: [(&str, &[&str]); 27] = [
             "shared/runtime",
             "controller",
             "rig/record/recording",
+            // Exit codes.
+            "rig/show/terminal",
         ],
     ),
     (
@@ -111,14 +113,7 @@ const MAY_USE: [(&str, &[&str]); 27] = [
     ),
     (
         "rig/vary/campaign",
-        &[
-            "shared/scenario",
-            "shared/runtime",
-            "rig/judge",
-            "rig/show/charts",
-            "rig/show/report",
-            "rig/record/table",
-        ],
+        &["shared/scenario", "shared/runtime", "rig/judge", "rig/show/charts", "rig/record/table"],
     ),
     // Its drive is none of the product's, or errors of master and drive could cancel out.
     ("tests/canopen_node", &["shared/can"]),

@@ -487,7 +487,7 @@ def test_a_plant_that_does_not_answer_is_given_up_by_a_controller_that_only_look
 def test_without_a_rig_or_a_run_the_reason_is_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(masseter.MasseterError, match="no rig named 'nowhere' takes a controller"):
         masseter.control(ahead, "nowhere")
-    with pytest.raises(masseter.MasseterError, match="is no run folder"):
+    with pytest.raises(masseter.MasseterError, match="nowhere does not exist: name the folder of a run"):
         masseter.load(tmp_path / "nowhere")
     with pytest.raises(masseter.MasseterError, match="nowhere.toml"):
         masseter.run("nowhere.toml")
@@ -513,4 +513,17 @@ def test_a_recording_that_is_cut_short_is_read_as_far_as_it_goes(tmp_path: Path)
     assert not cut.is_whole and 0 < len(cut.state) < whole
     recording.write_bytes(b"no recording")
     with pytest.raises(masseter.MasseterError, match="not readable as MCAP"):
+        masseter.load(tmp_path / "run")
+
+
+def test_a_run_is_loaded_by_its_folder_its_recording_or_a_link(tmp_path: Path) -> None:
+    states = masseter.run(clock="virtual", arguments=SHORT, out=tmp_path / "run").load().state
+    (tmp_path / "latest").symlink_to("run")
+    (tmp_path / "link.mcap").symlink_to("run/recording.mcap")
+    for name in ("run/recording.mcap", "latest", "latest/recording.mcap", "link.mcap"):
+        run = masseter.load(tmp_path / name)
+        assert len(run.state) == len(states) and run.summary["verdict"]["word"] == "PASS", name
+        assert run.folder.resolve() == (tmp_path / "run").resolve(), name
+    (tmp_path / "run" / "recording.mcap").unlink()
+    with pytest.raises(masseter.MasseterError, match="the run ended before its recorder wrote"):
         masseter.load(tmp_path / "run")

@@ -106,8 +106,8 @@ int masseter_declare_signal(masseter_session *session, const char *name, const c
 int masseter_declare_parameter(masseter_session *session, const char *name, const char *unit, const char *about,
                                double value, double least, double most);
 
-/* Declares, before masseter_start, that the controller plays a motion of its own, not the scenario's: its desired poses are then
- * not held against the scenario's, and the scenario must require something of the run. Returns MASSETER_OK or MASSETER_ERROR. */
+/* Declares, before masseter_start, that the controller plays a motion of its own, not the scenario's: the jaw is then
+ * judged by the desired poses of the state, and the scenario must require something of the run. Returns MASSETER_OK or MASSETER_ERROR. */
 int masseter_declare_own_motion(masseter_session *session);
 
 /* The value of a parameter in this cycle, by its place. Not a number before the start, and for another place. */
@@ -130,7 +130,7 @@ int masseter_wait(masseter_session *session, int64_t timeout_ns, masseter_cycle 
 
 /* Publishes this cycle's command, and what the controller made of the reading. Once a cycle. command->cycle is that of
  * masseter_wait; any other is an error, and nothing is sent. The session numbers and stamps both messages, and enters the
- * cycle's times into the state. The rig judges the desired pose of the state. */
+ * cycle's times into the state. The rig judges the jaw by the scenario's motion, not by the desired pose of the state. */
 int masseter_publish(masseter_session *session, const masseter_command *command, const masseter_state *state);
 
 /* Publishes an event. */

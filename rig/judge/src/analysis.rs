@@ -23,13 +23,13 @@ use crate::over_time::{
     AxisFigures, AxisWatch, CONTROLLER, ContactFigures, ContactWatch, OverTime, OverTimeCollector, PLANT,
     Place,
 };
-use crate::played::{Departure, PlayedWatch, StopWatch, StoppedBy};
+use crate::played::{MotionFigures, PlayedWatch, StopWatch, StoppedBy};
+use crate::poses::{estimated_pose, is_moving, is_running, true_pose};
 use crate::requirements::{RequirementFigures, Requirements};
 use crate::response::{BusResponse, Responses};
+use crate::signals::{Pace, Sample, Timeline};
 use crate::skips::{Counters, OverrunAttribution, SkipFigures, Skips};
-use crate::tracking::{
-    PathSample, PoseSource, Track, Tracking, TrackingFigures, estimated_pose, is_running, true_pose,
-};
+use crate::tracking::{PoseSource, Track, Tracking, TrackingFigures};
 
 /// Computes the [`Figures`] of a run from its messages, in their order in the recording.
 ///
@@ -56,6 +56,8 @@ use crate::tracking::{
 pub struct Analysis {
     period_ns: u64,
     declared: Declared,
+    /// The cycles in the order of time.
+    timeline: Timeline,
     named: NamedWatch,
     /// None where nothing is shown.
     shown: Option<Box<Shown>>,
@@ -87,12 +89,31 @@ pub struct Analysis {
 impl Analysis {
     /// For a run of this scenario, which was accepted when the run began, with what its controller declared.
     pub fn new(scenario: &Scenario, declared: &Declared) -> Self {
+        Self::at_pace(scenario, declared, Pace::Recorded)
+    }
+
+    /// The same for a run that is judged and not shown: no intervals, longest cycles, or curves. Its messages come in the order of
+    /// time.
+    #[must_use]
+    pub fn without_report(scenario: &Scenario, declared: &Declared) -> Self {
+        Self { shown: None, ..Self::at_pace(scenario, declared, Pace::InOrder) }
+    }
+
+    /// The same for messages that come while the run goes on. A clone that [finishes](Self::finish) gives the figures
+    /// so far.
+    #[must_use]
+    pub fn while_running(scenario: &Scenario, declared: &Declared) -> Self {
+        Self::at_pace(scenario, declared, Pace::Live)
+    }
+
+    fn at_pace(scenario: &Scenario, declared: &Declared, pace: Pace) -> Self {
         let is_emulated = scenario.can.is_virtual();
         let period_ns = scenario.period_ns();
         let requirements = Requirements::new(scenario, declared);
         Self {
             period_ns,
             declared: declared.clone(),
+            timeline: Timeline::new(scenario, declared, pace),
             named: NamedWatch::new(declared),
             shown: Some(Box::new(Shown::new(scenario))),
             axes: scenario.dry.is_on.then(|| AxisWatch::new(scenario)),
@@ -114,7 +135,7 @@ impl Analysis {
             plant_skips: Skips::default(),
             outage: OutageWatch::default(),
             stop: StopWatch::default(),
-            played: PlayedWatch::new(scenario, declared),
+            played: PlayedWatch::new(&scenario.jaw),
             contact: ContactWatch::default(),
             requirements: (!requirements.is_empty()).then_some(requirements),
             figures: Figures {
@@ -123,23 +144,6 @@ impl Analysis {
                 bite_force_max_n: scenario.has_contact().then_some(0.0),
                 ..Figures::default()
             },
-        }
-    }
-
-    /// The same for a run that is judged and not shown: no intervals, longest cycles, or curves.
-    #[must_use]
-    pub fn without_report(scenario: &Scenario, declared: &Declared) -> Self {
-        Self { shown: None, ..Self::new(scenario, declared) }
-    }
-
-    /// The same for messages that come while the run goes on. A clone that [finishes](Self::finish) gives the figures
-    /// so far.
-    #[must_use]
-    pub fn while_running(scenario: &Scenario, declared: &Declared) -> Self {
-        let requirements = Requirements::while_running(scenario, declared);
-        Self {
-            requirements: (!requirements.is_empty()).then_some(requirements),
-            ..Self::new(scenario, declared)
         }
     }
 
@@ -154,8 +158,8 @@ impl Analysis {
         }
         self.sequence.take(message);
         self.digest.add_message(message);
-        if let Some(requirements) = &mut self.requirements {
-            requirements.take(message);
+        if let Some(sample) = self.timeline.take(message) {
+            self.judge_sample(&sample);
         }
         match message {
             Recorded::Command(command) => {
@@ -175,10 +179,7 @@ impl Analysis {
                 self.shown.iter_mut().for_each(|shown| shown.over_time.apply_signals(message));
             }
             Recorded::Parameters(message) => self.named.add_parameters(message),
-            Recorded::Event(event) => {
-                self.played.apply_event(event);
-                self.apply_event(EventRecord::of_run(event, &self.declared));
-            }
+            Recorded::Event(event) => self.apply_event(EventRecord::of_run(event, &self.declared)),
             Recorded::Machine(machine) => {
                 self.shown.iter_mut().for_each(|shown| shown.longest_cycles.apply_machine(machine));
             }
@@ -196,14 +197,12 @@ impl Analysis {
             return;
         }
         self.faults.strike(fault.number, fault.struck_ns);
-        if let Some(requirements) = &mut self.requirements {
-            let ends = [(Cause::FaultInjected, Some(fault.struck_ns)), (Cause::FaultEnded, fault.ended_ns)];
-            for (cause, time_ns) in ends {
-                let Some(time_ns) = time_ns else { continue };
-                let event = Event::new(Source::Scenario, EventKind::Notice, cause);
-                let value = fault.number as f64;
-                requirements.event(&EventRecord::from(&Event { time_ns, value, ..event }));
-            }
+        let ends = [(Cause::FaultInjected, Some(fault.struck_ns)), (Cause::FaultEnded, fault.ended_ns)];
+        for (cause, time_ns) in ends {
+            let Some(time_ns) = time_ns else { continue };
+            let event = Event::new(Source::Scenario, EventKind::Notice, cause);
+            let value = fault.number as f64;
+            self.timeline.event(&EventRecord::from(&Event { time_ns, value, ..event }));
         }
     }
 
@@ -226,36 +225,41 @@ impl Analysis {
         let skipped = self.controller_skips.account(&Counters::from(state), self.period_ns, is_of_scenario);
         self.shown.iter_mut().for_each(|shown| shown.apply_state(state, is_fresh, skipped));
         self.outage.apply_state(state, is_of_scenario);
-        let is_disturbed = self.disturbance.may_act_in(state, is_fresh, is_path_of_scenario);
-        if let Some(requirements) = self.requirements.as_mut().filter(|_| is_disturbed) {
-            requirements.disturb(state.cycle);
-        }
-        if let Some(sample) = self.tracking.apply_state(state, is_fresh, is_disturbed) {
-            self.apply_path(sample);
+        if self.disturbance.may_act_in(state, is_fresh, is_path_of_scenario) {
+            self.timeline.disturb(state.cycle);
         }
         self.figures.cycles = self.figures.cycles.max(state.seq);
         self.figures.final_state = Some(state.controller_state.into());
         self.stop.apply_state(state);
-        self.played.apply_state(state);
     }
 
     fn apply_truth(&mut self, truth: &Truth) {
-        self.tracking.apply_truth(truth).into_iter().flatten().for_each(|sample| self.apply_path(sample));
         self.figures.bite_force_max_n.iter_mut().for_each(|most_n| *most_n = most_n.max(truth.bite_force_n));
         self.shown.iter_mut().for_each(|shown| shown.apply_truth(truth));
     }
 
-    fn apply_path(&mut self, sample: PathSample) {
-        self.shown.iter_mut().for_each(|shown| shown.over_time.apply_path(&sample));
-        self.faults.apply_sample(sample);
+    /// Takes the next cycle in the order of time.
+    fn judge_sample(&mut self, sample: &Sample) {
+        let messages = &sample.messages;
+        if let Some(path) = self.tracking.add_sample(sample) {
+            self.shown.iter_mut().for_each(|shown| shown.over_time.apply_path(&path));
+            self.faults.apply_sample(&path);
+            if let Some(lag_s) = messages.lag_s {
+                self.played.add_sample(lag_s, path.desired, path.actual);
+            }
+        }
+        if let Some(reading) = &messages.reading {
+            // Simulated time has no account of the loops, and no cycles that the machine lost.
+            let is_excused = messages.is_disturbed && self.controller_skips.figures.worked_ns > 0;
+            self.played.count_command(reading, is_moving(messages.controller_state) && !is_excused);
+        }
+        self.requirements.iter_mut().for_each(|requirements| requirements.judge_sample(sample));
     }
 
     fn apply_event(&mut self, event: EventRecord) {
         self.faults.apply_event(&event);
         self.stop.apply_event(&event);
-        if let Some(requirements) = &mut self.requirements {
-            requirements.event(&event);
-        }
+        self.timeline.event(&event);
         self.figures.events.push(event);
     }
 
@@ -275,6 +279,11 @@ impl Analysis {
     /// The figures of all messages so far. `cut_short` and `damage` are what the recording itself lacks, as its
     /// [`Reader`](masseter_recording::Reader) found them.
     pub fn finish(mut self, cut_short: bool, damage: &[Damage]) -> Figures {
+        while let Some(sample) = self.timeline.finish() {
+            self.judge_sample(&sample);
+        }
+        let rest_m =
+            self.timeline.reference().and_then(|of| of.rest(|from, to| self.played.distance_m(from, to)));
         let (tracking, track) = self.tracking.into_figures();
         let duration_ns =
             self.last_sample_ns.saturating_sub(self.first_sample_ns.unwrap_or(self.last_sample_ns));
@@ -282,7 +291,6 @@ impl Analysis {
         let missing_frames =
             topics.iter().find(|topic| topic.topic == FrameTap::TOPIC).map_or(0, |topic| topic.missing);
         let (stopped_by, enabled_cycles) = self.stop.into_figures();
-        let (reached_s, motion_departure) = self.played.into_figures();
         let enabled_s = enabled_cycles as f64 * self.period_ns as f64 / 1e9;
         let (intervals, worst_cycles, over_time, jaw_cycles) =
             self.shown.map_or_else(Default::default, |shown| {
@@ -305,12 +313,11 @@ impl Analysis {
             readings: self.freshness.figures,
             stopped_by,
             enabled_s,
-            motion_reached_s: reached_s.map(|reached_s| reached_s.min(enabled_s)),
-            motion_departure,
+            motion: self.played.into_figures(rest_m),
             outage: self.outage.outage(self.period_ns),
             tracking,
             faults: self.faults.into_figures(),
-            requirements: self.requirements.map(Requirements::finish).unwrap_or_default(),
+            requirements: self.requirements.map(Requirements::into_figures).unwrap_or_default(),
             signals: self.named.signals,
             parameters: self.named.parameters,
             contact: self.contact.into_figures(),
@@ -377,7 +384,7 @@ impl Shown {
     }
 
     fn solution(&mut self, state: &State) {
-        if is_running(state) {
+        if is_running(Some(state.controller_state)) {
             self.over_time.running(state.sampled_ns);
         }
         let estimated = estimated_pose(state);
@@ -427,12 +434,8 @@ pub struct Figures {
     pub stopped_by: Option<StoppedBy>,
     /// For how long all drives were enabled, s.
     pub enabled_s: f64,
-    /// How far the motion came, s of its own time, as the controller stated. It counts only while the drives were
-    /// enabled, and the stated time neither jumped nor was missing. None if nothing was stated.
-    pub motion_reached_s: Option<f64>,
-    /// How far the stated desired poses are from the scenario's motion; none where they need not be it: in an own motion,
-    /// with force control, and from where the amplitude is set.
-    pub motion_departure: Option<Departure>,
+    /// What was played of the scenario's motion.
+    pub motion: MotionFigures,
     /// Deadlines missed just before a safe stop; none without one.
     pub outage: Option<Outage>,
     /// Distance of the platform from its desired pose, while the motion played.

@@ -1,14 +1,13 @@
 //! Each declared fault: when it first struck, what detected it and began a safe stop, and how far the platform left its path
 //! until then.
 
-use std::collections::VecDeque;
-
 use masseter_model::geometry::Deviation;
 use masseter_runtime::messages::codes::{Cause, Source};
 use serde::Serialize;
 
 use crate::events::{Code, EventRecord};
-use crate::tracking::{PathSample, worse};
+use crate::poses::worse;
+use crate::tracking::PathSample;
 
 /// A declared fault and its effect.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -40,15 +39,11 @@ pub struct Detection {
     pub deviation_deg: f64,
 }
 
-/// Samples kept until the events of their time have come: the recorder drains topic after topic.
-const KEPT: usize = 1 << 13;
-
 /// Follows the declared faults.
 #[derive(Debug, Clone)]
 pub(super) struct FaultWatch {
     faults: Vec<Effect>,
     stops: Vec<Stop>,
-    recent: VecDeque<PathSample>,
 }
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -68,8 +63,7 @@ struct Stop {
 
 impl FaultWatch {
     pub(super) fn new(declared: usize) -> Self {
-        let recent = VecDeque::with_capacity(if declared > 0 { KEPT } else { 0 });
-        Self { faults: vec![Effect::default(); declared], stops: Vec::new(), recent }
+        Self { faults: vec![Effect::default(); declared], stops: Vec::new() }
     }
 
     pub(super) fn apply_event(&mut self, event: &EventRecord) {
@@ -89,20 +83,8 @@ impl FaultWatch {
         }
     }
 
-    pub(super) fn apply_sample(&mut self, sample: PathSample) {
-        if self.faults.is_empty() {
-            return;
-        }
-        if self.recent.len() == KEPT
-            && let Some(oldest) = self.recent.pop_front()
-        {
-            self.count_sample(&oldest);
-        }
-        self.recent.push_back(sample);
-    }
-
-    /// Counts a sample for every fault that had struck, until the stop.
-    fn count_sample(&mut self, sample: &PathSample) {
+    /// Counts a sample for every fault that had struck, until the stop. The events of its time have come.
+    pub(super) fn apply_sample(&mut self, sample: &PathSample) {
         for fault in &mut self.faults {
             let Some(struck_ns) = fault.struck_ns.filter(|struck_ns| *struck_ns <= sample.sampled_ns) else {
                 continue;
@@ -119,10 +101,7 @@ impl FaultWatch {
         }
     }
 
-    pub(super) fn into_figures(mut self) -> Vec<FaultFigures> {
-        while let Some(sample) = self.recent.pop_front() {
-            self.count_sample(&sample);
-        }
+    pub(super) fn into_figures(self) -> Vec<FaultFigures> {
         let figures = |(index, fault): (usize, &Effect)| {
             // A fault that strikes during a stop has not begun it.
             let stop = fault
@@ -169,7 +148,7 @@ mod tests {
 
     fn sample(sampled_ns: u64, incisal_m: f64) -> PathSample {
         let deviation = Deviation { incisal_m, angle_rad: 10.0 * incisal_m, origin_m: 0.0 };
-        PathSample { sampled_ns, desired: None, deviation }
+        PathSample { sampled_ns, desired: None, actual: None, deviation }
     }
 
     /// Fault 1 strikes at 1 ms, a drive reports an emergency at 1.5 ms, and the master stops at 3.5 ms. Fault 2 strikes during
@@ -179,11 +158,6 @@ mod tests {
         let mut watch = FaultWatch::new(3);
         let struck =
             |time_ns, value| event(time_ns, Source::Wire, EventKind::Notice, Cause::FaultInjected, value);
-        for (sampled_ns, incisal_m) in
-            [(0, 9e-3), (1_000_000, 1e-4), (2_000_000, 3e-4), (3_000_000, 2e-4), (4_000_000, 5e-3)]
-        {
-            watch.apply_sample(sample(sampled_ns, incisal_m));
-        }
         let emergency = |time_ns| event(time_ns, Source::Drive, EventKind::Fault, Cause::Emergency, 33_792.0);
         watch.apply_event(&emergency(1_500_000));
         watch.apply_event(&safe_stop(5_000_000));
@@ -191,6 +165,11 @@ mod tests {
         watch.apply_event(&struck(1_000_000, 1.0));
         watch.apply_event(&struck(4_500_000, 2.0));
         watch.apply_event(&emergency(6_500_000));
+        for (sampled_ns, incisal_m) in
+            [(0, 9e-3), (1_000_000, 1e-4), (2_000_000, 3e-4), (3_000_000, 2e-4), (4_000_000, 5e-3)]
+        {
+            watch.apply_sample(&sample(sampled_ns, incisal_m));
+        }
         let found = watch.into_figures();
         assert_eq!(found.iter().map(|figures| figures.number).collect::<Vec<_>>(), [1, 2, 3]);
 
@@ -211,7 +190,7 @@ mod tests {
         watch.apply_event(&event(5, Source::Wire, EventKind::Notice, Cause::FaultInjected, 1.0));
         watch.apply_event(&event(7, Source::Controller, EventKind::Fault, Cause::TrackingLost, 1e-3));
         watch.apply_event(&safe_stop(2_000_000));
-        (0..4).for_each(|i| watch.apply_sample(sample(i * 1_000_000, i as f64 * 1e-3)));
+        (0..4).for_each(|i| watch.apply_sample(&sample(i * 1_000_000, i as f64 * 1e-3)));
         let found = watch.into_figures();
         assert!((found[0].deviation_mm - 2.0).abs() < 1e-12, "{found:?}");
         assert!(found[0].detection.unwrap().source == Source::Controller, "{found:?}");
@@ -222,7 +201,7 @@ mod tests {
         for bad in [0, 2] {
             let mut watch = FaultWatch::new(1);
             watch.apply_event(&event(0, Source::Wire, EventKind::Notice, Cause::FaultInjected, 1.0));
-            (0..3).for_each(|i| watch.apply_sample(sample(i, if i == bad { f64::NAN } else { 1e-5 })));
+            (0..3).for_each(|i| watch.apply_sample(&sample(i, if i == bad { f64::NAN } else { 1e-5 })));
             let found = watch.into_figures();
             assert_eq!((found[0].deviation_mm, found[0].deviation_deg), (f64::INFINITY, f64::INFINITY));
         }
@@ -232,7 +211,7 @@ mod tests {
     fn an_undetected_fault_is_followed_to_the_end_of_a_long_run() {
         let mut watch = FaultWatch::new(1);
         watch.apply_event(&event(5, Source::Wire, EventKind::Notice, Cause::FaultInjected, 1.0));
-        (0..3 * KEPT as u64).for_each(|i| watch.apply_sample(sample(i, if i == 10 { 2e-3 } else { 1e-5 })));
+        (0..20_000).for_each(|i| watch.apply_sample(&sample(i, if i == 10 { 2e-3 } else { 1e-5 })));
         let found = watch.into_figures();
         assert!((found[0].deviation_mm - 2.0).abs() < 1e-12, "{found:?}");
     }

@@ -9,6 +9,7 @@ use masseter_runtime::messages::codes::{
 };
 use masseter_runtime::messages::{Event, explain};
 use masseter_runtime::named::Declared;
+use masseter_scenario::{Dimension, Unit};
 use serde::{Serialize, Serializer};
 
 /// The meaning of a code, or its number where the code has no meaning in this version.
@@ -92,6 +93,42 @@ impl EventRecord {
         self.source == Source::Master && self.kind == EventKind::Fault
     }
 
+    /// The event in words, without its time.
+    pub fn in_words(&self) -> String {
+        let Self { source, cause, .. } = self;
+        if let Some(text) = &self.text {
+            return format!("{source}: {cause} ({text})");
+        }
+        let axis = self.axis.map_or_else(String::new, |axis| format!(" {axis}"));
+        let transition =
+            self.transition.as_ref().map(|[from, to]| format!("{from} → {to}")).unwrap_or_default();
+        let text = match cause {
+            Code::Known(Cause::Sequence) => return format!("{source}{axis}: {transition}"),
+            Code::Known(Cause::StopRequested) => format!("{source}{axis}: {cause} {transition}"),
+            _ => {
+                let [value, limit] = [self.value, self.limit].map(|number| self.unit().text(number));
+                format!("{source}{axis}: {cause} (value {value}, limit {limit}) {transition}")
+            }
+        };
+        text.trim_end().to_owned()
+    }
+
+    /// In which value and limit are shown. Cycles and times of the bus are numbers as they are.
+    fn unit(&self) -> Unit {
+        use Cause::{
+            AccelerationLimit, EndStopHit, FollowingError, OrientationLost, StartTooFar, StrokeLimit,
+            TrackingLost, VelocityLimit,
+        };
+        let name = match self.cause {
+            Code::Known(StrokeLimit | FollowingError | TrackingLost | StartTooFar) => "mm",
+            Code::Known(VelocityLimit | EndStopHit) => "mm/s",
+            Code::Known(AccelerationLimit) => "m/s2",
+            Code::Known(OrientationLost) => "deg",
+            _ => "",
+        };
+        Unit::named(name).unwrap_or(Dimension::One.si_unit())
+    }
+
     /// The same, of a run whose controller declared these parameters.
     pub(crate) fn of_run(event: &Event, declared: &Declared) -> Self {
         let text = explain(event).or_else(|| change(event, declared));
@@ -143,6 +180,14 @@ mod tests {
     fn a_code_is_written_as_its_name_and_an_unknown_code_as_its_number() {
         let fault = Code::<EventKind>::from(EventKind::Fault.code());
         assert!(fault == EventKind::Fault && fault != EventKind::Transition);
+        let stroke = Event {
+            axis: 0,
+            value: 0.000_100_633_137_3,
+            limit: 1e-4,
+            ..Event::new(Source::Master, EventKind::Fault, Cause::StrokeLimit)
+        };
+        let words = "master d1: stroke_limit (value 0.1006 mm, limit 0.1 mm)";
+        assert_eq!(EventRecord { text: None, ..EventRecord::from(&stroke) }.in_words(), words);
         let unknown = Code::<EventKind>::from(4000);
         assert!(EventKind::ALL.iter().all(|kind| unknown != *kind));
         assert_eq!(serde_json::to_string(&[fault, unknown]).unwrap(), r#"["fault","code 4000"]"#);

@@ -1,9 +1,11 @@
-//! The figures of a run, computed from its messages in one pass: latencies, tracking, losses, events.
+//! The judge of a run: its figures, computed from its messages in one pass, and the verdict on them.
 //!
-//! [`Analysis`] takes the messages and returns [`Figures`]. It reads no file, writes none, and judges nothing: see the
-//! crates `masseter-recording` and `masseter-report`.
+//! [`Analysis`] takes the messages and returns [`Figures`]; [`Verdict`] judges them. Nothing here reads or writes a file:
+//! see the crates `masseter-recording` and `masseter-report`.
 
 mod analysis;
+mod check;
+mod checks;
 mod declared_faults;
 mod events;
 mod intervals;
@@ -14,14 +16,20 @@ mod measured;
 mod messages;
 mod over_time;
 mod played;
+mod poses;
+mod reference;
 pub mod requirements;
 mod response;
 mod series;
 pub mod signals;
 mod skips;
+mod timing;
 mod tracking;
+mod verdict;
 
 pub use analysis::{Analysis, Figures};
+pub use check::{Check, CheckFigures, CheckResult};
+pub use checks::whose_motion;
 pub use declared_faults::{Detection, FaultFigures};
 pub use events::{Code, EventRecord};
 pub use jaw_cycles::{COURSE_POINTS, CoursePoint, JawCycle, JawCycleFigures, Statistic};
@@ -30,10 +38,11 @@ pub use lost_cycles::{Outage, ReadingFigures};
 pub use measured::{IntervalFigures, Seconds, resolution_ns};
 pub use messages::{ParameterFigures, SequenceCheck, SignalFigures, TopicFigures};
 pub use over_time::{AxisFigures, ContactFigures, OverTime, ToothFigures, ToothLoads};
-pub use played::{Departure, StoppedBy};
+pub use played::{MotionFigures, StoppedBy};
+pub use poses::MOVING;
 pub use response::{BusResponse, ResponseFigures};
 pub use series::Curve;
 pub use skips::{OverrunAttribution, SkipFigures};
-pub use tracking::{
-    MOVING, PoseErrors, PoseSource, Track, TrackingFigures, TrackingSample, UndisturbedFigures,
-};
+pub use timing::{Timing, TimingWord};
+pub use tracking::{PoseErrors, PoseSource, Track, TrackingFigures, TrackingSample, UndisturbedFigures};
+pub use verdict::{Judgement, Verdict};

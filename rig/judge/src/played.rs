@@ -1,141 +1,116 @@
 //! How much of the scenario's motion was played, and what stopped the drives.
 //!
-//! The controller states its motion time. It counts only as far as cycles passed, and the pose that belongs to it is computed
-//! from the scenario. A stop shows in drives and master, whatever the controller reports.
+//! What was played shows in the jaw. A stop shows in drives and master, whatever the controller reports.
 
-use std::sync::Arc;
+use std::fmt::{self, Display, Formatter};
 
-use masseter_controller::trajectory::Trajectory;
-use masseter_model::geometry::{AXES, Mechanism};
-use masseter_runtime::messages::codes::{Cause, DriveState, NO_DRIVE_STATE};
-use masseter_runtime::messages::{Event, Reading, State};
-use masseter_runtime::named::{Declared, PlayedMotion};
-use masseter_scenario::Scenario;
+use masseter_model::geometry::{AXES, Pose, Vec3};
+use masseter_recording::jaw_points;
+use masseter_runtime::messages::codes::{DriveState, NO_DRIVE_STATE};
+use masseter_runtime::messages::{Reading, State};
+use masseter_scenario::JawConfig;
 use serde::Serialize;
 
 use crate::events::EventRecord;
-use crate::tracking::{desired_pose, deviation, is_moving, worse};
+use crate::poses::is_moving;
 
-/// Cycles that the motion's time may catch up: a reading that comes late has the time of the sample before.
-const LATE_CYCLES: f64 = 2.0;
-/// Share of the motion that may pass in cycles without a state, which lost cycles explain.
-const UNSEEN: f64 = 0.05;
-/// Less is rounding, s.
-const ROUNDING_S: f64 = 1e-6;
-/// The parameter of the rig's motion controller that lets it play a part of the motion's way.
-const AMPLITUDE: &str = "motion_amplitude";
-
-/// The greatest distance of the stated desired pose from the scenario's motion.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Departure {
-    /// Of the incisal point, mm.
-    pub incisal_mm: f64,
-    /// Angle, degrees.
-    pub deg: f64,
-    /// When the incisal point was so far away, s of the motion's time.
-    pub at_s: f64,
-    /// Whether the rest of the motion was not compared, since the amplitude was set.
-    pub is_partial: bool,
+/// What was played of the scenario's motion.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct MotionFigures {
+    /// The way of the jaw in the whole motion, mm: root of the sum of squares over the incisal point and both condyles. None where
+    /// the motion is the controller's own.
+    pub way_mm: Option<f64>,
+    /// The share of it that the jaw went, in the direction of the motion; none of a motion without a way.
+    pub played: Option<f64>,
+    /// By how much the motion was late at most, ms; none where it never began.
+    pub lag_ms: Option<f64>,
+    /// Cycles of the motion without a new command.
+    pub missed_commands: u64,
+    /// The most of them in a row.
+    pub missed_in_a_row: u64,
 }
 
-/// Follows the motion's time.
-#[derive(Debug, Clone, Default)]
+/// A shorter way is none, m.
+const NO_WAY_M: f64 = 1e-5;
+
+/// Follows the jaw on its way.
+#[derive(Debug, Clone)]
 pub(super) struct PlayedWatch {
-    period_s: f64,
-    incisal_m: [f64; 3],
-    /// None where the desired poses are not the scenario's: in an own motion, with force control, at another amplitude.
-    scenario: Option<Arc<Trajectory>>,
-    amplitude_place: Option<usize>,
-    /// Cycle and motion time of the last state of the motion.
-    last: Option<(u64, f64)>,
-    /// What the motion's time may catch up, s.
-    credit_s: f64,
-    /// The motion's time jumped or vanished: what follows is no part of it.
-    has_jumped: bool,
-    /// How far the motion came before.
-    reached_s: Option<f64>,
-    /// The part of it that passed in cycles without a state, s.
-    unseen_s: f64,
-    departure: Option<Departure>,
+    points_m: [Vec3; 3],
+    /// The last pose of both, desired and actual.
+    before: Option<[Pose; 2]>,
+    way_m: f64,
+    gone_m: f64,
+    lag_s: Option<f64>,
+    answered: u64,
+    missed_commands: u64,
+    in_a_row: u64,
+    most_in_a_row: u64,
 }
 
 impl PlayedWatch {
-    pub(super) fn new(scenario: &Scenario, declared: &Declared) -> Self {
-        let is_amplitude = |name: &String| name == AMPLITUDE;
-        let is_scaled = scenario.parameters.keys().any(is_amplitude)
-            || scenario.stimulus.iter().filter_map(|stimulus| stimulus.parameter.as_ref()).any(is_amplitude);
-        let has_poses =
-            declared.motion == PlayedMotion::Scenario && scenario.force_control.is_none() && !is_scaled;
+    pub(super) fn new(jaw: &JawConfig) -> Self {
         Self {
-            period_s: scenario.period_s(),
-            incisal_m: scenario.jaw.reference_point_m,
-            scenario: has_poses.then(|| trajectory(scenario)).flatten(),
-            amplitude_place: declared.place_of(AMPLITUDE).ok(),
-            credit_s: LATE_CYCLES * scenario.period_s(),
-            ..Self::default()
+            points_m: jaw_points(jaw),
+            before: None,
+            way_m: 0.0,
+            gone_m: 0.0,
+            lag_s: None,
+            answered: 0,
+            missed_commands: 0,
+            in_a_row: 0,
+            most_in_a_row: 0,
         }
     }
 
-    /// Takes a state. Once the motion has begun, a state without its time ends it.
-    pub(super) fn apply_state(&mut self, state: &State) {
-        let time_s = state.motion_time_s;
-        if !is_moving(state) || time_s.is_nan() || time_s < 0.0 {
-            self.has_jumped |= self.last.is_some();
-            return;
-        }
-        let (cycle, before_s) = self.last.replace((state.cycle, time_s)).unwrap_or((state.cycle, 0.0));
-        let passed_s = state.cycle.saturating_sub(cycle) as f64 * self.period_s;
-        let (step_s, late_s) = (time_s - before_s, LATE_CYCLES * self.period_s);
-        let credit_s = self.credit_s + passed_s - step_s;
-        // A motion that waits may not make up for it later.
-        self.credit_s = credit_s.min(late_s);
-        self.has_jumped |= credit_s < -ROUNDING_S;
-        let reached_s = self.reached_s.get_or_insert(0.0);
-        if !self.has_jumped {
-            *reached_s = reached_s.max(time_s);
-            self.unseen_s += (step_s - self.period_s - late_s).max(0.0);
-            self.compare(state);
+    /// Takes a sample of the motion, which is late by that much.
+    pub(super) fn add_sample(&mut self, lag_s: f64, desired: Option<Pose>, actual: Option<Pose>) {
+        self.lag_s = Some(self.lag_s.map_or(lag_s, |most_s| most_s.max(lag_s)));
+        let Some(now) = desired.zip(actual).map(|(desired, actual)| [desired, actual]) else { return };
+        let Some(before) = self.before.replace(now) else { return };
+        let [desired, actual] = [0, 1].map(|of| step(&self.points_m, &before[of], &now[of]));
+        let length_m = length(&desired);
+        if length_m > 0.0 {
+            self.way_m += length_m;
+            self.gone_m +=
+                desired.iter().zip(&actual).map(|(one, other)| one.dot(other)).sum::<f64>() / length_m;
         }
     }
 
-    /// The stated desired desired_pose, beside the scenario's at this time of the motion.
-    fn compare(&mut self, state: &State) {
-        let Some(scenario) = &self.scenario else { return };
-        let at_s = state.motion_time_s;
-        let stated = desired_pose(state);
-        let apart = deviation(stated.as_ref(), Some(&scenario.pose_in_motion(at_s)), self.incisal_m);
-        let (mm, deg) = (apart.incisal_m * 1e3, apart.angle_rad.to_degrees());
-        let greatest =
-            self.departure.get_or_insert(Departure { incisal_mm: 0.0, deg: 0.0, at_s, is_partial: false });
-        if mm > greatest.incisal_mm {
-            (greatest.incisal_mm, greatest.at_s) = (mm, at_s);
-        }
-        greatest.deg = worse(greatest.deg, deg);
+    /// Takes the reading of a sample of the motion.
+    pub(super) fn count_command(&mut self, reading: &Reading, is_moving: bool) {
+        let is_new = reading.answers_cycle > std::mem::replace(&mut self.answered, reading.answers_cycle);
+        self.in_a_row = if is_new || !is_moving { 0 } else { self.in_a_row + 1 };
+        self.missed_commands += u64::from(self.in_a_row > 0);
+        self.most_in_a_row = self.most_in_a_row.max(self.in_a_row);
     }
 
-    /// Once the amplitude is set, other poses are desired.
-    pub(super) fn apply_event(&mut self, event: &Event) {
-        let is_set = event.cause == Cause::ParameterSet.code();
-        if is_set && self.amplitude_place == Some(event.object as usize) {
-            self.scenario = None;
-            self.departure.iter_mut().for_each(|departure| departure.is_partial = true);
-        }
+    /// How far the jaw's points move from one pose to another, m.
+    pub(super) fn distance_m(&self, from: &Pose, to: &Pose) -> f64 {
+        length(&step(&self.points_m, from, to))
     }
 
-    /// How far the motion came, s, and how far the desired pose was from it. What passed unseen counts only as a small share.
-    pub(super) fn into_figures(self) -> (Option<f64>, Option<Departure>) {
-        let unseen_s = self.unseen_s;
-        let seen_s = |reached_s: f64| {
-            if unseen_s > UNSEEN * reached_s { (reached_s - unseen_s).max(0.0) } else { reached_s }
-        };
-        (self.reached_s.map(seen_s), self.departure)
+    /// `rest_m`: what is left of the motion; none where the motion is not the scenario's.
+    pub(super) fn into_figures(self, rest_m: Option<f64>) -> MotionFigures {
+        let way_m = rest_m.map(|rest_m| self.way_m + rest_m);
+        MotionFigures {
+            way_mm: way_m.map(|way_m| way_m * 1e3),
+            played: way_m.filter(|way_m| *way_m > NO_WAY_M).map(|way_m| self.gone_m / way_m),
+            lag_ms: self.lag_s.map(|lag_s| lag_s * 1e3),
+            missed_commands: self.missed_commands,
+            missed_in_a_row: self.most_in_a_row,
+        }
     }
 }
 
-/// The scenario's motion; none where its file is gone since the run.
-fn trajectory(scenario: &Scenario) -> Option<Arc<Trajectory>> {
-    let mechanism = Mechanism::new(&scenario.mechanism).ok()?;
-    Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s).ok().map(Arc::new)
+/// How each point moves from one pose to another, m.
+fn step(points_m: &[Vec3; 3], from: &Pose, to: &Pose) -> [Vec3; 3] {
+    let place = |pose: &Pose, point: &Vec3| pose.translation.vector + pose.rotation * point;
+    points_m.each_ref().map(|point| place(to, point) - place(from, point))
+}
+
+fn length(step: &[Vec3; 3]) -> f64 {
+    step.iter().map(Vec3::norm_squared).sum::<f64>().sqrt()
 }
 
 /// States after the reading of a drive that left operation. The controller may miss that reading in the first.
@@ -151,6 +126,16 @@ pub enum StoppedBy {
     QuickStop,
     /// A drive left operation while the motion ran.
     Drives,
+}
+
+impl Display for StoppedBy {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Master => "the master stopped the drives",
+            Self::QuickStop => "the drives made a quick stop",
+            Self::Drives => "a drive left operation while the motion ran",
+        })
+    }
 }
 
 /// Watches drives and master for a stop.
@@ -204,7 +189,7 @@ impl StopWatch {
 
     /// Takes a state. A controller that ends its motion with the drives is no stop of theirs.
     pub(super) fn apply_state(&mut self, state: &State) {
-        self.is_moving = is_moving(state);
+        self.is_moving = is_moving(Some(state.controller_state));
         let Some((left_ns, states)) = &mut self.left else { return };
         // The state of an earlier cycle may come later.
         if state.due_ns <= *left_ns {

@@ -3,64 +3,38 @@
 //! The recorder drains topic after topic, so messages of one cycle lie some tens of cycles apart. The longer a run, the wider
 //! the stretches of time that share their lowest and highest value.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 /// Cycles kept at most; more than a subscriber's queue holds of any topic.
 const MOST_CYCLES: usize = 1 << 13;
-/// Places at first. As long as every value is taken out soon, no more are needed.
-const FEWEST_PLACES: usize = 1 << 6;
 
 /// The latest values by cycle.
 #[derive(Debug, Clone)]
-pub(super) struct ByCycle<T> {
-    /// Empty before the first value: where nothing waits, no memory is used.
-    slots: Vec<Option<(u64, T)>>,
-}
+pub(super) struct ByCycle<T>(BTreeMap<u64, T>);
 
 impl<T> Default for ByCycle<T> {
     fn default() -> Self {
-        Self { slots: Vec::new() }
+        Self(BTreeMap::new())
     }
 }
 
-impl<T: Copy> ByCycle<T> {
-    /// Keeps a value. While its place holds another cycle, the number of places doubles, up to [`MOST_CYCLES`]. Beyond, the value
-    /// replaces that of the other cycle.
+impl<T> ByCycle<T> {
+    /// Keeps a value. Beyond [`MOST_CYCLES`] the oldest one goes.
     pub(super) fn insert(&mut self, cycle: u64, value: T) {
-        if self.slots.is_empty() {
-            self.slots = vec![None; FEWEST_PLACES];
+        self.0.insert(cycle, value);
+        if self.0.len() > MOST_CYCLES {
+            self.0.pop_first();
         }
-        let held_by_another =
-            |slots: &[Option<(u64, T)>]| slots[place(cycle, slots)].is_some_and(|(held, _)| held != cycle);
-        while self.slots.len() < MOST_CYCLES && held_by_another(&self.slots) {
-            let mut slots = vec![None; 2 * self.slots.len()];
-            for kept in self.slots.iter().flatten() {
-                let place = place(kept.0, &slots);
-                slots[place] = Some(*kept);
-            }
-            self.slots = slots;
-        }
-        let place = place(cycle, &self.slots);
-        self.slots[place] = Some((cycle, value));
     }
 
     pub(super) fn get(&self, cycle: u64) -> Option<&T> {
-        let (held, value) = self.slots.get(place(cycle, &self.slots))?.as_ref()?;
-        (*held == cycle).then_some(value)
+        self.0.get(&cycle)
     }
 
     /// Takes the value out.
     pub(super) fn remove(&mut self, cycle: u64) -> Option<T> {
-        let value = *self.get(cycle)?;
-        let place = place(cycle, &self.slots);
-        self.slots[place] = None;
-        Some(value)
+        self.0.remove(&cycle)
     }
-}
-
-/// The number of places is 0 or a power of two.
-fn place<T>(cycle: u64, slots: &[T]) -> usize {
-    cycle as usize & slots.len().wrapping_sub(1)
 }
 
 /// A point of a curve: seconds since the beginning, and a value.

@@ -1,19 +1,14 @@
 //! Distance of the platform from its desired pose. The actual pose is the true one where the mechanism is emulated,
-//! and forward kinematics' estimate on the robot, whose true pose is unknown. A pose with a value that is no number
-//! is infinitely far.
+//! and forward kinematics' estimate on the robot, whose true pose is unknown.
 
 use masseter_model::geometry::{Deviation, Pose};
 use masseter_runtime::clock::SECOND_NS;
 use masseter_runtime::messages::codes::ControllerState;
-use masseter_runtime::messages::{State, Truth, pose_from_fields};
 use serde::Serialize;
 
 use crate::measured::standard_error;
-use crate::series::ByCycle;
-
-/// States in which the platform has a desired pose.
-pub const MOVING: [ControllerState; 3] =
-    [ControllerState::Easing, ControllerState::Running, ControllerState::Holding];
+use crate::poses::{deviation, estimated_pose, is_moving, is_running, true_pose, worse};
+use crate::signals::Sample;
 
 /// Where the actual pose comes from, which the desired pose is compared with.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
@@ -109,37 +104,21 @@ enum OnPath {
     Off,
 }
 
-/// The state of a cycle, and its sample.
-#[derive(Debug, Clone, Copy)]
-struct Sample {
-    state: State,
-    /// Of the plant.
-    cycle: u64,
-    /// Whether the state is the first to use its reading.
-    is_fresh: bool,
-    on_path: OnPath,
-    /// Whether a lost cycle may have acted on the jaw.
-    is_disturbed: bool,
-}
-
 /// A cycle's desired pose, and the actual pose's distance from it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PathSample {
     pub(super) sampled_ns: u64,
     pub(super) desired: Option<Pose>,
+    pub(super) actual: Option<Pose>,
     pub(super) deviation: Deviation,
 }
 
-/// Joins desired, estimated and, where there are any, true poses of the same sample.
+/// Compares desired, estimated and, where there are any, true poses of the same sample.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tracking {
     source: PoseSource,
     /// The incisal point in the platform frame.
     incisal_m: [f64; 3],
-    /// By the controller's cycle, until their truths come.
-    waiting: ByCycle<Sample>,
-    /// Time and pose of the truths, by the plant's cycle.
-    truths: ByCycle<(u64, Option<Pose>)>,
     was_moving: bool,
     /// The plant's cycle in which the drives were stopped: no desired pose counts any more.
     stopped: Option<u64>,
@@ -150,8 +129,6 @@ pub(super) struct Tracking {
     next_sample_ns: u64,
     /// How often the time between two samples of the track has doubled.
     halvings: u32,
-    /// The last one before a stop.
-    desired: Option<Pose>,
     second: Accumulator,
     second_ends_ns: u64,
     seconds: Vec<f64>,
@@ -167,71 +144,45 @@ impl Tracking {
         self.stopped.get_or_insert(cycle);
     }
 
-    /// The state of a cycle. In one without a fresh reading, the desired pose is that of the sample that failed to come.
-    /// `is_disturbed`: a lost cycle may have acted on the jaw.
-    pub(super) fn apply_state(
-        &mut self,
-        state: &State,
-        is_fresh: bool,
-        is_disturbed: bool,
-    ) -> Option<PathSample> {
-        let cycle = if is_fresh { state.reading_cycle } else { state.cycle.saturating_sub(1) };
-        let is_moving = is_moving(state) && self.stopped.is_none_or(|stopped| cycle < stopped);
+    /// The deviation from the path in a cycle, where there is one. Every cycle with an actual pose counts, also one whose
+    /// sample the controller did not use.
+    pub(super) fn add_sample(&mut self, sample: &Sample) -> Option<PathSample> {
+        let (messages, sampled_ns) = (&sample.messages, sample.time_ns);
+        let state = messages.controller_state;
+        let is_moving = is_moving(state) && self.stopped.is_none_or(|stopped| messages.cycle < stopped);
         let on_path = match std::mem::replace(&mut self.was_moving, is_moving) {
             _ if is_moving => OnPath::Moving,
             true => OnPath::End,
             false => OnPath::Off,
         };
-        let sample = Sample { state: *state, cycle, is_fresh, on_path, is_disturbed };
-        if self.source == PoseSource::Estimate {
-            return is_fresh
-                .then(|| self.compare(&sample, state.sampled_ns, estimated_pose(state)))
-                .flatten();
-        }
-        let Some(&(sampled_ns, actual)) = self.truths.get(cycle) else {
-            self.waiting.insert(state.cycle, sample);
-            return None;
+        let (desired, is_disturbed, is_used) =
+            (messages.desired, messages.is_disturbed, messages.solution.is_some());
+        let estimated = messages.solution.as_ref().and_then(estimated_pose);
+        let actual = match self.source {
+            PoseSource::Truth => true_pose(messages.truth.as_ref()?),
+            PoseSource::Estimate if is_used => estimated,
+            PoseSource::Estimate => return None,
         };
-        self.compare(&sample, sampled_ns, actual)
-    }
-
-    /// The true pose of a sample, with the states that wait for it: its own cycle's and its neighbours'.
-    pub(super) fn apply_truth(&mut self, truth: &Truth) -> [Option<PathSample>; 3] {
-        let actual = true_pose(truth);
-        self.truths.insert(truth.cycle, (truth.sampled_ns, actual));
-        let cycles = [truth.cycle.saturating_sub(1), truth.cycle, truth.cycle + 1];
-        cycles.map(|cycle| {
-            self.waiting.get(cycle).filter(|sample| sample.cycle == truth.cycle)?;
-            let sample = self.waiting.remove(cycle)?;
-            self.compare(&sample, truth.sampled_ns, actual)
-        })
-    }
-
-    /// The deviation from the path, where there is one.
-    fn compare(&mut self, sample: &Sample, sampled_ns: u64, actual: Option<Pose>) -> Option<PathSample> {
-        let Sample { ref state, is_fresh, on_path, is_disturbed, .. } = *sample;
-        let is_on_path = on_path != OnPath::Off;
-        let (desired, estimated) = (desired_pose(state), estimated_pose(state));
         let error = deviation(desired.as_ref(), actual.as_ref(), self.incisal_m);
-        if is_on_path {
-            self.desired = desired;
+        let is_counted = on_path == OnPath::Moving && is_running(state);
+        if is_counted {
+            self.errors(is_disturbed).for_each(|errors| errors.actual.add(&error));
+            self.add_to_second(error.origin_m, sampled_ns);
+        } else if on_path != OnPath::Off {
             self.errors(is_disturbed).for_each(|errors| errors.actual.peak(&error));
         }
-        if on_path == OnPath::Moving && is_fresh {
-            let to_estimate =
-                |from: Option<Pose>| deviation(from.as_ref(), estimated.as_ref(), self.incisal_m);
-            let (estimate, estimate_error) = (to_estimate(desired), to_estimate(actual));
-            self.errors(is_disturbed).for_each(|errors| errors.estimated.peak(&estimate));
-            if is_running(state) {
-                self.errors(is_disturbed).for_each(|errors| errors.add(&error, &estimate));
-                self.estimates.add(estimate_error.origin_m);
-                self.add_to_second(error.origin_m, sampled_ns);
+        if on_path == OnPath::Moving && is_used {
+            let estimate = deviation(desired.as_ref(), estimated.as_ref(), self.incisal_m);
+            let add = if is_counted { PoseErrorSums::add } else { PoseErrorSums::peak };
+            self.errors(is_disturbed).for_each(|errors| add(&mut errors.estimated, &estimate));
+            if is_counted {
+                self.estimates.add(deviation(actual.as_ref(), estimated.as_ref(), self.incisal_m).origin_m);
             }
         }
-        if is_fresh && (is_moving(state) || state.controller_state == ControllerState::SafeStop.code()) {
-            self.draw(sampled_ns, [self.desired, estimated, actual]);
+        if is_used && (is_moving || state == Some(ControllerState::SafeStop.code())) {
+            self.draw(sampled_ns, [desired, estimated, actual]);
         }
-        is_on_path.then_some(PathSample { sampled_ns, desired, deviation: error })
+        (on_path != OnPath::Off).then_some(PathSample { sampled_ns, desired, actual, deviation: error })
     }
 
     /// What a cycle counts for: all errors, and the undisturbed ones unless a lost cycle may have acted on the jaw.
@@ -281,48 +232,6 @@ impl Tracking {
         };
         (figures, Track { samples: self.track })
     }
-}
-
-pub(super) fn is_moving(state: &State) -> bool {
-    MOVING.iter().any(|moving| moving.code() == state.controller_state)
-}
-
-pub(super) fn is_running(state: &State) -> bool {
-    state.controller_state == ControllerState::Running.code()
-}
-
-pub(super) fn desired_pose(state: &State) -> Option<Pose> {
-    pose(state.desired_position_m, state.desired_quaternion_wxyz)
-}
-
-pub(super) fn estimated_pose(state: &State) -> Option<Pose> {
-    pose(state.estimated_position_m, state.estimated_quaternion_wxyz)
-}
-
-pub(super) fn true_pose(truth: &Truth) -> Option<Pose> {
-    pose(truth.position_m, truth.quaternion_wxyz)
-}
-
-/// A quaternion's length may differ from 1 by so much: single precision and more.
-const LENGTH_TOLERANCE: f64 = 1e-3;
-
-/// The pose in a message; none where a number is not finite or the quaternion is no rotation.
-fn pose(position_m: [f64; 3], quaternion_wxyz: [f64; 4]) -> Option<Pose> {
-    let length = quaternion_wxyz.iter().map(|part| part * part).sum::<f64>().sqrt();
-    let is_pose = position_m.iter().all(|x| x.is_finite()) && (length - 1.0).abs() <= LENGTH_TOLERANCE;
-    is_pose.then(|| pose_from_fields(position_m, quaternion_wxyz))
-}
-
-/// How far two poses are apart.
-pub(super) fn deviation(a: Option<&Pose>, b: Option<&Pose>, incisal_m: [f64; 3]) -> Deviation {
-    const NOWHERE: Deviation =
-        Deviation { origin_m: f64::INFINITY, incisal_m: f64::INFINITY, angle_rad: f64::INFINITY };
-    a.zip(b).map_or(NOWHERE, |(a, b)| Deviation::between(a, b, incisal_m))
-}
-
-/// The worse of two errors; what is no number is infinite.
-pub(super) fn worse(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b.is_nan() { f64::INFINITY } else { a.max(b) }
 }
 
 /// Errors of a pose while the motion played; none without samples. The peaks also count the moves to its beginning, the
@@ -378,11 +287,6 @@ struct Errors {
 }
 
 impl Errors {
-    fn add(&mut self, actual: &Deviation, estimated: &Deviation) {
-        self.actual.add(actual);
-        self.estimated.add(estimated);
-    }
-
     fn figures(&self) -> UndisturbedFigures {
         let (actual, estimated) = (self.actual.figures(), self.estimated.figures());
         UndisturbedFigures { samples: self.actual.origin.samples, actual, estimated }

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use anyhow::Context;
 use clap::{Args, Parser, Subcommand};
 use masseter_plan::Overrides;
-use masseter_recording::output::new_folder;
+use masseter_recording::new_folder;
 use masseter_research::{Settings, Study};
 use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure, in_one_line, result_line, status};

@@ -11,7 +11,7 @@ use anyhow::Context;
 use clap::{Args, Subcommand, ValueEnum};
 use masseter_model::geometry::{Mechanism, MechanismConfig};
 use masseter_plan::{Overrides, RunPlan};
-use masseter_recording::output::new_file;
+use masseter_recording::new_file;
 use masseter_research::uniqueness::{Ambiguous, InputBox, boxes, prove, search};
 use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, result_line, status};

@@ -231,6 +231,8 @@ section! {
         pub tracking_rms_deg: f64 = 0.1 => Positive,
         /// Largest such angle; no declared fault may turn the platform further before it is detected.
         pub tracking_max_deg: f64 = 0.5 => Positive,
+        /// By how much the motion may be late, since commands or readings were lost; the desired pose waits for no longer.
+        pub motion_lag_ms: f64 = 20.0 => Within(0.0, 1000.0),
         /// Largest number of cycles that the rig itself, controller and plant together, may miss.
         pub missed_cycles: u64 = 0,
         /// Largest share of the cycles that the machine may lose; beyond it the run is INVALID.

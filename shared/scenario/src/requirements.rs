@@ -67,6 +67,8 @@ keys! {
         pub unit: Option<String> => "with `expression`",
         /// When it is judged; by default the whole run.
         pub during: Option<During> => "a state, a condition, or a table",
+        /// Whether a window, or a `stays_for`, that the end of the run cuts leaves the requirement untested.
+        pub whole: bool => "not with `order`",
         /// Bounds: what of the signal.
         pub statistic: Statistic,
         /// Bounds: the percentile, 0 to 100.
@@ -161,6 +163,8 @@ section! {
         pub exit_code: Option<u8> = None => "0, 1, 4, 5, 6, 130; that of `verdict`, if both are given",
         /// Occurrences that the run must have.
         pub events: Vec<String> = Vec::new() => "occurrences",
+        /// Checks and requirements that must fail, and no other may; without it any failure is the expected one.
+        pub failed: Vec<String> = Vec::new() => "names; with `verdict = \"fail\"`",
     }
 }
 
@@ -178,6 +182,9 @@ impl ExpectConfig {
     }
 
     pub(super) fn validate(&self) -> Checked {
+        let is_failure = self.failed.is_empty() || self.verdict == Some(ExpectedVerdict::Fail);
+        let failed = format!("{:?}", self.failed);
+        require(is_failure, "expect.failed", &failed, "it goes with verdict = \"fail\"")?;
         let Some(code) = self.exit_code else { return Ok(()) };
         let need = match self.verdict {
             Some(verdict) => format!("expect.verdict has the exit code {}: give one of both", verdict.exit_code()),

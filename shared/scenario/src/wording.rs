@@ -23,6 +23,23 @@ pub fn counted(number: u64, noun: &str) -> String {
     format!("{number} {noun}{ending}")
 }
 
+/// A number with its digits in groups of three.
+///
+/// # Examples
+/// ```
+/// use masseter_scenario::wording::grouped;
+///
+/// let numbers = [0, 7, 999, 1000, 11_379, 1_234_567];
+/// assert_eq!(numbers.map(grouped), ["0", "7", "999", "1,000", "11,379", "1,234,567"]);
+/// ```
+pub fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let first = digits.len() % 3;
+    let (head, rest) = digits.split_at(first);
+    let groups = (0..rest.len() / 3).map(|group| &rest[3 * group..3 * group + 3]);
+    [head].into_iter().filter(|head| !head.is_empty()).chain(groups).collect::<Vec<_>>().join(",")
+}
+
 /// The shortest text that is read as the same number. Numbers below 1e-5 and from 1e16 on have an exponent.
 ///
 /// # Examples

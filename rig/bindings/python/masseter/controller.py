@@ -86,8 +86,8 @@ class Session:
                 session.publish(command, state)
             session.finish()
 
-    An exception within the block ends the run with its message. The desired poses of the state are those of the scenario's
-    motion; own_motion declares that they are those of another one.
+    An exception within the block ends the run with its message. The rig judges the jaw by the scenario's motion; own_motion
+    declares another one, of which the desired poses of the state tell.
     """
 
     def __init__(

@@ -79,12 +79,13 @@ class Run:
         return pandas.DataFrame(self.columns(topic))
 
 
-def load(folder: str | PathLike[str]) -> Run:
-    """The run in this folder. Raises MasseterError where the recording cannot be read."""
-    folder = Path(folder)
-    if not folder.is_dir():
-        raise _native.MasseterError(f"{folder} is no run folder: give the folder that 'masseter run' names")
-    topics, is_whole = _native.topics(folder / "recording.mcap")
+def load(run: str | PathLike[str]) -> Run:
+    """The run of this folder, of the recording.mcap in it, or of a link to either.
+
+    Raises MasseterError where there is no run, or the recording cannot be read.
+    """
+    found, topics, is_whole = _native.read_run(run)
+    folder = Path(found)
     manifest = json.loads((folder / "manifest.json").read_text())
     declared = manifest.get("declared", {})
     layouts = {name: np.dtype(layout) for name, layout in _LAYOUTS.items()}

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use bytemuck::{AnyBitPattern, NoUninit, cast_slice, pod_read_unaligned};
 use masseter_controller::kinematics::ForwardTracker;
 use masseter_model::geometry::{self, AXES, Actuators, MechanismConfig};
-use masseter_recording::{ReadError, Reader, Topic};
+use masseter_recording::{ReadError, Reader, RunFolder, Topic};
 use masseter_runtime::lifecycle::attach::AttachError;
 use masseter_runtime::messages::{pose_fields, pose_from_fields};
 use masseter_scenario::Scenario;
@@ -47,7 +47,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<session::Session>()?;
     module.add_function(wrap_pyfunction!(law::check_declaration, module)?)?;
     module.add_function(wrap_pyfunction!(law::control, module)?)?;
-    module.add_function(wrap_pyfunction!(topics, module)?)?;
+    module.add_function(wrap_pyfunction!(read_run, module)?)?;
     Ok(())
 }
 
@@ -112,13 +112,19 @@ where
     Ok(PyBytes::new(py, cast_slice(&solved.map_err(failed)?)))
 }
 
-/// The messages of each topic that controllers use, in order, as the bytes of their structures; and whether the recording is
-/// whole.
+/// The folder of a run; the messages of each topic that controllers use, in order, as the bytes of their structures; and
+/// whether the recording is whole.
+type ReadRun<'py> = (PathBuf, BTreeMap<&'static str, Bound<'py, PyBytes>>, bool);
+
+/// Reads a run.
 #[pyfunction]
-fn topics(py: Python<'_>, path: PathBuf) -> PyResult<(BTreeMap<&'static str, Bound<'_, PyBytes>>, bool)> {
-    let read = py.detach(|| read_topics(&path));
-    let (topics, is_whole) = read.map_err(|error| failed(format!("{}: {error}", path.display())))?;
-    Ok((topics.into_iter().map(|(name, bytes)| (name, PyBytes::new(py, &bytes))).collect(), is_whole))
+fn read_run(py: Python<'_>, path: PathBuf) -> PyResult<ReadRun<'_>> {
+    let folder = RunFolder::open(&path).map_err(failed)?;
+    let recording = folder.recording();
+    let read = py.detach(|| read_topics(&recording));
+    let (topics, is_whole) = read.map_err(|error| failed(format!("{}: {error}", recording.display())))?;
+    let topics = topics.into_iter().map(|(name, bytes)| (name, PyBytes::new(py, &bytes))).collect();
+    Ok((folder.path().to_owned(), topics, is_whole))
 }
 
 fn read_topics(path: &Path) -> Result<(BTreeMap<&'static str, Vec<u8>>, bool), ReadError> {

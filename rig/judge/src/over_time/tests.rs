@@ -37,7 +37,7 @@ mod over_time {
             if cycle < 20 {
                 let desired = Some(Pose::translation(x + 1e-3, 0.0, 0.0));
                 let deviation = Deviation { origin_m: 9.0, incisal_m: 1e-3, angle_rad: 9.0 };
-                collector.apply_path(&PathSample { sampled_ns, desired, deviation });
+                collector.apply_path(&PathSample { sampled_ns, desired, actual: None, deviation });
             }
         }
         let over_time = collector.into_figures(0);

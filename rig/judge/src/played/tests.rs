@@ -2,125 +2,61 @@ use super::*;
 
 mod played {
     use masseter_runtime::messages::codes::ControllerState;
-    use masseter_runtime::messages::pose_fields;
-    use masseter_runtime::named::Parameter;
 
     use super::*;
 
-    fn watch(declared: &Declared) -> (PlayedWatch, Arc<Trajectory>) {
-        let scenario = Scenario { duration_s: Some(2.0), ..Scenario::default() };
-        (PlayedWatch::new(&scenario, declared), trajectory(&scenario).unwrap())
-    }
-
-    /// A state in the scenario's pose at this time.
-    fn state(motion: &Trajectory, cycle: u64, motion_time_s: f64) -> State {
-        let (desired_position_m, desired_quaternion_wxyz) =
-            pose_fields(&motion.pose_in_motion(motion_time_s));
-        let controller_state = ControllerState::Running.code();
-        State {
-            cycle,
-            motion_time_s,
-            desired_position_m,
-            desired_quaternion_wxyz,
-            controller_state,
-            ..State::default()
+    /// How far the jaw goes, where its place along x at each sample is this share of the desired one, mm.
+    fn played(samples: u32, place_mm: impl Fn(f64) -> f64, rest_m: f64) -> MotionFigures {
+        let mut watch = PlayedWatch::new(&JawConfig::default());
+        let pose = |mm: f64| Some(Pose::translation(mm * 1e-3, 0.0, 0.0));
+        for sample in 0..=samples {
+            let wanted_mm = 10.0 * (f64::from(sample) * 0.1).sin();
+            watch.add_sample(0.0, pose(wanted_mm), pose(place_mm(wanted_mm)));
         }
-    }
-
-    /// How far a motion with these cycles and times came, s.
-    fn reached_s(times: &[(u64, f64)]) -> Option<f64> {
-        let (mut watch, motion) = watch(&Declared::default());
-        for (cycle, time_s) in times {
-            watch.apply_state(&state(&motion, *cycle, *time_s));
-        }
-        watch.into_figures().0
+        watch.into_figures(Some(rest_m))
     }
 
     #[test]
-    fn the_motions_time_passes_no_faster_than_the_cycles() {
-        type Case = (&'static [(u64, f64)], Option<f64>);
-        let cases: [Case; 9] = [
-            (&[], None),
-            (&[(1, -1.0), (2, f64::NAN)], None),
-            (&[(7, 0.0), (8, 0.001), (9, 0.002)], Some(0.002)),
-            // A late reading has the time of the sample before.
-            (&[(7, 0.0), (8, 0.0), (9, 0.002)], Some(0.002)),
-            // Twice as fast, and at rest.
-            (&[(7, 0.0), (8, 0.002), (9, 0.004), (10, 0.006), (20, 0.006)], Some(0.004)),
-            // A wait earns nothing.
-            (&[(7, 0.0), (8, 0.0), (9, 0.0), (10, 0.0), (11, 0.004)], Some(0.0)),
-            // The time vanishes.
-            (&[(7, 0.0), (8, f64::NAN), (9, 0.002)], Some(0.0)),
-            (&[(7, 0.0), (8, 1.0), (9, 1.001), (1100, 1.5)], Some(0.0)),
-            (&[(7, 1.5), (2000, 1.5)], Some(0.0)),
-        ];
-        for (times, expected) in cases {
-            assert_eq!(reached_s(times), expected, "{times:?}");
+    fn what_the_jaw_goes_in_the_direction_of_the_motion_is_played() {
+        let share = |place_mm: fn(f64) -> f64| played(500, place_mm, 0.0).played.unwrap();
+        for (place_mm, expected) in [
+            ((|mm| mm) as fn(f64) -> f64, 1.0),
+            (|_| 0.0, 0.0),
+            (|mm| 0.5 * mm, 0.5),
+            (|mm| mm + 3.0, 1.0),
+            (|mm| -mm, -1.0),
+        ] {
+            assert!((share(place_mm) - expected).abs() < 1e-9, "{expected}");
         }
+        let whole = played(500, |mm| mm, 0.0);
+        let half = played(500, |mm| mm, whole.way_mm.unwrap() / 1e3);
+        assert!((half.played.unwrap() - 0.5).abs() < 1e-9, "the rest was not played: {half:?}");
     }
 
     #[test]
-    fn few_lost_cycles_pass_unseen_and_many_are_not_played() {
-        let (mut few, mut many) = (Vec::new(), Vec::new());
-        for cycle in 0..=1000_u32 {
-            let time = (u64::from(cycle), f64::from(cycle) * 1e-3);
-            few.extend((!(500..530).contains(&cycle)).then_some(time));
-            many.extend((!(300..800).contains(&cycle)).then_some(time));
-        }
-        assert_eq!(reached_s(&few), Some(1.0));
-        let seen_s = reached_s(&many).unwrap();
-        assert!((seen_s - 0.502).abs() < 1e-6, "{seen_s}");
+    fn a_motion_that_is_not_the_scenarios_or_moves_nothing_has_no_share() {
+        let own = PlayedWatch::new(&JawConfig::default()).into_figures(None);
+        assert_eq!((own.way_mm, own.played, own.lag_ms), (None, None, None));
+        let still = PlayedWatch::new(&JawConfig::default()).into_figures(Some(0.0));
+        assert_eq!((still.way_mm, still.played), (Some(0.0), None));
+        let never_moved = PlayedWatch::new(&JawConfig::default()).into_figures(Some(0.9));
+        assert_eq!(never_moved.played, Some(0.0));
     }
 
     #[test]
-    fn a_state_without_motion_ends_it() {
-        let (mut watch, motion) = watch(&Declared::default());
-        let off = State { controller_state: ControllerState::Disabling.code(), ..state(&motion, 2, 0.001) };
-        for state in [off, state(&motion, 3, 0.0), state(&motion, 4, 0.001), off, state(&motion, 6, 0.002)] {
-            watch.apply_state(&state);
+    fn the_greatest_lag_and_the_cycles_without_a_new_command_are_counted() {
+        let mut watch = PlayedWatch::new(&JawConfig::default());
+        for lag_s in [0.0, 0.003, 0.002] {
+            watch.add_sample(lag_s, None, None);
         }
-        assert_eq!(watch.into_figures().0, Some(0.001));
-    }
-
-    #[test]
-    fn another_pose_than_the_scenarios_is_a_departure_with_its_time() {
-        let (mut watch, motion) = watch(&Declared::default());
-        for cycle in 0..1000 {
-            let mut state = state(&motion, cycle, cycle as f64 * 1e-3);
-            if cycle == 700 {
-                state.desired_position_m[2] += 2e-3;
-            }
-            watch.apply_state(&state);
+        let moving = is_moving(Some(ControllerState::Running.code()));
+        for answers_cycle in [1, 2, 2, 2, 3, 3, 5, 6] {
+            watch.count_command(&Reading { answers_cycle, ..Reading::default() }, moving);
         }
-        let departure = watch.into_figures().1.unwrap();
-        assert!((departure.incisal_mm - 2.0).abs() < 1e-6 && departure.deg < 1e-4, "{departure:?}");
-        assert!((departure.at_s - 0.7).abs() < 1e-9);
-    }
-
-    #[test]
-    fn own_motions_and_set_amplitudes_have_poses_of_their_own() {
-        let amplitude = Declared { parameters: vec![Parameter::new(AMPLITUDE, 1.0)], ..Declared::default() };
-        let own = Declared { motion: PlayedMotion::Own, ..amplitude.clone() };
-        let set = Event { object: 0, cause: Cause::ParameterSet.code(), ..Event::default() };
-        for (declared, event, is_compared) in
-            [(&amplitude, None, true), (&own, None, false), (&amplitude, Some(set), false)]
-        {
-            let (mut watch, motion) = watch(declared);
-            watch.apply_state(&state(&motion, 1, 0.0));
-            if let Some(event) = event {
-                watch.apply_event(&event);
-            }
-            let controller_state = ControllerState::Running.code();
-            watch.apply_state(&State {
-                cycle: 2,
-                motion_time_s: 0.001,
-                controller_state,
-                ..State::default()
-            });
-            let departure = watch.into_figures().1;
-            assert_eq!(departure.is_some_and(|departure| departure.is_partial), event.is_some());
-            assert_eq!(departure.is_some_and(|departure| departure.incisal_mm.is_infinite()), is_compared);
-        }
+        watch.count_command(&Reading { answers_cycle: 6, ..Reading::default() }, false);
+        let found = watch.into_figures(None);
+        assert_eq!((found.missed_commands, found.missed_in_a_row), (3, 2));
+        assert!((found.lag_ms.unwrap() - 3.0).abs() < 1e-12);
     }
 }
 

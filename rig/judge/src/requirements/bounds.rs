@@ -8,7 +8,7 @@ use masseter_scenario::{Quantity, RequirementConfig, Statistic, Unit};
 use super::condition::{Lookup, Moment};
 use super::dimension::BaseExponents;
 use super::expression::Expression;
-use super::finding::{Finding, OfKey, Reason, Refused, RequirementPlot};
+use super::finding::{Finding, Missing, OfKey, Reason, Refused, RequirementPlot};
 use super::trigger::Window;
 use crate::series::{Extremes, Series};
 use crate::signals::Values;
@@ -105,7 +105,7 @@ pub(super) struct Bounds {
     percentile: f64,
     limits: Limits,
     samples: u64,
-    missing: u64,
+    missing: Missing,
     worst: Option<Worst>,
     fails_undisturbed: bool,
     sum: f64,
@@ -179,7 +179,7 @@ impl Bounds {
             percentile,
             limits,
             samples: 0,
-            missing: 0,
+            missing: Missing::default(),
             worst: None,
             fails_undisturbed: false,
             sum: 0.0,
@@ -217,10 +217,8 @@ impl Bounds {
         if !self.window.contains(moment) || moment.is_closing {
             return;
         }
-        let Some(value) = value else {
-            self.missing += 1;
-            return;
-        };
+        self.missing.count_sample(value.is_some());
+        let Some(value) = value else { return };
         // What the requirement does not judge would only spoil the scale of the plot.
         self.series.add(moment.time_ns - began_ns, 0, value / self.of.unit.si);
         let value = if self.statistic == Statistic::Abs { value.abs() } else { value };
@@ -254,7 +252,7 @@ impl Bounds {
         let unit = self.of.unit;
         let Some(worst) = self.worst else {
             let (text, window) = (&self.of.text, &self.window.text);
-            let why = match self.missing {
+            let why = match self.missing.all {
                 0 => format!("no sample{window}"),
                 n => format!("{text} has no value{window}: all {n} samples are missing{}", self.of.absence),
             };
@@ -263,15 +261,15 @@ impl Bounds {
         let is_of_values = matches!(self.statistic, Statistic::Value | Statistic::Abs);
         let value = if is_of_values { worst.value } else { self.value_of_statistic() };
         let (margin, limit) = self.limits.margin(value);
-        let missing = if self.missing > 0 { format!(", {} missing", self.missing) } else { String::new() };
-        let text = format!("{} in {} samples{missing}", unit.text(value), self.samples);
-        Finding {
+        let text = format!("{} in {} samples", unit.text(value), self.samples);
+        let finding = Finding {
             margin: Some(margin).filter(|margin| margin.is_finite()),
             relative_margin: Finding::share(margin, limit),
             worst_ns: is_of_values.then_some(worst.time_ns),
             may_be_disturbed: !(is_of_values && self.fails_undisturbed),
             ..Finding::new(margin >= 0.0, text, unit)
-        }
+        };
+        self.window.limit(finding.with_missing(&self.missing), None)
     }
 
     fn value_of_statistic(&mut self) -> f64 {

@@ -4,7 +4,7 @@ use masseter_scenario::wording::counted;
 use masseter_scenario::{Dimension, RequirementConfig};
 
 use super::condition::{Condition, Lookup, Moment, is_condition};
-use super::finding::{Finding, OfKey, Refused};
+use super::finding::{Finding, Missing, OfKey, Refused};
 use super::trigger::{Trigger, Window};
 
 /// Judges that something never happens.
@@ -13,6 +13,7 @@ pub(super) struct Never {
     what: What,
     window: Window,
     samples: u64,
+    missing: Missing,
     times: u64,
     first_ns: Option<u64>,
     /// The smallest margin and its moment.
@@ -34,7 +35,8 @@ impl Never {
             What::Occurrence(Trigger::parse(text, of).of_key("require.never")?)
         };
         let window = Window::new(config, of)?;
-        Ok(Self { what, window, samples: 0, times: 0, first_ns: None, worst: None })
+        let missing = Missing::default();
+        Ok(Self { what, window, samples: 0, missing, times: 0, first_ns: None, worst: None })
     }
 
     /// What must hold, in words.
@@ -50,7 +52,11 @@ impl Never {
         let is_inside = self.window.contains(moment);
         let (times, margin) = match &mut self.what {
             What::Condition(condition) => {
-                let Some(robustness) = condition.robustness(moment.values) else { return };
+                let robustness = condition.robustness(moment.values);
+                if is_inside && !moment.is_closing {
+                    self.missing.count_sample(robustness.is_some());
+                }
+                let Some(robustness) = robustness else { return };
                 (u64::from(robustness >= 0.0), -robustness)
             }
             What::Occurrence(trigger) => (trigger.times_ns(moment).len() as u64, f64::INFINITY),
@@ -83,12 +89,13 @@ impl Never {
             0 => format!("never in {} samples", self.samples),
             times => format!("in {times} of {} samples", self.samples),
         };
-        Finding {
+        let finding = Finding {
             margin: worst.map(|(margin, _)| margin),
             relative_margin,
             worst_ns: self.first_ns.or(worst.map(|(_, time_ns)| time_ns)),
             ..Finding::new(self.times == 0, text, unit)
-        }
+        };
+        self.window.limit(finding.with_missing(&self.missing), None)
     }
 }
 
@@ -147,7 +154,8 @@ impl Count {
         let below = self.at_most.map(|most| most as f64 - self.times as f64);
         let margin = above.into_iter().chain(below).fold(f64::INFINITY, f64::min);
         let text = counted(self.times, "time");
-        Finding { margin: Some(margin), worst_ns: self.last_ns, ..Finding::new(margin >= 0.0, text, unit) }
+        let finding = Finding::new(margin >= 0.0, text, unit);
+        self.window.limit(Finding { margin: Some(margin), worst_ns: self.last_ns, ..finding }, None)
     }
 }
 

@@ -3,25 +3,14 @@
 use masseter_scenario::Unit;
 use serde::Serialize;
 
+use crate::check::CheckResult;
 use crate::series::Curve;
 use crate::signals::UnknownSignal;
-
-/// Whether a requirement holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum RequirementResult {
-    /// It holds.
-    Passed,
-    /// It does not.
-    Failed,
-    /// What it needs did not happen; the finding names it.
-    Untested,
-}
 
 /// The judgement of a requirement, in SI units.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Finding {
-    pub(super) result: RequirementResult,
+    pub(super) result: CheckResult,
     /// What was found, in words.
     pub(super) text: String,
     /// How far the requirement is from failing; negative where it fails.
@@ -41,12 +30,35 @@ pub(super) struct Finding {
 impl Finding {
     /// The requirement could not show; `why` says what did not happen.
     pub(super) fn untested(why: String, unit: Unit) -> Self {
-        Self { result: RequirementResult::Untested, ..Self::new(true, why, unit) }
+        Self { may_be_disturbed: false, ..Self::new(true, why, unit) }.into_untested()
+    }
+
+    /// What passes with values missing in between is untested; the machine may have lost them.
+    pub(super) fn with_missing(self, missing: &Missing) -> Self {
+        let text = self.text + &missing.in_words();
+        match self.result {
+            CheckResult::Passed if missing.between > 0 => Self { text, ..self }.into_untested(),
+            _ => Self { text, ..self },
+        }
+    }
+
+    /// A window that the run's end cut, in words. One that must be whole leaves what passes untested.
+    pub(super) fn with_cut(self, part: Option<String>, is_whole: bool) -> Self {
+        let Some(part) = part else { return self };
+        let text = format!("{}; {part}", self.text);
+        match self.result {
+            CheckResult::Passed if is_whole => Self { may_be_disturbed: false, text, ..self }.into_untested(),
+            _ => Self { text, ..self },
+        }
+    }
+
+    fn into_untested(self) -> Self {
+        Self { result: CheckResult::Untested, ..self }
     }
 
     /// A judgement without figures.
     pub(super) fn new(passes: bool, text: String, unit: Unit) -> Self {
-        let result = if passes { RequirementResult::Passed } else { RequirementResult::Failed };
+        let result = if passes { CheckResult::Passed } else { CheckResult::Failed };
         let (margin, relative_margin, worst_ns, latency_s) = (None, None, None, None);
         Self { result, text, margin, relative_margin, unit, worst_ns, latency_s, may_be_disturbed: true }
     }
@@ -54,6 +66,34 @@ impl Finding {
     /// The share of a margin in its limit; none without a limit other than 0.
     pub(super) fn share(margin: f64, limit: f64) -> Option<f64> {
         (limit != 0.0 && margin.is_finite()).then(|| margin / limit.abs())
+    }
+}
+
+/// Samples of a window without a value.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Missing {
+    pub(super) all: u64,
+    /// Those between two values: before the first and after the last one, a signal need not have any.
+    between: u64,
+    since_value: Option<u64>,
+}
+
+impl Missing {
+    pub(super) fn count_sample(&mut self, has_value: bool) {
+        if has_value {
+            self.between += self.since_value.replace(0).unwrap_or(0);
+        } else {
+            self.all += 1;
+            self.since_value = self.since_value.map(|missing| missing + 1);
+        }
+    }
+
+    fn in_words(&self) -> String {
+        match (self.all, self.between) {
+            (0, _) => String::new(),
+            (all, 0) => format!(", {all} missing"),
+            (_, between) => format!(", {between} missing in between"),
+        }
     }
 }
 
@@ -65,7 +105,7 @@ pub struct RequirementFigures {
     /// What must hold, in words.
     pub must: String,
     /// Whether it does.
-    pub result: RequirementResult,
+    pub result: CheckResult,
     /// What was found, in words.
     pub finding: String,
     /// How far the requirement is from failing, in `margin_unit`; negative where it fails; none where there is no number.

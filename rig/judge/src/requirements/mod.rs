@@ -1,7 +1,7 @@
 //! Requirements: what must hold in a run, each with its outcome, its margin and the moment of the smallest margin.
 //!
 //! All are judged in one pass over the samples of the run, in the order of time. `docs/requirements.md` fixes the meaning
-//! of windows, missing samples and the run's end. What the outcomes mean for the verdict is the report's.
+//! of windows, missing samples and the run's end. What the outcomes mean for a run is the [verdict](crate::Verdict)'s.
 
 mod bounds;
 mod condition;
@@ -14,7 +14,6 @@ mod trigger;
 
 use std::collections::BTreeSet;
 
-use masseter_recording::Recorded;
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::named::Declared;
 use masseter_scenario::input::excerpt;
@@ -26,39 +25,16 @@ use self::count::{Count, Never, Order};
 use self::finding::{Finding, Reason, Refused};
 use self::response::Response;
 use self::trigger::Trigger;
-use crate::events::EventRecord;
-use crate::signals::{Registry, Sample, Timeline, Values};
+use crate::signals::{Registry, Sample, Values};
 
-pub use finding::{RequirementError, RequirementFigures, RequirementPlot, RequirementResult};
+pub use finding::{RequirementError, RequirementFigures, RequirementPlot};
 pub use trigger::event_names;
 
-/// Judges every requirement of a scenario.
-///
-/// ```
-/// use masseter_analysis::requirements::{RequirementResult, Requirements};
-/// use masseter_recording::Recorded;
-/// use masseter_scenario::{RequirementConfig, Scenario};
-/// use masseter_runtime::messages::Reading;
-/// use masseter_runtime::messages::codes::DriveState;
-/// use masseter_runtime::named::Declared;
-///
-/// let text = "[[require]]\nname = 'first leg'\nsignal = 'l1.position'\nmax = '300 mm'";
-/// let scenario = Scenario::parse("s.toml".as_ref(), text)?;
-/// let mut requirements = Requirements::new(&scenario, &Declared::default());
-/// let mut reading = Reading { cycle: 1, sampled_ns: 1000, ..Reading::default() };
-/// reading.position_m[3] = 0.29;
-/// reading.drive_state = [DriveState::OperationEnabled.code(); 6];
-/// requirements.take(&Recorded::Reading(reading));
-/// let found = requirements.finish();
-/// assert_eq!(found[0].result, RequirementResult::Passed);
-/// assert_eq!(found[0].margin.map(f64::round), Some(10.0));
-/// # Ok::<(), masseter_scenario::ScenarioError>(())
-/// ```
+/// Judges every requirement of a scenario, sample by sample.
 #[derive(Debug, Clone)]
-pub struct Requirements {
+pub(crate) struct Requirements {
     list: Vec<Requirement>,
     values: Values,
-    timeline: Timeline,
     row: Vec<f64>,
     state: usize,
     motion_ns: Option<u64>,
@@ -106,7 +82,7 @@ pub fn check_requirements(scenario: &Scenario, declared: Option<&Declared>) -> R
 
 impl Requirements {
     /// The requirements of a scenario whose controller declares these signals and parameters, and the events that it expects.
-    pub fn new(scenario: &Scenario, declared: &Declared) -> Self {
+    pub(crate) fn new(scenario: &Scenario, declared: &Declared) -> Self {
         let mut values = Values::new(Registry::new(scenario, declared));
         let mut of = Lookup { scenario, values: &mut values };
         let mut read = |config: &RequirementConfig| {
@@ -118,46 +94,21 @@ impl Requirements {
         let expected = scenario.expect.iter().flat_map(|expect| &expect.events).map(expected_event);
         list.extend(expected.map(|config| Requirement { is_expected_event: true, ..read(&config) }));
         let state = values.choose("controller.state").expect("every run has this signal");
-        Self { list, values, timeline: Timeline::default(), row: Vec::new(), state, motion_ns: None }
-    }
-
-    /// The same for messages that come while the run goes on, each soon after its cycle.
-    #[must_use]
-    pub fn while_running(scenario: &Scenario, declared: &Declared) -> Self {
-        Self { timeline: Timeline::while_running(), ..Self::new(scenario, declared) }
+        Self { list, values, row: Vec::new(), state, motion_ns: None }
     }
 
     /// Whether there are none: then nothing has to be taken.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.list.is_empty()
     }
 
-    /// Takes the next message of the recording.
-    pub fn take(&mut self, message: &Recorded) {
-        if let Some(sample) = self.timeline.take(message) {
-            self.judge_sample(&sample);
-        }
-    }
-
-    /// Takes an event of the run.
-    pub fn event(&mut self, event: &EventRecord) {
-        self.timeline.event(event);
-    }
-
-    /// A lost cycle may have acted on the jaw in this cycle.
-    pub fn disturb(&mut self, cycle: u64) {
-        self.timeline.disturb(cycle);
-    }
-
     /// What every requirement comes to.
-    pub fn finish(mut self) -> Vec<RequirementFigures> {
-        while let Some(sample) = self.timeline.finish() {
-            self.judge_sample(&sample);
-        }
+    pub(crate) fn into_figures(self) -> Vec<RequirementFigures> {
         self.list.into_iter().map(|requirement| requirement.into_figures(self.motion_ns)).collect()
     }
 
-    fn judge_sample(&mut self, Sample { time_ns, messages, events, is_closing }: &Sample) {
+    /// Takes the next sample.
+    pub(crate) fn judge_sample(&mut self, Sample { time_ns, messages, events, is_closing }: &Sample) {
         self.values.take(messages, &mut self.row);
         if self.row[self.state].to_bits() == f64::from(ControllerState::Running.code()).to_bits() {
             self.motion_ns.get_or_insert(*time_ns);
@@ -296,7 +247,9 @@ fn idle_key(config: &RequirementConfig, form: Form) -> Option<&'static str> {
         ("require.at_most", config.at_most.is_some(), Form::Event),
     ];
     let idle = keys.into_iter().find(|(_, is_given, of)| *is_given && *of != form);
-    let of_order = || (config.during.is_some() && form == Form::Order).then_some("require.during");
+    let of_order = [("require.during", config.during.is_some()), ("require.whole", config.whole)];
+    let of_order =
+        || of_order.into_iter().find(|(_, is_given)| *is_given && form == Form::Order).map(|(key, _)| key);
     let of_signal = || (config.unit.is_some() && config.signal.is_some()).then_some("require.unit");
     idle.map(|(key, ..)| key).or_else(of_order).or_else(of_signal)
 }

@@ -1,7 +1,8 @@
 //! Responses: after each trigger, a condition follows within a time and holds for a time.
 //!
-//! A trigger at t is answered if, for some sample τ of [t + delay, t + within], the condition holds at every sample of
-//! [τ, τ + `stays_for`]. Both windows end at the last sample of the run. The robustness of an answer is the largest, over τ, of
+//! A trigger that occurs at t is answered if, for some sample τ of [t + delay, t + within], the condition holds at every sample
+//! of [τ, τ + `stays_for`]. Time to answer, latency and margin count from t, also where t lies between two samples. Both windows
+//! end at the last sample of the run. The robustness of an answer is the largest, over τ, of
 //! the smallest robustness of the condition in its window: the discrete semantics of signal temporal logic.
 
 use std::collections::VecDeque;
@@ -37,17 +38,15 @@ pub(super) struct Response {
     worst: Option<Answer>,
     longest_s: Option<f64>,
     last_ns: u64,
-    /// Triggers whose time lies beyond the end of the run.
+    /// Triggers without a sample within their time, as at the end of the run.
     beyond: u64,
 }
 
 /// The answer to a trigger so far.
 #[derive(Debug, Clone, Copy)]
 struct Answer {
-    /// The sample at which the trigger counts, ns.
-    at_ns: u64,
     /// When the trigger occurred, ns.
-    occurred_ns: u64,
+    at_ns: u64,
     /// The best robustness within the time.
     best: f64,
     /// When the condition first held as required, ns.
@@ -60,7 +59,7 @@ struct Answer {
 
 impl Answer {
     fn latency_s(&self) -> Option<f64> {
-        Some((self.answered_ns? as f64 - self.occurred_ns as f64) / SECOND_NS as f64)
+        Some((self.answered_ns? as f64 - self.at_ns as f64) / SECOND_NS as f64)
     }
 }
 
@@ -120,8 +119,8 @@ impl Response {
         }
         let occurred = self.trigger.times_ns(moment);
         if self.window.contains(moment) {
-            for occurred_ns in occurred {
-                self.open_answer(moment.time_ns, occurred_ns);
+            for at_ns in occurred {
+                self.open_answer(at_ns);
             }
         }
     }
@@ -137,13 +136,13 @@ impl Response {
         self.last_ns = moment.time_ns;
     }
 
-    fn open_answer(&mut self, at_ns: u64, occurred_ns: u64) {
+    fn open_answer(&mut self, at_ns: u64) {
         self.triggers += 1;
         if self.open.len() == MOST_OPEN {
             self.not_followed += 1;
         } else {
             let (best, answered_ns, is_judged, observed_ns) = (f64::NEG_INFINITY, None, false, None);
-            self.open.push(Answer { at_ns, occurred_ns, best, answered_ns, is_judged, observed_ns });
+            self.open.push(Answer { at_ns, best, answered_ns, is_judged, observed_ns });
         }
     }
 
@@ -206,9 +205,7 @@ impl Response {
         if self.then.is_numeric() {
             return Some(answer.best);
         }
-        let left_ns =
-            |within_ns: u64| Some(within_ns as f64 - (answer.answered_ns? as f64 - answer.at_ns as f64));
-        Some(left_ns(self.within_ns?)? / SECOND_NS as f64)
+        Some(self.within_ns? as f64 / SECOND_NS as f64 - answer.latency_s()?)
     }
 
     pub(super) fn into_finding(mut self) -> Finding {
@@ -223,7 +220,7 @@ impl Response {
             let (trigger, window) = (&self.trigger.text, &self.window.text);
             let why = match self.triggers {
                 0 => format!("{trigger} never came{window}"),
-                _ => format!("the run ended before the time after {trigger}"),
+                _ => format!("no sample lies within the time after {trigger}"),
             };
             return Finding::untested(why, unit);
         };
@@ -232,34 +229,29 @@ impl Response {
             let within_s = self.within_ns.map(|ns| ns as f64 / SECOND_NS as f64);
             if is_numeric { self.then.share(margin) } else { Finding::share(margin, within_s?) }
         });
-        Finding {
-            margin,
-            relative_margin,
-            worst_ns: Some(worst.at_ns),
-            latency_s: self.longest_s,
-            ..Finding::new(self.answered == self.triggers - self.beyond, self.in_words(&worst), unit)
-        }
+        let finding = Finding::new(self.answered == self.triggers - self.beyond, self.in_words(), unit);
+        let (worst_ns, latency_s) = (Some(worst.at_ns), self.longest_s);
+        let ms = |ns: u64| ns as f64 / 1e6;
+        let cut = worst.observed_ns.map(|observed_ns| {
+            format!("the run ended after {:.0} ms of {:.0} ms", ms(observed_ns), ms(self.stays_for_ns))
+        });
+        self.window.limit(Finding { margin, relative_margin, worst_ns, latency_s, ..finding }, cut)
     }
 
-    fn in_words(&self, worst: &Answer) -> String {
+    fn in_words(&self) -> String {
         let latency = match self.longest_s {
             Some(longest_s) => format!("; longest latency {:.3} ms", longest_s * 1e3),
             None => "; never followed".to_owned(),
         };
-        let ms = |ns: u64| ns as f64 / 1e6;
-        let whole_ms = ms(self.stays_for_ns);
-        let observed = worst.observed_ns.map_or_else(String::new, |ns| {
-            format!("; the run ended after {:.0} ms of {whole_ms:.0} ms", ms(ns))
-        });
         let beyond = match self.beyond {
             0 => String::new(),
-            more => format!("; {} at the end of the run not judged", counted(more, "trigger")),
+            more => format!("; {} without a sample within its time not judged", counted(more, "trigger")),
         };
         let cut = match self.not_followed {
             0 => String::new(),
             more => format!("; {more} more not followed, as {MOST_OPEN} were open"),
         };
         let triggers = counted(self.triggers, "trigger");
-        format!("{} of {triggers} answered{latency}{observed}{beyond}{cut}", self.answered)
+        format!("{} of {triggers} answered{latency}{beyond}{cut}", self.answered)
     }
 }

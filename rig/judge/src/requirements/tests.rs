@@ -1,6 +1,6 @@
 //! Requirements over runs of a few samples, a millisecond apart.
 
-use RequirementResult::{Failed, Passed, Untested};
+use CheckResult::{Failed, Passed, Untested};
 use masseter_model::geometry::AXES;
 use masseter_recording::Recorded;
 use masseter_runtime::messages::codes::{Cause, ControllerState, DriveState, EventKind, Source};
@@ -8,10 +8,36 @@ use masseter_runtime::messages::{Event, Reading, State};
 use masseter_runtime::named::Declared;
 use masseter_scenario::Scenario;
 
+use crate::check::CheckResult;
 use crate::events::EventRecord;
-use crate::requirements::{RequirementFigures, RequirementResult, Requirements, check_requirements};
+use crate::requirements::{RequirementFigures, Requirements, check_requirements};
+use crate::signals::Timeline;
 
 const MS: u64 = 1_000_000;
+
+/// The requirements of a scenario, and the samples that they judge.
+struct Judge {
+    timeline: Timeline,
+    requirements: Requirements,
+}
+
+impl Judge {
+    fn new(scenario: &Scenario) -> Self {
+        let requirements = Requirements::new(scenario, &Declared::default());
+        Self { timeline: Timeline::default(), requirements }
+    }
+
+    fn take(&mut self, message: &Recorded) {
+        self.timeline.take(message).iter().for_each(|sample| self.requirements.judge_sample(sample));
+    }
+
+    fn finish(mut self) -> Vec<RequirementFigures> {
+        while let Some(sample) = self.timeline.finish() {
+            self.requirements.judge_sample(&sample);
+        }
+        self.requirements.into_figures()
+    }
+}
 
 /// A run: the force of axis l1 at each sample, N, and the controller's state.
 struct Run {
@@ -47,11 +73,11 @@ impl Run {
         let scenario = Scenario::parse("s.toml".as_ref(), &text).unwrap();
         scenario.validate().unwrap();
         check_requirements(&scenario, None).unwrap();
-        let mut requirements = Requirements::new(&scenario, &Declared::default());
+        let mut requirements = Judge::new(&scenario);
         for time_ms in &self.strikes_ms {
             let event = Event::new(Source::Scenario, EventKind::Notice, Cause::FaultInjected);
             let time_ns = (1e9 + time_ms * 1e6) as u64;
-            requirements.event(&EventRecord::from(&Event { time_ns, value: 1.0, ..event }));
+            requirements.timeline.event(&EventRecord::from(&Event { time_ns, value: 1.0, ..event }));
         }
         for (place, (force_n, state)) in self.forces_n.iter().zip(&self.states).enumerate() {
             let (cycle, sampled_ns) = (place as u64 + 1, 1000 * MS + place as u64 * MS);
@@ -77,7 +103,7 @@ impl Run {
 }
 
 /// Result, margin, and the moment of the smallest margin in samples.
-fn found(figures: &RequirementFigures) -> (RequirementResult, Option<f64>, Option<f64>) {
+fn found(figures: &RequirementFigures) -> (CheckResult, Option<f64>, Option<f64>) {
     let rounded = |value: f64| (value * 1e6).round() / 1e6;
     (figures.result, figures.margin.map(rounded), figures.worst_at_s.map(|at_s| rounded(at_s * 1e3)))
 }
@@ -110,8 +136,20 @@ fn bounds_have_the_smallest_margin_and_its_moment() {
 fn bounds_without_a_sample_are_untested_and_missing_samples_are_counted() {
     let gap = Run::of(&[1.0, f64::NAN, 3.0]);
     let figures = gap.judge("signal = 'l1.force'\nmax = '5 N'");
-    assert_eq!(found(&figures).0, Passed);
-    assert_eq!(figures.finding, "3 N in 2 samples, 1 missing");
+    assert_eq!(
+        (figures.result, figures.finding.as_str()),
+        (Untested, "3 N in 2 samples, 1 missing in between")
+    );
+    let failed = gap.judge("signal = 'l1.force'\nmax = '2 N'");
+    assert_eq!(failed.result, Failed);
+    let never = gap.judge("never = 'l1.force > 5 N'");
+    assert_eq!(
+        (never.result, never.finding.as_str()),
+        (Untested, "never in 2 samples, 1 missing in between")
+    );
+    // Before the first value and after the last one, there is none to be missed.
+    let ends = Run::of(&[f64::NAN, 1.0, 3.0, f64::NAN]).judge("signal = 'l1.force'\nmax = '5 N'");
+    assert_eq!((ends.result, ends.finding.as_str()), (Passed, "3 N in 2 samples, 2 missing"));
     let lost = Run::of(&[f64::NAN; 3]).judge("signal = 'l1.force'\nmax = '5 N'");
     assert_eq!(found(&lost), (Untested, None, None), "{lost:?}");
     let never = gap.judge("signal = 'l1.force'\nmax = '5 N'\nduring = 'safe_stop'");
@@ -136,13 +174,15 @@ fn a_window_after_an_occurrence_begins_with_the_next_sample() {
 fn a_response_has_a_latency_and_the_time_left_as_its_margin() {
     let run = Run::of(&[0.0; 12]).struck_at(1.5).stopping_at(6);
     let respond = "when = 'fault.encoder_stuck'\nthen = 'controller.state == safe_stop'";
-    // The fault counts at sample 2, the stop is at sample 6.
+    // The fault is between two samples, the stop is at sample 6.
     for (within, expected) in [
-        ("within = '5 ms'", (Passed, Some(1.0), Some(2.0))),
-        ("within = '4 ms'", (Passed, Some(0.0), Some(2.0))),
-        ("within = '3 ms'", (Failed, Some(-1.0), Some(2.0))),
-        ("within = '5 ms'\nstays_for = '100 ms'", (Passed, Some(1.0), Some(2.0))),
-        ("within = '9 ms'\ndelay = '5 ms'", (Passed, Some(4.0), Some(2.0))),
+        ("within = '5 ms'", (Passed, Some(0.5), Some(1.5))),
+        ("within = '4.5 ms'", (Passed, Some(0.0), Some(1.5))),
+        ("within = '4.499 ms'", (Failed, Some(-0.001), Some(1.5))),
+        ("within = '4 ms'", (Failed, Some(-0.5), Some(1.5))),
+        ("within = '4.5 ms'\nstays_for = '5 ms'", (Passed, Some(0.0), Some(1.5))),
+        ("within = '5 ms'\nstays_for = '100 ms'", (Passed, Some(0.5), Some(1.5))),
+        ("within = '9 ms'\ndelay = '5 ms'", (Passed, Some(3.5), Some(1.5))),
     ] {
         let figures = run.judge(&format!("{respond}\n{within}"));
         assert_eq!(found(&figures), expected, "{within}: {figures:?}");
@@ -257,7 +297,7 @@ fn what_occurs_after_the_last_sample_counts() {
     assert_eq!(run.judge("never = 'fault.encoder_stuck'").result, Failed);
     let respond = "when = 'fault.encoder_stuck'\nthen = 'controller.state == safe_stop'\nwithin = '5 ms'";
     let figures = run.judge(respond);
-    let why = "the run ended before the time after fault.encoder_stuck";
+    let why = "no sample lies within the time after fault.encoder_stuck";
     assert_eq!((figures.result, figures.finding.as_str()), (Untested, why));
 }
 
@@ -361,7 +401,7 @@ fn signals_of_a_controller_are_checked_once_it_has_declared_them() {
     let signal = Signal { name: "grip".into(), unit: "N".into(), about: String::new() };
     let declared = Declared { signals: vec![signal], ..Declared::default() };
     check_requirements(&scenario, Some(&declared)).unwrap();
-    let found = Requirements::new(&scenario, &Declared::default()).finish();
+    let found = Judge::new(&scenario).finish();
     assert_eq!(found[0].result, Untested, "the controller has no such signal");
 }
 
@@ -415,4 +455,32 @@ fn what_has_no_end_has_no_occurrence_of_it() {
     };
     assert!(check("plant_kill").unwrap_err().to_string().contains("'fault.it.ended' is no occurrence"));
     assert_eq!(check("plant_stall"), Ok(()));
+}
+
+#[test]
+fn a_window_that_the_runs_end_cuts_says_what_was_judged_and_a_whole_one_is_untested() {
+    let run = Run::of(&[1.0; 10]).struck_at(5.0).stopping_at(6);
+    for (requirement, part) in [
+        (
+            "signal = 'l1.force'\nmax = '2 N'\nduring = { from_s = 0.002, to_s = 5.0 }",
+            "judged to 0.009 s of 5 s",
+        ),
+        ("never = 'l1.force > 2 N'\nduring = { to_s = 5.0 }", "judged to 0.009 s of 5 s"),
+        (
+            "signal = 'l1.force'\nmax = '2 N'\nduring = { after = 'fault.encoder_stuck', for_s = 0.01 }",
+            "judged for 0.004 s of 0.01 s",
+        ),
+        ("event = 'fault.encoder_stuck'\nat_most = 1\nduring = { to_s = 5.0 }", "judged to 0.009 s of 5 s"),
+        (
+            "when = 'fault.encoder_stuck'\nthen = 'controller.state == safe_stop'\nstays_for = '10 s'",
+            "the run ended after 3 ms of 10000 ms",
+        ),
+    ] {
+        let cut = run.judge(requirement);
+        assert!(cut.result == Passed && cut.finding.ends_with(part), "{cut:?}");
+        let whole = run.judge(&format!("{requirement}\nwhole = true"));
+        assert!(whole.result == Untested && whole.finding.ends_with(part), "{whole:?}");
+    }
+    let within = run.judge("signal = 'l1.force'\nmax = '2 N'\nduring = { to_s = 0.005 }\nwhole = true");
+    assert_eq!((within.result, within.finding.as_str()), (Passed, "1 N in 6 samples"));
 }

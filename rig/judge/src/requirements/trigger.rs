@@ -11,7 +11,7 @@ use masseter_scenario::wording::nearest;
 use masseter_scenario::{During, RequirementConfig, Scenario, TimeWindow};
 
 use super::condition::{Condition, Lookup, Moment, has_comparison, state_of_controller};
-use super::finding::{OfKey, Reason, Refused};
+use super::finding::{Finding, OfKey, Reason, Refused};
 use crate::events::EventRecord;
 
 /// What a requirement waits for.
@@ -200,6 +200,10 @@ pub(super) struct Window {
     /// In words; empty for the whole run.
     pub(super) text: String,
     extent: Extent,
+    /// Whether it must not be cut.
+    is_whole: bool,
+    /// How far the motion came, s, and when the last sample was, ns.
+    reached: (f64, u64),
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -229,7 +233,7 @@ impl Window {
             }
             Some(During::Time(window)) => Self::of_time(window, of).of_key("require.during")?,
         };
-        Ok(Self { text, extent })
+        Ok(Self { text, extent, is_whole: config.whole, reached: (0.0, 0) })
     }
 
     fn of_time(window: &TimeWindow, of: &mut Lookup<'_>) -> Result<(String, Extent), Reason> {
@@ -259,8 +263,30 @@ impl Window {
         Ok((format!(" from {from_s} s{until}"), Extent::Motion { from_s, to_s: end_s }))
     }
 
+    /// The finding with the part of the window that was judged, where the run ended before. `cut` is what it cuts else.
+    pub(super) fn limit(&self, finding: Finding, cut: Option<String>) -> Finding {
+        let (reached_s, last_ns) = self.reached;
+        let part = match self.extent {
+            Extent::Motion { to_s, .. } if to_s.is_finite() && reached_s < to_s => {
+                Some(format!("judged to {reached_s:.3} s of {to_s} s"))
+            }
+            Extent::After { for_ns, until_ns: Some(until_ns), .. }
+                if for_ns < u64::MAX && last_ns < until_ns =>
+            {
+                let [judged_s, whole_s] = [for_ns - (until_ns - last_ns).min(for_ns), for_ns]
+                    .map(|ns| ns as f64 / SECOND_NS as f64);
+                Some(format!("judged for {judged_s:.3} s of {whole_s} s"))
+            }
+            _ => None,
+        };
+        finding.with_cut(part.or(cut), self.is_whole)
+    }
+
     /// Whether the sample belongs to the window. Every sample of the run must be given, in the order of time.
     pub(super) fn contains(&mut self, moment: &Moment<'_>) -> bool {
+        if !moment.is_closing {
+            self.reached = (moment.motion_s.unwrap_or(0.0), moment.time_ns);
+        }
         match &mut self.extent {
             Extent::Always => true,
             Extent::While(condition) => condition.holds(moment.values),

@@ -7,7 +7,7 @@ use masseter_runtime::messages::codes::{ControllerState, DriveRequest, DriveStat
 use masseter_runtime::named::Declared;
 use masseter_scenario::{Scenario, Unit};
 
-use super::signal::{Jaw, JawPoint, NamedSignal, SignalList, desired, estimated, solution};
+use super::signal::{Jaw, JawPoint, NamedSignal, SignalList, estimated};
 use super::timeline::CycleMessages;
 
 /// The signals of a run of this scenario with this jaw, whose controller declares these.
@@ -46,7 +46,7 @@ fn add_jaw(list: &mut SignalList, jaw: Jaw) {
             format!("{name}.error"),
             Unit::MM,
             "Distance of the point from its desired place.",
-            move |of| Some(jaw.distance(point, &jaw.actual(of)?, &desired(of)?)),
+            move |of| Some(jaw.distance(point, &jaw.actual(of)?, &of.desired?)),
         );
     }
     for (at, axis) in ["x", "y", "z"].into_iter().enumerate() {
@@ -54,14 +54,14 @@ fn add_jaw(list: &mut SignalList, jaw: Jaw) {
             format!("incisal.desired.{axis}"),
             Unit::MM,
             format!("Desired place of the incisal point along {axis} of the base."),
-            move |of| Some(jaw.place(JawPoint::Incisal, &desired(of)?)[at]),
+            move |of| Some(jaw.place(JawPoint::Incisal, &of.desired?)[at]),
         );
     }
     list.add(
         "incisal.estimated_error",
         Unit::MM,
         "Distance of the incisal point from its desired place, by forward kinematics.",
-        move |of| Some(jaw.distance(JawPoint::Incisal, &estimated(of)?, &desired(of)?)),
+        move |of| Some(jaw.distance(JawPoint::Incisal, &estimated(of)?, &of.desired?)),
     );
     list.add_from(
         "jaw.opening",
@@ -79,13 +79,13 @@ fn add_jaw(list: &mut SignalList, jaw: Jaw) {
         "platform.error",
         Unit::MM,
         "Distance of the platform's origin from its desired place.",
-        move |of| Some((jaw.actual(of)?.translation.vector - desired(of)?.translation.vector).norm()),
+        move |of| Some((jaw.actual(of)?.translation.vector - of.desired?.translation.vector).norm()),
     );
     list.add(
         "platform.angle_error",
         Unit::DEG,
         "Angle of the platform from its desired orientation.",
-        move |of| Some(jaw.actual(of)?.rotation.angle_to(&desired(of)?.rotation)),
+        move |of| Some(jaw.actual(of)?.rotation.angle_to(&of.desired?.rotation)),
     );
     list.add(
         "bite.force",
@@ -149,20 +149,28 @@ fn add_axes(list: &mut SignalList) {
 
 fn add_controller(list: &mut SignalList) {
     list.add_state("controller.state", "State of the controller.", controller_states, |of| {
-        Some(of.state?.controller_state)
+        of.controller_state
     });
-    list.add("motion.time", Unit::S, "How far the motion has come.", |of| Some(of.state?.motion_time_s));
+    list.add("motion.time", Unit::S, "How far the motion has come, as the controller states it.", |of| {
+        Some(of.state?.motion_time_s)
+    });
+    list.add(
+        "motion.lag",
+        Unit::MS,
+        "By how much the motion is late, since commands or readings were lost.",
+        |of| of.lag_s,
+    );
     list.add("fk.residual", Unit::UM, "Largest difference of a platform side from its length.", |of| {
-        Some(solution(of)?.residual_m)
+        Some(of.solution?.residual_m)
     });
     list.add(
         "fk.condition",
         Unit::ONE,
         "Condition number of the Jacobian, computed every ten cycles and held in between.",
-        |of| Some(solution(of)?.condition),
+        |of| Some(of.solution?.condition),
     );
     list.add("fk.iterations", Unit::ONE, "Iterations of the forward kinematics.", |of| {
-        Some(f64::from(solution(of)?.iterations))
+        Some(f64::from(of.solution?.iterations))
     });
     list.add("master.fault", Unit::ONE, "1 once the master refuses to move anything.", |of| {
         Some(f64::from(of.reading?.master_fault))
@@ -186,10 +194,10 @@ fn add_timing(list: &mut SignalList) {
         of.state.and_then(|state| seconds(state.due_ns, state.woke_ns))
     });
     list.add("controller.work", Unit::US, "Time from the reading to the ready command.", move |of| {
-        solution(of).and_then(|state| seconds(state.received_ns, state.commanded_ns))
+        of.solution.and_then(|state| seconds(state.received_ns, state.commanded_ns))
     });
     list.add("fk.time", Unit::US, "Time that the forward kinematics takes.", move |of| {
-        solution(of).and_then(|state| seconds(state.received_ns, state.solved_ns))
+        of.solution.and_then(|state| seconds(state.received_ns, state.solved_ns))
     });
     list.add("process_data.time", Unit::US, "Time from SYNC to the last process data.", move |of| {
         of.reading.and_then(|reading| seconds(reading.sampled_ns, reading.complete_ns))

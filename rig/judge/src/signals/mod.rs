@@ -17,10 +17,10 @@ use masseter_scenario::wording::nearest;
 
 use self::catalogue::signals;
 use self::signal::Jaw;
-use crate::tracking::is_running;
+use crate::poses::is_running;
 
 pub use signal::NamedSignal;
-pub use timeline::{CycleMessages, Sample, Timeline};
+pub use timeline::{CycleMessages, Pace, Sample, Timeline};
 
 /// There is no signal of that name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -134,7 +134,7 @@ impl Values {
 
     /// The values of the chosen signals in a cycle; NaN where the cycle does not have one.
     pub fn take(&mut self, messages: &CycleMessages, values: &mut Vec<f64>) {
-        if self.start.is_none() && messages.state.as_ref().is_some_and(is_running) {
+        if self.start.is_none() && is_running(messages.controller_state) {
             self.start = self.registry.jaw.actual(messages);
         }
         values.clear();

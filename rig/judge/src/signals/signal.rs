@@ -5,12 +5,11 @@ use std::fmt;
 
 use masseter_model::geometry::{Pose, Vec3};
 use masseter_recording::jaw_points;
-use masseter_runtime::messages::State;
 use masseter_scenario::{JawConfig, Unit};
 use serde::Serialize;
 
 use super::timeline::CycleMessages;
-use crate::tracking::{desired_pose, estimated_pose, true_pose};
+use crate::poses::{estimated_pose, true_pose};
 
 /// How a signal's value follows from a cycle, and from the pose of the jaw in the first cycle of the motion. None if
 /// the cycle lacks it.
@@ -157,15 +156,5 @@ impl Jaw {
 
 /// The pose that forward kinematics found.
 pub(super) fn estimated(messages: &CycleMessages) -> Option<Pose> {
-    estimated_pose(&solution(messages)?)
-}
-
-/// The pose that the jaw should have.
-pub(super) fn desired(messages: &CycleMessages) -> Option<Pose> {
-    desired_pose(&solution(messages)?)
-}
-
-/// The state, where it was computed from the cycle's sample: only then are its poses those of the sample.
-pub(super) fn solution(messages: &CycleMessages) -> Option<State> {
-    messages.state.filter(|_| messages.has_solution)
+    estimated_pose(messages.solution.as_ref()?)
 }

@@ -4,10 +4,14 @@
 
 use std::collections::VecDeque;
 
+use masseter_model::geometry::Pose;
 use masseter_recording::Recorded;
 use masseter_runtime::messages::{Command, Contact, Parameters, Reading, Signals, State, Truth};
+use masseter_runtime::named::Declared;
+use masseter_scenario::Scenario;
 
 use crate::events::EventRecord;
+use crate::reference::{Progress, Reference};
 
 /// The messages of a cycle; none where a message is missing.
 #[derive(Debug, Clone, Copy, Default)]
@@ -22,10 +26,16 @@ pub struct CycleMessages {
     pub truth: Option<Truth>,
     /// The forces between the jaws in the cycle before.
     pub contact: Option<Contact>,
-    /// What the controller made of the sample; without a new sample, its state alone.
+    /// The controller's state in its cycle of this number.
     pub state: Option<State>,
-    /// Whether the state was computed from this sample.
-    pub has_solution: bool,
+    /// What the controller made of this sample, which may have come late.
+    pub solution: Option<State>,
+    /// The controller's last state, as a code.
+    pub controller_state: Option<u32>,
+    /// The pose that the jaw should have.
+    pub desired: Option<Pose>,
+    /// By how much the motion is late, s; none but while the scenario's motion plays.
+    pub lag_s: Option<f64>,
     /// The controller's command.
     pub command: Option<Command>,
     /// The signals that the controller declares.
@@ -46,9 +56,11 @@ impl CycleMessages {
 }
 
 /// Cycles kept; more than a subscriber's queue holds of any topic.
-const KEPT: usize = 1 << 13;
+const KEPT: usize = (1 << 13) - 1;
 /// Cycles kept while the run goes on: more than come between two looks of the recorder.
-const KEPT_WHILE_RUNNING: usize = 1 << 8;
+const KEPT_WHILE_RUNNING: usize = (1 << 8) - 1;
+/// Cycles kept of messages that come in the order of time: more than a motion can wait.
+const KEPT_IN_ORDER: usize = (1 << 5) - 1;
 
 /// A cycle whose messages are complete.
 #[derive(Debug, Clone)]
@@ -71,6 +83,9 @@ pub struct Timeline {
     /// Events that were not handed out yet.
     events: Vec<EventRecord>,
     parameters: Option<Parameters>,
+    controller_state: Option<u32>,
+    /// None where nobody asks for the desired pose.
+    reference: Option<Reference>,
     controller_cpu: CpuShare,
     plant_cpu: CpuShare,
     /// The newest cycle whose sample a state was computed from.
@@ -81,17 +96,25 @@ pub struct Timeline {
 
 /// How far apart messages of one cycle come.
 #[derive(Debug, Clone, Copy, Default)]
-enum Pace {
+pub enum Pace {
+    /// As far as the recorder's queues reach.
     #[default]
     Recorded,
+    /// Soon after their cycle: a message that comes 255 cycles late is left out.
     Live,
+    /// In the order of time.
+    InOrder,
 }
 
 impl Timeline {
-    /// For messages that come soon after their cycle: a message that comes 256
-    /// cycles late is left out.
-    pub fn while_running() -> Self {
-        Self { pace: Pace::Live, ..Self::default() }
+    /// Of a run of this scenario whose controller declares these.
+    pub fn new(scenario: &Scenario, declared: &Declared, pace: Pace) -> Self {
+        Self { pace, reference: Some(Reference::new(scenario, declared)), ..Self::default() }
+    }
+
+    /// The motion beside which the run was played.
+    pub(crate) fn reference(&self) -> Option<&Reference> {
+        self.reference.as_ref()
     }
 
     /// Takes a message of a cycle; hands out a cycle that is complete now.
@@ -109,19 +132,21 @@ impl Timeline {
         let kept = match self.pace {
             Pace::Recorded => KEPT,
             Pace::Live => KEPT_WHILE_RUNNING,
+            Pace::InOrder => KEPT_IN_ORDER,
         };
         if self.cycles.len() > kept { self.hand_out() } else { None }
     }
 
-    /// A state belongs to the sample that it was computed from, which may be late. Without a new sample it belongs to its own
-    /// cycle, unless a state comes that was computed from that cycle's sample.
+    /// A state is the solution of the sample that it was computed from first.
     fn state(&mut self, state: &State) {
-        let is_fresh = state.reading_cycle > self.newest_reading;
-        self.newest_reading = self.newest_reading.max(state.reading_cycle);
-        let cycle = if is_fresh { state.reading_cycle } else { state.cycle };
-        let Some(messages) = self.at(cycle) else { return };
-        if is_fresh || messages.state.is_none() {
-            (messages.state, messages.has_solution) = (Some(*state), is_fresh);
+        if let Some(messages) = self.at(state.cycle) {
+            messages.state = Some(*state);
+        }
+        if state.reading_cycle > self.newest_reading {
+            self.newest_reading = state.reading_cycle;
+            if let Some(messages) = self.at(state.reading_cycle) {
+                messages.solution = Some(*state);
+            }
         }
     }
 
@@ -134,6 +159,7 @@ impl Timeline {
 
     /// Takes an event, which belongs to the first sample at or after its time.
     pub fn event(&mut self, event: &EventRecord) {
+        self.reference.iter_mut().for_each(|reference| reference.apply_event(event));
         self.events.push(event.clone());
     }
 
@@ -176,6 +202,9 @@ impl Timeline {
         let mut messages = self.cycles.pop_front()?;
         self.parameters = messages.parameters.or(self.parameters);
         messages.parameters = self.parameters;
+        self.controller_state = messages.state.map(|state| state.controller_state).or(self.controller_state);
+        messages.controller_state = self.controller_state;
+        self.compare_with_motion(&mut messages);
         let controller = messages.state.map(|state| [state.woke_ns, state.worked_ns + state.spun_ns]);
         let plant = messages.reading.map(|reading| [reading.woke_ns, reading.worked_ns + reading.spun_ns]);
         messages.cpu = [self.controller_cpu.of_next(controller), self.plant_cpu.of_next(plant)];
@@ -188,6 +217,30 @@ impl Timeline {
             events.sort_by_key(|event| event.time_ns);
         }
         Some(Sample { time_ns, messages, events, is_closing: false })
+    }
+}
+
+impl Timeline {
+    /// Of a sample that the controller did not use, the next one that it used tells how far the motion came, or else its next state.
+    fn compare_with_motion(&mut self, messages: &mut CycleMessages) {
+        let Some(reference) = &mut self.reference else { return };
+        let soon = || self.cycles.iter().take(KEPT_IN_ORDER);
+        let used = [&*messages].into_iter().chain(soon()).find(|cycle| cycle.solution.is_some());
+        let desired = reference.advance(&Progress {
+            cycle: messages.cycle,
+            has_sync: messages.reading.is_some() || messages.truth.is_some(),
+            state: messages.controller_state,
+            has_run: messages.state.is_some(),
+            // Simulated time has no account of the loops, and no lost cycles.
+            is_disturbed: messages.is_disturbed && messages.state.is_some_and(|state| state.worked_ns > 0),
+            next_use: used.map_or_else(|| soon().next()?.state.as_ref(), |cycle| cycle.solution.as_ref()),
+            is_used: messages.solution.is_some(),
+            parameters: messages.parameters.as_ref(),
+        });
+        // What disturbed the next cycle that the controller ran acts on those that it lost.
+        let next_run = soon().find(|cycle| cycle.state.is_some());
+        messages.is_disturbed |= messages.state.is_none() && next_run.is_some_and(|cycle| cycle.is_disturbed);
+        (messages.desired, messages.lag_s) = (desired.pose, desired.lag_s);
     }
 }
 

@@ -1,6 +1,10 @@
 //! States and truths made by hand.
 
+use masseter_runtime::messages::{State, Truth};
+
 use super::*;
+use crate::poses::desired_pose;
+use crate::signals::CycleMessages;
 
 const PERIOD_NS: u64 = 1_000_000;
 
@@ -20,10 +24,25 @@ fn truth(cycle: u64, x: f64) -> Truth {
     Truth { cycle, position_m: [x, 0.0, 0.0], quaternion_wxyz: [1.0, 0.0, 0.0, 0.0], ..Default::default() }
 }
 
+/// A cycle whose desired pose is the state's.
+#[expect(clippy::large_types_passed_by_value, reason = "a sample holds its truth")]
+fn sample(state: &State, truth: Option<Truth>) -> Sample {
+    let messages = CycleMessages {
+        cycle: state.cycle,
+        truth,
+        solution: Some(*state),
+        controller_state: Some(state.controller_state),
+        desired: desired_pose(state),
+        ..CycleMessages::default()
+    };
+    let time_ns = truth.map_or(0, |truth| truth.sampled_ns);
+    Sample { time_ns, messages, events: Vec::new(), is_closing: false }
+}
+
 #[test]
 fn without_truth_the_estimate_takes_its_place() {
     let mut tracking = Tracking::new(PoseSource::Estimate, [0.0; 3]);
-    tracking.apply_state(&State { estimated_position_m: [0.001, 0.0, 0.0], ..state(1, 0.003) }, true, false);
+    tracking.add_sample(&sample(&State { estimated_position_m: [0.001, 0.0, 0.0], ..state(1, 0.003) }, None));
     let (figures, track) = tracking.into_figures();
     assert_eq!((figures.samples, figures.estimate_rms_mm), (1, None));
     assert!((figures.actual.rms_mm.unwrap() - 2.0).abs() < 1e-9);
@@ -33,12 +52,8 @@ fn without_truth_the_estimate_takes_its_place() {
 #[test]
 fn a_platform_that_never_ran_has_no_tracking_error() {
     let mut tracking = Tracking::new(PoseSource::Truth, [0.0; 3]);
-    tracking.apply_state(
-        &State { controller_state: ControllerState::Easing.code(), ..state(1, 0.0) },
-        true,
-        false,
-    );
-    tracking.apply_truth(&truth(1, 0.0));
+    let easing = State { controller_state: ControllerState::Easing.code(), ..state(1, 0.0) };
+    tracking.add_sample(&sample(&easing, Some(truth(1, 0.0))));
     let (figures, _) = tracking.into_figures();
     let moved =
         |peak| PoseErrors { max_mm: peak, incisal_max_mm: peak, max_deg: peak, ..PoseErrors::default() };
@@ -53,8 +68,8 @@ fn a_long_run_keeps_samples_from_its_beginning_to_its_end() {
     for cycle in 0..100_000 {
         // To and fro in 0.7 s, as fast as chewing.
         let x = (cycle as f64 / 700.0 * std::f64::consts::TAU).sin();
-        tracking.apply_state(&state(cycle, x), true, false);
-        tracking.apply_truth(&Truth { sampled_ns: cycle * PERIOD_NS, ..truth(cycle, x) });
+        let truth = Truth { sampled_ns: cycle * PERIOD_NS, ..truth(cycle, x) };
+        tracking.add_sample(&sample(&state(cycle, x), Some(truth)));
     }
     let (_, track) = tracking.into_figures();
     let longest_ns = 4 * (SAMPLE_NS + PERIOD_NS);
@@ -64,42 +79,29 @@ fn a_long_run_keeps_samples_from_its_beginning_to_its_end() {
     assert!((MOST_SAMPLES / 2..=MOST_SAMPLES).contains(&track.samples.len()), "{}", track.samples.len());
 }
 
+/// The controller does not use sample 2, and the motion ends with sample 3.
 #[test]
-fn poses_are_compared_by_cycle_in_whatever_order_they_come() {
+#[expect(clippy::large_stack_arrays, reason = "five samples of a test")]
+fn every_cycle_of_the_motion_has_a_deviation_also_one_without_a_reading_and_the_last_one() {
     let mut tracking = Tracking::new(PoseSource::Truth, [0.0; 3]);
-    tracking.apply_state(&state(1, 0.003), true, false);
-    tracking.apply_state(&state(2, 0.000), true, false);
-    tracking.apply_truth(&truth(2, 0.004));
-    tracking.apply_truth(&truth(1, 0.000));
-    tracking.apply_truth(&truth(3, 9.000));
-    let (figures, _) = tracking.into_figures();
-    assert_eq!(figures.samples, 2);
-    assert!((figures.actual.max_mm.unwrap() - 4.0).abs() < 1e-9);
-    assert!((figures.actual.rms_mm.unwrap() - (12.5f64).sqrt()).abs() < 1e-9);
-}
-
-/// Cycle 3 has no reading of sample 2, and the motion ends with cycle 4.
-#[test]
-fn cycles_without_a_reading_and_the_last_one_have_a_deviation_too() {
-    let mut tracking = Tracking::new(PoseSource::Truth, [0.0; 3]);
-    let stale = State { reading_cycle: 1, ..state(3, 0.0) };
     let stopped = |cycle| State { controller_state: ControllerState::SafeStop.code(), ..state(cycle, 0.0) };
-    let mut deviations = Vec::new();
-    let found = [
-        tracking.apply_state(&state(1, 0.0), true, false),
-        tracking.apply_state(&stale, false, false),
-        tracking.apply_state(&stopped(4), true, false),
-        tracking.apply_state(&stopped(5), true, false),
-    ];
-    assert!(found.iter().all(Option::is_none), "{found:?}");
-    for (cycle, x) in [(1, 0.001), (2, 0.003), (4, 0.004), (5, 0.005)] {
-        deviations.extend(tracking.apply_truth(&truth(cycle, x)).into_iter().flatten());
-    }
-    let deviations: Vec<_> = deviations.iter().map(|sample| sample.deviation.origin_m).collect();
+    let mut unused = sample(&state(2, 0.0), Some(truth(2, 0.003)));
+    unused.messages.solution = None;
+    let samples = Vec::from_iter([
+        sample(&state(1, 0.0), Some(truth(1, 0.001))),
+        unused,
+        sample(&stopped(3), Some(truth(3, 0.004))),
+        sample(&stopped(4), Some(truth(4, 0.005))),
+        // No truth: nothing is compared.
+        sample(&stopped(5), None),
+    ]);
+    let found: Vec<_> = samples.iter().filter_map(|sample| tracking.add_sample(sample)).collect();
+    let deviations: Vec<_> = found.iter().map(|sample| sample.deviation.origin_m).collect();
     assert_eq!(deviations, [0.001, 0.003, 0.004]);
     let (figures, _) = tracking.into_figures();
-    assert_eq!((figures.samples, figures.actual.max_mm), (1, Some(4.0)));
-    assert!((figures.actual.rms_mm.unwrap() - 1.0).abs() < 1e-12);
+    assert_eq!((figures.samples, figures.actual.max_mm), (2, Some(4.0)));
+    assert!((figures.actual.rms_mm.unwrap() - 5.0_f64.sqrt()).abs() < 1e-12);
+    assert_eq!(figures.estimated.max_mm, Some(0.0), "of the one sample that was used");
 }
 
 type Numbers = for<'a> fn(&'a mut State, &'a mut Truth) -> &'a mut [f64];
@@ -130,8 +132,7 @@ fn a_pose_that_is_none_is_infinitely_far_from_its_path() {
                     if is_spoiled(cycle) {
                         field(&mut state, &mut truth)[index] = number;
                     }
-                    tracking.apply_state(&state, true, false);
-                    deviations.extend(tracking.apply_truth(&truth).into_iter().flatten());
+                    deviations.extend(tracking.add_sample(&sample(&state, Some(truth))));
                 }
                 let (figures, _) = tracking.into_figures();
                 let TrackingFigures { samples, actual, estimated, estimate_rms_mm, .. } = figures;
@@ -160,8 +161,12 @@ fn after_a_safe_stop_the_track_goes_on_beside_the_last_desired_pose() {
         let x = cycle as f64 * 1e-3;
         let name = if cycle < 20 { ControllerState::Running } else { ControllerState::SafeStop };
         let state = State { controller_state: name.code(), ..state(cycle, x) };
-        tracking.apply_state(&state, true, false);
-        tracking.apply_truth(&Truth { sampled_ns: cycle * SAMPLE_NS, ..truth(cycle, x) });
+        let truth = Truth { sampled_ns: cycle * SAMPLE_NS, ..truth(cycle, x) };
+        // From the stop on, the desired pose stays.
+        let desired = sample(&self::state(cycle, cycle.min(20) as f64 * 1e-3), None).messages.desired;
+        let mut sample = sample(&state, Some(truth));
+        sample.messages.desired = desired;
+        tracking.add_sample(&sample);
     }
     let (figures, track) = tracking.into_figures();
     assert_eq!(figures.samples, 19);
@@ -177,9 +182,9 @@ fn once_the_drives_are_stopped_no_desired_pose_counts_whatever_the_controller_re
         if cycle == 20 {
             tracking.stop(cycle);
         }
-        tracking.apply_state(&state(cycle, cycle as f64 * 1e-3), true, false);
         // The jaw stands from then on.
-        tracking.apply_truth(&truth(cycle, cycle.min(20) as f64 * 1e-3));
+        let truth = truth(cycle, cycle.min(20) as f64 * 1e-3);
+        tracking.add_sample(&sample(&state(cycle, cycle as f64 * 1e-3), Some(truth)));
     }
     let (figures, _) = tracking.into_figures();
     assert_eq!((figures.samples, figures.actual.max_mm), (19, Some(0.0)));

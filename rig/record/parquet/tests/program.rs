@@ -99,6 +99,11 @@ fn a_full_disk_is_an_error_of_that_kind_at_the_end_or_at_once() {
     }
 }
 
+/// A table without columns on its way to the program.
+const NO_COLUMNS: &[u8] = b"rows of masseter, v. 2\x01\0\0\0\0\0\0\0\0";
+/// What ends its rows.
+const END: [u8; 8] = [0; 8];
+
 fn full_disk() -> (ErrorKind, String) {
     (ErrorKind::StorageFull, io::Error::from_raw_os_error(28).to_string())
 }
@@ -125,10 +130,10 @@ fn a_writer_that_is_dropped_leaves_no_valid_file() {
 
 #[test]
 fn a_sender_that_dies_leaves_no_valid_file() {
-    let (code, words, is_whole) = said(b"rows of masseter, v. 1[]\n");
+    let (code, words, is_whole) = said(NO_COLUMNS);
     assert_eq!((code, is_whole), (Some(2), false));
     assert!(words.starts_with("the rows have no end"), "{words}");
-    let (code, words, is_whole) = said(b"rows of masseter, v. 1[]\n\0");
+    let (code, words, is_whole) = said(&[NO_COLUMNS, &END].concat());
     assert_eq!((code, is_whole), (Some(0), true), "{words}");
 }
 
@@ -150,7 +155,7 @@ fn a_limit_on_the_size_of_files_is_a_full_disk() {
     let mut command = Command::new("sh");
     command.args(["-c", "ulimit -f 0 && exec \"$0\" > table.parquet", PROGRAM]).current_dir(folder.path());
     let mut program = command.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    program.stdin.take().unwrap().write_all(b"rows of masseter, v. 1[]\n\0").unwrap();
+    program.stdin.take().unwrap().write_all(&[NO_COLUMNS, &END].concat()).unwrap();
     let output = program.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(6), "{}", String::from_utf8_lossy(&output.stderr));
 }

@@ -7,6 +7,7 @@
 #[cfg(test)]
 mod tests;
 
+use std::mem;
 use std::sync::mpsc::{
     Receiver, RecvTimeoutError, SyncSender, TryRecvError, TrySendError, channel, sync_channel,
 };
@@ -149,37 +150,26 @@ impl Backlog {
 
     /// Passes the pending batch to the disk, if the disk has written the last one. Never waits.
     pub fn hand_over(&mut self) {
-        if self.pending.is_empty() {
-            return;
-        }
-        match self.emptied.try_recv() {
-            Ok(empty) => self.send(empty),
-            Err(TryRecvError::Empty) => {}
-            Err(TryRecvError::Disconnected) => self.give_up(),
+        if !self.pending.is_empty() {
+            self.exchange(self.emptied.try_recv());
         }
     }
 
     /// Passes the pending batch to the disk as soon as the disk has written the last one.
     fn hand_over_waiting(&mut self) {
-        match self.emptied.recv() {
-            Ok(empty) => self.send(empty),
-            Err(_) => self.give_up(),
-        }
+        self.exchange(self.emptied.recv().map_err(TryRecvError::from));
     }
 
-    fn send(&mut self, empty: Batch) {
-        let full = std::mem::replace(&mut self.pending, empty);
-        if let Err(TrySendError::Full(batch) | TrySendError::Disconnected(batch)) =
-            self.to_disk.try_send(full)
-        {
+    /// Sends the pending batch, if there is an empty one in its place; drops it if the disk's thread has ended.
+    fn exchange(&mut self, emptied: Result<Batch, TryRecvError>) {
+        let unsent = match emptied {
+            Ok(empty) => self.to_disk.try_send(mem::replace(&mut self.pending, empty)).err(),
+            Err(TryRecvError::Empty) => None,
+            Err(TryRecvError::Disconnected) => Some(TrySendError::Disconnected(mem::take(&mut self.pending))),
+        };
+        if let Some(TrySendError::Full(batch) | TrySendError::Disconnected(batch)) = unsent {
             self.dropped += batch.len() as u64;
         }
-    }
-
-    /// Drops the pending batch, since the disk's thread has ended.
-    fn give_up(&mut self) {
-        self.dropped += self.pending.len() as u64;
-        self.pending.clear();
     }
 
     /// Messages lost so far for want of room or disk.

@@ -51,10 +51,10 @@ impl Kind {
         let unsigned = u64::from_le_bytes(wide);
         let unused = 64 - 8 * self.size() as u32;
         match self {
-            Self::Unsigned(_) => Number::Unsigned(unsigned),
-            Self::Signed(_) => Number::Signed((unsigned << unused).cast_signed() >> unused),
-            Self::Float(4) => Number::Single(f32::from_bits(unsigned as u32)),
-            Self::Float(_) => Number::Double(f64::from_bits(unsigned)),
+            Self::Unsigned(_) => Number::Whole(unsigned.into()),
+            Self::Signed(_) => Number::Whole(((unsigned << unused).cast_signed() >> unused).into()),
+            Self::Float(4) => Number::Real(f32::from_bits(unsigned as u32).into()),
+            Self::Float(_) => Number::Real(f64::from_bits(unsigned)),
         }
     }
 }
@@ -62,34 +62,26 @@ impl Kind {
 /// A number of a message. As text it has as many digits as give the same number again.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Number {
-    /// Without a sign.
-    Unsigned(u64),
-    /// With a sign.
-    Signed(i64),
-    /// A float of 32 bits.
-    Single(f32),
-    /// A float of 64 bits.
-    Double(f64),
+    /// An integer.
+    Whole(i128),
+    /// A float.
+    Real(f64),
 }
 
 impl Number {
     /// The number as a whole one; a fraction is cut off.
     pub fn to_i64(self) -> i64 {
         match self {
-            Self::Unsigned(value) => value as i64,
-            Self::Signed(value) => value,
-            Self::Single(value) => value as i64,
-            Self::Double(value) => value as i64,
+            Self::Whole(value) => value as i64,
+            Self::Real(value) => value as i64,
         }
     }
 
     /// The number as a float.
     pub fn to_f64(self) -> f64 {
         match self {
-            Self::Unsigned(value) => value as f64,
-            Self::Signed(value) => value as f64,
-            Self::Single(value) => value.into(),
-            Self::Double(value) => value,
+            Self::Whole(value) => value as f64,
+            Self::Real(value) => value,
         }
     }
 }
@@ -97,10 +89,8 @@ impl Number {
 impl fmt::Display for Number {
     fn fmt(&self, text: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Self::Unsigned(value) => value.fmt(text),
-            Self::Signed(value) => value.fmt(text),
-            Self::Single(value) => value.fmt(text),
-            Self::Double(value) => shortest(*value).fmt(text),
+            Self::Whole(value) => value.fmt(text),
+            Self::Real(value) => shortest(*value).fmt(text),
         }
     }
 }
@@ -116,8 +106,8 @@ fn is_byte_sequence(kind: &str) -> bool {
     kind.strip_prefix("uint8[").is_some_and(|bound| bound == "]" || bound.starts_with("<="))
 }
 
-/// A field of numbers: one, or an array of them.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// A field of numbers: one, or an array of them. Fields of one name and place are equal, whatever is said of them.
+#[derive(Debug, Clone)]
 pub struct Field {
     name: String,
     kind: Kind,
@@ -125,6 +115,15 @@ pub struct Field {
     offset: usize,
     /// None for a single number.
     elements: Option<usize>,
+    /// What the definition says of it.
+    pub description: Description,
+}
+
+impl PartialEq for Field {
+    fn eq(&self, other: &Self) -> bool {
+        let place = |field: &Self| (field.kind, field.offset, field.elements);
+        self.name == other.name && place(self) == place(other)
+    }
 }
 
 impl Field {
@@ -162,22 +161,23 @@ impl Field {
 }
 
 /// The table of a message definition.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Columns {
     fields: Vec<Field>,
     /// Bytes of the fields.
     bytes: usize,
-    /// Name of the byte sequence at the end, a column in hexadecimal digits.
-    tail: Option<String>,
+    /// The byte sequence at the end, a column in hexadecimal digits.
+    tail: Option<Field>,
 }
 
 impl Columns {
     /// Parses a definition; none if it does not fit a table.
     pub fn from_definition(definition: &str) -> Option<Self> {
         let mut table = Self { fields: Vec::new(), bytes: 0, tail: None };
-        for line in definition.lines().map(|line| line.split('#').next().unwrap_or_default().trim()) {
-            if !line.is_empty() {
-                table.add_field(line)?;
+        for line in definition.lines() {
+            let (field, comment) = line.split_once('#').unwrap_or((line, ""));
+            if !field.trim().is_empty() {
+                table.add_field(field.trim(), Description::parse(comment.trim()))?;
             }
         }
         Some(table)
@@ -187,7 +187,7 @@ impl Columns {
     pub fn of_topics<'a>(channels: impl Iterator<Item = &'a Channel<'static>>) -> BTreeMap<Topic, Self> {
         let table = |channel: &Channel| {
             if channel.topic == FrameBatch::TOPIC {
-                return Some((Topic::Frame, Self::from_definition(&FrameTap::schema())?));
+                return Some((Topic::Frame, Self::from_definition(&FrameTap::definition())?));
             }
             let definition = str::from_utf8(&channel.schema.as_ref()?.data).ok()?;
             Some((Topic::named(&channel.topic)?, Self::from_definition(definition)?))
@@ -195,15 +195,16 @@ impl Columns {
         channels.filter_map(table).collect()
     }
 
-    fn add_field(&mut self, line: &str) -> Option<()> {
+    fn add_field(&mut self, line: &str, description: Description) -> Option<()> {
         let (kind, name) = line.split_once(char::is_whitespace)?;
-        let name = name.trim();
+        let name = name.trim().to_owned();
         if self.tail.is_some() {
             return None;
         }
         if is_byte_sequence(kind) {
             self.bytes = self.bytes.next_multiple_of(LENGTH.size()) + LENGTH.size();
-            self.tail = Some(name.to_owned());
+            let (kind, offset) = (Kind::Unsigned(1), self.bytes);
+            self.tail = Some(Field { name, kind, offset, elements: None, description });
             return Some(());
         }
         let (kind, elements) = match kind.split_once('[') {
@@ -216,7 +217,7 @@ impl Columns {
         if elements.unwrap_or(1) > MAX_MESSAGE_BYTES.saturating_sub(self.bytes) / kind.size() {
             return None;
         }
-        self.fields.push(Field { name: name.to_owned(), kind, offset: self.bytes, elements });
+        self.fields.push(Field { name, kind, offset: self.bytes, elements, description });
         self.bytes += kind.size() * elements.unwrap_or(1);
         Some(())
     }
@@ -226,9 +227,9 @@ impl Columns {
         &self.fields
     }
 
-    /// The name of the byte sequence at the end, if there is one.
-    pub fn tail(&self) -> Option<&str> {
-        self.tail.as_deref()
+    /// The byte sequence at the end, if there is one.
+    pub fn tail(&self) -> Option<&Field> {
+        self.tail.as_ref()
     }
 
     /// The fields and the byte sequence of a message; none if its length differs from the definition's.
@@ -254,15 +255,6 @@ pub struct Description {
 }
 
 impl Description {
-    /// The descriptions of a definition's fields by their names; empty where there is no comment.
-    pub fn of_fields(definition: &str) -> BTreeMap<String, Self> {
-        let of_line = |line: &str| {
-            let (field, comment) = line.split_once('#').unwrap_or((line, ""));
-            Some((field.split_whitespace().nth(1)?.to_owned(), Self::parse(comment.trim())))
-        };
-        definition.lines().filter_map(of_line).collect()
-    }
-
     fn parse(comment: &str) -> Self {
         let unit = comment.strip_prefix('[').and_then(|rest| rest.split_once("] "));
         let (unit, text) = unit.unwrap_or(("", comment));
@@ -299,7 +291,12 @@ mod tests {
     }
 
     fn names(columns: &Columns) -> Vec<String> {
-        columns.fields().iter().flat_map(Field::columns).chain(columns.tail().map(str::to_owned)).collect()
+        columns
+            .fields()
+            .iter()
+            .flat_map(Field::columns)
+            .chain(columns.tail().map(|tail| tail.name.clone()))
+            .collect()
     }
 
     #[test]
@@ -350,20 +347,25 @@ mod tests {
         assert_eq!(line(&Columns::from_definition("uint64 a").unwrap(), &[0; 7]), None);
     }
 
+    fn descriptions(definition: &str) -> BTreeMap<String, Description> {
+        let Columns { fields, tail, .. } = Columns::from_definition(definition).unwrap();
+        fields.into_iter().chain(tail).map(|field| (field.name, field.description)).collect()
+    }
+
     #[test]
     fn the_table_of_messages_is_found_again_in_its_comments() {
-        let reading = Description::of_fields(&Reading::definition());
+        let reading = descriptions(&Reading::definition());
         assert_eq!(reading.len(), Reading::fields().len());
         assert_eq!(reading["position_m"].unit, "m");
         assert_eq!(reading["position_m"].meaning, "Encoder positions d₁ d₂ d₃ l₁ l₂ l₃, m.");
         assert_eq!(reading["drive_state"].codes[&u64::from(DriveState::Fault.code())], "fault");
         assert!(reading["cycle"].codes.is_empty() && reading["cycle"].unit.is_empty());
-        assert_eq!(Description::of_fields(&Event::definition())["cause"].codes.len(), Cause::ALL.len());
+        assert_eq!(descriptions(&Event::definition())["cause"].codes.len(), Cause::ALL.len());
     }
 
     #[test]
     fn parts_of_a_comment_may_be_missing() {
-        let found = Description::of_fields("# Any message.\nfloat64 gain  # [1/s] Gain\nuint8 bare\n");
+        let found = descriptions("# Any message.\nfloat64 gain  # [1/s] Gain\nuint8 bare\n");
         let gain = Description { unit: "1/s".into(), meaning: "Gain".into(), codes: BTreeMap::new() };
         assert_eq!((&found["gain"], &found["bare"]), (&gain, &Description::default()));
     }

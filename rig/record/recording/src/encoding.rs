@@ -74,22 +74,14 @@ impl Channel {
 }
 
 /// The definitions of the channels for live viewers, of a run whose controller declares these signals and parameters, numbered
-/// by their places from 1.
+/// by their places from 1. Recordings have [`Channel::Frames`] in place of single frames.
 pub fn definitions(declared: &Declared) -> Vec<(Channel, mcap::Channel<'static>)> {
-    defined(declared, |channel| channel != Channel::Frames)
+    let live = Channel::all().filter(|channel| *channel != Channel::Frames);
+    live.filter_map(|channel| Some((channel, definition(channel, declared)?))).collect()
 }
 
-/// The same for recordings.
-pub(super) fn recorded_definitions(declared: &Declared) -> Vec<(Channel, mcap::Channel<'static>)> {
-    defined(declared, |channel| channel != Channel::Topic(Topic::Frame))
-}
-
-fn defined(declared: &Declared, is_needed: fn(Channel) -> bool) -> Vec<(Channel, mcap::Channel<'static>)> {
-    let needed = Channel::all().filter(|channel| is_needed(*channel));
-    needed.filter_map(|channel| Some((channel, definition(channel, declared)?))).collect()
-}
-
-fn definition(channel: Channel, declared: &Declared) -> Option<mcap::Channel<'static>> {
+/// The definition of one channel; none for signals or parameters that nobody declares.
+pub(super) fn definition(channel: Channel, declared: &Declared) -> Option<mcap::Channel<'static>> {
     let (topic, name, definition) = match channel {
         Channel::Topic(topic) => {
             let (name, definition) = topic.definition();

@@ -9,6 +9,9 @@ use std::time::UNIX_EPOCH;
 
 use masseter_runtime::clock;
 
+const MANIFEST: &str = "manifest.json";
+const RECORDING: &str = "recording.mcap";
+
 /// The folder of a run.
 ///
 /// ```
@@ -23,18 +26,35 @@ use masseter_runtime::clock;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunFolder(PathBuf);
 
-/// Why a run folder could not be made or opened.
+/// Why a run folder could not be made, or a past run is not found.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
-    /// It is no run folder.
-    #[error("{} is no folder with a recording.mcap; name the folder of a run", .0.display())]
+    /// Nothing has the name.
+    #[error("{} does not exist: name the folder of a run, or its {RECORDING}", .0.display())]
+    Missing(PathBuf),
+    /// A link leads nowhere.
+    #[error("{} is a link to {}, which does not exist any more: name another run", path.display(), target.display())]
+    LostTarget {
+        /// The link.
+        path: PathBuf,
+        /// What it names.
+        target: PathBuf,
+    },
+    /// It is something else.
+    #[error("{} is no run: it has neither a {RECORDING} nor a {MANIFEST}; name the folder of a run", .0.display())]
     NoRun(PathBuf),
+    /// The recorder has written nothing, as when it or the run ended early.
+    #[error("{} does not exist: the run ended before its recorder wrote; {MANIFEST} says how it ended", .0.display())]
+    Unwritten(PathBuf),
+    /// A recording alone is no run.
+    #[error("{} is no {RECORDING} with a {MANIFEST} beside it, so no whole run: name the folder of a run", .0.display())]
+    NoFolder(PathBuf),
     /// The user may not look into it.
     #[error(
         "{} cannot be read: {error}; its owner can make it readable: chmod -R a+rX, or masseter run --readable-by", path.display()
     )]
     Unreadable {
-        /// The folder.
+        /// The folder or file.
         path: PathBuf,
         /// The system's reason.
         error: io::Error,
@@ -48,6 +68,35 @@ pub enum FolderError {
 pub fn time_in_names() -> String {
     let time = humantime::format_rfc3339_millis(UNIX_EPOCH + clock::wall_time()).to_string();
     time.replace([':', '-'], "")
+}
+
+/// The recording that a path names: the file itself or that in a run's folder, also through a link.
+///
+/// # Errors
+/// [`FolderError`] says what is missing.
+pub fn recording_at(path: &Path) -> Result<PathBuf, FolderError> {
+    let refused = |error: io::Error| match (error.kind(), fs::read_link(path)) {
+        (ErrorKind::NotFound, Err(_))
+            if path.ends_with(RECORDING) && path.with_file_name(MANIFEST).exists() =>
+        {
+            FolderError::Unwritten(path.to_owned())
+        }
+        (ErrorKind::NotFound, Ok(target)) => FolderError::LostTarget { path: path.to_owned(), target },
+        (ErrorKind::NotFound, Err(_)) => FolderError::Missing(path.to_owned()),
+        _ => FolderError::Unreadable { path: path.to_owned(), error },
+    };
+    if !fs::metadata(path).map_err(refused)?.is_dir() {
+        return Ok(path.to_owned());
+    }
+    let recording = path.join(RECORDING);
+    match fs::metadata(&recording) {
+        Ok(file) if file.is_file() => Ok(recording),
+        Err(error) if error.kind() == ErrorKind::PermissionDenied => {
+            Err(FolderError::Unreadable { path: path.to_owned(), error })
+        }
+        _ if path.join(MANIFEST).exists() => Err(FolderError::Unwritten(recording)),
+        _ => Err(FolderError::NoRun(path.to_owned())),
+    }
 }
 
 impl RunFolder {
@@ -74,19 +123,23 @@ impl RunFolder {
 
     /// The folder of a run that is to be recorded in this file.
     pub fn of_recording(recording: &Path) -> Self {
-        Self(recording.parent().map_or_else(PathBuf::new, Path::to_owned))
+        let folder = recording.parent().filter(|folder| !folder.as_os_str().is_empty());
+        Self(folder.unwrap_or(Path::new(".")).to_owned())
     }
 
-    /// Opens the folder of a past run.
+    /// Opens a past run by its folder, by the recording in it, or by a link to either.
+    ///
+    /// # Errors
+    /// [`FolderError`] says what is missing.
     pub fn open(path: &Path) -> Result<Self, FolderError> {
-        let folder = Self(path.to_owned());
-        match fs::metadata(folder.recording()) {
-            Ok(file) if file.is_file() => Ok(folder),
-            Err(error) if error.kind() == ErrorKind::PermissionDenied => {
-                Err(FolderError::Unreadable { path: path.to_owned(), error })
-            }
-            _ => Err(FolderError::NoRun(path.to_owned())),
+        let recording = recording_at(path)?;
+        if recording != path {
+            return Ok(Self(path.to_owned()));
         }
+        // A link may lie elsewhere.
+        let is_of_run = |file: &PathBuf| file.ends_with(RECORDING) && file.with_file_name(MANIFEST).exists();
+        let found = [Some(path.to_owned()), path.canonicalize().ok()].into_iter().flatten().find(is_of_run);
+        found.map(|file| Self::of_recording(&file)).ok_or(FolderError::NoFolder(recording))
     }
 
     /// Writes one of its files completely or not at all, so that a power cut leaves the scenario and the manifest of a
@@ -118,12 +171,12 @@ impl RunFolder {
 
     /// Scenario, machine, scheduling and end of the run.
     pub fn manifest(&self) -> PathBuf {
-        self.0.join("manifest.json")
+        self.0.join(MANIFEST)
     }
 
     /// Every message of the run.
     pub fn recording(&self) -> PathBuf {
-        self.0.join("recording.mcap")
+        self.0.join(RECORDING)
     }
 
     /// Verdict and figures.
@@ -186,4 +239,65 @@ pub fn new_folder(path: &Path) -> Result<(), OutputError> {
         fs::create_dir_all(parent).map_err(|error| OutputError::Create { path: path.to_owned(), error })?;
     }
     fs::create_dir(path).map_err(OutputError::creating(path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(path: &Path) -> String {
+        RunFolder::open(path).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_run_has_many_names_and_one_folder() {
+        let parent = tempfile::tempdir().unwrap();
+        let [run, to_run, to_file] = ["run", "latest", "link.mcap"].map(|name| parent.path().join(name));
+        let folder = RunFolder::create(&run).unwrap();
+        fs::write(folder.manifest(), "{}").unwrap();
+        fs::write(folder.recording(), "").unwrap();
+        symlink("run", &to_run).unwrap();
+        symlink("run/recording.mcap", &to_file).unwrap();
+        let same = fs::canonicalize(&run).unwrap();
+        for name in [&run, &to_run, &to_file, &run.join(RECORDING), &to_run.join(RECORDING)] {
+            let opened = RunFolder::open(name).unwrap();
+            assert_eq!(fs::canonicalize(opened.path()).unwrap(), same, "{}", name.display());
+            assert_eq!(fs::canonicalize(recording_at(name).unwrap()).unwrap(), same.join(RECORDING));
+        }
+        assert_eq!(
+            RunFolder::open(&to_run).unwrap().path(),
+            to_run,
+            "files are shown under the name that was given"
+        );
+    }
+
+    #[test]
+    fn a_recording_alone_can_be_read_but_is_no_run() {
+        let parent = tempfile::tempdir().unwrap();
+        let golden = parent.path().join("golden.mcap");
+        fs::write(&golden, "").unwrap();
+        assert_eq!(recording_at(&golden).unwrap(), golden);
+        let said = refusal(&golden);
+        assert!(said.contains("golden.mcap is no recording.mcap with a manifest.json beside it"), "{said}");
+        fs::write(parent.path().join(MANIFEST), "{}").unwrap();
+        assert_eq!(refusal(&golden), said, "a report of it would be one of another recording");
+    }
+
+    #[test]
+    fn what_is_missing_is_said() {
+        let parent = tempfile::tempdir().unwrap();
+        let path = |name: &str| parent.path().join(name);
+        assert!(refusal(&path("none")).contains("none does not exist: name the folder of a run"));
+        symlink("gone", path("latest")).unwrap();
+        assert!(refusal(&path("latest")).contains("latest is a link to gone, which does not exist any more"));
+        let run = RunFolder::create(&path("run")).unwrap();
+        assert!(refusal(run.path()).contains("run is no run: it has neither"), "{}", refusal(run.path()));
+        fs::write(run.manifest(), "{}").unwrap();
+        let said = refusal(run.path());
+        assert!(
+            said.contains("run/recording.mcap does not exist: the run ended before its recorder wrote"),
+            "{said}"
+        );
+        assert_eq!(refusal(&run.recording()), said);
+    }
 }

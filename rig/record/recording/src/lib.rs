@@ -26,7 +26,7 @@ mod writer;
 pub use backlog::{Backlog, Pace, WriteOutcome};
 pub use columns::{Columns, Description, Field, Number};
 pub use encoding::{Channel, Encoded, Encoder, SCHEMA_ENCODING, definitions};
-pub use folder::{FolderError, RunFolder, time_in_names};
+pub use folder::{FolderError, OutputError, RunFolder, new_file, new_folder, recording_at, time_in_names};
 pub use manifest::{
     DmaLatency, Ending, FullSpeed, Machine as MachineInfo, Manifest, ProcessFault, RunUsage, Usage,
 };
@@ -36,8 +36,3 @@ pub use scene::{Scene, jaw_points};
 pub use topic::{CDR_LITTLE_ENDIAN, Recorded, Topic};
 pub use walk::Damage;
 pub use writer::{DurableFile, Medium, Recorder, WriteError};
-
-/// New files and folders for the output of a command.
-pub mod output {
-    pub use crate::folder::{OutputError, new_file, new_folder};
-}

@@ -1,5 +1,5 @@
 //! `manifest.json`: scenario, machine, scheduling and end of a run; the processes' use of the machine and the setting for
-//! wake-ups. The verdict on the run is the report's.
+//! wake-ups. The verdict on the run is the judge's.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -64,9 +64,6 @@ pub struct Manifest {
     pub scenario: Scenario,
     /// Duration of the motion, s.
     pub motion_s: f64,
-    /// The motion time at its end (`state.motion_time_s`), s; none where it was not known.
-    #[serde(default)]
-    pub motion_end_s: Option<f64>,
     /// What the plan demands of the axes at full speed; none but in a dry run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub full_speed: Option<FullSpeed>,
@@ -111,7 +108,6 @@ impl Manifest {
             declared: Declared::default(),
             scenario,
             motion_s,
-            motion_end_s: None,
             full_speed: None,
             machine,
             scheduling: BTreeMap::new(),

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::vec;
 
-use masseter_runtime::messages::{FrameTap, LAYOUT_VERSION};
+use masseter_runtime::messages::LAYOUT_VERSION;
 use masseter_scenario::input::open_regular;
 use mcap::records::{AttachmentHeader, MessageHeader, Record, SchemaHeader, op};
 use mcap::{Attachment, Channel, Schema};
@@ -94,8 +94,8 @@ pub struct Reader<R = BufReader<File>> {
     walk: Walk<R>,
     /// The rest of the current chunk.
     unpacked: vec::IntoIter<Record<'static>>,
-    /// The rest of the frames of the current message.
-    frames: vec::IntoIter<FrameTap>,
+    /// The rest of the current entry.
+    messages: vec::IntoIter<Recorded>,
     definitions: Definitions,
     attachments: Vec<Attachment<'static>>,
     chunks: Chunks,
@@ -118,7 +118,7 @@ impl<R: Read + Seek> Reader<R> {
         Ok(Self {
             walk: Walk::new(source)?,
             unpacked: Vec::new().into_iter(),
-            frames: Vec::new().into_iter(),
+            messages: Vec::new().into_iter(),
             definitions: Definitions::default(),
             attachments: Vec::new(),
             chunks: Chunks::default(),
@@ -173,16 +173,11 @@ impl<R: Read + Seek> Reader<R> {
     /// The next message of the rig's topics, or none at the end. Other topics are skipped.
     pub fn next_message(&mut self) -> Result<Option<Recorded>, ReadError> {
         loop {
-            if let Some(frame) = self.frames.next() {
-                return Ok(Some(Recorded::Frame(frame)));
+            if let Some(message) = self.messages.next() {
+                return Ok(Some(message));
             }
             let Some(entry) = self.next_entry()? else { return Ok(None) };
-            if let Some(message) = entry.recorded() {
-                return message.map(Some);
-            }
-            if let Some(frames) = entry.frames() {
-                self.frames = frames?.into_iter();
-            }
+            self.messages = entry.messages()?.into_iter();
         }
     }
 
@@ -339,16 +334,18 @@ impl Definitions {
 }
 
 impl Entry {
-    /// The message, or why this program cannot read it; none on topics that are not the rig's, and for [frames](Self::frames).
-    pub fn recorded(&self) -> Option<Result<Recorded, ReadError>> {
-        let topic = Topic::named(&self.channel.as_ref()?.topic)?;
-        Some(decoded(topic.name(), &self.data, |body| Recorded::read(topic, body)))
-    }
-
-    /// The CAN frames, or why this program cannot read them; none where it holds something else.
-    pub fn frames(&self) -> Option<Result<Vec<FrameTap>, ReadError>> {
-        let has_frames = self.channel.as_ref()?.topic == FrameBatch::TOPIC;
-        has_frames.then(|| decoded(FrameBatch::TOPIC, &self.data, frames_of))
+    /// The messages of the rig in it: one, several CAN frames, or none on topics that are not the rig's.
+    ///
+    /// # Errors
+    /// [`ReadError::Foreign`] for another layout.
+    pub fn messages(&self) -> Result<Vec<Recorded>, ReadError> {
+        let topic = self.channel.as_ref().map_or("", |channel| &channel.topic);
+        if topic == FrameBatch::TOPIC {
+            let frames = decoded(FrameBatch::TOPIC, &self.data, frames_of)?;
+            return Ok(frames.into_iter().map(Recorded::Frame).collect());
+        }
+        let message = |topic: Topic| decoded(topic.name(), &self.data, |body| Recorded::read(topic, body));
+        Topic::named(topic).map(message).into_iter().collect()
     }
 }
 

@@ -155,13 +155,12 @@ pub fn is_kept(message: &Recorded) -> bool {
 pub fn thin<R: Read + Seek, W: Write + Seek>(reader: &mut Reader<R>, medium: W) -> Result<u64, ThinError> {
     let (mut digester, mut kept) = (Digester::default(), Vec::new());
     while let Some(entry) = reader.next_entry()? {
-        // Of frames only the digest is kept.
-        for frame in entry.frames().transpose()?.into_iter().flatten() {
-            digester.take(&Recorded::Frame(frame));
+        let messages = entry.messages()?;
+        for message in &messages {
+            digester.take(message);
         }
-        let Some(message) = entry.recorded().transpose()? else { continue };
-        digester.take(&message);
-        kept.extend(is_kept(&message).then_some(entry));
+        // Of frames, which share an entry, only the digest is kept.
+        kept.extend(messages.first().is_some_and(is_kept).then_some(entry));
     }
     if reader.was_cut_short() || !reader.damage().is_empty() {
         return Err(ThinError::Incomplete);
@@ -250,11 +249,8 @@ impl Digests {
         let first = |topic: &Topic| {
             let [a, b] = [self, other].map(|digests| digests.0.get(topic).unwrap_or(&none));
             let same = a.after_cycles.iter().zip(&b.after_cycles).take_while(|(a, b)| a == b).count();
-            let cycle = if a.after_cycles.len() == b.after_cycles.len() && same == a.after_cycles.len() {
-                same
-            } else {
-                same + 1
-            };
+            // Behind the last cycle only the whole digest may differ.
+            let cycle = (same + 1).min(a.after_cycles.len().max(b.after_cycles.len()));
             (a != b).then_some((*topic, cycle as u64))
         };
         topics.into_iter().filter_map(first).collect()

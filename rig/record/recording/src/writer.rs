@@ -7,7 +7,7 @@
 use std::borrow::Cow;
 use std::error::Error;
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Cursor, Seek, SeekFrom, Write};
+use std::io::{self, BufWriter, Cursor, Seek, Write};
 use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread;
@@ -16,13 +16,14 @@ use masseter_runtime::messages::FrameTap;
 use masseter_runtime::named::Declared;
 use masseter_scenario::input::read_bytes;
 use mcap::records::MessageHeader;
+use mcap::write::NoSeek;
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 
-use crate::encoding::{Channel, Encoded, Encoder, FrameBatch, recorded_definitions};
+use crate::encoding::{Channel, Encoded, Encoder, FrameBatch, definition};
 use crate::folder::RunFolder;
 use crate::manifest::{AT_START, Manifest};
 use crate::scene::Scene;
-use crate::topic::Recorded;
+use crate::topic::{Recorded, Topic};
 
 /// Bytes of messages in a chunk: what is compressed together, and read together by a tool that seeks. Twice as many save 0.4 %.
 const CHUNK_BYTES: u64 = 1 << 20;
@@ -54,7 +55,7 @@ fn root_of(error: &dyn Error) -> &dyn Error {
 }
 
 /// The medium of a recording: a file, or memory.
-pub trait Medium: Write + Seek {
+pub trait Medium: Write {
     /// Waits until everything written is safe.
     fn close(self) -> io::Result<()>;
 }
@@ -129,28 +130,24 @@ fn add_schema<W: Write + Seek>(writer: &mut Writer<W>, channel: &mcap::Channel) 
 /// ```
 #[doc(alias("logger", "data logger"))]
 pub struct Recorder<W: Medium = DurableFile> {
-    channels: Channels<W>,
+    file: RecordingFile<W>,
     encoder: Encoder,
     /// None where the frames are left out.
     frames: Option<FrameBatch>,
 }
 
 /// The file with the numbers of its channels, by their places.
-struct Channels<W: Medium> {
-    writer: Writer<W>,
+struct RecordingFile<W: Medium> {
+    writer: Writer<NoSeek<W>>,
     ids: [Option<u16>; Channel::COUNT],
 }
 
-impl<W: Medium> Channels<W> {
+impl<W: Medium> RecordingFile<W> {
     fn write_message(&mut self, message: &Encoded, log_time_ns: u64) -> Result<(), WriteError> {
         // Nobody declared what it holds.
         let Some(channel_id) = self.ids[message.channel.place()] else { return Ok(()) };
-        let header = MessageHeader {
-            channel_id,
-            sequence: message.sequence,
-            log_time: log_time_ns,
-            publish_time: message.publish_time_ns,
-        };
+        let &Encoded { sequence, publish_time_ns: publish_time, .. } = message;
+        let header = MessageHeader { channel_id, sequence, log_time: log_time_ns, publish_time };
         Ok(self.writer.write_to_known_channel(&header, message.bytes)?)
     }
 }
@@ -189,22 +186,25 @@ impl<W: Medium> Recorder<W> {
     }
 
     fn with_frames(medium: W, scene: Scene, frames: Option<FrameBatch>) -> Result<Self, WriteError> {
-        let channels = Channels { writer: options().create(medium)?, ids: [None; Channel::COUNT] };
-        let mut recorder = Self { channels, encoder: Encoder::new(scene), frames };
+        let writer = options().create(NoSeek::new(medium))?;
+        let file = RecordingFile { writer, ids: [None; Channel::COUNT] };
+        let mut recorder = Self { file, encoder: Encoder::new(scene), frames };
         recorder.declare(&Declared::default())?;
         Ok(recorder)
     }
 
     /// Adds the channels of the signals and parameters that a controller declares; before, their messages are left out.
     pub fn declare(&mut self, declared: &Declared) -> Result<(), WriteError> {
-        let Channels { writer, ids } = &mut self.channels;
-        let has_frames = self.frames.is_some();
-        let definitions = recorded_definitions(declared).into_iter();
-        for (channel, definition) in
-            definitions.filter(|(channel, _)| has_frames || *channel != Channel::Frames)
-        {
-            let id = &mut ids[channel.place()];
-            if id.is_none() {
+        let RecordingFile { writer, ids } = &mut self.file;
+        for (channel, id) in Channel::all().zip(ids) {
+            let is_left_out = match channel {
+                Channel::Frames => self.frames.is_none(),
+                other => other == Channel::Topic(Topic::Frame),
+            };
+            if id.is_none()
+                && !is_left_out
+                && let Some(definition) = definition(channel, declared)
+            {
                 let schema = add_schema(writer, &definition)?;
                 let mcap::Channel { topic, message_encoding, metadata, .. } = &definition;
                 *id = Some(writer.add_channel(schema, topic, message_encoding, metadata)?);
@@ -215,7 +215,7 @@ impl<W: Medium> Recorder<W> {
 
     /// Attaches a file.
     pub fn attach(&mut self, name: &str, media_type: &str, data: &[u8]) -> Result<(), WriteError> {
-        Ok(self.channels.writer.attach(&timeless(name, media_type, data))?)
+        Ok(self.file.writer.attach(&timeless(name, media_type, data))?)
     }
 
     /// Appends a message that was received at `log_time_ns`, and its view in 3-D.
@@ -224,8 +224,8 @@ impl<W: Medium> Recorder<W> {
             return self.record_frame(frame, log_time_ns);
         }
         self.end_frames()?;
-        let Self { channels, encoder, .. } = self;
-        encoder.encode(message, |message| channels.write_message(&message, log_time_ns))
+        let Self { file, encoder, .. } = self;
+        encoder.encode(message, |message| file.write_message(&message, log_time_ns))
     }
 
     fn record_frame(&mut self, frame: &FrameTap, log_time_ns: u64) -> Result<(), WriteError> {
@@ -243,26 +243,22 @@ impl<W: Medium> Recorder<W> {
         let Some(frames) = &mut self.frames else { return Ok(()) };
         let log_time_ns = frames.log_time_ns;
         let Some((first, bytes)) = frames.end_batch() else { return Ok(()) };
-        let message = Encoded {
-            channel: Channel::Frames,
-            sequence: first.seq as u32,
-            publish_time_ns: first.published_ns,
-            bytes,
-        };
-        self.channels.write_message(&message, log_time_ns)
+        let (sequence, publish_time_ns) = (first.seq as u32, first.published_ns);
+        let message = Encoded { channel: Channel::Frames, sequence, publish_time_ns, bytes };
+        self.file.write_message(&message, log_time_ns)
     }
 
     /// Ends the chunk and hands everything recorded so far to the medium.
     pub fn flush(&mut self) -> Result<(), WriteError> {
         self.end_frames()?;
-        Ok(self.channels.writer.flush()?)
+        Ok(self.file.writer.flush()?)
     }
 
     /// Ends the file with its index, and waits until it is safe.
     pub fn finish(mut self) -> Result<(), WriteError> {
         self.end_frames()?;
-        self.channels.writer.finish()?;
-        Ok(self.channels.writer.into_inner().close().map_err(McapError::from)?)
+        self.file.writer.finish()?;
+        Ok(self.file.writer.into_inner().into_inner().close().map_err(McapError::from)?)
     }
 }
 
@@ -338,16 +334,6 @@ impl Write for DurableFile {
             let _ = request.try_send(());
         }
         Ok(())
-    }
-}
-
-impl Seek for DurableFile {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.file.seek(to)
-    }
-
-    fn stream_position(&mut self) -> io::Result<u64> {
-        self.file.stream_position()
     }
 }
 

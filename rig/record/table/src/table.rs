@@ -93,7 +93,7 @@ impl Column {
 }
 
 /// Columns of one length: a table, or the next rows of a long one.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Table {
     columns: Vec<Column>,
 }
@@ -143,11 +143,6 @@ impl Table {
     /// Removes all rows.
     pub fn clear(&mut self) {
         self.columns.iter_mut().for_each(|column| column.values.clear());
-    }
-
-    /// The values of each column in turn, which stay as many as those of every other.
-    pub(crate) fn values_mut(&mut self) -> impl Iterator<Item = &mut Values> {
-        self.columns.iter_mut().map(|column| &mut column.values)
     }
 
     /// The codebook of tables: a row for each of their columns, with its unit, its type and its meaning.

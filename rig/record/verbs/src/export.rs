@@ -10,11 +10,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
 use clap::{Args, ValueEnum};
-use masseter_analysis::signals::Registry;
-use masseter_recording::output::new_folder;
-use masseter_recording::{Columns, Description, Field, Reader, Recorded, Topic};
+use masseter_recording::{Columns, Description, Field, Reader, Recorded, Topic, new_folder};
 use masseter_report::CandumpLogs;
-use masseter_runtime::messages::{FrameTap, Message, tap};
+use masseter_runtime::messages::tap;
 use masseter_runtime::named::{Declared, Parameter, Signal};
 use masseter_scenario::Scenario;
 use masseter_scenario::wording::nearest;
@@ -23,7 +21,7 @@ use masseter_terminal::{Exit, result};
 use mcap::Channel;
 
 use crate::survey::Survey;
-use crate::tables::{CYCLES, CycleTable, Shape, TopicTable};
+use crate::tables::{CYCLES, CycleTable, TopicTable};
 use crate::verbs::RecordingArgs;
 
 /// The name of the codebook's file.
@@ -111,14 +109,14 @@ impl Export<'_> {
     /// Returns the names of the files with their numbers of rows.
     fn write_tables(&self, recording: &Path, selection: Selection) -> anyhow::Result<Vec<(String, u64)>> {
         let mut topics = BTreeMap::new();
-        for (topic, shape) in selection.topics {
-            let table = TopicTable::new(topic, shape, self.motion_ns);
+        for (topic, columns) in selection.topics {
+            let table = TopicTable::new(topic, columns, self.motion_ns);
             let file = TableFile::create(self.out, topic.name(), &self.format, table.empty())?;
             topics.insert(topic, (table, file));
         }
-        let mut cycles = match selection.registry {
-            Some(registry) => {
-                let table = CycleTable::new(registry, self.motion_ns);
+        let mut cycles = match selection.cycles {
+            Some((scenario, declared)) => {
+                let table = CycleTable::new(&scenario, &declared, self.motion_ns);
                 let file = TableFile::create(self.out, CYCLES, &self.format, table.empty())?;
                 Some((table, file))
             }
@@ -128,9 +126,7 @@ impl Export<'_> {
         let mut reader = Reader::open(recording)?;
         while let Some(entry) = reader.next_entry()? {
             // The survey counts what cannot be read.
-            let message = entry.recorded().and_then(Result::ok);
-            let frames = entry.frames().and_then(Result::ok).unwrap_or_default();
-            for message in message.into_iter().chain(frames.into_iter().map(Recorded::Frame)) {
+            for message in entry.messages().unwrap_or_default() {
                 if let Some((table, file)) = topics.get_mut(&message.topic()) {
                     file.push_row(table.row(&message))?;
                 }
@@ -226,9 +222,9 @@ const SCENARIO: &str = "scenario.toml";
 
 /// The selected tables.
 struct Selection {
-    topics: BTreeMap<Topic, Shape>,
-    /// The signals of the table of cycles; none where it is not selected.
-    registry: Option<Registry>,
+    topics: BTreeMap<Topic, Columns>,
+    /// What the signals of the table of cycles come from; none where it is not selected.
+    cycles: Option<(Scenario, Declared)>,
 }
 
 impl Selection {
@@ -236,11 +232,14 @@ impl Selection {
     fn new(survey: &Survey, requested: &[String]) -> anyhow::Result<Self> {
         let reader = &survey.reader;
         let has_rows: Vec<_> = survey.topics().collect();
-        let shapes = shapes(reader).into_iter().filter(|(topic, _)| has_rows.contains(&topic.name()));
-        let mut topics: BTreeMap<_, _> = shapes.collect();
+        let mut topics = Columns::of_topics(reader.channels());
+        topics.retain(|topic, _| has_rows.contains(&topic.name()));
         let has_scenario = reader.attachments().iter().any(|file| file.name == SCENARIO);
-        let cycles = has_scenario.then_some(CYCLES).into_iter();
-        let known: Vec<_> = cycles.chain(topics.keys().map(|topic| topic.name())).collect();
+        let known: Vec<_> = has_scenario
+            .then_some(CYCLES)
+            .into_iter()
+            .chain(topics.keys().map(|topic| topic.name()))
+            .collect();
         if let Some(unknown) = requested.iter().find(|name| !known.contains(&name.as_str())) {
             if unknown == Topic::Frame.name() && !reader.has_frames() {
                 bail!("the recording gives no table 'frame': it leaves out the CAN frames");
@@ -252,36 +251,19 @@ impl Selection {
         let is_selected =
             |name: &str| requested.is_empty() || requested.iter().any(|requested| requested == name);
         topics.retain(|topic, _| is_selected(topic.name()));
-        let registry = (has_scenario && is_selected(CYCLES)).then(|| registry(reader)).transpose()?;
-        Ok(Self { topics, registry })
+        let cycles = (has_scenario && is_selected(CYCLES)).then(|| run_of(reader)).transpose()?;
+        Ok(Self { topics, cycles })
     }
 }
 
-/// The fields of the rig's topics, by the definitions in the recording.
-fn shapes(reader: &Reader) -> BTreeMap<Topic, Shape> {
-    let defined = reader.channels().filter_map(|channel| {
-        let definition = str::from_utf8(&channel.schema.as_ref()?.data).ok()?;
-        Some((Topic::named(&channel.topic)?, definition.to_owned()))
-    });
-    let mut definitions: BTreeMap<_, _> = defined.collect();
-    let columns = Columns::of_topics(reader.channels());
-    // Recordings have many frames in a message.
-    definitions.entry(Topic::Frame).or_insert_with(FrameTap::definition);
-    let shape = |(topic, columns)| {
-        let descriptions = definitions.get(&topic).map(|text| Description::of_fields(text));
-        (topic, Shape { columns, descriptions: descriptions.unwrap_or_default() })
-    };
-    columns.into_iter().map(shape).collect()
-}
-
-/// The signals of the run, by the scenario and the definitions in the recording.
-fn registry(reader: &Reader) -> anyhow::Result<Registry> {
+/// The run's scenario and what its controller declared, by the recording.
+fn run_of(reader: &Reader) -> anyhow::Result<(Scenario, Declared)> {
     let attached = reader.attachments().iter().find(|file| file.name == SCENARIO);
     let text = attached.and_then(|file| str::from_utf8(&file.data).ok());
     let text = text.context("the attached scenario is no text")?;
     let scenario = Scenario::parse(Path::new(SCENARIO), text)?;
     scenario.validate().context("the attached scenario")?;
-    Ok(Registry::new(&scenario, &declared(reader.channels())))
+    Ok((scenario, declared(reader.channels())))
 }
 
 /// What the controller of the recorded run declared. The values of the parameters at the start, and their ranges, are not
@@ -307,13 +289,11 @@ fn declared<'a>(channels: impl Iterator<Item = &'a Channel<'static>>) -> Declare
 
 /// The named values of a message: its numbers with fractions, which no other field of it has.
 fn named_values(channel: &Channel) -> Vec<Signal> {
-    let schema = channel.schema.as_ref();
-    let definition = schema.and_then(|schema| str::from_utf8(&schema.data).ok()).unwrap_or("");
-    let mut descriptions = Description::of_fields(definition);
-    let columns = Columns::from_definition(definition);
+    let definition = channel.schema.as_ref().and_then(|schema| str::from_utf8(&schema.data).ok());
+    let columns = definition.and_then(Columns::from_definition);
     let fields = columns.iter().flat_map(Columns::fields).filter(|field| !field.is_integer());
     let signal = |field: &Field| {
-        let Description { unit, meaning, .. } = descriptions.remove(field.name()).unwrap_or_default();
+        let Description { unit, meaning, .. } = field.description.clone();
         Signal { name: field.name().to_owned(), unit, about: meaning }
     };
     fields.map(signal).collect()

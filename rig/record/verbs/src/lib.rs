@@ -8,4 +8,4 @@ mod tables;
 mod verbs;
 
 pub use export::{ExportArgs, export};
-pub use verbs::{ExtractArgs, RecordingArgs, RecordingVerb, RecoverArgs, ThinArgs, execute};
+pub use verbs::{RecordingArgs, RecordingVerb, execute};

@@ -54,17 +54,15 @@ impl Survey {
                 undefined += 1;
                 continue;
             };
-            channels.entry(channel.id).or_default().count_entry(&entry);
-            if let Some(Ok(message)) = entry.recorded() {
+            let figures = channels.entry(channel.id).or_default();
+            figures.count_entry(&entry);
+            for message in entry.messages().unwrap_or_else(|error| figures.count_unreadable(&error)) {
                 sequence.take(&message);
                 if let Recorded::State(state) = message
                     && state.controller_state == ControllerState::Running.code()
                 {
                     motion_ns.get_or_insert(time_ns(&message));
                 }
-            }
-            for frame in entry.frames().into_iter().flatten().flatten() {
-                sequence.take(&Recorded::Frame(frame));
             }
         }
         let figures = |channel: &mcap::Channel<'static>| {
@@ -242,10 +240,12 @@ impl ChannelFigures {
         self.last_ns = self.last_ns.max(entry.header.log_time);
         self.messages += 1;
         self.bytes += entry.data.len() as u64;
-        let unread = entry.recorded().and_then(Result::err).or(entry.frames().and_then(Result::err));
-        if let Some(error) = unread {
-            self.unreadable += 1;
-            self.reason.get_or_insert_with(|| error.to_string());
-        }
+    }
+
+    /// Counts a message that this program cannot read, and returns none.
+    fn count_unreadable(&mut self, error: &ReadError) -> Vec<Recorded> {
+        self.unreadable += 1;
+        self.reason.get_or_insert_with(|| error.to_string());
+        Vec::new()
     }
 }

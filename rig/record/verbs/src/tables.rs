@@ -1,34 +1,29 @@
 //! The tables of `export`. That of a topic has a row for each message, in the order of the recording. `cycles` has a
 //! row for each cycle, with the values of all named signals, those of requirements.
 
-use std::collections::BTreeMap;
 use std::iter;
 
 use data_encoding::HEXUPPER;
 use masseter_analysis::EventRecord;
-use masseter_analysis::signals::{NamedSignal, Registry, Sample, Timeline, Values as SignalValues};
+use masseter_analysis::signals::{NamedSignal, Pace, Registry, Sample, Timeline, Values as SignalValues};
 use masseter_recording::{Columns, Description, Field, Number, Recorded, Topic};
+use masseter_runtime::named::Declared;
+use masseter_scenario::Scenario;
 use masseter_table::{Cell, Column, Table, Values};
 
 /// Fields that say nothing of the message: the version of its layout, and how many values follow.
 const LEFT_OUT: [&str; 2] = ["version", "length"];
 
-/// The fields of a topic's messages, and what their definition says of them.
-pub(super) struct Shape {
-    pub(super) columns: Columns,
-    pub(super) descriptions: BTreeMap<String, Description>,
-}
-
 /// Makes rows of the messages of a topic.
 pub(super) struct TopicTable {
     topic: Topic,
-    shape: Shape,
+    columns: Columns,
     motion_ns: Option<u64>,
 }
 
 impl TopicTable {
-    pub(super) fn new(topic: Topic, shape: Shape, motion_ns: Option<u64>) -> Self {
-        Self { topic, shape, motion_ns }
+    pub(super) fn new(topic: Topic, columns: Columns, motion_ns: Option<u64>) -> Self {
+        Self { topic, columns, motion_ns }
     }
 
     /// The columns without rows.
@@ -37,7 +32,7 @@ impl TopicTable {
             "Time since the motion began: of the sample, the frame or the event; of other messages that of their publication.",
         )];
         for field in self.fields() {
-            let description = self.description(field.name());
+            let description = &field.description;
             let has_words = !description.codes.is_empty();
             for (place, name) in field.columns().enumerate() {
                 let element = if field.is_array() { format!(" Element {place}.") } else { String::new() };
@@ -50,9 +45,9 @@ impl TopicTable {
                 columns.push(Column::new(&name, &description.unit, &about, values));
             }
         }
-        if let Some(tail) = self.shape.columns.tail() {
-            let about = format!("{} In hexadecimal digits.", self.description(tail).meaning);
-            columns.push(Column::new(tail, "", &about, Values::Words(Vec::new())));
+        if let Some(tail) = self.columns.tail() {
+            let about = format!("{} In hexadecimal digits.", tail.description.meaning);
+            columns.push(Column::new(tail.name(), "", &about, Values::Words(Vec::new())));
         }
         if self.topic == Topic::Event {
             columns.extend(event_columns());
@@ -63,17 +58,15 @@ impl TopicTable {
     /// The row of a message.
     pub(super) fn row(&self, message: &Recorded) -> Vec<Cell> {
         // What has another length than its definition has no values.
-        let (fixed, tail) = self.shape.columns.split(message.body()).unzip();
+        let (fixed, tail) = self.columns.split(message.body()).unzip();
         let mut row = vec![time_cell(time_ns(message), self.motion_ns)];
         for field in self.fields() {
-            let description = self.description(field.name());
-            let cell = |number| field_cell(field, description, number);
             match fixed {
-                Some(fixed) => row.extend(field.numbers(fixed).map(|number| cell(Some(number)))),
-                None => row.extend(field.columns().map(|_| cell(None))),
+                Some(fixed) => row.extend(field.numbers(fixed).map(|number| field_cell(field, Some(number)))),
+                None => row.extend(field.columns().map(|_| field_cell(field, None))),
             }
         }
-        row.extend(self.shape.columns.tail().map(|_| Cell::Word(tail.map(|bytes| HEXUPPER.encode(bytes)))));
+        row.extend(self.columns.tail().map(|_| Cell::Word(tail.map(|bytes| HEXUPPER.encode(bytes)))));
         if let Recorded::Event(event) = message {
             row.extend(event_cells(&EventRecord::from(event)));
         }
@@ -81,13 +74,7 @@ impl TopicTable {
     }
 
     fn fields(&self) -> impl Iterator<Item = &Field> {
-        self.shape.columns.fields().iter().filter(|field| !LEFT_OUT.contains(&field.name()))
-    }
-
-    fn description(&self, field: &str) -> &Description {
-        const NONE: &Description =
-            &Description { unit: String::new(), meaning: String::new(), codes: BTreeMap::new() };
-        self.shape.descriptions.get(field).unwrap_or(NONE)
+        self.columns.fields().iter().filter(|field| !LEFT_OUT.contains(&field.name()))
     }
 }
 
@@ -125,10 +112,11 @@ fn meaning(Description { meaning, codes, .. }: &Description) -> String {
 }
 
 /// A number; the name of one that is a code, and the number of one without a name.
-fn field_cell(field: &Field, description: &Description, number: Option<Number>) -> Cell {
-    if !description.codes.is_empty() {
+fn field_cell(field: &Field, number: Option<Number>) -> Cell {
+    let codes = &field.description.codes;
+    if !codes.is_empty() {
         let word = |number: Number| {
-            let name = u64::try_from(number.to_i64()).ok().and_then(|code| description.codes.get(&code));
+            let name = u64::try_from(number.to_i64()).ok().and_then(|code| codes.get(&code));
             name.cloned().unwrap_or_else(|| format!("code {number}"))
         };
         return Cell::Word(number.map(word));
@@ -170,10 +158,11 @@ pub(super) struct CycleTable {
 }
 
 impl CycleTable {
-    pub(super) fn new(registry: Registry, motion_ns: Option<u64>) -> Self {
+    pub(super) fn new(scenario: &Scenario, declared: &Declared, motion_ns: Option<u64>) -> Self {
+        let registry = Registry::new(scenario, declared);
         let count = registry.signals().len();
-        let signals = SignalValues::of_all(registry);
-        Self { timeline: Timeline::default(), signals, count, values: Vec::new(), motion_ns }
+        let timeline = Timeline::new(scenario, declared, Pace::Recorded);
+        Self { timeline, signals: SignalValues::of_all(registry), count, values: Vec::new(), motion_ns }
     }
 
     /// The columns without rows.

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use clap::{Args, Subcommand};
-use masseter_recording::{Reader, RunFolder, recover, thin};
+use masseter_recording::{Reader, recording_at, recover, thin};
 use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, result, result_with_tones};
 use mcap::Attachment;
@@ -29,94 +29,76 @@ pub enum RecordingVerb {
     #[command(after_help = "Example:\n  masseter recording verify runs/latest")]
     Verify(RecordingArgs),
     /// Save the readable messages of a damaged recording in a new one
-    Recover(RecoverArgs),
+    #[command(after_help = "Example:\n  masseter recording recover killed/recording.mcap --out whole.mcap")]
+    Recover {
+        /// Recording, run folder, or a link to either
+        #[arg(default_value = "runs/latest")]
+        recording: PathBuf,
+        /// New recording; must not exist [default: beside the old one, with '.recovered' in its name]
+        #[arg(long, value_name = "FILE.mcap")]
+        out: Option<PathBuf>,
+    },
     /// Keep few messages and the digests of all: a golden run, small enough for a repository
-    Thin(ThinArgs),
+    #[command(
+        after_help = "Example:\n  masseter recording thin runs/latest --out golden.mcap\n\n'masseter diff golden.mcap RUN' compares a later run with it."
+    )]
+    Thin {
+        /// Recording, run folder, or a link to either
+        #[arg(default_value = "runs/latest")]
+        recording: PathBuf,
+        /// New recording; must not exist
+        #[arg(long, value_name = "FILE.mcap")]
+        out: PathBuf,
+    },
     /// Write the attached files: the scenario, and the recorded motion that it plays
-    Extract(ExtractArgs),
+    #[command(after_help = "Example:\n  masseter recording extract recording.mcap --out /tmp/again")]
+    Extract {
+        /// Recording, run folder, or a link to either
+        #[arg(default_value = "runs/latest")]
+        recording: PathBuf,
+        /// Folder for the files; must not exist
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
 }
 
 /// The recording to read.
 #[derive(Debug, Clone, Args)]
 pub struct RecordingArgs {
-    /// Recording, or run folder
+    /// Recording, run folder, or a link to either
     #[arg(default_value = "runs/latest")]
     recording: PathBuf,
-}
-
-/// The arguments of `recover`.
-#[derive(Debug, Clone, Args)]
-#[command(after_help = "Example:\n  masseter recording recover killed/recording.mcap --out whole.mcap")]
-pub struct RecoverArgs {
-    #[command(flatten)]
-    from: RecordingArgs,
-    /// New recording; must not exist [default: beside the old one, with '.recovered' in its name]
-    #[arg(long, value_name = "FILE.mcap")]
-    out: Option<PathBuf>,
-}
-
-/// The arguments of `thin`.
-#[derive(Debug, Clone, Args)]
-#[command(
-    after_help = "Example:\n  masseter recording thin runs/latest --out golden.mcap\n\n'masseter diff golden.mcap RUN' compares a later run with it."
-)]
-pub struct ThinArgs {
-    #[command(flatten)]
-    from: RecordingArgs,
-    /// New recording; must not exist
-    #[arg(long, value_name = "FILE.mcap")]
-    out: PathBuf,
-}
-
-/// The arguments of `extract`.
-#[derive(Debug, Clone, Args)]
-#[command(after_help = "Example:\n  masseter recording extract recording.mcap --out /tmp/again")]
-pub struct ExtractArgs {
-    #[command(flatten)]
-    from: RecordingArgs,
-    /// Folder for the files; must not exist
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
 }
 
 impl RecordingArgs {
     /// The file.
     pub(crate) fn path(&self) -> anyhow::Result<PathBuf> {
-        if self.recording.is_dir() {
-            Ok(RunFolder::open(&self.recording)?.recording())
-        } else {
-            Ok(self.recording.clone())
-        }
+        Ok(recording_at(&self.recording)?)
     }
 }
 
 /// Executes a verb.
 pub fn execute(verb: &RecordingVerb) -> anyhow::Result<Exit> {
     match verb {
-        RecordingVerb::Info(args) => inspect(args, Survey::info),
-        RecordingVerb::Verify(args) => inspect(args, Survey::verification),
-        RecordingVerb::Recover(args) => save_readable(args),
-        RecordingVerb::Thin(args) => keep_few(args),
-        RecordingVerb::Extract(args) => extract(args),
+        RecordingVerb::Info(from) => inspect(&from.path()?, Survey::info),
+        RecordingVerb::Verify(from) => inspect(&from.path()?, Survey::verification),
+        RecordingVerb::Recover { recording, out } => save_readable(&recording_at(recording)?, out.as_deref()),
+        RecordingVerb::Thin { recording, out } => keep_few(&recording_at(recording)?, out),
+        RecordingVerb::Extract { recording, out } => extract(&recording_at(recording)?, out),
     }
 }
 
-fn inspect(
-    args: &RecordingArgs,
-    to_text: impl FnOnce(&Survey) -> Result<String, fmt::Error>,
-) -> anyhow::Result<Exit> {
-    let path = args.path()?;
-    let survey = Survey::of_file(&path)?;
+fn inspect(path: &Path, to_text: impl FnOnce(&Survey) -> Result<String, fmt::Error>) -> anyhow::Result<Exit> {
+    let survey = Survey::of_file(path)?;
     result_with_tones(&format!("{}\n{}", path.display(), to_text(&survey)?), &TONES)?;
     Ok(survey.exit())
 }
 
-fn save_readable(args: &RecoverArgs) -> anyhow::Result<Exit> {
-    let path = args.from.path()?;
-    let out = args.out.clone().unwrap_or_else(|| path.with_extension("recovered.mcap"));
+fn save_readable(path: &Path, out: Option<&Path>) -> anyhow::Result<Exit> {
+    let out = out.map_or_else(|| path.with_extension("recovered.mcap"), Path::to_owned);
     // An unreadable recording must leave no new file behind.
-    let survey = Survey::of_file(&path)?;
-    let recovered = write_new(&out, |medium| Ok(recover(&mut Reader::open(&path)?, medium)?))?;
+    let survey = Survey::of_file(path)?;
+    let recovered = write_new(&out, |medium| Ok(recover(&mut Reader::open(path)?, medium)?))?;
     let mut text = format!("{}\n{} saved\n", out.display(), counted(recovered.messages, "message"));
     if recovered.undefined > 0 {
         writeln!(text, "{} not saved: the definition of their channel is lost", recovered.undefined)?;
@@ -128,10 +110,9 @@ fn save_readable(args: &RecoverArgs) -> anyhow::Result<Exit> {
     Ok(Exit::Passed)
 }
 
-fn keep_few(args: &ThinArgs) -> anyhow::Result<Exit> {
-    let (path, out) = (args.from.path()?, &args.out);
+fn keep_few(path: &Path, out: &Path) -> anyhow::Result<Exit> {
     let named = || path.display().to_string();
-    let mut reader = Reader::open(&path).with_context(named)?;
+    let mut reader = Reader::open(path).with_context(named)?;
     let kept = write_new(out, |medium| thin(&mut reader, medium).with_context(named))?;
     result(&format!("{}\n{} and the digests of all\n", out.display(), counted(kept, "message")))?;
     Ok(Exit::Passed)
@@ -145,11 +126,10 @@ fn write_new<T>(path: &Path, write: impl FnOnce(BufWriter<File>) -> anyhow::Resu
     })
 }
 
-fn extract(args: &ExtractArgs) -> anyhow::Result<Exit> {
-    let path = args.from.path()?;
-    let survey = Survey::of_file(&path)?;
-    for (name, bytes) in write_attached(survey.reader.attachments(), &args.out)? {
-        result(&format!("{bytes:>10}  {}\n", args.out.join(name).display()))?;
+fn extract(path: &Path, out: &Path) -> anyhow::Result<Exit> {
+    let survey = Survey::of_file(path)?;
+    for (name, bytes) in write_attached(survey.reader.attachments(), out)? {
+        result(&format!("{bytes:>10}  {}\n", out.join(name).display()))?;
     }
     result(&survey.loss_with_advice()?)?;
     Ok(survey.exit())

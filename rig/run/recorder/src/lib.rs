@@ -15,6 +15,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use anyhow::Context;
 use clap::Args;
 use masseter_machine::SystemRoot;
 use masseter_machine::counters::{Sample, Sampler};
@@ -27,11 +28,12 @@ use masseter_runtime::messages::{
     Command, Contact, Event, FrameTap, LAYOUT_VERSION, Machine, Message, Parameters, Reading, Signals, State,
     Truth,
 };
+use masseter_runtime::named::Declared;
 use masseter_runtime::realtime::scheduling::keep_off;
 use masseter_runtime::transport::{Domain, FrameSubscriber, Node, Topic, TransportError};
 use masseter_terminal::{Exit, StderrWriter};
 
-use live::{Listener, LiveServer};
+use live::{LiveServer, listen_on};
 use sinks::{Progress, Sinks};
 
 /// Time between two drains of the topics; a fraction of what their buffers hold.
@@ -62,20 +64,20 @@ pub fn record(process_arguments: &ProcessArguments, args: &RecorderArgs) -> anyh
         // The threads started below inherit the cores.
         keep_off(&scenario.realtime.cores);
     }
-    let subscribers = Subscribers::open(&process.node)?;
+    let drains = drains_of_topics(&process.node)?;
     let scene = Scene::new(&Mechanism::new(&scenario.mechanism)?, &scenario.jaw);
-    let listener = args.live.map(Listener::bind).transpose()?;
+    let listener = args.live.map(listen_on).transpose()?;
     let pace = if is_lockstep { Pace::Virtual } else { Pace::RealTime };
     let folder = RunFolder::of_recording(&args.recording);
     let mut recorder = Recorder::of_run(&folder, scene.clone())?;
     let mut signals = is_lockstep.then(|| RecorderSignals::open(&process, DRAIN_INTERVAL)).transpose()?;
-    let start = process.ready(None)?;
+    let start = process.ready(None, Declared::default())?;
     recorder.declare(&start.declared)?;
     let backlog = Backlog::start(recorder, pace);
     let domain = Domain::named(&process_arguments.domain)?;
     let serve = |listener| -> anyhow::Result<_> {
         let manifest = Manifest::read(&folder)?;
-        Ok(LiveServer::start(listener, manifest, scene, start.declared.clone(), domain)?)
+        LiveServer::start(listener, manifest, scene, start.declared.clone(), domain).context("the live view")
     };
     let server = listener.map(serve).transpose()?;
 
@@ -87,15 +89,15 @@ pub fn record(process_arguments: &ProcessArguments, args: &RecorderArgs) -> anyh
     let progress = (!args.quiet).then(|| Progress::new(args.motion_s, scenario.period_s(), clock::now_ns()));
     let sinks = Sinks { backlog, server, progress, stderr };
     match &mut signals {
-        None => record_in_real_time(&process.stop, &start, &subscribers, sinks),
-        Some(signals) => record_in_lockstep(&process.stop, signals, &subscribers, sinks),
+        None => record_in_real_time(&process.stop, &start, &drains, sinks),
+        Some(signals) => record_in_lockstep(&process.stop, signals, &drains, sinks),
     }
 }
 
 fn record_in_real_time(
     stop: &StopRequest,
     start: &Start,
-    subscribers: &Subscribers,
+    drains: &[Drain],
     mut sinks: Sinks,
 ) -> anyhow::Result<Exit> {
     let loops = start.loops.to_vec();
@@ -106,12 +108,13 @@ fn record_in_real_time(
         let is_last = stop.is_made();
         // One time for a drain takes fewer bytes. But some messages are published during it.
         let mut received_ns = clock::now_ns();
-        subscribers.drain(&mut |message| {
+        let mut distribute = |message: &Recorded| {
             if message.published_ns() > received_ns {
                 received_ns = clock::now_ns();
             }
             sinks.distribute(message, received_ns);
-        })?;
+        };
+        drains.iter().try_for_each(|drain| drain(&mut distribute))?;
         let now_ns = clock::now_ns();
         if let Some(sample) = sampler.sample(now_ns)
             && let Some(machine) = machine_message(samples + 1, &sample)
@@ -132,14 +135,14 @@ fn record_in_real_time(
 fn record_in_lockstep(
     stop: &StopRequest,
     signals: &mut RecorderSignals,
-    subscribers: &Subscribers,
+    drains: &[Drain],
     mut sinks: Sinks,
 ) -> anyhow::Result<Exit> {
     let mut in_order = InOrder::default();
     loop {
         let is_last = stop.is_made();
         let is_asked = !is_last && signals.wait()?;
-        subscribers.drain(&mut |message| in_order.add_arrived(message))?;
+        drains.iter().try_for_each(|drain| drain(&mut |message| in_order.add_arrived(message)))?;
         in_order.drain_complete(is_last, |message| sinks.distribute(message, message.published_ns()));
         if is_asked {
             signals.answer()?;
@@ -154,29 +157,19 @@ fn record_in_lockstep(
 /// Drains one topic: hands everything that has arrived to a sink.
 type Drain = Box<dyn Fn(&mut dyn FnMut(&Recorded)) -> Result<(), TransportError>>;
 
-/// One subscriber per topic.
-struct Subscribers(Vec<Drain>);
-
-impl Subscribers {
-    fn open(node: &Node) -> Result<Self, TransportError> {
-        // Readings come first: what was published before the last of them follows in the same drain.
-        Ok(Self(vec![
-            drain_of::<Reading>(node)?,
-            drain_of::<Command>(node)?,
-            drain_of::<State>(node)?,
-            drain_of::<Signals>(node)?,
-            drain_of::<Parameters>(node)?,
-            drain_of::<Truth>(node)?,
-            drain_of::<Contact>(node)?,
-            drain_of_frames(node)?,
-            drain_of::<Event>(node)?,
-        ]))
-    }
-
-    /// Hands everything that has arrived to `take`, topic by topic.
-    fn drain(&self, take: &mut dyn FnMut(&Recorded)) -> Result<(), TransportError> {
-        self.0.iter().try_for_each(|drain| drain(take))
-    }
+/// One for each topic. Readings come first: what was published before the last of them follows in the same drain.
+fn drains_of_topics(node: &Node) -> Result<Vec<Drain>, TransportError> {
+    Ok(vec![
+        drain_of::<Reading>(node)?,
+        drain_of::<Command>(node)?,
+        drain_of::<State>(node)?,
+        drain_of::<Signals>(node)?,
+        drain_of::<Parameters>(node)?,
+        drain_of::<Truth>(node)?,
+        drain_of::<Contact>(node)?,
+        drain_of_frames(node)?,
+        drain_of::<Event>(node)?,
+    ])
 }
 
 /// Drains at most a queue's length, so that a flood cannot delay the other topics.

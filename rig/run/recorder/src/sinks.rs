@@ -201,36 +201,33 @@ impl Progress {
         format!("{BEFORE_REWRITE}{}{AFTER_REWRITE}", self.line_within(losses, columns))
     }
 
-    /// The figures for which a line of that many columns has room. The least important ones give way first.
+    /// The figures for which a line of that many columns has room, the first of them always.
     fn line_within(&self, losses: Losses, columns: usize) -> String {
         let mut figures = self.figures(losses);
-        loop {
-            let line = figures.iter().map(|(_, text)| text.as_str()).collect::<Vec<_>>().join(BETWEEN);
-            let least = figures.iter().map(|(rank, _)| *rank).max().unwrap_or(0);
-            if least == 0 || line.chars().count() <= columns {
-                return line;
-            }
-            figures.retain(|(rank, _)| *rank != least);
+        while figures.len() > 1 && figures.join(BETWEEN).chars().count() > columns {
+            figures.pop();
         }
+        figures.join(BETWEEN)
     }
 
-    /// Each figure in its place, behind its rank: 0 is the most important. Losses are more important than the error.
-    fn figures(&self, Losses { unrecorded, clients }: Losses) -> Vec<(u8, String)> {
+    /// The figures, the most important ones first.
+    fn figures(&self, Losses { unrecorded, clients }: Losses) -> Vec<String> {
         let state = self.controller_state().map_or("?", ControllerState::name);
         let (motion_s, of_s) = (self.motion_s.min(self.running as f64 * self.period_s), self.motion_s);
         let dropped = self.missing + unrecorded;
         let missed = self.state.skipped_cycles + self.reading.skipped_cycles;
         let mut figures = vec![
-            (0, format!("{state:<13} motion {motion_s:>5.2} of {of_s:.2} s")),
-            (1, format!("missed {missed}")),
-            (if dropped > 0 { 1 } else { 3 }, format!("dropped {dropped}")),
-            (2, format!("tracking error {:.3} mm", self.error_mm())),
-            (4, format!("max {:.3} mm", self.max_error_mm)),
-            (5, format!("latest {:.0} µs", self.max_late_ns as f64 / 1e3)),
+            format!("{state:<13} motion {motion_s:>5.2} of {of_s:.2} s"),
+            format!("missed {missed}"),
+            format!("dropped {dropped}"),
+            format!("tracking error {:.3} mm", self.error_mm()),
+            format!("max {:.3} mm", self.max_error_mm),
+            format!("latest {:.0} µs", self.max_late_ns as f64 / 1e3),
         ];
-        figures.extend(clients.map(|ClientCounts { connected, dropped }| {
-            (6, format!("live {connected} watching, {dropped} dropped"))
-        }));
+        figures.extend(
+            clients
+                .map(|clients| format!("live {} watching, {} dropped", clients.connected, clients.dropped)),
+        );
         figures
     }
 

@@ -1,13 +1,10 @@
 //! JUnit documents, as CI systems show them: a run or a whole suite of runs, each check as a test case.
 
 use askama::Template;
-use masseter_analysis::Figures;
+use masseter_analysis::{Check, CheckFigures, CheckResult, Figures, Verdict};
 use masseter_recording::Manifest;
 use masseter_runtime::named::PlayedMotion;
 use masseter_terminal::Exit;
-
-use crate::check::{Check, CheckFigures, CheckResult};
-use crate::verdict::Verdict;
 
 /// A document with one run, or with the runs of a suite that took so long.
 #[derive(Template)]
@@ -175,8 +172,8 @@ mod tests {
         let machine = MachineInfo { cpu: String::new(), cores: 2, kernel: String::new(), is_virtual: false };
         let manifest = Manifest::new("0.1.0", Scenario::default(), 10.0, "virtual", machine);
         let figures = Analysis::new(&manifest.scenario, &Declared::default()).finish(false, &[]);
-        let verdict =
-            Verdict { reason: "<&\u{1b}\u{ffff}\">".to_owned(), ..Verdict::new(&manifest, &figures) };
+        let mut verdict = Verdict::new(&manifest, &figures);
+        "<&\u{1b}\u{ffff}\">".clone_into(&mut verdict.reason);
         let xml = xml(&manifest, &figures, &verdict).unwrap();
         let case = "  <testcase classname=\"masseter.run\" name=\"run\">\
                     <error message=\"DIED: &#60;&#38;\u{fffd}\u{fffd}&#34;&#62;\"/></testcase>\n";

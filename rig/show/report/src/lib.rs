@@ -1,11 +1,9 @@
 //! The report of a run: table, `summary.json`, `junit.xml`, `report.html`, `events.jsonl`, histogram logs and candump
 //! logs; and two runs side by side.
 //!
-//! All of it is computed from the manifest and the recording, so `masseter report` can repeat it. The figures come from
-//! the crate `masseter-analysis`; this crate judges them, and each of its modules writes one form of the result.
+//! All of it is computed from the manifest and the recording, so `masseter report` can repeat it. Figures and verdict come
+//! from the crate `masseter-analysis`; each module of this crate writes one form of them.
 
-mod check;
-mod checks;
 pub mod compare;
 pub mod divergence;
 pub mod histogram_log;
@@ -15,14 +13,9 @@ mod page;
 mod run_report;
 mod table;
 mod text;
-mod timing;
-mod verdict;
 
-pub use check::{Check, CheckFigures, CheckResult};
 pub use junit::{JunitRun, junit_of_suite};
 pub use logs::{CandumpLogs, WriteError};
 pub use page::so_far as page_so_far;
 pub use run_report::{judge_run, report_past_run, report_run};
 pub use table::Detail;
-pub use timing::{Timing, TimingWord};
-pub use verdict::{Judgement, Verdict};

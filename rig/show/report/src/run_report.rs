@@ -5,7 +5,7 @@ use std::io::{self, ErrorKind};
 use std::path::Path;
 
 use anyhow::Context;
-use masseter_analysis::{Analysis, Figures};
+use masseter_analysis::{Analysis, Figures, Judgement, Verdict};
 use masseter_recording::{Manifest, ReadError, Reader, Recorded, RunFolder};
 use masseter_runtime::messages::tap::{self, TapError};
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, result_with_tones, status};
@@ -13,7 +13,6 @@ use serde::Serialize;
 
 use crate::logs::{CandumpLogs, WriteError, write_events};
 use crate::table::{self, Detail};
-use crate::verdict::{Judgement, Verdict};
 use crate::{histogram_log, junit, page};
 
 /// Why the recording of a run could not be analysed.
@@ -204,3 +203,6 @@ struct Summary<'a> {
 pub(crate) fn summary_json(verdict: &Verdict, figures: &Figures) -> serde_json::Result<String> {
     Ok(serde_json::to_string_pretty(&Summary { form: SUMMARY_FORM, verdict, figures })? + "\n")
 }
+
+#[cfg(test)]
+mod tests;

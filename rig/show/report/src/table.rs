@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use masseter_analysis::{
     AxisFigures, BusResponse, EventRecord, Figures, IntervalFigures, PoseErrors, ReadingFigures,
-    ResponseFigures, TopicFigures, TrackingFigures,
+    ResponseFigures, TopicFigures, TrackingFigures, Verdict, whose_motion,
 };
 use masseter_model::geometry::AXIS_NAMES;
 use masseter_recording::{Manifest, RunUsage, Usage};
@@ -13,9 +13,7 @@ use masseter_scenario::MotionConfig;
 use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, Tone};
 
-use crate::checks::whose_motion;
 use crate::text::{columns, decimals, event_with_cycle, or_dash, us};
-use crate::verdict::Verdict;
 
 /// The words that judge.
 pub(crate) const TONES: [(&str, Tone); 12] = [

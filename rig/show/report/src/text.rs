@@ -1,9 +1,8 @@
-//! Numbers and events as text, for the table, the checks and the page.
+//! Numbers and events as text, for the table and the page.
 
 use std::fmt::Display;
 
-use masseter_analysis::{Code, EventRecord};
-use masseter_runtime::messages::codes::Cause;
+use masseter_analysis::EventRecord;
 use masseter_scenario::Dimension;
 
 /// A dash where there is no such figure.
@@ -45,43 +44,7 @@ pub(crate) fn columns<const N: usize>(widths: [usize; N], cells: [impl Display; 
     cells.collect()
 }
 
-/// A number with its digits in groups of three.
-pub(crate) fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let first = digits.len() % 3;
-    let (head, rest) = digits.split_at(first);
-    let groups = (0..rest.len() / 3).map(|group| &rest[3 * group..3 * group + 3]);
-    [head].into_iter().filter(|head| !head.is_empty()).chain(groups).collect::<Vec<_>>().join(",")
-}
-
 /// An event with its cycle.
 pub(crate) fn event_with_cycle(record: &EventRecord) -> String {
-    format!("cycle {:>6} {}", record.cycle, event_in_words(record))
-}
-
-/// An event without its time.
-pub(crate) fn event_in_words(event: &EventRecord) -> String {
-    let EventRecord { source, cause, .. } = event;
-    if let Some(text) = &event.text {
-        return format!("{source}: {cause} ({text})");
-    }
-    let axis = event.axis.map_or_else(String::new, |axis| format!(" {axis}"));
-    let transition = event.transition.as_ref().map(|[from, to]| format!("{from} → {to}")).unwrap_or_default();
-    let text = match cause {
-        Code::Known(Cause::Sequence) => return format!("{source}{axis}: {transition}"),
-        Code::Known(Cause::StopRequested) => format!("{source}{axis}: {cause} {transition}"),
-        _ => format!("{source}{axis}: {cause} (value {}, limit {}) {transition}", event.value, event.limit),
-    };
-    text.trim_end().to_owned()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn digits_are_grouped_by_three() {
-        let numbers = [0, 7, 999, 1000, 11_379, 1_234_567];
-        assert_eq!(numbers.map(grouped), ["0", "7", "999", "1,000", "11,379", "1,234,567"]);
-    }
+    format!("cycle {:>6} {}", record.cycle, record.in_words())
 }

@@ -1,7 +1,6 @@
 //! A case: a whole scenario with its number and its identity, and what came of it, as it is kept.
 
-use masseter_analysis::Figures;
-use masseter_report::{Check, CheckResult, Verdict};
+use masseter_analysis::{Check, CheckResult, Figures, Verdict};
 use masseter_scenario::Scenario;
 use masseter_table::Values;
 use serde::{Deserialize, Serialize};

@@ -8,12 +8,11 @@ mod session;
 
 use std::borrow::Borrow;
 
-use crate::injection::{Due, Injected, begin_event};
+use crate::injection::{Due, Injected, Operator, begin_event};
 use crate::messages::{Command, Event, Parameters, Reading, Signals, State};
 use crate::named::{Change, Declared, NamedValues};
 use crate::realtime::Wake;
 
-pub use crate::injection::{Operator, OperatorError, is_seen_by_controller};
 pub use session::{Session, SessionError, Waited};
 
 /// A cycle's place in time.

@@ -237,10 +237,10 @@ impl Session {
     /// [`ProcessError`] when the supervisor is gone.
     pub fn finish(mut self, outcome: Outcome) -> Result<(), ProcessError> {
         self.end_turn(true)?;
-        self.context.link.end(match outcome {
+        Ok(self.context.link.end(match outcome {
             Outcome::Finished => End::Finished,
             Outcome::SafeStop => End::SafeStop,
-        })
+        })?)
     }
 
     /// Ends the work because the program cannot go on. The plant's master stops the drives, since no command follows.
@@ -296,7 +296,7 @@ impl Ports {
         parameters.as_ref().map_or(Ok(()), Publisher::warm_up)?;
         events.warm_up()?;
         let lockstep = Lockstep::open(context, Party::Controller, Party::Plant)?;
-        let start = context.ready_with(Some(scenario.realtime.cores[0]), declared)?;
+        let start = context.ready(Some(scenario.realtime.cores[0]), declared.clone())?;
         readings.connect()?;
         commands.connect()?;
         states.connect()?;
@@ -409,7 +409,8 @@ impl ControllerPorts for Ports {
         self.link.report(&report)?;
         match &self.clock {
             Clock::RealTime(_) => Ok(()),
-            Clock::Lockstep(_) => self.link.await_struck(),
+            // Also ends when the supervisor does.
+            Clock::Lockstep(_) => Ok(self.link.next_order().map(drop)?),
         }
     }
 }

@@ -18,6 +18,7 @@ use rustix::net::{
     socket_with,
 };
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 use crate::clock::{self, MILLISECOND_NS, SECOND_NS};
 
@@ -281,6 +282,15 @@ impl Conversation {
             // The end of the time has passed when the wait ends.
             self.wait(Duration::from_nanos(left_ns.min(SECOND_NS)) + Duration::from_millis(1));
         }
+    }
+
+    /// Asks a server, and waits for its answer: a line of JSON each.
+    ///
+    /// # Errors
+    /// [`Left`] when no answer comes, or what comes is none.
+    pub fn ask<A: DeserializeOwned>(&mut self, request: &impl Serialize) -> Result<A, Left> {
+        self.say(line(request).as_bytes());
+        serde_json::from_str(&self.await_line()?).map_err(|error| Left::Failed(error.into()))
     }
 
     /// Ends the connection in both directions.

@@ -14,7 +14,7 @@ use std::{env, iter};
 use masseter_scenario::input::excerpt;
 use serde::{Deserialize, Serialize};
 
-use super::{Patience, ProcessArguments, ProcessContext, ProcessError, SupervisorLink, line};
+use super::{Patience, ProcessArguments, ProcessContext, ProcessError, SupervisorLink};
 use crate::clock::SECOND_NS;
 use crate::conversation::{Conversation, Left, Limits};
 use crate::messages::{Command, Event, Message, Reading, State};
@@ -174,7 +174,8 @@ pub fn attach(rig: Option<&str>) -> Result<ProcessContext, AttachError> {
     let Ok(mut conversation) = Conversation::connect(&socket(&Domain::named(&rig)?), limits) else {
         return Err(AttachError::NoSuchRig { name: rig, waiting: waiting()? });
     };
-    let invitation = match greet(&mut conversation) {
+    // The rig sends nothing more before this program is ready.
+    let invitation = match conversation.ask(&Hello::new()) {
         Ok(Answer::Invited(invitation)) => invitation,
         Ok(Answer::Refused { reason }) => return Err(AttachError::Refused { rig, reason }),
         Err(left) => return Err(AttachError::NoAnswer { rig, left }),
@@ -184,13 +185,6 @@ pub fn attach(rig: Option<&str>) -> Result<ProcessContext, AttachError> {
     let connection = conversation.into_connection().map_err(ProcessError::Supervisor)?;
     let (link, stop) = SupervisorLink::over(connection.into()).map_err(ProcessError::Supervisor)?;
     Ok(ProcessContext::new(&arguments, stop, link)?)
-}
-
-fn greet(conversation: &mut Conversation) -> Result<Answer, Left> {
-    conversation.say(line(&Hello::new()).as_bytes());
-    // The rig sends nothing more before this program is ready.
-    let answer = conversation.await_line()?;
-    serde_json::from_str(&answer).map_err(|error| Left::Failed(error.into()))
 }
 
 fn only_rig() -> Result<String, AttachError> {

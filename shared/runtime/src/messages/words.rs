@@ -11,9 +11,8 @@ use masseter_can::cia402::{DriveState, Statusword};
 /// The sentence for an event that names a node, a bus, an object, or why there is no pose; `None` for other events.
 pub fn explain(event: &Event) -> Option<String> {
     let cause = Cause::try_from(event.cause).ok().filter(|_| event.kind != EventKind::Transition.code())?;
-    let what = complaint(cause, event)?;
-    let remedy = remedy(cause).map_or_else(String::new, |remedy| format!("; {remedy}"));
-    Some(format!("{}: {what}{remedy}", place_of(event)))
+    let words = words_of_start(cause, event).or_else(|| words_of_run(cause, event))?;
+    Some(format!("{}: {words}", place_of(event)))
 }
 
 fn place_of(event: &Event) -> String {
@@ -29,87 +28,149 @@ fn place_of(event: &Event) -> String {
     }
 }
 
-fn complaint(cause: Cause, event: &Event) -> Option<String> {
+/// What value, limit and object mean by the cause, and what helps: of a drive that does not start, and of its power.
+fn words_of_start(cause: Cause, event: &Event) -> Option<String> {
     let object = ObjectAddress::new((event.object >> 8) as u16, event.object as u8);
     let (value, limit) = (event.value as u32, event.limit as u32);
+    let (power, fault) = (|| power_words(value, limit), || fault_words(value, limit));
+    let expected = |remedy: &str| format!("object {object} is {value:08X}h, expected {limit:08X}h; {remedy}");
     Some(match cause {
-        Cause::WrongIdentity
-        | Cause::WrongPdo
-        | Cause::NotAccepted
-        | Cause::HomeOffset
-        | Cause::WrongObject
-        | Cause::WrongUnit => {
-            format!("object {object} is {value:08X}h, expected {limit:08X}h")
+        Cause::WrongIdentity => {
+            expected("connect the drive that is configured, or correct drive_profile.identity")
         }
-        Cause::NotKept => {
-            format!("object {object} was written as {limit:08X}h and acknowledged, and reads {value:08X}h")
+        Cause::WrongPdo => expected("give the drive the rig's PDO mapping and store it"),
+        Cause::NotAccepted => expected("check whether the drive supports cyclic synchronous position"),
+        Cause::HomeOffset => expected("home the drive, or correct drive_profile.homing.home_position_m"),
+        Cause::WrongObject => expected("configure the drive, or correct drive_profile.objects"),
+        Cause::WrongUnit => expected("correct drive_profile.units, or the unit in the drive"),
+        Cause::NotKept => format!(
+            "object {object} was written as {limit:08X}h and acknowledged, and reads {value:08X}h; look up when the drive \
+             takes this object; its rule in drive_profile.objects says whether the rig writes it"
+        ),
+        Cause::SdoAborted => {
+            format!("object {object}: {}; look the object up in the drive's manual", AbortCode(value))
         }
-        Cause::SdoAborted => format!("object {object}: {}", AbortCode(value)),
-        Cause::SdoTimeout => {
-            format!("object {object}: no answer for {value} ms, the request was repeated every {limit} ms")
+        Cause::SdoTimeout => format!(
+            "object {object}: no answer for {value} ms, the request was repeated every {limit} ms; check power, wiring and \
+             bit rate of this drive"
+        ),
+        Cause::DuplicateNode => {
+            let more = if value == 0 {
+                "more answers than SDO requests"
+            } else {
+                "different process data after one SYNC"
+            };
+            format!(
+                "{more}, again and again; give every node an id of its own, and let no other client use SDO meanwhile"
+            )
         }
-        Cause::DuplicateNode if value == 0 => "more answers than SDO requests, again and again".to_owned(),
-        Cause::DuplicateNode => "different process data after one SYNC, again and again".to_owned(),
-        Cause::NodeRestarted => "booted although the master did not reset it".to_owned(),
-        Cause::FaultAtStart => {
-            format!("in fault, and a fault reset does not help; {}", fault_words(value, limit))
+        Cause::NodeRestarted => {
+            "booted although the master did not reset it; check its power supply".to_owned()
         }
-        Cause::FaultFound => format!("was found in fault; {}", fault_words(value, limit)),
-        Cause::FaultReset => format!("was found in fault, which was reset; {}", fault_words(value, limit)),
-        Cause::WaitsForDrive => format!("the other drives wait for this one: {}", power_words(value, limit)),
-        Cause::NotReady => {
-            format!("not ready to switch on within can.ready_timeout_ms: {}", power_words(value, limit))
-        }
+        Cause::FaultAtStart => format!(
+            "in fault, and a fault reset does not help; {}; remove the cause of the drive's error code, then switch the \
+             drive off and on",
+            fault()
+        ),
+        Cause::FaultFound => format!(
+            "was found in fault; {}; remove the cause of the error code, then reset the drive, or run with --reset-faults \
+             (can.reset_faults = true)",
+            fault()
+        ),
+        Cause::FaultReset => format!("was found in fault, which was reset; {}", fault()),
+        Cause::WaitsForDrive => format!("the other drives wait for this one: {}", power()),
+        Cause::NotReady => format!(
+            "not ready to switch on within can.ready_timeout_ms: {}; release the emergency stop and check the drive's \
+             supply; --wait-ready 60s waits longer",
+            power()
+        ),
         Cause::NotEnabled => format!(
-            "not enabled within can.enable_timeout_ms, so all drives are switched off: {}",
-            power_words(value, limit)
+            "not enabled within can.enable_timeout_ms, so all drives are switched off: {}; check its supply and its brake; \
+             raise can.enable_timeout_ms if its brake opens late",
+            power()
         ),
         Cause::StartTooFar => format!(
-            "the jaw is {:.3} mm from the first pose of the motion, limit {:.3} mm",
-            event.value * 1e3,
-            event.limit * 1e3
+            "the jaw is {} from the first pose of the motion, limit {}; bring the jaw closer, begin the \
+             motion where the jaw is, or raise controller.start_tolerance_mm",
+            millimetres(event.value),
+            millimetres(event.limit)
         ),
+        _ => return None,
+    })
+}
+
+/// The same of what happens on the buses and to the mechanism.
+fn words_of_run(cause: Cause, event: &Event) -> Option<String> {
+    let (value, limit) = (event.value as u32, event.limit as u32);
+    Some(match cause {
         Cause::FoodBroke => format!("the food broke at {:.0} N", event.value),
         Cause::EndStopHit => format!("ran into its end stop at {:.1} mm/s", event.value.abs() * 1e3),
-        Cause::StillPowered => {
-            format!("was left switched on, and a quick stop does not switch it off; statusword {value:04X}h")
-        }
-        Cause::BootTimeout => format!("not operational after {value} ms"),
+        Cause::StillPowered => format!(
+            "was left switched on, and a quick stop does not switch it off; statusword {value:04X}h; stop the other program \
+             that controls the drive, then switch its power off and on"
+        ),
+        Cause::BootTimeout => format!(
+            "not operational after {value} ms; check power, wiring, bit rate and node id of this drive"
+        ),
         Cause::HeartbeatLost => format!("silent for {value} ms"),
         Cause::ProcessDataLost => format!("process data missing for {}", counted(value.into(), "cycle")),
         Cause::FollowingError => format!(
-            "{:.3} mm from where its targets should have taken it, limit {:.3} mm",
-            event.value * 1e3,
-            event.limit * 1e3
+            "{} from where its targets should have taken it, limit {}; check its wiring, its load, and \
+             controller.lead_cycles if it smooths its targets",
+            millimetres(event.value),
+            millimetres(event.limit)
         ),
-        Cause::NodeStopped => {
-            format!("left the NMT state operational without a command of the master; now in state {value}")
-        }
+        Cause::NodeStopped => format!(
+            "left the NMT state operational without a command of the master; now in state {value}; read the drive's own \
+             emergency message, if there is one, and find the node that sends NMT commands"
+        ),
         Cause::Emergency if value == 0 => "all errors gone (EMCY 0000h)".to_owned(),
         Cause::Emergency => {
             format!("EMCY {}, error register {limit:02X}h", EmergencyCode(event.value as u16))
         }
-        Cause::BusOff => format!("off after too many errors (transmit error counter {value})"),
-        Cause::BusRefused => "a frame could not be sent".to_owned(),
-        Cause::WrongLength => {
-            format!(
-                "frame {:03X}h has {}, expected {limit}",
-                event.object,
-                counted(value.into(), "data byte")
-            )
+        Cause::BusOff => format!(
+            "off after too many errors (transmit error counter {value}); check bit rate, termination and wiring"
+        ),
+        Cause::BusRefused => {
+            "a frame could not be sent; check that the interface is up and that another node acknowledges"
+                .to_owned()
         }
-        Cause::UnknownNode => "a node that no axis is configured with".to_owned(),
-        Cause::SecondMaster => "another node sends SYNC or NMT, or has the master's id".to_owned(),
-        Cause::LawFailed if event.limit > 0.0 => {
-            format!("gave no pose: its quaternion has the length {}, not 1", event.value)
+        Cause::WrongLength => format!(
+            "frame {:03X}h has {}, expected {limit}; find the other sender of this identifier, and check the mapping of the \
+             PDO",
+            event.object,
+            counted(value.into(), "data byte")
+        ),
+        Cause::UnknownNode => {
+            "a node that no axis is configured with; check can.buses and can.node_ids".to_owned()
         }
-        Cause::LawFailed if event.value == 0.0 => "failed".to_owned(),
-        Cause::LawFailed => format!("gave no pose: its position contains {}", event.value),
-        Cause::ForwardKinematics | Cause::InverseKinematics => {
-            no_pose(NoPose::try_from(event.object).ok()?).to_owned()
+        Cause::SecondMaster => {
+            "another node sends SYNC or NMT, or has the master's id; use one master only: stop the other, \
+             or give that node another id"
+                .to_owned()
         }
+        Cause::LawFailed => {
+            let what = match (event.value, event.limit > 0.0) {
+                (length, true) => format!("gave no pose: its quaternion has the length {length}, not 1"),
+                (0.0, false) => "failed".to_owned(),
+                (place_m, false) => format!("gave no pose: its position contains {place_m}"),
+            };
+            what + "; see the message of your controller"
+        }
+        Cause::ForwardKinematics => format!(
+            "{}; compare what the encoders count with the rig, and the rig with the scenario's [mechanism]",
+            no_pose(NoPose::try_from(event.object).ok()?)
+        ),
+        Cause::InverseKinematics => format!(
+            "{}; check the motion, and the scenario's [mechanism]",
+            no_pose(NoPose::try_from(event.object).ok()?)
+        ),
         _ => return None,
     })
+}
+
+fn millimetres(m: f64) -> String {
+    format!("{:.3} mm", m * 1e3)
 }
 
 /// Error code and state of a drive in fault.
@@ -139,58 +200,6 @@ const fn no_pose(reason: NoPose) -> &'static str {
         NoPose::Undecided => "the positions that were read fit poses that cannot be distinguished",
         NoPose::NotFound => "is singular with the positions that were read",
     }
-}
-
-const fn remedy(cause: Cause) -> Option<&'static str> {
-    Some(match cause {
-        Cause::WrongIdentity => "connect the drive that is configured, or correct drive_profile.identity",
-        Cause::WrongPdo => "give the drive the rig's PDO mapping and store it",
-        Cause::NotAccepted => "check whether the drive supports cyclic synchronous position",
-        Cause::SdoAborted => "look the object up in the drive's manual",
-        Cause::NotKept => {
-            "look up when the drive takes this object; its rule in drive_profile.objects says whether the rig writes it"
-        }
-        Cause::SdoTimeout => "check power, wiring and bit rate of this drive",
-        Cause::DuplicateNode => "give every node an id of its own, and let no other client use SDO meanwhile",
-        Cause::NodeRestarted => "check its power supply",
-        Cause::NodeStopped => {
-            "read the drive's own emergency message, if there is one, and find the node that sends NMT commands"
-        }
-        Cause::FollowingError => {
-            "check its wiring, its load, and controller.lead_cycles if it smooths its targets"
-        }
-        Cause::FaultAtStart => "remove the cause of the drive's error code, then switch the drive off and on",
-        Cause::FaultFound => {
-            "remove the cause of the error code, then reset the drive, or run with --reset-faults (can.reset_faults = true)"
-        }
-        Cause::NotReady => {
-            "release the emergency stop and check the drive's supply; --wait-ready 60s waits longer"
-        }
-        Cause::NotEnabled => {
-            "check its supply and its brake; raise can.enable_timeout_ms if its brake opens late"
-        }
-        Cause::StartTooFar => {
-            "bring the jaw closer, begin the motion where the jaw is, or raise controller.start_tolerance_mm"
-        }
-        Cause::StillPowered => {
-            "stop the other program that controls the drive, then switch its power off and on"
-        }
-        Cause::HomeOffset => "home the drive, or correct drive_profile.homing.home_position_m",
-        Cause::WrongObject => "configure the drive, or correct drive_profile.objects",
-        Cause::WrongUnit => "correct drive_profile.units, or the unit in the drive",
-        Cause::BootTimeout => "check power, wiring, bit rate and node id of this drive",
-        Cause::BusOff => "check bit rate, termination and wiring",
-        Cause::BusRefused => "check that the interface is up and that another node acknowledges",
-        Cause::WrongLength => "find the other sender of this identifier, and check the mapping of the PDO",
-        Cause::UnknownNode => "check can.buses and can.node_ids",
-        Cause::SecondMaster => "use one master only: stop the other, or give that node another id",
-        Cause::LawFailed => "see the message of your controller",
-        Cause::ForwardKinematics => {
-            "compare what the encoders count with the rig, and the rig with the scenario's [mechanism]"
-        }
-        Cause::InverseKinematics => "check the motion, and the scenario's [mechanism]",
-        _ => return None,
-    })
 }
 
 #[cfg(test)]

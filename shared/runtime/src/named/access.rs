@@ -184,17 +184,14 @@ fn ask_controller(domain: &Domain, request: &Request) -> Result<Vec<Parameter>, 
     let limits = Limits::answer(EXPIRY_NS + GRACE_NS, LONGEST_ANSWER);
     let connected = Conversation::connect(&parameter_socket(domain), limits);
     let mut conversation = connected.map_err(|_| AccessError::NoParameters(rig()))?;
-    conversation.say(line(request).as_bytes());
-    let answer = conversation.await_line().map_err(no_answer)?;
-    match serde_json::from_str(&answer) {
-        Ok(Answer::Parameters(parameters)) => {
+    match conversation.ask(request).map_err(no_answer)? {
+        Answer::Parameters(parameters) => {
             // Pages and terminals show them.
             let declared = Declared { parameters, ..Declared::default() };
             declared.check().map_err(|error| AccessError::Refused(error.to_string()))?;
             Ok(declared.parameters)
         }
-        Ok(Answer::Refused { reason }) => Err(AccessError::Refused(sentence(&reason))),
-        Err(error) => Err(no_answer(Left::Failed(error.into()))),
+        Answer::Refused { reason } => Err(AccessError::Refused(sentence(&reason))),
     }
 }
 

@@ -51,7 +51,7 @@ impl Outgoing for Outlet<[FrameTap]> {
         next: &mut dyn FnMut() -> FrameTap,
         stamp: &mut dyn FnMut(&mut [FrameTap]),
     ) -> Result<(), TransportError> {
-        let sample = self.port.loan_slice_uninit(count).map_err(failed("loaning", FrameTap::TOPIC))?;
+        let sample = self.inner.loan_slice_uninit(count).map_err(failed("loaning", FrameTap::TOPIC))?;
         let mut sample = sample.write_from_fn(|_| next());
         stamp(sample.payload_mut());
         sample.send().map_err(failed("sending", FrameTap::TOPIC))?;
@@ -59,7 +59,7 @@ impl Outgoing for Outlet<[FrameTap]> {
     }
 
     fn warm_up(&self) -> Result<(), TransportError> {
-        let sample = self.port.loan_slice_uninit(BATCH).map_err(failed("loaning", FrameTap::TOPIC))?;
+        let sample = self.inner.loan_slice_uninit(BATCH).map_err(failed("loaning", FrameTap::TOPIC))?;
         drop(sample.write_from_fn(|_| FrameTap::default()));
         Ok(())
     }
@@ -67,8 +67,8 @@ impl Outgoing for Outlet<[FrameTap]> {
 
 impl Incoming for Inlet<[FrameTap]> {
     fn next(&self) -> Result<Option<Batch>, TransportError> {
-        let sample = self.port.receive().map_err(failed("receiving", FrameTap::TOPIC))?;
-        self.refused.require_none(FrameTap::TOPIC)?;
+        let sample = self.inner.receive().map_err(failed("receiving", FrameTap::TOPIC))?;
+        self.require_all_connections()?;
         sample.iter().flat_map(|sample| sample.iter()).try_for_each(check_version)?;
         Ok(sample)
     }
@@ -84,7 +84,8 @@ impl FramePublisher {
     pub fn open(node: &Node) -> Result<Self, TransportError> {
         let service = service(node)?;
         let builder = service.publisher_builder().initial_max_slice_len(BATCH);
-        let outlet = Outlet::create(builder.allocation_strategy(AllocationStrategy::Static))?;
+        let outlet =
+            Outlet::create(builder.allocation_strategy(AllocationStrategy::Static), FrameTap::TOPIC)?;
         Ok(Self { port: Box::new(outlet), sent: 0 })
     }
 
@@ -136,7 +137,8 @@ impl FramePublisher {
 impl FrameSubscriber {
     /// A subscriber of the topic of frames.
     pub fn open(node: &Node) -> Result<Self, TransportError> {
-        Ok(Self(Box::new(Inlet::create(service(node)?.subscriber_builder())?)))
+        let service = service(node)?;
+        Ok(Self(Box::new(Inlet::create(service.subscriber_builder(), FrameTap::TOPIC)?)))
     }
 
     /// The oldest batch not yet received; never waits. Refused when a connection to a publisher failed, since its frames

@@ -41,9 +41,13 @@ mod timeline {
             timeline.take(&Recorded::State(State { cycle, reading_cycle, ..State::default() }));
         }
         let found: Vec<_> = std::iter::from_fn(|| timeline.finish())
-            .map(|Sample { messages, .. }| (messages.state.map(|state| state.cycle), messages.has_solution))
+            .map(|Sample { messages, .. }| {
+                [messages.state, messages.solution].map(|of| of.map(|state| state.cycle))
+            })
             .collect();
-        assert_eq!(found, [(Some(1), true), (Some(3), true), (None, false), (Some(4), true), (None, false)]);
+        let [first, second, third, fourth] =
+            [[Some(1), Some(1)], [Some(2), Some(3)], [Some(3), None], [Some(4), Some(4)]];
+        assert_eq!(found, [first, second, third, fourth, [None, None]]);
     }
 
     #[test]

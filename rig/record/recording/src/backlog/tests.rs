@@ -1,4 +1,4 @@
-use std::io::{self, Cursor, Seek, SeekFrom, Write};
+use std::io::{self, Cursor, Write};
 use std::sync::mpsc::{Receiver, channel};
 
 use masseter_model::geometry::{Mechanism, MechanismConfig};
@@ -40,12 +40,6 @@ impl Write for Stuck {
 
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
-    }
-}
-
-impl Seek for Stuck {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.bytes.seek(to)
     }
 }
 

@@ -10,6 +10,7 @@ use masseter_recording::{Recorded, Scene, Topic};
 use masseter_runtime::named::Declared;
 use masseter_runtime::transport::Domain;
 use rustix::process::{Pid, Signal, getppid, kill_process};
+use serde::Serialize;
 use tungstenite::Error;
 use tungstenite::protocol::frame::{CloseFrame, coding::CloseCode};
 use tungstenite::protocol::{Message, Role, WebSocket, WebSocketConfig};
@@ -35,7 +36,8 @@ pub(super) fn bit(topic: Topic) -> u16 {
 }
 
 /// The client is disconnected.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
+#[error("the client has left")]
 pub(super) struct Disconnected;
 
 impl From<Error> for Disconnected {
@@ -64,6 +66,13 @@ impl Socket {
             Ok(_) | Err(Error::Io(_)) => Ok(None),
             Err(_) => Err(Disconnected),
         }
+    }
+
+    /// Sends a message as JSON at once.
+    pub(super) fn send_json(&mut self, message: &impl Serialize) -> Result<(), Disconnected> {
+        self.send_text(
+            &serde_json::to_string(message).expect("the message holds only strings, numbers and lists"),
+        )
     }
 
     /// Sends a text at once.

@@ -10,13 +10,28 @@ use std::sync::mpsc::{Receiver, TryRecvError};
 
 use masseter_recording::{Channel, Encoded, Encoder, Recorded, Topic, definitions};
 use masseter_runtime::messages::Parameters;
-use masseter_runtime::named::{Declared, Parameter, access};
+use masseter_runtime::named::access::{self, AccessError};
+use masseter_runtime::named::{Declared, Parameter};
 use serde::{Deserialize, Serialize};
 
 use super::connection::{Disconnected, Host, QUEUE, Queued, Socket, bit};
 
 /// Why a request is not fulfilled.
-type Refusal = (Level, String);
+#[derive(Debug, thiserror::Error)]
+enum Refusal {
+    #[error(transparent)]
+    Disconnected(#[from] Disconnected),
+    #[error("the channel does not exist")]
+    NoChannel,
+    #[error("parameter '{name}' is a number, not {value}")]
+    NoNumber { name: String, value: serde_json::Value },
+    #[error("the server offers subscriptions and parameters only")]
+    Unsupported,
+    #[error("the request is not valid: {0}")]
+    Invalid(#[from] serde_json::Error),
+    #[error(transparent)]
+    Access(#[from] AccessError),
+}
 
 /// A client's connection.
 pub(super) struct Session {
@@ -40,8 +55,13 @@ impl Session {
 
     /// Serves the client until the queue has ended and the client has read everything.
     pub(super) fn serve(mut self, queue: &Receiver<Queued>) -> Result<(), Disconnected> {
-        self.socket.send_text(&server_info(self.host.domain.id(), &self.host.declared))?;
-        self.socket.send_text(&advertise(&self.host.declared))?;
+        let Host { declared, domain, .. } = &self.host;
+        let capabilities: &[_] =
+            if declared.parameters.is_empty() { &[] } else { &["parameters", "parametersSubscribe"] };
+        // Clients discard data of a run with another id.
+        let session_id = domain.id();
+        self.socket.send_json(&ServerMessage::ServerInfo { name: "masseter", capabilities, session_id })?;
+        self.socket.send_json(&advertise(declared))?;
         loop {
             if let Some(text) = self.socket.receive()? {
                 self.answer_request(&text)?;
@@ -58,80 +78,67 @@ impl Session {
     }
 
     /// Sends the parameters of these names, or all.
-    fn send_parameters(
-        &mut self,
-        names: &[String],
-        id: Option<&str>,
-    ) -> Result<Option<Refusal>, Disconnected> {
-        match access::list(&self.host.domain) {
-            Ok(parameters) => {
-                let is_asked = |parameter: &&Parameter| names.is_empty() || names.contains(&parameter.name);
-                let asked = parameters.iter().filter(is_asked).map(|parameter| (parameter, parameter.value));
-                self.socket.send_text(&parameter_values(asked, id))?;
-                Ok(None)
-            }
-            Err(error) => Ok(Some((Level::Error, error.to_string()))),
-        }
+    fn send_parameters(&mut self, names: &[String], id: Option<String>) -> Result<(), Refusal> {
+        let known = access::list(&self.host.domain)?;
+        let is_asked = |parameter: &&Parameter| names.is_empty() || names.contains(&parameter.name);
+        let asked = known.iter().filter(is_asked).map(|parameter| (parameter, parameter.value));
+        Ok(self.socket.send_json(&parameter_values(asked, id))?)
     }
 
-    /// Sets parameters at the controller, and answers if there is an id: with what holds now.
-    fn set_parameters(
-        &mut self,
-        wanted: &[WantedValue],
-        id: Option<&str>,
-    ) -> Result<Option<Refusal>, Disconnected> {
-        let mut refused = None;
-        for WantedValue { name, value } in wanted {
-            let set = match value.as_f64() {
-                Some(number) => {
-                    access::set(&self.host.domain, name, number).map_err(|error| error.to_string())
-                }
-                None => Err(format!("parameter '{name}' is a number, not {value}")),
-            };
-            refused = set.err().map(|error| (Level::Error, error)).or(refused);
-        }
-        if id.is_none() && refused.is_none() {
-            return Ok(None);
-        }
-        // A refused value must not remain on the client's screen.
+    /// Sets parameters at the controller, and answers if there is an id: with what holds now. A refused value must not remain
+    /// on the client's screen.
+    fn set_parameters(&mut self, wanted: Vec<WantedValue>, id: Option<String>) -> Result<(), Refusal> {
         let names: Vec<_> = wanted.iter().map(|WantedValue { name, .. }| name.clone()).collect();
-        let unanswered = self.send_parameters(&names, id)?;
-        Ok(refused.or(unanswered))
+        let set = |WantedValue { name, value }| match value.as_f64() {
+            Some(number) => Ok(access::set(&self.host.domain, &name, number).map(drop)?),
+            None => Err(Refusal::NoNumber { name, value }),
+        };
+        let refused = wanted.into_iter().filter_map(|value| set(value).err()).next_back();
+        if id.is_none() && refused.is_none() {
+            return Ok(());
+        }
+        let answered = self.send_parameters(&names, id);
+        refused.map_or(answered, Err)
     }
 
+    /// Answers a request; a refusal too.
     fn answer_request(&mut self, text: &str) -> Result<(), Disconnected> {
-        let mut refused = None;
-        match serde_json::from_str(text) {
-            Ok(ClientMessage::Subscribe { subscriptions }) => {
-                for subscription in subscriptions {
-                    match subscription.channel_index() {
-                        Some(index) => self.subscriptions[index] = Some(subscription.id),
-                        None => refused = Some((Level::Error, "the channel does not exist".to_owned())),
-                    }
+        let done = self.fulfil(text);
+        self.publish_subscriptions();
+        match done {
+            Ok(()) => Ok(()),
+            Err(Refusal::Disconnected(disconnected)) => Err(disconnected),
+            Err(refusal) => {
+                // The levels of the protocol: a warning is 1, an error 2.
+                let level = if matches!(refusal, Refusal::Unsupported) { 1 } else { 2 };
+                self.socket.send_json(&ServerMessage::Status { level, message: refusal.to_string() })
+            }
+        }
+    }
+
+    fn fulfil(&mut self, text: &str) -> Result<(), Refusal> {
+        match serde_json::from_str(text)? {
+            ClientMessage::Subscribe { subscriptions } => {
+                let is_known = |subscription: &Subscription| subscription.channel_id < Channel::COUNT;
+                for Subscription { id, channel_id } in subscriptions.iter().filter(|one| is_known(one)) {
+                    self.subscriptions[*channel_id] = Some(*id);
+                }
+                if !subscriptions.iter().all(is_known) {
+                    return Err(Refusal::NoChannel);
                 }
             }
-            Ok(ClientMessage::Unsubscribe { subscription_ids }) => {
+            ClientMessage::Unsubscribe { subscription_ids } => {
                 for id in &mut self.subscriptions {
                     *id = id.filter(|id| !subscription_ids.contains(id));
                 }
             }
-            Ok(ClientMessage::GetParameters { parameter_names, id }) => {
-                refused = self.send_parameters(&parameter_names, id.as_deref())?;
+            ClientMessage::GetParameters { parameter_names, id } => {
+                self.send_parameters(&parameter_names, id)?;
             }
-            Ok(ClientMessage::SetParameters { parameters, id }) => {
-                refused = self.set_parameters(&parameters, id.as_deref())?;
-            }
-            Ok(ClientMessage::SubscribeParameterUpdates { .. }) => self.wants_parameters = true,
-            Ok(ClientMessage::UnsubscribeParameterUpdates { .. }) => self.wants_parameters = false,
-            Ok(ClientMessage::Unsupported) => {
-                let offered = "the server offers subscriptions and parameters only".to_owned();
-                refused = Some((Level::Warning, offered));
-            }
-            Err(error) => refused = Some((Level::Error, format!("the request is not valid: {error}"))),
-        }
-        self.publish_subscriptions();
-        if let Some((level, text)) = refused {
-            self.socket.send_text(&status(level, &text))?;
+            ClientMessage::SetParameters { parameters, id } => self.set_parameters(parameters, id)?,
+            ClientMessage::SubscribeParameterUpdates { .. } => self.wants_parameters = true,
+            ClientMessage::UnsubscribeParameterUpdates { .. } => self.wants_parameters = false,
+            ClientMessage::Unsupported => return Err(Refusal::Unsupported),
         }
         Ok(())
     }
@@ -153,7 +160,7 @@ impl Session {
         {
             let values = parameters.as_slice().iter().copied();
             let named = self.host.declared.parameters.iter().zip(values);
-            self.socket.send_text(&parameter_values(named, None))?;
+            self.socket.send_json(&parameter_values(named, None))?;
         }
         let Self { socket, encoder, subscriptions, .. } = self;
         encoder.encode(message, |message: Encoded| match subscriptions[message.channel.place()] {
@@ -175,13 +182,6 @@ pub(super) fn choose_subprotocol(offered: &str) -> Option<&'static str> {
     SUBPROTOCOLS.into_iter().find(offers)
 }
 
-/// The level of a status message, by its number in the protocol.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Level {
-    Warning = 1,
-    Error = 2,
-}
-
 #[derive(Serialize)]
 #[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
 enum ServerMessage<'a> {
@@ -195,19 +195,19 @@ enum ServerMessage<'a> {
     },
     Status {
         level: u8,
-        message: &'a str,
+        message: String,
     },
     ParameterValues {
-        parameters: Vec<ParameterValue>,
+        parameters: Vec<ParameterValue<'a>>,
         #[serde(skip_serializing_if = "Option::is_none")]
-        id: Option<&'a str>,
+        id: Option<String>,
     },
 }
 
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 struct Advertised {
-    id: u64,
+    id: usize,
     topic: String,
     encoding: String,
     schema_name: String,
@@ -217,8 +217,8 @@ struct Advertised {
 
 /// A parameter with its value. Without a type, a client takes a whole number for an integer.
 #[derive(Serialize)]
-struct ParameterValue {
-    name: String,
+struct ParameterValue<'a> {
+    name: &'a str,
     value: f64,
     r#type: &'static str,
 }
@@ -265,40 +265,27 @@ enum ClientMessage {
 #[serde(rename_all = "camelCase")]
 struct Subscription {
     id: u32,
-    channel_id: u64,
-}
-
-impl Subscription {
-    /// Index of the channel in [`definitions`], if it exists.
-    fn channel_index(self) -> Option<usize> {
-        usize::try_from(self.channel_id).ok().filter(|index| *index < Channel::COUNT)
-    }
-}
-
-/// The first message to a client. `session` differs between runs, so that clients discard data of an earlier run.
-fn server_info(session: &str, declared: &Declared) -> String {
-    let capabilities: &[_] =
-        if declared.parameters.is_empty() { &[] } else { &["parameters", "parametersSubscribe"] };
-    to_json(&ServerMessage::ServerInfo { name: "masseter", capabilities, session_id: session })
+    /// The place of the channel.
+    channel_id: usize,
 }
 
 /// Parameters with their values; `id` is that of the request, if they answer one.
-fn parameter_values<'a>(parameters: impl Iterator<Item = (&'a Parameter, f64)>, id: Option<&str>) -> String {
-    let value = |(parameter, value): (&Parameter, f64)| ParameterValue {
-        name: parameter.name.clone(),
-        value,
-        r#type: "float64",
-    };
-    to_json(&ServerMessage::ParameterValues { parameters: parameters.map(value).collect(), id })
+fn parameter_values<'a>(
+    parameters: impl Iterator<Item = (&'a Parameter, f64)>,
+    id: Option<String>,
+) -> ServerMessage<'a> {
+    let value =
+        |(known, value): (&'a Parameter, f64)| ParameterValue { name: &known.name, value, r#type: "float64" };
+    ServerMessage::ParameterValues { parameters: parameters.map(value).collect(), id }
 }
 
 /// All channels, each with its place as id.
-fn advertise(declared: &Declared) -> String {
+fn advertise(declared: &Declared) -> ServerMessage<'static> {
     let channels = definitions(declared);
     let advertised = |(place, channel): &(Channel, mcap::Channel<'static>)| {
         let schema = channel.schema.as_ref().expect("every channel of the rig has a schema");
         Advertised {
-            id: place.place() as u64,
+            id: place.place(),
             topic: channel.topic.clone(),
             encoding: channel.message_encoding.clone(),
             schema_name: schema.name.clone(),
@@ -306,12 +293,7 @@ fn advertise(declared: &Declared) -> String {
             schema: String::from_utf8_lossy(&schema.data).into_owned(),
         }
     };
-    to_json(&ServerMessage::Advertise { channels: channels.iter().map(advertised).collect() })
-}
-
-/// A message for the client's user.
-fn status(level: Level, message: &str) -> String {
-    to_json(&ServerMessage::Status { level: level as u8, message })
+    ServerMessage::Advertise { channels: channels.iter().map(advertised).collect() }
 }
 
 /// A message of a subscribed channel.
@@ -322,10 +304,6 @@ fn message_data(subscription: u32, log_time_ns: u64, message: &Encoded) -> Vec<u
     data.extend_from_slice(&log_time_ns.to_le_bytes());
     data.extend_from_slice(message.bytes);
     data
-}
-
-fn to_json(message: &ServerMessage) -> String {
-    serde_json::to_string(message).expect("the message holds only strings, numbers and lists")
 }
 
 #[cfg(test)]
@@ -346,7 +324,7 @@ mod tests {
     fn channels_are_advertised_as_recordings_define_them() {
         let signal = Signal { name: "grip".into(), unit: "N".into(), about: String::new() };
         let declared = Declared { signals: vec![signal], ..Declared::default() };
-        let message: Value = serde_json::from_str(&advertise(&declared)).unwrap();
+        let message: Value = serde_json::to_value(advertise(&declared)).unwrap();
         assert_eq!(message["op"], "advertise");
         assert!(message.to_string().contains("float64 grip"));
         for (index, (place, definition)) in definitions(&declared).iter().enumerate() {
@@ -365,9 +343,7 @@ mod tests {
         let parse = |text: &str| serde_json::from_str::<ClientMessage>(text);
         let subscribe = json!({"op": "subscribe", "subscriptions": [{"id": 7, "channelId": 2}]});
         let Ok(ClientMessage::Subscribe { subscriptions }) = parse(&subscribe.to_string()) else { panic!() };
-        assert_eq!((subscriptions[0].id, subscriptions[0].channel_index()), (7, Some(2)));
-        let beyond = Subscription { id: 7, channel_id: Channel::COUNT as u64 };
-        assert_eq!(beyond.channel_index(), None);
+        assert_eq!(subscriptions, [Subscription { id: 7, channel_id: 2 }]);
         let unsubscribe = r#"{"op": "unsubscribe", "subscriptionIds": [7]}"#;
         assert_eq!(parse(unsubscribe).unwrap(), ClientMessage::Unsubscribe { subscription_ids: vec![7] });
         let set = json!({"op": "setParameters", "parameters": [{"name": "gain", "value": 3}], "id": "7"});

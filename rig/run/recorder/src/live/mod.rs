@@ -83,25 +83,12 @@ const CLOSING: Duration = Duration::from_millis(500);
 /// Time between two looks whether all have read it.
 const CLOSING_POLL: Duration = Duration::from_millis(10);
 
-/// A socket that listens, and does not answer yet.
-#[derive(Debug)]
-pub(crate) struct Listener {
-    listener: TcpListener,
-    address: SocketAddr,
-}
-
-impl Listener {
-    /// Listens on an address.
-    ///
-    /// # Errors
-    /// When the system refuses the address.
-    pub(crate) fn bind(address: SocketAddr) -> Result<Self, ListenError> {
-        let bound = TcpListener::bind(address).and_then(|listener| {
-            listener.set_nonblocking(true)?;
-            Ok(Self { address: listener.local_addr()?, listener })
-        });
-        bound.map_err(|error| ListenError { address, error })
-    }
+/// Listens on an address, and does not answer yet.
+///
+/// # Errors
+/// When the system refuses the address.
+pub fn listen_on(address: SocketAddr) -> Result<TcpListener, ListenError> {
+    TcpListener::bind(address).map_err(|error| ListenError { address, error })
 }
 
 /// A running server.
@@ -170,17 +157,6 @@ impl Client {
     fn is_gone(&self) -> bool {
         self.serving.is_finished()
     }
-
-    /// Ends the queue: the thread sends the rest and closes the connection.
-    fn end_queue(&mut self) {
-        self.queue = None;
-    }
-
-    /// Disconnects the client.
-    fn cut_off(&self) {
-        // It fails where the client has just left.
-        let _ = self.stream.shutdown(Shutdown::Both);
-    }
 }
 
 #[derive(Debug, Default)]
@@ -237,14 +213,6 @@ impl Clients {
     }
 }
 
-/// Whether a server can listen on `address`.
-///
-/// # Errors
-/// When the system refuses the address.
-pub fn check(address: SocketAddr) -> Result<(), ListenError> {
-    Listener::bind(address).map(drop)
-}
-
 impl LiveServer {
     /// Serves clients that name the secret, which is new. The domain is that of the run, whose controller makes the
     /// declaration.
@@ -252,15 +220,14 @@ impl LiveServer {
     /// # Errors
     /// When the system refuses a thread or random numbers.
     pub(crate) fn start(
-        Listener { listener, address }: Listener,
+        listener: TcpListener,
         manifest: Manifest,
         scene: Scene,
         declared: Declared,
         domain: Domain,
-    ) -> Result<Self, ListenError> {
-        let refused = |error| ListenError { address, error };
-        let secret = secret().map_err(refused)?;
-        let feed = Feed::start(manifest, &declared).map_err(refused)?;
+    ) -> io::Result<Self> {
+        let (address, secret) = (listener.local_addr()?, secret()?);
+        let feed = Feed::start(manifest, &declared)?;
         let host = Host {
             secret: secret.clone(),
             scene,
@@ -272,9 +239,8 @@ impl LiveServer {
         let clients = Arc::new(Clients::default());
         let accepted = Arc::clone(&clients);
         let limits = Limits::newcomer(request::LONGEST);
-        let mut newcomers = Newcomers::at(listener.into(), MAX_NEWCOMERS, limits).map_err(refused)?;
-        let accepting =
-            thread::Builder::new().spawn(move || accepted.accept(&mut newcomers, &host)).map_err(refused)?;
+        let mut newcomers = Newcomers::at(listener.into(), MAX_NEWCOMERS, limits)?;
+        let accepting = thread::Builder::new().spawn(move || accepted.accept(&mut newcomers, &host))?;
         Ok(Self { address, secret, feed, clients, dropped: AtomicU64::new(0), accepting })
     }
 
@@ -313,7 +279,8 @@ impl LiveServer {
         // A panic of this thread is on standard error already, and does not concern the recording.
         let _ = self.accepting.join();
         let mut clients = self.clients.connected();
-        clients.iter_mut().for_each(Client::end_queue);
+        // Without its queue a thread sends the rest and closes the connection.
+        clients.iter_mut().for_each(|client| client.queue = None);
         for _ in 0..time.as_millis() / CLOSING_POLL.as_millis() {
             clients.retain(|client| !client.is_gone());
             if clients.is_empty() {
@@ -321,7 +288,10 @@ impl LiveServer {
             }
             clock::sleep(CLOSING_POLL);
         }
-        clients.iter().for_each(Client::cut_off);
+        for client in clients.iter() {
+            // It fails where the client has just left.
+            let _ = client.stream.shutdown(Shutdown::Both);
+        }
         let cut_off = clients.iter().filter(|client| client.is_subscribed()).count();
         ClientLosses { dropped: self.dropped.load(Ordering::Relaxed), cut_off }
     }

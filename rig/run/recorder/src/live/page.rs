@@ -65,7 +65,7 @@ impl Session {
             }
             self.send_updates()?;
             if is_over {
-                self.socket.send_text(&json!({ "over": true }).to_string())?;
+                self.socket.send_json(&json!({ "over": true }))?;
                 return self.socket.close_after_all();
             }
         }
@@ -77,7 +77,7 @@ impl Session {
                 Next::Update(text) => self.socket.send_text(&text)?,
                 Next::None => return Ok(()),
                 Next::Lost => {
-                    self.socket.send_text(&json!({ "reload": true }).to_string())?;
+                    self.socket.send_json(&json!({ "reload": true }))?;
                     return self.socket.close_after_all();
                 }
             }
@@ -96,7 +96,7 @@ impl Session {
             }
             Err(error) => Some(format!("the request is not valid: {error}")),
         };
-        refused.map_or(Ok(()), |refused| self.socket.send_text(&json!({ "refused": refused }).to_string()))
+        refused.map_or(Ok(()), |refused| self.socket.send_json(&json!({ "refused": refused })))
     }
 }
 

@@ -78,23 +78,17 @@ pub(super) fn http_answer(status: StatusCode, kind: &str, text: &dyn Display) ->
     (head + &text).into_bytes()
 }
 
-/// None where the request has not come completely.
-fn parse_request(bytes: &[u8]) -> Result<Option<(Request, usize)>, NoRequest> {
+/// None where the request has not come completely; an error where the bytes are no request of HTTP.
+fn parse_request(bytes: &[u8]) -> anyhow::Result<Option<(Request, usize)>> {
     let mut headers = [httparse::EMPTY_HEADER; HEADERS];
     let mut parsed = httparse::Request::new(&mut headers);
-    let httparse::Status::Complete(length) = parsed.parse(bytes).map_err(|_| NoRequest)? else {
-        return Ok(None);
-    };
+    let httparse::Status::Complete(length) = parsed.parse(bytes)? else { return Ok(None) };
     let mut request = Request::builder().method(parsed.method.unwrap_or("")).uri(parsed.path.unwrap_or(""));
     for header in parsed.headers.iter() {
         request = request.header(header.name, header.value);
     }
-    Ok(Some((request.body(()).map_err(|_| NoRequest)?, length)))
+    Ok(Some((request.body(())?, length)))
 }
-
-/// The bytes are no request of HTTP.
-#[derive(Debug)]
-struct NoRequest;
 
 /// The first offered protocol that this server speaks, and its name.
 fn choose_protocol(request: &Request) -> Option<(Protocol, &'static str)> {

@@ -16,7 +16,7 @@ use super::*;
 
 fn server() -> LiveServer {
     let scene = Scene::new(&Mechanism::new(&MechanismConfig::default()).unwrap(), &JawConfig::default());
-    let listener = Listener::bind("127.0.0.1:0".parse().unwrap()).unwrap();
+    let listener = listen_on("127.0.0.1:0".parse().unwrap()).unwrap();
     let machine = MachineInfo { cpu: String::new(), cores: 2, kernel: String::new(), is_virtual: false };
     let manifest = Manifest::new("0.1.0", Scenario::default(), 1.0, "rt", machine);
     LiveServer::start(listener, manifest, scene, Declared::default(), Domain::named("test").unwrap()).unwrap()

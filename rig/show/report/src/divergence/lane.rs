@@ -110,12 +110,14 @@ impl Lane {
             }
         }
         let tails = bodies.map(|body| columns.split(body).map_or(body, |(_, tail)| tail));
-        if let Some(name) = columns.tail()
+        if let Some(tail) = columns.tail()
             && tails[0] != tails[1]
         {
             let values = tails.map(|tail| data_encoding::HEXUPPER.encode(tail));
             let growth = self.growths.entry(columns.fields().len());
-            growth.or_insert_with(|| FieldGrowth::of(name, "", cycle, values)).add_difference(cycle, None);
+            growth
+                .or_insert_with(|| FieldGrowth::of(tail.name(), "", cycle, values))
+                .add_difference(cycle, None);
         }
     }
 
@@ -263,7 +265,7 @@ mod tests {
 
     fn sized(definition: &str, a: &[f64], b: &[f64]) -> (Option<String>, &'static str) {
         let columns = Columns::from_definition(definition).unwrap();
-        let values = [a, b].map(|values| values.iter().copied().map(Number::Double).collect());
+        let values = [a, b].map(|values| values.iter().copied().map(Number::Real).collect());
         let (unit, size) = difference(&columns.fields()[0], &values);
         (size.map(|size| format!("{size:.3}")), unit)
     }

@@ -12,7 +12,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
-use masseter_recording::{Columns, Digester, Digests, Reader, Recorded, RunFolder, Topic, is_kept};
+use masseter_recording::{Columns, Digester, Digests, Reader, Recorded, Topic, is_kept, recording_at};
 use masseter_terminal::{Exit, Format, result};
 
 use self::differences::{DigestDifference, FORM, FieldDifference, MotionClock, OneSided};
@@ -148,7 +148,7 @@ struct Stream {
 impl Stream {
     /// Opens a recording, or that of a run folder.
     fn open(path: &Path) -> anyhow::Result<Self> {
-        let path = if path.is_dir() { RunFolder::open(path)?.recording() } else { path.to_owned() };
+        let path = recording_at(path)?;
         let name = || path.display().to_string();
         let mut reader = Reader::open(&path).with_context(name)?;
         // Before the first message come the definitions of all channels, and the attached files.

@@ -5,7 +5,7 @@ mod result;
 mod rig;
 mod times;
 
-use masseter_analysis::Figures;
+use masseter_analysis::{Figures, Verdict};
 use masseter_page::{Life, Page, PageError, Section};
 use masseter_recording::Manifest;
 
@@ -13,7 +13,6 @@ use self::motion::{actuators_section, jaw_section, mechanism_section, motion_sec
 use self::result::{events_section, live_sections, named_section, requirements_section, result_section};
 use self::rig::{buses_section, circumstances_section, timing_section};
 use self::times::{moments, phases, time};
-use crate::verdict::Verdict;
 
 /// The page.
 pub(crate) fn html(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Result<String, PageError> {

@@ -1,7 +1,10 @@
 //! What came out: verdict, checks, requirements, events, the controller's signals and parameters; and a run that goes on.
 
 use masseter_analysis::requirements::{RequirementFigures, RequirementPlot};
-use masseter_analysis::{Code, Curve, EventRecord, Figures, ParameterFigures, SignalFigures};
+use masseter_analysis::{
+    Check, CheckResult, Code, Curve, EventRecord, Figures, ParameterFigures, SignalFigures, TimingWord,
+    Verdict,
+};
 use masseter_page::{
     Block, Cell, Chart, Column, Content, EventRow, Events, Live, Moment, MomentKind, Points, Section, Series,
     Style, Table, Tone,
@@ -11,10 +14,7 @@ use masseter_runtime::messages::codes::{ControllerState, EventKind};
 use masseter_terminal::Exit;
 
 use super::times::{limit, plain, since_s};
-use crate::check::{Check, CheckResult};
-use crate::text::{self, microseconds, mm, or_dash, significant};
-use crate::timing::TimingWord;
-use crate::verdict::Verdict;
+use crate::text::{microseconds, mm, or_dash, significant};
 
 pub(super) fn result_section(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Section {
     let row = |check: &Check| {
@@ -156,7 +156,7 @@ fn requirement_chart(figures: &Figures, of: &RequirementFigures) -> Option<Chart
 pub(super) fn events_section(figures: &Figures) -> Section {
     let row = |event: &EventRecord| {
         let source = event.source.to_string();
-        let text = text::event_in_words(event);
+        let text = event.in_words();
         let text = text.strip_prefix(&source).map_or(&*text, |rest| rest.trim_start_matches([':', ' ']));
         EventRow {
             at_s: since_s(figures, event.time_ns),

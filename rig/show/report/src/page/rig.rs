@@ -11,11 +11,12 @@ use masseter_page::{
 use masseter_recording::{Manifest, Usage};
 use masseter_runtime::realtime::scheduling::Obtained;
 use masseter_runtime::schedule::CycleSchedule;
+use masseter_scenario::wording::grouped;
 use masseter_scenario::{MotionConfig, Scenario};
 
 use super::times::{limit, motion_s, plain, since_s};
 use crate::table;
-use crate::text::{grouped, microseconds, or_dash, us};
+use crate::text::{microseconds, or_dash, us};
 
 /// The least latency that a logarithmic axis shows, µs.
 const LEAST_US: f64 = 0.01;

@@ -6,19 +6,21 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use masseter_analysis::requirements::{RequirementFigures, RequirementResult};
-use masseter_analysis::{
-    BusResponse, Departure, EventRecord, Figures, ResponseFigures, SkipFigures, StoppedBy, TrackingFigures,
-};
 use masseter_recording::{Ending, Manifest};
 use masseter_runtime::messages::codes::{Cause, ControllerState};
 use masseter_runtime::named::PlayedMotion;
 use masseter_scenario::wording::counted;
-use masseter_scenario::{ExpectedVerdict, StimulusConfig};
+use masseter_scenario::{Dimension, ExpectedVerdict, StimulusConfig};
 
+use crate::analysis::Figures;
 use crate::check::{Check, CheckFigures, CheckResult, Subject, faults, tracking};
-use crate::text;
+use crate::events::EventRecord;
+use crate::played::MotionFigures;
+use crate::requirements::RequirementFigures;
+use crate::response::{BusResponse, ResponseFigures};
+use crate::skips::SkipFigures;
 use crate::timing::{Timing, TimingWord};
+use crate::tracking::TrackingFigures;
 
 /// None in a run that ended before its first cycle.
 pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) -> Vec<Check> {
@@ -39,6 +41,14 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     if actual_source.is_truth() {
         checks.push(tracking_of("estimated tracking", estimated, &undisturbed.estimated));
     }
+    // A stop ends the motion somewhere, and has a verdict of its own.
+    let is_stopped = figures.stopped_by.is_some()
+        || figures.final_state.is_some_and(|state| state == ControllerState::SafeStop);
+    if !is_stopped {
+        let of_motion =
+            [motion_lag(&figures.motion, limits.motion_lag_ms), missed_commands(manifest, figures)];
+        checks.extend(of_motion.into_iter().flatten().map(|check| check.unless(is_disturbed)));
+    }
     checks.extend(kept_time(timing, limits.missed_cycles));
     checks.extend([
         dropped_messages(
@@ -55,6 +65,23 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     checks
         .extend(figures.requirements.iter().map(|requirement| self::requirement(requirement, is_disturbed)));
     checks
+}
+
+/// A motion that waited for lost commands or readings is late from then on. None where the scenario's motion never began.
+fn motion_lag(motion: &MotionFigures, limit_ms: f64) -> Option<Check> {
+    let lag_ms = motion.way_mm.and(motion.lag_ms)?;
+    Some(Check::judged("motion lag", format!("{lag_ms:.1} ms, limit {limit_ms} ms"), lag_ms <= limit_ms))
+}
+
+/// A cycle of the motion without a new command leaves the drives with the last one. As many are allowed as the controller may
+/// miss readings in a row. None where the scenario's own faults stall a loop.
+fn missed_commands(manifest: &Manifest, figures: &Figures) -> Option<Check> {
+    let MotionFigures { lag_ms, missed_commands, missed_in_a_row, .. } = figures.motion;
+    let limit = u64::from(manifest.scenario.controller.stale_cycles);
+    let is_of_scenario = figures.controller_skips.by_scenario + figures.plant_skips.by_scenario > 0;
+    lag_ms.filter(|_| !is_of_scenario)?;
+    let finding = format!("{}, {missed_in_a_row} in a row, limit {limit}", counted(missed_commands, "cycle"));
+    Some(Check::judged("commands missed", finding, missed_commands <= limit))
 }
 
 /// Cycles that the machine lost are no failure of the rig. None in simulated time, which has no deadlines.
@@ -75,14 +102,13 @@ fn sequence(manifest: &Manifest, figures: &Figures) -> Check {
     const NAME: &str = "sequence";
     let (state, expect) = (figures.final_state, manifest.scenario.expect.as_ref());
     let was_stopped = was_stopped_by_request(figures);
-    let how =
-        match figures.stopped_by.filter(|_| state.is_none_or(|state| state != ControllerState::SafeStop)) {
-            Some(StoppedBy::Master) => ", though the master stopped the drives",
-            Some(StoppedBy::QuickStop) => ", though the drives made a quick stop",
-            Some(StoppedBy::Drives) => ", though a drive left operation while the motion ran",
-            None if was_stopped => ", stopped by request before the motion's end",
-            None => "",
-        };
+    let stopped_by =
+        figures.stopped_by.filter(|_| state.is_none_or(|state| state != ControllerState::SafeStop));
+    let how = match stopped_by {
+        Some(by) => format!(", though {by}"),
+        None if was_stopped => ", stopped by request before the motion's end".to_owned(),
+        None => String::new(),
+    };
     let in_words = state.map_or_else(|| "none".to_owned(), |state| state.to_string());
     let is_in = |expected| state.is_some_and(|state| state == expected);
     let is_expected = |outcome| expect.is_some_and(|expect| expect.accepts(outcome));
@@ -127,13 +153,8 @@ fn stimuli(declared: &[StimulusConfig], events: &[EventRecord]) -> Option<Check>
 
 /// A requirement of the scenario. The machine excuses a failure where a lost cycle may have caused it.
 fn requirement(found: &RequirementFigures, is_disturbed: bool) -> Check {
-    let result = match found.result {
-        RequirementResult::Passed => CheckResult::Passed,
-        RequirementResult::Failed => CheckResult::Failed,
-        RequirementResult::Untested => CheckResult::Untested,
-    };
-    let margin =
-        found.margin.map(|margin| format!("; margin {} {}", text::significant(margin), found.margin_unit));
+    let significant = |number: f64| Dimension::One.si_unit().text(number);
+    let margin = found.margin.map(|margin| format!("; margin {} {}", significant(margin), found.margin_unit));
     let moment = found.worst_at_s.map(|at_s| format!(" at {at_s:.3} s"));
     let words = [Some(found.must.clone()).filter(|must| !must.is_empty()), Some(found.finding.clone())];
     let words = words.into_iter().flatten().collect::<Vec<_>>().join(": ");
@@ -147,8 +168,12 @@ fn requirement(found: &RequirementFigures, is_disturbed: bool) -> Check {
     };
     let finding = finding.into_iter().flatten().collect::<String>();
     let subject = if found.is_expected_event { Subject::ExpectedEvent } else { Subject::Requirement };
-    let check = Check { figures: Some(figures), subject, ..Check::new(found.name.clone(), finding, result) };
-    check.unless(is_disturbed && found.may_be_disturbed)
+    let is_excused = is_disturbed && found.may_be_disturbed;
+    let result = match found.result {
+        CheckResult::Failed | CheckResult::Untested if is_excused => CheckResult::Excused,
+        result => result,
+    };
+    Check { figures: Some(figures), subject, ..Check::new(found.name.clone(), finding, result) }
 }
 
 /// Gaps show losses before the last recorded message. Losses behind it, and in unreadable parts, are unknown.
@@ -173,8 +198,8 @@ fn bus_response(response: &BusResponse, plant: &SkipFigures) -> Check {
         return Check::not_judged(NAME, why.clone());
     }
     let in_words = |message: &ResponseFigures| {
-        let (max_us, bound_us) = (text::us(message.max_ns), text::us(message.bound_ns));
-        format!("{} on bus {} took {max_us} µs, bound {bound_us} µs", message.message, message.bus)
+        let [max_us, bound_us] = [message.max_ns, message.bound_ns].map(|ns| ns.unwrap_or(0) as f64 / 1e3);
+        format!("{} on bus {} took {max_us:.2} µs, bound {bound_us:.2} µs", message.message, message.bus)
     };
     let unjudged = match response.off_time_frames {
         0 => String::new(),
@@ -201,89 +226,82 @@ fn longest_excess_ns(response: &BusResponse) -> u64 {
     response.exceeding().filter_map(excess_ns).max().unwrap_or(0)
 }
 
-/// Share of the motion that must be played; the last ramp moves nothing any more.
-const WHOLE: f64 = 0.99;
-/// A stated desired pose farther from the scenario's motion is that of another motion, mm and degrees. A program that computes
-/// the motion itself rounds otherwise.
-const SAME_POSE: f64 = 0.01;
+/// Share of the motion that the jaw must go.
+const WHOLE: f64 = 0.95;
+/// Share of the time that an own motion must last.
+const WHOLE_TIME: f64 = 0.99;
 
 /// By what a finished motion is not the one that the run was to play.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Shortfall {
-    /// The desired poses are not those of the scenario's motion.
-    Other(Departure),
-    /// The scenario's motion did not come to its end.
-    Early { reached_s: f64, end_s: f64 },
+    /// The jaw went only this share of the scenario's motion.
+    NotPlayed { share: f64, way_mm: f64 },
+    /// The scenario's motion moves nothing.
+    Still,
     /// The drives were not enabled for as long as an own motion is to last.
     OwnEarly { enabled_s: f64, duration_s: f64 },
-    /// A program's desired poses need not be the scenario's, and no requirement judges the run.
+    /// The motion is the controller's own or gone since the run, and no requirement judges the run.
     Unjudged,
 }
 
 impl Shortfall {
-    /// None where the motion was played, and where a stop ended it, which has a verdict of its own. A motion that was stopped by
-    /// request is short, but none other.
+    /// None where the motion was played, and where a stop ended it, which has a verdict of its own.
     pub(crate) fn of(manifest: &Manifest, figures: &Figures) -> Option<Self> {
         let has_finished = figures.final_state.is_some_and(|state| state == ControllerState::Finished);
         if !has_finished || figures.stopped_by.is_some() {
             return None;
         }
-        let found = match manifest.declared.motion {
-            PlayedMotion::Own => Self::of_own(manifest, figures),
-            PlayedMotion::Scenario => Self::of_scenario(manifest, figures),
-        };
-        found.filter(|found| matches!(found, Self::Other(_)) || !was_stopped_by_request(figures))
-    }
-
-    fn of_scenario(manifest: &Manifest, figures: &Figures) -> Option<Self> {
-        let is_same = |departure: &Departure| departure.incisal_mm <= SAME_POSE && departure.deg <= SAME_POSE;
-        if let Some(departure) = figures.motion_departure.filter(|departure| !is_same(departure)) {
-            return Some(Self::Other(departure));
+        if manifest.declared.motion == PlayedMotion::Own {
+            return Self::of_own(manifest, figures).filter(|_| !was_stopped_by_request(figures));
         }
-        let (end_s, reached_s) = (manifest.motion_end_s?, figures.motion_reached_s.unwrap_or(0.0));
-        let early = (reached_s < WHOLE * end_s).then_some(Self::Early { reached_s, end_s });
-        let is_compared = figures.motion_departure.is_some_and(|departure| !departure.is_partial);
-        early.or_else(|| if is_compared { None } else { Self::unjudged(manifest, figures) })
+        match (figures.motion.way_mm, figures.motion.played) {
+            (None, _) => Self::unjudged(manifest, figures),
+            (Some(_), None) => (!was_stopped_by_request(figures)).then_some(Self::Still),
+            (Some(way_mm), Some(share)) => {
+                let is_played = share >= WHOLE;
+                (!is_played).then_some(Self::NotPlayed { share, way_mm })
+            }
+        }
     }
 
     fn of_own(manifest: &Manifest, figures: &Figures) -> Option<Self> {
         let (enabled_s, duration_s) = (figures.enabled_s, manifest.motion_s);
-        let early = (enabled_s < WHOLE * duration_s).then_some(Self::OwnEarly { enabled_s, duration_s });
+        let early = (enabled_s < WHOLE_TIME * duration_s).then_some(Self::OwnEarly { enabled_s, duration_s });
         early.or_else(|| Self::unjudged(manifest, figures))
     }
 
     fn unjudged(manifest: &Manifest, figures: &Figures) -> Option<Self> {
         let mut required = figures.requirements.iter().filter(|required| !required.is_expected_event);
-        let is_judged = required.any(|required| required.result != RequirementResult::Untested);
+        let is_judged = required.any(|required| required.result != CheckResult::Untested);
         (manifest.is_of_program() && !is_judged).then_some(Self::Unjudged)
     }
 
     pub(crate) fn result(self) -> CheckResult {
-        if self == Self::Unjudged { CheckResult::Untested } else { CheckResult::Failed }
+        match self {
+            Self::Still | Self::Unjudged => CheckResult::Untested,
+            Self::NotPlayed { .. } | Self::OwnEarly { .. } => CheckResult::Failed,
+        }
     }
 }
 
 impl Display for Shortfall {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Other(Departure { incisal_mm, deg, at_s, .. }) => write!(
+            Self::NotPlayed { share, way_mm } => write!(
                 f,
-                "the scenario's motion was not played: the desired pose is up to {incisal_mm:.3} mm (at {at_s:.3} s of the \
-                 motion) and {deg:.3}° from it; a controller with a motion of its own declares it"
+                "the scenario's motion was not played: {:.0} % of its way of {way_mm:.1} mm; a controller with a motion of its own \
+                 declares it",
+                // No share of -0 %.
+                (share * 100.0).round() + 0.0
             ),
-            Self::Early { reached_s, end_s } => write!(
-                f,
-                "the scenario's motion was not played: it came to {reached_s:.2} of {end_s:.2} s of its own time"
-            ),
+            Self::Still => f.write_str("the scenario's motion does not move the jaw"),
             Self::OwnEarly { enabled_s, duration_s } => write!(
                 f,
                 "the controller's own motion ended early: the drives were enabled for {enabled_s:.2} of {duration_s:.2} s; \
                  --duration declares its end"
             ),
-            Self::Unjudged => write!(
-                f,
-                "nothing judged the motion, whose desired poses need not be the scenario's: require something of the jaw in \
-                 [[require]]"
+            Self::Unjudged => f.write_str(
+                "nothing judged the motion, which is not the scenario's: require something of the jaw in [[require]]",
             ),
         }
     }
@@ -295,7 +313,7 @@ pub(crate) fn was_stopped_by_request(figures: &Figures) -> bool {
 }
 
 /// What is added where the motion is not the scenario's.
-pub(crate) fn whose_motion(manifest: &Manifest) -> &'static str {
+pub fn whose_motion(manifest: &Manifest) -> &'static str {
     match manifest.declared.motion {
         PlayedMotion::Scenario => "",
         PlayedMotion::Own => ", own motion of the controller",

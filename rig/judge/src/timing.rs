@@ -4,12 +4,12 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use masseter_analysis::{Figures, OverrunAttribution};
 use masseter_recording::Manifest;
-use masseter_scenario::wording::counted;
+use masseter_scenario::wording::{counted, grouped};
 use serde::Serialize;
 
-use crate::text::grouped;
+use crate::analysis::Figures;
+use crate::skips::OverrunAttribution;
 
 /// Whether the deadlines were kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

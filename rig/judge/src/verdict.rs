@@ -2,25 +2,26 @@
 //!
 //! [`Timing`] is judged apart. Lost cycles matter here only where they leave nothing to judge the function by.
 
-use masseter_analysis::{EventRecord, Figures, Outage, StoppedBy};
 use masseter_recording::{DmaLatency, Ending, Manifest, RunUsage};
-use masseter_runtime::messages::codes::{Cause, EventKind, Source};
-use masseter_scenario::wording::counted;
+use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind, Source};
+use masseter_scenario::wording::{counted, grouped};
 use masseter_scenario::{CanConfig, ChecksConfig, ExpectConfig, ExpectedVerdict, Scenario, TimingConfig};
 use masseter_terminal::Exit;
 use serde::Serialize;
 
+use crate::analysis::Figures;
 use crate::check::{Check, CheckResult, Subject, left_its_path};
 use crate::checks::{Shortfall, checks};
-use crate::text::{self, grouped};
+use crate::events::EventRecord;
+use crate::lost_cycles::Outage;
+use crate::played::{MotionFigures, StoppedBy};
 use crate::timing::{Timing, TimingWord};
 
 /// The judgement of a run.
 ///
 /// ```
-/// use masseter_analysis::Analysis;
+/// use masseter_analysis::{Analysis, Verdict};
 /// use masseter_recording::{MachineInfo, Manifest};
-/// use masseter_report::Verdict;
 /// use masseter_scenario::Scenario;
 /// use masseter_runtime::named::Declared;
 ///
@@ -74,7 +75,7 @@ impl Verdict {
                     .map(|failure| clock_jump(&manifest.usage, &manifest.scenario.can).unwrap_or(failure))
             })
             .or_else(|| untested(&checks, figures.cycles))
-            .unwrap_or_else(|| (Outcome::Passed, "every check passed".to_owned()));
+            .unwrap_or_else(|| (Outcome::Passed, passed(&figures.motion)));
         if let Some(expect) = expect {
             (outcome, reason) = against(expect, (outcome, reason), [&checks, &beside], figures);
         }
@@ -85,18 +86,20 @@ impl Verdict {
     }
 
     /// What to do about the machine; none where the machine disturbed nothing.
-    pub(crate) fn advice(&self, manifest: &Manifest) -> Option<String> {
+    pub fn advice(&self, manifest: &Manifest) -> Option<String> {
         // The reason of an INVALID run contains the advice.
         let is_missing = self.timing.word == TimingWord::Disturbed && self.exit_code != Exit::Invalid;
         is_missing.then(|| remedy(manifest))
     }
 
     /// Whether checks alone decided it, so that their findings are the reason.
-    pub(crate) fn is_by_checks(&self) -> bool {
+    pub fn is_by_checks(&self) -> bool {
         matches!(self.outcome, Outcome::Untested | Outcome::ChecksFailed)
     }
 }
 
+/// A shorter delay of the motion is not worth a word, ms.
+const LEAST_LAG_MS: f64 = 0.5;
 /// Share of its core above which a real-time process is too busy: the kernel throttles at 95 %, by default.
 const TOO_BUSY: f64 = 0.9;
 
@@ -119,8 +122,8 @@ type OutcomeReason = (Outcome, String);
 /// What master and drives show comes before what the controller reports.
 fn ending(ending: &Ending, stopped_by: Option<StoppedBy>, events: &[EventRecord]) -> Option<OutcomeReason> {
     match ending {
-        Ending::Completed => stopped_by.map(|by| (Outcome::SafeStop, stopped(Stopper::Drives(by), events))),
-        Ending::SafeStop => Some((Outcome::SafeStop, stopped(Stopper::Controller, events))),
+        Ending::Completed => stopped_by.map(|by| (Outcome::SafeStop, stopped(Some(by), events))),
+        Ending::SafeStop => Some((Outcome::SafeStop, stopped(None, events))),
         Ending::Died { process, how } => Some((Outcome::Died, format!("the {process} died: {how}"))),
         Ending::Interrupted => Some((Outcome::Interrupted, "stopped by the user".to_owned())),
         Ending::NotStarted => Some((Outcome::Invalid, "real time was required and refused".to_owned())),
@@ -139,31 +142,22 @@ fn stopped_by_stimulus(scenario: &Scenario, events: &[EventRecord]) -> Option<Ou
     Some((Outcome::Interrupted, format!("stopped by stimulus {number} of the scenario")))
 }
 
-/// Who says that the rig was stopped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Stopper {
-    /// The controller reports it.
-    Controller,
-    /// Master or drives show it, and the controller reports another end.
-    Drives(StoppedBy),
-}
-
 /// The first fault explains the stop: the controller's own event often names only the master. A controller that reports
-/// another end explains nothing.
-fn stopped(stopper: Stopper, events: &[EventRecord]) -> String {
+/// another end explains nothing. `by`: what master or drives show of it, whatever the controller reports.
+fn stopped(by: Option<StoppedBy>, events: &[EventRecord]) -> String {
     let is_heard = |event: &&EventRecord| {
-        event.kind == EventKind::Fault
-            && (stopper == Stopper::Controller || event.source != Source::Controller)
+        event.kind == EventKind::Fault && (by.is_none() || event.source != Source::Controller)
     };
     let first = events.iter().find(is_heard);
-    let why =
-        first.map_or_else(String::new, |fault| format!("; first fault: {}", text::event_in_words(fault)));
-    let who = match stopper {
-        Stopper::Controller => "the controller stopped the rig",
-        Stopper::Drives(StoppedBy::Master) => "the master stopped the drives",
-        Stopper::Drives(StoppedBy::QuickStop) => "the drives made a quick stop",
-        Stopper::Drives(StoppedBy::Drives) => "a drive left operation while the motion ran",
+    let began = events.iter().find(|event| event.enters(ControllerState::Running));
+    let at = |fault: &EventRecord| {
+        let since_ns = fault.time_ns.checked_sub(began?.time_ns)?;
+        Some(format!(", {:.3} s after the motion began", since_ns as f64 / 1e9))
     };
+    let why = first.map_or_else(String::new, |fault| {
+        format!("; first fault: {}{}", fault.in_words(), at(fault).unwrap_or_default())
+    });
+    let who = by.map_or_else(|| "the controller stopped the rig".to_owned(), |by| by.to_string());
     format!("{who}{why}")
 }
 
@@ -263,6 +257,13 @@ fn failed(checks: &[Check]) -> Option<OutcomeReason> {
     named(checks, CheckResult::Failed).map(|names| (Outcome::ChecksFailed, format!("failed: {names}")))
 }
 
+/// The reason of a pass, with what somebody has to know beside.
+fn passed(motion: &MotionFigures) -> String {
+    let late = motion.lag_ms.filter(|lag_ms| *lag_ms >= LEAST_LAG_MS);
+    let late = late.map_or_else(String::new, |lag_ms| format!("; motion delayed by {lag_ms:.0} ms"));
+    format!("every check passed{late}")
+}
+
 /// What was not tested, with what to do. Without a cycle that was everything.
 fn untested(checks: &[Check], cycles: u64) -> Option<OutcomeReason> {
     let idle = checks.iter().filter(|check| check.result == CheckResult::Untested);
@@ -293,6 +294,9 @@ fn against(
             if outcome == Outcome::Passed { "every check of the rig passed" } else { reason.as_str() };
         return (Outcome::Failed, format!("expected {}, but {}: {reason}", wanted(expect), outcome.word()));
     }
+    if let Some(why) = other_failures(expect, [checks, beside]) {
+        return (Outcome::Failed, why);
+    }
     // The rig's own checks still count where the run goes on in order to its end.
     let own = || {
         let is_in_order = matches!(outcome, Outcome::SafeStop | Outcome::Interrupted);
@@ -310,6 +314,21 @@ fn against(
         .or_else(lost)
         .or_else(|| untested(beside, figures.cycles))
         .unwrap_or_else(|| (Outcome::Passed, format!("{}, as expected: {reason}", outcome.word())))
+}
+
+/// What failed beside the expected failures, or passed instead of them. None where the scenario names no failure.
+fn other_failures(expect: &ExpectConfig, checks: [&[Check]; 2]) -> Option<String> {
+    let all = || checks.into_iter().flatten();
+    let is_expected = |check: &Check| expect.failed.iter().any(|name| *name == check.name);
+    let other = all()
+        .filter(|check| check.result.is_failed() && !is_expected(check))
+        .map(|check| check.name.to_string());
+    let has_failed = |name: &String| all().any(|check| check.result.is_failed() && *name == check.name);
+    let idle = expect.failed.iter().filter(|name| !has_failed(name)).map(|name| format!("{name} did not"));
+    let wrong: Vec<_> = other.map(|name| format!("{name} failed")).chain(idle).collect();
+    let named = expect.failed.join(", ");
+    (!expect.failed.is_empty() && !wrong.is_empty())
+        .then(|| format!("expected that {named} fails and nothing else, but {}", wrong.join(", ")))
 }
 
 /// The expected outcome, in words.

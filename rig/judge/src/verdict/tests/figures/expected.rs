@@ -1,9 +1,9 @@
 //! Runs that expect an outcome other than a pass.
 
-use masseter_analysis::requirements::{RequirementFigures, RequirementResult};
 use masseter_scenario::{ExpectConfig, ExpectedVerdict};
 
 use super::*;
+use crate::requirements::RequirementFigures;
 
 /// A run that stops safely, as its scenario expects.
 fn stopped() -> Run {
@@ -18,7 +18,7 @@ fn expect(run: &mut Run, verdict: ExpectedVerdict) {
     run.manifest.scenario.expect = Some(ExpectConfig { verdict: Some(verdict), ..ExpectConfig::default() });
 }
 
-fn require(run: &mut Run, result: RequirementResult, may_be_disturbed: bool) {
+fn require(run: &mut Run, result: CheckResult, may_be_disturbed: bool) {
     run.figures.requirements.push(RequirementFigures {
         name: "stops".to_owned(),
         must: "after it: safe_stop".to_owned(),
@@ -65,9 +65,9 @@ fn the_expected_outcome_passes_and_any_other_fails() {
 fn requirements_and_the_rigs_own_checks_count_beside_the_expected_outcome() {
     type Case = (fn(&mut Run), &'static str);
     let cases: [Case; 7] = [
-        (|run| require(run, RequirementResult::Passed, true), "PASS"),
-        (|run| require(run, RequirementResult::Failed, true), "FAIL"),
-        (|run| require(run, RequirementResult::Untested, true), "UNTESTED"),
+        (|run| require(run, CheckResult::Passed, true), "PASS"),
+        (|run| require(run, CheckResult::Failed, true), "FAIL"),
+        (|run| require(run, CheckResult::Untested, true), "UNTESTED"),
         (Run::declare_fault, "UNTESTED"),
         (|run| run.lose(5), "INCOMPLETE"),
         (|run| run.figures.plant_skips.skipped = 1, "FAIL"),
@@ -85,7 +85,7 @@ fn a_requirement_that_lost_cycles_may_have_failed_is_excused() {
     for (may_be_disturbed, word) in [(true, "INVALID"), (false, "FAIL")] {
         let mut run = Run::new();
         run.disturb();
-        require(&mut run, RequirementResult::Failed, may_be_disturbed);
+        require(&mut run, CheckResult::Failed, may_be_disturbed);
         assert_eq!(judge(&run).0, word, "{}", judge(&run).1);
     }
 }
@@ -93,11 +93,11 @@ fn a_requirement_that_lost_cycles_may_have_failed_is_excused() {
 #[test]
 fn a_failure_may_be_expected_of_a_requirement_but_not_of_an_expected_event() {
     for (result, expected, word) in [
-        (RequirementResult::Failed, ExpectedVerdict::Fail, "PASS"),
-        (RequirementResult::Untested, ExpectedVerdict::Untested, "PASS"),
-        (RequirementResult::Failed, ExpectedVerdict::Untested, "FAIL"),
-        (RequirementResult::Passed, ExpectedVerdict::Fail, "FAIL"),
-        (RequirementResult::Failed, ExpectedVerdict::Pass, "FAIL"),
+        (CheckResult::Failed, ExpectedVerdict::Fail, "PASS"),
+        (CheckResult::Untested, ExpectedVerdict::Untested, "PASS"),
+        (CheckResult::Failed, ExpectedVerdict::Untested, "FAIL"),
+        (CheckResult::Passed, ExpectedVerdict::Fail, "FAIL"),
+        (CheckResult::Failed, ExpectedVerdict::Pass, "FAIL"),
     ] {
         let mut run = Run::new();
         expect(&mut run, expected);
@@ -106,9 +106,9 @@ fn a_failure_may_be_expected_of_a_requirement_but_not_of_an_expected_event() {
     }
     let mut run = Run::new();
     expect(&mut run, ExpectedVerdict::Fail);
-    require(&mut run, RequirementResult::Failed, true);
+    require(&mut run, CheckResult::Failed, true);
     assert_eq!(judge(&run).1, "FAIL, as expected: failed: stops");
-    require(&mut run, RequirementResult::Failed, true);
+    require(&mut run, CheckResult::Failed, true);
     let event = run.figures.requirements.last_mut().unwrap();
     (event.name, event.is_expected_event) = ("expected event it".to_owned(), true);
     assert_eq!(judge(&run), ("FAIL", "failed: expected event it".to_owned()));
@@ -125,6 +125,31 @@ fn an_exit_code_is_expected_as_its_outcome_is() {
     assert!(word == "FAIL" && reason.starts_with("expected FAIL or UNTESTED, but SAFE STOP: "), "{reason}");
     let mut failed = Run::new();
     failed.manifest.scenario.expect = code(1);
-    require(&mut failed, RequirementResult::Failed, true);
+    require(&mut failed, CheckResult::Failed, true);
     assert_eq!(judge(&failed).0, "PASS");
+}
+
+#[test]
+fn an_expected_failure_that_is_named_must_fail_and_no_other_may() {
+    let judged = |failed: &[&str], change: Change| {
+        let mut run = Run::new();
+        run.figures.tracking.actual.rms_mm = Some(0.2);
+        let failed = failed.iter().map(|name| (*name).to_owned()).collect();
+        let verdict = Some(ExpectedVerdict::Fail);
+        run.manifest.scenario.expect = Some(ExpectConfig { verdict, failed, ..ExpectConfig::default() });
+        change(&mut run);
+        let Verdict { word, reason, .. } = Verdict::new(&run.manifest, &run.figures);
+        (word, reason)
+    };
+    assert_eq!(judged(&["tracking"], |_| ()).0, "PASS");
+    assert_eq!(judged(&[], |run| run.figures.motion.missed_commands = 99).0, "PASS", "no failure is named");
+    let why = |reason: &str| ("FAIL", reason.to_owned());
+    assert_eq!(
+        judged(&["tracking"], |run| run.figures.motion.missed_commands = 99),
+        why("expected that tracking fails and nothing else, but commands missed failed")
+    );
+    assert_eq!(
+        judged(&["opens"], |_| ()),
+        why("expected that opens fails and nothing else, but tracking failed, opens did not")
+    );
 }

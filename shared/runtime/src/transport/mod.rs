@@ -115,35 +115,6 @@ fn check_version<M: Message>(message: &M) -> Result<(), TransportError> {
     }
 }
 
-/// Connections that a port could not make: iceoryx2 continues without them, and reports them in its log only.
-#[derive(Debug, Clone, Default)]
-struct Refused(Arc<AtomicU32>);
-
-impl Refused {
-    /// For the port's builder.
-    fn counter(&self) -> impl DegradationFn + use<> {
-        let Self(count) = self.clone();
-        move |_, _| {
-            count.fetch_add(1, Ordering::Relaxed);
-            DegradationAction::Warn
-        }
-    }
-
-    /// Makes a port's connections to the ports that are there by now.
-    fn connect(&self, port: &impl UpdateConnections, topic: &str) -> Result<(), TransportError> {
-        port.update_connections().map_err(failed("connecting", topic))?;
-        self.require_none(topic)
-    }
-
-    /// Refuses a port with missing connections: they leave no gap in any sequence, so a receiver must check.
-    fn require_none(&self, topic: &str) -> Result<(), TransportError> {
-        match self.0.load(Ordering::Relaxed) {
-            0 => Ok(()),
-            count => Err(failed("connecting", topic)(format_args!("ConnectionsRefused({count})"))),
-        }
-    }
-}
-
 /// A process's access to a domain.
 #[derive(Debug)]
 pub struct Node {
@@ -166,14 +137,6 @@ impl Node {
         let node = builder.create().map_err(failed("joining domain", id))?;
         domain.make_private().map_err(failed("joining domain", id))?;
         Ok(Self { node, domain: domain.clone() })
-    }
-
-    /// Refuses shared memory of another user beneath a port of this process.
-    ///
-    /// # Errors
-    /// As [`Domain::check_mapped`].
-    pub fn check_mapped(&self) -> Result<(), DomainError> {
-        self.domain.check_mapped()
     }
 
     pub(crate) fn domain(&self) -> &Domain {
@@ -237,13 +200,14 @@ macro_rules! topics {
     ($($message:ident)+) => {$(
         impl Topic for $message {
             fn publisher(node: &Node) -> Result<Publisher<Self>, TransportError> {
-                let outlet = Outlet::create(service::<Self>(node)?.publisher_builder())?;
+                let outlet = Outlet::create(service::<Self>(node)?.publisher_builder(), Self::TOPIC)?;
                 Ok(Publisher { port: Box::new(outlet), sent: 0 })
             }
 
             fn subscriber(node: &Node, buffer: usize) -> Result<Subscriber<Self>, TransportError> {
-                let inlet = Inlet::create(service::<Self>(node)?.subscriber_builder().buffer_size(buffer))?;
-                Ok(Subscriber { port: Box::new(inlet) })
+                let service = service::<Self>(node)?;
+                let builder = service.subscriber_builder().buffer_size(buffer);
+                Ok(Subscriber { port: Box::new(Inlet::create(builder, Self::TOPIC)?) })
             }
         }
     )+};
@@ -255,66 +219,72 @@ fn service<M: Message>(node: &Node) -> Result<PortFactory<ipc::Service, M, ()>, 
     node.topic::<M, M>(M::DEPTH)?.open_or_create().map_err(failed("opening topic", M::TOPIC))
 }
 
-/// The contents of a sample: one message, or a slice of several.
-trait Payload: IceoryxSend + Debug + 'static {
-    /// The topic of the messages.
-    const TOPIC: &'static str;
-}
-
-impl<M: Message> Payload for M {
-    const TOPIC: &'static str = M::TOPIC;
-}
-
-impl<M: Message> Payload for [M] {
-    const TOPIC: &'static str = M::TOPIC;
-}
-
 /// A port that connects to the ports of other processes.
 trait Connecting: Debug {
     /// Makes the connections to the ports that are there by now.
     fn connect(&self) -> Result<(), TransportError>;
 }
 
-/// A publishing port, with the connections that it could not make.
+/// A port of iceoryx2, and how many connections it could not make: iceoryx2 continues without them, and reports them in its
+/// log only.
 #[derive(Debug)]
-struct Outlet<P: Payload + ?Sized> {
-    port: IceoryxPublisher<ipc::Service, P, ()>,
-    refused: Refused,
+struct Port<T> {
+    inner: T,
+    topic: &'static str,
+    refused: Arc<AtomicU32>,
 }
 
-impl<P: Payload + ?Sized> Outlet<P> {
-    fn create(builder: PortFactoryPublisher<'_, ipc::Service, P, ()>) -> Result<Self, TransportError> {
-        let refused = Refused::default();
+/// A port that publishes messages, or slices of them.
+type Outlet<P> = Port<IceoryxPublisher<ipc::Service, P, ()>>;
+/// A port that receives messages, or slices of them.
+type Inlet<P> = Port<IceoryxSubscriber<ipc::Service, P, ()>>;
+
+/// Counts refused connections for a port's builder.
+fn counter(refused: &Arc<AtomicU32>) -> impl DegradationFn + use<> {
+    let refused = Arc::clone(refused);
+    move |_, _| {
+        refused.fetch_add(1, Ordering::Relaxed);
+        DegradationAction::Warn
+    }
+}
+
+impl<P: IceoryxSend + Debug + ?Sized + 'static> Outlet<P> {
+    fn create(
+        builder: PortFactoryPublisher<'_, ipc::Service, P, ()>,
+        topic: &'static str,
+    ) -> Result<Self, TransportError> {
+        let refused = Arc::default();
         let builder = builder.backpressure_strategy(BackpressureStrategy::DiscardData);
-        let port = builder.set_degradation_handler(refused.counter()).create();
-        Ok(Self { port: port.map_err(failed("publishing", P::TOPIC))?, refused })
+        let port = builder.set_degradation_handler(counter(&refused)).create();
+        Ok(Self { inner: port.map_err(failed("publishing", topic))?, topic, refused })
     }
 }
 
-impl<P: Payload + ?Sized> Connecting for Outlet<P> {
+impl<P: IceoryxSend + Debug + ?Sized + 'static> Inlet<P> {
+    fn create(
+        builder: PortFactorySubscriber<'_, ipc::Service, P, ()>,
+        topic: &'static str,
+    ) -> Result<Self, TransportError> {
+        let refused = Arc::default();
+        let port = builder.set_degradation_handler(counter(&refused)).create();
+        Ok(Self { inner: port.map_err(failed("subscribing to", topic))?, topic, refused })
+    }
+}
+
+impl<T> Port<T> {
+    /// Refuses a port with missing connections: they leave no gap in any sequence, so a receiver must check.
+    fn require_all_connections(&self) -> Result<(), TransportError> {
+        match self.refused.load(Ordering::Relaxed) {
+            0 => Ok(()),
+            count => Err(failed("connecting", self.topic)(format_args!("ConnectionsRefused({count})"))),
+        }
+    }
+}
+
+impl<T: UpdateConnections + Debug> Connecting for Port<T> {
     fn connect(&self) -> Result<(), TransportError> {
-        self.refused.connect(&self.port, P::TOPIC)
-    }
-}
-
-/// A receiving port, with the connections that it could not make.
-#[derive(Debug)]
-struct Inlet<P: Payload + ?Sized> {
-    port: IceoryxSubscriber<ipc::Service, P, ()>,
-    refused: Refused,
-}
-
-impl<P: Payload + ?Sized> Inlet<P> {
-    fn create(builder: PortFactorySubscriber<'_, ipc::Service, P, ()>) -> Result<Self, TransportError> {
-        let refused = Refused::default();
-        let port = builder.set_degradation_handler(refused.counter()).create();
-        Ok(Self { port: port.map_err(failed("subscribing to", P::TOPIC))?, refused })
-    }
-}
-
-impl<P: Payload + ?Sized> Connecting for Inlet<P> {
-    fn connect(&self) -> Result<(), TransportError> {
-        self.refused.connect(&self.port, P::TOPIC)
+        self.inner.update_connections().map_err(failed("connecting", self.topic))?;
+        self.require_all_connections()
     }
 }
 
@@ -327,14 +297,14 @@ trait Outgoing<M>: Connecting {
 
 impl<M: Message> Outgoing<M> for Outlet<M> {
     fn send(&self, write: &mut dyn FnMut(&mut M)) -> Result<(), TransportError> {
-        let mut sample = self.port.loan().map_err(failed("loaning", M::TOPIC))?;
+        let mut sample = self.inner.loan().map_err(failed("loaning", M::TOPIC))?;
         write(sample.payload_mut());
         sample.send().map_err(failed("sending", M::TOPIC))?;
         Ok(())
     }
 
     fn warm_up(&self) -> Result<(), TransportError> {
-        drop(self.port.loan().map_err(failed("loaning", M::TOPIC))?);
+        drop(self.inner.loan().map_err(failed("loaning", M::TOPIC))?);
         Ok(())
     }
 }
@@ -391,13 +361,13 @@ trait Incoming<M: Message>: Connecting {
 
 impl<M: Message> Incoming<M> for Inlet<M> {
     fn next(&self) -> Result<Option<ReceivedMessage<M>>, TransportError> {
-        let sample = self.port.receive().map_err(failed("receiving", M::TOPIC))?;
-        self.refused.require_none(M::TOPIC)?;
+        let sample = self.inner.receive().map_err(failed("receiving", M::TOPIC))?;
+        self.require_all_connections()?;
         Ok(sample.map(ReceivedMessage))
     }
 
     fn buffer(&self) -> usize {
-        self.port.buffer_size()
+        self.inner.buffer_size()
     }
 }
 

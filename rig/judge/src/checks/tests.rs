@@ -57,8 +57,6 @@ mod checks {
 }
 
 mod shortfall {
-    use masseter_analysis::requirements::RequirementFigures;
-    use masseter_analysis::{Analysis, Code, EventRecord, StoppedBy};
     use masseter_recording::MachineInfo;
     use masseter_runtime::messages::Event;
     use masseter_runtime::messages::codes::{EventKind, Source};
@@ -66,18 +64,24 @@ mod shortfall {
     use masseter_scenario::Scenario;
 
     use super::*;
+    use crate::{Analysis, Code, StoppedBy};
 
-    const PLAYED: Departure = Departure { incisal_mm: 0.009, deg: 0.009, at_s: 1.0, is_partial: false };
+    const PLAYED: MotionFigures = MotionFigures {
+        way_mm: Some(900.0),
+        played: Some(0.999),
+        lag_ms: Some(0.0),
+        missed_commands: 0,
+        missed_in_a_row: 0,
+    };
 
-    /// A finished run that played 10 s to the end, with this change.
+    /// A finished run that played its motion, with this change.
     fn shortfall(change: impl FnOnce(&mut Manifest, &mut Figures)) -> Option<Shortfall> {
         let machine = MachineInfo { cpu: "any".into(), cores: 2, kernel: "Linux".into(), is_virtual: false };
         let mut manifest = Manifest::new("0.1.0", Scenario::default(), 10.0, "virtual", machine);
-        (manifest.motion_end_s, manifest.controller) = (Some(9.5), Some("external".to_owned()));
+        manifest.controller = Some("external".to_owned());
         let mut figures = Analysis::new(&manifest.scenario, &Declared::default()).finish(false, &[]);
         figures.final_state = Some(Code::Known(ControllerState::Finished));
-        (figures.enabled_s, figures.motion_reached_s) = (11.0, Some(9.5));
-        figures.motion_departure = Some(PLAYED);
+        (figures.enabled_s, figures.motion) = (11.0, PLAYED);
         change(&mut manifest, &mut figures);
         Shortfall::of(&manifest, &figures)
     }
@@ -87,7 +91,7 @@ mod shortfall {
         figures.events.push(EventRecord::from(&stop));
     }
 
-    fn require(figures: &mut Figures, result: RequirementResult, is_expected_event: bool) {
+    fn require(figures: &mut Figures, result: CheckResult, is_expected_event: bool) {
         figures.requirements.push(RequirementFigures {
             name: "opens".to_owned(),
             must: String::new(),
@@ -106,47 +110,50 @@ mod shortfall {
     }
 
     #[test]
-    fn the_scenarios_motion_is_played_along_its_path_and_to_its_end() {
+    fn the_jaw_goes_the_way_of_the_scenarios_motion() {
         assert_eq!(shortfall(|_, _| ()), None);
-        assert_eq!(shortfall(|_, figures| figures.motion_reached_s = Some(9.41)), None);
-        let early = |reached_s| Some(Shortfall::Early { reached_s, end_s: 9.5 });
-        assert_eq!(shortfall(|_, figures| figures.motion_reached_s = Some(9.4)), early(9.4));
-        assert_eq!(shortfall(|_, figures| figures.motion_reached_s = None), early(0.0));
-        // With force control or another amplitude, the desired poses show nothing.
-        for departure in [None, Some(Departure { is_partial: true, ..PLAYED })] {
-            let found = shortfall(|_, figures| figures.motion_departure = departure);
-            assert_eq!(found, Some(Shortfall::Unjudged));
+        assert_eq!(shortfall(|_, figures| figures.motion.played = Some(0.95)), None);
+        for share in [0.949, 0.0, -0.2] {
+            let found = shortfall(|_, figures| figures.motion.played = Some(share));
+            assert_eq!(found, Some(Shortfall::NotPlayed { share, way_mm: 900.0 }));
         }
-        for departure in [
-            Departure { incisal_mm: 0.011, ..PLAYED },
-            Departure { deg: 0.011, ..PLAYED },
-            Departure { incisal_mm: f64::INFINITY, ..PLAYED },
-        ] {
-            let found = shortfall(|_, figures| figures.motion_departure = Some(departure));
-            assert_eq!(found, Some(Shortfall::Other(departure)));
-        }
+        let none = shortfall(|_, figures| figures.motion.played = Some(f64::NAN)).unwrap();
+        assert_eq!(none.result(), CheckResult::Failed, "what is no number is no share");
+        let still = Shortfall::NotPlayed { share: 0.004, way_mm: 900.0 };
+        assert!(
+            still
+                .to_string()
+                .starts_with("the scenario's motion was not played: 0 % of its way of 900.0 mm; ")
+        );
     }
 
     #[test]
-    fn a_request_excuses_an_early_end_and_no_other_motion() {
-        let early = |figures: &mut Figures| figures.motion_reached_s = Some(3.0);
-        assert!(shortfall(|_, figures| early(figures)).is_some());
+    fn a_motion_that_moves_nothing_and_one_that_is_unknown_are_untested() {
+        let still =
+            |figures: &mut Figures| (figures.motion.way_mm, figures.motion.played) = (Some(0.0), None);
+        assert_eq!(shortfall(|_, figures| still(figures)), Some(Shortfall::Still));
+        assert_eq!(Shortfall::Still.result(), CheckResult::Untested);
         let stopped = shortfall(|_, figures| {
-            early(figures);
+            still(figures);
             stop_by_request(figures);
         });
-        assert_eq!(stopped, None);
-        let other = Departure { incisal_mm: 7.0, ..PLAYED };
-        let stopped = shortfall(|_, figures| {
-            figures.motion_departure = Some(other);
-            stop_by_request(figures);
-        });
-        assert_eq!(stopped, Some(Shortfall::Other(other)));
+        assert_eq!(stopped, None, "it was stopped before it began to move");
+        let unknown = |figures: &mut Figures| (figures.motion.way_mm, figures.motion.played) = (None, None);
+        assert_eq!(shortfall(|_, figures| unknown(figures)), Some(Shortfall::Unjudged));
+    }
+
+    #[test]
+    fn a_late_motion_and_missed_commands_have_limits() {
+        let motion = |lag_ms| MotionFigures { lag_ms, ..PLAYED };
+        let found = [Some(11.0), Some(20.0), Some(20.1), Some(f64::NAN), None]
+            .map(|lag_ms| motion_lag(&motion(lag_ms), 20.0).map(|check| check.result.mark()));
+        assert_eq!(found, [Some("ok"), Some("ok"), Some("FAIL"), Some("FAIL"), None]);
+        assert_eq!(motion_lag(&MotionFigures { way_mm: None, ..PLAYED }, 20.0), None, "an own motion");
     }
 
     #[test]
     fn a_stop_and_an_end_in_another_state_are_told_otherwise() {
-        let never_moved = |figures: &mut Figures| figures.motion_reached_s = None;
+        let never_moved = |figures: &mut Figures| figures.motion.played = Some(0.0);
         let stopped = shortfall(|_, figures| {
             never_moved(figures);
             figures.stopped_by = Some(StoppedBy::Master);
@@ -164,17 +171,17 @@ mod shortfall {
             shortfall(|manifest, figures| {
                 manifest.declared.motion = PlayedMotion::Own;
                 // Nothing that the scenario's motion would have to be.
-                (figures.motion_reached_s, figures.motion_departure) = (None, None);
+                (figures.motion.way_mm, figures.motion.played) = (None, None);
                 change(manifest, figures);
             })
         };
         assert_eq!(own(|_, _| ()), Some(Shortfall::Unjudged));
         assert_eq!(own(|manifest, _| manifest.controller = Some("hold".to_owned())), None);
         for (result, is_expected_event, expected) in [
-            (RequirementResult::Passed, false, None),
-            (RequirementResult::Failed, false, None),
-            (RequirementResult::Untested, false, Some(Shortfall::Unjudged)),
-            (RequirementResult::Passed, true, Some(Shortfall::Unjudged)),
+            (CheckResult::Passed, false, None),
+            (CheckResult::Failed, false, None),
+            (CheckResult::Untested, false, Some(Shortfall::Unjudged)),
+            (CheckResult::Passed, true, Some(Shortfall::Unjudged)),
         ] {
             let found = shortfall(|manifest, figures| {
                 manifest.declared.motion = PlayedMotion::Own;

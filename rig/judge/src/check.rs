@@ -3,10 +3,12 @@
 
 use std::borrow::Cow;
 
-use masseter_analysis::{FaultFigures, PoseErrors};
 use masseter_scenario::wording::counted;
 use masseter_scenario::{ChecksConfig, FaultConfig};
 use serde::Serialize;
+
+use crate::declared_faults::FaultFigures;
+use crate::tracking::PoseErrors;
 
 /// Whether what was checked is as it should be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -92,7 +94,7 @@ impl Check {
     }
 
     /// Whether it is a requirement of the scenario, or an event that it expects.
-    pub(crate) fn is_requirement(&self) -> bool {
+    pub fn is_requirement(&self) -> bool {
         matches!(self.subject, Subject::Requirement | Subject::ExpectedEvent)
     }
 

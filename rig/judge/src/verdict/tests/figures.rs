@@ -1,9 +1,5 @@
 //! Verdicts on figures made by hand, each differing in one thing from those of a run that passes.
 
-use masseter_analysis::{
-    Analysis, Code, FaultFigures, OverrunAttribution, PoseErrors, ResponseFigures, SkipFigures, TopicFigures,
-    TrackingFigures, UndisturbedFigures,
-};
 use masseter_recording::{Damage, MachineInfo};
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::named::Declared;
@@ -11,6 +7,10 @@ use masseter_runtime::realtime::scheduling::{Obtained, SchedulingRequest};
 use masseter_scenario::{BusFault, CpuDmaLatency, FaultConfig, Scenario};
 
 use super::*;
+use crate::{
+    Analysis, Code, FaultFigures, MotionFigures, OverrunAttribution, PoseErrors, ResponseFigures,
+    SkipFigures, TopicFigures, TrackingFigures, UndisturbedFigures,
+};
 
 mod disturbed;
 mod expected;
@@ -32,6 +32,13 @@ impl Run {
         let on_path = PoseErrors { rms_mm: Some(0.05), ..PoseErrors::default() };
         let undisturbed = UndisturbedFigures { samples: 900, actual: on_path, estimated: on_path };
         figures.cycles = 1000;
+        figures.motion = MotionFigures {
+            way_mm: Some(900.0),
+            played: Some(0.999),
+            lag_ms: Some(0.0),
+            missed_commands: 0,
+            missed_in_a_row: 0,
+        };
         figures.tracking = TrackingFigures {
             samples: 1000,
             actual: on_path,
@@ -110,9 +117,17 @@ fn results(verdict: &Verdict) -> Vec<(&str, &'static str)> {
 fn a_run_without_anything_wrong_passes_every_check() {
     let verdict = Run::with(|_| ());
     assert_eq!((verdict.exit_code, verdict.reason.as_str()), (Exit::Passed, "every check passed"));
-    let expected =
-        ["sequence", "tracking", "estimated tracking", "timing", "dropped messages", "bus response"]
-            .map(|name| (name, "ok"));
+    let expected = [
+        "sequence",
+        "tracking",
+        "estimated tracking",
+        "motion lag",
+        "commands missed",
+        "timing",
+        "dropped messages",
+        "bus response",
+    ]
+    .map(|name| (name, "ok"));
     assert_eq!(results(&verdict), expected);
     let findings: Vec<_> = verdict.checks.iter().map(|check| check.finding.as_str()).collect();
     assert_eq!(
@@ -121,6 +136,8 @@ fn a_run_without_anything_wrong_passes_every_check() {
             "ended in state finished",
             "closest of 1000 samples: platform rms 0.0500 mm, limit 0.1 mm",
             "closest of 1000 samples: platform rms 0.0500 mm, limit 0.1 mm",
+            "0.0 ms, limit 20 ms",
+            "0 cycles, 0 in a row, limit 20",
             "held, limit of the rig 0",
             "0",
             "closest: SYNC on bus 0 took 150.00 µs, bound 190.00 µs",
@@ -142,11 +159,11 @@ fn each_thing_that_is_wrong_has_its_verdict() {
         (|run| run.figures.final_state = None, Exit::Failed, "failed: sequence"),
         (
             |run| {
-                run.manifest.motion_end_s = Some(9.0);
-                run.figures.motion_reached_s = Some(8.8);
+                run.figures.motion.played = Some(0.4);
             },
             Exit::Failed,
-            "failed: sequence; the scenario's motion was not played: it came to 8.80 of 9.00 s of its own time",
+            "failed: sequence; the scenario's motion was not played: 40 % of its way of 900.0 mm; a controller with a motion of \
+             its own declares it",
         ),
         (
             |run| run.figures.final_state = Some(Code::Known(ControllerState::Disabling)),
@@ -204,6 +221,19 @@ fn each_thing_that_is_wrong_has_its_verdict() {
         let verdict = Run::with(change);
         assert_eq!((verdict.exit_code, verdict.reason.as_str()), (outcome, reason));
     }
+}
+
+#[test]
+fn what_the_jaw_and_the_master_show_fails_a_run_and_a_short_delay_is_told() {
+    let delayed = Run::with(|run| run.figures.motion.lag_ms = Some(11.2));
+    let told = (delayed.exit_code, delayed.reason.as_str());
+    assert_eq!(told, (Exit::Passed, "every check passed; motion delayed by 11 ms"));
+    let late = Run::with(|run| run.figures.motion.lag_ms = Some(20.5));
+    assert_eq!((late.exit_code, late.reason.as_str()), (Exit::Failed, "failed: motion lag"));
+    let missed = Run::with(|run| run.figures.motion.missed_commands = 21);
+    assert_eq!((missed.exit_code, missed.reason.as_str()), (Exit::Failed, "failed: commands missed"));
+    let still = Run::with(|run| (run.figures.motion.way_mm, run.figures.motion.played) = (Some(0.0), None));
+    assert_eq!(still.word, "UNTESTED", "{}", still.reason);
 }
 
 #[test]
@@ -304,7 +334,7 @@ fn cycles_that_the_rig_missed_fail_a_run_and_those_that_the_machine_lost_do_not(
 fn the_evidence_on_overlong_work_is_part_of_the_finding() {
     let verdict = Run::with(|run| run.overruns(5, 0.002));
     assert_eq!(
-        verdict.checks[3].finding,
+        verdict.checks[5].finding,
         "missed by the plant (2); 5 stretches of work too long, 1 stall of that length while waiting, work is 25.0 % of the \
          time: probability by chance 0.00, limit of the rig 0"
     );
@@ -394,5 +424,5 @@ fn a_verdict_is_written_with_its_word_and_exit_code() {
     let written = serde_json::to_value(&verdict).unwrap();
     assert_eq!((&written["word"], &written["exit_code"]), (&"FAIL".into(), &1.into()));
     assert_eq!(written["reason"], "failed: tracking");
-    assert_eq!(written["checks"].as_array().map(Vec::len), Some(6));
+    assert_eq!(written["checks"].as_array().map(Vec::len), Some(8));
 }

@@ -1,0 +1,52 @@
+//! Poses in messages, and how far they are apart. A pose with a value that is no number is infinitely far.
+
+use masseter_model::geometry::{Deviation, Pose};
+use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::messages::{State, Truth, pose_from_fields};
+
+/// States in which the platform has a desired pose.
+pub const MOVING: [ControllerState; 3] =
+    [ControllerState::Easing, ControllerState::Running, ControllerState::Holding];
+
+/// Whether the platform has a desired pose in this state of the controller, a code.
+pub(super) fn is_moving(state: Option<u32>) -> bool {
+    MOVING.iter().any(|moving| state == Some(moving.code()))
+}
+
+pub(super) fn is_running(state: Option<u32>) -> bool {
+    state == Some(ControllerState::Running.code())
+}
+
+pub(super) fn desired_pose(state: &State) -> Option<Pose> {
+    pose(state.desired_position_m, state.desired_quaternion_wxyz)
+}
+
+pub(super) fn estimated_pose(state: &State) -> Option<Pose> {
+    pose(state.estimated_position_m, state.estimated_quaternion_wxyz)
+}
+
+pub(super) fn true_pose(truth: &Truth) -> Option<Pose> {
+    pose(truth.position_m, truth.quaternion_wxyz)
+}
+
+/// A quaternion's length may differ from 1 by so much: single precision and more.
+const LENGTH_TOLERANCE: f64 = 1e-3;
+
+/// The pose in a message; none where a number is not finite or the quaternion is no rotation.
+fn pose(position_m: [f64; 3], quaternion_wxyz: [f64; 4]) -> Option<Pose> {
+    let length = quaternion_wxyz.iter().map(|part| part * part).sum::<f64>().sqrt();
+    let is_pose = position_m.iter().all(|x| x.is_finite()) && (length - 1.0).abs() <= LENGTH_TOLERANCE;
+    is_pose.then(|| pose_from_fields(position_m, quaternion_wxyz))
+}
+
+/// How far two poses are apart.
+pub(super) fn deviation(a: Option<&Pose>, b: Option<&Pose>, incisal_m: [f64; 3]) -> Deviation {
+    const NOWHERE: Deviation =
+        Deviation { origin_m: f64::INFINITY, incisal_m: f64::INFINITY, angle_rad: f64::INFINITY };
+    a.zip(b).map_or(NOWHERE, |(a, b)| Deviation::between(a, b, incisal_m))
+}
+
+/// The worse of two errors; what is no number is infinite.
+pub(super) fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::INFINITY } else { a.max(b) }
+}

@@ -1,0 +1,190 @@
+//! The pose that the jaw should have at each sample, and by how much the motion is late.
+//!
+//! While the motion plays, the pose is the scenario's, computed here. The motion begins with the first sample in which the
+//! controller is in the state `running`, and goes on by a period with each cycle that the controller runs. A controller waits
+//! where commands or readings are lost: its motion time is then behind. The pose waits as well, up to the limit of `checks`;
+//! what it waited is the lag, which never shrinks. What cycles without SYNC and the machine's lost cycles cost does not count. Before the motion, and in an own motion, the controller's desired pose counts. After the motion the last
+//! pose stays.
+
+use masseter_controller::playback::Playback;
+use masseter_controller::trajectory::Trajectory;
+use masseter_model::geometry::{Mechanism, Pose};
+use masseter_runtime::messages::codes::Cause;
+use masseter_runtime::messages::{Parameters, State, pose_fields};
+use masseter_runtime::named::{Declared, PlayedMotion};
+use masseter_scenario::Scenario;
+
+use crate::events::EventRecord;
+use crate::poses::{desired_pose, is_moving, is_running};
+
+/// What the messages of a sample say of the motion.
+#[derive(Debug, Clone, Copy)]
+#[expect(clippy::struct_excessive_bools, reason = "facts that are independent of each other")]
+pub(crate) struct Progress<'a> {
+    pub(crate) cycle: u64,
+    /// Whether SYNC was sent, and whether the controller ran.
+    pub(crate) has_sync: bool,
+    pub(crate) has_run: bool,
+    /// The controller's, as a code.
+    pub(crate) state: Option<u32>,
+    /// Whether a cycle that the machine lost may act on this one.
+    pub(crate) is_disturbed: bool,
+    /// What the controller made of this sample, or else of the next one that it used, or what it states without any.
+    pub(crate) next_use: Option<&'a State>,
+    /// Whether that is this sample.
+    pub(crate) is_used: bool,
+    pub(crate) parameters: Option<&'a Parameters>,
+}
+
+/// Plays the scenario's motion beside the controller.
+#[derive(Debug, Clone)]
+pub(crate) struct Reference {
+    /// None for an own motion, and where the motion's file is gone since the run.
+    playback: Option<Playback>,
+    period_s: f64,
+    most_lag_s: f64,
+    /// How far force control may lead the jaw up or down from the motion, m.
+    reach_m: f64,
+    detour_m: f64,
+    /// Places of the parameters for rate and amplitude.
+    places: [Option<usize>; 2],
+    /// The controller's cycle in which somebody asked for a stop.
+    stop_cycle: Option<u64>,
+    has_begun: bool,
+    /// In the sample before, and in any.
+    is_moving: bool,
+    was_moving: bool,
+    lag_s: f64,
+    /// The part of it that does not count.
+    excused_s: f64,
+    pose: Option<Pose>,
+}
+
+/// The desired pose of a sample, and by how much the motion is late, s; no lag but while the scenario's motion plays.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Desired {
+    pub(crate) pose: Option<Pose>,
+    pub(crate) lag_s: Option<f64>,
+}
+
+/// The shortest step, s, and the most steps, in which the rest of a motion is measured.
+const STEP_S: f64 = 0.005;
+const MOST_STEPS: f64 = 20_000.0;
+
+impl Reference {
+    pub(crate) fn new(scenario: &Scenario, declared: &Declared) -> Self {
+        let is_of_scenario = declared.motion == PlayedMotion::Scenario;
+        Self {
+            playback: is_of_scenario.then(|| playback(scenario)).flatten(),
+            period_s: scenario.period_s(),
+            most_lag_s: scenario.checks.motion_lag_ms / 1e3,
+            reach_m: scenario.force_control.map_or(0.0, |config| config.reach_m),
+            detour_m: 0.0,
+            places: ["motion_rate", "motion_amplitude"].map(|name| declared.place_of(name).ok()),
+            stop_cycle: None,
+            has_begun: false,
+            is_moving: false,
+            was_moving: false,
+            lag_s: 0.0,
+            excused_s: 0.0,
+            pose: None,
+        }
+    }
+
+    /// A stop that operator or scenario asked for lets the motion come to rest.
+    pub(crate) fn apply_event(&mut self, event: &EventRecord) {
+        if event.cause == Cause::StopRequested {
+            self.stop_cycle = Some(self.stop_cycle.map_or(event.cycle, |cycle| cycle.min(event.cycle)));
+        }
+    }
+
+    /// Goes on to the next sample.
+    pub(crate) fn advance(&mut self, of: &Progress<'_>) -> Desired {
+        let is_moving = is_moving(of.state);
+        // A sample comes before the state that it leads to: the motion has its part in the sample that ends it.
+        let goes_on = std::mem::replace(&mut self.is_moving, is_moving) || is_moving;
+        let has_begun = self.has_begun || is_running(of.state);
+        if has_begun && self.playback.is_some() {
+            if goes_on {
+                self.play(of);
+            }
+        } else if let Some(used) = of.next_use.filter(|_| of.is_used && (goes_on || !self.was_moving)) {
+            self.pose = desired_pose(used);
+        }
+        self.was_moving |= is_moving;
+        let lag_s = (self.lag_s - self.excused_s).max(0.0);
+        Desired { pose: self.pose, lag_s: (self.has_begun && goes_on).then_some(lag_s) }
+    }
+
+    fn play(&mut self, of: &Progress<'_>) {
+        let Some(playback) = &mut self.playback else { return };
+        let set = |place: Option<usize>| of.parameters?.parameters.as_slice().get(place?).copied();
+        let [rate, amplitude] = self.places.map(set);
+        if let Some(rate) = rate {
+            playback.set_motion_rate(rate);
+        }
+        if let Some(amplitude) = amplitude {
+            playback.set_motion_amplitude(amplitude);
+        }
+        if !std::mem::replace(&mut self.has_begun, true) {
+            playback.play();
+        } else if of.has_run {
+            playback.advance(self.period_s);
+            self.excused_s += if of.has_sync { 0.0 } else { self.period_s };
+        }
+        let stated_s = of.next_use.map(|state| state.motion_time_s).filter(|stated_s| *stated_s >= 0.0);
+        let before_s = self.lag_s;
+        self.lag_s = stated_s.map_or(before_s, |stated_s| before_s.max(playback.lag_s(stated_s)));
+        self.excused_s += if of.is_disturbed { self.lag_s - before_s } else { 0.0 };
+        let mut pose = playback.earlier_pose(self.lag_s.min(self.most_lag_s + self.excused_s));
+        if let Some(stated) = of.next_use.filter(|_| of.is_used && self.reach_m > 0.0).and_then(desired_pose)
+        {
+            let detour_m = stated.translation.z - pose.translation.z;
+            self.detour_m = detour_m.clamp(-self.reach_m, self.reach_m);
+        }
+        pose.translation.z += self.detour_m;
+        self.pose = as_published(&pose);
+        if self.stop_cycle.is_some_and(|cycle| cycle <= of.cycle) {
+            playback.stop();
+        }
+    }
+
+    /// What is left of the motion, as `distance` measures it from pose to pose; nothing after a request to stop. None where the
+    /// motion is not the scenario's.
+    pub(crate) fn rest(&self, distance: impl Fn(&Pose, &Pose) -> f64) -> Option<f64> {
+        let mut playback = self.playback.clone()?;
+        if self.stop_cycle.is_some() {
+            return Some(0.0);
+        }
+        if !self.has_begun {
+            playback.play();
+        }
+        let rest_s = playback.rest_s();
+        let steps = (rest_s / STEP_S).ceil().min(MOST_STEPS);
+        let (mut from, mut rest) = (playback.earlier_pose(0.0), 0.0);
+        for step in 1..=steps as u32 {
+            let to = playback.earlier_pose(-rest_s * f64::from(step) / steps);
+            rest += distance(&from, &to);
+            from = to;
+        }
+        Some(rest)
+    }
+}
+
+/// The pose as a state carries it, so that equal poses are equal.
+fn as_published(pose: &Pose) -> Option<Pose> {
+    let (desired_position_m, desired_quaternion_wxyz) = pose_fields(pose);
+    let mut state = State { desired_position_m, desired_quaternion_wxyz, ..State::default() };
+    state.round();
+    desired_pose(&state)
+}
+
+/// The scenario's motion; none where its file is gone since the run.
+fn playback(scenario: &Scenario) -> Option<Playback> {
+    let mechanism = Mechanism::new(&scenario.mechanism).ok()?;
+    let motion = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s).ok()?;
+    Some(Playback::of_scenario(scenario, &mechanism, motion.slowed(scenario.dry.speed_now())))
+}
+
+#[cfg(test)]
+mod tests;
