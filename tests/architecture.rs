@@ -27,7 +27,7 @@ use std::path::Path;
 use circles::circles;
 use features::other_features;
 use impls::split_types;
-use layers::{dependencies_of, layer_violations};
+use layers::{ROOMS, Room, dependencies_of, layer_violations, room_violations};
 use orphans::orphans;
 
 #[test]
@@ -43,14 +43,12 @@ fn the_crate_of_can_stands_alone() {
     assert_eq!(used, ["libc", "rand", "rand_pcg", "rustix", "serde", "socketcan", "thiserror"]);
 }
 
-/// Emulated drives know frames and their own parts. Of a scenario they know the kinds of their faults alone.
+/// Emulated drives know frames and their own parts.
 #[test]
 fn emulated_drives_know_neither_mechanism_nor_scenario_nor_transport() {
     let foreign = |line: &&str| {
-        let is_foreign = ["masseter_model", "masseter_runtime", "masseter_scenario", "iceoryx2"]
-            .iter()
-            .any(|name| line.contains(name));
-        is_foreign && *line != "use masseter_scenario::DriveFault;" && !line.trim_start().starts_with("//")
+        let mut others = ["masseter_model", "masseter_runtime", "masseter_scenario", "iceoryx2"].iter();
+        !line.trim_start().starts_with("//") && others.any(|name| line.contains(name))
     };
     for path in code_files(&project().join("plant/src/simulator/drive")) {
         let text = fs::read_to_string(&path).unwrap();
@@ -70,6 +68,12 @@ fn the_command_and_its_bindings_share_the_compiled_crates_of_others() {
             differing.join("\n")
         );
     }
+}
+
+#[test]
+fn folders_of_the_simulator_keep_to_their_rooms() {
+    let violations = room_violations(project(), &ROOMS);
+    assert!(violations.is_empty(), "\n{}", violations.join("\n"));
 }
 
 #[test]
@@ -93,10 +97,7 @@ fn every_file_belongs_to_a_module() {
 
 /// Files that read what the kernel serves, a private folder, the program itself, or its sources; everything else reads through
 /// `masseter_scenario::input`, which refuses what has no end.
-const READERS: [&str; 14] = [
-    "rig/cli/bench/played_run.rs",
-    "rig/cli/bench/simulated.rs",
-    "rig/cli/bench/virtual_time.rs",
+const READERS: [&str; 11] = [
     "rig/cli/kinematics/table.rs",
     "rig/record/recording/src/folder.rs",
     "rig/record/recording/src/writer.rs",
@@ -209,6 +210,29 @@ fn every_file_of_tests_belongs_to_the_program() {
             main.contains(&format!("\nmod {name};\n")),
             "{file} never runs: add 'mod {name};' to tests/main.rs"
         );
+    }
+}
+
+#[test]
+fn a_planted_use_beyond_a_room_is_found() {
+    let rooms = [
+        Room { folder: "src/drive", crates: &["masseter_can"], rooms: &["src/error.rs"] },
+        Room { folder: "src/gone.rs", crates: &[], rooms: &[] },
+    ];
+    let manifest = ("Cargo.toml", "[package]\nname = \"planted\"\nedition = \"2024\"\n");
+    let lib = ("src/lib.rs", "mod drive;\nmod error;\nmod mechanism;");
+    let rest = [("src/error.rs", "pub struct Error;"), ("src/mechanism.rs", "pub struct Axis;")];
+    let inner = ("src/drive/inner.rs", "use masseter_can::Frame;\nuse crate::error::Error;");
+    for (code, expected) in [
+        ("mod inner;\n#[cfg(test)]\nmod tests { use masseter_scenario::Scenario; }", None),
+        ("mod inner;\nuse masseter_scenario::Scenario;", Some("src/drive/mod.rs uses masseter_scenario")),
+        ("mod inner;\nfn f() { masseter_model::g(); }", Some("src/drive/mod.rs uses masseter_model")),
+        ("mod inner;\nuse crate::mechanism::Axis;", Some("src/drive/mod.rs uses src/mechanism.rs")),
+    ] {
+        let files = [manifest, lib, rest[0], rest[1], inner, ("src/drive/mod.rs", code)];
+        let found = room_violations(planted(&files).path(), &rooms);
+        let expected: Vec<_> = expected.into_iter().chain(["src/gone.rs is not there"]).collect();
+        assert_eq!(found, expected, "{code}");
     }
 }
 

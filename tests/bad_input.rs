@@ -30,7 +30,7 @@ fn scenarios_are_refused_with_place_and_remedy() {
         ("[jaw]\nreference_point_m = [nan, 0, 0]", "scenario.toml:2:1: jaw.reference_point_m is NaN"),
         ("[jaw]\nreference_point_m = [1e300, 0, 0]", "scenario.toml:2:1: jaw.reference_point_m is 1e300"),
         (
-            "rate_hz = 10\n[controller]\nstart_timeout_s = 5",
+            "rate_hz = 10\n[controller]\nstart_timeout_s = 5\n[can]\nheartbeat_consumer_ms = 200",
             "scenario.toml:3:1: controller.start_timeout_s = 5: at 10 Hz",
         ),
         (

@@ -270,7 +270,7 @@ fn range_cell(range: Range) -> String {
 }
 
 fn fault_row(kind: FaultKindConfig) -> String {
-    let FaultDeclaration { name, layer, needs, takes, size, about } = kind.declared();
+    let FaultDeclaration { name, layer, overlap: _, needs, takes, size, about } = kind.declared();
     let size = size.map_or_else(String::new, |size| {
         let range = format!("{} {}", Range::Within(size.min, size.max), size.dimension.si_unit().name);
         format!(" `size`: {}, {}, such as `\"{}\"`.", size.about, range.trim_end(), size.example)

@@ -140,7 +140,8 @@ fn a_planted_bug_passes_by_the_requirement_that_it_fails() {
         max = '1 nm'
         [expect]
         exit_code = 1
-        verdict = 'fail'";
+        verdict = 'fail'
+        failed = ['impossible']";
     let (code, text) = run(&Workspace::new(bug));
     assert_eq!(code, Some(0), "{text}");
     assert!(text.contains("PASS: FAIL, as expected: failed: impossible"), "{text}");
@@ -271,7 +272,10 @@ fn junit_agrees_with_the_exit_code() {
         "{junit}"
     );
 
-    let met = Workspace::new("duration_s = 0.5\nchecks.tracking_max_mm = 0.0001\n[expect]\nverdict = 'fail'");
+    let met = Workspace::new(
+        "duration_s = 0.5\nchecks.tracking_max_mm = 0.0001\n[expect]\nverdict = 'fail'\n\
+         failed = ['tracking', 'estimated tracking']",
+    );
     assert_eq!(run(&met).0, Some(0));
     let junit = read(&met, "junit.xml");
     assert!(

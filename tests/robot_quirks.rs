@@ -66,7 +66,7 @@ fn rows() -> Vec<Row> {
 fn robot(quirk: &str, profile: &str) -> Workspace {
     let quirk = quirk.replace(", ", "\n");
     Workspace::new(&format!(
-        "duration_s = 0.2\n[controller]\nease_s = 0.2\n[drives]\nmemory = 'drives.json'\n[[drives.quirk]]\n{quirk}\n[dynamics]\ninitial_leg_m = 0.2974\n\
+        "duration_s = 0.2\n[drives]\nmemory = 'drives.json'\n[[drives.quirk]]\n{quirk}\n[dynamics]\ninitial_leg_m = 0.2974\n\
          [[drive_profile]]\n{profile}\n"
     ))
 }

@@ -139,24 +139,127 @@ fn a_suite_passes_if_every_scenario_does() {
 }
 
 #[test]
-fn what_is_untested_fails_unless_it_is_allowed() {
-    let suite = Suite::of(&[("untested.toml", UNTESTED)]);
-    for (arguments, code) in [(&["suite"][..], 1), (&["suite", "--allow-untested", "--out", "allowed"], 0)] {
-        let output = suite.test(arguments);
-        assert_eq!(output.status.code(), Some(code), "{}", stdout(&output));
-        assert!(stdout(&output).contains("0 passed; 0 failed; 1 untested"), "{}", stdout(&output));
+fn what_is_untested_fails_unless_it_is_allowed_and_a_fault_that_did_not_act_fails_always() {
+    let idle = "duration_s = 0.5\n[[require]]\nname = 'r'\nwhen = 'safe_stop'\nthen = 'l1.force < 1 N'\n";
+    for (scenario, allowed) in [(idle, 0), (UNTESTED, 1)] {
+        let suite = Suite::of(&[("untested.toml", scenario)]);
+        let arguments: [(&[&str], i32); 2] =
+            [(&["suite"], 1), (&["suite", "--allow-untested", "--out", "allowed"], allowed)];
+        for (arguments, code) in arguments {
+            let output = suite.test(arguments);
+            assert_eq!(output.status.code(), Some(code), "{}", stdout(&output));
+            assert!(stdout(&output).contains("0 passed; 0 failed; 1 untested"), "{}", stdout(&output));
+        }
+        assert_eq!(suite.path("allowed").exists(), allowed == 1);
     }
-    assert!(!suite.path("allowed").exists());
+}
+
+/// A knock stops the rig just before the fault would strike: the fault shows nothing, though the rig is stopped as
+/// expected.
+#[test]
+fn a_stop_before_the_fault_tests_nothing_of_the_fault() {
+    let scenario = "duration_s = 4.0
+        [[stimulus]]
+        name = 'knock'
+        at_s = 1.79
+        for_s = 0.02
+        push_n = [0, 0, -80]
+        [[faults]]
+        kind = 'encoder_stuck'
+        axis = 'l2'
+        at_s = 1.8
+        [[require]]
+        name = 'stops after an encoder fault'
+        when = 'fault.encoder_stuck'
+        then = 'controller.state == safe_stop'
+        within = '20 ms'
+        [expect]
+        verdict = 'safe_stop'";
+    let suite = Suite::of(&[("stuck.toml", scenario)]);
+    let output = suite.test(&["suite", "--allow-untested", "--out", "kept"]);
+    let said = stdout(&output);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    let why = "0 of 1 declared faults acted, number 1 only after the rig had stopped";
+    assert!(said.contains("test stuck ... UNTESTED\n") && said.contains(why), "{said}");
+    let summary = json(&suite.path("kept/stuck/summary.json"));
+    let checks = summary["verdict"]["checks"].as_array().unwrap();
+    let response = checks.iter().find(|check| check["name"] == "stops after an encoder fault").unwrap();
+    let finding = response["finding"].as_str().unwrap();
+    assert!(finding.contains("the condition held already before 1 trigger"), "{finding}");
+}
+
+#[test]
+fn a_failure_beside_the_named_one_fails_and_one_without_a_name_is_refused() {
+    let planted = "duration_s = 1.0
+        checks.tracking_max_mm = 1e-4
+        [[require]]
+        name = 'must hold'
+        signal = 'incisal.x'
+        LIMIT
+        [expect]
+        verdict = 'fail'";
+    let with = |limit: &str, failed: &str| planted.replace("LIMIT", limit) + failed;
+    let failed = "\nfailed = ['tracking', 'estimated tracking']\n";
+    let suite = Suite::of(&[
+        ("exact.toml", &with("max = '1000 mm'", failed)),
+        ("hides.toml", &with("max = '-1000 mm'", failed)),
+        ("unnamed.toml", &with("max = '1000 mm'", "")),
+    ]);
+    let output = suite.test(&["suite"]);
+    let said = stdout(&output);
+    assert!(said.contains("test exact ... ok\n"), "{said}");
+    let hides =
+        "FAIL: expected that tracking, estimated tracking fails and nothing else, but must hold failed";
+    assert!(said.contains("test hides ... FAILED\n") && said.contains(hides), "{said}");
+    let unnamed = "expect.failed = []: name the checks and requirements that must fail";
+    assert!(said.contains("test unnamed ... FAILED\n") && said.contains(unnamed), "{said}");
+}
+
+#[test]
+fn tags_and_a_matrix_choose_and_an_included_file_is_shared() {
+    let cases = "include = ['common/common.toml']\ntags = ['rates']\n[matrix]\nrate_hz = [500, 1000]\n";
+    let suite = Suite::of(&[("cases.toml", cases), ("plain.toml", PASSES), ("b.TOML", PASSES)]);
+    fs::create_dir(suite.path("suite/common")).unwrap();
+    let common = "duration_s = 1.0\n[[require]]\nname = 'small'\nid = 'REQ-12'\nsignal = 'incisal.error'\n\
+                  during = 'running'\nmax = '0.5 mm'\n";
+    fs::write(suite.path("suite/common/common.toml"), common).unwrap();
+
+    let output = suite.test(&["suite", "--junit", "junit.xml", "--format", "json", "--html", "suite.html"]);
+    assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+    assert!(stderr(&output).contains("left out: suite/b.TOML (its name does not end with .toml)"));
+    let result: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let names = |list: &serde_json::Value, key: &str| {
+        list.as_array().unwrap().iter().map(|row| row[key].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    let both = ["cases[rate_hz=500]", "cases[rate_hz=1000]"];
+    assert_eq!(names(&result["scenarios"], "name"), [both[0], both[1], "plain"]);
+    assert_eq!(names(&result["requirements"], "scenario"), both);
+    assert_eq!(names(&result["requirements"], "id"), ["REQ-12", "REQ-12"]);
+    assert!(fs::read_to_string(suite.path("suite.html")).unwrap().contains("cases[rate_hz=500]"));
+    let junit = fs::read_to_string(suite.path("junit.xml")).unwrap();
+    assert!(junit.contains("file=\"suite/cases.toml\"") && junit.contains("value=\"REQ-12\""), "{junit}");
+
+    fs::write(suite.path("before.json"), stdout(&output)).unwrap();
+    let arguments = ["suite", "--tag", "rates", "-k", "not 500", "--baseline", "before.json"];
+    let output = suite.test(&arguments);
+    let said = stdout(&output);
+    assert_eq!(output.status.code(), Some(0), "{said}{}", stderr(&output));
+    assert!(said.contains("margins since the baseline: 0 smaller, 0 larger, 1 equal\n"), "{said}");
+    assert!(said.contains("1 passed; 0 failed; 0 untested; 2 filtered out"), "{said}");
+    let shares = ["1/3", "2/3", "3/3"].map(|share| stdout(&suite.test(&["suite", "--shard", share])));
+    assert!(shares.iter().all(|said| said.contains("1 passed; 0 failed")), "{shares:?}");
+    let refused = suite.test(&["suite", "-k", "rates and"]);
+    assert!(refused.status.code() == Some(2) && stderr(&refused).contains("a word is missing"));
 }
 
 #[test]
 fn a_filter_chooses_by_name_and_must_leave_something() {
     let suite = all_kinds();
-    let output = suite.test(&["suite", "--filter", "passes"]);
+    let output = suite.test(&["suite", "-k", "passes and not fails"]);
     assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
     let said = stdout(&output);
     assert!(said.contains("running 1 test\n") && said.contains("3 filtered out"), "{said}");
-    let none = suite.test(&["suite", "--filter", "encoder"]);
+    let none = suite.test(&["suite", "-k", "encoder"]);
     assert_eq!(none.status.code(), Some(2));
     let expected = "there are: fails, passes, unreadable, untested";
     assert!(stderr(&none).contains(expected), "{}", stderr(&none));
@@ -188,12 +291,14 @@ fn files_can_be_named_and_runs_with_processes_keep_folders_of_failures_alone() {
     assert_eq!(output.status.code(), Some(1), "{said}{}", stderr(&output));
     assert!(said.contains("test passes ... ok\n"), "{said}");
     assert!(said.contains("test fails ... FAILED (also after 1 retry)\n"), "{said}");
-    assert!(suite.path("kept/fails/report.html").is_file());
+    for attempt in ["fails", "fails-retry-1"] {
+        assert!(suite.path("kept").join(attempt).join("report.html").is_file(), "{attempt}");
+    }
     assert!(!suite.path("kept/passes").exists());
 }
 
 #[test]
-fn a_scenario_that_passes_after_a_retry_is_shown_as_such() {
+fn another_result_of_the_same_run_in_simulated_time_is_a_failure_of_its_own() {
     // A controller that gives up in its first run, and attaches in the second.
     let suite = Suite::of(&[("one.toml", PASSES)]);
     let program = suite.path("controller.sh");
@@ -203,10 +308,14 @@ fn a_scenario_that_passes_after_a_retry_is_shown_as_such() {
     );
     fs::write(&program, script).unwrap();
     Command::new("chmod").arg("+x").arg(&program).status().unwrap();
-    let output = suite.test(&["suite", "--controller", "./controller.sh", "--retries", "2"]);
+    let arguments = ["suite", "--controller", "./controller.sh", "--retries", "2", "--out", "kept"];
+    let output = suite.test(&arguments);
     let said = stdout(&output);
-    assert_eq!(output.status.code(), Some(0), "{said}{}", stderr(&output));
-    assert!(said.contains("test one ... ok (only after 1 retry)\n"), "{said}");
+    assert_eq!(output.status.code(), Some(1), "{said}{}", stderr(&output));
+    assert!(said.contains("test one ... FAILED (also after 1 retry)\n"), "{said}");
+    let differ = "runs of the same scenario and seed differ in simulated time: ";
+    assert!(said.contains(differ) && said.contains("; then PASS: "), "{said}");
+    assert!(suite.path("kept/one-retry-1/report.html").is_file());
 }
 
 #[test]

@@ -71,6 +71,13 @@ pub(crate) struct Estimate {
     pub(crate) solution: Solution,
 }
 
+/// The cycles in a safe stop that show the whole time that the scenario asks for: one more than there are periods.
+fn observed_cycles(scenario: &Scenario) -> u64 {
+    let periods = scenario.observation_s() / scenario.period_s();
+    // A whole number of periods may be computed as a little more.
+    if periods > 0.0 { (periods - 1e-6).ceil() as u64 + 1 } else { 0 }
+}
+
 /// The state of a controller's sequence, and what decides on the next one.
 #[derive(Debug, Clone)]
 pub(crate) struct Sequencer {
@@ -78,8 +85,8 @@ pub(crate) struct Sequencer {
     pub(crate) period_s: f64,
     /// How long the drives may take to be enabled, s. The master, which has more of their state, gives up first.
     enable_timeout_s: f64,
-    /// How long a safe stop is observed, s.
-    observation_s: f64,
+    /// How many cycles a safe stop is observed at least.
+    observed_cycles: u64,
     pub(crate) tracker: ForwardTracker,
     pub(crate) state: ControllerState,
     pub(crate) cycles_in_state: u64,
@@ -102,7 +109,7 @@ impl Sequencer {
             config: scenario.controller,
             period_s: scenario.period_s(),
             enable_timeout_s: scenario.controller.start_timeout_s + scenario.can.longest_enabling_s(),
-            observation_s: scenario.observation_s(),
+            observed_cycles: observed_cycles(scenario),
             tracker: ForwardTracker::new(mechanism),
             state: WaitReadings,
             cycles_in_state: 0,
@@ -250,7 +257,7 @@ impl Sequencer {
             SafeStop => {
                 let waited_s = self.cycles_in_state as f64 * self.period_s;
                 let is_over = (is_repeated && self.drives_are_off()) || waited_s >= SAFE_STOP_S;
-                (is_over && waited_s >= self.observation_s).then_some(Outcome::SafeStop)
+                (is_over && self.cycles_in_state >= self.observed_cycles).then_some(Outcome::SafeStop)
             }
             _ => None,
         }
@@ -287,6 +294,19 @@ impl Sequencer {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_safe_stop_is_observed_for_the_whole_time_that_a_requirement_asks_for() {
+        let cycles = |stays_for: &str, rate_hz| {
+            let text = format!("rate_hz = {rate_hz}\n[[require]]\nname = 'r'\nthen = 'true'\n{stays_for}");
+            observed_cycles(&Scenario::parse(std::path::Path::new("s.toml"), &text).unwrap())
+        };
+        assert_eq!(cycles("", 1000), 0);
+        assert_eq!(cycles("stays_for = '50 ms'", 1000), 51);
+        assert_eq!(cycles("stays_for = '50 ms'", 2000), 101);
+        assert_eq!(cycles("stays_for = '9 ms'", 1000), 10, "0.009 s are nine periods");
+        assert_eq!(cycles("stays_for = '0.5 ms'", 1000), 2);
+    }
 
     const TRIGGERS: [Trigger; 3] = [Trigger::Done, Trigger::StopRequested, Trigger::Fault];
 

@@ -135,6 +135,11 @@ impl<L: Link> PlantCore<L> {
         Ok(plant)
     }
 
+    /// The number of the last cycle that began; 0 before the first.
+    pub(crate) fn cycle(&self) -> u64 {
+        self.cycle
+    }
+
     /// Simulates everything up to `now_ns` now, instead of when the next cycle begins.
     pub fn advance(&mut self, now_ns: u64) -> Result<(), PlantError> {
         Ok(self.link.advance(now_ns)?)

@@ -3,9 +3,11 @@
 
 use std::borrow::Borrow;
 
+use masseter_runtime::clock::SECOND_NS;
 use masseter_runtime::messages::{Command, Contact, Reading, Truth};
 use masseter_runtime::realtime::Wake;
 use masseter_runtime::schedule::CycleSchedule;
+use masseter_scenario::AFTER_STOP_S;
 
 use crate::core::PlantCore;
 use crate::error::PlantError;
@@ -135,4 +137,44 @@ pub fn end_cycle<L: Link, P: PlantPorts<L>>(
         .and_then(|command| Ok(plant.apply(ports.now_ns(), command.as_ref().map(Borrow::borrow))?));
     // Also after an error: these frames and events explain it.
     ports.publish_frames_and_events(plant).and(applied)
+}
+
+/// Fewest cycles after the controller's last one. The request to stop is sent in one cycle, takes effect in the next, and is
+/// confirmed after the ramp.
+const FEWEST_AFTER: u64 = 10;
+
+/// Stops the drives, and runs the cycles that follow the controller's last one, without commands: for [`AFTER_STOP_S`], so that a
+/// fall or a drift after the stop is recorded. `wait` waits for each cycle; those that it skips count.
+///
+/// # Errors
+/// Those of the plant, of the ports and of the wait.
+pub fn run_after_controller<L: Link, P: PlantPorts<L>>(
+    plant: &mut PlantCore<L>,
+    ports: &mut P,
+    schedule: &CycleSchedule,
+    period_ns: u64,
+    mut wait: impl FnMut(&mut PlantCore<L>, &mut P) -> Result<Wake, P::Error>,
+) -> Result<(), P::Error> {
+    plant.master.stop();
+    let last_cycle = plant.cycle() + cycles_after(period_ns);
+    while plant.cycle() < last_cycle {
+        let wake = wait(plant, ports)?;
+        run_cycle(plant, ports, schedule, &wake)?;
+    }
+    Ok(())
+}
+
+/// How many cycles of this period follow the controller's last one.
+fn cycles_after(period_ns: u64) -> u64 {
+    ((AFTER_STOP_S * SECOND_NS as f64) as u64).div_ceil(period_ns).max(FEWEST_AFTER)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_after_the_controller_is_half_a_second_and_never_less_than_a_stop_takes() {
+        assert_eq!([100_000, 1_000_000, 3_333_333, 100_000_000].map(cycles_after), [5000, 500, 151, 10]);
+    }
 }

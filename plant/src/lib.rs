@@ -5,8 +5,8 @@
 //! | `master` | boot, exchange, supervision of the drives; [`wanted`] objects; link, layout of the buses | |
 //! | `simulator::mechanism` | dynamics, axes with friction and stops, contact of teeth and food, poses at rest | |
 //! | `simulator::drive` | an emulated drive: node (CiA 301), axis (CiA 402), object dictionary | |
-//! | `simulator::injection` | when faults and stimuli act, and what they do | mechanism, drive, `master` |
-//! | [`emulation`] | drives and mechanism on simulated wires or real interfaces | all above |
+//! | [`emulation`] | a scenario's drives and mechanism on simulated or real wires | mechanism, drive, `master` |
+//! | `simulator::injection` | when faults and stimuli act, their events; faults of commands | `master` |
 //! | [`commissioning`] | a client of single drives that inspects, configures and moves them | `master`, [`emulation`] |
 //! | [`description`] | EDS and DBC of the emulated drives, DCF of any drive | [`emulation`], [`commissioning`] |
 //! | [`core`] | master and link as one pure step function | `master`, `simulator` |

@@ -13,15 +13,12 @@ use masseter_runtime::transport::{
 use masseter_scenario::Scenario;
 
 use crate::core::PlantCore;
-use crate::cycle::{PlantPorts, run_cycle};
+use crate::cycle::{PlantPorts, run_after_controller, run_cycle};
 use crate::error::PlantError;
 use crate::master::link::Link;
 
-/// Longest time for the drives to stop after the request to end, ns.
-const STOP_WITHIN_NS: u64 = 500_000_000;
-/// Least number of cycles for that. The request is sent in one cycle, takes effect in the next, and is confirmed after
-/// the ramp.
-const STOP_WITHIN_CYCLES: u64 = 10;
+/// Silence of the controller in lockstep that the plant plays, beyond the one that stops the drives, ns.
+const SILENCE_NS: u64 = 500_000_000;
 /// Silence after which no command will come any more, beyond the one that stops the drives, ns.
 const ABANDONED_AFTER_NS: u64 = 5_000_000_000;
 
@@ -90,7 +87,7 @@ impl Ports {
     }
 }
 
-/// Runs the plant until it is asked to end or its controller hangs, then until its drives are off.
+/// Runs the plant until it is asked to end or its controller hangs; then stops its drives, and goes on for a while.
 pub fn run(arguments: &ProcessArguments) -> Result<Reason, PlantProcessError> {
     let context = arguments.init()?;
     if context.scenario.can.is_virtual() {
@@ -240,11 +237,17 @@ fn serve<L: Link>(
         let wake = binding.wait(&mut plant)?;
         run_cycle(&mut plant, &mut binding, schedule, &wake)?;
     }
+    binding.takes_commands = false;
+    let wait = |plant: &mut PlantCore<L>, binding: &mut Binding<'_>| binding.wait(plant);
+    run_after_controller(&mut plant, &mut binding, schedule, scenario.period_ns(), wait)?;
     let is_stopped = match &binding.clock {
         // The run is over, as under virtual time.
         Clock::Lockstep(lockstep) if lockstep.is_last() => lockstep.await_stop(),
         _ => {
-            stop_drives(&mut plant, &mut binding, scenario.period_ns())?;
+            // The last cycle's process data are on the wire only by now.
+            let last = binding.wait(&mut plant)?;
+            plant.collect(last.woke_ns)?;
+            binding.publish_frames_and_events(&mut plant)?;
             context.stop.is_made()
         }
     };
@@ -258,25 +261,6 @@ fn most_silent_cycles(context: &ProcessContext) -> u64 {
     match context.lockstep {
         None => until_stopped + ABANDONED_AFTER_NS / scenario.period_ns(),
         // The plant has waited before.
-        Some(_) => until_stopped + STOP_WITHIN_NS / scenario.period_ns(),
+        Some(_) => until_stopped + SILENCE_NS / scenario.period_ns(),
     }
-}
-
-/// Runs further cycles without commands until the drives are off, at most for a while.
-fn stop_drives<L: Link>(
-    plant: &mut PlantCore<L>,
-    binding: &mut Binding<'_>,
-    period_ns: u64,
-) -> Result<(), PlantProcessError> {
-    plant.master.stop();
-    binding.takes_commands = false;
-    let give_up_ns = binding.clock.now_ns() + STOP_WITHIN_NS.max(STOP_WITHIN_CYCLES * period_ns);
-    while !plant.master.drives_are_off() && binding.clock.now_ns() < give_up_ns {
-        let wake = binding.wait(plant)?;
-        run_cycle(plant, binding, binding.schedule, &wake)?;
-    }
-    // The last cycle's process data are on the wire only by now.
-    let last = binding.wait(plant)?;
-    plant.collect(last.woke_ns)?;
-    binding.publish_frames_and_events(plant)
 }

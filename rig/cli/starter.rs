@@ -20,7 +20,7 @@ const INIT_FILES: [(&str, &str, &str); 3] = [
     (
         ".github/workflows/masseter.yml",
         include_str!("../../examples/workflow.yml"),
-        "the run in CI; enter where Masseter's source is",
+        "the folder's scenarios in CI; enter where Masseter's source is",
     ),
 ];
 

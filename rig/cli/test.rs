@@ -1,28 +1,31 @@
 //! `masseter test`: the scenarios of folders as a suite, listed in the form of `cargo test`.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use masseter_recording::time_in_names;
-use masseter_report::{JunitRun, junit_of_suite};
+use masseter_report::suite::{Baseline, Outcome, SuiteReport, TestedScenario};
+use masseter_report::{html_of_suite, junit_of_suite};
 use masseter_runtime::clock;
 use masseter_scenario::wording::counted;
-use masseter_terminal::{Exit, Failure, OrFailure, result, result_line, status};
+use masseter_terminal::{Exit, Failure, Format, OrFailure, result, result_line, status};
 
 use super::arguments::parse_controller;
 use crate::BUILD;
 use crate::run::interrupts::Interrupts;
 use crate::run::request::{ClockKind, ControllerChoice};
 use crate::run::runner::Runner;
-use crate::vary::suite::{Case, Cases, Outcome, Suite, Tested};
+use crate::vary::suite::Suite;
+use crate::vary::suite::cases::{Cases, Selection};
+use crate::vary::suite::choice::{Choice, Shard};
 
 /// The arguments of `test`.
 #[derive(Debug, Clone, Args)]
 #[command(
-    after_help = "Examples:\n  masseter test scenarios\n  masseter test scenarios --filter encoder --junit junit.xml"
+    after_help = "Examples:\n  masseter test scenarios\n  masseter test scenarios -k encoder --junit junit.xml"
 )]
 pub(super) struct TestArgs {
     /// Folders with scenarios (*.toml), and scenarios
@@ -40,18 +43,34 @@ pub(super) struct TestArgs {
         hide_default_value = true
     )]
     controller: ControllerChoice,
-    /// Run only the scenarios with this text in their names
-    #[arg(long, value_name = "TEXT")]
-    filter: Option<String>,
-    /// Run a failed scenario up to this many times again, in lockstep and in real time
+    /// Run only the scenarios with these words in their names or as tags, joined by and, or, not and parentheses
+    #[arg(short = 'k', long = "filter", value_name = "EXPRESSION")]
+    choice: Option<Choice>,
+    /// Run only the scenarios with this tag; of several, with any of them
+    #[arg(long = "tag", value_name = "TAG")]
+    tags: Vec<String>,
+    /// Run only this share of the scenarios, such as 2/5, on one of five machines
+    #[arg(long, value_name = "NUMBER/OF")]
+    shard: Option<Shard>,
+    /// Run a scenario up to this many times again: in real time one that is INVALID, in lockstep one that failed, which
+    /// must fail again the same
     #[arg(long, value_name = "N", default_value_t, hide_default_value = true)]
-    retries: u32,
-    /// Exit with 0 in spite of scenarios that left something untested
+    retries: usize,
+    /// Exit with 0 in spite of scenarios that left something untested, but not where a fault or stimulus did not act
     #[arg(long)]
     allow_untested: bool,
+    /// Format of the result
+    #[arg(long, value_enum, default_value_t, hide_default_value = true)]
+    format: Format,
     /// Write every scenario and its checks into this file, as CI systems read them
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
+    /// Write a page with the scenarios, and with the margins of all requirements
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Compare the margins with an earlier run, of which --format json made this file
+    #[arg(long, value_name = "FILE")]
+    baseline: Option<PathBuf>,
     /// Folder for the runs that failed; must not exist [default: runs/test-UTC_TIME]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -73,40 +92,55 @@ fn test_clocks() -> impl TypedValueParser<Value = ClockKind> {
 pub(super) fn test(args: &TestArgs) -> Result<Exit, Failure> {
     let began_ns = clock::now_ns();
     check_controller(&args.controller).usage()?;
-    let Cases { chosen, filtered_out } = Cases::find(&args.paths, args.filter.as_deref()).usage()?;
+    let selection = Selection { choice: args.choice.clone(), tags: args.tags.clone(), shard: args.shard };
+    let Cases { chosen, filtered_out, left_out } = Cases::find(&args.paths, &selection).usage()?;
+    let baseline = args.baseline.as_deref().map(Baseline::read).transpose().usage()?;
     let out = out_folder(args).usage()?;
     let interrupts = Interrupts::of_verb()?;
-    result_line!("\nrunning {}", counted(chosen.len() as u64, "test")).incomplete()?;
+    if !left_out.is_empty() {
+        status!("left out: {}", left_out.join(", "));
+    }
+    let is_human = args.format == Format::Human;
+    if is_human {
+        result_line!("\nrunning {}", counted(chosen.len() as u64, "test")).incomplete()?;
+    }
     let suite = Suite {
         runner: Runner { controller: &args.controller, interrupts: &interrupts },
         clock: args.clock,
         retries: args.retries,
-        allow_untested: args.allow_untested,
+        allows_untested: args.allow_untested,
         out: &out,
     };
-    let all = suite.run_all(&chosen, print_tested).incomplete()?;
+    let tell = |tested: &TestedScenario| if is_human { print_tested(tested) } else { Ok(()) };
+    let tested = suite.run_all(&chosen, tell).incomplete()?;
     let took_s = (clock::now_ns() - began_ns) as f64 / 1e9;
-    let is_over = |case: &&Case| all.iter().any(|tested| tested.case == **case);
-    let unrun: Vec<_> = chosen.iter().filter(|case| !is_over(case)).collect();
-    let others = Others { filtered_out, unrun: unrun.len() };
-    result(&summary(&all, others, args.allow_untested, took_s)).incomplete()?;
+    let is_over = |name: &String| tested.iter().any(|tested| tested.name == *name);
+    let names = chosen.into_iter().map(|case| case.name);
+    let unrun: Vec<_> = names.filter(|name| !is_over(name)).collect();
+    let report = SuiteReport { masseter: BUILD, tested, unrun, filtered_out, left_out, took_s, baseline };
+    result(&match args.format {
+        Format::Human => summary(&report),
+        Format::Json => report.to_json().context("cannot write the result").incomplete()? + "\n",
+    })
+    .incomplete()?;
     if let Some(path) = &args.junit {
-        let runs = all.iter().map(|tested| junit_run(tested, args.allow_untested));
-        // As errors, since most CI systems show a suite with skipped cases as passed.
-        let unrun = unrun.iter().map(|case| {
-            JunitRun::new(&case.name, Err("interrupted before its end"), true, 0.0)
-                .with(vec![("masseter", BUILD.to_owned())])
-        });
-        let runs: Vec<_> = runs.chain(unrun).collect();
-        let xml = junit_of_suite(&runs, took_s).context("cannot make the JUnit document").incomplete()?;
-        fs::write(path, xml).with_context(|| format!("cannot write {}", path.display())).incomplete()?;
+        let xml = junit_of_suite(&report).context("cannot make the JUnit document").incomplete()?;
+        write_document(path, &xml).incomplete()?;
+    }
+    if let Some(path) = &args.html {
+        write_document(path, &html_of_suite(&report).incomplete()?).incomplete()?;
     }
     if interrupts.is_stop_requested() {
-        status!("masseter: interrupted after {} of {} tests", all.len(), chosen.len());
+        let over = report.tested.len();
+        status!("masseter: interrupted after {over} of {} tests", over + report.unrun.len());
         return Ok(Exit::Interrupted);
     }
-    let has_failed = all.iter().any(|tested| tested.outcome().is_short(args.allow_untested));
+    let has_failed = report.tested.iter().any(TestedScenario::is_short);
     Ok(if has_failed { Exit::Failed } else { Exit::Passed })
+}
+
+fn write_document(path: &Path, text: &str) -> anyhow::Result<()> {
+    fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// Refuses a controller that somebody else would have to start, and a suite without one.
@@ -122,71 +156,46 @@ fn out_folder(args: &TestArgs) -> anyhow::Result<PathBuf> {
     Ok(out)
 }
 
-/// A scenario as a test suite of a JUnit document.
-fn junit_run(tested: &Tested, allow_untested: bool) -> JunitRun<'_> {
-    let verdict = tested.verdict.as_ref().map_err(String::as_str);
-    let properties = vec![
-        ("masseter", BUILD.to_owned()),
-        ("outcome", tested.outcome().word().to_owned()),
-        ("retries", tested.retries.to_string()),
-    ];
-    let is_short = tested.outcome().is_short(allow_untested);
-    JunitRun::new(&tested.case.name, verdict, is_short, tested.took_s).with(properties)
-}
-
 /// Prints the line of a test that is over.
-fn print_tested(tested: &Tested) -> anyhow::Result<()> {
-    let times =
-        if tested.retries == 1 { "1 retry".to_owned() } else { format!("{} retries", tested.retries) };
-    let retried = match (tested.outcome(), tested.retries) {
+fn print_tested(tested: &TestedScenario) -> anyhow::Result<()> {
+    let times = match tested.retries() {
+        1 => "1 retry".to_owned(),
+        times => format!("{times} retries"),
+    };
+    let retried = match (tested.outcome(), tested.retries()) {
         (_, 0) => String::new(),
         (Outcome::Passed, _) => format!(" (only after {times})"),
         _ => format!(" (also after {times})"),
     };
-    result_line!("test {} ... {}{retried}", tested.case.name, tested.outcome().word())
-}
-
-/// The numbers of scenarios without a result.
-#[derive(Debug, Clone, Copy)]
-struct Others {
-    filtered_out: usize,
-    /// Because the user interrupted.
-    unrun: usize,
+    result_line!("test {} ... {}{retried}", tested.name, tested.outcome().word())
 }
 
 /// What failed and why, then the result of the suite.
-fn summary(all: &[Tested], others: Others, allow_untested: bool, took_s: f64) -> String {
-    let short: Vec<_> = all.iter().filter(|tested| tested.outcome().is_short(allow_untested)).collect();
+fn summary(report: &SuiteReport) -> String {
+    let short: Vec<_> = report.tested.iter().filter(|tested| tested.is_short()).collect();
     let mut text = String::from("\n");
     if !short.is_empty() {
         let details: Vec<_> = short.iter().map(|tested| details(tested)).collect();
-        let names: Vec<_> = short.iter().map(|tested| format!("    {}\n", tested.case.name)).collect();
+        let names: Vec<_> = short.iter().map(|tested| format!("    {}\n", tested.name)).collect();
         text = format!("\nfailures:\n\n{}\nfailures:\n{}\n", details.join("\n"), names.concat());
     }
-    let count = |outcome| all.iter().filter(|tested| tested.outcome() == outcome).count();
-    let word = match (short.is_empty(), others.unrun) {
-        (false, _) => "FAILED",
-        (true, 0) => "ok",
-        (true, _) => "INTERRUPTED",
-    };
     let left_out = |count, why| if count > 0 { format!("; {count} {why}") } else { String::new() };
-    let others = left_out(others.unrun, "not run") + &left_out(others.filtered_out, "filtered out");
-    text + &format!(
-        "test result: {word}. {} passed; {} failed; {} untested{others}; finished in {took_s:.2}s\n",
-        count(Outcome::Passed),
-        count(Outcome::Failed),
-        count(Outcome::Untested),
-    )
+    let others = left_out(report.unrun.len(), "not run") + &left_out(report.filtered_out, "filtered out");
+    let trend = report.trend_in_words().map_or_else(String::new, |trend| trend + "\n");
+    text + &trend
+        + &format!(
+            "test result: {}. {} passed; {} failed; {} untested{others}; finished in {:.2}s\n",
+            report.word(),
+            report.count(Outcome::Passed),
+            report.count(Outcome::Failed),
+            report.count(Outcome::Untested),
+            report.took_s,
+        )
 }
 
-fn details(tested: &Tested) -> String {
-    let report = tested
-        .folder
-        .as_ref()
-        .map_or_else(String::new, |folder| format!("report: {}\n", folder.join("report.html").display()));
-    let reason = match &tested.verdict {
-        Ok(verdict) => &format!("{}: {}", verdict.word, verdict.reason),
-        Err(reason) => reason,
-    };
-    format!("---- {} ----\n{reason}\nagain: {}\n{report}", tested.case.name, tested.command)
+fn details(tested: &TestedScenario) -> String {
+    let folders = tested.attempts.iter().filter_map(|attempt| attempt.folder.as_ref());
+    let reports: Vec<_> =
+        folders.map(|folder| format!("report: {}\n", folder.join("report.html").display())).collect();
+    format!("---- {} ----\n{}\nagain: {}\n{}", tested.name, tested.reason(), tested.command, reports.concat())
 }

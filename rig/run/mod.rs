@@ -7,6 +7,7 @@
 mod child;
 mod controller;
 pub(crate) mod interrupts;
+mod loop_watch;
 mod prepared;
 mod reception;
 pub(crate) mod request;

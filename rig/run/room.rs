@@ -113,7 +113,7 @@ impl Reserve {
             allocate(&file, bytes)?;
             Ok::<_, io::Error>(file)
         };
-        Ok(Self { manifest: reserve(128 << 10)?, summary: reserve(1 << 20)? })
+        Ok(Self { manifest: reserve(512 << 10)?, summary: reserve(1 << 20)? })
     }
 }
 

@@ -9,6 +9,7 @@ use std::path::Path;
 use anyhow::{Context, anyhow};
 use masseter_analysis::{Figures, Judgement, Verdict};
 use masseter_controller::process::BuildController;
+use masseter_plan::Overrides;
 use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure};
 
@@ -24,11 +25,23 @@ pub(crate) struct Runner<'a> {
     pub(crate) interrupts: &'a Interrupts,
 }
 
+/// The scenario of a file, with values changed, each as `KEY=VALUE`.
+#[derive(Clone, Copy)]
+pub(crate) struct ScenarioFile<'a> {
+    pub(crate) path: &'a Path,
+    pub(crate) set: &'a [String],
+}
+
+impl<'a> From<&'a Path> for ScenarioFile<'a> {
+    fn from(path: &'a Path) -> Self {
+        Self { path, set: &[] }
+    }
+}
+
 /// What is played.
 #[derive(Clone, Copy)]
 pub(crate) enum Source<'a> {
-    /// The scenario of a file; the default scenario without one.
-    File(Option<&'a Path>),
+    File(ScenarioFile<'a>),
     /// A scenario whose files are found already.
     Scenario(&'a Scenario),
 }
@@ -54,7 +67,7 @@ impl Runner<'_> {
     pub(crate) fn play_by(&self, build: BuildController, source: Source<'_>) -> Result<Judged, Failure> {
         guarded(|| {
             let plan = match source {
-                Source::File(path) => resolve(&self.request(path, ClockKind::Virtual)).map(|(plan, _)| plan),
+                Source::File(file) => resolve(&self.request(file, ClockKind::Virtual)).map(|(plan, _)| plan),
                 Source::Scenario(scenario) => resolve_simulated(scenario, None, build),
             };
             let (manifest, figures) =
@@ -67,11 +80,11 @@ impl Runner<'_> {
     /// interrupts before anything is recorded.
     pub(crate) fn record(
         &self,
-        file: &Path,
+        file: ScenarioFile<'_>,
         clock: ClockKind,
         folder: &Path,
     ) -> Result<Option<Judgement>, Failure> {
-        let request = RunRequest { out: Some(folder.to_owned()), ..self.request(Some(file), clock) };
+        let request = RunRequest { out: Some(folder.to_owned()), ..self.request(file, clock) };
         guarded(|| PreparedRun::new(&request)?.play(self.interrupts)?.judge_unseen())
     }
 
@@ -80,7 +93,7 @@ impl Runner<'_> {
     pub(crate) fn record_again(
         &self,
         name: &str,
-        file: &Path,
+        file: ScenarioFile<'_>,
         folder: &Path,
         digest: &str,
     ) -> Result<Option<Judgement>, Failure> {
@@ -95,15 +108,18 @@ impl Runner<'_> {
     }
 
     /// The command that shows the run of a file again.
-    pub(crate) fn command(&self, file: &Path, clock: ClockKind) -> String {
+    pub(crate) fn command(&self, file: ScenarioFile<'_>, clock: ClockKind) -> String {
+        let path = word(&file.path.display().to_string());
+        let set: String = file.set.iter().flat_map(|value| [" --set ".to_owned(), word(value)]).collect();
         let controller = self.controller.name();
         let controller = controller.map_or_else(String::new, |name| format!(" --controller {}", word(&name)));
-        format!("masseter run {} --clock {}{controller}", word(&file.display().to_string()), name_of(&clock))
+        format!("masseter run {path}{set} --clock {}{controller}", name_of(&clock))
     }
 
-    fn request(&self, file: Option<&Path>, clock: ClockKind) -> RunRequest {
+    fn request(&self, file: ScenarioFile<'_>, clock: ClockKind) -> RunRequest {
         RunRequest {
-            scenario: file.map(Path::to_owned),
+            scenario: Some(file.path.to_owned()),
+            overrides: Overrides { set: file.set.to_vec(), ..Overrides::default() },
             clock,
             controller: self.controller.clone(),
             quiet: true,

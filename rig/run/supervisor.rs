@@ -16,7 +16,7 @@ use std::time::Duration;
 use anyhow::Context;
 use masseter_machine::{SystemRoot, dma_latency};
 use masseter_plan::RunPlan;
-use masseter_recording::{DmaLatency, Ending, Manifest, RunFolder};
+use masseter_recording::{DmaLatency, Ending, Manifest, RunFolder, RunUsage};
 use masseter_runtime::clock::{self, MILLISECOND_NS, SECOND_NS};
 use masseter_runtime::lifecycle::attach::Invitation;
 use masseter_runtime::lifecycle::{End, Order, Party, Patience, Silence, Start};
@@ -31,6 +31,7 @@ use masseter_terminal::{Exit, Failure, OrFailure, status};
 use super::child::{CONTROLLER, KILLED, PLANT, Process, RECORDER, Reports, describe};
 use super::controller::Controller;
 use super::interrupts::Interrupts;
+use super::loop_watch::LoopWatch;
 use super::request::RunRequest;
 use super::room::reserve_shared_memory;
 use super::strikes::{Strikes, Victims};
@@ -44,6 +45,8 @@ const SIGNAL_DELAY: Duration = Duration::from_millis(100);
 const START_LEAD_NS: u64 = 100_000_000;
 /// Longest time for a process to end after SIGTERM, beyond the work it must finish first, ns.
 const END_TIMEOUT_NS: u64 = 5 * SECOND_NS;
+/// The same for the plant, which stops the drives and runs on for a while first; in lockstep as fast as the recorder takes it, ns.
+const PLANT_END_TIMEOUT_NS: u64 = 3 * END_TIMEOUT_NS;
 /// Longest time for the recorder to write what is left to a slow disk, ns.
 const RECORD_TIMEOUT_NS: u64 = 60 * SECOND_NS;
 /// The cause of death of a process that did not end when it was asked to.
@@ -220,8 +223,13 @@ impl Processes {
         let names_and_ids =
             [(RECORDER, self.recorder.id()), (PLANT, self.plant.id()), (CONTROLLER, self.controller.id())];
         let mut meter = UsageMeter::new(epoch_ns, &names_and_ids);
-        let ending = self.monitor(interrupts, |now_ns| meter.update(now_ns))?;
-        manifest.usage = meter.into_usage();
+        let (root, period_ns) = (SystemRoot::of_this_machine(), plan.scenario.period_ns());
+        let mut loops = LoopWatch::new(root, is_virtual, period_ns, epoch_ns, &names_and_ids[1..]);
+        let ending = self.monitor(interrupts, |now_ns| {
+            loops.update(now_ns);
+            meter.update(now_ns);
+        })?;
+        manifest.usage = RunUsage { loops: loops.into_intervals(), ..meter.into_usage() };
         Ok(ending)
     }
 
@@ -296,7 +304,7 @@ impl Processes {
             clock::sleep(POLL);
         };
         let controller = self.controller_ending(end_of_controller, interrupts)?;
-        let plant = self.plant.end(END_TIMEOUT_NS, interrupts)?;
+        let plant = self.plant.end(PLANT_END_TIMEOUT_NS, interrupts)?;
         let recorder = self.recorder.end(RECORD_TIMEOUT_NS, interrupts)?;
         if interrupts.is_abort_requested() {
             return Ok(Ending::Interrupted);

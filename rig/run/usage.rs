@@ -111,6 +111,7 @@ impl UsageMeter {
             processes: self.processes.iter().filter_map(named).collect(),
             stolen_s: stolen_ns as f64 / 1e9,
             clock_jump_s: self.wall_clock.largest_jump_ns as f64 / 1e9,
+            ..RunUsage::default()
         }
     }
 }

@@ -202,7 +202,7 @@ impl Player<'_> {
             if !result.digest.is_empty() && !run.exists() {
                 self.record(&file, &run, result)?;
             }
-            let command = self.runner.command(&file, ClockKind::Virtual);
+            let command = self.runner.command(file.as_path().into(), ClockKind::Virtual);
             kept.push(WorstCase { number: result.number, command, run: run.exists().then_some(run) });
         }
         Ok(kept)
@@ -212,7 +212,7 @@ impl Player<'_> {
         let unfinished = run.with_extension("part");
         let _ = fs::remove_dir_all(&unfinished);
         let name = format!("case {}", result.number);
-        let again = self.runner.record_again(&name, file, &unfinished, &result.digest)?;
+        let again = self.runner.record_again(&name, file.into(), &unfinished, &result.digest)?;
         again.ok_or_else(|| Failure::with(Exit::Interrupted, anyhow!("interrupted")))?;
         fs::rename(&unfinished, run).with_context(|| format!("cannot make {}", run.display())).incomplete()
     }

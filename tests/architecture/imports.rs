@@ -162,6 +162,18 @@ impl Crate {
         in_glob.or_else(|| (absent == Absent::IsMade).then(item))
     }
 
+    /// The crates of the workspace that each file names.
+    pub(super) fn named_crates(&self) -> BTreeMap<&Path, BTreeSet<&str>> {
+        let mut found: BTreeMap<&Path, BTreeSet<&str>> = BTreeMap::new();
+        for module in self.modules.values() {
+            let paths = module.imports.iter().map(|import| &import.path).chain(&module.paths);
+            let firsts = paths.filter_map(|path| path.first()).map(String::as_str);
+            let named = firsts.filter(|name| name.starts_with("masseter_"));
+            found.entry(&module.file).or_default().extend(named);
+        }
+        found
+    }
+
     /// Inherent impls in another file than their type: file, name of the type, file of the type.
     pub(super) fn foreign_impls(&self) -> Vec<(&Path, String, &Path)> {
         let mut found = Vec::new();

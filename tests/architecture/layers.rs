@@ -1,8 +1,9 @@
-//! Layers: dependencies between the crates of the workspace.
+//! Layers: dependencies between the crates of the workspace, and between the folders of a crate.
 
 use std::path::Path;
 
-use super::workspace::{list, metadata, text, within};
+use super::imports::Crate;
+use super::workspace::{crate_roots, list, metadata, text, within};
 
 /// The crates of the workspace that each crate may use, all by their folders. The root package may use all
 /// but the programs that a run does not need.
@@ -129,6 +130,72 @@ const MAY_USE: [(&str, &[&str]); 27] = [
         ],
     ),
 ];
+
+/// What a folder (or a file) of a crate may use beside itself.
+pub(super) struct Room<'a> {
+    pub(super) folder: &'a str,
+    /// Crates of the workspace, by their names in code.
+    pub(super) crates: &'a [&'a str],
+    /// Folders and files of its own crate.
+    pub(super) rooms: &'a [&'a str],
+}
+
+/// The rooms of the plant's simulator. A drive stands on CAN alone, the mechanism on the equations. What a scenario says
+/// becomes their values in the emulation, which knows nothing of who injects faults.
+pub(super) const ROOMS: [Room<'_>; 4] = [
+    Room { folder: "plant/src/simulator/drive", crates: &["masseter_can"], rooms: &["plant/src/state.rs"] },
+    Room {
+        folder: "plant/src/simulator/mechanism",
+        // The messages of the runtime alone.
+        crates: &["masseter_model", "masseter_runtime"],
+        rooms: &["plant/src/error.rs", "plant/src/state.rs"],
+    },
+    Room {
+        folder: "plant/src/simulator/emulation",
+        crates: &["masseter_can", "masseter_model", "masseter_runtime", "masseter_scenario"],
+        rooms: &[
+            "plant/src/error.rs",
+            "plant/src/master",
+            "plant/src/simulator/drive",
+            "plant/src/simulator/mechanism",
+            "plant/src/state.rs",
+        ],
+    },
+    Room {
+        folder: "plant/src/simulator/injection.rs",
+        crates: &["masseter_runtime", "masseter_scenario"],
+        rooms: &["plant/src/error.rs", "plant/src/master", "plant/src/state.rs"],
+    },
+];
+
+/// One line for each use that a room's entry does not have, and for each room that is not there.
+pub(super) fn room_violations(workspace: &Path, rooms: &[Room<'_>]) -> Vec<String> {
+    let mut violations = Vec::new();
+    let mut seen = vec![false; rooms.len()];
+    for root in crate_roots(workspace) {
+        let read = Crate::read(&root);
+        let (imports, named) = (read.imports(), read.named_crates());
+        for (file, imported) in &imports {
+            let name = within(workspace, file);
+            let of_file =
+                rooms.iter().zip(&mut seen).find(|(room, _)| Path::new(&name).starts_with(room.folder));
+            let Some((room, seen)) = of_file else { continue };
+            *seen = true;
+            let named = named.get(file).into_iter().flatten().filter(|used| !room.crates.contains(used));
+            violations.extend(named.map(|used| format!("{name} uses {used}")));
+            let may_use = |other: &String| {
+                let mut rooms = room.rooms.iter().chain([&room.folder]);
+                rooms.any(|folder| Path::new(other).starts_with(folder))
+            };
+            let others = imported.keys().map(|other| within(workspace, other));
+            violations
+                .extend(others.filter(|other| !may_use(other)).map(|other| format!("{name} uses {other}")));
+        }
+    }
+    let missing = rooms.iter().zip(seen).filter(|(_, seen)| !seen);
+    violations.extend(missing.map(|(room, _)| format!("{} is not there", room.folder)));
+    violations
+}
 
 fn may_use(folder: &str, needed: &str) -> bool {
     if folder.is_empty() {

@@ -204,7 +204,7 @@ fn without_the_master_the_drives_stop_by_themselves() {
     let bound_ns = u64::from(scenario.can.heartbeat_consumer_ms) * PERIOD_NS + 60 * PERIOD_NS;
     bench.plant.link.advance(silent_from_ns + bound_ns).unwrap();
     for drive in &bench.plant.link.emulation.drives {
-        assert_eq!(drive.axis.power, DriveState::SwitchOnDisabled);
+        assert_eq!(drive.axis.power.state, DriveState::SwitchOnDisabled);
     }
 }
 
@@ -268,6 +268,32 @@ fn a_cycle_on_the_wire_is_sync_then_process_data_up_then_down() {
             Cob::Rpdo1(c),
         ];
         assert_eq!(on_bus(bus), expected);
+    }
+}
+
+#[test]
+fn a_heartbeat_is_the_last_frame_of_its_node_in_a_cycle() {
+    let mut bench = Bench::new(&Scenario::default());
+    bench.enable();
+    bench.frames.clear();
+    (0..160).for_each(|_| bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable))));
+    for bus in 0..2 {
+        let frames = bench.frames.iter().filter(|frame| frame.bus == bus);
+        let frames = frames.map(|frame| *tap::decode(frame).unwrap().frame().unwrap());
+        let cobs: Vec<_> = frames.map(|frame| Cob::try_from(frame.frame.id()).unwrap()).collect();
+        let mut beats = 0;
+        for cycle in cobs.split(|cob| *cob == Cob::Sync).skip(1) {
+            for (place, cob) in cycle.iter().enumerate() {
+                let Cob::Heartbeat(node) = *cob else { continue };
+                beats += 1;
+                let is_of_node = |later: &Cob| match later {
+                    Cob::Rpdo1(_) => node.get() == masseter_scenario::MASTER_NODE.get(),
+                    later => *later == Cob::Tpdo1(node),
+                };
+                assert!(!cycle[place..].iter().any(is_of_node), "{cycle:?}");
+            }
+        }
+        assert!(beats >= 4 * 3, "{beats}");
     }
 }
 

@@ -41,12 +41,16 @@ impl Exchange {
         })
     }
 
-    /// Begins a cycle with SYNC; returns whether the heartbeat is due too.
-    pub(super) fn begin_cycle(&mut self, wake: Wake) -> bool {
+    /// Begins a cycle with SYNC.
+    pub(super) fn begin_cycle(&mut self, wake: Wake) {
         (self.wake, self.complete_ns) = (wake, 0);
-        let is_due = wake.woke_ns >= self.next_heartbeat_ns;
+    }
+
+    /// Whether the cycle ends with a heartbeat; true once.
+    pub(super) fn is_heartbeat_due(&mut self) -> bool {
+        let is_due = self.wake.woke_ns >= self.next_heartbeat_ns;
         if is_due {
-            self.next_heartbeat_ns = wake.woke_ns + self.heartbeat_ns;
+            self.next_heartbeat_ns = self.wake.woke_ns + self.heartbeat_ns;
         }
         is_due
     }
@@ -143,15 +147,19 @@ mod exchange_tests {
     fn process_data_answer_the_first_sync_that_is_seen_in_a_cycle() {
         let can = Scenario::default().can;
         let mut exchange = Exchange::new(&can, 1000).unwrap();
-        assert!(!exchange.begin_cycle(Wake::on_time(1, 999)), "the first heartbeat is due at 1000");
-        assert!(exchange.begin_cycle(Wake::on_time(2, 1000)));
+        exchange.begin_cycle(Wake::on_time(1, 999));
+        assert!(!exchange.is_heartbeat_due(), "the first heartbeat is due at 1000");
+        exchange.begin_cycle(Wake::on_time(2, 1000));
+        assert!(exchange.is_heartbeat_due() && !exchange.is_heartbeat_due());
         assert_eq!([0, 1].map(|bus| exchange.answered_after_ns(bus)), [1000, 1000]);
         exchange.note_sync(1, 1200);
         exchange.note_sync(1, 1700);
         assert_eq!([0, 1].map(|bus| exchange.answered_after_ns(bus)), [1000, 1200]);
         let next_ns = 1000 + u64::from(can.heartbeat_producer_ms) * MILLISECOND_NS;
-        assert!(!exchange.begin_cycle(Wake::on_time(3, next_ns - 1)));
-        assert!(exchange.begin_cycle(Wake::on_time(4, next_ns)));
+        exchange.begin_cycle(Wake::on_time(3, next_ns - 1));
+        assert!(!exchange.is_heartbeat_due());
+        exchange.begin_cycle(Wake::on_time(4, next_ns));
+        assert!(exchange.is_heartbeat_due());
         assert_eq!((exchange.wake.cycle, exchange.wake.woke_ns), (4, next_ns));
         // A SYNC seen at the very time it was sent is this cycle's.
         exchange.note_sync(0, next_ns);

@@ -233,11 +233,11 @@ pub(crate) fn check_quantities(scenario: &Scenario) -> Result<(), PlantError> {
             return refuse(format!("{key}.encoder_resolution_m = {increment_m}: {need}"));
         }
     }
-    // The master sends its heartbeat with the first SYNC after the interval, whose end jitter may delay by a cycle.
+    // The master's heartbeat ends the first cycle whose SYNC comes after the interval, and is queued when the command is there.
     let interval_ns = u64::from(can.heartbeat_producer_ms) * MILLISECOND_NS;
-    let longest_ns = (interval_ns / period_ns + 1) * period_ns;
-    if u64::from(can.heartbeat_consumer_ms) * MILLISECOND_NS <= longest_ns {
-        let need = "use more than can.heartbeat_producer_ms and a cycle (1000 / rate_hz) together";
+    let longest_ns = (interval_ns / period_ns + 2) * period_ns;
+    if u64::from(can.heartbeat_consumer_ms) * MILLISECOND_NS < longest_ns {
+        let need = "use at least can.heartbeat_producer_ms and two cycles (2000 / rate_hz) together";
         return refuse(format!("can.heartbeat_consumer_ms = {}: {need}", can.heartbeat_consumer_ms));
     }
     // Jitter may leave two cycles between two process data.

@@ -7,7 +7,7 @@
 //!
 //! The master is written against the bus trait alone ([`Buses`]), so that simulated and real wires are the same to it.
 //! SDO takes place only with drives that exchange no process data, with one request a bus and cycle, queued after the
-//! process data. So a bus never carries more than the [time table](masseter_runtime::schedule) allows for.
+//! process data. The heartbeat is the last message of a cycle. So a bus never carries more than the [time table](masseter_runtime::schedule) allows for.
 
 mod boot;
 pub(crate) mod boot_plan;
@@ -90,19 +90,15 @@ impl Master {
         })
     }
 
-    /// Begins a cycle: SYNC on every bus, and the heartbeat when it is due.
+    /// Begins a cycle: SYNC on every bus.
     pub(crate) fn begin_cycle(&mut self, wake: Wake, buses: &mut impl Buses) {
         let now_ns = wake.woke_ns;
         self.events.cycle = wake.cycle;
-        let is_heartbeat_due = self.exchange.begin_cycle(wake);
+        self.exchange.begin_cycle(wake);
         self.drives.iter_mut().for_each(|drive| drive.begin_cycle(now_ns));
         self.watch_buses(now_ns, buses);
         for bus in 0..self.buses.len() {
             self.send(now_ns, bus, sync::frame(), buses);
-            if is_heartbeat_due {
-                let heartbeat = Heartbeat { state: NmtState::Operational }.frame(MASTER_NODE);
-                self.send(now_ns, bus, heartbeat, buses);
-            }
         }
     }
 
@@ -142,8 +138,9 @@ impl Master {
         }
     }
 
-    /// Judges the cycle, takes the newest command, sends every drive its process data, and then the messages of booting
-    /// drives.
+    /// Judges the cycle, takes the newest command, sends every drive its process data, then the messages of booting
+    /// drives, and at last the heartbeat when it is due: an interface that sends in the order of the queue delays no process
+    /// data by it.
     pub(crate) fn apply(&mut self, now_ns: u64, command: Option<&Command>, buses: &mut impl Buses) {
         self.supervise(now_ns);
         self.take_command(now_ns, command);
@@ -156,6 +153,10 @@ impl Master {
             }
         }
         self.boot(now_ns, buses);
+        if self.exchange.is_heartbeat_due() {
+            let heartbeat = Heartbeat { state: NmtState::Operational }.frame(MASTER_NODE);
+            (0..self.buses.len()).for_each(|bus| self.send(now_ns, bus, heartbeat, buses));
+        }
     }
 
     /// Stops the drives from the next process data on, for the end: commands are not needed any more.

@@ -1,14 +1,15 @@
 //! How much time the machine took from a bench: stolen by its host, or standing still before a round.
 
+use std::thread;
 use std::time::Duration;
 
 use masseter_machine::SystemRoot;
 use masseter_machine::counters::stolen_ns;
 use masseter_runtime::clock::{self, SECOND_NS};
 use masseter_runtime::realtime::Waiter;
+use masseter_runtime::realtime::scheduling::{Obtained, SchedulingRequest, obtain};
+use masseter_scenario::RealtimeConfig;
 use serde::Serialize;
-
-use super::on_core;
 
 /// With a greater share of time stolen or standing still, high percentiles come from the machine, %.
 const BOUND_PERCENT: f64 = 1.0;
@@ -77,6 +78,23 @@ impl Stillness {
             percent(self.stalled_ns, self.observed_ns),
         )
     }
+}
+
+/// Asks the kernel for the settings of a run on behalf of the calling thread.
+pub(super) fn realtime_on(core: usize) -> Obtained {
+    let priority = RealtimeConfig::default().priority;
+    obtain(SchedulingRequest { core: Some(core), fifo_priority: Some(priority), locked_memory: true })
+}
+
+/// Runs `work` on a new thread with these settings, as far as the kernel grants them.
+pub(super) fn on_core<T: Send>(core: usize, work: impl FnOnce() -> T + Send) -> T {
+    thread::scope(|scope| {
+        let thread = scope.spawn(|| {
+            realtime_on(core);
+            work()
+        });
+        thread.join().expect("measuring does not panic")
+    })
 }
 
 #[cfg(test)]

@@ -14,7 +14,8 @@ use masseter_runtime::schedule::OFF_TICK_NS;
 use masseter_scenario::{CpuDmaLatency, RealtimeConfig};
 
 use super::candidate::{Durations, Round, Turn, add_durations, no_durations};
-use super::{Results, on_core};
+use super::disturbance::on_core;
+use super::results::Results;
 
 const PERIOD_NS: u64 = SECOND_NS / 1000;
 /// Wake-ups per round.
@@ -47,7 +48,9 @@ pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Results> {
     } else {
         notes.push("cyclictest does not count the deadlines that it skips".to_owned());
     }
-    Ok(Results { notes, ..Results::by_turns(rounds, core, own_turns, others)? })
+    let mut results = Results::by_turns(rounds, core, own_turns, others)?;
+    results.notes = notes;
+    Ok(results)
 }
 
 /// A round with the share of its deadlines that passed before the loop could wait for them.

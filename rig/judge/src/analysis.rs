@@ -3,7 +3,7 @@
 //! Figures that no verdict depends on are in [`Shown`]: a run without a report does without them.
 
 use masseter_model::geometry::{AXES, Pose};
-use masseter_recording::{Damage, ProcessFault, Recorded};
+use masseter_recording::{Damage, ProcessFault, Recorded, RunUsage};
 use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind, NO_DRIVE_STATE, Source};
 use masseter_runtime::messages::tap::{self, TapError};
 use masseter_runtime::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
@@ -23,12 +23,14 @@ use crate::over_time::{
     AxisFigures, AxisWatch, CONTROLLER, ContactFigures, ContactWatch, OverTime, OverTimeCollector, PLANT,
     Place,
 };
+use crate::overruns::{LoopSamples, Overrun};
 use crate::played::{MotionFigures, PlayedWatch, StopWatch, StoppedBy};
 use crate::poses::{estimated_pose, is_moving, is_running, true_pose};
 use crate::requirements::{RequirementFigures, Requirements};
 use crate::response::{BusResponse, Responses};
 use crate::signals::{Pace, Sample, Timeline};
-use crate::skips::{Counters, OverrunAttribution, SkipFigures, Skips};
+use crate::skips::{Counters, OverrunAttribution, SkipFigures, Skips, longest_overruns};
+use crate::standstill::{StandstillFigures, StandstillWatch};
 use crate::tracking::{PoseSource, Track, Tracking, TrackingFigures};
 
 /// Computes the [`Figures`] of a run from its messages, in their order in the recording.
@@ -74,10 +76,13 @@ pub struct Analysis {
     digest: Digest,
     first_sample_ns: Option<u64>,
     last_sample_ns: u64,
+    /// The deadline of the controller's last cycle, ns.
+    last_due_ns: u64,
     controller_skips: Skips,
     plant_skips: Skips,
     outage: OutageWatch,
     stop: StopWatch,
+    standstill: StandstillWatch,
     played: PlayedWatch,
     contact: ContactWatch,
     /// None where the scenario requires nothing.
@@ -131,10 +136,12 @@ impl Analysis {
             digest: Digest::default(),
             first_sample_ns: None,
             last_sample_ns: 0,
+            last_due_ns: 0,
             controller_skips: Skips::default(),
             plant_skips: Skips::default(),
             outage: OutageWatch::default(),
             stop: StopWatch::default(),
+            standstill: StandstillWatch::new(scenario),
             played: PlayedWatch::new(&scenario.jaw),
             contact: ContactWatch::default(),
             requirements: (!requirements.is_empty()).then_some(requirements),
@@ -206,6 +213,12 @@ impl Analysis {
         }
     }
 
+    /// Takes what the supervisor sampled of the loops' threads. Call this before [`take`](Self::take).
+    pub fn loop_samples(&mut self, usage: &RunUsage) {
+        self.controller_skips.samples = LoopSamples::of(usage, "controller");
+        self.plant_skips.samples = LoopSamples::of(usage, "plant");
+    }
+
     fn apply_reading(&mut self, reading: &Reading) {
         let is_of_scenario = self.stalls.apply_reading(reading);
         let skipped = self.plant_skips.account(&Counters::from(reading), self.period_ns, is_of_scenario);
@@ -230,6 +243,7 @@ impl Analysis {
         }
         self.figures.cycles = self.figures.cycles.max(state.seq);
         self.figures.final_state = Some(state.controller_state.into());
+        self.last_due_ns = state.due_ns;
         self.stop.apply_state(state);
     }
 
@@ -241,6 +255,7 @@ impl Analysis {
     /// Takes the next cycle in the order of time.
     fn judge_sample(&mut self, sample: &Sample) {
         let messages = &sample.messages;
+        self.standstill.add_sample(sample);
         if let Some(path) = self.tracking.add_sample(sample) {
             self.shown.iter_mut().for_each(|shown| shown.over_time.apply_path(&path));
             self.faults.apply_sample(&path);
@@ -304,19 +319,27 @@ impl Analysis {
                 )
             });
         self.figures.events.sort_by_key(|event| event.time_ns);
+        let overruns = longest_overruns([&mut self.controller_skips, &mut self.plant_skips]);
+        let is_over = |state: &Code<ControllerState>| {
+            *state == ControllerState::Finished || *state == ControllerState::SafeStop
+        };
+        let ended_ns = self.figures.final_state.filter(is_over).map(|_| self.last_due_ns + self.period_ns);
         Figures {
+            ended_ns,
             digest: self.digest.in_hex(),
             duration_s: duration_ns as f64 / 1e9,
             overrun_attribution: OverrunAttribution::new(&[&self.controller_skips, &self.plant_skips]),
             controller_skips: self.controller_skips.figures,
             plant_skips: self.plant_skips.figures,
+            overruns,
             readings: self.freshness.figures,
             stopped_by,
             enabled_s,
             motion: self.played.into_figures(rest_m),
+            standstill: self.standstill.into_figures(),
             outage: self.outage.outage(self.period_ns),
             tracking,
-            faults: self.faults.into_figures(),
+            faults: self.faults.into_figures(ended_ns),
             requirements: self.requirements.map(Requirements::into_figures).unwrap_or_default(),
             signals: self.named.signals,
             parameters: self.named.parameters,
@@ -426,7 +449,9 @@ pub struct Figures {
     pub plant_skips: SkipFigures,
     /// Which readings the controller's cycles used.
     pub readings: ReadingFigures,
-    /// Rig or machine as the cause of the overlong stretches of work; none where no such stretch cost a deadline.
+    /// Stretches of work that cost deadlines, with what the kernel counted of the loop's thread: the longest, the loops' own first.
+    pub overruns: Vec<Overrun>,
+    /// Rig or machine as the cause of the other overlong stretches of work; none where no such stretch cost a deadline.
     pub overrun_attribution: Option<OverrunAttribution>,
     /// The last state of the controller's sequence; none without a single state message.
     pub final_state: Option<Code<ControllerState>>,
@@ -436,6 +461,11 @@ pub struct Figures {
     pub enabled_s: f64,
     /// What was played of the scenario's motion.
     pub motion: MotionFigures,
+    /// How far the mechanism moved after its stops.
+    pub standstill: StandstillFigures,
+    /// When the controller had ended in order, ns of the run's clock. What begins later is no part of the test.
+    #[serde(skip)]
+    pub ended_ns: Option<u64>,
     /// Deadlines missed just before a safe stop; none without one.
     pub outage: Option<Outage>,
     /// Distance of the platform from its desired pose, while the motion played.
@@ -489,8 +519,11 @@ impl Figures {
     pub fn skipped(&self) -> (u64, u64) {
         let (controller, plant) = (&self.controller_skips, &self.plant_skips);
         let is_machine = self.overrun_attribution.is_some_and(|overruns| overruns.may_be_the_machine());
-        let while_working = if is_machine { controller.while_working + plant.while_working } else { 0 };
-        (controller.skipped + plant.skipped, controller.by_machine + plant.by_machine + while_working)
+        let by_machine = |skips: &SkipFigures| {
+            let undecided = if is_machine { skips.working_undecided() } else { 0 };
+            skips.by_machine + skips.working_by_machine + undecided
+        };
+        (controller.skipped + plant.skipped, by_machine(controller) + by_machine(plant))
     }
 
     /// Messages that were published and not recorded.

@@ -63,6 +63,9 @@ pub struct CheckFigures {
 pub struct Check {
     /// What.
     pub name: Cow<'static, str>,
+    /// The requirement of the user's own list that it shows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub id: Option<String>,
     /// What was found, with its limit.
     pub finding: String,
     /// Whether it is as it should be.
@@ -90,7 +93,7 @@ pub(crate) enum Subject {
 
 impl Check {
     pub(crate) fn new(name: impl Into<Cow<'static, str>>, finding: String, result: CheckResult) -> Self {
-        Self { name: name.into(), finding, result, figures: None, subject: Subject::Rig }
+        Self { name: name.into(), id: None, finding, result, figures: None, subject: Subject::Rig }
     }
 
     /// Whether it is a requirement of the scenario, or an event that it expects.
@@ -179,16 +182,25 @@ pub(crate) fn tracking(
     }
 }
 
-/// A test with faults that passes without them has tested nothing, and a fault that leads the jaw beyond the limits must be
-/// detected before. None where no fault is declared.
+/// A test with faults that passes without them has tested nothing, also where one struck only after the rig had
+/// stopped, unless it waits for the stop. A fault that leads the jaw beyond the limits must be detected before. None
+/// where no fault is declared.
 pub(crate) fn faults(
     declared: &[FaultConfig],
     found: &[FaultFigures],
     limits: &ChecksConfig,
+    stopped_ns: Option<u64>,
 ) -> Option<Check> {
     let ChecksConfig { tracking_max_mm, tracking_max_deg, .. } = *limits;
-    let idle = found.iter().filter(|fault| fault.struck_ns.is_none());
-    let idle: Vec<_> = idle.map(|fault| fault.number.to_string()).collect();
+    let is_late = |(fault, found): &(&FaultConfig, &FaultFigures)| {
+        let struck_ns = found.struck_ns.filter(|_| fault.after.as_deref() != Some("controller.safe_stop"));
+        struck_ns.zip(stopped_ns).is_some_and(|(struck_ns, stopped_ns)| struck_ns > stopped_ns)
+    };
+    let numbers = |is_so: &dyn Fn(&(&FaultConfig, &FaultFigures)) -> bool| {
+        let so = declared.iter().zip(found).filter(is_so);
+        so.map(|(_, found)| found.number.to_string()).collect::<Vec<_>>()
+    };
+    let (idle, late) = (numbers(&|(_, found)| found.struck_ns.is_none()), numbers(&is_late));
     let beyond: Vec<_> = declared
         .iter()
         .zip(found)
@@ -203,16 +215,15 @@ pub(crate) fn faults(
             )
         })
         .collect();
-    let which = match idle.as_slice() {
+    let which = |numbers: &[String], what: &str| match numbers {
         [] => String::new(),
-        idle => format!(
-            ", number {} never: raise its probability, or let the fault act earlier or longer",
-            idle.join(", ")
-        ),
+        numbers => format!(", number {} {what}", numbers.join(", ")),
     };
-    let struck =
-        format!("{} of {} declared faults acted{which}", declared.len() - idle.len(), declared.len());
-    let result = match (beyond.is_empty(), idle.is_empty()) {
+    let never = which(&idle, "never: raise its probability, or let the fault act earlier or longer");
+    let after = which(&late, "only after the rig had stopped");
+    let acted = declared.len() - idle.len() - late.len();
+    let struck = format!("{acted} of {} declared faults acted{after}{never}", declared.len());
+    let result = match (beyond.is_empty(), acted == declared.len()) {
         (true, true) => CheckResult::Passed,
         (true, false) => CheckResult::Untested,
         (false, _) => CheckResult::Failed,

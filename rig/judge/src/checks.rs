@@ -9,6 +9,7 @@ use std::fmt::{self, Display, Formatter};
 use masseter_recording::{Ending, Manifest};
 use masseter_runtime::messages::codes::{Cause, ControllerState};
 use masseter_runtime::named::PlayedMotion;
+use masseter_runtime::schedule::CycleSchedule;
 use masseter_scenario::wording::counted;
 use masseter_scenario::{Dimension, ExpectedVerdict, StimulusConfig};
 
@@ -19,6 +20,7 @@ use crate::played::MotionFigures;
 use crate::requirements::RequirementFigures;
 use crate::response::{BusResponse, ResponseFigures};
 use crate::skips::SkipFigures;
+use crate::standstill::standstill;
 use crate::timing::{Timing, TimingWord};
 use crate::tracking::TrackingFigures;
 
@@ -49,7 +51,10 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
             [motion_lag(&figures.motion, limits.motion_lag_ms), missed_commands(manifest, figures)];
         checks.extend(of_motion.into_iter().flatten().map(|check| check.unless(is_disturbed)));
     }
+    let is_partial = figures.cut_short || !figures.damage.is_empty();
+    checks.extend(standstill(&figures.standstill, &manifest.ending, is_partial, limits));
     checks.extend(kept_time(timing, limits.missed_cycles));
+    checks.extend(late_commands(manifest, &figures.motion).filter(|_| !is_stopped));
     checks.extend([
         dropped_messages(
             figures.missing_messages(),
@@ -60,11 +65,18 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
         bus_response(&figures.bus_response, &figures.plant_skips),
     ]);
     // No lost cycle excuses a declared fault that led the jaw too far.
-    checks.extend(faults(&manifest.scenario.faults, &figures.faults, limits));
-    checks.extend(stimuli(&manifest.scenario.stimulus, &figures.events));
+    let stopped_ns = stopped_ns(&figures.events);
+    checks.extend(faults(&manifest.scenario.faults, &figures.faults, limits, stopped_ns));
+    checks.extend(stimuli(&manifest.scenario.stimulus, figures));
     checks
         .extend(figures.requirements.iter().map(|requirement| self::requirement(requirement, is_disturbed)));
     checks
+}
+
+/// When the rig began to stop: a safe stop, or one by request.
+fn stopped_ns(events: &[EventRecord]) -> Option<u64> {
+    let stops = events.iter().filter(|event| event.begins_stop() || event.cause == Cause::StopRequested);
+    stops.map(|event| event.time_ns).min()
 }
 
 /// A motion that waited for lost commands or readings is late from then on. None where the scenario's motion never began.
@@ -82,6 +94,28 @@ fn missed_commands(manifest: &Manifest, figures: &Figures) -> Option<Check> {
     lag_ms.filter(|_| !is_of_scenario)?;
     let finding = format!("{}, {missed_in_a_row} in a row, limit {limit}", counted(missed_commands, "cycle"));
     Some(Check::judged("commands missed", finding, missed_commands <= limit))
+}
+
+/// Whether so many commands were late that the motion is another one than in simulated time, where none is.
+pub(crate) fn is_often_late(manifest: &Manifest, motion: &MotionFigures) -> bool {
+    motion.late_commands > u64::from(manifest.scenario.controller.stale_cycles)
+}
+
+/// A command that comes after its time goes out a cycle later: the robot follows late, which tracking judges. None in simulated
+/// time, and where the motion never began.
+fn late_commands(manifest: &Manifest, motion: &MotionFigures) -> Option<Check> {
+    const NAME: &str = "commands late";
+    motion.lag_ms.filter(|_| manifest.is_in_real_time())?;
+    let late = counted(motion.late_commands, "command");
+    if !is_often_late(manifest, motion) {
+        return Some(Check::judged(NAME, late, true));
+    }
+    let schedule = CycleSchedule::new(&manifest.scenario).ok()?;
+    let room_us = (schedule.command_by_ns - schedule.controller_at_ns) / 1000;
+    let why = format!(
+        "{late} used a cycle late: from its wake-up to the command a controller has {room_us} µs; a lower rate_hz gives it more"
+    );
+    Some(Check::not_judged(NAME, why))
 }
 
 /// Cycles that the machine lost are no failure of the rig. None in simulated time, which has no deadlines.
@@ -133,9 +167,13 @@ fn sequence(manifest: &Manifest, figures: &Figures) -> Check {
 }
 
 /// A test with stimuli of which one never began has not tested what it should. None where there are none.
-fn stimuli(declared: &[StimulusConfig], events: &[EventRecord]) -> Option<Check> {
-    let is_begin =
-        |event: &EventRecord, number| event.cause == Cause::StimulusBegan && event.value as usize == number;
+fn stimuli(declared: &[StimulusConfig], figures: &Figures) -> Option<Check> {
+    let Figures { events, ended_ns, .. } = figures;
+    let is_begin = |event: &EventRecord, number| {
+        event.cause == Cause::StimulusBegan
+            && event.value as usize == number
+            && ended_ns.is_none_or(|ended_ns| event.time_ns <= ended_ns)
+    };
     let idle: Vec<_> = (1..=declared.len())
         .filter(|number| !events.iter().any(|event| is_begin(event, *number)))
         .map(|number| number.to_string())
@@ -173,7 +211,8 @@ fn requirement(found: &RequirementFigures, is_disturbed: bool) -> Check {
         CheckResult::Failed | CheckResult::Untested if is_excused => CheckResult::Excused,
         result => result,
     };
-    Check { figures: Some(figures), subject, ..Check::new(found.name.clone(), finding, result) }
+    let (id, figures) = (found.id.clone(), Some(figures));
+    Check { id, figures, subject, ..Check::new(found.name.clone(), finding, result) }
 }
 
 /// Gaps show losses before the last recorded message. Losses behind it, and in unreadable parts, are unknown.

@@ -101,7 +101,11 @@ impl FaultWatch {
         }
     }
 
-    pub(super) fn into_figures(self) -> Vec<FaultFigures> {
+    /// `ended_ns`: when the controller had ended in order. A fault that strikes later tests nothing.
+    pub(super) fn into_figures(mut self, ended_ns: Option<u64>) -> Vec<FaultFigures> {
+        for fault in &mut self.faults {
+            fault.struck_ns.take_if(|struck_ns| ended_ns.is_some_and(|ended_ns| *struck_ns > ended_ns));
+        }
         let figures = |(index, fault): (usize, &Effect)| {
             // A fault that strikes during a stop has not begun it.
             let stop = fault
@@ -170,7 +174,7 @@ mod tests {
         {
             watch.apply_sample(&sample(sampled_ns, incisal_m));
         }
-        let found = watch.into_figures();
+        let found = watch.into_figures(None);
         assert_eq!(found.iter().map(|figures| figures.number).collect::<Vec<_>>(), [1, 2, 3]);
 
         let first = &found[0];
@@ -185,13 +189,22 @@ mod tests {
     }
 
     #[test]
+    fn a_fault_that_strikes_after_the_controllers_end_has_not_acted() {
+        for (ended_ns, struck_ns) in [(None, Some(5)), (Some(5), Some(5)), (Some(4), None)] {
+            let mut watch = FaultWatch::new(1);
+            watch.apply_event(&event(5, Source::Wire, EventKind::Notice, Cause::FaultInjected, 1.0));
+            assert_eq!(watch.into_figures(ended_ns)[0].struck_ns, struck_ns, "{ended_ns:?}");
+        }
+    }
+
+    #[test]
     fn the_controllers_safe_stop_is_one_and_its_other_steps_are_not() {
         let mut watch = FaultWatch::new(1);
         watch.apply_event(&event(5, Source::Wire, EventKind::Notice, Cause::FaultInjected, 1.0));
         watch.apply_event(&event(7, Source::Controller, EventKind::Fault, Cause::TrackingLost, 1e-3));
         watch.apply_event(&safe_stop(2_000_000));
         (0..4).for_each(|i| watch.apply_sample(&sample(i * 1_000_000, i as f64 * 1e-3)));
-        let found = watch.into_figures();
+        let found = watch.into_figures(None);
         assert!((found[0].deviation_mm - 2.0).abs() < 1e-12, "{found:?}");
         assert!(found[0].detection.unwrap().source == Source::Controller, "{found:?}");
     }
@@ -202,7 +215,7 @@ mod tests {
             let mut watch = FaultWatch::new(1);
             watch.apply_event(&event(0, Source::Wire, EventKind::Notice, Cause::FaultInjected, 1.0));
             (0..3).for_each(|i| watch.apply_sample(&sample(i, if i == bad { f64::NAN } else { 1e-5 })));
-            let found = watch.into_figures();
+            let found = watch.into_figures(None);
             assert_eq!((found[0].deviation_mm, found[0].deviation_deg), (f64::INFINITY, f64::INFINITY));
         }
     }
@@ -212,7 +225,7 @@ mod tests {
         let mut watch = FaultWatch::new(1);
         watch.apply_event(&event(5, Source::Wire, EventKind::Notice, Cause::FaultInjected, 1.0));
         (0..20_000).for_each(|i| watch.apply_sample(&sample(i, if i == 10 { 2e-3 } else { 1e-5 })));
-        let found = watch.into_figures();
+        let found = watch.into_figures(None);
         assert!((found[0].deviation_mm - 2.0).abs() < 1e-12, "{found:?}");
     }
 }

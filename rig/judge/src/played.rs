@@ -6,7 +6,7 @@ use std::fmt::{self, Display, Formatter};
 
 use masseter_model::geometry::{AXES, Pose, Vec3};
 use masseter_recording::jaw_points;
-use masseter_runtime::messages::codes::{DriveState, NO_DRIVE_STATE};
+use masseter_runtime::messages::codes::{ControllerState, DriveState, NO_DRIVE_STATE, drive_state};
 use masseter_runtime::messages::{Reading, State};
 use masseter_scenario::JawConfig;
 use serde::Serialize;
@@ -28,21 +28,29 @@ pub struct MotionFigures {
     pub missed_commands: u64,
     /// The most of them in a row.
     pub missed_in_a_row: u64,
+    /// Commands that the plant used a cycle or more after their own.
+    pub late_commands: u64,
 }
 
 /// A shorter way is none, m.
 const NO_WAY_M: f64 = 1e-5;
 
+/// The way is measured in steps of at least this length, m.
+const LEAST_STEP_M: f64 = 1e-5;
+
 /// Follows the jaw on its way.
 #[derive(Debug, Clone)]
 pub(super) struct PlayedWatch {
     points_m: [Vec3; 3],
-    /// The last pose of both, desired and actual.
+    /// The poses of both at the last step, desired and actual.
     before: Option<[Pose; 2]>,
     way_m: f64,
     gone_m: f64,
     lag_s: Option<f64>,
+    /// The cycle of the last reading.
+    cycle: u64,
     answered: u64,
+    late_commands: u64,
     missed_commands: u64,
     in_a_row: u64,
     most_in_a_row: u64,
@@ -56,7 +64,9 @@ impl PlayedWatch {
             way_m: 0.0,
             gone_m: 0.0,
             lag_s: None,
+            cycle: 0,
             answered: 0,
+            late_commands: 0,
             missed_commands: 0,
             in_a_row: 0,
             most_in_a_row: 0,
@@ -67,19 +77,23 @@ impl PlayedWatch {
     pub(super) fn add_sample(&mut self, lag_s: f64, desired: Option<Pose>, actual: Option<Pose>) {
         self.lag_s = Some(self.lag_s.map_or(lag_s, |most_s| most_s.max(lag_s)));
         let Some(now) = desired.zip(actual).map(|(desired, actual)| [desired, actual]) else { return };
-        let Some(before) = self.before.replace(now) else { return };
+        let before = self.before.get_or_insert(now);
         let [desired, actual] = [0, 1].map(|of| step(&self.points_m, &before[of], &now[of]));
         let length_m = length(&desired);
-        if length_m > 0.0 {
+        // While the motion waits for lost cycles, the jaw goes on to where it was sent: this belongs to the next step.
+        if length_m >= LEAST_STEP_M {
+            *before = now;
             self.way_m += length_m;
             self.gone_m +=
                 desired.iter().zip(&actual).map(|(one, other)| one.dot(other)).sum::<f64>() / length_m;
         }
     }
 
-    /// Takes the reading of a sample of the motion.
+    /// Takes the reading of a sample of the motion. It answers a command that came in time by the cycle of the reading before.
     pub(super) fn count_command(&mut self, reading: &Reading, is_moving: bool) {
         let is_new = reading.answers_cycle > std::mem::replace(&mut self.answered, reading.answers_cycle);
+        let before = std::mem::replace(&mut self.cycle, reading.cycle);
+        self.late_commands += u64::from(is_moving && is_new && reading.answers_cycle < before);
         self.in_a_row = if is_new || !is_moving { 0 } else { self.in_a_row + 1 };
         self.missed_commands += u64::from(self.in_a_row > 0);
         self.most_in_a_row = self.most_in_a_row.max(self.in_a_row);
@@ -99,6 +113,7 @@ impl PlayedWatch {
             lag_ms: self.lag_s.map(|lag_s| lag_s * 1e3),
             missed_commands: self.missed_commands,
             missed_in_a_row: self.most_in_a_row,
+            late_commands: self.late_commands,
         }
     }
 }
@@ -140,6 +155,7 @@ impl Display for StoppedBy {
 
 /// Watches drives and master for a stop.
 #[derive(Debug, Clone, Copy, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "facts that are independent of each other")]
 pub(super) struct StopWatch {
     stopped: Option<StoppedBy>,
     was_enabled: [bool; AXES],
@@ -151,6 +167,10 @@ pub(super) struct StopWatch {
     last_cycle: u64,
     /// Cycles in which all drives were enabled.
     enabled_cycles: u64,
+    /// Whether the newest state is that of a controller that has finished; and whether no drive had power then. What master and
+    /// drives report later stops no motion.
+    is_finished: bool,
+    has_ended: bool,
 }
 
 impl StopWatch {
@@ -168,6 +188,9 @@ impl StopWatch {
             0 => is_quick.then_some(StoppedBy::QuickStop),
             _ => Some(StoppedBy::Master),
         };
+        let is_powered = |code: &u32| matches!(drive_state(*code), Ok(Some(state)) if state.is_powered());
+        self.has_ended |= self.is_finished && found.is_none() && !states.iter().any(is_powered);
+        let found = found.filter(|_| !self.has_ended);
         self.stopped = self.stopped.or(found);
         self.leave(reading);
         found.is_some()
@@ -190,6 +213,7 @@ impl StopWatch {
     /// Takes a state. A controller that ends its motion with the drives is no stop of theirs.
     pub(super) fn apply_state(&mut self, state: &State) {
         self.is_moving = is_moving(Some(state.controller_state));
+        self.is_finished = state.controller_state == ControllerState::Finished.code();
         let Some((left_ns, states)) = &mut self.left else { return };
         // The state of an earlier cycle may come later.
         if state.due_ns <= *left_ns {
@@ -205,7 +229,8 @@ impl StopWatch {
 
     /// The master's own report, should the run end before the next reading.
     pub(super) fn apply_event(&mut self, event: &EventRecord) {
-        self.stopped = self.stopped.or(event.is_fault_of_master().then_some(StoppedBy::Master));
+        let is_stop = event.is_fault_of_master() && !self.has_ended;
+        self.stopped = self.stopped.or(is_stop.then_some(StoppedBy::Master));
     }
 
     /// What stopped the drives, and for how many cycles all of them were enabled.

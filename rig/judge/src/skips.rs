@@ -1,7 +1,8 @@
 //! Skipped deadlines, what the time before them went to, and whether rig or machine caused them.
 //!
 //! The machine caused a skip that stalls while the process waited explain. A skip that only an overlong stretch of work
-//! explains may have either cause: [`OverrunAttribution`] weighs those of the whole run. The rig caused all others.
+//! explains may have either cause: the [counters](crate::overruns) of the loop's thread name it, and where they cannot,
+//! [`OverrunAttribution`] weighs those of the whole run. The rig caused all others.
 //!
 //! A process that skips n deadlines comes back at least n + 1 periods after the last one that it kept. A cycle in time
 //! takes one of them at most; the other n were lost, to stalls or to overlong work. Lost time explains as many skips as
@@ -13,11 +14,14 @@
 //! Where messages are missing from the recording, single cycles are unknown: skips in between have no known cause, and
 //! the time lost in between is not counted as one stall.
 
+use std::cmp::Reverse;
+
 use hdrhistogram::Histogram;
 use masseter_runtime::messages::{Reading, State};
 use serde::Serialize;
 
 use crate::measured::{histogram, record};
+use crate::overruns::{LoopSamples, Overrun, OverrunCause};
 
 /// Skipped deadlines of one process, and the account of its time.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
@@ -28,6 +32,10 @@ pub struct SkipFigures {
     pub by_machine: u64,
     /// Those before which a stretch of work took too long.
     pub while_working: u64,
+    /// Those of them that the counters of the loop's thread show to be the loop's own.
+    pub working_by_loop: u64,
+    /// Those that they show to be the machine's.
+    pub working_by_machine: u64,
     /// Those behind messages that were not recorded, and those that passed before the first wait.
     pub unknown_cause: u64,
     /// Those of a stall that a fault of the scenario made.
@@ -42,11 +50,22 @@ pub struct SkipFigures {
     pub overlong_ns: u64,
 }
 
+impl SkipFigures {
+    /// Those after overlong work of which nobody knows the cause.
+    pub(crate) fn working_undecided(&self) -> u64 {
+        self.while_working.saturating_sub(self.working_by_loop + self.working_by_machine)
+    }
+}
+
 /// Counters of a process since its start, and the lateness of its wake-up, as its messages carry them.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Counters {
     /// Number of the message.
     pub(super) seq: u64,
+    /// Cycle of the message.
+    pub(super) cycle: u64,
+    /// When the cycle began, ns.
+    pub(super) woke_ns: u64,
     pub(super) skipped: u64,
     pub(super) stalled_ns: u64,
     pub(super) spun_ns: u64,
@@ -63,6 +82,8 @@ macro_rules! counters_from {
             fn from(message: &$message) -> Self {
                 Self {
                     seq: message.seq,
+                    cycle: message.cycle,
+                    woke_ns: message.woke_ns,
                     skipped: message.skipped_cycles,
                     stalled_ns: message.stalled_ns,
                     spun_ns: message.spun_ns,
@@ -116,11 +137,27 @@ impl Loss {
     }
 }
 
+/// A stretch of work: its cycle, and the wake-ups before and behind it, ns.
+#[derive(Debug, Clone, Copy, Default)]
+struct Work {
+    cycle: u64,
+    from_ns: u64,
+    to_ns: u64,
+}
+
 /// Follows the counters of one process.
 #[derive(Debug, Clone)]
 pub(super) struct Skips {
     pub(super) figures: SkipFigures,
+    /// What the kernel counted of the loop's thread.
+    pub(super) samples: LoopSamples,
+    /// The stretches of work that cost a deadline and were sampled.
+    pub(super) overruns: Vec<Overrun>,
     last_seq: u64,
+    /// The cycle of the last message, with its work.
+    last_work: Work,
+    /// The last overlong stretch of work.
+    overlong_work: Work,
     /// Loss that made the last wake-up late: its deadlines are skipped after the late cycle, not before.
     carried_over: Loss,
     /// The stretch of work that is part of it, ns.
@@ -129,7 +166,7 @@ pub(super) struct Skips {
     stalls: Histogram<u64>,
     /// Length of each overlong stretch of work, ns.
     overlong: Histogram<u64>,
-    /// The shortest overlong stretch of work that cost a deadline, ns.
+    /// The shortest overlong stretch of work that cost a deadline and has no certain cause, ns.
     pub(super) shortest_costly_ns: Option<u64>,
 }
 
@@ -137,7 +174,11 @@ impl Default for Skips {
     fn default() -> Self {
         Self {
             figures: SkipFigures::default(),
+            samples: LoopSamples::default(),
+            overruns: Vec::new(),
             last_seq: 0,
+            last_work: Work::default(),
+            overlong_work: Work::default(),
             carried_over: Loss::default(),
             carried_over_stretch_ns: 0,
             stalls: histogram(),
@@ -157,6 +198,11 @@ impl Skips {
         let overlong_ns = counters.overlong_ns.saturating_sub(past.overlong_ns);
         let skipped = counters.skipped.saturating_sub(past.skipped);
         let lost = self.carried_over.and(Loss { waiting_ns: stall_ns, working_ns: overlong_ns });
+        let work = Work { to_ns: counters.woke_ns, ..self.last_work };
+        self.last_work = Work { cycle: counters.cycle, from_ns: counters.woke_ns, to_ns: counters.woke_ns };
+        if overlong_ns > 0 {
+            self.overlong_work = work;
+        }
         let is_next = counters.seq == std::mem::replace(&mut self.last_seq, counters.seq).wrapping_add(1);
         // Before its first wait a process keeps no account of what held it up.
         let known = if is_next && counters.seq > 1 { skipped } else { 0 };
@@ -179,8 +225,7 @@ impl Skips {
         self.figures.unknown_cause += skipped - known;
         let stretch_ns = overlong_ns.max(self.carried_over_stretch_ns);
         if while_working > 0 {
-            let shortest_ns = self.shortest_costly_ns.map_or(stretch_ns, |shortest| shortest.min(stretch_ns));
-            self.shortest_costly_ns = Some(shortest_ns);
+            self.judge_overrun(stretch_ns, while_working, period_ns);
         }
         for (histogram, lost_ns) in [(&mut self.stalls, stall_ns), (&mut self.overlong, overlong_ns)] {
             if is_next && lost_ns > 0 {
@@ -192,11 +237,69 @@ impl Skips {
         known
     }
 
+    /// Notes a stretch of work that cost deadlines.
+    fn judge_overrun(&mut self, lasted_ns: u64, skipped: u64, period_ns: u64) {
+        let Work { cycle, from_ns, to_ns } = self.overlong_work;
+        let LoopSamples { process, cpu_share, .. } = self.samples;
+        let overrun = self.samples.around(from_ns, to_ns).map(|counts| {
+            let cause = counts.cause(lasted_ns, period_ns, cpu_share);
+            Overrun { process, cycle, lasted_ns, skipped, cause, counts }
+        });
+        if overrun.is_none_or(|overrun| overrun.cause == OverrunCause::Unknown) {
+            self.leave_undecided(lasted_ns);
+        }
+        self.overruns.extend(overrun);
+    }
+
+    /// The whole run decides on a stretch of this length.
+    fn leave_undecided(&mut self, lasted_ns: u64) {
+        let shortest_ns = self.shortest_costly_ns.map_or(lasted_ns, |shortest| shortest.min(lasted_ns));
+        self.shortest_costly_ns = Some(shortest_ns);
+    }
+
+    /// Counts the deadlines of the overruns by their causes. A machine that also stalls while a loop waits, for half as
+    /// long or longer, may have made what counts as CPU time.
+    pub(super) fn count_causes(&mut self, longest_stall_ns: u64) {
+        for place in 0..self.overruns.len() {
+            let Overrun { cause, lasted_ns, skipped, .. } = self.overruns[place];
+            match cause {
+                OverrunCause::Computed if 2 * longest_stall_ns >= lasted_ns => {
+                    self.overruns[place].cause = OverrunCause::Unknown;
+                    self.leave_undecided(lasted_ns);
+                }
+                OverrunCause::Slept | OverrunCause::Computed => self.figures.working_by_loop += skipped,
+                OverrunCause::Machine => self.figures.working_by_machine += skipped,
+                OverrunCause::Unknown => {}
+            }
+        }
+    }
+
+    /// The longest stall of the machine while the process waited, ns.
+    pub(super) fn longest_stall_ns(&self) -> u64 {
+        self.stalls.max()
+    }
+
     /// Stalls while waiting, and overlong stretches of work, of at least this length.
     pub(super) fn as_long_as(&self, least_ns: u64) -> (u64, u64) {
         let count = |histogram: &Histogram<u64>| histogram.count_between(least_ns, u64::MAX);
         (count(&self.stalls), count(&self.overlong))
     }
+}
+
+/// Overruns that are told.
+const MOST_OVERRUNS: usize = 10;
+
+/// Decides whose fault the overruns of both loops were; returns the longest, those of the loops first.
+pub(super) fn longest_overruns(loops: [&mut Skips; 2]) -> Vec<Overrun> {
+    let longest_stall_ns = loops.iter().map(|skips| skips.longest_stall_ns()).max().unwrap_or(0);
+    let mut overruns = Vec::new();
+    for skips in loops {
+        skips.count_causes(longest_stall_ns);
+        overruns.append(&mut skips.overruns);
+    }
+    overruns.sort_by_key(|overrun| Reverse((overrun.cause.rank(), overrun.lasted_ns)));
+    overruns.truncate(MOST_OVERRUNS);
+    overruns
 }
 
 /// Least probability at which the machine may be the cause.
@@ -206,7 +309,7 @@ const LEAST_CHANCE: f64 = 0.01;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[doc(alias("root cause", "binomial test"))]
 pub struct OverrunAttribution {
-    /// Stretches of work at least as long as the shortest that cost a deadline.
+    /// Stretches of work at least as long as the shortest that cost a deadline and has no certain cause.
     pub while_working: u64,
     /// Stalls of that length while waiting.
     pub while_waiting: u64,
@@ -217,7 +320,8 @@ pub struct OverrunAttribution {
 }
 
 impl OverrunAttribution {
-    /// Counts the processes of a run together, since they share the machine. None if no stretch of work cost a deadline.
+    /// Counts the processes of a run together, since they share the machine. None if no stretch of work without a certain cause
+    /// cost a deadline.
     pub(super) fn new(processes: &[&Skips]) -> Option<Self> {
         let least_ns = processes.iter().filter_map(|skips| skips.shortest_costly_ns).min()?;
         let counts = processes.iter().map(|skips| skips.as_long_as(least_ns));

@@ -9,6 +9,7 @@ use masseter_scenario::wording::{counted, grouped};
 use serde::Serialize;
 
 use crate::analysis::Figures;
+use crate::overruns::{Overrun, OverrunCause};
 use crate::skips::OverrunAttribution;
 
 /// Whether the deadlines were kept.
@@ -37,7 +38,7 @@ pub struct Timing {
     /// Cycles of controller and plant together, with those that they skipped.
     pub cycles: u64,
     /// Cycles that the machine took from controller or plant, and those of unknown cause. Without the scheduling that the
-    /// rig requested, also those after overlong work.
+    /// rig requested, also those after overlong work that is not certainly a loop's own.
     pub lost: u64,
     /// Cycles that the rig missed by itself.
     pub missed: u64,
@@ -49,6 +50,10 @@ pub struct Timing {
     /// The evidence on overlong stretches of work, in words; empty without such stretches.
     #[serde(skip)]
     pub(crate) evidence: String,
+    /// The longest stretch of work that was a loop's own; without one, the longest of which the counters do not decide, or that
+    /// of the machine.
+    #[serde(skip)]
+    pub(crate) overrun: Option<Overrun>,
 }
 
 impl Timing {
@@ -57,11 +62,11 @@ impl Timing {
         let loops = [&figures.controller_skips, &figures.plant_skips];
         let may_be_the_machine =
             figures.overrun_attribution.is_some_and(|overruns| overruns.may_be_the_machine());
-        // Without real time, overlong work is no evidence against the rig.
+        // Without real time, overlong work is no evidence against the rig by itself.
         let is_work_excused = may_be_the_machine || manifest.refusal().is_some();
         let lost_by = loops.map(|skips| {
-            let working = if is_work_excused { skips.while_working } else { 0 };
-            skips.by_machine + working + skips.unknown_cause
+            let undecided = if is_work_excused { skips.working_undecided() } else { 0 };
+            skips.by_machine + skips.working_by_machine + undecided + skips.unknown_cause
         });
         let missed_by = [0, 1]
             .map(|index| loops[index].skipped.saturating_sub(lost_by[index] + loops[index].by_scenario));
@@ -81,8 +86,22 @@ impl Timing {
             TimingWord::Held
         };
         let cycles = 2 * figures.cycles + loops[0].skipped + loops[1].skipped;
-        let evidence = figures.overrun_attribution.map(in_words).unwrap_or_default();
-        Self { word, cycles, lost, missed, stalled, missed_by, evidence }
+        let overrun = figures.overruns.first().copied();
+        let told = overrun.map(|overrun| format!("; {overrun}")).unwrap_or_default();
+        let evidence = figures.overrun_attribution.map(in_words).unwrap_or_default() + &told;
+        Self { word, cycles, lost, missed, stalled, missed_by, evidence, overrun }
+    }
+
+    /// The loop's own stretch of work that made it miss deadlines, in words; empty without one.
+    pub(crate) fn culprit(&self) -> String {
+        let own = self.overrun.filter(|overrun| self.word == TimingWord::Missed && overrun.cause.is_own());
+        own.map(|overrun| format!("; {overrun}")).unwrap_or_default()
+    }
+
+    /// The stretch of work whose cause the counters do not show, in words; empty without one.
+    pub(crate) fn undecided(&self) -> String {
+        let undecided = self.overrun.filter(|overrun| overrun.cause == OverrunCause::Unknown);
+        undecided.map(|overrun| format!("; whose fault is not certain: {overrun}")).unwrap_or_default()
     }
 
     /// Share of the cycles that the machine lost, %.

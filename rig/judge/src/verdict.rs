@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::analysis::Figures;
 use crate::check::{Check, CheckResult, Subject, left_its_path};
-use crate::checks::{Shortfall, checks};
+use crate::checks::{Shortfall, checks, is_often_late};
 use crate::events::EventRecord;
 use crate::lost_cycles::Outage;
 use crate::played::{MotionFigures, StoppedBy};
@@ -75,9 +75,12 @@ impl Verdict {
                     .map(|failure| clock_jump(&manifest.usage, &manifest.scenario.can).unwrap_or(failure))
             })
             .or_else(|| untested(&checks, figures.cycles))
-            .unwrap_or_else(|| (Outcome::Passed, passed(&figures.motion)));
+            .unwrap_or_else(|| (Outcome::Passed, passed(manifest, &figures.motion)));
         if let Some(expect) = expect {
             (outcome, reason) = against(expect, (outcome, reason), [&checks, &beside], figures);
+        }
+        if matches!(outcome, Outcome::SafeStop | Outcome::Failed | Outcome::ChecksFailed) {
+            reason += &timing.culprit();
         }
         if outcome != Outcome::Passed {
             reason += &overload(&manifest.usage, manifest.scenario.rate_hz).unwrap_or_default();
@@ -90,6 +93,11 @@ impl Verdict {
         // The reason of an INVALID run contains the advice.
         let is_missing = self.timing.word == TimingWord::Disturbed && self.exit_code != Exit::Invalid;
         is_missing.then(|| remedy(manifest))
+    }
+
+    /// Whether a fault or stimulus of the scenario did not act, so that the run tested nothing of what it is about.
+    pub fn has_idle_entry(&self) -> bool {
+        self.checks.iter().any(|check| is_of_scenario(check) && check.result == CheckResult::Untested)
     }
 
     /// Whether checks alone decided it, so that their findings are the reason.
@@ -198,8 +206,10 @@ fn unjudged(limits: &ChecksConfig, timing: &Timing, checks: &[Check]) -> Option<
 fn account(manifest: &Manifest, figures: &Figures, timing: &Timing) -> String {
     let lost = counted(timing.lost, "cycle");
     match manifest.refusal() {
-        Some((process, refusal)) => format!("{lost} lost without real time; {process}: {refusal}"),
-        None => format!("{lost} lost{}; {}", stalls(figures), remedy(manifest)),
+        Some((process, refusal)) => {
+            format!("{lost} lost without real time{}; {process}: {refusal}", timing.undecided())
+        }
+        None => format!("{lost} lost{}{}; {}", stalls(figures), timing.undecided(), remedy(manifest)),
     }
 }
 
@@ -258,10 +268,15 @@ fn failed(checks: &[Check]) -> Option<OutcomeReason> {
 }
 
 /// The reason of a pass, with what somebody has to know beside.
-fn passed(motion: &MotionFigures) -> String {
+fn passed(manifest: &Manifest, motion: &MotionFigures) -> String {
     let late = motion.lag_ms.filter(|lag_ms| *lag_ms >= LEAST_LAG_MS);
     let late = late.map_or_else(String::new, |lag_ms| format!("; motion delayed by {lag_ms:.0} ms"));
-    format!("every check passed{late}")
+    let commands = if manifest.is_in_real_time() && is_often_late(manifest, motion) {
+        format!("; {} used a cycle late", counted(motion.late_commands, "command"))
+    } else {
+        String::new()
+    };
+    format!("every check passed{late}{commands}")
 }
 
 /// What was not tested, with what to do. Without a cycle that was everything.
@@ -294,8 +309,8 @@ fn against(
             if outcome == Outcome::Passed { "every check of the rig passed" } else { reason.as_str() };
         return (Outcome::Failed, format!("expected {}, but {}: {reason}", wanted(expect), outcome.word()));
     }
-    if let Some(why) = other_failures(expect, [checks, beside]) {
-        return (Outcome::Failed, why);
+    if let Some(other) = other_failures(expect, [checks, beside]) {
+        return other;
     }
     // The rig's own checks still count where the run goes on in order to its end.
     let own = || {
@@ -316,19 +331,28 @@ fn against(
         .unwrap_or_else(|| (Outcome::Passed, format!("{}, as expected: {reason}", outcome.word())))
 }
 
-/// What failed beside the expected failures, or passed instead of them. None where the scenario names no failure.
-fn other_failures(expect: &ExpectConfig, checks: [&[Check]; 2]) -> Option<String> {
+/// The outcome where a check did not pass beside the expected failures, or passed instead of them. None where the
+/// scenario names no failure.
+fn other_failures(expect: &ExpectConfig, checks: [&[Check]; 2]) -> Option<OutcomeReason> {
+    if expect.failed.is_empty() {
+        return None;
+    }
     let all = || checks.into_iter().flatten();
     let is_expected = |check: &Check| expect.failed.iter().any(|name| *name == check.name);
-    let other = all()
-        .filter(|check| check.result.is_failed() && !is_expected(check))
-        .map(|check| check.name.to_string());
+    let others = |result, what: &str| {
+        let others = all().filter(|check| check.result == result && !is_expected(check));
+        others.map(|check| format!("{} {what}", check.name)).collect::<Vec<_>>()
+    };
     let has_failed = |name: &String| all().any(|check| check.result.is_failed() && *name == check.name);
     let idle = expect.failed.iter().filter(|name| !has_failed(name)).map(|name| format!("{name} did not"));
-    let wrong: Vec<_> = other.map(|name| format!("{name} failed")).chain(idle).collect();
+    let other =
+        [others(CheckResult::Failed, "failed"), others(CheckResult::Untested, "is untested")].concat();
+    let wrong: Vec<_> = other.into_iter().chain(idle).collect();
+    let lost = others(CheckResult::Excused, "may have failed by lost cycles");
+    let (outcome, wrong) = if wrong.is_empty() { (Outcome::Invalid, lost) } else { (Outcome::Failed, wrong) };
     let named = expect.failed.join(", ");
-    (!expect.failed.is_empty() && !wrong.is_empty())
-        .then(|| format!("expected that {named} fails and nothing else, but {}", wrong.join(", ")))
+    let reason = || format!("expected that {named} fails and nothing else, but {}", wrong.join(", "));
+    (!wrong.is_empty()).then(|| (outcome, reason()))
 }
 
 /// The expected outcome, in words.

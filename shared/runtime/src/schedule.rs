@@ -1,8 +1,9 @@
 //! The schedule of a cycle, from the worst-case frame lengths on the bus.
 //!
 //! SYNC and the drives' process data (TPDO1) go first, at offset 0. Then the controller computes. Then its targets (RPDO1)
-//! go out, to be on the wire before the next SYNC. Heartbeats use the rest of the cycle; an SDO exchange takes the place of
-//! its drive's process data. Emergencies (EMCY) are not in the schedule: in a cycle with one, reading or command may be
+//! go out, to be on the wire before the next SYNC. The heartbeat is the last message of a node in its cycle: a drive's follows
+//! its TPDO1, the master's follows the RPDO1 and any SDO request. So the offsets also hold for interfaces that send in the order
+//! of their queue: SYNC waits for one heartbeat at most. An SDO exchange takes the place of its drive's process data. Emergencies (EMCY) are not in the schedule: in a cycle with one, reading or command may be
 //! late, as with a disturbed bus.
 
 use std::fmt;

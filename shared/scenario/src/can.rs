@@ -36,7 +36,7 @@ section! {
         pub heartbeat_producer_ms: u16 = 50 => "at least 1",
         /// Silence after which a heartbeat is lost (1016).
         #[doc(alias = "consumer heartbeat time")]
-        pub heartbeat_consumer_ms: u16 = 150 => Positive "more than `heartbeat_producer_ms` and a cycle together",
+        pub heartbeat_consumer_ms: u16 = 150 => Positive "at least `heartbeat_producer_ms` and two cycles together",
         /// Longest time from SYNC until a drive has its process data ready.
         pub answer_us: u32 = 0 => "as long as the cycle holds it",
         /// Longest time for the drives to boot.

@@ -218,6 +218,9 @@ pub enum CpuDmaLatency {
     Leave,
 }
 
+/// For so long a run is recorded after its controller has ended, so that a fall or a drift after the stop shows, s.
+pub const AFTER_STOP_S: f64 = 0.5;
+
 section! {
     /// The limits beyond which a run fails.
     #[derive(Copy)]
@@ -233,6 +236,14 @@ section! {
         pub tracking_max_deg: f64 = 0.5 => Positive,
         /// By how much the motion may be late, since commands or readings were lost; the desired pose waits for no longer.
         pub motion_lag_ms: f64 = 20.0 => Within(0.0, 1000.0),
+        /// Largest way of an axis after a stop, from where it was when its drive lost power.
+        pub standstill_axis_mm: f64 = 0.5 => Positive,
+        /// Largest way of the incisal point after a stop, once no drive has power.
+        pub standstill_jaw_mm: f64 = 0.5 => Positive,
+        /// Largest angle by which the platform turns then.
+        pub standstill_jaw_deg: f64 = 0.5 => Positive,
+        /// Reaction time after the loss of power in which axes may coast; `drive_profile.brake.close_s` comes on top.
+        pub standstill_after_ms: f64 = 0.0 => Within(0.0, 300.0),
         /// Largest number of cycles that the rig itself, controller and plant together, may miss.
         pub missed_cycles: u64 = 0,
         /// Largest share of the cycles that the machine may lose; beyond it the run is INVALID.

@@ -18,6 +18,7 @@ mod faults;
 mod force;
 pub mod input;
 mod jaw;
+mod matrix;
 mod merge;
 mod motion;
 mod quantity;
@@ -30,8 +31,8 @@ pub mod wording;
 
 pub use can::{CanConfig, MASTER_NODE};
 pub use control::{
-    ChecksConfig, ControllerConfig, ControllerState, CpuDmaLatency, DryConfig, MOST_LEAD_CYCLES,
-    RealtimeConfig, RecordingConfig, TimingConfig, TrajectoryLimitsConfig,
+    AFTER_STOP_S, ChecksConfig, ControllerConfig, ControllerState, CpuDmaLatency, DryConfig,
+    MOST_LEAD_CYCLES, RealtimeConfig, RecordingConfig, TimingConfig, TrajectoryLimitsConfig,
 };
 pub use drive_profile::{
     AccelerationUnit, BrakeConfig, DriveProfile, HomingConfig, INCREMENTS, IdentityConfig, ObjectConfig,
@@ -41,12 +42,13 @@ pub use drives::{AxisScale, DriveConfig, DrivesConfig, INCREMENTS_PER_TURN, Quir
 pub use error::ScenarioError;
 pub use faults::{
     AxisFault, BusFault, CommandFault, DriveFault, EncoderFault, FaultConfig, FaultDeclaration,
-    FaultKindConfig, FaultSize, PlatformFault, ProcessFault,
+    FaultKindConfig, FaultSize, Overlap, PlatformFault, ProcessFault,
 };
 pub use force::{BiteProfile, ForceControlConfig, ForceEstimateConfig, ForceSource, LoadCellConfig};
 pub use jaw::{FoodConfig, JawConfig, MOST_PAIRS, Material, TeethConfig, ToothConfig};
 pub use masseter_model::dynamics::{AxesConfig, DynamicsConfig, FrictionConfig, FrictionModel};
 pub use masseter_model::section::{Key, Range, unit_of};
+pub use matrix::{Matrix, MatrixCase};
 pub use motion::*;
 pub use quantity::{Dimension, Quantity, QuantityError, UNITS, Unit};
 pub use requirements::{During, ExpectConfig, ExpectedVerdict, RequirementConfig, Statistic, TimeWindow};

@@ -11,6 +11,8 @@ use toml::{Table, Value};
 
 use super::error::ScenarioError;
 
+/// The lists whose entries have names.
+pub(super) const LISTS: [&str; 3] = ["faults", "stimulus", "require"];
 /// The tables that describe a robot and not what is done with it. All scenarios that name its file in `robot` share them.
 const TABLES: [&str; 7] = ["mechanism", "jaw", "limits", "can", "drives", "drive_profile", "dynamics"];
 
@@ -104,20 +106,38 @@ pub(super) fn over_kind<T: DeserializeOwned>(kinds: &Kinds, given: Table) -> Res
 }
 
 /// The tables of the robot's file at `path`, whose paths are relative to its folder. The values are not checked here.
-pub(super) fn robot_tables(path: &Path, mut given: Table) -> Result<Table, ScenarioError> {
+pub(super) fn robot_tables(path: &Path, given: Table) -> Result<Table, ScenarioError> {
     if let Some(other) = given.keys().find(|key| !TABLES.contains(&key.as_str())) {
         let reason = format!("{other} does not describe a robot; a robot's file has {}", TABLES.join(", "));
         return Err(ScenarioError::malformed_file(path, reason));
     }
-    let folder = path.parent().unwrap_or(Path::new(""));
-    if let Some(file) = given.get_mut("drives").and_then(|drives| drives.get_mut("memory")) {
-        make_absolute(folder, file);
+    Ok(with_absolute_paths(path.parent().unwrap_or(Path::new("")), given))
+}
+
+/// The tables of a scenario's file in this folder, with the paths in them made independent of the folder.
+pub(super) fn with_absolute_paths(folder: &Path, mut given: Table) -> Table {
+    const FILES: [[&str; 2]; 4] =
+        [["drives", "memory"], ["motion", "path"], ["drive_profile", "dcf"], ["stimulus", "push_table"]];
+    given.get_mut("robot").into_iter().for_each(|file| make_absolute(folder, file));
+    for [name, key] in FILES {
+        let of =
+            |table: &mut Value| table.get_mut(key).into_iter().for_each(|file| make_absolute(folder, file));
+        match given.get_mut(name) {
+            Some(Value::Array(list)) => list.iter_mut().for_each(of),
+            Some(table) => of(table),
+            None => {}
+        }
     }
-    let profiles = given.get_mut("drive_profile").and_then(Value::as_array_mut);
-    for file in profiles.into_iter().flatten().filter_map(|profile| profile.get_mut("dcf")) {
-        make_absolute(folder, file);
+    given
+}
+
+/// Moves the lists of an included file behind those of the scenario, which keep the numbers of their entries.
+pub(super) fn append_lists(given: &mut Table, included: &mut Table) {
+    for list in LISTS.into_iter().chain(["tags"]) {
+        let Some(Value::Array(more)) = included.remove(list) else { continue };
+        let own = given.entry(list).or_insert_with(|| Value::Array(Vec::new()));
+        own.as_array_mut().into_iter().for_each(|own| own.extend(more.iter().cloned()));
     }
-    Ok(given)
 }
 
 /// Makes a file's path independent of the folder that the path is relative to.
@@ -155,6 +175,21 @@ mod tests {
             "faults has no entry 'x'; there are: lose, late"
         );
         assert_eq!(merged("faults = []", "faults.x.at_s = 3.0").unwrap_err(), "faults has no entry");
+    }
+
+    #[test]
+    fn lists_of_an_included_file_come_behind_and_its_paths_are_of_its_folder() {
+        let mut given: Table = toml::from_str("tags = ['own']\n[[require]]\nname = 'a'").unwrap();
+        let included = "robot = 'robot.toml'\ntags = ['of all']\nmotion = { kind = 'file', path = 'jaw.csv' }\n\
+                        [[require]]\nname = 'b'\n[[stimulus]]\npush_table = '/push.csv'";
+        let mut included = with_absolute_paths(Path::new("/common"), toml::from_str(included).unwrap());
+        append_lists(&mut given, &mut included);
+        assert_eq!(given["tags"].as_array().unwrap().len(), 2);
+        assert_eq!(given["require"][1]["name"].as_str(), Some("b"));
+        assert_eq!(given["stimulus"][0]["push_table"].as_str(), Some("/push.csv"));
+        assert_eq!(included["robot"].as_str(), Some("/common/robot.toml"));
+        assert_eq!(included["motion"]["path"].as_str(), Some("/common/jaw.csv"));
+        assert!(!included.contains_key("require"));
     }
 
     #[test]

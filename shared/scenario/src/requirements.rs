@@ -5,8 +5,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::error::{Checked, require};
+use super::error::{Checked, ScenarioError, require};
 use super::quantity::Quantity;
+use crate::input::is_printable;
 
 /// When a requirement is judged.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -59,6 +60,8 @@ keys! {
     pub struct RequirementConfig {
         /// Name in reports.
         pub name: String => "1 to 120 characters, required",
+        /// Requirement of your own list that it shows, such as `REQ-12`; several may show the same.
+        pub id: Option<String> => "1 to 64 bytes without spaces",
         /// Bounds: the signal.
         pub signal: Option<String> => "a line of `masseter signals`",
         /// Bounds: an expression of signals in SI units, instead of `signal`.
@@ -105,7 +108,10 @@ impl RequirementConfig {
         let is_line = !self.name.chars().any(char::is_control) && self.name.chars().count() <= 120;
         let is_name = is_line && !self.name.trim().is_empty();
         let name = format!("'{}'", self.name);
-        require(is_name, "require.name", &name, "use 1 to 120 characters in one line")
+        require(is_name, "require.name", &name, "use 1 to 120 characters in one line")?;
+        let id = self.id.as_deref().unwrap_or("-");
+        let is_id = !id.is_empty() && !id.contains(char::is_whitespace) && is_printable(id, 64);
+        require(is_id, "require.id", &format!("'{id}'"), "use 1 to 64 bytes without spaces, such as REQ-12")
     }
 }
 
@@ -163,8 +169,8 @@ section! {
         pub exit_code: Option<u8> = None => "0, 1, 4, 5, 6, 130; that of `verdict`, if both are given",
         /// Occurrences that the run must have.
         pub events: Vec<String> = Vec::new() => "occurrences",
-        /// Checks and requirements that must fail, and no other may; without it any failure is the expected one.
-        pub failed: Vec<String> = Vec::new() => "names; with `verdict = \"fail\"`",
+        /// Checks and requirements that must fail; every other one must pass.
+        pub failed: Vec<String> = Vec::new() => "names; required with `verdict = \"fail\"`, or `exit_code = 1` alone",
     }
 }
 
@@ -182,9 +188,19 @@ impl ExpectConfig {
     }
 
     pub(super) fn validate(&self) -> Checked {
-        let is_failure = self.failed.is_empty() || self.verdict == Some(ExpectedVerdict::Fail);
+        self.validate_exit_code()?;
         let failed = format!("{:?}", self.failed);
-        require(is_failure, "expect.failed", &failed, "it goes with verdict = \"fail\"")?;
+        let need = match (self.accepts(ExpectedVerdict::Fail), self.failed.is_empty()) {
+            (true, true) => {
+                "name the checks and requirements that must fail: any other failure would pass unseen"
+            }
+            (false, false) => "it goes with verdict = \"fail\"",
+            _ => return Ok(()),
+        };
+        Err(ScenarioError::bad("expect.failed", &failed, need))
+    }
+
+    fn validate_exit_code(&self) -> Checked {
         let Some(code) = self.exit_code else { return Ok(()) };
         let need = match self.verdict {
             Some(verdict) => format!("expect.verdict has the exit code {}: give one of both", verdict.exit_code()),

@@ -12,7 +12,8 @@ use super::error::{
     Checked, LONGEST_S, ScenarioError, ranges_of, read_limited, require, require_each, require_range,
 };
 use super::jaw::over_food;
-use super::merge::{merge, robot_tables};
+use super::matrix::Matrix;
+use super::merge::{LISTS, append_lists, merge, robot_tables, with_absolute_paths};
 use super::when::{EntryNames, refuse_circles};
 use super::{
     AxisScale, CanConfig, ChecksConfig, ControllerConfig, DriveProfile, DrivesConfig, DryConfig,
@@ -25,8 +26,6 @@ use crate::wording::nearest;
 
 /// Size of the largest scenario file, bytes.
 const MOST_BYTES: u64 = 1 << 20;
-/// The lists whose entries have names.
-const LISTS: [&str; 3] = ["faults", "stimulus", "require"];
 /// Longest time after a safe stop, s.
 const LONGEST_OBSERVATION_S: f64 = 10.0;
 /// Shortest motion, s: a hundred samples at 1 kHz.
@@ -46,6 +45,15 @@ section! {
         /// The file of the robot, whose tables this scenario changes; the built-in defaults when absent.
         #[serde(skip_serializing)]
         pub robot: Option<PathBuf> = None,
+        /// Files of other scenarios whose values this one takes over, and changes.
+        #[serde(skip_serializing)]
+        pub include: Vec<PathBuf> = Vec::new(),
+        /// Words by which a suite chooses its scenarios.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub tags: Vec<String> = Vec::new(),
+        /// Values of which a suite plays every combination.
+        #[serde(skip_serializing)]
+        pub matrix: Matrix = Matrix::default(),
         /// Seed of every random number: encoder noise, frames that a fault acts on.
         pub seed: u64 = 1,
         /// Cycles per second.
@@ -153,10 +161,19 @@ impl Scenario {
         let text = read_limited(path, MOST_BYTES)?;
         let mut scenario = Self::parse(path, &text)?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        if let Some(robot) = &scenario.robot {
-            let mut whole = Self::read_robot(&folder.join(robot))?;
-            merge(&mut whole, table_of(&text))
-                .map_err(|reason| ScenarioError::malformed_file(path, reason))?;
+        if scenario.robot.is_some() || !scenario.include.is_empty() {
+            let malformed = |reason| ScenarioError::malformed_file(path, reason);
+            let (mut given, mut included) = (table_of(&text), Table::new());
+            for file in &scenario.include {
+                let mut more = Self::read_included(&folder.join(file))?;
+                append_lists(&mut given, &mut more);
+                merge(&mut included, more).map_err(malformed)?;
+            }
+            merge(&mut included, given).map_err(malformed)?;
+            let robot = included.get("robot").and_then(toml::Value::as_str);
+            let mut whole =
+                robot.map_or_else(|| Ok(Table::new()), |robot| Self::read_robot(&folder.join(robot)))?;
+            merge(&mut whole, included).map_err(malformed)?;
             scenario = Self::parse(path, &whole.to_string())?;
         }
         if let Some(memory) = &mut scenario.drives.memory {
@@ -173,6 +190,16 @@ impl Scenario {
         let alone = Self::parse(path, &text)?;
         alone.validate().map_err(|refusal| Self::place_refusal(refusal, path))?;
         robot_tables(path, table_of(&text))
+    }
+
+    /// The tables of an included file; its paths no longer depend on its folder.
+    fn read_included(path: &Path) -> Result<Table, ScenarioError> {
+        let text = read_limited(path, MOST_BYTES)?;
+        let is_plain = Self::parse(path, &text)?.include.is_empty();
+        let need = "an included file includes no other: name both in the scenario";
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let table = with_absolute_paths(folder, table_of(&text));
+        if is_plain { Ok(table) } else { Err(ScenarioError::malformed_file(path, need.to_owned())) }
     }
 
     /// The files that a run reads beside the scenario, each with the name of its copy in the run's folder.
@@ -340,9 +367,13 @@ impl Scenario {
 
     fn validate_run(&self) -> Checked {
         let is_good = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_';
-        let is_name = (1..=64).contains(&self.name.len()) && self.name.bytes().all(is_good);
-        let name = format!("'{}'", self.name);
-        require(is_name, "name", &name, "use 1 to 64 letters, digits, '-' or '_'")?;
+        let named = |key, name: &String| {
+            let is_name = (1..=64).contains(&name.len()) && name.bytes().all(is_good);
+            require(is_name, key, &format!("'{name}'"), "use 1 to 64 letters, digits, '-' or '_'")
+        };
+        named("name", &self.name)?;
+        self.tags.iter().try_for_each(|tag| named("tags", tag))?;
+        self.matrix.cases()?;
         self.check_ranges(require_range)
     }
 

@@ -10,12 +10,12 @@ fn what_cannot_work_is_refused_with_its_key() {
         change(&mut scenario);
         check_scenario(&scenario).unwrap_err().to_string()
     };
-    let slow = "can.heartbeat_consumer_ms = 90: use more than can.heartbeat_producer_ms and a cycle";
+    let slow = "can.heartbeat_consumer_ms = 199: use at least can.heartbeat_producer_ms and two cycles";
     let too_fine = "drives.leg.encoder_resolution_m = 0.000000000001: use more";
     let cases: [(String, &str); 14] = [
-        (with(|s| s.can.heartbeat_consumer_ms = 50), "can.heartbeat_consumer_ms = 50: use more"),
-        (with(|s| s.can.heartbeat_consumer_ms = 51), "can.heartbeat_consumer_ms = 51: use more"),
-        (with(|s| (s.rate_hz, s.can.heartbeat_consumer_ms) = (10, 90)), slow),
+        (with(|s| s.can.heartbeat_consumer_ms = 50), "can.heartbeat_consumer_ms = 50: use at least"),
+        (with(|s| s.can.heartbeat_consumer_ms = 51), "can.heartbeat_consumer_ms = 51: use at least"),
+        (with(|s| (s.rate_hz, s.can.heartbeat_consumer_ms) = (10, 199)), slow),
         (with(|s| s.can.rpdo_timeout_ms = Some(2)), "can.rpdo_timeout_ms = 2: use 0 for none, or more"),
         (with(|s| s.can.node_ids[3] = 1), "node 1 is listed twice"),
         (with(|s| s.can.node_ids[3] = 0), "node id"),
@@ -32,8 +32,12 @@ fn what_cannot_work_is_refused_with_its_key() {
         assert!(error.contains(expected), "{error}");
     }
     assert_eq!(check_scenario(&default()), Ok(()));
+    let mut least = default();
+    least.can.heartbeat_consumer_ms = 52;
+    assert_eq!(check_scenario(&least), Ok(()));
     let boots_within = |start_timeout_s: f64| {
         let mut scenario = Scenario { rate_hz: 10, ..default() };
+        scenario.can.heartbeat_consumer_ms = 200;
         scenario.controller.start_timeout_s = start_timeout_s;
         check_scenario(&scenario)
     };

@@ -1,16 +1,18 @@
 //! An emulated servo drive: a CANopen node (CiA 301) with the profile of servo drives (CiA 402) and an encoder.
 //!
 //! [`node`] implements CiA 301, [`axis`] is the profile behind it, and the object [`dictionary`] lies between them:
-//! the node counts in increments, the axis works in SI units. The drive has no bus and no mechanism; its caller
-//! delivers frames and positions. It depends on neither scenario nor transport.
+//! the node counts in increments, the axis works in SI units. The drive has no bus, no encoder and no mechanism; its caller
+//! delivers frames and positions, and says what the encoder makes of them. A drive depends on CAN alone: not on mechanism,
+//! scenario, or transport.
 
 pub(crate) mod axis;
 pub(crate) mod dictionary;
+pub(crate) mod faults;
 pub(crate) mod names;
 pub(crate) mod node;
 pub(crate) mod table;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use std::collections::BTreeMap;
 

@@ -2,6 +2,9 @@
 //!
 //! The file of the memory is JSON, by the names of the axes. A drive that has no entry there has stored nothing.
 
+#[cfg(test)]
+mod tests;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::{fs, io};

@@ -1,10 +1,18 @@
 //! The emulated robot: six drives, the mechanism that they move, and the wires they are on.
 //!
 //! [`Emulation`] co-simulates drives and mechanism, without wires. Simulated wires step it with a master
-//! (the plant's default link) or without one ([`OpenLink`]); [`Emulator`] steps it on real interfaces.
+//! (the plant's default link) or without one ([`OpenLink`]); [`Emulator`] steps it on real interfaces. What a scenario
+//! declares becomes plain values here, and the entries of its agenda that are active become what acts.
 
+mod agenda;
 pub(crate) mod drives;
 mod emulator;
+mod encoder;
+pub(crate) mod jaw;
+mod load_cell;
+#[cfg(test)]
+mod overlap_tests;
+mod push;
 #[cfg(test)]
 mod tests;
 pub(crate) mod virtual_link;
@@ -15,26 +23,22 @@ use masseter_can::canopen::Cob;
 use masseter_can::{CanId, ErrorState, Frame};
 use masseter_model::geometry::{AXES, Mechanism};
 use masseter_runtime::messages::{Contact, Truth, pose_fields};
-use masseter_scenario::{LoadCellConfig, Scenario};
+use masseter_scenario::{self as scenario, AxisFault, FaultKindConfig, Scenario};
 use nalgebra::Translation3;
-use rand::{RngExt, SeedableRng};
-use rand_distr::StandardNormal;
-use rand_pcg::Pcg64Mcg;
 
 use crate::error::{DynamicsError, PlantError};
 use crate::master::link::Mishap;
 use crate::simulator::drive::DriveSettings;
 use crate::simulator::drive::axis::drivetrain::HeldMean;
-use crate::simulator::drive::axis::encoder::Encoder;
-use crate::simulator::drive::axis::motion::Shaft;
+use crate::simulator::drive::faults::DriveFault;
 use crate::simulator::drive::node::DriveNode;
-use crate::simulator::injection::agenda::{Agenda, Change, Effect, PartFault};
-use crate::simulator::injection::encoder_faults::EncoderFaults;
-use crate::simulator::mechanism::contact::Occlusion;
 use crate::simulator::mechanism::contact::food::{Food, FoodBreak};
 use crate::simulator::mechanism::dynamics::{Dynamics, MechanismState, closed_mouth, level};
 use crate::state::state;
+use agenda::{Agenda, Effect};
 use drives::{MemoryFile, drive_settings};
+use encoder::Encoder;
+use load_cell::LoadCell;
 
 pub use emulator::{Emulator, EmulatorCounters};
 pub use virtual_link::{NodePort, OpenLink, VirtualLink};
@@ -76,9 +80,11 @@ pub struct Emulation {
     /// Whether each drive has received the SYNC of the sample.
     synchronised: [bool; AXES],
     agenda: Agenda,
-    encoder_faults: [EncoderFaults; AXES],
+    encoders: [Encoder; AXES],
     /// The scenario's own food.
     food: Option<Food>,
+    /// The beginning of the stimulus whose food is served in place of the scenario's own.
+    served: Option<u64>,
     /// One of each axis, and one of the food, with its time, ns.
     mishaps: [Option<(u64, Mishap)>; AXES + 1],
     /// The forces between the jaws in the cycle before the sample; none where the jaws cannot touch.
@@ -88,7 +94,7 @@ pub struct Emulation {
 }
 
 state!(Emulation {
-    values: next_step_ns moved_to_ns force_n bite_force_n sample synchronised encoder_faults mishaps
+    values: next_step_ns moved_to_ns force_n bite_force_n sample synchronised encoders served mishaps
         contact;
     parts: drives dynamics load_cell agenda memory;
     constant: step_ns food;
@@ -121,8 +127,9 @@ impl Emulation {
             }
         }
         let mechanism = Mechanism::new(&scenario.mechanism)?;
-        let food = scenario.food.as_ref().map(|config| Food::new(config, &scenario.arch()));
-        let occlusion = Occlusion::new(scenario, &closed_mouth(&mechanism, &scenario.jaw));
+        let food = scenario.food.as_ref().map(|config| jaw::food(config, scenario));
+        let closed = closed_mouth(&mechanism, scenario.jaw.closed_leg_m, scenario.jaw.closed_offset_m);
+        let occlusion = jaw::occlusion(scenario, &closed);
         let start = Translation3::from(scenario.dynamics.initial_offset_m)
             * level(&mechanism, scenario.dynamics.initial_leg_m);
         let agenda = Agenda::new(scenario, now_ns)?;
@@ -130,10 +137,7 @@ impl Emulation {
         let dynamics = Dynamics::new(mechanism, &scenario.dynamics, start, occlusion, incisal_m)?;
         let positions_m = dynamics.state.positions_m();
         let drive = |(axis, settings): (usize, &DriveSettings)| {
-            let config = &settings.drive;
-            let encoder =
-                Encoder::new(config.encoder_resolution_m, config.encoder_noise_m, scenario.seed, axis);
-            let drive = DriveNode::new(settings, encoder, now_ns, positions_m[axis]);
+            let drive = DriveNode::new(settings, now_ns, positions_m[axis]);
             drive.map_err(|reason| match &memory {
                 Some(memory) => memory.refuse(axis, &reason),
                 None => PlantError::Scenario(reason),
@@ -160,8 +164,9 @@ impl Emulation {
             load_cell: scenario.load_cell.map(|config| LoadCell::new(config, scenario.seed)),
             synchronised: [true; AXES],
             agenda,
-            encoder_faults: EncoderFaults::of_axes(scenario),
+            encoders: Encoder::of_axes(scenario),
             food,
+            served: None,
             mishaps: [None; AXES + 1],
             contact: scenario.has_contact().then(Contact::default),
             memory,
@@ -224,8 +229,8 @@ impl Emulation {
         self.move_mechanism(now_ns)?;
         self.follow_agenda(now_ns);
         self.synchronise(axis, now_ns);
-        let seen_m = self.encoder_faults[axis].seen_m(now_ns, self.dynamics.drive_positions_m()[axis]);
-        self.drives[axis].take_sync(now_ns, frame, seen_m);
+        let (position_m, encoder) = (self.dynamics.drive_positions_m()[axis], &mut self.encoders[axis]);
+        self.drives[axis].take_sync(now_ns, frame, position_m, |at_m| encoder.look(now_ns, at_m));
         Ok(())
     }
 
@@ -240,9 +245,9 @@ impl Emulation {
         self.move_mechanism(now_ns)?;
         self.follow_agenda(now_ns);
         let positions_m = self.dynamics.drive_positions_m();
-        for (axis, is_m) in positions_m.into_iter().enumerate() {
-            let seen_m = self.encoder_faults[axis].seen_m(now_ns, is_m);
-            let force_n = self.drives[axis].step(now_ns, Shaft { seen_m, is_m });
+        for (axis, position_m) in positions_m.into_iter().enumerate() {
+            let encoder = &mut self.encoders[axis];
+            let force_n = self.drives[axis].step(now_ns, position_m, |at_m| encoder.look(now_ns, at_m));
             self.force_n[axis].hold(force_n, now_ns);
         }
         if self.agenda.is_empty() {
@@ -284,63 +289,55 @@ impl Emulation {
     /// Begins and ends what the scenario does to drives and mechanism by now.
     #[inline]
     fn follow_agenda(&mut self, now_ns: u64) {
-        while let Some(change) = self.agenda.next_change(now_ns) {
-            self.carry_out(change);
+        while let Some(place) = self.agenda.next_change(now_ns, || self.dynamics.state.positions_m()) {
+            self.follow_entry(place);
         }
     }
 
-    fn carry_out(&mut self, Change { place, is_begin }: Change) {
+    /// The entry at that place has begun or ended: from now on what acts follows from those that are active.
+    fn follow_entry(&mut self, place: usize) {
         match *self.agenda.effect(place) {
-            Effect::Fault { kind, size, axis } if is_begin => {
-                axes_of(axis).for_each(|axis| self.begin_fault(axis, kind, size));
-            }
-            Effect::Fault { kind, axis, .. } => {
-                if !self.agenda.has_another(kind, axis) {
-                    axes_of(axis).for_each(|axis| self.end_fault(axis, kind));
+            Effect::Fault { kind, axis, .. } => axes_of(axis).for_each(|axis| match kind {
+                FaultKindConfig::Encoder(_) => {
+                    self.encoders[axis].set(self.agenda.number(place), self.agenda.begun(place));
                 }
-            }
-            Effect::FaultyPayload { .. } | Effect::Payload { .. } => {
-                let payloads_kg = self.agenda.active().filter_map(|effect| match effect {
-                    Effect::FaultyPayload { kg } | Effect::Payload { kg } => Some(*kg),
-                    _ => None,
-                });
-                self.dynamics.load.payload_kg = payloads_kg.sum();
-            }
+                FaultKindConfig::Drive(of_drive) => {
+                    self.drives[axis].axis.faults.set(of_drive.into(), self.agenda.size(kind, axis));
+                }
+                FaultKindConfig::Axis(_) => self.dynamics.set_faults(axis, self.agenda.axis_faults(axis)),
+                _ => {}
+            }),
+            Effect::Payload { .. } => self.dynamics.load.payload_kg = self.agenda.payload_kg(),
             Effect::Food(_) => {
-                let served = self.agenda.active().filter_map(|effect| match effect {
-                    Effect::Food(food) => Some((**food).clone()),
-                    _ => None,
-                });
-                self.dynamics.occlusion.set_food(served.last().or_else(|| self.food.clone()));
+                let food = self.agenda.food();
+                let served = food.map(|(begun, _)| begun);
+                if std::mem::replace(&mut self.served, served) != served {
+                    let food = food.map(|(_, food)| food.clone());
+                    self.dynamics.occlusion.set_food(food.or_else(|| self.food.clone()));
+                }
             }
             // Its force is asked for at every step.
             Effect::Push(_) => {}
         }
     }
 
-    fn begin_fault(&mut self, axis: usize, kind: PartFault, size: f64) {
-        match kind {
-            PartFault::Encoder(kind) => self.encoder_faults[axis].begin(kind, size),
-            PartFault::Drive(kind) => self.drives[axis].axis.faults.begin(kind, size),
-            PartFault::Axis(kind) => self.dynamics.begin_fault(axis, kind, size),
-        }
-    }
-
-    fn end_fault(&mut self, axis: usize, kind: PartFault) {
-        match kind {
-            PartFault::Encoder(kind) => self.encoder_faults[axis].end(kind),
-            PartFault::Drive(kind) => self.drives[axis].axis.faults.end(kind),
-            PartFault::Axis(kind) => self.dynamics.end_fault(axis, kind),
-        }
-    }
-
-    /// Whether the fault at that place of the agenda has changed something.
+    /// Whether the fault at that place of the agenda has changed something itself.
     fn has_struck(&self, place: usize) -> bool {
-        let Effect::Fault { kind, axis, .. } = *self.agenda.effect(place) else { return false };
+        let Effect::Fault { kind, size, axis } = *self.agenda.effect(place) else { return false };
         axes_of(axis).any(|axis| match kind {
-            PartFault::Encoder(kind) => self.encoder_faults[axis].has_struck(kind),
-            PartFault::Drive(kind) => self.drives[axis].axis.faults.has_struck(kind),
-            PartFault::Axis(kind) => self.dynamics.axes.each[axis].acting.has_struck(kind),
+            FaultKindConfig::Encoder(_) => self.encoders[axis].has_struck(self.agenda.number(place)),
+            FaultKindConfig::Drive(of_drive) => {
+                self.drives[axis].axis.faults.has_struck(of_drive.into()) && self.agenda.acts(place, axis)
+            }
+            FaultKindConfig::Axis(AxisFault::EndStop) => {
+                let (touched, own) =
+                    (self.dynamics.axes.each[axis].touched, self.agenda.nearest_stops(place, axis));
+                touched.iter().zip(own).any(|(touched, is_own)| *touched && is_own)
+            }
+            FaultKindConfig::Axis(AxisFault::Friction) => {
+                size.to_bits() != 1.0_f64.to_bits() && self.agenda.acts(place, axis)
+            }
+            _ => self.agenda.acts(place, axis),
         })
     }
 
@@ -390,85 +387,26 @@ impl Emulation {
     }
 }
 
+impl From<scenario::DriveFault> for DriveFault {
+    fn from(kind: scenario::DriveFault) -> Self {
+        use scenario::DriveFault as Of;
+        match kind {
+            Of::Fault => Self::Fault,
+            Of::IgnoresTargets => Self::IgnoresTargets,
+            Of::TorqueLoss => Self::TorqueLoss,
+            Of::Runaway => Self::Runaway,
+            Of::Sto => Self::Sto,
+            Of::SlowEnable => Self::SlowEnable,
+            Of::BrakeOpen => Self::BrakeOpen,
+            Of::BrakeClosed => Self::BrakeClosed,
+            Of::Reboot => Self::Reboot,
+            Of::Scale => Self::Scale,
+            Of::EmcyStorm => Self::EmcyStorm,
+        }
+    }
+}
+
 /// The axis, or all of them.
 fn axes_of(axis: Option<usize>) -> Range<usize> {
     axis.map_or(0..AXES, |axis| axis..axis + 1)
-}
-
-/// Parts the cell's random numbers from those of the encoders, which have odd multiples of another number.
-const STREAM: u64 = 0x4C6F_6164_4365_6C6C;
-
-/// The load cell.
-#[derive(Debug, Clone)]
-struct LoadCell {
-    config: LoadCellConfig,
-    /// The force behind the low-pass, N.
-    passed_n: f64,
-    random: Pcg64Mcg,
-}
-
-state!(LoadCell {
-    values: passed_n random;
-    constant: config;
-});
-
-impl LoadCell {
-    /// Without load so far.
-    fn new(config: LoadCellConfig, seed: u64) -> Self {
-        Self { config, passed_n: 0.0, random: Pcg64Mcg::seed_from_u64(seed ^ STREAM) }
-    }
-
-    /// The bite force was this large (N) for that time (s).
-    fn follow(&mut self, force_n: f64, time_s: f64) {
-        let left = (-time_s / self.config.time_s()).exp();
-        self.passed_n = force_n + (self.passed_n - force_n) * left;
-    }
-
-    /// A sample, N.
-    fn read(&mut self) -> f64 {
-        let LoadCellConfig { noise_n, offset_n, range_n, .. } = self.config;
-        let noise: f64 = self.random.sample(StandardNormal);
-        (self.passed_n + offset_n + noise_n * noise).clamp(-range_n, range_n)
-    }
-}
-
-#[cfg(test)]
-mod load_cell_tests {
-    use super::*;
-
-    const QUIET: LoadCellConfig =
-        LoadCellConfig { bandwidth_hz: 100.0, noise_n: 0.0, offset_n: 0.0, range_n: 1000.0 };
-
-    #[test]
-    fn a_step_is_shown_behind_a_low_pass_however_finely_the_time_is_cut() {
-        let time_s = QUIET.time_s();
-        for steps in [1, 10, 1000] {
-            let mut cell = LoadCell::new(QUIET, 1);
-            (0..steps).for_each(|_| cell.follow(50.0, time_s / f64::from(steps)));
-            assert!((cell.read() - 50.0 * (1.0 - (-1.0_f64).exp())).abs() < 1e-9, "{steps}");
-        }
-    }
-
-    #[test]
-    fn the_cell_shows_its_offset_and_no_more_than_its_range() {
-        let config = LoadCellConfig { offset_n: 2.0, range_n: 40.0, ..QUIET };
-        for (force_n, shown_n) in [(0.0, 2.0), (30.0, 32.0), (39.0, 40.0), (-100.0, -40.0)] {
-            let mut cell = LoadCell::new(config, 1);
-            cell.follow(force_n, 1.0);
-            assert!((cell.read() - shown_n).abs() < 1e-9, "{force_n}");
-        }
-    }
-
-    #[test]
-    fn noise_has_the_declared_spread_and_comes_from_the_seed() {
-        let samples_n = |seed| {
-            let mut cell = LoadCell::new(LoadCellConfig { noise_n: 0.5, ..QUIET }, seed);
-            std::iter::repeat_with(|| cell.read()).take(20_000).collect::<Vec<f64>>()
-        };
-        let found_n = samples_n(3);
-        let rms_n = (found_n.iter().map(|n| n * n).sum::<f64>() / found_n.len() as f64).sqrt();
-        assert!((rms_n - 0.5).abs() < 0.015, "{rms_n}");
-        assert_eq!(found_n, samples_n(3));
-        assert_ne!(found_n, samples_n(4));
-    }
 }

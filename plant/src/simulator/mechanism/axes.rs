@@ -3,12 +3,11 @@
 //! Each part states its force in a step as an [`Element`]; their sums enter the equations of motion. The masses of the
 //! axes are not part of this module, but for the drives' sides of loose joints.
 
+use masseter_model::dynamics::AxesConfig;
 use masseter_model::geometry::{AXES, LEGS, Mechanism};
-use masseter_scenario::{AxesConfig, AxisFault};
 use nalgebra::Vector6;
 
 use super::friction::{Braking, CONTACT, Element, Spring};
-use crate::simulator::acting::Acting;
 
 /// The axes d₁ d₂ d₃ l₁ l₂ l₃.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
@@ -16,17 +15,35 @@ pub(crate) struct Axes {
     pub(crate) each: [Axis; AXES],
 }
 
+/// What faults make of an axis.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(crate) struct AxisFaults {
+    /// Whether its guide has seized.
+    pub(crate) is_jammed: bool,
+    /// The factor on its friction.
+    pub(crate) friction: f64,
+    /// The play of its joint in place of what it is built with, m; infinite where the rod is broken.
+    pub(crate) play_m: Option<f64>,
+    /// Between the hard stops in its way, m.
+    pub(crate) free_m: [f64; 2],
+}
+
+impl AxisFaults {
+    /// An axis without faults.
+    pub(crate) const NONE: Self =
+        Self { is_jammed: false, friction: 1.0, play_m: None, free_m: [f64::NEG_INFINITY, f64::INFINITY] };
+}
+
 /// One axis.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Axis {
-    /// The faults that act on it, and which of them have struck.
-    pub(crate) acting: Acting<AxisFault>,
+    pub(crate) faults: AxisFaults,
+    /// Which hard stops of faults it touched since their last change: the lower one, the upper one.
+    pub(crate) touched: [bool; 2],
     mass_kg: f64,
     play_m: f64,
     /// Behind the ends of the stroke.
     ends: Stops,
-    /// A fault's.
-    stops: Option<Stops>,
     seizure: Option<Seizure>,
     coupling: Coupling,
     is_at_end: bool,
@@ -67,11 +84,11 @@ impl Axes {
             let [low_m, high_m] = mechanism.strokes().of_axis(axis);
             let ends_m = [low_m - config.stop_beyond_m, high_m + config.stop_beyond_m];
             Axis {
-                acting: Acting::new(),
+                faults: AxisFaults::NONE,
+                touched: [false; 2],
                 mass_kg: masses_kg[axis],
                 play_m: if axis < LEGS { config.slide_play_m } else { config.leg_play_m },
                 ends: Stops::between(ends_m, steel),
-                stops: None,
                 seizure: None,
                 coupling: Coupling::Rigid { beyond_m: 0.0 },
                 is_at_end: false,
@@ -112,9 +129,9 @@ impl Axes {
         let coulomb_n = braking.coulomb_n();
         for (number, axis) in self.each.iter_mut().enumerate() {
             let motion = AxisMotion { position_m: positions_m[number], speed_m_s: speeds_m_s[number] };
-            let factor = axis.acting.size(AxisFault::Friction).unwrap_or(1.0);
             let mut element = axis.act(drives_n[number], motion, step_s);
-            element += braking.on_axis(number, coulomb_n[number], motion.speed_m_s, factor, step_s);
+            element +=
+                braking.on_axis(number, coulomb_n[number], motion.speed_m_s, axis.faults.friction, step_s);
             forces.force_n[number] = element.force_n;
             forces.parted_kg[number] = axis.coupling.parted_kg();
             forces.resisting_kg[number] = element.damping_n_s_per_m * step_s;
@@ -136,46 +153,19 @@ impl Axes {
 }
 
 impl Axis {
-    /// A fault begins.
-    pub(super) fn begin_fault(&mut self, kind: AxisFault, size: f64, motion: AxisMotion) {
+    /// From now on faults make this of it.
+    pub(super) fn set_faults(&mut self, faults: AxisFaults, motion: AxisMotion) {
         let AxisMotion { position_m, speed_m_s } = motion;
-        self.acting.begin(kind, size);
-        let strikes = match kind {
-            AxisFault::Jam => {
-                self.seizure = Some(Seizure::at(position_m));
-                true
-            }
-            AxisFault::EndStop => {
-                self.stops = Some(Stops::steel([position_m - size, position_m + size]));
-                false
-            }
-            AxisFault::Play => {
-                self.coupling.loosen(size, self.mass_kg, position_m, speed_m_s);
-                size > 0.0
-            }
-            AxisFault::BrokenRod => {
-                self.coupling.loosen(f64::INFINITY, self.mass_kg, position_m, speed_m_s);
-                true
-            }
-            // It has no memory of its fault.
-            AxisFault::Friction => size.to_bits() != 1.0_f64.to_bits(),
-        };
-        if strikes {
-            self.acting.strike(kind);
-        }
-    }
-
-    /// A fault ends.
-    pub(super) fn end_fault(&mut self, kind: AxisFault, motion: AxisMotion) {
-        self.acting.end(kind);
-        match kind {
-            AxisFault::Jam => self.seizure = None,
-            AxisFault::EndStop => self.stops = None,
-            AxisFault::Play | AxisFault::BrokenRod => {
-                self.coupling.tighten(motion.position_m);
+        let before = std::mem::replace(&mut self.faults, faults);
+        self.touched = [false; 2];
+        self.seizure = faults.is_jammed.then(|| self.seizure.unwrap_or(Seizure::at(position_m)));
+        match faults.play_m {
+            _ if faults.play_m == before.play_m => {}
+            Some(play_m) => self.coupling.loosen(play_m, self.mass_kg, position_m, speed_m_s),
+            None => {
+                self.coupling.tighten(position_m);
                 self.loosen_as_built(motion);
             }
-            AxisFault::Friction => {}
         }
     }
 
@@ -197,8 +187,8 @@ impl Axis {
         if let Some(seizure) = &mut self.seizure {
             element += seizure.hold(position_m, speed_m_s, step_s);
         }
-        if let Some(contact) = self.stops.and_then(|stops| stops.touch(position_m, speed_m_s, step_s)) {
-            self.acting.strike(AxisFault::EndStop);
+        if let Some(contact) = Stops::steel(self.faults.free_m).touch(position_m, speed_m_s, step_s) {
+            self.touched[usize::from(contact.force_n < 0.0)] = true;
             element += contact;
         }
         let contact = self.ends.touch(position_m, speed_m_s, step_s);
@@ -230,6 +220,8 @@ pub(super) enum Coupling {
 pub(super) struct DriveSide {
     /// Half of the play, m; infinite where nothing connects the sides.
     half_m: f64,
+    /// Where the middle of the play is beyond the joint, m.
+    beyond_m: f64,
     mass_kg: f64,
     position_m: f64,
     speed_m_s: f64,
@@ -257,15 +249,25 @@ impl Coupling {
     /// Gets loose, with that play.
     pub(super) fn loosen(&mut self, play_m: f64, axis_mass_kg: f64, joint_m: f64, joint_m_s: f64) {
         let half_m = play_m / 2.0;
-        let (position_m, speed_m_s) = match self {
+        let (position_m, speed_m_s, beyond_m) = match *self {
             // The play is even to both sides of where the joint is.
-            Self::Rigid { .. } => (joint_m, joint_m_s),
-            Self::Loose(side) => (side.position_m, side.speed_m_s),
+            Self::Rigid { beyond_m } => (joint_m + beyond_m, joint_m_s, beyond_m),
+            Self::Loose(DriveSide { position_m, speed_m_s, beyond_m, .. }) => {
+                // A drive's side outside of the new play does not jump into it.
+                let ahead_m = position_m - joint_m - beyond_m;
+                (position_m, speed_m_s, beyond_m + (ahead_m - ahead_m.clamp(-half_m, half_m)))
+            }
         };
-        let mass_kg = DRIVE_SHARE * axis_mass_kg;
-        let step = Step::default();
-        *self =
-            Self::Loose(DriveSide { half_m, mass_kg, position_m, speed_m_s, acceleration_m_s2: 0.0, step });
+        let (mass_kg, acceleration_m_s2, step) = (DRIVE_SHARE * axis_mass_kg, 0.0, Step::default());
+        *self = Self::Loose(DriveSide {
+            half_m,
+            beyond_m,
+            mass_kg,
+            position_m,
+            speed_m_s,
+            acceleration_m_s2,
+            step,
+        });
     }
 
     /// Gets rigid where it is.
@@ -312,7 +314,7 @@ impl DriveSide {
     /// by how much the gap is closed.
     fn push(&mut self, drive_n: f64, joint_m: f64, joint_m_s: f64, step_s: f64) -> Element {
         let middle_m = self.position_m + 0.5 * step_s * self.speed_m_s;
-        let (closed_m, damping) = self.contact(middle_m - joint_m, joint_m_s, step_s);
+        let (closed_m, damping) = self.contact(middle_m - joint_m - self.beyond_m, joint_m_s, step_s);
         let spring_n = CONTACT.stiffness_n_per_m * closed_m;
         let moved = self.mass_kg + step_s * (damping + DRIVE_DAMPING_N_S_PER_M);
         let free_m_s = (self.mass_kg * self.speed_m_s + step_s * (drive_n - spring_n)) / moved;

@@ -18,14 +18,13 @@ mod tests;
 
 use std::ops::AddAssign;
 
-use masseter_model::dynamics::{Bodies, Equations, Motion, Reactions};
+use masseter_model::dynamics::{Bodies, DynamicsConfig, Equations, Motion, Reactions};
 use masseter_model::geometry::{
     AXES, Actuators, Jacobian, LEGS, Mechanism, Pose, Twist, Vec3, frame_of_corners,
 };
-use masseter_scenario::{AxisFault, DynamicsConfig, JawConfig};
 use nalgebra::{Matrix3, Matrix6, Quaternion, Translation3, UnitQuaternion, Vector6};
 
-use super::axes::{Axes, AxesForces, AxisMotion};
+use super::axes::{Axes, AxesForces, AxisFaults, AxisMotion};
 use super::contact::Occlusion;
 use super::friction::Braking;
 use crate::error::DynamicsError;
@@ -99,21 +98,11 @@ impl Dynamics {
         })
     }
 
-    /// A fault of an axis begins.
-    pub(crate) fn begin_fault(&mut self, axis: usize, kind: AxisFault, size: f64) {
-        let motion = self.axis_motion(axis);
-        self.axes.each[axis].begin_fault(kind, size, motion);
-    }
-
-    /// A fault of an axis ends.
-    pub(crate) fn end_fault(&mut self, axis: usize, kind: AxisFault) {
-        let motion = self.axis_motion(axis);
-        self.axes.each[axis].end_fault(kind, motion);
-    }
-
-    fn axis_motion(&self, axis: usize) -> AxisMotion {
+    /// From now on faults make this of an axis.
+    pub(crate) fn set_faults(&mut self, axis: usize, faults: AxisFaults) {
         let speed_m_s = self.velocities_m_s(&self.state)[axis];
-        AxisMotion { position_m: self.state.positions_m()[axis], speed_m_s }
+        let motion = AxisMotion { position_m: self.state.positions_m()[axis], speed_m_s };
+        self.axes.each[axis].set_faults(faults, motion);
     }
 
     /// Adds a force (N) and a torque (N m) for the coming step, in base axes. The force acts at a point of the platform (m;
@@ -282,10 +271,10 @@ impl Load {
     }
 }
 
-/// The platform with the mouth closed. The pose is taken as level, which is an approximation for a mechanism of unequal
+/// The platform with the mouth closed: on legs of that mean length, and shifted. The pose is taken as level, which is an approximation for a mechanism of unequal
 /// sides: the exact pose would take the forward kinematics.
-pub(crate) fn closed_mouth(mechanism: &Mechanism, jaw: &JawConfig) -> Pose {
-    Translation3::from(jaw.closed_offset_m) * level(mechanism, jaw.closed_leg_m)
+pub(crate) fn closed_mouth(mechanism: &Mechanism, leg_m: f64, offset_m: [f64; 3]) -> Pose {
+    Translation3::from(offset_m) * level(mechanism, leg_m)
 }
 
 /// The platform level on three legs of that mean length, turned as the hinges are and above their middle.

@@ -9,9 +9,10 @@
 
 use std::ops::AddAssign;
 
-use masseter_model::dynamics::{Bodies, Friction, Loads, Motion};
+use masseter_model::dynamics::{
+    Bodies, DynamicsConfig, Friction, FrictionConfig, FrictionModel, Loads, Motion,
+};
 use masseter_model::geometry::AXES;
-use masseter_scenario::{DynamicsConfig, FrictionConfig, FrictionModel};
 use nalgebra::{Matrix6, Vector6};
 
 use crate::state::state;

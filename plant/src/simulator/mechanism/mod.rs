@@ -1,7 +1,8 @@
 //! The mechanism that the drives move: its dynamics, friction, teeth and food, and the pose in which it
 //! starts.
 //!
-//! This module never solves the forward kinematics. Drives, buses and the times of faults are not part of it.
+//! This module never solves the forward kinematics. Drives, buses, scenarios and the times of faults are not part of it: its
+//! values come as plain structs, or as those of the shared equations.
 
 pub(crate) mod axes;
 pub(crate) mod contact;

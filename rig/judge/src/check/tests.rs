@@ -118,32 +118,47 @@ mod motion_checks {
         for (declared, expected) in cases {
             let found: Vec<_> =
                 (1..=declared).map(|number| figures(number, (number == 1).then_some(5), 0.0)).collect();
-            let check = faults(&vec![fault(); declared], &found, &ChecksConfig::default());
+            let check = faults(&vec![fault(); declared], &found, &ChecksConfig::default(), None);
             assert_eq!(check.map(|check| (check.result.mark(), check.finding)), expected);
         }
         let found = [figures(1, None, 0.0), figures(2, Some(5), 0.6)];
-        let check = faults(&[fault(), fault()], &found, &ChecksConfig::default()).unwrap();
+        let check = faults(&[fault(), fault()], &found, &ChecksConfig::default(), None).unwrap();
         assert_eq!(check.result.mark(), "FAIL", "one fault led the jaw too far: {check:?}");
+    }
+
+    #[test]
+    fn a_fault_that_strikes_after_the_stop_tested_nothing_unless_it_waits_for_it() {
+        let stopped = |struck_ns, after: Option<&str>| {
+            let fault = FaultConfig { after: after.map(str::to_owned), ..fault() };
+            let check =
+                faults(&[fault], &[figures(1, Some(struck_ns), 0.0)], &ChecksConfig::default(), Some(5));
+            check.map(|check| (check.result.mark(), check.finding)).unwrap()
+        };
+        assert_eq!(stopped(5, None).0, "ok", "it began the stop");
+        let late = "0 of 1 declared faults acted, number 1 only after the rig had stopped";
+        assert_eq!(stopped(6, None), ("UNTESTED", late.to_owned()));
+        assert_eq!(stopped(6, Some("stimulus.knock")).0, "UNTESTED");
+        assert_eq!(stopped(6, Some("controller.safe_stop")).0, "ok");
     }
 
     #[test]
     fn a_fault_that_leads_the_jaw_beyond_the_limit_fails_the_run_with_its_name() {
         for (deviation_mm, mark) in [(0.5, "ok"), (0.51, "FAIL")] {
             let found = [figures(1, Some(5), deviation_mm)];
-            let check = faults(&[fault()], &found, &ChecksConfig::default()).unwrap();
+            let check = faults(&[fault()], &found, &ChecksConfig::default(), None).unwrap();
             assert_eq!(check.result.mark(), mark, "{check:?}");
             let named = "number 1, lose (bus 1, node 4, id 204h), led 0.510 mm and 0.100° from the path undetected, \
                          limit 0.5 mm and 0.5°";
             assert_eq!(check.finding.contains(named), mark == "FAIL", "{check:?}");
         }
         let turned = FaultFigures { deviation_deg: 0.5, ..figures(1, Some(5), 0.1) };
-        let check = faults(&[fault()], &[turned], &ChecksConfig::default()).unwrap();
+        let check = faults(&[fault()], &[turned], &ChecksConfig::default(), None).unwrap();
         assert_eq!(check.result.mark(), "ok", "{check:?}");
         for deviation_deg in [0.51, f64::INFINITY, f64::NAN] {
             let turned = FaultFigures { deviation_deg, ..figures(1, Some(5), 0.1) };
             let shifted = FaultFigures { deviation_mm: deviation_deg, ..figures(1, Some(5), 0.1) };
             for found in [turned, shifted] {
-                let check = faults(&[fault()], &[found], &ChecksConfig::default()).unwrap();
+                let check = faults(&[fault()], &[found], &ChecksConfig::default(), None).unwrap();
                 assert_eq!(check.result.mark(), "FAIL", "{check:?}");
             }
         }

@@ -72,6 +72,7 @@ mod shortfall {
         lag_ms: Some(0.0),
         missed_commands: 0,
         missed_in_a_row: 0,
+        late_commands: 0,
     };
 
     /// A finished run that played its motion, with this change.
@@ -94,6 +95,7 @@ mod shortfall {
     fn require(figures: &mut Figures, result: CheckResult, is_expected_event: bool) {
         figures.requirements.push(RequirementFigures {
             name: "opens".to_owned(),
+            id: None,
             must: String::new(),
             result,
             finding: String::new(),

@@ -33,6 +33,21 @@ mod played {
         assert!((half.played.unwrap() - 0.5).abs() < 1e-9, "the rest was not played: {half:?}");
     }
 
+    /// After lost cycles the motion stands for a while, and the jaw goes on to its last target.
+    #[test]
+    fn a_jaw_that_catches_up_while_the_motion_waits_has_played_all() {
+        let mut watch = PlayedWatch::new(&JawConfig::default());
+        let pose = |mm: f64| Some(Pose::translation(mm * 1e-3, 0.0, 0.0));
+        for (wanted_mm, is_mm) in (0..200).flat_map(|at| {
+            let wanted_mm = f64::from(at) * 0.1;
+            [(wanted_mm, wanted_mm - 0.05), (wanted_mm, wanted_mm)]
+        }) {
+            watch.add_sample(0.0, pose(wanted_mm), pose(is_mm));
+        }
+        let share = watch.into_figures(Some(0.0)).played.unwrap();
+        assert!((share - 1.0).abs() < 0.01, "{share}");
+    }
+
     #[test]
     fn a_motion_that_is_not_the_scenarios_or_moves_nothing_has_no_share() {
         let own = PlayedWatch::new(&JawConfig::default()).into_figures(None);
@@ -57,6 +72,22 @@ mod played {
         let found = watch.into_figures(None);
         assert_eq!((found.missed_commands, found.missed_in_a_row), (3, 2));
         assert!((found.lag_ms.unwrap() - 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_command_that_is_used_after_its_cycle_is_late() {
+        let late = |cycles_and_answers: &[(u64, u64)]| {
+            let mut watch = PlayedWatch::new(&JawConfig::default());
+            for &(cycle, answers_cycle) in cycles_and_answers {
+                watch.count_command(&Reading { cycle, answers_cycle, ..Reading::default() }, true);
+            }
+            let found = watch.into_figures(None);
+            (found.late_commands, found.missed_commands)
+        };
+        assert_eq!(late(&[(1, 0), (2, 1), (3, 2), (4, 3)]), (0, 1), "the first cycle has no command");
+        assert_eq!(late(&[(5, 3), (6, 4), (7, 5), (8, 6)]), (3, 0), "each a cycle late");
+        assert_eq!(late(&[(5, 4), (6, 4), (7, 5), (8, 7)]), (1, 1), "one that came late");
+        assert_eq!(late(&[(5, 4), (9, 5), (10, 9)]), (0, 0), "the plant skipped cycles");
     }
 }
 
@@ -136,6 +167,29 @@ mod stop {
                     controller_state,
                     ..State::default()
                 });
+            }
+            assert_eq!(watch.into_figures().0, expected);
+        }
+    }
+
+    /// Drives that still have power when the controller says that it has finished may be stopped.
+    #[test]
+    fn what_comes_after_the_end_of_a_finished_controller_is_no_stop() {
+        let enabled = reading(DriveState::OperationEnabled, 0);
+        let off = reading(DriveState::SwitchOnDisabled, 0);
+        let quick = reading(DriveState::QuickStopActive, 0);
+        let fault = reading(DriveState::SwitchOnDisabled, 1);
+        let cases = [
+            ([enabled, off, fault], ControllerState::Finished, None),
+            ([enabled, off, fault], ControllerState::SafeStop, Some(StoppedBy::Master)),
+            ([enabled, fault, fault], ControllerState::Finished, Some(StoppedBy::Master)),
+            ([enabled, enabled, quick], ControllerState::Finished, Some(StoppedBy::QuickStop)),
+        ];
+        for (readings, state, expected) in cases {
+            let mut watch = StopWatch::default();
+            watch.apply_state(&State { controller_state: state.code(), ..State::default() });
+            for (cycle, reading) in (1..).zip(&readings) {
+                watch.apply_reading(&Reading { cycle, ..*reading });
             }
             assert_eq!(watch.into_figures().0, expected);
         }

@@ -6,7 +6,7 @@ use masseter_scenario::{Dimension, Quantity, QuantityError, Scenario, Unit};
 
 use super::finding::{Finding, Reason};
 use crate::events::EventRecord;
-use crate::signals::Values;
+use crate::signals::{UnknownSignal, Values};
 
 /// What a requirement is read from: the scenario, and the signals, of which it chooses some.
 pub(super) struct Lookup<'a> {
@@ -83,7 +83,12 @@ impl Condition {
         let example = "write such as \"bite.force > 5 N\" or \"controller.state == running\"";
         let no_condition = || format!("'{}' is no condition: {example}", excerpt(text));
         let (name, comparison, limit) = compared.ok_or_else(no_condition)?;
-        let signal = values.choose(name)?;
+        let signal = values.choose(name);
+        // A controller's own signal is a number: a limit that is none is wrong, whatever the controller declares.
+        if signal.as_ref().is_err_and(UnknownSignal::is_of_controller) {
+            limit.parse::<Quantity>().map_err(|error| error.to_string())?;
+        }
+        let signal = signal?;
         let named = values.signal(signal);
         let (unit, states) = (named.shown(), named.states());
         let limit = match &states {

@@ -102,6 +102,9 @@ impl Missing {
 pub struct RequirementFigures {
     /// Its name.
     pub name: String,
+    /// The requirement of the user's own list that it shows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub id: Option<String>,
     /// What must hold, in words.
     pub must: String,
     /// Whether it does.

@@ -135,6 +135,7 @@ fn expected_event(name: &String) -> RequirementConfig {
 #[derive(Debug, Clone)]
 struct Requirement {
     name: String,
+    id: Option<String>,
     is_expected_event: bool,
     kind: Kind,
 }
@@ -162,7 +163,7 @@ enum Form {
 
 impl Requirement {
     fn of_kind(config: &RequirementConfig, kind: Kind) -> Self {
-        Self { name: config.name.clone(), is_expected_event: false, kind }
+        Self { name: config.name.clone(), id: config.id.clone(), is_expected_event: false, kind }
     }
 
     /// Reads a requirement, and chooses its signals.
@@ -216,6 +217,7 @@ impl Requirement {
         let since_motion_s = |ns: u64| Some((ns as f64 - motion_ns? as f64) / 1e9);
         RequirementFigures {
             name: self.name,
+            id: self.id,
             must,
             result: finding.result,
             finding: finding.text,

@@ -31,8 +31,12 @@ pub(super) struct Response {
     waiting: VecDeque<(u64, f64)>,
     /// Of the waiting samples, those that may be the smallest of a window, in ascending order.
     smallest: VecDeque<(u64, f64)>,
+    /// Samples without a value since the last one that has one.
+    missing_ns: Vec<u64>,
     open: Vec<Answer>,
     triggers: u64,
+    /// Triggers that changed nothing: the condition held before, and went on.
+    held_before: u64,
     answered: u64,
     not_followed: u64,
     worst: Option<Answer>,
@@ -91,8 +95,10 @@ impl Response {
             stays_for_ns,
             waiting: VecDeque::new(),
             smallest: VecDeque::new(),
+            missing_ns: Vec::new(),
             open: Vec::new(),
             triggers: 0,
+            held_before: 0,
             answered: 0,
             not_followed: 0,
             worst: None,
@@ -114,26 +120,44 @@ impl Response {
     }
 
     pub(super) fn judge_moment(&mut self, moment: &Moment<'_>) {
+        let held = self.holds();
         if !moment.is_closing {
             self.add_sample(moment);
         }
+        let held = held && self.holds();
         let occurred = self.trigger.times_ns(moment);
         if self.window.contains(moment) {
+            self.held_before += if held { occurred.len() as u64 } else { 0 };
             for at_ns in occurred {
                 self.open_answer(at_ns);
             }
         }
     }
 
+    /// Whether the condition holds at the last sample.
+    fn holds(&self) -> bool {
+        self.waiting.back().is_some_and(|(_, robustness)| *robustness >= 0.0)
+    }
+
+    /// A missing value ends what must stay only once another follows: after its last value, a signal need not have any.
     fn add_sample(&mut self, moment: &Moment<'_>) {
-        self.judge_ended(Some(moment.time_ns));
-        let robustness = self.then.robustness(moment.values).unwrap_or(f64::NEG_INFINITY);
-        self.waiting.push_back((moment.time_ns, robustness));
+        let Some(robustness) = self.then.robustness(moment.values) else {
+            return self.missing_ns.push(moment.time_ns);
+        };
+        for time_ns in std::mem::take(&mut self.missing_ns) {
+            self.add_robustness(time_ns, f64::NEG_INFINITY);
+        }
+        self.add_robustness(moment.time_ns, robustness);
+    }
+
+    fn add_robustness(&mut self, time_ns: u64, robustness: f64) {
+        self.judge_ended(Some(time_ns));
+        self.waiting.push_back((time_ns, robustness));
         while self.smallest.back().is_some_and(|(_, last)| *last >= robustness) {
             self.smallest.pop_back();
         }
-        self.smallest.push_back((moment.time_ns, robustness));
-        self.last_ns = moment.time_ns;
+        self.smallest.push_back((time_ns, robustness));
+        self.last_ns = time_ns;
     }
 
     fn open_answer(&mut self, at_ns: u64) {
@@ -211,6 +235,9 @@ impl Response {
     pub(super) fn into_finding(mut self) -> Finding {
         // The windows that are left end with the run.
         self.judge_ended(None);
+        for time_ns in std::mem::take(&mut self.missing_ns) {
+            self.judge_sample(time_ns, f64::NEG_INFINITY);
+        }
         for answer in std::mem::take(&mut self.open) {
             self.close_answer(answer);
         }
@@ -243,6 +270,10 @@ impl Response {
             Some(longest_s) => format!("; longest latency {:.3} ms", longest_s * 1e3),
             None => "; never followed".to_owned(),
         };
+        let held = match self.held_before {
+            0 => String::new(),
+            times => format!("; the condition held already before {}", counted(times, "trigger")),
+        };
         let beyond = match self.beyond {
             0 => String::new(),
             more => format!("; {} without a sample within its time not judged", counted(more, "trigger")),
@@ -252,6 +283,6 @@ impl Response {
             more => format!("; {more} more not followed, as {MOST_OPEN} were open"),
         };
         let triggers = counted(self.triggers, "trigger");
-        format!("{} of {triggers} answered{latency}{beyond}{cut}", self.answered)
+        format!("{} of {triggers} answered{latency}{held}{beyond}{cut}", self.answered)
     }
 }

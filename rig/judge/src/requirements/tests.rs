@@ -196,6 +196,17 @@ fn a_response_has_a_latency_and_the_time_left_as_its_margin() {
 }
 
 #[test]
+fn a_condition_that_held_before_its_trigger_is_said() {
+    let respond = "when = 'fault.encoder_stuck'\nthen = 'controller.state == safe_stop'\nwithin = '5 ms'";
+    let finding = |stop| Run::of(&[0.0; 12]).struck_at(4.5).stopping_at(stop).judge(respond).finding;
+    assert_eq!(
+        finding(2),
+        "1 of 1 trigger answered; longest latency 0.500 ms; the condition held already before 1 trigger"
+    );
+    assert_eq!(finding(6), "1 of 1 trigger answered; longest latency 1.500 ms");
+}
+
+#[test]
 fn a_response_that_does_not_stay_fails() {
     let mut run = Run::of(&[0.0; 12]).struck_at(0.0).stopping_at(2);
     run.states[5..].fill(ControllerState::Running);
@@ -203,6 +214,21 @@ fn a_response_that_does_not_stay_fails() {
     let respond = respond.replace("'safe_stop'", "'controller.state == safe_stop'");
     assert_eq!(run.judge(&format!("{respond}\nstays_for = '2 ms'")).result, Passed);
     assert_eq!(run.judge(&format!("{respond}\nstays_for = '3 ms'")).result, Failed);
+}
+
+/// A controller that has ended gives no more values: that cuts a window and answers nothing.
+#[test]
+fn a_condition_need_not_have_a_value_after_its_last_one() {
+    let lost = f64::NAN;
+    let then = "when = 'fault.encoder_stuck'\nthen = 'l1.force < 5 N'";
+    let judge = |forces_n: &[f64], struck_ms: f64, times: &str| {
+        Run::of(forces_n).struck_at(struck_ms).judge(&format!("{then}\n{times}")).result
+    };
+    let stays = "within = '1 ms'\nstays_for = '9 ms'";
+    assert_eq!(judge(&[0.0, 0.0, 0.0, lost, lost], 1.0, stays), Passed);
+    assert_eq!(judge(&[0.0, 0.0, 9.0, lost, lost], 1.0, stays), Failed);
+    assert_eq!(judge(&[0.0, 0.0, 0.0, lost, 0.0], 1.0, stays), Failed, "it is missing in between");
+    assert_eq!(judge(&[0.0, 0.0, lost, lost, lost], 2.0, "within = '1 ms'"), Failed, "nothing answers");
 }
 
 /// The largest, over the answers in time, of the smallest robustness while it must stay: by the definition.
@@ -410,6 +436,7 @@ fn signals_of_a_controller_are_checked_once_it_has_declared_them() {
 fn what_is_wrong_whatever_the_controller_declares_is_refused_before_it_starts() {
     for (requirement, key) in [
         ("when = 'controller.running'\nthen = 'signal.foo 5 N'", "require.then"),
+        ("when = 'controller.running'\nthen = 'signal.foo > 5 Q'", "require.then"),
         ("never = 'signal.foo'", "require.never"),
         ("event = 'parameter.foo'\nat_most = 1", "require.event"),
         ("expression = '{signal.foo} +'\nunit = 'N'\nmax = '1 N'", "require.expression"),

@@ -271,3 +271,81 @@ mod attribution {
         assert!((at_least(30_000, 100_000, 0.3) - 0.5).abs() < 0.01);
     }
 }
+
+mod causes {
+    use std::collections::BTreeMap;
+
+    use masseter_recording::{LoopInterval, RunUsage};
+
+    use super::*;
+
+    const STRETCH_NS: u64 = 100 * PERIOD_NS;
+
+    /// A loop that works 100 ms in cycle 50 and then skips 99 deadlines. `interval`: each sample of 10 ms around.
+    fn loop_with(interval: Option<LoopInterval>, stall_ns: u64) -> Skips {
+        let from_ns = |place: u64| 40 * PERIOD_NS + place * 10 * PERIOD_NS;
+        let intervals = interval.map(|interval| {
+            let at = |place| LoopInterval { from_ns: from_ns(place), to_ns: from_ns(place + 1), ..interval };
+            (0..15).map(at).collect::<Vec<_>>()
+        });
+        let loops: BTreeMap<_, _> = intervals.into_iter().map(|all| ("controller".to_owned(), all)).collect();
+        let usage = RunUsage { loops, ..RunUsage::default() };
+        let samples = LoopSamples::of(&usage, "controller");
+        let mut skips = Skips { samples, ..Skips::default() };
+        for cycle in 1..=50 {
+            let stalled_ns = if cycle > 1 { stall_ns } else { 0 };
+            let woke_ns = cycle * PERIOD_NS;
+            let counters = Counters { seq: cycle, cycle, woke_ns, stalled_ns, ..Counters::default() };
+            skips.account(&counters, PERIOD_NS, false);
+        }
+        let late = Counters {
+            seq: 51,
+            cycle: 150,
+            woke_ns: 150 * PERIOD_NS,
+            stalled_ns: stall_ns,
+            ..Counters::default()
+        };
+        skips.account(&Counters { skipped: 99, overlong_ns: STRETCH_NS, ..late }, PERIOD_NS, false);
+        skips
+    }
+
+    #[expect(clippy::unnecessary_wraps, reason = "it takes the place of a search")]
+    fn interval(cpu_ns: u64, queued_ns: u64) -> Option<LoopInterval> {
+        let (cpu_ns, queued_ns, stolen_ns) = (Some(cpu_ns), Some(queued_ns), Some(0));
+        Some(LoopInterval { cpu_ns, queued_ns, stolen_ns, voluntary_switches: 1, ..LoopInterval::default() })
+    }
+
+    #[test]
+    fn the_samples_around_a_stretch_of_work_name_its_cause() {
+        const MS: u64 = PERIOD_NS;
+        let cases = [
+            (interval(MS, 0), 0, OverrunCause::Slept, [99, 0, 0]),
+            (interval(10 * MS, 0), 0, OverrunCause::Computed, [99, 0, 0]),
+            (interval(10 * MS, 0), 30 * MS, OverrunCause::Computed, [99, 0, 0]),
+            // The machine stalls for as long where CPU time cannot be the reason.
+            (interval(10 * MS, 0), 80 * MS, OverrunCause::Unknown, [0, 0, 99]),
+            (interval(MS, 9 * MS), 0, OverrunCause::Machine, [0, 99, 0]),
+        ];
+        for (interval, stall_ns, cause, expected) in cases {
+            let mut skips = loop_with(interval, stall_ns);
+            let overruns = longest_overruns([&mut skips, &mut Skips::default()]);
+            let figures = skips.figures;
+            let found = [figures.working_by_loop, figures.working_by_machine, figures.working_undecided()];
+            assert_eq!(found, expected, "{cause:?}");
+            assert_eq!(overruns.len(), 1);
+            let Overrun { process, cycle, lasted_ns, skipped, cause: found, .. } = overruns[0];
+            assert_eq!((process, cycle, lasted_ns, skipped), ("controller", 50, STRETCH_NS, 99));
+            assert_eq!(found, cause);
+            let is_decided = cause != OverrunCause::Unknown;
+            assert_eq!(OverrunAttribution::new(&[&skips]).is_none(), is_decided);
+        }
+    }
+
+    #[test]
+    fn without_samples_the_whole_run_decides() {
+        let mut skips = loop_with(None, 0);
+        assert_eq!(longest_overruns([&mut skips, &mut Skips::default()]), []);
+        assert_eq!((skips.figures.while_working, skips.figures.working_undecided()), (99, 99));
+        assert!(OverrunAttribution::new(&[&skips]).is_some());
+    }
+}

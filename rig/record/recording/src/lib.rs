@@ -28,7 +28,8 @@ pub use columns::{Columns, Description, Field, Number};
 pub use encoding::{Channel, Encoded, Encoder, SCHEMA_ENCODING, definitions};
 pub use folder::{FolderError, OutputError, RunFolder, new_file, new_folder, recording_at, time_in_names};
 pub use manifest::{
-    DmaLatency, Ending, FullSpeed, Machine as MachineInfo, Manifest, ProcessFault, RunUsage, Usage,
+    DmaLatency, Ending, FullSpeed, LoopInterval, Machine as MachineInfo, Manifest, ProcessFault, RunUsage,
+    Usage,
 };
 pub use reader::{Chunks, Entry, ReadError, Reader};
 pub use rewrite::{Digester, Digests, RecoverError, Recovered, ThinError, is_kept, recover, thin};

@@ -212,6 +212,33 @@ pub struct RunUsage {
     /// The largest jump of the wall clock: it was set, or the machine was suspended, s.
     #[serde(default)]
     pub clock_jump_s: f64,
+    /// By process: where the thread of its loop slept less often than it had deadlines, in the order of time.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub loops: BTreeMap<String, Vec<LoopInterval>>,
+}
+
+/// Growth of the kernel's counters of the thread that runs a loop, between two samples of the supervisor.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LoopInterval {
+    /// The first sample, ns of the run's clock.
+    pub from_ns: u64,
+    /// The second, ns of the run's clock.
+    pub to_ns: u64,
+    /// CPU time, ns; none where the kernel does not count it.
+    pub cpu_ns: Option<u64>,
+    /// Time for which it was ready and had no core, ns; none where the kernel does not count it.
+    pub queued_ns: Option<u64>,
+    /// Time that the hypervisor took from its core, ns, in steps of 10 ms; none where the hypervisor does not report it.
+    pub stolen_ns: Option<u64>,
+    /// Times it gave up its core to wait.
+    pub voluntary_switches: u64,
+    /// Times its core was taken from it.
+    pub involuntary_switches: u64,
+    /// Page faults served from disk.
+    pub major_faults: u64,
+    /// Whether a signal or a debugger had stopped it at the second sample.
+    #[serde(default)]
+    pub is_stopped: bool,
 }
 
 /// Request to `/dev/cpu_dma_latency`, and its result.

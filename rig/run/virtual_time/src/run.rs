@@ -154,6 +154,9 @@ impl<S: Sink> Run<S> {
             }
             plant_error = self.play_cycle().err();
         }
+        if self.control.controller.outcome().is_some() && plant_error.is_none() {
+            plant_error = self.stepper.play_after_controller().err();
+        }
         let ending = match (plant_error, self.control.controller.outcome()) {
             (Some(error), _) => Ending::died(Party::Plant.name(), error.to_string()),
             _ if interrupts.is_stop_requested() => Ending::Interrupted,

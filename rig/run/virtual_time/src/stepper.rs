@@ -2,7 +2,7 @@
 
 use masseter_plant::PlantError;
 use masseter_plant::core::PlantCore;
-use masseter_plant::cycle::{PlantPorts, begin_cycle, end_cycle};
+use masseter_plant::cycle::{PlantPorts, begin_cycle, end_cycle, run_after_controller};
 use masseter_plant::emulation::VirtualLink;
 use masseter_plant::state::{Archive, State};
 use masseter_runtime::control::{Controller, Duties};
@@ -52,7 +52,8 @@ impl<S: Sink> Stepper<S> {
     /// Before the first cycle.
     pub(crate) fn new(scenario: &Scenario, schedule: CycleSchedule, sink: S) -> Result<Self, PlantError> {
         let plant = PlantCore::new(scenario, EPOCH_NS)?;
-        Ok(Self { schedule, period_ns: scenario.period_ns(), plant, ports: Ports::new(sink), cycle: 0 })
+        let ports = Ports::new(sink, schedule.controller_at_ns);
+        Ok(Self { schedule, period_ns: scenario.period_ns(), plant, ports, cycle: 0 })
     }
 
     /// The same before the first cycle again, with another sink.
@@ -85,6 +86,15 @@ impl<S: Sink> Stepper<S> {
         self.end_cycle(Some(command))
     }
 
+    /// The cycles after the controller's last one.
+    pub(crate) fn play_after_controller(&mut self) -> Result<(), PlantError> {
+        let Self { schedule, period_ns, plant, ports, cycle } = self;
+        run_after_controller(plant, ports, schedule, *period_ns, |_, _| {
+            *cycle += 1;
+            Ok(sync(*cycle, *period_ns))
+        })
+    }
+
     pub(crate) fn begin_next_cycle(&mut self) -> Result<(), PlantError> {
         self.cycle += 1;
         let sync = self.sync();
@@ -92,7 +102,6 @@ impl<S: Sink> Stepper<S> {
     }
 
     fn end_cycle(&mut self, command: Option<Command>) -> Result<(), PlantError> {
-        self.ports.now_ns = self.controller_at_ns();
         self.ports.command = command;
         let sync = self.sync();
         end_cycle(&mut self.plant, &mut self.ports, &sync)
@@ -100,7 +109,7 @@ impl<S: Sink> Stepper<S> {
 
     /// The state between two calls.
     pub(crate) fn state(&self) -> StepperState {
-        let Self { plant, ports: Ports { log, now_ns, reading, command }, cycle, .. } = self;
+        let Self { plant, ports: Ports { log, now_ns, reading, command, .. }, cycle, .. } = self;
         StepperState {
             plant: plant.clone(),
             published: log.published(),
@@ -142,7 +151,7 @@ impl<S: Sink> Stepper<S> {
     }
 
     fn sync(&self) -> Wake {
-        Wake::on_time(self.cycle, EPOCH_NS + (self.cycle - 1) * self.period_ns)
+        sync(self.cycle, self.period_ns)
     }
 
     fn controller_at_ns(&self) -> u64 {
@@ -150,9 +159,16 @@ impl<S: Sink> Stepper<S> {
     }
 }
 
+/// The SYNC of a cycle.
+fn sync(cycle: u64, period_ns: u64) -> Wake {
+    Wake::on_time(cycle, EPOCH_NS + (cycle - 1) * period_ns)
+}
+
 #[derive(Debug)]
 struct Ports<S> {
     log: Log<S>,
+    /// From SYNC to the controller's command.
+    controller_at_ns: u64,
     now_ns: u64,
     reading: Reading,
     /// The command of this cycle.
@@ -160,8 +176,9 @@ struct Ports<S> {
 }
 
 impl<S: Sink> Ports<S> {
-    fn new(sink: S) -> Self {
-        Self { log: Log::new(sink), now_ns: EPOCH_NS, reading: Reading::default(), command: None }
+    fn new(sink: S, controller_at_ns: u64) -> Self {
+        let (log, reading) = (Log::new(sink), Reading::default());
+        Self { log, controller_at_ns, now_ns: EPOCH_NS, reading, command: None }
     }
 }
 
@@ -197,7 +214,8 @@ impl<S: Sink> PlantPorts<VirtualLink> for Ports<S> {
         Ok(())
     }
 
-    fn command(&mut self, _: &Wake) -> Result<Option<Command>, PlantError> {
+    fn command(&mut self, wake: &Wake) -> Result<Option<Command>, PlantError> {
+        self.now_ns = wake.due_ns + self.controller_at_ns;
         Ok(self.command.take())
     }
 

@@ -94,7 +94,8 @@
   const first = document.querySelector('#sections > section');
   if (first) first.append(element('nav', { 'aria-label': 'Sections' }));
   links();
-  timeBar();
+  // A page without times, such as a suite's, has no bar.
+  if (page.time.end_s > 0 || page.life === 'live') timeBar();
   built.forEach(([, start]) => start());
   // Paper shows also the blocks that are folded.
   addEventListener('beforeprint', () => {

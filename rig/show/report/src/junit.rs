@@ -1,10 +1,12 @@
 //! JUnit documents, as CI systems show them: a run or a whole suite of runs, each check as a test case.
 
 use askama::Template;
-use masseter_analysis::{Check, CheckFigures, CheckResult, Figures, Verdict};
+use masseter_analysis::{Check, CheckResult, Figures, Verdict};
 use masseter_recording::Manifest;
 use masseter_runtime::named::PlayedMotion;
 use masseter_terminal::Exit;
+
+use crate::suite::{Attempt, NOT_RUN, SuiteReport, TestedScenario};
 
 /// A document with one run, or with the runs of a suite that took so long.
 #[derive(Template)]
@@ -16,10 +18,12 @@ struct Document<'a> {
 
 /// A run as a test suite: a case for the run itself, and one for each of its checks.
 #[derive(Debug)]
-pub struct JunitRun<'a> {
-    name: String,
+struct JunitRun<'a> {
+    name: &'a str,
     /// The class of its cases.
-    class: String,
+    class: &'a str,
+    /// The scenario's file.
+    file: Option<String>,
     properties: Vec<(&'static str, String)>,
     took_s: f64,
     timestamp: Option<&'a str>,
@@ -29,54 +33,79 @@ pub struct JunitRun<'a> {
 #[derive(Debug)]
 struct Case<'a> {
     name: &'a str,
+    took_s: f64,
     result: CaseResult,
-    figures: Option<&'a CheckFigures>,
+    /// Attempts before, which CI systems show as those of a flaky test: word and reason.
+    earlier: Vec<[&'a str; 2]>,
+    check: Option<&'a Check>,
 }
 
-/// What a case comes to, with the reason.
+/// What a case comes to, with its kind and the reason.
 #[derive(Debug)]
 enum CaseResult {
     Passed,
-    Failed(String),
-    /// A check of the rig that was not tested. Most CI systems show a suite with skipped cases as passed.
-    Untested(String),
-    Error(String),
+    /// A check of the rig that was not tested is a failure: most CI systems show a suite with skipped cases as passed.
+    Failed(&'static str, String),
+    Error(&'static str, String),
     Skipped(String),
 }
 
-impl CaseResult {
-    fn is_failure(&self) -> bool {
-        matches!(self, Self::Failed(_) | Self::Untested(_))
-    }
-}
-
 impl<'a> JunitRun<'a> {
-    /// A run with its verdict, or without one for that reason. `is_short`: the run does not count as passed.
-    pub fn new(name: &str, verdict: Result<&'a Verdict, &str>, is_short: bool, took_s: f64) -> Self {
+    /// A run with its verdict, or with an error of that kind and reason. `is_short`: the run does not count as passed.
+    fn new(
+        name: &'a str,
+        verdict: Result<&'a Verdict, (&'static str, String)>,
+        is_short: bool,
+        took_s: f64,
+    ) -> Self {
         let checks = verdict.iter().flat_map(|verdict| &verdict.checks);
         let case = |check: &'a Check| Case {
             name: check.name.as_ref(),
+            took_s: 0.0,
             result: of_check(check, is_short),
-            figures: check.figures.as_ref(),
+            earlier: Vec::new(),
+            check: Some(check),
         };
         let mut cases: Vec<_> = checks.map(case).collect();
-        let has_failure = cases.iter().any(|case| case.result.is_failure());
+        let has_failure = cases.iter().any(|case| matches!(case.result, CaseResult::Failed(..)));
         let result = match verdict {
             _ if !is_short => CaseResult::Passed,
             // The cases of its checks say it.
             Ok(verdict) if has_failure && verdict.is_by_checks() => CaseResult::Passed,
-            Ok(verdict) => CaseResult::Error(format!("{}: {}", verdict.word, verdict.reason)),
-            Err(why) => CaseResult::Error(why.to_owned()),
+            Ok(verdict) => CaseResult::Error(verdict.word, format!("{}: {}", verdict.word, verdict.reason)),
+            Err((kind, why)) => CaseResult::Error(kind, why),
         };
-        cases.insert(0, Case { name: "run", result, figures: None });
-        let (name, class) = (name.to_owned(), name.to_owned());
-        Self { name, class, properties: Vec::new(), took_s, timestamp: None, cases }
+        cases.insert(0, Case { name: "run", took_s, result, earlier: Vec::new(), check: None });
+        Self { name, class: name, file: None, properties: Vec::new(), took_s, timestamp: None, cases }
     }
 
-    /// The same with these properties.
-    #[must_use]
-    pub fn with(self, properties: Vec<(&'static str, String)>) -> Self {
-        Self { properties, ..self }
+    /// A scenario of a suite, with the attempts before the last.
+    fn of_tested(tested: &'a TestedScenario, masseter: &str) -> Self {
+        let is_short = tested.is_short();
+        let verdict = match tested.last().verdict() {
+            _ if tested.differs() => Err(("DIFFERS", tested.reason())),
+            verdict => verdict.map_err(|why| (NOT_RUN, why.to_owned())),
+        };
+        let mut run = Self::new(&tested.name, verdict, is_short, tested.took_s);
+        let earlier = tested.attempts.iter().take(tested.retries());
+        run.cases[0].earlier = earlier.map(Attempt::word_and_reason).collect();
+        let is_flaky = tested.retries() > 0 && !is_short;
+        run.properties = vec![
+            ("masseter", masseter.to_owned()),
+            ("outcome", tested.outcome().word().to_owned()),
+            ("retries", tested.retries().to_string()),
+            ("flaky", is_flaky.to_string()),
+            ("tags", tested.tags.join(" ")),
+        ];
+        run.file = Some(tested.file.display().to_string());
+        run
+    }
+
+    /// The element for an attempt before the last, in the form of Maven's Surefire.
+    fn earlier_element(&self) -> &'static str {
+        let is_short =
+            self.cases.iter().any(|case| !matches!(case.result, CaseResult::Passed | CaseResult::Skipped(_)));
+        if is_short { "rerunError" } else { "flakyError" }
     }
 
     fn tests(&self) -> usize {
@@ -84,11 +113,11 @@ impl<'a> JunitRun<'a> {
     }
 
     fn failures(&self) -> usize {
-        self.count(CaseResult::is_failure)
+        self.count(|result| matches!(result, CaseResult::Failed(..)))
     }
 
     fn errors(&self) -> usize {
-        self.count(|result| matches!(result, CaseResult::Error(_)))
+        self.count(|result| matches!(result, CaseResult::Error(..)))
     }
 
     fn skipped(&self) -> usize {
@@ -115,11 +144,14 @@ impl<'a> Document<'a> {
 /// The case of a check. One that failed, in a run that passed, did so as the scenario expects.
 fn of_check(check: &Check, is_short: bool) -> CaseResult {
     let finding = &check.finding;
+    let kind = if check.is_requirement() { "requirement" } else { "check" };
     match check.result {
         CheckResult::Passed => CaseResult::Passed,
-        CheckResult::Failed if is_short => CaseResult::Failed(finding.clone()),
+        CheckResult::Failed if is_short => CaseResult::Failed(kind, finding.clone()),
         CheckResult::Failed => CaseResult::Skipped(format!("as expected: {finding}")),
-        CheckResult::Untested if is_short && !check.is_requirement() => CaseResult::Untested(finding.clone()),
+        CheckResult::Untested if is_short && !check.is_requirement() => {
+            CaseResult::Failed("untested", format!("not tested: {finding}"))
+        }
         CheckResult::Untested => CaseResult::Skipped(format!("untested: {finding}")),
         CheckResult::Excused | CheckResult::NotJudged => CaseResult::Skipped(finding.clone()),
     }
@@ -138,24 +170,26 @@ pub(crate) fn xml(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> 
     }
     let run = JunitRun::new(&name, Ok(verdict), verdict.exit_code != Exit::Passed, figures.duration_s);
     let timestamp = Some(manifest.began.trim_end_matches('Z'));
-    let run = JunitRun { class: "masseter.run".to_owned(), properties, timestamp, ..run };
+    let run = JunitRun { class: "masseter.run", properties, timestamp, ..run };
     Document { runs: &[run], suite_s: None }.xml()
 }
 
-/// The document of a suite of runs that took so long, s.
-///
-/// ```
-/// use masseter_report::{JunitRun, junit_of_suite};
-///
-/// let run = JunitRun::new("push", Err("it cannot be read"), true, 0.5);
-/// assert!(junit_of_suite(&[run], 1.0)?.contains("<error message=\"it cannot be read\"/>"));
-/// # Ok::<(), askama::Error>(())
-/// ```
+/// The document of a suite. Scenarios that an interrupt left are errors, since most CI systems show a suite with
+/// skipped cases as passed.
 ///
 /// # Errors
 /// When the text cannot be formatted.
-pub fn junit_of_suite(runs: &[JunitRun], took_s: f64) -> askama::Result<String> {
-    Document { runs, suite_s: Some(took_s) }.xml()
+pub fn junit_of_suite(report: &SuiteReport) -> askama::Result<String> {
+    let tested = report.tested.iter().map(|tested| JunitRun::of_tested(tested, report.masseter));
+    let unrun = report.unrun.iter().map(|name| {
+        let properties = vec![("masseter", report.masseter.to_owned())];
+        JunitRun {
+            properties,
+            ..JunitRun::new(name, Err((NOT_RUN, "interrupted before its end".to_owned())), true, 0.0)
+        }
+    });
+    let runs: Vec<_> = tested.chain(unrun).collect();
+    Document { runs: &runs, suite_s: Some(report.took_s) }.xml()
 }
 
 #[cfg(test)]
@@ -175,8 +209,8 @@ mod tests {
         let mut verdict = Verdict::new(&manifest, &figures);
         "<&\u{1b}\u{ffff}\">".clone_into(&mut verdict.reason);
         let xml = xml(&manifest, &figures, &verdict).unwrap();
-        let case = "  <testcase classname=\"masseter.run\" name=\"run\">\
-                    <error message=\"DIED: &#60;&#38;\u{fffd}\u{fffd}&#34;&#62;\"/></testcase>\n";
+        let case = "  <testcase classname=\"masseter.run\" name=\"run\" time=\"0.000\">\
+                    <error message=\"DIED: &#60;&#38;\u{fffd}\u{fffd}&#34;&#62;\" type=\"DIED\"/></testcase>\n";
         assert!(xml.contains(case), "{xml}");
     }
 }

@@ -1,5 +1,5 @@
 //! The report of a run: table, `summary.json`, `junit.xml`, `report.html`, `events.jsonl`, histogram logs and candump
-//! logs; and two runs side by side.
+//! logs; two runs side by side; and a suite of runs.
 //!
 //! All of it is computed from the manifest and the recording, so `masseter report` can repeat it. Figures and verdict come
 //! from the crate `masseter-analysis`; each module of this crate writes one form of them.
@@ -11,11 +11,14 @@ mod junit;
 mod logs;
 mod page;
 mod run_report;
+pub mod suite;
+mod suite_page;
 mod table;
 mod text;
 
-pub use junit::{JunitRun, junit_of_suite};
+pub use junit::junit_of_suite;
 pub use logs::{CandumpLogs, WriteError};
 pub use page::so_far as page_so_far;
 pub use run_report::{judge_run, report_past_run, report_run};
+pub use suite_page::html_of_suite;
 pub use table::Detail;

@@ -117,6 +117,7 @@ fn analyse(
     scenario.files_mut().for_each(|(name, file)| *file = folder.file(&name));
     let mut analysis = Analysis::new(&scenario, &manifest.declared);
     manifest.process_faults.iter().for_each(|fault| analysis.process_fault(fault));
+    analysis.loop_samples(&manifest.usage);
     let mut logs = Ok(CandumpLogs::new(folder.path(), &manifest.scenario.can.interfaces));
     while let Some(message) = reader.next_message()? {
         analysis.take(&message)?;

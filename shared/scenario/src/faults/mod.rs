@@ -4,6 +4,7 @@ mod kinds;
 
 use std::fmt::{self, Display, Formatter};
 use std::iter;
+use std::ops::Range;
 
 use masseter_model::geometry::AXIS_NAMES;
 use serde::{Deserialize, Serialize};
@@ -16,7 +17,7 @@ use super::when::{EntryNames, When, WhenKeys};
 
 pub use kinds::{
     AxisFault, BusFault, CommandFault, DriveFault, EncoderFault, FaultDeclaration, FaultKindConfig,
-    FaultSize, PlatformFault, ProcessFault,
+    FaultSize, Overlap, PlatformFault, ProcessFault,
 };
 
 keys! {
@@ -100,6 +101,16 @@ impl FaultConfig {
     /// Its size in SI units; 0 where it has none.
     pub fn size_si(&self) -> f64 {
         self.size.map_or(0.0, |size| size.si())
+    }
+
+    /// The part of a window (ns) in which it acts: of some kinds, the size says how long.
+    pub fn acting_ns(&self, window_ns: Range<u64>) -> Range<u64> {
+        let lasts_its_size = [DriveFault::Reboot.into(), CommandFault::ControllerStall.into()];
+        if !lasts_its_size.contains(&self.kind) {
+            return window_ns;
+        }
+        let longest_ns = (self.size_si() * 1e9).round() as u64;
+        window_ns.start..window_ns.end.min(window_ns.start.saturating_add(longest_ns))
     }
 
     /// When it acts.
@@ -197,5 +208,20 @@ impl FaultConfig {
         let node = self.node.unwrap_or(MASTER_NODE.get());
         let need = format!("on a real interface only the master (node {MASTER_NODE}) can be given faults");
         require(node == MASTER_NODE.get(), "faults.node", &node, need)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dip_of_the_supply_lasts_as_long_as_its_size_says_and_no_longer_than_its_window() {
+        let size = Some("20 ms".parse().unwrap());
+        let dip = FaultConfig { size, ..FaultConfig::new(DriveFault::Reboot) };
+        assert_eq!(dip.acting_ns(1000..u64::MAX), 1000..20_001_000);
+        assert_eq!(dip.acting_ns(1000..5000), 1000..5000);
+        let slow = FaultConfig { kind: DriveFault::SlowEnable.into(), ..dip };
+        assert_eq!(slow.acting_ns(1000..u64::MAX), 1000..u64::MAX);
     }
 }

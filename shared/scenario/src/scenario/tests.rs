@@ -258,6 +258,15 @@ const WRONG: &[(&str, &str)] = &[
         "[expect]\nexit_code = 5\nverdict = 'fail'",
         "expect.exit_code = 5: expect.verdict has the exit code 1: give one of both",
     ),
+    ("[expect]\nverdict = 'fail'", "expect.failed = []: name the checks and requirements that must fail"),
+    ("[expect]\nexit_code = 1", "expect.failed = []: name the checks and requirements that must fail"),
+    (
+        "[expect]\nverdict = 'safe_stop'\nfailed = ['tracking']",
+        "expect.failed = [\"tracking\"]: it goes with",
+    ),
+    ("tags = ['slow one']", "tags = 'slow one': use 1 to 64 letters"),
+    ("[matrix]\nrate_hz = 500", "matrix = rate_hz: give each key a list of values"),
+    ("[[require]]\nname = 'a'\nid = 'REQ 1'", "require.id = 'REQ 1': use 1 to 64 bytes without spaces"),
     ("[[stimulus]]\nat_s = 1.0", "stimulus.push_n = none or several: give exactly one"),
     ("[[stimulus]]\nat_s = 1.0\nstop = true\nvalue = 1.0", "stimulus.value = given: leave it away"),
     ("[[stimulus]]\nat_s = 1.0\npush_n = [0, 0, 1]\nshape = 'ramp'", "stimulus.for_s = none"),
@@ -356,6 +365,42 @@ fn the_file_of_a_robot_gives_the_defaults_of_its_scenarios() {
     let path = write("own.toml", "robot = 'other.toml'");
     for (text, expected) in cases {
         write("other.toml", text);
+        let error = Scenario::read(&path).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+}
+
+#[test]
+fn an_included_file_gives_its_values_and_its_lists() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("common")).unwrap();
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    write("common/robot.toml", "[dynamics]\nrod_mass_kg = 0.6");
+    let common = "robot = 'robot.toml'\nrate_hz = 500\nduration_s = 3.0\ntags = ['slow']\n\
+                  [motion]\nkind = 'file'\npath = 'jaw.csv'\n[[require]]\nname = 'of all'\nnever = 'safe_stop'";
+    write("common/common.toml", common);
+    let own =
+        "include = ['common/common.toml']\nduration_s = 2.0\n[[require]]\nname = 'own'\nnever = 'safe_stop'";
+    let path = write("own.toml", own);
+    let scenario = Scenario::read(&path).unwrap();
+    assert_eq!((scenario.rate_hz, scenario.duration_s), (500, Some(2.0)), "the scenario's own keys win");
+    assert!((scenario.dynamics.rod_mass_kg - 0.6).abs() < 1e-12, "the included file names the robot");
+    let names: Vec<_> = scenario.require.iter().map(|requirement| requirement.name.as_str()).collect();
+    assert_eq!((names, scenario.tags.clone()), (vec!["own", "of all"], vec!["slow".to_owned()]));
+    let MotionConfig::File(file) = &scenario.motion else { panic!("{:?}", scenario.motion) };
+    assert_eq!(file.path, folder.path().join("common/jaw.csv"));
+    let resolved = Scenario::parse(&path, &scenario.to_toml()).unwrap();
+    assert_eq!((resolved.require, resolved.include), (scenario.require, Vec::new()));
+
+    for (text, expected) in [
+        ("include = ['own.toml']", "common.toml: an included file includes no other"),
+        ("rate_hzz = 500", "common.toml:1:1: unknown key"),
+    ] {
+        write("common/common.toml", text);
         let error = Scenario::read(&path).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}");
     }

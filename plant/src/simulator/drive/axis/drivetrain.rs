@@ -5,9 +5,8 @@
 
 use super::motion::{Motion, ServoCommand};
 use super::servo::{BRAKE_DAMPING_N_S_M, BRAKE_STIFFNESS_N_M, Servo, ServoLimits};
-use crate::simulator::acting::Acting;
+use crate::simulator::drive::faults::{DriveFault, DriveFaults};
 use crate::simulator::drive::{AxisQuirks, Ratings};
-use masseter_scenario::DriveFault;
 
 /// Share of the rated force at which a motor counts as pushing against a stop.
 const STOP_SHARE: f64 = 0.2;
@@ -44,9 +43,10 @@ impl Drivetrain {
     }
 
     /// The distance of the position that the drive counts from the shaft's, where its gear ratio is or was wrong.
-    pub(super) fn gear_error_m(&mut self, demand_m: Option<f64>, faults: &mut Acting<DriveFault>) -> f64 {
+    pub(super) fn gear_error_m(&mut self, demand_m: Option<f64>, faults: &mut DriveFaults) -> f64 {
+        let before_m = self.gear.missed_m;
         let error_m = self.gear.error_m(faults.size(DriveFault::Scale), demand_m);
-        if error_m != 0.0 {
+        if error_m.to_bits() != before_m.to_bits() {
             faults.strike(DriveFault::Scale);
         }
         error_m
@@ -60,7 +60,7 @@ impl Drivetrain {
         [measured_m, error_m]: [f64; 2],
         command: ServoCommand,
         limits: &ServoLimits,
-        faults: &mut Acting<DriveFault>,
+        faults: &mut DriveFaults,
     ) -> f64 {
         let force_n = self.servo.step(measured_m, error_m, command, limits);
         let is_braking = command == ServoCommand::Brake;
@@ -166,7 +166,7 @@ pub(super) struct Motor {
 
 impl Motor {
     /// The force of motor and brake on the mechanism, N.
-    pub(super) fn force_n(&mut self, asked: Asked, shaft: Motion, faults: &mut Acting<DriveFault>) -> f64 {
+    pub(super) fn force_n(&mut self, asked: Asked, shaft: Motion, faults: &mut DriveFaults) -> f64 {
         if faults.is_empty() {
             self.stuck_at_m = None;
             return asked.force_n;
@@ -174,7 +174,7 @@ impl Motor {
         motor_n(asked, faults) + self.brake_n(asked, shaft, faults)
     }
 
-    fn brake_n(&mut self, asked: Asked, shaft: Motion, faults: &mut Acting<DriveFault>) -> f64 {
+    fn brake_n(&mut self, asked: Asked, shaft: Motion, faults: &mut DriveFaults) -> f64 {
         if asked.is_braking {
             self.stuck_at_m = None;
             if !faults.has(DriveFault::BrakeOpen) {
@@ -194,7 +194,7 @@ impl Motor {
 }
 
 /// The motor's force: none without current, all of it where the drive runs away.
-fn motor_n(asked: Asked, faults: &mut Acting<DriveFault>) -> f64 {
+fn motor_n(asked: Asked, faults: &mut DriveFaults) -> f64 {
     if faults.has(DriveFault::Sto) || faults.has(DriveFault::Reboot) {
         return 0.0;
     }
@@ -205,7 +205,7 @@ fn motor_n(asked: Asked, faults: &mut Acting<DriveFault>) -> f64 {
     if asked.is_braking {
         return 0.0;
     }
-    let lost = faults.size(DriveFault::TorqueLoss).unwrap_or(0.0);
+    let lost = faults.size(DriveFault::TorqueLoss).unwrap_or(0.0).min(1.0);
     let lost_n = asked.force_n * lost;
     if lost_n != 0.0 {
         faults.strike(DriveFault::TorqueLoss);
@@ -302,8 +302,8 @@ mod motor_tests {
 
     /// The force at 0.1 mm beyond where the motor was at first, and whether the fault struck.
     fn force(kind: DriveFault, size: f64, asked: Asked) -> (f64, bool) {
-        let (mut motor, mut faults) = (Motor::default(), Acting::new());
-        faults.begin(kind, size);
+        let (mut motor, mut faults) = (Motor::default(), DriveFaults::default());
+        faults.set(kind, Some(size));
         motor.force_n(asked, Motion::at_rest(0.27), &mut faults);
         let force_n = motor.force_n(asked, Motion::at_rest(0.2701), &mut faults);
         ((force_n * 1e6).round() / 1e6, faults.has_struck(kind))
@@ -326,7 +326,7 @@ mod motor_tests {
 
     #[test]
     fn without_faults_the_mechanism_gets_what_is_asked_for() {
-        let force_n = Motor::default().force_n(MOVING, Motion::at_rest(0.27), &mut Acting::new());
+        let force_n = Motor::default().force_n(MOVING, Motion::at_rest(0.27), &mut DriveFaults::default());
         assert_eq!(force_n.to_bits(), MOVING.force_n.to_bits());
     }
 }

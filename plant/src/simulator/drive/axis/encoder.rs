@@ -1,14 +1,10 @@
-//! The encoder of an axis, where the dictionary's zero lies in its counts, and the switches (60FDh).
+//! What a drive sees of its axis: the encoder's counts, where the dictionary's zero lies in them, and the switches (60FDh).
 //!
 //! There are three zeros. The encoder counts from its own. An incremental drive counts from where it was switched on.
 //! The dictionary's positions count from the zero that homing has set.
 //!
 //! The limit switches close 1 mm before the ends of the stroke and stay closed beyond. The home switch is closed from 1 mm
 //! below to 1 mm above the middle of the stroke. The mechanism's stops are 2 mm beyond the stroke.
-
-use rand::{RngExt, SeedableRng};
-use rand_distr::StandardNormal;
-use rand_pcg::Pcg64Mcg;
 
 /// Counts from one reference mark to the next; count 0 has a mark.
 const MARK_PITCH: i32 = 2000;
@@ -28,43 +24,19 @@ pub(super) fn mark_between(from: i32, to: i32) -> Option<i32> {
     }
 }
 
-/// One axis' encoder.
-#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
-pub(crate) struct Encoder {
-    resolution_m: f64,
-    noise_m: f64,
-    random: Pcg64Mcg,
-}
-
-impl Encoder {
-    /// An encoder with its own stream of random numbers.
-    pub(crate) fn new(resolution_m: f64, noise_m: f64, seed: u64, axis: usize) -> Self {
-        // Odd multiples of the golden ratio keep the streams of neighbouring axes apart.
-        let stream = seed ^ (axis as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-        Self { resolution_m, noise_m, random: Pcg64Mcg::seed_from_u64(stream) }
-    }
-
-    /// The counts read at a true position; beyond the counter's range, its end.
-    pub(crate) fn read(&mut self, position_m: f64) -> i32 {
-        let noise: f64 = self.random.sample(StandardNormal);
-        self.nearest(position_m + self.noise_m * noise)
-    }
-
-    /// The count nearest to a position (m); or the increments per second nearest to a velocity (m/s).
-    pub(crate) fn nearest(&self, position_m: f64) -> i32 {
-        (position_m / self.resolution_m).round() as i32
-    }
-
-    /// The position of a count, m.
-    pub(crate) fn metres(&self, increments: i32) -> f64 {
-        f64::from(increments) * self.resolution_m
-    }
+/// What an encoder makes of the position at which it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Look {
+    /// The position that it shows, m.
+    pub(crate) shown_m: f64,
+    /// The same without its noise, m: from there to the shaft is the error that the brake does not know.
+    pub(crate) seen_m: f64,
 }
 
 /// The encoder with its last count.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Coordinates {
-    pub(super) encoder: Encoder,
+    increment_m: f64,
     pub(super) counts: i32,
     /// Whether the encoder counts from where it is at power-on.
     is_incremental: bool,
@@ -77,17 +49,12 @@ pub(super) struct Coordinates {
 }
 
 impl Coordinates {
-    /// An encoder that is switched on at a position.
-    pub(super) fn new(encoder: Encoder, position_m: f64, is_incremental: bool) -> Self {
-        let counts = encoder.nearest(position_m);
-        let mut coordinates = Self {
-            encoder,
-            counts,
-            is_incremental,
-            start_counts: 0,
-            origin_increments: 0,
-            is_referenced: false,
-        };
+    /// An encoder with that increment (m) that is switched on at a position.
+    pub(super) fn new(increment_m: f64, position_m: f64, is_incremental: bool) -> Self {
+        let (counts, start_counts, origin_increments, is_referenced) = (0, 0, 0, false);
+        let mut coordinates =
+            Self { increment_m, counts, is_incremental, start_counts, origin_increments, is_referenced };
+        coordinates.read(position_m);
         coordinates.restart();
         coordinates
     }
@@ -100,9 +67,20 @@ impl Coordinates {
     }
 
     /// Reads the encoder; returns the count before and the new one.
-    pub(super) fn read(&mut self, seen_m: f64) -> [i32; 2] {
-        let before = std::mem::replace(&mut self.counts, self.encoder.read(seen_m));
-        [before, self.counts]
+    pub(super) fn read(&mut self, shown_m: f64) -> [i32; 2] {
+        let counts = self.nearest(shown_m);
+        [std::mem::replace(&mut self.counts, counts), counts]
+    }
+
+    /// The count nearest to a position (m), or the end of the counter's range; or the increments per second nearest to a
+    /// velocity (m/s).
+    pub(super) fn nearest(&self, position_m: f64) -> i32 {
+        (position_m / self.increment_m).round() as i32
+    }
+
+    /// The position of the last count, m.
+    pub(super) fn counted_m(&self) -> f64 {
+        f64::from(self.counts) * self.increment_m
     }
 
     /// The last count as the drive shows it (6063h).
@@ -123,12 +101,12 @@ impl Coordinates {
 
     /// A position of the dictionary in the encoder's metres.
     pub(super) fn metres(&self, increments: i32) -> f64 {
-        self.encoder.metres(increments.saturating_sub(self.origin_increments))
+        f64::from(increments.saturating_sub(self.origin_increments)) * self.increment_m
     }
 
     /// A position in the encoder's metres as the dictionary has it.
     pub(super) fn increments(&self, position_m: f64) -> i32 {
-        self.encoder.nearest(position_m).saturating_add(self.origin_increments)
+        self.nearest(position_m).saturating_add(self.origin_increments)
     }
 }
 
@@ -173,31 +151,6 @@ mod encoder_tests {
     use super::*;
 
     #[test]
-    fn noise_has_the_declared_spread_and_no_bias() {
-        let mut encoder = Encoder::new(1e-9, 1e-6, 3, 0);
-        let errors: Vec<f64> = (0..20_000)
-            .map(|_| {
-                let counts = encoder.read(0.27);
-                encoder.metres(counts) - 0.27
-            })
-            .collect();
-        let mean = errors.iter().sum::<f64>() / errors.len() as f64;
-        let variance = errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / errors.len() as f64;
-        assert!(mean.abs() < 3e-8, "{mean}");
-        assert!((variance.sqrt() - 1e-6).abs() < 3e-8, "{}", variance.sqrt());
-    }
-
-    #[test]
-    fn without_noise_a_position_is_off_by_half_an_increment_at_most() {
-        let mut encoder = Encoder::new(1e-6, 0.0, 1, 0);
-        for step in 0..1000 {
-            let position_m = 0.27 + f64::from(step) * 1.37e-7;
-            let counts = encoder.read(position_m);
-            assert!((encoder.metres(counts) - position_m).abs() <= 0.5e-6 + 1e-15);
-        }
-    }
-
-    #[test]
     fn a_mark_is_passed_in_either_direction_and_not_left_behind_twice() {
         let table = [
             (1999, 2000, Some(2000)),
@@ -214,16 +167,6 @@ mod encoder_tests {
             assert_eq!(mark_between(from, to), mark, "from {from} to {to}");
         }
     }
-
-    #[test]
-    fn axes_do_not_share_their_noise() {
-        let read = |axis| {
-            let mut encoder = Encoder::new(1e-9, 1e-6, 3, axis);
-            [(); 8].map(|()| encoder.read(0.0))
-        };
-        assert_ne!(read(0), read(1));
-        assert_eq!(read(1), read(1));
-    }
 }
 
 #[cfg(test)]
@@ -231,7 +174,7 @@ mod coordinates_tests {
     use super::*;
 
     fn coordinates(is_incremental: bool) -> Coordinates {
-        Coordinates::new(Encoder::new(1e-6, 0.0, 1, 0), 0.27, is_incremental)
+        Coordinates::new(1e-6, 0.27, is_incremental)
     }
 
     #[test]
@@ -242,6 +185,16 @@ mod coordinates_tests {
             assert_eq!([coordinates.actual(), coordinates.shown_counts()], [expected; 2]);
             assert_eq!(coordinates.is_referenced, !is_incremental);
             assert!((coordinates.metres(expected) - 0.271).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_position_is_off_by_half_an_increment_at_most() {
+        let mut coordinates = coordinates(false);
+        for step in 0..1000 {
+            let position_m = 0.27 + f64::from(step) * 1.37e-7;
+            coordinates.read(position_m);
+            assert!((coordinates.counted_m() - position_m).abs() <= 0.5e-6 + 1e-15);
         }
     }
 

@@ -9,22 +9,21 @@ pub(crate) mod encoder;
 pub(crate) mod modes;
 pub(crate) mod motion;
 pub(crate) mod parameters;
+mod power;
 mod servo;
 
 use masseter_can::cia402::{Controlword, DriveState, StateCommand, StatusBit, Statusword};
 
 use super::dictionary::Objects;
 use super::names;
-use crate::simulator::acting::Acting;
-use crate::simulator::drive::{AxisQuirks, DriveSettings, Ratings, SECOND_NS};
+use crate::simulator::drive::faults::{DriveFault, DriveFaults};
+use crate::simulator::drive::{AxisQuirks, DriveSettings, Ratings};
 use drivetrain::Drivetrain;
-use encoder::{Coordinates, Encoder, Switches};
-use masseter_scenario::DriveFault;
+use encoder::{Coordinates, Look, Switches};
 use modes::{Homing, Positioning, Sensed};
-use motion::{
-    Demand, Mode, Motion, MotionCommand, NewTargets, PositionView, Profile, ServoCommand, Shaft, clamp,
-};
+use motion::{Demand, Mode, Motion, MotionCommand, NewTargets, PositionView, Profile, ServoCommand, clamp};
 use parameters::{Offsets, Parameters};
+use power::PowerStage;
 use servo::{FollowingErrorMonitor, ServoLimits};
 
 /// One axis.
@@ -43,39 +42,26 @@ pub(crate) struct Axis {
     positioning: Positioning,
     pub(super) homing: Homing,
     mode: Mode,
-    /// State of the power stage.
-    pub(crate) power: DriveState,
+    pub(crate) power: PowerStage,
     controlword: Controlword,
-    /// The state that the axis enters once it stands: 605Bh or 605Ch asks for a ramp.
-    leaves_for: Option<DriveState>,
-    /// Before then the torque is safely off, ns.
-    torque_from_ns: u64,
     /// Offsets of the cyclic modes.
     offsets: Offsets,
     /// Whether the newest cyclic target was limited.
     is_target_limited: bool,
     /// Injected faults of the drive.
-    pub(crate) faults: Acting<DriveFault>,
-    /// Since when a fault delays "operation enabled", ns.
-    enabling_since_ns: Option<u64>,
+    pub(crate) faults: DriveFaults,
 }
 
 impl Axis {
     /// An axis that is switched on at a position.
-    pub(super) fn new(
-        settings: &DriveSettings,
-        encoder: Encoder,
-        now_ns: u64,
-        position_m: f64,
-        objects: &Objects,
-    ) -> Self {
+    pub(super) fn new(settings: &DriveSettings, now_ns: u64, position_m: f64, objects: &Objects) -> Self {
         let DriveSettings { drive: config, step_s, stroke_m, .. } = *settings;
         let quirks = settings.quirks.axis;
         Self {
             parameters: Parameters::from_objects(objects, &config, &quirks),
             drivetrain: Drivetrain::new(config, &quirks, step_s, position_m),
             shown_n: 0.0,
-            coordinates: Coordinates::new(encoder, position_m, quirks.is_incremental),
+            coordinates: Coordinates::new(config.encoder_resolution_m, position_m, quirks.is_incremental),
             switches: Switches::new(stroke_m, position_m),
             config,
             quirks,
@@ -84,31 +70,19 @@ impl Axis {
             positioning: Positioning::default(),
             homing: Homing::default(),
             mode: Mode::from_number(objects.get(names::MODE)).unwrap_or(Mode::CyclicPosition),
-            power: DriveState::NotReadyToSwitchOn,
+            power: PowerStage::new(now_ns.saturating_add(quirks.torque_off_ns)),
             controlword: Controlword::DISABLE_VOLTAGE,
-            leaves_for: None,
-            torque_from_ns: now_ns.saturating_add(quirks.torque_off_ns),
             offsets: Offsets::default(),
             is_target_limited: false,
-            faults: Acting::new(),
-            enabling_since_ns: None,
+            faults: DriveFaults::default(),
         }
-    }
-
-    /// Whether the axis follows targets.
-    pub(super) fn is_enabled(&self) -> bool {
-        self.power == DriveState::OperationEnabled
     }
 
     /// Goes into fault by itself; returns whether it was in none.
     pub(super) fn fail(&mut self, now_ns: u64) -> bool {
-        let fails = !self.is_in_fault();
-        self.enter(self.power.after_fault(), now_ns);
+        let fails = !self.power.is_in_fault();
+        self.enter(self.power.state.after_fault(), now_ns);
         fails
-    }
-
-    fn is_in_fault(&self) -> bool {
-        matches!(self.power, DriveState::FaultReactionActive | DriveState::Fault)
     }
 
     /// The state after power-on: the brake closes, and positions count from the encoder's own zero.
@@ -127,7 +101,7 @@ impl Axis {
         if mode != self.mode {
             self.mode = mode;
             self.interrupt_mode();
-            if self.is_enabled() {
+            if self.power.is_enabled() {
                 self.slow_down(now_ns, self.parameters.profile.deceleration_m_s2);
             }
         }
@@ -136,9 +110,9 @@ impl Axis {
     /// Obeys a controlword (6040h); returns whether the controlword ended a fault.
     pub(super) fn control(&mut self, now_ns: u64, word: Controlword, objects: &Objects) -> bool {
         let before = std::mem::replace(&mut self.controlword, word);
-        let was_fault = self.power == DriveState::Fault;
-        self.obey(word.command(before, self.power), now_ns);
-        if self.is_enabled() && self.leaves_for.is_none() {
+        let was_fault = self.power.state == DriveState::Fault;
+        self.obey(word.command(before, self.power.state), now_ns);
+        if self.power.is_operated() {
             let (words, view) = ([before, word], self.position_view(now_ns));
             let (target, method) = (objects.get(names::TARGET_POSITION), self.parameters.homing_method);
             let command = match self.mode {
@@ -151,24 +125,18 @@ impl Axis {
             };
             self.execute(command, now_ns);
         }
-        was_fault && self.power != DriveState::Fault
+        was_fault && self.power.state != DriveState::Fault
     }
 
     fn obey(&mut self, command: StateCommand, now_ns: u64) {
-        let next = if self.parameters.holds_quick_stop {
-            self.power.after_in_held_quick_stop(command)
-        } else {
-            self.power.after(command)
-        };
-        let next = if self.is_kept_off(next) { self.power } else { self.delayed(next, now_ns) };
-        if next == DriveState::ReadyToSwitchOn && now_ns < self.torque_from_ns {
-            return;
-        }
-        match (self.is_enabled(), command, next) {
+        let holds_quick_stop = self.parameters.holds_quick_stop;
+        let next = self.power.after(command, holds_quick_stop, now_ns, &mut self.faults);
+        let Some(next) = next else { return };
+        match (self.power.is_enabled(), command, next) {
             (true, StateCommand::Shutdown, next) => self.leave(next, self.parameters.shutdown_m_s2, now_ns),
             (true, StateCommand::SwitchOn, next) => self.leave(next, self.parameters.disable_m_s2, now_ns),
             _ => {
-                self.leaves_for = None;
+                self.power.leaves_for = None;
                 self.enter(next, now_ns);
             }
         }
@@ -177,58 +145,28 @@ impl Axis {
     /// Leaves "operation enabled": at once, or once the axis stands after a ramp.
     fn leave(&mut self, next: DriveState, deceleration_m_s2: Option<f64>, now_ns: u64) {
         let Some(deceleration_m_s2) = deceleration_m_s2 else { return self.enter(next, now_ns) };
-        if self.leaves_for.replace(next).is_none() {
+        if self.power.leaves_for.replace(next).is_none() {
             self.interrupt_mode();
             self.slow_down(now_ns, deceleration_m_s2);
         }
     }
 
-    /// Whether the drive would leave "switch on disabled" while the torque is safely off.
-    fn is_kept_off(&mut self, next: DriveState) -> bool {
-        let is_kept = self.faults.has(DriveFault::Sto)
-            && self.power == DriveState::SwitchOnDisabled
-            && next != self.power;
-        if is_kept {
-            self.faults.strike(DriveFault::Sto);
-        }
-        is_kept
-    }
-
-    /// The next state, where an injected fault delays "operation enabled".
-    fn delayed(&mut self, next: DriveState, now_ns: u64) -> DriveState {
-        let delay_s = self.faults.size(DriveFault::SlowEnable);
-        let is_enabling = next == DriveState::OperationEnabled && !self.is_enabled();
-        let Some(delay_s) = delay_s.filter(|_| is_enabling) else {
-            self.enabling_since_ns = None;
-            return next;
-        };
-        let since_ns = *self.enabling_since_ns.get_or_insert(now_ns);
-        if now_ns - since_ns >= (delay_s * SECOND_NS as f64) as u64 {
-            return next;
-        }
-        self.faults.strike(DriveFault::SlowEnable);
-        match self.power {
-            DriveState::ReadyToSwitchOn => DriveState::SwitchedOn,
-            power => power,
-        }
-    }
-
     /// Reacts by 6007h when nobody controls the drive any more; returns whether that put it into fault.
     pub(super) fn abort_connection(&mut self, now_ns: u64) -> bool {
-        let was_in_fault = self.is_in_fault();
+        let was_in_fault = self.power.is_in_fault();
         match self.parameters.abort_connection_option {
             0 => {}
-            1 => self.enter(self.power.after_fault(), now_ns),
+            1 => self.enter(self.power.state.after_fault(), now_ns),
             2 => self.obey(StateCommand::DisableVoltage, now_ns),
             _ => self.obey(StateCommand::QuickStop, now_ns),
         }
-        self.is_in_fault() && !was_in_fault
+        self.power.is_in_fault() && !was_in_fault
     }
 
     /// The buffered cyclic targets take effect; a position beyond the velocity limit is approached further.
     pub(super) fn synchronise(&mut self, now_ns: u64, new: NewTargets, objects: &Objects) {
-        let is_free = self.leaves_for.is_none() && self.drivetrain.brake.free_from_ns(now_ns) == now_ns;
-        if !self.is_enabled() || !is_free || self.ignores(new) {
+        let is_free = self.drivetrain.brake.free_from_ns(now_ns) == now_ns;
+        if !self.power.is_operated() || !is_free || self.ignores(new) {
             return;
         }
         self.offsets = Offsets::from_objects(objects, &self.config);
@@ -271,15 +209,22 @@ impl Axis {
         self.demand = Demand::Force { force_n };
     }
 
-    /// A step of the servo loops; returns the force until the next one, N, and whether the following error became a
-    /// fault.
-    pub(super) fn step(&mut self, now_ns: u64, shaft: Shaft) -> (f64, bool) {
+    /// A step of the servo loops with the shaft at a position; returns the force until the next one, N, and whether the
+    /// following error became a fault. `look` says what the encoder makes of its own position.
+    pub(super) fn step(
+        &mut self,
+        now_ns: u64,
+        position_m: f64,
+        look: impl FnOnce(f64) -> Look,
+    ) -> (f64, bool) {
         self.complete_transition(now_ns);
-        self.take_off_torque(now_ns);
-        let seen_m = shaft.seen_m + self.gear_error_m(now_ns);
-        let counts = self.coordinates.read(seen_m);
-        self.switches.look(shaft.is_m);
-        if self.is_enabled() && self.leaves_for.is_none() {
+        if let Some(state) = self.power.without_torque(&mut self.faults) {
+            self.enter(state, now_ns);
+        }
+        let Look { shown_m, seen_m } = look(position_m + self.gear_error_m(now_ns));
+        let counts = self.coordinates.read(shown_m);
+        self.switches.look(position_m);
+        if self.power.is_operated() {
             let is_at_rest = || self.demand.is_at_rest(now_ns);
             let command = match self.mode {
                 Mode::ProfilePosition => self.positioning.step(self.controlword, is_at_rest()),
@@ -291,7 +236,7 @@ impl Axis {
             };
             self.execute(command, now_ns);
         }
-        let places_m = [self.coordinates.encoder.metres(self.coordinates.counts), seen_m - shaft.is_m];
+        let places_m = [self.coordinates.counted_m(), seen_m - position_m];
         let command = self.servo_command(now_ns);
         let limits = self.servo_limits(command);
         let force_n = self.drivetrain.step(now_ns, places_m, command, &limits, &mut self.faults);
@@ -320,34 +265,16 @@ impl Axis {
     }
 
     /// Reads the encoder and takes the motor's mean force, as SYNC demands.
-    pub(super) fn sample(&mut self, now_ns: u64, seen_m: f64) {
+    pub(super) fn sample(&mut self, now_ns: u64, position_m: f64, look: impl FnOnce(f64) -> Look) {
         self.shown_n = self.drivetrain.motor_n.take_mean(now_ns);
-        let gear_error_m = self.gear_error_m(now_ns);
-        self.coordinates.read(seen_m + gear_error_m);
+        let Look { shown_m, .. } = look(position_m + self.gear_error_m(now_ns));
+        self.coordinates.read(shown_m);
     }
 
-    /// The distance of what the drive sees from the shaft. Only a fault asks for the demand, which costs two divisions.
+    /// The distance of the encoder from the shaft. Only a fault asks for the demand, which costs two divisions.
     fn gear_error_m(&mut self, now_ns: u64) -> f64 {
         let demand_m = if self.faults.is_empty() { None } else { self.demand.position_m(now_ns) };
         self.drivetrain.gear_error_m(demand_m, &mut self.faults)
-    }
-
-    /// While the torque is safely off, the drive stays in "switch on disabled", or in fault.
-    fn take_off_torque(&mut self, now_ns: u64) {
-        use DriveState::{
-            Fault, FaultReactionActive, OperationEnabled, QuickStopActive, ReadyToSwitchOn, SwitchOnDisabled,
-            SwitchedOn,
-        };
-        if !self.faults.has(DriveFault::Sto) {
-            return;
-        }
-        let state = match self.power {
-            ReadyToSwitchOn | SwitchedOn | OperationEnabled | QuickStopActive => SwitchOnDisabled,
-            FaultReactionActive => Fault,
-            _ => return,
-        };
-        self.faults.strike(DriveFault::Sto);
-        self.enter(state, now_ns);
     }
 
     /// Writes the state of the axis into the objects that show it.
@@ -361,21 +288,19 @@ impl Axis {
         objects.set(names::POSITION_DEMAND, demand);
         objects.set(names::ENCODER_COUNTS, self.coordinates.shown_counts());
         objects.set(names::POSITION_ACTUAL, actual);
-        objects.set(
-            names::VELOCITY_ACTUAL,
-            self.coordinates.encoder.nearest(self.drivetrain.servo.motion.velocity_m_s),
-        );
+        objects
+            .set(names::VELOCITY_ACTUAL, self.coordinates.nearest(self.drivetrain.servo.motion.velocity_m_s));
         objects.set(names::TORQUE_ACTUAL, torque.round() as i16);
         objects.set(names::FOLLOWING_ERROR, demand.saturating_sub(actual));
         objects.set(names::DIGITAL_INPUTS, self.switches.inputs());
     }
 
     fn statusword(&self, now_ns: u64) -> Statusword {
-        let is_enabled = self.is_enabled();
+        let is_enabled = self.power.is_enabled();
         let is_free = is_enabled && self.drivetrain.brake.free_from_ns(now_ns) == now_ns;
         let is_limited =
             self.is_target_limited || self.positioning.is_limited || self.drivetrain.servo.is_limited;
-        let word = Statusword::for_state(self.power)
+        let word = Statusword::for_state(self.power.state)
             .with(StatusBit::VoltageEnabled, true)
             .with(StatusBit::Remote, true)
             .with(StatusBit::InternalLimit, is_enabled && is_limited);
@@ -402,11 +327,11 @@ impl Axis {
     }
 
     fn enter(&mut self, state: DriveState, now_ns: u64) {
-        if state == self.power {
+        if state == self.power.state {
             return;
         }
-        (self.power, self.leaves_for) = (state, None);
-        self.following.restart(self.is_in_fault());
+        (self.power.state, self.power.leaves_for) = (state, None);
+        self.following.restart(self.power.is_in_fault());
         self.interrupt_mode();
         match state {
             DriveState::OperationEnabled => self.enable(now_ns),
@@ -433,16 +358,16 @@ impl Axis {
 
     /// The drive's own transitions: initialised, quick stop ended, fault reaction ended.
     fn complete_transition(&mut self, now_ns: u64) {
-        let is_complete = match self.power {
+        let is_complete = match self.power.state {
             DriveState::QuickStopActive => {
                 !self.parameters.holds_quick_stop && self.demand.is_at_rest(now_ns)
             }
             DriveState::FaultReactionActive => self.demand.is_at_rest(now_ns),
-            DriveState::OperationEnabled => self.leaves_for.is_some() && self.demand.is_at_rest(now_ns),
+            DriveState::OperationEnabled => self.power.leaves_for.is_some() && self.demand.is_at_rest(now_ns),
             _ => true,
         };
         if is_complete {
-            self.enter(self.leaves_for.unwrap_or(self.power.after_completion()), now_ns);
+            self.enter(self.power.leaves_for.unwrap_or(self.power.state.after_completion()), now_ns);
         }
     }
 
@@ -456,7 +381,7 @@ impl Axis {
         if !self.following.exceeds(now_ns, error_m, window_m, self.parameters.following_timeout_ns) {
             return false;
         }
-        self.enter(self.power.after_fault(), now_ns);
+        self.enter(self.power.state.after_fault(), now_ns);
         self.following.is_fault = true;
         true
     }

@@ -23,15 +23,6 @@ impl Motion {
     }
 }
 
-/// A shaft as its encoder sees it, and as it is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Shaft {
-    /// The position that the encoder sees, m.
-    pub(crate) seen_m: f64,
-    /// The true position, m.
-    pub(crate) is_m: f64,
-}
-
 /// The value clamped to `[low, high]`, and whether it was outside.
 pub(super) fn clamp(asked: f64, [low, high]: [f64; 2]) -> (f64, bool) {
     let kept = asked.max(low).min(high);

@@ -187,9 +187,9 @@ pub(crate) fn configure(objects: &mut Objects, drive: &Ratings, period_ns: u64, 
 #[cfg(test)]
 mod tests {
     use masseter_can::canopen::NodeId;
-    use masseter_scenario::DrivesConfig;
 
     use super::*;
+    use crate::simulator::drive::tests::LEG;
 
     fn near(a: f64, b: f64) -> bool {
         (a - b).abs() <= 1e-9 * b.abs()
@@ -197,7 +197,7 @@ mod tests {
 
     #[test]
     fn what_the_scenario_says_comes_back_in_si() {
-        let drive = Ratings::from(DrivesConfig::default().leg);
+        let drive = LEG;
         let mut objects = Objects::new(NodeId::new(1).unwrap());
         configure(&mut objects, &drive, MILLISECOND_NS, [-5, 7]);
         let parameters = Parameters::from_objects(&objects, &drive, &AxisQuirks::default());
@@ -213,7 +213,7 @@ mod tests {
 
     /// A drive whose dictionary differs from its abilities in every limit.
     fn objects() -> (Objects, Ratings) {
-        let drive = Ratings { encoder_resolution_m: 2e-6, ..Ratings::from(DrivesConfig::default().leg) };
+        let drive = Ratings { encoder_resolution_m: 2e-6, ..LEG };
         let mut objects = Objects::new(NodeId::new(1).unwrap());
         configure(&mut objects, &drive, MILLISECOND_NS, [-5, 7]);
         objects.set(names::MAX_VELOCITY, 150_000);
@@ -329,11 +329,7 @@ mod tests {
             ];
             (numbers.map(|number| objects.get(number)), objects.get(names::MAX_TORQUE), window)
         };
-        let drive = Ratings {
-            max_force_n: 600.0,
-            encoder_noise_m: 5e-6,
-            ..Ratings::from(DrivesConfig::default().leg)
-        };
+        let drive = Ratings { max_force_n: 600.0, encoder_noise_m: 5e-6, ..LEG };
         let (numbers, torque, window) = read(&drive);
         let ramp = 10_000_000;
         let expected = [2000, 400_000, 100_000, ramp / 4, ramp / 4, ramp, 20_000, 4000, ramp / 4];

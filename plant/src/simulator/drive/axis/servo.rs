@@ -152,9 +152,9 @@ impl FollowingErrorMonitor {
 
 #[cfg(test)]
 mod servo_tests {
-    use masseter_scenario::DrivesConfig;
 
     use super::*;
+    use crate::simulator::drive::tests::LEG;
 
     const STEP_S: f64 = 1.25e-4;
     const LIMITS: ServoLimits =
@@ -162,7 +162,7 @@ mod servo_tests {
 
     /// A mass with a constant load.
     fn simulate(command: impl Fn(f64) -> ServoCommand, mass_kg: f64, load_n: f64, seconds: f64) -> Motion {
-        let mut servo = Servo::new(Ratings::from(DrivesConfig::default().leg), STEP_S, 0.27);
+        let mut servo = Servo::new(LEG, STEP_S, 0.27);
         let (mut position_m, mut velocity_m_s, mut time_s) = (0.27, 0.0, 0.0);
         while time_s < seconds {
             let force_n = servo.step(position_m, 0.0, command(time_s), &LIMITS);
@@ -199,7 +199,7 @@ mod servo_tests {
 
     /// The force on an axis at rest far from its target, and whether it was limited.
     fn pull(limits: &ServoLimits) -> (f64, bool) {
-        let mut servo = Servo::new(Ratings::from(DrivesConfig::default().leg), STEP_S, 0.27);
+        let mut servo = Servo::new(LEG, STEP_S, 0.27);
         let force_n = servo.step(0.27, 0.0, ServoCommand::Follow(Motion::at_rest(5.0)), limits);
         (force_n, servo.is_limited)
     }
@@ -217,7 +217,7 @@ mod servo_tests {
 
     #[test]
     fn a_force_is_given_as_it_is_asked_for() {
-        let mut servo = Servo::new(Ratings::from(DrivesConfig::default().leg), STEP_S, 0.27);
+        let mut servo = Servo::new(LEG, STEP_S, 0.27);
         let force_n = servo.step(0.27, 0.0, ServoCommand::Force { force_n: -33.0 }, &LIMITS);
         assert!((force_n + 33.0).abs() < 1e-12 && !servo.is_limited);
         let force_n = servo.step(0.27, 0.0, ServoCommand::Force { force_n: 5000.0 }, &LIMITS);

@@ -18,17 +18,19 @@ use super::axis::Axis;
 use super::dictionary::{Objects, Overlay};
 use super::names;
 use super::table::PDOS;
-use crate::simulator::drive::axis::encoder::Encoder;
-use crate::simulator::drive::axis::motion::Shaft;
+use crate::simulator::drive::axis::encoder::Look;
+use crate::simulator::drive::faults::DriveFault;
 use crate::simulator::drive::{DriveMemory, DriveSettings, MILLISECOND_NS, NodeQuirks, Quirks, SECOND_NS};
 use crate::state::state;
-use masseter_scenario::DriveFault;
 use pdo::{Effects, Outbox, ProcessData, Rpdo, Tpdo};
 use sdo::{DictionaryAccess, SdoServer, Storage};
 use state::{BOOT_NS, Consumer, Errors, Nmt, Producer, clear_history};
 
 /// The emergency of which a storm consists: one of the device, without an error that would last (CiA 301: FFxxh).
 const STORM: EmergencyCode = EmergencyCode(0xFF00);
+
+/// For so long a heartbeat waits for the process data that answer SYNC, so that it never comes just before them, ns.
+const HEARTBEAT_WAIT_NS: u64 = MILLISECOND_NS;
 
 /// One drive.
 #[derive(Debug, Clone)]
@@ -54,13 +56,14 @@ pub(crate) struct DriveNode {
     outbox: Outbox,
     /// Whether the supply is off.
     is_off: bool,
-    /// When the next message of a storm of emergencies is due, ns.
+    /// The time between two messages of the storm of emergencies that acts, and when the next one is due, ns.
+    storm_every_s: Option<f64>,
     next_storm_ns: u64,
 }
 
 state!(DriveNode {
     values: objects due_fault restarts_at_ns storage axis nmt errors error_state producer consumer
-        process_data sdo outbox is_off next_storm_ns;
+        process_data sdo outbox is_off storm_every_s next_storm_ns;
     constant: id overlay quirks;
 });
 
@@ -69,12 +72,7 @@ impl DriveNode {
     ///
     /// # Errors
     /// The stored value that the drive does not take.
-    pub(crate) fn new(
-        settings: &DriveSettings,
-        encoder: Encoder,
-        now_ns: u64,
-        position_m: f64,
-    ) -> Result<Self, String> {
+    pub(crate) fn new(settings: &DriveSettings, now_ns: u64, position_m: f64) -> Result<Self, String> {
         let Quirks { node: quirks, overlay, .. } = &settings.quirks;
         let mut objects = settings.objects.clone();
         settings.memory.restore(&mut objects, overlay)?;
@@ -84,7 +82,7 @@ impl DriveNode {
         Ok(Self {
             id: settings.node,
             storage: Storage::new(&settings.objects, &objects, quirks.save_ns),
-            axis: Axis::new(settings, encoder, now_ns, position_m, &objects),
+            axis: Axis::new(settings, now_ns, position_m, &objects),
             nmt: Nmt::booting(now_ns, quirks.boot_ups),
             errors: Errors::new(quirks.fault),
             quirks: *quirks,
@@ -98,6 +96,7 @@ impl DriveNode {
             sdo: SdoServer::default(),
             outbox: Outbox::new(),
             is_off: false,
+            storm_every_s: None,
             next_storm_ns: 0,
             objects,
         })
@@ -138,9 +137,16 @@ impl DriveNode {
         }
     }
 
-    /// Takes a SYNC that arrived at `now_ns` with the encoder at `position_m`: buffered process data take effect,
-    /// actual values are sampled and sent.
-    pub(crate) fn take_sync(&mut self, now_ns: u64, frame: &Frame, position_m: f64) {
+    /// Takes a SYNC that arrived at `now_ns` with the shaft at `position_m`: buffered process data take effect, actual
+    /// values are sampled and sent. `look` says what the encoder makes of its own position. A heartbeat
+    /// that is due follows them.
+    pub(crate) fn take_sync(
+        &mut self,
+        now_ns: u64,
+        frame: &Frame,
+        position_m: f64,
+        look: impl FnOnce(f64) -> Look,
+    ) {
         if self.is_off || !self.nmt.is_served() {
             return;
         }
@@ -158,36 +164,33 @@ impl DriveNode {
         }
         self.axis.synchronise(now_ns, std::mem::take(&mut self.process_data.new_targets), &self.objects);
         if is_operational {
-            self.axis.sample(now_ns, position_m);
+            self.axis.sample(now_ns, position_m, look);
             self.axis.show(now_ns, &mut self.objects);
             self.process_data.send(&mut self.outbox, |tpdo| tpdo.at_sync(now_ns, counter, &self.objects));
+            self.beat(now_ns, 0);
         }
     }
 
-    /// A step of the servo loops: the force until the next one, N.
-    pub(crate) fn step(&mut self, now_ns: u64, shaft: Shaft) -> f64 {
+    /// A step of the servo loops with the shaft at `position_m`: the force until the next one, N. `look` says what the
+    /// encoder makes of its own position.
+    pub(crate) fn step(&mut self, now_ns: u64, position_m: f64, look: impl FnOnce(f64) -> Look) -> f64 {
         self.follow_supply(now_ns);
         if self.restarts_at_ns.take_if(|at_ns| now_ns >= *at_ns).is_some() {
             self.reset_node(now_ns);
         }
         if self.is_off {
-            return self.axis.step(now_ns, shaft).0;
+            return self.axis.step(now_ns, position_m, look).0;
         }
         if self.nmt.boot(now_ns) {
             self.outbox.add(Heartbeat { state: NmtState::BootUp }.frame(self.id));
             self.fail_at_power_on(now_ns);
         }
         self.storage.end_saving(now_ns, &mut self.objects);
-        if let Some(state) = self.nmt.state
-            && self.producer.is_due(now_ns)
-        {
-            self.outbox.add(Heartbeat { state }.frame(self.id));
-        }
         self.supervise_connection(now_ns);
         if let Some(abort) = self.sdo.expire(now_ns) {
             self.outbox.add(abort.frame(self.id));
         }
-        let (force_n, has_following_error) = self.axis.step(now_ns, shaft);
+        let (force_n, has_following_error) = self.axis.step(now_ns, position_m, look);
         if has_following_error {
             self.raise(EmergencyCode::FOLLOWING_ERROR);
         }
@@ -198,15 +201,26 @@ impl DriveNode {
             self.axis.show(now_ns, &mut self.objects);
             self.process_data.send(&mut self.outbox, |tpdo| tpdo.at_event(now_ns, &self.objects));
         }
+        let wait_ns = if self.nmt.is_operational() { HEARTBEAT_WAIT_NS } else { 0 };
+        self.beat(now_ns, wait_ns);
         force_n
+    }
+
+    /// Sends a heartbeat that has been due for `wait_ns`.
+    fn beat(&mut self, now_ns: u64, wait_ns: u64) {
+        if let Some(state) = self.nmt.state
+            && self.producer.is_due(now_ns, wait_ns)
+        {
+            self.outbox.add(Heartbeat { state }.frame(self.id));
+        }
     }
 
     /// Loses the supply, or boots when it is back. Without it the node is silent and the brake closed.
     fn follow_supply(&mut self, now_ns: u64) {
         let is_off = self.axis.faults.has(DriveFault::Reboot);
+        self.axis.faults.strike(DriveFault::Reboot);
         match (std::mem::replace(&mut self.is_off, is_off), is_off) {
             (false, true) => {
-                self.axis.faults.strike(DriveFault::Reboot);
                 self.axis.restart(now_ns, &self.objects);
                 self.outbox.0.clear();
             }
@@ -232,9 +246,11 @@ impl DriveNode {
             self.axis.faults.strike(DriveFault::Fault);
             self.raise(EmergencyCode::LOGIC_SUPPLY);
         }
-        if let Some(every_s) = self.axis.faults.size(DriveFault::EmcyStorm)
+        let every_s = self.axis.faults.size(DriveFault::EmcyStorm);
+        let is_another = std::mem::replace(&mut self.storm_every_s, every_s) != every_s;
+        if let Some(every_s) = every_s
             && self.nmt.is_served()
-            && now_ns >= self.next_storm_ns
+            && (is_another || now_ns >= self.next_storm_ns)
         {
             self.axis.faults.strike(DriveFault::EmcyStorm);
             self.next_storm_ns = now_ns + (every_s * SECOND_NS as f64) as u64;
@@ -326,13 +342,13 @@ impl DriveNode {
         }
         let Some(number) = self.process_data.receive(now_ns, frame) else { return };
         self.judge_process_data();
-        if !self.process_data.is_synchronous(number) {
+        if !self.process_data.rpdos[number].is_synchronous {
             self.apply_process_data(number, now_ns);
         }
     }
 
     fn apply_process_data(&mut self, number: usize, now_ns: u64) {
-        if let Some(effects) = self.process_data.apply(number, &mut self.objects) {
+        if let Some(effects) = self.process_data.rpdos[number].apply(&mut self.objects) {
             self.act(effects, now_ns);
         }
     }

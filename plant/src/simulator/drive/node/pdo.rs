@@ -52,16 +52,6 @@ impl ProcessData {
         self.rpdos.iter_mut().fold(false, |any, rpdo| rpdo.expires(now_ns) | any)
     }
 
-    /// Whether the data of an RPDO take effect at the next SYNC instead of at once.
-    pub(super) fn is_synchronous(&self, number: usize) -> bool {
-        self.rpdos[number].is_synchronous
-    }
-
-    /// Writes the received data of an RPDO into the dictionary; returns their other effects, if there were data.
-    pub(super) fn apply(&mut self, number: usize, objects: &mut Objects) -> Option<Effects> {
-        self.rpdos[number].apply(objects)
-    }
-
     /// Adds cyclic targets that wait for SYNC.
     pub(super) fn add_targets(&mut self, targets: NewTargets) {
         self.new_targets.position |= targets.position;
@@ -171,7 +161,7 @@ pub(crate) struct Rpdo {
     /// Its identifier; none where the PDO does not exist.
     id: Option<CanId>,
     /// Whether its data take effect at the next SYNC instead of at once.
-    is_synchronous: bool,
+    pub(super) is_synchronous: bool,
     deadline_ns: u64,
     mapped: Mapped,
     heard_ns: Option<u64>,

@@ -237,7 +237,7 @@ impl DictionaryAccess<'_> {
             0x1003 => allow(word == 0, AbortCode::INVALID_VALUE),
             0x1010 => {
                 allow(word == SAVE, AbortCode::NOT_STORED)?;
-                allow(!axis.is_enabled(), AbortCode::DEVICE_STATE)
+                allow(!axis.power.is_enabled(), AbortCode::DEVICE_STATE)
             }
             0x1011 => allow(word == LOAD, AbortCode::NOT_STORED),
             0x1014 => cob_id(CobId(objects.get(names::EMERGENCY_COB_ID)), CobId(word)),
@@ -267,7 +267,7 @@ impl DictionaryAccess<'_> {
                 allow(Homing::is_method(word as i8), AbortCode::INVALID_VALUE)?;
                 allow(!axis.homing.is_running(), AbortCode::DEVICE_STATE)
             }
-            0x60C2 => allow(!axis.is_enabled(), AbortCode::DEVICE_STATE),
+            0x60C2 => allow(!axis.power.is_enabled(), AbortCode::DEVICE_STATE),
             _ => Ok(()),
         }
     }

@@ -75,9 +75,9 @@ impl Producer {
         self.next_ns += self.interval_ns;
     }
 
-    /// Whether a heartbeat is due. The next one is due an interval later; missed ones are skipped.
-    pub(super) fn is_due(&mut self, now_ns: u64) -> bool {
-        if self.interval_ns == 0 || now_ns < self.next_ns {
+    /// Whether a heartbeat has been due for `wait_ns`. The next one is due an interval later; missed ones are skipped.
+    pub(super) fn is_due(&mut self, now_ns: u64, wait_ns: u64) -> bool {
+        if self.interval_ns == 0 || now_ns < self.next_ns + wait_ns {
             return false;
         }
         let missed = (now_ns - self.next_ns) / self.interval_ns;

@@ -10,8 +10,8 @@ const HOMING_MS: u64 = 12_000;
 impl Bench {
     /// A drive that has booted at a position.
     fn standing_at(position_m: f64) -> Self {
-        let (settings, encoder) = (settings(""), Encoder::new(1e-6, 0.0, 1, 0));
-        let drive = DriveNode::new(&settings, encoder, 0, position_m).unwrap();
+        let settings = settings();
+        let drive = DriveNode::new(&settings, 0, position_m).unwrap();
         let mut bench = Self { drive, position_m, ..Self::switched_on(&settings) };
         bench.run_ms(25);
         bench
@@ -141,10 +141,10 @@ fn shutdown_and_disable_operation_slow_down_where_their_options_say_so() {
             bench.control(word);
             bench.run_ms(2);
             let expected = if slows_down { DriveState::OperationEnabled } else { state };
-            assert_eq!(bench.drive.axis.power, expected, "{option:X}h");
+            assert_eq!(bench.drive.axis.power.state, expected, "{option:X}h");
             let before_m = bench.position_m;
             bench.run_ms(100);
-            assert_eq!(bench.drive.axis.power, state, "{option:X}h");
+            assert_eq!(bench.drive.axis.power.state, state, "{option:X}h");
             // 0.1 m/s at 2.5 m/s² take 2 mm, of which 2 ms are over.
             let way_m = bench.position_m - before_m;
             assert!(if slows_down { (way_m - 1.8e-3).abs() < 2e-4 } else { way_m < 2e-4 }, "{way_m} m");
@@ -160,7 +160,7 @@ fn a_command_to_enable_ends_a_shutdown_that_slows_down() {
     bench.run_ms(2);
     bench.control(0x0F);
     bench.run_ms(100);
-    assert_eq!(bench.drive.axis.power, DriveState::OperationEnabled);
+    assert_eq!(bench.drive.axis.power.state, DriveState::OperationEnabled);
 }
 
 /// 0.1 m/s at 2.5 m/s² (6084h) take 2 mm, at 10 m/s² (6085h) 0.5 mm.

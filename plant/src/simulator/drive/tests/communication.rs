@@ -48,8 +48,35 @@ fn heartbeats_missed_while_the_drive_was_stalled_are_skipped() {
     bench.now_ns += 470_000_000;
     bench.run_ms(1);
     assert_eq!(bench.heartbeats().len(), 1, "no burst");
-    bench.run_ms(99);
+    // Each waits a while for a SYNC.
+    bench.run_ms(100);
     assert_eq!(bench.heartbeats().len(), 3, "and then as ever");
+}
+
+/// The beat is due at various times of the cycle.
+#[test]
+fn a_heartbeat_follows_the_process_data_of_its_cycle() {
+    let beat = Cob::Heartbeat(id(4)).into();
+    for early_steps in 0..STEPS_PER_MS {
+        let mut bench = Bench::operational();
+        bench.write((0x1800, 2), &[1]).unwrap();
+        bench.run_steps(early_steps);
+        let mut beats = 0;
+        for _ in 0..100 {
+            let answers = bench.sync();
+            if let Some(place) = answers.iter().position(|frame| frame.id() == beat) {
+                assert!(place > 0 && place + 1 == answers.len(), "the process data come first");
+                beats += 1;
+            }
+            bench.sent.clear();
+            bench.run_ms(1);
+            assert_eq!(bench.heartbeats(), [], "no heartbeat comes between two SYNCs");
+        }
+        assert_eq!(beats, 2);
+    }
+    let mut silent = Bench::operational();
+    silent.run_ms(100);
+    assert_eq!(silent.heartbeats().len(), 3, "without SYNC it comes a little late, after the boot-up");
 }
 
 #[test]
@@ -87,7 +114,7 @@ fn a_reset_of_the_communication_stops_the_axis_in_pre_operational_too() {
     assert!(bench.velocity_m_s > 0.05);
     bench.nmt(NmtCommand::ResetCommunication);
     bench.run_ms(100);
-    assert_eq!(bench.drive.axis.power, DriveState::SwitchOnDisabled);
+    assert_eq!(bench.drive.axis.power.state, DriveState::SwitchOnDisabled);
     assert!(bench.velocity_m_s.abs() < 1e-3);
 }
 
@@ -98,7 +125,7 @@ fn a_reset_closes_the_brake_and_boots_anew() {
     bench.nmt(NmtCommand::ResetNode);
     bench.run_ms(25);
     assert_eq!(bench.heartbeats(), [NmtState::BootUp]);
-    assert_eq!(bench.drive.axis.power, DriveState::SwitchOnDisabled);
+    assert_eq!(bench.drive.axis.power.state, DriveState::SwitchOnDisabled);
     assert_eq!(bench.read((0x6061, 0)), Ok(8));
 }
 
@@ -110,10 +137,10 @@ fn a_lost_heartbeat_is_answered_as_object_6007_says() {
         bench.write((0x6007, 0), &option.to_le_bytes()).unwrap();
         bench.master_beats();
         bench.run_ms(140);
-        assert_eq!(bench.drive.axis.power, DriveState::OperationEnabled);
+        assert_eq!(bench.drive.axis.power.state, DriveState::OperationEnabled);
         assert_eq!(bench.emergencies(), []);
         bench.run_ms(60);
-        assert_eq!(bench.drive.axis.power, state, "6007 = {option}");
+        assert_eq!(bench.drive.axis.power.state, state, "6007 = {option}");
         assert_eq!(bench.emergencies()[0], EmergencyCode::HEARTBEAT);
         bench.master_beats();
         assert_eq!(bench.emergencies().last(), Some(&EmergencyCode::RESET));
@@ -130,12 +157,12 @@ fn an_aborted_connection_that_is_a_fault_is_reported_and_lasts_until_reset() {
         bench.nmt(NmtCommand::Start);
         bench.nmt(command);
         bench.run_ms(100);
-        assert_eq!(bench.drive.axis.power, DriveState::Fault);
+        assert_eq!(bench.drive.axis.power.state, DriveState::Fault);
         assert_eq!(bench.emergencies(), [EmergencyCode::COMMUNICATION], "{command:?}");
         bench.nmt(NmtCommand::EnterPreOperational);
         assert_eq!(bench.errors(), (0x11, 0x8100));
         bench.control(0x80);
-        assert_eq!(bench.drive.axis.power, DriveState::SwitchOnDisabled);
+        assert_eq!(bench.drive.axis.power.state, DriveState::SwitchOnDisabled);
         assert_eq!(bench.emergencies(), [EmergencyCode::COMMUNICATION, EmergencyCode::RESET]);
         assert_eq!(bench.errors(), (0, 0));
     }
@@ -155,12 +182,12 @@ fn process_data_that_stay_away_are_answered_as_object_6007_says() {
             bench.sync();
             bench.run_ms(1);
         }
-        assert_eq!(bench.drive.axis.power, DriveState::OperationEnabled);
+        assert_eq!(bench.drive.axis.power.state, DriveState::OperationEnabled);
         for _ in 0..100 {
             bench.master_beats();
             bench.run_ms(1);
         }
-        assert_eq!(bench.drive.axis.power, state, "6007 = {option}");
+        assert_eq!(bench.drive.axis.power.state, state, "6007 = {option}");
         assert_eq!(bench.emergencies()[0], EmergencyCode::RPDO_TIMEOUT);
     }
 }
@@ -209,7 +236,7 @@ fn a_drive_in_bus_off_stops_by_itself_and_reports_it_once_back() {
         bench.write((0x6007, 0), &option.to_le_bytes()).unwrap();
         bench.drive.set_error_state(bench.now_ns, ErrorState::BusOff);
         bench.run_ms(100);
-        assert_eq!(bench.drive.axis.power, state, "6007 = {option}");
+        assert_eq!(bench.drive.axis.power.state, state, "6007 = {option}");
         assert_eq!(bench.heartbeats().pop(), Some(NmtState::PreOperational));
         bench.sent.clear();
         bench.drive.set_error_state(bench.now_ns, ErrorState::Active);
@@ -230,7 +257,7 @@ fn an_error_passive_drive_reports_it_once_and_continues() {
     bench.run_ms(1);
     assert_eq!(bench.emergencies(), [EmergencyCode::ERROR_PASSIVE, EmergencyCode::RESET]);
     assert_eq!(bench.errors(), (0, 0));
-    assert_eq!(bench.drive.axis.power, DriveState::OperationEnabled);
+    assert_eq!(bench.drive.axis.power.state, DriveState::OperationEnabled);
 }
 
 #[test]

@@ -15,9 +15,9 @@ fn cyclic_targets_are_followed_from_sync_to_sync() {
 fn a_single_controlword_switches_on_and_enables() {
     let mut bench = Bench::enabled(PROFILE_POSITION);
     bench.control(0x06);
-    assert_eq!(bench.drive.axis.power, DriveState::ReadyToSwitchOn);
+    assert_eq!(bench.drive.axis.power.state, DriveState::ReadyToSwitchOn);
     bench.control(0x0F);
-    assert_eq!(bench.drive.axis.power, DriveState::OperationEnabled);
+    assert_eq!(bench.drive.axis.power.state, DriveState::OperationEnabled);
 }
 
 #[test]
@@ -31,7 +31,7 @@ fn a_target_written_long_before_moves_nothing_when_the_drive_is_enabled() {
         bench.sync();
         bench.run_ms(1);
     }
-    assert_eq!(bench.drive.axis.power, DriveState::OperationEnabled);
+    assert_eq!(bench.drive.axis.power.state, DriveState::OperationEnabled);
     assert!((bench.position() - START).abs() < 100);
 }
 
@@ -87,7 +87,7 @@ fn a_quick_stop_goes_as_object_605a_says() {
             assert!((slowed - ramp_m_s2).abs() < 0.2 * ramp_m_s2, "605A = {option}: {slowed} m/s²");
         }
         bench.run_ms(100);
-        assert_eq!(bench.drive.axis.power, state, "605A = {option}");
+        assert_eq!(bench.drive.axis.power.state, state, "605A = {option}");
         assert!(bench.velocity_m_s.abs() < 1e-3);
     }
 }
@@ -100,7 +100,7 @@ fn a_held_quick_stop_can_be_left_for_operation() {
     bench.run_ms(50);
     let here = bench.position();
     bench.cycle(0x0F, here);
-    assert_eq!(bench.drive.axis.power, DriveState::OperationEnabled);
+    assert_eq!(bench.drive.axis.power.state, DriveState::OperationEnabled);
     bench.run_ms(20);
     assert!(bench.is_near(here));
 }
@@ -115,14 +115,14 @@ fn a_following_error_is_a_fault_that_only_an_edge_resets() {
     bench.load_n = LOAD_N;
     bench.run_ms(200);
     assert_eq!(bench.emergencies(), [EmergencyCode::FOLLOWING_ERROR]);
-    assert_eq!(bench.drive.axis.power, DriveState::Fault);
+    assert_eq!(bench.drive.axis.power.state, DriveState::Fault);
     assert!(bench.has(StatusBit::FollowingError), "as long as the fault stands");
     assert_eq!(bench.read((0x603F, 0)), Ok(0x8611));
     assert_eq!(bench.read((0x1001, 0)), Ok(0x21));
     bench.cycle(0x0F, target);
-    assert_eq!(bench.drive.axis.power, DriveState::Fault);
+    assert_eq!(bench.drive.axis.power.state, DriveState::Fault);
     bench.cycle(0x80, target);
-    assert_eq!(bench.drive.axis.power, DriveState::SwitchOnDisabled);
+    assert_eq!(bench.drive.axis.power.state, DriveState::SwitchOnDisabled);
     assert_eq!(bench.emergencies().last(), Some(&EmergencyCode::RESET));
     assert_eq!((bench.read((0x603F, 0)), bench.read((0x1001, 0))), (Ok(0), Ok(0)));
     assert!(!bench.has(StatusBit::FollowingError));
@@ -139,7 +139,7 @@ fn a_window_left_for_less_than_its_time_out_is_no_following_error() {
     assert!(!bench.has(StatusBit::FollowingError));
     bench.load_n = LOAD_N;
     bench.cycle(0x0F, target);
-    assert_eq!(bench.drive.axis.power, DriveState::OperationEnabled);
+    assert_eq!(bench.drive.axis.power.state, DriveState::OperationEnabled);
 }
 
 #[test]
@@ -148,7 +148,7 @@ fn without_a_window_no_following_error_is_seen() {
     bench.write((0x6065, 0), &u32::MAX.to_le_bytes()).unwrap();
     bench.load_n = 2000.0;
     bench.run_ms(60);
-    assert_eq!(bench.drive.axis.power, DriveState::OperationEnabled);
+    assert_eq!(bench.drive.axis.power.state, DriveState::OperationEnabled);
 }
 
 /// Object 605E: with 0 the brake closes at once, else the drive brakes before it is in fault.
@@ -164,9 +164,9 @@ fn a_fault_is_reacted_to_as_object_605e_says() {
         bench.write((0x6007, 0), &1_u16.to_le_bytes()).unwrap();
         bench.nmt(NmtCommand::EnterPreOperational);
         bench.run_ms(1);
-        assert_eq!(bench.drive.axis.power, state, "605E = {option}");
+        assert_eq!(bench.drive.axis.power.state, state, "605E = {option}");
         bench.run_ms(100);
-        assert_eq!(bench.drive.axis.power, DriveState::Fault);
+        assert_eq!(bench.drive.axis.power.state, DriveState::Fault);
     }
 }
 
@@ -320,7 +320,7 @@ fn a_quick_stop_out_of_torque_brakes_and_holds() {
     assert!(bench.velocity_m_s > 0.1);
     bench.control(0x02);
     bench.run_ms(150);
-    assert_eq!(bench.drive.axis.power, DriveState::SwitchOnDisabled);
+    assert_eq!(bench.drive.axis.power.state, DriveState::SwitchOnDisabled);
     assert!(bench.velocity_m_s.abs() < 1e-3);
 }
 
@@ -331,7 +331,7 @@ fn a_mode_that_changes_in_motion_brings_the_axis_to_rest() {
     assert_eq!(bench.read((0x6061, 0)), Ok(1));
     bench.run_ms(100);
     assert!(bench.velocity_m_s.abs() < 1e-3);
-    assert_eq!(bench.drive.axis.power, DriveState::OperationEnabled);
+    assert_eq!(bench.drive.axis.power.state, DriveState::OperationEnabled);
     bench.write(MODE, &[CYCLIC_POSITION as u8]).unwrap();
     let here = bench.position();
     bench.cycle(0x0F, here);

@@ -40,9 +40,9 @@ fn a_synchronous_pdo_takes_effect_at_sync_and_the_newest_counts() {
     bench.receive(pdo(0x204, &[0x07, 0, 0, 0, 0, 0]));
     bench.receive(pdo(0x204, &[0x06, 0, 0, 0, 0, 0]));
     bench.run_ms(1);
-    assert_eq!(bench.drive.axis.power, DriveState::SwitchOnDisabled);
+    assert_eq!(bench.drive.axis.power.state, DriveState::SwitchOnDisabled);
     bench.sync();
-    assert_eq!(bench.drive.axis.power, DriveState::ReadyToSwitchOn);
+    assert_eq!(bench.drive.axis.power.state, DriveState::ReadyToSwitchOn);
 }
 
 #[test]
@@ -50,7 +50,7 @@ fn an_event_driven_pdo_takes_effect_at_once() {
     let mut bench = Bench::operational();
     bench.write((0x1400, 2), &[255]).unwrap();
     bench.receive(pdo(0x204, &[0x06, 0, 0, 0, 0, 0]));
-    assert_eq!(bench.drive.axis.power, DriveState::ReadyToSwitchOn);
+    assert_eq!(bench.drive.axis.power.state, DriveState::ReadyToSwitchOn);
 }
 
 #[test]
@@ -151,10 +151,10 @@ fn process_data_of_a_wrong_length_are_reported_and_short_ones_not_used() {
     let mut bench = Bench::operational();
     bench.receive(pdo(0x204, &[0x06, 0]));
     bench.sync();
-    assert_eq!(bench.drive.axis.power, DriveState::SwitchOnDisabled);
+    assert_eq!(bench.drive.axis.power.state, DriveState::SwitchOnDisabled);
     bench.receive(pdo(0x204, &[0x06, 0, 0, 0, 0, 0, 0]));
     bench.sync();
-    assert_eq!(bench.drive.axis.power, DriveState::ReadyToSwitchOn);
+    assert_eq!(bench.drive.axis.power.state, DriveState::ReadyToSwitchOn);
     assert_eq!(bench.emergencies(), [EmergencyCode::PDO_LENGTH, EmergencyCode::PDO_LENGTH_EXCEEDED]);
 }
 

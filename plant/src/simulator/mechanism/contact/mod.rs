@@ -4,20 +4,20 @@
 //! shorter than the fastest oscillation of the mechanism on its contacts allows.
 
 pub(crate) mod food;
-mod teeth;
+pub(crate) mod teeth;
 
 #[cfg(test)]
 mod tests;
 
 use arrayvec::ArrayVec;
+use masseter_model::dynamics::DynamicsConfig;
 use masseter_model::geometry::{Pose, Twist, Vec3};
 use masseter_runtime::messages::Contact;
-use masseter_scenario::{DynamicsConfig, MOST_PAIRS, Scenario};
 use nalgebra::{Matrix6, Vector6};
 
 use crate::error::ContactError;
 use food::{Food, FoodBreak};
-use teeth::{Enamel, Pair};
+use teeth::{Enamel, MOST_PAIRS, Pair, Tooth};
 
 /// What acts between the jaws.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
@@ -26,7 +26,7 @@ pub(crate) struct Occlusion {
     pairs: ArrayVec<Pair, MOST_PAIRS>,
     /// The contact of each pair; none where the teeth never meet.
     enamel: ArrayVec<Enamel, MOST_PAIRS>,
-    food: Option<Food>,
+    pub(crate) food: Option<Food>,
     /// Force on each lower tooth, base axes, N.
     forces_n: [Vec3; MOST_PAIRS],
     /// Sum of these forces since the last message, N.
@@ -39,24 +39,20 @@ pub(crate) struct Occlusion {
 }
 
 impl Occlusion {
-    /// Teeth and food of a scenario, for a mouth that is closed in that pose of the platform.
-    pub(crate) fn new(scenario: &Scenario, closed: &Pose) -> Self {
-        let arch = if scenario.has_contact() { scenario.arch() } else { Vec::new() };
+    /// Teeth for a mouth that is closed in that pose of the platform, each with the stiffest contact that it may have (N/m).
+    /// Without enamel they meet food alone.
+    pub(crate) fn new(teeth: &[(Tooth, f64)], enamel: Option<&Enamel>, closed: &Pose) -> Self {
+        let teeth = &teeth[..teeth.len().min(MOST_PAIRS)];
         let pairs: ArrayVec<_, MOST_PAIRS> =
-            arch.iter().take(MOST_PAIRS).map(|tooth| Pair::new(tooth, closed)).collect();
-        let enamel =
-            scenario.teeth.iter().flat_map(|teeth| pairs.iter().map(|_| Enamel::new(teeth))).collect();
+            teeth.iter().map(|(tooth, _)| Pair::new(tooth, closed)).collect();
+        let enamel = enamel.into_iter().flat_map(|enamel| pairs.iter().map(|_| enamel.clone())).collect();
         let mut stiffness = Matrix6::zeros();
-        for pair in &pairs {
-            let on_tooth = scenario.foods().filter(|food| food.teeth.contains(&pair.number));
-            let shares = on_tooth.map(|food| food.stiffest_n_per_m() / food.teeth.len() as f64);
-            let of_teeth = scenario.teeth.iter().map(|teeth| teeth.stiff_n_per_m.max(teeth.soft_n_per_m));
-            let (jacobian, stiffest) = (pair.jacobian(closed), shares.chain(of_teeth).fold(0.0, f64::max));
-            stiffness += jacobian.transpose() * jacobian * stiffest;
+        for (pair, (_, stiffest_n_per_m)) in pairs.iter().zip(teeth) {
+            let jacobian = pair.jacobian(closed);
+            stiffness += jacobian.transpose() * jacobian * *stiffest_n_per_m;
         }
         let zero = [Vec3::zeros(); MOST_PAIRS];
-        let food = scenario.food.as_ref().map(|food| Food::new(food, &arch));
-        Self { pairs, enamel, food, forces_n: zero, sums_n: zero, steps: 0, broke: None, stiffness }
+        Self { pairs, enamel, food: None, forces_n: zero, sums_n: zero, steps: 0, broke: None, stiffness }
     }
 
     /// Refuses a step (ns) that does not resolve the contact for a platform of this mass matrix: longer than a radian of the

@@ -9,8 +9,21 @@
 //! contact comes.
 
 use masseter_model::geometry::{Pose, Twist, Vec3};
-use masseter_scenario::{TeethConfig, ToothConfig};
 use nalgebra::{Matrix3x6, Point3};
+
+/// Room for the contact of this many pairs of teeth: all lower ones.
+pub(crate) const MOST_PAIRS: usize = 16;
+
+/// A lower tooth.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Tooth {
+    /// Its FDI number.
+    pub(crate) number: u8,
+    /// Where it meets its antagonist in the closed mouth, platform frame, m.
+    pub(crate) point_m: [f64; 3],
+    /// Normal of the face on which they meet, from the lower tooth to its antagonist, platform frame of the closed mouth.
+    pub(crate) normal: [f64; 3],
+}
 
 /// The pair.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
@@ -46,7 +59,7 @@ pub(super) struct Touch {
 
 impl Pair {
     /// A tooth and its antagonist in a mouth that is closed in that pose of the platform.
-    pub(super) fn new(tooth: &ToothConfig, closed: &Pose) -> Self {
+    pub(super) fn new(tooth: &Tooth, closed: &Pose) -> Self {
         Self {
             number: tooth.number,
             lower_m: Vec3::from(tooth.point_m),
@@ -77,32 +90,20 @@ impl Pair {
 
 /// The contact of a pair of teeth.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
-pub(super) struct Enamel {
-    clearance_m: f64,
-    soft_n_per_m: f64,
-    soft_up_to_n: f64,
-    stiff_n_per_m: f64,
-    damping_s_per_m: f64,
-    friction: Friction,
-    grip: Grip,
+pub(crate) struct Enamel {
+    /// Distance of the teeth in the closed mouth, m.
+    pub(crate) clearance_m: f64,
+    /// Stiffness of a tooth in its ligament under forces up to `soft_up_to_n` (N), and under larger ones, N/m.
+    pub(crate) soft_n_per_m: f64,
+    pub(crate) soft_up_to_n: f64,
+    pub(crate) stiff_n_per_m: f64,
+    /// Damping of Hunt and Crossley, s/m.
+    pub(crate) damping_s_per_m: f64,
+    pub(crate) friction: Friction,
+    pub(crate) grip: Grip,
 }
 
 impl Enamel {
-    pub(super) fn new(teeth: &TeethConfig) -> Self {
-        let &TeethConfig { clearance_m, soft_n_per_m, soft_up_to_n, stiff_n_per_m, damping_s_per_m, .. } =
-            teeth;
-        let friction = Friction { coefficient: teeth.friction, stiffness_n_per_m: stiff_n_per_m };
-        Self {
-            clearance_m,
-            soft_n_per_m,
-            soft_up_to_n,
-            stiff_n_per_m,
-            damping_s_per_m,
-            friction,
-            grip: Grip::default(),
-        }
-    }
-
     /// The force on the lower tooth, base axes, N.
     pub(super) fn force_n(&mut self, touch: &Touch) -> Vec3 {
         let elastic_n = self.elastic_n(-touch.gap_m - self.clearance_m);
@@ -122,16 +123,16 @@ impl Enamel {
 
 /// The friction of a contact.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
-pub(super) struct Friction {
+pub(crate) struct Friction {
     /// Largest lateral force as a share of the normal one.
-    pub(super) coefficient: f64,
+    pub(crate) coefficient: f64,
     /// Stiffness of the faces along each other, N/m.
-    pub(super) stiffness_n_per_m: f64,
+    pub(crate) stiffness_n_per_m: f64,
 }
 
 /// Where a lower tooth holds to the other face.
 #[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
-pub(super) struct Grip {
+pub(crate) struct Grip {
     /// Where the spring would be slack, base frame, m; none without contact.
     anchor_m: Option<Vec3>,
 }
@@ -161,11 +162,13 @@ pub(super) fn contact_force_n(elastic_n: f64, damping_s_per_m: f64, closing_m_s:
 
 #[cfg(test)]
 mod enamel_tests {
+    use masseter_scenario::TeethConfig;
+
     use super::*;
 
     #[test]
     fn a_tooth_is_soft_up_to_4_n_and_then_ten_times_stiffer() {
-        let enamel = Enamel::new(&TeethConfig::default());
+        let enamel = Enamel::from(&TeethConfig::default());
         for (compression_um, expected_n) in [(-5.0, 0.0), (10.0, 2.0), (20.0, 4.0), (30.0, 24.0)] {
             let found_n = enamel.elastic_n(compression_um * 1e-6);
             assert!((found_n - expected_n).abs() < 1e-9, "{found_n} N at {compression_um} µm");

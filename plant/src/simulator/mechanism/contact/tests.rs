@@ -1,6 +1,6 @@
 //! Laws that the contact between the jaws keeps.
 
-use masseter_scenario::{FoodConfig, TeethConfig, ToothConfig};
+use masseter_scenario::{FoodConfig, Scenario, TeethConfig, ToothConfig};
 use nalgebra::{Matrix3, Vector3};
 
 use super::*;
@@ -16,7 +16,7 @@ fn teeth() -> TeethConfig {
 fn occlusion(teeth: TeethConfig, food: Option<FoodConfig>) -> Occlusion {
     let scenario = Scenario { teeth: Some(teeth), food, ..Scenario::default() };
     scenario.validate().unwrap();
-    Occlusion::new(&scenario, &Pose::translation(0.0, 0.0, CLOSED_M))
+    crate::simulator::emulation::jaw::occlusion(&scenario, &Pose::translation(0.0, 0.0, CLOSED_M))
 }
 
 /// The platform that much above the closed mouth, m.

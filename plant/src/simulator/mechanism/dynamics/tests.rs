@@ -1,9 +1,10 @@
 //! Laws of mechanics that the dynamics keep.
 
+use masseter_model::dynamics::{AxesConfig, FrictionConfig, FrictionModel};
 use masseter_model::geometry::MechanismConfig;
-use masseter_scenario::{AxesConfig, FrictionConfig, FrictionModel};
 
 use super::*;
+use crate::simulator::emulation::jaw::occlusion;
 
 #[path = "../../../../../shared/model/tests/energy/mod.rs"]
 mod energy;
@@ -24,7 +25,7 @@ fn at_rest(config: &DynamicsConfig) -> Dynamics {
 
 /// Jaws that never touch.
 fn without_contact() -> Occlusion {
-    Occlusion::new(&masseter_scenario::Scenario::default(), &Pose::identity())
+    occlusion(&masseter_scenario::Scenario::default(), &Pose::identity())
 }
 
 /// Without friction, and with its end stops far away.
@@ -226,6 +227,7 @@ mod reference {
 
     use super::super::*;
     use super::Energy;
+    use crate::simulator::emulation::jaw::occlusion;
 
     /// Steps in which one row of forces acts: 1 ms.
     const STEPS_PER_ROW: usize = 8;
@@ -277,8 +279,7 @@ mod reference {
         let [start] = *rows::<13>(&folder.join("start.csv")) else { panic!("one start") };
         let (pose, twist) = motion_of(&start);
         let mut dynamics =
-            Dynamics::new(mechanism, config, pose, Occlusion::new(&Scenario::default(), &pose), [0.0; 3])
-                .unwrap();
+            Dynamics::new(mechanism, config, pose, occlusion(&Scenario::default(), &pose), [0.0; 3]).unwrap();
         dynamics.state.twist = twist;
         let mut path = String::new();
         for force_n in rows::<AXES>(&folder.join("forces.csv")) {

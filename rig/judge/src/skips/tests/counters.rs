@@ -28,7 +28,7 @@ fn counters_are_those_of_the_messages() {
         ..State::default()
     };
     for (first, counters) in [(1, Counters::from(&reading)), (11, Counters::from(&state))] {
-        let Counters { seq, skipped, stalled_ns, spun_ns, worked_ns, overlong_ns, late_ns } = counters;
+        let Counters { seq, skipped, stalled_ns, spun_ns, worked_ns, overlong_ns, late_ns, .. } = counters;
         let found = [seq, skipped, stalled_ns, spun_ns, worked_ns, overlong_ns, late_ns];
         assert_eq!(found, std::array::from_fn(|place| first + place as u64));
         let mut skips = Skips::default();

@@ -8,8 +8,8 @@ use masseter_scenario::{BusFault, CpuDmaLatency, FaultConfig, Scenario};
 
 use super::*;
 use crate::{
-    Analysis, Code, FaultFigures, MotionFigures, OverrunAttribution, PoseErrors, ResponseFigures,
-    SkipFigures, TopicFigures, TrackingFigures, UndisturbedFigures,
+    Analysis, Code, FaultFigures, LoopCounts, MotionFigures, Overrun, OverrunAttribution, OverrunCause,
+    PoseErrors, ResponseFigures, SkipFigures, TopicFigures, TrackingFigures, UndisturbedFigures,
 };
 
 mod disturbed;
@@ -38,6 +38,7 @@ impl Run {
             lag_ms: Some(0.0),
             missed_commands: 0,
             missed_in_a_row: 0,
+            late_commands: 0,
         };
         figures.tracking = TrackingFigures {
             samples: 1000,
@@ -107,6 +108,29 @@ impl Run {
         self.figures.overrun_attribution =
             Some(OverrunAttribution { while_working, while_waiting: 1, work_share: 0.25, chance });
     }
+
+    /// The controller took 100 ms for a cycle, for this reason.
+    fn overrun(&mut self, cause: OverrunCause) {
+        let deadlines = |is_so| if is_so { 99 } else { 0 };
+        self.figures.controller_skips = SkipFigures {
+            skipped: 99,
+            while_working: 99,
+            working_by_loop: deadlines(cause.is_own()),
+            working_by_machine: deadlines(cause == OverrunCause::Machine),
+            ..SkipFigures::default()
+        };
+        let lasted_ns = 100_000_000;
+        let counts =
+            LoopCounts { looked_over_ns: 120_000_000, cpu_ns: Some(6_000_000), ..LoopCounts::default() };
+        let overrun = Overrun { process: "controller", cycle: 700, lasted_ns, skipped: 99, cause, counts };
+        self.figures.overruns.push(overrun);
+        self.figures.overrun_attribution = (cause == OverrunCause::Unknown).then_some(OverrunAttribution {
+            while_working: 1,
+            while_waiting: 0,
+            work_share: 0.25,
+            chance: 0.25,
+        });
+    }
 }
 
 fn results(verdict: &Verdict) -> Vec<(&str, &'static str)> {
@@ -124,6 +148,7 @@ fn a_run_without_anything_wrong_passes_every_check() {
         "motion lag",
         "commands missed",
         "timing",
+        "commands late",
         "dropped messages",
         "bus response",
     ]
@@ -139,6 +164,7 @@ fn a_run_without_anything_wrong_passes_every_check() {
             "0.0 ms, limit 20 ms",
             "0 cycles, 0 in a row, limit 20",
             "held, limit of the rig 0",
+            "0 commands",
             "0",
             "closest: SYNC on bus 0 took 150.00 µs, bound 190.00 µs",
         ]

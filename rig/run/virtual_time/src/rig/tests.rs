@@ -138,8 +138,8 @@ fn with_fault(seed: u64, fault: &str, time_s: f64) -> Scenario {
     with_keys(&format!("seed = {seed}\n[[faults]]\n{fault} = {time_s:.3}\n"))
 }
 
-/// Other faults, which need not strike.
-const OTHER_FAULTS: [&str; 12] = [
+/// Other faults, which need not strike; the last ones overlap.
+const OTHER_FAULTS: [&str; 16] = [
     "kind = 'corrupt'\nbus = 0\nprobability = 0.1\nat_s",
     "kind = 'lose'\nbus = 1\nprobability = 0.1\nat_s",
     "kind = 'delay'\nbus = 0\nsize = '1500 us'\nprobability = 0.05\nat_s",
@@ -152,14 +152,24 @@ const OTHER_FAULTS: [&str; 12] = [
     "kind = 'payload'\nsize = '0.5 kg'\nat_s",
     "kind = 'command_jump'\naxis = 'l2'\nsize = '1 mm'\nfor_s = 0.02\nat_s",
     "kind = 'controller_stall'\nsize = '50 ms'\nat_s",
+    "kind = 'encoder_stuck'\naxis = 'l3'\nat_s = 0.05\n\
+     [[faults]]\nkind = 'encoder_stuck'\naxis = 'l3'\nfor_s = 0.02\nat_s",
+    "kind = 'emcy_storm'\naxis = 'l1'\nsize = '5 ms'\nat_s = 0.05\n\
+     [[faults]]\nkind = 'emcy_storm'\naxis = 'l1'\nsize = '7 ms'\nfor_s = 0.02\nat_s",
+    "kind = 'play'\naxis = 'l2'\nsize = '0.1 mm'\nat_s = 0.05\n\
+     [[faults]]\nkind = 'play'\naxis = 'l2'\nsize = '0.2 mm'\nfor_s = 0.02\nat_s",
+    "kind = 'friction'\naxis = 'd1'\nsize = '3'\nat_s = 0.05\n\
+     [[faults]]\nkind = 'friction'\naxis = 'd1'\nsize = '2'\nfor_s = 0.02\nat_s",
 ];
 
 /// What a scenario has beside a fault.
-const FURNISHED: [&str; 6] = [
+const FURNISHED: [&str; 7] = [
     "",
     "[food]\n[teeth]\n",
     "[food]\nkind = 'peanut'\n[load_cell]\n[dynamics.friction]\nmodel = 'lugre'\n",
     "[food]\n[[stimulus]]\nat_s = 0.1\nfood = { stiffness_n_per_m = 5000.0, strength_n = 50.0 }\n",
+    "[food]\n[[stimulus]]\nat_s = 0.05\nfor_s = 0.3\nfood = { stiffness_n_per_m = 5000.0 }\n\
+     [[stimulus]]\nat_s = 0.1\nfor_s = 0.05\nfood = { stiffness_n_per_m = 8000.0 }\n",
     "[[drives.quirk]]\nkind = 'two_boot_ups'\n[[drives.quirk]]\nkind = 'restarts'\nafter_s = 0.7\naxes = ['l2']\n",
     "[[stimulus]]\nat_s = 0.05\nfor_s = 0.3\nshape = 'half_sine'\npush_n = [0.0, 0.0, -4.0]\n",
 ];

@@ -14,6 +14,8 @@ use self::result::{events_section, live_sections, named_section, requirements_se
 use self::rig::{buses_section, circumstances_section, timing_section};
 use self::times::{moments, phases, time};
 
+pub(crate) use self::result::mark;
+
 /// The page.
 pub(crate) fn html(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Result<String, PageError> {
     let first = vec![result_section(manifest, figures, verdict)];

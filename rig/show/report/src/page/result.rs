@@ -36,7 +36,7 @@ pub(super) fn result_section(manifest: &Manifest, figures: &Figures, verdict: &V
 }
 
 /// The word for a result as a cell.
-pub(super) fn mark(result: CheckResult) -> masseter_page::Cell {
+pub(crate) fn mark(result: CheckResult) -> masseter_page::Cell {
     let tone = match result {
         CheckResult::Passed => Tone::Good,
         CheckResult::Failed => Tone::Bad,

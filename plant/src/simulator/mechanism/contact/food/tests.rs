@@ -1,15 +1,13 @@
 //! How foods give way, bite after bite.
 
+use masseter_scenario::FoodConfig;
+
 use super::*;
 
 const STEP_S: f64 = 1e-5;
 /// Period of a chew, s, and how far it opens the teeth, m.
 const CHEW_S: f64 = 0.7;
 const OPEN_M: f64 = 0.012;
-
-fn tooth(number: u8) -> ToothConfig {
-    ToothConfig { number, point_m: [0.0; 3], normal: [0.0, 0.0, 1.0] }
-}
 
 fn touch(gap_m: f64, closing_m_s: f64) -> Touch {
     Touch {
@@ -31,7 +29,7 @@ struct Bite {
 
 impl Bite {
     fn new(config: &FoodConfig) -> Self {
-        Self { food: Food::new(config, &[tooth(36)]), broke: Vec::new() }
+        Self { food: Food::new(config.into(), &[36]), broke: Vec::new() }
     }
 
     /// The force at a gap while the gap shrinks at a speed, N.
@@ -170,7 +168,7 @@ fn no_chew_of_any_food_gives_more_work_than_it_takes() {
 #[test]
 fn several_teeth_share_a_piece_by_place() {
     let config = FoodConfig { teeth: vec![36, 37], ..undamped("soft") };
-    let mut food = Food::new(&config, &[tooth(36), tooth(37)]);
+    let mut food = Food::new((&config).into(), &[36, 37]);
     food.columns.iter_mut().for_each(|column| column.thickness_m = food.collected_m);
     let mut forces_n = [Vec3::zeros(); 2];
     food.bite(&[touch(0.008, 0.0), touch(0.006, 0.0)], &mut forces_n);

@@ -176,7 +176,10 @@ fn checks_that_the_machine_may_explain_are_marked() {
         ("sequence", "ok"),
         ("tracking", "lost"),
         ("estimated tracking", "ok"),
+        ("motion lag", "ok"),
+        ("commands missed", "ok"),
         ("timing", "skip"),
+        ("commands late", "ok"),
         ("dropped messages", "ok"),
         ("bus response", "ok"),
     ];
@@ -225,4 +228,68 @@ fn a_busy_core_is_a_remark_on_a_run_that_does_not_pass() {
     assert_eq!(busy(0.9, 0.2), "failed: tracking");
     let said = busy(0.92, 0.2);
     assert!(said.starts_with("failed: tracking; the controller kept its core busy for 92 %"), "{said}");
+}
+
+/// One stretch of work is enough where the counters show whose fault it was.
+#[test]
+fn a_stretch_of_work_with_a_certain_cause_is_no_matter_of_chance() {
+    use OverrunCause::{Computed, Machine, Slept, Unknown};
+    let verdict = |cause, is_stopped| {
+        let mut run = Run::new();
+        run.overrun(cause);
+        // Ten times as many cycles, so that the machine may lose these.
+        run.figures.cycles = 10_000;
+        if is_stopped {
+            run.manifest.ending = Ending::SafeStop;
+            run.figures.outage = Some(Outage { missed: 99, of: 100 });
+        }
+        Verdict::new(&run.manifest, &run.figures)
+    };
+    for (cause, exit, stopped) in [
+        (Slept, Exit::Failed, Exit::SafeStop),
+        (Computed, Exit::Failed, Exit::SafeStop),
+        (Machine, Exit::Passed, Exit::Invalid),
+        (Unknown, Exit::Passed, Exit::Invalid),
+    ] {
+        let found = [false, true].map(|is_stopped| verdict(cause, is_stopped).exit_code);
+        assert_eq!(found, [exit, stopped], "{cause:?}");
+    }
+    let culprit = "the controller slept or waited for 100.0 ms in cycle 700 (of 120.0 ms: CPU time 6.0 ms, ";
+    let failed = verdict(Slept, false);
+    assert!(failed.reason.starts_with(&format!("failed: timing; {culprit}")), "{}", failed.reason);
+    assert_eq!(failed.timing.to_string(), "missed by the controller (99)");
+    assert!(verdict(Slept, true).reason.contains(culprit));
+    let uncertain = verdict(Unknown, true).reason;
+    assert!(
+        uncertain.contains("whose fault is not certain: the controller worked, slept or had no core"),
+        "{uncertain}"
+    );
+    let without_real_time = |cause| {
+        let mut run = Run::new();
+        run.refuse();
+        run.overrun(cause);
+        run.figures.cycles = 10_000;
+        Verdict::new(&run.manifest, &run.figures).exit_code
+    };
+    assert_eq!(without_real_time(Slept), Exit::Failed, "a sleep needs no priority");
+    assert_eq!(without_real_time(Unknown), Exit::Passed);
+}
+
+#[test]
+fn late_commands_are_told_and_judged_by_the_tracking() {
+    let late = |commands: u64| {
+        let mut run = Run::new();
+        run.figures.motion.late_commands = commands;
+        Verdict::new(&run.manifest, &run.figures)
+    };
+    let found = |verdict: &Verdict| {
+        let check = verdict.checks.iter().find(|check| check.name == "commands late").unwrap();
+        (check.result, check.finding.clone())
+    };
+    assert_eq!(found(&late(20)), (CheckResult::Passed, "20 commands".to_owned()));
+    assert_eq!(late(20).reason, "every check passed");
+    let always = late(9999);
+    assert_eq!(found(&always).0, CheckResult::NotJudged);
+    assert!(found(&always).1.starts_with("9999 commands used a cycle late: "), "{:?}", found(&always));
+    assert_eq!(always.reason, "every check passed; 9999 commands used a cycle late");
 }

@@ -21,6 +21,7 @@ fn expect(run: &mut Run, verdict: ExpectedVerdict) {
 fn require(run: &mut Run, result: CheckResult, may_be_disturbed: bool) {
     run.figures.requirements.push(RequirementFigures {
         name: "stops".to_owned(),
+        id: None,
         must: "after it: safe_stop".to_owned(),
         result,
         finding: "found".to_owned(),
@@ -147,6 +148,11 @@ fn an_expected_failure_that_is_named_must_fail_and_no_other_may() {
     assert_eq!(
         judged(&["tracking"], |run| run.figures.motion.missed_commands = 99),
         why("expected that tracking fails and nothing else, but commands missed failed")
+    );
+    let untested = |run: &mut Run| require(run, CheckResult::Untested, false);
+    assert_eq!(
+        judged(&["tracking"], untested),
+        why("expected that tracking fails and nothing else, but stops is untested")
     );
     assert_eq!(
         judged(&["opens"], |_| ()),

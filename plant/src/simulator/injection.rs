@@ -1,22 +1,17 @@
 //! Faults and stimuli that the plant carries out: when each acts, and the events of its beginning and its end.
 //!
-//! [`Injector`] follows the times for the core and acts on commands itself. The [`Agenda`](agenda::Agenda) has what
-//! acts on drives and mechanism, which depend on neither times nor scenarios.
+//! [`Injector`] follows the times for the core and acts on commands itself. It hands the windows to the emulation, whose
+//! agenda has what acts on drives and mechanism. The emulation does not know it.
 //!
 //! A command is altered between its receipt and the master. The master judges what comes out, as it would judge a bad
 //! controller: nothing here detects anything.
 
-pub(crate) mod agenda;
-pub(crate) mod encoder_faults;
-mod push;
-
 use std::ops::Range;
 
-use masseter_runtime::clock::SECOND_NS;
 use masseter_runtime::injection::{Injected, Injection};
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::messages::{Command, Event, LAYOUT_VERSION};
-use masseter_scenario::{CommandFault, DriveFault, FaultConfig, FaultKindConfig, Scenario};
+use masseter_scenario::{CommandFault, FaultConfig, FaultKindConfig, Scenario};
 
 use crate::error::PlantError;
 use crate::master::events::Journal;
@@ -27,8 +22,9 @@ use crate::state::state;
 #[derive(Debug, Clone)]
 pub(crate) struct Injector {
     injection: Injection,
-    /// Those whose window is not told yet.
-    untold: Vec<Untold>,
+    /// Those whose window is not told yet, and whether the controller or the supervisor carries each out. Such a one begins
+    /// when its window does.
+    untold: Vec<(Injected, bool)>,
     /// Whether a window may have become known since the last look.
     has_news: bool,
     commands: CommandFaults,
@@ -40,24 +36,13 @@ state!(Injector {
     parts: commands;
 });
 
-#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
-struct Untold {
-    injected: Injected,
-    /// Whether the controller or the supervisor carries it out. It begins when its window does.
-    is_of_others: bool,
-}
-
 impl Injector {
     /// The faults and stimuli of a scenario that is switched on at `now_ns`.
     pub(crate) fn new(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
-        let faults = scenario.faults.iter().enumerate().map(|(place, fault)| Untold {
-            injected: Injected::Fault(place),
-            is_of_others: matches!(fault.kind, FaultKindConfig::Process(_)),
-        });
-        let stimuli = scenario.stimulus.iter().enumerate().map(|(place, stimulus)| Untold {
-            injected: Injected::Stimulus(place),
-            is_of_others: stimulus.is_of_controller(),
-        });
+        let faults = scenario.faults.iter().enumerate();
+        let faults = faults.map(|(place, fault)| (Injected::Fault(place), fault.kind.is_of_process()));
+        let stimuli = scenario.stimulus.iter().enumerate();
+        let stimuli = stimuli.map(|(place, of)| (Injected::Stimulus(place), of.is_of_controller()));
         Ok(Self {
             injection: Injection::new(scenario, now_ns)
                 .map_err(|error| PlantError::Scenario(error.to_string()))?,
@@ -109,12 +94,12 @@ impl Injector {
             return None;
         }
         let injection = &self.injection;
-        let known = self.untold.iter().position(|untold| injection.window_ns(untold.injected).is_some());
+        let known = self.untold.iter().position(|(injected, _)| injection.window_ns(*injected).is_some());
         let Some(place) = known else {
             self.has_news = false;
             return None;
         };
-        let Untold { injected, is_of_others } = self.untold.swap_remove(place);
+        let (injected, is_of_others) = self.untold.swap_remove(place);
         let window_ns = self.injection.window_ns(injected)?;
         if is_of_others {
             self.injection.note_begin(injected, window_ns.start);
@@ -166,12 +151,12 @@ struct AlteringFault {
     kind: CommandFault,
     config: FaultConfig,
     window_ns: Range<u64>,
-    has_begun: bool,
-    is_over: bool,
+    /// Whether its beginning is reported, and its end is not.
+    is_acting: bool,
 }
 
 state!(AlteringFault {
-    values: window_ns has_begun is_over;
+    values: window_ns is_acting;
     constant: injected kind config;
 });
 
@@ -185,8 +170,7 @@ impl CommandFaults {
                 kind,
                 config: config.clone(),
                 window_ns: u64::MAX..u64::MAX,
-                has_begun: false,
-                is_over: false,
+                is_acting: false,
             })
         };
         Self { faults: list.iter().enumerate().filter_map(altering).collect() }
@@ -195,7 +179,7 @@ impl CommandFaults {
     /// Sets when a fault acts.
     pub(super) fn set_window(&mut self, injected: Injected, window_ns: &Range<u64>) {
         for fault in self.faults.iter_mut().filter(|fault| fault.injected == injected) {
-            fault.window_ns = acting_ns(&fault.config, window_ns.clone());
+            fault.window_ns = fault.config.acting_ns(window_ns.clone());
         }
     }
 
@@ -205,21 +189,23 @@ impl CommandFaults {
         &mut self,
         sampled_ns: u64,
         now_ns: u64,
-        mut command: Option<Command>,
+        received: Option<Command>,
         mut report: impl FnMut(Occurrence),
     ) -> Option<Command> {
+        let mut command = received;
         for fault in &mut self.faults {
             let axis = fault.config.axis();
             let mut tell =
                 |has_ended| report(Occurrence { injected: fault.injected, time_ns: now_ns, axis, has_ended });
             if fault.window_ns.contains(&sampled_ns) {
-                if let Some(given) = command.take() {
-                    if !std::mem::replace(&mut fault.has_begun, true) {
-                        tell(false);
-                    }
-                    command = altered(given, fault.kind, &fault.config);
+                let Some(received) = received else { continue };
+                // It counts by what it alone would do, though another one may withhold the command.
+                let is_altered = altered(received, fault.kind, &fault.config) != Some(received);
+                if is_altered && !std::mem::replace(&mut fault.is_acting, true) {
+                    tell(false);
                 }
-            } else if fault.has_begun && !std::mem::replace(&mut fault.is_over, true) {
+                command = command.and_then(|given| altered(given, fault.kind, &fault.config));
+            } else if std::mem::take(&mut fault.is_acting) {
                 tell(true);
             }
         }
@@ -239,17 +225,8 @@ fn altered(mut command: Command, kind: CommandFault, fault: &FaultConfig) -> Opt
     Some(command)
 }
 
-/// The window of a fault, cut where its size says how long the fault lasts.
-pub(crate) fn acting_ns(fault: &FaultConfig, window_ns: Range<u64>) -> Range<u64> {
-    let for_its_size = [DriveFault::Reboot.into(), CommandFault::ControllerStall.into()];
-    let is_for_its_size = for_its_size.contains(&fault.kind);
-    let longest_ns = (fault.size_si() * SECOND_NS as f64).round() as u64;
-    let end_ns = if is_for_its_size { window_ns.start.saturating_add(longest_ns) } else { u64::MAX };
-    window_ns.start..window_ns.end.min(end_ns)
-}
-
 #[cfg(test)]
-mod commands_tests {
+mod tests {
     use super::*;
 
     fn alter(kind: CommandFault, size: Option<&str>) -> Option<Command> {
@@ -293,19 +270,29 @@ mod commands_tests {
         let told: Vec<_> = told.iter().map(|told| (told.time_ns, told.has_ended)).collect();
         assert_eq!(told, [(3_000_005, false), (4_000_005, true)], "nothing came in the second cycle");
     }
-}
-
-#[cfg(test)]
-mod times_tests {
-    use super::*;
 
     #[test]
-    fn a_dip_of_the_supply_lasts_as_long_as_its_size_says_and_no_longer_than_its_window() {
-        let size = Some("20 ms".parse().unwrap());
-        let dip = FaultConfig { size, ..FaultConfig::new(DriveFault::Reboot) };
-        assert_eq!(acting_ns(&dip, 1000..u64::MAX), 1000..20_001_000);
-        assert_eq!(acting_ns(&dip, 1000..5000), 1000..5000);
-        let slow = FaultConfig { kind: DriveFault::SlowEnable.into(), ..dip };
-        assert_eq!(acting_ns(&slow, 1000..u64::MAX), 1000..u64::MAX);
+    fn each_fault_counts_by_what_it_alone_does() {
+        let stall = FaultConfig {
+            size: Some("9 ms".parse().unwrap()),
+            ..FaultConfig::new(CommandFault::ControllerStall)
+        };
+        let jump = FaultConfig {
+            axis: Some("l2".to_owned()),
+            size: Some("0 mm".parse().unwrap()),
+            ..FaultConfig::new(CommandFault::Jump)
+        };
+        let mut faults = CommandFaults::new(&[stall.clone(), stall, jump]);
+        for (place, window_ns) in [1..9, 3..5, 2..7].iter().enumerate() {
+            faults.set_window(Injected::Fault(place), window_ns);
+        }
+        let mut told = Vec::new();
+        for now_ns in 0..10 {
+            let mut note = |of: Occurrence| told.push((of.injected, of.time_ns, of.has_ended));
+            let arrived = faults.alter(now_ns, now_ns, Some(Command::default()), &mut note);
+            assert_eq!(arrived.is_none(), (1..9).contains(&now_ns), "{now_ns}");
+        }
+        let [outer, inner] = [0, 1].map(Injected::Fault);
+        assert_eq!(told, [(outer, 1, false), (inner, 3, false), (inner, 5, true), (outer, 9, true)]);
     }
 }

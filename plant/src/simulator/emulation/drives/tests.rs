@@ -1,8 +1,41 @@
 //! Each quirk as a client meets it. What a drive without quirks does, the other files say.
 
+use masseter_can::canopen::{
+    AbortCode, EmergencyCode, NmtCommand, NmtState, ObjectAddress, SdoRequest, SdoResponse,
+};
+use masseter_can::cia402::{DriveState, StatusBit};
+
 use super::*;
-use crate::simulator::drive::DriveMemory;
 use crate::simulator::drive::dictionary::ENTRIES;
+use crate::simulator::drive::tests::{
+    Bench, CYCLIC_POSITION, HOMING, LIMITS, MODE, PROFILE_POSITION, START, STEP_NS, command, remap,
+};
+
+/// The drive of l1, with limits that leave it more room than the default, and with the scenario's quirks.
+fn settings(quirks: &str) -> DriveSettings {
+    let mut scenario = Scenario::parse(Path::new("quirks.toml"), quirks).unwrap();
+    scenario.validate().unwrap();
+    scenario.dynamics.step_ns = STEP_NS;
+    scenario.mechanism.strokes.leg_m = LIMITS.map(|end| f64::from(end) * 1e-6);
+    let [_, _, _, leg, ..] = drive_settings(&scenario).unwrap();
+    leg
+}
+
+/// The drive of l1 is what the tests of the drive take for one.
+#[test]
+fn the_settings_without_quirks_are_those_of_the_drives_own_tests() {
+    use crate::simulator::drive::tests;
+    let (of_scenario, plain) = (settings(""), tests::settings());
+    assert_eq!(
+        (of_scenario.node, of_scenario.step_s, of_scenario.stroke_m),
+        (plain.node, plain.step_s, plain.stroke_m)
+    );
+    assert_eq!(of_scenario.quirks.axis, plain.quirks.axis);
+    assert_eq!(format!("{:?}", of_scenario.drive), format!("{:?}", plain.drive));
+    let differing = ENTRIES.iter().zip(of_scenario.objects.words).zip(plain.objects.words);
+    let differing = differing.filter(|((_, a), b)| a != b).map(|((entry, _), _)| entry.address.index);
+    assert!(differing.clone().all(|index| index == 0x1018), "{:?}", differing.collect::<Vec<_>>());
+}
 
 /// A drive that has booted with a quirk.
 fn bench(quirk: &str) -> Bench {
@@ -26,7 +59,7 @@ fn factory_pdos_carry_controlword_and_statusword_alone_and_can_be_mapped() {
     bench.nmt(NmtCommand::Start);
     bench.receive(command(0x06, START));
     bench.sync();
-    assert_eq!(bench.drive.axis.power, DriveState::ReadyToSwitchOn);
+    assert_eq!(bench.drive.axis.power.state, DriveState::ReadyToSwitchOn);
 }
 
 #[test]
@@ -173,12 +206,12 @@ fn safe_torque_off_at_power_on_lasts_for_its_time_without_an_abort() {
         let mut bench = bench(&format!("kind = 'sto_at_power_on'\n{keys}"));
         bench.control(0x06);
         bench.run_ms(1);
-        assert_eq!(bench.drive.axis.power, DriveState::SwitchOnDisabled);
+        assert_eq!(bench.drive.axis.power.state, DriveState::SwitchOnDisabled);
         assert_eq!((bench.errors(), bench.emergencies()), ((0, 0), vec![]));
         bench.run_ms(500);
         bench.control(0x06);
         let expected = if is_over { DriveState::ReadyToSwitchOn } else { DriveState::SwitchOnDisabled };
-        assert_eq!(bench.drive.axis.power, expected);
+        assert_eq!(bench.drive.axis.power.state, expected);
     }
 }
 
@@ -200,13 +233,13 @@ fn an_incremental_encoder_is_at_0_after_every_start_and_moves_without_limits_unt
 #[test]
 fn a_fault_at_power_on_is_shown_and_can_be_reset() {
     let mut bench = bench("kind = 'fault_at_power_on'\ncode = 0x7305");
-    assert_eq!(bench.drive.axis.power, DriveState::Fault);
+    assert_eq!(bench.drive.axis.power.state, DriveState::Fault);
     assert_eq!((bench.errors().1, bench.emergencies()), (0x7305, vec![EmergencyCode(0x7305)]));
     bench.control(0x80);
-    assert_eq!((bench.drive.axis.power, bench.errors()), (DriveState::SwitchOnDisabled, (0, 0)));
+    assert_eq!((bench.drive.axis.power.state, bench.errors()), (DriveState::SwitchOnDisabled, (0, 0)));
     bench.nmt(NmtCommand::ResetNode);
     bench.run_ms(25);
-    assert_eq!(bench.drive.axis.power, DriveState::Fault, "it is there at every start");
+    assert_eq!(bench.drive.axis.power.state, DriveState::Fault, "it is there at every start");
 }
 
 #[test]
@@ -237,7 +270,7 @@ fn an_object_that_a_drive_lacks_leaves_the_others_of_its_index() {
 #[test]
 fn an_object_that_no_emulated_drive_has_is_refused_with_the_key() {
     let text = "[[drives.quirk]]\nkind = 'lacks'\nobjects = ['9999h']";
-    let scenario = Scenario::parse(std::path::Path::new("s.toml"), text).unwrap();
+    let scenario = Scenario::parse(Path::new("s.toml"), text).unwrap();
     let refusal = drive_settings(&scenario).unwrap_err().to_string();
     assert!(refusal.starts_with("drives.quirk.objects: 9999h:00h: "), "{refusal}");
 }
@@ -246,39 +279,6 @@ fn an_object_that_no_emulated_drive_has_is_refused_with_the_key() {
 fn a_quirk_is_on_its_axes_alone() {
     let mut bench = bench("kind = 'missing_objects'\naxes = ['l2', 'd1']");
     assert!(bench.read((0x6066, 0)).is_ok(), "this is l1");
-}
-
-#[test]
-fn what_a_drive_has_stored_is_there_when_it_is_switched_on_again() {
-    let mut bench = Bench::new();
-    assert_eq!(bench.drive.changed_memory(), None);
-    bench.write((0x6065, 0), &777_u32.to_le_bytes()).unwrap();
-    bench.write((0x607C, 0), &(-5_i32).to_le_bytes()).unwrap();
-    bench.write((0x1010, 1), b"save").unwrap();
-    let memory = bench.drive.changed_memory().unwrap();
-    let stored: Vec<_> = memory.values.iter().map(|(key, value)| (key.as_str(), *value)).collect();
-    assert_eq!((memory.serial_number, stored), (Some(4), vec![("6065:00", 777), ("607C:00", -5)]));
-
-    let memory = DriveMemory { serial_number: Some(77), ..memory };
-    let mut bench = Bench::with(&DriveSettings { memory, ..settings("") });
-    assert_eq!((bench.read((0x6065, 0)), bench.read((0x607C, 0))), (Ok(777), Ok(-5_i32 as u32)));
-    assert_eq!(bench.read((0x1018, 4)), Ok(77));
-    bench.write((0x1011, 1), b"load").unwrap();
-    let memory = bench.drive.changed_memory().unwrap();
-    assert!(memory.values.is_empty(), "as delivered: {memory:?}");
-}
-
-#[test]
-fn a_memory_that_the_drive_does_not_take_is_refused_with_its_object() {
-    for (key, value) in
-        [("6065:09", 1), ("2000:00", 1), ("x", 1), ("6007:00", 9), ("6041:00", 1), ("60C2:01", 257)]
-    {
-        let memory = DriveMemory { serial_number: None, values: [(key.to_owned(), value)].into() };
-        let settings = DriveSettings { memory, ..settings("") };
-        let encoder = Encoder::new(1e-6, 0.0, 1, 0);
-        let refusal = DriveNode::new(&settings, encoder, 0, 0.27).unwrap_err();
-        assert!(refusal.starts_with(key), "{refusal}");
-    }
 }
 
 #[test]

@@ -1,0 +1,75 @@
+//! The faults that can be injected into a drive. Whoever injects them sets what acts, and asks what has struck.
+
+/// A kind of fault.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum DriveFault {
+    /// The logic supply is too low.
+    Fault,
+    /// Targets are acknowledged and not followed.
+    IgnoresTargets,
+    /// The motor lacks a share of its force.
+    TorqueLoss,
+    /// The motor has full current towards larger positions.
+    Runaway,
+    /// The torque is safely off.
+    Sto,
+    /// "Operation enabled" comes so many seconds late.
+    SlowEnable,
+    /// The brake never closes.
+    BrakeOpen,
+    /// The brake does not open.
+    BrakeClosed,
+    /// The supply is off.
+    Reboot,
+    /// The gear has another ratio.
+    Scale,
+    /// Emergency messages come, one every so many seconds.
+    EmcyStorm,
+}
+
+const KINDS: usize = DriveFault::EmcyStorm as usize + 1;
+
+/// The faults that act on a drive, and which have changed something.
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
+pub(crate) struct DriveFaults {
+    sizes: [Option<f64>; KINDS],
+    struck: [bool; KINDS],
+    acting: usize,
+}
+
+impl DriveFaults {
+    /// From now on a fault acts with that size (0 where its kind has none), or acts no more.
+    pub(crate) fn set(&mut self, kind: DriveFault, size: Option<f64>) {
+        self.sizes[kind as usize] = size;
+        self.struck[kind as usize] = false;
+        self.acting = self.sizes.iter().flatten().count();
+    }
+
+    /// Whether none acts.
+    #[inline]
+    pub(crate) fn is_empty(&self) -> bool {
+        self.acting == 0
+    }
+
+    /// The size of the fault of that kind; none while no such fault acts.
+    #[inline]
+    pub(crate) fn size(&self, kind: DriveFault) -> Option<f64> {
+        self.sizes[kind as usize]
+    }
+
+    /// Whether a fault of that kind acts.
+    #[inline]
+    pub(super) fn has(&self, kind: DriveFault) -> bool {
+        self.size(kind).is_some()
+    }
+
+    /// The fault of that kind changes something.
+    pub(super) fn strike(&mut self, kind: DriveFault) {
+        self.struck[kind as usize] |= self.has(kind);
+    }
+
+    /// Whether the fault of that kind has changed something since it acts as it does.
+    pub(crate) fn has_struck(&self, kind: DriveFault) -> bool {
+        self.struck[kind as usize]
+    }
+}

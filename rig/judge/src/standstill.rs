@@ -1,0 +1,184 @@
+//! Whether the jaw stands after every stop: a safe stop, one by request, the end of the motion, and the loss of power.
+//!
+//! A stop begins where not all drives are enabled any more, where the master stops them, or where the controller says that the
+//! motion is over. From then on the way of each axis counts from where its drive lost power, and that of the jaw from where the
+//! last drive lost it: of the true mechanism where it is emulated, otherwise of the encoders.
+
+use masseter_model::geometry::{AXES, AXIS_NAMES, Deviation, Pose};
+use masseter_recording::Ending;
+use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
+use masseter_runtime::messages::Reading;
+use masseter_runtime::messages::codes::{ControllerState, DriveState, drive_state};
+use masseter_scenario::{AFTER_STOP_S, ChecksConfig, Scenario};
+use serde::Serialize;
+
+use crate::check::Check;
+use crate::poses::{true_pose, worse};
+use crate::signals::{CycleMessages, Sample};
+
+/// How far the mechanism moved after its stops.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct StandstillFigures {
+    /// For how long the last stop was recorded, s; none without a stop.
+    pub recorded_s: Option<f64>,
+    /// The largest way of each axis after a stop, mm.
+    pub axes_mm: [f64; AXES],
+    /// The largest way of the incisal point, mm; none where the true jaw is unknown.
+    pub jaw_mm: Option<f64>,
+    /// The largest angle of the platform, degrees.
+    pub jaw_deg: Option<f64>,
+}
+
+/// Longest time from the stop to the loss of power; a drive that is not heard of says nothing of its power, ns.
+const POWER_OFF_WITHIN_NS: u64 = 100 * MILLISECOND_NS;
+/// Share of the time after the stop that must be recorded: a plant that loses cycles records a little less.
+const LEAST_SHARE: f64 = 0.9;
+
+/// Watches the mechanism after each stop.
+#[derive(Debug, Clone)]
+pub(super) struct StandstillWatch {
+    has_truth: bool,
+    /// The incisal point in the platform frame.
+    incisal_m: [f64; 3],
+    /// From the loss of power until an axis must stand, ns.
+    reaction_ns: [u64; AXES],
+    is_at_work: bool,
+    stop: Option<Stop>,
+    figures: StandstillFigures,
+}
+
+/// The present stop.
+#[derive(Debug, Clone, Copy)]
+struct Stop {
+    began_ns: u64,
+    /// When each drive lost power, ns.
+    off_ns: [Option<u64>; AXES],
+    /// Where each axis must stay, m.
+    places_m: [Option<f64>; AXES],
+    jaw: Option<Pose>,
+}
+
+impl StandstillWatch {
+    pub(super) fn new(scenario: &Scenario) -> Self {
+        let reaction_s =
+            |axis| scenario.checks.standstill_after_ms / 1e3 + scenario.profile(axis).brake.close_s;
+        Self {
+            has_truth: scenario.can.is_virtual(),
+            incisal_m: scenario.jaw.reference_point_m,
+            reaction_ns: std::array::from_fn(|axis| (reaction_s(axis) * SECOND_NS as f64) as u64),
+            is_at_work: false,
+            stop: None,
+            figures: StandstillFigures::default(),
+        }
+    }
+
+    /// Takes the next sample in the order of time.
+    pub(super) fn add_sample(&mut self, Sample { time_ns, messages, is_closing, .. }: &Sample) {
+        if let Some(reading) = &messages.reading {
+            self.follow(*time_ns, reading, messages.controller_state);
+        }
+        let Some(stop) = self.stop.as_mut().filter(|_| !is_closing) else { return };
+        let since_ns = time_ns.saturating_sub(stop.began_ns);
+        self.figures.recorded_s = Some(since_ns as f64 / SECOND_NS as f64);
+        for (axis, most_mm) in self.figures.axes_mm.iter_mut().enumerate() {
+            let Some(place_m) = place_m(messages, axis, self.has_truth) else { continue };
+            if *time_ns >= stop.due_ns(axis) + self.reaction_ns[axis] {
+                let way_m = (place_m - *stop.places_m[axis].get_or_insert(place_m)).abs();
+                *most_mm = worse(*most_mm, way_m * 1e3);
+            }
+        }
+        let is_due = stop.places_m.iter().all(Option::is_some);
+        if let Some(pose) = messages.truth.as_ref().filter(|_| is_due).and_then(true_pose) {
+            let moved = Deviation::between(&pose, stop.jaw.get_or_insert(pose), self.incisal_m);
+            let StandstillFigures { jaw_mm, jaw_deg, .. } = &mut self.figures;
+            *jaw_mm = Some(worse(jaw_mm.unwrap_or(0.0), moved.incisal_m * 1e3));
+            *jaw_deg = Some(worse(jaw_deg.unwrap_or(0.0), moved.angle_rad.to_degrees()));
+        }
+    }
+
+    /// Notes a stop, the end of one, and the loss of power.
+    fn follow(&mut self, time_ns: u64, reading: &Reading, controller_state: Option<u32>) {
+        let is_enabled = |code: &u32| *code == DriveState::OperationEnabled.code();
+        let is_at_work = reading.drive_state.iter().all(is_enabled)
+            && reading.master_fault == 0
+            && !is_over(controller_state);
+        if is_at_work {
+            self.stop = None;
+        } else if self.is_at_work {
+            let (off_ns, places_m) = ([None; AXES], [None; AXES]);
+            self.stop = Some(Stop { began_ns: time_ns, off_ns, places_m, jaw: None });
+        }
+        self.is_at_work = is_at_work;
+        for (code, off_ns) in
+            reading.drive_state.iter().zip(self.stop.iter_mut().flat_map(|stop| &mut stop.off_ns))
+        {
+            if matches!(drive_state(*code), Ok(Some(state)) if !state.is_powered()) {
+                off_ns.get_or_insert(time_ns);
+            }
+        }
+    }
+
+    pub(super) fn into_figures(self) -> StandstillFigures {
+        self.figures
+    }
+}
+
+impl Stop {
+    /// From when on an axis that needs no time to react must stand, ns.
+    fn due_ns(&self, axis: usize) -> u64 {
+        let latest_ns = self.began_ns + POWER_OFF_WITHIN_NS;
+        self.off_ns[axis].map_or(latest_ns, |off_ns| off_ns.min(latest_ns))
+    }
+}
+
+/// Whether the controller says that the motion is over.
+fn is_over(state: Option<u32>) -> bool {
+    use ControllerState::{Disabling, Finished, SafeStop};
+    [Disabling, Finished, SafeStop].iter().any(|over| state == Some(over.code()))
+}
+
+/// Where an axis is in a cycle, m; none where its message is missing.
+fn place_m(messages: &CycleMessages, axis: usize, has_truth: bool) -> Option<f64> {
+    if has_truth {
+        return messages.truth.as_ref().map(|truth| truth.joint_m[axis]);
+    }
+    let reading = messages.reading.as_ref()?;
+    (reading.fresh_axes >> axis & 1 == 1).then_some(reading.position_m[axis])
+}
+
+/// None in a run without a stop. A recording that ends soon after the stop shows no fall.
+pub(super) fn standstill(
+    found: &StandstillFigures,
+    ending: &Ending,
+    is_partial: bool,
+    limits: &ChecksConfig,
+) -> Option<Check> {
+    const NAME: &str = "standstill";
+    let recorded_s = found.recorded_s?;
+    let ChecksConfig { standstill_axis_mm, standstill_jaw_mm, standstill_jaw_deg, .. } = *limits;
+    let axes = AXIS_NAMES.iter().zip(found.axes_mm).map(|(name, mm)| (*name, mm, standstill_axis_mm, " mm"));
+    let jaw = [
+        ("incisal point", found.jaw_mm, standstill_jaw_mm, " mm"),
+        ("platform", found.jaw_deg, standstill_jaw_deg, "°"),
+    ];
+    let jaw = jaw.into_iter().filter_map(|(name, most, limit, unit)| Some((name, most?, limit, unit)));
+    let ways: Vec<_> = jaw.chain(axes).collect();
+    let in_words = |(name, most, limit, unit): &(&str, f64, f64, &str)| {
+        format!("{name} {most:.3}{unit}, limit {limit}{unit}")
+    };
+    let beyond: Vec<_> = ways.iter().filter(|(_, most, limit, _)| most > limit).map(in_words).collect();
+    if !beyond.is_empty() {
+        return Some(Check::judged(NAME, format!("moved after the stop: {}", beyond.join("; ")), false));
+    }
+    if recorded_s < AFTER_STOP_S * LEAST_SHARE {
+        let why = format!("recorded for {recorded_s:.3} s after the stop, {AFTER_STOP_S} s needed");
+        let is_whole = matches!(ending, Ending::Completed | Ending::SafeStop) && !is_partial;
+        return Some(if is_whole { Check::untested(NAME, why) } else { Check::not_judged(NAME, why) });
+    }
+    let closest = ways.iter().max_by(|(_, a, of_a, _), (_, b, of_b, _)| (a / of_a).total_cmp(&(b / of_b)));
+    let closest = closest.map_or_else(String::new, in_words);
+    Some(Check::judged(NAME, format!("closest in {recorded_s:.2} s after the stop: {closest}"), true))
+}
+
+#[cfg(test)]
+mod tests;
