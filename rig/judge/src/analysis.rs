@@ -260,7 +260,7 @@ impl Analysis {
             self.shown.iter_mut().for_each(|shown| shown.over_time.apply_path(&path));
             self.faults.apply_sample(&path);
             if let Some(lag_s) = messages.lag_s {
-                self.played.add_sample(lag_s, path.desired, path.actual);
+                self.played.add_sample(lag_s, messages.progress_s, path.desired, path.actual);
             }
         }
         if let Some(reading) = &messages.reading {

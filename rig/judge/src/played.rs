@@ -44,6 +44,7 @@ pub(super) struct PlayedWatch {
     points_m: [Vec3; 3],
     /// The poses of both at the last step, desired and actual.
     before: Option<[Pose; 2]>,
+    progress_s: f64,
     way_m: f64,
     gone_m: f64,
     lag_s: Option<f64>,
@@ -61,6 +62,7 @@ impl PlayedWatch {
         Self {
             points_m: jaw_points(jaw),
             before: None,
+            progress_s: f64::NEG_INFINITY,
             way_m: 0.0,
             gone_m: 0.0,
             lag_s: None,
@@ -73,16 +75,24 @@ impl PlayedWatch {
         }
     }
 
-    /// Takes a sample of the motion, which is late by that much.
-    pub(super) fn add_sample(&mut self, lag_s: f64, desired: Option<Pose>, actual: Option<Pose>) {
+    /// Takes a sample of the motion, which is late by that much and has come so far. Where it goes back, its way is in the sum
+    /// already.
+    pub(super) fn add_sample(
+        &mut self,
+        lag_s: f64,
+        progress_s: f64,
+        desired: Option<Pose>,
+        actual: Option<Pose>,
+    ) {
         self.lag_s = Some(self.lag_s.map_or(lag_s, |most_s| most_s.max(lag_s)));
         let Some(now) = desired.zip(actual).map(|(desired, actual)| [desired, actual]) else { return };
         let before = self.before.get_or_insert(now);
         let [desired, actual] = [0, 1].map(|of| step(&self.points_m, &before[of], &now[of]));
         let length_m = length(&desired);
         // While the motion waits for lost cycles, the jaw goes on to where it was sent: this belongs to the next step.
-        if length_m >= LEAST_STEP_M {
+        if length_m >= LEAST_STEP_M && progress_s > self.progress_s {
             *before = now;
+            self.progress_s = progress_s;
             self.way_m += length_m;
             self.gone_m +=
                 desired.iter().zip(&actual).map(|(one, other)| one.dot(other)).sum::<f64>() / length_m;

@@ -11,7 +11,7 @@ mod played {
         let pose = |mm: f64| Some(Pose::translation(mm * 1e-3, 0.0, 0.0));
         for sample in 0..=samples {
             let wanted_mm = 10.0 * (f64::from(sample) * 0.1).sin();
-            watch.add_sample(0.0, pose(wanted_mm), pose(place_mm(wanted_mm)));
+            watch.add_sample(0.0, f64::from(sample), pose(wanted_mm), pose(place_mm(wanted_mm)));
         }
         watch.into_figures(Some(rest_m))
     }
@@ -40,9 +40,10 @@ mod played {
         let pose = |mm: f64| Some(Pose::translation(mm * 1e-3, 0.0, 0.0));
         for (wanted_mm, is_mm) in (0..200).flat_map(|at| {
             let wanted_mm = f64::from(at) * 0.1;
-            [(wanted_mm, wanted_mm - 0.05), (wanted_mm, wanted_mm)]
+            // In the third sample the motion goes back a little, as after lost cycles.
+            [(wanted_mm, wanted_mm - 0.05), (wanted_mm, wanted_mm), (wanted_mm - 0.05, wanted_mm)]
         }) {
-            watch.add_sample(0.0, pose(wanted_mm), pose(is_mm));
+            watch.add_sample(0.0, wanted_mm, pose(wanted_mm), pose(is_mm));
         }
         let share = watch.into_figures(Some(0.0)).played.unwrap();
         assert!((share - 1.0).abs() < 0.01, "{share}");
@@ -62,7 +63,7 @@ mod played {
     fn the_greatest_lag_and_the_cycles_without_a_new_command_are_counted() {
         let mut watch = PlayedWatch::new(&JawConfig::default());
         for lag_s in [0.0, 0.003, 0.002] {
-            watch.add_sample(lag_s, None, None);
+            watch.add_sample(lag_s, 0.0, None, None);
         }
         let moving = is_moving(Some(ControllerState::Running.code()));
         for answers_cycle in [1, 2, 2, 2, 3, 3, 5, 6] {

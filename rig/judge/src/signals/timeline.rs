@@ -36,6 +36,8 @@ pub struct CycleMessages {
     pub desired: Option<Pose>,
     /// By how much the motion is late, s; none but while the scenario's motion plays.
     pub lag_s: Option<f64>,
+    /// How far the desired pose has come on the motion, s, from any instant.
+    pub progress_s: f64,
     /// The controller's command.
     pub command: Option<Command>,
     /// The signals that the controller declares.
@@ -241,6 +243,7 @@ impl Timeline {
         let next_run = soon().find(|cycle| cycle.state.is_some());
         messages.is_disturbed |= messages.state.is_none() && next_run.is_some_and(|cycle| cycle.is_disturbed);
         (messages.desired, messages.lag_s) = (desired.pose, desired.lag_s);
+        messages.progress_s = desired.progress_s;
     }
 }
 
