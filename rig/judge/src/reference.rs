@@ -3,7 +3,7 @@
 //! While the motion plays, the pose is the scenario's, computed here. The motion begins with the first sample in which the
 //! controller is in the state `running`, and goes on by a period with each cycle that the controller runs. A controller waits
 //! where commands or readings are lost: its motion time is then behind. This lag is a figure, which never shrinks; the pose
-//! here does not wait. What cycles without SYNC and the machine's lost cycles cost does not count. Before the motion, and in
+//! here is as late, up to the limit of `checks`. What cycles without SYNC and the machine's lost cycles cost does not count. Before the motion, and in
 //! an own motion, the controller's desired pose counts. After the motion the last pose stays.
 
 use masseter_controller::playback::Playback;
@@ -42,6 +42,7 @@ pub(crate) struct Reference {
     /// None for an own motion, and where the motion's file is gone since the run.
     playback: Option<Playback>,
     period_s: f64,
+    most_lag_s: f64,
     /// How far force control may lead the jaw up or down from the motion, m.
     reach_m: f64,
     detour_m: f64,
@@ -79,6 +80,7 @@ impl Reference {
         Self {
             playback: is_of_scenario.then(|| playback(scenario)).flatten(),
             period_s: scenario.period_s(),
+            most_lag_s: scenario.checks.motion_lag_ms / 1e3,
             reach_m: scenario.force_control.map_or(0.0, |config| config.reach_m),
             detour_m: 0.0,
             places: ["motion_rate", "motion_amplitude"].map(|name| declared.place_of(name).ok()),
@@ -139,8 +141,7 @@ impl Reference {
         let before_s = self.lag_s;
         self.lag_s = stated_s.map_or(before_s, |stated_s| before_s.max(playback.lag_s(stated_s)));
         self.excused_s += if of.is_disturbed { self.lag_s - before_s } else { 0.0 };
-        // What a loop lost is no deviation. For anything else the motion waits for nobody.
-        let waited_s = self.lag_s.min(self.excused_s);
+        let waited_s = self.lag_s.min(self.most_lag_s + self.excused_s);
         let mut pose = playback.earlier_pose(waited_s);
         self.progress_s = -playback.rest_s() - waited_s;
         if let Some(stated) = of.next_use.filter(|_| of.is_used && self.reach_m > 0.0).and_then(desired_pose)
