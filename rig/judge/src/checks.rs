@@ -85,15 +85,15 @@ fn motion_lag(motion: &MotionFigures, limit_ms: f64) -> Option<Check> {
     Some(Check::judged("motion lag", format!("{lag_ms:.1} ms, limit {limit_ms} ms"), lag_ms <= limit_ms))
 }
 
-/// A cycle of the motion without a new command leaves the drives with the last one. As many are allowed as the controller may
-/// miss readings in a row. None where the scenario's own faults stall a loop.
+/// A cycle of the motion without a new command leaves the drives with the last one. As many in a row are allowed as the controller
+/// may miss readings; a single one in real time is a late command. None where the scenario's own faults stall a loop.
 fn missed_commands(manifest: &Manifest, figures: &Figures) -> Option<Check> {
     let MotionFigures { lag_ms, missed_commands, missed_in_a_row, .. } = figures.motion;
     let limit = u64::from(manifest.scenario.controller.stale_cycles);
     let is_of_scenario = figures.controller_skips.by_scenario + figures.plant_skips.by_scenario > 0;
     lag_ms.filter(|_| !is_of_scenario)?;
     let finding = format!("{}, {missed_in_a_row} in a row, limit {limit}", counted(missed_commands, "cycle"));
-    Some(Check::judged("commands missed", finding, missed_commands <= limit))
+    Some(Check::judged("commands missed", finding, missed_in_a_row <= limit))
 }
 
 /// Whether so many commands were late that the motion is another one than in simulated time, where none is.

@@ -217,7 +217,7 @@ impl Bounds {
         if !self.window.contains(moment) || moment.is_closing {
             return;
         }
-        self.missing.count_sample(value.is_some());
+        self.missing.count_sample(value.is_some(), moment.is_real_time);
         let Some(value) = value else { return };
         // What the requirement does not judge would only spoil the scale of the plot.
         self.series.add(moment.time_ns - began_ns, 0, value / self.of.unit.si);

@@ -27,6 +27,8 @@ pub(super) struct Moment<'a> {
     pub(super) events: &'a [EventRecord],
     /// Whether a lost cycle may have acted on the jaw.
     pub(super) is_disturbed: bool,
+    /// Whether the loops run in real time, where they may lose or delay single cycles.
+    pub(super) is_real_time: bool,
     /// Whether it is no sample, but holds the events after the last one.
     pub(super) is_closing: bool,
 }

@@ -54,7 +54,7 @@ impl Never {
             What::Condition(condition) => {
                 let robustness = condition.robustness(moment.values);
                 if is_inside && !moment.is_closing {
-                    self.missing.count_sample(robustness.is_some());
+                    self.missing.count_sample(robustness.is_some(), moment.is_real_time);
                 }
                 let Some(robustness) = robustness else { return };
                 (u64::from(robustness >= 0.0), -robustness)

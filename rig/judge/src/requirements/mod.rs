@@ -38,6 +38,7 @@ pub(crate) struct Requirements {
     row: Vec<f64>,
     state: usize,
     motion_ns: Option<u64>,
+    is_real_time: bool,
 }
 
 /// Refuses a scenario with a requirement that cannot be judged. Without `declared`, the controller's own signals and
@@ -94,7 +95,7 @@ impl Requirements {
         let expected = scenario.expect.iter().flat_map(|expect| &expect.events).map(expected_event);
         list.extend(expected.map(|config| Requirement { is_expected_event: true, ..read(&config) }));
         let state = values.choose("controller.state").expect("every run has this signal");
-        Self { list, values, row: Vec::new(), state, motion_ns: None }
+        Self { list, values, row: Vec::new(), state, motion_ns: None, is_real_time: false }
     }
 
     /// Whether there are none: then nothing has to be taken.
@@ -115,8 +116,11 @@ impl Requirements {
         }
         let motion_s = self.motion_ns.map(|motion_ns| (time_ns - motion_ns) as f64 / 1e9);
         let (values, is_disturbed) = (self.row.as_slice(), messages.is_disturbed);
+        // Simulated time has no account of the loops.
+        self.is_real_time |= messages.state.is_some_and(|state| state.worked_ns > 0);
+        let (is_real_time, is_closing) = (self.is_real_time, *is_closing);
         let moment =
-            Moment { time_ns: *time_ns, motion_s, values, events, is_disturbed, is_closing: *is_closing };
+            Moment { time_ns: *time_ns, motion_s, values, events, is_disturbed, is_real_time, is_closing };
         self.list.iter_mut().for_each(|requirement| requirement.judge_moment(&moment));
     }
 }
