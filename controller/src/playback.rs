@@ -241,14 +241,15 @@ impl Playback {
         self.rate == 0.0 || (self.is_at_end() && !is_changing)
     }
 
-    /// By how much a motion that has come to `motion_s` is behind this one, s of the trajectory's time; 0 where it is level or
-    /// ahead.
-    pub fn lag_s(&self, motion_s: f64) -> f64 {
+    /// By how much a motion that has come to `motion_s` is behind this one, s of the trajectory's time; negative where it is
+    /// ahead, by at most `most_ahead_s`.
+    pub fn lag_s(&self, motion_s: f64, most_ahead_s: f64) -> f64 {
         let is_beyond = |at_s: f64| self.trajectory.motion_time_s(at_s) > motion_s + SAME_TIME_S;
-        if !is_beyond(self.elapsed_s) {
-            return 0.0;
+        let latest_s = self.elapsed_s + most_ahead_s;
+        if !is_beyond(latest_s) {
+            return -most_ahead_s;
         }
-        let (mut before_s, mut after_s) = (0.0, self.elapsed_s);
+        let (mut before_s, mut after_s) = (0.0, latest_s);
         while after_s - before_s > SAME_TIME_S {
             let middle_s = f64::midpoint(before_s, after_s);
             if is_beyond(middle_s) { after_s = middle_s } else { before_s = middle_s }

@@ -139,9 +139,11 @@ impl Reference {
         }
         let stated_s = of.next_use.map(|state| state.motion_time_s).filter(|stated_s| *stated_s >= 0.0);
         let before_s = self.lag_s;
-        self.lag_s = stated_s.map_or(before_s, |stated_s| before_s.max(playback.lag_s(stated_s)));
+        let found_s = stated_s.map_or(before_s, |stated_s| playback.lag_s(stated_s, self.excused_s));
+        self.lag_s = found_s.max(before_s);
         self.excused_s += if of.is_disturbed { self.lag_s - before_s } else { 0.0 };
-        let waited_s = self.lag_s.min(self.most_lag_s + self.excused_s);
+        // A change of the rate goes on while the controller waits for lost cycles, here but not there.
+        let waited_s = found_s.max(self.lag_s - self.excused_s).min(self.most_lag_s + self.excused_s);
         let mut pose = playback.earlier_pose(waited_s);
         self.progress_s = -playback.rest_s() - waited_s;
         if let Some(stated) = of.next_use.filter(|_| of.is_used && self.reach_m > 0.0).and_then(desired_pose)
