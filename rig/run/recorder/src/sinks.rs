@@ -219,8 +219,8 @@ impl Progress {
         let mut figures = vec![
             format!("{state:<13} motion {motion_s:>5.2} of {of_s:.2} s"),
             format!("missed {missed}"),
-            format!("dropped {dropped}"),
             format!("tracking error {:.3} mm", self.error_mm()),
+            format!("dropped {dropped}"),
             format!("max {:.3} mm", self.max_error_mm),
             format!("latest {:.0} µs", self.max_late_ns as f64 / 1e3),
         ];
@@ -274,7 +274,7 @@ mod tests {
         let line = after_ten_cycles(false).next_line(SECOND_NS, Losses { unrecorded: 2, clients });
         assert_eq!(
             line,
-            "running       motion  1.00 of 4.00 s   missed 6   dropped 5   tracking error 2.000 mm   max 4.000 mm   latest 50 µs   \
+            "running       motion  1.00 of 4.00 s   missed 6   tracking error 2.000 mm   dropped 5   max 4.000 mm   latest 50 µs   \
              live 1 watching, 7 dropped\n"
         );
     }
@@ -283,7 +283,7 @@ mod tests {
     fn a_narrow_terminal_shows_what_matters_most() {
         let progress = after_ten_cycles(true);
         let shown = |columns| progress.line_within(Losses::default(), columns);
-        assert_eq!(shown(80), "running       motion  1.00 of 4.00 s   missed 6   dropped 3");
+        assert_eq!(shown(80), "running       motion  1.00 of 4.00 s   missed 6   tracking error 2.000 mm");
         assert_eq!(shown(20), "running       motion  1.00 of 4.00 s");
         assert_eq!(shown(120), shown(usize::MAX));
     }
