@@ -334,16 +334,16 @@ def test_a_misbehaving_controller_is_stopped_by_the_master_which_names_axis_and_
     assert not np.any(run.reading["drive_state"][-1] == DriveState.OPERATION_ENABLED)
 
 
-def test_a_controller_that_holds_the_drives_is_not_stopped(masseter_command: str, tmp_path: Path) -> None:
+def test_a_controller_that_ends_with_powered_drives_has_them_stopped(masseter_command: str, tmp_path: Path) -> None:
     def work(session: masseter.Session) -> None:
         hold(session, behave)
         session.finish()
 
     code, said = session_run(masseter_command, tmp_path, work)
     run = masseter.load(tmp_path / "run")
-    # The motion was never played.
-    assert code == 1 and run.reading["master_fault"][-1] == 0, said
-    assert np.all(run.reading["drive_state"][-1] == DriveState.OPERATION_ENABLED)
+    assert code == 5 and "the drives made a quick stop" in said, said
+    assert run.reading["master_fault"][-1] == 0
+    assert not np.any(run.reading["drive_state"][-1] == DriveState.OPERATION_ENABLED)
 
 
 def test_a_controller_that_goes_on_without_commands_is_given_up(masseter_command: str, tmp_path: Path) -> None:
