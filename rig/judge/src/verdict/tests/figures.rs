@@ -256,7 +256,7 @@ fn what_the_jaw_and_the_master_show_fails_a_run_and_a_short_delay_is_told() {
     assert_eq!(told, (Exit::Passed, "every check passed; motion delayed by 11 ms"));
     let late = Run::with(|run| run.figures.motion.lag_ms = Some(20.5));
     assert_eq!((late.exit_code, late.reason.as_str()), (Exit::Failed, "failed: motion lag"));
-    let missed = Run::with(|run| run.figures.motion.missed_commands = 21);
+    let missed = Run::with(|run| run.figures.motion.missed_in_a_row = 21);
     assert_eq!((missed.exit_code, missed.reason.as_str()), (Exit::Failed, "failed: commands missed"));
     let still = Run::with(|run| (run.figures.motion.way_mm, run.figures.motion.played) = (Some(0.0), None));
     assert_eq!(still.word, "UNTESTED", "{}", still.reason);
@@ -450,5 +450,5 @@ fn a_verdict_is_written_with_its_word_and_exit_code() {
     let written = serde_json::to_value(&verdict).unwrap();
     assert_eq!((&written["word"], &written["exit_code"]), (&"FAIL".into(), &1.into()));
     assert_eq!(written["reason"], "failed: tracking");
-    assert_eq!(written["checks"].as_array().map(Vec::len), Some(8));
+    assert_eq!(written["checks"].as_array().map(Vec::len), Some(9));
 }

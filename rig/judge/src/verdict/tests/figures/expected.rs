@@ -143,10 +143,10 @@ fn an_expected_failure_that_is_named_must_fail_and_no_other_may() {
         (word, reason)
     };
     assert_eq!(judged(&["tracking"], |_| ()).0, "PASS");
-    assert_eq!(judged(&[], |run| run.figures.motion.missed_commands = 99).0, "PASS", "no failure is named");
+    assert_eq!(judged(&[], |run| run.figures.motion.missed_in_a_row = 99).0, "PASS", "no failure is named");
     let why = |reason: &str| ("FAIL", reason.to_owned());
     assert_eq!(
-        judged(&["tracking"], |run| run.figures.motion.missed_commands = 99),
+        judged(&["tracking"], |run| run.figures.motion.missed_in_a_row = 99),
         why("expected that tracking fails and nothing else, but commands missed failed")
     );
     let untested = |run: &mut Run| require(run, CheckResult::Untested, false);
