@@ -3,8 +3,9 @@
 //! While the motion plays, the pose is the scenario's, computed here. The motion begins with the first sample in which the
 //! controller is in the state `running`, and goes on by a period with each cycle that the controller runs. A controller waits
 //! where commands or readings are lost: its motion time is then behind. This lag is a figure, which never shrinks; the pose
-//! here is as late, up to the limit of `checks`. What cycles without SYNC and the machine's lost cycles cost does not count. Before the motion, and in
-//! an own motion, the controller's desired pose counts. After the motion the last pose stays.
+//! here is as late, up to the limit of `checks`. What cycles without SYNC and the machine's lost cycles cost does not
+//! count. Before the motion, and in an own motion, the controller's desired pose counts. After the motion the last pose
+//! stays. Where the machine loses cycles while the rate of the motion changes, the pose is not exactly the controller's.
 
 use masseter_controller::playback::Playback;
 use masseter_controller::trajectory::Trajectory;
