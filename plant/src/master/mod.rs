@@ -17,6 +17,7 @@ mod exchange;
 mod following;
 mod gate;
 pub(crate) mod link;
+mod presence;
 pub(crate) mod sdo;
 pub(crate) mod sockets;
 mod supervision;

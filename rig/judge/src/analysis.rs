@@ -305,6 +305,7 @@ impl Analysis {
         let topics = self.sequence.finish();
         let missing_frames =
             topics.iter().find(|topic| topic.topic == FrameTap::TOPIC).map_or(0, |topic| topic.missing);
+        let has_resumed = self.stop.has_resumed();
         let (stopped_by, enabled_cycles) = self.stop.into_figures();
         let enabled_s = enabled_cycles as f64 * self.period_ns as f64 / 1e9;
         let (intervals, worst_cycles, over_time, jaw_cycles) =
@@ -326,6 +327,7 @@ impl Analysis {
         let ended_ns = self.figures.final_state.filter(is_over).map(|_| self.last_due_ns + self.period_ns);
         Figures {
             ended_ns,
+            has_resumed,
             digest: self.digest.in_hex(),
             duration_s: duration_ns as f64 / 1e9,
             overrun_attribution: OverrunAttribution::new(&[&self.controller_skips, &self.plant_skips]),
@@ -455,6 +457,9 @@ pub struct Figures {
     pub overrun_attribution: Option<OverrunAttribution>,
     /// The last state of the controller's sequence; none without a single state message.
     pub final_state: Option<Code<ControllerState>>,
+    /// Whether the controller left the motion and began it again.
+    #[serde(skip)]
+    pub has_resumed: bool,
     /// What stopped the drives, whatever the controller reports; none where nothing did.
     pub stopped_by: Option<StoppedBy>,
     /// For how long all drives were enabled, s.

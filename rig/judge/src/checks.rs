@@ -1,6 +1,6 @@
 //! What a finished run is checked for, each with its finding and its limit. One check is whether the intended motion
-//! was played. It depends on the scenario's motion, the time for which the drives were enabled, and how far the
-//! motion came.
+//! was played. It depends on the share of the scenario's motion that the jaw went; of an own motion, on the time for which
+//! the drives were enabled.
 //!
 //! What the checks come to is the [verdict](super::verdict)'s.
 
@@ -91,8 +91,12 @@ fn missed_commands(manifest: &Manifest, figures: &Figures) -> Option<Check> {
     let MotionFigures { lag_ms, missed_commands, missed_in_a_row, .. } = figures.motion;
     let limit = u64::from(manifest.scenario.controller.stale_cycles);
     let is_of_scenario = figures.controller_skips.by_scenario + figures.plant_skips.by_scenario > 0;
-    lag_ms.filter(|_| !is_of_scenario)?;
+    lag_ms?;
     let finding = format!("{}, {missed_in_a_row} in a row, limit {limit}", counted(missed_commands, "cycle"));
+    if is_of_scenario {
+        let why = format!("{finding}; faults of the scenario stall a loop");
+        return Some(Check::not_judged("commands missed", why));
+    }
     Some(Check::judged("commands missed", finding, missed_in_a_row <= limit))
 }
 
@@ -275,6 +279,8 @@ const WHOLE_TIME: f64 = 0.99;
 pub(crate) enum Shortfall {
     /// The jaw went only this share of the scenario's motion.
     NotPlayed { share: f64, way_mm: f64 },
+    /// The controller left the motion and began it again: meanwhile nothing compared the jaw with its path.
+    Resumed,
     /// The scenario's motion moves nothing.
     Still,
     /// The drives were not enabled for as long as an own motion is to last.
@@ -289,6 +295,9 @@ impl Shortfall {
         let has_finished = figures.final_state.is_some_and(|state| state == ControllerState::Finished);
         if !has_finished || figures.stopped_by.is_some() {
             return None;
+        }
+        if figures.has_resumed {
+            return Some(Self::Resumed);
         }
         if manifest.declared.motion == PlayedMotion::Own {
             return Self::of_own(manifest, figures).filter(|_| !was_stopped_by_request(figures));
@@ -318,7 +327,7 @@ impl Shortfall {
     pub(crate) fn result(self) -> CheckResult {
         match self {
             Self::Still | Self::Unjudged => CheckResult::Untested,
-            Self::NotPlayed { .. } | Self::OwnEarly { .. } => CheckResult::Failed,
+            Self::NotPlayed { .. } | Self::OwnEarly { .. } | Self::Resumed => CheckResult::Failed,
         }
     }
 }
@@ -333,6 +342,7 @@ impl Display for Shortfall {
                 // No share of -0 %.
                 (share * 100.0).round() + 0.0
             ),
+            Self::Resumed => f.write_str("the controller left the motion and began it again"),
             Self::Still => f.write_str("the scenario's motion does not move the jaw"),
             Self::OwnEarly { enabled_s, duration_s } => write!(
                 f,

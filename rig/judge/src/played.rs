@@ -169,8 +169,10 @@ impl Display for StoppedBy {
 pub(super) struct StopWatch {
     stopped: Option<StoppedBy>,
     was_enabled: [bool; AXES],
-    /// The newest state is one of the motion.
+    /// The newest state is one of the motion; whether one was; and whether the motion began again after it was left.
     is_moving: bool,
+    has_moved: bool,
+    has_resumed: bool,
     /// When a drive left operation in the motion, ns, and how many states of the motion came since.
     left: Option<(u64, u32)>,
     has_left: bool,
@@ -222,7 +224,10 @@ impl StopWatch {
 
     /// Takes a state. A controller that ends its motion with the drives is no stop of theirs.
     pub(super) fn apply_state(&mut self, state: &State) {
-        self.is_moving = is_moving(Some(state.controller_state));
+        let is_moving = is_moving(Some(state.controller_state));
+        self.has_resumed |= is_moving && !self.is_moving && self.has_moved;
+        self.has_moved |= is_moving;
+        self.is_moving = is_moving;
         self.is_finished = state.controller_state == ControllerState::Finished.code();
         let Some((left_ns, states)) = &mut self.left else { return };
         // The state of an earlier cycle may come later.
@@ -241,6 +246,11 @@ impl StopWatch {
     pub(super) fn apply_event(&mut self, event: &EventRecord) {
         let is_stop = event.is_fault_of_master() && !self.has_ended;
         self.stopped = self.stopped.or(is_stop.then_some(StoppedBy::Master));
+    }
+
+    /// Whether the motion began again after the controller had left it: meanwhile nobody compares the jaw with its path.
+    pub(super) fn has_resumed(&self) -> bool {
+        self.has_resumed
     }
 
     /// What stopped the drives, and for how many cycles all of them were enabled.

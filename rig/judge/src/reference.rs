@@ -1,10 +1,10 @@
 //! The pose that the jaw should have at each sample, and by how much the motion is late.
 //!
-//! While the motion plays, the pose is the scenario's, computed here. The motion begins with the first sample in which the
-//! controller is in the state `running`, and goes on by a period with each cycle that the controller runs. A controller waits
-//! where commands or readings are lost: its motion time is then behind. This lag is a figure, which never shrinks; the pose
-//! here is as late, up to the limit of `checks`. What cycles without SYNC and the machine's lost cycles cost does not
-//! count. Before the motion, and in an own motion, the controller's desired pose counts. After the motion the last pose
+//! While the motion plays, the pose is the scenario's, computed here; with force control its height follows the controller's
+//! within `reach_m`. The motion begins with the first sample in which the controller says `running`, and goes on by a period
+//! with each cycle that the controller runs. A controller waits where commands or readings are lost: its motion is then
+//! late, and the pose here is as late, up to the limit of `checks`. What was late stays late, but for what cycles without
+//! SYNC and the machine's lost cycles cost. Before the motion, and in an own motion, the controller's desired pose counts. After the motion the last pose
 //! stays. Where the machine loses cycles while the rate of the motion changes, the pose is not exactly the controller's.
 
 use masseter_controller::playback::Playback;
@@ -96,7 +96,7 @@ impl Reference {
         }
     }
 
-    /// A stop that operator or scenario asked for lets the motion come to rest.
+    /// A stop by request, whoever asked, lets the motion come to rest; the check `sequence` judges whether it was expected.
     pub(crate) fn apply_event(&mut self, event: &EventRecord) {
         if event.cause == Cause::StopRequested {
             self.stop_cycle = Some(self.stop_cycle.map_or(event.cycle, |cycle| cycle.min(event.cycle)));

@@ -79,7 +79,12 @@ impl StandstillWatch {
         }
         let Some(stop) = self.stop.as_mut().filter(|_| !is_closing) else { return };
         let since_ns = time_ns.saturating_sub(stop.began_ns);
-        self.figures.recorded_s = Some(since_ns as f64 / SECOND_NS as f64);
+        // A time in which an axis is unseen shows no standstill.
+        let has_all = (0..AXES).all(|axis| place_m(messages, axis, self.has_truth).is_some());
+        let recorded_s = self.figures.recorded_s.get_or_insert(0.0);
+        if has_all {
+            *recorded_s = since_ns as f64 / SECOND_NS as f64;
+        }
         for (axis, most_mm) in self.figures.axes_mm.iter_mut().enumerate() {
             let Some(place_m) = place_m(messages, axis, self.has_truth) else { continue };
             if *time_ns >= stop.due_ns(axis) + self.reaction_ns[axis] {
@@ -107,6 +112,7 @@ impl StandstillWatch {
         } else if self.is_at_work {
             let (off_ns, places_m) = ([None; AXES], [None; AXES]);
             self.stop = Some(Stop { began_ns: time_ns, off_ns, places_m, jaw: None });
+            self.figures.recorded_s = Some(0.0);
         }
         self.is_at_work = is_at_work;
         for (code, off_ns) in

@@ -249,6 +249,22 @@ fn a_jaw_that_never_moves_has_played_nothing_and_one_that_moves_has_played_all()
     assert!((0.2..0.8).contains(&half.motion.played.unwrap()), "{:?}", half.motion);
 }
 
+/// Meanwhile the jaw may go anywhere, and nobody would compare it with its path.
+#[test]
+fn a_controller_that_leaves_the_motion_and_begins_it_again_is_told() {
+    use ControllerState::{Easing, Enabling, Finished, Holding, Running};
+    for (states, expected) in [
+        (&[Enabling, Easing, Running, Running, Holding, Finished][..], false),
+        (&[Easing, Running, Enabling, Running, Finished], true),
+    ] {
+        let mut watch = crate::played::StopWatch::default();
+        for name in states {
+            watch.apply_state(&State { controller_state: name.code(), ..State::default() });
+        }
+        assert_eq!(watch.has_resumed(), expected, "{states:?}");
+    }
+}
+
 /// V5: the jaw strays in the cycles of which the controller has no reading.
 #[test]
 fn a_jaw_that_strays_while_readings_are_lost_is_seen() {

@@ -41,6 +41,8 @@ pub(super) struct Response {
     not_followed: u64,
     worst: Option<Answer>,
     longest_s: Option<f64>,
+    /// The shortest observation of an answer that the run's end cut, ns.
+    cut_ns: Option<u64>,
     last_ns: u64,
     /// Triggers without a sample within their time, as at the end of the run.
     beyond: u64,
@@ -103,6 +105,7 @@ impl Response {
             not_followed: 0,
             worst: None,
             longest_s: None,
+            cut_ns: None,
             last_ns: 0,
             beyond: 0,
         })
@@ -215,6 +218,7 @@ impl Response {
             return;
         }
         self.answered += u64::from(answer.best >= 0.0);
+        self.cut_ns = self.cut_ns.into_iter().chain(answer.observed_ns).min();
         let margin = self.margin(&answer).unwrap_or(f64::NEG_INFINITY);
         let worst = self.worst.map(|worst| self.margin(&worst).unwrap_or(f64::NEG_INFINITY));
         if worst.is_none_or(|worst| margin < worst) {
@@ -259,7 +263,7 @@ impl Response {
         let finding = Finding::new(self.answered == self.triggers - self.beyond, self.in_words(), unit);
         let (worst_ns, latency_s) = (Some(worst.at_ns), self.longest_s);
         let ms = |ns: u64| ns as f64 / 1e6;
-        let cut = worst.observed_ns.map(|observed_ns| {
+        let cut = self.cut_ns.map(|observed_ns| {
             format!("the run ended after {:.0} ms of {:.0} ms", ms(observed_ns), ms(self.stays_for_ns))
         });
         self.window.limit(Finding { margin, relative_margin, worst_ns, latency_s, ..finding }, cut)

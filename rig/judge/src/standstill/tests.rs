@@ -133,3 +133,15 @@ fn a_recording_that_ends_soon_is_untested_unless_something_else_ended_it() {
     let moved = StandstillFigures { axes_mm: [9.0; AXES], ..short };
     assert_eq!(mark(&moved), "FAIL");
 }
+
+#[test]
+fn an_axis_that_nobody_sees_after_the_stop_has_not_stood() {
+    let mut watch = StandstillWatch::new(&Scenario::default());
+    for ms in 0..700 {
+        let state = if ms < 100 { DriveState::OperationEnabled } else { DriveState::SwitchOnDisabled };
+        let mut sample = sample(ms, codes(state), ControllerState::Running, 0.0);
+        sample.messages.truth = sample.messages.truth.filter(|_| ms < 200);
+        watch.add_sample(&sample);
+    }
+    assert_eq!(mark(&watch.into_figures()), "UNTESTED");
+}

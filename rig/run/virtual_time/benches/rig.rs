@@ -1,7 +1,7 @@
 //! What a rig that steps costs: `cargo bench -p masseter-virtual-time`.
 //!
 //! `step` is the rig alone, with the commands of a controller that stands still; `virtual_cycle` is the rig with its
-//! controller, in the motion. Limits: a step 1.05 times what it was as a part of a virtual cycle, a snapshot 100 µs, a reset 5 ms.
+//! controller, in the motion.
 
 use std::path::PathBuf;
 

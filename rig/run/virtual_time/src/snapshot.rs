@@ -63,7 +63,7 @@ pub enum OtherScenario {
 impl OtherScenario {
     /// Refuses a snapshot of another scenario than the rig's.
     pub(crate) fn refuse(rig: &Arc<Scenario>, snapshot: &Arc<Scenario>) -> Result<(), Self> {
-        let is_same = Arc::ptr_eq(rig, snapshot) || rig == snapshot;
+        let is_same = Arc::ptr_eq(rig, snapshot) || Belonging::to(rig) == Belonging::to(snapshot);
         if is_same { Ok(()) } else { Err(Self::new(rig, &snapshot.name, snapshot.seed)) }
     }
 

@@ -32,18 +32,16 @@ pub(crate) struct StepperState {
     published: Published,
     now_ns: u64,
     reading: Reading,
-    command: Option<Command>,
     cycle: u64,
 }
 
 impl State for StepperState {
     fn exchange<A: Archive>(&mut self, archive: &mut A) -> Result<(), A::Error> {
-        let Self { plant, published, now_ns, reading, command, cycle } = self;
+        let Self { plant, published, now_ns, reading, cycle } = self;
         plant.exchange(archive)?;
         archive.value(published)?;
         archive.value(now_ns)?;
         archive.value(reading)?;
-        archive.value(command)?;
         archive.value(cycle)
     }
 }
@@ -109,23 +107,23 @@ impl<S: Sink> Stepper<S> {
 
     /// The state between two calls.
     pub(crate) fn state(&self) -> StepperState {
-        let Self { plant, ports: Ports { log, now_ns, reading, command, .. }, cycle, .. } = self;
+        let Self { plant, ports: Ports { log, now_ns, reading, .. }, cycle, .. } = self;
         StepperState {
             plant: plant.clone(),
             published: log.published(),
             now_ns: *now_ns,
             reading: *reading,
-            command: *command,
             cycle: *cycle,
         }
     }
 
     /// Goes to a state of the same scenario and seed.
     pub(crate) fn set_state(&mut self, state: &StepperState) {
-        let StepperState { plant, published, now_ns, reading, command, cycle } = state;
+        let StepperState { plant, published, now_ns, reading, cycle } = state;
         self.plant = plant.clone();
         self.ports.log.set_published(*published);
-        (self.ports.now_ns, self.ports.reading, self.ports.command) = (*now_ns, *reading, *command);
+        // A cycle takes its command before it ends.
+        (self.ports.now_ns, self.ports.reading, self.ports.command) = (*now_ns, *reading, None);
         self.cycle = *cycle;
     }
 
