@@ -19,7 +19,7 @@ use masseter_controller::motion_controller::MotionController;
 use masseter_plan::RunPlan;
 use masseter_recording::Manifest;
 use masseter_scenario::{BusFault, ChecksConfig, FaultConfig, Scenario};
-use masseter_virtual_time::Requests;
+use masseter_virtual_time::Uninterrupted;
 use rayon::prelude::*;
 
 const CYCLES: [u32; 8] = [1, 2, 5, 10, 20, 50, 100, 500];
@@ -100,19 +100,6 @@ fn faults_of_messages(bus: usize, messages: &[(u8, u8, u16)]) -> Vec<FaultConfig
 
 fn or_none(value: Option<impl Display>) -> String {
     value.map_or_else(String::new, |value| value.to_string())
-}
-
-/// Nobody interrupts.
-struct Uninterrupted;
-
-impl Requests for Uninterrupted {
-    fn is_stop_requested(&self) -> bool {
-        false
-    }
-
-    fn is_abort_requested(&self) -> bool {
-        false
-    }
 }
 
 /// Plays a scenario by the rig's own controller, and judges it.

@@ -248,6 +248,10 @@ fn tags_and_a_matrix_choose_and_an_included_file_is_shared() {
     assert!(said.contains("1 passed; 0 failed; 0 untested; 2 filtered out"), "{said}");
     let shares = ["1/3", "2/3", "3/3"].map(|share| stdout(&suite.test(&["suite", "--shard", share])));
     assert!(shares.iter().all(|said| said.contains("1 passed; 0 failed")), "{shares:?}");
+    for name in ["cases[rate_hz=500]", "cases[rate_hz=1000]", "plain"] {
+        let line = format!("test {name} ... ");
+        assert_eq!(shares.iter().filter(|said| said.contains(&line)).count(), 1, "{name}: {shares:?}");
+    }
     let refused = suite.test(&["suite", "-k", "rates and"]);
     assert!(refused.status.code() == Some(2) && stderr(&refused).contains("a word is missing"));
 }

@@ -11,7 +11,7 @@ use masseter_plan::RunPlan;
 use masseter_recording::Manifest;
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_scenario::Scenario;
-use masseter_virtual_time::Requests;
+use masseter_virtual_time::Uninterrupted;
 
 use crate::tables::{csv, number};
 
@@ -81,19 +81,6 @@ fn curves<'a>(
     curves.flat_map(move |(name, curve)| {
         curve.iter().map(move |&(at_s, force_n)| (run, name, [at_s, force_n].map(number)))
     })
-}
-
-/// Nothing asks a run to end: an interrupt ends the whole program.
-struct Uninterrupted;
-
-impl Requests for Uninterrupted {
-    fn is_stop_requested(&self) -> bool {
-        false
-    }
-
-    fn is_abort_requested(&self) -> bool {
-        false
-    }
 }
 
 /// Plays a scenario under virtual time without a recording.

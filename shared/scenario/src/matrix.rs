@@ -65,6 +65,9 @@ fn keys_within<'a>(
         let key = if within.is_empty() { key.clone() } else { format!("{within}.{key}") };
         match value {
             Value::Table(inner) => keys_within(&key, inner, found)?,
+            Value::Array(values) if (1..values.len()).any(|n| values[..n].contains(&values[n])) => {
+                return Err(ScenarioError::bad("matrix", &key, "name each value once"));
+            }
             Value::Array(values) if !values.is_empty() => found.push((key, values)),
             _ => {
                 let need = "give each key a list of values, such as rate_hz = [500, 1000]";
@@ -106,6 +109,7 @@ mod tests {
         for text in ["rate_hz = 500", "rate_hz = []", "controller.lead_cycles = 2.0"] {
             assert!(cases(text).unwrap_err().contains("give each key a list of values"), "{text}");
         }
+        assert!(cases("seed = [1, 1]").unwrap_err().contains("name each value once"));
         let tens =
             ["a", "b", "c", "d"].map(|key| key.to_owned() + " = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]\n").concat();
         assert!(cases(&tens).unwrap_err().contains("matrix = 10000: use at most 1000"));

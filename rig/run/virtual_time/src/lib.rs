@@ -24,7 +24,7 @@ use run::Control;
 
 pub use log::{Log, LoggedPorts, Sink};
 pub use rig::{Rig, RigError};
-pub use run::{Requests, RestoreError, Run, RunSnapshot};
+pub use run::{Requests, RestoreError, Run, RunSnapshot, Uninterrupted};
 pub use snapshot::{OtherScenario, Snapshot, SnapshotError, SnapshotProblem};
 
 /// Makes the analysis of a run: with everything that a report shows, or with what a verdict needs alone.

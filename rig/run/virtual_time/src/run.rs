@@ -29,6 +29,20 @@ pub trait Requests {
     fn is_abort_requested(&self) -> bool;
 }
 
+/// Nobody asks for anything.
+#[derive(Debug, Clone, Copy)]
+pub struct Uninterrupted;
+
+impl Requests for Uninterrupted {
+    fn is_stop_requested(&self) -> bool {
+        false
+    }
+
+    fn is_abort_requested(&self) -> bool {
+        false
+    }
+}
+
 /// The controller of a run, and what accompanies it.
 pub(crate) struct Control {
     controller: Box<dyn Controller>,

@@ -370,7 +370,12 @@ impl SuiteReport {
             let (scenario, name, unit) = (row.scenario, &row.check.name, row.unit());
             format!("; most of all {scenario}: {name}, {before} → {now} {unit}").trim_end().to_owned()
         });
-        Some(format!("margins since the baseline: {smaller} smaller, {larger} larger, {equal} equal{worst}"))
+        let others = match rows.len() - changes.len() {
+            0 => String::new(),
+            others => format!(", {others} not compared"),
+        };
+        let counts = format!("{smaller} smaller, {larger} larger, {equal} equal{others}");
+        Some(format!("margins since the baseline: {counts}{worst}"))
     }
 
     /// Every requirement of every scenario, by its id, then by its name.
