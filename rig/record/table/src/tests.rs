@@ -112,14 +112,17 @@ fn a_missing_program_is_named_with_what_builds_it() {
 fn a_program_that_says_much_before_it_takes_rows_blocks_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("program");
-    fs::write(&path, "#!/bin/sh\nhead -c 200000 /dev/zero >&2\nhead -c 500000 > /dev/null\nexit 3\n")
-        .unwrap();
-    fs::set_permissions(&path, Permissions::from_mode(0o700)).unwrap();
     let table = Table::new(vec![Column::new("case", "", "", Values::Whole(vec![Some(1); 100_000]))]);
-    let format = Format::Parquet(ParquetProgram::at(path));
-    let written = write_table(&format, tempfile::tempfile().unwrap(), &table);
-    let Err(TableError::Program { status, said }) = written else { panic!("{written:?}") };
-    assert_eq!((status.code(), said.len()), (Some(3), 200_000));
+    // One program ends amid the rows, the other after the end of the pipe.
+    for takes_rows in ["head -c 100000", "cat"] {
+        let script = format!("#!/bin/sh\nhead -c 200000 /dev/zero >&2\n{takes_rows} > /dev/null\nexit 3\n");
+        fs::write(&path, script).unwrap();
+        fs::set_permissions(&path, Permissions::from_mode(0o700)).unwrap();
+        let format = Format::Parquet(ParquetProgram::at(&path));
+        let written = write_table(&format, tempfile::tempfile().unwrap(), &table);
+        let Err(TableError::Program { status, said }) = written else { panic!("{written:?}") };
+        assert_eq!((status.code(), said.len()), (Some(3), 200_000), "{takes_rows}");
+    }
 }
 
 #[test]

@@ -178,7 +178,7 @@ impl ParquetProgram {
             let mut said = Vec::new();
             stderr.read_to_end(&mut said).map(|_| said)
         });
-        let mut file = ParquetFile { child, rows, said: Some(said) };
+        let mut file = ParquetFile { child, rows: Some(rows), said: Some(said) };
         file.send_rows(|rows| send_columns(table, rows))?;
         Ok(file)
     }
@@ -187,7 +187,8 @@ impl ParquetProgram {
 /// A file that the program writes.
 struct ParquetFile {
     child: Child,
-    rows: BufWriter<ChildStdin>,
+    /// None once their end was sent, or the program ended before it.
+    rows: Option<BufWriter<ChildStdin>>,
     /// Gathers what it writes to standard error, so that the pipe never fills and blocks it. None once it was waited for.
     said: Option<JoinHandle<io::Result<Vec<u8>>>>,
 }
@@ -207,7 +208,7 @@ impl ParquetFile {
         &mut self,
         write: impl FnOnce(&mut BufWriter<ChildStdin>) -> io::Result<()>,
     ) -> Result<(), TableError> {
-        match write(&mut self.rows) {
+        match write(self.rows.as_mut().expect("rows are sent before their end")) {
             // The program has ended, and says why.
             Err(error) if error.kind() == ErrorKind::BrokenPipe => self.await_end().and(Err(error.into())),
             sent => Ok(sent?),
@@ -215,6 +216,8 @@ impl ParquetFile {
     }
 
     fn await_end(&mut self) -> Result<(), TableError> {
+        // A program may read to the end of the pipe before it exits.
+        self.rows = None;
         let said = self.said.take().map(|said| said.join().expect("reading does not panic")).transpose()?;
         let said = String::from_utf8_lossy(&said.unwrap_or_default()).trim().to_owned();
         let status = self.child.wait()?;
