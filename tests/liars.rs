@@ -359,9 +359,11 @@ fn drives_that_leave_operation_in_a_pause_of_the_motion_are_no_pass() {
 #[test]
 fn an_own_motion_is_declared_lasts_as_long_as_the_scenario_says_and_something_is_required_of_it() {
     let required = "[[require]]\nname = 'opens'\nsignal = 'incisal.z'\nduring = 'running'\nmax = '1 m'\n";
-    let cases: [(&str, f64, &str, &str); 3] = [
+    let of_its_word = "[[require]]\nname = 'follows'\nsignal = 'incisal.estimated_error'\nduring = 'running'\nmax = '1 m'\n";
+    let cases: [(&str, f64, &str, &str); 4] = [
         (required, 1.6, "PASS", "ended in state finished, own motion of the controller"),
         ("", 1.6, "UNTESTED", "nothing judged the motion, which is not the scenario's: "),
+        (of_its_word, 1.6, "UNTESTED", "nothing judged the motion, which is not the scenario's: "),
         (required, 0.4, "FAIL", "the controller's own motion ended early: the drives were enabled for "),
     ];
     for (scenario, end_s, word, finding) in cases {

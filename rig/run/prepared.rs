@@ -157,6 +157,7 @@ fn manifest_of(plan: &RunPlan, controller: &ControllerChoice, clock: ClockKind) 
     let (motion_s, machine) = (plan.trajectory.duration_s(), masseter_machine::describe());
     let mut manifest = Manifest::new(BUILD, plan.scenario.clone(), motion_s, &name_of(&clock), machine);
     manifest.controller = controller.name();
+    manifest.warnings = plan.warnings();
     manifest.full_speed = plan.scenario.dry.is_on.then_some(FullSpeed {
         velocity_m_s: plan.demands.velocity_m_s,
         acceleration_m_s2: plan.demands.acceleration_m_s2,

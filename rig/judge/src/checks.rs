@@ -285,7 +285,7 @@ pub(crate) enum Shortfall {
     Still,
     /// The drives were not enabled for as long as an own motion is to last.
     OwnEarly { enabled_s: f64, duration_s: f64 },
-    /// The motion is the controller's own or gone since the run, and no requirement judges the run.
+    /// The motion is the controller's own or gone since the run, and no requirement judges the jaw.
     Unjudged,
 }
 
@@ -319,7 +319,8 @@ impl Shortfall {
     }
 
     fn unjudged(manifest: &Manifest, figures: &Figures) -> Option<Self> {
-        let mut required = figures.requirements.iter().filter(|required| !required.is_expected_event);
+        // What a controller says of its own motion proves nothing.
+        let mut required = figures.requirements.iter().filter(|required| required.is_of_mechanism);
         let is_judged = required.any(|required| required.result != CheckResult::Untested);
         (manifest.is_of_program() && !is_judged).then_some(Self::Unjudged)
     }
@@ -350,7 +351,8 @@ impl Display for Shortfall {
                  --duration declares its end"
             ),
             Self::Unjudged => f.write_str(
-                "nothing judged the motion, which is not the scenario's: require something of the jaw in [[require]]",
+                "nothing judged the motion, which is not the scenario's: require something of the true jaw in [[require]], such as \
+                 jaw.opening; on the robot of the encoders, such as l1.position",
             ),
         }
     }

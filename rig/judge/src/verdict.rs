@@ -43,6 +43,9 @@ pub struct Verdict {
     pub timing: Timing,
     /// Every check, also those that passed.
     pub checks: Vec<Check>,
+    /// What the plan of the run warns of. Warnings decide nothing.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
     #[serde(skip)]
     pub(crate) outcome: Outcome,
 }
@@ -85,7 +88,15 @@ impl Verdict {
         if outcome != Outcome::Passed {
             reason += &overload(&manifest.usage, manifest.scenario.rate_hz).unwrap_or_default();
         }
-        Self { word: outcome.word(), reason, exit_code: outcome.exit(), timing, checks: all, outcome }
+        Self {
+            word: outcome.word(),
+            reason,
+            exit_code: outcome.exit(),
+            timing,
+            checks: all,
+            warnings: manifest.warnings.clone(),
+            outcome,
+        }
     }
 
     /// What to do about the machine; none where the machine disturbed nothing.

@@ -92,7 +92,7 @@ mod shortfall {
         figures.events.push(EventRecord::from(&stop));
     }
 
-    fn require(figures: &mut Figures, result: CheckResult, is_expected_event: bool) {
+    fn require(figures: &mut Figures, result: CheckResult, is_of_mechanism: bool) {
         figures.requirements.push(RequirementFigures {
             name: "opens".to_owned(),
             id: None,
@@ -106,7 +106,8 @@ mod shortfall {
             worst_ns: None,
             latency_ms: None,
             may_be_disturbed: false,
-            is_expected_event,
+            is_expected_event: false,
+            is_of_mechanism,
             plot: None,
         });
     }
@@ -179,15 +180,15 @@ mod shortfall {
         };
         assert_eq!(own(|_, _| ()), Some(Shortfall::Unjudged));
         assert_eq!(own(|manifest, _| manifest.controller = Some("hold".to_owned())), None);
-        for (result, is_expected_event, expected) in [
-            (CheckResult::Passed, false, None),
-            (CheckResult::Failed, false, None),
-            (CheckResult::Untested, false, Some(Shortfall::Unjudged)),
-            (CheckResult::Passed, true, Some(Shortfall::Unjudged)),
+        for (result, is_of_mechanism, expected) in [
+            (CheckResult::Passed, true, None),
+            (CheckResult::Failed, true, None),
+            (CheckResult::Untested, true, Some(Shortfall::Unjudged)),
+            (CheckResult::Passed, false, Some(Shortfall::Unjudged)),
         ] {
             let found = shortfall(|manifest, figures| {
                 manifest.declared.motion = PlayedMotion::Own;
-                require(figures, result, is_expected_event);
+                require(figures, result, is_of_mechanism);
             });
             assert_eq!(found, expected, "{result:?}");
         }

@@ -22,6 +22,8 @@ pub(super) struct Quantified {
     pub(super) unit: Unit,
     /// Why it may have no value in a whole run; empty where nothing is known.
     pub(super) absence: &'static str,
+    /// Whether it depends on what the mechanism does.
+    pub(super) is_of_mechanism: bool,
     source: ValueSource,
 }
 
@@ -54,8 +56,9 @@ impl Quantified {
                 "{name} is a state, which has no bounds; use never, or when and then"
             )));
         }
-        let (unit, absence) = (named.shown(), named.absence);
-        Ok(Self { text: name.to_owned(), unit, absence, source: ValueSource::Signal(signal) })
+        let (unit, absence, is_of_mechanism) = (named.shown(), named.absence, named.is_of_mechanism);
+        let source = ValueSource::Signal(signal);
+        Ok(Self { text: name.to_owned(), unit, absence, is_of_mechanism, source })
     }
 
     fn of_expression(text: &str, unit: Unit, values: &mut Values) -> Result<Self, Reason> {
@@ -76,7 +79,9 @@ impl Quantified {
             return Err(quoted(&format_args!("its unit is {derived}, not '{}'", unit.name)).into());
         }
         let absences = named.iter().map(|signal| signal.absence);
+        let is_of_mechanism = named.iter().any(|signal| signal.is_of_mechanism);
         Ok(Self {
+            is_of_mechanism,
             text: text.to_owned(),
             unit,
             absence: absences.into_iter().find(|absence| !absence.is_empty()).unwrap_or_default(),
@@ -189,6 +194,11 @@ impl Bounds {
             series: Series::default(),
             began_ns: None,
         })
+    }
+
+    /// Whether it judges what the mechanism does.
+    pub(super) fn is_of_mechanism(&self) -> bool {
+        self.of.is_of_mechanism
     }
 
     /// What must hold, in words.

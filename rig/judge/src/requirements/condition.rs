@@ -69,6 +69,8 @@ pub(super) struct Condition {
     limit: f64,
     /// The unit in which the signal is shown.
     pub(super) unit: Unit,
+    /// Whether the signal is one of the mechanism.
+    pub(super) is_of_mechanism: bool,
 }
 
 impl Condition {
@@ -92,7 +94,7 @@ impl Condition {
         }
         let signal = signal?;
         let named = values.signal(signal);
-        let (unit, states) = (named.shown(), named.states());
+        let (unit, states, is_of_mechanism) = (named.shown(), named.states(), named.is_of_mechanism);
         let limit = match &states {
             Some(states) => state_code(limit, states)?,
             None => limit_of(limit, unit.dimension)?,
@@ -102,7 +104,10 @@ impl Condition {
             None if !comparison.is_of_order() && unit.dimension != Dimension::One => {
                 "a measured value is never exactly a number; use < or >"
             }
-            _ => return Ok(Self { text: text.to_owned(), signal, comparison, limit, unit }),
+            _ => {
+                let text = text.to_owned();
+                return Ok(Self { text, signal, comparison, limit, unit, is_of_mechanism });
+            }
         };
         Err(format!("'{}': {misfit}", excerpt(text)).into())
     }

@@ -39,6 +39,11 @@ impl Never {
         Ok(Self { what, window, samples: 0, missing, times: 0, first_ns: None, worst: None })
     }
 
+    /// Whether it judges what the mechanism does.
+    pub(super) fn is_of_mechanism(&self) -> bool {
+        matches!(&self.what, What::Condition(condition) if condition.is_of_mechanism)
+    }
+
     /// What must hold, in words.
     pub(super) fn must(&self) -> String {
         let what = match &self.what {

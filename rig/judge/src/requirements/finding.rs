@@ -143,6 +143,9 @@ pub struct RequirementFigures {
     /// Whether it is an event that `[expect]` names.
     #[serde(skip)]
     pub is_expected_event: bool,
+    /// Whether it judges what the mechanism does, and not what a controller states of it.
+    #[serde(skip)]
+    pub is_of_mechanism: bool,
     /// The signal over time, for plots.
     #[serde(skip)]
     pub plot: Option<RequirementPlot>,

@@ -111,6 +111,11 @@ impl Response {
         })
     }
 
+    /// Whether it judges what the mechanism does.
+    pub(super) fn is_of_mechanism(&self) -> bool {
+        self.then.is_of_mechanism
+    }
+
     /// What must hold, in words.
     pub(super) fn must(&self) -> String {
         let ms = |ns: u64| format!("{} ms", ns as f64 / 1e6);

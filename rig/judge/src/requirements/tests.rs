@@ -511,3 +511,33 @@ fn a_window_that_the_runs_end_cuts_says_what_was_judged_and_a_whole_one_is_untes
     let within = run.judge("signal = 'l1.force'\nmax = '2 N'\nduring = { to_s = 0.005 }\nwhole = true");
     assert_eq!((within.result, within.finding.as_str()), (Passed, "1 N in 6 samples"));
 }
+
+/// A controller's own statements count as nothing where it plays a motion of its own.
+#[test]
+fn a_requirement_on_the_mechanism_is_told_from_one_on_what_the_controller_states() {
+    let of_mechanism = |keys: &str| {
+        let text = format!("[[require]]\nname = 'it'\n{keys}\n");
+        let scenario = Scenario::parse("s.toml".as_ref(), &text).unwrap();
+        check_requirements(&scenario, None).unwrap();
+        Judge::new(&scenario).finish()[0].is_of_mechanism
+    };
+    for keys in [
+        "signal = 'jaw.opening'\nmax = '40 mm'",
+        "signal = 'l1.true_position'\nmax = '1 m'",
+        "expression = '2 * {incisal.z}'\nunit = 'mm'\nmax = '1 m'",
+        "never = 'bite.force > 100 N'",
+        "when = 'controller.running'\nthen = 'incisal.z < 1 m'",
+    ] {
+        assert!(of_mechanism(keys), "{keys}");
+    }
+    for keys in [
+        "signal = 'incisal.error'\nmax = '1 mm'",
+        "signal = 'l1.position'\nmax = '1 m'",
+        "expression = '{incisal.desired.z}'\nunit = 'mm'\nmax = '1 m'",
+        "never = 'fk.residual > 1 mm'",
+        "when = 'incisal.z < 1 m'\nthen = 'controller.state == running'",
+        "event = 'controller.stop_requested'\nat_most = 1",
+    ] {
+        assert!(!of_mechanism(keys), "{keys}");
+    }
+}

@@ -18,9 +18,10 @@ pub(super) fn signals(scenario: &Scenario, jaw: Jaw, declared: &Declared) -> Vec
     if scenario.load_cell.is_some() {
         list.add("load_cell.force", Unit::N, "Bite force that the load cell shows.", |of| {
             Some(of.reading?.load_cell_n)
-        });
+        })
+        .of_mechanism_if(true);
     }
-    add_axes(&mut list);
+    add_axes(&mut list, jaw.has_truth);
     add_controller(&mut list);
     add_timing(&mut list);
     add_declared(&mut list, declared);
@@ -40,7 +41,7 @@ fn add_jaw(list: &mut SignalList, jaw: Jaw) {
                 Unit::MM,
                 format!("Place of the point along {axis} of the base: the true one, on the robot the estimated one."),
                 move |of| Some(jaw.place(point, &jaw.actual(of)?)[at]),
-            );
+            ).of_mechanism_if(jaw.has_truth);
         }
         list.add(
             format!("{name}.error"),
@@ -68,13 +69,15 @@ fn add_jaw(list: &mut SignalList, jaw: Jaw) {
         Unit::MM,
         "Distance of the incisal point from its place when the motion began.",
         move |of, start| Some(jaw.distance(JawPoint::Incisal, &jaw.actual(of)?, start?)),
-    );
+    )
+    .of_mechanism_if(jaw.has_truth);
     list.add_from(
         "jaw.rotation",
         Unit::DEG,
         "Angle of the jaw from its orientation when the motion began.",
         move |of, start| Some(jaw.actual(of)?.rotation.angle_to(&start?.rotation)),
-    );
+    )
+    .of_mechanism_if(jaw.has_truth);
     list.add(
         "platform.error",
         Unit::MM,
@@ -92,7 +95,8 @@ fn add_jaw(list: &mut SignalList, jaw: Jaw) {
         Unit::N,
         "Vertical force of food and upper teeth on the emulated jaw, mean over the cycle.",
         |of| Some(of.truth?.bite_force_n),
-    );
+    )
+    .of_mechanism_if(true);
 }
 
 /// None where the jaws cannot touch.
@@ -106,14 +110,17 @@ fn add_contact(list: &mut SignalList, scenario: &Scenario) {
             Unit::N,
             format!("Force of antagonist and food on tooth {tooth}, mean over a cycle."),
             move |of| loads_n(of)?.find(|(number, _)| *number == tooth).map(|(_, load_n)| load_n),
-        );
+        )
+        .of_mechanism_if(true);
     }
     list.add("contact.total", Unit::N, "Sum of the forces on all teeth.", |of| {
         Some(loads_n(of)?.map(|(_, load_n)| load_n).sum())
-    });
+    })
+    .of_mechanism_if(true);
 }
 
-fn add_axes(list: &mut SignalList) {
+/// Where nothing is emulated, the encoders alone show what moves.
+fn add_axes(list: &mut SignalList, has_truth: bool) {
     for (axis, name) in AXIS_NAMES.into_iter().enumerate() {
         let at = move |values: [f64; AXES]| values[axis];
         // Before the first process data of a drive, and after its loss, a reading has no values of the drive.
@@ -125,13 +132,16 @@ fn add_axes(list: &mut SignalList) {
             |of: &CycleMessages| of.command.filter(|command| command.request != DriveRequest::Off.code());
         list.add(format!("{name}.position"), Unit::MM, "Position that the encoder reports.", move |of| {
             Some(at(reading(of)?.position_m))
-        });
+        })
+        .of_mechanism_if(!has_truth);
         list.add(format!("{name}.true_position"), Unit::MM, "True position of the axis.", move |of| {
             Some(at(of.truth?.joint_m))
-        });
+        })
+        .of_mechanism_if(true);
         list.add(format!("{name}.velocity"), Unit::MM_S, "True velocity of the axis.", move |of| {
             Some(at(of.truth?.joint_m_s))
-        });
+        })
+        .of_mechanism_if(true);
         list.add(
             format!("{name}.force"),
             Unit::N,

@@ -34,6 +34,9 @@ pub struct NamedSignal {
     /// Why it may have no value in a whole run; empty where nothing is known.
     #[serde(skip)]
     pub(crate) absence: &'static str,
+    /// Whether it is a motion or a load of the mechanism that no controller states.
+    #[serde(skip)]
+    pub(crate) is_of_mechanism: bool,
     #[serde(skip)]
     extract: Extract,
 }
@@ -48,6 +51,11 @@ impl NamedSignal {
     /// Its value in a cycle of a run whose motion began with this pose of the jaw.
     pub(super) fn value(&self, messages: &CycleMessages, start: Option<&Pose>) -> Option<f64> {
         (self.extract)(messages, start)
+    }
+
+    /// Says whether it shows the mechanism itself, and not what a controller states of it.
+    pub(super) fn of_mechanism_if(&mut self, is_of_mechanism: bool) {
+        self.is_of_mechanism = is_of_mechanism;
     }
 
     /// The unit in which it is shown.
@@ -87,7 +95,8 @@ impl SignalList {
     ) -> &mut NamedSignal {
         let (name, unit, about, extract) =
             (name.into(), shown.name.to_owned(), about.into(), Box::new(extract));
-        self.0.push(NamedSignal { name, unit, about, shown, states: None, absence: "", extract });
+        let (states, absence, is_of_mechanism) = (None, "", false);
+        self.0.push(NamedSignal { name, unit, about, shown, states, absence, is_of_mechanism, extract });
         self.0.last_mut().expect("it was just added")
     }
 
@@ -130,7 +139,7 @@ pub(super) enum JawPoint {
 pub(super) struct Jaw {
     /// Its points in the platform frame, m.
     points_m: [Vec3; 3],
-    has_truth: bool,
+    pub(super) has_truth: bool,
 }
 
 impl Jaw {

@@ -64,6 +64,9 @@ pub struct Manifest {
     pub scenario: Scenario,
     /// Duration of the motion, s.
     pub motion_s: f64,
+    /// What the plan warns of.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
     /// What the plan demands of the axes at full speed; none but in a dry run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub full_speed: Option<FullSpeed>,
@@ -108,6 +111,7 @@ impl Manifest {
             declared: Declared::default(),
             scenario,
             motion_s,
+            warnings: Vec::new(),
             full_speed: None,
             machine,
             scheduling: BTreeMap::new(),

@@ -95,8 +95,20 @@ impl RunPlan {
         })
     }
 
-    /// A line that describes the run, one if the motion file lacks the marker's offset, one for each doubt about it, and
-    /// one if the guides can lock themselves.
+    /// What a user should look at before the results: a motion file without the marker's offset, doubts about its rows, and
+    /// guides that can lock themselves.
+    pub fn warnings(&self) -> Vec<String> {
+        let centroid = self.trajectory.centroid_turn_deg().map(|turn_deg| {
+            format!(
+                "the jaw turns by up to {turn_deg:.1}°, so the markers' centroid does not follow the incisal point; \
+                 set motion.marker_origin_mm"
+            )
+        });
+        let doubts = self.trajectory.doubts().into_iter().map(|doubt| format!("the motion's {doubt}"));
+        centroid.into_iter().chain(doubts).chain(self.locking()).collect()
+    }
+
+    /// A line that describes the run, and one for each warning.
     pub fn announcement(&self) -> String {
         let scenario = &self.scenario;
         let wires = match &scenario.can.interfaces[..] {
@@ -107,23 +119,14 @@ impl RunPlan {
         let cut = cut.map_or_else(String::new, |whole_s| {
             format!("; cut short: the whole motion takes {whole_s:.1} s")
         });
-        let centroid = self.trajectory.centroid_turn_deg().map_or_else(String::new, |turn_deg| {
-            format!(
-                "\n  the jaw turns by up to {turn_deg:.1}°, so the markers' centroid does not follow the incisal point; \
-                 set motion.marker_origin_mm"
-            )
-        });
-        let doubts =
-            self.trajectory.doubts().into_iter().map(|doubt| format!("\n  warning: the motion's {doubt}"));
-        let doubts: String = doubts.collect();
-        let locking = self.locking().map_or_else(String::new, |locking| format!("\n  warning: {locking}"));
-        format!(
-            "{}: {:.1} s of motion at {} Hz on {wires}, seed {}{cut}{centroid}{doubts}{locking}",
+        let run = format!(
+            "{}: {:.1} s of motion at {} Hz on {wires}, seed {}{cut}",
             scenario.name,
             self.trajectory.duration_s(),
             scenario.rate_hz,
             scenario.seed
-        )
+        );
+        [vec![run], self.warnings()].concat().join("\n  warning: ")
     }
 
     /// What is wrong with guides that a force at the balls can lock: their friction grows as fast as the force.

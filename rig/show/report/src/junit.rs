@@ -68,6 +68,8 @@ impl<'a> JunitRun<'a> {
         };
         let mut cases: Vec<_> = checks.map(case).collect();
         let has_failure = cases.iter().any(|case| matches!(case.result, CaseResult::Failed(..)));
+        let warnings = verdict.iter().flat_map(|verdict| &verdict.warnings);
+        let properties = warnings.map(|warning| ("warning", warning.clone())).collect();
         let result = match verdict {
             _ if !is_short => CaseResult::Passed,
             // The cases of its checks say it.
@@ -76,7 +78,7 @@ impl<'a> JunitRun<'a> {
             Err((kind, why)) => CaseResult::Error(kind, why),
         };
         cases.insert(0, Case { name: "run", took_s, result, earlier: Vec::new(), check: None });
-        Self { name, class: name, file: None, properties: Vec::new(), took_s, timestamp: None, cases }
+        Self { name, class: name, file: None, properties, took_s, timestamp: None, cases }
     }
 
     /// A scenario of a suite, with the attempts before the last.
@@ -90,13 +92,13 @@ impl<'a> JunitRun<'a> {
         let earlier = tested.attempts.iter().take(tested.retries());
         run.cases[0].earlier = earlier.map(Attempt::word_and_reason).collect();
         let is_flaky = tested.retries() > 0 && !is_short;
-        run.properties = vec![
+        run.properties.extend([
             ("masseter", masseter.to_owned()),
             ("outcome", tested.outcome().word().to_owned()),
             ("retries", tested.retries().to_string()),
             ("flaky", is_flaky.to_string()),
             ("tags", tested.tags.join(" ")),
-        ];
+        ]);
         run.file = Some(tested.file.display().to_string());
         run
     }
@@ -170,6 +172,7 @@ pub(crate) fn xml(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> 
     }
     let run = JunitRun::new(&name, Ok(verdict), verdict.exit_code != Exit::Passed, figures.duration_s);
     let timestamp = Some(manifest.began.trim_end_matches('Z'));
+    properties.extend(run.properties);
     let run = JunitRun { class: "masseter.run", properties, timestamp, ..run };
     Document { runs: &[run], suite_s: None }.xml()
 }

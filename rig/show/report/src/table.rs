@@ -95,6 +95,9 @@ fn write_verdict(
     if let MotionConfig::File(file) = &scenario.motion {
         writeln!(text, "recording played: {}", file.path.display())?;
     }
+    for warning in &verdict.warnings {
+        writeln!(text, "warning: {warning}")?;
+    }
     text.push('\n');
     let widest = verdict.checks.iter().map(|check| check.result.mark().len()).max().unwrap_or(0).max(4);
     let names =
