@@ -319,7 +319,7 @@ impl Shortfall {
     }
 
     fn unjudged(manifest: &Manifest, figures: &Figures) -> Option<Self> {
-        // What a controller says of its own motion proves nothing.
+        // What the controller states of its own motion does not count.
         let mut required = figures.requirements.iter().filter(|required| required.is_of_mechanism);
         let is_judged = required.any(|required| required.result != CheckResult::Untested);
         (manifest.is_of_program() && !is_judged).then_some(Self::Unjudged)
@@ -352,7 +352,7 @@ impl Display for Shortfall {
             ),
             Self::Unjudged => f.write_str(
                 "nothing judged the motion, which is not the scenario's: require something of the true jaw in [[require]], such as \
-                 jaw.opening; on the robot of the encoders, such as l1.position",
+                 incisal.z; on the robot of the encoders, such as l1.position",
             ),
         }
     }

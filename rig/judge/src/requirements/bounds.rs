@@ -79,7 +79,8 @@ impl Quantified {
             return Err(quoted(&format_args!("its unit is {derived}, not '{}'", unit.name)).into());
         }
         let absences = named.iter().map(|signal| signal.absence);
-        let is_of_mechanism = named.iter().any(|signal| signal.is_of_mechanism);
+        // A difference from what the controller states is its statement.
+        let is_of_mechanism = named.iter().all(|signal| signal.is_of_mechanism);
         Ok(Self {
             is_of_mechanism,
             text: text.to_owned(),

@@ -13,7 +13,7 @@ use super::timeline::CycleMessages;
 /// The signals of a run of this scenario with this jaw, whose controller declares these.
 pub(super) fn signals(scenario: &Scenario, jaw: Jaw, declared: &Declared) -> Vec<NamedSignal> {
     let mut list = SignalList::default();
-    add_jaw(&mut list, jaw);
+    add_jaw(&mut list, jaw, scenario.has_contact());
     add_contact(&mut list, scenario);
     if scenario.load_cell.is_some() {
         list.add("load_cell.force", Unit::N, "Bite force that the load cell shows.", |of| {
@@ -28,7 +28,7 @@ pub(super) fn signals(scenario: &Scenario, jaw: Jaw, declared: &Declared) -> Vec
     list.0
 }
 
-fn add_jaw(list: &mut SignalList, jaw: Jaw) {
+fn add_jaw(list: &mut SignalList, jaw: Jaw, has_contact: bool) {
     let points = [
         ("incisal", JawPoint::Incisal),
         ("condyle.left", JawPoint::LeftCondyle),
@@ -96,7 +96,7 @@ fn add_jaw(list: &mut SignalList, jaw: Jaw) {
         "Vertical force of food and upper teeth on the emulated jaw, mean over the cycle.",
         |of| Some(of.truth?.bite_force_n),
     )
-    .of_mechanism_if(true);
+    .of_mechanism_if(has_contact);
 }
 
 /// None where the jaws cannot touch.

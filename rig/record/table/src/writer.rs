@@ -208,7 +208,8 @@ impl ParquetFile {
         &mut self,
         write: impl FnOnce(&mut BufWriter<ChildStdin>) -> io::Result<()>,
     ) -> Result<(), TableError> {
-        match write(self.rows.as_mut().expect("rows are sent before their end")) {
+        let Some(rows) = &mut self.rows else { return Err(io::Error::from(ErrorKind::BrokenPipe).into()) };
+        match write(rows) {
             // The program has ended, and says why.
             Err(error) if error.kind() == ErrorKind::BrokenPipe => self.await_end().and(Err(error.into())),
             sent => Ok(sent?),

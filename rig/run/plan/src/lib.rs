@@ -95,8 +95,7 @@ impl RunPlan {
         })
     }
 
-    /// What a user should look at before the results: a motion file without the marker's offset, doubts about its rows, and
-    /// guides that can lock themselves.
+    /// What a user should look at before the results: a file without the marker's offset, doubtful rows, guides that can lock.
     pub fn warnings(&self) -> Vec<String> {
         let centroid = self.trajectory.centroid_turn_deg().map(|turn_deg| {
             format!(

@@ -68,8 +68,8 @@ impl<'a> JunitRun<'a> {
         };
         let mut cases: Vec<_> = checks.map(case).collect();
         let has_failure = cases.iter().any(|case| matches!(case.result, CaseResult::Failed(..)));
-        let warnings = verdict.iter().flat_map(|verdict| &verdict.warnings);
-        let properties = warnings.map(|warning| ("warning", warning.clone())).collect();
+        let warnings = verdict.as_ref().map_or_else(|_| String::new(), |verdict| verdict.warnings.join("; "));
+        let properties = if warnings.is_empty() { Vec::new() } else { vec![("warnings", warnings)] };
         let result = match verdict {
             _ if !is_short => CaseResult::Passed,
             // The cases of its checks say it.

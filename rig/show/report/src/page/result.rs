@@ -27,7 +27,7 @@ pub(super) fn result_section(manifest: &Manifest, figures: &Figures, verdict: &V
         columns: vec![Column::text("check"), Column::text("result"), Column::text("found")],
         rows: checks.map(row).collect(),
     };
-    let warning = |(number, text)| Block::text(format!("warning-{number}"), format!("Warning: {text}."));
+    let warning = |(number, text)| Block::text(format!("warning-{number}"), format!("Warning: {text}"));
     let mut blocks = vec![Block::new("verdict", Content::Verdict(panel(manifest, figures, verdict)))];
     blocks.extend(verdict.warnings.iter().enumerate().map(warning));
     blocks.extend([Block::new("moments", Content::Moments), Block::table("checks", table)]);
