@@ -306,6 +306,7 @@ impl Analysis {
         let missing_frames =
             topics.iter().find(|topic| topic.topic == FrameTap::TOPIC).map_or(0, |topic| topic.missing);
         let has_resumed = self.stop.has_resumed();
+        let running_s = self.stop.running_cycles() as f64 * self.period_ns as f64 / 1e9;
         let (stopped_by, enabled_cycles) = self.stop.into_figures();
         let enabled_s = enabled_cycles as f64 * self.period_ns as f64 / 1e9;
         let (intervals, worst_cycles, over_time, jaw_cycles) =
@@ -337,6 +338,7 @@ impl Analysis {
             readings: self.freshness.figures,
             stopped_by,
             enabled_s,
+            running_s,
             motion: self.played.into_figures(rest_m),
             standstill: self.standstill.into_figures(),
             outage: self.outage.outage(self.period_ns),
@@ -464,6 +466,9 @@ pub struct Figures {
     pub stopped_by: Option<StoppedBy>,
     /// For how long all drives were enabled, s.
     pub enabled_s: f64,
+    /// For how long of it the controller was in the state `running`, s.
+    #[serde(skip)]
+    pub running_s: f64,
     /// What was played of the scenario's motion.
     pub motion: MotionFigures,
     /// How far the mechanism moved after its stops.

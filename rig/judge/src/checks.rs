@@ -283,8 +283,8 @@ pub(crate) enum Shortfall {
     Resumed,
     /// The scenario's motion moves nothing.
     Still,
-    /// The drives were not enabled for as long as an own motion is to last.
-    OwnEarly { enabled_s: f64, duration_s: f64 },
+    /// An own motion did not run, with enabled drives, for as long as it is to last. Its requirements judge no other time.
+    OwnEarly { running_s: f64, duration_s: f64 },
     /// The motion is the controller's own or gone since the run, and no requirement judges the jaw.
     Unjudged,
 }
@@ -313,14 +313,14 @@ impl Shortfall {
     }
 
     fn of_own(manifest: &Manifest, figures: &Figures) -> Option<Self> {
-        let (enabled_s, duration_s) = (figures.enabled_s, manifest.motion_s);
-        let early = (enabled_s < WHOLE_TIME * duration_s).then_some(Self::OwnEarly { enabled_s, duration_s });
+        let (running_s, duration_s) = (figures.running_s, manifest.motion_s);
+        let early = (running_s < WHOLE_TIME * duration_s).then_some(Self::OwnEarly { running_s, duration_s });
         early.or_else(|| Self::unjudged(manifest, figures))
     }
 
     fn unjudged(manifest: &Manifest, figures: &Figures) -> Option<Self> {
         // What the controller states of its own motion does not count.
-        let mut required = figures.requirements.iter().filter(|required| required.is_of_mechanism);
+        let mut required = figures.requirements.iter().filter(|required| required.is_truth);
         let is_judged = required.any(|required| required.result != CheckResult::Untested);
         (manifest.is_of_program() && !is_judged).then_some(Self::Unjudged)
     }
@@ -345,9 +345,9 @@ impl Display for Shortfall {
             ),
             Self::Resumed => f.write_str("the controller left the motion and began it again"),
             Self::Still => f.write_str("the scenario's motion does not move the jaw"),
-            Self::OwnEarly { enabled_s, duration_s } => write!(
+            Self::OwnEarly { running_s, duration_s } => write!(
                 f,
-                "the controller's own motion ended early: the drives were enabled for {enabled_s:.2} of {duration_s:.2} s; \
+                "the controller's own motion ended early: it ran for {running_s:.2} of {duration_s:.2} s with enabled drives; \
                  --duration declares its end"
             ),
             Self::Unjudged => f.write_str(

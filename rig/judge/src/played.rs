@@ -12,7 +12,7 @@ use masseter_scenario::JawConfig;
 use serde::Serialize;
 
 use crate::events::EventRecord;
-use crate::poses::is_moving;
+use crate::poses::{is_moving, is_running};
 
 /// What was played of the scenario's motion.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
@@ -171,6 +171,7 @@ pub(super) struct StopWatch {
     was_enabled: [bool; AXES],
     /// The newest state is one of the motion; whether one was; and whether the motion began again after it was left.
     is_moving: bool,
+    is_running: bool,
     has_moved: bool,
     has_resumed: bool,
     /// When a drive left operation in the motion, ns, and how many states of the motion came since.
@@ -179,6 +180,8 @@ pub(super) struct StopWatch {
     last_cycle: u64,
     /// Cycles in which all drives were enabled.
     enabled_cycles: u64,
+    /// Those of them in which the controller was in the state `running`.
+    running_cycles: u64,
     /// Whether the newest state is that of a controller that has finished; and whether no drive had power then. What master and
     /// drives report later stops no motion.
     is_finished: bool,
@@ -194,6 +197,7 @@ impl StopWatch {
         self.last_cycle = reading.cycle;
         if states.iter().all(is_in(DriveState::OperationEnabled)) {
             self.enabled_cycles += passed;
+            self.running_cycles += if self.is_running { passed } else { 0 };
         }
         let is_quick = self.enabled_cycles > 0 && states.iter().any(is_in(DriveState::QuickStopActive));
         let found = match reading.master_fault {
@@ -228,6 +232,7 @@ impl StopWatch {
         self.has_resumed |= is_moving && !self.is_moving && self.has_moved;
         self.has_moved |= is_moving;
         self.is_moving = is_moving;
+        self.is_running = is_running(Some(state.controller_state));
         self.is_finished = state.controller_state == ControllerState::Finished.code();
         let Some((left_ns, states)) = &mut self.left else { return };
         // The state of an earlier cycle may come later.
@@ -251,6 +256,11 @@ impl StopWatch {
     /// Whether the motion began again after the controller had left it: meanwhile nobody compares the jaw with its path.
     pub(super) fn has_resumed(&self) -> bool {
         self.has_resumed
+    }
+
+    /// In how many cycles the controller ran its motion with all drives enabled.
+    pub(super) fn running_cycles(&self) -> u64 {
+        self.running_cycles
     }
 
     /// What stopped the drives, and for how many cycles all of them were enabled.

@@ -82,7 +82,7 @@ mod shortfall {
         manifest.controller = Some("external".to_owned());
         let mut figures = Analysis::new(&manifest.scenario, &Declared::default()).finish(false, &[]);
         figures.final_state = Some(Code::Known(ControllerState::Finished));
-        (figures.enabled_s, figures.motion) = (11.0, PLAYED);
+        (figures.running_s, figures.motion) = (10.0, PLAYED);
         change(&mut manifest, &mut figures);
         Shortfall::of(&manifest, &figures)
     }
@@ -92,7 +92,7 @@ mod shortfall {
         figures.events.push(EventRecord::from(&stop));
     }
 
-    fn require(figures: &mut Figures, result: CheckResult, is_of_mechanism: bool) {
+    fn require(figures: &mut Figures, result: CheckResult, is_truth: bool) {
         figures.requirements.push(RequirementFigures {
             name: "opens".to_owned(),
             id: None,
@@ -107,7 +107,7 @@ mod shortfall {
             latency_ms: None,
             may_be_disturbed: false,
             is_expected_event: false,
-            is_of_mechanism,
+            is_truth,
             plot: None,
         });
     }
@@ -180,7 +180,7 @@ mod shortfall {
         };
         assert_eq!(own(|_, _| ()), Some(Shortfall::Unjudged));
         assert_eq!(own(|manifest, _| manifest.controller = Some("hold".to_owned())), None);
-        for (result, is_of_mechanism, expected) in [
+        for (result, is_truth, expected) in [
             (CheckResult::Passed, true, None),
             (CheckResult::Failed, true, None),
             (CheckResult::Untested, true, Some(Shortfall::Unjudged)),
@@ -188,11 +188,11 @@ mod shortfall {
         ] {
             let found = shortfall(|manifest, figures| {
                 manifest.declared.motion = PlayedMotion::Own;
-                require(figures, result, is_of_mechanism);
+                require(figures, result, is_truth);
             });
             assert_eq!(found, expected, "{result:?}");
         }
-        let early = Shortfall::OwnEarly { enabled_s: 4.3, duration_s: 10.0 };
-        assert_eq!(own(|_, figures| figures.enabled_s = 4.3), Some(early));
+        let early = Shortfall::OwnEarly { running_s: 4.3, duration_s: 10.0 };
+        assert_eq!(own(|_, figures| figures.running_s = 4.3), Some(early));
     }
 }

@@ -135,6 +135,20 @@ mod stop {
     }
 
     #[test]
+    fn a_motion_runs_in_its_state_and_with_enabled_drives() {
+        let (enabled, off) =
+            (reading(DriveState::OperationEnabled, 0), reading(DriveState::SwitchOnDisabled, 0));
+        let mut watch = StopWatch::default();
+        let (runs, holds) = (ControllerState::Running, ControllerState::Holding);
+        let cycles = [(runs, enabled), (runs, off), (holds, enabled), (runs, enabled)];
+        for (cycle, (state, reading)) in (1..).zip(cycles) {
+            watch.apply_state(&State { controller_state: state.code(), ..State::default() });
+            watch.apply_reading(&Reading { cycle, ..reading });
+        }
+        assert_eq!(watch.running_cycles(), 2);
+    }
+
+    #[test]
     fn a_drive_that_leaves_operation_while_the_motion_runs_is_a_stop() {
         use ControllerState::{Disabling, Enabling, Holding, Running, SafeStop};
         type Case<'a> = (&'a [(Reading, ControllerState)], Option<StoppedBy>);

@@ -23,7 +23,7 @@ pub(super) struct Quantified {
     /// Why it may have no value in a whole run; empty where nothing is known.
     pub(super) absence: &'static str,
     /// Whether it depends on what the mechanism does.
-    pub(super) is_of_mechanism: bool,
+    pub(super) is_truth: bool,
     source: ValueSource,
 }
 
@@ -56,9 +56,9 @@ impl Quantified {
                 "{name} is a state, which has no bounds; use never, or when and then"
             )));
         }
-        let (unit, absence, is_of_mechanism) = (named.shown(), named.absence, named.is_of_mechanism);
+        let (unit, absence, is_truth) = (named.shown(), named.absence, named.is_truth);
         let source = ValueSource::Signal(signal);
-        Ok(Self { text: name.to_owned(), unit, absence, is_of_mechanism, source })
+        Ok(Self { text: name.to_owned(), unit, absence, is_truth, source })
     }
 
     fn of_expression(text: &str, unit: Unit, values: &mut Values) -> Result<Self, Reason> {
@@ -80,9 +80,9 @@ impl Quantified {
         }
         let absences = named.iter().map(|signal| signal.absence);
         // A difference from what the controller states is its statement.
-        let is_of_mechanism = named.iter().all(|signal| signal.is_of_mechanism);
+        let is_truth = named.iter().all(|signal| signal.is_truth);
         Ok(Self {
-            is_of_mechanism,
+            is_truth,
             text: text.to_owned(),
             unit,
             absence: absences.into_iter().find(|absence| !absence.is_empty()).unwrap_or_default(),
@@ -198,8 +198,8 @@ impl Bounds {
     }
 
     /// Whether it judges what the mechanism does.
-    pub(super) fn is_of_mechanism(&self) -> bool {
-        self.of.is_of_mechanism
+    pub(super) fn is_truth(&self) -> bool {
+        self.of.is_truth
     }
 
     /// What must hold, in words.

@@ -70,7 +70,7 @@ pub(super) struct Condition {
     /// The unit in which the signal is shown.
     pub(super) unit: Unit,
     /// Whether the signal is one of the mechanism.
-    pub(super) is_of_mechanism: bool,
+    pub(super) is_truth: bool,
 }
 
 impl Condition {
@@ -94,7 +94,7 @@ impl Condition {
         }
         let signal = signal?;
         let named = values.signal(signal);
-        let (unit, states, is_of_mechanism) = (named.shown(), named.states(), named.is_of_mechanism);
+        let (unit, states, is_truth) = (named.shown(), named.states(), named.is_truth);
         let limit = match &states {
             Some(states) => state_code(limit, states)?,
             None => limit_of(limit, unit.dimension)?,
@@ -106,7 +106,7 @@ impl Condition {
             }
             _ => {
                 let text = text.to_owned();
-                return Ok(Self { text, signal, comparison, limit, unit, is_of_mechanism });
+                return Ok(Self { text, signal, comparison, limit, unit, is_truth });
             }
         };
         Err(format!("'{}': {misfit}", excerpt(text)).into())

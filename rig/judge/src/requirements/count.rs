@@ -40,8 +40,8 @@ impl Never {
     }
 
     /// Whether it judges what the mechanism does.
-    pub(super) fn is_of_mechanism(&self) -> bool {
-        matches!(&self.what, What::Condition(condition) if condition.is_of_mechanism)
+    pub(super) fn is_truth(&self) -> bool {
+        matches!(&self.what, What::Condition(condition) if condition.is_truth)
     }
 
     /// What must hold, in words.

@@ -145,7 +145,7 @@ pub struct RequirementFigures {
     pub is_expected_event: bool,
     /// Whether it judges what the mechanism does, and not what a controller states of it.
     #[serde(skip)]
-    pub is_of_mechanism: bool,
+    pub is_truth: bool,
     /// The signal over time, for plots.
     #[serde(skip)]
     pub plot: Option<RequirementPlot>,

@@ -209,18 +209,18 @@ impl Requirement {
     }
 
     /// Whether it judges what the mechanism does, and not what a controller states of it.
-    fn is_of_mechanism(&self) -> bool {
+    fn is_truth(&self) -> bool {
         match &self.kind {
-            Kind::Bounds(bounds) => bounds.is_of_mechanism(),
-            Kind::Response(response) => response.is_of_mechanism(),
-            Kind::Never(never) => never.is_of_mechanism(),
+            Kind::Bounds(bounds) => bounds.is_truth(),
+            Kind::Response(response) => response.is_truth(),
+            Kind::Never(never) => never.is_truth(),
             Kind::Count(_) | Kind::Order(_) | Kind::Unknown(_) => false,
         }
     }
 
     /// What it comes to. `motion_ns` is when the motion began.
     fn into_figures(self, motion_ns: Option<u64>) -> RequirementFigures {
-        let is_of_mechanism = self.is_of_mechanism();
+        let is_truth = self.is_truth();
         let (must, finding, plot) = match self.kind {
             Kind::Bounds(mut bounds) => (bounds.must(), bounds.finding(), Some(bounds.plot())),
             Kind::Response(response) => (response.must(), response.into_finding(), None),
@@ -244,7 +244,7 @@ impl Requirement {
             latency_ms: finding.latency_s.map(|seconds| seconds * 1e3),
             may_be_disturbed: finding.may_be_disturbed,
             is_expected_event: self.is_expected_event,
-            is_of_mechanism,
+            is_truth,
             plot,
         }
     }

@@ -112,8 +112,8 @@ impl Response {
     }
 
     /// Whether it judges what the mechanism does.
-    pub(super) fn is_of_mechanism(&self) -> bool {
-        self.then.is_of_mechanism
+    pub(super) fn is_truth(&self) -> bool {
+        self.then.is_truth
     }
 
     /// What must hold, in words.

@@ -514,12 +514,12 @@ fn a_window_that_the_runs_end_cuts_says_what_was_judged_and_a_whole_one_is_untes
 
 /// A controller's own statements count as nothing where it plays a motion of its own.
 #[test]
-fn a_requirement_on_the_mechanism_is_told_from_one_on_what_the_controller_states() {
-    let of_mechanism = |keys: &str| {
-        let text = format!("[[require]]\nname = 'it'\n{keys}\n");
+fn a_requirement_on_the_truth_is_told_from_one_on_what_the_controller_states() {
+    let is_truth = |tables: &str, keys: &str| {
+        let text = format!("{tables}\n[[require]]\nname = 'it'\n{keys}\n");
         let scenario = Scenario::parse("s.toml".as_ref(), &text).unwrap();
         check_requirements(&scenario, None).unwrap();
-        Judge::new(&scenario).finish()[0].is_of_mechanism
+        Judge::new(&scenario).finish()[0].is_truth
     };
     for keys in [
         "signal = 'jaw.opening'\nmax = '40 mm'",
@@ -528,7 +528,7 @@ fn a_requirement_on_the_mechanism_is_told_from_one_on_what_the_controller_states
         "never = 'l1.velocity > 1 m/s'",
         "when = 'controller.running'\nthen = 'incisal.z < 1 m'",
     ] {
-        assert!(of_mechanism(keys), "{keys}");
+        assert!(is_truth("", keys), "{keys}");
     }
     for keys in [
         "signal = 'incisal.error'\nmax = '1 mm'",
@@ -540,6 +540,11 @@ fn a_requirement_on_the_mechanism_is_told_from_one_on_what_the_controller_states
         "when = 'incisal.z < 1 m'\nthen = 'controller.state == running'",
         "event = 'controller.stop_requested'\nat_most = 1",
     ] {
-        assert!(!of_mechanism(keys), "{keys}");
+        assert!(!is_truth("", keys), "{keys}");
     }
+    assert!(is_truth("[food]", "never = 'bite.force > 100 N'"));
+    // On the robot the controller estimates the pose; the encoders are the drives'.
+    let robot = "[can]\ninterfaces = ['a', 'b']";
+    assert!(is_truth(robot, "signal = 'l1.position'\nmax = '1 m'"));
+    assert!(!is_truth(robot, "signal = 'incisal.z'\nmax = '1 m'"));
 }

@@ -19,7 +19,7 @@ pub(super) fn signals(scenario: &Scenario, jaw: Jaw, declared: &Declared) -> Vec
         list.add("load_cell.force", Unit::N, "Bite force that the load cell shows.", |of| {
             Some(of.reading?.load_cell_n)
         })
-        .of_mechanism_if(true);
+        .truth_if(true);
     }
     add_axes(&mut list, jaw.has_truth);
     add_controller(&mut list);
@@ -41,7 +41,7 @@ fn add_jaw(list: &mut SignalList, jaw: Jaw, has_contact: bool) {
                 Unit::MM,
                 format!("Place of the point along {axis} of the base: the true one, on the robot the estimated one."),
                 move |of| Some(jaw.place(point, &jaw.actual(of)?)[at]),
-            ).of_mechanism_if(jaw.has_truth);
+            ).truth_if(jaw.has_truth);
         }
         list.add(
             format!("{name}.error"),
@@ -70,14 +70,14 @@ fn add_jaw(list: &mut SignalList, jaw: Jaw, has_contact: bool) {
         "Distance of the incisal point from its place when the motion began.",
         move |of, start| Some(jaw.distance(JawPoint::Incisal, &jaw.actual(of)?, start?)),
     )
-    .of_mechanism_if(jaw.has_truth);
+    .truth_if(jaw.has_truth);
     list.add_from(
         "jaw.rotation",
         Unit::DEG,
         "Angle of the jaw from its orientation when the motion began.",
         move |of, start| Some(jaw.actual(of)?.rotation.angle_to(&start?.rotation)),
     )
-    .of_mechanism_if(jaw.has_truth);
+    .truth_if(jaw.has_truth);
     list.add(
         "platform.error",
         Unit::MM,
@@ -96,7 +96,7 @@ fn add_jaw(list: &mut SignalList, jaw: Jaw, has_contact: bool) {
         "Vertical force of food and upper teeth on the emulated jaw, mean over the cycle.",
         |of| Some(of.truth?.bite_force_n),
     )
-    .of_mechanism_if(has_contact);
+    .truth_if(has_contact);
 }
 
 /// None where the jaws cannot touch.
@@ -111,12 +111,12 @@ fn add_contact(list: &mut SignalList, scenario: &Scenario) {
             format!("Force of antagonist and food on tooth {tooth}, mean over a cycle."),
             move |of| loads_n(of)?.find(|(number, _)| *number == tooth).map(|(_, load_n)| load_n),
         )
-        .of_mechanism_if(true);
+        .truth_if(true);
     }
     list.add("contact.total", Unit::N, "Sum of the forces on all teeth.", |of| {
         Some(loads_n(of)?.map(|(_, load_n)| load_n).sum())
     })
-    .of_mechanism_if(true);
+    .truth_if(true);
 }
 
 /// Where nothing is emulated, the encoders alone show what moves.
@@ -133,15 +133,15 @@ fn add_axes(list: &mut SignalList, has_truth: bool) {
         list.add(format!("{name}.position"), Unit::MM, "Position that the encoder reports.", move |of| {
             Some(at(reading(of)?.position_m))
         })
-        .of_mechanism_if(!has_truth);
+        .truth_if(!has_truth);
         list.add(format!("{name}.true_position"), Unit::MM, "True position of the axis.", move |of| {
             Some(at(of.truth?.joint_m))
         })
-        .of_mechanism_if(true);
+        .truth_if(true);
         list.add(format!("{name}.velocity"), Unit::MM_S, "True velocity of the axis.", move |of| {
             Some(at(of.truth?.joint_m_s))
         })
-        .of_mechanism_if(true);
+        .truth_if(true);
         list.add(
             format!("{name}.force"),
             Unit::N,

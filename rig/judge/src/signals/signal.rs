@@ -36,7 +36,7 @@ pub struct NamedSignal {
     pub(crate) absence: &'static str,
     /// Whether it is a motion or a load of the mechanism that no controller states.
     #[serde(skip)]
-    pub(crate) is_of_mechanism: bool,
+    pub(crate) is_truth: bool,
     #[serde(skip)]
     extract: Extract,
 }
@@ -54,8 +54,8 @@ impl NamedSignal {
     }
 
     /// Says whether it shows the mechanism itself, and not what a controller states of it.
-    pub(super) fn of_mechanism_if(&mut self, is_of_mechanism: bool) {
-        self.is_of_mechanism = is_of_mechanism;
+    pub(super) fn truth_if(&mut self, is_truth: bool) {
+        self.is_truth = is_truth;
     }
 
     /// The unit in which it is shown.
@@ -95,8 +95,8 @@ impl SignalList {
     ) -> &mut NamedSignal {
         let (name, unit, about, extract) =
             (name.into(), shown.name.to_owned(), about.into(), Box::new(extract));
-        let (states, absence, is_of_mechanism) = (None, "", false);
-        self.0.push(NamedSignal { name, unit, about, shown, states, absence, is_of_mechanism, extract });
+        let (states, absence, is_truth) = (None, "", false);
+        self.0.push(NamedSignal { name, unit, about, shown, states, absence, is_truth, extract });
         self.0.last_mut().expect("it was just added")
     }
 

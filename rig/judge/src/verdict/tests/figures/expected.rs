@@ -33,7 +33,7 @@ fn require(run: &mut Run, result: CheckResult, may_be_disturbed: bool) {
         latency_ms: None,
         may_be_disturbed,
         is_expected_event: false,
-        is_of_mechanism: true,
+        is_truth: true,
         plot: None,
     });
 }
