@@ -6,5 +6,7 @@
 
 pub(crate) mod axes;
 pub(crate) mod contact;
+mod coupling;
 pub(crate) mod dynamics;
 mod friction;
+mod stops;
