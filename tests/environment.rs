@@ -304,7 +304,7 @@ fn a_full_disk_leaves_a_verdict_of_a_run_in_lockstep() {
 /// The recorder waits for the disk, and plant and controller for the recorder.
 #[test]
 fn a_disk_that_stands_still_for_five_seconds_changes_no_byte_of_a_run_in_lockstep() {
-    let scenario = "duration_s = 60.0";
+    let scenario = "duration_s = 25.0";
     let [reference, workspace] = [1, 2].map(|_| Workspace::new(scenario));
     let folder = workspace.file("");
     let Some(_disk) = SmallDisk::in_file(&folder, &reference.file("disk")) else {

@@ -8,7 +8,7 @@ use std::process::Command;
 
 use masseter_scenario::QuirkKindConfig;
 
-use crate::common::{MASSETER, Workspace, stderr, stdout};
+use crate::common::{self, MASSETER, Workspace, stderr, stdout};
 
 const AXES: [&str; 6] = ["l1", "l2", "l3", "d1", "d2", "d3"];
 
@@ -149,7 +149,7 @@ fn assert_runs(row: &Row) {
 
 #[test]
 fn every_quirk_does_in_a_run_what_the_table_says() {
-    rows().iter().for_each(assert_runs);
+    common::sample(&rows()).for_each(assert_runs);
 }
 
 #[test]

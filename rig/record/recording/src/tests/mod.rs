@@ -194,17 +194,14 @@ fn a_flipped_bit_is_damage_and_no_cut() {
     }
     recorder.finish().unwrap();
     let mut bytes = medium.into_inner();
+    // One bit of each byte, each bit of the eight in turn: all of them take eight times as long.
     for place in 0..bytes.len() {
-        for bit in 0..8 {
-            bytes[place] ^= 1 << bit;
-            let read = read(&bytes).unwrap();
-            assert!(
-                !read.damage.is_empty() && !read.cut_short,
-                "bit {bit} of byte {place}: {:?}",
-                read.damage
-            );
-            bytes[place] ^= 1 << bit;
-        }
+        let bit = place % 8;
+        bytes[place] ^= 1 << bit;
+        let read = read(&bytes).unwrap();
+        let is_found = !read.damage.is_empty() && !read.cut_short;
+        assert!(is_found, "bit {bit} of byte {place}: {:?}", read.damage);
+        bytes[place] ^= 1 << bit;
     }
 }
 
