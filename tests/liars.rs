@@ -109,6 +109,7 @@ struct Player {
     motion: Trajectory,
     tracker: ForwardTracker,
     play: Play,
+    end: Outcome,
     state: ControllerState,
     cycles_in_state: u32,
     start_m: [f64; AXES],
@@ -155,7 +156,7 @@ impl Player {
             ControllerState::Enabling if is_in(DriveState::OperationEnabled) => ControllerState::Easing,
             ControllerState::Easing if self.cycles_in_state == EASE_CYCLES => ControllerState::Running,
             ControllerState::Running if is_over => ControllerState::Disabling,
-            ControllerState::Disabling if reading.drive_state.iter().all(is_off) => ControllerState::Finished,
+            ControllerState::Disabling if reading.drive_state.iter().all(is_off) => self.last_state(),
             _ => {
                 self.cycles_in_state += 1;
                 return;
@@ -164,8 +165,15 @@ impl Player {
         (self.state, self.cycles_in_state) = (next, 0);
     }
 
+    fn last_state(&self) -> ControllerState {
+        match self.end {
+            Outcome::Finished => ControllerState::Finished,
+            Outcome::SafeStop => ControllerState::SafeStop,
+        }
+    }
+
     /// Plays its part in a run of this rig.
-    fn run(rig: &str, motion: PlayedMotion, play: Play) {
+    fn run(rig: &str, motion: PlayedMotion, play: Play, end: Outcome) {
         let declared = Declared { motion, ..Declared::default() };
         let mut session = Session::start(attach::attach(Some(rig)).unwrap(), declared).unwrap();
         let scenario = session.context().scenario.clone();
@@ -177,11 +185,12 @@ impl Player {
             mechanism,
             motion,
             play,
+            end,
             state: ControllerState::Enabling,
             cycles_in_state: 0,
             start_m: [0.0; AXES],
         };
-        while player.state != ControllerState::Finished {
+        while player.state != player.last_state() {
             let Waited::Cycle { tick, reading } = session.wait(None).unwrap() else { continue };
             let code = player.state.code();
             let mut command = Command { cycle: tick.cycle, controller_state: code, ..Command::default() };
@@ -195,7 +204,7 @@ impl Player {
             }
             session.publish(&command, &state).unwrap();
         }
-        session.finish(Outcome::Finished).unwrap();
+        session.finish(end).unwrap();
     }
 }
 
@@ -208,13 +217,17 @@ struct Judged {
 }
 
 fn judge(scenario: &str, motion: PlayedMotion, play: Play) -> Judged {
+    judge_end(scenario, motion, play, Outcome::Finished)
+}
+
+fn judge_end(scenario: &str, motion: PlayedMotion, play: Play, end: Outcome) -> Judged {
     static NUMBER: AtomicU32 = AtomicU32::new(0);
     let workspace = Workspace::new(&format!("duration_s = 1.5\n{scenario}"));
     let name = format!("liar-{}-{}", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed));
     let rig = workspace.start_lockstep(&["--controller", "external", "--name", &name]);
     let socket = socket(&Domain::named(&name).unwrap());
     wait_until("the rig waits", || UnixStream::connect(&socket).is_ok());
-    Player::run(&name, motion, play);
+    Player::run(&name, motion, play, end);
     let output = rig.wait_with_output().unwrap();
     let summary = workspace.summary();
     let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
@@ -336,6 +349,24 @@ fn a_stop_of_master_or_drives_is_one_whatever_the_controller_reports() {
         let expected = judge("expect.verdict = 'safe_stop'\n", PlayedMotion::Scenario, play);
         assert_eq!(expected.word, "PASS", "{}", expected.reason);
         assert!(expected.reason.starts_with("SAFE STOP, as expected: "), "{}", expected.reason);
+    }
+}
+
+/// The drives are off, and nothing went wrong: a program that stops whenever it likes proves nothing.
+#[test]
+fn a_safe_stop_that_the_controller_alone_states_is_expected_in_vain() {
+    let expect = "expect.verdict = 'safe_stop'\n";
+    let fault = "[[faults]]\nkind = 'encoder_noise'\naxis = 'l1'\nat_s = 0.2\nsize = '20 um'\n";
+    let required = "[[require]]\nname = 'opens'\nsignal = 'incisal.z'\nmax = '1 m'\n";
+    for motion in [PlayedMotion::Scenario, PlayedMotion::Own] {
+        for (cause, word) in [("", "UNTESTED"), (fault, "PASS"), (required, "PASS")] {
+            let scenario = format!("{expect}{cause}");
+            let play: Play = |moment| until(0.4, moment, moment.honest());
+            let judged = judge_end(&scenario, motion, play, Outcome::SafeStop);
+            assert_eq!(judged.word, word, "{cause}: {}", judged.reason);
+            let wanted = "the controller alone states the safe stop";
+            assert_eq!(judged.sequence.contains(wanted), word == "UNTESTED", "{}", judged.sequence);
+        }
     }
 }
 

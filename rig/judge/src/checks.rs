@@ -287,20 +287,28 @@ pub(crate) enum Shortfall {
     OwnEarly { running_s: f64, duration_s: f64 },
     /// The motion is the controller's own or gone since the run, and no requirement judges the jaw.
     Unjudged,
+    /// The controller alone states the expected safe stop, and nothing caused or judged the stop.
+    OnlyStated,
 }
 
 impl Shortfall {
-    /// None where the motion was played, and where a stop ended it, which has a verdict of its own.
+    /// None where the motion was played, and where something that anybody sees ended it, which has a verdict of its own.
     pub(crate) fn of(manifest: &Manifest, figures: &Figures) -> Option<Self> {
-        let has_finished = figures.final_state.is_some_and(|state| state == ControllerState::Finished);
-        if !has_finished || figures.stopped_by.is_some() {
+        let is_in = |expected| figures.final_state.is_some_and(|state| state == expected);
+        if figures.stopped_by.is_some() {
+            return None;
+        }
+        if is_in(ControllerState::SafeStop) {
+            return Self::of_stated_stop(manifest, figures);
+        }
+        if !is_in(ControllerState::Finished) {
             return None;
         }
         if figures.has_resumed {
             return Some(Self::Resumed);
         }
         if manifest.declared.motion == PlayedMotion::Own {
-            return Self::of_own(manifest, figures).filter(|_| !was_stopped_by_request(figures));
+            return Self::of_own(manifest, figures);
         }
         match (figures.motion.way_mm, figures.motion.played) {
             (None, _) => Self::unjudged(manifest, figures),
@@ -314,20 +322,28 @@ impl Shortfall {
 
     fn of_own(manifest: &Manifest, figures: &Figures) -> Option<Self> {
         let (running_s, duration_s) = (figures.running_s, manifest.motion_s);
-        let early = (running_s < WHOLE_TIME * duration_s).then_some(Self::OwnEarly { running_s, duration_s });
+        let is_early = running_s < WHOLE_TIME * duration_s && !was_stopped_by_request(figures);
+        let early = is_early.then_some(Self::OwnEarly { running_s, duration_s });
         early.or_else(|| Self::unjudged(manifest, figures))
     }
 
     fn unjudged(manifest: &Manifest, figures: &Figures) -> Option<Self> {
-        // What the controller states of its own motion does not count.
-        let mut required = figures.requirements.iter().filter(|required| required.is_truth);
-        let is_judged = required.any(|required| required.result != CheckResult::Untested);
-        (manifest.is_of_program() && !is_judged).then_some(Self::Unjudged)
+        (manifest.is_of_program() && !has_judged_truth(figures)).then_some(Self::Unjudged)
+    }
+
+    /// A program can state a safe stop at any time. An expected stop needs a cause from outside, or a requirement.
+    fn of_stated_stop(manifest: &Manifest, figures: &Figures) -> Option<Self> {
+        let expect = manifest.scenario.expect.as_ref();
+        let is_expected = expect.is_some_and(|expect| expect.accepts(ExpectedVerdict::SafeStop));
+        let has_cause = figures.faults.iter().any(|fault| fault.struck_ns.is_some())
+            || figures.events.iter().any(|event| event.cause == Cause::StimulusBegan);
+        let is_proved = has_cause || has_judged_truth(figures) || !manifest.is_of_program();
+        (is_expected && !is_proved).then_some(Self::OnlyStated)
     }
 
     pub(crate) fn result(self) -> CheckResult {
         match self {
-            Self::Still | Self::Unjudged => CheckResult::Untested,
+            Self::Still | Self::Unjudged | Self::OnlyStated => CheckResult::Untested,
             Self::NotPlayed { .. } | Self::OwnEarly { .. } | Self::Resumed => CheckResult::Failed,
         }
     }
@@ -354,8 +370,18 @@ impl Display for Shortfall {
                 "nothing judged the motion, which is not the scenario's: require something of the true jaw in [[require]], such as \
                  incisal.z; on the robot of the encoders, such as l1.position",
             ),
+            Self::OnlyStated => f.write_str(
+                "the controller alone states the safe stop: declare the fault that it answers in [[faults]], or require something of \
+                 the true jaw in [[require]]",
+            ),
         }
     }
+}
+
+/// Whether a requirement on the true jaw was judged. What the controller states of its own motion does not count.
+fn has_judged_truth(figures: &Figures) -> bool {
+    let mut required = figures.requirements.iter().filter(|required| required.is_truth);
+    required.any(|required| required.result != CheckResult::Untested)
 }
 
 /// Whether the motion was to end early: by the operator, the scenario, or the controller itself.

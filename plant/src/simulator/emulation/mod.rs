@@ -305,7 +305,11 @@ impl Emulation {
                     self.drives[axis].axis.faults.set(of_drive.into(), self.agenda.size(kind, axis));
                 }
                 FaultKindConfig::Axis(_) => self.dynamics.set_faults(axis, self.agenda.axis_faults(axis)),
-                _ => {}
+                // None of these is an effect on an axis.
+                FaultKindConfig::Platform(_)
+                | FaultKindConfig::Bus(_)
+                | FaultKindConfig::Command(_)
+                | FaultKindConfig::Process(_) => {}
             }),
             Effect::Payload { .. } => self.dynamics.load.payload_kg = self.agenda.payload_kg(),
             Effect::Food(_) => {
@@ -337,7 +341,13 @@ impl Emulation {
             FaultKindConfig::Axis(AxisFault::Friction) => {
                 size.to_bits() != 1.0_f64.to_bits() && self.agenda.acts(place, axis)
             }
-            _ => self.agenda.acts(place, axis),
+            FaultKindConfig::Axis(AxisFault::Jam | AxisFault::Play | AxisFault::BrokenRod) => {
+                self.agenda.acts(place, axis)
+            }
+            FaultKindConfig::Platform(_)
+            | FaultKindConfig::Bus(_)
+            | FaultKindConfig::Command(_)
+            | FaultKindConfig::Process(_) => false,
         })
     }
 

@@ -57,6 +57,8 @@ mod checks {
 }
 
 mod shortfall {
+    use std::path::Path;
+
     use masseter_recording::MachineInfo;
     use masseter_runtime::messages::Event;
     use masseter_runtime::messages::codes::{EventKind, Source};
@@ -64,7 +66,7 @@ mod shortfall {
     use masseter_scenario::Scenario;
 
     use super::*;
-    use crate::{Analysis, Code, StoppedBy};
+    use crate::{Analysis, Code, FaultFigures, StoppedBy};
 
     const PLAYED: MotionFigures = MotionFigures {
         way_mm: Some(900.0),
@@ -194,5 +196,47 @@ mod shortfall {
         }
         let early = Shortfall::OwnEarly { running_s: 4.3, duration_s: 10.0 };
         assert_eq!(own(|_, figures| figures.running_s = 4.3), Some(early));
+        let interrupted = own(|_, figures| {
+            figures.running_s = 4.3;
+            stop_by_request(figures);
+        });
+        assert_eq!(interrupted, Some(Shortfall::Unjudged), "a stop by request excuses the time alone");
+    }
+
+    #[test]
+    fn an_expected_safe_stop_needs_more_than_the_controllers_word() {
+        type Case = (fn(&mut Figures), Option<Shortfall>);
+        let stopped = |expect: &str, change: fn(&mut Figures)| {
+            shortfall(|manifest, figures| {
+                manifest.scenario = Scenario::parse(Path::new("stop.toml"), expect).unwrap();
+                figures.final_state = Some(Code::Known(ControllerState::SafeStop));
+                change(figures);
+            })
+        };
+        let expect = "expect.verdict = 'safe_stop'\n";
+        let cases: [Case; 6] = [
+            (|_| (), Some(Shortfall::OnlyStated)),
+            (|figures| require(figures, CheckResult::Passed, false), Some(Shortfall::OnlyStated)),
+            (|figures| require(figures, CheckResult::Passed, true), None),
+            (|figures| figures.stopped_by = Some(StoppedBy::Master), None),
+            (|figures| strike(figures, Some(1)), None),
+            (|figures| strike(figures, None), Some(Shortfall::OnlyStated)),
+        ];
+        for (number, (change, expected)) in cases.into_iter().enumerate() {
+            assert_eq!(stopped(expect, change), expected, "case {number}");
+        }
+        assert_eq!(Shortfall::OnlyStated.result(), CheckResult::Untested);
+        assert_eq!(stopped("", |_| ()), None, "such a stop is no pass anyway");
+    }
+
+    fn strike(figures: &mut Figures, struck_ns: Option<u64>) {
+        let [deviation_mm, deviation_deg] = [0.0; 2];
+        figures.faults.push(FaultFigures {
+            number: 1,
+            struck_ns,
+            deviation_mm,
+            deviation_deg,
+            detection: None,
+        });
     }
 }

@@ -8,7 +8,8 @@ use masseter_scenario::{Quantity, RequirementConfig, Statistic, Unit};
 use super::condition::{Lookup, Moment};
 use super::dimension::BaseExponents;
 use super::expression::Expression;
-use super::finding::{Finding, Missing, OfKey, Reason, Refused, RequirementPlot};
+use super::finding::{Finding, OfKey, Reason, Refused, RequirementPlot};
+use super::missing::Missing;
 use super::trigger::Window;
 use crate::series::{Extremes, Series};
 use crate::signals::Values;
@@ -225,10 +226,11 @@ impl Bounds {
     pub(super) fn judge_moment(&mut self, moment: &Moment<'_>) {
         let value = self.of.value(moment.values);
         let began_ns = *self.began_ns.get_or_insert(moment.time_ns);
+        self.missing.apply_phase(moment.phase);
         if !self.window.contains(moment) || moment.is_closing {
             return;
         }
-        self.missing.count_sample(value.is_some(), moment.is_real_time);
+        self.missing.count_sample(value.is_some(), moment.phase, moment.is_real_time);
         let Some(value) = value else { return };
         // What the requirement does not judge would only spoil the scale of the plot.
         self.series.add(moment.time_ns - began_ns, 0, value / self.of.unit.si);

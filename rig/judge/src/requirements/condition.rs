@@ -5,6 +5,7 @@ use masseter_scenario::input::excerpt;
 use masseter_scenario::{Dimension, Quantity, QuantityError, Scenario, Unit};
 
 use super::finding::{Finding, Reason};
+use super::missing::Phase;
 use crate::events::EventRecord;
 use crate::signals::{UnknownSignal, Values};
 
@@ -25,6 +26,7 @@ pub(super) struct Moment<'a> {
     pub(super) values: &'a [f64],
     /// The events since the sample before.
     pub(super) events: &'a [EventRecord],
+    pub(super) phase: Phase,
     /// Whether a lost cycle may have acted on the jaw.
     pub(super) is_disturbed: bool,
     /// Whether the loops run in real time, where they may lose or delay single cycles.

@@ -4,7 +4,8 @@ use masseter_scenario::wording::counted;
 use masseter_scenario::{Dimension, RequirementConfig};
 
 use super::condition::{Condition, Lookup, Moment, is_condition};
-use super::finding::{Finding, Missing, OfKey, Refused};
+use super::finding::{Finding, OfKey, Refused};
+use super::missing::Missing;
 use super::trigger::{Trigger, Window};
 
 /// Judges that something never happens.
@@ -55,11 +56,12 @@ impl Never {
 
     pub(super) fn judge_moment(&mut self, moment: &Moment<'_>) {
         let is_inside = self.window.contains(moment);
+        self.missing.apply_phase(moment.phase);
         let (times, margin) = match &mut self.what {
             What::Condition(condition) => {
                 let robustness = condition.robustness(moment.values);
                 if is_inside && !moment.is_closing {
-                    self.missing.count_sample(robustness.is_some(), moment.is_real_time);
+                    self.missing.count_sample(robustness.is_some(), moment.phase, moment.is_real_time);
                 }
                 let Some(robustness) = robustness else { return };
                 (u64::from(robustness >= 0.0), -robustness)

@@ -3,6 +3,7 @@
 use masseter_scenario::Unit;
 use serde::Serialize;
 
+use super::missing::Missing;
 use crate::check::CheckResult;
 use crate::series::Curve;
 use crate::signals::UnknownSignal;
@@ -66,48 +67,6 @@ impl Finding {
     /// The share of a margin in its limit; none without a limit other than 0.
     pub(super) fn share(margin: f64, limit: f64) -> Option<f64> {
         (limit != 0.0 && margin.is_finite()).then(|| margin / limit.abs())
-    }
-}
-
-/// Samples of a window without a value.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Missing {
-    pub(super) all: u64,
-    /// Those between two values: before the first and after the last one, a signal need not have any.
-    between: u64,
-    since_value: Option<u64>,
-    samples: u64,
-    is_real_time: bool,
-}
-
-/// The share of a window's samples that may be missing in real time, where the loops lose or delay single cycles. What that does is
-/// judged as timing.
-const MISSING_IN_REAL_TIME: f64 = 0.01;
-
-impl Missing {
-    pub(super) fn count_sample(&mut self, has_value: bool, is_real_time: bool) {
-        self.samples += 1;
-        self.is_real_time |= is_real_time;
-        if has_value {
-            self.between += self.since_value.replace(0).unwrap_or(0);
-        } else {
-            self.all += 1;
-            self.since_value = self.since_value.map(|missing| missing + 1);
-        }
-    }
-
-    /// Whether values are missing in between: in simulated time any, in real time more than single ones.
-    fn is_too_much(&self) -> bool {
-        let allowed = if self.is_real_time { MISSING_IN_REAL_TIME * self.samples as f64 } else { 0.0 };
-        self.between as f64 > allowed
-    }
-
-    fn in_words(&self) -> String {
-        match (self.all, self.between) {
-            (0, _) => String::new(),
-            (all, 0) => format!(", {all} missing"),
-            (_, between) => format!(", {between} missing in between"),
-        }
     }
 }
 
@@ -223,25 +182,4 @@ pub struct RequirementError {
     pub entry: Option<usize>,
     pub(super) of: String,
     pub(super) reason: String,
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Whether a bound passes, where one sample of this many is missing in between.
-    fn passes(samples: usize, is_real_time: bool) -> bool {
-        let mut missing = Missing::default();
-        (0..samples).for_each(|sample| missing.count_sample(sample != 1, is_real_time));
-        let finding = Finding::new(true, String::new(), Unit::ONE).with_missing(&missing);
-        finding.result == CheckResult::Passed
-    }
-
-    #[test]
-    fn a_missing_sample_is_no_pass_but_a_single_one_in_real_time() {
-        assert!(!passes(1000, false));
-        assert!(passes(1000, true));
-        assert!(!passes(50, true));
-        assert!(passes(2, false), "after the last value none is needed");
-    }
 }

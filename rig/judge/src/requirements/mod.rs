@@ -9,12 +9,12 @@ mod count;
 mod dimension;
 mod expression;
 mod finding;
+mod missing;
 mod response;
 mod trigger;
 
 use std::collections::BTreeSet;
 
-use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::named::Declared;
 use masseter_scenario::input::excerpt;
 use masseter_scenario::{Dimension, RequirementConfig, Scenario, Statistic};
@@ -23,6 +23,7 @@ use self::bounds::Bounds;
 use self::condition::{Lookup, Moment};
 use self::count::{Count, Never, Order};
 use self::finding::{Finding, Reason, Refused};
+use self::missing::Phase;
 use self::response::Response;
 use self::trigger::Trigger;
 use crate::signals::{Registry, Sample, Values};
@@ -111,7 +112,8 @@ impl Requirements {
     /// Takes the next sample.
     pub(crate) fn judge_sample(&mut self, Sample { time_ns, messages, events, is_closing }: &Sample) {
         self.values.take(messages, &mut self.row);
-        if self.row[self.state].to_bits() == f64::from(ControllerState::Running.code()).to_bits() {
+        let phase = Phase::of(self.row[self.state]);
+        if phase == Phase::Running {
             self.motion_ns.get_or_insert(*time_ns);
         }
         let motion_s = self.motion_ns.map(|motion_ns| (time_ns - motion_ns) as f64 / 1e9);
@@ -119,8 +121,9 @@ impl Requirements {
         // Simulated time has no account of the loops.
         self.is_real_time |= messages.state.is_some_and(|state| state.worked_ns > 0);
         let (is_real_time, is_closing) = (self.is_real_time, *is_closing);
+        let time_ns = *time_ns;
         let moment =
-            Moment { time_ns: *time_ns, motion_s, values, events, is_disturbed, is_real_time, is_closing };
+            Moment { time_ns, motion_s, values, events, phase, is_disturbed, is_real_time, is_closing };
         self.list.iter_mut().for_each(|requirement| requirement.judge_moment(&moment));
     }
 }

@@ -147,9 +147,12 @@ fn bounds_without_a_sample_are_untested_and_missing_samples_are_counted() {
         (never.result, never.finding.as_str()),
         (Untested, "never in 2 samples, 1 missing in between")
     );
-    // Before the first value and after the last one, there is none to be missed.
-    let ends = Run::of(&[f64::NAN, 1.0, 3.0, f64::NAN]).judge("signal = 'l1.force'\nmax = '5 N'");
-    assert_eq!((ends.result, ends.finding.as_str()), (Passed, "3 N in 2 samples, 2 missing"));
+    // Before the first value there is none to be missed.
+    let begins = Run::of(&[f64::NAN, 1.0, 3.0]).judge("signal = 'l1.force'\nmax = '5 N'");
+    assert_eq!((begins.result, begins.finding.as_str()), (Passed, "3 N in 2 samples, 1 missing"));
+    let vanishes = Run::of(&[1.0, 3.0, f64::NAN]).judge("signal = 'l1.force'\nmax = '5 N'");
+    let why = "3 N in 2 samples, 1 missing at the motion's end";
+    assert_eq!((vanishes.result, vanishes.finding.as_str()), (Untested, why));
     let lost = Run::of(&[f64::NAN; 3]).judge("signal = 'l1.force'\nmax = '5 N'");
     assert_eq!(found(&lost), (Untested, None, None), "{lost:?}");
     let never = gap.judge("signal = 'l1.force'\nmax = '5 N'\nduring = 'safe_stop'");

@@ -75,11 +75,14 @@ pub struct Rig {
     has_failed: bool,
 }
 
+// Methods that take in the whole plant, or the encoding of a state, are inlined: they are compiled where somebody calls them. The
+// command, which does neither, takes less to build.
 impl Rig {
     /// A rig of the scenario with this seed instead of the scenario's, in its first cycle.
     ///
     /// # Errors
     /// When the scenario has real interfaces, a wrong value, or does not fit its mechanism, drives or buses.
+    #[inline]
     pub fn new(scenario: &Scenario, seed: u64) -> Result<Self, RigError> {
         if !scenario.can.is_virtual() {
             return Err(RigError::Interfaces(scenario.can.interfaces.clone()));
@@ -98,6 +101,7 @@ impl Rig {
     ///
     /// # Errors
     /// When the plant fails.
+    #[inline]
     pub fn reset(&mut self) -> Result<&Reading, RigError> {
         self.has_failed = true;
         self.stepper.renew(&self.scenario, Latest::default())?;
@@ -112,6 +116,7 @@ impl Rig {
     /// # Errors
     /// When the plant fails. The cycle is then incomplete, and the rig refuses further steps until a
     /// [`reset`](Self::reset) or [`restore`](Self::restore).
+    #[inline]
     pub fn step(&mut self, command: &Command) -> Result<&Reading, RigError> {
         let Self { stepper, has_failed, .. } = self;
         if *has_failed {
@@ -150,6 +155,7 @@ impl Rig {
     }
 
     /// The state of the rig, to be [restored](Self::restore) later, also on another rig of the same scenario and seed.
+    #[inline]
     pub fn snapshot(&self) -> Snapshot {
         Snapshot {
             scenario: self.scenario.clone(),
@@ -163,6 +169,7 @@ impl Rig {
     ///
     /// # Errors
     /// Where there is no such file, the file is damaged, or it is of another build, scenario or seed.
+    #[inline]
     pub fn read_snapshot(&self, path: &Path) -> Result<Snapshot, SnapshotError> {
         self.snapshot().replaced_by(path)
     }
@@ -171,6 +178,7 @@ impl Rig {
     ///
     /// # Errors
     /// Where the snapshot is one of another scenario or seed.
+    #[inline]
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), RigError> {
         let Snapshot { scenario, stepper, latest, has_failed } = snapshot;
         OtherScenario::refuse(&self.scenario, scenario)?;

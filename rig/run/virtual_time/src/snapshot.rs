@@ -171,6 +171,7 @@ impl Snapshot {
     ///
     /// # Errors
     /// When the file cannot be written.
+    #[inline]
     pub fn write_to(&self, path: &Path) -> Result<(), SnapshotError> {
         let failed = |error: io::Error| SnapshotError { path: path.to_owned(), problem: error.into() };
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -183,6 +184,7 @@ impl Snapshot {
     }
 
     /// The snapshot of a file, in place of this one of the same scenario and seed.
+    #[inline]
     pub(crate) fn replaced_by(self, path: &Path) -> Result<Self, SnapshotError> {
         let bytes = read_bytes(path, MOST_BYTES).map_err(SnapshotProblem::File);
         let replaced = bytes.and_then(|bytes| self.decoded(&bytes));
@@ -190,6 +192,7 @@ impl Snapshot {
     }
 
     /// The bytes of a file.
+    #[inline]
     pub(crate) fn encode(&self) -> Vec<u8> {
         let mut writer = Writer(Vec::new());
         let written = writer.value(&mut Belonging::to(&self.scenario));
@@ -199,6 +202,7 @@ impl Snapshot {
     }
 
     /// The snapshot of these bytes, in place of this one.
+    #[inline]
     pub(crate) fn decoded(mut self, bytes: &[u8]) -> Result<Self, SnapshotProblem> {
         let mut reader = Reader(content(bytes)?);
         let own = Belonging::to(&self.scenario);
