@@ -2,7 +2,7 @@
 //!
 //! The verb `run` starts controller, plant and recorder as processes of this executable, or steps their cores in one
 //! thread under virtual time (`masseter_virtual_time`). `vary` plays many runs. Figures of a recorded run are
-//! computed from its recording and manifest only (crate `masseter_analysis`), so `report` and `record` can repeat
+//! computed from its recording and manifest only (crate `masseter_judge`), so `report` and `record` can repeat
 //! them. This crate holds no control, physics, analysis or file formats.
 
 // `println!` panics on a closed terminal, which would end a run: see `masseter_terminal`.

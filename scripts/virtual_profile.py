@@ -12,7 +12,7 @@ from pathlib import Path
 
 PARTS = {
     "condition number": ["Conditioning::", "symmetric_eigen", "SymmetricEigen", "symmetric_tridiagonal"],
-    "analysis": ["masseter_analysis::"],
+    "analysis": ["masseter_judge::"],
     "check of the motion": ["masseter_plan::", "trajectory::check"],
     "simulated wires": ["masseter_can::"],
     "drives": ["masseter_plant::simulator::drive::"],

@@ -14,8 +14,8 @@ use std::fmt::Display;
 use std::fs;
 use std::path::PathBuf;
 
-use masseter_analysis::{Analysis, Figures, Verdict};
 use masseter_controller::motion_controller::MotionController;
+use masseter_judge::{Analysis, Figures, Verdict};
 use masseter_plan::RunPlan;
 use masseter_recording::Manifest;
 use masseter_scenario::{BusFault, ChecksConfig, FaultConfig, Scenario};

@@ -5,7 +5,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use masseter_analysis::signals::Registry;
+use masseter_judge::signals::Registry;
 use masseter_model::geometry::{AXIS_NAMES, MechanismConfig, SlideConfig, StrokeLimits};
 use masseter_runtime::named::Declared;
 use masseter_scenario::{

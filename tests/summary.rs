@@ -7,7 +7,7 @@ use std::path::Path;
 use masseter_runtime::messages::codes::Source;
 
 use crate::common::Workspace;
-use masseter_analysis::hop_names;
+use masseter_judge::hop_names;
 use serde_json::Value;
 
 fn description() -> String {

@@ -7,9 +7,9 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
-use masseter_analysis::requirements::event_names;
-use masseter_analysis::signals::Registry;
 use masseter_controller::process;
+use masseter_judge::requirements::event_names;
+use masseter_judge::signals::Registry;
 use masseter_plan::{RunPlan, read_scenario};
 use masseter_runtime::control::Outcome;
 use masseter_runtime::named::{Parameter, access};

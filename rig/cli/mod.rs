@@ -24,7 +24,7 @@ use std::sync::Arc;
 use anyhow::anyhow;
 use clap::{ColorChoice, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 use masseter_recorder::RecorderArgs;
-use masseter_recordings::{ExportArgs, RecordingVerb};
+use masseter_recording_verbs::{ExportArgs, RecordingVerb};
 use masseter_runtime::transport::Domain;
 use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, Failure, OrFailure, choose_colour, in_one_line, result_line, status};
@@ -253,8 +253,8 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Robot(verb) => robot::execute(&verb),
         Verb::Kinematics { .. } => Err(anyhow!(ELSEWHERE)).usage(),
         Verb::Doctor(args) => doctor::examine(&args).usage(),
-        Verb::Export(args) => masseter_recordings::export(&args).usage(),
-        Verb::Recording(verb) => masseter_recordings::execute(&verb).usage(),
+        Verb::Export(args) => masseter_recording_verbs::export(&args).usage(),
+        Verb::Recording(verb) => masseter_recording_verbs::execute(&verb).usage(),
         Verb::Clean => clean().usage(),
         Verb::Completions(args) => help::completions(&args, &command()).usage(),
         Verb::Man(args) => help::manual(&args, command()).usage(),

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::io::{Read, Seek};
 
-use masseter_analysis::{SequenceCheck, TopicFigures};
+use masseter_judge::{SequenceCheck, TopicFigures};
 use masseter_model::geometry::AXES;
 use masseter_recording::{Columns, Ending, Manifest, ReadError, Reader, Recorded, Topic};
 use masseter_runtime::messages::codes::{Cause, ControllerState, Source};

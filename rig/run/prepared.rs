@@ -4,8 +4,8 @@ use std::fs::File;
 use std::path::Path;
 
 use anyhow::Context;
-use masseter_analysis::{Analysis, Figures, Judgement};
 use masseter_controller::process::BuildController;
+use masseter_judge::{Analysis, Figures, Judgement};
 use masseter_plan::RunPlan;
 use masseter_recording::{Ending, FullSpeed, Manifest, RunFolder};
 use masseter_report::Detail;

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::thread;
 
 use anyhow::{bail, ensure};
-use masseter_analysis::requirements::{RequirementError, check_requirements};
 use masseter_controller::process::BuildController;
+use masseter_judge::requirements::{RequirementError, check_requirements};
 use masseter_plan::RunPlan;
 use masseter_plant::core as plant;
 use masseter_recorder::live;

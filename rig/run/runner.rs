@@ -7,8 +7,8 @@ use std::panic::{self, AssertUnwindSafe};
 use std::path::Path;
 
 use anyhow::{Context, anyhow};
-use masseter_analysis::{Figures, Judgement, Verdict};
 use masseter_controller::process::BuildController;
+use masseter_judge::{Figures, Judgement, Verdict};
 use masseter_plan::Overrides;
 use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure};

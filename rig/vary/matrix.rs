@@ -4,7 +4,7 @@
 use masseter_campaign::{Coverage, FaultRow};
 use masseter_model::geometry::{AXIS_NAMES, Vec3};
 use masseter_plan::RunPlan;
-use masseter_runtime::messages::codes::EventKind;
+use masseter_runtime::messages::codes::{Cause, EventKind};
 use masseter_scenario::{ChecksConfig, DriveFault, FaultConfig, FaultKindConfig, Quantity, Scenario};
 use masseter_terminal::Failure;
 use rayon::prelude::*;
@@ -119,9 +119,11 @@ fn row_of(
     limits: &ChecksConfig,
 ) -> FaultRow {
     let found = &figures.faults[0];
-    // A drive's emergency is a detection too, although it stops nothing by itself.
+    let ended = figures.events.iter().find(|event| event.cause == Cause::FaultEnded);
+    let ended_ns = ended.map_or(u64::MAX, |event| event.time_ns);
+    // A drive's emergency is a detection too, although it stops nothing by itself. The jump as a fault ends detects nothing.
     let detection = found.struck_ns.and_then(|struck_ns| {
-        let mut events = figures.events.iter().filter(|event| event.time_ns >= struck_ns);
+        let mut events = figures.events.iter().filter(|event| (struck_ns..ended_ns).contains(&event.time_ns));
         Some((struck_ns, events.find(|event| event.kind == EventKind::Fault)?))
     });
     // The negation also counts what is no number.

@@ -3,8 +3,8 @@
 use std::fmt;
 
 use anyhow::anyhow;
-use masseter_analysis::{CheckResult, Figures, Verdict};
 use masseter_campaign::Shrink;
+use masseter_judge::{CheckResult, Figures, Verdict};
 use masseter_runtime::messages::codes::EventKind;
 use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure};

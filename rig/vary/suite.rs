@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
-use masseter_analysis::Judgement;
+use masseter_judge::Judgement;
 use masseter_report::suite::{Attempt, TestedScenario};
 use masseter_runtime::clock;
 use masseter_terminal::{Exit, Failure, in_one_line, status};
@@ -171,7 +171,7 @@ fn attempt(judged: Result<Judgement, Failure>, folder: Option<PathBuf>) -> Attem
 
 #[cfg(test)]
 mod tests {
-    use masseter_analysis::{Analysis, Verdict};
+    use masseter_judge::{Analysis, Verdict};
     use masseter_recording::{MachineInfo, Manifest};
     use masseter_runtime::named::Declared;
     use masseter_scenario::Scenario;

@@ -40,7 +40,7 @@ use crate::tracking::{PoseSource, Track, Tracking, TrackingFigures};
 /// the motion, the run's events, and the frames since the last SYNC of each bus.
 ///
 /// ```
-/// use masseter_analysis::Analysis;
+/// use masseter_judge::Analysis;
 /// use masseter_recording::Recorded;
 /// use masseter_scenario::Scenario;
 /// use masseter_runtime::messages::State;

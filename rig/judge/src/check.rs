@@ -81,6 +81,8 @@ pub struct Check {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Subject {
     Rig,
+    /// Which motion was played, and how it ended.
+    Sequence,
     /// The faults that the scenario declares.
     Faults,
     /// The stimuli that the scenario declares.

@@ -31,7 +31,7 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     }
     let limits = &manifest.scenario.checks;
     let is_disturbed = timing.is_disturbed();
-    let sequence = sequence(manifest, figures);
+    let sequence = Check { subject: Subject::Sequence, ..sequence(manifest, figures) };
     let TrackingFigures { actual_source, samples, actual, estimated, undisturbed, .. } = &figures.tracking;
     let tracking_of = |name, errors, undisturbed_errors| {
         let check = tracking(name, *samples, errors, limits);

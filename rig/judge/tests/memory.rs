@@ -5,9 +5,9 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use masseter_analysis::Analysis;
 use masseter_can::canopen::sync;
 use masseter_can::{Tapped, TappedFrame};
+use masseter_judge::Analysis;
 use masseter_recording::Recorded;
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::messages::{Command, Reading, State, Truth, tap};

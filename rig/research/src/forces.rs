@@ -4,8 +4,8 @@
 use std::path::Path;
 
 use anyhow::Context;
-use masseter_analysis::{Analysis, Curve, Figures, ToothFigures};
 use masseter_controller::motion_controller::MotionController;
+use masseter_judge::{Analysis, Curve, Figures, ToothFigures};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plan::RunPlan;
 use masseter_recording::Manifest;

@@ -25,6 +25,10 @@ const NOISIEST_M: f64 = 1e-3;
 /// Increments of a turn of the motor, unless a quirk says otherwise: a spindle that moves the axis by 10 mm a turn, at
 /// 1 µm an increment.
 pub const INCREMENTS_PER_TURN: u32 = 10_000;
+/// The distance of an axis' two encoders that is a fault by default, m: the jaw's limits are five times as wide.
+const ENCODERS_APART_M: f64 = 1e-4;
+/// The same in standard deviations of the noise and in increments, so that neither is a fault.
+const ENCODERS_APART: f64 = 10.0;
 /// The slowest save that is worth a test, and the slowest brake, s.
 const SLOWEST_S: f64 = 60.0;
 
@@ -143,7 +147,18 @@ impl DrivesConfig {
     pub(super) fn validate(&self) -> Checked {
         self.slide.check_ranges(ranges_of("drives.slide"))?;
         self.leg.check_ranges(ranges_of("drives.leg"))?;
-        require_each(&self.quirk, QuirkConfig::validate)
+        require_each(&self.quirk, QuirkConfig::validate)?;
+        require_each(&self.quirk, |quirk| self.check_second_encoder(quirk))
+    }
+
+    /// Refuses a limit that an encoder without a fault may exceed.
+    fn check_second_encoder(&self, quirk: &QuirkConfig) -> Checked {
+        let Some(limit_m) = quirk.encoders_apart_m() else { return Ok(()) };
+        let drives = (0..AXIS_NAMES.len()).filter(|axis| quirk.is_on(*axis)).map(|axis| self.of_axis(axis));
+        let uncertain_m = |drive: DriveConfig| drive.encoder_noise_m.max(drive.encoder_resolution_m);
+        let least_m = ENCODERS_APART * drives.map(uncertain_m).fold(0.0, f64::max);
+        let need = format!("use at least {least_m}: ten times the encoder's noise and its increment");
+        require(limit_m >= least_m, "drives.quirk.limit_m", &limit_m, &need)
     }
 }
 
@@ -276,6 +291,8 @@ quirk_kinds! {
     StoAtPowerOn "sto_at_power_on" [] [for_s];
     /// The encoder is incremental: 6064h is 0 at power-on, wherever the axis stands.
     IncrementalEncoder "incremental_encoder" [];
+    /// A second encoder sits at the joint; the drive is in fault (7320h) once both are more than `limit_m` apart.
+    SecondEncoder "second_encoder" [] [limit_m];
     /// The drive is in fault at power-on, with `code` in 603Fh, until it is reset.
     FaultAtPowerOn "fault_at_power_on" [code];
     /// The drive restarts by itself once, `after_s` after power-on.
@@ -311,6 +328,8 @@ keys! {
         pub close_s: Option<f64> => Within(0.0, SLOWEST_S),
         /// Increments of a turn of the motor (608Fh, 6092h); by default 10000.
         pub increments_per_turn: Option<u32> => "above 0",
+        /// Largest distance of the two encoders of an axis; by default 0.0001.
+        pub limit_m: Option<f64> => Within(COARSEST_M, 0.1) "at least ten times the encoder's increment and its noise",
         /// Error code (603Fh).
         pub code: Option<u16> => "1 to 0xFFFF",
         /// The objects that it is about.
@@ -329,6 +348,12 @@ impl QuirkConfig {
     /// Whether the drive of an axis has it.
     pub fn is_on(&self, axis: usize) -> bool {
         self.axes.as_ref().is_none_or(|axes| axes.iter().any(|name| name == AXIS_NAMES[axis]))
+    }
+
+    /// The distance of the two encoders that is a fault, m; none without a second one.
+    pub fn encoders_apart_m(&self) -> Option<f64> {
+        let is_second = self.kind == QuirkKindConfig::SecondEncoder;
+        is_second.then(|| self.limit_m.unwrap_or(ENCODERS_APART_M))
     }
 
     fn validate(&self) -> Checked {
@@ -420,6 +445,7 @@ mod tests {
                 "code" => "code = 0x7305\n".to_owned(),
                 "objects" => "objects = ['60C2h:01']\n".to_owned(),
                 "value" => "value = 1\n".to_owned(),
+                "limit_m" => "limit_m = 0.001\n".to_owned(),
                 time => format!("{time} = 0.5\n"),
             });
             let text = format!("kind = '{kind}'\naxes = ['l2']\n{}", values.collect::<String>());
@@ -439,6 +465,11 @@ mod tests {
             ("kind = 'no_brake'\naxes = []", "quirk.axes = []: name at least one"),
             ("kind = 'fault_at_power_on'\ncode = 0", "quirk.code = 0: use an error code"),
             ("kind = 'acceleration_in_rpm_s'\nincrements_per_turn = 0", "use at least 1"),
+            ("kind = 'second_encoder'\nlimit_m = 0.2", "quirk.limit_m = 0.2: use 0.00001 to 0.1"),
+            (
+                "kind = 'second_encoder'\n[drives.leg]\nencoder_noise_m = 2e-5",
+                "quirk.limit_m = 0.0001: use at least 0.0002",
+            ),
             ("kind = 'slow_saves'\nfor_s = 1.0", "did you mean 'slow_save'?"),
             ("kind = 'shows'\nobjects = ['6065h']", "quirk.value = none: give it"),
             ("kind = 'lacks'\nobjects = []", "quirk.objects = []: name at least one"),

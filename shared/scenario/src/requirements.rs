@@ -1,7 +1,7 @@
 //! What a scenario requires of its run, and the outcome that it expects: `[[require]]` and `[expect]`.
 //!
 //! This module holds what is written. Signals, conditions and their units are resolved and judged by the crate
-//! `masseter-analysis`.
+//! `masseter-judge`.
 
 use serde::{Deserialize, Serialize};
 

@@ -107,6 +107,8 @@ pub(crate) struct AxisQuirks {
     pub(crate) are_limits_from_zero: bool,
     /// Whether the encoder counts from where it is at power-on.
     pub(crate) is_incremental: bool,
+    /// How far the encoder may be from a second one at the joint, m; none without a second one.
+    pub(crate) encoders_apart_m: Option<f64>,
     /// How long after power-on the torque is safely off, ns.
     pub(crate) torque_off_ns: u64,
     /// How long the brake takes to open, ns.

@@ -141,6 +141,7 @@ fn quirks(on_axis: &[&QuirkConfig], period_ns: u64, objects: &mut Objects) -> Re
             Kind::HomeOffsetSign => axis.is_offset_inverted = true,
             Kind::LimitsFromZero => axis.are_limits_from_zero = true,
             Kind::StoAtPowerOn => axis.torque_off_ns = ns(quirk.for_s).unwrap_or(u64::MAX),
+            Kind::SecondEncoder => axis.encoders_apart_m = quirk.encoders_apart_m(),
             Kind::IncrementalEncoder => axis.is_incremental = true,
             Kind::Shows | Kind::Lacks => {
                 for ObjectKey(object) in quirk.objects.iter().flatten() {

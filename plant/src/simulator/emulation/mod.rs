@@ -245,10 +245,12 @@ impl Emulation {
         self.move_mechanism(now_ns)?;
         self.follow_agenda(now_ns);
         let positions_m = self.dynamics.drive_positions_m();
+        let joints_m = self.dynamics.state.positions_m();
         for (axis, position_m) in positions_m.into_iter().enumerate() {
             let encoder = &mut self.encoders[axis];
             let force_n = self.drives[axis].step(now_ns, position_m, |at_m| encoder.look(now_ns, at_m));
             self.force_n[axis].hold(force_n, now_ns);
+            self.drives[axis].compare_encoders(now_ns, joints_m[axis]);
         }
         if self.agenda.is_empty() {
             self.push()?;

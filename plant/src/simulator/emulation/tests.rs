@@ -37,3 +37,40 @@ fn time_left_out_is_counted_in_whole_steps_and_moves_nothing() {
     assert!(emulation.dynamics.state.positions_m().iter().eq(&positions_m));
     assert_eq!(emulation.skip_to(0), 0);
 }
+
+/// Which drives are in fault 0.2 s after power-on, with a second encoder at each joint and a fault at that of l1.
+fn faults_by_second_encoders(limit: &str, kind: &str) -> [bool; AXES] {
+    let fault = if kind.is_empty() {
+        String::new()
+    } else {
+        format!("[[faults]]\naxis = 'l1'\nfrom_s = 0.05\n{kind}\n")
+    };
+    let text = format!("[[drives.quirk]]\nkind = 'second_encoder'\n{limit}\n{fault}");
+    let scenario = Scenario::parse(std::path::Path::new("second_encoder.toml"), &text).unwrap();
+    scenario.validate().unwrap();
+    let mut emulation = Emulation::new(&scenario, 0).unwrap();
+    while emulation.next_step_ns < 200_000_000 {
+        emulation.step().unwrap();
+    }
+    std::array::from_fn(|axis| emulation.drives[axis].axis.power.is_in_fault())
+}
+
+#[test]
+fn a_second_encoder_finds_an_encoder_that_leaves_its_joint_and_nothing_else() {
+    let (none, l1) = ([false; AXES], std::array::from_fn(|axis| axis == 3));
+    let table = [
+        ("", "", none),
+        ("", "kind = 'encoder_offset'\nsize = '0.09 mm'", none),
+        ("", "kind = 'encoder_offset'\nsize = '0.11 mm'", l1),
+        ("limit_m = 0.001", "kind = 'encoder_offset'\nsize = '0.11 mm'", none),
+        // 0.15 mm in 0.15 s.
+        ("", "kind = 'encoder_drift'\nsize = '1 mm/s'", l1),
+        ("", "kind = 'encoder_drift'\nsize = '0.5 mm/s'", none),
+        // Nothing moves behind the closed brake.
+        ("", "kind = 'encoder_stuck'", none),
+        ("", "kind = 'drive_scale'\nsize = '1.05'", none),
+    ];
+    for (limit, kind, expected) in table {
+        assert_eq!(faults_by_second_encoders(limit, kind), expected, "{limit} {kind}");
+    }
+}

@@ -47,6 +47,12 @@ class Result:
         figures: dict[str, Any] = self.summary["figures"]
         return figures
 
+    @property
+    def warnings(self) -> list[str]:
+        """What the plan of the run warns of; no warning decides anything."""
+        warnings: list[str] = self.summary["verdict"].get("warnings", [])
+        return warnings
+
     def load(self) -> Run:
         """The messages of the run."""
         return load(self.folder)

@@ -41,7 +41,7 @@ impl UnknownSignal {
 /// The signals of a run.
 ///
 /// ```
-/// use masseter_analysis::signals::Registry;
+/// use masseter_judge::signals::Registry;
 /// use masseter_scenario::Scenario;
 /// use masseter_runtime::named::Declared;
 ///
@@ -50,7 +50,7 @@ impl UnknownSignal {
 /// assert_eq!(registry.signals()[place].unit, "mm");
 /// let refusal = registry.place_of("incisal.eror").unwrap_err().to_string();
 /// assert!(refusal.ends_with("did you mean 'incisal.error'?"));
-/// # Ok::<(), masseter_analysis::signals::UnknownSignal>(())
+/// # Ok::<(), masseter_judge::signals::UnknownSignal>(())
 /// ```
 #[derive(Debug)]
 pub struct Registry {

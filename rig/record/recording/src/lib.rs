@@ -7,7 +7,7 @@
 //! by zstd and carry checksums; each can be read without the others.
 //!
 //! [`Recorder`] writes recordings, [`Backlog`] does so without delaying its caller, and [`Reader`] reads them, also
-//! damaged ones. This crate computes no figures; see `masseter-analysis`.
+//! damaged ones. This crate computes no figures; see `masseter-judge`.
 
 mod backlog;
 mod columns;

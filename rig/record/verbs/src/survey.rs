@@ -5,7 +5,7 @@ use std::fmt::{Error, Write};
 use std::path::Path;
 
 use anyhow::Context;
-use masseter_analysis::{SequenceCheck, TopicFigures};
+use masseter_judge::{SequenceCheck, TopicFigures};
 use masseter_recording::{Chunks, Digests, Entry, ReadError, Reader, Recorded};
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_scenario::wording::counted;

@@ -4,8 +4,8 @@
 use std::iter;
 
 use data_encoding::HEXUPPER;
-use masseter_analysis::EventRecord;
-use masseter_analysis::signals::{NamedSignal, Pace, Registry, Sample, Timeline, Values as SignalValues};
+use masseter_judge::EventRecord;
+use masseter_judge::signals::{NamedSignal, Pace, Registry, Sample, Timeline, Values as SignalValues};
 use masseter_recording::{Columns, Description, Field, Number, Recorded, Topic};
 use masseter_runtime::named::Declared;
 use masseter_scenario::Scenario;

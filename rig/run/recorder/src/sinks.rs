@@ -6,7 +6,7 @@
 
 use std::io::{self, IsTerminal};
 
-use masseter_analysis::MOVING;
+use masseter_judge::MOVING;
 use masseter_recording::{Backlog, Recorded, Topic};
 use masseter_runtime::clock::SECOND_NS;
 use masseter_runtime::messages::codes::{Cause, ControllerState};

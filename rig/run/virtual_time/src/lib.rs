@@ -11,8 +11,8 @@ mod snapshot;
 mod stepper;
 
 use anyhow::Context;
-use masseter_analysis::{Analysis, Figures};
 use masseter_controller::process::BuildController;
+use masseter_judge::{Analysis, Figures};
 use masseter_plan::RunPlan;
 use masseter_recording::{Backlog, Ending, Manifest, Pace, Recorder, RunFolder, Scene};
 use masseter_runtime::named::Declared;

@@ -6,8 +6,8 @@
 use std::cell::Cell;
 use std::convert::Infallible;
 
-use masseter_analysis::signals::CycleMessages;
-use masseter_analysis::{Analysis, Figures};
+use masseter_judge::signals::CycleMessages;
+use masseter_judge::{Analysis, Figures};
 use masseter_plant::core::PlantCore;
 use masseter_plant::state::{Archive, State};
 use masseter_recording::{Backlog, Recorded};

@@ -13,7 +13,7 @@ use std::error::Error;
 use std::path::Path;
 use std::sync::Arc;
 
-use masseter_analysis::signals::{Registry, UnknownSignal};
+use masseter_judge::signals::{Registry, UnknownSignal};
 use masseter_plan::RunPlan;
 use masseter_plant::PlantError;
 use masseter_runtime::messages::{Command, Event, Reading, Truth};

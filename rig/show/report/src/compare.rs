@@ -66,7 +66,9 @@ impl Comparison {
     fn in_words(&self) -> Result<String, std::fmt::Error> {
         let mut text = String::new();
         for (name, side) in [("A", &self.a), ("B", &self.b)] {
-            writeln!(text, "{name}: {}\n   {}: {}", side.path, side.verdict.word, side.verdict.reason)?;
+            let StoredVerdict { word, reason, warnings } = &side.verdict;
+            writeln!(text, "{name}: {}\n   {word}: {reason}", side.path)?;
+            warnings.iter().try_for_each(|warning| writeln!(text, "   warning: {warning}"))?;
         }
         if !self.differs.is_empty() {
             writeln!(text, "\nwarning: these were not runs of the same\n{:<50} {:<24} B", "", "A")?;
@@ -115,6 +117,8 @@ struct ComparedRun {
 struct StoredVerdict {
     pub word: String,
     pub reason: String,
+    #[serde(default)]
+    pub warnings: Vec<String>,
 }
 
 /// A circumstance in which two runs differ; none where one has no such key.
@@ -267,7 +271,7 @@ fn noise_of(figure: &str) -> Option<String> {
 
 /// The least error of a figure: the resolution of its histogram, even where all seconds agree.
 fn resolution(figure: &str, value: f64) -> f64 {
-    if figure.starts_with("intervals.") { masseter_analysis::resolution_ns(value as u64) as f64 } else { 0.0 }
+    if figure.starts_with("intervals.") { masseter_judge::resolution_ns(value as u64) as f64 } else { 0.0 }
 }
 
 fn judge_change(a: Option<f64>, b: Option<f64>, noise: Option<f64>) -> ChangeJudgement {

@@ -9,7 +9,7 @@ use std::time::Duration;
 use hdrhistogram::Histogram;
 use hdrhistogram::serialization::V2DeflateSerializer;
 use hdrhistogram::serialization::interval_log::{IntervalLogWriterBuilder, IntervalLogWriterError};
-use masseter_analysis::IntervalFigures;
+use masseter_judge::IntervalFigures;
 use masseter_runtime::clock::SECOND_NS;
 
 use crate::logs::WriteError;

@@ -1,7 +1,7 @@
 //! JUnit documents, as CI systems show them: a run or a whole suite of runs, each check as a test case.
 
 use askama::Template;
-use masseter_analysis::{Check, CheckResult, Figures, Verdict};
+use masseter_judge::{Check, CheckResult, Figures, Verdict};
 use masseter_recording::Manifest;
 use masseter_runtime::named::PlayedMotion;
 use masseter_terminal::Exit;
@@ -68,8 +68,6 @@ impl<'a> JunitRun<'a> {
         };
         let mut cases: Vec<_> = checks.map(case).collect();
         let has_failure = cases.iter().any(|case| matches!(case.result, CaseResult::Failed(..)));
-        let warnings = verdict.as_ref().map_or_else(|_| String::new(), |verdict| verdict.warnings.join("; "));
-        let properties = if warnings.is_empty() { Vec::new() } else { vec![("warnings", warnings)] };
         let result = match verdict {
             _ if !is_short => CaseResult::Passed,
             // The cases of its checks say it.
@@ -78,6 +76,7 @@ impl<'a> JunitRun<'a> {
             Err((kind, why)) => CaseResult::Error(kind, why),
         };
         cases.insert(0, Case { name: "run", took_s, result, earlier: Vec::new(), check: None });
+        let properties = Vec::new();
         Self { name, class: name, file: None, properties, took_s, timestamp: None, cases }
     }
 
@@ -92,6 +91,7 @@ impl<'a> JunitRun<'a> {
         let earlier = tested.attempts.iter().take(tested.retries());
         run.cases[0].earlier = earlier.map(Attempt::word_and_reason).collect();
         let is_flaky = tested.retries() > 0 && !is_short;
+        run.properties = warned(tested.warnings());
         run.properties.extend([
             ("masseter", masseter.to_owned()),
             ("outcome", tested.outcome().word().to_owned()),
@@ -143,6 +143,11 @@ impl<'a> Document<'a> {
     }
 }
 
+/// What the plan of a run warns of, as a property; none without warnings.
+fn warned(warnings: &[String]) -> Vec<(&'static str, String)> {
+    if warnings.is_empty() { Vec::new() } else { vec![("warnings", warnings.join("; "))] }
+}
+
 /// The case of a check. One that failed, in a run that passed, did so as the scenario expects.
 fn of_check(check: &Check, is_short: bool) -> CaseResult {
     let finding = &check.finding;
@@ -172,7 +177,7 @@ pub(crate) fn xml(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> 
     }
     let run = JunitRun::new(&name, Ok(verdict), verdict.exit_code != Exit::Passed, figures.duration_s);
     let timestamp = Some(manifest.began.trim_end_matches('Z'));
-    properties.extend(run.properties);
+    properties.extend(warned(&verdict.warnings));
     let run = JunitRun { class: "masseter.run", properties, timestamp, ..run };
     Document { runs: &[run], suite_s: None }.xml()
 }
@@ -197,7 +202,7 @@ pub fn junit_of_suite(report: &SuiteReport) -> askama::Result<String> {
 
 #[cfg(test)]
 mod tests {
-    use masseter_analysis::Analysis;
+    use masseter_judge::Analysis;
     use masseter_recording::MachineInfo;
     use masseter_runtime::named::Declared;
     use masseter_scenario::Scenario;

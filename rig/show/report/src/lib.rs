@@ -2,7 +2,7 @@
 //! logs; two runs side by side; and a suite of runs.
 //!
 //! All of it is computed from the manifest and the recording, so `masseter report` can repeat it. Figures and verdict come
-//! from the crate `masseter-analysis`; each module of this crate writes one form of them.
+//! from the crate `masseter-judge`; each module of this crate writes one form of them.
 
 pub mod compare;
 pub mod divergence;

@@ -5,8 +5,8 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use masseter_analysis::EventRecord;
 use masseter_can::{Tapped, candump};
+use masseter_judge::EventRecord;
 
 /// Log files, created as their buses appear.
 ///

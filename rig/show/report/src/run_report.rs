@@ -5,7 +5,7 @@ use std::io::{self, ErrorKind};
 use std::path::Path;
 
 use anyhow::Context;
-use masseter_analysis::{Analysis, Figures, Judgement, Verdict};
+use masseter_judge::{Analysis, Figures, Judgement, Verdict};
 use masseter_recording::{Manifest, ReadError, Reader, Recorded, RunFolder};
 use masseter_runtime::messages::tap::{self, TapError};
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, result_with_tones, status};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
-use masseter_analysis::{Check, Judgement, Verdict};
+use masseter_judge::{Check, Judgement, Verdict};
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 use masseter_terminal::Exit;
 use serde::{Deserialize, Serialize};
@@ -156,6 +156,11 @@ impl TestedScenario {
         format!("runs of the same scenario and seed differ in simulated time: {}", all.join("; then "))
     }
 
+    /// What the plan of its run warns of.
+    pub(crate) fn warnings(&self) -> &[String] {
+        self.last().verdict().map_or(&[], |verdict| &verdict.warnings)
+    }
+
     fn checks(&self) -> &[Check] {
         self.last().verdict().map_or(&[], |verdict| &verdict.checks)
     }
@@ -207,6 +212,7 @@ struct ScenarioRow<'a> {
     took_s: f64,
     command: &'a str,
     attempts: Vec<AttemptRow<'a>>,
+    warnings: &'a [String],
     checks: &'a [Check],
 }
 
@@ -228,6 +234,7 @@ impl<'a> ScenarioRow<'a> {
             took_s: tested.took_s,
             command: &tested.command,
             attempts: tested.attempts.iter().map(AttemptRow::of).collect(),
+            warnings: tested.warnings(),
             checks: tested.checks(),
         }
     }

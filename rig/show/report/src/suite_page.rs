@@ -27,7 +27,10 @@ fn scenarios(report: &SuiteReport) -> Section {
         (!report.left_out.is_empty()).then(|| format!("left out: {}", report.left_out.join(", "))),
         report.trend_in_words(),
     ];
-    let lines = lines.into_iter().flatten().enumerate();
+    let warned = report.tested.iter().flat_map(|tested| {
+        tested.warnings().iter().map(|warning| format!("warning in {}: {warning}", tested.name))
+    });
+    let lines = lines.into_iter().flatten().chain(warned).enumerate();
     let lines = lines.map(|(place, line)| Block::text(format!("line-{place}"), line));
     let table = Table {
         label: "Scenarios".to_owned(),

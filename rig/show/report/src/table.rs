@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use masseter_analysis::{
+use masseter_judge::{
     AxisFigures, BusResponse, EventRecord, Figures, IntervalFigures, PoseErrors, ReadingFigures,
     ResponseFigures, TopicFigures, TrackingFigures, Verdict, whose_motion,
 };

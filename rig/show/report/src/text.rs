@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use masseter_analysis::EventRecord;
+use masseter_judge::EventRecord;
 use masseter_scenario::Dimension;
 
 /// A dash where there is no such figure.

@@ -1,6 +1,6 @@
 //! A case: a whole scenario with its number and its identity, and what came of it, as it is kept.
 
-use masseter_analysis::{Check, CheckResult, Figures, Verdict};
+use masseter_judge::{Check, CheckResult, Figures, Verdict};
 use masseter_scenario::Scenario;
 use masseter_table::Values;
 use serde::{Deserialize, Serialize};
@@ -23,6 +23,7 @@ pub(crate) const COLUMNS: [&[ResultColumn]; 3] = [
         ("verdict", "", "verdict in a word", |all| words(all, |case| &case.word)),
         ("exit_code", "", "verdict as exit code", |all| whole(all, |case| case.exit_code.into())),
         ("reason", "", "reason of the verdict", |all| words(all, |case| &case.reason)),
+        ("warnings", "", "what the plan warns of", |all| words(all, |case| &case.warnings)),
         ("digest", "", "what the rig did", |all| words(all, |case| &case.digest)),
         ("took_s", "s", "time that the case took", |all| numbers(all, |case| Some(case.took_s))),
     ],
@@ -99,6 +100,9 @@ pub struct CaseResult {
     pub exit_code: u8,
     /// The reason in a sentence.
     pub reason: String,
+    /// What the plan warns of, parted by semicolons; results of older campaigns have none.
+    #[serde(default)]
+    pub warnings: String,
     /// The digest of what the rig did; empty where nothing ran.
     pub digest: String,
     /// The checks in their order.
@@ -126,6 +130,7 @@ impl CaseResult {
         let errors = &figures.tracking.actual;
         Self {
             checks: verdict.checks.iter().map(case_check).collect(),
+            warnings: verdict.warnings.join("; "),
             digest: figures.digest.clone(),
             incisal_rms_mm: errors.incisal_rms_mm,
             incisal_max_mm: errors.incisal_max_mm,
@@ -146,6 +151,7 @@ impl CaseResult {
             word: word.to_owned(),
             exit_code,
             reason,
+            warnings: String::new(),
             digest: String::new(),
             checks: Vec::new(),
             incisal_rms_mm: None,

@@ -386,6 +386,18 @@ impl Axis {
         true
     }
 
+    /// Compares the last count with a second encoder at the joint; returns whether their distance has become a fault.
+    /// Brake instead of ramp: the loops do not know where the axis is.
+    pub(super) fn compare_encoders(&mut self, now_ns: u64, joint_m: f64) -> bool {
+        let Some(limit_m) = self.quirks.encoders_apart_m else { return false };
+        let is_apart = (self.coordinates.counted_m() - joint_m).abs() > limit_m;
+        let fails = is_apart && self.power.state != DriveState::Fault;
+        if fails {
+            self.enter(DriveState::Fault, now_ns);
+        }
+        fails
+    }
+
     /// Executes a command of the mode of operation.
     fn execute(&mut self, command: Option<MotionCommand>, now_ns: u64) {
         let Some(command) = command else { return };

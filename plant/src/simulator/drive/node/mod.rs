@@ -206,6 +206,14 @@ impl DriveNode {
         force_n
     }
 
+    /// Compares the encoder, as the last step read it, with a second one at the joint, where the drive has one.
+    pub(crate) fn compare_encoders(&mut self, now_ns: u64, joint_m: f64) {
+        let has_booted = !self.is_off && self.nmt.state.is_some();
+        if has_booted && self.axis.compare_encoders(now_ns, joint_m) {
+            self.raise(EmergencyCode::POSITION_SENSOR);
+        }
+    }
+
     /// Sends a heartbeat that has been due for `wait_ns`.
     fn beat(&mut self, now_ns: u64, wait_ns: u64) {
         if let Some(state) = self.nmt.state

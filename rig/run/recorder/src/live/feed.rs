@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use masseter_analysis::Analysis;
+use masseter_judge::Analysis;
 use masseter_page::{Block, Chart, Content, Page, PageError, Section};
 use masseter_recording::{Manifest, Recorded};
 use masseter_runtime::clock::{self, SECOND_NS};

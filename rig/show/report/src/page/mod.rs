@@ -5,7 +5,7 @@ mod result;
 mod rig;
 mod times;
 
-use masseter_analysis::{Figures, Verdict};
+use masseter_judge::{Figures, Verdict};
 use masseter_page::{Life, Page, PageError, Section};
 use masseter_recording::Manifest;
 
@@ -70,7 +70,7 @@ fn about(manifest: &Manifest, figures: &Figures) -> String {
 
 #[cfg(test)]
 mod tests {
-    use masseter_analysis::{Analysis, TrackingSample};
+    use masseter_judge::{Analysis, TrackingSample};
     use masseter_model::geometry::Pose;
     use masseter_recording::MachineInfo;
     use masseter_runtime::named::Declared;

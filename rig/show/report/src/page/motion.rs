@@ -4,11 +4,11 @@
 
 use std::ops::Range;
 
-use masseter_analysis::{
+use masseter_controller::trajectory::closed_pose;
+use masseter_judge::{
     CoursePoint, Curve, Figures, JawCycleFigures, PoseSource, Statistic, ToothFigures, ToothLoads,
     TrackingSample,
 };
-use masseter_controller::trajectory::closed_pose;
 use masseter_model::geometry::{AXES, AXIS_NAMES, LEGS, Mechanism, Pose, Vec3};
 use masseter_page::{Block, Chart, Content, Limit, Points, Pressure, Section, Series, Style, Tooth};
 use masseter_recording::jaw_points;
@@ -214,7 +214,7 @@ const COURSE_DIGITS: f64 = 1e3;
 #[derive(Serialize)]
 struct Cycles<'a> {
     statistics: Vec<Quantity>,
-    rows: &'a [masseter_analysis::JawCycle],
+    rows: &'a [masseter_judge::JawCycle],
     /// Of each point: opening, lateral, mm, force, N, then their standard deviations.
     mean: Vec<[f64; 6]>,
     /// Opening, lateral and force of each point of a cycle, one after the other.

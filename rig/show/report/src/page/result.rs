@@ -1,7 +1,7 @@
 //! What came out: verdict, checks, requirements, events, the controller's signals and parameters; and a run that goes on.
 
-use masseter_analysis::requirements::{RequirementFigures, RequirementPlot};
-use masseter_analysis::{
+use masseter_judge::requirements::{RequirementFigures, RequirementPlot};
+use masseter_judge::{
     Check, CheckResult, Code, Curve, EventRecord, Figures, ParameterFigures, SignalFigures, TimingWord,
     Verdict,
 };
@@ -27,11 +27,16 @@ pub(super) fn result_section(manifest: &Manifest, figures: &Figures, verdict: &V
         columns: vec![Column::text("check"), Column::text("result"), Column::text("found")],
         rows: checks.map(row).collect(),
     };
-    let warning = |(number, text)| Block::text(format!("warning-{number}"), format!("Warning: {text}"));
     let mut blocks = vec![Block::new("verdict", Content::Verdict(panel(manifest, figures, verdict)))];
-    blocks.extend(verdict.warnings.iter().enumerate().map(warning));
+    blocks.extend(warning_blocks(manifest));
     blocks.extend([Block::new("moments", Content::Moments), Block::table("checks", table)]);
     Section::new("result", "Result", blocks)
+}
+
+/// What the plan of the run warns of.
+fn warning_blocks(manifest: &Manifest) -> impl Iterator<Item = Block> {
+    let block = |(number, text)| Block::text(format!("warning-{number}"), format!("Warning: {text}"));
+    manifest.warnings.iter().enumerate().map(block)
 }
 
 /// The word for a result as a cell.
@@ -271,7 +276,8 @@ pub(super) fn live_sections(
     left_out: u64,
 ) -> Vec<Section> {
     let now = Block::new("now", Content::Live(now(manifest, figures, number, left_out)));
-    let mut sections = vec![Section::new("now", "Now", vec![now])];
+    let blocks = [now].into_iter().chain(warning_blocks(manifest)).collect();
+    let mut sections = vec![Section::new("now", "Now", blocks)];
     if !figures.parameters.is_empty() {
         let parameters = serde_json::to_value(&figures.parameters).unwrap_or_default();
         let block = Block::new("set-parameters", Content::Parameters(parameters));

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use masseter_analysis::{
+use masseter_judge::{
     BusResponse, Curve, Figures, IntervalFigures, ResponseFigures, TopicFigures, WorstCycle,
 };
 use masseter_page::{

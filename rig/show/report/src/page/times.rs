@@ -1,6 +1,6 @@
 //! What sections of the page have in common: times as seconds since the run's first SYNC, and curves.
 
-use masseter_analysis::{Curve, EventRecord, FaultFigures, Figures};
+use masseter_judge::{Curve, EventRecord, FaultFigures, Figures};
 use masseter_page::{Limit, Moment, MomentKind, Phase, Points, Series, Style, Time};
 use masseter_recording::Manifest;
 use masseter_runtime::messages::codes::Source;

@@ -1,6 +1,6 @@
 //! What every document says of a run that tested too little.
 
-use masseter_analysis::CheckResult;
+use masseter_judge::CheckResult;
 use masseter_recording::{Ending, MachineInfo};
 use masseter_runtime::named::Declared;
 use masseter_scenario::Scenario;

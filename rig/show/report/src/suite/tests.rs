@@ -1,4 +1,4 @@
-use masseter_analysis::{Analysis, CheckFigures, CheckResult};
+use masseter_judge::{Analysis, CheckFigures, CheckResult};
 use masseter_recording::{MachineInfo, Manifest};
 use masseter_runtime::named::Declared;
 use masseter_scenario::Scenario;
@@ -48,6 +48,27 @@ fn tested(name: &str, judgements: Vec<Result<Judgement, String>>) -> TestedScena
 fn report(tested: Vec<TestedScenario>, baseline: Option<Baseline>) -> SuiteReport {
     let (unrun, left_out) = (vec!["last".to_owned()], vec!["b.TOML".to_owned()]);
     SuiteReport { masseter: "0.1.0", tested, unrun, filtered_out: 0, left_out, took_s: 1.0, baseline }
+}
+
+#[test]
+fn warnings_of_the_plan_are_in_every_form_also_where_results_differ() {
+    let warned = |digest| {
+        let mut judgement = judged("PASS", Exit::Passed, digest, 1.0).unwrap();
+        judgement.verdict.warnings = ["the first row is away", "a row jumps"].map(str::to_owned).into();
+        Ok(judgement)
+    };
+    for attempts in [vec![warned("a")], vec![warned("a"), warned("b")]] {
+        let report = report(vec![tested("one", attempts)], None);
+        let xml = junit_of_suite(&report).unwrap();
+        let property = "<property name=\"warnings\" value=\"the first row is away; a row jumps\"/>";
+        assert!(xml.contains(property), "{xml}");
+        let json: Value = serde_json::from_str(&report.to_json().unwrap()).unwrap();
+        assert_eq!(json["scenarios"][0]["warnings"][1], "a row jumps");
+        let html = html_of_suite(&report).unwrap();
+        assert!(html.contains("warning in one: a row jumps"), "{html}");
+    }
+    let silent = junit_of_suite(&report(vec![tested("one", vec![passed(1.0)])], None)).unwrap();
+    assert!(!silent.contains("warnings"), "{silent}");
 }
 
 #[test]
