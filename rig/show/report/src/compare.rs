@@ -117,7 +117,7 @@ struct ComparedRun {
 struct StoredVerdict {
     pub word: String,
     pub reason: String,
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
 }
 

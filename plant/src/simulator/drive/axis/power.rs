@@ -34,7 +34,7 @@ impl PowerStage {
         self.is_enabled() && self.leaves_for.is_none()
     }
 
-    pub(super) fn is_in_fault(self) -> bool {
+    pub(crate) fn is_in_fault(self) -> bool {
         matches!(self.state, DriveState::FaultReactionActive | DriveState::Fault)
     }
 

@@ -290,6 +290,7 @@ fn every_kind_leaves_the_drive_readable() {
             "code" => "code = 0x7305\n".to_owned(),
             "objects" => "objects = ['6065h']\n".to_owned(),
             "value" => "value = 7\n".to_owned(),
+            "limit_m" => "limit_m = 0.001\n".to_owned(),
             time => format!("{time} = 0.5\n"),
         };
         let mut bench = bench(&format!(

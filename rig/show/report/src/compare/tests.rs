@@ -10,9 +10,8 @@ mod compare {
             "cycles": 5,
             "intervals": [{"name": "control", "p50_ns": p50_ns, "p50_noise_ns": 1.0, "max_ns": p50_ns}],
         });
-        let summary = json!({
-            "form": SUMMARY_FORM, "verdict": {"word": "PASS", "reason": "every check passed"}, "figures": figures,
-        });
+        let verdict = json!({"word": "PASS", "reason": "every check passed", "warnings": ["a row jumps"]});
+        let summary = json!({"form": SUMMARY_FORM, "verdict": verdict, "figures": figures});
         ComparedRun::new(path, &summary, &json!({"clock": "rt", "scenario": {"seed": seed}})).unwrap()
     }
 
@@ -27,7 +26,7 @@ mod compare {
     fn verdicts_come_first_then_what_differs_then_what_changed_most_surely() {
         let text = comparison().in_words().unwrap();
         let places = [
-            "A: A\n   PASS: every check passed\nB: B\n",
+            "A: A\n   PASS: every check passed\n   warning: a row jumps\nB: B\n",
             "warning: these were not runs of the same",
             "scenario.seed                                      1                        2",
             "intervals.control.p50_ns                                     5000           6000   +20.0 %  beyond spread",
@@ -43,7 +42,9 @@ mod compare {
         let json = serde_json::to_value(comparison()).unwrap();
         assert_eq!(
             json["a"],
-            json!({"path": "A", "verdict": {"word": "PASS", "reason": "every check passed"}})
+            json!({"path": "A", "verdict": {
+                "word": "PASS", "reason": "every check passed", "warnings": ["a row jumps"],
+            }})
         );
         assert_eq!(json["differs"], json!([{"key": "scenario.seed", "a": "1", "b": "2"}]));
         assert_eq!(json["changes"].as_array().unwrap().len(), 3);
