@@ -2,6 +2,7 @@
 //! real one may have. [`masseter_campaign`] shows what each of them came to.
 
 use masseter_campaign::{Coverage, FaultRow};
+use masseter_judge::EventRecord;
 use masseter_model::geometry::{AXIS_NAMES, Vec3};
 use masseter_plan::RunPlan;
 use masseter_runtime::messages::codes::{Cause, EventKind};
@@ -13,6 +14,8 @@ use crate::run::runner::{Judged, Runner, Source};
 
 /// How long a fault acts that does not last, s.
 const FOR_S: f64 = 0.5;
+/// A fault that ends so soon after its strike is a single blow, ns.
+const AT_ONCE_NS: u64 = 1_000_000;
 /// Where the search for phases begins and ends: the motion has its speed by then, s.
 const SEARCHED_S: [f64; 2] = [1.5, 3.5];
 /// Distance of two looks, s.
@@ -112,6 +115,16 @@ fn phases(plan: &RunPlan) -> [Phase; 3] {
     ]
 }
 
+/// The first report while the fault acts. A drive's emergency is one too, although it stops nothing by itself. The jump as a fault
+/// ends detects nothing; a fault that ends as it strikes, such as a single bus-off, acts by what follows.
+fn detection(events: &[EventRecord], struck_ns: u64) -> Option<&EventRecord> {
+    let is_end =
+        |event: &&EventRecord| event.cause == Cause::FaultEnded && event.time_ns > struck_ns + AT_ONCE_NS;
+    let ended_ns = events.iter().find(is_end).map_or(u64::MAX, |event| event.time_ns);
+    let mut during = events.iter().filter(|event| (struck_ns..ended_ns).contains(&event.time_ns));
+    during.find(|event| event.kind == EventKind::Fault)
+}
+
 /// What the fault of a case came to.
 fn row_of(
     Case { fault, axis, phase }: Case,
@@ -119,13 +132,8 @@ fn row_of(
     limits: &ChecksConfig,
 ) -> FaultRow {
     let found = &figures.faults[0];
-    let ended = figures.events.iter().find(|event| event.cause == Cause::FaultEnded);
-    let ended_ns = ended.map_or(u64::MAX, |event| event.time_ns);
-    // A drive's emergency is a detection too, although it stops nothing by itself. The jump as a fault ends detects nothing.
-    let detection = found.struck_ns.and_then(|struck_ns| {
-        let mut events = figures.events.iter().filter(|event| (struck_ns..ended_ns).contains(&event.time_ns));
-        Some((struck_ns, events.find(|event| event.kind == EventKind::Fault)?))
-    });
+    let detection =
+        found.struck_ns.and_then(|struck_ns| Some((struck_ns, detection(&figures.events, struck_ns)?)));
     // The negation also counts what is no number.
     let is_beyond =
         !(found.deviation_mm <= limits.tracking_max_mm && found.deviation_deg <= limits.tracking_max_deg);
@@ -152,7 +160,25 @@ fn row_of(
 
 #[cfg(test)]
 mod tests {
+    use masseter_runtime::messages::Event;
+    use masseter_runtime::messages::codes::Source;
+
     use super::*;
+
+    #[test]
+    fn a_report_while_the_fault_acts_detects_it_and_one_at_its_end_does_not() {
+        let event = |cause, kind, time_ns| {
+            EventRecord::from(&Event { time_ns, ..Event::new(Source::Master, kind, cause) })
+        };
+        let ended = |time_ns| event(Cause::FaultEnded, EventKind::Notice, time_ns);
+        let report = |time_ns| event(Cause::ProcessDataLost, EventKind::Fault, time_ns);
+        let found = |events: &[EventRecord]| detection(events, 2_000_000_000).map(|event| event.time_ns);
+        assert_eq!(found(&[report(2_003_000_000), ended(2_500_000_000)]), Some(2_003_000_000));
+        assert_eq!(found(&[ended(2_500_000_000), report(2_500_478_000)]), None);
+        assert_eq!(found(&[report(1_900_000_000), ended(2_500_000_000)]), None);
+        let bus_off = [ended(2_000_000_000), report(2_003_489_000)];
+        assert_eq!(found(&bus_off), Some(2_003_489_000), "a single bus-off ends as it strikes");
+    }
 
     #[test]
     fn every_case_is_a_valid_scenario() {

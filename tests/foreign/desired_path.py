@@ -1,9 +1,10 @@
 """The desired path of the jaw, by NumPy from the scenario alone: Bonwill's triangle on two condylar paths, recorded poses, recorded
 markers, and the clock that starts and stops a motion. No code of the rig is used, so judge and controller share no defect with it.
 
-    desired_path.py MASSETER FOLDER    # plays every kind of motion, and compares cycle by cycle
+    desired_path.py MASSETER FOLDER    # plays every kind of motion
 
-Not covered: rate and amplitude that change, force control, pauses, and mechanisms other than the paper's.
+The controller's pose is compared in every cycle, the judge's by its least and largest values and by the errors from it. The motion
+begins with the first cycle in the state `running`. Not covered: rate and amplitude that change, force control, pauses, and mechanisms other than the paper's.
 """
 
 import csv

@@ -4,8 +4,9 @@ recording of each run is judged here against the path of desired_path.py, and th
     second_judge.py MASSETER FOLDER --runs 40 --seed 7
 
 Of a run with exit code 0 all of this holds:
-- At each cycle of the motion the true jaw is within the limits of the scenario's path, at one of the lags that checks allow.
-- A passed requirement on the incisal point's error holds in each cycle of the truth, too.
+- At each cycle of the motion, until a stop, the true jaw is within the limits of the scenario's path, at one of the lags that checks
+  allow.
+- A passed requirement on the incisal point's error holds in each of these cycles, too, at one of the lags.
 - The master stopped nothing, unless the scenario expects a safe stop; then the first fault stands in the reason.
 - The jaw stands still once the drives are off.
 
@@ -32,8 +33,10 @@ from desired_path import RUNNING, DesiredPath, incisal, of_quaternion
 PERIOD_S = 1e-3
 LIMIT_M, LIMIT_RAD, LAG_S, STANDSTILL_M = 0.5e-3, math.radians(0.5), 20e-3, 0.5e-3
 REQUIRED_M = 0.3e-3
-# Poses are published with ten digits, and the judge's requirement has no lag of its own.
+# Poses are published with ten digits.
 ROUNDING_M = 2e-9
+# The plan refuses some pairs of faults. More of them would test little.
+MOST_REFUSED = 0.2
 FINISHED, MASTERS_FAULT = 6, (2, 1)
 
 AXES = ("d1", "d2", "d3", "l1", "l2", "l3")
@@ -123,7 +126,8 @@ class Run:
                     self.states[at.cycle] = at.controller_state
                 case "event" if (at.source, at.kind) == MASTERS_FAULT:
                     self.faults.append(at)
-        self.running = sorted(cycle for cycle, state in self.states.items() if state == RUNNING)
+        stopped = min((at.cycle for at in self.faults), default=math.inf)
+        self.running = sorted(cycle for cycle, state in self.states.items() if state == RUNNING and cycle < stopped)
         self.last = max(self.states)
         self.final_state = self.states[self.last]
 
@@ -142,7 +146,8 @@ def path_of(motion):
 def farthest(run, path):
     """The largest distance of the jaw from its path, as a share of the limits, and that of the incisal point, m. In each cycle the lag
     counts with which the jaw is nearest; where a truth is missing, no distance is small enough."""
-    began, worst, error_m = run.running[0], 0.0, 0.0
+    worst, error_m = 0.0, 0.0
+    began = run.running[0] if run.running else 0
     for cycle in run.running:
         if cycle not in run.truths:
             return math.inf, math.inf
@@ -166,7 +171,7 @@ def contradictions(run, path, summary, expects_stop):
         return
     checks = {check["name"]: check["result"] for check in verdict["checks"]}
     share, error_m = farthest(run, path)
-    if not expects_stop and share > 1 + 1e-6:
+    if share > 1 + 1e-6:
         yield f"the jaw was {share:.2f} times its limits from the path"
     if checks.get("near") == "passed" and error_m > REQUIRED_M + ROUNDING_M:
         yield f"a requirement of {1e3 * REQUIRED_M} mm passed with {1e3 * error_m:.4f} mm"
@@ -219,7 +224,8 @@ def main():
             print(f"run {number}, {word}: {text}")
         wrong += bool(found)
     print(f"second judge: {chosen.runs} runs of seed {chosen.seed}, {wrong} contradictions; " + ", ".join(f"{n} {w}" for w, n in sorted(words.items())))
-    return 1 if wrong or not {"PASS", "FAIL"} <= words.keys() else 0
+    refused = words.get("refused", 0) / chosen.runs
+    return 1 if wrong or refused > MOST_REFUSED or not {"PASS", "FAIL"} <= words.keys() else 0
 
 
 if __name__ == "__main__":

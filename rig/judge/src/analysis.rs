@@ -243,6 +243,9 @@ impl Analysis {
         }
         self.figures.cycles = self.figures.cycles.max(state.seq);
         self.figures.final_state = Some(state.controller_state.into());
+        if state.controller_state == ControllerState::SafeStop.code() {
+            self.figures.stated_stop_ns.get_or_insert(state.due_ns);
+        }
         self.last_due_ns = state.due_ns;
         self.stop.apply_state(state);
     }
@@ -459,6 +462,9 @@ pub struct Figures {
     pub overrun_attribution: Option<OverrunAttribution>,
     /// The last state of the controller's sequence; none without a single state message.
     pub final_state: Option<Code<ControllerState>>,
+    /// When the controller first stated a safe stop, ns of the run's clock.
+    #[serde(skip)]
+    pub stated_stop_ns: Option<u64>,
     /// Whether the controller left the motion and began it again.
     #[serde(skip)]
     pub has_resumed: bool,

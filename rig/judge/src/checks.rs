@@ -65,7 +65,7 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
         bus_response(&figures.bus_response, &figures.plant_skips),
     ]);
     // No lost cycle excuses a declared fault that led the jaw too far.
-    let stopped_ns = stopped_ns(&figures.events);
+    let stopped_ns = stopped_ns(figures);
     checks.extend(faults(&manifest.scenario.faults, &figures.faults, limits, stopped_ns));
     checks.extend(stimuli(&manifest.scenario.stimulus, figures));
     checks
@@ -73,10 +73,11 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     checks
 }
 
-/// When the rig began to stop: a safe stop, or one by request.
-fn stopped_ns(events: &[EventRecord]) -> Option<u64> {
-    let stops = events.iter().filter(|event| event.begins_stop() || event.cause == Cause::StopRequested);
-    stops.map(|event| event.time_ns).min()
+/// When the rig began to stop: a safe stop, or one by request. A program states its stop without an event.
+fn stopped_ns(figures: &Figures) -> Option<u64> {
+    let is_stop = |event: &&EventRecord| event.begins_stop() || event.cause == Cause::StopRequested;
+    let stops = figures.events.iter().filter(is_stop);
+    stops.map(|event| event.time_ns).min().or(figures.stated_stop_ns)
 }
 
 /// A motion that waited for lost commands or readings is late from then on. None where the scenario's motion never began.
@@ -331,12 +332,14 @@ impl Shortfall {
         (manifest.is_of_program() && !has_judged_truth(figures)).then_some(Self::Unjudged)
     }
 
-    /// A program can state a safe stop at any time. An expected stop needs a cause from outside, or a requirement.
+    /// A program can state a safe stop at any time. An expected stop needs a cause from outside before it, or a requirement.
     fn of_stated_stop(manifest: &Manifest, figures: &Figures) -> Option<Self> {
         let expect = manifest.scenario.expect.as_ref();
         let is_expected = expect.is_some_and(|expect| expect.accepts(ExpectedVerdict::SafeStop));
-        let has_cause = figures.faults.iter().any(|fault| fault.struck_ns.is_some())
-            || figures.events.iter().any(|event| event.cause == Cause::StimulusBegan);
+        let is_before = |time_ns| stopped_ns(figures).is_none_or(|stopped_ns| time_ns <= stopped_ns);
+        let mut struck = figures.faults.iter().filter_map(|fault| fault.struck_ns);
+        let mut stimuli = figures.events.iter().filter(|event| event.cause == Cause::StimulusBegan);
+        let has_cause = struck.any(is_before) || stimuli.any(|stimulus| is_before(stimulus.time_ns));
         let is_proved = has_cause || has_judged_truth(figures) || !manifest.is_of_program();
         (is_expected && !is_proved).then_some(Self::OnlyStated)
     }

@@ -327,7 +327,8 @@ fn against(
     let own = || {
         let is_in_order = matches!(outcome, Outcome::SafeStop | Outcome::Interrupted);
         let short = || incomplete(figures).or_else(|| failed(checks));
-        let counts = |check: &&Check| is_of_scenario(check) || check.subject == Subject::Sequence;
+        let counts =
+            |check: &&Check| is_of_scenario(check) || (is_in_order && check.subject == Subject::Sequence);
         let idle: Vec<_> = checks.iter().filter(counts).cloned().collect();
         let in_order = is_in_order.then(short).flatten();
         in_order.or_else(|| if outcome == Outcome::Untested { None } else { untested(&idle, figures.cycles) })

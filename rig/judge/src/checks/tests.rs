@@ -210,17 +210,19 @@ mod shortfall {
             shortfall(|manifest, figures| {
                 manifest.scenario = Scenario::parse(Path::new("stop.toml"), expect).unwrap();
                 figures.final_state = Some(Code::Known(ControllerState::SafeStop));
+                figures.stated_stop_ns = Some(100);
                 change(figures);
             })
         };
         let expect = "expect.verdict = 'safe_stop'\n";
-        let cases: [Case; 6] = [
+        let cases: [Case; 7] = [
             (|_| (), Some(Shortfall::OnlyStated)),
             (|figures| require(figures, CheckResult::Passed, false), Some(Shortfall::OnlyStated)),
             (|figures| require(figures, CheckResult::Passed, true), None),
             (|figures| figures.stopped_by = Some(StoppedBy::Master), None),
             (|figures| strike(figures, Some(1)), None),
             (|figures| strike(figures, None), Some(Shortfall::OnlyStated)),
+            (|figures| strike(figures, Some(101)), Some(Shortfall::OnlyStated)),
         ];
         for (number, (change, expected)) in cases.into_iter().enumerate() {
             assert_eq!(stopped(expect, change), expected, "case {number}");

@@ -2,10 +2,12 @@
 
 use masseter_runtime::messages::codes::ControllerState;
 
-/// What the controller does in a sample, as it states.
+use crate::signals::CycleMessages;
+
+/// What the rig does in a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Phase {
-    /// The motion runs.
+    /// The controller runs, and states that the motion does.
     Running,
     /// A safe stop.
     Stopped,
@@ -13,15 +15,15 @@ pub(super) enum Phase {
 }
 
 impl Phase {
-    /// Of the code of a state.
-    pub(super) fn of(state: f64) -> Self {
-        let is = |of: ControllerState| state.to_bits() == f64::from(of.code()).to_bits();
-        if is(ControllerState::Running) {
-            Self::Running
-        } else if is(ControllerState::SafeStop) {
-            Self::Stopped
-        } else {
-            Self::Other
+    /// A controller that has died, or lost a cycle, runs no motion; a fault of the master is a stop, whatever the controller states.
+    pub(super) fn of(messages: &CycleMessages) -> Self {
+        if messages.reading.is_some_and(|reading| reading.master_fault != 0) {
+            return Self::Stopped;
+        }
+        match messages.state.map(|state| ControllerState::try_from(state.controller_state)) {
+            Some(Ok(ControllerState::Running)) => Self::Running,
+            Some(Ok(ControllerState::SafeStop)) => Self::Stopped,
+            _ => Self::Other,
         }
     }
 }

@@ -15,6 +15,7 @@ mod trigger;
 
 use std::collections::BTreeSet;
 
+use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::named::Declared;
 use masseter_scenario::input::excerpt;
 use masseter_scenario::{Dimension, RequirementConfig, Scenario, Statistic};
@@ -112,15 +113,14 @@ impl Requirements {
     /// Takes the next sample.
     pub(crate) fn judge_sample(&mut self, Sample { time_ns, messages, events, is_closing }: &Sample) {
         self.values.take(messages, &mut self.row);
-        let phase = Phase::of(self.row[self.state]);
-        if phase == Phase::Running {
+        if self.row[self.state].to_bits() == f64::from(ControllerState::Running.code()).to_bits() {
             self.motion_ns.get_or_insert(*time_ns);
         }
         let motion_s = self.motion_ns.map(|motion_ns| (time_ns - motion_ns) as f64 / 1e9);
         let (values, is_disturbed) = (self.row.as_slice(), messages.is_disturbed);
         // Simulated time has no account of the loops.
         self.is_real_time |= messages.state.is_some_and(|state| state.worked_ns > 0);
-        let (is_real_time, is_closing) = (self.is_real_time, *is_closing);
+        let (phase, is_real_time, is_closing) = (Phase::of(messages), self.is_real_time, *is_closing);
         let time_ns = *time_ns;
         let moment =
             Moment { time_ns, motion_s, values, events, phase, is_disturbed, is_real_time, is_closing };
