@@ -152,6 +152,8 @@ def farthest(run, path):
         if cycle not in run.truths:
             return math.inf, math.inf
         position, rotation = run.pose(cycle)
+        if not (np.isfinite(position).all() and np.isfinite(rotation).all()):
+            return math.inf, math.inf
         shares, distances = [], []
         for lag in range(round(LAG_S / PERIOD_S) + 1):
             desired = path[min(max(cycle - began - lag, 0), len(path) - 1)]
@@ -180,7 +182,7 @@ def contradictions(run, path, summary, expects_stop):
     # The plant goes on for half a second after the controller's last cycle.
     after = [incisal(*run.pose(cycle)) for cycle in sorted(run.truths) if cycle > run.last + 1]
     moved_m = max((math.dist(place, after[0]) for place in after), default=math.inf)
-    if moved_m > STANDSTILL_M:
+    if not moved_m <= STANDSTILL_M:
         yield f"the jaw moved by {1e3 * moved_m:.3f} mm after the end"
     if expects_stop and "first fault: " not in verdict["reason"]:
         yield f"an expected stop without its fault: {verdict['reason']}"

@@ -13,9 +13,9 @@ use masseter_runtime::schedule::CycleSchedule;
 use masseter_scenario::wording::counted;
 use masseter_scenario::{Dimension, ExpectedVerdict, StimulusConfig};
 
-use crate::analysis::Figures;
 use crate::check::{Check, CheckFigures, CheckResult, Subject, faults, tracking};
 use crate::events::EventRecord;
+use crate::figures::Figures;
 use crate::played::MotionFigures;
 use crate::requirements::RequirementFigures;
 use crate::response::{BusResponse, ResponseFigures};

@@ -8,7 +8,7 @@ use masseter_recording::Manifest;
 use masseter_scenario::wording::{counted, grouped};
 use serde::Serialize;
 
-use crate::analysis::Figures;
+use crate::figures::Figures;
 use crate::overruns::{Overrun, OverrunCause};
 use crate::skips::OverrunAttribution;
 

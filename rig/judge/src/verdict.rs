@@ -9,10 +9,10 @@ use masseter_scenario::{CanConfig, ChecksConfig, ExpectConfig, ExpectedVerdict, 
 use masseter_terminal::Exit;
 use serde::Serialize;
 
-use crate::analysis::Figures;
 use crate::check::{Check, CheckResult, Subject, left_its_path};
 use crate::checks::{Shortfall, checks, is_often_late};
 use crate::events::EventRecord;
+use crate::figures::Figures;
 use crate::lost_cycles::Outage;
 use crate::played::{MotionFigures, StoppedBy};
 use crate::timing::{Timing, TimingWord};

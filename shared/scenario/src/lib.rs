@@ -22,6 +22,7 @@ mod matrix;
 mod merge;
 mod motion;
 mod quantity;
+mod quirks;
 mod requirements;
 pub mod rows;
 mod scenario;
@@ -38,7 +39,7 @@ pub use drive_profile::{
     AccelerationUnit, BrakeConfig, DriveProfile, HomingConfig, INCREMENTS, IdentityConfig, ObjectConfig,
     ObjectKey, ObjectRule, PdosConfig, StoreConfig, UnitsConfig, VelocityUnit,
 };
-pub use drives::{AxisScale, DriveConfig, DrivesConfig, INCREMENTS_PER_TURN, QuirkConfig, QuirkKindConfig};
+pub use drives::{AxisScale, DriveConfig, DrivesConfig};
 pub use error::ScenarioError;
 pub use faults::{
     AxisFault, BusFault, CommandFault, DriveFault, EncoderFault, FaultConfig, FaultDeclaration,
@@ -51,6 +52,7 @@ pub use masseter_model::section::{Key, Range, unit_of};
 pub use matrix::{Matrix, MatrixCase};
 pub use motion::*;
 pub use quantity::{Dimension, Quantity, QuantityError, UNITS, Unit};
+pub use quirks::{INCREMENTS_PER_TURN, QuirkConfig, QuirkKindConfig};
 pub use requirements::{During, ExpectConfig, ExpectedVerdict, RequirementConfig, Statistic, TimeWindow};
 pub use scenario::{RATES_HZ, Scenario};
 pub use stimuli::{Shape, StimulusConfig};

@@ -1,0 +1,131 @@
+//! What a run comes to: its figures.
+//!
+//! They judge nothing: that is for the checks.
+
+use masseter_model::geometry::AXES;
+use masseter_recording::Damage;
+use masseter_runtime::messages::codes::ControllerState;
+use serde::Serialize;
+
+use crate::declared_faults::FaultFigures;
+use crate::events::{Code, EventRecord};
+use crate::jaw_cycles::JawCycleFigures;
+use crate::longest_cycles::WorstCycle;
+use crate::lost_cycles::{Outage, ReadingFigures};
+use crate::measured::IntervalFigures;
+use crate::messages::{ParameterFigures, SignalFigures, TopicFigures};
+use crate::over_time::{AxisFigures, ContactFigures, OverTime};
+use crate::overruns::Overrun;
+use crate::played::{MotionFigures, StoppedBy};
+use crate::requirements::RequirementFigures;
+use crate::response::BusResponse;
+use crate::skips::{OverrunAttribution, SkipFigures};
+use crate::standstill::StandstillFigures;
+use crate::tracking::{Track, TrackingFigures};
+
+/// The figures of a run. As JSON: `figures` of `summary.json`.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Figures {
+    /// A short number for targets, positions and states by cycle: equal where two runs did the same.
+    pub digest: String,
+    /// Cycles that the controller ran.
+    pub cycles: u64,
+    /// From the first to the last reading, s.
+    pub duration_s: f64,
+    /// Deadlines that the controller skipped after overruns.
+    pub controller_skips: SkipFigures,
+    /// Deadlines that the plant skipped after overruns.
+    pub plant_skips: SkipFigures,
+    /// Which readings the controller's cycles used.
+    pub readings: ReadingFigures,
+    /// Stretches of work that cost deadlines, with what the kernel counted of the loop's thread: the longest, the loops' own first.
+    pub overruns: Vec<Overrun>,
+    /// Rig or machine as the cause of the other overlong stretches of work; none where no such stretch cost a deadline.
+    pub overrun_attribution: Option<OverrunAttribution>,
+    /// The last state of the controller's sequence; none without a single state message.
+    pub final_state: Option<Code<ControllerState>>,
+    /// When the controller first stated a safe stop, ns of the run's clock.
+    #[serde(skip)]
+    pub stated_stop_ns: Option<u64>,
+    /// Whether the controller left the motion and began it again.
+    #[serde(skip)]
+    pub has_resumed: bool,
+    /// What stopped the drives, whatever the controller reports; none where nothing did.
+    pub stopped_by: Option<StoppedBy>,
+    /// For how long all drives were enabled, s.
+    pub enabled_s: f64,
+    /// For how long of it the controller was in the state `running`, s.
+    #[serde(skip)]
+    pub running_s: f64,
+    /// What was played of the scenario's motion.
+    pub motion: MotionFigures,
+    /// How far the mechanism moved after its stops.
+    pub standstill: StandstillFigures,
+    /// When the controller had ended in order, ns of the run's clock. What begins later is no part of the test.
+    #[serde(skip)]
+    pub ended_ns: Option<u64>,
+    /// Deadlines missed just before a safe stop; none without one.
+    pub outage: Option<Outage>,
+    /// Distance of the platform from its desired pose, while the motion played.
+    pub tracking: TrackingFigures,
+    /// The scenario's faults, in their order.
+    pub faults: Vec<FaultFigures>,
+    /// The scenario's requirements, in their order, then the events that it expects.
+    pub requirements: Vec<RequirementFigures>,
+    /// The controller's signals.
+    pub signals: Vec<SignalFigures>,
+    /// The controller's parameters.
+    pub parameters: Vec<ParameterFigures>,
+    /// The greatest vertical force of food and upper teeth on the emulated jaw, N; none where the jaws cannot touch,
+    /// and on the robot.
+    pub bite_force_max_n: Option<f64>,
+    /// What the lower teeth bore; none where the jaws cannot touch, and on the robot.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contact: Option<ContactFigures>,
+    /// Cycles of the jaw; none without a report.
+    pub jaw_cycles: JawCycleFigures,
+    /// Measured intervals.
+    pub intervals: Vec<IntervalFigures>,
+    /// The longest cycles, each with the hop furthest above its median.
+    pub worst_cycles: Vec<WorstCycle>,
+    /// Messages and losses of each topic.
+    pub topics: Vec<TopicFigures>,
+    /// Frames on each bus; none where the scenario leaves them out.
+    pub frames: Option<Vec<u64>>,
+    /// Response times of the buses' messages, beside their bounds.
+    pub bus_response: BusResponse,
+    /// Events in the order of their times.
+    pub events: Vec<EventRecord>,
+    /// Whether the recording lacks its end.
+    pub cut_short: bool,
+    /// Stretches of the recording that cannot be read.
+    pub damage: Vec<Damage>,
+    /// How each drive met the demands while the motion played; zeros but in a dry run.
+    #[serde(skip)]
+    pub axes: [AxisFigures; AXES],
+    /// Tracking over time, for plots.
+    #[serde(skip)]
+    pub track: Track,
+    /// Wake-ups, axes and buses over time, for plots.
+    #[serde(skip)]
+    pub over_time: OverTime,
+}
+
+impl Figures {
+    /// Deadlines that the two processes skipped, and those of them that the machine caused: it stalled while they
+    /// waited, or may have stalled while they worked.
+    pub fn skipped(&self) -> (u64, u64) {
+        let (controller, plant) = (&self.controller_skips, &self.plant_skips);
+        let is_machine = self.overrun_attribution.is_some_and(|overruns| overruns.may_be_the_machine());
+        let by_machine = |skips: &SkipFigures| {
+            let undecided = if is_machine { skips.working_undecided() } else { 0 };
+            skips.by_machine + skips.working_by_machine + undecided
+        };
+        (controller.skipped + plant.skipped, by_machine(controller) + by_machine(plant))
+    }
+
+    /// Messages that were published and not recorded.
+    pub fn missing_messages(&self) -> u64 {
+        self.topics.iter().map(|topic| topic.missing).sum()
+    }
+}
