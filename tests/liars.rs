@@ -346,27 +346,49 @@ fn a_stop_of_master_or_drives_is_one_whatever_the_controller_reports() {
         for document in judged.documents {
             assert!(document.contains(reason), "{reason}: {document}");
         }
+        // A quick stop is what the controller asks for: by itself that proves nothing.
+        let word = if reason.starts_with("the master") { "PASS" } else { "UNTESTED" };
         let expected = judge("expect.verdict = 'safe_stop'\n", PlayedMotion::Scenario, play);
-        assert_eq!(expected.word, "PASS", "{}", expected.reason);
-        assert!(expected.reason.starts_with("SAFE STOP, as expected: "), "{}", expected.reason);
+        assert_eq!(expected.word, word, "{}", expected.reason);
+        let is_said = expected.reason.starts_with("SAFE STOP, as expected: ");
+        assert_eq!(is_said, word == "PASS", "{}", expected.reason);
     }
 }
 
 /// The drives are off, and nothing went wrong: a program that stops whenever it likes proves nothing.
 #[test]
-fn a_safe_stop_that_the_controller_alone_states_is_expected_in_vain() {
+fn a_safe_stop_that_the_controller_alone_causes_is_expected_in_vain() {
     let expect = "expect.verdict = 'safe_stop'\n";
     let fault = "[[faults]]\nkind = 'encoder_noise'\naxis = 'l1'\nat_s = 0.2\nsize = '20 um'\n";
     let required = "[[require]]\nname = 'opens'\nsignal = 'incisal.z'\nmax = '1 m'\n";
     for motion in [PlayedMotion::Scenario, PlayedMotion::Own] {
         for (cause, word) in [("", "UNTESTED"), (fault, "PASS"), (required, "PASS")] {
             let scenario = format!("{expect}{cause}");
-            let play: Play = |moment| until(0.4, moment, moment.honest());
-            let judged = judge_end(&scenario, motion, play, Outcome::SafeStop);
-            assert_eq!(judged.word, word, "{cause}: {}", judged.reason);
-            let wanted = "the controller alone states the safe stop";
-            assert_eq!(judged.sequence.contains(wanted), word == "UNTESTED", "{}", judged.sequence);
+            let states: Play = |moment| until(0.4, moment, moment.honest());
+            let asks: Play = |m| spoilt(m, |answer| answer.request = DriveRequest::QuickStop);
+            for (play, end) in [(states, Outcome::SafeStop), (asks, Outcome::Finished)] {
+                let judged = judge_end(&scenario, motion, play, end);
+                assert_eq!(judged.word, word, "{cause}: {}", judged.reason);
+                let wanted = "the controller alone caused the safe stop";
+                assert_eq!(judged.sequence.contains(wanted), word == "UNTESTED", "{}", judged.sequence);
+            }
         }
+    }
+}
+
+#[test]
+fn drives_that_the_controller_switches_off_are_no_expected_safe_stop() {
+    for motion in [PlayedMotion::Scenario, PlayedMotion::Own] {
+        let judged = judge("expect.verdict = 'safe_stop'\n", motion, |moment| {
+            let mut answer = moment.honest();
+            if moment.at_s > 0.5 {
+                answer.request = DriveRequest::Off;
+            }
+            until(1.6, moment, answer)
+        });
+        assert_ne!(judged.word, "PASS", "{}", judged.reason);
+        let wanted = "the controller alone caused the safe stop";
+        assert!(judged.sequence.contains(wanted), "{}", judged.sequence);
     }
 }
 

@@ -107,7 +107,8 @@ int masseter_declare_parameter(masseter_session *session, const char *name, cons
                                double value, double least, double most);
 
 /* Declares, before masseter_start, that the controller plays a motion of its own, not the scenario's: the jaw is then
- * judged by the desired poses of the state, and the scenario must require something of the run. Returns MASSETER_OK or MASSETER_ERROR. */
+ * judged by the desired poses of the state, and a requirement of the scenario must judge the true jaw. Returns MASSETER_OK or
+ * MASSETER_ERROR. */
 int masseter_declare_own_motion(masseter_session *session);
 
 /* The value of a parameter in this cycle, by its place. Not a number before the start, and for another place. */

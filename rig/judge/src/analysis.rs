@@ -223,6 +223,7 @@ impl Analysis {
         self.outage.apply_reading(reading, is_of_scenario);
         if self.stop.apply_reading(reading) {
             self.tracking.stop(reading.cycle);
+            self.figures.stop_without_event_ns.get_or_insert(reading.sampled_ns);
         }
         self.first_sample_ns.get_or_insert(reading.sampled_ns);
         self.last_sample_ns = reading.sampled_ns;
@@ -240,7 +241,7 @@ impl Analysis {
         self.figures.cycles = self.figures.cycles.max(state.seq);
         self.figures.final_state = Some(state.controller_state.into());
         if state.controller_state == ControllerState::SafeStop.code() {
-            self.figures.stated_stop_ns.get_or_insert(state.due_ns);
+            self.figures.stop_without_event_ns.get_or_insert(state.due_ns);
         }
         self.last_due_ns = state.due_ns;
         self.stop.apply_state(state);

@@ -16,7 +16,7 @@ use masseter_scenario::{Dimension, ExpectedVerdict, StimulusConfig};
 use crate::check::{Check, CheckFigures, CheckResult, Subject, faults, tracking};
 use crate::events::EventRecord;
 use crate::figures::Figures;
-use crate::played::MotionFigures;
+use crate::played::{MotionFigures, StoppedBy};
 use crate::requirements::RequirementFigures;
 use crate::response::{BusResponse, ResponseFigures};
 use crate::skips::SkipFigures;
@@ -73,11 +73,11 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     checks
 }
 
-/// When the rig began to stop: a safe stop, or one by request. A program states its stop without an event.
+/// When the rig began to stop: a safe stop, or one by request. A program stops without an event.
 fn stopped_ns(figures: &Figures) -> Option<u64> {
     let is_stop = |event: &&EventRecord| event.begins_stop() || event.cause == Cause::StopRequested;
     let stops = figures.events.iter().filter(is_stop);
-    stops.map(|event| event.time_ns).min().or(figures.stated_stop_ns)
+    stops.map(|event| event.time_ns).min().or(figures.stop_without_event_ns)
 }
 
 /// A motion that waited for lost commands or readings is late from then on. None where the scenario's motion never began.
@@ -288,7 +288,7 @@ pub(crate) enum Shortfall {
     OwnEarly { running_s: f64, duration_s: f64 },
     /// The motion is the controller's own or gone since the run, and no requirement judges the jaw.
     Unjudged,
-    /// The controller alone states the expected safe stop, and nothing caused or judged the stop.
+    /// The controller alone states or asks for the expected safe stop, and nothing caused or judged the stop.
     OnlyStated,
 }
 
@@ -296,11 +296,11 @@ impl Shortfall {
     /// None where the motion was played, and where something that anybody sees ended it, which has a verdict of its own.
     pub(crate) fn of(manifest: &Manifest, figures: &Figures) -> Option<Self> {
         let is_in = |expected| figures.final_state.is_some_and(|state| state == expected);
-        if figures.stopped_by.is_some() {
-            return None;
-        }
-        if is_in(ControllerState::SafeStop) {
-            return Self::of_stated_stop(manifest, figures);
+        match figures.stopped_by {
+            Some(StoppedBy::Master) => return None,
+            Some(StoppedBy::QuickStop | StoppedBy::Drives) => return Self::of_stated_stop(manifest, figures),
+            None if is_in(ControllerState::SafeStop) => return Self::of_stated_stop(manifest, figures),
+            None => {}
         }
         if !is_in(ControllerState::Finished) {
             return None;
@@ -332,7 +332,7 @@ impl Shortfall {
         (manifest.is_of_program() && !has_judged_truth(figures)).then_some(Self::Unjudged)
     }
 
-    /// A program can state a safe stop at any time. An expected stop needs a cause from outside before it, or a requirement.
+    /// A program can state a safe stop, or switch the drives off, at any time. An expected stop needs a cause from outside before it, or a requirement.
     fn of_stated_stop(manifest: &Manifest, figures: &Figures) -> Option<Self> {
         let expect = manifest.scenario.expect.as_ref();
         let is_expected = expect.is_some_and(|expect| expect.accepts(ExpectedVerdict::SafeStop));
@@ -374,7 +374,7 @@ impl Display for Shortfall {
                  incisal.z; on the robot of the encoders, such as l1.position",
             ),
             Self::OnlyStated => f.write_str(
-                "the controller alone states the safe stop: declare the fault that it answers in [[faults]], or require something of \
+                "the controller alone caused the safe stop: declare the fault that it answers in [[faults]], or require something of \
                  the true jaw in [[require]]",
             ),
         }

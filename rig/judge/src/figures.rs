@@ -44,9 +44,9 @@ pub struct Figures {
     pub overrun_attribution: Option<OverrunAttribution>,
     /// The last state of the controller's sequence; none without a single state message.
     pub final_state: Option<Code<ControllerState>>,
-    /// When the controller first stated a safe stop, ns of the run's clock.
+    /// When the controller first stated a safe stop, or the readings first showed a stop of drives or master, ns of the run's clock.
     #[serde(skip)]
-    pub stated_stop_ns: Option<u64>,
+    pub stop_without_event_ns: Option<u64>,
     /// Whether the controller left the motion and began it again.
     #[serde(skip)]
     pub has_resumed: bool,

@@ -210,7 +210,7 @@ mod shortfall {
             shortfall(|manifest, figures| {
                 manifest.scenario = Scenario::parse(Path::new("stop.toml"), expect).unwrap();
                 figures.final_state = Some(Code::Known(ControllerState::SafeStop));
-                figures.stated_stop_ns = Some(100);
+                figures.stop_without_event_ns = Some(100);
                 change(figures);
             })
         };

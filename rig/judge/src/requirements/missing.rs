@@ -1,4 +1,5 @@
-//! Samples without a value, which are no pass: those between two values, and those at the end of a motion that no stop ended.
+//! Samples without a value, which are no pass: those between two values, and those before the first or after the last value
+//! while the motion runs and no stop follows.
 
 use masseter_runtime::messages::codes::ControllerState;
 
@@ -32,7 +33,9 @@ impl Phase {
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Missing {
     pub(super) all: u64,
-    /// Those between two values: before the first one, a signal need not have any.
+    /// Those before the first value, while the motion ran.
+    at_start: u64,
+    /// Those between two values.
     between: u64,
     since_value: Option<u64>,
     /// Those after the last value, while the motion ran; none where a stop followed, with which a signal may end.
@@ -54,7 +57,8 @@ impl Missing {
             self.at_end = 0;
         } else {
             self.all += 1;
-            self.at_end += u64::from(self.since_value.is_some() && phase == Phase::Running);
+            let at_edge = if self.since_value.is_some() { &mut self.at_end } else { &mut self.at_start };
+            *at_edge += u64::from(phase == Phase::Running);
             self.since_value = self.since_value.map(|missing| missing + 1);
         }
     }
@@ -66,19 +70,26 @@ impl Missing {
         }
     }
 
-    /// Whether values are missing in between or at the motion's end: in simulated time any, in real time more than single ones.
+    /// Whether values are missing in between or at an end of the motion: in simulated time any, in real time more than single ones.
     pub(super) fn is_too_much(&self) -> bool {
         let allowed = if self.is_real_time { MISSING_IN_REAL_TIME * self.samples as f64 } else { 0.0 };
-        (self.between + self.at_end) as f64 > allowed
+        (self.at_start + self.between + self.at_end) as f64 > allowed
     }
 
     pub(super) fn in_words(&self) -> String {
-        match (self.all, self.between, self.at_end) {
-            (0, ..) => String::new(),
-            (all, 0, 0) => format!(", {all} missing"),
-            (_, 0, at_end) => format!(", {at_end} missing at the motion's end"),
-            (_, between, 0) => format!(", {between} missing in between"),
-            (_, between, at_end) => format!(", {between} missing in between, {at_end} at the motion's end"),
+        let places = [
+            (self.at_start, "at the motion's start"),
+            (self.between, "in between"),
+            (self.at_end, "at the motion's end"),
+        ];
+        let named: Vec<_> = places.iter().filter(|(samples, _)| *samples > 0).collect();
+        match (self.all, named.as_slice()) {
+            (0, _) => String::new(),
+            (all, []) => format!(", {all} missing"),
+            (_, [(samples, first), more @ ..]) => {
+                let more = more.iter().map(|(samples, place)| format!(", {samples} {place}"));
+                format!(", {samples} missing {first}{}", more.collect::<String>())
+            }
         }
     }
 }
@@ -105,6 +116,20 @@ mod tests {
         assert!(passes(1000, true));
         assert!(!passes(50, true));
         assert!(passes(2, false), "after the motion none is needed");
+    }
+
+    #[test]
+    fn a_signal_that_begins_after_the_motion_is_no_pass() {
+        let begins = |first: Phase| {
+            let mut missing = Missing::default();
+            missing.count_sample(false, first, false);
+            missing.count_sample(true, Phase::Running, false);
+            let finding = Finding::new(true, "0 mm".to_owned(), Unit::ONE).with_missing(&missing);
+            (finding.result, finding.text)
+        };
+        let untested = (CheckResult::Untested, "0 mm, 1 missing at the motion's start".to_owned());
+        assert_eq!(begins(Phase::Running), untested);
+        assert_eq!(begins(Phase::Other), (CheckResult::Passed, "0 mm, 1 missing".to_owned()));
     }
 
     #[test]

@@ -13,6 +13,7 @@ use masseter_scenario::{Dimension, Quantity, RequirementConfig, Unit};
 
 use super::condition::{Condition, Lookup, Moment};
 use super::finding::{Finding, OfKey, Refused};
+use super::missing::Phase;
 use super::trigger::{Trigger, Window};
 
 /// Triggers that are followed at a time. More are counted, not judged.
@@ -31,8 +32,8 @@ pub(super) struct Response {
     waiting: VecDeque<(u64, f64)>,
     /// Of the waiting samples, those that may be the smallest of a window, in ascending order.
     smallest: VecDeque<(u64, f64)>,
-    /// Samples without a value since the last one that has one.
-    missing_ns: Vec<u64>,
+    /// Samples without a value since the last one that has one, and whether the motion ran in each.
+    missing: Vec<(u64, bool)>,
     open: Vec<Answer>,
     triggers: u64,
     /// Triggers that changed nothing: the condition held before, and went on.
@@ -97,7 +98,7 @@ impl Response {
             stays_for_ns,
             waiting: VecDeque::new(),
             smallest: VecDeque::new(),
-            missing_ns: Vec::new(),
+            missing: Vec::new(),
             open: Vec::new(),
             triggers: 0,
             held_before: 0,
@@ -147,12 +148,15 @@ impl Response {
         self.waiting.back().is_some_and(|(_, robustness)| *robustness >= 0.0)
     }
 
-    /// A missing value ends what must stay only once another follows: after its last value, a signal need not have any.
+    /// A missing value ends what must stay once another follows, or where the motion ran. A stop excuses what is missing before it.
     fn add_sample(&mut self, moment: &Moment<'_>) {
+        if moment.phase == Phase::Stopped {
+            self.missing.iter_mut().for_each(|(_, has_run)| *has_run = false);
+        }
         let Some(robustness) = self.then.robustness(moment.values) else {
-            return self.missing_ns.push(moment.time_ns);
+            return self.missing.push((moment.time_ns, moment.phase == Phase::Running));
         };
-        for time_ns in std::mem::take(&mut self.missing_ns) {
+        for (time_ns, _) in std::mem::take(&mut self.missing) {
             self.add_robustness(time_ns, f64::NEG_INFINITY);
         }
         self.add_robustness(moment.time_ns, robustness);
@@ -242,10 +246,14 @@ impl Response {
     }
 
     pub(super) fn into_finding(mut self) -> Finding {
+        let missing = std::mem::take(&mut self.missing);
+        for (time_ns, _) in missing.iter().filter(|(_, has_run)| *has_run) {
+            self.add_robustness(*time_ns, f64::NEG_INFINITY);
+        }
         // The windows that are left end with the run.
         self.judge_ended(None);
-        for time_ns in std::mem::take(&mut self.missing_ns) {
-            self.judge_sample(time_ns, f64::NEG_INFINITY);
+        for (time_ns, _) in missing.iter().filter(|(_, has_run)| !has_run) {
+            self.judge_sample(*time_ns, f64::NEG_INFINITY);
         }
         for answer in std::mem::take(&mut self.open) {
             self.close_answer(answer);

@@ -147,9 +147,13 @@ fn bounds_without_a_sample_are_untested_and_missing_samples_are_counted() {
         (never.result, never.finding.as_str()),
         (Untested, "never in 2 samples, 1 missing in between")
     );
-    // Before the first value there is none to be missed.
-    let begins = Run::of(&[f64::NAN, 1.0, 3.0]).judge("signal = 'l1.force'\nmax = '5 N'");
-    assert_eq!((begins.result, begins.finding.as_str()), (Passed, "3 N in 2 samples, 1 missing"));
+    let mut begins = Run::of(&[f64::NAN, 1.0, 3.0]);
+    let figures = begins.judge("signal = 'l1.force'\nmax = '5 N'");
+    let why = "3 N in 2 samples, 1 missing at the motion's start";
+    assert_eq!((figures.result, figures.finding.as_str()), (Untested, why));
+    begins.states[0] = ControllerState::Easing;
+    let figures = begins.judge("signal = 'l1.force'\nmax = '5 N'");
+    assert_eq!((figures.result, figures.finding.as_str()), (Passed, "3 N in 2 samples, 1 missing"));
     let vanishes = Run::of(&[1.0, 3.0, f64::NAN]).judge("signal = 'l1.force'\nmax = '5 N'");
     let why = "3 N in 2 samples, 1 missing at the motion's end";
     assert_eq!((vanishes.result, vanishes.finding.as_str()), (Untested, why));
@@ -219,18 +223,25 @@ fn a_response_that_does_not_stay_fails() {
     assert_eq!(run.judge(&format!("{respond}\nstays_for = '3 ms'")).result, Failed);
 }
 
-/// A controller that has ended gives no more values: that cuts a window and answers nothing.
+/// A controller that has ended gives no more values: that cuts a window and answers nothing. A value that vanishes while the
+/// motion runs does not hold.
 #[test]
-fn a_condition_need_not_have_a_value_after_its_last_one() {
+fn a_condition_has_values_as_long_as_the_motion_runs() {
+    use ControllerState::{Finished, Running, SafeStop};
     let lost = f64::NAN;
     let then = "when = 'fault.encoder_stuck'\nthen = 'l1.force < 5 N'";
-    let judge = |forces_n: &[f64], struck_ms: f64, times: &str| {
-        Run::of(forces_n).struck_at(struck_ms).judge(&format!("{then}\n{times}")).result
+    let judge_until = |last: ControllerState, forces_n: &[f64], struck_ms: f64, times: &str| {
+        let mut run = Run::of(forces_n).struck_at(struck_ms);
+        run.states[3..].fill(last);
+        run.judge(&format!("{then}\n{times}")).result
     };
+    let judge = |forces_n: &[f64], struck_ms, times| judge_until(Finished, forces_n, struck_ms, times);
     let stays = "within = '1 ms'\nstays_for = '9 ms'";
     assert_eq!(judge(&[0.0, 0.0, 0.0, lost, lost], 1.0, stays), Passed);
     assert_eq!(judge(&[0.0, 0.0, 9.0, lost, lost], 1.0, stays), Failed);
     assert_eq!(judge(&[0.0, 0.0, 0.0, lost, 0.0], 1.0, stays), Failed, "it is missing in between");
+    assert_eq!(judge_until(Running, &[0.0, 0.0, 0.0, lost, lost], 1.0, stays), Failed, "it vanishes");
+    assert_eq!(judge_until(SafeStop, &[0.0, 0.0, 0.0, lost, lost], 1.0, stays), Passed, "a stop excuses it");
     assert_eq!(judge(&[0.0, 0.0, lost, lost, lost], 2.0, "within = '1 ms'"), Failed, "nothing answers");
 }
 

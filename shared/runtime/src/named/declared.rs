@@ -76,7 +76,7 @@ pub enum PlayedMotion {
     /// The scenario's: its desired poses are held against those of the scenario.
     #[default]
     Scenario,
-    /// One of its own, of which the rig knows nothing: the scenario must require something of the run.
+    /// One of its own: at least one requirement of the scenario must judge the true jaw.
     Own,
 }
 
