@@ -13,10 +13,13 @@ export PATH="$tools/bin:$PATH"
 
 as_root() { if [ "$(id -u)" -eq 0 ]; then "$@"; else sudo "$@"; fi; }
 
-install_packages() {
+# One step at a time installs; another that runs beside it waits.
+install_packages() (
+    exec 9>"$tools/lock"
+    flock 9
     as_root apt-get update -qq
     as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
-}
+)
 
 # Whether one of these commands exists.
 has_any() { local name; for name in "$@"; do command -v "$name" >/dev/null && return; done; return 1; }
@@ -32,8 +35,12 @@ install_cargo_tool() { # name, version
 use_python() {
     python3 -c 'import ensurepip, venv' 2>/dev/null || install_packages python3 python3-venv
     python=$tools/python/bin/python
-    [ -x "$python" ] || python3 -m venv "$tools/python"
-    "$python" -m pip install --quiet --disable-pip-version-check --requirement .ci/requirements.txt
+    (
+        exec 9>"$tools/lock"
+        flock 9
+        [ -x "$python" ] || python3 -m venv "$tools/python"
+        "$python" -m pip install --quiet --disable-pip-version-check --requirement .ci/requirements.txt
+    )
 }
 
 # The README's test command, of every package. The compiler is clippy, which compiles as rustc does: its lints and the tests share
