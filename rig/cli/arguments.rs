@@ -1,14 +1,11 @@
 //! Command-line arguments that several verbs share, and the parsers of their values.
 
 use std::net::{Ipv4Addr, SocketAddr};
-use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use masseter_runtime::lifecycle::{Patience, ProcessArguments};
-
-use crate::run::request::{ControllerChoice, ControllerKind};
 
 /// The arguments that the supervisor passes to every process of a run. Some verbs are also a user's, without them.
 #[derive(Debug, Clone, Args)]
@@ -25,30 +22,6 @@ pub(crate) struct ProcessArgs {
 impl ProcessArgs {
     pub(crate) fn process_arguments(self) -> ProcessArguments {
         ProcessArguments { scenario: self.scenario, domain: self.domain, lockstep: self.lockstep }
-    }
-}
-
-/// The name of a controller of the rig, `external`, or the path of an executable file.
-pub(crate) fn parse_controller(text: &str) -> Result<ControllerChoice, String> {
-    if let Ok(kind) = ControllerKind::from_str(text, false) {
-        return Ok(ControllerChoice::Own(kind));
-    }
-    match text {
-        "external" => return Ok(ControllerChoice::External),
-        "none" => return Ok(ControllerChoice::None),
-        _ => {}
-    }
-    let path = PathBuf::from(text);
-    match path.metadata() {
-        Ok(found) if found.is_file() && found.permissions().mode() & 0o111 != 0 => {
-            // Without a folder, the system would search PATH.
-            std::path::absolute(path).map(ControllerChoice::Executable).map_err(|error| error.to_string())
-        }
-        Ok(found) if found.is_file() => Err(format!("the file is not executable: chmod +x {text}")),
-        Ok(_) => Err("it is a folder: give the executable file of your controller".to_owned()),
-        Err(error) => {
-            Err(format!("use motion, hold, external, none, or the path of an executable file ({error})"))
-        }
     }
 }
 

@@ -1,4 +1,5 @@
-//! The command line: dispatches each verb to its module, and prints errors. Arguments are defined beside their verbs.
+//! The command line: dispatches each verb to its module, and prints errors. Arguments are defined beside their verbs, and
+//! those of `run` are the [`RunRequest`] itself.
 
 pub(crate) mod arguments;
 mod bench;
@@ -34,6 +35,7 @@ use crate::BUILD;
 use crate::doctor::{self, DoctorArgs};
 use crate::robot::{self, RobotVerb};
 use crate::run::exec_program;
+use crate::run::request::{Readers, RunRequest};
 use crate::vary::play::play_case;
 use arguments::ProcessArgs;
 use bench::BenchVerb;
@@ -47,7 +49,6 @@ use kinematics::{CsvArgs, FkArgs};
 use motion::MotionArgs;
 use plant::PlantArgs;
 use report::{DiffArgs, ReplayArgs, ReportArgs};
-use run::{Readers, RunArgs};
 use starter::{InitArgs, NewVerb};
 use test::TestArgs;
 
@@ -91,7 +92,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Verb {
     /// Run a jaw motion through controller, plant and recorder, and judge it
-    Run(RunArgs),
+    Run(RunRequest),
     /// Run the scenarios of a folder as a suite of tests
     Test(TestArgs),
     /// Run a scenario with many values of its keys, faults and motions
@@ -224,7 +225,7 @@ fn keep_files_private(verb: &Verb) {
         | Verb::New(_) => {
             return;
         }
-        Verb::Run(args) => args.readable_by.umask(),
+        Verb::Run(request) => request.readable_by.umask(),
         Verb::Report(args) => args.umask(),
         _ => Readers::Owner.umask(),
     });
@@ -233,7 +234,7 @@ fn keep_files_private(verb: &Verb) {
 /// Errors lead to exit code 2 unless the verb itself chooses another.
 fn execute(verb: Verb) -> Result<Exit, Failure> {
     match verb {
-        Verb::Run(args) => run::run(args),
+        Verb::Run(request) => run::run(&request),
         Verb::Test(args) => test::test(&args),
         Verb::Campaign(args) => campaign::campaign(&args),
         Verb::Search(args) => campaign::search(&args),

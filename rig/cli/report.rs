@@ -12,10 +12,9 @@ use masseter_terminal::{Exit, Failure, Format, OrFailure, result};
 use rustix::fs::Mode;
 use serde::Serialize;
 
-use super::run::Readers;
 use crate::BUILD;
 use crate::record::replay::{self, Outcome};
-use crate::run::request::{ControllerKind, name_of};
+use crate::run::request::{ControllerKind, Readers, name_of};
 
 /// The arguments of `report`.
 #[derive(Debug, Clone, Args)]

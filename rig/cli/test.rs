@@ -13,7 +13,6 @@ use masseter_runtime::clock;
 use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, result_line, status};
 
-use super::arguments::parse_controller;
 use crate::BUILD;
 use crate::run::interrupts::Interrupts;
 use crate::run::request::{ClockKind, ControllerChoice};
@@ -35,13 +34,7 @@ pub(super) struct TestArgs {
     #[arg(long, default_value = "virtual", value_parser = test_clocks())]
     clock: ClockKind,
     /// Who controls the robot: motion, hold, or the path of your own program
-    #[arg(
-        long,
-        value_name = "motion|hold|PATH",
-        value_parser = parse_controller,
-        default_value = "motion",
-        hide_default_value = true
-    )]
+    #[arg(long, value_name = "motion|hold|PATH", default_value = "motion", hide_default_value = true)]
     controller: ControllerChoice,
     /// Run only the scenarios with these words in their names or as tags, joined by and, or, not and parentheses
     #[arg(short = 'k', long = "filter", value_name = "EXPRESSION")]

@@ -12,7 +12,7 @@ use masseter_report::Detail;
 use masseter_runtime::transport::{Domain, DomainLock};
 use masseter_scenario::input::read_text;
 use masseter_scenario::{FileConfig, Scenario};
-use masseter_terminal::{Exit, Failure, Format, OrFailure, status};
+use masseter_terminal::{Exit, Failure, OrFailure, status};
 
 use super::interrupts::Interrupts;
 use super::request::{ClockKind, ControllerChoice, RunRequest, name_of};
@@ -104,17 +104,17 @@ impl PreparedRun {
 
 impl PlayedRun {
     /// Judges the run, prints its report and writes it into the folder.
-    pub(crate) fn report(self, format: Format, detail: Detail) -> Result<Exit, Failure> {
+    pub(crate) fn report(self) -> Result<Exit, Failure> {
         if self.is_unstarted() {
             let folder = self.folder.path().display();
             status!("masseter: interrupted before the first cycle: nothing is recorded in {folder}");
             return Ok(Exit::Interrupted);
         }
         let Self { request, folder, manifest, reserved, written } = self;
-        let exit = masseter_report::report_run(&folder, &manifest, format, detail, reserved)?;
+        let detail = if request.verbose { Detail::Whole } else { Detail::Brief };
+        let exit = masseter_report::report_run(&folder, &manifest, request.format, detail, reserved)?;
         written?;
-        let controller = request.controller.name();
-        let Manifest { scenario, motion_s, .. } = &manifest;
+        let Manifest { scenario, controller, motion_s, .. } = &manifest;
         let (controller, is_waived) = (controller.as_deref(), request.without_bring_up);
         let played = Played { scenario, controller, motion_s: *motion_s, is_waived };
         played.keep_dry_run(folder.path(), exit == Exit::Passed).incomplete()?;

@@ -1,45 +1,143 @@
-//! What a run is asked for: scenario, clock, controller, folder. The verbs make it of their arguments.
+//! What a run is asked for, as the arguments of `masseter run` have it. The other verbs set some of it.
 
 use std::net::SocketAddr;
+use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
+use std::str::FromStr;
 use std::time::Duration;
 
-use clap::ValueEnum;
+use clap::{Args, ValueEnum};
 use masseter_controller::hold_position::HoldPosition;
 use masseter_controller::motion_controller::MotionController;
 use masseter_controller::process::BuildController;
 use masseter_plan::Overrides;
+use masseter_recorder::live;
 use masseter_runtime::lifecycle::Patience;
+use masseter_terminal::Format;
+use rustix::fs::Mode;
+
+use crate::cli::arguments::{Wires, parse_address, parse_cores, parse_duration, parse_patience, parse_wires};
 
 /// The patience of a run in lockstep.
 const DEFAULT_PATIENCE: Duration = Duration::from_secs(10);
 
-/// A run. The default one is ten seconds of chewing by the rig's own controller.
-#[derive(Debug, Clone, Default)]
+const WHAT: &str = "Choose what to play";
+const HOW: &str = "Choose how it runs";
+const WATCH: &str = "Watch the run";
+const KEEP: &str = "Keep the result";
+
+/// A run, as the command line asks for it. The default one is ten seconds of chewing by the rig's own controller.
+#[derive(Debug, Clone, Default, Args)]
+#[command(
+    after_help = "Examples:\n  masseter run --duration 30\n  masseter run scenario.toml --live\n  masseter run --clock virtual --seed 2 --out /tmp/run"
+)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub(crate) struct RunRequest {
-    /// Scenario file; the default scenario without one.
-    pub(crate) scenario: Option<PathBuf>,
-    /// Changes to the scenario.
-    pub(crate) overrides: Overrides,
-    pub(crate) clock: ClockKind,
-    /// For how long a process may be silent in lockstep.
-    pub(crate) patience: Option<Patience>,
-    pub(crate) controller: ControllerChoice,
-    /// Whether a robot moves without the evidence of a bring-up.
-    pub(crate) without_bring_up: bool,
-    /// Run folder, which must not exist; one by time without it.
-    pub(crate) out: Option<PathBuf>,
-    /// Name of the rig.
-    pub(crate) name: Option<String>,
-    /// Whether the motion starts only if the kernel grants real time.
-    pub(crate) require_rt: bool,
-    /// Where the live view listens.
-    pub(crate) live: Option<SocketAddr>,
-    /// Whether no progress is shown.
-    pub(crate) quiet: bool,
+    /// Scenario file [default: ten seconds of chewing]
+    pub(super) scenario: Option<PathBuf>,
+    /// Recorded jaw motion (CSV), instead of the scenario's motion
+    #[arg(long, value_name = "FILE.csv", help_heading = WHAT)]
+    pub(super) trajectory: Option<PathBuf>,
+    /// Duration of the motion in seconds, or with a unit, such as 10, 10s or 2min
+    #[arg(long, value_name = "TIME", value_parser = parse_duration, allow_negative_numbers = true, help_heading = WHAT)]
+    pub(super) duration: Option<Duration>,
+    /// Change a key of the scenario, such as controller.integral_gain_per_s=50; may be given several times
+    #[arg(long, value_name = "KEY=VALUE", help_heading = WHAT)]
+    pub(super) set: Vec<String>,
+    /// Cycles per second
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, help_heading = HOW)]
+    pub(super) rate_hz: Option<u32>,
+    /// Clock of the run
+    #[arg(long, value_enum, default_value_t, help_heading = HOW)]
+    pub(super) clock: ClockKind,
+    /// In lockstep, how long a process may take to answer before the run ends: such as 10s, or none for a debugger
+    /// [default: 10s]
+    #[arg(long, value_name = "TIME", value_parser = parse_patience, help_heading = HOW)]
+    pub(super) patience: Option<Patience>,
+    /// Who controls the robot: motion plays the motion, hold keeps the position found at the start, a path starts
+    /// your own program, external waits until you start it [default: motion]
+    #[arg(
+        long,
+        value_name = "motion|hold|external|none|PATH",
+        default_value = "motion",
+        hide_default_value = true,
+        help_heading = WHAT
+    )]
+    pub(super) controller: ControllerChoice,
+    /// Simulated buses, or the CAN interface of each bus, such as can0,can1
+    #[arg(long, value_name = "virtual|IF[,IF]", value_parser = parse_wires, help_heading = HOW)]
+    pub(super) can: Option<Wires>,
+    /// Move a robot without a passed 'masseter robot check-pose': a wrong sign, scale or zero can drive an axis into
+    /// its end
+    #[arg(long, help_heading = HOW)]
+    pub(super) without_bring_up: bool,
+    /// Play the motion at a tenth of its speed with little force, and predict what it demands at full speed
+    #[arg(long, help_heading = HOW)]
+    pub(super) dry: bool,
+    /// Reset the fault of a drive that is in fault at the start, instead of ending the run
+    #[arg(long, help_heading = HOW)]
+    pub(super) reset_faults: bool,
+    /// How long to wait for a drive that is not ready, such as one with safe torque off [default: 5s]
+    #[arg(long, value_name = "TIME", value_parser = parse_duration, help_heading = HOW)]
+    pub(super) wait_ready: Option<Duration>,
+    /// Cores of controller and plant
+    #[arg(long, value_name = "N,N", value_parser = parse_cores, help_heading = HOW)]
+    pub(super) cores: Option<[usize; 2]>,
+    /// Seed of every random number
+    #[arg(long, allow_negative_numbers = true, help_heading = HOW)]
+    pub(super) seed: Option<u64>,
+    /// Run folder; must not exist [default: runs/UTC_TIME-NAME]
+    #[arg(long, value_name = "DIR", help_heading = KEEP)]
+    pub(super) out: Option<PathBuf>,
+    /// Name of this rig, unique among running rigs [default: a generated one]
+    #[arg(long, help_heading = HOW)]
+    pub(super) name: Option<String>,
+    /// Format of standard output
+    #[arg(long, value_enum, default_value_t, help_heading = WATCH)]
+    pub(super) format: Format,
+    /// Exit with 3 unless the kernel grants cores, SCHED_FIFO, locked memory and, if requested, /dev/cpu_dma_latency
+    #[arg(long, help_heading = HOW)]
+    pub(super) require_rt: bool,
+    /// Show the run live in a browser and in Foxglove on a port of this machine, such as --live=9000, or on an address
+    /// [default: 127.0.0.1:8765]
+    #[arg(
+        long,
+        value_name = "PORT|ADDR:PORT",
+        value_parser = parse_address,
+        help_heading = WATCH,
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = live::DEFAULT_ADDRESS
+    )]
+    pub(super) live: Option<SocketAddr>,
+    /// Who may read the run's files
+    #[arg(long, value_enum, default_value_t, value_name = "WHO", help_heading = KEEP)]
+    pub(crate) readable_by: Readers,
+    /// Show every figure, not only verdict and checks
+    #[arg(long, help_heading = WATCH)]
+    pub(super) verbose: bool,
+    /// Show no progress
+    #[arg(long, help_heading = WATCH)]
+    pub(super) quiet: bool,
 }
 
 impl RunRequest {
+    /// The changes to the scenario.
+    pub(super) fn overrides(&self) -> Overrides {
+        Overrides {
+            set: self.set.clone(),
+            trajectory: self.trajectory.clone(),
+            duration: self.duration,
+            rate_hz: self.rate_hz,
+            interfaces: self.can.as_ref().map(|wires| wires.0.clone()),
+            cores: self.cores,
+            seed: self.seed,
+            is_dry: self.dry,
+            reset_faults: self.reset_faults,
+            wait_ready: self.wait_ready,
+        }
+    }
+
     /// For how long a process may be silent, if the run is in lockstep.
     pub(super) fn lockstep(&self) -> Option<Patience> {
         let patience = self.patience.unwrap_or(Patience(Some(DEFAULT_PATIENCE)));
@@ -109,6 +207,34 @@ impl Default for ControllerChoice {
     }
 }
 
+impl FromStr for ControllerChoice {
+    type Err = String;
+
+    /// The name of a controller of the rig, `external`, `none`, or the path of an executable file.
+    fn from_str(text: &str) -> Result<Self, String> {
+        if let Ok(kind) = ControllerKind::from_str(text, false) {
+            return Ok(Self::Own(kind));
+        }
+        match text {
+            "external" => return Ok(Self::External),
+            "none" => return Ok(Self::None),
+            _ => {}
+        }
+        let path = PathBuf::from(text);
+        match path.metadata() {
+            Ok(found) if found.is_file() && found.permissions().mode() & 0o111 != 0 => {
+                // Without a folder, the system would search PATH.
+                std::path::absolute(path).map(Self::Executable).map_err(|error| error.to_string())
+            }
+            Ok(found) if found.is_file() => Err(format!("the file is not executable: chmod +x {text}")),
+            Ok(_) => Err("it is a folder: give the executable file of your controller".to_owned()),
+            Err(error) => {
+                Err(format!("use motion, hold, external, none, or the path of an executable file ({error})"))
+            }
+        }
+    }
+}
+
 impl ControllerChoice {
     /// How a controller of the rig is built; none for a program of the user.
     pub(crate) fn builder(&self) -> Option<BuildController> {
@@ -125,6 +251,29 @@ impl ControllerChoice {
             Self::External => Some("external".to_owned()),
             Self::None => Some("none".to_owned()),
             Self::Executable(path) => Some(path.display().to_string()),
+        }
+    }
+}
+
+/// Who may read the files of a run. They hold the motion of a person's jaw.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Readers {
+    /// This user
+    #[default]
+    Owner,
+    /// This user and the group
+    Group,
+    /// Every user of the machine
+    All,
+}
+
+impl Readers {
+    /// The rights that new files do not get.
+    pub(crate) fn umask(self) -> Mode {
+        match self {
+            Self::Owner => Mode::RWXG | Mode::RWXO,
+            Self::Group => Mode::WGRP | Mode::RWXO,
+            Self::All => Mode::WGRP | Mode::WOTH,
         }
     }
 }

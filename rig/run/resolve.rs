@@ -24,9 +24,9 @@ const HIGHEST_PRIORITY: u8 = 99;
 
 /// Plans the run and chooses its clock; refuses interfaces and addresses that this machine does not have.
 pub(super) fn resolve(request: &RunRequest) -> anyhow::Result<(RunPlan, RunRequest)> {
-    let overrides = &request.overrides;
-    let scenario = masseter_plan::scenario_with_overrides(request.scenario.as_deref(), overrides)?;
-    overrides.cores.map_or(Ok(()), |cores| check_cores(&cores, &usable_cores()))?;
+    let overrides = request.overrides();
+    let scenario = masseter_plan::scenario_with_overrides(request.scenario.as_deref(), &overrides)?;
+    request.cores.map_or(Ok(()), |cores| check_cores(&cores, &usable_cores()))?;
     let request = RunRequest { clock: choose_clock(request, &scenario), ..request.clone() };
     check_clock(&request, &scenario)?;
     request.live.map(live::listen_on).transpose()?;

@@ -9,7 +9,6 @@ use std::path::Path;
 use anyhow::{Context, anyhow};
 use masseter_controller::process::BuildController;
 use masseter_judge::{Figures, Judgement, Verdict};
-use masseter_plan::Overrides;
 use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure};
 
@@ -119,7 +118,7 @@ impl Runner<'_> {
     fn request(&self, file: ScenarioFile<'_>, clock: ClockKind) -> RunRequest {
         RunRequest {
             scenario: Some(file.path.to_owned()),
-            overrides: Overrides { set: file.set.to_vec(), ..Overrides::default() },
+            set: file.set.to_vec(),
             clock,
             controller: self.controller.clone(),
             quiet: true,
