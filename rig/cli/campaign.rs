@@ -15,7 +15,6 @@ use masseter_scenario::wording::counted;
 use masseter_table::{Format, ParquetProgram};
 use masseter_terminal::{Exit, Failure, OrFailure, result, status};
 
-use crate::run::interrupts::Interrupts;
 use crate::run::request::{ControllerChoice, ControllerKind};
 use crate::run::runner::{Runner, word};
 use crate::vary::play::{Player, open_cases, plan};
@@ -45,8 +44,7 @@ struct Begun {
     out: PathBuf,
     folder: CampaignFolder,
     _lock: CampaignLock,
-    controller: ControllerChoice,
-    interrupts: Interrupts,
+    runner: Runner,
     record: usize,
 }
 
@@ -58,19 +56,18 @@ impl Begun {
         };
         let out = args.out.clone().unwrap_or_else(by_time);
         let (folder, lock) = CampaignFolder::begin(&out, &campaign).usage()?;
-        let (controller, interrupts) = (ControllerChoice::Own(args.controller), Interrupts::of_verb()?);
-        Ok(Self { campaign, out, folder, _lock: lock, controller, interrupts, record: args.record })
+        let runner = Runner::of_verb(ControllerChoice::Own(args.controller))?;
+        Ok(Self { campaign, out, folder, _lock: lock, runner, record: args.record })
     }
 
     fn player(&self) -> Player<'_> {
-        let runner = Runner { controller: &self.controller, interrupts: &self.interrupts };
-        Player { runner, folder: &self.folder }
+        Player { runner: &self.runner, folder: &self.folder }
     }
 
     /// The report on the results, and the worst cases; none if the user interrupts.
     fn report(&self, results: Vec<CaseResult>) -> Result<Option<(Report<'_>, Vec<WorstCase>)>, Failure> {
         let out = word(&self.out.display().to_string());
-        if self.interrupts.is_stop_requested() {
+        if self.runner.is_interrupted() {
             let ended = counted(results.len() as u64, "case");
             status!("interrupted after {ended}; the same command with --out {out} goes on");
             return Ok(None);
@@ -220,12 +217,11 @@ pub(super) struct ShrinkArgs {
 pub(super) fn shrink(args: &ShrinkArgs) -> Result<Exit, Failure> {
     let path = scenario_of(&args.path).usage()?;
     let scenario = scenario_with_overrides(Some(&path), &Overrides::default()).usage()?;
-    let (controller, interrupts) = (ControllerChoice::Own(args.controller), Interrupts::of_verb()?);
-    let runner = Runner { controller: &controller, interrupts: &interrupts };
-    let reason = Reason::of(runner, &scenario, args.requirement.as_deref())?;
+    let runner = Runner::of_verb(ControllerChoice::Own(args.controller))?;
+    let reason = Reason::of(&runner, &scenario, args.requirement.as_deref())?;
     status!("fails by {reason}; shrinking");
-    let (text, runs) = shrink::shrink(runner, &scenario, &reason);
-    if interrupts.is_stop_requested() {
+    let (text, runs) = shrink::shrink(&runner, &scenario, &reason);
+    if runner.is_interrupted() {
         return Ok(Exit::Interrupted);
     }
     status!("{runs} runs");

@@ -12,7 +12,6 @@ use masseter_recording::new_folder;
 use masseter_scenario::{FaultDeclaration, FaultKindConfig};
 use masseter_terminal::{Exit, Failure, OrFailure, result, status};
 
-use crate::run::interrupts::Interrupts;
 use crate::run::request::ControllerChoice;
 use crate::run::runner::Runner;
 use crate::vary::matrix;
@@ -68,12 +67,11 @@ fn play_matrix(MatrixArgs { scenario, out, filter }: &MatrixArgs) -> Result<Exit
         return Err(anyhow!("no kind has this text in its name; see masseter faults list")).usage();
     }
     new_folder(out).usage()?;
-    let interrupts = Interrupts::of_verb()?;
+    let runner = Runner::of_verb(ControllerChoice::default())?;
     status!("{} runs", cases.len());
-    let runner = Runner { controller: &ControllerChoice::default(), interrupts: &interrupts };
-    let rows = matrix::play(&plan.scenario, cases, runner)?;
-    interrupts.restore_default_actions();
-    if interrupts.is_stop_requested() {
+    let rows = matrix::play(&plan.scenario, cases, &runner)?;
+    runner.interrupts.restore_default_actions();
+    if runner.is_interrupted() {
         // Empty as it is, it would only be in the way of the next matrix.
         let _ = fs::remove_dir(out);
         status!("masseter: interrupted: no table is written");

@@ -14,7 +14,6 @@ use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, result_line, status};
 
 use crate::BUILD;
-use crate::run::interrupts::Interrupts;
 use crate::run::request::{ClockKind, ControllerChoice};
 use crate::run::runner::Runner;
 use crate::vary::suite::Suite;
@@ -89,7 +88,7 @@ pub(super) fn test(args: &TestArgs) -> Result<Exit, Failure> {
     let Cases { chosen, filtered_out, left_out } = Cases::find(&args.paths, &selection).usage()?;
     let baseline = args.baseline.as_deref().map(Baseline::read).transpose().usage()?;
     let out = out_folder(args).usage()?;
-    let interrupts = Interrupts::of_verb()?;
+    let runner = Runner::of_verb(args.controller.clone())?;
     if !left_out.is_empty() {
         status!("left out: {}", left_out.join(", "));
     }
@@ -98,7 +97,7 @@ pub(super) fn test(args: &TestArgs) -> Result<Exit, Failure> {
         result_line!("\nrunning {}", counted(chosen.len() as u64, "test")).incomplete()?;
     }
     let suite = Suite {
-        runner: Runner { controller: &args.controller, interrupts: &interrupts },
+        runner,
         clock: args.clock,
         retries: args.retries,
         allows_untested: args.allow_untested,
@@ -123,7 +122,7 @@ pub(super) fn test(args: &TestArgs) -> Result<Exit, Failure> {
     if let Some(path) = &args.html {
         write_document(path, &html_of_suite(&report).incomplete()?).incomplete()?;
     }
-    if interrupts.is_stop_requested() {
+    if suite.runner.is_interrupted() {
         let over = report.tested.len();
         status!("masseter: interrupted after {over} of {} tests", over + report.unrun.len());
         return Ok(Exit::Interrupted);

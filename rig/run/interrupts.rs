@@ -24,7 +24,7 @@ pub(crate) struct Interrupts {
 
 impl Interrupts {
     /// Handles the signals from now on. SIGHUP stays ignored if the parent ignores it, as `nohup` does.
-    pub(crate) fn listen() -> io::Result<Self> {
+    fn listen() -> io::Result<Self> {
         let interrupts = Self::default();
         let hang_up = (!is_ignored(SIGHUP)).then_some(SIGHUP);
         let caught: Vec<_> = [SIGINT, SIGTERM].into_iter().chain(hang_up).collect();

@@ -17,11 +17,11 @@ use super::prepared::{PreparedRun, analyse_unrecorded};
 use super::request::{ClockKind, ControllerChoice, RunRequest, name_of};
 use super::resolve::{resolve, resolve_simulated};
 
-/// Plays runs by one controller.
-#[derive(Clone, Copy)]
-pub(crate) struct Runner<'a> {
-    pub(crate) controller: &'a ControllerChoice,
-    pub(crate) interrupts: &'a Interrupts,
+/// Plays runs by one controller, until the user interrupts.
+#[derive(Default)]
+pub(crate) struct Runner {
+    pub(crate) controller: ControllerChoice,
+    pub(crate) interrupts: Interrupts,
 }
 
 /// The scenario of a file, with values changed, each as `KEY=VALUE`.
@@ -51,7 +51,17 @@ pub(crate) struct Judged {
     pub(crate) figures: Figures,
 }
 
-impl Runner<'_> {
+impl Runner {
+    /// The runner of a verb, which handles signals from now on.
+    pub(crate) fn of_verb(controller: ControllerChoice) -> Result<Self, Failure> {
+        Ok(Self { controller, interrupts: Interrupts::of_verb()? })
+    }
+
+    /// Whether the user interrupts.
+    pub(crate) fn is_interrupted(&self) -> bool {
+        self.interrupts.is_stop_requested()
+    }
+
     /// Plays a scenario under virtual time, without a recording.
     ///
     /// # Errors
@@ -70,7 +80,7 @@ impl Runner<'_> {
                 Source::Scenario(scenario) => resolve_simulated(scenario, None, build),
             };
             let (manifest, figures) =
-                analyse_unrecorded(&plan.usage()?, self.controller, build, self.interrupts)?;
+                analyse_unrecorded(&plan.usage()?, &self.controller, build, &self.interrupts)?;
             Ok(Judged { verdict: Verdict::new(&manifest, &figures), figures })
         })
     }
@@ -84,7 +94,7 @@ impl Runner<'_> {
         folder: &Path,
     ) -> Result<Option<Judgement>, Failure> {
         let request = RunRequest { out: Some(folder.to_owned()), ..self.request(file, clock) };
-        guarded(|| PreparedRun::new(&request)?.play(self.interrupts)?.judge_unseen())
+        guarded(|| PreparedRun::new(&request)?.play(&self.interrupts)?.judge_unseen())
     }
 
     /// Plays a run under virtual time again, with a recording, and refuses another digest than before. None if the user
@@ -97,7 +107,7 @@ impl Runner<'_> {
         digest: &str,
     ) -> Result<Option<Judgement>, Failure> {
         let again = self.record(file, ClockKind::Virtual, folder)?;
-        let Some(again) = again.filter(|_| !self.interrupts.is_stop_requested()) else { return Ok(None) };
+        let Some(again) = again.filter(|_| !self.is_interrupted()) else { return Ok(None) };
         if again.digest != digest {
             let what =
                 format!("{name} with a recording ({}) differs from the one without ({digest})", again.digest);

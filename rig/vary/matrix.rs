@@ -22,7 +22,7 @@ const SEARCHED_S: [f64; 2] = [1.5, 3.5];
 const STEP_S: f64 = 0.01;
 
 /// Plays the cases under virtual time on all cores.
-pub(crate) fn play(base: &Scenario, cases: Vec<Case>, runner: Runner<'_>) -> Result<Vec<FaultRow>, Failure> {
+pub(crate) fn play(base: &Scenario, cases: Vec<Case>, runner: &Runner) -> Result<Vec<FaultRow>, Failure> {
     let row = |case: Case| -> Result<FaultRow, Failure> {
         let scenario = scenario_of(base, &case);
         Ok(row_of(case, &runner.play(Source::Scenario(&scenario))?, &scenario.checks))

@@ -19,7 +19,6 @@ use masseter_table::Format;
 use masseter_terminal::{Exit, Failure, OrFailure, in_one_line, status};
 use rustix::process::getppid;
 
-use crate::run::interrupts::Interrupts;
 use crate::run::request::{ClockKind, ControllerChoice, ControllerKind, name_of};
 use crate::run::runner::{Judged, Runner, Source};
 use crate::run::{end_with_parent, resolve_simulated};
@@ -69,9 +68,9 @@ pub(crate) fn play_case(folder: &Path, number: usize) -> Result<Exit, Failure> {
     if number >= count {
         return Err(anyhow!("the campaign has cases 0 to {}", count.saturating_sub(1))).usage();
     }
-    let (controller, interrupts) = (ControllerChoice::Own(kind), Interrupts::of_verb()?);
-    let runner = Runner { controller: &controller, interrupts: &interrupts };
-    let result = Player { runner, folder: &folder }.result_of(&campaign.case(&campaign.points(), number))?;
+    let runner = Runner::of_verb(ControllerChoice::Own(kind))?;
+    let result =
+        Player { runner: &runner, folder: &folder }.result_of(&campaign.case(&campaign.points(), number))?;
     Ok(if result.is_some() { Exit::Passed } else { Exit::Interrupted })
 }
 
@@ -90,16 +89,11 @@ pub(crate) fn open_cases(campaign: &Campaign, folder: &CampaignFolder) -> Result
 /// Plays cases, and keeps their results in the folder of the campaign.
 #[derive(Clone, Copy)]
 pub(crate) struct Player<'a> {
-    pub(crate) runner: Runner<'a>,
+    pub(crate) runner: &'a Runner,
     pub(crate) folder: &'a CampaignFolder,
 }
 
 impl Player<'_> {
-    /// Whether the user interrupts.
-    pub(super) fn is_interrupted(&self) -> bool {
-        self.runner.interrupts.is_stop_requested()
-    }
-
     /// The result of a case: the kept one, or that of playing it now; none if the user interrupts.
     pub(super) fn result_of(&self, case: &Case) -> Result<Option<CaseResult>, Failure> {
         if let Some(kept) = self.folder.result_of(case).incomplete()? {
@@ -122,7 +116,7 @@ impl Player<'_> {
             Err(reason) => return unrun(CaseResult::REFUSED, Exit::Usage, reason.clone()),
         };
         let judged = self.runner.play(Source::Scenario(scenario));
-        if self.is_interrupted() {
+        if self.runner.is_interrupted() {
             return Ok(None);
         }
         let took_s = || (clock::now_ns() - began_ns) as f64 / 1e9;
@@ -146,7 +140,7 @@ impl Player<'_> {
         let tally = Mutex::new(Tally::new(campaign.case_count(), campaign.file.stop_after));
         let work = || -> Result<Vec<CaseResult>, Failure> {
             let mut ended = Vec::new();
-            while !self.is_interrupted() && !lock(&tally).is_over() {
+            while !self.runner.is_interrupted() && !lock(&tally).is_over() {
                 let number = next.fetch_add(1, Ordering::Relaxed);
                 if number >= campaign.case_count() {
                     break;

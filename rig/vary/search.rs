@@ -75,8 +75,6 @@ mod tests {
     use masseter_terminal::status;
 
     use super::*;
-    use crate::run::interrupts::Interrupts;
-    use crate::run::request::ControllerChoice;
     use crate::run::runner::{Judged, Runner, Source};
 
     const SCENARIO: &str = "\
@@ -156,7 +154,7 @@ range = [0.5, 1.0]
 
     /// The runs until a margin below zero.
     fn runs_until_found(method: Method, seed: u64, campaign: &Campaign) -> usize {
-        let runner = Runner { controller: &ControllerChoice::default(), interrupts: &Interrupts::default() };
+        let runner = Runner::default();
         let search = Search { method, dimension: 4, runs: 5000, seed, goes_on: false };
         let evaluate = |number: usize, point: &[f64]| {
             let case = campaign.case_at(number, point, 0);

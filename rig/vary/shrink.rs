@@ -12,11 +12,11 @@ use masseter_terminal::{Exit, Failure, OrFailure};
 use crate::run::runner::{Judged, Runner, Source};
 
 /// The smallest scenario that fails for this reason, as TOML, and the number of runs that it took.
-pub(crate) fn shrink(runner: Runner<'_>, scenario: &Scenario, reason: &Reason) -> (String, usize) {
+pub(crate) fn shrink(runner: &Runner, scenario: &Scenario, reason: &Reason) -> (String, usize) {
     let mut runs = 0;
     let fails = |smaller: &Scenario| {
         runs += 1;
-        !runner.interrupts.is_stop_requested()
+        !runner.is_interrupted()
             && runner.play(Source::Scenario(smaller)).is_ok_and(|judged| reason.is_that_of(&judged))
     };
     let text = Shrink::run(fails, scenario);
@@ -34,7 +34,7 @@ pub(crate) enum Reason {
 impl Reason {
     /// Why the scenario fails, or that the check of this name does; refuses one that passes.
     pub(crate) fn of(
-        runner: Runner<'_>,
+        runner: &Runner,
         scenario: &Scenario,
         requirement: Option<&str>,
     ) -> Result<Self, Failure> {

@@ -22,7 +22,7 @@ use crate::run::runner::{Runner, Source};
 
 /// How the scenarios of a suite are run.
 pub(crate) struct Suite<'a> {
-    pub(crate) runner: Runner<'a>,
+    pub(crate) runner: Runner,
     /// The clock of the scenarios that can have it.
     pub(crate) clock: ClockKind,
     /// How often a run with processes is tried again: see [`asks_for_another`].
@@ -72,7 +72,7 @@ impl Suite<'_> {
 
     /// Runs a scenario by this clock; none if the user interrupts.
     fn test(&self, case: &Case, clock: ClockKind) -> Option<TestedScenario> {
-        if self.is_interrupted() {
+        if self.runner.is_interrupted() {
             return None;
         }
         let began_ns = clock::now_ns();
@@ -80,7 +80,7 @@ impl Suite<'_> {
             ClockKind::Virtual => vec![self.in_virtual_time(case)],
             _ => self.in_processes(case, clock),
         };
-        if self.is_interrupted() {
+        if self.runner.is_interrupted() {
             return None;
         }
         Some(TestedScenario {
@@ -102,7 +102,7 @@ impl Suite<'_> {
             played.map(|judged| Judgement { verdict: judged.verdict, digest: judged.figures.digest });
         let attempt = attempt(played, None);
         let Ok(unrecorded) = &attempt.judgement else { return attempt };
-        if !attempt.is_short(self.allows_untested) || self.is_interrupted() {
+        if !attempt.is_short(self.allows_untested) || self.runner.is_interrupted() {
             return attempt;
         }
         let folder = self.folder_of(case, 0);
@@ -129,7 +129,7 @@ impl Suite<'_> {
             let recorded = self.runner.record(case.file(), clock, &folder);
             let judged = recorded.and_then(|judgement| judgement.ok_or_else(unstarted));
             attempts.push(attempt(judged, Some(folder)));
-            let has_tries = attempts.len() <= self.retries && !self.is_interrupted();
+            let has_tries = attempts.len() <= self.retries && !self.runner.is_interrupted();
             if !has_tries || !asks_for_another(clock, &attempts, self.allows_untested) {
                 break;
             }
@@ -141,10 +141,6 @@ impl Suite<'_> {
             let _ = only.folder.take().map(fs::remove_dir_all);
         }
         attempts
-    }
-
-    fn is_interrupted(&self) -> bool {
-        self.runner.interrupts.is_stop_requested()
     }
 
     fn folder_of(&self, case: &Case, retries: usize) -> PathBuf {
