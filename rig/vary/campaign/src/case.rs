@@ -84,7 +84,7 @@ pub struct CaseCheck {
 }
 
 /// The result of a case.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct CaseResult {
     /// The case's place in the campaign, from 0.
     pub number: usize,
@@ -151,14 +151,7 @@ impl CaseResult {
             word: word.to_owned(),
             exit_code,
             reason,
-            warnings: String::new(),
-            digest: String::new(),
-            checks: Vec::new(),
-            incisal_rms_mm: None,
-            incisal_max_mm: None,
-            rotation_max_deg: None,
-            bite_force_max_n: None,
-            took_s: 0.0,
+            ..Self::default()
         }
     }
 
