@@ -10,7 +10,7 @@ use crate::poses::worse;
 use crate::tracking::PathSample;
 
 /// A declared fault and its effect.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct FaultFigures {
     /// Number in the scenario's list, from 1.
     pub number: usize,
@@ -42,95 +42,72 @@ pub struct Detection {
 /// Follows the declared faults.
 #[derive(Debug, Clone)]
 pub(super) struct FaultWatch {
-    faults: Vec<Effect>,
-    stops: Vec<Stop>,
-}
-
-#[derive(Debug, Clone, Copy, Default)]
-struct Effect {
-    struck_ns: Option<u64>,
-    largest: Deviation,
-    last: Deviation,
-}
-
-/// The beginning of a safe stop.
-#[derive(Debug, Clone, Copy)]
-struct Stop {
-    time_ns: u64,
-    source: Code<Source>,
-    cause: Code<Cause>,
+    /// Each with the deviation in its last sample.
+    faults: Vec<(FaultFigures, Deviation)>,
+    /// The beginnings of safe stops.
+    stops: Vec<EventRecord>,
 }
 
 impl FaultWatch {
     pub(super) fn new(declared: usize) -> Self {
-        Self { faults: vec![Effect::default(); declared], stops: Vec::new() }
+        let figures = |number| FaultFigures { number, ..FaultFigures::default() };
+        let faults = (1..=declared).map(|number| (figures(number), Deviation::default()));
+        Self { faults: faults.collect(), stops: Vec::new() }
     }
 
     pub(super) fn apply_event(&mut self, event: &EventRecord) {
-        let EventRecord { time_ns, source, cause, .. } = *event;
-        if cause == Cause::FaultInjected {
-            self.strike(event.value as usize, time_ns);
+        if event.cause == Cause::FaultInjected {
+            self.strike(event.value as usize, event.time_ns);
         }
         if event.begins_stop() && !self.faults.is_empty() {
-            self.stops.push(Stop { time_ns, source, cause });
+            self.stops.push(event.clone());
         }
     }
 
     /// A fault of this number, from 1, has struck.
     pub(super) fn strike(&mut self, number: usize, time_ns: u64) {
-        if let Some(fault) = number.checked_sub(1).and_then(|place| self.faults.get_mut(place)) {
+        if let Some((fault, _)) = number.checked_sub(1).and_then(|place| self.faults.get_mut(place)) {
             fault.struck_ns = Some(fault.struck_ns.map_or(time_ns, |struck_ns| struck_ns.min(time_ns)));
         }
     }
 
     /// Counts a sample for every fault that had struck, until the stop. The events of its time have come.
     pub(super) fn apply_sample(&mut self, sample: &PathSample) {
-        for fault in &mut self.faults {
+        for (fault, last) in &mut self.faults {
             let Some(struck_ns) = fault.struck_ns.filter(|struck_ns| *struck_ns <= sample.sampled_ns) else {
                 continue;
             };
             if first_stop(&self.stops, struck_ns).is_none_or(|found| sample.sampled_ns <= found.time_ns) {
-                let Deviation { origin_m, incisal_m, angle_rad } = sample.deviation;
-                fault.last = sample.deviation;
-                fault.largest = Deviation {
-                    origin_m: worse(fault.largest.origin_m, origin_m),
-                    incisal_m: worse(fault.largest.incisal_m, incisal_m),
-                    angle_rad: worse(fault.largest.angle_rad, angle_rad),
-                };
+                *last = sample.deviation;
+                fault.deviation_mm = worse(fault.deviation_mm, last.incisal_m * 1e3);
+                fault.deviation_deg = worse(fault.deviation_deg, last.angle_rad.to_degrees());
             }
         }
     }
 
     /// `ended_ns`: when the controller had ended in order. A fault that strikes later tests nothing.
-    pub(super) fn into_figures(mut self, ended_ns: Option<u64>) -> Vec<FaultFigures> {
-        for fault in &mut self.faults {
+    pub(super) fn into_figures(self, ended_ns: Option<u64>) -> Vec<FaultFigures> {
+        let first = first_stop(&self.stops, 0);
+        let figures = |(mut fault, last): (FaultFigures, Deviation)| {
             fault.struck_ns.take_if(|struck_ns| ended_ns.is_some_and(|ended_ns| *struck_ns > ended_ns));
-        }
-        let figures = |(index, fault): (usize, &Effect)| {
-            // A fault that strikes during a stop has not begun it.
-            let stop = fault
-                .struck_ns
-                .and_then(|struck_ns| first_stop(&self.stops, 0).filter(|stop| stop.time_ns >= struck_ns));
-            FaultFigures {
-                number: index + 1,
-                struck_ns: fault.struck_ns,
-                deviation_mm: fault.largest.incisal_m * 1e3,
-                deviation_deg: fault.largest.angle_rad.to_degrees(),
-                detection: stop.map(|Stop { time_ns, source, cause }| Detection {
-                    source,
-                    cause,
-                    latency_ms: (time_ns - fault.struck_ns.unwrap_or(time_ns)) as f64 / 1e6,
-                    deviation_mm: fault.last.incisal_m * 1e3,
-                    deviation_deg: fault.last.angle_rad.to_degrees(),
-                }),
-            }
+            fault.detection = fault.struck_ns.zip(first).and_then(|(struck_ns, stop)| {
+                Some(Detection {
+                    source: stop.source,
+                    cause: stop.cause,
+                    // A fault that strikes during a stop has not begun it.
+                    latency_ms: stop.time_ns.checked_sub(struck_ns)? as f64 / 1e6,
+                    deviation_mm: last.incisal_m * 1e3,
+                    deviation_deg: last.angle_rad.to_degrees(),
+                })
+            });
+            fault
         };
-        self.faults.iter().enumerate().map(figures).collect()
+        self.faults.into_iter().map(figures).collect()
     }
 }
 
-fn first_stop(stops: &[Stop], struck_ns: u64) -> Option<Stop> {
-    stops.iter().filter(|found| found.time_ns >= struck_ns).min_by_key(|found| found.time_ns).copied()
+fn first_stop(stops: &[EventRecord], struck_ns: u64) -> Option<&EventRecord> {
+    stops.iter().filter(|found| found.time_ns >= struck_ns).min_by_key(|found| found.time_ns)
 }
 
 #[cfg(test)]
