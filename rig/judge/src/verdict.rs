@@ -4,6 +4,7 @@
 
 use masseter_recording::{DmaLatency, Ending, Manifest, RunUsage};
 use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind, Source};
+use masseter_scenario::ExpectedVerdict::{Died, Fail, Incomplete, Interrupted, Pass, SafeStop, Untested};
 use masseter_scenario::wording::{counted, grouped};
 use masseter_scenario::{CanConfig, ChecksConfig, ExpectConfig, ExpectedVerdict, Scenario, TimingConfig};
 use masseter_terminal::Exit;
@@ -66,7 +67,7 @@ impl Verdict {
         let (mut outcome, mut reason) = ending(&manifest.ending, figures.stopped_by, &figures.events)
             .or_else(|| stopped_by_stimulus(&manifest.scenario, &figures.events))
             // The machine caused the stop, or it came only after the jaw had left its path.
-            .filter(|(outcome, _)| !(*outcome == Outcome::SafeStop && (excuse.is_some() || is_too_late)))
+            .filter(|(ending, _)| *ending != Outcome::Named(SafeStop) || (excuse.is_none() && !is_too_late))
             .or_else(|| incomplete(figures))
             .or_else(|| {
                 let unjudged = excuse.or_else(|| unjudged(&manifest.scenario.checks, &timing, &checks))?;
@@ -78,14 +79,14 @@ impl Verdict {
                     .map(|failure| clock_jump(&manifest.usage, &manifest.scenario.can).unwrap_or(failure))
             })
             .or_else(|| untested(&checks, figures.cycles))
-            .unwrap_or_else(|| (Outcome::Passed, passed(manifest, &figures.motion)));
+            .unwrap_or_else(|| (Outcome::Named(Pass), passed(manifest, &figures.motion)));
         if let Some(expect) = expect {
             (outcome, reason) = against(expect, (outcome, reason), [&checks, &beside], figures);
         }
-        if matches!(outcome, Outcome::SafeStop | Outcome::Failed | Outcome::ChecksFailed) {
+        if matches!(outcome, Outcome::Named(SafeStop | Fail) | Outcome::ChecksFailed) {
             reason += &timing.culprit();
         }
-        if outcome != Outcome::Passed {
+        if outcome != Outcome::Named(Pass) {
             reason += &overload(&manifest.usage, manifest.scenario.rate_hz).unwrap_or_default();
         }
         Self {
@@ -113,7 +114,7 @@ impl Verdict {
 
     /// Whether checks alone decided it, so that their findings are the reason.
     pub fn is_by_checks(&self) -> bool {
-        matches!(self.outcome, Outcome::Untested | Outcome::ChecksFailed)
+        matches!(self.outcome, Outcome::Named(Untested) | Outcome::ChecksFailed)
     }
 }
 
@@ -141,13 +142,13 @@ type OutcomeReason = (Outcome, String);
 /// What master and drives show comes before what the controller reports.
 fn ending(ending: &Ending, stopped_by: Option<StoppedBy>, events: &[EventRecord]) -> Option<OutcomeReason> {
     match ending {
-        Ending::Completed => stopped_by.map(|by| (Outcome::SafeStop, stopped(Some(by), events))),
-        Ending::SafeStop => Some((Outcome::SafeStop, stopped(None, events))),
-        Ending::Died { process, how } => Some((Outcome::Died, format!("the {process} died: {how}"))),
-        Ending::Interrupted => Some((Outcome::Interrupted, "stopped by the user".to_owned())),
+        Ending::Completed => stopped_by.map(|by| (Outcome::Named(SafeStop), stopped(Some(by), events))),
+        Ending::SafeStop => Some((Outcome::Named(SafeStop), stopped(None, events))),
+        Ending::Died { process, how } => Some((Outcome::Named(Died), format!("the {process} died: {how}"))),
+        Ending::Interrupted => Some((Outcome::Named(Interrupted), "stopped by the user".to_owned())),
         Ending::NotStarted => Some((Outcome::Invalid, "real time was required and refused".to_owned())),
         Ending::RecordingFailed => {
-            Some((Outcome::Incomplete, "the recorder could not write everything".to_owned()))
+            Some((Outcome::Named(Incomplete), "the recorder could not write everything".to_owned()))
         }
     }
 }
@@ -158,7 +159,7 @@ fn stopped_by_stimulus(scenario: &Scenario, events: &[EventRecord]) -> Option<Ou
     let number = began.map(|event| event.value as usize).find(|number| {
         number.checked_sub(1).and_then(|place| scenario.stimulus.get(place)).is_some_and(|found| found.stop)
     })?;
-    Some((Outcome::Interrupted, format!("stopped by stimulus {number} of the scenario")))
+    Some((Outcome::Named(Interrupted), format!("stopped by stimulus {number} of the scenario")))
 }
 
 /// The first fault explains the stop: the controller's own event often names only the master. A controller that reports
@@ -191,7 +192,7 @@ fn incomplete(figures: &Figures) -> Option<OutcomeReason> {
     } else {
         return None;
     };
-    Some((Outcome::Incomplete, reason))
+    Some((Outcome::Named(Incomplete), reason))
 }
 
 /// Why the machine leaves nothing to judge a run by that ended normally; none where the run can be judged. What the rig
@@ -295,13 +296,12 @@ fn untested(checks: &[Check], cycles: u64) -> Option<OutcomeReason> {
     let idle = checks.iter().filter(|check| check.result == CheckResult::Untested);
     let findings: Vec<_> = idle.map(|check| format!("{}: {}", check.name, check.finding)).collect();
     let why = if cycles == 0 { "no cycle ran".to_owned() } else { findings.join("; ") };
-    (!why.is_empty()).then_some((Outcome::Untested, why))
+    (!why.is_empty()).then_some((Outcome::Named(Untested), why))
 }
 
 /// Whether a check counts beside the expected outcome, not towards it: an expected event always does. A requirement counts
 /// towards whether the run passes, but says nothing on how it ends.
 fn stands_beside(check: &Check, expect: &ExpectConfig) -> bool {
-    use ExpectedVerdict::{Fail, Pass, Untested};
     let is_by_checks = [Pass, Fail, Untested].into_iter().any(|outcome| expect.accepts(outcome));
     check.subject == Subject::ExpectedEvent || (check.is_requirement() && !is_by_checks)
 }
@@ -316,22 +316,22 @@ fn against(
 ) -> OutcomeReason {
     let Some(ending) = outcome.named() else { return (outcome, reason) };
     if !expect.accepts(ending) {
-        let reason =
-            if outcome == Outcome::Passed { "every check of the rig passed" } else { reason.as_str() };
-        return (Outcome::Failed, format!("expected {}, but {}: {reason}", wanted(expect), outcome.word()));
+        let reason = if ending == Pass { "every check of the rig passed" } else { reason.as_str() };
+        let reason = format!("expected {}, but {}: {reason}", wanted(expect), outcome.word());
+        return (Outcome::Named(Fail), reason);
     }
     if let Some(other) = other_failures(expect, [checks, beside]) {
         return other;
     }
     // The rig's own checks still count where the run goes on in order to its end.
     let own = || {
-        let is_in_order = matches!(outcome, Outcome::SafeStop | Outcome::Interrupted);
+        let is_in_order = matches!(ending, SafeStop | Interrupted);
         let short = || incomplete(figures).or_else(|| failed(checks));
         let counts =
             |check: &&Check| is_of_scenario(check) || (is_in_order && check.subject == Subject::Sequence);
         let idle: Vec<_> = checks.iter().filter(counts).cloned().collect();
         let in_order = is_in_order.then(short).flatten();
-        in_order.or_else(|| if outcome == Outcome::Untested { None } else { untested(&idle, figures.cycles) })
+        in_order.or_else(|| if ending == Untested { None } else { untested(&idle, figures.cycles) })
     };
     let lost = || {
         let names = named(beside, CheckResult::Excused)?;
@@ -341,7 +341,7 @@ fn against(
         .or_else(|| failed(beside))
         .or_else(lost)
         .or_else(|| untested(beside, figures.cycles))
-        .unwrap_or_else(|| (Outcome::Passed, format!("{}, as expected: {reason}", outcome.word())))
+        .unwrap_or_else(|| (Outcome::Named(Pass), format!("{}, as expected: {reason}", outcome.word())))
 }
 
 /// The outcome where a check did not pass beside the expected failures, or passed instead of them. None where the
@@ -362,7 +362,8 @@ fn other_failures(expect: &ExpectConfig, checks: [&[Check]; 2]) -> Option<Outcom
         [others(CheckResult::Failed, "failed"), others(CheckResult::Untested, "is untested")].concat();
     let wrong: Vec<_> = other.into_iter().chain(idle).collect();
     let lost = others(CheckResult::Excused, "may have failed by lost cycles");
-    let (outcome, wrong) = if wrong.is_empty() { (Outcome::Invalid, lost) } else { (Outcome::Failed, wrong) };
+    let (outcome, wrong) =
+        if wrong.is_empty() { (Outcome::Invalid, lost) } else { (Outcome::Named(Fail), wrong) };
     let named = expect.failed.join(", ");
     let reason = || format!("expected that {named} fails and nothing else, but {}", wrong.join(", "));
     (!wrong.is_empty()).then(|| (outcome, reason()))
@@ -371,7 +372,7 @@ fn other_failures(expect: &ExpectConfig, checks: [&[Check]; 2]) -> Option<Outcom
 /// The expected outcome, in words.
 fn wanted(expect: &ExpectConfig) -> String {
     let outcomes = ExpectedVerdict::ALL.into_iter().filter(|outcome| expect.accepts(*outcome));
-    let words: Vec<_> = outcomes.map(|outcome| Outcome::of(outcome).word()).collect();
+    let words: Vec<_> = outcomes.map(|outcome| Outcome::Named(outcome).word()).collect();
     words.join(" or ")
 }
 
@@ -390,37 +391,22 @@ fn named(checks: &[Check], result: CheckResult) -> Option<String> {
 /// The outcome of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Outcome {
-    Passed,
-    Failed,
+    /// One that a scenario can expect.
+    Named(ExpectedVerdict),
     /// Failed, by checks alone: their findings are the reason.
     ChecksFailed,
-    /// Nothing failed, and something that the scenario asks for was not tested.
-    Untested,
+    /// The run cannot be judged, which no scenario expects.
     Invalid,
-    Died,
-    SafeStop,
-    Incomplete,
-    Interrupted,
 }
 
 impl Outcome {
-    /// The outcome that a scenario expects.
-    fn of(expected: ExpectedVerdict) -> Self {
-        match expected {
-            ExpectedVerdict::Pass => Self::Passed,
-            ExpectedVerdict::Fail => Self::Failed,
-            ExpectedVerdict::SafeStop => Self::SafeStop,
-            ExpectedVerdict::Died => Self::Died,
-            ExpectedVerdict::Interrupted => Self::Interrupted,
-            ExpectedVerdict::Incomplete => Self::Incomplete,
-            ExpectedVerdict::Untested => Self::Untested,
-        }
-    }
-
-    /// The name of the outcome in `[expect]`. No scenario expects a run that cannot be judged.
+    /// Its name in `[expect]`; none of a run that cannot be judged.
     fn named(self) -> Option<ExpectedVerdict> {
-        let plain = if self == Self::ChecksFailed { Self::Failed } else { self };
-        ExpectedVerdict::ALL.into_iter().find(|expected| Self::of(*expected) == plain)
+        match self {
+            Self::Named(outcome) => Some(outcome),
+            Self::ChecksFailed => Some(Fail),
+            Self::Invalid => None,
+        }
     }
 
     fn word(self) -> &'static str {
@@ -433,15 +419,15 @@ impl Outcome {
 
     /// The word in reports, and the exit code of the program. A test that tested nothing is as red as one that failed.
     fn word_and_exit(self) -> (&'static str, Exit) {
-        match self {
-            Self::Passed => ("PASS", Exit::Passed),
-            Self::Failed | Self::ChecksFailed => ("FAIL", Exit::Failed),
-            Self::Untested => ("UNTESTED", Exit::Failed),
-            Self::Invalid => ("INVALID", Exit::Invalid),
-            Self::Died => ("DIED", Exit::Died),
-            Self::SafeStop => ("SAFE STOP", Exit::SafeStop),
-            Self::Incomplete => ("INCOMPLETE", Exit::Incomplete),
-            Self::Interrupted => ("INTERRUPTED", Exit::Interrupted),
+        match self.named() {
+            Some(Pass) => ("PASS", Exit::Passed),
+            Some(Fail) => ("FAIL", Exit::Failed),
+            Some(Untested) => ("UNTESTED", Exit::Failed),
+            Some(Died) => ("DIED", Exit::Died),
+            Some(SafeStop) => ("SAFE STOP", Exit::SafeStop),
+            Some(Incomplete) => ("INCOMPLETE", Exit::Incomplete),
+            Some(Interrupted) => ("INTERRUPTED", Exit::Interrupted),
+            None => ("INVALID", Exit::Invalid),
         }
     }
 }

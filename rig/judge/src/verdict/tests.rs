@@ -16,7 +16,7 @@ fn a_safe_stop_is_explained_by_what_went_wrong_first() {
     ];
     let (outcome, reason) =
         ending(&Ending::SafeStop, None, &events.map(|event| EventRecord::from(&event))).unwrap();
-    assert_eq!(outcome, Outcome::SafeStop);
+    assert_eq!(outcome, Outcome::Named(SafeStop));
     assert_eq!(
         reason,
         "the controller stopped the rig; first fault: master: process_data_lost \
@@ -31,7 +31,7 @@ fn what_master_and_drives_show_comes_before_what_the_controller_reports() {
     let events = [fault(Source::Controller, Cause::LawFailed), fault(Source::Master, Cause::BadMessage)];
     let shown = |stopped_by| ending(&Ending::Completed, stopped_by, &events);
     assert_eq!(shown(None), None);
-    let stopped = |reason: &str| Some((Outcome::SafeStop, reason.to_owned()));
+    let stopped = |reason: &str| Some((Outcome::Named(SafeStop), reason.to_owned()));
     assert_eq!(
         shown(Some(StoppedBy::Master)),
         stopped("the master stopped the drives; first fault: master: bad_message (value 0, limit 0)")
@@ -42,7 +42,7 @@ fn what_master_and_drives_show_comes_before_what_the_controller_reports() {
     );
     // The end of a process comes before both.
     let died = Ending::died("plant", "signal 9".to_owned());
-    assert_eq!(ending(&died, Some(StoppedBy::Master), &events).unwrap().0, Outcome::Died);
+    assert_eq!(ending(&died, Some(StoppedBy::Master), &events).unwrap().0, Outcome::Named(Died));
 }
 
 #[test]
@@ -74,8 +74,8 @@ mod outcome {
     #[test]
     fn the_exit_codes_of_scenarios_are_those_of_the_program() {
         for expected in ExpectedVerdict::ALL {
-            assert_eq!(Outcome::of(expected).exit() as u8, expected.exit_code(), "{expected:?}");
+            assert_eq!(Outcome::Named(expected).exit() as u8, expected.exit_code(), "{expected:?}");
         }
-        assert_eq!((Outcome::Invalid.named(), Outcome::Died.named()), (None, Some(ExpectedVerdict::Died)));
+        assert_eq!((Outcome::Invalid.named(), Outcome::ChecksFailed.named()), (None, Some(Fail)));
     }
 }
