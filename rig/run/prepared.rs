@@ -112,7 +112,9 @@ impl PlayedRun {
         }
         let Self { request, folder, manifest, reserved, written } = self;
         let detail = if request.verbose { Detail::Whole } else { Detail::Brief };
-        let exit = masseter_report::report_run(&folder, &manifest, request.format, detail, reserved)?;
+        let shown = Some((request.format, detail));
+        let judgement = masseter_report::report_run(&folder, &manifest, shown, reserved)?;
+        let exit = judgement.verdict.exit_code;
         written?;
         let Manifest { scenario, controller, motion_s, .. } = &manifest;
         let (controller, is_waived) = (controller.as_deref(), request.without_bring_up);
@@ -127,7 +129,7 @@ impl PlayedRun {
             return Ok(None);
         }
         let Self { folder, manifest, reserved, written, .. } = self;
-        let judgement = masseter_report::judge_run(&folder, &manifest, reserved)?;
+        let judgement = masseter_report::report_run(&folder, &manifest, None, reserved)?;
         written?;
         Ok(Some(judgement))
     }

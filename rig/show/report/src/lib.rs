@@ -19,6 +19,6 @@ mod text;
 pub use junit::junit_of_suite;
 pub use logs::{CandumpLogs, WriteError};
 pub use page::so_far as page_so_far;
-pub use run_report::{judge_run, report_past_run, report_run};
+pub use run_report::{report_past_run, report_run};
 pub use suite_page::html_of_suite;
 pub use table::Detail;

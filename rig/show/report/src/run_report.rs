@@ -24,8 +24,8 @@ enum AnalysisError {
     Frame(#[from] TapError),
 }
 
-/// Analyses and judges a run that has just ended, prints its report and writes it. `reserved` holds the summary's room on the
-/// disk until the verdict is printed.
+/// Analyses and judges a run that has just ended, prints its report and writes it. Without `shown` nothing is printed, for a run
+/// of many. `reserved` holds the summary's room on the disk until the verdict is printed.
 ///
 /// ```no_run
 /// use masseter_recording::{Manifest, RunFolder};
@@ -35,8 +35,9 @@ enum AnalysisError {
 /// let folder = RunFolder::open("runs/latest".as_ref())?;
 /// let manifest = Manifest::read(&folder)?;
 /// let reserved = std::fs::File::create(folder.file("reserved"))?;
-/// let exit = report_run(&folder, &manifest, Format::Human, Detail::Brief, reserved).map_err(|failure| failure.error)?;
-/// println!("{exit:?}");
+/// let shown = Some((Format::Human, Detail::Brief));
+/// let judgement = report_run(&folder, &manifest, shown, reserved).map_err(|failure| failure.error)?;
+/// println!("{:?}", judgement.verdict.exit_code);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
@@ -45,29 +46,13 @@ enum AnalysisError {
 pub fn report_run(
     folder: &RunFolder,
     manifest: &Manifest,
-    format: Format,
-    detail: Detail,
+    shown: Option<(Format, Detail)>,
     reserved: File,
-) -> Result<Exit, Failure> {
+) -> Result<Judgement, Failure> {
     let (figures, logged) =
         analyse(folder, manifest).context("the run's recording cannot be analysed").incomplete()?;
-    let (exit, written) =
-        show_and_write(folder, manifest, &figures, logged, (format, detail), Some(reserved))?;
+    let (judgement, written) = show_and_write(folder, manifest, &figures, logged, shown, Some(reserved))?;
     written.incomplete()?;
-    Ok(exit)
-}
-
-/// The same without printing, for a run of many.
-///
-/// # Errors
-/// As [`report_run`].
-pub fn judge_run(folder: &RunFolder, manifest: &Manifest, reserved: File) -> Result<Judgement, Failure> {
-    let (figures, logged) =
-        analyse(folder, manifest).context("the run's recording cannot be analysed").incomplete()?;
-    let judgement = Judgement::new(manifest, &figures);
-    let documents = Documents::new(manifest, &figures, &judgement.verdict)?;
-    drop(reserved);
-    documents.write(folder, &figures, logged).incomplete()?;
     Ok(judgement)
 }
 
@@ -89,8 +74,8 @@ pub fn report_past_run(path: &Path, format: Format) -> Result<Exit, Failure> {
     let unread = || format!("cannot read {}", folder.manifest().display());
     let manifest = Manifest::read(&folder).with_context(unread).usage()?;
     let (figures, logged) = analyse(&folder, &manifest).usage()?;
-    let (exit, written) =
-        show_and_write(&folder, &manifest, &figures, logged, (format, Detail::Whole), None)?;
+    let shown = Some((format, Detail::Whole));
+    let (judgement, written) = show_and_write(&folder, &manifest, &figures, logged, shown, None)?;
     match written {
         Err(WriteError { path, error }) if is_read_only(&error) => status!(
             "masseter: cannot write {}: {error}; the run is shown, and no file written",
@@ -98,7 +83,7 @@ pub fn report_past_run(path: &Path, format: Format) -> Result<Exit, Failure> {
         ),
         written => written.incomplete()?,
     }
-    Ok(exit)
+    Ok(judgement.verdict.exit_code)
 }
 
 /// Whether the folder takes no files, as an archive does.
@@ -137,24 +122,25 @@ fn show_and_write(
     manifest: &Manifest,
     figures: &Figures,
     logged: Result<(), WriteError>,
-    (format, detail): (Format, Detail),
+    shown: Option<(Format, Detail)>,
     reserved: Option<File>,
-) -> Result<(Exit, Result<(), WriteError>), Failure> {
-    let verdict = Verdict::new(manifest, figures);
-    let documents = Documents::new(manifest, figures, &verdict)?;
-    let shown = match format {
-        Format::Human => {
-            let table = table::table_in_words(manifest, figures, &verdict, detail);
+) -> Result<(Judgement, Result<(), WriteError>), Failure> {
+    let judgement = Judgement::new(manifest, figures);
+    let documents = Documents::new(manifest, figures, &judgement.verdict)?;
+    let shown = match shown {
+        None => Ok(()),
+        Some((Format::Human, detail)) => {
+            let table = table::table_in_words(manifest, figures, &judgement.verdict, detail);
             let more = if detail == Detail::Brief { "; --verbose shows every figure" } else { "" };
             let text = format!("{table}\nreport: {}{more}\n", folder.file("report.html").display());
             result_with_tones(&text, &table::TONES)
         }
-        Format::Json => result(&documents.summary),
+        Some((Format::Json, _)) => result(&documents.summary),
     };
     drop(reserved);
     let written = documents.write(folder, figures, logged);
     shown.incomplete()?;
-    Ok((verdict.exit_code, written))
+    Ok((judgement, written))
 }
 
 /// The documents of a report.
