@@ -84,7 +84,7 @@ impl EventRecord {
     }
 
     /// Whether the controller enters that state.
-    pub(crate) fn enters(&self, state: ControllerState) -> bool {
+    pub fn enters(&self, state: ControllerState) -> bool {
         let is_into = |[_, to]: &[String; 2]| to == state.name();
         self.source == Source::Controller && self.transition.as_ref().is_some_and(is_into)
     }

@@ -24,7 +24,8 @@ cycle_rate_hz = 1.43
 slide = { encoder_noise_m = 0.0, encoder_resolution_m = 1e-9 }
 leg = { encoder_noise_m = 0.0, encoder_resolution_m = 1e-9 }
 ";
-const CYCLE_S: f64 = 1.0 / 1.43;
+/// A cycle of that motion, s.
+const CHEWING_CYCLE_S: f64 = 1.0 / 1.43;
 /// The chewing motion with less and less friction: name, and what the scenario has beside the motion.
 const FRICTIONS: [(&str, &str); 3] = [
     ("all friction", ""),
@@ -103,12 +104,10 @@ fn run(scenario: &str) -> anyhow::Result<(Manifest, Figures)> {
 type CycleForces = [Curve; AXES];
 
 fn cycle_forces(figures: &Figures) -> anyhow::Result<CycleForces> {
-    let running = ControllerState::Running.name();
-    let mut begins =
-        figures.events.iter().filter(|event| matches!(&event.transition, Some([_, to]) if to == running));
-    let began_ns = begins.next().context("the motion of a run has not begun")?.time_ns;
-    let from_s = (began_ns - figures.over_time.began_ns) as f64 / 1e9 + CYCLE_S;
-    Ok(figures.over_time.force_n.each_ref().map(|curve| cut(curve, from_s, from_s + CYCLE_S, from_s)))
+    let began = figures.events.iter().find(|event| event.enters(ControllerState::Running));
+    let began_ns = began.context("the motion of a run has not begun")?.time_ns;
+    let from_s = (began_ns - figures.over_time.began_ns) as f64 / 1e9 + CHEWING_CYCLE_S;
+    Ok(figures.over_time.force_n.each_ref().map(|curve| cut(curve, from_s, from_s + CHEWING_CYCLE_S, from_s)))
 }
 
 /// The part of a curve between two times, which counts from a third.

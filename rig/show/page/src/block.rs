@@ -135,16 +135,16 @@ pub struct Column {
 }
 
 impl Column {
-    /// Of text.
+    /// Columns of text, by their titles.
     #[must_use]
-    pub fn text(title: &str) -> Self {
-        Self { title: title.to_owned(), is_number: false }
+    pub fn texts(titles: &[&str]) -> Vec<Self> {
+        titles.iter().map(|title| Self { title: (*title).to_owned(), is_number: false }).collect()
     }
 
-    /// Of numbers.
+    /// Columns of numbers, by their titles.
     #[must_use]
-    pub fn number(title: &str) -> Self {
-        Self { title: title.to_owned(), is_number: true }
+    pub fn numbers(titles: &[&str]) -> Vec<Self> {
+        titles.iter().map(|title| Self { title: (*title).to_owned(), is_number: true }).collect()
     }
 }
 
@@ -186,16 +186,15 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table whose first column holds text, and whose others hold numbers.
+    /// A table of these groups of columns, from left to right.
     #[must_use]
-    pub fn of_numbers<const N: usize>(
+    pub fn new(
         label: &str,
-        first: &str,
-        numbers: [&str; N],
-        rows: impl IntoIterator<Item = Vec<Cell>>,
+        columns: impl IntoIterator<Item = Vec<Column>>,
+        rows: impl IntoIterator<Item: IntoIterator<Item: Into<Cell>>>,
     ) -> Self {
-        let columns = [Column::text(first)].into_iter().chain(numbers.map(Column::number)).collect();
-        Self { label: label.to_owned(), columns, rows: rows.into_iter().collect() }
+        let rows = rows.into_iter().map(|row| row.into_iter().map(Into::into).collect()).collect();
+        Self { label: label.to_owned(), columns: columns.into_iter().flatten().collect(), rows }
     }
 }
 

@@ -32,30 +32,21 @@ fn scenarios(report: &SuiteReport) -> Section {
     });
     let lines = lines.into_iter().flatten().chain(warned).enumerate();
     let lines = lines.map(|(place, line)| Block::text(format!("line-{place}"), line));
-    let table = Table {
-        label: "Scenarios".to_owned(),
-        columns: vec![
-            Column::text("scenario"),
-            Column::text("result"),
-            Column::text("why"),
-            Column::text("tags"),
-            Column::number("attempts"),
-            Column::number("took, s"),
-        ],
-        rows: report.tested.iter().map(scenario_row).collect(),
-    };
+    let columns =
+        [Column::texts(&["scenario", "result", "why", "tags"]), Column::numbers(&["attempts", "took, s"])];
+    let table = Table::new("Scenarios", columns, report.tested.iter().map(scenario_row));
     let blocks = lines.chain([Block::table("scenarios", table)]).collect();
     Section::new("result", "Result", blocks)
 }
 
-fn scenario_row(tested: &TestedScenario) -> Vec<Cell> {
+fn scenario_row(tested: &TestedScenario) -> [Cell; 6] {
     let tone = match (tested.outcome(), tested.is_short()) {
         (Outcome::Passed, _) if tested.retries() > 0 => Tone::Doubtful,
         (Outcome::Passed, _) => Tone::Good,
         (_, true) => Tone::Bad,
         (_, false) => Tone::Doubtful,
     };
-    vec![
+    [
         tested.name.clone().into(),
         Cell::Mark { mark: tested.outcome().word().to_owned(), tone },
         tested.reason().into(),
@@ -71,24 +62,15 @@ fn requirements(report: &SuiteReport) -> Option<Section> {
     if rows.is_empty() {
         return None;
     }
-    let table = Table {
-        label: "Requirements by scenario".to_owned(),
-        columns: vec![
-            Column::text("id"),
-            Column::text("requirement"),
-            Column::text("scenario"),
-            Column::text("result"),
-            Column::number("margin"),
-            Column::number("of the limit"),
-            Column::number("before"),
-            Column::number("change"),
-        ],
-        rows,
-    };
+    let columns = [
+        Column::texts(&["id", "requirement", "scenario", "result"]),
+        Column::numbers(&["margin", "of the limit", "before", "change"]),
+    ];
+    let table = Table::new("Requirements by scenario", columns, rows);
     Some(Section::new("requirements", "Requirements", vec![Block::table("requirements", table)]))
 }
 
-fn requirement_row(row: &RequirementRow<'_>) -> Vec<Cell> {
+fn requirement_row(row: &RequirementRow<'_>) -> [Cell; 8] {
     let in_unit = |margin: f64| format!("{} {}", significant(margin), row.unit()).trim_end().to_owned();
     let percent = |share: f64| format!("{:.0} %", share * 100.0);
     let share = row.check.figures.as_ref().and_then(|figures| figures.relative_margin);
@@ -96,7 +78,7 @@ fn requirement_row(row: &RequirementRow<'_>) -> Vec<Cell> {
         Some(before) if before.margin.is_none() => before.result.clone(),
         before => or_dash(before.and_then(|before| before.margin), in_unit),
     };
-    vec![
+    [
         or_dash(row.check.id.as_ref(), Clone::clone).into(),
         row.check.name.to_string().into(),
         row.scenario.into(),

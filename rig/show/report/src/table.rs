@@ -13,7 +13,7 @@ use masseter_scenario::MotionConfig;
 use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, Tone};
 
-use crate::text::{columns, decimals, event_with_cycle, or_dash, us};
+use crate::text::{self, decimals, or_dash, us};
 
 /// The words that judge.
 pub(crate) const TONES: [(&str, Tone); 12] = [
@@ -54,9 +54,12 @@ pub(crate) fn table_in_words(
             write_figures(&mut text, manifest, figures)?;
         }
         write_full_speed(&mut text, manifest, figures)?;
-        write_start(&mut text, figures)?;
+        // What somebody has to know of the start, also of a run that passed.
+        list_events(&mut text, figures, "start", |event| {
+            [Cause::FaultReset, Cause::WaitsForDrive].into_iter().any(|cause| event.cause == cause)
+        })?;
         if detail == Detail::Whole || verdict.exit_code != Exit::Passed {
-            write_faults(&mut text, figures)?;
+            list_events(&mut text, figures, "faults", |event| event.kind == EventKind::Fault)?;
         }
         Ok(())
     };
@@ -117,22 +120,19 @@ fn write_figures(text: &mut String, manifest: &Manifest, figures: &Figures) -> s
     if let Some(most_n) = figures.bite_force_max_n {
         writeln!(text, "bite force: at most {most_n:.1} N")?;
     }
-    text.push('\n');
-    latencies(text, &figures.intervals)?;
-    responses(text, &figures.bus_response)?;
+    let heads = ["interval, µs", "n", "p50", "p99", "p99.9", "max"];
+    let latencies = text::table([28, 8, 10, 10, 10, 10], heads, figures.intervals.iter().map(latency));
+    write!(text, "\n{latencies}{}", responses(&figures.bus_response))?;
     writeln!(text, "\nskipped {}\n{}", skips(figures), readings(&figures.readings))?;
     usage(text, &manifest.usage)?;
     losses(text, figures)
 }
 
-fn latencies(text: &mut String, intervals: &[IntervalFigures]) -> std::fmt::Result {
-    const WIDTHS: [usize; 6] = [28, 8, 10, 10, 10, 10];
-    writeln!(text, "{}", columns(WIDTHS, ["interval, µs", "n", "p50", "p99", "p99.9", "max"]))?;
-    for IntervalFigures { name, n, p50_ns, p99_ns, p999_ns, max_ns, .. } in intervals {
-        let [p50, p99, p999, max] = [*p50_ns, *p99_ns, *p999_ns, *max_ns].map(us);
-        writeln!(text, "{}", columns(WIDTHS, [(*name).to_owned(), n.to_string(), p50, p99, p999, max]))?;
-    }
-    Ok(())
+/// Name, number of samples, median, 99 %, 99.9 % and greatest of an interval, µs.
+pub(crate) fn latency(interval: &IntervalFigures) -> [String; 6] {
+    let IntervalFigures { name, n, p50_ns, p99_ns, p999_ns, max_ns, .. } = interval;
+    let [p50, p99, p999, max] = [*p50_ns, *p99_ns, *p999_ns, *max_ns].map(us);
+    [(*name).to_owned(), n.to_string(), p50, p99, p999, max]
 }
 
 /// Cycles that the loops skipped, and stalls of the machine.
@@ -155,8 +155,8 @@ pub(crate) fn readings(readings: &ReadingFigures) -> String {
     )
 }
 
-/// Of each kind of message the one that used most of its bound, or took longest where it has none.
-fn responses(text: &mut String, response: &BusResponse) -> std::fmt::Result {
+/// Of each kind of message the one that used most of its bound, or took longest where it has none; nothing without any.
+fn responses(response: &BusResponse) -> String {
     const WIDTHS: [usize; 5] = [20, 4, 8, 10, 10];
     let measured = response.messages.iter().filter(|message| message.frames > 0);
     let kind = |message: &ResponseFigures| {
@@ -173,18 +173,13 @@ fn responses(text: &mut String, response: &BusResponse) -> std::fmt::Result {
         }
     }
     if closest.is_empty() {
-        return Ok(());
+        return String::new();
     }
-    writeln!(text, "\n{}", columns(WIDTHS, ["response, µs", "bus", "n", "max", "bound"]))?;
-    for ResponseFigures { bus, message, frames, max_ns, bound_ns } in closest {
+    let rows = closest.into_iter().map(|ResponseFigures { bus, message, frames, max_ns, bound_ns }| {
         let [max, bound] = [*max_ns, *bound_ns].map(us);
-        writeln!(
-            text,
-            "{}",
-            columns(WIDTHS, [message.clone(), bus.to_string(), frames.to_string(), max, bound])
-        )?;
-    }
-    Ok(())
+        [message.clone(), bus.to_string(), frames.to_string(), max, bound]
+    });
+    "\n".to_owned() + &text::table(WIDTHS, ["response, µs", "bus", "n", "max", "bound"], rows)
 }
 
 /// Distances between actual and desired pose.
@@ -225,28 +220,18 @@ fn losses(text: &mut String, figures: &Figures) -> std::fmt::Result {
     writeln!(text, "frames: {}", frames.join(", "))
 }
 
-/// What somebody has to know of the start, also of a run that passed.
-fn write_start(text: &mut String, figures: &Figures) -> std::fmt::Result {
-    let is_of_start = |event: &&EventRecord| {
-        [Cause::FaultReset, Cause::WaitsForDrive].into_iter().any(|cause| event.cause == cause)
-    };
-    let mut events = figures.events.iter().filter(is_of_start).peekable();
+/// The events that `is_listed`, below a heading; nothing without any.
+fn list_events(
+    text: &mut String,
+    figures: &Figures,
+    heading: &str,
+    is_listed: impl Fn(&EventRecord) -> bool,
+) -> std::fmt::Result {
+    let mut events = figures.events.iter().filter(|event| is_listed(event)).peekable();
     if events.peek().is_some() {
-        writeln!(text, "\nstart:")?;
+        writeln!(text, "\n{heading}:")?;
     }
-    events.try_for_each(|event| writeln!(text, "  {}", event_with_cycle(event)))
-}
-
-fn write_faults(text: &mut String, figures: &Figures) -> std::fmt::Result {
-    let faults: Vec<_> = figures.events.iter().filter(|event| event.kind == EventKind::Fault).collect();
-    if faults.is_empty() {
-        return Ok(());
-    }
-    writeln!(text, "\nfaults:")?;
-    for event in faults {
-        writeln!(text, "  {}", event_with_cycle(event))?;
-    }
-    Ok(())
+    events.try_for_each(|event| writeln!(text, "  cycle {:>6} {}", event.cycle, event.in_words()))
 }
 
 /// The table; nothing of a run that is no dry one.
@@ -270,8 +255,7 @@ pub(crate) fn write_full_speed(
         "mass, kg",
         "TPDO1 here, µs",
     ];
-    writeln!(text, "{}", columns(WIDTHS, heads))?;
-    for (axis, name) in AXIS_NAMES.into_iter().enumerate() {
+    let rows = AXIS_NAMES.into_iter().enumerate().map(|(axis, name)| {
         let AxisFigures { following_error_m, force_n } = figures.axes[axis];
         let (velocity_m_s, acceleration_m_s2) = (planned.velocity_m_s[axis], planned.acceleration_m_s2[axis]);
         let most_n = scenario.drives.of_axis(axis).max_force_n;
@@ -279,7 +263,7 @@ pub(crate) fn write_full_speed(
         let most_m_s2 = limits.acceleration_m_s2(axis);
         let following_um = following_error_m / dry.speed * 1e6;
         let most_um = scenario.can.following_limit_m * 1e6;
-        let cells = [
+        [
             name.to_owned(),
             format!("{velocity_m_s:.3} ({most_m_s:.3})"),
             format!("{acceleration_m_s2:.2} ({most_m_s2:.1})"),
@@ -287,9 +271,9 @@ pub(crate) fn write_full_speed(
             format!("{force_n:.1} ({most_n:.0})"),
             format!("{:.1}", (most_n - force_n).max(0.0) / acceleration_m_s2),
             process_data(figures, scenario.can.node_ids[axis]),
-        ];
-        writeln!(text, "{}", columns(WIDTHS, cells))?;
-    }
+        ]
+    });
+    text.push_str(&text::table(WIDTHS, heads, rows));
     writeln!(
         text,
         "  following: if it grows with the velocity; mass: what the rest of the force accelerates, compare it with what the \

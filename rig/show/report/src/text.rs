@@ -1,8 +1,7 @@
-//! Numbers and events as text, for the table and the page.
+//! Numbers and tables as text, for the terminal and the page.
 
 use std::fmt::Display;
 
-use masseter_judge::EventRecord;
 use masseter_scenario::Dimension;
 
 /// A dash where there is no such figure.
@@ -35,16 +34,20 @@ pub(crate) fn mm(value: Option<f64>) -> String {
     or_dash(value, |mm| format!("{} mm", decimals(mm)))
 }
 
-/// A row of a table: the first cell to the left, the others to the right, each as wide as given.
-pub(crate) fn columns<const N: usize>(widths: [usize; N], cells: [impl Display; N]) -> String {
+/// A table with columns of these widths, the first to the left, the others to the right.
+pub(crate) fn table<const N: usize>(
+    widths: [usize; N],
+    heads: [&str; N],
+    rows: impl IntoIterator<Item = [String; N]>,
+) -> String {
+    let rows: String = rows.into_iter().map(|row| columns(widths, row)).collect();
+    columns(widths, heads) + &rows
+}
+
+fn columns<const N: usize>(widths: [usize; N], cells: [impl Display; N]) -> String {
     let cells = widths.into_iter().zip(cells).enumerate().map(|(place, (width, cell))| match place {
         0 => format!("{cell:<width$}"),
         _ => format!(" {cell:>width$}"),
     });
-    cells.collect()
-}
-
-/// An event with its cycle.
-pub(crate) fn event_with_cycle(record: &EventRecord) -> String {
-    format!("cycle {:>6} {}", record.cycle, record.in_words())
+    cells.collect::<String>() + "\n"
 }

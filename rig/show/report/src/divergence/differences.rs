@@ -9,7 +9,7 @@ use masseter_terminal::Exit;
 use serde::Serialize;
 
 use super::lane::{FieldGrowth, Missing};
-use crate::text::{columns, or_dash};
+use crate::text::{or_dash, table};
 
 /// Version of the form as JSON.
 pub(super) const FORM: u32 = 1;
@@ -88,20 +88,19 @@ impl Differences {
                 "in cycle",
                 "at the end",
             ];
-            let _ = writeln!(text, "\n{}", columns(WIDTHS, heads));
-        }
-        for FieldDifference { topic, motion_s, growth } in &self.fields {
-            let cells = [
-                format!("{topic}.{}", growth.name()),
-                growth.first_cycle.to_string(),
-                or_dash(*motion_s, |motion_s| format!("{motion_s:.3}")),
-                growth.sized(growth.first),
-                or_dash(growth.beyond_one_cycle, |cycle| cycle.to_string()),
-                growth.sized(growth.largest),
-                growth.largest_cycle.to_string(),
-                growth.sized(growth.at_end),
-            ];
-            let _ = writeln!(text, "{}", columns(WIDTHS, cells));
+            let rows = self.fields.iter().map(|FieldDifference { topic, motion_s, growth }| {
+                [
+                    format!("{topic}.{}", growth.name()),
+                    growth.first_cycle.to_string(),
+                    or_dash(*motion_s, |motion_s| format!("{motion_s:.3}")),
+                    growth.sized(growth.first),
+                    or_dash(growth.beyond_one_cycle, |cycle| cycle.to_string()),
+                    growth.sized(growth.largest),
+                    growth.largest_cycle.to_string(),
+                    growth.sized(growth.at_end),
+                ]
+            });
+            text = text + "\n" + &table(WIDTHS, heads, rows);
         }
         for OneSided { topic, only_in_b, missing } in &self.one_sided {
             let Missing { first_cycle, messages } = missing;

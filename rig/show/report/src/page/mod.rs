@@ -32,10 +32,13 @@ pub fn so_far(manifest: &Manifest, figures: &Figures, number: u64, left_out: u64
 
 fn page(life: Life, first: Vec<Section>, manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Page {
     let scenario = &manifest.scenario;
+    let mechanism = mechanism_section(scenario, figures);
+    // The jaw's views take the poses from the mechanism's.
+    let jaw = mechanism.as_ref().and_then(|_| jaw_section(figures));
     let others: [Option<Section>; 11] = [
         requirements_section(figures, verdict),
-        mechanism_section(scenario, figures),
-        jaw_section(scenario, figures),
+        mechanism,
+        jaw,
         Some(motion_section(scenario, figures)),
         pressure_section(figures),
         Some(actuators_section(scenario, figures)),

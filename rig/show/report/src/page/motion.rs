@@ -233,9 +233,7 @@ struct Quantity {
     statistic: Statistic,
 }
 
-/// None without a motion.
-pub(super) fn jaw_section(scenario: &Scenario, figures: &Figures) -> Option<Section> {
-    animation_data(scenario, figures)?;
+pub(super) fn jaw_section(figures: &Figures) -> Option<Section> {
     let data = serde_json::to_value(cycles(&figures.jaw_cycles)).ok()?;
     Some(Section::new("jaw", "Jaw", vec![Block::new("jaw", Content::Jaw(data))]))
 }

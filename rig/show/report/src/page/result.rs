@@ -19,14 +19,10 @@ use crate::text::{microseconds, mm, or_dash, significant};
 pub(super) fn result_section(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Section {
     let row = |check: &Check| {
         let Check { name, finding, result, .. } = check;
-        vec![name.to_string().into(), mark(*result), finding.clone().into()]
+        [name.to_string().into(), mark(*result), finding.clone().into()]
     };
     let checks = verdict.checks.iter().filter(|check| !check.is_requirement());
-    let table = Table {
-        label: "Checks".to_owned(),
-        columns: vec![Column::text("check"), Column::text("result"), Column::text("found")],
-        rows: checks.map(row).collect(),
-    };
+    let table = Table::new("Checks", [Column::texts(&["check", "result", "found"])], checks.map(row));
     let mut blocks = vec![Block::new("verdict", Content::Verdict(panel(manifest, figures, verdict)))];
     blocks.extend(warning_blocks(manifest));
     blocks.extend([Block::new("moments", Content::Moments), Block::table("checks", table)]);
@@ -102,17 +98,11 @@ pub(super) fn requirements_section(figures: &Figures, verdict: &Verdict) -> Opti
     if rows.is_empty() {
         return None;
     }
-    let columns = vec![
-        Column::text("requirement"),
-        Column::text("result"),
-        Column::text("signal and limit"),
-        Column::text("must hold"),
-        Column::text("found"),
-        Column::number("margin"),
-        Column::number("smallest at, s"),
-        Column::number("latency, ms"),
+    let columns = [
+        Column::texts(&["requirement", "result", "signal and limit", "must hold", "found"]),
+        Column::numbers(&["margin", "smallest at, s", "latency, ms"]),
     ];
-    let table = Table { label: "Requirements".to_owned(), columns, rows };
+    let table = Table::new("Requirements", columns, rows);
     let charts = figures.requirements.iter().enumerate().filter_map(|(place, found)| {
         Some(Block::chart(format!("requirement-{place}"), requirement_chart(figures, found)?))
     });
@@ -120,12 +110,12 @@ pub(super) fn requirements_section(figures: &Figures, verdict: &Verdict) -> Opti
     Some(Section::new("requirements", "Requirements", blocks))
 }
 
-fn requirement_row(figures: &Figures, found: &RequirementFigures, check: &Check) -> Vec<Cell> {
+fn requirement_row(figures: &Figures, found: &RequirementFigures, check: &Check) -> [Cell; 8] {
     let margin = or_dash(found.margin, |margin| format!("{} {}", significant(margin), found.margin_unit));
     let share = found.relative_margin.map(|share| format!(" ({:.0} %)", share * 100.0)).unwrap_or_default();
     let plot = requirement_chart(figures, found)
         .map_or_else(|| "".into(), |chart| Cell::Plot { plot: Box::new(Chart { height: SMALL, ..chart }) });
-    vec![
+    [
         found.name.clone().into(),
         mark(check.result),
         plot,
@@ -176,10 +166,8 @@ pub(super) fn events_section(figures: &Figures) -> Section {
 
 /// The events until the controller first moves the jaw, and those from then on.
 fn phases(events: &[EventRecord]) -> (&[EventRecord], &[EventRecord]) {
-    let moves = |event: &EventRecord| {
-        event.transition.as_ref().is_some_and(|[_, to]| to == ControllerState::Easing.name())
-    };
-    events.split_at(events.iter().position(moves).unwrap_or(0))
+    let moves = events.iter().position(|event| event.enters(ControllerState::Easing));
+    events.split_at(moves.unwrap_or(0))
 }
 
 /// None where the controller declares nothing.
@@ -201,20 +189,21 @@ pub(super) fn named_section(figures: &Figures) -> Option<Section> {
 }
 
 fn signals(signals: &[SignalFigures]) -> Table {
-    let row = |named: &SignalFigures| -> Vec<Cell> {
-        let values = [named.min, named.mean, named.max, named.last].map(value_in_words);
+    let row = |named: &SignalFigures| {
+        let [min, mean, max, last] = [named.min, named.mean, named.max, named.last].map(value_in_words);
         let not_finite = match named.not_finite {
             0 => String::new(),
             count => format!(" ({count} values were no finite numbers)"),
         };
-        let words = [named.signal.name.clone(), named.signal.unit.clone()];
         let about = format!("{}{not_finite}", named.signal.about);
-        words.into_iter().chain(values).chain([about]).map(Cell::from).collect()
+        [named.signal.name.clone(), named.signal.unit.clone(), min, mean, max, last, about]
     };
-    let numbers = ["smallest", "mean", "largest", "last"].map(Column::number);
-    let columns = [Column::text("signal"), Column::text("unit")].into_iter().chain(numbers);
-    let columns = columns.chain([Column::text("meaning")]).collect();
-    Table { label: "Signals of the controller".to_owned(), columns, rows: signals.iter().map(row).collect() }
+    let columns = [
+        Column::texts(&["signal", "unit"]),
+        Column::numbers(&["smallest", "mean", "largest", "last"]),
+        Column::texts(&["meaning"]),
+    ];
+    Table::new("Signals of the controller", columns, signals.iter().map(row))
 }
 
 /// One chart for each unit, in the order of the signals' declaration.
@@ -238,10 +227,10 @@ fn signal_charts(figures: &Figures) -> Vec<Block> {
 }
 
 fn parameters(parameters: &[ParameterFigures]) -> Table {
-    let row = |named: &ParameterFigures| -> Vec<Cell> {
+    let row = |named: &ParameterFigures| {
         let parameter = &named.parameter;
         let [low, high] = parameter.range;
-        let cells = [
+        [
             parameter.name.clone(),
             parameter.unit.clone(),
             parameter.value.to_string(),
@@ -249,20 +238,14 @@ fn parameters(parameters: &[ParameterFigures]) -> Table {
             named.changes.to_string(),
             format!("{low} to {high}"),
             parameter.about.clone(),
-        ];
-        cells.map(Cell::from).into()
+        ]
     };
-    let columns = vec![
-        Column::text("parameter"),
-        Column::text("unit"),
-        Column::number("at the start"),
-        Column::number("at the end"),
-        Column::number("changes"),
-        Column::number("range"),
-        Column::text("meaning"),
+    let columns = [
+        Column::texts(&["parameter", "unit"]),
+        Column::numbers(&["at the start", "at the end", "changes", "range"]),
+        Column::texts(&["meaning"]),
     ];
-    let rows = parameters.iter().map(row).collect();
-    Table { label: "Parameters of the controller".to_owned(), columns, rows }
+    Table::new("Parameters of the controller", columns, parameters.iter().map(row))
 }
 
 fn value_in_words(value: Option<f64>) -> String {

@@ -99,20 +99,15 @@ fn in_us(ns: f64) -> f64 {
 }
 
 fn latencies(intervals: &[IntervalFigures]) -> Table {
-    let row = |interval: &IntervalFigures| -> Vec<Cell> {
-        let values = [interval.p50_ns, interval.p99_ns, interval.p999_ns, interval.max_ns].map(us);
-        let words = [interval.name.to_owned(), interval.n.to_string()];
-        words.into_iter().chain(values).map(Cell::from).collect()
-    };
-    let numbers = ["n", "p50, µs", "p99, µs", "p99.9, µs", "max, µs"];
-    Table::of_numbers("Latencies", "interval", numbers, intervals.iter().map(row))
+    let numbers = Column::numbers(&["n", "p50, µs", "p99, µs", "p99.9, µs", "max, µs"]);
+    Table::new("Latencies", [Column::texts(&["interval"]), numbers], intervals.iter().map(table::latency))
 }
 
 fn longest(figures: &Figures) -> Table {
-    let row = |worst: &WorstCycle| -> Vec<Cell> {
+    let row = |worst: &WorstCycle| {
         let count = |count: Option<u64>| or_dash(count, |count| count.to_string());
         let at_s = since_s(figures, worst.due_ns) - motion_s(figures);
-        let cells = [
+        [
             worst.cycle.to_string(),
             format!("{at_s:.3}"),
             microseconds(worst.total_ns),
@@ -123,23 +118,18 @@ fn longest(figures: &Figures) -> Table {
             us(worst.around.stolen_ns),
             count(worst.around.involuntary_switches),
             count(worst.around.page_faults),
-        ];
-        cells.map(Cell::from).into()
+        ]
     };
-    let columns = vec![
-        Column::text("cycle"),
-        Column::number("at, s of the motion"),
-        Column::number("took, µs"),
-        Column::text("hop"),
-        Column::number("hop took, µs"),
-        Column::number("median, µs"),
-        Column::number("stalls while waiting, µs"),
-        Column::number("stolen, µs"),
-        Column::number("preempted"),
-        Column::number("page faults"),
+    let of_hop = ["hop took, µs", "median, µs"];
+    let of_machine = ["stalls while waiting, µs", "stolen, µs", "preempted", "page faults"];
+    let columns = [
+        Column::texts(&["cycle"]),
+        Column::numbers(&["at, s of the motion", "took, µs"]),
+        Column::texts(&["hop"]),
+        Column::numbers(&of_hop),
+        Column::numbers(&of_machine),
     ];
-    let rows = figures.worst_cycles.iter().map(row).collect();
-    Table { label: "Longest cycles".to_owned(), columns, rows }
+    Table::new("Longest cycles", columns, figures.worst_cycles.iter().map(row))
 }
 
 /// What stands in the place of all that the frames would show.
@@ -194,21 +184,22 @@ fn load(figures: &Figures) -> Chart {
 }
 
 fn responses(messages: &[ResponseFigures]) -> Table {
-    let row = |message: &ResponseFigures| -> Vec<Cell> {
+    let row = |message: &ResponseFigures| -> [Cell; 4] {
         let max = us(message.max_ns);
         let max = if message.exceeds() { Cell::Mark { mark: max, tone: Tone::Bad } } else { max.into() };
         let name = format!("can{} {}", message.bus, message.message);
-        vec![name.into(), message.frames.to_string().into(), max, us(message.bound_ns).into()]
+        [name.into(), message.frames.to_string().into(), max, us(message.bound_ns).into()]
     };
-    let label = "Response times of the buses' messages";
-    Table::of_numbers(label, "message", ["frames", "max, µs", "bound, µs"], messages.iter().map(row))
+    let columns = [Column::texts(&["message"]), Column::numbers(&["frames", "max, µs", "bound, µs"])];
+    Table::new("Response times of the buses' messages", columns, messages.iter().map(row))
 }
 
 fn topics(topics: &[TopicFigures]) -> Table {
-    let row = |topic: &TopicFigures| -> Vec<Cell> {
-        vec![topic.topic.into(), topic.messages.to_string().into(), topic.missing.to_string().into()]
+    let row = |topic: &TopicFigures| {
+        [topic.topic.to_owned(), topic.messages.to_string(), topic.missing.to_string()]
     };
-    Table::of_numbers("Messages of the topics", "topic", ["messages", "dropped"], topics.iter().map(row))
+    let columns = [Column::texts(&["topic"]), Column::numbers(&["messages", "dropped"])];
+    Table::new("Messages of the topics", columns, topics.iter().map(row))
 }
 
 pub(super) fn circumstances_section(manifest: &Manifest) -> Section {
@@ -246,19 +237,18 @@ fn scheduling(process: &str, obtained: &Obtained) -> String {
 }
 
 fn resources(processes: &BTreeMap<String, Usage>) -> Table {
-    let row = |(process, usage): (&String, &Usage)| -> Vec<Cell> {
-        let cells = [
+    let row = |(process, usage): (&String, &Usage)| {
+        [
             process.clone(),
             format!("{:.1}", usage.share() * 100.0),
             usage.voluntary_switches.to_string(),
             usage.involuntary_switches.to_string(),
             usage.minor_faults.to_string(),
             usage.major_faults.to_string(),
-        ];
-        cells.map(Cell::from).into()
+        ]
     };
     let numbers =
         ["CPU, % of a core", "waits", "times its core was taken", "page faults, memory", "page faults, disk"];
-    let label = "Resources of the processes in their steady state";
-    Table::of_numbers(label, "process, in its steady state", numbers, processes.iter().map(row))
+    let columns = [Column::texts(&["process, in its steady state"]), Column::numbers(&numbers)];
+    Table::new("Resources of the processes in their steady state", columns, processes.iter().map(row))
 }
