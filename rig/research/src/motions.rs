@@ -12,7 +12,7 @@ use crate::solver::{COMPARED, CONTROLLER, Solver, Start, distance_rad};
 use crate::tables::{csv, number};
 
 /// A cycle of the rig, s.
-const CYCLE_S: f64 = 1e-3;
+pub(crate) const CYCLE_S: f64 = 1e-3;
 /// Leg angles closer than this to those of the inverse kinematics are the true ones, radians.
 const TRUE_WITHIN_RAD: f64 = 1e-6;
 

@@ -6,7 +6,7 @@ use masseter_controller::kinematics::{ForwardTracker, solve};
 use masseter_model::geometry::Mechanism;
 use masseter_runtime::clock;
 
-use crate::motions::Motion;
+use crate::motions::{CYCLE_S, Motion};
 use crate::solver::{COMPARED, Solver, Start};
 use crate::tables::{csv, number, quantile};
 use crate::trials::{Guesses, Trial, Trials};
@@ -15,8 +15,6 @@ use crate::trials::{Guesses, Trial, Trials};
 const CASES: usize = 2000;
 /// Calls between two readings of the clock: one alone would mostly time the clock.
 const CALLS: u32 = 8;
-/// A trajectory's cycle, s.
-const CYCLE_S: f64 = 1e-3;
 
 /// From random guesses above the base from which all three solvers reach a solution; and from the solution one
 /// millisecond of chewing before. Takes one core; nothing else of the study runs meanwhile.
