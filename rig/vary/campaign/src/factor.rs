@@ -126,7 +126,9 @@ impl Factor {
 
     fn ends(&self) -> [f64; 2] {
         let endless = [f64::NEG_INFINITY, f64::INFINITY];
-        self.range.as_ref().map_or(endless, |ends| ends.each_ref().map(|end| number(end).unwrap_or(f64::NAN)))
+        self.range
+            .as_ref()
+            .map_or(endless, |ends| ends.each_ref().map(|end| bare_number(end).unwrap_or(f64::NAN)))
     }
 
     /// Mean and deviation of a normal distribution.
@@ -209,11 +211,9 @@ impl Setting {
     /// The value as a number, without its unit; none of one that is no number.
     pub fn number(&self) -> Option<f64> {
         match self.value.as_ref()? {
-            Value::Float(number) => Some(*number),
-            Value::Integer(whole) => Some(*whole as f64),
             Value::Boolean(is_true) => Some(f64::from(u8::from(*is_true))),
             Value::String(text) => text.split_whitespace().next()?.parse().ok(),
-            _ => None,
+            other => bare_number(other),
         }
     }
 
@@ -275,7 +275,8 @@ fn is_finite(value: &Value) -> bool {
     }
 }
 
-fn number(value: &Value) -> Option<f64> {
+/// A number without a unit.
+pub(crate) fn bare_number(value: &Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
 }
 

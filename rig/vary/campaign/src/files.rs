@@ -164,46 +164,40 @@ fn results_table(campaign: &Campaign, results: &[CaseResult]) -> Table {
     let [identity, verdict, figures] = COLUMNS.map(|columns| {
         columns.iter().map(|&(name, unit, about, values)| Column::new(name, unit, about, values(results)))
     });
-    let rows = Rows(results);
-    let factors = campaign.file.factors.iter().enumerate().map(|(at, factor)| rows.factor(at, factor));
-    let checks = names(results).into_iter().flat_map(|name| rows.check_columns(&name));
+    let factors = campaign.file.factors.iter().enumerate();
+    let factors = factors.map(|(at, factor)| factor_column(results, at, factor));
+    let checks = names(results).into_iter().flat_map(|name| check_columns(results, &name));
     Table::new(identity.chain(factors).chain(verdict).chain(checks).chain(figures).collect())
 }
 
-/// Makes the columns of a table whose rows are the results.
-#[derive(Clone, Copy)]
-struct Rows<'a>(&'a [CaseResult]);
+/// Numbers where all values of the factor are numbers, otherwise words.
+fn factor_column(results: &[CaseResult], at: usize, factor: &Factor) -> Column {
+    let settings = || results.iter().map(|result| &result.settings[at]);
+    let values = if settings().all(|setting| setting.number().is_some()) {
+        Values::Numbers(settings().map(Setting::number).collect())
+    } else {
+        Values::Words(settings().map(|setting| Some(setting.word())).collect())
+    };
+    Column::new(factor.name(), factor.unit(), "factor", values)
+}
 
-impl<'a> Rows<'a> {
-    /// Numbers where all values of the factor are numbers, otherwise words.
-    fn factor(self, at: usize, factor: &Factor) -> Column {
-        let settings = || self.0.iter().map(|result| &result.settings[at]);
-        let values = if settings().all(|setting| setting.number().is_some()) {
-            Values::Numbers(settings().map(Setting::number).collect())
-        } else {
-            Values::Words(settings().map(|setting| Some(setting.word())).collect())
+/// Whether the check passed, and its margin where it has one.
+fn check_columns(results: &[CaseResult], name: &str) -> Vec<Column> {
+    let checks = || results.iter().map(|result| result.checks.iter().find(|check| check.name == name));
+    let passed = checks().map(|check| check?.passed).collect();
+    let about = "whether the check passed";
+    let mut columns = vec![Column::new(&format!("{name}.passed"), "", about, Values::Truths(passed))];
+    let with_margin = checks().flatten().find(|check| check.margin.is_some());
+    if let Some(CaseCheck { unit, .. }) = with_margin {
+        let column = |ending: &str, unit: &str, about: &str, number: fn(&CaseCheck) -> Option<f64>| {
+            let numbers = checks().map(|check| number(check?)).collect();
+            Column::new(&format!("{name}.{ending}"), unit, about, Values::Numbers(numbers))
         };
-        Column::new(factor.name(), factor.unit(), "factor", values)
+        columns.push(column("margin", unit, "distance from failing", |check| check.margin));
+        let about = "distance from failing as a share of the limit";
+        columns.push(column("relative_margin", "", about, |check| check.relative_margin));
     }
-
-    /// Whether the check passed, and its margin where it has one.
-    fn check_columns(self, name: &str) -> Vec<Column> {
-        let of = |result: &'a CaseResult| result.checks.iter().find(|check| check.name == name);
-        let passed = self.0.iter().map(|result| of(result)?.passed).collect();
-        let about = "whether the check passed";
-        let mut columns = vec![Column::new(&format!("{name}.passed"), "", about, Values::Truths(passed))];
-        let with_margin = self.0.iter().filter_map(of).find(|check| check.margin.is_some());
-        if let Some(CaseCheck { unit, .. }) = with_margin {
-            let column = |ending: &str, unit: &str, about: &str, of_check: fn(&CaseCheck) -> Option<f64>| {
-                let numbers = self.0.iter().map(|result| of_check(of(result)?)).collect();
-                Column::new(&format!("{name}.{ending}"), unit, about, Values::Numbers(numbers))
-            };
-            columns.push(column("margin", unit, "distance from failing", |check| check.margin));
-            let about = "distance from failing as a share of the limit";
-            columns.push(column("relative_margin", "", about, |check| check.relative_margin));
-        }
-        columns
-    }
+    columns
 }
 
 /// The names of all checks, in the order in which they first appear.

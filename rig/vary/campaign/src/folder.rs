@@ -71,10 +71,14 @@ impl CampaignFolder {
         }
         let lock = CampaignLock { _file: lock(path)? };
         if folder.plan_path().exists() {
-            folder.refuse_another(campaign)?;
+            let difference = folder.read_plan()?.difference_to(campaign);
+            difference.map_or(Ok(()), |words| Err(FolderError::OfAnother(path.to_owned(), words)))?;
         } else {
             let plan = serde_json::to_string_pretty(campaign).expect("a campaign has a JSON form");
-            folder.write_whole(&folder.plan_path(), &plan)?;
+            let unfinished = folder.path.join(ATTEMPTS).join(PLAN);
+            let written = write_through(&unfinished, &plan);
+            let written = written.and_then(|()| fs::rename(&unfinished, folder.plan_path()));
+            written.map_err(system(&folder.plan_path()))?;
         }
         folder.sweep()?;
         Ok((folder, lock))
@@ -134,23 +138,8 @@ impl CampaignFolder {
         Ok(())
     }
 
-    fn refuse_another(&self, campaign: &Campaign) -> Result<(), FolderError> {
-        let difference = self.read_plan()?.difference_to(campaign);
-        difference.map_or(Ok(()), |words| Err(FolderError::OfAnother(self.path.clone(), words)))
-    }
-
     fn read_plan(&self) -> Result<Campaign, FolderError> {
         read_json(&self.plan_path(), "plan")
-    }
-
-    fn write_whole(&self, path: &Path, text: &str) -> Result<(), FolderError> {
-        let write = || {
-            let mut file = tempfile::NamedTempFile::new_in(self.path.join(ATTEMPTS))?;
-            file.write_all(text.as_bytes())?;
-            file.as_file().sync_all()?;
-            file.persist(path).map_err(|error| error.error)
-        };
-        write().map(drop).map_err(system(path))
     }
 
     fn plan_path(&self) -> PathBuf {

@@ -82,7 +82,7 @@ impl Search {
         let mut start = vec![0.5; self.dimension];
         while !watch.is_over() {
             let mut generations = Generations::new(start, STEP);
-            while !watch.is_over() && !generations.has_converged() {
+            while !watch.is_over() && !generations.has_converged {
                 let points = generations.points(&mut random);
                 let value = |point: &DVector<f64>| {
                     let inside: Vec<_> = point.iter().map(|x| reflected(*x)).collect();
@@ -169,6 +169,7 @@ struct Generations {
     shape_path: DVector<f64>,
     /// Generations learned.
     count: i32,
+    /// Whether further generations tell nothing new.
     has_converged: bool,
     /// Generations in which all values were equal, in a row.
     flat: usize,
@@ -194,11 +195,6 @@ impl Generations {
             has_converged: false,
             flat: 0,
         }
-    }
-
-    /// Whether further generations tell nothing new.
-    fn has_converged(&self) -> bool {
-        self.has_converged
     }
 
     /// The points of the next generation.
@@ -378,6 +374,6 @@ mod tests {
             let valued = generations.points(&mut random).into_iter().map(|point| (1.0, point)).collect();
             generations.learn(valued);
         }
-        assert!(generations.has_converged());
+        assert!(generations.has_converged);
     }
 }

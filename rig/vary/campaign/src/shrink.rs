@@ -8,6 +8,8 @@ use std::path::Path;
 use masseter_scenario::{RequirementConfig, Scenario};
 use toml::{Table, Value};
 
+use crate::factor::bare_number;
+
 /// The lists whose entries are changes of their own.
 const LISTS: [&str; 3] = ["faults", "stimulus", REQUIREMENTS];
 /// The list whose entries stay as they are, or go whole: another limit would be another failure.
@@ -260,13 +262,9 @@ fn at_place_mut<'a>(value: &'a mut Value, place: &[String]) -> Option<&'a mut Va
     place.iter().try_fold(value, |value, name| value.as_table_mut()?.get_mut(name))
 }
 
+/// Also one with a unit.
 fn number(value: &Value) -> Option<f64> {
-    match value {
-        Value::Float(number) => Some(*number),
-        Value::Integer(whole) => Some(*whole as f64),
-        Value::String(text) => text.split_once(' ').and_then(|(number, _)| number.parse().ok()),
-        _ => None,
-    }
+    bare_number(value).or_else(|| value.as_str()?.split_once(' ')?.0.parse().ok())
 }
 
 #[cfg(test)]
