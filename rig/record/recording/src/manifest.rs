@@ -105,7 +105,7 @@ impl Manifest {
             form: FORM,
             masseter: build.to_owned(),
             began: began.to_string(),
-            wall_ahead_ns: if clock == "rt" { clock::wall_ahead_ns() } else { None },
+            wall_ahead_ns: if clock == REAL_TIME { clock::wall_ahead_ns() } else { None },
             clock: clock.to_owned(),
             controller: None,
             declared: Declared::default(),

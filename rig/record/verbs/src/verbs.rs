@@ -31,9 +31,9 @@ pub enum RecordingVerb {
     /// Save the readable messages of a damaged recording in a new one
     #[command(after_help = "Example:\n  masseter recording recover killed/recording.mcap --out whole.mcap")]
     Recover {
-        /// Recording, run folder, or a link to either
-        #[arg(default_value = "runs/latest")]
-        recording: PathBuf,
+        /// The recording to read.
+        #[command(flatten)]
+        from: RecordingArgs,
         /// New recording; must not exist [default: beside the old one, with '.recovered' in its name]
         #[arg(long, value_name = "FILE.mcap")]
         out: Option<PathBuf>,
@@ -43,9 +43,9 @@ pub enum RecordingVerb {
         after_help = "Example:\n  masseter recording thin runs/latest --out golden.mcap\n\n'masseter diff golden.mcap RUN' compares a later run with it."
     )]
     Thin {
-        /// Recording, run folder, or a link to either
-        #[arg(default_value = "runs/latest")]
-        recording: PathBuf,
+        /// The recording to read.
+        #[command(flatten)]
+        from: RecordingArgs,
         /// New recording; must not exist
         #[arg(long, value_name = "FILE.mcap")]
         out: PathBuf,
@@ -53,9 +53,9 @@ pub enum RecordingVerb {
     /// Write the attached files: the scenario, and the recorded motion that it plays
     #[command(after_help = "Example:\n  masseter recording extract recording.mcap --out /tmp/again")]
     Extract {
-        /// Recording, run folder, or a link to either
-        #[arg(default_value = "runs/latest")]
-        recording: PathBuf,
+        /// The recording to read.
+        #[command(flatten)]
+        from: RecordingArgs,
         /// Folder for the files; must not exist
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
@@ -82,9 +82,9 @@ pub fn execute(verb: &RecordingVerb) -> anyhow::Result<Exit> {
     match verb {
         RecordingVerb::Info(from) => inspect(&from.path()?, Survey::info),
         RecordingVerb::Verify(from) => inspect(&from.path()?, Survey::verification),
-        RecordingVerb::Recover { recording, out } => save_readable(&recording_at(recording)?, out.as_deref()),
-        RecordingVerb::Thin { recording, out } => keep_few(&recording_at(recording)?, out),
-        RecordingVerb::Extract { recording, out } => extract(&recording_at(recording)?, out),
+        RecordingVerb::Recover { from, out } => save_readable(&from.path()?, out.as_deref()),
+        RecordingVerb::Thin { from, out } => keep_few(&from.path()?, out),
+        RecordingVerb::Extract { from, out } => extract(&from.path()?, out),
     }
 }
 
