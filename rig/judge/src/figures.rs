@@ -112,18 +112,6 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// Deadlines that the two processes skipped, and those of them that the machine caused: it stalled while they
-    /// waited, or may have stalled while they worked.
-    pub fn skipped(&self) -> (u64, u64) {
-        let (controller, plant) = (&self.controller_skips, &self.plant_skips);
-        let is_machine = self.overrun_attribution.is_some_and(|overruns| overruns.may_be_the_machine());
-        let by_machine = |skips: &SkipFigures| {
-            let undecided = if is_machine { skips.working_undecided() } else { 0 };
-            skips.by_machine + skips.working_by_machine + undecided
-        };
-        (controller.skipped + plant.skipped, by_machine(controller) + by_machine(plant))
-    }
-
     /// Messages that were published and not recorded.
     pub fn missing_messages(&self) -> u64 {
         self.topics.iter().map(|topic| topic.missing).sum()
