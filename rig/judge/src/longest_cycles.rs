@@ -5,12 +5,11 @@
 //! command overtook the cycle's own, the path ends with the first later command that went out: the longest cycles end so.
 //! A cycle without a fresh reading has no path.
 
-use hdrhistogram::Histogram;
 use masseter_runtime::messages::{Command, Machine, Reading, State};
 use serde::Serialize;
 
 use crate::intervals::{Answer, Answers};
-use crate::measured::{histogram, record};
+use crate::measured::Durations;
 use crate::series::ByCycle;
 
 /// A cycle's path, joined from messages of both processes.
@@ -66,25 +65,19 @@ struct HopTime {
 }
 
 /// How long the hops typically take.
-#[derive(Debug, Clone)]
-struct TypicalHops([Histogram<u64>; HOPS.len()]);
-
-impl Default for TypicalHops {
-    fn default() -> Self {
-        Self(std::array::from_fn(|_| histogram()))
-    }
-}
+#[derive(Debug, Clone, Default)]
+struct TypicalHops([Durations; HOPS.len()]);
 
 impl TypicalHops {
     fn add(&mut self, path: &CyclePath) {
-        for (histogram, (_, ends)) in self.0.iter_mut().zip(HOPS) {
-            record(histogram, took_ns(ends, path), 1);
+        for (durations, (_, ends)) in self.0.iter_mut().zip(HOPS) {
+            durations.record(took_ns(ends, path), 1);
         }
     }
 
     /// The hop furthest above its median.
     fn furthest_above_median(&self, path: &CyclePath) -> HopTime {
-        let hops = HOPS.into_iter().zip(&self.0).map(|((name, ends), histogram)| HopTime {
+        let hops = HOPS.into_iter().zip(&self.0).map(|((name, ends), Durations(histogram))| HopTime {
             name,
             took_ns: took_ns(ends, path),
             p50_ns: histogram.value_at_quantile(0.5).min(histogram.max()),

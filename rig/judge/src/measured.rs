@@ -60,47 +60,44 @@ impl Seconds {
     }
 }
 
-/// Collects the samples of an interval.
+/// Durations, ns.
 #[derive(Debug, Clone)]
+pub(super) struct Durations(pub(super) Histogram<u64>);
+
+impl Default for Durations {
+    fn default() -> Self {
+        Self(Histogram::new(DIGITS).expect("three digits are allowed"))
+    }
+}
+
+impl Durations {
+    pub(super) fn record(&mut self, value_ns: u64, times: u64) {
+        self.0.record_n(value_ns, times).expect("a histogram that resizes itself takes any value");
+    }
+}
+
+/// Collects the samples of an interval.
+#[derive(Debug, Clone, Default)]
 pub(super) struct Measured {
     name: &'static str,
-    total: Histogram<u64>,
+    total: Durations,
     max_ns: u64,
     max_at_ns: u64,
-    second: Histogram<u64>,
+    second: Durations,
     second_began_ns: u64,
     seconds: Seconds,
     medians_ns: Vec<f64>,
     p99s_ns: Vec<f64>,
 }
 
-pub(super) fn histogram() -> Histogram<u64> {
-    Histogram::new(DIGITS).expect("three digits are allowed")
-}
-
-pub(super) fn record(histogram: &mut Histogram<u64>, value_ns: u64, times: u64) {
-    histogram.record_n(value_ns, times).expect("a histogram that resizes itself takes any value");
-}
-
 /// Width of the bucket that holds this value, ns: a histogram cannot separate closer values.
 pub fn resolution_ns(value_ns: u64) -> u64 {
-    histogram().equivalent_range(value_ns)
+    Durations::default().0.equivalent_range(value_ns)
 }
 
 impl Measured {
     pub(super) fn new(name: &'static str) -> Self {
-        let (total, second) = (histogram(), histogram());
-        Self {
-            name,
-            total,
-            max_ns: 0,
-            max_at_ns: 0,
-            second,
-            second_began_ns: 0,
-            seconds: Seconds::default(),
-            medians_ns: Vec::new(),
-            p99s_ns: Vec::new(),
-        }
+        Self { name, ..Self::default() }
     }
 
     pub(super) fn add(&mut self, value_ns: u64, at_ns: u64) {
@@ -111,7 +108,7 @@ impl Measured {
     pub(super) fn add_steps(&mut self, value_ns: u64, step_ns: u64, more: u64, at_ns: u64) {
         let more = more.min((u64::MAX - value_ns) / step_ns);
         let largest_ns = value_ns + more * step_ns;
-        if largest_ns > self.max_ns || self.total.is_empty() {
+        if largest_ns > self.max_ns || self.total.0.is_empty() {
             (self.max_ns, self.max_at_ns) = (largest_ns, at_ns);
         }
         if at_ns >= self.second_began_ns.saturating_add(SECOND_NS) {
@@ -121,9 +118,9 @@ impl Measured {
         let (mut value_ns, mut left) = (value_ns, more + 1);
         while left > 0 {
             // Values of one bucket are recorded at once: a damaged message may count any number of skips.
-            let alike = ((self.total.highest_equivalent(value_ns) - value_ns) / step_ns + 1).min(left);
-            record(&mut self.total, value_ns, alike);
-            record(&mut self.second, value_ns, alike);
+            let alike = ((self.total.0.highest_equivalent(value_ns) - value_ns) / step_ns + 1).min(left);
+            self.total.record(value_ns, alike);
+            self.second.record(value_ns, alike);
             left -= alike;
             value_ns = value_ns.saturating_add(alike.saturating_mul(step_ns));
         }
@@ -131,20 +128,21 @@ impl Measured {
 
     /// Ends a whole second, whose quantiles show the noise.
     fn close_second(&mut self) {
-        if self.second.is_empty() {
+        let Durations(second) = &mut self.second;
+        if second.is_empty() {
             return;
         }
-        self.medians_ns.push(self.second.value_at_quantile(0.50) as f64);
-        self.p99s_ns.push(self.second.value_at_quantile(0.99) as f64);
-        self.seconds.push(self.second_began_ns, &self.second);
-        self.second.reset();
+        self.medians_ns.push(second.value_at_quantile(0.50) as f64);
+        self.p99s_ns.push(second.value_at_quantile(0.99) as f64);
+        self.seconds.push(self.second_began_ns, second);
+        second.reset();
     }
 
     pub(super) fn into_figures(mut self) -> IntervalFigures {
-        if !self.second.is_empty() {
-            self.seconds.push(self.second_began_ns, &self.second);
+        if !self.second.0.is_empty() {
+            self.seconds.push(self.second_began_ns, &self.second.0);
         }
-        let n = self.total.len();
+        let n = self.total.0.len();
         let measured = |ns: u64| (n > 0).then_some(ns);
         IntervalFigures {
             name: self.name,
@@ -163,13 +161,13 @@ impl Measured {
 
     /// A histogram gives the end of a value's bucket, which may lie beyond the largest value.
     fn quantile_ns(&self, quantile: f64) -> u64 {
-        self.total.value_at_quantile(quantile).min(self.max_ns)
+        self.total.0.value_at_quantile(quantile).min(self.max_ns)
     }
 
     /// The distribution as HdrHistogram plots it; the largest value lies where its own share ends.
     fn curve(&self) -> Vec<(f64, u64)> {
-        let samples = self.total.len() as f64;
-        let steps = self.total.iter_quantiles(5);
+        let samples = self.total.0.len() as f64;
+        let steps = self.total.0.iter_quantiles(5);
         let points = steps.map(|step| (step.quantile_iterated_to(), step.value_iterated_to()));
         points
             .map(|(quantile, value)| ((1.0 / (1.0 - quantile)).min(samples), value.min(self.max_ns)))

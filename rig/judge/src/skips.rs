@@ -16,11 +16,10 @@
 
 use std::cmp::Reverse;
 
-use hdrhistogram::Histogram;
 use masseter_runtime::messages::{Reading, State};
 use serde::Serialize;
 
-use crate::measured::{histogram, record};
+use crate::measured::Durations;
 use crate::overruns::{LoopSamples, Overrun, OverrunCause};
 
 /// Skipped deadlines of one process, and the account of its time.
@@ -146,7 +145,7 @@ struct Work {
 }
 
 /// Follows the counters of one process.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Skips {
     pub(super) figures: SkipFigures,
     /// What the kernel counted of the loop's thread.
@@ -162,30 +161,12 @@ pub(super) struct Skips {
     carried_over: Loss,
     /// The stretch of work that is part of it, ns.
     carried_over_stretch_ns: u64,
-    /// Length of each stall of the machine, ns.
-    stalls: Histogram<u64>,
-    /// Length of each overlong stretch of work, ns.
-    overlong: Histogram<u64>,
+    /// Each stall of the machine.
+    stalls: Durations,
+    /// Each overlong stretch of work.
+    overlong: Durations,
     /// The shortest overlong stretch of work that cost a deadline and has no certain cause, ns.
     pub(super) shortest_costly_ns: Option<u64>,
-}
-
-impl Default for Skips {
-    fn default() -> Self {
-        Self {
-            figures: SkipFigures::default(),
-            samples: LoopSamples::default(),
-            overruns: Vec::new(),
-            last_seq: 0,
-            last_work: Work::default(),
-            overlong_work: Work::default(),
-            carried_over: Loss::default(),
-            carried_over_stretch_ns: 0,
-            stalls: histogram(),
-            overlong: histogram(),
-            shortest_costly_ns: None,
-        }
-    }
 }
 
 impl Skips {
@@ -227,9 +208,9 @@ impl Skips {
         if while_working > 0 {
             self.judge_overrun(stretch_ns, while_working, period_ns);
         }
-        for (histogram, lost_ns) in [(&mut self.stalls, stall_ns), (&mut self.overlong, overlong_ns)] {
+        for (durations, lost_ns) in [(&mut self.stalls, stall_ns), (&mut self.overlong, overlong_ns)] {
             if is_next && lost_ns > 0 {
-                record(histogram, lost_ns, 1);
+                durations.record(lost_ns, 1);
             }
         }
         self.carried_over = lost.carried_over(counters.late_ns);
@@ -276,12 +257,12 @@ impl Skips {
 
     /// The longest stall of the machine while the process waited, ns.
     pub(super) fn longest_stall_ns(&self) -> u64 {
-        self.stalls.max()
+        self.stalls.0.max()
     }
 
     /// Stalls while waiting, and overlong stretches of work, of at least this length.
     pub(super) fn as_long_as(&self, least_ns: u64) -> (u64, u64) {
-        let count = |histogram: &Histogram<u64>| histogram.count_between(least_ns, u64::MAX);
+        let count = |Durations(histogram): &Durations| histogram.count_between(least_ns, u64::MAX);
         (count(&self.stalls), count(&self.overlong))
     }
 }
