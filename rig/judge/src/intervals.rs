@@ -3,6 +3,7 @@
 //! A skipped deadline has no cycle and so no samples. Only the wake-ups have a second series in which it counts, with
 //! the time until the wake-up that skipped it: corrected for coordinated omission once, by the skips as counted.
 
+use masseter_can::codes;
 use masseter_runtime::messages::{Command, Reading, State};
 
 use crate::measured::{IntervalFigures, Measured};
@@ -38,42 +39,26 @@ impl Answers {
     }
 }
 
-/// An interval that a cycle passes through.
-#[derive(Debug, Clone, Copy)]
-enum Interval {
-    PlantWakeUp,
-    PlantWakeUpCorrected,
-    ProcessData,
-    ControllerWakeUp,
-    ControllerWakeUpCorrected,
-    ReadingTransport,
-    ForwardKinematics,
-    Control,
-    ControllerCycle,
-    CommandTransport,
-    CommandToWire,
-    SampleToWire,
-    /// From the plant's wake-up to the reading's publication, and from the reading's reception to the command's: both
-    /// processes and the wires, without the waits of the time table.
-    RoundTrip,
+codes! {
+    /// An interval that a cycle passes through.
+    Interval as u32 {
+        PlantWakeUp = 0 "plant wake-up",
+        PlantWakeUpCorrected = 1 "plant wake-up corrected",
+        ProcessData = 2 "process data",
+        ControllerWakeUp = 3 "controller wake-up",
+        ControllerWakeUpCorrected = 4 "controller wake-up corrected",
+        ReadingTransport = 5 "reading transport",
+        ForwardKinematics = 6 "forward kinematics",
+        Control = 7 "control",
+        ControllerCycle = 8 "controller cycle",
+        CommandTransport = 9 "command transport",
+        CommandToWire = 10 "command to wire",
+        SampleToWire = 11 "sample to wire",
+        /// From the plant's wake-up to the reading's publication, and from the reading's reception to the command's: both
+        /// processes and the wires, without the waits of the time table.
+        RoundTrip = 12 "round trip",
+    }
 }
-
-/// The names of the intervals, each at the place that is its number.
-const NAMES: [&str; Interval::RoundTrip as usize + 1] = [
-    "plant wake-up",
-    "plant wake-up corrected",
-    "process data",
-    "controller wake-up",
-    "controller wake-up corrected",
-    "reading transport",
-    "forward kinematics",
-    "control",
-    "controller cycle",
-    "command transport",
-    "command to wire",
-    "sample to wire",
-    "round trip",
-];
 
 /// All intervals of a run, and the latest messages, between which they lie. The later message completes an interval,
 /// whichever that is.
@@ -94,7 +79,8 @@ pub(super) struct Intervals {
 
 impl Intervals {
     pub(super) fn new(period_ns: u64) -> Self {
-        Self { period_ns, measured: NAMES.map(Measured::new).into(), ..Self::default() }
+        let measured = Interval::ALL.map(|interval| Measured::new(interval.name())).into();
+        Self { period_ns, measured, ..Self::default() }
     }
 
     fn add(&mut self, interval: Interval, from_ns: u64, to_ns: u64) {
