@@ -74,7 +74,7 @@ impl Timing {
         let stalled = loops.iter().map(|skips| skips.by_scenario).sum();
         let word = if figures.cycles == 0 {
             TimingWord::Unknown
-        } else if manifest.clock != "rt" {
+        } else if !manifest.is_in_real_time() {
             TimingWord::Simulated
         } else if missed > manifest.scenario.checks.missed_cycles {
             TimingWord::Missed
