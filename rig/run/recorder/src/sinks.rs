@@ -6,8 +6,8 @@
 
 use std::io::{self, IsTerminal};
 
-use masseter_judge::MOVING;
-use masseter_recording::{Backlog, Recorded, Topic};
+use masseter_judge::{MOVING, SequenceCheck};
+use masseter_recording::{Backlog, Recorded};
 use masseter_runtime::clock::SECOND_NS;
 use masseter_runtime::messages::codes::{Cause, ControllerState};
 use masseter_runtime::messages::{Reading, State, explain};
@@ -137,10 +137,8 @@ pub(super) struct Progress {
     max_late_ns: u64,
     /// Largest distance between desired and estimated position in a moving state, mm.
     max_error_mm: f64,
-    /// Last sequence number of each topic with one publisher.
-    last_seq: [u64; Topic::ALL.len()],
-    /// Gaps in the sequence numbers.
-    missing: u64,
+    /// Of all messages but the events.
+    sequence: SequenceCheck,
 }
 
 impl Progress {
@@ -155,11 +153,8 @@ impl Progress {
     }
 
     fn count_message(&mut self, message: &Recorded) {
-        // Events have several publishers, each with numbers of its own.
         if !matches!(message, Recorded::Event(_)) {
-            let last = &mut self.last_seq[message.topic() as usize];
-            self.missing += message.seq().saturating_sub(*last + 1);
-            *last = message.seq();
+            self.sequence.take(message);
         }
         match message {
             Recorded::State(state) => {
@@ -214,7 +209,8 @@ impl Progress {
     fn figures(&self, Losses { unrecorded, clients }: Losses) -> Vec<String> {
         let state = self.controller_state().map_or("?", ControllerState::name);
         let (motion_s, of_s) = (self.motion_s.min(self.running as f64 * self.period_s), self.motion_s);
-        let dropped = self.missing + unrecorded;
+        let missing: u64 = self.sequence.clone().finish().iter().map(|topic| topic.missing).sum();
+        let dropped = missing + unrecorded;
         let missed = self.state.skipped_cycles + self.reading.skipped_cycles;
         let mut figures = vec![
             format!("{state:<13} motion {motion_s:>5.2} of {of_s:.2} s"),
