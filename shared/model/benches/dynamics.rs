@@ -20,7 +20,7 @@ fn moving() -> (Mechanism, Bodies, Pose, Twist, Twist) {
     (mechanism, bodies, pose, Twist::repeat(0.1), Twist::repeat(1.0))
 }
 
-/// Forces of the axes from pose, twist and acceleration, inverse kinematics and Jacobian included.
+/// Forces of the axes from pose, twist and acceleration, with inverse kinematics and Jacobian.
 #[divan::bench]
 fn inverse_dynamics(bencher: Bencher<'_, '_>) {
     let (mechanism, bodies, pose, twist, acceleration) = moving();
@@ -30,7 +30,7 @@ fn inverse_dynamics(bencher: Bencher<'_, '_>) {
     });
 }
 
-/// The platform's acceleration under forces of the axes, inverse kinematics and Jacobian included.
+/// The platform's acceleration under forces of the axes, with inverse kinematics and Jacobian.
 #[divan::bench]
 fn forward_dynamics(bencher: Bencher<'_, '_>) {
     let (mechanism, bodies, pose, twist, _) = moving();

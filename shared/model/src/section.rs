@@ -1,10 +1,10 @@
-//! Tables of a scenario, declared once: every key with its meaning, its default, its range, and what else holds for it. Checks
+//! Tables of a scenario: every key has one declaration with its meaning, default, range, and further condition. Checks
 //! and documents follow from the declaration.
 
 use std::fmt::{self, Display, Formatter};
 use std::iter;
 
-/// Suffixes of keys and the units that they stand for. Of two that fit, the longer comes first.
+/// Suffixes of keys with their units. Of two that fit, the longer comes first.
 const UNITS: [(&str, &str); 22] = [
     ("_kg_m2", "kg m²"),
     ("_n_s_per_m", "N s/m"),
@@ -30,7 +30,7 @@ const UNITS: [(&str, &str); 22] = [
     ("_percent", "%"),
 ];
 
-/// The unit of a key, by the suffix of its name; none where it has none.
+/// The unit of a key, by the suffix of its name; none without a suffix.
 pub fn unit_of(key: &str) -> Option<&'static str> {
     UNITS.iter().find(|(suffix, _)| key.ends_with(suffix)).map(|(_, unit)| *unit)
 }
@@ -42,16 +42,16 @@ pub struct Key {
     pub name: &'static str,
     /// The lines of its doc comment. The first paragraph is its meaning.
     pub about: &'static [&'static str],
-    /// The range of its numbers; any where none is declared.
+    /// The range of its numbers; none allows any number.
     pub range: Option<Range>,
-    /// What else holds for its value, in words; empty where nothing does.
+    /// A further condition on its value, in words; empty for none.
     pub condition: &'static str,
 }
 
 /// The range of a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Range {
-    /// From the first to the second.
+    /// From the first to the second number.
     Within(f64, f64),
     /// Finite and above 0.
     Positive,
@@ -78,7 +78,7 @@ impl Range {
     }
 }
 
-/// As messages ask for it: `0 to 1`, `a finite number above 0`.
+/// The range in the words of a message: `0 to 1`, `a finite number above 0`.
 impl Display for Range {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         match self {
@@ -90,7 +90,7 @@ impl Display for Range {
     }
 }
 
-/// A value whose every number has the range of its key.
+/// A value with numbers in the range of its key.
 pub trait Numbers {
     /// Its numbers; none where the key is absent.
     fn numbers(&self) -> impl Iterator<Item = f64>;
@@ -126,7 +126,7 @@ impl<T: Numbers> Numbers for Option<T> {
     }
 }
 
-/// Declares a table: after `=>` stand the range of a key's numbers and, in words, what else holds for its value.
+/// Declares a table. After `=>` stand the range of a key's numbers and, in words, a further condition on its value.
 #[macro_export]
 macro_rules! keys {
     ($(#[$attribute:meta])* pub struct $name:ident {$(
@@ -140,7 +140,7 @@ macro_rules! keys {
         )*}
 
         impl $name {
-            /// Its keys as they are declared.
+            /// Its keys in the order of declaration.
             pub const KEYS: &'static [$crate::section::Key] = &[$($crate::section::Key {
                 name: stringify!($field),
                 about: &[$($doc),+],
@@ -148,10 +148,10 @@ macro_rules! keys {
                 condition: concat!($($($condition)?)?),
             },)*];
 
-            /// Gives key, range and number of every number that has a range to `check`.
+            /// Calls `check` with key, range and number, for every number with a range.
             ///
             /// # Errors
-            /// The first of `check`.
+            /// The first error of `check`.
             #[allow(unused_mut, unused_variables, reason = "a table may have no range")]
             pub fn check_ranges<E>(
                 &self,

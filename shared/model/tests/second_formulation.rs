@@ -1,8 +1,8 @@
-//! Inverse kinematics and Jacobian against a second formulation: plant and controller share both, so an error in them
-//! would cancel out of every tracking figure.
+//! Inverse kinematics and Jacobian against a second formulation. Plant and controller share both, so an error in them
+//! cancels out of every tracking figure.
 //!
 //! The second formulation is the loop closure of each leg, from the dimensions alone: Cᵢ + dᵢûᵢ + lᵢ(cos θᵢ v̂ᵢ + sin
-//! θᵢ ẑ) − (p + R Pᵢ) = 0. Its derivatives are central differences. Nothing of `geometry` is called for it.
+//! θᵢ ẑ) − (p + R Pᵢ) = 0. Its derivatives are central differences. The second formulation calls nothing of `geometry`.
 
 use masseter_model::geometry::{Jacobian, LEGS, Mechanism, MechanismConfig, Pose, SlideConfig};
 use nalgebra::{Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};

@@ -1,4 +1,5 @@
-//! The rigid bodies: their masses, centres of mass and inertias; and their motion with all that kinematics makes of it.
+//! The rigid bodies (masses, centres of mass, inertias), and their motion with the quantities that kinematics derives
+//! from it.
 
 use nalgebra::{Matrix3, Vector3, Vector6};
 
@@ -11,7 +12,7 @@ use crate::geometry::{InverseError, Jacobian, LEGS, Legs, Mechanism, Pose, Twist
 pub struct Link {
     /// Mass, kg.
     pub mass_kg: f64,
-    /// Centre of mass on the leg's axis, m: of the cylinder above the hinge, of the rod behind the ball.
+    /// Centre of mass on the leg's axis, m: above the hinge for the cylinder, behind the ball for the rod.
     pub centre_m: f64,
     /// Inertia about the centre of mass, for a turn about û, kg m².
     pub inertia_kg_m2: f64,
@@ -31,11 +32,11 @@ pub struct Platform {
 /// The moving bodies of the mechanism, under gravity along −z of the base. All three legs are equal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bodies {
-    /// What a slide moves and does not turn, kg; its centre of mass is the hinge.
+    /// Carriage, kg: the slide moves the carriage without a turn. Its centre of mass is the hinge.
     pub carriage_kg: f64,
-    /// Turns with the hinge.
+    /// Cylinder, which turns with the hinge.
     pub cylinder: Link,
-    /// Turns with the hinge and slides in the cylinder.
+    /// Rod, which turns with the hinge and slides in the cylinder.
     pub rod: Link,
     /// The platform.
     pub platform: Platform,
@@ -43,7 +44,7 @@ pub struct Bodies {
     pub gravity_m_s2: f64,
 }
 
-/// The equations of one leg alone, cut off at the ball, in the order d, l, θ: Q = masses · q̈ + bias.
+/// The equations of one leg, cut off at the ball, in the order d, l, θ: Q = masses · q̈ + bias.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LegEquations {
     /// kg, kg, kg m².
@@ -78,7 +79,7 @@ impl From<&DynamicsConfig> for Bodies {
 }
 
 impl Bodies {
-    /// Mass that each axis d₁ d₂ d₃ l₁ l₂ l₃ moves along itself, kg, without the platform.
+    /// Mass that each axis d₁ d₂ d₃ l₁ l₂ l₃ moves in its own direction, kg, without the platform.
     pub fn axis_mass_kg(&self) -> Vector6<f64> {
         let (slide, leg) = (self.slide_kg(), self.rod.mass_kg);
         Vector6::new(slide, slide, slide, leg, leg, leg)
@@ -94,7 +95,7 @@ impl Bodies {
         leg_m - self.rod.centre_m
     }
 
-    /// Cylinder's and rod's mass by the distance of the centre from the hinge, kg m.
+    /// First moment of cylinder and rod about the hinge, kg m.
     fn leg_moment_kg_m(&self, leg_m: f64) -> f64 {
         self.cylinder.mass_kg * self.cylinder.centre_m + self.rod.mass_kg * self.rod_from_hinge_m(leg_m)
     }
@@ -168,7 +169,7 @@ impl Motion {
         Ok(motion)
     }
 
-    /// Accelerations of the joints while the twist changes by that much a second, m/s² and rad/s²: J V̇ + J̇V.
+    /// Accelerations of the joints for a rate of change of the twist in m/s² and rad/s²: J V̇ + J̇V.
     pub fn accelerations(&self, acceleration: &Twist) -> JointAccelerations {
         JointAccelerations {
             axes_m_s2: self.jacobian.actuators * acceleration + self.bias.axes_m_s2,
@@ -181,9 +182,9 @@ impl Motion {
         self.twist.fixed_rows::<3>(3).into()
     }
 
-    /// Under a constant twist a corner is accelerated by ω×(ω×r) alone. Slide and leg see their component of this vector,
-    /// the leg also the centrifugal lθ̇², the hinge the Coriolis −2l̇θ̇/l. The first three columns of a row of the Jacobian
-    /// are the direction to project on.
+    /// Under a constant twist a corner has the acceleration ω×(ω×r) alone. Slide and leg get their component of this
+    /// vector. The leg also gets the centrifugal lθ̇², the hinge the Coriolis −2l̇θ̇/l. The first three columns of a
+    /// row of the Jacobian are the direction to project on.
     fn constant_twist_accelerations(&self) -> JointAccelerations {
         let (omega, mut bias) = (self.omega(), self.bias);
         let along_axes = self.jacobian.actuators.fixed_columns::<3>(0);

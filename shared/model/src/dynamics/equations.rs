@@ -1,5 +1,5 @@
-//! The equations of motion M V̇ + h = Jᵀ τ + w at one instant, their two solutions, and the forces and moments that the joints
-//! of each leg carry.
+//! The equations of motion M V̇ + h = Jᵀ τ + w at one instant, and their two solutions. Also the forces and moments in
+//! the joints of each leg. The equations contain no friction.
 
 use nalgebra::{Matrix3, Matrix6, Vector6};
 
@@ -19,14 +19,14 @@ pub struct Equations {
 }
 
 impl Equations {
-    /// The equations of bodies in a motion: those of the platform, and those of each leg's joints, projected on the
-    /// platform by d'Alembert's principle.
+    /// The equations of bodies in a motion. D'Alembert's principle projects the equations of each leg's joints on the
+    /// platform.
     pub fn new(bodies: &Bodies, motion: &Motion) -> Self {
         Self::with_added(bodies, motion, &Vector6::zeros())
     }
 
-    /// The same with a further mass on each axis, kg, which may be negative. It resists the change of the axis' speed, and adds
-    /// neither weight nor bias.
+    /// The equations with a further mass on each axis, kg, which may be negative. The mass resists the change of the
+    /// axis' speed, and adds neither weight nor bias.
     pub fn with_added(bodies: &Bodies, motion: &Motion, added_kg: &Vector6<f64>) -> Self {
         let mut sums = Sums::of_platform(bodies, motion);
         let (actuators, hinges) = (&motion.jacobian.actuators, &motion.jacobian.hinges);
@@ -69,7 +69,7 @@ impl Equations {
     }
 }
 
-/// What all bodies need for an acceleration of the platform, about its origin, in blocks of force and moment.
+/// Force and moment that all bodies need for an acceleration of the platform, about its origin, in blocks.
 struct Sums {
     /// Force by linear acceleration, which is symmetric.
     linear: Matrix3<f64>,
@@ -102,8 +102,8 @@ impl Sums {
         sums
     }
 
-    /// Adds a body at an arm from the platform's origin: its inertia against the acceleration of that point, which is symmetric,
-    /// and the force that the body needs without one.
+    /// Adds a body at an arm from the platform's origin. `inertia` is symmetric and resists the acceleration of that
+    /// point; the body needs `force` at zero acceleration.
     fn add_at(&mut self, arm: &Vec3, inertia: &Matrix3<f64>, force: &Vec3) {
         let crossed = |matrix: &Matrix3<f64>| {
             Matrix3::from_columns(&[0, 1, 2].map(|column| arm.cross(&matrix.column(column))))
@@ -137,7 +137,7 @@ pub struct JointWrench {
     pub moment_nm: Vec3,
 }
 
-/// What the joints of a leg carry.
+/// Reactions in the joints of a leg.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LegReactions {
     /// Force of the rod on the platform at the ball, along û, v̂, ẑ, N.
@@ -150,7 +150,7 @@ pub struct LegReactions {
     pub guide: JointWrench,
 }
 
-/// What the joints of all legs carry.
+/// Reactions in the joints of all legs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reactions {
     /// Legs 1, 2, 3.
@@ -158,14 +158,14 @@ pub struct Reactions {
 }
 
 impl Reactions {
-    /// The reactions in a motion in which the platform has an acceleration V̇ (m/s², rad/s²) under these forces of the axes
-    /// (N): those of [`Equations::inverse`], or those that [`forward`](Equations::forward)
-    /// made the acceleration of. Friction of an axis is a part of its force.
+    /// The reactions in a motion with the platform's acceleration V̇ (m/s², rad/s²) and the forces of the axes (N).
+    /// Acceleration and forces belong together by [`Equations::inverse`] or [`Equations::forward`]. Friction of an axis
+    /// is a part of its force.
     pub fn new(bodies: &Bodies, motion: &Motion, acceleration: &Twist, force_n: &Vector6<f64>) -> Self {
         Self::of_joints(bodies, motion, &motion.accelerations(acceleration), force_n)
     }
 
-    /// The same where the joints' accelerations are known.
+    /// The reactions for known accelerations of the joints.
     pub fn of_joints(
         bodies: &Bodies,
         motion: &Motion,
@@ -180,7 +180,7 @@ impl Reactions {
         Self { legs }
     }
 
-    /// What friction depends on, with the forces of the axes (N) that these reactions are of.
+    /// The loads that friction depends on. `force_n` are the axes' forces of these reactions, N.
     pub fn loads(&self, force_n: &Vector6<f64>) -> Loads {
         let across = |load: &Vec3| load.yz().norm();
         Loads {
@@ -194,16 +194,16 @@ impl Reactions {
 }
 
 impl LegReactions {
-    /// By Newton and Euler from the ball down to the guide, with accelerations in the order d, l, θ and the forces of the
-    /// leg's two axes, N.
+    /// The reactions by Newton and Euler, from the ball down to the guide. Accelerations are in the order d, l, θ;
+    /// forces are those of the leg's two axes, N.
     fn new(bodies: &Bodies, motion: &Motion, leg: usize, accelerations: [f64; 3], axes_n: [f64; 2]) -> Self {
         let [slide_m_s2, stretch_m_s2, swing_rad_s2] = accelerations;
         let (leg_m, (sin, cos)) = (motion.legs.actuators.leg_m[leg], motion.legs.sin_cos[leg]);
         let (stretch_m_s, swing_rad_s) = (motion.rates_m_s[LEGS + leg], motion.swings_rad_s[leg]);
         let (along, across) = (Vec3::new(0.0, cos, sin), Vec3::new(0.0, -sin, cos));
         let carried_m_s2 = Vec3::new(slide_m_s2, 0.0, bodies.gravity_m_s2);
-        // What a link needs to move so against its weight. The distance of its centre from the hinge grows at a speed
-        // and with an acceleration along the leg.
+        // Force and moment that a link needs for its motion against its weight. Speed and acceleration along the leg
+        // are those of the distance from the hinge to its centre.
         let needed_by = |link: &Link, arm_m: f64, speed_m_s: f64, acceleration_m_s2: f64| {
             let acceleration = carried_m_s2
                 + along * (acceleration_m_s2 - arm_m * swing_rad_s * swing_rad_s)

@@ -1,7 +1,7 @@
-//! Friction of axes and joints under load.
+//! Friction of axes and joints under load. Friction at rest is a part of the plant.
 //!
-//! Guides, screws and seals brake the axes; hinges and ball joints brake the legs' turns. Friction here depends on speed
-//! and load alone. The bristles of an axis at rest are a part of the plant.
+//! Guides, screws and seals brake the axes; hinges and ball joints brake the legs' turns. Friction here depends on
+//! speed and load alone.
 
 use nalgebra::Matrix6;
 
@@ -14,7 +14,7 @@ const LEG_SHARE: f64 = 0.25;
 /// Below about this speed the friction of a hinge or a ball fades towards zero, rad/s.
 const TURN_RAD_S: f64 = 0.01;
 
-/// Forces and moments that joints carry, all of them not negative.
+/// Forces and moments in the joints, none of them negative.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Loads {
     /// Normal force on the guide of each slide, N.
@@ -30,7 +30,7 @@ pub struct Loads {
 }
 
 impl Loads {
-    /// Loads a share of the way from here to others.
+    /// Loads at a share of the way from these to others.
     #[must_use]
     pub fn towards(&self, others: &Self, share: f64) -> Self {
         fn mix<const N: usize>(from: [f64; N], to: [f64; N], share: f64) -> [f64; N] {
@@ -68,7 +68,7 @@ pub struct Friction {
 }
 
 impl Friction {
-    /// The friction that a scenario describes.
+    /// The friction of a scenario.
     pub fn new(dynamics: &DynamicsConfig) -> Self {
         let mut config = dynamics.friction;
         if config.model == FrictionModel::None {
@@ -81,8 +81,8 @@ impl Friction {
         Self { config, unloaded_n, viscous_n_s_per_m: dynamics.viscous_friction_n_s_per_m }
     }
 
-    /// Coulomb friction of the axes d₁ d₂ d₃ l₁ l₂ l₃, N: seals, screws, and for slides the guides,
-    /// F_seal + |f|(1/η − 1) + μ(N + k M/L).
+    /// Coulomb friction of the axes d₁ d₂ d₃ l₁ l₂ l₃, N, of seals, screws, and the slides' guides: F_seal + |f|(1/η −
+    /// 1) + μ(N + k M/L).
     pub fn coulomb_n(&self, loads: &Loads) -> [f64; AXES] {
         std::array::from_fn(|axis| {
             let guided_n =
@@ -97,7 +97,7 @@ impl Friction {
         guide_coefficient * (normal_n + block_factor * moment_nm / block_spacing_m)
     }
 
-    /// Force that the screw of an axis loses, as a share of the force that the screw transmits; the same share when the load
+    /// Force that the screw of an axis loses, as a share of its transmitted force. The share is the same when the load
     /// drives.
     pub fn screw_loss(&self, axis: usize) -> f64 {
         let FrictionConfig { slide_screw_efficiency, leg_screw_efficiency, .. } = self.config;
@@ -125,8 +125,8 @@ impl Friction {
         self.viscous_n_s_per_m
     }
 
-    /// Damping of hinges and ball joints against the platform's twist V, N s/m to N m s/rad: their friction is the wrench −D V on
-    /// the platform. The torque is μ r f, and fades towards zero at rest.
+    /// Damping D of hinges and ball joints, N s/m to N m s/rad: their friction is the wrench −D V for the platform's
+    /// twist V. The torque is μ r f, and fades towards zero at rest.
     ///
     /// Each leg adds c_h h hᵀ for its hinge and c_b (I_ω − u hᵀ − h uᵀ + h hᵀ) for its ball:
     /// - c is the torque divided by the speed of the turn.
@@ -154,14 +154,14 @@ impl Friction {
         damping
     }
 
-    /// Friction of a guide per force across the slide that acts at a lever (m): μ k h/L. From 1 on the guide locks itself.
+    /// Friction of a guide per force across the slide at a lever of h (m): μ k h/L. From 1 on the guide locks itself.
     pub fn self_locking(&self, lever_m: f64) -> f64 {
         let FrictionConfig { guide_coefficient, block_factor, block_spacing_m, .. } = self.config;
         guide_coefficient * block_factor * lever_m / block_spacing_m
     }
 }
 
-/// The speed by which the torque of a turn is divided, which stays above zero at rest, rad/s.
+/// The divisor of a turn's torque, which stays above zero at rest, rad/s.
 fn faded(square_rad2_s2: f64) -> f64 {
     (square_rad2_s2 + TURN_RAD_S * TURN_RAD_S).sqrt()
 }
@@ -228,7 +228,7 @@ mod tests {
         assert!((power_w / expected_w - 1.0).abs() < 1e-3, "{power_w} W, expected {expected_w} W");
     }
 
-    /// How fast a ball turns in its socket, by the platform's twist.
+    /// Speed of a ball in its socket at the platform's twist.
     fn ball_turns(motion: &Motion, leg: usize) -> Matrix3x6<f64> {
         let along_slide = motion.jacobian.actuators.fixed_view::<1, 3>(leg, 0).transpose();
         let mut turns = -along_slide * motion.jacobian.hinges.row(leg);

@@ -1,15 +1,17 @@
 //! Rigid-body dynamics of the mechanism in closed form: forward, inverse, and the reactions in its joints.
 //!
-//! The [bodies](Bodies) are, in each leg, a carriage on the slide, a cylinder that turns with the hinge, and a rod that
-//! slides in the cylinder and ends in the ball; and the platform with the lower jaw. With V the platform's twist, τ the
-//! forces of the axes d₁ d₂ d₃ l₁ l₂ l₃, w a wrench on the platform, and J the actuators' Jacobian,
+//! Each leg has three [bodies](Bodies). The carriage moves on the slide, the cylinder turns with the hinge, and the rod
+//! slides in the cylinder and ends in the ball. The platform with the lower jaw is one more body. The equations of
+//! motion are
 //!
 //! M V̇ + h = Jᵀ τ + w.
 //!
-//! A wrench is a force (N), then a moment (N m) about the platform's origin, in base axes. [Friction] is no part of these
-//! equations: τ is what reaches the bodies. Equations and their validation: `docs/dynamics.md`.
+//! V is the platform's twist, w a wrench on the platform, and J the actuators' Jacobian. τ are the forces of the axes
+//! d₁ d₂ d₃ l₁ l₂ l₃. A wrench is a force (N), then a moment (N m) about the platform's origin, in base axes.
+//! [Friction] is no part of these equations: τ are the forces that reach the bodies. Equations and their validation:
+//! `docs/dynamics.md`.
 //!
-//! Whoever has a motion asks in this order:
+//! The order of the calls for a motion:
 //!
 //! ```
 //! use masseter_model::dynamics::DynamicsConfig;

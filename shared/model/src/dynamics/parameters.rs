@@ -1,4 +1,4 @@
-//! The parameters of the mechanism's dynamics with their defaults and ranges. A scenario checks the ranges.
+//! The parameters of the mechanism's dynamics with their defaults and ranges. The scenario checks the ranges.
 
 use std::ops::RangeInclusive;
 

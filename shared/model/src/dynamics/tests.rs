@@ -1,4 +1,4 @@
-//! Laws of mechanics that the equations keep for any bodies, poses and motions.
+//! Laws of mechanics that hold for any bodies, poses and motions.
 
 use nalgebra::{Matrix3, Matrix6, Translation3, UnitQuaternion, Vector6};
 use proptest::prelude::*;
@@ -85,7 +85,7 @@ proptest! {
         prop_assert!((swings - now.bias.hinges_rad_s2).amax() < 1e-4);
     }
 
-    /// The platform gets the acceleration for which the forces were asked, within 10⁻⁹ of it.
+    /// Forward dynamics gives back the acceleration of inverse dynamics within 10⁻⁹.
     #[test]
     fn forward_dynamics_undoes_inverse_dynamics(
         bodies in bodies(), pose in pose(), twist in twist(), acceleration in six(20.0), wrench in six(50.0),
@@ -96,7 +96,7 @@ proptest! {
         prop_assert!((found - acceleration).norm() <= 1e-9 * acceleration.norm(), "{found} {acceleration}");
     }
 
-    /// The law that ties every term of M and h to the energy of the bodies: only forces change it, by their power.
+    /// Only forces change the energy of the bodies, by their power. This law covers every term of M and h.
     #[test]
     fn energy_changes_by_the_power_of_the_forces(
         bodies in bodies(), pose in pose(), twist in twist(), force_n in six(50.0), wrench in six(5.0),
@@ -128,7 +128,7 @@ proptest! {
         prop_assert_eq!(with.bias, without.bias);
     }
 
-    /// M and the energy of motion are the same thing.
+    /// M gives the energy of motion.
     #[test]
     fn the_mass_matrix_gives_the_kinetic_energy(bodies in bodies(), pose in pose(), twist in twist()) {
         let motion = Motion::new(&mechanism(), &pose, &twist).unwrap();
@@ -137,7 +137,7 @@ proptest! {
         prop_assert!((kinetic_j - energy.kinetic_j).abs() < 1e-12 * (1.0 + kinetic_j));
     }
 
-    /// Newton's and Euler's laws of each body, from both sides.
+    /// Newton's and Euler's laws hold for each body, from both sides.
     #[test]
     fn reactions_of_all_joints_balance(
         bodies in bodies(), pose in pose(), twist in twist(), force_n in six(50.0),

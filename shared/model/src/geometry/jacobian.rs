@@ -1,4 +1,4 @@
-//! The Jacobian from the platform's twist to joint rates, how well conditioned it is, and a bound for the poses around it.
+//! The Jacobian from the platform's twist to joint rates, its conditioning, and a bound for the poses around.
 
 use nalgebra::{Matrix3x6, Matrix6, Vector6};
 
@@ -42,7 +42,7 @@ impl Jacobian {
         Self::of_legs(mechanism, &Legs { actuators: joints.actuators, sin_cos, arms_m })
     }
 
-    /// The Jacobian where the legs' directions are known (of [`Mechanism::legs`]).
+    /// The Jacobian for known directions of the legs (of [`Mechanism::legs`]).
     pub fn of_legs(mechanism: &Mechanism, legs: &Legs) -> Self {
         let mut jacobian = Self {
             actuators: Matrix6::zeros(),
@@ -73,8 +73,8 @@ impl Jacobian {
     }
 }
 
-/// The singular values of a pose's actuators' rates, with angular velocities scaled by the platform's side A₁A₂ so that all
-/// columns are velocities.
+/// The singular values of the actuators' rates at a pose. Angular velocities are scaled by the platform's side A₁A₂, so
+/// that all columns are velocities.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Conditioning {
     scaled: Matrix6<f64>,
@@ -83,15 +83,16 @@ pub struct Conditioning {
 }
 
 impl Conditioning {
-    /// The conditioning of a pose. The smallest singular value is 0 and the largest infinite where the pose is no number.
+    /// The conditioning of a pose. For a pose without a number, the smallest singular value is 0 and the largest
+    /// infinite.
     pub fn new(jacobian: &Jacobian) -> Self {
         let scaled = jacobian.scaled();
         // The eigenvalue iteration terminates for finite numbers only.
         if !scaled.iter().all(|rate| rate.is_finite()) {
             return Self { scaled, smallest: 0.0, largest: f64::INFINITY };
         }
-        // Eigenvalues of JᵀJ cost half as much as the singular values of J. They are as good far below a condition number
-        // of 10⁷, and no mechanism is of use beyond.
+        // Eigenvalues of JᵀJ cost half as much as the singular values of J. They are as good far below a condition
+        // number of 10⁷; no mechanism is of use beyond it.
         let squares = (scaled.transpose() * scaled).symmetric_eigenvalues();
         Self { scaled, smallest: squares.min().max(0.0).sqrt(), largest: squares.max().sqrt() }
     }
@@ -101,8 +102,8 @@ impl Conditioning {
         if self.smallest > 0.0 { self.largest / self.smallest } else { f64::INFINITY }
     }
 
-    /// A condition number that another pose of the same mechanism does not exceed, without singular values of its own:
-    /// each of them differs from the one here by at most the norm of the matrices' difference (Weyl's inequality).
+    /// An upper bound for the condition number of another pose of the same mechanism, without that pose's singular
+    /// values. Each singular value changes by at most the norm of the matrices' difference (Weyl's inequality).
     /// Infinite for a pose too far away.
     pub fn most(&self, other: &Jacobian) -> f64 {
         let change = (other.scaled() - self.scaled).norm();

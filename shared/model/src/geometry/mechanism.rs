@@ -1,6 +1,6 @@
-//! The mechanism's dimensions, validated once, the positions of its points at any pose, and the inverse kinematics in closed
-//! form: dᵢ = (Aᵢ − Bᵢ⁰)·ûᵢ, lᵢ and θᵢ from the part of Aᵢ − Bᵢ perpendicular to ûᵢ. Strokes are not checked here: see
-//! [`StrokeLimits`].
+//! The mechanism's validated dimensions, the positions of its points at any pose, and the inverse kinematics in closed
+//! form. The slide is dᵢ = (Aᵢ − Bᵢ⁰)·ûᵢ; lᵢ and θᵢ follow from the part of Aᵢ − Bᵢ perpendicular to ûᵢ. Strokes are
+//! not checked here: see [`StrokeLimits`].
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
@@ -57,7 +57,7 @@ const SHORTEST_SIDE_M: f64 = 1e-3;
 /// Least area of the triangle of the slides' centres, m².
 const LEAST_BASE_M2: f64 = 1e-6;
 
-/// Dimensions that describe no mechanism: the key, the value and the remedy.
+/// Dimensions that describe no mechanism, with the key, the value and the remedy.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("mechanism.{0}")]
 pub struct GeometryError(String);
@@ -69,7 +69,7 @@ const SHORTEST_LEG_M: f64 = 1e-9;
 #[doc(alias = "IK")]
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum InverseError {
-    /// The pose has a value that is no finite number, or one whose square is none.
+    /// The pose has a value that is not finite, or a value with an infinite square.
     #[error("the pose has a value that is no finite number, or too large a one")]
     NotFinite,
     /// Platform corner and hinge coincide, so the leg's angle is undefined.
@@ -92,7 +92,7 @@ struct Slide {
     inward: Vec3,
 }
 
-/// A mechanism whose dimensions have been checked.
+/// A mechanism with checked dimensions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mechanism {
     slides: [Slide; LEGS],
@@ -221,7 +221,8 @@ impl Mechanism {
         Ok(Legs { actuators, sin_cos, arms_m })
     }
 
-    /// Slides and legs of [`inverse`](Self::inverse) without the angles, which take half of its time.
+    /// Slides and legs of [`inverse`](Self::inverse) without the angles. The angles take half of the time of
+    /// [`inverse`](Self::inverse).
     ///
     /// # Errors
     /// Those of [`inverse`](Self::inverse).
@@ -242,7 +243,7 @@ impl Mechanism {
             let slide = &self.slides[leg];
             let from_centre = corner - slide.centre;
             let horizontal = from_centre.dot(&slide.inward);
-            // hypot takes five times as long, and no mechanism is so large that a square overflows.
+            // `hypot` takes five times as long, and no mechanism is so large that a square overflows.
             let leg_m = (horizontal * horizontal + from_centre.z * from_centre.z).sqrt();
             if !(leg_m.is_finite() && from_centre.iter().all(|x| x.is_finite())) {
                 return Err(InverseError::NotFinite);

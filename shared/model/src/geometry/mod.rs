@@ -1,12 +1,11 @@
 //! The mechanism: three slides, three telescopic legs and one platform.
 //!
-//! Frames, as reconstructed from the paper (Fig. 1 and its two conditions):
-//! *base* has its origin at the centre of the base, x anterior, y left, z up;
-//! *platform* has its origin at the centroid of A₁A₂A₃, x towards A₁, z along the
-//! normal (A₂−A₁)×(A₃−A₁). A pose is the platform frame in the base frame.
+//! The two frames are a reconstruction from the paper (Fig. 1 and its two conditions). The *base* has its origin at the
+//! centre of the base, x anterior, y left, z up. The *platform* has its origin at the centroid of A₁A₂A₃, x towards A₁,
+//! z along the normal (A₂−A₁)×(A₃−A₁). A pose is the platform frame in the base frame.
 //!
-//! This module holds the geometry, the closed-form inverse kinematics and the Jacobian, which controller and plant
-//! share. It does not hold forward kinematics: only the controller has it, so that the plant stays an independent oracle.
+//! Controller and plant share the geometry, the closed-form inverse kinematics and the Jacobian of this module. Forward
+//! kinematics is not here: only the controller has it, so that the plant stays an independent oracle.
 
 use serde::{Deserialize, Serialize};
 
@@ -70,7 +69,7 @@ pub struct Joints {
     pub theta_rad: [f64; LEGS],
 }
 
-/// Slides and legs at a pose, with the directions of the legs in place of the angles, which cost an arc tangent each.
+/// Slides and legs at a pose, with the directions of the legs in place of the angles. An angle costs an arc tangent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Legs {
     /// Slides and legs.
@@ -111,7 +110,7 @@ pub struct LimitViolation {
 }
 
 impl LimitViolation {
-    /// The end of the stroke that was passed.
+    /// The end of the stroke that the axis has passed.
     pub fn limit_m(&self) -> f64 {
         if self.value_m > self.highest_m { self.highest_m } else { self.lowest_m }
     }
@@ -124,13 +123,13 @@ impl StrokeLimits {
         if axis < LEGS { self.slide_m } else { self.leg_m }
     }
 
-    /// The first axis outside its stroke, if any; a value that is not a number is outside.
+    /// The first axis outside its stroke, if any. A value that is not a number is outside.
     #[inline]
     pub fn check(&self, actuators: &Actuators) -> Result<(), LimitViolation> {
         self.check_within(ROUNDING_M, actuators)
     }
 
-    /// The actuators with every axis clamped to its stroke. An axis that was outside before may come back, but go no
+    /// The actuators with every axis clamped to its stroke. An axis outside its stroke before may come back, but go no
     /// further.
     ///
     /// # Errors
@@ -163,7 +162,7 @@ impl StrokeLimits {
     }
 }
 
-/// How far one pose is from another.
+/// The difference between two poses.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Deviation {
     /// Distance of the platform's origin, m.
@@ -193,7 +192,8 @@ mod tests {
 
     const STROKES: StrokeLimits = StrokeLimits { slide_m: [-0.03, 0.03], leg_m: [0.24, 0.30] };
 
-    /// Inverse of forward kinematics at the end of a stroke ends up to a few units of the last place beyond it.
+    /// Inverse of forward kinematics at the end of a stroke gives a value up to a few units of the last place beyond
+    /// it.
     #[test]
     fn rounding_at_the_end_of_a_stroke_is_tolerated() {
         let legs = |leg_m: f64| Actuators { slide_m: [0.0; LEGS], leg_m: [leg_m; LEGS] };

@@ -1,4 +1,4 @@
-//! The mechanical energy of the bodies, body by body: a measure for tests of the model and of the plant, which include this file.
+//! The mechanical energy of the bodies, body by body. Tests of the model and of the plant include this file.
 
 use nalgebra::Vector3;
 

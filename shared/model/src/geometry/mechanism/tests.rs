@@ -3,7 +3,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// Any mechanism a builder could declare, not only the paper's.
+/// Any mechanism that a builder can declare, not only the paper's.
 fn mechanisms() -> impl Strategy<Value = Mechanism> {
     let slide = |azimuth: f64| {
         (0.04..0.09f64, -15.0..15.0f64, -10.0..10.0f64).prop_map(move |(radius, shift, skew)| {
@@ -38,7 +38,7 @@ proptest! {
         }
     }
 
-    /// The corners that the joint coordinates place give back the pose they came from.
+    /// The corners of the joint coordinates give back the original pose.
     #[test]
     fn pose_survives_the_way_through_the_corners(mechanism in mechanisms(), pose in poses()) {
         let again = frame_of_corners(&mechanism.corners_at(&pose));
