@@ -1,7 +1,9 @@
-//! A master enables a drive (CiA 402) on a simulated wire: an SDO read, then SYNC and process data until the drive follows
-//! its target. A fault destroys one frame, which its sender repeats. The log of the wire goes to standard output.
+//! A master enables a drive (CiA 402) on a simulated wire. The master reads an object by SDO, then exchanges SYNC and
+//! process data until the drive follows its target. A fault destroys one frame, which its sender repeats. The log of
+//! the wire goes to standard output.
 //!
-//! `cargo run --release --example drive -p masseter-can`. It needs no CAN interface, and gives the same log every time.
+//! `cargo run --release --example drive -p masseter-can`. The example needs no CAN interface, and gives the same log
+//! every time.
 
 use std::error::Error;
 

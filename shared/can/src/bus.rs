@@ -17,11 +17,11 @@ pub trait Bus {
     /// [`SendError`]; a refused frame is not queued. The caller decides whether to send the frame again.
     fn send(&mut self, now_ns: u64, frame: Frame) -> Result<(), SendError>;
 
-    /// The oldest frame of another node that had arrived at `now_ns` and was not fetched yet; `None` when there is none.
-    /// A port never receives its own frames.
+    /// The oldest frame of another node that has arrived at `now_ns` and is not fetched yet; `None` without such a
+    /// frame. A port never receives its own frames.
     ///
     /// # Errors
-    /// [`ReceiveError`]; frames received before and after the failure are still delivered by later calls.
+    /// [`ReceiveError`]; later calls still deliver the frames received before and after the failure.
     fn receive(&mut self, now_ns: u64) -> Result<Option<Received>, ReceiveError>;
 
     /// The port's fault confinement, as last known.
@@ -60,7 +60,7 @@ pub enum SendError {
         /// Frames the queue holds.
         capacity: usize,
     },
-    /// The controller took itself off the bus after too many errors.
+    /// The controller is off the bus after too many errors.
     #[error("bus-off (transmit error counter {tec}): check bit rate, termination and wiring, then restart")]
     BusOff {
         /// Transmit error counter.
@@ -74,10 +74,10 @@ pub enum SendError {
     },
 }
 
-/// Why nothing could be received.
+/// Why a port receives nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ReceiveError {
-    /// Frames arrived while the receive queue was full. Reported once for each group of losses.
+    /// Frames arrive while the receive queue is full. Reported once for each group of losses.
     #[error("received frames lost: {lost}; the receive queue was not emptied in time")]
     Overrun {
         /// Frames lost since the last report.
@@ -96,9 +96,9 @@ pub enum ReceiveError {
 pub enum ErrorState {
     /// The node sends, receives, and signals errors with dominant flags.
     Active,
-    /// An error counter reached 128: the node signals errors with recessive flags.
+    /// An error counter is at 128 or more: the node signals errors with recessive flags.
     Passive,
-    /// The transmit error counter passed 255: the node neither sends nor receives.
+    /// The transmit error counter is above 255: the node neither sends nor receives.
     BusOff,
 }
 

@@ -6,7 +6,7 @@
 //! Modes of operation, targets, ramps and the policy of restarting after a fault are not here.
 
 codes! {
-    /// State of a drive's power (CiA 402). Code 0 is left for a drive whose state is not known.
+    /// State of a drive's power (CiA 402). Code 0 stands for a drive in an unknown state.
     DriveState as u32 {
         /// Initialising.
         NotReadyToSwitchOn = 1 "not_ready_to_switch_on",
@@ -53,7 +53,7 @@ impl DriveState {
         )
     }
 
-    /// The state after a command; the same where the command has no effect.
+    /// The state after a command, unchanged for a command without effect.
     ///
     /// Enable operation in ready to switch on performs T3 and, by itself, T4 after it.
     #[must_use]
@@ -83,8 +83,8 @@ impl DriveState {
         next
     }
 
-    /// The state after a command to a drive that stays in quick stop until the next command (605A = 5 or 6): as
-    /// [`after`](Self::after), and T16.
+    /// The state after a command to a drive that stays in quick stop until the next command (605A = 5 or 6). This is
+    /// [`after`](Self::after) with T16.
     #[must_use]
     pub const fn after_in_held_quick_stop(self, command: StateCommand) -> Self {
         match (self, command) {
@@ -93,7 +93,7 @@ impl DriveState {
         }
     }
 
-    /// The state after the drive detected a fault (T13).
+    /// The state after the detection of a fault (T13).
     #[must_use]
     pub const fn after_fault(self) -> Self {
         match self {
@@ -102,8 +102,8 @@ impl DriveState {
         }
     }
 
-    /// The state after the drive completed its own task in this state: initialising (T1), the
-    /// quick-stop ramp (T12), the reaction to a fault (T14). Other states have no such task.
+    /// The state after the drive's own task in this state: initialising (T1), the quick-stop ramp (T12), the reaction
+    /// to a fault (T14). Other states have no such task.
     #[must_use]
     pub const fn after_completion(self) -> Self {
         match self {
@@ -132,7 +132,7 @@ const PATTERNS: [(u16, u16, DriveState); 8] = [
 pub enum StatusBit {
     /// The power stage has voltage.
     VoltageEnabled = 4,
-    /// A warning is present; the state did not change.
+    /// A warning is present; the state is unchanged.
     Warning = 7,
     /// The drive obeys the controlword.
     Remote = 9,
@@ -141,18 +141,18 @@ pub enum StatusBit {
     /// An internal limit is active, such as the software position limit 607D.
     #[doc(alias = "internal limit active")]
     InternalLimit = 11,
-    /// Cyclic synchronous modes: the target is being followed.
+    /// Cyclic synchronous modes: the drive follows the target.
     TargetFollowed = 12,
-    /// Position modes: the following error window was left for too long.
+    /// Position modes: the following error exceeds its window for too long.
     FollowingError = 13,
 }
 
 impl StatusBit {
-    /// Profile position: the new set-point was taken.
+    /// Profile position: the drive has the new set-point.
     pub const SETPOINT_ACKNOWLEDGED: Self = Self::TargetFollowed;
-    /// Homing: the home position was found.
+    /// Homing: the drive has found the home position.
     pub const HOMING_ATTAINED: Self = Self::TargetFollowed;
-    /// Homing: it failed.
+    /// Homing: the search has failed.
     pub const HOMING_ERROR: Self = Self::FollowingError;
 }
 
@@ -174,7 +174,7 @@ impl Statusword {
         Self(bits)
     }
 
-    /// The same with one bit set or cleared.
+    /// The statusword with one bit set or cleared.
     #[must_use]
     pub const fn with(self, bit: StatusBit, set: bool) -> Self {
         let mask = 1 << bit as u8;
@@ -189,7 +189,7 @@ impl Statusword {
     /// The state of the drive.
     ///
     /// # Errors
-    /// [`StatuswordError`] where the bits are those of no state.
+    /// [`StatuswordError`] for bits of no state.
     pub fn state(self) -> Result<DriveState, StatuswordError> {
         let mut patterns = PATTERNS.into_iter();
         let pattern = patterns.find(|&(mask, bits, _)| self.0 & mask == bits);
@@ -223,10 +223,10 @@ impl Controlword {
     pub const SWITCH_ON: Self = Self(Self::SHUTDOWN.0 | SWITCH_ON);
     /// Enable operation.
     pub const ENABLE_OPERATION: Self = Self(Self::SWITCH_ON.0 | ENABLE_OPERATION);
-    /// Fault reset; it takes a controlword without this bit before it.
+    /// Fault reset; the controlword before must have this bit cleared.
     pub const FAULT_RESET: Self = Self(FAULT_RESET);
 
-    /// The command to a drive in that state, given the controlword before.
+    /// The command to a drive in that state, after the previous controlword.
     ///
     /// Fault reset is the rising edge of bit 7 in the state fault. Any other bit 7 is ignored and leaves the other
     /// bits valid, so that bit 7 can never mask a quick stop.
@@ -257,7 +257,7 @@ impl Controlword {
         self.has(CHANGE_IMMEDIATELY)
     }
 
-    /// Bit 6 in profile position: the target counts from the one before.
+    /// Bit 6 in profile position: the target is relative to the previous target.
     pub const fn is_relative(self) -> bool {
         self.has(RELATIVE)
     }
@@ -267,19 +267,19 @@ impl Controlword {
         self.has(HALT)
     }
 
-    /// The same with bit 4: a new set-point, or the start of homing.
+    /// The controlword with bit 4: a new set-point, or the start of homing.
     #[must_use]
     pub const fn with_start(self) -> Self {
         Self(self.0 | MODE_START)
     }
 
-    /// The same with bit 5: a new set-point takes effect at once.
+    /// The controlword with bit 5: a new set-point takes effect at once.
     #[must_use]
     pub const fn with_immediate_change(self) -> Self {
         Self(self.0 | CHANGE_IMMEDIATELY)
     }
 
-    /// The same with bit 8: the axis stops.
+    /// The controlword with bit 8: the axis stops.
     #[must_use]
     pub const fn with_halt(self) -> Self {
         Self(self.0 | HALT)
@@ -305,12 +305,12 @@ codes! {
 /// The next controlword (6040h) on the way from `state` to the requested state. `previous` is the last controlword
 /// sent to the drive.
 ///
-/// - [`DriveRequest::Enable`] climbs one transition a call, resets a fault by an edge of bit 7 and lets a
-///   running quick stop end. It restarts a drive in fault: a caller that must not restart drives requests something else.
+/// - [`DriveRequest::Enable`] climbs one transition a call, resets a fault by an edge of bit 7 and lets a running quick
+///   stop end. The request restarts a drive in fault: a caller that must not restart drives requests something else.
 /// - [`DriveRequest::QuickStop`] brakes a drive that moves and switches off one that does not.
 /// - [`DriveRequest::Off`] takes the voltage away at once; a moving drive coasts.
 ///
-/// The function does not wait: without an answer of the drive it repeats the word, and the edge of a fault reset.
+/// The function does not wait: without an answer of the drive, the word and the edge of a fault reset repeat.
 ///
 /// # Examples
 /// From "switch on disabled" to "operation enabled":
@@ -342,7 +342,7 @@ pub const fn next_controlword(
             DriveState::ReadyToSwitchOn => Controlword::SWITCH_ON,
             DriveState::SwitchedOn | DriveState::OperationEnabled => Controlword::ENABLE_OPERATION,
             DriveState::QuickStopActive => Controlword::QUICK_STOP,
-            // A word that holds the bit already cannot raise it.
+            // A word with the bit set gives no rising edge.
             DriveState::Fault if !previous.has(FAULT_RESET) => Controlword::FAULT_RESET,
             DriveState::NotReadyToSwitchOn | DriveState::FaultReactionActive | DriveState::Fault => {
                 Controlword::DISABLE_VOLTAGE
@@ -354,8 +354,9 @@ pub const fn next_controlword(
 /// Longest value of 60C2:1.
 const LONGEST: u64 = u8::MAX as u64;
 
-/// A period in the form of object 60C2: value and power of ten, in seconds. The value has at most 255 steps, no finer than
-/// 1 µs, and the fewest digits (1 · 10⁻³ rather than 100 · 10⁻⁵): some drives accept whole ms only.
+/// A period in the form of object 60C2: value and power of ten, in seconds. The value has at most 255 steps, no finer
+/// than 1 µs. The value has the fewest digits (1 · 10⁻³ rather than 100 · 10⁻⁵), because some drives accept whole ms
+/// only.
 ///
 /// A period between two values is rounded up: a drive that ends its move too early rests until the next SYNC.
 pub const fn interpolation_period(period_ns: u64) -> (u8, i8) {

@@ -1,8 +1,8 @@
-//! Faults of a CAN link: the frames and nodes they act on, their times and their probabilities.
+//! Faults of a CAN link: their frames and nodes, their times, and their probabilities.
 //!
-//! The faults are declarative and deterministic: seed, fault and number of a frame decide whether the fault acts on the
-//! frame, however often a caller asks. [`VirtualWire`](super::VirtualWire) carries the faults out, and on any other bus
-//! [`PortFaults`](super::PortFaults).
+//! The faults are declarative and deterministic. Seed, fault and number of a frame decide whether the fault acts on the
+//! frame; the number of queries has no effect. [`VirtualWire`](super::VirtualWire) carries the faults out, and on any
+//! other bus [`PortFaults`](super::PortFaults). This module changes no frame itself.
 
 use std::ops::Range;
 
@@ -23,8 +23,8 @@ pub enum FaultKind {
         /// For how long, ns.
         by_ns: u64,
     },
-    /// Disturbs the last bit of the end of frame at the transmitter alone: the receivers have taken the
-    /// frame, and the transmitter repeats it.
+    /// Disturbs the last bit of the end of frame at the transmitter alone: the receivers have the frame, and the
+    /// transmitter repeats the frame.
     Duplicate,
     /// Makes a node send a frame whenever the bus is idle.
     Babble {
@@ -42,15 +42,15 @@ pub enum FaultKind {
 pub struct Fault {
     /// Number of the fault in reports and for its random choices; unique in the link.
     pub number: usize,
-    /// What it does.
+    /// The kind of the fault.
     pub kind: FaultKind,
-    /// Begin, ns; the greatest number where it is not known yet.
+    /// Begin, ns; the greatest number for an unknown begin.
     pub from_ns: u64,
     /// End, ns.
     pub until_ns: u64,
     /// Frames of this identifier only.
     pub id: Option<CanId>,
-    /// The port concerned: of frames their sender, of lost frames the receiver, else the node itself.
+    /// The port concerned: the sender of frames, the receiver of lost frames, otherwise the node itself.
     pub port: Option<usize>,
     /// Probability that the fault acts on a frame, 0 to 1.
     pub probability: f64,
@@ -58,7 +58,7 @@ pub struct Fault {
     pub count: u64,
 }
 
-/// A fault has begun to act, or has ended.
+/// Begin or end of a fault's effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FaultNote {
     /// When, ns.
@@ -73,10 +73,10 @@ pub struct FaultNote {
     pub has_ended: bool,
 }
 
-/// A frame with the number by which faults select frames.
+/// A frame with its number for the selection by faults.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct NumberedFrame {
-    /// Time at which a fault would act on the frame, ns.
+    /// Time of a fault's effect on the frame, ns.
     pub(crate) at_ns: u64,
     /// The port concerned.
     pub(crate) port: usize,
@@ -130,7 +130,7 @@ struct Listed {
     noted: Noted,
 }
 
-/// What the notes have said of a fault.
+/// The notes given on a fault.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 enum Noted {
     Nothing,
@@ -155,14 +155,14 @@ impl Faults {
         Self { list: faults.into_iter().map(listed).collect(), seed }
     }
 
-    /// Sets when a fault acts, where that is known only later. A number of none of these faults has no effect.
+    /// Sets the time of a fault whose time is not known at the start. A number of no fault has no effect.
     pub(crate) fn set_window(&mut self, number: usize, window_ns: Range<u64>) {
         for listed in self.list.iter_mut().filter(|listed| listed.fault.number == number) {
             (listed.fault.from_ns, listed.fault.until_ns) = (window_ns.start, window_ns.end);
         }
     }
 
-    /// Whether there are none.
+    /// Whether the list is empty.
     pub(crate) fn is_empty(&self) -> bool {
         self.list.is_empty()
     }
@@ -268,7 +268,7 @@ impl Faults {
         })
     }
 
-    /// Records an activation.
+    /// Counts an activation.
     pub(crate) fn record(&mut self, activation: FaultActivation) {
         let listed = &mut self.list[activation.place];
         listed.began_ns.get_or_insert(activation.at_ns);
@@ -285,7 +285,7 @@ impl Faults {
         next.min_by_key(|activation| activation.at_ns)
     }
 
-    /// Marks disconnections as begun. The frames they suppress are not counted.
+    /// Marks disconnections as begun. Suppressed frames do not count.
     pub(crate) fn begin_disconnections(&mut self, now_ns: u64) {
         let off = self.list.iter_mut().filter(|listed| listed.fault.kind == FaultKind::Disconnect);
         for listed in off.filter(|listed| listed.fault.from_ns <= now_ns && listed.fault.count > 0) {
@@ -293,7 +293,7 @@ impl Faults {
         }
     }
 
-    /// The next note on the faults up to `now_ns`: each fault is reported once when it acts, and once when it has ended.
+    /// The next note on the faults up to `now_ns`: one when a fault acts, and one when the fault has ended.
     pub fn next_note(&mut self, now_ns: u64) -> Option<FaultNote> {
         self.list.iter_mut().find_map(|listed| {
             let began_ns = listed.began_ns?;

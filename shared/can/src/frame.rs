@@ -16,8 +16,8 @@ const EXTENDED_FLAG: u32 = 1 << 31;
 /// The order is that of bus arbitration (ISO 11898-1): the smaller identifier wins.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub struct CanId {
-    /// The arbitration field as it goes over the wire, without RTR: 11 bits of base, IDE, 18 bits of
-    /// extension. Dominant is 0, so comparing these numbers is arbitrating.
+    /// The arbitration field on the wire, without RTR: 11 bits of base, IDE, 18 bits of extension. Dominant is 0, so a
+    /// comparison of these numbers is an arbitration.
     arbitration: u32,
 }
 
@@ -49,8 +49,8 @@ impl CanId {
     /// From the form of `SocketCAN`: bit 31 is set for a 29-bit identifier.
     ///
     /// # Errors
-    /// [`FrameError`] where the number is too large. The flags of remote and error frames (bits 30 and 29) are
-    /// refused in this way too.
+    /// [`FrameError`] for a number that is too large, also for one with the flags of remote and error frames (bits 30
+    /// and 29).
     pub const fn from_flagged(flagged: u32) -> Result<Self, FrameError> {
         match flagged {
             ..=STANDARD_MAX => Self::standard(flagged as u16),
@@ -59,12 +59,12 @@ impl CanId {
         }
     }
 
-    /// The identifier with bit 31 set for a 29-bit one.
+    /// The number of the identifier, with bit 31 set for 29 bits.
     pub const fn flagged(self) -> u32 {
         if self.is_extended() { self.number() | EXTENDED_FLAG } else { self.number() }
     }
 
-    /// Whether it has 29 bits.
+    /// Whether the identifier has 29 bits.
     pub const fn is_extended(self) -> bool {
         self.arbitration & IDE != 0
     }

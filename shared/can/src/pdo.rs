@@ -1,4 +1,4 @@
-//! PDOs of a drive in cyclic synchronous position mode (CiA 301 objects 1600h and 1A00h): one PDO in each direction, both
+//! PDOs of a drive in cyclic synchronous position mode (CiA 301 objects 1600h and 1A00h). Each direction has one PDO,
 //! synchronous (type 1).
 //!
 //! | PDO | mapped objects | bytes |
@@ -6,8 +6,8 @@
 //! | RPDO1 (200h + node) | 6040 controlword u16, 607A target position i32; 60B2 torque offset i16 where it is mapped | 6 or 8 |
 //! | TPDO1 (180h + node) | 6041 statusword u16, 6064 position actual i32, 6077 torque actual i16 | 8 |
 //!
-//! A [`PdoMapping`] has their order. All values are little endian. Positions are encoder increments, torque is per mille of
-//! the rated torque. The length of an increment and the time at which a PDO takes effect are not part of this module.
+//! A [`PdoMapping`] has their order. All values are little endian. Positions are encoder increments, torque is per
+//! mille of the rated torque. The length of an increment and the effective time of a PDO are not part of this module.
 
 use crate::canopen::{Cob, LengthError, NodeId, ObjectAddress};
 use crate::cia402::{Controlword, Statusword};
@@ -28,7 +28,7 @@ pub struct Rpdo1 {
 pub const EVERY_SYNC: u8 = 1;
 
 impl Rpdo1 {
-    /// The frame that carries it to that drive.
+    /// The frame to that drive.
     pub fn frame(self, node: NodeId, mapping: &PdoMapping) -> Frame {
         let Self { controlword, target_increments, torque_offset_permille } = self;
         mapping.pack(Cob::Rpdo1(node), |object| match object.index {
@@ -66,7 +66,7 @@ pub struct Tpdo1 {
 }
 
 impl Tpdo1 {
-    /// The frame that carries it from that drive.
+    /// The frame from that drive.
     pub fn frame(self, node: NodeId, mapping: &PdoMapping) -> Frame {
         let Self { statusword, actual_increments, torque_permille } = self;
         mapping.pack(Cob::Tpdo1(node), |object| match object.index {
@@ -120,7 +120,7 @@ pub struct PdoMapping {
     count: usize,
 }
 
-/// Objects that the PDO of a drive cannot have.
+/// Why objects are no PDO of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum PdoMappingError {
     /// An object that the master does not exchange.
@@ -199,7 +199,7 @@ impl PdoMapping {
         Frame::new(cob.into(), &data.to_le_bytes()[..self.length()]).expect("a mapping fits a frame")
     }
 
-    /// Hands out the value of each object.
+    /// Reads the value of each object.
     fn unpack(
         &self,
         pdo: &'static str,

@@ -23,11 +23,11 @@ pub struct PeriodicMessage {
     pub period_ns: u64,
     /// Latest arrival after the begin of the period, ns.
     pub deadline_ns: u64,
-    /// The message whose arrival releases this one; without a release, the begin of the period releases it.
+    /// The message whose arrival releases this message; without one, the begin of the period is the release.
     pub release: Option<Release>,
 }
 
-/// The release of a message by another's arrival.
+/// The release of a message by the arrival of another message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Release {
     /// The other message, which is more urgent.
@@ -43,9 +43,9 @@ pub struct PlannedMessage {
     pub message: PeriodicMessage,
     /// Longest time on the wire, interframe space included, ns.
     pub transmission_ns: u64,
-    /// The latest release after the begin of the period, ns; `None` where there is no bound.
+    /// The latest release after the begin of the period, ns; `None` without a bound.
     pub jitter_ns: Option<u64>,
-    /// Longest time from release to arrival, ns; `None` where there is no bound.
+    /// Longest time from release to arrival, ns; `None` without a bound.
     pub response_ns: Option<u64>,
 }
 
@@ -55,13 +55,13 @@ impl PlannedMessage {
         self.arrival_ns().is_some_and(|arrival_ns| arrival_ns <= self.message.deadline_ns)
     }
 
-    /// The latest arrival after the begin of the period, ns; `None` where there is no bound.
+    /// The latest arrival after the begin of the period, ns; `None` without a bound.
     pub fn arrival_ns(&self) -> Option<u64> {
         Some(self.jitter_ns? + self.response_ns?)
     }
 }
 
-/// Share of the time that the messages take at worst.
+/// Worst-case share of the bus time.
 fn utilisation(messages: &[PlannedMessage]) -> f64 {
     messages.iter().map(|planned| planned.transmission_ns as f64 / planned.message.period_ns as f64).sum()
 }
@@ -102,13 +102,13 @@ pub struct BusPlan {
 #[error("{0}\nuse a longer period, a faster bit rate or more buses")]
 pub struct Overload(pub Box<BusPlan>);
 
-/// A message whose release is not by a more urgent message of its bus.
+/// A message whose release names no more urgent message of its bus.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{name}: its releaser {releaser}h is not a more urgent message of the same bus")]
 pub struct NoReleaser {
     /// The message.
     pub name: String,
-    /// The message that should release it.
+    /// The named releaser.
     pub releaser: CanId,
 }
 
@@ -134,20 +134,20 @@ impl BusPlan {
         planned.sort_by_key(|planned| planned.message.id);
         let bit_ns = bitrate.bits_to_ns(1);
         for index in 0..planned.len() {
-            // The message that releases this one is analysed already.
+            // The analysis of the releaser is done already.
             planned[index].jitter_ns = jitter_ns(&planned[index].message, &planned[..index])?;
             planned[index].response_ns = response_ns(&planned, index, bit_ns);
         }
         Ok(Self { bus, bitrate, cycle_ns, messages: planned })
     }
 
-    /// The longest that all messages of one cycle take together, ns.
+    /// Worst-case time of all messages of one cycle together, ns.
     pub fn cycle_time_ns(&self) -> u64 {
         let cyclic = self.messages.iter().filter(|planned| planned.message.period_ns == self.cycle_ns);
         cyclic.map(|planned| planned.transmission_ns).sum()
     }
 
-    /// Share of the bus time that all messages take at worst; more than 1 does not fit.
+    /// Worst-case share of the bus time of all messages; more than 1 does not fit.
     pub fn utilisation(&self) -> f64 {
         utilisation(&self.messages)
     }
@@ -155,7 +155,7 @@ impl BusPlan {
     /// Whether every message arrives in time.
     ///
     /// # Errors
-    /// [`Overload`], which shows the plan, where one does not.
+    /// [`Overload`] with the plan, for a message that arrives late.
     pub fn check(&self) -> Result<(), Overload> {
         let fits = self.messages.iter().all(PlannedMessage::fits);
         if fits { Ok(()) } else { Err(Overload(Box::new(self.clone()))) }
@@ -209,11 +209,11 @@ impl fmt::Display for BusPlan {
     }
 }
 
-/// Longest busy period of the analysis. Near a load of 1 the iteration takes ever more steps, and at 1 there is no bound.
+/// Longest busy period of the analysis. Near a load of 1 the iteration needs ever more steps; a load of 1 has no bound.
 const LONGEST_BUSY_NS: u64 = 1_000_000_000;
 
-/// Worst-case response time of the message of that index (Davis et al. 2007, equations 7 to 12), without its
-/// own jitter; the messages are in the order of priority.
+/// Worst-case response time of the message with that index (Davis et al. 2007, equations 7 to 12), without its own
+/// jitter. The messages are in the order of priority.
 fn response_ns(messages: &[PlannedMessage], index: usize, bit_ns: u64) -> Option<u64> {
     let (own, more_urgent) = (&messages[index], &messages[..index]);
     if utilisation(&messages[..=index]) >= 1.0 {
@@ -235,8 +235,7 @@ fn response_ns(messages: &[PlannedMessage], index: usize, bit_ns: u64) -> Option
     })
 }
 
-/// The most time that those messages take in a window of that length; `None` when the release of one of them has no
-/// bound.
+/// The most time of the messages in a window of that length; `None` when a release has no bound.
 fn interference_ns(window_ns: u64, of: &[PlannedMessage]) -> Option<u64> {
     let taken_ns = |other: &PlannedMessage| {
         let instances = (window_ns + other.jitter_ns?).div_ceil(other.message.period_ns);
@@ -284,8 +283,8 @@ mod tests {
         plan.messages.iter().map(|planned| planned.response_ns.map(|ns| ns / 1000)).collect()
     }
 
-    /// Table 2 of the paper: three messages of 1 ms transmission time at 125 kbit/s, where the second instance of
-    /// the least urgent one is the late one, which earlier analyses missed.
+    /// Table 2 of the paper: three messages of 1 ms transmission time at 125 kbit/s. The second instance of the least
+    /// urgent message is the late one; earlier analyses miss it.
     #[test]
     fn the_example_that_refuted_earlier_analyses() {
         let messages = vec![message(1, 7, 2500), message(2, 7, 3500), message(3, 7, 3500)];
@@ -360,7 +359,7 @@ mod tests {
 
     #[test]
     fn a_bus_without_a_free_moment_has_no_bound() {
-        // SYNC, three TPDO1 and three RPDO1 in just the time that they take, and a heartbeat that blocks them.
+        // SYNC, three TPDO1 and three RPDO1 fill their period, and a heartbeat blocks them.
         let mut messages = vec![message(1, 0, 805)];
         messages.extend((2..5).map(|id| message(id, 8, 805)));
         messages.extend((5..8).map(|id| message(id, 6, 805)));
@@ -371,8 +370,8 @@ mod tests {
     }
 
     proptest! {
-        /// Every message released at once at the worst instant, behind the longest frame of lower priority:
-        /// what a bus really does then is within the bound.
+        /// At the worst instant all messages are released at once, behind the longest frame of lower priority. The time
+        /// of this burst is within the bound.
         #[test]
         fn a_burst_behind_the_longest_frame_is_within_the_bounds(
             set in prop::collection::btree_map(1_u16..100, (0_u32..=8, 2_u64..20), 1..8),

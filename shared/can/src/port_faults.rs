@@ -1,7 +1,7 @@
 //! Seeded faults over any port: all faults except corrupted frames.
 //!
-//! Frames are lost on reception, delayed or sent twice; the node babbles, is disconnected or off the bus. A node in
-//! bus-off returns after the restart time, like a controller with `restart-ms`, but does not wait for 128 sequences of
+//! A frame is lost on reception, delayed or sent twice. A node babbles, is disconnected or is off the bus. A node in
+//! bus-off returns after the restart time, like a controller with `restart-ms`, but without the 128 sequences of
 //! recessive bits.
 
 use std::ops::Range;
@@ -11,10 +11,10 @@ use crate::{Bus, BusStatus, ErrorState, Frame, ReceiveError, Received, SendError
 
 /// Frames that may be held back at one time.
 const HELD: usize = 64;
-/// Transmit error counter of a node put off the bus: the least above the limit.
+/// Transmit error counter of a node in forced bus-off: the least above the limit.
 const OFF_TEC: u16 = 256;
 
-/// A fault that no port can carry out.
+/// A fault that needs a wire, not a port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("fault {0}: a frame is corrupted on the wire; inject that into a simulated one")]
 pub struct NotByPort(pub usize);
@@ -72,8 +72,8 @@ struct Held {
 }
 
 impl PortFaults {
-    /// The faults that apply to this port; the same seed makes the same choices. After bus-off the port stays off where
-    /// it has no time to its restart. Nothing is allocated after this.
+    /// The faults of this port; the same seed makes the same choices. After bus-off a port without a restart time stays
+    /// off. The port allocates nothing later.
     ///
     /// # Errors
     /// [`NotByPort`] for a fault that corrupts frames.
@@ -101,7 +101,7 @@ impl PortFaults {
         self.faults.next_note(now_ns)
     }
 
-    /// Sets when a fault acts. A number of no fault has no effect.
+    /// Sets the time of a fault. A number of no fault has no effect.
     pub fn set_fault_window(&mut self, number: usize, window_ns: Range<u64>) {
         self.faults.set_window(number, window_ns);
     }
@@ -110,20 +110,20 @@ impl PortFaults {
         NumberedFrame { at_ns, port: self.port, id: frame.id(), number }
     }
 
-    /// Whether a fault duplicates a frame. The activation is recorded.
+    /// Whether a fault duplicates a frame. Counts the activation.
     fn duplicates(&mut self, now_ns: u64, frame: &Frame, number: u64) -> bool {
         let activation = self.faults.duplicates(self.numbered(now_ns, frame, number));
         activation.inspect(|&activation| self.faults.record(activation)).is_some()
     }
 
-    /// Whether a fault makes the port lose a received frame. The activation is recorded.
+    /// Whether a fault makes the port lose a received frame. Counts the activation.
     fn loses(&mut self, time_ns: u64, frame: &Frame) -> bool {
         let number = self.received;
         self.received += 1;
         self.faults.loses(self.numbered(time_ns, frame, number))
     }
 
-    /// Holds a frame back if a fault delays it; whether it did.
+    /// Holds a frame back if a fault delays the frame, and returns whether.
     fn holds_back(&mut self, now_ns: u64, frame: Frame, number: u64) -> Result<bool, SendError> {
         let delay = self.faults.delays(self.numbered(now_ns, &frame, number));
         let Some((activation, by_ns)) = delay else { return Ok(false) };
@@ -153,14 +153,14 @@ impl PortFaults {
         self.off_since_ns.is_some() || self.faults.is_disconnected(now_ns, self.port)
     }
 
-    /// A frame that the node babbles at that time.
+    /// The babbled frame of the node at that time.
     fn babbled(&mut self, now_ns: u64) -> Option<Frame> {
         let (activation, frame) = self.faults.makes_babble(now_ns, self.port)?;
         self.faults.record(activation);
         Some(frame)
     }
 
-    /// The next frame that was held back until then.
+    /// The next delayed frame that is due at that time.
     fn release_held(&mut self, now_ns: u64) -> Option<Frame> {
         let due = self.held.iter().position(|held| held.due_ns <= now_ns)?;
         Some(self.held.remove(due).frame)
@@ -201,7 +201,7 @@ impl<B: Bus> Bus for Faulty<'_, B> {
         }
         self.bus.send(now_ns, frame)?;
         if self.faults.duplicates(now_ns, &frame, number) {
-            // The frame itself is queued: that its copy finds no room is no failure of the sender.
+            // The frame itself is queued, so a copy without room is no failure of the sender.
             let _ = self.bus.send(now_ns, frame);
         }
         Ok(())
@@ -212,7 +212,7 @@ impl<B: Bus> Bus for Faulty<'_, B> {
         if !is_cut_off {
             self.send_own(now_ns);
         }
-        // Each turn takes a frame from the port, so that this ends with what has arrived.
+        // Each turn takes a frame from the port, so the loop ends with the last arrived frame.
         loop {
             let received = self.bus.receive(now_ns)?;
             let Some(Received { frame, time_ns }) = received else { return Ok(None) };

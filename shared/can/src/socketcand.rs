@@ -1,8 +1,8 @@
-//! The text protocol of socketcand in raw mode, on the side of the server: access to a bus over TCP.
+//! The text protocol of socketcand in raw mode, for the server: access to a bus over TCP.
 //!
-//! After `< hi >` a client sends `< open can0 >` and `< rawmode >` and gets `< ok >` for each. From then on the client gets
-//! `< frame … >` for every frame on the bus, and sends a frame with `< send … >`. The modes for broadcast management,
-//! statistics and ISO-TP are not supported, nor are remote frames. This module opens no sockets.
+//! After `< hi >` a client sends `< open can0 >` and `< rawmode >` and gets `< ok >` for each. From then on the client
+//! gets `< frame … >` for every frame on the bus, and sends a frame with `< send … >`. There is no support for remote
+//! frames and for the modes of broadcast management, statistics and ISO-TP. This module opens no sockets.
 //!
 //! Source: linux-can/socketcand, `doc/protocol.md`.
 
@@ -17,9 +17,9 @@ pub const OK: &str = "< ok >";
 /// The answer to `< echo >`.
 pub const ECHO: &str = "< echo >";
 
-/// Hexadecimal digits that mean a 29-bit identifier; fewer mean one of 11 bits.
+/// Hexadecimal digits of a 29-bit identifier; fewer digits mean 11 bits.
 const EXTENDED_DIGITS: usize = 8;
-/// The bit by which some clients mark a 29-bit identifier.
+/// The mark of a 29-bit identifier in the requests of some clients.
 const EXTENDED_FLAG: u32 = 1 << 31;
 
 /// Longest request, bytes.
@@ -38,13 +38,13 @@ pub enum Request {
     Echo,
 }
 
-/// Why a request is refused.
+/// The reason for the refusal of a request.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum RequestError {
     /// No request of raw mode.
     #[error("unknown command '{0}': expected open, rawmode, send or echo")]
     Unknown(String),
-    /// The bytes sent are not as many as announced.
+    /// The number of bytes differs from the length field.
     #[error("data bytes announced: {announced}, sent: {sent}")]
     Length {
         /// The length field.
@@ -58,7 +58,7 @@ pub enum RequestError {
     /// The frame cannot exist.
     #[error(transparent)]
     Frame(#[from] FrameError),
-    /// Text that is no request, or one without an end.
+    /// Text that is no request, or a request without an end.
     #[error("text outside of angle brackets, or a request of more than {LONGEST_REQUEST} bytes")]
     Stray,
 }
@@ -78,7 +78,7 @@ pub enum RequestError {
 #[derive(Debug, Default)]
 pub struct Requests {
     pending: Vec<u8>,
-    /// What is pending belongs to a request that has been refused for its length.
+    /// The pending bytes belong to a request refused for its length.
     is_overlong: bool,
 }
 
@@ -88,7 +88,7 @@ impl Requests {
         self.pending.extend_from_slice(bytes);
     }
 
-    /// The next whole request, if it has arrived.
+    /// The next whole request, if there is one.
     ///
     /// # Errors
     /// [`RequestError`]; the refused bytes are dropped, and later requests are still read.
@@ -132,13 +132,13 @@ fn parse_send(id: &str, length: &str, data: &[&str]) -> Result<Request, RequestE
     if length.parse() != Ok(data.len()) {
         return Err(RequestError::Length { announced: length.to_owned(), sent: data.len() });
     }
-    // Clients that keep bytes in signed numbers write FFFFFFFFFFFFFF81 for 81: the lowest byte counts, as in the original.
+    // Clients with signed bytes write FFFFFFFFFFFFFF81 for 81: the lowest byte counts, as in the original.
     let byte = |text: &&str| parse_number(text).map(|number| number as u8);
     let data = data.iter().map(byte).collect::<Result<Vec<u8>, _>>()?;
     Ok(Request::Send(Frame::new(parse_id(id)?, &data)?))
 }
 
-/// Clients need not write leading zeros, so that fewer digits than those of a 29-bit identifier mean one of 11 bits.
+/// Clients may omit leading zeros, so fewer digits than those of a 29-bit identifier mean 11 bits.
 fn parse_id(text: &str) -> Result<CanId, RequestError> {
     let number = parse_number(text)?;
     let number = u32::try_from(number).map_err(|_| RequestError::Number(text.to_owned()))?;
@@ -148,21 +148,21 @@ fn parse_id(text: &str) -> Result<CanId, RequestError> {
     }
 }
 
-/// A number in hexadecimal digits. `from_str_radix` alone would take a sign.
+/// A number in hexadecimal digits. `from_str_radix` alone accepts a sign.
 fn parse_number(text: &str) -> Result<u64, RequestError> {
     let is_number = text.chars().all(|digit| digit.is_ascii_hexdigit());
     let number = is_number.then(|| u64::from_str_radix(text, 16).ok()).flatten();
     number.ok_or_else(|| RequestError::Number(text.to_owned()))
 }
 
-/// Writes a received frame. Its time keeps whole microseconds, as the format does.
+/// Writes a received frame, with its time in whole microseconds.
 ///
 /// # Errors
 /// Errors of `out`.
 pub fn write_frame(out: &mut impl Write, received: &Received) -> fmt::Result {
     let micros = received.time_ns / 1000;
     write!(out, "< frame {} {}.{:06} ", received.frame.id(), micros / 1_000_000, micros % 1_000_000)?;
-    // Bytes without blanks between them, and two blanks where there are none: python-can splits at blanks.
+    // No blanks between bytes, and two blanks for no bytes, because python-can splits at blanks.
     received.frame.data().iter().try_for_each(|byte| write!(out, "{byte:02X}"))?;
     out.write_str(" >")
 }
@@ -260,7 +260,7 @@ mod tests {
     }
 
     proptest! {
-        /// However the stream is cut, the frame arrives.
+        /// The frame arrives for every cut of the stream.
         #[test]
         fn a_frame_survives_any_cut(frame in any_frame(), cut in 0..40_usize) {
             let mut text = format!("< send {} {}", frame.id(), frame.data().len());

@@ -1,8 +1,8 @@
-//! What a tap on a bus sees: frames and errors, each with its time; and the lines of their log.
+//! The observations of a tap on a bus (frames and errors, each with its time), and the lines of their log.
 //!
-//! The coding of errors is that of `SocketCAN`'s error messages (`linux/can/error.h`): identifier flag 2000_0000h with the
-//! class, details in the data bytes, error counters in bytes 6 and 7. Byte 5, which the kernel leaves to the driver, holds
-//! the port. Overload frames, lost arbitration and line faults are not represented.
+//! The coding of errors is that of `SocketCAN`'s error messages (`linux/can/error.h`). The identifier has the flag
+//! 2000_0000h and the class; the data bytes have the details, bytes 6 and 7 the error counters. Byte 5, which the
+//! kernel leaves to the driver, holds the port. Overload frames, lost arbitration and line faults are not represented.
 
 use libc::{CAN_ERR_ACK, CAN_ERR_BUSERROR, CAN_ERR_BUSOFF, CAN_ERR_CNT, CAN_ERR_CRTL, CAN_ERR_PROT};
 
@@ -22,9 +22,9 @@ pub enum Tapped {
 pub struct TappedFrame {
     /// The frame.
     pub frame: Frame,
-    /// When its last end-of-frame bit was on the wire, ns.
+    /// Time of the last end-of-frame bit on the wire, ns.
     pub time_ns: u64,
-    /// When its transmitter queued it, ns; `None` on real wires.
+    /// Time at which the transmitter queued the frame, ns; `None` on real wires.
     pub queued_ns: Option<u64>,
 }
 
@@ -43,7 +43,7 @@ impl Tapped {
         }
     }
 
-    /// The frame, if it is one.
+    /// The frame, if the observation is one.
     pub fn frame(&self) -> Option<&TappedFrame> {
         match self {
             Self::Frame(tapped) => Some(tapped),
@@ -63,11 +63,11 @@ const BIT_ERROR_IN_TRANSMISSION: u8 = 0x81;
 /// The kind of an error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum ErrorKind {
-    /// A frame was destroyed by an error frame.
+    /// An error frame has destroyed a frame.
     Bit,
-    /// No node acknowledged a frame, which ended in an error frame.
+    /// No node has acknowledged a frame, and an error frame has ended the frame.
     Acknowledge,
-    /// A controller changed its error state.
+    /// A controller has changed its error state.
     State(ErrorState),
 }
 
@@ -76,7 +76,7 @@ pub enum ErrorKind {
 pub struct ErrorReport {
     /// Time of the error: the end of an error frame's delimiter, or the change of state, ns.
     pub time_ns: u64,
-    /// The port: of the transmitter, or of the controller whose state changed.
+    /// The port of the transmitter, or of the controller with the changed state.
     pub port: u8,
     /// The kind of the error.
     pub kind: ErrorKind,
@@ -145,7 +145,7 @@ pub mod candump {
     use super::Tapped;
 
     /// Writes one line without line end. Fractions of a microsecond are cut off. An error report becomes the error
-    /// message that a `SocketCAN` interface would give.
+    /// message of a `SocketCAN` interface.
     ///
     /// # Errors
     /// Those of `out`.

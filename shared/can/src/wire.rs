@@ -1,6 +1,6 @@
 //! Bit rates, and lengths of frames in bits: exact from the content, and at worst (ISO 11898-1).
 //!
-//! The lengths are those of frames without errors. Error frames are part of [`VirtualWire`](crate::VirtualWire).
+//! The lengths do not cover error frames, which are part of [`VirtualWire`](crate::VirtualWire).
 
 use crate::frame::{CanId, Frame};
 
@@ -14,12 +14,13 @@ pub struct BitrateError(pub u32);
 pub struct Bitrate(u32);
 
 impl Bitrate {
-    /// The fastest of classical CAN, 1 Mbit/s.
+    /// The highest bit rate of classical CAN, 1 Mbit/s.
     pub const MAX: Self = Self(1_000_000);
-    /// One bit a nanosecond, which no CAN has. A frame takes about 0.14 µs, so the time of a run is that of the software.
+    /// One bit a nanosecond, which no CAN has. A frame takes about 0.14 µs, so the software alone decides the time of a
+    /// run.
     pub const IDEAL: Self = Self(1_000_000_000);
 
-    /// That many bits a second, 1 to 1 000 000.
+    /// A bit rate of 1 to 1 000 000 bit/s.
     ///
     /// # Errors
     /// [`BitrateError`] for 0 and for more than 1 Mbit/s.
@@ -38,16 +39,16 @@ impl Bitrate {
     }
 }
 
-/// Pause after a frame before the next may start.
+/// Pause between two frames.
 pub const INTERFRAME_BITS: u32 = 3;
 /// Acknowledge delimiter and end of frame.
 pub(crate) const BEHIND_ACKNOWLEDGE_BITS: u32 = 1 + 7;
-/// CRC delimiter and acknowledge slot, and the bits behind it.
+/// CRC delimiter, acknowledge slot, and the bits behind.
 const TRAILER_BITS: u32 = 1 + 1 + BEHIND_ACKNOWLEDGE_BITS;
 const CRC_BITS: u32 = 15;
 const CRC_POLYNOMIAL: u16 = 0x4599;
 const CRC_MASK: u16 = (1 << CRC_BITS) - 1;
-/// Bytes of the number that has a content.
+/// Bytes of the number that holds a content.
 const CONTENT_BYTES: usize = 16;
 static CRC_OF_BYTE: [[u16; 256]; CONTENT_BYTES] = crc_of_bytes();
 const STANDARD_HEADER_BITS: u32 = 19;
@@ -66,9 +67,8 @@ pub const fn unstuffed_bits(data_length: u32, extended: bool) -> u32 {
     header_bits(extended) + 8 * data_length + CRC_BITS + TRAILER_BITS + INTERFRAME_BITS
 }
 
-/// Length of a frame of that many data bytes with as many stuff bits as any content can cause,
-/// interframe space included, bits: 55 + 10 n, or 80 + 10 n with a 29-bit identifier (Davis, Burns, Bril
-/// and Lukkien, Real-Time Systems 35, 2007).
+/// Length of a frame of `n` data bytes with the most stuff bits and the interframe space, bits. The length is 55 + 10
+/// n, or 80 + 10 n with a 29-bit identifier (Davis, Burns, Bril and Lukkien, Real-Time Systems 35, 2007).
 pub const fn worst_case_bits(data_length: u32, extended: bool) -> u32 {
     // Five equal bits cause the first stuff bit, which with four more causes the next.
     let stuffed_bits = header_bits(extended) + 8 * data_length + CRC_BITS;
@@ -79,8 +79,8 @@ const fn header_bits(extended: bool) -> u32 {
     if extended { EXTENDED_HEADER_BITS } else { STANDARD_HEADER_BITS }
 }
 
-/// The bits that the CRC protects, from the start bit to the last data bit, in the low end of the
-/// number, and how many they are: at most 103.
+/// The bits under the CRC, from the start bit to the last data bit, in the low end of a number. The second value is
+/// their count, at most 103.
 fn content(frame: &Frame) -> (u128, u32) {
     let length = frame.data().len() as u32;
     let bits = 8 * length;
@@ -99,7 +99,7 @@ fn header(id: CanId, length: u32) -> u64 {
     arbitration << 7 | u64::from(length)
 }
 
-/// CRC of a content. The CRC starts from zero and is linear: the CRCs of the bytes at their places add up, and the
+/// CRC of a content. The CRC starts from zero and is linear. So the CRCs of the bytes at their places add up, and the
 /// zeros above the content add nothing.
 fn crc15(content: u128) -> u16 {
     let bytes = content.to_le_bytes();
@@ -127,10 +127,10 @@ const fn crc_of_bytes() -> [[u16; 256]; CONTENT_BYTES] {
     tables
 }
 
-/// Bit stuffing: after five equal bits, one of the other level, which itself counts towards the next five (10.5).
+/// Bit stuffing: after five equal bits follows one bit of the other level, which counts towards the next five (10.5).
 ///
-/// Stuff bits that the lowest `length` bits of `sequence` get, first the highest of them; one that is due
-/// behind the last bit is counted.
+/// Number of stuff bits in the lowest `length` bits of `sequence`, from the highest bit on. A stuff bit due behind the
+/// last bit counts.
 fn stuff_bits(sequence: u128, length: u32) -> u32 {
     if length == 0 {
         return 0;
@@ -157,7 +157,7 @@ fn stuff_bits(sequence: u128, length: u32) -> u32 {
     stuffed
 }
 
-/// Where two frames of one identifier first differ on the wire, and which of them is dominant there.
+/// The first difference on the wire of two frames with one identifier, and the dominant frame there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Difference {
     /// Number of the bit, counted from 1 with stuff bits.
@@ -166,8 +166,8 @@ pub(crate) struct Difference {
     pub(crate) first_is_dominant: bool,
 }
 
-/// Where two frames of one identifier first differ, so that one of the transmitters detects an error; `None` where they
-/// are the same. Frames with equal data have equal CRCs, so the content alone decides.
+/// The first difference of two frames with one identifier, where one transmitter detects an error; `None` for equal
+/// frames. Frames with equal data have equal CRCs, so the content alone decides.
 pub(crate) fn first_difference(first: &Frame, second: &Frame) -> Option<Difference> {
     let [first, second] = [first, second].map(|frame| {
         let (content, length) = content(frame);

@@ -1,4 +1,4 @@
-//! The laws of every [`Bus`], as checks of an implementation; the library's tests check its buses with this file too.
+//! The laws of every [`Bus`], as checks of an implementation. The library's tests check its buses with this file too.
 //!
 //! An implementation provides a [`Pair`]: two ports of one wire and a way to let time pass. The checks fetch with
 //! [`Bus::receive`] only after [`Pair::wait_for_arrivals`]. Timing and fault confinement are not checked.
@@ -170,7 +170,7 @@ fn send(pair: &mut impl Pair, frame: Frame) -> Result<(), SendError> {
     pair.end(End::A).send(now_ns, frame)
 }
 
-/// All frames that a port has received, and how many it reports as lost.
+/// All received frames of a port, and the reported number of lost frames.
 fn drain(pair: &mut impl Pair, end: End) -> Result<(Vec<Received>, u64), ReceiveError> {
     let now_ns = pair.now_ns();
     let mut port = pair.end(end);
@@ -196,7 +196,7 @@ mod tests {
 
     const CAPACITY: usize = 100;
 
-    /// What is wrong with a bus.
+    /// A defect of a bus.
     #[derive(Clone, Copy, PartialEq)]
     enum Flaw {
         None,

@@ -1,5 +1,4 @@
-//! Checks that two CAN interfaces on one wire keep the laws of the bus, through everything that may stand between a
-//! node and its port.
+//! Checks that two CAN interfaces on one wire keep the laws of the bus, through every wrapper of a port.
 //!
 //! `cargo run --release --example conformance -p masseter-can -- can0 can1`. No other program may use the wire at the
 //! same time. Two ports of one virtual interface of the kernel work too: `-- vcan0 vcan0`.
@@ -23,7 +22,7 @@ const LOOK: Duration = Duration::from_millis(1);
 /// A frame is lost if it has not arrived after so many checks without progress.
 const IDLE_LIMIT: u32 = 500;
 
-/// Two ports under all wrappers, and two more to know when everything sent has left the one side and reached the other.
+/// Two ports under all wrappers, and two more that count the frames sent and arrived.
 struct SocketPair {
     ends: [WrappedEnd; 2],
     watches: [Watch; 2],

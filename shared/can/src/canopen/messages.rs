@@ -21,7 +21,7 @@ codes! {
     }
 }
 
-/// The nodes that a command is for.
+/// The nodes of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NmtTarget {
     /// Every node (node id 0 on the wire).
@@ -31,7 +31,7 @@ pub enum NmtTarget {
 }
 
 impl NmtTarget {
-    /// Whether the command is for that node.
+    /// Whether the command reaches that node.
     pub fn includes(self, node: NodeId) -> bool {
         self == Self::All || self == Self::Node(node)
     }
@@ -96,7 +96,7 @@ pub enum HeartbeatError {
     /// supported.
     #[error("{code:02X}h is no NMT state of a heartbeat")]
     UnknownState {
-        /// The number received.
+        /// The received number.
         code: u8,
     },
 }
@@ -123,7 +123,7 @@ impl Heartbeat {
 pub struct EmergencyCode(pub u16);
 
 impl EmergencyCode {
-    /// No error any more.
+    /// All errors are gone.
     pub const RESET: Self = Self(0x0000);
     /// The logic supply of the drive, 24 V, is too low (CiA 402: control supply U1).
     pub const LOGIC_SUPPLY: Self = Self(0x5112);
@@ -131,7 +131,7 @@ impl EmergencyCode {
     pub const COMMUNICATION: Self = Self(0x8100);
     /// The CAN controller became error passive.
     pub const ERROR_PASSIVE: Self = Self(0x8120);
-    /// The CAN controller was off the bus and is back.
+    /// The CAN controller is back on the bus.
     pub const WAS_BUS_OFF: Self = Self(0x8140);
     /// A heartbeat or node guarding is overdue.
     pub const HEARTBEAT: Self = Self(0x8130);
@@ -150,8 +150,7 @@ impl EmergencyCode {
     pub const FOLLOWING_ERROR: Self = Self(0x8611);
 }
 
-/// The meaning of the codes whose leading digits are those given (CiA 301, table 21; CiA 402, error codes). The longest
-/// match counts.
+/// The meaning of codes by their leading digits (CiA 301, table 21; CiA 402, error codes). The longest match counts.
 #[rustfmt::skip]
 const MEANINGS: [(&str, &str); 64] = [
     ("0000", "no error"), ("10", "generic error"),
@@ -178,7 +177,7 @@ const MEANINGS: [(&str, &str); 64] = [
 ];
 
 impl EmergencyCode {
-    /// What the code means, by its leading digits; none for codes of no class of the standards.
+    /// The meaning of the code, by its leading digits; none for codes of no class of the standards.
     pub fn meaning(self) -> Option<&'static str> {
         let digits = format!("{:04X}", self.0);
         let known = MEANINGS.iter().filter(|(leading, _)| digits.starts_with(leading));
@@ -207,7 +206,7 @@ impl fmt::Display for EmergencyCode {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Emergency {
-    /// What happened.
+    /// The error.
     pub code: EmergencyCode,
     /// Error register, object 1001: the kinds of errors that persist.
     pub register: u8,

@@ -1,5 +1,5 @@
-//! CANopen messages (CiA 301): node ids, the predefined connection set, NMT, heartbeat, SYNC, EMCY and SDO; and the
-//! [descriptions](dcf) of devices.
+//! CANopen messages (CiA 301): node ids, the predefined connection set, NMT, heartbeat, SYNC, EMCY, SDO, and device
+//! [descriptions](dcf).
 //!
 //! This module encodes and decodes messages. Supervision, boot-up and reactions are not part of the crate. The PDOs are
 //! in the [crate root](crate).
@@ -87,7 +87,7 @@ impl CobId {
         self.0 & Self::NOT_VALID == 0
     }
 
-    /// The same identifier, of an object that does not exist.
+    /// The identifier with bit 31 set: the object does not exist.
     #[must_use]
     pub const fn invalidated(self) -> Self {
         Self(self.0 | Self::NOT_VALID)

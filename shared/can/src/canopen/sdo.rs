@@ -1,5 +1,5 @@
-//! Service data objects (CiA 301, 7.2.4): one entry of a node's object dictionary read or written,
-//! confirmed, expedited (at most 4 bytes) or in segments of 7.
+//! Service data objects (CiA 301, 7.2.4): a confirmed read or write of one entry of a node's object dictionary. A
+//! transfer is expedited (at most 4 bytes) or in segments of 7.
 //!
 //! A client sends an [`SdoRequest`], a server answers with an [`SdoResponse`]; both have eight bytes. This module only
 //! encodes and decodes: client and server keep the order of a transfer, its toggle bits and its time-outs. Block
@@ -130,8 +130,8 @@ pub enum SdoResponse {
     },
 }
 
-/// Coding of the messages of one direction. The direction that carries the data uses three forms of message, the other one
-/// two; the forms are the same in both, with other command specifiers.
+/// Coding of the messages of one direction. The direction with the data has three forms of message, the other direction
+/// two. The forms are the same in both, with other command specifiers.
 macro_rules! sdo_messages {
     ($message:ident, $name:literal: $value:ident or $sized:ident = $initiate:literal,
      $bytes:ident = $segment:literal, $bare:ident = $object:literal, $toggled:ident = $next:literal) => {
@@ -193,19 +193,19 @@ pub enum SdoError {
     UnknownCommand {
         /// The first byte.
         command: u8,
-        /// The bytes at the place of the object.
+        /// The bytes of the object's address.
         object: ObjectAddress,
     },
 }
 
-/// A message of a command specifier with an object, and flags and four bytes.
+/// A message with command specifier, object, flags and four bytes.
 fn initiate(specifier: u8, object: ObjectAddress, (flags, data): (u8, [u8; 4])) -> [u8; LENGTH] {
     let [index_low, index_high] = object.index.to_le_bytes();
     let [d0, d1, d2, d3] = data;
     [specifier << 5 | flags, index_low, index_high, object.subindex, d0, d1, d2, d3]
 }
 
-/// A message of a command specifier with its toggle bit, and a segment's flags and data.
+/// A message with command specifier, toggle bit, and a segment's flags and data.
 fn segment(specifier: u8, toggle: bool, (flags, data): (u8, [u8; Segment::MAX])) -> [u8; LENGTH] {
     let mut bytes = [0; LENGTH];
     bytes[0] = specifier << 5 | flags | if toggle { TOGGLE } else { 0 };
@@ -218,7 +218,7 @@ fn size_field(size: Option<u32>) -> (u8, [u8; 4]) {
     size.map_or((0, [0; 4]), |size| (SIZED, size.to_le_bytes()))
 }
 
-/// A received message. Which of its parts it has depends on its command specifier.
+/// A received message. The command specifier decides which parts are present.
 struct Message([u8; LENGTH]);
 
 impl Message {
@@ -264,8 +264,8 @@ impl Message {
     }
 }
 
-/// The value in an expedited message: 1 to 4 bytes. Without a size in the message there are 4 bytes, and the receiver
-/// must know how many of them are the value.
+/// The value in an expedited message: 1 to 4 bytes. A message without a size has 4 bytes, and the receiver must know
+/// the length of the value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Expedited {
     /// Bytes beyond `length` are zero.

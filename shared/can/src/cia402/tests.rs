@@ -155,10 +155,10 @@ fn bit_7_masks_no_stop() {
     assert_eq!(off, StateCommand::DisableVoltage);
 }
 
-/// More than the longest way takes: fault reaction, fault, an edge prepared and made, four steps up.
+/// More steps than the longest way: fault reaction, fault, two words for the edge of the reset, four steps up.
 const STEPS: usize = 8;
 
-/// States of a drive that finishes its own doings at once and then obeys [`next_controlword`].
+/// States of a drive that finishes its own tasks at once and then obeys [`next_controlword`].
 fn journey(start: DriveState, request: DriveRequest, mut previous: Controlword) -> Vec<DriveState> {
     let mut state = start;
     let mut states = vec![start];

@@ -1,4 +1,4 @@
-//! The frames that faults act on, and the reports on faults.
+//! Faults select their frames, and reports on faults.
 
 use super::*;
 

@@ -9,7 +9,7 @@ pub(crate) fn any_id() -> impl Strategy<Value = CanId> {
     ]
 }
 
-/// Also of the runs of equal bits that are stuffed most.
+/// Frames also with the runs of equal bits that need the most stuff bits.
 pub(crate) fn any_frame() -> impl Strategy<Value = Frame> {
     let byte = prop_oneof![Just(0_u8), Just(0xFF), any::<u8>()];
     (any_id(), prop::collection::vec(byte, 0..=Frame::MAX_DATA))

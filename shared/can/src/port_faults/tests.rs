@@ -48,7 +48,7 @@ impl Faulted {
         self.end(End::A).send(now_ns, frame(byte))
     }
 
-    /// First bytes of the frames that have arrived at the other end.
+    /// First bytes of the frames at the other end.
     fn received(&mut self) -> Vec<u8> {
         self.wait_for_arrivals();
         let now_ns = self.now_ns;

@@ -1,5 +1,5 @@
-//! The CAN interfaces of this machine: which of them can be used, with the remedy for every refusal, and what the kernel says
-//! of their controllers.
+//! The CAN interfaces of this machine, the state of their controllers in the kernel, and the remedy for every refusal.
+//! This module changes no interface.
 
 use std::fs;
 use std::io;
@@ -14,7 +14,7 @@ const CAN_TYPE: u32 = 280;
 /// Flag of an interface that is up (`IFF_UP`).
 const UP: u32 = 1;
 
-/// Why an interface, whose name comes first, cannot be used; with the number of the system's error.
+/// Why an interface is not usable, with its name first, and the number of the system's error.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum OpenError {
     /// The kernel has no CAN.
@@ -25,9 +25,9 @@ pub enum OpenError {
     /// No CAN interface of that name.
     #[error("no CAN interface '{interface}'; there {}", existing(.there))]
     NoInterface {
-        /// The interface asked for.
+        /// The requested interface.
         interface: String,
-        /// Those there are.
+        /// The existing interfaces.
         there: Vec<String>,
     },
     /// The interface is down.
@@ -62,23 +62,24 @@ impl OpenError {
     }
 }
 
-/// A CAN interface of this machine, up or not.
+/// A CAN interface of this machine.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Interface {
     /// Its name, such as `can0`.
     pub name: String,
-    /// Whether it is up.
+    /// Whether the interface is up.
     pub is_up: bool,
     /// Whether its controller is bus-off.
     pub is_bus_off: bool,
-    /// Whether no hardware belongs to it, as for `vcan0`: only a controller of hardware has a bit rate.
+    /// Whether the interface has no hardware, such as `vcan0`. Only a controller of hardware has a bit rate.
     pub is_virtual: bool,
     /// Length of its transmit queue, frames.
     pub transmit_capacity: usize,
 }
 
 impl Interface {
-    /// All CAN interfaces by name. The kernel describes them below `root/sys/class/net`; `root` is `/` but for tests.
+    /// All CAN interfaces by name. The kernel's descriptions are below `root/sys/class/net`; `root` is `/`, except in
+    /// tests.
     pub fn list(root: &Path) -> Vec<Self> {
         let folders = fs::read_dir(root.join("sys/class/net")).into_iter().flatten().flatten();
         let mut interfaces: Vec<_> =
@@ -87,7 +88,7 @@ impl Interface {
         interfaces
     }
 
-    /// None if it is no CAN interface. From flags and carrier: `operstate` changes up to a second later.
+    /// None for another kind of interface. Flags and carrier decide, because `operstate` changes up to a second later.
     fn read(name: &str, folder: &Path) -> Option<Self> {
         let text = |property: &str| fs::read_to_string(folder.join(property)).ok();
         let number = |property: &str| text(property)?.trim().parse::<u32>().ok();
@@ -102,17 +103,16 @@ impl Interface {
     }
 }
 
-/// Whether this kernel has CAN, and lets this process use it.
+/// Whether this kernel has CAN, and this process may use CAN.
 ///
 /// # Errors
-/// The system's error if not.
+/// The system's error otherwise.
 pub fn is_supported() -> io::Result<()> {
     // A socket on all interfaces exists wherever the kernel has CAN.
     CanSocket::open_iface(0).map(drop)
 }
 
-/// The length of the interface's transmit queue, frames. Refuses an interface that does not exist, is not a CAN
-/// interface, or is down.
+/// The length of the interface's transmit queue, frames. The interface must exist, be a CAN interface, and be up.
 pub(super) fn usable_transmit_capacity(interface: &str) -> Result<usize, OpenError> {
     is_supported().map_err(|error| OpenError::from_errno(interface, errno(&error)))?;
     let found = Interface::list(Path::new("/")).into_iter().find(|there| there.name == interface);
@@ -156,14 +156,14 @@ const ERROR_COUNTERS: u16 = 8;
 const HEADER: usize = 16;
 const LINK: usize = 16;
 
-/// Settings and state of a CAN controller. What the driver does not report is left out; `vcan` reports nothing.
+/// Settings and state of a CAN controller. A driver may report only some of them; `vcan` reports nothing.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct InterfaceDetails {
     /// Bit rate, bit/s.
     pub bitrate_bps: Option<u32>,
     /// Sample point, ‰ of a bit.
     pub sample_point_permille: Option<u32>,
-    /// How long after bus-off the controller restarts by itself, ms; 0 for never.
+    /// Time from bus-off to the controller's own restart, ms; 0 for never.
     pub restart_ms: Option<u32>,
     /// State of its fault confinement.
     pub state: Option<&'static str>,
@@ -172,10 +172,10 @@ pub struct InterfaceDetails {
 }
 
 impl InterfaceDetails {
-    /// Asks the kernel. That needs no rights.
+    /// Asks the kernel. The query needs no rights.
     ///
     /// # Errors
-    /// The system's error, such as for an interface that does not exist.
+    /// The system's error, for instance for an interface that does not exist.
     pub fn read(interface: &str) -> io::Result<Self> {
         let index = fs::read_to_string(format!("/sys/class/net/{interface}/ifindex"))?;
         let index: u32 = index.trim().parse().map_err(io::Error::other)?;
@@ -192,7 +192,7 @@ impl InterfaceDetails {
             .ok_or_else(|| io::Error::other("the kernel's answer describes no link"))
     }
 
-    /// None for another message than the description of a link.
+    /// None for a message that is no description of a link.
     fn parse(message: &[u8]) -> Option<Self> {
         if short(message.get(4..)?)? != NEW_LINK {
             return None;
@@ -293,7 +293,7 @@ mod tests {
         };
         assert_eq!(InterfaceDetails::parse(&message), Some(expected));
         for length in 0..message.len() {
-            // A message that is cut short has no other values.
+            // A truncated message causes no panic.
             let _ = InterfaceDetails::parse(&message[..length]);
         }
     }

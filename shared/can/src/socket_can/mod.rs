@@ -1,31 +1,30 @@
 //! A node's port on a real wire: a raw `SocketCAN` socket that never blocks.
 //!
 //! Frames leave through the queue of the interface (`txqueuelen`) in the order of sending: a caller sends urgent frames
-//! first. Frames of other sockets on the same interface are received like those of other nodes, and in the order in which
-//! they were on the wire; so a second port on the interface is a tap.
+//! first. A port receives frames of other sockets on the same interface like those of other nodes. The order is that on
+//! the wire, so a second port on the interface is a tap.
 //!
 //! # Time stamps
-//! The kernel stamps a frame when the driver hands it over, in wall-clock time; the stamp is converted to
-//! `CLOCK_MONOTONIC` when the frame is fetched. Stamps of a port never run
-//! backwards. Hardware stamps are not used: they count in the adapter's own clock, which has another
-//! origin.
+//! The kernel stamps a frame in wall-clock time when the frame comes from the driver. The port converts the stamp to
+//! `CLOCK_MONOTONIC` when it fetches the frame. Stamps of a port never run backwards. Hardware stamps are not used,
+//! because the adapter's own clock has another origin.
 //!
 //! # Fault confinement
-//! The driver reports it by error frames, which change [`status`](Bus::status) and are handed on to a
-//! [tap](SocketCan::tap) alone: changes of state and, where the driver reports them (`berr-reporting on`), errors on the
-//! wire. Warnings, lost arbitration and faults of the line are passed over. A port
-//! counts as error active until the first error frame. A port that is bus-off refuses to send until the
-//! driver reports a restart (`ip link set … type can restart-ms 100`) or the interface was taken down.
+//! The driver reports fault confinement by error frames, which change [`status`](Bus::status). Only a
+//! [tap](SocketCan::tap) gets the error frames. They are changes of state and, with `berr-reporting on`, errors on the
+//! wire. Warnings, lost arbitration and faults of the line are skipped. A port counts as error active until the first
+//! error frame. A port in bus-off refuses to send until the interface goes down or the driver reports a restart (`ip
+//! link set … type can restart-ms 100`).
 //!
 //! # Losses
-//! Frames lost because the socket was not emptied in time are counted by the kernel. The kernel does
-//! not count the frames that the controller itself lost, so each such report means at least one frame.
+//! The kernel counts the frames lost in a full socket. The kernel does not count the frames lost in the controller, so
+//! each such report means at least one frame.
 //!
 //! # Frames
-//! Remote frames and frames in FD format are passed over.
+//! Remote frames and frames in FD format are skipped.
 //!
-//! An adapter that is unplugged is gone for good: its port reports [`ReceiveError::Os`](crate::ReceiveError::Os) until it
-//! is opened anew; one that was only taken down works again when it is up.
+//! The port of an unplugged adapter reports [`ReceiveError::Os`](crate::ReceiveError::Os) until the port is opened
+//! anew. The port of an interface that is down works again when the interface is up.
 
 use std::io;
 use std::time::{Duration, SystemTime};
@@ -51,18 +50,18 @@ mod interface;
 pub use interface::{Interface, InterfaceDetails, OpenError, is_supported};
 use interface::{errno, usable_transmit_capacity};
 
-/// Frames looked at in one call of [`Bus::receive`]: error and remote frames must not hold a cycle up.
+/// Most frames that one call of [`Bus::receive`] reads: error and remote frames must not delay a cycle.
 const FRAMES_AT_ONCE: usize = 64;
-/// Receive buffer asked for, bytes; the kernel grants at most `net.core.rmem_max`.
+/// Requested receive buffer, bytes; the kernel grants at most `net.core.rmem_max`.
 const RECEIVE_BUFFER: i32 = 1 << 20;
-/// The port of every error report: the controller of this machine, which all sockets of an interface share.
+/// The port of every error report: all sockets of an interface share this machine's controller.
 const OWN_PORT: u8 = 0;
-/// Fields of `SO_MEMINFO` (`linux/sock_diag.h`), 32 bits each, and which of them counts dropped frames.
+/// Number of 32-bit fields of `SO_MEMINFO` (`linux/sock_diag.h`), and the index of the counter of dropped frames.
 const MEMINFO_FIELDS: usize = 9;
 const MEMINFO_DROPS: usize = 8;
 /// Transmit error counter at which a controller is bus-off; error frames have no room for more than 255.
 const BUS_OFF_TEC: u16 = 256;
-/// An older stamp shows that the wall clock was set.
+/// An older stamp means that the wall clock has been set.
 const MAX_AGE: Duration = Duration::from_secs(60);
 const PASSIVE: ControllerProblems = ControllerProblems::RX_PASSIVE.union(ControllerProblems::TX_PASSIVE);
 /// A warning is no state of ISO 11898-1: below passive a controller is active.
@@ -90,14 +89,14 @@ pub struct SocketCan {
     transmit_capacity: usize,
     status: BusStatus,
     last_ns: u64,
-    /// Frames were fetched since the drop counter was looked at.
+    /// The port has fetched frames since the last look at the drop counter.
     drained: bool,
-    /// The kernel's drop counter as last reported.
+    /// The kernel's drop counter at the last report.
     dropped: u32,
 }
 
 impl SocketCan {
-    /// Opens a port on an interface that is there and up.
+    /// Opens a port on an existing interface that is up.
     ///
     /// # Errors
     /// [`OpenError`], with the remedy.
@@ -116,21 +115,20 @@ impl SocketCan {
         time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64
     }
 
-    /// Blocks until one of the first `N` ports has something to fetch, or until `deadline_ns`; a signal ends the wait
-    /// early.
+    /// Blocks until one of the first `N` ports has a frame, or until `deadline_ns`. A signal ends the wait early.
     pub fn wait<const N: usize>(ports: &[Self], deadline_ns: u64) {
         let Some(last) = ports.last() else { return };
         let left = Duration::from_nanos(deadline_ns.saturating_sub(Self::now_ns()));
         let left = Timespec { tv_sec: left.as_secs() as i64, tv_nsec: left.subsec_nanos() as _ };
-        // Fewer ports than `N` are filled up with the last one, so that nothing is allocated.
+        // The last port fills an array of fewer than `N` ports, so that the wait allocates nothing.
         let port = |index| ports.get(index).unwrap_or(last);
         let mut watched: [_; N] =
             std::array::from_fn(|index| PollFd::new(&port(index).socket, PollFlags::IN));
-        // A failed wait ends at once: the caller looks at the ports either way.
+        // A failed wait ends at once; the caller looks at the ports in any case.
         let _ = poll(&mut watched, Some(&left));
     }
 
-    /// The next frame or error on the wire, for an observer; `None` when there is none.
+    /// The next frame or error on the wire, for an observer; `None` for none.
     ///
     /// # Errors
     /// As those of [`Bus::receive`].
@@ -178,7 +176,7 @@ impl SocketCan {
         }
     }
 
-    /// Reports the frames dropped since the last time that the socket was empty.
+    /// Reports the frames dropped since the socket was last empty.
     fn report_dropped(&mut self) -> Result<(), ReceiveError> {
         if !std::mem::take(&mut self.drained) {
             return Ok(());
@@ -190,7 +188,7 @@ impl SocketCan {
         }
     }
 
-    /// Frames that the kernel dropped since the socket was opened.
+    /// Frames that the kernel has dropped since the opening of the socket.
     fn count_dropped(&self) -> io::Result<u32> {
         let mut fields = [0; MEMINFO_FIELDS * size_of::<u32>()];
         self.socket.get_socket_option_bytes(libc::SOL_SOCKET, libc::SO_MEMINFO, &mut fields)?;
@@ -246,11 +244,11 @@ fn configure(socket: &CanSocket) -> io::Result<()> {
 }
 
 /// Changes a port's status by an error frame of its driver (`linux/can/error.h`). Most drivers report every change of
-/// state; newer ones also report both counters. Gives a change of state, otherwise an error on the wire; `None` for
-/// anything else.
+/// state; newer drivers also report both counters. Returns a change of state, otherwise an error on the wire; `None`
+/// for anything else.
 ///
 /// # Errors
-/// [`ReceiveError::Overrun`] where the controller lost frames; it does not count them.
+/// [`ReceiveError::Overrun`] for frames lost in the controller, without their number.
 fn apply_error(status: &mut BusStatus, classes: u32, data: &[u8]) -> Result<Option<ErrorKind>, ReceiveError> {
     let has = |class| classes & class != 0;
     let before = status.state;
@@ -293,20 +291,20 @@ fn to_kernel(frame: &Frame) -> CanDataFrame {
     kernels.expect("an identifier of 11 or 29 bits, and at most 8 bytes")
 }
 
-/// The frame of the kernel's form; `None` for a frame that CAN does not have.
+/// The frame of the kernel's form; `None` for an invalid frame.
 fn from_kernel(frame: &CanDataFrame) -> Option<Frame> {
     Frame::new(CanId::from_flagged(frame.id_word()).ok()?, frame.data()).ok()
 }
 
-/// The instant of `CLOCK_MONOTONIC` at which the wall clock showed `stamp`, ns. A stamp in the future or more than a
-/// minute old gives the present: the wall clock was set in between. The result never lies before the true instant,
+/// The instant of `CLOCK_MONOTONIC` for the wall-clock time `stamp`, ns. A stamp in the future or more than a minute
+/// old gives the present, because the wall clock has been set in between. The result is never before the true instant,
 /// unless the wall clock is set.
 #[allow(
     clippy::disallowed_methods,
     reason = "stamps must be comparable with the times that a user passes in"
 )]
 fn monotonic_ns(stamp: SystemTime) -> u64 {
-    // In this order, time between the two readings makes the result later, but never later than now.
+    // With this order, time between the two readings makes the result later, but never later than now.
     let wall = SystemTime::now();
     let now_ns = SocketCan::now_ns();
     match wall.duration_since(stamp) {

@@ -1,4 +1,5 @@
-//! What a simulated controller keeps: its bounded queues, which allocate when made and never after, and its fault confinement.
+//! State of a simulated controller: its fault confinement, and its bounded queues, which allocate only in the
+//! constructor.
 
 use std::collections::VecDeque;
 
@@ -9,18 +10,18 @@ const ACTIVE_MAX: u16 = 127;
 /// A transmit error counter above this takes a node off the bus.
 const PASSIVE_MAX: u16 = 255;
 const TRANSMIT_ERROR: u16 = 8;
-/// Where a success sets the receive counter of a passive receiver; the standard leaves 119 to 127 open.
+/// Receive counter of a passive receiver after a success; the standard allows 119 to 127.
 const RECEIVE_AFTER_SUCCESS: u16 = 119;
 /// Sequences of 11 recessive bits that lead back from bus-off.
 const RECOVERY_SEQUENCES: u64 = 128;
 /// Bits of such a sequence: also acknowledge delimiter, end of frame and intermission of a frame.
 pub(super) const SEQUENCE_BITS: u32 = 11;
 
-/// Fault confinement of one port: error counters, error states and the way back from bus-off (ISO 11898-1, 12.1.4;
-/// counting rules as in the Bosch specification 2.0, chapter 8).
+/// Fault confinement of one port: error counters, error states and the way back from bus-off (ISO 11898-1, 12.1.4).
+/// Counting rules are those of the Bosch specification 2.0, chapter 8.
 ///
-/// Not counted: the receiver's +8 for a dominant bit behind its own error flag, which distinguishes the disturbing node
-/// from the others; a simulated receiver never disturbs by itself.
+/// The receiver's +8 for a dominant bit behind its own error flag is not counted. That rule distinguishes the
+/// disturbing node from the others, and a simulated receiver never disturbs by itself.
 #[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Confinement {
     tec: u16,
@@ -31,11 +32,11 @@ pub(super) struct Confinement {
 /// Off the bus.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Off {
-    /// When the host restarts, or did restart, the controller; `None` without a restart.
+    /// Time of the controller's restart by the host, past or future; `None` without a restart.
     restart_ns: Option<u64>,
     /// Recessive sequences still to be seen after that.
     sequences: u64,
-    /// Up to where the wire was searched for them.
+    /// End of the search for sequences so far.
     seen_to_ns: u64,
 }
 
@@ -58,17 +59,17 @@ impl Confinement {
         }
     }
 
-    /// Sent a frame. The counters of a node off the bus rest.
+    /// Counts a sent frame. The counters of a node off the bus do not change.
     pub(super) const fn transmitted(&mut self) {
         self.tec = self.tec.saturating_sub(1);
     }
 
-    /// Received a frame.
+    /// Counts a received frame.
     pub(super) const fn received(&mut self) {
         self.rec = if self.rec > ACTIVE_MAX { RECEIVE_AFTER_SUCCESS } else { self.rec.saturating_sub(1) };
     }
 
-    /// Detected an error while sending; a controller beyond 255 leaves the bus until `restart_ns`.
+    /// Counts an error of the transmitter. A controller beyond 255 leaves the bus until `restart_ns`.
     pub(super) fn transmit_error(&mut self, now_ns: u64, restart_after_ns: Option<u64>) {
         self.tec += TRANSMIT_ERROR;
         if self.tec > PASSIVE_MAX {
@@ -76,33 +77,33 @@ impl Confinement {
         }
     }
 
-    /// Nobody acknowledged. A passive node does not count that, so that a lone one stays on the bus.
+    /// Counts a missing acknowledgement. A passive node does not count it, so that a lone node stays on the bus.
     pub(super) fn unacknowledged(&mut self, now_ns: u64, restart_after_ns: Option<u64>) {
         if self.state() == ErrorState::Active {
             self.transmit_error(now_ns, restart_after_ns);
         }
     }
 
-    /// Detected an error while receiving.
+    /// Counts an error of the receiver.
     pub(super) fn receive_error(&mut self) {
         self.rec = (self.rec + 1).min(PASSIVE_MAX);
     }
 
-    /// Goes off the bus at once.
+    /// Puts the controller off the bus at once.
     pub(super) fn leave_bus(&mut self, now_ns: u64, restart_after_ns: Option<u64>) {
         self.tec = self.tec.max(PASSIVE_MAX + 1);
         let restart_ns = restart_after_ns.map(|after_ns| now_ns.saturating_add(after_ns));
         self.off = Some(Off { restart_ns, sequences: RECOVERY_SEQUENCES, seen_to_ns: now_ns });
     }
 
-    /// When the node is back on the bus if the wire stays idle and 11 bits take `sequence_ns`; `None` on the
-    /// bus, or without a restart.
+    /// Time of the return to the bus if the wire stays idle and 11 bits take `sequence_ns`. `None` on the bus, or
+    /// without a restart.
     pub(super) fn back_at_ns(&self, sequence_ns: u64) -> Option<u64> {
         let off = self.off?;
         Some(off.seen_to_ns.max(off.restart_ns?).saturating_add(off.sequences * sequence_ns))
     }
 
-    /// The wire was idle until `idle_until_ns`, from the end of what was last seen.
+    /// Notes an idle wire until `idle_until_ns`, from the end of the last search.
     pub(super) fn saw_idle(&mut self, idle_until_ns: u64, sequence_ns: u64) {
         let Some(off) = &mut self.off else { return };
         let Some(restart_ns) = off.restart_ns else { return };
@@ -114,7 +115,7 @@ impl Confinement {
         }
     }
 
-    /// A frame or an error frame ended, with the sequence that ends both.
+    /// Notes the end of a frame or an error frame, with the sequence that ends both.
     pub(super) fn saw_end(&mut self, idle_from_ns: u64) {
         if let Some(off) = &mut self.off {
             if off.restart_ns.is_some_and(|restart_ns| restart_ns <= idle_from_ns) {
@@ -124,7 +125,7 @@ impl Confinement {
         }
     }
 
-    /// Takes part again, with both counters 0.
+    /// Lets the node take part again, with both counters at 0.
     pub(super) fn come_back(&mut self) {
         *self = Self::default();
     }
@@ -134,7 +135,7 @@ impl Confinement {
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(super) struct Queued {
     pub(super) frame: Frame,
-    /// Its duration on the wire, interframe space included, computed once, since arbitration needs it many times.
+    /// Duration on the wire with interframe space, computed once, because arbitration needs the value many times.
     pub(super) duration_ns: u64,
     pub(super) since_ns: u64,
 }
@@ -145,7 +146,7 @@ impl Queued {
     }
 }
 
-/// Frames in the order of priority; those of one identifier in the order they were queued.
+/// Frames in the order of priority; frames of one identifier in the order of arrival.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct TransmitQueue {
     pub(super) frames: Vec<Queued>,
@@ -166,17 +167,17 @@ impl TransmitQueue {
         Ok(())
     }
 
-    /// When the frame that waits longest was queued.
+    /// Arrival of the frame that waits longest.
     pub(super) fn earliest_ns(&self) -> Option<u64> {
         self.frames.iter().map(|queued| queued.since_ns).min()
     }
 
-    /// The most urgent of the frames queued up to that time.
+    /// The most urgent frame queued up to that time.
     pub(super) fn most_urgent(&self, at_ns: u64) -> Option<&Queued> {
         self.frames.iter().find(|queued| queued.since_ns <= at_ns)
     }
 
-    /// Removes that frame.
+    /// Removes the frame.
     pub(super) fn remove_most_urgent(&mut self, at_ns: u64) {
         if let Some(place) = self.frames.iter().position(|queued| queued.since_ns <= at_ns) {
             self.frames.remove(place);
@@ -200,7 +201,7 @@ impl<T> ReceiveQueue<T> {
 
     pub(super) fn push(&mut self, time_ns: u64, item: T) {
         if self.arrived.is_empty() {
-            // An empty queue starts at its front again: entries of a long queue would not be in the cache.
+            // An empty queue starts at its front again, because the other entries of a long queue are not in the cache.
             self.arrived.clear();
         }
         if self.arrived.len() == self.capacity {
@@ -210,7 +211,7 @@ impl<T> ReceiveQueue<T> {
         }
     }
 
-    /// The oldest item, if it had arrived by then. Losses are reported first, once.
+    /// The oldest item that has arrived by then. A report of losses comes first, once.
     pub(super) fn pop(&mut self, now_ns: u64) -> Result<Option<T>, ReceiveError> {
         match std::mem::take(&mut self.lost) {
             0 if self.arrived.front().is_some_and(|(time_ns, _)| *time_ns <= now_ns) => {

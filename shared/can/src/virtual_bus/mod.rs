@@ -1,26 +1,24 @@
 //! A simulated wire: bit-exact frame times, arbitration, errors and fault confinement, bounded queues, all in
 //! virtual time.
 //!
-//! A frame takes the time of its exact stuffed length. Whenever the bus gets idle, the lowest identifier
-//! among all ports' most urgent frames wins. Every other port and the tap receive the frame when its last
-//! end-of-frame bit is over, which is its time stamp; three bits of interframe space later the bus is
-//! idle again.
+//! A frame takes the time of its exact stuffed length. When the bus gets idle, the lowest identifier among all ports'
+//! most urgent frames wins. Every other port and the tap receive the frame at the end of its last end-of-frame bit,
+//! which is its time stamp. Three bits of interframe space later the bus is idle again.
 //!
 //! # Errors
-//! A frame that is disturbed ends where the disturbance is: an error flag (6 bits, 12 where error active
-//! nodes echo it), 8 bits of delimiter, 3 of intermission; then the transmitter takes part in the next
-//! arbitration with the same frame. A missing acknowledgement is such a disturbance. Two ports that send different
-//! frames of one identifier disturb each other where the frames first differ; equal frames pass as one. Each
-//! port counts errors by the rules of ISO 11898-1, becomes error passive and leaves the bus; a passive
-//! transmitter pauses for 8 bits. A port off the bus discards its queue. After a restart it comes back with 128
-//! times 11 recessive bits. The restart follows after [`restart_after_ns`](WireConfig::restart_after_ns), as with
-//! `ip link … restart-ms`.
+//! A disturbance ends a frame. An error flag (6 bits, 12 with the echo of error active nodes), 8 bits of delimiter and
+//! 3 of intermission follow. Then the transmitter takes part in the next arbitration with the same frame. A missing
+//! acknowledgement is a disturbance, too. Two ports that send different frames of one identifier disturb each other
+//! where the frames first differ; equal frames pass as one. Each port counts errors by the rules of ISO 11898-1,
+//! becomes error passive and leaves the bus; a passive transmitter pauses for 8 bits. A port off the bus discards its
+//! queue. After a restart it comes back with 128 times 11 recessive bits. The restart follows after
+//! [`restart_after_ns`](WireConfig::restart_after_ns), as with `ip link … restart-ms`.
 //!
 //! # Time
-//! The wire moves in [`advance`](VirtualWire::advance) only. All frames queued at or before an instant take
-//! part in the arbitration of that instant, in whatever order they were queued: the frame that starts at
-//! `t` is settled once the wire advances beyond `t`. A frame queued for a time before the one already
-//! advanced to counts as queued at that time. Faults of nodes take effect between frames.
+//! The wire moves in [`advance`](VirtualWire::advance) only. All frames queued at or before an instant take part in the
+//! arbitration of that instant, in any order of queueing. The frame that starts at `t` is final once the wire advances
+//! beyond `t`. A frame queued for a time that the wire has passed counts as queued at the wire's present time. Faults
+//! of nodes take effect between frames.
 //!
 //! # What is not modelled
 //! - Errors that only some nodes see, and overload frames.
@@ -50,7 +48,7 @@ pub struct VirtualWire {
     queued: u64,
 }
 
-/// A port, borrowed from its wire for as long as it is used.
+/// A port, borrowed from its wire.
 ///
 /// A port does not move time: frames arrive when the caller [advances](VirtualWire::advance) the wire.
 #[derive(Debug)]
@@ -66,7 +64,7 @@ enum Traffic {
     Unknown,
     /// The wire is idle, and no node has a frame to send.
     Nothing,
-    /// The transmission is on the wire, or will be; until then the wire is idle.
+    /// The present transmission, or the next; until its start the wire is idle.
     Coming { transmission: Transmission, is_on_wire: bool },
 }
 
@@ -79,7 +77,7 @@ struct NodeChange {
 }
 
 impl VirtualWire {
-    /// An idle wire at time 0. Nothing is allocated after this.
+    /// An idle wire at time 0. The wire allocates nothing later.
     pub fn new(config: &WireConfig) -> Self {
         Self::with_faults(config, Faults::default())
     }
@@ -93,7 +91,7 @@ impl VirtualWire {
         Self { nodes: Nodes::new(config, faults), traffic: Traffic::Unknown, advanced_to_ns: 0, queued: 0 }
     }
 
-    /// One port, to be used as a [`Bus`].
+    /// One port, as a [`Bus`].
     ///
     /// # Panics
     /// If no port has that index.
@@ -103,10 +101,10 @@ impl VirtualWire {
         Port { wire: self, port }
     }
 
-    /// The next frame or error that was on the wire up to `now_ns`, of any port.
+    /// The next frame or error on the wire up to `now_ns`, of any port.
     ///
     /// # Errors
-    /// [`ReceiveError::Overrun`] where the tap missed frames because its queue was full; no other.
+    /// [`ReceiveError::Overrun`] for frames lost in a full queue of the tap; no other.
     pub fn tap(&mut self, now_ns: u64) -> Result<Option<Tapped>, ReceiveError> {
         self.nodes.tap.pop(now_ns)
     }
@@ -116,15 +114,16 @@ impl VirtualWire {
         self.nodes.faults.next_note(now_ns)
     }
 
-    /// Sets when a fault acts, from now on at the earliest: the wire's past stays. A number of no fault has no effect.
+    /// Sets the time of a fault, from now on at the earliest: the wire's past stays. A number of no fault has no
+    /// effect.
     pub fn set_fault_window(&mut self, number: usize, window_ns: Range<u64>) {
         let from_ns = window_ns.start.max(self.advanced_to_ns);
         self.nodes.faults.set_window(number, from_ns..window_ns.end);
         self.invalidate_traffic();
     }
 
-    /// When the frame on the wire, or the next one, will have ended if nothing else is queued until then,
-    /// ns; `None` when nothing is on the way.
+    /// End of the frame on the wire or of the next frame, ns, if no other frame is queued until then. `None` without a
+    /// frame.
     pub fn next_event_ns(&mut self) -> Option<u64> {
         self.update_traffic();
         match &self.traffic {
@@ -140,13 +139,13 @@ impl VirtualWire {
         self.advanced_to_ns = self.advanced_to_ns.max(until_ns);
     }
 
-    /// Puts the next frame on the wire if it starts before `until_ns`; whether one is on it now. Until then
-    /// nodes come back from bus-off, or are sent there.
+    /// Puts the next frame on the wire if the frame starts before `until_ns`. Returns whether a frame is on the wire.
+    /// Until then nodes go to bus-off or come back.
     fn start_before(&mut self, until_ns: u64) -> bool {
         if self.is_busy() {
             return true;
         }
-        // Behind a frame nothing can start yet, and what its receivers answer would have to be looked at again.
+        // No frame starts before the bus is idle, and a result now would miss the answers of the receivers.
         if self.nodes.idle_from_ns > until_ns {
             return false;
         }
@@ -179,7 +178,7 @@ impl VirtualWire {
         }
     }
 
-    /// Computes the next transmission, unless it is known: callers ask far more often than the state changes.
+    /// Computes the next transmission, unless known: callers ask far more often than the state changes.
     #[inline]
     fn update_traffic(&mut self) {
         if let Traffic::Unknown = self.traffic {
@@ -197,7 +196,7 @@ impl VirtualWire {
         }
     }
 
-    /// Ends the frame on the wire if its end is not after `until_ns`; whether it did.
+    /// Ends the frame on the wire if its end is not after `until_ns`, and returns whether.
     fn end_until(&mut self, until_ns: u64) -> bool {
         match self.traffic {
             Traffic::Coming { transmission, is_on_wire: true } if transmission.end_ns <= until_ns => {
@@ -273,7 +272,7 @@ impl Bus for Port<'_> {
     }
 
     /// # Errors
-    /// [`ReceiveError::Overrun`] where frames were lost because the port's queue was full; no other.
+    /// [`ReceiveError::Overrun`] for frames lost in a full queue of the port; no other.
     fn receive(&mut self, now_ns: u64) -> Result<Option<Received>, ReceiveError> {
         self.wire.nodes.stations[self.port].receive.pop(now_ns)
     }

@@ -1,4 +1,4 @@
-//! The nodes of a simulated wire: which of them sends next, what comes of the transmission, and what its end changes.
+//! The nodes of a simulated wire: the next sender, the result of its transmission, and the changes at its end.
 //!
 //! The next transmission is a function of the present state, so a caller can ask for it without changing the state.
 
@@ -9,12 +9,12 @@ use crate::{Bitrate, CanId, ErrorKind, ErrorReport, ErrorState, Frame, Received,
 
 const ERROR_FLAG_BITS: u32 = 6;
 const ERROR_DELIMITER_BITS: u32 = 8;
-/// A dominant bit behind the end of frame is answered one bit later by overload flags.
+/// Overload flags answer a dominant bit behind the end of frame one bit later.
 const LATE_FLAG_BITS: u32 = 7;
-/// Pause of an error passive transmitter before it may send again, behind the interframe space.
+/// Pause of an error passive transmitter before its next frame, behind the interframe space.
 const SUSPEND_BITS: u32 = 8;
 
-/// What a wire is made of.
+/// Settings of a wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct WireConfig {
     /// Bit rate.
@@ -23,9 +23,9 @@ pub struct WireConfig {
     pub ports: usize,
     /// Frames a port may have waiting for transmission.
     pub transmit_capacity: usize,
-    /// Frames a port may have received and not fetched; the tap's queue is as long for each port.
+    /// Received frames that a port may hold; the tap's queue is as long for each port.
     pub receive_capacity: usize,
-    /// How long after bus-off a port restarts by itself, ns; `None` for never.
+    /// Time from bus-off to a port's own restart, ns; `None` for never.
     pub restart_after_ns: Option<u64>,
 }
 
@@ -92,7 +92,7 @@ pub(super) struct Transmission {
     frame: Frame,
     queued_ns: u64,
     pub(super) start_ns: u64,
-    /// When the last end-of-frame bit is, or would have been, over.
+    /// End of the last end-of-frame bit without a disturbance.
     received_ns: u64,
     /// End of the frame, or of the delimiter of the error frame, ns.
     pub(super) end_ns: u64,
@@ -127,7 +127,7 @@ struct ArbitrationResult {
     destroyed_at: Option<u32>,
 }
 
-/// The frame that a port would send.
+/// The frame that a port sends next.
 #[derive(Clone, Copy)]
 struct Candidate {
     port: usize,
@@ -175,7 +175,8 @@ impl Nodes {
         !self.stations[port].confinement.is_off() && !self.faults.is_disconnected(now_ns, port)
     }
 
-    /// Changes a port's fault confinement. The tap gets a change of state, and a port that leaves the bus discards its queue.
+    /// Changes a port's fault confinement. The tap gets a change of state. A port that leaves the bus discards its
+    /// queue.
     pub(super) fn confine(&mut self, port: usize, now_ns: u64, change: impl FnOnce(&mut Confinement)) {
         let station = &mut self.stations[port];
         let before = station.confinement.state();
@@ -191,7 +192,7 @@ impl Nodes {
         }
     }
 
-    /// The next transmission if no other frame is queued until then.
+    /// The next transmission, if no other frame is queued until then.
     pub(super) fn next_transmission(&self) -> Option<Transmission> {
         let ports = self.candidate_ports();
         // As soon as the bus is idle and a node has something to send.
@@ -257,7 +258,7 @@ impl Nodes {
         (at_ns < u64::MAX).then_some(at_ns)
     }
 
-    /// The frame that each of those ports would send at that time.
+    /// The frame of each of the ports at that time.
     fn candidates(&self, ports: PortSet, start_ns: u64) -> impl Iterator<Item = Candidate> {
         ports.iter().filter_map(move |port| {
             let candidate = self.candidate(port, start_ns)?;
@@ -287,8 +288,8 @@ impl Nodes {
             .any(|port| !transmission.is_from(port) && self.is_on_bus(port, transmission.start_ns))
     }
 
-    /// The lowest port with the most urgent identifier of all wins. The frames of later ports that send the same
-    /// identifier are compared with its frame; the result has the one that stays on the bus.
+    /// The lowest port with the most urgent identifier wins. Frames of later ports with the same identifier are
+    /// compared with its frame; the result has the frame that stays on the bus.
     fn arbitrate(&self, ports: PortSet, start_ns: u64) -> Option<(ArbitrationResult, Candidate)> {
         let winner = self.candidates(ports, start_ns).min_by_key(Candidate::id)?;
         let (mut arbitration, mut strongest) = (ArbitrationResult::default(), winner);
@@ -318,7 +319,7 @@ impl Nodes {
         Some((arbitration, strongest))
     }
 
-    /// Changes ports and tap by a transmission that has just ended.
+    /// Changes ports and tap at the end of a transmission.
     pub(super) fn end_transmission(&mut self, transmission: &Transmission) {
         self.idle_from_ns = transmission.idle_from_ns;
         if let Some(activation) = transmission.activation {
@@ -341,7 +342,7 @@ impl Nodes {
         }
     }
 
-    /// The frame has arrived, and its senders are done with it.
+    /// Delivers the frame, and removes it from the queues of its senders.
     fn complete(&mut self, transmission: &Transmission) {
         let &Transmission { arbitration, end_ns, .. } = transmission;
         self.deliver(transmission);
@@ -376,7 +377,7 @@ impl Nodes {
         }
     }
 
-    /// An error frame has ended the transmission; the frame stays queued, to be sent again.
+    /// Handles the end by an error frame; the frame stays queued for the next attempt.
     fn fail(&mut self, transmission: &Transmission, kind: ErrorKind) {
         let is_received = transmission.outcome == TransmissionOutcome::ReceivedAndRepeated;
         for port in 0..self.stations.len() {
@@ -388,8 +389,8 @@ impl Nodes {
         }
     }
 
-    /// Counts the error at a sender. The tap gets the error frame once, with the counters of the first sender after
-    /// the error, and before the resulting change of state.
+    /// Counts the error at a sender. The tap gets the error frame once, before the resulting change of state, with the
+    /// first sender's counters after the error.
     fn fail_to_send(&mut self, transmission: &Transmission, port: usize, kind: ErrorKind) {
         let (now_ns, restart_after_ns) = (transmission.end_ns, self.config.restart_after_ns);
         let count = |node: &mut Confinement| match kind {
@@ -407,7 +408,7 @@ impl Nodes {
 }
 
 impl Transmission {
-    /// Whether the port sent that identifier. A loser has signalled an error and does not receive the frame.
+    /// Whether the port has sent that identifier. A loser has signalled an error and does not receive the frame.
     fn is_from(&self, port: usize) -> bool {
         self.arbitration.senders.contains(port) || self.arbitration.losers.contains(port)
     }

@@ -58,7 +58,7 @@ fn error_frames(tapped: &[Tapped]) -> usize {
     tapped.iter().filter(is_error_frame).count()
 }
 
-/// The errors that the tap saw.
+/// The errors at the tap.
 fn errors(wire: &mut VirtualWire) -> Vec<ErrorReport> {
     let tapped = tapped(wire).into_iter();
     tapped.filter_map(|tapped| if let Tapped::Error(report) = tapped { Some(report) } else { None }).collect()

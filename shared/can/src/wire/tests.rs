@@ -8,7 +8,7 @@ fn bits_of(field: u128, length: u32) -> impl Iterator<Item = bool> {
     (0..length).rev().map(move |bit| field >> bit & 1 == 1)
 }
 
-/// Stuffing as a transmitter does it, bit by bit: the reference.
+/// The reference: stuffing of a transmitter, bit by bit.
 #[derive(Debug, Clone, Copy, Default)]
 struct Stuffer {
     last: Option<bool>,
@@ -17,8 +17,8 @@ struct Stuffer {
 }
 
 impl Stuffer {
-    /// The next bit of the sequence. A stuff bit that is due is inserted before it, so that none
-    /// follows the last bit of a sequence.
+    /// Adds the next bit of the sequence, behind a stuff bit if one is due. So no stuff bit follows the last bit of a
+    /// sequence.
     fn push(&mut self, bit: bool) {
         if self.run == 5 {
             (self.last, self.run) = (self.last.map(|last| !last), 1);
@@ -28,7 +28,7 @@ impl Stuffer {
         self.last = Some(bit);
     }
 
-    /// The stuff bits with the one that is due behind the last bit.
+    /// The stuff bits, with the one due behind the last bit.
     fn with_last(&self) -> u32 {
         self.stuffed + u32::from(self.run == 5)
     }
@@ -46,7 +46,7 @@ fn frame(id: u16, data: &[u8]) -> Frame {
     Frame::new(CanId::standard(id).unwrap(), data).unwrap()
 }
 
-/// The CRC as ISO 11898-1 writes it: a shift register.
+/// The CRC of ISO 11898-1: a shift register.
 fn reference_crc(bits: impl Iterator<Item = bool>) -> u16 {
     bits.fold(0, |crc: u16, bit| {
         let shifted = crc << 1 & 0x7FFF;

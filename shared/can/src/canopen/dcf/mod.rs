@@ -1,8 +1,8 @@
-//! Device descriptions: electronic data sheets (EDS) and device configuration files (DCF), as CiA 306-1 lays them out.
+//! Device descriptions: electronic data sheets (EDS) and device configuration files (DCF) in the format of CiA 306-1.
 //!
-//! [`Dcf::parse`] reads the entries of the object dictionary with their types, access, limits and values. Sections on the
-//! file, on its device, on bit rates and on dummy mapping are passed over. The texts of other code pages than UTF-8 are the caller's:
-//! `String::from_utf8_lossy` changes names alone.
+//! [`Dcf::parse`] reads the entries of the object dictionary with their types, access, limits and values. The parser
+//! skips the sections on the file, its device, bit rates and dummy mapping. The caller converts texts of other code
+//! pages to UTF-8: `String::from_utf8_lossy` changes names alone.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -40,7 +40,7 @@ impl Dcf {
     /// Reads a description.
     ///
     /// # Errors
-    /// [`DcfError`] with the first line that cannot be read.
+    /// [`DcfError`] with the first line in error.
     pub fn parse(text: &str) -> Result<Self, DcfError> {
         let sections = Section::read_all(text)?;
         let by_name: HashMap<_, _> =
@@ -65,7 +65,7 @@ impl Dcf {
         self.0.values()
     }
 
-    /// The entry of that address.
+    /// The entry at the address.
     pub fn entry(&self, address: ObjectAddress) -> Option<&Entry> {
         self.0.get(&address)
     }
@@ -93,7 +93,7 @@ impl Dcf {
         Ok(())
     }
 
-    /// The entries of an array that is described once for all of them.
+    /// The entries of an array with one description for all.
     fn add_compact(
         &mut self,
         index: u16,
@@ -155,13 +155,13 @@ const DOMAIN_OBJECT: u16 = 0x2;
 /// Who may access an entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Access {
-    /// Nobody changes it, not even the device.
+    /// A constant, also for the device.
     Constant,
-    /// Clients may read it.
+    /// Clients may read the entry.
     ReadOnly,
-    /// Clients may write it.
+    /// Clients may write the entry.
     WriteOnly,
-    /// Clients may read and write it.
+    /// Clients may read and write the entry.
     ReadWrite,
     /// As [`ReadWrite`](Self::ReadWrite), and a TPDO may carry it.
     ReadWriteTpdo,
@@ -180,9 +180,9 @@ pub struct Entry {
     pub data_type: DataType,
     /// `AccessType`.
     pub access: Access,
-    /// `DefaultValue`: the value as delivered.
+    /// `DefaultValue`: the value of a new device.
     pub default: Option<Value>,
-    /// `ParameterValue`: the value that a DCF gives the device.
+    /// `ParameterValue`: the configured value of a DCF.
     pub parameter: Option<Value>,
     /// `LowLimit`.
     pub lowest: Option<Value>,
@@ -205,7 +205,7 @@ impl Access {
 }
 
 impl Entry {
-    /// The value of the device: that of the configuration, else that as delivered.
+    /// The configured value, else the value of a new device.
     pub fn value(&self) -> Option<&Value> {
         self.parameter.as_ref().or(self.default.as_ref())
     }
@@ -213,7 +213,7 @@ impl Entry {
     /// Reads the section of an entry.
     fn read(section: &Section<'_>, address: ObjectAddress) -> Result<Self, DcfError> {
         let kind = section.number("ObjectType", 0xFF)?;
-        // CiA 306 lets a domain leave out what is the same for all of them.
+        // By CiA 306 a domain may omit the keys whose values are the same for all domains.
         let may_omit = |key| kind == Some(DOMAIN_OBJECT) && section.get(key).is_none();
         let data_type = if may_omit("DataType") {
             DataType::DOMAIN

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use crate::canopen::NodeId;
 
-/// A section and its keys; names are compared without regard to case.
+/// A section and its keys. Names match without regard to case.
 #[derive(Debug)]
 pub(super) struct Section<'a> {
     pub(super) name: &'a str,
@@ -59,12 +59,12 @@ impl<'a> Section<'a> {
         Ok(sections)
     }
 
-    /// The value of a key; none if it is absent or empty.
+    /// The value of a key; none for an absent or empty key.
     pub(super) fn get(&self, key: &str) -> Option<Field<'a>> {
         self.keys.get(&key.to_ascii_lowercase()).copied().filter(|field| !field.text.is_empty())
     }
 
-    /// The number of a key that is no value of an entry, such as an object type; none if it is absent or empty.
+    /// The number of a key that is no value of an entry, such as an object type; none for an absent or empty key.
     pub(super) fn number(&self, key: &str, highest: u16) -> Result<Option<u16>, DcfError> {
         self.get(key).map(|field| field.number(highest)).transpose()
     }
@@ -74,7 +74,7 @@ impl<'a> Section<'a> {
         self.get(key).ok_or_else(|| self.refused(format!("[{}] has no {key}; add it", self.name)))
     }
 
-    /// The section is wrong as a whole.
+    /// The error for a wrong section.
     pub(super) fn refused(&self, problem: String) -> DcfError {
         DcfError { line: self.line, problem }
     }
@@ -87,7 +87,7 @@ impl Field<'_> {
         Ok(self.within(number, (0, highest.into()))? as u16)
     }
 
-    /// The value is wrong.
+    /// The error for a wrong value.
     pub(super) fn refused(self, reason: &str) -> DcfError {
         DcfError { line: self.line, problem: format!("{}={} is {reason}", self.key, self.text) }
     }
@@ -118,7 +118,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// The integer that it is for that node; none for texts and floating-point numbers.
+    /// The integer of the value for that node; none for texts and floating-point numbers.
     pub fn number(&self, node: NodeId) -> Option<i128> {
         match self {
             Self::Number(number) => Some(*number),
@@ -219,6 +219,6 @@ impl DataType {
 pub struct DcfError {
     /// Number of the line, from 1.
     pub line: usize,
-    /// What is wrong there, with its remedy: for the person who corrects the file.
+    /// The error and its remedy, for the author of the file.
     pub problem: String,
 }

@@ -1,4 +1,4 @@
-//! Injected faults: what each kind does to the frames and to the counters.
+//! Injected faults: the effect of each kind on the frames and the counters.
 
 use super::*;
 use crate::faults::{Fault, FaultKind};
