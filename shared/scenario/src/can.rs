@@ -71,7 +71,7 @@ impl CanConfig {
         self.interfaces.is_empty()
     }
 
-    /// The longest time from the request to enable the drives until the master gives up, s.
+    /// The master's longest time for enabling the drives, s.
     pub fn longest_enabling_s(&self) -> f64 {
         f64::from(self.ready_timeout_ms) * 1e-3 + f64::from(self.enable_timeout_ms) * 1e-3
     }

@@ -1,4 +1,4 @@
-//! How a run is controlled, executed and judged: `[controller]`, `[limits]`, `[dry]`, `[realtime]`, `[recording]` and
+//! Control, execution and judgement of a run: `[controller]`, `[limits]`, `[dry]`, `[realtime]`, `[recording]` and
 //! `[checks]`.
 
 use masseter_can::codes;
@@ -9,14 +9,14 @@ use serde::{Deserialize, Serialize};
 use super::error::{Checked, LONGEST_S, ranges_of, require};
 use super::{DrivesConfig, dynamics};
 
-/// SYNC takes one cycle and the drives' interpolation one; drives that smooth their targets take some more. The
-/// controller extrapolates the motion by this time.
+/// The controller extrapolates the motion by this time. SYNC takes one cycle, the drives' interpolation one, and
+/// smoothing in the drives some more.
 pub const MOST_LEAD_CYCLES: usize = 10;
-/// Smallest lead, cycles: the largest integral gain is the rate divided by it, which must be a number.
+/// Smallest lead, cycles. The rate divided by the lead is the largest integral gain, which must be finite.
 const LEAST_LEAD_CYCLES: f64 = 1e-3;
 
-/// From the default start, 7 mm away, the move takes half of the legs' velocity then; a shorter one is none that drives
-/// follow, s.
+/// Shortest move to the first pose, s. From the default start, 7 mm away, this move takes half of the legs' velocity;
+/// drives cannot follow a shorter move.
 const SHORTEST_EASE_S: f64 = 0.1;
 
 codes! {
@@ -89,7 +89,7 @@ section! {
 }
 
 impl ControllerConfig {
-    /// Start tolerance on real interfaces, mm: a person puts the jaw so near to the first pose, and a wrong zero of an
+    /// Start tolerance on real interfaces, mm. A person can put the jaw so near to the first pose; a wrong zero of an
     /// encoder is mostly farther away.
     pub(super) const START_TOLERANCE_MM: f64 = 2.0;
 
@@ -218,7 +218,7 @@ pub enum CpuDmaLatency {
     Leave,
 }
 
-/// For so long a run is recorded after its controller has ended, so that a fall or a drift after the stop shows, s.
+/// Time of recording after the end of the controller, so that the recording shows a fall or a drift after the stop, s.
 pub const AFTER_STOP_S: f64 = 0.5;
 
 section! {

@@ -1,5 +1,5 @@
-//! A scenario's text as a tree of TOML: where its keys stand, which arrays stand for tables, and the refusal of a malformed
-//! file with place and key, in the words of the documents.
+//! A scenario's text as a tree of TOML, with the places of its keys. The refusal of a malformed file has place and key,
+//! in the words of the documents.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -16,12 +16,12 @@ use crate::wording::question;
 
 /// More keys than any table has.
 const MOST_SUSPECTS: usize = 100;
-/// What a message on an unknown key begins with.
+/// Beginning of a message on an unknown key.
 const UNKNOWN_KEY: &str = "unknown key";
 /// Characters of the longest message of the TOML reader.
 const LONGEST_REASON: usize = 2000;
 
-/// A parsed text with its name in messages.
+/// A parsed text and its name in messages.
 pub(super) struct Document<'a> {
     path: &'a Path,
     text: &'a str,
@@ -33,8 +33,8 @@ impl<'a> Document<'a> {
         Ok(Self { path, text, root: DeTable::parse(text)?.into_inner() })
     }
 
-    /// The place of a key, or of the innermost table around it that the text has.
-    /// `entry` is the number of the table in a list of tables, from 0.
+    /// The place of a key, or of the innermost table around the key in the text. `entry` is the number of the table in
+    /// a list of tables, from 0.
     pub(super) fn place_of(&self, key: &str, entry: Option<usize>) -> String {
         let (mut table, mut found) = (Some(&self.root), None);
         for name in key.split('.') {
@@ -46,13 +46,13 @@ impl<'a> Document<'a> {
         found.map_or_else(|| self.path.display().to_string(), |offset| place_in(self.path, self.text, offset))
     }
 
-    /// The key whose value stands at an offset, with the tables around it.
+    /// The key of the value at an offset, with the tables around.
     pub(super) fn key_at(&self, offset: usize) -> Option<String> {
         key_in(&self.root, offset)
     }
 
-    /// The key of the table `path` without which the whole text is as it must be: serde reads some tables whole, and does
-    /// not say which of their keys is wrong.
+    /// The key of the table `path` whose removal makes the whole text valid. Serde reads some tables whole, and its
+    /// error names no key of them.
     pub(super) fn culprit<T: Deserialize<'a>>(&self, path: &str) -> Option<String> {
         let without = |key: Option<&str>| {
             let mut root = self.root.clone();
@@ -74,8 +74,7 @@ impl<'a> Document<'a> {
         Some(format!("{path}.{culprit}"))
     }
 
-    /// The first array that stands where the scenario as resolved has a table, with its place: serde takes an array for
-    /// a table without names.
+    /// The first array in the place of a table, with its position. Serde accepts an array as a table without names.
     pub(super) fn unnamed_table(&self, resolved: &Value) -> Option<(String, String)> {
         let (key, offset) = unnamed_in(&self.root, resolved)?;
         Some((key, place_in(self.path, self.text, offset)))
@@ -127,7 +126,7 @@ fn unnamed(given: &Spanned<DeValue<'_>>, resolved: &Value) -> Option<(String, us
     }
 }
 
-/// The refusal of a text that is no `T`. With a document, the text is TOML, and the message names the key.
+/// The refusal of a text that is no `T`. With a document the text is TOML, and the message names the key.
 pub(super) fn malformed<T: DeserializeOwned>(
     path: &Path,
     text: &str,
@@ -154,8 +153,7 @@ pub(super) fn malformed<T: DeserializeOwned>(
     ScenarioError::Malformed { place, reason }
 }
 
-/// A message of the TOML reader in the words of the documents, with the most similar of the keys or values that it
-/// expects.
+/// A message of the TOML reader in the words of the documents, with the most similar of the expected keys or values.
 fn in_words(message: &str) -> String {
     let message = cut_quotations(message);
     let known = [("unknown field", UNKNOWN_KEY), ("unknown variant", "unknown value")];

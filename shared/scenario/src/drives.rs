@@ -11,13 +11,14 @@ use super::drive_profile::{AccelerationUnit, DriveProfile, VelocityUnit};
 use super::error::{Checked, ranges_of, require, require_each};
 use super::quirks::QuirkConfig;
 
-/// Increments of encoders: with a coarser one the drives are never as near to their targets as the following limit
-/// asks, m.
+/// Range of an encoder's increment, m. With a coarser encoder the drives never come within the following limit of their
+/// targets.
 const FINEST_M: f64 = 1e-12;
 const COARSEST_M: f64 = 1e-5;
 /// Most noise of an encoder, m.
 const NOISIEST_M: f64 = 1e-3;
-/// The least limit of a second encoder, in standard deviations of the noise and in increments, so that neither is a fault.
+/// The least limit of a second encoder, in standard deviations of the noise and in increments, so that neither causes a
+/// fault.
 const ENCODERS_APART: f64 = 10.0;
 
 keys! {
@@ -139,7 +140,7 @@ impl DrivesConfig {
         require_each(&self.quirk, |quirk| self.check_second_encoder(quirk))
     }
 
-    /// Refuses a limit that an encoder without a fault may exceed.
+    /// Refuses a limit that an encoder without a fault can exceed.
     fn check_second_encoder(&self, quirk: &QuirkConfig) -> Checked {
         let Some(limit_m) = quirk.encoders_apart_m() else { return Ok(()) };
         let drives = (0..AXIS_NAMES.len()).filter(|axis| quirk.is_on(*axis)).map(|axis| self.of_axis(axis));
@@ -167,7 +168,7 @@ impl AxisScale {
     pub(crate) fn new(drive: &DriveConfig, profile: &DriveProfile, axis: usize) -> Self {
         let (length_m, sign) =
             (drive.encoder_resolution_m, if profile.is_reversed(axis) { -1.0 } else { 1.0 });
-        // A profile that counts turns has a lead: it is refused otherwise.
+        // A profile that counts turns has a lead; the checks refuse a profile without one.
         let rpm_m_s = profile.units.travel_per_turn_m().unwrap_or(length_m) / 60.0;
         Self {
             increment_m: sign * length_m,
@@ -184,7 +185,7 @@ impl AxisScale {
         }
     }
 
-    /// The increments nearest to d or l; out of their range the nearest of all.
+    /// The increments nearest to d or l, clamped to the range of the number.
     #[inline]
     pub fn increments(&self, position_m: f64) -> i32 {
         (position_m / self.increment_m).round() as i32

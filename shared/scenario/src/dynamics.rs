@@ -5,9 +5,9 @@ use nalgebra::Matrix3;
 
 use super::error::{Checked, ranges_of, require};
 
-/// Share by which a flat body's largest inertia may exceed the sum of the others, for rounding.
+/// Allowance for rounding: share by which a flat body's largest inertia may exceed the sum of the others.
 const ROUNDING: f64 = 1e-6;
-/// A screw of less efficiency hides too much of a load that drives it.
+/// Least efficiency of a screw: below it the screw hides too much of a load that drives it.
 const LEAST_SHOWN: f64 = 0.7;
 
 /// Checks the values of this table: `dynamics` or `controller.model`.
@@ -19,7 +19,7 @@ pub(super) fn validate(table: &str, dynamics: &DynamicsConfig) -> Checked {
         .map_err(|refusal| refusal.in_table(table))
 }
 
-/// Refuses screws through which the forces of the drives do not show the load.
+/// Refuses screws that hide the load from the forces of the drives.
 pub(super) fn require_open_screws(friction: &FrictionConfig) -> Checked {
     let need = "use at least 0.7 with [force_estimate] or [force_control], or control by a load cell: this screw hides the load from \
                 its drive";
@@ -33,7 +33,7 @@ pub(super) fn require_open_screws(friction: &FrictionConfig) -> Checked {
     })
 }
 
-/// Refuses a tensor that no body has: one that is not positive definite, or a principal inertia larger than the two others
+/// Refuses a tensor that no body has: not positive definite, or with a principal inertia larger than the two others
 /// together.
 fn require_inertia(key: &str, elements: [f64; 6]) -> Checked {
     let [xx, yy, zz, xy, xz, yz] = elements;

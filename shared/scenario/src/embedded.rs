@@ -1,7 +1,7 @@
 //! A scenario as a part of another document, for `#[serde(with = "masseter_scenario::embedded")]`.
 //!
-//! The code that reads and writes a scenario is compiled once, in this crate. The derived code is generic: otherwise each crate
-//! that embeds a scenario compiles it again.
+//! This crate compiles the code that reads and writes a scenario once. The derived code is generic, so each crate with
+//! an embedded scenario would compile the code again.
 
 use serde::de::Error;
 use serde::{Deserializer, Serializer};

@@ -1,4 +1,4 @@
-//! Why a scenario is refused, and the checks that many of its values share.
+//! The reasons for the refusal of a scenario, and the checks that many of its values share.
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use crate::input::{excerpt, read_text};
 /// Longest run, s.
 pub(super) const LONGEST_S: f64 = 86_400.0;
 
-/// Why a scenario was refused.
+/// The reason for the refusal of a scenario.
 #[derive(Debug, thiserror::Error)]
 pub enum ScenarioError {
     /// The file cannot be read.
@@ -28,13 +28,13 @@ pub enum ScenarioError {
     Malformed {
         /// File, line and column.
         place: String,
-        /// The key and its error, with the most similar valid one.
+        /// The key and its error, with the most similar valid key.
         reason: String,
     },
     /// An invalid value.
     #[error("{}{key} = {value}: {need}", place.as_ref().map(|place| format!("{place}: ")).unwrap_or_default())]
     BadValue {
-        /// File, line and column, if the value stands in a file.
+        /// File, line and column, for a value of a file.
         place: Option<String>,
         /// The number of the table in a list of tables, from 0.
         entry: Option<usize>,
@@ -57,7 +57,7 @@ impl ScenarioError {
         Self::Malformed { place: path.display().to_string(), reason }
     }
 
-    /// The same of a key of this table.
+    /// The refusal with the key in this table.
     pub(super) fn in_table(mut self, table: &str) -> Self {
         if let Self::BadValue { key, .. } = &mut self {
             *key = format!("{table}.{key}");
@@ -65,7 +65,7 @@ impl ScenarioError {
         self
     }
 
-    /// The same of a table in a list of tables.
+    /// The refusal with the number of the table in a list of tables.
     pub(super) fn of_entry(mut self, number: usize) -> Self {
         if let Self::BadValue { entry, .. } = &mut self {
             *entry = Some(number);
@@ -74,7 +74,7 @@ impl ScenarioError {
     }
 }
 
-/// What a check leads to.
+/// The result of a check.
 pub(super) type Checked = Result<(), ScenarioError>;
 
 /// The text of a file of at most `most_bytes`.
@@ -82,7 +82,7 @@ pub(super) fn read_limited(path: &Path, most_bytes: u64) -> Result<String, Scena
     read_text(path, most_bytes).map_err(|error| ScenarioError::Unreadable { path: path.to_owned(), error })
 }
 
-/// Refuses a value that is not good.
+/// Refuses a value for a failed condition.
 pub(super) fn require(is_good: bool, key: &str, value: &dyn Display, need: impl Display) -> Checked {
     if is_good { Ok(()) } else { Err(ScenarioError::bad(key, value, need)) }
 }
@@ -95,14 +95,14 @@ pub(super) fn require_range(key: &str, range: Range, number: f64) -> Checked {
     Err(ScenarioError::bad(key, &number, format_args!("use {}", range.of_key(key))))
 }
 
-/// Refuses a number out of the range that is declared beside its key, in this table.
+/// Refuses a number out of the declared range of its key, in this table.
 pub(super) fn ranges_of(table: &str) -> impl Fn(&str, Range, f64) -> Checked {
     move |key, range, number| require_range(key, range, number).map_err(|error| error.in_table(table))
 }
 
-/// Refuses keys that the kind of an entry neither needs nor takes, and requires those that it needs. The keys are those of
-/// all kinds; one is given where the entry differs from one that has its kind alone. `need_of` says what a missing one must
-/// say.
+/// Requires the keys that an entry's kind needs, and refuses the keys that the kind neither needs nor takes. `keys` are
+/// those of all kinds. A key counts as given where `entry` differs from `alone`, an entry with its kind only. `need_of`
+/// gives the valid values of a missing key.
 pub(super) fn require_keys<T: Serialize>(
     kind: &str,
     [needs, takes]: [&[&str]; 2],
@@ -123,7 +123,7 @@ pub(super) fn require_keys<T: Serialize>(
     })
 }
 
-/// Refuses names that are none of an axis.
+/// Refuses names of no axis.
 pub(super) fn require_axes(key: &str, names: &[String]) -> Checked {
     let unknown = names.iter().find(|name| !AXIS_NAMES.contains(&name.as_str()));
     let need = || format!("name axes: {}", AXIS_NAMES.join(", "));
@@ -136,7 +136,7 @@ pub(super) fn require_each<T>(entries: &[T], mut check: impl FnMut(&T) -> Checke
     numbered.try_for_each(|(number, entry)| check(entry).map_err(|error| error.of_entry(number)))
 }
 
-/// Refuses a name that cannot be a part of a signal's.
+/// Refuses a name that cannot be a part of a signal's name.
 pub(super) fn require_name(key: &str, name: &str) -> Checked {
     let is_good = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_';
     let is_name = (1..=64).contains(&name.len()) && name.bytes().all(is_good);

@@ -80,14 +80,14 @@ impl ForceControlConfig {
     /// Time constant of the admittance, virtual mass by damping, s.
     pub const MASS_TIME_S: f64 = 0.003;
 
-    /// The least damping with which the loop is stable against a stiffness (N/m) with a delay (s), N per m/s: 2/π k t. It is
+    /// The least damping for a stable loop against a stiffness k (N/m) with a delay t (s), N per m/s: 2/π k t. This is
     /// the limit of a pure delay; the lags of the rig turn the phase less.
     pub fn least_damping_n_s_per_m(stiffness_n_per_m: f64, delay_s: f64) -> f64 {
         FRAC_2_PI * stiffness_n_per_m * delay_s
     }
 
-    /// Refuses values without use, and a damping below the limit of stability for the delays of lead and of the
-    /// observer or the load cell (s).
+    /// Refuses values without use, and a damping below the limit of stability. The delays (s) are the lead and that of
+    /// the observer or the load cell.
     pub(super) fn validate(&self, lead_s: f64, source_s: f64) -> Checked {
         self.check_ranges(ranges_of("force_control"))?;
         require_range("force_control.peak_n", Range::Within(self.contact_n, 1000.0), self.peak_n)?;
@@ -133,8 +133,8 @@ impl LoadCellConfig {
         1.0 / (TAU * self.bandwidth_hz)
     }
 
-    /// Refuses a cell by which this control cannot tell a bite: one that is full below the peak, or that shows a contact
-    /// without one.
+    /// Refuses a cell that cannot measure a bite for this control. The range must exceed the peak; offset and noise
+    /// must not look like a contact.
     pub(super) fn require_for(&self, control: &ForceControlConfig) -> Checked {
         let Self { noise_n, offset_n, range_n, .. } = *self;
         let [most_offset_n, most_noise_n] = [control.contact_n / 2.0, control.contact_n / 5.0];

@@ -1,4 +1,4 @@
-//! Input files of limited size, and their text as messages quote it.
+//! Input files of limited size, and quotations of their text for messages.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Read};
@@ -7,19 +7,19 @@ use std::path::Path;
 
 use rustix::fs::OFlags;
 
-/// Size of the largest file that the rig reads back of those that it has written, bytes.
+/// Size of the largest file of the rig's own that the rig reads back, bytes.
 pub const MOST_KEPT_BYTES: u64 = 64 << 20;
-/// Characters of a value that a message quotes.
+/// Longest quotation of a value in a message, characters.
 const QUOTED: usize = 80;
-/// Characters of a sentence of somebody else that a message quotes.
+/// Longest quotation of another program's sentence in a message, characters.
 const QUOTED_SENTENCE: usize = 200;
 
 /// A regular file, opened for reading. A device or a pipe is refused at once: neither has an end.
 ///
 /// # Errors
-/// The system's, and when the file is no regular file.
+/// The system's error, and a file that is no regular file.
 pub fn open_regular(path: &Path) -> io::Result<File> {
-    // A pipe would block the opening until somebody writes.
+    // Opening a pipe blocks until a writer comes.
     let file = OpenOptions::new().read(true).custom_flags(OFlags::NONBLOCK.bits() as i32).open(path)?;
     if !file.metadata()?.is_file() {
         return Err(io::Error::other("it is no regular file; copy its content into one"));
@@ -30,7 +30,7 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
 /// The content of a regular file of at most `most_bytes`.
 ///
 /// # Errors
-/// Those of [`open_regular`], and when the file is larger.
+/// Those of [`open_regular`], and a larger file.
 pub fn read_bytes(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open_regular(path)?.take(most_bytes + 1).read_to_end(&mut bytes)?;
@@ -43,7 +43,7 @@ pub fn read_bytes(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
 /// The text of a regular file of at most `most_bytes`.
 ///
 /// # Errors
-/// Those of [`read_bytes`], and when the file is not text in UTF-8.
+/// Those of [`read_bytes`], and a file that is not text in UTF-8.
 ///
 /// # Examples
 /// ```
@@ -62,7 +62,7 @@ pub fn read_text(path: &Path, most_bytes: u64) -> io::Result<String> {
     })
 }
 
-/// A value as messages quote it: at most 80 characters, without control characters.
+/// The quotation of a value for messages: at most 80 characters, without control characters.
 ///
 /// # Examples
 /// ```
@@ -75,7 +75,7 @@ pub fn excerpt(text: &str) -> String {
     quoted(text, QUOTED)
 }
 
-/// A sentence of somebody else as messages quote it: at most 200 characters, without control characters.
+/// The quotation of another program's sentence for messages: at most 200 characters, without control characters.
 ///
 /// # Examples
 /// ```
@@ -88,8 +88,8 @@ pub fn sentence(text: &str) -> String {
     quoted(text, QUOTED_SENTENCE)
 }
 
-/// Whether a text is at most `most_bytes` long, and none of its characters commands a terminal, ends a line or turns the
-/// direction of reading.
+/// Whether a text is at most `most_bytes` long and printable. No character may command a terminal, end a line or turn
+/// the direction of reading.
 ///
 /// # Examples
 /// ```

@@ -18,19 +18,19 @@ const FARTHEST_M: f64 = 1.0;
 const FIRST_MOLAR_M: [f64; 3] = [0.0024, 0.0248, 0.0];
 /// Teeth of a side from the middle on, by the last digit of their FDI numbers, without third molars.
 const BY_SIDE: usize = 7;
-/// Places of their centres along the arch, as shares of the way from the incisal point to the first molar: by the mean
-/// mesiodistal widths of lower teeth, 5, 5.5, 7, 7, 7, 11, 10.5 mm (dental anatomy, recalled).
+/// Places of their centres along the arch, as shares of the way from the incisal point to the first molar. The mean
+/// mesiodistal widths of lower teeth are 5, 5.5, 7, 7, 7, 11, 10.5 mm (dental anatomy, recalled).
 const ALONG_ARCH: [f64; BY_SIDE] =
     [2.5 / 37.0, 7.75 / 37.0, 14.0 / 37.0, 21.0 / 37.0, 28.0 / 37.0, 1.0, 47.75 / 37.0];
 /// The tens of the FDI numbers of the lower teeth, left then right.
 const QUADRANTS: [u8; 2] = [30, 40];
-/// Steps in which the length of the arch is summed.
+/// Steps of the sum for the length of the arch.
 const STEPS: usize = 1000;
 
-/// Room for the contact of this many pairs of teeth: all lower ones.
+/// Most pairs of teeth in contact: all lower teeth.
 pub const MOST_PAIRS: usize = 16;
 
-/// The kinds of food with their values. A food is data: the values stand in `food/kinds/`, each with its source.
+/// The kinds of food with their values. The values are data in `food/kinds/`, each with its source.
 const FOODS: [(&str, &str); 5] = [
     ("soft", include_str!("food/kinds/soft.toml")),
     ("peanut", include_str!("food/kinds/peanut.toml")),
@@ -125,7 +125,7 @@ impl TeethConfig {
             let is_new = placed.insert(tooth.number);
             require(is_new, "teeth.tooth.number", &tooth.number, "give each tooth one place")?;
             tooth.check_ranges(ranges_of("teeth.tooth"))?;
-            // A steeper face would catch the tooth on its way up.
+            // A steeper face catches the tooth on its way up.
             require_range("teeth.tooth.normal", Range::Within(0.5, 1.0), tooth.rise())
         })?;
         self.check_ranges(ranges_of("teeth"))
@@ -133,7 +133,7 @@ impl TeethConfig {
 }
 
 impl ToothConfig {
-    /// The vertical part of its normal, of a length of 1.
+    /// The vertical part of its unit normal.
     fn rise(&self) -> f64 {
         let [x, y, z] = self.normal;
         z / (x * x + y * y + z * z).sqrt()
@@ -145,7 +145,7 @@ fn default_arch(jaw: &JawConfig) -> Vec<ToothConfig> {
     const { assert!(2 * (BY_SIDE + 1) <= MOST_PAIRS) };
     let [molar_x, molar_y, molar_z] = FIRST_MOLAR_M;
     let [incisal_x, incisal_y, incisal_z] = jaw.reference_point_m;
-    // By the distance from the middle as a share of the first molar's.
+    // By the distance from the middle as a share of the first molar's distance.
     let point = |aside: f64, side: f64| {
         let (back, front) = (aside * aside, 1.0 - aside * aside);
         [
@@ -163,8 +163,8 @@ fn default_arch(jaw: &JawConfig) -> Vec<ToothConfig> {
     arch
 }
 
-/// How far aside each tooth stands, as a share of the first molar's distance from the middle: where the arch has the tooth's
-/// length.
+/// Distance of each tooth from the middle, as a share of the first molar's: the point at the tooth's length along the
+/// arch.
 fn distances_aside(point: impl Fn(f64) -> [f64; 3]) -> [f64; BY_SIDE] {
     let step = 1.0 / STEPS as f64;
     let mut lengths_m = vec![0.0];
@@ -269,7 +269,7 @@ impl FoodConfig {
     }
 }
 
-/// Reads a food: what the table has replaces the values of its kind.
+/// Reads a food. The values of the table replace the values of its kind.
 pub(super) fn over_food<'de, D: Deserializer<'de>>(table: D) -> Result<Option<FoodConfig>, D::Error> {
     let given = Option::<Given>::deserialize(table)?;
     given.map(|given| given.over(&FOODS)).transpose().map_err(D::Error::custom)
@@ -295,7 +295,7 @@ mod tests {
         );
         let incisal = JawConfig::default().reference_point_m;
         assert!((of(31)[0] - incisal[0]).abs() < 5e-4 && of(31)[1] < 4e-3, "{:?}", of(31));
-        // Neighbours are about as far apart as their widths together, halved.
+        // The distance of neighbours is about the mean of their widths.
         let distance_m = |a: u8, b: u8| {
             let squares = of(a).into_iter().zip(of(b)).map(|(a, b)| (a - b) * (a - b));
             squares.sum::<f64>().sqrt()

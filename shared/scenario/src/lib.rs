@@ -1,7 +1,8 @@
-//! Scenario files: the configuration of a run, resolved and validated before the run starts.
+//! Scenario files: the configuration of a run, resolved and validated before its start.
 //!
-//! A scenario is TOML. Every key has a default, so an empty file is the default run. This crate checks values
-//! within the scenario; checks against other parts, such as a trajectory against the strokes, are made where these parts are built.
+//! A scenario is TOML. Every key has a default, so an empty file is the default run. This crate checks values within
+//! the scenario. The builders of other parts make the checks against those parts, such as a trajectory against the
+//! strokes.
 
 #[macro_use(keys, section)]
 extern crate masseter_model;

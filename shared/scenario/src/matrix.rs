@@ -23,10 +23,10 @@ pub struct MatrixCase {
 }
 
 impl Matrix {
-    /// Every combination, the last key first; none without a key.
+    /// Every combination; the last key changes first. None without a key.
     ///
     /// # Errors
-    /// [`ScenarioError::BadValue`] where a key has no list of values, or for too many combinations.
+    /// [`ScenarioError::BadValue`] for a key without a list of values, or for too many combinations.
     pub fn cases(&self) -> Result<Vec<MatrixCase>, ScenarioError> {
         let mut keys = Vec::new();
         keys_within("", &self.0, &mut keys)?;

@@ -1,5 +1,5 @@
-//! Tables in place of others: over the values of a kind that comes with the rig, over the file of a robot, and over a
-//! scenario.
+//! Replacement of values by tables: over a kind of the rig, over the file of a robot, and over a scenario. The values
+//! are not checked here.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,14 +13,14 @@ use super::error::ScenarioError;
 
 /// The lists whose entries have names.
 pub(super) const LISTS: [&str; 3] = ["faults", "stimulus", "require"];
-/// The tables that describe a robot and not what is done with it. All scenarios that name its file in `robot` share them.
+/// The tables that describe a robot, not its use. All scenarios with its file in `robot` share these tables.
 const TABLES: [&str; 7] = ["mechanism", "jaw", "limits", "can", "drives", "drive_profile", "dynamics"];
 
-/// Replaces the values that are given, and leaves the others of their tables. A table of another `kind` is replaced whole. A
-/// table given for a list changes the entries of the list by their names.
+/// Replaces the given values, and leaves the other values of their tables. A table of another `kind` replaces the whole
+/// table. A table given for a list changes the entries of the list by their names.
 ///
 /// # Errors
-/// When a list has no entry of a name that is given for it.
+/// For the name of an entry that a list does not have.
 pub(super) fn merge(whole: &mut Table, given: Table) -> Result<(), String> {
     for (key, value) in given {
         match (whole.get_mut(&key), value) {
@@ -57,7 +57,7 @@ fn merge_entries(list_name: &str, list: &mut [Value], given: Table) -> Result<()
     Ok(())
 }
 
-/// The name of an entry; that of its kind where it has none.
+/// The name of an entry; without one, that of its kind.
 fn entry_name(entry: &Value) -> Option<&str> {
     let entry = entry.as_table()?;
     ["name", "kind"].into_iter().find_map(|key| entry.get(key)?.as_str())
@@ -66,7 +66,7 @@ fn entry_name(entry: &Value) -> Option<&str> {
 /// The kinds of one sort of table: names, and TOML texts with their values. The first is that of a table without a `kind`.
 pub(super) type Kinds = [(&'static str, &'static str)];
 
-/// A table as it is given. In the manifest's JSON a key that is not given is null.
+/// A given table. In the manifest's JSON an absent key is null.
 #[derive(Deserialize)]
 #[serde(transparent)]
 pub(super) struct Given(BTreeMap<String, Option<GivenValue>>);
@@ -79,7 +79,7 @@ enum GivenValue {
 }
 
 impl Given {
-    /// The values of its kind, replaced by those that are given.
+    /// The values of its kind, replaced by the given values.
     pub(super) fn over<T: DeserializeOwned>(self, kinds: &Kinds) -> Result<T, TomlError> {
         over_kind(kinds, self.into_table())
     }
@@ -93,7 +93,7 @@ impl Given {
     }
 }
 
-/// The values of the kind that a table names, replaced by the other values of the table.
+/// The values of the table's kind, replaced by the other values of the table.
 pub(super) fn over_kind<T: DeserializeOwned>(kinds: &Kinds, given: Table) -> Result<T, TomlError> {
     let kind = given.get("kind").and_then(Value::as_str).unwrap_or(kinds[0].0);
     let Some((_, text)) = kinds.iter().find(|(name, _)| *name == kind) else {
@@ -105,7 +105,7 @@ pub(super) fn over_kind<T: DeserializeOwned>(kinds: &Kinds, given: Table) -> Res
     whole.try_into()
 }
 
-/// The tables of the robot's file at `path`, whose paths are relative to its folder. The values are not checked here.
+/// The tables of the robot's file at `path`. Their paths are relative to its folder.
 pub(super) fn robot_tables(path: &Path, given: Table) -> Result<Table, ScenarioError> {
     if let Some(other) = given.keys().find(|key| !TABLES.contains(&key.as_str())) {
         let reason = format!("{other} does not describe a robot; a robot's file has {}", TABLES.join(", "));
@@ -114,7 +114,7 @@ pub(super) fn robot_tables(path: &Path, given: Table) -> Result<Table, ScenarioE
     Ok(with_absolute_paths(path.parent().unwrap_or(Path::new("")), given))
 }
 
-/// The tables of a scenario's file in this folder, with the paths in them made independent of the folder.
+/// The tables of a scenario's file in this folder, with paths that do not depend on the folder.
 pub(super) fn with_absolute_paths(folder: &Path, mut given: Table) -> Table {
     const FILES: [[&str; 2]; 4] =
         [["drives", "memory"], ["motion", "path"], ["drive_profile", "dcf"], ["stimulus", "push_table"]];
@@ -131,7 +131,7 @@ pub(super) fn with_absolute_paths(folder: &Path, mut given: Table) -> Table {
     given
 }
 
-/// Moves the lists of an included file behind those of the scenario, which keep the numbers of their entries.
+/// Moves the lists of an included file behind those of the scenario. The scenario's entries keep their numbers.
 pub(super) fn append_lists(given: &mut Table, included: &mut Table) {
     for list in LISTS.into_iter().chain(["tags"]) {
         let Some(Value::Array(more)) = included.remove(list) else { continue };
@@ -140,7 +140,7 @@ pub(super) fn append_lists(given: &mut Table, included: &mut Table) {
     }
 }
 
-/// Makes a file's path independent of the folder that the path is relative to.
+/// Makes a file's path independent of its folder.
 fn make_absolute(folder: &Path, file: &mut Value) {
     if let Some(name) = file.as_str() {
         let whole = folder.join(name);

@@ -1,8 +1,8 @@
 //! The motion of the jaw: `[motion]`.
 //!
-//! Jaw frame: origin at the incisal point, x anterior, y left, z up, upper jaw fixed; every motion
-//! is a displacement from the closed (intercuspal) pose. The
-//! trajectory checks the ranges. Defaults are figures of published studies; the generators name them.
+//! The jaw frame has its origin at the incisal point, x anterior, y left, z up; the upper jaw is fixed. Every motion is
+//! a displacement from the closed (intercuspal) pose. The trajectory checks the ranges. Defaults are figures of
+//! published studies, with references in the generators.
 
 use std::path::PathBuf;
 
@@ -45,7 +45,7 @@ pub enum MotionConfig {
 }
 
 impl MotionConfig {
-    /// The rig's controller gives a motion up after as many of its durations, however slow it is.
+    /// The rig's controller gives up a motion after this many of its durations, at any speed.
     pub const MOST_DURATIONS: f64 = 10.0;
 }
 

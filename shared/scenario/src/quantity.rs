@@ -1,6 +1,6 @@
-//! Numbers with their units, as users write them: `"50 um"`, `"0.2 N"`, `3`.
+//! Numbers with units in the users' notation: `"50 um"`, `"0.2 N"`, `3`.
 //!
-//! The values are SI inside. No prefixes are derived: [`UNITS`] lists every unit that can be written.
+//! The values are SI inside. No prefixes are derived: [`UNITS`] lists every valid unit.
 
 use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
@@ -41,11 +41,11 @@ pub enum Dimension {
 /// A unit: its name, its kind, and its size in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
-    /// As users write it.
+    /// The users' notation.
     pub name: &'static str,
     /// What it measures.
     pub dimension: Dimension,
-    /// One of it, in SI units.
+    /// Its size, in SI units.
     pub si: f64,
 }
 
@@ -119,14 +119,14 @@ impl Unit {
         UNITS.into_iter().find(|unit| unit.name == name)
     }
 
-    /// A value of SI units with this unit.
+    /// A value given in SI units, with this unit.
     pub fn text(self, si: f64) -> String {
         let separator = if self.name.is_empty() || self.name == "°" { "" } else { " " };
         format!("{}{separator}{}", significant(si / self.si), self.name)
     }
 }
 
-/// Four significant digits: enough to compare, few enough to read.
+/// Four significant digits: enough for a comparison, and easy to read.
 fn significant(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
@@ -165,7 +165,7 @@ impl Dimension {
     }
 }
 
-/// A value with its unit. It is written back as it was given.
+/// A value with its unit. Reading and writing keep the user's notation.
 ///
 /// ```
 /// use masseter_scenario::{Dimension, Quantity};
@@ -200,7 +200,7 @@ impl Quantity {
         self.number * self.unit.si
     }
 
-    /// The unit in which it was given.
+    /// The given unit.
     pub fn unit(&self) -> Unit {
         self.unit
     }
@@ -210,10 +210,10 @@ impl Quantity {
         self.unit.dimension
     }
 
-    /// The value in SI units, if it measures this.
+    /// The value in SI units, if it has this dimension.
     ///
     /// # Errors
-    /// A sentence that says what to write.
+    /// A sentence with the remedy.
     pub fn si_of(&self, dimension: Dimension) -> Result<f64, String> {
         if self.dimension() == dimension {
             return Ok(self.si());

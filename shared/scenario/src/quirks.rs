@@ -1,6 +1,6 @@
-//! What emulated drives do otherwise than the standard: `[[drives.quirk]]`.
+//! Deviations of emulated drives from the standard: `[[drives.quirk]]`.
 //!
-//! What a quirk does to a drive is the plant's.
+//! The plant carries a quirk out.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -12,14 +12,14 @@ use serde_json::json;
 use super::drive_profile::ObjectKey;
 use super::error::{Checked, LONGEST_S, ranges_of, require, require_axes, require_keys, require_range};
 
-/// Increments of a turn of the motor, unless a quirk says otherwise: a spindle that moves the axis by 10 mm a turn, at
-/// 1 µm an increment.
+/// Increments of a turn of the motor without a quirk: a spindle with 10 mm a turn, at 1 µm an increment.
 pub const INCREMENTS_PER_TURN: u32 = 10_000;
-/// The distance of an axis' two encoders that is a fault by default, m: the jaw's limits are five times as wide.
+/// Default distance of an axis' two encoders at which the drive is in fault, m. The jaw's limits are five times as
+/// wide.
 const ENCODERS_APART_M: f64 = 1e-4;
-/// The least distance of two encoders that can be a fault, m.
+/// The least valid distance of two encoders for a fault, m.
 const LEAST_APART_M: f64 = 1e-5;
-/// The slowest save that is worth a test, and the slowest brake, s.
+/// The slowest valid save, and the slowest brake, s.
 const SLOWEST_S: f64 = 60.0;
 
 macro_rules! quirk_kinds {
@@ -40,12 +40,12 @@ macro_rules! quirk_kinds {
                 match self { $(Self::$kind => $name),* }
             }
 
-            /// The keys that it needs, and those that it may have as well, beside `kind` and `axes`.
+            /// The required and the optional keys, beside `kind` and `axes`.
             pub const fn keys(self) -> [&'static [&'static str]; 2] {
                 match self { $(Self::$kind => [&[$(stringify!($need)),*], &[$($(stringify!($take)),*)?]]),* }
             }
 
-            /// What it does.
+            /// Its effect.
             pub const fn about(self) -> &'static str {
                 match self { $(Self::$kind => concat!($($doc),+).trim_ascii_start()),* }
             }
@@ -136,12 +136,12 @@ impl QuirkConfig {
         serde_json::from_value(json!({ "kind": kind })).expect("a kind alone is a quirk")
     }
 
-    /// Whether the drive of an axis has it.
+    /// Whether the drive of an axis has the quirk.
     pub fn is_on(&self, axis: usize) -> bool {
         self.axes.as_ref().is_none_or(|axes| axes.iter().any(|name| name == AXIS_NAMES[axis]))
     }
 
-    /// The distance of the two encoders that is a fault, m; none without a second one.
+    /// The distance of the two encoders at which the drive is in fault, m; none without a second encoder.
     pub fn encoders_apart_m(&self) -> Option<f64> {
         let is_second = self.kind == QuirkKindConfig::SecondEncoder;
         is_second.then(|| self.limit_m.unwrap_or(ENCODERS_APART_M))

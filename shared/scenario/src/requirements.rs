@@ -1,7 +1,7 @@
-//! What a scenario requires of its run, and the outcome that it expects: `[[require]]` and `[expect]`.
+//! A scenario's requirements of its run, and the expected outcome: `[[require]]` and `[expect]`.
 //!
-//! This module holds what is written. Signals, conditions and their units are resolved and judged by the crate
-//! `masseter-judge`.
+//! This module holds the text alone. The crate `masseter-judge` resolves and judges signals, conditions and their
+//! units.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +9,7 @@ use super::error::{Checked, ScenarioError, require};
 use super::quantity::Quantity;
 use crate::input::is_printable;
 
-/// When a requirement is judged.
+/// The time of a requirement.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum During {
@@ -33,7 +33,7 @@ pub struct TimeWindow {
     pub for_s: Option<f64>,
 }
 
-/// What of a signal is held against the bounds.
+/// The statistic of a signal for the bounds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Statistic {
@@ -147,7 +147,7 @@ impl ExpectedVerdict {
         Self::Untested,
     ];
 
-    /// The exit code of a run with this outcome that expects none.
+    /// The exit code of a run with this outcome and no expectation.
     pub const fn exit_code(self) -> u8 {
         match self {
             Self::Pass => 0,

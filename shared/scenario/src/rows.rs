@@ -1,18 +1,18 @@
-//! Rows of numbers, as people and their programs write CSV: read the same way wherever the rig takes any.
+//! Rows of numbers in CSV of people and programs. Every reader of the rig uses these rules.
 //!
-//! A row is a line. Comments begin with `#`. Names and numbers may stand in quotes; neither holds a comma or the end of a
-//! line, so a quote without its other is a part of the field.
+//! A row is a line. Comments begin with `#`. Names and numbers may stand in quotes. Neither has a comma or the end of a
+//! line, so a quote without its partner is a part of the field.
 
 use std::io::{self, BufRead, Read};
 
 use crate::input::excerpt;
 use crate::wording::counted;
 
-/// Bytes of the longest line that is read. Numbers of full precision make lines a tenth as long.
+/// Bytes of the longest line. Numbers of full precision need a tenth of this length.
 const LONGEST_LINE: usize = 4096;
 const BYTE_ORDER_MARK: char = '\u{feff}';
 
-/// A line, or why it could not be read.
+/// A line, or the reason for its refusal.
 #[derive(Debug)]
 pub struct Line {
     /// From 1; comments count.
@@ -21,7 +21,7 @@ pub struct Line {
     pub text: Result<String, String>,
 }
 
-/// The lines without comments. What is no text in UTF-8 becomes replacement characters. An error of the system is the
+/// The lines without comments. Bytes that are no UTF-8 become replacement characters. An error of the system is the
 /// last line.
 ///
 /// ```
@@ -45,7 +45,7 @@ pub fn fields(line: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// A finite number for each of the columns. The error names what is wrong, with its remedy.
+/// A finite number for each of the columns. The error has the cause and its remedy.
 pub fn numbers(line: &str, columns: &[&str]) -> Result<Vec<f64>, String> {
     if line.is_empty() {
         return Err("an empty line".to_owned());
@@ -68,16 +68,17 @@ fn finite_number(text: &str, column: &str) -> Result<f64, String> {
     })
 }
 
-/// Lines of at most [`LONGEST_LINE`] bytes. A longer one is an error, but for a comment, which is cut.
+/// Lines of at most [`LONGEST_LINE`] bytes. A longer line is an error; a longer comment is cut.
 struct Bounded<R> {
     source: R,
     rest: Rest,
 }
 
-/// What to read next.
+/// The next part to read.
 enum Rest {
     NextLine,
-    /// The line just given goes on: the end is only looked for when the next line is asked for, since there may be none.
+    /// The last line is longer than the limit. The search for its end waits for the next call, because there may be no
+    /// end.
     OfLongLine,
     Nothing,
 }

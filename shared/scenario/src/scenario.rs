@@ -117,8 +117,8 @@ section! {
 }
 
 impl Scenario {
-    /// A refusal with its place in the file of the scenario, if the file alone leads to it: an argument may have
-    /// replaced the value.
+    /// A refusal with its place in the file of the scenario, if the file alone causes it: an argument may have replaced
+    /// the value.
     #[must_use]
     pub fn place_refusal(mut refusal: ScenarioError, path: &Path) -> ScenarioError {
         let in_words = refusal.to_string();
@@ -128,15 +128,15 @@ impl Scenario {
         refusal
     }
 
-    /// The place in its file of the key with which a refusal of the whole scenario begins; none where the file does not
-    /// have this value: an argument may have replaced it.
+    /// The place in its file of the key at the beginning of a refusal of the whole scenario. None for a file without
+    /// this value: an argument may have replaced it.
     pub fn place_of(&self, path: &Path, refusal: &str) -> Option<String> {
         let is_of_key = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '.');
         self.place_of_key(path, refusal.split(|c| !is_of_key(c)).next()?, None)
     }
 
-    /// The place in its file of a key, or of the table that would have it; `entry` is the number of the table in a list of
-    /// tables, from 0. None where the file does not have the value of this scenario: an argument may have replaced it.
+    /// The place in its file of a key, or of its table for an absent key. `entry` is the number of the table in a list
+    /// of tables, from 0. None for a file without the value of this scenario: an argument may have replaced it.
     pub fn place_of_key(&self, path: &Path, key: &str, entry: Option<usize>) -> Option<String> {
         let value_in = |scenario: &Self| {
             let values = serde_json::to_value(scenario).ok()?;
@@ -151,11 +151,11 @@ impl Scenario {
         is_given.then(|| Some(Document::parse(path, &text).ok()?.place_of(key, entry))).flatten()
     }
 
-    /// Reads a scenario file. The paths of its files are relative to its folder. The values are not checked
-    /// yet: see [`Self::validate`].
+    /// Reads a scenario file. The paths of its files are relative to its folder. [`Self::validate`] checks the values,
+    /// not this function.
     ///
     /// # Errors
-    /// [`ScenarioError`] for a file that cannot be read, is no regular file or is larger than 1 MiB, and those of
+    /// [`ScenarioError`] for a file that is unreadable, no regular file or larger than 1 MiB, and those of
     /// [`Self::parse`].
     pub fn read(path: &Path) -> Result<Self, ScenarioError> {
         let text = read_limited(path, MOST_BYTES)?;
@@ -184,7 +184,7 @@ impl Scenario {
         Ok(scenario)
     }
 
-    /// The tables of a robot's file, each checked by itself.
+    /// The tables of a robot's file. The file is checked by itself.
     fn read_robot(path: &Path) -> Result<Table, ScenarioError> {
         let text = read_limited(path, MOST_BYTES)?;
         let alone = Self::parse(path, &text)?;
@@ -192,7 +192,7 @@ impl Scenario {
         robot_tables(path, table_of(&text))
     }
 
-    /// The tables of an included file; its paths no longer depend on its folder.
+    /// The tables of an included file, with paths that do not depend on its folder.
     fn read_included(path: &Path) -> Result<Table, ScenarioError> {
         let text = read_limited(path, MOST_BYTES)?;
         let is_plain = Self::parse(path, &text)?.include.is_empty();
@@ -202,7 +202,7 @@ impl Scenario {
         if is_plain { Ok(table) } else { Err(ScenarioError::malformed_file(path, need.to_owned())) }
     }
 
-    /// The files that a run reads beside the scenario, each with the name of its copy in the run's folder.
+    /// The files of a run beside the scenario, each with the name of its copy in the run's folder.
     pub fn files_mut(&mut self) -> impl Iterator<Item = (String, &mut PathBuf)> {
         let motion = match &mut self.motion {
             MotionConfig::File(file) => Some(("motion.csv".to_owned(), &mut file.path)),
@@ -262,7 +262,7 @@ impl Scenario {
         Ok(scenario)
     }
 
-    /// A key that `[controller.model]` of the text leaves out gets the value that `[dynamics]` has.
+    /// Gives an absent key of `[controller.model]` the value of `[dynamics]`.
     fn complete_model(&mut self, text: &str) {
         let Ok(given) = toml::from_str::<Table>(text) else { return };
         let model = given.get("controller").and_then(|controller| controller.get("model")?.as_table());
@@ -273,9 +273,9 @@ impl Scenario {
             Some(whole.try_into().expect("[dynamics] and [controller.model] have been read"));
     }
 
-    /// The scenario with one value changed: `KEY=VALUE`, with the key and the value as in a file; see
-    /// [`Self::with_table`] for lists. A value that is no TOML is text. A name that is no key of a scenario is that of
-    /// a parameter of the controller. The value is not checked yet: see [`Self::validate`].
+    /// The scenario with one changed value: `KEY=VALUE`, with the key and the value as in a file; see
+    /// [`Self::with_table`] for lists. A value that is no TOML is text. A name that is no key of a scenario is the name
+    /// of a parameter of the controller. [`Self::validate`] checks the value, not this function.
     ///
     /// ```
     /// use masseter_scenario::Scenario;
@@ -298,21 +298,21 @@ impl Scenario {
         let as_text = || toml::from_str(&format!("{key} = {}", toml::Value::from(value)));
         let given = as_toml.or_else(|_| as_text()).map_err(|error| refused(error.message().to_owned()))?;
         self.with_table(given).map_err(|error| match error {
-            // The place is one in the resolved scenario, which the user does not see.
+            // The place is in the resolved scenario, which the user does not see.
             ScenarioError::Malformed { reason, .. } => refused(reason),
             other => other,
         })
     }
 
-    /// The scenario with the values of a table in place of its own. A table of another `kind` replaces the one that is
-    /// there, and an entry of a list has the name that `after` and requirements use: `faults.NAME.at_s`.
+    /// The scenario with the values of a table in place of its own. A table of another `kind` replaces the whole table.
+    /// An entry of a list has the name that `after` and requirements use: `faults.NAME.at_s`.
     ///
     /// # Errors
-    /// [`ScenarioError::Malformed`] for an unknown key, a value of another type, or an entry that is not there.
+    /// [`ScenarioError::Malformed`] for an unknown key, a value of another type, or an absent entry.
     pub fn with_table(&self, given: Table) -> Result<Self, ScenarioError> {
         let changed = Path::new("the changed scenario");
         let mut whole: Table = toml::from_str(&self.to_toml()).expect("it was written from a scenario");
-        // Empty lists are not written.
+        // `to_toml` omits empty lists.
         for list in LISTS {
             whole.entry(list).or_insert_with(|| toml::Value::Array(Vec::new()));
         }
@@ -320,7 +320,7 @@ impl Scenario {
         Self::parse(changed, &whole.to_string())
     }
 
-    /// The question whether a key of a scenario is meant, for a name that is none but like one.
+    /// The question "did you mean", for a name that is similar to a key of a scenario.
     ///
     /// ```
     /// use masseter_scenario::Scenario;
@@ -343,7 +343,7 @@ impl Scenario {
         toml::to_string_pretty(self).expect("every part of a scenario has a TOML form")
     }
 
-    /// Checks every value, and those that need each other.
+    /// Checks every value, and values that depend on each other.
     ///
     /// # Errors
     /// [`ScenarioError::BadValue`] with key, value and valid values.
@@ -377,7 +377,7 @@ impl Scenario {
         self.check_ranges(require_range)
     }
 
-    /// Faults, stimuli and their order by `after`, then requirements and the expected outcome.
+    /// Checks faults, stimuli and their order by `after`, then requirements and the expected outcome.
     fn validate_entries(&self) -> Checked {
         let (arch, entries) = (self.arch(), self.entry_names());
         require_each(&self.faults, |fault| fault.validate(&self.can, &entries))?;
@@ -390,7 +390,7 @@ impl Scenario {
         self.expect.as_ref().map_or(Ok(()), ExpectConfig::validate)
     }
 
-    /// Load cell, estimate and control of the bite force.
+    /// Checks load cell, estimate and control of the bite force.
     fn validate_forces(&self) -> Checked {
         let estimate = self.force_estimate.unwrap_or_default();
         estimate.check_ranges(ranges_of("force_estimate"))?;
@@ -408,8 +408,7 @@ impl Scenario {
         if self.is_force_estimated() { dynamics::require_open_screws(&self.model().friction) } else { Ok(()) }
     }
 
-    /// Control by a load cell needs one, and only the emulated jaw has one. Returns the cell; none for control by the
-    /// estimate.
+    /// The load cell of the control; none for control by the estimate. Only the emulated jaw has a load cell.
     fn source_of(&self, control: &ForceControlConfig) -> Result<Option<&LoadCellConfig>, ScenarioError> {
         if control.source == ForceSource::Estimate {
             return Ok(None);
@@ -422,13 +421,13 @@ impl Scenario {
         }
     }
 
-    /// Whether the bite force is estimated: because the scenario asks for the estimate, or controls the force by it.
+    /// Whether the bite force is estimated: for the scenario's own request, or for the force control.
     pub fn is_force_estimated(&self) -> bool {
         self.force_estimate.is_some()
             || self.force_control.is_some_and(|control| control.source == ForceSource::Estimate)
     }
 
-    /// Feed-forward needs an object of the process data that carries it.
+    /// Feed-forward needs the torque offset in the process data.
     fn require_torque_offsets(&self) -> Checked {
         let takes_none = |axis: &usize| !self.profile(*axis).pdos.rpdo1().has_torque_offset();
         let Some(axis) = (0..AXES).find(takes_none) else { return Ok(()) };
@@ -440,13 +439,13 @@ impl Scenario {
         require(!self.controller.feed_forward_torque, "controller.feed_forward_torque", &true, need)
     }
 
-    /// Masses and friction that the controller believes in.
+    /// Masses and friction of the controller's model.
     pub fn model(&self) -> DynamicsConfig {
         self.controller.model.unwrap_or(self.dynamics)
     }
 
-    /// How long a run goes on after a safe stop, so that requirements can see that the rig stays stopped: the longest
-    /// `stays_for`, at most ten seconds, s.
+    /// Time of a run after a safe stop, s: the longest `stays_for`, at most ten seconds. So requirements can check that
+    /// the rig stays stopped.
     pub fn observation_s(&self) -> f64 {
         let times = self.require.iter().filter_map(|requirement| requirement.stays_for);
         times.map(|time| time.si()).fold(0.0, f64::max).min(LONGEST_OBSERVATION_S)
@@ -457,27 +456,27 @@ impl Scenario {
         self.teeth.clone().unwrap_or_default().arch(&self.jaw)
     }
 
-    /// The foods of the whole run, those of the stimuli too.
+    /// The foods of the whole run, with those of the stimuli.
     pub fn foods(&self) -> impl Iterator<Item = &FoodConfig> {
         self.food.iter().chain(self.stimulus.iter().filter_map(|stimulus| stimulus.food.as_ref()))
     }
 
-    /// Whether the emulated jaws can touch: by their teeth, or by food.
+    /// Whether the emulated jaws can touch, by teeth or by food.
     pub fn has_contact(&self) -> bool {
         self.can.is_virtual() && (self.teeth.is_some() || self.foods().next().is_some())
     }
 
-    /// What the master expects of the drive of an axis.
+    /// The profile of the drive of an axis.
     pub fn profile(&self, axis: usize) -> &DriveProfile {
         DriveProfile::of_axis(&self.drive_profile, axis)
     }
 
-    /// From metres to the numbers of the drive of an axis.
+    /// The scale from metres to the numbers of the drive of an axis.
     pub fn scale(&self, axis: usize) -> AxisScale {
         AxisScale::new(&self.drives.of_axis(axis), self.profile(axis), axis)
     }
 
-    /// How far the jaw may be from the first pose of the motion at the start, m; none for any distance.
+    /// Longest distance of the jaw from the first pose of the motion at the start, m; none for any distance.
     pub fn start_tolerance_m(&self) -> Option<f64> {
         let on_robot_mm = (!self.can.is_virtual()).then_some(ControllerConfig::START_TOLERANCE_MM);
         self.controller.start_tolerance_mm.or(on_robot_mm).map(|tolerance_mm| tolerance_mm * 1e-3)
@@ -502,7 +501,7 @@ impl Scenario {
     }
 }
 
-/// The JSON pointer to the value of keys within each other.
+/// The JSON pointer to the value of nested keys.
 fn pointer<const N: usize>(keys: [&str; N]) -> String {
     let steps = keys.iter().filter(|key| !key.is_empty()).flat_map(|key| key.split('.'));
     steps.flat_map(|step| ["/", step]).collect()

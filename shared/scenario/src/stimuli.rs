@@ -1,4 +1,4 @@
-//! Stimuli: what happens to the jaw, the food and the controller during the motion: `[[stimulus]]`.
+//! Stimuli of the jaw, the food and the controller during the motion: `[[stimulus]]`.
 
 use std::fmt::{self, Display, Formatter};
 use std::path::PathBuf;
@@ -101,7 +101,7 @@ impl StimulusConfig {
     /// Size of the largest table, bytes: more than an hour at 50 Hz.
     pub const MOST_TABLE_BYTES: u64 = 16 << 20;
 
-    /// A stimulus at that time of the motion that does nothing yet.
+    /// A stimulus at that time of the motion, without an effect.
     pub fn at(at_s: f64) -> Self {
         Self { at_s, ..Self::default() }
     }
@@ -111,7 +111,7 @@ impl StimulusConfig {
         self.name.as_deref().or(self.what()).unwrap_or("nothing")
     }
 
-    /// What happens; none unless it is exactly one thing.
+    /// The kind of the stimulus; none unless there is exactly one.
     fn what(&self) -> Option<&'static str> {
         let given = [
             (self.push_n.is_some() || self.torque_n_m.is_some(), "push"),
@@ -125,15 +125,15 @@ impl StimulusConfig {
         given.next().map(|(_, what)| what).filter(|_| given.next().is_none())
     }
 
-    /// Whether the controller carries it out; otherwise the plant.
+    /// Whether the controller carries the stimulus out; otherwise the plant.
     pub fn is_of_controller(&self) -> bool {
         self.stop || self.parameter.is_some()
     }
 
-    /// When it acts.
+    /// The time of the stimulus.
     ///
     /// # Errors
-    /// Where that names nothing of the scenario.
+    /// For a time that names no entry of the scenario.
     pub fn when(&self, entries: &EntryNames<'_>) -> Result<When, ScenarioError> {
         let (at_s, after) = (Some(self.at_s), self.after.as_deref());
         let keys = WhenKeys { at_s, after, for_s: self.for_s, from_s: None, until_s: None };

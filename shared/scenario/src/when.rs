@@ -1,7 +1,7 @@
-//! When a fault or a stimulus acts: from an instant on, for a time.
+//! The time of a fault or a stimulus: from an instant on, for a duration.
 //!
-//! Times count from switch-on, from the beginning of the motion, or from another occurrence. This module resolves names, and
-//! refuses times that count from each other; the runtime's `Injection` follows the occurrences of a run.
+//! Times count from switch-on, from the beginning of the motion, or from another occurrence. This module resolves
+//! names, and refuses times that count from each other. The runtime's `Injection` follows the occurrences of a run.
 
 use std::collections::BTreeMap;
 use std::iter::successors;
@@ -10,7 +10,7 @@ use super::control::ControllerState;
 use super::error::{Checked, ScenarioError, require};
 use crate::wording::question;
 
-/// What the time of a fault or a stimulus counts from.
+/// The start of the time of a fault or a stimulus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Start {
     /// The rig is switched on.
@@ -30,7 +30,7 @@ pub struct EntryNames<'a> {
     pub faults: Vec<&'a str>,
     /// Of the stimuli, in their order.
     pub stimuli: Vec<&'a str>,
-    /// What `after` can name; none where several entries have the name.
+    /// The valid names of `after`; none for a name of several entries.
     starts: BTreeMap<String, Option<Start>>,
 }
 
@@ -63,18 +63,18 @@ impl<'a> EntryNames<'a> {
     }
 }
 
-/// When something acts.
+/// The time of a fault or a stimulus.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct When {
-    /// What the time counts from.
+    /// The start of the time.
     pub start: Start,
-    /// When it begins, s from there.
+    /// The beginning, s from the start.
     pub begin_s: f64,
-    /// For how long, s; to the end of the run when absent.
+    /// The duration, s; to the end of the run when absent.
     pub for_s: Option<f64>,
 }
 
-/// The keys of an entry that say when, as given.
+/// The given keys of an entry for its time.
 pub(super) struct WhenKeys<'a> {
     pub(super) at_s: Option<f64>,
     pub(super) after: Option<&'a str>,
@@ -84,7 +84,7 @@ pub(super) struct WhenKeys<'a> {
 }
 
 impl WhenKeys<'_> {
-    /// Resolves the keys, whose ranges stand beside them. A refusal has the name of the key alone.
+    /// Resolves the keys. Their declared ranges are not checked here. A refusal has the name of the key alone.
     pub(super) fn resolve(&self, entries: &EntryNames<'_>) -> Result<When, ScenarioError> {
         match (self.at_s, self.from_s) {
             (None, None) => {
@@ -118,8 +118,8 @@ impl WhenKeys<'_> {
     }
 }
 
-/// Refuses entries whose times count from each other, or from themselves. The starts are those of the faults and of the
-/// stimuli, in their order.
+/// Refuses entries whose times count from each other, or from themselves. The starts are in the order of the faults and
+/// of the stimuli.
 pub(super) fn refuse_circles(faults: &[Start], stimuli: &[Start], entries: &EntryNames<'_>) -> Checked {
     let before = |start: Start| match start {
         Start::Fault(place) => faults.get(place).copied(),
@@ -132,7 +132,7 @@ pub(super) fn refuse_circles(faults: &[Start], stimuli: &[Start], entries: &Entr
         Start::SwitchOn | Start::State(_) => None,
     };
     let all = (0..faults.len()).map(Start::Fault).chain((0..stimuli.len()).map(Start::Stimulus));
-    // The walk that first came to each entry: every entry is looked at once.
+    // The first walk that reaches each entry, so that the search looks at every entry once.
     let mut first_walk = vec![None; faults.len() + stimuli.len()];
     for (walk, entry) in all.enumerate() {
         for start in successors(Some(entry), |start| before(*start)) {
@@ -147,7 +147,7 @@ pub(super) fn refuse_circles(faults: &[Start], stimuli: &[Start], entries: &Entr
     Ok(())
 }
 
-/// The refusal of a circle, told from its first entry on.
+/// The refusal of a circle, from its first entry on.
 fn refuse_circle(
     on_it: Start,
     before: impl Fn(Start) -> Option<Start> + Copy,

@@ -1,11 +1,11 @@
 //! Parts of sentences that many messages share.
 
-/// Bytes of the longest name that may be meant as another.
+/// Bytes of the longest name with a suggestion.
 const LONGEST: usize = 200;
-/// Likeness from which a name may be meant.
+/// Least similarity of a suggestion.
 const LIKELY: f64 = 0.7;
 
-/// A number of things, with the noun in the number that fits.
+/// A number of things, with the noun in singular or plural.
 ///
 /// # Examples
 /// ```
@@ -40,7 +40,7 @@ pub fn grouped(number: u64) -> String {
     [head].into_iter().filter(|head| !head.is_empty()).chain(groups).collect::<Vec<_>>().join(",")
 }
 
-/// The shortest text that is read as the same number. Numbers below 1e-5 and from 1e16 on have an exponent.
+/// The shortest text that parses to the same number. Numbers below 1e-5 and from 1e16 on have an exponent.
 ///
 /// # Examples
 /// ```
@@ -55,7 +55,7 @@ pub fn shortest(number: f64) -> String {
     if is_plain { number.to_string() } else { format!("{number:e}") }
 }
 
-/// The most similar of the names to one that is none of them, whatever its case; none if all are unlike it.
+/// The most similar of the names to an unknown name, without regard to case; none without a similar name.
 ///
 /// # Examples
 /// ```
@@ -75,7 +75,7 @@ pub fn nearest<'a>(unknown: &str, names: impl IntoIterator<Item = &'a str>) -> O
     likely.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name)
 }
 
-/// The question whether the most similar of the names is meant, as the end of a sentence; empty if all are unlike it.
+/// The question "did you mean" with the most similar name, as the end of a sentence; empty without a similar name.
 ///
 /// # Examples
 /// ```

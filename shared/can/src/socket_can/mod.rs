@@ -10,11 +10,11 @@
 //! because the adapter's own clock has another origin.
 //!
 //! # Fault confinement
-//! The driver reports fault confinement by error frames, which change [`status`](Bus::status). Only a
-//! [tap](SocketCan::tap) gets the error frames. They are changes of state and, with `berr-reporting on`, errors on the
-//! wire. Warnings, lost arbitration and faults of the line are skipped. A port counts as error active until the first
-//! error frame. A port in bus-off refuses to send until the interface goes down or the driver reports a restart (`ip
-//! link set … type can restart-ms 100`).
+//! The driver reports fault confinement by error frames, which change [`status`](Bus::status). A [tap](SocketCan::tap)
+//! alone gets the error frames. They are changes of state and, with `berr-reporting on`, errors on the wire. Warnings,
+//! lost arbitration and faults of the line are skipped. A port counts as error active until the first error frame. A
+//! port in bus-off refuses to send until the interface goes down or the driver reports a restart
+//! (`ip link set … type can restart-ms 100`).
 //!
 //! # Losses
 //! The kernel counts the frames lost in a full socket. The kernel does not count the frames lost in the controller, so

@@ -1,7 +1,7 @@
-//! What the master expects of a kind of drive: `[[drive_profile]]`.
+//! The master's expectations of a kind of drive: `[[drive_profile]]`.
 //!
-//! A profile is data: identity, units, objects, storing, brake and homing. Nothing here talks to a drive. What an
-//! emulated drive takes from its profile is in the plant.
+//! A profile is data: identity, units, objects, storing, brake and homing. This module talks to no drive. The emulated
+//! drive's use of its profile is in the plant.
 
 mod object;
 
@@ -24,7 +24,7 @@ pub use object::{ObjectConfig, ObjectKey, ObjectRule};
 /// The kinds with their profiles.
 const KINDS: [(&str, &str); 3] =
     [("emulated", ""), ("epos4", include_str!("kinds/epos4.toml")), ("n5", include_str!("kinds/n5.toml"))];
-/// The profile of axes that no `[[drive_profile]]` names.
+/// The profile of axes without a `[[drive_profile]]`.
 static EMULATED: LazyLock<DriveProfile> = LazyLock::new(DriveProfile::default);
 
 section! {
@@ -81,18 +81,18 @@ section! {
 }
 
 impl DriveProfile {
-    /// The profile of an axis: of the emulated drives where no profile names the axis.
+    /// The profile of an axis; without one, that of the emulated drives.
     pub fn of_axis(profiles: &[Self], axis: usize) -> &Self {
         let named = |profile: &&Self| profile.axes.iter().any(|name| name == AXIS_NAMES[axis]);
         profiles.iter().find(named).unwrap_or(&EMULATED)
     }
 
-    /// Replaces `dcf`, whose path is relative to a folder, by the objects of its file.
+    /// Replaces `dcf`, a path relative to a folder, by the objects of its file.
     pub(super) fn read_dcf(&mut self, folder: &Path) -> Checked {
         self.dcf.take().map_or(Ok(()), |path| add_dcf_objects(&mut self.objects, &folder.join(path)))
     }
 
-    /// What the profile says of an object; nothing in particular when absent.
+    /// The profile's entry for an object; the default without one.
     pub fn object(&self, key: ObjectKey) -> ObjectConfig {
         self.objects.get(&key).copied().unwrap_or_default()
     }
@@ -126,7 +126,7 @@ impl DriveProfile {
     }
 }
 
-/// Reads profiles: what a table has replaces the values of its kind.
+/// Reads profiles. The values of a table replace the values of its kind.
 pub(super) fn over_kinds<'de, D: Deserializer<'de>>(list: D) -> Result<Vec<DriveProfile>, D::Error> {
     let tables = Vec::<Given>::deserialize(list)?;
     tables.into_iter().map(|table| table.over(&KINDS).map_err(D::Error::custom)).collect()
@@ -221,7 +221,7 @@ section! {
 }
 
 impl UnitsConfig {
-    /// Travel of the axis for a turn of the motor, m; none where the profile has no lead.
+    /// Travel of the axis for a turn of the motor, m; none without a lead.
     pub fn travel_per_turn_m(&self) -> Option<f64> {
         Some(self.lead_m? / self.gear_ratio)
     }
@@ -257,12 +257,12 @@ fn mapping_of(keys: &[ObjectKey], of: Constructor) -> Result<PdoMapping, PdoMapp
 }
 
 impl PdosConfig {
-    /// The mapping of RPDO1; the usual one where the objects are not valid.
+    /// The mapping of RPDO1; the usual mapping for invalid objects.
     pub fn rpdo1(&self) -> PdoMapping {
         mapping_of(&self.rpdo1, PdoMapping::rpdo1).unwrap_or(PdoMapping::RPDO1)
     }
 
-    /// The mapping of TPDO1; the usual one where the objects are not valid.
+    /// The mapping of TPDO1; the usual mapping for invalid objects.
     pub fn tpdo1(&self) -> PdoMapping {
         mapping_of(&self.tpdo1, PdoMapping::tpdo1).unwrap_or(PdoMapping::TPDO1)
     }
@@ -308,13 +308,13 @@ section! {
 }
 
 impl HomingConfig {
-    /// What `home_object` must be, in increments of a scale with that many metres an increment.
+    /// Value of `home_object` in increments, at that many metres an increment.
     pub fn home_increments(&self, increment_m: f64) -> i32 {
         let home_m = self.home_position_m.unwrap_or(0.0);
         (f64::from(self.home_sign) * home_m / increment_m).round() as i32
     }
 
-    /// What the drive subtracts from software limits (607Dh), m.
+    /// Offset that the drive subtracts from software limits (607Dh), m.
     pub fn limit_offset_m(&self) -> f64 {
         self.home_position_m.filter(|_| self.limits_from_home).unwrap_or(0.0)
     }

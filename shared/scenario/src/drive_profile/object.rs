@@ -1,5 +1,5 @@
-//! Single objects of a profile: whether the master writes, compares or leaves them, and within which limits. They stand in
-//! the profile, or in a device configuration file.
+//! Single objects of a profile, with their limits: the master writes, compares or leaves an object. The objects stand
+//! in the profile, or in a device configuration file.
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
@@ -16,7 +16,7 @@ use crate::error::{Checked, ScenarioError, read_limited};
 const MOST_BYTES: u64 = 4 << 20;
 /// Communication and mapping parameters of PDOs.
 const PDOS: std::ops::Range<u16> = 0x1400..0x1C00;
-/// Objects of the master's table that drives may lack: a file without one of them makes it absent.
+/// Objects of the master's table that drives may lack. A file without such an object makes the object absent.
 const MAY_LACK: [ObjectAddress; 7] = [
     ObjectAddress::new(0x1400, 5),
     ObjectAddress::new(0x6007, 0),
@@ -27,7 +27,7 @@ const MAY_LACK: [ObjectAddress; 7] = [
     ObjectAddress::new(0x6085, 0),
 ];
 
-/// What the master does with an object.
+/// The master's handling of an object.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ObjectRule {
@@ -59,7 +59,7 @@ pub struct ObjectConfig {
 }
 
 impl ObjectConfig {
-    /// Whether the drive takes that value.
+    /// Whether the drive accepts that value.
     pub fn takes(&self, value: i64) -> bool {
         self.lowest.is_none_or(|lowest| value >= lowest)
             && self.highest.is_none_or(|highest| value <= highest)
@@ -125,8 +125,8 @@ impl From<ObjectKey> for String {
     }
 }
 
-/// Adds the objects of a device configuration file (CiA 306). Objects that the profile names itself stay as they are. PDO
-/// parameters stay the rig's own, and so do values that depend on the node id.
+/// Adds the objects of a device configuration file (CiA 306). Objects of the profile itself stay unchanged. PDO
+/// parameters and values that depend on the node id stay those of the rig.
 pub(super) fn add_dcf_objects(objects: &mut BTreeMap<ObjectKey, ObjectConfig>, path: &Path) -> Checked {
     let dcf = Dcf::parse(&read_limited(path, MOST_BYTES)?).map_err(|error| ScenarioError::Malformed {
         place: format!("{}:{}", path.display(), error.line),
@@ -145,7 +145,7 @@ fn objects_of(dcf: &Dcf) -> impl Iterator<Item = (ObjectAddress, ObjectConfig)> 
     absent.chain(dcf.entries().filter_map(|entry| Some((entry.address, object_of(entry)?))))
 }
 
-/// What a file says of an entry; none where it says nothing that the master can use.
+/// The rule for an entry of a file; none where the file has nothing for the master.
 fn object_of(entry: &Entry) -> Option<ObjectConfig> {
     let address = entry.address;
     let bytes = entry.data_type.bits().filter(|bits| matches!(bits, 8 | 16 | 32))? / 8;
@@ -154,7 +154,7 @@ fn object_of(entry: &Entry) -> Option<ObjectConfig> {
     }
     let (value, limits) = (entry.parameter.as_ref().and_then(plain_number), [&entry.lowest, &entry.highest]);
     let [lowest, highest] = limits.map(|limit| limit.as_ref().and_then(plain_number));
-    // A value that nobody can change is compared, where the master would write it.
+    // The master compares a read-only 60C2h:02 with its value in the file, and never writes that object.
     let is_fixed = !entry.access.is_writable();
     let fixed =
         entry.value().and_then(plain_number).filter(|_| is_fixed && address == ObjectAddress::new(0x60C2, 2));

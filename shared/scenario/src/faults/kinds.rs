@@ -1,4 +1,4 @@
-//! The kinds of faults: the layer that they act in, the keys that they take, and what they stand for.
+//! The kinds of faults, each with its layer, its keys, and its meaning.
 
 use std::borrow::Cow;
 use std::fmt::{self, Display, Formatter};
@@ -8,22 +8,22 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::quantity::Dimension;
 
-/// What is declared of a kind.
+/// The declaration of a kind.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FaultDeclaration {
     /// Its name in scenarios.
     pub name: &'static str,
-    /// The name of the layer that it acts in.
+    /// The name of its layer.
     pub layer: &'static str,
-    /// What acts where several entries of this kind are active at one place at one time.
+    /// The effect of several entries of this kind that are active at one place at one time.
     pub overlap: Overlap,
-    /// The keys that it needs, beside those of the time.
+    /// The required keys, beside those of the time.
     pub needs: &'static [&'static str],
-    /// The keys that it may have as well.
+    /// The optional keys.
     pub takes: &'static [&'static str],
-    /// Its size; none where it has no size.
+    /// Its size; none for a kind without a size.
     pub size: Option<FaultSize>,
-    /// What it stands for.
+    /// Its meaning.
     pub about: &'static str,
 }
 
@@ -35,16 +35,16 @@ pub enum Overlap {
     Adds,
     /// The entry alone that began last; of those that begin together, the last of the list.
     Latest,
-    /// The same as of one entry, from the first beginning to the last end.
+    /// The effect of one entry, from the first beginning to the last end.
     Once,
     /// Every entry by itself, in the order of the list.
     Each,
 }
 
-/// The size of a fault: what it measures, its range in SI units, and a size that a real one may have.
+/// The size of a fault: its dimension, its range in SI units, and the size of a real fault as an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FaultSize {
-    /// What it measures.
+    /// Its dimension.
     pub dimension: Dimension,
     /// The smallest valid size.
     pub min: f64,
@@ -52,11 +52,11 @@ pub struct FaultSize {
     pub max: f64,
     /// A size that a real fault may have.
     pub example: &'static str,
-    /// What it is, in words.
+    /// Its meaning, in words.
     pub about: &'static str,
 }
 
-/// Declares layers and kinds: name, overlap, needed keys, other keys, and where it has one the size.
+/// Declares layers and kinds: name, overlap, required keys, optional keys, and the size of a kind with a size.
 macro_rules! fault_kinds {
     ($($(#[doc = $part:literal])+ $layer:ident $layer_name:literal: $faults:ident {
         $($(#[doc = $doc:literal])+ $kind:ident $name:literal $overlap:ident [$($need:ident)*] $([$($take:ident)*])?
@@ -89,7 +89,7 @@ macro_rules! fault_kinds {
             /// The names of all kinds.
             pub const NAMES: &'static [&'static str] = &[$($($name,)*)*];
 
-            /// What is declared of it.
+            /// The declaration of the kind.
             pub const fn declared(self) -> &'static FaultDeclaration {
                 match self {
                     $($(Self::$layer($faults::$kind) => const {
@@ -235,12 +235,12 @@ impl FaultKindConfig {
         self.declared().name
     }
 
-    /// Whether it acts on a process, so that the supervisor carries it out.
+    /// Whether the kind acts on a process: the supervisor then carries the fault out.
     pub const fn is_of_process(self) -> bool {
         matches!(self, Self::Process(_))
     }
 
-    /// Whether a key has an effect on it.
+    /// Whether a key has an effect on the kind.
     pub fn takes(self, key: &str) -> bool {
         let FaultDeclaration { needs, takes, .. } = self.declared();
         needs.contains(&key) || takes.contains(&key)

@@ -81,7 +81,7 @@ impl Display for FaultConfig {
 }
 
 impl FaultConfig {
-    /// A fault of that kind, with no time and no place yet.
+    /// A fault of that kind without time and place.
     pub fn new(kind: impl Into<FaultKindConfig>) -> Self {
         let kind: FaultKindConfig = kind.into();
         serde_json::from_value(json!({ "kind": kind })).expect("a kind alone is a fault")
@@ -92,18 +92,18 @@ impl FaultConfig {
         self.name.as_deref().unwrap_or(self.kind.name())
     }
 
-    /// The place of its axis; none where it has none.
+    /// The place of its axis; none without an axis.
     pub fn axis(&self) -> Option<usize> {
         let name = self.axis.as_deref()?;
         AXIS_NAMES.iter().position(|axis| *axis == name)
     }
 
-    /// Its size in SI units; 0 where it has none.
+    /// Its size in SI units; 0 without a size.
     pub fn size_si(&self) -> f64 {
         self.size.map_or(0.0, |size| size.si())
     }
 
-    /// The part of a window (ns) in which it acts: of some kinds, the size says how long.
+    /// The part of a window (ns) in which the fault acts: for some kinds, the size is the duration.
     pub fn acting_ns(&self, window_ns: Range<u64>) -> Range<u64> {
         let lasts_its_size = [DriveFault::Reboot.into(), CommandFault::ControllerStall.into()];
         if !lasts_its_size.contains(&self.kind) {
@@ -113,10 +113,10 @@ impl FaultConfig {
         window_ns.start..window_ns.end.min(window_ns.start.saturating_add(longest_ns))
     }
 
-    /// When it acts.
+    /// The time of the fault.
     ///
     /// # Errors
-    /// Where that is missing, contradictory, or names nothing of the scenario.
+    /// For a time that is missing, contradictory, or names no entry of the scenario.
     pub fn when(&self, entries: &EntryNames<'_>) -> Result<When, ScenarioError> {
         let Self { at_s, ref after, for_s, from_s, until_s, .. } = *self;
         let keys = WhenKeys { at_s, after: after.as_deref(), for_s, from_s, until_s };
@@ -145,7 +145,7 @@ impl FaultConfig {
         }
     }
 
-    /// Refuses keys that have no effect on this kind, and requires those that it needs.
+    /// Refuses keys without effect on this kind, and requires the keys that the kind needs.
     fn require_keys(&self) -> Checked {
         let FaultDeclaration { name, needs, takes, .. } = self.kind.declared();
         let of_any = |key: &&str| FaultKindConfig::ALL.iter().any(|kind| kind.takes(key));
@@ -154,7 +154,7 @@ impl FaultConfig {
             .map_err(|refusal| refusal.in_table("faults"))
     }
 
-    /// What a missing key must say.
+    /// The valid values of a missing key.
     fn need_of(&self, key: &str) -> String {
         match (key, self.kind.declared().size) {
             ("bus", _) => "name a bus of can.buses, from 0".to_owned(),

@@ -412,7 +412,7 @@ fn the_controllers_model_is_that_of_the_mechanism_but_for_what_it_names() {
         "[dynamics]\nplatform_mass_kg = 0.7\nrod_mass_kg = 0.3\n[controller.model]\nrod_mass_kg = 0.36";
     let scenario = Scenario::parse(Path::new("s.toml"), text).unwrap();
     assert_eq!(scenario.model(), DynamicsConfig { rod_mass_kg: 0.36, ..scenario.dynamics });
-    // Also where a resolved scenario gets another value by an argument.
+    // The same holds for a resolved scenario with another value by an argument.
     let scenario = scenario.with("controller.model.slide_friction_n=5").unwrap();
     assert_eq!(
         scenario.model(),
@@ -428,7 +428,7 @@ fn feed_forward_is_accepted_where_every_drive_takes_torque_offsets() {
     assert!(Scenario::parse(Path::new("s.toml"), text).unwrap().validate().is_ok());
 }
 
-/// Work that grows with the square of the entries would take minutes.
+/// Work with the square of the entries takes minutes.
 #[test]
 fn ten_thousand_entries_after_each_other_are_checked_at_once() {
     let fault = |number: usize, after: usize| {
