@@ -1,9 +1,10 @@
-//! A command to another process and a reading back, both polling: `cargo bench -p masseter-runtime --bench round_trips`.
+//! A command to another process and a reading back. Both processes poll:
+//! `cargo bench -p masseter-runtime --bench round_trips`.
 //!
-//! The rig's transport is compared with bare iceoryx2 and the same messages, with a Unix socket (128 bytes, also polled),
-//! and with the lower bound: one cache line that two threads on the same cores write in turn. The channels take turns,
-//! because a machine changes its speed from second to second: the ratio within a round counts. Waiting for a socket in
-//! the kernel is not measured; it takes about fifty times as long.
+//! The bench compares the rig's transport with bare iceoryx2 and the same messages, and with a polled Unix socket (128
+//! bytes). The lower bound is one cache line that two threads on the same cores write in turn. The channels take turns,
+//! because a machine changes its speed from second to second: the ratio within a round counts. The bench does not
+//! measure a wait for a socket in the kernel, which takes about fifty times as long.
 
 use std::error::Error;
 use std::io::{self, ErrorKind, Read, Write};
@@ -30,7 +31,7 @@ const ROUND_TRIPS: u64 = 20_000;
 /// Round trips before the measurement.
 const WARM_UP: u64 = 1_000;
 const LAST: u64 = WARM_UP + ROUND_TRIPS;
-/// An answer that takes longer ends the bench, ns.
+/// Longest wait for an answer, ns. A longer wait ends the bench.
 const TIMEOUT_NS: u64 = 10 * SECOND_NS;
 /// Cores of the asking and of the answering side.
 const CORES: [usize; 2] = [0, 1];
@@ -39,7 +40,7 @@ const PRIORITY: u8 = 80;
 /// Bytes of a message on the socket; it begins with its number.
 const SOCKET_BYTES: usize = 128;
 
-/// What carries the numbers; the first is compared with the others.
+/// The channels for the numbers; the bench compares the first with the others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Channel {
     Rig,
@@ -69,8 +70,8 @@ impl Channel {
         }
     }
 
-    /// The round trips of one round, ns, sorted. The other process starts from an ordinary thread: from a real-time
-    /// thread it would inherit core and priority, and get no time while that thread polls.
+    /// The round trips of one round, ns, sorted. The other process starts from an ordinary thread. From a real-time
+    /// thread it inherits core and priority, and gets no time while that thread polls.
     fn measure(self) -> Failable<Vec<u64>> {
         if self == Self::CacheLine {
             return on_a_cache_line();
@@ -155,7 +156,7 @@ fn socket_ends(mut input: UnixStream) -> Failable<Ends> {
     Ok(Ends {
         send: Box::new(move |number| {
             message[..8].copy_from_slice(&number.to_ne_bytes());
-            // At most one message is under way, so the socket always has room for it.
+            // At most one message is under way, so the socket always has room.
             let taken = output.write(&message)?;
             if taken == SOCKET_BYTES { Ok(()) } else { Err("the socket took only part of a message".into()) }
         }),
@@ -221,7 +222,7 @@ fn on_a_cache_line() -> Failable<Vec<u64>> {
         scope.spawn(move || {
             realtime_on(CORES[1]);
             for _ in 1..=LAST {
-                // The other side fails for the same reason and returns the error.
+                // The other side fails for the same reason, and returns the error.
                 let Ok(number) = poll(&mut || read(1)) else { break };
                 write(2 * number);
             }
@@ -266,7 +267,7 @@ impl Peer {
 
 impl Drop for Peer {
     fn drop(&mut self) {
-        // It may have ended by itself; then there is nothing left to kill.
+        // The process may have ended by itself.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }

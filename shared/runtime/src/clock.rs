@@ -16,7 +16,7 @@ pub const SECOND_NS: u64 = 1_000_000_000;
 /// Nanoseconds in a millisecond.
 pub const MILLISECOND_NS: u64 = 1_000_000;
 
-/// Two readings in a row take far less than this, ns.
+/// Far more than the time of two readings in a row, ns.
 const UNDISTURBED_NS: u64 = 10_000;
 
 /// Now, ns of `CLOCK_MONOTONIC`.
@@ -24,7 +24,7 @@ pub fn now_ns() -> u64 {
     read_ns(ClockId::Monotonic)
 }
 
-/// CPU time that the calling thread has used, ns. A system call.
+/// CPU time of the calling thread, ns. A system call.
 pub fn thread_cpu_ns() -> u64 {
     read_ns(ClockId::ThreadCPUTime)
 }
@@ -34,7 +34,7 @@ fn read_ns(clock: ClockId) -> u64 {
     time.tv_sec as u64 * SECOND_NS + time.tv_nsec as u64
 }
 
-/// Sleeps until `deadline_ns`; returns at once when it has passed, or early when a signal arrives.
+/// Sleeps until `deadline_ns`. Returns at once for a past deadline, and early on a signal.
 pub fn sleep_until(deadline_ns: u64) {
     let deadline =
         Timespec { tv_sec: (deadline_ns / SECOND_NS) as i64, tv_nsec: (deadline_ns % SECOND_NS) as _ };
@@ -49,8 +49,8 @@ pub fn sleep(duration: Duration) {
     sleep_until(now_ns() + duration.as_nanos() as u64);
 }
 
-/// By how much the wall clock is ahead of `CLOCK_MONOTONIC`, ns; none when the two readings were interrupted. The
-/// value jumps when the clock is set, and when the machine was suspended.
+/// Lead of the wall clock over `CLOCK_MONOTONIC`, ns; none after an interruption between the readings. The value jumps
+/// when the clock is set, and after a suspension of the machine.
 pub fn wall_ahead_ns() -> Option<i64> {
     let (before_ns, wall_ns, after_ns) = (now_ns(), read_ns(ClockId::Realtime), now_ns());
     (after_ns - before_ns < UNDISTURBED_NS).then(|| wall_ns as i64 - before_ns as i64)

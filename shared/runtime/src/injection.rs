@@ -1,8 +1,8 @@
-//! The times of faults and stimuli in a run, from the occurrences that they count from. And the operator of a
-//! scenario, who sets parameters of the controller and requests a stop, and when the faults of processes are due.
+//! The times of faults and stimuli in a run, from their starting occurrences. The operator of a scenario sets
+//! parameters of the controller, requests a stop, and finds the due faults of processes.
 //!
-//! [`Injection`] acts on nothing: plant, controller and supervisor ask for the windows of what they carry out. The
-//! [`Operator`] sees what the controller sees, readings and its states, and acts on nothing either.
+//! [`Injection`] acts on nothing: plant, controller and supervisor ask for the windows of their own faults and stimuli.
+//! The [`Operator`] gets readings and the controller's states, and acts on nothing either.
 
 use std::fmt::{self, Display, Formatter};
 use std::ops::Range;
@@ -60,7 +60,7 @@ struct Timed {
 }
 
 impl Injection {
-    /// The faults and stimuli of a scenario that is switched on at `now_ns`.
+    /// The faults and stimuli of a scenario with the switch-on at `now_ns`.
     ///
     /// # Errors
     /// Those of [`Scenario::validate`].
@@ -78,12 +78,12 @@ impl Injection {
         Ok(injection)
     }
 
-    /// Whether there are none.
+    /// Whether the scenario has none.
     pub fn is_empty(&self) -> bool {
         self.faults.is_empty() && self.stimuli.is_empty()
     }
 
-    /// The controller is in this state at that time, ns. Only the first cycle in a state counts.
+    /// Notes the controller's state at that time, ns. Only the first cycle in a state counts.
     pub fn note_state(&mut self, state: ControllerState, now_ns: u64) {
         if self.state != Some(state) {
             self.state = Some(state);
@@ -91,7 +91,7 @@ impl Injection {
         }
     }
 
-    /// A fault or a stimulus acts for the first time, ns.
+    /// Notes the first effect of a fault or a stimulus, ns.
     pub fn note_begin(&mut self, injected: Injected, now_ns: u64) {
         let start = match injected {
             Injected::Fault(place) => Start::Fault(place),
@@ -100,7 +100,7 @@ impl Injection {
         self.occur(start, now_ns);
     }
 
-    /// The time in which it acts, ns; none until the occurrence that the time counts from.
+    /// The time of its effect, ns; none before the starting occurrence.
     pub fn window_ns(&self, injected: Injected) -> Option<Range<u64>> {
         let timed = match injected {
             Injected::Fault(place) => self.faults.get(place),
@@ -109,7 +109,7 @@ impl Injection {
         timed?.window_ns.clone()
     }
 
-    /// Whether it acts at that time, ns.
+    /// Whether the fault or stimulus acts at that time, ns.
     pub fn is_active(&self, injected: Injected, now_ns: u64) -> bool {
         self.window_ns(injected).is_some_and(|window_ns| window_ns.contains(&now_ns))
     }
@@ -125,7 +125,7 @@ impl Injection {
     }
 }
 
-/// Why the operator cannot do what the scenario says.
+/// The reason why the operator cannot carry a scenario out.
 #[derive(Debug, thiserror::Error)]
 pub enum OperatorError {
     /// A time names nothing of the scenario.
@@ -139,7 +139,7 @@ pub enum OperatorError {
         /// The refusal.
         error: NameError,
     },
-    /// A time counts from what the controller does not see.
+    /// A time counts from an occurrence that the controller does not see.
     #[error(
         "{0}: its time counts from an occurrence in the plant, which the controller does not see: count from the motion \
          (at_s alone), or from controller.STATE"
@@ -148,7 +148,7 @@ pub enum OperatorError {
 }
 
 impl OperatorError {
-    /// The key in the scenario, and the number of its entry in the list, from 0.
+    /// The key in the scenario and the number of its entry in the list, from 0.
     pub fn key(&self) -> Option<(&'static str, usize)> {
         match self {
             Self::Scenario(_) => None,
@@ -162,14 +162,15 @@ impl OperatorError {
     }
 }
 
-/// What is due.
+/// A due action.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Due {
     /// A parameter gets a value.
     Set { place: usize, value: f64 },
     /// An orderly stop is asked for.
     Stop,
-    /// A fault of a process, with its place in the scenario's list. The supervisor knows whether it is to carry it out.
+    /// A fault of a process, by its place in the scenario's list. The supervisor decides whether to carry the fault
+    /// out.
     Fault(usize),
 }
 
@@ -188,14 +189,14 @@ pub(crate) enum Due {
 #[derive(Debug, Clone)]
 pub struct Operator {
     injection: Injection,
-    /// What has not been due yet.
+    /// Actions that have not been due.
     waiting: Vec<(Injected, Due)>,
-    /// When the newest reading was sampled, ns.
+    /// Time of the newest reading's sample, ns.
     sampled_ns: u64,
 }
 
 impl Operator {
-    /// The operator of a scenario that is switched on at `now_ns`, for a controller that declares these parameters.
+    /// The operator of a scenario with the switch-on at `now_ns`, for a controller with these parameters.
     ///
     /// # Errors
     /// [`OperatorError`].
@@ -230,8 +231,8 @@ impl Operator {
         Ok(Self { injection: Injection::new(scenario, now_ns)?, waiting, sampled_ns: 0 })
     }
 
-    /// What is due in a cycle that uses a reading sampled at this time, ns: at most one thing, so that the work of a cycle is
-    /// bounded. None stands for a cycle without a new reading.
+    /// The due action of a cycle with a reading sampled at this time, ns. A cycle gets at most one, so that its work is
+    /// bounded. `None` as the time stands for a cycle without a new reading.
     pub(crate) fn take_due(&mut self, sampled_ns: Option<u64>) -> Option<(Injected, Due)> {
         self.sampled_ns = sampled_ns.unwrap_or(self.sampled_ns);
         let (injection, now_ns) = (&self.injection, self.sampled_ns);
@@ -241,7 +242,7 @@ impl Operator {
         Some((injected, due))
     }
 
-    /// The controller was in this state in the cycle of the newest reading.
+    /// Notes the controller's state in the cycle of the newest reading.
     pub(crate) fn note_state(&mut self, state: u32) {
         if self.waiting.is_empty() {
             return;
@@ -252,7 +253,7 @@ impl Operator {
     }
 }
 
-/// The event of a stimulus that began; none for a fault, which whoever carries it out enters.
+/// The event of a begun stimulus; none for a fault, whose event comes from the part that carries the fault out.
 pub(crate) fn begin_event(injected: Injected, cycle: u64, time_ns: u64) -> Option<Event> {
     let Injected::Stimulus(place) = injected else { return None };
     let value = (place + 1) as f64;
@@ -260,7 +261,7 @@ pub(crate) fn begin_event(injected: Injected, cycle: u64, time_ns: u64) -> Optio
     Some(Event { time_ns, cycle, value, object: OF_OPERATOR, ..event })
 }
 
-/// Whether the controller sees what the time counts from.
+/// Whether the controller sees the start of the time.
 pub fn is_seen_by_controller(when: When, scenario: &Scenario) -> bool {
     match when.start {
         Start::SwitchOn | Start::State(_) => true,

@@ -1,5 +1,5 @@
-//! What both sides of the rig run on: messages and their transport, the schedule of the bus, the real-time loop, the life of a
-//! process, and the trait `Controller` with its session.
+//! The common runtime of both sides of the rig: messages and their transport, the schedule of the bus, and the
+//! real-time loop. Also the life of a process, and the trait `Controller` with its session.
 //!
 //! Geometry and dynamics are in `masseter-model`, scenarios in `masseter-scenario`. This crate is the same in every process.
 

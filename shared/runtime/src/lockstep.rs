@@ -1,9 +1,9 @@
 //! Simulated time in three processes: plant and controller take turns, and the plant never runs far ahead of the
 //! recorder.
 //!
-//! A turn ends with a signal to the other loop, after all messages of the turn. A process that waits sleeps. A process
-//! that does not answer is given up after the [`Patience`], the plant after twice that. The process that waits reports
-//! the silence to the supervisor and goes on alone, in real time, so that its watchdogs end the run.
+//! A turn ends with a signal to the other loop, after all messages of the turn. A process that waits sleeps. The wait
+//! for a silent process ends after the [`Patience`], for the plant after twice that. The waiting process reports the
+//! silence to the supervisor and goes on alone, in real time, so that its watchdogs end the run.
 
 use std::mem;
 use std::time::Duration;
@@ -26,14 +26,14 @@ const RECORDED: u8 = 3;
 
 /// Longest uninterrupted sleep.
 const SLICE: Duration = Duration::from_millis(20);
-/// Longest silence of another process once this one was asked to end: it has probably ended, ns.
+/// Longest silence of another process after the request to end, ns: the other process has probably ended.
 const STOP_PATIENCE_NS: u64 = clock::SECOND_NS;
 /// Longest wait for the request to end, after the last turn, ns.
 const STOP_REQUEST_NS: u64 = 10 * clock::SECOND_NS;
 /// Polling interval of the request to end.
 const STOP_POLL: Duration = Duration::from_millis(1);
 /// Messages of the plant between two requests to the recorder. The recorder has room for more than two such windows and
-/// everything that a cycle may add.
+/// one cycle's messages.
 const WINDOW_MESSAGES: usize = 256;
 
 /// The clock of a loop's cycles.
@@ -46,7 +46,7 @@ pub enum Clock {
 }
 
 impl Clock {
-    /// The clock of a loop whose first cycle is due at this time, ns.
+    /// The clock of a loop with its first cycle due at this time, ns.
     pub fn start(lockstep: Option<Lockstep>, first_due_ns: u64, period_ns: u64) -> Self {
         match lockstep {
             None => Self::RealTime(Cycle::new(first_due_ns, period_ns)),
@@ -67,7 +67,7 @@ impl Clock {
 #[derive(Debug)]
 pub struct Lockstep {
     signals: SignalReceiver,
-    /// The signals that have arrived and were not taken yet, as bits.
+    /// The arrived signals that no wait has taken, as bits.
     arrived: u8,
     other: (Party, SignalSender),
     recorder: SignalSender,
@@ -79,27 +79,27 @@ pub struct Lockstep {
     period_ns: u64,
     cycle: u64,
     now_ns: u64,
-    /// The process that was given up.
+    /// The lost process.
     lost: Option<Party>,
-    /// Whether the other loop has had its last turn.
+    /// Whether the other loop's last turn is over.
     is_last: bool,
-    /// The silence of the other loop in the turn that is awaited.
+    /// The silence of the other loop in the awaited turn.
     silence: SilenceCount,
     unrecorded: usize,
     is_recording: bool,
 }
 
-/// For how long a process has been silent.
+/// The silence of a process.
 #[derive(Debug, Clone, Copy, Default)]
 struct SilenceCount {
-    /// When this process last looked for a signal; none before the first time.
+    /// Time of the last look for a signal; none before the first look.
     looked_ns: Option<u64>,
-    /// In all, and since this process was asked to end, ns.
+    /// In all, and since the request to end, ns.
     silent_ns: [u64; 2],
 }
 
 impl SilenceCount {
-    /// Takes note of a look in vain. Stretches in which this process itself was stopped hardly count.
+    /// Counts a look without a signal. Stretches in which this process itself is stopped hardly count.
     fn look(&mut self, is_stop_requested: bool) {
         let now_ns = clock::now_ns();
         let looked_ns = self.looked_ns.replace(now_ns).unwrap_or(now_ns);
@@ -142,7 +142,7 @@ impl Lockstep {
     /// Begins the next cycle, in time.
     pub fn begin_cycle(&mut self) -> Wake {
         if self.lost.is_some() {
-            // Nothing else keeps this loop from running far ahead of the recorder.
+            // Only this sleep keeps the loop from running far ahead of the recorder.
             clock::sleep(Duration::from_nanos(self.period_ns));
         }
         self.cycle += 1;
@@ -155,23 +155,23 @@ impl Lockstep {
         self.now_ns
     }
 
-    /// Goes on to `now_ns` of simulated time; returns it.
+    /// Advances simulated time to `now_ns`, and returns it.
     pub fn advance(&mut self, now_ns: u64) -> u64 {
         self.now_ns = now_ns;
         now_ns
     }
 
-    /// For a look at what has arrived, without a wait.
+    /// Looks at the arrived signals, without a wait.
     pub fn waiter(&mut self) -> &mut Waiter {
         &mut self.waiter
     }
 
-    /// The process that was given up, if any: nothing waits for it again.
+    /// The lost process, if any. No later call waits for this process.
     pub fn lost(&self) -> Option<Party> {
         self.lost
     }
 
-    /// Whether the other loop has had its last turn.
+    /// Whether the other loop's last turn is over.
     pub fn is_last(&self) -> bool {
         self.is_last
     }
@@ -187,7 +187,7 @@ impl Lockstep {
         self.other.1.send(if is_last { LAST_TURN_ENDED } else { TURN_ENDED })
     }
 
-    /// Waits until the other loop has ended its turn; false once the other loop was given up.
+    /// Waits for the end of the other loop's turn; false for a lost process.
     ///
     /// # Errors
     /// Those of the signals, and of standard output.
@@ -197,8 +197,8 @@ impl Lockstep {
         Ok(ended.is_some())
     }
 
-    /// Whether the other loop ends its turn within this time, which [`Self::await_turn`] then returns at once. So it is
-    /// once the other loop was given up: its silence counts from one call to the next.
+    /// Whether the other loop ends its turn within this time, or is lost. [`Self::await_turn`] then returns at once.
+    /// The silence counts from one call to the next.
     ///
     /// # Errors
     /// As [`Self::await_turn`].
@@ -220,7 +220,7 @@ impl Lockstep {
         Ok(true)
     }
 
-    /// Takes note of a cycle that left this many messages on the fullest topic. Waits if the recorder lags behind.
+    /// Counts a cycle with this many messages on the fullest topic. Waits for a recorder that lags behind.
     ///
     /// # Errors
     /// As [`Self::await_turn`].
@@ -231,7 +231,7 @@ impl Lockstep {
             return Ok(());
         }
         if is_first {
-            // Before any message: a recorder that connects after a short run has ended receives nothing of it.
+            // Before any message: a recorder that connects after the end of a short run receives none of its messages.
             self.recorder.send(RECORD)?;
         }
         self.wait(&[RECORDED], Party::Recorder)?;
@@ -240,7 +240,7 @@ impl Lockstep {
         Ok(self.recorder.send(RECORD)?)
     }
 
-    /// Waits for the request to end, after the last turn; false if it does not come.
+    /// Waits for the request to end, after the last turn; false without the request.
     pub fn await_stop(&self) -> bool {
         let mut waited_ns = 0;
         while !self.stop.is_made() && waited_ns < STOP_REQUEST_NS {
@@ -250,9 +250,9 @@ impl Lockstep {
         self.stop.is_made()
     }
 
-    /// Waits for one of the signals from a process; none once that process was given up.
+    /// Waits for one of the signals from a process; none for a lost process.
     fn wait(&mut self, signals: &[u8], from: Party) -> Result<Option<u8>, ProcessError> {
-        // Looks with a time limit may have been in vain before.
+        // Looks with a time limit may have found no signal before.
         let mut silence =
             if from == self.other.0 { mem::take(&mut self.silence) } else { SilenceCount::default() };
         while self.lost != Some(from) {
@@ -272,10 +272,10 @@ impl Lockstep {
         Ok(None)
     }
 
-    /// Gives a process up that has been silent for too long, and reports it.
+    /// Reports a process lost after a silence that is too long.
     fn give_up_silent(&mut self, process: Party, silence: SilenceCount) -> Result<(), ProcessError> {
         let [silent_ns, since_stop_ns] = silence.silent_ns;
-        // The plant may have to wait for the recorder meanwhile.
+        // The plant may wait for the recorder meanwhile.
         let waits = if process == Party::Plant { 2 } else { 1 };
         if !self.patience.lasts(silent_ns / waits) {
             self.lost = Some(process);
@@ -288,7 +288,7 @@ impl Lockstep {
     }
 }
 
-/// The recorder's end: it learns when the plant wants to be sure that everything is received.
+/// The recorder's end, which gets the plant's requests for an acknowledgement of all messages.
 #[derive(Debug)]
 pub struct RecorderSignals {
     signals: SignalReceiver,
@@ -313,7 +313,7 @@ impl RecorderSignals {
         Ok(self.signals.receive()? == Some(RECORD))
     }
 
-    /// Answers a request, once everything that had been sent before is received.
+    /// Answers a request, after the reception of all earlier messages.
     ///
     /// # Errors
     /// Those of the signals.

@@ -1,10 +1,11 @@
 //! The schedule of a cycle, from the worst-case frame lengths on the bus.
 //!
-//! SYNC and the drives' process data (TPDO1) go first, at offset 0. Then the controller computes. Then its targets (RPDO1)
-//! go out, to be on the wire before the next SYNC. The heartbeat is the last message of a node in its cycle: a drive's follows
-//! its TPDO1, the master's follows the RPDO1 and any SDO request. So the offsets also hold for interfaces that send in the order
-//! of their queue: SYNC waits for one heartbeat at most. An SDO exchange takes the place of its drive's process data. Emergencies (EMCY) are not in the schedule: in a cycle with one, reading or command may be
-//! late, as with a disturbed bus.
+//! SYNC and the drives' process data (TPDO1) go first, at offset 0. Then the controller computes. Then its targets
+//! (RPDO1) go out, before the next SYNC. The heartbeat is the last message of a node in its cycle. A drive's heartbeat
+//! follows its TPDO1; the master's heartbeat follows the RPDO1 and any SDO request. So the offsets also hold for
+//! interfaces that send in the order of their queue: SYNC waits for one heartbeat at most. An SDO exchange takes the
+//! place of its drive's process data. Emergencies (EMCY) are not in the schedule: in a cycle with an emergency, reading
+//! or command may be late, as with a disturbed bus.
 
 use std::fmt;
 
@@ -17,8 +18,7 @@ use masseter_can::{
     Bitrate, BitrateError, BusPlan, NoReleaser, Overload, PdoMapping, PeriodicMessage, Release,
 };
 
-/// SYNC and the controller's deadline keep this clear of whole milliseconds, where the kernel's timer
-/// tick falls, ns.
+/// Distance of SYNC and of the controller's deadline from whole milliseconds, the times of the kernel's timer tick, ns.
 pub const OFF_TICK_NS: u64 = 230_000;
 
 /// From the latest reading to the controller's deadline, ns: publishing takes some microseconds.
@@ -50,11 +50,11 @@ pub struct CycleSchedule {
     pub reading_by_ns: u64,
     /// When the controller wakes.
     pub controller_at_ns: u64,
-    /// The latest command whose process data are on the wire before the next SYNC.
+    /// The latest command with process data on the wire before the next SYNC.
     pub command_by_ns: u64,
 }
 
-/// Why there is no schedule.
+/// The reason for a missing schedule.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ScheduleError {
     /// Unknown bit rate.
@@ -71,7 +71,7 @@ pub enum ScheduleError {
     Misfit {
         /// The part that does not fit.
         misfit: Misfit,
-        /// The rate that fits.
+        /// The highest rate that fits.
         room: Room,
     },
 }
@@ -82,7 +82,7 @@ pub enum Misfit {
     /// Messages that do not arrive in time.
     #[error("the messages of a bus do not fit\n{0}")]
     Overload(#[from] Overload),
-    /// The frames fit, but leave the controller no time between reading and command.
+    /// The frames fit, without time for the controller between reading and command.
     #[error(
         "the reading may take until {reading_by_ns} ns and the command must be there by {command_by_ns} ns of a cycle \
          of {period_ns} ns, which leaves the controller no time; use a lower rate_hz or more buses"
@@ -127,7 +127,7 @@ impl CycleSchedule {
         // A frame has arrived before the interframe space behind it.
         let pause_ns = bitrate.bits_to_ns(INTERFRAME_BITS);
         let reading_from_ns = shortest(sync) + axes * shortest(tpdo) - pause_ns;
-        // A heartbeat may have begun just before SYNC is queued.
+        // A heartbeat may begin just before SYNC is queued.
         let heartbeat_ns = heartbeat_ns(bitrate);
         let up_ns = longest(sync) + axes * longest(tpdo);
         let rpdos_ns = |axes: &Vec<usize>| {
@@ -144,12 +144,12 @@ impl CycleSchedule {
     }
 }
 
-/// The cycle rate that a link has room for.
+/// The highest cycle rate of a link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Room {
-    /// The highest rate for which there is a time table, Hz; none where no rate is low enough.
+    /// The highest rate with a time table, Hz; none if no rate is low enough.
     pub max_rate_hz: Option<u32>,
-    /// The part of every cycle that the drives take to answer SYNC, ns.
+    /// Time of the drives' answer to SYNC in every cycle, ns.
     pub answer_ns: u64,
 }
 
@@ -167,7 +167,7 @@ impl fmt::Display for Room {
 }
 
 impl Room {
-    /// The room of a scenario's link, by bisection: whatever fits into a cycle fits into a longer one.
+    /// The room of a scenario's link, by bisection: frames that fit into a cycle fit into a longer cycle.
     ///
     /// # Errors
     /// [`ScheduleError`] for unknown bit rates and node ids.
@@ -198,7 +198,8 @@ fn heartbeat_ns(bitrate: Bitrate) -> u64 {
     bitrate.bits_to_ns(worst_case_bits(HEARTBEAT_LENGTH, false))
 }
 
-/// The delay of the reading by drives that do not answer SYNC at once, ns: a heartbeat may begin while the bus is idle.
+/// The delay of the reading by drives that do not answer SYNC at once, ns. A heartbeat may begin in the idle time
+/// before the answer.
 fn answer_ns(can: &CanConfig, heartbeat_ns: u64) -> u64 {
     if can.answer_us > 0 { u64::from(can.answer_us) * 1000 + heartbeat_ns } else { 0 }
 }
@@ -226,20 +227,19 @@ pub fn plans(scenario: &Scenario) -> Result<Vec<BusPlan>, ScheduleError> {
     plans_of(scenario, scenario.period_ns(), Drives::AllRun)
 }
 
-/// What the drives of every bus do.
+/// The activity of the drives of every bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Drives {
     AllRun,
     OneBoots,
 }
 
-/// The plans while all drives run, or while one of every bus boots and the others run: then request and answer of one
-/// SDO exchange take the place of its process data. The worst is the drive with the shortest RPDO1. With more drives
-/// booting there is still one request in a cycle, and each answer is no longer than the process data that its drive
-/// does not send.
+/// The plans with all drives running, or with one booting drive on every bus. Request and answer of one SDO exchange
+/// take the place of the booting drive's process data. The worst case is the drive with the shortest RPDO1. With more
+/// booting drives a cycle still has one request. Each answer is no longer than the missing process data of its drive.
 ///
-/// The offsets of the schedule hold as well: an SDO frame blocks the bus for longer than a heartbeat, but for no longer than
-/// a heartbeat and the missing process data.
+/// The offsets of the schedule hold as well. An SDO frame blocks the bus for longer than a heartbeat, but not for
+/// longer than a heartbeat and the missing process data.
 fn plans_of(scenario: &Scenario, period_ns: u64, drives: Drives) -> Result<Vec<BusPlan>, ScheduleError> {
     let can = &scenario.can;
     let plan = |(bus, axes): (usize, &Vec<usize>)| {
@@ -259,7 +259,7 @@ fn pdo_bytes(mapping: &PdoMapping) -> u32 {
     mapping.length() as u32
 }
 
-/// The messages of a bus with these drives, of which one may be booting.
+/// The messages of a bus with these drives, at most one of them booting.
 fn bus_messages(
     drives: &[(NodeId, PdoMapping)],
     can: &CanConfig,

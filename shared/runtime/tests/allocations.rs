@@ -1,5 +1,5 @@
-//! What a cycle allocates: nothing for waiting, receiving and dynamics, and for each message sent the one small
-//! counter that iceoryx2 keeps a loan with. Alone in its file: the allocator is that of the whole program.
+//! Allocations of a cycle: none for waiting, receiving and dynamics, and iceoryx2's one small counter of a loan for
+//! each sent message. Alone in its file: the allocator is that of the whole program.
 #![allow(unsafe_code)] // A global allocator is an unsafe trait; this one only counts and passes on.
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -18,7 +18,7 @@ use nalgebra::Vector6;
 struct Counting;
 
 thread_local! {
-    /// Of this thread alone: the test harness allocates in its own.
+    /// Counts of this thread alone: the test harness allocates in its own threads.
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
     static LARGEST: Cell<u64> = const { Cell::new(0) };
 }
@@ -26,12 +26,12 @@ thread_local! {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-// SAFETY: every call goes to the system's allocator unchanged, so its guarantees are this one's.
+// SAFETY: every call goes to the system's allocator unchanged, so its guarantees hold.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.set(ALLOCATIONS.get() + 1);
         LARGEST.set(LARGEST.get().max(layout.size() as u64));
-        // SAFETY: the caller's promises about `layout` are passed on.
+        // SAFETY: the caller's promises about `layout` go to the system's allocator.
         unsafe { System.alloc(layout) }
     }
 
@@ -41,7 +41,7 @@ unsafe impl GlobalAlloc for Counting {
     }
 }
 
-/// Number and largest size of the allocations that `work` makes.
+/// Number and largest size of the allocations of `work`.
 fn allocations_of(work: impl FnOnce()) -> (u64, u64) {
     LARGEST.set(0);
     let before = ALLOCATIONS.get();

@@ -1,10 +1,10 @@
-//! Connections that cannot be made. Alone in its file: the limit that refuses them is the whole process's.
+//! Failed connections. Alone in its file: the limit that causes the failures holds for the whole process.
 
 use masseter_runtime::messages::Event;
 use masseter_runtime::transport::{FramePublisher, FrameSubscriber, Node, ScratchDomain, TransportError};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
-/// What `connect` says where no file may be opened.
+/// The error of `connect` when no file may be opened.
 fn refused<T>(connect: impl FnOnce() -> Result<T, TransportError>) -> String {
     let before = getrlimit(Resource::Nofile);
     setrlimit(Resource::Nofile, Rlimit { current: Some(0), ..before }).unwrap();

@@ -27,7 +27,7 @@ pub struct Tick {
 /// How a controller ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// The controller did what it was asked to, and the drives are off.
+    /// The controller has completed its task, and the drives are off.
     Finished,
     /// A fault ended the motion.
     SafeStop,
@@ -41,7 +41,7 @@ pub enum Outcome {
 pub struct NoBranch(pub &'static str);
 
 impl NoBranch {
-    /// The refusal of that type.
+    /// The refusal for that type.
     pub fn of<T: ?Sized>() -> Self {
         Self(std::any::type_name::<T>())
     }
@@ -95,22 +95,22 @@ impl NoBranch {
 /// ```
 #[doc(alias("control law", "regulator"))]
 pub trait Controller {
-    /// Takes the newest reading; none where no reading arrived in time.
+    /// Takes the newest reading; none without a reading in time.
     fn observe(&mut self, reading: Option<&Reading>);
 
-    /// Decides what the drives have to do, and reports a change of state.
+    /// Decides the command of the drives, and reports a change of state.
     fn decide(&mut self, tick: Tick) -> Option<Event>;
 
     /// Writes this cycle's command: targets in m, and a request to all drives.
     fn fill_command(&self, command: &mut Command);
 
-    /// Writes what this cycle made of the reading.
+    /// Writes the state of this cycle.
     fn fill_state(&mut self, state: &mut State);
 
     /// Asks for an orderly stop: the motion comes to rest, then the drives are switched off.
     fn request_stop(&mut self);
 
-    /// How the controller ended; none while it still has something to do.
+    /// The controller's outcome; none before its end.
     fn outcome(&self) -> Option<Outcome>;
 
     /// The signals that the controller publishes, and the parameters that its user sets. Called once, before the start.
@@ -118,19 +118,19 @@ pub trait Controller {
         Declared::default()
     }
 
-    /// Takes a parameter's value, which is within its range: before the first cycle, and at the beginning of a cycle.
+    /// Takes a parameter's value, within its range, before the first cycle or at the beginning of a cycle.
     fn set_parameter(&mut self, _place: usize, _value: f64) {}
 
     /// Writes the declared signals of this cycle.
     fn fill_signals(&self, _signals: &mut [f64]) {}
 
-    /// Does work of the next cycle once in advance and without effect, so that its code and data are in the caches.
+    /// Does work of the next cycle in advance and without effect, so that its code and data are in the caches.
     fn warm_up(&self) {}
 
-    /// A copy of the controller with its whole state, which goes on by itself as this one would. Not part of a cycle.
+    /// A copy of the controller with its whole state, for an independent continuation. Not part of a cycle.
     ///
     /// # Errors
-    /// [`NoBranch`] for a controller that has none.
+    /// [`NoBranch`] for a controller without copies.
     fn branch(&self) -> Result<Box<dyn Controller>, NoBranch> {
         Err(NoBranch::of::<Self>())
     }
@@ -140,16 +140,16 @@ pub trait Controller {
 pub trait ControllerPorts {
     /// A reading, owned or in shared memory.
     type Reading: Borrow<Reading>;
-    /// Why a message could not be exchanged.
+    /// A failed exchange of a message.
     type Error;
 
     /// Now, ns.
     fn now_ns(&self) -> u64;
 
-    /// The reading of this cycle, or the newest reading when a longer wait would miss the deadline.
+    /// The reading of this cycle, or the newest reading if a longer wait misses the deadline.
     ///
     /// # Errors
-    /// When the messages cannot be received.
+    /// When the reception of messages fails.
     fn reading(&mut self, wake: &Wake) -> Result<Option<Self::Reading>, Self::Error>;
 
     /// Publishes the command that `fill` writes.
@@ -182,7 +182,7 @@ pub trait ControllerPorts {
     /// When the message cannot be sent.
     fn publish_event(&mut self, event: &Event) -> Result<(), Self::Error>;
 
-    /// A fault of a process, with its place in the scenario's list, is due. Without processes there is nothing to do.
+    /// Reports a due fault of a process, by its place in the scenario's list. No action without processes.
     ///
     /// # Errors
     /// When the supervisor is gone.
@@ -191,17 +191,18 @@ pub trait ControllerPorts {
     }
 }
 
-/// What accompanies a controller through a run: the values of its named numbers, and the operator of the scenario.
-/// A clone has settings of its own.
+/// The values of a controller's named numbers in a run, and the operator of the scenario. A clone has settings of its
+/// own.
 #[derive(Debug, Clone)]
 pub struct Duties {
     /// The signals and parameters.
     pub named: NamedValues,
-    /// Who sets parameters and asks for a stop.
+    /// The operator, who sets parameters and asks for a stop.
     pub operator: Operator,
 }
 
-/// Runs one cycle: reading, decision, command; then state, signals, parameters and events, which no other loop waits for.
+/// Runs one cycle: reading, decision, command; then state, signals, parameters and events. No other loop waits for the
+/// latter.
 ///
 /// ```
 /// use masseter_runtime::control::{Controller, ControllerPorts, Duties, run_cycle};
@@ -291,8 +292,8 @@ fn publish_begin<P: ControllerPorts>(
     event.map_or(Ok(()), |event| ports.publish_event(&event))
 }
 
-/// Makes a state ready to be published: rounds its figures, and enters the use of time and the times of the cycle.
-/// Those are when the reading was received, the pose was found, and the command was ready.
+/// Completes a state for its publication: rounds its figures, and enters the use of time and the times of the cycle.
+/// These are the times of the received reading, the found pose, and the ready command.
 fn complete_state(state: &mut State, wake: &Wake, [received_ns, solved_ns, commanded_ns]: [u64; 3]) {
     (state.due_ns, state.woke_ns) = (wake.due_ns, wake.woke_ns);
     (state.received_ns, state.solved_ns, state.commanded_ns) = (received_ns, solved_ns, commanded_ns);

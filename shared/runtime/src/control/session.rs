@@ -1,4 +1,5 @@
-//! A controller's part in a run: bound to iceoryx2, and to real time or to lockstep. It decides nothing.
+//! A controller's part in a run, with the bindings to iceoryx2 and to real time or lockstep. This module decides
+//! nothing.
 
 use std::time::Duration;
 
@@ -17,11 +18,11 @@ use crate::named::{Declared, NamedValues, access};
 use crate::realtime::Wake;
 use crate::transport::{Publisher, ReceivedMessage, Subscriber, TransportError};
 
-/// A started run, from the side of its controller.
+/// A started run, for its controller.
 ///
-/// Either [`Self::run`] runs a [`Controller`] to its end; or a program runs the cycles itself: [`Self::wait`],
-/// [`Self::publish`], and at last [`Self::finish`] or [`Self::fail`]. Nothing is published beside the cycle's own time:
-/// a cycle begins with [`Self::wait`] and ends with the next one.
+/// [`Self::run`] runs a [`Controller`] to its end. Or a program runs the cycles itself: [`Self::wait`],
+/// [`Self::publish`], and at last [`Self::finish`] or [`Self::fail`]. A cycle begins with [`Self::wait`] and ends with
+/// the next [`Self::wait`]. [`Self::publish`] refuses a command outside a cycle.
 ///
 /// ```no_run
 /// use masseter_runtime::control::{Outcome, Session, Waited};
@@ -46,13 +47,13 @@ pub struct Session {
     context: ProcessContext,
     ports: Ports,
     duties: Duties,
-    /// Whether the operator of the scenario has asked for a stop.
+    /// Whether the scenario's operator has asked for a stop.
     is_stopped: bool,
-    /// The cycle whose turn has not ended.
+    /// The cycle with an open turn.
     cycle: Option<OpenCycle>,
 }
 
-/// A cycle that has begun.
+/// A begun cycle.
 #[derive(Debug, Clone, Copy)]
 struct OpenCycle {
     wake: Wake,
@@ -60,7 +61,7 @@ struct OpenCycle {
     is_published: bool,
 }
 
-/// What a wait led to.
+/// The result of a wait.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "it lives for a moment")]
 pub enum Waited {
@@ -68,14 +69,14 @@ pub enum Waited {
     Cycle {
         /// Its number and time.
         tick: Tick,
-        /// The newest reading; none where no new one arrived in time.
+        /// The newest reading; none without a new reading in time.
         reading: Option<Reading>,
     },
-    /// None has begun within the given time.
+    /// No cycle has begun within the given time.
     TimedOut,
 }
 
-/// Why a message was not published.
+/// The reason for an unpublished message.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionError {
     /// A message before the first cycle.
@@ -84,12 +85,12 @@ pub enum SessionError {
     /// A second command.
     #[error("cycle {0} has its command already: call wait for the next cycle")]
     Published(u64),
-    /// A command of an earlier cycle, or of none: whoever made it may have stopped.
+    /// A command of an earlier cycle, or of none: its sender may have stopped.
     #[error("the command is of cycle {given}, but cycle {cycle} has begun: make a command for each cycle")]
     OtherCycle {
-        /// The cycle that the command names.
+        /// The cycle of the command.
         given: u64,
-        /// The cycle that has begun.
+        /// The begun cycle.
         cycle: u64,
     },
     /// The transport or the supervisor.
@@ -99,7 +100,7 @@ pub enum SessionError {
 
 impl Session {
     /// Opens the ports, reports ready, and waits for the start of the run. The signals and parameters are those of the
-    /// controller; the scenario may give the parameters other values.
+    /// controller. The scenario may give the parameters other values.
     ///
     /// # Errors
     /// [`ProcessError`] when the ports cannot be opened, the start is cancelled, or the declaration does not fit the
@@ -111,7 +112,7 @@ impl Session {
                 .map_err(ProcessError::Parameters)?;
         }
         let declared = named.settings().declared();
-        // Once before the start, so that what cannot be done is refused in time.
+        // A check before the start refuses an impossible stimulus in time.
         Operator::new(&context.scenario, declared, 0)?;
         let (ports, epoch_ns) = Ports::open(&context, declared)?;
         let operator = Operator::new(&context.scenario, declared, epoch_ns)?;
@@ -119,7 +120,7 @@ impl Session {
         Ok(Self { context, ports, duties, is_stopped: false, cycle: None })
     }
 
-    /// Runs the controller that made the declaration until it is done.
+    /// Runs the controller of the declaration to its end.
     ///
     /// # Errors
     /// [`ProcessError`] when messages cannot be exchanged.
@@ -140,17 +141,18 @@ impl Session {
         }
     }
 
-    /// Whether an orderly end is requested: bring the motion to rest, switch the drives off, then [`Self::finish`].
+    /// Whether an orderly end is requested. The program then brings the motion to rest, switches the drives off, and
+    /// calls [`Self::finish`].
     pub fn is_stop_requested(&self) -> bool {
         self.is_stopped || self.context.stop.is_made()
     }
 
-    /// The context of the run: its scenario and time table.
+    /// The context of the run, with its scenario and time table.
     pub fn context(&self) -> &ProcessContext {
         &self.context
     }
 
-    /// Ends the current cycle and waits for the next; with a time-out of zero, only looks whether it has begun.
+    /// Ends the current cycle and waits for the next. A time-out of zero only looks for the next cycle.
     ///
     /// # Errors
     /// [`ProcessError`] when messages cannot be exchanged.
@@ -170,7 +172,7 @@ impl Session {
         Ok(Waited::Cycle { tick, reading })
     }
 
-    /// Does what is due, and takes over a parameter that was set.
+    /// Carries out due stimuli, and takes over a changed parameter.
     fn act(&mut self, sampled_ns: Option<u64>, tick: Tick) -> Result<(), ProcessError> {
         let Duties { named, operator } = &mut self.duties;
         let due = operator.take_due(sampled_ns);
@@ -191,17 +193,16 @@ impl Session {
         self.duties.named.parameters()
     }
 
-    /// The signals that go out with this cycle's command, in the order of their declaration.
+    /// The signals for this cycle's command, in the order of their declaration.
     pub fn signals_mut(&mut self) -> &mut [f64] {
         self.duties.named.signals_mut()
     }
 
-    /// Publishes this cycle's command and what the program made of the reading. The session enters the time stamps and
-    /// the use of time into the state.
+    /// Publishes this cycle's command and state. The session enters the time stamps and the use of time into the state.
     ///
     /// # Errors
-    /// [`SessionError`] for a second command in one cycle, a command that names another cycle, before the first cycle,
-    /// or when it cannot be sent.
+    /// [`SessionError`] for a second command in one cycle, a command of another cycle, a call before the first cycle,
+    /// or a failed transmission.
     pub fn publish(&mut self, command: &Command, state: &State) -> Result<(), SessionError> {
         let OpenCycle { wake, received_ns, is_published } = self.cycle.ok_or(SessionError::NoCycle)?;
         if is_published {
@@ -226,7 +227,7 @@ impl Session {
     /// Publishes an event.
     ///
     /// # Errors
-    /// [`ProcessError`] when it cannot be sent.
+    /// [`ProcessError`] for a failed transmission.
     pub fn publish_event(&mut self, event: &Event) -> Result<(), ProcessError> {
         self.ports.publish_event(event)
     }
@@ -243,17 +244,17 @@ impl Session {
         })?)
     }
 
-    /// Ends the work because the program cannot go on. The plant's master stops the drives, since no command follows.
+    /// Ends the work of a program that cannot go on. The plant's master stops the drives, because no command follows.
     ///
     /// # Errors
     /// [`ProcessError`] when the supervisor is gone.
     pub fn fail(mut self, reason: &str) -> Result<(), ProcessError> {
-        // The reason first: the turn cannot end where the plant has failed too.
+        // The reason first: the end of the turn fails when the plant has failed too.
         self.context.link.end(End::Failed { reason: sentence(reason) })?;
         self.end_turn(true)
     }
 
-    /// Ends the turn of a cycle that has begun, in lockstep.
+    /// Ends the turn of a begun cycle, in lockstep.
     fn end_turn(&mut self, is_last: bool) -> Result<(), ProcessError> {
         if self.cycle.take().is_some() || is_last {
             self.ports.end_turn(is_last)?;
@@ -262,26 +263,26 @@ impl Session {
     }
 }
 
-/// The controller's ports on iceoryx2, and the deadlines of its cycles.
+/// The controller's ports on iceoryx2 and the deadlines of its cycles.
 #[derive(Debug)]
 struct Ports {
     readings: Subscriber<Reading>,
     commands: Publisher<Command>,
     states: Publisher<State>,
-    /// None where no signal is declared.
+    /// None without declared signals.
     signals: Option<Publisher<Signals>>,
-    /// None where no parameter is declared.
+    /// None without declared parameters.
     parameters: Option<Publisher<Parameters>>,
     events: Publisher<Event>,
     clock: Clock,
     link: SupervisorLink,
-    /// From the deadline until the newest reading is used, whichever that is, ns.
+    /// Longest wait for a new reading after the deadline, ns; then the newest reading counts.
     reading_timeout_ns: u64,
 }
 
 impl Ports {
-    /// Opens the ports, reports ready, and connects to the ports of the other processes before the first cycle, since a
-    /// connection makes and maps files. Returns the time of the first SYNC with them, ns.
+    /// Opens the ports, reports ready, and returns the time of the first SYNC, ns. The ports connect to the other
+    /// processes before the first cycle, because a connection makes and maps files.
     fn open(context: &ProcessContext, declared: &Declared) -> Result<(Self, u64), ProcessError> {
         let (node, scenario, schedule) = (&context.node, &context.scenario, &context.schedule);
         let readings = node.newest_subscriber()?;
@@ -332,7 +333,7 @@ impl Ports {
         }
     }
 
-    /// Whether the next cycle begins within this time. Sleeps for that time otherwise.
+    /// Whether the next cycle begins within this time; otherwise sleeps for that time.
     fn begins_within(&mut self, timeout: Duration) -> Result<bool, ProcessError> {
         match &mut self.clock {
             Clock::RealTime(cycle) => {
@@ -402,14 +403,14 @@ impl ControllerPorts for Ports {
         Ok(self.events.publish_by(|| self.clock.now_ns(), |message| *message = *event)?)
     }
 
-    /// The supervisor carries it out. In lockstep, simulated time stands still until it has, so that the fault strikes
-    /// in this cycle.
+    /// The supervisor carries the fault out. In lockstep, simulated time stands still until then, so that the fault
+    /// strikes in this cycle.
     fn fault_is_due(&mut self, fault: usize) -> Result<(), ProcessError> {
         let report = Report::Due { fault, now_ns: self.clock.now_ns() };
         self.link.report(&report)?;
         match &self.clock {
             Clock::RealTime(_) => Ok(()),
-            // Also ends when the supervisor does.
+            // The wait also ends with the supervisor.
             Clock::Lockstep(_) => Ok(self.link.next_order().map(drop)?),
         }
     }

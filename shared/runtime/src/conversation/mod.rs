@@ -1,7 +1,7 @@
-//! A peer on a socket, heard and answered without blocking: one deadline and one byte budget hold for the whole exchange.
+//! A peer on a socket, without blocking. One deadline and one byte budget hold for the whole exchange.
 //!
-//! Every server of the rig meets its peers through [`Newcomers`]. The module does not decide who is admitted. Time is an
-//! argument, but for clients that wait for an answer.
+//! Every server of the rig accepts its peers through [`Newcomers`]. The module does not decide on admission. Time is an
+//! argument, except for clients that wait for an answer.
 
 mod newcomers;
 
@@ -26,58 +26,58 @@ pub use newcomers::{Look, Newcomers};
 
 /// Bytes of one read.
 const READ_BYTES: usize = 16_384;
-/// Most bytes that wait in either direction.
+/// Most bytes waiting in either direction.
 const MOST_WAITING: usize = 1 << 20;
-/// Time between two attempts at a server whose queue of connections is full.
+/// Time between two attempts at a server with a full queue of connections.
 const RETRY: Duration = Duration::from_millis(5);
 
-/// What a peer may take before it is out.
+/// The limits of a peer.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
     /// Time until its first byte, ns.
     pub first_byte_ns: u64,
     /// Time for everything, ns.
     pub whole_ns: u64,
-    /// Bytes that it may send.
+    /// Most bytes from the peer.
     pub bytes: usize,
 }
 
 impl Limits {
-    /// Those of a peer that a server does not know yet: the first byte comes within 200 ms, the whole request within 2 s.
+    /// The limits of a new peer: the first byte comes within 200 ms, the whole request within 2 s.
     pub const fn newcomer(bytes: usize) -> Self {
         Self { first_byte_ns: 200 * MILLISECOND_NS, whole_ns: 2 * SECOND_NS, bytes }
     }
 
-    /// Those of a server, which answers within this time.
+    /// The limits of a server, which answers within this time.
     pub const fn answer(whole_ns: u64, bytes: usize) -> Self {
         Self { first_byte_ns: whole_ns, whole_ns, bytes }
     }
 
-    /// Those of an admitted peer: it sends when it has something to say.
+    /// The limits of an admitted peer, which may stay silent.
     pub const fn admitted(bytes: usize) -> Self {
         Self::answer(u64::MAX, bytes)
     }
 }
 
-/// Why a peer is out.
+/// The reason for the removal of a peer.
 #[derive(Debug, thiserror::Error)]
 pub enum Left {
-    /// It has closed the connection.
+    /// The peer has closed the connection.
     #[error("it closed the connection")]
     Closed,
-    /// It is connected and sends nothing.
+    /// The peer is connected and sends nothing.
     #[error("it sent nothing within {} ms", .0 / MILLISECOND_NS)]
     Silent(u64),
-    /// It takes too long.
+    /// The peer takes too long.
     #[error("it did not finish within {} ms", .0 / MILLISECOND_NS)]
     Late(u64),
-    /// It sends too much.
+    /// The peer sends too much.
     #[error("it sent more than {0} bytes")]
     TooLong(usize),
-    /// It does not read.
+    /// The peer does not read.
     #[error("it reads too slowly: {0} bytes are unread")]
     Unread(usize),
-    /// Newer peers need its place.
+    /// Newer peers need the place.
     #[error("newer peers take its place, since it has not asked for anything yet")]
     Displaced,
     /// The system refuses the connection.
@@ -85,7 +85,7 @@ pub enum Left {
     Failed(#[from] io::Error),
 }
 
-/// One peer: what it has sent and not yet been asked for, and what it has not read yet.
+/// One peer, with its bytes that nobody has consumed, and the bytes that the peer has not read.
 ///
 /// ```
 /// use std::io::Write;
@@ -109,9 +109,9 @@ pub struct Conversation {
     limits: Limits,
     began_ns: u64,
     heard: Vec<u8>,
-    /// Bytes at the beginning of `heard` that are known to contain no end of a line.
+    /// Searched bytes at the beginning of `heard`, without an end of a line.
     searched: usize,
-    /// Bytes that have come in all.
+    /// All bytes received so far.
     received: usize,
     unsent: Vec<u8>,
     end: Option<Left>,
@@ -136,10 +136,10 @@ impl Conversation {
         })
     }
 
-    /// Connects to the server at `path`, also while its queue of connections is full.
+    /// Connects to the server at `path`, with attempts while its queue of connections is full.
     ///
     /// # Errors
-    /// When nobody listens there, or the queue stays full for the time of the limits.
+    /// Without a listener, or with a full queue for the time of the limits.
     pub fn connect(path: &Path, limits: Limits) -> io::Result<Self> {
         let now_ns = clock::now_ns();
         let address = SocketAddrUnix::new(path)?;
@@ -158,12 +158,12 @@ impl Conversation {
         }
     }
 
-    /// Holds other limits from now on; bytes count anew.
+    /// Sets other limits; bytes count anew.
     pub fn renew(&mut self, limits: Limits, now_ns: u64) {
         (self.limits, self.began_ns, self.received) = (limits, now_ns, self.heard.len());
     }
 
-    /// Reads what has come, and sends what waits. Never blocks.
+    /// Reads the received bytes, and sends the waiting bytes. Never blocks.
     pub fn hear(&mut self) {
         self.send_unsent();
         let before = self.heard.len();
@@ -178,24 +178,24 @@ impl Conversation {
             Ok(0) => drop(self.end.get_or_insert(Left::Closed)),
             Ok(count) => self.received += count,
             Err(Errno::AGAIN | Errno::INTR) => {}
-            // So ends a connection whose peer has not read everything.
+            // A connection ends so when the peer has not read everything.
             Err(Errno::CONNRESET) => self.end = Some(Left::Closed),
             Err(error) => self.end = Some(Left::Failed(error.into())),
         }
     }
 
-    /// What has come and is not consumed.
+    /// Received bytes that are not consumed.
     pub fn heard(&self) -> &[u8] {
         &self.heard
     }
 
-    /// Takes `count` bytes off the beginning of what has come.
+    /// Consumes `count` bytes from the beginning.
     pub fn consume(&mut self, count: usize) -> Vec<u8> {
         self.searched = 0;
         self.heard.drain(..count).collect()
     }
 
-    /// Takes a line that is complete, without its end. Bytes that are no UTF-8 are replaced.
+    /// Takes a complete line, without its end. Replaces bytes that are no UTF-8.
     pub fn next_line(&mut self) -> Option<String> {
         let Some(end) = self.heard[self.searched..].iter().position(|byte| *byte == b'\n') else {
             self.searched = self.heard.len();
@@ -205,7 +205,8 @@ impl Conversation {
         Some(String::from_utf8_lossy(&line[..line.len() - 1]).into_owned())
     }
 
-    /// Why the peer is out at this time; none while it may go on. What came before can still be consumed.
+    /// The reason for the removal of the peer at this time; none while the peer may go on. Received bytes stay
+    /// available.
     pub fn left(&mut self, now_ns: u64) -> Option<Left> {
         if let Some(end) = self.end.take() {
             self.end = Some(Left::Closed);
@@ -224,7 +225,7 @@ impl Conversation {
         }
     }
 
-    /// Sends bytes behind those that wait, as far as the peer has room. Never blocks, and raises no SIGPIPE.
+    /// Sends bytes behind the waiting bytes, as far as the peer has room. Never blocks, and raises no SIGPIPE.
     pub fn say(&mut self, bytes: &[u8]) {
         self.unsent.extend_from_slice(bytes);
         self.send_unsent();
@@ -237,7 +238,7 @@ impl Conversation {
                 Ok(count) => sent += count,
                 Err(Errno::INTR) => {}
                 Err(Errno::AGAIN) => break,
-                // What it sent before it left can still be read.
+                // Bytes sent before the peer's end are still readable.
                 Err(Errno::PIPE | Errno::CONNRESET) => sent = self.unsent.len(),
                 Err(error) => self.end = Some(Left::Failed(error.into())),
             }
@@ -245,7 +246,7 @@ impl Conversation {
         self.unsent.drain(..sent);
     }
 
-    /// Sends what waits until `by_ns`, and gives the rest up. Blocks.
+    /// Sends the waiting bytes until `by_ns`, and gives the rest up. Blocks.
     pub fn send_rest(&mut self, by_ns: u64) {
         while !self.is_sent() && self.end.is_none() && clock::now_ns() < by_ns {
             let events = &mut [PollFd::new(&self.connection, PollFlags::OUT)];
@@ -254,20 +255,20 @@ impl Conversation {
         }
     }
 
-    /// Whether everything that was said has gone out.
+    /// Whether all bytes have gone out.
     pub fn is_sent(&self) -> bool {
         self.unsent.is_empty()
     }
 
-    /// Waits until there is something to hear or room to send, for at most `timeout`.
+    /// Waits for received bytes or for room to send, for at most `timeout`.
     pub fn wait(&self, timeout: Duration) {
         wait_for_peers([self], None, timeout);
     }
 
-    /// Waits for a line, within the limits of the conversation. For clients, which have nothing else to do.
+    /// Waits for a line, within the limits of the conversation. For clients without other work.
     ///
     /// # Errors
-    /// [`Left`] when no line comes.
+    /// [`Left`] without a line.
     pub fn await_line(&mut self) -> Result<String, Left> {
         loop {
             self.hear();
@@ -279,15 +280,15 @@ impl Conversation {
                 return Err(left);
             }
             let left_ns = self.limits.whole_ns.saturating_sub(now_ns.saturating_sub(self.began_ns));
-            // The end of the time has passed when the wait ends.
+            // At the end of the wait, the end of the time has passed.
             self.wait(Duration::from_nanos(left_ns.min(SECOND_NS)) + Duration::from_millis(1));
         }
     }
 
-    /// Asks a server, and waits for its answer: a line of JSON each.
+    /// Asks a server, and waits for its answer. Both are a line of JSON.
     ///
     /// # Errors
-    /// [`Left`] when no answer comes, or what comes is none.
+    /// [`Left`] without an answer, or for a line that is no answer.
     pub fn ask<A: DeserializeOwned>(&mut self, request: &impl Serialize) -> Result<A, Left> {
         self.say(line(request).as_bytes());
         serde_json::from_str(&self.await_line()?).map_err(|error| Left::Failed(error.into()))
@@ -295,11 +296,11 @@ impl Conversation {
 
     /// Ends the connection in both directions.
     pub fn close(&self) {
-        // It fails where the peer has closed it before.
+        // A connection that the peer has closed fails here.
         let _ = shutdown(&self.connection, Shutdown::Both);
     }
 
-    /// The connection, which blocks again. What has come and is not consumed is lost.
+    /// The connection, which blocks again. Bytes that are not consumed are lost.
     ///
     /// # Errors
     /// When the system refuses.

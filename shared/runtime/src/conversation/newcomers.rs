@@ -1,4 +1,4 @@
-//! The peers of a server that have not asked for anything yet. A small buffer is held for each, and a bounded number of them.
+//! The peers of a server without a whole request. Their number is bounded, and each has a small buffer.
 
 use std::collections::VecDeque;
 use std::io;
@@ -9,22 +9,21 @@ use rustix::net::{SocketFlags, accept_with, listen};
 
 use super::{Conversation, Left, Limits, set_blocking, wait_for_peers};
 
-/// Connections that one look accepts, so that a look takes a bounded time.
+/// Most connections that one look accepts, so that a look takes a bounded time.
 const MOST_ACCEPTED: usize = 64;
-/// Connections that wait to be accepted: nobody waits behind thousands.
+/// Most connections in the kernel's queue, so that no peer waits behind thousands.
 const BACKLOG: i32 = 128;
 
-/// What a look at the newcomers found.
+/// The result of a look at the newcomers.
 #[derive(Debug, Default)]
 pub struct Look {
-    /// Peers whose request is whole.
+    /// Peers with a whole request.
     pub asking: Vec<Conversation>,
-    /// Why others are out.
+    /// Reasons for the removal of other peers.
     pub out: Vec<Left>,
 }
 
-/// The peers of a server that have not asked for anything yet: at most a fixed number, the oldest of which goes when
-/// another one comes.
+/// The peers of a server without a whole request. Their number is limited; a new peer replaces the oldest.
 #[derive(Debug)]
 pub struct Newcomers {
     listener: OwnedFd,
@@ -35,7 +34,7 @@ pub struct Newcomers {
 }
 
 impl Newcomers {
-    /// The peers that connect to `listener`; at most `most` of them wait.
+    /// The peers at `listener`; at most `most` of them wait.
     ///
     /// # Errors
     /// When the system refuses a listener that does not block.
@@ -45,13 +44,14 @@ impl Newcomers {
         Ok(Self { listener, limits, most, greeting: &[], waiting: VecDeque::new() })
     }
 
-    /// Says this to each peer first.
+    /// Greets each peer with these bytes.
     #[must_use]
     pub fn greeted_with(self, greeting: &'static [u8]) -> Self {
         Self { greeting, ..self }
     }
 
-    /// Hears those that wait, and accepts a bounded number of others. `is_whole` recognises a whole request. Never blocks.
+    /// Reads from the waiting peers, and accepts a bounded number of new peers. `is_whole` recognises a whole request.
+    /// Never blocks.
     pub fn look(&mut self, now_ns: u64, is_whole: impl Fn(&[u8]) -> bool) -> Look {
         let mut look = Look::default();
         for conversation in std::mem::take(&mut self.waiting) {
@@ -59,7 +59,7 @@ impl Newcomers {
         }
         for _ in 0..MOST_ACCEPTED {
             let flags = SocketFlags::NONBLOCK | SocketFlags::CLOEXEC;
-            // A peer that has left meanwhile, or a machine without descriptors: the next look tries again.
+            // The peer has left meanwhile, or the machine has no descriptors: the next look tries again.
             let Ok(connection) = accept_with(&self.listener, flags) else { break };
             match Conversation::begin(connection, self.limits, now_ns) {
                 Ok(mut conversation) => {
@@ -95,7 +95,7 @@ impl Newcomers {
         self.waiting.push_back(conversation);
     }
 
-    /// Waits until a peer connects, or one that waits sends something or has had its time, for at most `timeout`.
+    /// Waits for a new peer, for bytes of a waiting peer, or for the end of a peer's time; at most `timeout`.
     pub fn wait(&self, timeout: Duration) {
         let first_byte = Duration::from_nanos(self.limits.first_byte_ns);
         let timeout = if self.waiting.is_empty() { timeout } else { timeout.min(first_byte) };
@@ -133,7 +133,7 @@ mod tests {
         assert_eq!(look.asking.len(), 1);
         assert_eq!(look.asking[0].next_line().as_deref(), Some("hello"));
         assert!(matches!(look.out[..], [Left::Displaced, Left::Displaced]));
-        // Their time is over: a peer that sends nothing holds nothing.
+        // Their time is over: a silent peer holds no place.
         let look = newcomers.look(1300, is_line);
         assert!(look.asking.is_empty() && look.out.len() == 3);
         drop(silent);

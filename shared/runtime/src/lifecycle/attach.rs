@@ -1,8 +1,8 @@
-//! How a program of the user attaches to a running rig as its controller.
+//! Attaches a program of the user to a running rig as its controller.
 //!
-//! The rig listens on a socket in the private folder of its domain, so only the same user's programs reach it. The program
-//! says [`Hello`]; the rig answers with the [`Invitation`] or a refusal. From then on the socket carries [`Report`]s and
-//! [`Order`]s. The cycle itself is in [`control::Session`](crate::control::Session).
+//! The rig listens on a socket in the private folder of its domain, so only the same user's programs reach it. The
+//! program sends [`Hello`]; the rig answers with the [`Invitation`] or a refusal. From then on the socket carries
+//! [`Report`]s and [`Order`]s. The cycle itself is in [`control::Session`](crate::control::Session).
 //!
 //! [`Report`]: super::Report
 //! [`Order`]: super::Order
@@ -32,12 +32,12 @@ const SOCKET: &str = "attach";
 /// The first message of a program.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Hello {
-    /// The layouts of the messages that the program uses, with their hashes.
+    /// The layouts of the program's messages, with their hashes.
     pub layouts: Vec<String>,
 }
 
 impl Hello {
-    /// The greeting of a program that is built from this version.
+    /// The greeting of a program built from this version.
     pub fn new() -> Self {
         let layouts = [
             Reading::SHARED_MEMORY_NAME,
@@ -48,7 +48,8 @@ impl Hello {
         Self { layouts: layouts.map(str::to_owned).to_vec() }
     }
 
-    /// The first layout that differs from this version's, as messages quote it, with this version's, if any does.
+    /// The first layout that differs from this version, quoted for messages, with this version's layout; none without a
+    /// difference.
     pub fn difference(&self) -> Option<(String, String)> {
         let theirs = self.layouts.iter().map(String::as_str).chain(iter::repeat(""));
         let mut pairs = theirs.zip(Self::new().layouts);
@@ -69,21 +70,21 @@ impl Default for Hello {
 pub enum Answer {
     /// The program is the rig's controller.
     Invited(Invitation),
-    /// It is not.
+    /// The rig refuses the program.
     Refused {
-        /// Why, and what to do.
+        /// The reason and the remedy.
         reason: String,
     },
 }
 
-/// What a program needs to take part in a run.
+/// The data of a run for a program.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Invitation {
     /// The resolved scenario.
     pub scenario: PathBuf,
     /// Whether the run is in lockstep.
     pub is_lockstep: bool,
-    /// In lockstep, how long a process may be silent; none for ever.
+    /// In lockstep, the longest silence of a process; none for ever.
     pub patience: Option<Duration>,
 }
 
@@ -95,7 +96,7 @@ impl Invitation {
     }
 }
 
-/// Why a program could not attach.
+/// The reason for a failed attachment.
 #[derive(Debug, thiserror::Error)]
 pub enum AttachError {
     /// No rig of that name waits for a controller.
@@ -103,10 +104,10 @@ pub enum AttachError {
     NoSuchRig {
         /// The name.
         name: String,
-        /// The rigs that do.
+        /// The rigs that wait.
         waiting: Waiting,
     },
-    /// Without a name there must be one rig.
+    /// A request without a name needs exactly one rig.
     #[error("there is not one rig to attach to; {0}")]
     NotOneRig(Waiting),
     /// The rig refused the program.
@@ -114,21 +115,21 @@ pub enum AttachError {
     Refused {
         /// The rig.
         rig: String,
-        /// Why, and what to do.
+        /// The reason and the remedy.
         reason: String,
     },
-    /// The rig did not answer.
+    /// The rig does not answer.
     #[error("the rig '{rig}' does not answer: {left}")]
     NoAnswer {
         /// The rig.
         rig: String,
-        /// Why no answer is awaited any more.
+        /// The reason for the end of the wait.
         left: Left,
     },
-    /// The rigs of this user cannot be found.
+    /// The search for the rigs of this user fails.
     #[error(transparent)]
     Domain(#[from] DomainError),
-    /// The scenario or the domain cannot be used.
+    /// The scenario or the domain is not usable.
     #[error(transparent)]
     Process(#[from] ProcessError),
 }
@@ -151,8 +152,8 @@ pub fn socket(domain: &Domain) -> PathBuf {
     domain.root().join(SOCKET)
 }
 
-/// Attaches this process as the controller of a rig: the named one, or that of [`RIG_VARIABLE`], or the only one that takes a
-/// controller. Other threads of the process are not touched; no signal handler is installed.
+/// Attaches this process as the controller of a rig: the named rig, or that of [`RIG_VARIABLE`], or the only rig that
+/// takes a controller. The call leaves other threads alone, and installs no signal handler.
 ///
 /// ```no_run
 /// use masseter_runtime::control::Session;
@@ -166,7 +167,7 @@ pub fn socket(domain: &Domain) -> PathBuf {
 /// ```
 ///
 /// # Errors
-/// [`AttachError`] when there is no such rig, it refuses this program, or its scenario cannot be used.
+/// [`AttachError`] without such a rig, for a refused program, or for an unusable scenario.
 pub fn attach(rig: Option<&str>) -> Result<ProcessContext, AttachError> {
     let named = rig.map(str::to_owned).or_else(|| env::var(RIG_VARIABLE).ok());
     let rig = named.map_or_else(only_rig, Ok)?;
@@ -174,7 +175,7 @@ pub fn attach(rig: Option<&str>) -> Result<ProcessContext, AttachError> {
     let Ok(mut conversation) = Conversation::connect(&socket(&Domain::named(&rig)?), limits) else {
         return Err(AttachError::NoSuchRig { name: rig, waiting: waiting()? });
     };
-    // The rig sends nothing more before this program is ready.
+    // The rig sends no more bytes before this program is ready.
     let invitation = match conversation.ask(&Hello::new()) {
         Ok(Answer::Invited(invitation)) => invitation,
         Ok(Answer::Refused { reason }) => return Err(AttachError::Refused { rig, reason }),

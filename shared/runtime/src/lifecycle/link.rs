@@ -1,4 +1,4 @@
-//! The line of a process to its supervisor, and the supervisor's request to end.
+//! The line from a process to its supervisor, and the supervisor's request to end.
 
 use std::io::{self, BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
@@ -18,9 +18,9 @@ use crate::conversation::line;
 /// The process's end of the line.
 #[derive(Debug, Clone)]
 pub(crate) enum SupervisorLink {
-    /// Standard input and output of a process that the supervisor has started from its own executable.
+    /// Standard input and output of a process of the supervisor's own executable.
     Pipes,
-    /// The socket of an attached program, whose standard input and output are the user's.
+    /// The socket of an attached program. Its standard input and output belong to the user.
     Socket(Arc<Socket>),
 }
 
@@ -28,7 +28,7 @@ pub(crate) enum SupervisorLink {
 #[derive(Debug)]
 pub(crate) struct Socket {
     stream: UnixStream,
-    /// Those that a process waits for.
+    /// The orders that a process waits for.
     orders: Mutex<Receiver<Order>>,
 }
 
@@ -63,7 +63,8 @@ impl SupervisorLink {
         }
     }
 
-    /// Waits for the next order: the start or a refusal, later that a fault has struck. None when the supervisor ends.
+    /// Waits for the next order: the start or a refusal, later the report that a fault has struck. None at the end of
+    /// the supervisor.
     pub(crate) fn next_order(&self) -> io::Result<Option<Order>> {
         match self {
             Self::Pipes => {
@@ -75,7 +76,7 @@ impl SupervisorLink {
         }
     }
 
-    /// Reports the end of an attached program's work. An exit code reports that of the own processes.
+    /// Reports the end of an attached program's work. The rig's own processes report their end by an exit code.
     pub(crate) fn end(&self, end: End) -> io::Result<()> {
         match self {
             Self::Pipes => Ok(()),
@@ -84,7 +85,7 @@ impl SupervisorLink {
     }
 }
 
-/// Sends without SIGPIPE, which would end a program that is not written in Rust.
+/// Sends without SIGPIPE, which ends a program that is not written in Rust.
 fn send_all(stream: &UnixStream, mut bytes: &[u8]) -> io::Result<()> {
     while !bytes.is_empty() {
         match send(stream, bytes, SendFlags::NOSIGNAL) {
@@ -101,8 +102,8 @@ fn send_all(stream: &UnixStream, mut bytes: &[u8]) -> io::Result<()> {
 pub struct StopRequest(Arc<AtomicBool>);
 
 impl StopRequest {
-    /// Listens for SIGTERM, also on the supervisor's death. A terminal sends SIGINT and SIGHUP to the whole
-    /// process group; the supervisor reacts to them, and this process ignores them.
+    /// Listens for SIGTERM, which the kernel also sends on the supervisor's death. A terminal sends SIGINT and SIGHUP
+    /// to the whole process group: the supervisor reacts, and this process ignores both.
     pub(super) fn listen() -> io::Result<Self> {
         Self::by(&[SIGINT, SIGHUP])?;
         let requested = Self::by(&[SIGTERM])?;

@@ -1,10 +1,10 @@
 //! Start and end of a process of the rig, and its line to the supervisor.
 //!
-//! The process reports to the supervisor that it is ready, and the scheduling that the kernel granted. It gets the epoch of
-//! the first cycle and the process ids of both loops. The own processes use standard output and input for that; SIGTERM
-//! requests their orderly end, and the kernel also sends SIGTERM when the supervisor dies. A program of the user
-//! [attaches](attach) over a socket. Messages to and from the supervisor are JSON, one a line. All data of the run travel
-//! over iceoryx2.
+//! The process reports its readiness and the granted scheduling to the supervisor. The answer has the epoch of the
+//! first cycle and the process ids of both loops. The rig's own processes use standard output and input. SIGTERM
+//! requests their orderly end; the kernel also sends SIGTERM at the death of the supervisor. A program of the user
+//! [attaches](attach) over a socket. Messages to and from the supervisor are JSON, one a line. All data of the run
+//! travel over iceoryx2.
 
 pub mod attach;
 mod link;
@@ -33,16 +33,16 @@ pub struct ProcessArguments {
     pub scenario: PathBuf,
     /// The id of the run's domain.
     pub domain: String,
-    /// For a run in lockstep: how long a process may be silent. None for real time.
+    /// For a run in lockstep, the longest silence of a process. None for real time.
     pub lockstep: Option<Patience>,
 }
 
-/// How long a process may be silent in lockstep; none for ever.
+/// The longest silence of a process in lockstep; none for ever.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Patience(pub Option<Duration>);
 
 impl Patience {
-    /// Whether a silence of this length is not too long.
+    /// Whether a silence of this length is short enough.
     pub fn lasts(self, silent_ns: u64) -> bool {
         self.0.is_none_or(|patience| u128::from(silent_ns) < patience.as_nanos())
     }
@@ -64,13 +64,13 @@ pub struct ProcessContext {
     pub(crate) link: SupervisorLink,
 }
 
-/// Why a process could not start or run.
+/// Why a process cannot start or run.
 #[derive(Debug, thiserror::Error)]
 pub enum ProcessError {
-    /// The scenario cannot be used.
+    /// The scenario is not usable.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
-    /// The domain cannot be used.
+    /// The domain is not usable.
     #[error(transparent)]
     Domain(#[from] DomainError),
     /// The CAN link's time table.
@@ -88,16 +88,16 @@ pub enum ProcessError {
     /// Other programs cannot reach the controller's parameters.
     #[error("cannot serve the parameters: {0}")]
     Parameters(io::Error),
-    /// Signals cannot be received.
+    /// The reception of signals fails.
     #[error("cannot listen for signals: {0}")]
     Signals(io::Error),
     /// The line to the supervisor failed.
     #[error("the line to the supervisor failed: {0}")]
     Supervisor(#[from] io::Error),
-    /// The rig does not take this program.
+    /// The rig refuses this program.
     #[error("the rig refuses this program: {0}")]
     Refused(String),
-    /// The supervisor ended before the start, or cancelled the start.
+    /// The supervisor has ended before the start, or has cancelled the start.
     #[error("the supervisor ended or cancelled the start")]
     NoStart,
 }
@@ -123,9 +123,9 @@ impl ProcessContext {
         Ok(Self { scenario, schedule, node, lockstep: arguments.lockstep, stop, link })
     }
 
-    /// Reports that the process is ready, and waits for the start; before, requests real-time scheduling on `core`, or none
-    /// without a core and in lockstep. The ports are open by then, and none may use another user's memory. Only a controller
-    /// declares anything.
+    /// Requests real-time scheduling on `core`, reports the process ready, and waits for the start. Without a core and
+    /// in lockstep, requests no real-time scheduling. The ports are open by then, and none may use another user's
+    /// memory. Only a controller has a declaration.
     pub fn ready(&self, core: Option<usize>, declared: Declared) -> Result<Start, ProcessError> {
         self.node.domain().check_mapped()?;
         let realtime = &self.scenario.realtime;

@@ -1,4 +1,4 @@
-//! What a process reports to the supervisor, and what the supervisor orders.
+//! The reports of a process to the supervisor, and the supervisor's orders.
 
 use masseter_scenario::input::{excerpt, sentence};
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ use crate::realtime::scheduling::Obtained;
 
 /// Longest silence that a process can report, s.
 const LONGEST_SILENCE_S: f64 = 1e7;
-/// Most refusals of the kernel: core, priority, memory.
+/// Most refusals of the kernel, for core, priority and memory.
 const MOST_REFUSALS: usize = 3;
 
 /// A process of a run.
@@ -34,14 +34,14 @@ impl Party {
     }
 }
 
-/// The report that another process has stopped answering, in lockstep.
+/// The report of another process' silence, in lockstep.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Silence {
     /// The silent process.
     pub process: Party,
-    /// The cycle in which it was waited for.
+    /// The cycle of the wait.
     pub cycle: u64,
-    /// For how long, s.
+    /// The length of the silence, s.
     pub silent_s: f64,
 }
 
@@ -59,7 +59,7 @@ pub enum Report {
     },
     /// Another process has stopped answering, in lockstep.
     Silence(Silence),
-    /// A fault of a process is due, which the supervisor carries out.
+    /// A due fault of a process, which the supervisor carries out.
     Due {
         /// Its place in the scenario's list.
         fault: usize,
@@ -70,30 +70,30 @@ pub enum Report {
     Ended(End),
 }
 
-/// Why a line is no report.
+/// The reason why a line is no report.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// It has another form.
+    /// The line has another form.
     #[error("'{line}' is no report of this version: {reason}")]
     Form {
         /// The beginning of the line.
         line: String,
-        /// What the reader misses.
+        /// The error of the reader.
         reason: String,
     },
-    /// No recording can have the signals and parameters.
+    /// The signals and parameters do not fit into a recording.
     #[error("{0}")]
     Declared(#[from] NameError),
-    /// The kernel refuses less.
+    /// More refusals than the kernel can give.
     #[error("it reports {0} refusals of the kernel: there are at most {MOST_REFUSALS}")]
     Refusals(usize),
-    /// No process can have been silent for so long.
+    /// An impossibly long silence.
     #[error("it reports a silence of {0:e} s: use 0 to {LONGEST_SILENCE_S:e} s")]
     Silence(f64),
 }
 
 impl Report {
-    /// The report in a line of a process, whose values and texts can be recorded and shown. Its sentences are cut to
+    /// The report in a line of a process, with values and texts fit for recording and display. Cuts its sentences to
     /// 200 characters.
     ///
     /// # Errors
@@ -123,15 +123,15 @@ impl Report {
     }
 }
 
-/// How an attached program ended its work.
+/// The outcome of an attached program's work.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum End {
-    /// It did what it was asked to.
+    /// The program has completed its task.
     Finished,
     /// A fault ended the motion.
     SafeStop,
-    /// It cannot go on.
+    /// The program cannot go on.
     Failed {
         /// Why.
         reason: String,
@@ -144,13 +144,13 @@ pub enum End {
 pub enum Order {
     /// Start of the first cycle.
     Start(Start),
-    /// In lockstep: the fault that was due has struck, or could not.
+    /// In lockstep: the due fault has struck, or has failed to.
     Struck,
-    /// Come to an orderly end. The own processes get SIGTERM instead.
+    /// The request for an orderly end. The rig's own processes get SIGTERM instead.
     Stop,
-    /// The rig does not take the program: what it reports cannot be recorded or shown.
+    /// The rig refuses the program: its report does not fit into a recording or a display.
     Refused {
-        /// Why, and the limit.
+        /// The reason, with the limit.
         reason: String,
     },
 }

@@ -1,17 +1,17 @@
-//! The enumerations that messages carry as numbers. A number without a meaning is refused, never guessed.
+//! The enumerations that messages carry as numbers. The conversion refuses a number without a meaning.
 
 use masseter_can::{UnknownCode, codes};
 
 pub use masseter_can::cia402::{DriveRequest, DriveState};
 pub use masseter_scenario::ControllerState;
 
-/// [`Event::axis`](super::Event::axis) when no axis is concerned.
+/// [`Event::axis`](super::Event::axis) of an event without an axis.
 pub const NO_AXIS: u32 = u32::MAX;
 
 /// [`Event::object`](super::Event::object) of a stimulus that the controller's side carries out.
 pub const OF_OPERATOR: u32 = 1;
 
-/// [`Reading::drive_state`](super::Reading::drive_state) of a drive not heard of yet, or lost.
+/// [`Reading::drive_state`](super::Reading::drive_state) of a drive that is silent so far, or lost.
 pub const NO_DRIVE_STATE: u32 = 0;
 /// Its name.
 const NO_STATE_NAME: &str = "unknown";
@@ -220,12 +220,12 @@ pub(super) fn of_enumeration(name: &str) -> Vec<(u32, &'static str)> {
     codes
 }
 
-/// What a message carries for the state of a drive; [`NO_DRIVE_STATE`] for none.
+/// The code of a drive's state in a message; [`NO_DRIVE_STATE`] for none.
 pub fn drive_state_code(state: Option<DriveState>) -> u32 {
     state.map_or(NO_DRIVE_STATE, DriveState::code)
 }
 
-/// The state of a drive that a message carries; none for [`NO_DRIVE_STATE`].
+/// The state of a drive by its code in a message; none for [`NO_DRIVE_STATE`].
 ///
 /// # Errors
 /// A code that no state has.
@@ -233,7 +233,7 @@ pub fn drive_state(code: u32) -> Result<Option<DriveState>, UnknownCode> {
     if code == NO_DRIVE_STATE { Ok(None) } else { DriveState::try_from(code).map(Some) }
 }
 
-/// The name of the state of a drive that a message carries.
+/// The name of a drive's state by its code in a message.
 ///
 /// # Errors
 /// A code that no state has.
@@ -247,7 +247,7 @@ mod tests {
 
     #[test]
     fn every_number_is_its_value_or_refused() {
-        /// The numbers below 256 that are values, each checked to be the number of its value.
+        /// The numbers below 256 with a value. Asserts that each is the number of its value.
         fn numbers<T: TryFrom<u32, Error = UnknownCode>>(code: impl Fn(T) -> u32) -> Vec<u32> {
             let check = |number| match T::try_from(number) {
                 Ok(value) => assert_eq!(code(value), number),

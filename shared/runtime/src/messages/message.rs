@@ -1,5 +1,5 @@
-//! What messages have in common: the macro that makes a message of its fields, the types that a field may have, and
-//! the ROS 2 definition. The messages themselves are in the [parent module](super).
+//! The common parts of messages: the macro that declares a message, the types of fields, and the ROS 2 definition. The
+//! messages themselves are in the [parent module](super).
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
@@ -7,30 +7,30 @@ use masseter_can::Frame;
 
 use super::codes;
 
-/// Version of the layouts of all messages; it changes with any of them, and with what a field means.
+/// Version of the layouts of all messages. The version changes with any layout, and with the meaning of a field.
 pub const LAYOUT_VERSION: u64 = 14;
 /// Room for the data bytes of frames of other formats too.
 const MOST_BYTES: usize = 64;
-/// Room for this many numbers.
+/// Most numbers in a message.
 pub const MOST_VALUES: usize = 64;
-/// The endings of names that tell a unit; of two that fit, the first counts.
+/// The endings of names with their units. Of two that fit, the first counts.
 const UNITS: [(&str, &str); 6] =
     [("_m_s", "m/s"), ("_ns", "ns"), ("_m", "m"), ("_s", "s"), ("_n", "N"), ("_rad", "rad")];
 
 /// The type of the messages of a topic.
 pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
-    /// The topic the message travels on.
+    /// The topic of the message.
     const TOPIC: &'static str;
-    /// Messages that a subscriber keeps; a slower subscriber loses the oldest ones.
+    /// Messages that a subscriber keeps; a slower subscriber loses the oldest messages.
     const DEPTH: usize;
     /// Type name in recordings.
     const TYPE_NAME: &'static str;
-    /// Type name in shared memory, `masseter/Reading/<hash>`: a service of another layout is refused when it is opened. The
-    /// hash covers the schema, the version, and the number and name of every code that messages carry.
+    /// Type name in shared memory, `masseter/Reading/<hash>`: the opening of a service with another layout fails. The
+    /// hash covers the schema, the version, and the number and name of every code in messages.
     const SHARED_MEMORY_NAME: &'static str;
     /// [`LAYOUT_VERSION`] of the sender.
     fn version(&self) -> u64;
-    /// What the message is.
+    /// Meaning of the message.
     fn about() -> &'static str;
     /// The fields in order.
     fn fields() -> Vec<Field>;
@@ -39,16 +39,16 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
         let fields = Self::fields();
         fields.iter().fold(String::new(), |text, field| text + &field.ros_type + " " + field.name + "\n")
     }
-    /// The same with comments: meaning, units and the names of codes. Recordings carry it.
+    /// The layout with comments (meaning, units and the names of codes), for recordings.
     fn definition() -> String {
         let lines = Self::fields().iter().map(Field::line).collect::<String>();
         format!("# {}\n{lines}", plain(Self::about()))
     }
     /// The CDR body: all bytes except the unused ones at the end.
     fn body(&self) -> &[u8];
-    /// The message with this body; none when no message of this type has such a body.
+    /// The message with this body; none for an invalid body.
     fn from_body(body: &[u8]) -> Option<Self>;
-    /// Stamps sequence number, time and version just before it is sent.
+    /// Stamps sequence number, time and version just before the transmission.
     fn stamp(&mut self, seq: u64, published_ns: u64);
 }
 
@@ -136,11 +136,11 @@ macro_rules! messages {
 }
 pub(super) use messages;
 
-/// A type that a message field may have.
+/// A type of a message field.
 pub(super) trait FieldType {
     fn ros_type() -> String;
 
-    /// Unused bytes at the end of the field. Only a message's last field may have any.
+    /// Unused bytes at the end of the field. Only a message's last field may have unused bytes.
     fn unused_bytes(&self) -> usize {
         0
     }
@@ -171,9 +171,9 @@ pub struct Field {
     pub name: &'static str,
     /// Its type in the ROS 2 message definition language.
     pub ros_type: String,
-    /// Where it begins in the message, bytes.
+    /// Its offset in the message, bytes.
     pub offset: usize,
-    /// What it is.
+    /// Its meaning.
     pub about: &'static str,
 }
 
@@ -182,17 +182,17 @@ impl Field {
         Self { name, ros_type: T::ros_type(), offset, about }
     }
 
-    /// The unit of its values; empty where they have none.
+    /// The unit of its values; empty for none.
     pub fn unit(&self) -> &'static str {
         UNITS.iter().find(|(ending, _)| self.name.ends_with(ending)).map_or("", |(_, unit)| unit)
     }
 
-    /// What it is, without the links of Rust's documentation.
+    /// Its meaning, without the links of Rust's documentation.
     pub fn meaning(&self) -> String {
         plain(self.about)
     }
 
-    /// The numbers and names of its values, where it is an enumeration.
+    /// The numbers and names of its values, for an enumeration.
     pub fn codes(&self) -> Vec<(u32, &'static str)> {
         let Some((before, behind)) = self.about.split_once("[`codes::") else { return Vec::new() };
         let is_all_it_holds = [", a ", ", an ", ", "].iter().any(|words| before.ends_with(words));
@@ -216,7 +216,7 @@ pub fn plain(about: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Data bytes, as CDR writes a sequence: how many, then they themselves. Unused ones are zero.
+/// Data bytes as a CDR sequence: the number, then the bytes. Unused bytes are zero.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, ZeroCopySend)]
 pub struct CanData {
@@ -230,7 +230,7 @@ impl CanData {
     /// The data of a frame.
     ///
     /// # Panics
-    /// With more bytes than there is room for.
+    /// With too many bytes.
     pub fn new(data: &[u8]) -> Self {
         let mut bytes = [0; MOST_BYTES];
         bytes[..data.len()].copy_from_slice(data);
@@ -244,7 +244,7 @@ impl CanData {
         Self { length: frame.data().len() as u32, bytes }
     }
 
-    /// The data of a frame; none with more bytes than there is room for.
+    /// The data of a frame; none for too many bytes.
     pub fn checked(data: &[u8]) -> Option<Self> {
         (data.len() <= MOST_BYTES).then(|| Self::new(data))
     }
@@ -265,7 +265,7 @@ impl FieldType for CanData {
     }
 }
 
-/// Numbers, as CDR writes a sequence: how many, then they themselves on their alignment. Unused ones are zero.
+/// Numbers as a CDR sequence: the count, then the numbers on their alignment. Unused numbers are zero.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, ZeroCopySend)]
 pub struct Values {
@@ -281,7 +281,7 @@ impl Values {
     /// This many zeros.
     ///
     /// # Panics
-    /// With more than there is room for.
+    /// With too many numbers.
     pub fn zeros(length: usize) -> Self {
         assert!(length <= MOST_VALUES, "{length} values have no room");
         Self { length: length as u32, ..Self::zeroed() }
@@ -292,7 +292,7 @@ impl Values {
         &self.values[..self.count()]
     }
 
-    /// The same, to be changed.
+    /// The values in use, mutable.
     pub fn as_mut_slice(&mut self) -> &mut [f64] {
         let count = self.count();
         &mut self.values[..count]

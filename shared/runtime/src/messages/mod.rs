@@ -1,10 +1,10 @@
 //! Messages between the processes: one fixed-size type for each topic.
 //!
-//! Every message begins with its sequence number, the time it was published and the version of its
-//! layout. All times are nanoseconds of `CLOCK_MONOTONIC`, 0 where nothing happened yet. Fields lie
-//! on their natural alignment without padding, so that the bytes in shared memory are also a valid
-//! CDR body, except for unused bytes at the end of a field of variable length. The recording writes [`Message::body`]
-//! unchanged, with the definition that [`Message::definition`] derives from the same table.
+//! Every message begins with its sequence number, its publication time and the version of its layout. All times are
+//! nanoseconds of `CLOCK_MONOTONIC`, 0 for an event that has not happened. Fields lie on their natural alignment
+//! without padding, so the bytes in shared memory are also a valid CDR body. The exception is unused bytes at the end
+//! of a field of variable length. The recording writes [`Message::body`] unchanged, with the definition that
+//! [`Message::definition`] derives from the same table.
 //!
 //! The codes of enumerations are in [`codes`]. The transport is in [`transport`](crate::transport).
 
@@ -28,9 +28,9 @@ pub use words::explain;
 
 /// Lowest bits of the significand that are zero in computed figures: 31 bits stay, nine decimal digits.
 ///
-/// A place of 0.3 m keeps steps of 0.2 nm, far below every encoder. Lower bits are rounding errors of formulas. They do not
-/// compress, and would be a sixth of a recording (docs/data.md). Commands, readings, times, and the signals of a controller
-/// keep every bit.
+/// A place of 0.3 m keeps steps of 0.2 nm, far below every encoder. Lower bits are rounding errors of formulas. Such
+/// bits do not compress: without rounding they are a sixth of a recording (docs/data.md). Commands, readings, times,
+/// and the signals of a controller keep every bit.
 const ZERO_BITS: u32 = 22;
 
 messages! {
@@ -301,7 +301,7 @@ impl Contact {
 }
 
 impl State {
-    /// Rounds the poses and what belongs to them to the precision of published figures. The motion's time stays exact.
+    /// Rounds the poses and their figures to the precision of published figures. The motion's time stays exact.
     pub fn round(&mut self) {
         round_figures(&mut self.desired_position_m);
         round_figures(&mut self.desired_quaternion_wxyz);
@@ -337,19 +337,19 @@ impl Event {
         }
     }
 
-    /// Whether the controller's side published it, which also carries out the operator's stimuli.
+    /// Whether the event comes from the controller's side, which also carries out the operator's stimuli.
     pub fn is_of_controller(&self) -> bool {
         self.source == Source::Controller.code()
             || (self.source == Source::Scenario.code() && self.object == OF_OPERATOR)
     }
 }
 
-/// Rounds to the nearest number with the published precision, away from zero where two are as near. What is no finite number
+/// Rounds to the nearest number with the published precision, and halves away from zero. A number that is not finite
 /// stays.
 fn round_figures<'a>(values: impl IntoIterator<Item = &'a mut f64>) {
     const HALF: u64 = 1 << (ZERO_BITS - 1);
     for value in values.into_iter().filter(|value| value.is_finite()) {
-        // A carry into the exponent is the next power of two, which is right.
+        // A carry into the exponent gives the next power of two, which is right.
         let rounded = f64::from_bits((value.to_bits() + HALF) & (u64::MAX << ZERO_BITS));
         if rounded.is_finite() {
             *value = rounded;
@@ -357,13 +357,13 @@ fn round_figures<'a>(values: impl IntoIterator<Item = &'a mut f64>) {
     }
 }
 
-/// Position and w x y z quaternion of a pose, as messages carry it.
+/// Position and w x y z quaternion of a pose, for the fields of messages.
 pub fn pose_fields(pose: &Pose) -> ([f64; 3], [f64; 4]) {
     let rotation = pose.rotation.quaternion();
     (pose.translation.vector.into(), [rotation.w, rotation.i, rotation.j, rotation.k])
 }
 
-/// The pose that [`pose_fields`] took apart.
+/// The pose of the values from [`pose_fields`].
 pub fn pose_from_fields(position_m: [f64; 3], [w, x, y, z]: [f64; 4]) -> Pose {
     let rotation = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z));
     Pose::from_parts(nalgebra::Translation3::from(position_m), rotation)

@@ -6,7 +6,7 @@ use masseter_can::{
 
 use super::{CanData, FrameTap};
 
-/// Upper limit of buses in a link. Six drives need at most six.
+/// Most buses in a link: six drives need at most six.
 const MAX_BUSES: usize = 64;
 
 /// A message that holds neither frame nor error report.
@@ -18,7 +18,7 @@ pub enum TapError {
     /// An error report of no known class.
     #[error(transparent)]
     Error(#[from] ErrorReportError),
-    /// An index that no bus has.
+    /// An index without a bus.
     #[error("a frame on bus {0}, of {MAX_BUSES} that a link may have")]
     Bus(u32),
 }
@@ -45,7 +45,7 @@ pub fn encode(bus: u16, tapped: &Tapped) -> FrameTap {
 /// Index of the bus of a message, which is safe as an index of arrays with one entry for each bus.
 ///
 /// # Errors
-/// [`TapError::Bus`] where no link has that many.
+/// [`TapError::Bus`] for an index beyond the most buses.
 pub fn bus_of(tap: &FrameTap) -> Result<usize, TapError> {
     let bus = tap.bus as usize;
     if bus < MAX_BUSES { Ok(bus) } else { Err(TapError::Bus(tap.bus)) }
@@ -59,7 +59,7 @@ pub fn is_error(tap: &FrameTap) -> bool {
 /// The frame or error report of a message.
 ///
 /// # Errors
-/// [`TapError`] where it is neither a frame nor an error report.
+/// [`TapError`] for a message that is neither.
 pub fn decode(tap: &FrameTap) -> Result<Tapped, TapError> {
     if is_error(tap) {
         let (said, _) = tap.data.bytes.split_first_chunk().expect("an error message has 8 bytes");

@@ -51,7 +51,7 @@ fn the_hash_covers_version_fields_data_bytes_and_codes() {
     }
 }
 
-/// Sets every figure to 0.1, rounds, and checks that the lowest bits are zero except in the exact ones.
+/// Sets every figure to 0.1, rounds, and checks that the lowest bits are zero, except in exact figures.
 fn check_rounding<M: Message>(round: fn(&mut M), exact: &[&str]) {
     let mut message = M::zeroed();
     let fields = M::fields();

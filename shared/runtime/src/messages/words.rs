@@ -8,7 +8,7 @@ use super::codes::{Cause, EventKind, NoPose, Source};
 use masseter_can::canopen::{AbortCode, EmergencyCode, ObjectAddress};
 use masseter_can::cia402::{DriveState, Statusword};
 
-/// The sentence for an event that names a node, a bus, an object, or why there is no pose; `None` for other events.
+/// The sentence for an event with a node, a bus, an object, or the reason for a missing pose; `None` for other events.
 pub fn explain(event: &Event) -> Option<String> {
     let cause = Cause::try_from(event.cause).ok().filter(|_| event.kind != EventKind::Transition.code())?;
     let words = words_of_start(cause, event).or_else(|| words_of_run(cause, event))?;
@@ -28,7 +28,7 @@ fn place_of(event: &Event) -> String {
     }
 }
 
-/// What value, limit and object mean by the cause, and what helps: of a drive that does not start, and of its power.
+/// The meaning of value, limit and object by the cause, with the remedy, for the start and the power of a drive.
 fn words_of_start(cause: Cause, event: &Event) -> Option<String> {
     let object = ObjectAddress::new((event.object >> 8) as u16, event.object as u8);
     let (value, limit) = (event.value as u32, event.limit as u32);
@@ -99,7 +99,7 @@ fn words_of_start(cause: Cause, event: &Event) -> Option<String> {
     })
 }
 
-/// The same of what happens on the buses and to the mechanism.
+/// The meaning of value, limit and object by the cause, with the remedy, for buses and mechanism.
 fn words_of_run(cause: Cause, event: &Event) -> Option<String> {
     let (value, limit) = (event.value as u32, event.limit as u32);
     Some(match cause {
@@ -178,7 +178,7 @@ fn fault_words(code: u32, statusword: u32) -> String {
     format!("error code {}, statusword {statusword:04X}h", EmergencyCode(code as u16))
 }
 
-/// State of a drive that is not enabled, and its emergency code if it has reported one.
+/// State of a drive that is not enabled, with its emergency code if reported.
 fn power_words(statusword: u32, code: u32) -> String {
     let state = Statusword(statusword as u16).state();
     let name = state.map_or_else(|_| "unknown state".to_owned(), |state| state.name().replace('_', " "));
@@ -273,7 +273,7 @@ mod tests {
     #[test]
     fn what_figures_say_alone_is_left_to_them() {
         assert_eq!(explain(&event(Cause::CommandLost)), None);
-        // Of recordings that are older than the reason.
+        // Older recordings do not have the reason.
         assert_eq!(explain(&event(Cause::ForwardKinematics)), None);
         let moved = Event { kind: EventKind::Transition.code(), ..event(Cause::BootTimeout) };
         assert_eq!(explain(&moved), None);

@@ -1,7 +1,7 @@
-//! How other programs read and set the parameters of a running controller.
+//! Access of other programs to the parameters of a running controller.
 //!
-//! The controller's process listens on a socket in the private folder of its domain, so only the same user's programs reach
-//! it. A request and its answer are a line of JSON each. A thread of its own serves them, never the loop.
+//! The controller's process listens on a socket in the private folder of its domain, so only the same user's programs
+//! reach it. A request and its answer are a line of JSON each. A thread of its own serves the requests, never the loop.
 
 use std::os::unix::net::UnixListener;
 use std::path::PathBuf;
@@ -18,17 +18,17 @@ use crate::conversation::{Conversation, Left, Limits, Newcomers, line};
 use crate::transport::{Domain, DomainError};
 
 const SOCKET: &str = "parameters";
-/// Time after which a request has no effect any more, ns.
+/// Lifetime of a request, ns.
 const EXPIRY_NS: u64 = 2 * SECOND_NS;
-/// Time for an answer that was made just before that, ns.
+/// Further time for the answer to a request at the end of its lifetime, ns.
 const GRACE_NS: u64 = 200 * MILLISECOND_NS;
 /// Bytes of the longest request.
 const LONGEST_REQUEST: usize = 4096;
 /// Bytes of the longest answer: 64 parameters with long descriptions.
 const LONGEST_ANSWER: usize = 1 << 20;
-/// Most programs whose request is not whole, and most that have not read their answer.
+/// Most programs without a whole request, and most programs with an unread answer.
 const MOST_PEERS: usize = 16;
-/// Least time between two looks for requests, which bounds what they cost.
+/// Least time between two looks for requests, which bounds their cost.
 const INTERVAL: Duration = Duration::from_millis(5);
 /// Longest time between two looks.
 const IDLE: Duration = Duration::from_secs(60);
@@ -37,7 +37,7 @@ const IDLE: Duration = Duration::from_secs(60);
 #[serde(rename_all = "snake_case")]
 enum Request {
     List,
-    /// Refused from `expires_ns` on, ns of `CLOCK_MONOTONIC`: its sender waits no longer.
+    /// The request expires at `expires_ns`, ns of `CLOCK_MONOTONIC`: its sender waits no longer.
     Set {
         name: String,
         value: f64,
@@ -48,20 +48,20 @@ enum Request {
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Answer {
-    /// The parameters with the values that are set.
+    /// The parameters with their set values.
     Parameters(Vec<Parameter>),
     Refused {
         reason: String,
     },
 }
 
-/// Why parameters could not be read or set.
+/// The reason for a failed access to parameters.
 #[derive(Debug, thiserror::Error)]
 pub enum AccessError {
-    /// Nobody listens.
+    /// No controller listens.
     #[error("the rig '{0}' does not run, or its controller declares no parameters")]
     NoParameters(String),
-    /// The domains cannot be read.
+    /// The list of domains fails.
     #[error(transparent)]
     Domain(#[from] DomainError),
     /// The controller refuses the name or the value.
@@ -72,7 +72,7 @@ pub enum AccessError {
     NoAnswer {
         /// The rig.
         rig: String,
-        /// Why no answer is awaited any more.
+        /// The reason for the end of the wait.
         left: Left,
     },
     /// The controller does not answer a request for another value.
@@ -85,7 +85,7 @@ pub enum AccessError {
         rig: String,
         /// The parameter.
         name: String,
-        /// Why no answer is awaited any more.
+        /// The reason for the end of the wait.
         left: Left,
     },
 }
@@ -94,13 +94,13 @@ fn parameter_socket(domain: &Domain) -> PathBuf {
     domain.root().join(SOCKET)
 }
 
-/// Lets other programs read and set these parameters until the process ends.
+/// Gives other programs access to these parameters until the end of the process.
 ///
 /// # Errors
 /// When the socket or the thread cannot be made.
 pub(crate) fn serve(domain: &Domain, settings: Arc<Settings>) -> io::Result<()> {
     let path = parameter_socket(domain);
-    // That of a program which ended before the start of the run.
+    // The old socket of a program that has ended before the start of the run.
     let _ = fs::remove_file(&path);
     let listener = UnixListener::bind(path)?;
     let mut newcomers = Newcomers::at(listener.into(), MOST_PEERS, Limits::newcomer(LONGEST_REQUEST))?;
@@ -121,7 +121,7 @@ pub(crate) fn serve(domain: &Domain, settings: Arc<Settings>) -> io::Result<()> 
     Ok(())
 }
 
-/// Answers a request, unless its sender has left or waits no longer: a value that was said to be refused is not set later.
+/// Answers a request, unless its sender has left or waits no longer. So a refused value is never set later.
 fn answer_request(conversation: &mut Conversation, settings: &Settings) {
     let request = conversation.next_line().unwrap_or_default();
     conversation.hear();
@@ -147,18 +147,18 @@ fn answer_request(conversation: &mut Conversation, settings: &Settings) {
     conversation.say(line(&answer).as_bytes());
 }
 
-/// The parameters of a rig's controller, with the values that are set.
+/// The parameters of a rig's controller, with their set values.
 ///
 /// # Errors
-/// [`AccessError`] when no controller with parameters runs there.
+/// [`AccessError`] without a controller with parameters.
 pub fn list(domain: &Domain) -> Result<Vec<Parameter>, AccessError> {
     ask_controller(domain, &Request::List)
 }
 
-/// Sets a parameter of a rig's controller, which takes it over in its next cycle. Returns all parameters.
+/// Sets a parameter of a rig's controller from its next cycle on. Returns all parameters.
 ///
 /// # Errors
-/// [`AccessError`], also when there is no such parameter or the value is beyond its range.
+/// [`AccessError`], also for an unknown parameter or a value beyond its range.
 pub fn set(domain: &Domain, name: &str, value: f64) -> Result<Vec<Parameter>, AccessError> {
     if !value.is_finite() {
         return Err(AccessError::Refused(format!("parameter '{name}' cannot be {value}")));
@@ -170,7 +170,7 @@ pub fn set(domain: &Domain, name: &str, value: f64) -> Result<Vec<Parameter>, Ac
 /// The rigs whose controllers have parameters.
 ///
 /// # Errors
-/// When the domains of this user cannot be listed.
+/// When the list of this user's domains fails.
 pub fn rigs() -> Result<Vec<Domain>, DomainError> {
     Domain::serving(SOCKET)
 }
@@ -186,7 +186,7 @@ fn ask_controller(domain: &Domain, request: &Request) -> Result<Vec<Parameter>, 
     let mut conversation = connected.map_err(|_| AccessError::NoParameters(rig()))?;
     match conversation.ask(request).map_err(no_answer)? {
         Answer::Parameters(parameters) => {
-            // Pages and terminals show them.
+            // Pages and terminals show these texts.
             let declared = Declared { parameters, ..Declared::default() };
             declared.check().map_err(|error| AccessError::Refused(error.to_string()))?;
             Ok(declared.parameters)
@@ -222,7 +222,7 @@ mod tests {
         for (name, value) in [("gain", 10.0), ("gain", f64::NAN), ("gian", 1.0)] {
             assert!(matches!(set(&domain, name, value), Err(AccessError::Refused(_))));
         }
-        // What is no request concerns its own connection only.
+        // A line that is no request concerns its own connection only.
         UnixStream::connect(parameter_socket(&domain)).unwrap().write_all(b"hello\n").unwrap();
         assert_eq!(value(list(&domain)), Some([3.0]));
     }
@@ -260,7 +260,7 @@ mod tests {
         let mut peers: Vec<_> =
             (0..100).map(|_| UnixStream::connect(parameter_socket(&domain)).unwrap()).collect();
         for _ in 0..10 {
-            // It fails once the server has closed the connection.
+            // The write fails after the server has closed the connection.
             for peer in &mut peers {
                 let _ = peer.write_all(b"x");
             }

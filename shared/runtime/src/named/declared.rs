@@ -1,4 +1,4 @@
-//! What a controller declares: its signals, its parameters, and which motion it plays.
+//! The declaration of a controller: its signals, its parameters, and its motion.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,7 +14,7 @@ const LONGEST_NAME: usize = 48;
 const LONGEST_UNIT: usize = 48;
 /// Bytes of all texts of a declaration together.
 const MOST_TEXT_BYTES: usize = 64 << 10;
-/// The fields that stand beside the named values in a recorded message.
+/// The fields beside the named values in a recorded message.
 const TAKEN: [&str; 5] = ["seq", "published_ns", "version", "cycle", "length"];
 
 /// A number that the controller publishes in each cycle.
@@ -24,18 +24,18 @@ pub struct Signal {
     pub name: String,
     /// Its unit, such as `mm`; empty for none.
     pub unit: String,
-    /// What it is.
+    /// Its meaning.
     pub about: String,
 }
 
-/// A number that the user sets, also during a run.
+/// A number that the user sets, at any time of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
     /// Its name, in lower case, such as `gain`.
     pub name: String,
     /// Its unit, such as `1/s`; empty for none.
     pub unit: String,
-    /// What it is.
+    /// Its meaning.
     pub about: String,
     /// Its value at the start.
     pub value: f64,
@@ -44,7 +44,7 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// A parameter of this value without unit and range; fields can be set otherwise.
+    /// A parameter with this value, without unit and range. Other fields are for the caller.
     pub fn new(name: &str, value: f64) -> Self {
         Self {
             name: name.to_owned(),
@@ -58,7 +58,7 @@ impl Parameter {
     /// Refuses a value beyond the range.
     ///
     /// # Errors
-    /// [`NameError::OutOfRange`], also for what is no number.
+    /// [`NameError::OutOfRange`], also for a value that is no number.
     pub fn check(&self, value: f64) -> Result<(), NameError> {
         let [least, most] = self.range;
         if (least..=most).contains(&value) {
@@ -69,18 +69,18 @@ impl Parameter {
     }
 }
 
-/// Which motion a controller plays.
+/// The motion of a controller.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PlayedMotion {
-    /// The scenario's: its desired poses are held against those of the scenario.
+    /// The scenario's motion: checks compare its desired poses with those of the scenario.
     #[default]
     Scenario,
     /// One of its own: at least one requirement of the scenario must judge the true jaw.
     Own,
 }
 
-/// What a controller declares: its signals and parameters, each in the order of its values, and which motion it plays.
+/// The declaration of a controller: its signals and parameters, each in the order of its values, and its motion.
 ///
 /// ```
 /// use masseter_runtime::named::{Declared, Parameter, Signal};
@@ -107,22 +107,22 @@ pub struct Declared {
     pub motion: PlayedMotion,
 }
 
-/// Why a name or a value is refused.
+/// The reason for the refusal of a name or a value.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NameError {
-    /// A recording could not have the name.
+    /// The name is not valid in a recording.
     #[error(
         "'{}' is no name of a signal or parameter: use up to {LONGEST_NAME} lower-case letters, digits and single '_', \
          beginning with a letter, and none of seq, published_ns, version, cycle, length", excerpt(.0)
     )]
     BadName(String),
-    /// Two have one name.
+    /// Two signals or parameters have one name.
     #[error("two signals, or two parameters, are named '{0}'")]
     Twice(String),
-    /// There are too many.
+    /// Too many signals or parameters.
     #[error("{0} {1} are too many: a controller has up to {MOST_VALUES}")]
     TooMany(usize, &'static str),
-    /// A unit or a description cannot be shown.
+    /// A unit or a description is not fit for display.
     #[error(
         "the {what} of '{name}' is '{}': use printable characters on one line, at most {most_bytes} bytes", excerpt(.text)
     )]
@@ -139,7 +139,7 @@ pub enum NameError {
     /// The texts are too long.
     #[error("names, units and descriptions take {0} bytes together: shorten them to {MOST_TEXT_BYTES} bytes")]
     TooLong(usize),
-    /// A range is not one, or is infinite.
+    /// A range is no range, or is infinite.
     #[error("the range of parameter '{0}' is none: give a smallest and a larger or equal largest number")]
     BadRange(String),
     /// The value is beyond the parameter's range.
@@ -156,18 +156,18 @@ pub enum NameError {
         /// The unit of all three.
         unit: String,
     },
-    /// There is no such parameter.
+    /// The parameter is unknown.
     #[error("the controller has no parameter '{}'{}", excerpt(.name), others(.name, .parameters))]
     Unknown {
         /// The name.
         name: String,
-        /// The parameters that there are.
+        /// The declared parameters.
         parameters: Vec<String>,
     },
 }
 
 impl NameError {
-    /// The signal or parameter, where one is at fault.
+    /// The signal or parameter at fault, if any.
     pub fn name(&self) -> Option<&str> {
         match self {
             Self::BadName(name)
@@ -190,7 +190,7 @@ fn others(name: &str, parameters: &[String]) -> String {
 }
 
 impl Declared {
-    /// Refuses what a recording could not contain, and parameters whose value is beyond their range.
+    /// Refuses declarations that are not valid in a recording, and parameters with a value beyond their range.
     ///
     /// # Errors
     /// [`NameError`].
@@ -208,7 +208,7 @@ impl Declared {
         Ok(())
     }
 
-    /// The texts stand in schemas, pages and terminals.
+    /// Schemas, pages and terminals show the texts.
     fn require_texts(&self) -> Result<(), NameError> {
         let signals = self.signals.iter().map(|known| [&known.name, &known.unit, &known.about]);
         let parameters = self.parameters.iter().map(|known| [&known.name, &known.unit, &known.about]);
@@ -240,10 +240,10 @@ impl Declared {
         })
     }
 
-    /// The same with the values of a scenario at the start.
+    /// The declaration with the start values of a scenario.
     ///
     /// # Errors
-    /// [`NameError`] for a parameter that is not declared, or a value beyond its range.
+    /// [`NameError`] for an undeclared parameter, or a value beyond its range.
     pub fn with(mut self, values: &BTreeMap<String, f64>) -> Result<Self, NameError> {
         for (name, &value) in values {
             let place = self.place_of(name)?;
@@ -270,7 +270,7 @@ fn require_names(names: &[&str], kind: &'static str) -> Result<(), NameError> {
     twice.map_or(Ok(()), |name| Err(NameError::Twice((*name).to_owned())))
 }
 
-/// Whether a field of a ROS 2 message may have this name.
+/// Whether the name is valid for a field of a ROS 2 message.
 fn is_name(name: &str) -> bool {
     let has_form = name.len() <= LONGEST_NAME
         && name.starts_with(|c: char| c.is_ascii_lowercase())

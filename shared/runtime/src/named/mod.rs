@@ -1,8 +1,8 @@
-//! The named numbers of a controller: signals, which it publishes, and parameters, which its user sets.
+//! The named numbers of a controller: signals, which the controller publishes, and parameters, which its user sets.
 //!
-//! A controller [declares](Declared) both once, before the start; the declaration is checked then, and kept beside the
-//! recording. [`NamedValues`] holds the values of a run. [`access`] lets other programs read and set the parameters
-//! meanwhile. What a controller does with a parameter is not known here.
+//! A controller [declares](Declared) both once, before the start. The recording keeps the checked declaration.
+//! [`NamedValues`] holds the values of a run. [`access`] gives other programs access to the parameters. This module
+//! does not interpret a parameter.
 
 pub mod access;
 mod declared;
@@ -17,7 +17,7 @@ use crate::messages::{Event, MOST_VALUES, Values};
 
 pub use declared::{Declared, NameError, Parameter, PlayedMotion, Signal};
 
-/// The parameters as their user wants them. Any thread may set them; the loop that takes them over never waits.
+/// The user's values of the parameters. Any thread may set a value; the loop that takes values over never waits.
 #[derive(Debug)]
 pub struct Settings {
     declared: Declared,
@@ -32,12 +32,12 @@ impl Settings {
         Self { declared, wanted }
     }
 
-    /// What the controller declares.
+    /// The controller's declaration.
     pub fn declared(&self) -> &Declared {
         &self.declared
     }
 
-    /// The value of a parameter that is set, and takes effect in the next cycle if it has not yet.
+    /// The set value of a parameter, in force from the next cycle on at the latest.
     pub fn value(&self, place: usize) -> f64 {
         f64::from_bits(self.wanted[place].load(Ordering::Relaxed))
     }
@@ -59,7 +59,7 @@ impl Settings {
     }
 }
 
-/// A parameter that has a new value.
+/// A parameter with a new value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Change {
     /// The place of the parameter.
@@ -94,7 +94,7 @@ pub struct NamedValues {
 }
 
 impl Clone for NamedValues {
-    /// The same values, with settings of their own: whoever sets these sets no others.
+    /// A copy of the values with independent settings.
     fn clone(&self) -> Self {
         let Self { settings, parameters, signals, is_changed } = self;
         let wanted = array::from_fn(|place| AtomicU64::new(settings.value(place).to_bits()));
@@ -104,10 +104,10 @@ impl Clone for NamedValues {
 }
 
 impl NamedValues {
-    /// The values at the start: the declared ones, or those given for parameters by their names.
+    /// The values at the start: the declared values, or those given for parameters by their names.
     ///
     /// # Errors
-    /// [`NameError`] when the declaration cannot be used, or the given values do not fit.
+    /// [`NameError`] for an invalid declaration, or for given values that do not fit.
     pub fn new(declared: Declared, given: &BTreeMap<String, f64>) -> Result<Self, NameError> {
         let declared = declared.with(given)?;
         let mut parameters = Values::zeros(declared.parameters.len());
@@ -118,7 +118,7 @@ impl NamedValues {
         Ok(Self { settings: Arc::new(Settings::new(declared)), parameters, signals, is_changed })
     }
 
-    /// The parameters as their user wants them.
+    /// The user's values of the parameters.
     pub fn settings(&self) -> &Arc<Settings> {
         &self.settings
     }
@@ -128,7 +128,7 @@ impl NamedValues {
         self.parameters.as_slice()
     }
 
-    /// The signals, to be filled.
+    /// The signals, for writing.
     pub fn signals_mut(&mut self) -> &mut [f64] {
         self.signals.as_mut_slice()
     }
@@ -138,8 +138,8 @@ impl NamedValues {
         (self.signals.length > 0).then_some(self.signals)
     }
 
-    /// Takes over one parameter that is set otherwise than it is in force: at most one a cycle, so that the work of a cycle
-    /// is bounded.
+    /// Takes over one parameter with a set value other than the value in force. A cycle takes over at most one, so that
+    /// its work is bounded.
     pub fn take_change(&mut self) -> Option<Change> {
         let changed = |(place, value): (usize, &f64)| {
             let to = self.settings.value(place);

@@ -1,9 +1,9 @@
-//! The real-time loop: absolute deadlines on a fixed grid, the n-th at `epoch + phase + n · period`, and the scheduling that
-//! keeps them.
+//! The real-time loop: absolute deadlines on a fixed grid, the n-th at `epoch + phase + n · period`, and the scheduling
+//! for them.
 //!
 //! [`Cycle`] waits for deadlines and applies the overrun policy. [`Waiter`] waits for an instant or for a message, and
-//! measures how long the machine stalled. [`scheduling`] requests a core, a real-time priority and locked memory, and
-//! reports what the kernel granted. The work of a cycle is not part of this module.
+//! measures stalls of the machine. [`scheduling`] requests a core, a real-time priority and locked memory, and reports
+//! the kernel's grants. The work of a cycle is not part of this module.
 
 pub mod scheduling;
 
@@ -15,10 +15,9 @@ use crate::clock;
 /// longer gap has another cause: an interrupt, the hypervisor, a task of higher priority. While the task works, the work
 /// itself may be the cause, so [`Account`] keeps such gaps apart.
 const GAP_NS: u64 = 50_000;
-/// A wait that may end late sleeps only for longer than this: a sleep takes 20 to 40 µs of the core on some virtual
-/// machines.
+/// Shortest sleep of a wait that may end late: a sleep takes 20 to 40 µs of the core on some virtual machines.
 const SHORTEST_SLEEP_NS: u64 = 50_000;
-/// A warm-up takes less than this, ns: tens of microseconds with cold caches.
+/// Upper bound of a warm-up, ns: tens of microseconds with cold caches.
 const WARM_UP_NS: u64 = 25_000;
 /// The longest margin, ns: a later wake-up is rare, and the machine's stalls are longer.
 const LONGEST_MARGIN_NS: u64 = 200_000;
@@ -29,8 +28,8 @@ const SHORTEST_MARGIN_NS: u64 = 5_000;
 const PARTS_OF_PERIOD: u64 = 3;
 /// The margin covers this many times the latency.
 const SAFETY_FACTOR: u64 = 2;
-/// The surplus of the margin shrinks by one part in 2^12 with each sleep, so that a latency seen once in a thousand
-/// cycles stays covered.
+/// The surplus of the margin shrinks by one part in 2^12 with each sleep. So the margin keeps covering a latency of
+/// once in a thousand cycles.
 const DECAY: u32 = 12;
 
 /// Waits for the deadlines of a periodic task.
@@ -46,9 +45,8 @@ const DECAY: u32 = 12;
 /// assert_eq!(second.due_ns - first.due_ns, (second.cycle - first.cycle) * 1_000_000);
 /// ```
 ///
-/// Overrun policy: a deadline that the task is late for by less than a period is kept, late; those that passed before
-/// are skipped and counted, never caught up in a burst. Cycle numbers keep counting deadlines, so a skipped one leaves a
-/// gap.
+/// Overrun policy: a deadline less than a period past is kept, late. Earlier deadlines are skipped and counted, never
+/// caught up in a burst. Cycle numbers count all deadlines, so a skipped deadline leaves a gap.
 #[derive(Debug)]
 pub struct Cycle {
     first_due_ns: u64,
@@ -63,9 +61,9 @@ pub struct Cycle {
 pub struct Wake {
     /// Number of the deadline, from 1.
     pub cycle: u64,
-    /// When it was due, ns.
+    /// Due time, ns.
     pub due_ns: u64,
-    /// When the task woke, ns.
+    /// Wake-up time of the task, ns.
     pub woke_ns: u64,
     /// Deadlines skipped since the start.
     pub skipped: u64,
@@ -86,17 +84,17 @@ impl Cycle {
         Self { first_due_ns, period_ns, waiter: Waiter::new(period_ns), next: 0, skipped: 0 }
     }
 
-    /// When deadline `cycle` (from 1) is due, ns.
+    /// Due time of deadline `cycle` (from 1), ns.
     fn due_ns(&self, cycle: u64) -> u64 {
         self.first_due_ns + (cycle - 1) * self.period_ns
     }
 
-    /// When the next deadline is due, ns; it may have passed.
+    /// Due time of the next deadline, possibly past, ns.
     pub fn next_due_ns(&self) -> u64 {
         self.due_ns(self.next + 1)
     }
 
-    /// The next deadline that is less than a period past at `now_ns`, counting those before it as skipped.
+    /// The next deadline that is less than a period past at `now_ns`. Earlier deadlines count as skipped.
     fn claim_deadline(&mut self, now_ns: u64) -> u64 {
         self.next += 1;
         let late_ns = now_ns.saturating_sub(self.due_ns(self.next));
@@ -112,8 +110,8 @@ impl Cycle {
         wake
     }
 
-    /// As [`Self::wait`], with one call of `warm_up` shortly before the deadline if there is time for it: it may do work of
-    /// the cycle early, and brings code and data back into the caches.
+    /// As [`Self::wait`], with one call of `warm_up` shortly before the deadline if there is time. `warm_up` may do
+    /// work of the cycle early, and brings code and data back into the caches.
     ///
     /// # Errors
     /// Those of `warm_up`.
@@ -124,7 +122,7 @@ impl Cycle {
         Ok(Wake { cycle, due_ns, woke_ns, skipped: self.skipped, account: self.waiter.account() })
     }
 
-    /// For the waits within a cycle.
+    /// The waiter for the waits within a cycle.
     pub fn waiter(&mut self) -> &mut Waiter {
         &mut self.waiter
     }
@@ -139,35 +137,35 @@ pub struct Account {
     pub spun_ns: u64,
     /// Between waits.
     pub worked_ns: u64,
-    /// The part of `worked_ns` in stretches longer than a gap: either the machine stalled or the work took too long. The
-    /// task itself cannot distinguish the two.
+    /// The part of `worked_ns` in stretches longer than a gap. Either the machine has stalled or the work has taken too
+    /// long; the task itself cannot distinguish the two.
     pub overlong_ns: u64,
 }
 
-/// How a real-time task waits, and the account of its time. All time outside of waits counts as work.
+/// The waits of a real-time task, and the account of its time. All time outside of waits counts as work.
 #[derive(Debug)]
 pub struct Waiter {
-    /// A task spins for the last stretch before a deadline: a sleeping core takes tens of microseconds to wake up, a
-    /// spinning one a tenth of one.
+    /// A task spins for the last stretch before a deadline. A sleeping core takes tens of microseconds to wake up, a
+    /// spinning core a tenth of a microsecond.
     margin: SpinMargin,
     account: Account,
-    /// Since when the task has not been waiting; none before its first wait.
+    /// End of the last wait; none before the first wait.
     working_since_ns: Option<u64>,
 }
 
 impl Waiter {
-    /// For a task of this period.
+    /// A waiter for a task of this period.
     pub fn new(period_ns: u64) -> Self {
         Self { margin: SpinMargin::new(period_ns), account: Account::default(), working_since_ns: None }
     }
 
-    /// The account. It covers work up to the beginning of the last wait, and waiting up to the last reading of the clock.
+    /// The account, with work up to the beginning of the last wait, and waits up to the last reading of the clock.
     pub fn account(&self) -> Account {
         self.account
     }
 
-    /// Sleeps, calls `warm_up` once if there is time for it, and spins until `due_ns`; returns the time at the end. The
-    /// warm-up counts as work. It is needed because a core that slept has cold caches.
+    /// Sleeps, calls `warm_up` once if there is time, and spins until `due_ns`; returns the time at the end. The
+    /// warm-up counts as work. A core has cold caches after a sleep, so a warm-up is necessary.
     ///
     /// # Errors
     /// Those of `warm_up`.
@@ -184,8 +182,8 @@ impl Waiter {
         Ok(self.spin_until(due_ns, now_ns))
     }
 
-    /// Waits until `due_ns`, and at most until `latest_ns` if the core wakes up late: spins only for the time in which a
-    /// sleep of the usual wake-up latency would end after `latest_ns`. Returns the time at the end.
+    /// Waits until `due_ns`, and at most until `latest_ns` if the core wakes up late. Spins only while a sleep of the
+    /// usual wake-up latency ends after `latest_ns`. Returns the time at the end.
     pub fn until_between(&mut self, due_ns: u64, latest_ns: u64) -> u64 {
         let now_ns = self.end_work();
         let wake_ns = latest_ns.saturating_sub(self.margin.latency_ns()).min(due_ns);
@@ -194,15 +192,15 @@ impl Waiter {
         self.spin_until(due_ns, now_ns)
     }
 
-    /// Calls `block`, which sleeps in the kernel until an event, or until about `until_ns`. Spins instead if a sleep of the
-    /// usual wake-up latency would end after `latest_ns`. Returns the time at the end.
+    /// Calls `block`, which sleeps in the kernel until an event, or until about `until_ns`. Spins instead when a sleep
+    /// of the usual wake-up latency ends after `latest_ns`. Returns the time at the end.
     pub fn until_woken(&mut self, until_ns: u64, latest_ns: u64, block: impl FnOnce(u64)) -> u64 {
         let now_ns = self.end_work();
         let until_ns = latest_ns.saturating_sub(self.margin.latency_ns()).min(until_ns);
         if now_ns < until_ns { self.sleep(until_ns, latest_ns, block) } else { self.spin().now_ns() }
     }
 
-    /// Spins from `from_ns`, which is now, until `due_ns`; returns the time at the end.
+    /// Spins from `from_ns` (now) until `due_ns`; returns the time at the end.
     fn spin_until(&mut self, due_ns: u64, from_ns: u64) -> u64 {
         if from_ns >= due_ns {
             self.working_since_ns = Some(from_ns);
@@ -229,7 +227,7 @@ impl Waiter {
         woke_ns
     }
 
-    /// Begins to spin.
+    /// Begins a spin.
     pub fn spin(&mut self) -> Spin<'_> {
         Spin { last_ns: self.end_work(), waiter: self }
     }
@@ -248,7 +246,7 @@ impl Waiter {
     }
 }
 
-/// A loop that reads the clock until its caller ends it.
+/// A loop that reads the clock until its caller ends the loop.
 #[derive(Debug)]
 pub struct Spin<'a> {
     last_ns: u64,
@@ -256,7 +254,7 @@ pub struct Spin<'a> {
 }
 
 impl Spin<'_> {
-    /// Now, ns. The time since the last call counts as spun, or as stalled if it is a gap; the time after the last call
+    /// Now, ns. The time since the last call counts as spun, or as stalled for a gap. The time after the last call
     /// counts as work.
     pub fn now_ns(&mut self) -> u64 {
         std::hint::spin_loop();
@@ -284,7 +282,7 @@ struct SpinMargin {
 }
 
 impl SpinMargin {
-    /// For a task of this period: the longest margin, until sleeps have shown the latency.
+    /// The margin of a task of this period: the longest margin, until sleeps have shown the latency.
     fn new(period_ns: u64) -> Self {
         let longest_ns = LONGEST_MARGIN_NS.min(period_ns / PARTS_OF_PERIOD);
         Self { longest_ns, current_ns: longest_ns }
@@ -300,10 +298,10 @@ impl SpinMargin {
         self.current_ns / SAFETY_FACTOR
     }
 
-    /// Learns from a sleep that ended `latency_ns` late.
+    /// Adapts to a sleep with the latency `latency_ns`.
     fn learn(&mut self, latency_ns: u64) {
         if latency_ns > self.longest_ns {
-            // The machine stalled: no margin covers that.
+            // A stall of the machine: no margin covers that.
             return;
         }
         let needed_ns = SAFETY_FACTOR * latency_ns + SHORTEST_MARGIN_NS;

@@ -1,5 +1,4 @@
-//! Core, real-time priority and locked memory of a process: what it requests, and what the kernel granted, read
-//! back.
+//! Core, real-time priority and locked memory of a process: the request, and the kernel's grant, read back.
 //!
 //! A refusal is reported and never ends a run: screen, manifest and `--require-rt` judge it.
 
@@ -21,7 +20,7 @@ pub struct SchedulingRequest {
     pub locked_memory: bool,
 }
 
-/// The scheduling that a process has, as the kernel reports it, and why a request was refused.
+/// The scheduling of a process by the kernel's report, and the reasons for refusals.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Obtained {
     /// The request.
@@ -37,8 +36,8 @@ pub struct Obtained {
     pub refusals: Vec<String>,
 }
 
-/// Requests `request`, then reads back the granted scheduling. Memory is locked for the whole process, the rest holds for
-/// the calling thread.
+/// Requests `request`, then reads back the granted scheduling. The lock of memory holds for the whole process, the rest
+/// for the calling thread.
 ///
 /// ```
 /// use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain};
@@ -76,7 +75,8 @@ pub fn obtain(request: SchedulingRequest) -> Obtained {
     Obtained { requested: request, core, fifo_priority, locked_memory, refusals }
 }
 
-/// Why a request was not granted, if it was not. The kernel may accept a request without effect: what is read back counts.
+/// The reason for a refused request, if any. The kernel may accept a request without effect: the value read back
+/// counts.
 fn refusal(asked: io::Result<()>, is_granted: bool) -> Option<String> {
     match asked {
         Err(error) => Some(error.to_string()),
@@ -102,11 +102,11 @@ pub fn allowed_cores() -> Vec<usize> {
     (0..CpuSet::MAX_CPU).filter(|&core| set.is_set(core)).collect()
 }
 
-/// The cores to which a thread of this process can be pinned. A cpuset limits them; an inherited affinity mask does not,
-/// and neither does `isolcpus=`, which takes cores out of every mask.
+/// The cores to which a thread of this process can be pinned. A cpuset limits these cores. An inherited affinity mask
+/// and `isolcpus=`, which takes cores out of every mask, do not.
 pub fn usable_cores() -> Vec<usize> {
     let stays_on = |core: &usize| stay_on(&[*core]).is_ok() && pinned_core() == Some(*core);
-    // In a thread of its own, so that the caller keeps its mask.
+    // A thread of its own, so that the caller keeps its mask.
     let tried = thread::spawn(move || (0..CpuSet::MAX_CPU).filter(stays_on).collect());
     tried.join().expect("asking the kernel does not panic")
 }
@@ -122,16 +122,16 @@ fn stay_on(cores: &[usize]) -> io::Result<()> {
     Ok(sched_setaffinity(None, &set)?)
 }
 
-/// Keeps the calling thread, and the threads that it starts, off the cores of real-time tasks: off all of them, or off
-/// as many of the last ones as leave a core to run on.
+/// Keeps the calling thread, and its later threads, off the cores of real-time tasks. If no other core is allowed, only
+/// as many of the last cores are excluded as leave one.
 pub fn keep_off(cores: &[usize]) {
     if let Some(left) = cores_beside(&allowed_cores(), cores) {
-        // These cores are allowed already. If the kernel refuses all the same, the thread keeps its mask.
+        // These cores are allowed already. The thread keeps its mask if the kernel refuses.
         let _ = stay_on(&left);
     }
 }
 
-/// The allowed cores without `cores`, or without as many of the last of `cores` as leave one.
+/// The allowed cores without `cores`; without the last ones of `cores`, if no other core is left.
 fn cores_beside(allowed: &[usize], cores: &[usize]) -> Option<Vec<usize>> {
     (0..cores.len()).find_map(|first| {
         let left: Vec<_> = allowed.iter().copied().filter(|core| !cores[first..].contains(core)).collect();

@@ -60,7 +60,7 @@ fn a_far_deadline_is_warmed_up_for_once_and_that_is_work() {
         calls
     };
     assert_eq!(warmed_up(&mut waiter, 0), 0);
-    // A machine that stalls leaves no time for a warm-up, but not each time.
+    // A stall of the machine leaves no time for a warm-up, but a stall does not happen each time.
     let calls: Vec<_> = (0..20).map(|_| warmed_up(&mut waiter, 5_000_000)).collect();
     assert!(calls.iter().all(|&calls| calls <= 1) && calls.contains(&1), "{calls:?}");
     assert!(waiter.account().worked_ns > 0);
@@ -91,7 +91,7 @@ fn a_blocking_wait_ends_with_its_event_and_does_not_count_as_work() {
     });
     assert!((begun_ns + STALL_NS..begun_ns + SECOND_NS).contains(&woken_ns));
     assert_eq!(waiter.account().worked_ns, 0);
-    // What is due at once is not blocked for.
+    // A due instant does not block.
     waiter.until_woken(0, 0, |_| panic!("blocked"));
 }
 

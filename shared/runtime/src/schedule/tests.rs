@@ -52,7 +52,7 @@ fn a_drive_booted_beside_running_ones_keeps_to_the_offsets() {
     }
 }
 
-/// The frames of the drive that boots go: the worst case keeps the longer ones.
+/// The booting drive sends no process data: in the worst case the longer frames stay.
 #[test]
 fn the_drive_with_the_shortest_process_data_boots() {
     let text = "rate_hz = 500\n[[drive_profile]]\naxes = ['l1']\npdos.rpdo1 = ['6040h', '607Ah', '60B2h']";

@@ -1,8 +1,8 @@
-//! The file names of a run, the check for living processes of the run, and the removal of the files.
+//! The file names of a run, the check for its living processes, and the removal of the files.
 //!
-//! iceoryx2 leaves files in two places: in a root folder, which is private, and in `/dev/shm` with a prefix. The prefix
-//! contains a random number of the claim, so no other user can squat a name. Every process of a run holds an inherited
-//! lock on `<root>/lock`, whose text is that number; while anyone holds it, the run is alive.
+//! iceoryx2 leaves files in a private root folder, and in `/dev/shm` with a prefix. The prefix contains a random number
+//! of the claim, so no other user can squat a name. Every process of a run holds an inherited lock on `<root>/lock`,
+//! whose text is that number. The run is alive while any process holds the lock.
 
 use std::fs::{self, File, Metadata, TryLockError};
 use std::io::{self, Write};
@@ -20,7 +20,7 @@ use crate::clock::{self, SECOND_NS};
 
 const SHARED_MEMORY: &str = "/dev/shm";
 const LOCK: &str = "lock";
-/// No domain can have this name.
+/// A name that is not valid for a domain.
 const TURN: &str = ".turn";
 /// Claims and sweeps take milliseconds, ns.
 const TURN_TIMEOUT_NS: u64 = 5 * SECOND_NS;
@@ -39,12 +39,12 @@ pub struct DomainLock {
     _lock: File,
 }
 
-/// What a sweep did.
+/// The result of a sweep.
 #[derive(Debug, Default)]
 pub struct Swept {
     /// Removed files of shared memory.
     pub removed: usize,
-    /// Why others remain, as those that another user has put there.
+    /// Reasons for remaining files, such as files of another user.
     pub remaining: Vec<DomainError>,
 }
 
@@ -57,7 +57,7 @@ impl Swept {
     }
 }
 
-/// A domain whose files are removed on drop, for tests and measurements.
+/// A domain that removes its files on drop, for tests and measurements.
 #[derive(Debug)]
 pub struct ScratchDomain {
     domain: Domain,
@@ -65,7 +65,7 @@ pub struct ScratchDomain {
 }
 
 impl ScratchDomain {
-    /// Claims a domain of that name that no other process takes.
+    /// Claims a domain with a name that no other process takes.
     pub fn claim(name: &str) -> Result<Self, DomainError> {
         let domain = Domain::named(&format!("{name}-{}", std::process::id()))?;
         let claim = Some(domain.claim()?);
@@ -84,7 +84,7 @@ impl Deref for ScratchDomain {
 impl Drop for ScratchDomain {
     fn drop(&mut self) {
         drop(self.claim.take());
-        // What cannot be removed now is left to `masseter clean`.
+        // `masseter clean` removes the remaining files.
         let _ = self.domain.sweep();
     }
 }
@@ -112,13 +112,13 @@ impl Domain {
     /// The prefix of the files in shared memory of the domain's claim.
     ///
     /// # Errors
-    /// When nobody has claimed the domain.
+    /// For a domain without a claim.
     pub fn prefix(&self) -> io::Result<String> {
         let secret = fs::read_to_string(self.root.join(LOCK))?;
         Ok(format!("masseter_{}_{}.{secret}_", getuid().as_raw(), self.id))
     }
 
-    /// Locks the domain for this process and its children until all have ended.
+    /// Locks the domain for this process and its children until the end of all.
     pub fn claim(&self) -> Result<DomainLock, DomainError> {
         let _turn = self.take_turn()?;
         if self.is_locked() {
@@ -132,7 +132,7 @@ impl Domain {
         runtime::secret()
             .and_then(|secret| lock.write_all(secret.as_bytes()))
             .map_err(file_error("write", &path))?;
-        // Children inherit the lock, so the domain counts as alive until the last of them ended.
+        // Children inherit the lock, so the domain counts as alive until the end of the last child.
         fcntl_setfd(&lock, FdFlags::empty()).map_err(io::Error::from).map_err(file_error("share", &path))?;
         Ok(DomainLock { _lock: lock })
     }
@@ -143,8 +143,8 @@ impl Domain {
         Ok(self.is_locked())
     }
 
-    /// Removes what a domain without a living process left in shared memory and in the file system; nothing while it is
-    /// alive.
+    /// Removes the files of a domain without a living process from shared memory and the file system. Keeps the files
+    /// of a living domain.
     pub fn sweep(&self) -> Result<Option<Swept>, DomainError> {
         let _turn = self.take_turn()?;
         if self.is_locked() { Ok(None) } else { self.remove_files().map(Some) }
@@ -159,7 +159,7 @@ impl Domain {
         Ok(swept)
     }
 
-    /// The files in shared memory of the domain's claim, if there is one.
+    /// The files in shared memory of the domain's claim, if any.
     ///
     /// # Errors
     /// When shared memory cannot be listed.
@@ -169,8 +169,8 @@ impl Domain {
         Ok(files.into_iter().filter(|path| file_name(path).starts_with(&prefix)).collect())
     }
 
-    /// Takes the rights of other users from this user's files in shared memory. iceoryx2 makes one of them for everybody,
-    /// whatever the umask: until then others may change its only content, the count of the nodes so far.
+    /// Takes the rights of other users from this user's files in shared memory. iceoryx2 makes one file for everybody,
+    /// for any umask. Until this call, others may change its only content, the count of the nodes so far.
     ///
     /// # Errors
     /// When shared memory cannot be listed, or the system refuses.
@@ -186,22 +186,22 @@ impl Domain {
         Ok(self.shared_memory()?.into_iter().filter(|path| runtime::own_file(path).is_some()).collect())
     }
 
-    /// A file of another user in shared memory that bears the prefix, which the first own file shows to everybody.
+    /// A file of another user in shared memory with the prefix. The first own file shows the prefix to everybody.
     ///
     /// # Errors
     /// When shared memory cannot be listed.
     pub fn foreign_file(&self) -> Result<Option<PathBuf>, DomainError> {
         let files = self.shared_memory()?;
-        // Asked once: iceoryx2 may remove an own file at any time, which is then nobody's.
+        // One query for each file: iceoryx2 may remove an own file at any time, and a second query then finds no owner.
         let is_foreign = |path: &PathBuf| path.symlink_metadata().is_ok_and(|found| !runtime::is_own(&found));
         Ok(files.into_iter().find(is_foreign))
     }
 
-    /// Refuses shared memory of another user that this process uses. Files that the process does not use do no harm. Nobody
-    /// can exchange an own file, since the folder is sticky.
+    /// Refuses shared memory of another user in this process. Unused files do no harm. Nobody can exchange an own file,
+    /// because the folder is sticky.
     ///
     /// # Errors
-    /// [`DomainError::Foreign`] for a file that is not this user's, [`DomainError::Gone`] for one that is no longer there.
+    /// [`DomainError::Foreign`] for another user's file, [`DomainError::Gone`] for a removed file.
     pub fn check_mapped(&self) -> Result<(), DomainError> {
         let maps = Path::new("/proc/self/maps");
         let text = fs::read_to_string(maps).map_err(file_error("read", maps))?;
@@ -211,13 +211,13 @@ impl Domain {
         mapped.try_for_each(|(line, path)| check_mapped_file(line, path))
     }
 
-    /// Asking takes the lock for a moment, which only one may do at a time.
+    /// The query takes the lock for a moment, so only one query may run at a time.
     fn is_locked(&self) -> bool {
         File::open(self.root.join(LOCK))
             .is_ok_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock)))
     }
 
-    /// Every domain of this user that left something behind.
+    /// Every domain of this user with files.
     pub fn all() -> Result<Vec<Self>, DomainError> {
         let mut domains = Vec::new();
         for folder in runtime::folders()? {
@@ -227,14 +227,14 @@ impl Domain {
         Ok(domains)
     }
 
-    /// Those with a living process that has made a file of this name, such as a socket, in the root folder.
+    /// The domains with a living process and a file of this name, such as a socket, in the root folder.
     pub(crate) fn serving(name: &str) -> Result<Vec<Self>, DomainError> {
         let serves = |domain: &Self| domain.root.join(name).exists() && domain.is_alive().unwrap_or(false);
         Ok(Self::all()?.into_iter().filter(serves).collect())
     }
 
-    /// Waits until no other process of this user claims or sweeps a domain: a lock not yet taken must not look like one
-    /// that was let go. The turn ends with the file.
+    /// Waits until no other process of this user claims or sweeps a domain. A lock before its acquisition must not look
+    /// like a released lock. The turn ends with the drop of the file.
     fn take_turn(&self) -> Result<File, DomainError> {
         let path = self.root.with_file_name(TURN);
         let turn = runtime::open(&path)?;
@@ -258,10 +258,10 @@ fn is_id(id: &str) -> bool {
     (1..=32).contains(&id.len()) && id.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_')
 }
 
-/// Refuses a line of `/proc/self/maps` whose file is not this user's: `7f00-7f01 rw-s 00000000 00:1a 12345 /dev/shm/…`.
+/// Refuses a line of `/proc/self/maps` with another user's file: `7f00-7f01 rw-s 00000000 00:1a 12345 /dev/shm/…`.
 fn check_mapped_file(line: &str, path: &str) -> Result<(), DomainError> {
     let inode = line.split_whitespace().nth(4).and_then(|inode| inode.parse().ok());
-    // The kernel marks what has been removed.
+    // The kernel marks removed files.
     let (path, is_removed) = path.strip_suffix(" (deleted)").map_or((path, false), |path| (path, true));
     match fs::symlink_metadata(path) {
         Ok(found) if runtime::is_own(&found) && Some(found.ino()) == inode && !is_removed => Ok(()),
@@ -270,7 +270,7 @@ fn check_mapped_file(line: &str, path: &str) -> Result<(), DomainError> {
     }
 }
 
-/// The process that locked the file, by its id and name.
+/// The process with the lock on the file, by its id and name.
 fn lock_holder(file: &Metadata) -> Option<String> {
     let locks = fs::read_to_string("/proc/locks").ok()?;
     // 1: FLOCK  ADVISORY  WRITE 4711 00:1a:12345 0 EOF

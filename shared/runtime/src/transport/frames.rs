@@ -10,7 +10,7 @@ use super::{Connecting, Inlet, Node, Outlet, TransportError, check_version, fail
 use crate::clock;
 use crate::messages::{FrameTap, Message};
 
-/// Most messages in a sample: those of a cycle of six drives.
+/// Most messages in a sample: the messages of a cycle of six drives.
 const BATCH: usize = 16;
 
 /// Publishes frames and numbers them.
@@ -20,16 +20,16 @@ pub struct FramePublisher {
     sent: u64,
 }
 
-/// Receives frames, oldest first. It keeps up to [`Message::DEPTH`] frames, less where batches are not full.
+/// Receives frames, oldest first. Keeps up to [`Message::DEPTH`] frames, fewer with batches that are not full.
 #[derive(Debug)]
 pub struct FrameSubscriber(Box<dyn Incoming>);
 
 /// Several frames in shared memory.
 type Batch = Sample<ipc::Service, [FrameTap], ()>;
 
-/// What a publisher needs of its port, which is behind a pointer for the reason of [`Topic`](super::Topic).
+/// The port of a publisher, behind a pointer for the reason of [`Topic`](super::Topic).
 trait Outgoing: Connecting {
-    /// Sends so many frames: `next` makes each in shared memory, `stamp` completes them.
+    /// Sends this many frames: `next` makes each in shared memory, `stamp` completes the batch.
     fn send(
         &self,
         count: usize,
@@ -39,7 +39,7 @@ trait Outgoing: Connecting {
     fn warm_up(&self) -> Result<(), TransportError>;
 }
 
-/// What a subscriber needs of its port.
+/// The port of a subscriber.
 trait Incoming: Connecting {
     fn next(&self) -> Result<Option<Batch>, TransportError>;
 }
@@ -89,12 +89,12 @@ impl FramePublisher {
         Ok(Self { port: Box::new(outlet), sent: 0 })
     }
 
-    /// The number of samples in which so many frames travel.
+    /// The number of samples for this many frames.
     pub fn samples(frames: usize) -> usize {
         frames.div_ceil(BATCH)
     }
 
-    /// Connects to the subscribers that are there by now, as [`Publisher::connect`](super::Publisher::connect).
+    /// Connects to the present subscribers, as [`Publisher::connect`](super::Publisher::connect).
     pub fn connect(&self) -> Result<(), TransportError> {
         self.port.connect()
     }
@@ -107,7 +107,7 @@ impl FramePublisher {
         self.publish_by(clock::now_ns, frames)
     }
 
-    /// The same with the time of another clock in the stamps.
+    /// As `publish`, with the time of another clock in the stamps.
     pub fn publish_by(
         &mut self,
         now_ns: impl Fn() -> u64,
@@ -141,8 +141,8 @@ impl FrameSubscriber {
         Ok(Self(Box::new(Inlet::create(service.subscriber_builder(), FrameTap::TOPIC)?)))
     }
 
-    /// The oldest batch not yet received; never waits. Refused when a connection to a publisher failed, since its frames
-    /// would be missing.
+    /// The oldest waiting batch; never waits. Refuses after a failed connection to a publisher, because its frames are
+    /// missing.
     pub fn receive(&self) -> Result<Option<Batch>, TransportError> {
         self.0.next()
     }

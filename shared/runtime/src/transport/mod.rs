@@ -1,9 +1,9 @@
 //! Transport of messages: iceoryx2 publish–subscribe, one service for each topic, one domain for each run.
 //!
-//! Readings, commands and states are written directly into the loaned sample. Truth, events and the frames of a cycle are
-//! copied there once. No publisher waits for a subscriber: a slow subscriber loses its oldest messages and sees the gap in
-//! the sequence numbers. Two rigs share no topic, because each [`Domain`] has names of its own. iceoryx2 continues without a
-//! connection that it could not make; a port of this module refuses to.
+//! Publishers write readings, commands and states directly into the loaned sample, and copy truth, events and the
+//! frames of a cycle there once. No publisher waits for a subscriber: a slow subscriber loses its oldest messages and
+//! sees the gap in the sequence numbers. Two rigs share no topic, because each [`Domain`] has names of its own. After a
+//! failed connection iceoryx2 continues; a port of this module refuses to.
 //!
 //! # Examples
 //! ```
@@ -57,21 +57,21 @@ pub use frames::{FramePublisher, FrameSubscriber};
 pub use runtime::{DomainError, secret};
 pub use signals::{SignalReceiver, SignalSender};
 
-/// Publishers a topic may have: every process may publish events.
+/// Most publishers of a topic: every process may publish events.
 const MAX_PUBLISHERS: usize = 4;
-/// Subscribers a topic may have: the counterpart, the recorder, and two observers. Shared memory is
-/// reserved, and locked, for all of them.
+/// Most subscribers of a topic: the counterpart, the recorder, and two observers. The port reserves and locks shared
+/// memory for all of them.
 const MAX_SUBSCRIBERS: usize = 4;
 /// Messages that a subscriber of the newest message keeps.
 const KEPT_FOR_THE_NEWEST: usize = 4;
-/// Messages a subscriber may hold at once: while it looks for a newer one than it has, it holds the one
-/// it has, the newest found so far, and the next.
+/// Most messages that a subscriber holds at once. During a search for a newer message these are the present message,
+/// the newest found so far, and the next.
 const MAX_HELD: usize = 3;
-/// Longest wait for another process that makes the same part of the domain: that process may be stopped for a moment, or
-/// starved. Shorter than the time in which a process must end.
+/// Longest wait for another process that makes the same part of the domain: that process may be stopped for a moment,
+/// or starved. Shorter than the time limit for the end of a process.
 const CREATION_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// Why a port could not be made or used.
+/// The reason for a failed port.
 #[derive(Debug, thiserror::Error)]
 #[error("iceoryx2: {action} failed ({reason}); {help}", help = remedy(reason))]
 pub struct TransportError {
@@ -79,7 +79,7 @@ pub struct TransportError {
     reason: String,
 }
 
-/// What helps against the refusals users meet.
+/// The remedy for common refusals.
 fn remedy(reason: &str) -> &'static str {
     if reason.contains("Permission") {
         "another user has made a file of this name in /dev/shm; start the rig again"
@@ -94,8 +94,7 @@ fn remedy(reason: &str) -> &'static str {
     }
 }
 
-/// Formats the error only after a failure and outside of the hot path: the formatting code within the hot path made a
-/// round trip a tenth slower.
+/// Formats the error outside of the hot path: formatting code within the hot path makes a round trip a tenth slower.
 fn failed<E: Debug>(verb: &'static str, what: &str) -> impl FnOnce(E) -> TransportError {
     #[cold]
     fn error(verb: &str, what: &str, cause: &dyn Debug) -> TransportError {
@@ -104,7 +103,7 @@ fn failed<E: Debug>(verb: &'static str, what: &str) -> impl FnOnce(E) -> Transpo
     move |cause| error(verb, what, &cause)
 }
 
-/// Refuses a message that does not carry this program's version: a sender need not be this program.
+/// Refuses a message of another version: the sender may be another program.
 fn check_version<M: Message>(message: &M) -> Result<(), TransportError> {
     match message.version() {
         LAYOUT_VERSION => Ok(()),
@@ -148,7 +147,7 @@ impl Node {
         &self.node
     }
 
-    /// The service of `M`'s topic, to be opened; it carries messages, or slices of them.
+    /// The service of `M`'s topic, before its opening, for messages or slices of them.
     fn topic<M: Message, P: Debug + IceoryxSend + ?Sized>(
         &self,
         depth: usize,
@@ -173,15 +172,15 @@ impl Node {
         M::subscriber(self, M::DEPTH)
     }
 
-    /// A subscriber for the newest message only. Its queue is short: entries of a long queue are not in the cache, and old
-    /// messages are of no use after a stall.
+    /// A subscriber for the newest message only. Its queue is short: entries of a long queue are not in the cache, and
+    /// old messages have no use after a stall.
     pub fn newest_subscriber<M: Topic>(&self) -> Result<Subscriber<M>, TransportError> {
         M::subscriber(self, KEPT_FOR_THE_NEWEST)
     }
 }
 
-/// A message whose ports this crate compiles, once for all crates that use them. iceoryx2 is generic: otherwise each crate that
-/// makes ports compiles it again (docs/realtime-log.md#the-first-build).
+/// A message with ports compiled in this crate, once for all crates. The ports of iceoryx2 are generic, so each crate
+/// with ports of its own compiles them again (docs/realtime-log.md#the-first-build).
 pub trait Topic: Message {
     /// As [`Node::publisher`].
     ///
@@ -189,7 +188,7 @@ pub trait Topic: Message {
     /// When the port cannot be made.
     fn publisher(node: &Node) -> Result<Publisher<Self>, TransportError>;
 
-    /// A subscriber that keeps so many messages.
+    /// A subscriber that keeps this many messages.
     ///
     /// # Errors
     /// When the port cannot be made.
@@ -221,12 +220,12 @@ fn service<M: Message>(node: &Node) -> Result<PortFactory<ipc::Service, M, ()>, 
 
 /// A port that connects to the ports of other processes.
 trait Connecting: Debug {
-    /// Makes the connections to the ports that are there by now.
+    /// Makes the connections to the present ports.
     fn connect(&self) -> Result<(), TransportError>;
 }
 
-/// A port of iceoryx2, and how many connections it could not make: iceoryx2 continues without them, and reports them in its
-/// log only.
+/// A port of iceoryx2, and the number of its failed connections. iceoryx2 continues without these connections, and
+/// reports them in its log only.
 #[derive(Debug)]
 struct Port<T> {
     inner: T,
@@ -239,7 +238,7 @@ type Outlet<P> = Port<IceoryxPublisher<ipc::Service, P, ()>>;
 /// A port that receives messages, or slices of them.
 type Inlet<P> = Port<IceoryxSubscriber<ipc::Service, P, ()>>;
 
-/// Counts refused connections for a port's builder.
+/// The counter of refused connections, for a port's builder.
 fn counter(refused: &Arc<AtomicU32>) -> impl DegradationFn + use<> {
     let refused = Arc::clone(refused);
     move |_, _| {
@@ -272,7 +271,8 @@ impl<P: IceoryxSend + Debug + ?Sized + 'static> Inlet<P> {
 }
 
 impl<T> Port<T> {
-    /// Refuses a port with missing connections: they leave no gap in any sequence, so a receiver must check.
+    /// Refuses a port with missing connections. Such connections leave no gap in any sequence, so a receiver must
+    /// check.
     fn require_all_connections(&self) -> Result<(), TransportError> {
         match self.refused.load(Ordering::Relaxed) {
             0 => Ok(()),
@@ -288,9 +288,9 @@ impl<T: UpdateConnections + Debug> Connecting for Port<T> {
     }
 }
 
-/// What a publisher needs of its port.
+/// The port of a publisher.
 trait Outgoing<M>: Connecting {
-    /// Lets `write` fill the next message in shared memory, and sends it.
+    /// Lets `write` fill the next message in shared memory, and sends the message.
     fn send(&self, write: &mut dyn FnMut(&mut M)) -> Result<(), TransportError>;
     fn warm_up(&self) -> Result<(), TransportError>;
 }
@@ -318,8 +318,8 @@ pub struct Publisher<M: Message> {
 }
 
 impl<M: Message> Publisher<M> {
-    /// Connects to the subscribers that are there by now. Otherwise the first message makes the connections, which create
-    /// and map files.
+    /// Connects to the present subscribers. Otherwise the first message makes the connections, which create and map
+    /// files.
     pub fn connect(&self) -> Result<(), TransportError> {
         self.port.connect()
     }
@@ -329,7 +329,7 @@ impl<M: Message> Publisher<M> {
         self.publish_by(clock::now_ns, fill)
     }
 
-    /// The same with the time of another clock in the stamp.
+    /// As `publish`, with the time of another clock in the stamp.
     pub fn publish_by(
         &mut self,
         now_ns: impl FnOnce() -> u64,
@@ -344,16 +344,16 @@ impl<M: Message> Publisher<M> {
         })
     }
 
-    /// Touches the memory of the next message: the first message of the loop then costs no page fault, and later ones find
-    /// the memory in the caches.
+    /// Touches the memory of the next message. So the first message of the loop costs no page fault, and later messages
+    /// find the memory in the caches.
     pub fn warm_up(&self) -> Result<(), TransportError> {
         self.port.warm_up()
     }
 }
 
-/// What a subscriber needs of its port.
+/// The port of a subscriber.
 trait Incoming<M: Message>: Connecting {
-    /// The oldest message not yet received.
+    /// The oldest waiting message.
     fn next(&self) -> Result<Option<ReceivedMessage<M>>, TransportError>;
     /// Messages that the port keeps.
     fn buffer(&self) -> usize;
@@ -383,7 +383,7 @@ pub struct Subscriber<M: Message> {
 pub struct ReceivedMessage<M: Message>(Sample<ipc::Service, M, ()>);
 
 impl<M: Message> ReceivedMessage<M> {
-    /// The message, unless it has another version.
+    /// The message, if the version is right.
     ///
     /// # Errors
     /// For another version.
@@ -407,20 +407,19 @@ impl<M: Message> Borrow<M> for ReceivedMessage<M> {
 }
 
 impl<M: Message> Subscriber<M> {
-    /// Connects to the publishers that exist by now; otherwise the first call of `receive` does, as in
-    /// [`Publisher::connect`].
+    /// Connects to the present publishers. Otherwise the first call of `receive` does so, as in [`Publisher::connect`].
     pub fn connect(&self) -> Result<(), TransportError> {
         self.port.connect()
     }
 
-    /// The oldest message not yet received; never waits. Refused when a connection to a publisher failed, since its messages
-    /// would be missing.
+    /// The oldest waiting message; never waits. Refuses after a failed connection to a publisher, because its messages
+    /// are missing.
     pub fn receive(&self) -> Result<Option<ReceivedMessage<M>>, TransportError> {
         self.port.next()?.map(ReceivedMessage::checked).transpose()
     }
 
-    /// The first message that `is_awaited`, or the newest there is when `deadline_ns` has passed. Polls without
-    /// sleeping: for waits of microseconds. The version of the message is the caller's to check.
+    /// The first message that `is_awaited`, or the newest message at `deadline_ns`. Polls without a sleep, for waits of
+    /// microseconds. The caller checks the version of the message.
     pub fn latest_by(
         &self,
         deadline_ns: u64,

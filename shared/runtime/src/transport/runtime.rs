@@ -1,8 +1,8 @@
-//! The private folder of locks and iceoryx2's files: no other user may hold a lock, squat a name or read a file in it. And
-//! what can go wrong with a domain and its files.
+//! The private folder of locks and iceoryx2's files, and the errors of a domain and its files. No other user may hold a
+//! lock, squat a name or read a file in the folder.
 //!
-//! It is `masseter` below the session's `XDG_RUNTIME_DIR`, `/run/masseter` of root, or `/dev/shm/masseter-UID`. Where another
-//! user has taken that name, it is `/dev/shm/masseter-UID-1`, or one of the next.
+//! The folder is `masseter` below the session's `XDG_RUNTIME_DIR`, `/run/masseter` of root, or `/dev/shm/masseter-UID`.
+//! If another user has taken that name, the folder is `/dev/shm/masseter-UID-1`, or a later number.
 
 use std::env;
 use std::fs::{self, DirBuilder, File, Metadata, OpenOptions};
@@ -19,21 +19,22 @@ const ONLY_OWNER: Mode = Mode::RWXU;
 /// Permissions of group and others.
 const OF_OTHERS: u32 = 0o077;
 const WRITE_OF_OTHERS: u32 = 0o022;
-/// Longest session folder, bytes: iceoryx2 aborts on paths of more than 255, and needs most of them for its own names.
+/// Longest session folder, bytes. iceoryx2 aborts on paths of more than 255 bytes, and needs most of them for its own
+/// names.
 pub(super) const LONGEST_SESSION_FOLDER: usize = 40;
-/// Folders of a user in `/dev/shm`, so that nobody stops another user by taking one name.
+/// Most folders of a user in `/dev/shm`, so that a taken name does not stop another user.
 const FOLDERS: usize = 8;
 
-/// Why a domain could not be claimed or removed.
+/// Why the claim or the removal of a domain fails.
 #[derive(Debug, thiserror::Error)]
 pub enum DomainError {
     /// Another run uses the name.
     #[error("a rig named '{0}' is running; wait for it, stop it, or give this one another --name")]
     InUse(String),
-    /// The id cannot be a file name.
+    /// The id is not valid as a file name.
     #[error("'{0}' cannot name a rig: use 1 to 32 letters, digits, '-' or '_'")]
     BadName(String),
-    /// Another process claims or sweeps domains for longer than that takes.
+    /// Another process claims or sweeps domains for too long.
     #[error("{holder} holds the lock {path} for more than 5 s; end it, or let it go on")]
     Busy {
         /// The lock.
@@ -41,20 +42,20 @@ pub enum DomainError {
         /// The process that holds it.
         holder: String,
     },
-    /// Other users could read or replace the files of a run.
+    /// Other users can read or replace the files of a run.
     #[error(
         "{path} is not a private folder of this user (mode 0700): remove it, or have root remove it, or set XDG_RUNTIME_DIR to a private folder{passed_over}"
     )]
     NotPrivate {
-        /// The folder, or what has its name.
+        /// The folder, or the file with its name.
         path: PathBuf,
-        /// Why the session's folder is of no use, if there is one.
+        /// The reason against the session's folder, if there is one.
         passed_over: String,
     },
-    /// This process uses a file that is not this user's.
+    /// This process uses a file of another user.
     #[error("another user has made {0}: start the rig again, whose files then have other names")]
     Foreign(PathBuf),
-    /// This process uses a file that has been removed: nobody knows any more whose it was.
+    /// This process uses a removed file with an unknown owner.
     #[error(
         "{0} was removed while the rig started, as when one of its processes is killed: start the rig again"
     )]
@@ -62,11 +63,11 @@ pub enum DomainError {
     /// The file system refused.
     #[error("cannot {action} {path}: {error}")]
     File {
-        /// What was tried.
+        /// The action.
         action: &'static str,
-        /// Where.
+        /// The path.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         error: io::Error,
     },
 }
@@ -75,15 +76,15 @@ pub(super) fn file_error(action: &'static str, path: &Path) -> impl FnOnce(io::E
     move |error| DomainError::File { action, path: path.to_owned(), error }
 }
 
-/// The folder, made if it does not exist, and verified.
+/// The verified folder, created if necessary.
 ///
 /// # Errors
-/// [`DomainError::NotPrivate`] if other users made or may use every folder that it could be.
+/// [`DomainError::NotPrivate`] if every possible folder belongs to other users or is open to them.
 pub(super) fn folder() -> Result<PathBuf, DomainError> {
     folders().map(|mut folders| folders.swap_remove(0))
 }
 
-/// The folder, and further ones that earlier runs may have used.
+/// The folder, and further folders of earlier runs.
 ///
 /// # Errors
 /// As [`folder`].
@@ -94,8 +95,8 @@ pub(super) fn folders() -> Result<Vec<PathBuf>, DomainError> {
     choose(env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from), &of_user)
 }
 
-/// A session folder of another user, as after `su`, is passed over. Of the user's folders, those that are there come first:
-/// the choice holds when another user gives a name back.
+/// Skips a session folder of another user, as after `su`. Existing folders of the user come first, so that the choice
+/// stays when another user gives a name back.
 fn choose(session: Option<PathBuf>, of_user: &[PathBuf]) -> Result<Vec<PathBuf>, DomainError> {
     let passed_over = session.as_deref().and_then(unusable);
     let of_session = session.filter(|_| passed_over.is_none()).map(|session| session.join("masseter"));
@@ -112,7 +113,7 @@ fn choose(session: Option<PathBuf>, of_user: &[PathBuf]) -> Result<Vec<PathBuf>,
     Ok(found)
 }
 
-/// The private ones of these folders, or else the first that can be made; none if all names are taken.
+/// The private folders among these, otherwise the first new folder; none if all names are taken.
 fn private_ones(folders: &[PathBuf]) -> Result<Vec<PathBuf>, DomainError> {
     let mut found = Vec::new();
     for path in folders {
@@ -127,7 +128,7 @@ fn private_ones(folders: &[PathBuf]) -> Result<Vec<PathBuf>, DomainError> {
     Ok(found)
 }
 
-/// Whether a folder is private, after the rights of others who could only look into it are taken.
+/// Whether a folder is private. Takes the rights of others first if these rights do not allow writing.
 fn make_folder_private(folder: &Path) -> Result<bool, DomainError> {
     if is_own_folder_without(WRITE_OF_OTHERS, folder) {
         fs::set_permissions(folder, PermissionsExt::from_mode(0o700))
@@ -136,7 +137,7 @@ fn make_folder_private(folder: &Path) -> Result<bool, DomainError> {
     Ok(is_private(folder))
 }
 
-/// Why a session's folder is passed over, if it is.
+/// The reason against a session's folder, if any.
 fn unusable(session: &Path) -> Option<String> {
     let length = session.as_os_str().len();
     let reason = if !session.is_absolute() {
@@ -163,18 +164,18 @@ fn is_private(path: &Path) -> bool {
     is_own_folder_without(OF_OTHERS, path)
 }
 
-/// Whether it is a folder, not a link, of this user, and nobody has these rights to it.
+/// Whether the path is a folder of this user, not a link, without these rights for others.
 fn is_own_folder_without(rights: u32, path: &Path) -> bool {
     fs::symlink_metadata(path)
         .is_ok_and(|found| found.is_dir() && found.uid() == geteuid().as_raw() && found.mode() & rights == 0)
 }
 
-/// What the system says of a file of this user; none for a link, another user's file, or one that is gone.
+/// The metadata of a file of this user; none for a link, another user's file, or a missing file.
 pub(super) fn own_file(path: &Path) -> Option<Metadata> {
     fs::symlink_metadata(path).ok().filter(is_own)
 }
 
-/// Whether it is a file of this user, and no link.
+/// Whether the path is a file of this user, and no link.
 pub(super) fn is_own(found: &Metadata) -> bool {
     found.is_file() && found.uid() == geteuid().as_raw()
 }
@@ -190,7 +191,7 @@ pub(super) fn make_private(path: &Path) -> Result<(), DomainError> {
     }
 }
 
-/// Makes a folder for its owner only, unless something has the name.
+/// Makes a folder for its owner only, unless the name is taken.
 pub(super) fn make(path: &Path) -> io::Result<()> {
     match DirBuilder::new().mode(ONLY_OWNER.bits()).create(path) {
         Err(error) if error.kind() != ErrorKind::AlreadyExists => Err(error),
@@ -198,7 +199,7 @@ pub(super) fn make(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Opens a file for its owner only, makes it if necessary, follows no link and truncates nothing.
+/// Opens a file for its owner only, or creates the file. Follows no link and truncates nothing.
 pub(super) fn open(path: &Path) -> Result<File, DomainError> {
     let mut options = OpenOptions::new();
     options.read(true).write(true).create(true).truncate(false);
@@ -221,7 +222,7 @@ mod tests {
 
     use super::*;
 
-    /// A folder with short path and this mode, removed with the test.
+    /// A folder with a short path and this mode, removed with the test.
     struct Session(PathBuf);
 
     impl Session {

@@ -1,5 +1,5 @@
-//! Signals from one process to another, which wake a process that sleeps: datagrams of one byte in the domain's root
-//! folder. iceoryx2's events would need longer paths than sockets may have.
+//! Signals that wake a sleeping process: datagrams of one byte in the domain's root folder. iceoryx2's events need
+//! longer paths than sockets allow.
 
 use std::io::ErrorKind;
 use std::os::unix::net::UnixDatagram;
@@ -15,15 +15,15 @@ use super::Node;
 use super::runtime::{DomainError, file_error};
 use crate::clock;
 
-/// Longest wait for room in the receiver's queue, which holds more signals than processes leave there.
+/// Longest wait for room in the receiver's queue. The queue has more room than the processes need.
 const SEND_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// Longest wait that yields the core instead of sleeping, ns. The other loop's turn is usually shorter, and to wake a
-/// process that sleeps on an idle core takes longer than a turn.
+/// Longest wait that yields the core instead of sleeping, ns. The other loop's turn is usually shorter. To wake a
+/// sleeping process on an idle core takes longer than a turn.
 const YIELD_NS: u64 = 50_000;
-/// A yield that takes longer has given the core to other work, ns.
+/// Longest yield without other work on the core, ns.
 const TAKEN_NS: u64 = 500_000;
-/// Waits that sleep at once after such a yield, since other work gives the core back late: the fewest, and the most.
+/// Waits that sleep at once after a longer yield, the fewest and the most. Other work gives the core back late.
 const SLEEPS: [u32; 2] = [64, 4096];
 
 /// Receives the signals to this process.
@@ -31,9 +31,10 @@ const SLEEPS: [u32; 2] = [64, 4096];
 pub struct SignalReceiver {
     socket: UnixDatagram,
     path: PathBuf,
-    /// Waits from now on that sleep at once.
+    /// Number of next waits that sleep at once.
     sleeps: u32,
-    /// Those after the next yield that takes long: twice as many each time, fewer with each signal that a yield brings.
+    /// That number after the next long yield. A long yield doubles the number; each signal during a yield reduces the
+    /// number.
     next_sleeps: u32,
 }
 
@@ -45,7 +46,7 @@ pub struct SignalSender {
 }
 
 impl SignalReceiver {
-    /// The receiver of this name. Each of its waits lasts at most `timeout`.
+    /// The receiver of this name. A wait lasts at most `timeout`.
     ///
     /// # Errors
     /// When the socket cannot be made.
@@ -60,7 +61,7 @@ impl SignalReceiver {
         Ok(Self { socket, path, sleeps: 0, next_sleeps: SLEEPS[0] })
     }
 
-    /// The next signal; none when it does not come within the timeout, or when the kernel interrupts the wait.
+    /// The next signal; none after the timeout, or when the kernel interrupts the wait.
     ///
     /// # Errors
     /// When the socket fails.
@@ -76,7 +77,7 @@ impl SignalReceiver {
         }
     }
 
-    /// The next signal, if it comes within this time; without any time, this only looks.
+    /// The next signal within this time, if any. A time of zero only looks.
     ///
     /// # Errors
     /// When the socket fails.
@@ -91,7 +92,7 @@ impl SignalReceiver {
         }
     }
 
-    /// The next signal, if it comes soon. Errors are left to the wait that follows.
+    /// The next signal, if it comes soon. The following wait reports errors.
     fn receive_by_yielding(&mut self) -> Option<u8> {
         if self.sleeps > 0 {
             self.sleeps -= 1;
@@ -118,7 +119,7 @@ impl SignalReceiver {
 }
 
 impl SignalSender {
-    /// A sender to the receiver of this name, which may be opened later.
+    /// A sender to the receiver of this name. The receiver may open later.
     ///
     /// # Errors
     /// When the socket cannot be made.
@@ -133,7 +134,8 @@ impl SignalSender {
         Ok(Self { socket, path })
     }
 
-    /// Sends a signal. Without a receiver the signal is lost: that process has ended, which its supervisor notices.
+    /// Sends a signal. Without a receiver the signal is lost: that process has ended, and its supervisor notices the
+    /// end.
     ///
     /// # Errors
     /// When the socket fails.

@@ -40,7 +40,7 @@ fn no_other_user_may_touch_a_file_of_a_domain_and_every_path_leaves_room_for_a_s
     files_below(domain.root(), &mut files);
     assert!(!files.is_empty());
     let room = 255 - runtime::LONGEST_SESSION_FOLDER - "/masseter/".len() - 32 - 1;
-    // The name may have 32 bytes, the user's id 10 digits, the node's number 39.
+    // Longest parts: the name has 32 bytes, the user's id 10 digits, the node's number 39.
     let longer = (32 - domain.id().len()) + 9 + 15;
     for file in files {
         let beside_the_id = file.strip_prefix(domain.root()).unwrap().as_os_str().len();
@@ -96,7 +96,7 @@ fn messages_after_the_awaited_one_are_kept_for_the_next_wait() {
     assert_eq!([3, 4, 2].map(&mut wait), [Some(3), Some(4), Some(5)]);
 }
 
-/// Each look of a wait may find messages while the newest of the last look is still held.
+/// Each look of a wait may find messages while the subscriber still holds the newest of the last look.
 #[test]
 fn a_wait_that_keeps_finding_messages_never_holds_too_many() {
     let domain = ScratchDomain::claim("test-wait").unwrap();
@@ -133,7 +133,7 @@ fn a_message_of_another_version_is_refused() {
     assert!(error.contains(&other) && error.contains("another version"), "{error}");
 }
 
-/// Reads like an event, but for the name of its layout.
+/// An event, except for the name of its layout.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, ZeroCopySend)]
 #[type_name("masseter/Event/0000000000000000")]

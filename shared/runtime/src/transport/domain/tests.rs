@@ -10,7 +10,7 @@ fn segment(domain: &Domain) -> PathBuf {
     Path::new(SHARED_MEMORY).join(domain.prefix().unwrap() + "segment")
 }
 
-/// Removed files of a dead domain, all of which can be removed.
+/// Sweeps a dead domain and returns the number of removed files; no file may remain.
 fn swept(domain: &Domain) -> usize {
     let swept = domain.sweep().unwrap().unwrap();
     assert!(swept.remaining.is_empty(), "{swept:?}");
@@ -24,7 +24,7 @@ fn what_cannot_be_removed_is_reported_and_the_rest_removed() {
     let file = segment(&domain);
     let foreign = PathBuf::from(format!("{}-folder", file.display()));
     fs::write(&file, "").unwrap();
-    // No user can remove a folder as a file.
+    // The removal of a folder as a file fails for every user.
     fs::create_dir(&foreign).unwrap();
     drop(claim);
     let swept = domain.sweep().unwrap().unwrap();
@@ -64,7 +64,7 @@ fn a_file_of_others_is_found_and_does_no_harm() {
     assert_eq!(fs::metadata(&own).unwrap().mode() & 0o777, 0o600);
 }
 
-/// iceoryx2 removes its own files while others are listed.
+/// iceoryx2 removes its own files during a listing.
 #[test]
 fn a_file_that_vanishes_is_nobody_elses() {
     let domain = ScratchDomain::claim("test-vanish").unwrap();
