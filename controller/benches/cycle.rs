@@ -1,6 +1,6 @@
-//! A cycle of the controller, alone and with what forces add: `cargo bench -p masseter-controller --bench cycle`.
+//! A cycle of the controller, alone and with the forces: `cargo bench -p masseter-controller --bench cycle`.
 //!
-//! The drives are where they were told to be, in the middle of a chewing cycle.
+//! The drives are at their targets, in the middle of a chewing cycle.
 
 use divan::Bencher;
 use masseter_controller::motion_controller::MotionController;

@@ -1,5 +1,5 @@
-//! The forward solvers side by side, in one run: `cargo bench -p masseter-controller --bench
-//! forward_kinematics`. For figures that no other load on the machine can change see `instructions`.
+//! The forward solvers side by side, in one run: `cargo bench -p masseter-controller --bench forward_kinematics`. The
+//! bench `instructions` gives figures that do not depend on the load of the machine.
 
 mod workloads;
 

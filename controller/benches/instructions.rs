@@ -1,7 +1,7 @@
-//! Instructions a solve takes, counted by Valgrind: `cargo bench -p masseter-controller --bench instructions`.
+//! Instructions of a solve, counted by Valgrind: `cargo bench -p masseter-controller --bench instructions`.
 //!
-//! Runs itself under Valgrind twice per work, with different numbers of calls; the difference is free of
-//! start and preparation. Unlike times, the counts do not depend on what else the machine does.
+//! Runs itself under Valgrind twice per work, with different numbers of calls; the difference is free of start and
+//! preparation. Unlike times, the counts do not depend on the load of the machine.
 
 mod workloads;
 
@@ -42,7 +42,7 @@ fn tell_all() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Instructions of a process that makes so many calls.
+/// Instructions of a process that makes this many calls.
 fn counted(name: &str, calls: u32) -> Result<u64, Box<dyn Error>> {
     let output = Command::new("valgrind")
         .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])

@@ -1,4 +1,4 @@
-//! Random poses to actuators and back: without a guess, from a random one, and from one nearby; a million:
+//! A million random poses to actuators and back, without a guess, from a random guess, and from a near guess:
 //! `cargo run --release -p masseter-controller --example round_trip -- 1000000`.
 
 use std::error::Error;
@@ -34,7 +34,7 @@ fn errors(found: &Pose, pose: &Pose) -> (f64, f64) {
     ((found.translation.vector - pose.translation.vector).norm(), turn.norm())
 }
 
-/// What a way of solving came to over all poses.
+/// The results of a method over all poses.
 #[derive(Default)]
 struct Score {
     reached: u32,
@@ -43,7 +43,7 @@ struct Score {
 }
 
 impl Score {
-    /// Counts as reached what is the true pose within 10⁻⁹ m and rad.
+    /// Counts a pose as reached within 10⁻⁹ m and rad of the true pose.
     fn add(&mut self, solved: Result<Solution, ForwardError>, pose: &Pose) {
         let Ok(solution) = solved else { return };
         let (error_m, error_rad) = errors(&solution.pose, pose);

@@ -4,11 +4,11 @@
 //!
 //! M v̇ + D v = f_desired − f, with M = D times 3 ms.
 //!
-//! The speed begins with that of the motion, so that nothing jumps. The damping D grows where the teeth meet. A bite
-//! ends after its time, where the food breaks, or where the opening motion has come to the jaw. From then on the jaw
-//! does not close: the jaw waits, or gives way to more than the force of contact, and goes with the motion again when
-//! the motion opens. Only the height is controlled; the other five freedoms keep to the motion. Limit of stability:
-//! `docs/dynamics-control.md`.
+//! The speed begins with that of the motion, so that nothing jumps. The damping D grows towards the contact of the
+//! teeth. A bite ends after its time, at a break of the food, or when the opening motion reaches the jaw. After that
+//! the jaw does not close. The jaw waits, gives way to more than the force of contact, and follows the motion again
+//! when the motion opens. The law controls the height only; the other five freedoms keep to the motion. Limit of
+//! stability: `docs/dynamics-control.md`.
 
 use std::f64::consts::PI;
 
@@ -23,30 +23,30 @@ use crate::forces::signal;
 use crate::pose_control::PoseControl;
 use crate::pose_law::{Demand, Detour, LawFailed, PoseLaw};
 
-/// Cycles within which a bite force falls to half where food breaks.
+/// Cycles of a fall of the bite force to half when food breaks.
 const BREAK_CYCLES: usize = 10;
-/// Share of the force that is left then.
+/// Share of the force left after the break.
 const BREAK_SHARE: f64 = 0.5;
-/// Cycles at the end of its range after which a load cell counts as useless.
+/// Cycles at the end of its range after which a load cell counts as full.
 const FULL_CYCLES: usize = 3;
-/// Time constant with which the jaw catches up with the opening motion, s.
+/// Time constant of the jaw's approach to the opening motion, s.
 const CATCH_UP_S: f64 = 0.02;
-/// The jaw is back on the motion when nearer and not faster than this beside it, m and m/s.
+/// Largest distance and relative speed at which the jaw is back on the motion, m and m/s.
 const NEAR_M: f64 = 2e-6;
 const SLOW_M_S: f64 = 2e-3;
-/// Share of a bite in which the force of a hold is reached.
+/// Share of a bite for the ramp of a hold.
 const RAMP_SHARE: f64 = 0.1;
 
-/// Who moves the jaw up and down.
+/// The source of the jaw's height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Phase {
     /// The motion.
     Free,
-    /// The force, for that long, s.
+    /// The force, for this long, s.
     Biting { time_s: f64 },
-    /// The motion again, as soon as the motion is further open than the mouth.
+    /// The motion again, once the motion is further open than the mouth.
     Opening,
-    /// The same after food broke.
+    /// The same, after a break of the food.
     Broken,
 }
 
@@ -56,28 +56,28 @@ pub(crate) struct ForceControl {
     config: ForceControlConfig,
     period_s: f64,
     lead_cycles: f64,
-    /// End of the range of the force that is controlled, N.
+    /// End of the range of the controlled force, N.
     range_n: f64,
-    /// Corrects what the drives leave of the pose that is asked for.
+    /// Corrects the drives' error of the requested pose.
     position: PoseControl,
     /// Height of the platform in the closed mouth, m.
     closed_m: f64,
     phase: Phase,
     /// The last height of the motion, m.
     motion_m: Option<f64>,
-    /// Speed of the height that is asked for, and of the motion's, m/s.
+    /// Speed of the requested height, and of the motion's height, m/s.
     speed_m_s: f64,
     motion_m_s: f64,
-    /// Heights asked for above those of the motion, the newest first, m.
+    /// Requested heights above those of the motion, the newest first, m.
     offsets_m: [f64; MOST_LEAD_CYCLES + 1],
     /// Bite forces of the last cycles, the newest first, N.
     bites_n: [f64; BREAK_CYCLES],
-    /// What the bite is to be, N; 0 between bites.
+    /// Desired bite force, N; 0 between bites.
     desired_n: f64,
 }
 
 impl ForceControl {
-    /// The law of a scenario with these values; the platform of the closed mouth has that height, m.
+    /// The law of a scenario with these values. `closed_m` is the height of the platform in the closed mouth, m.
     pub(crate) fn new(scenario: &Scenario, config: ForceControlConfig, closed_m: f64) -> Self {
         Self {
             config,
@@ -103,8 +103,8 @@ impl ForceControl {
         self.bites_n[0]
     }
 
-    /// Takes the newest force and the newest height of the motion. A cycle without a force keeps the last one. A load
-    /// cell that stays at the end of its range hides how hard the jaw bites.
+    /// Takes the newest force and the newest height of the motion. A cycle without a force keeps the last force. A load
+    /// cell that stays at the end of its range hides the bite force, so the law fails.
     fn observe(&mut self, demand: &Demand) -> Result<(), LawFailed> {
         let known_n = match self.config.source {
             ForceSource::Estimate => demand.external.map(|external| external.bite_n()),
@@ -120,7 +120,7 @@ impl ForceControl {
         if is_full { Err(LawFailed) } else { Ok(()) }
     }
 
-    /// Whether the force has fallen while it should not have.
+    /// Whether the force has fallen by a break of the food.
     fn has_broken(&self) -> bool {
         let before_n = self.bites_n[BREAK_CYCLES - 1].min(self.desired_n);
         before_n >= self.config.contact_n && self.bite_n() < BREAK_SHARE * before_n
@@ -149,7 +149,7 @@ impl ForceControl {
         }
     }
 
-    /// Damping at the height that was asked for last, N per m/s: between food and teeth by the opening of the mouth.
+    /// Damping at the last requested height, N per m/s: between food and teeth by the opening of the mouth.
     fn damping_n_s_per_m(&self) -> f64 {
         let Self { config, closed_m, offsets_m, motion_m, .. } = self;
         let opening_m = closed_m - motion_m.unwrap_or(*closed_m) - offsets_m[0];
@@ -158,7 +158,7 @@ impl ForceControl {
         config.tooth_damping_n_s_per_m * ratio.powf(share)
     }
 
-    /// The speed that the height is to have in this phase, m/s.
+    /// The desired speed of the height in this phase, m/s.
     fn wanted_m_s(&self) -> f64 {
         let (offset_m, damping) = (self.offsets_m[0], self.damping_n_s_per_m());
         match self.phase {
@@ -185,11 +185,11 @@ impl ForceControl {
         if offset_m > reach_m {
             self.speed_m_s = self.speed_m_s.min(self.motion_m_s);
         }
-        // Pressed further, food would push back with any force.
+        // Under a further press, food can push back with any force.
         if offset_m < -reach_m { Err(LawFailed) } else { Ok(offset_m.min(reach_m)) }
     }
 
-    /// The height above that of the motion some cycles before the coming one, m.
+    /// The height above that of the motion, this many cycles before the coming one, m.
     fn offset_before_m(&self, cycles: f64) -> f64 {
         let at = (cycles - 1.0).clamp(0.0, (MOST_LEAD_CYCLES - 1) as f64);
         let (place, share) = (at.floor() as usize, at.fract());

@@ -11,27 +11,27 @@ use nalgebra::Vector6;
 use crate::pose_law::{Detour, ExternalForce, PoseLaw};
 use crate::sequencer::Sequencer;
 
-/// Friction depends on loads, and loads on what friction leaves of the drives' forces: passes until both agree. The
-/// first one is exact for the screws of sliding axes; the others are for guides, and for axes near rest.
+/// Passes until friction and loads agree: friction depends on loads, and loads on the drives' forces less friction. The
+/// first pass is exact for the screws of sliding axes; the others are for guides, and for axes near rest.
 const LOAD_PASSES: usize = 5;
 /// Drives report forces in thousandths of the rated force.
 const STEPS: f64 = 1000.0;
 /// Variance of a value within a step of 1: 1/12.
 const ROUNDING_VARIANCE: f64 = 1.0 / 12.0;
-/// Time from no offset to the whole one, s: the loops of a drive take a tenth of it.
+/// Time from no offset to the whole offset, s: ten times that of a drive's loops.
 const FADE_IN_S: f64 = 0.3;
 
 /// The forces of the rig: estimated, measured, and fed forward.
 #[derive(Debug, Clone)]
 pub(crate) struct Forces {
-    /// None unless the scenario has the bite force estimated.
+    /// None without an estimate of the bite force in the scenario.
     observer: Option<ForceObserver>,
     has_load_cell: bool,
-    /// What the load cell showed last, N.
+    /// Last value of the load cell, N.
     pub(crate) load_cell_n: Option<f64>,
-    /// None unless the scenario has forces fed forward.
+    /// None without feed-forward in the scenario.
     feed_forward: Option<FeedForward>,
-    /// What is fed forward in this cycle, N.
+    /// Offsets of this cycle, N.
     pub(crate) offset_n: [f64; AXES],
 }
 
@@ -48,7 +48,7 @@ impl Forces {
         }
     }
 
-    /// Takes what a reading shows. The observer takes each fresh sample while the drives carry the jaw.
+    /// Takes the values of a reading. The observer takes each fresh sample while the drives carry the jaw.
     pub(crate) fn observe(&mut self, reading: Option<&Reading>, sequencer: &Sequencer) {
         if let Some(observer) = &mut self.observer {
             match (reading, sequencer.fresh_estimate()) {
@@ -74,8 +74,9 @@ impl Forces {
         self.feed_forward.iter_mut().for_each(FeedForward::begin);
     }
 
-    /// The forces that the motion needs while the drives move to the targets of this cycle: they approach a target
-    /// during the last period before it is reached. `before` is the desired pose so many periods before that.
+    /// The forces that the motion needs while the drives move to the targets of this cycle. The drives approach a
+    /// target during the last period before its time. `before` gives the desired pose this many periods before that
+    /// time.
     pub(crate) fn feed_forward(&mut self, law: &dyn PoseLaw, before: impl Fn(f64) -> Pose) {
         if let Some(feed_forward) = &mut self.feed_forward {
             self.offset_n = feed_forward.offset_n([1.5, 0.5, -0.5].map(before), &law.detour());
@@ -95,12 +96,12 @@ impl Forces {
     }
 }
 
-/// A signal with its unit and what it is.
+/// A signal with its unit and meaning.
 pub(crate) fn signal(name: &str, unit: &str, about: &str) -> Signal {
     Signal { name: name.to_owned(), unit: unit.to_owned(), about: about.to_owned() }
 }
 
-/// Inverse dynamics with friction, by the masses and the friction that the controller assumes.
+/// Inverse dynamics with friction, by the controller's assumed masses and friction.
 ///
 /// τ = J⁻ᵀ (M V̇ + h − w) + friction, with the [equations](masseter_model::dynamics) of the rigid bodies.
 #[derive(Debug, Clone)]
@@ -113,9 +114,9 @@ struct Model {
 /// Friction in a motion.
 #[derive(Debug, Clone, Copy)]
 struct Braking {
-    /// What the drives overcome on the axes, N.
+    /// Friction of the axes that the drives overcome, N.
     axes_n: Vector6<f64>,
-    /// The largest friction of an axis at rest but for its breakaway, N.
+    /// The largest friction of an axis at rest, without its breakaway, N.
     coulomb_n: Vector6<f64>,
     /// Wrench of hinges and ball joints on the platform, N and N m.
     joints: Vector6<f64>,
@@ -144,13 +145,13 @@ impl Model {
         Some(moved_n + self.drag_n(&loads, motion))
     }
 
-    /// Friction in a motion in which the drives have these forces, N. The loads leave out that the motion accelerates.
+    /// Friction in a motion with these forces of the drives, N. The loads ignore the acceleration of the motion.
     fn braking(&self, motion: &Motion, driven_n: &Vector6<f64>) -> Braking {
         let (mut axes_n, mut loads) = (Vector6::zeros(), Loads::default());
         for _ in 0..LOAD_PASSES {
             let moved_n = driven_n - axes_n;
             loads = Reactions::new(&self.bodies, motion, &Twist::zeros(), &moved_n).loads(&moved_n);
-            // A screw takes a share of what is left: the whole step would overshoot by it.
+            // A screw takes a share of the rest, so the whole step overshoots by this share.
             let missing_n = self.drag_n(&loads, motion) - axes_n;
             axes_n += Vector6::from_fn(|axis, _| missing_n[axis] / (1.0 + self.friction.screw_loss(axis)));
         }
@@ -176,7 +177,7 @@ fn twist_between(from: &Pose, to: &Pose, time_s: f64) -> Twist {
     Twist::new(way.x, way.y, way.z, turn.x, turn.y, turn.z) / time_s
 }
 
-/// What was measured between the last two samples.
+/// The measurement between the last two samples.
 #[derive(Debug, Clone, Copy)]
 struct Interval {
     cycle: u64,
@@ -219,7 +220,7 @@ struct ForceObserver {
 }
 
 impl ForceObserver {
-    /// How many signals the observer has.
+    /// Number of the observer's signals.
     const SIGNALS: usize = 5;
 
     /// The signals that the controller publishes of the observer.
@@ -234,7 +235,7 @@ impl ForceObserver {
         .map(|(name, about)| signal(name, "N", about))
     }
 
-    /// Writes these signals; no numbers before there is an estimate.
+    /// Writes these signals; NaN before the first estimate.
     fn fill_signals(&self, signals: &mut [f64]) {
         let values = self.external().map(|external| {
             let [x, y, z] = external.force_n;
@@ -255,12 +256,12 @@ impl ForceObserver {
         }
     }
 
-    /// Forgets everything: the drives' forces say nothing while brakes hold the axes.
+    /// Clears the observer: the drives' forces have no meaning while brakes hold the axes.
     fn reset(&mut self) {
         (self.last, self.residual, self.uncertainty_n) = (None, Vector6::zeros(), f64::INFINITY);
     }
 
-    /// The estimate; none before two intervals have been seen.
+    /// The estimate; none before two intervals.
     fn external(&self) -> Option<ExternalForce> {
         let [x, y, z, moment_x, moment_y, moment_z] = self.residual.into();
         let is_known = self.uncertainty_n.is_finite();
@@ -313,16 +314,17 @@ impl ForceObserver {
     }
 }
 
-/// Feed-forward of forces: what the desired motion needs of each axis while the drives move to the targets of a cycle.
+/// Feed-forward of forces: the forces of the axes for the desired motion while the drives move to the targets of a
+/// cycle.
 ///
-/// A target acts from the next SYNC on and is reached one period later: the offset of this cycle is that of the middle
+/// A target acts from the next SYNC on and is reached one period later. The offset of this cycle is that of the middle
 /// of this period. Velocity and acceleration are differences of three desired poses, one period apart. The offsets fade
-/// in, since the drives' own loops carry the weight when the motion begins.
+/// in, because the drives' own loops carry the weight at the beginning of the motion.
 #[derive(Debug, Clone)]
 struct FeedForward {
     model: Model,
     period_s: f64,
-    /// Share of the forces that is fed forward.
+    /// Share of the forces in the offsets.
     share: f64,
 }
 
@@ -336,8 +338,8 @@ impl FeedForward {
         self.share = 0.0;
     }
 
-    /// The forces for the middle one of three desired poses, one period apart, N. A law's detour changes the velocity;
-    /// its acceleration, and its way from the pose, are left out. Zeros in a singular pose.
+    /// The forces for the middle of three desired poses, one period apart, N. A law's detour changes the velocity; its
+    /// acceleration and its distance from the pose are ignored. Zeros in a singular pose.
     fn offset_n(&mut self, poses: [Pose; 3], detour: &Detour) -> [f64; AXES] {
         let [before, here, after] = poses;
         let to = twist_between(&before, &here, self.period_s);

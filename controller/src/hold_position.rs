@@ -35,7 +35,7 @@ use crate::sequencer::{Estimate, Sequencer};
 pub struct HoldPosition {
     sequencer: Sequencer,
     hold_cycles: u64,
-    /// The estimate when the drives are switched on.
+    /// The estimate at the switch-on of the drives.
     held: Option<Estimate>,
 }
 
@@ -54,7 +54,7 @@ impl Controller for HoldPosition {
 
     fn decide(&mut self, tick: Tick) -> Option<Event> {
         let fault = self.sequencer.begin_cycle(tick);
-        // Nothing has to be eased to, and a motion at rest need not be held any longer.
+        // The start needs no easing, and a motion at rest needs no further hold.
         let is_running = self.sequencer.state == ControllerState::Running;
         let is_over = !is_running || self.sequencer.cycles_in_state >= self.hold_cycles;
         let event = self.sequencer.follow(fault, is_over, tick)?;
@@ -98,7 +98,7 @@ mod tests {
     use super::*;
     use crate::sequencer::ALL_AXES;
 
-    /// Drives that do at once what they are asked to, at a fixed position.
+    /// Drives at a fixed position that obey a request at once.
     struct Bench {
         controller: HoldPosition,
         reading: Reading,

@@ -1,7 +1,7 @@
 //! The rig's controller: forward kinematics, jaw trajectories, pose control and safety.
 //!
-//! [`motion_controller`] and [`hold_position`] are pure step functions; [`process`] runs one of them. The crate
-//! does not depend on the plant; it uses the plant's messages only.
+//! [`motion_controller`] and [`hold_position`] are pure step functions; [`process`] runs one of them. The crate does
+//! not depend on the plant, and uses only the messages that both share.
 
 mod force_control;
 mod forces;

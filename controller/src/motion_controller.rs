@@ -47,7 +47,7 @@ pub struct MotionController {
     start: StartTolerance,
     progress: Progress,
     law: Box<dyn PoseLaw>,
-    /// What the law declares; the controller's own parameters and signals come after it.
+    /// The declaration of the law. The controller's own parameters and signals follow.
     of_law: Declared,
     forces: Forces,
     supervision: PathSupervision,
@@ -58,7 +58,7 @@ pub struct MotionController {
 /// Takes the value of a parameter, 0 to 1.
 type SetShare = fn(&mut Playback, f64);
 
-/// What the controller adds to the parameters of the law: name, meaning, and what takes the value.
+/// The controller's own parameters: name, meaning, and the function that takes the value.
 const OWN_PARAMETERS: [(&str, &str, SetShare); 2] = [
     ("motion_rate", "Speed of the motion; 1 as written.", Playback::set_motion_rate),
     (
@@ -79,7 +79,7 @@ impl MotionController {
         Self::with_law(scenario, mechanism, trajectory, law)
     }
 
-    /// The same with another pose law, which takes the place of the scenario's force control too.
+    /// A controller with another pose law, which also replaces the scenario's force control.
     pub fn with_law(
         scenario: &Scenario,
         mechanism: Mechanism,
@@ -104,7 +104,7 @@ impl MotionController {
         self.sequencer.state
     }
 
-    /// Pose law, inverse kinematics and limits: the targets of this cycle.
+    /// Computes the targets of this cycle: pose law, inverse kinematics and limits.
     fn control(&mut self, desired: Pose) -> Result<(), Fault> {
         if !self.sequencer.is_moving() {
             return Ok(());
@@ -122,7 +122,7 @@ impl MotionController {
         Ok(())
     }
 
-    /// Compares desired and estimated pose; what the law means and what the slack explains is no deviation.
+    /// Compares desired and estimated pose. The law's detour and the slack are no deviation.
     fn supervise(&mut self, desired: &Pose, estimated: &Pose) -> Result<(), Fault> {
         let detour = Translation3::from(self.law.detour().at_sample_m);
         let slack_s = self.supervision.slack_cycles * self.sequencer.period_s;
@@ -204,7 +204,7 @@ impl Controller for MotionController {
         }
     }
 
-    /// Also the conditioning, which is only reported, and so computed after the command has gone out.
+    /// Also computes the conditioning: a figure for reports, so its place is after the command.
     fn fill_state(&mut self, state: &mut State) {
         *state = self.sequencer.state_message(self.desired.as_ref());
         state.motion_time_s = self.progress.playback.motion_time_ahead_s(-self.sequencer.sample_age_s());

@@ -1,9 +1,9 @@
-//! Whether the platform is on its path: distance of the incisal point and angle of the platform, for a moment and on
+//! Supervision of the platform's path: distance of the incisal point and angle of the platform, for a moment and on
 //! average.
 //!
 //! The drives interpolate between SYNCs, and hold their targets while a command is missing. So after a SYNC or a
-//! command that came at another time than planned, the platform is elsewhere on its path. What the motion makes in that
-//! time is no deviation: that is the slack.
+//! command at an unplanned time, the platform is elsewhere on its path. The motion's way in that time is no deviation,
+//! but the slack.
 
 use masseter_model::geometry::{Deviation, Mechanism, Pose, Vec3};
 use masseter_runtime::messages::codes::Cause;
@@ -12,12 +12,12 @@ use masseter_scenario::Scenario;
 use crate::safety::Fault;
 use crate::sequencer::Estimate;
 
-/// Least readings, and least time, in which a disturbed one still shows: the drives take a target at the next SYNC and
-/// reach it at the second, and the motion makes up for it in the third. The drives' loops need milliseconds, whatever
-/// the rate.
+/// Least number of readings, and least time, with an effect of a disturbed one. The drives take a target at the next
+/// SYNC and reach the target at the second; the motion catches up in the third. The drives' loops need milliseconds at
+/// every rate.
 const SHOWS_FOR: usize = 4;
 const SHOWS_FOR_S: f64 = 0.004;
-/// The motion goes on for as long without an answer, or the drives stop as late.
+/// Longest time of a motion without an answer, or of drives that stop late.
 const MOST_SLACK_CYCLES: f64 = 2.0;
 const MOST_SLACK_S: f64 = 0.002;
 
@@ -31,7 +31,7 @@ struct Supervised {
 }
 
 impl Supervised {
-    /// Takes a value, of which `slack` is no deviation. What is no number is infinitely far.
+    /// Checks a value, of which `slack` is no deviation. A value that is no number is infinitely far.
     fn check_value(&mut self, value: f64, slack: f64, share: f64) -> Result<(), Fault> {
         let beyond_slack = value - slack;
         let deviation = if beyond_slack.is_finite() { beyond_slack.max(0.0) } else { f64::INFINITY };
@@ -58,9 +58,9 @@ pub(crate) struct PathSupervision {
     orientation: Supervised,
     last_sampled_ns: u64,
     most_slack_cycles: f64,
-    /// By how much the last readings differ from planned ones, in cycles.
+    /// Difference of the last readings from their plan, in cycles.
     recent_slack: Vec<f64>,
-    /// By how many cycles the platform may be earlier or later on its path: the largest of these.
+    /// The largest of these: the platform may be so many cycles earlier or later on its path.
     pub(crate) slack_cycles: f64,
 }
 
@@ -109,10 +109,10 @@ impl PathSupervision {
     }
 }
 
-/// Whether the jaw stands near enough to the first pose of the motion to be eased there.
+/// The check that the jaw is near enough to the first pose of the motion for easing.
 #[derive(Debug, Clone)]
 pub(crate) struct StartTolerance {
-    /// None where the way may have any length.
+    /// None for a way of any length.
     limit_m: Option<f64>,
     /// The incisal point and the corners of the platform, platform frame: no turn leaves all of them in place.
     points: [Vec3; 4],
@@ -125,7 +125,7 @@ impl StartTolerance {
         Self { limit_m: scenario.start_tolerance_m(), points }
     }
 
-    /// Refuses a start from a pose of which a point is farther from the first pose than allowed.
+    /// Refuses a start with a point farther from its place in the first pose than allowed.
     pub(crate) fn check_way(&self, found: &Pose, first: &Pose) -> Result<(), Fault> {
         let Some(limit_m) = self.limit_m else { return Ok(()) };
         let place = |pose: &Pose, point: &Vec3| pose.rotation * point + pose.translation.vector;
@@ -189,7 +189,7 @@ mod tests {
         }
     }
 
-    /// Positions without a number stop by the position; of a turn without one, the incisal point is nowhere either.
+    /// A position that is no number stops by the position. A turn that is no number gives no incisal point either.
     #[test]
     fn a_pose_that_is_no_number_is_a_fault_wherever_it_stands() {
         let here = Pose::identity();

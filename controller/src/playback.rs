@@ -1,6 +1,6 @@
-//! Progress of the motion: the move to its first pose, the motion itself, and the ramp to rest when it is stopped
-//! halfway. Time comes in as the steps of the motion, so that the motion waits while the drives cannot follow. Rate and
-//! amplitude of the motion may change while it plays. The controller plays one [`Playback`], the judge of a run another.
+//! Progress of the motion: the move to its first pose, the motion itself, and the ramp to rest at a stop halfway. Time
+//! comes in as the steps of the motion, so that the motion waits while the drives cannot follow. Rate and amplitude may
+//! change during the motion. The controller plays one [`Playback`], the judge of a run another.
 
 use std::sync::Arc;
 
@@ -13,20 +13,21 @@ use crate::trajectory::{self, Trajectory, TrajectoryReport, interpolate, minimum
 
 /// Time between two looks at the motion for its margins, s.
 const MARGINS_EVERY_S: f64 = 0.005;
-/// Cycles until the reading that answers a command: the next one's, and either may be a cycle late.
+/// Most cycles until the reading that answers a command: the next cycle, and one late cycle each for command and
+/// reading.
 const LATEST_ANSWER_CYCLES: u64 = 2;
 /// Shortest and longest time of a change from 0 to 1, s.
 const SHORTEST_S: f64 = 1.0;
 const LONGEST_S: f64 = 60.0;
-/// A change gathers speed and loses it in a third of its time each.
+/// A change accelerates and brakes for a third of its time each.
 const SPEED: f64 = 1.5;
 const ACCELERATION: f64 = 4.5;
-/// Nearer times of a motion are the same, s.
+/// Largest difference of equal times of a motion, s.
 const SAME_TIME_S: f64 = 1e-9;
-/// By how much more than in proportion the axes may move with the share.
+/// Largest way of the axes by the share, relative to a proportional way.
 const BEND: f64 = 1.25;
 
-/// The motion under way: its playback, which waits for the drives, and for how long the jaw has been at rest.
+/// The motion under way: its playback, which waits for the drives, and the time of the jaw at rest.
 #[derive(Debug, Clone)]
 pub(crate) struct Progress {
     pub(crate) playback: Playback,
@@ -44,8 +45,8 @@ impl Progress {
         }
     }
 
-    /// Begins a cycle. A motion that waited goes on at full speed from the target that the drives held: a period's
-    /// worth, as ever.
+    /// Begins a cycle. After a wait the motion goes on at full speed from the drives' held target, by one period as
+    /// always.
     pub(crate) fn advance(&mut self, sequencer: &Sequencer, cycle: u64) {
         let answered_cycle = sequencer.estimate.map_or(0, |estimate| estimate.answers_cycle);
         if self.acknowledgement.takes_step(cycle, answered_cycle) {
@@ -80,12 +81,12 @@ impl Progress {
     }
 }
 
-/// The part that is playing.
+/// The present part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Part {
     /// Holds a pose.
     Hold(Pose),
-    /// From a pose to the first one of the motion.
+    /// From a pose to the first pose of the motion.
     Ease(Pose),
     /// The motion.
     Motion,
@@ -99,7 +100,7 @@ pub struct Playback {
     stop_ramp_s: f64,
     part: Part,
     elapsed_s: f64,
-    /// Speed of everything: 1, or less while the part comes to rest.
+    /// Speed of all clocks: 1, or less while the part comes to rest.
     rate: f64,
     /// Speed of the motion's own clock beside that.
     tempo: Slew,
@@ -111,10 +112,10 @@ pub struct Playback {
 }
 
 impl Playback {
-    /// Of a scenario's motion on its mechanism, as its limits let rate and amplitude change.
+    /// The playback of a scenario's motion on its mechanism. Its limits bound the changes of rate and amplitude.
     pub fn of_scenario(scenario: &Scenario, mechanism: &Mechanism, trajectory: Trajectory) -> Self {
         let limits = scenario.limits.within(&scenario.drives);
-        // The plan has checked every cycle; the margins that a change of rate needs show in a coarser look.
+        // The plan has checked every cycle, so a coarser look is enough for the margins of a change.
         let period_s = scenario.period_s().max(MARGINS_EVERY_S);
         let demands = trajectory::check(&trajectory, mechanism, &limits, period_s).ok();
         let ControllerConfig { ease_s, stop_ramp_s, .. } = scenario.controller;
@@ -174,7 +175,7 @@ impl Playback {
 
     fn begin(&mut self, part: Part) {
         (self.part, self.elapsed_s, self.rate, self.stopping) = (part, 0.0, 1.0, false);
-        // No part begins on the motion's way, so neither moves anything.
+        // No part begins on the motion's way, so neither jump moves the pose.
         self.tempo.jump();
         self.amplitude.jump();
         self.played_s = 0.0;
@@ -216,7 +217,7 @@ impl Playback {
         }
     }
 
-    /// What is left of the motion, s of the trajectory's time.
+    /// The rest of the motion, s of the trajectory's time.
     pub fn rest_s(&self) -> f64 {
         (self.trajectory.duration_s() - self.elapsed_s).max(0.0)
     }
@@ -241,8 +242,8 @@ impl Playback {
         self.rate == 0.0 || (self.is_at_end() && !is_changing)
     }
 
-    /// By how much a motion that has come to `motion_s` is behind this one, s of the trajectory's time; negative where it is
-    /// ahead, by at most `most_ahead_s`.
+    /// Lag of a motion at `motion_s` behind this one, s of the trajectory's time. Negative for a motion ahead, by at
+    /// most `most_ahead_s`.
     pub fn lag_s(&self, motion_s: f64, most_ahead_s: f64) -> f64 {
         let is_beyond = |at_s: f64| self.trajectory.motion_time_s(at_s) > motion_s + SAME_TIME_S;
         let latest_s = self.elapsed_s + most_ahead_s;
@@ -257,13 +258,12 @@ impl Playback {
         self.elapsed_s - after_s
     }
 
-    /// The pose of the motion so long before, or later if negative, s of the trajectory's time.
+    /// The pose of the motion by this lag before, or later if negative, s of the trajectory's time.
     pub fn earlier_pose(&self, lag_s: f64) -> Pose {
         self.trajectory.scaled_pose(self.elapsed_s - lag_s, self.amplitude.value)
     }
 
-    /// How far the motion has come `ahead_s` from now, in the sense of [`Trajectory::motion_time_s`]; negative before
-    /// it begins.
+    /// Progress of the motion `ahead_s` from now, as [`Trajectory::motion_time_s`]; negative before its beginning.
     pub(crate) fn motion_time_ahead_s(&self, ahead_s: f64) -> f64 {
         let is_motion = self.part == Part::Motion;
         if is_motion { self.trajectory.motion_time_s(self.time_ahead_s(ahead_s)) } else { -1.0 }
@@ -272,8 +272,8 @@ impl Playback {
 
 /// Acknowledgement of commands: the motion makes its next step after the drives have received the last one.
 ///
-/// While either process stalls, the drives hold their last target. If the motion continued meanwhile, it would have to
-/// catch up in one cycle.
+/// While either process stalls, the drives hold their last target. A motion that continues meanwhile has to catch up in
+/// one cycle.
 #[derive(Debug, Clone, Default)]
 #[doc(alias("flow control", "stop-and-wait"))]
 struct CommandAcknowledgement {
@@ -308,14 +308,14 @@ struct Slew {
 }
 
 impl Slew {
-    /// The whole, whose change to nothing takes this long, s.
+    /// The share 1. Its change to 0 takes `change_s`.
     fn of(change_s: f64) -> Self {
         let (most_per_s, most_per_s2) = (SPEED / change_s, ACCELERATION / (change_s * change_s));
         Self { value: 1.0, target: 1.0, per_s: 0.0, most_per_s, most_per_s2 }
     }
 
-    /// The shortest time, s, in which rate and amplitude may change from 0 to 1, also both at once. The motion has
-    /// these demands, and stays within its limits. Without demands the time is the longest one.
+    /// The shortest time, s, for a change of rate and amplitude from 0 to 1, also both at once. A motion with these
+    /// demands then stays within its limits. Without demands the time is the longest.
     fn change_s(demands: Option<&TrajectoryReport>, limits: &TrajectoryLimitsConfig) -> f64 {
         let Some(demands) = demands else { return LONGEST_S };
         let of_axis = |axis: usize| {
@@ -331,17 +331,17 @@ impl Slew {
         (0..AXES).map(of_axis).fold(SHORTEST_S, f64::max).min(LONGEST_S)
     }
 
-    /// Goes there at once.
+    /// Jumps to the target.
     fn jump(&mut self) {
         (self.value, self.per_s) = (self.target, 0.0);
     }
 
-    /// Whether it has arrived.
+    /// Whether the share has reached its target.
     fn is_settled(&self) -> bool {
         self.value.to_bits() == self.target.to_bits() && self.per_s == 0.0
     }
 
-    /// What it is in that time.
+    /// The share after that time.
     fn ahead(&self, ahead_s: f64) -> f64 {
         (self.value + self.per_s * ahead_s).clamp(0.0, 1.0)
     }
@@ -354,7 +354,7 @@ impl Slew {
             self.jump();
             return;
         }
-        // From this speed it comes to rest exactly at the target, in steps of this length.
+        // Speed from which the share comes to rest exactly at the target, in steps of this length.
         let half_step = step_per_s / 2.0;
         let arriving_per_s = (half_step * half_step + 2.0 * self.most_per_s2 * left.abs()).sqrt() - half_step;
         let wanted_per_s = arriving_per_s.min(self.most_per_s).copysign(left);

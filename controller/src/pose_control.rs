@@ -1,7 +1,7 @@
 //! The default pose law: a slow integral trim on top of the drives' own position loops.
 //!
-//! The drives follow fast motion by feed-forward; what remains on average (friction, gravity,
-//! calibration) is corrected here. The trim adds no damping and no feed-forward.
+//! The drives follow fast motion by feed-forward. The trim corrects the remaining mean error (friction, gravity,
+//! calibration). The trim adds no damping and no feed-forward.
 
 use masseter_model::geometry::{Pose, Vec3};
 use masseter_runtime::control::NoBranch;
@@ -21,7 +21,7 @@ pub(crate) struct PoseControl {
 }
 
 impl PoseControl {
-    /// At this rate of cycles, Hz.
+    /// The law at this rate of cycles, Hz.
     pub(crate) fn new(config: &ControllerConfig, rate_hz: u32) -> Self {
         let most_gain_per_s = config.most_integral_gain_per_s(rate_hz);
         Self { config: *config, most_gain_per_s, position_m: Vec3::zeros(), rotation_rad: Vec3::zeros() }
@@ -36,7 +36,7 @@ impl PoseControl {
         self.rotation_rad = (self.rotation_rad + turn * share).cap_magnitude(self.config.trim_limit_rad);
     }
 
-    /// The pose to ask for so that the desired pose comes about.
+    /// The requested pose for a desired pose.
     fn correct(&self, desired: &Pose) -> Pose {
         Pose::from_parts(
             (desired.translation.vector + self.position_m).into(),
@@ -53,8 +53,8 @@ impl PoseLaw for PoseControl {
         Ok(self.correct(&demand.ahead))
     }
 
-    /// The gains of the scenario. A trim limit can only become narrower: the strokes are checked against the
-    /// scenario's.
+    /// The gains of the scenario. A trim limit can only become narrower, because the check of the strokes uses the
+    /// scenario's limit.
     fn declared(&self) -> Declared {
         let ControllerConfig { integral_gain_per_s: gain, trim_limit_m, trim_limit_rad, .. } = self.config;
         let parameter = |name, unit: &str, about: &str, value, most| Parameter {
@@ -90,7 +90,7 @@ impl PoseLaw for PoseControl {
 mod tests {
     use super::*;
 
-    /// A platform that always stands a fixed step beside what was asked for.
+    /// A platform with a fixed distance from the requested pose.
     #[test]
     fn a_constant_offset_is_taken_out() {
         let mut control = PoseControl::new(&ControllerConfig::default(), 1000);

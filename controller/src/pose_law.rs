@@ -1,7 +1,7 @@
-//! The seam for a user's pose control: one call a cycle, from a demand to the pose to ask for.
+//! The seam for a user's pose control: one call a cycle, from a demand to the requested pose.
 //!
 //! The sequence (enable, ease, run, hold, disable), kinematics, playback and every safety check stay with
-//! [`MotionController`](crate::motion_controller::MotionController), whatever the law is.
+//! [`MotionController`](crate::motion_controller::MotionController) for every law.
 
 use std::fmt;
 
@@ -18,7 +18,7 @@ pub struct Demand {
     pub cycle: u64,
     /// Time from one cycle to the next, s.
     pub period_s: f64,
-    /// `Easing`, `Running` or `Holding`: in other states the law is not asked.
+    /// `Easing`, `Running` or `Holding`: other states do not call the law.
     pub state: ControllerState,
     /// How far the motion has come at the sample, s; negative before the motion begins.
     pub motion_time_s: f64,
@@ -26,7 +26,7 @@ pub struct Demand {
     pub desired: Pose,
     /// The pose at the sample, by forward kinematics; none in a cycle without a fresh, complete reading.
     pub estimated: Option<Pose>,
-    /// The desired pose at the instant at which this cycle's command is reached.
+    /// The desired pose at the instant at which the drives reach this cycle's command.
     pub ahead: Pose,
     /// The external force at the sample; none unless the scenario has it estimated.
     pub external: Option<ExternalForce>,
@@ -34,7 +34,7 @@ pub struct Demand {
     pub load_cell_n: Option<f64>,
 }
 
-/// What pushes the platform from outside, in base axes.
+/// The external force on the platform, in base axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExternalForce {
     /// Force, N.
@@ -46,13 +46,13 @@ pub struct ExternalForce {
 }
 
 impl ExternalForce {
-    /// The force with which the jaw bites: the platform is pushed downwards, N.
+    /// The bite force of the jaw, which pushes the platform downwards, N.
     pub fn bite_n(&self) -> f64 {
         -self.force_n[2]
     }
 }
 
-/// By how much a law means to leave the desired pose, in base axes.
+/// A law's intended deviation from the desired pose, in base axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Detour {
     /// Distance from the desired position at the sample of the coming cycle, m.
@@ -102,16 +102,16 @@ pub struct LawFailed;
 /// ```
 #[doc(alias("control law", "regulator"))]
 pub trait PoseLaw: std::fmt::Debug {
-    /// The pose to ask for, so that the desired pose comes about when this cycle's command is reached. It must not
-    /// block or allocate: in real time, the cycle waits for it. A target beyond a stroke by less than the default
-    /// trim's reach is clamped.
+    /// The requested pose, for the desired pose at the time of this cycle's command. The call must not block or
+    /// allocate: in real time, the cycle waits for the call. A target beyond a stroke by less than the default trim's
+    /// reach is clamped.
     ///
     /// # Errors
-    /// When there is no such pose: the controller then stops safely.
+    /// Without such a pose: the controller then stops safely.
     fn command(&mut self, demand: &Demand) -> Result<Pose, LawFailed>;
 
-    /// The law's detour from the desired pose. The supervision of the path and the published state count it as desired,
-    /// so that the limits hold for what the law did not mean. Whoever makes a detour bounds it.
+    /// The law's detour from the desired pose. The supervision of the path and the published state count the detour as
+    /// desired, so that the limits hold for the unintended deviation. The law itself must bound its detour.
     fn detour(&self) -> Detour {
         Detour::default()
     }
@@ -124,20 +124,20 @@ pub trait PoseLaw: std::fmt::Debug {
     /// Takes a parameter's value, which is within its range.
     fn set_parameter(&mut self, _place: usize, _value: f64) {}
 
-    /// Writes the declared signals, also in cycles in which the law is not asked.
+    /// Writes the declared signals, also in cycles without a call of the law.
     fn fill_signals(&self, _signals: &mut [f64]) {}
 
     /// A copy of the law with its whole state. Not part of a cycle.
     ///
     /// # Errors
-    /// [`NoBranch`] for a law that has none.
+    /// [`NoBranch`] for a law without copies.
     fn branch(&self) -> Result<Box<dyn PoseLaw>, NoBranch> {
         Err(NoBranch::of::<Self>())
     }
 }
 
-/// A law that is one function: of a demand, the parameters in force, and the signals that it fills. Both are in the order of
-/// their declaration, and signals keep their values until they are filled again.
+/// A law of one function, with the arguments demand, parameters in force, and signals to fill. Both are in the order of
+/// their declaration. Signals keep their values until the next write.
 pub struct FunctionLaw<F> {
     declared: Declared,
     parameters: Vec<f64>,
@@ -177,7 +177,7 @@ impl<F: FnMut(&Demand, &[f64], &mut [f64]) -> Result<Pose, LawFailed>> PoseLaw f
     }
 }
 
-/// The pose that a foreign law asks for, as it is: the controller refuses what is no pose.
+/// The requested pose of a foreign law, without a check: the controller refuses values that are no pose.
 pub fn asked_pose(position_m: [f64; 3], [w, x, y, z]: [f64; 4]) -> Pose {
     Pose::from_parts(Translation3::from(position_m), Unit::new_unchecked(Quaternion::new(w, x, y, z)))
 }

@@ -1,4 +1,4 @@
-//! The controller's process: the mechanism and the motion of its scenario, and the controller that is built for them.
+//! The controller's process: builds mechanism, motion and controller of a scenario, and runs them.
 
 use masseter_model::geometry::{GeometryError, Mechanism};
 use masseter_runtime::control::{Controller, Outcome, Session};
@@ -13,13 +13,13 @@ use crate::trajectory::{Trajectory, TrajectoryError};
 /// Builds a controller for a scenario, its mechanism and its motion.
 pub type BuildController = fn(&Scenario, Mechanism, Trajectory) -> Box<dyn Controller>;
 
-/// Why a controller could not be built or could not run.
+/// Why a controller cannot be built or cannot run.
 #[derive(Debug, thiserror::Error)]
 pub enum ControllerError {
     /// The start of the process, or its messages.
     #[error(transparent)]
     Process(#[from] ProcessError),
-    /// No rig takes this program.
+    /// Every rig refuses this program.
     #[error(transparent)]
     Attach(#[from] AttachError),
     /// The mechanism's dimensions.
@@ -30,18 +30,18 @@ pub enum ControllerError {
     Trajectory(#[from] TrajectoryError),
 }
 
-/// Runs the controller that `build` makes, until it is done.
+/// Runs the controller of `build` to its end.
 ///
 /// # Errors
-/// [`ControllerError`] when the scenario cannot be used, or the process cannot start or loses its messages.
+/// [`ControllerError`] for an unusable scenario, a failed start, or lost messages.
 pub fn run(arguments: &ProcessArguments, build: BuildController) -> Result<Outcome, ControllerError> {
     play(arguments.init()?, build)
 }
 
-/// The same for a rig that waits for a controller: the named one, or as [`attach`] finds it.
+/// Runs a controller for a waiting rig: the named rig, or the rig that [`attach`] finds.
 ///
 /// # Errors
-/// As [`run`], and when the program cannot attach.
+/// As [`run`], and a failed attachment.
 pub fn run_attached(rig: Option<&str>, build: BuildController) -> Result<Outcome, ControllerError> {
     play(attach(rig)?, build)
 }
@@ -67,7 +67,7 @@ fn play(
 /// Builds a controller for the mechanism and the motion of a scenario.
 ///
 /// # Errors
-/// [`ControllerError`] when either cannot be used.
+/// [`ControllerError`] if either is unusable.
 pub fn for_scenario(
     scenario: &Scenario,
     build: impl FnOnce(&Scenario, Mechanism, Trajectory) -> Box<dyn Controller>,

@@ -7,7 +7,8 @@ use masseter_runtime::messages::{Event, Reading};
 use crate::kinematics::ForwardError;
 use crate::pose_law::LawFailed;
 
-/// Beyond it, a quaternion is no rotation: the error would turn the platform's points by as much of their distance.
+/// Largest error of a quaternion's length: beyond it, the error moves the platform's points by this share of their
+/// distance.
 const MOST_NORM_ERROR: f64 = 1e-6;
 
 /// A fault, in the form of an event.
@@ -21,7 +22,7 @@ pub struct Fault {
     pub value: f64,
     /// The limit.
     pub limit: f64,
-    /// Why there is no pose, for faults of kinematics.
+    /// The reason for a missing pose, for faults of kinematics.
     pub no_pose: Option<NoPose>,
 }
 
@@ -100,7 +101,7 @@ pub(crate) fn check_asked(asked: &Pose) -> Result<(), Fault> {
     if is_rotation { Ok(()) } else { Err(Fault::new(Cause::LawFailed, norm, 1.0)) }
 }
 
-/// Whether every value of a reading is a number and every code known.
+/// Whether every value of a reading is a number, and every code known.
 pub(crate) fn check_reading(reading: &Reading) -> Result<(), Fault> {
     for axis in 0..AXES {
         let code = reading.drive_state[axis];
@@ -119,7 +120,7 @@ pub(crate) fn check_reading(reading: &Reading) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Whether the reading answers a command of this controller, whose last one was `last_sent`.
+/// Whether the reading answers a command of this controller; `last_sent` is the last command.
 pub(crate) fn check_commander(reading: &Reading, last_sent: u64) -> Result<(), Fault> {
     if reading.answers_cycle > last_sent {
         return Err(Fault::new(Cause::ForeignCommand, reading.answers_cycle as f64, last_sent as f64));
@@ -127,7 +128,7 @@ pub(crate) fn check_commander(reading: &Reading, last_sent: u64) -> Result<(), F
     Ok(())
 }
 
-/// Whether the master still serves, no drive is in fault, and, once `moving`, all are enabled.
+/// Whether the master serves, no drive is in fault, and, once `moving`, all drives are enabled.
 pub(crate) fn check_drives(reading: &Reading, moving: bool) -> Result<(), Fault> {
     if reading.master_fault != 0 {
         return Err(Fault::new(Cause::MasterFault, 1.0, 0.0));
@@ -143,7 +144,7 @@ pub(crate) fn check_drives(reading: &Reading, moving: bool) -> Result<(), Fault>
     Ok(())
 }
 
-/// Whether the targets can be reached within a period at the drives' speed.
+/// Whether the drives can reach the targets within a period at their speed.
 pub(crate) fn check_velocity(
     targets: &Actuators,
     before: &Actuators,

@@ -1,5 +1,5 @@
-//! What the controllers have in common: they take readings, follow the sequence of states (a table), stop when a wait
-//! takes too long, and write command and state.
+//! The common part of the controllers: readings, the sequence of states (a table), time-outs of waits, and the writing
+//! of command and state.
 
 use masseter_model::geometry::{AXES, Actuators, Mechanism, Pose};
 use masseter_runtime::control::{Outcome, Tick};
@@ -15,15 +15,15 @@ use ControllerState::{Disabling, Easing, Enabling, Finished, Holding, Running, S
 
 /// Bits of [`Reading::fresh_axes`] when all axes are fresh.
 pub(crate) const ALL_AXES: u32 = (1 << AXES) - 1;
-/// Cycles for which the last command is repeated, so that the drives receive it.
+/// Repetitions of the last command, so that the drives receive it.
 pub(crate) const REPEATED_CYCLES: u64 = 5;
 /// Longest wait of a safe stop for drives without voltage, s.
 pub(crate) const SAFE_STOP_S: f64 = 0.3;
 
-/// Age of a reading that comes late but is used.
+/// Greatest age of a late reading in use.
 const LATE_READING_CYCLES: u64 = 1;
 
-/// What changes a state. In one cycle only the most urgent trigger counts: the last in this order.
+/// Triggers of a change of state. In one cycle only the most urgent trigger counts: the last in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Trigger {
     /// The condition that ends the state holds.
@@ -34,7 +34,7 @@ enum Trigger {
     Fault,
 }
 
-/// The state that follows `state` when `trigger` happens; the same state where nothing changes.
+/// The state after `trigger` in `state`; the same state without a change.
 fn next_state(state: ControllerState, trigger: Trigger) -> ControllerState {
     let [done, stop_requested] = match state {
         WaitReadings => [Enabling, Finished],
@@ -71,21 +71,21 @@ pub(crate) struct Estimate {
     pub(crate) solution: Solution,
 }
 
-/// The cycles in a safe stop that show the whole time that the scenario asks for: one more than there are periods.
+/// Cycles of a safe stop for the scenario's time of observation: one more than the periods.
 fn observed_cycles(scenario: &Scenario) -> u64 {
     let periods = scenario.observation_s() / scenario.period_s();
-    // A whole number of periods may be computed as a little more.
+    // Rounding may give a little more than a whole number of periods.
     if periods > 0.0 { (periods - 1e-6).ceil() as u64 + 1 } else { 0 }
 }
 
-/// The state of a controller's sequence, and what decides on the next one.
+/// The state of a controller's sequence, and the data for the next state.
 #[derive(Debug, Clone)]
 pub(crate) struct Sequencer {
     pub(crate) config: ControllerConfig,
     pub(crate) period_s: f64,
-    /// How long the drives may take to be enabled, s. The master, which has more of their state, gives up first.
+    /// Longest time for enabling the drives, s. The master has more of their state, and gives up first.
     enable_timeout_s: f64,
-    /// How many cycles a safe stop is observed at least.
+    /// Least cycles of observation of a safe stop.
     observed_cycles: u64,
     pub(crate) tracker: ForwardTracker,
     pub(crate) state: ControllerState,
@@ -138,7 +138,7 @@ impl Sequencer {
         }
     }
 
-    /// Whether the reading is complete, and so gives an estimate.
+    /// Whether the reading is complete: only a complete reading gives an estimate.
     fn apply_reading(&mut self, reading: &Reading) -> Result<bool, Fault> {
         safety::check_reading(reading)?;
         safety::check_commander(reading, self.cycle)?;
@@ -173,7 +173,7 @@ impl Sequencer {
         matches!(self.state, Easing | Running | Holding)
     }
 
-    /// Begins the decision of a cycle: the fault of its reading, or of a wait that took too long.
+    /// Begins the decision of a cycle: returns the fault of its reading, or of an overdue wait.
     pub(crate) fn begin_cycle(&mut self, tick: Tick) -> Option<Fault> {
         self.cycle = tick.cycle;
         self.fault.take().or_else(|| self.overdue())
@@ -195,8 +195,8 @@ impl Sequencer {
         }
     }
 
-    /// Follows the most urgent trigger to the next state, and reports it. `is_over`: whether the controller has moved
-    /// and held for as long as this state takes; a state without motion ignores it.
+    /// Follows the most urgent trigger to the next state, and reports the change. `is_over`: whether the motion or the
+    /// hold of this state is over; a state without motion ignores `is_over`.
     pub(crate) fn follow(&mut self, fault: Option<Fault>, is_over: bool, tick: Tick) -> Option<Event> {
         let triggers = [
             (Trigger::Fault, fault.is_some()),
@@ -243,13 +243,13 @@ impl Sequencer {
         }
     }
 
-    /// Whether every drive reports that it is without voltage. A lost drive reports nothing, and may have voltage.
+    /// Whether every drive reports no voltage. A lost drive reports nothing, and may have voltage.
     fn drives_are_off(&self) -> bool {
         let is_off = |&code: &u32| matches!(drive_state(code), Ok(Some(state)) if !state.is_powered());
         self.drive_state.iter().all(is_off)
     }
 
-    /// How the controller ended; none while it has something to do. A safe stop waits for the drives to be off.
+    /// The controller's outcome; none before its end. A safe stop waits until the drives are off.
     pub(crate) fn outcome(&self) -> Option<Outcome> {
         let is_repeated = self.cycles_in_state >= REPEATED_CYCLES;
         match self.state {
@@ -275,7 +275,7 @@ impl Sequencer {
         }
     }
 
-    /// What this cycle made of the reading.
+    /// The state of this cycle.
     pub(crate) fn state_message(&self, desired: Option<&Pose>) -> State {
         let mut state = State { cycle: self.cycle, controller_state: self.state.code(), ..State::default() };
         if let Some(desired) = desired {

@@ -1,4 +1,4 @@
-//! From the pose that a law asks for to targets of the six axes within their limits.
+//! From a law's requested pose to targets of the six axes within their limits.
 
 use std::hint::black_box;
 
@@ -11,14 +11,14 @@ use crate::sequencer::{Estimate, Sequencer};
 /// Cycles between two condition numbers, which change slowly and take a microsecond each.
 const CYCLES_OF_A_CONDITION: u64 = 10;
 
-/// The targets of the axes, and what bounds them.
+/// The targets of the axes with their limits.
 #[derive(Debug, Clone)]
 pub(crate) struct Targets {
     pub(crate) mechanism: Mechanism,
     pub(crate) velocity_limit_m_s: [f64; AXES],
-    /// The most that the trim may move an axis.
+    /// The largest way of an axis by the trim.
     trim_reach_m: f64,
-    /// The pose that the law asked for last.
+    /// The last requested pose of the law.
     asked: Option<Pose>,
     /// The last targets; none before the drives are enabled.
     pub(crate) actuators: Option<Actuators>,
@@ -40,7 +40,7 @@ impl Targets {
         }
     }
 
-    /// Sets the targets that bring about the pose asked for, reached within a period (s).
+    /// Sets the targets for the requested pose, reached within a period (s).
     pub(crate) fn ask_for(&mut self, asked: &Pose, period_s: f64) -> Result<(), Fault> {
         safety::check_asked(asked)?;
         self.asked = Some(*asked);
@@ -53,7 +53,7 @@ impl Targets {
         Ok(())
     }
 
-    /// The condition number of the mechanism where it stands: computed anew every ten cycles, held in between.
+    /// The condition number at the present pose: computed every ten cycles, held in between.
     pub(crate) fn condition(&mut self, sequencer: &Sequencer, estimate: &Estimate) -> f64 {
         if sequencer.cycle >= self.next_condition_cycle {
             let joints = Joints { actuators: estimate.measured, theta_rad: estimate.solution.theta_rad };

@@ -1,5 +1,5 @@
-//! The solvers and the controller's cycle allocate nothing, whichever way they go. Alone in its file: the allocator is
-//! that of the whole process.
+//! The solvers and the controller's cycle allocate nothing, on every path. Alone in its file: the allocator is that of
+//! the whole process.
 #![allow(unsafe_code)] // A global allocator is an unsafe trait; this one only counts and passes on.
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -18,18 +18,18 @@ use masseter_scenario::{ControllerConfig, ForceControlConfig, Scenario};
 struct Counting;
 
 thread_local! {
-    /// Of this thread: the others belong to the test harness.
+    /// Counts of this thread: the other threads belong to the test harness.
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
 }
 
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-// SAFETY: every call goes to the system's allocator unchanged, so its guarantees are this one's.
+// SAFETY: every call goes to the system's allocator unchanged, so its guarantees hold.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.set(ALLOCATIONS.get() + 1);
-        // SAFETY: the caller's promises about `layout` are passed on.
+        // SAFETY: the caller's promises about `layout` go to the system's allocator.
         unsafe { System.alloc(layout) }
     }
 
@@ -45,7 +45,7 @@ fn allocations_of(work: impl FnOnce()) -> u64 {
     ALLOCATIONS.get() - before
 }
 
-/// Drives that are where they were told to be, from the wait for readings until the motion is played.
+/// Drives at their targets, from the wait for readings until the motion plays.
 #[test]
 fn no_cycle_of_the_controller_allocates() {
     check_cycles(&Scenario { duration_s: Some(0.5), ..Scenario::default() });

@@ -1,15 +1,15 @@
-//! A general solver without knowledge of the mechanism's structure: MINPACK's Levenberg–Marquardt, from the
-//! crate of that name, on the paper's equations and their derivatives, to full precision.
+//! A general solver without knowledge of the mechanism's structure: MINPACK's Levenberg–Marquardt, from the crate of
+//! that name. It solves the paper's equations with their derivatives, to full precision.
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use masseter_controller::kinematics::Equations;
 use masseter_model::geometry::{Actuators, LEGS, Mechanism};
 use nalgebra_0_34::{Matrix3, U3, Vector3};
 
-/// A side that is off by less counts as closed, metres; Newton's iteration ends at the same error.
+/// Largest error of a side that counts as closed, metres. Newton's iteration ends at the same error.
 const CLOSED_WITHIN_M: f64 = 1e-14;
 
-/// The leg angles it comes to from a guess, radians; none where these close no platform.
+/// The leg angles of the solution from a guess, radians; none if they close no platform.
 pub(super) fn solve(
     mechanism: &Mechanism,
     actuators: &Actuators,
@@ -17,7 +17,7 @@ pub(super) fn solve(
 ) -> Option<[f64; LEGS]> {
     let problem = Problem { equations: Equations::new(mechanism, actuators), theta_rad: guess_rad.into() };
     let (problem, report) = LevenbergMarquardt::new().minimize(problem);
-    // What is minimised is half the sum of squares.
+    // The solver minimises half the sum of squares.
     (2.0 * report.objective_function < CLOSED_WITHIN_M * CLOSED_WITHIN_M).then(|| problem.theta_rad.into())
 }
 

@@ -1,7 +1,7 @@
-//! Solvers and the streams of inputs they are measured on, shared by both benches.
+//! Solvers and their streams of inputs, shared by both benches.
 //!
-//! Warm solves follow a chewing cycle at 1 kHz, each from the last solution. Cold ones take the same inputs,
-//! each from a random guess in (0°, 180°).
+//! Warm solves follow a chewing cycle at 1 kHz, each from the last solution. Cold solves take the same inputs, each
+//! from a random guess in (0°, 180°).
 
 mod general_purpose;
 
@@ -18,16 +18,16 @@ pub(crate) const CYCLES: u32 = 460;
 
 /// A solver on a stream of inputs.
 pub(crate) struct Work {
-    /// What the benches call it.
+    /// The name in the benches.
     pub(crate) name: &'static str,
-    /// Prepares it; each call of what comes back solves the next input.
+    /// Prepares the solver. Each call of the result solves the next input.
     pub(crate) start: fn() -> Call,
 }
 
 /// Solves the next input.
 pub(crate) type Call = Box<dyn FnMut()>;
 
-/// Everything that is measured, in the order of the tables.
+/// All workloads, in the order of the tables.
 pub(crate) const WORKS: &[Work] = &[
     Work { name: "warm: certified", start: warm_certified },
     Work { name: "warm: published", start: || warm(Method::Published) },
@@ -140,7 +140,7 @@ fn chewing(mechanism: &Mechanism) -> Vec<Actuators> {
     (0..CYCLES).map(|cycle| mechanism.inverse(&pose(cycle)).expect("legs have length").actuators).collect()
 }
 
-/// Inputs over the whole box of strokes, of which one in five has no true solution.
+/// Inputs over the whole box of strokes. One in five has no true solution.
 fn box_of_strokes(_: &Mechanism) -> Vec<Actuators> {
     let axis = |index, axis: usize| {
         let share = scattered(index, axis);

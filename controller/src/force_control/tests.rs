@@ -1,5 +1,4 @@
-//! The law against food in a world that is only as high as the bite: drives that are two cycles late, and an observer
-//! that is a low-pass.
+//! The law against food in a world with height alone: drives two cycles late, and a low-pass as the observer.
 
 use masseter_scenario::LoadCellConfig;
 
@@ -10,7 +9,7 @@ use crate::trajectory::minimum_jerk;
 const PERIOD_S: f64 = 1e-3;
 const LEAD_CYCLES: usize = 2;
 const OBSERVER_S: f64 = 0.003;
-/// The mouth closes and opens by 15 mm within as long, and stays closed for longer than a bite, s.
+/// Time of the mouth's closing and opening by 15 mm, and time closed, longer than a bite, s.
 const OPENING_M: f64 = 0.015;
 const MOVE_S: f64 = 0.25;
 const CLOSED_S: f64 = 0.8;
@@ -20,16 +19,16 @@ const END_S: f64 = 2.0 * MOVE_S + CLOSED_S;
 struct World {
     law: ForceControl,
     cycle: u64,
-    /// Heights asked for, the newest last, m; the closed mouth is at 0.
+    /// Requested heights, the newest last, m; the closed mouth is at 0.
     asked_m: Vec<f64>,
     /// True force, N, cycle by cycle.
     bites_n: Vec<f64>,
     estimate_n: f64,
     stiffness_n_per_m: f64,
     thickness_m: f64,
-    /// Deeper than this the food breaks, m.
+    /// Depth at which the food breaks, m.
     breaks_at_m: f64,
-    /// Ends of what the load cell shows, N.
+    /// End of the load cell's range, N.
     cell_ends_n: [f64; 2],
 }
 
@@ -129,8 +128,7 @@ fn a_half_sine_comes_near_its_peak_and_back() {
     assert!((22.0..33.0).contains(&peak_n), "{peak_n}");
 }
 
-/// The stated limit is that of a pure delay. The world has lags instead, so that its own limit is less than half as
-/// high.
+/// The stated limit is that of a pure delay. The world has lags instead, so its own limit is less than half as high.
 #[test]
 fn inside_the_limit_of_stability_a_bite_is_quiet_and_far_outside_of_it_the_bite_shakes() {
     for stiffness_n_per_m in [3500.0, 35_000.0, 1.5e5] {
@@ -149,7 +147,7 @@ fn inside_the_limit_of_stability_a_bite_is_quiet_and_far_outside_of_it_the_bite_
             let mut world = World { stiffness_n_per_m, thickness_m, ..World::new(config) };
             world.run_to(0.85);
             let swing_n = world.most_n([0.75, 0.85]) - world.least_n([0.75, 0.85]);
-            // A bite that shakes enough looks like food that breaks.
+            // A strongly shaking bite looks like a break of food.
             let found = swing_n < 2.0 && world.law.phase != Phase::Broken;
             assert_eq!(
                 found, is_quiet,
@@ -173,7 +171,7 @@ fn neither_contact_nor_opening_makes_the_targets_jump() {
 fn after_the_bite_the_jaw_is_back_on_the_motion() {
     let mut world = World::new(ForceControlConfig::default());
     world.run_to(END_S);
-    // The opening motion takes the jaw along; it ends before the jaw has caught up to the last micrometre.
+    // The opening motion takes the jaw along, and ends before the jaw is back to the last micrometre.
     assert!(world.law.offsets_m[0].abs() < 1e-5, "{:?}", world.law);
     assert!(world.law.detour().at_sample_m.norm() < 1e-5);
 }

@@ -1,4 +1,4 @@
-//! The model against itself, the observer on a platform that swings, and feed-forward along simple ways.
+//! The model against itself, the observer on a swinging platform, and feed-forward along simple ways.
 
 use masseter_model::geometry::{LEGS, MechanismConfig, Vec3};
 use masseter_scenario::{DynamicsConfig, FrictionModel};
@@ -171,7 +171,7 @@ fn a_law_that_holds_the_platform_back_takes_the_friction_back() {
 #[test]
 fn friction_is_found_in_the_forces_of_the_drives_whatever_the_screws_lose() {
     let wrench = Vector6::z() * -40.0;
-    // A load that drives is hidden by a screw that locks itself.
+    // A self-locking screw hides a driving load.
     for (leg_screw_efficiency, speeds_m_s) in
         [(0.9, [0.05, -0.05]), (0.8, [0.05, -0.05]), (0.3, [0.05, 0.02])]
     {

@@ -1,9 +1,9 @@
-//! A polynomial of degree 8 on [0, 1] in Bernstein form, and where its zeros can be.
+//! A polynomial of degree 8 on [0, 1] in Bernstein form, and the places of its zeros.
 //!
-//! A polynomial lies within the hull of its Bernstein coefficients, and has as many zeros as they
-//! change sign, or fewer by an even number. So coefficients of one sign prove that there is no zero,
-//! one change proves exactly one, and halving the interval decides the rest, but for places where the
-//! polynomial is smaller than its own rounding error. Those are reported, never dropped.
+//! A polynomial lies within the hull of its Bernstein coefficients. The number of its zeros is the number of sign
+//! changes of the coefficients, or less by an even number. So coefficients of one sign prove no zero, and one sign
+//! change proves exactly one zero. Halving the interval decides the rest, except where the polynomial is smaller than
+//! its own rounding error. The module reports such places.
 
 /// The elimination's degree in cos θ₁.
 pub(super) const DEGREE: usize = 8;
@@ -19,16 +19,16 @@ pub(super) const NODES: [f64; DEGREE + 1] = [
     0.961_939_766_255_643_4,
     1.0,
 ];
-/// Error of the coefficients relative to the largest value at a node. Interpolation was measured below to make
-/// 2·10⁻¹³ of values with 16 roundings relative to each; the rest is for what cancels within the values.
+/// Error of the coefficients relative to the largest value at a node. A test below measures 2·10⁻¹³ for the
+/// interpolation of values with 16 roundings relative to each. The rest is for cancellation within the values.
 const NOISE: f64 = 2e-12;
-/// Error of the coefficients relative to the largest rounding of a value that the caller states.
+/// Error of the coefficients relative to the caller's largest rounding of a value.
 const GROWTH: f64 = 20.0;
 /// The first and the last coefficient, one bit each.
 const ENDS: u32 = 1 | 1 << DEGREE;
-/// Halvings after which what is undecided is reported as it is.
+/// Halvings before an undecided interval is reported.
 const DEEPEST: u32 = 13;
-/// Intervals looked at before giving up; the neutral input, with its two triple zeros, takes 60.
+/// Most intervals of a search; the neutral input, with its two triple zeros, takes 60.
 const MOST_INTERVALS: u32 = 1000;
 
 /// A closed interval; empty when its ends are not in order.
@@ -53,21 +53,21 @@ impl Interval {
     }
 }
 
-/// Where zeros are.
+/// Places of zeros.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Zeros {
     /// Exactly one, with a change of sign.
     One(Interval),
-    /// Any number, also none: the polynomial is zero here but for rounding.
+    /// Any number, also none: except for rounding, the polynomial is zero here.
     Undecided(Interval),
 }
 
-/// More intervals than allowed, or values that are no numbers: the polynomial vanishes on a whole
-/// stretch but for rounding, or is none.
+/// More intervals than allowed, or values that are no numbers. Except for rounding, the polynomial vanishes on a whole
+/// stretch, or is no polynomial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Vanishing;
 
-/// Coefficients on an interval that came from [0, 1] by halving.
+/// Coefficients on an interval from the halving of [0, 1].
 #[derive(Debug, Clone, Copy)]
 struct Piece {
     coefficients: [f64; DEGREE + 1],
@@ -75,7 +75,7 @@ struct Piece {
     depth: u32,
 }
 
-/// What the signs of the coefficients prove.
+/// The proof by the signs of the coefficients.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum SignTest {
     NoZero,
@@ -123,7 +123,7 @@ pub(super) fn locate(
     Err(Vanishing)
 }
 
-/// Adjacent undecided intervals are one; an earlier one that is not adjacent is reported.
+/// Joins adjacent undecided intervals; reports an earlier interval that is not adjacent.
 fn joined(earlier: Option<Interval>, next: Interval, found: &mut impl FnMut(Zeros)) -> Interval {
     match earlier {
         Some(earlier) if earlier.high >= next.low => Interval { low: earlier.low, high: next.high },
@@ -156,7 +156,8 @@ impl Piece {
         while doubtful != 0 {
             let index = doubtful.trailing_zeros();
             let before = positive >> (index - 1) & 1;
-            // One doubtful value between two signs adds no change, more of them or equal signs may.
+            // One doubtful value between two different signs adds no sign change; more such values, or equal signs, may
+            // add some.
             if clear >> (index + 1) & 1 == 0 || positive >> (index + 1) & 1 == before {
                 return SignTest::Unknown;
             }
@@ -170,7 +171,7 @@ impl Piece {
         }
     }
 
-    /// De Casteljau's algorithm at the middle: averages only, so that no error grows.
+    /// De Casteljau's algorithm at the middle uses averages only, so that no error grows.
     fn halved(&self) -> [Self; 2] {
         let mut row = self.coefficients;
         let (mut low, mut high) = (row, row);
@@ -213,7 +214,7 @@ const CARDINALS: [[f64; DEGREE + 1]; DEGREE + 1] = {
     all
 };
 
-/// One factor (x − other) / (node − other) after the other, each raising the degree by one.
+/// One factor (x − other) / (node − other) after the other. Each raises the degree by one.
 const fn cardinal(node: usize) -> [f64; DEGREE + 1] {
     let mut coefficients = [0.0; DEGREE + 1];
     coefficients[0] = 1.0;
@@ -275,7 +276,7 @@ mod tests {
     }
 
     proptest! {
-        /// Every zero is in a reported interval, and an interval with one zero has one.
+        /// Every zero is in a reported interval, and an interval reported with one zero has exactly one.
         #[test]
         fn no_zero_is_lost(
             zeros in prop::collection::vec(-0.3..1.3f64, DEGREE),

@@ -23,8 +23,8 @@
 //! - ρₖ also bounds the rounding of each derivative, of which a row has two. Y's own rounding counts no
 //!   more than these two again. Hence z ≤ 4 max Σ|Yᵢₖ| ρₖ ≤ 4y.
 //!
-//! The proof is about the input as an exact set of numbers, not about what the encoders measured, and it
-//! does not identify the solution.
+//! The proof holds for the input as an exact set of numbers, not for the errors of the encoders. The proof does not
+//! identify the solution.
 
 use std::f64::consts::PI;
 
@@ -35,10 +35,10 @@ use super::loop_equations::{LoopEquations, PlatformSide, Residuals};
 
 /// z per unit of y.
 const INVERSE_ROUNDINGS: f64 = 4.0;
-/// What r, R and K are moved by to outweigh the roundings of their own formulas.
+/// Margin of r, R and K for the roundings of their own formulas.
 const OUTWARD: f64 = 1.0 + 64.0 * f64::EPSILON;
 
-/// What is proven about a solution. Distances are the largest difference of any leg's angle.
+/// The proven distances of a solution. A distance is the largest difference of any leg's angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Certificate {
     /// r: an exact solution lies at most this far from the computed angles, radians.
@@ -50,8 +50,8 @@ pub struct Certificate {
 }
 
 impl Certificate {
-    /// The proof at evaluated leg angles; none where the inequality does not hold or a value is no
-    /// number, as at a singularity.
+    /// The proof at evaluated leg angles. None if the inequality does not hold or a value is no number, as at a
+    /// singularity.
     #[inline]
     pub(super) fn new(loops: &LoopEquations<'_>, at: &Residuals) -> Option<Self> {
         let inverse = at.inverse();
@@ -76,20 +76,20 @@ impl Certificate {
         let reach = margin + discriminant.sqrt();
         Some(Self {
             exists_within_rad: 2.0 * offset_rad / reach * OUTWARD,
-            // Beyond half a turn the ball would overlap itself on the torus.
+            // Beyond half a turn the ball overlaps itself on the torus.
             unique_within_rad: (reach / curvature / OUTWARD).min(PI),
             regular_within_rad: margin / curvature / OUTWARD,
         })
     }
 }
 
-/// The largest of three; none where one is no finite number.
+/// The largest of three; none if one is not finite.
 #[inline]
 fn largest([a, b, c]: [f64; LEGS]) -> Option<f64> {
     (a + b + c).is_finite().then(|| a.max(b).max(c))
 }
 
-/// The most by which row k of the Jacobian changes, in total, per radian of the largest change.
+/// Largest total change of row k of the Jacobian per radian of the largest change of an angle.
 #[inline]
 fn curvature_bound(side: &PlatformSide) -> f64 {
     side.near_cos.abs() + side.far_cos.abs() + 2.0 * (1.0 + side.cos_cos.abs()) + side.rounding

@@ -1,4 +1,4 @@
-//! Every set of leg angles that closes the platform, by eliminating two of the three.
+//! Every set of leg angles that closes the platform, by elimination of two of the three.
 //!
 //! At a given θ₁ legs 2 and 3 have two possible angles each ([`FourBar`]); side 23 decides which of the four
 //! pairs close. With Nⱼ = Bⱼ² + Cⱼ² the product over the pairs is
@@ -18,10 +18,10 @@
 //! This is not proven. Tests against random starts, dense grids and walks towards singular poses find no exception.
 //!
 //! An isolated zero changes the sign of g₂₃ of exactly one pair. Newton's iteration follows that pair; the result
-//! counts if its x lies in the interval. Elsewhere every pair is tried from three points: where several zeros meet, and
-//! where r is smaller than its rounding, as at the neutral input, whose triple zeros belong to three pairs. If these
-//! starts reach nothing, or something nearly singular, more starts follow. Each result is polished on the three
-//! equations, so only solutions are reported.
+//! counts if its x lies in the interval. Elsewhere the iteration starts from three points for every pair. Such places
+//! are those of several zeros, and those with r smaller than its rounding. The neutral input has such triple zeros,
+//! which belong to three pairs. If these starts reach no solution, or a nearly singular one, more starts follow. An
+//! iteration on the three equations polishes each result, so all results are solutions.
 //!
 //! Next to a singularity two solutions lie close together. [`solutions`](super::solutions) looks for the second
 //! from the first. If rounding does not separate the two, both are reported without a certificate.
@@ -32,30 +32,30 @@ use super::bernstein::{Interval, NODES, Vanishing, Zeros, locate};
 use super::legs::LegAngle;
 use super::loop_equations::{LoopEquations, LoopSolution, PlatformSide};
 
-/// Iterations that polish a solution: where two meet, each only halves the error.
+/// Iterations that polish a solution: where two solutions meet, each iteration only halves the error.
 const MOST_ITERATIONS: u32 = 40;
 /// Steps that narrow a change of sign; half of them gain several digits each.
 const MOST_STEPS: u32 = 50;
-/// Iterations for a solution that is near; where they do not suffice, the change of sign is narrowed.
+/// Iterations for a near solution. If they do not suffice, the bracket of the sign change shrinks first.
 const FEW_ITERATIONS: u32 = 6;
 /// g₂₃ at which Newton's iteration takes over for good.
 const NARROW_ENOUGH: f64 = 1e-10;
 /// Below this determinant ([`LoopEquations::determinant`]) another solution may be close.
 pub(super) const NEARLY_SINGULAR: f64 = 1e-2;
-/// A range of x narrower than this is tried in pieces: rounding hides r, and also whether the range is empty.
+/// Width of a range of x below which the search goes by pieces: rounding hides r, and also whether the range is empty.
 const NARROW: f64 = 1e-8;
-/// An undecided interval wider than this share of the range is tried in pieces.
+/// Share of the range above which the search of an undecided interval goes by pieces.
 const WIDE: f64 = 1.0 / 512.0;
 const PIECES: u32 = 16;
 /// Pairs of leg angles of legs 2 and 3.
 const PAIRS: usize = 4;
 
-/// Which solutions are followed.
+/// The filter of the followed solutions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum SolutionFilter {
     /// Every solution.
     All,
-    /// Those with a positive determinant, which a true one has; others may be found as well.
+    /// Solutions with a positive determinant, as a true solution has; the search may also find others.
     PositiveDeterminant,
 }
 
@@ -97,7 +97,7 @@ impl FourBar {
     /// The x = cos θ₁ in [−1, 1] at which the chain closes.
     pub(super) fn range(&self) -> Interval {
         let ([a, a_slope], [b, b_slope]) = (self.offset, self.along);
-        // Kept below zero: what is zero but for rounding must still open downward.
+        // Kept below zero: a coefficient that is zero except for rounding must still open downward.
         let leading = (b_slope * b_slope - 1.0 - a_slope * a_slope).min(-f64::MIN_POSITIVE);
         let half_linear = b * b_slope - a * a_slope;
         let constant = b * b + 1.0 - a * a;
@@ -110,7 +110,7 @@ impl FourBar {
         Interval { low: one.min(other), high: one.max(other) }.intersect(Interval { low: -1.0, high: 1.0 })
     }
 
-    /// Both leg angles of the driven leg; outside the range the one that comes closest, twice.
+    /// Both leg angles of the driven leg; outside the range the closest angle, twice.
     #[inline]
     pub(super) fn branches(&self, driving: LegAngle) -> Branches {
         let offset = self.offset[0] + self.offset[1] * driving.cos;
@@ -196,7 +196,7 @@ impl<'a> Elimination<'a> {
         self.second.range().intersect(self.third.range())
     }
 
-    /// The four sets of leg angles at x, on which sides 12 and 31 fit, or come closest to it.
+    /// The four sets of leg angles at x with the best fit of sides 12 and 31.
     pub(super) fn leg_angles(&self, x: f64) -> [[LegAngle; LEGS]; PAIRS] {
         let (driving, second, third) = self.branches(x);
         std::array::from_fn(|pair| [driving, second.leg_angles[pair & 1], third.leg_angles[pair >> 1]])
@@ -246,7 +246,8 @@ impl<'a> Elimination<'a> {
         }
         let residual = |x| self.residuals_23(x).0[pair];
         let close_from = |x| self.loops.close(&self.leg_angles(x)[pair], MOST_ITERATIONS);
-        // Next to a solution beyond the interval the residual is small too, so that one may be found instead.
+        // Next to a solution beyond the interval the residual is small too, so the iteration may find that solution
+        // instead.
         let own = close_from(narrowed(within, low[pair], high[pair], residual));
         let own = own.filter(|closed| lies_within(within, closed));
         match own.or_else(|| close_from(bisected(within, low[pair], residual))) {
@@ -290,7 +291,7 @@ fn has_positive_determinant(pair: usize, rising: bool) -> bool {
     ((pair & 1) == (pair >> 1)) == rising
 }
 
-/// Whether a solution is the one that an interval holds: it is enough that its x lies there.
+/// Whether a solution is the one of an interval: the test of its x is enough.
 fn lies_within(interval: Interval, closed: &LoopSolution) -> bool {
     let driving = closed.leg_angles[0];
     driving.sin >= 0.0 && interval.low <= driving.cos && driving.cos <= interval.high
@@ -300,12 +301,12 @@ fn scaled(range: Interval, within: Interval) -> Interval {
     Interval { low: range.at(within.low), high: range.at(within.high) }
 }
 
-/// Where the straight line through two points crosses zero.
+/// The zero of the straight line through two points.
 fn crossing([kept, newest]: [f64; 2], [at_kept, at_newest]: [f64; 2]) -> f64 {
     newest - at_newest * (newest - kept) / (at_newest - at_kept)
 }
 
-/// Where a function changes sign, to the last digit.
+/// The sign change of a function, to the last digit.
 fn bisected(mut within: Interval, at_low: f64, function: impl Fn(f64) -> f64) -> f64 {
     for _ in 0..f64::MANTISSA_DIGITS {
         let middle = within.at(0.5);
@@ -315,7 +316,7 @@ fn bisected(mut within: Interval, at_low: f64, function: impl Fn(f64) -> f64) ->
     within.at(0.5)
 }
 
-/// Where a function changes sign, by false position with the Illinois rule.
+/// The sign change of a function, by false position with the Illinois rule.
 fn narrowed(within: Interval, at_low: f64, at_high: f64, function: impl Fn(f64) -> f64) -> f64 {
     let ([mut kept, mut newest], [mut at_kept, mut at_newest]) =
         ([within.low, within.high], [at_low, at_high]);
@@ -371,8 +372,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(1000))]
 
-        /// What is not followed has a negative determinant, but for rounding. Of those that have one, some are
-        /// followed none the less: where two solutions lie in one interval.
+        /// A solution that is not followed has a negative determinant, except for rounding. Some solutions with a
+        /// negative determinant are followed: those of an interval with two solutions.
         #[test]
         fn no_solution_with_a_positive_determinant_is_passed_over(
             mechanism in mechanisms(),

@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::legs::next;
 
-/// The equations for one input: what stays the same while the leg angles vary.
+/// The equations for one input. Only the leg angles vary.
 #[derive(Debug, Clone, Copy)]
 pub struct Equations<'a> {
     mechanism: &'a Mechanism,
@@ -22,7 +22,7 @@ pub struct Evaluation {
     pub theta_rad: Vector3<f64>,
     /// Corners A₁, A₂, A₃ in the base frame, metres.
     pub corners: [Vec3; LEGS],
-    /// f₁ f₂ f₃: what the sides 12, 23, 31 are too long, metres.
+    /// f₁ f₂ f₃: excess lengths of the sides 12, 23, 31, metres.
     pub residual_m: Vector3<f64>,
 }
 
@@ -60,8 +60,8 @@ impl<'a> Equations<'a> {
         at.residual_m.component_mul(&(at.residual_m + Vector3::from(self.mechanism.platform_sides_m()) * 2.0))
     }
 
-    /// Determinant of the Jacobian with every leg's length taken as 1: unitless, at most 2, positive
-    /// when the platform stands as it does at the neutral pose, 0 where solutions meet.
+    /// Determinant of the Jacobian with every leg's length taken as 1: unitless and at most 2. The determinant is
+    /// positive in the assembly of the neutral pose, and 0 where solutions meet.
     pub fn determinant(&self, at: &Evaluation) -> f64 {
         self.directions(at).determinant()
     }
@@ -98,7 +98,7 @@ impl Evaluation {
         self.residual_m.norm_squared()
     }
 
-    /// The same in the paper's unit, cm².
+    /// The error in the paper's unit, cm².
     pub fn error_cm2(&self) -> f64 {
         self.error_m2() * 1e4
     }

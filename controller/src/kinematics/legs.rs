@@ -3,8 +3,8 @@
 
 use masseter_model::geometry::LEGS;
 
-/// One value for each leg or side. `array::map` and `from_fn` do the same, but are not unrolled here, and
-/// then pass everything through memory: a quarter of a warm solve's time.
+/// One value for each leg or side. The compiler does not unroll `array::map` and `from_fn` here, and then passes
+/// everything through memory: a quarter of a warm solve's time.
 #[inline]
 pub(super) fn each<T>(value: impl Fn(usize) -> T) -> [T; LEGS] {
     [value(0), value(1), value(2)]
@@ -16,12 +16,12 @@ pub(super) fn next(leg: usize) -> usize {
     (leg + 1) % LEGS
 }
 
-/// The most by which a square may differ from 1 for its root to be had from the series of
-/// 1/√(1 + e): the first term left out, 5e³/16, is then a tenth of a rounding.
+/// Largest difference e of a square from 1 for the series of 1/√(1 + e). The first omitted term, 5e³/16, is then a
+/// tenth of a rounding.
 const SERIES_SUFFICES: f64 = 4e-6;
 
-/// The sine up to which five terms of the arc sine's series suffice: the sixth, 0.022 x¹¹, is then less
-/// than a rounding of x.
+/// Largest sine x for five terms of the arc sine's series. The sixth term, 0.022 x¹¹, is then less than a rounding of
+/// x.
 const SERIES_REACHES: f64 = 0.03;
 
 /// (cos θ, sin θ) of one leg in its plane: cos inward, sin up. Unit length within 2 roundings.
@@ -46,8 +46,8 @@ impl LegAngle {
         self.sin.atan2(self.cos)
     }
 
-    /// Moved along the tangent by `step_rad` and back onto the circle: turned by atan(step), which is
-    /// the step up to its third power and never past a right angle.
+    /// The angle moved along the tangent by `step_rad` and back onto the circle. The turn is atan(step): the step up to
+    /// its third power, and never past a right angle.
     #[must_use]
     #[inline]
     pub(super) fn stepped(self, step_rad: f64) -> Self {
@@ -85,8 +85,7 @@ impl LegAngle {
     }
 }
 
-/// Leg angles with known values in radians. Values nearby follow from them to 3 roundings, without an arc
-/// tangent.
+/// Leg angles with known values in radians. Near values follow to 3 roundings, without an arc tangent.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Anchor {
     leg_angles: [LegAngle; LEGS],
@@ -99,7 +98,7 @@ impl Anchor {
         Self { leg_angles: [LegAngle { cos: 0.0, sin: 0.0 }; LEGS], theta_rad: [0.0; LEGS] }
     }
 
-    /// The angles in radians; anchored anew where a leg is too far away.
+    /// The angles in radians. A leg too far away sets a new anchor.
     #[inline]
     pub(super) fn angles_rad(&mut self, leg_angles: &[LegAngle; LEGS]) -> [f64; LEGS] {
         let sines = each(|leg| self.leg_angles[leg].sine_to(leg_angles[leg]));
@@ -114,7 +113,7 @@ impl Anchor {
     }
 }
 
-/// The arc sine of what is smaller than [`SERIES_REACHES`].
+/// The arc sine of a number smaller than [`SERIES_REACHES`].
 #[inline]
 fn arc_sine(x: f64) -> f64 {
     let square = x * x;
@@ -122,8 +121,7 @@ fn arc_sine(x: f64) -> f64 {
     x + x * square * (1.0 / 6.0 + square * (3.0 / 40.0 + square * fourth))
 }
 
-/// Whether no leg's angle differs by more than a small angle, radians; compares chords, which needs
-/// no arc tangent.
+/// Whether no leg's angle differs by more than a small angle, radians. The comparison of chords needs no arc tangent.
 pub(super) fn coincide(a: &[LegAngle; LEGS], b: &[LegAngle; LEGS], within_rad: f64) -> bool {
     a.iter().zip(b).all(|(a, b)| {
         let (cos, sin) = (a.cos - b.cos, a.sin - b.sin);
@@ -131,7 +129,7 @@ pub(super) fn coincide(a: &[LegAngle; LEGS], b: &[LegAngle; LEGS], within_rad: f
     })
 }
 
-/// How far apart two sets of leg angles are: the largest difference of any leg, radians.
+/// Distance of two sets of leg angles: the largest difference of any leg, radians.
 pub(super) fn separation_rad(a: &[LegAngle; LEGS], b: &[LegAngle; LEGS]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.angle_to(*b)).fold(0.0, f64::max)
 }

@@ -33,10 +33,10 @@ pub(super) struct PlatformSide {
     pub near_cos: f64,
     pub far_cos: f64,
     pub cos_cos: f64,
-    /// 2lᵢlⱼ, m²: what gₖ is multiplied by to become a difference of squares.
+    /// 2lᵢlⱼ, m²: the factor from gₖ to a difference of squares.
     pub unit_m2: f64,
     pub length_m: f64,
-    /// What the computed gₖ may be off by.
+    /// Largest rounding error of the computed gₖ.
     pub rounding: f64,
 }
 
@@ -61,7 +61,7 @@ pub(super) struct Residuals {
     pub far: [f64; LEGS],
 }
 
-/// Where an iteration ended with every gₖ zero but for rounding.
+/// The end of an iteration: every gₖ is zero, except for rounding.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LoopSolution {
     pub leg_angles: [LegAngle; LEGS],
@@ -69,7 +69,7 @@ pub(super) struct LoopSolution {
     pub iterations: u32,
 }
 
-/// One leg's end of the two sides it carries.
+/// One leg's end of its two sides.
 #[derive(Debug, Clone, Copy)]
 struct End {
     hinge: Vec3,
@@ -77,7 +77,7 @@ struct End {
     leg_m: f64,
     /// 1/lᵢ.
     per_leg_m: f64,
-    /// No coordinate of the hinge, nor a term of it, is larger, metres.
+    /// Bound of the hinge's coordinates and of their terms, metres.
     extent_m: f64,
 }
 
@@ -103,7 +103,7 @@ impl PlatformSide {
         let (unit_m2, per_unit) = (2.0 * near.leg_m * far.leg_m, 0.5 * near.per_leg_m * far.per_leg_m);
         let legs_m2 = near.leg_m * near.leg_m + far.leg_m * far.leg_m;
         let length_m2 = length_m * length_m;
-        // No term of gₖ or of its derivatives, nor of what they are made of, is larger than this sum.
+        // Upper bound of every term of gₖ, of its derivatives, and of their parts.
         let extent_m = near.extent_m + far.extent_m;
         let scale = (extent_m * extent_m + legs_m2 + length_m2) * per_unit
             + extent_m * (near.per_leg_m + far.per_leg_m)
@@ -228,8 +228,8 @@ impl Residuals {
         Self { value: self.value, near: self.near.map(|slope| -slope), far: self.far.map(|slope| -slope) }
     }
 
-    /// Inverse of ∂g/∂θ: row for the leg, column for the side. Every cofactor is a single product, so
-    /// but for the determinant's rounding, common to all, each entry is right to two roundings.
+    /// Inverse of ∂g/∂θ: row for the leg, column for the side. Every cofactor is a single product. So each entry is
+    /// right to two roundings, except for the common rounding of the determinant.
     #[inline]
     pub(super) fn inverse(&self) -> [[f64; LEGS]; LEGS] {
         let ([a, b, c], [d, e, f]) = (self.near, self.far);
@@ -238,8 +238,8 @@ impl Residuals {
         each(|row| each(|column| cofactors[row][column] * scale))
     }
 
-    /// The direction in which the equations hold nearly to first order where the Jacobian is nearly singular: its
-    /// adjugate's longest column. The largest component has magnitude 1; all are zero if the rank is 1 or less.
+    /// The null direction of a nearly singular Jacobian: its adjugate's longest column. Along it the equations nearly
+    /// hold to first order. The largest component has magnitude 1; all are zero for a rank of 1 or less.
     pub(super) fn null_direction(&self) -> [f64; LEGS] {
         let ([a, b, c], [d, e, f]) = (self.near, self.far);
         let columns = [[b * c, e * f, -b * f], [-c * d, a * c, d * f], [d * e, -a * e, a * b]];
@@ -248,7 +248,7 @@ impl Residuals {
         longest.map(|entry| entry / length(&longest).max(f64::MIN_POSITIVE))
     }
 
-    /// −(∂g/∂θ)⁻¹ g, bounded; zero where the Jacobian has no inverse.
+    /// −(∂g/∂θ)⁻¹ g, bounded; zero for a Jacobian without an inverse.
     #[inline]
     fn newton_step_rad(&self) -> [f64; LEGS] {
         let inverse = self.inverse();

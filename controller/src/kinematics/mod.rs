@@ -1,14 +1,13 @@
 //! Forward kinematics: the platform's pose from slide displacements and leg lengths.
 //!
-//! What the loop and the command line use is [`ForwardTracker`]: Newton's iteration from the last
-//! solution, a [`Certificate`] for its result, and [`solve_completely`] whenever that is not enough.
-//! The latter finds every solution ([`Solutions`]) and picks the one in which the mechanism stands as
-//! it was assembled ([`Assembly`]), or reports that there is none, or more than one. The paper's own
-//! algorithm and plain Newton–Raphson ([`solve`], on the paper's form of the [`Equations`]) stand
-//! beside it for comparison.
+//! The loop and the command line use [`ForwardTracker`]: Newton's iteration from the last solution, a [`Certificate`]
+//! for its result, and otherwise [`solve_completely`]. The latter finds every solution ([`Solutions`]) and picks the
+//! one with the mechanism's assembly ([`Assembly`]). If there is none, or more than one, the result is an error. The
+//! paper's own algorithm and plain Newton–Raphson ([`solve`], on the paper's form of the [`Equations`]) are for
+//! comparison.
 //!
-//! Everything is pure, allocates nothing and ends after a fixed number of iterations. Strokes and
-//! speeds are not checked, and the dimensions of the mechanism are taken as given.
+//! Everything is pure, allocates nothing and ends after a fixed number of iterations. The module does not check
+//! strokes, speeds and the dimensions of the mechanism.
 
 mod bernstein;
 mod certificate;

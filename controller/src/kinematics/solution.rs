@@ -1,11 +1,11 @@
-//! The result of a solver: leg angles that close the platform's triangle, or why there are none.
+//! The result of a solver: leg angles that close the platform's triangle, or the reason for their absence.
 //!
 //! The paper selects the true solution by two conditions: every Bᵢ below the plane of A₁A₂A₃, and A₂ beyond A₃ along
-//! slide 1. Without a sign for the plane these leave several candidates. So three conditions are added: the plane is
-//! oriented by (A₂−A₁)×(A₃−A₁), the legs stand above the base, and the Jacobian's determinant is positive.
+//! slide 1. Without a sign for the plane these leave several candidates. So this module adds three conditions:
+//! (A₂−A₁)×(A₃−A₁) orients the plane, the legs stand above the base, and the Jacobian's determinant is positive.
 //!
-//! All five together do *not* always leave one solution. Near the edge of the strokes about one standing input in 23,000
-//! has two (`docs/uniqueness.md`). Nothing here relies on a single solution.
+//! All five together do *not* always leave one solution. Near the edge of the strokes about one standing input in
+//! 23,000 has two solutions (`docs/uniqueness.md`). This module does not rely on a single solution.
 
 use masseter_model::geometry::{AXIS_NAMES, Actuators, LEGS, Legs, Mechanism, Pose, Vec3, frame_of_corners};
 use nalgebra::Vector3;
@@ -15,7 +15,7 @@ use super::equations::{Equations, directions};
 use super::legs::{LegAngle, each};
 use super::loop_equations::{LoopEquations, LoopSolution};
 
-/// What must hold for a true solution, in the order in which it is checked.
+/// Conditions of a true solution, in the order of the checks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum Condition {
     /// Corner Aᵢ lies above the base.
@@ -115,7 +115,7 @@ pub struct Solution {
     pub theta_rad: [f64; LEGS],
     /// The platform in the base frame, metres.
     pub pose: Pose,
-    /// Iterations made from the start that led here.
+    /// Iterations from the start of this solution.
     pub iterations: u32,
     /// The largest |fₖ|, metres.
     pub residual_m: f64,
@@ -123,7 +123,7 @@ pub struct Solution {
     pub determinant: f64,
     /// Which conditions of the true solution hold.
     pub assembly: Assembly,
-    /// What is proven; none too close to a singularity, or where the iteration stopped too early.
+    /// The proof; none too close to a singularity, or after a premature end of the iteration.
     pub certificate: Option<Certificate>,
     pub(super) leg_angles: [LegAngle; LEGS],
 }
@@ -155,7 +155,7 @@ impl Solution {
     }
 }
 
-/// An input without a true solution, as far as the solver could find.
+/// An input without a true solution, by the result of the solver.
 #[doc(alias = "direct kinematics")]
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum ForwardError {
@@ -184,7 +184,7 @@ pub enum ForwardError {
         /// Iterations made.
         iterations: u32,
     },
-    /// The Jacobian has no inverse at the iteration's end, or rounding does not separate the solution from another.
+    /// The Jacobian has no inverse at the iteration's end, or rounding does not separate two solutions.
     #[error(
         "singular: the Jacobian's determinant is {determinant:e} with a side of the platform off by \
          {residual_m:e} m; start elsewhere or keep away from this input"
@@ -195,7 +195,7 @@ pub enum ForwardError {
         /// The largest |fₖ| there, metres.
         residual_m: f64,
     },
-    /// A solution of the equations at which the mechanism cannot stand.
+    /// A solution of the equations in which the mechanism cannot stand.
     #[error(
         "solved, but not as the mechanism is assembled: {violated}; check the six inputs and the scenario's [mechanism]"
     )]
@@ -249,8 +249,8 @@ impl ForwardError {
         }
     }
 
-    /// What a side of the platform is off by where the iteration ended, metres; none where no
-    /// iteration ended short of a solution.
+    /// Error of a side of the platform at the iteration's end, metres; none without an iteration that ends short of a
+    /// solution.
     pub fn residual_m(&self) -> Option<f64> {
         match *self {
             Self::NoConvergence { residual_m, .. }

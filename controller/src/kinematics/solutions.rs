@@ -1,5 +1,4 @@
-//! All ways in which the mechanism can be assembled for one input, and how far an input without any is from one with
-//! some.
+//! All assemblies of the mechanism for one input, and the distance of an input without any from an input with some.
 //!
 //! [`LoopSolutions`] holds each solution of the loop equations once, before pose and certificate are computed: the
 //! choice of the true solution needs no more. A full description of every solution, [`Solutions`], costs several times
@@ -20,11 +19,11 @@ pub const MOST_SOLUTIONS: usize = 16;
 
 /// Estimates closer than this are one solution if one of them has a certificate, radians on every leg.
 const MERGED_WITHIN_RAD: f64 = 1e-6;
-/// The same if neither has: rounding alone moves an estimate this far next to a singularity.
+/// The same if neither has a certificate: next to a singularity rounding alone moves an estimate this far.
 const MERGED_UNCERTIFIED_WITHIN_RAD: f64 = 1e-4;
 /// A second solution is looked for unless the certificate excludes one within this distance, radians.
 pub(super) const CLOSE_RAD: f64 = 3e-4;
-/// How far from a nearly singular solution its neighbour is looked for, radians along the null direction.
+/// Distances of the search for the neighbour of a nearly singular solution, radians along the null direction.
 const NEIGHBOUR_DISTANCES_RAD: [f64; 12] =
     [1e-7, 3e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2];
 /// Iterations to the neighbour; where two solutions meet, each iteration only halves the error.
@@ -107,7 +106,8 @@ impl LoopSolutions {
         }
     }
 
-    /// Adds the second of two solutions that rounding has made one: a solution at a singularity is at least double.
+    /// Doubles a solution at a singularity without a second one: such a solution is at least double, and rounding has
+    /// joined the two.
     fn double_singular_ones(&mut self, loops: &LoopEquations<'_>) {
         for index in 0..self.count {
             let Some(closed) = self.all[index] else { continue };
@@ -166,14 +166,14 @@ fn is_certified(loops: &LoopEquations<'_>, closed: &LoopSolution) -> bool {
     Certificate::new(loops, &closed.residuals).is_some()
 }
 
-/// Which conditions of the true solution a platform meets.
+/// The conditions of the true solution that a platform meets.
 pub(super) fn assembly(loops: &LoopEquations<'_>, closed: &LoopSolution) -> Assembly {
     let corners = loops.corners(&closed.leg_angles);
     let determinant = loops.determinant(&closed.residuals);
     Assembly::from_corners(loops.mechanism, &loops.hinges, &corners, determinant)
 }
 
-/// How far the nearest of the others is, by the largest difference of any leg's angle, radians.
+/// Distance of the nearest other solution: the largest difference of any leg's angle, radians.
 pub(super) fn nearest_other_rad<'a>(
     leg_angles: &[LegAngle; LEGS],
     all: impl Iterator<Item = &'a [LegAngle; LEGS]>,
@@ -190,9 +190,9 @@ pub struct Solutions {
 }
 
 impl Solutions {
-    /// Solves completely; the module `elimination` has the reason why nothing is missed. No solution is a result, not
-    /// an error: the mechanism cannot be assembled. Two solutions that rounding does not separate are both there,
-    /// without a certificate.
+    /// Solves completely; the module `elimination` has the argument for completeness. No solution is a result, not an
+    /// error: the mechanism cannot be assembled. Two solutions that rounding does not separate are both there, without
+    /// a certificate.
     ///
     /// # Errors
     /// [`ForwardError::NotFinite`], [`ForwardError::NoLength`], and [`ForwardError::Undecided`] where
@@ -204,7 +204,7 @@ impl Solutions {
         Ok(Self { solutions: found.all.map(|one| one.map(|closed| Solution::new(&loops, &closed))) })
     }
 
-    /// How many there are.
+    /// The number of solutions.
     pub fn count(&self) -> usize {
         self.iter().count()
     }
@@ -219,8 +219,8 @@ impl Solutions {
         self.iter().filter(|solution| solution.assembly.is_true())
     }
 
-    /// How far the nearest other solution is from one of these: the largest difference of any leg's
-    /// angle, radians. None where there is no other.
+    /// Distance of the nearest other solution from one of these: the largest difference of any leg's angle, radians.
+    /// None without another solution.
     pub fn separation_rad(&self, solution: &Solution) -> Option<f64> {
         let others = self.iter().map(|other| &other.leg_angles);
         nearest_other_rad(&solution.leg_angles, others)
@@ -229,14 +229,15 @@ impl Solutions {
 
 /// Values of cos θ₁, each with four sets of angles to start from.
 const GRID: u32 = 32;
-/// Steps of one descent at most; it ends before when the error hardly decreases or the step hardly turns a leg.
+/// Most steps of one descent. A descent ends before when the error hardly decreases or the step hardly turns a leg.
 const STEPS: u32 = 40;
 /// A step that leaves more than this share of the error is the last.
 const HARDLY_LESS: f64 = 1.0 - 1e-5;
-/// So is one that turns no leg by more, radians.
+/// A step that turns no leg by more is also the last, radians.
 const HARDLY_TURNED_RAD: f64 = 1e-7;
 
-/// The least √(f₁² + f₂² + f₃²) found, metres. It takes many times as long as finding that there is no solution.
+/// The least √(f₁² + f₂² + f₃²) found, metres. The search takes many times as long as the proof that there is no
+/// solution.
 pub fn nearest_assembly_m(mechanism: &Mechanism, actuators: &Actuators) -> f64 {
     let loops = LoopEquations::new(mechanism, actuators);
     let equations = Equations::new(mechanism, actuators);
@@ -317,8 +318,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(2000))]
 
-        /// The leg angles that an input was made from are among its solutions, up to the singularity. Where rounding
-        /// leaves open which of two solutions is which, there are two without a certificate.
+        /// The original leg angles of an input are among its solutions, up to the singularity. If rounding does not
+        /// separate two solutions, there are two without a certificate.
         #[test]
         fn the_angles_an_input_came_from_are_found_near_singularities(singular in nearly_singular()) {
             let NearlySingular { mechanism, joints, determinant } = singular;
@@ -341,7 +342,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(300))]
 
-        /// What random starts lead to is among the solutions, and each of these is one.
+        /// The results of random starts are among the solutions, and each solution is valid.
         #[test]
         fn no_start_leads_to_a_solution_that_is_not_there(
             mechanism in mechanisms(), actuators in boxes(),
@@ -359,7 +360,7 @@ mod tests {
             }
         }
 
-        /// The four pairs of leg angles, watched on a dense grid: as many changes of sign as solutions.
+        /// The four pairs of leg angles on a dense grid have as many sign changes as solutions.
         #[test]
         fn a_dense_grid_counts_no_more_and_no_fewer(mechanism in mechanisms(), actuators in boxes()) {
             const GRID: u32 = 20_000;
@@ -415,7 +416,7 @@ mod tests {
         }
     }
 
-    /// The start with the least error does not lead to them.
+    /// The start with the least error does not lead to these solutions.
     #[test]
     fn solutions_far_from_the_best_start_are_found() {
         let inputs = [
@@ -438,7 +439,7 @@ mod tests {
         }
     }
 
-    /// Two legs so short that they cannot reach each other: their side alone has to give.
+    /// Two legs are too short to reach each other, so the error is that of their side alone.
     #[test]
     fn legs_that_cannot_meet_are_as_far_off_as_they_are_apart() {
         let actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [0.01, 0.01, 0.06] };

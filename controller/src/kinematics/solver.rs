@@ -1,8 +1,8 @@
 //! Two iterations for the equations: the paper's (Fig. 2) and plain Newton–Raphson.
 //!
-//! Both go in the Newton direction. The paper's reduces the increment until the error decreases; that
-//! stops oscillation and divergence but may stall in a local minimum. Either finds *a* solution near
-//! its guess; [`Assembly`](super::Assembly) judges which one.
+//! Both go in the Newton direction. The paper's iteration reduces the increment until the error decreases. This rule
+//! stops oscillation and divergence, but may stall in a local minimum. Either iteration finds *a* solution near its
+//! guess; [`Assembly`](super::Assembly) judges the solution.
 //!
 //! The text leaves two things open, and both are options. *The residual*: eq. 1 prints distances, and
 //! [`Residual::Distance`] is that reading. *The step rule*: "the increment is reduced" names no
@@ -19,21 +19,21 @@ use super::legs::LegAngle;
 use super::loop_equations::{LoopEquations, LoopSolution};
 use super::solution::{ForwardError, Solution};
 
-/// No options allow more iterations than this.
+/// Upper limit of the iterations in the options.
 pub const MAX_ITERATIONS: u32 = 100;
-/// No options allow more reductions of one increment than this.
+/// Upper limit of the reductions of one increment in the options.
 pub const MAX_HALVINGS: u32 = 40;
 
-/// ε: solved when the error (eq. 2) of the distances is not above it, cm², whatever residual the iteration goes by. The
-/// tolerance, 10⁻¹⁴ m for each side, lies a few hundred roundings above what double precision reaches at these sizes.
+/// ε: largest error (eq. 2) of the distances at a solution, cm², for every residual of the iteration. The tolerance,
+/// 10⁻¹⁴ m for each side, is a few hundred roundings above the limit of double precision at these sizes.
 const EPSILON_CM2: f64 = 1e-24;
 
 /// How to iterate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// What the iteration drives to zero.
+    /// The residual of the iteration.
     pub residual: Residual,
-    /// How the paper's algorithm reduces an increment; Newton–Raphson reduces none.
+    /// The step rule of the paper's algorithm; Newton–Raphson reduces no increment.
     pub step: StepRule,
     /// Iterations allowed; at most [`MAX_ITERATIONS`].
     pub max_iterations: u32,
@@ -52,7 +52,7 @@ impl Default for Options {
     }
 }
 
-/// Which iteration.
+/// The iteration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
     /// The paper's algorithm: Newton's direction, the increment reduced until the error decreases.
@@ -62,7 +62,7 @@ pub enum Method {
     Newton,
 }
 
-/// Which form of the equations gives the increment and must decrease.
+/// The form of the equations that gives the increment and must decrease.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Residual {
     /// |AᵢAⱼ| − Lᵢⱼ, metres: eq. 1 as printed.
@@ -72,7 +72,7 @@ pub enum Residual {
     SquaredDistance,
 }
 
-/// What "the increment is reduced" (Fig. 2) means.
+/// The meaning of "the increment is reduced" (Fig. 2).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StepRule {
     /// Halved until the error is smaller than before; every iteration begins with the full increment.
@@ -80,12 +80,12 @@ pub enum StepRule {
     Halving,
     /// The same, but the next iteration begins with twice the accepted share of its increment.
     CautiousHalving,
-    /// The line search of Numerical Recipes: a sufficient decrease, found through the parabola of
-    /// value, slope and last attempt, cut to between a tenth and a half.
+    /// The line search of Numerical Recipes for a sufficient decrease. The parabola of value, slope and last attempt
+    /// gives the factor, cut to between a tenth and a half.
     QuadraticBacktracking,
 }
 
-/// Solves from a guess of the leg angles (radians) by the method asked for.
+/// Solves from a guess of the leg angles (radians) by the given method.
 ///
 /// ```
 /// use masseter_controller::kinematics::{Method, Options, solve};
@@ -147,26 +147,26 @@ pub fn solve_traced(
 
 /// Below this the Newton direction is noise; unitless, see [`Equations::determinant`].
 const SMALLEST_DETERMINANT: f64 = 1e-10;
-/// The share of the decrease which the slope promises that counts as sufficient (Numerical Recipes).
+/// Sufficient share of the decrease that the slope predicts (Numerical Recipes).
 const SUFFICIENT_SHARE: f64 = 1e-4;
 
-/// What stays the same over the iterations.
+/// The constants of the iterations.
 struct Search<'a> {
     equations: Equations<'a>,
     method: Method,
     options: &'a Options,
 }
 
-/// One iteration as it went: the guess is number 0.
+/// The record of one iteration; the guess is number 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Iteration {
     /// From 0.
     pub number: u32,
-    /// The leg angles it arrived at, not wrapped, and the equations there.
+    /// The resulting leg angles, not wrapped, and the equations there.
     pub evaluation: Evaluation,
-    /// How often the increment was reduced before.
+    /// Number of reductions of the increment.
     pub halvings: u32,
-    /// The share of the Newton increment that was made.
+    /// The used share of the Newton increment.
     share: f64,
 }
 
@@ -178,7 +178,7 @@ impl Iteration {
 }
 
 impl Search<'_> {
-    /// What must vanish, in the form asked for; the sum of its squares must decrease.
+    /// The residual, in the given form. The sum of its squares must decrease.
     fn residual(&self, at: &Evaluation) -> Vector3<f64> {
         match self.options.residual {
             Residual::Distance => at.residual_m,
@@ -233,7 +233,7 @@ impl Search<'_> {
         None
     }
 
-    /// What the error must fall below. Along Newton's direction its slope is −2 errors per increment.
+    /// Upper limit of the new error. Along Newton's direction the slope of the error is −2 errors per increment.
     fn enough(&self, before: f64, share: f64) -> f64 {
         match self.options.step {
             StepRule::QuadraticBacktracking => before * (1.0 - 2.0 * SUFFICIENT_SHARE * share),
@@ -303,7 +303,7 @@ mod tests {
         );
     }
 
-    /// With leg 1 shorter than its hinge's distance from everything leg 2 reaches, nothing closes.
+    /// Leg 1 is shorter than its hinge's distance from the reach of leg 2, so nothing closes.
     #[test]
     fn what_cannot_be_assembled_is_a_typed_error() {
         let actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [0.01, 0.30, 0.30] };
@@ -331,7 +331,7 @@ mod tests {
         ) {
             let joints = mechanism.inverse(&pose).unwrap();
             let guess = std::array::from_fn(|leg| joints.theta_rad[leg] + off[leg]);
-            // A near guess cannot separate two solutions that are closer together than its error.
+            // A near guess does not separate two solutions that are closer together than its error.
             let here = Equations::new(&mechanism, &joints.actuators);
             prop_assume!(here.determinant(&here.evaluate(joints.theta_rad.into())).abs() > 0.2);
             let by = |method| solve(method, &mechanism, &joints.actuators, &guess, &default()).unwrap();
@@ -343,7 +343,7 @@ mod tests {
             }
         }
 
-        /// With every reading of the text that goes by the error of eq. 2.
+        /// The test covers every reading of the text with the error of eq. 2.
         #[test]
         fn the_papers_error_never_increases(
             actuators in [-0.03..0.03f64, -0.03..0.03f64, -0.03..0.03f64, 0.24..0.3f64, 0.24..0.3f64, 0.24..0.3f64],

@@ -46,8 +46,8 @@ pub(super) struct NearlySingular {
     pub determinant: f64,
 }
 
-/// Somewhere on a random path between two poses whose determinants have opposite signs, as near to the singularity as
-/// the determinant drawn between 10⁻¹ and 10⁻¹² says.
+/// A pose on a random path between two poses with determinants of opposite signs. A random determinant between 10⁻¹ and
+/// 10⁻¹² gives the distance to the singularity.
 pub(super) fn nearly_singular() -> impl Strategy<Value = NearlySingular> {
     let exponents = (-12.0..-1.0f64, prop::bool::ANY);
     let mechanisms = prop_oneof![Just(published_mechanism()), mechanisms()];
@@ -76,7 +76,7 @@ pub(super) fn nearly_singular() -> impl Strategy<Value = NearlySingular> {
     })
 }
 
-/// Angle between two orientations, radians; unlike the arc cosine it is exact near zero.
+/// Angle between two orientations, radians; unlike the arc cosine exact near zero.
 pub(super) fn angle_between(a: &Pose, b: &Pose) -> f64 {
     let turn: Vec3 = (a.rotation.inverse() * b.rotation).scaled_axis();
     turn.norm()

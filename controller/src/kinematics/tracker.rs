@@ -1,4 +1,4 @@
-//! Forward kinematics cycle by cycle: warm from the last solution, proven, and complete when not.
+//! Forward kinematics cycle by cycle: warm from the last solution with a proof, otherwise complete.
 //!
 //! A warm result is accepted only under these conditions:
 //! - Newton's iteration ended within `WARM_ITERATIONS`.
@@ -8,7 +8,7 @@
 //!   contains no second solution of its input.
 //!
 //! In every other case the complete method decides ([`solve_completely`]): the true solution among all, from the input
-//! alone. So the guess only saves time; it cannot make the result wrong.
+//! alone. So the guess only saves time, and cannot make the result wrong.
 
 use masseter_model::geometry::{Actuators, LEGS, Mechanism};
 
@@ -52,13 +52,13 @@ struct Last {
 }
 
 impl ForwardTracker {
-    /// A tracker without a solution yet.
+    /// A tracker without a solution.
     pub fn new(mechanism: Mechanism) -> Self {
         Self { mechanism, last: None, anchor: Anchor::nowhere() }
     }
 
-    /// A tracker that takes leg angles (radians) from elsewhere for its last solution. Good ones save
-    /// the first cycle the complete method, and settle an ambiguous input; bad ones cost time only.
+    /// A tracker with given leg angles (radians) as its last solution. Good angles save the complete method in the
+    /// first cycle, and settle an ambiguous input; bad angles cost time only.
     pub fn with_guess(mechanism: Mechanism, theta_rad: [f64; LEGS]) -> Self {
         let leg_angles = theta_rad.map(LegAngle::from_rad);
         let last = Some(Last { leg_angles, theta_rad, unique_within_rad: f64::INFINITY });
@@ -89,7 +89,7 @@ impl Last {
         Self { leg_angles: solution.leg_angles, theta_rad: solution.theta_rad, unique_within_rad }
     }
 
-    /// The true solution that continues this one, if the iteration finds and proves it.
+    /// The true solution that continues this one, if the iteration finds and proves a solution.
     #[inline]
     fn continued(&self, loops: &LoopEquations<'_>, anchor: &mut Anchor) -> Option<Solution> {
         let closed = loops.close(&self.leg_angles, WARM_ITERATIONS)?;
@@ -99,7 +99,7 @@ impl Last {
         (self.is_within(reach_rad, &solution) && solution.assembly.is_true()).then_some(solution)
     }
 
-    /// Angles on either side of ±π count as far apart, which costs time and nothing else.
+    /// Angles on either side of ±π count as far apart, which costs only time.
     #[inline]
     fn is_within(&self, reach_rad: f64, solution: &Solution) -> bool {
         each(|leg| (solution.theta_rad[leg] - self.theta_rad[leg]).abs() < reach_rad) == [true; LEGS]
@@ -121,10 +121,10 @@ impl Last {
 /// ```
 ///
 /// # Errors
-/// [`ForwardError::NotFinite`] and [`ForwardError::NoLength`] for what is no input;
-/// [`ForwardError::Unassemblable`] without any solution, [`ForwardError::WrongAssembly`] without a
-/// true one, [`ForwardError::Ambiguous`] with more than one; [`ForwardError::Singular`] and
-/// [`ForwardError::Undecided`] where solutions meet or rounding is too large for a certificate.
+/// [`ForwardError::NotFinite`] and [`ForwardError::NoLength`] for an invalid input. [`ForwardError::Unassemblable`]
+/// without any solution, [`ForwardError::WrongAssembly`] without a true solution, [`ForwardError::Ambiguous`] with more
+/// than one. [`ForwardError::Singular`] and [`ForwardError::Undecided`] where solutions meet or rounding is too large
+/// for a certificate.
 #[doc(alias("direct kinematics", "forward kinematics", "FK"))]
 pub fn solve_completely(mechanism: &Mechanism, actuators: &Actuators) -> Result<Solution, ForwardError> {
     check_input(actuators)?;
@@ -169,7 +169,7 @@ fn judged(loops: &LoopEquations<'_>) -> Result<Solution, ForwardError> {
     }
 }
 
-/// How far the nearest two of the true ones are apart, radians.
+/// Distance of the nearest two true solutions, radians.
 fn separation_rad(loops: &LoopEquations<'_>, solutions: &LoopSolutions) -> f64 {
     let true_ones = || solutions.true_ones(loops).map(|closed| &closed.leg_angles);
     let nearest = true_ones().filter_map(|leg_angles| nearest_other_rad(leg_angles, true_ones()));
@@ -203,7 +203,7 @@ mod tests {
         )
     }
 
-    /// Mostly inputs within the strokes, but any axis may be any number.
+    /// Mostly inputs within the strokes; any axis may be any number.
     fn any_numbers() -> impl Strategy<Value = Actuators> {
         let or_any = |low: f64, high: f64| prop_oneof![30 => low..high, 1 => prop::num::f64::ANY];
         let axes = (prop::array::uniform3(or_any(-0.03, 0.03)), prop::array::uniform3(or_any(0.24, 0.3)));
@@ -256,7 +256,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(2000))]
 
-        /// Whatever the guess, also one that is no number: the same answer as without one.
+        /// Every guess, also one that is no number, gives the same answer as no guess.
         #[test]
         fn no_guess_makes_the_result_wrong(
             slide_m in prop::array::uniform3(-0.03..0.03f64),
@@ -275,7 +275,7 @@ mod tests {
             }
         }
 
-        /// Whatever came before: what an input alone does not settle, the last solution may.
+        /// For every history: the last solution may settle an input that is ambiguous alone.
         #[test]
         fn any_numbers_end_in_what_they_mean_alone(inputs in prop::collection::vec(any_numbers(), 3)) {
             let mut tracker = ForwardTracker::new(published_mechanism());
@@ -296,7 +296,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(1000))]
 
-        /// Up to the singularity, where the true solution and another can no longer be separated.
+        /// The test goes up to the singularity, where the true solution and another are not separable.
         #[test]
         fn no_true_solution_is_called_a_wrong_assembly(singular in nearly_singular()) {
             let NearlySingular { mechanism, joints, determinant } = singular;

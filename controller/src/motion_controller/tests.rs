@@ -1,4 +1,4 @@
-//! Scenarios of the controller alone: a plant that does what it is told, and one thing that goes wrong.
+//! Scenarios of the controller alone: an obedient plant, and one disturbance.
 
 use masseter_model::geometry::{AXES, Actuators, Conditioning, Jacobian, LEGS, MechanismConfig};
 use masseter_runtime::messages::codes::{Cause, DriveRequest, DriveState, EventKind, NO_DRIVE_STATE};
@@ -27,13 +27,13 @@ fn trajectory(scenario: &Scenario) -> Trajectory {
     Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism(), scenario.duration_s).unwrap()
 }
 
-/// A plant that stands two cycles later where it was told to, and does what was requested at once.
+/// A plant that reaches its targets two cycles later, and obeys requests at once.
 struct Bench {
     controller: MotionController,
     cycle: u64,
     commands: [Command; 2],
     events: Vec<Event>,
-    /// The largest step of any axis from one target that the drives took to the next, m.
+    /// The largest step of any axis between two targets of the drives, m.
     largest_step_m: f64,
 }
 
@@ -75,7 +75,7 @@ impl Bench {
         }
     }
 
-    /// A cycle with the reading that `disturb` makes of the good one.
+    /// A cycle with a good reading changed by `disturb`.
     fn cycle(&mut self, disturb: impl FnOnce(Reading) -> Option<Reading>) {
         let reading = disturb(self.reading());
         let command = self.controller_cycle(reading.as_ref());
@@ -102,7 +102,7 @@ impl Bench {
         self.commands = [last, command];
     }
 
-    /// Cycles that the controller misses: the drives reach their last target and hold it.
+    /// Cycles that the controller misses: the drives reach and hold their last target.
     fn controller_stalls(&mut self, cycles: u64) {
         self.cycle += cycles;
         self.commands[0] = self.commands[1];
@@ -212,7 +212,8 @@ fn a_condition_number_is_computed_every_ten_cycles_and_held_in_between() {
     assert!(changes.len() >= 4 && changes.windows(2).all(|pair| pair[1] - pair[0] == 10), "{changes:?}");
 }
 
-/// As after its drives were off: the encoders may count the end of the stroke as outside, or it was pushed there.
+/// As after drives without power: the encoders may count the end of the stroke as outside, or a push has moved the axis
+/// there.
 #[test]
 fn axes_slightly_outside_their_strokes_are_eased_back() {
     let lowest_m = MechanismConfig::default().strokes.leg_m[0];

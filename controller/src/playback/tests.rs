@@ -1,4 +1,4 @@
-//! The desired pose moves forward on its path, and comes to rest where it is told to.
+//! The desired pose moves forward on its path, and comes to rest at its end.
 
 use masseter_model::geometry::{MechanismConfig, Vec3};
 use masseter_scenario::JawConfig;
@@ -20,7 +20,7 @@ fn playback() -> Playback {
     Playback::new(trajectory(), EASE_S, RAMP_S, 1.0)
 }
 
-/// As found at the start: shifted and turned against the first pose of the motion.
+/// A pose at the start: shifted and turned against the first pose of the motion.
 fn start() -> Pose {
     trajectory().pose(0.0) * Pose::new(Vec3::new(2e-3, -3e-3, 4e-3), Vec3::new(0.05, -0.04, 0.03))
 }
@@ -182,7 +182,7 @@ fn half_the_amplitude_is_half_of_the_incisal_points_way() {
     }
 }
 
-/// Limits a tenth above what the motion takes of each, and changes of both at all its phases.
+/// Limits a tenth above the demands of the motion, and changes of both at all its phases.
 #[test]
 fn changes_of_rate_and_amplitude_keep_the_limits_of_the_axes() {
     let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();

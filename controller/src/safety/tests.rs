@@ -65,7 +65,7 @@ fn a_command_that_was_not_sent_yet_is_another_controllers() {
     assert_eq!(answers(8), Err(Fault::new(Cause::ForeignCommand, 8.0, 7.0)));
 }
 
-/// Codes of a drive: whether it is a fault at rest, and while the platform moves. A lost drive has code 0.
+/// Codes of a drive: whether the code is a fault at rest, and in motion. A lost drive has code 0.
 #[test]
 fn a_drive_in_fault_is_one_always_and_any_that_is_not_enabled_while_moving() {
     for axis in 0..AXES {

@@ -1,9 +1,9 @@
-//! Whether the mechanism can follow a trajectory, before anything moves.
+//! The check that the mechanism can follow a trajectory, before any motion.
 //!
-//! The whole trajectory is sampled at the controller's cycle: inverse kinematics, the conditions of
-//! the true solution, strokes, velocities and accelerations by differences, and conditioning. It does
-//! not look at forces, nor at how the rig gets to the first pose, nor at the trim: a target that the trim
-//! carries beyond a stroke is held at its end.
+//! The check samples the whole trajectory at the controller's cycle. It covers inverse kinematics, the conditions of
+//! the true solution, strokes, velocities and accelerations by differences, and conditioning. Forces, the way to the
+//! first pose, and the trim are not part of the check. A target that the trim carries beyond a stroke is held at the
+//! stroke's end.
 
 use masseter_model::geometry::{
     AXES, AXIS_NAMES, Conditioning, Jacobian, LEGS, Mechanism, Pose, StrokeLimits,
@@ -30,7 +30,7 @@ pub struct TrajectoryReport {
 }
 
 impl TrajectoryReport {
-    /// What is left of each stroke at its nearer end, metres.
+    /// Margin of each stroke at its nearer end, metres.
     pub fn margin_m(&self, strokes: &StrokeLimits) -> [f64; AXES] {
         std::array::from_fn(|axis| {
             let [lowest_m, highest_m] = strokes.of_axis(axis);
@@ -55,7 +55,7 @@ impl TrajectoryReport {
 /// ```
 ///
 /// # Errors
-/// The first sample that the mechanism or the limits do not allow: when, where in the file, and why.
+/// The first sample that the mechanism or the limits do not allow, with time, place in the file, and reason.
 pub fn check(
     trajectory: &Trajectory,
     mechanism: &Mechanism,
@@ -82,14 +82,14 @@ pub fn check(
     Ok(survey.report)
 }
 
-/// The check under way: the last two samples, and the report so far.
+/// The running check: the last two samples, and the report so far.
 struct Survey<'a> {
     mechanism: &'a Mechanism,
     limits: &'a TrajectoryLimitsConfig,
     period_s: f64,
     last_m: Option<[f64; AXES]>,
     last_m_s: Option<[f64; AXES]>,
-    /// Of the last pose that needed one of its own.
+    /// Conditioning of the last pose with its own computation.
     conditioning: Option<Conditioning>,
     report: TrajectoryReport,
 }

@@ -4,12 +4,12 @@ use masseter_model::geometry::Vec3;
 use nalgebra::Vector6;
 use serde::Serialize;
 
-/// Below this everywhere, a file may hold metres where it should hold millimetres, m and rad.
+/// A file with smaller values everywhere may hold metres in place of millimetres, m and rad.
 const STILL_M: f64 = 1e-4;
 const STILL_RAD: f64 = 2e-3;
 /// No jaw opens further, m.
 const WIDEST_M: f64 = 0.1;
-/// A jaw glides so far without a turn, m. One that opens turns by 0.6 to 0.7° a millimetre; a sixth of that is
+/// Longest glide of a jaw without a turn, m. An opening jaw turns by 0.6 to 0.7° a millimetre; a sixth of that is
 /// doubtful.
 const GLIDE_M: f64 = 0.012;
 const TURN_DEG_PER_M: f64 = 100.0;
@@ -18,16 +18,16 @@ const CLOSED_M: f64 = 0.01;
 const CLOSED_RAD: f64 = 0.1;
 /// The least deviation of a row, m.
 const LEAST_M: f64 = 1e-3;
-/// By how much a glitch exceeds what is usual: deviation, and speed.
+/// Factors by which a glitch exceeds the usual deviation and speed.
 const DEVIATION: f64 = 4.0;
 const SPEED: f64 = 1.5;
-/// Rows on each side that show what is usual.
+/// Rows on each side for the usual values.
 const AROUND: usize = 4;
-/// Rows of one glitch are no further apart.
+/// Largest distance of the rows of one glitch.
 const ONE: usize = 3;
 
-/// The rows of a recording as they were recorded: translation of the incisal point (m) from the closed pose, and
-/// rotation vector (rad) from the first row's orientation.
+/// The original rows of a recording: translation of the incisal point (m) from the closed pose, and rotation vector
+/// (rad) from the first row's orientation.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rows<'a> {
     pub time_s: &'a [f64],
@@ -38,7 +38,7 @@ pub(super) struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// Where the incisal point is in a row, m.
+    /// Place of the incisal point in a row, m.
     fn place_m(&self, row: usize) -> Vec3 {
         self.coordinates[row].fixed_rows::<3>(0).into_owned()
     }
@@ -59,7 +59,7 @@ impl Rows<'_> {
     }
 }
 
-/// What is doubtful in the rows, each with a line. Glitches are not part of it.
+/// The doubts about the rows, each with a line, without glitches.
 pub(super) fn doubts(rows: &Rows) -> Vec<String> {
     not_closed(rows).into_iter().chain(units(rows)).collect()
 }
@@ -112,16 +112,16 @@ pub(super) fn jumps(glitches: &[Glitch]) -> Option<String> {
 
 /// A row that leaves the path of its neighbours: a glitch of the tracker.
 ///
-/// A glitch is a row that lies off the straight way between its neighbours, and is reached or left faster than usual.
-/// The deviation is above 1 mm and above four times the usual one of the rows around. A jaw that stops at the teeth
-/// stops hard, and is no faster before. Jumps of the orientation alone are not looked for.
+/// A glitch is a row off the straight way between its neighbours, with a faster step than usual before or after the
+/// row. The deviation is above 1 mm and above four times the usual deviation of the rows around. A jaw that stops at
+/// the teeth stops hard, but is no faster before. The search ignores jumps of the orientation alone.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Glitch {
     /// Line of the file.
     pub line: u64,
     /// Time of the row since the first, s.
     pub time_s: f64,
-    /// How far the incisal point jumps, m.
+    /// Length of the incisal point's jump, m.
     pub jump_m: f64,
     /// Time between the two rows of the jump, s.
     pub within_s: f64,
@@ -155,7 +155,7 @@ fn glitch(rows: &Rows, row: usize) -> Glitch {
     }
 }
 
-/// How the rows follow each other.
+/// Deviations and steps of the rows.
 struct Steps {
     /// Of each row from the straight way between its neighbours; 0 at the ends.
     deviation_m: Vec<f64>,
@@ -178,7 +178,7 @@ impl Steps {
         Self { deviation_m, speed_m_s }
     }
 
-    /// Whether a row between others is one.
+    /// Whether a row between others is a glitch.
     fn is_glitch(&self, row: usize) -> bool {
         let deviation_m = self.deviation_m[row];
         let usual = |values: &[f64]| before(values, row - 1).max(after(values, row + 2));

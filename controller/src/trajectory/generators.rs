@@ -10,17 +10,17 @@ use super::{TrajectoryError, ranges_of};
 
 /// Share of the opening after which a swing to the side begins: the jaw opens near the midline.
 const SWING_BEGINS: f64 = 0.3;
-/// Advance of the balancing condyle beyond which no jaw goes, metres.
+/// Largest advance of a balancing condyle, metres.
 const CHEWING_BALANCING_M: f64 = 0.02;
-/// A condyle may go back from the closed pose by as much as to the retruded contact, metres.
+/// Way of a condyle back from the closed pose to the retruded contact, metres.
 const LARGEST_RETRUSION_M: f64 = 0.001;
-/// Points of the cycle at which the path is proven before it is played.
+/// Points of the cycle for the check of the path before its use.
 const PROOF_POINTS: u32 = 256;
 /// Condylar advance a radian of opening, m/rad.
 const ADVANCE_PER_PITCH_M: f64 = 0.0148 / (32.2 * std::f64::consts::PI / 180.0);
-/// Widest opening that is looked for, radians (measured: up to 41.8°).
+/// Widest opening in the search, radians (measured: up to 41.8°).
 const LARGEST_PITCH_RAD: f64 = 0.8;
-/// Farthest advance of the balancing condyle that is looked for, metres.
+/// Farthest advance of the balancing condyle in the search, metres.
 const LARGEST_BALANCING_M: f64 = 0.025;
 
 /// Chewing: a tear-drop loop of the incisal point.
@@ -53,7 +53,7 @@ impl Chewing {
             back_m: anterior_posterior_mm / 1000.0,
             balancing_m: 0.0,
         };
-        // A point that is out of reach without a swing is reported as such.
+        // A point out of reach without a swing has an error of its own.
         chewing.prove()?;
         chewing.balancing_m = chewing.balancing_for(lateral_mm, side.sign())?;
         chewing.prove()?;
@@ -62,7 +62,7 @@ impl Chewing {
 
     /// Displacement of the jaw from the closed pose, jaw frame.
     pub(super) fn displacement(&self, motion_s: f64) -> Pose {
-        // Postures exist at all proven points; a gap between two would be a jump, which `check` stops.
+        // Postures exist at all checked points. `check` finds the jump of a gap between two points.
         let posture = self.posture(self.cycle.phase(motion_s)).unwrap_or_default();
         self.mandible.displacement(&posture)
     }
@@ -105,10 +105,10 @@ impl Chewing {
 /// Opening, protrusion and lateral excursion: a straight way through the mandible's postures to the
 /// farthest one, and back.
 ///
-/// Opening advances the condyles in proportion to its angle, 14.8 mm in 32.2° (Kordaß 2014, n = 259:
-/// 14.5 and 15.1 mm right and left), from the first millimetre on (Mehl 2025). Protrusion glides
-/// along the condylar path without turning; in a lateral excursion the balancing condyle advances
-/// alone. Simplified: no tooth guides the jaw near the closed pose.
+/// Opening advances the condyles in proportion to its angle, from the first millimetre on (Mehl 2025). The advance is
+/// 14.8 mm in 32.2° (Kordaß 2014, n = 259: 14.5 and 15.1 mm right and left). Protrusion glides along the condylar path
+/// without a turn. In a lateral excursion the balancing condyle advances alone. Simplified: no tooth guides the jaw
+/// near the closed pose.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Excursion {
     mandible: Mandible,
@@ -170,7 +170,7 @@ fn farthest(amplitude_mm: f64, highest: f64, travel_m: impl Fn(f64) -> f64) -> R
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MotionRhythm {
     rate_hz: f64,
-    /// The phase at which the jaw is widest open.
+    /// The phase of the widest opening.
     opening: f64,
     closing: f64,
 }
@@ -187,17 +187,17 @@ impl MotionRhythm {
         Ok(Self { rate_hz, opening, closing })
     }
 
-    /// Where in its cycle the motion is, 0 to 1.
+    /// Place of the motion in its cycle, 0 to 1.
     fn phase(&self, motion_s: f64) -> f64 {
         (motion_s * self.rate_hz).rem_euclid(1.0)
     }
 
-    /// How far out of the closed pose, 0 to 1.
+    /// Share of the way from the closed pose, 0 to 1.
     fn opened(&self, phase: f64) -> f64 {
         if phase < self.opening { minimum_jerk(phase / self.opening) } else { self.returning(phase) }
     }
 
-    /// How far to the working side, 0 to 1: later out than [`opened`](Self::opened), back with it.
+    /// Share of the way to the working side, 0 to 1: later out than [`opened`](Self::opened), and back with it.
     fn swung(&self, phase: f64) -> f64 {
         let begin = SWING_BEGINS * self.opening;
         if phase < self.opening {
@@ -211,9 +211,9 @@ impl MotionRhythm {
         1.0 - minimum_jerk((phase - self.opening) / self.closing)
     }
 
-    /// The time of as many whole cycles as fit, at least one, s.
+    /// Time of the whole cycles that fit, at least one, s.
     pub(super) fn whole_cycles_s(&self, available_s: f64) -> f64 {
-        // The tiny surplus keeps a fit that is exact from falling to one cycle less by rounding.
+        // The tiny surplus keeps an exact fit from losing a cycle by rounding.
         (available_s * self.rate_hz + 1e-9).floor().max(1.0) / self.rate_hz
     }
 }

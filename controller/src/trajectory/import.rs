@@ -1,7 +1,7 @@
-//! Reading a recorded motion of the lower jaw: from a CSV file to a [`Recording`] in the jaw frame.
+//! Import of a recorded motion of the lower jaw: from a CSV file to a [`Recording`] in the jaw frame.
 //!
-//! Comments start with `#`; the header decides between poses and markers. A file is used whole or
-//! refused with line, reason and remedy: nothing is guessed, skipped or repaired.
+//! Comments start with `#`; the header decides between poses and markers. The import takes a whole file, or refuses the
+//! file with line, reason and remedy. The import guesses, skips and repairs nothing.
 
 use masseter_model::geometry::{Pose, Vec3};
 use masseter_scenario::input::read_text;
@@ -15,11 +15,12 @@ use super::{TrajectoryError, require};
 
 /// The names of a file's axes, each with its direction.
 pub(super) const SIGNED_AXES: [&str; 6] = ["+x", "-x", "+y", "-y", "+z", "-z"];
-/// Within this of 1 a quaternion counts as rounded, beyond it as wrong.
+/// Largest difference of a quaternion's length from 1 by rounding; beyond it the quaternion is wrong.
 const NORM_TOLERANCE: f64 = 1e-3;
 /// A triangle lower than this share of its longest side fixes no orientation.
 const FLATTEST: f64 = 0.05;
-/// Markers on one rigid carrier change their distances by noise only; a jaw tracker's is 0.03 mm.
+/// Largest change of the markers' distances. On one rigid carrier only noise changes them; a jaw tracker's noise is
+/// 0.03 mm.
 const LARGEST_CHANGE_M: f64 = 0.002;
 const SIDES: [(usize, usize); 3] = [(0, 1), (1, 2), (2, 0)];
 
@@ -28,7 +29,7 @@ pub(super) fn import(config: &FileConfig, jaw: &JawConfig) -> Result<Recording, 
     Source::read(config, jaw)?.recording().map(|(_, recording)| recording)
 }
 
-/// A file that was read, with what its numbers mean.
+/// A file's content, with the meaning of its numbers.
 pub(super) struct Source<'a> {
     config: &'a FileConfig,
     axes: Axes,
@@ -96,7 +97,7 @@ fn axes_and_table(config: &FileConfig) -> Result<(Axes, Table), Located> {
     Ok((axes, table))
 }
 
-/// Refuses a key that the file's format does not use: ignoring it would hide a mistake.
+/// Refuses a key without a use in the file's format, because an ignored key hides a mistake.
 fn check_points(config: &FileConfig, format: Format) -> Result<(), String> {
     let (key, of, holds) = match format {
         Format::Poses if config.marker_origin_mm.is_some() => ("marker_origin_mm", "markers", "poses"),
@@ -106,12 +107,12 @@ fn check_points(config: &FileConfig, format: Format) -> Result<(), String> {
     Err(format!("motion.{key} is for files of {of}, and this one holds {holds}; leave it away"))
 }
 
-/// From a file's axes to the jaw frame's (anterior, left, up): a signed permutation that keeps the hand.
+/// The map from a file's axes to the jaw frame's (anterior, left, up): a signed permutation that keeps the hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Axes(UnitQuaternion<f64>);
 
 impl Axes {
-    /// From names such as "+y": which file axis points anterior, left and up.
+    /// The map by the names of the file's axes that point anterior, left and up, such as "+y".
     pub(super) fn parse(names: &[String; 3]) -> Result<Self, String> {
         let refuse = |reason: &str| {
             format!(
@@ -150,8 +151,8 @@ fn direction(name: &str) -> Option<Vec3> {
     Some(Vec3::ith(index / 2, if index % 2 == 0 { 1.0 } else { -1.0 }))
 }
 
-/// Displacement of the incisal point and the jaw from that of a reference point fixed to the jaw, given in the jaw
-/// frame at the closed pose, metres.
+/// Displacement of the incisal point and the jaw from that of a reference point on the jaw. The reference point is in
+/// the jaw frame at the closed pose, metres.
 fn displacement_of_pose(values: &[f64], axes: &Axes, reference: &Vec3) -> Result<Pose, String> {
     let moved = axes.vector(&(Vec3::from_column_slice(&values[..3]) / 1000.0));
     let quaternion = Quaternion::new(values[3], values[4], values[5], values[6]);
@@ -169,8 +170,8 @@ fn displacement_of_pose(values: &[f64], axes: &Axes, reference: &Vec3) -> Result
 /// Places of the three markers, m.
 type Markers = [Vec3; 3];
 
-/// Displacement of the jaw since the first row by the rigid motion of three markers (Kabsch 1976); `origin` is the
-/// incisal point at the closed pose in file coordinates, metres, by default the markers' centroid.
+/// Displacement of the jaw since the first row by the rigid motion of three markers (Kabsch 1976). `origin` is the
+/// incisal point at the closed pose in file coordinates, metres; by default the markers' centroid.
 fn displacement_of_markers(
     first: &[f64],
     values: &[f64],
@@ -194,7 +195,7 @@ fn rigid_motion(from: &Markers, to: &Markers) -> Pose {
         from.iter().zip(to).map(|(a, b)| (b - to_centre) * (a - from_centre).transpose()).sum();
     let svd = covariance.svd_unordered(true, true);
     let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return Pose::identity() };
-    // Three points lie in a plane: their least singular value is 0, and its axis may come mirrored.
+    // Three points lie in a plane, so their least singular value is 0, and its axis may be mirrored.
     let mut upright = Matrix3::identity();
     let least = svd.singular_values.imin();
     upright[(least, least)] = (u * v_t).determinant().signum();

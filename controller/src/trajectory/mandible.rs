@@ -1,10 +1,10 @@
 //! The mandible as a rigid body on two condylar paths, and its place on the platform.
 //!
-//! Condyles and incisal point form Bonwill's triangle, inclined to the occlusal plane by Balkwill's
-//! angle. A posture is how far both condyles have advanced along the sagittal path, how much further
-//! the balancing condyle has, and the pitch about the line between them. The balancing path turns
-//! inward by the Bennett angle; the working condyle is free to shift sideways by as much as the
-//! fixed distance between the condyles demands (the Bennett movement, about half a millimetre).
+//! Condyles and incisal point form Bonwill's triangle, inclined to the occlusal plane by Balkwill's angle. A posture
+//! has three coordinates. They are the advance of both condyles along the sagittal path, the further advance of the
+//! balancing condyle, and the pitch about their line. The balancing path turns inward by the Bennett angle. The working
+//! condyle shifts sideways as the fixed distance between the condyles demands (the Bennett movement, about half a
+//! millimetre).
 //!
 //! Simplified: the paths are straight, working and balancing side share their inclination, and
 //! neither discs, muscles nor tooth contacts guide anything.
@@ -16,7 +16,7 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use super::{TrajectoryError, ranges_of, require};
 use crate::kinematics::solve_completely;
 
-/// An amplitude that is missed by no more is reached, mm.
+/// Largest error of a reached amplitude, mm.
 const REACHED_MM: f64 = 1e-6;
 
 /// A rigid mandible; jaw frame at the closed pose.
@@ -24,7 +24,7 @@ const REACHED_MM: f64 = 1e-6;
 pub(super) struct Mandible {
     /// Middle between the condyles.
     middle: Vec3,
-    /// How far the incisal point lies below the condyles, seen from them, rad.
+    /// Angle of the incisal point below the condyles, seen from the condyles, rad.
     declination_rad: f64,
     width_m: f64,
     path: Vec3,
@@ -54,7 +54,7 @@ impl Posture {
     }
 }
 
-/// What the balancing condyle alone does to the line between the condyles.
+/// Effect of the balancing condyle alone on the line between the condyles.
 struct CondylarLine {
     shift: Vec3,
     turn: UnitQuaternion<f64>,
@@ -102,12 +102,12 @@ impl Mandible {
         })
     }
 
-    /// For motions in which both sides do the same.
+    /// A mandible for symmetric motions.
     pub(super) fn symmetric(jaw: &JawConfig, inclination_deg: f64) -> Result<Self, TrajectoryError> {
         Self::new(jaw, inclination_deg, 0.0, JawSide::Left)
     }
 
-    /// Displacement of the jaw from the closed pose: where the incisal point went, and the turn.
+    /// Displacement of the jaw from the closed pose: the way of the incisal point, and the turn.
     pub(super) fn displacement(&self, posture: &Posture) -> Pose {
         let line = self.condylar_line(posture.balancing_m);
         let pitch = UnitQuaternion::from_axis_angle(&Vec3::y_axis(), posture.pitch_rad);
@@ -116,11 +116,11 @@ impl Mandible {
         Pose::from_parts((middle - rotation * self.middle).into(), rotation)
     }
 
-    /// The posture that brings the incisal point to these coordinates in the midsagittal plane with
-    /// the balancing condyle advanced; where to the side it comes to lie follows. None out of reach.
+    /// The posture with the incisal point at these coordinates in the midsagittal plane and this advance of the
+    /// balancing condyle. The lateral coordinate follows. None out of reach.
     ///
-    /// The incisal point lies at its fixed distance from the condyles' middle M + c u, in the plane
-    /// across their line: a quadratic in the advance c.
+    /// The incisal point lies at its fixed distance from the condyles' middle M + c u, in the plane across their line.
+    /// This condition is a quadratic in the advance c.
     pub(super) fn posture_at(&self, anterior_m: f64, up_m: f64, balancing_m: f64) -> Option<Posture> {
         let line = self.condylar_line(balancing_m);
         let across = |x: f64, z: f64| {
@@ -163,8 +163,8 @@ fn turn_of_y_to(direction: &Vec3) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(half)
 }
 
-/// The coordinate in 0..=`highest` at which the incisal point's travel (metres, rising from 0) is an amplitude; where
-/// there is no travel, the coordinate is too high. Sixty halvings exhaust double precision.
+/// The coordinate in 0..=`highest` at which the incisal point's travel (metres, rising from 0) is an amplitude. A
+/// coordinate without a travel is too high. Sixty halvings exhaust double precision.
 pub(super) fn reach(
     name: &str,
     amplitude_mm: f64,
@@ -189,8 +189,8 @@ pub(super) fn reach(
 
 /// The jaw on the platform: from displacements of the lower jaw to poses of the platform.
 ///
-/// Platform = closed · X · T · X⁻¹, where X is the jaw frame in the platform frame at the closed pose: origin at the
-/// incisal point, axes parallel to the base's.
+/// Platform = closed · X · T · X⁻¹, where X is the jaw frame in the platform frame at the closed pose. The jaw frame
+/// has its origin at the incisal point, and axes parallel to the base's.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct JawFrame {
     /// closed · X: the jaw frame in the base frame.
@@ -206,7 +206,7 @@ impl JawFrame {
         Ok(Self { jaw: closed * jaw_in_platform, platform_in_jaw: jaw_in_platform.inverse() })
     }
 
-    /// The platform in the base frame when the jaw is displaced from the closed pose.
+    /// The platform in the base frame for a displacement of the jaw from the closed pose.
     pub(super) fn platform(&self, displacement: &Pose) -> Pose {
         self.jaw * displacement * self.platform_in_jaw
     }
@@ -217,7 +217,7 @@ fn jaw_in_platform(jaw: &JawConfig, closed: &Pose) -> Pose {
     Pose::from_parts(Translation3::from(jaw.reference_point_m), closed.rotation.inverse())
 }
 
-/// The platform in the base frame when the jaw is closed.
+/// The platform in the base frame for the closed jaw.
 ///
 /// # Errors
 /// When a value lies outside its range, or no such pose exists.
@@ -231,7 +231,7 @@ pub fn closed_pose(jaw: &JawConfig, mechanism: &Mechanism) -> Result<Pose, Traje
     Ok(Translation3::from(closed_offset_m) * closed.pose)
 }
 
-/// Incisal point, right and left condyle in the platform frame, when the jaw is closed at that pose.
+/// Incisal point, right and left condyle in the platform frame, with the closed jaw at that pose.
 ///
 /// # Errors
 /// When a dimension of the mandible lies outside its range.
@@ -265,7 +265,7 @@ mod tests {
         }
     }
 
-    /// Where the condyles have gone, working and balancing, metres.
+    /// Ways of the condyles, working and balancing, metres.
     fn condyles(mandible: &Mandible, displacement: &Pose) -> [Vec3; 2] {
         [1.0, -1.0].map(|side| {
             let at = mandible.middle + Vec3::y() * (side * mandible.working * mandible.width_m / 2.0);

@@ -1,10 +1,10 @@
 //! Trajectories: the desired pose of the platform as a function of time.
 //!
-//! A trajectory is built once from a scenario (here files are read, motions solved and memory allocated) and then
-//! evaluated in the loop, without allocation and without iteration. It comes from a generator on a rigid mandible
-//! ([`MotionConfig`](masseter_scenario::MotionConfig)'s kinds) or from a recording, starts and ends at rest, and moves
-//! nothing by itself: [`check`] judges beforehand whether the mechanism can follow it. The way of the rig to the first
-//! pose is not part of it.
+//! The constructor builds a trajectory once from a scenario: it reads files, solves motions and allocates memory. The
+//! loop evaluates the trajectory without allocation and without iteration. A trajectory comes from a generator on a
+//! rigid mandible ([`MotionConfig`](masseter_scenario::MotionConfig)'s kinds) or from a recording, and starts and ends
+//! at rest. [`check`] judges beforehand whether the mechanism can follow. The rig's way to the first pose is not part
+//! of a trajectory.
 
 mod check;
 mod doubts;
@@ -27,8 +27,7 @@ pub use mandible::{closed_jaw_points, closed_pose};
 pub use motion::Trajectory;
 pub use survey::{Gap, PointFigures, Range, RecordingSurvey, StepFigures, SurveyRow, survey};
 
-/// A motion that cannot be built or followed: the key, or the line of the recording, what is wrong there, and the
-/// remedy.
+/// A motion that cannot be built or followed: the key or the line of the recording, the error there, and the remedy.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct TrajectoryError(String);
@@ -39,7 +38,7 @@ fn require(name: &str, value: f64, holds: bool, need: &str) -> Result<(), Trajec
     if holds && value.is_finite() { Ok(()) } else { Err(problem()) }
 }
 
-/// Refuses a number out of the range that is declared beside its key, in this table.
+/// Refuses a number out of the declared range of its key, in this table.
 fn ranges_of(table: &str) -> impl Fn(&str, section::Range, f64) -> Result<(), TrajectoryError> {
     move |key, range, number| {
         if range.contains(number) {
@@ -49,7 +48,7 @@ fn ranges_of(table: &str) -> impl Fn(&str, section::Range, f64) -> Result<(), Tr
     }
 }
 
-/// The pose at a share of the way from one pose to another: position and turn by as much.
+/// The pose at a share of the way from one pose to another, for position and turn.
 pub(crate) fn interpolate(from: &Pose, to: &Pose, share: f64) -> Pose {
     let turn = from.rotation.rotation_to(&to.rotation).scaled_axis() * share;
     let position = from.translation.vector.lerp(&to.translation.vector, share);

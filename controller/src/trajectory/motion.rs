@@ -1,5 +1,5 @@
-//! A motion of the jaw on the platform, and its own clock: it starts and stops smoothly, so that any motion starts and
-//! ends at rest while its path stays what it is.
+//! A motion of the jaw on the platform, with a clock of its own. The clock starts and stops smoothly, so that any
+//! motion starts and ends at rest on its unchanged path.
 
 use masseter_model::geometry::{Mechanism, Pose};
 use masseter_scenario::{JawConfig, MotionConfig};
@@ -11,10 +11,10 @@ use super::mandible::JawFrame;
 use super::recording::Recording;
 use super::{TrajectoryError, interpolate, require};
 
-/// How long the clock takes to reach full speed, and to stop, s.
+/// Time of the clock to full speed, and to a stop, s.
 const RAMP_S: f64 = 0.5;
 
-/// Less is rounding, s.
+/// Largest difference of times by rounding, s.
 const SHORTEST_CUT_S: f64 = 1e-6;
 
 /// Duration of a generated motion without `duration_s`, s.
@@ -51,7 +51,7 @@ impl Trajectory {
     /// for 10 s and a recording to its end.
     ///
     /// # Errors
-    /// When a value lies outside its range, the file cannot be used, or no closed pose exists.
+    /// For a value outside its range, an unusable file, or a missing closed pose.
     pub fn new(
         config: &MotionConfig,
         jaw: &JawConfig,
@@ -73,7 +73,7 @@ impl Trajectory {
         Ok(Self { motion, clock, frame })
     }
 
-    /// The same motion at a share of its speed.
+    /// The motion at a share of its speed.
     #[must_use]
     pub fn slowed(mut self, speed: f64) -> Self {
         self.clock = self.clock.slowed(speed);
@@ -86,7 +86,7 @@ impl Trajectory {
         self.pose_in_motion(self.motion_time_s(t_s))
     }
 
-    /// The same with a share of the jaw's way from its first pose.
+    /// The platform with a share of the jaw's way from its first pose.
     pub(crate) fn scaled_pose(&self, t_s: f64, amplitude: f64) -> Pose {
         if amplitude >= 1.0 {
             return self.pose(t_s);
@@ -106,18 +106,18 @@ impl Trajectory {
         self.frame.platform(&Pose::identity())
     }
 
-    /// How far the motion has come `t_s` seconds after the start, s: of a recording, the time since its first row. It
-    /// passes more slowly while the motion gathers speed and while it comes to rest.
+    /// Progress of the motion `t_s` seconds after the start, s: for a recording, the time since its first row. This
+    /// time passes more slowly at the start and at the end of the motion.
     pub fn motion_time_s(&self, t_s: f64) -> f64 {
         self.clock.motion_time_s(t_s)
     }
 
-    /// How long the trajectory lasts, s.
+    /// Duration of the trajectory, s.
     pub fn duration_s(&self) -> f64 {
         self.clock.duration_s
     }
 
-    /// How long the whole motion would take, s, where the duration cuts it: it then ends somewhere on its way.
+    /// Time of the whole motion, s, if the duration cuts the motion: the motion then ends on its way.
     pub fn cut_from_s(&self) -> Option<f64> {
         self.clock.cut_from_s()
     }
@@ -129,7 +129,7 @@ impl Trajectory {
         recording.centroid_turn_deg
     }
 
-    /// What is doubtful in a recording, each with its line; nothing for a generator.
+    /// The doubts about a recording, each with its line; none for a generator.
     pub fn doubts(&self) -> Vec<String> {
         let Motion::Recording(recording) = &self.motion else { return Vec::new() };
         recording.doubts.iter().cloned().chain(jumps(&recording.glitches)).collect()
@@ -143,7 +143,7 @@ impl Trajectory {
 }
 
 impl Motion {
-    /// Generators play whole cycles only, so that they end closed, but for a duration in which not even one fits.
+    /// Generators play whole cycles only, and so end closed. A duration shorter than one cycle is the exception.
     fn clock(&self, duration_s: Option<f64>) -> MotionClock {
         let cycle = match self {
             Self::Chewing(chewing) => &chewing.cycle,
@@ -170,27 +170,27 @@ impl Motion {
 /// Maps the trajectory's time to the motion's time.
 #[derive(Debug, Clone, Copy)]
 struct MotionClock {
-    /// Share of real time at which it runs.
+    /// Speed of the clock as a share of real time.
     speed: f64,
     ramp_s: f64,
     stopped_s: f64,
     duration_s: f64,
-    /// What the motion takes to its end.
+    /// Time of the motion to its end.
     whole_s: f64,
 }
 
 impl MotionClock {
     /// A clock for a motion of some length in a trajectory of some duration, both above 0.
     ///
-    /// A ramp covers half its time, so a motion takes one ramp longer than its length. What is left
-    /// of the duration is held; what does not fit into it is cut.
+    /// A ramp covers half its time, so a motion takes one ramp longer than its length. The last pose fills a longer
+    /// duration; a shorter duration cuts the motion.
     fn new(length_s: f64, duration_s: f64) -> Self {
         let ramp_s = RAMP_S.min(length_s).min(duration_s / 2.0);
         let whole_s = length_s + RAMP_S.min(length_s);
         Self { speed: 1.0, ramp_s, stopped_s: duration_s.min(length_s + ramp_s), duration_s, whole_s }
     }
 
-    /// The same clock at a share of its speed.
+    /// The clock at a share of its speed.
     fn slowed(self, speed: f64) -> Self {
         Self {
             speed: self.speed * speed,
@@ -200,7 +200,7 @@ impl MotionClock {
         }
     }
 
-    /// What the motion would take to its end, s, where the duration cuts it by more than rounding.
+    /// Time of the motion to its end, s, if the duration cuts the motion by more than rounding.
     fn cut_from_s(&self) -> Option<f64> {
         (self.duration_s < self.whole_s - SHORTEST_CUT_S).then_some(self.whole_s)
     }

@@ -1,7 +1,7 @@
 //! A recording as a smooth curve of jaw displacements.
 //!
-//! Samples become translation and rotation vector (from the first sample's orientation), are spread
-//! to an even grid, low-passed and joined by a spline, twice continuously differentiable.
+//! Samples become translation and rotation vector (from the first sample's orientation) on an even grid. A low-pass and
+//! a spline make the curve twice continuously differentiable.
 
 use std::f64::consts::{PI, SQRT_2};
 use std::path::PathBuf;
@@ -12,15 +12,15 @@ use nalgebra::{SVector, UnitQuaternion, Vector6};
 use super::doubts::{Glitch, Rows, doubts, glitches};
 use super::table::Located;
 
-/// Least rate of the even grid, Hz: well above what a jaw does. What is sampled faster keeps its rate, because what a
-/// slower grid cannot hold would return on it as slow motion, which the filter passes.
+/// Least rate of the even grid, Hz, well above the frequencies of a jaw. Faster samples keep their rate, because a
+/// slower grid turns their high frequencies into slow motion, which the filter passes.
 const LEAST_GRID_HZ: f64 = 200.0;
-/// A turn by more than this moves the incisal point otherwise than the markers' centroid by what matters: 1.4 mm where
-/// they are 40 mm apart.
+/// Largest turn for which the markers' centroid can stand for the incisal point: 1.4 mm of difference at a distance of
+/// 40 mm.
 const CENTROID_TURN_DEG: f64 = 2.0;
-/// Beyond this, rotation vectors are no longer a good measure of the way between two poses.
+/// Largest turn for which rotation vectors are a good measure of the way between two poses.
 const LARGEST_TURN_DEG: f64 = 90.0;
-/// How long the reflected ends are, in periods of the corner frequency.
+/// Length of the reflected ends, in periods of the corner frequency.
 const MARGIN_PERIODS: f64 = 3.0;
 
 /// A row of the file: jaw displacement in the jaw frame, metres.
@@ -41,15 +41,15 @@ pub(super) struct Recording {
     curve: Spline<6>,
     /// The largest turn, degrees, if it makes the markers' centroid a bad substitute for the incisal point.
     pub centroid_turn_deg: Option<f64>,
-    /// What is doubtful beside the glitches, with the line.
+    /// Other doubts than the glitches, with the line.
     pub doubts: Vec<String>,
     /// Rows that leave the path of their neighbours.
     pub glitches: Vec<Glitch>,
 }
 
 impl Recording {
-    /// From samples at strictly increasing times; a corner of 0 leaves them unfiltered. `are_of_centroid`: whether the
-    /// samples are displacements of the markers' centroid, because the incisal point is not given.
+    /// A recording from samples at strictly increasing times; a corner of 0 leaves them unfiltered. `are_of_centroid`:
+    /// whether the samples are displacements of the markers' centroid, for lack of the incisal point.
     pub(super) fn new(
         path: PathBuf,
         samples: &[Sample],
@@ -92,7 +92,7 @@ impl Recording {
         Pose::from_parts(Vec3::new(at[0], at[1], at[2]).into(), self.first_rotation * turn)
     }
 
-    /// File and line whose time is nearest.
+    /// File and line with the nearest time.
     pub(super) fn source_line(&self, motion_s: f64) -> String {
         let right = self.time_s.partition_point(|&t_s| t_s < motion_s).min(self.time_s.len() - 1);
         let left = right.saturating_sub(1);
@@ -135,7 +135,7 @@ struct Spline<const N: usize> {
 }
 
 impl<const N: usize> Spline<N> {
-    /// Through at least two values at strictly increasing times.
+    /// The spline through at least two values at strictly increasing times.
     fn through(time_s: Vec<f64>, values: Vec<SVector<f64, N>>) -> Self {
         assert!(time_s.len() >= 2 && time_s.len() == values.len(), "a curve needs two knots");
         let curvatures = curvatures(&time_s, &values);
@@ -159,7 +159,7 @@ impl<const N: usize> Spline<N> {
     }
 }
 
-/// Elimination in the tridiagonal system that equal slopes on both sides of each knot make.
+/// Elimination in the tridiagonal system for equal slopes on both sides of each knot.
 fn curvatures<const N: usize>(time_s: &[f64], values: &[SVector<f64, N>]) -> Vec<SVector<f64, N>> {
     let knots = time_s.len();
     let span = |left: usize| time_s[left + 1] - time_s[left];
@@ -182,8 +182,8 @@ fn curvatures<const N: usize>(time_s: &[f64], values: &[SVector<f64, N>]) -> Vec
 /// A low-pass without delay: a second-order Butterworth filter forwards, then backwards. Both passes together reach −3
 /// dB at the corner, which must lie below half the rate of the evenly spaced values.
 ///
-/// Both ends are extended by their own point reflection and the filter starts settled, so that the first and the last
-/// value stay where they are.
+/// A point reflection extends both ends, and the filter starts settled, so that the first and the last value stay
+/// unchanged.
 fn lowpass<const N: usize>(values: &[SVector<f64, N>], rate_hz: f64, corner_hz: f64) -> Vec<SVector<f64, N>> {
     let margin = ((MARGIN_PERIODS * rate_hz / corner_hz).ceil() as usize).min(values.len().saturating_sub(1));
     let filter = Butterworth::new(rate_hz, corner_hz);
@@ -212,7 +212,7 @@ struct Butterworth {
 
 impl Butterworth {
     fn new(rate_hz: f64, corner_hz: f64) -> Self {
-        // Two passes of a second-order filter multiply its attenuation; this moves −3 dB back.
+        // Two passes of a second-order filter multiply its attenuation; this factor moves −3 dB back.
         let two_passes = (SQRT_2 - 1.0).powf(0.25);
         let k = (PI * corner_hz / rate_hz).tan() / two_passes;
         let scale = 1.0 / (1.0 + SQRT_2 * k + k * k);

@@ -1,7 +1,6 @@
-//! What a recorded motion holds, before it is played.
+//! A survey of a recorded motion, before its use.
 //!
-//! Everything here describes the file. Whether the mechanism can follow the motion is judged by
-//! [`check`](super::check).
+//! The survey describes the file. [`check`](super::check) judges whether the mechanism can follow the motion.
 
 use masseter_model::geometry::{Pose, Vec3};
 use masseter_scenario::{FileConfig, JawConfig};
@@ -14,26 +13,25 @@ use super::mandible::jaw_points;
 use super::recording::{Recording, Sample};
 use super::table::{Format, Located, Row, Table};
 
-/// A step longer than this many usual ones is a gap.
+/// A step longer than this many usual steps is a gap.
 const GAP_STEPS: f64 = 1.5;
 const POINTS: [&str; 3] = ["incisal point", "right condyle", "left condyle"];
 /// Components of the rotation vector: about the axes that point anterior, left and up.
 const TURNS: [&str; 3] = ["roll to the right", "opening", "yaw to the left"];
-/// Rows looked at.
+/// Most rows of a survey.
 const ROWS: usize = 200;
 /// A turn that shows the axis of opening fully, rad.
 const CLEAR_RAD: f64 = 0.05;
-/// A jaw reaches so far from the closed place only by opening, m.
+/// Distance from the closed place that a jaw reaches only by opening, m.
 const OPENED_M: f64 = 0.015;
-/// A motion shows its axes from this score on, of less than 2.5, and others than the stated ones only by this much
-/// more.
+/// Least score for axes shown by a motion, of less than 2.5, and least surplus of other axes than the stated ones.
 const LEAST: f64 = 0.6;
 const BETTER: f64 = 0.5;
 /// Weights of the incisal point's way back, and of the condyles' way forward.
 const BACK: f64 = 0.25;
 const FORWARD: f64 = 0.25;
 
-/// What a recorded motion holds.
+/// The survey of a recorded motion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RecordingSurvey {
     /// `poses` or `markers`.
@@ -60,9 +58,9 @@ pub struct RecordingSurvey {
     pub turn_deg: f64,
     /// Rows that leave the path of their neighbours.
     pub glitches: Vec<Glitch>,
-    /// What may not be the motion of a jaw, each with a line.
+    /// Doubts about the motion of a jaw, each with a line.
     pub doubts: Vec<String>,
-    /// The file's axes that point anterior, left and up, where the motion shows others than the stated ones.
+    /// The file's axes that point anterior, left and up, if the motion shows other axes than the stated ones.
     pub likely_axes: Option<[String; 3]>,
     /// The rows in the jaw frame.
     #[serde(skip)]
@@ -101,7 +99,7 @@ pub struct Gap {
 /// Least and greatest value.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Range {
-    /// Of what.
+    /// The quantity.
     pub name: &'static str,
     /// The least value.
     pub least: f64,
@@ -109,7 +107,7 @@ pub struct Range {
     pub greatest: f64,
 }
 
-/// Where a point of the jaw goes.
+/// The way of a point of the jaw.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PointFigures {
     /// Its name.
@@ -138,7 +136,7 @@ pub struct SurveyRow {
 /// Reads a file and describes its motion.
 ///
 /// # Errors
-/// When the file cannot be used: its line, the reason and a remedy.
+/// For an unusable file: the line, the reason and a remedy.
 pub fn survey(config: &FileConfig, jaw: &JawConfig) -> Result<RecordingSurvey, TrajectoryError> {
     let source = Source::read(config, jaw)?;
     let (samples, recording) = source.recording()?;
@@ -251,11 +249,11 @@ fn point_figures(
     }
 }
 
-/// The axes under which the motion opens, where the stated ones do not do so: which axes of the file are likely to
-/// point anterior, left and up, from what a jaw does when it opens widest.
+/// The file's axes that are likely to point anterior, left and up, if the motion does not open under the stated axes.
+/// The widest opening of the jaw decides.
 ///
-/// Then the incisal point goes down, rather back than forward and hardly aside, the jaw turns about the axis that
-/// points left, and the condyles go forward. A recording without an opening shows nothing of that.
+/// At the widest opening the incisal point goes down, rather back than forward, and hardly aside. The jaw turns about
+/// the axis that points left, and the condyles go forward. A recording without an opening gives no axes.
 fn likely_axes(source: &Source, stated: &[String; 3]) -> Option<[String; 3]> {
     let (mut best, mut score_of_stated) = (None::<(f64, [String; 3])>, f64::NEG_INFINITY);
     let pairs = SIGNED_AXES.iter().flat_map(|anterior| SIGNED_AXES.map(|left| (*anterior, left)));
@@ -275,7 +273,7 @@ fn likely_axes(source: &Source, stated: &[String; 3]) -> Option<[String; 3]> {
     (most >= LEAST && most >= score_of_stated + BETTER).then_some(names)
 }
 
-/// How much the widest row looks like an opened jaw.
+/// Similarity of the widest row to an opened jaw.
 fn score(source: &Source, axes: &Axes) -> Result<f64, Located> {
     let rows = &source.table.rows;
     let first = source.displacement(&rows[0], axes)?;

@@ -10,13 +10,13 @@ use masseter_scenario::wording::counted;
 
 use super::TrajectoryError;
 
-/// Fewer rows are no motion.
+/// Least rows of a motion.
 const FEWEST_ROWS: usize = 4;
-/// Samples that are closer are repeats: the slope between them would be the clock's noise, s.
+/// Least time between samples, s. Closer samples are repeats: the slope between them is the clock's noise.
 const SHORTEST_STEP_S: f64 = 1e-6;
 /// The longest time without a sample that interpolation may bridge, s.
 const LARGEST_GAP_S: f64 = 0.25;
-/// A marker's place in the frame of any tracker is closer to its origin, mm.
+/// Largest distance of a marker from the origin of any tracker, mm.
 pub(super) const LARGEST_MM: f64 = 1e5;
 
 const POSES: [&str; 8] = ["time_s", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"];
@@ -30,7 +30,7 @@ const MARKERS: [&str; 10] = [
 pub(super) struct Located {
     /// The line, from 1; none where the file as a whole is at fault.
     pub line: Option<u64>,
-    /// What is wrong, with its remedy: for the person who corrects the file.
+    /// The error and its remedy, for the author of the file.
     pub problem: String,
 }
 
@@ -49,7 +49,7 @@ impl Located {
     }
 }
 
-/// What a header announces.
+/// The content by the header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Format {
     Poses,

@@ -55,7 +55,7 @@ fn largest(values: &[SVector<f64, AXES>]) -> f64 {
     values.iter().map(SVector::amax).fold(0.0, f64::max)
 }
 
-/// A jump of the acceleration would show as a jerk that grows as the period shrinks.
+/// A jump of the acceleration shows as a jerk that grows as the period shrinks.
 #[test]
 fn generated_motions_are_twice_continuously_differentiable() {
     for motion in generators() {

@@ -7,8 +7,8 @@ fn place(bench: &Bench, name: &str) -> usize {
     bench.controller.declared().place_of(name).unwrap()
 }
 
-/// Plays the motion, with a change of both in its middle; the largest distance of the estimated from the desired
-/// position.
+/// Plays the motion, with a change of both in its middle. Returns the largest distance of the estimated from the
+/// desired position.
 fn worst_m(rate: f64, amplitude: f64) -> (f64, Bench) {
     let mut bench = Bench::new();
     bench.run_until(ControllerState::Running);

@@ -1,4 +1,4 @@
-//! What goes wrong, and that the controller stops for it with the cause.
+//! The controller stops for every disturbance, with its cause.
 
 use masseter_runtime::messages::explain;
 
@@ -19,7 +19,7 @@ fn a_stop_for_want_of_a_pose_says_why_there_is_none() {
     }
 }
 
-/// Every disturbance while the motion plays, and the cause it must be reported with.
+/// Every disturbance of the playing motion, with its cause.
 #[test]
 fn whatever_goes_wrong_while_moving_ends_in_a_safe_stop_with_its_cause() {
     type Disturbance = fn(Reading) -> Option<Reading>;
@@ -92,7 +92,7 @@ fn a_bad_reading_is_reported_with_its_bad_value() {
     }
 }
 
-/// Its quick stop may still be under way, and the command must go on asking for it.
+/// The quick stop of the drive may still be under way, and the command must keep requesting the stop.
 #[test]
 fn a_safe_stop_waits_for_a_lost_drive_until_its_time_is_over() {
     let mut bench = Bench::new();

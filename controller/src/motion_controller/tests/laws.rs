@@ -1,4 +1,4 @@
-//! Pose laws of a user: what they may do, and that whatever they do wrong ends in a safe stop with its cause.
+//! Pose laws of a user: a valid law works, and every error of a law ends in a safe stop with its cause.
 
 use masseter_model::geometry::Vec3;
 use masseter_runtime::messages::explain;
@@ -29,7 +29,7 @@ fn bench(law: fn(&Demand) -> Result<Pose, LawFailed>) -> Bench {
     Bench { controller, ..Bench::new() }
 }
 
-/// A law of a user that computes what the default one does.
+/// A law of a user with the computation of the default law.
 #[derive(Debug)]
 struct Copied(PoseControl);
 
@@ -46,7 +46,7 @@ fn a_law_equal_to_the_default_one_gives_equal_commands_whether_warmed_up_or_not(
     let controller = MotionController::with_law(&scenario, mechanism(), trajectory(&scenario), law);
     let (mut default, mut own) = (Bench::new(), Bench { controller, ..Bench::new() });
     while own.controller.state() != ControllerState::Finished {
-        // Work in advance must not reach the law: it would integrate an error twice.
+        // Work in advance must not reach the law, which then integrates an error twice.
         own.controller.warm_up();
         default.cycle(Some);
         own.cycle(Some);

@@ -1,4 +1,4 @@
-//! What the controller commands: no axis beyond its velocity limit, and a requested stop that only slows down.
+//! Commands keep every axis within its velocity limit, and a requested stop only slows down.
 
 use super::*;
 

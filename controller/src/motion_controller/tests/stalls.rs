@@ -1,4 +1,4 @@
-//! Readings that come late, and processes that stand still for a while.
+//! Late readings, and processes that stand still for a while.
 
 use super::*;
 
@@ -20,7 +20,7 @@ fn a_late_reading_is_compared_with_the_desired_pose_at_its_own_sample() {
     assert!((desired - at_its_time).norm() < 1e-12);
 }
 
-/// Each for 15 cycles, and what the run is longer by.
+/// Each for 15 cycles, with the extra length of the run.
 #[test]
 fn after_a_stall_the_motion_continues_from_the_position_of_the_drives_without_a_burst() {
     type Stall = fn(&mut Bench);

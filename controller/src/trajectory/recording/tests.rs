@@ -38,7 +38,7 @@ fn a_smooth_motion_is_kept_with_and_without_the_filter() {
     }
 }
 
-/// 195 Hz sampled at 200 Hz would be 5 Hz.
+/// 195 Hz sampled at 200 Hz looks like 5 Hz.
 #[test]
 fn fast_noise_of_a_fast_recording_does_not_become_slow_motion() {
     let trembling =
