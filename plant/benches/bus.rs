@@ -45,7 +45,7 @@ fn wire() -> VirtualWire {
     })
 }
 
-/// Lets everything arrive, and fetches it at every port and at the tap.
+/// Lets all frames arrive, and fetches them at every port and at the tap.
 fn settle(wire: &mut VirtualWire) {
     while let Some(event_ns) = wire.next_event_ns() {
         wire.advance(event_ns);
@@ -101,7 +101,7 @@ fn plant(bencher: Bencher<'_, '_>) {
     plant_of(bencher, &Scenario::default());
 }
 
-/// The same with bristles, teeth, food and a load cell.
+/// The plant with bristles, teeth, food and a load cell.
 #[divan::bench]
 fn plant_with_everything(bencher: Bencher<'_, '_>) {
     let mut scenario = Scenario {

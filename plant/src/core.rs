@@ -1,7 +1,7 @@
 //! The plant as a pure step function: master, wires, drives and mechanism.
 //!
-//! Time is an argument of every call, exact or as irregular as real time. The core reads no clock and publishes nothing;
-//! the [process](crate::process) does.
+//! Time is an argument of every call, exact or as irregular as real time. The core reads no clock and publishes
+//! nothing; the [process](crate::process) does both.
 
 #[cfg(test)]
 mod tests;
@@ -25,7 +25,7 @@ use crate::simulator::emulation::virtual_link::VirtualLink;
 use crate::simulator::injection::Injector;
 use crate::state::state;
 
-/// Tapped frames kept between two drains, of which one follows every cycle.
+/// Tapped frames kept between two drains. A drain follows every cycle.
 const TAPPED: usize = 4096;
 
 /// The plant.
@@ -60,7 +60,7 @@ pub struct PlantCore<L = VirtualLink> {
     pub(crate) link: L,
     buses: usize,
     cycle: u64,
-    /// With the index of its bus.
+    /// The tapped frames, with the index of the bus.
     tapped: Vec<(u16, Tapped)>,
     wire_events: Journal,
     injector: Injector,
@@ -93,8 +93,8 @@ pub fn check_scenario(scenario: &Scenario) -> Result<(), PlantError> {
     check_boot_time(scenario)
 }
 
-/// The drives must be able to boot within the controller's time: every bus carries one SDO exchange a cycle, and then
-/// the readings must be steady for some cycles.
+/// Refuses a controller's start time that is too short for the boot of the drives. Every bus carries one SDO exchange a
+/// cycle, and then the readings must be steady for some cycles.
 fn check_boot_time(scenario: &Scenario) -> Result<(), PlantError> {
     let Scenario { can, controller, rate_hz, .. } = scenario;
     let fullest = can.buses.iter().map(Vec::len).max().unwrap_or(0);
@@ -140,7 +140,7 @@ impl<L: Link> PlantCore<L> {
         self.cycle
     }
 
-    /// Simulates everything up to `now_ns` now, instead of when the next cycle begins.
+    /// Simulates up to `now_ns` now, instead of at the beginning of the next cycle.
     pub fn advance(&mut self, now_ns: u64) -> Result<(), PlantError> {
         Ok(self.link.advance(now_ns)?)
     }
@@ -154,8 +154,7 @@ impl<L: Link> PlantCore<L> {
         Ok(())
     }
 
-    /// Simulates everything up to `now_ns` and takes the frames that have arrived; returns whether the process data of all
-    /// drives are in.
+    /// Simulates up to `now_ns`, and takes the arrived frames. Returns whether the process data of all drives are in.
     pub fn collect(&mut self, now_ns: u64) -> Result<bool, PlantError> {
         self.link.advance(now_ns)?;
         self.collect_taps(now_ns);
@@ -169,14 +168,14 @@ impl<L: Link> PlantCore<L> {
         reading.load_cell_n = self.link.load_cell_n();
     }
 
-    /// The mechanism's true motion at the cycle's SYNC, where it is emulated here.
+    /// The mechanism's true motion at the cycle's SYNC, for an emulated mechanism.
     pub fn truth(&self) -> Option<Truth> {
         let mut truth = Truth { cycle: self.cycle, ..self.link.truth()? };
         truth.round();
         Some(truth)
     }
 
-    /// The forces between the jaws in the cycle before this one, where they are emulated here and can touch.
+    /// The forces between the jaws in the last cycle, for emulated jaws that can touch.
     pub fn contact(&self) -> Option<Contact> {
         let mut contact = Contact { cycle: self.cycle, ..self.link.contact()? };
         contact.round();
@@ -205,7 +204,7 @@ impl<L: Link> PlantCore<L> {
         self.injector.alter(self.cycle, sampled_ns, now_ns, command)
     }
 
-    /// Takes what the emulation reports, and gives the link the times that have become known.
+    /// Takes the reports of the emulation, and gives the link the newly known times.
     fn follow_injections(&mut self) {
         while let Some(occurrence) = self.link.next_occurrence() {
             self.injector.note(&occurrence, self.cycle);
@@ -215,7 +214,7 @@ impl<L: Link> PlantCore<L> {
         }
     }
 
-    /// Hands out the frames and errors tapped since the last drain. They are encoded only now, after the reading.
+    /// Hands out the frames and errors tapped since the last drain. Their encoding comes only now, after the reading.
     pub fn drain_frames(&mut self) -> impl ExactSizeIterator<Item = FrameTap> {
         self.tapped.drain(..).map(|(bus, tapped)| tap::encode(bus, &tapped))
     }

@@ -1,5 +1,5 @@
-//! The order of the plant's cycle, the same in real time, in lockstep and under virtual time. The clock and the
-//! transport are the caller's: see [`PlantPorts`].
+//! The order of the plant's cycle, the same in real time, in lockstep and under virtual time. The caller provides clock
+//! and transport: see [`PlantPorts`].
 
 use std::borrow::Borrow;
 
@@ -13,11 +13,11 @@ use crate::core::PlantCore;
 use crate::error::PlantError;
 use crate::master::link::Link;
 
-/// Where the plant's messages come from and go to, and how the plant waits.
+/// Source and destinations of the plant's messages, and the plant's waits.
 pub trait PlantPorts<L: Link> {
     /// A command, owned or in shared memory.
     type Command: Borrow<Command>;
-    /// Why a cycle could not be completed.
+    /// The reason for an incomplete cycle.
     type Error: From<PlantError>;
 
     /// Now, ns.
@@ -35,7 +35,7 @@ pub trait PlantPorts<L: Link> {
     /// When the message cannot be sent.
     fn publish_reading(&mut self, fill: impl FnOnce(&mut Reading)) -> Result<(), Self::Error>;
 
-    /// Publishes what the mechanism did.
+    /// Publishes the truth of the mechanism.
     ///
     /// # Errors
     /// When the message cannot be sent.
@@ -47,8 +47,7 @@ pub trait PlantPorts<L: Link> {
     /// When the message cannot be sent.
     fn publish_contact(&mut self, contact: &Contact) -> Result<(), Self::Error>;
 
-    /// The command of this cycle. If it does not come in time, the newest that there is; none if there is none.
-    /// `wake` is the cycle's SYNC.
+    /// The command of this cycle; if late, the newest command, if any. `wake` is the cycle's SYNC.
     ///
     /// # Errors
     /// When the messages cannot be received.
@@ -61,7 +60,8 @@ pub trait PlantPorts<L: Link> {
     fn publish_frames_and_events(&mut self, plant: &mut PlantCore<L>) -> Result<(), Self::Error>;
 }
 
-/// Runs one cycle: SYNC, process data, reading, truth, contact, command; then frames and events, for which nobody waits.
+/// Runs one cycle: SYNC, process data, reading, truth, contact, command; then frames and events, which nobody waits
+/// for.
 ///
 /// ```
 /// use masseter_plant::core::PlantCore;
@@ -143,8 +143,9 @@ pub fn end_cycle<L: Link, P: PlantPorts<L>>(
 /// confirmed after the ramp.
 const FEWEST_AFTER: u64 = 10;
 
-/// Stops the drives, and runs the cycles that follow the controller's last one, without commands: for [`AFTER_STOP_S`], so that a
-/// fall or a drift after the stop is recorded. `wait` waits for each cycle; those that it skips count.
+/// Stops the drives, and runs the cycles after the controller's last one, without commands. The time is
+/// [`AFTER_STOP_S`], so that the recording has a fall or a drift after the stop. `wait` waits for each cycle; skipped
+/// cycles count.
 ///
 /// # Errors
 /// Those of the plant, of the ports and of the wait.
@@ -164,7 +165,7 @@ pub fn run_after_controller<L: Link, P: PlantPorts<L>>(
     Ok(())
 }
 
-/// How many cycles of this period follow the controller's last one.
+/// Number of cycles of this period after the controller's last cycle.
 fn cycles_after(period_ns: u64) -> u64 {
     ((AFTER_STOP_S * SECOND_NS as f64) as u64).div_ceil(period_ns).max(FEWEST_AFTER)
 }

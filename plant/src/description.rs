@@ -1,6 +1,6 @@
-//! Descriptions of drives for other tools: the electronic data sheet of an emulated drive (EDS, CiA 306), the messages
-//! of all buses (DBC), and what was read from a drive as a device configuration file (DCF, CiA 306). The first two follow
-//! from the emulated drives' object dictionary.
+//! Descriptions of drives for other tools. The electronic data sheet of an emulated drive (EDS, CiA 306) and the
+//! messages of all buses (DBC) follow from the emulated drives' object dictionary. A device configuration file (DCF,
+//! CiA 306) holds the survey of a drive.
 //!
 //! A description is that of one scenario: the scenario's values are its default values, scales and identifiers.
 //! Positions in the DBC are in metres, forces in newtons; segments of SDO are not decoded.
@@ -53,14 +53,14 @@ const MASTER: &str = "Master";
 /// Receiver of messages to all nodes.
 const ANYBODY: &str = "Vector__XXX";
 
-/// A signal of a message, little endian, that begins where the signal before ends.
+/// A signal of a message, little endian, behind the previous signal.
 struct Signal {
     name: String,
     bits: usize,
     is_signed: bool,
     factor: f64,
     unit: &'static str,
-    /// Lowest and highest value in that unit; none where every value can come.
+    /// Lowest and highest value in that unit; none for any value.
     range: Option<[f64; 2]>,
 }
 
@@ -170,8 +170,8 @@ fn message(id: CanId, name: &str, [sender, receiver]: [&str; 2], signals: &[Sign
     format!("BO_ {} {name}: {} {sender}\n{}\n", id.number(), start / 8, lines.concat())
 }
 
-/// How often each message that comes regularly does so, ms: heartbeats, and SYNC with the PDOs that follow it. Whole
-/// milliseconds alone can be said, so that a faster SYNC has no such time.
+/// Periods of regular messages, ms: heartbeats, and SYNC with its PDOs. The format has whole milliseconds only, so a
+/// faster SYNC has no period.
 fn cycle_times(drives: &[DriveSettings; AXES], period_ns: u64) -> String {
     let heartbeat_ms =
         |settings: &DriveSettings| u64::from(settings.objects.get(names::PRODUCER_HEARTBEAT_TIME_MS));
@@ -198,7 +198,7 @@ fn values(cob: Cob, signal: &str, names: &[(u8, &str)]) -> String {
     format!("VAL_ {} {signal} {} ;\n", CanId::from(cob).number(), names.join(" "))
 }
 
-/// Objects that CiA 301 makes mandatory.
+/// Mandatory objects of CiA 301.
 const MANDATORY: [u16; 3] = [0x1000, 0x1001, 0x1018];
 
 /// The file, lines ended by a line feed.
@@ -280,7 +280,7 @@ fn describe(entry: &Entry, objects: &Objects) -> String {
     )
 }
 
-/// What was read from a drive as a device configuration file (CiA 306), which has no other objects.
+/// The survey of a drive as a device configuration file (CiA 306), without other objects.
 pub fn dcf(survey: &Survey, node: u8, name: &str) -> String {
     let mut objects: BTreeMap<u16, Vec<(ObjectAddress, &[u8])>> = BTreeMap::new();
     for (object, value) in survey.readings() {

@@ -1,4 +1,4 @@
-//! Errors of the plant: every reason why it cannot be built or cannot continue.
+//! Errors of the plant: every reason why a plant cannot be built or cannot continue.
 
 use std::path::PathBuf;
 
@@ -36,9 +36,9 @@ pub enum PlantError {
     Table {
         /// The file.
         path: PathBuf,
-        /// The line, from 1; none where the file as a whole is at fault.
+        /// The line, from 1; none for the file as a whole.
         line: Option<u64>,
-        /// What is wrong, with its remedy.
+        /// The error with its remedy.
         problem: String,
     },
     /// The file with the drives' memory.
@@ -46,10 +46,10 @@ pub enum PlantError {
     Memory {
         /// The file.
         path: PathBuf,
-        /// Why it cannot be used.
+        /// Why the file is not usable.
         reason: String,
     },
-    /// Values of the scenario that cannot be used together: their keys, the reason and the remedy.
+    /// Values of the scenario that contradict each other: their keys, the reason and the remedy.
     #[error("{0}")]
     Scenario(String),
 }

@@ -1,4 +1,4 @@
-//! The plant's process: binds the pure core to iceoryx2, and to real time or to lockstep. It decides nothing.
+//! The plant's process binds the pure core to iceoryx2, and to real time or lockstep. This module decides nothing.
 
 use masseter_runtime::clock;
 use masseter_runtime::lifecycle::{Party, ProcessArguments, ProcessContext, ProcessError, StopRequest};
@@ -17,24 +17,24 @@ use crate::cycle::{PlantPorts, run_after_controller, run_cycle};
 use crate::error::PlantError;
 use crate::master::link::Link;
 
-/// Silence of the controller in lockstep that the plant plays, beyond the one that stops the drives, ns.
+/// Longest played silence of the controller in lockstep, beyond the silence that stops the drives, ns.
 const SILENCE_NS: u64 = 500_000_000;
-/// Silence after which no command will come any more, beyond the one that stops the drives, ns.
+/// Silence that means the end of the controller, beyond the silence that stops the drives, ns.
 const ABANDONED_AFTER_NS: u64 = 5_000_000_000;
 
-/// Why the plant ended.
+/// The reason for the plant's end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reason {
-    /// A stop was requested.
+    /// A request to stop.
     Requested,
-    /// Its controller was silent for longer than a controller can be that still runs.
+    /// A silence of the controller longer than any running controller's.
     Abandoned,
 }
 
-/// Why the plant could not do its work.
+/// The failure of the plant.
 #[derive(Debug, thiserror::Error)]
 pub enum PlantProcessError {
-    /// What any process may meet.
+    /// A failure common to all processes.
     #[error(transparent)]
     Process(#[from] ProcessError),
     /// The plant itself.
@@ -67,7 +67,7 @@ impl Ports {
         })
     }
 
-    /// Connects to the ports of the other processes before the first cycle, since a connection makes and maps files.
+    /// Connects to the ports of the other processes before the first cycle, because a connection makes and maps files.
     fn connect(&self) -> Result<(), TransportError> {
         self.commands.connect()?;
         self.readings.connect()?;
@@ -87,7 +87,7 @@ impl Ports {
     }
 }
 
-/// Runs the plant until it is asked to end or its controller hangs; then stops its drives, and goes on for a while.
+/// Runs the plant until a request to end or a hanging controller. Then stops the drives, and goes on for a while.
 pub fn run(arguments: &ProcessArguments) -> Result<Reason, PlantProcessError> {
     let context = arguments.init()?;
     if context.scenario.can.is_virtual() {
@@ -102,9 +102,9 @@ struct Binding<'a> {
     ports: Ports,
     clock: Clock,
     schedule: &'a CycleSchedule,
-    /// Whether commands are received; at the end they no longer are.
+    /// Whether the plant receives commands: not at the end.
     takes_commands: bool,
-    /// The largest number of samples that the last cycle left on one topic.
+    /// The largest number of the last cycle's samples on one topic.
     samples: usize,
 }
 
@@ -126,7 +126,7 @@ impl Binding<'_> {
         let Self { clock, ports, .. } = self;
         match clock {
             Clock::RealTime(cycle) => cycle.wait_warm(|| {
-                // Works out what has happened on the wires by now.
+                // Simulates the wires up to now.
                 plant.advance(clock::now_ns())?;
                 Ok(ports.warm_up()?)
             }),
@@ -221,7 +221,7 @@ fn serve<L: Link>(
     build: impl Fn(&Scenario, u64) -> Result<PlantCore<L>, PlantError>,
 ) -> Result<Reason, PlantProcessError> {
     let (scenario, schedule) = (&context.scenario, &context.schedule);
-    // Built once before the start, so that a plant that cannot be built is never reported ready.
+    // A construction before the start, so that an impossible plant never reports ready.
     build(scenario, 0)?;
     let ports = Ports::open(&context.node)?;
     ports.warm_up()?;
@@ -244,7 +244,7 @@ fn serve<L: Link>(
         // The run is over, as under virtual time.
         Clock::Lockstep(lockstep) if lockstep.is_last() => lockstep.await_stop(),
         _ => {
-            // The last cycle's process data are on the wire only by now.
+            // Only by now the last cycle's process data are on the wire.
             let last = binding.wait(&mut plant)?;
             plant.collect(last.woke_ns)?;
             binding.publish_frames_and_events(&mut plant)?;
@@ -254,7 +254,7 @@ fn serve<L: Link>(
     Ok(if is_stopped { Reason::Requested } else { Reason::Abandoned })
 }
 
-/// Cycles without commands after which no command will come any more.
+/// Cycles without commands that mean the end of the controller.
 fn most_silent_cycles(context: &ProcessContext) -> u64 {
     let scenario = &context.scenario;
     let until_stopped = u64::from(scenario.can.command_timeout_cycles);

@@ -1,17 +1,17 @@
 //! The state of a plant on its way into an [`Archive`] and back.
 //!
-//! A scenario builds a plant, and its cycles change it. Only what they change is the state. The rest is not archived:
-//! mechanism, dictionaries, tables of pushes. So a state is read into a plant of the same scenario.
+//! A scenario builds a plant, and its cycles change the plant. Only the changed values are the state. The archive does
+//! not hold the rest: mechanism, dictionaries, tables of pushes. So a state needs a plant of the same scenario.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// Where the values of a state are written to, or where they are read from, one after the other.
+/// The destination or the source of a state's values, one after the other.
 pub trait Archive {
-    /// Why a value cannot be written or read.
+    /// A failed write or read of a value.
     type Error;
 
-    /// Writes the value, or replaces it by the one that is read.
+    /// Writes the value, or replaces the value by the read one.
     ///
     /// # Errors
     /// When there is no such value.
@@ -20,16 +20,16 @@ pub trait Archive {
     /// Binds the archive to a constant of the plant.
     ///
     /// # Errors
-    /// When the archive that is read was bound to another constant.
+    /// When the archive has another constant.
     fn constant<T: Serialize>(&mut self, constant: &T) -> Result<(), Self::Error>;
 }
 
-/// What cycles change.
+/// The values that cycles change.
 pub trait State {
-    /// Exchanges the state with an archive. A state that is read leaves nothing of the one before.
+    /// Exchanges the state with an archive. A read state replaces the whole old state.
     ///
     /// # Errors
-    /// Those of the archive. A state of which a part is read is useless.
+    /// Those of the archive. A partly read state is useless.
     fn exchange<A: Archive>(&mut self, archive: &mut A) -> Result<(), A::Error>;
 }
 

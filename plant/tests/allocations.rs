@@ -18,18 +18,18 @@ use masseter_scenario::{
 struct Counting;
 
 thread_local! {
-    /// Of this thread alone: the test harness allocates in its own.
+    /// Counts of this thread alone: the test harness allocates in its own threads.
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
 }
 
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-// SAFETY: every call goes to the system's allocator unchanged, so its guarantees are this one's.
+// SAFETY: every call goes to the system's allocator unchanged, so its guarantees hold.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.set(ALLOCATIONS.get() + 1);
-        // SAFETY: the caller's promises about `layout` are passed on.
+        // SAFETY: the caller's promises about `layout` go to the system's allocator.
         unsafe { System.alloc(layout) }
     }
 
@@ -45,7 +45,7 @@ fn allocations_of(work: impl FnOnce()) -> u64 {
     ALLOCATIONS.get() - before
 }
 
-/// One cycle in which the drives are asked to hold where they stand.
+/// One cycle with a request to the drives to hold their places.
 fn cycle(plant: &mut PlantCore, cycle: u64, reading: &mut Reading) {
     let sync_ns = cycle * 1_000_000;
     let wake = Wake::on_time(cycle, sync_ns);

@@ -18,7 +18,7 @@ const GAP_STEPS: f64 = 1.5;
 const POINTS: [&str; 3] = ["incisal point", "right condyle", "left condyle"];
 /// Components of the rotation vector: about the axes that point anterior, left and up.
 const TURNS: [&str; 3] = ["roll to the right", "opening", "yaw to the left"];
-/// Most rows of a survey.
+/// Most rows in the search for the axes.
 const ROWS: usize = 200;
 /// A turn that shows the axis of opening fully, rad.
 const CLEAR_RAD: f64 = 0.05;

@@ -1,6 +1,6 @@
-//! Every deviation of one drive from what scenario and profile need, and what would mend it.
+//! Every deviation of one drive from scenario and profile, with the remedy. This module writes nothing.
 //!
-//! Units and ratios of a drive stand beside those of its profile: a wrong one scales every motion.
+//! The module compares units and ratios of a drive with those of its profile: a wrong one scales every motion.
 
 use std::fmt::Display;
 
@@ -30,7 +30,7 @@ pub fn deviations(
     all.extend(of_state(survey));
     all.extend(of_units(survey, profile, wanted.increment_m));
     let differences = settings.differences(survey);
-    // A unit that the profile writes is mended; one that it expects is told in words.
+    // `configure` mends a unit that the profile writes; a unit that the profile expects gets a sentence.
     all.retain(|found| {
         let mut written = differences.iter().filter(|one| one.wanted.rule != ObjectRule::Expect);
         !written.any(|one| one.wanted.object.0 == found.object)
@@ -43,7 +43,7 @@ pub fn deviations(
     all
 }
 
-/// A value, or why there is none.
+/// A value, or the reason for its absence.
 fn found_text(survey: &Survey, object: ObjectAddress) -> String {
     let refusal = || survey.refusal(object).map_or_else(|| "not there".to_owned(), reason_text);
     survey.number(object).map_or_else(refusal, |value| value_text(object, value))
@@ -87,7 +87,7 @@ fn of_state(survey: &Survey) -> Vec<Deviation> {
     all
 }
 
-/// A limit switch that is closed while the axis stands.
+/// A closed limit switch of an axis at rest.
 fn of_switches(survey: &Survey) -> Option<Deviation> {
     let inputs = ObjectAddress::new(0x60FD, 0);
     let closed = match survey.number(inputs)? & 0b11 {
@@ -125,15 +125,15 @@ fn of_object(survey: &Survey, difference: &Difference) -> Deviation {
     Deviation::new(*object, wanted, found_text(survey, *object), outcome, remedy, key)
 }
 
-/// What becomes of a deviation.
+/// The consequence of a deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// `configure` mends it.
+    /// `configure` mends the deviation.
     Mended,
-    /// Somebody should look at it; it stops nothing.
+    /// A person should look at the deviation, which stops nothing.
     Doubtful,
-    /// `configure` cannot mend it and refuses.
+    /// `configure` cannot mend the deviation, and refuses.
     Refused,
 }
 
@@ -149,16 +149,16 @@ pub struct Deviation {
     pub wanted: String,
     /// The value of the drive.
     pub found: String,
-    /// What becomes of it.
+    /// Its consequence.
     pub outcome: Outcome,
-    /// What `configure` would do, or what the user should.
+    /// The action of `configure`, or the advice to the user.
     pub remedy: String,
     /// The key of the scenario that decides.
     pub key: String,
 }
 
 impl Deviation {
-    /// Of an object: its value as wanted and as found, in words.
+    /// The wanted and the found value of an object, in words.
     fn new(
         object: ObjectAddress,
         wanted: impl Into<String>,
@@ -172,7 +172,7 @@ impl Deviation {
     }
 }
 
-/// Serialises a value as it prints, such as `6066h:00h`.
+/// Serialises a value in its printed form, such as `6066h:00h`.
 pub(super) fn as_text<S: Serializer>(value: &impl Display, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_str(value)
 }
@@ -202,7 +202,7 @@ fn unit_name(code: u32) -> Option<&'static str> {
     NAMES.iter().find(|(known, _)| *known == code).map(|(_, name)| *name)
 }
 
-/// Way of a unit of position, m; none without the lead of the screw where that decides, and for other units.
+/// Way of a unit of position, m. None for other units, and for units of the screw without its lead.
 fn way_m(code: u32, lead_m: Option<f64>) -> Option<f64> {
     match code {
         MICROMETRES => Some(1e-6),
@@ -214,7 +214,7 @@ fn way_m(code: u32, lead_m: Option<f64>) -> Option<f64> {
     }
 }
 
-/// The unit of 6064h (60A8h): one as long as the rig's increment is as good as increments.
+/// The unit of 6064h (60A8h): a unit of the length of the rig's increment is as good as increments.
 fn of_position(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Option<Deviation> {
     let object = ObjectAddress::new(0x60A8, 0);
     let code = told(survey, profile, object).filter(|&code| code != INCREMENTS)?;
@@ -243,8 +243,8 @@ fn of_position(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Opt
     Some(Deviation::new(object, "increments", unit, Outcome::Refused, remedy, key))
 }
 
-/// Units of the drive, as far as it has objects for them (60A8h to 60AAh). A value that `configure` writes counts,
-/// not the one that it replaces.
+/// Units of the drive, as far as the drive has objects for them (60A8h to 60AAh). A value that `configure` writes
+/// counts, not the replaced value.
 fn of_units(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Deviation> {
     let units = &profile.units;
     let declared = [
@@ -255,7 +255,7 @@ fn of_units(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<De
         let object = ObjectAddress::new(index, 0);
         let code = told(survey, profile, object).filter(|&code| code != declared)?;
         let declared = unit_name(declared).expect("every unit of a profile has a name");
-        // Drives use codes of their own for units that the rig has: such a code proves nothing.
+        // Drives use codes of their own for the rig's units: such a code proves nothing.
         let (found, outcome) = match unit_name(code) {
             Some(name) => (name.to_owned(), Outcome::Refused),
             None => (value_text(object, code), Outcome::Doubtful),
@@ -270,8 +270,8 @@ fn of_units(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<De
         .collect()
 }
 
-/// The value of an object after `configure`: one that it writes counts, and not the one that it replaces. None if the
-/// drive or its profile has no such object.
+/// The value of an object after `configure`: a written value counts, not the replaced value. None if the drive or its
+/// profile has no such object.
 fn told(survey: &Survey, profile: &DriveProfile, object: ObjectAddress) -> Option<u32> {
     let ObjectConfig { rule, value, .. } = profile.object(ObjectKey(object));
     let found = || survey.number(object);
@@ -282,9 +282,9 @@ fn told(survey: &Survey, profile: &DriveProfile, object: ObjectAddress) -> Optio
     }
 }
 
-/// Ratios by which the drive counts its way, as far as the drive has them: gear, feed and encoder. A wrong one scales
-/// every motion. Without a lead the profile declares no travel, so that a gear is only to be looked at. A feed decides
-/// the unit of 6064h; the encoder decides without one.
+/// Ratios of the drive for its way, as far as the drive has them: gear, feed and encoder. A wrong ratio scales every
+/// motion. Without a lead the profile declares no travel, so a gear is only for a look. A feed decides the unit of
+/// 6064h; the encoder decides without one.
 fn of_ratios(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Deviation> {
     let units = &profile.units;
     let part = |index, subindex| told(survey, profile, ObjectAddress::new(index, subindex)).map(f64::from);
@@ -327,7 +327,7 @@ mod deviations_tests {
     use super::*;
     use crate::commissioning::line::Line;
 
-    /// What emulated drives lack of what this profile needs.
+    /// Needs of this profile that emulated drives lack.
     fn of_profile(text: &str) -> Vec<(String, Outcome, String)> {
         let scenario = Scenario::parse(Path::new("robot.toml"), text).unwrap();
         let mut line = Line::open(&Scenario::default(), Box::new(io::sink())).unwrap();
@@ -363,7 +363,7 @@ mod deviations_tests {
         }
     }
 
-    /// Emulated drives have a gear of 1: a profile that writes another one is told of its own mistake.
+    /// Emulated drives have a gear of 1, so a profile with another gear is wrong.
     #[test]
     fn a_ratio_that_the_profile_itself_makes_wrong_is_refused() {
         let all = of_profile(
@@ -407,7 +407,7 @@ mod units_tests {
         assert_eq!(all[0].outcome, Outcome::Refused);
     }
 
-    /// A drive of the default profile too: as delivered some count tenths of a degree.
+    /// The check also covers the default profile: some drives are delivered with tenths of a degree.
     #[test]
     fn units_of_every_profile_are_those_of_the_drive() {
         let units = |found: &[(u16, u32)], profile: &str| {
@@ -438,7 +438,7 @@ mod units_tests {
         assert_eq!(units(&degrees, &profile(written)), [], "configure writes it");
     }
 
-    /// An increment of 1 µm, or of a tenth of a degree of a screw, is what the drive calls µm or 0.1°.
+    /// The drive's units µm or 0.1° equal an increment of 1 µm, or of a tenth of a degree of a screw.
     #[test]
     fn a_unit_as_long_as_an_increment_is_as_good_as_increments() {
         let units = |code, increment_m, keys: &str| {
@@ -467,7 +467,7 @@ mod units_tests {
         );
     }
 
-    /// Where 6092h decides the unit of 6064h, 608Fh is only to be looked at.
+    /// With 6092h as the unit of 6064h, 608Fh is only for a look.
     #[test]
     fn ratios_of_the_drive_are_those_of_the_profile() {
         let ratios = |found: &[(u16, u32, u32)], profile: &str| {

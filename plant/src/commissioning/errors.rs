@@ -1,4 +1,5 @@
-//! Why a line to the drives cannot go on, and why a motion did not begin or ended early; objects and values in words.
+//! The reasons why a line to the drives cannot go on, and why a motion does not begin or ends early. Also objects and
+//! values in words.
 
 use std::fmt::{self, Display, Formatter};
 use std::io;
@@ -11,18 +12,18 @@ use masseter_model::geometry::AXIS_NAMES;
 use crate::error::PlantError;
 use crate::simulator::drive::dictionary::{ENTRIES, find};
 
-/// Why a question had no answer.
+/// The reason for a missing answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum SdoReason {
-    /// The drive refused the transfer.
+    /// The drive refuses the transfer.
     #[error("{0}")]
     Aborted(AbortCode),
-    /// Nothing came.
+    /// No answer comes.
     #[error("no answer; check its power, wiring, bit rate and node id")]
     Silent,
 }
 
-/// Why an object could not be read.
+/// Why the read of an object fails.
 pub fn reason_text(reason: SdoReason) -> String {
     match reason {
         SdoReason::Aborted(AbortCode::NO_OBJECT | AbortCode::NO_SUBINDEX) => "not there".to_owned(),
@@ -30,7 +31,7 @@ pub fn reason_text(reason: SdoReason) -> String {
     }
 }
 
-/// Why a line cannot go on.
+/// The reason for the end of a line.
 #[derive(Debug, thiserror::Error)]
 pub enum LineError {
     /// A transfer failed.
@@ -43,7 +44,7 @@ pub enum LineError {
         /// The reason.
         reason: SdoReason,
     },
-    /// The drive acknowledged a value and shows another one, or none.
+    /// The drive acknowledges a value and shows another value, or none.
     #[error(
         "{}: object {object} ({}) := {}: the drive acknowledged it and shows {}",
         AXIS_NAMES[*axis], object_name(*object), value_text(*object, *written),
@@ -54,20 +55,20 @@ pub enum LineError {
         axis: usize,
         /// The object.
         object: ObjectAddress,
-        /// The value that was written.
+        /// The written value.
         written: u32,
-        /// The value that the drive shows; none where it refuses to show the object.
+        /// The value that the drive shows; none for a refusal to show the object.
         found: Option<u32>,
     },
-    /// A second drive would be switched on.
+    /// The request switches on a second drive.
     #[error("{}: not switched on, because {} still is; end that step first", AXIS_NAMES[*axis], AXIS_NAMES[*other])]
     SecondAxis {
         /// The axis to be switched on.
         axis: usize,
-        /// The axis that is.
+        /// The axis that is switched on.
         other: usize,
     },
-    /// A frame could not be sent.
+    /// The transmission of a frame fails.
     #[error("bus {bus}: {error}")]
     Send {
         /// The bus.
@@ -78,7 +79,7 @@ pub enum LineError {
     /// The emulated mechanism failed, or the memory of emulated drives cannot be written.
     #[error(transparent)]
     Emulation(#[from] PlantError),
-    /// Old values could not be kept.
+    /// The ledger cannot keep old values.
     #[error("old values of {} cannot be kept, so that no further value is written: {source}; free the disk", AXIS_NAMES[*axis])]
     Ledger {
         /// The axis.
@@ -86,13 +87,13 @@ pub enum LineError {
         /// The reason.
         source: io::Error,
     },
-    /// The log could not be written.
+    /// The write of the log fails.
     #[error("the log of the bus cannot be written: {0}")]
     Log(#[from] io::Error),
 }
 
 impl LineError {
-    /// The code with which a drive refused a transfer.
+    /// The abort code of a drive's refusal.
     pub fn abort_code(&self) -> Option<AbortCode> {
         match self {
             Self::Sdo { reason: SdoReason::Aborted(code), .. } => Some(*code),
@@ -110,11 +111,11 @@ impl LineError {
 pub struct Restarted {
     /// Its axis.
     pub axis: usize,
-    /// Whether another master was heard, which may have reset it.
+    /// Whether there is a sign of another master, which may have reset the drive.
     pub by_master: bool,
 }
 
-/// What only another master sends, in the order in which signs are listed.
+/// Frames that only another master sends, in the order of the list of signs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum MasterSign {
     /// Network management.
@@ -151,59 +152,59 @@ pub struct OtherMaster {
     pub sign: MasterSign,
 }
 
-/// What stopped a motion.
+/// The reason for the stop of a motion.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum StopCause {
     /// The person stopped it.
     #[error("stopped on request")]
     Requested,
-    /// The axis did not follow its demand.
+    /// The axis does not follow its demand.
     #[error("following error beyond {:.3} mm; check motor, brake and gains", .window_m * 1e3)]
     FollowingError {
         /// The window (6065h), m.
         window_m: f64,
     },
-    /// The motor's force was too high.
+    /// The motor's force is too high.
     #[error("force {force_n:.1} N above {limit_n:.1} N; check brake and guides, or allow more with --torque")]
     Force {
         /// The force, N.
         force_n: f64,
-        /// What is allowed, N.
+        /// The limit, N.
         limit_n: f64,
     },
-    /// A limit switch closed.
+    /// A limit switch closes.
     #[error("limit switch (60FDh = {bits:08X}h); move the axis the other way")]
     LimitSwitch {
         /// 60FDh.
         bits: u32,
     },
-    /// The axis moved against its target.
+    /// The axis moves against its target.
     #[error("moved {:.4} mm against its target; check the phases of the motor and the sign of the encoder", .moved_m * 1e3)]
     WrongDirection {
-        /// How far, m.
+        /// The way, m.
         moved_m: f64,
     },
-    /// The axis went past its target.
+    /// The axis goes past its target.
     #[error("went {:.3} mm past its target; check the scale and the gains", .beyond_m * 1e3)]
     Overrun {
-        /// How far, m.
+        /// The way, m.
         beyond_m: f64,
     },
     /// The axis does not stand still with power on.
     #[error("moved {:.3} mm with power on and no target; check brake and gains", .moved_m * 1e3)]
     Restless {
-        /// How far within a second, m.
+        /// The way within a second, m.
         moved_m: f64,
     },
-    /// Another axis moved, though it is braked.
+    /// Another axis moves in spite of its brake.
     #[error("{} moved {:.3} mm, though it is off; check its brake", AXIS_NAMES[*other], .moved_m * 1e3)]
     OtherAxis {
         /// The other axis.
         other: usize,
-        /// How far, m.
+        /// The way, m.
         moved_m: f64,
     },
-    /// Another drive has power, which this step did not give.
+    /// Another drive has power without this step.
     #[error("{} went to {state}, and this step did not switch it on; end the program that controls it", AXIS_NAMES[*other])]
     OtherPowered {
         /// The axis of the other drive.
@@ -211,10 +212,10 @@ pub enum StopCause {
         /// The state of that drive.
         state: DriveState,
     },
-    /// Another master was heard.
+    /// There is a sign of another master.
     #[error(transparent)]
     OtherMaster(#[from] OtherMaster),
-    /// A drive sent an emergency.
+    /// A drive sends an emergency.
     #[error("{} sent emergency {:04X}h; see the drive's manual", AXIS_NAMES[*sender], .code.0)]
     Emergency {
         /// The axis of the drive.
@@ -222,54 +223,54 @@ pub enum StopCause {
         /// The code.
         code: EmergencyCode,
     },
-    /// The drive left "operation enabled".
+    /// The drive leaves "operation enabled".
     #[error("the drive went to {state} (error code {error_code:04X}h); see the drive's manual")]
     LeftOperation {
-        /// Where it went.
+        /// Its new state.
         state: DriveState,
         /// 603Fh.
         error_code: u16,
     },
-    /// A drive restarted.
+    /// A drive restarts.
     #[error(transparent)]
     Restarted(#[from] Restarted),
-    /// The motion took too long.
+    /// The motion takes too long.
     #[error("not done within {:.1} s; check whether the drive takes set-points, or its unit of velocity", .limit_s)]
     TimedOut {
-        /// What was allowed, s.
+        /// The limit, s.
         limit_s: f64,
     },
-    /// It did not end in time, and the drive reports a limit.
+    /// The motion does not end in time, and the drive reports a limit.
     #[error(
         "not done within {limit_s:.1} s, and the drive reports a limit (statusword bit 11); check what 607Dh counts from: \
          drive_profile.homing.limits_from_home or home_sign"
     )]
     Limited {
-        /// What was allowed, s.
+        /// The limit, s.
         limit_s: f64,
     },
-    /// The drive shows the homing before.
+    /// The drive shows the previous homing.
     #[error(
         "homing did not begin: statusword bit 12 stays from the homing before; check mode 6 and the start bit"
     )]
     NotBegun,
-    /// The drive could not home.
+    /// The drive reports a homing error.
     #[error("homing failed (statusword bit 13); check method, switches and index")]
     Homing,
 }
 
-/// Why a motion did not begin, or ended early.
+/// Why a motion does not begin, or ends early.
 #[derive(Debug, thiserror::Error)]
 pub enum MotionError {
-    /// The line failed.
+    /// The line fails.
     #[error(transparent)]
     Line(#[from] LineError),
-    /// The drive did not answer, or with no state, and the axis was switched off afterwards.
+    /// The drive gives no answer, or no state. The axis is switched off afterwards.
     #[error("{source}; {} is off", AXIS_NAMES[*axis])]
     Unread {
         /// The axis.
         axis: usize,
-        /// What ended the motion.
+        /// The reason for the end of the motion.
         source: Box<MotionError>,
     },
     /// An axis or its drive.
@@ -282,13 +283,13 @@ pub enum MotionError {
     },
 }
 
-/// Why one axis did not begin a motion, or ended one early.
+/// Why one axis does not begin a motion, or ends a motion early.
 #[derive(Debug, thiserror::Error)]
 pub enum AxisError {
-    /// It was stopped and switched off.
+    /// The axis has been stopped and switched off.
     #[error("{0}; the axis is off")]
     Stopped(StopCause),
-    /// The drive has power that this step did not give.
+    /// The drive has power without this step.
     #[error("{0} already; end the program that controls it, and switch the drive off")]
     Powered(DriveState),
     /// The drive does not go to "operation enabled".
@@ -299,7 +300,7 @@ pub enum AxisError {
         /// 603Fh.
         error_code: u16,
     },
-    /// The drive does not take a mode of operation.
+    /// The drive refuses a mode of operation.
     #[error("mode {wanted} was asked for, 6061h shows {found}; check 6502h")]
     Mode {
         /// The mode.
@@ -310,23 +311,23 @@ pub enum AxisError {
     /// A statusword of no state.
     #[error("{0}")]
     Statusword(StatuswordError),
-    /// The drive did not confirm that it is off.
+    /// The drive does not confirm that its power is off.
     #[error(
         "NOT PROVED OFF ({0}); press the emergency stop. The next step that writes gives the old limits back"
     )]
     StaysOn(Unproved),
-    /// Objects of the drive kept the values of this step.
+    /// Objects of the drive keep the values of this step.
     #[error(
         "{}not every old value returned ({why}); the next step that writes tries again",
         cause.as_ref().map(|cause| format!("{cause}; ")).unwrap_or_default()
     )]
     NotRestored {
-        /// Why the motion ended early, if so.
+        /// The reason for an early end of the motion, if any.
         cause: Option<Box<MotionError>>,
-        /// Why the value did not return.
+        /// The reason why the old value has not returned.
         why: LineError,
     },
-    /// An object that the profile keeps from being written is not careful enough.
+    /// The profile forbids the write of an object, and its value is not careful enough.
     #[error(
         "object {object} is {found}, and its rule in drive_profile.objects lets nobody reduce it; change the rule"
     )]
@@ -336,7 +337,7 @@ pub enum AxisError {
         /// Its value.
         found: u32,
     },
-    /// A limit switch in the direction of the way is closed before it begins.
+    /// A limit switch in the direction of the way is closed at the beginning.
     #[error(
         "a limit switch is closed (60FDh = {bits:08X}h), and the way goes in its direction; move the axis the other way, \
          or check the switch and its wire"
@@ -345,17 +346,17 @@ pub enum AxisError {
         /// 60FDh.
         bits: u32,
     },
-    /// The axis moved after its power went.
+    /// The axis moves after the loss of its power.
     #[error(
         "moved {:.3} mm after its power went; support the axis, and let the drive close the brake before it takes the \
          current away",
         .moved_m * 1e3
     )]
     Dropped {
-        /// How far, m.
+        /// The way, m.
         moved_m: f64,
     },
-    /// A way that is not for this step.
+    /// A way that this step does not allow.
     #[error("{:.3} mm is no way for a jog; give up to {:.0} mm, at least ten increments", .by_m * 1e3, .most_m * 1e3)]
     Way {
         /// The way, m.
@@ -363,7 +364,7 @@ pub enum AxisError {
         /// The longest, m.
         most_m: f64,
     },
-    /// An incremental encoder whose home has no position.
+    /// An incremental encoder without a position at home.
     #[error("enter drive_profile.homing.home_position_m: what d or l is at the home position")]
     NoHomePosition,
     /// 6064h at home is not the value in the profile.
@@ -378,7 +379,7 @@ pub enum AxisError {
         /// The value in the profile, m.
         expected_m: f64,
     },
-    /// A second homing found another place.
+    /// A second homing finds another place.
     #[error(
         "a second homing is {:.3} mm beside the first, allowed are {:.3} mm (drive_profile.homing.tolerance_m)",
         .spread_m * 1e3, .tolerance_m * 1e3
@@ -386,7 +387,7 @@ pub enum AxisError {
     Spread {
         /// The distance, m.
         spread_m: f64,
-        /// What is allowed, m.
+        /// The limit, m.
         tolerance_m: f64,
     },
     /// An absolute encoder shows a position beyond the stroke.
@@ -410,13 +411,13 @@ impl AxisError {
     }
 }
 
-/// What is known of a drive that did not confirm that it is off.
+/// The known state of a drive that does not confirm its power off.
 #[derive(Debug, thiserror::Error)]
 pub enum Unproved {
-    /// It has another state.
+    /// The drive has another state.
     #[error("it shows {0}")]
     Shows(DriveState),
-    /// Its state cannot be read, or nothing can be sent.
+    /// The read of its state or the transmission fails.
     #[error(transparent)]
     Unread(Box<MotionError>),
 }
@@ -435,7 +436,7 @@ pub fn object_name(object: ObjectAddress) -> &'static str {
     }
 }
 
-/// An object's value as its type shows it: identifiers and units in hexadecimal digits, quantities in decimal ones.
+/// An object's value by its type: identifiers and units in hexadecimal digits, quantities in decimal digits.
 pub fn value_text(object: ObjectAddress, value: u32) -> String {
     if is_code(object) {
         return format!("{value:X}h");

@@ -1,6 +1,7 @@
 //! Homing of one axis (CiA 402, mode 6), while the other five stay without power.
 //!
-//! Encoders that keep their position are compared and not moved. The others home twice: the second homing shows the spread.
+//! An axis with an encoder that keeps its position is compared and not moved. The others home twice: the second homing
+//! shows the spread.
 
 use masseter_can::cia402::{Controlword, StatusBit};
 use masseter_runtime::clock::SECOND_NS;
@@ -15,25 +16,26 @@ use super::write::Loan;
 
 /// Methods that make the present place home (6098h).
 const ON_THE_SPOT: [i8; 2] = [35, 37];
-/// How far the axis goes back before it homes again, m: beyond the place where it stopped, not beyond the next index.
+/// Way back before the second homing, m: beyond the place of the stop, not beyond the next index.
 const BACK_M: f64 = 1e-3;
-/// A homing with a shorter way needs no way back, m.
+/// Shortest homing with a way back, m.
 const NO_WAY_M: f64 = 1e-5;
-/// Software limits are opened to this many strokes on either side of the axis.
+/// Opening of the software limits on either side of the axis, strokes.
 const OPENED: f64 = 1.1;
-/// The search may take this many times the way at the homing speeds.
+/// Longest time of the search, in times of the way at the homing speeds.
 const PATIENCE: f64 = 1.5;
-/// An axis goes on for this time after its home, s.
+/// Time of the motion beyond home, s.
 const REACTION_S: f64 = 0.02;
 
-/// What homing found.
+/// The result of a homing.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct HomeReport {
     /// 6064h afterwards, m.
     pub position_m: f64,
     /// Way of the search, m.
     pub way_m: f64,
-    /// How far the second homing was from the first, m; none if the encoder keeps its position, so that nothing moved.
+    /// Distance of the second homing from the first, m. None for an encoder that keeps its position, because nothing
+    /// moves.
     pub spread_m: Option<f64>,
 }
 
@@ -45,11 +47,11 @@ struct Found {
     way_m: f64,
     /// 6064h at the end, m.
     position_m: f64,
-    /// By how much 6064h changed at the end without a motion, m.
+    /// Change of 6064h at the end without a motion, m.
     shift_m: f64,
 }
 
-/// Homes an axis, or compares one whose encoder keeps its position.
+/// Homes an axis, or compares an axis with an encoder that keeps its position.
 ///
 /// # Errors
 /// [`MotionError`]; the axis is off then, unless the error says that this is not proved.
@@ -86,7 +88,7 @@ fn home_twice(mover: &mut Mover<'_>, home_m: f64, stroke_m: f64) -> Result<HomeR
     mover.watch.ignore_switches();
     open_limits(mover, stroke_m)?;
     let first = search(mover, stroke_m)?;
-    // The axis stops behind its home: by its ramp, and by the time that it needs to notice.
+    // The axis stops behind its home, by its ramp and by its reaction time.
     let HomingConfig { tolerance_m, zero_speed_m_s, acceleration_m_s2, .. } = homing;
     let behind_m = zero_speed_m_s.powi(2) / (2.0 * acceleration_m_s2) + zero_speed_m_s * REACTION_S;
     if (first.position_m - home_m).abs() > tolerance_m + behind_m {
@@ -143,7 +145,7 @@ fn search(mover: &mut Mover<'_>, stroke_m: f64) -> Result<Found, MotionError> {
     let limit_s = PATIENCE * stroke_m * (1.0 / homing.speed_m_s + 1.0 / homing.zero_speed_m_s);
     let until_ns = mover.line.now_ns() + seconds(limit_s);
     mover.control(Controlword::ENABLE_OPERATION)?;
-    // "Attained" of a homing before proves nothing: it must go first, except where the drive homes on the spot.
+    // "Attained" of an earlier homing proves nothing: the bit must go first, except for a homing on the spot.
     let mut is_old =
         mover.look()?.status.has(StatusBit::HOMING_ATTAINED) && !ON_THE_SPOT.contains(&homing.method);
     let begins_ns = mover.line.now_ns() + SECOND_NS;

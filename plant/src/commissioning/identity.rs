@@ -1,5 +1,5 @@
-//! The identity of an axis' drive: its identity object (1018h) and its node id. It shows whether an axis still has
-//! the same drive at the end of a step.
+//! The identity of an axis' drive: its identity object (1018h) and its node id. A step compares the identities at its
+//! beginning and its end.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -16,23 +16,23 @@ use crate::master::wanted::WantedDrive;
 /// The identity object.
 const INDEX: u16 = 0x1018;
 const SERIAL: u8 = 4;
-/// Drives of which nothing is known.
+/// Drives with unknown identities.
 pub const NOT_ASKED: [Known; AXES] = [Known::NotAsked; AXES];
 
-/// One entry of the identity object, all but the first of which are optional (CiA 301, 7.5.2.19).
+/// One entry of the identity object. All entries but the first are optional (CiA 301, 7.5.2.19).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Entry {
     /// The drive has this number.
     Told(u32),
-    /// The drive refused the request: it has no such number.
+    /// The drive refuses the request, and so has no such number.
     Absent,
 }
 
 /// The identity of a drive. Two drives without serial numbers may have equal ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
-    /// The node id at which it answers.
+    /// The node id of its answers.
     pub node: u8,
     /// 1018h:01h.
     pub vendor: Entry,
@@ -44,13 +44,13 @@ pub struct Identity {
     pub serial: Entry,
 }
 
-/// What is known of the drive of an axis.
+/// The known identity of the drive of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Known {
-    /// Nobody asked it, or it did not answer.
+    /// The drive has not been asked, or gives no answer.
     NotAsked,
-    /// It is this one.
+    /// The identity.
     Is(Identity),
 }
 
@@ -83,7 +83,7 @@ impl Identity {
     /// Asks a drive.
     ///
     /// # Errors
-    /// [`LineError`], also for a drive that is silent: it may be any drive.
+    /// [`LineError`], also for a silent drive, which may be any drive.
     pub fn read(line: &mut Line, can: &CanConfig, axis: usize) -> Result<Self, LineError> {
         Self::of(can.node_ids[axis], |object| {
             Ok(line.read_if_there(axis, object)?.map_or(Entry::Absent, Entry::Told))
@@ -172,16 +172,16 @@ impl Known {
     }
 }
 
-/// Why what a step has read from a drive, or written to it, may not count any more.
+/// The reason why a step's reads and writes of a drive may be void.
 #[derive(Debug, thiserror::Error)]
 pub enum Disturbance {
-    /// It restarted.
+    /// The drive has restarted.
     #[error(transparent)]
     Restarted(#[from] Restarted),
-    /// Another master may have changed it.
+    /// Another master may have changed the drive.
     #[error(transparent)]
     OtherMaster(#[from] OtherMaster),
-    /// It does not answer any more.
+    /// The drive no longer answers.
     #[error(transparent)]
     Line(#[from] LineError),
     /// Another drive answers.
@@ -199,13 +199,13 @@ pub enum Disturbance {
     },
 }
 
-/// Refuses drives of which one restarted since then, or beside which another master was heard. Nothing is sent.
+/// Refuses drives after a restart since then, or beside a sign of another master. Sends nothing.
 pub fn check_undisturbed(line: &Line, axes: &[usize], since: BootUps) -> Result<(), Disturbance> {
     axes.iter().try_for_each(|&axis| since.check_axis(line, axis))?;
     Ok(line.strangers().refuse_masters()?)
 }
 
-/// The same, and reads the identities of the drives again.
+/// Makes these checks, and reads the identities of the drives again.
 pub fn check_present(
     line: &mut Line,
     can: &CanConfig,
@@ -214,7 +214,7 @@ pub fn check_present(
     drives: &[Known; AXES],
 ) -> Result<(), Disturbance> {
     let answers: Vec<_> = axes.iter().map(|&axis| (axis, Identity::read(line, can, axis))).collect();
-    // A restart is the cause of a missing answer, and may become known while the answer is waited for.
+    // A restart is the cause of a missing answer, and may become known during the wait for the answer.
     check_undisturbed(line, axes, since)?;
     for (axis, now) in answers {
         let now = now?;
@@ -227,7 +227,7 @@ pub fn check_present(
     Ok(())
 }
 
-/// What these identities leave open, one line for each gap.
+/// The gaps of these identities, one line each.
 pub fn gaps(drives: &[Known; AXES]) -> Vec<String> {
     let known = || drives.iter().enumerate().filter_map(|(axis, known)| Some((axis, known.identity()?)));
     let names = |alike: &dyn Fn(&Identity) -> bool| {

@@ -1,7 +1,7 @@
 //! Jog: one axis goes a short way and back, while the other five stay without power.
 //!
-//! Everything goes by SDO in pre-operational, in profile position (mode 1). After that, the drive answers some SYNCs without
-//! power, for the time that its answers take.
+//! The jog uses SDO in pre-operational, in profile position (mode 1). After that, the drive answers some SYNCs without
+//! power, for a measurement of its answer time.
 
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_scenario::Scenario;
@@ -15,39 +15,39 @@ use super::watch::Sample;
 
 /// The longest way of a jog, m.
 const MOST_M: f64 = 0.02;
-/// Shortest time at either end, so that overshoot and settling show, ns.
+/// Shortest time at either end, for overshoot and settling, ns.
 const REST_NS: u64 = 300 * MILLISECOND_NS;
 
-/// What a jog is to do.
+/// The order of a jog.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JogOrder {
     /// The axis.
     pub axis: usize,
     /// The way, m: d or l grows where it is above 0.
     pub by_m: f64,
-    /// How carefully.
+    /// The caution.
     pub caution: Caution,
-    /// How long the axis stays at the far end, ns.
+    /// Time at the far end, ns.
     pub dwell_ns: u64,
 }
 
-/// What a jog found.
+/// The result of a jog.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct JogReport {
-    /// Where it began, at the far end, and where it ended by 6064h, m.
+    /// Positions at the beginning, at the far end, and at the end by 6064h, m.
     pub positions_m: [f64; 3],
     /// Half of the range of 6064h while the axis stood, m.
     pub noise_m: f64,
     /// There and back.
     pub ways: [StepResponse; 2],
-    /// How far the axis moved while the brake closed, m.
+    /// Way of the axis while the brake closes, m.
     pub drop_m: f64,
-    /// The longest time from SYNC to process data, ns; none for a drive that left a SYNC without an answer.
+    /// The longest time from SYNC to process data, ns; none for a missing answer to a SYNC.
     pub sync_answer_ns: Option<u64>,
 }
 
 impl JogOrder {
-    /// A jog with the usual caution, and so slow that the way takes a second.
+    /// A jog with the usual caution, at a speed of one second for the way.
     pub fn usual(scenario: &Scenario, axis: usize, by_m: f64) -> Self {
         let mut caution = Caution::usual(scenario, axis);
         caution.speed_m_s = caution.speed_m_s.min(by_m.abs());
@@ -114,7 +114,7 @@ fn there_and_back(mover: &mut Mover<'_>, order: &JogOrder) -> Result<JogReport, 
     })
 }
 
-/// One way with the rest at its end; everything that was seen, and where the axis stands.
+/// One way with the rest at its end. Returns all looks, and the place of the axis.
 fn one_way(mover: &mut Mover<'_>, target: i32, rest_ns: u64) -> Result<(Vec<Sample>, f64), MotionError> {
     let mut seen = mover.move_to(target)?;
     let rest = mover.dwell(rest_ns.max(REST_NS))?;
@@ -129,7 +129,7 @@ const RAMP: f64 = 0.2;
 /// Fewest looks that give a mean force.
 const FEWEST: usize = 3;
 
-/// How an axis went one way. SDO answers are milliseconds apart, so the times are no finer than that.
+/// The figures of one way of an axis. SDO answers are milliseconds apart, so the times are no finer.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StepResponse {
     /// From 10 to 90 % of the way, s.
@@ -138,7 +138,7 @@ pub struct StepResponse {
     pub overshoot_m: f64,
     /// From the set-point to the last look further than the noise from the end, s.
     pub settled_s: f64,
-    /// Mean force (6077h) in the middle of the way, N; none if there were too few looks.
+    /// Mean force (6077h) in the middle of the way, N; none for too few looks.
     pub force_n: Option<f64>,
 }
 

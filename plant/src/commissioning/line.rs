@@ -1,6 +1,6 @@
 //! A line to all drives: SDO, NMT and the heartbeat, one question at a time.
 //!
-//! In every step of the commissioning, the line refuses to switch on a drive while another one is switched on.
+//! In every step of the commissioning, the line refuses to switch on a second drive.
 
 use std::fmt::{self, Debug, Formatter};
 use std::io;
@@ -22,13 +22,13 @@ use crate::master::link::Address;
 use crate::master::sdo::{SdoClient, SdoFailure, number};
 use crate::master::wanted::{is_write_only, shown_bits};
 
-/// Silence of a server after which a request is repeated.
+/// Silence of a server before the repetition of a request.
 const TIMEOUT_NS: u64 = 500 * MILLISECOND_NS;
-/// The same while a drive has power: a motion nobody sees must be short.
+/// The same while a drive has power: a motion without a look must be short.
 const POWERED_TIMEOUT_NS: u64 = 100 * MILLISECOND_NS;
 /// Time that a node has to answer a scan, ns.
 const SCAN_NS: u64 = 10 * MILLISECOND_NS;
-/// Longest time for which an answer to SYNC is waited for, ns.
+/// Longest wait for an answer to SYNC, ns.
 const SYNC_NS: u64 = 20 * MILLISECOND_NS;
 /// Time that a drive has to show a value that it acknowledged, ns, and the pause between two readings.
 const SHOWN_WITHIN_NS: u64 = 100 * MILLISECOND_NS;
@@ -39,7 +39,7 @@ pub struct Line {
     traffic: Traffic,
     /// The axis whose drive this line has switched on.
     switched_on: Option<usize>,
-    /// Where old values are kept; none where nobody needs them after a kill.
+    /// The ledger of old values; none if nobody needs old values after a kill.
     ledger: Option<Box<dyn Ledger>>,
 }
 
@@ -53,8 +53,8 @@ impl Debug for Line {
 }
 
 impl Line {
-    /// A line on the scenario's interfaces, or on simulated buses where it names none. Every frame on the buses goes to `log`, in
-    /// the format of candump. The line sends nothing yet.
+    /// A line on the scenario's interfaces, or on simulated buses for a scenario without interfaces. Every frame on the
+    /// buses goes to `log`, in the format of candump. The constructor sends nothing.
     ///
     /// # Errors
     /// [`PlantError`] for interfaces that cannot be opened and for buses that cannot be built.
@@ -78,12 +78,12 @@ impl Line {
         self.traffic.wires.now_ns()
     }
 
-    /// What was heard of a drive.
+    /// The received messages of a drive.
     pub fn heard(&self, axis: usize) -> &Heard {
         &self.traffic.heard[axis]
     }
 
-    /// Who else was heard.
+    /// The signs of other masters and nodes.
     pub fn strangers(&self) -> &Strangers {
         &self.traffic.strangers
     }
@@ -105,7 +105,7 @@ impl Line {
         Ok(())
     }
 
-    /// Listens until a condition holds; returns whether it did within that time.
+    /// Listens until a condition holds, and returns whether the condition holds within that time.
     ///
     /// # Errors
     /// [`LineError`] except those of transfers.
@@ -124,7 +124,7 @@ impl Line {
         Ok(true)
     }
 
-    /// Looks every so often, until what was seen is right or the time is over; returns what was seen last.
+    /// Looks at intervals until a value is right or the time is over. Returns the last value.
     pub(super) fn look_until<T: Copy, E: From<LineError>>(
         &mut self,
         within_ns: u64,
@@ -142,7 +142,7 @@ impl Line {
         }
     }
 
-    /// Reads an object, however long.
+    /// Reads an object of any length.
     ///
     /// # Errors
     /// [`LineError`].
@@ -162,7 +162,7 @@ impl Line {
         Ok(number(&value))
     }
 
-    /// The same; none where the drive refuses, as one without the object does.
+    /// Reads such an object; none for a refusal, as by a drive without the object.
     ///
     /// # Errors
     /// [`LineError`].
@@ -177,9 +177,9 @@ impl Line {
         }
     }
 
-    /// Writes the lowest bytes of a value to an object, and reads it back: a write is believed when the drive shows it,
-    /// which may take a moment. What does not show itself is for the caller to prove. The controlword has
-    /// [its own function](Self::control).
+    /// Writes the lowest bytes of a value to an object, and reads the object back. A write counts when the drive shows
+    /// the value, which may take a moment. The caller must prove a value that the drive does not show. The controlword
+    /// has [its own function](Self::control).
     ///
     /// # Errors
     /// [`LineError`].
@@ -208,7 +208,7 @@ impl Line {
         if is_kept { Ok(()) } else { Err(LineError::NotKept { axis, object, written: value, found }) }
     }
 
-    /// Sends a controlword by SDO. One that switches a drive on is refused while another drive is on.
+    /// Sends a controlword by SDO. Refuses a controlword that switches a drive on while another drive is on.
     ///
     /// # Errors
     /// [`LineError`].
@@ -222,7 +222,7 @@ impl Line {
         self.download(axis, ObjectAddress::new(0x6040, 0), word.0.into(), 2)
     }
 
-    /// The drive of an axis has no voltage any more, as its statusword showed: another one may be switched on.
+    /// Notes that the statusword of an axis' drive shows no voltage: another drive may be switched on.
     pub fn note_off(&mut self, axis: usize) {
         self.switched_on = self.switched_on.filter(|&on| on != axis);
     }
@@ -252,8 +252,8 @@ impl Line {
         Ok(())
     }
 
-    /// Sends SYNC to the bus of an axis. Returns the time from its end until the drive began to transmit its process data, ns;
-    /// none where nothing came.
+    /// Sends SYNC to the bus of an axis. Returns the time from its end to the start of the drive's process data, ns;
+    /// none without process data.
     pub(super) fn sync_answer_ns(&mut self, axis: usize) -> Result<Option<u64>, LineError> {
         let Address { bus, .. } = self.traffic.addresses[axis];
         (self.traffic.sync_ns, self.traffic.heard[axis].process_data_ns) = (None, None);
@@ -262,7 +262,7 @@ impl Line {
         Ok(self.traffic.sync_answer_ns(axis))
     }
 
-    /// Everything of the log is on its way to its file.
+    /// Flushes the log to its file.
     ///
     /// # Errors
     /// [`LineError::Log`].
@@ -331,16 +331,17 @@ pub struct OldValue {
     pub bytes: usize,
 }
 
-/// Where old values are kept.
+/// The place of old values.
 pub trait Ledger: Send {
-    /// Replaces what is kept of the drive of an axis by these values, the oldest change first; by nothing without values.
+    /// Replaces the kept values of the drive of an axis by these values, the oldest change first. Without values,
+    /// removes the kept values.
     ///
     /// # Errors
-    /// When the values cannot be kept.
+    /// When the write of the values fails.
     fn keep(&mut self, axis: usize, values: &[OldValue]) -> io::Result<()>;
 }
 
-/// The boot-up messages that were heard until a moment.
+/// The boot-up messages received until a moment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BootUps([u32; AXES]);
 

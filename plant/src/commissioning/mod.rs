@@ -1,4 +1,4 @@
-//! Commissioning of a robot, step by step: a client of all drives that reads, configures and moves single drives.
+//! Commissioning of a robot in steps: a client of all drives that reads, configures and moves single drives.
 //!
 //! Unlike the master, the client waits for every answer and exchanges no process data. The steps are
 //! sequences of questions to a [`Line`]; time comes from the line, simulated or real. Files, arguments and the

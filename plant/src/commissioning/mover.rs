@@ -1,4 +1,4 @@
-//! One axis with power, under watch: prepared, switched on, moved to a position, and stopped whatever happens.
+//! One axis with power, under watch: prepared, switched on, moved to a position, and stopped in every case.
 
 use masseter_can::canopen::{NmtCommand, ObjectAddress};
 use masseter_can::cia402::{Controlword, StatusBit};
@@ -18,12 +18,12 @@ use crate::master::wanted::OFFSETS;
 /// Profile position and homing (6060h).
 pub(super) const POSITIONING: i8 = 1;
 pub(super) const HOMING: i8 = 6;
-/// How long an axis must stand with power on, and within which time it must, ns.
+/// Time at rest with power on, and the time limit for it, ns.
 const STILL_NS: u64 = SECOND_NS;
 const RESTLESS_NS: u64 = 5 * SECOND_NS;
-/// The motor may use this share of its force limit (6072h): at the limit it no longer follows.
+/// Allowed share of the motor's force limit (6072h): at the limit the motor no longer follows.
 const USABLE: f64 = 0.9;
-/// An axis moves against its target if it does so by this many times its noise, and by more than this many increments.
+/// Least way against the target that counts, in times of the noise and in increments.
 const NOISES: f64 = 3.0;
 const INCREMENTS: f64 = 3.0;
 
@@ -77,13 +77,13 @@ impl<'a> Mover<'a> {
     fn configure(&mut self) -> Result<(), MotionError> {
         let (can, scale) = (&self.scenario.can, self.scale());
         let Caution { speed_m_s, acceleration_m_s2, force_n, .. } = self.caution;
-        // The drive stops when this program dies: it watches the heartbeat, and a lost one is a quick stop.
+        // The drive stops when this program dies: a lost heartbeat is a quick stop.
         self.line.beat_every(can.heartbeat_producer_ms);
         let consumed = u32::from(MASTER_NODE.get()) << 16 | u32::from(can.heartbeat_consumer_ms);
         let acceleration = scale.acceleration(acceleration_m_s2);
         let permille = (force_n / scale.permille_n.abs()).round() as u32;
-        // A following error is a fault at once, and a fault closes the brake at once: the feedback may be what is wrong, and
-        // then a ramp only drives the axis further. Not every drive takes these values.
+        // A following error is a fault at once, and a fault closes the brake at once. With a wrong feedback, a ramp
+        // only drives the axis further. Not every drive takes these values.
         let at_once = [0x6066, 0x605E].map(|index| Loan { may_lack: true, ..Loan::new(index, 0, 0, 2) });
         let window = scale.window(self.watch.bounds.window_m);
         let reduced = [
@@ -97,7 +97,7 @@ impl<'a> Mover<'a> {
             Loan::new(0x6084, 0, acceleration, 4),
         ];
         self.borrow(&[&reduced[..], &at_once].concat())?;
-        // A profile may keep the step from writing an object: then the drive must be as careful by itself.
+        // A profile may forbid the write of an object. Then the drive itself must be as careful.
         self.require(0x1016, 1, |found| found == consumed)?;
         self.require(0x6072, 0, |found| found <= permille)?;
         self.require(0x6081, 0, |found| found <= scale.velocity(speed_m_s))?;
@@ -105,8 +105,8 @@ impl<'a> Mover<'a> {
         Ok(())
     }
 
-    /// Offsets of the cyclic modes (60B0h to 60B2h) are 0 from now on: a drive may keep the last one of its process
-    /// data, and some drives add it in every mode.
+    /// Sets the offsets of the cyclic modes (60B0h to 60B2h) to 0. A drive may keep the last offset of its process
+    /// data, and some drives add the offset in every mode.
     fn clear_offsets(&mut self) -> Result<(), LineError> {
         for (index, bytes) in OFFSETS {
             let object = ObjectAddress::new(index, 0);
@@ -142,7 +142,7 @@ impl<'a> Mover<'a> {
         self.watch.check_way(self.scale().metres(target), self.backwards_m())
     }
 
-    /// As far as an axis may seem to go backwards, m.
+    /// Largest apparent way backwards of an axis, m.
     fn backwards_m(&self) -> f64 {
         (NOISES * self.noise_m).max(INCREMENTS * self.scale().increment_m.abs())
     }
@@ -157,7 +157,7 @@ impl<'a> Mover<'a> {
         self.scenario.profile(self.axis)
     }
 
-    /// Where the axis is, m.
+    /// Position of the axis, m.
     pub(super) fn position_m(&mut self) -> Result<f64, LineError> {
         read_position(self.line, self.axis, &self.scale())
     }
@@ -191,7 +191,7 @@ impl<'a> Mover<'a> {
         self.wait_until_still()
     }
 
-    /// Goes on only once the axis has stood for a second.
+    /// Waits until the axis has stood for a second.
     fn wait_until_still(&mut self) -> Result<(), MotionError> {
         let restless_ns = self.line.now_ns() + RESTLESS_NS;
         let mut since_ns = self.line.now_ns();
@@ -215,7 +215,7 @@ impl<'a> Mover<'a> {
         }
     }
 
-    /// Moves to a position in profile position; returns everything that was seen, from the set-point on.
+    /// Moves to a position in profile position; returns all looks from the set-point on.
     pub(super) fn move_to(&mut self, target: i32) -> Result<Vec<Sample>, MotionError> {
         self.check_way(target)?;
         let scale = self.scale();
@@ -283,7 +283,7 @@ impl<'a> Mover<'a> {
         }
     }
 
-    /// Looks for that long, at an axis that stands.
+    /// Looks at an axis at rest for that time.
     pub(super) fn dwell(&mut self, for_ns: u64) -> Result<Vec<Sample>, MotionError> {
         let until_ns = self.line.now_ns() + for_ns;
         let mut seen = Vec::new();
@@ -297,16 +297,16 @@ impl<'a> Mover<'a> {
         Ok(seen)
     }
 
-    /// Switches off an axis that stands; returns how far it moved meanwhile, m.
+    /// Switches off an axis at rest; returns its way meanwhile, m.
     pub(super) fn switch_off(&mut self) -> Result<f64, MotionError> {
         switch_off_drive(self.line, self.axis, &self.scale(), &self.profile().brake)
     }
 
-    /// Ends: stops and switches off after a failure, and writes the old values back. A drive that is not proved off keeps its
-    /// reduced limits.
+    /// Ends the motion: stops and switches off after a failure, and writes the old values back. A drive without a proof
+    /// of power off keeps its reduced limits.
     ///
     /// # Errors
-    /// That of the motion, unless the drive is not proved off, or an old value did not return.
+    /// That of the motion, unless the proof of power off fails, or an old value has not returned.
     pub(super) fn end_motion<T>(mut self, done: Result<T, MotionError>) -> Result<T, MotionError> {
         let axis = self.axis;
         if done.is_err() {
@@ -322,8 +322,8 @@ impl<'a> Mover<'a> {
         self.give_back(done)
     }
 
-    /// Writes the old values back, and judges the motion. A restart or another master is the cause of whatever else was
-    /// seen, such as a position that jumps.
+    /// Writes the old values back, and judges the motion. A restart or another master is the cause of all other signs,
+    /// such as a jump of the position.
     fn give_back<T>(&mut self, done: Result<T, MotionError>) -> Result<T, MotionError> {
         let restored = self.borrowed.restore(self.line);
         let done = self.watch.check_undisturbed(self.line).and(done);
@@ -333,14 +333,14 @@ impl<'a> Mover<'a> {
     }
 }
 
-/// The way of a motion from rest to rest, with what may be seen beside it.
+/// The way of a motion from rest to rest, with its tolerances.
 #[expect(clippy::struct_field_names, reason = "the unit ends every name")]
 struct Way {
     start_m: f64,
     target_m: f64,
-    /// As far as it may seem to go backwards.
+    /// Largest apparent way backwards.
     backwards_m: f64,
-    /// As far as it may go beyond the target.
+    /// Largest way beyond the target.
     beyond_m: f64,
 }
 
@@ -349,7 +349,7 @@ impl Way {
         (self.target_m - self.start_m).abs()
     }
 
-    /// Why an axis at this position must stop, if it must.
+    /// The reason for a stop of an axis at this position, if any.
     fn left_at(&self, position_m: f64) -> Option<StopCause> {
         let direction = (self.target_m - self.start_m).signum();
         let moved_m = (self.start_m - position_m) * direction;
@@ -361,7 +361,7 @@ impl Way {
     }
 }
 
-/// What the person at the machine wants.
+/// The order of the person at the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wish {
     /// To go on.
@@ -375,7 +375,7 @@ pub enum Wish {
 /// Asked at every look, with the line's time, ns.
 pub type Operator<'a> = dyn FnMut(u64) -> Wish + 'a;
 
-/// How carefully an axis is moved.
+/// The caution of a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Caution {
     /// Speed (6081h), m/s.

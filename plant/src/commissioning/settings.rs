@@ -1,6 +1,6 @@
 //! The PDOs and objects of a drive: wanted, found, or to be restored.
 //!
-//! One form serves all three. A [`Survey`] holds what was read from a drive. This module sends nothing but uploads.
+//! One form serves all three. A [`Survey`] holds the answers of a drive. This module sends only uploads.
 
 use std::collections::BTreeMap;
 
@@ -18,16 +18,16 @@ use crate::master::wanted::{PdoLayout, PdoSetting, Setting, WantedDrive, may_kee
 pub struct Settings {
     /// The PDOs.
     pub pdos: Vec<PdoSetting>,
-    /// The objects, in the order in which they are written.
+    /// The objects, in the order of the writes.
     pub objects: Vec<Setting>,
 }
 
-/// An object that is not as it shall be.
+/// An object with a deviation.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Difference {
-    /// As it shall be.
+    /// The wanted object.
     pub wanted: Setting,
-    /// Its value; none where the drive has no such object.
+    /// Its value; none for a drive without the object.
     pub found: Option<u32>,
 }
 
@@ -39,7 +39,7 @@ impl Difference {
 }
 
 impl Settings {
-    /// What the rig needs.
+    /// The settings that the rig needs.
     pub fn wanted(wanted: &WantedDrive) -> Self {
         let mut home = Some(&wanted.home).filter(|home| home.rule != ObjectRule::Absent).cloned();
         // A drive without the object has its home at its own zero.
@@ -55,7 +55,7 @@ impl Settings {
         self.objects.iter().map(|setting| setting.object.0)
     }
 
-    /// The same objects and PDOs with the values that were found, without those that the drive does not have.
+    /// These objects and PDOs with the found values, without objects that the drive lacks.
     #[must_use]
     pub fn found(&self, survey: &Survey) -> Self {
         let pdo = |like: &PdoSetting| {
@@ -82,7 +82,7 @@ impl Settings {
         }
     }
 
-    /// What is not as it shall be. An optional object may be absent, and so may the timers and PDOs that nobody needs.
+    /// The deviations. An optional object may be absent, and also timers and PDOs without a use.
     pub fn differences(&self, survey: &Survey) -> Vec<Difference> {
         let mut differences = Vec::new();
         for pdo in &self.pdos {
@@ -134,7 +134,7 @@ pub struct Survey {
 }
 
 impl Survey {
-    /// Reads a drive: what every drive has, its PDOs, and these objects. The first silence ends the survey.
+    /// Reads a drive: the common objects, its PDOs, and these objects. The first silence ends the survey.
     ///
     /// # Errors
     /// [`LineError`] except those of transfers, which are part of the survey.
@@ -197,12 +197,12 @@ impl Survey {
         self.readings.values().any(|reading| *reading == Err(SdoReason::Silent))
     }
 
-    /// Every object that was asked for, with its answer.
+    /// Every requested object with its answer.
     pub fn readings(&self) -> impl Iterator<Item = (ObjectAddress, &Result<Vec<u8>, SdoReason>)> {
         self.readings.iter().map(|(&object, reading)| (object, reading))
     }
 
-    /// Why an object could not be read.
+    /// The reason for an unread object.
     pub fn refusal(&self, object: ObjectAddress) -> Option<SdoReason> {
         self.readings.get(&object)?.as_ref().err().copied()
     }

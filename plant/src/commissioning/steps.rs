@@ -1,4 +1,4 @@
-//! Steps that move nothing: proof that a drive has no power, positions of all axes, storing, answers to SYNC.
+//! Steps without a motion: proof that a drive has no power, positions of all axes, storing, answers to SYNC.
 
 use masseter_can::canopen::{NmtCommand, ObjectAddress};
 use masseter_can::cia402::{Controlword, DriveState, Statusword};
@@ -10,14 +10,14 @@ use super::errors::{LineError, MotionError, SdoReason};
 use super::line::Line;
 use super::watch::{read_position, read_state};
 
-/// For how long an axis is watched, ns.
+/// Time of the watch over an axis, ns.
 const WATCH_NS: u64 = 200 * MILLISECOND_NS;
-/// How long a drive may take to lose its power after it was told to, ns.
+/// Longest time of a drive from the command to the loss of its power, ns.
 const POWER_OFF_NS: u64 = 5 * SECOND_NS;
 const POSITION: ObjectAddress = ObjectAddress::new(0x6064, 0);
 const STATUS: ObjectAddress = ObjectAddress::new(0x6041, 0);
 
-/// Why nothing may be written to a drive.
+/// The reason against writes to a drive.
 #[derive(Debug, thiserror::Error)]
 pub enum PowerError {
     /// The statusword shows power, or cannot be read.
@@ -41,7 +41,7 @@ pub enum PowerError {
         axis: usize,
         /// How far it moved.
         increments: u32,
-        /// What counts as noise.
+        /// The limit of noise.
         noise: u32,
     },
     /// The line.
@@ -62,32 +62,32 @@ pub fn prove_no_power(line: &mut Line, axis: usize, noise: u32) -> Result<(), Po
     if moved > noise { Err(PowerError::Moves { axis, increments: moved, noise }) } else { Ok(()) }
 }
 
-/// Stops a drive that somebody else left with power: quick stop, and no voltage once it stands. Whether it worked is for
-/// [`prove_no_power`] to say.
+/// Stops a drive that another program has left with power: quick stop, and no voltage once the axis stands.
+/// [`prove_no_power`] proves the success.
 ///
 /// # Errors
 /// [`LineError`].
 pub fn take_over(line: &mut Line, axis: usize, noise: u32) -> Result<(), LineError> {
     line.control(axis, Controlword::QUICK_STOP)?;
     let until_ns = line.now_ns() + POWER_OFF_NS;
-    // An axis that cannot be read may move.
+    // An unreadable axis may move.
     while motion(line, axis, WATCH_NS / 4).map_or(true, |moved| moved > noise) && line.now_ns() < until_ns {}
     line.control(axis, Controlword::DISABLE_VOLTAGE)
 }
 
-/// How far an axis moves in that time, increments.
+/// Way of an axis in that time, increments.
 fn motion(line: &mut Line, axis: usize, within_ns: u64) -> Result<u32, LineError> {
     let before = line.read_number(axis, POSITION)? as i32;
     line.listen(within_ns)?;
     Ok((line.read_number(axis, POSITION)? as i32).abs_diff(before))
 }
 
-/// All axes at one moment, as far as one question after the other is one.
+/// All axes at nearly one moment, by one question after the other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stand {
     /// d1 to l3 by 6064h, m.
     pub positions_m: [f64; AXES],
-    /// How far each axis moved between two readings, m.
+    /// Way of each axis between two readings, m.
     pub moved_m: [f64; AXES],
     /// The states of the drives.
     pub states: [DriveState; AXES],
@@ -121,13 +121,13 @@ const SAVE: u32 = 0x6576_6173;
 const LOOK_NS: u64 = 100 * MILLISECOND_NS;
 /// How long a drive may take to boot, ns.
 const BOOT_NS: u64 = 10 * SECOND_NS;
-/// Silence after a boot-up message that ends the boot: a boot loader sends a message of its own before, ns.
+/// Silence after a boot-up message that ends the boot, ns. A boot loader sends an earlier message of its own.
 const SETTLED_NS: u64 = SECOND_NS;
 
-/// Why a drive did not store.
+/// Why a drive has not stored.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// It is not done in time.
+    /// The drive is not done in time.
     #[error(
         "{}: {object} did not show within {timeout_ms} ms that the drive stored; raise drive_profile.store.timeout_ms",
         AXIS_NAMES[*axis]
@@ -137,7 +137,7 @@ pub enum StoreError {
         axis: usize,
         /// The object that stores.
         object: ObjectAddress,
-        /// The time that it had, ms.
+        /// The time limit, ms.
         timeout_ms: u32,
     },
     /// No boot-up message after the reset.
@@ -151,14 +151,14 @@ pub enum StoreError {
     Line(#[from] LineError),
 }
 
-/// Stores, and waits until the drive is done.
+/// Stores, and waits for the end of the storing.
 ///
 /// # Errors
 /// [`StoreError`].
 pub fn store(line: &mut Line, axis: usize, config: StoreConfig) -> Result<(), StoreError> {
     let (object, timeout_ms) = (ObjectAddress::new(0x1010, config.subindex), config.timeout_ms);
     let until_ns = line.now_ns() + u64::from(timeout_ms) * MILLISECOND_NS;
-    // Some drives answer nothing until they are done.
+    // Some drives give no answer before they are done.
     unless_silent(line.write(axis, object, SAVE, 4))?;
     loop {
         let read = line.read_number(axis, object);
@@ -200,13 +200,13 @@ fn unless_silent<T>(answer: Result<T, LineError>) -> Result<Option<T>, LineError
     }
 }
 
-/// How many SYNCs a drive answers.
+/// Number of SYNCs for the measurement.
 const SYNCS: usize = 50;
 /// Time that a node takes to become operational, ns.
 const START_NS: u64 = 50 * MILLISECOND_NS;
 
-/// The longest time from the end of a SYNC until the drive began to transmit its process data, ns. It is none if a
-/// SYNC had no answer. The drive is operational meanwhile, and pre-operational before and after.
+/// The longest time from the end of a SYNC to the start of the drive's process data, ns; none for a SYNC without an
+/// answer. The drive is operational meanwhile, and pre-operational before and after.
 ///
 /// # Errors
 /// [`LineError`] except those of transfers.

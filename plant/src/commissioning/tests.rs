@@ -45,7 +45,7 @@ impl Bench {
         home(&mut self.line, &self.scenario, L1, &mut |_| Wish::Move)
     }
 
-    /// What stopped a jog. All drives are off afterwards.
+    /// The reason for the stop of a jog. All drives are off afterwards.
     fn stopped(&mut self, by_m: f64) -> StopCause {
         let error = self.jog(by_m).unwrap_err();
         let MotionError::OfAxis { axis: L1, reason: AxisError::Stopped(cause) } = error else {
@@ -55,7 +55,7 @@ impl Bench {
         cause
     }
 
-    /// What stopped a jog. Another drive has power.
+    /// The reason for the stop of a jog. Another drive has power.
     fn stopped_beside(&mut self, by_m: f64) -> StopCause {
         let error = self.jog(by_m).unwrap_err();
         let MotionError::OfAxis { axis: L1, reason: AxisError::Stopped(cause) } = error else {
@@ -159,7 +159,7 @@ fn a_released_key_halts_and_a_stop_switches_off() {
     assert_eq!(end, [Controlword::QUICK_STOP, Controlword::DISABLE_VOLTAGE]);
 }
 
-/// A person who lets go before the motion begins, and then ends it, sees no motion.
+/// No motion follows when a person lets go before the beginning and then ends the step.
 #[test]
 fn a_stop_while_the_axis_waits_starts_nothing() {
     let mut bench = Bench::new("");
@@ -270,12 +270,12 @@ impl Write for Log {
 }
 
 impl Log {
-    /// Everything that was written.
+    /// All written bytes.
     pub(super) fn text(&self) -> String {
         String::from_utf8(self.0.lock().unwrap().clone()).unwrap()
     }
 
-    /// Every controlword that was sent, with the node.
+    /// Every sent controlword, with the node.
     pub(super) fn controlwords(&self) -> Vec<(u8, Controlword)> {
         let text = self.text();
         let words = text.lines().filter_map(|line| {

@@ -1,4 +1,4 @@
-//! The frames on the buses of all drives: sent, heard and logged. Nothing here waits for an answer.
+//! The frames on the buses of all drives: sent, received and logged. This module waits for no answer.
 //!
 //! The buses are simulated ones with the emulated drives, or real interfaces, each with its clock.
 
@@ -21,31 +21,31 @@ use crate::simulator::emulation::virtual_link::VirtualLink;
 /// Time between two looks at the buses, ns.
 const STEP_NS: u64 = MILLISECOND_NS;
 
-/// The heartbeat of this node: drives that watch it stop without it.
+/// The heartbeat of this node: drives that watch this heartbeat stop without it.
 #[derive(Debug, Clone, Copy)]
 struct Beat {
     every_ns: u64,
     next_ns: u64,
 }
 
-/// The buses, and what was heard on them.
+/// The buses, with the received messages.
 pub(super) struct Traffic {
     pub(super) wires: Wires,
     /// Names of the buses in the log.
     pub(super) names: Vec<String>,
     pub(super) addresses: [Address; AXES],
     pub(super) heard: [Heard; AXES],
-    /// Who else was heard.
+    /// The signs of other masters and nodes.
     pub(super) strangers: Strangers,
     beat: Option<Beat>,
-    /// When the last SYNC was on its bus, ns.
+    /// Time of the last SYNC on its bus, ns.
     pub(super) sync_ns: Option<u64>,
     bitrate: Bitrate,
     pub(super) log: Box<dyn Write + Send>,
 }
 
 impl Traffic {
-    /// On the scenario's interfaces, or on simulated buses where it names none.
+    /// Traffic on the scenario's interfaces, or on simulated buses for a scenario without interfaces.
     ///
     /// # Errors
     /// [`PlantError`] for interfaces that cannot be opened and for buses that cannot be built.
@@ -66,7 +66,7 @@ impl Traffic {
         })
     }
 
-    /// Time from the end of the last SYNC until a drive began to transmit process data, ns; none where one of them was not heard.
+    /// Time from the end of the last SYNC to the start of a drive's process data, ns; none if either is missing.
     pub(super) fn sync_answer_ns(&self, axis: usize) -> Option<u64> {
         let (begin_ns, sync_ns) = self.heard[axis].process_data_ns.zip(self.sync_ns)?;
         Some(begin_ns.saturating_sub(sync_ns))
@@ -137,7 +137,7 @@ impl Traffic {
     }
 }
 
-/// What was heard of one drive.
+/// The received messages of one drive.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Heard {
     /// State of its heartbeat.
@@ -146,7 +146,7 @@ pub struct Heard {
     pub boot_ups: u32,
     /// Its emergencies, the oldest first.
     pub emergencies: Vec<Emergency>,
-    /// When it began to transmit process data last, ns.
+    /// Start of its last process data, ns.
     pub(super) process_data_ns: Option<u64>,
     /// Answers of its SDO server since the last transfer.
     pub(super) answers: Vec<SdoResponse>,
@@ -174,12 +174,12 @@ impl Heard {
 pub struct Strangers {
     /// SYNC, NMT, process data or SDO requests to a drive, or a heartbeat of the master's node id.
     pub masters: BTreeSet<OtherMaster>,
-    /// Nodes that are none of the scenario.
+    /// Nodes beside those of the scenario.
     pub nodes: BTreeSet<Address>,
 }
 
 impl Strangers {
-    /// Refuses to go on where another master was heard.
+    /// Refuses to go on after a sign of another master.
     ///
     /// # Errors
     /// [`OtherMaster`].
@@ -239,7 +239,7 @@ impl Wires {
         }
     }
 
-    /// Lets time pass. What emulated drives store meanwhile goes to the file of their memory.
+    /// Lets time pass. Writes values that emulated drives store meanwhile to the file of their memory.
     pub(super) fn pass(&mut self, for_ns: u64) -> Result<(), PlantError> {
         match self {
             Self::Simulated(link, now_ns) => {

@@ -1,6 +1,6 @@
 //! The watch over a motion, and the switching of one drive with the times of its brake.
 //!
-//! One look reads the moved axis and one of the others, and returns what must stop the motion.
+//! One look reads the moved axis and one of the others, and returns a reason for a stop of the motion.
 
 use masseter_can::canopen::{EmergencyCode, ObjectAddress};
 use masseter_can::cia402::{Controlword, DriveState, StatusBit, Statusword};
@@ -16,7 +16,7 @@ const INPUTS: ObjectAddress = ObjectAddress::new(0x60FD, 0);
 const NEGATIVE_SWITCH: u32 = 0b01;
 const POSITIVE_SWITCH: u32 = 0b10;
 
-/// What is allowed while one axis moves.
+/// The limits while one axis moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Bounds {
     /// Force of the motor, N.
@@ -56,12 +56,12 @@ pub(super) struct Watch {
     scales: [AxisScale; AXES],
     /// What is allowed.
     pub(super) bounds: Bounds,
-    /// Where every axis stood at the beginning, m.
+    /// Positions of all axes at the beginning, m.
     began_m: [f64; AXES],
-    /// Emergencies heard before.
+    /// Emergencies received before.
     emergencies: [usize; AXES],
     boot_ups: BootUps,
-    /// None in a drive without 60FDh, and while they do not count.
+    /// None for a drive without 60FDh, and while the switches do not count.
     switches: Option<Switches>,
     /// The other axis that is looked at next.
     next: usize,
@@ -89,12 +89,12 @@ pub(super) fn read_error_code(line: &mut Line, axis: usize) -> u16 {
 
 /// The limit switches of an axis that stands there; none in a drive without 60FDh.
 fn read_switches(line: &mut Line, axis: usize, place_m: f64) -> Result<Option<Switches>, LineError> {
-    // Silence does not say that a switch is open.
+    // Silence does not prove an open switch.
     Ok(line.read_if_there(axis, INPUTS)?.map(|bits| Switches { bits, place_m }))
 }
 
 impl Watch {
-    /// Begins; refuses if a drive has power.
+    /// Begins the watch; refuses a drive with power.
     pub(super) fn begin(
         line: &mut Line,
         axis: usize,
@@ -115,7 +115,7 @@ impl Watch {
         Ok(Self { axis, scales, bounds, began_m, emergencies, boot_ups, switches, next: 0 })
     }
 
-    /// Refuses to go on after a restart of a drive, whose reduced limits are lost, and beside another master.
+    /// Refuses to go on after a restart of a drive, which loses its reduced limits, and beside another master.
     ///
     /// # Errors
     /// [`AxisError::Stopped`].
@@ -126,20 +126,20 @@ impl Watch {
         line.strangers().refuse_masters().map_err(|master| stopped(master.into()))
     }
 
-    /// The limit switches count no more: homing looks for them.
+    /// Ignores the limit switches: homing searches for them.
     pub(super) fn ignore_switches(&mut self) {
         self.switches = None;
     }
 
-    /// The limit switches count again. Those that are closed now end no motion, and allow none in their direction.
+    /// Watches the limit switches again. Switches closed now end no motion, but allow none in their direction.
     pub(super) fn heed_switches(&mut self, line: &mut Line) -> Result<(), LineError> {
         let place_m = read_position(line, self.axis, &self.scales[self.axis])?;
         self.switches = read_switches(line, self.axis, place_m)?;
         Ok(())
     }
 
-    /// Refuses a target beyond the place where the axis stood, in the direction of a switch that was closed there: the axis
-    /// is at its end, or the switch or its wire is broken. Positions within the noise are one place.
+    /// Refuses a target beyond the axis' first place in the direction of a switch closed there. The axis is at its end,
+    /// or the switch or its wire is broken. Positions within the noise are one place.
     ///
     /// # Errors
     /// [`AxisError::OnSwitch`].
@@ -154,7 +154,7 @@ impl Watch {
         Ok(())
     }
 
-    /// Looks once. The position comes before the statusword: a statusword without "homed" proves an old position.
+    /// Looks once, at the position before the statusword: a statusword without "homed" proves an old position.
     ///
     /// # Errors
     /// [`AxisError::Stopped`] for what must stop the motion.
@@ -197,7 +197,7 @@ impl Watch {
         Ok((force_n.abs() > limit_n).then_some(StopCause::Force { force_n, limit_n }))
     }
 
-    /// A switch that was closed at the beginning may be left.
+    /// The axis may leave a switch closed at the beginning.
     fn look_at_switches(&self, line: &mut Line) -> Result<Option<StopCause>, MotionError> {
         let Some(before) = self.switches else { return Ok(None) };
         let bits = line.read_number(self.axis, INPUTS)?;
@@ -212,7 +212,7 @@ impl Watch {
             return Ok(None);
         }
         let state = read_state(line, other)?;
-        // A drive in fault reacts without power too, and its emergency tells more.
+        // A drive in fault reacts without power too, and its emergency has more information.
         if state.is_powered() && state != DriveState::FaultReactionActive {
             return Ok(Some(StopCause::OtherPowered { other, state }));
         }
@@ -221,19 +221,19 @@ impl Watch {
     }
 }
 
-/// How long a drive may take from one state to the next, ns.
+/// Longest time of a drive from one state to the next, ns.
 const TRANSITION_NS: u64 = SECOND_NS;
-/// How long an axis is watched after its power went, ns.
+/// Time of the watch over an axis after the loss of its power, ns.
 const SETTLING_NS: u64 = SECOND_NS;
-/// How far an axis may move as its brake closes, m: some turns of play, and not a fall.
+/// Largest way of an axis while its brake closes, m: some turns of play, not a fall.
 const MOST_DROP_M: f64 = 5e-4;
-/// How long a stop is tried, and after which time its command is repeated, ns.
+/// Longest time of the attempts at a stop, and the time between two commands, ns.
 const STOP_NS: u64 = SECOND_NS;
 const REPEAT_NS: u64 = 200 * MILLISECOND_NS;
 
-/// Switches a drive on, up to "operation enabled". The brake is opening then: the axis may not move yet. A drive that
-/// restarted has lost its reduced limits: it gets no power. One that restarts later is no longer ready to switch on,
-/// and takes no further word.
+/// Switches a drive on, up to "operation enabled". The brake opens then: the axis may not move before it is open. A
+/// restarted drive has lost its reduced limits, and gets no power. A drive that restarts later is no longer ready to
+/// switch on, and takes no further word.
 pub(super) fn switch_on_drive(line: &mut Line, axis: usize, watch: &Watch) -> Result<(), MotionError> {
     for (word, wanted) in [
         (Controlword::SHUTDOWN, DriveState::ReadyToSwitchOn),
@@ -271,8 +271,8 @@ pub(super) fn switch_off_drive(
     if moved_m.abs() > MOST_DROP_M { Err(AxisError::Dropped { moved_m }.of(axis)) } else { Ok(moved_m) }
 }
 
-/// Stops an axis in whatever it does: quick stop, then voltage off. Neither word can enable a drive, whatever its
-/// state. Commands that are lost are repeated.
+/// Stops an axis in every state: quick stop, then voltage off. Neither word can enable a drive in any state. Lost
+/// commands are repeated.
 ///
 /// # Errors
 /// [`AxisError::StaysOn`] unless the statusword proves that the drive is off.
@@ -289,7 +289,7 @@ fn disable_voltage(line: &mut Line, axis: usize) -> Result<(), MotionError> {
     Ok(())
 }
 
-/// Sends a controlword again and again until the drive shows no voltage, for a limited time; returns why that is not proved.
+/// Repeats a controlword until the drive shows no voltage, for a limited time. Returns the reason for a missing proof.
 fn repeat(line: &mut Line, axis: usize, word: Controlword) -> Result<(), Unproved> {
     let until_ns = line.now_ns() + STOP_NS;
     loop {
@@ -302,7 +302,7 @@ fn repeat(line: &mut Line, axis: usize, word: Controlword) -> Result<(), Unprove
         if line.now_ns() >= until_ns {
             return Err(sent.err().map_or(reason, |error| Unproved::Unread(Box::new(error.into()))));
         }
-        // Time passes also where nothing can be sent.
+        // Time passes also without a transmission.
         let _ = line.listen(MILLISECOND_NS);
     }
 }
@@ -317,7 +317,7 @@ pub(super) fn wait_for_mode(line: &mut Line, axis: usize, wanted: i8) -> Result<
     if found == wanted { Ok(()) } else { Err(AxisError::Mode { wanted, found }.of(axis)) }
 }
 
-/// The state that a drive has when the condition holds, or at the end of the time.
+/// The state of a drive when the condition holds, or at the end of the time.
 fn wait_for_state(
     line: &mut Line,
     axis: usize,

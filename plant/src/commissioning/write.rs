@@ -1,4 +1,4 @@
-//! Settings into a drive: PDOs by the standard's procedure, objects one by one, every value read back.
+//! The write of settings to a drive: PDOs by the standard's procedure, objects one by one, every value read back.
 //!
 //! [`Borrowed`] has the objects of one drive that a step changes for its own duration.
 
@@ -16,10 +16,10 @@ use super::line::{Line, OldValue};
 use super::settings::{Settings, Survey};
 use crate::master::wanted::{COB_ID_BITS, PdoSetting, Setting, may_keep, value_bits};
 
-/// The time that a drive gets to become pre-operational, ns.
+/// Longest time of a drive to become pre-operational, ns.
 const ENTER_NS: u64 = 100 * MILLISECOND_NS;
 
-/// A value that was written.
+/// A written value.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Change {
     /// The object.
@@ -27,16 +27,16 @@ pub struct Change {
     pub object: ObjectAddress,
     /// Its name.
     pub name: &'static str,
-    /// Its value before; none where it could not be read.
+    /// Its value before; none if unreadable.
     pub before: Option<String>,
     /// Its value now.
     pub after: String,
 }
 
-/// Why a drive does not have its settings.
+/// The reason why a drive lacks its settings.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
-    /// The drive refused a value.
+    /// The drive refuses a value.
     #[error(
         "{}: object {object} ({}) := {}: {code}{limits}; change {key}",
         AXIS_NAMES[*axis], object_name(*object), value_text(*object, *value)
@@ -55,7 +55,7 @@ pub enum WriteError {
         /// The key of the scenario that decides the value.
         key: String,
     },
-    /// The drive acknowledged a value and shows another one.
+    /// The drive acknowledges a value and shows another.
     #[error("{source}; change {key}")]
     NotKept {
         /// The object with its values.
@@ -78,18 +78,18 @@ pub struct Writer<'a> {
 }
 
 impl<'a> Writer<'a> {
-    /// For the drive of an axis.
+    /// The writer for the drive of an axis.
     pub fn new(line: &'a mut Line, axis: usize, profile: &'a DriveProfile) -> Self {
         Self { line, axis, profile, changes: Vec::new() }
     }
 
-    /// Every value that was written.
+    /// Every written value.
     pub fn into_changes(self) -> Vec<Change> {
         self.changes
     }
 
-    /// Makes the drive pre-operational, since many drives take PDO parameters in no other state, and writes what differs from
-    /// the survey. The first refusal ends it.
+    /// Makes the drive pre-operational, because many drives take PDO parameters in no other state. Writes the
+    /// differences from the survey. The first refusal ends the writes.
     ///
     /// # Errors
     /// [`WriteError`].
@@ -196,7 +196,7 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// Drives refuse software limits that cross: the one that moves away from the other comes first.
+/// Drives refuse software limits that cross, so the limit that moves away from the other comes first.
 fn in_order<'s>(settings: &'s [Setting], survey: &Survey) -> Vec<&'s Setting> {
     let mut settings: Vec<_> = settings.iter().collect();
     let place = |subindex| {
@@ -219,7 +219,7 @@ pub(super) struct Loan {
     pub(super) object: ObjectAddress,
     pub(super) value: u32,
     pub(super) bytes: usize,
-    /// Whether the drive may lack the object or refuse the value, whatever is in its profile.
+    /// Whether the drive may lack the object or refuse the value, for every profile.
     pub(super) may_lack: bool,
 }
 
@@ -239,12 +239,12 @@ pub(super) struct Borrowed<'a> {
 }
 
 impl<'a> Borrowed<'a> {
-    /// Nothing is changed yet.
+    /// No changes.
     pub(super) const fn of_axis(axis: usize, profile: &'a DriveProfile) -> Self {
         Self { axis, profile, old: Vec::new() }
     }
 
-    /// Writes values as the profile's rules allow. All old values are kept at once, before the first write.
+    /// Writes values by the profile's rules. Keeps all old values before the first write.
     pub(super) fn set_all(&mut self, line: &mut Line, loans: &[Loan]) -> Result<(), LineError> {
         let mut writes = Vec::new();
         for loan in loans {
@@ -257,12 +257,12 @@ impl<'a> Borrowed<'a> {
         if writes.is_empty() {
             return Ok(());
         }
-        // A kill may come between.
+        // A kill may come in between.
         self.old.extend(writes.iter().map(|(.., old)| *old));
         line.keep_old_values(self.axis, &self.old)?;
         for (loan, may_lack, old) in writes {
             match line.write(self.axis, loan.object, loan.value, loan.bytes) {
-                // The drive has refused, so that nothing is changed. Without an answer it may have taken the value.
+                // The drive has refused, so nothing has changed. Without an answer the drive may have the value.
                 Err(error) if error.abort_code().is_some() => {
                     let place = self.old.iter().rposition(|kept| *kept == old);
                     self.old.remove(place.expect("it was kept"));
@@ -287,7 +287,7 @@ impl<'a> Borrowed<'a> {
         }
     }
 
-    /// The old value; none where nothing is to be written. An equal value is not written: some objects are constant.
+    /// The old value; none without a write. An equal value is not written, because some objects are constant.
     fn read(&self, line: &mut Line, loan: &Loan, may_lack: bool) -> Result<Option<OldValue>, LineError> {
         let &Loan { object, value, bytes, .. } = loan;
         match line.read_number(self.axis, object) {
@@ -298,7 +298,7 @@ impl<'a> Borrowed<'a> {
         }
     }
 
-    /// Sets the software limits (607Dh) to positions as 6064h shows them, in increments; never the lower one above the upper one.
+    /// Sets the software limits (607Dh) to positions of 6064h, in increments. The lower limit is never above the upper.
     pub(super) fn set_limits(&mut self, line: &mut Line, ends: [i32; 2]) -> Result<(), LineError> {
         let offset = self.limit_offset(line)?;
         let [lowest, highest] = ends.map(|end| end.saturating_sub(offset) as u32);
@@ -309,7 +309,7 @@ impl<'a> Borrowed<'a> {
         self.set_all(line, &limits)
     }
 
-    /// What the drive adds to its software limits, increments: the position at home as the drive has it now.
+    /// Addend of the drive to its software limits, increments: the drive's present position at home.
     fn limit_offset(&self, line: &mut Line) -> Result<i32, LineError> {
         let homing = self.profile.homing;
         if !homing.limits_from_home {
@@ -320,7 +320,7 @@ impl<'a> Borrowed<'a> {
         Ok((home as i32).saturating_mul(homing.home_sign.into()))
     }
 
-    /// Writes every old value back, the last change first. A failure does not keep the others from their old values.
+    /// Writes every old value back, the last change first. A failure does not stop the other writes.
     pub(super) fn restore(&mut self, line: &mut Line) -> Result<(), LineError> {
         let failures = write_back(line, self.axis, &mem::take(&mut self.old));
         let left: Vec<_> = failures.iter().rev().map(|(old, _)| *old).collect();
@@ -329,11 +329,11 @@ impl<'a> Borrowed<'a> {
     }
 }
 
-/// Writes old values back that a killed step left, the last change first. Returns those that the drive refuses: it never takes
-/// them, so that it is owed them no more.
+/// Writes the old values of a killed step back, the last change first. Returns the values that the drive refuses: the
+/// drive never takes them, so the ledger may drop them.
 ///
 /// # Errors
-/// The first failure; the other values have returned nevertheless.
+/// The first failure. The other values have returned.
 pub fn give_back(line: &mut Line, axis: usize, old: &[OldValue]) -> Result<Vec<OldValue>, LineError> {
     let failures = write_back(line, axis, old);
     let (refused, lost): (Vec<_>, Vec<_>) =
@@ -344,8 +344,8 @@ pub fn give_back(line: &mut Line, axis: usize, old: &[OldValue]) -> Result<Vec<O
     lost.into_iter().next().map_or(Ok(refused), |(_, error)| Err(error))
 }
 
-/// Writes the oldest value of each object, the last one first. Returns those that failed, in this order. A refused one
-/// is tried again after the others: the software limits of a drive that restarted must not cross either.
+/// Writes the oldest value of each object, the last object first. Returns the failures in this order. A refused value
+/// gets another attempt after the others, because software limits of a restarted drive must not cross either.
 fn write_back(line: &mut Line, axis: usize, old: &[OldValue]) -> Vec<(OldValue, LineError)> {
     let mut write = |old: &OldValue| {
         let OldValue { object: ObjectKey(object), value, bytes } = *old;
@@ -444,7 +444,7 @@ mod tests {
         );
     }
 
-    /// A drive may lack the torque offset, but not keep one: another node answers in its place with "read-only".
+    /// A drive may lack the torque offset, but not keep one. Here another node answers in its place with "read-only".
     #[test]
     fn an_offset_that_a_drive_keeps_is_refused_and_another_optional_value_is_left() {
         for (index, is_refused) in [(0x60B2_u16, true), (0x6072, false)] {

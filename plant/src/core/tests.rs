@@ -114,8 +114,8 @@ fn the_process_data_are_complete_at_one_of_the_links_events() {
     assert_eq!(bench.reading.complete_ns, now_ns);
 }
 
-/// Joint positions of a smooth motion about the pose the rig is switched on in: 15 mm up and down, some
-/// pitch, 1.4 times a second; at rest at its beginning.
+/// Joint positions of a smooth motion about the pose at switch-on, from rest: 15 mm up and down, some pitch, 1.4 times
+/// a second.
 fn targets(mechanism: &Mechanism, start: &Pose, time_s: f64) -> [f64; AXES] {
     let share = (1.0 - (time_s * 1.4 * std::f64::consts::TAU).cos()) / 2.0;
     let shift = Vec3::new(-0.003, 0.002, -0.015) * share;
@@ -130,7 +130,7 @@ fn start_pose(bench: &Bench) -> Pose {
     Pose::translation(bench.truth.position_m[0], bench.truth.position_m[1], bench.truth.position_m[2])
 }
 
-/// Plays the motion for so many cycles; the largest distance of an axis from the target two cycles old.
+/// Plays the motion for this many cycles. Returns the largest distance of an axis from the target two cycles old.
 fn play(bench: &mut Bench, cycles: u64) -> f64 {
     let start = start_pose(bench);
     let began = bench.cycle;
@@ -301,7 +301,7 @@ fn a_heartbeat_is_the_last_frame_of_its_node_in_a_cycle() {
 fn process_data_of_the_sync_before_are_no_answer_to_this_one() {
     let mut bench = Bench::new(&Scenario::default());
     bench.enable();
-    // A cycle whose process data are not waited for; they lie in the queue when the next one begins.
+    // A cycle without a wait for process data, which lie in the queue at the beginning of the next cycle.
     let sync_ns = EPOCH_NS + bench.cycle * PERIOD_NS;
     bench.plant.begin_cycle(Wake::on_time(bench.cycle + 1, sync_ns)).unwrap();
     bench.plant.begin_cycle(Wake::on_time(bench.cycle + 2, sync_ns + PERIOD_NS)).unwrap();

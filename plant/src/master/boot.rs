@@ -1,7 +1,7 @@
-//! The boot of one drive: from its first message to the moment when it may be started.
+//! The boot of one drive: from its first message to the permission to start.
 //!
-//! A pure state machine that executes its [plan](super::boot_plan) over its [SDO client](super::sdo). It judges one drive
-//! alone; the master decides when drives are started, and what follows from a failure.
+//! A pure state machine that executes its [plan](super::boot_plan) over its [SDO client](super::sdo). The machine
+//! judges one drive alone. The master decides on the start of the drives, and on the consequence of a failure.
 
 use masseter_can::canopen::{AbortCode, CobId, Expedited, NmtCommand, NmtState, ObjectAddress, SdoResponse};
 use masseter_can::cia402::{DriveState, Statusword};
@@ -14,21 +14,21 @@ use super::events::Failure;
 use super::sdo::{ATTEMPTS, SdoClient, SdoFailure, number};
 use super::wanted::{WantedDrive, is_write_only};
 
-/// Silence of a server after which a transfer begins anew, ns. Drives that store parameters or boot take seconds, and
-/// nothing that moves waits for them.
+/// Silence of a server before a transfer begins anew, ns. Drives that store parameters or boot take seconds, and no
+/// motion waits for them.
 const TIMEOUT_NS: u64 = 1_000_000_000;
-/// Silence after which the communication of a drive is reset: it may be alive without a heartbeat, ns.
+/// Silence before a reset of a drive's communication, ns: the drive may be alive without a heartbeat.
 const RESET_EVERY_NS: u64 = 500_000_000;
-/// The time that a drive may take to become operational, ns.
+/// Longest time of a drive to become operational, ns.
 const START_WITHIN_NS: u64 = 1_000_000_000;
-/// Readings of a value that a drive may take some time to show.
+/// Most readings of a value that a drive shows late.
 const READINGS: u32 = 100;
-/// Answers without a request in one boot that repeated frames explain; more of them mean a second drive with this id.
+/// Most answers without a request in one boot by repeated frames. More of them mean a second drive with this id.
 const UNASKED: u32 = 7;
-/// Boot-up messages during a boot before the drive is given up.
+/// Most boot-up messages during a boot before the master gives up the drive.
 const RESTARTS: u32 = 3;
 
-/// A drive that took longer than it may.
+/// A drive beyond its time.
 pub(super) fn late(waited_ns: u64, limit_ns: u64) -> Failure {
     Failure::with(Cause::BootTimeout, waited_ns as f64 / 1e6, limit_ns as f64 / 1e6)
 }
@@ -53,14 +53,14 @@ impl From<SdoFailure> for Failure {
 /// Progress of a boot.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Boot {
-    /// How far the boot is.
+    /// The progress of the boot.
     pub(super) phase: BootPhase,
     steps: Vec<Step>,
     next: usize,
     readings: u32,
     /// The value to be written back.
     kept: Expedited,
-    /// How the write of this step ended, while the object is read back.
+    /// The outcome of this step's write, during the read back.
     written: Option<Result<(), SdoFailure>>,
     /// The statusword of a drive found in fault.
     fault_statusword: u32,
@@ -75,7 +75,7 @@ pub(super) struct Boot {
 }
 
 impl Boot {
-    /// The boot of a drive of which nothing is known at `now_ns`.
+    /// The boot of a drive, with an empty knowledge at `now_ns`.
     pub(super) fn new(wanted: &WantedDrive, resets_faults: bool, now_ns: u64) -> Self {
         Self {
             phase: BootPhase::Waiting,
@@ -106,7 +106,7 @@ impl Boot {
         matches!(self.phase, BootPhase::Configured | BootPhase::Starting | BootPhase::Ready)
     }
 
-    /// Begins anew: nothing known of the drive counts any more.
+    /// Begins anew, and forgets all knowledge of the drive.
     pub(super) fn forget(&mut self, now_ns: u64) {
         self.start_over();
         (self.phase, self.restarts) = (BootPhase::Waiting, 0);
@@ -123,7 +123,8 @@ impl Boot {
     pub(super) fn hear(&mut self, now_ns: u64, state: NmtState) -> Result<(), Failure> {
         if state != NmtState::BootUp {
             if self.phase == BootPhase::Waiting {
-                // A drive that was alive before this master may have any configuration: it is reset at once.
+                // A drive that was alive before this master may have any configuration, so the master resets the drive
+                // at once.
                 self.reset_at_ns = self.reset_at_ns.min(now_ns);
             }
             return Ok(());
@@ -196,8 +197,8 @@ impl Boot {
         }
     }
 
-    /// The number of steps to skip after the refusal of the step under way: the value was optional, or the drive lacks an
-    /// optional object. None where the refusal is a failure.
+    /// The number of steps to skip after the refusal of the present step, for an optional value or an optional object.
+    /// None for a refusal that is a failure.
     fn skipped_if_refused(&self, failure: SdoFailure) -> Option<usize> {
         let SdoFailure::Aborted { code, .. } = failure else { return None };
         let is_missing = matches!(code, AbortCode::NO_OBJECT | AbortCode::NO_SUBINDEX);
@@ -224,7 +225,7 @@ impl Boot {
         }
     }
 
-    /// The write under way, if one is.
+    /// The present write, if any.
     fn write(&self) -> Option<Write> {
         match self.steps[self.next] {
             Step::Write(write) => Some(write),
@@ -236,8 +237,8 @@ impl Boot {
         }
     }
 
-    /// Ends the step of a write: the object must show the value, whether the drive took it or had it already. A drive that
-    /// took it may need some time to show it.
+    /// Ends the step of a write: the object must show the value, whether new or unchanged. A drive may show a new value
+    /// late.
     fn judge_shown(
         &mut self,
         written: Result<(), SdoFailure>,
@@ -258,7 +259,7 @@ impl Boot {
         Ok(())
     }
 
-    /// The bits that prove the write under way; none where it is no write, or a later step proves it.
+    /// The bits that prove the present write; none for no write, or for a proof in a later step.
     fn bits_to_show(&self) -> Option<u32> {
         self.write()?.shown_bits()
     }
@@ -283,7 +284,7 @@ impl Boot {
         }
     }
 
-    /// Ends the step under way with the outcome of its transfer, unless a value is to be read again.
+    /// Ends the present step with the outcome of its transfer, unless a value needs another reading.
     fn end_transfer(&mut self, outcome: Result<Expedited, SdoFailure>) -> Result<(), Failure> {
         if let Some(written) = self.written.take() {
             return self.judge_shown(written, outcome);
@@ -309,7 +310,7 @@ impl Boot {
         Ok(())
     }
 
-    /// Judges a value; returns the number of steps to skip, or none if the value is to be read again.
+    /// Judges a value; returns the number of steps to skip, or none for another reading.
     fn judge_value(
         &mut self,
         object: ObjectAddress,
@@ -349,19 +350,19 @@ impl Boot {
         Ok(Some(0))
     }
 
-    /// The fault of the drive, whose code (603Fh) was kept.
+    /// The fault of the drive, by its kept code (603Fh).
     fn fault(&self, cause: Cause, object: ObjectAddress) -> Failure {
         at(cause, object, number(self.kept.data()), self.fault_statusword)
     }
 
-    /// A value that may still change is read again, but not for ever.
+    /// Reads a value that may still change again, for a limited number of times.
     fn read_again(&mut self, failure: Failure) -> Result<Option<usize>, Failure> {
         self.readings += 1;
         if self.readings < READINGS { Ok(None) } else { Err(failure) }
     }
 }
 
-/// A statusword without a meaning does not prove that a drive is off.
+/// A statusword without a meaning does not prove a drive off.
 fn may_be_powered(statusword: u32) -> bool {
     let state = Statusword(statusword as u16).state();
     !state.is_ok_and(|state| !state.is_powered())

@@ -1,7 +1,8 @@
 //! The plan of a drive's boot: a list of SDO steps, made once for each drive.
 //!
-//! Nothing is written before the identity and the PDOs of the drive are verified, and the first write stops it. What the
-//! objects must be is decided by [`WantedDrive`]. The plan executes nothing; the [boot](super::boot) does.
+//! No write comes before the checks of the drive's identity and PDOs, and the first write stops the drive.
+//! [`WantedDrive`] decides the values of the objects. The plan executes nothing; the [boot](super::boot) executes the
+//! plan.
 
 use masseter_can::canopen::ObjectAddress;
 use masseter_can::cia402::Controlword;
@@ -16,7 +17,7 @@ use crate::master::wanted::{
 const STATUSWORD: ObjectAddress = ObjectAddress::new(0x6041, 0);
 /// 6060h and 6061h: cyclic synchronous position.
 const CYCLIC_POSITION: u32 = 8;
-/// 607Ah := 6064h, so that nothing jumps when the drive is enabled.
+/// 607Ah := 6064h, so that the axis does not jump at the enabling of the drive.
 const HOLD_POSITION: [Step; 2] =
     [Step::Read(ObjectAddress::new(0x6064, 0), Check::Keep), Step::WriteKept(ObjectAddress::new(0x607A, 0))];
 
@@ -42,21 +43,21 @@ pub(super) struct Write {
     pub(super) demand: Demand,
 }
 
-/// What a write must achieve. A drive that acknowledges a value and does not keep it is never enabled.
+/// The required effect of a write. A drive that acknowledges a value without keeping it is never enabled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(super) enum Demand {
-    /// The drive has the value. A constant object may have it already.
+    /// The drive has the value. A constant object may have the value already.
     Kept,
-    /// The same, but the drive may lack the object.
+    /// The drive has the value, or lacks the object.
     KeptIfPresent,
-    /// The drive may refuse the value, and keeps its own then.
+    /// The drive may refuse the value, and then keeps its own value.
     KeptIfTaken,
-    /// Nothing: the write only makes room for a later one of the same object, which counts.
+    /// No effect: the write only makes room for a later write of the same object, which counts.
     Nothing,
 }
 
 impl Write {
-    /// The bits of the object that must be those of the value afterwards; none where a later step proves the write.
+    /// The bits of the object that must equal those of the value afterwards; none for a proof in a later step.
     pub(super) fn shown_bits(&self) -> Option<u32> {
         let Self { object, value, bytes, demand } = *self;
         if demand == Demand::Nothing { None } else { shown_bits(object, value, bytes) }
@@ -68,11 +69,11 @@ impl Write {
 pub(super) enum Check {
     /// The bits of `mask` must be those of `value`, now or after repetitions.
     Equals { mask: u32, value: u32, otherwise: Cause },
-    /// It must be that value if the drive has the object; without the object the value must be 0.
+    /// The object must have that value; for a drive without the object the value must be 0.
     EqualsIfPresent { value: u32, otherwise: Cause },
-    /// A unit of acceleration: none that the rig knows but this one. Drives may lack the object, or use other codes.
+    /// A unit of acceleration: this unit, or a code unknown to the rig. Drives may lack the object, or use other codes.
     Unit(AccelerationUnit),
-    /// It is kept.
+    /// The boot keeps the value.
     Keep,
     /// A statusword: without a fault, now or after repetitions.
     NoFault,
@@ -80,13 +81,13 @@ pub(super) enum Check {
     FaultRefused,
     /// A statusword: without voltage, now or after repetitions.
     NoVoltage,
-    /// A statusword: unless the drive is in fault, skip that many steps.
+    /// A statusword: skip that many steps for a drive without a fault.
     FaultElseSkip(usize),
     /// A COB-ID, kept and marked as invalid: unless it is that of a valid PDO, skip that many steps.
     PdoElseSkip(usize),
 }
 
-/// The steps for a drive, in their order; a fault that is found ends them, or is reset.
+/// The steps for a drive, in their order. A fault ends the boot, or is reset.
 pub(super) fn plan(wanted: &WantedDrive, resets_faults: bool) -> Vec<Step> {
     let mut steps = vec![Step::Enter(BootPhase::Identifying)];
     steps.extend(wanted.identity.iter().map(|&wanted| compare(wanted, Cause::WrongIdentity)));
@@ -113,12 +114,12 @@ pub(super) fn plan(wanted: &WantedDrive, resets_faults: bool) -> Vec<Step> {
     }
     steps.push(Step::Read(ObjectAddress::new(0x60AA, 0), Check::Unit(wanted.acceleration_unit)));
     steps.extend(configure(&wanted.objects));
-    // A drive may begin to follow its target with the mode, and may have moved before the last step.
+    // A drive may begin to follow its target with the mode, and may move before the last step.
     steps.extend(HOLD_POSITION);
     steps.push(write(0x6060, 0, CYCLIC_POSITION, 1));
     let mode = WantedIdentity::new(0x6061, 0, u32::MAX, CYCLIC_POSITION);
     steps.push(compare(mode, Cause::NotAccepted));
-    // Somebody has to look at a fault, so it is reset only on request: by an edge, if its cause is gone.
+    // A person has to look at a fault, so the boot resets a fault only on request: by an edge, if its cause is gone.
     let error_code = ObjectAddress::new(0x603F, 0);
     let with_fault = if resets_faults {
         vec![
@@ -138,8 +139,8 @@ pub(super) fn plan(wanted: &WantedDrive, resets_faults: bool) -> Vec<Step> {
     steps
 }
 
-/// The least number of SDO exchanges that the boot of a drive takes: of a drive without a fault and without other PDOs
-/// that gives the expected answers at once, and takes every value.
+/// The least number of SDO exchanges of a drive's boot. Such a drive has no fault and no other PDOs, gives the expected
+/// answers at once, and takes every value.
 pub(crate) fn shortest_boot(wanted: &WantedDrive) -> usize {
     let steps = plan(wanted, false);
     let (mut exchanges, mut rest) = (0, steps.iter());
@@ -171,8 +172,8 @@ const fn control(word: Controlword) -> Step {
     write(0x6040, 0, word.0 as u32, 2)
 }
 
-/// Writes and comparisons of the objects. Drives refuse software limits that cross, and the old ones are unknown: the lower
-/// one is opened first.
+/// Writes and comparisons of the objects. Drives refuse software limits that cross, and the old limits are unknown, so
+/// the lower limit is opened first.
 fn configure(objects: &[Setting]) -> Vec<Step> {
     let mut steps = Vec::with_capacity(objects.len() + 1);
     let is_lower_written = |wanted: &Setting| {

@@ -1,4 +1,4 @@
-//! One drive as the master sees it: its boot and its process data.
+//! One drive for the master: its boot and its process data.
 //!
 //! A [`RemoteDrive`] sends nothing; it returns frames and judgements. [`Message`] decodes frames; the master decides the
 //! effect of a message.
@@ -33,12 +33,12 @@ pub(super) struct RemoteDrive {
     heartbeat_timeout_ns: u64,
     boot_timeout_ns: u64,
     pub(super) boot: Boot,
-    /// The phase of the boot that was reported last.
+    /// The last reported phase of the boot.
     reported_phase: BootPhase,
     pub(super) presence: Presence,
     following: Following,
     nmt: Option<NmtState>,
-    /// Whether it was started as a verified drive: only then its process data are used.
+    /// Whether the drive has been started after its verification: only then its process data count.
     pub(super) is_started: bool,
     /// Whether its absence was reported, or it was lost.
     is_absence_known: bool,
@@ -46,7 +46,7 @@ pub(super) struct RemoteDrive {
     wrong_lengths: u16,
     power: Option<DriveState>,
     pub(super) statusword: Statusword,
-    /// What its last emergency message reported.
+    /// The report of its last emergency message.
     pub(super) emergency: EmergencyCode,
     actual_increments: i32,
     torque_permille: i16,
@@ -54,7 +54,7 @@ pub(super) struct RemoteDrive {
 }
 
 impl RemoteDrive {
-    /// The drive of an axis, of which nothing is known at `now_ns`.
+    /// The drive of an axis, unknown at `now_ns`.
     ///
     /// # Errors
     /// [`PlantError::Scenario`] for values that its profile does not allow.
@@ -108,7 +108,7 @@ impl RemoteDrive {
         self.is_operational() && self.boot.phase == BootPhase::Ready
     }
 
-    /// State of its power stage, as far as it is known.
+    /// State of its power stage, if known.
     pub(super) fn drive_state(&self) -> Option<DriveState> {
         self.power.filter(|_| self.is_operational())
     }
@@ -150,14 +150,14 @@ impl RemoteDrive {
         } else if may_boot {
             return self.boot.hear(time_ns, state);
         } else if state == NmtState::BootUp {
-            // Its configuration is lost. The drive is reset once more when the stop is over.
+            // The configuration of the drive is lost. Another reset follows after the stop.
             self.boot.forget(time_ns);
         }
         Ok(())
     }
 
-    /// Takes process data, which only an operational drive sends; a statusword without a meaning keeps the last state.
-    /// Returns its state before and after; none while its process data are not used.
+    /// Takes process data, which only an operational drive sends. A statusword without a meaning keeps the last state.
+    /// Returns the state before and after; none while process data do not count.
     pub(super) fn take_process_data(
         &mut self,
         time_ns: u64,
@@ -193,7 +193,7 @@ impl RemoteDrive {
         known != self.wrong_lengths
     }
 
-    /// Why the drive counts as absent, once it does: it never came.
+    /// The reason for the drive's absence, if absent: the drive has never come.
     pub(super) fn absence(&mut self, now_ns: u64) -> Option<Failure> {
         let (waited_ns, limit_ns) = (self.boot.waited_ns(now_ns), self.boot_timeout_ns);
         let is_absent = self.boot.phase == BootPhase::Waiting && waited_ns > limit_ns;
@@ -201,8 +201,8 @@ impl RemoteDrive {
         is_new.then(|| late(waited_ns, limit_ns))
     }
 
-    /// Why the drive counts as lost, if it does, given whether it has answered SYNC. A verified drive must be received,
-    /// and an operational one must answer every SYNC once.
+    /// The reason for the loss of the drive, if lost, given its answer to SYNC. A verified drive must send messages,
+    /// and an operational drive must answer every SYNC once.
     pub(super) fn loss(&mut self, now_ns: u64, is_fresh: bool) -> Option<Failure> {
         if !matches!(self.boot.phase, BootPhase::Configured | BootPhase::Ready) {
             return None;
@@ -220,13 +220,13 @@ impl RemoteDrive {
         Some(Failure::with(Cause::NodeStopped, state.code(), NmtState::Operational.code()))
     }
 
-    /// Why the drive counts as one that does not follow its targets, once it does, given whether it has answered SYNC.
+    /// The failure of a drive that does not follow its targets, given its answer to SYNC.
     pub(super) fn following_error(&mut self, is_fresh: bool) -> Option<Failure> {
         let position_m = self.following_m().filter(|_| is_fresh)?;
         self.following.following_failure(position_m)
     }
 
-    /// Discards everything found out about the drive; it has to boot again.
+    /// Discards all knowledge of the drive, which has to boot again.
     pub(super) fn forget(&mut self, now_ns: u64) {
         self.boot.forget(now_ns);
         self.presence.restart();
@@ -273,9 +273,9 @@ impl RemoteDrive {
         Nmt { command, target: NmtTarget::Node(self.address.node) }.frame()
     }
 
-    /// The process data for a request and a target, if the drive exchanges any. While the drive may not be switched on, it is
-    /// led to "ready to switch on" only. Until the drive follows targets, its
-    /// target is its position, so that nothing jumps when it begins to (607Ah := 6064h).
+    /// The process data for a request and a target, if the drive exchanges any. A drive that may not be switched on
+    /// goes to "ready to switch on" only. Before the drive follows targets, its target is its position (607Ah :=
+    /// 6064h), so that its first motion has no jump.
     pub(super) fn process_data(
         &mut self,
         now_ns: u64,
@@ -315,7 +315,7 @@ pub(super) struct Change<T> {
     pub(super) after: T,
 }
 
-/// The contents of an object that the master receives from a node.
+/// The content of an object that the master receives from a node.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Message {
     Heartbeat(NmtState),

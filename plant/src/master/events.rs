@@ -1,6 +1,6 @@
 //! The master's events, and the reasons of a stop or of a failed boot.
 //!
-//! A [`Journal`] keeps events until they are published, and counts those without room. Nothing here decides anything.
+//! A [`Journal`] keeps events until their publication, and counts events without room. This module decides nothing.
 
 use masseter_can::CanId;
 use masseter_can::canopen::{Cob, Emergency, LengthError, ObjectAddress};
@@ -81,7 +81,7 @@ pub(super) struct Failure {
 }
 
 impl Failure {
-    /// A failure that needs no value to explain it.
+    /// A failure without an explaining value.
     pub(super) const fn new(cause: Cause) -> Self {
         Self { cause, object: None, value: 0.0, limit: 0.0 }
     }
@@ -99,7 +99,7 @@ impl Failure {
     }
 }
 
-/// Events kept between two drains, of which one follows every cycle.
+/// Events kept between two drains. A drain follows every cycle.
 const CAPACITY: usize = 256;
 
 /// The list.

@@ -1,7 +1,7 @@
-//! The times of a cycle's exchange, and the state of each bus as the master sees it.
+//! The times of a cycle's exchange, and the state of each bus for the master.
 //!
-//! SYNC, the process data that answer it, and the master's heartbeat; bus-off, nodes that nobody configured, and turns
-//! for SDO. Nothing is sent here.
+//! The times are those of SYNC, of the process data in answer, and of the master's heartbeat. The state covers bus-off,
+//! unknown nodes, and turns for SDO. This module sends nothing.
 
 use masseter_can::canopen::{NodeId, sync};
 use masseter_can::wire::{INTERFRAME_BITS, frame_bits};
@@ -20,9 +20,9 @@ pub(super) struct Exchange {
     heartbeat_ns: u64,
     next_heartbeat_ns: u64,
     pub(super) wake: Wake,
-    /// When the tap saw the last SYNC of each bus.
+    /// Time of the last SYNC of each bus at the tap.
     seen_sync_ns: Vec<u64>,
-    /// When the last process data of the cycle arrived.
+    /// Arrival of the cycle's last process data.
     complete_ns: u64,
 }
 
@@ -65,7 +65,7 @@ impl Exchange {
         self.complete_ns = self.complete_ns.max(time_ns);
     }
 
-    /// A SYNC was seen on a wire. Only the first one of a cycle counts: a repeated one has its answers already.
+    /// Notes a SYNC on a wire. Only the first SYNC of a cycle counts: a repeated SYNC has its answers already.
     pub(super) fn note_sync(&mut self, bus: usize, time_ns: u64) {
         let seen_ns = &mut self.seen_sync_ns[bus];
         if *seen_ns < self.wake.woke_ns {
@@ -126,8 +126,8 @@ impl BusMonitor {
         is_new
     }
 
-    /// Whether a refusal to send needs a report of its own. Bus-off has its own; and before any drive is switched on
-    /// nobody acknowledges, so that the queue fills up.
+    /// Whether a refusal to send needs a report. Bus-off has its own report. Before the power-on of the drives nobody
+    /// acknowledges, so the queue fills up.
     pub(super) fn is_unexplained(self, refusal: &SendError) -> bool {
         match refusal {
             SendError::BusOff { .. } => false,

@@ -1,11 +1,11 @@
-//! The following error of one drive: the distance of its position from where its targets should have taken the drive.
+//! The following error of one drive: the distance of its position from the demand of its targets.
 //!
-//! A drive takes its newest target at SYNC and reaches the target on a straight line within a period. It may lag
-//! behind by the time that `controller.lead_cycles` allows. So the demand at every SYNC, when the drive samples its
-//! position, follows from the targets.
+//! A drive takes its newest target at SYNC and reaches the target on a straight line within a period. The drive may lag
+//! behind by the time that `controller.lead_cycles` allows. So the demand at every SYNC, the time of the position's
+//! sample, follows from the targets.
 //!
-//! A real drive cannot follow a demand that is uneven: SYNC comes early or late or overtakes the target, or the targets
-//! stop or start at once. For some cycles after that, the drive may be farther away.
+//! A real drive cannot follow an uneven demand: SYNC comes early or late or overtakes the target, or the targets stop
+//! or start at once. For some cycles after that, the drive may be farther away.
 
 #[cfg(test)]
 mod tests;
@@ -19,8 +19,8 @@ use super::events::Failure;
 const LEAST_LEAD_CYCLES: f64 = 2.0;
 /// Deviation of an even SYNC from its time, in periods.
 const JITTER: f64 = 0.1;
-/// Largest acceleration of an even demand: the default motions take 1.3 m/s², and a drive that stops from such a change at once
-/// stays within the following error's limit.
+/// Largest acceleration of an even demand. The default motions take 1.3 m/s². A drive that stops at once from such a
+/// change stays within the limit of the following error.
 const EVEN_CHANGE_M_S2: f64 = 40.0;
 /// Least SYNCs, and least time, until a drive has settled after an uneven demand. The emulated drives' error falls by 12 %
 /// a millisecond.
@@ -28,7 +28,7 @@ const SETTLING_SYNCS: u32 = 12;
 const SETTLING_S: f64 = 0.012;
 /// Time by which a drive brakes and accelerates late after an uneven demand, at least a period.
 const LATE_S: f64 = 0.001;
-/// Way that a drive may miss while its position is unknown, in limits of the following error.
+/// Largest missed way of a drive with an unknown position, in limits of the following error.
 const UNSEEN_LIMITS: f64 = 4.0;
 /// Demands that are kept: SYNCs may follow each other within half a period.
 const KEPT: usize = 2 * MOST_LEAD_CYCLES;
@@ -40,7 +40,7 @@ struct Line {
     to_m: f64,
     /// SYNC, at which the line begins, ns.
     since_ns: u64,
-    /// The target sent last, m, and when it was sent, ns.
+    /// The last target, m, and the time of its transmission, ns.
     target_m: f64,
     sent_ns: u64,
 }
@@ -64,8 +64,8 @@ pub(super) struct Following {
     longest_step_m: f64,
     /// Largest change from one step to the next of an even demand, m.
     even_change_m: f64,
-    /// Distance that an uneven demand excuses, in steps of that demand: one for a target that SYNC overtook, one for the way
-    /// that a suddenly held mechanism swings and sticks, the others for the drive, which is late.
+    /// Distance that an uneven demand excuses, in steps of that demand. One step is for a target that SYNC overtakes.
+    /// One is for the swing and the sticking of a suddenly held mechanism, the others for the drive's lateness.
     excused_steps: f64,
     settling_syncs: u32,
     /// Time by which the drive lags behind the demand, in periods.
@@ -87,8 +87,8 @@ impl Line {
 }
 
 impl Following {
-    /// The monitor of the drive of an axis, which follows nothing yet. A target sent less than `sending_ns` before SYNC
-    /// may miss SYNC.
+    /// The monitor of the drive of an axis, without a target. A target sent less than `sending_ns` before SYNC may miss
+    /// SYNC.
     pub(super) fn new(scenario: &Scenario, axis: usize, sending_ns: u64) -> Self {
         let (drive, period_s) = (scenario.drives.of_axis(axis), scenario.period_s());
         Self {
@@ -109,7 +109,7 @@ impl Following {
         }
     }
 
-    /// A target is sent to a drive that is at `position_m` and follows its targets.
+    /// Notes a target sent to a following drive at `position_m`.
     pub(super) fn follow(&mut self, now_ns: u64, position_m: f64, target_m: f64) {
         let standing =
             Line { from_m: position_m, to_m: position_m, since_ns: now_ns, target_m, sent_ns: now_ns };
@@ -121,12 +121,12 @@ impl Following {
         (line.target_m, line.sent_ns) = (target_m, now_ns);
     }
 
-    /// The drive follows no targets any more.
+    /// Notes that the drive follows no targets.
     pub(super) fn stop(&mut self) {
         self.line = None;
     }
 
-    /// SYNC at `now_ns`: the drive samples its position and takes the target sent last, at its greatest speed at most.
+    /// Notes SYNC at `now_ns`: the drive samples its position and takes the last target, within its greatest speed.
     pub(super) fn synchronise(&mut self, now_ns: u64) {
         let Some(line) = self.line else { return };
         let interval = self.periods(now_ns.saturating_sub(line.since_ns));
@@ -155,7 +155,8 @@ impl Following {
         }
     }
 
-    /// Takes the position sampled at the last SYNC; returns the failure once too many in a row are beyond the limit.
+    /// Takes the position sampled at the last SYNC. Returns the failure after too many positions in a row beyond the
+    /// limit.
     pub(super) fn following_failure(&mut self, position_m: f64) -> Option<Failure> {
         self.line?;
         let (error_m, limit_m) = (self.error_m(position_m), self.limit_m + self.excused_m);

@@ -1,8 +1,8 @@
-//! The last gate before the wire: no target passes that a drive must not be sent to, whoever commands.
+//! The last gate before the wire: no forbidden target passes, from any sender.
 //!
-//! Strokes, velocities and accelerations are those of targets that drives follow; others are not sent. The gate only
-//! judges; a command passes as a whole or not at all. Only forces are cut, to the limit of the drive. [`Commands`] has the
-//! newest command that passed, and the silence since.
+//! Strokes, velocities and accelerations are those of targets that drives follow; the master sends no other targets.
+//! The gate only judges; a command passes as a whole or not at all. Only forces are cut, to the limit of the drive.
+//! [`Commands`] has the newest passed command, and the silence since.
 //!
 //! A motion waits while a process stalls. So targets may stop at once and go on as before, within twice the time-out of
 //! commands; after that they start from rest.
@@ -19,16 +19,17 @@ use super::events::{Failure, Subject};
 
 /// Standard deviations of the encoder by which a position held at the end of a stroke may be beyond it.
 const NOISE_DEVIATIONS: f64 = 6.0;
-/// Periods that one target may take, however many commands were missed: a motion may go on for one of them, then it waits.
+/// Most periods of one target, for any number of missed commands: a motion may go on for one of them, then the motion
+/// waits.
 const MOST_PERIODS: u64 = 2;
 /// Periods that targets may have left: a late cycle of the master may take a command that came early, after late ones.
 const MOST_FREE_PERIODS: u64 = 3;
 
-/// What a drive that follows targets is sent to.
+/// The demand on a drive that follows targets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Target {
     pub(super) position_m: f64,
-    /// Force that the drive adds to that of its position control, N.
+    /// Force that the drive adds to its position control, N.
     pub(super) force_offset_n: f64,
 }
 
@@ -42,23 +43,23 @@ struct Followed {
     recent: RecentVelocities,
 }
 
-/// The velocities of late: between these a motion stops at once and goes on.
+/// The recent velocities: between these a motion may stop at once and go on.
 #[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 struct RecentVelocities {
-    /// When the newer of two stretches of cycles began.
+    /// Beginning of the newer of two stretches of cycles.
     since_cycle: u64,
     /// The lowest and highest of each stretch, the newer first; rest is always among them.
     ranges_m_s: [[f64; 2]; 2],
 }
 
-/// What one axis may be asked for.
+/// The limits of one axis.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct AxisGate {
     stroke_m: [f64; 2],
     max_velocity_m_s: f64,
     max_acceleration_m_s2: f64,
     max_force_n: f64,
-    /// Distance by which a drive at rest may be elsewhere than its first target, m.
+    /// Largest distance of a drive at rest from its first target, m.
     standing_m: f64,
     followed: Option<Followed>,
 }
@@ -80,7 +81,7 @@ pub(super) struct Gate {
     passed_cycle: u64,
     /// The master's cycle.
     cycle: u64,
-    /// Periods that no target has taken yet.
+    /// Periods without a target so far.
     free_periods: u64,
 }
 
@@ -111,7 +112,7 @@ impl Gate {
         }
     }
 
-    /// Begins a cycle of the master. A drive whose position is none follows no target: its last one is forgotten.
+    /// Begins a cycle of the master. A drive without a position follows no target, and loses its last target.
     pub(super) fn begin_cycle(&mut self, cycle: u64, following_m: [Option<f64>; AXES]) {
         self.free_periods = (self.free_periods + cycle.saturating_sub(self.cycle)).min(MOST_FREE_PERIODS);
         self.cycle = cycle;
@@ -120,8 +121,8 @@ impl Gate {
         }
     }
 
-    /// Judges the command that comes in this cycle; returns its request. `following_m` has the position of every drive that
-    /// would follow its target.
+    /// Judges the command of this cycle; returns its request. `following_m` has the position of every drive that
+    /// follows its target.
     pub(super) fn pass(
         &mut self,
         command: &Command,
@@ -144,15 +145,15 @@ impl Gate {
         Ok(request)
     }
 
-    /// The target that passed last for each drive that follows targets.
+    /// The last passed target of each drive that follows targets.
     pub(super) fn targets(&self) -> [Option<Target>; AXES] {
         let target =
             |Followed { target_m, force_offset_n, .. }| Target { position_m: target_m, force_offset_n };
         self.axes.map(|axis| axis.followed.map(target))
     }
 
-    /// Periods that the step to a command's target takes: those since the last command by the controller's count. The
-    /// count alone proves nothing: all steps together take no more periods than the master's cycles.
+    /// Periods of the step to a command's target: those since the last command by the controller's count. The count
+    /// alone proves nothing, so all steps together get no more periods than the master's cycles.
     fn periods(&self, command_cycle: u64) -> u64 {
         let most = self.free_periods.clamp(1, MOST_PERIODS);
         command_cycle.saturating_sub(self.passed_cycle).clamp(1, most)
@@ -180,7 +181,7 @@ fn check_limit(cause: Cause, value: f64, limit: f64) -> Result<(), Failure> {
 }
 
 impl RecentVelocities {
-    /// Those still recent in a cycle: of the stretch of `length` cycles that has begun, and of the one before.
+    /// The velocities still recent in a cycle: those of the present stretch of `length` cycles, and of the one before.
     fn at(self, cycle: u64, length: u64) -> Self {
         let [newer, _] = self.ranges_m_s;
         match cycle.saturating_sub(self.since_cycle) {
@@ -192,14 +193,14 @@ impl RecentVelocities {
         }
     }
 
-    /// The nearest velocity that needs no explanation.
+    /// The nearest recent velocity.
     fn nearest(&self, velocity_m_s: f64) -> f64 {
         let [[low, high], [older_low, older_high]] = self.ranges_m_s;
         velocity_m_s.clamp(low.min(older_low), high.max(older_high))
     }
 
-    /// With one more. A motion that has turned back does not go on in its old direction. While a motion waits, pose
-    /// control moves its targets by less than `slow_m_s`.
+    /// The velocities with one more. A motion that has turned back does not go on in its old direction. During a wait,
+    /// pose control moves the targets by less than `slow_m_s`.
     fn with(mut self, velocity_m_s: f64, slow_m_s: f64) -> Self {
         for range_m_s in &mut self.ranges_m_s {
             if velocity_m_s > slow_m_s {
@@ -240,7 +241,7 @@ impl AxisGate {
         })
     }
 
-    /// A drive that stands at its first target, or as near as its position allows.
+    /// A drive at rest at its first target, or as near as its position allows.
     fn standing(&self, target_m: f64, position_m: f64) -> Followed {
         let target_m = target_m.clamp(position_m - self.standing_m, position_m + self.standing_m);
         Followed { target_m, force_offset_n: 0.0, velocity_m_s: 0.0, recent: RecentVelocities::default() }
@@ -268,7 +269,7 @@ pub(super) struct Commands {
 }
 
 impl Commands {
-    /// No command yet.
+    /// Without a command.
     pub(super) fn new(scenario: &Scenario) -> Self {
         Self {
             timeout_cycles: scenario.can.command_timeout_cycles,
@@ -285,8 +286,9 @@ impl Commands {
         self.silent_cycles == 0 && self.request == DriveRequest::Off
     }
 
-    /// Takes the command of a cycle, if one came; a stale one is none. Silence is a failure only where `needs_command`; a
-    /// command is one if the gate refuses it. `following_m` has the position of every drive that would follow its target.
+    /// Takes the command of a cycle, if any; a stale command counts as none. Silence is a failure only with
+    /// `needs_command`, and a refusal by the gate is a failure. `following_m` has the position of every drive that
+    /// follows its target.
     pub(super) fn apply_command(
         &mut self,
         cycle: u64,
@@ -296,7 +298,7 @@ impl Commands {
         following_m: [Option<f64>; AXES],
     ) -> Result<(), (Subject, Failure)> {
         self.gate.begin_cycle(cycle, following_m);
-        // A refused command is none.
+        // A refused command counts as none.
         self.silent_cycles = self.silent_cycles.saturating_add(1);
         let Some(command) = command.filter(|command| !self.is_stale(command)) else {
             if !needs_command || self.silent_cycles <= self.timeout_cycles {
@@ -310,13 +312,13 @@ impl Commands {
         Ok(())
     }
 
-    /// Whether a command demands motion for a cycle that had its command: nobody may control any more, and the same
-    /// message is only sent again. A request to stop is never stale.
+    /// Whether a command demands motion for a cycle with an earlier command: such a message may be a repetition without
+    /// a controller. A request to stop is never stale.
     fn is_stale(&self, command: &Command) -> bool {
         self.cycle == Some(command.cycle) && command.request == DriveRequest::Enable.code()
     }
 
-    /// Writes the command that a reading answers.
+    /// Writes the answered command into a reading.
     pub(super) fn fill_reading(&self, reading: &mut Reading) {
         reading.answers_cycle = self.cycle.unwrap_or(0);
         reading.command_received_ns = self.received_ns;

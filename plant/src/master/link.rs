@@ -1,7 +1,7 @@
-//! The connection between master and drives, as the plant sees it: [`Buses`] for the master, [`Link`] for the core.
+//! The plant's connection between master and drives: [`Buses`] for the master, [`Link`] for the core.
 //!
-//! A scenario assigns drives to buses here, and faults to wires: node ids become ports, seconds become the wire's time.
-//! Nothing is sent or injected here.
+//! Here a scenario assigns drives to buses, and faults to wires: node ids become ports, seconds become the wire's time.
+//! This module sends and injects nothing.
 
 use std::ops::Range;
 
@@ -37,10 +37,10 @@ pub trait Link: Buses {
     /// The next beginning or end of an injected fault up to `now_ns`.
     fn next_note(&mut self, bus: usize, now_ns: u64) -> Option<FaultNote>;
 
-    /// The time in which a fault or a stimulus acts has become known.
+    /// Sets the time of a fault or a stimulus.
     fn set_window(&mut self, injected: Injected, window_ns: Range<u64>);
 
-    /// The next beginning or end of what the emulation carries out; the wires have notes instead.
+    /// The next beginning or end of a fault or a stimulus in the emulation; the wires have notes instead.
     fn next_occurrence(&mut self) -> Option<Occurrence> {
         None
     }
@@ -50,7 +50,7 @@ pub trait Link: Buses {
         None
     }
 
-    /// The axis whose drive is at a port of a simulated wire; none at the master's.
+    /// The axis of the drive at a port of a simulated wire; none at the master's.
     fn axis_at(&self, _bus: usize, _port: usize) -> Option<usize> {
         None
     }
@@ -58,17 +58,17 @@ pub trait Link: Buses {
     /// Waits in real time until frames may have arrived, but not beyond `latest_ns`; returns the time.
     fn wait(&mut self, latest_ns: u64, waiter: &mut Waiter) -> u64;
 
-    /// The mechanism's true motion at the last SYNC, where it is emulated here.
+    /// The mechanism's true motion at the last SYNC, for an emulated mechanism.
     fn truth(&self) -> Option<Truth> {
         None
     }
 
-    /// What the load cell showed at the last SYNC, N; 0 where there is none.
+    /// Value of the load cell at the last SYNC, N; 0 without one.
     fn load_cell_n(&self) -> f64 {
         0.0
     }
 
-    /// The forces between the jaws in the cycle before the last SYNC, where they are emulated here and can touch.
+    /// The forces between the jaws in the cycle before the last SYNC, for emulated jaws that can touch.
     fn contact(&self) -> Option<Contact> {
         None
     }
@@ -123,7 +123,7 @@ pub(crate) fn node_ids(can: &CanConfig) -> Result<[NodeId; AXES], PlantError> {
     Ok(ids)
 }
 
-/// Where a node is reached.
+/// The address of a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub struct Address {
     /// Index of the bus.
@@ -155,13 +155,13 @@ pub(crate) fn fault_seed(scenario: &Scenario, bus: usize) -> u64 {
     scenario.seed.wrapping_add(bus as u64)
 }
 
-/// Time after which a controller in bus-off is restarted; none where it is not, ns.
+/// Time from bus-off to the restart of a controller, ns; none without a restart.
 pub(crate) fn restart_after_ns(can: &CanConfig) -> Option<u64> {
     (can.restart_ms > 0).then(|| u64::from(can.restart_ms) * MILLISECOND_NS)
 }
 
 /// The faults of a bus whose ports have these nodes, switched on at `now_ns`. A fault's number is its index in the
-/// scenario's list. A fault whose time is not known at switch-on does not act before it is set.
+/// scenario's list. A fault with a time unknown at switch-on does not act before its time is set.
 pub(crate) fn faults_of_bus(
     scenario: &Scenario,
     bus: usize,
@@ -233,7 +233,7 @@ pub(crate) fn check_quantities(scenario: &Scenario) -> Result<(), PlantError> {
             return refuse(format!("{key}.encoder_resolution_m = {increment_m}: {need}"));
         }
     }
-    // The master's heartbeat ends the first cycle whose SYNC comes after the interval, and is queued when the command is there.
+    // The master's heartbeat ends the first cycle with a SYNC after the interval, and is queued with the command.
     let interval_ns = u64::from(can.heartbeat_producer_ms) * MILLISECOND_NS;
     let longest_ns = (interval_ns / period_ns + 2) * period_ns;
     if u64::from(can.heartbeat_consumer_ms) * MILLISECOND_NS < longest_ns {
@@ -250,7 +250,7 @@ pub(crate) fn check_quantities(scenario: &Scenario) -> Result<(), PlantError> {
     }
 }
 
-/// A fault or a stimulus began to act, or its time is over.
+/// The beginning or the end of a fault or a stimulus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Occurrence {
     /// Which.
@@ -259,7 +259,7 @@ pub struct Occurrence {
     pub time_ns: u64,
     /// The axis concerned, if there is one.
     pub axis: Option<usize>,
-    /// Whether it is over.
+    /// Whether this is the end.
     pub has_ended: bool,
 }
 

@@ -1,13 +1,14 @@
-//! The CAN master: boots the drives and verifies them, exchanges process data with them every cycle, supervises them,
-//! and stops them when commands cease.
+//! The CAN master boots and verifies the drives, exchanges process data every cycle, supervises the drives, and stops
+//! them when commands cease.
 //!
 //! [`Master`] sequences its parts. [`boot`] verifies one drive, [`drive`] holds the state of one drive, and
 //! [`exchange`] the times of the cycle. [`gate`] judges the controller's commands, and [`supervision`] decides
 //! whether drives may move. The parts return frames and failures; only the master sends.
 //!
-//! The master is written against the bus trait alone ([`Buses`]), so that simulated and real wires are the same to it.
-//! SDO takes place only with drives that exchange no process data, with one request a bus and cycle, queued after the
-//! process data. The heartbeat is the last message of a cycle. So a bus never carries more than the [time table](masseter_runtime::schedule) allows for.
+//! The master uses the bus trait alone ([`Buses`]), so simulated and real wires need the same code. SDO takes place
+//! only with drives that exchange no process data. A bus has one request a cycle, queued after the process data. The
+//! heartbeat is the last message of a cycle. So a bus never carries more than the [time
+//! table](masseter_runtime::schedule) allows for.
 
 mod boot;
 pub(crate) mod boot_plan;
@@ -46,7 +47,7 @@ use gate::Commands;
 use link::{Address, Buses, addresses, sender};
 use supervision::{Enabling, Supervision};
 
-/// Frames taken from a bus at once, so that a babbling node cannot stop the cycle.
+/// Most frames taken from a bus at once, so that a babbling node cannot stop the cycle.
 const FRAMES_AT_ONCE: usize = 512;
 
 /// The master.
@@ -62,7 +63,7 @@ pub(crate) struct Master {
 }
 
 impl Master {
-    /// The scenario's master, which begins at `now_ns` without any knowledge of its drives.
+    /// The scenario's master, at `now_ns` without any knowledge of its drives.
     ///
     /// # Errors
     /// [`PlantError`] for buses, node ids and bit rates that cannot be used.
@@ -103,13 +104,13 @@ impl Master {
         }
     }
 
-    /// Takes the frames that have arrived; returns whether the process data of all drives are in.
+    /// Takes the arrived frames; returns whether the process data of all drives are in.
     pub(crate) fn collect(&mut self, now_ns: u64, buses: &mut impl Buses) -> bool {
         for bus in 0..self.buses.len() {
             for _ in 0..FRAMES_AT_ONCE {
                 match buses.port(bus).receive(now_ns) {
                     Ok(Some(received)) => self.take_frame(bus, &received),
-                    // Lost frames show as missing process data; the others are still there.
+                    // Lost frames show as missing process data; the other frames remain.
                     Err(ReceiveError::Overrun { .. }) => {}
                     Ok(None) | Err(ReceiveError::Os { .. }) => break,
                 }
@@ -118,17 +119,17 @@ impl Master {
         (0..AXES).all(|axis| self.is_fresh(axis))
     }
 
-    /// A SYNC was seen on a wire.
+    /// Notes a SYNC on a wire.
     pub(crate) fn note_sync(&mut self, bus: usize, time_ns: u64) {
         self.exchange.note_sync(bus, time_ns);
     }
 
-    /// When the drives sampled in this cycle, as the reading has it, ns.
+    /// Time of the drives' sample in this cycle, for the reading, ns.
     pub(crate) fn sampled_ns(&self) -> u64 {
         self.exchange.sampled_ns()
     }
 
-    /// Writes this cycle's reading, without the times that only the link has.
+    /// Writes this cycle's reading, without the times of the link.
     pub(crate) fn fill_reading(&self, reading: &mut Reading) {
         *reading = Reading { master_fault: u32::from(self.supervision.is_stopped()), ..Reading::default() };
         self.exchange.fill_reading(reading);
@@ -139,9 +140,9 @@ impl Master {
         }
     }
 
-    /// Judges the cycle, takes the newest command, sends every drive its process data, then the messages of booting
-    /// drives, and at last the heartbeat when it is due: an interface that sends in the order of the queue delays no process
-    /// data by it.
+    /// Judges the cycle and takes the newest command. Sends every drive its process data, then the messages of booting
+    /// drives, and at last a due heartbeat. So the heartbeat delays no process data on an interface that sends in the
+    /// order of its queue.
     pub(crate) fn apply(&mut self, now_ns: u64, command: Option<&Command>, buses: &mut impl Buses) {
         self.supervise(now_ns);
         self.take_command(now_ns, command);
@@ -160,7 +161,7 @@ impl Master {
         }
     }
 
-    /// Stops the drives from the next process data on, for the end: commands are not needed any more.
+    /// Stops the drives from the next process data on, for the end of the run. Commands are no longer necessary.
     pub(crate) fn stop(&mut self) {
         self.supervision.is_ending = true;
     }
@@ -170,7 +171,7 @@ impl Master {
         self.commands.silent_cycles
     }
 
-    /// Whether no drive reports voltage. A lost drive reports nothing and is not waited for: it stops by itself.
+    /// Whether no drive reports voltage. A lost drive reports nothing, stops by itself, and does not count.
     pub(crate) fn drives_are_off(&self) -> bool {
         !self.drives.iter().filter_map(RemoteDrive::drive_state).any(DriveState::is_powered)
     }
@@ -212,7 +213,7 @@ impl Master {
         self.supervise_enabling(now_ns, is_enable);
     }
 
-    /// Names the drives that keep the others from being enabled; beyond its time, each of them stops all.
+    /// Names the drives that delay the enabling of the others. Beyond its time, each of them stops all drives.
     fn supervise_enabling(&mut self, now_ns: u64, is_enable: bool) {
         let states = self.drives.each_ref().map(RemoteDrive::drive_state);
         let is_enable = is_enable && self.supervision.may_move();
@@ -228,7 +229,7 @@ impl Master {
         }
     }
 
-    /// Reports a bus that goes off and one that returns; the drives of a bus in bus-off stop by themselves.
+    /// Reports a bus that goes off or returns. The drives of a bus in bus-off stop by themselves.
     fn watch_buses(&mut self, now_ns: u64, buses: &mut impl Buses) {
         for bus in 0..self.buses.len() {
             let status = buses.port(bus).status();
@@ -244,7 +245,7 @@ impl Master {
     }
 
     fn take_command(&mut self, now_ns: u64, command: Option<&Command>) {
-        // A controller whose drives are off or stopping may be silent: they need no command.
+        // The controller of drives that are off or stopping may be silent: such drives need no command.
         let needs_command = self.request() == DriveRequest::Enable;
         let may_move = self.supervision.may_move();
         let following_m = self.drives.each_ref().map(|drive| drive.following_m().filter(|_| may_move));
@@ -255,8 +256,8 @@ impl Master {
         }
     }
 
-    /// Ends a stop once every drive is verified again, none has voltage, and the controller has switched them off:
-    /// what still demands motion was sent before the report of the stop.
+    /// Ends a stop once every drive is verified again, none has voltage, and the controller has switched the drives
+    /// off. Earlier demands for motion come from before the report of the stop.
     fn restore(&mut self, now_ns: u64) {
         let is_restored = self.supervision.awaits_restoration()
             && self.commands.switch_off()
@@ -269,7 +270,7 @@ impl Master {
         }
     }
 
-    /// Stops the drives. The first cause and the first refused command are reported, consequences are not.
+    /// Stops the drives. Reports the first cause and the first refused command, but no consequences.
     fn fail(&mut self, now_ns: u64, subject: Subject, failure: &Failure) {
         if self.supervision.stop(failure.cause) {
             self.events.add(now_ns, subject, failure.event(EventKind::Fault));
@@ -324,7 +325,7 @@ impl Master {
         }
     }
 
-    /// Starts the drives once all are verified: none moves beside one that is not.
+    /// Starts the drives once all are verified. No drive moves beside an unverified drive.
     fn start_drives(&mut self, now_ns: u64, buses: &mut impl Buses) {
         if !self.drives.iter().all(|drive| drive.boot.is_verified()) {
             return;
@@ -350,7 +351,7 @@ impl Master {
         }
     }
 
-    /// Takes a frame. A malformed one is reported once and has no other effect.
+    /// Takes a frame. Reports a malformed frame once, without another effect.
     fn take_frame(&mut self, bus: usize, received: &Received) {
         let Ok(cob) = Cob::try_from(received.frame.id()) else { return };
         let time_ns = received.time_ns;
@@ -381,7 +382,8 @@ impl Master {
                 }
             }
             Ok(Message::Emergency(emergency)) => {
-                // Before its boot-up, a drive reports emergencies of a time before this master, which resets it.
+                // Before its boot-up, a drive reports emergencies from the time before this master. The master resets
+                // such a drive.
                 let is_past = emergency.is_reset() || drive.boot.phase == BootPhase::Waiting;
                 drive.emergency = emergency.code;
                 self.events.add(time_ns, Subject::Axis(axis), events::emergency(emergency, is_past));
@@ -421,8 +423,8 @@ impl Master {
         }
     }
 
-    /// Reports why a drive cannot be used. The failure of one drive at the start is no consequence of another's, so that each
-    /// is reported.
+    /// Reports the reason against a drive. The failure of one drive at the start is no consequence of another failure,
+    /// so each has a report.
     fn name(&mut self, now_ns: u64, axis: usize, failure: &Failure) {
         self.supervision.stop(failure.cause);
         self.events.add(now_ns, Subject::Axis(axis), failure.event(EventKind::Fault));

@@ -1,6 +1,6 @@
-//! How long a drive is silent, and what process data it owes or sends too many of.
+//! Silence of a drive, and its missing or surplus process data.
 //!
-//! What a loss means for the other drives is the master's.
+//! The master decides the consequence of a loss for the other drives.
 
 use masseter_runtime::messages::codes::Cause;
 
@@ -8,32 +8,32 @@ use super::events::Failure;
 
 /// Cycles in a row in which an operational drive's process data may be missing at most.
 pub(super) const MISSING_CYCLES: u32 = 3;
-/// New process data beyond one a SYNC that a single node may send: all those that may be missing may come late, at once.
+/// Most surplus process data of a single node: all missing process data may come late, at once.
 const SURPLUS: u32 = MISSING_CYCLES + 2;
 
 /// Memory of the supervision.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(super) struct Presence {
-    /// When the drive sent something.
+    /// Time of the drive's last message.
     pub(super) heard_ns: u64,
     /// Time of the newest process data.
     pub(super) answered_ns: u64,
     /// Cycles in a row without process data.
     pub(super) missing_cycles: u32,
-    /// Recent new process data beyond one a SYNC. A late drive makes up for a cycle without any. A drive that
-    /// receives a repeated SYNC answers twice. Two drives of one id send one more every cycle.
+    /// Recent surplus of new process data over SYNCs. A late drive makes up for a cycle without process data. A drive
+    /// with a repeated SYNC answers twice. Two drives of one id send one more every cycle.
     surplus: u32,
     /// New process data since the last SYNC.
     new_data: u32,
 }
 
 impl Presence {
-    /// A drive that is expected from `now_ns` on.
+    /// A drive expected from `now_ns` on.
     pub(super) fn new(now_ns: u64) -> Self {
         Self { heard_ns: now_ns, answered_ns: 0, missing_cycles: 0, surplus: 0, new_data: 0 }
     }
 
-    /// SYNC demands new process data.
+    /// Notes a SYNC, which demands new process data.
     pub(super) fn begin_cycle(&mut self) {
         self.surplus = match std::mem::take(&mut self.new_data) {
             0 | 1 => self.surplus.saturating_sub(1),
@@ -41,7 +41,7 @@ impl Presence {
         };
     }
 
-    /// The drive sent process data; a frame that its transmitter had to repeat is not new.
+    /// Notes process data of the drive. A frame repeated by its transmitter is not new.
     pub(super) fn answer(&mut self, time_ns: u64, is_new: bool) {
         self.answered_ns = time_ns;
         self.new_data += u32::from(is_new);
@@ -52,12 +52,12 @@ impl Presence {
         self.answered_ns > time_ns
     }
 
-    /// Missing and surplus process data are counted anew.
+    /// Counts missing and surplus process data anew.
     pub(super) fn restart(&mut self) {
         (self.missing_cycles, self.surplus) = (0, 0);
     }
 
-    /// The reason why the drive counts as lost, if it does, given how many cycles in a row may be without process data.
+    /// The reason for the loss of the drive, if lost, given the most cycles in a row without process data.
     pub(super) fn loss(&self, now_ns: u64, heartbeat_timeout_ns: u64, may_miss: u32) -> Option<Failure> {
         let silent_ns = now_ns.saturating_sub(self.heard_ns);
         if silent_ns > heartbeat_timeout_ns {

@@ -1,5 +1,5 @@
-//! The SDO client (CiA 301, 7.2.4) of master and commissioning: one entry of one drive's object dictionary read or
-//! written at a time. Values of more than four bytes are read in segments where the caller has room for them.
+//! The SDO client (CiA 301, 7.2.4) of master and commissioning reads or writes one entry of one drive's object
+//! dictionary at a time. It reads values of more than four bytes in segments for callers with room.
 //!
 //! A pure state machine: [`SdoClient::poll`] returns the request to send, [`SdoClient::take_answer`] takes the answer.
 //! Frames and buses are not part of it.
@@ -14,16 +14,16 @@ pub(crate) const ATTEMPTS: u32 = 3;
 /// Bytes of the longest value that is read.
 const LONGEST_VALUE: usize = 1792;
 
-/// Why a transfer failed.
+/// Why a transfer fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) enum SdoFailure {
-    /// One side gave it up.
+    /// An abort by one side.
     Aborted { object: ObjectAddress, code: AbortCode },
-    /// Nothing came.
+    /// No answer comes.
     Silent { object: ObjectAddress },
 }
 
-/// What a transfer does next.
+/// The next action of a transfer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 enum Action {
     Read,
@@ -40,7 +40,7 @@ struct Transfer {
     attempt: u32,
 }
 
-/// The client's memory: at most one transfer, and an abort that is still to be sent.
+/// The client's memory: at most one transfer, and an abort to be sent.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct SdoClient {
     transfer: Option<Transfer>,
@@ -48,13 +48,13 @@ pub(crate) struct SdoClient {
 }
 
 impl SdoClient {
-    /// Begins to read an object, or to write a value to it; a transfer under way is forgotten.
+    /// Begins a read or a write of an object; forgets the present transfer.
     pub(crate) fn begin(&mut self, object: ObjectAddress, written: Option<Expedited>) {
         let action = written.map_or(Action::Read, Action::Write);
         self.transfer = Some(Transfer { object, action, sent_ns: None, attempt: 1 });
     }
 
-    /// Whether nothing is under way.
+    /// Whether the client is idle.
     pub(crate) fn is_idle(&self) -> bool {
         self.transfer.is_none()
     }
@@ -64,13 +64,13 @@ impl SdoClient {
         self.transfer.is_some_and(|transfer| transfer.attempt > 1)
     }
 
-    /// Begins a transfer anew after a silence of more than `timeout_ns`, and gives it up after [`ATTEMPTS`].
+    /// Begins a transfer anew after a silence of more than `timeout_ns`. Gives the transfer up after [`ATTEMPTS`].
     pub(crate) fn expire(&mut self, now_ns: u64, timeout_ns: u64) -> Result<(), SdoFailure> {
         let Some(transfer) = &mut self.transfer else { return Ok(()) };
         if transfer.sent_ns.is_none_or(|sent_ns| now_ns.saturating_sub(sent_ns) <= timeout_ns) {
             return Ok(());
         }
-        // A segment is not asked for twice: its answer would be another one.
+        // No second request for a segment: its answer is the next segment.
         if transfer.attempt < ATTEMPTS && !matches!(transfer.action, Action::ReadSegment { .. }) {
             transfer.attempt += 1;
             transfer.sent_ns = None;
@@ -96,9 +96,10 @@ impl SdoClient {
         })
     }
 
-    /// Takes an answer of the server; returns the value read or written, or why the transfer failed. None for an unasked
-    /// answer: there are some after a transfer begun twice, in a frame that came twice, and from a second server with the
-    /// same node id. The segments of a longer value go to `long`, and none is its value; without `long` it is refused.
+    /// Takes an answer of the server; returns the value read or written, or the failure of the transfer. Returns none
+    /// for an answer without a request. Such answers follow a transfer begun twice or a repeated frame, or come from a
+    /// second server with the same node id. The segments of a longer value go to `long`, and the value is then none;
+    /// without `long` the client aborts.
     pub(crate) fn take_answer(
         &mut self,
         response: SdoResponse,
@@ -145,7 +146,7 @@ impl SdoClient {
         Some(outcome)
     }
 
-    /// Gives up a value that is too long.
+    /// Aborts the read of a value that is too long.
     fn abort(&mut self, object: ObjectAddress) -> SdoFailure {
         self.abort = Some((object, AbortCode::LENGTH));
         SdoFailure::Aborted { object, code: AbortCode::LENGTH }

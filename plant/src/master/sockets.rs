@@ -1,6 +1,6 @@
-//! The link to real drives: SocketCAN interfaces. It has no truth of the mechanism.
+//! The link to real drives: SocketCAN interfaces. This link has no truth of the mechanism.
 //!
-//! An interface has one master, since two masters would stop each other's drives. The lock is a name among the abstract
+//! An interface has one master, because two masters stop each other's drives. The lock is a name among the abstract
 //! sockets. Abstract sockets belong to a network namespace, as interfaces do, and end with their process. The lock does
 //! not exclude masters of other programs or other computers; the master notices those by their frames.
 
@@ -20,11 +20,10 @@ use masseter_scenario::{MASTER_NODE, Scenario};
 use super::link::{Buses, Link, MASTER_PORT, check_quantities, fault_seed, faults_of_bus, restart_after_ns};
 use crate::error::PlantError;
 
-/// How long a wait for a real frame may take at most, ns: a fault may hold frames back that are due before the next
-/// frame arrives.
+/// Longest wait for a real frame, ns. A fault may hold frames back that are due before the next arrival.
 const LONGEST_BLOCK_NS: u64 = 100_000;
 
-/// The master's port, the faults laid over it, and a tap on every wire.
+/// The master's port, its faults, and a tap on every wire.
 #[derive(Debug)]
 pub struct SocketLink {
     ports: Vec<SocketCan>,
@@ -34,7 +33,7 @@ pub struct SocketLink {
 }
 
 impl SocketLink {
-    /// Opens the scenario's interfaces, one a bus, each with the faults of the master's port there from `now_ns` on.
+    /// Opens the scenario's interfaces, one a bus, with the faults of the master's ports from `now_ns` on.
     pub(crate) fn open(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
         check_quantities(scenario)?;
         let can = &scenario.can;

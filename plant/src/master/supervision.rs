@@ -1,7 +1,7 @@
-//! Whether the master lets the drives move: how long a stop lasts, and the way to "operation enabled".
+//! The permission of the drives to move: the duration of a stop, and the way to "operation enabled".
 //!
-//! Other parts find the causes of a stop; [`Supervision`] keeps their consequence, and the master sends it. No drive is
-//! switched on before all are ready for it, and all are [enabled](Enabling) within a time, or none stays on.
+//! Other parts find the causes of a stop; [`Supervision`] keeps their consequence, and the master sends the request. No
+//! drive is switched on before all are ready. All are [enabled](Enabling) within a time, or none stays on.
 
 use masseter_model::geometry::AXES;
 use masseter_runtime::clock::MILLISECOND_NS;
@@ -10,7 +10,7 @@ use masseter_scenario::CanConfig;
 
 use super::events::Failure;
 
-/// How long the drives stay stopped.
+/// The duration of a stop.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 enum Stop {
     #[default]
@@ -26,7 +26,7 @@ pub(super) struct Supervision {
     stop: Stop,
     /// Whether the drives stop for the end of the run.
     pub(super) is_ending: bool,
-    /// Whether a refused command stopped the drives.
+    /// Whether a refused command has stopped the drives.
     has_refused: bool,
 }
 
@@ -57,8 +57,8 @@ impl Supervision {
         }
     }
 
-    /// Whether drives may be booted. During a stop they may not: the drives have to stop first. After a permanent stop
-    /// nobody moves the drives again, and another master may control them.
+    /// Whether the master may boot drives. During a stop it may not: the drives have to stop first. After a permanent
+    /// stop nobody moves the drives again, and another master may control them.
     pub(super) fn may_boot(self, drives_are_off: bool) -> bool {
         match self.stop {
             Stop::None => true,
@@ -88,7 +88,7 @@ impl Supervision {
         is_first
     }
 
-    /// Stops the drives permanently, whatever stopped them before; returns whether they were not stopped permanently yet.
+    /// Stops the drives permanently, also after another stop. Returns whether the permanent stop is new.
     pub(super) fn stop_permanently(&mut self) -> bool {
         std::mem::replace(&mut self.stop, Stop::Permanent) != Stop::Permanent
     }
@@ -104,19 +104,19 @@ fn is_refusal(cause: Cause) -> bool {
     matches!(cause, Cause::BadMessage | Cause::StrokeLimit | Cause::VelocityLimit | Cause::AccelerationLimit)
 }
 
-/// After this time the drives that the others wait for are named, ns.
+/// Time before the report of the drives that the others wait for, ns.
 const NAMED_AFTER_NS: u64 = 500_000_000;
 
-/// How far the drives are.
+/// The stage of the drives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 enum Phase {
-    /// They are not to be enabled.
+    /// The drives are not to be enabled.
     Off,
-    /// All are led to "ready to switch on", since that time.
+    /// All go to "ready to switch on", since that time.
     Preparing { since_ns: u64 },
-    /// All are led to "operation enabled", since that time.
+    /// All go to "operation enabled", since that time.
     SwitchingOn { since_ns: u64 },
-    /// All were enabled: none may leave operation by itself.
+    /// All have been enabled: none may leave operation by itself.
     Enabled,
 }
 
@@ -140,13 +140,13 @@ impl Enabling {
         }
     }
 
-    /// Whether drives may be switched on: all of them were ready for it.
+    /// Whether drives may be switched on: all have been ready.
     pub(super) fn may_switch_on(&self) -> bool {
         matches!(self.phase, Phase::SwitchingOn { .. } | Phase::Enabled)
     }
 
-    /// Judges the state of a drive in a cycle in which the drives are to be enabled, or not. On the way there a drive may
-    /// neither go into fault, which is not reset, nor become unready, as by safe torque off.
+    /// Judges the state of a drive in a cycle with or without enabling. On the way to operation a drive may neither go
+    /// into fault, which nobody resets, nor become unready, as by safe torque off.
     pub(super) fn disobedience(&self, state: Option<DriveState>, is_enable: bool) -> Option<Failure> {
         let is_in_fault = matches!(state, Some(DriveState::Fault | DriveState::FaultReactionActive));
         let has_left = match self.phase {
@@ -158,7 +158,7 @@ impl Enabling {
             .then(|| Failure::with(Cause::DriveFault, drive_state_code(state), 0.0))
     }
 
-    /// Ends the judgement of a cycle; returns what there is to say of each drive.
+    /// Ends the judgement of a cycle; returns the verdict on each drive.
     pub(super) fn end_cycle(
         &mut self,
         now_ns: u64,

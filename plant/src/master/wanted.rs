@@ -1,7 +1,7 @@
-//! The objects of a drive as the rig needs them, from scenario and profile: once for the boot of a run, for inspection and
-//! for configuration.
+//! The objects that the rig needs in a drive, from scenario and profile, in one form for boot, inspection and
+//! configuration.
 //!
-//! Nothing here talks to a drive.
+//! This module talks to no drive.
 
 #[cfg(test)]
 mod tests;
@@ -19,20 +19,20 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::PlantError;
 
-/// A drive as the rig needs it.
+/// The wanted state of a drive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WantedDrive {
     /// Device type and identity.
     pub identity: [WantedIdentity; 4],
-    /// The two PDOs of the process data, then those that must be off.
+    /// The two PDOs of the process data, then the PDOs that must be off.
     pub pdos: Vec<PdoSetting>,
-    /// The object that sets 6064h at home, with its value; 0 where the drive's own zero is right.
+    /// The object that sets 6064h at home, with its value; 0 for the drive's own zero.
     pub home: Setting,
     /// Length of an increment of 6064h, m.
     pub increment_m: f64,
     /// Unit of the drive's accelerations (60AAh).
     pub acceleration_unit: AccelerationUnit,
-    /// The objects to write or to compare, in the order in which they are written.
+    /// The objects to write or to compare, in the order of the writes.
     pub objects: Vec<Setting>,
 }
 
@@ -61,7 +61,7 @@ fn home(scenario: &Scenario, axis: usize) -> Setting {
     Setting { object, value, bytes: 4, rule, key }
 }
 
-/// One object as it must be, or as it was.
+/// One object, wanted or found.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Setting {
     /// Its address.
@@ -88,23 +88,23 @@ pub(crate) const fn value_bits(bytes: usize) -> u32 {
     u32::MAX >> (32 - 8 * bytes)
 }
 
-/// One PDO as it must be, or as it was.
+/// One PDO, wanted or found.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PdoSetting {
     /// Index of its communication parameter; that of its mapping is 200h higher.
     pub communication: u16,
     /// Its COB-ID. Without [`layout`](Self::layout) only its validity counts.
     pub cob_id: u32,
-    /// What it carries and when; none where that does not matter.
+    /// Content and timing; none where they do not matter.
     pub layout: Option<PdoLayout>,
 }
 
-/// What a PDO carries and when.
+/// Content and timing of a PDO.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PdoLayout {
     /// Transmission type.
     pub transmission: u32,
-    /// Inhibit time; none for RPDOs and for drives that have none.
+    /// Inhibit time; none for RPDOs and for drives without one.
     pub inhibit: Option<u32>,
     /// Event timer of a TPDO, like `inhibit`.
     pub event: Option<u32>,
@@ -162,7 +162,7 @@ impl PdoSetting {
             .collect()
     }
 
-    /// What the master compares, in this order: COB-ID, transmission type and mapping of a PDO that must exist.
+    /// The master's comparisons, in this order: COB-ID, transmission type and mapping of a PDO that must exist.
     pub(crate) fn compared(&self) -> impl Iterator<Item = WantedIdentity> {
         let cob_id = WantedIdentity { object: self.part(1), mask: COB_ID_BITS, value: self.cob_id };
         let parts = self.parts().into_iter().filter(move |(object, _)| !self.is_timer(*object));
@@ -171,13 +171,13 @@ impl PdoSetting {
     }
 }
 
-/// Whether a drive that refuses to show a written object with this code proves the write by its acknowledgement alone.
-/// Nothing else can prove it: nobody can read a write-only object.
+/// Whether the acknowledgement alone proves the write of an object that a drive refuses to show with this code. There
+/// is no other proof for a write-only object.
 pub(crate) fn is_write_only(code: AbortCode) -> bool {
     code == AbortCode::WRITE_ONLY
 }
 
-/// Objects that do not show what was written to them, with what proves the write instead.
+/// Objects that do not show the written value, with the proof of the write instead.
 const SHOWN_ELSEWHERE: [(u16, &str); 4] = [
     (0x1010, "a signature starts the saving, and a reset shows what was saved"),
     (0x1011, "as 1010h"),
@@ -185,12 +185,12 @@ const SHOWN_ELSEWHERE: [(u16, &str); 4] = [
     (0x6060, "drives after DSP 402 2.0 do not show it; 6061h shows the mode"),
 ];
 
-/// The bits of an object that must be those that were written to it; none where something else proves the write.
+/// The bits of an object that must equal the written bits; none for another proof of the write.
 pub(crate) fn shown_bits(object: ObjectAddress, value: u32, bytes: usize) -> Option<u32> {
     let is_cob_id = matches!(object.index, 0x1400..0x1600 | 0x1800..0x1A00) && object.subindex == 1;
     match SHOWN_ELSEWHERE.iter().find(|(index, _)| *index == object.index) {
         Some(_) => None,
-        // The number of a PDO that does not exist means nothing.
+        // The number of a PDO that does not exist has no meaning.
         None if is_cob_id && !CobId(value).is_valid() => Some(CobId::NOT_VALID),
         // A drive decides itself whether it answers remote requests, which nobody sends.
         None if is_cob_id => Some(COB_ID_BITS),
@@ -203,13 +203,13 @@ pub(crate) const OFFSETS: [(u16, usize); 3] = [(0x60B0, 4), (0x60B1, 4), TORQUE_
 /// The only offset that process data of the rig may carry.
 const TORQUE_OFFSET: (u16, usize) = (0x60B2, 2);
 
-/// Whether a drive that has an object may keep another value. An offset moves the axis or loads it: the drive may lack
-/// it, and no more.
+/// Whether a drive with an object may keep another value. An offset moves or loads the axis: a drive may lack the
+/// object, but not keep another value.
 pub(crate) fn may_keep(rule: ObjectRule, object: ObjectAddress) -> bool {
     rule == ObjectRule::Optional && OFFSETS.iter().all(|(index, _)| *index != object.index)
 }
 
-/// Where the profile has a value of its own, that one; the profile's further objects come last.
+/// The objects with the profile's own values; the profile's further objects come last.
 fn objects(scenario: &Scenario, axis: usize) -> Result<Vec<Setting>, PlantError> {
     let profile = scenario.profile(axis);
     let known = known_objects(scenario, axis)?;
@@ -253,8 +253,8 @@ fn objects(scenario: &Scenario, axis: usize) -> Result<Vec<Setting>, PlantError>
     Ok(wanted)
 }
 
-/// Offsets that the process data do not carry: 0, instead of the last value of other process data. The torque offset of
-/// an earlier run acts in every drive that has the object; the others are those that the profile names.
+/// Offsets outside the process data: 0, instead of the last value of other process data. The torque offset of an
+/// earlier run acts in every drive with the object; the other offsets are those of the profile.
 fn offsets(profile: &DriveProfile) -> impl Iterator<Item = Setting> + '_ {
     let mapping = profile.pdos.rpdo1();
     OFFSETS.into_iter().filter_map(move |(index, bytes)| {
@@ -285,8 +285,7 @@ fn beyond(
     ))
 }
 
-/// The profile's rule for an object, in a dry run with less force. A rule that keeps the reduced force from the drive
-/// is refused.
+/// The profile's rule for an object, in a dry run with less force. Refuses a rule that prevents the reduced force.
 fn in_this_run(
     config: ObjectConfig,
     object: ObjectAddress,
@@ -383,8 +382,7 @@ fn period(scenario: &Scenario, profile: &DriveProfile) -> Result<(i64, i64), Pla
     Ok(((scenario.period_ns() / unit_ns) as i64, exponent))
 }
 
-/// The event timer of a drive's RPDO: a stall of the machine that neither heartbeat nor commands make a fault trips no
-/// drive.
+/// The event timer of a drive's RPDO. A stall that is no fault by heartbeat or commands trips no drive.
 fn rpdo_timeout_ms(scenario: &Scenario) -> u16 {
     let can = &scenario.can;
     let commands_ms = u64::from(can.command_timeout_cycles) * scenario.period_ns() / MILLISECOND_NS;

@@ -1,10 +1,10 @@
-//! Faults and stimuli that the plant carries out: when each acts, and the events of its beginning and its end.
+//! Faults and stimuli of the plant: the time of each, and the events of its beginning and its end.
 //!
-//! [`Injector`] follows the times for the core and acts on commands itself. It hands the windows to the emulation, whose
-//! agenda has what acts on drives and mechanism. The emulation does not know it.
+//! [`Injector`] follows the times for the core and acts on commands itself. The injector hands the windows to the
+//! emulation, whose agenda has the effects on drives and mechanism. The emulation does not depend on the injector.
 //!
-//! A command is altered between its receipt and the master. The master judges what comes out, as it would judge a bad
-//! controller: nothing here detects anything.
+//! A command is altered between its receipt and the master. The master judges the result like the command of a bad
+//! controller. This module detects nothing.
 
 use std::ops::Range;
 
@@ -22,8 +22,8 @@ use crate::state::state;
 #[derive(Debug, Clone)]
 pub(crate) struct Injector {
     injection: Injection,
-    /// Those whose window is not told yet, and whether the controller or the supervisor carries each out. Such a one begins
-    /// when its window does.
+    /// Entries with a window not handed out, and whether the controller or the supervisor carries each out. Such an
+    /// entry begins with its window.
     untold: Vec<(Injected, bool)>,
     /// Whether a window may have become known since the last look.
     has_news: bool,
@@ -58,7 +58,7 @@ impl Injector {
         self.injection.is_empty()
     }
 
-    /// A command was received in the cycle that sampled at `sampled_ns`: it has the controller's state.
+    /// Takes the controller's state from a command in the cycle that samples at `sampled_ns`.
     pub(crate) fn note_command(&mut self, command: &Command, sampled_ns: u64) {
         if command.version == LAYOUT_VERSION
             && let Ok(state) = ControllerState::try_from(command.controller_state)
@@ -68,7 +68,7 @@ impl Injector {
         }
     }
 
-    /// A fault of a bus strikes; the wire reports that itself.
+    /// Notes the strike of a bus fault, which the wire reports itself.
     pub(crate) fn note_bus_fault(&mut self, place: usize, time_ns: u64) {
         self.injection.note_begin(Injected::Fault(place), time_ns);
         self.has_news = true;
@@ -132,7 +132,7 @@ impl Injector {
     }
 }
 
-/// How far ahead of this controller another one counts its cycles: further than any run takes.
+/// Lead of another controller's cycle count: more than any run has.
 const FOREIGN_CYCLES: u64 = 1 << 40;
 
 /// The faults of the commands.
@@ -183,8 +183,8 @@ impl CommandFaults {
         }
     }
 
-    /// The command that reaches the master in the cycle that sampled at `sampled_ns`, in place of the one received at
-    /// `now_ns`. Tells `report` what began or ended.
+    /// The command for the master in the cycle that samples at `sampled_ns`, in place of the one received at `now_ns`.
+    /// Calls `report` with beginnings and ends.
     pub(super) fn alter(
         &mut self,
         sampled_ns: u64,
@@ -199,7 +199,7 @@ impl CommandFaults {
                 |has_ended| report(Occurrence { injected: fault.injected, time_ns: now_ns, axis, has_ended });
             if fault.window_ns.contains(&sampled_ns) {
                 let Some(received) = received else { continue };
-                // It counts by what it alone would do, though another one may withhold the command.
+                // A fault counts by its effect alone, also when another fault withholds the command.
                 let is_altered = altered(received, fault.kind, &fault.config) != Some(received);
                 if is_altered && !std::mem::replace(&mut fault.is_acting, true) {
                     tell(false);
@@ -213,7 +213,7 @@ impl CommandFaults {
     }
 }
 
-/// What a fault makes of a command.
+/// The effect of a fault on a command.
 fn altered(mut command: Command, kind: CommandFault, fault: &FaultConfig) -> Option<Command> {
     match kind {
         CommandFault::ControllerStall => return None,

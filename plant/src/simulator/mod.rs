@@ -1,8 +1,7 @@
-//! The emulated robot: drives and mechanism, neither of which depends on the other, and what injects faults into
-//! them.
+//! The emulated robot: independent drives and mechanism, and the injection of faults into both.
 //!
-//! [`emulation`] steps drives and mechanism together, on simulated wires or on real interfaces. [`injection`] wraps it: it
-//! knows the times of faults, and the emulation does not know it.
+//! [`emulation`] steps drives and mechanism together, on simulated wires or on real interfaces. [`injection`] follows
+//! the times of faults; the emulation does not depend on it.
 
 pub(crate) mod drive;
 pub mod emulation;

@@ -1,4 +1,4 @@
-//! Values that a motion changes for its own duration, and what a killed one owes.
+//! Values that a motion changes for its own duration, and the debts of a killed motion.
 
 use std::io;
 use std::sync::{Arc, Mutex};
@@ -18,7 +18,7 @@ impl Ledger for Notes {
     }
 }
 
-/// A step that is killed at any moment: what was kept until then returns all old values.
+/// A step killed at any moment: the kept values until then return all old values.
 #[test]
 fn kept_values_return_what_a_killed_step_has_changed() {
     let mut bench = Bench::new("");
@@ -48,7 +48,7 @@ fn kept_values_return_what_a_killed_step_has_changed() {
     assert_eq!(bench.objects(), before);
 }
 
-/// A cable that is pulled between reading and writing: the drive may have the value, so that it is owed the old one.
+/// A cable pulled between reading and writing: the drive may have the value, so the ledger keeps the old value.
 #[test]
 fn a_write_without_an_answer_is_not_forgotten_and_a_refused_one_is() {
     let play = |text: &str, loan| {
@@ -106,7 +106,7 @@ impl Ledger for Lengths {
     }
 }
 
-/// What a drive never takes is owed no more; the other values return.
+/// The ledger drops a value that a drive never takes; the other values return.
 #[test]
 fn a_refused_old_value_does_not_stay_in_the_ledger() {
     let mut bench = Bench::new("");
@@ -120,7 +120,7 @@ fn a_refused_old_value_does_not_stay_in_the_ledger() {
     assert!(notes.0.lock().unwrap().is_empty());
 }
 
-/// A drive that takes the value of one object for another one: nothing is powered, and the refusal names both values.
+/// A drive that takes the value of one object for another: no drive gets power, and the refusal has both values.
 #[test]
 fn a_loan_that_a_drive_does_not_keep_is_refused_before_power() {
     for object in ["1016h:01", "6007h", "605Ah", "605Eh", "6065h", "6066h", "6072h", "607Dh:01", "607Ah"] {

@@ -1,4 +1,4 @@
-//! What ends a motion early, or keeps a drive from power.
+//! Reasons for an early end of a motion, or for a drive without power.
 
 use super::*;
 
@@ -76,7 +76,7 @@ fn an_axis_does_not_go_in_the_direction_of_a_switch_that_is_closed_at_the_start(
     }
 }
 
-/// Somebody switches on d1 in the middle of the jog, and this interface hears no other master.
+/// Another program switches on d1 in the middle of the jog, and this interface has no sign of another master.
 #[test]
 fn a_second_drive_that_somebody_else_switches_on_ends_a_jog() {
     let word = |word: u8, from_s: f64| {
@@ -162,7 +162,7 @@ fn a_drive_without_torque_is_not_enabled() {
     bench.assert_off();
 }
 
-/// A leg that nothing holds falls as its power goes: with a brake that closes late, and without one.
+/// A leg without a hold falls at the loss of its power: with a brake that closes late, and without a brake.
 #[test]
 fn an_axis_that_falls_without_power_fails_the_jog() {
     for quirk in ["kind = 'slow_brake'\nclose_s = 1.0", "kind = 'no_brake'"] {

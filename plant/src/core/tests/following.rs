@@ -1,11 +1,11 @@
-//! The master's own following-error monitor on the whole plant: what a disturbed machine may do, and what no drive may.
+//! The master's own following-error monitor on the whole plant. A disturbed machine passes; a wrong drive does not.
 
 use super::*;
 
 /// A cycle of a disturbed machine.
 #[derive(Debug, Clone, Copy, Default)]
 struct Disturbance {
-    /// SYNC goes out that much late, ns.
+    /// Delay of SYNC, ns.
     late_ns: u64,
     skipped: u64,
     /// Whether no command comes.
@@ -44,7 +44,7 @@ fn faults(disturbances: &[Disturbance]) -> Vec<Cause> {
     bench.causes(EventKind::Fault)
 }
 
-/// At the fastest moment of the default motion and with its limit: late SYNCs, also such that SYNC overtakes the targets,
+/// The test covers the fastest moment of the default motion with its limit: late SYNCs (also beyond the targets),
 /// skipped cycles and missing commands.
 #[test]
 fn a_disturbed_machine_makes_no_following_error() {

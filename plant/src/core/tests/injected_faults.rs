@@ -1,4 +1,4 @@
-//! Injected faults of encoders, drives, mechanism and commands: each strikes, does what its name says, and ends.
+//! Injected faults of encoders, drives, mechanism and commands: each strikes, has the effect of its name, and ends.
 
 mod commands;
 mod drives;
@@ -72,7 +72,7 @@ fn since_switch_on_s(event: &Event) -> f64 {
     (event.time_ns - EPOCH_NS) as f64 * 1e-9
 }
 
-/// A size with which a kind shows in the motion of the tests.
+/// A size with a visible effect in the motion of the tests.
 fn size_of(kind: Kind) -> Option<&'static str> {
     kind.declared().size?;
     Some(match kind {

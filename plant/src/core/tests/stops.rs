@@ -59,7 +59,7 @@ fn a_quick_stop_slows_down_along_its_ramp() {
     assert!(hardest_m_s2 < 1.5 * ramp_m_s2, "{hardest_m_s2} m/s²");
 }
 
-/// The drive obeys a quick stop that the master did not ask for: nobody may switch it on again.
+/// The drive obeys a foreign quick stop: nobody may switch the drive on again.
 #[test]
 fn a_drive_that_leaves_operation_stops_them_all_for_good() {
     let mut moving = Moving::new();
@@ -83,7 +83,7 @@ fn a_drive_taken_out_of_operational_stops_them_all() {
     assert!(causes == [Cause::ProcessDataLost] || causes == [Cause::NodeStopped], "{causes:?}");
 }
 
-/// What a command asks for too much, and what the master says of it.
+/// Excessive demands of a command, with the master's cause.
 #[test]
 fn a_command_beyond_a_limit_is_refused_as_a_whole_and_stops_the_rig() {
     type Change = fn([f64; AXES]) -> [f64; AXES];

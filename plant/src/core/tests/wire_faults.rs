@@ -1,4 +1,4 @@
-//! Faults of the wires: those that the rig tolerates, those that stop it, and its reports.
+//! Faults of the wires: those that the rig tolerates, those that stop the rig, and the reports.
 
 use masseter_can::canopen::EmergencyCode;
 use masseter_can::{ErrorKind, Tapped};

@@ -8,7 +8,7 @@ const SENDING_NS: u64 = 300_000;
 /// The fastest step of the default motion.
 const STEP_M: f64 = 0.116e-3;
 
-/// A master and a drive that is where its targets take it.
+/// A master, and a drive exactly at its demand.
 struct Bench {
     monitor: Following,
     now_ns: u64,
@@ -26,7 +26,7 @@ impl Bench {
         Self { monitor, now_ns: 0, sent_m: START_M, received_m: None, drive }
     }
 
-    /// SYNC so long after the last; the position that the drive samples.
+    /// SYNC this long after the last; returns the drive's sampled position.
     fn sync(&mut self, interval_ns: u64) -> f64 {
         self.now_ns += interval_ns;
         self.monitor.synchronise(self.now_ns);
@@ -68,7 +68,7 @@ impl Bench {
     }
 }
 
-/// By a drive without inertia; the emulated ones go on a little, so that they bear one lost target.
+/// Limits for a drive without inertia. The emulated drives go on a little, and so tolerate one lost target.
 #[test]
 fn a_lost_target_is_noticed_when_the_drive_should_be_there() {
     let mut bench = Bench::new(|_| {});
@@ -148,7 +148,7 @@ fn a_missing_position_neither_hides_nor_makes_an_error() {
     assert!(bench.cycle(MS, true).is_some());
 }
 
-/// A drive is late by a time, whatever the rate.
+/// A drive is late by a time, at every rate.
 #[test]
 fn at_high_rates_an_uneven_demand_excuses_the_way_of_a_millisecond_and_12_ms() {
     for (rate_hz, steps, syncs) in [(500, 3.0, 12), (1000, 3.0, 12), (20_000, 22.0, 240)] {

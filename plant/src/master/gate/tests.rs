@@ -1,7 +1,7 @@
 use super::*;
 
 type Judgement = Result<(), (Subject, Failure)>;
-/// A motion that reaches so many times its limit.
+/// A motion with this multiple of its limit.
 type Attempt<'a> = &'a dyn Fn(f64) -> Judgement;
 type Change = fn(&mut Command);
 
@@ -31,7 +31,7 @@ impl Bench {
         bench
     }
 
-    /// Sends the command of the next cycle with a change; a refused one leaves the targets as they were.
+    /// Sends the command of the next cycle with a change. A refused command leaves the targets unchanged.
     fn send(&mut self, change: impl FnOnce(&mut Command)) -> Judgement {
         self.cycle += 1;
         let mut command = Command {
@@ -52,7 +52,7 @@ impl Bench {
         self.send(|command| command.target_m[axis] += velocity_m_s * PERIOD_S)
     }
 
-    /// Brings an axis to a velocity as fast as it may.
+    /// Brings an axis to a velocity as fast as allowed.
     fn reach(&mut self, axis: usize, velocity_m_s: f64) {
         (1..=20).for_each(|part| self.step(axis, velocity_m_s * f64::from(part) / 20.0).unwrap());
     }
@@ -166,7 +166,7 @@ fn a_refused_command_leaves_no_trace() {
     assert!(bench.step(3, 0.09).is_err(), "of the velocity that passed");
 }
 
-/// As the motion does while a process stalls.
+/// The targets of a motion during a stall of a process.
 #[test]
 fn a_motion_may_wait_and_go_on_as_before_but_not_faster() {
     for waited in [1, 3, 15] {
@@ -180,8 +180,8 @@ fn a_motion_may_wait_and_go_on_as_before_but_not_faster() {
     }
 }
 
-/// As readings that are late again and again make the motion wait. The velocity is beyond what the limit of acceleration
-/// lets a drive start with.
+/// The waits of a motion with repeatedly late readings. The velocity is beyond a start within the limit of
+/// acceleration.
 #[test]
 fn a_motion_may_wait_in_every_second_cycle() {
     for (direction, end) in [(-1.0, 45), (-1.0, 100), (1.0, 45), (1.0, 100)] {

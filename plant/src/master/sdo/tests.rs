@@ -18,7 +18,7 @@ fn writing(object: ObjectAddress, bytes: &[u8]) -> SdoClient {
     client
 }
 
-/// The client's request and the answer it gets, both as bytes on the wire; returns the outcome.
+/// Sends the client's request and gives the answer, both as bytes on the wire; returns the outcome.
 fn play(client: &mut SdoClient, request: [u8; 8], answer: [u8; 8]) -> Result<Expedited, SdoFailure> {
     assert_eq!(client.poll(0).unwrap().encode(), request);
     assert_eq!(client.poll(0), None, "one request at a time");

@@ -8,7 +8,7 @@ use super::*;
 /// The axis l2.
 const L2: usize = 4;
 
-/// The bench with a drive that does not leave a state once it is ready, until the others wait for it.
+/// The bench with a ready drive that stays in its state, until the others wait for this drive.
 fn stuck(state: DriveState) -> Bench {
     let mut bench = Bench::new();
     bench.cycles(400, DriveRequest::Off);

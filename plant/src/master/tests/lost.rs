@@ -25,7 +25,7 @@ fn a_drive_that_falls_silent_after_its_configuration_is_lost_before_any_is_start
 }
 
 impl Bench {
-    /// Restarts a drive so many times in the midst of its boot.
+    /// Restarts a drive this many times in the midst of its boot.
     fn interrupt_boot(&mut self, axis: usize, times: usize) {
         for _ in 0..times {
             self.cycles_until(axis, BootPhase::Configuring);
@@ -72,7 +72,7 @@ fn a_running_drive_may_owe_its_process_data_for_three_cycles() {
     assert_eq!((fault.value, fault.limit), (4.0, 3.0));
 }
 
-/// From its boot-up message on: nothing of before counts for it.
+/// From its boot-up message on: nothing earlier counts for the drive.
 #[test]
 fn a_drive_that_has_restarted_is_unknown_at_once() {
     let mut bench = Bench::enabled();

@@ -20,7 +20,7 @@ use peer::{Peer, Wires};
 use super::Master;
 
 const PERIOD_NS: u64 = 1_000_000;
-/// When the rig is switched on: time does not begin with it.
+/// Switch-on of the rig, after the beginning of time.
 const EPOCH_NS: u64 = 1_000_000_000;
 
 /// A master and six scripted drives on two wires.
@@ -35,7 +35,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// Everything switched on, the drives as the master expects them.
+    /// All parts switched on, with drives by the master's expectations.
     fn new() -> Self {
         Self::of(Scenario::default())
     }

@@ -27,7 +27,7 @@ pub(super) struct Peer {
     pub(super) objects: BTreeMap<(u16, u8), Vec<u8>>,
     pub(super) nmt: Option<NmtState>,
     pub(super) power: DriveState,
-    /// The state that it does not leave.
+    /// The state that the drive does not leave.
     stuck_in: Option<DriveState>,
     /// Whether its fault reaction goes on.
     pub(super) is_reacting: bool,
@@ -37,9 +37,9 @@ pub(super) struct Peer {
     pub(super) servers: usize,
     /// Position that another drive of its id reports, increments.
     pub(super) twin_position: Option<i32>,
-    /// An object that it refuses to have read or written.
+    /// An object with refused reads and writes.
     pub(super) refuses: Option<((u16, u8), AbortCode)>,
-    /// Objects that it refuses to have written.
+    /// Objects with refused writes.
     pub(super) constants: Vec<(u16, u8)>,
     /// An object that it acknowledges and does not keep.
     pub(super) forgets: Option<(u16, u8)>,
@@ -55,7 +55,7 @@ pub(super) struct Peer {
     pub(super) torque_permille: i16,
     /// Its position, increments.
     pub(super) position: i32,
-    /// Whether targets may be elsewhere than it is.
+    /// Whether targets may differ from the position.
     pub(super) may_move: bool,
     /// The targets it received, each with the state that it was in.
     pub(super) targets: Vec<(DriveState, i32)>,
@@ -306,7 +306,7 @@ impl Wires {
         &mut self.0[bus]
     }
 
-    /// The drives' own doings, before the cycle's SYNC.
+    /// The drives' own transitions, before the cycle's SYNC.
     pub(super) fn begin(&mut self, now_ns: u64) {
         for wire in &mut self.0 {
             let mut out = Vec::new();

@@ -1,4 +1,4 @@
-//! What happens when a running drive or bus fails, and how it comes back.
+//! Failure and return of a running drive or bus.
 
 use masseter_can::Frame;
 use masseter_can::canopen::{Cob, Emergency, EmergencyCode, Heartbeat, NmtState, sync};
@@ -7,7 +7,7 @@ use masseter_scenario::MASTER_NODE;
 use super::peer::POSITION;
 use super::*;
 
-/// Keeps asking for motion, which must not happen, then switches off, after which it may again.
+/// Keeps requesting motion, which must not happen, then switches off, after which motion is allowed again.
 fn restore(bench: &mut Bench, cause: Cause) {
     for _ in 0..600 {
         bench.cycle(Some(DriveRequest::Enable));

@@ -6,7 +6,7 @@ use super::*;
 
 type Trigger = fn(&mut Bench);
 
-/// What stops the drives permanently, and the cause that is reported.
+/// Reasons for a permanent stop, with the reported cause.
 const PERMANENT: [(Cause, Trigger); 14] = [
     (Cause::CommandLost, |bench| (0..=TIMEOUT_CYCLES).for_each(|_| bench.cycle(None))),
     (Cause::CommandLost, |bench| {

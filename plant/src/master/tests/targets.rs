@@ -1,5 +1,5 @@
-//! The targets that the drives get: those of the command only while they are enabled and are to be; and the readings that
-//! the controller gets.
+//! The targets of the drives, and the readings of the controller. Drives get the targets of the command only while they
+//! are enabled and are to be enabled.
 
 use super::peer::POSITION;
 use super::*;
@@ -86,7 +86,7 @@ fn a_refused_command_counts_as_none() {
     assert_eq!(bench.master.silent_cycles(), 1);
 }
 
-/// Whatever stops the drives, which have moved meanwhile.
+/// The same holds for every stop of drives that have moved meanwhile.
 #[test]
 fn from_the_first_cycle_of_a_stop_the_target_is_the_position() {
     type Stop = fn(&mut Bench);

@@ -58,7 +58,7 @@ fn an_absent_object_is_left_and_an_optional_one_may_be_refused() {
     assert_eq!(find(&wanted, 0x1400, 5).unwrap().rule, ObjectRule::Optional);
 }
 
-/// A drive keeps the last force of process data that no longer carry it.
+/// A drive keeps the last force of process data that no longer carry the force.
 #[test]
 fn offsets_are_0_unless_they_are_process_data() {
     let offset = |text: &str, index| {

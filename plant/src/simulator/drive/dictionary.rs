@@ -1,7 +1,7 @@
-//! The drive's object dictionary: the values of all entries, one word each, at places that are constants.
+//! The drive's object dictionary: the values of all entries, one word each, at constant places.
 //!
-//! The dictionary has type, limits and access of its objects, but not their effects. An [`Overlay`] is where one drive
-//! differs from the table.
+//! The dictionary has type, limits and access of its objects, but not their effects. An [`Overlay`] holds the
+//! differences of one drive from the table.
 
 use std::marker::PhantomData;
 
@@ -64,12 +64,12 @@ numbers!(i8 is I8, i16 is I16, i32 is I32, u8 is U8, u16 is U16, u32 is U32);
 /// Place of an entry of that type.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Slot<T> {
-    /// Where it is among [`ENTRIES`].
+    /// Its index in [`ENTRIES`].
     pub(crate) place: usize,
     kind: PhantomData<T>,
 }
 
-/// The place of an entry of the table; an entry that does not exist does not compile.
+/// The place of an entry of the table. A missing entry does not compile.
 pub(crate) const fn slot<T: Number>(index: u16, subindex: u8) -> Slot<T> {
     let mut place = 0;
     while FLAT[place].address.index != index || FLAT[place].address.subindex != subindex {
@@ -99,7 +99,7 @@ pub(crate) struct Objects {
 }
 
 impl Objects {
-    /// The values after power-on; those that the scenario configures are still 0.
+    /// The values after power-on; the scenario's values are still 0.
     pub(crate) fn new(node: NodeId) -> Self {
         let words = ENTRIES.each_ref().map(|entry| match entry.initial {
             Initial::Value(value) => value as u32,
@@ -170,7 +170,7 @@ impl Objects {
 /// The differences of one drive; none for a drive that has the whole table.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Overlay {
-    /// Places in the table with their entries in this drive; none where the drive lacks it.
+    /// Places in the table with their entries in this drive; none for a missing entry.
     changed: Vec<(usize, Option<Entry>)>,
     /// Places whose entries show a value that no write changes.
     shown: Vec<(usize, u32)>,
@@ -188,12 +188,12 @@ impl Overlay {
         self.changed.push((place, None));
     }
 
-    /// An entry shows this value, whatever is written.
+    /// Sets the constant value of an entry, which no write changes.
     pub(crate) fn show(&mut self, place: usize, word: u32) {
         self.shown.push((place, word));
     }
 
-    /// The value that an entry shows whatever is written, if it has one.
+    /// The constant value of an entry, if any.
     pub(crate) fn shown(&self, place: usize) -> Option<u32> {
         self.shown.iter().find(|(at, _)| *at == place).map(|(_, word)| *word)
     }

@@ -1,4 +1,4 @@
-//! The faults that can be injected into a drive. Whoever injects them sets what acts, and asks what has struck.
+//! The injectable faults of a drive. The injector sets the acting faults, and asks for the faults that have struck.
 
 /// A kind of fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,7 +29,7 @@ pub(crate) enum DriveFault {
 
 const KINDS: usize = DriveFault::EmcyStorm as usize + 1;
 
-/// The faults that act on a drive, and which have changed something.
+/// The faults that act on a drive, with those that have struck.
 #[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct DriveFaults {
     sizes: [Option<f64>; KINDS],
@@ -38,14 +38,14 @@ pub(crate) struct DriveFaults {
 }
 
 impl DriveFaults {
-    /// From now on a fault acts with that size (0 where its kind has none), or acts no more.
+    /// Sets the size of an acting fault (0 for a kind without a size), or ends the fault.
     pub(crate) fn set(&mut self, kind: DriveFault, size: Option<f64>) {
         self.sizes[kind as usize] = size;
         self.struck[kind as usize] = false;
         self.acting = self.sizes.iter().flatten().count();
     }
 
-    /// Whether none acts.
+    /// Whether no fault acts.
     #[inline]
     pub(crate) fn is_empty(&self) -> bool {
         self.acting == 0
@@ -63,12 +63,12 @@ impl DriveFaults {
         self.size(kind).is_some()
     }
 
-    /// The fault of that kind changes something.
+    /// Notes that the fault of that kind has struck.
     pub(super) fn strike(&mut self, kind: DriveFault) {
         self.struck[kind as usize] |= self.has(kind);
     }
 
-    /// Whether the fault of that kind has changed something since it acts as it does.
+    /// Whether the fault of that kind has struck since its last change.
     pub(crate) fn has_struck(&self, kind: DriveFault) -> bool {
         self.struck[kind as usize]
     }

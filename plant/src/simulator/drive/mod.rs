@@ -1,9 +1,9 @@
 //! An emulated servo drive: a CANopen node (CiA 301) with the profile of servo drives (CiA 402) and an encoder.
 //!
-//! [`node`] implements CiA 301, [`axis`] is the profile behind it, and the object [`dictionary`] lies between them:
-//! the node counts in increments, the axis works in SI units. The drive has no bus, no encoder and no mechanism; its caller
-//! delivers frames and positions, and says what the encoder makes of them. A drive depends on CAN alone: not on mechanism,
-//! scenario, or transport.
+//! [`node`] implements CiA 301, [`axis`] is the profile, and the object [`dictionary`] lies between them. The node
+//! counts in increments, the axis works in SI units. The drive has no bus, no encoder and no mechanism; its caller
+//! delivers frames, positions, and the encoder's output. A drive depends on CAN alone: not on mechanism, scenario, or
+//! transport.
 
 pub(crate) mod axis;
 pub(crate) mod dictionary;
@@ -30,7 +30,7 @@ pub(crate) const SECOND_NS: u64 = 1_000_000_000;
 pub(crate) struct DriveSettings {
     /// Its node id.
     pub(crate) node: NodeId,
-    /// What it can do.
+    /// Its abilities.
     pub(crate) drive: Ratings,
     /// Step of the servo loops, s.
     pub(crate) step_s: f64,
@@ -38,13 +38,13 @@ pub(crate) struct DriveSettings {
     pub(crate) objects: Objects,
     /// What the drive has stored.
     pub(crate) memory: DriveMemory,
-    /// What it does otherwise than the standard.
+    /// Its deviations from the standard.
     pub(crate) quirks: Quirks,
     /// The ends of the axis' stroke, m.
     pub(crate) stroke_m: [f64; 2],
 }
 
-/// What a drive can do, and the gains of its loops.
+/// The abilities of a drive, and the gains of its loops.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(crate) struct Ratings {
     /// Force at 1000 ‰ of the torque objects (6077h), N.
@@ -75,7 +75,7 @@ impl Ratings {
     }
 }
 
-/// Everything that a drive does otherwise than the standard.
+/// All deviations of a drive from the standard.
 #[derive(Debug, Clone)]
 pub(crate) struct Quirks {
     pub(crate) node: NodeQuirks,
@@ -83,45 +83,45 @@ pub(crate) struct Quirks {
     pub(crate) overlay: Overlay,
 }
 
-/// What the node does otherwise.
+/// The deviations of the node.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct NodeQuirks {
     /// Boot-up messages at a start.
     pub(crate) boot_ups: u8,
     /// Whether PDO parameters are closed in operational.
     pub(crate) locks_pdos: bool,
-    /// How long saving takes, ns.
+    /// Time of saving, ns.
     pub(crate) save_ns: u64,
-    /// The error that is present at power-on (603Fh).
+    /// The error at power-on (603Fh).
     pub(crate) fault: Option<u16>,
-    /// How long after power-on it restarts by itself, ns.
+    /// Time from power-on to a restart by itself, ns.
     pub(crate) restart_ns: Option<u64>,
 }
 
-/// What the axis does otherwise.
+/// The deviations of the axis.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct AxisQuirks {
     /// Whether the position at home is the home offset instead of its negative.
     pub(crate) is_offset_inverted: bool,
     /// Whether the software limits count from zero instead of from home.
     pub(crate) are_limits_from_zero: bool,
-    /// Whether the encoder counts from where it is at power-on.
+    /// Whether the encoder counts from its place at power-on.
     pub(crate) is_incremental: bool,
-    /// How far the encoder may be from a second one at the joint, m; none without a second one.
+    /// Largest distance of the encoder from a second one at the joint, m; none without a second one.
     pub(crate) encoders_apart_m: Option<f64>,
-    /// How long after power-on the torque is safely off, ns.
+    /// Time of safe torque off after power-on, ns.
     pub(crate) torque_off_ns: u64,
-    /// How long the brake takes to open, ns.
+    /// Opening time of the brake, ns.
     pub(crate) opening_ns: u64,
-    /// How long the brake takes to close, ns; none without a brake.
+    /// Closing time of the brake, ns; none without a brake.
     pub(crate) closing_ns: Option<u64>,
 }
 
-/// What a drive keeps without supply. Values that are as delivered are left out.
+/// The non-volatile memory of a drive, without values of delivery.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct DriveMemory {
-    /// Serial number (1018h:04); none for that of the scenario.
+    /// Serial number (1018h:04); none for the scenario's.
     pub(crate) serial_number: Option<u32>,
     /// Stored values by their objects, such as `6065:00`.
     #[serde(default)]
@@ -129,7 +129,7 @@ pub(crate) struct DriveMemory {
 }
 
 impl DriveMemory {
-    /// What differs between stored values and those of delivery.
+    /// The differences between stored values and those of delivery.
     pub(crate) fn of(stored: &Objects, factory: &Objects) -> Self {
         let differs = |place: &usize| stored.words[*place] != factory.words[*place];
         let value = |place: usize| {
@@ -143,7 +143,7 @@ impl DriveMemory {
     /// Writes the memory into a dictionary as delivered.
     ///
     /// # Errors
-    /// The object that the drive does not have, or whose value it would not take.
+    /// The object that the drive lacks, or whose value the drive refuses.
     pub(crate) fn restore(&self, objects: &mut Objects, overlay: &Overlay) -> Result<(), String> {
         if let Some(serial_number) = self.serial_number {
             objects.set(names::SERIAL_NUMBER, serial_number);

@@ -25,7 +25,7 @@ const SUPPORTED_MODES: i64 = 1 << 0 | 1 << 5 | 1 << 7 | 1 << 9;
 
 /// Increments of a turn of the motor.
 pub(crate) const INCREMENTS_PER_TURN: u32 = 10_000;
-/// Units in the notation of CiA 402 (60A8h to 60AAh): increments (B5h), a second of them (03h, 57h for its square), and
+/// Units in the notation of CiA 402 (60A8h to 60AAh): increments (B5h), their rate (second 03h, its square 57h), and
 /// turns a minute a second.
 pub(crate) const INCREMENTS: u32 = 0x00B5_0000;
 pub(crate) const INCREMENTS_PER_S: u32 = 0x00B5_0300;
@@ -213,7 +213,7 @@ pub(crate) static OBJECTS: &[Object] = &[
     var(&[plain(0x606C, "Velocity actual value", I32, ReadOnly, Value(0)).mapped(Tpdo)]),
     var(&[plain(0x6071, "Target torque", I16, ReadWrite, Value(0)).mapped(Any)]),
     var(&[plain(0x6072, "Max torque", U16, ReadWrite, Configured)]),
-    // In process data that answer a SYNC, the mean since the last SYNC, so that no cycle's work is missed between samples.
+    // In process data that answer a SYNC, the mean since the last SYNC, so that samples miss no work of a cycle.
     // Otherwise the present value.
     var(&[plain(0x6077, "Torque actual value", I16, ReadOnly, Value(0)).mapped(Tpdo)]),
     var(&[plain(0x607A, "Target position", I32, ReadWrite, Value(0)).mapped(Any)]),
@@ -296,7 +296,7 @@ impl DataType {
     }
 }
 
-/// Who may change an entry.
+/// The right to change an entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Access {
     /// Nobody: it never changes.
@@ -405,7 +405,7 @@ impl Entry {
     }
 }
 
-/// How an object is made of entries (CiA 301, table 42).
+/// The structure of an object (CiA 301, table 42).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Shape {
     Var,

@@ -1,7 +1,7 @@
-//! What a scenario does to drives and mechanism, and when: the entries that begin and end, in the order of time.
+//! A scenario's faults and stimuli for drives and mechanism: entries that begin and end, in the order of time.
 //!
-//! The agenda acts on nothing. It hands out each change once, says what acts by the entries that are active, and keeps
-//! what the emulation reports of each of them.
+//! The agenda acts on nothing. It hands out each change once, derives the present effects from the active entries, and
+//! keeps the emulation's reports on each entry.
 
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -21,7 +21,7 @@ use crate::simulator::mechanism::axes::AxisFaults;
 use crate::simulator::mechanism::contact::food::Food;
 use crate::state::state;
 
-/// What an entry does.
+/// The action of an entry.
 #[derive(Debug, Clone, serde::Serialize)]
 pub(crate) enum Effect {
     /// A fault of one axis, or of all.
@@ -38,12 +38,12 @@ pub(crate) enum Effect {
 struct Entry {
     injected: Injected,
     effect: Effect,
-    /// The fault that cuts its own window.
+    /// The fault with a limit of its own window.
     fault: Option<FaultConfig>,
     window_ns: Range<u64>,
-    /// Which of all beginnings was its own, while it is active.
+    /// Number of its beginning among all, while active.
     begun: Option<u64>,
-    /// Where the axes were then, m.
+    /// Positions of the axes at that time, m.
     began_m: [f64; AXES],
     has_struck: bool,
 }
@@ -58,10 +58,10 @@ state!(Entry {
 #[derive(Debug, Clone)]
 pub(crate) struct Agenda {
     entries: Vec<Entry>,
-    /// Before then no entry begins or ends, ns.
+    /// No entry begins or ends before this time, ns.
     next_change_ns: u64,
     begun: u64,
-    /// What began or ended, the oldest first.
+    /// Beginnings and ends, the oldest first.
     pub(crate) occurrences: VecDeque<Occurrence>,
 }
 
@@ -71,8 +71,8 @@ state!(Agenda {
 });
 
 impl Agenda {
-    /// The entries of a scenario that drives and mechanism carry out, switched on at `now_ns`. One whose window is not known
-    /// yet does not act before it is set.
+    /// The entries of a scenario for drives and mechanism, switched on at `now_ns`. An entry with an unknown window
+    /// does not act before its window is set.
     pub(crate) fn new(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
         let faults = scenario.faults.iter().enumerate().filter_map(|(place, config)| {
             Some(Entry::new(Injected::Fault(place), effect_of_fault(config)?, Some(config)))
@@ -100,7 +100,7 @@ impl Agenda {
         self.entries.is_empty()
     }
 
-    /// Sets when an entry acts.
+    /// Sets the window of an entry.
     pub(crate) fn set_window(&mut self, injected: Injected, window_ns: &Range<u64>) {
         for entry in self.entries.iter_mut().filter(|entry| entry.injected == injected) {
             entry.window_ns = match (&entry.fault, &entry.effect) {
@@ -148,12 +148,12 @@ impl Agenda {
         }
     }
 
-    /// What the entry at that place does.
+    /// The action of the entry at that place.
     pub(crate) fn effect(&self, place: usize) -> &Effect {
         &self.entries[place].effect
     }
 
-    /// Which of all beginnings was that of the entry at that place, while it is active.
+    /// Number of the beginning of the entry at that place, while active.
     pub(crate) fn begun(&self, place: usize) -> Option<u64> {
         self.entries[place].begun
     }
@@ -178,7 +178,7 @@ impl Agenda {
         })
     }
 
-    /// The size with which a fault acts on an axis, by the rule of its kind; none while no such entry is active.
+    /// The size of a fault on an axis, by the rule of its kind; none without an active entry.
     pub(crate) fn size(&self, kind: impl Into<FaultKindConfig>, axis: usize) -> Option<f64> {
         let kind = kind.into();
         let mut active = self.active_faults(kind, axis);
@@ -189,7 +189,7 @@ impl Agenda {
         }
     }
 
-    /// Whether the fault at that place acts on the axis itself: another one may have begun later, or be as large as it.
+    /// Whether the fault at that place itself acts on the axis: another fault may have begun later, or be as large.
     pub(crate) fn acts(&self, place: usize, axis: usize) -> bool {
         let (entry, Effect::Fault { kind, size, .. }) = (&self.entries[place], &self.entries[place].effect)
         else {
@@ -202,7 +202,7 @@ impl Agenda {
         }
     }
 
-    /// What acts on an axis of the mechanism.
+    /// The present faults of an axis of the mechanism.
     pub(crate) fn axis_faults(&self, axis: usize) -> AxisFaults {
         let is_broken = self.size(AxisFault::BrokenRod, axis).is_some();
         let stops = self.active_faults(AxisFault::EndStop.into(), axis).map(|(entry, _)| entry.stops_m(axis));
@@ -231,7 +231,7 @@ impl Agenda {
         payloads_kg.sum()
     }
 
-    /// The food that was served last of those that are there, with the number of its beginning.
+    /// The last served active food, with the number of its beginning.
     pub(crate) fn food(&self) -> Option<(u64, &Food)> {
         let foods = self.active().filter_map(|entry| match &entry.effect {
             Effect::Food(food) => Some((entry.begun?, &**food)),
@@ -254,7 +254,7 @@ impl Agenda {
         (from..self.entries.len()).find(|&place| waits(&self.entries[place]))
     }
 
-    /// The entry at that place has changed something.
+    /// Notes that the entry at that place has struck.
     pub(crate) fn strike(&mut self, place: usize, now_ns: u64) {
         let entry = &mut self.entries[place];
         entry.has_struck = true;
@@ -263,7 +263,7 @@ impl Agenda {
     }
 
     fn report(&mut self, occurrence: Occurrence) {
-        // The queue keeps its room, should nobody take the occurrences: nothing is allocated in a cycle.
+        // The queue keeps its room when nobody takes the occurrences, so that a cycle allocates nothing.
         if self.occurrences.len() < 2 * self.entries.len() {
             self.occurrences.push_back(occurrence);
         }
@@ -291,7 +291,7 @@ impl Entry {
         Occurrence { injected: self.injected, time_ns, axis, has_ended }
     }
 
-    /// Whether it changes something as soon as it begins. Faults of a drive, an encoder or an axis report that themselves.
+    /// Whether the entry strikes at its beginning. Faults of a drive, an encoder or an axis report their own strike.
     fn strikes_at_once(&self) -> bool {
         match self.effect {
             Effect::Fault { .. } => false,
@@ -307,7 +307,7 @@ impl Entry {
     }
 }
 
-/// What a fault does to drives and mechanism; none where it acts elsewhere.
+/// The effect of a fault on drives and mechanism; none for a fault elsewhere.
 fn effect_of_fault(config: &FaultConfig) -> Option<Effect> {
     let size = config.size_si();
     match config.kind {

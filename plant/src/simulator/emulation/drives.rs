@@ -1,6 +1,6 @@
-//! The emulated drives of a scenario: their settings, what they do otherwise than the standard, their memory.
+//! The emulated drives of a scenario: their settings, their deviations from the standard, their memory.
 //!
-//! The file of the memory is JSON, by the names of the axes. A drive that has no entry there has stored nothing.
+//! The file of the memory is JSON, by the names of the axes. A drive without an entry has stored nothing.
 
 #[cfg(test)]
 mod tests;
@@ -86,14 +86,14 @@ const FACTORY_INHIBIT: u16 = 10;
 /// CiA 402's generic PDOs after their first object, the controlword or the statusword: nothing, mode, position.
 const GENERIC: [[Option<u32>; 2]; 3] =
     [[None, None], [Some(0x6060_0008), Some(0x6061_0008)], [Some(0x607A_0020), Some(0x6064_0020)]];
-/// Most that 60C2h:01 takes where its limits are narrow.
+/// Highest value of 60C2h:01 with narrow limits.
 const NARROW_PERIOD: u8 = 100;
 /// Milliseconds in 60C2h:02.
 const MILLISECONDS: i8 = -3;
 /// Cyclic synchronous position in 6502h.
 const CYCLIC_POSITION: u32 = 1 << 7;
 
-/// What a drive does otherwise than the standard. Writes the values that it is delivered with into its dictionary.
+/// The deviations of a drive from the standard. Writes the drive's values of delivery into its dictionary.
 ///
 /// # Errors
 /// [`PlantError::Scenario`] for an object that no emulated drive has.
@@ -207,7 +207,7 @@ state!(MemoryFile {
 });
 
 impl MemoryFile {
-    /// Reads a file; one that does not exist is that of drives that have stored nothing.
+    /// Reads a file. A missing file stands for drives that have stored nothing.
     pub(super) fn read(path: &Path) -> Result<Self, PlantError> {
         let text = match read_text(path, MOST_KEPT_BYTES) {
             Ok(text) => text,
@@ -223,7 +223,7 @@ impl MemoryFile {
         Ok(Self { path: path.to_owned(), drives, is_stale: false })
     }
 
-    /// A drive has stored something.
+    /// Takes the stored values of a drive.
     pub(super) fn set_of_axis(&mut self, axis: usize, memory: DriveMemory) {
         self.drives[axis] = memory;
         self.is_stale = true;
@@ -234,7 +234,7 @@ impl MemoryFile {
         refused(&self.path, &format!("{}: {reason}", AXIS_NAMES[axis]))
     }
 
-    /// Writes the file, if it does not have the present values: as a whole or not at all.
+    /// Writes the file, unless the file has the present values, as a whole or not at all.
     pub(super) fn write_if_stale(&mut self) -> Result<(), PlantError> {
         if !self.is_stale {
             return Ok(());

@@ -1,7 +1,7 @@
-//! The emulated drives on real interfaces: to a master, they are a robot.
+//! The emulated drives on real interfaces: a robot for any master.
 //!
-//! Every drive has a socket of its own. The mechanism moves in real time: frames are delivered at their time stamps, and
-//! the steps between them are caught up. The emulator has no master and publishes nothing.
+//! Every drive has a socket of its own. The mechanism moves in real time: the emulator delivers frames at their time
+//! stamps, and catches up the steps between them. The emulator has no master and publishes nothing.
 
 use masseter_can::{Bus, OpenError, Received, SocketCan};
 use masseter_model::geometry::AXES;
@@ -68,7 +68,7 @@ impl Emulator {
     /// Runs until `stop` is requested.
     pub fn run(mut self, stop: &StopRequest) -> Result<EmulatorCounters, PlantError> {
         while !stop.is_made() {
-            // A frame that arrived during the last deliveries is fetched already: no socket would wake for it.
+            // A frame that arrived during the last deliveries is already fetched: no socket wakes for this frame.
             if self.earliest().is_none() {
                 SocketCan::wait::<AXES>(&self.ports, clock::now_ns() + LONGEST_WAIT_NS);
             }

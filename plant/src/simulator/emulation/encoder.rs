@@ -1,8 +1,8 @@
-//! The encoder of an axis: its noise, and what faults make of the position that it shows.
+//! The encoder of an axis: its noise, and the effect of faults on its position.
 //!
-//! A fault of the signal makes an error of the true position; the errors add up, and the encoder's own noise with them.
-//! What reads the signal comes after: coarser steps, and an interface that repeats its last position. A fault has struck
-//! once it alone shows another position than the one that is there. Randomness comes from the scenario's seed.
+//! A fault of the signal makes an error of the true position; the errors and the encoder's own noise add up. The
+//! interface comes after the signal: coarser steps, or a repeated last position. A fault has struck once the fault
+//! alone gives a position other than the true one. Randomness comes from the scenario's seed.
 
 use std::collections::VecDeque;
 
@@ -88,7 +88,7 @@ impl Encoder {
         self.faults.iter().any(|fault| fault.place == place && fault.has_struck)
     }
 
-    /// What it makes of its position at that time.
+    /// The output of the encoder at that time.
     #[inline]
     pub(super) fn look(&mut self, now_ns: u64, at_m: f64) -> Look {
         let noise: f64 = self.noise.sample(StandardNormal);
@@ -120,7 +120,7 @@ impl Encoder {
         seen_m
     }
 
-    /// What the interface makes of the signal.
+    /// The output of the interface for a signal.
     fn read_m(&mut self, now_ns: u64, signal_m: f64) -> f64 {
         let mut shown_m = signal_m;
         let steps = self.faults.iter_mut().filter(|fault| fault.kind == EncoderFault::Steps);
@@ -149,7 +149,7 @@ impl Fault {
         Some(Self { place, kind, size, begun: None, from: None, has_struck: false, past })
     }
 
-    /// What it alone makes of a position, where it is a fault of the signal.
+    /// The effect of the fault alone on a position, for a fault of the signal.
     fn alone_m(&mut self, now_ns: u64, at_m: f64, random: &mut Pcg64Mcg) -> f64 {
         let size = self.size;
         let (from_ns, from_m) = *self.from.get_or_insert((now_ns, at_m));
@@ -205,7 +205,7 @@ mod tests {
         Encoder::new(1, 0, noise_m, faults.iter().enumerate().filter_map(fault).collect())
     }
 
-    /// What an encoder shows of a shaft that moves from 100 mm on by 1 mm a millisecond, in µm.
+    /// The encoder's positions for a shaft that moves from 100 mm on by 1 mm a millisecond, in µm.
     fn shown_um(encoder: &mut Encoder, ms: u64) -> i64 {
         (encoder.look(5 * MS + ms * MS, 0.1 + ms as f64 * 1e-3).shown_m * 1e6).round() as i64
     }

@@ -1,4 +1,4 @@
-//! Teeth and food of a scenario, as the mechanism takes them.
+//! Teeth and food of a scenario, in the form of the mechanism.
 
 use masseter_model::geometry::Pose;
 use masseter_scenario::{self as scenario, FoodConfig, Scenario, TeethConfig, ToothConfig};

@@ -25,12 +25,12 @@ state!(LoadCell {
 });
 
 impl LoadCell {
-    /// Without load so far.
+    /// A cell without load.
     pub(super) fn new(config: LoadCellConfig, seed: u64) -> Self {
         Self { config, passed_n: 0.0, random: Pcg64Mcg::seed_from_u64(seed ^ STREAM) }
     }
 
-    /// The bite force was this large (N) for that time (s).
+    /// Takes a bite force (N) over a time (s).
     pub(super) fn follow(&mut self, force_n: f64, time_s: f64) {
         let left = (-time_s / self.config.time_s()).exp();
         self.passed_n = force_n + (self.passed_n - force_n) * left;

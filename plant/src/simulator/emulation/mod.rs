@@ -1,8 +1,8 @@
-//! The emulated robot: six drives, the mechanism that they move, and the wires they are on.
+//! The emulated robot: six drives, their mechanism, and their wires.
 //!
-//! [`Emulation`] co-simulates drives and mechanism, without wires. Simulated wires step it with a master
-//! (the plant's default link) or without one ([`OpenLink`]); [`Emulator`] steps it on real interfaces. What a scenario
-//! declares becomes plain values here, and the entries of its agenda that are active become what acts.
+//! [`Emulation`] co-simulates drives and mechanism, without wires. Simulated wires step it with a master (the plant's
+//! default link) or without one ([`OpenLink`]); [`Emulator`] steps it on real interfaces. This module turns a
+//! scenario's declarations into plain values, and the active entries of its agenda into effects.
 
 mod agenda;
 pub(crate) mod drives;
@@ -45,7 +45,7 @@ pub use virtual_link::{NodePort, OpenLink, VirtualLink};
 
 /// The six drives and the mechanism that they move.
 ///
-/// Whoever carries the frames calls [`step`](Self::step) and [`deliver`](Self::deliver) in the order of time, and
+/// The carrier of the frames calls [`step`](Self::step) and [`deliver`](Self::deliver) in the order of time, and
 /// [`outgoing`](Self::outgoing) after each.
 ///
 /// ```
@@ -69,7 +69,7 @@ pub struct Emulation {
     pub(crate) drives: Vec<DriveNode>,
     dynamics: Dynamics,
     step_ns: u64,
-    /// When the drives' servo loops are due next, ns.
+    /// Next due time of the drives' servo loops, ns.
     next_step_ns: u64,
     /// The time up to which the mechanism has moved, ns.
     moved_to_ns: u64,
@@ -100,7 +100,7 @@ state!(Emulation {
     constant: step_ns food;
 });
 
-/// State of the mechanism at a SYNC. The truth is computed from it later, once the reading is on its way.
+/// State of the mechanism at a SYNC. The computation of the truth comes later, after the reading.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Sample {
     time_ns: u64,
@@ -109,7 +109,7 @@ struct Sample {
     force_n: [[f64; AXES]; 2],
     /// The bite force: mean since the last sample, and present value.
     bite_force_n: [f64; 2],
-    /// What the load cell shows; 0 without one.
+    /// Value of the load cell; 0 without one.
     load_cell_n: f64,
 }
 
@@ -173,8 +173,8 @@ impl Emulation {
         })
     }
 
-    /// Writes what the drives have stored into the scenario's file (`drives.memory`), if that has changed. This takes
-    /// the time of a file: a loop in real time calls it at its end.
+    /// Writes the drives' changed stored values into the scenario's file (`drives.memory`). A write takes the time of a
+    /// file, so a loop in real time calls this function at its end.
     ///
     /// # Errors
     /// [`PlantError::Memory`] for a file that cannot be written.
@@ -220,7 +220,7 @@ impl Emulation {
         }
     }
 
-    /// Delivers a frame to a drive. Only a SYNC moves the mechanism to this very instant, and makes the drive look at it.
+    /// Delivers a frame to a drive. Only a SYNC moves the mechanism to this very instant, for the drive's sample.
     pub fn deliver(&mut self, axis: usize, frame: &Frame, now_ns: u64) -> Result<(), DynamicsError> {
         if frame.id() != CanId::from(Cob::Sync) {
             self.drives[axis].receive(now_ns, frame);
@@ -288,7 +288,7 @@ impl Emulation {
         Ok(())
     }
 
-    /// Begins and ends what the scenario does to drives and mechanism by now.
+    /// Begins and ends the scenario's due entries for drives and mechanism.
     #[inline]
     fn follow_agenda(&mut self, now_ns: u64) {
         while let Some(place) = self.agenda.next_change(now_ns, || self.dynamics.state.positions_m()) {
@@ -296,7 +296,7 @@ impl Emulation {
         }
     }
 
-    /// The entry at that place has begun or ended: from now on what acts follows from those that are active.
+    /// Handles the beginning or the end of the entry at that place: the effects follow from the active entries.
     fn follow_entry(&mut self, place: usize) {
         match *self.agenda.effect(place) {
             Effect::Fault { kind, axis, .. } => axes_of(axis).for_each(|axis| match kind {

@@ -1,4 +1,4 @@
-//! What acts follows from the entries that are active: random overlaps against a model that knows no state.
+//! The effects follow from the active entries alone: random overlaps against a model without state.
 
 use masseter_model::geometry::AXIS_NAMES;
 use masseter_runtime::injection::Injected;
@@ -74,7 +74,7 @@ impl Declared {
     }
 }
 
-/// The model: pure functions from the list and a time to what acts.
+/// The model: pure functions from the list and a time to the effects.
 struct Model<'a>(&'a [Declared]);
 
 impl Model<'_> {

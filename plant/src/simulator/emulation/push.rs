@@ -1,4 +1,4 @@
-//! A push on the jaw: a force and a torque over the time since they began, of a shape or from a CSV file.
+//! A push on the jaw: a force and a torque over the time since the beginning, by a shape or a CSV file.
 //!
 //! Comments in the file begin with `#`, and blank lines are ignored. Between two rows the values change evenly.
 
@@ -28,7 +28,7 @@ enum Course {
 }
 
 impl Push {
-    /// The push of a stimulus; none of another one.
+    /// The push of a stimulus; none for another kind of stimulus.
     pub(crate) fn new(config: &StimulusConfig) -> Result<Option<Self>, PlantError> {
         let StimulusConfig { push_n, torque_n_m, push_table, point_m, shape, for_s, frequency_hz, .. } =
             config;

@@ -38,7 +38,7 @@ fn time_left_out_is_counted_in_whole_steps_and_moves_nothing() {
     assert_eq!(emulation.skip_to(0), 0);
 }
 
-/// Which drives are in fault 0.2 s after power-on, with a second encoder at each joint and a fault at that of l1.
+/// The drives in fault 0.2 s after power-on, with a second encoder at each joint and a fault at that of l1.
 fn faults_by_second_encoders(limit: &str, kind: &str) -> [bool; AXES] {
     let fault = if kind.is_empty() {
         String::new()

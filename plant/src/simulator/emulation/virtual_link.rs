@@ -121,8 +121,7 @@ impl VirtualLink {
         self.wires[bus].port(port)
     }
 
-    /// When the next frame arrives or the drives make their next step: until then nothing changes unless a frame is
-    /// queued, ns.
+    /// Time of the next arrival or of the drives' next step, ns. Until then only a queued frame changes anything.
     pub(crate) fn next_event_ns(&mut self) -> u64 {
         let step_ns = self.emulation.next_step_ns;
         self.next_arrival().map_or(step_ns, |(time_ns, _)| time_ns.min(step_ns))
@@ -249,7 +248,7 @@ impl OpenLink {
         self.link.emulation.truth()
     }
 
-    /// Writes what the drives have stored into the scenario's file (`drives.memory`), if that has changed.
+    /// Writes the drives' changed stored values into the scenario's file (`drives.memory`).
     ///
     /// # Errors
     /// [`PlantError::Memory`] for a file that cannot be written.
@@ -289,7 +288,7 @@ mod tests {
 
     const MS: u64 = 1_000_000;
 
-    /// What the drive of l1 answers.
+    /// The answer of the drive of l1.
     fn ask(link: &mut OpenLink, now_ns: &mut u64, request: SdoRequest) -> SdoResponse {
         let node = NodeId::new(4).unwrap();
         link.master(1).send(*now_ns, request.frame(node)).unwrap();

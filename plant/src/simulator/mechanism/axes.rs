@@ -1,7 +1,7 @@
-//! The axes between drives and platform: friction, end stops, play, and what faults make of them.
+//! The axes between drives and platform: friction, end stops, play, and the effects of faults.
 //!
 //! Each part states its force in a step as an [`Element`]; their sums enter the equations of motion. The masses of the
-//! axes are not part of this module, but for the drives' sides of loose joints.
+//! axes are not part of this module, except for the drives' sides of loose joints.
 
 use masseter_model::dynamics::AxesConfig;
 use masseter_model::geometry::{AXES, LEGS, Mechanism};
@@ -17,14 +17,14 @@ pub(crate) struct Axes {
     pub(crate) each: [Axis; AXES],
 }
 
-/// What faults make of an axis.
+/// The effects of faults on an axis.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct AxisFaults {
     /// Whether its guide has seized.
     pub(crate) is_jammed: bool,
     /// The factor on its friction.
     pub(crate) friction: f64,
-    /// The play of its joint in place of what it is built with, m; infinite where the rod is broken.
+    /// The play of its joint in place of the built-in play, m; infinite for a broken rod.
     pub(crate) play_m: Option<f64>,
     /// Between the hard stops in its way, m.
     pub(crate) free_m: [f64; 2],
@@ -40,7 +40,7 @@ impl AxisFaults {
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Axis {
     pub(crate) faults: AxisFaults,
-    /// Which hard stops of faults it touched since their last change: the lower one, the upper one.
+    /// The touched hard stops of faults since their last change: the lower, the upper.
     pub(crate) touched: [bool; 2],
     mass_kg: f64,
     play_m: f64,
@@ -62,11 +62,11 @@ pub(super) struct AxisMotion {
 /// The forces of the axes in a step.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct AxesForces {
-    /// On the moving bodies while the speeds stay, those of the drives included, N.
+    /// Forces on the moving bodies at constant speeds, with those of the drives, N.
     pub(super) force_n: Vector6<f64>,
     /// Mass of the drives' sides, which the axes do not move, kg.
     pub(super) parted_kg: Vector6<f64>,
-    /// What the change of the axes' speeds acts against like a mass, kg.
+    /// Resistance to a change of the axes' speeds, like a mass, kg.
     pub(super) resisting_kg: Vector6<f64>,
 }
 
@@ -109,7 +109,7 @@ impl Axes {
         self.each.iter_mut().enumerate().find_map(|(axis, faults)| Some((axis, faults.hit_m_s.take()?)))
     }
 
-    /// Where the encoders see the axes: at the drives' side of each joint, m.
+    /// Positions at the encoders: the drives' side of each joint, m.
     pub(super) fn drive_positions_m(&self, joints_m: [f64; AXES]) -> [f64; AXES] {
         std::array::from_fn(|axis| self.each[axis].coupling.drive_m(joints_m[axis]))
     }
@@ -155,7 +155,7 @@ impl Axes {
 }
 
 impl Axis {
-    /// From now on faults make this of it.
+    /// Sets the effects of faults on an axis from now on.
     pub(super) fn set_faults(&mut self, faults: AxisFaults, motion: AxisMotion) {
         let AxisMotion { position_m, speed_m_s } = motion;
         let before = std::mem::replace(&mut self.faults, faults);
@@ -171,7 +171,7 @@ impl Axis {
         }
     }
 
-    /// Gives the joint the play that it has without faults.
+    /// Gives the joint its play without faults.
     fn loosen_as_built(&mut self, AxisMotion { position_m, speed_m_s }: AxisMotion) {
         if self.play_m > 0.0 {
             self.coupling.loosen(self.play_m, self.mass_kg, position_m, speed_m_s);

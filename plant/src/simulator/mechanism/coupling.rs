@@ -1,4 +1,4 @@
-//! The joint between a drive and its axis: rigid, or loose by a play that the drive's side crosses.
+//! The joint between a drive and its axis: rigid, or loose with a play for the drive's side.
 
 use super::friction::{CONTACT, Element};
 
@@ -10,9 +10,9 @@ const DRIVE_DAMPING_N_S_PER_M: f64 = 20.0;
 /// The joint.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(super) enum Coupling {
-    /// The drive's side is that far beyond the joint, m.
+    /// Rigid: the distance of the drive's side beyond the joint, m.
     Rigid { beyond_m: f64 },
-    /// The drive's side moves by itself.
+    /// Loose: the drive's side moves by itself.
     Loose(DriveSide),
 }
 
@@ -21,7 +21,7 @@ pub(super) enum Coupling {
 pub(super) struct DriveSide {
     /// Half of the play, m; infinite where nothing connects the sides.
     half_m: f64,
-    /// Where the middle of the play is beyond the joint, m.
+    /// Distance of the middle of the play beyond the joint, m.
     beyond_m: f64,
     mass_kg: f64,
     position_m: f64,
@@ -39,7 +39,7 @@ struct Step {
 }
 
 impl Coupling {
-    /// Where the drive's side is while the joint is at a position, m.
+    /// Position of the drive's side for a position of the joint, m.
     pub(super) fn drive_m(&self, joint_m: f64) -> f64 {
         match self {
             Self::Rigid { beyond_m } => joint_m + beyond_m,
@@ -47,7 +47,7 @@ impl Coupling {
         }
     }
 
-    /// Gets loose, with that play.
+    /// Makes the joint loose, with that play.
     pub(super) fn loosen(&mut self, play_m: f64, axis_mass_kg: f64, joint_m: f64, joint_m_s: f64) {
         let half_m = play_m / 2.0;
         let (position_m, speed_m_s, beyond_m) = match *self {
@@ -71,7 +71,7 @@ impl Coupling {
         });
     }
 
-    /// Gets rigid where it is.
+    /// Makes the joint rigid in its present place.
     pub(super) fn tighten(&mut self, joint_m: f64) {
         *self = Self::Rigid { beyond_m: self.drive_m(joint_m) - joint_m };
     }
@@ -84,7 +84,8 @@ impl Coupling {
         }
     }
 
-    /// The force on the joint in a step in which the drive has a force. The joint is there in the middle of the step.
+    /// The force on the joint in a step with a force of the drive. The position of the joint is that of the middle of
+    /// the step.
     pub(super) fn push(&mut self, force_n: f64, joint_m: f64, joint_m_s: f64, step_s: f64) -> Element {
         match self {
             Self::Rigid { .. } => Element { force_n, damping_n_s_per_m: 0.0 },
@@ -92,7 +93,7 @@ impl Coupling {
         }
     }
 
-    /// Solves the drive's side, now that the joint's speed at the end of the step is known.
+    /// Solves the drive's side for the known speed of the joint at the end of the step.
     pub(super) fn solve_drive_side(&mut self, joint_m_s: f64) {
         if let Self::Loose(side) = self {
             side.acceleration_m_s2 = side.step.free_m_s2 + side.step.per_speed_per_s * joint_m_s;
@@ -111,8 +112,8 @@ impl Coupling {
 impl DriveSide {
     /// The speed v′ of the drive's side is a linear function of the joint's speed q̇′.
     ///
-    /// The drive's side obeys m (v′ − v)/h = F − b v′ − c. The force of the contact is c = k g + d (v′ − q̇′), where g is
-    /// by how much the gap is closed.
+    /// The drive's side obeys m (v′ − v)/h = F − b v′ − c. The force of the contact is c = k g + d (v′ − q̇′), with the
+    /// closing g of the gap.
     fn push(&mut self, drive_n: f64, joint_m: f64, joint_m_s: f64, step_s: f64) -> Element {
         let middle_m = self.position_m + 0.5 * step_s * self.speed_m_s;
         let (closed_m, damping) = self.contact(middle_m - joint_m - self.beyond_m, joint_m_s, step_s);
@@ -127,8 +128,8 @@ impl DriveSide {
         Element { force_n, damping_n_s_per_m }
     }
 
-    /// By how much the play is closed, and the contact's damping in the step. The first is positive if the drive
-    /// pushes upwards. Both are zero if the sides do not touch before the end of the step.
+    /// The closing of the play, and the contact's damping in the step. The closing is positive for a drive that pushes
+    /// upwards. Both are zero for sides that do not touch before the end of the step.
     fn contact(&self, ahead_m: f64, joint_m_s: f64, step_s: f64) -> (f64, f64) {
         let next_m = ahead_m + step_s * (self.speed_m_s - joint_m_s);
         if next_m.abs() <= self.half_m {

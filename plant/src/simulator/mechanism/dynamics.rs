@@ -1,17 +1,17 @@
 //! Forward dynamics of the mechanism in task space: forces of six actuators and gravity in, motion of
 //! the platform out.
 //!
-//! The state is the platform's pose and twist. Joint positions come from inverse kinematics and joint
-//! rates from the Jacobian. The forward kinematics is never solved here, so the mechanism is an
-//! independent oracle for it. With the [equations](masseter_model::dynamics) of the rigid bodies,
+//! The state is the platform's pose and twist. Joint positions come from inverse kinematics and joint rates from the
+//! Jacobian. This module never solves the forward kinematics, so the mechanism is an independent oracle for them. With
+//! the [equations](masseter_model::dynamics) of the rigid bodies,
 //!
 //! M V̇ = Jᵀ(τ − friction) + contact − h.
 //!
-//! A step is one of the leapfrog scheme (Störmer and Verlet): the acceleration of its middle holds for the whole step.
-//! The forces of the drives are held too, so that they act exactly. The scheme is of second order, and no energy drifts
-//! away or comes in. Terms of h that depend on the twist take it extrapolated from the last step.
+//! A step follows the leapfrog scheme (Störmer and Verlet): the acceleration of its middle holds for the whole step.
+//! The forces of the drives are constant over the step, and so act exactly. The scheme is of second order, and the
+//! energy does not drift. Terms of h that depend on the twist take the twist extrapolated from the last step.
 //!
-//! The parts are rigid: elasticity is left out. Inverse kinematics alone finds the poses at rest, by bisection.
+//! The parts are rigid, without elasticity. Inverse kinematics alone finds the poses at rest, by bisection.
 
 #[cfg(test)]
 mod tests;
@@ -98,7 +98,7 @@ impl Dynamics {
         })
     }
 
-    /// From now on faults make this of an axis.
+    /// Sets the effects of faults on an axis from now on.
     pub(crate) fn set_faults(&mut self, axis: usize, faults: AxisFaults) {
         let speed_m_s = self.velocities_m_s(&self.state)[axis];
         let motion = AxisMotion { position_m: self.state.positions_m()[axis], speed_m_s };
@@ -111,12 +111,12 @@ impl Dynamics {
         self.load.push(&self.state.pose, wrench, point_m.map(Vec3::from));
     }
 
-    /// Where the encoders see the axes, m: at the drives' side of each joint.
+    /// Positions of the axes at the encoders, m: the drives' side of each joint.
     pub(crate) fn drive_positions_m(&self) -> [f64; AXES] {
         self.axes.drive_positions_m(self.state.positions_m())
     }
 
-    /// Joint velocities in a state, m/s. They cost more than a step, so that only callers who need them pay.
+    /// Joint velocities in a state, m/s. Their computation costs more than a step, so it is not part of a step.
     pub(crate) fn velocities_m_s(&self, state: &MechanismState) -> [f64; AXES] {
         let legs = self.mechanism.legs(&state.pose).expect("a pose that was reached has joints");
         (Jacobian::of_legs(&self.mechanism, &legs).actuators * state.twist).into()
@@ -149,7 +149,7 @@ impl Dynamics {
         Ok(())
     }
 
-    /// Ends a step that began with these speeds of the axes: parts with a state get the new speeds and the loads.
+    /// Ends a step with these initial speeds of the axes: parts with a state get the new speeds and the loads.
     fn end_step(&mut self, motion: &Motion, speeds_m_s: &Vector6<f64>, forces: &AxesForces) {
         let step_s = self.step_s();
         let accelerations = motion.accelerations(&self.acceleration);
@@ -175,7 +175,7 @@ impl Dynamics {
         Ok(())
     }
 
-    /// The motion in the middle of the step that begins, there with the twist that the last step's acceleration leads to.
+    /// The motion in the middle of the beginning step, with the twist by the last step's acceleration.
     fn middle(&self) -> Result<Motion, DynamicsError> {
         let half_s = self.step_s() / 2.0;
         let twist = self.state.twist + self.acceleration * half_s;
@@ -271,8 +271,8 @@ impl Load {
     }
 }
 
-/// The platform with the mouth closed: on legs of that mean length, and shifted. The pose is taken as level, which is an approximation for a mechanism of unequal
-/// sides: the exact pose would take the forward kinematics.
+/// The platform with the mouth closed: on legs of that mean length, and shifted. The pose is level, an approximation
+/// for a mechanism of unequal sides, because the exact pose needs the forward kinematics.
 pub(crate) fn closed_mouth(mechanism: &Mechanism, leg_m: f64, offset_m: [f64; 3]) -> Pose {
     Translation3::from(offset_m) * level(mechanism, leg_m)
 }

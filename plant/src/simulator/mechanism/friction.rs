@@ -1,11 +1,11 @@
-//! Stiff forces on the axes, and friction: what brakes the axes, hinges and ball joints in a step.
+//! Stiff forces on the axes, and the friction of axes, hinges and ball joints in a step.
 //!
-//! The force of a step depends on the speed at the step's end, which is not known yet. An [`Element`] states the force as if
-//! the speed stayed, and its damping. The change of speed then acts against the damping like a mass: linearly implicit
-//! Euler (Baraff and Witkin, Large Steps in Cloth Simulation, SIGGRAPH 1998). No stiffness makes it grow.
+//! The force of a step depends on the unknown speed at the step's end. An [`Element`] has the force at constant speed,
+//! and its damping. The damping resists the change of speed like a mass: linearly implicit Euler (Baraff and Witkin,
+//! Large Steps in Cloth Simulation, SIGGRAPH 1998). The scheme is stable for every stiffness.
 //!
-//! The law of friction is [shared](masseter_model::dynamics::Friction). This module has the state of friction, which is
-//! the bristles of axes at rest, and its integration. The loads are those of the steps before.
+//! The law of friction is [shared](masseter_model::dynamics::Friction). This module has the state of friction (the
+//! bristles of axes at rest) and its integration. The loads are those of earlier steps.
 
 use std::ops::AddAssign;
 
@@ -17,7 +17,7 @@ use nalgebra::{Matrix6, Vector6};
 
 use crate::state::state;
 
-/// Time in which friction follows the loads, s. Without it, a guide that can lock itself would shake.
+/// Time in which friction follows the loads, s. Without this time, a self-locking guide shakes.
 const LOAD_TIME_S: f64 = 1e-3;
 
 /// Friction with its state.
@@ -59,8 +59,8 @@ impl Braking {
         self.law.coulomb_n(&self.loads)
     }
 
-    /// The force on an axis of this Coulomb friction in a step, at a speed (m/s), where its friction is a multiple of the
-    /// usual one.
+    /// The force on an axis with this Coulomb friction in a step, at a speed (m/s). `factor` multiplies the usual
+    /// friction.
     pub(super) fn on_axis(
         &self,
         axis: usize,
@@ -129,7 +129,7 @@ impl Braking {
 /// A force that is linear in the change of the axis' speed within a step.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Element {
-    /// Force while the speed stays as it is, N.
+    /// Force at constant speed, N.
     pub(super) force_n: f64,
     /// Force against a change of the speed, N per m/s.
     pub(super) damping_n_s_per_m: f64,

@@ -1,4 +1,4 @@
-//! What stops an axis: the hard stops at its ends, those of faults, and a guide that has seized.
+//! Stops of an axis: the hard stops at its ends, those of faults, and a seized guide.
 
 use super::friction::{CONTACT, Element, Spring};
 
@@ -19,7 +19,7 @@ impl Seizure {
 
     /// The force on the axis in a step.
     pub(super) fn hold(&mut self, position_m: f64, speed_m_s: f64, step_s: f64) -> Element {
-        // The spring slides along where it is stretched by more than the largest force takes.
+        // The spring slides along beyond the stretch of the largest force.
         let most_m = MOST_N / CONTACT.stiffness_n_per_m;
         let stretch_m = (position_m - self.held_at_m).clamp(-most_m, most_m);
         self.held_at_m = position_m - stretch_m;

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// The master judges a bad command as it judges that of any controller.
+/// The master judges a bad command like that of any controller.
 #[test]
 fn a_bad_command_stops_the_rig_by_the_path_that_refuses_it() {
     for (kind, size, cause, axis) in [

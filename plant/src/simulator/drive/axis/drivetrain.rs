@@ -1,7 +1,7 @@
 //! From the command of a step to the force on the axis: servo loops, motor, brake and gear.
 //!
-//! While a brake opens, the motor holds the axis already; while it closes, the motor has no current any more. Without
-//! faults the mechanism gets what the loops ask for.
+//! While a brake opens, the motor holds the axis already; while a brake closes, the motor has no current. Without
+//! faults the mechanism gets the force of the loops.
 
 use super::motion::{Motion, ServoCommand};
 use super::servo::{BRAKE_DAMPING_N_S_M, BRAKE_STIFFNESS_N_M, Servo, ServoLimits};
@@ -42,7 +42,7 @@ impl Drivetrain {
         [self.motor_n.value <= -threshold_n, self.motor_n.value >= threshold_n]
     }
 
-    /// The distance of the position that the drive counts from the shaft's, where its gear ratio is or was wrong.
+    /// The distance of the drive's counted position from the shaft's, by a present or past wrong gear ratio.
     pub(super) fn gear_error_m(&mut self, demand_m: Option<f64>, faults: &mut DriveFaults) -> f64 {
         let before_m = self.gear.missed_m;
         let error_m = self.gear.error_m(faults.size(DriveFault::Scale), demand_m);
@@ -52,8 +52,8 @@ impl Drivetrain {
         error_m
     }
 
-    /// A step with a measured position and its error: the force of motor and brake until the next one, N. The loops know
-    /// nothing of a fault; the current that the drive shows is the motor's.
+    /// A step with a measured position and its error. Returns the force of motor and brake until the next step, N. The
+    /// loops do not depend on faults; the drive shows the motor's current.
     pub(super) fn step(
         &mut self,
         now_ns: u64,
@@ -125,7 +125,7 @@ impl Brake {
     }
 }
 
-/// The way that the shaft missed so far.
+/// The missed way of the shaft so far.
 #[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Gear {
     missed_m: f64,
@@ -146,7 +146,7 @@ impl Gear {
     }
 }
 
-/// What the drive asks for in a step.
+/// The drive's request in a step.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Asked {
     /// The motor's force, or the brake's, N.
@@ -225,18 +225,18 @@ pub(crate) struct HeldMean {
 }
 
 impl HeldMean {
-    /// Zero from now on.
+    /// Sets zero from now on.
     pub(crate) fn new(now_ns: u64) -> Self {
         Self { value: 0.0, value_ns: 0.0, from_ns: now_ns, at_ns: now_ns }
     }
 
-    /// From now on the value is this one.
+    /// Sets the value from now on.
     pub(crate) fn hold(&mut self, value: f64, now_ns: u64) {
         self.value_ns += self.value * now_ns.saturating_sub(self.at_ns) as f64;
         (self.value, self.at_ns) = (value, now_ns);
     }
 
-    /// The mean since the last call; the present value where no time has passed.
+    /// The mean since the last call; the present value if no time has passed.
     pub(crate) fn take_mean(&mut self, now_ns: u64) -> f64 {
         self.hold(self.value, now_ns);
         let passed_ns = now_ns.saturating_sub(self.from_ns);

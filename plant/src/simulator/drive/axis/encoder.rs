@@ -1,7 +1,7 @@
-//! What a drive sees of its axis: the encoder's counts, where the dictionary's zero lies in them, and the switches (60FDh).
+//! The drive's inputs from its axis: the encoder's counts, the dictionary's zero in them, and the switches (60FDh).
 //!
-//! There are three zeros. The encoder counts from its own. An incremental drive counts from where it was switched on.
-//! The dictionary's positions count from the zero that homing has set.
+//! There are three zeros. The encoder counts from its own. An incremental drive counts from its place at switch-on. The
+//! dictionary's positions count from the zero of homing.
 //!
 //! The limit switches close 1 mm before the ends of the stroke and stay closed beyond. The home switch is closed from 1 mm
 //! below to 1 mm above the middle of the stroke. The mechanism's stops are 2 mm beyond the stroke.
@@ -24,12 +24,12 @@ pub(super) fn mark_between(from: i32, to: i32) -> Option<i32> {
     }
 }
 
-/// What an encoder makes of the position at which it is.
+/// The output of an encoder at a position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Look {
-    /// The position that it shows, m.
+    /// The shown position, m.
     pub(crate) shown_m: f64,
-    /// The same without its noise, m: from there to the shaft is the error that the brake does not know.
+    /// The shown position without its noise, m. The distance to the shaft is an error that does not affect the brake.
     pub(crate) seen_m: f64,
 }
 
@@ -132,7 +132,7 @@ impl Switches {
         switches
     }
 
-    /// The axis is at a position now.
+    /// Takes the present position of the axis.
     pub(super) fn look(&mut self, position_m: f64) {
         let [low_m, high_m] = self.stroke_m;
         self.limits = [position_m <= low_m + BEFORE_END_M, position_m >= high_m - BEFORE_END_M];

@@ -34,7 +34,7 @@ pub(crate) struct Axis {
     coordinates: Coordinates,
     switches: Switches,
     drivetrain: Drivetrain,
-    /// The motor's force that 6077h shows: at SYNC the mean since the last one, otherwise the present value; N.
+    /// The motor's force in 6077h, N: at SYNC the mean since the last SYNC, otherwise the present value.
     shown_n: f64,
     parameters: Parameters,
     demand: Demand,
@@ -78,7 +78,7 @@ impl Axis {
         }
     }
 
-    /// Goes into fault by itself; returns whether it was in none.
+    /// Goes into fault; returns whether the fault is new.
     pub(super) fn fail(&mut self, now_ns: u64) -> bool {
         let fails = !self.power.is_in_fault();
         self.enter(self.power.state.after_fault(), now_ns);
@@ -142,7 +142,7 @@ impl Axis {
         }
     }
 
-    /// Leaves "operation enabled": at once, or once the axis stands after a ramp.
+    /// Leaves "operation enabled" at once, or at rest after a ramp.
     fn leave(&mut self, next: DriveState, deceleration_m_s2: Option<f64>, now_ns: u64) {
         let Some(deceleration_m_s2) = deceleration_m_s2 else { return self.enter(next, now_ns) };
         if self.power.leaves_for.replace(next).is_none() {
@@ -151,7 +151,7 @@ impl Axis {
         }
     }
 
-    /// Reacts by 6007h when nobody controls the drive any more; returns whether that put it into fault.
+    /// Reacts by 6007h to the loss of control over the drive; returns whether the reaction is a fault.
     pub(super) fn abort_connection(&mut self, now_ns: u64) -> bool {
         let was_in_fault = self.power.is_in_fault();
         match self.parameters.abort_connection_option {
@@ -163,7 +163,7 @@ impl Axis {
         self.power.is_in_fault() && !was_in_fault
     }
 
-    /// The buffered cyclic targets take effect; a position beyond the velocity limit is approached further.
+    /// Applies the buffered cyclic targets. The axis approaches a position beyond the velocity limit further.
     pub(super) fn synchronise(&mut self, now_ns: u64, new: NewTargets, objects: &Objects) {
         let is_free = self.drivetrain.brake.free_from_ns(now_ns) == now_ns;
         if !self.power.is_operated() || !is_free || self.ignores(new) {
@@ -209,8 +209,8 @@ impl Axis {
         self.demand = Demand::Force { force_n };
     }
 
-    /// A step of the servo loops with the shaft at a position; returns the force until the next one, N, and whether the
-    /// following error became a fault. `look` says what the encoder makes of its own position.
+    /// A step of the servo loops with the shaft at a position. Returns the force until the next step, N, and whether
+    /// the following error has become a fault. `look` gives the encoder's output at its own position.
     pub(super) fn step(
         &mut self,
         now_ns: u64,
@@ -371,7 +371,7 @@ impl Axis {
         }
     }
 
-    /// Judges the position that the servo was told to follow.
+    /// Judges the error of the servo from its demanded position.
     fn supervise_following(&mut self, now_ns: u64, command: ServoCommand) -> bool {
         let Some(window_m) = self.parameters.following_window_m else { return false };
         let error_m = match command {
@@ -387,7 +387,7 @@ impl Axis {
     }
 
     /// Compares the last count with a second encoder at the joint; returns whether their distance has become a fault.
-    /// Brake instead of ramp: the loops do not know where the axis is.
+    /// The reaction is the brake instead of a ramp, because the true position is unknown.
     pub(super) fn compare_encoders(&mut self, now_ns: u64, joint_m: f64) -> bool {
         let Some(limit_m) = self.quirks.encoders_apart_m else { return false };
         let is_apart = (self.coordinates.counted_m() - joint_m).abs() > limit_m;
@@ -440,7 +440,7 @@ impl Axis {
         self.demand.slow_down(now_ns, self.drivetrain.servo.motion, deceleration_m_s2);
     }
 
-    /// The software position limits, which mean nothing before the homing of an incremental encoder.
+    /// The software position limits, which have no meaning before the homing of an incremental encoder.
     fn position_limits(&self) -> [i32; 2] {
         let is_referenced = self.coordinates.is_referenced;
         if is_referenced { self.parameters.position_limits } else { [i32::MIN, i32::MAX] }
@@ -454,8 +454,8 @@ impl Axis {
         ServoLimits { force_n: force_limit_n, velocity_m_s: velocity_limit_m_s, free_velocity_m_s, feed_n }
     }
 
-    /// In force control the axis may be no faster than it can stop before the software position limits, at the
-    /// profile deceleration (6084h).
+    /// Speed limit in force control: the axis can stop before the software position limits, at the profile deceleration
+    /// (6084h).
     fn free_velocity_m_s(&self) -> [f64; 2] {
         let Parameters { velocity_limit_m_s, profile, .. } = self.parameters;
         let ([lowest_m, highest_m], at_m) =
@@ -465,8 +465,8 @@ impl Axis {
         [-braking_m_s(at_m - lowest_m), braking_m_s(highest_m - at_m)]
     }
 
-    /// The positions that a mode of operation sees. Homing moves the software position limits and may leave the axis
-    /// outside of them: there it may stay or come nearer, but go no further.
+    /// The positions for a mode of operation. Homing moves the software position limits and may leave the axis outside:
+    /// the axis may then stay or come nearer, but go no further.
     fn position_view(&self, now_ns: u64) -> PositionView {
         let [lowest, highest] = self.position_limits();
         let here = self.coordinates.increments(self.demand.position_m(now_ns).unwrap_or(self.measured_m()));

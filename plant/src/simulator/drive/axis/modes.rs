@@ -22,10 +22,10 @@ use masseter_can::cia402::{Controlword, StatusBit, Statusword};
 use super::encoder::mark_between;
 use super::motion::{MotionCommand, PositionView};
 
-/// Further than any axis goes, increments: a search for a switch or a stop ends there alone.
+/// Way beyond any axis, increments: a search ends only at a switch or a stop.
 const FAR: i32 = 1 << 30;
 
-/// What ends a search.
+/// The end of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 enum Target {
     /// A reference mark.
@@ -36,11 +36,11 @@ enum Target {
     Stop,
 }
 
-/// A search as its method says.
+/// The search of a homing method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Search {
     target: Target,
-    /// Whether it begins towards larger positions.
+    /// Whether the search begins towards larger positions.
     is_positive: bool,
     /// Whether home is the next reference mark on the way back.
     then_mark: bool,
@@ -60,7 +60,7 @@ impl Search {
         Some(Self { target, is_positive, then_mark })
     }
 
-    /// A way as long as can be, from the present position.
+    /// The longest way from the present position.
     fn far(self, actual: i32, is_forwards: bool) -> MotionCommand {
         let way = if self.is_positive == is_forwards { FAR } else { -FAR };
         MotionCommand::MoveTo { target: actual.saturating_add(way) }
@@ -145,8 +145,8 @@ impl Homing {
         }
     }
 
-    /// A search for a mark goes as far as the software position limits allow. One for a switch or a stop ignores them: they
-    /// mean nothing before homing.
+    /// A search for a mark goes as far as the software position limits allow. A search for a switch or a stop ignores
+    /// the limits, which have no meaning before homing.
     fn start(&mut self, method: i8, counts: i32, limits: [bool; 2], view: PositionView) -> MotionCommand {
         let [lowest, highest] = view.allowed;
         let Some(search) = Search::of(method) else { return self.attain(counts) };
@@ -204,7 +204,7 @@ impl Homing {
         }
     }
 
-    /// Switch or stop is found at that count: home is there, or at the next mark on the way back.
+    /// Handles a switch or a stop found at that count: home is there, or at the next mark on the way back.
     fn leave(&mut self, search: Search, counts: i32, actual: i32, end: MotionCommand) -> MotionCommand {
         if search.then_mark {
             *self = Self::Searching;
@@ -261,7 +261,8 @@ impl Positioning {
         command
     }
 
-    /// Starts a set-point, or lets it wait. Where one waits already, the new one is refused: it is not acknowledged.
+    /// Starts a set-point, or lets the set-point wait. With a waiting set-point, the new one is refused without an
+    /// acknowledgement.
     fn take_setpoint(
         &mut self,
         word: Controlword,

@@ -1,7 +1,7 @@
 //! Motion of an axis: the values that its parts exchange, profiles, and the demand over time.
 //!
 //! A profile has piecewise constant acceleration: from any velocity to rest, at a target or as soon as the ramp allows.
-//! It is computed in closed form at every instant, so that no error accumulates. Jerk is not limited.
+//! The closed form holds at every instant, so that no error accumulates. Jerk is not limited.
 
 use super::parameters::MotionLimits;
 use crate::simulator::drive::dictionary::Objects;
@@ -39,7 +39,7 @@ pub(crate) enum Mode {
 }
 
 impl Mode {
-    /// The mode of that number; `None` where the drive has no such mode.
+    /// The mode of that number; `None` for an unknown mode.
     pub(crate) fn from_number(number: i8) -> Option<Self> {
         let modes = [Self::ProfilePosition, Self::Homing, Self::CyclicPosition, Self::CyclicTorque];
         modes.into_iter().find(|mode| mode.number() == number)
@@ -90,7 +90,7 @@ pub(super) enum MotionCommand {
     MoveTo { target: i32 },
     /// Slow down to rest.
     SlowDown,
-    /// Come to rest at once where the axis is: it stands at a stop.
+    /// Come to rest at once in place: the axis stands at a stop.
     Hold,
     /// Make that count of the encoder the home position.
     SetHome { counts: i32 },
@@ -108,8 +108,8 @@ struct Phase {
 pub(super) struct Profile {
     from_ns: u64,
     start: Motion,
-    /// Stop (only if the axis moves away from the target or cannot stop before it), speed up or slow down to the limit,
-    /// cruise, slow down.
+    /// Stop, speed up or slow down to the limit, cruise, slow down. The stop is only for an axis that moves away from
+    /// the target or cannot stop before the target.
     phases: [Phase; 4],
     end_m: f64,
 }
@@ -164,8 +164,8 @@ impl Profile {
     }
 }
 
-/// Speed up, cruise and slow down over a way that is long enough to stop on from the initial velocity,
-/// which points along it.
+/// Speed up, cruise and slow down. The way is long enough for a stop from the initial velocity, which points along the
+/// way.
 fn trapezoid(way_m: f64, velocity_m_s: f64, limits: &MotionLimits) -> [Phase; 3] {
     let direction = if way_m < 0.0 { -1.0 } else { 1.0 };
     let (way_m, begin_m_s) = (way_m.abs(), velocity_m_s.abs());
@@ -242,8 +242,8 @@ impl Demand {
         self.at(now_ns).map(|motion| motion.position_m)
     }
 
-    /// Interpolates to a target over the coming period, from the end of the present demand or from `actual_m`.
-    /// The way is limited by the velocity limit; returns whether it was.
+    /// Interpolates to a target over the coming period, from the end of the present demand or from `actual_m`. Limits
+    /// the way by the velocity limit, and returns whether.
     pub(super) fn interpolate(
         &mut self,
         now_ns: u64,
@@ -263,9 +263,9 @@ impl Demand {
         is_limited
     }
 
-    /// Slows down from the demanded position (the actual one under a force) and the actual velocity. The demanded
-    /// velocity is no guide: it is zero at the end of a line, which is when SYNC brings the command. A closed
-    /// brake stays closed.
+    /// Slows down from the demanded position (the actual position under a force) and the actual velocity. The demanded
+    /// velocity is no guide: at SYNC, the time of the command, it is zero at the end of a line. A closed brake stays
+    /// closed.
     pub(super) fn slow_down(&mut self, now_ns: u64, actual: Motion, deceleration_m_s2: f64) {
         if *self != Self::Brake {
             let position_m = self.position_m(now_ns).unwrap_or(actual.position_m);

@@ -1,6 +1,6 @@
 //! The configuration of an axis in the object dictionary, read in SI units and written at power-on.
 //!
-//! Nothing here is checked: the dictionary accepts only values that the axis can use.
+//! This module checks nothing: the dictionary accepts only values that the axis can use.
 
 use masseter_can::cia402::interpolation_period;
 
@@ -45,7 +45,7 @@ impl Offsets {
 /// Seconds in a minute.
 const MINUTE_S: f64 = 60.0;
 
-/// The drive's unit of acceleration, m/s², from its own words (60AAh, 608Fh).
+/// The drive's unit of acceleration, m/s², by its own objects (60AAh, 608Fh).
 fn acceleration_unit_m_s2(objects: &Objects, drive: &Ratings) -> f64 {
     let increments_s2 = match objects.get(names::ACCELERATION_UNIT) {
         RPM_PER_S => f64::from(objects.get(names::INCREMENTS_PER_TURN)) / MINUTE_S,
@@ -63,8 +63,8 @@ pub(super) struct Parameters {
     pub(super) velocity_limit_m_s: f64,
     /// Force limit of every mode (6072h and the drive's own), N.
     pub(super) force_limit_n: f64,
-    /// Software position limits as positions of the application: 607D counts from the home position, so that it is
-    /// less the home offset (607Ch); increments.
+    /// Software position limits as positions of the application, increments. 607D counts from the home position, so the
+    /// limits are 607D less the home offset (607Ch).
     pub(super) position_limits: [i32; 2],
     /// Following error window (6065h), m; none without supervision.
     pub(super) following_window_m: Option<f64>,
@@ -256,7 +256,7 @@ mod tests {
         assert_eq!((parameters.homing_method, parameters.home_position), (34, -100));
     }
 
-    /// However high the dictionary's limits are.
+    /// The test covers all limits of the dictionary.
     #[test]
     fn no_parameter_exceeds_the_abilities_of_the_drive() {
         let (mut objects, drive) = objects();

@@ -1,4 +1,4 @@
-//! The power stage of an axis: its state, and what keeps it from another one.
+//! The power stage of an axis: its state, and the conditions for a change of state.
 
 use masseter_can::cia402::{DriveState, StateCommand};
 
@@ -86,7 +86,7 @@ impl PowerStage {
         }
     }
 
-    /// The state into which a fault forces it that takes the torque off: "switch on disabled", or fault.
+    /// The state forced by an injected fault without torque: "switch on disabled", or fault.
     pub(super) fn without_torque(self, faults: &mut DriveFaults) -> Option<DriveState> {
         use DriveState::{
             Fault, FaultReactionActive, OperationEnabled, QuickStopActive, ReadyToSwitchOn, SwitchOnDisabled,

@@ -1,5 +1,5 @@
-//! The servo loops of a drive: P position loop with velocity feed-forward, PI velocity loop, force
-//! limit; force control within a range of velocities; and the holding brake.
+//! The servo loops of a drive: P position loop with velocity feed-forward, PI velocity loop, force limit. Also force
+//! control within a range of velocities, and the holding brake.
 //!
 //! The loops depend on neither CANopen nor time: the caller gives the command of every step. The monitor of the
 //! following error (6065h, 6066h) only judges; the reaction is the axis' matter.
@@ -13,7 +13,7 @@ const VELOCITY_FILTER_S: f64 = 5e-4;
 pub(super) const BRAKE_STIFFNESS_N_M: f64 = 2e5;
 pub(super) const BRAKE_DAMPING_N_S_M: f64 = 400.0;
 
-/// Limits of a step, and what is added to its loops.
+/// Limits of a step, and the addend to its loops.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ServoLimits {
     /// Largest force, N.
@@ -33,7 +33,7 @@ pub(super) struct Servo {
     step_s: f64,
     /// The last measured position with the filtered velocity.
     pub(super) motion: Motion,
-    /// The same of the shaft itself, which the brake holds: it differs where the encoder is wrong.
+    /// The same of the shaft itself, which the brake holds. The two differ by the encoder's error.
     pub(super) shaft: Motion,
     integral_n: f64,
     brake_at_m: Option<f64>,
@@ -55,7 +55,7 @@ impl Servo {
         }
     }
 
-    /// The brake holds nothing: it closes anew where the shaft is then.
+    /// Releases the brake, which later closes at the shaft's new place.
     pub(super) fn release_brake(&mut self) {
         (self.brake_at_m, self.integral_n) = (None, 0.0);
     }

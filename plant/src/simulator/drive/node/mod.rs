@@ -1,7 +1,7 @@
 //! The drive as a CANopen node (CiA 301).
 //!
-//! [`DriveNode`] sequences its parts: network management, process data, heartbeats, errors and the SDO server each keep
-//! their own state and return what is to be done. The profile (CiA 402) is the [axis](super::axis).
+//! [`DriveNode`] sequences its parts: network management, process data, heartbeats, errors and the SDO server. Each
+//! part keeps its own state and returns the due actions. The profile (CiA 402) is the [axis](super::axis).
 
 mod pdo;
 mod sdo;
@@ -26,10 +26,10 @@ use pdo::{Effects, Outbox, ProcessData, Rpdo, Tpdo};
 use sdo::{DictionaryAccess, SdoServer, Storage};
 use state::{BOOT_NS, Consumer, Errors, Nmt, Producer, clear_history};
 
-/// The emergency of which a storm consists: one of the device, without an error that would last (CiA 301: FFxxh).
+/// The emergency of a storm: a device emergency without a lasting error (CiA 301: FFxxh).
 const STORM: EmergencyCode = EmergencyCode(0xFF00);
 
-/// For so long a heartbeat waits for the process data that answer SYNC, so that it never comes just before them, ns.
+/// Longest wait of a heartbeat for the process data in answer to SYNC, ns: a heartbeat never comes just before them.
 const HEARTBEAT_WAIT_NS: u64 = MILLISECOND_NS;
 
 /// One drive.
@@ -39,9 +39,9 @@ pub(crate) struct DriveNode {
     pub(super) objects: Objects,
     overlay: Overlay,
     quirks: NodeQuirks,
-    /// The fault that the drive has once it has started (603Fh).
+    /// The fault after the start (603Fh).
     due_fault: Option<u16>,
-    /// When the drive restarts by itself, ns.
+    /// Time of a restart by itself, ns.
     restarts_at_ns: Option<u64>,
     storage: Storage,
     pub(crate) axis: Axis,
@@ -56,7 +56,7 @@ pub(crate) struct DriveNode {
     outbox: Outbox,
     /// Whether the supply is off.
     is_off: bool,
-    /// The time between two messages of the storm of emergencies that acts, and when the next one is due, ns.
+    /// Interval of the present storm of emergencies, and due time of the next, ns.
     storm_every_s: Option<f64>,
     next_storm_ns: u64,
 }
@@ -102,7 +102,7 @@ impl DriveNode {
         })
     }
 
-    /// What the drive keeps without supply, if that has changed since the last call.
+    /// The non-volatile memory, if changed since the last call.
     pub(crate) fn changed_memory(&mut self) -> Option<DriveMemory> {
         let has_changed = std::mem::take(&mut self.storage.has_changed);
         has_changed.then(|| DriveMemory::of(&self.storage.stored, &self.storage.factory))
@@ -137,9 +137,9 @@ impl DriveNode {
         }
     }
 
-    /// Takes a SYNC that arrived at `now_ns` with the shaft at `position_m`: buffered process data take effect, actual
-    /// values are sampled and sent. `look` says what the encoder makes of its own position. A heartbeat
-    /// that is due follows them.
+    /// Takes a SYNC that arrives at `now_ns` with the shaft at `position_m`. Buffered process data take effect, and the
+    /// drive samples and sends actual values. `look` gives the encoder's output at its own position. A due heartbeat
+    /// follows.
     pub(crate) fn take_sync(
         &mut self,
         now_ns: u64,
@@ -171,8 +171,8 @@ impl DriveNode {
         }
     }
 
-    /// A step of the servo loops with the shaft at `position_m`: the force until the next one, N. `look` says what the
-    /// encoder makes of its own position.
+    /// A step of the servo loops with the shaft at `position_m`; returns the force until the next step, N. `look` gives
+    /// the encoder's output at its own position.
     pub(crate) fn step(&mut self, now_ns: u64, position_m: f64, look: impl FnOnce(f64) -> Look) -> f64 {
         self.follow_supply(now_ns);
         if self.restarts_at_ns.take_if(|at_ns| now_ns >= *at_ns).is_some() {
@@ -267,8 +267,8 @@ impl DriveNode {
         }
     }
 
-    /// Takes the error state of the drive's CAN controller. In bus-off the communication has failed, which an emergency
-    /// reports once the bus is back.
+    /// Takes the error state of the drive's CAN controller. Bus-off is a failure of the communication; an emergency
+    /// reports the failure after the return of the bus.
     pub(crate) fn set_error_state(&mut self, now_ns: u64, state: ErrorState) {
         if self.is_off || state == self.error_state {
             return;
@@ -303,7 +303,7 @@ impl DriveNode {
             NmtCommand::Stop => self.leave_operational(NmtState::Stopped, now_ns),
             NmtCommand::EnterPreOperational => self.leave_operational(NmtState::PreOperational, now_ns),
             NmtCommand::ResetCommunication => {
-                // While the node boots it receives nothing, so that nobody controls the axis.
+                // A booting node receives nothing, so nobody controls the axis.
                 self.abort_connection(now_ns);
                 self.reset_communication(now_ns);
             }
@@ -378,8 +378,8 @@ impl DriveNode {
         }
     }
 
-    /// A lost heartbeat is a failure of the communication. An RPDO whose event timer ran out leaves nobody to control
-    /// the axis either.
+    /// A lost heartbeat is a failure of the communication. After the event timer of an RPDO nobody controls the axis
+    /// either.
     fn supervise_connection(&mut self, now_ns: u64) {
         if self.consumer.loses(now_ns) {
             self.raise(EmergencyCode::HEARTBEAT);
@@ -403,7 +403,7 @@ impl DriveNode {
         }
     }
 
-    /// Reacts by 6007h when nobody controls the axis any more. A fault outlasts its cause.
+    /// Reacts by 6007h to the loss of control over the axis. A fault outlasts its cause.
     fn abort_connection(&mut self, now_ns: u64) {
         if self.axis.abort_connection(now_ns) {
             self.raise(EmergencyCode::COMMUNICATION);
@@ -431,7 +431,7 @@ impl DriveNode {
         }
     }
 
-    /// The effect of an object that was written by SDO.
+    /// Applies the effect of an object written by SDO.
     fn apply_written(&mut self, object: ObjectAddress, now_ns: u64) {
         let number = usize::from(object.index & 0xFF);
         match object.index {

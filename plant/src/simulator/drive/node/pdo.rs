@@ -1,8 +1,8 @@
-//! The drive's process data: PDOs as its object dictionary configures them, and the cyclic targets that wait for SYNC.
+//! The drive's process data: PDOs by the object dictionary, and the cyclic targets that wait for SYNC.
 //!
-//! This module copies between frames and the object dictionary. It moves nothing and raises no emergency; it reports
-//! [`Effects`] and errors. PDOs are compiled into copies of bytes whenever a parameter changes; the
-//! rules of [SDO](super::sdo) decide which changes are allowed. Remote requests are not answered.
+//! This module copies between frames and the object dictionary, and reports [`Effects`] and errors. It moves nothing,
+//! raises no emergency and answers no remote requests. A change of a parameter compiles the PDOs into copies of bytes;
+//! the rules of [SDO](super::sdo) decide the allowed changes.
 
 use std::cmp::Ordering;
 use std::collections::VecDeque;
@@ -77,7 +77,7 @@ impl ProcessData {
 
 /// The lowest transmission type that SYNC does not trigger.
 pub(super) const EVENT_DRIVEN: u8 = 254;
-/// Bytes that a PDO of the drive carries at most, whatever the format of its frames.
+/// Most bytes of a PDO of the drive, for every format of its frames.
 pub(super) const MAX_BYTES: usize = Frame::MAX_DATA;
 
 /// A mapped object: its place in the dictionary and its length.
@@ -147,8 +147,8 @@ impl Mapped {
     }
 }
 
-/// The errors of a receive PDO: shorter than its mapping, so that its data are discarded; longer than its mapping, so that
-/// the bytes beyond are discarded; its event timer ran out.
+/// The errors of a receive PDO. A PDO shorter than its mapping loses its data; a longer PDO loses the bytes beyond. The
+/// third error is the end of the event timer.
 pub(crate) const ERRORS: [EmergencyCode; 3] =
     [EmergencyCode::PDO_LENGTH, EmergencyCode::PDO_LENGTH_EXCEEDED, EmergencyCode::RPDO_TIMEOUT];
 const SHORT: usize = 0;
@@ -191,7 +191,7 @@ impl Effects {
                 0x6040 => effects.commands = true,
                 0x6071 => effects.targets.torque = true,
                 0x607A => effects.targets.position = true,
-                // They take effect with the next target, so that an old target moves nothing.
+                // Offsets take effect with the next target, so that an old target moves nothing.
                 0x60B0..=0x60B2 => {}
                 0x6000.. => effects.configures = true,
                 _ => {}
@@ -260,8 +260,8 @@ impl Rpdo {
 
 /// Unit of an inhibit time, ns.
 const INHIBIT_UNIT_NS: u64 = MILLISECOND_NS / 10;
-/// Objects that change with every sample. As in most drives their change is no event, since noise alone would fill the
-/// bus; the event timer (1800h:5) sends them.
+/// Objects that change with every sample. As in most drives their change is no event, because noise alone fills the
+/// bus. The event timer (1800h:5) sends these objects.
 const SAMPLED: [u16; 6] = [0x6062, 0x6063, 0x6064, 0x606C, 0x6077, 0x60F4];
 
 /// The condition for sending a TPDO.

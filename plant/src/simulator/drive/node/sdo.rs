@@ -1,8 +1,8 @@
 //! The drive's SDO server: one transfer at a time, expedited or in segments.
 //!
-//! The server only keeps the order of a transfer; [`DictionaryAccess`] reads and writes the entries by the rules of the
-//! standard: values without a range, parameters in use, and the procedure of CiA 301 for changing a PDO. A write only
-//! changes the dictionary. The node applies its effect on the drive, from [`DictionaryAccess::written`].
+//! The server keeps the order of a transfer. [`DictionaryAccess`] reads and writes the entries by the rules of the
+//! standard. They cover values without a range, parameters in use, and the procedure of CiA 301 for a change of a PDO.
+//! A write only changes the dictionary. The node applies the effect on the drive, from [`DictionaryAccess::written`].
 
 use arrayvec::ArrayVec;
 use masseter_can::canopen::{
@@ -19,12 +19,12 @@ use crate::simulator::drive::table::{
     Access, CONSUMED, DataType, Initial, MAPPED_MAX, Mapping, MappingEntry,
 };
 
-/// Silence of a client in the middle of a transfer that ends it, ns.
+/// Silence of a client that ends a transfer, ns.
 const TIMEOUT_NS: u64 = 1_000_000_000;
 /// The longest value that can be written.
 const WRITABLE_BYTES: usize = 4;
 
-/// What is left of a transfer.
+/// The rest of a transfer.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 enum Progress {
     Upload { sent: usize },
@@ -55,7 +55,7 @@ impl Transfer {
     }
 }
 
-/// The answer to a request, with the transfer that goes on after it.
+/// The answer to a request, with the rest of the transfer.
 type Answer = Result<(SdoResponse, Option<Transfer>), AbortCode>;
 
 /// The server's memory.
@@ -100,7 +100,7 @@ impl SdoServer {
         Some(response)
     }
 
-    /// Aborts a transfer whose client has fallen silent; returns the abort message.
+    /// Aborts a transfer after the silence of its client; returns the abort message.
     pub(super) fn expire(&mut self, now_ns: u64) -> Option<SdoResponse> {
         let is_late = |transfer: &mut Transfer| now_ns.saturating_sub(transfer.heard_ns) > TIMEOUT_NS;
         let transfer = self.transfer.take_if(is_late)?;
@@ -280,7 +280,7 @@ const LOAD: u32 = u32::from_le_bytes(*b"load");
 /// Bits that a PDO carries at most.
 const PDO_BITS: usize = 64;
 
-/// An error unless something is allowed.
+/// An error unless the condition holds.
 fn allow(is_allowed: bool, code: AbortCode) -> Result<(), AbortCode> {
     if is_allowed { Ok(()) } else { Err(code) }
 }
@@ -366,7 +366,7 @@ const COMMANDS: [u16; 9] = [0x1003, 0x1010, 0x1011, 0x6040, 0x6071, 0x607A, 0x60
 const BUSY: u32 = 0;
 const SAVES_ON_COMMAND: u32 = 1;
 
-/// Dictionaries that outlast a reset.
+/// Dictionaries that survive a reset.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Storage {
     /// The values that a reset restores.

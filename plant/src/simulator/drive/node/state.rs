@@ -1,7 +1,7 @@
 //! The state of the node: network management with its boot-up, heartbeats (1016h, 1017h), and errors.
 //!
-//! Errors are the present ones, error register (1001h), history (1003h), error code (603Fh) and EMCY contents. The module
-//! only decides what is due; the node sends and reacts.
+//! Errors are the present ones, error register (1001h), history (1003h), error code (603Fh) and EMCY contents. The
+//! module decides the due actions; the node sends and reacts.
 
 use arrayvec::ArrayVec;
 use masseter_can::canopen::{Emergency, EmergencyCode, NmtState, NodeId};
@@ -61,7 +61,7 @@ pub(super) struct Producer {
 }
 
 impl Producer {
-    /// The first heartbeat is due at `first_ns`.
+    /// The heartbeat with its first due time `first_ns`.
     pub(super) fn new(objects: &Objects, first_ns: u64) -> Self {
         Self {
             interval_ns: u64::from(objects.get(names::PRODUCER_HEARTBEAT_TIME_MS)) * MILLISECOND_NS,
@@ -121,7 +121,7 @@ impl Consumer {
         Self { entries }
     }
 
-    /// A heartbeat arrived: supervision begins with the first one, and again after a loss.
+    /// Takes a heartbeat: supervision begins with the first heartbeat, and again after a loss.
     pub(super) fn hear(&mut self, now_ns: u64, node: NodeId) {
         for entry in &mut self.entries {
             if entry.node == Some(node) {
@@ -160,8 +160,8 @@ const TEMPERATURE: u8 = 0x08;
 /// The number of errors that the drive can report: room for each of them once.
 const COUNT: usize = 11;
 
-/// The errors that put the drive into fault and last until a reset. The axis was outside the following window for
-/// longer than the time out. Nobody controls the drive, and 6007h makes that a fault. The logic supply is too low.
+/// The errors that put the drive into fault and last until a reset. These are a following error beyond window and time
+/// out, a loss of control (6007h), and a logic supply that is too low.
 const FAULTS: [EmergencyCode; 3] =
     [EmergencyCode::FOLLOWING_ERROR, EmergencyCode::COMMUNICATION, EmergencyCode::LOGIC_SUPPLY];
 
@@ -184,7 +184,7 @@ impl Errors {
         FAULTS.into_iter().chain(self.at_power_on)
     }
 
-    /// An error appears; returns its emergency message, unless the error was present already.
+    /// Adds an error; returns its emergency message, unless the error is already present.
     pub(super) fn raise(&mut self, error: EmergencyCode, objects: &mut Objects) -> Option<Emergency> {
         if self.present.contains(&error) {
             return None;
@@ -194,7 +194,7 @@ impl Errors {
         Some(self.emergency(error, objects))
     }
 
-    /// An error disappears; returns the emergency message, if the error was present.
+    /// Removes an error; returns the emergency message, if the error is present.
     pub(super) fn clear(&mut self, error: EmergencyCode, objects: &mut Objects) -> Option<Emergency> {
         let place = self.present.iter().position(|present| *present == error)?;
         self.present.remove(place);

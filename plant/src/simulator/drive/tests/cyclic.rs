@@ -1,4 +1,4 @@
-//! What must not happen between the modes, their targets and SYNC: nothing of before moves an axis.
+//! Modes, their targets and SYNC: no earlier target moves an axis.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! What a drive keeps without supply.
+//! The non-volatile memory of a drive.
 
 use super::*;
 

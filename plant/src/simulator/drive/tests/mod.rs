@@ -57,7 +57,7 @@ pub(crate) fn id(number: u8) -> NodeId {
     NodeId::new(number).unwrap()
 }
 
-/// What the drive of a leg can do.
+/// The abilities of a leg's drive.
 pub(crate) const LEG: Ratings = Ratings {
     rated_force_n: 500.0,
     max_force_n: 1000.0,
@@ -72,7 +72,7 @@ pub(crate) const LEG: Ratings = Ratings {
     encoder_noise_m: 0.2e-6,
 };
 
-/// What an encoder without noise or fault makes of its position.
+/// The output of an encoder without noise and fault.
 pub(crate) fn exact(at_m: f64) -> Look {
     Look { shown_m: at_m, seen_m: at_m }
 }
@@ -199,7 +199,7 @@ impl Bench {
         self.receive(Heartbeat { state: NmtState::Operational }.frame(id(127)));
     }
 
-    /// What the SDO server answers.
+    /// The answer of the SDO server.
     pub(crate) fn ask(&mut self, request: SdoRequest) -> Option<SdoResponse> {
         let before = self.sent.len();
         self.receive(request.frame(id(4)));

@@ -49,7 +49,7 @@ fn targets_beyond_the_software_limits_end_there_and_are_reported() {
     assert!(bench.is_near(START + 1000));
 }
 
-/// A master that was late, or whose process data got lost, may leave a target further off than a period allows.
+/// After late or lost process data of the master, a target may be further off than a period allows.
 #[test]
 fn a_target_too_far_for_one_period_is_reached_over_the_next_syncs() {
     let mut bench = Bench::operational();

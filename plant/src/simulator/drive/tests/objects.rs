@@ -1,10 +1,10 @@
-//! The object dictionary as a client sees it.
+//! The object dictionary for a client.
 
 use super::*;
 use crate::simulator::drive::dictionary::ENTRIES;
 use crate::simulator::drive::table::{Access, DataType};
 
-/// What is tried, where, with which data, and the answer.
+/// The access, its object, its data, and the answer.
 type Refusal<'a> = (&'a str, (u16, u8), &'a [u8], AbortCode);
 
 /// Every abort code that an expedited transfer can meet, with a request that meets it.

@@ -1,4 +1,4 @@
-//! Each quirk as a client meets it. What a drive without quirks does, the other files say.
+//! Each quirk for a client. The other files cover a drive without quirks.
 
 use masseter_can::canopen::{
     AbortCode, EmergencyCode, NmtCommand, NmtState, ObjectAddress, SdoRequest, SdoResponse,
@@ -21,7 +21,7 @@ fn settings(quirks: &str) -> DriveSettings {
     leg
 }
 
-/// The drive of l1 is what the tests of the drive take for one.
+/// The drive of l1 equals the drive of the drive's own tests.
 #[test]
 fn the_settings_without_quirks_are_those_of_the_drives_own_tests() {
     use crate::simulator::drive::tests;

@@ -1,9 +1,9 @@
-//! Food between teeth: a piece that is bitten, gives way, is chewed to a thinner one, and is swallowed.
+//! Food between teeth: a piece gives way to a bite, gets thinner with every chew, and is swallowed.
 //!
-//! Each of its teeth presses on an equal share of the piece: a column, which the tooth compresses by itself. A chew
-//! closes the teeth to less than half of the piece's thickness, and opens them again. The tongue then collects the
-//! food: in the next bite the piece has `left_by_chew` of its thickness. Below `swallowed_m` the food is swallowed,
-//! and a fresh piece follows once the mouth is open wide enough.
+//! Each of its teeth compresses a column, an equal share of the piece, independently. A chew closes the teeth to less
+//! than half of the piece's thickness, and opens them again. The tongue then collects the food: in the next bite the
+//! piece has `left_by_chew` of its thickness. Below `swallowed_m` the food is swallowed, and a fresh piece follows once
+//! the mouth is open wide enough.
 
 #[cfg(test)]
 mod tests;
@@ -15,18 +15,18 @@ use masseter_model::geometry::Vec3;
 
 use super::teeth::{Friction, Grip, MOST_PAIRS, Touch, contact_force_n};
 
-/// How a food gives way.
+/// The material of a food.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) enum Material {
-    /// It flows at its strength, and stays flat until it is collected again.
+    /// The food flows at its strength, and stays flat until its collection.
     Yielding,
-    /// It breaks at its strength. Its fragments flow at a share of the strength.
+    /// The food breaks at its strength. Its fragments flow at a share of the strength.
     Brittle,
-    /// A spring beside a spring with a damper. It regains its shape.
+    /// A spring beside a spring with a damper. The food regains its shape.
     Viscoelastic,
 }
 
-/// What a piece of food consists of.
+/// The properties of a piece of food.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Foodstuff {
     /// The lower teeth that it lies on, by their FDI numbers. They carry it in equal shares.
@@ -52,7 +52,7 @@ pub(crate) struct Foodstuff {
     pub(crate) friction: f64,
 }
 
-/// A piece of food that broke between the teeth.
+/// A break of a piece of food between the teeth.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct FoodBreak {
     /// FDI number of the first of the teeth on which the piece lay.
@@ -108,7 +108,7 @@ impl Food {
         }
     }
 
-    /// Bites: adds the forces on the lower teeth (N, base axes) to those of their pairs. Tells where the piece breaks.
+    /// Bites: adds the forces on the lower teeth (N, base axes) to those of their pairs. Reports a break of the piece.
     pub(super) fn bite(&mut self, touches: &[Touch], forces_n: &mut [Vec3]) -> Option<FoodBreak> {
         self.collect(touches);
         let mut elastic_n = 0.0;
@@ -126,7 +126,7 @@ impl Food {
         broke
     }
 
-    /// Collects the food where the mouth is open wide enough.
+    /// Collects the food if the mouth is open wide enough.
     fn collect(&mut self, touches: &[Touch]) {
         let is_open =
             |thickness_m: f64| self.columns.iter().all(|column| touches[column.pair].gap_m >= thickness_m);
@@ -155,7 +155,7 @@ impl Food {
         Some(FoodBreak { tooth, force_n: elastic_n, strength_n })
     }
 
-    /// Flattens what would bear more than the strength of a material that flows.
+    /// Flattens columns beyond the strength of a material that flows.
     fn give_way(&mut self, touches: &[Touch]) {
         let Foodstuff { material, strength_n, .. } = *self.config;
         let is_whole_and_brittle = material == Material::Brittle && !self.is_broken;
@@ -194,8 +194,9 @@ impl Food {
         }
     }
 
-    /// Elastic force of a column by its compression, N/m: that of the whole piece is stiffness · t · (compression / t)ⁿ, t being
-    /// the thickness of a fresh one. So a thinner piece bears less until the teeth meet, as in the course of chewing.
+    /// Elastic force of a column divided by its compression, N/m. The force of the whole piece is stiffness · t ·
+    /// (compression / t)ⁿ, with the thickness t of a fresh piece. So a thinner piece carries less until the teeth meet,
+    /// as in the course of chewing.
     fn stiffness_n_per_m(&self, compression_m: f64) -> f64 {
         let Foodstuff { thickness_m, stiffness_n_per_m, exponent, .. } = *self.config;
         let stiffness_n_per_m = self.share() * stiffness_n_per_m / self.columns.len() as f64;
@@ -209,14 +210,14 @@ impl Food {
         thickness_m * (elastic_n / whole_n).powf(1.0 / exponent)
     }
 
-    /// Share of stiffness and strength that the piece has.
+    /// Present share of stiffness and strength of the piece.
     fn share(&self) -> f64 {
         if self.is_broken { self.config.residual } else { 1.0 }
     }
 }
 
 impl Column {
-    /// Compresses it in a step that takes a share of the time in which its spring relaxes.
+    /// Compresses the column in a step. `relaxation` is the step as a share of the spring's time of relaxation.
     fn compress(&mut self, compression_m: f64, relaxation: f64) {
         let more_m = compression_m - std::mem::replace(&mut self.compression_m, compression_m);
         let relaxed_m = (self.relaxing_m + more_m) / (1.0 + relaxation);

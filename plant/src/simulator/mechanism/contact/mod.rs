@@ -19,7 +19,7 @@ use crate::error::ContactError;
 use food::{Food, FoodBreak};
 use teeth::{Enamel, MOST_PAIRS, Pair, Tooth};
 
-/// What acts between the jaws.
+/// The contact between the jaws.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Occlusion {
     /// By the numbers of their teeth; none where the jaws never touch.
@@ -34,7 +34,7 @@ pub(crate) struct Occlusion {
     steps: u32,
     /// The break of a piece of food since the last look.
     pub(crate) broke: Option<FoodBreak>,
-    /// How fast contact and all foods of the scenario at most press on the platform in the closed mouth, against its twist.
+    /// Largest stiffness of contact and all foods of the scenario against the platform's twist in the closed mouth.
     stiffness: Matrix6<f64>,
 }
 
@@ -55,8 +55,8 @@ impl Occlusion {
         Self { pairs, enamel, food: None, forces_n: zero, sums_n: zero, steps: 0, broke: None, stiffness }
     }
 
-    /// Refuses a step (ns) that does not resolve the contact for a platform of this mass matrix: longer than a radian of the
-    /// fastest oscillation. Damped by its own end, a step is stable up to 1.15 radians.
+    /// Refuses a step (ns) longer than a radian of the fastest oscillation of a platform with this mass matrix on its
+    /// contacts. With the damping of its own end, a step is stable up to 1.15 radians.
     pub(crate) fn check_step(&self, mass: &Matrix6<f64>, step_ns: u64) -> Result<(), ContactError> {
         let Some(cholesky) = mass.cholesky().filter(|_| !self.pairs.is_empty()) else { return Ok(()) };
         let half = cholesky.l().solve_lower_triangular(&self.stiffness).unwrap_or_default();
@@ -108,7 +108,7 @@ impl Occlusion {
         0.0 - self.forces_n.iter().map(|force_n| force_n.z).sum::<f64>()
     }
 
-    /// The mean forces since the last call; those of the last step, where there was none since.
+    /// The mean forces since the last call; without a step since, those of the last step.
     pub(crate) fn take_mean(&mut self) -> Contact {
         let mut message = Contact::default();
         for (place, pair) in self.pairs.iter().enumerate() {

@@ -1,12 +1,13 @@
-//! A lower tooth and its antagonist: where they are, how they move, and the forces when they touch each other.
+//! A lower tooth and its antagonist: their places, their motion, and the forces of their contact.
 //!
-//! A tooth gives way in its ligament, at first easily, then less. Its stiffness is an assumption: no measured one is known.
-//! Friction is Coulomb's law, regularised by elasticity: the faces hold to each other by a spring, and slide where the
-//! spring would pull more than friction allows (Cundall and Strack, Géotechnique 29, 1979). A contact at rest stays at rest.
+//! A tooth gives way in its ligament, at first easily, then less. Its stiffness is an assumption, because no
+//! measurement is known. Friction is Coulomb's law, regularised by elasticity (Cundall and Strack, Géotechnique 29,
+//! 1979). A spring holds the faces to each other, and the faces slide at a pull beyond the friction. A contact at rest
+//! stays at rest.
 //!
 //! The law of every contact is that of Hunt and Crossley, "Coefficient of restitution interpreted as damping in
-//! vibroimpact", 1975. The damping grows with the elastic force. So the force begins at 0 with the contact, however fast the
-//! contact comes.
+//! vibroimpact", 1975. The damping grows with the elastic force. So the force begins at 0 with the contact, at any
+//! speed.
 
 use masseter_model::geometry::{Pose, Twist, Vec3};
 use nalgebra::{Matrix3x6, Point3};
@@ -19,7 +20,7 @@ pub(crate) const MOST_PAIRS: usize = 16;
 pub(crate) struct Tooth {
     /// Its FDI number.
     pub(crate) number: u8,
-    /// Where it meets its antagonist in the closed mouth, platform frame, m.
+    /// Place of the contact with its antagonist in the closed mouth, platform frame, m.
     pub(crate) point_m: [f64; 3],
     /// Normal of the face on which they meet, from the lower tooth to its antagonist, platform frame of the closed mouth.
     pub(crate) normal: [f64; 3],
@@ -38,7 +39,7 @@ pub(super) struct Pair {
     normal: Vec3,
 }
 
-/// The motion of a pair over a step. Forces are held over the step, so that they are those of its end: where the speed leads.
+/// The motion of a pair over a step. Forces are constant over the step, so they are those of its end at this speed.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Touch {
     /// From the platform's origin to the lower tooth, base axes, m.
@@ -47,7 +48,7 @@ pub(super) struct Touch {
     pub(super) place_m: Vec3,
     /// From the lower tooth to its antagonist.
     pub(super) normal: Vec3,
-    /// Distance along the normal at the step's end, m; negative where the teeth would overlap.
+    /// Distance along the normal at the step's end, m; negative for overlapping teeth.
     pub(super) gap_m: f64,
     /// Speed at which the distance shrinks, m/s.
     pub(super) closing_m_s: f64,
@@ -68,7 +69,7 @@ impl Pair {
         }
     }
 
-    /// How the pair moves at a pose and twist of the platform.
+    /// The motion of the pair at a pose and twist of the platform.
     pub(super) fn touch(&self, pose: &Pose, twist: &Twist, step_s: f64) -> Touch {
         let (linear, angular): (Vec3, Vec3) =
             (twist.fixed_rows::<3>(0).into(), twist.fixed_rows::<3>(3).into());
@@ -130,10 +131,10 @@ pub(crate) struct Friction {
     pub(crate) stiffness_n_per_m: f64,
 }
 
-/// Where a lower tooth holds to the other face.
+/// The hold of a lower tooth on the other face.
 #[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Grip {
-    /// Where the spring would be slack, base frame, m; none without contact.
+    /// Place of the slack spring, base frame, m; none without contact.
     anchor_m: Option<Vec3>,
 }
 

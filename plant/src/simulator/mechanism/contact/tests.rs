@@ -1,4 +1,4 @@
-//! Laws that the contact between the jaws keeps.
+//! Laws of the contact between the jaws.
 
 use masseter_scenario::{FoodConfig, Scenario, TeethConfig, ToothConfig};
 use nalgebra::{Matrix3, Vector3};
@@ -43,7 +43,7 @@ fn teeth_meet_without_a_jump() {
         Some((force_n - std::mem::replace(before_n, force_n)).abs())
     });
     let most_n = most_n.fold(0.0, f64::max);
-    // 14 stiff teeth in a microsecond at 60 mm/s: 1.7 N, and a damper of 10 N s/m a tooth would jump by 8 N.
+    // 14 stiff teeth in a microsecond at 60 mm/s give 1.7 N; a damper of 10 N s/m a tooth jumps by 8 N.
     assert!(most_n < 2.1, "{most_n} N");
 }
 
@@ -101,7 +101,7 @@ fn friction_stays_in_its_cone_opposes_sliding_and_holds_at_rest() {
         assert!(force.fixed_rows::<2>(0).norm() <= 0.23 * -force[2] * (1.0 + 1e-12), "{force}");
     }
     assert!(shares[0] < 0.05 && (shares[999] - 0.23).abs() < 1e-9, "{} to {}", shares[0], shares[999]);
-    // It holds what it held, without creeping.
+    // The contact holds its load without creeping.
     let held: Vec<_> =
         (0..1000).map(|_| occlusion.push(&above(2e-4, 1e-4), &Twist::zeros(), step_s)[0]).collect();
     assert!(held[0] < -10.0 && (held[0] - held[999]).abs() < 1e-9, "{} to {} N", held[0], held[999]);

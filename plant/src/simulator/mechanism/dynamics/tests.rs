@@ -1,4 +1,4 @@
-//! Laws of mechanics that the dynamics keep.
+//! Laws of mechanics of the dynamics.
 
 use masseter_model::dynamics::{AxesConfig, FrictionConfig, FrictionModel};
 use masseter_model::geometry::MechanismConfig;
@@ -69,7 +69,7 @@ fn friction_of_any_size_ends_a_motion_and_never_turns_it_round() {
     }
 }
 
-/// How far a slide goes under a force from one time to another (s), mm, with the weight carried.
+/// Way of a slide under a force from one time to another (s), mm, with the weight carried.
 fn drift_mm(model: FrictionModel, push_n: f64, [from_s, until_s]: [f64; 2]) -> f64 {
     let friction = FrictionConfig { model, ..FrictionConfig::default() };
     let mut dynamics = at_rest(&DynamicsConfig { friction, ..DynamicsConfig::default() });
@@ -151,7 +151,7 @@ fn swing(config: &DynamicsConfig, start: Twist) -> (f64, [f64; 10]) {
     let (start_j, mut kinetic_j) = (total_j(&dynamics), 0.0_f64);
     let drift_j = std::array::from_fn(|_| {
         (0..1_000_000_000 / config.step_ns).fold(0.0_f64, |most_j, _| {
-            // A spring is a part of the mechanism: unlike a drive, the spring feels the middle of the step.
+            // A spring is a part of the mechanism: unlike a drive, a spring acts by the middle of the step.
             let force_n = stretched_m(&dynamics.middle().unwrap().legs.actuators) * -SPRING_N_PER_M;
             step(&mut dynamics, &force_n.into());
             kinetic_j = kinetic_j.max(energy(&dynamics).kinetic_j);

@@ -1,4 +1,4 @@
-//! How foods give way, bite after bite.
+//! The behaviour of foods, bite after bite.
 
 use masseter_scenario::FoodConfig;
 
