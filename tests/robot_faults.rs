@@ -39,7 +39,7 @@ struct Tried {
 }
 
 const SILENT: &[&str] = &["node 4 does not answer; check its power"];
-const ALL: [Tried; 7] = [
+const ALL: [Tried; 8] = [
     Tried {
         before: &[],
         step: "inspect",
@@ -98,6 +98,14 @@ const ALL: [Tried; 7] = [
         before: &[],
         step: "jog --axis l1 --by=-5mm --measured=-5mm --out-of-order",
         from_s: 2.5,
+        exit: 5,
+        says: [&[NOT_PROVED], &[NOT_PROVED], &[DIPPED, OFF], &[BY_MASTER, OFF], &[BESIDE, OFF]],
+    },
+    // While the axis stands with power.
+    Tried {
+        before: &[],
+        step: "watchdog --axis l1 --out-of-order",
+        from_s: 1.5,
         exit: 5,
         says: [&[NOT_PROVED], &[NOT_PROVED], &[DIPPED, OFF], &[BY_MASTER, OFF], &[BESIDE, OFF]],
     },

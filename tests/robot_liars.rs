@@ -168,7 +168,12 @@ const REPLACED: [(&str, &str); 4] = [
 fn a_replaced_drive_gets_no_power_and_no_value_whatever_it_tells() {
     let workspace = Workspace::new(SOUND);
     let jog = "robot jog --axis l1 --by 1mm";
-    for step in ["robot inspect", "robot configure", "robot jog --axis l1 --by 1mm --measured 1mm"] {
+    for step in [
+        "robot inspect",
+        "robot configure",
+        "robot jog --axis l1 --by 1mm --measured 1mm",
+        "robot watchdog --axis l1",
+    ] {
         assert_passes(&workspace, step);
     }
     for (keys, says) in REPLACED {
@@ -187,7 +192,12 @@ fn a_replaced_drive_gets_no_power_and_no_value_whatever_it_tells() {
 #[test]
 fn a_drive_of_another_kind_gets_no_power_out_of_order_either() {
     let other = SOUND.to_owned() + &quirk("kind = 'lacks'\nobjects = ['1018h:04']") + &shows("1018h:02", 7);
-    for step in ["robot jog --axis l1 --by 1mm", "robot home --axis l1", "robot check-pose"] {
+    for step in [
+        "robot jog --axis l1 --by 1mm",
+        "robot watchdog --axis l1",
+        "robot home --axis l1",
+        "robot check-pose",
+    ] {
         let workspace = Workspace::new(&other);
         let (exit, text) = play(&workspace, &format!("{step} --out-of-order"));
         let says = "l1: object 1018h:02h (Product code) is 7h, the profile wants 402h";
@@ -204,7 +214,9 @@ fn a_drive_without_a_serial_number_uses_its_evidence_and_the_steps_say_what_is_n
                 product and revision has taken its place";
     assert!(assert_passes(&workspace, "robot inspect").contains(says));
     assert_passes(&workspace, "robot configure");
-    for step in ["robot jog --axis l1 --by 1mm --measured 1mm", "robot home --axis l1"] {
+    for step in
+        ["robot jog --axis l1 --by 1mm --measured 1mm", "robot watchdog --axis l1", "robot home --axis l1"]
+    {
         let text = assert_passes(&workspace, step);
         assert!(text.contains(says), "{step}: {text}");
     }

@@ -43,6 +43,44 @@ fn a_jog_passes_with_a_right_reading_of_a_gauge_alone() {
 }
 
 #[test]
+fn a_jog_with_a_sync_that_the_drive_misses_is_no_evidence() {
+    let deaf = "[[faults]]\nkind = 'lose'\nbus = 1\nnode = 4\nid = 0x80\ncount = 1\nfrom_s = 0.0\n";
+    let (code, out, err, result) = robot(deaf, &["jog", "--axis", "l1", "--by", "1mm", "--measured", "1mm"]);
+    assert_eq!((code, &result["passed"]), (Some(1), &Value::Bool(false)), "{out}{err}");
+    assert!(out.contains("49 of 50 SYNCs answered, within "), "{out}");
+    assert!(err.contains("l1: 1 of 50 SYNCs without process data; check 1800h"), "{err}");
+}
+
+#[test]
+fn a_way_that_no_gauge_resolves_is_refused_with_a_reading() {
+    let workspace = Workspace::new("");
+    let (file, evidence) = (workspace.file("scenario.toml"), workspace.file("bringup"));
+    let output = Command::new(MASSETER)
+        .args([
+            "robot",
+            "jog",
+            "--axis",
+            "l1",
+            "--by",
+            "0.2mm",
+            "--measured",
+            "0.2mm",
+            "--out-of-order",
+            "--folder",
+        ])
+        .args([&evidence, &file])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(2), "{}", stdout(&output));
+    assert!(
+        stderr(&output).contains("a gauge proves no way below 0.5 mm; jog further"),
+        "{}",
+        stderr(&output)
+    );
+    assert!(!evidence.exists(), "a refused step makes no folder");
+}
+
+#[test]
 fn a_jog_that_is_stopped_ends_with_5_and_is_no_evidence() {
     let jammed = "[[faults]]\nkind = 'drive_fault'\naxis = 'l1'\nfrom_s = 2.2\n";
     let (code, _, err, result) = robot(jammed, &["jog", "--axis", "l1", "--by", "5mm"]);
@@ -102,7 +140,13 @@ fn the_steps_follow_each_other_by_their_evidence() {
     let workspace = Workspace::new("");
     let (file, evidence) = (workspace.file("scenario.toml"), workspace.file("bringup"));
     let places = ["--folder", evidence.to_str().unwrap(), file.to_str().unwrap()];
-    for step in ["inspect", "configure", "jog --axis l1 --by 2mm --measured 2mm", "home --axis l1"] {
+    for step in [
+        "inspect",
+        "configure",
+        "jog --axis l1 --by 2mm --measured 2mm",
+        "watchdog --axis l1",
+        "home --axis l1",
+    ] {
         let step: Vec<_> = step.split(' ').collect();
         let output = masseter(&[&["robot"], &step[..], &places].concat());
         assert_eq!(output.status.code(), Some(0), "{step:?}: {}{}", stdout(&output), stderr(&output));
@@ -122,7 +166,7 @@ fn bring_up(workspace: &Workspace) -> (Option<i32>, String) {
     };
     let jogs = AXIS_NAMES.map(|axis| vec!["jog", "--axis", axis, "--by", "1mm", "--measured", "1mm"]);
     let before = [vec!["inspect"], vec!["configure"]];
-    for step in before.into_iter().chain(jogs).chain([vec!["home"]]) {
+    for step in before.into_iter().chain(jogs).chain([vec!["watchdog"], vec!["home"]]) {
         let output = play(&step);
         assert_eq!(output.status.code(), Some(0), "{step:?}: {}{}", stdout(&output), stderr(&output));
     }
@@ -142,18 +186,21 @@ fn a_slide_that_was_without_power_since_home_fails_the_pose_check() {
     let (code, err) = bring_up(&workspace);
     assert_eq!(code, Some(1), "{err}");
     assert!(err.contains("d1: the drive was without power, reset or jogged since "), "{err}");
-    let moved = AXIS_NAMES.map(|axis| format!("jog-{axis}")).into_iter().chain(["home".to_owned()]);
+    let jogs = AXIS_NAMES.map(|axis| format!("jog-{axis}"));
+    let moved = jogs.into_iter().chain(["watchdog", "home"].map(str::to_owned));
     assert_eq!(steps_with_power(&workspace), moved.collect());
 }
 
-/// The nodes with power after each controlword that a step has sent by SDO.
+/// The nodes with power after each controlword that a step has sent by SDO. Process data go to such a node alone.
 fn powered(log: &str) -> Vec<BTreeSet<u8>> {
     let frames = log.lines().filter_map(|line| line.split_whitespace().nth(2)?.split_once('#'));
     let mut on = BTreeSet::new();
     let mut all = Vec::new();
     for (id, data) in frames {
         let id = u16::from_str_radix(id, 16).unwrap();
-        assert!(!(0x201..0x280).contains(&id), "process data: {id:X}#{data}");
+        let receiver = id.checked_sub(0x200).and_then(|node| u8::try_from(node).ok());
+        let receiver = receiver.filter(|node| (1..0x80).contains(node));
+        assert!(receiver.is_none_or(|node| on.contains(&node)), "process data: {id:X}#{data}");
         let Some(word) = data.strip_prefix("2B406000").filter(|_| id > 0x600) else { continue };
         let node = (id - 0x600) as u8;
         // Bits 0 and 1: "switch on" and "enable voltage".
@@ -197,10 +244,11 @@ fn no_step_before_the_run_gives_two_axes_power() {
         .unwrap();
     assert_eq!(run.status.code(), Some(0), "{}{}", stdout(&run), stderr(&run));
     let dry = std::fs::read_dir(workspace.file("bringup")).unwrap().map(|entry| entry.unwrap().path());
-    let dry = dry.filter(|path| path.ends_with("11-dry-run")).last().expect("the dry run leaves evidence");
+    let dry = dry.filter(|path| path.ends_with("12-dry-run")).last().expect("the dry run leaves evidence");
     assert_eq!(common::json(&dry.join("result.json"))["passed"], true);
     let jogs = AXIS_NAMES.map(|axis| format!("jog-{axis}"));
-    assert_eq!(steps_with_power(&workspace), jogs.into(), "absolute drives need no homing");
+    let moved = jogs.into_iter().chain(["watchdog".to_owned()]);
+    assert_eq!(steps_with_power(&workspace), moved.collect(), "absolute drives need no homing");
 }
 
 /// The emulated drives do not outlive their process: what the next step writes back is proved by the library's test.

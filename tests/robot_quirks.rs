@@ -75,7 +75,8 @@ fn robot(quirk: &str, profile: &str) -> Workspace {
 fn steps() -> Vec<(&'static str, Vec<&'static str>)> {
     let jog = |axis| ("jog", vec!["--axis", axis, "--by", "1mm", "--measured", "1mm"]);
     let before = [("inspect", vec![]), ("configure", vec!["--store"])];
-    before.into_iter().chain(AXES.map(jog)).chain([("home", vec![]), ("check-pose", vec![])]).collect()
+    let after = ["watchdog", "home", "check-pose"].map(|step| (step, vec![]));
+    before.into_iter().chain(AXES.map(jog)).chain(after).collect()
 }
 
 /// Plays one step; returns its exit code and what it says.

@@ -17,7 +17,8 @@ use masseter_terminal::{Exit, Failure, OrFailure, Tone, result, result_with_tone
 use serde::{Deserialize, Serialize};
 
 use super::args::WriteArgs;
-use super::evidence::{Basis, Evidence, Past, Step, StepFolder};
+use super::basis::Basis;
+use super::evidence::{Evidence, Past, Step, StepFolder};
 use super::ledger::{before_file, read_before, return_owed_values};
 use super::robot_line::{LISTEN_NS, RobotLine, Surveys, deviations_table, drives, failed, prove_off};
 

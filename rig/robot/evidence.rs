@@ -5,19 +5,24 @@
 //! ends: a killed step proves nothing.
 
 use std::fmt::{self, Display, Formatter};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufRead, BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::{fs::File, time::UNIX_EPOCH};
 
-use masseter_model::geometry::{AXES, AXIS_NAMES, MechanismConfig};
+use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::commissioning::{Identity, Known, NOT_ASKED};
 use masseter_recording::RunFolder;
 use masseter_runtime::clock;
-use masseter_scenario::Scenario;
+use masseter_scenario::{Scenario, input::open_regular};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
+use sha1::{Digest, Sha1};
 
+use super::basis::{Basis, Difference};
 use super::ledger::{Nameless, before_file, parse_file};
+
+/// The log of the buses in the folder of a step.
+const LOG: &str = "candump.log";
 
 /// A step with evidence of its own, in the order of the bring-up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -31,6 +36,8 @@ pub(crate) enum Step {
     Restore,
     /// An axis moved alone.
     Jog(usize),
+    /// Each drive stops by itself once the master is silent.
+    Watchdog,
     /// All axes have their zero.
     Home,
     /// The pose of the platform is the one that follows from the axes' positions.
@@ -43,8 +50,8 @@ impl Step {
     /// The steps that lead to a run.
     pub(crate) fn chain() -> Vec<Self> {
         let jogs = (0..AXES).map(Self::Jog);
-        let (first, last) = ([Self::Inspect, Self::Configure], [Self::Home, Self::CheckPose, Self::DryRun]);
-        first.into_iter().chain(jogs).chain(last).collect()
+        let last = [Self::Watchdog, Self::Home, Self::CheckPose, Self::DryRun];
+        [Self::Inspect, Self::Configure].into_iter().chain(jogs).chain(last).collect()
     }
 
     /// The axes that the step must be about.
@@ -69,6 +76,7 @@ impl Display for Step {
             Self::Configure => f.write_str("configure"),
             Self::Restore => f.write_str("restore"),
             Self::Jog(axis) => write!(f, "jog-{}", AXIS_NAMES[*axis]),
+            Self::Watchdog => f.write_str("watchdog"),
             Self::Home => f.write_str("home"),
             Self::CheckPose => f.write_str("check-pose"),
             Self::DryRun => f.write_str("dry-run"),
@@ -91,39 +99,14 @@ impl TryFrom<String> for Step {
     }
 }
 
-/// What a result depends on: another drive or another profile makes it outdated.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Basis {
-    /// Hash of everything that decides the objects and the scales of the drives.
-    pub(crate) profile_hash: String,
-    /// The drives.
-    pub(crate) drives: [Known; AXES],
-}
-
-impl Basis {
-    /// Of the scenario's profiles, interfaces, mechanism and jaw, and of these drives. Limits of a run do not count:
-    /// a run writes them itself, and a dry run has others.
-    pub(crate) fn new(scenario: &Scenario, drives: [Known; AXES]) -> Self {
-        let mut hasher = crc32fast::Hasher::new();
-        let mut mechanism = scenario.mechanism.clone();
-        mechanism.strokes = MechanismConfig::default().strokes;
-        // Evidence of emulated drives is none of real ones.
-        let place = format!("{:?}{:?}{:?}", scenario.can.interfaces, scenario.jaw, mechanism);
-        hasher.update(place.as_bytes());
-        for (axis, node) in scenario.can.node_ids.into_iter().enumerate() {
-            let parts = format!("{node}{:?}{:?}", scenario.profile(axis), scenario.scale(axis));
-            hasher.update(parts.as_bytes());
-        }
-        Self { profile_hash: format!("{:08x}", hasher.finalize()), drives }
-    }
-}
-
 /// `result.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Evidence {
     /// The folder that it was read from.
     #[serde(skip)]
     pub(crate) folder: PathBuf,
+    /// Digest (SHA-1) of the rest and of the log of the buses; empty while the step is under way.
+    digest: String,
     pub(crate) step: Step,
     /// When the step began, UTC.
     pub(crate) started: String,
@@ -143,6 +126,28 @@ impl Evidence {
     /// Whether it is about an axis.
     pub(crate) fn is_about(&self, axis: usize) -> bool {
         self.axes.iter().any(|name| name == AXIS_NAMES[axis])
+    }
+
+    /// The digest of result and log in a folder. Whoever edits either by hand shows; no secret keeps anybody from a new digest.
+    fn digest_in(&self, folder: &Path) -> anyhow::Result<String> {
+        let mut hasher = Sha1::new();
+        hasher.update(serde_json::to_vec(&Self { digest: String::new(), ..self.clone() })?);
+        match open_regular(&folder.join(LOG)) {
+            Ok(log) => {
+                let mut log = BufReader::new(log);
+                while let bytes = log.fill_buf()?
+                    && !bytes.is_empty()
+                {
+                    let read = bytes.len();
+                    hasher.update(bytes);
+                    log.consume(read);
+                }
+            }
+            // A dry run has its log in the folder of the run.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            Err(error) => return Err(error.into()),
+        }
+        Ok(data_encoding::HEXLOWER.encode(&hasher.finalize()))
     }
 
     /// The step's own data.
@@ -180,6 +185,7 @@ impl StepFolder {
             step,
             started: humantime::format_rfc3339_seconds(UNIX_EPOCH + clock::wall_time()).to_string(),
             passed: false,
+            digest: String::new(),
             basis: Basis::new(scenario, NOT_ASKED),
             in_order: true,
             axes: axes.iter().map(|&axis| AXIS_NAMES[axis].to_owned()).collect(),
@@ -195,7 +201,7 @@ impl StepFolder {
     /// # Errors
     /// When the file cannot be made.
     pub(crate) fn log(&self) -> io::Result<Box<dyn Write + Send>> {
-        Ok(Box::new(BufWriter::new(File::create(self.files.file("candump.log"))?)))
+        Ok(Box::new(BufWriter::new(File::create(self.files.file(LOG))?)))
     }
 
     /// Writes a further file of the step.
@@ -206,12 +212,13 @@ impl StepFolder {
         self.files.keep(&self.files.file(name), text)
     }
 
-    /// Replaces the result by that of the ended step.
+    /// Replaces the result by that of the ended step. The log must be complete.
     ///
     /// # Errors
     /// When it cannot be written.
     pub(crate) fn finish_step(mut self, passed: bool, result: &impl Serialize) -> anyhow::Result<()> {
         (self.evidence.passed, self.evidence.result) = (passed, serde_json::to_value(result)?);
+        self.evidence.digest = self.evidence.digest_in(self.files.path())?;
         Ok(self.write_result()?)
     }
 
@@ -244,9 +251,12 @@ pub(crate) enum Lack {
     /// The newest one did not pass, or was killed.
     #[error("not passed at {0}")]
     NotPassed(String),
-    /// The profiles or the values that decide objects are others.
-    #[error("outdated: the profiles changed since {0}")]
-    OtherProfile(String),
+    /// The scenario decides other objects or scales, or the build is another one.
+    #[error("outdated: {0}")]
+    OtherBasis(Box<Difference>),
+    /// The folder does not have its digest.
+    #[error("edited: result.json and candump.log are not as the step of {0} left them")]
+    Edited(String),
     /// The drive is another one, or its identity has fewer or more numbers.
     #[error("outdated: the drive's {}", .now.differs_from(before))]
     OtherDrive { before: Identity, now: Identity },
@@ -339,11 +349,11 @@ impl Past {
         {
             return Some(Lack::Restored(at));
         }
-        // A jog takes the mark of power out of the drive, and home sets the zero for good.
+        // A jog and a proof of the watchdogs take the mark of power out of the drive, and home sets the zero for good.
         let earlier: &[Step] = match step {
-            Step::Home => &[Step::Configure],
-            Step::CheckPose => &[Step::Configure, Step::Jog(axis), Step::Home],
-            Step::DryRun => &[Step::Configure, Step::Jog(axis), Step::Home, Step::CheckPose],
+            Step::Watchdog | Step::Home => &[Step::Configure],
+            Step::CheckPose => &[Step::Configure, Step::Jog(axis), Step::Watchdog, Step::Home],
+            Step::DryRun => &[Step::Configure, Step::Jog(axis), Step::Watchdog, Step::Home, Step::CheckPose],
             _ => &[],
         };
         earlier.iter().find_map(|&step| Some(Lack::Repeated { step, at: since(step)? }))
@@ -366,8 +376,11 @@ impl Past {
         if !evidence.in_order {
             return Err(Lack::OutOfOrder(at()));
         }
-        if evidence.basis.profile_hash != basis.profile_hash {
-            return Err(Lack::OtherProfile(at()));
+        if !evidence.digest_in(&evidence.folder).is_ok_and(|digest| digest == evidence.digest) {
+            return Err(Lack::Edited(at()));
+        }
+        if let Some(difference) = evidence.basis.difference(basis) {
+            return Err(Lack::OtherBasis(Box::new(difference)));
         }
         match (evidence.basis.drives[axis], basis.drives[axis]) {
             (Known::Is(before), Known::Is(now)) if before != now => Err(Lack::OtherDrive { before, now }),
@@ -395,6 +408,8 @@ impl Past {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use masseter_plant::commissioning::Entry;
 
     use super::*;
@@ -458,12 +473,33 @@ mod tests {
         let mut changed = Scenario::default();
         changed.drives.leg.encoder_resolution_m = 2e-6;
         let changed = Basis::new(&changed, basis.drives);
-        assert!(check(&changed).unwrap().starts_with("outdated: the profiles changed"));
+        assert!(check(&changed).unwrap().starts_with("outdated: axes.l1."), "{:?}", check(&changed));
         leave_step(&parent, Step::Inspect, &ALL, None);
         assert!(check(&basis).unwrap().starts_with("not passed at "), "a killed step proves nothing");
         leave_step(&parent, Step::Inspect, &ALL, Some(true));
         assert_eq!(check(&basis), None);
         assert!(parent.join("03-inspect/result.json").exists());
+    }
+
+    #[test]
+    fn an_edited_folder_is_no_evidence() {
+        let folder = tempfile::tempdir().unwrap();
+        let basis = Basis::new(&Scenario::default(), NOT_ASKED);
+        let check = || refusal(folder.path(), Step::Inspect, &[3], &basis);
+        let mut step = StepFolder::begin(folder.path(), Step::Inspect, &ALL, &Scenario::default()).unwrap();
+        step.evidence.basis.drives = drives(SERIALS);
+        step.keep(LOG, "(0.0) can0 080#\n").unwrap();
+        let (result, log) = (step.files.file("result.json"), step.files.file(LOG));
+        step.finish_step(false, &"data").unwrap();
+        let failed = fs::read_to_string(&result).unwrap();
+        fs::write(&result, failed.replace("\"passed\": false", "\"passed\": true")).unwrap();
+        assert!(check().unwrap().starts_with("edited: result.json and candump.log are not as the step of "));
+        leave_step(folder.path(), Step::Inspect, &ALL, Some(true));
+        assert_eq!(check(), None);
+        let newest = folder.path().join("02-inspect");
+        fs::write(newest.join(LOG), "(0.0) can0 080#\n").unwrap();
+        assert!(check().unwrap().starts_with("edited: "), "a log that the step did not write");
+        assert!(log.exists());
     }
 
     /// A pose that was checked before the axes were homed again is no evidence for the new zeros.
@@ -515,7 +551,7 @@ mod tests {
     #[test]
     fn the_chain_is_in_order_and_every_step_has_a_command() {
         let chain = Step::chain();
-        assert_eq!(chain.len(), 5 + AXES);
+        assert_eq!(chain.len(), 6 + AXES);
         assert!(chain.is_sorted());
         assert_eq!(chain[4].to_string(), "jog-d3");
         assert_eq!(chain[4].command(), "masseter robot jog --axis d3 --by 1mm");

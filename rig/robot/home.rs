@@ -39,7 +39,7 @@ struct AxisResult {
 /// Homes, prints what was found, and keeps it.
 pub(crate) fn home(args: &HomeArgs) -> Result<Exit, Failure> {
     let axes = args.axis.map_or_else(|| ORDER.to_vec(), |axis| vec![axis]);
-    let earlier = (!args.out_of_order).then_some(Step::Jog);
+    let earlier = (!args.out_of_order).then_some(|_: usize| Step::Watchdog);
     let mut session = Session::begin(&args.robot, Step::Home, &axes, earlier)?;
     let stop = session.stop.clone();
     let mut operator = |_| if stop.is_made() { Wish::Stop } else { Wish::Move };

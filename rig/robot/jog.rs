@@ -7,7 +7,7 @@ use std::{io::Read, thread, time::Duration};
 use anyhow::anyhow;
 use clap::Args;
 use masseter_model::geometry::AXIS_NAMES;
-use masseter_plant::commissioning::{JogOrder, JogReport, Wish, jog as play};
+use masseter_plant::commissioning::{JogOrder, JogReport, SyncAnswers, Wish, jog as play};
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_terminal::{Exit, Failure, OrFailure, result_line, status};
 use serde::Serialize;
@@ -22,8 +22,10 @@ const HELD_NS: u64 = 300 * MILLISECOND_NS;
 const RELEASED_NS: u64 = 3 * SECOND_NS;
 /// How long the first byte may take, ns.
 const FIRST_NS: u64 = 60 * SECOND_NS;
-/// A ruler's reading may differ by this share from the way that the drive shows.
+/// A gauge's reading may differ by this share from the way that the drive shows.
 const DEVIATION: f64 = 0.02;
+/// The shortest way that a reading proves, m: of less, a hundredth of a millimetre on the gauge is more than that share.
+const LEAST_PROOF_M: f64 = 5e-4;
 
 /// The arguments of `robot jog`.
 #[derive(Debug, Clone, Args)]
@@ -64,6 +66,10 @@ pub(crate) struct JogArgs {
 /// Jogs, prints what was found, and keeps it.
 pub(crate) fn jog(args: &JogArgs) -> Result<Exit, Failure> {
     let axis = args.axis;
+    if args.measured.is_some() && args.by.abs() < LEAST_PROOF_M {
+        let least_mm = LEAST_PROOF_M * 1e3;
+        return Err(anyhow!("--by: a gauge proves no way below {least_mm} mm; jog further")).usage();
+    }
     let earlier = (!args.out_of_order).then_some(|_: usize| Step::Configure);
     let mut session = Session::begin(&args.robot, Step::Jog(axis), &[axis], earlier)?;
     let mut hold = args.hold.then(Hold::of_stdin);
@@ -85,9 +91,13 @@ pub(crate) fn jog(args: &JogArgs) -> Result<Exit, Failure> {
         return Err(session.fail(Exit::Failed, disturbance));
     }
     let factor = args.measured.map(|measured_m| measured_m / report.moved_m());
-    let is_right = factor.is_some_and(|factor| (factor - 1.0).abs() <= DEVIATION);
+    let is_silent = report.sync_answers.unanswered > 0;
+    let is_right = factor.is_some_and(|factor| (factor - 1.0).abs() <= DEVIATION) && !is_silent;
     session.finish_session(is_right, &JogResult::new(args, report, factor))?;
     result_line!("{}", report_text(axis, &report)).incomplete()?;
+    if is_silent {
+        return Err(failed(no_answer(axis, report.sync_answers)));
+    }
     match factor {
         Some(factor) if !is_right => Err(failed(wrong_scale(axis, factor))),
         Some(_) => Ok(Exit::Passed),
@@ -107,6 +117,13 @@ fn order(args: &JogArgs, session: &Session) -> JogOrder {
     }
     order.dwell_ns = args.dwell.map_or(order.dwell_ns, |dwell| dwell.as_nanos() as u64);
     order
+}
+
+fn no_answer(axis: usize, SyncAnswers { sent, unanswered, .. }: SyncAnswers) -> anyhow::Error {
+    anyhow!(
+        "{}: {unanswered} of {sent} SYNCs without process data; check 1800h (run configure), wires and termination",
+        AXIS_NAMES[axis]
+    )
 }
 
 fn wrong_scale(axis: usize, factor: f64) -> anyhow::Error {
@@ -130,9 +147,11 @@ fn report_text(axis: usize, report: &JogReport) -> String {
         || "too few looks for friction; jog further or slower".to_owned(),
         |[friction_n, load_n]| format!("friction {friction_n:.1} N, load {load_n:.1} N"),
     );
-    let answer = report.sync_answer_ns.map_or_else(
+    let SyncAnswers { sent, unanswered, longest_ns } = report.sync_answers;
+    let answered = sent - unanswered;
+    let answer = longest_ns.map_or_else(
         || "no answer to a SYNC".to_owned(),
-        |answer_ns| format!("SYNC answered within {} µs (can.answer_us)", answer_ns.div_ceil(1000)),
+        |ns| format!("{answered} of {sent} SYNCs answered, within {} µs (can.answer_us)", ns.div_ceil(1000)),
     );
     let positions_m = report.positions_m;
     let [moved_mm, back_mm] = [1, 2].map(|place| (positions_m[place] - positions_m[0]) * 1e3);

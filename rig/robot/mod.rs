@@ -4,6 +4,7 @@
 //! ([`masseter_plant::commissioning`]): these modules hold arguments, files and text.
 
 mod args;
+mod basis;
 mod check_pose;
 mod configure;
 mod evidence;
@@ -16,6 +17,7 @@ mod power_mark;
 mod robot_line;
 mod session;
 mod status;
+mod watchdog;
 
 use clap::Subcommand;
 use masseter_terminal::{Exit, Failure, OrFailure};
@@ -35,6 +37,8 @@ pub(crate) enum RobotVerb {
     Restore(args::WriteArgs),
     /// Move one axis a short way and back, while the others have no power
     Jog(jog::JogArgs),
+    /// Prove that each drive stops by itself once the master is silent
+    Watchdog(watchdog::WatchdogArgs),
     /// Home the axes, one after the other
     Home(home::HomeArgs),
     /// Check whether the axes tell the closed pose
@@ -53,6 +57,7 @@ pub(crate) fn execute(verb: &RobotVerb) -> Result<Exit, Failure> {
         RobotVerb::Configure(args) => configure::configure(args),
         RobotVerb::Restore(args) => configure::restore(args),
         RobotVerb::Jog(args) => jog::jog(args),
+        RobotVerb::Watchdog(args) => watchdog::watchdog(args),
         RobotVerb::Home(args) => home::home(args),
         RobotVerb::CheckPose(args) => check_pose::check_pose(args),
         RobotVerb::Status(args) => status::status(args).usage(),

@@ -1,5 +1,5 @@
-//! Whether `masseter run` may move a real robot: only with a passed pose check of the same drives and profiles, and
-//! at full speed only after a passed dry run. `masseter run --dry` leaves its evidence beside the steps of the
+//! Whether `masseter run` may move a real robot: only with proved watchdogs and a passed pose check of the same drives and
+//! profiles, and at full speed only after a passed dry run. `masseter run --dry` leaves its evidence beside the steps of the
 //! bring-up.
 
 use std::io;
@@ -10,8 +10,10 @@ use masseter_plant::commissioning::{Identity, Known, Line, NOT_ASKED};
 use masseter_scenario::{FileConfig, Scenario, input::read_bytes};
 use masseter_terminal::status;
 use serde::{Deserialize, Serialize};
+use sha1::{Digest, Sha1};
 
-use super::evidence::{Basis, Past, Step, StepFolder};
+use super::basis::Basis;
+use super::evidence::{Past, Step, StepFolder};
 use super::ledger::{owed_advice, owed_axes};
 use super::power_mark::{check_marks, marks_of_pose_check};
 use super::robot_line::warn_of_gaps;
@@ -82,16 +84,16 @@ impl Played<'_> {
             );
             return Ok(());
         }
-        let refused = "a run needs a passed pose check of this robot, and at full speed also a passed dry run; \
-                       --without-bring-up skips both: a wrong sign, scale or zero can then drive an axis into its end";
+        let refused = "a run needs proved watchdogs and a passed pose check of this robot, and at full speed also a passed dry run; \
+                       --without-bring-up skips all: a wrong sign, scale or zero can then drive an axis into its end";
         let folder = Path::new(FOLDER);
         if let Some(&axis) = owed_axes(folder).first() {
             bail!(owed_advice(folder, axis));
         }
         let past = Past::read(folder)?;
         let unknown = Basis::new(scenario, NOT_ASKED);
-        let steps: &[Step] =
-            if scenario.dry.is_on { &[Step::CheckPose] } else { &[Step::CheckPose, Step::DryRun] };
+        let all = [Step::Watchdog, Step::CheckPose, Step::DryRun];
+        let steps = if scenario.dry.is_on { &all[..2] } else { &all };
         let require = |basis: &Basis| {
             steps.iter().try_for_each(|&step| past.require(step, &Step::DryRun.axes(), basis))
         };
@@ -134,21 +136,21 @@ impl Played<'_> {
     /// parameters. The files are those of the scenario, or their copies in a run's folder. The mechanism is part of the
     /// basis of all evidence.
     fn hash(&self, copies: Option<&Path>) -> anyhow::Result<String> {
-        let (mut scenario, mut hasher) = (self.scenario.clone(), crc32fast::Hasher::new());
+        let (mut scenario, mut hasher) = (self.scenario.clone(), Sha1::new());
         for (name, file) in scenario.files_mut() {
             let path = copies.map_or_else(|| file.clone(), |folder| folder.join(&name));
-            hasher.update(
-                &read_bytes(&path, FileConfig::MOST_BYTES).with_context(|| path.display().to_string())?,
-            );
+            let bytes = read_bytes(&path, FileConfig::MOST_BYTES);
+            hasher.update(bytes.with_context(|| path.display().to_string())?);
             file.clear();
         }
         // A dry run has a longer ease.
         let ease_s = scenario.controller.ease_s * scenario.dry.speed_now();
         let Scenario { rate_hz, controller, parameters, stimulus, motion, .. } = &scenario;
         let (lead_cycles, own) = (controller.lead_cycles, self.controller);
-        let text = format!("{motion:?}{rate_hz}{own:?}{lead_cycles}{ease_s:.6}{parameters:?}{stimulus:?}");
-        hasher.update(text.as_bytes());
-        Ok(format!("{:08x}", hasher.finalize()))
+        let ease_us = (ease_s * 1e6).round();
+        let played = (motion, rate_hz, own, lead_cycles, ease_us, parameters, stimulus);
+        hasher.update(serde_json::to_vec(&played)?);
+        Ok(data_encoding::HEXLOWER.encode(&hasher.finalize()))
     }
 }
 

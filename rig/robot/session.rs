@@ -13,7 +13,8 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::args::RobotArgs;
-use super::evidence::{Basis, Past, Step, StepFolder};
+use super::basis::Basis;
+use super::evidence::{Past, Step, StepFolder};
 use super::ledger::{OwedFiles, return_owed_values};
 use super::power_mark::remove_mark;
 use super::robot_line::{LISTEN_NS, failed, wanted_drive, warn_of_gaps};
@@ -72,7 +73,7 @@ impl Session {
         warn_of_gaps(&drives);
         return_owed_values(&args.folder, &scenario, &mut line, false)?;
         // A step that borrows the marked object must not return a mark.
-        if matches!(step, Step::Jog(_) | Step::Home) {
+        if matches!(step, Step::Jog(_) | Step::Watchdog | Step::Home) {
             axes.iter().try_for_each(|&axis| remove_mark(&past, &scenario, &mut line, axis))?;
         }
         line.keep_old_values_in(Box::new(OwedFiles { folder: args.folder.clone(), drives: identities }));

@@ -8,7 +8,9 @@ use masseter_plant::commissioning::{Identity, Known};
 use masseter_terminal::{Exit, Tone, result, result_with_tones};
 
 use super::args::RobotArgs;
-use super::evidence::{Basis, Past, Step};
+use super::basis::Basis;
+use super::evidence::{Past, Step};
+use crate::BUILD;
 
 /// The arguments of `robot status` and `robot report`.
 #[derive(Debug, Clone, Args)]
@@ -49,7 +51,7 @@ pub(crate) fn report(args: &StatusArgs) -> anyhow::Result<Exit> {
         let (Ok(more) | Err(more)) = state;
         writeln!(text, "| {step} | {}{more} |", if state.is_ok() { "passed " } else { "" })?;
     }
-    writeln!(text, "\nProfiles: {}\n\n| axis | drive |\n| --- | --- |", basis.profile_hash)?;
+    writeln!(text, "\nBuild: {BUILD}\n\n| axis | drive |\n| --- | --- |")?;
     for (name, drive) in AXIS_NAMES.iter().zip(basis.drives) {
         writeln!(text, "| {name} | {} |", drive.identity().map_or_else(String::new, Identity::to_string))?;
     }

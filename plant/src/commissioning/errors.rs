@@ -283,6 +283,34 @@ pub enum MotionError {
     },
 }
 
+/// What the master stops sending.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Silence {
+    /// The heartbeat, which 1016h:01 watches.
+    Heartbeat,
+    /// The process data, which the event timer of the RPDO (1400h:05) watches.
+    ProcessData,
+}
+
+impl Silence {
+    /// The object with the time after which the drive must stop.
+    pub fn object(self) -> ObjectAddress {
+        match self {
+            Self::Heartbeat => ObjectAddress::new(0x1016, 1),
+            Self::ProcessData => ObjectAddress::new(0x1400, 5),
+        }
+    }
+}
+
+impl Display for Silence {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Heartbeat => "heartbeat",
+            Self::ProcessData => "process data",
+        })
+    }
+}
+
 /// Why one axis does not begin a motion, or ends a motion early.
 #[derive(Debug, thiserror::Error)]
 pub enum AxisError {
@@ -356,6 +384,49 @@ pub enum AxisError {
         /// The way, m.
         moved_m: f64,
     },
+    /// The drive ignores that the master is silent.
+    #[error(
+        "kept its power for {waited_ms:.0} ms after the last {silence}, {} is {timeout_ms} ms; nothing stops this drive if the \
+         master dies: check {} and 6007h, or use another drive", .silence.object(), .silence.object()
+    )]
+    Unwatched {
+        /// What the master did not send.
+        silence: Silence,
+        /// For how long, ms.
+        waited_ms: f64,
+        /// After which time the drive should stop, ms.
+        timeout_ms: u16,
+    },
+    /// The drive stops too late.
+    #[error(
+        "stopped {stopped_after_ms:.0} ms after the last {silence}, {} is {timeout_ms} ms; check the unit of that object, and \
+         what else delays the drive", .silence.object()
+    )]
+    LateWatchdog {
+        /// What the master did not send.
+        silence: Silence,
+        /// When the drive stopped, ms.
+        stopped_after_ms: f64,
+        /// After which time it should, ms.
+        timeout_ms: u16,
+    },
+    /// The drive left operation, and keeps its power.
+    #[error("stays in {state} without {silence}; check 605Ah and 605Eh: the drive must take the power away")]
+    KeepsPower {
+        /// What the master did not send.
+        silence: Silence,
+        /// The state of the drive.
+        state: DriveState,
+    },
+    /// The drive stops without a word.
+    #[error("stopped without {silence}, and sent no emergency message; check 1014h")]
+    Unreported {
+        /// What the master did not send.
+        silence: Silence,
+    },
+    /// RPDO1 is not the one that the rig sends.
+    #[error("1600h is not as the profile has it; run 'masseter robot configure' again")]
+    OtherMapping,
     /// A way that this step does not allow.
     #[error("{:.3} mm is no way for a jog; give up to {:.0} mm, at least ten increments", .by_m * 1e3, .most_m * 1e3)]
     Way {
@@ -444,6 +515,8 @@ pub fn value_text(object: ObjectAddress, value: u32) -> String {
     match find(object) {
         Ok(place) => ENTRIES[place].kind.number(value).to_string(),
         Err(_) if object.index == 0x30B0 => (value as i32).to_string(),
+        // Nobody knows whether such an object has a sign.
+        Err(_) if value > i32::MAX as u32 => format!("{value} (with a sign {})", value as i32),
         Err(_) => value.to_string(),
     }
 }
@@ -472,6 +545,8 @@ mod tests {
             (0x60C2, 2, 0xFD, "-3"),
             (0x60AA, 0, 0x00C0_0300, "C00300h"),
             (0x30B0, 0, u32::MAX, "-1"),
+            (0x2FFF, 0, -5i32 as u32, "4294967291 (with a sign -5)"),
+            (0x2FFF, 0, 5, "5"),
         ] {
             assert_eq!(value_text(ObjectAddress::new(index, subindex), value), text);
         }

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::errors::{AxisError, MotionError};
 use super::line::Line;
 use super::mover::{Caution, Mover, Operator, POSITIONING};
-use super::steps::longest_sync_answer_ns;
+use super::steps::{SyncAnswers, sync_answers};
 use super::watch::Sample;
 
 /// The longest way of a jog, m.
@@ -42,8 +42,8 @@ pub struct JogReport {
     pub ways: [StepResponse; 2],
     /// Way of the axis while the brake closes, m.
     pub drop_m: f64,
-    /// The longest time from SYNC to process data, ns; none for a missing answer to a SYNC.
-    pub sync_answer_ns: Option<u64>,
+    /// The drive's answers to SYNC after the motion.
+    pub sync_answers: SyncAnswers,
 }
 
 impl JogOrder {
@@ -86,7 +86,7 @@ pub fn jog(
     let mut mover = Mover::prepare(line, scenario, axis, caution, operator)?;
     let done = there_and_back(&mut mover, order);
     let report = mover.end_motion(done)?;
-    Ok(JogReport { sync_answer_ns: longest_sync_answer_ns(line, axis)?, ..report })
+    Ok(JogReport { sync_answers: sync_answers(line, axis)?, ..report })
 }
 
 fn there_and_back(mover: &mut Mover<'_>, order: &JogOrder) -> Result<JogReport, MotionError> {
@@ -110,7 +110,7 @@ fn there_and_back(mover: &mut Mover<'_>, order: &JogOrder) -> Result<JogReport, 
         noise_m,
         ways: [response(&there, [began_m, far_m]), response(&back, [far_m, end_m])],
         drop_m,
-        sync_answer_ns: None,
+        sync_answers: SyncAnswers::default(),
     })
 }
 

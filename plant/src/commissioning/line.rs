@@ -6,6 +6,7 @@ use std::fmt::{self, Debug, Formatter};
 use std::io;
 use std::io::Write;
 
+use masseter_can::Frame;
 use masseter_can::canopen::{
     AbortCode, Expedited, Nmt, NmtCommand, NmtTarget, NodeId, ObjectAddress, SdoRequest, sync,
 };
@@ -91,6 +92,19 @@ impl Line {
     /// Sends the master's heartbeat from now on, with that interval.
     pub fn beat_every(&mut self, interval_ms: u16) {
         self.traffic.beat_every(interval_ms);
+    }
+
+    /// Sends no further heartbeat; returns when the last one was sent, ns.
+    pub(super) fn end_heartbeat(&mut self) -> u64 {
+        self.traffic.end_heartbeat()
+    }
+
+    /// Sends SYNC and process data to the drive of an axis; returns when, ns.
+    pub(super) fn send_cycle(&mut self, axis: usize, rpdo: Frame) -> Result<u64, LineError> {
+        let Address { bus, .. } = self.traffic.addresses[axis];
+        self.traffic.send(bus, sync::frame())?;
+        self.traffic.send(bus, rpdo)?;
+        Ok(self.now_ns())
     }
 
     /// Listens for that long.

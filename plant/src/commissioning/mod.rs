@@ -17,13 +17,14 @@ mod steps;
 mod tests;
 mod traffic;
 mod watch;
+mod watchdog;
 mod write;
 
 pub use crate::master::link::Address;
 pub use deviations::{Deviation, Outcome, deviations};
 pub use errors::{
-    AxisError, LineError, MasterSign, MotionError, OtherMaster, Restarted, SdoReason, StopCause, Unproved,
-    object_name, reason_text, value_text,
+    AxisError, LineError, MasterSign, MotionError, OtherMaster, Restarted, SdoReason, Silence, StopCause,
+    Unproved, object_name, reason_text, value_text,
 };
 pub use home::{HomeReport, home};
 pub use identity::{
@@ -33,7 +34,8 @@ pub use jog::{JogOrder, JogReport, StepResponse, jog};
 pub use line::{BootUps, Ledger, Line, OldValue};
 pub use mover::{Caution, Operator, Wish};
 pub use settings::{Difference, Settings, Survey};
-pub use steps::{PowerError, Stand, StoreError, prove_no_power, reset, stand, store, take_over};
+pub use steps::{PowerError, Stand, StoreError, SyncAnswers, prove_no_power, reset, stand, store, take_over};
 pub use traffic::{Heard, Strangers};
 pub use watch::Sample;
+pub use watchdog::{Reaction, WatchdogReport, prove_watchdogs};
 pub use write::{Change, WriteError, Writer, give_back};

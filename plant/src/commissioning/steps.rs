@@ -5,6 +5,7 @@ use masseter_can::cia402::{Controlword, DriveState, Statusword};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_scenario::{Scenario, StoreConfig};
+use serde::Serialize;
 
 use super::errors::{LineError, MotionError, SdoReason};
 use super::line::Line;
@@ -203,19 +204,31 @@ fn unless_silent<T>(answer: Result<T, LineError>) -> Result<Option<T>, LineError
 /// Number of SYNCs for the measurement.
 const SYNCS: usize = 50;
 /// Time that a node takes to become operational, ns.
-const START_NS: u64 = 50 * MILLISECOND_NS;
+pub(super) const START_NS: u64 = 50 * MILLISECOND_NS;
 
-/// The longest time from the end of a SYNC to the start of the drive's process data, ns; none for a SYNC without an
-/// answer. The drive is operational meanwhile, and pre-operational before and after.
+/// How a drive answered to SYNC.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct SyncAnswers {
+    /// SYNCs that were sent.
+    pub sent: usize,
+    /// Those without process data of the drive.
+    pub unanswered: usize,
+    /// The longest time from the end of a SYNC until the drive began to transmit, ns; none without any answer.
+    pub longest_ns: Option<u64>,
+}
+
+/// Sends SYNCs to a drive without power. The drive is operational meanwhile, and pre-operational before and after.
 ///
 /// # Errors
 /// [`LineError`] except those of transfers.
-pub(super) fn longest_sync_answer_ns(line: &mut Line, axis: usize) -> Result<Option<u64>, LineError> {
+pub(super) fn sync_answers(line: &mut Line, axis: usize) -> Result<SyncAnswers, LineError> {
     line.command(axis, NmtCommand::Start)?;
     line.listen(START_NS)?;
-    let answers = (0..SYNCS).map(|_| line.sync_answer_ns(axis)).collect::<Result<Option<Vec<_>>, _>>();
+    let answers_ns = (0..SYNCS).map(|_| line.sync_answer_ns(axis)).collect::<Result<Vec<_>, _>>();
     line.command(axis, NmtCommand::EnterPreOperational)?;
-    Ok(answers?.and_then(|answers| answers.into_iter().max()))
+    let answered: Vec<_> = answers_ns?.into_iter().flatten().collect();
+    let longest_ns = answered.iter().copied().max();
+    Ok(SyncAnswers { sent: SYNCS, unanswered: SYNCS - answered.len(), longest_ns })
 }
 
 #[cfg(test)]
@@ -279,10 +292,12 @@ mod sync_answer_tests {
         let log = Log::default();
         let mut line = Line::open(&Scenario::default(), Box::new(log.clone())).unwrap();
         line.listen(100 * MILLISECOND_NS).unwrap();
-        let found_ns = longest_sync_answer_ns(&mut line, 3).unwrap().unwrap();
-        assert!(found_ns < 10_000, "emulated drives answer at once: {found_ns} ns");
+        let answers = sync_answers(&mut line, 3).unwrap();
+        assert_eq!((answers.sent, answers.unanswered), (SYNCS, 0));
+        assert!(answers.longest_ns.unwrap() < 10_000, "emulated drives answer at once: {answers:?}");
         line.write(3, ObjectAddress::new(0x1800, 1), 0xC000_0184, 4).unwrap();
-        assert_eq!(longest_sync_answer_ns(&mut line, 3).unwrap(), None, "TPDO1 is off");
+        let silent = SyncAnswers { sent: SYNCS, unanswered: SYNCS, longest_ns: None };
+        assert_eq!(sync_answers(&mut line, 3).unwrap(), silent, "TPDO1 is off");
         assert_eq!(log.controlwords(), []);
         let log = log.text();
         assert_eq!(

@@ -2,6 +2,7 @@
 
 mod loans;
 mod stops;
+mod watchdogs;
 
 use std::path::Path;
 

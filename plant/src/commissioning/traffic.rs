@@ -78,6 +78,12 @@ impl Traffic {
             Some(Beat { every_ns: u64::from(interval_ms) * MILLISECOND_NS, next_ns: self.wires.now_ns() });
     }
 
+    /// Sends no further heartbeat; returns when the last one was sent, ns.
+    pub(super) fn end_heartbeat(&mut self) -> u64 {
+        let now_ns = self.wires.now_ns();
+        self.beat.take().map_or(now_ns, |beat| beat.next_ns.saturating_sub(beat.every_ns))
+    }
+
     /// Sends a frame to a bus.
     pub(super) fn send(&mut self, bus: usize, frame: Frame) -> Result<(), LineError> {
         self.wires.send(bus, frame).map_err(|error| LineError::Send { bus, error })

@@ -224,9 +224,9 @@ impl Watch {
 /// Longest time of a drive from one state to the next, ns.
 const TRANSITION_NS: u64 = SECOND_NS;
 /// Time of the watch over an axis after the loss of its power, ns.
-const SETTLING_NS: u64 = SECOND_NS;
+pub(super) const SETTLING_NS: u64 = SECOND_NS;
 /// Largest way of an axis while its brake closes, m: some turns of play, not a fall.
-const MOST_DROP_M: f64 = 5e-4;
+pub(super) const MOST_DROP_M: f64 = 5e-4;
 /// Longest time of the attempts at a stop, and the time between two commands, ns.
 const STOP_NS: u64 = SECOND_NS;
 const REPEAT_NS: u64 = 200 * MILLISECOND_NS;
@@ -283,7 +283,7 @@ pub(super) fn stop_drive(line: &mut Line, axis: usize, brake: &BrakeConfig) -> R
     Ok(line.listen(seconds(brake.close_s))?)
 }
 
-fn disable_voltage(line: &mut Line, axis: usize) -> Result<(), MotionError> {
+pub(super) fn disable_voltage(line: &mut Line, axis: usize) -> Result<(), MotionError> {
     repeat(line, axis, Controlword::DISABLE_VOLTAGE).map_err(|reason| AxisError::StaysOn(reason).of(axis))?;
     line.note_off(axis);
     Ok(())
@@ -318,7 +318,7 @@ pub(super) fn wait_for_mode(line: &mut Line, axis: usize, wanted: i8) -> Result<
 }
 
 /// The state of a drive when the condition holds, or at the end of the time.
-fn wait_for_state(
+pub(super) fn wait_for_state(
     line: &mut Line,
     axis: usize,
     within_ns: u64,

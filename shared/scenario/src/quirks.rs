@@ -88,6 +88,14 @@ quirk_kinds! {
     FaultAtPowerOn "fault_at_power_on" [code];
     /// The drive restarts by itself once, `after_s` after power-on.
     Restarts "restarts" [after_s];
+    /// The drive goes on without the master's heartbeat, though it shows 1016h.
+    IgnoresHeartbeat "ignores_heartbeat" [];
+    /// The drive goes on without process data, though it shows 1400h:05.
+    IgnoresProcessData "ignores_process_data" [];
+    /// Heartbeat and process data count as lost only `for_s` after their time.
+    LateWatchdog "late_watchdog" [for_s];
+    /// A lost master takes the current away at once, and the brake stays open: the axis coasts, and a leg falls.
+    CoastsWithoutMaster "coasts_without_master" [];
     /// SDO shows `value` in each of `objects`; writes are acknowledged, and change nothing.
     Shows "shows" [objects value];
     /// The drive has none of `objects`.

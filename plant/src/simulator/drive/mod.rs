@@ -84,7 +84,7 @@ pub(crate) struct Quirks {
 }
 
 /// The deviations of the node.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct NodeQuirks {
     /// Boot-up messages at a start.
     pub(crate) boot_ups: u8,
@@ -96,10 +96,14 @@ pub(crate) struct NodeQuirks {
     pub(crate) fault: Option<u16>,
     /// Time from power-on to a restart by itself, ns.
     pub(crate) restart_ns: Option<u64>,
+    /// How much later than configured a heartbeat and process data count as lost, ns; `u64::MAX` for never.
+    pub(crate) heartbeat_late_ns: u64,
+    pub(crate) process_data_late_ns: u64,
 }
 
 /// The deviations of the axis.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::struct_excessive_bools, reason = "quirks that are independent of each other")]
 pub(crate) struct AxisQuirks {
     /// Whether the position at home is the home offset instead of its negative.
     pub(crate) is_offset_inverted: bool,
@@ -109,6 +113,8 @@ pub(crate) struct AxisQuirks {
     pub(crate) is_incremental: bool,
     /// Largest distance of the encoder from a second one at the joint, m; none without a second one.
     pub(crate) encoders_apart_m: Option<f64>,
+    /// Whether a lost master takes the current away, with an open brake.
+    pub(crate) coasts_without_master: bool,
     /// Time of safe torque off after power-on, ns.
     pub(crate) torque_off_ns: u64,
     /// Opening time of the brake, ns.

@@ -99,7 +99,7 @@ const CYCLIC_POSITION: u32 = 1 << 7;
 /// [`PlantError::Scenario`] for an object that no emulated drive has.
 fn quirks(on_axis: &[&QuirkConfig], period_ns: u64, objects: &mut Objects) -> Result<Quirks, PlantError> {
     let ns = |time_s: Option<f64>| time_s.map(|time_s| (time_s * SECOND_NS as f64) as u64);
-    let mut node = NodeQuirks { boot_ups: 1, locks_pdos: false, save_ns: 0, fault: None, restart_ns: None };
+    let mut node = NodeQuirks { boot_ups: 1, ..NodeQuirks::default() };
     let mut axis = AxisQuirks { closing_ns: Some(0), ..AxisQuirks::default() };
     let mut overlay = Overlay::default();
     for quirk in on_axis {
@@ -132,6 +132,14 @@ fn quirks(on_axis: &[&QuirkConfig], period_ns: u64, objects: &mut Objects) -> Re
             Kind::TwoBootUps => node.boot_ups = 2,
             Kind::SlowSave => node.save_ns = ns(quirk.for_s).unwrap_or(0),
             Kind::FaultAtPowerOn => node.fault = quirk.code,
+            Kind::IgnoresHeartbeat => node.heartbeat_late_ns = u64::MAX,
+            Kind::IgnoresProcessData => node.process_data_late_ns = u64::MAX,
+            Kind::LateWatchdog => {
+                let late_ns = ns(quirk.for_s).unwrap_or(0);
+                node.heartbeat_late_ns = node.heartbeat_late_ns.max(late_ns);
+                node.process_data_late_ns = node.process_data_late_ns.max(late_ns);
+            }
+            Kind::CoastsWithoutMaster => axis.coasts_without_master = true,
             Kind::Restarts => node.restart_ns = ns(quirk.after_s),
             Kind::SlowBrake => {
                 axis.opening_ns = ns(quirk.open_s).unwrap_or(0);

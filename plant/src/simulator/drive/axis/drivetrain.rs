@@ -109,6 +109,11 @@ impl Brake {
         }
     }
 
+    /// Never closes again.
+    pub(super) fn fail_open(&mut self) {
+        self.closing_ns = None;
+    }
+
     /// The earliest time from `now_ns` on at which the axis may move.
     pub(super) fn free_from_ns(&self, now_ns: u64) -> u64 {
         now_ns.max(self.open_at_ns)

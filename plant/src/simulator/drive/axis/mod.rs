@@ -156,6 +156,10 @@ impl Axis {
         let was_in_fault = self.power.is_in_fault();
         match self.parameters.abort_connection_option {
             0 => {}
+            _ if self.quirks.coasts_without_master && self.power.is_operated() => {
+                self.drivetrain.brake.fail_open();
+                self.obey(StateCommand::DisableVoltage, now_ns);
+            }
             1 => self.enter(self.power.state.after_fault(), now_ns),
             2 => self.obey(StateCommand::DisableVoltage, now_ns),
             _ => self.obey(StateCommand::QuickStop, now_ns),

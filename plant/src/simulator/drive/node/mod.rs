@@ -381,11 +381,11 @@ impl DriveNode {
     /// A lost heartbeat is a failure of the communication. After the event timer of an RPDO nobody controls the axis
     /// either.
     fn supervise_connection(&mut self, now_ns: u64) {
-        if self.consumer.loses(now_ns) {
+        if self.consumer.loses(now_ns.saturating_sub(self.quirks.heartbeat_late_ns)) {
             self.raise(EmergencyCode::HEARTBEAT);
             self.fail_communication(now_ns);
         }
-        if self.process_data.expires(now_ns) {
+        if self.process_data.expires(now_ns.saturating_sub(self.quirks.process_data_late_ns)) {
             self.judge_process_data();
             self.abort_connection(now_ns);
         }

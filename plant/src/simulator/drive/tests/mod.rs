@@ -86,7 +86,7 @@ pub(crate) fn settings() -> DriveSettings {
     objects.set(names::CONSUMER_HEARTBEAT_TIME, (127 << 16) + 150);
     objects.set(names::PRODUCER_HEARTBEAT_TIME_MS, 50);
     configure(&mut objects, &LEG, MILLISECOND_NS, LIMITS);
-    let node = NodeQuirks { boot_ups: 1, locks_pdos: false, save_ns: 0, fault: None, restart_ns: None };
+    let node = NodeQuirks { boot_ups: 1, ..NodeQuirks::default() };
     let axis = AxisQuirks { closing_ns: Some(0), ..AxisQuirks::default() };
     DriveSettings {
         node: id(4),
