@@ -3,7 +3,7 @@
 use std::fmt::{self, Display, Formatter};
 
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::commissioning::Known;
+use masseter_plant::commissioning::{Known, process_data_timeout_ms};
 use masseter_scenario::Scenario;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -13,7 +13,7 @@ use crate::BUILD;
 /// What a result depends on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Basis {
-    /// Build, interfaces, jaw, mechanism with its strokes, and node, profile and scale of each axis, by their names.
+    /// Build, times of the watchdogs, interfaces, jaw, mechanism with its strokes, and node, profile and scale of each axis, by their names.
     pub(crate) decided_by: Value,
     /// The drives.
     pub(crate) drives: [Known; AXES],
@@ -36,8 +36,11 @@ impl Basis {
             (*low_m, *high_m) = (to_nm(*low_m - margin_m), to_nm(*high_m + margin_m));
         }
         // Evidence of emulated drives is none of real ones.
+        let watchdogs = json!({
+            "heartbeat_ms": can.heartbeat_consumer_ms, "process_data_ms": process_data_timeout_ms(scenario)
+        });
         let decided_by = json!({
-            "axes": axes, "build": BUILD, "interfaces": can.interfaces, "jaw": jaw, "mechanism": mechanism
+            "watchdogs": watchdogs, "axes": axes, "build": BUILD, "interfaces": can.interfaces, "jaw": jaw, "mechanism": mechanism
         });
         Self { decided_by, drives }
     }

@@ -85,7 +85,7 @@ impl Played<'_> {
             return Ok(());
         }
         let refused = "a run needs proved watchdogs and a passed pose check of this robot, and at full speed also a passed dry run; \
-                       --without-bring-up skips all: a wrong sign, scale or zero can then drive an axis into its end";
+                       --without-bring-up skips all three: a wrong sign, scale or zero can then drive an axis into its end";
         let folder = Path::new(FOLDER);
         if let Some(&axis) = owed_axes(folder).first() {
             bail!(owed_advice(folder, axis));

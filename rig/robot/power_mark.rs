@@ -1,7 +1,7 @@
 //! Whether a drive has lost its power since its homing: a number in an object that the drive forgets without power.
 //!
-//! The object is the profile velocity (6081h). Only jog and home use it, and both take the mark out first. Home
-//! leaves a new one. Drives whose encoder keeps its position need no mark.
+//! The object is the profile velocity (6081h). Only jog, the proof of the watchdogs and home use it, and each takes the mark
+//! out first. Home leaves a new one. Drives whose encoder keeps its position need no mark.
 
 use anyhow::Context;
 use masseter_can::canopen::ObjectAddress;

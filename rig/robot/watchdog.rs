@@ -1,4 +1,4 @@
-//! `masseter robot watchdog`: one axis after the other stands with power, and must stop once the master is silent.
+//! `masseter robot watchdog`: one axis after the other stands with power, and must stop once the master sends nothing.
 
 use clap::Args;
 use masseter_model::geometry::{AXES, AXIS_NAMES};

@@ -283,7 +283,7 @@ fn told(survey: &Survey, profile: &DriveProfile, object: ObjectAddress) -> Optio
 }
 
 /// Ratios of the drive for its way, as far as the drive has them: gear, feed and encoder. A wrong ratio scales every
-/// motion. Without a lead the profile declares no travel, so a gear is only for a look. A feed decides the unit of
+/// motion. Without a lead the profile declares no travel, so a wrong gear is only doubtful. A feed decides the unit of
 /// 6064h; the encoder decides without one.
 fn of_ratios(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Deviation> {
     let units = &profile.units;
@@ -467,7 +467,7 @@ mod units_tests {
         );
     }
 
-    /// With 6092h as the unit of 6064h, 608Fh is only for a look.
+    /// Where 6092h decides the unit of 6064h, a wrong 608Fh is only doubtful.
     #[test]
     fn ratios_of_the_drive_are_those_of_the_profile() {
         let ratios = |found: &[(u16, u32, u32)], profile: &str| {

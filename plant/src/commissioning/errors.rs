@@ -60,7 +60,7 @@ pub enum LineError {
         /// The value that the drive shows; none for a refusal to show the object.
         found: Option<u32>,
     },
-    /// The request switches on a second drive.
+    /// The request would switch on a second drive.
     #[error("{}: not switched on, because {} still is; end that step first", AXIS_NAMES[*axis], AXIS_NAMES[*other])]
     SecondAxis {
         /// The axis to be switched on.
@@ -204,7 +204,7 @@ pub enum StopCause {
         /// The way, m.
         moved_m: f64,
     },
-    /// Another drive has power without this step.
+    /// Another drive has power that this step did not give.
     #[error("{} went to {state}, and this step did not switch it on; end the program that controls it", AXIS_NAMES[*other])]
     OtherPowered {
         /// The axis of the other drive.
@@ -317,7 +317,7 @@ pub enum AxisError {
     /// The axis has been stopped and switched off.
     #[error("{0}; the axis is off")]
     Stopped(StopCause),
-    /// The drive has power without this step.
+    /// The drive has power that this step did not give.
     #[error("{0} already; end the program that controls it, and switch the drive off")]
     Powered(DriveState),
     /// The drive does not go to "operation enabled".
@@ -384,10 +384,10 @@ pub enum AxisError {
         /// The way, m.
         moved_m: f64,
     },
-    /// The drive ignores that the master is silent.
+    /// The drive does not react to a silence of the master.
     #[error(
-        "kept its power for {waited_ms:.0} ms after the last {silence}, {} is {timeout_ms} ms; nothing stops this drive if the \
-         master dies: check {} and 6007h, or use another drive", .silence.object(), .silence.object()
+        "kept its power for {waited_ms:.0} ms after the last {silence}, while {} is {timeout_ms} ms; nothing stops this drive \
+         without {silence}: check {} and 6007h, or use another drive", .silence.object(), .silence.object()
     )]
     Unwatched {
         /// What the master did not send.
@@ -397,12 +397,25 @@ pub enum AxisError {
         /// After which time the drive should stop, ms.
         timeout_ms: u16,
     },
-    /// The drive stops too late.
+    /// The drive stops too late, or its stop was seen too late.
     #[error(
-        "stopped {stopped_after_ms:.0} ms after the last {silence}, {} is {timeout_ms} ms; check the unit of that object, and \
-         what else delays the drive", .silence.object()
+        "was seen without power only {stopped_after_ms:.0} ms after the last {silence}, while {} is {timeout_ms} ms; check the \
+         unit of that object and what else delays the drive, then repeat the step", .silence.object()
     )]
     LateWatchdog {
+        /// What the master did not send.
+        silence: Silence,
+        /// When the stop was seen, ms.
+        stopped_after_ms: f64,
+        /// After which time the drive should stop, ms.
+        timeout_ms: u16,
+    },
+    /// The drive stopped, and not because of the silence.
+    #[error(
+        "stopped {stopped_after_ms:.0} ms after the last {silence}, while {} is {timeout_ms} ms, and its emergency messages name \
+         no lost {silence}; find what else stopped the drive, then repeat the step", .silence.object()
+    )]
+    OtherStop {
         /// What the master did not send.
         silence: Silence,
         /// When the drive stopped, ms.
@@ -418,15 +431,26 @@ pub enum AxisError {
         /// The state of the drive.
         state: DriveState,
     },
-    /// The drive stops without a word.
+    /// A fault that the silence made does not end.
+    #[error(
+        "stays in fault (error code {error_code:04X}h) though the heartbeat is back; look the code up in the drive's manual"
+    )]
+    KeepsFault {
+        /// 603Fh.
+        error_code: u16,
+    },
+    /// The drive stops without an emergency message.
     #[error("stopped without {silence}, and sent no emergency message; check 1014h")]
     Unreported {
         /// What the master did not send.
         silence: Silence,
     },
     /// RPDO1 is not the one that the rig sends.
-    #[error("1600h is not as the profile has it; run 'masseter robot configure' again")]
-    OtherMapping,
+    #[error("{index:04X}h is not as the rig needs it; run 'masseter robot configure' again")]
+    OtherMapping {
+        /// The object.
+        index: u16,
+    },
     /// A way that this step does not allow.
     #[error("{:.3} mm is no way for a jog; give up to {:.0} mm, at least ten increments", .by_m * 1e3, .most_m * 1e3)]
     Way {

@@ -22,7 +22,7 @@ const BACK_M: f64 = 1e-3;
 const NO_WAY_M: f64 = 1e-5;
 /// Opening of the software limits on either side of the axis, strokes.
 const OPENED: f64 = 1.1;
-/// Longest time of the search, in times of the way at the homing speeds.
+/// Longest time of the search, as a multiple of the time for the stroke at the homing speeds.
 const PATIENCE: f64 = 1.5;
 /// Time of the motion beyond home, s.
 const REACTION_S: f64 = 0.02;

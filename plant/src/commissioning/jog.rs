@@ -34,7 +34,7 @@ pub struct JogOrder {
 /// The result of a jog.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct JogReport {
-    /// Positions at the beginning, at the far end, and at the end by 6064h, m.
+    /// Positions by 6064h at the beginning, at the far end and at the end, m.
     pub positions_m: [f64; 3],
     /// Half of the range of 6064h while the axis stood, m.
     pub noise_m: f64,
@@ -47,7 +47,7 @@ pub struct JogReport {
 }
 
 impl JogOrder {
-    /// A jog with the usual caution, at a speed of one second for the way.
+    /// A jog with the usual caution, and so slow that the way takes at least a second.
     pub fn usual(scenario: &Scenario, axis: usize, by_m: f64) -> Self {
         let mut caution = Caution::usual(scenario, axis);
         caution.speed_m_s = caution.speed_m_s.min(by_m.abs());

@@ -25,7 +25,7 @@ use crate::master::wanted::{is_write_only, shown_bits};
 
 /// Silence of a server before the repetition of a request.
 const TIMEOUT_NS: u64 = 500 * MILLISECOND_NS;
-/// The same while a drive has power: a motion without a look must be short.
+/// The same while a drive has power: a motion that nobody watches must be short.
 const POWERED_TIMEOUT_NS: u64 = 100 * MILLISECOND_NS;
 /// Time that a node has to answer a scan, ns.
 const SCAN_NS: u64 = 10 * MILLISECOND_NS;
@@ -99,11 +99,14 @@ impl Line {
         self.traffic.end_heartbeat()
     }
 
-    /// Sends SYNC and process data to the drive of an axis; returns when, ns.
-    pub(super) fn send_cycle(&mut self, axis: usize, rpdo: Frame) -> Result<u64, LineError> {
-        let Address { bus, .. } = self.traffic.addresses[axis];
-        self.traffic.send(bus, sync::frame())?;
-        self.traffic.send(bus, rpdo)?;
+    /// Sends SYNC to the bus of an axis.
+    pub(super) fn send_sync(&mut self, axis: usize) -> Result<(), LineError> {
+        self.traffic.send(self.traffic.addresses[axis].bus, sync::frame())
+    }
+
+    /// Sends process data to the drive of an axis; returns when, ns.
+    pub(super) fn send_process_data(&mut self, axis: usize, rpdo: Frame) -> Result<u64, LineError> {
+        self.traffic.send(self.traffic.addresses[axis].bus, rpdo)?;
         Ok(self.now_ns())
     }
 
@@ -269,9 +272,8 @@ impl Line {
     /// Sends SYNC to the bus of an axis. Returns the time from its end to the start of the drive's process data, ns;
     /// none without process data.
     pub(super) fn sync_answer_ns(&mut self, axis: usize) -> Result<Option<u64>, LineError> {
-        let Address { bus, .. } = self.traffic.addresses[axis];
         (self.traffic.sync_ns, self.traffic.heard[axis].process_data_ns) = (None, None);
-        self.traffic.send(bus, sync::frame())?;
+        self.send_sync(axis)?;
         self.listen_until(SYNC_NS, |line| line.heard(axis).process_data_ns.is_some())?;
         Ok(self.traffic.sync_answer_ns(axis))
     }

@@ -23,7 +23,8 @@ const STILL_NS: u64 = SECOND_NS;
 const RESTLESS_NS: u64 = 5 * SECOND_NS;
 /// Allowed share of the motor's force limit (6072h): at the limit the motor no longer follows.
 const USABLE: f64 = 0.9;
-/// Least way against the target that counts, in times of the noise and in increments.
+/// Largest apparent way against the target that is no motion: the larger of these multiples of the noise and of an
+/// increment.
 const NOISES: f64 = 3.0;
 const INCREMENTS: f64 = 3.0;
 

@@ -18,7 +18,7 @@ const POWER_OFF_NS: u64 = 5 * SECOND_NS;
 const POSITION: ObjectAddress = ObjectAddress::new(0x6064, 0);
 const STATUS: ObjectAddress = ObjectAddress::new(0x6041, 0);
 
-/// The reason against writes to a drive.
+/// The reason why nothing may be written to a drive.
 #[derive(Debug, thiserror::Error)]
 pub enum PowerError {
     /// The statusword shows power, or cannot be read.

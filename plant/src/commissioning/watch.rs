@@ -138,8 +138,9 @@ impl Watch {
         Ok(())
     }
 
-    /// Refuses a target beyond the axis' first place in the direction of a switch closed there. The axis is at its end,
-    /// or the switch or its wire is broken. Positions within the noise are one place.
+    /// Refuses a target beyond the place at the last reading of the switches, in the direction of a switch that was
+    /// closed there. The axis is at its end, or the switch or its wire is broken. Positions within the noise are one
+    /// place.
     ///
     /// # Errors
     /// [`AxisError::OnSwitch`].
@@ -154,7 +155,7 @@ impl Watch {
         Ok(())
     }
 
-    /// Looks once, at the position before the statusword: a statusword without "homed" proves an old position.
+    /// Looks once. The position is read before the statusword: a statusword without "homed" proves an old position.
     ///
     /// # Errors
     /// [`AxisError::Stopped`] for what must stop the motion.
@@ -197,7 +198,7 @@ impl Watch {
         Ok((force_n.abs() > limit_n).then_some(StopCause::Force { force_n, limit_n }))
     }
 
-    /// The axis may leave a switch closed at the beginning.
+    /// A switch that was closed at the beginning stops no motion, because the axis may leave it.
     fn look_at_switches(&self, line: &mut Line) -> Result<Option<StopCause>, MotionError> {
         let Some(before) = self.switches else { return Ok(None) };
         let bits = line.read_number(self.axis, INPUTS)?;
@@ -205,7 +206,7 @@ impl Watch {
         Ok((closed != 0).then_some(StopCause::LimitSwitch { bits }))
     }
 
-    fn look_at_another(&mut self, line: &mut Line) -> Result<Option<StopCause>, MotionError> {
+    pub(super) fn look_at_another(&mut self, line: &mut Line) -> Result<Option<StopCause>, MotionError> {
         let other = self.next;
         self.next = (other + 1) % AXES;
         if other == self.axis {
@@ -222,7 +223,7 @@ impl Watch {
 }
 
 /// Longest time of a drive from one state to the next, ns.
-const TRANSITION_NS: u64 = SECOND_NS;
+pub(super) const TRANSITION_NS: u64 = SECOND_NS;
 /// Time of the watch over an axis after the loss of its power, ns.
 pub(super) const SETTLING_NS: u64 = SECOND_NS;
 /// Largest way of an axis while its brake closes, m: some turns of play, not a fall.

@@ -1,32 +1,41 @@
-//! Watchdogs of a drive: an axis stands with power, the master falls silent, and the drive must stop by itself and report that.
+//! Watchdogs of a drive: an axis stands with power, the master's frames end, and the drive must stop by itself and report that.
 //!
-//! The heartbeat ends first, in pre-operational. Then the process data end, in operational, while the heartbeat goes on. Statuswords
-//! come by SDO, milliseconds apart, so the times are no finer than that. How fast a moving axis comes to rest is not part of it.
+//! The heartbeat ends first. Then the process data end, while heartbeat and SYNC go on. Statuswords come by SDO, milliseconds apart, so
+//! the times are no finer than that. The step does not prove how fast a moving axis comes to rest.
 
-use masseter_can::canopen::{EmergencyCode, NmtCommand, NodeId, ObjectAddress};
+use masseter_can::canopen::{
+    AbortCode, Emergency, EmergencyCode, NmtCommand, NmtState, NodeId, ObjectAddress,
+};
 use masseter_can::cia402::{Controlword, DriveState};
 use masseter_can::{Frame, Rpdo1};
+use masseter_model::geometry::AXES;
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_scenario::Scenario;
 use serde::{Deserialize, Serialize};
 
-use super::errors::{AxisError, MotionError, Silence};
+use super::errors::{AxisError, LineError, MotionError, SdoReason, Silence, StopCause};
 use super::line::Line;
-use super::mover::{Caution, Mover, Operator, POSITIONING};
+use super::mover::{Caution, Mover, Operator, POSITIONING, Wish};
 use super::steps::START_NS;
-use super::watch::{MOST_DROP_M, SETTLING_NS, disable_voltage, read_state, wait_for_state};
+use super::watch::{
+    MOST_DROP_M, SETTLING_NS, TRANSITION_NS, disable_voltage, read_error_code, read_state, wait_for_state,
+};
 use super::write::Loan;
-use crate::master::wanted::rpdo_timeout_ms;
+use crate::master::wanted::{WantedDrive, rpdo_timeout_ms};
 
 /// How much longer than its time a drive may take: some drives look every few milliseconds, and the statusword comes by SDO.
 const MARGIN_NS: u64 = 50 * MILLISECOND_NS;
-/// For how long a silent drive is watched beyond that, so that a late one shows how late it is, ns.
+/// The share of its time after which a stop may be that of the watchdog. An earlier one has another cause.
+const EARLIEST: f64 = 0.8;
+/// How long a drive is watched beyond its time, so that a late one shows how late it is, ns.
 const LATE_NS: u64 = SECOND_NS;
 /// How long a drive may take from leaving operation to being without power, ns.
 const POWER_OFF_NS: u64 = 2 * SECOND_NS;
-/// For how long process data are sent, and how often, before they end.
+/// For how long process data are sent, and how often, before they end, ns.
 const SENT_NS: u64 = 200 * MILLISECOND_NS;
-const SENT_EVERY_NS: u64 = 5 * MILLISECOND_NS;
+const SENT_EVERY_NS: u64 = 2 * MILLISECOND_NS;
+/// Objects that decide what the drive does without a master. The proof uses the values of the run.
+const REACTIONS: [u16; 3] = [0x6007, 0x605A, 0x605E];
 
 /// How a drive reacted to a silence.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -46,8 +55,13 @@ pub struct Reaction {
 pub struct WatchdogReport {
     /// Without the master's heartbeat.
     pub heartbeat: Reaction,
-    /// Without process data; none of a drive without an event timer for its RPDO, and where the scenario switches the timer off.
+    /// Without process data. None of a drive without an event timer for its RPDO, and in a scenario without that time.
     pub process_data: Option<Reaction>,
+}
+
+/// The time without process data after which the drives of a scenario must stop, ms; 0 for never.
+pub fn process_data_timeout_ms(scenario: &Scenario) -> u16 {
+    rpdo_timeout_ms(scenario)
 }
 
 /// Proves both watchdogs of a drive, whose axis stands meanwhile.
@@ -60,14 +74,21 @@ pub fn prove_watchdogs(
     axis: usize,
     operator: &mut Operator<'_>,
 ) -> Result<WatchdogReport, MotionError> {
-    let heartbeat_ms = scenario.can.heartbeat_consumer_ms;
-    let heartbeat = prove(line, scenario, axis, operator, Silence::Heartbeat, heartbeat_ms)?;
-    let timer_ms = rpdo_timeout_ms(scenario);
-    let has_timer = timer_ms > 0 && line.read_if_there(axis, Silence::ProcessData.object())?.is_some();
-    let process_data = has_timer
-        .then(|| prove(line, scenario, axis, operator, Silence::ProcessData, timer_ms))
-        .transpose()?;
+    let heartbeat = prove(line, scenario, axis, operator, Silence::Heartbeat)?;
+    let has_timer = rpdo_timeout_ms(scenario) > 0 && has_timer(line, axis)?;
+    let process_data =
+        has_timer.then(|| prove(line, scenario, axis, operator, Silence::ProcessData)).transpose()?;
     Ok(WatchdogReport { heartbeat, process_data })
+}
+
+/// Whether a drive has an event timer for its RPDO.
+fn has_timer(line: &mut Line, axis: usize) -> Result<bool, LineError> {
+    match line.read_number(axis, Silence::ProcessData.object()) {
+        Err(error) if matches!(error.abort_code(), Some(AbortCode::NO_OBJECT | AbortCode::NO_SUBINDEX)) => {
+            Ok(false)
+        }
+        read => read.map(|_| true),
+    }
 }
 
 fn prove(
@@ -76,109 +97,211 @@ fn prove(
     axis: usize,
     operator: &mut Operator<'_>,
     silence: Silence,
-    timeout_ms: u16,
 ) -> Result<Reaction, MotionError> {
+    if operator(line.now_ns()) == Wish::Stop {
+        return Err(AxisError::Stopped(StopCause::Requested).of(axis));
+    }
     let mut operator = |now_ns| operator(now_ns);
     let mut mover = Mover::prepare(line, scenario, axis, Caution::usual(scenario, axis), &mut operator)?;
-    let done = fall_silent(&mut mover, scenario, silence, timeout_ms);
+    let done = Proof::begin(&mut mover, scenario, silence).and_then(|proof| proof.play(&mut mover));
     // Some drives take no configuration in operational.
     let left = mover.line.command(axis, NmtCommand::EnterPreOperational).map_err(MotionError::from);
     mover.end_motion(done.and_then(|reaction| left.map(|()| reaction)))
 }
 
-fn fall_silent(
-    mover: &mut Mover<'_>,
-    scenario: &Scenario,
+/// One silence.
+struct Proof<'a> {
+    scenario: &'a Scenario,
     silence: Silence,
     timeout_ms: u16,
-) -> Result<Reaction, MotionError> {
-    let axis = mover.axis;
-    if silence == Silence::ProcessData {
-        let timer = silence.object();
-        mover.borrow(&[Loan::new(timer.index, timer.subindex, timeout_ms.into(), 2)])?;
-        check_mapping(mover)?;
-    }
-    mover.switch_on(POSITIONING)?;
-    let from_m = mover.position_m()?;
-    let before = mover.line.heard(axis).emergencies.len();
-    let last_ns = match silence {
-        Silence::Heartbeat => mover.line.end_heartbeat(),
-        Silence::ProcessData => send_process_data(mover, scenario)?,
-    };
-    let limit_ns = last_ns + u64::from(timeout_ms) * MILLISECOND_NS + MARGIN_NS;
-    let watched_ns = (limit_ns + LATE_NS).saturating_sub(mover.line.now_ns());
-    let state = wait_for_state(mover.line, axis, watched_ns, |state| state != DriveState::OperationEnabled)?;
-    let stopped_ns = mover.line.now_ns();
-    let stopped_after_ms = (stopped_ns - last_ns) as f64 / MILLISECOND_NS as f64;
-    if state == DriveState::OperationEnabled {
-        return Err(AxisError::Unwatched { silence, waited_ms: stopped_after_ms, timeout_ms }.of(axis));
-    }
-    // The drive takes the power away by itself.
-    let state = wait_for_state(mover.line, axis, POWER_OFF_NS, |state| !state.is_powered())?;
-    if state.is_powered() {
-        return Err(AxisError::KeepsPower { silence, state }.of(axis));
-    }
-    mover.line.listen(SETTLING_NS)?;
-    let moved_m = mover.position_m()? - from_m;
-    let mut emergencies = mover.line.heard(axis).emergencies[before..].iter();
-    let emergency = emergencies.find(|emergency| !emergency.is_reset()).map(|emergency| emergency.code);
-    recover(mover, scenario)?;
-    if stopped_ns > limit_ns {
-        return Err(AxisError::LateWatchdog { silence, stopped_after_ms, timeout_ms }.of(axis));
-    }
-    if moved_m.abs() > MOST_DROP_M {
-        return Err(AxisError::Dropped { moved_m }.of(axis));
-    }
-    let Some(EmergencyCode(emergency)) = emergency else {
-        return Err(AxisError::Unreported { silence }.of(axis));
-    };
-    Ok(Reaction { timeout_ms, stopped_after_ms, emergency, moved_m })
+    node: NodeId,
+    /// The drives in fault before.
+    in_fault: [bool; AXES],
 }
 
-/// The RPDO must hold what the rig sends, which `configure` writes.
-fn check_mapping(mover: &mut Mover<'_>) -> Result<(), MotionError> {
-    let mapping = mover.profile().pdos.rpdo1();
-    let mut entries = (1..).zip(mapping.entries());
-    let read = |mover: &mut Mover<'_>, subindex| {
-        mover.line.read_if_there(mover.axis, ObjectAddress::new(0x1600, subindex))
-    };
-    let is_same = read(mover, 0)? == Some(mapping.entries().len() as u32)
-        && entries.try_fold(true, |is_same, (subindex, entry)| {
-            Ok::<_, MotionError>(is_same && read(mover, subindex)? == Some(*entry))
-        })?;
-    if is_same { Ok(()) } else { Err(AxisError::OtherMapping.of(mover.axis)) }
-}
-
-/// Sends process data that hold the axis, for a while; returns when the last ones were sent, ns.
-fn send_process_data(mover: &mut Mover<'_>, scenario: &Scenario) -> Result<u64, MotionError> {
-    let (axis, scale) = (mover.axis, mover.scale());
-    let target_increments = scale.increments(mover.position_m()?);
-    let rpdo =
-        Rpdo1 { controlword: Controlword::ENABLE_OPERATION, target_increments, torque_offset_permille: 0 };
-    let node = NodeId::new(scenario.can.node_ids[axis]).expect("the line has opened with this id");
-    let frame: Frame = rpdo.frame(node, &mover.profile().pdos.rpdo1());
-    mover.line.command(axis, NmtCommand::Start)?;
-    mover.line.listen(START_NS)?;
-    let until_ns = mover.line.now_ns() + SENT_NS;
-    loop {
-        let sent_ns = mover.line.send_cycle(axis, frame)?;
-        if sent_ns >= until_ns {
-            return Ok(sent_ns);
+impl<'a> Proof<'a> {
+    /// Gives the drive the objects of a run.
+    fn begin(mover: &mut Mover<'_>, scenario: &'a Scenario, silence: Silence) -> Result<Self, MotionError> {
+        let axis = mover.axis;
+        let node = NodeId::new(scenario.can.node_ids[axis]).expect("the line has opened with this id");
+        let timeout_ms = match silence {
+            Silence::Heartbeat => scenario.can.heartbeat_consumer_ms,
+            Silence::ProcessData => rpdo_timeout_ms(scenario),
+        };
+        let mut in_fault = [false; AXES];
+        for (axis, in_fault) in in_fault.iter_mut().enumerate() {
+            *in_fault = read_state(mover.line, axis)? == DriveState::Fault;
         }
-        mover.line.listen(SENT_EVERY_NS)?;
-        mover.look()?;
+        let wanted = WantedDrive::of_axis(scenario, axis, node).map_err(LineError::from)?;
+        let is_needed = |object: ObjectAddress| {
+            REACTIONS.contains(&object.index) || silence == Silence::ProcessData && object == silence.object()
+        };
+        let loans: Vec<_> = wanted.objects.iter().filter(|setting| is_needed(setting.object.0)).collect();
+        let loans: Vec<_> = loans
+            .into_iter()
+            .map(|setting| {
+                let object = setting.object.0;
+                let loan = Loan::new(object.index, object.subindex, setting.value, setting.bytes);
+                Loan { may_lack: true, ..loan }
+            })
+            .collect();
+        mover.borrow(&loans)?;
+        if silence == Silence::ProcessData {
+            check_pdo(mover, node)?;
+        }
+        Ok(Self { scenario, silence, timeout_ms, node, in_fault })
+    }
+
+    fn play(&self, mover: &mut Mover<'_>) -> Result<Reaction, MotionError> {
+        let &Self { silence, timeout_ms, .. } = self;
+        let axis = mover.axis;
+        mover.switch_on(POSITIONING)?;
+        let from_m = mover.position_m()?;
+        let before = mover.line.heard(axis).emergencies.len();
+        // A run is in operational, too.
+        mover.line.command(axis, NmtCommand::Start)?;
+        let last_ns = match silence {
+            Silence::Heartbeat => {
+                mover.line.listen(START_NS)?;
+                mover.line.end_heartbeat()
+            }
+            Silence::ProcessData => self.send_process_data(mover)?,
+        };
+        let timeout_ns = u64::from(timeout_ms) * MILLISECOND_NS;
+        let limit_ns = last_ns + timeout_ns + MARGIN_NS;
+        let stopped_ns = self.wait_for_stop(mover, from_m, last_ns, limit_ns + LATE_NS)?;
+        // The drive takes the power away by itself.
+        let state = wait_for_state(mover.line, axis, POWER_OFF_NS, |state| !state.is_powered())?;
+        if state.is_powered() {
+            return Err(AxisError::KeepsPower { silence, state }.of(axis));
+        }
+        mover.line.listen(SETTLING_NS)?;
+        let moved_m = mover.position_m()? - from_m;
+        let emergencies = &mover.line.heard(axis).emergencies[before..];
+        let emergency = emergencies.iter().map(|emergency| emergency.code).find(|code| self.explains(*code));
+        let is_silent = emergencies.iter().all(Emergency::is_reset);
+        let recovered = self.recover(mover);
+        let stopped_after_ms = (stopped_ns - last_ns) as f64 / MILLISECOND_NS as f64;
+        let is_early = stopped_after_ms < EARLIEST * f64::from(timeout_ms);
+        // What went wrong first is the cause of what does not recover.
+        Err(match emergency {
+            _ if moved_m.abs() > MOST_DROP_M => AxisError::Dropped { moved_m },
+            _ if stopped_ns > limit_ns => AxisError::LateWatchdog { silence, stopped_after_ms, timeout_ms },
+            None if is_silent && !is_early => AxisError::Unreported { silence },
+            Some(EmergencyCode(emergency)) if !is_early => {
+                return recovered.map(|()| Reaction { timeout_ms, stopped_after_ms, emergency, moved_m });
+            }
+            _ => AxisError::OtherStop { silence, stopped_after_ms, timeout_ms },
+        }
+        .of(axis))
+    }
+
+    /// Whether an error code is one of the communication (81xxh, 82xxh), and not that of the other watchdog.
+    fn explains(&self, EmergencyCode(code): EmergencyCode) -> bool {
+        let is_of_other = self.silence == Silence::ProcessData && code == EmergencyCode::HEARTBEAT.0;
+        matches!(code >> 8, 0x81 | 0x82) && !is_of_other
+    }
+
+    /// Sends process data that hold the axis, for a while; returns when the last ones were sent, ns.
+    fn send_process_data(&self, mover: &mut Mover<'_>) -> Result<u64, MotionError> {
+        let target_increments = mover.scale().increments(mover.position_m()?);
+        let controlword = Controlword::ENABLE_OPERATION;
+        let rpdo = Rpdo1 { controlword, target_increments, torque_offset_permille: 0 };
+        let frame: Frame = rpdo.frame(self.node, &mover.profile().pdos.rpdo1());
+        let until_ns = mover.line.now_ns() + SENT_NS;
+        loop {
+            mover.line.send_sync(mover.axis)?;
+            let sent_ns = mover.line.send_process_data(mover.axis, frame)?;
+            if sent_ns >= until_ns {
+                return Ok(sent_ns);
+            }
+            mover.line.listen(SENT_EVERY_NS)?;
+        }
+    }
+
+    /// Watches the axis until the drive leaves operation; returns when that was seen, ns.
+    fn wait_for_stop(
+        &self,
+        mover: &mut Mover<'_>,
+        from_m: f64,
+        last_ns: u64,
+        until_ns: u64,
+    ) -> Result<u64, MotionError> {
+        let axis = mover.axis;
+        loop {
+            if self.silence == Silence::ProcessData {
+                mover.line.send_sync(axis)?;
+            }
+            let state = match read_state(mover.line, axis) {
+                // 1029h may stop the node, whose SDO server is silent then.
+                Err(MotionError::Line(LineError::Sdo { reason: SdoReason::Silent, .. }))
+                    if mover.line.heard(axis).nmt == Some(NmtState::Stopped) =>
+                {
+                    mover.line.command(axis, NmtCommand::EnterPreOperational)?;
+                    mover.line.listen(START_NS)?;
+                    read_state(mover.line, axis)?
+                }
+                state => state?,
+            };
+            let now_ns = mover.line.now_ns();
+            if state != DriveState::OperationEnabled {
+                return Ok(now_ns);
+            }
+            let moved_m = (mover.position_m()? - from_m).abs();
+            if moved_m > mover.caution.still_m {
+                return mover.stopped(StopCause::Restless { moved_m });
+            }
+            mover.watch.check_undisturbed(mover.line)?;
+            if let Some(cause) = mover.watch.look_at_another(mover.line)? {
+                return mover.stopped(cause);
+            }
+            if (mover.operator)(now_ns) == Wish::Stop {
+                return mover.stopped(StopCause::Requested);
+            }
+            if now_ns >= until_ns {
+                let waited_ms = (now_ns - last_ns) as f64 / MILLISECOND_NS as f64;
+                let &Self { silence, timeout_ms, .. } = self;
+                return Err(AxisError::Unwatched { silence, waited_ms, timeout_ms }.of(axis));
+            }
+        }
+    }
+
+    /// Ends the faults that the silence has made, once the heartbeat is back: also drives without power may go into fault.
+    fn recover(&self, mover: &mut Mover<'_>) -> Result<(), MotionError> {
+        let beat_ms = self.scenario.can.heartbeat_producer_ms;
+        mover.line.beat_every(beat_ms);
+        mover.line.command(mover.axis, NmtCommand::EnterPreOperational)?;
+        mover.line.listen(2 * u64::from(beat_ms) * MILLISECOND_NS)?;
+        disable_voltage(mover.line, mover.axis)?;
+        for axis in (0..AXES).filter(|&axis| !self.in_fault[axis]) {
+            if read_state(mover.line, axis)? != DriveState::Fault {
+                continue;
+            }
+            mover.line.control(axis, Controlword::FAULT_RESET)?;
+            let state = wait_for_state(mover.line, axis, TRANSITION_NS, |state| state != DriveState::Fault)?;
+            // The next reset needs a rising edge.
+            mover.line.control(axis, Controlword::DISABLE_VOLTAGE)?;
+            if state == DriveState::Fault {
+                let error_code = read_error_code(mover.line, axis);
+                return Err(AxisError::KeepsFault { error_code }.of(axis));
+            }
+        }
+        Ok(())
     }
 }
 
-/// Ends the fault of a drive that has stopped, once the heartbeat is back.
-fn recover(mover: &mut Mover<'_>, scenario: &Scenario) -> Result<(), MotionError> {
-    let axis = mover.axis;
-    mover.line.beat_every(scenario.can.heartbeat_producer_ms);
-    mover.line.listen(2 * u64::from(scenario.can.heartbeat_producer_ms) * MILLISECOND_NS)?;
-    disable_voltage(mover.line, axis)?;
-    if read_state(mover.line, axis)? == DriveState::Fault {
-        mover.control(Controlword::FAULT_RESET)?;
-        disable_voltage(mover.line, axis)?;
+/// RPDO1 must exist and hold what the rig sends, which `configure` writes.
+fn check_pdo(mover: &mut Mover<'_>, node: NodeId) -> Result<(), MotionError> {
+    const COB_ID_BITS: u32 = 0x8000_07FF;
+    let mapping = mover.profile().pdos.rpdo1();
+    let entries = (1..).zip(mapping.entries()).map(|(subindex, entry)| (0x1600, subindex, *entry, u32::MAX));
+    let cob_id = 0x200 + u32::from(node.get());
+    let wanted = [(0x1400, 1, cob_id, COB_ID_BITS), (0x1600, 0, mapping.entries().len() as u32, u32::MAX)];
+    for (index, subindex, value, bits) in wanted.into_iter().chain(entries) {
+        let found = mover.line.read_if_there(mover.axis, ObjectAddress::new(index, subindex))?;
+        if found.is_none_or(|found| (found ^ value) & bits != 0) {
+            return Err(AxisError::OtherMapping { index }.of(mover.axis));
+        }
     }
     Ok(())
 }

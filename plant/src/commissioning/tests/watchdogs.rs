@@ -1,4 +1,4 @@
-//! Drives whose master falls silent.
+//! Drives whose master stops sending.
 
 use super::*;
 
@@ -16,7 +16,7 @@ fn quirk(text: &str) -> String {
 }
 
 #[test]
-fn a_sound_drive_stops_in_time_stands_and_says_why() {
+fn a_sound_drive_stops_in_time_and_reports_the_lost_master() {
     for more in ["", "kind = 'pdos_locked_in_operation'", "kind = 'two_boot_ups'"] {
         let text = if more.is_empty() { String::new() } else { quirk(more) };
         let (bench, report) = prove(&text);
@@ -43,17 +43,17 @@ fn a_drive_that_does_not_stop_is_switched_off_and_named() {
         (
             "kind = 'ignores_heartbeat'",
             "l1: kept its power for ",
-            "1016h:01h is 150 ms; nothing stops this drive",
+            "1016h:01h is 150 ms; nothing stops this drive without ",
         ),
         (
             "kind = 'ignores_process_data'",
             "l1: kept its power for ",
-            "1400h:05h is 150 ms; nothing stops this drive",
+            "1400h:05h is 150 ms; nothing stops this drive without ",
         ),
         (
             "kind = 'late_watchdog'\nfor_s = 0.2",
-            "l1: stopped 35",
-            "after the last heartbeat, 1016h:01h is 150 ms",
+            "l1: was seen without power only 35",
+            "after the last heartbeat, while 1016h:01h is 150 ms",
         ),
         ("kind = 'coasts_without_master'", "l1: moved ", "after its power went"),
     ];
@@ -64,7 +64,7 @@ fn a_drive_that_does_not_stop_is_switched_off_and_named() {
 }
 
 #[test]
-fn a_drive_that_stops_without_a_word_is_named() {
+fn a_drive_that_stops_without_an_emergency_message_is_named() {
     let mut bench = Bench::new("");
     let emergencies_off = 0x8000_0080 | u32::from(bench.scenario.can.node_ids[L1]);
     bench.line.write(L1, ObjectAddress::new(0x1014, 0), emergencies_off, 4).unwrap();
@@ -78,7 +78,8 @@ fn a_drive_that_stops_without_a_word_is_named() {
 
 #[test]
 fn a_little_late_is_in_time() {
-    assert!(prove(&quirk("kind = 'late_watchdog'\nfor_s = 0.03")).1.is_ok());
+    let report = prove(&quirk("kind = 'late_watchdog'\nfor_s = 0.03")).1.unwrap();
+    assert!((180.0..195.0).contains(&report.heartbeat.stopped_after_ms), "{report:?}");
 }
 
 #[test]
@@ -91,18 +92,67 @@ fn a_drive_without_an_event_timer_has_one_watchdog() {
 #[test]
 fn process_data_that_the_drive_does_not_take_prove_nothing() {
     let error = prove(&quirk("kind = 'factory_pdos'")).1.unwrap_err().to_string();
-    assert!(
-        error.starts_with("l1: 1600h is not as the profile has it; run 'masseter robot configure'"),
-        "{error}"
-    );
+    let wanted = "l1: 1600h is not as the rig needs it; run 'masseter robot configure' again";
+    assert_eq!(error, wanted);
+}
+
+/// Instants within both silences of a sound drive, s: the heartbeat ends 50 ms after the start of the node, and the process data 200 ms
+/// after that of the second proof.
+fn silences_s() -> [f64; 2] {
+    let (bench, report) = prove("");
+    report.unwrap();
+    let log = bench.log.text();
+    let starts = log.lines().filter(|line| line.contains(" 000#0104"));
+    let at_s = |line: &str| line[1..].split(')').next().unwrap().parse::<f64>().unwrap();
+    let starts: Vec<f64> = starts.map(at_s).collect();
+    [starts[0] + 0.05 + 0.06, starts[1] + 0.2 + 0.06]
 }
 
 #[test]
-fn a_wish_to_stop_ends_the_proof_before_the_silence() {
-    let mut bench = Bench::new("");
-    let stopped = prove_watchdogs(&mut bench.line, &bench.scenario, L1, &mut |_| Wish::Stop).unwrap_err();
-    let MotionError::OfAxis { reason: AxisError::Stopped(StopCause::Requested), .. } = stopped else {
-        panic!("{stopped}")
-    };
-    bench.assert_off();
+fn a_fault_within_the_silence_is_no_proof_of_a_watchdog() {
+    for (at_s, silence) in silences_s().into_iter().zip(["heartbeat", "process data"]) {
+        let mut bench = Bench::with_fault("drive_fault", L1, at_s);
+        let error = prove_watchdogs(&mut bench.line, &bench.scenario, L1, &mut |_| Wish::Move).unwrap_err();
+        let text = error.to_string();
+        assert!(
+            text.starts_with("l1: stopped ") && text.contains("find what else stopped the drive"),
+            "{text}"
+        );
+        assert!(text.contains(&format!("after the last {silence}")), "{text}");
+        bench.assert_off();
+    }
+}
+
+#[test]
+fn a_wish_to_stop_ends_the_proof_at_any_time_and_gives_no_power_after_it() {
+    let [first_s, second_s] = silences_s();
+    for (at_s, powered) in [(0.0, 0), (1.0, 1), (first_s, 1), (first_s + 1.0, 1), (second_s, 2)] {
+        let mut bench = Bench::new("");
+        let at_ns = (at_s * SECOND_NS as f64) as u64;
+        let wish = &mut |now_ns| if now_ns >= at_ns { Wish::Stop } else { Wish::Move };
+        let stopped = prove_watchdogs(&mut bench.line, &bench.scenario, L1, wish).unwrap_err();
+        let MotionError::OfAxis { reason: AxisError::Stopped(StopCause::Requested), .. } = stopped else {
+            panic!("{at_s}: {stopped}")
+        };
+        bench.assert_off();
+        let enabled = bench.log.controlwords().iter().filter(|(_, word)| word.0 & 0xF == 0xF).count();
+        assert_eq!(enabled, powered, "{at_s}");
+    }
+}
+
+/// A drive without power goes into fault, too, where the profile makes a lost connection a fault.
+#[test]
+fn faults_of_other_drives_by_the_silence_end_with_it() {
+    let mut bench = Bench::new("[[drive_profile]]\nobjects.6007h = { value = 1 }");
+    for axis in 0..AXES {
+        bench.line.write(axis, ObjectAddress::new(0x6007, 0), 1, 2).unwrap();
+        bench.line.write(axis, ObjectAddress::new(0x1400, 5), 0, 2).unwrap();
+    }
+    let before = bench.objects();
+    for axis in [L1, 0] {
+        prove_watchdogs(&mut bench.line, &bench.scenario, axis, &mut |_| Wish::Move).unwrap();
+        let states = stand(&mut bench.line, &bench.scenario, 0).unwrap().states;
+        assert!(states.iter().all(|state| *state == DriveState::SwitchOnDisabled), "{states:?}");
+    }
+    assert_eq!(bench.objects(), before, "every borrowed object has its old value");
 }

@@ -28,6 +28,9 @@ fn place_of(event: &Event) -> String {
     }
 }
 
+/// The cycle of the interpolation (CiA 402).
+const INTERPOLATION_TIME: u16 = 0x60C2;
+
 /// The meaning of value, limit and object by the cause, with the remedy, for the start and the power of a drive.
 fn words_of_start(cause: Cause, event: &Event) -> Option<String> {
     let object = ObjectAddress::new((event.object >> 8) as u16, event.object as u8);
@@ -48,7 +51,14 @@ fn words_of_start(cause: Cause, event: &Event) -> Option<String> {
              takes this object; its rule in drive_profile.objects says whether the rig writes it"
         ),
         Cause::SdoAborted => {
-            format!("object {object}: {}; look the object up in the drive's manual", AbortCode(value))
+            let remedy = match object.index {
+                INTERPOLATION_TIME => {
+                    "the drive counts its cycle in a unit of its own: choose rate_hz so that the cycle is whole in it, and \
+                     declare the unit in drive_profile.objects.'60C2h:02'"
+                }
+                _ => "look the object up in the drive's manual",
+            };
+            format!("object {object}: {}; {remedy}", AbortCode(value))
         }
         Cause::SdoTimeout => format!(
             "object {object}: no answer for {value} ms, the request was repeated every {limit} ms; check power, wiring and \
@@ -230,6 +240,8 @@ mod tests {
         let value = f64::from(AbortCode::READ_ONLY.0);
         let refused = Event { object: 0x10_1700, value, ..event(Cause::SdoAborted) };
         assert!(explain(&refused).unwrap().contains("object 1017h:00h: 06010002h (object is read-only)"));
+        let cycle = explain(&Event { object: 0x60_C202, ..refused }).unwrap();
+        assert!(cycle.contains("choose rate_hz so that the cycle is whole in it"), "{cycle}");
         let off = Event { axis: NO_AXIS, node: 0, value: 256.0, ..event(Cause::BusOff) };
         assert!(explain(&off).unwrap().starts_with("bus 1: off after"));
     }
