@@ -151,7 +151,7 @@ impl Model {
         for _ in 0..LOAD_PASSES {
             let moved_n = driven_n - axes_n;
             loads = Reactions::new(&self.bodies, motion, &Twist::zeros(), &moved_n).loads(&moved_n);
-            // A screw takes a share of the rest, so the whole step overshoots by this share.
+            // A screw takes a share of the rest: the whole step would overshoot by this share.
             let missing_n = self.drag_n(&loads, motion) - axes_n;
             axes_n += Vector6::from_fn(|axis, _| missing_n[axis] / (1.0 + self.friction.screw_loss(axis)));
         }

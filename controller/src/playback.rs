@@ -13,8 +13,8 @@ use crate::trajectory::{self, Trajectory, TrajectoryReport, interpolate, minimum
 
 /// Time between two looks at the motion for its margins, s.
 const MARGINS_EVERY_S: f64 = 0.005;
-/// Most cycles until the reading that answers a command: the next cycle, and one late cycle each for command and
-/// reading.
+/// Most cycles until the reading that answers a command: the next cycle, and one more if either the command or the
+/// reading is late.
 const LATEST_ANSWER_CYCLES: u64 = 2;
 /// Shortest and longest time of a change from 0 to 1, s.
 const SHORTEST_S: f64 = 1.0;

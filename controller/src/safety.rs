@@ -120,7 +120,7 @@ pub(crate) fn check_reading(reading: &Reading) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Whether the reading answers a command of this controller; `last_sent` is the last command.
+/// Whether the reading answers a command of this controller; `last_sent` is the cycle of its last command.
 pub(crate) fn check_commander(reading: &Reading, last_sent: u64) -> Result<(), Fault> {
     if reading.answers_cycle > last_sent {
         return Err(Fault::new(Cause::ForeignCommand, reading.answers_cycle as f64, last_sent as f64));

@@ -175,7 +175,7 @@ impl<L: Link> PlantCore<L> {
         Some(truth)
     }
 
-    /// The forces between the jaws in the last cycle, for emulated jaws that can touch.
+    /// The forces between the jaws in the cycle before this one, for emulated jaws that can touch.
     pub fn contact(&self) -> Option<Contact> {
         let mut contact = Contact { cycle: self.cycle, ..self.link.contact()? };
         contact.round();

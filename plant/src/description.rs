@@ -60,7 +60,7 @@ struct Signal {
     is_signed: bool,
     factor: f64,
     unit: &'static str,
-    /// Lowest and highest value in that unit; none for any value.
+    /// Lowest and highest value in that unit; none if every value is possible.
     range: Option<[f64; 2]>,
 }
 

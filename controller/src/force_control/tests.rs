@@ -28,7 +28,7 @@ struct World {
     thickness_m: f64,
     /// Depth at which the food breaks, m.
     breaks_at_m: f64,
-    /// End of the load cell's range, N.
+    /// Ends of the load cell's range, N.
     cell_ends_n: [f64; 2],
 }
 

@@ -6,8 +6,8 @@
 //! paper's own algorithm and plain Newton–Raphson ([`solve`], on the paper's form of the [`Equations`]) are for
 //! comparison.
 //!
-//! Everything is pure, allocates nothing and ends after a fixed number of iterations. The module does not check
-//! strokes, speeds and the dimensions of the mechanism.
+//! Everything is pure, allocates nothing and ends after a fixed number of iterations. The module checks neither strokes
+//! nor speeds nor the dimensions of the mechanism.
 
 mod bernstein;
 mod certificate;

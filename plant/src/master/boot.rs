@@ -23,7 +23,8 @@ const RESET_EVERY_NS: u64 = 500_000_000;
 const START_WITHIN_NS: u64 = 1_000_000_000;
 /// Most readings of a value that a drive shows late.
 const READINGS: u32 = 100;
-/// Most answers without a request in one boot by repeated frames. More of them mean a second drive with this id.
+/// Most answers without a request in one boot that repeated frames can explain. More of them mean a second drive with
+/// this id.
 const UNASKED: u32 = 7;
 /// Most boot-up messages during a boot before the master gives up the drive.
 const RESTARTS: u32 = 3;
@@ -75,7 +76,7 @@ pub(super) struct Boot {
 }
 
 impl Boot {
-    /// The boot of a drive, with an empty knowledge at `now_ns`.
+    /// The boot of a drive of which nothing is known at `now_ns`.
     pub(super) fn new(wanted: &WantedDrive, resets_faults: bool, now_ns: u64) -> Self {
         Self {
             phase: BootPhase::Waiting,

@@ -121,8 +121,8 @@ impl Gate {
         }
     }
 
-    /// Judges the command of this cycle; returns its request. `following_m` has the position of every drive that
-    /// follows its target.
+    /// Judges the command of this cycle; returns its request. `following_m` has the position of every drive that would
+    /// follow its target.
     pub(super) fn pass(
         &mut self,
         command: &Command,
@@ -193,7 +193,7 @@ impl RecentVelocities {
         }
     }
 
-    /// The nearest recent velocity.
+    /// The nearest velocity within the range of the recent velocities.
     fn nearest(&self, velocity_m_s: f64) -> f64 {
         let [[low, high], [older_low, older_high]] = self.ranges_m_s;
         velocity_m_s.clamp(low.min(older_low), high.max(older_high))
@@ -288,7 +288,7 @@ impl Commands {
 
     /// Takes the command of a cycle, if any; a stale command counts as none. Silence is a failure only with
     /// `needs_command`, and a refusal by the gate is a failure. `following_m` has the position of every drive that
-    /// follows its target.
+    /// would follow its target.
     pub(super) fn apply_command(
         &mut self,
         cycle: u64,
@@ -312,8 +312,8 @@ impl Commands {
         Ok(())
     }
 
-    /// Whether a command demands motion for a cycle with an earlier command: such a message may be a repetition without
-    /// a controller. A request to stop is never stale.
+    /// Whether a command demands motion for a cycle that has had its command. Such a message may be only a repetition
+    /// of the last one, while no controller runs any more. A request to stop is never stale.
     fn is_stale(&self, command: &Command) -> bool {
         self.cycle == Some(command.cycle) && command.request == DriveRequest::Enable.code()
     }

@@ -233,7 +233,8 @@ pub(crate) fn check_quantities(scenario: &Scenario) -> Result<(), PlantError> {
             return refuse(format!("{key}.encoder_resolution_m = {increment_m}: {need}"));
         }
     }
-    // The master's heartbeat ends the first cycle with a SYNC after the interval, and is queued with the command.
+    // The master's heartbeat ends the first cycle with a SYNC after the interval, and is queued once the command has
+    // come.
     let interval_ns = u64::from(can.heartbeat_producer_ms) * MILLISECOND_NS;
     let longest_ns = (interval_ns / period_ns + 2) * period_ns;
     if u64::from(can.heartbeat_consumer_ms) * MILLISECOND_NS < longest_ns {

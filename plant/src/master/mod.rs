@@ -257,7 +257,7 @@ impl Master {
     }
 
     /// Ends a stop once every drive is verified again, none has voltage, and the controller has switched the drives
-    /// off. Earlier demands for motion come from before the report of the stop.
+    /// off. A command that still demands motion was sent before the report of the stop.
     fn restore(&mut self, now_ns: u64) {
         let is_restored = self.supervision.awaits_restoration()
             && self.commands.switch_off()
@@ -423,8 +423,8 @@ impl Master {
         }
     }
 
-    /// Reports the reason against a drive. The failure of one drive at the start is no consequence of another failure,
-    /// so each has a report.
+    /// Reports the reason why a drive cannot be used. The failure of one drive at the start is no consequence of
+    /// another failure, so each has a report.
     fn name(&mut self, now_ns: u64, axis: usize, failure: &Failure) {
         self.supervision.stop(failure.cause);
         self.events.add(now_ns, Subject::Axis(axis), failure.event(EventKind::Fault));

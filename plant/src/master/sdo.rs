@@ -70,7 +70,7 @@ impl SdoClient {
         if transfer.sent_ns.is_none_or(|sent_ns| now_ns.saturating_sub(sent_ns) <= timeout_ns) {
             return Ok(());
         }
-        // No second request for a segment: its answer is the next segment.
+        // No second request for a segment: its answer would be the next segment.
         if transfer.attempt < ATTEMPTS && !matches!(transfer.action, Action::ReadSegment { .. }) {
             transfer.attempt += 1;
             transfer.sent_ns = None;

@@ -209,7 +209,8 @@ pub(crate) fn may_keep(rule: ObjectRule, object: ObjectAddress) -> bool {
     rule == ObjectRule::Optional && OFFSETS.iter().all(|(index, _)| *index != object.index)
 }
 
-/// The objects with the profile's own values; the profile's further objects come last.
+/// The objects with the scenario's values, or with the profile's own value where the profile has one. The profile's
+/// further objects come last.
 fn objects(scenario: &Scenario, axis: usize) -> Result<Vec<Setting>, PlantError> {
     let profile = scenario.profile(axis);
     let known = known_objects(scenario, axis)?;

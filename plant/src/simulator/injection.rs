@@ -22,8 +22,8 @@ use crate::state::state;
 #[derive(Debug, Clone)]
 pub(crate) struct Injector {
     injection: Injection,
-    /// Entries with a window not handed out, and whether the controller or the supervisor carries each out. Such an
-    /// entry begins with its window.
+    /// Entries with a window not handed out yet, each with whether the controller or the supervisor carries it out. An
+    /// entry of those two begins when its window begins.
     untold: Vec<(Injected, bool)>,
     /// Whether a window may have become known since the last look.
     has_news: bool,

@@ -123,7 +123,7 @@ impl PortFaults {
         self.faults.loses(self.numbered(time_ns, frame, number))
     }
 
-    /// Holds a frame back if a fault delays the frame, and returns whether.
+    /// Holds a frame back if a fault delays the frame, and returns whether a fault does.
     fn holds_back(&mut self, now_ns: u64, frame: Frame, number: u64) -> Result<bool, SendError> {
         let delay = self.faults.delays(self.numbered(now_ns, &frame, number));
         let Some((activation, by_ns)) = delay else { return Ok(false) };

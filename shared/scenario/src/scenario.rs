@@ -151,8 +151,8 @@ impl Scenario {
         is_given.then(|| Some(Document::parse(path, &text).ok()?.place_of(key, entry))).flatten()
     }
 
-    /// Reads a scenario file. The paths of its files are relative to its folder. [`Self::validate`] checks the values,
-    /// not this function.
+    /// Reads a scenario file. The paths of its files are relative to its folder. This function does not check the
+    /// values: see [`Self::validate`].
     ///
     /// # Errors
     /// [`ScenarioError`] for a file that is unreadable, no regular file or larger than 1 MiB, and those of
@@ -275,7 +275,7 @@ impl Scenario {
 
     /// The scenario with one changed value: `KEY=VALUE`, with the key and the value as in a file; see
     /// [`Self::with_table`] for lists. A value that is no TOML is text. A name that is no key of a scenario is the name
-    /// of a parameter of the controller. [`Self::validate`] checks the value, not this function.
+    /// of a parameter of the controller. This function does not check the value: see [`Self::validate`].
     ///
     /// ```
     /// use masseter_scenario::Scenario;

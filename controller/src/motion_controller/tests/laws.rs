@@ -46,7 +46,7 @@ fn a_law_equal_to_the_default_one_gives_equal_commands_whether_warmed_up_or_not(
     let controller = MotionController::with_law(&scenario, mechanism(), trajectory(&scenario), law);
     let (mut default, mut own) = (Bench::new(), Bench { controller, ..Bench::new() });
     while own.controller.state() != ControllerState::Finished {
-        // Work in advance must not reach the law, which then integrates an error twice.
+        // Work in advance must not reach the law: the law would integrate an error twice.
         own.controller.warm_up();
         default.cycle(Some);
         own.cycle(Some);

@@ -44,8 +44,8 @@ fn faults(disturbances: &[Disturbance]) -> Vec<Cause> {
     bench.causes(EventKind::Fault)
 }
 
-/// The test covers the fastest moment of the default motion with its limit: late SYNCs (also beyond the targets),
-/// skipped cycles and missing commands.
+/// The test covers the fastest moment of the default motion with its limit: late SYNCs (some so late that SYNC
+/// overtakes the targets), skipped cycles and missing commands.
 #[test]
 fn a_disturbed_machine_makes_no_following_error() {
     let none = Disturbance::default();

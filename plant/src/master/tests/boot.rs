@@ -91,7 +91,7 @@ fn a_drive_that_is_not_as_expected_is_named_and_no_drive_is_enabled() {
         (|drive| drop(drive.objects.insert((0x1400, 2), vec![255])), Cause::WrongPdo, 0x14_0002),
         (|drive| drop(drive.objects.remove(&(0x6064, 0))), Cause::SdoAborted, 0x60_6400),
         (|drive| drive.refuses = Some(((0x6007, 0), AbortCode::READ_ONLY)), Cause::SdoAborted, 0x60_0700),
-        // A profile may omit only an object that a drive lacks.
+        // The boot goes on without such an object only if the drive lacks it: any other refusal is a failure.
         (|drive| drive.refuses = Some(((0x607C, 0), AbortCode::GENERAL)), Cause::SdoAborted, 0x60_7C00),
         (|drive| drive.refuses = Some(((0x1801, 1), AbortCode::GENERAL)), Cause::SdoAborted, 0x18_0101),
         (|drive| drive.get_stuck_in(DriveState::QuickStopActive), Cause::StillPowered, 0x60_4100),

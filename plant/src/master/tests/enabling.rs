@@ -8,7 +8,7 @@ use super::*;
 /// The axis l2.
 const L2: usize = 4;
 
-/// The bench with a ready drive that stays in its state, until the others wait for this drive.
+/// The bench with a drive that, once ready, goes into this state and does not leave it.
 fn stuck(state: DriveState) -> Bench {
     let mut bench = Bench::new();
     bench.cycles(400, DriveRequest::Off);

@@ -20,7 +20,7 @@ use peer::{Peer, Wires};
 use super::Master;
 
 const PERIOD_NS: u64 = 1_000_000;
-/// Switch-on of the rig, after the beginning of time.
+/// Time of the rig's switch-on, ns: not 0, because time does not begin with the rig.
 const EPOCH_NS: u64 = 1_000_000_000;
 
 /// A master and six scripted drives on two wires.

@@ -38,7 +38,7 @@ pub(crate) enum Effect {
 struct Entry {
     injected: Injected,
     effect: Effect,
-    /// The fault with a limit of its own window.
+    /// The fault, which may shorten its window: for some kinds, the size is the duration.
     fault: Option<FaultConfig>,
     window_ns: Range<u64>,
     /// Number of its beginning among all, while active.

@@ -175,7 +175,7 @@ impl Dynamics {
         Ok(())
     }
 
-    /// The motion in the middle of the beginning step, with the twist by the last step's acceleration.
+    /// The motion in the middle of the coming step, with the twist by the last step's acceleration.
     fn middle(&self) -> Result<Motion, DynamicsError> {
         let half_s = self.step_s() / 2.0;
         let twist = self.state.twist + self.acceleration * half_s;

@@ -1,4 +1,4 @@
-//! Faults select their frames, and reports on faults.
+//! The frames that faults act on, and the reports on faults.
 
 use super::*;
 

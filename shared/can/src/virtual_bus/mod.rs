@@ -196,7 +196,7 @@ impl VirtualWire {
         }
     }
 
-    /// Ends the frame on the wire if its end is not after `until_ns`, and returns whether.
+    /// Ends the frame on the wire if its end is not after `until_ns`, and returns whether the frame has ended.
     fn end_until(&mut self, until_ns: u64) -> bool {
         match self.traffic {
             Traffic::Coming { transmission, is_on_wire: true } if transmission.end_ns <= until_ns => {

@@ -83,8 +83,8 @@ pub struct Conditioning {
 }
 
 impl Conditioning {
-    /// The conditioning of a pose. For a pose without a number, the smallest singular value is 0 and the largest
-    /// infinite.
+    /// The conditioning of a pose. For a pose with a value that is no number, the smallest singular value is 0 and the
+    /// largest infinite.
     pub fn new(jacobian: &Jacobian) -> Self {
         let scaled = jacobian.scaled();
         // The eigenvalue iteration terminates for finite numbers only.

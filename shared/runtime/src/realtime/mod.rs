@@ -183,7 +183,7 @@ impl Waiter {
     }
 
     /// Waits until `due_ns`, and at most until `latest_ns` if the core wakes up late. Spins only while a sleep of the
-    /// usual wake-up latency ends after `latest_ns`. Returns the time at the end.
+    /// usual wake-up latency would end after `latest_ns`. Returns the time at the end.
     pub fn until_between(&mut self, due_ns: u64, latest_ns: u64) -> u64 {
         let now_ns = self.end_work();
         let wake_ns = latest_ns.saturating_sub(self.margin.latency_ns()).min(due_ns);
@@ -193,7 +193,7 @@ impl Waiter {
     }
 
     /// Calls `block`, which sleeps in the kernel until an event, or until about `until_ns`. Spins instead when a sleep
-    /// of the usual wake-up latency ends after `latest_ns`. Returns the time at the end.
+    /// of the usual wake-up latency would end after `latest_ns`. Returns the time at the end.
     pub fn until_woken(&mut self, until_ns: u64, latest_ns: u64, block: impl FnOnce(u64)) -> u64 {
         let now_ns = self.end_work();
         let until_ns = latest_ns.saturating_sub(self.margin.latency_ns()).min(until_ns);

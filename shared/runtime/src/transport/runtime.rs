@@ -49,7 +49,7 @@ pub enum DomainError {
     NotPrivate {
         /// The folder, or the file with its name.
         path: PathBuf,
-        /// The reason against the session's folder, if there is one.
+        /// The reason why the session's folder cannot be used, if there is one.
         passed_over: String,
     },
     /// This process uses a file of another user.
@@ -137,7 +137,7 @@ fn make_folder_private(folder: &Path) -> Result<bool, DomainError> {
     Ok(is_private(folder))
 }
 
-/// The reason against a session's folder, if any.
+/// The reason why a session's folder is skipped, if it is.
 fn unusable(session: &Path) -> Option<String> {
     let length = session.as_os_str().len();
     let reason = if !session.is_absolute() {

@@ -428,7 +428,7 @@ fn feed_forward_is_accepted_where_every_drive_takes_torque_offsets() {
     assert!(Scenario::parse(Path::new("s.toml"), text).unwrap().validate().is_ok());
 }
 
-/// Work with the square of the entries takes minutes.
+/// Work that grows with the square of the entries would take minutes.
 #[test]
 fn ten_thousand_entries_after_each_other_are_checked_at_once() {
     let fault = |number: usize, after: usize| {

@@ -53,7 +53,7 @@ impl Drivetrain {
     }
 
     /// A step with a measured position and its error. Returns the force of motor and brake until the next step, N. The
-    /// loops do not depend on faults; the drive shows the motor's current.
+    /// loops are not told of a fault; the drive shows the motor's current.
     pub(super) fn step(
         &mut self,
         now_ns: u64,

@@ -167,7 +167,8 @@ impl Axis {
         self.power.is_in_fault() && !was_in_fault
     }
 
-    /// Applies the buffered cyclic targets. The axis approaches a position beyond the velocity limit further.
+    /// Applies the buffered cyclic targets. If the velocity limit has cut the way to the last target, the axis goes on
+    /// towards that target at every SYNC.
     pub(super) fn synchronise(&mut self, now_ns: u64, new: NewTargets, objects: &Objects) {
         let is_free = self.drivetrain.brake.free_from_ns(now_ns) == now_ns;
         if !self.power.is_operated() || !is_free || self.ignores(new) {

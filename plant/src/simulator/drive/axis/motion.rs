@@ -243,7 +243,7 @@ impl Demand {
     }
 
     /// Interpolates to a target over the coming period, from the end of the present demand or from `actual_m`. Limits
-    /// the way by the velocity limit, and returns whether.
+    /// the way by the velocity limit, and returns whether the limit has cut the way.
     pub(super) fn interpolate(
         &mut self,
         now_ns: u64,

@@ -378,8 +378,8 @@ impl DriveNode {
         }
     }
 
-    /// A lost heartbeat is a failure of the communication. After the event timer of an RPDO nobody controls the axis
-    /// either.
+    /// A lost heartbeat is a failure of the communication. When the event timer of an RPDO has run out, nobody controls
+    /// the axis either.
     fn supervise_connection(&mut self, now_ns: u64) {
         if self.consumer.loses(now_ns.saturating_sub(self.quirks.heartbeat_late_ns)) {
             self.raise(EmergencyCode::HEARTBEAT);

@@ -260,8 +260,8 @@ impl Rpdo {
 
 /// Unit of an inhibit time, ns.
 const INHIBIT_UNIT_NS: u64 = MILLISECOND_NS / 10;
-/// Objects that change with every sample. As in most drives their change is no event, because noise alone fills the
-/// bus. The event timer (1800h:5) sends these objects.
+/// Objects that change with every sample. As in most drives their change is no event, because noise alone would fill
+/// the bus. The event timer (1800h:5) sends these objects.
 const SAMPLED: [u16; 6] = [0x6062, 0x6063, 0x6064, 0x606C, 0x6077, 0x60F4];
 
 /// The condition for sending a TPDO.
