@@ -14,7 +14,7 @@ use masseter_plant::commissioning::{
 };
 use masseter_plant::description;
 use masseter_runtime::clock::SECOND_NS;
-use masseter_scenario::{CanConfig, wording::counted};
+use masseter_scenario::{CanConfig, DriveProfile, wording::counted};
 use masseter_terminal::{Exit, Failure, OrFailure, Tone, result_with_tones};
 use serde::Serialize;
 
@@ -114,7 +114,8 @@ pub(crate) fn inspect(args: &InspectArgs) -> Result<Exit, Failure> {
     folder.evidence.basis.drives = drives;
     let (mut text, passed) = describe(&robot, &result);
     let advice = owed_axes(parent).into_iter().map(|axis| owed_advice(parent, axis));
-    for warning in gaps(&drives).into_iter().chain(advice) {
+    let of_files = robot.scenario.drive_profile.iter().filter_map(DriveProfile::dcf_warning);
+    for warning in gaps(&drives).into_iter().chain(advice).chain(of_files) {
         let _ = writeln!(text, "warning: {warning}");
     }
     folder.finish_step(passed, &result).incomplete()?;

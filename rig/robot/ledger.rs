@@ -75,7 +75,7 @@ fn read_checked<T: DeserializeOwned>(
 
 /// Refuses an old value that no step has kept.
 fn check_old_value(object: ObjectKey, bytes: usize) -> Result<(), Damage> {
-    if !matches!(bytes, 1 | 2 | 4) || object.0.index == CONTROLWORD {
+    if !matches!(bytes, 1..=4) || object.0.index == CONTROLWORD {
         return Err(Damage::Object { object, bytes });
     }
     Ok(())
@@ -263,7 +263,7 @@ mod tests {
     #[test]
     fn a_damaged_file_is_refused_and_nothing_is_written() {
         for old in [
-            r#"{ "object": "6081h", "value": 77, "bytes": 3 }"#,
+            r#"{ "object": "6081h", "value": 77, "bytes": 5 }"#,
             r#"{ "object": "6081h", "value": 77, "bytes": 40 }"#,
             r#"{ "object": "6040h", "value": 15, "bytes": 2 }"#,
             r#"{ "object": "6081h", "value": 77"#,

@@ -212,12 +212,12 @@ pub(crate) fn may_keep(rule: ObjectRule, object: ObjectAddress) -> bool {
 /// The objects with the scenario's values, or with the profile's own value where the profile has one. The profile's
 /// further objects come last.
 fn objects(scenario: &Scenario, axis: usize) -> Result<Vec<Setting>, PlantError> {
-    let profile = scenario.profile(axis);
+    let (profile, node) = (scenario.profile(axis), scenario.can.node_ids[axis]);
     let known = known_objects(scenario, axis)?;
     let mut wanted = Vec::with_capacity(known.len());
     for (index, subindex, value, bytes, key) in known {
         let object = ObjectAddress::new(index, subindex);
-        let config = in_this_run(profile.object(ObjectKey(object)), object, scenario)?;
+        let config = in_this_run(profile.object(ObjectKey(object)).at_node(node), object, scenario)?;
         let value = config.value.unwrap_or(value);
         if config.rule == ObjectRule::Absent {
             continue;
@@ -240,14 +240,18 @@ fn objects(scenario: &Scenario, axis: usize) -> Result<Vec<Setting>, PlantError>
     }
     wanted.extend(offsets(profile));
     for (&object, config) in &profile.objects {
+        let config = config.at_node(node);
         let is_known = wanted.iter().any(|known| known.object == object);
         let (Some(value), false, false) = (config.value, is_known, config.rule == ObjectRule::Absent) else {
             continue;
         };
         let Some(bytes) = config.bytes else {
-            let reason = "enter bytes = 1, 2 or 4: the rig does not know the object";
+            let reason = "enter bytes = 1 to 4: the rig does not know the object";
             return Err(PlantError::Scenario(format!("drive_profile.objects.{object}: {reason}")));
         };
+        if !config.takes(value) {
+            return Err(beyond(profile, "drive_profile.objects", object.0, value, &config));
+        }
         let (value, bytes, key) = (value as u32, bytes.into(), "drive_profile.objects".to_owned());
         wanted.push(Setting { object, value, bytes, rule: config.rule, key });
     }

@@ -62,6 +62,46 @@ pub fn read_text(path: &Path, most_bytes: u64) -> io::Result<String> {
     })
 }
 
+/// Bytes 80h to 9Fh of Windows-1252; the others are those of Latin-1.
+const WINDOWS_1252: [char; 32] = [
+    '€', '\u{fffd}', '‚', 'ƒ', '„', '…', '†', '‡', 'ˆ', '‰', 'Š', '‹', 'Œ', '\u{fffd}', 'Ž', '\u{fffd}',
+    '\u{fffd}', '‘', '’', '“', '”', '•', '–', '—', '˜', '™', 'š', '›', 'œ', '\u{fffd}', 'ž', 'Ÿ',
+];
+
+/// The text of a regular file of at most `most_bytes` that another program wrote: UTF-8, UTF-16 with a byte order mark,
+/// otherwise Windows-1252. The text has no byte order mark.
+///
+/// # Errors
+/// Those of [`read_bytes`], and when the file is no text.
+pub fn read_foreign_text(path: &Path, most_bytes: u64) -> io::Result<String> {
+    decode(&read_bytes(path, most_bytes)?).map_err(|reason| io::Error::new(ErrorKind::InvalidData, reason))
+}
+
+fn decode(bytes: &[u8]) -> Result<String, &'static str> {
+    let utf_16 = |bytes: &[u8], unit: fn([u8; 2]) -> u16| {
+        let (pairs, rest) = bytes.as_chunks();
+        let text = String::from_utf16(&pairs.iter().copied().map(unit).collect::<Vec<_>>());
+        text.ok().filter(|_| rest.is_empty()).ok_or("it is no text in UTF-16, as its byte order mark says")
+    };
+    let text = match bytes {
+        [0xFF, 0xFE, rest @ ..] => utf_16(rest, u16::from_le_bytes)?,
+        [0xFE, 0xFF, rest @ ..] => utf_16(rest, u16::from_be_bytes)?,
+        [0xEF, 0xBB, 0xBF, rest @ ..] | rest => match std::str::from_utf8(rest) {
+            Ok(text) => text.to_owned(),
+            Err(_) => rest.iter().map(|&byte| windows_1252(byte)).collect(),
+        },
+    };
+    let need = "it has zero bytes; save the text as UTF-8, or as UTF-16 with a byte order mark";
+    if text.contains('\0') { Err(need) } else { Ok(text) }
+}
+
+fn windows_1252(byte: u8) -> char {
+    byte.checked_sub(0x80)
+        .and_then(|place| WINDOWS_1252.get(usize::from(place)))
+        .copied()
+        .unwrap_or(char::from(byte))
+}
+
 /// The quotation of a value for messages: at most 80 characters, without control characters.
 ///
 /// # Examples
@@ -148,6 +188,28 @@ mod tests {
         let error = read_text(&path, 10).unwrap_err().to_string();
         std::fs::remove_file(&path).unwrap();
         assert_eq!(error, "line 3 is no text in UTF-8");
+    }
+
+    #[test]
+    fn foreign_text_is_read_in_its_code_page() {
+        let text = "[FileInfo]\r\nDescription=Prüfung µm €\r\n";
+        let utf_16 =
+            |unit: fn(u16) -> [u8; 2]| "\u{feff}".encode_utf16().chain(text.encode_utf16()).flat_map(unit);
+        let windows: Vec<u8> = text.chars().map(|c| if c == '€' { 0x80 } else { c as u8 }).collect();
+        for bytes in [
+            text.into(),
+            ["\u{feff}", text].concat().into_bytes(),
+            utf_16(u16::to_le_bytes).collect(),
+            utf_16(u16::to_be_bytes).collect(),
+            windows,
+        ] {
+            assert_eq!(decode(&bytes).as_deref(), Ok(text), "{bytes:x?}");
+        }
+        assert_eq!(decode(b"\x8e\x9f\xa0\xff\x81").as_deref(), Ok("ŽŸ\u{a0}ÿ\u{fffd}"));
+        assert_eq!(decode(b"").as_deref(), Ok(""));
+        for no_text in [&b"\xff\xfea"[..], b"\xff\xfe\x00\xd8", b"a\0b\0", b"\x7fELF\0\xff"] {
+            assert!(decode(no_text).is_err(), "{no_text:x?}");
+        }
     }
 
     #[test]

@@ -37,8 +37,8 @@ pub use control::{
     MOST_LEAD_CYCLES, RealtimeConfig, RecordingConfig, TimingConfig, TrajectoryLimitsConfig,
 };
 pub use drive_profile::{
-    AccelerationUnit, BrakeConfig, DriveProfile, HomingConfig, INCREMENTS, IdentityConfig, ObjectConfig,
-    ObjectKey, ObjectRule, PdosConfig, StoreConfig, UnitsConfig, VelocityUnit,
+    AccelerationUnit, BrakeConfig, DcfRead, DriveProfile, HomingConfig, INCREMENTS, IdentityConfig,
+    ObjectConfig, ObjectKey, ObjectRule, PdosConfig, StoreConfig, UnitsConfig, VelocityUnit,
 };
 pub use drives::{AxisScale, DriveConfig, DrivesConfig};
 pub use error::ScenarioError;

@@ -352,7 +352,7 @@ impl Scenario {
         self.realtime.validate()?;
         self.can.validate()?;
         self.drives.validate()?;
-        DriveProfile::validate_all(&self.drive_profile)?;
+        DriveProfile::validate_all(&self.drive_profile, &self.can)?;
         dynamics::validate("dynamics", &self.dynamics)?;
         self.teeth.as_ref().map_or(Ok(()), TeethConfig::validate)?;
         self.validate_entries()?;

@@ -23,7 +23,7 @@ use masseter_model::dynamics::Friction;
 use masseter_model::geometry::Mechanism;
 use masseter_plant::core as plant;
 use masseter_runtime::schedule::CycleSchedule;
-use masseter_scenario::{FileConfig, MotionConfig, Scenario};
+use masseter_scenario::{DriveProfile, FileConfig, MotionConfig, Scenario};
 
 pub use placement::{Placement, best_placement};
 
@@ -95,7 +95,8 @@ impl RunPlan {
         })
     }
 
-    /// What a user should look at before the results: a file without the marker's offset, doubtful rows, guides that can lock.
+    /// What a user should look at before the results: a file without the marker's offset, doubtful rows, guides that can lock,
+    /// what the rig does not take from files of drives.
     pub fn warnings(&self) -> Vec<String> {
         let centroid = self.trajectory.centroid_turn_deg().map(|turn_deg| {
             format!(
@@ -104,7 +105,8 @@ impl RunPlan {
             )
         });
         let doubts = self.trajectory.doubts().into_iter().map(|doubt| format!("the motion's {doubt}"));
-        centroid.into_iter().chain(doubts).chain(self.locking()).collect()
+        let of_files = self.scenario.drive_profile.iter().filter_map(DriveProfile::dcf_warning);
+        centroid.into_iter().chain(doubts).chain(self.locking()).chain(of_files).collect()
     }
 
     /// A line that describes the run, and one for each warning.

@@ -3,6 +3,7 @@
 //! A profile is data: identity, units, objects, storing, brake and homing. This module talks to no drive. The emulated
 //! drive's use of its profile is in the plant.
 
+mod dcf;
 mod object;
 
 use std::collections::BTreeMap;
@@ -17,8 +18,9 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::error::{Checked, ScenarioError, ranges_of, require, require_axes, require_each};
 use super::merge::Given;
-use object::add_dcf_objects;
+use crate::CanConfig;
 
+pub use dcf::DcfRead;
 pub use object::{ObjectConfig, ObjectKey, ObjectRule};
 
 /// The kinds with their profiles.
@@ -41,6 +43,9 @@ section! {
         /// A device configuration file (CiA 306), relative to the scenario: its `ParameterValue`s and limits become
         /// `objects`.
         pub dcf: Option<PathBuf> = None => "path",
+        /// What the file of `dcf` says beside its objects.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub dcf_read: Option<DcfRead> = None,
         /// What the drive reports of itself.
         pub identity: IdentityConfig = IdentityConfig::default(),
         /// What the drive's numbers count.
@@ -89,7 +94,15 @@ impl DriveProfile {
 
     /// Replaces `dcf`, a path relative to a folder, by the objects of its file.
     pub(super) fn read_dcf(&mut self, folder: &Path) -> Checked {
-        self.dcf.take().map_or(Ok(()), |path| add_dcf_objects(&mut self.objects, &folder.join(path)))
+        if let Some(path) = self.dcf.take() {
+            self.dcf_read = Some(DcfRead::of_file(&folder.join(path), &mut self.objects)?);
+        }
+        Ok(())
+    }
+
+    /// What the rig does not take from the file of `dcf`, in one line; none where it takes everything.
+    pub fn dcf_warning(&self) -> Option<String> {
+        self.dcf_read.as_ref()?.warning()
     }
 
     /// The profile's entry for an object; the default without one.
@@ -103,12 +116,12 @@ impl DriveProfile {
     }
 
     /// Checks all profiles.
-    pub(super) fn validate_all(profiles: &[Self]) -> Checked {
+    pub(super) fn validate_all(profiles: &[Self], can: &CanConfig) -> Checked {
         let mut taken = [false; AXES];
-        require_each(profiles, |profile| profile.validate(&mut taken))
+        require_each(profiles, |profile| profile.validate(&mut taken, can))
     }
 
-    fn validate(&self, taken: &mut [bool; AXES]) -> Checked {
+    fn validate(&self, taken: &mut [bool; AXES], can: &CanConfig) -> Checked {
         require_axes("drive_profile.axes", &self.axes)?;
         require_axes("drive_profile.reversed", &self.reversed)?;
         for (axis, name) in AXIS_NAMES.iter().enumerate() {
@@ -118,6 +131,7 @@ impl DriveProfile {
             require(!is_twice, "drive_profile.axes", &name, "give each axis one profile")?;
         }
         self.objects.iter().try_for_each(|(key, object)| object.validate(*key))?;
+        self.dcf_read.as_ref().map_or(Ok(()), |read| read.validate(&self.axes, can))?;
         self.pdos.validate()?;
         self.units.validate()?;
         self.homing.validate()?;
@@ -341,7 +355,7 @@ mod tests {
             let profile: DriveProfile = over_kind(&KINDS, table).unwrap();
             assert_eq!(profile.kind, name);
             assert!(!profile.source.is_empty());
-            DriveProfile::validate_all(&[profile]).unwrap();
+            DriveProfile::validate_all(&[profile], &CanConfig::default()).unwrap();
         }
     }
 

@@ -1,8 +1,8 @@
 //! Device descriptions: electronic data sheets (EDS) and device configuration files (DCF) in the format of CiA 306-1.
 //!
-//! [`Dcf::parse`] reads the entries of the object dictionary with their types, access, limits and values. The parser
-//! skips the sections on the file, its device, bit rates and dummy mapping. The caller converts texts of other code
-//! pages to UTF-8: `String::from_utf8_lossy` changes names alone.
+//! [`Dcf::parse`] reads the entries of the object dictionary with their types, access, limits and values, and the node
+//! that a configuration is for. The parser skips the sections on the file, its device, bit rates and dummy mapping. The
+//! caller converts texts of other code pages to UTF-8: `String::from_utf8_lossy` changes names alone.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -34,7 +34,30 @@ const COLLECTIONS: [u16; 2] = [0x8, 0x9];
 /// # Ok::<(), masseter_can::canopen::dcf::DcfError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Dcf(BTreeMap<ObjectAddress, Entry>);
+pub struct Dcf {
+    /// The node and the bit rate that the file is for.
+    pub commissioning: Commissioning,
+    entries: BTreeMap<ObjectAddress, Entry>,
+}
+
+/// Names of the section that CiA 306 calls `DeviceComissioning`; many tools mend the spelling.
+const COMMISSIONING: [&str; 2] = ["devicecomissioning", "devicecommissioning"];
+
+/// The node and the bit rate that a configuration is for; none where the file has none, or 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Commissioning {
+    /// `NodeID`.
+    pub node_id: Option<u16>,
+    /// `Baudrate`, kbit/s.
+    pub baudrate_kbit_s: Option<u16>,
+}
+
+impl Commissioning {
+    fn read(section: &Section<'_>) -> Result<Self, DcfError> {
+        let named = |key| section.number(key, u16::MAX).map(|number| number.filter(|&number| number > 0));
+        Ok(Self { node_id: named("NodeID")?, baudrate_kbit_s: named("Baudrate")? })
+    }
+}
 
 impl Dcf {
     /// Reads a description.
@@ -46,6 +69,9 @@ impl Dcf {
         let by_name: HashMap<_, _> =
             sections.iter().map(|section| (section.name.to_ascii_lowercase(), section)).collect();
         let mut dcf = Self::default();
+        if let Some(section) = COMMISSIONING.iter().find_map(|name| by_name.get(*name)) {
+            dcf.commissioning = Commissioning::read(section)?;
+        }
         for section in &sections {
             if let Some(index) = index(section.name) {
                 dcf.add_object(index, section, &by_name)?;
@@ -62,16 +88,16 @@ impl Dcf {
 
     /// All entries, in the order of addresses.
     pub fn entries(&self) -> impl ExactSizeIterator<Item = &Entry> {
-        self.0.values()
+        self.entries.values()
     }
 
     /// The entry at the address.
     pub fn entry(&self, address: ObjectAddress) -> Option<&Entry> {
-        self.0.get(&address)
+        self.entries.get(&address)
     }
 
     fn add(&mut self, entry: Entry) {
-        self.0.insert(entry.address, entry);
+        self.entries.insert(entry.address, entry);
     }
 
     /// Adds an object without sub-indices, or the entries of a compact array. Others have sections of their own.
@@ -123,7 +149,7 @@ impl Dcf {
             self.add(Entry {
                 address: ObjectAddress::new(index, subindex),
                 name: name.unwrap_or_else(|| format!("{}{key}", common.name)),
-                default: value.or_else(|| common.default.clone()),
+                parameter: value.or_else(|| common.parameter.clone()),
                 ..common.clone()
             });
         }

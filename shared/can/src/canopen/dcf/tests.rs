@@ -83,9 +83,33 @@ fn a_compact_array_has_all_its_entries() {
                 [1003Name]\nNrOfEntries=1\n2=Older\n[1003Value]\nNrOfEntries=1\n1=0x10\n";
     let dcf = Dcf::parse(text).unwrap();
     let entry = |subindex| dcf.entry(ObjectAddress::new(0x1003, subindex)).unwrap();
-    let read = [0, 1, 2].map(|subindex| (entry(subindex).name.as_str(), entry(subindex).default.clone()));
+    let read = [0, 1, 2].map(|subindex| (entry(subindex).name.as_str(), entry(subindex).value().cloned()));
     let expected = [("Highest sub-index supported", 2), ("Errors1", 0x10), ("Older", 9)];
     assert_eq!(read, expected.map(|(name, number)| (name, Some(Value::Number(number)))));
+    let given = [0, 1, 2].map(|subindex| entry(subindex).parameter.is_some());
+    assert_eq!(given, [false, true, false], "values of the file are no values as delivered");
+    assert_eq!(entry(1).default, Some(Value::Number(9)));
+}
+
+#[test]
+fn a_configuration_says_for_which_node_and_bit_rate_it_is() {
+    let read = |text: &str| Dcf::parse(text).map(|dcf| dcf.commissioning);
+    let named = |node_id, baudrate_kbit_s| Ok(Commissioning { node_id, baudrate_kbit_s });
+    assert_eq!(read("[DeviceComissioning]\nNodeID=0x04\nBaudrate=500\n"), named(Some(4), Some(500)));
+    assert_eq!(read("[DEVICECommissioning]\nnodeid=4\nBaudrate=\n"), named(Some(4), None));
+    assert_eq!(read("[DeviceComissioning]\nNodeID=0\nNodeName=x\n"), named(None, None));
+    assert_eq!(read("[FileInfo]\nNodeID=4\n"), named(None, None));
+    assert_eq!(read("[DeviceComissioning]\nNodeID=four\n").unwrap_err().line, 2);
+}
+
+#[test]
+fn a_data_type_has_its_name_of_cia_301() {
+    let names = [(1, "BOOLEAN"), (2, "INTEGER8"), (7, "UNSIGNED32"), (8, "REAL32"), (9, "VISIBLE_STRING")];
+    let more = [(0xC, "TIME_OF_DAY"), (0x10, "INTEGER24"), (0x11, "REAL64"), (0x15, "INTEGER64")];
+    let last = [(0x16, "UNSIGNED24"), (0x1B, "UNSIGNED64"), (0x40, "data type 0040h")];
+    for (index, name) in names.into_iter().chain(more).chain(last) {
+        assert_eq!(DataType(index).to_string(), name);
+    }
 }
 
 #[test]

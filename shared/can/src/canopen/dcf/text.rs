@@ -2,6 +2,7 @@
 //! numbers, and numbers that follow from the node id. A crate for INI files would lose the lines.
 
 use std::collections::HashMap;
+use std::fmt::{self, Display, Formatter};
 
 use crate::canopen::NodeId;
 
@@ -210,6 +211,27 @@ impl DataType {
         let bits = self.bits().filter(|_| !self.is_real())?;
         let count = 1_i128 << bits;
         Some(if self.is_signed() { (-count / 2, count / 2 - 1) } else { (0, count - 1) })
+    }
+}
+
+/// As CiA 301 names it: `UNSIGNED32`.
+impl Display for DataType {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let name = match self.0 {
+            0x1 => "BOOLEAN",
+            0x9 => "VISIBLE_STRING",
+            0xA => "OCTET_STRING",
+            0xB => "UNICODE_STRING",
+            0xC => "TIME_OF_DAY",
+            0xD => "TIME_DIFFERENCE",
+            0xF => "DOMAIN",
+            _ if self.is_real() => "REAL",
+            _ if self.is_signed() => "INTEGER",
+            _ if self.bits().is_some() => "UNSIGNED",
+            other => return write!(f, "data type {other:04X}h"),
+        };
+        let bits = self.bits().filter(|_| matches!(name, "REAL" | "INTEGER" | "UNSIGNED"));
+        write!(f, "{name}{}", bits.map_or_else(String::new, |bits| bits.to_string()))
     }
 }
 
