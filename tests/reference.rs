@@ -9,7 +9,7 @@ use masseter_judge::signals::Registry;
 use masseter_model::geometry::{AXIS_NAMES, MechanismConfig, SlideConfig, StrokeLimits};
 use masseter_runtime::named::Declared;
 use masseter_scenario::{
-    AxesConfig, BrakeConfig, CanConfig, ChecksConfig, ChewingConfig, ControllerConfig, DriveConfig,
+    AxesConfig, BrakeConfig, CanConfig, ChecksConfig, ChewingConfig, ControllerConfig, DcfRead, DriveConfig,
     DriveProfile, DrivesConfig, DryConfig, DynamicsConfig, ExpectConfig, FaultConfig, FaultDeclaration,
     FaultKindConfig, FileConfig, FoodConfig, ForceControlConfig, ForceEstimateConfig, FrictionConfig,
     HomingConfig, IdentityConfig, JawConfig, Key, LateralConfig, LoadCellConfig, MotionConfig, OpeningConfig,
@@ -34,7 +34,7 @@ type Rewrite = fn(&str) -> String;
 const DOCUMENTS: [(&str, Rewrite); 2] = [("scenario.md", scenario), ("signals.md", signals)];
 
 /// The tables of a scenario by the TOML that leads to them.
-const TABLES: [(&str, &[Key]); 45] = [
+const TABLES: [(&str, &[Key]); 46] = [
     ("", Scenario::KEYS),
     ("[motion] kind = \"chewing\"", ChewingConfig::KEYS),
     ("[motion] kind = \"opening\"", OpeningConfig::KEYS),
@@ -58,6 +58,7 @@ const TABLES: [(&str, &[Key]); 45] = [
     ("[drives.slide]", DriveConfig::KEYS),
     ("[drives.leg]", DriveConfig::KEYS),
     ("[[drive_profile]]", DriveProfile::KEYS),
+    ("[drive_profile.dcf_read]", DcfRead::KEYS),
     ("[drive_profile.identity]", IdentityConfig::KEYS),
     ("[drive_profile.pdos]", PdosConfig::KEYS),
     ("[drive_profile.units]", UnitsConfig::KEYS),

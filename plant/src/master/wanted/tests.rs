@@ -41,11 +41,26 @@ fn what_a_drive_cannot_take_is_refused_with_the_key_that_decides_it() {
         ),
         ("objects.6085h = { lowest = 20_000_000 }", "drives.leg.quick_stop_deceleration_m_s2: object 6085h"),
         ("objects.3000h = { value = 1 }", "drive_profile.objects.3000h: enter bytes"),
+        (
+            "objects.1014h = { value = 128, plus_node_id = true, highest = 132, bytes = 4 }",
+            "drive_profile.objects: object 1014h:00h would be 133; the drive takes any to 132",
+        ),
         ("objects.'60C2h:02' = { value = -2 }", "rate_hz = 1000: the drive counts its cycle in 10^-2 s"),
     ] {
         let error = wanted(&format!("[[drive_profile]]\n{text}"), 4).unwrap_err().to_string();
         assert!(error.starts_with(refusal), "{error}");
     }
+}
+
+#[test]
+fn a_value_may_follow_from_the_node_id_or_have_three_bytes() {
+    let text = "[[drive_profile]]\nobjects.1014h = { value = 128, plus_node_id = true, bytes = 4 }\n\
+                objects.2000h = { value = -5, bytes = 3 }";
+    for (axis, cob_id) in [(0, 0x81), (4, 0x85)] {
+        assert_eq!(find(&wanted(text, axis).unwrap(), 0x1014, 0).unwrap().value, cob_id);
+    }
+    let small = find(&wanted(text, 0).unwrap(), 0x2000, 0).unwrap();
+    assert!(small.is_shown_by(0xFF_FFFB) && !small.is_shown_by(0xFF_FFFC));
 }
 
 #[test]
