@@ -96,10 +96,10 @@ fn decode(bytes: &[u8]) -> Result<String, &'static str> {
 }
 
 fn windows_1252(byte: u8) -> char {
-    byte.checked_sub(0x80)
-        .and_then(|place| WINDOWS_1252.get(usize::from(place)))
-        .copied()
-        .unwrap_or(char::from(byte))
+    match byte {
+        0x80..=0x9F => WINDOWS_1252[usize::from(byte - 0x80)],
+        _ => char::from(byte),
+    }
 }
 
 /// The quotation of a value for messages: at most 80 characters, without control characters.

@@ -78,7 +78,11 @@ impl DcfRead {
             let key = ObjectKey(entry.address);
             if let Some(object) = object {
                 let kept = *objects.entry(key).or_insert(object);
-                if object.value.is_some() && kept != object {
+                let is_lost = |of_file: Option<i64>, kept| of_file.is_some() && of_file != kept;
+                if is_lost(object.value, kept.value)
+                    || is_lost(object.lowest, kept.lowest)
+                    || is_lost(object.highest, kept.highest)
+                {
                     reason = Some("the profile names the object".to_owned());
                 }
             }
@@ -107,15 +111,10 @@ impl DcfRead {
             format!("{} is for another: [DeviceComissioning] has {key}={number}; {remedy}", self.file)
         };
         for (name, node) in AXIS_NAMES.iter().zip(can.node_ids) {
-            let is_of_file = self.node_id.is_none_or(|of_file| of_file == u16::from(node));
-            let is_other = axes.iter().any(|axis| axis == name) && !is_of_file;
+            let of_file = self.node_id.filter(|_| axes.iter().any(|axis| axis == name));
+            let of_file = of_file.unwrap_or(node.into());
             let value = format_args!("{node} (axis {name})");
-            require(
-                !is_other,
-                "can.node_ids",
-                &value,
-                need("NodeID", self.node_id.unwrap_or_default().into()),
-            )?;
+            require(of_file == u16::from(node), "can.node_ids", &value, need("NodeID", of_file.into()))?;
         }
         let bitrate_bps = self.bitrate_bps.unwrap_or(can.bitrate_bps);
         let need = need("Baudrate", bitrate_bps / 1000);
@@ -267,13 +266,15 @@ mod tests {
             ("201C", "DataType=0x8000 ParameterValue=5"),
             ("6065", "DataType=7 ParameterValue=5"),
             ("6066", "DataType=6 ParameterValue=5"),
+            ("6067", "DataType=7 HighLimit=5"),
         ];
-        let (objects, warning) = read(&lines, "6065h = { value = 7 }\n6066h = { value = 5, bytes = 2 }");
+        let (objects, warning) =
+            read(&lines, "6065h = { value = 7 }\n6066h = { value = 5 }\n6067h = { value = 3 }");
         let taken = |key: &str| objects.get(&key.parse().unwrap()).and_then(|object| object.value);
         let own = ["1015h", "1C00h", "6065h", "6066h", "1018h:01", "2014h"].map(taken);
         assert_eq!(own, [Some(5), Some(1), Some(7), Some(5), None, None]);
         for named in [
-            "not taken from the file x.dcf: 16 objects: ",
+            "not taken from the file x.dcf: 17 objects: ",
             "1010h:01 (write-only",
             "1014h ($NODEID beyond the data type)",
             "1015h (a limit of $NODEID)",
@@ -287,7 +288,7 @@ mod tests {
             "2019h (OCTET_STRING)",
             "201Ah ($NODEID in no object of the communication)",
             "201Ch (data type 8000h)",
-            "6065h (the profile names the object)",
+            "6065h, 6067h (the profile names the object)",
         ] {
             assert!(warning.contains(named), "{named}: {warning}");
         }
