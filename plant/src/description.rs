@@ -311,6 +311,7 @@ fn read_entry(object: ObjectAddress, value: &[u8]) -> String {
     let (kind, value) = match value.len() {
         1 => (5, format!("0x{number:02X}")),
         2 => (6, format!("0x{number:04X}")),
+        3 => (0x16, format!("0x{number:06X}")),
         4 => (7, format!("0x{number:08X}")),
         _ => (9, String::from_utf8_lossy(value).trim_end_matches('\0').replace(['\r', '\n'], " ")),
     };

@@ -136,15 +136,11 @@ impl<'a> Proof<'a> {
         let is_needed = |object: ObjectAddress| {
             REACTIONS.contains(&object.index) || silence == Silence::ProcessData && object == silence.object()
         };
-        let loans: Vec<_> = wanted.objects.iter().filter(|setting| is_needed(setting.object.0)).collect();
-        let loans: Vec<_> = loans
-            .into_iter()
-            .map(|setting| {
-                let object = setting.object.0;
-                let loan = Loan::new(object.index, object.subindex, setting.value, setting.bytes);
-                Loan { may_lack: true, ..loan }
-            })
-            .collect();
+        let of_run = wanted.objects.iter().filter(|setting| is_needed(setting.object.0)).map(|setting| {
+            let ObjectAddress { index, subindex } = setting.object.0;
+            Loan { may_lack: true, ..Loan::new(index, subindex, setting.value, setting.bytes) }
+        });
+        let loans: Vec<_> = of_run.collect();
         mover.borrow(&loans)?;
         if silence == Silence::ProcessData {
             check_pdo(mover, node)?;

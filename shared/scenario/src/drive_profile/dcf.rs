@@ -16,12 +16,22 @@ use crate::wording::counted;
 
 /// Size of the largest file, bytes.
 const MOST_BYTES: u64 = 4 << 20;
-/// Objects whose values the rig decides, with the reason.
-const OWN: [(std::ops::Range<u16>, &str); 2] =
-    [(0x1018..0x1019, "drive_profile.identity decides"), (0x1400..0x1C00, "PDO layout is the rig's")];
+/// Objects that the rig never takes from a file, with the reason.
+const OWN: [(std::ops::Range<u16>, &str); 7] = [
+    (0x1010..0x1012, "a command"),
+    (0x1018..0x1019, "drive_profile.identity decides"),
+    (0x1400..0x1C00, "PDO layout is the rig's"),
+    (0x6040..0x6041, "a command"),
+    (0x6060..0x6061, "the rig decides the mode"),
+    (0x607A..0x607B, "the rig decides the target"),
+    (0x607C..0x607D, HOME),
+];
+const HOME: &str = "drive_profile.homing decides";
+/// The event timer of the RPDO, which a file may limit.
+const EVENT_TIMER: ObjectAddress = ObjectAddress::new(0x1400, 5);
 /// Objects of the master's table that drives may lack: a file without one of them makes it absent.
 const MAY_LACK: [ObjectAddress; 7] = [
-    ObjectAddress::new(0x1400, 5),
+    EVENT_TIMER,
     ObjectAddress::new(0x6007, 0),
     ObjectAddress::new(0x605A, 0),
     ObjectAddress::new(0x6065, 0),
@@ -45,9 +55,10 @@ section! {
 }
 
 impl DcfRead {
-    /// Reads a file, and adds its objects to those of a profile.
+    /// Reads a file, and adds its objects to those of a profile with that home object.
     pub(super) fn of_file(
         path: &Path,
+        home: ObjectKey,
         objects: &mut BTreeMap<ObjectKey, ObjectConfig>,
     ) -> Result<Self, ScenarioError> {
         let unreadable = |error| ScenarioError::Unreadable { path: path.to_owned(), error };
@@ -62,24 +73,26 @@ impl DcfRead {
             bitrate_bps: dcf.commissioning.baudrate_kbit_s.map(|kbit_s| u32::from(kbit_s) * 1000),
             not_taken: BTreeMap::new(),
         };
-        read.add(&dcf, objects);
+        read.add(&dcf, home, objects);
         Ok(read)
     }
 
     /// Adds the objects of a file. Those that the profile names itself stay as they are.
-    fn add(&mut self, dcf: &Dcf, objects: &mut BTreeMap<ObjectKey, ObjectConfig>) {
+    fn add(&mut self, dcf: &Dcf, home: ObjectKey, objects: &mut BTreeMap<ObjectKey, ObjectConfig>) {
         let absent = MAY_LACK.into_iter().filter(|address| dcf.entry(*address).is_none());
         for address in absent {
             let absent = ObjectConfig { rule: ObjectRule::Absent, ..Default::default() };
             objects.entry(ObjectKey(address)).or_insert(absent);
         }
         for entry in dcf.entries() {
-            let (object, mut reason) = object_of(entry);
             let key = ObjectKey(entry.address);
+            let (object, mut reason) = object_of(entry, (key == home).then_some(HOME));
             if let Some(object) = object {
                 let kept = *objects.entry(key).or_insert(object);
                 let is_lost = |of_file: Option<i64>, kept| of_file.is_some() && of_file != kept;
-                if is_lost(object.value, kept.value)
+                let is_other = object.value.is_some() && object.plus_node_id != kept.plus_node_id;
+                if is_other
+                    || is_lost(object.value, kept.value)
                     || is_lost(object.lowest, kept.lowest)
                     || is_lost(object.highest, kept.highest)
                 {
@@ -108,7 +121,7 @@ impl DcfRead {
     pub(super) fn validate(&self, axes: &[String], can: &CanConfig) -> Checked {
         let need = |key, number: u32| {
             let remedy = "use the file of this drive, or correct one of the two";
-            format!("{} is for another: [DeviceComissioning] has {key}={number}; {remedy}", self.file)
+            format!("{} is for another drive: [DeviceComissioning] has {key}={number}; {remedy}", self.file)
         };
         for (name, node) in AXIS_NAMES.iter().zip(can.node_ids) {
             let of_file = self.node_id.filter(|_| axes.iter().any(|axis| axis == name));
@@ -122,8 +135,9 @@ impl DcfRead {
     }
 }
 
-/// What a file says of an entry, as far as the master can use that, and why the master cannot use the rest.
-fn object_of(entry: &Entry) -> (Option<ObjectConfig>, Option<String>) {
+/// What a file says of an entry, as far as the master can use that, and why the master cannot use the rest. With `decided`,
+/// something else decides the object.
+fn object_of(entry: &Entry, decided: Option<&str>) -> (Option<ObjectConfig>, Option<String>) {
     let Entry { address, data_type, access, lowest, highest, .. } = entry;
     // A value that nobody can change is compared, where the master would write it.
     let is_fixed = !access.is_writable();
@@ -131,6 +145,11 @@ fn object_of(entry: &Entry) -> (Option<ObjectConfig>, Option<String>) {
     let value = entry.parameter.as_ref().or(fixed);
     if [value, lowest.as_ref(), highest.as_ref()].iter().all(Option::is_none) {
         return (None, None);
+    }
+    let own = OWN.iter().find(|(range, _)| range.contains(&address.index)).map(|(_, reason)| *reason);
+    let is_limited_alone = *address == EVENT_TIMER && value.is_none();
+    if let Some(reason) = decided.or(own).filter(|_| !is_limited_alone) {
+        return (None, Some(reason.to_owned()));
     }
     let Some(bits) = data_type.bits().filter(|bits| *bits <= u32::BITS && !data_type.is_real()) else {
         return (None, Some(data_type.to_string()));
@@ -150,7 +169,7 @@ fn object_of(entry: &Entry) -> (Option<ObjectConfig>, Option<String>) {
         }
         None => None,
     });
-    let rule = if *address == ObjectAddress::new(0x1400, 5) {
+    let rule = if *address == EVENT_TIMER {
         ObjectRule::Optional
     } else if is_fixed {
         ObjectRule::Expect
@@ -166,9 +185,6 @@ fn object_of(entry: &Entry) -> (Option<ObjectConfig>, Option<String>) {
 
 /// A value as a profile carries it, and whether the node id is added to it; else the reason why no profile does.
 fn carried(value: &Value, address: ObjectAddress, bits: u32) -> Result<(i64, bool), &'static str> {
-    if let Some((_, reason)) = OWN.iter().find(|(range, _)| range.contains(&address.index)) {
-        return Err(reason);
-    }
     let bases = 0..(1 << bits) - i128::from(MASTER_NODE.get());
     match value {
         Value::Number(number) => Ok((*number as i64, false)),
@@ -185,6 +201,10 @@ fn carried(value: &Value, address: ObjectAddress, bits: u32) -> Result<(i64, boo
 mod tests {
     use super::*;
     use crate::Scenario;
+
+    fn home() -> ObjectKey {
+        "607Ch".parse().unwrap()
+    }
 
     const FILE: &str = "
 [1017]\nParameterName=Heartbeat\nDataType=0x6\nAccessType=rw\nDefaultValue=0\n
@@ -203,7 +223,7 @@ mod tests {
     #[test]
     fn a_file_gives_values_limits_and_what_the_drive_lacks() {
         let (mut objects, mut read) = (BTreeMap::new(), DcfRead::default());
-        read.add(&Dcf::parse(FILE).unwrap(), &mut objects);
+        read.add(&Dcf::parse(FILE).unwrap(), home(), &mut objects);
         let object = |key: &str| objects.get(&key.parse().unwrap()).copied();
         let window = ObjectConfig {
             rule: ObjectRule::Write,
@@ -237,7 +257,7 @@ mod tests {
         let text: String = lines.iter().map(section).collect();
         let mut read = DcfRead { file: "x.dcf".to_owned(), ..DcfRead::default() };
         let mut objects = toml::from_str(own).unwrap();
-        read.add(&Dcf::parse(&text).unwrap(), &mut objects);
+        read.add(&Dcf::parse(&text).unwrap(), home(), &mut objects);
         (objects, read.warning().unwrap_or_default())
     }
 
@@ -246,6 +266,7 @@ mod tests {
         let lines = [
             ("1010", "ObjectType=9"),
             ("1010sub1", "DataType=7 ParameterValue=5 AccessType=wo"),
+            ("1012", "DataType=7 ParameterValue=$NODEID+0x80"),
             ("1014", "DataType=5 ParameterValue=$NODEID+0x90"),
             ("1015", "DataType=6 ParameterValue=5 HighLimit=$NODEID"),
             ("1018", "ObjectType=9"),
@@ -253,6 +274,8 @@ mod tests {
             ("1400", "ObjectType=9"),
             ("1400sub1", "DataType=7 ParameterValue=$NODEID+0x200"),
             ("1400sub2", "DataType=5 ParameterValue=1"),
+            ("1800", "ObjectType=9"),
+            ("1800sub5", "DataType=6 HighLimit=9"),
             ("1bff", "DataType=5 ParameterValue=1"),
             ("1c00", "DataType=5 ParameterValue=1"),
             ("2014", "DataType=8 DefaultValue=1.5 ParameterValue=1.5"),
@@ -264,22 +287,28 @@ mod tests {
             ("201A", "DataType=7 ParameterValue=$NODEID"),
             ("201B", "DataType=0x1B DefaultValue=5"),
             ("201C", "DataType=0x8000 ParameterValue=5"),
+            ("2021", "DataType=7 ParameterValue=5 AccessType=wo"),
+            ("6040", "DataType=6 ParameterValue=15"),
             ("6065", "DataType=7 ParameterValue=5"),
             ("6066", "DataType=6 ParameterValue=5"),
             ("6067", "DataType=7 HighLimit=5"),
+            ("607C", "DataType=4 ParameterValue=5000"),
         ];
-        let (objects, warning) =
-            read(&lines, "6065h = { value = 7 }\n6066h = { value = 5 }\n6067h = { value = 3 }");
+        let own =
+            "1012h = { value = 128 }\n6065h = { value = 7 }\n6066h = { value = 5 }\n6067h = { value = 3 }";
+        let (objects, warning) = read(&lines, own);
         let taken = |key: &str| objects.get(&key.parse().unwrap()).and_then(|object| object.value);
         let own = ["1015h", "1C00h", "6065h", "6066h", "1018h:01", "2014h"].map(taken);
         assert_eq!(own, [Some(5), Some(1), Some(7), Some(5), None, None]);
         for named in [
-            "not taken from the file x.dcf: 17 objects: ",
-            "1010h:01 (write-only",
+            "not taken from the file x.dcf: 22 objects: ",
+            "1010h:01, 6040h (a command)",
+            "2021h (write-only",
+            "607Ch (drive_profile.homing decides)",
             "1014h ($NODEID beyond the data type)",
             "1015h (a limit of $NODEID)",
             "1018h:01 (drive_profile.identity decides)",
-            "1400h:01, 1400h:02, 1BFFh (PDO layout is the rig's)",
+            "1400h:01, 1400h:02, 1800h:05, 1BFFh (PDO layout is the rig's)",
             "2014h (REAL32)",
             "2015h (VISIBLE_STRING)",
             "2016h (UNSIGNED64)",
@@ -288,7 +317,7 @@ mod tests {
             "2019h (OCTET_STRING)",
             "201Ah ($NODEID in no object of the communication)",
             "201Ch (data type 8000h)",
-            "6065h, 6067h (the profile names the object)",
+            "1012h, 6065h, 6067h (the profile names the object)",
         ] {
             assert!(warning.contains(named), "{named}: {warning}");
         }
@@ -329,13 +358,13 @@ mod tests {
         std::fs::write(&path, FILE).unwrap();
         let own = ObjectConfig { value: Some(7), ..ObjectConfig::default() };
         let mut objects = BTreeMap::from([("6065h".parse().unwrap(), own)]);
-        DcfRead::of_file(&path, &mut objects).unwrap();
+        DcfRead::of_file(&path, home(), &mut objects).unwrap();
         assert_eq!((objects[&"6065h".parse().unwrap()], objects.len() > 5), (own, true));
         std::fs::write(&path, "[6065]\nParameterName=W\nDataType=seven\n").unwrap();
-        let error = DcfRead::of_file(&path, &mut objects).unwrap_err().to_string();
+        let error = DcfRead::of_file(&path, home(), &mut objects).unwrap_err().to_string();
         std::fs::remove_file(&path).unwrap();
         assert!(error.contains(".dcf:3: "), "{error}");
-        assert!(DcfRead::of_file(&path, &mut objects).is_err(), "a file that is not there");
+        assert!(DcfRead::of_file(&path, home(), &mut objects).is_err(), "a file that is not there");
     }
 
     #[test]
@@ -355,15 +384,13 @@ mod tests {
             scenario.validate().err().map_or_else(String::new, |error| error.to_string())
         };
         let node = "[DeviceComissioning]\nNodeID=0x09\nBaudrate=1000\n";
-        let refused =
-            "can.node_ids = 4 (axis l1): l1.dcf is for another: [DeviceComissioning] has NodeID=9; use the";
+        let refused = "can.node_ids = 4 (axis l1): l1.dcf is for another drive: [DeviceComissioning] has NodeID=9; use the";
         assert!(refusal("", node, "").starts_with(refused), "{}", refusal("", node, ""));
         assert_eq!(refusal("can.node_ids = [1, 2, 3, 9, 5, 6]", node, ""), "");
         assert_eq!(refusal("", node, "can.node_ids = [1, 2, 3, 9, 5, 6]"), "", "what the run has counts");
         assert!(refusal("can.node_ids = [9, 2, 3, 4, 5, 6]", node, "").starts_with(refused));
         let rate = "[devicecommissioning]\nBaudrate=500\nNodeID=4\n";
-        let refused =
-            "can.bitrate_bps = 1000000: l1.dcf is for another: [DeviceComissioning] has Baudrate=500; use";
+        let refused = "can.bitrate_bps = 1000000: l1.dcf is for another drive: [DeviceComissioning] has Baudrate=500; use";
         assert!(refusal("", rate, "").starts_with(refused), "{}", refusal("", rate, ""));
         assert_eq!(refusal("can.bitrate_bps = 500000", rate, ""), "");
         let none = "[DeviceComissioning]\nNodeID=0\nBaudrate=\nNodeName=x\n";

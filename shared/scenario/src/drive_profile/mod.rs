@@ -95,7 +95,8 @@ impl DriveProfile {
     /// Replaces `dcf`, a path relative to a folder, by the objects of its file.
     pub(super) fn read_dcf(&mut self, folder: &Path) -> Checked {
         if let Some(path) = self.dcf.take() {
-            self.dcf_read = Some(DcfRead::of_file(&folder.join(path), &mut self.objects)?);
+            self.dcf_read =
+                Some(DcfRead::of_file(&folder.join(path), self.homing.home_object, &mut self.objects)?);
         }
         Ok(())
     }

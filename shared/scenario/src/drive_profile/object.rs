@@ -6,6 +6,7 @@ use std::str::FromStr;
 use masseter_can::canopen::ObjectAddress;
 use serde::{Deserialize, Serialize};
 
+use crate::can::MASTER_NODE;
 use crate::error::{Checked, ScenarioError};
 
 /// The master's handling of an object.
@@ -42,6 +43,8 @@ pub struct ObjectConfig {
     pub plus_node_id: bool,
 }
 
+/// The controlword, which the master alone sends.
+const CONTROLWORD: u16 = 0x6040;
 /// Objects with values that may follow from the node id: those of the communication.
 pub(super) const OF_NODE: std::ops::Range<u16> = 0x1000..0x2000;
 
@@ -59,6 +62,13 @@ impl ObjectConfig {
         Self { value: self.value.map(|value| value + node), plus_node_id: false, ..self }
     }
 
+    /// Whether a value, and the largest node id where it is added, fits into the object's bytes, with or without a sign.
+    fn fits(&self, value: i64) -> bool {
+        let bits = 8 * u32::from(self.bytes.unwrap_or(4));
+        let node = if self.plus_node_id { i64::from(MASTER_NODE.get()) } else { 0 };
+        (-(1 << (bits - 1))..(1 << bits) - node).contains(&value)
+    }
+
     pub(super) fn validate(&self, key: ObjectKey) -> Checked {
         let is_ordered = self.lowest.zip(self.highest).is_none_or(|(lowest, highest)| lowest <= highest);
         let need = match self {
@@ -70,6 +80,11 @@ impl ObjectConfig {
                 "value must be within lowest and highest"
             }
             _ if !self.bytes.is_none_or(|bytes| matches!(bytes, 1..=4)) => "bytes must be 1 to 4",
+            _ if self.plus_node_id && self.value.is_none() => "plus_node_id needs a value",
+            _ if key.0.index == CONTROLWORD && self.value.is_some() => {
+                "the controlword has no value of its own"
+            }
+            _ if !self.value.is_none_or(|value| self.fits(value)) => "value does not fit into its bytes",
             _ => return Ok(()),
         };
         Err(ScenarioError::bad("drive_profile.objects", &key, need))
@@ -138,6 +153,31 @@ mod tests {
         assert_eq!("60c2:2h".parse(), "60C2h:02".parse::<ObjectKey>());
         for text in ["", "606h", "60666h", "6066h:100", "+066h", "6066h:", "x066h"] {
             assert!(text.parse::<ObjectKey>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_value_that_no_drive_can_hold_is_refused() {
+        let of = |value, bytes, plus_node_id| ObjectConfig {
+            value,
+            bytes,
+            plus_node_id,
+            ..ObjectConfig::default()
+        };
+        let cases = [
+            ("2000h", of(Some(300), Some(1), false), "does not fit"),
+            ("2000h", of(Some(-129), Some(1), false), "does not fit"),
+            ("1014h", of(Some(i64::MAX), None, true), "does not fit"),
+            ("1014h", of(Some(0xFFFF_FFFF), Some(4), true), "does not fit"),
+            ("1014h", of(None, Some(4), true), "plus_node_id needs a value"),
+            ("6040h", of(Some(15), Some(2), false), "the controlword has no value of its own"),
+        ];
+        for (key, object, reason) in cases {
+            let refusal = object.validate(key.parse().unwrap()).unwrap_err().to_string();
+            assert!(refusal.contains(reason), "{key}: {refusal}");
+        }
+        for (value, bytes) in [(255, Some(1)), (-128, Some(1)), (0xFFFF_FFFF, None), (-1, None)] {
+            of(Some(value), bytes, false).validate("2000h".parse().unwrap()).unwrap();
         }
     }
 }

@@ -69,8 +69,10 @@ impl Dcf {
         let by_name: HashMap<_, _> =
             sections.iter().map(|section| (section.name.to_ascii_lowercase(), section)).collect();
         let mut dcf = Self::default();
-        if let Some(section) = COMMISSIONING.iter().find_map(|name| by_name.get(*name)) {
-            dcf.commissioning = Commissioning::read(section)?;
+        for section in COMMISSIONING.iter().filter_map(|name| by_name.get(*name)) {
+            let Commissioning { node_id, baudrate_kbit_s } = Commissioning::read(section)?;
+            dcf.commissioning.node_id = dcf.commissioning.node_id.or(node_id);
+            dcf.commissioning.baudrate_kbit_s = dcf.commissioning.baudrate_kbit_s.or(baudrate_kbit_s);
         }
         for section in &sections {
             if let Some(index) = index(section.name) {
