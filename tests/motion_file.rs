@@ -54,6 +54,30 @@ fn a_motion_is_described_by_its_rows_rate_range_turn_and_speed() {
     assert_eq!(found["glitches"], Value::Array(Vec::new()));
 }
 
+/// Trackers write UTF-16 and Windows-1252, too: the motion is that of the same text in UTF-8, also in the copy of a run.
+#[test]
+fn the_code_page_of_a_recording_does_not_matter() {
+    let text = opening(|_, _| ());
+    let utf_16: Vec<u8> =
+        [0xFEFF].into_iter().chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+    let with_mark = [&[0xEF, 0xBB, 0xBF], text.as_bytes()].concat();
+    let workspace = Workspace::new("duration_s = 2.0\n[motion]\nkind = 'file'\npath = 'motion.csv'");
+    let file = workspace.write("motion.csv", &text);
+    let play = || {
+        let described = stdout(&masseter(&["motion", file.to_str().unwrap(), "--format", "json"]));
+        let output = workspace.run_virtual(&[]);
+        assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+        let digest = workspace.summary()["figures"]["digest"].clone();
+        fs::remove_dir_all(workspace.run_folder()).unwrap();
+        (described, digest)
+    };
+    let plain = play();
+    for bytes in [utf_16, with_mark] {
+        fs::write(&file, bytes).unwrap();
+        assert_eq!(play(), plain);
+    }
+}
+
 #[test]
 fn a_jump_of_the_tracker_and_a_gap_are_named_with_their_lines() {
     let text = opening(|row, numbers| {

@@ -10,7 +10,7 @@ use masseter_plan::RunPlan;
 use masseter_recording::{Ending, FullSpeed, Manifest, RunFolder};
 use masseter_report::Detail;
 use masseter_runtime::transport::{Domain, DomainLock};
-use masseter_scenario::input::read_text;
+use masseter_scenario::input::read_foreign_text;
 use masseter_scenario::{FileConfig, Scenario};
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
@@ -179,7 +179,7 @@ fn write_manifest(folder: &RunFolder, manifest: &Manifest) -> Result<(), Failure
 fn keep_scenario(folder: &RunFolder, scenario: &Scenario) -> anyhow::Result<()> {
     let mut kept = scenario.clone();
     for (name, file) in kept.files_mut() {
-        let rows = read_text(file, FileConfig::MOST_BYTES);
+        let rows = read_foreign_text(file, FileConfig::MOST_BYTES);
         let rows = rows.with_context(|| format!("cannot read {}", file.display()))?;
         keep(folder, &folder.file(&name), &rows)?;
         *file = name.into();

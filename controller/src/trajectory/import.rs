@@ -4,7 +4,7 @@
 //! file with line, reason and remedy. The import guesses, skips and repairs nothing.
 
 use masseter_model::geometry::{Pose, Vec3};
-use masseter_scenario::input::read_text;
+use masseter_scenario::input::read_foreign_text;
 use masseter_scenario::{FileConfig, JawConfig};
 use nalgebra::{Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion};
 
@@ -89,8 +89,8 @@ impl<'a> Source<'a> {
 
 fn axes_and_table(config: &FileConfig) -> Result<(Axes, Table), Located> {
     let axes = Axes::parse(&config.axes).map_err(Located::whole)?;
-    let text = read_text(&config.path, FileConfig::MOST_BYTES).map_err(|error| {
-        Located::whole(format!("cannot be read ({error}); check the path and that it is UTF-8 text"))
+    let text = read_foreign_text(&config.path, FileConfig::MOST_BYTES).map_err(|error| {
+        Located::whole(format!("cannot be read ({error}); check the path and that it is text"))
     })?;
     let table = Table::parse(&text)?;
     check_points(config, table.format).map_err(Located::whole)?;
