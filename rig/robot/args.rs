@@ -33,6 +33,19 @@ impl RobotArgs {
     }
 }
 
+/// The arguments of a step with one axis after the other: `robot watchdog` and `robot home`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct AxesArgs {
+    #[command(flatten)]
+    pub(crate) robot: RobotArgs,
+    /// The axis: d1 to l3 [default: all]
+    #[arg(long, value_parser = parse_axis)]
+    pub(crate) axis: Option<usize>,
+    /// Go on without the evidence of the earlier steps
+    #[arg(long)]
+    pub(crate) out_of_order: bool,
+}
+
 /// The arguments of `robot configure` and `robot restore`.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct WriteArgs {

@@ -1,31 +1,16 @@
 //! `masseter robot home`: one axis after the other.
 
-use clap::Args;
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::commissioning::{HomeReport, Wish, home as find};
 use masseter_terminal::{Exit, Failure, OrFailure, result_line};
 use serde::Serialize;
 
-use super::args::{RobotArgs, parse_axis};
+use super::args::AxesArgs;
 use super::power_mark::{Homed, leave_mark};
 use super::{evidence::Step, robot_line::failed, session::Session};
 
 /// The legs come first: a slide moves a leg whose length is known.
 const ORDER: [usize; AXES] = [3, 4, 5, 0, 1, 2];
-
-/// The arguments of `robot home`.
-#[derive(Debug, Clone, Args)]
-#[command(after_help = "Examples:\n  masseter robot home\n  masseter robot home --axis l1")]
-pub(crate) struct HomeArgs {
-    #[command(flatten)]
-    robot: RobotArgs,
-    /// The axis: d1 to l3 [default: all, the legs first]
-    #[arg(long, value_parser = parse_axis)]
-    axis: Option<usize>,
-    /// Go on without the evidence of the earlier steps
-    #[arg(long)]
-    out_of_order: bool,
-}
 
 /// What is kept of one axis.
 #[derive(Debug, Serialize)]
@@ -37,7 +22,7 @@ struct AxisResult {
 }
 
 /// Homes, prints what was found, and keeps it.
-pub(crate) fn home(args: &HomeArgs) -> Result<Exit, Failure> {
+pub(crate) fn home(args: &AxesArgs) -> Result<Exit, Failure> {
     let axes = args.axis.map_or_else(|| ORDER.to_vec(), |axis| vec![axis]);
     let earlier = (!args.out_of_order).then_some(|_: usize| Step::Watchdog);
     let mut session = Session::begin(&args.robot, Step::Home, &axes, earlier)?;

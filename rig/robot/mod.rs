@@ -38,9 +38,11 @@ pub(crate) enum RobotVerb {
     /// Move one axis a short way and back, while the others have no power
     Jog(jog::JogArgs),
     /// Prove that each drive stops by itself once the master is silent
-    Watchdog(watchdog::WatchdogArgs),
-    /// Home the axes, one after the other
-    Home(home::HomeArgs),
+    #[command(after_help = "Examples:\n  masseter robot watchdog\n  masseter robot watchdog --axis l1")]
+    Watchdog(args::AxesArgs),
+    /// Home the axes, one after the other: the legs first
+    #[command(after_help = "Examples:\n  masseter robot home\n  masseter robot home --axis l1")]
+    Home(args::AxesArgs),
     /// Check whether the axes tell the closed pose
     CheckPose(check_pose::CheckPoseArgs),
     /// Show which steps are done, and which is next

@@ -1,27 +1,12 @@
 //! `masseter robot watchdog`: one axis after the other stands with power, and must stop once the master sends nothing.
 
-use clap::Args;
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::commissioning::{Reaction, WatchdogReport, Wish, prove_watchdogs};
 use masseter_terminal::{Exit, Failure, OrFailure, result_line};
 use serde::Serialize;
 
-use super::args::{RobotArgs, parse_axis};
+use super::args::AxesArgs;
 use super::{evidence::Step, session::Session};
-
-/// The arguments of `robot watchdog`.
-#[derive(Debug, Clone, Args)]
-#[command(after_help = "Examples:\n  masseter robot watchdog\n  masseter robot watchdog --axis l1")]
-pub(crate) struct WatchdogArgs {
-    #[command(flatten)]
-    robot: RobotArgs,
-    /// The axis: d1 to l3 [default: all]
-    #[arg(long, value_parser = parse_axis)]
-    axis: Option<usize>,
-    /// Go on without the evidence of the earlier steps
-    #[arg(long)]
-    out_of_order: bool,
-}
 
 /// What is kept of one axis.
 #[derive(Debug, Serialize)]
@@ -32,7 +17,7 @@ struct AxisResult {
 }
 
 /// Proves the watchdogs, prints what was found, and keeps it.
-pub(crate) fn watchdog(args: &WatchdogArgs) -> Result<Exit, Failure> {
+pub(crate) fn watchdog(args: &AxesArgs) -> Result<Exit, Failure> {
     let axes: Vec<usize> = args.axis.map_or_else(|| (0..AXES).collect(), |axis| vec![axis]);
     let earlier = (!args.out_of_order).then_some(Step::Jog);
     let mut session = Session::begin(&args.robot, Step::Watchdog, &axes, earlier)?;
