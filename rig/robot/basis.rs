@@ -3,7 +3,8 @@
 use std::fmt::{self, Display, Formatter};
 
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::commissioning::{Known, process_data_timeout_ms};
+use masseter_plant::commissioning::Known;
+use masseter_plant::wanted::rpdo_timeout_ms;
 use masseter_scenario::Scenario;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -37,7 +38,7 @@ impl Basis {
         }
         // Evidence of emulated drives is none of real ones.
         let watchdogs = json!({
-            "heartbeat_ms": can.heartbeat_consumer_ms, "process_data_ms": process_data_timeout_ms(scenario)
+            "heartbeat_ms": can.heartbeat_consumer_ms, "process_data_ms": rpdo_timeout_ms(scenario)
         });
         let decided_by = json!({
             "watchdogs": watchdogs, "axes": axes, "build": BUILD, "interfaces": can.interfaces, "jaw": jaw, "mechanism": mechanism

@@ -59,11 +59,6 @@ pub struct WatchdogReport {
     pub process_data: Option<Reaction>,
 }
 
-/// The time without process data after which the drives of a scenario must stop, ms; 0 for never.
-pub fn process_data_timeout_ms(scenario: &Scenario) -> u16 {
-    rpdo_timeout_ms(scenario)
-}
-
 /// Proves both watchdogs of a drive, whose axis stands meanwhile.
 ///
 /// # Errors

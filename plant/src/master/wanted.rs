@@ -387,8 +387,8 @@ fn period(scenario: &Scenario, profile: &DriveProfile) -> Result<(i64, i64), Pla
     Ok(((scenario.period_ns() / unit_ns) as i64, exponent))
 }
 
-/// The event timer of a drive's RPDO. A stall that is no fault by heartbeat or commands trips no drive.
-pub(crate) fn rpdo_timeout_ms(scenario: &Scenario) -> u16 {
+/// The event timer of a drive's RPDO, ms; 0 for never. A stall that is no fault by heartbeat or commands trips no drive.
+pub fn rpdo_timeout_ms(scenario: &Scenario) -> u16 {
     let can = &scenario.can;
     let commands_ms = u64::from(can.command_timeout_cycles) * scenario.period_ns() / MILLISECOND_NS;
     let longest_ms = u16::try_from(commands_ms).unwrap_or(u16::MAX).max(can.heartbeat_consumer_ms);
