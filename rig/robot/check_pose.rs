@@ -16,7 +16,7 @@ use serde_json::json;
 
 use super::args::{RobotArgs, parse_length};
 use super::power_mark::{Marks, check_mark, mark_of_home};
-use super::{evidence::Step, robot_line::failed, session::Session};
+use super::{robot_line::failed, session::Session, step::Step};
 
 /// How long the axes must stand, ns, and how far they may move meanwhile, m.
 const STAND_NS: u64 = 200 * MILLISECOND_NS;

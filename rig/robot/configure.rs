@@ -18,9 +18,10 @@ use serde::{Deserialize, Serialize};
 
 use super::args::WriteArgs;
 use super::basis::Basis;
-use super::evidence::{Evidence, Past, Step, StepFolder};
+use super::evidence::{Evidence, Past, StepFolder};
 use super::ledger::{before_file, read_before, return_owed_values};
 use super::robot_line::{LISTEN_NS, RobotLine, Surveys, deviations_table, drives, failed, prove_off};
+use super::step::Step;
 
 /// Configures the drives, and lists the changes.
 pub(crate) fn configure(args: &WriteArgs) -> Result<Exit, Failure> {

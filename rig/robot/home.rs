@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::args::AxesArgs;
 use super::power_mark::{Homed, leave_mark};
-use super::{evidence::Step, robot_line::failed, session::Session};
+use super::{robot_line::failed, session::Session, step::Step};
 
 /// The legs come first: a slide moves a leg whose length is known.
 const ORDER: [usize; AXES] = [3, 4, 5, 0, 1, 2];

@@ -13,7 +13,7 @@ use masseter_terminal::{Exit, Failure, OrFailure, result_line, status};
 use serde::Serialize;
 
 use super::args::{RobotArgs, parse_axis, parse_length, parse_speed};
-use super::{evidence::Step, robot_line::failed, session::Session};
+use super::{robot_line::failed, session::Session, step::Step};
 use crate::cli::arguments::parse_duration;
 
 /// For how long a byte permits motion: longer than the time between two repeats of a key, ns.

@@ -17,6 +17,7 @@ mod power_mark;
 mod robot_line;
 mod session;
 mod status;
+mod step;
 mod watchdog;
 
 use clap::Subcommand;

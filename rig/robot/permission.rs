@@ -13,10 +13,11 @@ use serde::{Deserialize, Serialize};
 use sha1::{Digest, Sha1};
 
 use super::basis::Basis;
-use super::evidence::{Past, Step, StepFolder};
+use super::evidence::{Past, StepFolder};
 use super::ledger::{owed_advice, owed_axes};
 use super::power_mark::{check_marks, marks_of_pose_check};
 use super::robot_line::warn_of_gaps;
+use super::step::Step;
 
 /// Where the evidence of a run's robot is.
 const FOLDER: &str = "bringup";

@@ -12,8 +12,9 @@ use masseter_scenario::{DriveProfile, ObjectConfig, ObjectKey, ObjectRule, Scena
 use masseter_terminal::{Failure, status};
 use serde::{Deserialize, Serialize};
 
-use super::evidence::{Evidence, Past, Step};
+use super::evidence::{Evidence, Past};
 use super::robot_line::{failed, prove_off};
+use super::step::Step;
 
 /// The profile velocity.
 const MARKED: ObjectAddress = ObjectAddress::new(0x6081, 0);

@@ -14,10 +14,11 @@ use serde_json::json;
 
 use super::args::RobotArgs;
 use super::basis::Basis;
-use super::evidence::{Past, Step, StepFolder};
+use super::evidence::{Past, StepFolder};
 use super::ledger::{OwedFiles, return_owed_values};
 use super::power_mark::remove_mark;
 use super::robot_line::{LISTEN_NS, failed, wanted_drive, warn_of_gaps};
+use super::step::Step;
 
 /// All axes.
 const ALL: [usize; AXES] = [0, 1, 2, 3, 4, 5];

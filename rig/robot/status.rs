@@ -9,7 +9,8 @@ use masseter_terminal::{Exit, Tone, result, result_with_tones};
 
 use super::args::RobotArgs;
 use super::basis::Basis;
-use super::evidence::{Past, Step};
+use super::evidence::Past;
+use super::step::Step;
 use crate::BUILD;
 
 /// The arguments of `robot status` and `robot report`.

@@ -6,7 +6,7 @@ use masseter_terminal::{Exit, Failure, OrFailure, result_line};
 use serde::Serialize;
 
 use super::args::AxesArgs;
-use super::{evidence::Step, session::Session};
+use super::{session::Session, step::Step};
 
 /// What is kept of one axis.
 #[derive(Debug, Serialize)]
