@@ -234,8 +234,8 @@ fn dropped_messages(missing: u64, ending: &Ending, is_cut_short: bool, is_damage
     }
 }
 
-/// No message may take longer on its bus than the plan allows at worst. Frames off their times are left out only where
-/// the machine lost cycles.
+/// No message may take longer on its bus than the plan allows at worst. Frames beside a stall are left out only where the
+/// machine lost cycles.
 fn bus_response(response: &BusResponse, plant: &SkipFigures) -> Check {
     const NAME: &str = "bus response";
     if let Some(why) = &response.unbounded {
@@ -247,13 +247,13 @@ fn bus_response(response: &BusResponse, plant: &SkipFigures) -> Check {
     };
     let unjudged = match response.off_time_frames {
         0 => String::new(),
-        frames => format!("; {} off their times not judged", counted(frames, "frame")),
+        frames => format!("; {} beside a stall not judged", counted(frames, "frame")),
     };
     let exceeding: Vec<_> = response.exceeding().map(in_words).collect();
     let stalled_ns = plant.stalled_ns + plant.overlong_ns;
     if exceeding.is_empty() {
         let tightest = response.tightest().map_or_else(|| "no message has a bound".to_owned(), in_words);
-        Check::judged(NAME, format!("closest: {tightest}{unjudged}"), response.tightest().is_some())
+        Check::judged(NAME, format!("closest to its bound: {tightest}{unjudged}"), response.tightest().is_some())
     } else if longest_excess_ns(response) <= stalled_ns {
         // The plant's process moves the frames of simulated wires.
         let stalled_ms = stalled_ns as f64 / 1e6;

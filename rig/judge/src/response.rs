@@ -276,7 +276,7 @@ impl Followed {
         }
         if self.off_time > 0 && self.frames - self.off_time < FEWEST_ON_TIME {
             return Some(format!(
-                "{} of {} frames of bus {bus} were off their times",
+                "{} of {} frames of bus {bus} were early or late beside a stall",
                 self.off_time, self.frames
             ));
         }

@@ -43,7 +43,7 @@ mod checks {
         let off_time = BusResponse { off_time_frames: 7, ..response(150_000, None) };
         let check = bus_response(&off_time, &SkipFigures::default());
         assert_eq!(check.result.mark(), "ok");
-        assert!(check.finding.ends_with("; 7 frames off their times not judged"), "{check:?}");
+        assert!(check.finding.ends_with("; 7 frames beside a stall not judged"), "{check:?}");
     }
 
     #[test]
