@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::declared_faults::FaultFigures;
 use crate::tracking::PoseErrors;
 
-/// Whether what was checked is as it should be.
+/// The result of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CheckResult {
@@ -66,7 +66,7 @@ pub struct Check {
     /// The requirement of the user's own list that it shows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub id: Option<String>,
-    /// What was found, with its limit.
+    /// The finding, with its limit.
     pub finding: String,
     /// Whether it is as it should be.
     pub result: CheckResult,

@@ -123,7 +123,7 @@ mod shortfall {
             assert_eq!(found, Some(Shortfall::NotPlayed { share, way_mm: 900.0 }));
         }
         let none = shortfall(|_, figures| figures.motion.played = Some(f64::NAN)).unwrap();
-        assert_eq!(none.result(), CheckResult::Failed, "what is no number is no share");
+        assert_eq!(none.result(), CheckResult::Failed, "NaN is no share");
         let still = Shortfall::NotPlayed { share: 0.004, way_mm: 900.0 };
         assert!(
             still
