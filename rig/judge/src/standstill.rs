@@ -183,7 +183,7 @@ pub(super) fn standstill(
     }
     let closest = ways.iter().max_by(|(_, a, of_a, _), (_, b, of_b, _)| (a / of_a).total_cmp(&(b / of_b)));
     let closest = closest.map_or_else(String::new, in_words);
-    Some(Check::judged(NAME, format!("{closest}; for {recorded_s:.2} s after the stop"), true))
+    Some(Check::judged(NAME, format!("{closest}; observed for {recorded_s:.2} s after the stop"), true))
 }
 
 #[cfg(test)]
