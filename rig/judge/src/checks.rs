@@ -253,11 +253,8 @@ fn bus_response(response: &BusResponse, plant: &SkipFigures) -> Check {
     let stalled_ns = plant.stalled_ns + plant.overlong_ns;
     if exceeding.is_empty() {
         let tightest = response.tightest().map_or_else(|| "no message has a bound".to_owned(), in_words);
-        Check::judged(
-            NAME,
-            format!("closest to its bound: {tightest}{unjudged}"),
-            response.tightest().is_some(),
-        )
+        let found = format!("closest to its bound: {tightest}{unjudged}");
+        Check::judged(NAME, found, response.tightest().is_some())
     } else if longest_excess_ns(response) <= stalled_ns {
         // The plant's process moves the frames of simulated wires.
         let stalled_ms = stalled_ns as f64 / 1e6;
