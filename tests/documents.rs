@@ -41,7 +41,9 @@ fn every_link_leads_to_a_file_and_its_heading() {
     assert!(documents.len() > 10, "{documents:?}");
     for document in documents {
         let text = fs::read_to_string(&document).unwrap();
-        for (_, target) in links(&text).filter(|(_, target)| !target.contains("://")) {
+        let pictures = text.split("src=\"").skip(1).map(|rest| rest.split('"').next().unwrap());
+        let targets = links(&text).map(|(_, target)| target).chain(pictures);
+        for target in targets.filter(|target| !target.contains("://")) {
             let (file, heading) = target.split_once('#').unwrap_or((target, ""));
             let path = if file.is_empty() { document.clone() } else { document.with_file_name(file) };
             assert!(path.exists(), "{}: {target}", document.display());
