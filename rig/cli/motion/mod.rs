@@ -82,7 +82,7 @@ struct Found {
 /// Whether the rig would play a motion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct Judged {
-    /// The strokes that then remain; negative where the motion is too large.
+    /// What is then left of the strokes; negative where the motion is too large.
     strokes: Option<Strokes>,
     /// Why the rig would not play it.
     refused: Option<String>,
@@ -98,9 +98,9 @@ struct Strokes {
 /// Keys of the scenario.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct Suggestion {
-    /// `motion.axes`; `None` if the stated ones are likely.
+    /// `motion.axes`; none where the stated ones are likely.
     axes: Option<[String; 3]>,
-    /// `jaw.closed_offset_m`; `None` if the stated one is good.
+    /// `jaw.closed_offset_m`; none where the stated one is good.
     closed_offset_m: Option<[f64; 3]>,
     /// Whether the rig would play the motion with them.
     #[serde(flatten)]
@@ -166,7 +166,7 @@ fn suggest(
     Some(Suggestion { axes: axes.cloned(), closed_offset_m, judged })
 }
 
-/// The offset with the most left of every stroke, to half a millimetre; `None` if there is no better one.
+/// The offset with the most left of every stroke, to half a millimetre; none where there is no better one.
 fn better_offset(scenario: &Scenario, mechanism: &Mechanism) -> Option<[f64; 3]> {
     let jaw = &scenario.jaw;
     let trajectory = Trajectory::new(&scenario.motion, jaw, mechanism, scenario.duration_s).ok()?;

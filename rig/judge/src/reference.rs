@@ -3,7 +3,7 @@
 //! While the motion plays, the pose is the scenario's, computed here; with force control its height follows the controller's
 //! within `reach_m`. The motion begins with the first sample in which the controller says `running`, and goes on by a period
 //! with each cycle that the controller runs. A controller waits where commands or readings are lost: its motion is then
-//! late, and the pose here is as late, up to the limit of `checks`. A late motion stays late, but for what cycles without
+//! late, and the pose here is as late, up to the limit of `checks`. What was late stays late, but for what cycles without
 //! SYNC and the machine's lost cycles cost. Before the motion, and in an own motion, the controller's desired pose counts. After the motion the last pose
 //! stays. Where the machine loses cycles while the rate of the motion changes, the pose is not exactly the controller's.
 
@@ -159,7 +159,7 @@ impl Reference {
         }
     }
 
-    /// The rest of the motion, as `distance` measures it from pose to pose; nothing after a request to stop. `None` if the
+    /// What is left of the motion, as `distance` measures it from pose to pose; nothing after a request to stop. None where the
     /// motion is not the scenario's.
     pub(crate) fn rest(&self, distance: impl Fn(&Pose, &Pose) -> f64) -> Option<f64> {
         let mut playback = self.playback.clone()?;
@@ -189,7 +189,7 @@ fn as_published(pose: &Pose) -> Option<Pose> {
     desired_pose(&state)
 }
 
-/// The scenario's motion; `None` if its file is gone since the run.
+/// The scenario's motion; none where its file is gone since the run.
 fn playback(scenario: &Scenario) -> Option<Playback> {
     let mechanism = Mechanism::new(&scenario.mechanism).ok()?;
     let motion = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s).ok()?;

@@ -57,7 +57,7 @@ pub struct JawCycle {
     pub opening_mm_s: f64,
     /// The greatest velocity upwards, mm/s.
     pub closing_mm_s: f64,
-    /// The greatest vertical force on the jaw, N; `None` if the jaws cannot touch, and on the robot.
+    /// The greatest vertical force on the jaw, N; none where the jaws cannot touch, and on the robot.
     pub force_n: Option<f64>,
 }
 
@@ -139,7 +139,7 @@ const LEAST_SHARE: f64 = 0.5;
 const CLOSED_M: f64 = 0.0005;
 /// A longer rest between the teeth ends a bout of chewing, s.
 const LONGEST_REST_S: f64 = 1.0;
-/// A longer stretch is no cycle, s.
+/// A longer cycle is none, s.
 const LONGEST_S: f64 = 10.0;
 /// Samples in which the beginning of an opening is looked for, s.
 const LOOK_BACK_S: f64 = 2.0;
@@ -235,7 +235,7 @@ impl Segments {
         Some(cycle)
     }
 
-    /// Drops samples that are too old to be the beginning of an opening; half of the samples at a time.
+    /// Drops what is too old to be the beginning of an opening; half of the samples at a time.
     fn forget(&mut self) {
         if self.lasts_s() > 2.0 * LOOK_BACK_S {
             let newest_s = self.samples[self.samples.len() - 1].at_s;
