@@ -190,7 +190,7 @@ fn start_recorder(scenario: &Path, domain: &str, recording: &Path) -> anyhow::Re
     Ok(recorder)
 }
 
-/// What was published.
+/// The published messages.
 struct Played {
     /// Messages.
     sent: u64,

@@ -50,7 +50,7 @@ ITERATIONS, LAST = 40, 20
 LEAST_CM2 = 1e-30
 # Guesses anywhere above the base: each leg is within 90° of the vertical.
 ABOVE_BASE_DEG = 90
-# Forces below this are none, N.
+# Smaller forces count as zero, N.
 NONE_N = 0.05
 
 

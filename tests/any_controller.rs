@@ -356,7 +356,10 @@ fn a_program_that_declares_what_cannot_be_shown_is_refused_and_the_next_one_take
         (of(vec![signal("a", "m\nfloat64 evil", "")]), "printable characters"),
         (of(vec![signal("a", "", "\u{1b}]0;evil\u{7}")]), "printable characters"),
         (of(vec![signal("a", "", &"x".repeat(100_000))]), "at most 65536 bytes"),
-        (Declared { parameters: vec![reversed], ..Declared::default() }, "range of parameter 'gain'"),
+        (
+            Declared { parameters: vec![reversed], ..Declared::default() },
+            "parameter 'gain' has no valid range",
+        ),
     ] {
         let report = Report::Ready { scheduling: scheduling.clone(), declared };
         let answers = answer_to(&name, line(&report).trim_end());

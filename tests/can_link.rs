@@ -1,4 +1,4 @@
-//! The CAN link seen from outside: what is planned, what a run measures beside it, and what is served.
+//! The CAN link seen from outside: the plan, the measurements of a run beside it, and the served drives.
 
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};

@@ -20,7 +20,7 @@ fn project() -> &'static Path {
 }
 
 fn documents() -> Vec<PathBuf> {
-    let folders = [".", "docs", "docs/tutorials", "shared/can"].map(|folder| project().join(folder));
+    let folders = [".", "docs", "docs/tutorials", "notes", "shared/can"].map(|folder| project().join(folder));
     let files =
         folders.iter().flat_map(|folder| fs::read_dir(folder).unwrap()).map(|entry| entry.unwrap().path());
     files.filter(|path| path.extension().is_some_and(|extension| extension == "md")).collect()
@@ -41,7 +41,9 @@ fn every_link_leads_to_a_file_and_its_heading() {
     assert!(documents.len() > 10, "{documents:?}");
     for document in documents {
         let text = fs::read_to_string(&document).unwrap();
-        for (_, target) in links(&text).filter(|(_, target)| !target.contains("://")) {
+        let pictures = text.split("src=\"").skip(1).map(|rest| rest.split('"').next().unwrap());
+        let targets = links(&text).map(|(_, target)| target).chain(pictures);
+        for target in targets.filter(|target| !target.contains("://")) {
             let (file, heading) = target.split_once('#').unwrap_or((target, ""));
             let path = if file.is_empty() { document.clone() } else { document.with_file_name(file) };
             assert!(path.exists(), "{}: {target}", document.display());
@@ -60,6 +62,70 @@ fn has_heading(document: &Path, name: &str) -> bool {
         kept.collect::<String>().to_lowercase().replace(' ', "-")
     };
     headings.map(as_name).any(|heading| heading == name)
+}
+
+#[test]
+fn the_readme_is_short_and_the_contents_lead_to_every_document() {
+    let readme = fs::read_to_string(project().join("README.md")).unwrap();
+    let words = readme.split_whitespace().count();
+    assert!(words <= 700, "{words} words");
+    let contents = project().join("docs/README.md");
+    let text = fs::read_to_string(&contents).unwrap();
+    let linked: Vec<_> = links(&text).map(|(_, target)| target.split('#').next().unwrap()).collect();
+    for document in documents() {
+        let Ok(name) = document.strip_prefix(project().join("docs")) else { continue };
+        let is_linked = document == contents || linked.iter().any(|target| Path::new(target) == name);
+        assert!(is_linked, "docs/README.md has no link to {}", name.display());
+    }
+}
+
+/// The Rust files of the product, each with its broken string literals joined.
+fn sources(folder: &Path) -> Vec<String> {
+    let mut found = Vec::new();
+    for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        if path.is_dir() {
+            found.extend(sources(&path));
+        } else if path.extension() == Some("rs".as_ref()) && !path.ends_with("tests.rs") {
+            let text = fs::read_to_string(&path).unwrap();
+            let product = text.split("\n#[cfg(test)]\nmod tests {").next().unwrap();
+            let mut pieces = product.split("\\\n");
+            let first = pieces.next().unwrap().to_owned();
+            found.push(pieces.fold(first, |joined, piece| joined + piece.trim_start()));
+        }
+    }
+    found
+}
+
+/// Whether the text has these pieces one after the other, close together.
+fn has_in_order(text: &str, pieces: &[&str]) -> bool {
+    const FARTHEST: usize = 400;
+    let [first, others @ ..] = pieces else { return false };
+    text.match_indices(first).any(|(at, _)| {
+        let mut rest = &text[at + first.len()..];
+        others.iter().all(|piece| match rest.find(piece) {
+            Some(at) if at < FARTHEST => {
+                rest = &rest[at + piece.len()..];
+                true
+            }
+            _ => false,
+        })
+    })
+}
+
+/// The first column of a row is a message as the code writes it; `…` takes the place of values.
+#[test]
+fn every_message_of_the_troubleshooting_is_one_of_the_code() {
+    let folders = ["shared", "controller", "plant", "rig"];
+    let sources: Vec<_> = folders.iter().flat_map(|folder| sources(&project().join(folder))).collect();
+    let text = fs::read_to_string(project().join("docs/troubleshooting.md")).unwrap();
+    let rows: Vec<_> = text.lines().filter_map(|line| line.strip_prefix("| `")).collect();
+    for row in &rows {
+        let message = row.split('`').next().unwrap();
+        let pieces: Vec<_> = message.split('…').filter(|piece| !piece.trim().is_empty()).collect();
+        let is_there = sources.iter().any(|source| has_in_order(source, &pieces));
+        assert!(is_there, "no file has the message: {message}");
+    }
+    assert!(rows.len() >= 30, "only {} messages were found", rows.len());
 }
 
 /// "Follow one cycle through the code" names a function before the link to the file that has it.

@@ -105,7 +105,7 @@ impl<'a> SmallDisk<'a> {
         Self::mount(folder, &["-o", "loop", image.to_str()?])
     }
 
-    /// None where nothing may be mounted, as by ordinary users and in most containers.
+    /// `None` if nothing may be mounted, as by ordinary users and in most containers.
     fn mount(folder: &'a Path, what: &[&str]) -> Option<Self> {
         let mounted = Command::new("mount").args(what).arg(folder).status();
         mounted.is_ok_and(|status| status.success()).then(|| Self(folder))
@@ -143,7 +143,7 @@ impl Drop for SmallDisk<'_> {
     }
 }
 
-/// A run on a small disk; none where such a disk cannot be mounted.
+/// A run on a small disk; `None` if such a disk cannot be mounted.
 fn run_on_a_small_disk(size: &str, run: impl FnOnce(&Workspace) -> Output) -> Option<Output> {
     let workspace = Workspace::new("");
     let folder = workspace.file("");

@@ -143,7 +143,7 @@ fn row(fault: &FaultConfig, cycles: u32, from_s: f64) -> (String, bool) {
     // Heartbeats are rarer than the shorter faults, and the messages of the boot are sent once.
     let is_rare = from_s < BOOT_S || (fault.id.is_some_and(|id| id >= HEARTBEAT) && cycles < SENT_WITHIN);
     let is_typed = ["PASS", "SAFE STOP"].contains(&verdict) || (is_rare && verdict == NEVER_STRUCK);
-    // The negation also counts what is no number.
+    // The negation also counts NaN.
     let is_within = mm <= tracking_max_mm && deg <= tracking_max_deg;
     (row, !is_typed || !is_within)
 }

@@ -161,7 +161,7 @@ impl Table {
         self.toml[..end].trim_start_matches('[')
     }
 
-    /// A scenario that has this table with its defaults, and with what is required in it.
+    /// A scenario that has this table with its defaults, and with its required keys.
     fn text(&self) -> String {
         let prelude = match self.path().split_once('.') {
             Some(("motion", _)) => "motion.kind = 'chewing'\n",

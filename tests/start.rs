@@ -2,7 +2,7 @@
 
 use crate::common::{Workspace, stderr, stdout};
 
-/// Runs the scenario under virtual time; the exit code and what was printed.
+/// Runs the scenario under virtual time; the exit code and the output.
 fn run(scenario: &str, arguments: &[&str]) -> (Option<i32>, String) {
     let workspace = Workspace::new(&format!("duration_s = 1.0\n{scenario}"));
     let output = workspace.run_virtual(arguments);

@@ -18,7 +18,7 @@ const LONGEST_BYTES: usize = 20_000;
 /// # Panics
 /// If what the head of this file says does not hold.
 pub fn feed(data: &[u8]) {
-    // Too few bytes for a configuration are none.
+    // Too few bytes make no configuration.
     let _ = play(&mut Unstructured::new(data));
 }
 

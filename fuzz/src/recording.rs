@@ -69,7 +69,7 @@ struct Found {
     data: Vec<u8>,
 }
 
-/// Reads to the end; none where nothing is MCAP.
+/// Reads to the end; `None` if nothing is MCAP.
 fn read(reader: &mut Reader<Cursor<&[u8]>>) -> Option<Vec<Found>> {
     let mut all = Vec::new();
     loop {

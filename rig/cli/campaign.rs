@@ -27,7 +27,7 @@ const RECORD: usize = 10;
 /// What campaigns and searches share.
 #[derive(Debug, Clone, Args)]
 struct PlayArgs {
-    /// Folder of the results; what was begun in it goes on [default: campaigns/UTC_TIME-NAME]
+    /// Folder of the results; a campaign begun there goes on [default: campaigns/UTC_TIME-NAME]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Who controls the robot
@@ -101,7 +101,7 @@ pub(super) struct CampaignArgs {
     plan: bool,
 }
 
-/// Runs the campaign, or what is left of it; [`Exit::Passed`] if enough cases passed.
+/// Runs the campaign, or the rest of it; [`Exit::Passed`] if enough cases passed.
 pub(super) fn campaign(args: &CampaignArgs) -> Result<Exit, Failure> {
     let campaign = plan(&args.file, args.play.controller).usage()?;
     if args.plan && campaign.file.stop_after != StopRules::default() {

@@ -295,7 +295,8 @@ fn clean() -> anyhow::Result<Exit> {
 
 #[cfg(test)]
 mod tests {
-    use std::iter;
+    use std::path::Path;
+    use std::{fs, iter};
 
     use super::*;
 
@@ -338,15 +339,29 @@ mod tests {
     }
 
     #[test]
-    fn every_command_line_of_the_readme_and_the_workflow_is_right() {
+    fn every_command_line_of_the_documents_and_the_workflow_is_right() {
         let workflow = include_str!("../../examples/workflow.yml").replace("run: masseter", "masseter");
         let workflow: Vec<_> = command_lines(&workflow).collect();
         assert!(!workflow.is_empty());
         workflow.into_iter().for_each(assert_parsed);
-        let readme = include_str!("../../README.md").lines().filter(|line| line.starts_with("    "));
-        let readme: Vec<_> = readme.flat_map(command_lines).collect();
-        assert!(readme.len() > 10, "{readme:?}");
-        readme.into_iter().for_each(assert_parsed);
+        let project = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let files = ["docs", "docs/tutorials"].map(|folder| fs::read_dir(project.join(folder)).unwrap());
+        let files = files.into_iter().flatten().map(|entry| entry.unwrap().path());
+        let mut checked = 0;
+        for path in
+            files.chain([project.join("README.md")]).filter(|path| path.extension() == Some("md".as_ref()))
+        {
+            let text = fs::read_to_string(path).unwrap();
+            let indented: Vec<_> = text.lines().filter(|line| line.starts_with("    ")).collect();
+            // The program of a user does not exist here.
+            let commands = indented.join("\n").replace("./my_controller", "motion");
+            // This test splits at blanks, as a shell does outside of quotes.
+            for line in command_lines(&commands).filter(|line| !line.contains('"')) {
+                assert_parsed(line);
+                checked += 1;
+            }
+        }
+        assert!(checked > 50, "only {checked} command lines were found");
     }
 
     #[test]

@@ -25,7 +25,7 @@ pub(super) fn huge_pages(root: &SystemRoot) -> Finding {
         .with_remedy(on_host(root, format!("echo madvise | sudo tee /{MODES}")))
 }
 
-/// Judges blocks and free bytes of the file system of shared memory; none if there is none.
+/// Judges blocks and free bytes of the file system of shared memory; `None` without one.
 pub(super) fn room(root: &SystemRoot, shared: Option<(u64, u64)>) -> Finding {
     let enlarge =
         |mount: &str| start_with(root, "--shm-size 1g", format!("sudo mount {mount} {SHARED_MEMORY}"));

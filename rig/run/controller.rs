@@ -119,7 +119,7 @@ impl Controller {
         }
     }
 
-    /// Its process file; none where the rig has not started it.
+    /// Its process file; `None` if the rig has not started it.
     pub(super) fn handle(&self) -> io::Result<Option<OwnedFd>> {
         match self {
             Self::Own(process) => process.handle().map(Some),
@@ -412,7 +412,7 @@ impl Drop for Program {
     }
 }
 
-/// What is said of a program that reports nothing more.
+/// The words for a program that reports nothing more.
 fn without_report(left: &Left) -> String {
     match left {
         Left::Closed => "it left the rig without a report".to_owned(),

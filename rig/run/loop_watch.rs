@@ -33,7 +33,7 @@ pub(super) struct LoopWatch {
 }
 
 impl LoopWatch {
-    /// For processes, by name and id, that begin their work at `start_ns`. The id 0 is none.
+    /// For processes, by name and id, that begin their work at `start_ns`. The id 0 means no process.
     pub(super) fn new(
         root: SystemRoot,
         is_virtual: bool,
@@ -65,7 +65,7 @@ impl LoopWatch {
         }
     }
 
-    /// What was kept, by process. A hypervisor that has stolen nothing since boot does not report it.
+    /// The kept intervals, by process. A hypervisor that has stolen nothing since boot does not report it.
     pub(super) fn into_intervals(self) -> BTreeMap<String, Vec<LoopInterval>> {
         let is_reported =
             !self.is_virtual || stolen_by_core_ns(&self.root).values().any(|stolen_ns| *stolen_ns > 0);

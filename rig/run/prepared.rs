@@ -154,7 +154,7 @@ pub(super) fn analyse_unrecorded(
     Ok((manifest, figures))
 }
 
-/// What is known before the start.
+/// The facts known before the start.
 fn manifest_of(plan: &RunPlan, controller: &ControllerChoice, clock: ClockKind) -> Manifest {
     let (motion_s, machine) = (plan.trajectory.duration_s(), masseter_machine::describe());
     let mut manifest = Manifest::new(BUILD, plan.scenario.clone(), motion_s, &name_of(&clock), machine);

@@ -257,10 +257,7 @@ fn check_process_faults(request: &RunRequest, scenario: &Scenario) -> anyhow::Re
     if !has(stall) {
         return Ok(());
     }
-    ensure!(
-        *clock == ClockKind::Rt,
-        "faults.kind = {stall}: simulated time stands still meanwhile: use --clock rt"
-    );
+    ensure!(*clock == ClockKind::Rt, "faults.kind = {stall}: simulated time waits meanwhile: use --clock rt");
     ensure!(
         scenario.realtime.priority != HIGHEST_PRIORITY,
         "realtime.priority = {HIGHEST_PRIORITY}: {stall} needs a higher one: use at most {}",

@@ -37,7 +37,7 @@ impl<'a> From<&'a Path> for ScenarioFile<'a> {
     }
 }
 
-/// What is played.
+/// The scenario that is played.
 #[derive(Clone, Copy)]
 pub(crate) enum Source<'a> {
     File(ScenarioFile<'a>),

@@ -1,7 +1,7 @@
 //! Starts the three processes, monitors them, stops them in order, and removes their shared memory.
 //!
 //! Order of ending: the controller first (it brings the drives to rest), then the plant, then the recorder, which
-//! drains what is left. A process that dies is not restarted: the rig ends in that order, and the watchdogs of the
+//! drains the rest. A process that dies is not restarted: the rig ends in that order, and the watchdogs of the
 //! other processes stop the drives. A process that does not end in time is killed. So is a controller that hangs,
 //! which the plant detects. The supervisor reads no message of the run and judges nothing.
 
@@ -47,7 +47,7 @@ const START_LEAD_NS: u64 = 100_000_000;
 const END_TIMEOUT_NS: u64 = 5 * SECOND_NS;
 /// The same for the plant, which stops the drives and runs on for a while first; in lockstep as fast as the recorder takes it, ns.
 const PLANT_END_TIMEOUT_NS: u64 = 3 * END_TIMEOUT_NS;
-/// Longest time for the recorder to write what is left to a slow disk, ns.
+/// Longest time for the recorder to write the rest to a slow disk, ns.
 const RECORD_TIMEOUT_NS: u64 = 60 * SECOND_NS;
 /// The cause of death of a process that did not end when it was asked to.
 const NOT_ENDED: &str = "it did not end when it was asked to";
@@ -102,7 +102,7 @@ pub(super) fn run(
         Some((mut processes, scheduling)) => {
             manifest.scheduling = scheduling;
             manifest.declared = processes.declared.clone();
-            // The supervisor may be killed: a report of what is recorded then needs the names.
+            // The supervisor may be killed: a report of the recorded messages then needs the names.
             manifest.write(folder).context("cannot write the manifest").incomplete()?;
             let ending = match request.lockstep() {
                 None => processes.run(plan, request.require_rt, interrupts, manifest),

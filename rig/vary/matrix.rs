@@ -134,7 +134,7 @@ fn row_of(
     let found = &figures.faults[0];
     let detection =
         found.struck_ns.and_then(|struck_ns| Some((struck_ns, detection(&figures.events, struck_ns)?)));
-    // The negation also counts what is no number.
+    // The negation also counts NaN.
     let is_beyond =
         !(found.deviation_mm <= limits.tracking_max_mm && found.deviation_deg <= limits.tracking_max_deg);
     let coverage = match (found.struck_ns, detection, is_beyond) {

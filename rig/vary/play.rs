@@ -41,7 +41,7 @@ pub(crate) fn plan(file: &Path, controller: ControllerKind) -> anyhow::Result<Ca
         base: base.to_toml(),
     };
     campaign.check_factors().with_context(|| file.display().to_string())?;
-    // What is wrong with the scenario itself is wrong with every case.
+    // A mistake in the scenario itself is in every case.
     resolve_simulated(&base, campaign.file.scenario.as_deref(), controller.builder())
         .context("the scenario of the campaign")?;
     Ok(campaign)

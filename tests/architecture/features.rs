@@ -14,7 +14,7 @@ pub(super) fn other_features(workspace: &Path, binding: &str) -> Vec<String> {
     // Programs that run while compiling have features of their own.
     for edges in ["normal,build", "normal,no-proc-macro"] {
         let command = features(workspace, "masseter", edges).expect("the command is compiled for its tests");
-        // None where the crates of the binding were never downloaded.
+        // `None` if the crates of the binding were never downloaded.
         for (name, sets) in features(workspace, binding, edges).into_iter().flatten() {
             let Some(known) = command.get(&name) else { continue };
             differing

@@ -28,7 +28,7 @@ const MARKERS: [&str; 10] = [
 /// A problem of a recording, before its path is known.
 #[derive(Debug)]
 pub(super) struct Located {
-    /// The line, from 1; none where the file as a whole is at fault.
+    /// The line, from 1; `None` if the file as a whole is at fault.
     pub line: Option<u64>,
     /// The error and its remedy, for the author of the file.
     pub problem: String,

@@ -95,7 +95,7 @@ pub struct PdoSetting {
     pub communication: u16,
     /// Its COB-ID. Without [`layout`](Self::layout) only its validity counts.
     pub cob_id: u32,
-    /// Content and timing; none where they do not matter.
+    /// Content and timing; `None` if they do not matter.
     pub layout: Option<PdoLayout>,
 }
 

@@ -32,7 +32,7 @@ pub(super) fn add_durations(durations: &mut Durations, taken_ns: u64, count: u64
 #[derive(Debug)]
 pub(super) struct Round {
     pub(super) durations: Durations,
-    /// Deadlines that passed before the loop could wait for them, %; none where nobody counts them.
+    /// Deadlines that passed before the loop could wait for them, %; `None` if nobody counts them.
     pub(super) skipped_percent: Option<f64>,
 }
 

@@ -57,7 +57,7 @@ pub(super) struct Columns {
     pub written: &'static str,
 }
 
-/// Solves one line's values and writes the output lines. The error names what is wrong with the values.
+/// Solves one line's values and writes the output lines. The error names the wrong value.
 pub(super) type Solved = Result<(), String>;
 
 /// Output lines under way.

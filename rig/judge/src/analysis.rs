@@ -57,7 +57,7 @@ pub struct Analysis {
     /// The cycles in the order of time.
     timeline: Timeline,
     named: NamedWatch,
-    /// None where nothing is shown.
+    /// `None` if nothing is shown.
     shown: Option<Box<Shown>>,
     /// None but in a dry run.
     axes: Option<AxisWatch>,
@@ -81,7 +81,7 @@ pub struct Analysis {
     standstill: StandstillWatch,
     played: PlayedWatch,
     contact: ContactWatch,
-    /// None where the scenario requires nothing.
+    /// `None` if the scenario requires nothing.
     requirements: Option<Requirements>,
     /// What needs no collector.
     figures: Figures,

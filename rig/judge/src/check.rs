@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::declared_faults::FaultFigures;
 use crate::tracking::PoseErrors;
 
-/// Whether what was checked is as it should be.
+/// The result of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CheckResult {
@@ -66,7 +66,7 @@ pub struct Check {
     /// The requirement of the user's own list that it shows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub id: Option<String>,
-    /// What was found, with its limit.
+    /// The finding, with its limit.
     pub finding: String,
     /// Whether it is as it should be.
     pub result: CheckResult,
@@ -128,7 +128,7 @@ impl Check {
 /// Fewer samples of a motion show nothing.
 const FEWEST_SAMPLES: u64 = 10;
 
-/// What is no number is within no limit.
+/// NaN exceeds every limit.
 fn is_within(value: f64, limit: f64) -> bool {
     value <= limit
 }
@@ -144,7 +144,7 @@ pub(crate) fn left_its_path(errors: &PoseErrors, limits: &ChecksConfig) -> bool 
     peaks.into_iter().any(|(value, limit)| value.is_some_and(|value| !is_within(value, limit)))
 }
 
-/// The worst error against its limit, or all that exceed theirs; untested if the motion left too little to compare.
+/// The error nearest to its limit, or all that exceed theirs; untested if the motion left too little to compare.
 pub(crate) fn tracking(
     name: &'static str,
     samples: u64,
@@ -173,7 +173,7 @@ pub(crate) fn tracking(
     match found.first() {
         _ if !exceeding.is_empty() => Check::judged(name, exceeding.join("; "), false),
         Some((_, _, closest)) if samples >= FEWEST_SAMPLES => {
-            Check::judged(name, format!("closest of {samples} samples: {closest}"), true)
+            Check::judged(name, format!("{closest}; {samples} samples"), true)
         }
         _ => {
             let samples = counted(samples, "sample");
@@ -212,8 +212,8 @@ pub(crate) fn faults(
         .map(|(fault, FaultFigures { number, deviation_mm, deviation_deg, detection, .. })| {
             let until = if detection.is_some() { "before it was detected" } else { "undetected" };
             format!(
-                "; number {number}, {fault}, led {deviation_mm:.3} mm and {deviation_deg:.3}° from the path {until}, limit \
-                 {tracking_max_mm} mm and {tracking_max_deg}°"
+                "; number {number}, {fault}, moved the jaw {deviation_mm:.3} mm and {deviation_deg:.3}° from its path {until}, \
+                 limit {tracking_max_mm} mm and {tracking_max_deg}°"
             )
         })
         .collect();

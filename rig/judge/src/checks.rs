@@ -80,14 +80,14 @@ fn stopped_ns(figures: &Figures) -> Option<u64> {
     stops.map(|event| event.time_ns).min().or(figures.stop_without_event_ns)
 }
 
-/// A motion that waited for lost commands or readings is late from then on. None where the scenario's motion never began.
+/// A motion that waited for lost commands or readings is late from then on. `None` if the scenario's motion never began.
 fn motion_lag(motion: &MotionFigures, limit_ms: f64) -> Option<Check> {
     let lag_ms = motion.way_mm.and(motion.lag_ms)?;
     Some(Check::judged("motion lag", format!("{lag_ms:.1} ms, limit {limit_ms} ms"), lag_ms <= limit_ms))
 }
 
 /// A cycle of the motion without a new command leaves the drives with the last one. As many in a row are allowed as the controller
-/// may miss readings; a single one in real time is a late command. None where the scenario's own faults stall a loop.
+/// may miss readings; a single one in real time is a late command. `None` if the scenario's own faults stall a loop.
 fn missed_commands(manifest: &Manifest, figures: &Figures) -> Option<Check> {
     let MotionFigures { lag_ms, missed_commands, missed_in_a_row, .. } = figures.motion;
     let limit = u64::from(manifest.scenario.controller.stale_cycles);
@@ -171,7 +171,7 @@ fn sequence(manifest: &Manifest, figures: &Figures) -> Check {
     Check::judged(NAME, format!("ended in state {in_words}{how}{as_expected}{whose}"), is_good)
 }
 
-/// A test with stimuli of which one never began has not tested what it should. None where there are none.
+/// A test with stimuli of which one never began has not tested what it should. `None` without stimuli.
 fn stimuli(declared: &[StimulusConfig], figures: &Figures) -> Option<Check> {
     let Figures { events, ended_ns, .. } = figures;
     let is_begin = |event: &EventRecord, number| {
@@ -234,8 +234,8 @@ fn dropped_messages(missing: u64, ending: &Ending, is_cut_short: bool, is_damage
     }
 }
 
-/// No message may take longer on its bus than the plan allows at worst. Frames off their times are left out only where
-/// the machine lost cycles.
+/// No message may take longer on its bus than the plan allows at worst. Frames beside a stall are left out only where the
+/// machine lost cycles.
 fn bus_response(response: &BusResponse, plant: &SkipFigures) -> Check {
     const NAME: &str = "bus response";
     if let Some(why) = &response.unbounded {
@@ -247,13 +247,14 @@ fn bus_response(response: &BusResponse, plant: &SkipFigures) -> Check {
     };
     let unjudged = match response.off_time_frames {
         0 => String::new(),
-        frames => format!("; {} off their times not judged", counted(frames, "frame")),
+        frames => format!("; {} beside a stall not judged", counted(frames, "frame")),
     };
     let exceeding: Vec<_> = response.exceeding().map(in_words).collect();
     let stalled_ns = plant.stalled_ns + plant.overlong_ns;
     if exceeding.is_empty() {
         let tightest = response.tightest().map_or_else(|| "no message has a bound".to_owned(), in_words);
-        Check::judged(NAME, format!("closest: {tightest}{unjudged}"), response.tightest().is_some())
+        let found = format!("closest to its bound: {tightest}{unjudged}");
+        Check::judged(NAME, found, response.tightest().is_some())
     } else if longest_excess_ns(response) <= stalled_ns {
         // The plant's process moves the frames of simulated wires.
         let stalled_ms = stalled_ns as f64 / 1e6;
@@ -293,7 +294,7 @@ pub(crate) enum Shortfall {
 }
 
 impl Shortfall {
-    /// None where the motion was played, and where something that anybody sees ended it, which has a verdict of its own.
+    /// `None` if the motion was played, and where something that anybody sees ended it, which has a verdict of its own.
     pub(crate) fn of(manifest: &Manifest, figures: &Figures) -> Option<Self> {
         let is_in = |expected| figures.final_state.is_some_and(|state| state == expected);
         match figures.stopped_by {
@@ -392,7 +393,7 @@ pub(crate) fn was_stopped_by_request(figures: &Figures) -> bool {
     figures.events.iter().any(|event| event.cause == Cause::StopRequested)
 }
 
-/// What is added where the motion is not the scenario's.
+/// The words added where the motion is not the scenario's.
 pub fn whose_motion(manifest: &Manifest) -> &'static str {
     match manifest.declared.motion {
         PlayedMotion::Scenario => "",

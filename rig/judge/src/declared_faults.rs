@@ -14,7 +14,7 @@ use crate::tracking::PathSample;
 pub struct FaultFigures {
     /// Number in the scenario's list, from 1.
     pub number: usize,
-    /// When it first struck, ns of the run's clock; none where it never did.
+    /// When it first struck, ns of the run's clock; `None` if it never did.
     pub struck_ns: Option<u64>,
     /// Largest distance of the incisal point from its path, from then until a safe stop began, or else the motion's end, mm.
     pub deviation_mm: f64,

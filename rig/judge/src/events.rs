@@ -68,10 +68,10 @@ pub struct EventRecord {
     /// State before and after.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub transition: Option<[String; 2]>,
-    /// What is wrong, where, and what to do, where figures alone do not say it.
+    /// The defect, its place and the remedy, where figures alone do not say it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub text: Option<String>,
-    /// The value that explains it; none where it is no number.
+    /// The value that explains it; NaN without one.
     pub value: f64,
     /// The limit it is held against.
     pub limit: f64,

@@ -40,7 +40,7 @@ pub struct Figures {
     pub readings: ReadingFigures,
     /// Stretches of work that cost deadlines, with what the kernel counted of the loop's thread: the longest, the loops' own first.
     pub overruns: Vec<Overrun>,
-    /// Rig or machine as the cause of the other overlong stretches of work; none where no such stretch cost a deadline.
+    /// Rig or machine as the cause of the other overlong stretches of work; `None` if no such stretch cost a deadline.
     pub overrun_attribution: Option<OverrunAttribution>,
     /// The last state of the controller's sequence; none without a single state message.
     pub final_state: Option<Code<ControllerState>>,
@@ -50,14 +50,14 @@ pub struct Figures {
     /// Whether the controller left the motion and began it again.
     #[serde(skip)]
     pub has_resumed: bool,
-    /// What stopped the drives, whatever the controller reports; none where nothing did.
+    /// What stopped the drives, whatever the controller reports; `None` if nothing did.
     pub stopped_by: Option<StoppedBy>,
     /// For how long all drives were enabled, s.
     pub enabled_s: f64,
     /// For how long of it the controller was in the state `running`, s.
     #[serde(skip)]
     pub running_s: f64,
-    /// What was played of the scenario's motion.
+    /// The played part of the scenario's motion.
     pub motion: MotionFigures,
     /// How far the mechanism moved after its stops.
     pub standstill: StandstillFigures,
@@ -76,10 +76,10 @@ pub struct Figures {
     pub signals: Vec<SignalFigures>,
     /// The controller's parameters.
     pub parameters: Vec<ParameterFigures>,
-    /// The greatest vertical force of food and upper teeth on the emulated jaw, N; none where the jaws cannot touch,
+    /// The greatest vertical force of food and upper teeth on the emulated jaw, N; `None` if the jaws cannot touch,
     /// and on the robot.
     pub bite_force_max_n: Option<f64>,
-    /// What the lower teeth bore; none where the jaws cannot touch, and on the robot.
+    /// What the lower teeth bore; `None` if the jaws cannot touch, and on the robot.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contact: Option<ContactFigures>,
     /// Cycles of the jaw; none without a report.
@@ -90,7 +90,7 @@ pub struct Figures {
     pub worst_cycles: Vec<WorstCycle>,
     /// Messages and losses of each topic.
     pub topics: Vec<TopicFigures>,
-    /// Frames on each bus; none where the scenario leaves them out.
+    /// Frames on each bus; `None` if the scenario leaves them out.
     pub frames: Option<Vec<u64>>,
     /// Response times of the buses' messages, beside their bounds.
     pub bus_response: BusResponse,

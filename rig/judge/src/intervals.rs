@@ -15,7 +15,7 @@ pub(super) struct Answer {
     /// The controller's.
     pub(super) cycle: u64,
     pub(super) received_ns: u64,
-    /// None where nothing went out, as before the drives exchange process data.
+    /// `None` if nothing went out, as before the drives exchange process data.
     pub(super) sent_ns: Option<u64>,
 }
 

@@ -13,7 +13,7 @@ const DIGITS: u8 = 3;
 /// One measured interval.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct IntervalFigures {
-    /// What is measured.
+    /// The measured interval.
     pub name: &'static str,
     /// Samples.
     pub n: u64,

@@ -1,4 +1,4 @@
-//! What is counted of all messages alike: their digest, gaps in their numbers, and the values that the controller declares.
+//! The counts of all messages: their digest, gaps in their numbers, and the values that the controller declares.
 //!
 //! The digest leaves out times. Simulated runs of the same scenario and seed have the same one, whatever the machine. In real
 //! time, lost cycles and the phase of the start change it.

@@ -258,7 +258,7 @@ pub(super) struct ContactWatch {
 }
 
 impl ContactWatch {
-    /// Takes a message, sampled so long after the run's first SYNC; none where no course is shown.
+    /// Takes a message, sampled so long after the run's first SYNC; `None` if no course is shown.
     pub(super) fn add_contact(&mut self, contact: &Contact, since_ns: Option<u64>) {
         let mut total_n = 0.0;
         for (place, tooth) in contact.teeth().enumerate() {

@@ -27,7 +27,7 @@ impl OverrunCause {
         matches!(self, Self::Slept | Self::Computed)
     }
 
-    /// The order in which overruns are told: what is certain against the loop, then what is not certain.
+    /// The order in which overruns are told: first those that are certainly the loop's own.
     pub(crate) fn rank(self) -> u8 {
         match self {
             Self::Slept | Self::Computed => 2,
@@ -177,7 +177,7 @@ impl LoopSamples {
         }
     }
 
-    /// What happened in a stretch of work within this time; none where samples are missing.
+    /// What happened in a stretch of work within this time; `None` if samples are missing.
     pub(crate) fn around(&self, from_ns: u64, to_ns: u64) -> Option<LoopCounts> {
         let first = self.intervals.partition_point(|interval| interval.to_ns <= from_ns);
         let around = self.intervals[first..].iter();

@@ -1,6 +1,6 @@
 //! How much of the scenario's motion was played, and what stopped the drives.
 //!
-//! What was played shows in the jaw. A stop shows in drives and master, whatever the controller reports.
+//! The played motion shows in the jaw. A stop shows in drives and master, whatever the controller reports.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -14,15 +14,15 @@ use serde::Serialize;
 use crate::events::EventRecord;
 use crate::poses::{is_moving, is_running};
 
-/// What was played of the scenario's motion.
+/// The played part of the scenario's motion.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct MotionFigures {
-    /// The way of the jaw in the whole motion, mm: root of the sum of squares over the incisal point and both condyles. None where
+    /// The way of the jaw in the whole motion, mm: root of the sum of squares over the incisal point and both condyles. `None` if
     /// the motion is the controller's own.
     pub way_mm: Option<f64>,
     /// The share of it that the jaw went, in the direction of the motion; none of a motion without a way.
     pub played: Option<f64>,
-    /// By how much the motion was late at most, ms; none where it never began.
+    /// By how much the motion was late at most, ms; `None` if it never began.
     pub lag_ms: Option<f64>,
     /// Cycles of the motion without a new command.
     pub missed_commands: u64,
@@ -32,7 +32,7 @@ pub struct MotionFigures {
     pub late_commands: u64,
 }
 
-/// A shorter way is none, m.
+/// A shorter way counts as no motion, m.
 const NO_WAY_M: f64 = 1e-5;
 
 /// The way is measured in steps of at least this length, m.
@@ -114,7 +114,7 @@ impl PlayedWatch {
         length(&step(&self.points_m, from, to))
     }
 
-    /// `rest_m`: what is left of the motion; none where the motion is not the scenario's.
+    /// `rest_m`: the rest of the motion; `None` if the motion is not the scenario's.
     pub(super) fn into_figures(self, rest_m: Option<f64>) -> MotionFigures {
         let way_m = rest_m.map(|rest_m| self.way_m + rest_m);
         MotionFigures {

@@ -32,7 +32,7 @@ pub(super) fn true_pose(truth: &Truth) -> Option<Pose> {
 /// A quaternion's length may differ from 1 by so much: single precision and more.
 const LENGTH_TOLERANCE: f64 = 1e-3;
 
-/// The pose in a message; none where a number is not finite or the quaternion is no rotation.
+/// The pose in a message; `None` if a number is not finite or the quaternion is no rotation.
 fn pose(position_m: [f64; 3], quaternion_wxyz: [f64; 4]) -> Option<Pose> {
     let length = quaternion_wxyz.iter().map(|part| part * part).sum::<f64>().sqrt();
     let is_pose = position_m.iter().all(|x| x.is_finite()) && (length - 1.0).abs() <= LENGTH_TOLERANCE;
@@ -46,7 +46,7 @@ pub(super) fn deviation(a: Option<&Pose>, b: Option<&Pose>, incisal_m: [f64; 3])
     a.zip(b).map_or(NOWHERE, |(a, b)| Deviation::between(a, b, incisal_m))
 }
 
-/// The worse of two errors; what is no number is infinite.
+/// The worse of two errors; NaN counts as infinite.
 pub(super) fn worse(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::INFINITY } else { a.max(b) }
 }

@@ -49,7 +49,7 @@ pub struct BusResponse {
     pub messages: Vec<ResponseFigures>,
     /// Frames queued off their times by a stall, and those beside them, which are not judged.
     pub off_time_frames: u64,
-    /// Why there are no bounds for this run; none where there are.
+    /// Why there are no bounds for this run; `None` if there are.
     pub unbounded: Option<String>,
 }
 
@@ -276,7 +276,7 @@ impl Followed {
         }
         if self.off_time > 0 && self.frames - self.off_time < FEWEST_ON_TIME {
             return Some(format!(
-                "{} of {} frames of bus {bus} were off their times",
+                "{} of {} frames of bus {bus} were early or late beside a stall",
                 self.off_time, self.frames
             ));
         }

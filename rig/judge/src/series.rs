@@ -109,7 +109,7 @@ impl<T: Merge> Series<T> {
 }
 
 impl<const N: usize> Series<Extremes<N>> {
-    /// Takes one of the values of a time since the beginning; what is no finite number is left out.
+    /// Takes one of the values of a time since the beginning; NaN and infinite values are left out.
     pub(super) fn add(&mut self, since_ns: u64, index: usize, value: f64) {
         if value.is_finite() {
             let point = (since_ns as f64 / 1e9, value);

@@ -23,7 +23,7 @@ pub struct StandstillFigures {
     pub recorded_s: Option<f64>,
     /// The largest way of each axis after a stop, mm.
     pub axes_mm: [f64; AXES],
-    /// The largest way of the incisal point, mm; none where the true jaw is unknown.
+    /// The largest way of the incisal point, mm; `None` if the true jaw is unknown.
     pub jaw_mm: Option<f64>,
     /// The largest angle of the platform, degrees.
     pub jaw_deg: Option<f64>,
@@ -143,7 +143,7 @@ fn is_over(state: Option<u32>) -> bool {
     [Disabling, Finished, SafeStop].iter().any(|over| state == Some(over.code()))
 }
 
-/// Where an axis is in a cycle, m; none where its message is missing.
+/// Where an axis is in a cycle, m; `None` if its message is missing.
 fn place_m(messages: &CycleMessages, axis: usize, has_truth: bool) -> Option<f64> {
     if has_truth {
         return messages.truth.as_ref().map(|truth| truth.joint_m[axis]);
@@ -183,7 +183,7 @@ pub(super) fn standstill(
     }
     let closest = ways.iter().max_by(|(_, a, of_a, _), (_, b, of_b, _)| (a / of_a).total_cmp(&(b / of_b)));
     let closest = closest.map_or_else(String::new, in_words);
-    Some(Check::judged(NAME, format!("closest in {recorded_s:.2} s after the stop: {closest}"), true))
+    Some(Check::judged(NAME, format!("{closest}; observed for {recorded_s:.2} s after the stop"), true))
 }
 
 #[cfg(test)]

@@ -24,7 +24,7 @@ pub enum TimingWord {
     Stalled,
     /// The rig missed too many.
     Missed,
-    /// There are none in simulated time.
+    /// Simulated time has no deadlines.
     Simulated,
     /// No cycle ran.
     Unknown,

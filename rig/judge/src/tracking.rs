@@ -252,7 +252,7 @@ pub struct PoseErrors {
     pub max_deg: Option<f64>,
 }
 
-/// Root mean square and maximum of what is added.
+/// Root mean square and maximum of the added values.
 #[derive(Debug, Clone, Default)]
 struct Accumulator {
     samples: u64,

@@ -100,7 +100,7 @@ impl Verdict {
         }
     }
 
-    /// What to do about the machine; none where the machine disturbed nothing.
+    /// What to do about the machine; `None` if the machine disturbed nothing.
     pub fn advice(&self, manifest: &Manifest) -> Option<String> {
         // The reason of an INVALID run contains the advice.
         let is_missing = self.timing.word == TimingWord::Disturbed && self.exit_code != Exit::Invalid;
@@ -195,7 +195,7 @@ fn incomplete(figures: &Figures) -> Option<OutcomeReason> {
     Some((Outcome::Named(Incomplete), reason))
 }
 
-/// Why the machine leaves nothing to judge a run by that ended normally; none where the run can be judged. What the rig
+/// Why the machine leaves nothing to judge a run by that ended normally; `None` if the run can be judged. What the rig
 /// missed by itself fails the run, and where no cycle ran there is nothing to judge.
 fn unjudged(limits: &ChecksConfig, timing: &Timing, checks: &[Check]) -> Option<String> {
     let has = |result| checks.iter().any(|check| check.result == result);
@@ -269,7 +269,7 @@ fn excuse(ending: &Ending, timing: &Timing, outage: Option<Outage>) -> Option<St
     })
 }
 
-/// A failure with what is short of the motion, which the names of checks do not say.
+/// A failure with the missing part of the motion, which the names of checks do not say.
 fn with_shortfall((outcome, reason): OutcomeReason, manifest: &Manifest, figures: &Figures) -> OutcomeReason {
     let short = Shortfall::of(manifest, figures).map(|short| format!("; {short}"));
     (outcome, reason + &short.unwrap_or_default())
@@ -291,7 +291,7 @@ fn passed(manifest: &Manifest, motion: &MotionFigures) -> String {
     format!("every check passed{late}{commands}")
 }
 
-/// What was not tested, with what to do. Without a cycle that was everything.
+/// The untested checks with their remedies; without a cycle, all of them.
 fn untested(checks: &[Check], cycles: u64) -> Option<OutcomeReason> {
     let idle = checks.iter().filter(|check| check.result == CheckResult::Untested);
     let findings: Vec<_> = idle.map(|check| format!("{}: {}", check.name, check.finding)).collect();
@@ -344,7 +344,7 @@ fn against(
         .unwrap_or_else(|| (Outcome::Named(Pass), format!("{}, as expected: {reason}", outcome.word())))
 }
 
-/// The outcome where a check did not pass beside the expected failures, or passed instead of them. None where the
+/// The outcome where a check did not pass beside the expected failures, or passed instead of them. `None` if the
 /// scenario names no failure.
 fn other_failures(expect: &ExpectConfig, checks: [&[Check]; 2]) -> Option<OutcomeReason> {
     if expect.failed.is_empty() {

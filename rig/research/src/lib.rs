@@ -1,5 +1,5 @@
 //! The paper study: the forward kinematics of the paper measured again, as tables. `scripts/study.py` sets each of the paper's
-//! claims beside what was measured, and draws the figures. And [`uniqueness`]: a proof that six inputs determine one pose.
+//! claims beside the measurements, and draws the figures. And [`uniqueness`]: a proof that six inputs determine one pose.
 //! `masseter-research` is the command to both. No run needs this crate.
 //!
 //! Both are about the published mechanism, and neither prints: progress goes to a callback. All results but times are a

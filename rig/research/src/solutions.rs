@@ -77,7 +77,7 @@ impl SolutionSet {
     }
 
     /// The class of leg angles found by a solver: equal but for the order of the legs. 0 is the true
-    /// one's, none where no solution above the base has these angles.
+    /// one's, `None` if no solution above the base has these angles.
     pub(crate) fn class_of(&self, theta_rad: &[f64; LEGS]) -> Option<usize> {
         let near = |one: &&&Solution| distance_rad(&one.theta_rad, theta_rad) < SAME_RAD;
         let above = self.above_base();

@@ -31,7 +31,7 @@ const CLIMBS: usize = 40;
 const STEPS: u32 = 1500;
 /// The first step's length as a share of the stroke; each failure shortens it.
 const FIRST_STEP: f64 = 0.3;
-/// What is left of a step's length after a failure.
+/// The share of a step's length that remains after a failure.
 const SHORTER: f64 = 0.995;
 
 /// A box of inputs and the known bounds of its solutions' reaches.
@@ -46,7 +46,7 @@ pub struct Proven {
     pub unsolvable_share: f64,
     /// Share of the volume with at most one solution, 0 to 1.
     pub unique_share: f64,
-    /// Boxes that stay undecided; none where all is proven.
+    /// Boxes that stay undecided; empty if all is proven.
     pub undecided: Vec<InputBox>,
 }
 

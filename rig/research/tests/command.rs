@@ -1,4 +1,4 @@
-//! `masseter-research` as a user has it: the folder of a study, proofs and searches, and what is refused.
+//! `masseter-research` as a user has it: the folder of a study, proofs, searches and refusals.
 
 use std::fs::{self, File};
 use std::path::Path;

@@ -92,7 +92,7 @@ impl Display for Range {
 
 /// A value with numbers in the range of its key.
 pub trait Numbers {
-    /// Its numbers; none where the key is absent.
+    /// Its numbers; empty if the key is absent.
     fn numbers(&self) -> impl Iterator<Item = f64>;
 }
 

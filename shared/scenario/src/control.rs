@@ -120,7 +120,7 @@ section! {
     ///
     /// Velocities stay a quarter below the drives' own limits. Fast human chewing (0.46 s a cycle) takes 3.5 m/s² of a
     /// leg. A jaw tracker's own jumps, low-passed at 12 Hz, take up to 5.8 m/s² of a slide. The limit of 8 m/s² admits
-    /// both, and refuses what is no jaw motion.
+    /// both, and refuses a motion that no jaw makes.
     #[derive(Copy)]
     pub struct TrajectoryLimitsConfig {
         /// Speed of a slide.

@@ -112,7 +112,7 @@ impl Peer {
         }
     }
 
-    /// What was written to an object, as a number.
+    /// The value written to an object, as a number.
     pub(super) fn written(&self, index: u16, subindex: u8) -> u32 {
         let mut word = [0; 4];
         let value = &self.objects[&(index, subindex)];

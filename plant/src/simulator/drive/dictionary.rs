@@ -215,7 +215,7 @@ impl Overlay {
         }
     }
 
-    /// The entry at a place of the table; none where the drive lacks it.
+    /// The entry at a place of the table; `None` if the drive lacks it.
     pub(crate) fn entry(&self, place: usize) -> Option<&Entry> {
         let changed = self.changed.iter().find(|(at, _)| *at == place);
         changed.map_or(Some(&ENTRIES[place]), |(_, entry)| entry.as_ref())

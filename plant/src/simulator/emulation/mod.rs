@@ -87,7 +87,7 @@ pub struct Emulation {
     served: Option<u64>,
     /// One of each axis, and one of the food, with its time, ns.
     mishaps: [Option<(u64, Mishap)>; AXES + 1],
-    /// The forces between the jaws in the cycle before the sample; none where the jaws cannot touch.
+    /// The forces between the jaws in the cycle before the sample; `None` if the jaws cannot touch.
     contact: Option<Contact>,
     /// None for drives that forget everything at the end.
     memory: Option<MemoryFile>,

@@ -52,7 +52,7 @@ impl Stops {
         Self::between(ends_m, CONTACT)
     }
 
-    /// The force on the axis in a step; none where the axis touches no stop before its end.
+    /// The force on the axis in a step; `None` if the axis touches no stop before its end.
     pub(super) fn touch(&self, position_m: f64, speed_m_s: f64, step_s: f64) -> Option<Element> {
         let next_m = position_m + speed_m_s * step_s;
         let (into_m, away) = if next_m > self.high_m {

@@ -87,7 +87,7 @@ pub struct MasseterCycle {
 }
 
 impl MasseterSession {
-    /// Adds to what is declared before the start; `add` returns how many there are then. Returns the place of the last.
+    /// Adds to the declarations before the start; `add` returns how many there are then. Returns the place of the last.
     fn declare(&mut self, add: impl FnOnce(&mut Declared) -> usize) -> Result<c_int, Failure> {
         let Stage::Attached(_) = self.stage else {
             return Err(Failure::of("the session is started: declare before"));

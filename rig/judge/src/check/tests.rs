@@ -41,11 +41,11 @@ mod motion_checks {
         let check = tracking("tracking", 10, &good, &limits);
         assert_eq!(
             (check.result.mark(), check.finding.as_str()),
-            ("ok", "closest of 10 samples: incisal point max 0.1000 mm, limit 0.5 mm")
+            ("ok", "incisal point max 0.1000 mm, limit 0.5 mm; 10 samples")
         );
         let rms_is_closest = PoseErrors { rms_mm: Some(0.05), incisal_max_mm: Some(0.2), ..good };
         let check = tracking("tracking", 10, &rms_is_closest, &limits);
-        assert_eq!(check.finding, "closest of 10 samples: platform rms 0.0500 mm, limit 0.1 mm");
+        assert_eq!(check.finding, "platform rms 0.0500 mm, limit 0.1 mm; 10 samples");
         let mm = |share: f64, limit: f64| Some(share * limit);
         let each: [(Spoil, f64); 6] = [
             (|errors, value| errors.rms_mm = value, limits.tracking_rms_mm),
@@ -84,7 +84,7 @@ mod motion_checks {
             (0, still, "UNTESTED", "0 samples to compare, at least 10 needed: play more of the motion"),
             (0, eased, "UNTESTED", "0 samples to compare, at least 10 needed: play more of the motion"),
             (9, begun, "UNTESTED", "9 samples to compare, at least 10 needed: play more of the motion"),
-            (10, begun, "ok", "closest of 10 samples: platform rms 0.0100 mm, limit 0.1 mm"),
+            (10, begun, "ok", "platform rms 0.0100 mm, limit 0.1 mm; 10 samples"),
         ];
         for (samples, errors, mark, finding) in cases {
             let check = tracking("tracking", samples, &errors, &ChecksConfig::default());
@@ -147,8 +147,8 @@ mod motion_checks {
             let found = [figures(1, Some(5), deviation_mm)];
             let check = faults(&[fault()], &found, &ChecksConfig::default(), None).unwrap();
             assert_eq!(check.result.mark(), mark, "{check:?}");
-            let named = "number 1, lose (bus 1, node 4, id 204h), led 0.510 mm and 0.100° from the path undetected, \
-                         limit 0.5 mm and 0.5°";
+            let named = "number 1, lose (bus 1, node 4, id 204h), moved the jaw 0.510 mm and 0.100° from its path \
+                         undetected, limit 0.5 mm and 0.5°";
             assert_eq!(check.finding.contains(named), mark == "FAIL", "{check:?}");
         }
         let turned = FaultFigures { deviation_deg: 0.5, ..figures(1, Some(5), 0.1) };

@@ -43,7 +43,7 @@ mod checks {
         let off_time = BusResponse { off_time_frames: 7, ..response(150_000, None) };
         let check = bus_response(&off_time, &SkipFigures::default());
         assert_eq!(check.result.mark(), "ok");
-        assert!(check.finding.ends_with("; 7 frames off their times not judged"), "{check:?}");
+        assert!(check.finding.ends_with("; 7 frames beside a stall not judged"), "{check:?}");
     }
 
     #[test]
@@ -123,7 +123,7 @@ mod shortfall {
             assert_eq!(found, Some(Shortfall::NotPlayed { share, way_mm: 900.0 }));
         }
         let none = shortfall(|_, figures| figures.motion.played = Some(f64::NAN)).unwrap();
-        assert_eq!(none.result(), CheckResult::Failed, "what is no number is no share");
+        assert_eq!(none.result(), CheckResult::Failed, "NaN is no share");
         let still = Shortfall::NotPlayed { share: 0.004, way_mm: 900.0 };
         assert!(
             still

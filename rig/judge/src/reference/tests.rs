@@ -27,7 +27,7 @@ fn state(motion: &Trajectory, at_s: f64) -> State {
     State { motion_time_s, desired_position_m, desired_quaternion_wxyz, ..State::default() }
 }
 
-/// Cycles of a motion: what the controller states of each, or none where it used no reading.
+/// Cycles of a motion: what the controller states of each, or `None` if it used no reading.
 fn desired(reference: &mut Reference, states: &[Option<State>]) -> Vec<Desired> {
     let cycle = |(place, used): (usize, &Option<State>)| {
         reference.advance(&Progress {

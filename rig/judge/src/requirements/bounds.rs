@@ -91,7 +91,7 @@ impl Quantified {
         })
     }
 
-    /// The value in SI units; none where a signal is missing.
+    /// The value in SI units; `None` if a signal is missing.
     pub(super) fn value(&mut self, values: &[f64]) -> Option<f64> {
         match &mut self.source {
             ValueSource::Signal(signal) => Some(values[*signal]).filter(|value| !value.is_nan()),
@@ -146,7 +146,7 @@ impl Limits {
         let above = self.min.map(|min| (value - min, min));
         let nearest = below.into_iter().chain(above).min_by(|(a, _), (b, _)| a.total_cmp(b));
         let (margin, limit) = nearest.expect("a requirement has a limit");
-        // What is no number is within no limit.
+        // NaN exceeds every limit.
         (if margin.is_nan() { f64::NEG_INFINITY } else { margin }, limit)
     }
 }

@@ -90,7 +90,7 @@ impl Condition {
         let no_condition = || format!("'{}' is no condition: {example}", excerpt(text));
         let (name, comparison, limit) = compared.ok_or_else(no_condition)?;
         let signal = values.choose(name);
-        // A controller's own signal is a number: a limit that is none is wrong, whatever the controller declares.
+        // A controller's own signal is a number: a limit that is no number is wrong, whatever the controller declares.
         if signal.as_ref().is_err_and(UnknownSignal::is_of_controller) {
             limit.parse::<Quantity>().map_err(|error| error.to_string())?;
         }
@@ -119,7 +119,7 @@ impl Condition {
         self.comparison.is_of_order()
     }
 
-    /// How far the condition is from failing, in the signal's SI unit; infinite for states. None where the signal is
+    /// How far the condition is from failing, in the signal's SI unit; infinite for states. `None` if the signal is
     /// missing.
     pub(super) fn robustness(&self, values: &[f64]) -> Option<f64> {
         let value = values[self.signal];

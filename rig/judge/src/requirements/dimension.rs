@@ -27,7 +27,7 @@ impl BaseExponents {
         Some(product)
     }
 
-    /// Of a power; none where its exponents are no whole numbers, or beyond what any unit has.
+    /// Of a power; `None` if its exponents are no whole numbers, or beyond what any unit has.
     pub(super) fn to_the(self, power: f64) -> Option<Self> {
         let mut product = self;
         for own in &mut product.0 {

@@ -121,7 +121,7 @@ static OPERATORS: [Operator; 8] = [
 
 impl Expression {
     /// # Errors
-    /// Where the text is no expression, with what is expected there; or is too long or too deep.
+    /// Where the text is no expression, with the expected text; or is too long or too deep.
     pub(super) fn read(text: &str) -> Result<Self, ExpressionError> {
         if text.len() > MOST_BYTES {
             return Err(ExpressionError { column: 1, fault: Fault::TooLong(text.len()) });
@@ -261,7 +261,7 @@ impl Reader<'_> {
         number.map(Step::Number).ok_or_else(|| self.unexpected(expected))
     }
 
-    /// What is in parentheses: two operations with a comma between them, or one.
+    /// The text in parentheses: two operations with a comma between them, or one.
     fn parenthesised(&mut self, has_two: bool) -> Result<(), ExpressionError> {
         self.levels += 1;
         if self.levels > MOST_LEVELS {

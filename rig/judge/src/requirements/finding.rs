@@ -12,7 +12,7 @@ use crate::signals::UnknownSignal;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Finding {
     pub(super) result: CheckResult,
-    /// What was found, in words.
+    /// The finding, in words.
     pub(super) text: String,
     /// How far the requirement is from failing; negative where it fails.
     pub(super) margin: Option<f64>,
@@ -82,9 +82,9 @@ pub struct RequirementFigures {
     pub must: String,
     /// Whether it does.
     pub result: CheckResult,
-    /// What was found, in words.
+    /// The finding, in words.
     pub finding: String,
-    /// How far the requirement is from failing, in `margin_unit`; negative where it fails; none where there is no number.
+    /// How far the requirement is from failing, in `margin_unit`; negative where it fails; `None` if there is no number.
     pub margin: Option<f64>,
     /// Its unit.
     pub margin_unit: &'static str,

@@ -38,7 +38,7 @@ pub(super) struct Missing {
     /// Those between two values.
     between: u64,
     since_value: Option<u64>,
-    /// Those after the last value, while the motion ran; none where a stop followed, with which a signal may end.
+    /// Those after the last value, while the motion ran; 0 if a stop followed, with which a signal may end.
     at_end: u64,
     samples: u64,
     is_real_time: bool,
@@ -63,7 +63,7 @@ impl Missing {
         }
     }
 
-    /// A stop excuses what is missing before it: drives and sensors may have been lost, which caused it.
+    /// A stop excuses values that are missing before it: drives and sensors may have been lost, which caused it.
     pub(super) fn apply_phase(&mut self, phase: Phase) {
         if phase == Phase::Stopped {
             self.at_end = 0;

@@ -100,7 +100,7 @@ impl Requirements {
         Self { list, values, row: Vec::new(), state, motion_ns: None, is_real_time: false }
     }
 
-    /// Whether there are none: then nothing has to be taken.
+    /// Whether the list is empty: then nothing has to be taken.
     pub(crate) fn is_empty(&self) -> bool {
         self.list.is_empty()
     }

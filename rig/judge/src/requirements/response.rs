@@ -148,7 +148,8 @@ impl Response {
         self.waiting.back().is_some_and(|(_, robustness)| *robustness >= 0.0)
     }
 
-    /// A missing value ends what must stay once another follows, or where the motion ran. A stop excuses what is missing before it.
+    /// A missing value ends a condition that must stay once another follows, or where the motion ran. A stop
+    /// excuses values that are missing before it.
     fn add_sample(&mut self, moment: &Moment<'_>) {
         if moment.phase == Phase::Stopped {
             self.missing.iter_mut().for_each(|(_, has_run)| *has_run = false);

@@ -80,8 +80,14 @@ fn there_are_no_bounds_of_disturbed_buses_of_crowded_ones_and_of_unknown_times()
         (vec![], "no frame of bus 0 was recorded"),
         (vec![seen(0x080, 0, 0)], "lacks the queuing times of the frames"),
         (vec![seen(0x080, 1000, 51), error], "bus 0 had 1 error"),
-        (vec![seen(0x080, 1000, 51), seen(0x080, 61_000, 51)], "2 of 2 frames of bus 0 were off their times"),
-        (vec![seen(0x080, 1000, 51), seen(0x080, 1000, 102)], "2 of 2 frames of bus 0 were off their times"),
+        (
+            vec![seen(0x080, 1000, 51), seen(0x080, 61_000, 51)],
+            "2 of 2 frames of bus 0 were early or late beside a stall",
+        ),
+        (
+            vec![seen(0x080, 1000, 51), seen(0x080, 1000, 102)],
+            "2 of 2 frames of bus 0 were early or late beside a stall",
+        ),
     ];
     for (frames, reason) in cases {
         let found = followed_without_faults(frames.clone());

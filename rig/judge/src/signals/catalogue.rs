@@ -99,7 +99,7 @@ fn add_jaw(list: &mut SignalList, jaw: Jaw, has_contact: bool) {
     .truth_if(has_contact);
 }
 
-/// None where the jaws cannot touch.
+/// Adds nothing if the jaws cannot touch.
 fn add_contact(list: &mut SignalList, scenario: &Scenario) {
     if !scenario.has_contact() {
         return;

@@ -13,7 +13,7 @@ use masseter_scenario::Scenario;
 use crate::events::EventRecord;
 use crate::reference::{Progress, Reference};
 
-/// The messages of a cycle; none where a message is missing.
+/// The messages of a cycle; a missing message is `None`.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct CycleMessages {
     /// Number of the cycle, from 1: that of both loops, which count deadlines from one epoch.
@@ -86,7 +86,7 @@ pub struct Timeline {
     events: Vec<EventRecord>,
     parameters: Option<Parameters>,
     controller_state: Option<u32>,
-    /// None where nobody asks for the desired pose.
+    /// `None` if nobody asks for the desired pose.
     reference: Option<Reference>,
     controller_cpu: CpuShare,
     plant_cpu: CpuShare,
@@ -182,7 +182,7 @@ impl Timeline {
         })
     }
 
-    /// The messages of a cycle; none where the cycle was handed out, or is impossibly far ahead.
+    /// The messages of a cycle; `None` if the cycle was handed out, or is impossibly far ahead.
     fn at(&mut self, cycle: u64) -> Option<&mut CycleMessages> {
         let first = self.cycles.front().map_or(cycle, |messages| messages.cycle);
         if self.cycles.is_empty() {
@@ -199,7 +199,7 @@ impl Timeline {
         self.cycles.get_mut(place)
     }
 
-    /// The oldest cycle; none where it has no message, as a skipped one.
+    /// The oldest cycle; `None` if it has no message, as a skipped one.
     fn hand_out(&mut self) -> Option<Sample> {
         let mut messages = self.cycles.pop_front()?;
         self.parameters = messages.parameters.or(self.parameters);

@@ -181,7 +181,7 @@ fn stretches_are_counted_from_the_shortest_that_cost_a_deadline() {
     assert_eq!(skips.shortest_costly_ns, Some(2_000_000));
     assert_eq!(skips.as_long_as(2_000_000), (1, 2));
     assert_eq!([0, 1].map(|least_ns| skips.as_long_as(least_ns)), [(2, 3); 2]);
-    // A stretch that a wake-up in time made up for is none of the next.
+    // A stretch that a wake-up in time made up for does not count towards the next.
     let skips = skips_of(&[[0, 0, 5_000_000, 0], [2, 0, 7_000_000, 0]]);
     assert_eq!(skips.shortest_costly_ns, Some(2_000_000));
     // What is left of a stretch is not a shorter one.

@@ -261,7 +261,7 @@ impl FrameBatch {
         self.bytes.extend_from_slice(&[0; HEAD - COUNT_AT]);
     }
 
-    /// The message, with the first frame; none without frames. Then there are none.
+    /// The message, with the first frame; none without frames.
     pub(super) fn end_batch(&mut self) -> Option<(&FrameTap, &[u8])> {
         let count = std::mem::take(&mut self.count);
         let at = CDR_LITTLE_ENDIAN.len() + COUNT_AT;
@@ -277,7 +277,7 @@ fn differences_ns(before: &FrameTap, frame: &FrameTap) -> [i64; 3] {
     array::from_fn(|time| after_ns[time].wrapping_sub(before_ns[time]).cast_signed())
 }
 
-/// The frames of a message's body; none where they do not fill it.
+/// The frames of a message's body; `None` if they do not fill it.
 pub(crate) fn frames_of(body: &[u8]) -> Option<Vec<FrameTap>> {
     let (head, mut rest) = body.split_at_checked(HEAD)?;
     let [seq, published_ns, version, time_ns, queued_ns]: [u64; 5] =

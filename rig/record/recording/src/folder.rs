@@ -73,7 +73,7 @@ pub fn time_in_names() -> String {
 /// The recording that a path names: the file itself or that in a run's folder, also through a link.
 ///
 /// # Errors
-/// [`FolderError`] says what is missing.
+/// [`FolderError`] names the missing file.
 pub fn recording_at(path: &Path) -> Result<PathBuf, FolderError> {
     let refused = |error: io::Error| match (error.kind(), fs::read_link(path)) {
         (ErrorKind::NotFound, Err(_))
@@ -130,7 +130,7 @@ impl RunFolder {
     /// Opens a past run by its folder, by the recording in it, or by a link to either.
     ///
     /// # Errors
-    /// [`FolderError`] says what is missing.
+    /// [`FolderError`] names the missing file.
     pub fn open(path: &Path) -> Result<Self, FolderError> {
         let recording = recording_at(path)?;
         if recording != path {

@@ -123,7 +123,7 @@ impl Manifest {
         }
     }
 
-    /// What is known at the start beside the scenario, as JSON. Without what differs between runs in simulated time, whose
+    /// The facts known at the start beside the scenario, as JSON. Without what differs between runs in simulated time, whose
     /// recordings are equal.
     pub(crate) fn at_start(&self) -> String {
         let mut known = json!({ "masseter": self.masseter, "motion_s": self.motion_s });
@@ -228,11 +228,11 @@ pub struct LoopInterval {
     pub from_ns: u64,
     /// The second, ns of the run's clock.
     pub to_ns: u64,
-    /// CPU time, ns; none where the kernel does not count it.
+    /// CPU time, ns; `None` if the kernel does not count it.
     pub cpu_ns: Option<u64>,
-    /// Time for which it was ready and had no core, ns; none where the kernel does not count it.
+    /// Time for which it was ready and had no core, ns; `None` if the kernel does not count it.
     pub queued_ns: Option<u64>,
-    /// Time that the hypervisor took from its core, ns, in steps of 10 ms; none where the hypervisor does not report it.
+    /// Time that the hypervisor took from its core, ns, in steps of 10 ms; `None` if the hypervisor does not report it.
     pub stolen_ns: Option<u64>,
     /// Times it gave up its core to wait.
     pub voluntary_switches: u64,
@@ -278,7 +278,7 @@ pub struct ProcessFault {
     pub number: usize,
     /// When it struck, ns of the run's clock.
     pub struck_ns: u64,
-    /// When it ended, ns of the run's clock: in simulated time, which stands still meanwhile, at once. None where it has no
+    /// When it ended, ns of the run's clock: in simulated time, which stands still meanwhile, at once. `None` if it has no
     /// end, or the run ended before.
     #[serde(default)]
     pub ended_ns: Option<u64>,

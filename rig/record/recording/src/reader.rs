@@ -35,7 +35,7 @@ pub enum ReadError {
     },
     /// A topic's message does not have this version's layout.
     #[error(
-        "topic '{topic}' has a message of {found} bytes, layout version {version}, which is none of this build (version \
+        "topic '{topic}' has a message of {found} bytes, layout version {version}, which is not that of this build (version \
          {LAYOUT_VERSION}): read the recording with the masseter that made it; circumstances.json names its version"
     )]
     Foreign {

@@ -214,7 +214,7 @@ struct TopicDigest {
 pub struct Digests(BTreeMap<Topic, TopicDigest>);
 
 impl Digests {
-    /// Those attached to a recording; empty where there are none.
+    /// Those attached to a recording; empty if there are no such files.
     pub fn attached(attachments: &[Attachment]) -> Self {
         let read = |file: &Attachment| {
             let topic = Topic::named(file.name.strip_prefix(NAME)?)?;

@@ -100,7 +100,7 @@ impl<R: Read + Seek> Walk<R> {
         self.stretch(reason)
     }
 
-    /// The next record, or the next stretch that is none.
+    /// The next record, or the next stretch that is no record.
     pub(super) fn step(&mut self) -> io::Result<Step> {
         self.at = self.next;
         let left = self.size - self.at;

@@ -25,7 +25,7 @@ use crate::manifest::{AT_START, Manifest};
 use crate::scene::Scene;
 use crate::topic::{Recorded, Topic};
 
-/// Bytes of messages in a chunk: what is compressed together, and read together by a tool that seeks. Twice as many save 0.4 %.
+/// Bytes of messages in a chunk, the unit of compression and of a tool that seeks. Twice as many save 0.4 %.
 const CHUNK_BYTES: u64 = 1 << 20;
 /// A level of zstd, its default. Level 6 saves 3 % of the bytes for a fifth more CPU time of a run under virtual time; level 1 takes
 /// 6 % more bytes for a tenth less time.
@@ -42,7 +42,7 @@ const BUFFER_BYTES: usize = 1 << 18;
 /// Why a recording cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
-    /// The file could not be created, or what is attached not be read.
+    /// The file could not be created, or an attached file not be read.
     #[error("cannot create the recording: {0}")]
     Create(#[from] io::Error),
     /// Writing failed.
@@ -133,7 +133,7 @@ fn add_schema<W: Write + Seek>(writer: &mut Writer<W>, channel: &mcap::Channel) 
 pub struct Recorder<W: Medium = DurableFile> {
     file: RecordingFile<W>,
     encoder: Encoder,
-    /// None where the frames are left out.
+    /// `None` if the frames are left out.
     frames: Option<FrameBatch>,
 }
 
@@ -263,7 +263,7 @@ impl<W: Medium> Recorder<W> {
     }
 }
 
-/// A file whose flush reaches the system at once and the disk soon after: what was flushed survives the
+/// A file whose flush reaches the system at once and the disk soon after: flushed bytes survive the
 /// death of the process, and, once the disk has taken it, a power cut.
 ///
 /// A thread of its own waits for the disk, so that a slow one does not hold the writer up. Closing the file

@@ -223,7 +223,7 @@ const SCENARIO: &str = "scenario.toml";
 /// The selected tables.
 struct Selection {
     topics: BTreeMap<Topic, Columns>,
-    /// What the signals of the table of cycles come from; none where it is not selected.
+    /// What the signals of the table of cycles come from; `None` if it is not selected.
     cycles: Option<(Scenario, Declared)>,
 }
 

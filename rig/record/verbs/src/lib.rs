@@ -1,6 +1,6 @@
 //! Verbs that read recordings: `masseter export` makes tables of them, `masseter recording` examines and mends them.
 //!
-//! The verdict on a run is none of them: `masseter report` judges.
+//! None of them judges a run: `masseter report` judges.
 
 mod export;
 mod survey;

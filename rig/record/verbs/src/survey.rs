@@ -177,7 +177,7 @@ impl Survey {
         Ok(text + &self.loss_with_advice()?)
     }
 
-    /// What is thinned, missing or unreadable, and what helps; empty for a complete recording.
+    /// The thinned, missing or unreadable parts, and the remedy; empty for a complete recording.
     pub(crate) fn loss_with_advice(&self) -> Result<String, Error> {
         let mut text = self.loss()?;
         if self.reader.was_cut_short() {
@@ -186,7 +186,7 @@ impl Survey {
         Ok(text)
     }
 
-    /// What is thinned, missing or unreadable, and where.
+    /// The thinned, missing or unreadable parts, with their places.
     pub(crate) fn loss(&self) -> Result<String, Error> {
         let mut text = String::new();
         if self.is_thinned {

@@ -53,7 +53,7 @@ fn stat_field(stat: &str, number: usize) -> Option<&str> {
 /// The kernel's counters of a thread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ThreadCounters {
-    /// CPU time, ns; none where the kernel has no statistics of its scheduler.
+    /// CPU time, ns; `None` if the kernel has no statistics of its scheduler.
     pub cpu_ns: Option<u64>,
     /// Time for which it was ready and had no core, ns; none as above. It grows when the thread gets a core.
     pub queued_ns: Option<u64>,

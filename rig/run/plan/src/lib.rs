@@ -130,7 +130,7 @@ impl RunPlan {
         [vec![run], self.warnings()].concat().join("\n  warning: ")
     }
 
-    /// What is wrong with guides that a force at the balls can lock: their friction grows as fast as the force.
+    /// The defect of guides that a force at the balls can lock: their friction grows as fast as the force.
     fn locking(&self) -> Option<String> {
         let joints = self.mechanism.inverse(&self.trajectory.pose(0.0)).ok()?;
         let heights_m =

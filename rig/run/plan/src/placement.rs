@@ -28,7 +28,7 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// By what is left of the stroke, to the micrometre; of two alike the shorter shift is greater.
+    /// By the rest of the stroke, to the micrometre; of two alike the shorter shift is greater.
     fn compare(&self, other: &Self) -> Ordering {
         let length_m = |placement: &Self| Vec3::from(placement.shift_m).norm();
         self.microns().total_cmp(&other.microns()).then(length_m(other).total_cmp(&length_m(self)))
@@ -39,7 +39,7 @@ impl Placement {
     }
 }
 
-/// The best place of the closed jaw for a motion: none where no shift lets every leg reach it. A search in steps down to
+/// The best place of the closed jaw for a motion: `None` if no shift lets every leg reach it. A search in steps down to
 /// 0.5 mm, from where the motion is.
 ///
 /// ```

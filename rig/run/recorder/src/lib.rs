@@ -54,7 +54,7 @@ pub struct RecorderArgs {
     quiet: bool,
 }
 
-/// Records until it is asked to stop, then drains what is left. [`Exit::Incomplete`] if a received message is not in the
+/// Records until it is asked to stop, then drains the rest. [`Exit::Incomplete`] if a received message is not in the
 /// recording.
 pub fn record(process_arguments: &ProcessArguments, args: &RecorderArgs) -> anyhow::Result<Exit> {
     let process = process_arguments.init()?;
@@ -157,7 +157,7 @@ fn record_in_lockstep(
 /// Drains one topic: hands everything that has arrived to a sink.
 type Drain = Box<dyn Fn(&mut dyn FnMut(&Recorded)) -> Result<(), TransportError>>;
 
-/// One for each topic. Readings come first: what was published before the last of them follows in the same drain.
+/// One for each topic. Readings come first: all that was published before the last of them follows in the same drain.
 fn drains_of_topics(node: &Node) -> Result<Vec<Drain>, TransportError> {
     Ok(vec![
         drain_of::<Reading>(node)?,

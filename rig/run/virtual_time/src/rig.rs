@@ -145,7 +145,7 @@ impl Rig {
         &self.latest().events
     }
 
-    /// The value of a signal in this cycle, in its unit (`masseter signals`). None where it has none, as all of a
+    /// The value of a signal in this cycle, in its unit (`masseter signals`). `None` if it has none, as all of a
     /// controller's, and those that count from the start of the motion.
     ///
     /// # Errors

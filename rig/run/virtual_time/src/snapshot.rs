@@ -24,7 +24,7 @@ use crate::stepper::StepperState;
 
 /// What a file begins with.
 const MAGIC: [u8; 8] = *b"MASSETER";
-/// The version of the format: of what is before the state.
+/// The version of the format: of the bytes before the state.
 const FORMAT: u32 = 1;
 /// The digest of the sources of this build.
 const SOURCES: &str = env!("MASSETER_SOURCES");
@@ -87,11 +87,11 @@ impl OtherScenario {
 pub struct SnapshotError {
     /// The file.
     pub path: PathBuf,
-    /// What is wrong.
+    /// The defect.
     pub problem: SnapshotProblem,
 }
 
-/// What is wrong with the file of a snapshot.
+/// A defect of the file of a snapshot.
 #[derive(Debug, thiserror::Error)]
 pub enum SnapshotProblem {
     /// The file cannot be read or written.

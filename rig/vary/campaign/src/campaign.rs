@@ -290,7 +290,7 @@ impl Campaign {
         data_encoding::HEXLOWER.encode(&hasher.finalize()[..6])
     }
 
-    /// What differs from another campaign, in words; none where both are the same.
+    /// What differs from another campaign, in words; `None` if both are the same.
     pub(crate) fn difference_to(&self, other: &Self) -> Option<&'static str> {
         let differences = [
             (self.program != other.program, "another build of masseter began it"),

@@ -62,7 +62,7 @@ pub struct Case {
     pub id: String,
     /// The values of the factors.
     pub settings: Vec<Setting>,
-    /// What is added to the seed of the scenario.
+    /// The number added to the seed of the scenario.
     pub more_seed: u64,
     /// The scenario, or why the values lead to none.
     pub scenario: Result<Scenario, String>,
@@ -73,7 +73,7 @@ pub struct Case {
 pub struct CaseCheck {
     /// Its name.
     pub name: String,
-    /// Whether it passed; none where it could not show.
+    /// Whether it passed; `None` if it could not show.
     pub passed: Option<bool>,
     /// How far it is from failing; none of a check without a limit in numbers.
     pub margin: Option<f64>,
@@ -92,7 +92,7 @@ pub struct CaseResult {
     pub id: String,
     /// The values of the factors.
     pub settings: Vec<Setting>,
-    /// What is added to the seed of the scenario.
+    /// The number added to the seed of the scenario.
     pub more_seed: u64,
     /// The verdict in a word; REFUSED where the values lead to no run.
     pub word: String,

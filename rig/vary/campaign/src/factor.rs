@@ -195,7 +195,7 @@ pub struct Setting {
     pub key: Option<String>,
     /// The value of the key; none for a fault.
     pub value: Option<Value>,
-    /// The fault that is added; none where nothing is.
+    /// The fault that is added; `None` if nothing is.
     pub fault: Option<Table>,
 }
 

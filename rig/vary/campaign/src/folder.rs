@@ -105,7 +105,7 @@ impl CampaignFolder {
     /// The result of a case; none of one that has not ended.
     ///
     /// # Errors
-    /// [`FolderError::Damaged`] for a result that is none.
+    /// [`FolderError::Damaged`] for a file that is no result.
     pub fn result_of(&self, case: &Case) -> Result<Option<CaseResult>, FolderError> {
         let path = self.cases_path().join(&case.id).join(RESULT);
         if path.is_file() { read_result(&path).map(Some) } else { Ok(None) }

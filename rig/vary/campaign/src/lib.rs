@@ -1,4 +1,4 @@
-//! Campaigns: one scenario with many values of its keys, faults and motions; what is run, and what came of it.
+//! Campaigns: one scenario with many values of its keys, faults and motions, their runs and results.
 //!
 //! A [`CampaignFile`] names a scenario, the [factors](Factor) that vary, and a [sampler](Sampler). A [`Campaign`]
 //! makes a [`Case`] of every point: a whole scenario. A [`CampaignFolder`] keeps the [result](CaseResult) of each

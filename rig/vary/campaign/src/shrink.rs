@@ -29,7 +29,7 @@ struct Change {
     /// The names of the key.
     path: Vec<String>,
     value: Value,
-    /// The default; none where there is none.
+    /// The default; `None` without one.
     default: Option<Value>,
     /// Whether the value is an entry of the list at the path.
     is_entry: bool,

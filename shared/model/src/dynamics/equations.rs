@@ -54,7 +54,7 @@ impl Equations {
         sums.into_equations(&motion.jacobian.actuators)
     }
 
-    /// The platform's acceleration V̇ (m/s², rad/s²) under forces of the axes (N) and a wrench on the platform. None where
+    /// The platform's acceleration V̇ (m/s², rad/s²) under forces of the axes (N) and a wrench on the platform. `None` if
     /// a value is not finite.
     pub fn forward(&self, force_n: &Vector6<f64>, wrench: &Vector6<f64>) -> Option<Twist> {
         let driving = self.actuators.tr_mul(force_n) + wrench - self.bias;

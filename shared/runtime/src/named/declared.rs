@@ -140,7 +140,9 @@ pub enum NameError {
     #[error("names, units and descriptions take {0} bytes together: shorten them to {MOST_TEXT_BYTES} bytes")]
     TooLong(usize),
     /// A range is no range, or is infinite.
-    #[error("the range of parameter '{0}' is none: give a smallest and a larger or equal largest number")]
+    #[error(
+        "parameter '{0}' has no valid range: give a smallest number, and a largest one that is not below it"
+    )]
     BadRange(String),
     /// The value is beyond the parameter's range.
     #[error("parameter '{name}' cannot be {value}: its range is {least} to {most} {unit}")]

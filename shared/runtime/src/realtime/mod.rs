@@ -24,7 +24,7 @@ const LONGEST_MARGIN_NS: u64 = 200_000;
 /// The shortest margin, ns: entering and leaving the kernel takes this long on a busy core.
 const SHORTEST_MARGIN_NS: u64 = 5_000;
 /// The margin is at most the period divided by this. Two loops at 10 kHz that spin for half of it starve the recorder
-/// (docs/realtime-log.md).
+/// (notes/realtime-log.md).
 const PARTS_OF_PERIOD: u64 = 3;
 /// The margin covers this many times the latency.
 const SAFETY_FACTOR: u64 = 2;

@@ -180,7 +180,7 @@ impl Node {
 }
 
 /// A message with ports compiled in this crate, once for all crates. The ports of iceoryx2 are generic, so each crate
-/// with ports of its own compiles them again (docs/realtime-log.md#the-first-build).
+/// with ports of its own compiles them again (notes/realtime-log.md#the-first-build).
 pub trait Topic: Message {
     /// As [`Node::publisher`].
     ///

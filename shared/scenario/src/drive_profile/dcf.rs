@@ -105,7 +105,7 @@ impl DcfRead {
         }
     }
 
-    /// What the rig does not take from the file, in one line; none where it takes everything.
+    /// What the rig does not take from the file, in one line; `None` if it takes everything.
     pub(super) fn warning(&self) -> Option<String> {
         let count = self.not_taken.values().map(Vec::len).sum::<usize>();
         let group = |(reason, keys): (&String, &Vec<ObjectKey>)| {

@@ -101,7 +101,7 @@ impl DriveProfile {
         Ok(())
     }
 
-    /// What the rig does not take from the file of `dcf`, in one line; none where it takes everything.
+    /// What the rig does not take from the file of `dcf`, in one line; `None` if it takes everything.
     pub fn dcf_warning(&self) -> Option<String> {
         self.dcf_read.as_ref()?.warning()
     }

@@ -74,13 +74,13 @@ pub(super) struct Parameters {
     pub(super) position_window_m: f64,
     /// Profile position (6081h, 6083h, 6084h).
     pub(super) profile: MotionLimits,
-    /// Deceleration of a quick stop (605Ah, 6084h, 6085h), m/s²; none where the brake closes at once.
+    /// Deceleration of a quick stop (605Ah, 6084h, 6085h), m/s²; `None` if the brake closes at once.
     pub(super) quick_stop_m_s2: Option<f64>,
     /// Whether the drive stays in quick stop active (605Ah from 5 on).
     pub(super) holds_quick_stop: bool,
-    /// Deceleration of the fault reaction (605Eh), m/s²; none where the brake closes at once.
+    /// Deceleration of the fault reaction (605Eh), m/s²; `None` if the brake closes at once.
     pub(super) fault_stop_m_s2: Option<f64>,
-    /// Deceleration before "shutdown" and "disable operation" (605Bh, 605Ch), m/s²; none where the brake closes at once.
+    /// Deceleration before "shutdown" and "disable operation" (605Bh, 605Ch), m/s²; `None` if the brake closes at once.
     pub(super) shutdown_m_s2: Option<f64>,
     pub(super) disable_m_s2: Option<f64>,
     /// Deceleration of a halt (605Dh), m/s²; none for that of the mode.

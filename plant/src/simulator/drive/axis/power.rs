@@ -38,7 +38,7 @@ impl PowerStage {
         matches!(self.state, DriveState::FaultReactionActive | DriveState::Fault)
     }
 
-    /// The state after a command; none where the torque is still off after power-on.
+    /// The state after a command; `None` if the torque is still off after power-on.
     pub(super) fn after(
         &mut self,
         command: StateCommand,

@@ -158,7 +158,7 @@ const OVERDUE: usize = 2;
 /// A receive PDO.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Rpdo {
-    /// Its identifier; none where the PDO does not exist.
+    /// Its identifier; `None` if the PDO does not exist.
     id: Option<CanId>,
     /// Whether its data take effect at the next SYNC instead of at once.
     pub(super) is_synchronous: bool,

@@ -22,9 +22,9 @@ use teeth::{Enamel, MOST_PAIRS, Pair, Tooth};
 /// The contact between the jaws.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Occlusion {
-    /// By the numbers of their teeth; none where the jaws never touch.
+    /// By the numbers of their teeth; empty if the jaws never touch.
     pairs: ArrayVec<Pair, MOST_PAIRS>,
-    /// The contact of each pair; none where the teeth never meet.
+    /// The contact of each pair; empty if the teeth never meet.
     enamel: ArrayVec<Enamel, MOST_PAIRS>,
     pub(crate) food: Option<Food>,
     /// Force on each lower tooth, base axes, N.

@@ -159,14 +159,14 @@ fn a_run_without_anything_wrong_passes_every_check() {
         findings,
         [
             "ended in state finished",
-            "closest of 1000 samples: platform rms 0.0500 mm, limit 0.1 mm",
-            "closest of 1000 samples: platform rms 0.0500 mm, limit 0.1 mm",
+            "platform rms 0.0500 mm, limit 0.1 mm; 1000 samples",
+            "platform rms 0.0500 mm, limit 0.1 mm; 1000 samples",
             "0.0 ms, limit 20 ms",
             "0 cycles, 0 in a row, limit 20",
             "held, limit of the rig 0",
             "0 commands",
             "0",
-            "closest: SYNC on bus 0 took 150.00 µs, bound 190.00 µs",
+            "closest to its bound: SYNC on bus 0 took 150.00 µs, bound 190.00 µs",
         ]
     );
 }

@@ -1,4 +1,4 @@
-//! Laws of the recording: what was flushed survives any cut, and no damage goes unnoticed or invents
+//! Laws of the recording: flushed messages survive any cut, and no damage goes unnoticed or invents
 //! anything.
 
 mod forged;

@@ -19,7 +19,7 @@ use super::feed::Feed;
 
 /// Length of a client's queue: almost half a second of every topic at 1 kHz.
 pub(super) const QUEUE: usize = 8192;
-/// Time that the thread waits for a request before it sends what is queued.
+/// Time that the thread waits for a request before it sends the queue.
 pub(super) const INTERVAL: Duration = Duration::from_millis(10);
 
 /// The longest message from a client, bytes; clients only ask.
@@ -85,7 +85,7 @@ impl Socket {
         Ok(self.0.write(Message::Binary(bytes.into()))?)
     }
 
-    /// Sends what is written.
+    /// Sends the written bytes.
     pub(super) fn flush(&mut self) -> Result<(), Disconnected> {
         Ok(self.0.flush()?)
     }

@@ -106,7 +106,7 @@ impl Feed {
             match queued.recv_timeout(left) {
                 Ok(message) => {
                     let mut analysis = lock(&self.analysis);
-                    // A frame that is none is in the recording, whose report names it.
+                    // A message that is no frame is in the recording, whose report names it.
                     let _ = analysis.take(&message);
                     while let Ok(message) = queued.try_recv() {
                         let _ = analysis.take(&message);
@@ -169,7 +169,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// The update that makes the second page of the first, as JSON for the page's script. Curves and frames of the scene only
 /// grow: their new points are appended. Every other block is replaced where it differs, and so is a section with other blocks.
-/// Unless it is a whole one, what is slow to draw stays as before, also in the second page.
+/// Unless it is a whole one, drawings that take long stay as before, also in the second page.
 fn changes_between(before: &Page, now: &mut Page, is_whole: bool) -> Value {
     let [from_s, to_s] = [before.time.end_s, now.time.end_s].map(|end_s| end_s - UNSETTLED_S);
     let mut changes = Changes { from_s, to_s, is_whole, append: Vec::new(), update: Vec::new() };

@@ -269,7 +269,7 @@ impl LiveServer {
         ClientCounts { connected, dropped: self.dropped.load(Ordering::Relaxed) }
     }
 
-    /// Sends what is queued, gives clients half a second to read it, and closes; returns what they missed.
+    /// Sends the queue, gives clients half a second to read it, and closes; returns what they missed.
     pub(crate) fn close(self) -> ClientLosses {
         self.close_within(CLOSING)
     }

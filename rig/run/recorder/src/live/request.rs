@@ -21,7 +21,7 @@ const HEADERS: usize = 64;
 /// The protocol of the page's updates.
 const PAGE: &str = "masseter.page.v1";
 
-/// What is spoken on a WebSocket.
+/// The protocol on a WebSocket.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Protocol {
     /// Topics, with their schemas.
@@ -78,7 +78,7 @@ pub(super) fn http_answer(status: StatusCode, kind: &str, text: &dyn Display) ->
     (head + &text).into_bytes()
 }
 
-/// None where the request has not come completely; an error where the bytes are no request of HTTP.
+/// `None` if the request has not come completely; an error where the bytes are no request of HTTP.
 fn parse_request(bytes: &[u8]) -> anyhow::Result<Option<(Request, usize)>> {
     let mut headers = [httparse::EMPTY_HEADER; HEADERS];
     let mut parsed = httparse::Request::new(&mut headers);

@@ -43,7 +43,7 @@ pub struct Dcf {
 /// Names of the section that CiA 306 calls `DeviceComissioning`; many tools mend the spelling.
 const COMMISSIONING: [&str; 2] = ["devicecomissioning", "devicecommissioning"];
 
-/// The node and the bit rate that a configuration is for; none where the file has none, or 0.
+/// The node and the bit rate that a configuration is for; `None` if the file has none, or 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Commissioning {
     /// `NodeID`.
@@ -114,7 +114,7 @@ impl Dcf {
             self.add(Entry::read(section, ObjectAddress::new(index, 0))?);
         } else if !COLLECTIONS.contains(&kind) {
             let known = "2 (domain), 5, 6, 7 (variable), 8 (array), 9 (record)";
-            return Err(section.refused(format!("ObjectType={kind:#X} is none of {known}")));
+            return Err(section.refused(format!("ObjectType={kind:#X} is not one of {known}")));
         } else if let Some(count @ 1..) = section.number("CompactSubObj", 0xFE)? {
             self.add_compact(index, count as u8, section, by_name)?;
         }
@@ -277,6 +277,6 @@ fn access_type(field: Field<'_>) -> Result<Access, DcfError> {
         "rw" => Access::ReadWrite,
         "rwr" => Access::ReadWriteTpdo,
         "rww" => Access::ReadWriteRpdo,
-        _ => return Err(field.refused("none of ro, wo, rw, rwr, rww, const")),
+        _ => return Err(field.refused("not one of ro, wo, rw, rwr, rww, const")),
     })
 }

@@ -47,7 +47,7 @@ fn what_cannot_be_read_is_refused_with_its_line_and_a_remedy() {
         ("DataType=7\ndatatype=7", 6, "datatype occurs twice in its section, first in line 5"),
         ("DataType=7\n[2000]", 6, "[2000] occurs twice, first in line 1"),
         ("DataType=7\n[2001sub0]", 6, "[2001sub0] has no section [2001] of its object; add it"),
-        ("DataType=7\n[2001]\nObjectType=3", 6, "ObjectType=0x3 is none of 2 (domain)"),
+        ("DataType=7\n[2001]\nObjectType=3", 6, "ObjectType=0x3 is not one of 2 (domain)"),
     ];
     for (lines, line, message) in table {
         let error = read(lines).unwrap_err();
@@ -55,9 +55,9 @@ fn what_cannot_be_read_is_refused_with_its_line_and_a_remedy() {
         assert!(error.to_string().starts_with(&format!("line {line}: {message}")), "{error}");
     }
     let access = Dcf::parse("[2000]\nParameterName=Some\nDataType=7\nAccessType=any").unwrap_err();
-    assert_eq!(access.to_string(), "line 4: AccessType=any is none of ro, wo, rw, rwr, rww, const");
+    assert_eq!(access.to_string(), "line 4: AccessType=any is not one of ro, wo, rw, rwr, rww, const");
     let outside = Dcf::parse("; comment\nKey=1").unwrap_err();
-    assert_eq!(outside.to_string(), "line 2: Key stands before the first [section]");
+    assert_eq!(outside.to_string(), "line 2: Key is before the first [section]");
 }
 
 #[test]

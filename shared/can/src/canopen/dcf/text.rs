@@ -49,7 +49,7 @@ impl<'a> Section<'a> {
             };
             let (key, text) = (key.trim(), text.trim());
             let Some(section) = sections.last_mut() else {
-                return refuse(format!("{key} stands before the first [section]"));
+                return refuse(format!("{key} is before the first [section]"));
             };
             let former = section.keys.insert(key.to_ascii_lowercase(), Field { key, text, line });
             if let Some(Field { line: first, .. }) = former {

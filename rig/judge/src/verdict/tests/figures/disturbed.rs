@@ -1,4 +1,4 @@
-//! Runs that the machine disturbed: what is still judged, what is excused, and the reason in words.
+//! Runs that the machine disturbed: the judged checks, the excused checks, and the reason in words.
 
 use masseter_scenario::TimingConfig;
 
