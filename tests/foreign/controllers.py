@@ -92,7 +92,8 @@ max = 20
 
 def main(masseter: str, target: str) -> None:
     masseter = str(Path(masseter).resolve())
-    with tempfile.TemporaryDirectory() as name:
+    # Users have folders with spaces and umlauts.
+    with tempfile.TemporaryDirectory(prefix="größe 2 ") as name:
         folder = Path(name)
         digests, stiff = {}, {}
         (folder / "required.toml").write_text(REQUIRED)

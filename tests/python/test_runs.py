@@ -579,3 +579,15 @@ def test_the_fixture_of_pytest_fails_with_verdict_requirement_margin_and_moment(
     said = subprocess.run([sys.executable, "-m", "pytest", "-q", "test_it.py"], cwd=tmp_path, stdout=subprocess.PIPE, text=True).stdout
     assert "1 failed, 1 passed" in said, said
     assert "FAIL: failed: strict" in said and "margin" in said and "report.html" in said, said
+
+
+def test_a_program_gets_its_arguments_and_lengths_near_one_are_poses(tmp_path: Path) -> None:
+    (tmp_path / "a law.py").write_text(
+        "import sys, masseter\n"
+        "assert sys.argv[1:] == ['--gain', '2 x'], sys.argv\n"
+        "longer = lambda demand: masseter.Pose(demand.ahead.position_m, [1.0001 * part for part in demand.ahead.quaternion_wxyz])\n"
+        "sys.exit(not masseter.control(longer))\n"
+    )
+    result = masseter.run(controller=f"{sys.executable} '{tmp_path}/a law.py' --gain '2 x'", duration=1)
+    assert result.passed, result
+    assert result.load().manifest["controller"].endswith("a law.py --gain 2 x")

@@ -181,7 +181,10 @@ pub(crate) fn control(
 }
 
 /// Calls `play` in a thread of its own; Ctrl-C ends the wait.
-fn in_own_thread<T: Send + 'static>(py: Python<'_>, play: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
+fn in_own_thread<T: Send + 'static>(
+    py: Python<'_>,
+    play: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
     let running = thread::spawn(play);
     while !running.is_finished() {
         py.detach(|| thread::sleep(POLL));
