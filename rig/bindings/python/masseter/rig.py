@@ -104,8 +104,8 @@ def run(
     that of the variable MASSETER, or masseter on the PATH.
     """
     check_declaration(signals, parameters)
-    temporary = None if keep is not None else tempfile.TemporaryDirectory(prefix="masseter-")
-    folder = Path(keep) if temporary is None else Path(temporary.name) / "run"
+    temporary = tempfile.TemporaryDirectory(prefix="masseter-") if keep is None else None
+    folder = Path(temporary.name) / "run" if temporary else Path(keep or "")
     law = controller if callable(controller) else None
     name = f"python-{uuid.uuid4().hex[:12]}"
     chosen = ["external", "--name", name] if law else [os.fspath(controller)]  # type: ignore[arg-type]
