@@ -4,6 +4,7 @@
 //! [`MotionController`](crate::motion_controller::MotionController) for every law.
 
 use std::fmt;
+use std::ops::Range;
 
 use masseter_model::geometry::{Pose, Vec3};
 use masseter_runtime::control::NoBranch;
@@ -177,7 +178,14 @@ impl<F: FnMut(&Demand, &[f64], &mut [f64]) -> Result<Pose, LawFailed>> PoseLaw f
     }
 }
 
-/// The requested pose of a foreign law, without a check: the controller refuses values that are no pose.
+/// The requested pose of a foreign law. A quaternion whose length is rounded is brought to 1. Other values are not
+/// checked: the controller refuses those that are no pose.
 pub fn asked_pose(position_m: [f64; 3], [w, x, y, z]: [f64; 4]) -> Pose {
-    Pose::from_parts(Translation3::from(position_m), Unit::new_unchecked(Quaternion::new(w, x, y, z)))
+    let quaternion = Quaternion::new(w, x, y, z);
+    let is_rounded = ROUNDED_NORM_ERROR.contains(&(quaternion.norm() - 1.0).abs());
+    let rotation = if is_rounded { Unit::new_normalize(quaternion) } else { Unit::new_unchecked(quaternion) };
+    Pose::from_parts(Translation3::from(position_m), rotation)
 }
+
+/// Errors of a length that 32-bit numbers or a few decimal digits make. Smaller ones stay as they are.
+const ROUNDED_NORM_ERROR: Range<f64> = 1e-9..1e-3;

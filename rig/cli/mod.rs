@@ -188,6 +188,9 @@ enum Verb {
         supervisor: i32,
         /// The program
         path: PathBuf,
+        /// Its arguments
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        arguments: Vec<OsString>,
     },
 }
 
@@ -267,7 +270,9 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Recorder { process, recorder } => {
             masseter_recorder::record(&process.process_arguments(), &recorder).usage()
         }
-        Verb::ExecProgram { supervisor, path } => exec_program(supervisor, &path).usage(),
+        Verb::ExecProgram { supervisor, path, arguments } => {
+            exec_program(supervisor, &path, &arguments).usage()
+        }
     }
 }
 

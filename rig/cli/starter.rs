@@ -169,12 +169,21 @@ fn files_of(project: &Project, source: &Path, folder: &Path) -> Vec<StarterFile>
     let files = project.files.iter().map(|&(path, content)| (path, content.to_owned()));
     let in_place = |(path, content): (_, String)| StarterFile {
         path,
-        content: content
+        content: with_interpreter(content, folder)
             .replace("@SOURCE@", &source.display().to_string())
             .replace("@TARGET@", &source.join("target").display().to_string())
             .replace("@FOLDER@", &folder.display().to_string()),
     };
     files.chain([("README.md", readme)]).map(in_place).collect()
+}
+
+/// The content with a first line that the kernel understands. Its line for an interpreter ends at the first space, so a
+/// shell starts an interpreter in such a folder.
+fn with_interpreter(content: String, folder: &Path) -> String {
+    const KERNELS: &str = "#!@FOLDER@/.venv/bin/python\n";
+    const SHELLS: &str = "#!/bin/sh\n'''exec' \"@FOLDER@/.venv/bin/python\" \"$0\" \"$@\"\n' '''\n";
+    let has_space = folder.display().to_string().contains(char::is_whitespace);
+    if has_space { content.replacen(KERNELS, SHELLS, 1) } else { content }
 }
 
 /// A file of such a folder: its path within, and its content.

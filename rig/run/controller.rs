@@ -63,8 +63,8 @@ impl Controller {
             }
             ControllerChoice::External => Self::Program(Box::new(Program::external(domain, invitation)?)),
             ControllerChoice::None => Self::None { motion_ns: (motion_s * 1e9) as u64, ends_ns: u64::MAX },
-            ControllerChoice::Executable(path) => {
-                Self::Program(Box::new(Program::executable(domain, invitation, path)?))
+            ControllerChoice::Executable(path, arguments) => {
+                Self::Program(Box::new(Program::executable(domain, invitation, path, arguments)?))
             }
         })
     }
@@ -240,13 +240,19 @@ impl Program {
 
     /// Starts an executable, and listens for it. Its standard output goes to standard error, since the rig's own is the
     /// result.
-    fn executable(domain: &Domain, invitation: Invitation, path: &Path) -> anyhow::Result<Self> {
+    fn executable(
+        domain: &Domain,
+        invitation: Invitation,
+        path: &Path,
+        arguments: &[String],
+    ) -> anyhow::Result<Self> {
         let mut program = Self::external(domain, invitation)?;
         let output = io::stderr().as_fd().try_clone_to_owned().context("standard error cannot be shared")?;
         // It ends with the supervisor's main thread, which is this one.
         let child = tied_to_this_process(path)
             .and_then(|mut command| {
                 command
+                    .args(arguments)
                     .env(RIG_VARIABLE, domain.id())
                     .stdin(Stdio::null())
                     .stdout(File::from(output))
@@ -444,8 +450,8 @@ pub(crate) fn end_with_parent(parent: Option<Pid>) -> anyhow::Result<()> {
 /// A program may ignore every signal and the closed line, and would outlive a killed supervisor. So the kernel kills
 /// it with the supervisor. Only the process itself can ask for that, before it executes the program, which keeps the
 /// request. The kernel drops the request for an executable with the set-user-ID bit or with capabilities of its own.
-pub(crate) fn exec_program(supervisor: i32, path: &Path) -> anyhow::Result<Exit> {
+pub(crate) fn exec_program(supervisor: i32, path: &Path, arguments: &[OsString]) -> anyhow::Result<Exit> {
     end_with_parent(Pid::from_raw(supervisor))?;
-    let error = Command::new(path).exec();
+    let error = Command::new(path).args(arguments).exec();
     Err(error).with_context(|| format!("the controller {} cannot be started", path.display()))
 }

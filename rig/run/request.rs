@@ -2,7 +2,7 @@
 
 use std::net::SocketAddr;
 use std::os::unix::fs::PermissionsExt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
@@ -55,10 +55,10 @@ pub(crate) struct RunRequest {
     #[arg(long, value_name = "TIME", value_parser = parse_patience, help_heading = HOW)]
     pub(super) patience: Option<Patience>,
     /// Who controls the robot: motion plays the motion, hold keeps the position found at the start, a path starts
-    /// your own program, external waits until you start it [default: motion]
+    /// your own program, also with arguments ("python3 law.py --gain 2"), external waits until you start it [default: motion]
     #[arg(
         long,
-        value_name = "motion|hold|external|none|PATH",
+        value_name = "motion|hold|external|none|PROGRAM",
         default_value = "motion",
         hide_default_value = true,
         help_heading = WHAT
@@ -195,8 +195,8 @@ pub(crate) enum ControllerChoice {
     Own(ControllerKind),
     /// A program that the user starts.
     External,
-    /// A program that the rig starts.
-    Executable(PathBuf),
+    /// A program that the rig starts, with its arguments.
+    Executable(PathBuf, Vec<String>),
     /// Nobody, or whoever publishes commands: the rig starts, invites and watches no controller.
     None,
 }
@@ -210,7 +210,8 @@ impl Default for ControllerChoice {
 impl FromStr for ControllerChoice {
     type Err = String;
 
-    /// The name of a controller of the rig, `external`, `none`, or the path of an executable file.
+    /// The name of a controller of the rig, `external`, `none`, the path of an executable file, or a command line: a
+    /// program and its arguments, with the quotes of a shell.
     fn from_str(text: &str) -> Result<Self, String> {
         if let Ok(kind) = ControllerKind::from_str(text, false) {
             return Ok(Self::Own(kind));
@@ -220,11 +221,21 @@ impl FromStr for ControllerChoice {
             "none" => return Ok(Self::None),
             _ => {}
         }
+        // A path may contain spaces.
+        let words = if Path::new(text).exists() { None } else { shlex::split(text) };
+        if let Some([program, arguments @ ..]) = words.as_deref().filter(|words| words.len() > 1) {
+            let path = if program.contains('/') { std::path::absolute(program) } else { Ok(program.into()) };
+            return path
+                .map(|path| Self::Executable(path, arguments.to_vec()))
+                .map_err(|error| error.to_string());
+        }
         let path = PathBuf::from(text);
         match path.metadata() {
             Ok(found) if found.is_file() && found.permissions().mode() & 0o111 != 0 => {
                 // Without a folder, the system would search PATH.
-                std::path::absolute(path).map(Self::Executable).map_err(|error| error.to_string())
+                std::path::absolute(path)
+                    .map(|path| Self::Executable(path, Vec::new()))
+                    .map_err(|error| error.to_string())
             }
             Ok(found) if found.is_file() => Err(format!("the file is not executable: chmod +x {text}")),
             Ok(_) => Err("it is a folder: give the executable file of your controller".to_owned()),
@@ -240,7 +251,7 @@ impl ControllerChoice {
     pub(crate) fn builder(&self) -> Option<BuildController> {
         match self {
             Self::Own(kind) => Some(kind.builder()),
-            Self::External | Self::Executable(_) | Self::None => None,
+            Self::External | Self::Executable(..) | Self::None => None,
         }
     }
 
@@ -250,7 +261,8 @@ impl ControllerChoice {
             Self::Own(kind) => Some(name_of(kind)).filter(|_| *kind != ControllerKind::default()),
             Self::External => Some("external".to_owned()),
             Self::None => Some("none".to_owned()),
-            Self::Executable(path) => Some(path.display().to_string()),
+            Self::Executable(path, arguments) if arguments.is_empty() => Some(path.display().to_string()),
+            Self::Executable(path, arguments) => Some(format!("{} {}", path.display(), arguments.join(" "))),
         }
     }
 }

@@ -120,7 +120,7 @@ fn check_cores(cores: &[usize], usable: &[usize]) -> anyhow::Result<()> {
 /// The clock that this machine can keep: real time where the kernel grants it, otherwise lockstep.
 fn choose_clock(request: &RunRequest, scenario: &Scenario) -> ClockKind {
     let is_program =
-        matches!(request.controller, ControllerChoice::External | ControllerChoice::Executable(_));
+        matches!(request.controller, ControllerChoice::External | ControllerChoice::Executable(..));
     let say = |what: &str| {
         if !request.quiet {
             status!("clock: lockstep, {what}");

@@ -4,6 +4,7 @@
 """
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -12,6 +13,8 @@ from pathlib import Path
 
 LANGUAGES = ["rust", "c", "cpp", "python"]
 MOST_LINES = 60
+# The law of a program, as gdb finds its function.
+LAWS = {"c": "^command$", "rust": "my_controller.*command"}
 
 
 def shell(command: str, folder: Path) -> str:
@@ -57,6 +60,20 @@ def run(masseter: str, program: str, folder: Path, clock: str, *more: str) -> di
     return json.loads(ended.stdout)
 
 
+def stop_in_the_law(masseter: str, program: str, law: str, folder: Path) -> None:
+    """The program in gdb, with a breakpoint in its law: it stops there, goes on, and passes."""
+    words = [masseter, "run", "--controller", "external", "--name", "gdb", "--clock", "lockstep", "--patience", "none", "--duration", "1"]
+    rig = subprocess.Popen([*words, "--quiet"], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while "waiting for a controller" not in (line := rig.stderr.readline()):
+        assert line, "the rig ended"
+    orders = [f"rbreak {law}", "run", "backtrace 1", "delete", "continue"]
+    debugger = ["gdb", "-batch", *(word for order in orders for word in ("-ex", order)), program]
+    said = subprocess.run(debugger, env={**os.environ, "MASSETER_RIG": "gdb"}, capture_output=True, text=True, timeout=120).stdout
+    output, _ = rig.communicate(timeout=60)
+    assert re.search(f"hit Breakpoint \\d+, .*{law.strip('^$').rpartition(':')[2]}", said), said
+    assert output.startswith("PASS"), output
+
+
 # A requirement on what the controllers declare themselves.
 REQUIRED = """
 [[require]]
@@ -75,7 +92,8 @@ max = 20
 
 def main(masseter: str, target: str) -> None:
     masseter = str(Path(masseter).resolve())
-    with tempfile.TemporaryDirectory() as name:
+    # Users have folders with spaces and umlauts.
+    with tempfile.TemporaryDirectory(prefix="größe 2 ") as name:
         folder = Path(name)
         digests, stiff = {}, {}
         (folder / "required.toml").write_text(REQUIRED)
@@ -90,6 +108,8 @@ def main(masseter: str, target: str) -> None:
             checks = {check["name"]: check for check in summary["verdict"]["checks"]}
             assert checks["trim"]["result"] == checks["gain"]["result"] == "passed", checks
             assert 0.0 < checks["trim"]["margin"] < 1.0, checks["trim"]
+            if law := LAWS.get(language):
+                stop_in_the_law(masseter, program, law, folder)
             print(f"{language}: digest {digests[language][0]}, and a run in real time")
         found = {digest for of_language in digests.values() for digest in of_language}
         assert len(found) == 1, digests

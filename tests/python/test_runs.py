@@ -3,8 +3,10 @@
 import contextlib
 import json
 import os
+import pickle
 import signal
 import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -90,7 +92,7 @@ def test_an_exception_of_the_law_stops_the_rig_safely_and_is_raised_again(tmp_pa
         return demand.ahead
 
     with pytest.raises(ZeroDivisionError, match="my law broke"):
-        masseter.run(controller=law, arguments=SHORT, out=tmp_path / "run")
+        masseter.run(controller=law, arguments=SHORT, keep=tmp_path / "run")
     summary = masseter.load(tmp_path / "run").summary
     assert "law_failed" in {event["cause"] for event in summary["figures"]["events"]}
 
@@ -505,7 +507,7 @@ def test_tables_have_the_units_in_their_names() -> None:
 
 
 def test_a_recording_that_is_cut_short_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
-    result = masseter.run(clock="virtual", arguments=SHORT, out=tmp_path / "run")
+    result = masseter.run(clock="virtual", arguments=SHORT, keep=tmp_path / "run")
     recording = tmp_path / "run" / "recording.mcap"
     whole = len(result.load().state)
     recording.write_bytes(recording.read_bytes()[: recording.stat().st_size // 2])
@@ -517,7 +519,7 @@ def test_a_recording_that_is_cut_short_is_read_as_far_as_it_goes(tmp_path: Path)
 
 
 def test_a_run_is_loaded_by_its_folder_its_recording_or_a_link(tmp_path: Path) -> None:
-    states = masseter.run(clock="virtual", arguments=SHORT, out=tmp_path / "run").load().state
+    states = masseter.run(clock="virtual", arguments=SHORT, keep=tmp_path / "run").load().state
     (tmp_path / "latest").symlink_to("run")
     (tmp_path / "link.mcap").symlink_to("run/recording.mcap")
     for name in ("run/recording.mcap", "latest", "latest/recording.mcap", "link.mcap"):
@@ -527,3 +529,65 @@ def test_a_run_is_loaded_by_its_folder_its_recording_or_a_link(tmp_path: Path) -
     (tmp_path / "run" / "recording.mcap").unlink()
     with pytest.raises(masseter.MasseterError, match="the run ended before its recorder wrote"):
         masseter.load(tmp_path / "run")
+
+
+def test_a_result_is_short_as_text_and_a_notebook_sees_verdict_and_charts(tmp_path: Path) -> None:
+    strict = tmp_path / "strict.toml"
+    strict.write_text("[[require]]\nname = 'impossible & strict'\nsignal = 'incisal.error'\nduring = 'running'\nmax = '1 nm'\n")
+    result = masseter.run(strict, clock="virtual", duration=1, seed=7, set={"rate_hz": 500})
+    assert len(repr(result)) < 120 and "FAIL" in repr(result)
+    assert str(result).startswith("FAIL: failed: impossible & strict\n  FAIL: impossible & strict: ") and "margin" in str(result)
+    page = result._repr_html_()
+    assert page.count("<svg") == 3 and "impossible &amp; strict" in page and len(page) < 100_000
+    run = result.load()
+    assert (run.scenario["seed"], run.scenario["rate_hz"]) == (7, 500)
+
+
+def test_the_folder_of_a_run_that_nobody_keeps_goes_with_its_result(tmp_path: Path) -> None:
+    result = masseter.run(clock="virtual", duration=1)
+    folder = result.folder
+    assert folder.is_dir()
+    del result
+    assert not folder.exists()
+    assert masseter.run(clock="virtual", duration=1, keep=tmp_path / "kept").folder == tmp_path / "kept"
+    assert (tmp_path / "kept" / "report.html").is_file()
+
+
+def test_a_pose_is_compared_and_pickled() -> None:
+    pose = masseter.Pose([0.0, 0.0, 0.27], [1.0, 0.0, 0.0, 0.0])
+    assert pickle.loads(pickle.dumps(pose)) == pose
+    assert pose != masseter.Pose([0.0, 0.0, 0.28], [1.0, 0.0, 0.0, 0.0])
+
+
+def test_a_law_cannot_change_its_parameters() -> None:
+    def law(demand: masseter.Demand) -> masseter.Pose:
+        demand.parameters["gain"] = 99.0  # type: ignore[index]
+        return demand.ahead
+
+    with pytest.raises(TypeError, match="does not support item assignment"):
+        masseter.run(controller=law, duration=1, parameters=[masseter.Parameter("gain", 1.0, (0.0, 10.0))])
+
+
+def test_the_fixture_of_pytest_fails_with_verdict_requirement_margin_and_moment(tmp_path: Path) -> None:
+    (tmp_path / "test_it.py").write_text(
+        "def test_passes(masseter):\n    assert masseter(duration=1).verdict == 'PASS'\n"
+        "def test_fails(masseter):\n    masseter('strict.toml', duration=1)\n"
+    )
+    (tmp_path / "strict.toml").write_text(
+        "[[require]]\nname = 'strict'\nsignal = 'incisal.error'\nduring = 'running'\nmax = '1 nm'\n"
+    )
+    said = subprocess.run([sys.executable, "-m", "pytest", "-q", "test_it.py"], cwd=tmp_path, stdout=subprocess.PIPE, text=True).stdout
+    assert "1 failed, 1 passed" in said, said
+    assert "FAIL: failed: strict" in said and "margin" in said and "report.html" in said, said
+
+
+def test_a_program_gets_its_arguments_and_lengths_near_one_are_poses(tmp_path: Path) -> None:
+    (tmp_path / "a law.py").write_text(
+        "import sys, masseter\n"
+        "assert sys.argv[1:] == ['--gain', '2 x'], sys.argv\n"
+        "longer = lambda demand: masseter.Pose(demand.ahead.position_m, [1.0001 * part for part in demand.ahead.quaternion_wxyz])\n"
+        "sys.exit(not masseter.control(longer))\n"
+    )
+    result = masseter.run(controller=f"{sys.executable} '{tmp_path}/a law.py' --gain '2 x'", duration=1)
+    assert result.passed, result
+    assert result.load().manifest["controller"].endswith("a law.py --gain 2 x")

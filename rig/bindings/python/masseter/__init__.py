@@ -8,7 +8,7 @@
 Lengths are in m, angles in rad, times in s unless a name says otherwise; poses are those of the platform in the base frame.
 """
 
-from masseter._native import Demand, MasseterError, Pose
+from masseter._native import Demand, MasseterError, Pose, __version__
 from masseter.controller import Parameter, Session, Signal, control
 from masseter.kinematics import Mechanism, fk, ik
 from masseter.recording import Run, load
@@ -24,6 +24,7 @@ __all__ = [
     "Run",
     "Session",
     "Signal",
+    "__version__",
     "control",
     "fk",
     "ik",

@@ -1,9 +1,11 @@
 from os import PathLike
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 _Signal = tuple[str, str, str]
 _Parameter = tuple[str, str, str, float, tuple[float, float]]
+
+__version__: str
 
 class MasseterError(Exception): ...
 class NoRigError(MasseterError): ...
@@ -51,8 +53,8 @@ class Demand:
     def ahead(self) -> Pose:
         """The desired pose when this cycle's command is reached."""
     @property
-    def parameters(self) -> dict[str, float]:
-        """The parameters in this cycle, by their names."""
+    def parameters(self) -> Mapping[str, float]:
+        """The parameters in this cycle, by their names. The law cannot change them."""
     @property
     def signals(self) -> dict[str, float]:
         """The declared signals, for the law to fill; a value stays until it is replaced."""

@@ -12,7 +12,7 @@ use masseter_runtime::lifecycle::attach::attach;
 use masseter_runtime::messages::pose_fields;
 use masseter_runtime::named::{Declared, Parameter, Signal};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyMappingProxy};
 
 use crate::{failed, not_attached};
 
@@ -20,14 +20,17 @@ use crate::{failed, not_attached};
 const POLL: Duration = Duration::from_millis(20);
 
 /// A pose: position in the base frame, m, and unit quaternion.
-#[pyclass(frozen, from_py_object)]
-#[derive(Debug, Clone, Copy)]
+#[pyclass(frozen, eq, from_py_object, module = "masseter")]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pose {
     #[pyo3(get)]
-    position_m: (f64, f64, f64),
+    position_m: Vector,
     #[pyo3(get)]
-    quaternion_wxyz: (f64, f64, f64, f64),
+    quaternion_wxyz: Quaternion,
 }
+
+type Vector = (f64, f64, f64);
+type Quaternion = (f64, f64, f64, f64);
 
 #[pymethods]
 impl Pose {
@@ -35,6 +38,11 @@ impl Pose {
     fn new(position_m: [f64; 3], quaternion_wxyz: [f64; 4]) -> Self {
         let ([px, py, pz], [w, x, y, z]) = (position_m, quaternion_wxyz);
         Self { position_m: (px, py, pz), quaternion_wxyz: (w, x, y, z) }
+    }
+
+    /// What pickle calls the constructor with.
+    fn __getnewargs__(&self) -> (Vector, Quaternion) {
+        (self.position_m, self.quaternion_wxyz)
     }
 
     fn __repr__(&self) -> String {
@@ -60,7 +68,7 @@ pub(crate) struct Demand {
     desired: Pose,
     estimated: Option<Pose>,
     ahead: Pose,
-    parameters: Py<PyDict>,
+    parameters: Py<PyMappingProxy>,
     signals: Py<PyDict>,
 }
 
@@ -68,7 +76,6 @@ pub(crate) struct Demand {
 struct PythonLaw {
     function: Py<PyAny>,
     declared: Declared,
-    parameters: Py<PyDict>,
     signals: Py<PyDict>,
 }
 
@@ -76,8 +83,9 @@ impl PythonLaw {
     /// The pose that the law returns; takes over the signals that the law fills.
     fn ask(&self, demand: &RigDemand, parameters: &[f64], filled: &mut [f64]) -> PyResult<geometry::Pose> {
         Python::attach(|py| {
+            let values = PyDict::new(py);
             for (parameter, value) in self.declared.parameters.iter().zip(parameters) {
-                self.parameters.bind(py).set_item(&parameter.name, value)?;
+                values.set_item(&parameter.name, value)?;
             }
             let demand = Demand {
                 cycle: demand.cycle,
@@ -87,7 +95,7 @@ impl PythonLaw {
                 desired: (&demand.desired).into(),
                 estimated: demand.estimated.as_ref().map(Pose::from),
                 ahead: (&demand.ahead).into(),
-                parameters: self.parameters.clone_ref(py),
+                parameters: PyMappingProxy::new(py, values.as_mapping()).unbind(),
                 signals: self.signals.clone_ref(py),
             };
             let pose = self.function.call1(py, (demand,))?;
@@ -153,8 +161,7 @@ pub(crate) fn control(
     for signal in &declared.signals {
         signals.set_item(&signal.name, 0.0)?;
     }
-    let (parameters, signals) = (PyDict::new(py).into(), signals.into());
-    let python = PythonLaw { function: law, declared: declared.clone(), parameters, signals };
+    let python = PythonLaw { function: law, declared: declared.clone(), signals: signals.into() };
     let law = FunctionLaw::new(declared, move |demand, parameters, signals| {
         python.ask(demand, parameters, signals).map_err(|error| {
             // Nobody waits for it once the caller was interrupted.
@@ -162,18 +169,26 @@ pub(crate) fn control(
             LawFailed
         })
     });
-    // A thread of its own: real-time priority and core end with it.
-    let running = thread::spawn(move || {
-        let context = attach(rig.as_deref()).map_err(not_attached)?;
-        run_with_law(context, Box::new(law)).map_err(failed)
-    });
-    while !running.is_finished() {
-        py.detach(|| thread::sleep(POLL));
-        py.check_signals()?;
-    }
-    let ran = py.detach(|| running.join()).map_err(|_| failed("a fault of Masseter itself"))?;
+    let context = py.detach(|| attach(rig.as_deref())).map_err(not_attached)?;
+    let is_simulated = context.lockstep.is_some();
+    let play = move || run_with_law(context, Box::new(law)).map_err(failed);
+    // Debuggers follow the caller's thread. In real time the law has a thread of its own, with which priority and core end.
+    let ran = if is_simulated { py.detach(play) } else { in_own_thread(py, play)? };
     if let Ok(exception) = exceptions.try_recv() {
         return Err(exception);
     }
     ran.map(|outcome| outcome == Outcome::Finished)
+}
+
+/// Calls `play` in a thread of its own; Ctrl-C ends the wait.
+fn in_own_thread<T: Send + 'static>(
+    py: Python<'_>,
+    play: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
+    let running = thread::spawn(play);
+    while !running.is_finished() {
+        py.detach(|| thread::sleep(POLL));
+        py.check_signals()?;
+    }
+    py.detach(|| running.join()).map_err(|_| failed("a fault of Masseter itself"))
 }

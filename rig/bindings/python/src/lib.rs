@@ -40,6 +40,7 @@ fn not_attached(error: AttachError) -> PyErr {
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("MasseterError", module.py().get_type::<MasseterError>())?;
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("NoRigError", module.py().get_type::<NoRigError>())?;
     module.add_class::<Mechanism>()?;
     module.add_class::<law::Demand>()?;
