@@ -58,6 +58,8 @@ fn settings_of_axis(scenario: &Scenario, axis: usize, node: NodeId) -> Result<Dr
     objects.set(names::VENDOR_ID, identity.vendor_id);
     objects.set(names::PRODUCT_CODE, identity.product_code);
     objects.set(names::REVISION, identity.revision);
+    // A drive keeps its serial number under another node id.
+    objects.set(names::SERIAL_NUMBER, scenario.can.node_ids[axis].into());
     objects.set(names::CONSUMER_HEARTBEAT_TIME, watched);
     objects.set(names::PRODUCER_HEARTBEAT_TIME_MS, scenario.can.heartbeat_producer_ms);
     let on_axis: Vec<_> = scenario.drives.quirk.iter().filter(|quirk| quirk.is_on(axis)).collect();
