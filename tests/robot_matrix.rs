@@ -1,5 +1,5 @@
 //! What every step of the bring-up does with every quirk, and after every event between two steps: the last two tables of
-//! docs/robot.md. `cargo test --test rig -- --ignored renew_the_reference` plays everything and writes the tables anew.
+//! docs/robot.md. `cargo test --test rig -- --ignored renew_the_tables_of_the_robot` plays everything and writes the tables anew.
 //!
 //! Each step plays, also those after the one that finds the quirk. The log of every step shows that no second axis ever had power,
 //! and that `inspect` only asks.
@@ -239,7 +239,7 @@ fn every_step_does_after_an_event_what_the_table_says() {
 
 #[test]
 #[ignore = "writes documents"]
-fn renew_the_reference_of_the_robot() {
+fn renew_the_tables_of_the_robot() {
     let mut text = fs::read_to_string(document()).unwrap();
     let all: [(&str, String); 2] =
         [(QUIRKS, rows().iter().map(row_of_quirk).collect()), (EVENTS, rows_of_events().concat())];
