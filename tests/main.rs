@@ -41,6 +41,7 @@ mod requirements;
 mod robot;
 mod robot_faults;
 mod robot_liars;
+mod robot_matrix;
 mod robot_motion;
 mod robot_quirks;
 mod start;

@@ -112,7 +112,7 @@ fn renew_the_reference() {
 }
 
 /// The text with these rows in place of those under the head of a table.
-fn with_rows(text: &str, head: &str, rows: &str) -> String {
+pub(crate) fn with_rows(text: &str, head: &str, rows: &str) -> String {
     let (before, table) = text.split_once(head).unwrap_or_else(|| panic!("no table {head}"));
     let old: usize = table.split_inclusive('\n').take_while(|line| line.starts_with('|')).map(str::len).sum();
     format!("{before}{head}{rows}{}", &table[old..])

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use masseter_model::geometry::AXIS_NAMES;
 
-use crate::common::{self, MASSETER, Workspace, masseter, stderr, stdout};
+use crate::common::{self, MASSETER, Workspace, bus_log, masseter, stderr, stdout};
 use serde_json::Value;
 
 /// A rig whose jaw is closed, as check-pose wants it.
@@ -32,6 +32,7 @@ fn a_jog_passes_with_a_right_reading_of_a_gauge_alone() {
         (Some("1.01mm"), 0, true, "/bringup/01-jog-l1"),
         (Some("0.97mm"), 1, false, "multiply encoder_resolution_m"),
         (Some("-1mm"), 1, false, "drive_profile.reversed"),
+        (Some("0mm"), 1, false, "did another axis move? compare can.node_ids with the drives"),
     ] {
         let more = measured.map_or(vec![], |measured| vec!["--measured", measured]);
         let (found, out, err, result) =
@@ -87,6 +88,24 @@ fn a_jog_that_is_stopped_ends_with_5_and_is_no_evidence() {
     assert_eq!(code, Some(5), "{err}");
     assert!(err.contains("l1: l1 sent emergency 5112h") && err.contains("the axis is off"), "{err}");
     assert_eq!(result["passed"], false);
+}
+
+/// The fourth axis is l1, whose drive ignores a lost heartbeat.
+#[test]
+fn a_proof_that_fails_keeps_the_figures_of_the_axes_before() {
+    let deaf = "[[drives.quirk]]\nkind = 'ignores_heartbeat'\naxes = ['l1']\n";
+    let (code, out, err, result) = robot(deaf, &["watchdog"]);
+    assert_eq!((code, out.lines().count()), (Some(1), 3), "{out}{err}");
+    assert_eq!(result["passed"], false);
+    let result = &result["result"];
+    assert!(result["error"].as_str().unwrap().starts_with("l1: kept its power for "), "{result}");
+    let before = result["before"].as_array().unwrap();
+    assert_eq!(before.iter().map(|figures| &figures["axis"]).collect::<Vec<_>>(), ["d1", "d2", "d3"]);
+    for figures in before {
+        let reaction = &figures["heartbeat"];
+        assert!(reaction["stopped_after_ms"].as_f64().unwrap() > 140.0, "{figures}");
+        assert_eq!((&reaction["emergency"], &reaction["last_frame"]), (&0x8130.into(), &"left".into()));
+    }
 }
 
 #[test]
@@ -191,30 +210,6 @@ fn a_slide_that_was_without_power_since_home_fails_the_pose_check() {
     assert_eq!(steps_with_power(&workspace), moved.collect());
 }
 
-/// The nodes with power after each controlword that a step has sent by SDO. Process data go to such a node alone.
-fn powered(log: &str) -> Vec<BTreeSet<u8>> {
-    let frames = log.lines().filter_map(|line| line.split_whitespace().nth(2)?.split_once('#'));
-    let mut on = BTreeSet::new();
-    let mut all = Vec::new();
-    for (id, data) in frames {
-        let id = u16::from_str_radix(id, 16).unwrap();
-        let receiver = id.checked_sub(0x200).and_then(|node| u8::try_from(node).ok());
-        let receiver = receiver.filter(|node| (1..0x80).contains(node));
-        assert!(receiver.is_none_or(|node| on.contains(&node)), "process data: {id:X}#{data}");
-        let Some(word) = data.strip_prefix("2B406000").filter(|_| id > 0x600) else { continue };
-        let node = (id - 0x600) as u8;
-        // Bits 0 and 1: "switch on" and "enable voltage".
-        let low = u8::from_str_radix(&word[..2], 16).unwrap();
-        if low & 3 == 3 {
-            on.insert(node)
-        } else {
-            low & 2 == 0 && on.remove(&node)
-        };
-        all.push(on.clone());
-    }
-    all
-}
-
 /// The steps that gave an axis power, and never a second one; at their end none has power.
 fn steps_with_power(workspace: &Workspace) -> BTreeSet<String> {
     let folders = std::fs::read_dir(workspace.file("bringup")).unwrap().map(|entry| entry.unwrap().path());
@@ -222,10 +217,8 @@ fn steps_with_power(workspace: &Workspace) -> BTreeSet<String> {
     for folder in folders {
         // A dry run is a run, and has no log here.
         let Ok(log) = std::fs::read_to_string(folder.join("candump.log")) else { continue };
-        let (powered, name) = (powered(&log), folder.file_name().unwrap().to_str().unwrap()[3..].to_owned());
-        assert!(powered.iter().all(|on| on.len() <= 1), "{name}: {powered:?}");
-        assert!(powered.last().is_none_or(BTreeSet::is_empty), "{name}: {powered:?}");
-        if powered.iter().any(|on| !on.is_empty()) {
+        let name = folder.file_name().unwrap().to_str().unwrap()[3..].to_owned();
+        if bus_log::moved_one_axis_at_most(&name, &log) {
             moved.insert(name);
         }
     }

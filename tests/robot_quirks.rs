@@ -14,10 +14,14 @@ const AXES: [&str; 6] = ["l1", "l2", "l3", "d1", "d2", "d3"];
 
 /// A row of the table.
 #[derive(Debug)]
-struct Row {
+pub(crate) struct Row {
+    /// The first cell.
+    pub(crate) cell: String,
     quirk: String,
     /// Keys of the profile without which the quirk does not show.
     shown_with: String,
+    /// What a gauge shows after a jog by 1 mm.
+    gauge: String,
     found_by: Option<String>,
     exit: Option<i32>,
     says: Option<String>,
@@ -36,7 +40,7 @@ fn quoted_at(cell: &str, place: usize) -> Option<String> {
     Some(cell.split('`').nth(2 * place + 1)?.to_owned())
 }
 
-fn rows() -> Vec<Row> {
+pub(crate) fn rows() -> Vec<Row> {
     let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/robot.md")).unwrap();
     let (_, table) = text.split_once("| quirk | found by | exit |").unwrap();
     let lines = table.lines().skip(2).take_while(|line| line.starts_with('|'));
@@ -46,9 +50,12 @@ fn rows() -> Vec<Row> {
             panic!("{line}");
         };
         let no_profile_helps = profile.trim().starts_with("none");
+        let gauge = quirk.split_once("a gauge that shows ").and_then(|(_, reading)| quoted(reading));
         Row {
+            cell: quirk.trim().to_owned(),
             quirk: quoted(quirk).unwrap(),
-            shown_with: quoted_at(quirk, 1).unwrap_or_default(),
+            shown_with: quoted_at(quirk, 1).filter(|_| gauge.is_none()).unwrap_or_default(),
+            gauge: gauge.unwrap_or_else(|| "1mm".to_owned()),
             found_by: quoted(found_by),
             exit: exit.trim().parse().ok(),
             says: quoted(says),
@@ -64,23 +71,49 @@ fn rows() -> Vec<Row> {
 
 /// A robot whose jaw is closed, with that quirk and those keys of a profile.
 fn robot(quirk: &str, profile: &str) -> Workspace {
-    let quirk = quirk.replace(", ", "\n");
-    Workspace::new(&format!(
-        "duration_s = 0.2\n[drives]\nmemory = 'drives.json'\n[[drives.quirk]]\n{quirk}\n[dynamics]\ninitial_leg_m = 0.2974\n\
+    Workspace::new(&scenario(&table(quirk), profile))
+}
+
+/// The table of a quirk, or that of a fault which has its head.
+fn table(quirk: &str) -> String {
+    // An array goes on.
+    let keys = quirk.replace(", ", "\n").replace("\"\n\"", "\", \"");
+    if keys.starts_with("[[faults]]") {
+        keys.replacen(' ', "\n", 1)
+    } else {
+        format!("[[drives.quirk]]\n{keys}")
+    }
+}
+
+/// The scenario of a robot whose jaw is closed, with these tables and those keys of a profile.
+pub(crate) fn scenario(tables: &str, profile: &str) -> String {
+    format!(
+        "duration_s = 0.2\n[drives]\nmemory = 'drives.json'\n{tables}\n[dynamics]\ninitial_leg_m = 0.2974\n\
          [[drive_profile]]\n{profile}\n"
-    ))
+    )
+}
+
+impl Row {
+    pub(crate) fn robot(&self) -> Workspace {
+        robot(&self.quirk, &self.shown_with)
+    }
+
+    /// Every step in its order: its name, and its arguments.
+    pub(crate) fn steps(&self) -> Vec<(&'static str, Vec<&str>)> {
+        steps(&self.gauge)
+    }
 }
 
 /// Every step in its order: its name, and its arguments.
-fn steps() -> Vec<(&'static str, Vec<&'static str>)> {
-    let jog = |axis| ("jog", vec!["--axis", axis, "--by", "1mm", "--measured", "1mm"]);
+pub(crate) fn steps(gauge: &str) -> Vec<(&'static str, Vec<&str>)> {
+    let jog = |axis| ("jog", vec!["--axis", axis, "--by", "1mm", "--measured", gauge]);
     let before = [("inspect", vec![]), ("configure", vec!["--store"])];
     let after = ["watchdog", "home", "check-pose"].map(|step| (step, vec![]));
     before.into_iter().chain(AXES.map(jog)).chain(after).collect()
 }
 
 /// Plays one step; returns its exit code and what it says.
-fn play(robot: &Workspace, step: &str, arguments: &[&str]) -> (i32, String) {
+pub(crate) fn play(robot: &Workspace, step: &str, arguments: &[&str]) -> (i32, String) {
     let mut command = Command::new(MASSETER);
     command.args(["robot", step]).arg(robot.file("scenario.toml")).args(arguments);
     let output = command.arg("--folder").arg(robot.file("bringup")).output().expect("masseter starts");
@@ -90,8 +123,8 @@ fn play(robot: &Workspace, step: &str, arguments: &[&str]) -> (i32, String) {
 /// The steps up to the one that finds the quirk.
 fn assert_found(row: &Row) {
     let Some(found_by) = &row.found_by else { return };
-    let robot = robot(&row.quirk, &row.shown_with);
-    for (step, arguments) in steps() {
+    let robot = row.robot();
+    for (step, arguments) in row.steps() {
         let (exit, text) = play(&robot, step, &arguments);
         if step == found_by {
             let says = row.says.as_deref().unwrap();
@@ -107,7 +140,7 @@ fn assert_found(row: &Row) {
 fn assert_passes(row: &Row) {
     let Some(profile) = &row.profile else { return };
     let robot = robot(&row.quirk, profile);
-    for (step, arguments) in steps() {
+    for (step, arguments) in row.steps() {
         let (exit, text) = play(&robot, step, &arguments);
         assert_eq!(exit, 0, "{row:?}: {step}: {text}");
     }
@@ -119,7 +152,7 @@ fn assert_passes(row: &Row) {
 }
 
 /// `run --dry` and `run`: exit codes and what they say.
-fn play_runs(robot: &Workspace) -> [(Option<i32>, String); 2] {
+pub(crate) fn play_runs(robot: &Workspace) -> [(Option<i32>, String); 2] {
     [&["--dry"][..], &[]].map(|arguments| {
         let output = robot.run_virtual(arguments);
         fs::remove_dir_all(robot.run_folder()).expect("a run leaves a folder");
@@ -129,8 +162,8 @@ fn play_runs(robot: &Workspace) -> [(Option<i32>, String); 2] {
 
 /// A run does not need the steps on simulated buses. The drives are as `configure --store` leaves them.
 fn assert_runs(row: &Row) {
-    let robot = robot(&row.quirk, &row.shown_with);
-    for (step, arguments) in &steps()[..2] {
+    let robot = row.robot();
+    for (step, arguments) in &row.steps()[..2] {
         play(&robot, step, arguments);
     }
     for ((exit, text), (wanted, says)) in play_runs(&robot).into_iter().zip(&row.runs) {
@@ -139,7 +172,7 @@ fn assert_runs(row: &Row) {
     }
     if let Some(profile) = &row.profile {
         let robot = self::robot(&row.quirk, profile);
-        for (step, arguments) in &steps()[..2] {
+        for (step, arguments) in &row.steps()[..2] {
             assert_eq!(play(&robot, step, arguments).0, 0);
         }
         for (exit, text) in play_runs(&robot) {

@@ -16,7 +16,8 @@ use serde_json::json;
 
 use super::args::{RobotArgs, parse_length};
 use super::power_mark::{Marks, check_mark, mark_of_home};
-use super::{robot_line::failed, session::Session, step::Step};
+use super::session::{NO_RESULTS, Session};
+use super::{robot_line::failed, step::Step};
 
 /// How long the axes must stand, ns, and how far they may move meanwhile, m.
 const STAND_NS: u64 = 200 * MILLISECOND_NS;
@@ -78,9 +79,9 @@ pub(crate) fn check_pose(args: &CheckPoseArgs) -> Result<Exit, Failure> {
         // No drive has power by this step: there is nothing to stop.
         Err(error @ MotionError::Line(_)) => {
             let error = session.check_undisturbed().err().map_or_else(|| error.into(), anyhow::Error::new);
-            return Err(session.fail(Exit::Failed, error));
+            return Err(session.fail(Exit::Failed, error, NO_RESULTS));
         }
-        Err(error) => return Err(session.fail_motion(error)),
+        Err(error) => return Err(session.fail_motion(error, NO_RESULTS)),
     };
     match find_pose(&mut session, marks, &stand) {
         Ok(found) => {

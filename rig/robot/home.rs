@@ -32,7 +32,7 @@ pub(crate) fn home(args: &AxesArgs) -> Result<Exit, Failure> {
     for &axis in &axes {
         let report = match find(&mut session.line, &session.scenario, axis, &mut operator) {
             Ok(report) => report,
-            Err(error) => return Err(session.fail_motion(error)),
+            Err(error) => return Err(session.fail_motion(error, &results)),
         };
         print(axis, &report).incomplete()?;
         results.push(AxisResult { homed: Homed { axis: AXIS_NAMES[axis].to_owned(), mark: None }, report });

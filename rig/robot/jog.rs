@@ -13,7 +13,8 @@ use masseter_terminal::{Exit, Failure, OrFailure, result_line, status};
 use serde::Serialize;
 
 use super::args::{RobotArgs, parse_axis, parse_length, parse_speed};
-use super::{robot_line::failed, session::Session, step::Step};
+use super::session::{NO_RESULTS, Session};
+use super::{robot_line::failed, step::Step};
 use crate::cli::arguments::parse_duration;
 
 /// For how long a byte permits motion: longer than the time between two repeats of a key, ns.
@@ -85,10 +86,10 @@ pub(crate) fn jog(args: &JogArgs) -> Result<Exit, Failure> {
     };
     let report = match play(&mut session.line, &session.scenario, &order, &mut operator) {
         Ok(report) => report,
-        Err(error) => return Err(session.fail_motion(error)),
+        Err(error) => return Err(session.fail_motion(error, NO_RESULTS)),
     };
     if let Err(disturbance) = session.check_present() {
-        return Err(session.fail(Exit::Failed, disturbance));
+        return Err(session.fail(Exit::Failed, disturbance, NO_RESULTS));
     }
     let factor = args.measured.map(|measured_m| measured_m / report.moved_m());
     let is_silent = report.sync_answers.unanswered > 0;
@@ -128,6 +129,12 @@ fn no_answer(axis: usize, SyncAnswers { sent, unanswered, .. }: SyncAnswers) -> 
 
 fn wrong_scale(axis: usize, factor: f64) -> anyhow::Error {
     let name = AXIS_NAMES[axis];
+    if factor.abs() <= DEVIATION {
+        return anyhow!(
+            "{name}: the gauge shows no motion, and 6064h does; did another axis move? compare can.node_ids with the \
+             drives, and check the coupling of {name}"
+        );
+    }
     if factor < 0.0 {
         return anyhow!("{name}: the axis moved the other way; change drive_profile.reversed for {name}");
     }

@@ -23,6 +23,9 @@ use super::step::Step;
 /// All axes.
 const ALL: [usize; AXES] = [0, 1, 2, 3, 4, 5];
 
+/// No results of axes before the failure.
+pub(super) const NO_RESULTS: &[()] = &[];
+
 /// A step under way.
 pub(super) struct Session {
     pub(super) scenario: Scenario,
@@ -100,15 +103,24 @@ impl Session {
         self.folder.finish_step(passed, result).incomplete()
     }
 
-    /// Writes that the step failed, and why.
-    pub(super) fn fail(self, exit: Exit, error: impl Into<anyhow::Error>) -> Failure {
+    /// Writes that the step failed, why, and the results of the axes before, if any.
+    pub(super) fn fail(
+        self,
+        exit: Exit,
+        error: impl Into<anyhow::Error>,
+        before: &[impl Serialize],
+    ) -> Failure {
         let error = error.into();
-        let written = self.finish_session(false, &json!({ "error": error.to_string() }));
+        let mut result = json!({ "error": error.to_string() });
+        if !before.is_empty() {
+            result["before"] = json!(before);
+        }
+        let written = self.finish_session(false, &result);
         written.err().unwrap_or_else(|| Failure::with(exit, error))
     }
 
     /// The same of a motion.
-    pub(super) fn fail_motion(self, error: MotionError) -> Failure {
+    pub(super) fn fail_motion(self, error: MotionError, before: &[impl Serialize]) -> Failure {
         let exit = match &error {
             // No motion begins before its values are in the drive.
             MotionError::Line(LineError::NotKept { .. }) => Exit::Failed,
@@ -120,6 +132,6 @@ impl Session {
                 _ => Exit::Failed,
             },
         };
-        self.fail(exit, error)
+        self.fail(exit, error, before)
     }
 }

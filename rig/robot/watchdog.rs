@@ -1,7 +1,7 @@
 //! `masseter robot watchdog`: one axis after the other stands with power, and must stop once the master sends nothing.
 
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::commissioning::{Reaction, WatchdogReport, Wish, prove_watchdogs};
+use masseter_plant::commissioning::{LastFrame, Reaction, WatchdogReport, Wish, prove_watchdogs};
 use masseter_terminal::{Exit, Failure, OrFailure, result_line};
 use serde::Serialize;
 
@@ -27,13 +27,13 @@ pub(crate) fn watchdog(args: &AxesArgs) -> Result<Exit, Failure> {
     for &axis in &axes {
         let report = match prove_watchdogs(&mut session.line, &session.scenario, axis, &mut operator) {
             Ok(report) => report,
-            Err(error) => return Err(session.fail_motion(error)),
+            Err(error) => return Err(session.fail_motion(error, &results)),
         };
         print(axis, &report).incomplete()?;
         results.push(AxisResult { axis: AXIS_NAMES[axis], report });
     }
     if let Err(disturbance) = session.check_present() {
-        return Err(session.fail(Exit::Failed, disturbance));
+        return Err(session.fail(Exit::Failed, disturbance, &results));
     }
     session.finish_session(true, &results)?;
     Ok(Exit::Passed)
@@ -41,9 +41,13 @@ pub(crate) fn watchdog(args: &AxesArgs) -> Result<Exit, Failure> {
 
 fn print(axis: usize, report: &WatchdogReport) -> anyhow::Result<()> {
     let in_words = |silence: &str, reaction: &Reaction| {
-        let Reaction { timeout_ms, stopped_after_ms, emergency, moved_m } = reaction;
+        let Reaction { timeout_ms, stopped_after_ms, last_frame, emergency, moved_m } = reaction;
+        let since = match last_frame {
+            LastFrame::Left => "",
+            LastFrame::Queued => " since its last frame was queued",
+        };
         format!(
-            "without {silence} off after {stopped_after_ms:.0} ms of {timeout_ms} ms, emergency {emergency:04X}h, moved {:.4} mm",
+            "without {silence} off after {stopped_after_ms:.0} ms of {timeout_ms} ms{since}, emergency {emergency:04X}h, moved {:.4} mm",
             moved_m * 1e3
         )
     };

@@ -1,6 +1,8 @@
 //! Shared by the whole-rig tests: the executable under test, its run folders, and how a run is judged.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
+pub(crate) mod bus_log;
+
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};

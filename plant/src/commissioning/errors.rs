@@ -311,6 +311,16 @@ impl Display for Silence {
     }
 }
 
+/// What to do about a drive that stays in a state without operation.
+fn advice(state: DriveState, error_code: u16) -> &'static str {
+    match (state, error_code >> 8) {
+        (DriveState::Fault, 0x81 | 0x82) => {
+            "the drive has lost its master; switch its supply off and on, and configure 6007h so that this is no fault"
+        }
+        _ => "check safe torque off, supply and faults",
+    }
+}
+
 /// Why one axis does not begin a motion, or ends a motion early.
 #[derive(Debug, thiserror::Error)]
 pub enum AxisError {
@@ -321,7 +331,7 @@ pub enum AxisError {
     #[error("{0} already; end the program that controls it, and switch the drive off")]
     Powered(DriveState),
     /// The drive does not go to "operation enabled".
-    #[error("stays in {state} (error code {error_code:04X}h); check safe torque off, supply and faults")]
+    #[error("stays in {state} (error code {error_code:04X}h); {}", advice(*state, *error_code))]
     NotEnabled {
         /// The state of the drive.
         state: DriveState,
@@ -384,6 +394,12 @@ pub enum AxisError {
         /// The way, m.
         moved_m: f64,
     },
+    /// The axis still moves when its brake should hold it.
+    #[error("still moves at {:.3} mm/s half a second after its power went; support the axis, and mend its brake", .speed_m_s * 1e3)]
+    Creeps {
+        /// The speed, m/s.
+        speed_m_s: f64,
+    },
     /// The drive does not react to a silence of the master.
     #[error(
         "kept its power for {waited_ms:.0} ms after the last {silence}, while {} is {timeout_ms} ms; nothing stops this drive \
@@ -438,6 +454,14 @@ pub enum AxisError {
     KeepsFault {
         /// 603Fh.
         error_code: u16,
+    },
+    /// The proof of a watchdog failed, and a fault of its silence stays.
+    #[error("{cause}; {left}")]
+    Unrecovered {
+        /// Why the proof failed.
+        cause: Box<AxisError>,
+        /// What stays.
+        left: Box<MotionError>,
     },
     /// The drive stops without an emergency message.
     #[error("stopped without {silence}, and sent no emergency message; check 1014h")]

@@ -16,7 +16,7 @@ use masseter_runtime::clock::MILLISECOND_NS;
 use masseter_scenario::{MASTER_NODE, ObjectKey, Scenario};
 use serde::{Deserialize, Serialize};
 
-use super::errors::{LineError, MasterSign, Restarted, SdoReason};
+use super::errors::{LineError, MasterSign, Restarted, SdoReason, Silence};
 use super::traffic::{Heard, Strangers, Traffic};
 use crate::error::PlantError;
 use crate::master::link::Address;
@@ -94,7 +94,7 @@ impl Line {
         self.traffic.beat_every(interval_ms);
     }
 
-    /// Sends no further heartbeat; returns when the last one was sent, ns.
+    /// Sends no further heartbeat; returns when the last one was queued, ns.
     pub(super) fn end_heartbeat(&mut self) -> u64 {
         self.traffic.end_heartbeat()
     }
@@ -104,10 +104,19 @@ impl Line {
         self.traffic.send(self.traffic.addresses[axis].bus, sync::frame())
     }
 
-    /// Sends process data to the drive of an axis; returns when, ns.
+    /// Queues process data for the drive of an axis; returns when, ns.
     pub(super) fn send_process_data(&mut self, axis: usize, rpdo: Frame) -> Result<u64, LineError> {
         self.traffic.send(self.traffic.addresses[axis].bus, rpdo)?;
         Ok(self.now_ns())
+    }
+
+    /// When the master's last frame of that kind left for the drive of an axis, ns; none on a bus that does not show it.
+    pub(super) fn left_ns(&self, axis: usize, kind: Silence) -> Option<u64> {
+        let Heard { beat_left_ns, rpdo_left_ns, .. } = self.traffic.heard[axis];
+        match kind {
+            Silence::Heartbeat => beat_left_ns,
+            Silence::ProcessData => rpdo_left_ns,
+        }
     }
 
     /// Listens for that long.

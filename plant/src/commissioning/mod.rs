@@ -37,5 +37,5 @@ pub use settings::{Difference, Settings, Survey};
 pub use steps::{PowerError, Stand, StoreError, SyncAnswers, prove_no_power, reset, stand, store, take_over};
 pub use traffic::{Heard, Strangers};
 pub use watch::Sample;
-pub use watchdog::{Reaction, WatchdogReport, prove_watchdogs};
+pub use watchdog::{LastFrame, Reaction, WatchdogReport, prove_watchdogs};
 pub use write::{Change, WriteError, Writer, give_back};

@@ -78,7 +78,7 @@ impl Traffic {
             Some(Beat { every_ns: u64::from(interval_ms) * MILLISECOND_NS, next_ns: self.wires.now_ns() });
     }
 
-    /// Sends no further heartbeat; returns when the last one was sent, ns.
+    /// Sends no further heartbeat; returns when the last one was queued, ns.
     pub(super) fn end_heartbeat(&mut self) -> u64 {
         let now_ns = self.wires.now_ns();
         self.beat.take().map_or(now_ns, |beat| beat.next_ns.saturating_sub(beat.every_ns))
@@ -109,10 +109,20 @@ impl Traffic {
         Ok(())
     }
 
-    /// Notes the times of SYNC and of process data.
+    /// Notes the times of SYNC, of process data and of the master's heartbeat.
     fn note_time(&mut self, bus: usize, tapped: &TappedFrame) {
         match Cob::try_from(tapped.frame.id()) {
             Ok(Cob::Sync) => self.sync_ns = Some(tapped.time_ns),
+            Ok(Cob::Heartbeat(MASTER_NODE)) => {
+                let on_bus = self.addresses.iter().zip(&mut self.heard).filter(|(at, _)| at.bus == bus);
+                on_bus.for_each(|(_, heard)| heard.beat_left_ns = Some(tapped.time_ns));
+            }
+            Ok(Cob::Rpdo1(node)) => {
+                let axis = self.addresses.iter().position(|at| *at == Address { bus, node });
+                if let Some(axis) = axis {
+                    self.heard[axis].rpdo_left_ns = Some(tapped.time_ns);
+                }
+            }
             Ok(Cob::Tpdo1(node)) => {
                 let bits = frame_bits(&tapped.frame) - INTERFRAME_BITS;
                 let begin_ns = tapped.time_ns.saturating_sub(self.bitrate.bits_to_ns(bits));
@@ -154,6 +164,9 @@ pub struct Heard {
     pub emergencies: Vec<Emergency>,
     /// Start of its last process data, ns.
     pub(super) process_data_ns: Option<u64>,
+    /// Ends of the master's last heartbeat on its bus, and of the last process data for it, ns.
+    pub(super) beat_left_ns: Option<u64>,
+    pub(super) rpdo_left_ns: Option<u64>,
     /// Answers of its SDO server since the last transfer.
     pub(super) answers: Vec<SdoResponse>,
 }

@@ -224,10 +224,14 @@ impl Watch {
 
 /// Longest time of a drive from one state to the next, ns.
 pub(super) const TRANSITION_NS: u64 = SECOND_NS;
-/// Time of the watch over an axis after the loss of its power, ns.
-pub(super) const SETTLING_NS: u64 = SECOND_NS;
+/// Time of the watch over an axis after the loss of its power, and of its last part, in which a brake holds the axis, ns.
+const SETTLING_NS: u64 = SECOND_NS;
+const HELD_NS: u64 = SECOND_NS / 2;
+/// Largest way within that last part, m and increments: more is no noise of an encoder.
+const MOST_CREEP_M: f64 = 1e-5;
+const MOST_CREEP_INCREMENTS: f64 = 3.0;
 /// Largest way of an axis while its brake closes, m: some turns of play, not a fall.
-pub(super) const MOST_DROP_M: f64 = 5e-4;
+const MOST_DROP_M: f64 = 5e-4;
 /// Longest time of the attempts at a stop, and the time between two commands, ns.
 const STOP_NS: u64 = SECOND_NS;
 const REPEAT_NS: u64 = 200 * MILLISECOND_NS;
@@ -256,7 +260,7 @@ pub(super) fn switch_on_drive(line: &mut Line, axis: usize, watch: &Watch) -> Re
 /// how far the axis moved until a second later, m.
 ///
 /// # Errors
-/// [`AxisError::Dropped`] for an axis that nothing holds without power.
+/// [`AxisError::Dropped`] and [`AxisError::Creeps`] for an axis that nothing holds without power.
 pub(super) fn switch_off_drive(
     line: &mut Line,
     axis: usize,
@@ -267,9 +271,33 @@ pub(super) fn switch_off_drive(
     line.control(axis, Controlword::SWITCH_ON)?;
     line.listen(seconds(brake.close_s))?;
     disable_voltage(line, axis)?;
-    line.listen(SETTLING_NS)?;
-    let moved_m = read_position(line, axis, scale)? - before_m;
-    if moved_m.abs() > MOST_DROP_M { Err(AxisError::Dropped { moved_m }.of(axis)) } else { Ok(moved_m) }
+    watch_unpowered(line, axis, scale, before_m)
+}
+
+/// Watches an axis for a second after the loss of its power. Returns its way from a position, m.
+///
+/// # Errors
+/// [`AxisError::Dropped`] and [`AxisError::Creeps`] for an axis that nothing holds.
+pub(super) fn watch_unpowered(
+    line: &mut Line,
+    axis: usize,
+    scale: &AxisScale,
+    before_m: f64,
+) -> Result<f64, MotionError> {
+    line.listen(SETTLING_NS - HELD_NS)?;
+    let held_m = read_position(line, axis, scale)?;
+    line.listen(HELD_NS)?;
+    let now_m = read_position(line, axis, scale)?;
+    let (moved_m, crept_m) = (now_m - before_m, now_m - held_m);
+    let most_m = MOST_CREEP_M.max(MOST_CREEP_INCREMENTS * scale.increment_m.abs());
+    if moved_m.abs() > MOST_DROP_M {
+        return Err(AxisError::Dropped { moved_m }.of(axis));
+    }
+    if crept_m.abs() > most_m {
+        let speed_m_s = crept_m * SECOND_NS as f64 / HELD_NS as f64;
+        return Err(AxisError::Creeps { speed_m_s }.of(axis));
+    }
+    Ok(moved_m)
 }
 
 /// Stops an axis in every state: quick stop, then voltage off. Neither word can enable a drive in any state. Lost

@@ -1,7 +1,8 @@
 //! Watchdogs of a drive: an axis stands with power, the master's frames end, and the drive must stop by itself and report that.
 //!
 //! The heartbeat ends first. Then the process data end, while heartbeat and SYNC go on. Statuswords come by SDO, milliseconds apart, so
-//! the times are no finer than that. The step does not prove how fast a moving axis comes to rest.
+//! the times are no finer than that. They count from the moment when the last frame left, as the bus shows it. The step does not prove how
+//! fast a moving axis comes to rest.
 
 use masseter_can::canopen::{
     AbortCode, Emergency, EmergencyCode, NmtCommand, NmtState, NodeId, ObjectAddress,
@@ -18,7 +19,7 @@ use super::line::Line;
 use super::mover::{Caution, Mover, Operator, POSITIONING, Wish};
 use super::steps::START_NS;
 use super::watch::{
-    MOST_DROP_M, SETTLING_NS, TRANSITION_NS, disable_voltage, read_error_code, read_state, wait_for_state,
+    TRANSITION_NS, disable_voltage, read_error_code, read_state, stop_drive, wait_for_state, watch_unpowered,
 };
 use super::write::Loan;
 use crate::master::wanted::{WantedDrive, rpdo_timeout_ms};
@@ -31,11 +32,21 @@ const EARLIEST: f64 = 0.8;
 const LATE_NS: u64 = SECOND_NS;
 /// How long a drive may take from leaving operation to being without power, ns.
 const POWER_OFF_NS: u64 = 2 * SECOND_NS;
-/// For how long process data are sent, and how often, before they end, ns.
+/// For how long process data are sent before they end, and how often at most: a slow bus has the cycle of its run, ns.
 const SENT_NS: u64 = 200 * MILLISECOND_NS;
 const SENT_EVERY_NS: u64 = 2 * MILLISECOND_NS;
 /// Objects that decide what the drive does without a master. The proof uses the values of the run.
 const REACTIONS: [u16; 3] = [0x6007, 0x605A, 0x605E];
+
+/// From when a silence counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LastFrame {
+    /// The end of the master's last frame on the bus.
+    Left,
+    /// The moment when that frame was queued, on an interface that does not show it.
+    Queued,
+}
 
 /// How a drive reacted to a silence.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -44,6 +55,8 @@ pub struct Reaction {
     pub timeout_ms: u16,
     /// From the last frame of the master until a statusword without "operation enabled", ms.
     pub stopped_after_ms: f64,
+    /// What the time counts from.
+    pub last_frame: LastFrame,
     /// Error code of the drive's emergency message.
     pub emergency: u16,
     /// How far the axis moved until a second after its power went, m.
@@ -151,40 +164,58 @@ impl<'a> Proof<'a> {
         let before = mover.line.heard(axis).emergencies.len();
         // A run is in operational, too.
         mover.line.command(axis, NmtCommand::Start)?;
-        let last_ns = match silence {
+        let queued_ns = match silence {
             Silence::Heartbeat => {
                 mover.line.listen(START_NS)?;
                 mover.line.end_heartbeat()
             }
             Silence::ProcessData => self.send_process_data(mover)?,
         };
-        let timeout_ns = u64::from(timeout_ms) * MILLISECOND_NS;
-        let limit_ns = last_ns + timeout_ns + MARGIN_NS;
-        let stopped_ns = self.wait_for_stop(mover, from_m, last_ns, limit_ns + LATE_NS)?;
+        let limit_ns = u64::from(timeout_ms) * MILLISECOND_NS + MARGIN_NS;
+        let stopped_ns = self.wait_for_stop(mover, from_m, queued_ns + limit_ns + LATE_NS)?;
+        let left_ns = mover.line.left_ns(axis, silence).filter(|&left_ns| left_ns >= queued_ns);
+        let (last_ns, last_frame) =
+            left_ns.map_or((queued_ns, LastFrame::Queued), |left_ns| (left_ns, LastFrame::Left));
+        let since_ms = |now_ns: u64| now_ns.saturating_sub(last_ns) as f64 / MILLISECOND_NS as f64;
+        let Some(stopped_ns) = stopped_ns else {
+            let waited_ms = since_ms(mover.line.now_ns());
+            return self.take_power(mover, AxisError::Unwatched { silence, waited_ms, timeout_ms });
+        };
         // The drive takes the power away by itself.
         let state = wait_for_state(mover.line, axis, POWER_OFF_NS, |state| !state.is_powered())?;
         if state.is_powered() {
-            return Err(AxisError::KeepsPower { silence, state }.of(axis));
+            return self.take_power(mover, AxisError::KeepsPower { silence, state });
         }
-        mover.line.listen(SETTLING_NS)?;
-        let moved_m = mover.position_m()? - from_m;
+        let scale = mover.scale();
+        let held = match watch_unpowered(mover.line, axis, &scale, from_m) {
+            Err(error @ MotionError::Line(_)) => return Err(error),
+            held => held,
+        };
         let emergencies = &mover.line.heard(axis).emergencies[before..];
         let emergency = emergencies.iter().map(|emergency| emergency.code).find(|code| self.explains(*code));
         let is_silent = emergencies.iter().all(Emergency::is_reset);
         let recovered = self.recover(mover);
-        let stopped_after_ms = (stopped_ns - last_ns) as f64 / MILLISECOND_NS as f64;
+        let stopped_after_ms = since_ms(stopped_ns);
         let is_early = stopped_after_ms < EARLIEST * f64::from(timeout_ms);
-        // What went wrong first is the cause of what does not recover.
-        Err(match emergency {
-            _ if moved_m.abs() > MOST_DROP_M => AxisError::Dropped { moved_m },
-            _ if stopped_ns > limit_ns => AxisError::LateWatchdog { silence, stopped_after_ms, timeout_ms },
-            None if is_silent && !is_early => AxisError::Unreported { silence },
-            Some(EmergencyCode(emergency)) if !is_early => {
-                return recovered.map(|()| Reaction { timeout_ms, stopped_after_ms, emergency, moved_m });
+        let wrong = match (held, emergency) {
+            (Err(unheld), _) => unheld,
+            _ if stopped_ns.saturating_sub(last_ns) > limit_ns => {
+                AxisError::LateWatchdog { silence, stopped_after_ms, timeout_ms }.of(axis)
             }
-            _ => AxisError::OtherStop { silence, stopped_after_ms, timeout_ms },
-        }
-        .of(axis))
+            (Ok(_), None) if is_silent && !is_early => AxisError::Unreported { silence }.of(axis),
+            (Ok(moved_m), Some(EmergencyCode(emergency))) if !is_early => {
+                let reaction = Reaction { timeout_ms, stopped_after_ms, last_frame, emergency, moved_m };
+                return recovered.map(|()| reaction);
+            }
+            _ => AxisError::OtherStop { silence, stopped_after_ms, timeout_ms }.of(axis),
+        };
+        Err(with_faults(wrong, recovered))
+    }
+
+    /// Takes the power from a drive that keeps it, and then ends the faults of the silence. The proof has failed for that reason.
+    fn take_power<T>(&self, mover: &mut Mover<'_>, reason: AxisError) -> Result<T, MotionError> {
+        stop_drive(mover.line, mover.axis, &mover.profile().brake)?;
+        Err(with_faults(reason.of(mover.axis), self.recover(mover)))
     }
 
     /// Whether an error code is one of the communication (81xxh, 82xxh), and not that of the other watchdog.
@@ -193,7 +224,7 @@ impl<'a> Proof<'a> {
         matches!(code >> 8, 0x81 | 0x82) && !is_of_other
     }
 
-    /// Sends process data that hold the axis, for a while; returns when the last ones were sent, ns.
+    /// Sends process data that hold the axis, for a while; returns when the last ones were queued, ns.
     fn send_process_data(&self, mover: &mut Mover<'_>) -> Result<u64, MotionError> {
         let target_increments = mover.scale().increments(mover.position_m()?);
         let controlword = Controlword::ENABLE_OPERATION;
@@ -202,22 +233,21 @@ impl<'a> Proof<'a> {
         let until_ns = mover.line.now_ns() + SENT_NS;
         loop {
             mover.line.send_sync(mover.axis)?;
-            let sent_ns = mover.line.send_process_data(mover.axis, frame)?;
-            if sent_ns >= until_ns {
-                return Ok(sent_ns);
+            let queued_ns = mover.line.send_process_data(mover.axis, frame)?;
+            if queued_ns >= until_ns {
+                return Ok(queued_ns);
             }
-            mover.line.listen(SENT_EVERY_NS)?;
+            mover.line.listen(SENT_EVERY_NS.max(self.scenario.period_ns()))?;
         }
     }
 
-    /// Watches the axis until the drive leaves operation; returns when that was seen, ns.
+    /// Watches the axis until the drive leaves operation; returns when that was seen, ns, and none if it never was.
     fn wait_for_stop(
         &self,
         mover: &mut Mover<'_>,
         from_m: f64,
-        last_ns: u64,
         until_ns: u64,
-    ) -> Result<u64, MotionError> {
+    ) -> Result<Option<u64>, MotionError> {
         let axis = mover.axis;
         loop {
             if self.silence == Silence::ProcessData {
@@ -236,7 +266,7 @@ impl<'a> Proof<'a> {
             };
             let now_ns = mover.line.now_ns();
             if state != DriveState::OperationEnabled {
-                return Ok(now_ns);
+                return Ok(Some(now_ns));
             }
             let moved_m = (mover.position_m()? - from_m).abs();
             if moved_m > mover.caution.still_m {
@@ -250,9 +280,7 @@ impl<'a> Proof<'a> {
                 return mover.stopped(StopCause::Requested);
             }
             if now_ns >= until_ns {
-                let waited_ms = (now_ns - last_ns) as f64 / MILLISECOND_NS as f64;
-                let &Self { silence, timeout_ms, .. } = self;
-                return Err(AxisError::Unwatched { silence, waited_ms, timeout_ms }.of(axis));
+                return Ok(None);
             }
         }
     }
@@ -278,6 +306,16 @@ impl<'a> Proof<'a> {
             }
         }
         Ok(())
+    }
+}
+
+/// What went wrong first, with the fault that it has left.
+fn with_faults(cause: MotionError, recovered: Result<(), MotionError>) -> MotionError {
+    match (cause, recovered) {
+        (MotionError::OfAxis { axis, reason }, Err(left)) => {
+            AxisError::Unrecovered { cause: Box::new(reason), left: Box::new(left) }.of(axis)
+        }
+        (cause, _) => cause,
     }
 }
 

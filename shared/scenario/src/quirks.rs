@@ -19,6 +19,8 @@ pub const INCREMENTS_PER_TURN: u32 = 10_000;
 const ENCODERS_APART_M: f64 = 1e-4;
 /// The least valid distance of two encoders for a fault, m.
 const LEAST_APART_M: f64 = 1e-5;
+/// The fastest valid slip of a brake, m/s.
+const FASTEST_M_S: f64 = 0.01;
 /// The slowest valid save, and the slowest brake, s.
 const SLOWEST_S: f64 = 60.0;
 
@@ -96,6 +98,10 @@ quirk_kinds! {
     LateWatchdog "late_watchdog" [for_s];
     /// A lost master takes the current away at once, and the brake stays open: the axis coasts, and a leg falls.
     CoastsWithoutMaster "coasts_without_master" [];
+    /// The brake slips: without power the axis creeps towards larger positions at `speed_m_s`.
+    Creeps "creeps" [speed_m_s];
+    /// The drives of two `axes` have each other's node id.
+    SwappedIds "swapped_ids" [];
     /// SDO shows `value` in each of `objects`; writes are acknowledged, and change nothing.
     Shows "shows" [objects value];
     /// The drive has none of `objects`.
@@ -125,6 +131,8 @@ keys! {
         pub open_s: Option<f64> => Within(0.0, SLOWEST_S) "this or `close_s` is required",
         /// From the loss of current until the brake is closed; by default 0.
         pub close_s: Option<f64> => Within(0.0, SLOWEST_S),
+        /// Speed of an axis without power.
+        pub speed_m_s: Option<f64> => Within(0.0, FASTEST_M_S),
         /// Increments of a turn of the motor (608Fh, 6092h); by default 10000.
         pub increments_per_turn: Option<u32> => "above 0",
         /// Largest distance of the two encoders of an axis; by default 0.0001.
@@ -183,6 +191,9 @@ impl QuirkConfig {
         let need_of = |_: &str| format!("give it: {}", kind.about());
         require_keys(kind.name(), kind.keys(), keys, [self, &Self::new(kind)], need_of)
             .map_err(|refusal| refusal.in_table("drives.quirk"))?;
+        let is_pair = matches!(self.axes.as_deref(), Some([one, other]) if one != other);
+        let need = "name the two axes whose drives have each other's node id";
+        require(kind != QuirkKindConfig::SwappedIds || is_pair, "drives.quirk.axes", &"no pair", need)?;
         let is_brake_timed = self.open_s.is_some() || self.close_s.is_some();
         let need = "give open_s, close_s or both";
         require(kind != QuirkKindConfig::SlowBrake || is_brake_timed, "drives.quirk.open_s", &"none", need)
@@ -209,9 +220,11 @@ mod tests {
                 "objects" => "objects = ['60C2h:01']\n".to_owned(),
                 "value" => "value = 1\n".to_owned(),
                 "limit_m" => "limit_m = 0.001\n".to_owned(),
+                "speed_m_s" => "speed_m_s = 5e-5\n".to_owned(),
                 time => format!("{time} = 0.5\n"),
             });
-            let text = format!("kind = '{kind}'\naxes = ['l2']\n{}", values.collect::<String>());
+            let axes = if *kind == QuirkKindConfig::SwappedIds { "'l2', 'l3'" } else { "'l2'" };
+            let text = format!("kind = '{kind}'\naxes = [{axes}]\n{}", values.collect::<String>());
             assert_eq!(refusal(&text), None, "{text}");
             assert!(kind.about().ends_with('.'), "{kind}");
         }
@@ -225,6 +238,8 @@ mod tests {
             ("kind = 'slow_save'\nfor_s = 61.0", "quirk.for_s = 61: use 0 to 60"),
             ("kind = 'slow_brake'", "quirk.open_s = none: give open_s, close_s or both"),
             ("kind = 'no_brake'\naxes = ['x']", "quirk.axes = 'x': name axes: d1"),
+            ("kind = 'swapped_ids'\naxes = ['l1']", "quirk.axes = no pair: name the two axes"),
+            ("kind = 'creeps'\nspeed_m_s = 0.02", "quirk.speed_m_s = 0.02: use 0 to 0.01"),
             ("kind = 'no_brake'\naxes = []", "quirk.axes = []: name at least one"),
             ("kind = 'fault_at_power_on'\ncode = 0", "quirk.code = 0: use an error code"),
             ("kind = 'acceleration_in_rpm_s'\nincrements_per_turn = 0", "use at least 1"),

@@ -156,3 +156,70 @@ fn faults_of_other_drives_by_the_silence_end_with_it() {
     }
     assert_eq!(bench.objects(), before, "every borrowed object has its old value");
 }
+
+/// The time of the last frame is its end on the bus. At 50 kbit/s that is no whole millisecond, while frames are queued and statuswords
+/// are seen at whole ones.
+#[test]
+fn a_silence_begins_when_the_last_frame_has_left() {
+    let (bench, report) = prove("rate_hz = 100\n[can]\nbitrate_bps = 50000");
+    let report = report.unwrap();
+    let log = bench.log.text();
+    let at_ms = |line: &str| line[1..].split(')').next().unwrap().parse::<f64>().unwrap() * 1e3;
+    let ends = |frame: &str| log.lines().filter(|line| line.contains(frame)).map(at_ms).collect::<Vec<_>>();
+    let from_whole_ms = |time_ms: f64| (time_ms - time_ms.round()).abs();
+    for (reaction, frame, emergency) in [
+        (report.heartbeat, "can1 77F#05", "can1 084#3081"),
+        (report.process_data.unwrap(), "can1 204#0F00", "can1 084#5082"),
+    ] {
+        assert_eq!(reaction.last_frame, LastFrame::Left);
+        let stopped_ms = ends(emergency)[0];
+        let last_ms = ends(frame).into_iter().rfind(|&end_ms| end_ms < stopped_ms).unwrap();
+        let seen_ms = last_ms + reaction.stopped_after_ms;
+        assert!(from_whole_ms(last_ms) > 0.05 && from_whole_ms(seen_ms) < 0.01, "{reaction:?} {last_ms}");
+        assert!((stopped_ms - 5.0..stopped_ms + 50.0).contains(&seen_ms), "{reaction:?} {stopped_ms}");
+    }
+}
+
+/// 605Ah = 6 stays in the quick stop for ever. The other drives make a fault of the lost heartbeat.
+#[test]
+fn a_drive_that_keeps_its_power_is_switched_off_and_no_drive_stays_in_fault() {
+    let (mut bench, error) = prove_among_faults("");
+    let error = error.unwrap_err();
+    let MotionError::OfAxis { axis: L1, reason: AxisError::KeepsPower { .. } } = error else {
+        panic!("{error}")
+    };
+    let says = "l1: stays in quick_stop_active without heartbeat; check 605Ah and 605Eh: the drive must take the power away";
+    assert_eq!(error.to_string(), says);
+    let states = stand(&mut bench.line, &bench.scenario, 0).unwrap().states;
+    assert!(states.iter().all(|state| *state == DriveState::SwitchOnDisabled), "{states:?}");
+    let words = bench.log.controlwords();
+    let l1 = bench.scenario.can.node_ids[L1];
+    let reset = words.iter().position(|&(_, word)| word == Controlword::FAULT_RESET).unwrap();
+    let of_l1 = words[..reset].iter().filter(|(node, _)| *node == l1).map(|(_, word)| *word);
+    let last: Vec<_> = of_l1.skip_while(|word| *word != Controlword::QUICK_STOP).collect();
+    assert!(
+        last.contains(&Controlword::DISABLE_VOLTAGE),
+        "the power goes before a fault is reset: {words:?}"
+    );
+}
+
+#[test]
+fn an_ignored_heartbeat_leaves_no_fault_in_another_drive_either() {
+    let (mut bench, error) = prove_among_faults(&quirk("kind = 'ignores_heartbeat'"));
+    let error = error.unwrap_err();
+    assert!(matches!(error, MotionError::OfAxis { reason: AxisError::Unwatched { .. }, .. }), "{error}");
+    let states = stand(&mut bench.line, &bench.scenario, 0).unwrap().states;
+    assert!(states.iter().all(|state| *state == DriveState::SwitchOnDisabled), "{states:?}");
+}
+
+/// The proof of l1, which stays in its quick stop, beside drives that make a fault of a lost heartbeat.
+fn prove_among_faults(text: &str) -> (Bench, Result<WatchdogReport, MotionError>) {
+    let profile = "[[drive_profile]]\naxes = ['l1']\nobjects.605Ah = { value = 6 }\n";
+    let mut bench = Bench::new(&format!("{profile}{text}"));
+    for axis in (0..AXES).filter(|&axis| axis != L1) {
+        bench.line.write(axis, ObjectAddress::new(0x6007, 0), 1, 2).unwrap();
+    }
+    let report = prove_watchdogs(&mut bench.line, &bench.scenario, L1, &mut |_| Wish::Move);
+    bench.assert_off();
+    (bench, report)
+}

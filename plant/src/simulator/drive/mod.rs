@@ -115,6 +115,8 @@ pub(crate) struct AxisQuirks {
     pub(crate) encoders_apart_m: Option<f64>,
     /// Whether a lost master takes the current away, with an open brake.
     pub(crate) coasts_without_master: bool,
+    /// Speed of the axis while the brake is closed, m/s.
+    pub(crate) creep_m_s: f64,
     /// Time of safe torque off after power-on, ns.
     pub(crate) torque_off_ns: u64,
     /// Opening time of the brake, ns.

@@ -33,7 +33,13 @@ use crate::state::state;
 /// [`PlantError`] for quantities that contradict each other and for node ids that cannot be used.
 pub(crate) fn drive_settings(scenario: &Scenario) -> Result<[DriveSettings; AXES], PlantError> {
     check_quantities(scenario)?;
-    let ids = node_ids(&scenario.can)?;
+    let mut ids = node_ids(&scenario.can)?;
+    for quirk in scenario.drives.quirk.iter().filter(|quirk| quirk.kind == Kind::SwappedIds) {
+        let mut pair = (0..AXES).filter(|&axis| quirk.is_on(axis));
+        if let (Some(one), Some(other)) = (pair.next(), pair.next()) {
+            ids.swap(one, other);
+        }
+    }
     let all =
         (0..AXES).map(|axis| settings_of_axis(scenario, axis, ids[axis])).collect::<Result<Vec<_>, _>>()?;
     Ok(all.try_into().expect("a drive for every axis"))
@@ -52,6 +58,8 @@ fn settings_of_axis(scenario: &Scenario, axis: usize, node: NodeId) -> Result<Dr
     objects.set(names::VENDOR_ID, identity.vendor_id);
     objects.set(names::PRODUCT_CODE, identity.product_code);
     objects.set(names::REVISION, identity.revision);
+    // A drive keeps its serial number under another node id.
+    objects.set(names::SERIAL_NUMBER, scenario.can.node_ids[axis].into());
     objects.set(names::CONSUMER_HEARTBEAT_TIME, watched);
     objects.set(names::PRODUCER_HEARTBEAT_TIME_MS, scenario.can.heartbeat_producer_ms);
     let on_axis: Vec<_> = scenario.drives.quirk.iter().filter(|quirk| quirk.is_on(axis)).collect();
@@ -146,6 +154,9 @@ fn quirks(on_axis: &[&QuirkConfig], period_ns: u64, objects: &mut Objects) -> Re
                 axis.closing_ns = axis.closing_ns.and(Some(ns(quirk.close_s).unwrap_or(0)));
             }
             Kind::NoBrake => axis.closing_ns = None,
+            Kind::Creeps => axis.creep_m_s = quirk.speed_m_s.unwrap_or(0.0),
+            // The node ids are given out before.
+            Kind::SwappedIds => {}
             Kind::HomeOffsetSign => axis.is_offset_inverted = true,
             Kind::LimitsFromZero => axis.are_limits_from_zero = true,
             Kind::StoAtPowerOn => axis.torque_off_ns = ns(quirk.for_s).unwrap_or(u64::MAX),

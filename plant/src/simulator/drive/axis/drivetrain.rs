@@ -19,6 +19,8 @@ pub(super) struct Drivetrain {
     gear: Gear,
     motor: Motor,
     pub(super) brake: Brake,
+    /// How far the closed brake slips in a step, m.
+    slip_m: f64,
     /// The motor's share of the force: without current the brake holds.
     pub(super) motor_n: HeldMean,
 }
@@ -32,6 +34,7 @@ impl Drivetrain {
             gear: Gear::default(),
             motor: Motor::default(),
             brake: Brake::new(quirks.opening_ns, quirks.closing_ns),
+            slip_m: quirks.creep_m_s * step_s,
             motor_n: HeldMean::new(0),
         }
     }
@@ -62,6 +65,7 @@ impl Drivetrain {
         limits: &ServoLimits,
         faults: &mut DriveFaults,
     ) -> f64 {
+        self.servo.slip(self.slip_m);
         let force_n = self.servo.step(measured_m, error_m, command, limits);
         let is_braking = command == ServoCommand::Brake;
         let mut motor_n = if is_braking { 0.0 } else { force_n };

@@ -60,6 +60,11 @@ impl Servo {
         (self.brake_at_m, self.integral_n) = (None, 0.0);
     }
 
+    /// Lets the brake slip, if it is closed.
+    pub(super) fn slip(&mut self, way_m: f64) {
+        self.brake_at_m = self.brake_at_m.map(|at_m| at_m + way_m);
+    }
+
     /// One step of the loops with the encoder `error_m` beside the shaft: the force for the next `step_s`, N.
     pub(super) fn step(
         &mut self,

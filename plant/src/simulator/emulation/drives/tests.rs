@@ -291,10 +291,12 @@ fn every_kind_leaves_the_drive_readable() {
             "objects" => "objects = ['6065h']\n".to_owned(),
             "value" => "value = 7\n".to_owned(),
             "limit_m" => "limit_m = 0.001\n".to_owned(),
+            "speed_m_s" => "speed_m_s = 5e-5\n".to_owned(),
             time => format!("{time} = 0.5\n"),
         };
+        let axes = if *kind == QuirkKindConfig::SwappedIds { "axes = ['d1', 'd2']\n" } else { "" };
         let mut bench = bench(&format!(
-            "kind = '{kind}'\n{}",
+            "kind = '{kind}'\n{axes}{}",
             kind.keys().concat().iter().map(value).collect::<String>()
         ));
         bench.run_ms(100);
