@@ -93,11 +93,16 @@ impl Exchange {
     }
 }
 
+/// SYNCs in a row with unsent frames at which a bus is stuck.
+const STUCK_SYNCS: u32 = 2;
+
 /// Memory of a bus.
 #[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct BusMonitor {
     /// Whether the master's controller is in bus-off.
     pub(super) is_off: bool,
+    /// SYNCs in a row before which frames of earlier cycles were not sent yet.
+    unsent_syncs: u32,
     /// Whether any drive was ever received.
     pub(super) has_drives: bool,
     /// The axis whose SDO request was sent last.
@@ -111,6 +116,18 @@ impl BusMonitor {
     pub(super) fn set_error_state(&mut self, state: ErrorState) -> Option<bool> {
         let is_off = state == ErrorState::BusOff;
         (std::mem::replace(&mut self.is_off, is_off) != is_off).then_some(is_off)
+    }
+
+    /// Takes before a SYNC whether earlier frames are not sent yet; returns whether the bus gets stuck with it. Frames of a
+    /// late cycle may still wait at one SYNC. At the second one they are old: new frames behind them would go out in a burst.
+    pub(super) fn note_unsent(&mut self, has_unsent: bool) -> bool {
+        self.unsent_syncs = if has_unsent { self.unsent_syncs.saturating_add(1) } else { 0 };
+        self.unsent_syncs == STUCK_SYNCS
+    }
+
+    /// Whether the bus sends nothing, so that it gets no further frames.
+    pub(super) fn is_stuck(self) -> bool {
+        self.unsent_syncs >= STUCK_SYNCS
     }
 
     /// The axes in the order of their turns for SDO.
@@ -208,6 +225,19 @@ mod bus_monitor_tests {
         }
         let strangers = [1, 2, 127, 1, 127, 1, 3, 2].map(|id| bus.is_new_unknown(NodeId::new(id).unwrap()));
         assert_eq!(strangers, [true, true, true, false, false, false, true, false]);
+    }
+
+    #[test]
+    fn a_bus_is_stuck_at_the_second_sync_that_finds_old_frames_until_they_are_sent() {
+        let mut bus = BusMonitor::default();
+        let syncs =
+            [(true, false), (false, false), (true, false), (true, true), (true, true), (false, false)];
+        let mut begins = 0;
+        for (has_unsent, is_stuck) in syncs {
+            begins += u32::from(bus.note_unsent(has_unsent));
+            assert_eq!(bus.is_stuck(), is_stuck);
+        }
+        assert_eq!(begins, 1);
     }
 
     #[test]

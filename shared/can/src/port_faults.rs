@@ -231,6 +231,10 @@ impl<B: Bus> Bus for Faulty<'_, B> {
             status
         }
     }
+
+    fn has_unsent(&self) -> bool {
+        !self.faults.held.is_empty() || self.bus.has_unsent()
+    }
 }
 
 #[cfg(test)]

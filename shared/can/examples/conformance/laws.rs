@@ -280,6 +280,10 @@ mod tests {
         fn status(&self) -> BusStatus {
             BusStatus { state: ErrorState::Active, tec: 0, rec: 0 }
         }
+
+        fn has_unsent(&self) -> bool {
+            false
+        }
     }
 
     #[test]

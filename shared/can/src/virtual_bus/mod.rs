@@ -280,4 +280,8 @@ impl Bus for Port<'_> {
     fn status(&self) -> BusStatus {
         self.wire.nodes.stations[self.port].confinement.status()
     }
+
+    fn has_unsent(&self) -> bool {
+        !self.wire.nodes.stations[self.port].transmit.frames.is_empty()
+    }
 }
