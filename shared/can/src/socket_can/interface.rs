@@ -134,7 +134,10 @@ pub fn explain_errno(interface: &str, errno: i32) -> String {
         libc::ENODEV | libc::ENXIO => {
             format!("{interface} is gone: plug its adapter in, bring {interface} up again, then start anew")
         }
-        libc::ENETDOWN => format!("{interface} is down: 'ip link set {interface} up' brings it up again"),
+        // An unplugged adapter is taken down first.
+        libc::ENETDOWN => format!(
+            "{interface} was taken down or unplugged: plug its adapter in, then 'ip link set {interface} up' brings it up again"
+        ),
         libc::ENOBUFS => format!(
             "{interface} does not get rid of its frames: its adapter hangs, the bus is overloaded, or no node acknowledges; check \
              power, wiring and bit rate of the drives, then 'ip link set {interface} down' and 'ip link set {interface} up'"
@@ -182,7 +185,7 @@ mod tests {
         let table = [
             (libc::ENXIO, "No such device or address (os error 6); can1 is gone: plug its adapter in"),
             (libc::ENODEV, "No such device (os error 19); can1 is gone"),
-            (libc::ENETDOWN, "Network is down (os error 100); can1 is down: 'ip link set can1 up'"),
+            (libc::ENETDOWN, "Network is down (os error 100); can1 was taken down or unplugged"),
             (libc::ENOBUFS, "No buffer space available (os error 105); can1 does not get rid of its frames"),
             (libc::EIO, "(os error 5); look for can1 in the kernel's log"),
         ];
