@@ -93,16 +93,16 @@ impl Exchange {
     }
 }
 
-/// SYNCs in a row with unsent frames at which a bus is stuck.
-const STUCK_SYNCS: u32 = 2;
-
 /// Memory of a bus.
 #[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct BusMonitor {
     /// Whether the master's controller is in bus-off.
     pub(super) is_off: bool,
-    /// SYNCs in a row before which frames of earlier cycles were not sent yet.
-    unsent_syncs: u32,
+    /// Whether frames wait that are older than two cycles: new ones behind them would go out in a burst. Frames of the last
+    /// cycle may wait, since an adapter on USB takes a while to tell what it has sent.
+    pub(super) is_stuck: bool,
+    /// Frames handed over since the last SYNC, that one included, and in the cycle before.
+    handed_over: [u32; 2],
     /// Whether any drive was ever received.
     pub(super) has_drives: bool,
     /// The axis whose SDO request was sent last.
@@ -118,16 +118,19 @@ impl BusMonitor {
         (std::mem::replace(&mut self.is_off, is_off) != is_off).then_some(is_off)
     }
 
-    /// Takes before a SYNC whether earlier frames are not sent yet; returns whether the bus gets stuck with it. Frames of a
-    /// late cycle may still wait at one SYNC. At the second one they are old: new frames behind them would go out in a burst.
-    pub(super) fn note_unsent(&mut self, has_unsent: bool) -> bool {
-        self.unsent_syncs = if has_unsent { self.unsent_syncs.saturating_add(1) } else { 0 };
-        self.unsent_syncs == STUCK_SYNCS
+    /// Takes before a SYNC how many frames wait; returns whether the bus gets stuck. A stuck bus gets no frames until all
+    /// old ones are sent.
+    pub(super) fn note_unsent(&mut self, unsent: usize) -> bool {
+        let was_stuck = self.is_stuck;
+        let [last, before] = self.handed_over;
+        self.is_stuck = unsent > if was_stuck { 0 } else { (last + before) as usize };
+        self.handed_over = [0, last];
+        self.is_stuck && !was_stuck
     }
 
-    /// Whether the bus sends nothing, so that it gets no further frames.
-    pub(super) fn is_stuck(self) -> bool {
-        self.unsent_syncs >= STUCK_SYNCS
+    /// Notes a frame that the bus took.
+    pub(super) fn note_handed_over(&mut self) {
+        self.handed_over[0] += 1;
     }
 
     /// The axes in the order of their turns for SDO.
@@ -227,17 +230,27 @@ mod bus_monitor_tests {
         assert_eq!(strangers, [true, true, true, false, false, false, true, false]);
     }
 
+    /// Four frames a cycle, and how many of them wait at each SYNC.
     #[test]
-    fn a_bus_is_stuck_at_the_second_sync_that_finds_old_frames_until_they_are_sent() {
-        let mut bus = BusMonitor::default();
-        let syncs =
-            [(true, false), (false, false), (true, false), (true, true), (true, true), (false, false)];
-        let mut begins = 0;
-        for (has_unsent, is_stuck) in syncs {
-            begins += u32::from(bus.note_unsent(has_unsent));
-            assert_eq!(bus.is_stuck(), is_stuck);
-        }
-        assert_eq!(begins, 1);
+    fn a_bus_is_stuck_while_frames_wait_that_are_older_than_two_cycles() {
+        let states = |unsent: &[usize]| {
+            let mut bus = BusMonitor::default();
+            let mut state = |&unsent: &usize| {
+                let begins = bus.note_unsent(unsent);
+                if !bus.is_stuck {
+                    (0..4).for_each(|_| bus.note_handed_over());
+                }
+                (begins, bus.is_stuck)
+            };
+            unsent.iter().map(&mut state).collect::<Vec<_>>()
+        };
+        assert_eq!(
+            states(&[0, 3, 4, 7, 8, 8, 0]),
+            [(false, false); 7],
+            "an adapter that tells late what it has sent"
+        );
+        let (free, begins, stuck) = ((false, false), (true, true), (false, true));
+        assert_eq!(states(&[0, 3, 7, 11, 11, 2, 0, 4]), [free, free, free, begins, stuck, stuck, free, free]);
     }
 
     #[test]

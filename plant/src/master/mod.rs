@@ -149,10 +149,8 @@ impl Master {
     /// drives, and at last a due heartbeat. So the heartbeat delays no process data on an interface that sends in the
     /// order of its queue.
     pub(crate) fn apply(&mut self, now_ns: u64, command: Option<&Command>, buses: &mut impl Buses) {
-        for (bus, monitor) in self.buses.iter_mut().enumerate().filter(|(_, monitor)| monitor.is_stuck()) {
-            if !buses.port(bus).has_unsent() {
-                monitor.note_unsent(false);
-            }
+        for (bus, monitor) in self.buses.iter_mut().enumerate().filter(|(_, monitor)| monitor.is_stuck) {
+            monitor.is_stuck = buses.port(bus).unsent() > 0;
         }
         self.supervise(now_ns);
         self.take_command(now_ns, command);
@@ -320,11 +318,11 @@ impl Master {
             }
         }
         for bus in 0..self.buses.len() {
-            if !self.buses[bus].is_stuck() {
+            if !self.buses[bus].is_stuck {
                 self.send_sdo(now_ns, bus, buses);
             }
         }
-        if !self.buses.iter().any(|bus| bus.is_stuck()) {
+        if !self.buses.iter().any(|bus| bus.is_stuck) {
             self.start_drives(now_ns, buses);
         }
     }
@@ -357,16 +355,16 @@ impl Master {
     }
 
     fn is_stuck(&self, axis: usize) -> bool {
-        self.buses[self.drives[axis].address.bus].is_stuck()
+        self.buses[self.drives[axis].address.bus].is_stuck
     }
 
     fn send_to(&mut self, now_ns: u64, axis: usize, frame: Frame, buses: &mut impl Buses) {
         self.send(now_ns, self.drives[axis].address.bus, frame, buses);
     }
 
-    /// Reports once that a bus with drives keeps the frames of earlier cycles.
+    /// Reports once that a bus with drives keeps frames that are older than two cycles.
     fn watch_queue(&mut self, now_ns: u64, bus: usize, buses: &mut impl Buses) {
-        let begins = self.buses[bus].note_unsent(buses.port(bus).has_unsent());
+        let begins = self.buses[bus].note_unsent(buses.port(bus).unsent());
         if begins && self.buses[bus].has_drives {
             let value = f64::from(FULL_QUEUE);
             self.events.add(now_ns, Subject::Bus(bus), Event { value, ..notice(Cause::BusRefused) });
@@ -375,15 +373,17 @@ impl Master {
 
     /// Sends a frame, unless older ones are stuck before it: a drive must not get the frames of many cycles at once.
     fn send(&mut self, now_ns: u64, bus: usize, frame: Frame, buses: &mut impl Buses) {
-        if self.buses[bus].is_stuck() {
+        if self.buses[bus].is_stuck {
             return;
         }
-        if let Err(refusal) = buses.port(bus).send(now_ns, frame)
-            && self.buses[bus].is_unexplained(&refusal)
-        {
-            let errno = if let SendError::Os { errno } = refusal { errno } else { FULL_QUEUE };
-            let failure = Failure::with(Cause::BusRefused, errno, 0.0);
-            self.fail(self.exchange.wake.woke_ns, Subject::Bus(bus), &failure);
+        match buses.port(bus).send(now_ns, frame) {
+            Ok(()) => self.buses[bus].note_handed_over(),
+            Err(refusal) if self.buses[bus].is_unexplained(&refusal) => {
+                let errno = if let SendError::Os { errno } = refusal { errno } else { FULL_QUEUE };
+                let failure = Failure::with(Cause::BusRefused, errno, 0.0);
+                self.fail(self.exchange.wake.woke_ns, Subject::Bus(bus), &failure);
+            }
+            Err(_) => {}
         }
     }
 

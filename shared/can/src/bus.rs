@@ -27,8 +27,8 @@ pub trait Bus {
     /// The port's fault confinement, as last known.
     fn status(&self) -> BusStatus;
 
-    /// Whether frames of this port wait for the wire. After a hang of the adapter they would all be sent at once.
-    fn has_unsent(&self) -> bool;
+    /// Frames of this port that wait for the wire, as far as known. After a hang of the adapter they are all sent at once.
+    fn unsent(&self) -> usize;
 }
 
 impl<B: Bus + ?Sized> Bus for &mut B {
@@ -44,8 +44,8 @@ impl<B: Bus + ?Sized> Bus for &mut B {
         (**self).status()
     }
 
-    fn has_unsent(&self) -> bool {
-        (**self).has_unsent()
+    fn unsent(&self) -> usize {
+        (**self).unsent()
     }
 }
 

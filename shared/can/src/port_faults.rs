@@ -232,8 +232,8 @@ impl<B: Bus> Bus for Faulty<'_, B> {
         }
     }
 
-    fn has_unsent(&self) -> bool {
-        !self.faults.held.is_empty() || self.bus.has_unsent()
+    fn unsent(&self) -> usize {
+        self.faults.held.len() + self.bus.unsent()
     }
 }
 

@@ -199,7 +199,7 @@ fn process_data_of_the_cycle_before_are_no_answer_however_late_they_come() {
     }
 }
 
-/// The frames of the master are held for 10 ms, as by an adapter that hangs. Two cycles' frames may come late.
+/// The frames of the master are held for 10 ms, as by an adapter that hangs. The frames of three cycles may come late.
 #[test]
 fn drives_get_no_burst_of_old_syncs_after_a_hang() {
     let mut bench = bench_with(FaultConfig {
@@ -218,7 +218,7 @@ fn drives_get_no_burst_of_old_syncs_after_a_hang() {
     let (longest_ns, close) =
         (gaps_ns.clone().max().unwrap(), gaps_ns.filter(|&gap_ns| gap_ns < PERIOD_NS / 2).count());
     assert!(longest_ns > 9 * PERIOD_NS, "the hang shows: {longest_ns} ns");
-    assert!(close <= 2, "{close} SYNCs close behind another");
+    assert!(close <= 3, "{close} SYNCs close behind another");
 }
 
 #[test]

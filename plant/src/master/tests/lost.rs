@@ -75,15 +75,14 @@ fn a_running_drive_may_owe_its_process_data_for_three_cycles() {
     assert_eq!((fault.value, fault.limit), (4.0, 3.0));
 }
 
-/// SYNC, process data and heartbeat of the cycle in which it begins, and of the one after.
 #[test]
-fn an_adapter_that_hangs_gets_the_frames_of_two_cycles_and_then_none_until_they_are_sent() {
+fn an_adapter_that_hangs_gets_the_frames_of_three_cycles_and_then_none_until_they_are_sent() {
     let mut bench = Bench::enabled();
     bench.wires.wire(0).hangs = true;
     bench.cycles(20, DriveRequest::Enable);
     let kept = bench.wires.wire(0).kept.clone();
     let syncs = kept.iter().filter(|frame| frame.id() == sync::frame().id()).count();
-    assert_eq!(syncs, 2, "{kept:?}");
+    assert_eq!(syncs, 3, "{kept:?}");
     let notice = bench.events_of(EventKind::Notice).find(|event| event.cause == Cause::BusRefused.code());
     let notice = *notice.expect("the hang is reported");
     assert_eq!((notice.bus, notice.value), (0, f64::from(FULL_QUEUE)));

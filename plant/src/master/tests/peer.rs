@@ -375,8 +375,8 @@ impl Bus for &mut Wire {
         BusStatus { state, tec, rec: 0 }
     }
 
-    fn has_unsent(&self) -> bool {
-        !self.kept.is_empty()
+    fn unsent(&self) -> usize {
+        self.kept.len()
     }
 }
 

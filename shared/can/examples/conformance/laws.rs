@@ -281,8 +281,8 @@ mod tests {
             BusStatus { state: ErrorState::Active, tec: 0, rec: 0 }
         }
 
-        fn has_unsent(&self) -> bool {
-            false
+        fn unsent(&self) -> usize {
+            self.pair.arrived[1].len()
         }
     }
 

@@ -54,8 +54,8 @@ impl<B: Bus> Bus for Counted<'_, B> {
         self.bus.status()
     }
 
-    fn has_unsent(&self) -> bool {
-        self.bus.has_unsent()
+    fn unsent(&self) -> usize {
+        self.bus.unsent()
     }
 }
 

@@ -98,6 +98,8 @@ pub struct SocketCan {
     socket: CanSocket,
     transmit_capacity: usize,
     status: BusStatus,
+    /// Bytes of memory that the kernel counts for an unsent frame; 0 until one is sent.
+    frame_bytes: u32,
     /// When the driver reported bus-off.
     off_since_ns: u64,
     last_ns: u64,
@@ -121,6 +123,7 @@ impl SocketCan {
             socket,
             transmit_capacity,
             status: UNDISTURBED,
+            frame_bytes: 0,
             off_since_ns: 0,
             last_ns: 0,
             drained: false,
@@ -248,7 +251,12 @@ impl Bus for SocketCan {
             // ENOBUFS: the interface's queue; EAGAIN: the socket's own share of it.
             libc::ENOBUFS | libc::EAGAIN => SendError::QueueFull { capacity: self.transmit_capacity },
             errno => SendError::Os { errno },
-        })
+        })?;
+        if self.frame_bytes == 0 {
+            // The first frame is alone in the queue. A virtual interface has sent it already, and keeps none.
+            self.frame_bytes = self.memory_info(MEMINFO_UNSENT).unwrap_or(0);
+        }
+        Ok(())
     }
 
     fn receive(&mut self, _: u64) -> Result<Option<Received>, ReceiveError> {
@@ -261,8 +269,9 @@ impl Bus for SocketCan {
         self.status
     }
 
-    fn has_unsent(&self) -> bool {
-        self.memory_info(MEMINFO_UNSENT).is_ok_and(|bytes| bytes > 0)
+    fn unsent(&self) -> usize {
+        let bytes = self.memory_info(MEMINFO_UNSENT).unwrap_or(0);
+        bytes.checked_div(self.frame_bytes).unwrap_or(0) as usize
     }
 }
 

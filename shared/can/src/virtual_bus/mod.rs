@@ -281,7 +281,7 @@ impl Bus for Port<'_> {
         self.wire.nodes.stations[self.port].confinement.status()
     }
 
-    fn has_unsent(&self) -> bool {
-        !self.wire.nodes.stations[self.port].transmit.frames.is_empty()
+    fn unsent(&self) -> usize {
+        self.wire.nodes.stations[self.port].transmit.frames.len()
     }
 }
