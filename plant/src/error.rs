@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use masseter_can::canopen::NodeIdError;
-use masseter_can::{BitrateError, InterfaceFault, NotByPort, OpenError};
+use masseter_can::{BitrateError, NotByPort, OpenError};
 use masseter_model::geometry::{GeometryError, InverseError, LimitViolation};
 use masseter_scenario::DynamicsConfig;
 
@@ -19,14 +19,9 @@ pub enum PlantError {
     /// A real interface.
     #[error(transparent)]
     Interface(#[from] OpenError),
-    /// Settings or a state of a real interface with which no drive can be controlled.
-    #[error("{}", of_interface(.interface, .faults))]
-    Unfit {
-        /// The interface.
-        interface: String,
-        /// What is wrong with it.
-        faults: Vec<InterfaceFault>,
-    },
+    /// Settings or a state of a real interface with which no drive can be controlled: what is wrong, and the remedies.
+    #[error("{}", .0.join("; "))]
+    Unfit(Vec<String>),
     /// Another master of this machine drives the interface.
     #[error("{0}: another rig drives it; end that one, or use other interfaces")]
     MasterHere(String),
@@ -60,11 +55,6 @@ pub enum PlantError {
     /// Values of the scenario that contradict each other: their keys, the reason and the remedy.
     #[error("{0}")]
     Scenario(String),
-}
-
-/// Sentences of which each begins with the name of the interface.
-fn of_interface(interface: &str, faults: &[InterfaceFault]) -> String {
-    faults.iter().map(|fault| format!("{interface} {fault}")).collect::<Vec<_>>().join("; ")
 }
 
 /// Dynamics that cannot be built or cannot be integrated.

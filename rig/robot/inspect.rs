@@ -6,11 +6,11 @@
 use std::{collections::BTreeMap, fmt::Write};
 
 use clap::Args;
-use masseter_can::canopen::ObjectAddress;
+use masseter_can::{JudgedInterface, canopen::ObjectAddress};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::commissioning::{
-    Address, BootUps, Deviation, Identity, JudgedInterface, LineError, OtherMaster, Outcome, Restarted,
-    Survey, gaps, judge_interfaces, object_name, reason_text,
+    Address, BootUps, Deviation, Identity, LineError, OtherMaster, Outcome, Restarted, Survey, gaps,
+    judge_interfaces, object_name, reason_text,
 };
 use masseter_plant::description;
 use masseter_runtime::clock::SECOND_NS;
@@ -72,34 +72,11 @@ struct Read {
 /// What was found of everything.
 #[derive(Debug, Serialize)]
 struct InspectResult {
-    interfaces: Vec<InterfaceResult>,
+    interfaces: Vec<JudgedInterface>,
     masters: Vec<String>,
     other_nodes: Vec<String>,
     restarted: Vec<String>,
     drives: Vec<DriveResult>,
-}
-
-/// An interface, with its faults and its doubts in words.
-#[derive(Debug, Serialize)]
-struct InterfaceResult {
-    name: String,
-    bitrate_bps: Option<u32>,
-    data_bitrate_bps: Option<u32>,
-    sample_point_permille: Option<u32>,
-    modes: Vec<&'static str>,
-    restart_ms: Option<u32>,
-    state: Option<&'static str>,
-    errors: Option<[u16; 2]>,
-    txqueuelen: Option<u32>,
-    queueing: Option<String>,
-    mtu: Option<u32>,
-    is_virtual: bool,
-    driver: Option<String>,
-    /// Everything in words.
-    #[serde(skip)]
-    words: String,
-    faults: Vec<String>,
-    doubts: Vec<String>,
 }
 
 /// Inspects, and prints one table.
@@ -107,7 +84,7 @@ pub(crate) fn inspect(args: &InspectArgs) -> Result<Exit, Failure> {
     let scenario = args.robot.scenario().usage()?;
     let parent = &args.robot.folder;
     let mut folder = StepFolder::begin(parent, Step::Inspect, &Step::Inspect.axes(), &scenario).usage()?;
-    let interfaces: Vec<_> = judge_interfaces(&scenario.can).into_iter().map(InterfaceResult::from).collect();
+    let interfaces = judge_interfaces(&scenario.can);
     if interfaces.iter().any(|interface| !interface.faults.is_empty()) {
         // A frame at a wrong bit rate would disturb every other node.
         let mut text = String::new();
@@ -145,33 +122,10 @@ pub(crate) fn inspect(args: &InspectArgs) -> Result<Exit, Failure> {
     Ok(if passed { Exit::Passed } else { Exit::Failed })
 }
 
-impl From<JudgedInterface> for InterfaceResult {
-    fn from(JudgedInterface { name, details, faults, doubts }: JudgedInterface) -> Self {
-        Self {
-            words: details.to_string(),
-            bitrate_bps: details.bitrate_bps,
-            data_bitrate_bps: details.data_bitrate_bps,
-            sample_point_permille: details.sample_point_permille,
-            modes: details.modes.names().collect(),
-            restart_ms: details.restart_ms,
-            state: details.state,
-            errors: details.errors,
-            txqueuelen: details.queue_length,
-            queueing: details.queueing,
-            mtu: details.mtu,
-            is_virtual: details.is_virtual,
-            driver: details.driver,
-            faults: faults.iter().map(|fault| format!("{name} {fault}")).collect(),
-            doubts: doubts.iter().map(|doubt| format!("{name} {doubt}")).collect(),
-            name,
-        }
-    }
-}
-
 /// Each interface as the kernel has it, with what is wrong and what is risky.
-fn describe_interfaces(interfaces: &[InterfaceResult], text: &mut String) {
-    for InterfaceResult { name, words, faults, doubts, .. } in interfaces {
-        let _ = writeln!(text, "{name}: {words}");
+fn describe_interfaces(interfaces: &[JudgedInterface], text: &mut String) {
+    for JudgedInterface { name, details, faults, doubts } in interfaces {
+        let _ = writeln!(text, "{name}: {details}");
         for (word, lines) in [("failed", faults), ("warning", doubts)] {
             for line in lines {
                 let _ = writeln!(text, "{word}: {line}");
@@ -277,17 +231,14 @@ fn devices(drives: &[DriveResult]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use masseter_can::{InterfaceDetails, InterfaceNeeds, judge_interface};
+    use masseter_can::{InterfaceDetails, InterfaceNeeds};
 
     use super::*;
 
     #[test]
     fn a_wrong_bit_rate_is_a_fault_and_no_restart_a_doubt() {
-        let of = |details: InterfaceDetails| {
-            let (faults, doubts) =
-                judge_interface("can0", &details, InterfaceNeeds { bitrate_bps: 1_000_000, frames: 9 });
-            InterfaceResult::from(JudgedInterface { name: "can0".to_owned(), details, faults, doubts })
-        };
+        let needs = InterfaceNeeds { bitrate_bps: 1_000_000, frames: 9 };
+        let of = |details| JudgedInterface::new("can0", details, needs);
         let details = InterfaceDetails {
             is_up: true,
             bitrate_bps: Some(500_000),

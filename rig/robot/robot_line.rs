@@ -6,8 +6,8 @@ use anyhow::ensure;
 use masseter_can::canopen::NodeId;
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::commissioning::{
-    BootUps, Deviation, JudgedInterface, Known, Line, Outcome, PowerError, Settings, Survey, deviations,
-    gaps, judge_interfaces, prove_no_power, take_over,
+    BootUps, Deviation, Known, Line, Outcome, PowerError, Settings, Survey, deviations, gaps,
+    judge_interfaces, prove_no_power, take_over,
 };
 use masseter_plant::wanted::WantedDrive;
 use masseter_runtime::clock::MILLISECOND_NS;
@@ -106,10 +106,8 @@ pub(crate) fn drives(surveys: &Surveys, can: &CanConfig) -> [Known; AXES] {
 
 /// Warns of what may go wrong on real interfaces.
 pub(crate) fn warn_of_interfaces(can: &CanConfig) {
-    for JudgedInterface { name, doubts, .. } in judge_interfaces(can) {
-        for doubt in doubts {
-            status!("warning: {name} {doubt}");
-        }
+    for doubt in judge_interfaces(can).iter().flat_map(|judged| &judged.doubts) {
+        status!("warning: {doubt}");
     }
 }
 

@@ -11,8 +11,7 @@ use std::os::unix::net::{SocketAddr, UnixDatagram};
 
 use masseter_can::faults::FaultNote;
 use masseter_can::{
-    Bus, InterfaceDetails, InterfaceDoubt, InterfaceFault, InterfaceNeeds, OpenError, PortFaults,
-    ReceiveError, SocketCan, Tapped, judge_interface,
+    Bus, InterfaceNeeds, JudgedInterface, OpenError, PortFaults, ReceiveError, SocketCan, Tapped,
 };
 use masseter_model::geometry::AXES;
 use masseter_runtime::clock;
@@ -26,38 +25,20 @@ use crate::error::PlantError;
 /// Longest wait for a real frame, ns. A fault may hold frames back that are due before the next arrival.
 const LONGEST_BLOCK_NS: u64 = 100_000;
 
-/// An interface as the kernel has it, judged by what the scenario needs.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct JudgedInterface {
-    /// Its name.
-    pub name: String,
-    /// Its settings and state.
-    pub details: InterfaceDetails,
-    /// Why nothing may be sent over it.
-    pub faults: Vec<InterfaceFault>,
-    /// What may go wrong.
-    pub doubts: Vec<InterfaceDoubt>,
-}
-
 /// Judges the interfaces of a scenario. One that cannot be asked is left out: its opening says why.
 pub fn judge_interfaces(can: &CanConfig) -> Vec<JudgedInterface> {
     let judged = |(name, drives): (&String, &Vec<usize>)| {
-        let details = InterfaceDetails::read(name).ok()?;
-        // SYNC, SDO and heartbeat, and for each drive process data or NMT, which follow each other within two cycles.
+        // SYNC, SDO and heartbeat; for each drive process data, or NMT at its start.
         let frames = 3 + 2 * drives.len() as u32;
-        let needs = InterfaceNeeds { bitrate_bps: can.bitrate_bps, frames };
-        let (faults, doubts) = judge_interface(name, &details, needs);
-        Some(JudgedInterface { name: name.clone(), details, faults, doubts })
+        JudgedInterface::read(name, InterfaceNeeds { bitrate_bps: can.bitrate_bps, frames }).ok()
     };
     can.interfaces.iter().zip(&can.buses).filter_map(judged).collect()
 }
 
-/// Refuses the first interface over which nothing may be sent.
+/// Refuses interfaces over which nothing may be sent.
 pub(crate) fn refuse_unfit(can: &CanConfig) -> Result<(), PlantError> {
-    let unfit = judge_interfaces(can).into_iter().find(|judged| !judged.faults.is_empty());
-    unfit.map_or(Ok(()), |JudgedInterface { name: interface, faults, .. }| {
-        Err(PlantError::Unfit { interface, faults })
-    })
+    let faults: Vec<_> = judge_interfaces(can).into_iter().flat_map(|judged| judged.faults).collect();
+    if faults.is_empty() { Ok(()) } else { Err(PlantError::Unfit(faults)) }
 }
 
 /// The master's port, its faults, and a tap on every wire.

@@ -56,6 +56,12 @@ const UP: u32 = 1;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ControlModes(pub u32);
 
+impl serde::Serialize for ControlModes {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.names())
+    }
+}
+
 impl ControlModes {
     /// Whether the mode with this name of `ip` is on.
     pub fn has(self, mode: &str) -> bool {
@@ -70,7 +76,7 @@ impl ControlModes {
 
 /// Settings and state of an interface and its controller. A driver may report only some of them; a virtual interface has
 /// no controller and no bit timing.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, serde::Serialize)]
 pub struct InterfaceDetails {
     /// Whether the interface is up.
     pub is_up: bool,

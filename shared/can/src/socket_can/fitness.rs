@@ -1,15 +1,23 @@
 //! Whether an interface can carry the traffic of drives: what of its settings and state forbids that, what is risky, and the
-//! command that mends each. This module reads and changes no interface.
+//! command that mends each. This module changes no interface.
+
+use std::io;
 
 use super::details::InterfaceDetails;
 
 /// Queueing disciplines that send every frame in its order, or refuse the frame with an error.
 const FAITHFUL: [&str; 5] = ["pfifo_fast", "pfifo", "bfifo", "noqueue", "mq"];
+/// Modes in which drives cannot be controlled, and why.
+const FORBIDDEN: [(&str, &str); 3] = [
+    ("listen-only", "it sends and acknowledges nothing"),
+    ("loopback", "it hears itself, and its frames may not reach the wire"),
+    ("one-shot", "a frame that loses arbitration or is disturbed is never sent again"),
+];
 /// Longest useful queue, in cycles.
 const LONGEST_CYCLES: u32 = 10;
 /// The advised length of a queue, frames.
 const QUEUE_LENGTH: u32 = 50;
-/// Its controller's automatic restart has crashed kernels.
+/// The driver whose automatic restart has crashed kernels.
 const CRASHES: &str = "mcp251xfd";
 
 /// What drives need of their interface.
@@ -21,130 +29,42 @@ pub struct InterfaceNeeds {
     pub frames: u32,
 }
 
-/// Why nothing may be sent over an interface.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum InterfaceFault {
-    /// It is down.
-    #[error("is down; '{0}' brings it up")]
-    Down(String),
-    /// A control mode in which drives cannot be controlled.
-    #[error("is in the mode {mode}: {effect}; {}", in_mode(.interface, .mode, "off"))]
-    Mode {
-        /// The interface.
-        interface: String,
-        /// The mode as `ip` names it.
-        mode: &'static str,
-        /// What the mode does.
-        effect: &'static str,
-    },
-    /// Another bit rate than that of the scenario.
-    #[error(
-        "has {found_bps} bit/s, can.bitrate_bps is {wanted_bps}; 'ip link set {interface} down' and '{command}' change it"
-    )]
-    Bitrate {
-        /// The interface.
-        interface: String,
-        /// Its bit rate, bit/s.
-        found_bps: u32,
-        /// That of the scenario, bit/s.
-        wanted_bps: u32,
-        /// The command that brings the interface up with it.
-        command: String,
-    },
-    /// It is off the bus until somebody restarts it.
-    #[error(
-        "is bus-off and restart-ms is 0; check bit rate, termination and wiring, then 'ip link set {0} type can restart'"
-    )]
-    BusOff(String),
-    /// It is up, and its controller does not run.
-    #[error(
-        "is {state}; 'ip link set {interface} down' and 'ip link set {interface} up' start its controller"
-    )]
-    Asleep {
-        /// The interface.
-        interface: String,
-        /// State of its controller.
-        state: &'static str,
-    },
+/// An interface as the kernel has it, judged by the needs of drives.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct JudgedInterface {
+    /// Its name.
+    pub name: String,
+    /// Its settings and state.
+    #[serde(flatten)]
+    pub details: InterfaceDetails,
+    /// Why nothing may be sent over the interface, each with the command that mends it.
+    pub faults: Vec<String>,
+    /// What may go wrong, likewise.
+    pub doubts: Vec<String>,
 }
 
-/// What may go wrong on an interface.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum InterfaceDoubt {
-    /// The driver reports no bit rate.
-    #[error("reports no bit rate; make sure that it has {0} bit/s, that of can.bitrate_bps")]
-    NoBitrate(u32),
-    /// Many errors, or nobody who acknowledges.
-    #[error("is error passive; check bit rate, termination and wiring, and that the drives have power")]
-    Passive,
-    /// It is off the bus, and restarts by itself.
-    #[error("is bus-off and restarts within {0} ms; check bit rate, termination and wiring")]
-    BusOff(u32),
-    /// Its controller counts errors.
-    #[error(
-        "has the error counters {sent} for sending and {received} for receiving; check termination and wiring"
-    )]
-    Errors {
-        /// Counter for sending.
-        sent: u16,
-        /// Counter for receiving.
-        received: u16,
-    },
-    /// Frames count as sent without an acknowledgement.
-    #[error("is in the mode presume-ack: frames count as sent that no node has; {}", in_mode(.0, "presume-ack", "off"))]
-    PresumesAcknowledgement(String),
-    /// It stays off after bus-off.
-    #[error(
-        "has restart-ms 0: after bus-off it stays off until 'ip link set {0} type can restart'; 'ip link set {0} down', 'ip \
-         link set {0} type can restart-ms 100' and 'ip link set {0} up' let it restart by itself"
-    )]
-    NeverRestarts(String),
-    /// The automatic restart of this driver has crashed kernels.
-    #[error(
-        "has restart-ms {restart_ms} with the driver {CRASHES}, whose automatic restart has crashed kernels (raspberrypi/linux \
-         #6916); {}", in_mode(.interface, "restart-ms", "0")
-    )]
-    RestartCrashes {
-        /// The interface.
-        interface: String,
-        /// Time to the restart, ms.
-        restart_ms: u32,
-    },
-    /// A queueing discipline that may drop frames without an error, or change their order.
-    #[error(
-        "has the queueing discipline {found}, which may drop, delay or reorder frames without an error; expected is pfifo_fast: \
-         'tc qdisc replace dev {interface} root pfifo_fast'"
-    )]
-    Queueing {
-        /// The interface.
-        interface: String,
-        /// Its discipline.
-        found: String,
-    },
-    /// A queue that has no room for the frames of a cycle.
-    #[error(
-        "has txqueuelen {found}, and a cycle has up to {frames} frames: others are refused (ENOBUFS); 'ip link set {interface} \
-         txqueuelen {QUEUE_LENGTH}'"
-    )]
-    ShortQueue {
-        /// The interface.
-        interface: String,
-        /// Frames that its queue holds.
-        found: u32,
-        /// Most frames of a cycle.
-        frames: u32,
-    },
-    /// A queue that holds the frames of many cycles.
-    #[error(
-        "has txqueuelen {found}: after a hang it sends the old frames of many cycles; 'ip link set {interface} txqueuelen \
-         {QUEUE_LENGTH}'"
-    )]
-    LongQueue {
-        /// The interface.
-        interface: String,
-        /// Frames that its queue holds.
-        found: u32,
-    },
+impl JudgedInterface {
+    /// Asks the kernel.
+    ///
+    /// # Errors
+    /// Those of [`InterfaceDetails::read`].
+    pub fn read(interface: &str, needs: InterfaceNeeds) -> io::Result<Self> {
+        Ok(Self::new(interface, InterfaceDetails::read(interface)?, needs))
+    }
+
+    /// An interface with these details.
+    pub fn new(interface: &str, details: InterfaceDetails, needs: InterfaceNeeds) -> Self {
+        let (mut faults, mut doubts) = (Vec::new(), Vec::new());
+        let bitrate_bps = Some(needs.bitrate_bps).filter(|_| !details.is_virtual);
+        let bring_up = bring_up_command(interface, details.driver.as_deref(), bitrate_bps);
+        if !details.is_up {
+            faults.push(format!("{interface} is down; '{bring_up}' brings it up"));
+        } else if !details.is_virtual {
+            faults = find_faults(interface, &details, needs, &bring_up);
+            doubts = find_doubts(interface, &details, needs);
+        }
+        Self { name: interface.to_owned(), details, faults, doubts }
+    }
 }
 
 /// The command that brings an interface up. Only a controller of hardware has a bit rate, and only a driver whose restart
@@ -155,87 +75,98 @@ pub fn bring_up_command(interface: &str, driver: Option<&str>, bitrate_bps: Opti
     format!("ip link set {interface} up txqueuelen {QUEUE_LENGTH}{controller}")
 }
 
-/// The commands that change a setting of a controller, for which the interface must be down.
-fn in_mode(interface: &str, setting: &str, value: &str) -> String {
-    format!(
-        "'ip link set {interface} down', 'ip link set {interface} type can {setting} {value}' and 'ip link set {interface} \
-         up' change it"
-    )
-}
-
-/// Judges an interface. The sentences begin behind its name.
-pub fn judge(
-    interface: &str,
+fn find_faults(
+    name: &str,
     details: &InterfaceDetails,
-    needs: InterfaceNeeds,
-) -> (Vec<InterfaceFault>, Vec<InterfaceDoubt>) {
-    let bitrate_bps = Some(needs.bitrate_bps).filter(|_| !details.is_virtual);
-    let command = || bring_up_command(interface, details.driver.as_deref(), bitrate_bps);
-    if !details.is_up {
-        return (vec![InterfaceFault::Down(command())], Vec::new());
-    }
-    if details.is_virtual {
-        return Default::default();
-    }
-    let mut faults = faults(interface, details);
-    if let Some(found_bps) = details.bitrate_bps.filter(|&bps| bps != needs.bitrate_bps) {
-        let (interface, wanted_bps, command) = (interface.to_owned(), needs.bitrate_bps, command());
-        faults.push(InterfaceFault::Bitrate { interface, found_bps, wanted_bps, command });
-    }
-    (faults, doubts(interface, details, needs))
+    InterfaceNeeds { bitrate_bps: wanted, .. }: InterfaceNeeds,
+    bring_up: &str,
+) -> Vec<String> {
+    let modes = FORBIDDEN.iter().filter(|(mode, _)| details.modes.has(mode));
+    let modes = modes
+        .map(|(mode, why)| format!("{name} is in the mode {mode}: {why}; {}", change(name, mode, "off")));
+    let bitrate = details.bitrate_bps.filter(|&found| found != wanted).map(|found| {
+        format!(
+            "{name} has {found} bit/s, can.bitrate_bps is {wanted}; 'ip link set {name} down' and '{bring_up}' change it"
+        )
+    });
+    let state = details.state.and_then(|state| match state {
+        "bus-off" if details.restart_ms.unwrap_or(0) == 0 => Some(format!(
+            "{name} is bus-off and restart-ms is 0; check bit rate, termination and wiring, then 'ip link set {name} type can \
+             restart'"
+        )),
+        "stopped" | "sleeping" => Some(format!(
+            "{name} is {state}; 'ip link set {name} down' and 'ip link set {name} up' start its controller"
+        )),
+        _ => None,
+    });
+    modes.chain(bitrate).chain(state).collect()
 }
 
-fn faults(interface: &str, details: &InterfaceDetails) -> Vec<InterfaceFault> {
-    let name = || interface.to_owned();
-    let forbidden = [
-        ("listen-only", "it sends and acknowledges nothing"),
-        ("loopback", "it hears itself, and its frames may not reach the wire"),
-        ("one-shot", "a frame that loses arbitration or is disturbed is never sent again"),
-    ];
-    let modes = forbidden.into_iter().filter(|(mode, _)| details.modes.has(mode));
-    let mut faults: Vec<_> =
-        modes.map(|(mode, effect)| InterfaceFault::Mode { interface: name(), mode, effect }).collect();
-    match details.state {
-        Some("bus-off") if details.restart_ms.unwrap_or(0) == 0 => {
-            faults.push(InterfaceFault::BusOff(name()));
+fn find_doubts(name: &str, details: &InterfaceDetails, needs: InterfaceNeeds) -> Vec<String> {
+    let InterfaceNeeds { bitrate_bps: wanted, frames } = needs;
+    let InterfaceDetails { state, restart_ms, queueing, errors, .. } = details;
+    let mut doubts = Vec::new();
+    let mut doubt = |applies: bool, words: String| {
+        if applies {
+            doubts.push(format!("{name} {words}"));
         }
-        Some(state @ ("stopped" | "sleeping")) => {
-            faults.push(InterfaceFault::Asleep { interface: name(), state });
-        }
-        _ => {}
-    }
-    faults
-}
-
-fn doubts(interface: &str, details: &InterfaceDetails, needs: InterfaceNeeds) -> Vec<InterfaceDoubt> {
-    use InterfaceDoubt::{
-        BusOff, Errors, LongQueue, NeverRestarts, NoBitrate, Passive, PresumesAcknowledgement, Queueing,
-        RestartCrashes, ShortQueue,
     };
-    let name = || interface.to_owned();
-    let is_off = details.state == Some("bus-off");
-    let restart_ms = details.restart_ms.filter(|&ms| ms > 0);
-    let crashes = details.driver.as_deref() == Some(CRASHES);
-    let queue = details.queue_length.filter(|_| details.queueing.as_deref() != Some("noqueue"));
-    let frames = needs.frames;
-    let unfaithful = details.queueing.as_ref().filter(|found| !FAITHFUL.contains(&found.as_str()));
-    [
-        details.bitrate_bps.is_none().then_some(NoBitrate(needs.bitrate_bps)),
-        (details.state == Some("error passive")).then_some(Passive),
-        restart_ms.filter(|_| is_off).map(BusOff),
-        details.errors.filter(|errors| *errors != [0, 0]).map(|[sent, received]| Errors { sent, received }),
-        details.modes.has("presume-ack").then(|| PresumesAcknowledgement(name())),
-        (details.restart_ms == Some(0) && !crashes && !is_off).then(|| NeverRestarts(name())),
-        restart_ms.filter(|_| crashes).map(|restart_ms| RestartCrashes { interface: name(), restart_ms }),
-        unfaithful.map(|found| Queueing { interface: name(), found: found.clone() }),
-        queue.filter(|&found| found < frames).map(|found| ShortQueue { interface: name(), found, frames }),
-        queue
-            .filter(|&found| found > LONGEST_CYCLES * frames)
-            .map(|found| LongQueue { interface: name(), found }),
-    ]
-    .into_iter()
-    .flatten()
-    .collect()
+    let no_bitrate =
+        format!("reports no bit rate; make sure that it has {wanted} bit/s, that of can.bitrate_bps");
+    doubt(details.bitrate_bps.is_none(), no_bitrate);
+    let check = "check bit rate, termination and wiring";
+    doubt(
+        *state == Some("error passive"),
+        format!("is error passive; {check}, and that the drives have power"),
+    );
+    let [sent, received] = errors.unwrap_or_default();
+    let counters = format!("has the error counters {sent} for sending and {received} for receiving; {check}");
+    doubt(sent > 0 || received > 0, counters);
+    let presumes = change(name, "presume-ack", "off");
+    doubt(
+        details.modes.has("presume-ack"),
+        format!("is in the mode presume-ack: frames count as sent that no node has; {presumes}"),
+    );
+    let (is_off, crashes) = (*state == Some("bus-off"), details.driver.as_deref() == Some(CRASHES));
+    if let Some(ms) = *restart_ms {
+        doubt(is_off && ms > 0, format!("is bus-off and restarts within {ms} ms; {check}"));
+        let by_itself = change(name, "restart-ms", "100");
+        let never = format!(
+            "has restart-ms 0: after bus-off it stays off until 'ip link set {name} type can restart'; to let it restart by \
+             itself, {by_itself}"
+        );
+        doubt(ms == 0 && !crashes && !is_off, never);
+        let off = change(name, "restart-ms", "0");
+        let crash = format!(
+            "has restart-ms {ms} with the driver {CRASHES}, whose automatic restart has crashed kernels (raspberrypi/linux \
+             #6916); {off}"
+        );
+        doubt(ms > 0 && crashes, crash);
+    }
+    let queueing = queueing.as_deref().unwrap_or("noqueue");
+    let unfaithful = format!(
+        "has the queueing discipline {queueing}, which may drop, delay or reorder frames without an error; expected is \
+         pfifo_fast: 'tc qdisc replace dev {name} root pfifo_fast'"
+    );
+    doubt(!FAITHFUL.contains(&queueing), unfaithful);
+    if let Some(found) = details.queue_length.filter(|_| queueing != "noqueue") {
+        let mend = format!("'ip link set {name} txqueuelen {QUEUE_LENGTH}'");
+        let short = format!(
+            "has txqueuelen {found}, and a cycle has up to {frames} frames: others are refused (ENOBUFS); {mend}"
+        );
+        doubt(found < frames, short);
+        let long = format!(
+            "has txqueuelen {found}: after a hang, a step of the bring-up sends so many old frames at once; {mend}"
+        );
+        doubt(found > LONGEST_CYCLES * frames, long);
+    }
+    doubts
+}
+
+/// The commands that change a setting of a controller, for which the interface must be down.
+fn change(name: &str, setting: &str, value: &str) -> String {
+    let set = format!("ip link set {name}");
+    format!("'{set} down', '{set} type can {setting} {value}' and '{set} up' change it")
 }
 
 #[cfg(test)]
@@ -263,11 +194,8 @@ mod tests {
     }
 
     fn said(details: &InterfaceDetails) -> (Vec<String>, Vec<String>) {
-        let (faults, doubts) = judge("can0", details, NEEDS);
-        (
-            faults.iter().map(InterfaceFault::to_string).collect(),
-            doubts.iter().map(InterfaceDoubt::to_string).collect(),
-        )
+        let judged = JudgedInterface::new("can0", details.clone(), NEEDS);
+        (judged.faults, judged.doubts)
     }
 
     #[test]
@@ -323,7 +251,7 @@ mod tests {
                 "'tc qdisc replace dev can0 root pfifo_fast'",
             ),
             (InterfaceDetails { queue_length: Some(8), ..good() }, "'ip link set can0 txqueuelen 50'"),
-            (InterfaceDetails { queue_length: Some(1000), ..good() }, "the old frames of many cycles"),
+            (InterfaceDetails { queue_length: Some(1000), ..good() }, "so many old frames"),
         ];
         for (details, words) in table {
             let (faults, doubts) = said(&details);
@@ -343,6 +271,6 @@ mod tests {
             said(&InterfaceDetails { is_up, is_virtual: true, queueing, ..InterfaceDetails::default() })
         };
         assert_eq!(of(true), (vec![], vec![]));
-        assert_eq!(of(false).0, ["is down; 'ip link set can0 up txqueuelen 50' brings it up"]);
+        assert_eq!(of(false).0, ["can0 is down; 'ip link set can0 up txqueuelen 50' brings it up"]);
     }
 }

@@ -50,9 +50,7 @@ mod fitness;
 mod interface;
 
 pub use details::{ControlModes, InterfaceDetails};
-pub use fitness::{
-    InterfaceDoubt, InterfaceFault, InterfaceNeeds, bring_up_command, judge as judge_interface,
-};
+pub use fitness::{InterfaceNeeds, JudgedInterface, bring_up_command};
 pub use interface::{Interface, OpenError, explain_errno, is_supported};
 use interface::{errno, usable_transmit_capacity};
 
