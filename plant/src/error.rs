@@ -19,6 +19,9 @@ pub enum PlantError {
     /// A real interface.
     #[error(transparent)]
     Interface(#[from] OpenError),
+    /// Settings or a state of a real interface with which no drive can be controlled: what is wrong, and the remedies.
+    #[error("{}", .0.join("; "))]
+    Unfit(Vec<String>),
     /// Another master of this machine drives the interface.
     #[error("{0}: another rig drives it; end that one, or use other interfaces")]
     MasterHere(String),

@@ -2,7 +2,7 @@
 
 use std::io;
 
-use masseter_can::Interface;
+use masseter_can::{Interface, bring_up_command};
 use masseter_machine::SystemRoot;
 use masseter_runtime::transport::{Domain, DomainError};
 use masseter_scenario::wording::counted;
@@ -62,10 +62,12 @@ pub(super) fn interfaces(root: &SystemRoot) -> Finding {
 }
 
 /// Why an interface cannot send, and the command that remedies it.
-fn obstacle(Interface { name, is_up, is_bus_off, is_virtual, .. }: &Interface) -> Option<(String, String)> {
+fn obstacle(
+    Interface { name, is_up, is_bus_off, is_virtual, driver, .. }: &Interface,
+) -> Option<(String, String)> {
     if !is_up {
-        let controller = if *is_virtual { "" } else { " type can bitrate 1000000 restart-ms 100" };
-        let bring_up = format!("sudo ip link set {name} up txqueuelen 100{controller}");
+        let bitrate_bps = (!is_virtual).then_some(1_000_000);
+        let bring_up = format!("sudo {}", bring_up_command(name, driver.as_deref(), bitrate_bps));
         return Some((format!("{name} down"), bring_up));
     }
     // The kernel refuses `type can restart` if the interface restarts by itself.
@@ -180,8 +182,8 @@ mod tests {
         assert_eq!(
             interfaces(&down.root()).remedy.as_deref(),
             Some(
-                "sudo ip link set can0 up txqueuelen 100 type can bitrate 1000000 restart-ms 100 && \
-                 sudo ip link set vcan0 up txqueuelen 100"
+                "sudo ip link set can0 up txqueuelen 50 type can bitrate 1000000 restart-ms 100 && \
+                 sudo ip link set vcan0 up txqueuelen 50"
             )
         );
     }

@@ -20,7 +20,9 @@ use super::args::WriteArgs;
 use super::basis::Basis;
 use super::evidence::{Evidence, Past, StepFolder};
 use super::ledger::{before_file, read_before, return_owed_values};
-use super::robot_line::{LISTEN_NS, RobotLine, Surveys, deviations_table, drives, failed, prove_off};
+use super::robot_line::{
+    LISTEN_NS, RobotLine, Surveys, deviations_table, drives, failed, prove_off, warn_of_interfaces,
+};
 use super::step::Step;
 
 /// Configures the drives, and lists the changes.
@@ -146,6 +148,7 @@ impl<'a> Writing<'a> {
     fn begin(args: &'a WriteArgs, step: Step, scenario: Scenario) -> Result<Self, Failure> {
         let folder = StepFolder::begin(&args.robot.folder, step, &args.axes(), &scenario).usage()?;
         let mut robot = RobotLine::open(scenario, folder.log().usage()?).usage()?;
+        warn_of_interfaces(&robot.scenario.can);
         return_owed_values(&args.robot.folder, &robot.scenario, &mut robot.line, args.take_over)?;
         // All drives may boot until then. After a restart a survey is no more than a memory.
         robot.line.listen(LISTEN_NS).map_err(failed)?;

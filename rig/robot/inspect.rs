@@ -6,17 +6,18 @@
 use std::{collections::BTreeMap, fmt::Write};
 
 use clap::Args;
-use masseter_can::{InterfaceDetails, canopen::ObjectAddress};
+use masseter_can::{JudgedInterface, canopen::ObjectAddress};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::commissioning::{
     Address, BootUps, Deviation, Identity, LineError, OtherMaster, Outcome, Restarted, Survey, gaps,
-    object_name, reason_text,
+    judge_interfaces, object_name, reason_text,
 };
 use masseter_plant::description;
 use masseter_runtime::clock::SECOND_NS;
-use masseter_scenario::{CanConfig, DriveProfile, wording::counted};
+use masseter_scenario::{DriveProfile, wording::counted};
 use masseter_terminal::{Exit, Failure, OrFailure, Tone, result_with_tones};
 use serde::Serialize;
+use serde_json::json;
 
 use super::args::RobotArgs;
 use super::evidence::StepFolder;
@@ -26,6 +27,10 @@ use super::step::Step;
 
 /// For how long the buses are listened to before the first question, ns.
 const LISTEN_NS: u64 = 2 * SECOND_NS;
+
+/// What follows where an interface cannot be used.
+const NOTHING_SENT: &str = "nothing was sent, and no drive was asked\n";
+const TONES: [(&str, Tone); 3] = [("passed", Tone::Good), ("failed", Tone::Bad), ("warning", Tone::Doubtful)];
 
 /// The arguments of `robot inspect`.
 #[derive(Debug, Clone, Args)]
@@ -67,24 +72,11 @@ struct Read {
 /// What was found of everything.
 #[derive(Debug, Serialize)]
 struct InspectResult {
-    interfaces: Vec<InterfaceResult>,
+    interfaces: Vec<JudgedInterface>,
     masters: Vec<String>,
     other_nodes: Vec<String>,
     restarted: Vec<String>,
     drives: Vec<DriveResult>,
-}
-
-/// An interface, with its faults and its doubts in words.
-#[derive(Debug, Serialize)]
-struct InterfaceResult {
-    name: String,
-    bitrate_bps: Option<u32>,
-    sample_point_permille: Option<u32>,
-    restart_ms: Option<u32>,
-    state: Option<&'static str>,
-    errors: Option<[u16; 2]>,
-    faults: Vec<String>,
-    doubts: Vec<String>,
 }
 
 /// Inspects, and prints one table.
@@ -92,9 +84,15 @@ pub(crate) fn inspect(args: &InspectArgs) -> Result<Exit, Failure> {
     let scenario = args.robot.scenario().usage()?;
     let parent = &args.robot.folder;
     let mut folder = StepFolder::begin(parent, Step::Inspect, &Step::Inspect.axes(), &scenario).usage()?;
-    let CanConfig { interfaces, bitrate_bps, .. } = &scenario.can;
-    let details = |name: &String| InterfaceDetails::read(name).unwrap_or_default();
-    let interfaces = interfaces.iter().map(|name| interface(name, details(name), *bitrate_bps)).collect();
+    let interfaces = judge_interfaces(&scenario.can);
+    if interfaces.iter().any(|interface| !interface.faults.is_empty()) {
+        // A frame at a wrong bit rate would disturb every other node.
+        let mut text = String::new();
+        describe_interfaces(&interfaces, &mut text);
+        folder.finish_step(false, &json!({ "interfaces": interfaces })).incomplete()?;
+        result_with_tones(&(text + NOTHING_SENT), &TONES).usage()?;
+        return Ok(Exit::Failed);
+    }
     let mut robot = RobotLine::open(scenario, folder.log().usage()?).usage()?;
     let Read { surveys, answer, restarted } = read(&mut robot, args.scan).map_err(failed)?;
     let (strangers, can) = (robot.line.strangers(), &robot.scenario.can);
@@ -120,34 +118,20 @@ pub(crate) fn inspect(args: &InspectArgs) -> Result<Exit, Failure> {
         let _ = writeln!(text, "warning: {warning}");
     }
     folder.finish_step(passed, &result).incomplete()?;
-    result_with_tones(&text, &[("passed", Tone::Good), ("failed", Tone::Bad), ("warning", Tone::Doubtful)])
-        .usage()?;
+    result_with_tones(&text, &TONES).usage()?;
     Ok(if passed { Exit::Passed } else { Exit::Failed })
 }
 
-/// What the kernel says of a real interface, and what of it is wrong.
-fn interface(name: &str, details: InterfaceDetails, wanted_bps: u32) -> InterfaceResult {
-    let InterfaceDetails { bitrate_bps, sample_point_permille, restart_ms, state, errors } = details;
-    let (mut faults, mut doubts) = (Vec::new(), Vec::new());
-    if let Some(bps) = bitrate_bps.filter(|&bps| bps != wanted_bps) {
-        faults.push(format!(
-            "{name} has {bps} bit/s, can.bitrate_bps is {wanted_bps}; 'ip link set {name} down' and 'ip link \
-             set {name} up type can bitrate {wanted_bps} restart-ms 100' change it"
-        ));
+/// Each interface as the kernel has it, with what is wrong and what is risky.
+fn describe_interfaces(interfaces: &[JudgedInterface], text: &mut String) {
+    for JudgedInterface { name, details, faults, doubts } in interfaces {
+        let _ = writeln!(text, "{name}: {details}");
+        for (word, lines) in [("failed", faults), ("warning", doubts)] {
+            for line in lines {
+                let _ = writeln!(text, "{word}: {line}");
+            }
+        }
     }
-    if let Some(state @ ("bus-off" | "stopped" | "error passive")) = state {
-        faults.push(format!("{name} is {state}; check bit rate, termination and wiring"));
-    }
-    if restart_ms == Some(0) && bitrate_bps.is_some() {
-        doubts.push(format!(
-            "{name} has restart-ms 0: it stays off for good after bus-off; set restart-ms 100"
-        ));
-    }
-    if let Some([sent, received]) = errors.filter(|errors| *errors != [0, 0]) {
-        doubts.push(format!("{name} counts {sent} errors while sending and {received} while receiving"));
-    }
-    let name = name.to_owned();
-    InterfaceResult { name, bitrate_bps, sample_point_permille, restart_ms, state, errors, faults, doubts }
 }
 
 /// Reads all drives, and asks each of them again at the end.
@@ -199,12 +183,7 @@ fn describe(robot: &RobotLine, result: &InspectResult) -> (String, bool) {
         let _ = writeln!(text, "failed: {line}");
     };
     let _ = writeln!(text, "{}", devices(&result.drives));
-    for interface in &result.interfaces {
-        interface.faults.iter().for_each(|fault| fail(&mut text, fault));
-        for doubt in &interface.doubts {
-            let _ = writeln!(text, "warning: {doubt}");
-        }
-    }
+    describe_interfaces(&result.interfaces, &mut text);
     result.masters.iter().for_each(|sign| fail(&mut text, sign));
     for node in &result.other_nodes {
         let _ = writeln!(text, "warning: {node} is not of the scenario");
@@ -252,21 +231,33 @@ fn devices(drives: &[DriveResult]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use masseter_can::{InterfaceDetails, InterfaceNeeds};
+
     use super::*;
 
     #[test]
     fn a_wrong_bit_rate_is_a_fault_and_no_restart_a_doubt() {
+        let needs = InterfaceNeeds { bitrate_bps: 1_000_000, frames: 9 };
+        let of = |details| JudgedInterface::new("can0", details, needs);
         let details = InterfaceDetails {
+            is_up: true,
             bitrate_bps: Some(500_000),
             restart_ms: Some(0),
-            state: Some("bus-off"),
             errors: Some([0, 3]),
             ..InterfaceDetails::default()
         };
-        let result = interface("can0", details, 1_000_000);
-        assert_eq!((result.faults.len(), result.doubts.len()), (2, 2), "{result:?}");
-        assert!(result.faults[0].starts_with("can0 has 500000 bit/s, can.bitrate_bps is 1000000"));
-        let virtual_one = interface("vcan0", InterfaceDetails::default(), 1_000_000);
+        let result = of(InterfaceDetails { state: Some("bus-off"), ..details.clone() });
+        assert_eq!((result.faults.len(), result.doubts.len()), (2, 1), "{result:?}");
+        assert_eq!(of(details).doubts.len(), 2, "errors, and no restart");
+        let mut text = String::new();
+        describe_interfaces(&[result], &mut text);
+        assert!(
+            text.starts_with("can0: up, 500000 bit/s, bus-off, error counters 0 and 3, restart-ms 0\n"),
+            "{text}"
+        );
+        assert!(text.contains("\nfailed: can0 has 500000 bit/s, can.bitrate_bps is 1000000"), "{text}");
+        let virtual_one =
+            of(InterfaceDetails { is_up: true, is_virtual: true, ..InterfaceDetails::default() });
         assert!(virtual_one.faults.is_empty() && virtual_one.doubts.is_empty());
     }
 }

@@ -16,7 +16,7 @@ use super::basis::Basis;
 use super::evidence::{Past, StepFolder};
 use super::ledger::{owed_advice, owed_axes};
 use super::power_mark::{check_marks, marks_of_pose_check};
-use super::robot_line::warn_of_gaps;
+use super::robot_line::{warn_of_gaps, warn_of_interfaces};
 use super::step::Step;
 
 /// Where the evidence of a run's robot is.
@@ -79,6 +79,7 @@ impl Played<'_> {
         if scenario.can.is_virtual() {
             return Ok(());
         }
+        warn_of_interfaces(&scenario.can);
         if self.is_waived {
             status!(
                 "WITHOUT BRING-UP: signs, scales and zeros are not proved, and a wrong one can drive an axis into its end"

@@ -6,8 +6,8 @@ use anyhow::ensure;
 use masseter_can::canopen::NodeId;
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::commissioning::{
-    BootUps, Deviation, Known, Line, Outcome, PowerError, Settings, Survey, deviations, gaps, prove_no_power,
-    take_over,
+    BootUps, Deviation, Known, Line, Outcome, PowerError, Settings, Survey, deviations, gaps,
+    judge_interfaces, prove_no_power, take_over,
 };
 use masseter_plant::wanted::WantedDrive;
 use masseter_runtime::clock::MILLISECOND_NS;
@@ -102,6 +102,13 @@ pub(crate) fn failed(error: impl Into<anyhow::Error>) -> Failure {
 /// The drives that were surveyed.
 pub(crate) fn drives(surveys: &Surveys, can: &CanConfig) -> [Known; AXES] {
     std::array::from_fn(|axis| Known::of_survey(surveys[axis].as_ref(), can.node_ids[axis]))
+}
+
+/// Warns of what may go wrong on real interfaces.
+pub(crate) fn warn_of_interfaces(can: &CanConfig) {
+    for doubt in judge_interfaces(can).iter().flat_map(|judged| &judged.doubts) {
+        status!("warning: {doubt}");
+    }
 }
 
 /// Warns of what the identities of drives leave open.

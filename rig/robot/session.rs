@@ -17,7 +17,7 @@ use super::basis::Basis;
 use super::evidence::{Past, StepFolder};
 use super::ledger::{OwedFiles, return_owed_values};
 use super::power_mark::remove_mark;
-use super::robot_line::{LISTEN_NS, failed, wanted_drive, warn_of_gaps};
+use super::robot_line::{LISTEN_NS, failed, wanted_drive, warn_of_gaps, warn_of_interfaces};
 use super::step::Step;
 
 /// All axes.
@@ -63,6 +63,7 @@ impl Session {
         folder.evidence.in_order = needed.is_some();
         let log = folder.log().context("cannot write the log of the buses").incomplete()?;
         let mut line = Line::open(&scenario, log).usage()?;
+        warn_of_interfaces(&scenario.can);
         line.listen(LISTEN_NS).died()?;
         line.strangers().refuse_masters().usage()?;
         let boot_ups = BootUps::until_now(&line);

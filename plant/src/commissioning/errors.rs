@@ -4,9 +4,9 @@
 use std::fmt::{self, Display, Formatter};
 use std::io;
 
-use masseter_can::SendError;
 use masseter_can::canopen::{AbortCode, EmergencyCode, ObjectAddress};
 use masseter_can::cia402::{DriveState, StatuswordError};
+use masseter_can::{SendError, explain_errno};
 use masseter_model::geometry::AXIS_NAMES;
 
 use crate::error::PlantError;
@@ -75,6 +75,16 @@ pub enum LineError {
         bus: usize,
         /// The reason.
         error: SendError,
+    },
+    /// An interface fails: above all one that is unplugged, down, or has a full queue.
+    #[error("bus {bus}, {interface}: {}", explain_errno(.interface, *.errno))]
+    Interface {
+        /// The bus.
+        bus: usize,
+        /// The interface.
+        interface: String,
+        /// Error number of the operating system.
+        errno: i32,
     },
     /// The emulated mechanism failed, or the memory of emulated drives cannot be written.
     #[error(transparent)]

@@ -21,6 +21,7 @@ mod watchdog;
 mod write;
 
 pub use crate::master::link::Address;
+pub use crate::master::sockets::judge_interfaces;
 pub use deviations::{Deviation, Outcome, deviations};
 pub use errors::{
     AxisError, LineError, MasterSign, MotionError, OtherMaster, Restarted, SdoReason, Silence, StopCause,

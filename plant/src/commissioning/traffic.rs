@@ -7,7 +7,7 @@ use std::io::Write;
 
 use masseter_can::canopen::{Cob, Emergency, Heartbeat, NmtState, SdoResponse};
 use masseter_can::wire::{Bitrate, INTERFRAME_BITS, frame_bits};
-use masseter_can::{Frame, Received, SendError, Tapped, TappedFrame, candump};
+use masseter_can::{FULL_QUEUE, Frame, ReceiveError, Received, SendError, Tapped, TappedFrame, candump};
 use masseter_model::geometry::AXES;
 use masseter_runtime::clock::{self, MILLISECOND_NS};
 use masseter_scenario::{MASTER_NODE, Scenario};
@@ -86,7 +86,17 @@ impl Traffic {
 
     /// Sends a frame to a bus.
     pub(super) fn send(&mut self, bus: usize, frame: Frame) -> Result<(), LineError> {
-        self.wires.send(bus, frame).map_err(|error| LineError::Send { bus, error })
+        self.wires.send(bus, frame).map_err(|error| match error {
+            SendError::Os { errno } => self.failed(bus, errno),
+            SendError::QueueFull { .. } if matches!(self.wires, Wires::Real(_)) => {
+                self.failed(bus, FULL_QUEUE)
+            }
+            _ => LineError::Send { bus, error },
+        })
+    }
+
+    fn failed(&self, bus: usize, errno: i32) -> LineError {
+        LineError::Interface { bus, interface: self.names[bus].clone(), errno }
     }
 
     /// A step of time: the heartbeat, and every frame that has come.
@@ -102,8 +112,14 @@ impl Traffic {
                     self.note_time(bus, &tapped);
                 }
             }
-            while let Some(received) = self.wires.receive(bus) {
-                self.note_frame(bus, &received.frame);
+            loop {
+                match self.wires.receive(bus) {
+                    Ok(Some(received)) => self.note_frame(bus, &received.frame),
+                    // Lost frames show as missing answers.
+                    Err(ReceiveError::Overrun { .. }) => {}
+                    Ok(None) => break,
+                    Err(ReceiveError::Os { errno }) => return Err(self.failed(bus, errno)),
+                }
             }
         }
         Ok(())
@@ -279,11 +295,11 @@ impl Wires {
         on_link!(self, link => link.port(bus).send(now_ns, frame))
     }
 
-    /// The next frame of another node. Lost frames show as missing answers.
-    pub(super) fn receive(&mut self, bus: usize) -> Option<Received> {
+    /// The next frame of another node.
+    pub(super) fn receive(&mut self, bus: usize) -> Result<Option<Received>, ReceiveError> {
         use masseter_can::Bus;
         let now_ns = self.now_ns();
-        on_link!(self, link => link.port(bus).receive(now_ns)).ok().flatten()
+        on_link!(self, link => link.port(bus).receive(now_ns))
     }
 
     /// The next frame of any node, this one too.

@@ -98,6 +98,11 @@ impl Exchange {
 pub(super) struct BusMonitor {
     /// Whether the master's controller is in bus-off.
     pub(super) is_off: bool,
+    /// Whether frames wait that are older than two cycles: new ones behind them would go out in a burst. Frames of the last
+    /// cycle may wait, since an adapter on USB takes a while to tell what it has sent.
+    pub(super) is_stuck: bool,
+    /// Frames handed over since the last SYNC, that one included, and in the cycle before.
+    handed_over: [u32; 2],
     /// Whether any drive was ever received.
     pub(super) has_drives: bool,
     /// The axis whose SDO request was sent last.
@@ -111,6 +116,21 @@ impl BusMonitor {
     pub(super) fn set_error_state(&mut self, state: ErrorState) -> Option<bool> {
         let is_off = state == ErrorState::BusOff;
         (std::mem::replace(&mut self.is_off, is_off) != is_off).then_some(is_off)
+    }
+
+    /// Takes before a SYNC how many frames wait; returns whether the bus gets stuck. A stuck bus gets no frames until all
+    /// old ones are sent.
+    pub(super) fn note_unsent(&mut self, unsent: usize) -> bool {
+        let was_stuck = self.is_stuck;
+        let [last, before] = self.handed_over;
+        self.is_stuck = unsent > if was_stuck { 0 } else { (last + before) as usize };
+        self.handed_over = [0, last];
+        self.is_stuck && !was_stuck
+    }
+
+    /// Notes a frame that the bus took.
+    pub(super) fn note_handed_over(&mut self) {
+        self.handed_over[0] += 1;
     }
 
     /// The axes in the order of their turns for SDO.
@@ -208,6 +228,29 @@ mod bus_monitor_tests {
         }
         let strangers = [1, 2, 127, 1, 127, 1, 3, 2].map(|id| bus.is_new_unknown(NodeId::new(id).unwrap()));
         assert_eq!(strangers, [true, true, true, false, false, false, true, false]);
+    }
+
+    /// Four frames a cycle, and how many of them wait at each SYNC.
+    #[test]
+    fn a_bus_is_stuck_while_frames_wait_that_are_older_than_two_cycles() {
+        let states = |unsent: &[usize]| {
+            let mut bus = BusMonitor::default();
+            let mut state = |&unsent: &usize| {
+                let begins = bus.note_unsent(unsent);
+                if !bus.is_stuck {
+                    (0..4).for_each(|_| bus.note_handed_over());
+                }
+                (begins, bus.is_stuck)
+            };
+            unsent.iter().map(&mut state).collect::<Vec<_>>()
+        };
+        assert_eq!(
+            states(&[0, 3, 4, 7, 8, 8, 0]),
+            [(false, false); 7],
+            "an adapter that tells late what it has sent"
+        );
+        let (free, begins, stuck) = ((false, false), (true, true), (false, true));
+        assert_eq!(states(&[0, 3, 7, 11, 11, 2, 0, 4]), [free, free, free, begins, stuck, stuck, free, free]);
     }
 
     #[test]

@@ -29,7 +29,7 @@ mod tests;
 
 use masseter_can::canopen::{Cob, Heartbeat, NmtState, sync};
 use masseter_can::wire::worst_case_bits;
-use masseter_can::{Bus, Frame, ReceiveError, Received};
+use masseter_can::{Bus, FULL_QUEUE, Frame, ReceiveError, Received, SendError};
 use masseter_model::geometry::AXES;
 use masseter_runtime::messages::codes::{
     BootPhase, Cause, DriveRequest, DriveState, EventKind, Source, drive_state_code,
@@ -100,6 +100,7 @@ impl Master {
         self.drives.iter_mut().for_each(|drive| drive.begin_cycle(now_ns));
         self.watch_buses(now_ns, buses);
         for bus in 0..self.buses.len() {
+            self.watch_queue(now_ns, bus, buses);
             self.send(now_ns, bus, sync::frame(), buses);
         }
     }
@@ -112,7 +113,11 @@ impl Master {
                     Ok(Some(received)) => self.take_frame(bus, &received),
                     // Lost frames show as missing process data; the other frames remain.
                     Err(ReceiveError::Overrun { .. }) => {}
-                    Ok(None) | Err(ReceiveError::Os { .. }) => break,
+                    Ok(None) => break,
+                    Err(ReceiveError::Os { errno }) => {
+                        self.fail(now_ns, Subject::Bus(bus), &Failure::with(Cause::BusRefused, errno, 0.0));
+                        break;
+                    }
                 }
             }
         }
@@ -144,6 +149,9 @@ impl Master {
     /// drives, and at last a due heartbeat. So the heartbeat delays no process data on an interface that sends in the
     /// order of its queue.
     pub(crate) fn apply(&mut self, now_ns: u64, command: Option<&Command>, buses: &mut impl Buses) {
+        for (bus, monitor) in self.buses.iter_mut().enumerate().filter(|(_, monitor)| monitor.is_stuck) {
+            monitor.is_stuck = buses.port(bus).unsent() > 0;
+        }
         self.supervise(now_ns);
         self.take_command(now_ns, command);
         self.restore(now_ns);
@@ -301,15 +309,22 @@ impl Master {
         if !self.may_boot() {
             return;
         }
+        // A message of the boot counts as sent, and is repeated late.
         for axis in 0..AXES {
-            if let Some(frame) = self.drives[axis].boot_command(now_ns) {
+            if !self.is_stuck(axis)
+                && let Some(frame) = self.drives[axis].boot_command(now_ns)
+            {
                 self.send_to(now_ns, axis, frame, buses);
             }
         }
         for bus in 0..self.buses.len() {
-            self.send_sdo(now_ns, bus, buses);
+            if !self.buses[bus].is_stuck {
+                self.send_sdo(now_ns, bus, buses);
+            }
         }
-        self.start_drives(now_ns, buses);
+        if !self.buses.iter().any(|bus| bus.is_stuck) {
+            self.start_drives(now_ns, buses);
+        }
     }
 
     /// Sends one SDO request at most; the drives of a bus take turns.
@@ -339,15 +354,36 @@ impl Master {
         }
     }
 
+    fn is_stuck(&self, axis: usize) -> bool {
+        self.buses[self.drives[axis].address.bus].is_stuck
+    }
+
     fn send_to(&mut self, now_ns: u64, axis: usize, frame: Frame, buses: &mut impl Buses) {
         self.send(now_ns, self.drives[axis].address.bus, frame, buses);
     }
 
+    /// Reports once that a bus with drives keeps frames that are older than two cycles.
+    fn watch_queue(&mut self, now_ns: u64, bus: usize, buses: &mut impl Buses) {
+        let begins = self.buses[bus].note_unsent(buses.port(bus).unsent());
+        if begins && self.buses[bus].has_drives {
+            let value = f64::from(FULL_QUEUE);
+            self.events.add(now_ns, Subject::Bus(bus), Event { value, ..notice(Cause::BusRefused) });
+        }
+    }
+
+    /// Sends a frame, unless older ones are stuck before it: a drive must not get the frames of many cycles at once.
     fn send(&mut self, now_ns: u64, bus: usize, frame: Frame, buses: &mut impl Buses) {
-        if let Err(refusal) = buses.port(bus).send(now_ns, frame)
-            && self.buses[bus].is_unexplained(&refusal)
-        {
-            self.fail(self.exchange.wake.woke_ns, Subject::Bus(bus), &Failure::new(Cause::BusRefused));
+        if self.buses[bus].is_stuck {
+            return;
+        }
+        match buses.port(bus).send(now_ns, frame) {
+            Ok(()) => self.buses[bus].note_handed_over(),
+            Err(refusal) if self.buses[bus].is_unexplained(&refusal) => {
+                let errno = if let SendError::Os { errno } = refusal { errno } else { FULL_QUEUE };
+                let failure = Failure::with(Cause::BusRefused, errno, 0.0);
+                self.fail(self.exchange.wake.woke_ns, Subject::Bus(bus), &failure);
+            }
+            Err(_) => {}
         }
     }
 

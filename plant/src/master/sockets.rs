@@ -10,18 +10,36 @@ use std::os::linux::net::SocketAddrExt;
 use std::os::unix::net::{SocketAddr, UnixDatagram};
 
 use masseter_can::faults::FaultNote;
-use masseter_can::{Bus, OpenError, PortFaults, ReceiveError, SocketCan, Tapped};
+use masseter_can::{
+    Bus, InterfaceNeeds, JudgedInterface, OpenError, PortFaults, ReceiveError, SocketCan, Tapped,
+};
 use masseter_model::geometry::AXES;
 use masseter_runtime::clock;
 use masseter_runtime::injection::Injected;
 use masseter_runtime::realtime::Waiter;
-use masseter_scenario::{MASTER_NODE, Scenario};
+use masseter_scenario::{CanConfig, MASTER_NODE, Scenario};
 
 use super::link::{Buses, Link, MASTER_PORT, check_quantities, fault_seed, faults_of_bus, restart_after_ns};
 use crate::error::PlantError;
 
 /// Longest wait for a real frame, ns. A fault may hold frames back that are due before the next arrival.
 const LONGEST_BLOCK_NS: u64 = 100_000;
+
+/// Judges the interfaces of a scenario. One that cannot be asked is left out: its opening says why.
+pub fn judge_interfaces(can: &CanConfig) -> Vec<JudgedInterface> {
+    let judged = |(name, drives): (&String, &Vec<usize>)| {
+        // SYNC, SDO and heartbeat; for each drive process data, or NMT at its start.
+        let frames = 3 + 2 * drives.len() as u32;
+        JudgedInterface::read(name, InterfaceNeeds { bitrate_bps: can.bitrate_bps, frames }).ok()
+    };
+    can.interfaces.iter().zip(&can.buses).filter_map(judged).collect()
+}
+
+/// Refuses interfaces over which nothing may be sent.
+pub(crate) fn refuse_unfit(can: &CanConfig) -> Result<(), PlantError> {
+    let faults: Vec<_> = judge_interfaces(can).into_iter().flat_map(|judged| judged.faults).collect();
+    if faults.is_empty() { Ok(()) } else { Err(PlantError::Unfit(faults)) }
+}
 
 /// The master's port, its faults, and a tap on every wire.
 #[derive(Debug)]
@@ -33,7 +51,8 @@ pub struct SocketLink {
 }
 
 impl SocketLink {
-    /// Opens the scenario's interfaces, one a bus, with the faults of the master's ports from `now_ns` on.
+    /// Opens the scenario's interfaces, one a bus, with the faults of the master's ports from `now_ns` on. Nothing is sent,
+    /// and nothing ever will be on an interface that is unfit.
     pub(crate) fn open(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
         check_quantities(scenario)?;
         let can = &scenario.can;
@@ -42,6 +61,7 @@ impl SocketLink {
             let (seed, restart_after_ns) = (fault_seed(scenario, bus), restart_after_ns(can));
             Ok(PortFaults::new(faults, MASTER_PORT, seed, restart_after_ns)?)
         };
+        refuse_unfit(can)?;
         let faults = (0..can.buses.len()).map(faults_of_port).collect::<Result<_, PlantError>>()?;
         let port = |interface: &String| SocketCan::open(interface);
         let open = || can.interfaces.iter().map(port).collect::<Result<_, _>>();

@@ -54,6 +54,7 @@ use crate::tracking::{PoseSource, Tracking};
 pub struct Analysis {
     period_ns: u64,
     declared: Declared,
+    interfaces: Vec<String>,
     /// The cycles in the order of time.
     timeline: Timeline,
     named: NamedWatch,
@@ -114,6 +115,7 @@ impl Analysis {
         Self {
             period_ns,
             declared: declared.clone(),
+            interfaces: scenario.can.interfaces.clone(),
             timeline: Timeline::new(scenario, declared, pace),
             named: NamedWatch::new(declared),
             shown: Some(Box::new(Shown::new(scenario))),
@@ -182,7 +184,9 @@ impl Analysis {
                 self.shown.iter_mut().for_each(|shown| shown.over_time.apply_signals(message));
             }
             Recorded::Parameters(message) => self.named.add_parameters(message),
-            Recorded::Event(event) => self.apply_event(EventRecord::of_run(event, &self.declared)),
+            Recorded::Event(event) => {
+                self.apply_event(EventRecord::of_run(event, &self.declared, &self.interfaces));
+            }
             Recorded::Machine(machine) => {
                 self.shown.iter_mut().for_each(|shown| shown.longest_cycles.apply_machine(machine));
             }

@@ -129,9 +129,9 @@ impl EventRecord {
         Unit::named(name).unwrap_or(Dimension::One.si_unit())
     }
 
-    /// The same, of a run whose controller declared these parameters.
-    pub(crate) fn of_run(event: &Event, declared: &Declared) -> Self {
-        let text = explain(event).or_else(|| change(event, declared));
+    /// The same, of a run on these interfaces whose controller declared these parameters.
+    pub(crate) fn of_run(event: &Event, declared: &Declared, interfaces: &[String]) -> Self {
+        let text = explain(event, interfaces).or_else(|| change(event, declared));
         Self { text, ..event.into() }
     }
 }
@@ -154,7 +154,7 @@ impl From<&Event> for EventRecord {
             cause: event.cause.into(),
             axis: AXIS_NAMES.get(event.axis as usize).copied(),
             transition: moved.then(|| [state(event.from), state(event.to)]),
-            text: explain(event),
+            text: explain(event, &[]),
             value: event.value,
             limit: event.limit,
         }

@@ -26,6 +26,9 @@ pub trait Bus {
 
     /// The port's fault confinement, as last known.
     fn status(&self) -> BusStatus;
+
+    /// Frames of this port that wait for the wire, as far as known. After a hang of the adapter they are all sent at once.
+    fn unsent(&self) -> usize;
 }
 
 impl<B: Bus + ?Sized> Bus for &mut B {
@@ -40,6 +43,10 @@ impl<B: Bus + ?Sized> Bus for &mut B {
     fn status(&self) -> BusStatus {
         (**self).status()
     }
+
+    fn unsent(&self) -> usize {
+        (**self).unsent()
+    }
 }
 
 /// A frame with the time it was received.
@@ -50,6 +57,9 @@ pub struct Received {
     /// When its last end-of-frame bit was on the wire, ns.
     pub time_ns: u64,
 }
+
+/// The system's error for a transmit queue without room (`ENOBUFS`).
+pub const FULL_QUEUE: i32 = libc::ENOBUFS;
 
 /// Why a frame was not queued.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

@@ -20,13 +20,16 @@ mod tap;
 mod virtual_bus;
 pub mod wire;
 
-pub use bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
+pub use bus::{Bus, BusStatus, ErrorState, FULL_QUEUE, ReceiveError, Received, SendError};
 pub use codes::UnknownCode;
 pub use frame::{CanId, Frame, FrameError};
 pub use pdo::{EVERY_SYNC, PdoMapping, PdoMappingError, Rpdo1, Tpdo1};
 pub use plan::{BusPlan, NoReleaser, Overload, PeriodicMessage, PlannedMessage, Release};
 pub use port_faults::{Faulty, NotByPort, PortFaults};
-pub use socket_can::{Interface, InterfaceDetails, OpenError, SocketCan, is_supported};
+pub use socket_can::{
+    ControlModes, Interface, InterfaceDetails, InterfaceNeeds, JudgedInterface, OpenError, SocketCan,
+    bring_up_command, explain_errno, is_supported,
+};
 pub use tap::{ERROR_FLAG, ErrorKind, ErrorReport, ErrorReportError, Tapped, TappedFrame, candump};
 pub use virtual_bus::{Port, VirtualWire, WireConfig};
 pub use wire::{Bitrate, BitrateError};

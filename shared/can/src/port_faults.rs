@@ -231,6 +231,10 @@ impl<B: Bus> Bus for Faulty<'_, B> {
             status
         }
     }
+
+    fn unsent(&self) -> usize {
+        self.faults.held.len() + self.bus.unsent()
+    }
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ fn a_stop_for_want_of_a_pose_says_why_there_is_none() {
         let mut bench = Bench::new();
         bench.run_until(ControllerState::Running);
         bench.cycle(|reading| Some(Reading { position_m, ..reading }));
-        let said = explain(bench.events.last().unwrap()).unwrap_or_default();
+        let said = explain(bench.events.last().unwrap(), &[]).unwrap_or_default();
         assert!(said.contains(reason) && said.contains("[mechanism]"), "{said}");
     }
 }

@@ -115,7 +115,7 @@ fn whatever_a_law_does_wrong_ends_in_a_safe_stop_with_its_cause() {
         (0..3).for_each(|_| bench.cycle(Some));
         assert_eq!(bench.controller.state(), ControllerState::SafeStop, "{cause}");
         assert_eq!(bench.last_cause(), cause);
-        let explained = explain(bench.events.last().unwrap()).unwrap_or_default();
+        let explained = explain(bench.events.last().unwrap(), &[]).unwrap_or_default();
         assert!(explained.contains(said), "{explained}");
     }
 }

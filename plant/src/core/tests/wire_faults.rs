@@ -199,6 +199,28 @@ fn process_data_of_the_cycle_before_are_no_answer_however_late_they_come() {
     }
 }
 
+/// The frames of the master are held for 10 ms, as by an adapter that hangs. The frames of three cycles may come late.
+#[test]
+fn drives_get_no_burst_of_old_syncs_after_a_hang() {
+    let mut bench = bench_with(FaultConfig {
+        kind: BusFault::Delay.into(),
+        node: Some(127),
+        size: Some("10 ms".parse().unwrap()),
+        until_s: Some(0.51),
+        ..base()
+    });
+    play_until(&mut bench, 0.6);
+    let frames = bench.frames.iter().filter(|frame| frame.bus == 0);
+    let frames = frames.map(|frame| *tap::decode(frame).unwrap().frame().unwrap());
+    let syncs = frames.filter(|frame| Cob::try_from(frame.frame.id()) == Ok(Cob::Sync));
+    let times_ns: Vec<_> = syncs.map(|frame| frame.time_ns).collect();
+    let gaps_ns = times_ns.windows(2).map(|pair| pair[1] - pair[0]);
+    let (longest_ns, close) =
+        (gaps_ns.clone().max().unwrap(), gaps_ns.filter(|&gap_ns| gap_ns < PERIOD_NS / 2).count());
+    assert!(longest_ns > 9 * PERIOD_NS, "the hang shows: {longest_ns} ns");
+    assert!(close <= 3, "{close} SYNCs close behind another");
+}
+
 #[test]
 fn drives_that_are_switched_on_after_the_master_are_waited_for() {
     let faults = [1, 2, 3].map(|node| FaultConfig {

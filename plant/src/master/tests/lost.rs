@@ -1,5 +1,8 @@
 //! Drives that are lost, or restart, before they are started.
 
+use masseter_can::FULL_QUEUE;
+use masseter_can::canopen::sync;
+
 use super::*;
 
 #[test]
@@ -70,6 +73,36 @@ fn a_running_drive_may_owe_its_process_data_for_three_cycles() {
     let fault = *bench.events_of(EventKind::Fault).next().unwrap();
     assert_eq!((fault.cause, fault.axis), (Cause::ProcessDataLost.code(), 1));
     assert_eq!((fault.value, fault.limit), (4.0, 3.0));
+}
+
+#[test]
+fn an_adapter_that_hangs_gets_the_frames_of_three_cycles_and_then_none_until_they_are_sent() {
+    let mut bench = Bench::enabled();
+    bench.wires.wire(0).hangs = true;
+    bench.cycles(20, DriveRequest::Enable);
+    let kept = bench.wires.wire(0).kept.clone();
+    let syncs = kept.iter().filter(|frame| frame.id() == sync::frame().id()).count();
+    assert_eq!(syncs, 3, "{kept:?}");
+    let notice = bench.events_of(EventKind::Notice).find(|event| event.cause == Cause::BusRefused.code());
+    let notice = *notice.expect("the hang is reported");
+    assert_eq!((notice.bus, notice.value), (0, f64::from(FULL_QUEUE)));
+    assert_eq!(bench.causes(EventKind::Fault)[0], Cause::ProcessDataLost);
+    bench.wires.wire(0).hangs = false;
+    bench.wires.wire(0).kept.clear();
+    bench.cycles(600, DriveRequest::Off);
+    bench.cycles(30, DriveRequest::Enable);
+    assert!(bench.all_are(DriveState::OperationEnabled), "{:?}", bench.events);
+}
+
+#[test]
+fn an_adapter_that_is_unplugged_stops_the_drives_with_the_number_of_the_error() {
+    let mut bench = Bench::enabled();
+    bench.wires.wire(1).errno = Some(6);
+    bench.cycle(Some(DriveRequest::Enable));
+    let fault = *bench.events_of(EventKind::Fault).next().unwrap();
+    assert_eq!((fault.cause, fault.bus, fault.value), (Cause::BusRefused.code(), 1, 6.0));
+    bench.cycles(10, DriveRequest::Enable);
+    assert_eq!(bench.causes(EventKind::Fault)[0], Cause::BusRefused);
 }
 
 /// From its boot-up message on: nothing earlier counts for the drive.

@@ -284,6 +284,11 @@ pub(super) struct Wire {
     arrived: VecDeque<Received>,
     /// Whether the master's controller is off the bus.
     pub(super) is_off: bool,
+    /// Whether its adapter hangs: it keeps the master's frames.
+    pub(super) hangs: bool,
+    pub(super) kept: Vec<Frame>,
+    /// Error of the system for every call.
+    pub(super) errno: Option<i32>,
     /// Frames lost for want of room, reported once.
     pub(super) lost: u64,
 }
@@ -295,7 +300,15 @@ impl Wires {
     pub(super) fn new(peers: [Peer; AXES]) -> Self {
         let mut peers = Vec::from(peers);
         let second = peers.split_off(AXES / 2);
-        Self([peers, second].map(|peers| Wire { peers, arrived: VecDeque::new(), is_off: false, lost: 0 }))
+        Self([peers, second].map(|peers| Wire {
+            peers,
+            arrived: VecDeque::new(),
+            is_off: false,
+            hangs: false,
+            kept: Vec::new(),
+            errno: None,
+            lost: 0,
+        }))
     }
 
     pub(super) fn peer(&mut self, axis: usize) -> &mut Peer {
@@ -332,6 +345,13 @@ impl Bus for &mut Wire {
         if self.is_off {
             return Err(SendError::BusOff { tec: 256 });
         }
+        if let Some(errno) = self.errno {
+            return Err(SendError::Os { errno });
+        }
+        if self.hangs {
+            self.kept.push(frame);
+            return Ok(());
+        }
         let mut out = Vec::new();
         self.peers.iter_mut().for_each(|peer| peer.receive(now_ns, &frame, &mut out));
         for frame in out {
@@ -341,6 +361,9 @@ impl Bus for &mut Wire {
     }
 
     fn receive(&mut self, _now_ns: u64) -> Result<Option<Received>, ReceiveError> {
+        if let Some(errno) = self.errno {
+            return Err(ReceiveError::Os { errno });
+        }
         match std::mem::take(&mut self.lost) {
             0 => Ok(self.arrived.pop_front()),
             lost => Err(ReceiveError::Overrun { lost }),
@@ -350,6 +373,10 @@ impl Bus for &mut Wire {
     fn status(&self) -> BusStatus {
         let (state, tec) = if self.is_off { (ErrorState::BusOff, 256) } else { (ErrorState::Active, 0) };
         BusStatus { state, tec, rec: 0 }
+    }
+
+    fn unsent(&self) -> usize {
+        self.kept.len()
     }
 }
 

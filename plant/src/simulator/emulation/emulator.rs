@@ -12,6 +12,7 @@ use masseter_scenario::Scenario;
 use super::Emulation;
 use crate::error::{DynamicsError, PlantError};
 use crate::master::link::drive_ports;
+use crate::master::sockets::refuse_unfit;
 
 /// The longest wait for a frame: the drives are stepped at least this often, ns.
 const LONGEST_WAIT_NS: u64 = MILLISECOND_NS;
@@ -58,6 +59,7 @@ impl Emulator {
     /// The scenario's drives, switched on at `now_ns` on the interfaces that it names.
     pub fn open(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
         let emulation = Emulation::new(scenario, now_ns)?;
+        refuse_unfit(&scenario.can)?;
         let interfaces = drive_ports(&scenario.can)?.map(|at| &scenario.can.interfaces[at.bus]);
         let ports = interfaces.map(|interface| SocketCan::open(interface));
         let ports: Vec<_> = ports.into_iter().collect::<Result<_, OpenError>>()?;

@@ -41,7 +41,7 @@ impl Sinks {
     fn show_news(&mut self, message: &Recorded) {
         let Recorded::Event(event) = message else { return };
         let is_news = [Cause::WaitsForDrive, Cause::FaultReset].iter().any(|news| news.code() == event.cause);
-        if let Some(text) = explain(event).filter(|_| is_news) {
+        if let Some(text) = explain(event, &[]).filter(|_| is_news) {
             self.end_line(self.losses());
             self.stderr.write(&format!("masseter: {text}\n"));
         }

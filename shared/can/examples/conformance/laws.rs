@@ -280,6 +280,10 @@ mod tests {
         fn status(&self) -> BusStatus {
             BusStatus { state: ErrorState::Active, tec: 0, rec: 0 }
         }
+
+        fn unsent(&self) -> usize {
+            self.pair.arrived[1].len()
+        }
     }
 
     #[test]

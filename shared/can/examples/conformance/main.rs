@@ -53,6 +53,10 @@ impl<B: Bus> Bus for Counted<'_, B> {
     fn status(&self) -> BusStatus {
         self.bus.status()
     }
+
+    fn unsent(&self) -> usize {
+        self.bus.unsent()
+    }
 }
 
 /// Counts the frames that pass an interface.

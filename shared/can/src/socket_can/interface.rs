@@ -1,12 +1,9 @@
-//! The CAN interfaces of this machine, the state of their controllers in the kernel, and the remedy for every refusal.
-//! This module changes no interface.
+//! The CAN interfaces of this machine, and the remedy for every refusal to open one. This module changes no interface.
 
 use std::fs;
 use std::io;
 use std::path::Path;
 
-use rustix::net::netlink::SocketAddrNetlink;
-use rustix::net::{AddressFamily, RecvFlags, SendFlags, SocketType, recv, sendto, socket};
 use socketcan::{CanSocket, Socket};
 
 /// Hardware type of CAN interfaces (`ARPHRD_CAN`).
@@ -73,6 +70,8 @@ pub struct Interface {
     pub is_bus_off: bool,
     /// Whether the interface has no hardware, such as `vcan0`. Only a controller of hardware has a bit rate.
     pub is_virtual: bool,
+    /// The kernel's driver of its hardware.
+    pub driver: Option<String>,
     /// Length of its transmit queue, frames.
     pub transmit_capacity: usize,
 }
@@ -98,9 +97,15 @@ impl Interface {
             is_up: flags().is_none_or(|flags| flags & UP != 0),
             is_bus_off: number("carrier") == Some(0),
             is_virtual: !folder.join("device").exists(),
+            driver: driver(folder),
             transmit_capacity: number("tx_queue_len").unwrap_or(0) as usize,
         })
     }
+}
+
+/// The kernel's driver of the hardware of an interface, which is described in this folder.
+pub(super) fn driver(folder: &Path) -> Option<String> {
+    Some(fs::read_link(folder.join("device/driver")).ok()?.file_name()?.to_str()?.to_owned())
 }
 
 /// Whether this kernel has CAN, and this process may use CAN.
@@ -123,6 +128,25 @@ pub(super) fn usable_transmit_capacity(interface: &str) -> Result<usize, OpenErr
     }
 }
 
+/// What an error of the system on an interface in use says, and what to do.
+pub fn explain_errno(interface: &str, errno: i32) -> String {
+    let remedy = match errno {
+        libc::ENODEV | libc::ENXIO => {
+            format!("{interface} is gone: plug its adapter in, bring {interface} up again, then start anew")
+        }
+        // An unplugged adapter is taken down first.
+        libc::ENETDOWN => format!(
+            "{interface} was taken down or unplugged: plug its adapter in, then 'ip link set {interface} up' brings it up again"
+        ),
+        libc::ENOBUFS => format!(
+            "{interface} does not get rid of its frames: its adapter hangs, the bus is overloaded, or no node acknowledges; check \
+             power, wiring and bit rate of the drives, then 'ip link set {interface} down' and 'ip link set {interface} up'"
+        ),
+        _ => format!("look for {interface} in the kernel's log (dmesg)"),
+    };
+    format!("{}; {remedy}", io::Error::from_raw_os_error(errno))
+}
+
 /// The number of an error of the operating system.
 pub(super) fn errno(error: &io::Error) -> i32 {
     // Only a frame of an unexpected size has no number of the system's.
@@ -134,100 +158,6 @@ fn existing(there: &[String]) -> String {
         [] => "is none: load the driver of your adapter, or 'ip link add vcan0 type vcan'".to_owned(),
         [only] => format!("is {only}"),
         more => format!("are {}", more.join(", ")),
-    }
-}
-
-/// States of fault confinement, by their number in the kernel.
-const STATES: [&str; 6] =
-    ["error active", "error warning", "error passive", "bus-off", "stopped", "sleeping"];
-
-// Messages and attributes (linux/rtnetlink.h, linux/if_link.h, linux/can/netlink.h). `socketcan` reads them with its feature
-// `netlink`, at the price of a dozen crates.
-const GET_LINK: u16 = 18;
-const NEW_LINK: u16 = 16;
-const REQUEST: u16 = 1;
-const LINK_INFO: u16 = 18;
-const INFO_DATA: u16 = 2;
-const BIT_TIMING: u16 = 1;
-const STATE: u16 = 4;
-const RESTART_MS: u16 = 6;
-const ERROR_COUNTERS: u16 = 8;
-/// Bytes of the header of a message, and of the link's description before its attributes.
-const HEADER: usize = 16;
-const LINK: usize = 16;
-
-/// Settings and state of a CAN controller. A driver may report only some of them; `vcan` reports nothing.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct InterfaceDetails {
-    /// Bit rate, bit/s.
-    pub bitrate_bps: Option<u32>,
-    /// Sample point, ‰ of a bit.
-    pub sample_point_permille: Option<u32>,
-    /// Time from bus-off to the controller's own restart, ms; 0 for never.
-    pub restart_ms: Option<u32>,
-    /// State of its fault confinement.
-    pub state: Option<&'static str>,
-    /// Errors counted while sending, and while receiving.
-    pub errors: Option<[u16; 2]>,
-}
-
-impl InterfaceDetails {
-    /// Asks the kernel. The query needs no rights.
-    ///
-    /// # Errors
-    /// The system's error, for instance for an interface that does not exist.
-    pub fn read(interface: &str) -> io::Result<Self> {
-        let index = fs::read_to_string(format!("/sys/class/net/{interface}/ifindex"))?;
-        let index: u32 = index.trim().parse().map_err(io::Error::other)?;
-        let socket = socket(AddressFamily::NETLINK, SocketType::RAW, None)?;
-        let mut request = [0; HEADER + LINK];
-        request[..4].copy_from_slice(&((HEADER + LINK) as u32).to_ne_bytes());
-        request[4..6].copy_from_slice(&GET_LINK.to_ne_bytes());
-        request[6..8].copy_from_slice(&REQUEST.to_ne_bytes());
-        request[20..24].copy_from_slice(&index.to_ne_bytes());
-        sendto(&socket, &request, SendFlags::empty(), &SocketAddrNetlink::new(0, 0))?;
-        let mut answer = vec![0; 1 << 15];
-        let (length, _) = recv(&socket, &mut answer[..], RecvFlags::empty())?;
-        Self::parse(&answer[..length])
-            .ok_or_else(|| io::Error::other("the kernel's answer describes no link"))
-    }
-
-    /// None for a message that is no description of a link.
-    fn parse(message: &[u8]) -> Option<Self> {
-        if short(message.get(4..)?)? != NEW_LINK {
-            return None;
-        }
-        let info = find(message.get(HEADER + LINK..)?, LINK_INFO).unwrap_or_default();
-        let data = find(info, INFO_DATA).unwrap_or_default();
-        let timing = find(data, BIT_TIMING).unwrap_or_default();
-        let errors = find(data, ERROR_COUNTERS).and_then(|pair| Some([short(pair)?, short(pair.get(2..)?)?]));
-        Some(Self {
-            bitrate_bps: long(timing),
-            sample_point_permille: timing.get(4..).and_then(long),
-            restart_ms: find(data, RESTART_MS).and_then(long),
-            state: find(data, STATE).and_then(long).and_then(|state| STATES.get(state as usize).copied()),
-            errors,
-        })
-    }
-}
-
-fn short(bytes: &[u8]) -> Option<u16> {
-    Some(u16::from_ne_bytes(*bytes.first_chunk()?))
-}
-
-fn long(bytes: &[u8]) -> Option<u32> {
-    Some(u32::from_ne_bytes(*bytes.first_chunk()?))
-}
-
-/// The value of the first attribute of a kind. Attributes begin at multiples of four bytes.
-fn find(mut attributes: &[u8], kind: u16) -> Option<&[u8]> {
-    loop {
-        let (length, found) = (usize::from(short(attributes)?), short(attributes.get(2..)?)?);
-        let value = attributes.get(4..length)?;
-        if found & 0x3FFF == kind {
-            return Some(value);
-        }
-        attributes = attributes.get(length.next_multiple_of(4)..)?;
     }
 }
 
@@ -251,6 +181,20 @@ mod tests {
     }
 
     #[test]
+    fn an_error_on_an_interface_in_use_has_its_text_its_interface_and_a_remedy() {
+        let table = [
+            (libc::ENXIO, "No such device or address (os error 6); can1 is gone: plug its adapter in"),
+            (libc::ENODEV, "No such device (os error 19); can1 is gone"),
+            (libc::ENETDOWN, "Network is down (os error 100); can1 was taken down or unplugged"),
+            (libc::ENOBUFS, "No buffer space available (os error 105); can1 does not get rid of its frames"),
+            (libc::EIO, "(os error 5); look for can1 in the kernel's log"),
+        ];
+        for (errno, words) in table {
+            assert!(explain_errno("can1", errno).contains(words), "{}", explain_errno("can1", errno));
+        }
+    }
+
+    #[test]
     fn existing_interfaces_are_listed() {
         let there = |names: &[&str]| {
             let there = names.iter().map(|&name| name.to_owned()).collect();
@@ -259,48 +203,5 @@ mod tests {
         assert!(there(&[]).contains("there is none"));
         assert!(there(&["can0"]).ends_with("there is can0"));
         assert!(there(&["can0", "can1"]).ends_with("there are can0, can1"));
-    }
-
-    fn attribute(kind: u16, value: &[u8]) -> Vec<u8> {
-        let mut bytes = [(value.len() as u16 + 4).to_ne_bytes(), kind.to_ne_bytes()].concat();
-        bytes.extend(value);
-        bytes.resize(bytes.len().next_multiple_of(4), 0);
-        bytes
-    }
-
-    #[test]
-    fn the_settings_of_a_controller_are_found_among_other_attributes() {
-        let timing: Vec<u8> =
-            [500_000u32, 875, 1, 2, 3, 4, 5, 6].iter().flat_map(|n| n.to_ne_bytes()).collect();
-        let data = [
-            attribute(BIT_TIMING, &timing),
-            attribute(3, &[1, 2, 3]),
-            attribute(STATE, &3u32.to_ne_bytes()),
-            attribute(RESTART_MS, &100u32.to_ne_bytes()),
-            attribute(ERROR_COUNTERS, &[7, 0, 9, 0].map(u8::to_le)),
-        ]
-        .concat();
-        let info = [attribute(1, b"can\0"), attribute(INFO_DATA, &data)].concat();
-        let mut message = vec![0; HEADER + LINK];
-        message[4..6].copy_from_slice(&NEW_LINK.to_ne_bytes());
-        message.extend([attribute(3, b"can0\0"), attribute(LINK_INFO | 0x8000, &info)].concat());
-        let expected = InterfaceDetails {
-            bitrate_bps: Some(500_000),
-            sample_point_permille: Some(875),
-            restart_ms: Some(100),
-            state: Some("bus-off"),
-            errors: Some([7, 9]),
-        };
-        assert_eq!(InterfaceDetails::parse(&message), Some(expected));
-        for length in 0..message.len() {
-            // A truncated message causes no panic.
-            let _ = InterfaceDetails::parse(&message[..length]);
-        }
-    }
-
-    #[test]
-    fn the_kernel_answers_of_an_interface_that_is_no_can_and_refuses_what_does_not_exist() {
-        assert_eq!(InterfaceDetails::read("lo").unwrap(), InterfaceDetails::default());
-        assert!(InterfaceDetails::read("nocan9").is_err());
     }
 }

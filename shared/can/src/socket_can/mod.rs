@@ -13,8 +13,8 @@
 //! The driver reports fault confinement by error frames, which change [`status`](Bus::status). A [tap](SocketCan::tap)
 //! alone gets the error frames. They are changes of state and, with `berr-reporting on`, errors on the wire. Warnings,
 //! lost arbitration and faults of the line are skipped. A port counts as error active until the first error frame. A
-//! port in bus-off refuses to send until the interface goes down or the driver reports a restart
-//! (`ip link set … type can restart-ms 100`).
+//! port in bus-off refuses to send until the driver reports a restart or an active controller, until a frame arrives a tenth
+//! of a second later, or until the interface goes down. A warning ends no bus-off.
 //!
 //! # Losses
 //! The kernel counts the frames lost in a full socket. The kernel does not count the frames lost in the controller, so
@@ -45,9 +45,13 @@ use crate::{
     Tapped, TappedFrame,
 };
 
+mod details;
+mod fitness;
 mod interface;
 
-pub use interface::{Interface, InterfaceDetails, OpenError, is_supported};
+pub use details::{ControlModes, InterfaceDetails};
+pub use fitness::{InterfaceNeeds, JudgedInterface, bring_up_command};
+pub use interface::{Interface, OpenError, explain_errno, is_supported};
 use interface::{errno, usable_transmit_capacity};
 
 /// Most frames that one call of [`Bus::receive`] reads: error and remote frames must not delay a cycle.
@@ -59,6 +63,10 @@ const OWN_PORT: u8 = 0;
 /// Number of 32-bit fields of `SO_MEMINFO` (`linux/sock_diag.h`), and the index of the counter of dropped frames.
 const MEMINFO_FIELDS: usize = 9;
 const MEMINFO_DROPS: usize = 8;
+/// Index of the bytes of frames that wait in the interface's queue or in the controller.
+const MEMINFO_UNSENT: usize = 2;
+/// Traffic so long after bus-off proves a restart that no error frame reported: frames received before are over, ns.
+const RESTARTED_NS: u64 = 100_000_000;
 /// Transmit error counter at which a controller is bus-off; error frames have no room for more than 255.
 const BUS_OFF_TEC: u16 = 256;
 /// An older stamp means that the wall clock has been set.
@@ -88,6 +96,10 @@ pub struct SocketCan {
     socket: CanSocket,
     transmit_capacity: usize,
     status: BusStatus,
+    /// Bytes of memory that the kernel counts for an unsent frame; 0 until one is sent.
+    frame_bytes: u32,
+    /// When the driver reported bus-off.
+    off_since_ns: u64,
     last_ns: u64,
     /// The port has fetched frames since the last look at the drop counter.
     drained: bool,
@@ -105,7 +117,16 @@ impl SocketCan {
         let failed = |error| OpenError::from_errno(interface, errno(&error));
         let socket = CanSocket::open(interface).map_err(failed)?;
         configure(&socket).map_err(failed)?;
-        Ok(Self { socket, transmit_capacity, status: UNDISTURBED, last_ns: 0, drained: false, dropped: 0 })
+        Ok(Self {
+            socket,
+            transmit_capacity,
+            status: UNDISTURBED,
+            frame_bytes: 0,
+            off_since_ns: 0,
+            last_ns: 0,
+            drained: false,
+            dropped: 0,
+        })
     }
 
     /// Now on the clock of the time stamps, ns of `CLOCK_MONOTONIC`.
@@ -166,9 +187,15 @@ impl SocketCan {
         self.last_ns = time_ns;
         let tapped = |frame| Tapped::Frame(Received { frame, time_ns }.into());
         match frame {
-            CanFrame::Data(data) => Ok(from_kernel(data).map(tapped)),
+            CanFrame::Data(data) => {
+                apply_traffic(&mut self.status, time_ns.saturating_sub(self.off_since_ns));
+                Ok(from_kernel(data).map(tapped))
+            }
             CanFrame::Error(error) => {
                 let kind = apply_error(&mut self.status, error.error_bits(), error.data())?;
+                if kind == Some(ErrorKind::State(ErrorState::BusOff)) {
+                    self.off_since_ns = time_ns;
+                }
                 let report = |kind| ErrorReport::new(time_ns, OWN_PORT, kind, self.status);
                 Ok(kind.map(report).map(Tapped::Error))
             }
@@ -181,19 +208,20 @@ impl SocketCan {
         if !std::mem::take(&mut self.drained) {
             return Ok(());
         }
-        let dropped = self.count_dropped().map_err(|error| ReceiveError::Os { errno: errno(&error) })?;
+        let dropped =
+            self.memory_info(MEMINFO_DROPS).map_err(|error| ReceiveError::Os { errno: errno(&error) })?;
         match dropped.wrapping_sub(std::mem::replace(&mut self.dropped, dropped)) {
             0 => Ok(()),
             lost => Err(ReceiveError::Overrun { lost: u64::from(lost) }),
         }
     }
 
-    /// Frames that the kernel has dropped since the opening of the socket.
-    fn count_dropped(&self) -> io::Result<u32> {
+    /// A figure of the socket: the frames dropped since its opening, or the bytes of unsent ones.
+    fn memory_info(&self, index: usize) -> io::Result<u32> {
         let mut fields = [0; MEMINFO_FIELDS * size_of::<u32>()];
         self.socket.get_socket_option_bytes(libc::SOL_SOCKET, libc::SO_MEMINFO, &mut fields)?;
         let (fields, _) = fields.as_chunks();
-        Ok(u32::from_ne_bytes(fields[MEMINFO_DROPS]))
+        Ok(u32::from_ne_bytes(fields[index]))
     }
 
     fn receive_failed(&mut self, error: &io::Error) -> Result<(), ReceiveError> {
@@ -221,7 +249,12 @@ impl Bus for SocketCan {
             // ENOBUFS: the interface's queue; EAGAIN: the socket's own share of it.
             libc::ENOBUFS | libc::EAGAIN => SendError::QueueFull { capacity: self.transmit_capacity },
             errno => SendError::Os { errno },
-        })
+        })?;
+        if self.frame_bytes == 0 {
+            // The first frame is alone in the queue. A virtual interface has sent it already, and keeps none.
+            self.frame_bytes = self.memory_info(MEMINFO_UNSENT).unwrap_or(0);
+        }
+        Ok(())
     }
 
     fn receive(&mut self, _: u64) -> Result<Option<Received>, ReceiveError> {
@@ -233,6 +266,11 @@ impl Bus for SocketCan {
     fn status(&self) -> BusStatus {
         self.status
     }
+
+    fn unsent(&self) -> usize {
+        let bytes = self.memory_info(MEMINFO_UNSENT).unwrap_or(0);
+        bytes.checked_div(self.frame_bytes).unwrap_or(0) as usize
+    }
 }
 
 fn configure(socket: &CanSocket) -> io::Result<()> {
@@ -241,6 +279,13 @@ fn configure(socket: &CanSocket) -> io::Result<()> {
     socket.set_error_filter_accept_all()?;
     socket.set_recv_timestamp(true)?;
     socket.set_socket_option_int(libc::SOL_SOCKET, libc::SO_RCVBUF, RECEIVE_BUFFER)
+}
+
+/// Ends bus-off by a frame that arrives so long after it, since a controller in bus-off receives nothing.
+fn apply_traffic(status: &mut BusStatus, after_ns: u64) {
+    if status.state == ErrorState::BusOff && after_ns >= RESTARTED_NS {
+        *status = UNDISTURBED;
+    }
 }
 
 /// Changes a port's status by an error frame of its driver (`linux/can/error.h`). Most drivers report every change of
@@ -260,9 +305,12 @@ fn apply_error(status: &mut BusStatus, classes: u32, data: &[u8]) -> Result<Opti
     if has(CAN_ERR_CNT) {
         (status.tec, status.rec) = (u16::from(tec), u16::from(rec));
     }
-    if has(CAN_ERR_CRTL) && problems.intersects(PASSIVE) {
+    let is_off = status.state == ErrorState::BusOff;
+    if has(CAN_ERR_CRTL) && problems.contains(ControllerProblems::ACTIVE) && is_off {
+        *status = UNDISTURBED;
+    } else if has(CAN_ERR_CRTL) && problems.intersects(PASSIVE) && !is_off {
         status.state = ErrorState::Passive;
-    } else if has(CAN_ERR_CRTL) && problems.intersects(ACTIVE) {
+    } else if has(CAN_ERR_CRTL) && problems.intersects(ACTIVE) && !is_off {
         status.state = ErrorState::Active;
     }
     if has(CAN_ERR_BUSOFF) {
@@ -337,6 +385,10 @@ mod tests {
             (CAN_ERR_CRTL | CAN_ERR_CNT, [0, TX_PASSIVE, 0, 0, 0, 0, 128, 7], ErrorState::Passive, 128, 7),
             (CAN_ERR_CNT, [0, 0, 0, 0, 0, 0, 248, 7], ErrorState::Passive, 248, 7),
             (CAN_ERR_BUSOFF, [0; 8], ErrorState::BusOff, 256, 7),
+            (CAN_ERR_CRTL, [0, TX_WARNING, 0, 0, 0, 0, 0, 0], ErrorState::BusOff, 256, 7),
+            (CAN_ERR_CRTL, [0, TX_PASSIVE, 0, 0, 0, 0, 0, 0], ErrorState::BusOff, 256, 7),
+            (CAN_ERR_CRTL, [0, BACK, 0, 0, 0, 0, 0, 0], ErrorState::Active, 0, 0),
+            (CAN_ERR_BUSOFF, [0; 8], ErrorState::BusOff, 256, 0),
             (CAN_ERR_RESTARTED, [0; 8], ErrorState::Active, 0, 0),
             (CAN_ERR_CRTL, [0, TX_PASSIVE, 0, 0, 0, 0, 0, 0], ErrorState::Passive, 0, 0),
             (CAN_ERR_CRTL, [0, BACK, 0, 0, 0, 0, 0, 0], ErrorState::Active, 0, 0),
@@ -347,6 +399,20 @@ mod tests {
             assert_eq!(apply_error(&mut port, classes, &data), Ok(kind));
             assert_eq!(port, BusStatus { state, tec, rec }, "{classes:x} {data:?}");
         }
+    }
+
+    #[test]
+    fn traffic_well_after_bus_off_proves_a_restart_that_no_error_frame_reported() {
+        let off = BusStatus { state: ErrorState::BusOff, tec: BUS_OFF_TEC, rec: 3 };
+        for (after_ns, is_over) in [(0, false), (RESTARTED_NS - 1, false), (RESTARTED_NS, true)] {
+            let mut port = off;
+            apply_traffic(&mut port, after_ns);
+            assert_eq!(port, if is_over { UNDISTURBED } else { off }, "{after_ns}");
+        }
+        let passive = BusStatus { state: ErrorState::Passive, ..off };
+        let mut port = passive;
+        apply_traffic(&mut port, u64::MAX);
+        assert_eq!(port, passive);
     }
 
     #[test]

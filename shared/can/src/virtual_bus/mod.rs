@@ -280,4 +280,8 @@ impl Bus for Port<'_> {
     fn status(&self) -> BusStatus {
         self.wire.nodes.stations[self.port].confinement.status()
     }
+
+    fn unsent(&self) -> usize {
+        self.wire.nodes.stations[self.port].transmit.frames.len()
+    }
 }

@@ -7,16 +7,20 @@ use super::Event;
 use super::codes::{Cause, EventKind, NoPose, Source};
 use masseter_can::canopen::{AbortCode, EmergencyCode, ObjectAddress};
 use masseter_can::cia402::{DriveState, Statusword};
+use masseter_can::explain_errno;
 
 /// The sentence for an event with a node, a bus, an object, or the reason for a missing pose; `None` for other events.
-pub fn explain(event: &Event) -> Option<String> {
+/// A bus also has the name of its interface, if it is among these.
+pub fn explain(event: &Event, interfaces: &[String]) -> Option<String> {
     let cause = Cause::try_from(event.cause).ok().filter(|_| event.kind != EventKind::Transition.code())?;
-    let words = words_of_start(cause, event).or_else(|| words_of_run(cause, event))?;
-    Some(format!("{}: {words}", place_of(event)))
+    let interface = interfaces.get(usize::from(event.bus)).map(String::as_str);
+    let words = words_of_start(cause, event).or_else(|| words_of_run(cause, event, interface))?;
+    Some(format!("{}: {words}", place_of(event, interface)))
 }
 
-fn place_of(event: &Event) -> String {
+fn place_of(event: &Event, interface: Option<&str>) -> String {
     let Event { node, bus, .. } = event;
+    let bus = interface.map_or_else(|| bus.to_string(), |name| format!("{bus}, {name}"));
     match (AXIS_NAMES.get(event.axis as usize), node) {
         _ if event.cause == Cause::LawFailed.code() => "the pose law".to_owned(),
         _ if event.cause == Cause::FoodBroke.code() => format!("tooth {}", event.object),
@@ -110,7 +114,7 @@ fn words_of_start(cause: Cause, event: &Event) -> Option<String> {
 }
 
 /// The meaning of value, limit and object by the cause, with the remedy, for buses and mechanism.
-fn words_of_run(cause: Cause, event: &Event) -> Option<String> {
+fn words_of_run(cause: Cause, event: &Event, interface: Option<&str>) -> Option<String> {
     let (value, limit) = (event.value as u32, event.limit as u32);
     Some(match cause {
         Cause::FoodBroke => format!("the food broke at {:.0} N", event.value),
@@ -141,6 +145,9 @@ fn words_of_run(cause: Cause, event: &Event) -> Option<String> {
         Cause::BusOff => format!(
             "off after too many errors (transmit error counter {value}); check bit rate, termination and wiring"
         ),
+        Cause::BusRefused if value != 0 => {
+            explain_errno(interface.unwrap_or("the interface"), event.value as i32)
+        }
         Cause::BusRefused => {
             "a frame could not be sent; check that the interface is up and that another node acknowledges"
                 .to_owned()
@@ -233,23 +240,31 @@ mod tests {
         let (value, limit) = (f64::from(0x6041_0010), f64::from(0x6040_0010));
         let pdo = Event { object: 0x16_0001, value, limit, ..event(Cause::WrongPdo) };
         assert_eq!(
-            explain(&pdo).unwrap(),
+            explain(&pdo, &[]).unwrap(),
             "axis l1 (node 4 on bus 1): object 1600h:01h is 60410010h, expected 60400010h; give the drive the \
              rig's PDO mapping and store it"
         );
         let value = f64::from(AbortCode::READ_ONLY.0);
         let refused = Event { object: 0x10_1700, value, ..event(Cause::SdoAborted) };
-        assert!(explain(&refused).unwrap().contains("object 1017h:00h: 06010002h (object is read-only)"));
-        let cycle = explain(&Event { object: 0x60_C202, ..refused }).unwrap();
+        assert!(
+            explain(&refused, &[]).unwrap().contains("object 1017h:00h: 06010002h (object is read-only)")
+        );
+        let cycle = explain(&Event { object: 0x60_C202, ..refused }, &[]).unwrap();
         assert!(cycle.contains("choose rate_hz so that the cycle is whole in it"), "{cycle}");
         let off = Event { axis: NO_AXIS, node: 0, value: 256.0, ..event(Cause::BusOff) };
-        assert!(explain(&off).unwrap().starts_with("bus 1: off after"));
+        assert!(explain(&off, &[]).unwrap().starts_with("bus 1: off after"));
+        let gone = Event { value: 6.0, ..Event { cause: Cause::BusRefused.code(), ..off } };
+        assert_eq!(
+            explain(&gone, &["can0".to_owned(), "can1".to_owned()]).unwrap(),
+            "bus 1, can1: No such device or address (os error 6); can1 is gone: plug its adapter in, bring can1 up again, then \
+             start anew"
+        );
     }
 
     #[test]
     fn what_keeps_drives_off_is_said_with_state_code_and_remedy() {
         let at = |cause, value: u16, limit: u16| {
-            explain(&Event { value: value.into(), limit: limit.into(), ..event(cause) }).unwrap()
+            explain(&Event { value: value.into(), limit: limit.into(), ..event(cause) }, &[]).unwrap()
         };
         assert_eq!(
             at(Cause::FaultFound, 0x8611, 0x0218),
@@ -271,7 +286,7 @@ mod tests {
     fn kinematics_without_a_pose_says_why() {
         let stopped = |cause: Cause, axis: u32, reason: NoPose| {
             let (source, object) = (Source::Controller.code(), reason.code());
-            explain(&Event { source, axis, object, node: 0, bus: 0, ..event(cause) }).unwrap()
+            explain(&Event { source, axis, object, node: 0, bus: 0, ..event(cause) }, &[]).unwrap()
         };
         assert_eq!(
             stopped(Cause::ForwardKinematics, NO_AXIS, NoPose::Unassemblable),
@@ -284,10 +299,10 @@ mod tests {
 
     #[test]
     fn what_figures_say_alone_is_left_to_them() {
-        assert_eq!(explain(&event(Cause::CommandLost)), None);
+        assert_eq!(explain(&event(Cause::CommandLost), &[]), None);
         // Older recordings do not have the reason.
-        assert_eq!(explain(&event(Cause::ForwardKinematics)), None);
+        assert_eq!(explain(&event(Cause::ForwardKinematics), &[]), None);
         let moved = Event { kind: EventKind::Transition.code(), ..event(Cause::BootTimeout) };
-        assert_eq!(explain(&moved), None);
+        assert_eq!(explain(&moved, &[]), None);
     }
 }
