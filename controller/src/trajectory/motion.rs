@@ -6,8 +6,8 @@ use masseter_scenario::{JawConfig, MotionConfig};
 
 use super::doubts::jumps;
 use super::generators::{Chewing, Excursion, minimum_jerk_integral};
-use super::import::import;
 use super::mandible::JawFrame;
+use super::plausible::import;
 use super::recording::Recording;
 use super::{TrajectoryError, interpolate, require};
 

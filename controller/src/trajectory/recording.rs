@@ -31,6 +31,18 @@ pub(super) struct Sample {
     pub displacement: Pose,
 }
 
+impl Sample {
+    /// How far a point of the jaw has moved from its place in the closed jaw, m.
+    pub(super) fn way(&self, point: &Vec3) -> Vec3 {
+        moved(&self.displacement, point)
+    }
+}
+
+/// How far a displacement moves a point, m.
+pub(super) fn moved(displacement: &Pose, point: &Vec3) -> Vec3 {
+    displacement.rotation * point + displacement.translation.vector - point
+}
+
 /// Jaw displacements over the recording's own time, from 0.
 #[derive(Debug, Clone)]
 pub(super) struct Recording {

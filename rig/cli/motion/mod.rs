@@ -12,11 +12,11 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::Args;
 use masseter_controller::trajectory::{
-    Gap, Glitch, PointFigures, Range, RecordingSurvey, Trajectory, TrajectoryError, survey,
+    Frame, Gap, Glitch, PointFigures, Range, RecordingSurvey, Trajectory, TrajectoryError, survey,
 };
 use masseter_model::geometry::{AXES, AXIS_NAMES, Mechanism};
 use masseter_plan::{Overrides, best_placement, demands, scenario_with_overrides};
-use masseter_scenario::{MotionConfig, Scenario, wording::counted};
+use masseter_scenario::{LengthUnit, MotionConfig, Scenario, TimeUnit, wording::counted};
 use masseter_terminal::{Exit, Format, Tone, result, result_with_tones};
 use serde::Serialize;
 
@@ -76,6 +76,9 @@ struct Found {
     survey: RecordingSurvey,
     #[serde(flatten)]
     judged: Judged,
+    /// With the axes that the motion shows; several where they are as likely as each other.
+    suggestions: Vec<Suggestion>,
+    /// The first of them.
     suggestion: Option<Suggestion>,
 }
 
@@ -98,8 +101,14 @@ struct Strokes {
 /// Keys of the scenario.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct Suggestion {
+    /// `motion.length_unit`; none where the stated one is likely.
+    length_unit: Option<LengthUnit>,
+    /// `motion.time_unit`; none where the stated one is likely.
+    time_unit: Option<TimeUnit>,
     /// `motion.axes`; none where the stated ones are likely.
     axes: Option<[String; 3]>,
+    /// The motion of the jaw with these axes.
+    jaw: Option<String>,
     /// `jaw.closed_offset_m`; none where the stated one is good.
     closed_offset_m: Option<[f64; 3]>,
     /// Whether the rig would play the motion with them.
@@ -114,8 +123,15 @@ impl Found {
         let survey = survey(file, &scenario.jaw)?;
         let mechanism = Mechanism::new(&scenario.mechanism)?;
         let judged = Judged::new(scenario, &mechanism);
-        let suggestion = suggest(scenario, &mechanism, survey.likely_axes.as_ref(), &judged);
-        Ok(Self { file: path.to_owned(), survey, judged, suggestion })
+        let other = survey.frames.iter().filter(|frames| !frames.fits()).flat_map(|frames| frames.likely());
+        let mut frames: Vec<Option<&Frame>> = other.map(Some).collect();
+        if frames.is_empty() {
+            frames.push(None);
+        }
+        let suggest = |frame| suggest(scenario, &mechanism, survey.likely_units, frame, &judged);
+        let suggestions: Vec<_> = frames.into_iter().filter_map(suggest).collect();
+        let suggestion = suggestions.first().cloned();
+        Ok(Self { file: path.to_owned(), survey, judged, suggestions, suggestion })
     }
 }
 
@@ -142,28 +158,39 @@ impl Strokes {
     }
 }
 
-/// What to change; nothing where the motion fits as it is.
+/// What to change; nothing where the motion fits as it is. Whatever is suggested was played.
 fn suggest(
     scenario: &Scenario,
     mechanism: &Mechanism,
-    axes: Option<&[String; 3]>,
+    units: Option<(LengthUnit, TimeUnit)>,
+    frame: Option<&Frame>,
     now: &Judged,
 ) -> Option<Suggestion> {
-    if axes.is_none() && now.fits() {
+    let is_changed = units.is_some() || frame.is_some();
+    if !is_changed && now.fits() {
         return None;
     }
     let mut changed = scenario.clone();
-    if let (Some(axes), MotionConfig::File(file)) = (axes, &mut changed.motion) {
-        file.axes.clone_from(axes);
+    let (mut length_unit, mut time_unit) = (None, None);
+    if let MotionConfig::File(file) = &mut changed.motion {
+        if let Some((length, time)) = units {
+            length_unit = (length != file.length_unit).then_some(length);
+            time_unit = (time != file.time_unit).then_some(time);
+            (file.length_unit, file.time_unit) = (length, time);
+        }
+        if let Some(frame) = frame {
+            file.axes.clone_from(&frame.axes);
+        }
     }
-    let is_turned_enough = axes.is_some() && Judged::new(&changed, mechanism).fits();
-    let closed_offset_m = if is_turned_enough { None } else { better_offset(&changed, mechanism) };
-    if axes.is_none() && closed_offset_m.is_none() {
+    let is_enough = is_changed && Judged::new(&changed, mechanism).fits();
+    let closed_offset_m = if is_enough { None } else { better_offset(&changed, mechanism) };
+    if !is_changed && closed_offset_m.is_none() {
         return None;
     }
     changed.jaw.closed_offset_m = closed_offset_m.unwrap_or(changed.jaw.closed_offset_m);
     let judged = Judged::new(&changed, mechanism);
-    Some(Suggestion { axes: axes.cloned(), closed_offset_m, judged })
+    let (axes, jaw) = (frame.map(|frame| frame.axes.clone()), frame.map(Frame::words));
+    Some(Suggestion { length_unit, time_unit, axes, jaw, closed_offset_m, judged })
 }
 
 /// The offset with the most left of every stroke, to half a millimetre; none where there is no better one.
@@ -191,8 +218,27 @@ fn describe(found: &Found) -> String {
     for doubt in &survey.doubts {
         let _ = writeln!(text, "warning {doubt}");
     }
+    for implausible in &survey.implausible {
+        let _ = writeln!(text, "warning {implausible}");
+    }
+    text += &axes(survey);
     text += &judgement(&found.judged);
-    text + &found.suggestion.as_ref().map_or_else(String::new, suggested)
+    if found.suggestions.len() > 1 {
+        text += "AMBIGUOUS: these axes are as likely as each other; look at the condyles\n";
+    }
+    text + &found.suggestions.iter().map(suggested).collect::<String>()
+}
+
+/// The jaw's motion with the stated axes and with the most likely ones.
+fn axes(survey: &RecordingSurvey) -> String {
+    let Some(frames) = &survey.frames else {
+        return "axes    not judged: the motion has no opening\n".to_owned();
+    };
+    let line = |(name, frame): (&str, &Frame)| {
+        format!("{name:<7} {frame} misfit {:.1}: {}\n", frame.misfit, frame.words())
+    };
+    let others = frames.best.iter().filter(|frame| frame.axes != frames.stated.axes);
+    [("axes", &frames.stated)].into_iter().chain(others.map(|frame| ("or", frame))).map(line).collect()
 }
 
 fn head(survey: &RecordingSurvey) -> String {
@@ -281,8 +327,14 @@ fn judgement(judged: &Judged) -> String {
 
 fn suggested(suggestion: &Suggestion) -> String {
     let mut text = String::from("suggest for the scenario:\n");
-    if let Some([anterior, left, up]) = &suggestion.axes {
-        let _ = writeln!(text, "  [motion]\n  axes = [\"{anterior}\", \"{left}\", \"{up}\"]");
+    let length = suggestion.length_unit.map(|unit| format!("  length_unit = \"{}\"\n", unit.name()));
+    let time = suggestion.time_unit.map(|unit| format!("  time_unit = \"{}\"\n", unit.name()));
+    let axes = suggestion.axes.iter().zip(&suggestion.jaw).map(|([anterior, left, up], jaw)| {
+        format!("  axes = [\"{anterior}\", \"{left}\", \"{up}\"]  # {jaw}\n")
+    });
+    let motion: String = length.into_iter().chain(time).chain(axes).collect();
+    if !motion.is_empty() {
+        text = text + "  [motion]\n" + &motion;
     }
     if let Some([x, y, z]) = suggestion.closed_offset_m {
         let _ = writeln!(text, "  [jaw]\n  closed_offset_m = [{x:?}, {y:?}, {z:?}]");
