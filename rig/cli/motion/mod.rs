@@ -12,8 +12,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::Args;
 use masseter_controller::trajectory::{
-    Frame, Gap, Glitch, PointFigures, Range, RecordingSurvey, Trajectory, TrajectoryError, survey,
+    Frame, Frames, Gap, Glitch, PointFigures, Range, RecordingSurvey, Trajectory, TrajectoryError, survey,
 };
+use masseter_judge::{RecordedError, RecordedFigures, RecordedWatch};
 use masseter_model::geometry::{AXES, AXIS_NAMES, Mechanism};
 use masseter_plan::{Overrides, best_placement, demands, scenario_with_overrides};
 use masseter_scenario::{LengthUnit, MotionConfig, Scenario, TimeUnit, wording::counted};
@@ -76,6 +77,8 @@ struct Found {
     survey: RecordingSurvey,
     #[serde(flatten)]
     judged: Judged,
+    /// How far filter and ramps lead the motion from the file's rows; none of a motion that is refused.
+    recorded: Option<RecordedFigures>,
     /// With the axes that the motion shows; several where they are as likely as each other.
     suggestions: Vec<Suggestion>,
     /// The first of them.
@@ -123,7 +126,7 @@ impl Found {
         let survey = survey(file, &scenario.jaw)?;
         let mechanism = Mechanism::new(&scenario.mechanism)?;
         let judged = Judged::new(scenario, &mechanism);
-        let other = survey.frames.iter().filter(|frames| !frames.fits()).flat_map(|frames| frames.likely());
+        let other = survey.frames.iter().filter(|frames| !frames.fits()).flat_map(Frames::likely);
         let mut frames: Vec<Option<&Frame>> = other.map(Some).collect();
         if frames.is_empty() {
             frames.push(None);
@@ -131,7 +134,8 @@ impl Found {
         let suggest = |frame| suggest(scenario, &mechanism, survey.likely_units, frame, &judged);
         let suggestions: Vec<_> = frames.into_iter().filter_map(suggest).collect();
         let suggestion = suggestions.first().cloned();
-        Ok(Self { file: path.to_owned(), survey, judged, suggestions, suggestion })
+        let recorded = predicted(scenario, &mechanism);
+        Ok(Self { file: path.to_owned(), survey, judged, recorded, suggestions, suggestion })
     }
 }
 
@@ -205,6 +209,18 @@ fn better_offset(scenario: &Scenario, mechanism: &Mechanism) -> Option<[f64; 3]>
     Some(std::array::from_fn(at))
 }
 
+/// The errors that a robot without errors would have: those of filter and ramps.
+fn predicted(scenario: &Scenario, mechanism: &Mechanism) -> Option<RecordedFigures> {
+    let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, mechanism, scenario.duration_s).ok()?;
+    let cycles = (trajectory.duration_s() / scenario.period_s()) as u32;
+    let mut watch = RecordedWatch::new(trajectory.clone(), &scenario.jaw);
+    for cycle in 0..=cycles {
+        let motion_s = trajectory.motion_time_s(f64::from(cycle) * scenario.period_s());
+        watch.add(motion_s, &trajectory.pose_in_motion(motion_s));
+    }
+    watch.into_figures()
+}
+
 /// The description as text: no line is longer than a terminal, but for those with a path.
 fn describe(found: &Found) -> String {
     let survey = &found.survey;
@@ -222,11 +238,25 @@ fn describe(found: &Found) -> String {
         let _ = writeln!(text, "warning {implausible}");
     }
     text += &axes(survey);
+    text += &found.recorded.as_ref().map_or_else(String::new, against_played);
     text += &judgement(&found.judged);
     if found.suggestions.len() > 1 {
         text += "AMBIGUOUS: these axes are as likely as each other; look at the condyles\n";
     }
     text + &found.suggestions.iter().map(suggested).collect::<String>()
+}
+
+/// The table of errors; the robot's own are measured in a run.
+fn against_played(recorded: &RecordedFigures) -> String {
+    let line = |error: &RecordedError| {
+        let numbers = [error.rms, error.p95, error.max].map(|value| format!("{value:.4} {}", error.unit));
+        let [rms, p95, max] = numbers;
+        format!("{:<14} {:<7} {rms:>12} {p95:>12} {max:>12}\n", error.place, error.source)
+    };
+    let head = format!("{:<22} {:>12} {:>12} {:>12}\n", "recorded against played", "rms", "95 %", "max");
+    let is_predicted = |error: &&RecordedError| ["filter", "ramps"].contains(&error.source);
+    let lines: String = recorded.errors.iter().filter(is_predicted).map(line).collect();
+    format!("{head}{lines}{}\n\n", recorded.in_words())
 }
 
 /// The jaw's motion with the stated axes and with the most likely ones.

@@ -1,0 +1,214 @@
+//! A recorded motion against the played one: how far the jaw was from the file's own rows, and why.
+//!
+//! At the same instant of the motion, the filter leads the desired path away from the recorded one, and the robot leads
+//! the jaw away from the desired path. Both add up to the whole error. The clock of a motion starts and stops slowly:
+//! these ramps change no path, and their error is the distance to an even pace. Between rows the recording is a spline.
+//! Not judged: cycles outside the motion, and whether a deviation matters.
+
+use std::sync::Arc;
+
+use hdrhistogram::Histogram;
+use masseter_controller::trajectory::Trajectory;
+use masseter_model::geometry::{Mechanism, Pose, Vec3};
+use masseter_recording::jaw_points;
+use masseter_scenario::{JawConfig, MotionConfig, Scenario};
+use serde::Serialize;
+
+/// Incisal point, left and right condyle, then the jaw's orientation.
+const PLACES: [&str; 4] = ["incisal point", "left condyle", "right condyle", "orientation"];
+/// Parts of an error, and the unit in which a histogram counts: a nanometre or a microdegree.
+const SOURCES: [&str; 4] = ["all", "filter", "robot", "ramps"];
+const COUNTED: f64 = 1e-6;
+/// Digits of a percentile.
+const DIGITS: u8 = 2;
+
+/// Errors of the played motion against the recorded one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RecordedFigures {
+    /// Cycles compared.
+    pub samples: u64,
+    /// Each place with each source.
+    pub errors: Vec<RecordedError>,
+    /// Largest distance of the incisal point from the closed jaw, mm: recorded, played.
+    pub opening_mm: [f64; 2],
+    /// Inclination of the left and the right condyle's path below the horizontal, at its farthest place, °: recorded,
+    /// played.
+    pub condylar_inclination_deg: [[f64; 2]; 2],
+    /// Angle between the recorded and the played axis of the jaw's largest turn, °; none of a jaw that does not turn.
+    pub hinge_axis_deg: Option<f64>,
+}
+
+/// An error of one place by one source.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct RecordedError {
+    /// Incisal point, a condyle, or the orientation.
+    pub place: &'static str,
+    /// `all`, or the part of `filter`, `robot` or `ramps`.
+    pub source: &'static str,
+    /// `mm` or `°`.
+    pub unit: &'static str,
+    /// Root mean square.
+    pub rms: f64,
+    /// 95th percentile.
+    pub p95: f64,
+    /// The largest.
+    pub max: f64,
+    /// Share of the mean square of the whole error; none of the ramps, which are no part of it.
+    pub share: Option<f64>,
+}
+
+/// Compares the jaw with the rows of the scenario's file.
+#[derive(Debug, Clone)]
+pub struct RecordedWatch {
+    trajectory: Arc<Trajectory>,
+    /// In the platform frame.
+    points_m: [Vec3; 3],
+    samples: u64,
+    sums: [[Sum; 4]; 4],
+    opening_m: [f64; 2],
+    /// Recorded and played ways of the condyles, each where the recorded one is longest.
+    condyles_m: [[Vec3; 2]; 2],
+    turns_rad: [Vec3; 2],
+}
+
+#[derive(Debug, Clone)]
+struct Sum {
+    squares: f64,
+    /// Of the products with the whole error.
+    with_whole: f64,
+    values: Histogram<u64>,
+    largest: f64,
+}
+
+impl RecordedFigures {
+    /// The jaw's figures, recorded and played, in a sentence.
+    pub fn in_words(&self) -> String {
+        let [left, right] = self.condylar_inclination_deg;
+        let pair = |[recorded, played]: [f64; 2], unit: &str| {
+            format!("{recorded:.2} {unit} recorded, {played:.2} {unit} played")
+        };
+        let axis =
+            self.hinge_axis_deg.map_or_else(String::new, |deg| format!("; hinge axis {deg:.3}° apart"));
+        format!(
+            "Opening {}; condylar inclination left {}, right {}{axis}.",
+            pair(self.opening_mm, "mm"),
+            pair(left, "°"),
+            pair(right, "°"),
+        )
+    }
+}
+
+impl RecordedWatch {
+    /// None where the scenario plays no file, or the file is gone.
+    pub fn of_scenario(scenario: &Scenario) -> Option<Self> {
+        let MotionConfig::File(_) = &scenario.motion else { return None };
+        let mechanism = Mechanism::new(&scenario.mechanism).ok()?;
+        let trajectory =
+            Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s).ok()?;
+        Some(Self::new(trajectory, &scenario.jaw))
+    }
+
+    /// For a motion on a jaw.
+    pub fn new(trajectory: Trajectory, jaw: &JawConfig) -> Self {
+        let empty = Sum {
+            squares: 0.0,
+            with_whole: 0.0,
+            values: Histogram::new(DIGITS).expect("two digits are allowed"),
+            largest: 0.0,
+        };
+        Self {
+            trajectory: Arc::new(trajectory),
+            points_m: jaw_points(jaw),
+            samples: 0,
+            sums: std::array::from_fn(|_| std::array::from_fn(|_| empty.clone())),
+            opening_m: [0.0; 2],
+            condyles_m: [[Vec3::zeros(); 2]; 2],
+            turns_rad: [Vec3::zeros(); 2],
+        }
+    }
+
+    /// Takes the platform's pose at an instant of the motion.
+    pub fn add(&mut self, motion_s: f64, actual: &Pose) {
+        let of = &self.trajectory;
+        let [Some(recorded), Some(even)] =
+            [motion_s, of.even_time_s(motion_s)].map(|at_s| of.recorded_pose(at_s))
+        else {
+            return;
+        };
+        let (desired, closed) = (of.pose_in_motion(motion_s), of.closed_pose());
+        self.samples += 1;
+        let parts = [[&recorded, actual], [&recorded, &desired], [&desired, actual], [&even, &recorded]];
+        for (place, sums) in self.sums.iter_mut().enumerate() {
+            let errors = parts.map(|[from, to]| match self.points_m.get(place) {
+                Some(point) => way(from, to, point) * 1e3,
+                None => turn(from, to).map(f64::to_degrees),
+            });
+            for (sum, error) in sums.iter_mut().zip(&errors) {
+                sum.add(error, &errors[0]);
+            }
+        }
+        let both = [&recorded, actual];
+        for (opening_m, pose) in self.opening_m.iter_mut().zip(both) {
+            *opening_m = opening_m.max(way(&closed, pose, &self.points_m[0]).norm());
+        }
+        for (farthest_m, point) in self.condyles_m.iter_mut().zip(&self.points_m[1..]) {
+            keep_longest(farthest_m, both.map(|pose| way(&closed, pose, point)));
+        }
+        keep_longest(&mut self.turns_rad, both.map(|pose| turn(&closed, pose)));
+    }
+
+    /// None without a cycle.
+    pub fn into_figures(self) -> Option<RecordedFigures> {
+        let samples = (self.samples > 0).then_some(self.samples)?;
+        let errors = self.sums.iter().enumerate().flat_map(|(place, sums)| {
+            let whole = sums[0].squares;
+            sums.iter().enumerate().map(move |(source, sum)| RecordedError {
+                place: PLACES[place],
+                source: SOURCES[source],
+                unit: if place < 3 { "mm" } else { "°" },
+                rms: (sum.squares / samples as f64).sqrt(),
+                p95: sum.values.value_at_quantile(0.95) as f64 * COUNTED,
+                max: sum.largest,
+                share: (source < 3 && whole > 0.0).then(|| sum.with_whole / whole),
+            })
+        });
+        let [recorded, played] = self.turns_rad;
+        Some(RecordedFigures {
+            samples,
+            errors: errors.collect(),
+            opening_mm: self.opening_m.map(|m| m * 1e3),
+            condylar_inclination_deg: self
+                .condyles_m
+                .map(|ways| ways.map(|way| (-way.z).atan2(way.x).to_degrees())),
+            hinge_axis_deg: (recorded.norm() > 1e-3).then(|| recorded.angle(&played).to_degrees()),
+        })
+    }
+}
+
+impl Sum {
+    fn add(&mut self, error: &Vec3, whole: &Vec3) {
+        let length = error.norm();
+        self.squares += length * length;
+        self.with_whole += error.dot(whole);
+        self.values.saturating_record((length / COUNTED) as u64);
+        self.largest = self.largest.max(length);
+    }
+}
+
+/// Keeps the recorded and the played vector where the recorded one is longest.
+fn keep_longest(kept: &mut [Vec3; 2], now: [Vec3; 2]) {
+    if now[0].norm() > kept[0].norm() {
+        *kept = now;
+    }
+}
+
+/// How a point moves from one pose to another, m.
+fn way(from: &Pose, to: &Pose, point: &Vec3) -> Vec3 {
+    let place = |pose: &Pose| pose.translation.vector + pose.rotation * point;
+    place(to) - place(from)
+}
+
+/// How the platform turns from one pose to another, base frame, rad.
+fn turn(from: &Pose, to: &Pose) -> Vec3 {
+    (to.rotation * from.rotation.inverse()).scaled_axis()
+}
