@@ -107,6 +107,12 @@ impl Trajectory {
         Some(self.frame.platform(&recording.recorded(motion_s)))
     }
 
+    /// The times of a recording's rows after one time of the motion and up to another, s; none of a generator.
+    pub fn rows_between(&self, after_s: f64, to_s: f64) -> &[f64] {
+        let Motion::Recording(recording) = &self.motion else { return &[] };
+        recording.rows_between(after_s, to_s)
+    }
+
     /// Progress of the motion at an even pace, s, at the instant when the ramps have brought it this far.
     pub fn even_time_s(&self, motion_s: f64) -> f64 {
         self.clock.even_time_s(motion_s)

@@ -52,7 +52,7 @@ enum Cause {
 
 /// A quantity of a recording that no jaw has.
 #[derive(Debug, Clone, PartialEq, Serialize, thiserror::Error)]
-#[error("line {line}: {quantity}: {value:.3} {unit}, a jaw's is {} {limit} {unit}; {remedy}", if *.value < *.limit { "at least" } else { "at most" })]
+#[error("line {line}: {quantity}: {} {unit}, plausible is {} {} {unit}; {remedy}", short(*value), if *value < *limit { "at least" } else { "at most" }, short(*limit))]
 pub struct Implausible {
     /// The quantity.
     pub quantity: &'static str,
@@ -68,6 +68,11 @@ pub struct Implausible {
     pub remedy: String,
     #[serde(skip)]
     cause: Cause,
+}
+
+/// With four digits.
+fn short(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
 }
 
 /// A recording judged as the motion of a jaw.

@@ -110,6 +110,13 @@ impl Recording {
         self.pose(&self.raw.at(motion_s))
     }
 
+    /// The times of the rows after one time and up to another.
+    pub(super) fn rows_between(&self, after_s: f64, to_s: f64) -> &[f64] {
+        let end = self.time_s.partition_point(|&t_s| t_s <= to_s);
+        let begin = self.time_s.partition_point(|&t_s| t_s <= after_s).min(end);
+        &self.time_s[begin..end]
+    }
+
     fn pose(&self, at: &Vector6<f64>) -> Pose {
         let turn = UnitQuaternion::from_scaled_axis(Vec3::new(at[3], at[4], at[5]));
         Pose::from_parts(Vec3::new(at[0], at[1], at[2]).into(), self.first_rotation * turn)

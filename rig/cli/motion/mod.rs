@@ -259,16 +259,25 @@ fn against_played(recorded: &RecordedFigures) -> String {
     format!("{head}{lines}{}\n\n", recorded.in_words())
 }
 
-/// The jaw's motion with the stated axes and with the most likely ones.
+/// The jaw's motion with the stated axes, and with other ones where those are not the only likely ones.
 fn axes(survey: &RecordingSurvey) -> String {
     let Some(frames) = &survey.frames else {
         return "axes    not judged: the motion has no opening\n".to_owned();
     };
     let line = |(name, frame): (&str, &Frame)| {
-        format!("{name:<7} {frame} misfit {:.1}: {}\n", frame.misfit, frame.words())
+        format!(
+            "{name:<7} {frame} misfit {:.1}: {}\n",
+            frame.misfit,
+            frame.words().replace("; ", "\n        ")
+        )
     };
     let others = frames.best.iter().filter(|frame| frame.axes != frames.stated.axes);
-    [("axes", &frames.stated)].into_iter().chain(others.map(|frame| ("or", frame))).map(line).collect()
+    let shown = if frames.fits() && !frames.is_ambiguous() { 0 } else { frames.best.len() };
+    [("axes", &frames.stated)]
+        .into_iter()
+        .chain(others.take(shown).map(|frame| ("or", frame)))
+        .map(line)
+        .collect()
 }
 
 fn head(survey: &RecordingSurvey) -> String {
@@ -360,7 +369,8 @@ fn suggested(suggestion: &Suggestion) -> String {
     let length = suggestion.length_unit.map(|unit| format!("  length_unit = \"{}\"\n", unit.name()));
     let time = suggestion.time_unit.map(|unit| format!("  time_unit = \"{}\"\n", unit.name()));
     let axes = suggestion.axes.iter().zip(&suggestion.jaw).map(|([anterior, left, up], jaw)| {
-        format!("  axes = [\"{anterior}\", \"{left}\", \"{up}\"]  # {jaw}\n")
+        let jaw = jaw.replace("; ", "\n  # ");
+        format!("  # {jaw}\n  axes = [\"{anterior}\", \"{left}\", \"{up}\"]\n")
     });
     let motion: String = length.into_iter().chain(time).chain(axes).collect();
     if !motion.is_empty() {

@@ -2,7 +2,7 @@
 //!
 //! At the same instant of the motion, the filter leads the desired path away from the recorded one, and the robot leads
 //! the jaw away from the desired path. Both add up to the whole error. The clock of a motion starts and stops slowly:
-//! these ramps change no path, and their error is the distance to an even pace. Between rows the recording is a spline.
+//! these ramps change no path, and their error is the distance to an even pace. Only rows count, not what lies between.
 //! Not judged: cycles outside the motion, and whether a deviation matters.
 
 use std::sync::Arc;
@@ -19,14 +19,16 @@ const PLACES: [&str; 4] = ["incisal point", "left condyle", "right condyle", "or
 /// Parts of an error, and the unit in which a histogram counts: a nanometre or a microdegree.
 const SOURCES: [&str; 4] = ["all", "filter", "robot", "ramps"];
 const COUNTED: f64 = 1e-6;
+/// The largest value in a percentile, mm or °.
+const MOST: f64 = 1e6;
 /// Digits of a percentile.
 const DIGITS: u8 = 2;
 
 /// Errors of the played motion against the recorded one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RecordedFigures {
-    /// Cycles compared.
-    pub samples: u64,
+    /// Rows compared.
+    pub rows: u64,
     /// Each place with each source.
     pub errors: Vec<RecordedError>,
     /// Largest distance of the incisal point from the closed jaw, mm: recorded, played.
@@ -63,7 +65,9 @@ pub struct RecordedWatch {
     trajectory: Arc<Trajectory>,
     /// In the platform frame.
     points_m: [Vec3; 3],
-    samples: u64,
+    /// Instant of the motion, and the platform's pose.
+    before: Option<(f64, Pose)>,
+    rows: u64,
     sums: [[Sum; 4]; 4],
     opening_m: [f64; 2],
     /// Recorded and played ways of the condyles, each where the recorded one is longest.
@@ -119,7 +123,8 @@ impl RecordedWatch {
         Self {
             trajectory: Arc::new(trajectory),
             points_m: jaw_points(jaw),
-            samples: 0,
+            before: None,
+            rows: 0,
             sums: std::array::from_fn(|_| std::array::from_fn(|_| empty.clone())),
             opening_m: [0.0; 2],
             condyles_m: [[Vec3::zeros(); 2]; 2],
@@ -127,16 +132,24 @@ impl RecordedWatch {
         }
     }
 
-    /// Takes the platform's pose at an instant of the motion.
+    /// Takes the platform's pose at an instant of the motion. The rows since the instant before count.
     pub fn add(&mut self, motion_s: f64, actual: &Pose) {
-        let of = &self.trajectory;
+        let Some((before_s, before)) = self.before.replace((motion_s, *actual)) else { return };
+        let trajectory = Arc::clone(&self.trajectory);
+        for &row_s in trajectory.rows_between(before_s, motion_s) {
+            let share = (row_s - before_s) / (motion_s - before_s);
+            self.add_row(&trajectory, row_s, &before.lerp_slerp(actual, share));
+        }
+    }
+
+    fn add_row(&mut self, of: &Trajectory, motion_s: f64, actual: &Pose) {
         let [Some(recorded), Some(even)] =
             [motion_s, of.even_time_s(motion_s)].map(|at_s| of.recorded_pose(at_s))
         else {
             return;
         };
         let (desired, closed) = (of.pose_in_motion(motion_s), of.closed_pose());
-        self.samples += 1;
+        self.rows += 1;
         let parts = [[&recorded, actual], [&recorded, &desired], [&desired, actual], [&even, &recorded]];
         for (place, sums) in self.sums.iter_mut().enumerate() {
             let errors = parts.map(|[from, to]| match self.points_m.get(place) {
@@ -157,16 +170,16 @@ impl RecordedWatch {
         keep_longest(&mut self.turns_rad, both.map(|pose| turn(&closed, pose)));
     }
 
-    /// None without a cycle.
+    /// None without a row.
     pub fn into_figures(self) -> Option<RecordedFigures> {
-        let samples = (self.samples > 0).then_some(self.samples)?;
+        let rows = (self.rows > 0).then_some(self.rows)?;
         let errors = self.sums.iter().enumerate().flat_map(|(place, sums)| {
             let whole = sums[0].squares;
             sums.iter().enumerate().map(move |(source, sum)| RecordedError {
                 place: PLACES[place],
                 source: SOURCES[source],
                 unit: if place < 3 { "mm" } else { "°" },
-                rms: (sum.squares / samples as f64).sqrt(),
+                rms: (sum.squares / rows as f64).sqrt(),
                 p95: sum.values.value_at_quantile(0.95) as f64 * COUNTED,
                 max: sum.largest,
                 share: (source < 3 && whole > 0.0).then(|| sum.with_whole / whole),
@@ -174,7 +187,7 @@ impl RecordedWatch {
         });
         let [recorded, played] = self.turns_rad;
         Some(RecordedFigures {
-            samples,
+            rows,
             errors: errors.collect(),
             opening_mm: self.opening_m.map(|m| m * 1e3),
             condylar_inclination_deg: self
@@ -190,7 +203,8 @@ impl Sum {
         let length = error.norm();
         self.squares += length * length;
         self.with_whole += error.dot(whole);
-        self.values.saturating_record((length / COUNTED) as u64);
+        // With automatic growth, no value below the cap is refused.
+        let _ = self.values.record((length.min(MOST) / COUNTED) as u64);
         self.largest = self.largest.max(length);
     }
 }
