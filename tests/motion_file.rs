@@ -30,6 +30,13 @@ fn describe(text: &str, arguments: &[&str]) -> Output {
     masseter(&[&["motion", file.to_str().unwrap()], arguments].concat())
 }
 
+/// With these keys of `[motion]`.
+fn describe_with(text: &str, keys: &str) -> Output {
+    let workspace = Workspace::new(&format!("[motion]\nkind = 'file'\npath = 'motion.csv'\n{keys}\n"));
+    let (file, scenario) = (workspace.write("motion.csv", text), workspace.file("scenario.toml"));
+    masseter(&["motion", file.to_str().unwrap(), "--scenario", scenario.to_str().unwrap()])
+}
+
 fn described(text: &str) -> Value {
     serde_json::from_slice(&describe(text, &["--format", "json"]).stdout).unwrap()
 }
@@ -125,15 +132,14 @@ fn units_that_fit_no_jaw_are_refused_and_the_likely_ones_suggested() {
         assert!(found["refused"].as_str().unwrap().contains(remedy), "{remedy}: {}", found["refused"]);
         assert_eq!(found["suggestion"]["length_unit"].as_str(), unit, "{}", found["suggestion"]);
         if let Some(unit) = unit {
-            let set = format!("motion.length_unit='{unit}'");
-            let played = describe(&text, &["--set", &set]);
+            let played = describe_with(&text, &format!("length_unit = '{unit}'"));
             assert!(stdout(&played).contains("PLAYS"), "{}", stdout(&played));
         }
     }
     let milliseconds = opening(|_, numbers| numbers[0] *= 1000.0);
     let said = stderr(&describe(&milliseconds, &[]));
     assert!(said.contains("set motion.time_unit = \"ms\""), "{said}");
-    let played = describe(&milliseconds, &["--set", "motion.time_unit='ms'"]);
+    let played = describe_with(&milliseconds, "time_unit = 'ms'");
     assert!(stdout(&played).contains("PLAYS"), "{}", stdout(&played));
 }
 
@@ -145,11 +151,11 @@ fn wrong_axes_are_refused_and_those_suggested_play() {
     assert!(found["refused"].as_str().unwrap().contains("3.0 mm up"), "{}", found["refused"]);
     assert_eq!(found["suggestion"]["axes"], serde_json::json!(["-x", "+y", "-z"]));
     assert!(found["suggestion"]["refused"].is_null());
-    let played = describe(&text, &["--set", "motion.axes=['-x', '+y', '-z']"]);
+    let played = describe_with(&text, "axes = ['-x', '+y', '-z']");
     assert!(stdout(&played).contains("PLAYS"), "{}", stdout(&played));
-    let played = describe(&text, &["--set", "motion.if_implausible='warn'"]);
+    let played = describe_with(&text, "if_implausible = 'warn'");
     assert!(stdout(&played).contains("PLAYS"), "{}", stdout(&played));
-    let mirrored = stderr(&describe(&text, &["--set", "motion.axes=['+x', '-y', '+z']"]));
+    let mirrored = stderr(&describe_with(&text, "axes = ['+x', '-y', '+z']"));
     assert!(mirrored.contains("left is +y") && mirrored.contains("negate its y_mm"), "{mirrored}");
 }
 
@@ -196,10 +202,8 @@ fn what_a_run_would_refuse_is_refused_in_the_same_words_and_a_place_that_fits_is
 
 #[test]
 fn a_motion_too_large_for_any_place_is_said_to_be() {
-    let output = describe(
-        &opening(|_, numbers| numbers[1..4].iter_mut().for_each(|mm| *mm *= 20.0)),
-        &["--set", "motion.if_implausible='warn'"],
-    );
+    let large = opening(|_, numbers| numbers[1..4].iter_mut().for_each(|mm| *mm *= 20.0));
+    let output = describe_with(&large, "if_implausible = 'warn'");
     assert_eq!(output.status.code(), Some(1));
     assert!(stdout(&output).contains("even then the motion is refused"), "{}", stdout(&output));
 }

@@ -55,6 +55,18 @@ impl Rows<'_> {
     }
 }
 
+/// The largest value but for a hundredth of the rows and two, with its row: a glitch is no unit.
+pub(super) fn largest(values: &[f64]) -> (usize, f64) {
+    quantile(values, 2 + values.len() / 100)
+}
+
+/// The value with so many values above, and its row.
+pub(super) fn quantile(values: &[f64], above: usize) -> (usize, f64) {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[b].total_cmp(&values[a]));
+    order.get(above.min(values.len().saturating_sub(1))).map_or((0, 0.0), |&row| (row, values[row]))
+}
+
 /// The doubts about the rows, each with a line, without glitches.
 pub(super) fn doubts(rows: &Rows) -> Vec<String> {
     not_closed(rows).into_iter().chain(ways(rows)).collect()

@@ -11,10 +11,11 @@ use std::fmt::Write;
 
 use masseter_model::geometry::Vec3;
 use masseter_scenario::{FileConfig, JawConfig};
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, UnitQuaternion};
 use serde::Serialize;
 
 use super::TrajectoryError;
+use super::doubts::largest;
 use super::import::{Axes, SIGNED_AXES, Source};
 use super::mandible::condylar_middle;
 use super::table::{Format, Located};
@@ -194,7 +195,7 @@ struct Evidence {
     rotation: Matrix3<f64>,
     turn_rad: Vec3,
     /// The row farthest from the closed jaw.
-    widest: (f64, Vec3, Matrix3<f64>),
+    widest: (Vec3, Matrix3<f64>),
     /// The point that the file follows and the middle between the condyles, jaw frame, m.
     point: Vec3,
     middle: Vec3,
@@ -208,33 +209,34 @@ impl Evidence {
         let is_of_poses = source.table.format == Format::Poses;
         let point = if is_of_poses { source.reference } else { Vec3::zeros() };
         let middle = condylar_middle(jaw).map_err(|error| Located::whole(error.to_string()))?;
-        let (mut weights, mut way, mut turn_rad, mut rotation) =
-            (0.0, Vec3::zeros(), Vec3::zeros(), Matrix3::zeros());
-        let (mut widest, mut largest_rad, mut largest_m) =
-            ((0.0, Vec3::zeros(), Matrix3::identity()), 0.0_f64, 0.0_f64);
-        for row in &source.table.rows {
+        let displaced = |row| -> Result<(Vec3, UnitQuaternion<f64>), Located> {
             let displacement = source.displacement(row, &Axes::of_jaw())?;
             let turn = displacement.rotation;
-            let row_way = displacement.translation.vector + turn * point - point;
-            let (angle_rad, way_m) = (turn.angle(), row_way.norm());
-            let weight = LEVER_M * angle_rad + way_m;
-            let matrix = *turn.to_rotation_matrix().matrix();
-            (largest_rad, largest_m) = (largest_rad.max(angle_rad), largest_m.max(way_m));
-            if weight > widest.0 {
-                widest = (weight, row_way, matrix);
-            }
-            weights += weight;
-            way += row_way * weight;
-            turn_rad += turn.scaled_axis() * weight;
-            rotation += matrix * weight;
-        }
-        if largest_rad < OPENED_RAD && largest_m < OPENED_M {
+            Ok((displacement.translation.vector + turn * point - point, turn))
+        };
+        let rows = source.table.rows.iter().map(displaced).collect::<Result<Vec<_>, _>>()?;
+        let each = |of: fn(&(Vec3, UnitQuaternion<f64>)) -> f64| rows.iter().map(of).collect::<Vec<f64>>();
+        let weights = each(|(way, turn)| LEVER_M * turn.angle() + way.norm());
+        let is_opened = largest(&each(|(_, turn)| turn.angle())).1 >= OPENED_RAD
+            || largest(&each(|(way, _)| way.norm())).1 >= OPENED_M;
+        if !is_opened {
             return Ok(None);
         }
-        let turn_rad = turn_rad / weights;
+        let (widest, most) = largest(&weights);
+        let matrix = |turn: &UnitQuaternion<f64>| *turn.to_rotation_matrix().matrix();
+        let widest = (rows[widest].0, matrix(&rows[widest].1));
+        let (mut sum, mut way, mut turn_rad, mut rotation) =
+            (0.0, Vec3::zeros(), Vec3::zeros(), Matrix3::zeros());
+        // What is farther is a glitch.
+        for ((row_way, turn), &weight) in rows.iter().zip(&weights).filter(|(_, weight)| **weight <= most) {
+            sum += weight;
+            way += row_way * weight;
+            turn_rad += turn.scaled_axis() * weight;
+            rotation += matrix(turn) * weight;
+        }
+        let turn_rad = turn_rad / sum;
         let shows_condyles = source.shows_condyles();
-        let (way, rotation, turn_shown) =
-            (way / weights, rotation / weights, between(SHOWN_RAD, turn_rad.norm()));
+        let (way, rotation, turn_shown) = (way / sum, rotation / sum, between(SHOWN_RAD, turn_rad.norm()));
         Ok(Some(Self { way, rotation, turn_rad, widest, point, middle, turn_shown, shows_condyles }))
     }
 
@@ -247,7 +249,7 @@ impl Evidence {
     }
 
     fn frame(&self, axes_names: [String; 3], axes: &Axes) -> Frame {
-        let (_, way, rotation) = &self.widest;
+        let (way, rotation) = &self.widest;
         let [incisal, condyles] = self.ways(axes, way, rotation).map(|way| (way * 1e3).into());
         let is_shown = self.shows_condyles && self.turn_shown > 0.0;
         let misfit = self.misfit(axes) + exchanged(&axes_names);

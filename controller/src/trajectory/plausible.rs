@@ -9,7 +9,7 @@ use masseter_scenario::{FileConfig, IfImplausible, JawConfig, LengthUnit, TimeUn
 use serde::Serialize;
 
 use super::TrajectoryError;
-use super::doubts::{GLIDE_M, NOTHING_M, TURN_DEG_PER_M};
+use super::doubts::{GLIDE_M, NOTHING_M, TURN_DEG_PER_M, largest, quantile};
 use super::frames::Frames;
 use super::import::Source;
 use super::mandible::jaw_points;
@@ -81,7 +81,7 @@ pub(super) struct Judgement {
     pub implausible: Vec<Implausible>,
     /// The section with the units in which the recording is plausible; none where the stated ones are, or none are.
     pub likely: Option<FileConfig>,
-    /// The frames in plausible units; none without those or without an opening.
+    /// The frames in the likely units, or else in the stated ones; none without an opening.
     pub frames: Option<Frames>,
 }
 
@@ -100,8 +100,10 @@ impl Judgement {
         for found in &mut implausible {
             found.remedy = remedy(found.cause, config, likely.as_ref());
         }
-        let of_likely = |config| Frames::new(&Source::read(config, jaw)?, config, jaw);
-        let frames = likely.as_ref().map(of_likely).transpose()?.flatten();
+        let frames = match &likely {
+            Some(units) => Frames::new(&Source::read(units, jaw)?, units, jaw)?,
+            None => Frames::new(source, config, jaw)?,
+        };
         Ok(Self { implausible, likely, frames })
     }
 
@@ -170,17 +172,6 @@ fn remedy(cause: Cause, config: &FileConfig, likely: Option<&FileConfig>) -> Str
                 .to_owned()
         }
     }
-}
-
-/// The largest value but for a hundredth of the rows and two, with its row: a glitch is no unit.
-fn largest(values: &[f64]) -> (usize, f64) {
-    quantile(values, 2 + values.len() / 100)
-}
-
-fn quantile(values: &[f64], above: usize) -> (usize, f64) {
-    let mut order: Vec<usize> = (0..values.len()).collect();
-    order.sort_by(|&a, &b| values[b].total_cmp(&values[a]));
-    order.get(above.min(values.len().saturating_sub(1))).map_or((0, 0.0), |&row| (row, values[row]))
 }
 
 fn implausible(

@@ -231,13 +231,13 @@ keys! {
         pub axes: [String; 3] => "signed axes, right-handed",
         /// The unit of the file's lengths, whatever the header says.
         #[serde(default = "FileConfig::default_length_unit")]
-        pub length_unit: LengthUnit => "`\"mm\"`, `\"cm\"` or `\"m\"`",
+        pub length_unit: LengthUnit,
         /// The unit of the file's times, whatever the header says.
         #[serde(default = "FileConfig::default_time_unit")]
-        pub time_unit: TimeUnit => "`\"s\"` or `\"ms\"`",
+        pub time_unit: TimeUnit,
         /// Whether a file whose ways, turns, speeds or axes are no jaw's is refused, or played with a warning.
         #[serde(default = "FileConfig::default_if_implausible")]
-        pub if_implausible: IfImplausible => "`\"refuse\"` or `\"warn\"`",
+        pub if_implausible: IfImplausible,
         /// Only for poses: their point of reference, in the jaw frame at the closed pose; by default the midpoint between
         /// the condyles.
         pub reference_point_mm: Option<[f64; 3]> => "finite",
