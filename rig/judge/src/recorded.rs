@@ -226,3 +226,88 @@ fn way(from: &Pose, to: &Pose, point: &Vec3) -> Vec3 {
 fn turn(from: &Pose, to: &Pose) -> Vec3 {
     (to.rotation * from.rotation.inverse()).scaled_axis()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use masseter_scenario::FileConfig;
+
+    /// Two seconds of opening by 10°, with a jump that only a filter moves.
+    fn trajectory(lowpass_hz: f64) -> Trajectory {
+        let row = |row: u32| {
+            let share = (1.0 - (std::f64::consts::PI * f64::from(row) / 100.0).cos()) / 2.0;
+            let half = 5.0_f64.to_radians() * share;
+            let (x, z) = (4.0 * share, -3.0 * share - if row == 50 { 0.5 } else { 0.0 });
+            format!("{},{x},0,{z},{},0,{},0\n", f64::from(row) / 100.0, half.cos(), half.sin())
+        };
+        let text: String = (0..=200).map(row).collect();
+        let path =
+            std::env::temp_dir().join(format!("masseter-recorded-{}-{lowpass_hz}.csv", std::process::id()));
+        std::fs::write(&path, "time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n".to_owned() + &text).unwrap();
+        let scenario = Scenario::default();
+        let mechanism = Mechanism::new(&scenario.mechanism).unwrap();
+        let motion = MotionConfig::File(FileConfig { lowpass_hz, ..FileConfig::new(&path) });
+        let trajectory = Trajectory::new(&motion, &scenario.jaw, &mechanism, None).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        trajectory
+    }
+
+    /// Of a jaw that is moved from the desired path by `off`.
+    fn figures(lowpass_hz: f64, off: impl Fn(Pose) -> Pose) -> RecordedFigures {
+        let trajectory = trajectory(lowpass_hz);
+        let mut watch = RecordedWatch::new(trajectory.clone(), &Scenario::default().jaw);
+        for cycle in 0..=2500 {
+            let motion_s = trajectory.motion_time_s(f64::from(cycle) / 1000.0);
+            watch.add(motion_s, &off(trajectory.pose_in_motion(motion_s)));
+        }
+        watch.into_figures().unwrap()
+    }
+
+    fn error<'a>(figures: &'a RecordedFigures, place: &str, source: &str) -> &'a RecordedError {
+        figures.errors.iter().find(|error| (error.place, error.source) == (place, source)).unwrap()
+    }
+
+    #[test]
+    fn a_jaw_beside_an_unfiltered_path_is_the_robots_error_alone() {
+        let turn = Pose::rotation(Vec3::new(0.0, 0.0, 0.01)).rotation;
+        let found = figures(0.0, |pose| {
+            let turned = Pose::from_parts(pose.translation, turn * pose.rotation);
+            Pose::translation(0.0, 0.001, 0.0) * turned
+        });
+        assert!(found.rows >= 199, "{}", found.rows);
+        for place in PLACES {
+            let [all, filter, robot] =
+                ["all", "filter", "robot"].map(|source| error(&found, place, source).rms);
+            assert!(filter < 1e-9 && (all - robot).abs() < 1e-9, "{place}: {found:?}");
+        }
+        let angle = error(&found, "orientation", "all");
+        let deg = 0.01_f64.to_degrees();
+        assert!((angle.rms - deg).abs() < 1e-4 && (angle.p95 / deg - 1.0).abs() < 0.01, "{angle:?}");
+        assert!((error(&found, "incisal point", "robot").share.unwrap() - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_filters_and_the_robots_parts_add_up() {
+        let found = figures(12.0, |pose| Pose::translation(0.0, 0.0001, 0.0) * pose);
+        for place in &PLACES[..3] {
+            let share = |source| error(&found, place, source).share.unwrap();
+            assert!((share("filter") + share("robot") - 1.0).abs() < 1e-9, "{place}: {found:?}");
+        }
+        let filter = error(&found, "incisal point", "filter");
+        assert!(filter.max > 0.2 && filter.max < 0.5 && filter.p95 < 0.1, "{filter:?}");
+        assert!((error(&found, "left condyle", "robot").rms - 0.1).abs() < 1e-9, "{found:?}");
+    }
+
+    #[test]
+    fn the_jaws_figures_are_those_of_the_motion() {
+        let found = figures(0.0, |pose| pose);
+        let [left, right] = found.condylar_inclination_deg;
+        for inclination_deg in [left, right].concat() {
+            assert!((inclination_deg - 36.87).abs() < 1.0, "{found:?}");
+        }
+        assert!((found.opening_mm[0] - found.opening_mm[1]).abs() < 1e-3, "{found:?}");
+        assert!(found.hinge_axis_deg.unwrap() < 1e-3, "{found:?}");
+        let ramps = error(&found, "incisal point", "ramps");
+        assert!(ramps.max > 0.02 && ramps.share.is_none(), "{ramps:?}");
+    }
+}
