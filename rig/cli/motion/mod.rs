@@ -240,9 +240,6 @@ fn describe(found: &Found) -> String {
     text += &axes(survey);
     text += &found.recorded.as_ref().map_or_else(String::new, against_played);
     text += &judgement(&found.judged);
-    if found.suggestions.len() > 1 {
-        text += "AMBIGUOUS: these axes are as likely as each other; look at the condyles\n";
-    }
     text + &found.suggestions.iter().map(suggested).collect::<String>()
 }
 
@@ -272,12 +269,14 @@ fn axes(survey: &RecordingSurvey) -> String {
         )
     };
     let others = frames.best.iter().filter(|frame| frame.axes != frames.stated.axes);
-    let shown = if frames.fits() && !frames.is_ambiguous() { 0 } else { frames.best.len() };
-    [("axes", &frames.stated)]
-        .into_iter()
-        .chain(others.take(shown).map(|frame| ("or", frame)))
-        .map(line)
-        .collect()
+    let is_clear = frames.fits() && !frames.is_ambiguous();
+    let shown = others.take(if is_clear { 0 } else { frames.best.len() }).map(|frame| ("or", frame));
+    let text: String = [("axes", &frames.stated)].into_iter().chain(shown).map(line).collect();
+    let likely: Vec<String> = frames.likely().map(Frame::to_string).collect();
+    match likely.len() {
+        0 | 1 => text,
+        _ => text + &format!("AMBIGUOUS, as likely as each other: {}\n", likely.join(", ")),
+    }
 }
 
 fn head(survey: &RecordingSurvey) -> String {
