@@ -215,10 +215,10 @@ fn a_doubtful_motion_is_played_with_a_warning_that_names_the_line() {
         let row = |i: i32| format!("{},0,0,{},1,0,0,0\n", f64::from(i) * 0.02, z_mm(i));
         (0..50).map(row).collect::<String>()
     };
-    let still = |i: i32| -f64::from(i % 10) * 1e-3;
+    let still = |_: i32| 0.0;
     let jump = |i: i32| if i == 25 { -2.0 } else { 0.0 };
     let cases: [(&dyn Fn(i32) -> f64, &str); 2] =
-        [(&still, "is the unit millimetres?"), (&jump, "line 27: the incisal point jumps by 2.0 mm")];
+        [(&still, "line 51: the jaw does not move"), (&jump, "line 27: the incisal point jumps by 2.0 mm")];
     for (z_mm, warning) in cases {
         let workspace = Workspace::new("");
         let file = workspace.write("jaw.csv", &(head.to_owned() + &rows(z_mm)));

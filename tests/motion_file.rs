@@ -30,6 +30,13 @@ fn describe(text: &str, arguments: &[&str]) -> Output {
     masseter(&[&["motion", file.to_str().unwrap()], arguments].concat())
 }
 
+/// With these keys of `[motion]`.
+fn describe_with(text: &str, keys: &str) -> Output {
+    let workspace = Workspace::new(&format!("[motion]\nkind = 'file'\npath = 'motion.csv'\n{keys}\n"));
+    let (file, scenario) = (workspace.write("motion.csv", text), workspace.file("scenario.toml"));
+    masseter(&["motion", file.to_str().unwrap(), "--scenario", scenario.to_str().unwrap()])
+}
+
 fn described(text: &str) -> Value {
     serde_json::from_slice(&describe(text, &["--format", "json"]).stdout).unwrap()
 }
@@ -95,32 +102,61 @@ fn a_jump_of_the_tracker_and_a_gap_are_named_with_their_lines() {
 }
 
 #[test]
-fn units_that_look_wrong_are_named() {
-    let scaled = |factor: f64| {
-        let half = move |numbers: &mut [f64; 8]| {
-            let half = numbers[6].asin() * factor;
-            (numbers[4], numbers[6]) = (half.cos(), half.sin());
-        };
+fn units_that_fit_no_jaw_are_refused_and_the_likely_ones_suggested() {
+    let turned = |factor: f64| {
         opening(move |_, numbers| {
             numbers[1] *= 4.0;
             numbers[3] *= 4.0;
-            half(numbers);
+            let half = numbers[6].asin() * factor;
+            (numbers[4], numbers[6]) = (half.cos(), half.sin());
         })
     };
-    let metres = opening(|_, numbers| {
-        numbers[1..4].iter_mut().for_each(|mm| *mm /= 1000.0);
-        (numbers[4], numbers[6]) = (1.0, 0.0);
-    });
+    // Seven decimals, or too little is left of a metre's file.
+    let in_unit = |mm: f64| {
+        opening(|_, _| ()).lines().skip(1).fold(POSES.to_owned(), |text, row| {
+            let mut numbers: Vec<f64> = row.split(',').map(|number| number.parse().unwrap()).collect();
+            numbers[1..4].iter_mut().for_each(|length| *length /= mm);
+            text + &numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n"
+        })
+    };
     let order = opening(|_, numbers| numbers[4..].rotate_left(1));
-    for (text, doubt) in [
-        (metres, "is the unit millimetres?"),
-        (scaled(1.0_f64.to_radians()), "are angles in the right unit"),
-        (order, "the quaternions in the order qw,qx,qy,qz?"),
+    for (text, remedy, unit) in [
+        (in_unit(1000.0), "set motion.length_unit = \"m\"", Some("m")),
+        (in_unit(10.0), "set motion.length_unit = \"cm\"", Some("cm")),
+        (turned(1.0_f64.to_radians()), "angles the right unit", None),
+        (order, "quaternions have the order qw,qx,qy,qz", None),
     ] {
+        let output = describe(&text, &[]);
+        assert_eq!(output.status.code(), Some(1), "{}", stdout(&output));
         let found = described(&text);
-        let doubts = found["doubts"].to_string();
-        assert!(doubts.contains(doubt) && doubts.contains("line "), "{doubt}: {doubts}");
+        assert!(found["refused"].as_str().unwrap().contains(remedy), "{remedy}: {}", found["refused"]);
+        assert_eq!(found["suggestion"]["length_unit"].as_str(), unit, "{}", found["suggestion"]);
+        if let Some(unit) = unit {
+            let played = describe_with(&text, &format!("length_unit = '{unit}'"));
+            assert!(stdout(&played).contains("PLAYS"), "{}", stdout(&played));
+        }
     }
+    let milliseconds = opening(|_, numbers| numbers[0] *= 1000.0);
+    let said = stderr(&describe(&milliseconds, &[]));
+    assert!(said.contains("set motion.time_unit = \"ms\""), "{said}");
+    let played = describe_with(&milliseconds, "time_unit = 'ms'");
+    assert!(stdout(&played).contains("PLAYS"), "{}", stdout(&played));
+}
+
+/// Axes under which the condyles rise: refused, with axes that play.
+#[test]
+fn wrong_axes_are_refused_and_those_suggested_play() {
+    let text = opening(|_, numbers| (numbers[1], numbers[3]) = (-numbers[1], -numbers[3]));
+    let found = described(&text);
+    assert!(found["refused"].as_str().unwrap().contains("3.0 mm up"), "{}", found["refused"]);
+    assert_eq!(found["suggestion"]["axes"], serde_json::json!(["-x", "+y", "-z"]));
+    assert!(found["suggestion"]["refused"].is_null());
+    let played = describe_with(&text, "axes = ['-x', '+y', '-z']");
+    assert!(stdout(&played).contains("PLAYS"), "{}", stdout(&played));
+    let played = describe_with(&text, "if_implausible = 'warn'");
+    assert!(stdout(&played).contains("PLAYS"), "{}", stdout(&played));
+    let mirrored = stderr(&describe_with(&text, "axes = ['+x', '-y', '+z']"));
+    assert!(mirrored.contains("left is +y") && mirrored.contains("negate its y_mm"), "{mirrored}");
 }
 
 /// Degrees where radians belong turn the jaw by more than any jaw.
@@ -166,7 +202,8 @@ fn what_a_run_would_refuse_is_refused_in_the_same_words_and_a_place_that_fits_is
 
 #[test]
 fn a_motion_too_large_for_any_place_is_said_to_be() {
-    let output = describe(&opening(|_, numbers| numbers[1..4].iter_mut().for_each(|mm| *mm *= 20.0)), &[]);
+    let large = opening(|_, numbers| numbers[1..4].iter_mut().for_each(|mm| *mm *= 20.0));
+    let output = describe_with(&large, "if_implausible = 'warn'");
     assert_eq!(output.status.code(), Some(1));
     assert!(stdout(&output).contains("even then the motion is refused"), "{}", stdout(&output));
 }

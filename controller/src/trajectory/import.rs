@@ -1,7 +1,8 @@
 //! Import of a recorded motion of the lower jaw: from a CSV file to a [`Recording`] in the jaw frame.
 //!
 //! Comments start with `#`; the header decides between poses and markers. The import takes a whole file, or refuses the
-//! file with line, reason and remedy. The import guesses, skips and repairs nothing.
+//! file with line, reason and remedy. The import guesses, skips and repairs nothing. Whether the motion is a jaw's is not
+//! judged here.
 
 use masseter_model::geometry::{Pose, Vec3};
 use masseter_scenario::input::read_foreign_text;
@@ -23,11 +24,6 @@ const FLATTEST: f64 = 0.05;
 /// 0.03 mm.
 const LARGEST_CHANGE_M: f64 = 0.002;
 const SIDES: [(usize, usize); 3] = [(0, 1), (1, 2), (2, 0)];
-
-/// Reads, converts to the jaw frame and smooths.
-pub(super) fn import(config: &FileConfig, jaw: &JawConfig) -> Result<Recording, TrajectoryError> {
-    Source::read(config, jaw)?.recording().map(|(_, recording)| recording)
-}
 
 /// A file's content, with the meaning of its numbers.
 pub(super) struct Source<'a> {
@@ -71,19 +67,34 @@ impl<'a> Source<'a> {
         displacement.map_err(|problem| Located::at(row.line, problem))
     }
 
-    /// The rows in the jaw frame, and the smooth motion.
-    pub(super) fn recording(&self) -> Result<(Vec<Sample>, Recording), TrajectoryError> {
-        let path = &self.config.path;
+    /// The rows in the jaw frame.
+    pub(super) fn samples(&self) -> Result<Vec<Sample>, TrajectoryError> {
         let sample = |row: &Row| {
             let displacement = self.displacement(row, &self.axes)?;
             Ok(Sample { line: row.line, time_s: row.time_s, displacement })
         };
         let samples = self.table.rows.iter().map(sample).collect::<Result<Vec<_>, _>>();
-        let samples = samples.map_err(|problem: Located| problem.in_file(path))?;
+        samples.map_err(|problem: Located| problem.in_file(&self.config.path))
+    }
+
+    /// The smooth motion through the rows.
+    pub(super) fn recording(&self, samples: &[Sample]) -> Result<Recording, TrajectoryError> {
+        let path = &self.config.path;
         // Without an incisal point, the markers' centroid stands for it.
         let are_of_centroid = self.table.format == Format::Markers && self.origin.is_none();
-        let recording = Recording::new(path.clone(), &samples, are_of_centroid, self.config.lowpass_hz);
-        Ok((samples, recording.map_err(|problem| problem.in_file(path))?))
+        let recording = Recording::new(path.clone(), samples, are_of_centroid, self.config.lowpass_hz);
+        recording.map_err(|problem| problem.in_file(path))
+    }
+
+    /// Whether the file shows where the condyles are: the point that it follows is known.
+    pub(super) fn shows_condyles(&self) -> bool {
+        self.table.format == Format::Poses || self.origin.is_some()
+    }
+
+    /// The longest side of the markers' triangle, mm; none of poses.
+    pub(super) fn longest_side_mm(&self) -> Option<f64> {
+        let values = &self.table.rows[0].values;
+        (self.table.format == Format::Markers).then(|| longest_side_m(&markers_m(values)) * 1e3)
     }
 }
 
@@ -92,7 +103,11 @@ fn axes_and_table(config: &FileConfig) -> Result<(Axes, Table), Located> {
     let text = read_foreign_text(&config.path, FileConfig::MOST_BYTES).map_err(|error| {
         Located::whole(format!("cannot be read ({error}); check the path and that it is text"))
     })?;
-    let table = Table::parse(&text)?;
+    let mut table = Table::parse(&text, config.time_unit)?;
+    let lengths = if table.format == Format::Poses { 3 } else { 9 };
+    for length in table.rows.iter_mut().flat_map(|row| &mut row.values[..lengths]) {
+        *length *= config.length_unit.mm();
+    }
     check_points(config, table.format).map_err(Located::whole)?;
     Ok((axes, table))
 }
@@ -130,20 +145,42 @@ impl Axes {
             return Err(refuse("an axis is named twice"));
         }
         if determinant < 0.0 {
-            return Err(refuse("the frame is left-handed; turn one sign, or the file mirrors the jaw"));
+            return Err(refuse(&mirrored(names)));
         }
         Ok(Self(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rows))))
     }
 
+    /// The jaw frame's own axes.
+    pub(super) fn of_jaw() -> Self {
+        Self(UnitQuaternion::identity())
+    }
+
     /// A vector of the file in the jaw frame.
-    fn vector(&self, in_file: &Vec3) -> Vec3 {
+    pub(super) fn vector(&self, in_file: &Vec3) -> Vec3 {
         self.0 * in_file
+    }
+
+    /// The map as a matrix.
+    pub(super) fn matrix(&self) -> Matrix3<f64> {
+        *self.0.to_rotation_matrix().matrix()
     }
 
     /// A rotation of the file in the jaw frame.
     fn rotation(&self, in_file: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
         self.0 * in_file * self.0.inverse()
     }
+}
+
+/// What a left-handed frame means. The motion shows what is anterior and up, so the axis of left is the mirrored one.
+fn mirrored([anterior, left, up]: &[String; 3]) -> String {
+    let axis = left.trim_start_matches(['+', '-']);
+    let right_handed = if left.starts_with('+') { format!("-{axis}") } else { format!("+{axis}") };
+    let others: Vec<_> = ["x", "y", "z"].into_iter().filter(|name| *name != axis).collect();
+    format!(
+        "the frame is left-handed: where {anterior} is anterior and {up} is up, left is {right_handed}. A file whose left \
+         is {left} mirrors the jaw along {axis}: negate its {axis}_mm and its q{} and q{}, then left is {right_handed}",
+        others[0], others[1]
+    )
 }
 
 fn direction(name: &str) -> Option<Vec3> {
@@ -211,9 +248,13 @@ fn centroid(markers: &Markers) -> Vec3 {
     markers.iter().sum::<Vec3>() / 3.0
 }
 
+fn longest_side_m(markers: &Markers) -> f64 {
+    SIDES.map(|(i, j)| (markers[i] - markers[j]).norm()).into_iter().fold(0.0, f64::max)
+}
+
 fn check_spread(markers: &Markers) -> Result<(), String> {
     let [a, b, c] = markers;
-    let longest_m = SIDES.map(|(i, j)| (markers[i] - markers[j]).norm()).into_iter().fold(0.0, f64::max);
+    let longest_m = longest_side_m(markers);
     let height_m = (b - a).cross(&(c - a)).norm() / longest_m.max(f64::MIN_POSITIVE);
     if height_m <= FLATTEST * longest_m {
         let (height_mm, longest_mm) = (1000.0 * height_m, 1000.0 * longest_m);

@@ -8,10 +8,12 @@
 
 mod check;
 mod doubts;
+mod frames;
 mod generators;
 mod import;
 mod mandible;
 mod motion;
+mod plausible;
 mod recording;
 mod survey;
 mod table;
@@ -22,9 +24,11 @@ use nalgebra::UnitQuaternion;
 
 pub use check::{TrajectoryReport, check};
 pub use doubts::Glitch;
+pub use frames::{Frame, Frames};
 pub(crate) use generators::minimum_jerk;
 pub use mandible::{closed_jaw_points, closed_pose};
 pub use motion::Trajectory;
+pub use plausible::Implausible;
 pub use survey::{Gap, PointFigures, Range, RecordingSurvey, StepFigures, SurveyRow, survey};
 
 /// A motion that cannot be built or followed: the key or the line of the recording, the error there, and the remedy.

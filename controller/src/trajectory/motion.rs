@@ -6,8 +6,8 @@ use masseter_scenario::{JawConfig, MotionConfig};
 
 use super::doubts::jumps;
 use super::generators::{Chewing, Excursion, minimum_jerk_integral};
-use super::import::import;
 use super::mandible::JawFrame;
+use super::plausible::import;
 use super::recording::Recording;
 use super::{TrajectoryError, interpolate, require};
 
@@ -101,8 +101,25 @@ impl Trajectory {
         self.frame.platform(&self.motion.displacement(motion_s))
     }
 
+    /// The platform in the base frame as a recording's rows have it, without the low-pass; none for a generator.
+    pub fn recorded_pose(&self, motion_s: f64) -> Option<Pose> {
+        let Motion::Recording(recording) = &self.motion else { return None };
+        Some(self.frame.platform(&recording.recorded(motion_s)))
+    }
+
+    /// The times of a recording's rows after one time of the motion and up to another, s; none of a generator.
+    pub fn rows_between(&self, after_s: f64, to_s: f64) -> &[f64] {
+        let Motion::Recording(recording) = &self.motion else { return &[] };
+        recording.rows_between(after_s, to_s)
+    }
+
+    /// Progress of the motion at an even pace, s, at the instant when the ramps have brought it this far.
+    pub fn even_time_s(&self, motion_s: f64) -> f64 {
+        self.clock.even_time_s(motion_s)
+    }
+
     /// The platform in the base frame when the mouth is closed.
-    pub(crate) fn closed_pose(&self) -> Pose {
+    pub fn closed_pose(&self) -> Pose {
         self.frame.platform(&Pose::identity())
     }
 
@@ -205,6 +222,20 @@ impl MotionClock {
         (self.duration_s < self.whole_s - SHORTEST_CUT_S).then_some(self.whole_s)
     }
 
+    /// The motion's time at an even pace, s, when the clock shows this time. Halvings find the instant.
+    fn even_time_s(&self, motion_s: f64) -> f64 {
+        let (even, end_s) = (Self { speed: 1.0, ..*self }, self.stopped_s - self.ramp_s);
+        if (self.ramp_s / 2.0..=end_s - self.ramp_s / 2.0).contains(&motion_s) {
+            return motion_s;
+        }
+        let (mut before_s, mut after_s) = (0.0, self.stopped_s);
+        for _ in 0..60 {
+            let middle_s = f64::midpoint(before_s, after_s);
+            if even.motion_time_s(middle_s) < motion_s { before_s = middle_s } else { after_s = middle_s }
+        }
+        (before_s - self.ramp_s / 2.0).clamp(0.0, end_s)
+    }
+
     /// The motion's time, s.
     fn motion_time_s(&self, t_s: f64) -> f64 {
         let t_s = t_s * self.speed;
@@ -254,6 +285,17 @@ mod tests {
         for t_s in [0.1, 1.0, 3.0, 9.0] {
             assert!((slow.motion_time_s(10.0 * t_s) - clock.motion_time_s(t_s)).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn the_ramps_lead_the_motion_from_an_even_pace_at_its_ends_alone() {
+        let clock = MotionClock::new(3.0, 3.5);
+        for (motion_s, even_s) in [(0.0, 0.0), (0.25, 0.25), (1.0, 1.0), (2.75, 2.75), (3.0, 3.0)] {
+            assert!((clock.even_time_s(motion_s) - even_s).abs() < 1e-9, "{motion_s}");
+        }
+        let ramped_s = clock.motion_time_s(0.4);
+        assert!((clock.even_time_s(ramped_s) - 0.15).abs() < 1e-9);
+        assert!((clock.slowed(0.1).even_time_s(ramped_s) - 0.15).abs() < 1e-9);
     }
 
     proptest! {

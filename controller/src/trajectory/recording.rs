@@ -31,6 +31,18 @@ pub(super) struct Sample {
     pub displacement: Pose,
 }
 
+impl Sample {
+    /// How far a point of the jaw has moved from its place in the closed jaw, m.
+    pub(super) fn way(&self, point: &Vec3) -> Vec3 {
+        moved(&self.displacement, point)
+    }
+}
+
+/// How far a displacement moves a point, m.
+pub(super) fn moved(displacement: &Pose, point: &Vec3) -> Vec3 {
+    displacement.rotation * point + displacement.translation.vector - point
+}
+
 /// Jaw displacements over the recording's own time, from 0.
 #[derive(Debug, Clone)]
 pub(super) struct Recording {
@@ -38,6 +50,8 @@ pub(super) struct Recording {
     time_s: Vec<f64>,
     lines: Vec<u64>,
     first_rotation: UnitQuaternion<f64>,
+    /// Through the rows as they are.
+    raw: Spline<6>,
     curve: Spline<6>,
     /// The largest turn, degrees, if it makes the markers' centroid a bad substitute for the incisal point.
     pub centroid_turn_deg: Option<f64>,
@@ -75,7 +89,8 @@ impl Recording {
             doubts,
             glitches,
             first_rotation,
-            curve: if lowpass_hz == 0.0 { raw } else { smoothed(&raw, &time_s, lowpass_hz) },
+            curve: if lowpass_hz == 0.0 { raw.clone() } else { smoothed(&raw, &time_s, lowpass_hz) },
+            raw,
             centroid_turn_deg: is_bad.then_some(largest_turn_deg),
             time_s,
         })
@@ -87,7 +102,22 @@ impl Recording {
 
     /// Displacement of the jaw from the closed pose, jaw frame.
     pub(super) fn displacement(&self, motion_s: f64) -> Pose {
-        let at = self.curve.at(motion_s);
+        self.pose(&self.curve.at(motion_s))
+    }
+
+    /// The same without the low-pass, as the rows have it.
+    pub(super) fn recorded(&self, motion_s: f64) -> Pose {
+        self.pose(&self.raw.at(motion_s))
+    }
+
+    /// The times of the rows after one time and up to another.
+    pub(super) fn rows_between(&self, after_s: f64, to_s: f64) -> &[f64] {
+        let end = self.time_s.partition_point(|&t_s| t_s <= to_s);
+        let begin = self.time_s.partition_point(|&t_s| t_s <= after_s).min(end);
+        &self.time_s[begin..end]
+    }
+
+    fn pose(&self, at: &Vector6<f64>) -> Pose {
         let turn = UnitQuaternion::from_scaled_axis(Vec3::new(at[3], at[4], at[5]));
         Pose::from_parts(Vec3::new(at[0], at[1], at[2]).into(), self.first_rotation * turn)
     }

@@ -2,35 +2,24 @@
 //!
 //! The survey describes the file. [`check`](super::check) judges whether the mechanism can follow the motion.
 
-use masseter_model::geometry::{Pose, Vec3};
-use masseter_scenario::{FileConfig, JawConfig};
+use masseter_model::geometry::Vec3;
+use masseter_scenario::{FileConfig, JawConfig, LengthUnit, TimeUnit};
 use serde::Serialize;
 
 use super::TrajectoryError;
 use super::doubts::Glitch;
-use super::import::{Axes, SIGNED_AXES, Source};
+use super::frames::Frames;
+use super::import::Source;
 use super::mandible::jaw_points;
-use super::recording::{Recording, Sample};
-use super::table::{Format, Located, Row, Table};
+use super::plausible::{Implausible, Judgement};
+use super::recording::{Recording, Sample, moved};
+use super::table::{Format, Table};
 
 /// A step longer than this many usual steps is a gap.
 const GAP_STEPS: f64 = 1.5;
 const POINTS: [&str; 3] = ["incisal point", "right condyle", "left condyle"];
 /// Components of the rotation vector: about the axes that point anterior, left and up.
 const TURNS: [&str; 3] = ["roll to the right", "opening", "yaw to the left"];
-/// Most rows in the search for the axes.
-const ROWS: usize = 200;
-/// A turn that shows the axis of opening fully, rad.
-const CLEAR_RAD: f64 = 0.05;
-/// Distance from the closed place that a jaw reaches only by opening, m.
-const OPENED_M: f64 = 0.015;
-/// Least score for axes shown by a motion, of less than 2.5, and least surplus of other axes than the stated ones.
-const LEAST: f64 = 0.6;
-const BETTER: f64 = 0.5;
-/// Weights of the incisal point's way back, and of the condyles' way forward.
-const BACK: f64 = 0.25;
-const FORWARD: f64 = 0.25;
-
 /// The survey of a recorded motion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RecordingSurvey {
@@ -60,7 +49,13 @@ pub struct RecordingSurvey {
     pub glitches: Vec<Glitch>,
     /// Doubts about the motion of a jaw, each with a line.
     pub doubts: Vec<String>,
-    /// The file's axes that point anterior, left and up, if the motion shows other axes than the stated ones.
+    /// What no jaw has: units, points or angles are wrong.
+    pub implausible: Vec<Implausible>,
+    /// The units of length and time in which the motion is plausible, if the stated ones are not.
+    pub likely_units: Option<(LengthUnit, TimeUnit)>,
+    /// Which of the file's axes point anterior, left and up, in those units; none of a motion without an opening.
+    pub frames: Option<Frames>,
+    /// The most likely axes, if the stated ones are not as likely.
     pub likely_axes: Option<[String; 3]>,
     /// The rows in the jaw frame.
     #[serde(skip)]
@@ -139,13 +134,15 @@ pub struct SurveyRow {
 /// For an unusable file: the line, the reason and a remedy.
 pub fn survey(config: &FileConfig, jaw: &JawConfig) -> Result<RecordingSurvey, TrajectoryError> {
     let source = Source::read(config, jaw)?;
-    let (samples, recording) = source.recording()?;
+    let samples = source.samples()?;
+    let recording = source.recording(&samples)?;
+    let Judgement { implausible, likely, frames } = Judgement::new(&source, &samples, config, jaw)?;
     let points = jaw_points(jaw)?;
     let table = &source.table;
-    let row = |Sample { time_s, displacement, .. }: &Sample| SurveyRow {
-        time_s: time_s - samples[0].time_s,
-        points_m: points.map(|point| moved(displacement, &point)),
-        turn_rad: displacement.rotation.scaled_axis(),
+    let row = |sample: &Sample| SurveyRow {
+        time_s: sample.time_s - samples[0].time_s,
+        points_m: points.map(|point| sample.way(&point)),
+        turn_rad: sample.displacement.rotation.scaled_axis(),
     };
     let path: Vec<SurveyRow> = samples.iter().map(row).collect();
     let (steps, gaps) = steps_and_gaps(table);
@@ -166,15 +163,14 @@ pub fn survey(config: &FileConfig, jaw: &JawConfig) -> Result<RecordingSurvey, T
             range(TURNS[axis], path.iter().map(|row| row.turn_rad[axis].to_degrees()))
         }),
         turn_deg: path.iter().map(|row| row.turn_rad.norm().to_degrees()).fold(0.0, f64::max),
-        likely_axes: likely_axes(&source, &config.axes),
+        implausible,
+        likely_units: likely.map(|likely| (likely.length_unit, likely.time_unit)),
+        likely_axes: frames.as_ref().and_then(Frames::other_axes),
+        frames,
         glitches: recording.glitches,
         doubts: recording.doubts,
         path,
     })
-}
-
-fn moved(displacement: &Pose, point: &Vec3) -> Vec3 {
-    displacement.rotation * point + displacement.translation.vector - point
 }
 
 fn follows(config: &FileConfig, source: &Source) -> String {
@@ -247,58 +243,4 @@ fn point_figures(
         farthest_mm: path.iter().map(|row| row.points_m[point].norm() * 1e3).fold(0.0, f64::max),
         fastest_mm_s: path.windows(2).map(speed_m_s).fold(0.0, f64::max) * 1e3,
     }
-}
-
-/// The file's axes that are likely to point anterior, left and up, if the motion does not open under the stated axes.
-/// The widest opening of the jaw decides.
-///
-/// At the widest opening the incisal point goes down, rather back than forward, and hardly aside. The jaw turns about
-/// the axis that points left, and the condyles go forward. A recording without an opening gives no axes.
-fn likely_axes(source: &Source, stated: &[String; 3]) -> Option<[String; 3]> {
-    let (mut best, mut score_of_stated) = (None::<(f64, [String; 3])>, f64::NEG_INFINITY);
-    let pairs = SIGNED_AXES.iter().flat_map(|anterior| SIGNED_AXES.map(|left| (*anterior, left)));
-    for [anterior, left, up] in pairs.flat_map(|(anterior, left)| SIGNED_AXES.map(|up| [anterior, left, up]))
-    {
-        let names = [anterior, left, up].map(String::from);
-        let Ok(axes) = Axes::parse(&names) else { continue };
-        let Ok(score) = score(source, &axes) else { continue };
-        if names == *stated {
-            score_of_stated = score;
-        }
-        if best.as_ref().is_none_or(|(most, _)| score > *most) {
-            best = Some((score, names));
-        }
-    }
-    let (most, names) = best?;
-    (most >= LEAST && most >= score_of_stated + BETTER).then_some(names)
-}
-
-/// Similarity of the widest row to an opened jaw.
-fn score(source: &Source, axes: &Axes) -> Result<f64, Located> {
-    let rows = &source.table.rows;
-    let first = source.displacement(&rows[0], axes)?;
-    let away = |row: &Row| -> Result<Pose, Located> {
-        let displacement = source.displacement(row, axes)?;
-        let way = displacement.translation.vector - first.translation.vector;
-        Ok(Pose::from_parts(way.into(), first.rotation.inverse() * displacement.rotation))
-    };
-    let mut widest = Pose::identity();
-    for row in rows.iter().step_by(rows.len().div_ceil(ROWS)) {
-        let pose = away(row)?;
-        if pose.translation.vector.norm() > widest.translation.vector.norm() {
-            widest = pose;
-        }
-    }
-    let share = |along: f64, of: &Vec3| along / of.norm().max(f64::MIN_POSITIVE);
-    let incisal = widest.translation.vector;
-    if incisal.norm() < OPENED_M {
-        return Ok(0.0);
-    }
-    let turn = widest.rotation.scaled_axis();
-    let condyle = incisal + widest.rotation * source.reference - source.reference;
-    let down = share(-incisal.z - incisal.y.abs() - BACK * incisal.x, &incisal);
-    // A small turn is noise, and shows no axis.
-    let clear = (turn.norm() / CLEAR_RAD).min(1.0).powi(2);
-    let opening = share(turn.y, &turn) + FORWARD * share(condyle.x, &condyle);
-    Ok(down + clear * opening)
 }

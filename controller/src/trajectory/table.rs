@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use masseter_scenario::TimeUnit;
 use masseter_scenario::input::excerpt;
 use masseter_scenario::rows::{Line, fields, lines, numbers};
 use masseter_scenario::wording::counted;
@@ -95,7 +96,7 @@ impl Format {
 }
 
 impl Table {
-    pub(super) fn parse(text: &str) -> Result<Self, Located> {
+    pub(super) fn parse(text: &str, time_unit: TimeUnit) -> Result<Self, Located> {
         let mut content = lines(text.as_bytes()).filter(|line| line.text.as_deref() != Ok(""));
         let too_few = |rows| {
             let rows = counted(rows as u64, "row");
@@ -106,7 +107,7 @@ impl Table {
         let format = format.map_err(|problem| Located::at(number, problem))?;
         let mut rows: Vec<Row> = Vec::new();
         for Line { number, text } in content {
-            let row = text.and_then(|text| parse_row(number, &text, format.columns(), rows.last()));
+            let row = text.and_then(|text| parse_row(number, &text, format.columns(), time_unit, &rows));
             rows.push(row.map_err(|problem| Located::at(number, problem))?);
         }
         if rows.len() < FEWEST_ROWS {
@@ -116,23 +117,35 @@ impl Table {
     }
 }
 
-fn parse_row(line: u64, text: &str, columns: &[&str], previous: Option<&Row>) -> Result<Row, String> {
+fn parse_row(
+    line: u64,
+    text: &str,
+    columns: &[&str],
+    time_unit: TimeUnit,
+    before: &[Row],
+) -> Result<Row, String> {
     let mut values = numbers(text, columns)?;
     let is_too_far = |(value, column): &(&f64, &&str)| column.ends_with("_mm") && value.abs() > LARGEST_MM;
     if let Some((value, column)) = values.iter().zip(columns).find(is_too_far) {
         return Err(format!("{column} is {value:e}, beyond ±{LARGEST_MM} mm; is the unit millimetres?"));
     }
-    let time_s = values.remove(0);
-    previous.map_or(Ok(()), |previous| check_time(time_s, previous.time_s))?;
+    let time_s = time_unit.seconds(values.remove(0));
+    before.last().map_or(Ok(()), |previous| check_time(time_s, previous.time_s, before.len() == 1))?;
     Ok(Row { line, time_s, values })
 }
 
-fn check_time(time_s: f64, previous_s: f64) -> Result<(), String> {
+fn check_time(time_s: f64, previous_s: f64, is_first_step: bool) -> Result<(), String> {
     let gap_s = time_s - previous_s;
     if gap_s < SHORTEST_STEP_S {
         return Err(format!(
             "time {time_s} s does not come after {previous_s} s of the row before by 1 µs or more; sort the rows, \
              drop repeats"
+        ));
+    }
+    if gap_s > LARGEST_GAP_S && is_first_step {
+        return Err(format!(
+            "the time between the first rows is {gap_s:.3} s, at most {LARGEST_GAP_S} s can be bridged; is the time in \
+             ms? set motion.time_unit = \"ms\""
         ));
     }
     if gap_s > LARGEST_GAP_S {
@@ -153,7 +166,7 @@ mod tests {
     #[test]
     fn lines_are_counted_past_comments_blank_lines_and_a_byte_order_mark() {
         let text = format!("\u{feff}# a comment\r\n\r\n{HEADER}# another\n{ROWS}");
-        let table = Table::parse(&text).ok().unwrap();
+        let table = Table::parse(&text, TimeUnit::S).ok().unwrap();
         assert_eq!(table.format, Format::Poses);
         assert_eq!(table.rows.iter().map(|row| row.line).collect::<Vec<_>>(), [5, 6, 7, 8]);
         assert_eq!(table.rows[2].values[2].to_bits(), (-2.0f64).to_bits());
@@ -163,8 +176,11 @@ mod tests {
     fn names_and_numbers_may_stand_in_quotes() {
         let quoted = |line: &str| format!("\"{}\"\n", line.replace(',', "\",\""));
         let text: String = (HEADER.to_owned() + ROWS).lines().map(quoted).collect();
-        assert_eq!(Table::parse(&text).ok(), Table::parse(&(HEADER.to_owned() + ROWS)).ok());
-        assert!(Table::parse(&text).is_ok());
+        assert_eq!(
+            Table::parse(&text, TimeUnit::S).ok(),
+            Table::parse(&(HEADER.to_owned() + ROWS), TimeUnit::S).ok()
+        );
+        assert!(Table::parse(&text, TimeUnit::S).is_ok());
     }
 
     #[test]
@@ -189,7 +205,7 @@ mod tests {
             (with("0.04,0,0,-4e262,1,0,0,0"), Some(6), "z_mm is -4e262, beyond"),
         ];
         for (text, line, reason) in table {
-            let error = Table::parse(&text).err().unwrap();
+            let error = Table::parse(&text, TimeUnit::S).err().unwrap();
             assert_eq!(error.line, line, "{text}");
             assert!(error.problem.contains(reason), "{}", error.problem);
         }

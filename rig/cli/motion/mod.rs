@@ -12,11 +12,12 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::Args;
 use masseter_controller::trajectory::{
-    Gap, Glitch, PointFigures, Range, RecordingSurvey, Trajectory, TrajectoryError, survey,
+    Frame, Frames, Gap, Glitch, PointFigures, Range, RecordingSurvey, Trajectory, TrajectoryError, survey,
 };
+use masseter_judge::{RecordedError, RecordedFigures, RecordedWatch};
 use masseter_model::geometry::{AXES, AXIS_NAMES, Mechanism};
 use masseter_plan::{Overrides, best_placement, demands, scenario_with_overrides};
-use masseter_scenario::{MotionConfig, Scenario, wording::counted};
+use masseter_scenario::{LengthUnit, MotionConfig, Scenario, TimeUnit, wording::counted};
 use masseter_terminal::{Exit, Format, Tone, result, result_with_tones};
 use serde::Serialize;
 
@@ -76,6 +77,11 @@ struct Found {
     survey: RecordingSurvey,
     #[serde(flatten)]
     judged: Judged,
+    /// How far filter and ramps lead the motion from the file's rows; none of a motion that is refused.
+    recorded: Option<RecordedFigures>,
+    /// With the axes that the motion shows; several where they are as likely as each other.
+    suggestions: Vec<Suggestion>,
+    /// The first of them.
     suggestion: Option<Suggestion>,
 }
 
@@ -98,8 +104,14 @@ struct Strokes {
 /// Keys of the scenario.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct Suggestion {
+    /// `motion.length_unit`; none where the stated one is likely.
+    length_unit: Option<LengthUnit>,
+    /// `motion.time_unit`; none where the stated one is likely.
+    time_unit: Option<TimeUnit>,
     /// `motion.axes`; none where the stated ones are likely.
     axes: Option<[String; 3]>,
+    /// The motion of the jaw with these axes.
+    jaw: Option<String>,
     /// `jaw.closed_offset_m`; none where the stated one is good.
     closed_offset_m: Option<[f64; 3]>,
     /// Whether the rig would play the motion with them.
@@ -114,8 +126,16 @@ impl Found {
         let survey = survey(file, &scenario.jaw)?;
         let mechanism = Mechanism::new(&scenario.mechanism)?;
         let judged = Judged::new(scenario, &mechanism);
-        let suggestion = suggest(scenario, &mechanism, survey.likely_axes.as_ref(), &judged);
-        Ok(Self { file: path.to_owned(), survey, judged, suggestion })
+        let other = survey.frames.iter().filter(|frames| !frames.fits()).flat_map(Frames::likely);
+        let mut frames: Vec<Option<&Frame>> = other.map(Some).collect();
+        if frames.is_empty() {
+            frames.push(None);
+        }
+        let suggest = |frame| suggest(scenario, &mechanism, survey.likely_units, frame, &judged);
+        let suggestions: Vec<_> = frames.into_iter().filter_map(suggest).collect();
+        let suggestion = suggestions.first().cloned();
+        let recorded = predicted(scenario, &mechanism);
+        Ok(Self { file: path.to_owned(), survey, judged, recorded, suggestions, suggestion })
     }
 }
 
@@ -142,28 +162,39 @@ impl Strokes {
     }
 }
 
-/// What to change; nothing where the motion fits as it is.
+/// What to change; nothing where the motion fits as it is. Whatever is suggested was played.
 fn suggest(
     scenario: &Scenario,
     mechanism: &Mechanism,
-    axes: Option<&[String; 3]>,
+    units: Option<(LengthUnit, TimeUnit)>,
+    frame: Option<&Frame>,
     now: &Judged,
 ) -> Option<Suggestion> {
-    if axes.is_none() && now.fits() {
+    let is_changed = units.is_some() || frame.is_some();
+    if !is_changed && now.fits() {
         return None;
     }
     let mut changed = scenario.clone();
-    if let (Some(axes), MotionConfig::File(file)) = (axes, &mut changed.motion) {
-        file.axes.clone_from(axes);
+    let (mut length_unit, mut time_unit) = (None, None);
+    if let MotionConfig::File(file) = &mut changed.motion {
+        if let Some((length, time)) = units {
+            length_unit = (length != file.length_unit).then_some(length);
+            time_unit = (time != file.time_unit).then_some(time);
+            (file.length_unit, file.time_unit) = (length, time);
+        }
+        if let Some(frame) = frame {
+            file.axes.clone_from(&frame.axes);
+        }
     }
-    let is_turned_enough = axes.is_some() && Judged::new(&changed, mechanism).fits();
-    let closed_offset_m = if is_turned_enough { None } else { better_offset(&changed, mechanism) };
-    if axes.is_none() && closed_offset_m.is_none() {
+    let is_enough = is_changed && Judged::new(&changed, mechanism).fits();
+    let closed_offset_m = if is_enough { None } else { better_offset(&changed, mechanism) };
+    if !is_changed && closed_offset_m.is_none() {
         return None;
     }
     changed.jaw.closed_offset_m = closed_offset_m.unwrap_or(changed.jaw.closed_offset_m);
     let judged = Judged::new(&changed, mechanism);
-    Some(Suggestion { axes: axes.cloned(), closed_offset_m, judged })
+    let (axes, jaw) = (frame.map(|frame| frame.axes.clone()), frame.map(Frame::words));
+    Some(Suggestion { length_unit, time_unit, axes, jaw, closed_offset_m, judged })
 }
 
 /// The offset with the most left of every stroke, to half a millimetre; none where there is no better one.
@@ -176,6 +207,18 @@ fn better_offset(scenario: &Scenario, mechanism: &Mechanism) -> Option<[f64; 3]>
     }
     let at = |axis: usize| ((jaw.closed_offset_m[axis] + best.shift_m[axis]) * 1e4).round() / 1e4;
     Some(std::array::from_fn(at))
+}
+
+/// The errors that a robot without errors would have: those of filter and ramps.
+fn predicted(scenario: &Scenario, mechanism: &Mechanism) -> Option<RecordedFigures> {
+    let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, mechanism, scenario.duration_s).ok()?;
+    let cycles = (trajectory.duration_s() / scenario.period_s()) as u32;
+    let mut watch = RecordedWatch::new(trajectory.clone(), &scenario.jaw);
+    for cycle in 0..=cycles {
+        let motion_s = trajectory.motion_time_s(f64::from(cycle) * scenario.period_s());
+        watch.add(motion_s, &trajectory.pose_in_motion(motion_s));
+    }
+    watch.into_figures()
 }
 
 /// The description as text: no line is longer than a terminal, but for those with a path.
@@ -191,8 +234,49 @@ fn describe(found: &Found) -> String {
     for doubt in &survey.doubts {
         let _ = writeln!(text, "warning {doubt}");
     }
+    for implausible in &survey.implausible {
+        let _ = writeln!(text, "warning {implausible}");
+    }
+    text += &axes(survey);
+    text += &found.recorded.as_ref().map_or_else(String::new, against_played);
     text += &judgement(&found.judged);
-    text + &found.suggestion.as_ref().map_or_else(String::new, suggested)
+    text + &found.suggestions.iter().map(suggested).collect::<String>()
+}
+
+/// The table of errors; the robot's own are measured in a run.
+fn against_played(recorded: &RecordedFigures) -> String {
+    let line = |error: &RecordedError| {
+        let numbers = [error.rms, error.p95, error.max].map(|value| format!("{value:.4} {}", error.unit));
+        let [rms, p95, max] = numbers;
+        format!("{:<14} {:<7} {rms:>12} {p95:>12} {max:>12}\n", error.place, error.source)
+    };
+    let head = format!("{:<22} {:>12} {:>12} {:>12}\n", "recorded against played", "rms", "95 %", "max");
+    let is_predicted = |error: &&RecordedError| ["filter", "ramps"].contains(&error.source);
+    let lines: String = recorded.errors.iter().filter(is_predicted).map(line).collect();
+    format!("{head}{lines}{}\n\n", recorded.in_words())
+}
+
+/// The jaw's motion with the stated axes, and with other ones where those are not the only likely ones.
+fn axes(survey: &RecordingSurvey) -> String {
+    let Some(frames) = &survey.frames else {
+        return "axes    not judged: the motion has no opening\n".to_owned();
+    };
+    let line = |(name, frame): (&str, &Frame)| {
+        format!(
+            "{name:<7} {frame} misfit {:.1}: {}\n",
+            frame.misfit,
+            frame.words().replace("; ", "\n        ")
+        )
+    };
+    let others = frames.best.iter().filter(|frame| frame.axes != frames.stated.axes);
+    let is_clear = frames.fits() && !frames.is_ambiguous();
+    let shown = others.take(if is_clear { 0 } else { frames.best.len() }).map(|frame| ("or", frame));
+    let text: String = [("axes", &frames.stated)].into_iter().chain(shown).map(line).collect();
+    let likely: Vec<String> = frames.likely().map(Frame::to_string).collect();
+    match likely.len() {
+        0 | 1 => text,
+        _ => text + &format!("AMBIGUOUS, as likely as each other: {}\n", likely.join(", ")),
+    }
 }
 
 fn head(survey: &RecordingSurvey) -> String {
@@ -281,8 +365,15 @@ fn judgement(judged: &Judged) -> String {
 
 fn suggested(suggestion: &Suggestion) -> String {
     let mut text = String::from("suggest for the scenario:\n");
-    if let Some([anterior, left, up]) = &suggestion.axes {
-        let _ = writeln!(text, "  [motion]\n  axes = [\"{anterior}\", \"{left}\", \"{up}\"]");
+    let length = suggestion.length_unit.map(|unit| format!("  length_unit = \"{}\"\n", unit.name()));
+    let time = suggestion.time_unit.map(|unit| format!("  time_unit = \"{}\"\n", unit.name()));
+    let axes = suggestion.axes.iter().zip(&suggestion.jaw).map(|([anterior, left, up], jaw)| {
+        let jaw = jaw.replace("; ", "\n  # ");
+        format!("  # {jaw}\n  axes = [\"{anterior}\", \"{left}\", \"{up}\"]\n")
+    });
+    let motion: String = length.into_iter().chain(time).chain(axes).collect();
+    if !motion.is_empty() {
+        text = text + "  [motion]\n" + &motion;
     }
     if let Some([x, y, z]) = suggestion.closed_offset_m {
         let _ = writeln!(text, "  [jaw]\n  closed_offset_m = [{x:?}, {y:?}, {z:?}]");

@@ -7,7 +7,7 @@ use masseter_recording::{Damage, ProcessFault, Recorded, RunUsage};
 use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind, NO_DRIVE_STATE, Source};
 use masseter_runtime::messages::tap::{self, TapError};
 use masseter_runtime::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
-use masseter_runtime::named::Declared;
+use masseter_runtime::named::{Declared, PlayedMotion};
 use masseter_scenario::{FaultKindConfig, Scenario};
 
 use crate::declared_faults::FaultWatch;
@@ -22,6 +22,7 @@ use crate::over_time::{AxisWatch, CONTROLLER, ContactWatch, OverTimeCollector, P
 use crate::overruns::LoopSamples;
 use crate::played::{PlayedWatch, StopWatch};
 use crate::poses::{estimated_pose, is_moving, is_running, true_pose};
+use crate::recorded::RecordedWatch;
 use crate::requirements::Requirements;
 use crate::response::Responses;
 use crate::signals::{Pace, Sample, Timeline};
@@ -40,7 +41,7 @@ use crate::tracking::{PoseSource, Tracking};
 /// use masseter_recording::Recorded;
 /// use masseter_scenario::Scenario;
 /// use masseter_runtime::messages::State;
-/// use masseter_runtime::named::Declared;
+/// use masseter_runtime::named::{Declared, PlayedMotion};
 ///
 /// let mut analysis = Analysis::new(&Scenario::default(), &Declared::default());
 /// for cycle in 1..=3 {
@@ -81,6 +82,8 @@ pub struct Analysis {
     stop: StopWatch,
     standstill: StandstillWatch,
     played: PlayedWatch,
+    /// None where the scenario plays no recording.
+    recorded: Option<RecordedWatch>,
     contact: ContactWatch,
     /// `None` if the scenario requires nothing.
     requirements: Option<Requirements>,
@@ -141,6 +144,9 @@ impl Analysis {
             stop: StopWatch::default(),
             standstill: StandstillWatch::new(scenario),
             played: PlayedWatch::new(&scenario.jaw),
+            recorded: (declared.motion == PlayedMotion::Scenario)
+                .then(|| RecordedWatch::of_scenario(scenario))
+                .flatten(),
             contact: ContactWatch::default(),
             requirements: (!requirements.is_empty()).then_some(requirements),
             figures: Figures {
@@ -263,6 +269,12 @@ impl Analysis {
         if let Some(path) = self.tracking.add_sample(sample) {
             self.shown.iter_mut().for_each(|shown| shown.over_time.apply_path(&path));
             self.faults.apply_sample(&path);
+            if let (Some(recorded), Some(used)) = (&mut self.recorded, &messages.solution) {
+                let is_counted = is_running(messages.controller_state) && used.motion_time_s >= 0.0;
+                if let Some(actual) = path.actual.filter(|_| is_counted) {
+                    recorded.add(used.motion_time_s, &actual);
+                }
+            }
             if let Some(lag_s) = messages.lag_s {
                 self.played.add_sample(lag_s, messages.progress_s, path.desired, path.actual);
             }
@@ -347,6 +359,7 @@ impl Analysis {
             standstill: self.standstill.into_figures(),
             outage: self.outage.outage(self.period_ns),
             tracking,
+            recorded: self.recorded.and_then(RecordedWatch::into_figures),
             faults: self.faults.into_figures(ended_ns),
             requirements: self.requirements.map(Requirements::into_figures).unwrap_or_default(),
             signals: self.named.signals,

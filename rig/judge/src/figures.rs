@@ -17,6 +17,7 @@ use crate::messages::{ParameterFigures, SignalFigures, TopicFigures};
 use crate::over_time::{AxisFigures, ContactFigures, OverTime};
 use crate::overruns::Overrun;
 use crate::played::{MotionFigures, StoppedBy};
+use crate::recorded::RecordedFigures;
 use crate::requirements::RequirementFigures;
 use crate::response::BusResponse;
 use crate::skips::{OverrunAttribution, SkipFigures};
@@ -68,6 +69,9 @@ pub struct Figures {
     pub outage: Option<Outage>,
     /// Distance of the platform from its desired pose, while the motion played.
     pub tracking: TrackingFigures,
+    /// Distance of the jaw from the rows of a recorded motion; none of a generated one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recorded: Option<RecordedFigures>,
     /// The scenario's faults, in their order.
     pub faults: Vec<FaultFigures>,
     /// The scenario's requirements, in their order, then the events that it expects.

@@ -19,6 +19,7 @@ mod over_time;
 mod overruns;
 mod played;
 mod poses;
+mod recorded;
 mod reference;
 pub mod requirements;
 mod response;
@@ -45,6 +46,7 @@ pub use over_time::{AxisFigures, ContactFigures, OverTime, ToothFigures, ToothLo
 pub use overruns::{LoopCounts, Overrun, OverrunCause};
 pub use played::{MotionFigures, StoppedBy};
 pub use poses::MOVING;
+pub use recorded::{RecordedError, RecordedFigures, RecordedWatch};
 pub use response::{BusResponse, ResponseFigures};
 pub use series::Curve;
 pub use skips::{OverrunAttribution, SkipFigures};

@@ -140,6 +140,82 @@ section! {
     }
 }
 
+/// The unit of a recording's lengths.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LengthUnit {
+    /// Millimetres, as the header says.
+    Mm,
+    /// Centimetres.
+    Cm,
+    /// Metres.
+    M,
+}
+
+impl LengthUnit {
+    /// All units.
+    pub const ALL: [Self; 3] = [Self::Mm, Self::Cm, Self::M];
+
+    /// Its name, as in a scenario.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Mm => "mm",
+            Self::Cm => "cm",
+            Self::M => "m",
+        }
+    }
+
+    /// Millimetres in one.
+    pub fn mm(self) -> f64 {
+        match self {
+            Self::Mm => 1.0,
+            Self::Cm => 10.0,
+            Self::M => 1000.0,
+        }
+    }
+}
+
+/// The unit of a recording's times.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TimeUnit {
+    /// Seconds, as the header says.
+    S,
+    /// Milliseconds.
+    Ms,
+}
+
+impl TimeUnit {
+    /// All units.
+    pub const ALL: [Self; 2] = [Self::S, Self::Ms];
+
+    /// Its name, as in a scenario.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::S => "s",
+            Self::Ms => "ms",
+        }
+    }
+
+    /// A time in this unit, in seconds.
+    pub fn seconds(self, time: f64) -> f64 {
+        match self {
+            Self::S => time,
+            Self::Ms => time / 1000.0,
+        }
+    }
+}
+
+/// What becomes of a recording that is no motion of a jaw.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum IfImplausible {
+    /// The recording is refused.
+    Refuse,
+    /// The recording is played with a warning.
+    Warn,
+}
+
 keys! {
     /// A recorded motion of the lower jaw, as CSV.
     ///
@@ -153,6 +229,15 @@ keys! {
         /// The file's axes that point anterior, left and up.
         #[serde(default = "FileConfig::default_axes")]
         pub axes: [String; 3] => "signed axes, right-handed",
+        /// The unit of the file's lengths, whatever the header says.
+        #[serde(default = "FileConfig::default_length_unit")]
+        pub length_unit: LengthUnit,
+        /// The unit of the file's times, whatever the header says.
+        #[serde(default = "FileConfig::default_time_unit")]
+        pub time_unit: TimeUnit,
+        /// Whether a file whose ways, turns, speeds or axes are no jaw's is refused, or played with a warning.
+        #[serde(default = "FileConfig::default_if_implausible")]
+        pub if_implausible: IfImplausible,
         /// Only for poses: their point of reference, in the jaw frame at the closed pose; by default the midpoint between
         /// the condyles.
         pub reference_point_mm: Option<[f64; 3]> => "finite",
@@ -174,6 +259,9 @@ impl FileConfig {
         Self {
             path: path.into(),
             axes: Self::default_axes(),
+            length_unit: Self::default_length_unit(),
+            time_unit: Self::default_time_unit(),
+            if_implausible: Self::default_if_implausible(),
             reference_point_mm: None,
             marker_origin_mm: None,
             lowpass_hz: Self::default_lowpass_hz(),
@@ -182,6 +270,18 @@ impl FileConfig {
 
     fn default_axes() -> [String; 3] {
         ["+x", "+y", "+z"].map(String::from)
+    }
+
+    fn default_length_unit() -> LengthUnit {
+        LengthUnit::Mm
+    }
+
+    fn default_time_unit() -> TimeUnit {
+        TimeUnit::S
+    }
+
+    fn default_if_implausible() -> IfImplausible {
+        IfImplausible::Refuse
     }
 
     fn default_lowpass_hz() -> f64 {

@@ -1,6 +1,7 @@
 //! `report.html`: one page that needs no network. Each module fills a section of it; `masseter-page` draws them.
 
 mod motion;
+mod recorded;
 mod result;
 mod rig;
 mod times;

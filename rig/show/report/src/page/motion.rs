@@ -17,6 +17,7 @@ use masseter_scenario::{Scenario, ToothConfig};
 use serde::Serialize;
 use serde_json::Value;
 
+use super::recorded::recorded_blocks;
 use super::times::{in_unit, limit, plain, since_s};
 use crate::table;
 
@@ -35,6 +36,7 @@ pub(super) fn mechanism_section(scenario: &Scenario, figures: &Figures) -> Optio
 pub(super) fn motion_section(scenario: &Scenario, figures: &Figures) -> Section {
     let over_time = &figures.over_time;
     let mut blocks = vec![Block::text("motion-in-words", motion_in_words(figures))];
+    blocks.extend(figures.recorded.iter().flat_map(recorded_blocks));
     if let Some(closed_m) = closed_incisal_m(scenario) {
         let along = |axis: usize| {
             let chart = displacement(figures, axis, closed_m[axis]);
