@@ -7,12 +7,15 @@
 //! of a trajectory.
 
 mod check;
+mod columns;
 mod doubts;
 mod generators;
 mod import;
 mod mandible;
+mod markers;
 mod motion;
 mod recording;
+mod sheet;
 mod survey;
 mod table;
 
@@ -23,6 +26,7 @@ use nalgebra::UnitQuaternion;
 pub use check::{TrajectoryReport, check};
 pub use doubts::Glitch;
 pub(crate) use generators::minimum_jerk;
+pub use import::plain_form;
 pub use mandible::{closed_jaw_points, closed_pose};
 pub use motion::Trajectory;
 pub use survey::{Gap, PointFigures, Range, RecordingSurvey, StepFigures, SurveyRow, survey};

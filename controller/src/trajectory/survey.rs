@@ -38,6 +38,8 @@ pub struct RecordingSurvey {
     pub format: &'static str,
     /// The point that the file follows.
     pub follows: String,
+    /// What was read, converted and left out, a line each.
+    pub protocol: Vec<String>,
     /// Rows of data.
     pub rows: usize,
     /// Lines of the first and of the last row.
@@ -152,9 +154,10 @@ pub fn survey(config: &FileConfig, jaw: &JawConfig) -> Result<RecordingSurvey, T
     Ok(RecordingSurvey {
         format: match table.format {
             Format::Poses => "poses",
-            Format::Markers => "markers",
+            Format::Markers(_) => "markers",
         },
         follows: follows(config, &source),
+        protocol: table.protocol.clone(),
         rows: table.rows.len(),
         lines: [table.rows[0].line, table.rows[table.rows.len() - 1].line],
         duration_s: recording.length_s(),
@@ -180,15 +183,15 @@ fn moved(displacement: &Pose, point: &Vec3) -> Vec3 {
 fn follows(config: &FileConfig, source: &Source) -> String {
     let mm = |point: &Vec3| format!("({:.1}, {:.1}, {:.1}) mm", point.x * 1e3, point.y * 1e3, point.z * 1e3);
     let reference = mm(&source.reference);
-    match (source.table.format, config.reference_point_mm, config.marker_origin_mm) {
+    match (&source.table.format, config.reference_point_mm, config.marker_origin_mm) {
         (Format::Poses, None, _) => format!(
             "the middle between the condyles, {reference} from the incisal point\n        (assumed; if it is another point, set motion.reference_point_mm)"
         ),
         (Format::Poses, Some(_), _) => format!("the point {reference} from the incisal point"),
-        (Format::Markers, _, None) => {
+        (Format::Markers(_), _, None) => {
             "the markers' centroid, not the incisal point (set motion.marker_origin_mm)".to_owned()
         }
-        (Format::Markers, _, Some([x, y, z])) => {
+        (Format::Markers(_), _, Some([x, y, z])) => {
             format!("the incisal point, at ({x:.1}, {y:.1}, {z:.1}) mm of the tracker in the first row")
         }
     }
@@ -215,7 +218,7 @@ fn steps_and_gaps(table: &Table) -> (StepFigures, Vec<Gap>) {
 
 fn columns(table: &Table) -> Vec<Range> {
     let values = |column: usize| table.rows.iter().map(move |row| row.values[column]);
-    let names = table.format.columns()[1..].iter().enumerate();
+    let names = table.columns()[1..].iter().enumerate();
     names.map(|(column, name)| range(name, values(column))).collect()
 }
 

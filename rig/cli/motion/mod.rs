@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::Args;
 use masseter_controller::trajectory::{
-    Gap, Glitch, PointFigures, Range, RecordingSurvey, Trajectory, TrajectoryError, survey,
+    Gap, Glitch, PointFigures, Range, RecordingSurvey, Trajectory, TrajectoryError, plain_form, survey,
 };
 use masseter_model::geometry::{AXES, AXIS_NAMES, Mechanism};
 use masseter_plan::{Overrides, best_placement, demands, scenario_with_overrides};
@@ -33,9 +33,10 @@ const MOST: usize = 8;
 #[command(after_help = "\
 Examples:
   masseter motion examples/patient.csv --svg patient.svg
+  masseter motion jaw.trc --set motion.lowpass_hz=6 --write motion.csv
   masseter motion examples/tracker.csv --scenario examples/markers.toml")]
 pub(crate) struct MotionArgs {
-    /// CSV file of a recorded jaw motion, as for run --trajectory
+    /// File of a recorded jaw motion, as for run --trajectory
     file: PathBuf,
     /// Scenario with the file's axes, the jaw and the mechanism [default: the default one]
     #[arg(long, value_name = "SCENARIO.toml")]
@@ -43,6 +44,9 @@ pub(crate) struct MotionArgs {
     /// Set a key of the scenario
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Write the motion in its plain form, with what was read and converted in comments
+    #[arg(long, value_name = "FILE.csv")]
+    write: Option<PathBuf>,
     /// Write a picture of the motion
     #[arg(long, value_name = "FILE.svg")]
     svg: Option<PathBuf>,
@@ -57,6 +61,9 @@ pub(crate) fn motion(args: &MotionArgs) -> anyhow::Result<Exit> {
         Overrides { set: args.set.clone(), trajectory: Some(args.file.clone()), ..Overrides::default() };
     let scenario = scenario_with_overrides(args.scenario.as_deref(), &overrides)?;
     let found = Found::new(&scenario, &args.file)?;
+    if let (Some(path), MotionConfig::File(file)) = (&args.write, &scenario.motion) {
+        write_plain(path, &plain_form(file, &scenario.jaw)?, &args.file)?;
+    }
     if let Some(path) = &args.svg {
         fs::write(path, picture::svg(&found.survey))
             .with_context(|| format!("cannot write {}", path.display()))?;
@@ -66,6 +73,14 @@ pub(crate) fn motion(args: &MotionArgs) -> anyhow::Result<Exit> {
         Format::Human => result_with_tones(&describe(&found), &TONES)?,
     }
     Ok(if found.judged.refused.is_none() { Exit::Passed } else { Exit::Failed })
+}
+
+/// Writes the plain form, but not over its source.
+fn write_plain(path: &Path, text: &str, source: &Path) -> anyhow::Result<()> {
+    if path.canonicalize().is_ok_and(|path| source.canonicalize().is_ok_and(|source| path == source)) {
+        bail!("--write {} is the file that is read; name another one", path.display());
+    }
+    fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// What the verb finds.
@@ -182,7 +197,11 @@ fn better_offset(scenario: &Scenario, mechanism: &Mechanism) -> Option<[f64; 3]>
 fn describe(found: &Found) -> String {
     let survey = &found.survey;
     let mut text = format!("{}: {}\n", found.file.display(), head(survey));
-    let _ = writeln!(text, "follows {}\n", survey.follows);
+    let _ = writeln!(text, "follows {}", survey.follows);
+    for line in &survey.protocol {
+        let _ = writeln!(text, "read    {line}");
+    }
+    text.push('\n');
     text += &columns(&survey.columns);
     text += &points(&survey.points);
     text += &turns(survey);

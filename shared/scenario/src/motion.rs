@@ -140,11 +140,47 @@ section! {
     }
 }
 
+/// The unit of a recording's times.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TimeUnit {
+    /// Seconds.
+    S,
+    /// Milliseconds.
+    Ms,
+    /// Microseconds.
+    Us,
+}
+
+/// The unit of a recording's lengths.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LengthUnit {
+    /// Micrometres.
+    Um,
+    /// Millimetres.
+    Mm,
+    /// Centimetres.
+    Cm,
+    /// Metres.
+    M,
+}
+
+/// The unit of a recording's angles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AngleUnit {
+    /// Degrees.
+    Deg,
+    /// Radians.
+    Rad,
+}
+
 keys! {
-    /// A recorded motion of the lower jaw, as CSV.
+    /// A recorded motion of the lower jaw, as a tracker writes it.
     ///
-    /// The header decides the format: `time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz` (pose relative to the closed
-    /// pose) or `time_s,m1_x_mm,…,m3_z_mm` (three markers, the first row closed).
+    /// The names of the columns decide the content: poses relative to the closed pose, or markers, the first row closed.
+    /// The plain forms are `time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz` and `time_s,m1_x_mm,…,m3_z_mm`.
     #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]
     pub struct FileConfig {
@@ -159,6 +195,29 @@ keys! {
         /// Only for markers: the incisal point at the closed pose, in the file's coordinates; by default the markers'
         /// centroid.
         pub marker_origin_mm: Option<[f64; 3]> => "finite",
+        /// A name for each column in the place of the file's own names, `-` for a column without use; by default those
+        /// of the file's header.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub columns: Option<Vec<String>> => "one for each column",
+        /// Only for markers: the names of those on the lower jaw; by default all.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub markers: Option<Vec<String>> => "three to twelve names of the file",
+        /// The unit of times, in the place of the file's.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub time_unit: Option<TimeUnit>,
+        /// The unit of lengths, in the place of the file's.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub length_unit: Option<LengthUnit>,
+        /// Only for three angles: their unit, in the place of the file's.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub angle_unit: Option<AngleUnit>,
+        /// Only for three angles: the axes of the file in the order of the turns. Capitals turn about the axes that move
+        /// with the jaw, small letters about fixed axes.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub euler_order: Option<String> => "each of x, y, z once, such as `XYZ` or `xyz`",
+        /// Only for files without times: rows, or numbered frames, a second.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub rate_hz: Option<f64> => Within(4.0, 10_000.0),
         /// Cut-off frequency of the zero-phase low-pass filter; 0 for none.
         #[serde(default = "FileConfig::default_lowpass_hz")]
         pub lowpass_hz: f64 => "0, or 0.5 to 50",
@@ -169,13 +228,20 @@ impl FileConfig {
     /// Size of the largest file, bytes: more than an hour of three markers at 200 Hz.
     pub const MOST_BYTES: u64 = 256 << 20;
 
-    /// A file read with the default axes, reference point and low-pass.
+    /// A file read as its header says, with the default axes, reference point and low-pass.
     pub fn new(path: impl Into<PathBuf>) -> Self {
         Self {
             path: path.into(),
             axes: Self::default_axes(),
             reference_point_mm: None,
             marker_origin_mm: None,
+            columns: None,
+            markers: None,
+            time_unit: None,
+            length_unit: None,
+            angle_unit: None,
+            euler_order: None,
+            rate_hz: None,
             lowpass_hz: Self::default_lowpass_hz(),
         }
     }
