@@ -412,12 +412,22 @@ impl Reader<'_> {
 
     /// What a file without a motion lacks.
     fn not_a_motion(&self, has_place: bool, has_turn: bool) -> String {
+        let is_part = |column: &&Column| {
+            matches!(
+                column.meaning,
+                Meaning::Place(_) | Meaning::Bare(_) | Meaning::Turn(_) | Meaning::Quaternion(_)
+            )
+        };
+        let parts: Vec<_> = self.columns.iter().filter(is_part).map(quoted).collect();
+        let turn = "qw,qx,qy,qz, three angles, or a matrix";
         let lacks = match (has_place, has_turn) {
-            (true, false) => "no columns of an orientation (qw,qx,qy,qz, three angles, or a matrix)",
-            (false, true) => "no columns of a place (x,y,z)",
-            _ => {
-                "no columns of poses (x,y,z and qw,qx,qy,qz, three angles, or a matrix) or of three markers or more"
-            }
+            (true, false) => format!("no columns of an orientation ({turn})"),
+            (false, true) => "no columns of a place (x,y,z)".to_owned(),
+            _ if !parts.is_empty() => format!(
+                "{} are only a part of a pose (x,y,z and {turn}); add the others, with 0 where the jaw is held",
+                sentence(&parts.join(", "))
+            ),
+            _ => format!("no columns of poses (x,y,z and {turn}) or of three markers or more"),
         };
         format!(
             "{lacks}; name the columns, {}; poses are time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz, markers \

@@ -12,7 +12,8 @@ use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
 use super::mandible::condylar_middle;
 use super::markers::Body;
 use super::recording::{Recording, Sample};
-use super::table::{Format, LARGEST_MM, Located, Row, Table};
+use super::row::{Located, Row};
+use super::table::{Format, LARGEST_MM, Table};
 use super::{TrajectoryError, ranges_of, require};
 
 /// The names of a file's axes, each with its direction.

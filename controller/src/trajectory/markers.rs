@@ -6,7 +6,7 @@ use masseter_model::geometry::{Pose, Vec3};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
 use super::columns::MARKERS;
-use super::table::{Located, Row};
+use super::row::{Located, Row, gaps};
 
 /// Markers nearer to one line than this share of their greatest distance fix no orientation.
 const FLATTEST: f64 = 0.05;
@@ -138,14 +138,14 @@ pub(super) fn settle(names: &[String], mut rows: Vec<Row>) -> Result<Settled, Lo
         rows.drain(..whole);
     }
     let body = Body::new(names, &rows[0].values).map_err(|problem| Located::at(rows[0].line, problem))?;
-    let before = rows.len();
+    let mut lost: Vec<u64> = Vec::new();
     rows.retain(|row| {
         let seen: Vec<Vec3> = places_m(&row.values).into_iter().filter(is_seen).collect();
-        seen.len() >= MARKERS[0] && flat(&seen).is_none()
+        let is_enough = seen.len() >= MARKERS[0] && flat(&seen).is_none();
+        lost.extend((!is_enough).then_some(row.line));
+        is_enough
     });
-    if rows.len() < before {
-        protocol.push(format!("{} rows with too few markers are gaps", before - rows.len()));
-    }
+    protocol.extend(gaps(&lost));
     let (mut last, mut square_m2, mut largest) = (UnitQuaternion::identity(), 0.0, (0.0, 0));
     let mut swaps: Vec<(usize, usize, Vec<u64>)> = Vec::new();
     for row in &mut rows {

@@ -15,6 +15,7 @@ mod mandible;
 mod markers;
 mod motion;
 mod recording;
+mod row;
 mod sheet;
 mod survey;
 mod table;

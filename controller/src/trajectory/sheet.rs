@@ -8,7 +8,7 @@ use masseter_scenario::wording::counted;
 use masseter_scenario::{AngleUnit, LengthUnit, TimeUnit};
 
 use super::columns::{Assumed, Column, Meaning, Unit};
-use super::table::Located;
+use super::row::Located;
 
 /// Lines in which the header is looked for.
 const HEAD_LINES: usize = 200;

@@ -11,7 +11,8 @@ use super::doubts::Glitch;
 use super::import::{Axes, SIGNED_AXES, Source};
 use super::mandible::jaw_points;
 use super::recording::{Recording, Sample};
-use super::table::{Format, Located, Row, Table};
+use super::row::{Located, Row};
+use super::table::{Format, Table};
 
 /// A step longer than this many usual steps is a gap.
 const GAP_STEPS: f64 = 1.5;

@@ -10,9 +10,9 @@ use masseter_scenario::input::excerpt;
 use masseter_scenario::wording::counted;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-use super::TrajectoryError;
 use super::columns::{Clock, Content, Layout, Scaled, Turn};
 use super::markers::{Body, settle};
+use super::row::{Located, Row, gaps};
 use super::sheet::Sheet;
 
 /// Least rows of a motion.
@@ -41,43 +41,11 @@ const MARKERS: [&str; 37] = [
     "m12_y_mm", "m12_z_mm",
 ];
 
-/// A problem of a recording, before its path is known.
-#[derive(Debug)]
-pub(super) struct Located {
-    /// The line, from 1; none where the file as a whole is at fault.
-    pub line: Option<u64>,
-    /// The error and its remedy, for the author of the file.
-    pub problem: String,
-}
-
-impl Located {
-    pub(super) fn at(line: u64, problem: String) -> Self {
-        Self { line: Some(line), problem }
-    }
-
-    pub(super) fn whole(problem: String) -> Self {
-        Self { line: None, problem }
-    }
-
-    pub(super) fn in_file(self, path: &Path) -> TrajectoryError {
-        let line = self.line.map_or_else(String::new, |line| format!(":{line}"));
-        TrajectoryError(format!("{}{line}: {}", path.display(), self.problem))
-    }
-}
-
 /// The content of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Format {
     Poses,
     Markers(Body),
-}
-
-/// A row: time, and the other columns of the plain form. A marker that is lost has NaN.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Row {
-    pub line: u64,
-    pub time_s: f64,
-    pub values: Vec<f64>,
 }
 
 /// A file's content.
@@ -113,10 +81,7 @@ impl Table {
         if let Some((',', _)) = reader.decimal {
             protocol.push("decimal comma".to_owned());
         }
-        if let (Some(first), Some(last)) = (lost.first(), lost.last()) {
-            let lost = counted(lost.len() as u64, "row");
-            protocol.push(format!("gaps for lost samples: {lost}, lines {first} to {last}"));
-        }
+        protocol.extend(gaps(&lost));
         let too_few = |rows: usize| {
             let rows = counted(rows as u64, "row");
             Located::whole(format!("{rows} of data, at least {FEWEST_ROWS} are needed"))

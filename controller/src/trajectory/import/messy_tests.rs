@@ -484,6 +484,12 @@ fn heads() -> Vec<Case> {
         ("comments", format!("# Patient 7\n\n{}", separated(",", ".")), no_keys, WHOLE),
         ("MOT in degrees", mot("yes", 1.0_f64.to_degrees()), euler, WHOLE),
         ("STO in radians", mot("no", 1.0), euler, WHOLE),
+        (
+            "MOT in a plane",
+            mot("yes", 1.0).replace("jaw_tz", "jaw_a").replace("jaw_rx", "jaw_b"),
+            no_keys,
+            Refused("'jaw_tx', 'jaw_ty', 'jaw_ry', 'jaw_rz' are only a part of a pose"),
+        ),
         ("MOT without an order", mot("yes", 1.0_f64.to_degrees()), no_keys, Refused("motion.euler_order")),
         ("TRC", trc("mm", 1.0), no_keys, Read(Plain::Markers(3), 0)),
         ("TRC in metres", trc("m", 1e-3), no_keys, Read(Plain::Markers(3), 0)),
