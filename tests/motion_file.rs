@@ -254,3 +254,71 @@ fn the_picture_shows_the_paths_the_courses_and_the_glitches() {
         assert!(picture.contains(part), "{part}");
     }
 }
+
+/// `--set` speaks of the file that the command line names.
+#[test]
+fn every_key_of_a_file_can_be_set_from_the_command_line() {
+    let workspace = Workspace::new("");
+    let text = opening(|_, _| ()).replacen("time_s,x_mm,y_mm,z_mm", "t,x,y,z", 1);
+    let file = workspace.write("motion.csv", &text);
+    let file = file.to_str().unwrap();
+    let asked = masseter(&["motion", file]);
+    assert_eq!(asked.status.code(), Some(2), "{}", stdout(&asked));
+    for key in ["motion.time_unit = \"s\"", "motion.length_unit = \"um\", \"mm\""] {
+        assert!(stderr(&asked).contains(key), "{key}: {}", stderr(&asked));
+    }
+    let keys = [
+        "--set",
+        "motion.time_unit=\"s\"",
+        "--set",
+        "motion.length_unit=\"mm\"",
+        "--set",
+        "motion.lowpass_hz=6",
+    ];
+    let set = masseter(&[&["motion", file], &keys[..]].concat());
+    assert_eq!(set.status.code(), Some(0), "{}", stderr(&set));
+    let output = workspace.run_virtual(&[&["--trajectory", file, "--duration", "1s"], &keys[..]].concat());
+    assert!(workspace.run_folder().exists(), "{}", stderr(&output));
+    let scenario = fs::read_to_string(workspace.run_folder().join("scenario.toml")).unwrap();
+    assert!(scenario.contains("lowpass_hz = 6.0") && scenario.contains("length_unit = \"mm\""), "{scenario}");
+}
+
+#[test]
+fn the_plain_form_has_the_protocol_and_is_the_same_motion() {
+    let workspace = Workspace::new("");
+    let text = opening(|row, numbers| numbers[3] = if row == 50 { f64::NAN } else { numbers[3] });
+    let tracker = text
+        .replacen(POSES, "Zeit [s];X [mm];Y [mm];Z [mm];q0;q1;q2;q3\n", 1)
+        .replace(',', ";")
+        .replace('.', ",");
+    let (file, plain) = (workspace.write("export.csv", &tracker), workspace.file("plain.csv"));
+    let arguments = ["motion", file.to_str().unwrap(), "--write", plain.to_str().unwrap()];
+    let written = masseter(&arguments);
+    assert_eq!(written.status.code(), Some(0), "{}", stderr(&written));
+    let plain_text = fs::read_to_string(&plain).unwrap();
+    let protocol = [
+        "columns between semicolons",
+        "time from 'Zeit [s]' in s",
+        "turn from 'q0', 'q1', 'q2', 'q3', a quaternion, scalar first",
+        "place from 'X [mm]', 'Y [mm]', 'Z [mm]' in mm",
+        "decimal comma",
+        "gaps for lost samples: 1 row, lines 52 to 52",
+    ];
+    for line in protocol {
+        assert!(stdout(&written).contains(&format!("read    {line}\n")), "{line}: {}", stdout(&written));
+        assert!(plain_text.contains(&format!("# {line}\n")), "{line}: {plain_text}");
+    }
+    let figures = |path: &Path| {
+        let output = masseter(&["motion", path.to_str().unwrap(), "--format", "json"]);
+        let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+        [&found["points"], &found["turns_deg"], &found["steps"], &found["strokes"]].map(Value::clone)
+    };
+    assert_eq!(figures(&plain), figures(&file));
+    let over = masseter(&["motion", plain.to_str().unwrap(), "--write", plain.to_str().unwrap()]);
+    assert!(
+        over.status.code() == Some(2) && stderr(&over).contains("is the file that is read"),
+        "{}",
+        stderr(&over)
+    );
+    assert_eq!(fs::read_to_string(&plain).unwrap(), plain_text);
+}

@@ -18,7 +18,8 @@ use super::TrajectoryError;
 use super::doubts::largest;
 use super::import::{Axes, SIGNED_AXES, Source};
 use super::mandible::condylar_middle;
-use super::table::{Format, Located};
+use super::row::Located;
+use super::table::Format;
 
 /// A turn moves the incisal point by this length a radian, m.
 const LEVER_M: f64 = 0.08;

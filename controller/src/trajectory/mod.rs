@@ -7,14 +7,18 @@
 //! of a trajectory.
 
 mod check;
+mod columns;
 mod doubts;
 mod frames;
 mod generators;
 mod import;
 mod mandible;
+mod markers;
 mod motion;
 mod plausible;
 mod recording;
+mod row;
+mod sheet;
 mod survey;
 mod table;
 
@@ -26,9 +30,10 @@ pub use check::{TrajectoryReport, check};
 pub use doubts::Glitch;
 pub use frames::{Frame, Frames};
 pub(crate) use generators::minimum_jerk;
+pub use import::plain_form;
 pub use mandible::{closed_jaw_points, closed_pose};
 pub use motion::Trajectory;
-pub use plausible::Implausible;
+pub use plausible::{Implausible, LikelyUnit};
 pub use survey::{Gap, PointFigures, Range, RecordingSurvey, StepFigures, SurveyRow, survey};
 
 /// A motion that cannot be built or followed: the key or the line of the recording, the error there, and the remedy.

@@ -4,6 +4,8 @@
 //! The likely unit is one in which everything fits. The bounds are wide: they are for wrong units, points and angles,
 //! not for illness. Not found: a wrong unit of a recording that is plausible in several units.
 
+use std::fmt::{self, Display, Formatter};
+
 use masseter_model::geometry::Vec3;
 use masseter_scenario::{FileConfig, IfImplausible, JawConfig, LengthUnit, TimeUnit};
 use serde::Serialize;
@@ -14,7 +16,8 @@ use super::frames::Frames;
 use super::import::Source;
 use super::mandible::jaw_points;
 use super::recording::{Recording, Sample};
-use super::table::{Format, Located};
+use super::row::Located;
+use super::table::Format;
 
 /// Largest ways, m. Incisal point: 44 mm in the mean, 56 mm at the 95th percentile; condyles: 22 mm (Kordass 2014).
 const WIDEST_M: f64 = 0.08;
@@ -70,6 +73,45 @@ pub struct Implausible {
     cause: Cause,
 }
 
+/// A unit in which a recording is plausible, though it is not in the stated one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum LikelyUnit {
+    /// Of lengths.
+    #[serde(rename = "length_unit")]
+    Length(LengthUnit),
+    /// Of times.
+    #[serde(rename = "time_unit")]
+    Time(TimeUnit),
+}
+
+impl LikelyUnit {
+    const TRIED: [Self; 5] = [
+        Self::Length(LengthUnit::Mm),
+        Self::Length(LengthUnit::Cm),
+        Self::Length(LengthUnit::M),
+        Self::Time(TimeUnit::S),
+        Self::Time(TimeUnit::Ms),
+    ];
+
+    /// The section with this unit.
+    pub fn applied(self, config: &FileConfig) -> FileConfig {
+        match self {
+            Self::Length(unit) => FileConfig { length_unit: Some(unit), ..config.clone() },
+            Self::Time(unit) => FileConfig { time_unit: Some(unit), ..config.clone() },
+        }
+    }
+}
+
+/// The key and its value.
+impl Display for LikelyUnit {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Length(unit) => write!(f, "length_unit = \"{}\"", unit.name()),
+            Self::Time(unit) => write!(f, "time_unit = \"{}\"", unit.name()),
+        }
+    }
+}
+
 /// With four digits.
 fn short(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
@@ -79,9 +121,9 @@ fn short(value: f64) -> f64 {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Judgement {
     pub implausible: Vec<Implausible>,
-    /// The section with the units in which the recording is plausible; none where the stated ones are, or none are.
-    pub likely: Option<FileConfig>,
-    /// The frames in the likely units, or else in the stated ones; none without an opening.
+    /// The unit in which the recording is plausible; none where the stated ones are, or none is.
+    pub likely: Option<LikelyUnit>,
+    /// The frames in the likely unit, or else in the stated ones; none without an opening.
     pub frames: Option<Frames>,
 }
 
@@ -96,12 +138,12 @@ impl Judgement {
         if implausible.is_empty() {
             return Ok(Self { frames: Frames::new(source, config, jaw)?, ..Self::default() });
         }
-        let likely = likely_units(config, jaw);
+        let likely = likely_unit(config, jaw);
         for found in &mut implausible {
-            found.remedy = remedy(found.cause, config, likely.as_ref());
+            found.remedy = remedy(found.cause, likely);
         }
-        let frames = match &likely {
-            Some(units) => Frames::new(&Source::read(units, jaw)?, units, jaw)?,
+        let frames = match likely.map(|unit| unit.applied(config)) {
+            Some(changed) => Frames::new(&Source::read(&changed, jaw)?, &changed, jaw)?,
             None => Frames::new(source, config, jaw)?,
         };
         Ok(Self { implausible, likely, frames })
@@ -137,29 +179,25 @@ pub(super) fn import(config: &FileConfig, jaw: &JawConfig) -> Result<Recording, 
     Ok(recording)
 }
 
-/// Units in which everything is plausible. One changed unit is likelier than two.
-fn likely_units(config: &FileConfig, jaw: &JawConfig) -> Option<FileConfig> {
-    let lengths = LengthUnit::ALL.map(|length_unit| FileConfig { length_unit, ..config.clone() });
-    let times = TimeUnit::ALL.map(|time_unit| FileConfig { time_unit, ..config.clone() });
-    let is_plausible = |changed: &FileConfig| {
-        let source = Source::read(changed, jaw)?;
+/// The unit in which everything is plausible.
+fn likely_unit(config: &FileConfig, jaw: &JawConfig) -> Option<LikelyUnit> {
+    let is_plausible = |unit: &LikelyUnit| {
+        let changed = unit.applied(config);
+        let source = Source::read(&changed, jaw)?;
         let samples = source.samples()?;
         implausible(&source, &samples, jaw).map(|found| found.is_empty())
     };
-    lengths
-        .into_iter()
-        .chain(times)
-        .find(|changed| changed != config && is_plausible(changed).unwrap_or(false))
+    LikelyUnit::TRIED.into_iter().find(|unit| is_plausible(unit).unwrap_or(false))
 }
 
-fn remedy(cause: Cause, config: &FileConfig, likely: Option<&FileConfig>) -> String {
+fn remedy(cause: Cause, likely: Option<LikelyUnit>) -> String {
     match (cause, likely) {
-        (_, Some(likely)) if likely.length_unit != config.length_unit => {
-            let unit = likely.length_unit.name();
+        (_, Some(LikelyUnit::Length(unit))) => {
+            let unit = unit.name();
             format!("the unit of length seems to be {unit}: set motion.length_unit = \"{unit}\"")
         }
-        (_, Some(likely)) => {
-            let unit = likely.time_unit.name();
+        (_, Some(LikelyUnit::Time(unit))) => {
+            let unit = unit.name();
             format!("the unit of time seems to be {unit}: set motion.time_unit = \"{unit}\"")
         }
         (Cause::Length, None) => "check motion.length_unit and the point that the file follows \

@@ -10,7 +10,7 @@ use masseter_model::geometry::{Pose, Vec3};
 use nalgebra::{SVector, UnitQuaternion, Vector6};
 
 use super::doubts::{Glitch, Rows, doubts, glitches};
-use super::table::Located;
+use super::row::Located;
 
 /// Least rate of the even grid, Hz, well above the frequencies of a jaw. Faster samples keep their rate, because a
 /// slower grid turns their high frequencies into slow motion, which the filter passes.

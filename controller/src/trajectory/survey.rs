@@ -3,7 +3,7 @@
 //! The survey describes the file. [`check`](super::check) judges whether the mechanism can follow the motion.
 
 use masseter_model::geometry::Vec3;
-use masseter_scenario::{FileConfig, JawConfig, LengthUnit, TimeUnit};
+use masseter_scenario::{FileConfig, JawConfig};
 use serde::Serialize;
 
 use super::TrajectoryError;
@@ -11,7 +11,7 @@ use super::doubts::Glitch;
 use super::frames::Frames;
 use super::import::Source;
 use super::mandible::jaw_points;
-use super::plausible::{Implausible, Judgement};
+use super::plausible::{Implausible, Judgement, LikelyUnit};
 use super::recording::{Recording, Sample, moved};
 use super::table::{Format, Table};
 
@@ -27,6 +27,8 @@ pub struct RecordingSurvey {
     pub format: &'static str,
     /// The point that the file follows.
     pub follows: String,
+    /// What was read, converted and left out, a line each.
+    pub protocol: Vec<String>,
     /// Rows of data.
     pub rows: usize,
     /// Lines of the first and of the last row.
@@ -51,8 +53,8 @@ pub struct RecordingSurvey {
     pub doubts: Vec<String>,
     /// What no jaw has: units, points or angles are wrong.
     pub implausible: Vec<Implausible>,
-    /// The units of length and time in which the motion is plausible, if the stated ones are not.
-    pub likely_units: Option<(LengthUnit, TimeUnit)>,
+    /// The unit in which the motion is plausible, if the stated ones are not.
+    pub likely_unit: Option<LikelyUnit>,
     /// Which of the file's axes point anterior, left and up, in those units; none of a motion without an opening.
     pub frames: Option<Frames>,
     /// The most likely axes, if the stated ones are not as likely.
@@ -149,9 +151,10 @@ pub fn survey(config: &FileConfig, jaw: &JawConfig) -> Result<RecordingSurvey, T
     Ok(RecordingSurvey {
         format: match table.format {
             Format::Poses => "poses",
-            Format::Markers => "markers",
+            Format::Markers(_) => "markers",
         },
         follows: follows(config, &source),
+        protocol: table.protocol.clone(),
         rows: table.rows.len(),
         lines: [table.rows[0].line, table.rows[table.rows.len() - 1].line],
         duration_s: recording.length_s(),
@@ -164,7 +167,7 @@ pub fn survey(config: &FileConfig, jaw: &JawConfig) -> Result<RecordingSurvey, T
         }),
         turn_deg: path.iter().map(|row| row.turn_rad.norm().to_degrees()).fold(0.0, f64::max),
         implausible,
-        likely_units: likely.map(|likely| (likely.length_unit, likely.time_unit)),
+        likely_unit: likely,
         likely_axes: frames.as_ref().and_then(Frames::other_axes),
         frames,
         glitches: recording.glitches,
@@ -176,15 +179,15 @@ pub fn survey(config: &FileConfig, jaw: &JawConfig) -> Result<RecordingSurvey, T
 fn follows(config: &FileConfig, source: &Source) -> String {
     let mm = |point: &Vec3| format!("({:.1}, {:.1}, {:.1}) mm", point.x * 1e3, point.y * 1e3, point.z * 1e3);
     let reference = mm(&source.reference);
-    match (source.table.format, config.reference_point_mm, config.marker_origin_mm) {
+    match (&source.table.format, config.reference_point_mm, config.marker_origin_mm) {
         (Format::Poses, None, _) => format!(
             "the middle between the condyles, {reference} from the incisal point\n        (assumed; if it is another point, set motion.reference_point_mm)"
         ),
         (Format::Poses, Some(_), _) => format!("the point {reference} from the incisal point"),
-        (Format::Markers, _, None) => {
+        (Format::Markers(_), _, None) => {
             "the markers' centroid, not the incisal point (set motion.marker_origin_mm)".to_owned()
         }
-        (Format::Markers, _, Some([x, y, z])) => {
+        (Format::Markers(_), _, Some([x, y, z])) => {
             format!("the incisal point, at ({x:.1}, {y:.1}, {z:.1}) mm of the tracker in the first row")
         }
     }
@@ -211,7 +214,7 @@ fn steps_and_gaps(table: &Table) -> (StepFigures, Vec<Gap>) {
 
 fn columns(table: &Table) -> Vec<Range> {
     let values = |column: usize| table.rows.iter().map(move |row| row.values[column]);
-    let names = table.format.columns()[1..].iter().enumerate();
+    let names = table.columns()[1..].iter().enumerate();
     names.map(|(column, name)| range(name, values(column))).collect()
 }
 

@@ -1,15 +1,19 @@
-//! The recording as a table of finite numbers over increasing time.
+//! The recording in its plain form: numbers in s, mm and quaternions over increasing time.
 //!
-//! Blank lines are ignored. The module reads the columns' names; their meaning is not part of it.
+//! A row without a whole pose is a gap. The frame of the jaw is not part of this module.
 
+use std::fmt::Write;
 use std::path::Path;
 
-use masseter_scenario::TimeUnit;
+use masseter_scenario::FileConfig;
 use masseter_scenario::input::excerpt;
-use masseter_scenario::rows::{Line, fields, lines, numbers};
 use masseter_scenario::wording::counted;
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-use super::TrajectoryError;
+use super::columns::{Clock, Content, Layout, Scaled, Turn};
+use super::markers::{Body, settle};
+use super::row::{Located, Row, gaps};
+use super::sheet::Sheet;
 
 /// Least rows of a motion.
 const FEWEST_ROWS: usize = 4;
@@ -17,52 +21,29 @@ const FEWEST_ROWS: usize = 4;
 const SHORTEST_STEP_S: f64 = 1e-6;
 /// The longest time without a sample that interpolation may bridge, s.
 const LARGEST_GAP_S: f64 = 0.25;
+const DAY_S: f64 = 86_400.0;
 /// Largest distance of a marker from the origin of any tracker, mm.
 pub(super) const LARGEST_MM: f64 = 1e5;
+/// Largest element by which a matrix by its transpose differs from the identity by rounding.
+const MATRIX_TOLERANCE: f64 = 5e-3;
+/// What trackers write for a lost sample, besides an empty cell.
+const LOST: [&str; 12] =
+    ["", "-", "--", "nan", "-nan", "na", "n/a", "#n/a", "null", "none", "missing", "-3.697314e28"];
 
 const POSES: [&str; 8] = ["time_s", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"];
-const MARKERS: [&str; 10] = [
+const MARKERS: [&str; 37] = [
     "time_s", "m1_x_mm", "m1_y_mm", "m1_z_mm", "m2_x_mm", "m2_y_mm", "m2_z_mm", "m3_x_mm", "m3_y_mm",
-    "m3_z_mm",
+    "m3_z_mm", "m4_x_mm", "m4_y_mm", "m4_z_mm", "m5_x_mm", "m5_y_mm", "m5_z_mm", "m6_x_mm", "m6_y_mm",
+    "m6_z_mm", "m7_x_mm", "m7_y_mm", "m7_z_mm", "m8_x_mm", "m8_y_mm", "m8_z_mm", "m9_x_mm", "m9_y_mm",
+    "m9_z_mm", "m10_x_mm", "m10_y_mm", "m10_z_mm", "m11_x_mm", "m11_y_mm", "m11_z_mm", "m12_x_mm",
+    "m12_y_mm", "m12_z_mm",
 ];
 
-/// A problem of a recording, before its path is known.
-#[derive(Debug)]
-pub(super) struct Located {
-    /// The line, from 1; `None` if the file as a whole is at fault.
-    pub line: Option<u64>,
-    /// The error and its remedy, for the author of the file.
-    pub problem: String,
-}
-
-impl Located {
-    pub(super) fn at(line: u64, problem: String) -> Self {
-        Self { line: Some(line), problem }
-    }
-
-    pub(super) fn whole(problem: String) -> Self {
-        Self { line: None, problem }
-    }
-
-    pub(super) fn in_file(self, path: &Path) -> TrajectoryError {
-        let line = self.line.map_or_else(String::new, |line| format!(":{line}"));
-        TrajectoryError(format!("{}{line}: {}", path.display(), self.problem))
-    }
-}
-
-/// The content by the header.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The content of a file.
+#[derive(Debug, Clone, PartialEq)]
 pub(super) enum Format {
     Poses,
-    Markers,
-}
-
-/// A row: time and the other columns, as written.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Row {
-    pub line: u64,
-    pub time_s: f64,
-    pub values: Vec<f64>,
+    Markers(Body),
 }
 
 /// A file's content.
@@ -70,144 +51,317 @@ pub(super) struct Row {
 pub(super) struct Table {
     pub format: Format,
     pub rows: Vec<Row>,
-}
-
-impl Format {
-    pub(super) fn columns(self) -> &'static [&'static str] {
-        match self {
-            Self::Poses => &POSES,
-            Self::Markers => &MARKERS,
-        }
-    }
-
-    fn of_header(header: &str) -> Result<Self, String> {
-        let found: Vec<&str> = fields(header).collect();
-        let is_of_markers = found.iter().any(|name| name.starts_with("m1"));
-        let format = if is_of_markers { Self::Markers } else { Self::Poses };
-        let columns = format.columns();
-        let differs = |&position: &usize| found.get(position) != columns.get(position);
-        let Some(position) = (0..found.len().max(columns.len())).find(differs) else { return Ok(format) };
-        let [found, expected] =
-            [&found, columns].map(|names| names.get(position).copied().unwrap_or_default());
-        let (position, header) = (position + 1, columns.join(","));
-        let found = excerpt(found);
-        Err(format!("column {position} is '{found}', expected '{expected}'; the header must be '{header}'"))
-    }
+    /// What was read, converted and left out, a line each.
+    pub protocol: Vec<String>,
+    /// What the user must know before a run, each with its line.
+    pub doubts: Vec<String>,
 }
 
 impl Table {
-    pub(super) fn parse(text: &str, time_unit: TimeUnit) -> Result<Self, Located> {
-        let mut content = lines(text.as_bytes()).filter(|line| line.text.as_deref() != Ok(""));
-        let too_few = |rows| {
+    pub(super) fn parse(text: &str, config: &FileConfig) -> Result<Self, Located> {
+        let sheet = Sheet::of(text, config.columns.as_deref())?;
+        let first = sheet.rows().next().transpose()?.map_or_else(Vec::new, |(_, cells)| cells);
+        let is_clock = |at: usize| first.get(at).is_some_and(|cell: &&str| cell.contains(':'));
+        let layout = Layout::of(&sheet.columns, config, sheet.assumed, is_clock);
+        let layout = layout.map_err(|problem| Located { line: sheet.header_line, problem })?;
+        let mut protocol = [sheet.protocol.clone(), layout.protocol.clone()].concat();
+        let mut reader = Reader { layout: &layout, sheet: &sheet, decimal: None, last_s: None };
+        let (mut rows, mut lost): (Vec<Row>, Vec<u64>) = (Vec::new(), Vec::new());
+        for (index, row) in sheet.rows().enumerate() {
+            let (line, cells) = row?;
+            let (time_s, values) =
+                reader.row(index, line, &cells).map_err(|problem| Located::at(line, problem))?;
+            match values {
+                Some(values) => rows.push(Row { line, time_s, values }),
+                None => lost.push(line),
+            }
+        }
+        if let Some((',', _)) = reader.decimal {
+            protocol.push("decimal comma".to_owned());
+        }
+        protocol.extend(gaps(&lost));
+        let too_few = |rows: usize| {
             let rows = counted(rows as u64, "row");
             Located::whole(format!("{rows} of data, at least {FEWEST_ROWS} are needed"))
         };
-        let Line { number, text } = content.next().ok_or_else(|| too_few(0))?;
-        let format = text.and_then(|header| Format::of_header(&header));
-        let format = format.map_err(|problem| Located::at(number, problem))?;
-        let mut rows: Vec<Row> = Vec::new();
-        for Line { number, text } in content {
-            let row = text.and_then(|text| parse_row(number, &text, format.columns(), time_unit, &rows));
-            rows.push(row.map_err(|problem| Located::at(number, problem))?);
-        }
         if rows.len() < FEWEST_ROWS {
             return Err(too_few(rows.len()));
         }
-        Ok(Self { format, rows })
+        let (format, doubts) = match &layout.content {
+            Content::Poses { .. } => (Format::Poses, Vec::new()),
+            Content::Markers { names, .. } => {
+                lose_origins(&mut rows);
+                let settled = settle(names, rows)?;
+                protocol.extend(settled.protocol);
+                rows = settled.rows;
+                (Format::Markers(settled.body), settled.doubts)
+            }
+        };
+        if rows.len() < FEWEST_ROWS {
+            return Err(too_few(rows.len()));
+        }
+        check_steps(&rows)?;
+        Ok(Self { format, rows, protocol, doubts })
+    }
+
+    /// The names in the plain form.
+    pub(super) fn columns(&self) -> &'static [&'static str] {
+        match self.format {
+            Format::Poses => &POSES,
+            Format::Markers(_) => &MARKERS[..=self.rows[0].values.len()],
+        }
+    }
+
+    /// The plain form, under comments with the protocol.
+    pub(super) fn plain(&self, path: &Path) -> String {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let mut text = format!(
+            "# The plain form of {}; axes and point of reference are those of the file.\n",
+            excerpt(&name)
+        );
+        for line in &self.protocol {
+            let _ = writeln!(text, "# {line}");
+        }
+        text += &self.columns().join(",");
+        for row in &self.rows {
+            let _ = write!(text, "\n{}", row.time_s);
+            for value in &row.values {
+                let _ = if value.is_nan() { write!(text, ",") } else { write!(text, ",{value}") };
+            }
+        }
+        text + "\n"
     }
 }
 
-fn parse_row(
-    line: u64,
-    text: &str,
-    columns: &[&str],
-    time_unit: TimeUnit,
-    before: &[Row],
-) -> Result<Row, String> {
-    let mut values = numbers(text, columns)?;
-    let is_too_far = |(value, column): &(&f64, &&str)| column.ends_with("_mm") && value.abs() > LARGEST_MM;
-    if let Some((value, column)) = values.iter().zip(columns).find(is_too_far) {
-        return Err(format!("{column} is {value:e}, beyond ±{LARGEST_MM} mm; is the unit millimetres?"));
-    }
-    let time_s = time_unit.seconds(values.remove(0));
-    before.last().map_or(Ok(()), |previous| check_time(time_s, previous.time_s, before.len() == 1))?;
-    Ok(Row { line, time_s, values })
+/// The numbers of rows.
+struct Reader<'a> {
+    layout: &'a Layout,
+    sheet: &'a Sheet<'a>,
+    /// The decimal mark, and the line of its first use.
+    decimal: Option<(char, u64)>,
+    last_s: Option<f64>,
 }
 
-fn check_time(time_s: f64, previous_s: f64, is_first_step: bool) -> Result<(), String> {
-    let gap_s = time_s - previous_s;
-    if gap_s < SHORTEST_STEP_S {
+impl Reader<'_> {
+    /// Time, and the other columns of the plain form; these are absent in a row of a lost sample.
+    fn row(&mut self, index: usize, line: u64, cells: &[&str]) -> Result<(f64, Option<Vec<f64>>), String> {
+        let layout = self.layout;
+        let time_s = match layout.clock {
+            Clock::Times(scaled) => self.time_s(line, cells[scaled.column], scaled)?,
+            Clock::Frames { column, rate_hz } => {
+                self.present(line, cells, Scaled { column, size: 1.0 })? / rate_hz
+            }
+            Clock::Rows { rate_hz } => index as f64 / rate_hz,
+        };
+        self.last_s = Some(time_s);
+        let values = match &layout.content {
+            Content::Poses { place, turn } => {
+                let place = self.numbers(line, cells, place)?;
+                let turn = self.quaternion(line, cells, turn)?;
+                place.zip(turn).map(|(place, turn)| [&place[..], &turn[..]].concat())
+            }
+            Content::Markers { places, .. } => {
+                let mut values = Vec::with_capacity(3 * places.len());
+                for place in places {
+                    values.extend(self.numbers(line, cells, place)?.unwrap_or([f64::NAN; 3]));
+                }
+                Some(values)
+            }
+        };
+        let columns = match layout.content {
+            Content::Poses { .. } => &POSES[1..4],
+            Content::Markers { .. } => &MARKERS[1..],
+        };
+        let is_too_far = |(value, _): &(&f64, &&str)| value.abs() > LARGEST_MM;
+        if let Some((value, column)) = values.iter().flatten().zip(columns).find(is_too_far) {
+            return Err(format!(
+                "{column} is {value:e}, beyond ±{LARGEST_MM} mm; is the unit millimetres? (motion.length_unit)"
+            ));
+        }
+        Ok((time_s, values))
+    }
+
+    /// A number of s, or a time of the day; midnight may pass.
+    fn time_s(&mut self, line: u64, cell: &str, scaled: Scaled) -> Result<f64, String> {
+        if !cell.contains(':') {
+            return match self.number(line, scaled.column, cell)? {
+                Some(number) => Ok(number * scaled.size),
+                None => {
+                    Err(format!("{} has no time; complete the line or delete it", self.name(scaled.column)))
+                }
+            };
+        }
+        let of_day =
+            cell.rsplit(['T', ' ']).next().unwrap_or_default().trim_end_matches('Z').replace(',', ".");
+        let parts: Option<Vec<f64>> = of_day.split(':').map(|part| part.parse().ok()).collect();
+        let seconds = match parts.as_deref() {
+            Some(&[h, m, s])
+                if (0.0..24.0).contains(&h) && (0.0..60.0).contains(&m) && (0.0..60.0).contains(&s) =>
+            {
+                3600.0 * h + 60.0 * m + s
+            }
+            Some(&[m, s]) if m >= 0.0 && (0.0..60.0).contains(&s) => 60.0 * m + s,
+            _ => {
+                let name = self.name(scaled.column);
+                return Err(format!(
+                    "{name} is '{}', no time of the day such as 10:00:00.015",
+                    excerpt(cell)
+                ));
+            }
+        };
+        let days = self.last_s.map_or(0.0, |last_s| ((last_s - seconds) / DAY_S).round().max(0.0));
+        Ok(seconds + days * DAY_S)
+    }
+
+    /// The numbers of columns in their units; none if one is lost.
+    fn numbers<const N: usize>(
+        &mut self,
+        line: u64,
+        cells: &[&str],
+        columns: &[Scaled; N],
+    ) -> Result<Option<[f64; N]>, String> {
+        let mut numbers = [Some(0.0); N];
+        for (number, &Scaled { column, size }) in numbers.iter_mut().zip(columns) {
+            *number = self.number(line, column, cells[column])?.map(|number| number * size);
+        }
+        Ok(numbers.iter().all(Option::is_some).then(|| numbers.map(Option::unwrap_or_default)))
+    }
+
+    fn present(&mut self, line: u64, cells: &[&str], scaled: Scaled) -> Result<f64, String> {
+        let number = self.numbers(line, cells, &[scaled])?;
+        number
+            .map(|[number]| number)
+            .ok_or_else(|| format!("{} is empty; complete the line or delete it", self.name(scaled.column)))
+    }
+
+    /// A quaternion, scalar first; none if it is lost.
+    fn quaternion(&mut self, line: u64, cells: &[&str], turn: &Turn) -> Result<Option<[f64; 4]>, String> {
+        let plain = |column| Scaled { column, size: 1.0 };
+        let of_turn = |turn: UnitQuaternion<f64>| [turn.w, turn.i, turn.j, turn.k];
+        Ok(match turn {
+            Turn::Quaternion(columns) => {
+                let parts = self.numbers(line, cells, &columns.map(plain))?;
+                parts.filter(|parts| parts.iter().any(|part| *part != 0.0))
+            }
+            Turn::Angles(angles) => {
+                let values = self.numbers(line, cells, &angles.map(|(_, scaled)| scaled))?;
+                values.map(|values| {
+                    let turn = |part: usize| {
+                        UnitQuaternion::from_scaled_axis(Vector3::ith(angles[part].0, values[part]))
+                    };
+                    of_turn(turn(0) * turn(1) * turn(2))
+                })
+            }
+            Turn::Matrix { rotation: columns, last_row } => {
+                let elements = self.numbers(line, cells, &columns.map(plain))?;
+                let last_row =
+                    last_row.map(|columns| self.numbers(line, cells, &columns.map(plain))).transpose()?;
+                if let Some(Some(last_row)) = last_row.filter(|row| *row != Some([0.0, 0.0, 0.0, 1.0])) {
+                    return Err(format!(
+                        "the last row of the matrix is {last_row:?}, not 0, 0, 0, 1; is it written column after column? name the \
+                         columns in their order by motion.columns"
+                    ));
+                }
+                let elements = elements.filter(|elements| elements.iter().any(|element| *element != 0.0));
+                elements.map(|elements| rotation(&elements).map(of_turn)).transpose()?
+            }
+        })
+    }
+
+    fn name(&self, column: usize) -> String {
+        format!("column {} '{}'", column + 1, excerpt(&self.sheet.columns[column].name))
+    }
+
+    /// A finite number with a decimal point or comma; none if it is lost.
+    fn number(&mut self, line: u64, column: usize, cell: &str) -> Result<Option<f64>, String> {
+        let mark = cell.chars().find(|c| matches!(c, '.' | ','));
+        let finite = |text: &str| text.parse().ok().filter(|number: &f64| number.is_finite());
+        let number = if mark == Some(',') { finite(&cell.replacen(',', ".", 1)) } else { finite(cell) };
+        let may_be_lost = number.is_none() || cell.starts_with("-3.697");
+        if may_be_lost && LOST.contains(&cell.to_lowercase().replace("e+", "e").as_str()) {
+            return Ok(None);
+        }
+        let Some(number) = number else {
+            let name = self.name(column);
+            return Err(format!(
+                "{name} is '{}', not a finite number; correct it, or leave the cell empty for a lost sample",
+                excerpt(cell)
+            ));
+        };
+        if let Some(mark) = mark {
+            let (first, first_line) = *self.decimal.get_or_insert((mark, line));
+            if first != mark {
+                let name = self.name(column);
+                return Err(format!(
+                    "{name} is '{}', but line {first_line} has the decimal mark '{first}'; use one in all lines",
+                    excerpt(cell)
+                ));
+            }
+        }
+        Ok(Some(number))
+    }
+}
+
+fn rotation(elements: &[f64; 9]) -> Result<UnitQuaternion<f64>, String> {
+    let matrix = Matrix3::from_row_slice(elements);
+    let off = (matrix.transpose() * matrix - Matrix3::identity()).amax();
+    if off > MATRIX_TOLERANCE || matrix.determinant() < 0.0 {
+        let determinant = matrix.determinant();
         return Err(format!(
-            "time {time_s} s does not come after {previous_s} s of the row before by 1 µs or more; sort the rows, \
-             drop repeats"
+            "the matrix is no rotation (determinant {determinant:.3}, {off:.3} off orthogonal); are the columns named in the right \
+             order (motion.columns), and is the frame right-handed?"
         ));
     }
-    if gap_s > LARGEST_GAP_S && is_first_step {
-        return Err(format!(
-            "the time between the first rows is {gap_s:.3} s, at most {LARGEST_GAP_S} s can be bridged; is the time in \
-             ms? set motion.time_unit = \"ms\""
+    let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
+    Ok(UnitQuaternion::from_quaternion(turn.into_inner()))
+}
+
+/// A marker exactly at the origin, where it is not at first, is lost: so some trackers write it.
+fn lose_origins(rows: &mut [Row]) {
+    let Some(first) = rows.first().map(|row| row.values.clone()) else { return };
+    let is_origin = |place: &[f64]| place.iter().all(|coordinate| *coordinate == 0.0);
+    for row in rows {
+        for (place, first) in row.values.chunks_exact_mut(3).zip(first.chunks_exact(3)) {
+            if is_origin(place) && !is_origin(first) {
+                place.fill(f64::NAN);
+            }
+        }
+    }
+}
+
+fn check_steps(rows: &[Row]) -> Result<(), Located> {
+    let step_s = |pair: &[Row]| pair[1].time_s - pair[0].time_s;
+    let mut steps_s: Vec<f64> = rows.windows(2).map(step_s).collect();
+    let middle = steps_s.len() / 2;
+    let usual_s = *steps_s.select_nth_unstable_by(middle, f64::total_cmp).1;
+    // Steps that are too short are judged with the speeds.
+    if usual_s > LARGEST_GAP_S {
+        return Err(Located::at(
+            rows[1].line,
+            format!(
+                "the usual time between rows is {usual_s} s, which no tracker has; if the times are in ms, set \
+                 motion.time_unit = \"ms\""
+            ),
         ));
     }
-    if gap_s > LARGEST_GAP_S {
-        return Err(format!(
-            "{gap_s:.3} s without a sample, at most {LARGEST_GAP_S} s can be bridged; cut the recording here"
-        ));
+    for pair in rows.windows(2) {
+        let (time_s, previous_s, gap_s) = (pair[1].time_s, pair[0].time_s, step_s(pair));
+        let problem = if gap_s < SHORTEST_STEP_S {
+            format!(
+                "time {time_s} s does not come after {previous_s} s of the row before by 1 µs or more; sort the rows, \
+                 drop repeats"
+            )
+        } else if gap_s > LARGEST_GAP_S {
+            format!(
+                "{gap_s:.3} s without a sample, at most {LARGEST_GAP_S} s can be bridged; cut the recording here"
+            )
+        } else {
+            continue;
+        };
+        return Err(Located::at(pair[1].line, problem));
     }
     Ok(())
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const HEADER: &str = "time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n";
-    const ROWS: &str = "0.00,0,0,0,1,0,0,0\n0.01,0,0,-1,1,0,0,0\n0.02,0,0,-2,1,0,0,0\n0.03,0,0,-3,1,0,0,0\n";
-
-    #[test]
-    fn lines_are_counted_past_comments_blank_lines_and_a_byte_order_mark() {
-        let text = format!("\u{feff}# a comment\r\n\r\n{HEADER}# another\n{ROWS}");
-        let table = Table::parse(&text, TimeUnit::S).ok().unwrap();
-        assert_eq!(table.format, Format::Poses);
-        assert_eq!(table.rows.iter().map(|row| row.line).collect::<Vec<_>>(), [5, 6, 7, 8]);
-        assert_eq!(table.rows[2].values[2].to_bits(), (-2.0f64).to_bits());
-    }
-
-    #[test]
-    fn names_and_numbers_may_stand_in_quotes() {
-        let quoted = |line: &str| format!("\"{}\"\n", line.replace(',', "\",\""));
-        let text: String = (HEADER.to_owned() + ROWS).lines().map(quoted).collect();
-        assert_eq!(
-            Table::parse(&text, TimeUnit::S).ok(),
-            Table::parse(&(HEADER.to_owned() + ROWS), TimeUnit::S).ok()
-        );
-        assert!(Table::parse(&text, TimeUnit::S).is_ok());
-    }
-
-    #[test]
-    fn bad_files_are_refused_with_line_and_reason() {
-        let with = |row: &str| format!("{HEADER}{ROWS}{row}\n");
-        let table = [
-            (String::new(), None, "0 rows"),
-            (HEADER.to_owned(), None, "0 rows"),
-            (ROWS.to_owned(), Some(1), "column 1 is '0.00', expected 'time_s'"),
-            ("time_s,x_mm,ymm,z_mm,qw,qx,qy,qz".to_owned(), Some(1), "column 3 is 'ymm', expected 'y_mm'"),
-            ("time_s,m1_x_mm,m1_y_mm".to_owned(), Some(1), "column 4 is '', expected 'm1_z_mm'"),
-            ("time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz,more".to_owned(), Some(1), "column 9 is 'more'"),
-            (with("0.04,0,0,0,1,0,0"), Some(6), "7 fields"),
-            (with("0.04,0,zero,0,1,0,0,0"), Some(6), "y_mm is 'zero'"),
-            (with("0.04,0,0,NaN,1,0,0,0"), Some(6), "z_mm is 'NaN'"),
-            (with("inf,0,0,0,1,0,0,0"), Some(6), "time_s is 'inf'"),
-            (with(&"0".repeat(5000)), Some(6), "longer than 4096 bytes"),
-            (with("0.03,0,0,0,1,0,0,0"), Some(6), "does not come after"),
-            (with("0.02,0,0,0,1,0,0,0"), Some(6), "does not come after"),
-            (with("0.0300001,0,0,0,1,0,0,0"), Some(6), "does not come after"),
-            (with("9.03,0,0,0,1,0,0,0"), Some(6), "without a sample"),
-            (with("0.04,0,0,-4e262,1,0,0,0"), Some(6), "z_mm is -4e262, beyond"),
-        ];
-        for (text, line, reason) in table {
-            let error = Table::parse(&text, TimeUnit::S).err().unwrap();
-            assert_eq!(error.line, line, "{text}");
-            assert!(error.problem.contains(reason), "{}", error.problem);
-        }
-    }
-}
+mod tests;

@@ -12,12 +12,13 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::Args;
 use masseter_controller::trajectory::{
-    Frame, Frames, Gap, Glitch, PointFigures, Range, RecordingSurvey, Trajectory, TrajectoryError, survey,
+    Frame, Frames, Gap, Glitch, LikelyUnit, PointFigures, Range, RecordingSurvey, Trajectory,
+    TrajectoryError, plain_form, survey,
 };
 use masseter_judge::{RecordedError, RecordedFigures, RecordedWatch};
 use masseter_model::geometry::{AXES, AXIS_NAMES, Mechanism};
 use masseter_plan::{Overrides, best_placement, demands, scenario_with_overrides};
-use masseter_scenario::{LengthUnit, MotionConfig, Scenario, TimeUnit, wording::counted};
+use masseter_scenario::{MotionConfig, Scenario, wording::counted};
 use masseter_terminal::{Exit, Format, Tone, result, result_with_tones};
 use serde::Serialize;
 
@@ -34,9 +35,10 @@ const MOST: usize = 8;
 #[command(after_help = "\
 Examples:
   masseter motion examples/patient.csv --svg patient.svg
+  masseter motion jaw.trc --set motion.lowpass_hz=6 --write motion.csv
   masseter motion examples/tracker.csv --scenario examples/markers.toml")]
 pub(crate) struct MotionArgs {
-    /// CSV file of a recorded jaw motion, as for run --trajectory
+    /// File of a recorded jaw motion, as for run --trajectory
     file: PathBuf,
     /// Scenario with the file's axes, the jaw and the mechanism [default: the default one]
     #[arg(long, value_name = "SCENARIO.toml")]
@@ -44,6 +46,9 @@ pub(crate) struct MotionArgs {
     /// Set a key of the scenario
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Write the motion in its plain form, with what was read and converted in comments
+    #[arg(long, value_name = "FILE.csv")]
+    write: Option<PathBuf>,
     /// Write a picture of the motion
     #[arg(long, value_name = "FILE.svg")]
     svg: Option<PathBuf>,
@@ -58,6 +63,9 @@ pub(crate) fn motion(args: &MotionArgs) -> anyhow::Result<Exit> {
         Overrides { set: args.set.clone(), trajectory: Some(args.file.clone()), ..Overrides::default() };
     let scenario = scenario_with_overrides(args.scenario.as_deref(), &overrides)?;
     let found = Found::new(&scenario, &args.file)?;
+    if let (Some(path), MotionConfig::File(file)) = (&args.write, &scenario.motion) {
+        write_plain(path, &plain_form(file, &scenario.jaw)?, &args.file)?;
+    }
     if let Some(path) = &args.svg {
         fs::write(path, picture::svg(&found.survey))
             .with_context(|| format!("cannot write {}", path.display()))?;
@@ -67,6 +75,14 @@ pub(crate) fn motion(args: &MotionArgs) -> anyhow::Result<Exit> {
         Format::Human => result_with_tones(&describe(&found), &TONES)?,
     }
     Ok(if found.judged.refused.is_none() { Exit::Passed } else { Exit::Failed })
+}
+
+/// Writes the plain form, but not over its source.
+fn write_plain(path: &Path, text: &str, source: &Path) -> anyhow::Result<()> {
+    if path.canonicalize().is_ok_and(|path| source.canonicalize().is_ok_and(|source| path == source)) {
+        bail!("--write {} is the file that is read; name another one", path.display());
+    }
+    fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// What the verb finds.
@@ -104,10 +120,9 @@ struct Strokes {
 /// Keys of the scenario.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct Suggestion {
-    /// `motion.length_unit`; none where the stated one is likely.
-    length_unit: Option<LengthUnit>,
-    /// `motion.time_unit`; none where the stated one is likely.
-    time_unit: Option<TimeUnit>,
+    /// `motion.length_unit` or `motion.time_unit`; none where the stated ones are likely.
+    #[serde(flatten)]
+    unit: Option<LikelyUnit>,
     /// `motion.axes`; none where the stated ones are likely.
     axes: Option<[String; 3]>,
     /// The motion of the jaw with these axes.
@@ -131,7 +146,7 @@ impl Found {
         if frames.is_empty() {
             frames.push(None);
         }
-        let suggest = |frame| suggest(scenario, &mechanism, survey.likely_units, frame, &judged);
+        let suggest = |frame| suggest(scenario, &mechanism, survey.likely_unit, frame, &judged);
         let suggestions: Vec<_> = frames.into_iter().filter_map(suggest).collect();
         let suggestion = suggestions.first().cloned();
         let recorded = predicted(scenario, &mechanism);
@@ -166,21 +181,18 @@ impl Strokes {
 fn suggest(
     scenario: &Scenario,
     mechanism: &Mechanism,
-    units: Option<(LengthUnit, TimeUnit)>,
+    unit: Option<LikelyUnit>,
     frame: Option<&Frame>,
     now: &Judged,
 ) -> Option<Suggestion> {
-    let is_changed = units.is_some() || frame.is_some();
+    let is_changed = unit.is_some() || frame.is_some();
     if !is_changed && now.fits() {
         return None;
     }
     let mut changed = scenario.clone();
-    let (mut length_unit, mut time_unit) = (None, None);
     if let MotionConfig::File(file) = &mut changed.motion {
-        if let Some((length, time)) = units {
-            length_unit = (length != file.length_unit).then_some(length);
-            time_unit = (time != file.time_unit).then_some(time);
-            (file.length_unit, file.time_unit) = (length, time);
+        if let Some(unit) = unit {
+            *file = unit.applied(file);
         }
         if let Some(frame) = frame {
             file.axes.clone_from(&frame.axes);
@@ -194,7 +206,7 @@ fn suggest(
     changed.jaw.closed_offset_m = closed_offset_m.unwrap_or(changed.jaw.closed_offset_m);
     let judged = Judged::new(&changed, mechanism);
     let (axes, jaw) = (frame.map(|frame| frame.axes.clone()), frame.map(Frame::words));
-    Some(Suggestion { length_unit, time_unit, axes, jaw, closed_offset_m, judged })
+    Some(Suggestion { unit, axes, jaw, closed_offset_m, judged })
 }
 
 /// The offset with the most left of every stroke, to half a millimetre; none where there is no better one.
@@ -225,7 +237,11 @@ fn predicted(scenario: &Scenario, mechanism: &Mechanism) -> Option<RecordedFigur
 fn describe(found: &Found) -> String {
     let survey = &found.survey;
     let mut text = format!("{}: {}\n", found.file.display(), head(survey));
-    let _ = writeln!(text, "follows {}\n", survey.follows);
+    let _ = writeln!(text, "follows {}", survey.follows);
+    for line in &survey.protocol {
+        let _ = writeln!(text, "read    {line}");
+    }
+    text.push('\n');
     text += &columns(&survey.columns);
     text += &points(&survey.points);
     text += &turns(survey);
@@ -365,13 +381,12 @@ fn judgement(judged: &Judged) -> String {
 
 fn suggested(suggestion: &Suggestion) -> String {
     let mut text = String::from("suggest for the scenario:\n");
-    let length = suggestion.length_unit.map(|unit| format!("  length_unit = \"{}\"\n", unit.name()));
-    let time = suggestion.time_unit.map(|unit| format!("  time_unit = \"{}\"\n", unit.name()));
+    let unit = suggestion.unit.map(|unit| format!("  {unit}\n"));
     let axes = suggestion.axes.iter().zip(&suggestion.jaw).map(|([anterior, left, up], jaw)| {
         let jaw = jaw.replace("; ", "\n  # ");
         format!("  # {jaw}\n  axes = [\"{anterior}\", \"{left}\", \"{up}\"]\n")
     });
-    let motion: String = length.into_iter().chain(time).chain(axes).collect();
+    let motion: String = unit.into_iter().chain(axes).collect();
     if !motion.is_empty() {
         text = text + "  [motion]\n" + &motion;
     }

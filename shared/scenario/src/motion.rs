@@ -140,11 +140,25 @@ section! {
     }
 }
 
+/// The unit of a recording's times.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TimeUnit {
+    /// Seconds.
+    S,
+    /// Milliseconds.
+    Ms,
+    /// Microseconds.
+    Us,
+}
+
 /// The unit of a recording's lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LengthUnit {
-    /// Millimetres, as the header says.
+    /// Micrometres.
+    Um,
+    /// Millimetres.
     Mm,
     /// Centimetres.
     Cm,
@@ -153,55 +167,24 @@ pub enum LengthUnit {
 }
 
 impl LengthUnit {
-    /// All units.
-    pub const ALL: [Self; 3] = [Self::Mm, Self::Cm, Self::M];
-
     /// Its name, as in a scenario.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Um => "um",
             Self::Mm => "mm",
             Self::Cm => "cm",
             Self::M => "m",
         }
     }
-
-    /// Millimetres in one.
-    pub fn mm(self) -> f64 {
-        match self {
-            Self::Mm => 1.0,
-            Self::Cm => 10.0,
-            Self::M => 1000.0,
-        }
-    }
-}
-
-/// The unit of a recording's times.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum TimeUnit {
-    /// Seconds, as the header says.
-    S,
-    /// Milliseconds.
-    Ms,
 }
 
 impl TimeUnit {
-    /// All units.
-    pub const ALL: [Self; 2] = [Self::S, Self::Ms];
-
     /// Its name, as in a scenario.
     pub fn name(self) -> &'static str {
         match self {
             Self::S => "s",
             Self::Ms => "ms",
-        }
-    }
-
-    /// A time in this unit, in seconds.
-    pub fn seconds(self, time: f64) -> f64 {
-        match self {
-            Self::S => time,
-            Self::Ms => time / 1000.0,
+            Self::Us => "us",
         }
     }
 }
@@ -216,11 +199,21 @@ pub enum IfImplausible {
     Warn,
 }
 
+/// The unit of a recording's angles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AngleUnit {
+    /// Degrees.
+    Deg,
+    /// Radians.
+    Rad,
+}
+
 keys! {
-    /// A recorded motion of the lower jaw, as CSV.
+    /// A recorded motion of the lower jaw, as a tracker writes it.
     ///
-    /// The header decides the format: `time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz` (pose relative to the closed
-    /// pose) or `time_s,m1_x_mm,…,m3_z_mm` (three markers, the first row closed).
+    /// The names of the columns decide the content: poses relative to the closed pose, or markers, the first row closed.
+    /// The plain forms are `time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz` and `time_s,m1_x_mm,…,m3_z_mm`.
     #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]
     pub struct FileConfig {
@@ -229,12 +222,6 @@ keys! {
         /// The file's axes that point anterior, left and up.
         #[serde(default = "FileConfig::default_axes")]
         pub axes: [String; 3] => "signed axes, right-handed",
-        /// The unit of the file's lengths, whatever the header says.
-        #[serde(default = "FileConfig::default_length_unit")]
-        pub length_unit: LengthUnit,
-        /// The unit of the file's times, whatever the header says.
-        #[serde(default = "FileConfig::default_time_unit")]
-        pub time_unit: TimeUnit,
         /// Whether a file whose ways, turns, speeds or axes are no jaw's is refused, or played with a warning.
         #[serde(default = "FileConfig::default_if_implausible")]
         pub if_implausible: IfImplausible,
@@ -244,6 +231,29 @@ keys! {
         /// Only for markers: the incisal point at the closed pose, in the file's coordinates; by default the markers'
         /// centroid.
         pub marker_origin_mm: Option<[f64; 3]> => "finite",
+        /// A name for each column in the place of the file's own names, `-` for a column without use; by default those
+        /// of the file's header.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub columns: Option<Vec<String>> => "one for each column",
+        /// Only for markers: the names of those on the lower jaw; by default all.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub markers: Option<Vec<String>> => "three to twelve names of the file",
+        /// The unit of times, in the place of the file's.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub time_unit: Option<TimeUnit>,
+        /// The unit of lengths, in the place of the file's.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub length_unit: Option<LengthUnit>,
+        /// Only for three angles: their unit, in the place of the file's.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub angle_unit: Option<AngleUnit>,
+        /// Only for three angles: the axes of the file in the order of the turns. Capitals turn about the axes that move
+        /// with the jaw, small letters about fixed axes.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub euler_order: Option<String> => "each of x, y, z once, such as `XYZ` or `xyz`",
+        /// Only for files without times: rows, or numbered frames, a second.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub rate_hz: Option<f64> => Within(4.0, 10_000.0),
         /// Cut-off frequency of the zero-phase low-pass filter; 0 for none.
         #[serde(default = "FileConfig::default_lowpass_hz")]
         pub lowpass_hz: f64 => "0, or 0.5 to 50",
@@ -254,30 +264,27 @@ impl FileConfig {
     /// Size of the largest file, bytes: more than an hour of three markers at 200 Hz.
     pub const MOST_BYTES: u64 = 256 << 20;
 
-    /// A file read with the default axes, reference point and low-pass.
+    /// A file read as its header says, with the default axes, reference point and low-pass.
     pub fn new(path: impl Into<PathBuf>) -> Self {
         Self {
             path: path.into(),
             axes: Self::default_axes(),
-            length_unit: Self::default_length_unit(),
-            time_unit: Self::default_time_unit(),
             if_implausible: Self::default_if_implausible(),
             reference_point_mm: None,
             marker_origin_mm: None,
+            columns: None,
+            markers: None,
+            time_unit: None,
+            length_unit: None,
+            angle_unit: None,
+            euler_order: None,
+            rate_hz: None,
             lowpass_hz: Self::default_lowpass_hz(),
         }
     }
 
     fn default_axes() -> [String; 3] {
         ["+x", "+y", "+z"].map(String::from)
-    }
-
-    fn default_length_unit() -> LengthUnit {
-        LengthUnit::Mm
-    }
-
-    fn default_time_unit() -> TimeUnit {
-        TimeUnit::S
     }
 
     fn default_if_implausible() -> IfImplausible {

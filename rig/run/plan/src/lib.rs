@@ -198,11 +198,12 @@ pub fn demands(
 }
 
 fn apply_overrides(overrides: &Overrides, scenario: &mut Scenario) -> anyhow::Result<()> {
-    for assignment in &overrides.set {
-        *scenario = scenario.with(assignment).context("--set")?;
-    }
+    // The keys of a file can be set only for a motion that is a file.
     if let Some(path) = &overrides.trajectory {
         play_file(path, scenario);
+    }
+    for assignment in &overrides.set {
+        *scenario = scenario.with(assignment).context("--set")?;
     }
     for (_, file) in scenario.files_mut() {
         *file = absolute(file)?;
