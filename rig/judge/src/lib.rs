@@ -26,6 +26,7 @@ mod series;
 pub mod signals;
 mod skips;
 mod standstill;
+mod statistic;
 mod timing;
 mod tracking;
 mod verdict;
@@ -36,7 +37,10 @@ pub use checks::whose_motion;
 pub use declared_faults::{Detection, FaultFigures};
 pub use events::{Code, EventRecord};
 pub use figures::Figures;
-pub use jaw_cycles::{COURSE_POINTS, CoursePoint, JawCycle, JawCycleFigures, Statistic};
+pub use jaw_cycles::{
+    BorderStep, COURSE_POINTS, Course, CoursePoint, JawCycle, JawCycleFigures, JawCycleGroup, JawCycleKind,
+    JawSide, LeftOut, Quantity, closed_incisal_m,
+};
 pub use longest_cycles::{KernelCounts, WorstCycle, hop_names};
 pub use lost_cycles::{Outage, ReadingFigures};
 pub use measured::{IntervalFigures, Seconds, resolution_ns};
