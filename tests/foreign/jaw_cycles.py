@@ -77,9 +77,9 @@ def cycles_of(times, places, stopped_s):
         end = begins[number + 1] if number + 1 < len(found) else len(away) - 1
         tail = away[far : end + 1]
         closed = far + np.flatnonzero(tail <= tail.min() + 0.5)[0]
-        is_last = number + 1 == len(found) or times[end] - times[closed] > 1
+        is_last = number + 1 == len(found) or times[end] - times[closed] > 0.5
         if is_last:
-            end = closed + np.searchsorted(times[closed:], times[closed] + 1) - 1
+            end = closed + np.searchsorted(times[closed:], times[closed] + 0.5) - 1
         ways = places[begin : end + 1] - home
         down, forward, left, right = -ways[:, 2].min(), ways[:, 0].max(), ways[:, 1].max(), -ways[:, 1].min()
         down, forward, left, right = (max(0.0, way) for way in (down, forward, left, right))
@@ -136,9 +136,11 @@ def assert_statistics(group, cycles, name):
         if len(values) > 1:
             sd = values.std(ddof=1)
             half = STUDENT_T[len(values) - 2] * sd / np.sqrt(len(values))
-            expected |= {"sd": sd, "mean_low": values.mean() - half, "mean_high": values.mean() + half}
+            expected["sd"] = sd
+            ends = np.array([quantity["mean"] - quantity["mean_low"], quantity["mean_high"] - quantity["mean"]])
+            assert np.allclose(ends, half, rtol=2e-3, atol=1e-9), (name, quantity, half)
         for key, value in expected.items():
-            assert np.isclose(quantity[key], value, rtol=1e-9 if "mean_" not in key else 2e-3, atol=1e-9), (name, quantity, key, value)
+            assert np.isclose(quantity[key], value, rtol=1e-9, atol=1e-9), (name, quantity, key, value)
 
 
 def main():

@@ -38,8 +38,8 @@ pub use declared_faults::{Detection, FaultFigures};
 pub use events::{Code, EventRecord};
 pub use figures::Figures;
 pub use jaw_cycles::{
-    BorderStep, COURSE_POINTS, Course, CoursePoint, JawCycle, JawCycleFigures, JawCycleGroup, JawCycleKind,
-    JawSide, LeftOut, Quantity, closed_incisal_m,
+    BorderStep, COURSE_POINTS, Course, CoursePoint, CycleQuantity, JawCycle, JawCycleFigures, JawCycleGroup,
+    JawCycleKind, JawSide, LeftOut, QUANTITIES, Quantity, closed_incisal_m, mean_course,
 };
 pub use longest_cycles::{KernelCounts, WorstCycle, hop_names};
 pub use lost_cycles::{Outage, ReadingFigures};
@@ -53,6 +53,7 @@ pub use response::{BusResponse, ResponseFigures};
 pub use series::Curve;
 pub use skips::{OverrunAttribution, SkipFigures};
 pub use standstill::StandstillFigures;
+pub use statistic::Statistic;
 pub use timing::{Timing, TimingWord};
 pub use tracking::{PoseErrors, PoseSource, Track, TrackingFigures, TrackingSample, UndisturbedFigures};
 pub use verdict::{Judgement, Verdict};

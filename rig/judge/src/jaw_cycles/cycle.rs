@@ -4,6 +4,8 @@
 use masseter_model::geometry::Vec3;
 use serde::Serialize;
 
+use crate::statistic::Statistic;
+
 /// Points of a course.
 pub const COURSE_POINTS: usize = 51;
 /// A velocity is the way of so many samples.
@@ -132,6 +134,17 @@ pub enum LeftOut {
     ByHand,
 }
 
+impl LeftOut {
+    /// The word for it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Ramp => "ramp",
+            Self::Window => "window",
+            Self::ByHand => "by hand",
+        }
+    }
+}
+
 /// A cycle of the jaw.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct JawCycle {
@@ -178,6 +191,60 @@ pub struct CoursePoint {
     pub lateral_mm: f64,
     /// Vertical force on the jaw, N.
     pub force_n: f64,
+}
+
+/// A quantity of a cycle.
+#[derive(Debug, Clone, Copy)]
+pub struct CycleQuantity {
+    /// Its key in a summary, and its column in a table.
+    pub name: &'static str,
+    /// What it is.
+    pub about: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Its value in a cycle.
+    pub value: fn(&JawCycle) -> Option<f64>,
+}
+
+const fn quantity(
+    name: &'static str,
+    unit: &'static str,
+    about: &'static str,
+    value: fn(&JawCycle) -> Option<f64>,
+) -> CycleQuantity {
+    CycleQuantity { name, about, unit, value }
+}
+
+/// The quantities of a cycle that have statistics.
+pub const QUANTITIES: [CycleQuantity; 11] = [
+    quantity("duration_s", "s", "duration, beginning to beginning", |of| of.duration_s),
+    quantity("opening_s", "s", "duration of the opening", |of| Some(of.opening_s)),
+    quantity("hold_s", "s", "hold at the farthest place", |of| Some(of.hold_s)),
+    quantity("closing_s", "s", "duration of the closing", |of| Some(of.closing_s)),
+    quantity("occlusal_s", "s", "occlusal phase", |of| of.occlusal_s),
+    quantity("opening_mm", "mm", "opening", |of| Some(of.opening_mm)),
+    quantity("lateral_mm", "mm", "lateral width", |of| Some(of.lateral_mm)),
+    quantity("forward_mm", "mm", "way forward", |of| Some(of.forward_mm)),
+    quantity("opening_mm_s", "mm/s", "peak opening velocity", |of| Some(of.opening_mm_s)),
+    quantity("closing_mm_s", "mm/s", "peak closing velocity", |of| Some(of.closing_mm_s)),
+    quantity("force_n", "N", "peak bite force", |of| of.force_n),
+];
+
+/// Mean and standard deviation of courses, point by point; empty without a course.
+pub fn mean_course(courses: &[&Course]) -> Vec<[CoursePoint; 2]> {
+    let statistic = |point: usize, of: fn(&CoursePoint) -> f64| {
+        let values: Vec<_> = courses.iter().map(|course| of(&course[point])).collect();
+        let Statistic { mean, sd, .. } = Statistic::of(&values);
+        [mean, sd].map(Option::unwrap_or_default)
+    };
+    let mean_and_sd = |point: usize| {
+        let opening = statistic(point, |at| at.opening_mm);
+        let lateral = statistic(point, |at| at.lateral_mm);
+        let force = statistic(point, |at| at.force_n);
+        [0, 1].map(|of| CoursePoint { opening_mm: opening[of], lateral_mm: lateral[of], force_n: force[of] })
+    };
+    let points = if courses.is_empty() { 0 } else { COURSE_POINTS };
+    (0..points).map(mean_and_sd).collect()
 }
 
 /// Points at even shares of a cycle: of chewing until the next cycle begins, of others until the jaw is closed.

@@ -19,7 +19,10 @@ use self::segments::{Cycle, Segments};
 use crate::statistic::Statistic;
 
 pub(crate) use cycle::MotionSpeed;
-pub use cycle::{COURSE_POINTS, Course, CoursePoint, JawCycle, JawCycleKind, JawSide, LeftOut};
+pub use cycle::{
+    COURSE_POINTS, Course, CoursePoint, CycleQuantity, JawCycle, JawCycleKind, JawSide, LeftOut, QUANTITIES,
+    mean_course,
+};
 
 /// Time between samples, ns.
 const SAMPLE_NS: u64 = 4_000_000;
@@ -65,7 +68,7 @@ pub struct JawCycleGroup {
     /// The courses of the first 64, each with the number of its cycle.
     #[serde(skip)]
     pub courses: Vec<(u64, Course)>,
-    /// Mean and standard deviation of all courses; empty without one.
+    /// Their mean and standard deviation; empty without one.
     #[serde(skip)]
     pub mean_course: Vec<[CoursePoint; 2]>,
 }
@@ -99,21 +102,6 @@ pub struct BorderStep {
     pub left_mm: f64,
 }
 
-type Value = fn(&JawCycle) -> Option<f64>;
-const QUANTITIES: [(&str, &str, &str, Value); 11] = [
-    ("duration_s", "duration, beginning to beginning", "s", |cycle| cycle.duration_s),
-    ("opening_s", "duration of the opening", "s", |cycle| Some(cycle.opening_s)),
-    ("hold_s", "hold at the farthest place", "s", |cycle| Some(cycle.hold_s)),
-    ("closing_s", "duration of the closing", "s", |cycle| Some(cycle.closing_s)),
-    ("occlusal_s", "occlusal phase", "s", |cycle| cycle.occlusal_s),
-    ("opening_mm", "opening", "mm", |cycle| Some(cycle.opening_mm)),
-    ("lateral_mm", "lateral width", "mm", |cycle| Some(cycle.lateral_mm)),
-    ("forward_mm", "way forward", "mm", |cycle| Some(cycle.forward_mm)),
-    ("opening_mm_s", "peak opening velocity", "mm/s", |cycle| Some(cycle.opening_mm_s)),
-    ("closing_mm_s", "peak closing velocity", "mm/s", |cycle| Some(cycle.closing_mm_s)),
-    ("force_n", "peak bite force", "N", |cycle| cycle.force_n),
-];
-
 /// Place of the incisal point when the jaw is closed, base frame, m; none for a scenario without a closed pose, which no run
 /// has.
 pub fn closed_incisal_m(scenario: &Scenario) -> Option<[f64; 3]> {
@@ -125,6 +113,9 @@ pub fn closed_incisal_m(scenario: &Scenario) -> Option<[f64; 3]> {
 fn incisal_m(platform: &Pose, in_platform_m: [f64; 3]) -> Vec3 {
     platform.translation.vector + platform.rotation * Vec3::from(in_platform_m)
 }
+
+/// What cycles of a group share.
+type GroupKey = (JawCycleKind, Option<JawSide>);
 
 /// Collects them.
 #[derive(Debug, Clone)]
@@ -140,22 +131,9 @@ pub(super) struct JawCycles {
     force_n: f64,
     most_closed_mm: Option<f64>,
     cycles: Vec<JawCycle>,
-    courses: BTreeMap<(JawCycleKind, Option<JawSide>), Courses>,
+    courses: BTreeMap<GroupKey, Vec<(u64, Course)>>,
     /// Back, front, right and left of each step.
     border: Vec<Option<[f64; 4]>>,
-}
-
-/// Courses of a group.
-#[derive(Debug, Clone)]
-struct Courses {
-    first: Vec<(u64, Course)>,
-    moments: Box<[[Moments; 3]; COURSE_POINTS]>,
-}
-
-impl Default for Courses {
-    fn default() -> Self {
-        Self { first: Vec::new(), moments: Box::new([[Moments::default(); 3]; COURSE_POINTS]) }
-    }
 }
 
 impl JawCycles {
@@ -218,12 +196,8 @@ impl JawCycles {
         }
         if let Some(course) = course.filter(|_| figures.left_out.is_none()) {
             let courses = self.courses.entry((figures.kind, figures.side)).or_default();
-            for (moments, point) in courses.moments.iter_mut().zip(&course) {
-                let values = [point.opening_mm, point.lateral_mm, point.force_n];
-                moments.iter_mut().zip(values).for_each(|(moments, value)| moments.add(value));
-            }
-            if courses.first.len() < MOST_COURSES {
-                courses.first.push((figures.number, course));
+            if courses.len() < MOST_COURSES {
+                courses.push((figures.number, course));
             }
         }
         self.cycles.push(figures);
@@ -266,59 +240,21 @@ impl JawCycles {
 }
 
 impl JawCycleGroup {
-    fn new((kind, side): (JawCycleKind, Option<JawSide>), cycles: &[&JawCycle], courses: Courses) -> Self {
-        let quantities = QUANTITIES.into_iter().map(|(name, about, unit, value)| {
+    fn new((kind, side): GroupKey, cycles: &[&JawCycle], courses: Vec<(u64, Course)>) -> Self {
+        let quantities = QUANTITIES.into_iter().map(|CycleQuantity { name, about, unit, value }| {
             let values: Vec<f64> = cycles.iter().filter_map(|cycle| value(cycle)).collect();
             Quantity { name, about, unit, statistic: Statistic::of(&values) }
         });
-        let has_course = !courses.first.is_empty();
+        let side_word = side.map_or_else(String::new, |side| format!(" {}", side.word()));
         Self {
-            name: [Some(kind.word()), side.map(JawSide::word)]
-                .into_iter()
-                .flatten()
-                .collect::<Vec<_>>()
-                .join(" "),
+            name: kind.word().to_owned() + &side_word,
             kind,
             side,
             count: cycles.len() as u64,
             quantities: quantities.filter(|quantity| quantity.statistic.count > 0).collect(),
-            courses: courses.first,
-            mean_course: if has_course {
-                courses.moments.iter().map(mean_and_sd).collect()
-            } else {
-                Vec::new()
-            },
+            mean_course: mean_course(&courses.iter().map(|(_, course)| course).collect::<Vec<_>>()),
+            courses,
         }
-    }
-}
-
-fn mean_and_sd(moments: &[Moments; 3]) -> [CoursePoint; 2] {
-    let point = |of: fn(&Moments) -> f64| {
-        let [opening_mm, lateral_mm, force_n] = [0, 1, 2].map(|quantity| of(&moments[quantity]));
-        CoursePoint { opening_mm, lateral_mm, force_n }
-    };
-    [point(|moments| moments.mean), point(Moments::sd)]
-}
-
-/// Collects mean and standard deviation (Welford 1962).
-#[derive(Debug, Clone, Copy, Default)]
-struct Moments {
-    count: u64,
-    mean: f64,
-    squares: f64,
-}
-
-impl Moments {
-    fn add(&mut self, value: f64) {
-        self.count += 1;
-        let from_mean = value - self.mean;
-        self.mean += from_mean / self.count as f64;
-        self.squares += from_mean * (value - self.mean);
-    }
-
-    /// As of a sample; 0 with fewer than two.
-    fn sd(&self) -> f64 {
-        if self.count > 1 { (self.squares / (self.count - 1) as f64).sqrt() } else { 0.0 }
     }
 }
 

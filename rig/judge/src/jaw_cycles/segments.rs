@@ -3,7 +3,7 @@
 //! A movement is a way of 3 mm from the most closed place since the last movement. Its beginning is the last sample within
 //! 0.5 mm of that place. The return is a way back by 3 mm, and by half of the way out, from the farthest place; its end is the
 //! first sample within 0.5 mm of the most closed place that follows. The cycle lasts until the next movement begins, so the
-//! time in which the jaw stays closed belongs to the cycle before. After a rest of more than a second, or at the end of the
+//! time in which the jaw stays closed belongs to the cycle before. After a rest of more than half a second, or at the end of the
 //! motion, there is no such movement.
 
 use super::cycle::{CLOSED_M, Course, JawCycle, Part, Sample, course};
@@ -19,8 +19,8 @@ pub(super) struct Cycle {
 const LEAST_M: f64 = 0.003;
 /// The share of the way out that a return takes back.
 const LEAST_SHARE: f64 = 0.5;
-/// A longer rest between the teeth ends a bout of chewing, s.
-const LONGEST_REST_S: f64 = 1.0;
+/// A longer rest between the teeth ends a bout of chewing, s: pauses within a bout take 0.1 to 0.2 s.
+const LONGEST_REST_S: f64 = 0.5;
 /// A longer cycle is none, s.
 const LONGEST_S: f64 = 10.0;
 /// Samples in which the beginning of a movement is looked for, s.

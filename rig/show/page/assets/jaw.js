@@ -39,12 +39,13 @@
   const span = (values) => values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
   const fileName = (text) => text.toLowerCase().replace(/[^a-z0-9]+/g, '-').replace(/^-|-$/g, '');
 
-  // A drawing as PNG, twice as large.
+  // A drawing as PNG: one in mm with 300 dots per inch, one in px twice as large.
   function savePng(name, text, [width, height]) {
+    const times = text.includes('mm" height') ? 300 / 25.4 : 2;
     const image = new Image(), address = URL.createObjectURL(new Blob([text], { type: 'image/svg+xml' }));
     image.onload = () => {
-      const canvas = element('canvas', { width: 2 * width, height: 2 * height });
-      canvas.getContext('2d').drawImage(image, 0, 0, 2 * width, 2 * height);
+      const canvas = element('canvas', { width: Math.round(times * width), height: Math.round(times * height) });
+      canvas.getContext('2d').drawImage(image, 0, 0, canvas.width, canvas.height);
       URL.revokeObjectURL(address);
       canvas.toBlob((blob) => Masseter.save(name, 'image/png', blob));
     };
@@ -52,12 +53,12 @@
   }
 
   function menu(title, svgText, csvText) {
-    const name = fileName(title), size = (text) => ['width', 'height'].map((side) => Number(new RegExp(`${side}="(\\d+)`).exec(text)[1]));
+    const name = fileName(title), size = (text) => ['width', 'height'].map((side) => Number(new RegExp(`${side}="([\\d.]+)`).exec(text)[1]));
     const entry = (words, act) => element('button', { type: 'button', onclick: () => { details.open = false; act(); } }, words);
     const details = element('details', { class: 'menu' }, element('summary', { 'aria-label': `Save ${title}`, title: 'Save this view' }, '⋯'), element('div', {},
       svgText && entry('Save as SVG', () => Masseter.save(`${name}.svg`, 'image/svg+xml', svgText())),
       svgText && entry('Save as PNG', () => { const text = svgText(); savePng(`${name}.png`, text, size(text)); }),
-      entry('Save as CSV', () => Masseter.save(`${name}.csv`, 'text/csv', csvText()))));
+      csvText && entry('Save as CSV', () => Masseter.save(`${name}.csv`, 'text/csv', csvText()))));
     details.addEventListener('focusout', (event) => { if (!details.contains(event.relatedTarget)) details.open = false; });
     return details;
   }
@@ -241,6 +242,13 @@
       chartData('Velocity of the rotation', '°/s', order.map((axis) => [parts[axis], 'plain', rates(path, ({ turn }) => turn[axis])])),
     ];
   }
+
+  // A drawing for print, shown as large as it is.
+  Masseter.block('figure', (holder, text) => {
+    const title = holder.id.replace(/\.svg$/, '');
+    const picture = element('img', { alt: title, src: `data:image/svg+xml;charset=utf-8,${encodeURIComponent(text)}` });
+    holder.append(element('figure', { class: 'chart' }, element('figcaption', { style: 'display:flex;justify-content:space-between' }, element('h3', {}, title), menu(title, () => text, null)), picture));
+  });
 
   Masseter.block('jaw', (holder, data, clock) => {
     const { scene } = Masseter;

@@ -18,7 +18,7 @@ use crate::{histogram_log, junit, page};
 
 /// Why the recording of a run could not be analysed.
 #[derive(Debug, thiserror::Error)]
-enum AnalysisError {
+pub(crate) enum AnalysisError {
     #[error(transparent)]
     Read(#[from] ReadError),
     #[error("a message on topic 'frame' holds no CAN frame: {0}")]
@@ -104,7 +104,7 @@ fn is_read_only(error: &io::Error) -> bool {
 }
 
 /// Reads the recording once: its figures, and whether its CAN frames could be written as candump logs.
-fn analyse(
+pub(crate) fn analyse(
     folder: &RunFolder,
     manifest: &Manifest,
 ) -> Result<(Figures, Result<(), WriteError>), AnalysisError> {
