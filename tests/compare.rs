@@ -8,15 +8,19 @@ use crate::common::{MASSETER, Workspace};
 /// Person, and opening before and after, mm.
 const PERSONS: [(&str, [f64; 2]); 3] = [("P1", [18.0, 15.0]), ("P2", [20.0, 17.5]), ("P3", [16.0, 12.5])];
 
-/// The rows of a table by the names of its columns.
-fn rows(text: &str) -> impl Iterator<Item = impl Fn(&str) -> &str> {
+/// A row of a table.
+struct Row<'a>(Vec<(&'a str, &'a str)>);
+
+impl Row<'_> {
+    fn cell(&self, name: &str) -> &str {
+        self.0.iter().find(|(column, _)| *column == name).unwrap().1
+    }
+}
+
+/// The rows of a table whose cells have no commas.
+fn rows(text: &str) -> impl Iterator<Item = Row<'_>> {
     let (head, rows) = text.split_once('\n').unwrap();
-    let names: Vec<_> = head.split(',').collect();
-    rows.lines().map(move |row| {
-        let cells: Vec<_> = row.split(',').collect();
-        let names = names.clone();
-        move |name: &str| cells[names.iter().position(|other| *other == name).unwrap()].trim_matches('"')
-    })
+    rows.lines().map(move |row| Row(head.split(',').zip(row.split(',')).collect()))
 }
 
 #[test]
@@ -50,9 +54,12 @@ fn known_differences_between_six_sessions_are_found_and_covered() {
     let read = |name: &str| fs::read_to_string(workspace.file("study").join(name)).unwrap();
     let differences = read("differences.csv");
     let found = |quantity: &str| -> Vec<f64> {
-        let row = rows(&differences).find(|row| row("quantity") == quantity).unwrap();
-        assert_eq!((row("group"), row("from"), row("to"), row("n")), ("chew left", "before", "after", "3"));
-        ["mean", "mean_low", "mean_high"].map(|column| row(column).parse().unwrap()).to_vec()
+        let row = rows(&differences).find(|row| row.cell("quantity") == quantity).unwrap();
+        assert_eq!(
+            (row.cell("group"), row.cell("from"), row.cell("to"), row.cell("n")),
+            ("chew left", "before", "after", "3")
+        );
+        ["mean", "mean_low", "mean_high"].map(|column| row.cell(column).parse().unwrap()).to_vec()
     };
     let [mean, low, high] = found("opening_mm")[..] else { unreachable!() };
     assert!((mean + 3.0).abs() < 0.05, "{mean}");
@@ -62,7 +69,7 @@ fn known_differences_between_six_sessions_are_found_and_covered() {
     assert!((low..=high).contains(&0.0) || high - low < 0.1, "the width did not change: {low} to {high}");
 
     let cycles = read("cycles.csv");
-    let counted = rows(&cycles).filter(|row| row("left_out").is_empty()).count();
+    let counted = rows(&cycles).filter(|row| row.cell("left_out").is_empty()).count();
     assert!(counted >= 6 * 3, "{counted}");
     for name in ["cycles.csv", "means.csv", "courses.csv", "differences.csv", "compare.html", "caption.txt"] {
         assert!(!read(name).contains("a-name-that-is-nobodys"), "{name}");

@@ -43,9 +43,9 @@ pub(crate) struct Progress<'a> {
 pub(crate) struct Reference {
     /// None for an own motion, and where the motion's file is gone since the run.
     playback: Option<Playback>,
-    /// Progress at which the motion's clock has come to its full speed, and at which it begins to stop, s.
-    full_speed_s: [f64; 2],
     period_s: f64,
+    /// The speed of the motion's clock between its ramps.
+    full_speed: f64,
     most_lag_s: f64,
     /// How far force control may lead the jaw up or down from the motion, m.
     reach_m: f64,
@@ -78,15 +78,17 @@ pub(crate) struct Desired {
 const STEP_S: f64 = 0.005;
 const MOST_STEPS: f64 = 20_000.0;
 
+/// Time over which the speed of the motion's clock is taken, s, and the share of its full speed that counts as full.
+const SPEED_S: f64 = 1e-4;
+const FULL_SHARE: f64 = 0.999;
+
 impl Reference {
     pub(crate) fn new(scenario: &Scenario, declared: &Declared) -> Self {
         let is_of_scenario = declared.motion == PlayedMotion::Scenario;
-        let motion = is_of_scenario.then(|| motion(scenario)).flatten();
-        let always = [f64::NEG_INFINITY, f64::INFINITY];
         Self {
-            full_speed_s: motion.as_ref().map_or(always, |(_, motion)| full_speed_s(motion)),
-            playback: motion.map(|(mechanism, motion)| Playback::of_scenario(scenario, &mechanism, motion)),
+            playback: is_of_scenario.then(|| playback(scenario)).flatten(),
             period_s: scenario.period_s(),
+            full_speed: scenario.dry.speed_now(),
             most_lag_s: scenario.checks.motion_lag_ms / 1e3,
             reach_m: scenario.force_control.map_or(0.0, |config| config.reach_m),
             detour_m: 0.0,
@@ -167,8 +169,11 @@ impl Reference {
 
     /// The speed of the motion's clock at this progress, s.
     pub(crate) fn speed(&self, progress_s: f64) -> MotionSpeed {
-        let [from_s, to_s] = self.full_speed_s;
-        if (from_s..=to_s).contains(&progress_s) { MotionSpeed::Full } else { MotionSpeed::Ramped }
+        let Some(playback) = &self.playback else { return MotionSpeed::Full };
+        let motion = playback.trajectory();
+        let at_s = motion.duration_s() + progress_s;
+        let speed = (motion.motion_time_s(at_s) - motion.motion_time_s(at_s - SPEED_S)) / SPEED_S;
+        if speed >= FULL_SHARE * self.full_speed { MotionSpeed::Full } else { MotionSpeed::Ramped }
     }
 
     /// What is left of the motion, as `distance` measures it from pose to pose; nothing after a request to stop. None where the
@@ -202,35 +207,10 @@ fn as_published(pose: &Pose) -> Option<Pose> {
 }
 
 /// The scenario's motion; none where its file is gone since the run.
-fn motion(scenario: &Scenario) -> Option<(Mechanism, Trajectory)> {
+fn playback(scenario: &Scenario) -> Option<Playback> {
     let mechanism = Mechanism::new(&scenario.mechanism).ok()?;
     let motion = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s).ok()?;
-    Some((mechanism, motion.slowed(scenario.dry.speed_now())))
-}
-
-/// Instants at which the speed of the motion's clock is looked at, and bisections for the ends of its full speed.
-const LOOKS: u32 = 1000;
-const BISECTIONS: u32 = 40;
-/// Half of the time over which a speed is taken, s, and the share of the greatest speed that is full speed.
-const SPEED_S: f64 = 1e-4;
-const FULL_SPEED: f64 = 0.999;
-
-/// Progress between which the clock of the motion has its full speed, s before the end as negative numbers.
-fn full_speed_s(motion: &Trajectory) -> [f64; 2] {
-    let duration_s = motion.duration_s();
-    let speed = |t_s: f64| motion.motion_time_s(t_s + SPEED_S) - motion.motion_time_s(t_s - SPEED_S);
-    let looks = || (1..LOOKS).map(|look| duration_s * f64::from(look) / f64::from(LOOKS));
-    let full = FULL_SPEED * looks().map(speed).fold(0.0, f64::max);
-    let is_full = |t_s: &f64| speed(*t_s) >= full;
-    let bisect = |[slow_s, full_s]: [f64; 2]| {
-        let halve = |[slow_s, full_s]: [f64; 2], _| {
-            let middle_s = f64::midpoint(slow_s, full_s);
-            if is_full(&middle_s) { [slow_s, middle_s] } else { [middle_s, full_s] }
-        };
-        (0..BISECTIONS).fold([slow_s, full_s], halve)[1] - duration_s
-    };
-    let [first_s, last_s] = [looks().find(is_full), looks().rfind(is_full)].map(Option::unwrap_or_default);
-    [bisect([0.0, first_s]), bisect([duration_s, last_s])]
+    Some(Playback::of_scenario(scenario, &mechanism, motion.slowed(scenario.dry.speed_now())))
 }
 
 #[cfg(test)]

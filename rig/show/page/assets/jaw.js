@@ -220,10 +220,18 @@
       hasForce ? overlay('Bite force over the cycle', 'bite force, N', 2, 'var(--c1)') : null));
   }
 
-  function planes(clock, scene, path, desired) {
+  // What the motion reached at each opening, in the planes with the vertical.
+  function borderOf(border, plan) {
+    const [low, high] = plan === PLANES.sagittal ? ['back_mm', 'front_mm'] : ['right_mm', 'left_mm'];
+    if (plan === PLANES.horizontal || border.length < 2) return [];
+    const back = border.toReversed();
+    return [{ name: 'border', style: 'estimated', stroke: 'var(--jaw)', xs: [...border.map((step) => step[low]), ...back.map((step) => step[high])], ys: [...border, ...back].map((step) => -step.opening_mm) }];
+  }
+
+  function planes(clock, scene, path, desired, border) {
     const isTrue = scene.actual_name === 'true', own = isTrue ? 'var(--true)' : 'var(--estimated)', style = styleOf(scene);
     const incisal = Object.values(PLANES).map((plan) => plane(clock, { title: `Incisal point: ${plan[0].toLowerCase()}`, across: plan[1], up: plan[2], isEqual: true, isPlaced: true, curves: [
-      curve(desired, 'incisal', plan, 'desired', 'desired', 'var(--desired)'), curve(path, 'incisal', plan, scene.actual_name, style, own)] }));
+      curve(desired, 'incisal', plan, 'desired', 'desired', 'var(--desired)'), curve(path, 'incisal', plan, scene.actual_name, style, own), ...borderOf(border, plan)] }));
     const condyles = [PLANES.sagittal, PLANES.horizontal].map((plan) => plane(clock, { title: `Condyles: ${plan[0].toLowerCase()}`, across: plan[1], up: plan[2], isEqual: true, isPlaced: true, curves: [
       curve(desired, 'right', plan, '', 'desired', 'var(--desired)'), curve(desired, 'left', plan, 'desired', 'desired', 'var(--desired)'),
       curve(path, 'right', plan, 'right', style, 'var(--c1)'), curve(path, 'left', plan, 'left', style, 'var(--c3)')] }));
@@ -269,7 +277,7 @@
       const lasts = path[path.length - 1].at - path[0].at;
       words.textContent = `${Masseter.fixed(lasts, 1)} s of the motion at ${Masseter.fixed((path.length - 1) / (lasts || 1), 0)} poses a second`
         + `${running.length && running[running.length - 1].to_s - path[path.length - 1].at > 0.1 ? '; the recording goes on' : ''}. Displacements count from the closed jaw. A click on a path moves the cursor there.`;
-      views.replaceChildren(...planes(clock, scene, path, desired));
+      views.replaceChildren(...planes(clock, scene, path, desired, now.border));
       const next = courses(scene, path, desired);
       charts ||= next.map((course) => Masseter.chart(drawn.appendChild(element('div', { class: 'block chart' })), course, clock));
       charts.forEach((chart, at) => chart.update(next[at]));

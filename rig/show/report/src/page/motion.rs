@@ -6,8 +6,8 @@ use std::ops::Range;
 
 use masseter_controller::trajectory::closed_pose;
 use masseter_judge::{
-    Course, CoursePoint, Curve, Figures, JawCycle, JawCycleFigures, JawCycleGroup, PoseSource, Quantity,
-    ToothFigures, ToothLoads, TrackingSample, closed_incisal_m,
+    BorderStep, Course, CoursePoint, Curve, Figures, JawCycle, JawCycleFigures, JawCycleGroup, PoseSource,
+    Quantity, ToothFigures, ToothLoads, TrackingSample, closed_incisal_m,
 };
 use masseter_model::geometry::{AXES, AXIS_NAMES, LEGS, Mechanism, Pose};
 use masseter_page::{Block, Chart, Content, Limit, Points, Pressure, Section, Series, Style, Tooth};
@@ -211,6 +211,7 @@ struct Cycles<'a> {
     has_force: bool,
     groups: Vec<Group<'a>>,
     rows: &'a [JawCycle],
+    border: &'a [BorderStep],
 }
 
 /// Cycles of one kind and side.
@@ -231,10 +232,11 @@ pub(super) fn jaw_section(figures: &Figures) -> Option<Section> {
 }
 
 fn cycles(found: &JawCycleFigures) -> Cycles<'_> {
-    let JawCycleFigures { count, left_out, unclear, most_closed_mm, ref groups, ref cycles, .. } = *found;
+    let JawCycleFigures { count, left_out, unclear, most_closed_mm, ref groups, ref cycles, ref border } =
+        *found;
     let has_force = cycles.iter().any(|cycle| cycle.force_n.is_some());
     let groups = groups.iter().map(Group::new).collect();
-    Cycles { count, left_out, unclear, most_closed_mm, has_force, groups, rows: cycles }
+    Cycles { count, left_out, unclear, most_closed_mm, has_force, groups, rows: cycles, border }
 }
 
 impl<'a> Group<'a> {
