@@ -21,8 +21,8 @@ pub fn jaw_cycle_table<'a>(of: impl IntoIterator<Item = (JawCyclesOf<'a>, &'a [J
     let number = |name, unit, about: &str| Column::new(name, unit, about, Values::Numbers(Vec::new()));
     let numbers = QUANTITIES.map(|of| number(of.name, of.unit, &format!("{}.", of.about)));
     let first = [
-        words("patient", "Pseudonym of the person."),
-        words("session", "Session, or another condition."),
+        words("patient", "Pseudonym of the person; none where the run names none."),
+        words("session", "Session, or another condition; none where the run names none."),
         whole("recording", "Number of the recording."),
         whole("cycle", "Number of the cycle in its recording."),
         words("kind", "Kind of the cycle."),
@@ -33,7 +33,7 @@ pub fn jaw_cycle_table<'a>(of: impl IntoIterator<Item = (JawCyclesOf<'a>, &'a [J
     let mut table = Table::new(first.into_iter().chain(numbers).collect());
     for (JawCyclesOf { person, condition, recording }, cycles) in of {
         for cycle in cycles {
-            let word = |text: &str| Cell::Word(Some(text.to_owned()));
+            let word = |text: &str| Cell::Word(Some(text.to_owned()).filter(|text| !text.is_empty()));
             let first = [
                 word(person),
                 word(condition),
