@@ -124,6 +124,6 @@ with tempfile.TemporaryDirectory(prefix="rig-") as folder:
     terminal.write_text(page_of(play(masseter, folder)).replace(folder, "/home/you"))
     draw(browser, terminal, pictures / "terminal.png")
     draw_part(browser, report, CUT_REPORT, pictures / "report.png")
-    patient = ["run", "examples/patient.toml", "--trajectory", "examples/patient.csv", "--clock", "virtual", "--quiet"]
+    patient = ["run", "examples/patient.toml", "--clock", "virtual", "--quiet"]
     subprocess.run([masseter, *patient, "--out", f"{folder}/patient"], check=True, stdout=subprocess.DEVNULL)
     draw_part(browser, Path(folder) / "patient/report.html", CUT_JAW, pictures / "jaw.png")

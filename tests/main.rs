@@ -10,6 +10,7 @@ mod campaign;
 mod can_link;
 mod command_line;
 mod common;
+mod compare;
 mod doctor;
 mod documents;
 mod dynamics;

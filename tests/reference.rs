@@ -14,8 +14,8 @@ use masseter_scenario::{
     FaultKindConfig, FileConfig, FoodConfig, ForceControlConfig, ForceEstimateConfig, FrictionConfig,
     HomingConfig, IdentityConfig, JawConfig, Key, LateralConfig, LoadCellConfig, MotionConfig, OpeningConfig,
     PdosConfig, PhaseShares, ProtrusionConfig, QuirkConfig, QuirkKindConfig, Range, RealtimeConfig,
-    RecordingConfig, RequirementConfig, Scenario, ScenarioError, StimulusConfig, StoreConfig, TeethConfig,
-    ToothConfig, TrajectoryLimitsConfig, UnitsConfig, unit_of,
+    RecordingConfig, RequirementConfig, Scenario, ScenarioError, StimulusConfig, StoreConfig, StudyConfig,
+    TeethConfig, ToothConfig, TrajectoryLimitsConfig, UnitsConfig, unit_of,
 };
 use serde_json::Value;
 
@@ -34,7 +34,7 @@ type Rewrite = fn(&str) -> String;
 const DOCUMENTS: [(&str, Rewrite); 2] = [("scenario.md", scenario), ("signals.md", signals)];
 
 /// The tables of a scenario by the TOML that leads to them.
-const TABLES: [(&str, &[Key]); 46] = [
+const TABLES: [(&str, &[Key]); 47] = [
     ("", Scenario::KEYS),
     ("[motion] kind = \"chewing\"", ChewingConfig::KEYS),
     ("[motion] kind = \"opening\"", OpeningConfig::KEYS),
@@ -81,6 +81,7 @@ const TABLES: [(&str, &[Key]); 46] = [
     ("[[stimulus]]", StimulusConfig::KEYS),
     ("[[require]]", RequirementConfig::KEYS),
     ("[expect]", ExpectConfig::KEYS),
+    ("[study]", StudyConfig::KEYS),
 ];
 
 fn path_of(document: &str) -> PathBuf {

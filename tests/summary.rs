@@ -52,7 +52,7 @@ fn the_summary_has_the_keys_that_are_documented_and_no_others() {
         assert!(undocumented.is_empty(), "not in docs/summary.md: {undocumented:?}");
         let absent: Vec<_> = documented.difference(&found).filter(|key| !optional.contains(*key)).collect();
         assert!(absent.is_empty(), "in docs/summary.md, but not in summary.json: {absent:?}");
-        assert_eq!(workspace.summary()["form"], 2);
+        assert_eq!(workspace.summary()["form"], 3);
     }
 }
 

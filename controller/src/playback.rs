@@ -217,6 +217,11 @@ impl Playback {
         }
     }
 
+    /// The motion.
+    pub fn trajectory(&self) -> &Trajectory {
+        &self.trajectory
+    }
+
     /// The rest of the motion, s of the trajectory's time.
     pub fn rest_s(&self) -> f64 {
         (self.trajectory.duration_s() - self.elapsed_s).max(0.0)

@@ -5,6 +5,7 @@ pub(crate) mod arguments;
 mod bench;
 mod campaign;
 mod can;
+mod compare;
 mod controller;
 mod faults;
 mod help;
@@ -41,6 +42,7 @@ use arguments::ProcessArgs;
 use bench::BenchVerb;
 use campaign::{CampaignArgs, SearchArgs, ShrinkArgs};
 use can::CanVerb;
+use compare::CompareArgs;
 use controller::{ControllerArgs, ParamVerb, SignalsArgs};
 use faults::FaultsVerb;
 use help::{CompletionsArgs, ManArgs, with_overview};
@@ -132,6 +134,8 @@ enum Verb {
     Plant(PlantArgs),
     /// Write the report of a run again, or compare two runs
     Report(ReportArgs),
+    /// Compare the jaw motion of persons and sessions: tables, figures for print, a page
+    Compare(CompareArgs),
     /// Give the recorded readings of a run to its controller again, and compare the answers
     Replay(ReplayArgs),
     /// Find the first message in which two recordings differ
@@ -248,6 +252,7 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Faults(verb) => faults::execute(&verb),
         Verb::Signals(args) => controller::signals(&args).usage(),
         Verb::Report(args) => report::report(&args),
+        Verb::Compare(args) => compare::compare(&args).usage(),
         Verb::Replay(args) => report::replay(&args).usage(),
         Verb::Diff(args) => report::diff(&args).usage(),
         Verb::Bench(verb) => bench::execute(&verb),

@@ -27,6 +27,9 @@ pub(super) struct ReportArgs {
     folder: PathBuf,
     /// Second run, to compare with the first
     against: Option<PathBuf>,
+    /// Change a key of 'study', which chooses jaw cycles; may be given several times
+    #[arg(long, value_name = "KEY=VALUE", conflicts_with = "against")]
+    set: Vec<String>,
     /// Format of standard output
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -44,7 +47,7 @@ impl ReportArgs {
 /// Judges a run again, or compares two runs.
 pub(super) fn report(args: &ReportArgs) -> Result<Exit, Failure> {
     match &args.against {
-        None => masseter_report::report_past_run(&args.folder, args.format),
+        None => masseter_report::report_past_run(&args.folder, &args.set, args.format),
         Some(against) => masseter_report::compare::runs(&args.folder, against, args.format).usage(),
     }
 }

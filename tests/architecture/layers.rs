@@ -53,6 +53,8 @@ const MAY_USE: [(&str, &[&str]); 27] = [
             "controller",
             "rig/record/recording",
             "rig/judge",
+            "rig/record/table",
+            "rig/show/charts",
             "rig/show/page",
             "rig/show/terminal",
         ],

@@ -19,7 +19,7 @@ for kind in ("parquet", "csv"):
     words = [masseter, "export", run, "--format", kind, "--out", folder / kind]
     subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
 names = {path.stem for path in (folder / "parquet").glob("*.parquet")}
-assert names == {"cycles", "command", "reading", "state", "truth", "frame", "event", "parameter"}, names
+assert names == {"cycles", "jaw_cycles", "command", "reading", "state", "truth", "frame", "event", "parameter"}, names
 
 # The recording, as another reader sees it.
 readings = [message.ros_msg for message in read_ros2_messages(str(run / "recording.mcap"), topics=["reading"])]

@@ -334,13 +334,14 @@ fn check_steps(rows: &[Row]) -> Result<(), Located> {
     let mut steps_s: Vec<f64> = rows.windows(2).map(step_s).collect();
     let middle = steps_s.len() / 2;
     let usual_s = *steps_s.select_nth_unstable_by(middle, f64::total_cmp).1;
-    // Steps that are too short are judged with the speeds.
-    if usual_s > LARGEST_GAP_S {
+    // Steps that are short for a tracker are judged with the speeds.
+    if usual_s > 0.0 && !(SHORTEST_STEP_S..=LARGEST_GAP_S).contains(&usual_s) {
+        let unit = if usual_s > LARGEST_GAP_S { "ms" } else { "s" };
         return Err(Located::at(
             rows[1].line,
             format!(
-                "the usual time between rows is {usual_s} s, which no tracker has; if the times are in ms, set \
-                 motion.time_unit = \"ms\""
+                "the usual time between rows is {usual_s} s, which no tracker has; if the times are in {unit}, set \
+                 motion.time_unit = \"{unit}\""
             ),
         ));
     }

@@ -2,7 +2,6 @@
 //!
 //! Figures that no verdict depends on are in [`Shown`]: a run without a report does without them.
 
-use masseter_model::geometry::Pose;
 use masseter_recording::{Damage, ProcessFault, Recorded, RunUsage};
 use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind, NO_DRIVE_STATE, Source};
 use masseter_runtime::messages::tap::{self, TapError};
@@ -14,7 +13,7 @@ use crate::declared_faults::FaultWatch;
 use crate::events::{Code, EventRecord};
 use crate::figures::Figures;
 use crate::intervals::Intervals;
-use crate::jaw_cycles::JawCycles;
+use crate::jaw_cycles::{JawCycles, MotionSpeed};
 use crate::longest_cycles::LongestCycles;
 use crate::lost_cycles::{Disturbance, Freshness, OutageWatch, ScenarioStalls};
 use crate::messages::{Digest, NamedWatch, SequenceCheck};
@@ -25,10 +24,10 @@ use crate::poses::{estimated_pose, is_moving, is_running, true_pose};
 use crate::recorded::RecordedWatch;
 use crate::requirements::Requirements;
 use crate::response::Responses;
-use crate::signals::{Pace, Sample, Timeline};
+use crate::signals::{CycleMessages, Pace, Sample, Timeline};
 use crate::skips::{Counters, OverrunAttribution, Skips, longest_overruns};
 use crate::standstill::StandstillWatch;
-use crate::tracking::{PoseSource, Tracking};
+use crate::tracking::{PathSample, PoseSource, Tracking};
 
 /// Computes the [`Figures`] of a run from its messages, in their order in the recording.
 ///
@@ -267,7 +266,9 @@ impl Analysis {
         let messages = &sample.messages;
         self.standstill.add_sample(sample);
         if let Some(path) = self.tracking.add_sample(sample) {
-            self.shown.iter_mut().for_each(|shown| shown.over_time.apply_path(&path));
+            let speed =
+                self.timeline.reference().map_or(MotionSpeed::Full, |of| of.speed(messages.progress_s));
+            self.shown.iter_mut().for_each(|shown| shown.apply_path(&path, messages, speed));
             self.faults.apply_sample(&path);
             if let (Some(recorded), Some(used)) = (&mut self.recorded, &messages.solution) {
                 let is_counted = is_running(messages.controller_state) && used.motion_time_s >= 0.0;
@@ -398,7 +399,7 @@ impl Shown {
             intervals: Intervals::new(scenario.period_ns()),
             longest_cycles: LongestCycles::default(),
             over_time: OverTimeCollector::new(scenario.jaw.reference_point_m, scenario.can.bitrate().ok()),
-            jaw_cycles: JawCycles::new(scenario.jaw.reference_point_m, scenario.has_contact()),
+            jaw_cycles: JawCycles::new(scenario),
         }
     }
 
@@ -435,22 +436,22 @@ impl Shown {
         if self.has_truth {
             self.over_time.incisal(Place::Estimated, state.sampled_ns, estimated.as_ref());
         } else {
-            self.actual(state.sampled_ns, estimated.as_ref(), 0.0);
+            self.over_time.incisal(Place::Actual, state.sampled_ns, estimated.as_ref());
         }
     }
 
-    /// The actual pose of the platform, and the vertical force on the jaw.
-    fn actual(&mut self, sampled_ns: u64, actual: Option<&Pose>, force_n: f64) {
-        self.over_time.incisal(Place::Actual, sampled_ns, actual);
-        let since_ns = self.over_time.since(sampled_ns);
-        if let Some(pose) = actual {
-            self.jaw_cycles.add_pose(since_ns, pose, force_n);
+    fn apply_path(&mut self, path: &PathSample, messages: &CycleMessages, speed: MotionSpeed) {
+        self.over_time.apply_path(path);
+        let played_ns = self.over_time.since_motion(path.sampled_ns);
+        let played_ns = played_ns.filter(|_| is_running(messages.controller_state));
+        if let Some((played_ns, actual)) = played_ns.zip(path.actual) {
+            let force_n = messages.truth.map_or(0.0, |truth| truth.bite_force_n);
+            self.jaw_cycles.add_pose(played_ns, &actual, force_n, speed);
         }
     }
 
     fn apply_truth(&mut self, truth: &Truth) {
-        let actual = true_pose(truth);
         self.over_time.apply_truth(truth);
-        self.actual(truth.sampled_ns, actual.as_ref(), truth.bite_force_n);
+        self.over_time.incisal(Place::Actual, truth.sampled_ns, true_pose(truth).as_ref());
     }
 }

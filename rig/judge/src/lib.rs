@@ -27,6 +27,7 @@ mod series;
 pub mod signals;
 mod skips;
 mod standstill;
+mod statistic;
 mod timing;
 mod tracking;
 mod verdict;
@@ -37,7 +38,10 @@ pub use checks::whose_motion;
 pub use declared_faults::{Detection, FaultFigures};
 pub use events::{Code, EventRecord};
 pub use figures::Figures;
-pub use jaw_cycles::{COURSE_POINTS, CoursePoint, JawCycle, JawCycleFigures, Statistic};
+pub use jaw_cycles::{
+    BorderStep, COURSE_POINTS, Course, CoursePoint, CycleQuantity, JawCycle, JawCycleFigures, JawCycleGroup,
+    JawCycleKind, JawSide, LeftOut, QUANTITIES, Quantity, closed_incisal_m, mean_course,
+};
 pub use longest_cycles::{KernelCounts, WorstCycle, hop_names};
 pub use lost_cycles::{Outage, ReadingFigures};
 pub use measured::{IntervalFigures, Seconds, resolution_ns};
@@ -51,6 +55,7 @@ pub use response::{BusResponse, ResponseFigures};
 pub use series::Curve;
 pub use skips::{OverrunAttribution, SkipFigures};
 pub use standstill::StandstillFigures;
+pub use statistic::Statistic;
 pub use timing::{Timing, TimingWord};
 pub use tracking::{PoseErrors, PoseSource, Track, TrackingFigures, TrackingSample, UndisturbedFigures};
 pub use verdict::{Judgement, Verdict};

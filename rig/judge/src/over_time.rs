@@ -125,6 +125,11 @@ impl OverTimeCollector {
         self.motion_began_ns.get_or_insert(sampled_ns);
     }
 
+    /// A time of the run's clock since the motion began, ns; none before.
+    pub(super) fn since_motion(&self, time_ns: u64) -> Option<u64> {
+        time_ns.checked_sub(self.motion_began_ns?)
+    }
+
     /// The incisal point of a pose.
     pub(super) fn incisal(&mut self, of: Place, sampled_ns: u64, pose: Option<&Pose>) {
         let since_ns = self.since(sampled_ns);

@@ -16,6 +16,7 @@ use masseter_runtime::named::{Declared, PlayedMotion};
 use masseter_scenario::Scenario;
 
 use crate::events::EventRecord;
+use crate::jaw_cycles::MotionSpeed;
 use crate::poses::{desired_pose, is_moving, is_running};
 
 /// What the messages of a sample say of the motion.
@@ -43,6 +44,8 @@ pub(crate) struct Reference {
     /// None for an own motion, and where the motion's file is gone since the run.
     playback: Option<Playback>,
     period_s: f64,
+    /// The speed of the motion's clock between its ramps.
+    full_speed: f64,
     most_lag_s: f64,
     /// How far force control may lead the jaw up or down from the motion, m.
     reach_m: f64,
@@ -75,12 +78,17 @@ pub(crate) struct Desired {
 const STEP_S: f64 = 0.005;
 const MOST_STEPS: f64 = 20_000.0;
 
+/// Time over which the speed of the motion's clock is taken, s, and the share of its full speed that counts as full.
+const SPEED_S: f64 = 1e-4;
+const FULL_SHARE: f64 = 0.999;
+
 impl Reference {
     pub(crate) fn new(scenario: &Scenario, declared: &Declared) -> Self {
         let is_of_scenario = declared.motion == PlayedMotion::Scenario;
         Self {
             playback: is_of_scenario.then(|| playback(scenario)).flatten(),
             period_s: scenario.period_s(),
+            full_speed: scenario.dry.speed_now(),
             most_lag_s: scenario.checks.motion_lag_ms / 1e3,
             reach_m: scenario.force_control.map_or(0.0, |config| config.reach_m),
             detour_m: 0.0,
@@ -157,6 +165,15 @@ impl Reference {
         if self.stop_cycle.is_some_and(|cycle| cycle <= of.cycle) {
             playback.stop();
         }
+    }
+
+    /// The speed of the motion's clock at this progress, s.
+    pub(crate) fn speed(&self, progress_s: f64) -> MotionSpeed {
+        let Some(playback) = &self.playback else { return MotionSpeed::Full };
+        let motion = playback.trajectory();
+        let at_s = motion.duration_s() + progress_s;
+        let speed = (motion.motion_time_s(at_s) - motion.motion_time_s(at_s - SPEED_S)) / SPEED_S;
+        if speed >= FULL_SHARE * self.full_speed { MotionSpeed::Full } else { MotionSpeed::Ramped }
     }
 
     /// What is left of the motion, as `distance` measures it from pose to pose; nothing after a request to stop. None where the

@@ -28,6 +28,7 @@ mod requirements;
 pub mod rows;
 mod scenario;
 mod stimuli;
+mod study;
 mod when;
 pub mod wording;
 
@@ -57,4 +58,5 @@ pub use quirks::{INCREMENTS_PER_TURN, QuirkConfig, QuirkKindConfig};
 pub use requirements::{During, ExpectConfig, ExpectedVerdict, RequirementConfig, Statistic, TimeWindow};
 pub use scenario::{RATES_HZ, Scenario};
 pub use stimuli::{Shape, StimulusConfig};
+pub use study::StudyConfig;
 pub use when::{EntryNames, Start, When};

@@ -19,7 +19,7 @@ use super::{
     AxisScale, CanConfig, ChecksConfig, ControllerConfig, DriveProfile, DrivesConfig, DryConfig,
     DynamicsConfig, ExpectConfig, FaultConfig, FoodConfig, ForceControlConfig, ForceEstimateConfig,
     ForceSource, JawConfig, LoadCellConfig, MotionConfig, RealtimeConfig, RecordingConfig, RequirementConfig,
-    StimulusConfig, TeethConfig, ToothConfig, TrajectoryLimitsConfig, dynamics,
+    StimulusConfig, StudyConfig, TeethConfig, ToothConfig, TrajectoryLimitsConfig, dynamics,
 };
 use crate::input::{excerpt, read_text};
 use crate::wording::nearest;
@@ -113,6 +113,8 @@ section! {
         pub require: Vec<RequirementConfig> = Vec::new(),
         /// The expected outcome; that every check passes when absent.
         pub expect: Option<ExpectConfig> = None,
+        /// The run's place in a study, and the choice of its jaw cycles.
+        pub study: Option<StudyConfig> = None,
     }
 }
 
@@ -251,6 +253,7 @@ impl Scenario {
                 force_estimate: Some(ForceEstimateConfig::default()),
                 force_control: Some(ForceControlConfig::default()),
                 expect: Some(ExpectConfig::default()),
+                study: Some(StudyConfig::default()),
                 ..Self::default()
             };
             unnamed(&every_table).unwrap_or_else(|| malformed::<Self>(path, text, Some(&document), &error))
@@ -374,6 +377,7 @@ impl Scenario {
         named("name", &self.name)?;
         self.tags.iter().try_for_each(|tag| named("tags", tag))?;
         self.matrix.cases()?;
+        self.study.as_ref().map_or(Ok(()), StudyConfig::validate)?;
         self.check_ranges(require_range)
     }
 

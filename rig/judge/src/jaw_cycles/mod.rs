@@ -1,121 +1,206 @@
-//! Cycles of the jaw, found in the path of the incisal point, with their figures: in one pass and in memory of a fixed size.
+//! Cycles of the jaw, found in the path of the incisal point while the motion plays, with their kinds and figures, in one pass.
+//! It keeps the figures of each cycle, and of the path no more than one cycle.
 //!
 //! [docs/jaw-cycles.md](../../../../docs/jaw-cycles.md) states the definition and its sources. Which motion was played does not
 //! matter, nor do its rows: a robot's estimated path is cut like a true one.
 
+mod cycle;
 mod segments;
 
-use masseter_model::geometry::{Pose, Vec3};
+use std::collections::BTreeMap;
+
+use masseter_controller::trajectory::closed_pose;
+use masseter_model::geometry::{Mechanism, Pose, Vec3};
+use masseter_scenario::{Scenario, StudyConfig};
 use serde::Serialize;
 
-use self::segments::{Cycle, Sample, Segments};
+use self::cycle::Sample;
+use self::segments::{Cycle, Segments};
+use crate::statistic::Statistic;
 
-pub use segments::{COURSE_POINTS, CoursePoint, JawCycle};
+pub(crate) use cycle::MotionSpeed;
+pub use cycle::{
+    COURSE_POINTS, Course, CoursePoint, CycleQuantity, JawCycle, JawCycleKind, JawSide, LeftOut, QUANTITIES,
+    mean_course,
+};
 
 /// Time between samples, ns.
 const SAMPLE_NS: u64 = 4_000_000;
-/// Cycles that are kept one by one, and those with their course. Statistics count all.
+/// Cycles in the list, and courses of a group. Statistics count all.
 const MOST_CYCLES: usize = 512;
 const MOST_COURSES: usize = 64;
+/// Steps of the border, mm, and their number: wider than any mouth opens.
+const BORDER_STEP_MM: f64 = 1.0;
+const BORDER_STEPS: usize = 80;
 
 /// The cycles of a run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct JawCycleFigures {
     /// Cycles found.
     pub count: u64,
-    /// Durations, s.
-    pub duration_s: Statistic,
-    /// Durations of the openings, s.
-    pub opening_s: Statistic,
-    /// Durations of the closings, s.
-    pub closing_s: Statistic,
-    /// How far the incisal point goes down, mm.
-    pub opening_mm: Statistic,
-    /// Lateral widths, mm.
-    pub lateral_mm: Statistic,
-    /// Greatest velocities downwards, mm/s.
-    pub opening_mm_s: Statistic,
-    /// Greatest velocities upwards, mm/s.
-    pub closing_mm_s: Statistic,
-    /// Greatest forces, N; without a value where the jaws cannot touch, and on the robot.
-    pub force_n: Statistic,
+    /// Those that do not count: ramps of the rig, and the choice in `[study]`.
+    pub left_out: u64,
+    /// Those of the others whose kind is unclear: no group has them.
+    pub unclear: u64,
+    /// How far below its closed place the incisal point stays at the most closed place, mm; none without a motion.
+    pub most_closed_mm: Option<f64>,
+    /// Cycles that count, by kind and side.
+    pub groups: Vec<JawCycleGroup>,
     /// The first 512 cycles.
     pub cycles: Vec<JawCycle>,
-    /// The courses of the first 64 cycles that have one.
+    /// Border of the incisal point's path: what this motion reached at each opening, after Posselt.
+    pub border: Vec<BorderStep>,
+}
+
+/// Cycles of one kind and one side.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct JawCycleGroup {
+    /// Kind and side in words: `chew left`.
+    pub name: String,
+    /// Their kind.
+    pub kind: JawCycleKind,
+    /// Their side.
+    pub side: Option<JawSide>,
+    /// Cycles.
+    pub count: u64,
+    /// Their quantities, those with a value.
+    pub quantities: Vec<Quantity>,
+    /// The courses of the first 64, each with the number of its cycle.
     #[serde(skip)]
-    pub courses: Vec<[CoursePoint; COURSE_POINTS]>,
-    /// Mean and standard deviation of all courses; empty without one.
+    pub courses: Vec<(u64, Course)>,
+    /// Their mean and standard deviation; empty without one.
     #[serde(skip)]
     pub mean_course: Vec<[CoursePoint; 2]>,
 }
 
+/// A quantity of the cycles of a group.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Quantity {
+    /// Its key in a cycle.
+    pub name: &'static str,
+    /// What it is.
+    pub about: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Its values.
+    #[serde(flatten)]
+    pub statistic: Statistic,
+}
+
+/// Extreme places of the incisal point from its closed place while it is this far down, mm.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct BorderStep {
+    /// Middle of the step, downwards.
+    pub opening_mm: f64,
+    /// Farthest back: the least way forward.
+    pub back_mm: f64,
+    /// Farthest forward.
+    pub front_mm: f64,
+    /// Farthest to the right: the least way to the left.
+    pub right_mm: f64,
+    /// Farthest to the left.
+    pub left_mm: f64,
+}
+
+/// Place of the incisal point when the jaw is closed, base frame, m; none for a scenario without a closed pose, which no run
+/// has.
+pub fn closed_incisal_m(scenario: &Scenario) -> Option<[f64; 3]> {
+    let mechanism = Mechanism::new(&scenario.mechanism).ok()?;
+    let closed = closed_pose(&scenario.jaw, &mechanism).ok()?;
+    Some(incisal_m(&closed, scenario.jaw.reference_point_m).into())
+}
+
+fn incisal_m(platform: &Pose, in_platform_m: [f64; 3]) -> Vec3 {
+    platform.translation.vector + platform.rotation * Vec3::from(in_platform_m)
+}
+
+/// What cycles of a group share.
+type GroupKey = (JawCycleKind, Option<JawSide>);
+
 /// Collects them.
 #[derive(Debug, Clone)]
 pub(super) struct JawCycles {
-    /// The incisal point in the platform frame.
-    incisal_m: Vec3,
+    /// The incisal point in the platform frame, and its closed place.
+    incisal_m: [f64; 3],
+    closed_m: Vec3,
     has_force: bool,
+    study: StudyConfig,
     segments: Segments,
     next_ns: u64,
     /// The greatest force since the last sample, N.
     force_n: f64,
-    moments: [Moments; QUANTITIES],
-    courses: Box<[[Moments; 3]; COURSE_POINTS]>,
-    found: JawCycleFigures,
+    most_closed_mm: Option<f64>,
+    cycles: Vec<JawCycle>,
+    courses: BTreeMap<GroupKey, Vec<(u64, Course)>>,
+    /// Back, front, right and left of each step.
+    border: Vec<Option<[f64; 4]>>,
 }
 
-/// Quantities with a statistic.
-const QUANTITIES: usize = 8;
-
 impl JawCycles {
-    /// For a jaw with this incisal point in the platform frame. `has_force`: whether forces between the jaws are known.
-    pub(super) fn new(incisal_m: [f64; 3], has_force: bool) -> Self {
+    pub(super) fn new(scenario: &Scenario) -> Self {
         Self {
-            incisal_m: incisal_m.into(),
-            has_force,
+            incisal_m: scenario.jaw.reference_point_m,
+            closed_m: closed_incisal_m(scenario).unwrap_or_default().into(),
+            has_force: scenario.has_contact(),
+            study: scenario.study.clone().unwrap_or_default(),
             segments: Segments::default(),
             next_ns: 0,
             force_n: 0.0,
-            moments: Default::default(),
-            courses: Box::new([[Moments::default(); 3]; COURSE_POINTS]),
-            found: JawCycleFigures::default(),
+            most_closed_mm: None,
+            cycles: Vec::new(),
+            courses: BTreeMap::new(),
+            border: vec![None; BORDER_STEPS],
         }
     }
 
-    /// The pose of the platform at a time since the first SYNC, with the vertical force on the jaw.
-    pub(super) fn add_pose(&mut self, since_ns: u64, pose: &Pose, force_n: f64) {
+    /// The pose of the platform at a time since the motion began, with the vertical force on the jaw.
+    pub(super) fn add_pose(&mut self, since_ns: u64, pose: &Pose, force_n: f64, speed: MotionSpeed) {
         self.force_n = self.force_n.max(force_n);
-        let place = pose.translation.vector + pose.rotation * self.incisal_m;
+        let place = incisal_m(pose, self.incisal_m) - self.closed_m;
         if since_ns < self.next_ns || !place.iter().all(|coordinate| coordinate.is_finite()) {
             return;
         }
         self.next_ns = (since_ns / SAMPLE_NS + 1) * SAMPLE_NS;
         let force_n = std::mem::take(&mut self.force_n);
-        let sample = Sample { at_s: since_ns as f64 / 1e9, place_m: place.into(), force_n };
+        let sample = Sample { at_s: since_ns as f64 / 1e9, place_m: place.into(), force_n, speed };
+        self.add_to_border(&sample);
         if let Some(cycle) = self.segments.add_sample(sample) {
             self.add_cycle(cycle);
         }
     }
 
+    fn add_to_border(&mut self, sample: &Sample) {
+        if sample.speed == MotionSpeed::Ramped || self.is_outside(sample.at_s, sample.at_s) {
+            return;
+        }
+        let [x, y, z] = sample.place_m.map(|way_m| way_m * 1e3);
+        self.most_closed_mm = Some(self.most_closed_mm.map_or(-z, |least| least.min(-z)));
+        let step = (-z / BORDER_STEP_MM).max(0.0) as usize;
+        let Some(border) = self.border.get_mut(step) else { return };
+        let [back, front, right, left] = border.unwrap_or([x, x, y, y]);
+        *border = Some([back.min(x), front.max(x), right.min(y), left.max(y)]);
+    }
+
+    fn is_outside(&self, from_s: f64, to_s: f64) -> bool {
+        self.study.window_s.is_some_and(|[begin_s, end_s]| from_s < begin_s || to_s > end_s)
+    }
+
     fn add_cycle(&mut self, Cycle { mut figures, course }: Cycle) {
+        figures.number = self.cycles.len() as u64 + 1;
         figures.force_n = figures.force_n.filter(|_| self.has_force);
-        self.found.count += 1;
-        for (moments, value) in self.moments.iter_mut().zip(quantities(&figures)) {
-            if let Some(value) = value {
-                moments.add(value);
+        let closed_s = figures.began_s + figures.opening_s + figures.hold_s + figures.closing_s;
+        if self.study.leave_out.contains(&figures.number) {
+            figures.left_out = Some(LeftOut::ByHand);
+        } else if self.is_outside(figures.began_s, closed_s) {
+            figures.left_out = Some(LeftOut::Window);
+        }
+        if let Some(course) = course.filter(|_| figures.left_out.is_none()) {
+            let courses = self.courses.entry((figures.kind, figures.side)).or_default();
+            if courses.len() < MOST_COURSES {
+                courses.push((figures.number, course));
             }
         }
-        if self.found.cycles.len() < MOST_CYCLES {
-            self.found.cycles.push(figures);
-        }
-        let Some(course) = course else { return };
-        for (moments, point) in self.courses.iter_mut().zip(&course) {
-            let values = [point.opening_mm, point.lateral_mm, point.force_n];
-            moments.iter_mut().zip(values).for_each(|(moments, value)| moments.add(value));
-        }
-        if self.found.courses.len() < MOST_COURSES {
-            self.found.courses.push(course);
-        }
+        self.cycles.push(figures);
     }
 
     /// The figures of all cycles.
@@ -123,78 +208,53 @@ impl JawCycles {
         if let Some(last) = std::mem::take(&mut self.segments).last_cycle() {
             self.add_cycle(last);
         }
-        let has_course = !self.found.courses.is_empty();
-        let [duration_s, opening_s, closing_s, opening_mm, lateral_mm, opening_mm_s, closing_mm_s, force_n] =
-            self.moments.map(Moments::statistic);
+        let counting = || self.cycles.iter().filter(|cycle| cycle.left_out.is_none());
+        let mut members: BTreeMap<_, Vec<&JawCycle>> = BTreeMap::new();
+        for cycle in counting().filter(|cycle| cycle.kind != JawCycleKind::Unclear) {
+            members.entry((cycle.kind, cycle.side)).or_default().push(cycle);
+        }
+        let groups = members.into_iter().map(|(key, cycles)| {
+            let courses = self.courses.remove(&key).unwrap_or_default();
+            JawCycleGroup::new(key, &cycles, courses)
+        });
+        let groups = groups.collect();
+        let counted = counting().count() as u64;
+        let border = (0..).zip(&self.border).filter_map(|(step, border)| {
+            let [back_mm, front_mm, right_mm, left_mm] = (*border)?;
+            let opening_mm = (f64::from(step) + 0.5) * BORDER_STEP_MM;
+            Some(BorderStep { opening_mm, back_mm, front_mm, right_mm, left_mm })
+        });
         JawCycleFigures {
-            duration_s,
-            opening_s,
-            closing_s,
-            opening_mm,
-            lateral_mm,
-            opening_mm_s,
-            closing_mm_s,
-            force_n,
-            mean_course: if has_course { self.courses.iter().map(mean_and_sd).collect() } else { Vec::new() },
-            ..self.found
+            count: self.cycles.len() as u64,
+            left_out: self.cycles.len() as u64 - counted,
+            unclear: counting().filter(|cycle| cycle.kind == JawCycleKind::Unclear).count() as u64,
+            most_closed_mm: self.most_closed_mm,
+            groups,
+            border: border.collect(),
+            cycles: {
+                self.cycles.truncate(MOST_CYCLES);
+                self.cycles
+            },
         }
     }
 }
 
-/// In the order of the statistics.
-fn quantities(cycle: &JawCycle) -> [Option<f64>; QUANTITIES] {
-    [
-        cycle.duration_s,
-        Some(cycle.opening_s),
-        Some(cycle.closing_s),
-        Some(cycle.opening_mm),
-        Some(cycle.lateral_mm),
-        Some(cycle.opening_mm_s),
-        Some(cycle.closing_mm_s),
-        cycle.force_n,
-    ]
-}
-
-fn mean_and_sd(moments: &[Moments; 3]) -> [CoursePoint; 2] {
-    let [opening, lateral, force] = moments.map(Moments::statistic);
-    let point = |of: fn(Statistic) -> Option<f64>| CoursePoint {
-        opening_mm: of(opening).unwrap_or_default(),
-        lateral_mm: of(lateral).unwrap_or_default(),
-        force_n: of(force).unwrap_or_default(),
-    };
-    [point(|statistic| statistic.mean), point(|statistic| statistic.sd)]
-}
-
-/// Mean and standard deviation.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct Statistic {
-    /// Values.
-    pub count: u64,
-    /// Their mean; none without a value.
-    pub mean: Option<f64>,
-    /// Their standard deviation, as of a sample; none with fewer than two.
-    pub sd: Option<f64>,
-}
-
-/// Collects them (Welford 1962).
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Moments {
-    count: u64,
-    mean: f64,
-    squares: f64,
-}
-
-impl Moments {
-    pub(super) fn add(&mut self, value: f64) {
-        self.count += 1;
-        let from_mean = value - self.mean;
-        self.mean += from_mean / self.count as f64;
-        self.squares += from_mean * (value - self.mean);
-    }
-
-    fn statistic(self) -> Statistic {
-        let sd = (self.count > 1).then(|| (self.squares / (self.count - 1) as f64).sqrt());
-        Statistic { count: self.count, mean: (self.count > 0).then_some(self.mean), sd }
+impl JawCycleGroup {
+    fn new((kind, side): GroupKey, cycles: &[&JawCycle], courses: Vec<(u64, Course)>) -> Self {
+        let quantities = QUANTITIES.into_iter().map(|CycleQuantity { name, about, unit, value }| {
+            let values: Vec<f64> = cycles.iter().filter_map(|cycle| value(cycle)).collect();
+            Quantity { name, about, unit, statistic: Statistic::of(&values) }
+        });
+        let side_word = side.map_or_else(String::new, |side| format!(" {}", side.word()));
+        Self {
+            name: kind.word().to_owned() + &side_word,
+            kind,
+            side,
+            count: cycles.len() as u64,
+            quantities: quantities.filter(|quantity| quantity.statistic.count > 0).collect(),
+            mean_course: mean_course(&courses.iter().map(|(_, course)| course).collect::<Vec<_>>()),
+            courses,
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Values are SI numbers; states are their codes. A value that a cycle does not have is none, never a guess.
 
-use masseter_model::geometry::{AXES, AXIS_NAMES};
+use masseter_model::geometry::{AXES, AXIS_NAMES, Vec3};
 use masseter_runtime::messages::codes::{ControllerState, DriveRequest, DriveState, NO_DRIVE_STATE};
 use masseter_runtime::named::Declared;
 use masseter_scenario::{Scenario, Unit};
@@ -64,13 +64,34 @@ fn add_jaw(list: &mut SignalList, jaw: Jaw, has_contact: bool) {
         "Distance of the incisal point from its desired place, by forward kinematics.",
         move |of| Some(jaw.distance(JawPoint::Incisal, &estimated(of)?, &of.desired?)),
     );
-    list.add_from(
-        "jaw.opening",
-        Unit::MM,
-        "Distance of the incisal point from its place when the motion began.",
-        move |of, start| Some(jaw.distance(JawPoint::Incisal, &jaw.actual(of)?, start?)),
-    )
-    .truth_if(jaw.has_truth);
+    let ways = [
+        ("jaw.opening", "down", Vec3::new(0.0, 0.0, -1.0)),
+        ("jaw.forward", "forward", Vec3::new(1.0, 0.0, 0.0)),
+        ("jaw.left", "to the left", Vec3::new(0.0, 1.0, 0.0)),
+    ];
+    for (name, direction, along) in ways {
+        let about = format!("Way of the incisal point {direction} from the closed jaw.");
+        list.add(name, Unit::MM, about, move |of| Some(jaw.way(&jaw.actual(of)?)?.dot(&along)))
+            .truth_if(jaw.has_truth);
+    }
+    for (axis, name, direction) in
+        [(1, "pitch", "opening"), (2, "yaw", "to the left"), (0, "roll", "to the right")]
+    {
+        let about =
+            format!("Turn of the jaw from the closed jaw, {direction}: a component of the rotation vector.");
+        list.add(format!("jaw.{name}"), Unit::DEG, about, move |of| Some(jaw.turn(&jaw.actual(of)?)?[axis]))
+            .truth_if(jaw.has_truth);
+    }
+    for (axis, name, direction) in [(0, "x", "forward"), (2, "z", "up")] {
+        let about = format!(
+            "Where the hinge axis from the closed jaw meets the midsagittal plane, {direction} of the closed incisal point; none \
+             for turns below 2°."
+        );
+        list.add(format!("jaw.hinge.{name}"), Unit::MM, about, move |of| {
+            Some(jaw.hinge(&jaw.actual(of)?)?[axis])
+        })
+        .truth_if(jaw.has_truth);
+    }
     list.add_from(
         "jaw.rotation",
         Unit::DEG,

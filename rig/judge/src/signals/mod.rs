@@ -61,7 +61,7 @@ pub struct Registry {
 impl Registry {
     /// The signals of a run of this scenario whose controller declares these.
     pub fn new(scenario: &Scenario, declared: &Declared) -> Self {
-        let jaw = Jaw::new(&scenario.jaw, scenario.can.is_virtual());
+        let jaw = Jaw::new(scenario);
         Self { signals: signals(scenario, jaw, declared), jaw }
     }
 

@@ -3,9 +3,10 @@
 
 use std::fmt;
 
-use masseter_model::geometry::{Pose, Vec3};
+use masseter_controller::trajectory::closed_pose;
+use masseter_model::geometry::{Mechanism, Pose, Vec3};
 use masseter_recording::jaw_points;
-use masseter_scenario::{JawConfig, Unit};
+use masseter_scenario::{Scenario, Unit};
 use serde::Serialize;
 
 use super::timeline::CycleMessages;
@@ -139,12 +140,44 @@ pub(super) enum JawPoint {
 pub(super) struct Jaw {
     /// Its points in the platform frame, m.
     points_m: [Vec3; 3],
+    /// The platform when the jaw is closed; none for a scenario without that pose, which no run has.
+    closed: Option<Pose>,
     pub(super) has_truth: bool,
 }
 
+/// A turn below which a hinge axis is noise, rad, and the least share of the axis across the midsagittal plane.
+const LEAST_TURN_RAD: f64 = 0.035;
+const LEAST_ACROSS: f64 = 0.2;
+
 impl Jaw {
-    pub(super) fn new(jaw: &JawConfig, has_truth: bool) -> Self {
-        Self { points_m: jaw_points(jaw), has_truth }
+    pub(super) fn new(scenario: &Scenario) -> Self {
+        let closed = Mechanism::new(&scenario.mechanism).ok();
+        let closed = closed.and_then(|mechanism| closed_pose(&scenario.jaw, &mechanism).ok());
+        Self { points_m: jaw_points(&scenario.jaw), closed, has_truth: scenario.can.is_virtual() }
+    }
+
+    /// The incisal point from its closed place, base frame, m.
+    pub(super) fn way(&self, pose: &Pose) -> Option<Vec3> {
+        Some(self.place(JawPoint::Incisal, pose) - self.place(JawPoint::Incisal, &self.closed?))
+    }
+
+    /// The turn from the closed jaw: an angle, rad, along its axis, base frame.
+    pub(super) fn turn(&self, pose: &Pose) -> Option<Vec3> {
+        Some((pose.rotation * self.closed?.rotation.inverse()).scaled_axis())
+    }
+
+    /// Where the finite helical axis from the closed jaw meets the midsagittal plane, from the closed incisal point, m. None for
+    /// a small turn, or an axis along the plane. The formula is that of docs/jaw-cycles.md.
+    pub(super) fn hinge(&self, pose: &Pose) -> Option<Vec3> {
+        let (moved, turn) = (self.way(pose)?, self.turn(pose)?);
+        let angle = turn.norm();
+        let axis = turn / angle;
+        if angle.is_nan() || angle < LEAST_TURN_RAD || axis.y.abs() < LEAST_ACROSS {
+            return None;
+        }
+        let across = moved - axis * axis.dot(&moved);
+        let point = 0.5 * (across + axis.cross(&across) / (angle / 2.0).tan());
+        Some(point - axis * (point.y / axis.y))
     }
 
     /// The pose that the jaw has: the true one where the mechanism is emulated, otherwise the estimated one.

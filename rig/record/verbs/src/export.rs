@@ -1,5 +1,5 @@
 //! `masseter export`: a recording as tables with a codebook, and its CAN frames as candump logs. Each topic has a
-//! table; one more has the named signals of each cycle.
+//! table; one more has the named signals of each cycle, another the cycles of the jaw.
 //!
 //! Everything comes from the recording alone: a run folder is not needed. The recording is read twice, first for its gaps and
 //! the start of its motion. Rows are written in groups, so that its length does not matter for the memory.
@@ -10,8 +10,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
 use clap::{Args, ValueEnum};
+use masseter_judge::Analysis;
 use masseter_recording::{Columns, Description, Field, Reader, Recorded, Topic, new_folder};
-use masseter_report::CandumpLogs;
+use masseter_report::{CandumpLogs, JawCyclesOf, jaw_cycle_table};
 use masseter_runtime::messages::tap;
 use masseter_runtime::named::{Declared, Parameter, Signal};
 use masseter_scenario::Scenario;
@@ -24,6 +25,8 @@ use crate::survey::Survey;
 use crate::tables::{CYCLES, CycleTable, TopicTable};
 use crate::verbs::RecordingArgs;
 
+/// The name of the table of jaw cycles.
+const JAW_CYCLES: &str = "jaw_cycles";
 /// The name of the codebook's file.
 const CODEBOOK: &str = "codebook.csv";
 
@@ -41,14 +44,14 @@ pub struct ExportArgs {
     /// Folder for the files; must not exist [default: beside the recording, with the ending .tables]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Table to write: cycles, or a topic; may be repeated [default: all with rows]
+    /// Table to write: cycles, jaw_cycles, or a topic; may be repeated [default: all with rows]
     #[arg(long = "table", value_name = "NAME")]
     tables: Vec<String>,
 }
 
 /// The format of the tables.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-enum FileFormat {
+pub enum FileFormat {
     /// Apache Parquet: types, units in the metadata, a fifth of the bytes
     #[default]
     Parquet,
@@ -57,8 +60,11 @@ enum FileFormat {
 }
 
 impl FileFormat {
-    /// A missing program is an error before any work is done.
-    fn of_tables(self) -> anyhow::Result<Format> {
+    /// The format of the table writer. A missing program is an error before any work is done.
+    ///
+    /// # Errors
+    /// When the program that writes Parquet is missing.
+    pub fn of_tables(self) -> anyhow::Result<Format> {
         match self {
             Self::Parquet => {
                 let program = ParquetProgram::beside_this_one();
@@ -122,6 +128,13 @@ impl Export<'_> {
             }
             None => None,
         };
+        let mut jaw = match selection.jaw {
+            Some((scenario, declared)) => {
+                let file = TableFile::create(self.out, JAW_CYCLES, &self.format, jaw_cycle_table([]))?;
+                Some((Analysis::new(&beside(scenario, recording), &declared), file))
+            }
+            None => None,
+        };
         let mut candump = topics.contains_key(&Topic::Frame).then(|| CandumpLogs::new(self.out, &[]));
         let mut reader = Reader::open(recording)?;
         while let Some(entry) = reader.next_entry()? {
@@ -133,6 +146,9 @@ impl Export<'_> {
                 if let Some((table, file)) = &mut cycles {
                     table.completed_row(&message).map_or(Ok(()), |row| file.push_row(row))?;
                 }
+                if let Some((analysis, _)) = &mut jaw {
+                    analysis.take(&message)?;
+                }
                 if let (Some(logs), Recorded::Frame(frame)) = (&mut candump, &message) {
                     logs.write(tap::bus_of(frame)?, &tap::decode(frame)?)?;
                 }
@@ -143,6 +159,13 @@ impl Export<'_> {
             while let Some(row) = table.last_row() {
                 file.push_row(row)?;
             }
+            files.push(file);
+        }
+        if let Some((analysis, mut file)) = jaw {
+            let (person, condition) = selection.study;
+            let of = JawCyclesOf { person: &person, condition: &condition, recording: 1 };
+            let cycles = analysis.finish(false, &[]).jaw_cycles.cycles;
+            file.group = jaw_cycle_table([(of, &cycles[..])]);
             files.push(file);
         }
         files.extend(topics.into_values().map(|(_, file)| file));
@@ -225,6 +248,10 @@ struct Selection {
     topics: BTreeMap<Topic, Columns>,
     /// What the signals of the table of cycles come from; `None` if it is not selected.
     cycles: Option<(Scenario, Declared)>,
+    /// The run of the table of jaw cycles; none where it is not selected.
+    jaw: Option<(Scenario, Declared)>,
+    /// Pseudonyms of person and session.
+    study: (String, String),
 }
 
 impl Selection {
@@ -236,8 +263,9 @@ impl Selection {
         topics.retain(|topic, _| has_rows.contains(&topic.name()));
         let has_scenario = reader.attachments().iter().any(|file| file.name == SCENARIO);
         let known: Vec<_> = has_scenario
-            .then_some(CYCLES)
+            .then_some([CYCLES, JAW_CYCLES])
             .into_iter()
+            .flatten()
             .chain(topics.keys().map(|topic| topic.name()))
             .collect();
         if let Some(unknown) = requested.iter().find(|name| !known.contains(&name.as_str())) {
@@ -252,8 +280,21 @@ impl Selection {
             |name: &str| requested.is_empty() || requested.iter().any(|requested| requested == name);
         topics.retain(|topic, _| is_selected(topic.name()));
         let cycles = (has_scenario && is_selected(CYCLES)).then(|| run_of(reader)).transpose()?;
-        Ok(Self { topics, cycles })
+        let jaw = (has_scenario && is_selected(JAW_CYCLES)).then(|| run_of(reader)).transpose()?;
+        let study = jaw.as_ref().and_then(|(scenario, _)| scenario.study.clone()).unwrap_or_default();
+        Ok(Self { topics, cycles, jaw, study: (study.patient, study.session) })
     }
+}
+
+/// The scenario with the files that a run's folder holds beside its recording.
+fn beside(mut scenario: Scenario, recording: &Path) -> Scenario {
+    for (name, file) in scenario.files_mut() {
+        let copy = recording.with_file_name(name);
+        if copy.exists() {
+            *file = copy;
+        }
+    }
+    scenario
 }
 
 /// The run's scenario and what its controller declared, by the recording.

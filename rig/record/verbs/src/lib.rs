@@ -7,5 +7,5 @@ mod survey;
 mod tables;
 mod verbs;
 
-pub use export::{ExportArgs, export};
+pub use export::{ExportArgs, FileFormat, export};
 pub use verbs::{RecordingArgs, RecordingVerb, execute};

@@ -205,6 +205,11 @@ fn apply_overrides(overrides: &Overrides, scenario: &mut Scenario) -> anyhow::Re
     for assignment in &overrides.set {
         *scenario = scenario.with(assignment).context("--set")?;
     }
+    if let MotionConfig::File(file) = &scenario.motion
+        && scenario.name == Scenario::default().name
+    {
+        scenario.name = name_of_file(&file.path);
+    }
     for (_, file) in scenario.files_mut() {
         *file = absolute(file)?;
     }
@@ -251,8 +256,13 @@ fn play_file(path: &Path, scenario: &mut Scenario) {
         MotionConfig::File(file) => path.clone_into(&mut file.path),
         motion => *motion = MotionConfig::File(FileConfig::new(path)),
     }
+    scenario.name = name_of_file(path);
+}
+
+/// The name of a run that plays a file.
+fn name_of_file(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    scenario.name = stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(64).collect();
+    stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(64).collect()
 }
 
 /// The absolute path, for readers of the manifest in other folders.

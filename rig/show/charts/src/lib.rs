@@ -122,6 +122,10 @@ pub fn extent(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
 pub enum Look {
     /// Joined.
     Line,
+    /// Joined by a thin line: one of many.
+    Hair,
+    /// The border of a pale area.
+    Area,
     /// One by one.
     Dots,
 }
@@ -154,17 +158,37 @@ pub struct Chart {
     pub series: Vec<Series>,
 }
 
+/// Width of a printed column, 85 mm, px: letters of 12 px then have 7 pt, lines of 2 px 0.4 mm.
+pub const PRINT_COLUMN: f64 = 412.0;
+const PX_PER_MM: f64 = PRINT_COLUMN / 85.0;
+
 /// Charts on white, in a drawing of this width and height, px.
 #[must_use]
-pub fn drawing([width, height]: [f64; 2], charts: &[Chart]) -> String {
+pub fn drawing(size: [f64; 2], charts: &[Chart]) -> String {
+    sized(size, size.map(|px| px.to_string()), charts)
+}
+
+/// The same with a size in mm, for print: [`PRINT_COLUMN`] is 85 mm.
+#[must_use]
+pub fn printed(size: [f64; 2], charts: &[Chart]) -> String {
+    sized(size, size.map(|px| format!("{:.4}mm", px / PX_PER_MM).replace(".0000", "")), charts)
+}
+
+fn sized([width, height]: [f64; 2], [shown_width, shown_height]: [String; 2], charts: &[Chart]) -> String {
     let charts: String = charts.iter().map(Chart::svg).collect();
     format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" \
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{shown_width}\" height=\"{shown_height}\" \
          font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n{charts}</svg>\n"
     )
 }
 
 impl Chart {
+    /// Width and height of the plot in a frame of this width and height, px.
+    #[must_use]
+    pub fn plot_size([width, height]: [f64; 2]) -> [f64; 2] {
+        [width - ROOM[0] - ROOM[2], height - ROOM[1] - ROOM[3]]
+    }
+
     fn svg(&self) -> String {
         let [left, top, width, height] = self.frame;
         let (right, bottom) = (left + width - ROOM[2], top + height - ROOM[3]);
@@ -182,7 +206,8 @@ impl Chart {
         }
         svg += &text([f64::midpoint(left, right), bottom + 36.0], "middle", &self.x.label);
         svg += &text([left, top - 8.0], "start", &format!("{}  {}", self.y.label, self.title));
-        let names = self.series.iter().map(|Series { name, colour, .. }| {
+        let named = self.series.iter().filter(|series| !series.name.is_empty());
+        let names = named.map(|Series { name, colour, .. }| {
             format!("<tspan fill=\"{colour}\">\u{2003}{}</tspan>", escaped(name))
         });
         let _ = writeln!(
@@ -194,15 +219,15 @@ impl Chart {
         for Series { colour, look, points, .. } in &self.series {
             let points = points.iter().map(|&(across, up)| (x(across), y(up)));
             let points = points.filter(|(x, y)| x.is_finite() && y.is_finite());
+            let mut shape = |element: &str, attributes: &str| {
+                let points: Vec<_> = points.clone().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
+                writeln!(svg, "<{element} points=\"{}\" {attributes}/>", points.join(" "))
+            };
+            let line = |width: &str| format!("fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\"");
             let _ = match look {
-                Look::Line => {
-                    let points: Vec<_> = points.map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
-                    let points = points.join(" ");
-                    writeln!(
-                        svg,
-                        "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>"
-                    )
-                }
+                Look::Line => shape("polyline", &line("2")),
+                Look::Hair => shape("polyline", &line("0.8")),
+                Look::Area => shape("polygon", &format!("fill=\"{colour}\" fill-opacity=\"0.2\"")),
                 Look::Dots => points.into_iter().try_for_each(|(x, y)| {
                     writeln!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{DOT}\" fill=\"{colour}\"/>")
                 }),

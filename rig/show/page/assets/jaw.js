@@ -39,12 +39,13 @@
   const span = (values) => values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
   const fileName = (text) => text.toLowerCase().replace(/[^a-z0-9]+/g, '-').replace(/^-|-$/g, '');
 
-  // A drawing as PNG, twice as large.
+  // A drawing as PNG: one in mm with 300 dots per inch, one in px twice as large.
   function savePng(name, text, [width, height]) {
+    const times = text.includes('mm" height') ? 300 / 25.4 : 2;
     const image = new Image(), address = URL.createObjectURL(new Blob([text], { type: 'image/svg+xml' }));
     image.onload = () => {
-      const canvas = element('canvas', { width: 2 * width, height: 2 * height });
-      canvas.getContext('2d').drawImage(image, 0, 0, 2 * width, 2 * height);
+      const canvas = element('canvas', { width: Math.round(times * width), height: Math.round(times * height) });
+      canvas.getContext('2d').drawImage(image, 0, 0, canvas.width, canvas.height);
       URL.revokeObjectURL(address);
       canvas.toBlob((blob) => Masseter.save(name, 'image/png', blob));
     };
@@ -52,25 +53,26 @@
   }
 
   function menu(title, svgText, csvText) {
-    const name = fileName(title), size = (text) => ['width', 'height'].map((side) => Number(new RegExp(`${side}="(\\d+)`).exec(text)[1]));
+    const name = fileName(title), size = (text) => ['width', 'height'].map((side) => Number(new RegExp(`${side}="([\\d.]+)`).exec(text)[1]));
     const entry = (words, act) => element('button', { type: 'button', onclick: () => { details.open = false; act(); } }, words);
     const details = element('details', { class: 'menu' }, element('summary', { 'aria-label': `Save ${title}`, title: 'Save this view' }, '⋯'), element('div', {},
       svgText && entry('Save as SVG', () => Masseter.save(`${name}.svg`, 'image/svg+xml', svgText())),
       svgText && entry('Save as PNG', () => { const text = svgText(); savePng(`${name}.png`, text, size(text)); }),
-      entry('Save as CSV', () => Masseter.save(`${name}.csv`, 'text/csv', csvText()))));
+      csvText && entry('Save as CSV', () => Masseter.save(`${name}.csv`, 'text/csv', csvText()))));
     details.addEventListener('focusout', (event) => { if (!details.contains(event.relatedTarget)) details.open = false; });
     return details;
   }
 
   // A drawing of curves over any two quantities: { title, across, up, isEqual, height, curves, band }. A curve is { name, xs,
   // ys, at (times, for the cursor), style, stroke }. `band` is { xs, low, high, stroke }.
-  function plane(clock, { title, across, up, isEqual, height = 240, curves, band = null, isPlaced = false, note = '' }) {
+  function plane(clock, { title, across, up, isEqual, height = 240, curves, band = null, isPlaced = false, note = '', csv: ownCsv = null }) {
     const drawing = svg('svg', { role: 'img', 'aria-label': `${title}: ${curves.map(({ name }) => name).filter(Boolean).join(', ')}. ${across} to the right, ${up} upwards.` });
     const named = curves.filter(({ name }) => name);
     const key = ({ name, style, stroke }) => element('span', {}, svg('svg', { width: 24, height: 10, 'aria-hidden': 'true', style: 'width:24px' },
       style === 'dots' ? svg('circle', { cx: 12, cy: 5, r: 3, style: `fill:${stroke}` }) : svg('path', { d: 'M1 5h22', class: `curve ${style}`, style: `--c:${stroke}` })), name);
-    const csv = () => [['curve', 'run time, s', across, up].map((text) => `"${text}"`).join(','), ...curves.flatMap((curve) =>
-      curve.xs.map((x, at) => [`"${curve.name || title}"`, curve.at ? curve.at[at].toFixed(4) : '', x.toFixed(4), curve.ys[at].toFixed(4)].join(',')))].join('\n') + '\n';
+    const zero = clock.time.motion_s || 0;
+    const csv = ownCsv || (() => [['curve', 'time since the motion began, s', across, up].map((text) => `"${text}"`).join(','), ...curves.flatMap((curve) =>
+      curve.xs.map((x, at) => [`"${curve.name || title}"`, curve.at ? (curve.at[at] - zero).toFixed(4) : '', x.toFixed(4), curve.ys[at].toFixed(4)].join(',')))].join('\n') + '\n');
     const figure = element('figure', { class: 'plane' }, element('figcaption', {}, element('h3', {}, title),
       menu(title, () => Masseter.svgText({ drawing, label: title, series: named.map((curve) => ({ ...curve, isShown: true })) }), csv)),
       element('p', { class: 'keys' }, ...named.map(key)), drawing, note ? element('p', { class: 'beyond' }, note) : null);
@@ -175,36 +177,61 @@
         element('tbody', {}, ...rows.map((row) => element('tr', {}, ...row.map(cell)))))));
   }
 
+  const DECIMALS = { s: 3, mm: 2, 'mm/s': 1, N: 1 };
+  const counted = (count, noun) => `${count} ${noun}${count === 1 ? '' : 's'}`;
+  const number = (value, decimals) => (value === null || value === undefined ? '–' : Masseter.fixed(value, decimals));
+
   function cycles(holder, data, clock) {
     holder.append(element('h3', { class: 'part' }, 'Cycles'));
     if (!data.count) {
-      holder.append(element('p', {}, 'No cycle was found: the incisal point never opened by 3 mm or more and closed again.'));
+      holder.append(element('p', {}, 'No cycle was found: the incisal point never went 3 mm away from the closed jaw and came back.'));
       return;
     }
-    const number = (value, decimals) => (value === null ? '–' : Masseter.fixed(value, decimals));
-    holder.append(tableOf(`Mean ± standard deviation of ${data.count} ${data.count === 1 ? 'cycle' : 'cycles'}`, ['quantity', 'mean', 'SD', 'unit', 'cycles'],
-      data.statistics.map(({ name, unit, decimals, mean, sd, count }) => [name, number(mean, decimals), number(sd, decimals), unit, String(count)]), 'statistics of cycles'));
-    const share = data.mean.map((_, at) => 100 * at / Math.max(1, data.mean.length - 1));
-    const overlay = (title, up, part, stroke) => {
-      const single = data.courses.map((course, at) => ({ name: at ? '' : 'each cycle', style: 'raw', stroke, xs: share, ys: share.map((_, point) => course[3 * point + part]) }));
-      const mean = data.mean.map((point) => point[part]), sd = data.mean.map((point) => point[3 + part]);
-      return plane(clock, { title, across: 'share of the cycle, %', up, height: 190, curves: [...single, { name: 'mean ± SD', style: 'smoothed', stroke, xs: share, ys: mean }],
-        band: { xs: share, low: mean.map((value, at) => (part === 2 ? Math.max(0, value - sd[at]) : value - sd[at])), high: mean.map((value, at) => value + sd[at]), stroke } });
-    };
-    if (data.mean.length) {
-      holder.append(element('div', { class: 'planes' }, overlay('Opening over the cycle', 'down, mm', 0, 'var(--c0)'), overlay('Lateral path over the cycle', 'to the left, mm', 1, 'var(--c2)'),
-        data.has_force ? overlay('Bite force over the cycle', 'bite force, N', 2, 'var(--c1)') : null));
-    }
-    const head = ['cycle', 'begins', 'duration, s', 'opening, mm', 'lateral, mm', 'opening, mm/s', 'closing, mm/s', ...(data.has_force ? ['force, N'] : [])];
-    const rows = data.rows.map((row, at) => [String(at + 1), clock.text(row.began_s), number(row.duration_s, 3), number(row.opening_mm, 2), number(row.lateral_mm, 2), number(row.opening_mm_s, 1), number(row.closing_mm_s, 1),
+    const hasOcclusion = data.groups.some(({ quantities }) => quantities.some(({ name }) => name === 'occlusal_s'));
+    holder.append(element('p', {}, `${counted(data.count, 'cycle')} found; ${data.left_out} left out, ${data.unclear} of unclear kind. Only cycles of one kind and side are pooled. `
+      + (hasOcclusion || data.most_closed_mm <= 1 ? '' : `No occlusal phase: the jaw stays at least ${number(data.most_closed_mm, 1)} mm open. `) + 'masseter report RUN --set study.leave_out=[2] or --set study.window_s=[1,5] chooses cycles.'));
+    data.groups.forEach((group) => groupOf(holder, group, data.has_force, clock));
+    const { motion_s: zero } = clock.time;
+    const head = ['cycle', 'kind', 'counts', 'begins', 'duration, s', 'opening, mm', 'lateral, mm', 'forward, mm', 'opening, mm/s', 'closing, mm/s', 'hold, s', 'occlusal phase, s', ...(data.has_force ? ['force, N'] : [])];
+    const rows = data.rows.map((row) => [String(row.number), [row.kind, row.side].filter(Boolean).join(' '), row.left_out ? `no: ${row.left_out.replace('_', ' ')}` : 'yes', clock.text(row.began_s + (zero || 0)),
+      number(row.duration_s, 3), number(row.opening_mm, 2), number(row.lateral_mm, 2), number(row.forward_mm, 2), number(row.opening_mm_s, 1), number(row.closing_mm_s, 1), number(row.hold_s, 3), number(row.occlusal_s, 3),
       ...(data.has_force ? [number(row.force_n, 1)] : [])]);
     holder.append(element('details', {}, element('summary', {}, `Each of ${rows.length === data.count ? 'the' : 'the first'} ${rows.length} cycles`), tableOf('Cycles', head, rows, 'cycles')));
   }
 
-  function planes(clock, scene, path, desired) {
+  // The cycles of one kind and side: their statistics, and their courses one over the other.
+  function groupOf(holder, { name, count, quantities, mean: points, courses }, hasForce, clock) {
+    holder.append(tableOf(`${name}: ${counted(count, 'cycle')}`, ['quantity', 'mean', 'SD', 'median', 'CV, %', 'mean, 95 % from', 'to', 'unit', 'cycles'],
+      quantities.map(({ about, unit, mean, sd, median, cv, mean_low: low, mean_high: high, count: n }) => {
+        const decimals = DECIMALS[unit];
+        return [about, number(mean, decimals), number(sd, decimals), number(median, decimals), number(cv === null ? null : 100 * cv, 1), number(low, decimals), number(high, decimals), unit, String(n)];
+      }), `statistics of ${name}`));
+    if (!points.length) return;
+    const share = points.map((_, at) => 100 * at / Math.max(1, points.length - 1));
+    const overlay = (title, up, part, stroke) => {
+      const single = courses.map(([cycle, course], at) => ({ name: at ? '' : 'each cycle', cycle, style: 'raw', stroke, xs: share, ys: share.map((_, point) => course[3 * point + part]) }));
+      const mean = points.map((point) => point[part]), sd = points.map((point) => point[3 + part]);
+      const rows = share.map((at, point) => [at, mean[point], sd[point], ...single.map(({ ys }) => ys[point])].map((value) => value.toFixed(4)).join(','));
+      return plane(clock, { title: `${title}, ${name}`, across: 'share of the cycle, %', up, height: 190, curves: [...single, { name: 'mean ± SD', style: 'smoothed', stroke, xs: share, ys: mean }],
+        csv: () => `${['share of the cycle, %', `mean, ${up}`, `SD, ${up}`, ...single.map(({ cycle }) => `cycle ${cycle}, ${up}`)].map((text) => `"${text}"`).join(',')}\n${rows.join('\n')}\n`,
+        band: { xs: share, low: mean.map((value, at) => (part === 2 ? Math.max(0, value - sd[at]) : value - sd[at])), high: mean.map((value, at) => value + sd[at]), stroke } });
+    };
+    holder.append(element('div', { class: 'planes' }, overlay('Opening over the cycle', 'down, mm', 0, 'var(--c0)'), overlay('Lateral path over the cycle', 'to the left, mm', 1, 'var(--c2)'),
+      hasForce ? overlay('Bite force over the cycle', 'bite force, N', 2, 'var(--c1)') : null));
+  }
+
+  // What the motion reached at each opening, in the planes with the vertical.
+  function borderOf(border, plan) {
+    const [low, high] = plan === PLANES.sagittal ? ['back_mm', 'front_mm'] : ['right_mm', 'left_mm'];
+    if (plan === PLANES.horizontal || border.length < 2) return [];
+    const back = border.toReversed();
+    return [{ name: 'border', style: 'estimated', stroke: 'var(--jaw)', xs: [...border.map((step) => step[low]), ...back.map((step) => step[high])], ys: [...border, ...back].map((step) => -step.opening_mm) }];
+  }
+
+  function planes(clock, scene, path, desired, border) {
     const isTrue = scene.actual_name === 'true', own = isTrue ? 'var(--true)' : 'var(--estimated)', style = styleOf(scene);
     const incisal = Object.values(PLANES).map((plan) => plane(clock, { title: `Incisal point: ${plan[0].toLowerCase()}`, across: plan[1], up: plan[2], isEqual: true, isPlaced: true, curves: [
-      curve(desired, 'incisal', plan, 'desired', 'desired', 'var(--desired)'), curve(path, 'incisal', plan, scene.actual_name, style, own)] }));
+      curve(desired, 'incisal', plan, 'desired', 'desired', 'var(--desired)'), curve(path, 'incisal', plan, scene.actual_name, style, own), ...borderOf(border, plan)] }));
     const condyles = [PLANES.sagittal, PLANES.horizontal].map((plan) => plane(clock, { title: `Condyles: ${plan[0].toLowerCase()}`, across: plan[1], up: plan[2], isEqual: true, isPlaced: true, curves: [
       curve(desired, 'right', plan, '', 'desired', 'var(--desired)'), curve(desired, 'left', plan, 'desired', 'desired', 'var(--desired)'),
       curve(path, 'right', plan, 'right', style, 'var(--c1)'), curve(path, 'left', plan, 'left', style, 'var(--c3)')] }));
@@ -223,6 +250,13 @@
       chartData('Velocity of the rotation', '°/s', order.map((axis) => [parts[axis], 'plain', rates(path, ({ turn }) => turn[axis])])),
     ];
   }
+
+  // A drawing for print, shown as large as it is.
+  Masseter.block('figure', (holder, text) => {
+    const title = holder.id.replace(/\.svg$/, '');
+    const picture = element('img', { alt: title, src: `data:image/svg+xml;charset=utf-8,${encodeURIComponent(text)}` });
+    holder.append(element('figure', { class: 'chart' }, element('figcaption', { style: 'display:flex;justify-content:space-between' }, element('h3', {}, title), menu(title, () => text, null)), picture));
+  });
 
   Masseter.block('jaw', (holder, data, clock) => {
     const { scene } = Masseter;
@@ -243,7 +277,7 @@
       const lasts = path[path.length - 1].at - path[0].at;
       words.textContent = `${Masseter.fixed(lasts, 1)} s of the motion at ${Masseter.fixed((path.length - 1) / (lasts || 1), 0)} poses a second`
         + `${running.length && running[running.length - 1].to_s - path[path.length - 1].at > 0.1 ? '; the recording goes on' : ''}. Displacements count from the closed jaw. A click on a path moves the cursor there.`;
-      views.replaceChildren(...planes(clock, scene, path, desired));
+      views.replaceChildren(...planes(clock, scene, path, desired, now.border));
       const next = courses(scene, path, desired);
       charts ||= next.map((course) => Masseter.chart(drawn.appendChild(element('div', { class: 'block chart' })), course, clock));
       charts.forEach((chart, at) => chart.update(next[at]));

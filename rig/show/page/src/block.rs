@@ -90,6 +90,8 @@ pub enum Content {
     Table(Table),
     /// Curves.
     Chart(Box<Chart>),
+    /// A drawing as SVG text, whose size is in mm.
+    Figure(String),
     /// What happened when.
     Events(Events),
     /// The page's moments in words.

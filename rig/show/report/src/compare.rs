@@ -26,7 +26,7 @@ const FORM: u32 = 1;
 const LEGEND: &str = "\
 beyond spread: by more than three standard errors, estimated from the seconds of each run.
 Runs differ by more than their seconds do: repeat both in turn to be certain.
-'masseter diff A B' finds the first message in which two runs differ.
+'masseter diff A B' finds the first message in which two runs differ, 'masseter compare A B' compares the jaw's motion.
 ";
 
 /// As JSON it is what `report A B --format json` writes.
@@ -171,8 +171,9 @@ fn differences(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>) -> Ve
 
 /// A change beyond this many standard errors of the difference exceeds the spread.
 const BEYOND: f64 = 3.0;
-/// Parts of names of figures that are no results: times, places, errors of others.
-const NO_RESULTS: [&str; 6] = ["_noise_", "_at_ns", "events", "worst_cycles", "damage", ".bus"];
+/// Parts of names of figures that are no results: times, places, errors of others. Jaw cycles are those of a person, which
+/// `masseter compare` compares.
+const NO_RESULTS: [&str; 7] = ["_noise_", "_at_ns", "events", "worst_cycles", "damage", ".bus", "jaw_cycles"];
 
 /// The weight of a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

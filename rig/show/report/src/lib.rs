@@ -1,5 +1,5 @@
 //! The report of a run: table, `summary.json`, `junit.xml`, `report.html`, `events.jsonl`, histogram logs and candump
-//! logs; two runs side by side; and a suite of runs.
+//! logs; two runs side by side; a study of several persons and sessions; and a suite of runs.
 //!
 //! All of it is computed from the manifest and the recording, so `masseter report` can repeat it. Figures and verdict come
 //! from the crate `masseter-judge`; each module of this crate writes one form of them.
@@ -7,15 +7,18 @@
 pub mod compare;
 pub mod divergence;
 pub mod histogram_log;
+mod jaw_table;
 mod junit;
 mod logs;
 mod page;
 mod run_report;
+pub mod study;
 pub mod suite;
 mod suite_page;
 mod table;
 mod text;
 
+pub use jaw_table::{JawCyclesOf, jaw_cycle_table};
 pub use junit::junit_of_suite;
 pub use logs::{CandumpLogs, WriteError};
 pub use page::so_far as page_so_far;

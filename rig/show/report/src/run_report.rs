@@ -4,10 +4,11 @@ use std::fs::{self, File};
 use std::io::{self, ErrorKind};
 use std::path::Path;
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use masseter_judge::{Analysis, Figures, Judgement, Verdict};
 use masseter_recording::{Manifest, ReadError, Reader, Recorded, RunFolder};
 use masseter_runtime::messages::tap::{self, TapError};
+use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, result_with_tones, status};
 use serde::Serialize;
 
@@ -17,7 +18,7 @@ use crate::{histogram_log, junit, page};
 
 /// Why the recording of a run could not be analysed.
 #[derive(Debug, thiserror::Error)]
-enum AnalysisError {
+pub(crate) enum AnalysisError {
     #[error(transparent)]
     Read(#[from] ReadError),
     #[error("a message on topic 'frame' holds no CAN frame: {0}")]
@@ -56,23 +57,24 @@ pub fn report_run(
     Ok(judgement)
 }
 
-/// `masseter report`: the same of a past run. Where its folder is read-only, the run is shown and no file is written.
+/// `masseter report`: the same of a past run, with assignments to keys of `[study]`. Where its folder is read-only, the run is shown and no file is written.
 ///
 /// ```no_run
 /// use masseter_report::report_past_run;
 /// use masseter_terminal::Format;
 ///
-/// let exit = report_past_run("runs/latest".as_ref(), Format::Human).map_err(|failure| failure.error)?;
+/// let exit = report_past_run("runs/latest".as_ref(), &[], Format::Human).map_err(|failure| failure.error)?;
 /// println!("{exit:?}");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// # Errors
 /// With [`Exit::Usage`] when the folder holds no readable run, with [`Exit::Incomplete`] when a file cannot be written.
-pub fn report_past_run(path: &Path, format: Format) -> Result<Exit, Failure> {
+pub fn report_past_run(path: &Path, set: &[String], format: Format) -> Result<Exit, Failure> {
     let folder = RunFolder::open(path).usage()?;
     let unread = || format!("cannot read {}", folder.manifest().display());
-    let manifest = Manifest::read(&folder).with_context(unread).usage()?;
+    let mut manifest = Manifest::read(&folder).with_context(unread).usage()?;
+    choose_cycles(&mut manifest.scenario, set).usage()?;
     let (figures, logged) = analyse(&folder, &manifest).usage()?;
     let shown = Some((format, Detail::Whole));
     let (judgement, written) = show_and_write(&folder, &manifest, &figures, logged, shown, None)?;
@@ -86,13 +88,23 @@ pub fn report_past_run(path: &Path, format: Format) -> Result<Exit, Failure> {
     Ok(judgement.verdict.exit_code)
 }
 
+/// Applies assignments of `[study]`: nothing else of a run can change once it is recorded.
+fn choose_cycles(scenario: &mut Scenario, set: &[String]) -> anyhow::Result<()> {
+    for assignment in set {
+        let is_choice = assignment.trim_start().starts_with("study.");
+        ensure!(is_choice, "--set {assignment}: the run is recorded; only keys of 'study.' can be set");
+        *scenario = scenario.with(assignment).context("--set")?;
+    }
+    Ok(scenario.validate()?)
+}
+
 /// Whether the folder takes no files, as an archive does.
 fn is_read_only(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem)
 }
 
 /// Reads the recording once: its figures, and whether its CAN frames could be written as candump logs.
-fn analyse(
+pub(crate) fn analyse(
     folder: &RunFolder,
     manifest: &Manifest,
 ) -> Result<(Figures, Result<(), WriteError>), AnalysisError> {
@@ -177,7 +189,7 @@ impl Documents {
 }
 
 /// Version of the summary's form.
-pub(crate) const SUMMARY_FORM: u32 = 2;
+pub(crate) const SUMMARY_FORM: u32 = 3;
 
 #[derive(Serialize)]
 struct Summary<'a> {

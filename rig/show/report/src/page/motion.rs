@@ -6,10 +6,10 @@ use std::ops::Range;
 
 use masseter_controller::trajectory::closed_pose;
 use masseter_judge::{
-    CoursePoint, Curve, Figures, JawCycleFigures, PoseSource, Statistic, ToothFigures, ToothLoads,
-    TrackingSample,
+    BorderStep, Course, CoursePoint, Curve, Figures, JawCycle, JawCycleFigures, JawCycleGroup, PoseSource,
+    Quantity, ToothFigures, ToothLoads, TrackingSample, closed_incisal_m,
 };
-use masseter_model::geometry::{AXES, AXIS_NAMES, LEGS, Mechanism, Pose, Vec3};
+use masseter_model::geometry::{AXES, AXIS_NAMES, LEGS, Mechanism, Pose};
 use masseter_page::{Block, Chart, Content, Limit, Points, Pressure, Section, Series, Style, Tooth};
 use masseter_recording::jaw_points;
 use masseter_runtime::messages::pose_fields;
@@ -95,15 +95,6 @@ fn motion_in_words(figures: &Figures) -> String {
     let bite = figures.bite_force_max_n.map(|most_n| format!("Bite force: at most {most_n:.1} N."));
     let sentences = [format!("Platform, {}.", table::distances(tracking))];
     sentences.into_iter().chain(estimate).chain(bite).collect::<Vec<_>>().join(" ")
-}
-
-/// Place of the incisal point when the jaw is closed, base frame; none for a scenario without a closed pose, which no run
-/// has.
-fn closed_incisal_m(scenario: &Scenario) -> Option<[f64; 3]> {
-    let mechanism = Mechanism::new(&scenario.mechanism).ok()?;
-    let closed = closed_pose(&scenario.jaw, &mechanism).ok()?;
-    let incisal = Vec3::from(scenario.jaw.reference_point_m);
-    Some((closed.translation.vector + closed.rotation * incisal).into())
 }
 
 /// None where the jaws cannot touch.
@@ -215,24 +206,26 @@ const COURSE_DIGITS: f64 = 1e3;
 
 #[derive(Serialize)]
 struct Cycles<'a> {
-    statistics: Vec<Quantity>,
-    rows: &'a [masseter_judge::JawCycle],
-    /// Of each point: opening, lateral, mm, force, N, then their standard deviations.
-    mean: Vec<[f64; 6]>,
-    /// Opening, lateral and force of each point of a cycle, one after the other.
-    courses: Vec<Vec<f64>>,
-    has_force: bool,
     count: u64,
+    left_out: u64,
+    unclear: u64,
+    most_closed_mm: Option<f64>,
+    has_force: bool,
+    groups: Vec<Group<'a>>,
+    rows: &'a [JawCycle],
+    border: &'a [BorderStep],
 }
 
-/// A row of the table of statistics.
+/// Cycles of one kind and side.
 #[derive(Serialize)]
-struct Quantity {
-    name: &'static str,
-    unit: &'static str,
-    decimals: u32,
-    #[serde(flatten)]
-    statistic: Statistic,
+struct Group<'a> {
+    name: &'a str,
+    count: u64,
+    quantities: &'a [Quantity],
+    /// Of each point: opening, lateral, mm, force, N, then their standard deviations.
+    mean: Vec<[f64; 6]>,
+    /// The number of a cycle, and opening, lateral and force of each of its points, one after the other.
+    courses: Vec<(u64, Vec<f64>)>,
 }
 
 pub(super) fn jaw_section(figures: &Figures) -> Option<Section> {
@@ -241,35 +234,30 @@ pub(super) fn jaw_section(figures: &Figures) -> Option<Section> {
 }
 
 fn cycles(found: &JawCycleFigures) -> Cycles<'_> {
-    let rounded = |value: f64| (value * COURSE_DIGITS).round() / COURSE_DIGITS;
-    let values = |point: &CoursePoint| [point.opening_mm, point.lateral_mm, point.force_n].map(rounded);
-    let mean_and_sd = |[mean, sd]: &[CoursePoint; 2]| {
-        let ([a, b, c], [d, e, f]) = (values(mean), values(sd));
-        [a, b, c, d, e, f]
-    };
-    Cycles {
-        statistics: statistics(found),
-        rows: &found.cycles,
-        mean: found.mean_course.iter().map(mean_and_sd).collect(),
-        courses: found.courses.iter().map(|course| course.iter().flat_map(values).collect()).collect(),
-        has_force: found.force_n.count > 0,
-        count: found.count,
-    }
+    let JawCycleFigures { count, left_out, unclear, most_closed_mm, ref groups, ref cycles, ref border } =
+        *found;
+    let has_force = cycles.iter().any(|cycle| cycle.force_n.is_some());
+    let groups = groups.iter().map(Group::new).collect();
+    Cycles { count, left_out, unclear, most_closed_mm, has_force, groups, rows: cycles, border }
 }
 
-fn statistics(found: &JawCycleFigures) -> Vec<Quantity> {
-    let quantity = |name, unit, decimals, statistic| Quantity { name, unit, decimals, statistic };
-    let all = [
-        quantity("duration, opening to opening", "s", 3, found.duration_s),
-        quantity("duration of the opening", "s", 3, found.opening_s),
-        quantity("duration of the closing", "s", 3, found.closing_s),
-        quantity("opening", "mm", 2, found.opening_mm),
-        quantity("lateral width", "mm", 2, found.lateral_mm),
-        quantity("peak opening velocity", "mm/s", 1, found.opening_mm_s),
-        quantity("peak closing velocity", "mm/s", 1, found.closing_mm_s),
-        quantity("peak bite force", "N", 1, found.force_n),
-    ];
-    all.into_iter().filter(|quantity| quantity.statistic.count > 0).collect()
+impl<'a> Group<'a> {
+    fn new(of: &'a JawCycleGroup) -> Self {
+        let rounded = |value: f64| (value * COURSE_DIGITS).round() / COURSE_DIGITS;
+        let values = |point: &CoursePoint| [point.opening_mm, point.lateral_mm, point.force_n].map(rounded);
+        let mean_and_sd = |[mean, sd]: &[CoursePoint; 2]| {
+            let ([a, b, c], [d, e, f]) = (values(mean), values(sd));
+            [a, b, c, d, e, f]
+        };
+        let course = |(number, course): &(u64, Course)| (*number, course.iter().flat_map(values).collect());
+        Self {
+            name: &of.name,
+            count: of.count,
+            quantities: &of.quantities,
+            mean: of.mean_course.iter().map(mean_and_sd).collect(),
+            courses: of.courses.iter().map(course).collect(),
+        }
+    }
 }
 
 /// Three axes of one kind.

@@ -13,14 +13,26 @@ mod animation {
 }
 
 mod jaw {
+    use masseter_judge::{COURSE_POINTS, JawCycleKind};
+
     use super::*;
 
     #[test]
-    fn quantities_without_a_value_have_no_row() {
-        let one = Statistic { count: 1, mean: Some(18.0), sd: None };
-        let found = JawCycleFigures { count: 1, opening_mm: one, ..JawCycleFigures::default() };
+    fn a_course_has_the_number_of_its_cycle() {
+        let point = CoursePoint { opening_mm: 18.000_04, lateral_mm: 2.0, force_n: 0.0 };
+        let group = JawCycleGroup {
+            name: "chew left".to_owned(),
+            kind: JawCycleKind::Chew,
+            side: None,
+            count: 1,
+            quantities: Vec::new(),
+            courses: vec![(7, [point; COURSE_POINTS])],
+            mean_course: vec![[point; 2]],
+        };
+        let found = JawCycleFigures { count: 1, groups: vec![group], ..JawCycleFigures::default() };
         let cycles = cycles(&found);
-        let names: Vec<_> = cycles.statistics.iter().map(|quantity| quantity.name).collect();
-        assert_eq!((names, cycles.has_force), (vec!["opening"], false));
+        let [group] = &cycles.groups[..] else { panic!("one group") };
+        assert_eq!((group.courses[0].0, &group.courses[0].1[..3]), (7, &[18.0, 2.0, 0.0][..]));
+        assert_eq!((group.mean[0], cycles.has_force), ([18.0, 2.0, 0.0, 18.0, 2.0, 0.0], false));
     }
 }

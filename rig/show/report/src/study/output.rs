@@ -1,0 +1,256 @@
+//! What `masseter compare` writes: tables, figures with their caption, and a page with all of it.
+
+use std::fs::{self, File};
+use std::path::Path;
+
+use anyhow::Context;
+use masseter_judge::{COURSE_POINTS, Statistic};
+use masseter_page::{Block, Column, Content, Life, Page, Section, Table as PageTable, Time};
+use masseter_table::{Cell, Column as TableColumn, Format, Table, Values, write_table};
+
+use super::figures::{Figure, figures, groups};
+use super::{Difference, Study, means};
+use crate::jaw_table::{JawCyclesOf, jaw_cycle_table};
+use crate::text::{self, or_dash, significant};
+
+/// Writes tables, figures, caption and page into a folder, and returns the text for a terminal.
+///
+/// # Errors
+/// When a file cannot be written.
+pub fn write(study: &Study, folder: &Path, format: &Format) -> anyhow::Result<String> {
+    let differences = study.differences();
+    let tables = [
+        ("cycles", cycles(study)),
+        ("means", means_table(study)),
+        ("courses", courses(study)),
+        ("differences", differences_table(&differences)),
+    ];
+    for (name, table) in &tables {
+        let path = folder.join(format!("{name}.{}", format.extension()));
+        write_one(&path, format, table)?;
+    }
+    let codebook = Table::codebook(tables.iter().map(|(name, table)| (*name, table)));
+    write_one(&folder.join("codebook.csv"), &Format::Csv, &codebook)?;
+    let (figures, caption) = (figures(study), caption(study, &differences));
+    let write = |name: &str, text: &str| {
+        let path = folder.join(name);
+        fs::write(&path, text).with_context(|| path.display().to_string())
+    };
+    figures.iter().try_for_each(|figure| write(&figure.name, &figure.svg))?;
+    write("caption.txt", &caption)?;
+    write("compare.html", &page(study, &differences, figures, &caption)?)?;
+    Ok(in_words(study, &differences))
+}
+
+fn write_one(path: &Path, format: &Format, table: &Table) -> anyhow::Result<()> {
+    let written = || -> anyhow::Result<()> {
+        write_table(format, File::create_new(path)?, table)?;
+        Ok(())
+    };
+    written().with_context(|| path.display().to_string())
+}
+
+fn cycles(study: &Study) -> Table {
+    let recordings = (1..).zip(&study.recordings).map(|(recording, of)| {
+        (JawCyclesOf { person: &of.person, condition: &of.condition, recording }, &of.jaw.cycles[..])
+    });
+    jaw_cycle_table(recordings)
+}
+
+fn words(name: &str, about: &str) -> TableColumn {
+    TableColumn::new(name, "", about, Values::Words(Vec::new()))
+}
+
+fn number(name: &str, unit: &str, about: &str) -> TableColumn {
+    TableColumn::new(name, unit, about, Values::Numbers(Vec::new()))
+}
+
+fn word(text: &str) -> Cell {
+    Cell::Word(Some(text.to_owned()))
+}
+
+/// Columns of a statistic, whose unit is in a column of its own.
+fn statistic_columns(of: &str) -> [TableColumn; 7] {
+    [
+        number("n", "", &format!("Number of {of}.")),
+        number("mean", "", "Their mean, in the unit of the row."),
+        number("sd", "", "Their standard deviation, as of a sample."),
+        number("median", "", "Their median."),
+        number("cv", "", "Standard deviation by mean."),
+        number("mean_low", "", "Lower end of the 95 % confidence interval of the mean, by Student's t."),
+        number("mean_high", "", "Its upper end."),
+    ]
+}
+
+fn statistic_cells(of: &Statistic) -> [Cell; 7] {
+    let Statistic { count, mean, sd, median, cv, mean_low, mean_high } = *of;
+    [Some(count as f64), mean, sd, median, cv, mean_low, mean_high].map(Cell::Number)
+}
+
+fn recording_columns() -> [TableColumn; 4] {
+    [
+        words("patient", "Pseudonym of the person."),
+        words("session", "Session, or another condition."),
+        number("recording", "", "Number of the recording."),
+        words("group", "Kind and side of the cycles."),
+    ]
+}
+
+fn means_table(study: &Study) -> Table {
+    let quantity =
+        [words("quantity", "Key of the quantity in the table of cycles."), words("unit", "Its unit.")];
+    let columns = recording_columns().into_iter().chain(quantity).chain(statistic_columns("cycles"));
+    let mut table = Table::new(columns.collect());
+    for (recording, of) in (1..).map(f64::from).zip(&study.recordings) {
+        for (measure, statistic) in means(of) {
+            let first = [word(&of.person), word(&of.condition), Cell::Number(Some(recording))];
+            let quantity = [word(&measure.group), word(measure.name), word(measure.unit)];
+            table.push(first.into_iter().chain(quantity).chain(statistic_cells(&statistic)));
+        }
+    }
+    table
+}
+
+fn courses(study: &Study) -> Table {
+    let values = [
+        number("share_percent", "%", "Share of the cycle."),
+        number("opening_mm", "mm", "Mean way down from the most closed place."),
+        number("opening_sd_mm", "mm", "Its standard deviation over the cycles."),
+        number("lateral_mm", "mm", "Mean way to the left."),
+        number("lateral_sd_mm", "mm", "Its standard deviation over the cycles."),
+    ];
+    let mut table = Table::new(recording_columns().into_iter().chain(values).collect());
+    for (recording, of) in (1..).map(f64::from).zip(&study.recordings) {
+        for group in &of.jaw.groups {
+            for (point, [mean, sd]) in group.mean_course.iter().enumerate() {
+                let first =
+                    [word(&of.person), word(&of.condition), Cell::Number(Some(recording)), word(&group.name)];
+                let share = 100.0 * point as f64 / (COURSE_POINTS - 1) as f64;
+                let values = [share, mean.opening_mm, sd.opening_mm, mean.lateral_mm, sd.lateral_mm];
+                table.push(first.into_iter().chain(values.map(|value| Cell::Number(Some(value)))));
+            }
+        }
+    }
+    table
+}
+
+fn differences_table(differences: &[Difference]) -> Table {
+    let first = [
+        words("group", "Kind and side of the cycles."),
+        words("quantity", "Key of the quantity in the table of cycles."),
+        words("unit", "Its unit."),
+        words("from", "Condition before."),
+        words("to", "Condition after."),
+    ];
+    let columns = first.into_iter().chain(statistic_columns("persons with both conditions"));
+    let effect =
+        number("hedges_g", "", "Paired effect size: mean by standard deviation, corrected for few pairs.");
+    let mut table = Table::new(columns.chain([effect]).collect());
+    for Difference { measure, from, to, statistic, effect } in differences {
+        let first = [&measure.group, measure.name, measure.unit, from, to].map(word);
+        table.push(first.into_iter().chain(statistic_cells(statistic)).chain([Cell::Number(*effect)]));
+    }
+    table
+}
+
+/// Method and numbers, for below the figures.
+fn caption(study: &Study, differences: &[Difference]) -> String {
+    let conditions = study.conditions().into_iter().map(|condition| {
+        let of: Vec<_> = study.recordings.iter().filter(|recorded| recorded.condition == condition).collect();
+        let mut persons: Vec<_> = of.iter().map(|recorded| &recorded.person).collect();
+        persons.sort();
+        persons.dedup();
+        let cycles: u64 =
+            of.iter().map(|recorded| recorded.jaw.count - recorded.jaw.left_out - recorded.jaw.unclear).sum();
+        format!("{condition}: {} persons, {} recordings, {cycles} cycles", persons.len(), of.len())
+    });
+    let conditions = conditions.collect::<Vec<_>>().join("; ");
+    let pose =
+        if study.recordings.iter().all(|recorded| recorded.is_true) { "true" } else { "true or estimated" };
+    let pairs = differences.iter().map(|difference| difference.statistic.count).max().unwrap_or_default();
+    let tested = if pairs > 1 {
+        format!(
+            " Differences are paired within persons ({pairs} pairs at most): mean of the persons' differences, 95 % confidence \
+             interval by Student's t, effect size Hedges' g of paired values. No correction for several quantities."
+        )
+    } else {
+        " There are no two persons with two conditions: no difference has an interval.".to_owned()
+    };
+    format!(
+        "Movement of the incisal point from the closed jaw, by the {pose} pose of the jaw that the rig played. n = {conditions}. \
+         Cycles are cut, named and scaled to their duration as docs/jaw-cycles.md of Masseter states; the rig's ramps are left \
+         out, and cycles are pooled within a kind and a side only. Curves: mean ± SD of the recordings' mean courses; of a single recording, of \
+         its cycles.{tested}\n"
+    )
+}
+
+fn interval(of: &Statistic) -> String {
+    let ends = of.mean_low.zip(of.mean_high);
+    or_dash(ends, |(low, high)| format!("{} to {}", significant(low), significant(high)))
+}
+
+fn difference_cells(Difference { measure, from, to, statistic, effect }: &Difference) -> [String; 8] {
+    [
+        measure.group.clone(),
+        format!("{}, {}", measure.about, measure.unit),
+        format!("{from} to {to}"),
+        or_dash(statistic.mean, significant),
+        interval(statistic),
+        or_dash(statistic.sd, significant),
+        or_dash(*effect, |g| format!("{g:.2}")),
+        statistic.count.to_string(),
+    ]
+}
+
+fn page(
+    study: &Study,
+    differences: &[Difference],
+    figures: Vec<Figure>,
+    caption: &str,
+) -> anyhow::Result<String> {
+    let table = |id: &str, label: &str, titles: [Vec<Column>; 2], rows: Vec<Vec<String>>| {
+        Block::table(id, PageTable::new(label, titles, rows))
+    };
+    let rows = differences.iter().map(|difference| difference_cells(difference).to_vec()).collect();
+    let titles = [
+        Column::texts(&["cycles", "quantity", "condition"]),
+        Column::numbers(&["difference", "95 % interval", "SD", "Hedges' g", "pairs"]),
+    ];
+    let mut first = vec![Block::text("caption", caption)];
+    first.push(table("differences", "Differences within persons", titles, rows));
+    let recordings = study.recordings.iter().map(|of| {
+        let open = or_dash(of.jaw.most_closed_mm, |open_mm| format!("{:.1}", open_mm.max(0.0)));
+        let kinds = of.jaw.groups.iter().map(|group| format!("{} {}", group.count, group.name));
+        let kinds = kinds.collect::<Vec<_>>().join(", ");
+        let counts = [of.jaw.left_out, of.jaw.unclear].map(|count| count.to_string());
+        [&of.person, &of.condition, &of.verdict, &kinds]
+            .map(String::clone)
+            .into_iter()
+            .chain(counts)
+            .chain([open])
+            .collect()
+    });
+    let titles = [
+        Column::texts(&["person", "condition", "rig", "cycles that count"]),
+        Column::numbers(&["left out", "unclear", "most closed, mm open"]),
+    ];
+    let recordings = table("recordings", "Recordings", titles, recordings.collect());
+    let drawn = figures.into_iter().map(|Figure { name, svg }| Block::new(name, Content::Figure(svg)));
+    let sections = vec![
+        Section::new("differences", "Differences", first),
+        Section::new("figures", "Figures", drawn.collect()),
+        Section::new("recordings", "Recordings", vec![recordings]),
+    ];
+    let about =
+        format!("{} recordings by {} and {}", study.recordings.len(), study.by.person, study.by.condition);
+    let page = Page { about, sections, ..Page::new("Jaw motion compared", Life::Finished, Time::default()) };
+    Ok(page.to_html()?)
+}
+
+/// The differences that a terminal shows, a line each.
+fn in_words(study: &Study, differences: &[Difference]) -> String {
+    let found =
+        format!("{} recordings; cycles with courses: {}\n", study.recordings.len(), groups(study).join(", "));
+    let heads = ["cycles", "quantity", "condition", "difference", "95 % interval", "SD", "g", "pairs"];
+    found + &text::table([14, 34, 20, 12, 22, 10, 7, 6], heads, differences.iter().map(difference_cells))
+}
