@@ -68,6 +68,7 @@
     for (const [id, series, points] of message.append) Masseter.append(id, series, points);
     for (const [id, data] of message.update) Masseter.update(id, data);
     for (const moment of message.mark || []) Masseter.mark(moment);
+    if (Masseter.phases.length) Masseter.phases[Masseter.phases.length - 1].to_s = message.end_s;
     Masseter.time.extend(message.end_s);
   }
 

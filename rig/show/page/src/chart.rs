@@ -70,11 +70,23 @@ impl Series {
     }
 }
 
-/// Levels that must not be passed. A level far from all curves stands in words below the chart.
+/// What a level is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LevelKind {
+    /// It must not be passed.
+    Limit,
+    /// It was found, such as the rms of a curve.
+    Found,
+}
+
+/// Levels over the whole width. A level far from all curves stands in words below the chart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Limit {
     /// What it is.
     pub name: String,
+    /// Whether it bounds or was found.
+    pub kind: LevelKind,
     /// In the chart's unit.
     pub values: Vec<f64>,
 }
@@ -95,6 +107,9 @@ pub struct Chart {
     /// Levels over the whole width.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub limits: Vec<Limit>,
+    /// Whether the stretches in which the first curve has points are shaded: they were judged.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub is_shaded: bool,
     /// Moments of this chart alone, beside those of the page.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub moments: Vec<Moment>,
@@ -120,6 +135,7 @@ impl Chart {
             scale: Scale::Linear,
             series: Vec::new(),
             limits: Vec::new(),
+            is_shaded: false,
             moments: Vec::new(),
             height: 190,
             otherwise: "No value was recorded.".to_owned(),
