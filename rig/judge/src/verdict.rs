@@ -102,8 +102,9 @@ impl Verdict {
 
     /// What to do about the machine; none where the machine disturbed nothing.
     pub fn advice(&self, manifest: &Manifest) -> Option<String> {
-        // The reason of an INVALID run contains the advice.
-        let is_missing = self.timing.word == TimingWord::Disturbed && self.exit_code != Exit::Invalid;
+        // The reason of an INVALID run contains the advice, and a run that passed needs none.
+        let is_missing = self.timing.word == TimingWord::Disturbed
+            && !matches!(self.exit_code, Exit::Invalid | Exit::Passed);
         is_missing.then(|| remedy(manifest))
     }
 
