@@ -90,6 +90,8 @@ def loads_fast(browser, path: Path) -> float:
 
 def draws_every_chart(sheet: Sheet):
     """A curve has a height in pixels, and its colour is really in the picture."""
+    sheet.get("() => document.querySelectorAll('details.block').forEach(details => { details.open = true; })")
+    sheet.frame()
     names = sheet.get("() => [...document.querySelectorAll('.block-chart')].map(block => block.id)")
     assert len(names) > 12, names
     empty = [name for name in names if not sheet.page.locator(f"#{name} svg[tabindex] path.curve[d^=M]").count()]

@@ -34,7 +34,7 @@
     const own = series.colour === undefined && OWN_COLOUR[series.style];
     const stroke = own ? `var(--${own})` : `var(--c${number % PALETTE})`;
     const isSecond = !own && number >= PALETTE;
-    return { name: series.name, style: series.style, xs, ys, step: Infinity, stroke, isSecond, isShown: true, place };
+    return { name: series.name, style: series.style, xs, ys, step: Infinity, stroke, isSecond, isShown: !series.is_hidden, place };
   }
 
   function preparedAll(data) {
@@ -192,7 +192,7 @@
     function grid() {
       const { x, y, left, right, top, bottom, window } = plot;
       const many = Math.max(3, Math.floor((right - left) / (isTime ? clock.tickRoom : 64))), few = Math.max(4, Math.floor(data.height / 27));
-      const apart = (ticks) => ticks.filter(({ value }) => x.position(value) === x.position(ticks[0].value) || x.position(value) - left > 46);
+      const apart = (ticks) => ticks.reduce((kept, tick) => (kept.length && x.position(tick.value) - x.position(kept[kept.length - 1].value) < 52 ? kept : [...kept, tick]), []);
       const across = isTime ? clock.ticks(window, many) : data.across === 'percentile' ? apart(Masseter.percentileTicks(window)) : Masseter.logTicks(window, many);
       const up = isLog ? Masseter.logTicks(y.ends, few) : Masseter.linearTicks(y.ends, few);
       const vertical = across.map(({ value, text }) => [
@@ -212,7 +212,14 @@
       return way > 0.5 * (plot.right - plot.left) * data.height / DENSE;
     }
 
+    // Buckets as stairs: each point is the end of its bucket.
+    function stairs({ xs, ys }) {
+      const { x, y, left, bottom } = plot, height = (at) => (ys[at] > 0 ? y.position(ys[at]) : bottom).toFixed(1);
+      return `M${left} ${bottom}${xs.map((to, at) => `V${height(at)}H${x.position(to).toFixed(1)}`).join('')}V${bottom}`;
+    }
+
     function curve(one) {
+      if (data.across === 'duration') return svg('path', { ...strokeOf(one), d: stairs(one) });
       const { x, y, window } = plot;
       const places = Masseter.thinned(one, window, x.position, plot.right - plot.left).filter((at) => !isLog || one.ys[at] > 0);
       if (isTime && BANDED.includes(one.style) && isDense(one, places)) return band(one, places);
@@ -351,9 +358,9 @@
       // Takes the place of the whole chart.
       update(next) {
         Object.assign(data, next);
-        const hidden = new Set(series.filter(({ isShown }) => !isShown).map(({ name }) => name));
+        const chosen = new Map(series.map(({ name, isShown }) => [name, isShown]));
         series = preparedAll(data);
-        series.forEach((one) => { one.isShown = !hidden.has(one.name); });
+        series.forEach((one) => { one.isShown = chosen.get(one.name) ?? one.isShown; });
         writeLegend();
         redraw();
       },

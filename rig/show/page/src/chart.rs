@@ -12,6 +12,8 @@ pub enum Across {
     Time,
     /// 1/(1 − quantile), by its logarithm, labelled as percentiles.
     Percentile,
+    /// Ends of buckets of durations, µs, by their logarithm: curves are stairs.
+    Duration,
 }
 
 /// How values are spaced from bottom to top.
@@ -49,6 +51,9 @@ pub struct Series {
     pub name: String,
     /// How it looks.
     pub style: Style,
+    /// Whether its name must be clicked first.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub is_hidden: bool,
     /// A place in the palette, from 0. Without one, a plain curve takes the next and the others that of their style.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub colour: Option<usize>,
@@ -60,7 +65,7 @@ impl Series {
     /// In the colour of its style.
     #[must_use]
     pub fn new(name: impl Into<String>, style: Style, points: Points) -> Self {
-        Self { name: name.into(), style, colour: None, points }
+        Self { name: name.into(), style, is_hidden: false, colour: None, points }
     }
 
     /// In a colour of the palette.

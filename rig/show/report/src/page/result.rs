@@ -15,7 +15,7 @@ use masseter_terminal::Exit;
 
 use super::stop::{chain, moments, stop, window};
 use super::times::{level, limit, plain, since_s};
-use crate::text::{microseconds, mm, or_dash};
+use crate::text::{mm, or_dash};
 
 pub(super) fn result_section(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Section {
     let mut blocks = vec![Block::new("verdict", Content::Verdict(panel(manifest, figures, verdict)))];
@@ -114,7 +114,7 @@ fn figures_in_words(manifest: &Manifest, figures: &Figures) -> Vec<[String; 2]> 
         ["incisal point from desired, most".to_owned(), mm(errors.incisal_max_mm)],
     ];
     if let Some(longest_ns) = longest {
-        all.push(["longest cycle".to_owned(), format!("{} µs", microseconds(longest_ns))]);
+        all.push(["longest cycle".to_owned(), format!("{:.0} µs", longest_ns as f64 / 1e3)]);
     }
     if let Some(most_n) = figures.bite_force_max_n.filter(|most_n| *most_n > 0.0) {
         all.push(["greatest bite force".to_owned(), format!("{most_n:.1} N")]);
@@ -286,7 +286,8 @@ fn now(manifest: &Manifest, figures: &Figures, number: u64, left_out: u64) -> Li
     let state = figures.final_state.map_or_else(|| "starting".to_owned(), |state: Code<_>| state.to_string());
     let tone = match figures.final_state {
         Some(Code::Known(ControllerState::SafeStop)) => Tone::Bad,
-        Some(Code::Known(ControllerState::Running | ControllerState::Finished)) => Tone::Good,
+        // Whether an end is good, says the verdict.
+        Some(Code::Known(ControllerState::Running)) => Tone::Good,
         _ => Tone::Plain,
     };
     let over_time = &figures.over_time;
@@ -302,7 +303,7 @@ fn now(manifest: &Manifest, figures: &Figures, number: u64, left_out: u64) -> Li
     let missed = figures.controller_skips.skipped + figures.plant_skips.skipped;
     let mut shown = vec![
         ["incisal point from desired, rms".to_owned(), mm(errors.incisal_rms_mm)],
-        ["the same, greatest".to_owned(), mm(errors.incisal_max_mm)],
+        ["incisal point from desired, most".to_owned(), mm(errors.incisal_max_mm)],
         ["cycles".to_owned(), figures.cycles.to_string()],
         ["missed".to_owned(), missed.to_string()],
     ];

@@ -32,9 +32,8 @@ pub(super) fn window(figures: &Figures) -> Option<[f64; 2]> {
 pub(super) fn moments(scenario: &Scenario, figures: &Figures) -> Vec<Moment> {
     let moment = |at_s, kind, name: &str, text| Moment { at_s, kind, name: name.to_owned(), text };
     let strike = |fault: &FaultFigures| {
-        let declared = scenario.faults.get(fault.number - 1)?;
         let name = format!("fault {}", fault.number);
-        let text = format!("{name}: {declared}");
+        let text = format!("{name}: {}", scenario.faults.get(fault.number - 1)?);
         Some(moment(since_s(figures, fault.struck_ns?), MomentKind::Fault, &name, text))
     };
     let mut moments: Vec<_> = figures.faults.iter().filter_map(strike).collect();
