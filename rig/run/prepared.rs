@@ -1,6 +1,6 @@
 //! A run with its folder: prepared, played into the folder, and reported from there.
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::path::Path;
 
 use anyhow::Context;
@@ -11,7 +11,7 @@ use masseter_recorder::live::ReportServer;
 use masseter_recording::{Ending, FullSpeed, Manifest, RunFolder};
 use masseter_report::Detail;
 use masseter_runtime::transport::{Domain, DomainLock};
-use masseter_scenario::input::read_foreign_text;
+use masseter_scenario::input::{MOST_KEPT_BYTES, read_foreign_text, read_text};
 use masseter_scenario::{FileConfig, Scenario};
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
@@ -121,7 +121,7 @@ impl PlayedRun {
         let judgement = masseter_report::report_run(&folder, &manifest, shown, reserved)?;
         let exit = judgement.verdict.exit_code;
         if let Some(server) = report_server
-            && let Ok(html) = fs::read_to_string(folder.file("report.html"))
+            && let Ok(html) = read_text(&folder.file("report.html"), MOST_KEPT_BYTES)
         {
             server.serve(&html);
         }

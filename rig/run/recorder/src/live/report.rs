@@ -10,16 +10,18 @@ use std::time::Duration;
 use masseter_runtime::clock::{self, SECOND_NS};
 use masseter_runtime::conversation::{Limits, Newcomers};
 use masseter_runtime::transport::Domain;
+use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 use serde::{Deserialize, Serialize};
 use tungstenite::http::StatusCode;
 
-use super::MAX_NEWCOMERS;
 use super::request::{self, Wish, http_answer};
 
 /// The file's name in the private folder.
 const NAME: &str = "live-page";
 /// The page asks twice, first whether the report is there. This long after a request, nobody asks again, ns.
 const QUIET_NS: u64 = 3 * SECOND_NS;
+/// Most connections at a time that have not asked.
+const MOST_NEWCOMERS: usize = 16;
 /// Longest time for which the report is served, ns.
 const SERVED_NS: u64 = 15 * SECOND_NS;
 const INTERVAL: Duration = Duration::from_millis(50);
@@ -47,11 +49,11 @@ pub struct ReportServer {
 impl ReportServer {
     /// Listens at once; none where nobody watched the end, or where the system refuses.
     pub fn take_over(domain: &Domain) -> Option<Self> {
-        let text = fs::read_to_string(domain.root().join(NAME)).ok()?;
+        let text = read_text(&domain.root().join(NAME), MOST_KEPT_BYTES).ok()?;
         let Address { address, secret } = serde_json::from_str(&text).ok()?;
         let listener = TcpListener::bind(address).ok()?;
         let newcomers =
-            Newcomers::at(listener.into(), MAX_NEWCOMERS, Limits::newcomer(request::LONGEST)).ok()?;
+            Newcomers::at(listener.into(), MOST_NEWCOMERS, Limits::newcomer(request::LONGEST)).ok()?;
         Some(Self { newcomers, secret })
     }
 
