@@ -183,13 +183,7 @@ impl OverTimeCollector {
 
     /// The points of stretches in which a reading came. Where nothing came, a silent bus is no finding.
     fn recorded(&self, load: Curve) -> Curve {
-        let read = self.late.highest(PLANT);
-        let half_s = self.late.width_s() / 2.0;
-        let has_reading = |at_s: f64| {
-            let after = read.partition_point(|(read_s, _)| *read_s < at_s - half_s);
-            read.get(after).is_some_and(|(read_s, _)| *read_s <= at_s + half_s)
-        };
-        load.into_iter().filter(|(at_s, _)| has_reading(*at_s)).collect()
+        load.into_iter().filter(|(at_s, _)| self.late.has_value(PLANT, (at_s * 1e9) as u64)).collect()
     }
 
     /// The values, with those of this many signals.
