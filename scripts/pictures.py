@@ -30,7 +30,7 @@ for (let last = document.getElementById("section-mechanism"); last !== document.
   while (last.nextElementSibling) last.nextElementSibling.remove();
 Masseter.time.seek(Masseter.time.time.motion_s + 0.55);
 </script>"""
-# The planes of the jaw's motion, and its opening over time.
+# The planes of the jaw's motion, and its rotation over time.
 CUT_JAW = """<script>
 for (let kept = document.getElementById("section-jaw"); kept !== document.body; kept = kept.parentElement)
   for (const other of [...kept.parentElement.children])

@@ -132,12 +132,28 @@ fn after_a_safe_stop_the_charts_go_on_and_show_the_fault_and_its_detection() {
     );
     assert_eq!(workspace.run_virtual(&[]).status.code(), Some(5));
     let page = data(&workspace);
-    let [fault, stop] = &page["moments"].as_array().unwrap()[..] else { panic!("{}", page["moments"]) };
-    assert_eq!((&fault["kind"], &stop["kind"]), (&"fault".into(), &"detection".into()));
+    let [fault, stop, reaction, standstill] = &page["moments"].as_array().unwrap()[..] else {
+        panic!("{}", page["moments"])
+    };
+    let kinds = [fault, stop, reaction, standstill].map(|moment| moment["kind"].as_str().unwrap());
+    assert_eq!(kinds, ["fault", "detection", "note", "note"]);
     assert_eq!(fault["text"], "fault 1: disconnect (bus 1, node 5)");
     assert!(stop["text"].as_str().unwrap().starts_with("safe stop: master, "), "{stop}");
     let [struck_s, stopped_s] = [fault, stop].map(|moment| moment["at_s"].as_f64().unwrap());
     assert!((struck_s - 2.2).abs() < 0.002 && stopped_s > struck_s, "{fault} {stop}");
+    let [reacted_s, stands_s] = [reaction, standstill].map(|moment| moment["at_s"].as_f64().unwrap());
+    assert!(stopped_s <= reacted_s && reacted_s <= stands_s && stands_s < stopped_s + 0.1, "{standstill}");
+    // The page opens around the stop, with the axis whose process data are lost.
+    let window_s = [0, 1].map(|end| page["window"][end].as_f64().unwrap() - stopped_s);
+    assert!((window_s[0] + 0.05).abs() < 1e-6 && (window_s[1] - 0.5).abs() < 1e-6, "{window_s:?}");
+    let axis = block(&page, "stop-axis");
+    assert!(axis["title"].as_str().unwrap().contains("l2"), "{}", axis["title"]);
+    let [[.., true_s], [.., reported_s]] = curves_s(axis)[..] else { panic!("{axis}") };
+    assert!(true_s > stopped_s + 0.4 && reported_s < stopped_s, "{reported_s}: a lost drive reports nothing");
+    let chain = block(&page, "moments")["rows"].as_array().unwrap();
+    assert_eq!((chain.len(), &chain[0][2], &chain[0][4]), (4, &"0.0".into(), &"0.000".into()), "{chain:?}");
+    let first = &block(&page, "checks")["rows"][0];
+    assert_eq!((&first[0], &first[1]["mark"]), (&"sequence".into(), &"FAIL".into()), "{first}");
     // The jaw is followed for as long as the axes are.
     let [jaw, legs] = ["motion-z", "legs"].map(|id| curves_s(block(&page, id)));
     assert!((jaw[1][1] - legs[0][1]).abs() < 0.01, "{jaw:?} and {legs:?}");

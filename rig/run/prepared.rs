@@ -7,10 +7,11 @@ use anyhow::Context;
 use masseter_controller::process::BuildController;
 use masseter_judge::{Analysis, Figures, Judgement};
 use masseter_plan::RunPlan;
+use masseter_recorder::live::ReportServer;
 use masseter_recording::{Ending, FullSpeed, Manifest, RunFolder};
 use masseter_report::Detail;
 use masseter_runtime::transport::{Domain, DomainLock};
-use masseter_scenario::input::read_foreign_text;
+use masseter_scenario::input::{MOST_KEPT_BYTES, read_foreign_text, read_text};
 use masseter_scenario::{FileConfig, Scenario};
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
@@ -43,6 +44,8 @@ pub(crate) struct PlayedRun {
     manifest: Manifest,
     /// The summary's room on the disk.
     reserved: File,
+    /// For those who watched.
+    report_server: Option<ReportServer>,
     /// Whether the manifest was written.
     written: Result<(), Failure>,
 }
@@ -88,7 +91,9 @@ impl PreparedRun {
         let ran = match domain {
             None => {
                 let build = request.controller.builder().expect("the clock is checked");
-                masseter_virtual_time::record(&plan, &folder, build, &mut manifest, interrupts).incomplete()
+                masseter_virtual_time::record(&plan, &folder, build, &mut manifest, interrupts)
+                    .incomplete()
+                    .map(|()| None)
             }
             Some(domain) => supervisor::run(domain, &plan, &folder, &request, &mut manifest, interrupts),
         };
@@ -97,8 +102,8 @@ impl PreparedRun {
         }
         drop(reserve.manifest);
         let written = write_manifest(&folder, &manifest);
-        ran?;
-        Ok(PlayedRun { request, folder, manifest, reserved: reserve.summary, written })
+        let report_server = ran?;
+        Ok(PlayedRun { request, folder, manifest, reserved: reserve.summary, report_server, written })
     }
 }
 
@@ -110,11 +115,16 @@ impl PlayedRun {
             status!("masseter: interrupted before the first cycle: nothing is recorded in {folder}");
             return Ok(Exit::Interrupted);
         }
-        let Self { request, folder, manifest, reserved, written } = self;
+        let Self { request, folder, manifest, reserved, report_server, written } = self;
         let detail = if request.verbose { Detail::Whole } else { Detail::Brief };
         let shown = Some((request.format, detail));
         let judgement = masseter_report::report_run(&folder, &manifest, shown, reserved)?;
         let exit = judgement.verdict.exit_code;
+        if let Some(server) = report_server
+            && let Ok(html) = read_text(&folder.file("report.html"), MOST_KEPT_BYTES)
+        {
+            server.serve(&html);
+        }
         written?;
         let Manifest { scenario, controller, motion_s, .. } = &manifest;
         let (controller, is_waived) = (controller.as_deref(), request.without_bring_up);

@@ -16,6 +16,7 @@ use std::time::Duration;
 use anyhow::Context;
 use masseter_machine::{SystemRoot, dma_latency};
 use masseter_plan::RunPlan;
+use masseter_recorder::live::ReportServer;
 use masseter_recording::{DmaLatency, Ending, Manifest, RunFolder, RunUsage};
 use masseter_runtime::clock::{self, MILLISECOND_NS, SECOND_NS};
 use masseter_runtime::lifecycle::attach::Invitation;
@@ -73,7 +74,7 @@ pub(super) fn reserve_domain(name: Option<&str>) -> Result<(Domain, DomainLock),
 }
 
 /// Runs the rig in real time or in lockstep, then releases its domain. Enters the circumstances and the ending into
-/// the manifest.
+/// the manifest. Returns the server for the report, where somebody watches.
 pub(super) fn run(
     (domain, mut claim): (Domain, DomainLock),
     plan: &RunPlan,
@@ -81,7 +82,7 @@ pub(super) fn run(
     request: &RunRequest,
     manifest: &mut Manifest,
     interrupts: &Interrupts,
-) -> Result<(), Failure> {
+) -> Result<Option<ReportServer>, Failure> {
     let mut names_left = NAMES;
     let prepared = loop {
         let prepared = Processes::prepare(plan, folder, &domain, request, interrupts);
@@ -113,13 +114,14 @@ pub(super) fn run(
         }
         None => Ok(Ending::Interrupted),
     });
+    let report_server = ReportServer::take_over(&domain);
     drop(claim);
     match domain.sweep() {
         Ok(swept) => report_remaining(&swept.unwrap_or_default()),
         Err(error) => status!("masseter: {error}; 'masseter clean' removes the rest of this run"),
     }
     manifest.ending = result?;
-    Ok(())
+    Ok(report_server)
 }
 
 fn report_remaining(swept: &Swept) {

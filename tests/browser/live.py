@@ -1,5 +1,6 @@
 """The page of a run that goes on, in a browser: it keeps up, its charts and the mechanism move, a parameter is changed, a request
-out of range is refused in words, the run is stopped, and nothing but the rig is asked.
+out of range is refused in words until a good one comes, the run is stopped, its report takes the place of the page at the same
+address, and nothing but the rig is asked.
 
 Usage: live.py MASSETER FOLDER [CHROMIUM]
 """
@@ -83,6 +84,9 @@ with sync_playwright() as playwright:
     gain.press("Tab")
     note = page.locator("#now .note")
     expect(note).to_contain_text("integral_gain_per_s")
+    gain.fill("6")
+    gain.press("Tab")
+    expect(note).to_have_text("", timeout=5_000)
 
     # A second window of a phone has the whole run so far, and fits.
     phone = browser(playwright.chromium).new_page(viewport=PHONE)
@@ -92,9 +96,14 @@ with sync_playwright() as playwright:
     first_s = phone.evaluate("JSON.parse(document.getElementById('data').textContent).time.motion_s")
     assert first_s is not None
 
-    page.get_by_role("button", name="stop the run").click()
-    expect(note).to_contain_text("over", timeout=20_000)
-    assert state.inner_text() in ("finished", "holding"), state.inner_text()
+    stop = page.locator("#now .stop")
+    asking = stop.evaluate("button => getComputedStyle(button).color")
+    stop.click()
+    assert stop.is_disabled() and stop.evaluate("button => getComputedStyle(button).color") != asking
+    # Both windows get the report, with the verdict.
+    for shown in (page, phone):
+        expect(shown.locator("#verdict")).to_contain_text("INTERRUPTED", timeout=30_000)
+        assert "stopped by the user" in shown.locator("#verdict").inner_text() and shown.url == url
     own = url.replace("http", "ws")
     assert all(each in (url,) or each.startswith(own) for each in asked), asked
     assert not said, said

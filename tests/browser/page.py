@@ -1,5 +1,6 @@
 """The page of a run in a browser, used as a hand does: it loads fast, fetches nothing, draws every chart, follows pointer, wheel,
-fingers and keys, fits a phone, prints, has a dark face, and axe finds nothing serious.
+fingers and keys, fits a phone, prints, has a dark face, and axe finds nothing serious. However a run ends, its cause is on the
+first screen, nothing is cut, and the page of a stop opens around the stop.
 
 Usage: page.py MASSETER FOLDER [CHROMIUM]
 """
@@ -30,9 +31,9 @@ PHONE = {"width": 390, "height": 844}
 DESK = {"width": 1280, "height": 900}
 
 
-def run(name: str, *arguments: str, code: int = 0) -> Path:
+def run(name: str, *arguments: str, code: int = 0, clock: str = "virtual") -> Path:
     """The page of a run in simulated time."""
-    command = [MASSETER, "run", *arguments, "--clock", "virtual", "--out", FOLDER / name]
+    command = [MASSETER, "run", *arguments, "--clock", clock, "--out", FOLDER / name]
     ended = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ended.returncode == code, ended.stdout + ended.stderr
     return FOLDER / name / "report.html"
@@ -41,7 +42,7 @@ def run(name: str, *arguments: str, code: int = 0) -> Path:
 class Sheet:
     """A page that is open in a browser of its own settings; everything that it says or asks for is kept."""
 
-    def __init__(self, browser, path: Path, **settings):
+    def __init__(self, browser, path: Path, view: str = "", **settings):
         context = browser.new_context(**{"viewport": DESK, **settings}, accept_downloads=True)
         self.page: Page = context.new_page()
         self.said, self.asked = [], []
@@ -49,7 +50,7 @@ class Sheet:
         self.page.on("pageerror", lambda error: self.said.append(str(error)))
         self.page.on("request", lambda request: self.asked.append(request.url))
         began = time.monotonic()
-        self.page.goto(path.as_uri(), wait_until="load")
+        self.page.goto(path.as_uri() + view, wait_until="load")
         self.page.wait_for_selector("html[data-ready=yes]", state="attached")
         self.loaded_s = time.monotonic() - began
 
@@ -89,6 +90,8 @@ def loads_fast(browser, path: Path) -> float:
 
 def draws_every_chart(sheet: Sheet):
     """A curve has a height in pixels, and its colour is really in the picture."""
+    sheet.get("() => document.querySelectorAll('details.block').forEach(details => { details.open = true; })")
+    sheet.frame()
     names = sheet.get("() => [...document.querySelectorAll('.block-chart')].map(block => block.id)")
     assert len(names) > 12, names
     empty = [name for name in names if not sheet.page.locator(f"#{name} svg[tabindex] path.curve[d^=M]").count()]
@@ -243,11 +246,89 @@ def plays(sheet: Sheet):
 
 def marks_the_stop(sheet: Sheet):
     marks = sheet.page.locator("#motion-z .moment line")
-    assert marks.count() == 2, marks.count()
+    assert marks.count() == 4, marks.count()
     text = sheet.page.locator("#motion-z svg[tabindex]").text_content()
     assert "fault 1" in text and "safe stop" in text, text
+    assert "reaction" in text and "standstill" in text, text
     folded = sheet.page.locator("#events details")
     assert folded.get_attribute("open") is None and folded.locator("li").count() > 20
+
+
+def is_told_first(sheet: Sheet, words: str):
+    """The cause is on the first screen, what failed is in the first row, and no table is cut."""
+    cause = sheet.page.locator("#verdict .panel").first
+    box = cause.bounding_box()
+    assert words in cause.inner_text() and box["y"] + box["height"] < 600, (words, cause.inner_text(), box)
+    marks = sheet.page.locator("#checks .mark").all_text_contents()
+    bad = [mark in ("FAIL", "lost", "UNTESTED") for mark in marks]
+    assert bad == sorted(bad, reverse=True), marks
+    for media in ("print", "screen"):
+        sheet.page.emulate_media(media=media)
+        cut = sheet.get("""() => [...document.querySelectorAll('#checks .table, #moments .table')]
+            .filter(table => table.scrollWidth > table.clientWidth + 1).length""")
+        assert cut == 0, (media, cut)
+
+
+def opens_around_the_stop(sheet: Sheet):
+    """The window is that around the stop; buttons, keys and a drag with Shift move it, and a click on a time shows what was there."""
+    page = sheet.page
+    window = lambda: [round(at, 3) for at in sheet.get("() => Masseter.time.window")]
+    stop_s, (begin, end) = sheet.get("() => Masseter.moments.find(({kind}) => kind === 'detection').at_s"), window()
+    assert abs(begin - stop_s + 0.05) < 2e-3 and abs(end - stop_s - 0.5) < 2e-3, (begin, stop_s, end)
+    for axis in ("reported", "true"):
+        assert axis in page.locator("#stop-axis .legend").inner_text()
+    assert page.locator("#moments tbody tr").count() == 4
+    page.click("#time-bar .whole")
+    assert window() == [0, round(sheet.get("() => Masseter.time.range[1]"), 3)]
+    page.click("#time-bar .moment")
+    assert window() == [begin, end]
+    box = sheet.chart("legs").bounding_box()
+    y = box["y"] + 80
+    page.keyboard.down("Shift")
+    page.mouse.move(box["x"] + 0.4 * box["width"], y)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.6 * box["width"], y, steps=4)
+    page.mouse.up()
+    page.keyboard.up("Shift")
+    panned = window()
+    assert panned[0] < begin - 0.1 and abs(panned[1] - panned[0] - end + begin) < 2e-3, (panned, begin, end)
+    sheet.chart("legs").focus()
+    page.keyboard.press(".")
+    assert window()[0] > panned[0] + 0.1, (window(), panned)
+    page.locator("#moments button").first.click()
+    assert abs(window()[0] - sheet.get("() => Masseter.moments[0].at_s") + 0.05) < 2e-3
+
+
+def names_its_view(browser, path: Path):
+    """The address opens the same window."""
+    sheet = Sheet(browser, path)
+    sheet.get("() => Masseter.time.zoom(2, 2.5)")
+    sheet.page.wait_for_function("() => location.hash.startsWith('#t=')")
+    view = sheet.get("() => location.hash")
+    sheet.close()
+    sheet = Sheet(browser, path, view)
+    assert [round(at, 3) for at in sheet.get("() => Masseter.time.window")] == [2, 2.5], view
+    sheet.close()
+
+
+def shows_what_was_judged(sheet: Sheet):
+    """A requirement on an rms shows the shaded window, the rms and the limit; a failed one comes first."""
+    text = sheet.page.locator("#section-requirements .block-chart").first.inner_text()
+    assert text.startswith("close"), text
+    drawing = sheet.chart("requirement-1")
+    sheet.frame()
+    words = drawing.text_content()
+    assert drawing.locator(".shade").count() == 1 and "rms 0.006" in words and "limit 0.002 mm" in words, words
+
+
+def draws_bands(sheet: Sheet):
+    """A motion that is too fast for the pixels is a band; zoomed in, it is a curve."""
+    sheet.chart("motion-y")
+    sheet.frame()
+    assert sheet.page.locator("#motion-y path.banded").count() == 3
+    sheet.get("() => Masseter.time.zoom(10, 12)")
+    sheet.frame()
+    sheet.page.wait_for_function("() => !document.querySelector('#motion-y path.banded')")
 
 
 def goes_on(sheet: Sheet):
@@ -362,8 +443,8 @@ def counts_the_cycles(sheet: Sheet):
 
 
 def fits_the_screen(sheet: Sheet):
-    width = sheet.get("() => document.documentElement.scrollWidth")
-    assert width <= sheet.page.viewport_size["width"], width
+    """Also after another medium, once the charts have been drawn for the screen again."""
+    sheet.page.wait_for_function("width => document.documentElement.scrollWidth <= width", arg=sheet.page.viewport_size["width"], timeout=10_000)
 
 
 def is_accessible(sheet: Sheet):
@@ -392,7 +473,16 @@ def main():
     stop = FOLDER / "stop.toml"
     FOLDER.mkdir(parents=True, exist_ok=True)
     stop.write_text("name = 'stop'\nduration_s = 4.0\n[[faults]]\nkind = 'disconnect'\nbus = 1\nnode = 5\nfrom_s = 2.2\n")
+    failing = FOLDER / "failing.toml"
+    required = "".join(f"[[require]]\nname = '{name}'\nsignal = 'incisal.error'\nduring = 'running'\n{limit}\n"
+                       for name, limit in (("near", "max = '5 mm'"), ("close", "statistic = 'rms'\nmax = '2 um'")))
+    failing.write_text("name = 'failing'\nduration_s = 3.0\n" + required)
+    halted, killed = FOLDER / "halted.toml", FOLDER / "killed.toml"
+    halted.write_text("name = 'halted'\nduration_s = 3.0\n[[stimulus]]\nat_s = 1.0\nstop = true\n")
+    killed.write_text("name = 'killed'\nduration_s = 2.0\n[[faults]]\nkind = 'controller_kill'\nat_s = 1.0\n")
     chewing, stopped = run("chewing"), run("stopped", str(stop), code=5)
+    failed, interrupted = run("failed", str(failing), code=1), run("halted", str(halted), code=130)
+    died = run("died", str(killed), code=4, clock="lockstep")
     long = run("long", "--duration", "60")
     # A run in real time has a date; a run in simulated time is the same on every machine.
     dated = FOLDER / "dated.html"
@@ -410,7 +500,9 @@ def main():
         goes_on(sheet)
         sheet.close()
         for path, settings, checks in (
-            (long, {}, [keeps_extremes]),
+            (long, {}, [keeps_extremes, draws_bands]),
+            (failed, {}, [shows_what_was_judged]),
+            (stopped, {}, [opens_around_the_stop]),
             (dated, {}, [tells_wall_time]),
             (food, {}, [bites, is_accessible]),
             (stopped, {}, [marks_the_stop, draws_every_chart, prints]),
@@ -421,6 +513,18 @@ def main():
             for check in checks:
                 check(sheet)
             sheet.close()
+        names_its_view(browser, chewing)
+        # A run of simulated time is never INVALID: the machine is no part of it.
+        invalid = FOLDER / "invalid.html"
+        invalid.write_text(interrupted.read_text().replace('"word":"INTERRUPTED"', '"word":"INVALID"'))
+        for path, words in ((failed, "close: rms of incisal.error"), (stopped, "process data missing"), (died, "SIGKILL"),
+                            (interrupted, "stopped by stimulus 1"), (invalid, "INVALID"), (long, "every check passed")):
+            dark = [{"color_scheme": "dark"}] if path == failed else []
+            for settings in ({}, {"viewport": PHONE, "is_mobile": True}, *dark):
+                sheet = Sheet(browser, path, **settings)
+                is_told_first(sheet, words)
+                fits_the_screen(sheet)
+                sheet.close()
         browser.close()
     print(f"page: 10 s load in {short:.2f} times a reference; 60 s take {size_mb:.2f} MB and load in {longest:.2f} times it")
 

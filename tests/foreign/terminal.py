@@ -1,7 +1,7 @@
 """Looks at a run on a terminal: `pyte` renders what a user sees.
 
 Fails when the progress is not rewritten in its line, when the verdict does not stand readable below it, when a line
-that is wider than the terminal wraps, or when the terminal is not left as it was: after a run, after Ctrl-C, with
+that is wider than the terminal wraps, when the verdict of a stop is not the last on a terminal of 24 lines, or when the terminal is not left as it was: after a run, after Ctrl-C, with
 --quiet and on a terminal that only prints. Fails when words are coloured against NO_COLOR or --color, or are not where
 --color asks for it.
 """
@@ -21,6 +21,7 @@ import pyte
 # Narrower than the line of the progress, and longer than everything that is said.
 COLUMNS, LINES = 80, 300
 INTERRUPTED = 130
+SAFE_STOP = 5
 LENIENT = Path(__file__).parents[1] / "lenient.toml"
 # Passed, too disturbed to judge, or incomplete because the machine starved the recorder: this judges the terminal.
 ACCEPTED = (0, 3, 6)
@@ -34,10 +35,10 @@ COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 VERDICTS = ("PASS: ", "INVALID: ", "INCOMPLETE: ", "INTERRUPTED: ")
 
 
-def run(masseter, arguments, term="xterm-256color", interrupt_after=None, clock="rt", **more):
+def run(masseter, arguments, term="xterm-256color", interrupt_after=None, clock="rt", scenario=LENIENT, **more):
     """Runs on a terminal of its own; returns exit code, output and what stands on the screen."""
     with tempfile.TemporaryDirectory() as folder:
-        command = [masseter, "run", str(LENIENT), "--clock", clock, "--out", str(Path(folder) / "run"), *arguments]
+        command = [masseter, "run", str(scenario), "--clock", clock, "--out", str(Path(folder) / "run"), *arguments]
         process, terminal = pty.fork()
         if process == 0:
             # With CI set, colours are printed on every terminal: this looks at a user's.
@@ -72,6 +73,10 @@ def assert_one_line_above_a_verdict(shown):
     assert len(verdicts) == 1 and verdicts[0] > lines[0], "\n".join(shown)
 
 
+def has_coloured_verdict(output):
+    return any(line.startswith(GREEN_OR_AMBER) for line in output.splitlines())
+
+
 signal.alarm(120)
 masseter = os.path.abspath(sys.argv[1])
 
@@ -89,7 +94,7 @@ code, output, shown = run(masseter, ["--duration", "10s"], term="dumb")
 assert code in ACCEPTED and "\x1b" not in output and PROGRESS in output, (code, output)
 
 code, output, shown = run(masseter, ["--duration", "1s", "--quiet"])
-assert code in ACCEPTED and output.startswith(GREEN_OR_AMBER) and PROGRESS not in output, output
+assert code in ACCEPTED and has_coloured_verdict(output) and PROGRESS not in output, output
 
 for arguments, environment, term, is_coloured in [
     (["--color", "never"], {}, "xterm-256color", False),
@@ -100,7 +105,19 @@ for arguments, environment, term, is_coloured in [
     code, output, shown = run(masseter, ["--duration", "1s", "--quiet", *arguments], term, clock="virtual", **environment)
     case = (arguments, environment, term, output)
     assert code in ACCEPTED and PROGRESS not in output, case
-    assert output.startswith(GREEN_OR_AMBER) if is_coloured else "\x1b" not in output, case
+    assert has_coloured_verdict(output) if is_coloured else "\x1b" not in output, case
+
+# After a stop the last screen has the verdict with its reason, once, and the times of the motion.
+with tempfile.TemporaryDirectory() as folder:
+    scenario = Path(folder) / "stop.toml"
+    scenario.write_text("duration_s = 3.0\n[[faults]]\nkind = 'jam'\naxis = 'l2'\nfrom_s = 1.8\n")
+    code, output, shown = run(masseter, ["--quiet"], clock="virtual", scenario=scenario)
+while not shown[-1]:
+    shown.pop()
+screen = "\n".join(shown[-24:])
+assert code == SAFE_STOP and shown[-1] == "timing: simulated", (code, screen)
+assert any(line.startswith("SAFE STOP: ") for line in shown[-8:]) and "FAIL sequence" in screen, screen
+assert COLOUR.sub("", output).count("following_error") == 1 and re.search(r"\n +0\.5\d\d s  controller: ", output), output
 
 # The line of the progress is rewritten without colours, too.
 code, output, shown = run(masseter, ["--duration", "2s"], NO_COLOR="1")

@@ -413,8 +413,11 @@ impl Shown {
         self.intervals.apply_reading(reading, skipped);
         self.longest_cycles.apply_reading(reading);
         self.over_time.wake_up(PLANT, reading.due_ns, reading.woke_ns);
-        if !self.has_truth && reading.drive_state.iter().all(|state| *state != NO_DRIVE_STATE) {
-            self.over_time.reported(reading);
+        let has_states = reading.drive_state.iter().all(|state| *state != NO_DRIVE_STATE);
+        match (self.has_truth, has_states) {
+            (true, _) => self.over_time.reported_beside_truth(reading),
+            (false, true) => self.over_time.reported(reading),
+            (false, false) => {}
         }
     }
 

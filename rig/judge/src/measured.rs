@@ -7,6 +7,8 @@ use serde::Serialize;
 
 /// Below this many samples the 99.9th percentile rests on fewer than ten of them and is not given.
 const SAMPLES_FOR_P999: u64 = 10_000;
+/// End of the first bucket of a plot, ns.
+const FIRST_BUCKET_NS: u64 = 10;
 /// Significant decimal digits of a histogram.
 const DIGITS: u8 = 3;
 
@@ -34,6 +36,9 @@ pub struct IntervalFigures {
     /// The distribution, for plots: 1/(1 − quantile) and value in ns.
     #[serde(skip)]
     pub curve: Vec<(f64, u64)>,
+    /// Samples in buckets of a tenth of a decade, for plots: the end of the bucket, ns, and how many.
+    #[serde(skip)]
+    pub buckets: Vec<(u64, u64)>,
     /// The samples of each second, for histogram logs.
     #[serde(skip)]
     pub seconds: Seconds,
@@ -155,6 +160,7 @@ impl Measured {
             max_ns: measured(self.max_ns),
             max_at_ns: measured(self.max_at_ns),
             curve: self.curve(),
+            buckets: self.buckets(),
             seconds: self.seconds,
         }
     }
@@ -162,6 +168,11 @@ impl Measured {
     /// A histogram gives the end of a value's bucket, which may lie beyond the largest value.
     fn quantile_ns(&self, quantile: f64) -> u64 {
         self.total.0.value_at_quantile(quantile).min(self.max_ns)
+    }
+
+    fn buckets(&self) -> Vec<(u64, u64)> {
+        let steps = self.total.0.iter_log(FIRST_BUCKET_NS, 10_f64.powf(0.1));
+        steps.map(|step| (step.value_iterated_to(), step.count_since_last_iteration())).collect()
     }
 
     /// The distribution as HdrHistogram plots it; the largest value lies where its own share ends.

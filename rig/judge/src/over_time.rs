@@ -37,6 +37,8 @@ pub struct OverTime {
     pub plant_late_ns: Curve,
     /// Position of each axis, m.
     pub position_m: [Curve; AXES],
+    /// Position that the drive of each axis reports, m; beside a true one alone.
+    pub reported_m: [Curve; AXES],
     /// Velocity of each axis, m/s.
     pub velocity_m_s: [Curve; AXES],
     /// Force of each actuator, N.
@@ -65,6 +67,7 @@ pub(super) struct OverTimeCollector {
     axes: Series<Extremes<{ BITE_FORCE + 1 }>>,
     smoothing: Smoothing<AXES>,
     smooth_force_n: Series<Extremes<AXES>>,
+    reported_m: Series<Extremes<AXES>>,
     /// Time that frames took on each bus.
     busy_ns: Vec<Series<u64>>,
     signals: Series<Extremes<MOST_VALUES>>,
@@ -146,6 +149,14 @@ impl OverTimeCollector {
         self.axes.add(since_ns, BITE_FORCE, truth.bite_force_n);
     }
 
+    /// Positions that drives report of an emulated mechanism. An axis without news has none.
+    pub(super) fn reported_beside_truth(&mut self, reading: &Reading) {
+        let since_ns = self.since(reading.sampled_ns);
+        for axis in (0..AXES).filter(|axis| reading.fresh_axes >> axis & 1 == 1) {
+            self.reported_m.add(since_ns, axis, reading.position_m[axis]);
+        }
+    }
+
     /// Positions and forces that the drives of the robot report, which has no truth.
     pub(super) fn reported(&mut self, reading: &Reading) {
         let since_ns = self.since(reading.sampled_ns);
@@ -175,6 +186,11 @@ impl OverTimeCollector {
         }
     }
 
+    /// The points of stretches in which a reading came. Where nothing came, a silent bus is no finding.
+    fn recorded(&self, load: Curve) -> Curve {
+        load.into_iter().filter(|(at_s, _)| self.late.has_value(PLANT, (at_s * 1e9) as u64)).collect()
+    }
+
     /// The values, with those of this many signals.
     pub(super) fn into_figures(self, signals: usize) -> OverTime {
         let load = |bus: &Series<u64>| {
@@ -193,11 +209,12 @@ impl OverTimeCollector {
             controller_late_ns: self.late.highest(CONTROLLER),
             plant_late_ns: self.late.highest(PLANT),
             position_m: self.axes.bands(POSITION),
+            reported_m: self.reported_m.bands(0),
             velocity_m_s: self.axes.bands(VELOCITY),
             force_n: self.axes.bands(FORCE),
             smooth_force_n: self.smooth_force_n.bands(0),
             bite_force_n: self.axes.band(BITE_FORCE),
-            bus_load: self.busy_ns.iter().map(load).collect(),
+            bus_load: self.busy_ns.iter().map(|bus| self.recorded(load(bus))).collect(),
             signals: (0..signals).map(|place| self.signals.band(place)).collect(),
         }
     }

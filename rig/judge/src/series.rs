@@ -122,6 +122,12 @@ impl<const N: usize> Series<Extremes<N>> {
         (first..).zip(values).for_each(|(index, value)| self.add(since_ns, index, *value));
     }
 
+    /// Whether the stretch of a time since the beginning has this value.
+    pub(super) fn has_value(&self, index: usize, since_ns: u64) -> bool {
+        let stretch = self.stretches.get((since_ns / self.width_ns) as usize);
+        stretch.is_some_and(|stretch| stretch.0[index].is_some())
+    }
+
     /// The bands at `first` and behind.
     pub(super) fn bands<const M: usize>(&self, first: usize) -> [Curve; M] {
         std::array::from_fn(|place| self.band(first + place))

@@ -102,9 +102,12 @@ impl Verdict {
 
     /// What to do about the machine; `None` if the machine disturbed nothing.
     pub fn advice(&self, manifest: &Manifest) -> Option<String> {
-        // The reason of an INVALID run contains the advice.
-        let is_missing = self.timing.word == TimingWord::Disturbed && self.exit_code != Exit::Invalid;
-        is_missing.then(|| remedy(manifest))
+        // The reason of an INVALID run contains the advice. A run that passed needs no command as root.
+        match (self.timing.word, self.exit_code) {
+            (TimingWord::Disturbed, Exit::Passed) => Some(DOCTOR.to_owned()),
+            (_, Exit::Invalid) => None,
+            (word, _) => (word == TimingWord::Disturbed).then(|| remedy(manifest)),
+        }
     }
 
     /// Whether a fault or stimulus of the scenario did not act, so that the run tested nothing of what it is about.
@@ -247,6 +250,9 @@ fn clock_jump(usage: &RunUsage, can: &CanConfig) -> Option<OutcomeReason> {
     })
 }
 
+/// Where to begin with stalls of the machine.
+const DOCTOR: &str = "masseter doctor lists what disturbs this machine";
+
 /// The remedy against stalls of the machine.
 fn remedy(manifest: &Manifest) -> String {
     let latency = match &manifest.cpu_dma_latency {
@@ -257,7 +263,7 @@ fn remedy(manifest: &Manifest) -> String {
     let lockstep = if is_virtual { ", --clock lockstep keeps it out of the result" } else { "" };
     let first = manifest.mending_command.as_ref();
     let first = first.map_or_else(String::new, |command| format!("; first try: {command}"));
-    format!("masseter doctor lists what disturbs this machine{lockstep}{latency}{first}")
+    format!("{DOCTOR}{lockstep}{latency}{first}")
 }
 
 /// The excuse for a safe stop, in words: the machine lost all missed cycles, and many of them just before the stop.

@@ -8,12 +8,13 @@ mod over_time {
     use super::*;
 
     #[test]
-    fn a_bus_that_is_half_full_is_said_to_be() {
+    fn a_bus_that_is_half_full_is_said_to_be_where_anything_was_recorded() {
         let frame = Frame::fixed(CanId::standard(0x123).unwrap(), [0x55; 8]);
         let bits = wire::frame_bits(&frame);
         let mut collector = OverTimeCollector::new([0.0; 3], Some(Bitrate::new(2 * 1000 * bits).unwrap()));
-        for millisecond in 0..1000 {
+        for millisecond in (0..400).chain(600..1000) {
             let time_ns = millisecond * 1_000_000;
+            collector.wake_up(PLANT, time_ns, time_ns + 1);
             collector.apply_frame(
                 time_ns,
                 0,
@@ -21,8 +22,10 @@ mod over_time {
             );
         }
         let over_time = collector.into_figures(0);
-        assert_eq!(over_time.bus_load.len(), 1);
-        assert!(over_time.bus_load[0].iter().all(|(_, share)| (share - 0.5).abs() < 1e-3));
+        let [load] = &over_time.bus_load[..] else { panic!("{:?}", over_time.bus_load) };
+        assert!(load.iter().all(|(_, share)| (share - 0.5).abs() < 1e-3), "{load:?}");
+        let is_lost = |(at_s, _): &&(f64, f64)| (0.4..0.6).contains(at_s);
+        assert_eq!((load.len(), load.iter().filter(is_lost).count()), (80, 0));
     }
 
     /// The platform moves by 1 mm a cycle, and from cycle 20 on without a desired pose.

@@ -249,15 +249,29 @@ impl Bounds {
         }
     }
 
-    /// The signal over time, with its limits.
-    pub(super) fn plot(&self) -> RequirementPlot {
-        let limits = [self.limits.min, self.limits.max].into_iter().flatten();
+    /// The signal over time, with its limits and the statistic that was judged.
+    pub(super) fn plot(&mut self) -> RequirementPlot {
+        let si = self.of.unit.si;
+        let curve = self.series.band(0);
+        let is_signed = curve.iter().any(|(_, value)| *value < 0.0);
+        let both_sides = |value: f64| if is_signed { vec![value, -value] } else { vec![value] };
+        let limits = [self.limits.min, self.limits.max].into_iter().flatten().map(|limit| limit / si);
+        let value = if self.samples > 0 { self.value_of_statistic() / si } else { f64::NAN };
+        let (limits, found) = match self.statistic {
+            Statistic::Value => (limits.collect(), None),
+            Statistic::Abs => (limits.flat_map(both_sides).collect(), None),
+            Statistic::Mean => (limits.collect(), Some(("mean", vec![value]))),
+            Statistic::Rms => (limits.flat_map(both_sides).collect(), Some(("rms", both_sides(value)))),
+            Statistic::PeakToPeak => (Vec::new(), Some(("range", self.range.map(|end| end / si).to_vec()))),
+            Statistic::Percentile => (limits.collect(), Some(("percentile", vec![value]))),
+        };
         RequirementPlot {
             signal: self.of.text.clone(),
             unit: self.of.unit.name,
             began_ns: self.began_ns.unwrap_or(0),
-            curve: self.series.band(0),
-            limits: limits.map(|limit| limit / self.of.unit.si).collect(),
+            curve,
+            limits,
+            found: found.filter(|(_, values)| values.iter().all(|value| value.is_finite())),
         }
     }
 

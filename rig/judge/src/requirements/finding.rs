@@ -121,8 +121,10 @@ pub struct RequirementPlot {
     pub began_ns: u64,
     /// Lowest and highest values, by seconds.
     pub curve: Curve,
-    /// Its limits.
+    /// Its limits, on both sides of zero where the magnitude of a signed curve is judged; none of a range, which no level shows.
     pub limits: Vec<f64>,
+    /// The statistic that was judged and where the curve shows it; none where each value was judged.
+    pub found: Option<(&'static str, Vec<f64>)>,
 }
 
 /// Why a value of a requirement cannot be read.

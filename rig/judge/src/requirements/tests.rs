@@ -133,6 +133,23 @@ fn bounds_have_the_smallest_margin_and_its_moment() {
 }
 
 #[test]
+fn a_plot_shows_what_was_judged() {
+    let of_run = |forces_n: &[f64], bounds: &str| {
+        let plot = Run::of(forces_n).judge(&format!("signal = 'l1.force'\n{bounds}")).plot.unwrap();
+        (plot.limits, plot.found)
+    };
+    let signed = [3.0, -4.0, 4.0, -3.0];
+    assert_eq!(of_run(&signed, "max = '5 N'"), (vec![5.0], None));
+    assert_eq!(of_run(&signed, "statistic = 'abs'\nmax = '5 N'"), (vec![5.0, -5.0], None));
+    assert_eq!(of_run(&[3.0, 4.0], "statistic = 'abs'\nmax = '5 N'"), (vec![5.0], None));
+    let (limits, found) = of_run(&[4.0, -4.0, 4.0], "statistic = 'rms'\nmax = '5 N'");
+    assert_eq!((limits, found), (vec![5.0, -5.0], Some(("rms", vec![4.0, -4.0]))));
+    // No level of the curve is the limit of a range.
+    let (limits, found) = of_run(&signed, "statistic = 'peak_to_peak'\nmax = '5 N'");
+    assert_eq!((limits, found), (Vec::new(), Some(("range", vec![-4.0, 4.0]))));
+}
+
+#[test]
 fn bounds_without_a_sample_are_untested_and_missing_samples_are_counted() {
     let gap = Run::of(&[1.0, f64::NAN, 3.0]);
     let figures = gap.judge("signal = 'l1.force'\nmax = '5 N'");

@@ -13,19 +13,25 @@
       element('span', { class: 'name' }, name), element('strong', {}, word), reason ? element('p', {}, ...rich(reason)) : null);
     const update = (now) => {
       const figures = now.figures.map(([name, value]) => [element('dt', {}, name), element('dd', {}, value)]);
+      // Simulated time is no result: the line below the title names the clock.
       holder.replaceChildren(element('div', { class: 'panels' }, panel('function', now.tone, now.word, now.reason),
-        panel('timing', now.timing_tone, now.timing, now.timing_reason)), element('dl', { class: 'figures' }, ...figures.map((pair) => element('div', {}, ...pair))));
+        now.timing === 'simulated' ? null : panel('timing', now.timing_tone, now.timing, now.timing_reason)),
+      figures.length ? element('dl', { class: 'figures' }, ...figures.map((pair) => element('div', {}, ...pair))) : '');
     };
     update(data);
     return { update };
   });
 
+  // A button that shows a time, and what was around it.
+  const timeButton = (at, clock) => element('button', { type: 'button', class: 'time', 'data-at': at, title: 'Show what was around it', onclick: () => clock.look(at) }, clock.text(at));
+  const retell = (holder, clock) => holder.querySelectorAll('[data-at]').forEach((button) => { button.textContent = clock.text(Number(button.dataset.at)); });
+
   Masseter.block('table', (holder, data, clock) => {
-    const cell = (content, { is_number: isNumber }, isFirst) => {
-      const td = element(isFirst ? 'th' : 'td', { class: isNumber ? 'number' : '', scope: isFirst ? 'row' : null });
+    const cell = (content, { title, is_number: isNumber }, isFirst) => {
+      const td = element(isFirst ? 'th' : 'td', { class: isNumber ? 'number' : '', scope: isFirst ? 'row' : null, 'data-title': title });
       if (typeof content === 'string') td.append(...rich(isNumber ? content.replace(/^-/, '\u2212') : content));
       else if (content.mark !== undefined) td.append(element('span', { class: `mark ${content.tone}` }, content.mark));
-      else Masseter.chart(td.appendChild(element('div', { class: 'small' })), content.plot, clock, true);
+      else td.append(timeButton(content.at_s, clock));
       return td;
     };
     const update = (now) => {
@@ -35,20 +41,8 @@
         element('table', {}, element('thead', {}, element('tr', {}, ...head)), element('tbody', {}, ...rows))));
     };
     update(data);
+    clock.on('mode', () => retell(holder, clock));
     return { update };
-  });
-
-  // A button that shows a time and moves the cursor there.
-  const timeButton = (at, clock) => element('button', { type: 'button', 'data-at': at, title: 'Move the cursor there',
-    onclick: () => { clock.play(false); clock.seek(at); } }, clock.text(at));
-  const retell = (holder, clock) => holder.querySelectorAll('[data-at]').forEach((button) => { button.textContent = clock.text(Number(button.dataset.at)); });
-
-  Masseter.block('moments', (holder, _, clock) => {
-    const write = () => holder.replaceChildren(element('ul', { class: 'events' }, ...[...Masseter.moments].sort((a, b) => a.at_s - b.at_s)
-      .map((moment) => element('li', { class: moment.kind === 'note' ? '' : 'fault' }, timeButton(moment.at_s, clock), ` ${moment.text}`))));
-    // A new moment tells the mode again.
-    clock.on('mode', write);
-    write();
   });
 
   Masseter.block('events', (holder, data, clock) => {
@@ -82,7 +76,7 @@ timeButton(event.at_s, clock), ` ${event.source}: `, ...rich(event.text));
     holder.append(drawing);
     function draw() {
       const sources = [...new Set(events().map(({ source }) => source))].sort();
-      const width = Math.round(holder.clientWidth) || 640, bottom = ROW * (sources.length + 1);
+      const width = Math.max(LEFT + RIGHT + 1, Math.round(holder.clientWidth) || 640), bottom = ROW * (sources.length + 1);
       const x = Masseter.axis(false, clock.window, [LEFT, width - RIGHT]);
       const clamp = (at) => Math.min(width - RIGHT, Math.max(LEFT, x.position(at)));
       const isIn = (at) => at >= clock.window[0] && at <= clock.window[1];

@@ -4,25 +4,27 @@
   const ROOM = { left: 62, right: 16, top: 8, below: 38 };
   // On a phone every pixel counts.
   const NARROW = { width: 500, left: 46, right: 10 };
-  const SMALL = { left: 2, right: 2, top: 3, below: 3 };
   // Height of a row of names above the plot, px.
   const ROW = 16;
   // A limit further from the curves than this many times their height is written, not drawn.
   const FAR = 0.6;
+  // A curve that turns more often than every so many pixels is drawn as the band between its ends in columns of twice the width.
+  const DENSE = 8;
+  const BANDED = ['desired', 'true', 'estimated'];
   const PALETTE = 8;
   const OWN_COLOUR = { desired: 'desired', true: 'true', estimated: 'estimated' };
   const all = new Set();
   let clips = 0;
 
   // A view of another quantity than time: it has a cursor of its own and no zoom.
-  function ownView(changed) {
+  function ownView(across, changed) {
     return {
       window: [0, 1],
       cursor: null,
       isPlaying: false,
       seek(at) { this.cursor = at === null ? null : Math.min(this.window[1], Math.max(this.window[0], at)); changed(); },
-      zoom() {}, zoomAbout() {}, reset() {}, play() {},
-      text: (at) => `${Masseter.significant(100 - 100 / at, 6)} %`,
+      zoom() {}, zoomAbout() {}, pan() {}, reset() {}, play() {},
+      text: (at) => (across === 'percentile' ? `${Masseter.significant(100 - 100 / at, 6)} %` : `${Masseter.significant(at)} µs`),
     };
   }
 
@@ -32,7 +34,7 @@
     const own = series.colour === undefined && OWN_COLOUR[series.style];
     const stroke = own ? `var(--${own})` : `var(--c${number % PALETTE})`;
     const isSecond = !own && number >= PALETTE;
-    return { name: series.name, style: series.style, xs, ys, step: Infinity, stroke, isSecond, isShown: true, place };
+    return { name: series.name, style: series.style, xs, ys, step: Infinity, stroke, isSecond, isShown: !series.is_hidden, place };
   }
 
   function preparedAll(data) {
@@ -63,11 +65,11 @@
   }
 
   // The ends of the vertical axis, and the limits that lie near enough.
-  function fitted(found, limits, isLog, isWhole) {
+  function fitted(found, limits, isLog) {
     let [low, high] = found;
     const far = FAR * Math.max(high - low, 1e-9 * Math.abs(high));
-    const isNear = (value) => isLog || isWhole || (value >= low - far && value <= high + far);
-    const near = limits.flatMap(({ name, values }) => values.filter(isNear).map((value) => ({ name, value })));
+    const isNear = (value) => isLog || (value >= low - far && value <= high + far);
+    const near = limits.flatMap(({ name, kind, values }) => values.filter(isNear).map((value, at) => ({ name: at ? '' : name, kind, value })));
     const beyond = limits.map(({ name, values }) => ({ name, values: values.filter((value) => !isNear(value)) }))
       .filter(({ values }) => values.length);
     for (const { value } of near) { low = Math.min(low, value); high = Math.max(high, value); }
@@ -99,14 +101,14 @@
     });
   }
 
-  Masseter.chart = (holder, data, clock, isSmall = false) => {
+  Masseter.chart = (holder, data, clock) => {
     const isTime = data.across === 'time', isLog = data.scale === 'log';
-    const view = isTime ? clock : ownView(() => moveCursor());
+    const view = isTime ? clock : ownView(data.across, () => moveCursor());
     const clip = `clip-${clips += 1}`;
-    let series = preparedAll(data), plot = null, isDirty = true, isVisible = true, isWaiting = false, isUnderPointer = false;
+    let series = preparedAll(data), plot = null, isDirty = true, isVisible = true, isWaiting = false, isUnderPointer = false, isBanded = false;
 
     const label = data.unit ? `${data.title}, ${data.unit}` : data.title;
-    const drawing = svg('svg', isSmall ? { role: 'img' } : { tabindex: 0, role: 'application', 'aria-roledescription': 'chart' });
+    const drawing = svg('svg', { tabindex: 0, role: 'application', 'aria-roledescription': 'chart' });
     const legend = element('div', { class: 'legend' }), words = element('p', { class: 'beyond' });
     const chart = {
       data, view, drawing, label, isTime,
@@ -143,35 +145,36 @@
       isDirty = false;
       if (isTime) series.forEach((one) => { one.step = Masseter.longestStep(one.xs); });
       const width = Math.round(holder.clientWidth) || 640;
-      const window = !isTime ? ownWindow() : isSmall ? clock.range : clock.window;
+      const window = isTime ? clock.window : ownWindow();
       const shown = series.filter(({ isShown }) => isShown);
       const found = extremes(shown, window, isLog);
       if (!isTime) view.window = window;
       drawing.replaceChildren();
       words.textContent = '';
       if (!found) {
-        const height = isSmall ? data.height : 48;
-        size(width, height);
+        size(width, 48);
         plot = null;
-        drawing.append(svg('text', { x: isSmall ? 4 : ROOM.left, y: height / 2 + 4, class: 'empty' }, chart.isShowing ? 'Nothing in this stretch.' : data.otherwise));
+        drawing.append(svg('text', { x: ROOM.left, y: 28, class: 'empty' }, chart.isShowing ? 'Nothing in this stretch.' : data.otherwise));
         return;
       }
-      const room = isSmall ? SMALL : width < NARROW.width ? { ...ROOM, ...NARROW } : ROOM;
-      const { ends, near, beyond } = fitted(found, data.limits || [], isLog, isSmall);
-      const right = width - room.right;
+      const room = width < NARROW.width ? { ...ROOM, ...NARROW } : ROOM;
+      // A share is drawn from nothing on.
+      if (data.unit === '%') found[0] = Math.min(found[0], 0);
+      const { ends, near, beyond } = fitted(found, data.limits || [], isLog);
+      const right = Math.max(room.left + 1, width - room.right);
       const x = Masseter.axis(!isTime, window, [room.left, right]);
-      const moments = isTime ? placed([...(isSmall ? [] : Masseter.moments), ...(data.moments || [])], window, x, right) : [];
-      const top = room.top + (isSmall ? 0 : ROW * Math.max(0, ...moments.map(({ row }) => row + 1)));
+      const moments = isTime ? placed([...Masseter.moments, ...(data.moments || [])], window, x, right) : [];
+      const top = room.top + ROW * Math.max(0, ...moments.map(({ row }) => row + 1));
       const bottom = top + data.height;
       const y = Masseter.axis(isLog, ends, [bottom, top]);
       plot = { x, y, left: room.left, right, top, bottom, window };
       size(width, bottom + room.below);
       drawing.append(svg('clipPath', { id: clip }, svg('rect', { x: room.left, y: top, width: right - room.left, height: data.height })));
-      if (!isSmall) drawing.append(...grid());
-      drawing.append(svg('g', { 'clip-path': `url(#${clip})` }, ...near.map(level), ...shown.map(curve)));
-      if (!isSmall) drawing.append(...near.map(levelName));
+      isBanded = false;
+      drawing.append(...grid(), svg('g', { 'clip-path': `url(#${clip})` }, ...shades(), ...near.map(level), ...shown.map(curve)), ...near.map(levelName));
       drawing.append(...moments.map(mark), svg('g', { class: 'cursor' }));
-      if (beyond.length) words.textContent = `Not in the picture: ${beyond.map(inWords).join('; ')}.`;
+      words.textContent = [beyond.length ? `Not in the picture: ${beyond.map(inWords).join('; ')}.` : '',
+        data.is_shaded ? 'Judged: the shaded stretches.' : '', isBanded ? 'Too dense for lines: bands from the lowest to the highest values. Zoom in for the curves.' : ''].filter(Boolean).join(' ');
       moveCursor();
     }
 
@@ -189,7 +192,8 @@
     function grid() {
       const { x, y, left, right, top, bottom, window } = plot;
       const many = Math.max(3, Math.floor((right - left) / (isTime ? clock.tickRoom : 64))), few = Math.max(4, Math.floor(data.height / 27));
-      const across = isTime ? clock.ticks(window, many) : Masseter.percentileTicks(window);
+      const apart = (ticks) => ticks.reduce((kept, tick) => (kept.length && x.position(tick.value) - x.position(kept[kept.length - 1].value) < 52 ? kept : [...kept, tick]), []);
+      const across = isTime ? clock.ticks(window, many) : data.across === 'percentile' ? apart(Masseter.percentileTicks(window)) : Masseter.logTicks(window, many);
       const up = isLog ? Masseter.logTicks(y.ends, few) : Masseter.linearTicks(y.ends, few);
       const vertical = across.map(({ value, text }) => [
         svg('line', { x1: x.position(value), x2: x.position(value), y1: top, y2: bottom, class: 'mesh' }),
@@ -197,37 +201,72 @@
       const horizontal = up.map(({ value, text }) => [
         svg('line', { x1: left, x2: right, y1: y.position(value), y2: y.position(value), class: 'mesh' }),
         svg('text', { x: left - 6, y: y.position(value) + 4, class: 'tick', 'text-anchor': 'end' }, text)]);
-      const name = isTime ? clock.label : 'percentile';
+      const name = isTime ? clock.label : data.across === 'percentile' ? 'percentile' : 'µs';
       return [...vertical.flat(), ...horizontal.flat(), svg('rect', { x: left, y: top, width: right - left, height: bottom - top, class: 'frame' }),
         svg('text', { x: right, y: bottom + 32, class: 'tick', 'text-anchor': 'end' }, name)];
     }
 
+    // Whether the curve goes up and down over the whole height more often than the pixels show.
+    function isDense({ ys }, places) {
+      const way = places.reduce((sum, at, place) => sum + (place ? Math.abs(plot.y.position(ys[at]) - plot.y.position(ys[places[place - 1]])) : 0), 0);
+      return way > 0.5 * (plot.right - plot.left) * data.height / DENSE;
+    }
+
+    // Buckets as stairs: each point is the end of its bucket.
+    function stairs({ xs, ys }) {
+      const { x, y, left, bottom } = plot, height = (at) => (ys[at] > 0 ? y.position(ys[at]) : bottom).toFixed(1);
+      return `M${left} ${bottom}${xs.map((to, at) => `V${height(at)}H${x.position(to).toFixed(1)}`).join('')}V${bottom}`;
+    }
+
     function curve(one) {
+      if (data.across === 'duration') return svg('path', { ...strokeOf(one), d: stairs(one) });
       const { x, y, window } = plot;
       const places = Masseter.thinned(one, window, x.position, plot.right - plot.left).filter((at) => !isLog || one.ys[at] > 0);
+      if (isTime && BANDED.includes(one.style) && isDense(one, places)) return band(one, places);
       const joins = (at, before) => before !== undefined && one.xs[at] - one.xs[at - 1] <= one.step;
       const points = places.map((at, place) => `${joins(at, places[place - 1]) ? 'L' : 'M'}${x.position(one.xs[at]).toFixed(1)} ${y.position(one.ys[at]).toFixed(1)}`);
       return svg('path', { ...strokeOf(one), d: points.join('') });
     }
 
-    function level({ value }) {
-      const at = plot.y.position(value);
-      return svg('line', { x1: plot.left, x2: plot.right, y1: at, y2: at, class: 'limit' });
+    // Where a curve turns too often for lines, the band between its lowest and highest values.
+    function band(one, places) {
+      const { x, y } = plot, columns = new Map();
+      for (const at of places) {
+        const column = Math.floor(x.position(one.xs[at]) / (2 * DENSE)), [low, high] = columns.get(column) || [Infinity, -Infinity];
+        columns.set(column, [Math.min(low, one.ys[at]), Math.max(high, one.ys[at])]);
+      }
+      const edge = (end) => [...columns].map(([column, ends]) => `${((column + 0.5) * 2 * DENSE).toFixed(1)} ${y.position(ends[end]).toFixed(1)}`);
+      isBanded = true;
+      return svg('path', { class: `curve banded ${one.style}`, style: `--c:${one.stroke}`, d: `M${[...edge(1), ...edge(0).reverse()].join('L')}Z` });
     }
 
-    function levelName({ name, value }) {
-      const at = plot.y.position(value), isHigh = at - plot.top < 18;
-      return svg('text', { x: plot.right - 4, y: at + (isHigh ? 13 : -4), class: 'limit-name', 'text-anchor': 'end' },
-        `${name} ${Masseter.short(value)} ${data.unit}`);
+    // The stretches in which the first curve has points.
+    function shades() {
+      const one = series[0];
+      if (!data.is_shaded || !one?.xs.length) return [];
+      const ends = one.xs.flatMap((x, at) => (at === 0 ? [x] : x - one.xs[at - 1] > one.step ? [one.xs[at - 1], x] : [])).concat(one.xs[one.xs.length - 1]);
+      const shade = (from, to) => svg('rect', { class: 'shade', x: from, y: plot.top, width: Math.max(1, to - from), height: data.height });
+      return ends.flatMap((from, at) => (at % 2 ? [] : [shade(plot.x.position(from), plot.x.position(ends[at + 1]))]));
+    }
+
+    function level({ kind, value }) {
+      const at = plot.y.position(value);
+      return svg('line', { x1: plot.left, x2: plot.right, y1: at, y2: at, class: kind });
+    }
+
+    // Curves of percentiles rise at the right, where they would strike a name.
+    function levelName({ name, kind, value }) {
+      const at = plot.y.position(value), isHigh = at - plot.top < 18, isLeft = data.across === 'percentile';
+      return name && svg('text', { x: isLeft ? plot.left + 4 : plot.right - 4, y: at + (isHigh ? 13 : -4), class: `${kind}-name`, 'text-anchor': isLeft ? 'start' : 'end' },
+        `${name} ${kind === 'found' ? Masseter.significant(value) : Masseter.short(value)} ${data.unit}`);
     }
 
     const inWords = ({ name, values }) => `${name} ${values.map(Masseter.short).join(' and ')} ${data.unit}`.trim();
 
     function mark({ marks, name, x, row, isLeft }) {
-      const from = isSmall ? plot.top : ROOM.top + ROW * row;
+      const from = ROOM.top + ROW * row;
       const lines = marks.map((one) => svg('g', { class: `moment ${one.kind}` }, svg('title', {}, `${one.text}, ${clock.text(one.at_s)}`),
         svg('line', { x1: one.x, x2: one.x, y1: from, y2: plot.bottom })));
-      if (isSmall) return svg('g', {}, ...lines);
       const kind = marks.every((one) => one.kind === 'note') ? 'note' : 'fault';
       return svg('g', {}, ...lines, svg('g', { class: `moment ${kind}` },
         svg('text', { x: x + (isLeft ? -5 : 5), y: from + 11, 'text-anchor': isLeft ? 'end' : 'start' }, name)));
@@ -241,11 +280,10 @@
       if (group) group.replaceChildren();
       const shown = series.filter(({ isShown }) => isShown);
       const values = shown.map((one) => (isInside ? Masseter.valueAt(one, at) : null));
-      if (!isSmall) writeLegendValues(shown, values);
+      writeLegendValues(shown, values);
       if (!isInside) return;
       const x = plot.x.position(at);
       group.append(svg('line', { x1: x, x2: x, y1: plot.top, y2: plot.bottom }));
-      if (isSmall) return;
       values.forEach((value, place) => {
         if (value === null || (isLog && value <= 0)) return;
         group.append(svg('circle', { cx: x, cy: plot.y.position(value), r: 3, style: `fill:${shown[place].stroke}` }));
@@ -283,14 +321,9 @@
       moveCursor();
     }
 
-    if (isSmall) {
-      holder.append(drawing);
-      drawing.setAttribute('aria-label', summary());
-    } else {
-      holder.append(element('figcaption', {}, element('h3', {}, label), Masseter.chartMenu(chart)), legend, drawing, words);
-      writeLegend();
-      Masseter.gestures(chart);
-    }
+    holder.append(element('figcaption', {}, element('h3', {}, label), Masseter.chartMenu(chart)), legend, drawing, words);
+    writeLegend();
+    Masseter.gestures(chart);
     if (isTime) {
       clock.on('window', redraw);
       clock.on('mode', redraw);
@@ -325,10 +358,10 @@
       // Takes the place of the whole chart.
       update(next) {
         Object.assign(data, next);
-        const hidden = new Set(series.filter(({ isShown }) => !isShown).map(({ name }) => name));
+        const chosen = new Map(series.map(({ name, isShown }) => [name, isShown]));
         series = preparedAll(data);
-        series.forEach((one) => { one.isShown = !hidden.has(one.name); });
-        if (!isSmall) writeLegend();
+        series.forEach((one) => { one.isShown = chosen.get(one.name) ?? one.isShown; });
+        writeLegend();
         redraw();
       },
     };

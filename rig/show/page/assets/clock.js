@@ -5,14 +5,18 @@
   // A time axis in wall time has steps that a clock has.
   const WALL_STEPS = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600];
 
-  Masseter.clock = (time) => {
+  // `moment`: the window around the stop of the run; none without one.
+  Masseter.clock = (time, moment = null) => {
     const listeners = { cursor: [], window: [], mode: [], play: [], range: [] };
     const tell = (what) => listeners[what].forEach((listener) => listener());
     const began = time.wall_s ?? null;
+    // What is shown around a moment: from so long before, to so long after, s.
+    const AROUND = [0.05, 0.5];
     let range = [0, Math.max(time.end_s, 1e-3)], window = [...range], before = null;
 
     const clock = {
       time,
+      moment,
       // The moment under the cursor; null without one.
       cursor: null,
       mode: 'motion',
@@ -39,6 +43,10 @@
         window = [begin, begin + length];
         tell('window');
       },
+      // Moves the cursor to a moment, and shows what was around it.
+      look(at) { clock.play(false); clock.zoom(at - AROUND[0], at + AROUND[1]); clock.seek(at); },
+      // Shows an earlier (below 0) or later stretch of the same length, by a share of the window.
+      pan(share) { const by = share * (window[1] - window[0]); clock.zoom(window[0] + by, window[1] + by); },
       // Zooms about a moment that stays where it is.
       zoomAbout(at, factor) { clock.zoom(at - (at - window[0]) * factor, at + (window[1] - at) * factor); },
       reset() { window = [...range]; tell('window'); },

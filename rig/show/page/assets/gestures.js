@@ -1,5 +1,5 @@
-// What a hand does on a chart: hover moves the cursor, dragging chooses a stretch of time, the wheel (with Ctrl, or once the
-// chart is clicked) and two fingers zoom, a double click shows everything, keys do the same.
+// What a hand does on a chart: hover moves the cursor, dragging chooses a stretch of time, dragging with Shift pans, the wheel
+// (with Ctrl, or once the chart is clicked) and two fingers zoom, a double click shows everything, keys do the same.
 {
   const { svg } = Masseter;
   // A drag shorter than this is a click, px.
@@ -9,7 +9,7 @@
   Masseter.gestures = (chart) => {
     const { drawing, view } = chart;
     const fingers = new Map();
-    let from = null, pinch = null;
+    let from = null, pinch = null, panned = null;
 
     // Where a pointer is, in the drawing's pixels.
     function pixel(event) {
@@ -33,7 +33,7 @@
       if (event.pointerType === 'touch') {
         pinch = fingers.size === 2 ? [...fingers.values()].map((x) => chart.plot.x.value(x)) : null;
       } else {
-        from = pixel(event);
+        if (event.shiftKey && chart.isTime) panned = pixel(event); else from = pixel(event);
         drawing.setPointerCapture(event.pointerId);
       }
       view.play(false);
@@ -47,6 +47,11 @@
         spread();
         return;
       }
+      if (panned !== null) {
+        view.pan((panned - x) / (chart.plot.right - chart.plot.left));
+        panned = x;
+        return;
+      }
       if (from !== null) chosen(x);
       if (view.isPlaying) return;
       chart.setPointer(true);
@@ -56,7 +61,7 @@
       const x = pixel(event), began = from;
       fingers.delete(event.pointerId);
       if (fingers.size < 2) pinch = null;
-      from = null;
+      from = panned = null;
       drawing.querySelector('.chosen')?.remove();
       if (event.type !== 'pointerup' || began === null || !chart.isTime || Math.abs(x - began) < SHORT) return;
       const [low, high] = [valueAt(began), valueAt(x)].sort((a, b) => a - b);
@@ -96,6 +101,8 @@
         '+': () => view.zoomAbout(at, 0.5),
         '=': () => view.zoomAbout(at, 0.5),
         '-': () => view.zoomAbout(at, 2),
+        ',': () => view.pan(-0.25),
+        '.': () => view.pan(0.25),
         0: () => view.reset(),
         Escape: () => view.reset(),
       };

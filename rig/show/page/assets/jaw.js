@@ -150,12 +150,12 @@
     });
   }
 
-  // Curves of a point in a plane, desired below true.
+  // Curves of a point in a plane, desired below true. The right side is at the right of what is seen from above.
   const PLANES = {
     sagittal: ['Sagittal', 'forward, mm', 'up, mm', 0, 2], frontal: ['Frontal', 'to the left, mm', 'up, mm', 1, 2],
-    horizontal: ['Horizontal', 'to the left, mm', 'forward, mm', 1, 0],
+    horizontal: ['Horizontal', 'to the right, mm', 'forward, mm', 1, 0, -1],
   };
-  const curve = (path, point, [, , , a, b], name, style, stroke) => ({ name, style, stroke, xs: path.map((frame) => frame[point][a]), ys: path.map((frame) => frame[point][b]), at: path.map(({ at }) => at) });
+  const curve = (path, point, [, , , a, b, sign = 1], name, style, stroke) => ({ name, style, stroke, xs: path.map((frame) => sign * frame[point][a]), ys: path.map((frame) => frame[point][b]), at: path.map(({ at }) => at) });
 
   const chartData = (title, unit, series) => ({ title, unit, across: 'time', scale: 'linear', height: 130, otherwise: 'Nothing moved.',
     series: series.map(([name, style, points]) => ({ name, style, points: points.flat() })) });
@@ -240,11 +240,10 @@
 
   const styleOf = (scene) => (scene.actual_name === 'true' ? 'true' : 'smoothed');
 
-  function courses(scene, path, desired) {
+  function courses(path) {
     const over = (frames, of) => frames.map((frame) => [frame.at, of(frame)]);
-    const down = ({ incisal }) => -incisal[2], parts = ['roll to the right', 'opening', 'yaw to the left'], order = [1, 2, 0];
+    const parts = ['roll to the right', 'opening', 'yaw to the left'], order = [1, 2, 0];
     return [
-      chartData('Opening: incisal point downwards', 'mm', [['desired', 'desired', over(desired, down)], [scene.actual_name, styleOf(scene), over(path, down)]]),
       chartData('Rotation of the jaw from the closed jaw', '°', order.map((axis) => [parts[axis], 'plain', over(path, ({ turn }) => turn[axis])])),
       chartData('Velocity of the incisal point', 'mm/s', ['forward', 'to the left', 'up'].map((name, axis) => [name, 'plain', rates(path, ({ incisal }) => incisal[axis])])),
       chartData('Velocity of the rotation', '°/s', order.map((axis) => [parts[axis], 'plain', rates(path, ({ turn }) => turn[axis])])),
@@ -278,7 +277,7 @@
       words.textContent = `${Masseter.fixed(lasts, 1)} s of the motion at ${Masseter.fixed((path.length - 1) / (lasts || 1), 0)} poses a second`
         + `${running.length && running[running.length - 1].to_s - path[path.length - 1].at > 0.1 ? '; the recording goes on' : ''}. Displacements count from the closed jaw. A click on a path moves the cursor there.`;
       views.replaceChildren(...planes(clock, scene, path, desired, now.border));
-      const next = courses(scene, path, desired);
+      const next = courses(path);
       charts ||= next.map((course) => Masseter.chart(drawn.appendChild(element('div', { class: 'block chart' })), course, clock));
       charts.forEach((chart, at) => chart.update(next[at]));
       cycles(found, now, clock);

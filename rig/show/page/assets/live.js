@@ -3,6 +3,8 @@
   const { element, rich } = Masseter;
   // Time until a lost connection is tried again, ms.
   const AGAIN_MS = 1000;
+  // How often the page asks for the report at its own address.
+  const REPORT_TRIES = 10;
   let socket = null, isOver = false;
 
   const ask = (wish) => { if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(wish)); };
@@ -25,7 +27,8 @@
       figures.replaceChildren(...now.figures.map(([name, value]) => element('div', {}, element('dt', {}, name), element('dd', {}, value))));
     };
     update(data);
-    Masseter.live = { number: data.number, say: (text) => { note.textContent = text; }, end: () => { stop.disabled = true; stop.textContent = 'stop the run'; } };
+    Masseter.live = { number: data.number, say: (text, isGood = false) => { note.textContent = text; note.classList.toggle('good', isGood); },
+      end: () => { stop.disabled = true; stop.textContent = 'the run is over'; panel.className = 'panel'; } };
     return { update };
   });
 
@@ -52,13 +55,27 @@
     };
   });
 
+  // The address of the page has the report once the run is judged. A request waits until then.
+  function showReport(left) {
+    const request = new XMLHttpRequest();
+    request.open('GET', location.pathname);
+    request.onload = () => location.reload();
+    request.onerror = () => {
+      if (left) setTimeout(showReport, AGAIN_MS, left - 1);
+      else Masseter.live.say('The run is over, and so is its server. The verdict is in report.html in the folder of the run.');
+    };
+    request.send();
+  }
+
   function take(message) {
     if (message.reload) { location.reload(); return; }
     if (message.refused) Masseter.live.say(message.refused);
+    if (message.set) Masseter.live.say('');
     if (message.over) {
       isOver = true;
       Masseter.live.end();
-      Masseter.live.say('The run is over. Its report has the verdict.');
+      Masseter.live.say('The run is over. The verdict follows.', true);
+      setTimeout(showReport, AGAIN_MS, REPORT_TRIES);
     }
     if (message.end_s === undefined) return;
     Masseter.live.number += 1;
@@ -68,6 +85,7 @@
     for (const [id, series, points] of message.append) Masseter.append(id, series, points);
     for (const [id, data] of message.update) Masseter.update(id, data);
     for (const moment of message.mark || []) Masseter.mark(moment);
+    if (Masseter.phases.length) Masseter.phases[Masseter.phases.length - 1].to_s = message.end_s;
     Masseter.time.extend(message.end_s);
   }
 

@@ -2,7 +2,7 @@
 {
   const { element } = Masseter;
   const page = JSON.parse(document.getElementById('data').textContent);
-  const clock = Masseter.clock(page.time);
+  const clock = Masseter.clock(page.time, page.window);
   const MODES = { motion: 'motion time', cycle: 'cycle', wall: 'wall time' };
   const spoken = element('p', { class: 'spoken', 'aria-live': 'polite' });
 
@@ -71,6 +71,7 @@
     const mode = element('select', { 'aria-label': 'how times are shown', onchange: () => clock.setMode(mode.value) },
       ...clock.modes.map((name) => element('option', { value: name }, MODES[name])));
     const whole = element('button', { type: 'button', class: 'whole', onclick: () => clock.reset() }, 'whole run');
+    const moment = clock.moment && element('button', { type: 'button', class: 'moment', onclick: () => clock.zoom(...clock.moment) }, 'the moment');
     const show = () => {
       const [from, to] = clock.window, at = clock.cursor;
       slider.value = at === null ? 0 : (at - from) / (to - from);
@@ -83,7 +84,7 @@
       play.textContent = clock.isPlaying ? '❚❚' : '▶';
       play.setAttribute('aria-label', clock.isPlaying ? 'pause' : 'play');
     });
-    document.getElementById('time-bar').append(play, slider, now, mode, whole);
+    document.getElementById('time-bar').append(play, slider, now, mode, ...[moment, whole].filter(Boolean));
     show();
   }
 
@@ -106,6 +107,23 @@
     document.querySelectorAll('details[data-was]').forEach((details) => { details.open = details.dataset.was === 'true'; });
     Masseter.drawAll();
   });
+  // The address has the window as times of the motion, so that a link opens the same view.
+  const zero = () => page.time.motion_s || 0;
+  function openView() {
+    const view = /^#t=(-?[\d.]+),(-?[\d.]+)$/.exec(location.hash);
+    if (view) clock.zoom(...view.slice(1).map((text) => Number(text) + zero()));
+    return Boolean(view);
+  }
+  let naming = null;
+  clock.on('window', () => {
+    clearTimeout(naming);
+    naming = setTimeout(() => {
+      const view = clock.isZoomed ? `#t=${clock.window.map((at) => (at - zero()).toFixed(4)).join()}` : '';
+      if (page.life !== 'live' && (view || location.hash.startsWith('#t='))) history.replaceState(null, '', location.href.split('#')[0] + view);
+    }, 300);
+  });
+  addEventListener('hashchange', openView);
+  if (!openView() && clock.moment) clock.zoom(...clock.moment);
   document.documentElement.dataset.ready = 'yes';
   if (page.life === 'live') Masseter.connect();
 }

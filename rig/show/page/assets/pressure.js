@@ -48,7 +48,7 @@
     }
 
     function drawMap() {
-      const width = Math.round(mapHolder.clientWidth) || 640, bottom = ROW * rows.length + 6, window = clock.window;
+      const width = Math.max(LEFT + RIGHT + 1, Math.round(mapHolder.clientWidth) || 640), bottom = ROW * rows.length + 6, window = clock.window;
       const x = Masseter.axis(false, window, [LEFT, width - RIGHT]);
       map.setAttribute('viewBox', `0 0 ${width} ${bottom + BELOW}`);
       map.setAttribute('height', bottom + BELOW);

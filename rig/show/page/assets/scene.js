@@ -70,6 +70,17 @@ Masseter.block('scene', (holder, data, clock) => {
     return low;
   }
 
+  // Without a cursor: the newest pose of a run that goes on, the first fault of one that stopped, or else the jaw at its widest.
+  let widest = null;
+  function firstLook() {
+    if (Masseter.page.life === 'live') return Infinity;
+    if (Masseter.moments.length && clock.moment) return Masseter.moments[0].at_s;
+    const opening = (frame) => space.length(less(placed(poseOf(frame, ACTUAL), incisal), placed(closed, incisal)));
+    const motion = data.frames.filter(([at]) => at >= (Masseter.page.time.motion_s ?? 0));
+    widest ??= motion.reduce((most, frame) => (opening(frame) > most[0] ? [opening(frame), frame[0]] : most), [-1, 0])[1];
+    return widest;
+  }
+
   function forcesAt(seconds) {
     const at = data.forces.findLast?.(([time]) => time <= seconds + HELD_S);
     return at && seconds - at[0] <= HELD_S ? at : null;
@@ -199,7 +210,7 @@ Masseter.block('scene', (holder, data, clock) => {
     pen.clearRect(0, 0, ...size);
     const solid = Masseter.solid(pen, camera, size);
     if (!data.frames.length) return;
-    const at = frameAt(clock.cursor ?? Masseter.page.time.motion_s ?? data.frames[0][0]), frame = data.frames[at];
+    const at = frameAt(clock.cursor ?? firstLook()), frame = data.frames[at];
     const [actual, desired] = [poseOf(frame, ACTUAL), poseOf(frame, DESIRED)];
     const shown = factor === 1 ? actual : beyond(desired, actual, factor);
     const own = colour(data.actual_name === 'true' ? 'true' : 'estimated');

@@ -94,8 +94,6 @@ pub enum Content {
     Figure(String),
     /// What happened when.
     Events(Events),
-    /// The page's moments in words.
-    Moments,
     /// The force on each lower tooth.
     Pressure(Pressure),
     /// The mechanism in three dimensions; `scene.js` knows the data.
@@ -163,10 +161,10 @@ pub enum Cell {
         /// Its colour.
         tone: Tone,
     },
-    /// A small plot.
-    Plot {
-        /// The chart.
-        plot: Box<Chart>,
+    /// A time, and a button that shows what was around it.
+    Time {
+        /// When, s since the first SYNC.
+        at_s: f64,
     },
 }
 

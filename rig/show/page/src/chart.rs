@@ -12,6 +12,8 @@ pub enum Across {
     Time,
     /// 1/(1 − quantile), by its logarithm, labelled as percentiles.
     Percentile,
+    /// Ends of buckets of durations, µs, by their logarithm: curves are stairs.
+    Duration,
 }
 
 /// How values are spaced from bottom to top.
@@ -49,6 +51,9 @@ pub struct Series {
     pub name: String,
     /// How it looks.
     pub style: Style,
+    /// Whether its name must be clicked first.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub is_hidden: bool,
     /// A place in the palette, from 0. Without one, a plain curve takes the next and the others that of their style.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub colour: Option<usize>,
@@ -60,7 +65,7 @@ impl Series {
     /// In the colour of its style.
     #[must_use]
     pub fn new(name: impl Into<String>, style: Style, points: Points) -> Self {
-        Self { name: name.into(), style, colour: None, points }
+        Self { name: name.into(), style, is_hidden: false, colour: None, points }
     }
 
     /// In a colour of the palette.
@@ -70,11 +75,23 @@ impl Series {
     }
 }
 
-/// Levels that must not be passed. A level far from all curves stands in words below the chart.
+/// What a level is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LevelKind {
+    /// It must not be passed.
+    Limit,
+    /// It was found, such as the rms of a curve.
+    Found,
+}
+
+/// Levels over the whole width. A level far from all curves stands in words below the chart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Limit {
     /// What it is.
     pub name: String,
+    /// Whether it bounds or was found.
+    pub kind: LevelKind,
     /// In the chart's unit.
     pub values: Vec<f64>,
 }
@@ -95,6 +112,9 @@ pub struct Chart {
     /// Levels over the whole width.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub limits: Vec<Limit>,
+    /// Whether the stretches in which the first curve has points are shaded: they were judged.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub is_shaded: bool,
     /// Moments of this chart alone, beside those of the page.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub moments: Vec<Moment>,
@@ -120,6 +140,7 @@ impl Chart {
             scale: Scale::Linear,
             series: Vec::new(),
             limits: Vec::new(),
+            is_shaded: false,
             moments: Vec::new(),
             height: 190,
             otherwise: "No value was recorded.".to_owned(),

@@ -23,5 +23,7 @@ mod page;
 pub use block::{
     Block, Cell, Column, Content, EventRow, Events, Live, Pressure, Section, Table, Tone, Tooth, Verdict,
 };
-pub use chart::{Across, Chart, Limit, Moment, MomentKind, Phase, Points, Scale, Series, Style, Time};
+pub use chart::{
+    Across, Chart, LevelKind, Limit, Moment, MomentKind, Phase, Points, Scale, Series, Style, Time,
+};
 pub use page::{Life, Page, PageError};

@@ -29,6 +29,9 @@ pub struct Page {
     pub time: Time,
     /// What all charts over time mark.
     pub moments: Vec<Moment>,
+    /// The window that the page opens at, s since the first SYNC; the whole run where there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub window: Option<[f64; 2]>,
     /// The controller's states, one after the other.
     pub phases: Vec<Phase>,
     /// In their order.
@@ -83,6 +86,7 @@ impl Page {
             life,
             time,
             moments: Vec::new(),
+            window: None,
             phases: Vec::new(),
             sections: Vec::new(),
         }

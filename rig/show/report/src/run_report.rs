@@ -144,7 +144,13 @@ fn show_and_write(
         Some((Format::Human, detail)) => {
             let table = table::table_in_words(manifest, figures, &judgement.verdict, detail);
             let more = if detail == Detail::Brief { "; --verbose shows every figure" } else { "" };
-            let text = format!("{table}\nreport: {}{more}\n", folder.file("report.html").display());
+            let said = table::verdict_in_words(manifest, &judgement.verdict);
+            let report = format!("report: {}{more}\n", folder.file("report.html").display());
+            // What failed is the last that a screen shows; a pass fits on one.
+            let text = match judgement.verdict.exit_code {
+                Exit::Passed => format!("{said}{table}\n{report}"),
+                _ => format!("{table}\n{report}{said}"),
+            };
             result_with_tones(&text, &table::TONES)
         }
         Some((Format::Json, _)) => result(&documents.summary),

@@ -40,7 +40,13 @@ pub enum Detail {
     Whole,
 }
 
-/// Verdict, checks and faults; with every detail also latencies and losses.
+/// The verdict on function and timing.
+pub(crate) fn verdict_in_words(manifest: &Manifest, verdict: &Verdict) -> String {
+    let advice = verdict.advice(manifest).map_or_else(String::new, |advice| format!("  {advice}\n"));
+    format!("{}: {}\ntiming: {}\n{advice}", verdict.word, verdict.reason, verdict.timing)
+}
+
+/// Checks and faults; with every detail also latencies and losses.
 pub(crate) fn table_in_words(
     manifest: &Manifest,
     figures: &Figures,
@@ -49,7 +55,7 @@ pub(crate) fn table_in_words(
 ) -> String {
     let mut text = String::new();
     let mut write = || -> std::fmt::Result {
-        write_verdict(&mut text, manifest, figures, verdict)?;
+        write_checks(&mut text, manifest, figures, verdict)?;
         if detail == Detail::Whole {
             write_figures(&mut text, manifest, figures)?;
         }
@@ -59,7 +65,11 @@ pub(crate) fn table_in_words(
             [Cause::FaultReset, Cause::WaitsForDrive].into_iter().any(|cause| event.cause == cause)
         })?;
         if detail == Detail::Whole || verdict.exit_code != Exit::Passed {
-            list_events(&mut text, figures, "faults", |event| event.kind == EventKind::Fault)?;
+            // The reason has the first fault.
+            let is_told = |event: &EventRecord| verdict.reason.contains(&event.in_words());
+            list_events(&mut text, figures, "faults", |event| {
+                event.kind == EventKind::Fault && !is_told(event)
+            })?;
         }
         Ok(())
     };
@@ -67,18 +77,13 @@ pub(crate) fn table_in_words(
     text
 }
 
-fn write_verdict(
+fn write_checks(
     text: &mut String,
     manifest: &Manifest,
     figures: &Figures,
     verdict: &Verdict,
 ) -> std::fmt::Result {
     let scenario = &manifest.scenario;
-    writeln!(text, "{}: {}", verdict.word, verdict.reason)?;
-    writeln!(text, "timing: {}", verdict.timing)?;
-    if let Some(advice) = verdict.advice(manifest) {
-        writeln!(text, "  {advice}")?;
-    }
     writeln!(
         text,
         "{}{}: {:.1} s of motion at {} Hz ({} clock), {} in {:.1} s of cycle time, seed {}, digest {}",
@@ -220,7 +225,7 @@ fn losses(text: &mut String, figures: &Figures) -> std::fmt::Result {
     writeln!(text, "frames: {}", frames.join(", "))
 }
 
-/// The events that `is_listed`, below a heading; nothing without any.
+/// The events that `is_listed`, below a heading, by the time of the motion where it began; nothing without any.
 fn list_events(
     text: &mut String,
     figures: &Figures,
@@ -231,7 +236,12 @@ fn list_events(
     if events.peek().is_some() {
         writeln!(text, "\n{heading}:")?;
     }
-    events.try_for_each(|event| writeln!(text, "  cycle {:>6} {}", event.cycle, event.in_words()))
+    let over_time = &figures.over_time;
+    let zero_ns = over_time.motion_began_ns.unwrap_or(over_time.began_ns);
+    events.try_for_each(|event| {
+        let at_s = (event.time_ns as f64 - zero_ns as f64) / 1e9;
+        writeln!(text, "  {at_s:>8.3} s  {}", event.in_words())
+    })
 }
 
 /// The table; nothing of a run that is no dry one.

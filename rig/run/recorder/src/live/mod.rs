@@ -10,6 +10,7 @@ mod connection;
 mod feed;
 mod foxglove;
 mod page;
+mod report;
 mod request;
 #[cfg(test)]
 mod tests;
@@ -28,6 +29,8 @@ use masseter_runtime::conversation::{Conversation, Limits, Newcomers};
 use masseter_runtime::named::Declared;
 use masseter_runtime::transport::{Domain, secret};
 use tungstenite::http::StatusCode;
+
+pub use report::ReportServer;
 
 use connection::{Host, INTERVAL, QUEUE, Queued, Socket, Supervisor, bit};
 use feed::Feed;
@@ -98,6 +101,7 @@ pub(crate) struct LiveServer {
     secret: String,
     feed: Arc<Feed>,
     clients: Arc<Clients>,
+    domain: Domain,
     dropped: AtomicU64,
     accepting: JoinHandle<()>,
 }
@@ -108,6 +112,7 @@ struct Client {
     stream: TcpStream,
     /// None once the server closes.
     queue: Option<SyncSender<Queued>>,
+    protocol: Protocol,
     /// One bit per topic that it subscribes to.
     subscribed: Arc<AtomicU16>,
     serving: JoinHandle<()>,
@@ -140,7 +145,7 @@ impl Client {
             };
         };
         let serving = thread::Builder::new().spawn(serve)?;
-        Ok(Self { stream, queue: Some(queue), subscribed, serving })
+        Ok(Self { stream, queue: Some(queue), protocol, subscribed, serving })
     }
 
     /// Queues a message if the client subscribes to its topic. False if the message is dropped for want of room.
@@ -232,7 +237,7 @@ impl LiveServer {
             secret: secret.clone(),
             scene,
             declared: Arc::new(declared),
-            domain,
+            domain: domain.clone(),
             feed: Arc::clone(&feed),
             supervisor: Supervisor::of_this_process(),
         };
@@ -241,7 +246,7 @@ impl LiveServer {
         let limits = Limits::newcomer(request::LONGEST);
         let mut newcomers = Newcomers::at(listener.into(), MAX_NEWCOMERS, limits)?;
         let accepting = thread::Builder::new().spawn(move || accepted.accept(&mut newcomers, &host))?;
-        Ok(Self { address, secret, feed, clients, dropped: AtomicU64::new(0), accepting })
+        Ok(Self { address, secret, feed, clients, domain, dropped: AtomicU64::new(0), accepting })
     }
 
     /// The address of the page, with the secret.
@@ -279,6 +284,10 @@ impl LiveServer {
         // A panic of this thread is on standard error already, and does not concern the recording.
         let _ = self.accepting.join();
         let mut clients = self.clients.connected();
+        let watches = |client: &Client| matches!(client.protocol, Protocol::Page { .. }) && !client.is_gone();
+        if clients.iter().any(watches) {
+            report::Address { address: self.address, secret: self.secret }.leave(&self.domain);
+        }
         // Without its queue a thread sends the rest and closes the connection.
         clients.iter_mut().for_each(|client| client.queue = None);
         for _ in 0..time.as_millis() / CLOSING_POLL.as_millis() {

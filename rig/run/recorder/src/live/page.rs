@@ -86,17 +86,18 @@ impl Session {
     }
 
     fn answer_request(&mut self, text: &str) -> Result<(), Disconnected> {
-        let refused = match serde_json::from_str(text) {
-            Ok(Wish::Set { name, value }) => {
-                access::set(&self.host.domain, &name, value).err().map(|error| error.to_string())
-            }
+        let answer = match serde_json::from_str(text) {
+            Ok(Wish::Set { name, value }) => match access::set(&self.host.domain, &name, value) {
+                Ok(_) => json!({ "set": name }),
+                Err(error) => json!({ "refused": error.to_string() }),
+            },
             Ok(Wish::Stop) => {
                 self.host.supervisor.stop();
-                None
+                return Ok(());
             }
-            Err(error) => Some(format!("the request is not valid: {error}")),
+            Err(error) => json!({ "refused": format!("the request is not valid: {error}") }),
         };
-        refused.map_or(Ok(()), |refused| self.socket.send_json(&json!({ "refused": refused })))
+        self.socket.send_json(&answer)
     }
 }
 

@@ -4,6 +4,7 @@ mod motion;
 mod recorded;
 mod result;
 mod rig;
+mod stop;
 mod times;
 
 use masseter_judge::{Figures, Verdict};
@@ -13,7 +14,8 @@ use masseter_recording::Manifest;
 use self::motion::{actuators_section, jaw_section, mechanism_section, motion_section, pressure_section};
 use self::result::{events_section, live_sections, named_section, requirements_section, result_section};
 use self::rig::{buses_section, circumstances_section, timing_section};
-use self::times::{moments, phases, time};
+use self::stop::{moments, stop_section, window};
+use self::times::{phases, time};
 
 pub(crate) use self::result::mark;
 
@@ -36,15 +38,16 @@ fn page(life: Life, first: Vec<Section>, manifest: &Manifest, figures: &Figures,
     let mechanism = mechanism_section(scenario, figures);
     // The jaw's views take the poses from the mechanism's.
     let jaw = mechanism.as_ref().and_then(|_| jaw_section(figures));
-    let others: [Option<Section>; 11] = [
-        requirements_section(figures, verdict),
+    let others: [Option<Section>; 12] = [
+        stop_section(figures),
+        requirements_section(figures, verdict, life),
         mechanism,
         jaw,
         Some(motion_section(scenario, figures)),
         pressure_section(figures),
         Some(actuators_section(scenario, figures)),
         named_section(figures),
-        Some(timing_section(scenario, figures)),
+        Some(timing_section(manifest, figures)),
         Some(buses_section(figures)),
         Some(events_section(figures)),
         Some(circumstances_section(manifest)),
@@ -52,6 +55,7 @@ fn page(life: Life, first: Vec<Section>, manifest: &Manifest, figures: &Figures,
     Page {
         about: about(manifest, figures),
         moments: moments(scenario, figures),
+        window: window(figures),
         phases: phases(figures),
         sections: first.into_iter().chain(others.into_iter().flatten()).collect(),
         ..Page::new(&scenario.name, life, time(manifest, figures))

@@ -35,7 +35,20 @@ pub(super) fn mechanism_section(scenario: &Scenario, figures: &Figures) -> Optio
 
 pub(super) fn motion_section(scenario: &Scenario, figures: &Figures) -> Section {
     let over_time = &figures.over_time;
-    let mut blocks = vec![Block::text("motion-in-words", motion_in_words(figures))];
+    let error = |title: &str, unit: &str, curve: &Curve, factor: f64| Chart {
+        series: vec![plain("distance", curve, factor)],
+        otherwise: "There was no desired motion.".to_owned(),
+        ..Chart::over_time(title, unit)
+    };
+    let distance = error("Incisal point from desired", "µm", &over_time.distance_m, 1e6);
+    let mut angle = error("Platform from desired, angle", "°", &over_time.angle_rad, 1f64.to_degrees());
+    "angle".clone_into(&mut angle.series[0].name);
+    // What nobody knows before the run comes first.
+    let mut blocks = vec![
+        Block::text("motion-in-words", motion_in_words(figures)),
+        Block::chart("error", distance),
+        Block::chart("angle", angle),
+    ];
     blocks.extend(figures.recorded.iter().flat_map(recorded_blocks));
     if let Some(closed_m) = closed_incisal_m(scenario) {
         let along = |axis: usize| {
@@ -45,17 +58,6 @@ pub(super) fn motion_section(scenario: &Scenario, figures: &Figures) -> Section 
         // The jaw opens downwards, so z says most.
         blocks.extend([along(2), along(0).half(), along(1).half()]);
     }
-    let error = |title: &str, unit: &str, curve: &Curve, factor: f64| Chart {
-        series: vec![plain("distance", curve, factor)],
-        otherwise: "There was no desired motion.".to_owned(),
-        height: 140,
-        ..Chart::over_time(title, unit)
-    };
-    let distance = error("Incisal point from desired", "µm", &over_time.distance_m, 1e6);
-    let mut angle = error("Platform from desired, angle", "°", &over_time.angle_rad, 1f64.to_degrees());
-    "angle".clone_into(&mut angle.series[0].name);
-    blocks.push(Block::chart("error", distance).half());
-    blocks.push(Block::chart("angle", angle).half());
     if figures.bite_force_max_n.is_some() {
         let force = Chart {
             series: vec![plain("bite force", &over_time.bite_force_n, 1.0)],

@@ -6,27 +6,47 @@ use masseter_judge::{
     Verdict,
 };
 use masseter_page::{
-    Block, Cell, Chart, Column, Content, EventRow, Events, Live, Moment, MomentKind, Points, Section, Series,
-    Style, Table, Tone,
+    Block, Cell, Chart, Column, Content, EventRow, Events, LevelKind, Life, Live, Moment, MomentKind, Points,
+    Section, Series, Style, Table, Tone,
 };
 use masseter_recording::Manifest;
 use masseter_runtime::messages::codes::{ControllerState, EventKind};
 use masseter_terminal::Exit;
 
-use super::times::{limit, plain, since_s};
-use crate::text::{microseconds, mm, or_dash, significant};
+use super::stop::{chain, moments, stop, window};
+use super::times::{level, limit, plain, since_s};
+use crate::text::{mm, or_dash};
 
 pub(super) fn result_section(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Section {
-    let row = |check: &Check| {
-        let Check { name, finding, result, .. } = check;
-        [name.to_string().into(), mark(*result), finding.clone().into()]
-    };
-    let checks = verdict.checks.iter().filter(|check| !check.is_requirement());
-    let table = Table::new("Checks", [Column::texts(&["check", "result", "found"])], checks.map(row));
     let mut blocks = vec![Block::new("verdict", Content::Verdict(panel(manifest, figures, verdict)))];
+    blocks.extend(chain(figures, &moments(&manifest.scenario, figures)));
+    blocks.push(Block::table("checks", checks(figures, verdict.checks.iter().collect())));
     blocks.extend(warning_blocks(manifest));
-    blocks.extend([Block::new("moments", Content::Moments), Block::table("checks", table)]);
     Section::new("result", "Result", blocks)
+}
+
+/// Checks and requirements, what is not as it should be first.
+fn checks(figures: &Figures, mut checks: Vec<&Check>) -> Table {
+    checks.sort_by_key(|check| match check.result {
+        CheckResult::Failed => 0,
+        CheckResult::Excused | CheckResult::Untested => 1,
+        CheckResult::Passed => 2,
+        CheckResult::NotJudged => 3,
+    });
+    let worst_ns = |check: &Check| {
+        let mut required = figures.requirements.iter().filter(|_| check.is_requirement());
+        required.find(|found| found.name == check.name).and_then(|found| found.worst_ns)
+    };
+    let has_times = checks.iter().any(|check| worst_ns(check).is_some());
+    let row = |check: &Check| {
+        let at = worst_ns(check).map_or_else(|| "".into(), |ns| Cell::Time { at_s: since_s(figures, ns) });
+        let Check { name, finding, result, .. } = check;
+        let cells: [Cell; 3] = [name.to_string().into(), mark(*result), finding.clone().into()];
+        cells.into_iter().chain(has_times.then_some(at)).collect::<Vec<_>>()
+    };
+    let times = if has_times { Column::texts(&["least margin at"]) } else { Vec::new() };
+    let columns = [Column::texts(&["check", "result", "found"]), times];
+    Table::new("Checks and requirements", columns, checks.into_iter().map(row))
 }
 
 /// What the plan of the run warns of.
@@ -51,9 +71,18 @@ fn panel(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> masseter_
     let (word, more) = timing.split_once(" (").unwrap_or((&timing, ""));
     let more = more.trim_end_matches(')').to_owned();
     let reasons = [more].into_iter().filter(|more| !more.is_empty()).chain(verdict.advice(manifest));
+    // The names of failed checks are no cause.
+    let cause = match (verdict.is_by_checks(), stop(figures)) {
+        (true, Some(stop)) => format!("; safe stop: {}", stop.in_words()),
+        (true, None) => {
+            let first = verdict.checks.iter().find(|check| check.result == CheckResult::Failed);
+            first.map_or_else(String::new, |Check { name, finding, .. }| format!("; {name}: {finding}"))
+        }
+        (false, _) => String::new(),
+    };
     masseter_page::Verdict {
         word: verdict.word.to_owned(),
-        reason: verdict.reason.clone(),
+        reason: verdict.reason.clone() + &cause,
         tone: match verdict.exit_code {
             Exit::Passed => Tone::Good,
             Exit::Invalid | Exit::Interrupted => Tone::Doubtful,
@@ -67,19 +96,25 @@ fn panel(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> masseter_
             TimingWord::Missed => Tone::Bad,
             TimingWord::Simulated | TimingWord::Unknown => Tone::Plain,
         },
-        figures: figures_in_words(figures),
+        figures: figures_in_words(manifest, figures),
     }
 }
 
-fn figures_in_words(figures: &Figures) -> Vec<[String; 2]> {
+/// None of a run that stopped: they would be those of the time before.
+fn figures_in_words(manifest: &Manifest, figures: &Figures) -> Vec<[String; 2]> {
+    if window(figures).is_some() {
+        return Vec::new();
+    }
     let errors = figures.tracking.actual;
-    let longest = figures.worst_cycles.first().map(|cycle| cycle.total_ns);
+    // In simulated time every cycle takes as long.
+    let longest = figures.worst_cycles.first().filter(|_| manifest.is_in_real_time());
+    let longest = longest.map(|cycle| cycle.total_ns);
     let mut all = vec![
         ["incisal point from desired, rms".to_owned(), mm(errors.incisal_rms_mm)],
         ["incisal point from desired, most".to_owned(), mm(errors.incisal_max_mm)],
     ];
     if let Some(longest_ns) = longest {
-        all.push(["longest cycle".to_owned(), format!("{} µs", microseconds(longest_ns))]);
+        all.push(["longest cycle".to_owned(), format!("{:.0} µs", longest_ns as f64 / 1e3)]);
     }
     if let Some(most_n) = figures.bite_force_max_n.filter(|most_n| *most_n > 0.0) {
         all.push(["greatest bite force".to_owned(), format!("{most_n:.1} N")]);
@@ -87,49 +122,24 @@ fn figures_in_words(figures: &Figures) -> Vec<[String; 2]> {
     all
 }
 
-/// Height of a small plot, px.
-const SMALL: u32 = 34;
-
-/// None where the scenario requires nothing.
-pub(super) fn requirements_section(figures: &Figures, verdict: &Verdict) -> Option<Section> {
-    let checks = verdict.checks.iter().filter(|check| check.is_requirement());
-    let rows = figures.requirements.iter().zip(checks);
-    let rows: Vec<_> = rows.map(|(found, check)| requirement_row(figures, found, check)).collect();
-    if rows.is_empty() {
-        return None;
-    }
-    let columns = [
-        Column::texts(&["requirement", "result", "signal and limit", "must hold", "found"]),
-        Column::numbers(&["margin", "smallest at, s", "latency, ms"]),
-    ];
-    let table = Table::new("Requirements", columns, rows);
-    let charts = figures.requirements.iter().enumerate().filter_map(|(place, found)| {
+/// The table of the requirements alone, for a page without a verdict, and the signal of each, what failed first. None where the
+/// scenario requires nothing that has a signal.
+pub(super) fn requirements_section(figures: &Figures, verdict: &Verdict, life: Life) -> Option<Section> {
+    let required = verdict.checks.iter().filter(|check| check.is_requirement()).collect();
+    let table = Block::table("requirements", checks(figures, required));
+    let mut found: Vec<_> = figures.requirements.iter().enumerate().collect();
+    found.sort_by_key(|(_, found)| found.result != CheckResult::Failed);
+    let charts = found.into_iter().filter_map(|(place, found)| {
         Some(Block::chart(format!("requirement-{place}"), requirement_chart(figures, found)?))
     });
-    let blocks = [Block::table("requirements", table)].into_iter().chain(charts).collect();
-    Some(Section::new("requirements", "Requirements", blocks))
-}
-
-fn requirement_row(figures: &Figures, found: &RequirementFigures, check: &Check) -> [Cell; 8] {
-    let margin = or_dash(found.margin, |margin| format!("{} {}", significant(margin), found.margin_unit));
-    let share = found.relative_margin.map(|share| format!(" ({:.0} %)", share * 100.0)).unwrap_or_default();
-    let plot = requirement_chart(figures, found)
-        .map_or_else(|| "".into(), |chart| Cell::Plot { plot: Box::new(Chart { height: SMALL, ..chart }) });
-    [
-        found.name.clone().into(),
-        mark(check.result),
-        plot,
-        found.must.clone().into(),
-        found.finding.clone().into(),
-        format!("{}{share}", margin.trim_end()).into(),
-        or_dash(found.worst_at_s, |at_s| format!("{at_s:.3}")).into(),
-        or_dash(found.latency_ms, |ms| format!("{ms:.3}")).into(),
-    ]
+    let has_table = life == Life::Live && !figures.requirements.is_empty();
+    let blocks: Vec<_> = has_table.then_some(table).into_iter().chain(charts).collect();
+    (!blocks.is_empty()).then(|| Section::new("requirements", "Requirements", blocks))
 }
 
 /// The signal, its limits, and the moment of the smallest margin; none without a signal.
 fn requirement_chart(figures: &Figures, of: &RequirementFigures) -> Option<Chart> {
-    let RequirementPlot { signal, unit, began_ns, curve, limits } = of.plot.as_ref()?;
+    let RequirementPlot { signal, unit, began_ns, curve, limits, found } = of.plot.as_ref()?;
     let shift_s = since_s(figures, *began_ns);
     let points: Vec<_> = curve.iter().map(|&(at_s, value)| (at_s + shift_s, value)).collect();
     let smallest = of.worst_ns.map(|ns| Moment {
@@ -138,9 +148,12 @@ fn requirement_chart(figures: &Figures, of: &RequirementFigures) -> Option<Chart
         name: "smallest margin".to_owned(),
         text: format!("smallest margin of {}", of.name),
     });
+    let found = found.as_ref().map(|(name, values)| level(LevelKind::Found, name, values));
+    let limits = (!limits.is_empty()).then(|| limit("limit", limits));
     Some(Chart {
         series: vec![Series::new(signal, Style::Plain, Points::over_time(&points))],
-        limits: if limits.is_empty() { Vec::new() } else { vec![limit("limit", limits)] },
+        limits: limits.into_iter().chain(found).collect(),
+        is_shaded: true,
         moments: smallest.into_iter().collect(),
         otherwise: "The signal has no value.".to_owned(),
         ..Chart::over_time(format!("{}: {signal}", of.name), *unit)
@@ -273,7 +286,8 @@ fn now(manifest: &Manifest, figures: &Figures, number: u64, left_out: u64) -> Li
     let state = figures.final_state.map_or_else(|| "starting".to_owned(), |state: Code<_>| state.to_string());
     let tone = match figures.final_state {
         Some(Code::Known(ControllerState::SafeStop)) => Tone::Bad,
-        Some(Code::Known(ControllerState::Running | ControllerState::Finished)) => Tone::Good,
+        // Whether an end is good, says the verdict.
+        Some(Code::Known(ControllerState::Running)) => Tone::Good,
         _ => Tone::Plain,
     };
     let over_time = &figures.over_time;
@@ -289,7 +303,7 @@ fn now(manifest: &Manifest, figures: &Figures, number: u64, left_out: u64) -> Li
     let missed = figures.controller_skips.skipped + figures.plant_skips.skipped;
     let mut shown = vec![
         ["incisal point from desired, rms".to_owned(), mm(errors.incisal_rms_mm)],
-        ["the same, greatest".to_owned(), mm(errors.incisal_max_mm)],
+        ["incisal point from desired, most".to_owned(), mm(errors.incisal_max_mm)],
         ["cycles".to_owned(), figures.cycles.to_string()],
         ["missed".to_owned(), missed.to_string()],
     ];

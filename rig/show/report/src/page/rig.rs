@@ -21,6 +21,12 @@ use crate::text::{microseconds, or_dash, us};
 /// The least latency that a logarithmic axis shows, µs.
 const LEAST_US: f64 = 0.01;
 
+/// The intervals that are shown at first; a click on their names shows the others.
+const SHOWN: [&str; 4] =
+    ["plant wake-up corrected", "controller wake-up corrected", "controller cycle", "round trip"];
+
+const SIMULATED: &str = "In simulated time no wake-up is late, and every interval follows from the model.";
+
 const P999: &str = "p99.9 needs 10,000 samples. A skipped deadline has a sample only in the two wake-ups named corrected (for \
 coordinated omission): the time until the wake-up that skipped it.";
 
@@ -29,38 +35,58 @@ where a newer one overtook it. The hop is the one furthest above its median. The
 between two samples, a tenth of a second apart: time that the hypervisor took (in steps of 10 ms), times that a loop lost its \
 core, and page faults of both processes.";
 
-pub(super) fn timing_section(scenario: &Scenario, figures: &Figures) -> Section {
+pub(super) fn timing_section(manifest: &Manifest, figures: &Figures) -> Section {
     let (skips, readings) = (table::skips(figures), table::readings(&figures.readings));
     let skipped = format!("Skipped {skips}. Controller's {readings}.");
-    let blocks = vec![
-        Block::chart("percentiles", percentiles(scenario, figures)),
-        Block::table("latencies", latencies(&figures.intervals)).folded("Latencies in numbers"),
-        Block::text("percentiles-in-words", P999),
-        Block::text("skipped", skipped),
-        wake_ups(figures),
-        Block::text("worst-in-words", LONGEST),
-        Block::table("worst", longest(figures)),
-    ];
+    let [percentiles, histogram] = distributions(&manifest.scenario, figures);
+    let percentiles = Block::chart("percentiles", percentiles);
+    let latencies = Block::table("latencies", latencies(&figures.intervals)).folded("Latencies in numbers");
+    let worst = Block::table("worst", longest(figures));
+    let blocks = if manifest.is_in_real_time() {
+        vec![
+            Block::chart("histogram", histogram),
+            percentiles,
+            latencies,
+            Block::text("percentiles-in-words", P999),
+            Block::text("skipped", skipped),
+            wake_ups(figures),
+            Block::text("worst-in-words", LONGEST),
+            worst,
+        ]
+    } else {
+        vec![
+            Block::text("simulated", SIMULATED),
+            percentiles.folded("Latency by percentile"),
+            latencies,
+            worst.folded("Longest cycles"),
+        ]
+    };
     Section::new("timing", "Timing", blocks)
 }
 
-/// Percentiles of every interval, with the cycle's budgets.
-fn percentiles(scenario: &Scenario, figures: &Figures) -> Chart {
-    let measured = figures.intervals.iter().filter(|interval| interval.max_ns > Some(0));
-    let series = |interval: &IntervalFigures| {
-        let points: Vec<_> =
-            interval.curve.iter().map(|&(x, value_ns)| (x, in_us(value_ns as f64))).collect();
-        Series::new(interval.name, Style::Plain, Points::plain(&points))
+/// Percentiles and histogram of every interval, with the cycle's budgets beside the percentiles.
+fn distributions(scenario: &Scenario, figures: &Figures) -> [Chart; 2] {
+    let series = |interval: &IntervalFigures, points: Vec<(f64, f64)>| Series {
+        is_hidden: !SHOWN.contains(&interval.name),
+        ..Series::new(interval.name, Style::Plain, Points::plain(&points))
     };
-    Chart {
-        across: Across::Percentile,
+    let measured = || figures.intervals.iter().filter(|interval| interval.max_ns > Some(0));
+    let percentiles = measured().map(|interval| {
+        series(interval, interval.curve.iter().map(|&(x, ns)| (x, in_us(ns as f64))).collect())
+    });
+    let histograms = measured().map(|interval| {
+        series(interval, interval.buckets.iter().map(|&(ns, n)| (in_us(ns as f64), n as f64)).collect())
+    });
+    let chart = |title: &str, unit: &str, across, series| Chart {
+        across,
         scale: Scale::Log,
-        series: measured.map(series).collect(),
-        limits: budgets(scenario),
-        height: 330,
+        series,
         otherwise: "No interval was measured.".to_owned(),
-        ..Chart::over_time("Latency by percentile", "µs")
-    }
+        ..Chart::over_time(title, unit)
+    };
+    let percentiles = chart("Latency by percentile", "µs", Across::Percentile, percentiles.collect());
+    let histogram = chart("Latency histogram", "samples", Across::Duration, histograms.collect());
+    [Chart { limits: budgets(scenario), height: 330, ..percentiles }, Chart { height: 240, ..histogram }]
 }
 
 /// What the time table leaves: the period, and from the controller's deadline to the latest command.
@@ -74,18 +100,14 @@ fn budgets(scenario: &Scenario) -> Vec<Limit> {
     budgets
 }
 
-/// The latest wake-ups over time; words under virtual time, where no wake-up is late.
+/// The latest wake-ups over time.
 fn wake_ups(figures: &Figures) -> Block {
     let over_time = &figures.over_time;
-    let curves = [("controller", &over_time.controller_late_ns), ("plant", &over_time.plant_late_ns)];
-    let is_late = |curve: &Curve| curve.iter().any(|(_, late_ns)| *late_ns > 0.0);
-    if !curves.iter().any(|(_, curve)| is_late(curve)) {
-        return Block::text("jitter", "Under virtual time no wake-up is late.");
-    }
     let late = |(name, curve): (&str, &Curve)| {
         let points: Vec<_> = curve.iter().map(|&(at_s, late_ns)| (at_s, in_us(late_ns))).collect();
         Series::new(name, Style::Plain, Points::over_time(&points))
     };
+    let curves = [("controller", &over_time.controller_late_ns), ("plant", &over_time.plant_late_ns)];
     let chart = Chart {
         scale: Scale::Log,
         series: curves.map(late).into(),

@@ -1,10 +1,9 @@
 //! What sections of the page have in common: times as seconds since the run's first SYNC, and curves.
 
-use masseter_judge::{Curve, EventRecord, FaultFigures, Figures};
-use masseter_page::{Limit, Moment, MomentKind, Phase, Points, Series, Style, Time};
+use masseter_judge::{Curve, Figures};
+use masseter_page::{LevelKind, Limit, Phase, Points, Series, Style, Time};
 use masseter_recording::Manifest;
 use masseter_runtime::messages::codes::Source;
-use masseter_scenario::Scenario;
 
 /// What the page's times count from.
 pub(super) fn time(manifest: &Manifest, figures: &Figures) -> Time {
@@ -21,27 +20,6 @@ pub(super) fn time(manifest: &Manifest, figures: &Figures) -> Time {
 /// An instant of the run's clock as a time of the page, s since the first SYNC.
 pub(super) fn since_s(figures: &Figures, time_ns: u64) -> f64 {
     time_ns.saturating_sub(figures.over_time.began_ns) as f64 / 1e9
-}
-
-/// The first strike of every fault, and the event that began the first safe stop.
-pub(super) fn moments(scenario: &Scenario, figures: &Figures) -> Vec<Moment> {
-    let strike = |fault: &FaultFigures| {
-        let declared = scenario.faults.get(fault.number - 1)?;
-        Some(Moment {
-            at_s: since_s(figures, fault.struck_ns?),
-            kind: MomentKind::Fault,
-            name: format!("fault {}", fault.number),
-            text: format!("fault {}: {declared}", fault.number),
-        })
-    };
-    let stop = figures.events.iter().find(|event| event.begins_stop());
-    let detection = |EventRecord { source, cause, time_ns, .. }: &EventRecord| Moment {
-        at_s: since_s(figures, *time_ns),
-        kind: MomentKind::Detection,
-        name: "safe stop".to_owned(),
-        text: format!("safe stop: {source}, {cause}"),
-    };
-    figures.faults.iter().filter_map(strike).chain(stop.map(detection)).collect()
 }
 
 /// The states of the controller, one after the other.
@@ -73,7 +51,11 @@ pub(super) fn plain(name: &str, curve: &Curve, unit: f64) -> Series {
 }
 
 pub(super) fn limit(name: &str, values: &[f64]) -> Limit {
-    Limit { name: name.to_owned(), values: values.to_vec() }
+    level(LevelKind::Limit, name, values)
+}
+
+pub(super) fn level(kind: LevelKind, name: &str, values: &[f64]) -> Limit {
+    Limit { name: name.to_owned(), kind, values: values.to_vec() }
 }
 
 /// A curve in another unit, from another zero.

@@ -39,7 +39,8 @@ fn every_document_names_what_was_not_tested() {
 fn a_run_without_a_cycle_claims_nothing() {
     let (manifest, figures) = run(0, 0);
     let verdict = Verdict::new(&manifest, &figures);
-    let text = table::table_in_words(&manifest, &figures, &verdict, Detail::Brief);
+    let said = table::verdict_in_words(&manifest, &verdict);
+    let text = said + &table::table_in_words(&manifest, &figures, &verdict, Detail::Brief);
     assert!(text.starts_with("UNTESTED: no cycle ran\n") && !text.contains("FAIL"), "{text}");
     assert!(text.contains("\ntiming: unknown, because no cycle ran\n"), "{text}");
 }
