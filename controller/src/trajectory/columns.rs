@@ -200,12 +200,8 @@ pub(super) struct Scaled {
 
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Clock {
-    /// Numbers, or times of the day.
+    /// Numbers of a unit or of frames, or times of the day.
     Times(Scaled),
-    Frames {
-        column: usize,
-        rate_hz: f64,
-    },
     Rows {
         rate_hz: f64,
     },
@@ -248,7 +244,7 @@ impl Layout {
             Reader { columns, config, assumed, used: Vec::new(), protocol: Vec::new(), asked: Vec::new() };
         let clock = reader.clock(is_clock)?;
         let content = reader.content()?;
-        reader.refuse_unused_keys(&clock, &content)?;
+        reader.refuse_unused_keys(&content)?;
         if !reader.asked.is_empty() {
             return Err(reader.asked.join("; "));
         }
@@ -355,8 +351,15 @@ impl Reader<'_> {
 
     fn clock(&mut self, is_clock: impl Fn(usize) -> bool) -> Result<Clock, String> {
         let rate_hz = self.config.rate_hz;
+        let has_unit = self.config.time_unit.is_some();
         if let Some(at) = self.one(&Meaning::Time)? {
+            refuse_unused("rate_hz", rate_hz.is_some(), "is for files without a column of times")?;
             if is_clock(at) {
+                refuse_unused(
+                    "time_unit",
+                    has_unit,
+                    "is for times in numbers, and these are times of the day",
+                )?;
                 self.use_columns("time", &[at], ", times of the day");
                 return Ok(Clock::Times(Scaled { column: at, size: 1.0 }));
             }
@@ -364,6 +367,7 @@ impl Reader<'_> {
             let [scaled] = self.scaled("time", [at], key, self.assumed.time.map(Unit::Time));
             return Ok(Clock::Times(scaled));
         }
+        refuse_unused("time_unit", has_unit, "is for files with a column of times")?;
         let frames = self.one(&Meaning::Frame)?;
         let Some(rate_hz) = rate_hz else {
             self.asked.push("no column has times; set motion.rate_hz = the rows a second".to_owned());
@@ -371,7 +375,7 @@ impl Reader<'_> {
         };
         if let Some(column) = frames {
             self.use_columns("time", &[column], &format!(", frames at motion.rate_hz = {rate_hz}"));
-            return Ok(Clock::Frames { column, rate_hz });
+            return Ok(Clock::Times(Scaled { column, size: 1.0 / rate_hz }));
         }
         self.protocol.push(format!("time from the order of the rows at motion.rate_hz = {rate_hz}"));
         Ok(Clock::Rows { rate_hz })
@@ -556,29 +560,24 @@ impl Reader<'_> {
         Ok(Some(Content::Markers { names, places }))
     }
 
-    /// Refuses a key without a use in the file, because an ignored key hides a mistake.
-    fn refuse_unused_keys(&self, clock: &Clock, content: &Content) -> Result<(), String> {
+    fn refuse_unused_keys(&self, content: &Content) -> Result<(), String> {
         let config = self.config;
         let has_angles = matches!(content, Content::Poses { turn: Turn::Angles(_), .. });
         let is_of_poses = matches!(content, Content::Poses { .. });
-        let has_times = matches!(clock, Clock::Times(_));
         let of_markers = "is for files of markers, and this one holds poses";
         let of_poses = "is for files of poses, and this one holds markers";
         let of_angles = "is for files with three angles";
-        let unused = [
-            ("marker_origin_mm", config.marker_origin_mm.is_some() && is_of_poses, of_markers),
-            ("markers", config.markers.is_some() && is_of_poses, of_markers),
-            ("reference_point_mm", config.reference_point_mm.is_some() && !is_of_poses, of_poses),
-            ("angle_unit", config.angle_unit.is_some() && !has_angles, of_angles),
-            ("euler_order", config.euler_order.is_some() && !has_angles, of_angles),
-            ("rate_hz", config.rate_hz.is_some() && has_times, "is for files without a column of times"),
-            ("time_unit", config.time_unit.is_some() && !has_times, "is for files with a column of times"),
-        ];
-        match unused.iter().find(|(_, is_unused, _)| *is_unused) {
-            Some((key, _, reason)) => Err(format!("motion.{key} {reason}; leave it away")),
-            None => Ok(()),
-        }
+        refuse_unused("marker_origin_mm", config.marker_origin_mm.is_some() && is_of_poses, of_markers)?;
+        refuse_unused("markers", config.markers.is_some() && is_of_poses, of_markers)?;
+        refuse_unused("reference_point_mm", config.reference_point_mm.is_some() && !is_of_poses, of_poses)?;
+        refuse_unused("angle_unit", config.angle_unit.is_some() && !has_angles, of_angles)?;
+        refuse_unused("euler_order", config.euler_order.is_some() && !has_angles, of_angles)
     }
+}
+
+/// Refuses a key without a use in the file, because an ignored key hides a mistake.
+fn refuse_unused(key: &str, is_unused: bool, reason: &str) -> Result<(), String> {
+    if is_unused { Err(format!("motion.{key} {reason}; leave it away")) } else { Ok(()) }
 }
 
 /// The axes of an order of turns, as turns about axes that move with the jaw: turns about fixed axes are those in the

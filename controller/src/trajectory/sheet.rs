@@ -8,7 +8,7 @@ use masseter_scenario::wording::counted;
 use masseter_scenario::{AngleUnit, LengthUnit, TimeUnit};
 
 use super::columns::{Assumed, Column, Meaning, Unit};
-use super::row::Located;
+use super::row::{Located, is_lost};
 
 /// Lines in which the header is looked for.
 const HEAD_LINES: usize = 200;
@@ -88,8 +88,10 @@ impl<'a> Sheet<'a> {
     /// `named`: the columns by a key.
     pub(super) fn of(text: &'a str, named: Option<&[String]>) -> Result<Self, Located> {
         let (assumed, format, after) = vendor(text);
-        let head: Vec<(usize, &str)> =
-            content(text).filter(|(at, _)| *at >= after).take(HEAD_LINES).collect();
+        let head: Vec<(usize, &str)> = content(text)
+            .filter(|(at, line)| *at >= after && !line.trim().is_empty())
+            .take(HEAD_LINES)
+            .collect();
         let mut sheet = match named {
             Some(names) => Self::named(text, &head, names)?,
             None => Self::with_header(text, &head)?,
@@ -109,12 +111,14 @@ impl<'a> Sheet<'a> {
         Ok(sheet)
     }
 
-    /// The cells of each row, with its line from 1.
+    /// The cells of each row, with its line from 1. A row whose cells are all empty has none.
     pub(super) fn rows(&self) -> impl Iterator<Item = Result<(u64, Vec<&'a str>), Located>> {
         let rows = content(self.text).filter(|(at, _)| *at >= self.head_lines);
-        let rows = rows.map(|(at, line)| (at as u64 + 1, self.separator.cells(line)));
-        let rows = rows.filter(|(_, cells)| cells.iter().any(|cell| !cell.is_empty()));
-        rows.map(|(line, mut cells)| {
+        rows.map(|(at, text)| {
+            let (line, mut cells) = (at as u64 + 1, self.separator.cells(text));
+            if cells.iter().all(|cell| cell.is_empty()) {
+                return Ok((line, Vec::new()));
+            }
             let (found, expected) = (cells.len(), self.columns.len());
             if found < expected || cells[expected..].iter().any(|cell| !cell.is_empty()) {
                 let found = counted(found as u64, "cell");
@@ -175,7 +179,7 @@ impl<'a> Sheet<'a> {
         })
     }
 
-    /// The rows begin at the first line with a number in each of the columns that a key names.
+    /// The rows begin at the first line with numbers, or lost samples, in the columns that a key names.
     fn named(text: &'a str, head: &[(usize, &'a str)], names: &[String]) -> Result<Self, Located> {
         let columns: Vec<Column> = names.iter().map(|name| Column::of(name)).collect();
         let is_number = |cell: &str| {
@@ -185,9 +189,12 @@ impl<'a> Sheet<'a> {
         for (line, text_there) in head {
             for (separator, _) in Separator::ALL {
                 let cells = separator.cells(text_there);
-                let mut both = columns.iter().zip(&cells);
+                let used =
+                    columns.iter().zip(&cells).filter(|(column, _)| column.meaning != Meaning::Unknown);
+                let used: Vec<&str> = used.map(|(_, cell)| *cell).collect();
                 if cells.len() == columns.len()
-                    && both.all(|(column, cell)| column.meaning == Meaning::Unknown || is_number(cell))
+                    && used.iter().all(|cell| is_number(cell) || is_lost(cell))
+                    && used.iter().any(|cell| is_number(cell))
                 {
                     return Ok(Self {
                         text,
@@ -208,11 +215,10 @@ impl<'a> Sheet<'a> {
     }
 }
 
-/// The lines that are not blank and no comments, each with its index.
+/// The lines that are not blank and no comments, each with its index. Tabs alone are cells of a row.
 fn content(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    text.lines()
-        .enumerate()
-        .filter(|(_, line)| !line.trim().is_empty() && !line.trim_start().starts_with('#'))
+    let is_content = |line: &str| !line.trim_matches(' ').is_empty() && !line.trim_start().starts_with('#');
+    text.lines().enumerate().filter(move |(_, line)| is_content(line))
 }
 
 /// The columns of a header. Coordinates without a marker's name take the name from the line above, as in TRC.
