@@ -7,7 +7,7 @@ use masseter_scenario::input::excerpt;
 use masseter_scenario::wording::counted;
 use masseter_scenario::{AngleUnit, LengthUnit, TimeUnit};
 
-use super::columns::{Assumed, Column, Meaning, Unit};
+use super::columns::{Column, Meaning, Unit, Units};
 use super::row::{Located, is_lost};
 
 /// Lines in which the header is looked for.
@@ -80,7 +80,7 @@ pub(super) struct Sheet<'a> {
     pub columns: Vec<Column>,
     /// The line of the names; none if a key gives them.
     pub header_line: Option<u64>,
-    pub assumed: Assumed,
+    pub assumed: Units,
     pub protocol: Vec<String>,
 }
 
@@ -174,7 +174,7 @@ impl<'a> Sheet<'a> {
             head_lines,
             columns,
             header_line: Some(line as u64 + 1),
-            assumed: Assumed::default(),
+            assumed: Units::default(),
             protocol: Vec::new(),
         })
     }
@@ -202,7 +202,7 @@ impl<'a> Sheet<'a> {
                         head_lines: *line,
                         columns,
                         header_line: None,
-                        assumed: Assumed::default(),
+                        assumed: Units::default(),
                         protocol: Vec::new(),
                     });
                 }
@@ -251,7 +251,7 @@ fn names(header: &[String], above: &[String]) -> Vec<Column> {
 }
 
 /// What the head of a format says: the units, the format's name, and the line after the head, from 0.
-fn vendor(text: &str) -> (Assumed, Option<&'static str>, usize) {
+fn vendor(text: &str) -> (Units, Option<&'static str>, usize) {
     let lines: Vec<&str> = text.lines().take(HEAD_LINES).collect();
     if let [first, keys, values, ..] = lines[..]
         && first.starts_with("PathFileType")
@@ -259,15 +259,15 @@ fn vendor(text: &str) -> (Assumed, Option<&'static str>, usize) {
         let at = keys.split('\t').position(|key| key.trim().eq_ignore_ascii_case("units"));
         let unit = at.and_then(|at| Unit::of(values.split('\t').nth(at)?));
         let length = if let Some(Unit::Length(length)) = unit { Some(length) } else { None };
-        return (Assumed { time: Some(TimeUnit::S), length, angle: None }, Some("TRC: times in s"), 3);
+        return (Units { time: Some(TimeUnit::S), length, angle: None }, Some("TRC: times in s"), 3);
     }
     let Some(end) = lines.iter().position(|line| line.trim().eq_ignore_ascii_case("endheader")) else {
-        return (Assumed::default(), None, 0);
+        return (Units::default(), None, 0);
     };
     let is_in_degrees =
         lines[..end].iter().any(|line| line.replace(' ', "").eq_ignore_ascii_case("inDegrees=yes"));
     let angle = Some(if is_in_degrees { AngleUnit::Deg } else { AngleUnit::Rad });
-    let assumed = Assumed { time: Some(TimeUnit::S), length: Some(LengthUnit::M), angle };
+    let assumed = Units { time: Some(TimeUnit::S), length: Some(LengthUnit::M), angle };
     let format = if is_in_degrees {
         "MOT/STO: times in s, lengths in m, angles in degrees"
     } else {

@@ -11,6 +11,7 @@ use masseter_scenario::wording::counted;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::columns::{Clock, Content, Layout, Scaled, Turn};
+use super::doubts::upper_median;
 use super::markers::{Body, settle};
 use super::row::{Located, Row, gaps, is_lost};
 use super::sheet::Sheet;
@@ -324,9 +325,7 @@ fn lose_origins(rows: &mut [Row]) {
 
 fn check_steps(rows: &[Row]) -> Result<(), Located> {
     let step_s = |pair: &[Row]| pair[1].time_s - pair[0].time_s;
-    let mut steps_s: Vec<f64> = rows.windows(2).map(step_s).collect();
-    let middle = steps_s.len() / 2;
-    let usual_s = *steps_s.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let usual_s = upper_median(&rows.windows(2).map(step_s).collect::<Vec<_>>());
     // Steps that are short for a tracker are judged with the speeds.
     if usual_s > 0.0 && !(SHORTEST_STEP_S..=LARGEST_GAP_S).contains(&usual_s) {
         let unit = match usual_s / LARGEST_GAP_S {
