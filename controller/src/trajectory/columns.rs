@@ -397,11 +397,7 @@ impl Reader<'_> {
         if let Some(at) = self.one(&Meaning::Time)? {
             refuse_unused("rate_hz", rate_hz.is_some(), "is for files without a column of times")?;
             if is_clock(at) {
-                refuse_unused(
-                    "time_unit",
-                    has_unit,
-                    "is for times in numbers, and these are times of the day",
-                )?;
+                refuse_unused("time_unit", has_unit, "is for times in numbers, not of the day")?;
                 self.use_columns("time", &[at], ", times of the day");
                 return Ok(Clock::Times(Scaled { column: at, size: 1.0 }));
             }

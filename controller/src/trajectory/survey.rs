@@ -169,7 +169,10 @@ pub fn survey(config: &FileConfig, jaw: &JawConfig) -> Result<RecordingSurvey, T
         turn_deg: path.iter().map(|row| row.turn_rad.norm().to_degrees()).fold(0.0, f64::max),
         implausible,
         likely_unit: likely,
-        likely_axes: frames.as_ref().and_then(Frames::other_axes),
+        likely_axes: frames
+            .as_ref()
+            .filter(|frames| !frames.fits())
+            .map(|frames| frames.best[0].axes.clone()),
         frames,
         glitches: recording.glitches,
         doubts: recording.doubts,
