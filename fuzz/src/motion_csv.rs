@@ -7,7 +7,7 @@ use crate::{assert_proper, file_of};
 use arbitrary::{Result, Unstructured};
 use masseter_controller::trajectory::Trajectory;
 use masseter_model::geometry::{Mechanism, MechanismConfig};
-use masseter_scenario::{FileConfig, JawConfig, MotionConfig};
+use masseter_scenario::{FileConfig, IfImplausible, JawConfig, MotionConfig};
 
 const POSES: &str = "time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz";
 const MARKERS: &str = "time_s,m1_x_mm,m1_y_mm,m1_z_mm,m2_x_mm,m2_y_mm,m2_z_mm,m3_x_mm,m3_y_mm,m3_z_mm";
@@ -53,6 +53,8 @@ fn config(bytes: &mut Unstructured<'_>) -> Result<FileConfig> {
         reference_point_mm: bytes.arbitrary()?,
         marker_origin_mm: bytes.arbitrary()?,
         lowpass_hz: *bytes.choose(&[config.lowpass_hz, 0.0, 0.5, 50.0])?,
+        // Of random rows hardly any are plausible; with a warning they are played all the same.
+        if_implausible: *bytes.choose(&[IfImplausible::Warn, IfImplausible::Refuse])?,
         ..config
     })
 }

@@ -3,11 +3,12 @@
 //! A name counts in any case and with any signs between its words. A unit stands in brackets or at the end. What the
 //! names and the keys of `[motion]` leave open is asked for. The module reads no numbers.
 
-use std::fmt::Write;
+use std::fmt::{self, Display, Formatter};
 
 use masseter_scenario::input::{excerpt, sentence};
 use masseter_scenario::wording::counted;
 use masseter_scenario::{AngleUnit, FileConfig, LengthUnit, TimeUnit};
+use serde::Serialize;
 
 /// Most and least markers of a body.
 pub(super) const MARKERS: [usize; 2] = [3, 12];
@@ -21,11 +22,17 @@ const MATRICES: [&str; 7] = ["m", "r", "t", "a", "mat", "rot", "matrix"];
 const TIMES: [&str; 6] = ["time", "t", "timestamp", "clock", "zeit", "uhrzeit"];
 const FRAMES: [&str; 7] = ["frame", "frameno", "framenumber", "sample", "sampleno", "samplenumber", "bild"];
 
-/// A unit of time, length or angle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Unit {
+/// A unit of a recording, by its key.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Unit {
+    /// Of times.
+    #[serde(rename = "time_unit")]
     Time(TimeUnit),
+    /// Of lengths.
+    #[serde(rename = "length_unit")]
     Length(LengthUnit),
+    /// Of three angles.
+    #[serde(rename = "angle_unit")]
     Angle(AngleUnit),
 }
 
@@ -49,8 +56,19 @@ impl Unit {
         })
     }
 
-    /// Its symbol, and its size in s, mm or rad.
-    fn parts(self) -> (&'static str, f64) {
+    /// The section with this unit.
+    pub fn applied(self, config: &FileConfig) -> FileConfig {
+        let mut config = config.clone();
+        match self {
+            Self::Time(unit) => config.time_unit = Some(unit),
+            Self::Length(unit) => config.length_unit = Some(unit),
+            Self::Angle(unit) => config.angle_unit = Some(unit),
+        }
+        config
+    }
+
+    /// Its name, as in a scenario, and its size in s, mm or rad.
+    pub(super) fn parts(self) -> (&'static str, f64) {
         match self {
             Self::Time(TimeUnit::S) => ("s", 1.0),
             Self::Time(TimeUnit::Ms) => ("ms", 1e-3),
@@ -62,6 +80,18 @@ impl Unit {
             Self::Angle(AngleUnit::Deg) => ("deg", std::f64::consts::PI / 180.0),
             Self::Angle(AngleUnit::Rad) => ("rad", 1.0),
         }
+    }
+}
+
+/// The key and its value.
+impl Display for Unit {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let key = match self {
+            Self::Time(_) => "time_unit",
+            Self::Length(_) => "length_unit",
+            Self::Angle(_) => "angle_unit",
+        };
+        write!(f, "{key} = \"{}\"", self.parts().0)
     }
 }
 
@@ -183,12 +213,30 @@ fn meaning(words: &[String]) -> Meaning {
     }
 }
 
-/// Units that the format of a file fixes.
+/// What a unit is of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Quantity {
+    Time,
+    Length,
+    Angle,
+}
+
+/// Units that the format of a file or the keys fix.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Assumed {
+pub(super) struct Units {
     pub time: Option<TimeUnit>,
     pub length: Option<LengthUnit>,
     pub angle: Option<AngleUnit>,
+}
+
+impl Units {
+    fn of(self, quantity: Quantity) -> Option<Unit> {
+        match quantity {
+            Quantity::Time => self.time.map(Unit::Time),
+            Quantity::Length => self.length.map(Unit::Length),
+            Quantity::Angle => self.angle.map(Unit::Angle),
+        }
+    }
 }
 
 /// A column of numbers, and the size of its unit in s, mm or rad.
@@ -200,12 +248,8 @@ pub(super) struct Scaled {
 
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Clock {
-    /// Numbers, or times of the day.
+    /// Numbers of a unit or of frames, or times of the day.
     Times(Scaled),
-    Frames {
-        column: usize,
-        rate_hz: f64,
-    },
     Rows {
         rate_hz: f64,
     },
@@ -241,14 +285,14 @@ impl Layout {
     pub(super) fn of(
         columns: &[Column],
         config: &FileConfig,
-        assumed: Assumed,
+        assumed: Units,
         is_clock: impl Fn(usize) -> bool,
     ) -> Result<Self, String> {
         let mut reader =
             Reader { columns, config, assumed, used: Vec::new(), protocol: Vec::new(), asked: Vec::new() };
         let clock = reader.clock(is_clock)?;
         let content = reader.content()?;
-        reader.refuse_unused_keys(&clock, &content)?;
+        reader.refuse_unused_keys(&content)?;
         if !reader.asked.is_empty() {
             return Err(reader.asked.join("; "));
         }
@@ -267,7 +311,7 @@ impl Layout {
 struct Reader<'a> {
     columns: &'a [Column],
     config: &'a FileConfig,
-    assumed: Assumed,
+    assumed: Units,
     used: Vec<usize>,
     protocol: Vec<String>,
     /// What neither the file nor a key says, each with its key.
@@ -323,47 +367,45 @@ impl Reader<'_> {
         self.protocol.push(format!("{what} from {}{units}", sentence(&names.join(", "))));
     }
 
-    /// The columns in the unit of a key, of their names, or of the format.
-    fn scaled<const N: usize>(
-        &mut self,
-        what: &str,
-        found: [usize; N],
-        key: (&str, Option<Unit>),
-        assumed: Option<Unit>,
-    ) -> [Scaled; N] {
-        let (key, set) = key;
+    /// The columns in the unit of a key, of their names, or of the format, and the units in words.
+    fn scaled<const N: usize>(&mut self, found: [usize; N], quantity: Quantity) -> ([Scaled; N], String) {
+        let FileConfig { time_unit: time, length_unit: length, angle_unit: angle, .. } = *self.config;
+        let (set, assumed) = (Units { time, length, angle }.of(quantity), self.assumed.of(quantity));
+        let (key, need) = match quantity {
+            Quantity::Time => ("motion.time_unit", "\"s\", \"ms\" or \"us\""),
+            Quantity::Length => ("motion.length_unit", "\"um\", \"mm\", \"cm\" or \"m\""),
+            Quantity::Angle => ("motion.angle_unit", "\"deg\" or \"rad\""),
+        };
         let unit_of = |at: usize| set.or(self.columns[at].unit).or(assumed);
         if let Some(&at) = found.iter().find(|&&at| unit_of(at).is_none()) {
             let name = quoted(&self.columns[at]);
-            let need = match key {
-                "motion.time_unit" => "\"s\", \"ms\" or \"us\"",
-                "motion.length_unit" => "\"um\", \"mm\", \"cm\" or \"m\"",
-                _ => "\"deg\" or \"rad\"",
-            };
-            let ask = format!("column {} {name} has no unit; set {key} = {need}", at + 1);
             if !self.asked.iter().any(|asked| asked.ends_with(need)) {
-                self.asked.push(ask);
+                self.asked.push(format!("column {} {name} has no unit; set {key} = {need}", at + 1));
             }
         }
         let parts = found.map(|at| unit_of(at).map_or(("?", 1.0), Unit::parts));
-        let mut symbols: Vec<_> = parts.iter().map(|(symbol, _)| *symbol).collect();
+        let mut symbols = parts.map(|(symbol, _)| symbol).to_vec();
         symbols.dedup();
         let by = if set.is_some() { format!(" by {key}") } else { String::new() };
-        self.use_columns(what, &found, &format!(" in {}{by}", symbols.join(", ")));
-        std::array::from_fn(|part| Scaled { column: found[part], size: parts[part].1 })
+        let scaled = std::array::from_fn(|part| Scaled { column: found[part], size: parts[part].1 });
+        (scaled, format!("{}{by}", symbols.join(", ")))
     }
 
     fn clock(&mut self, is_clock: impl Fn(usize) -> bool) -> Result<Clock, String> {
         let rate_hz = self.config.rate_hz;
+        let has_unit = self.config.time_unit.is_some();
         if let Some(at) = self.one(&Meaning::Time)? {
+            refuse_unused("rate_hz", rate_hz.is_some(), "is for files without a column of times")?;
             if is_clock(at) {
+                refuse_unused("time_unit", has_unit, "is for times in numbers, not of the day")?;
                 self.use_columns("time", &[at], ", times of the day");
                 return Ok(Clock::Times(Scaled { column: at, size: 1.0 }));
             }
-            let key = ("motion.time_unit", self.config.time_unit.map(Unit::Time));
-            let [scaled] = self.scaled("time", [at], key, self.assumed.time.map(Unit::Time));
+            let ([scaled], unit) = self.scaled([at], Quantity::Time);
+            self.use_columns("time", &[at], &format!(" in {unit}"));
             return Ok(Clock::Times(scaled));
         }
+        refuse_unused("time_unit", has_unit, "is for files with a column of times")?;
         let frames = self.one(&Meaning::Frame)?;
         let Some(rate_hz) = rate_hz else {
             self.asked.push("no column has times; set motion.rate_hz = the rows a second".to_owned());
@@ -371,7 +413,7 @@ impl Reader<'_> {
         };
         if let Some(column) = frames {
             self.use_columns("time", &[column], &format!(", frames at motion.rate_hz = {rate_hz}"));
-            return Ok(Clock::Frames { column, rate_hz });
+            return Ok(Clock::Times(Scaled { column, size: 1.0 / rate_hz }));
         }
         self.protocol.push(format!("time from the order of the rows at motion.rate_hz = {rate_hz}"));
         Ok(Clock::Rows { rate_hz })
@@ -397,14 +439,14 @@ impl Reader<'_> {
             (None, Some(Turn::Matrix { .. })) => of_matrix()?,
             (place, _) => place,
         };
-        let key = ("motion.length_unit", self.config.length_unit.map(Unit::Length));
-        let assumed = self.assumed.length.map(Unit::Length);
         match (place, turn) {
             (Some(place), Some(turn)) => {
-                Ok(Content::Poses { place: self.scaled("place", place, key, assumed), turn })
+                let (scaled, unit) = self.scaled(place, Quantity::Length);
+                self.use_columns("place", &place, &format!(" in {unit}"));
+                Ok(Content::Poses { place: scaled, turn })
             }
             (place, turn) => {
-                let markers = self.markers(key, assumed)?;
+                let markers = self.markers()?;
                 markers.ok_or_else(|| self.not_a_motion(place.is_some(), turn.is_some()))
             }
         }
@@ -477,19 +519,13 @@ impl Reader<'_> {
             ));
             [0, 1, 2]
         });
-        let key = ("motion.angle_unit", self.config.angle_unit.map(Unit::Angle));
-        let scaled = self.scaled("turn", angles, key, self.assumed.angle.map(Unit::Angle));
-        if let (Some(order), Some(line)) = (order, self.protocol.last_mut()) {
-            let _ = write!(line, ", angles about x, y, z in the order {order}");
-        }
+        let (scaled, unit) = self.scaled(angles, Quantity::Angle);
+        let order = order.unwrap_or_default();
+        self.use_columns("turn", &angles, &format!(" in {unit}, angles about x, y, z in the order {order}"));
         Ok(Turn::Angles(axes.map(|axis| (axis, scaled[axis]))))
     }
 
-    fn markers(
-        &mut self,
-        key: (&str, Option<Unit>),
-        assumed: Option<Unit>,
-    ) -> Result<Option<Content>, String> {
+    fn markers(&mut self) -> Result<Option<Content>, String> {
         let mut found: Vec<&str> = Vec::new();
         for Column { meaning, .. } in self.columns {
             if let Meaning::Marker(name, _) = meaning
@@ -543,42 +579,36 @@ impl Reader<'_> {
                 sentence(&names.join(", "))
             ));
         }
-        let (mut places, kept) = (Vec::new(), self.protocol.len());
-        for (name, columns) in names.iter().zip(columns) {
-            places.push(self.scaled(name, columns, key, assumed));
+        let (mut places, mut units) = (Vec::new(), Vec::new());
+        for columns in columns {
+            let (scaled, unit) = self.scaled(columns, Quantity::Length);
+            self.used.extend(columns);
+            places.push(scaled);
+            units.push(unit);
         }
-        // Twelve lines say no more than one.
-        let lines = self.protocol.split_off(kept);
-        let units = lines.iter().filter_map(|line| line.rsplit_once(" in ")).map(|(_, unit)| unit);
-        let mut units: Vec<_> = units.collect();
         units.dedup();
         self.protocol.push(format!("markers {} in {}", sentence(&names.join(", ")), units.join(", ")));
         Ok(Some(Content::Markers { names, places }))
     }
 
-    /// Refuses a key without a use in the file, because an ignored key hides a mistake.
-    fn refuse_unused_keys(&self, clock: &Clock, content: &Content) -> Result<(), String> {
+    fn refuse_unused_keys(&self, content: &Content) -> Result<(), String> {
         let config = self.config;
         let has_angles = matches!(content, Content::Poses { turn: Turn::Angles(_), .. });
         let is_of_poses = matches!(content, Content::Poses { .. });
-        let has_times = matches!(clock, Clock::Times(_));
         let of_markers = "is for files of markers, and this one holds poses";
         let of_poses = "is for files of poses, and this one holds markers";
         let of_angles = "is for files with three angles";
-        let unused = [
-            ("marker_origin_mm", config.marker_origin_mm.is_some() && is_of_poses, of_markers),
-            ("markers", config.markers.is_some() && is_of_poses, of_markers),
-            ("reference_point_mm", config.reference_point_mm.is_some() && !is_of_poses, of_poses),
-            ("angle_unit", config.angle_unit.is_some() && !has_angles, of_angles),
-            ("euler_order", config.euler_order.is_some() && !has_angles, of_angles),
-            ("rate_hz", config.rate_hz.is_some() && has_times, "is for files without a column of times"),
-            ("time_unit", config.time_unit.is_some() && !has_times, "is for files with a column of times"),
-        ];
-        match unused.iter().find(|(_, is_unused, _)| *is_unused) {
-            Some((key, _, reason)) => Err(format!("motion.{key} {reason}; leave it away")),
-            None => Ok(()),
-        }
+        refuse_unused("marker_origin_mm", config.marker_origin_mm.is_some() && is_of_poses, of_markers)?;
+        refuse_unused("markers", config.markers.is_some() && is_of_poses, of_markers)?;
+        refuse_unused("reference_point_mm", config.reference_point_mm.is_some() && !is_of_poses, of_poses)?;
+        refuse_unused("angle_unit", config.angle_unit.is_some() && !has_angles, of_angles)?;
+        refuse_unused("euler_order", config.euler_order.is_some() && !has_angles, of_angles)
     }
+}
+
+/// Refuses a key without a use in the file, because an ignored key hides a mistake.
+fn refuse_unused(key: &str, is_unused: bool, reason: &str) -> Result<(), String> {
+    if is_unused { Err(format!("motion.{key} {reason}; leave it away")) } else { Ok(()) }
 }
 
 /// The axes of an order of turns, as turns about axes that move with the jaw: turns about fixed axes are those in the

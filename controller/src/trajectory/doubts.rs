@@ -202,10 +202,8 @@ fn after(values: &[f64], from: usize) -> f64 {
 }
 
 /// The upper median; 0 without a value.
-fn upper_median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or_default()
+pub(super) fn upper_median(values: &[f64]) -> f64 {
+    quantile(values, values.len().saturating_sub(1) / 2).1
 }
 
 #[cfg(test)]

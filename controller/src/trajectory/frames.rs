@@ -147,11 +147,6 @@ impl Frames {
         !self.is_jaw() || self.excess() < NEAR
     }
 
-    /// The best axes, if the stated ones do not fit.
-    pub(super) fn other_axes(&self) -> Option<[String; 3]> {
-        (!self.fits()).then(|| self.best[0].axes.clone())
-    }
-
     /// Whether the stated frame is wrong.
     pub(super) fn is_wrong(&self) -> bool {
         self.is_jaw() && self.excess() >= WRONG

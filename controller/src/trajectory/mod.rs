@@ -27,13 +27,14 @@ use masseter_model::section;
 use nalgebra::UnitQuaternion;
 
 pub use check::{TrajectoryReport, check};
+pub use columns::Unit;
 pub use doubts::Glitch;
 pub use frames::{Frame, Frames};
 pub(crate) use generators::minimum_jerk;
 pub use import::plain_form;
 pub use mandible::{closed_jaw_points, closed_pose};
 pub use motion::Trajectory;
-pub use plausible::{Implausible, LikelyUnit};
+pub use plausible::Implausible;
 pub use survey::{Gap, PointFigures, Range, RecordingSurvey, StepFigures, SurveyRow, survey};
 
 /// A motion that cannot be built or followed: the key or the line of the recording, the error there, and the remedy.

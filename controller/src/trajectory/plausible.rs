@@ -4,13 +4,12 @@
 //! The likely unit is one in which everything fits. The bounds are wide: they are for wrong units, points and angles,
 //! not for illness. Not found: a wrong unit of a recording that is plausible in several units.
 
-use std::fmt::{self, Display, Formatter};
-
 use masseter_model::geometry::Vec3;
 use masseter_scenario::{FileConfig, IfImplausible, JawConfig, LengthUnit, TimeUnit};
 use serde::Serialize;
 
 use super::TrajectoryError;
+use super::columns::Unit;
 use super::doubts::{GLIDE_M, NOTHING_M, TURN_DEG_PER_M, largest, quantile};
 use super::frames::Frames;
 use super::import::Source;
@@ -18,32 +17,43 @@ use super::mandible::jaw_points;
 use super::recording::{Recording, Sample};
 use super::row::Located;
 use super::table::Format;
+use Cause::{Length, Time, Turn};
 
-/// Largest ways, m. Incisal point: 44 mm in the mean, 56 mm at the 95th percentile; condyles: 22 mm (Kordass 2014).
-const WIDEST_M: f64 = 0.08;
-const CONDYLES_M: f64 = 0.035;
+/// Largest ways, mm. Incisal point: 44 mm in the mean, 56 mm at the 95th percentile; condyles: 22 mm (Kordass 2014).
+const WIDEST_MM: f64 = 80.0;
+const CONDYLES_MM: f64 = 35.0;
 /// Largest turn, °: 42° at the 95th percentile.
 const WIDEST_DEG: f64 = 60.0;
-/// From this turn on the way to the turn is judged, rad.
-const TURNED_RAD: f64 = 0.07;
+/// From this turn on the way to the turn is judged, °.
+const TURNED_DEG: f64 = 4.0;
 /// Least way to the turn, m/rad. The axis of opening lies some 32 mm below the condyles (Mehl 2025), and nobody's runs
 /// through them all the time.
 const NEAREST_M: f64 = 0.005;
 /// The same, as a share of the distance between the condyles and the point that the file follows.
 const LEAST_SHARE: f64 = 0.4;
-/// Below both a jaw stands still, m and rad. A file without any way is at rest in every unit.
-const STILL_M: f64 = 1e-4;
-const STILL_RAD: f64 = 2e-3;
+/// Below both a jaw stands still. A file without any way is at rest in every unit.
+const STILL_MM: f64 = 0.1;
+const STILL_DEG: f64 = 0.115;
 /// Largest usual speeds, mm/s and °/s: chewing reaches some 150 mm/s.
 const FASTEST_MM_S: f64 = 600.0;
 const FASTEST_DEG_S: f64 = 500.0;
 /// Least largest speed of a way above 5 mm, mm/s.
 const SLOWEST_MM_S: f64 = 1.0;
-const WAY_M: f64 = 0.005;
+const WAY_MM: f64 = 5.0;
 /// Usual time between rows, s.
 const STEP_S: [f64; 2] = [1e-4, 0.25];
 /// Longest side of a carrier's markers, mm.
 const CARRIER_MM: [f64; 2] = [10.0, 500.0];
+
+/// The units that are tried for a recording which is implausible in the stated ones. In micrometres many an impossible
+/// motion is a small one of a jaw.
+const TRIED: [Unit; 5] = [
+    Unit::Length(LengthUnit::Mm),
+    Unit::Length(LengthUnit::Cm),
+    Unit::Length(LengthUnit::M),
+    Unit::Time(TimeUnit::S),
+    Unit::Time(TimeUnit::Ms),
+];
 
 /// What a wrong value comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,45 +83,6 @@ pub struct Implausible {
     cause: Cause,
 }
 
-/// A unit in which a recording is plausible, though it is not in the stated one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum LikelyUnit {
-    /// Of lengths.
-    #[serde(rename = "length_unit")]
-    Length(LengthUnit),
-    /// Of times.
-    #[serde(rename = "time_unit")]
-    Time(TimeUnit),
-}
-
-impl LikelyUnit {
-    const TRIED: [Self; 5] = [
-        Self::Length(LengthUnit::Mm),
-        Self::Length(LengthUnit::Cm),
-        Self::Length(LengthUnit::M),
-        Self::Time(TimeUnit::S),
-        Self::Time(TimeUnit::Ms),
-    ];
-
-    /// The section with this unit.
-    pub fn applied(self, config: &FileConfig) -> FileConfig {
-        match self {
-            Self::Length(unit) => FileConfig { length_unit: Some(unit), ..config.clone() },
-            Self::Time(unit) => FileConfig { time_unit: Some(unit), ..config.clone() },
-        }
-    }
-}
-
-/// The key and its value.
-impl Display for LikelyUnit {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Length(unit) => write!(f, "length_unit = \"{}\"", unit.name()),
-            Self::Time(unit) => write!(f, "time_unit = \"{}\"", unit.name()),
-        }
-    }
-}
-
 /// With four digits.
 fn short(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
@@ -122,7 +93,7 @@ fn short(value: f64) -> f64 {
 pub(super) struct Judgement {
     pub implausible: Vec<Implausible>,
     /// The unit in which the recording is plausible; none where the stated ones are, or none is.
-    pub likely: Option<LikelyUnit>,
+    pub likely: Option<Unit>,
     /// The frames in the likely unit, or else in the stated ones; none without an opening.
     pub frames: Option<Frames>,
 }
@@ -138,14 +109,13 @@ impl Judgement {
         if implausible.is_empty() {
             return Ok(Self { frames: Frames::new(source, config, jaw)?, ..Self::default() });
         }
-        let likely = likely_unit(config, jaw);
+        let (likely, frames) = match in_likely_unit(config, jaw) {
+            Some((unit, frames)) => (Some(unit), frames),
+            None => (None, Frames::new(source, config, jaw)?),
+        };
         for found in &mut implausible {
             found.remedy = remedy(found.cause, likely);
         }
-        let frames = match likely.map(|unit| unit.applied(config)) {
-            Some(changed) => Frames::new(&Source::read(&changed, jaw)?, &changed, jaw)?,
-            None => Frames::new(source, config, jaw)?,
-        };
         Ok(Self { implausible, likely, frames })
     }
 
@@ -179,37 +149,35 @@ pub(super) fn import(config: &FileConfig, jaw: &JawConfig) -> Result<Recording, 
     Ok(recording)
 }
 
-/// The unit in which everything is plausible.
-fn likely_unit(config: &FileConfig, jaw: &JawConfig) -> Option<LikelyUnit> {
-    let is_plausible = |unit: &LikelyUnit| {
+/// The unit in which everything is plausible, and the frames in this unit.
+fn in_likely_unit(config: &FileConfig, jaw: &JawConfig) -> Option<(Unit, Option<Frames>)> {
+    let in_unit = |unit: Unit| -> Result<_, TrajectoryError> {
         let changed = unit.applied(config);
         let source = Source::read(&changed, jaw)?;
-        let samples = source.samples()?;
-        implausible(&source, &samples, jaw).map(|found| found.is_empty())
+        let is_plausible = implausible(&source, &source.samples()?, jaw)?.is_empty();
+        let frames = is_plausible.then(|| Frames::new(&source, &changed, jaw)).transpose()?;
+        Ok(frames.map(|frames| (unit, frames)))
     };
-    LikelyUnit::TRIED.into_iter().find(|unit| is_plausible(unit).unwrap_or(false))
+    TRIED.into_iter().find_map(|unit| in_unit(unit).ok().flatten())
 }
 
-fn remedy(cause: Cause, likely: Option<LikelyUnit>) -> String {
-    match (cause, likely) {
-        (_, Some(LikelyUnit::Length(unit))) => {
-            let unit = unit.name();
-            format!("the unit of length seems to be {unit}: set motion.length_unit = \"{unit}\"")
-        }
-        (_, Some(LikelyUnit::Time(unit))) => {
-            let unit = unit.name();
-            format!("the unit of time seems to be {unit}: set motion.time_unit = \"{unit}\"")
-        }
-        (Cause::Length, None) => "check motion.length_unit and the point that the file follows \
-            (motion.reference_point_mm or motion.marker_origin_mm)"
-            .to_owned(),
-        (Cause::Time, None) => "check motion.time_unit".to_owned(),
-        (Cause::Turn, None) => {
-            "check that quaternions have the order qw,qx,qy,qz and angles the right unit, and that \
-            poses are relative to the closed jaw"
-                .to_owned()
-        }
+fn remedy(cause: Cause, likely: Option<Unit>) -> String {
+    if let Some(unit) = likely {
+        let quantity = if matches!(unit, Unit::Time(_)) { "time" } else { "length" };
+        return format!("the unit of {quantity} seems to be {}: set motion.{unit}", unit.parts().0);
     }
+    let check = match cause {
+        Length => {
+            "check motion.length_unit and the point that the file follows (motion.reference_point_mm or \
+             motion.marker_origin_mm)"
+        }
+        Time => "check motion.time_unit",
+        Turn => {
+            "check that quaternions have the order qw,qx,qy,qz and angles the right unit, and that poses are relative to \
+             the closed jaw"
+        }
+    };
+    check.to_owned()
 }
 
 fn implausible(
@@ -221,16 +189,14 @@ fn implausible(
     let middle = (right + left) / 2.0;
     let is_of_poses = source.table.format == Format::Poses;
     let point = if is_of_poses { source.reference } else { incisal };
-    let way_m =
-        |point: &Vec3| -> Vec<f64> { samples.iter().map(|sample| sample.way(point).norm()).collect() };
-    let turns_rad: Vec<f64> = samples.iter().map(|sample| sample.displacement.rotation.angle()).collect();
-    let (turned, turn_rad) = largest(&turns_rad);
-    let (farthest, incisal_m) = largest(&way_m(&incisal));
-    let (followed, followed_m) = largest(&way_m(&point));
-    let (condyle, condyles_m) = largest(&way_m(&middle));
-    let turn_deg = turn_rad.to_degrees();
+    let way_mm = |point: &Vec3| {
+        largest(&samples.iter().map(|sample| sample.way(point).norm() * 1e3).collect::<Vec<_>>())
+    };
+    let turns_deg = samples.iter().map(|sample| sample.displacement.rotation.angle().to_degrees());
+    let turn_deg = largest(&turns_deg.collect::<Vec<_>>());
+    let way = way_mm(&incisal);
     let mut found = Vec::new();
-    let mut judge = |cause, quantity, row: usize, value: f64, unit, [least, most]: [f64; 2]| {
+    let mut judge = |cause, quantity, (row, value): (usize, f64), unit, [least, most]: [f64; 2]| {
         if (least..=most).contains(&value) {
             return;
         }
@@ -239,45 +205,24 @@ fn implausible(
         found.push(Implausible { quantity, value, limit, unit, line, remedy: String::new(), cause });
     };
     let any = f64::INFINITY;
-    judge(Cause::Turn, "turn from the closed jaw", turned, turn_deg, "°", [0.0, WIDEST_DEG]);
-    judge(Cause::Length, "way of the incisal point", farthest, incisal_m * 1e3, "mm", [0.0, WIDEST_M * 1e3]);
-    let is_still = incisal_m < STILL_M && turn_rad < STILL_RAD && incisal_m > NOTHING_M;
-    if is_still {
-        judge(
-            Cause::Length,
-            "way of the incisal point",
-            farthest,
-            incisal_m * 1e3,
-            "mm",
-            [STILL_M * 1e3, any],
-        );
-    }
-    if turn_rad >= TURNED_RAD && source.shows_condyles() {
-        judge(Cause::Length, "way of the condyles", condyle, condyles_m * 1e3, "mm", [0.0, CONDYLES_M * 1e3]);
-    }
-    if turn_rad >= TURNED_RAD {
+    judge(Turn, "turn from the closed jaw", turn_deg, "°", [0.0, WIDEST_DEG]);
+    let is_still = way.1 < STILL_MM && turn_deg.1 < STILL_DEG && way.1 > NOTHING_M * 1e3;
+    let least_mm = if is_still { STILL_MM } else { 0.0 };
+    judge(Length, "way of the incisal point", way, "mm", [least_mm, WIDEST_MM]);
+    if turn_deg.1 >= TURNED_DEG {
+        if source.shows_condyles() {
+            judge(Length, "way of the condyles", way_mm(&middle), "mm", [0.0, CONDYLES_MM]);
+        }
         let distance_m = if is_of_poses { (point - middle).norm() } else { 0.0 };
-        let least_m = NEAREST_M.max(LEAST_SHARE * distance_m);
-        let mm_deg = (followed_m / turn_deg * 1e3, least_m.to_radians() * 1e3);
-        judge(
-            Cause::Length,
-            "way of the followed point to the turn",
-            followed,
-            mm_deg.0,
-            "mm/°",
-            [mm_deg.1, any],
-        );
+        let least_mm_deg = NEAREST_M.max(LEAST_SHARE * distance_m).to_radians() * 1e3;
+        let (row, followed_mm) = way_mm(&point);
+        let to_turn = (row, followed_mm / turn_deg.1);
+        judge(Length, "way of the followed point to the turn", to_turn, "mm/°", [least_mm_deg, any]);
     }
-    if is_of_poses && incisal_m > GLIDE_M {
-        let least_deg = TURN_DEG_PER_M * incisal_m;
-        judge(
-            Cause::Turn,
-            "turn of a jaw that moves its incisal point so far",
-            farthest,
-            turn_deg,
-            "°",
-            [least_deg, any],
-        );
+    if is_of_poses && way.1 > GLIDE_M * 1e3 {
+        let (quantity, least_deg) =
+            ("turn of a jaw that moves its incisal point so far", TURN_DEG_PER_M * way.1 / 1e3);
+        judge(Turn, quantity, (way.0, turn_deg.1), "°", [least_deg, any]);
     }
     let steps_s: Vec<f64> = samples.windows(2).map(|pair| pair[1].time_s - pair[0].time_s).collect();
     let rate = |of: &dyn Fn(&[Sample]) -> f64| -> Vec<f64> {
@@ -286,25 +231,20 @@ fn implausible(
     let speeds_mm_s = rate(&|pair| (pair[1].way(&incisal) - pair[0].way(&incisal)).norm() * 1e3);
     let speeds_deg_s =
         rate(&|pair| pair[0].displacement.rotation.angle_to(&pair[1].displacement.rotation).to_degrees());
-    let twentieth = steps_s.len() / 20 + 2;
-    let (row, step_s) = quantile(&steps_s, steps_s.len() / 2);
-    judge(Cause::Time, "usual time between rows", row + 1, step_s, "s", STEP_S);
-    let (row, speed) = quantile(&speeds_mm_s, twentieth);
-    judge(
-        Cause::Time,
-        "usual greatest speed of the incisal point",
-        row + 1,
-        speed,
-        "mm/s",
-        [0.0, FASTEST_MM_S],
-    );
-    let (row, speed) = quantile(&speeds_deg_s, twentieth);
-    judge(Cause::Time, "usual greatest speed of the turn", row + 1, speed, "°/s", [0.0, FASTEST_DEG_S]);
-    let (row, speed) = largest(&speeds_mm_s);
-    let least = if incisal_m > WAY_M { SLOWEST_MM_S } else { 0.0 };
-    judge(Cause::Time, "greatest speed of the incisal point", row + 1, speed, "mm/s", [least, any]);
+    // The second row of a step shows the step.
+    let second = |(row, value): (usize, f64)| (row + 1, value);
+    let twentieth = |speeds: &[f64]| second(quantile(speeds, steps_s.len() / 20 + 2));
+    let step_s = second(quantile(&steps_s, steps_s.len() / 2));
+    let fastest_mm_s = twentieth(&speeds_mm_s);
+    judge(Time, "usual time between rows", step_s, "s", STEP_S);
+    judge(Time, "usual greatest speed of the incisal point", fastest_mm_s, "mm/s", [0.0, FASTEST_MM_S]);
+    judge(Time, "usual greatest speed of the turn", twentieth(&speeds_deg_s), "°/s", [0.0, FASTEST_DEG_S]);
+    if way.1 > WAY_MM {
+        let fastest = second(largest(&speeds_mm_s));
+        judge(Time, "greatest speed of the incisal point", fastest, "mm/s", [SLOWEST_MM_S, any]);
+    }
     if let Some(side_mm) = source.longest_side_mm() {
-        judge(Cause::Length, "longest side of the markers' triangle", 0, side_mm, "mm", CARRIER_MM);
+        judge(Length, "longest side of the markers' triangle", (0, side_mm), "mm", CARRIER_MM);
     }
     Ok(found)
 }

@@ -8,6 +8,10 @@ use masseter_scenario::wording::counted;
 
 use super::TrajectoryError;
 
+/// What trackers write for a lost sample, besides an empty cell.
+const LOST: [&str; 12] =
+    ["", "-", "--", "nan", "-nan", "na", "n/a", "#n/a", "null", "none", "missing", "-3.697314e28"];
+
 /// A row: time, and the other columns of the plain form. A marker that is lost has NaN.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Row {
@@ -45,4 +49,8 @@ pub(super) fn gaps(lines: &[u64]) -> Option<String> {
     let (first, last) = (lines.first()?, lines.last()?);
     let rows = counted(lines.len() as u64, "row");
     Some(format!("gaps for lost samples: {rows}, lines {first} to {last}"))
+}
+
+pub(super) fn is_lost(cell: &str) -> bool {
+    LOST.contains(&cell.to_lowercase().replace("e+", "e").as_str())
 }

@@ -7,8 +7,8 @@ use masseter_scenario::input::excerpt;
 use masseter_scenario::wording::counted;
 use masseter_scenario::{AngleUnit, LengthUnit, TimeUnit};
 
-use super::columns::{Assumed, Column, Meaning, Unit};
-use super::row::Located;
+use super::columns::{Column, Meaning, Unit, Units};
+use super::row::{Located, is_lost};
 
 /// Lines in which the header is looked for.
 const HEAD_LINES: usize = 200;
@@ -80,7 +80,7 @@ pub(super) struct Sheet<'a> {
     pub columns: Vec<Column>,
     /// The line of the names; none if a key gives them.
     pub header_line: Option<u64>,
-    pub assumed: Assumed,
+    pub assumed: Units,
     pub protocol: Vec<String>,
 }
 
@@ -88,33 +88,30 @@ impl<'a> Sheet<'a> {
     /// `named`: the columns by a key.
     pub(super) fn of(text: &'a str, named: Option<&[String]>) -> Result<Self, Located> {
         let (assumed, format, after) = vendor(text);
-        let head: Vec<(usize, &str)> =
-            content(text).filter(|(at, _)| *at >= after).take(HEAD_LINES).collect();
-        let mut sheet = match named {
-            Some(names) => Self::named(text, &head, names)?,
-            None => Self::with_header(text, &head)?,
+        let is_of_head = |(at, line): &(usize, &str)| *at >= after && !line.trim().is_empty();
+        let head: Vec<_> = content(text).filter(is_of_head).take(HEAD_LINES).collect();
+        let (separator, head_lines, columns, header_line) = match named {
+            Some(names) => by_key(&head, names)?,
+            None => with_header(&head)?,
         };
-        sheet.assumed = assumed;
-        sheet.protocol.extend(format.map(|format| format!("format {format}")));
-        sheet.protocol.push(format!("columns between {}", sheet.separator.name()));
-        match (sheet.header_line, named.is_some()) {
-            (Some(line), _) if line > 1 => {
-                sheet.protocol.push(format!("header in line {line}; the lines before are not read"));
-            }
-            (None, true) => sheet
-                .protocol
-                .push(format!("columns by motion.columns, from line {} on", sheet.head_lines + 1)),
-            _ => {}
+        let mut protocol = Vec::from_iter(format);
+        protocol.push(format!("columns between {}", separator.name()));
+        match header_line {
+            Some(1) => {}
+            Some(line) => protocol.push(format!("header in line {line}; the lines before are not read")),
+            None => protocol.push(format!("columns by motion.columns, from line {} on", head_lines + 1)),
         }
-        Ok(sheet)
+        Ok(Self { text, separator, head_lines, columns, header_line, assumed, protocol })
     }
 
-    /// The cells of each row, with its line from 1.
+    /// The cells of each row, with its line from 1. A row whose cells are all empty has none.
     pub(super) fn rows(&self) -> impl Iterator<Item = Result<(u64, Vec<&'a str>), Located>> {
         let rows = content(self.text).filter(|(at, _)| *at >= self.head_lines);
-        let rows = rows.map(|(at, line)| (at as u64 + 1, self.separator.cells(line)));
-        let rows = rows.filter(|(_, cells)| cells.iter().any(|cell| !cell.is_empty()));
-        rows.map(|(line, mut cells)| {
+        rows.map(|(at, text)| {
+            let (line, mut cells) = (at as u64 + 1, self.separator.cells(text));
+            if cells.iter().all(|cell| cell.is_empty()) {
+                return Ok((line, Vec::new()));
+            }
             let (found, expected) = (cells.len(), self.columns.len());
             if found < expected || cells[expected..].iter().any(|cell| !cell.is_empty()) {
                 let found = counted(found as u64, "cell");
@@ -129,90 +126,78 @@ impl<'a> Sheet<'a> {
             Ok((line, cells))
         })
     }
-
-    fn with_header(text: &'a str, head: &[(usize, &'a str)]) -> Result<Self, Located> {
-        let mut best = (0, 0, Separator::Comma);
-        for (at, (_, line)) in head.iter().enumerate() {
-            for (separator, _) in Separator::ALL {
-                let names = separator.names(line);
-                let known = names.iter().filter(|name| Column::of(name).meaning != Meaning::Unknown).count();
-                // Of two lines that name as much, such as a translation, the lower is nearer to the numbers.
-                if known > best.0 || (known == best.0 && at == best.1 + 1) {
-                    best = (known, at, separator);
-                }
-            }
-        }
-        let (known, at, separator) = best;
-        if known < FEWEST {
-            return Err(no_header(head));
-        }
-        let (line, header) = head[at];
-        let above = at.checked_sub(1).map(|above| separator.names(head[above].1));
-        let mut columns = names(&separator.names(header), &above.unwrap_or_default());
-        let mut head_lines = line + 1;
-        // A line of units may follow.
-        if let Some((units_line, units)) = head.get(at + 1) {
-            let units = separator.cells(units);
-            let bare = |cell: &str| cell.trim_matches(['[', ']', '(', ')']).to_owned();
-            let is_unit = |cell: &&str| cell.is_empty() || **cell == *"-" || Unit::of(&bare(cell)).is_some();
-            if units.iter().all(is_unit) && units.iter().any(|cell| Unit::of(&bare(cell)).is_some()) {
-                for (column, unit) in columns.iter_mut().zip(units) {
-                    if column.unit.is_none() && !unit.is_empty() {
-                        *column = Column::of(&format!("{} [{}]", column.name, bare(unit)));
-                    }
-                }
-                head_lines = units_line + 1;
-            }
-        }
-        Ok(Self {
-            text,
-            separator,
-            head_lines,
-            columns,
-            header_line: Some(line as u64 + 1),
-            assumed: Assumed::default(),
-            protocol: Vec::new(),
-        })
-    }
-
-    /// The rows begin at the first line with a number in each of the columns that a key names.
-    fn named(text: &'a str, head: &[(usize, &'a str)], names: &[String]) -> Result<Self, Located> {
-        let columns: Vec<Column> = names.iter().map(|name| Column::of(name)).collect();
-        let is_number = |cell: &str| {
-            cell.chars().all(|c| c.is_ascii_digit() || "+-.,:eE".contains(c))
-                && cell.contains(|c: char| c.is_ascii_digit())
-        };
-        for (line, text_there) in head {
-            for (separator, _) in Separator::ALL {
-                let cells = separator.cells(text_there);
-                let mut both = columns.iter().zip(&cells);
-                if cells.len() == columns.len()
-                    && both.all(|(column, cell)| column.meaning == Meaning::Unknown || is_number(cell))
-                {
-                    return Ok(Self {
-                        text,
-                        separator,
-                        head_lines: *line,
-                        columns,
-                        header_line: None,
-                        assumed: Assumed::default(),
-                        protocol: Vec::new(),
-                    });
-                }
-            }
-        }
-        Err(Located::whole(format!(
-            "motion.columns names {}, and no line has a number in each; give a name for each column of the file, \"-\" for one without use",
-            counted(names.len() as u64, "column")
-        )))
-    }
 }
 
-/// The lines that are not blank and no comments, each with its index.
+type Found = (Separator, usize, Vec<Column>, Option<u64>);
+
+/// Separator, lines before the rows, columns, and the line of their names.
+fn with_header(head: &[(usize, &str)]) -> Result<Found, Located> {
+    let mut best = (0, 0, Separator::Comma);
+    for (at, (_, line)) in head.iter().enumerate() {
+        for (separator, _) in Separator::ALL {
+            let names = separator.names(line);
+            let known = names.iter().filter(|name| Column::of(name).meaning != Meaning::Unknown).count();
+            // Of two lines that name as much, such as a translation, the lower is nearer to the numbers.
+            if known > best.0 || (known == best.0 && at == best.1 + 1) {
+                best = (known, at, separator);
+            }
+        }
+    }
+    let (known, at, separator) = best;
+    if known < FEWEST {
+        return Err(no_header(head));
+    }
+    let (line, header) = head[at];
+    let above = at.checked_sub(1).map(|above| separator.names(head[above].1));
+    let mut columns = names(&separator.names(header), &above.unwrap_or_default());
+    let mut head_lines = line + 1;
+    // A line of units may follow.
+    if let Some((units_line, units)) = head.get(at + 1) {
+        let units = separator.cells(units);
+        let bare = |cell: &str| cell.trim_matches(['[', ']', '(', ')']).to_owned();
+        let is_unit = |cell: &&str| cell.is_empty() || **cell == *"-" || Unit::of(&bare(cell)).is_some();
+        if units.iter().all(is_unit) && units.iter().any(|cell| Unit::of(&bare(cell)).is_some()) {
+            for (column, unit) in columns.iter_mut().zip(units) {
+                if column.unit.is_none() && !unit.is_empty() {
+                    *column = Column::of(&format!("{} [{}]", column.name, bare(unit)));
+                }
+            }
+            head_lines = units_line + 1;
+        }
+    }
+    Ok((separator, head_lines, columns, Some(line as u64 + 1)))
+}
+
+/// The rows begin at the first line with numbers, or lost samples, in the columns that a key names.
+fn by_key(head: &[(usize, &str)], names: &[String]) -> Result<Found, Located> {
+    let columns: Vec<Column> = names.iter().map(|name| Column::of(name)).collect();
+    let is_number = |cell: &str| {
+        cell.chars().all(|c| c.is_ascii_digit() || "+-.,:eE".contains(c))
+            && cell.contains(|c: char| c.is_ascii_digit())
+    };
+    for (line, text_there) in head {
+        for (separator, _) in Separator::ALL {
+            let cells = separator.cells(text_there);
+            let used = columns.iter().zip(&cells).filter(|(column, _)| column.meaning != Meaning::Unknown);
+            let used: Vec<&str> = used.map(|(_, cell)| *cell).collect();
+            if cells.len() == columns.len()
+                && used.iter().all(|cell| is_number(cell) || is_lost(cell))
+                && used.iter().any(|cell| is_number(cell))
+            {
+                return Ok((separator, *line, columns, None));
+            }
+        }
+    }
+    Err(Located::whole(format!(
+        "motion.columns names {}, and no line has a number in each; give a name for each column of the file, \"-\" for one without use",
+        counted(names.len() as u64, "column")
+    )))
+}
+
+/// The lines that are not blank and no comments, each with its index. Tabs alone are cells of a row.
 fn content(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    text.lines()
-        .enumerate()
-        .filter(|(_, line)| !line.trim().is_empty() && !line.trim_start().starts_with('#'))
+    let is_content = |line: &str| !line.trim_matches(' ').is_empty() && !line.trim_start().starts_with('#');
+    text.lines().enumerate().filter(move |(_, line)| is_content(line))
 }
 
 /// The columns of a header. Coordinates without a marker's name take the name from the line above, as in TRC.
@@ -244,30 +229,27 @@ fn names(header: &[String], above: &[String]) -> Vec<Column> {
     columns.into_iter().enumerate().map(column).collect()
 }
 
-/// What the head of a format says: the units, the format's name, and the line after the head, from 0.
-fn vendor(text: &str) -> (Assumed, Option<&'static str>, usize) {
+/// What the head of a format says: the units, a line of the protocol, and the line after the head, from 0.
+fn vendor(text: &str) -> (Units, Option<String>, usize) {
     let lines: Vec<&str> = text.lines().take(HEAD_LINES).collect();
+    let time = Some(TimeUnit::S);
     if let [first, keys, values, ..] = lines[..]
         && first.starts_with("PathFileType")
     {
         let at = keys.split('\t').position(|key| key.trim().eq_ignore_ascii_case("units"));
         let unit = at.and_then(|at| Unit::of(values.split('\t').nth(at)?));
         let length = if let Some(Unit::Length(length)) = unit { Some(length) } else { None };
-        return (Assumed { time: Some(TimeUnit::S), length, angle: None }, Some("TRC: times in s"), 3);
+        return (Units { time, length, angle: None }, Some("format TRC: times in s".to_owned()), 3);
     }
     let Some(end) = lines.iter().position(|line| line.trim().eq_ignore_ascii_case("endheader")) else {
-        return (Assumed::default(), None, 0);
+        return (Units::default(), None, 0);
     };
     let is_in_degrees =
         lines[..end].iter().any(|line| line.replace(' ', "").eq_ignore_ascii_case("inDegrees=yes"));
-    let angle = Some(if is_in_degrees { AngleUnit::Deg } else { AngleUnit::Rad });
-    let assumed = Assumed { time: Some(TimeUnit::S), length: Some(LengthUnit::M), angle };
-    let format = if is_in_degrees {
-        "MOT/STO: times in s, lengths in m, angles in degrees"
-    } else {
-        "MOT/STO: times in s, lengths in m, angles in radians"
-    };
-    (assumed, Some(format), end + 1)
+    let (angle, angles) =
+        if is_in_degrees { (AngleUnit::Deg, "degrees") } else { (AngleUnit::Rad, "radians") };
+    let format = format!("format MOT/STO: times in s, lengths in m, angles in {angles}");
+    (Units { time, length: Some(LengthUnit::M), angle: Some(angle) }, Some(format), end + 1)
 }
 
 fn no_header(head: &[(usize, &str)]) -> Located {

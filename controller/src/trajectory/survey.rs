@@ -7,11 +7,12 @@ use masseter_scenario::{FileConfig, JawConfig};
 use serde::Serialize;
 
 use super::TrajectoryError;
+use super::columns::Unit;
 use super::doubts::Glitch;
 use super::frames::Frames;
 use super::import::Source;
 use super::mandible::jaw_points;
-use super::plausible::{Implausible, Judgement, LikelyUnit};
+use super::plausible::{Implausible, Judgement};
 use super::recording::{Recording, Sample, moved};
 use super::table::{Format, Table};
 
@@ -54,7 +55,7 @@ pub struct RecordingSurvey {
     /// What no jaw has: units, points or angles are wrong.
     pub implausible: Vec<Implausible>,
     /// The unit in which the motion is plausible, if the stated ones are not.
-    pub likely_unit: Option<LikelyUnit>,
+    pub likely_unit: Option<Unit>,
     /// Which of the file's axes point anterior, left and up, in those units; none of a motion without an opening.
     pub frames: Option<Frames>,
     /// The most likely axes, if the stated ones are not as likely.
@@ -168,7 +169,10 @@ pub fn survey(config: &FileConfig, jaw: &JawConfig) -> Result<RecordingSurvey, T
         turn_deg: path.iter().map(|row| row.turn_rad.norm().to_degrees()).fold(0.0, f64::max),
         implausible,
         likely_unit: likely,
-        likely_axes: frames.as_ref().and_then(Frames::other_axes),
+        likely_axes: frames
+            .as_ref()
+            .filter(|frames| !frames.fits())
+            .map(|frames| frames.best[0].axes.clone()),
         frames,
         glitches: recording.glitches,
         doubts: recording.doubts,

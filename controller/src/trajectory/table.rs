@@ -11,8 +11,9 @@ use masseter_scenario::wording::counted;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::columns::{Clock, Content, Layout, Scaled, Turn};
+use super::doubts::upper_median;
 use super::markers::{Body, settle};
-use super::row::{Located, Row, gaps};
+use super::row::{Located, Row, gaps, is_lost};
 use super::sheet::Sheet;
 
 /// Least rows of a motion.
@@ -26,10 +27,6 @@ const DAY_S: f64 = 86_400.0;
 pub(super) const LARGEST_MM: f64 = 1e5;
 /// Largest element by which a matrix by its transpose differs from the identity by rounding.
 const MATRIX_TOLERANCE: f64 = 5e-3;
-/// What trackers write for a lost sample, besides an empty cell.
-const LOST: [&str; 12] =
-    ["", "-", "--", "nan", "-nan", "na", "n/a", "#n/a", "null", "none", "missing", "-3.697314e28"];
-
 const POSES: [&str; 8] = ["time_s", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"];
 const MARKERS: [&str; 37] = [
     "time_s", "m1_x_mm", "m1_y_mm", "m1_z_mm", "m2_x_mm", "m2_y_mm", "m2_z_mm", "m3_x_mm", "m3_y_mm",
@@ -60,15 +57,22 @@ pub(super) struct Table {
 impl Table {
     pub(super) fn parse(text: &str, config: &FileConfig) -> Result<Self, Located> {
         let sheet = Sheet::of(text, config.columns.as_deref())?;
-        let first = sheet.rows().next().transpose()?.map_or_else(Vec::new, |(_, cells)| cells);
+        let is_filled = |row: &Result<(_, Vec<&str>), _>| !matches!(row, Ok((_, cells)) if cells.is_empty());
+        let first = sheet.rows().find(is_filled).transpose()?.map_or_else(Vec::new, |(_, cells)| cells);
         let is_clock = |at: usize| first.get(at).is_some_and(|cell: &&str| cell.contains(':'));
         let layout = Layout::of(&sheet.columns, config, sheet.assumed, is_clock);
         let layout = layout.map_err(|problem| Located { line: sheet.header_line, problem })?;
         let mut protocol = [sheet.protocol.clone(), layout.protocol.clone()].concat();
         let mut reader = Reader { layout: &layout, sheet: &sheet, decimal: None, last_s: None };
-        let (mut rows, mut lost): (Vec<Row>, Vec<u64>) = (Vec::new(), Vec::new());
+        let (mut rows, mut lost, mut empty) = (Vec::new(), Vec::new(), Vec::new());
         for (index, row) in sheet.rows().enumerate() {
             let (line, cells) = row?;
+            // Programs leave empty rows at the end of a table; between others an empty row is a lost sample.
+            if cells.is_empty() {
+                empty.push(line);
+                continue;
+            }
+            lost.append(&mut empty);
             let (time_s, values) =
                 reader.row(index, line, &cells).map_err(|problem| Located::at(line, problem))?;
             match values {
@@ -148,9 +152,6 @@ impl Reader<'_> {
         let layout = self.layout;
         let time_s = match layout.clock {
             Clock::Times(scaled) => self.time_s(line, cells[scaled.column], scaled)?,
-            Clock::Frames { column, rate_hz } => {
-                self.present(line, cells, Scaled { column, size: 1.0 })? / rate_hz
-            }
             Clock::Rows { rate_hz } => index as f64 / rate_hz,
         };
         self.last_s = Some(time_s);
@@ -227,13 +228,6 @@ impl Reader<'_> {
         Ok(numbers.iter().all(Option::is_some).then(|| numbers.map(Option::unwrap_or_default)))
     }
 
-    fn present(&mut self, line: u64, cells: &[&str], scaled: Scaled) -> Result<f64, String> {
-        let number = self.numbers(line, cells, &[scaled])?;
-        number
-            .map(|[number]| number)
-            .ok_or_else(|| format!("{} is empty; complete the line or delete it", self.name(scaled.column)))
-    }
-
     /// A quaternion, scalar first; none if it is lost.
     fn quaternion(&mut self, line: u64, cells: &[&str], turn: &Turn) -> Result<Option<[f64; 4]>, String> {
         let plain = |column| Scaled { column, size: 1.0 };
@@ -278,7 +272,7 @@ impl Reader<'_> {
         let finite = |text: &str| text.parse().ok().filter(|number: &f64| number.is_finite());
         let number = if mark == Some(',') { finite(&cell.replacen(',', ".", 1)) } else { finite(cell) };
         let may_be_lost = number.is_none() || cell.starts_with("-3.697");
-        if may_be_lost && LOST.contains(&cell.to_lowercase().replace("e+", "e").as_str()) {
+        if may_be_lost && is_lost(cell) {
             return Ok(None);
         }
         let Some(number) = number else {
@@ -331,12 +325,14 @@ fn lose_origins(rows: &mut [Row]) {
 
 fn check_steps(rows: &[Row]) -> Result<(), Located> {
     let step_s = |pair: &[Row]| pair[1].time_s - pair[0].time_s;
-    let mut steps_s: Vec<f64> = rows.windows(2).map(step_s).collect();
-    let middle = steps_s.len() / 2;
-    let usual_s = *steps_s.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let usual_s = upper_median(&rows.windows(2).map(step_s).collect::<Vec<_>>());
     // Steps that are short for a tracker are judged with the speeds.
     if usual_s > 0.0 && !(SHORTEST_STEP_S..=LARGEST_GAP_S).contains(&usual_s) {
-        let unit = if usual_s > LARGEST_GAP_S { "ms" } else { "s" };
+        let unit = match usual_s / LARGEST_GAP_S {
+            1e3.. => "us",
+            1.0.. => "ms",
+            _ => "s",
+        };
         return Err(Located::at(
             rows[1].line,
             format!(

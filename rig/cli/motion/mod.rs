@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::Args;
 use masseter_controller::trajectory::{
-    Frame, Frames, Gap, Glitch, LikelyUnit, PointFigures, Range, RecordingSurvey, Trajectory,
-    TrajectoryError, plain_form, survey,
+    Frame, Frames, Gap, Glitch, PointFigures, Range, RecordingSurvey, Trajectory, TrajectoryError, Unit,
+    plain_form, survey,
 };
 use masseter_judge::{RecordedError, RecordedFigures, RecordedWatch};
 use masseter_model::geometry::{AXES, AXIS_NAMES, Mechanism};
@@ -122,7 +122,7 @@ struct Strokes {
 struct Suggestion {
     /// `motion.length_unit` or `motion.time_unit`; none where the stated ones are likely.
     #[serde(flatten)]
-    unit: Option<LikelyUnit>,
+    unit: Option<Unit>,
     /// `motion.axes`; none where the stated ones are likely.
     axes: Option<[String; 3]>,
     /// The motion of the jaw with these axes.
@@ -181,7 +181,7 @@ impl Strokes {
 fn suggest(
     scenario: &Scenario,
     mechanism: &Mechanism,
-    unit: Option<LikelyUnit>,
+    unit: Option<Unit>,
     frame: Option<&Frame>,
     now: &Judged,
 ) -> Option<Suggestion> {

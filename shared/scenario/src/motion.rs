@@ -166,29 +166,6 @@ pub enum LengthUnit {
     M,
 }
 
-impl LengthUnit {
-    /// Its name, as in a scenario.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Um => "um",
-            Self::Mm => "mm",
-            Self::Cm => "cm",
-            Self::M => "m",
-        }
-    }
-}
-
-impl TimeUnit {
-    /// Its name, as in a scenario.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::S => "s",
-            Self::Ms => "ms",
-            Self::Us => "us",
-        }
-    }
-}
-
 /// What becomes of a recording that is no motion of a jaw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 use masseter_scenario::LengthUnit;
 use nalgebra::{Quaternion, UnitQuaternion};
 
-use super::super::plausible::{LikelyUnit, import};
+use super::super::columns::Unit;
+use super::super::plausible::import;
 use super::super::survey::survey;
 use super::*;
 
@@ -98,10 +99,8 @@ fn the_right_frame_of_24_is_the_best_or_among_equals_in_every_unit() {
                     margins.push(other - misfit(frames.best.iter().find(is_right)));
                     assert!(played.is_ok() || !likely.contains(&stated), "{name} {names:?}: {played:?}");
                 } else {
-                    assert!(
-                        played.unwrap_err().contains(&format!("motion.length_unit = \"{}\"", unit.name()))
-                    );
-                    assert_eq!(found.likely_unit, Some(LikelyUnit::Length(unit)));
+                    assert!(played.unwrap_err().contains(&format!("motion.{}", Unit::Length(unit))));
+                    assert_eq!(found.likely_unit, Some(Unit::Length(unit)));
                 }
             }
         }

@@ -94,6 +94,13 @@ fn lost(change: impl Fn(&mut Vec<String>)) -> String {
     text_of(POSES, &rows, ",")
 }
 
+/// The poses in rows at a rate, some of them without a cell.
+fn without_times(separator: &str) -> String {
+    let rows = lost(|row| row.iter_mut().for_each(String::clear));
+    let rows = rows.lines().map(|row| row.split_once(',').map_or("", |(_, cells)| cells));
+    rows.map(|row| row.replace(',', separator) + "\n").collect()
+}
+
 fn separated(separator: &str, mark: &str) -> String {
     let mut rows = cells(&poses());
     rows.iter_mut().flatten().for_each(|cell| *cell = cell.replace('.', mark));
@@ -434,7 +441,19 @@ fn times() -> Vec<Case> {
             no_keys,
             Refused("motion.time_unit = \"s\""),
         ),
+        (
+            "microseconds as seconds",
+            with(POSES, scaled(1e6, 1.0)),
+            no_keys,
+            Refused("motion.time_unit = \"us\""),
+        ),
         ("clock", clock(36_000.0), no_keys, WHOLE),
+        (
+            "clock with a unit",
+            clock(36_000.0),
+            |config| config.time_unit = Some(TimeUnit::Ms),
+            Refused("motion.time_unit is for times in numbers"),
+        ),
         ("clock over midnight", clock(86_399.5), no_keys, WHOLE),
         ("frames", with("Frame,x_mm,y_mm,z_mm,qw,qx,qy,qz", frames), no_keys, Refused("motion.rate_hz = ")),
         (
@@ -466,6 +485,24 @@ fn losses() -> Vec<Case> {
             "zero quaternion",
             lost(|row| row[4..].iter_mut().for_each(|cell| *cell = "0".to_owned())),
             no_keys,
+            Read(Plain::Poses, 5),
+        ),
+        (
+            "rows of empty cells, at the end too",
+            lost(|row| row.iter_mut().for_each(String::clear)) + ",,,,,,,\n,,,,,,,\n",
+            no_keys,
+            Read(Plain::Poses, 5),
+        ),
+        (
+            "rows of empty cells without times",
+            without_times(","),
+            |config| config.rate_hz = Some(RATE_HZ),
+            Read(Plain::Poses, 5),
+        ),
+        (
+            "rows of tabs without times",
+            without_times("\t"),
+            |config| config.rate_hz = Some(RATE_HZ),
             Read(Plain::Poses, 5),
         ),
         (

@@ -75,7 +75,7 @@ fn the_likely_unit_is_one_with_which_the_motion_plays() {
     for (unit, factor) in [(LengthUnit::Cm, 0.1), (LengthUnit::M, 0.001)] {
         let mut config = opening(|row| row[1..4].iter_mut().for_each(|length| *length *= factor));
         let found = survey(&config, &JawConfig::default()).unwrap();
-        assert_eq!(found.likely_unit, Some(LikelyUnit::Length(unit)));
+        assert_eq!(found.likely_unit, Some(Unit::Length(unit)));
         config.length_unit = Some(unit);
         assert!(import(&config, &JawConfig::default()).unwrap().doubts.is_empty());
     }

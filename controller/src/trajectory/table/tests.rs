@@ -64,3 +64,17 @@ fn a_row_without_a_whole_pose_is_a_gap_in_whatever_way_the_tracker_writes_it() {
         );
     }
 }
+
+/// The closed jaw is asked about, though a key and no header names the columns.
+#[test]
+fn a_marker_lost_in_the_first_row_is_no_line_before_the_rows() {
+    let row = |row: u32| {
+        let x = if row == 0 { String::new() } else { format!("{row}") };
+        format!("{},{x},0,0,{},0,0,{row},40,0\n", f64::from(row) / 100.0, row + 40)
+    };
+    let columns = ["time_s"].into_iter().chain(MARKERS[1..10].iter().copied()).map(str::to_owned).collect();
+    let config = FileConfig { columns: Some(columns), ..FileConfig::new("motion.csv") };
+    let table = Table::parse(&(0..6).map(row).collect::<String>(), &config).ok().unwrap();
+    assert_eq!(table.rows[0].line, 2);
+    assert!(table.doubts[0].starts_with("line 2: the closed jaw is this row"), "{:?}", table.doubts);
+}
