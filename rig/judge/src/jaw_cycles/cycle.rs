@@ -194,7 +194,7 @@ pub struct CoursePoint {
 }
 
 /// A quantity of a cycle.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct CycleQuantity {
     /// Its key in a summary, and its column in a table.
     pub name: &'static str,
@@ -202,21 +202,21 @@ pub struct CycleQuantity {
     pub about: &'static str,
     /// Its unit.
     pub unit: &'static str,
-    /// Its value in a cycle.
-    pub value: fn(&JawCycle) -> Option<f64>,
 }
+
+type ValueOfCycle = fn(&JawCycle) -> Option<f64>;
 
 const fn quantity(
     name: &'static str,
     unit: &'static str,
     about: &'static str,
-    value: fn(&JawCycle) -> Option<f64>,
-) -> CycleQuantity {
-    CycleQuantity { name, about, unit, value }
+    value: ValueOfCycle,
+) -> (CycleQuantity, ValueOfCycle) {
+    (CycleQuantity { name, about, unit }, value)
 }
 
-/// The quantities of a cycle that have statistics.
-pub const QUANTITIES: [CycleQuantity; 11] = [
+/// The quantities of a cycle that have statistics, with their values in a cycle.
+pub const QUANTITIES: [(CycleQuantity, ValueOfCycle); 11] = [
     quantity("duration_s", "s", "duration, beginning to beginning", |of| of.duration_s),
     quantity("opening_s", "s", "duration of the opening", |of| Some(of.opening_s)),
     quantity("hold_s", "s", "hold at the farthest place", |of| Some(of.hold_s)),
