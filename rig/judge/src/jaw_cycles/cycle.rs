@@ -1,6 +1,8 @@
 //! The figures of one cycle of the jaw, its kind and its side. [docs/jaw-cycles.md](../../../../docs/jaw-cycles.md) has the rule
 //! in words, with its sources.
 
+use std::fmt;
+
 use masseter_model::geometry::Vec3;
 use serde::Serialize;
 
@@ -86,19 +88,6 @@ pub enum JawCycleKind {
     Unclear,
 }
 
-impl JawCycleKind {
-    /// The word for it.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Chew => "chew",
-            Self::Opening => "opening",
-            Self::Lateral => "lateral",
-            Self::Protrusive => "protrusive",
-            Self::Unclear => "unclear",
-        }
-    }
-}
-
 /// Where chewing closes from, and where a lateral movement goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -109,17 +98,6 @@ pub enum JawSide {
     Right,
     /// Both or neither.
     Both,
-}
-
-impl JawSide {
-    /// The word for it.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Left => "left",
-            Self::Right => "right",
-            Self::Both => "both",
-        }
-    }
 }
 
 /// Why a cycle does not count.
@@ -134,16 +112,18 @@ pub enum LeftOut {
     ByHand,
 }
 
-impl LeftOut {
-    /// The word for it.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Ramp => "ramp",
-            Self::Window => "window",
-            Self::ByHand => "by hand",
+/// In words they are what a summary has.
+macro_rules! words_of_the_summary {
+    ($($of:ty),+) => { $(
+        impl fmt::Display for $of {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                self.serialize(f)
+            }
         }
-    }
+    )+ };
 }
+
+words_of_the_summary!(JawCycleKind, JawSide, LeftOut);
 
 /// A cycle of the jaw.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -243,9 +243,8 @@ impl JawCycleGroup {
             let values: Vec<f64> = cycles.iter().filter_map(|cycle| value(cycle)).collect();
             Quantity { of, statistic: Statistic::of(&values) }
         });
-        let side_word = side.map_or_else(String::new, |side| format!(" {}", side.word()));
         Self {
-            name: kind.word().to_owned() + &side_word,
+            name: side.map_or_else(|| kind.to_string(), |side| format!("{kind} {side}")),
             kind,
             side,
             count: cycles.len() as u64,

@@ -209,6 +209,7 @@ fn ramps_a_window_and_cycles_by_hand_leave_cycles_out() {
     let [window, hand] = [Some(LeftOut::Window), Some(LeftOut::ByHand)];
     assert_eq!(why(&chosen)[..5], [window, window, None, hand, None]);
     assert_eq!(names(&chosen), [("chew left", 4)]);
+    assert_eq!(LeftOut::ByHand.to_string(), "by_hand");
 }
 
 #[test]

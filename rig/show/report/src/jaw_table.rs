@@ -48,9 +48,9 @@ pub fn jaw_cycle_table<'a>(of: impl IntoIterator<Item = ([&'a str; 2], &'a [JawC
         for cycle in cycles {
             let about = [
                 Cell::Whole(Some(cycle.number.cast_signed())),
-                word(cycle.kind.word()),
-                Cell::Word(cycle.side.map(|side| side.word().to_owned())),
-                Cell::Word(cycle.left_out.map(|why| why.word().to_owned())),
+                word(&cycle.kind.to_string()),
+                Cell::Word(cycle.side.map(|side| side.to_string())),
+                Cell::Word(cycle.left_out.map(|why| why.to_string())),
                 Cell::Number(Some(cycle.began_s)),
             ];
             let numbers = QUANTITIES.map(|(_, value)| Cell::Number(value(cycle)));

@@ -205,7 +205,7 @@ fn recorded(path: &Path, by: &By) -> anyhow::Result<Recorded> {
     let read = || -> anyhow::Result<Recorded> {
         let folder = RunFolder::open(path)?;
         let manifest = Manifest::read(&folder)?;
-        let figures = analyse(&folder, &manifest, |_| Ok(()))?;
+        let (figures, _) = analyse(&folder, &manifest, None)?;
         let scenario = &manifest.scenario;
         let closed_m = closed_incisal_m(scenario).context("the scenario has no closed pose")?;
         let place = |sample: &TrackingSample| {

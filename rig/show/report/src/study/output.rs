@@ -1,5 +1,6 @@
 //! What `masseter compare` writes: tables, figures with their caption, and a page with all of it.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::path::Path;
 
@@ -148,9 +149,7 @@ fn differences_table(differences: &[Difference]) -> Table {
 fn caption(study: &Study, differences: &[Difference]) -> String {
     let conditions = study.conditions().into_iter().map(|condition| {
         let of: Vec<_> = study.recordings.iter().filter(|recorded| recorded.condition == condition).collect();
-        let mut persons: Vec<_> = of.iter().map(|recorded| &recorded.person).collect();
-        persons.sort();
-        persons.dedup();
+        let persons: BTreeSet<_> = of.iter().map(|recorded| &recorded.person).collect();
         let cycles: u64 =
             of.iter().map(|recorded| recorded.jaw.count - recorded.jaw.left_out - recorded.jaw.unclear).sum();
         let [persons, recordings] =
@@ -242,8 +241,8 @@ fn page(
 
 /// The differences that a terminal shows, a line each.
 fn in_words(study: &Study, differences: &[Difference]) -> String {
-    let found =
-        format!("{} recordings; cycles with courses: {}\n", study.recordings.len(), groups(study).join(", "));
+    let groups = groups(study).into_iter().collect::<Vec<_>>().join(", ");
+    let found = format!("{} recordings; cycles with courses: {groups}\n", study.recordings.len());
     let heads = ["cycles", "quantity", "condition", "difference", "95 % interval", "SD", "g", "pairs"];
     found + &text::table([14, 34, 20, 12, 22, 10, 7, 6], heads, differences.iter().map(difference_cells))
 }
