@@ -25,8 +25,7 @@ fn rows(text: &str) -> impl Iterator<Item = Row<'_>> {
 
 #[test]
 fn known_differences_between_six_sessions_are_found_and_covered() {
-    let workspace =
-        Workspace::new("name = 'a-name-that-is-nobodys'\nduration_s = 5.0\nrecording.frames = false");
+    let workspace = Workspace::new("name = 'a-name-that-is-nobodys'\nduration_s = 5.0");
     let run = |words: &[&str]| {
         let output = Command::new(MASSETER).args(words).current_dir(workspace.file("")).output().unwrap();
         assert!(output.status.success(), "{words:?}: {}", String::from_utf8_lossy(&output.stderr));
@@ -48,7 +47,10 @@ fn known_differences_between_six_sessions_are_found_and_covered() {
         }
     }
     let runs: Vec<_> = runs.iter().map(String::as_str).collect();
+    let log = workspace.file("P1-before").join("can0.log");
+    fs::remove_file(&log).unwrap();
     let said = run(&[&["compare", "--out", "study"][..], &runs].concat());
+    assert!(!log.exists(), "a comparison writes nothing into the folders of runs");
     assert!(said.contains("before to after") && said.contains("opening, mm"), "{said}");
 
     let read = |name: &str| fs::read_to_string(workspace.file("study").join(name)).unwrap();

@@ -1,6 +1,6 @@
 //! The motion as a picture: paths of the incisal point and the condyles, and their course.
 
-use masseter_charts::{Axis, BLUE, Chart, GREEN, Look, RED, ROOM, Scale, Series, VERMILION, drawing, extent};
+use masseter_charts::{Axis, BLUE, Chart, GREEN, Look, RED, Series, VERMILION, drawing};
 use masseter_controller::trajectory::{Glitch, RecordingSurvey, SurveyRow};
 
 const COLOURS: [&str; 3] = [BLUE, VERMILION, GREEN];
@@ -14,8 +14,6 @@ const AROUND: f64 = 1.15;
 const MOST_MARKS: usize = 5;
 /// The component on which they are marked.
 const UP: usize = 2;
-/// A path of no size is drawn in a box of this size, mm.
-const LEAST_MM: f64 = 1.0;
 
 /// Sagittal and frontal paths over displacements and turns.
 pub(super) fn svg(survey: &RecordingSurvey) -> String {
@@ -40,18 +38,7 @@ fn path(survey: &RecordingSurvey, left: f64, title: &str, across: usize, label: 
         Series { name: name.to_owned(), colour, look: Look::Line, points }
     };
     let series: Vec<Series> = names.map(of).collect();
-    let points = || series.iter().flat_map(|series| &series.points);
-    let extents = [extent(points().map(|point| point.0)), extent(points().map(|point| point.1))];
-    let plot = [PATH[0] - ROOM[0] - ROOM[2], PATH[1] - ROOM[1] - ROOM[3]];
-    let sizes_mm = extents.map(|[low, high]| high - low);
-    let mm_a_px =
-        (AROUND * sizes_mm[0] / plot[0]).max(AROUND * sizes_mm[1] / plot[1]).max(LEAST_MM / plot[0]);
-    let axis = |of: usize, label: &str| {
-        let [low, high] = extents[of];
-        let (middle, half) = (f64::midpoint(low, high), mm_a_px * plot[of] / 2.0);
-        Axis { label: label.to_owned(), scale: Scale::Linear, ends: [middle - half, middle + half] }
-    };
-    let (x, y) = (axis(0, label), axis(1, "up, mm"));
+    let [x, y] = Axis::in_one_scale([label, "up, mm"], &series, PATH, AROUND);
     Chart { frame: [left, 0.0, PATH[0], PATH[1]], title: title.to_owned(), x, y, series }
 }
 

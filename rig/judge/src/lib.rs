@@ -40,7 +40,7 @@ pub use events::{Code, EventRecord};
 pub use figures::Figures;
 pub use jaw_cycles::{
     BorderStep, COURSE_POINTS, Course, CoursePoint, CycleQuantity, JawCycle, JawCycleFigures, JawCycleGroup,
-    JawCycleKind, JawSide, LeftOut, QUANTITIES, Quantity, closed_incisal_m, mean_course,
+    JawCycleKind, JawSide, LeftOut, QUANTITIES, Quantity, closed_incisal_m, incisal_m, mean_course,
 };
 pub use longest_cycles::{KernelCounts, WorstCycle, hop_names};
 pub use lost_cycles::{Outage, ReadingFigures};

@@ -1,8 +1,10 @@
 //! Poses in messages, and how far they are apart. A pose with a value that is no number is infinitely far.
 
-use masseter_model::geometry::{Deviation, Pose};
+use masseter_controller::trajectory::closed_pose;
+use masseter_model::geometry::{Deviation, Mechanism, Pose};
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::messages::{State, Truth, pose_from_fields};
+use masseter_scenario::Scenario;
 
 /// States in which the platform has a desired pose.
 pub const MOVING: [ControllerState; 3] =
@@ -15,6 +17,11 @@ pub(super) fn is_moving(state: Option<u32>) -> bool {
 
 pub(super) fn is_running(state: Option<u32>) -> bool {
     state == Some(ControllerState::Running.code())
+}
+
+/// The platform when the jaw is closed; none for a scenario without that pose, which no run has.
+pub(super) fn closed_platform(scenario: &Scenario) -> Option<Pose> {
+    closed_pose(&scenario.jaw, &Mechanism::new(&scenario.mechanism).ok()?).ok()
 }
 
 pub(super) fn desired_pose(state: &State) -> Option<Pose> {

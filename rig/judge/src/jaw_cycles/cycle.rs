@@ -1,6 +1,8 @@
 //! The figures of one cycle of the jaw, its kind and its side. [docs/jaw-cycles.md](../../../../docs/jaw-cycles.md) has the rule
 //! in words, with its sources.
 
+use std::fmt;
+
 use masseter_model::geometry::Vec3;
 use serde::Serialize;
 
@@ -86,19 +88,6 @@ pub enum JawCycleKind {
     Unclear,
 }
 
-impl JawCycleKind {
-    /// The word for it.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Chew => "chew",
-            Self::Opening => "opening",
-            Self::Lateral => "lateral",
-            Self::Protrusive => "protrusive",
-            Self::Unclear => "unclear",
-        }
-    }
-}
-
 /// Where chewing closes from, and where a lateral movement goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -109,17 +98,6 @@ pub enum JawSide {
     Right,
     /// Both or neither.
     Both,
-}
-
-impl JawSide {
-    /// The word for it.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Left => "left",
-            Self::Right => "right",
-            Self::Both => "both",
-        }
-    }
 }
 
 /// Why a cycle does not count.
@@ -134,16 +112,18 @@ pub enum LeftOut {
     ByHand,
 }
 
-impl LeftOut {
-    /// The word for it.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Ramp => "ramp",
-            Self::Window => "window",
-            Self::ByHand => "by hand",
+/// In words they are what a summary has.
+macro_rules! words_of_the_summary {
+    ($($of:ty),+) => { $(
+        impl fmt::Display for $of {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                self.serialize(f)
+            }
         }
-    }
+    )+ };
 }
+
+words_of_the_summary!(JawCycleKind, JawSide, LeftOut);
 
 /// A cycle of the jaw.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -194,7 +174,7 @@ pub struct CoursePoint {
 }
 
 /// A quantity of a cycle.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct CycleQuantity {
     /// Its key in a summary, and its column in a table.
     pub name: &'static str,
@@ -202,21 +182,21 @@ pub struct CycleQuantity {
     pub about: &'static str,
     /// Its unit.
     pub unit: &'static str,
-    /// Its value in a cycle.
-    pub value: fn(&JawCycle) -> Option<f64>,
 }
+
+type ValueOfCycle = fn(&JawCycle) -> Option<f64>;
 
 const fn quantity(
     name: &'static str,
     unit: &'static str,
     about: &'static str,
-    value: fn(&JawCycle) -> Option<f64>,
-) -> CycleQuantity {
-    CycleQuantity { name, about, unit, value }
+    value: ValueOfCycle,
+) -> (CycleQuantity, ValueOfCycle) {
+    (CycleQuantity { name, about, unit }, value)
 }
 
-/// The quantities of a cycle that have statistics.
-pub const QUANTITIES: [CycleQuantity; 11] = [
+/// The quantities of a cycle that have statistics, with their values in a cycle.
+pub const QUANTITIES: [(CycleQuantity, ValueOfCycle); 11] = [
     quantity("duration_s", "s", "duration, beginning to beginning", |of| of.duration_s),
     quantity("opening_s", "s", "duration of the opening", |of| Some(of.opening_s)),
     quantity("hold_s", "s", "hold at the farthest place", |of| Some(of.hold_s)),

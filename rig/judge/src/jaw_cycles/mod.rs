@@ -9,13 +9,13 @@ mod segments;
 
 use std::collections::BTreeMap;
 
-use masseter_controller::trajectory::closed_pose;
-use masseter_model::geometry::{Mechanism, Pose, Vec3};
+use masseter_model::geometry::{Pose, Vec3};
 use masseter_scenario::{Scenario, StudyConfig};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use self::cycle::Sample;
 use self::segments::{Cycle, Segments};
+use crate::poses::closed_platform;
 use crate::statistic::Statistic;
 
 pub(crate) use cycle::MotionSpeed;
@@ -26,7 +26,7 @@ pub use cycle::{
 
 /// Time between samples, ns.
 const SAMPLE_NS: u64 = 4_000_000;
-/// Cycles in the list, and courses of a group. Statistics count all.
+/// Cycles in the list of a summary, and courses of a group. Statistics and tables have all cycles.
 const MOST_CYCLES: usize = 512;
 const MOST_COURSES: usize = 64;
 /// Steps of the border, mm, and their number: wider than any mouth opens.
@@ -46,10 +46,15 @@ pub struct JawCycleFigures {
     pub most_closed_mm: Option<f64>,
     /// Cycles that count, by kind and side.
     pub groups: Vec<JawCycleGroup>,
-    /// The first 512 cycles.
+    /// The cycles; a summary and a page list the first 512.
+    #[serde(serialize_with = "first_cycles")]
     pub cycles: Vec<JawCycle>,
     /// Border of the incisal point's path: what this motion reached at each opening, after Posselt.
     pub border: Vec<BorderStep>,
+}
+
+fn first_cycles<S: Serializer>(cycles: &[JawCycle], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(cycles.iter().take(MOST_CYCLES))
 }
 
 /// Cycles of one kind and one side.
@@ -76,12 +81,9 @@ pub struct JawCycleGroup {
 /// A quantity of the cycles of a group.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Quantity {
-    /// Its key in a cycle.
-    pub name: &'static str,
-    /// What it is.
-    pub about: &'static str,
-    /// Its unit.
-    pub unit: &'static str,
+    /// Its name and unit.
+    #[serde(flatten)]
+    pub of: CycleQuantity,
     /// Its values.
     #[serde(flatten)]
     pub statistic: Statistic,
@@ -104,13 +106,12 @@ pub struct BorderStep {
 
 /// Place of the incisal point when the jaw is closed, base frame, m; none for a scenario without a closed pose, which no run
 /// has.
-pub fn closed_incisal_m(scenario: &Scenario) -> Option<[f64; 3]> {
-    let mechanism = Mechanism::new(&scenario.mechanism).ok()?;
-    let closed = closed_pose(&scenario.jaw, &mechanism).ok()?;
-    Some(incisal_m(&closed, scenario.jaw.reference_point_m).into())
+pub fn closed_incisal_m(scenario: &Scenario) -> Option<Vec3> {
+    Some(incisal_m(&closed_platform(scenario)?, scenario.jaw.reference_point_m))
 }
 
-fn incisal_m(platform: &Pose, in_platform_m: [f64; 3]) -> Vec3 {
+/// The incisal point of a pose, base frame, m; its place in the platform frame is `jaw.reference_point_m`.
+pub fn incisal_m(platform: &Pose, in_platform_m: [f64; 3]) -> Vec3 {
     platform.translation.vector + platform.rotation * Vec3::from(in_platform_m)
 }
 
@@ -140,7 +141,7 @@ impl JawCycles {
     pub(super) fn new(scenario: &Scenario) -> Self {
         Self {
             incisal_m: scenario.jaw.reference_point_m,
-            closed_m: closed_incisal_m(scenario).unwrap_or_default().into(),
+            closed_m: closed_incisal_m(scenario).unwrap_or_default(),
             has_force: scenario.has_contact(),
             study: scenario.study.clone().unwrap_or_default(),
             segments: Segments::default(),
@@ -231,23 +232,19 @@ impl JawCycles {
             most_closed_mm: self.most_closed_mm,
             groups,
             border: border.collect(),
-            cycles: {
-                self.cycles.truncate(MOST_CYCLES);
-                self.cycles
-            },
+            cycles: self.cycles,
         }
     }
 }
 
 impl JawCycleGroup {
     fn new((kind, side): GroupKey, cycles: &[&JawCycle], courses: Vec<(u64, Course)>) -> Self {
-        let quantities = QUANTITIES.into_iter().map(|CycleQuantity { name, about, unit, value }| {
+        let quantities = QUANTITIES.into_iter().map(|(of, value)| {
             let values: Vec<f64> = cycles.iter().filter_map(|cycle| value(cycle)).collect();
-            Quantity { name, about, unit, statistic: Statistic::of(&values) }
+            Quantity { of, statistic: Statistic::of(&values) }
         });
-        let side_word = side.map_or_else(String::new, |side| format!(" {}", side.word()));
         Self {
-            name: kind.word().to_owned() + &side_word,
+            name: side.map_or_else(|| kind.to_string(), |side| format!("{kind} {side}")),
             kind,
             side,
             count: cycles.len() as u64,

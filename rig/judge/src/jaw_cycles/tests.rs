@@ -18,8 +18,7 @@ fn found_of(
 ) -> JawCycleFigures {
     let scenario = Scenario { study: Some(study), ..Scenario::default() };
     let mut cycles = JawCycles { has_force: true, ..JawCycles::new(&scenario) };
-    let closed =
-        Vec3::from(closed_incisal_m(&scenario).unwrap()) - Vec3::from(scenario.jaw.reference_point_m);
+    let closed = closed_incisal_m(&scenario).unwrap() - Vec3::from(scenario.jaw.reference_point_m);
     for cycle in 0..(seconds * 1e3) as u64 {
         let t_s = cycle as f64 / 1e3;
         let ([x, y, z], force_n) = motion(t_s);
@@ -56,7 +55,7 @@ fn noise(t_s: f64) -> f64 {
 }
 
 fn statistic(group: &JawCycleGroup, name: &str) -> Statistic {
-    group.quantities.iter().find(|quantity| quantity.name == name).unwrap().statistic
+    group.quantities.iter().find(|quantity| quantity.of.name == name).unwrap().statistic
 }
 
 #[track_caller]
@@ -193,7 +192,7 @@ fn a_jaw_that_stays_open_has_no_occlusal_phase() {
     assert_eq!(names(&figures), [("chew left", 10)]);
     assert!((figures.most_closed_mm.unwrap() - 10.0).abs() < 0.01, "{:?}", figures.most_closed_mm);
     assert!(figures.cycles.iter().all(|cycle| cycle.occlusal_s.is_none()));
-    assert!(figures.groups[0].quantities.iter().all(|quantity| quantity.name != "occlusal_s"));
+    assert!(figures.groups[0].quantities.iter().all(|quantity| quantity.of.name != "occlusal_s"));
 }
 
 #[test]
@@ -210,6 +209,7 @@ fn ramps_a_window_and_cycles_by_hand_leave_cycles_out() {
     let [window, hand] = [Some(LeftOut::Window), Some(LeftOut::ByHand)];
     assert_eq!(why(&chosen)[..5], [window, window, None, hand, None]);
     assert_eq!(names(&chosen), [("chew left", 4)]);
+    assert_eq!(LeftOut::ByHand.to_string(), "by_hand");
 }
 
 #[test]
@@ -249,12 +249,14 @@ fn what_does_not_move_away_and_back_is_no_cycle() {
 }
 
 #[test]
-fn a_long_run_lists_the_first_cycles_and_counts_all() {
+fn a_long_run_keeps_all_cycles_and_its_summary_lists_the_first() {
     let figures = found(400.0, |t_s| {
         let ([x, y, z], force_n) = chewing(t_s);
         ([x, y, z], if t_s > 300.0 { 0.0 } else { force_n })
     });
     let chew = &figures.groups[0];
-    assert_eq!((chew.count, figures.cycles.len(), chew.courses.len()), (571, MOST_CYCLES, MOST_COURSES));
+    assert_eq!((chew.count, figures.cycles.len(), chew.courses.len()), (571, 571, MOST_COURSES));
+    let listed = serde_json::to_value(&figures).unwrap();
+    assert_eq!(listed["cycles"].as_array().unwrap().len(), MOST_CYCLES);
     assert_eq!(statistic(chew, "force_n").count, 571);
 }

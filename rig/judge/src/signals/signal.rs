@@ -3,14 +3,13 @@
 
 use std::fmt;
 
-use masseter_controller::trajectory::closed_pose;
-use masseter_model::geometry::{Mechanism, Pose, Vec3};
+use masseter_model::geometry::{Pose, Vec3};
 use masseter_recording::jaw_points;
 use masseter_scenario::{Scenario, Unit};
 use serde::Serialize;
 
 use super::timeline::CycleMessages;
-use crate::poses::{estimated_pose, true_pose};
+use crate::poses::{closed_platform, estimated_pose, true_pose};
 
 /// How a signal's value follows from a cycle, and from the pose of the jaw in the first cycle of the motion. None if
 /// the cycle lacks it.
@@ -151,9 +150,8 @@ const LEAST_ACROSS: f64 = 0.2;
 
 impl Jaw {
     pub(super) fn new(scenario: &Scenario) -> Self {
-        let closed = Mechanism::new(&scenario.mechanism).ok();
-        let closed = closed.and_then(|mechanism| closed_pose(&scenario.jaw, &mechanism).ok());
-        Self { points_m: jaw_points(&scenario.jaw), closed, has_truth: scenario.can.is_virtual() }
+        let (points_m, has_truth) = (jaw_points(&scenario.jaw), scenario.can.is_virtual());
+        Self { points_m, closed: closed_platform(scenario), has_truth }
     }
 
     /// The incisal point from its closed place, base frame, m.

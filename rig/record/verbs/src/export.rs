@@ -12,7 +12,7 @@ use anyhow::{Context, anyhow, bail};
 use clap::{Args, ValueEnum};
 use masseter_judge::Analysis;
 use masseter_recording::{Columns, Description, Field, Reader, Recorded, Topic, new_folder};
-use masseter_report::{CandumpLogs, JawCyclesOf, jaw_cycle_table};
+use masseter_report::{CandumpLogs, jaw_cycle_table};
 use masseter_runtime::messages::tap;
 use masseter_runtime::named::{Declared, Parameter, Signal};
 use masseter_scenario::Scenario;
@@ -131,7 +131,8 @@ impl Export<'_> {
         let mut jaw = match selection.jaw {
             Some((scenario, declared)) => {
                 let file = TableFile::create(self.out, JAW_CYCLES, &self.format, jaw_cycle_table([]))?;
-                Some((Analysis::new(&beside(scenario, recording), &declared), file))
+                let scenario = beside(scenario, recording);
+                Some((Analysis::new(&scenario, &declared), scenario.study.unwrap_or_default(), file))
             }
             None => None,
         };
@@ -146,7 +147,7 @@ impl Export<'_> {
                 if let Some((table, file)) = &mut cycles {
                     table.completed_row(&message).map_or(Ok(()), |row| file.push_row(row))?;
                 }
-                if let Some((analysis, _)) = &mut jaw {
+                if let Some((analysis, ..)) = &mut jaw {
                     analysis.take(&message)?;
                 }
                 if let (Some(logs), Recorded::Frame(frame)) = (&mut candump, &message) {
@@ -161,11 +162,9 @@ impl Export<'_> {
             }
             files.push(file);
         }
-        if let Some((analysis, mut file)) = jaw {
-            let (person, condition) = selection.study;
-            let of = JawCyclesOf { person: &person, condition: &condition, recording: 1 };
+        if let Some((analysis, study, mut file)) = jaw {
             let cycles = analysis.finish(false, &[]).jaw_cycles.cycles;
-            file.group = jaw_cycle_table([(of, &cycles[..])]);
+            file.group = jaw_cycle_table([([study.patient.as_str(), &study.session], &cycles[..])]);
             files.push(file);
         }
         files.extend(topics.into_values().map(|(_, file)| file));
@@ -250,8 +249,6 @@ struct Selection {
     cycles: Option<(Scenario, Declared)>,
     /// The run of the table of jaw cycles; none where it is not selected.
     jaw: Option<(Scenario, Declared)>,
-    /// Pseudonyms of person and session.
-    study: (String, String),
 }
 
 impl Selection {
@@ -279,10 +276,8 @@ impl Selection {
         let is_selected =
             |name: &str| requested.is_empty() || requested.iter().any(|requested| requested == name);
         topics.retain(|topic, _| is_selected(topic.name()));
-        let cycles = (has_scenario && is_selected(CYCLES)).then(|| run_of(reader)).transpose()?;
-        let jaw = (has_scenario && is_selected(JAW_CYCLES)).then(|| run_of(reader)).transpose()?;
-        let study = jaw.as_ref().and_then(|(scenario, _)| scenario.study.clone()).unwrap_or_default();
-        Ok(Self { topics, cycles, jaw, study: (study.patient, study.session) })
+        let run_for = |name| (has_scenario && is_selected(name)).then(|| run_of(reader)).transpose();
+        Ok(Self { topics, cycles: run_for(CYCLES)?, jaw: run_for(JAW_CYCLES)? })
     }
 }
 

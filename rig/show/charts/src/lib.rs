@@ -43,6 +43,8 @@ const DOT: f64 = 3.0;
 /// Least length of an axis, and the same as a share of its greatest value: ticks must differ from each other.
 const LEAST: f64 = 1e-6;
 const LEAST_SHARE: f64 = 1e-9;
+/// A path of no size is drawn in a box of this size, in the unit of its axes.
+const LEAST_PATH: f64 = 1.0;
 
 /// What stands along an axis.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -73,6 +75,26 @@ impl Axis {
         let [low, high] = extent(values);
         let room = room * (high - low);
         Self { label: label.to_owned(), scale: Scale::Linear, ends: [low - room, high + room] }
+    }
+
+    /// To the right and upwards, in one scale around all points of a chart of this width and height, px. `around` is the extent of
+    /// the axes by that of the points.
+    #[must_use]
+    pub fn in_one_scale(
+        labels: [&str; 2],
+        series: &[Series],
+        [width, height]: [f64; 2],
+        around: f64,
+    ) -> [Self; 2] {
+        let points = || series.iter().flat_map(|series| &series.points);
+        let extents = [extent(points().map(|point| point.0)), extent(points().map(|point| point.1))];
+        let plot = [width - ROOM[0] - ROOM[2], height - ROOM[1] - ROOM[3]];
+        let [x, y] = [0, 1].map(|of| around * (extents[of][1] - extents[of][0]) / plot[of]);
+        let per_px = x.max(y).max(LEAST_PATH / plot[0]);
+        [0, 1].map(|of| {
+            let (middle, half) = (f64::midpoint(extents[of][0], extents[of][1]), per_px * plot[of] / 2.0);
+            Self::around(labels[of], [middle - half, middle + half], 0.0)
+        })
     }
 
     /// Both ends, along which places are even.
@@ -183,12 +205,6 @@ fn sized([width, height]: [f64; 2], [shown_width, shown_height]: [String; 2], ch
 }
 
 impl Chart {
-    /// Width and height of the plot in a frame of this width and height, px.
-    #[must_use]
-    pub fn plot_size([width, height]: [f64; 2]) -> [f64; 2] {
-        [width - ROOM[0] - ROOM[2], height - ROOM[1] - ROOM[3]]
-    }
-
     fn svg(&self) -> String {
         let [left, top, width, height] = self.frame;
         let (right, bottom) = (left + width - ROOM[2], top + height - ROOM[3]);
@@ -285,6 +301,26 @@ mod tests {
             assert!(axis.share(3.0).is_finite(), "{axis:?}");
             assert!(axis.ticks().iter().all(|(value, _)| value.is_finite()), "{axis:?}");
         }
+    }
+
+    #[test]
+    fn axes_in_one_scale_hold_all_points_also_of_a_path_without_size() {
+        let path = |points| Series { name: String::new(), colour: BLUE, look: Look::Hair, points };
+        let frame = [412.0, 250.0];
+        let plot = [frame[0] - ROOM[0] - ROOM[2], frame[1] - ROOM[1] - ROOM[3]];
+        for points in [vec![(-5.0, -18.0), (1.0, 0.0)], vec![(2.0, 2.0)]] {
+            let axes = Axis::in_one_scale(["x", "y"], &[path(points.clone())], frame, 1.1);
+            let [x, y] = [0, 1].map(|of| (axes[of].ends[1] - axes[of].ends[0]) / plot[of]);
+            assert!((x / y - 1.0).abs() < 1e-9 && x > 0.0, "{axes:?}");
+            let inside = 0.0..=1.0;
+            assert!(
+                points
+                    .iter()
+                    .all(|at| inside.contains(&axes[0].share(at.0)) && inside.contains(&axes[1].share(at.1)))
+            );
+        }
+        let none = Axis::in_one_scale(["x", "y"], &[], frame, 1.1);
+        assert!(none.iter().all(|axis| axis.share(3.0).is_finite()), "{none:?}");
     }
 
     #[test]

@@ -190,10 +190,10 @@
     const hasOcclusion = data.groups.some(({ quantities }) => quantities.some(({ name }) => name === 'occlusal_s'));
     holder.append(element('p', {}, `${counted(data.count, 'cycle')} found; ${data.left_out} left out, ${data.unclear} of unclear kind. Only cycles of one kind and side are pooled. `
       + (hasOcclusion || data.most_closed_mm <= 1 ? '' : `No occlusal phase: the jaw stays at least ${number(data.most_closed_mm, 1)} mm open. `) + 'masseter report RUN --set study.leave_out=[2] or --set study.window_s=[1,5] chooses cycles.'));
-    data.groups.forEach((group) => groupOf(holder, group, data.has_force, clock));
+    data.groups.forEach((group, at) => groupOf(holder, { ...group, ...data.drawn[at] }, data.has_force, clock));
     const { motion_s: zero } = clock.time;
     const head = ['cycle', 'kind', 'counts', 'begins', 'duration, s', 'opening, mm', 'lateral, mm', 'forward, mm', 'opening, mm/s', 'closing, mm/s', 'hold, s', 'occlusal phase, s', ...(data.has_force ? ['force, N'] : [])];
-    const rows = data.rows.map((row) => [String(row.number), [row.kind, row.side].filter(Boolean).join(' '), row.left_out ? `no: ${row.left_out.replace('_', ' ')}` : 'yes', clock.text(row.began_s + (zero || 0)),
+    const rows = data.cycles.map((row) => [String(row.number), [row.kind, row.side].filter(Boolean).join(' '), row.left_out ? `no: ${row.left_out.replace('_', ' ')}` : 'yes', clock.text(row.began_s + (zero || 0)),
       number(row.duration_s, 3), number(row.opening_mm, 2), number(row.lateral_mm, 2), number(row.forward_mm, 2), number(row.opening_mm_s, 1), number(row.closing_mm_s, 1), number(row.hold_s, 3), number(row.occlusal_s, 3),
       ...(data.has_force ? [number(row.force_n, 1)] : [])]);
     holder.append(element('details', {}, element('summary', {}, `Each of ${rows.length === data.count ? 'the' : 'the first'} ${rows.length} cycles`), tableOf('Cycles', head, rows, 'cycles')));

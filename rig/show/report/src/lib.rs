@@ -18,7 +18,7 @@ mod suite_page;
 mod table;
 mod text;
 
-pub use jaw_table::{JawCyclesOf, jaw_cycle_table};
+pub use jaw_table::jaw_cycle_table;
 pub use junit::junit_of_suite;
 pub use logs::{CandumpLogs, WriteError};
 pub use page::so_far as page_so_far;

@@ -50,8 +50,8 @@ pub fn report_run(
     shown: Option<(Format, Detail)>,
     reserved: File,
 ) -> Result<Judgement, Failure> {
-    let (figures, logged) =
-        analyse(folder, manifest).context("the run's recording cannot be analysed").incomplete()?;
+    let analysed = analyse(folder, manifest, Some(folder.path()));
+    let (figures, logged) = analysed.context("the run's recording cannot be analysed").incomplete()?;
     let (judgement, written) = show_and_write(folder, manifest, &figures, logged, shown, Some(reserved))?;
     written.incomplete()?;
     Ok(judgement)
@@ -75,7 +75,7 @@ pub fn report_past_run(path: &Path, set: &[String], format: Format) -> Result<Ex
     let unread = || format!("cannot read {}", folder.manifest().display());
     let mut manifest = Manifest::read(&folder).with_context(unread).usage()?;
     choose_cycles(&mut manifest.scenario, set).usage()?;
-    let (figures, logged) = analyse(&folder, &manifest).usage()?;
+    let (figures, logged) = analyse(&folder, &manifest, Some(folder.path())).usage()?;
     let shown = Some((format, Detail::Whole));
     let (judgement, written) = show_and_write(&folder, &manifest, &figures, logged, shown, None)?;
     match written {
@@ -103,10 +103,11 @@ fn is_read_only(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem)
 }
 
-/// Reads the recording once: its figures, and whether its CAN frames could be written as candump logs.
+/// Reads the recording once: its figures, and whether its CAN frames could be written into a folder, as candump logs.
 pub(crate) fn analyse(
     folder: &RunFolder,
     manifest: &Manifest,
+    log_folder: Option<&Path>,
 ) -> Result<(Figures, Result<(), WriteError>), AnalysisError> {
     let mut reader = Reader::open(&folder.recording())?;
     // The files that it named may have changed since.
@@ -115,17 +116,17 @@ pub(crate) fn analyse(
     let mut analysis = Analysis::new(&scenario, &manifest.declared);
     manifest.process_faults.iter().for_each(|fault| analysis.process_fault(fault));
     analysis.loop_samples(&manifest.usage);
-    let mut logs = Ok(CandumpLogs::new(folder.path(), &manifest.scenario.can.interfaces));
+    let mut logs = Ok(log_folder.map(|folder| CandumpLogs::new(folder, &manifest.scenario.can.interfaces)));
     while let Some(message) = reader.next_message()? {
         analysis.take(&message)?;
-        if let (Recorded::Frame(frame), Ok(open)) = (&message, &mut logs)
+        if let (Recorded::Frame(frame), Ok(Some(open))) = (&message, &mut logs)
             && let Err(error) = open.write(tap::bus_of(frame)?, &tap::decode(frame)?)
         {
             logs = Err(error);
         }
     }
     let figures = analysis.finish(reader.was_cut_short(), reader.damage());
-    Ok((figures, logs.and_then(CandumpLogs::finish).map(drop)))
+    Ok((figures, logs.and_then(|logs| logs.map_or(Ok(()), |logs| logs.finish().map(drop)))))
 }
 
 /// Judges the run and prints the result, then writes every file of the report, the summary first.

@@ -6,8 +6,8 @@ use std::ops::Range;
 
 use masseter_controller::trajectory::closed_pose;
 use masseter_judge::{
-    BorderStep, Course, CoursePoint, Curve, Figures, JawCycle, JawCycleFigures, JawCycleGroup, PoseSource,
-    Quantity, ToothFigures, ToothLoads, TrackingSample, closed_incisal_m,
+    Course, CoursePoint, Curve, Figures, JawCycleFigures, JawCycleGroup, PoseSource, ToothFigures,
+    ToothLoads, TrackingSample, closed_incisal_m,
 };
 use masseter_model::geometry::{AXES, AXIS_NAMES, LEGS, Mechanism, Pose};
 use masseter_page::{Block, Chart, Content, Limit, Points, Pressure, Section, Series, Style, Tooth};
@@ -208,22 +208,15 @@ const COURSE_DIGITS: f64 = 1e3;
 
 #[derive(Serialize)]
 struct Cycles<'a> {
-    count: u64,
-    left_out: u64,
-    unclear: u64,
-    most_closed_mm: Option<f64>,
+    #[serde(flatten)]
+    found: &'a JawCycleFigures,
     has_force: bool,
-    groups: Vec<Group<'a>>,
-    rows: &'a [JawCycle],
-    border: &'a [BorderStep],
+    /// The drawings of each group.
+    drawn: Vec<Drawn>,
 }
 
-/// Cycles of one kind and side.
 #[derive(Serialize)]
-struct Group<'a> {
-    name: &'a str,
-    count: u64,
-    quantities: &'a [Quantity],
+struct Drawn {
     /// Of each point: opening, lateral, mm, force, N, then their standard deviations.
     mean: Vec<[f64; 6]>,
     /// The number of a cycle, and opening, lateral and force of each of its points, one after the other.
@@ -236,29 +229,21 @@ pub(super) fn jaw_section(figures: &Figures) -> Option<Section> {
 }
 
 fn cycles(found: &JawCycleFigures) -> Cycles<'_> {
-    let JawCycleFigures { count, left_out, unclear, most_closed_mm, ref groups, ref cycles, ref border } =
-        *found;
-    let has_force = cycles.iter().any(|cycle| cycle.force_n.is_some());
-    let groups = groups.iter().map(Group::new).collect();
-    Cycles { count, left_out, unclear, most_closed_mm, has_force, groups, rows: cycles, border }
+    let has_force = found.cycles.iter().any(|cycle| cycle.force_n.is_some());
+    Cycles { found, has_force, drawn: found.groups.iter().map(drawn).collect() }
 }
 
-impl<'a> Group<'a> {
-    fn new(of: &'a JawCycleGroup) -> Self {
-        let rounded = |value: f64| (value * COURSE_DIGITS).round() / COURSE_DIGITS;
-        let values = |point: &CoursePoint| [point.opening_mm, point.lateral_mm, point.force_n].map(rounded);
-        let mean_and_sd = |[mean, sd]: &[CoursePoint; 2]| {
-            let ([a, b, c], [d, e, f]) = (values(mean), values(sd));
-            [a, b, c, d, e, f]
-        };
-        let course = |(number, course): &(u64, Course)| (*number, course.iter().flat_map(values).collect());
-        Self {
-            name: &of.name,
-            count: of.count,
-            quantities: &of.quantities,
-            mean: of.mean_course.iter().map(mean_and_sd).collect(),
-            courses: of.courses.iter().map(course).collect(),
-        }
+fn drawn(of: &JawCycleGroup) -> Drawn {
+    let rounded = |value: f64| (value * COURSE_DIGITS).round() / COURSE_DIGITS;
+    let values = |point: &CoursePoint| [point.opening_mm, point.lateral_mm, point.force_n].map(rounded);
+    let mean_and_sd = |[mean, sd]: &[CoursePoint; 2]| {
+        let ([a, b, c], [d, e, f]) = (values(mean), values(sd));
+        [a, b, c, d, e, f]
+    };
+    let course = |(number, course): &(u64, Course)| (*number, course.iter().flat_map(values).collect());
+    Drawn {
+        mean: of.mean_course.iter().map(mean_and_sd).collect(),
+        courses: of.courses.iter().map(course).collect(),
     }
 }
 

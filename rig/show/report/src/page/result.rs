@@ -13,7 +13,7 @@ use masseter_recording::Manifest;
 use masseter_runtime::messages::codes::{ControllerState, EventKind};
 use masseter_terminal::Exit;
 
-use super::stop::{chain, moments, stop, window};
+use super::stop::{chain, moments, stop};
 use super::times::{level, limit, plain, since_s};
 use crate::text::{mm, or_dash};
 
@@ -102,7 +102,7 @@ fn panel(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> masseter_
 
 /// None of a run that stopped: they would be those of the time before.
 fn figures_in_words(manifest: &Manifest, figures: &Figures) -> Vec<[String; 2]> {
-    if window(figures).is_some() {
+    if stop(figures).is_some() {
         return Vec::new();
     }
     let errors = figures.tracking.actual;

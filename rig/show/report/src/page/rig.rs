@@ -66,26 +66,22 @@ pub(super) fn timing_section(manifest: &Manifest, figures: &Figures) -> Section 
 
 /// Percentiles and histogram of every interval, with the cycle's budgets beside the percentiles.
 fn distributions(scenario: &Scenario, figures: &Figures) -> [Chart; 2] {
-    let series = |interval: &IntervalFigures, points: Vec<(f64, f64)>| Series {
-        is_hidden: !SHOWN.contains(&interval.name),
-        ..Series::new(interval.name, Style::Plain, Points::plain(&points))
+    type PointsOf = fn(&IntervalFigures) -> Vec<(f64, f64)>;
+    let chart = |title: &str, unit: &str, across, points: PointsOf| {
+        let measured = figures.intervals.iter().filter(|interval| interval.max_ns > Some(0));
+        let series = measured.map(|interval| Series {
+            is_hidden: !SHOWN.contains(&interval.name),
+            ..Series::new(interval.name, Style::Plain, Points::plain(&points(interval)))
+        });
+        let (series, otherwise) = (series.collect(), "No interval was measured.".to_owned());
+        Chart { across, scale: Scale::Log, series, otherwise, ..Chart::over_time(title, unit) }
     };
-    let measured = || figures.intervals.iter().filter(|interval| interval.max_ns > Some(0));
-    let percentiles = measured().map(|interval| {
-        series(interval, interval.curve.iter().map(|&(x, ns)| (x, in_us(ns as f64))).collect())
+    let percentiles = chart("Latency by percentile", "µs", Across::Percentile, |of| {
+        of.curve.iter().map(|&(x, ns)| (x, in_us(ns as f64))).collect()
     });
-    let histograms = measured().map(|interval| {
-        series(interval, interval.buckets.iter().map(|&(ns, n)| (in_us(ns as f64), n as f64)).collect())
+    let histogram = chart("Latency histogram", "samples", Across::Duration, |of| {
+        of.buckets.iter().map(|&(ns, n)| (in_us(ns as f64), n as f64)).collect()
     });
-    let chart = |title: &str, unit: &str, across, series| Chart {
-        across,
-        scale: Scale::Log,
-        series,
-        otherwise: "No interval was measured.".to_owned(),
-        ..Chart::over_time(title, unit)
-    };
-    let percentiles = chart("Latency by percentile", "µs", Across::Percentile, percentiles.collect());
-    let histogram = chart("Latency histogram", "samples", Across::Duration, histograms.collect());
     [Chart { limits: budgets(scenario), height: 330, ..percentiles }, Chart { height: 240, ..histogram }]
 }
 

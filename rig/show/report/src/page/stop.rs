@@ -28,18 +28,27 @@ pub(super) fn window(figures: &Figures) -> Option<[f64; 2]> {
 }
 
 /// The chain, as far as there is one: the first strike of every fault, the event that began the first safe stop, the first
-/// drive that left operation, and the standstill of the last axis.
+/// drive that left operation, and the standstill of the last axis, in the order of time.
 pub(super) fn moments(scenario: &Scenario, figures: &Figures) -> Vec<Moment> {
-    let moment = |at_s, kind, name: &str, text| Moment { at_s, kind, name: name.to_owned(), text };
     let strike = |fault: &FaultFigures| {
         let name = format!("fault {}", fault.number);
         let text = format!("{name}: {}", scenario.faults.get(fault.number - 1)?);
         Some(moment(since_s(figures, fault.struck_ns?), MomentKind::Fault, &name, text))
     };
-    let mut moments: Vec<_> = figures.faults.iter().filter_map(strike).collect();
-    let Some(EventRecord { source, cause, time_ns, .. }) = stop(figures) else { return moments };
+    let strikes = figures.faults.iter().filter_map(strike);
+    let mut moments: Vec<_> = strikes.chain(moments_of_stop(figures)).collect();
+    moments.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+    moments
+}
+
+fn moment(at_s: f64, kind: MomentKind, name: &str, text: String) -> Moment {
+    Moment { at_s, kind, name: name.to_owned(), text }
+}
+
+fn moments_of_stop(figures: &Figures) -> Vec<Moment> {
+    let Some(EventRecord { source, cause, time_ns, .. }) = stop(figures) else { return Vec::new() };
     let text = format!("safe stop: {source}, {cause}");
-    moments.push(moment(since_s(figures, *time_ns), MomentKind::Detection, "safe stop", text));
+    let mut moments = vec![moment(since_s(figures, *time_ns), MomentKind::Detection, "safe stop", text)];
     let leaves = |event: &&EventRecord| {
         let is_from = |[from, _]: &[String; 2]| from == "operation_enabled";
         event.time_ns >= *time_ns
@@ -131,4 +140,22 @@ fn value_at(curve: &Curve, at_s: f64) -> Option<f64> {
     let after = curve.partition_point(|(point_s, _)| *point_s < at_s);
     let ((from_s, from), (to_s, to)) = (*curve.get(after.checked_sub(1)?)?, *curve.get(after)?);
     Some(from + (to - from) * (at_s - from_s) / (to_s - from_s))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_chain_is_in_the_order_of_time_whatever_the_order_of_the_faults() {
+        let fault = "kind = 'encoder_stuck'\naxis = 'l2'\nat_s = 1.0\n";
+        let faults = format!("[[faults]]\n{fault}[[faults]]\n{fault}");
+        let scenario = Scenario::parse("scenario.toml".as_ref(), &faults).unwrap();
+        let strike = |number, struck_ns| FaultFigures { number, struck_ns, ..FaultFigures::default() };
+        let faults = vec![strike(1, Some(3_000_000_000)), strike(2, Some(1_000_000_000))];
+        let figures = Figures { faults, ..Figures::default() };
+        let moments = moments(&scenario, &figures);
+        assert_eq!(moments.iter().map(|moment| moment.at_s).collect::<Vec<_>>(), [1.0, 3.0]);
+        assert_eq!(moments[0].name, "fault 2");
+    }
 }

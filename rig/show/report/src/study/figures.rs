@@ -1,9 +1,9 @@
 //! Figures of a study for print, as SVG: courses of the cycles with mean ± SD, and paths of the incisal point. Sizes are those of
 //! one and two columns of a journal, 85 and 170 mm, with letters of 7 pt and lines of 0.4 mm.
 
-use masseter_charts::{
-    Axis, BLUE, Chart, GREEN, GREY, Look, PRINT_COLUMN, RED, Series, VERMILION, extent, printed,
-};
+use std::collections::BTreeSet;
+
+use masseter_charts::{Axis, BLUE, Chart, GREEN, GREY, Look, PRINT_COLUMN, RED, Series, VERMILION, printed};
 use masseter_judge::{COURSE_POINTS, Course, CoursePoint, mean_course};
 
 use super::{Recorded, Study};
@@ -25,8 +25,8 @@ pub(super) fn figures(study: &Study) -> Vec<Figure> {
     let mut all = Vec::new();
     for group in groups(study) {
         let courses = [
-            course(study, &group, "opening, mm", |at| at.opening_mm),
-            course(study, &group, "to the left, mm", |at| at.lateral_mm),
+            course(study, group, "opening, mm", |at| at.opening_mm),
+            course(study, group, "to the left, mm", |at| at.lateral_mm),
         ];
         all.extend(both_widths(&format!("cycles-{}", group.replace(' ', "-")), &courses));
     }
@@ -35,13 +35,9 @@ pub(super) fn figures(study: &Study) -> Vec<Figure> {
 }
 
 /// Kinds and sides of which a recording has a course.
-pub(super) fn groups(study: &Study) -> Vec<String> {
+pub(super) fn groups(study: &Study) -> BTreeSet<&str> {
     let groups = study.recordings.iter().flat_map(|recorded| &recorded.jaw.groups);
-    let mut names: Vec<_> =
-        groups.filter(|group| !group.mean_course.is_empty()).map(|group| group.name.clone()).collect();
-    names.sort();
-    names.dedup();
-    names
+    groups.filter(|group| !group.mean_course.is_empty()).map(|group| group.name.as_str()).collect()
 }
 
 /// Two charts: one below the other in a column, side by side over two.
@@ -114,14 +110,7 @@ fn path(study: &Study, label: &str, across: usize) -> Chart {
             series.push(Series { name, colour, look: Look::Hair, points });
         }
     }
-    let points = || series.iter().flat_map(|series| series.points.iter());
-    let [x, y] = [extent(points().map(|point| point.0)), extent(points().map(|point| point.1))];
-    let size = Chart::plot_size([PRINT_COLUMN, HEIGHT]);
-    let per_px = (1.0 + 2.0 * ROOM) * ((x[1] - x[0]) / size[0]).max((y[1] - y[0]) / size[1]);
-    let axis = |label: &str, [low, high]: [f64; 2], px: f64| {
-        let (middle, half) = (f64::midpoint(low, high), per_px * px / 2.0);
-        Axis::around(label, [middle - half, middle + half], 0.0)
-    };
-    let (x, y) = (axis(label, x, size[0]), axis("up, mm", y, size[1]));
+    let around = 1.0 + 2.0 * ROOM;
+    let [x, y] = Axis::in_one_scale([label, "up, mm"], &series, [PRINT_COLUMN, HEIGHT], around);
     Chart { frame: [0.0; 4], title: "(incisal point)".to_owned(), x, y, series }
 }

@@ -10,9 +10,10 @@ mod tests;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, ensure};
-use masseter_judge::{JawCycleFigures, Judgement, Statistic, TrackingSample, closed_incisal_m};
-use masseter_model::geometry::Vec3;
+use anyhow::{Context, bail, ensure};
+use masseter_judge::{
+    CycleQuantity, JawCycleFigures, Judgement, Statistic, TrackingSample, closed_incisal_m, incisal_m,
+};
 use masseter_recording::{Manifest, RunFolder};
 use masseter_scenario::Scenario;
 use serde_json::Value;
@@ -36,6 +37,13 @@ pub struct Recorded {
     pub jaw: JawCycleFigures,
     /// The incisal point from its closed place: anterior, left, up, mm.
     pub path_mm: Vec<[f64; 3]>,
+}
+
+impl Recorded {
+    /// Pseudonyms of person and condition.
+    fn names(&self) -> [&str; 2] {
+        [&self.person, &self.condition]
+    }
 }
 
 /// What tells recordings apart: the key that names the person, and the one that differs within a person.
@@ -68,17 +76,13 @@ pub struct Study {
     pub by: By,
 }
 
-/// A quantity of a kind of cycles, in words.
+/// A quantity of a kind of cycles.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Measure {
     /// Kind and side.
     pub group: String,
-    /// Key of the quantity.
-    pub name: &'static str,
     /// The quantity.
-    pub about: &'static str,
-    /// Its unit.
-    pub unit: &'static str,
+    pub of: CycleQuantity,
 }
 
 /// The change of a quantity within persons, from one condition to another.
@@ -101,10 +105,14 @@ impl Study {
     /// Reads and analyses the runs.
     ///
     /// # Errors
-    /// For a folder without a readable run, for a key that a scenario lacks, and for fewer than two runs.
+    /// For a folder without a readable run, for a key that a scenario lacks, for fewer than two runs, and for a run that is
+    /// named twice.
     pub fn read(runs: &[PathBuf], by: By) -> anyhow::Result<Self> {
         ensure!(runs.len() > 1, "name at least two runs");
-        let recordings = runs.iter().map(|run| recorded(run, &by)).collect::<Result<_, _>>()?;
+        let folders = different_folders(runs)?;
+        let mut recordings =
+            runs.iter().map(|run| recorded(run, &by)).collect::<Result<Vec<Recorded>, _>>()?;
+        name_persons(&mut recordings, &folders);
         Ok(Self { recordings, by })
     }
 
@@ -155,11 +163,8 @@ impl Study {
 /// The statistics of a recording's cycles.
 fn means(recorded: &Recorded) -> impl Iterator<Item = (Measure, Statistic)> {
     recorded.jaw.groups.iter().flat_map(|group| {
-        group.quantities.iter().map(|of| {
-            let measure =
-                Measure { group: group.name.clone(), name: of.name, about: of.about, unit: of.unit };
-            (measure, of.statistic)
-        })
+        let measure = |of| Measure { group: group.name.clone(), of };
+        group.quantities.iter().map(move |quantity| (measure(quantity.of), quantity.statistic))
     })
 }
 
@@ -169,25 +174,49 @@ fn effect(of: &Statistic) -> Option<f64> {
     Some(of.mean? / sd * (1.0 - 3.0 / (4.0 * freedom - 1.0)))
 }
 
+/// The names of the folders in which the recordings lie, behind links such as `runs/latest`.
+fn different_folders(runs: &[PathBuf]) -> anyhow::Result<Vec<String>> {
+    let mut seen = BTreeMap::new();
+    let mut folder = |run: &PathBuf| -> anyhow::Result<String> {
+        let recording = RunFolder::open(run)?.recording().canonicalize()?;
+        let name = recording.parent().and_then(Path::file_name);
+        let name = name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        if let Some(same) = seen.insert(recording, run.clone()) {
+            bail!("it is the same run as {}: name each run once", same.display());
+        }
+        Ok(name)
+    };
+    runs.iter().map(|run| folder(run).with_context(|| run.display().to_string())).collect()
+}
+
+/// Names persons without a pseudonym by their folders. Each is a person of its own, also where folders have one name.
+fn name_persons(recordings: &mut [Recorded], folders: &[String]) {
+    let mut taken: BTreeSet<_> = recordings.iter().map(|recorded| recorded.person.clone()).collect();
+    for (number, (recorded, folder)) in (1..).zip(recordings.iter_mut().zip(folders)) {
+        if recorded.person.is_empty() {
+            let is_taken = taken.contains(folder);
+            recorded.person = if is_taken { format!("{folder} ({number})") } else { folder.clone() };
+            taken.insert(recorded.person.clone());
+        }
+    }
+}
+
 fn recorded(path: &Path, by: &By) -> anyhow::Result<Recorded> {
     let read = || -> anyhow::Result<Recorded> {
         let folder = RunFolder::open(path)?;
         let manifest = Manifest::read(&folder)?;
-        let (figures, _) = analyse(&folder, &manifest)?;
+        let (figures, _) = analyse(&folder, &manifest, None)?;
         let scenario = &manifest.scenario;
-        let closed = Vec3::from(closed_incisal_m(scenario).context("the scenario has no closed pose")?);
-        let incisal = Vec3::from(scenario.jaw.reference_point_m);
+        let closed_m = closed_incisal_m(scenario).context("the scenario has no closed pose")?;
         let place = |sample: &TrackingSample| {
-            let pose = &sample.actual;
-            ((pose.translation.vector + pose.rotation * incisal - closed) * 1e3).into()
+            ((incisal_m(&sample.actual, scenario.jaw.reference_point_m) - closed_m) * 1e3).into()
         };
         // Before the motion the rig brings the jaw to its first pose.
         let has_begun = |sample: &&TrackingSample| {
             figures.over_time.motion_began_ns.is_some_and(|began_ns| sample.sampled_ns >= began_ns)
         };
-        let name = folder.path().file_name().map(|name| name.to_string_lossy().into_owned());
         Ok(Recorded {
-            person: value_of(scenario, &by.person)?.or(name).unwrap_or_default(),
+            person: value_of(scenario, &by.person)?.unwrap_or_default(),
             condition: value_of(scenario, &by.condition)?.unwrap_or_else(|| "all".to_owned()),
             verdict: Judgement::new(&manifest, &figures).verdict.word.to_string(),
             is_true: figures.tracking.actual_source.is_truth(),
@@ -198,7 +227,7 @@ fn recorded(path: &Path, by: &By) -> anyhow::Result<Recorded> {
     read().with_context(|| path.display().to_string())
 }
 
-/// The value of a key; none of a pseudonym that is not given.
+/// The value of a key; none of a key without a value, such as a pseudonym that is not given.
 fn value_of(scenario: &Scenario, key: &str) -> anyhow::Result<Option<String>> {
     let is_of_study = key == "patient" || key == "session";
     let pointer = if is_of_study { format!("/study/{key}") } else { format!("/{}", key.replace('.', "/")) };
@@ -206,5 +235,5 @@ fn value_of(scenario: &Scenario, key: &str) -> anyhow::Result<Option<String>> {
     let value = values.pointer(&pointer);
     ensure!(value.is_some() || is_of_study, "its scenario has no key '{key}'");
     let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-    Ok(value.map(text).filter(|text| !text.is_empty()))
+    Ok(value.filter(|value| !value.is_null()).map(text).filter(|text| !text.is_empty()))
 }

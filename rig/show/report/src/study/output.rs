@@ -1,17 +1,22 @@
 //! What `masseter compare` writes: tables, figures with their caption, and a page with all of it.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::path::Path;
 
 use anyhow::Context;
 use masseter_judge::{COURSE_POINTS, Statistic};
 use masseter_page::{Block, Column, Content, Life, Page, Section, Table as PageTable, Time};
-use masseter_table::{Cell, Column as TableColumn, Format, Table, Values, write_table};
+use masseter_scenario::wording::counted;
+use masseter_table::{Cell, Column as TableColumn, Format, Table, write_table};
 
 use super::figures::{Figure, figures, groups};
-use super::{Difference, Study, means};
-use crate::jaw_table::{JawCyclesOf, jaw_cycle_table};
+use super::{Difference, Measure, Study, means};
+use crate::jaw_table::{jaw_cycle_table, number, recording_cells, recording_columns, whole, word, words};
 use crate::text::{self, or_dash, significant};
+
+/// The meaning of a column.
+const GROUP: &str = "Kind and side of the cycles.";
 
 /// Writes tables, figures, caption and page into a folder, and returns the text for a terminal.
 ///
@@ -51,28 +56,13 @@ fn write_one(path: &Path, format: &Format, table: &Table) -> anyhow::Result<()> 
 }
 
 fn cycles(study: &Study) -> Table {
-    let recordings = (1..).zip(&study.recordings).map(|(recording, of)| {
-        (JawCyclesOf { person: &of.person, condition: &of.condition, recording }, &of.jaw.cycles[..])
-    });
-    jaw_cycle_table(recordings)
-}
-
-fn words(name: &str, about: &str) -> TableColumn {
-    TableColumn::new(name, "", about, Values::Words(Vec::new()))
-}
-
-fn number(name: &str, unit: &str, about: &str) -> TableColumn {
-    TableColumn::new(name, unit, about, Values::Numbers(Vec::new()))
-}
-
-fn word(text: &str) -> Cell {
-    Cell::Word(Some(text.to_owned()))
+    jaw_cycle_table(study.recordings.iter().map(|of| (of.names(), &of.jaw.cycles[..])))
 }
 
 /// Columns of a statistic, whose unit is in a column of its own.
 fn statistic_columns(of: &str) -> [TableColumn; 7] {
     [
-        number("n", "", &format!("Number of {of}.")),
+        whole("n", &format!("Number of {of}.")),
         number("mean", "", "Their mean, in the unit of the row."),
         number("sd", "", "Their standard deviation, as of a sample."),
         number("median", "", "Their median."),
@@ -84,50 +74,57 @@ fn statistic_columns(of: &str) -> [TableColumn; 7] {
 
 fn statistic_cells(of: &Statistic) -> [Cell; 7] {
     let Statistic { count, mean, sd, median, cv, mean_low, mean_high } = *of;
-    [Some(count as f64), mean, sd, median, cv, mean_low, mean_high].map(Cell::Number)
+    let [mean, sd, median, cv, low, high] = [mean, sd, median, cv, mean_low, mean_high].map(Cell::Number);
+    [Cell::Whole(Some(count.cast_signed())), mean, sd, median, cv, low, high]
 }
 
-fn recording_columns() -> [TableColumn; 4] {
+/// Columns of a group of cycles, and of a quantity of theirs.
+fn measure_columns() -> [TableColumn; 3] {
     [
-        words("patient", "Pseudonym of the person."),
-        words("session", "Session, or another condition."),
-        number("recording", "", "Number of the recording."),
-        words("group", "Kind and side of the cycles."),
+        words("group", GROUP),
+        words("quantity", "Key of the quantity in the table of cycles."),
+        words("unit", "Its unit."),
     ]
 }
 
+fn measure_cells(Measure { group, of }: &Measure) -> [Cell; 3] {
+    [group, of.name, of.unit].map(word)
+}
+
 fn means_table(study: &Study) -> Table {
-    let quantity =
-        [words("quantity", "Key of the quantity in the table of cycles."), words("unit", "Its unit.")];
-    let columns = recording_columns().into_iter().chain(quantity).chain(statistic_columns("cycles"));
+    let columns = recording_columns().into_iter().chain(measure_columns());
+    let columns = columns.chain(statistic_columns("cycles"));
     let mut table = Table::new(columns.collect());
-    for (recording, of) in (1..).map(f64::from).zip(&study.recordings) {
+    for (recording, of) in (1..).zip(&study.recordings) {
         for (measure, statistic) in means(of) {
-            let first = [word(&of.person), word(&of.condition), Cell::Number(Some(recording))];
-            let quantity = [word(&measure.group), word(measure.name), word(measure.unit)];
-            table.push(first.into_iter().chain(quantity).chain(statistic_cells(&statistic)));
+            let first = recording_cells(of.names(), recording).into_iter().chain(measure_cells(&measure));
+            table.push(first.chain(statistic_cells(&statistic)));
         }
     }
     table
 }
 
-fn courses(study: &Study) -> Table {
-    let values = [
+pub(super) fn courses(study: &Study) -> Table {
+    let columns = [
+        words("group", GROUP),
         number("share_percent", "%", "Share of the cycle."),
         number("opening_mm", "mm", "Mean way down from the most closed place."),
         number("opening_sd_mm", "mm", "Its standard deviation over the cycles."),
         number("lateral_mm", "mm", "Mean way to the left."),
         number("lateral_sd_mm", "mm", "Its standard deviation over the cycles."),
     ];
-    let mut table = Table::new(recording_columns().into_iter().chain(values).collect());
-    for (recording, of) in (1..).map(f64::from).zip(&study.recordings) {
+    let mut table = Table::new(recording_columns().into_iter().chain(columns).collect());
+    for (recording, of) in (1..).zip(&study.recordings) {
         for group in &of.jaw.groups {
             for (point, [mean, sd]) in group.mean_course.iter().enumerate() {
-                let first =
-                    [word(&of.person), word(&of.condition), Cell::Number(Some(recording)), word(&group.name)];
+                let first = recording_cells(of.names(), recording).into_iter().chain([word(&group.name)]);
                 let share = 100.0 * point as f64 / (COURSE_POINTS - 1) as f64;
-                let values = [share, mean.opening_mm, sd.opening_mm, mean.lateral_mm, sd.lateral_mm];
-                table.push(first.into_iter().chain(values.map(|value| Cell::Number(Some(value)))));
+                // One course has no spread.
+                let [opening_sd_mm, lateral_sd_mm] = [sd.opening_mm, sd.lateral_mm]
+                    .map(|sd_mm| Some(sd_mm).filter(|_| group.courses.len() > 1));
+                let [opening_mm, lateral_mm] = [mean.opening_mm, mean.lateral_mm].map(Some);
+                let values = [Some(share), opening_mm, opening_sd_mm, lateral_mm, lateral_sd_mm];
+                table.push(first.chain(values.map(Cell::Number)));
             }
         }
     }
@@ -135,20 +132,15 @@ fn courses(study: &Study) -> Table {
 }
 
 fn differences_table(differences: &[Difference]) -> Table {
-    let first = [
-        words("group", "Kind and side of the cycles."),
-        words("quantity", "Key of the quantity in the table of cycles."),
-        words("unit", "Its unit."),
-        words("from", "Condition before."),
-        words("to", "Condition after."),
-    ];
-    let columns = first.into_iter().chain(statistic_columns("persons with both conditions"));
+    let conditions = [words("from", "Condition before."), words("to", "Condition after.")];
+    let columns = measure_columns().into_iter().chain(conditions);
+    let columns = columns.chain(statistic_columns("persons with both conditions"));
     let effect =
         number("hedges_g", "", "Paired effect size: mean by standard deviation, corrected for few pairs.");
     let mut table = Table::new(columns.chain([effect]).collect());
     for Difference { measure, from, to, statistic, effect } in differences {
-        let first = [&measure.group, measure.name, measure.unit, from, to].map(word);
-        table.push(first.into_iter().chain(statistic_cells(statistic)).chain([Cell::Number(*effect)]));
+        let first = measure_cells(measure).into_iter().chain([from, to].map(|condition| word(condition)));
+        table.push(first.chain(statistic_cells(statistic)).chain([Cell::Number(*effect)]));
     }
     table
 }
@@ -157,12 +149,12 @@ fn differences_table(differences: &[Difference]) -> Table {
 fn caption(study: &Study, differences: &[Difference]) -> String {
     let conditions = study.conditions().into_iter().map(|condition| {
         let of: Vec<_> = study.recordings.iter().filter(|recorded| recorded.condition == condition).collect();
-        let mut persons: Vec<_> = of.iter().map(|recorded| &recorded.person).collect();
-        persons.sort();
-        persons.dedup();
+        let persons: BTreeSet<_> = of.iter().map(|recorded| &recorded.person).collect();
         let cycles: u64 =
             of.iter().map(|recorded| recorded.jaw.count - recorded.jaw.left_out - recorded.jaw.unclear).sum();
-        format!("{condition}: {} persons, {} recordings, {cycles} cycles", persons.len(), of.len())
+        let [persons, recordings] =
+            [(persons.len(), "person"), (of.len(), "recording")].map(|(n, noun)| counted(n as u64, noun));
+        format!("{condition}: {persons}, {recordings}, {}", counted(cycles, "cycle"))
     });
     let conditions = conditions.collect::<Vec<_>>().join("; ");
     let pose =
@@ -192,7 +184,7 @@ fn interval(of: &Statistic) -> String {
 fn difference_cells(Difference { measure, from, to, statistic, effect }: &Difference) -> [String; 8] {
     [
         measure.group.clone(),
-        format!("{}, {}", measure.about, measure.unit),
+        format!("{}, {}", measure.of.about, measure.of.unit),
         format!("{from} to {to}"),
         or_dash(statistic.mean, significant),
         interval(statistic),
@@ -249,8 +241,8 @@ fn page(
 
 /// The differences that a terminal shows, a line each.
 fn in_words(study: &Study, differences: &[Difference]) -> String {
-    let found =
-        format!("{} recordings; cycles with courses: {}\n", study.recordings.len(), groups(study).join(", "));
+    let groups = groups(study).into_iter().collect::<Vec<_>>().join(", ");
+    let found = format!("{} recordings; cycles with courses: {groups}\n", study.recordings.len());
     let heads = ["cycles", "quantity", "condition", "difference", "95 % interval", "SD", "g", "pairs"];
     found + &text::table([14, 34, 20, 12, 22, 10, 7, 6], heads, differences.iter().map(difference_cells))
 }

@@ -13,7 +13,10 @@ fn recorded(person: &str, condition: &str, opening_mm: f64) -> Recorded {
         kind: JawCycleKind::Chew,
         side: None,
         count: 3,
-        quantities: vec![Quantity { name: "opening_mm", about: "opening", unit: "mm", statistic }],
+        quantities: vec![Quantity {
+            of: CycleQuantity { name: "opening_mm", about: "opening", unit: "mm" },
+            statistic,
+        }],
         courses: Vec::new(),
         mean_course: vec![[point(opening_mm), point(0.2)]; COURSE_POINTS],
     };
@@ -53,6 +56,57 @@ fn persons_with_one_condition_make_no_pair_and_repeated_recordings_one_value() {
     // P1's mean after is 15.5 mm.
     assert_eq!(difference.statistic.count, 3);
     assert!((difference.statistic.mean.unwrap() - (-2.5 - 2.5 - 3.5) / 3.0).abs() < 1e-9);
+}
+
+#[test]
+fn persons_without_a_pseudonym_are_never_taken_for_one() {
+    let mut recordings = ["", "run", "", ""].map(|person| recorded(person, "before", 18.0));
+    name_persons(&mut recordings, &["run", "any", "day", "day"].map(str::to_owned));
+    assert_eq!(recordings.map(|recorded| recorded.person), ["run (1)", "run", "day", "day (4)"]);
+}
+
+#[test]
+fn a_run_that_is_named_twice_is_refused() {
+    let runs = tempfile::tempdir().unwrap();
+    let [run, link] = ["run", "latest"].map(|name| runs.path().join(name));
+    std::fs::create_dir(&run).unwrap();
+    std::fs::write(run.join("recording.mcap"), "").unwrap();
+    std::os::unix::fs::symlink(&run, &link).unwrap();
+    let refusal = Study::read(&[run, link], By::parse("patient,session").unwrap()).unwrap_err();
+    let refusal = format!("{refusal:#}");
+    assert!(
+        refusal.contains("latest: it is the same run as") && refusal.contains("name each run once"),
+        "{refusal}"
+    );
+}
+
+#[test]
+fn a_key_without_a_value_gives_no_condition() {
+    let scenario = Scenario::default();
+    assert_eq!(value_of(&scenario, "patient").unwrap(), None);
+    assert_eq!(value_of(&scenario, "rate_hz").unwrap(), Some(scenario.rate_hz.to_string()));
+    assert!(value_of(&scenario, "no.key").is_err());
+}
+
+#[test]
+fn one_course_has_no_standard_deviation() {
+    let mut study = study();
+    let group = &mut study.recordings[0].jaw.groups[0];
+    group.courses = vec![(1, [CoursePoint::default(); COURSE_POINTS])];
+    let group = &mut study.recordings[1].jaw.groups[0];
+    group.courses = vec![(1, [CoursePoint::default(); COURSE_POINTS]); 2];
+    let mut text = Vec::new();
+    let file = tempfile::NamedTempFile::new().unwrap();
+    masseter_table::write_table(
+        &masseter_table::Format::Csv,
+        file.reopen().unwrap(),
+        &output::courses(&study),
+    )
+    .unwrap();
+    std::io::Read::read_to_end(&mut file.reopen().unwrap(), &mut text).unwrap();
+    let text = String::from_utf8(text).unwrap();
+    assert!(text.contains("before,1,chew left,0,18,,0,\n"), "{text}");
+    assert!(text.contains("after,2,chew left,0,15,0.2,0,0\n"), "{text}");
 }
 
 #[test]

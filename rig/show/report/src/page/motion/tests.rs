@@ -31,7 +31,7 @@ mod jaw {
         };
         let found = JawCycleFigures { count: 1, groups: vec![group], ..JawCycleFigures::default() };
         let cycles = cycles(&found);
-        let [group] = &cycles.groups[..] else { panic!("one group") };
+        let [group] = &cycles.drawn[..] else { panic!("one group") };
         assert_eq!((group.courses[0].0, &group.courses[0].1[..3]), (7, &[18.0, 2.0, 0.0][..]));
         assert_eq!((group.mean[0], cycles.has_force), ([18.0, 2.0, 0.0, 18.0, 2.0, 0.0], false));
     }
