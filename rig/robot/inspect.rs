@@ -84,7 +84,7 @@ pub(crate) fn inspect(args: &InspectArgs) -> Result<Exit, Failure> {
     let scenario = args.robot.scenario().usage()?;
     let parent = &args.robot.folder;
     let mut folder = StepFolder::begin(parent, Step::Inspect, &Step::Inspect.axes(), &scenario).usage()?;
-    let interfaces = judge_interfaces(&scenario.can);
+    let interfaces = judge_interfaces(&scenario.can).usage()?;
     if interfaces.iter().any(|interface| !interface.faults.is_empty()) {
         // A frame at a wrong bit rate would disturb every other node.
         let mut text = String::new();

@@ -13,7 +13,7 @@ use super::interface::driver;
 /// States of fault confinement, by their number in the kernel.
 const STATES: [&str; 6] =
     ["error active", "error warning", "error passive", "bus-off", "stopped", "sleeping"];
-/// Control modes as `ip` names them, by their bit.
+/// Control modes (`CAN_CTRLMODE_…`) as `ip` names them, by their bit.
 const MODES: [&str; 11] = [
     "loopback",
     "listen-only",
@@ -52,28 +52,6 @@ const LINK: usize = 16;
 const FLAGS: usize = HEADER + 8;
 const UP: u32 = 1;
 
-/// Control modes of a controller (`CAN_CTRLMODE_…`), one a bit.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct ControlModes(pub u32);
-
-impl serde::Serialize for ControlModes {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_seq(self.names())
-    }
-}
-
-impl ControlModes {
-    /// Whether the mode with this name of `ip` is on.
-    pub fn has(self, mode: &str) -> bool {
-        self.names().any(|name| name == mode)
-    }
-
-    /// The names that `ip` gives to the modes that are on.
-    pub fn names(self) -> impl Iterator<Item = &'static str> {
-        MODES.into_iter().enumerate().filter(move |(bit, _)| self.0 & 1 << bit != 0).map(|(_, name)| name)
-    }
-}
-
 /// Settings and state of an interface and its controller. A driver may report only some of them; a virtual interface has
 /// no controller and no bit timing.
 #[derive(Debug, Clone, Default, PartialEq, Eq, serde::Serialize)]
@@ -96,8 +74,8 @@ pub struct InterfaceDetails {
     pub data_bitrate_bps: Option<u32>,
     /// Sample point, ‰ of a bit.
     pub sample_point_permille: Option<u32>,
-    /// Control modes.
-    pub modes: ControlModes,
+    /// The control modes that are on, as `ip` names them.
+    pub modes: Vec<&'static str>,
     /// Time from bus-off to the controller's own restart, ms; 0 for never.
     pub restart_ms: Option<u32>,
     /// State of its fault confinement.
@@ -129,8 +107,9 @@ impl InterfaceDetails {
         Ok(Self { driver: driver(&folder), ..details })
     }
 
-    /// None for a message that is no description of a link.
+    /// None for a message that is no whole description of a link: without its end, a forbidden mode might be missing.
     fn parse(message: &[u8]) -> Option<Self> {
+        let message = message.get(..long(message)? as usize)?;
         if short(message.get(4..)?)? != NEW_LINK {
             return None;
         }
@@ -139,8 +118,9 @@ impl InterfaceDetails {
         let data = find(info, INFO_DATA).unwrap_or_default();
         let timing = find(data, BIT_TIMING).unwrap_or_default();
         let errors = find(data, ERROR_COUNTERS).and_then(|pair| Some([short(pair)?, short(pair.get(2..)?)?]));
-        // The first number is the mask of the modes that the driver supports.
-        let modes = find(data, CONTROL_MODE).and_then(|modes| long(modes.get(4..)?));
+        // The first number is a mask.
+        let modes = find(data, CONTROL_MODE).and_then(|modes| long(modes.get(4..)?)).unwrap_or(0);
+        let modes = MODES.into_iter().enumerate().filter(|(bit, _)| modes & 1 << bit != 0);
         let bits_per_s = |timing: &[u8]| long(timing).filter(|&bps| bps > 0);
         Some(Self {
             is_up: long(message.get(FLAGS..)?)? & UP != 0,
@@ -152,7 +132,7 @@ impl InterfaceDetails {
             bitrate_bps: bits_per_s(timing),
             data_bitrate_bps: find(data, DATA_BIT_TIMING).and_then(bits_per_s),
             sample_point_permille: timing.get(4..).and_then(long),
-            modes: ControlModes(modes.unwrap_or(0)),
+            modes: modes.map(|(_, name)| name).collect(),
             restart_ms: find(data, RESTART_MS).and_then(long),
             state: find(data, STATE).and_then(long).and_then(|state| STATES.get(state as usize).copied()),
             errors,
@@ -163,7 +143,6 @@ impl InterfaceDetails {
 impl Display for InterfaceDetails {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let number = |name: &str, value: Option<u32>| value.map(|value| format!("{name} {value}"));
-        let modes: Vec<_> = self.modes.names().collect();
         let parts = [
             Some(if self.is_up { "up" } else { "down" }.to_owned()),
             self.driver.clone(),
@@ -173,7 +152,7 @@ impl Display for InterfaceDetails {
             self.sample_point_permille.map(|permille| format!("sample point {permille} ‰")),
             self.state.map(str::to_owned),
             self.errors.map(|[sent, received]| format!("error counters {sent} and {received}")),
-            (!modes.is_empty()).then(|| modes.join(" ")),
+            (!self.modes.is_empty()).then(|| self.modes.join(" ")),
             number("restart-ms", self.restart_ms),
             number("txqueuelen", self.queue_length),
             self.queueing.clone(),
@@ -227,6 +206,8 @@ mod tests {
         message[4..6].copy_from_slice(&NEW_LINK.to_ne_bytes());
         message[FLAGS..FLAGS + 4].copy_from_slice(&0x400C1u32.to_ne_bytes());
         message.extend(attributes.concat());
+        let length = message.len() as u32;
+        message[..4].copy_from_slice(&length.to_ne_bytes());
         message
     }
 
@@ -260,7 +241,7 @@ mod tests {
             bitrate_bps: Some(500_000),
             data_bitrate_bps: Some(2_000_000),
             sample_point_permille: Some(875),
-            modes: ControlModes(0b1010),
+            modes: vec!["listen-only", "one-shot"],
             restart_ms: Some(100),
             state: Some("bus-off"),
             errors: Some([7, 9]),
@@ -273,8 +254,7 @@ mod tests {
              listen-only one-shot, restart-ms 100, txqueuelen 10, fq_codel, mtu 72"
         );
         for length in 0..message.len() {
-            // A truncated message causes no panic.
-            let _ = InterfaceDetails::parse(&message[..length]);
+            assert_eq!(InterfaceDetails::parse(&message[..length]), None, "{length} bytes of the answer");
         }
     }
 
