@@ -60,11 +60,8 @@ const FRAMES_AT_ONCE: usize = 64;
 const RECEIVE_BUFFER: i32 = 1 << 20;
 /// The port of every error report: all sockets of an interface share this machine's controller.
 const OWN_PORT: u8 = 0;
-/// Number of 32-bit fields of `SO_MEMINFO` (`linux/sock_diag.h`), and the index of the counter of dropped frames.
-const MEMINFO_FIELDS: usize = 9;
-const MEMINFO_DROPS: usize = 8;
-/// Index of the bytes of frames that wait in the interface's queue; of older kernels, also in the controller.
-const MEMINFO_UNSENT: usize = 2;
+/// Number of 32-bit fields of `SO_MEMINFO` (`linux/sock_diag.h`).
+const MEMINFO_FIELDS: usize = libc::SK_MEMINFO_DROPS as usize + 1;
 /// A frame takes whole lines of the cache, of at least so many bytes. The kernel counts a frame as one byte while another
 /// processor frees the frame (`sock_wfree`).
 const CACHE_LINE_BYTES: u32 = 32;
@@ -211,20 +208,22 @@ impl SocketCan {
         if !std::mem::take(&mut self.drained) {
             return Ok(());
         }
-        let dropped =
-            self.memory_info(MEMINFO_DROPS).map_err(|error| ReceiveError::Os { errno: errno(&error) })?;
+        let dropped = self
+            .memory_info(libc::SK_MEMINFO_DROPS)
+            .map_err(|error| ReceiveError::Os { errno: errno(&error) })?;
         match dropped.wrapping_sub(std::mem::replace(&mut self.dropped, dropped)) {
             0 => Ok(()),
             lost => Err(ReceiveError::Overrun { lost: u64::from(lost) }),
         }
     }
 
-    /// A figure of the socket: the frames dropped since its opening, or the bytes of unsent ones.
-    fn memory_info(&self, index: usize) -> io::Result<u32> {
+    /// A figure of the socket: the frames dropped since its opening, or the bytes of those that wait in the interface's
+    /// queue; of older kernels, also of those in the controller.
+    fn memory_info(&self, field: i32) -> io::Result<u32> {
         let mut fields = [0; MEMINFO_FIELDS * size_of::<u32>()];
         self.socket.get_socket_option_bytes(libc::SOL_SOCKET, libc::SO_MEMINFO, &mut fields)?;
         let (fields, _) = fields.as_chunks();
-        Ok(u32::from_ne_bytes(fields[index]))
+        Ok(u32::from_ne_bytes(fields[field as usize]))
     }
 
     fn receive_failed(&mut self, error: &io::Error) -> Result<(), ReceiveError> {
@@ -255,7 +254,7 @@ impl Bus for SocketCan {
         })?;
         if self.frame_bytes == 0 {
             // The first frame that waits is alone. A virtual interface has sent it already, and keeps none.
-            self.frame_bytes = self.memory_info(MEMINFO_UNSENT).map_or(0, whole_frames);
+            self.frame_bytes = self.memory_info(libc::SK_MEMINFO_WMEM_ALLOC).map_or(0, whole_frames);
         }
         Ok(())
     }
@@ -271,7 +270,7 @@ impl Bus for SocketCan {
     }
 
     fn unsent(&self) -> usize {
-        let bytes = self.memory_info(MEMINFO_UNSENT).unwrap_or(0);
+        let bytes = self.memory_info(libc::SK_MEMINFO_WMEM_ALLOC).unwrap_or(0);
         bytes.checked_div(self.frame_bytes).unwrap_or(0) as usize
     }
 }
