@@ -60,7 +60,7 @@ impl JudgedInterface {
         if !details.is_up {
             faults.push(format!("{interface} is down; '{bring_up}' brings it up"));
         } else if !details.is_virtual {
-            faults = find_faults(interface, &details, needs, &bring_up);
+            faults = find_faults(interface, &details, needs.bitrate_bps, &bring_up);
             doubts = find_doubts(interface, &details, needs);
         }
         Self { name: interface.to_owned(), details, faults, doubts }
@@ -75,12 +75,7 @@ pub fn bring_up_command(interface: &str, driver: Option<&str>, bitrate_bps: Opti
     format!("ip link set {interface} up txqueuelen {QUEUE_LENGTH}{controller}")
 }
 
-fn find_faults(
-    name: &str,
-    details: &InterfaceDetails,
-    InterfaceNeeds { bitrate_bps: wanted, .. }: InterfaceNeeds,
-    bring_up: &str,
-) -> Vec<String> {
+fn find_faults(name: &str, details: &InterfaceDetails, wanted: u32, bring_up: &str) -> Vec<String> {
     let modes = FORBIDDEN.iter().filter(|(mode, _)| details.modes.contains(mode));
     let modes = modes
         .map(|(mode, why)| format!("{name} is in the mode {mode}: {why}; {}", change(name, mode, "off")));
