@@ -16,8 +16,7 @@ use serde_json::json;
 
 use super::args::{RobotArgs, parse_length};
 use super::power_mark::{Marks, check_mark, mark_of_home};
-use super::session::{NO_RESULTS, Session};
-use super::{robot_line::failed, step::Step};
+use super::{robot_line::failed, session::Session, step::Step};
 
 /// How long the axes must stand, ns, and how far they may move meanwhile, m.
 const STAND_NS: u64 = 200 * MILLISECOND_NS;
@@ -79,9 +78,9 @@ pub(crate) fn check_pose(args: &CheckPoseArgs) -> Result<Exit, Failure> {
         // No drive has power by this step: there is nothing to stop.
         Err(error @ MotionError::Line(_)) => {
             let error = session.check_undisturbed().err().map_or_else(|| error.into(), anyhow::Error::new);
-            return Err(session.fail(Exit::Failed, error, NO_RESULTS));
+            return Err(session.fail(Exit::Failed, error));
         }
-        Err(error) => return Err(session.fail_motion(error, NO_RESULTS)),
+        Err(error) => return Err(session.fail_motion(error)),
     };
     match find_pose(&mut session, marks, &stand) {
         Ok(found) => {

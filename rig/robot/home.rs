@@ -4,6 +4,7 @@ use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::commissioning::{HomeReport, Wish, home as find};
 use masseter_terminal::{Exit, Failure, OrFailure, result_line};
 use serde::Serialize;
+use serde_json::json;
 
 use super::args::AxesArgs;
 use super::power_mark::{Homed, leave_mark};
@@ -32,10 +33,11 @@ pub(crate) fn home(args: &AxesArgs) -> Result<Exit, Failure> {
     for &axis in &axes {
         let report = match find(&mut session.line, &session.scenario, axis, &mut operator) {
             Ok(report) => report,
-            Err(error) => return Err(session.fail_motion(error, &results)),
+            Err(error) => return Err(session.fail_motion(error)),
         };
         print(axis, &report).incomplete()?;
         results.push(AxisResult { homed: Homed { axis: AXIS_NAMES[axis].to_owned(), mark: None }, report });
+        session.results = Some(json!(results));
     }
     let marked = leave_marks(&mut session, &axes, &mut results);
     session.finish_session(marked.is_ok(), &results)?;

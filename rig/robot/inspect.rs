@@ -28,8 +28,6 @@ use super::step::Step;
 /// For how long the buses are listened to before the first question, ns.
 const LISTEN_NS: u64 = 2 * SECOND_NS;
 
-/// What follows where an interface cannot be used.
-const NOTHING_SENT: &str = "nothing was sent, and no drive was asked\n";
 const TONES: [(&str, Tone); 3] = [("passed", Tone::Good), ("failed", Tone::Bad), ("warning", Tone::Doubtful)];
 
 /// The arguments of `robot inspect`.
@@ -84,13 +82,14 @@ pub(crate) fn inspect(args: &InspectArgs) -> Result<Exit, Failure> {
     let scenario = args.robot.scenario().usage()?;
     let parent = &args.robot.folder;
     let mut folder = StepFolder::begin(parent, Step::Inspect, &Step::Inspect.axes(), &scenario).usage()?;
-    let interfaces = judge_interfaces(&scenario.can);
+    let interfaces = judge_interfaces(&scenario.can).usage()?;
     if interfaces.iter().any(|interface| !interface.faults.is_empty()) {
         // A frame at a wrong bit rate would disturb every other node.
         let mut text = String::new();
         describe_interfaces(&interfaces, &mut text);
+        text += "nothing was sent, and no drive was asked\n";
         folder.finish_step(false, &json!({ "interfaces": interfaces })).incomplete()?;
-        result_with_tones(&(text + NOTHING_SENT), &TONES).usage()?;
+        result_with_tones(&text, &TONES).usage()?;
         return Ok(Exit::Failed);
     }
     let mut robot = RobotLine::open(scenario, folder.log().usage()?).usage()?;

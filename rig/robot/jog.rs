@@ -13,8 +13,7 @@ use masseter_terminal::{Exit, Failure, OrFailure, result_line, status};
 use serde::Serialize;
 
 use super::args::{RobotArgs, parse_axis, parse_length, parse_speed};
-use super::session::{NO_RESULTS, Session};
-use super::{robot_line::failed, step::Step};
+use super::{robot_line::failed, session::Session, step::Step};
 use crate::cli::arguments::parse_duration;
 
 /// For how long a byte permits motion: longer than the time between two repeats of a key, ns.
@@ -86,10 +85,10 @@ pub(crate) fn jog(args: &JogArgs) -> Result<Exit, Failure> {
     };
     let report = match play(&mut session.line, &session.scenario, &order, &mut operator) {
         Ok(report) => report,
-        Err(error) => return Err(session.fail_motion(error, NO_RESULTS)),
+        Err(error) => return Err(session.fail_motion(error)),
     };
     if let Err(disturbance) = session.check_present() {
-        return Err(session.fail(Exit::Failed, disturbance, NO_RESULTS));
+        return Err(session.fail(Exit::Failed, disturbance));
     }
     let factor = args.measured.map(|measured_m| measured_m / report.moved_m());
     let is_silent = report.sync_answers.unanswered > 0;

@@ -106,7 +106,8 @@ pub(crate) fn drives(surveys: &Surveys, can: &CanConfig) -> [Known; AXES] {
 
 /// Warns of what may go wrong on real interfaces.
 pub(crate) fn warn_of_interfaces(can: &CanConfig) {
-    for doubt in judge_interfaces(can).iter().flat_map(|judged| &judged.doubts) {
+    // The opening refuses an interface that cannot be judged.
+    for doubt in judge_interfaces(can).iter().flatten().flat_map(|judged| &judged.doubts) {
         status!("warning: {doubt}");
     }
 }

@@ -10,7 +10,7 @@ use masseter_runtime::lifecycle::StopRequest;
 use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 use serde::Serialize;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::args::RobotArgs;
 use super::basis::Basis;
@@ -23,15 +23,14 @@ use super::step::Step;
 /// All axes.
 const ALL: [usize; AXES] = [0, 1, 2, 3, 4, 5];
 
-/// No results of axes before the failure.
-pub(super) const NO_RESULTS: &[()] = &[];
-
 /// A step under way.
 pub(super) struct Session {
     pub(super) scenario: Scenario,
     pub(super) line: Line,
     pub(super) stop: StopRequest,
     pub(super) past: Past,
+    /// The results of the axes so far, for a step that fails at a later axis.
+    pub(super) results: Option<Value>,
     folder: StepFolder,
     /// Boot-up messages before the step.
     boot_ups: BootUps,
@@ -82,7 +81,7 @@ impl Session {
             axes.iter().try_for_each(|&axis| remove_mark(&past, &scenario, &mut line, axis))?;
         }
         line.keep_old_values_in(Box::new(OwedFiles { folder: args.folder.clone(), drives: identities }));
-        Ok(Self { scenario, line, stop, past, folder, boot_ups, drives })
+        Ok(Self { scenario, line, stop, past, results: None, folder, boot_ups, drives })
     }
 
     /// Refuses a drive that restarted since the step began, since it may have lost its position or what was written,
@@ -105,23 +104,18 @@ impl Session {
     }
 
     /// Writes that the step failed, why, and the results of the axes before, if any.
-    pub(super) fn fail(
-        self,
-        exit: Exit,
-        error: impl Into<anyhow::Error>,
-        before: &[impl Serialize],
-    ) -> Failure {
+    pub(super) fn fail(mut self, exit: Exit, error: impl Into<anyhow::Error>) -> Failure {
         let error = error.into();
         let mut result = json!({ "error": error.to_string() });
-        if !before.is_empty() {
-            result["before"] = json!(before);
+        if let Some(before) = self.results.take() {
+            result["before"] = before;
         }
         let written = self.finish_session(false, &result);
         written.err().unwrap_or_else(|| Failure::with(exit, error))
     }
 
     /// The same of a motion.
-    pub(super) fn fail_motion(self, error: MotionError, before: &[impl Serialize]) -> Failure {
+    pub(super) fn fail_motion(self, error: MotionError) -> Failure {
         let exit = match &error {
             // No motion begins before its values are in the drive.
             MotionError::Line(LineError::NotKept { .. }) => Exit::Failed,
@@ -133,6 +127,6 @@ impl Session {
                 _ => Exit::Failed,
             },
         };
-        self.fail(exit, error, before)
+        self.fail(exit, error)
     }
 }

@@ -4,6 +4,7 @@ use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::commissioning::{LastFrame, Reaction, WatchdogReport, Wish, prove_watchdogs};
 use masseter_terminal::{Exit, Failure, OrFailure, result_line};
 use serde::Serialize;
+use serde_json::json;
 
 use super::args::AxesArgs;
 use super::{session::Session, step::Step};
@@ -27,13 +28,14 @@ pub(crate) fn watchdog(args: &AxesArgs) -> Result<Exit, Failure> {
     for &axis in &axes {
         let report = match prove_watchdogs(&mut session.line, &session.scenario, axis, &mut operator) {
             Ok(report) => report,
-            Err(error) => return Err(session.fail_motion(error, &results)),
+            Err(error) => return Err(session.fail_motion(error)),
         };
         print(axis, &report).incomplete()?;
         results.push(AxisResult { axis: AXIS_NAMES[axis], report });
+        session.results = Some(json!(results));
     }
     if let Err(disturbance) = session.check_present() {
-        return Err(session.fail(Exit::Failed, disturbance, &results));
+        return Err(session.fail(Exit::Failed, disturbance));
     }
     session.finish_session(true, &results)?;
     Ok(Exit::Passed)

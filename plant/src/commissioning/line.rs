@@ -16,7 +16,7 @@ use masseter_runtime::clock::MILLISECOND_NS;
 use masseter_scenario::{MASTER_NODE, ObjectKey, Scenario};
 use serde::{Deserialize, Serialize};
 
-use super::errors::{LineError, MasterSign, Restarted, SdoReason, Silence};
+use super::errors::{LineError, MasterSign, Restarted, SdoReason};
 use super::traffic::{Heard, Strangers, Traffic};
 use crate::error::PlantError;
 use crate::master::link::Address;
@@ -108,15 +108,6 @@ impl Line {
     pub(super) fn send_process_data(&mut self, axis: usize, rpdo: Frame) -> Result<u64, LineError> {
         self.traffic.send(self.traffic.addresses[axis].bus, rpdo)?;
         Ok(self.now_ns())
-    }
-
-    /// When the master's last frame of that kind left for the drive of an axis, ns; none on a bus that does not show it.
-    pub(super) fn left_ns(&self, axis: usize, kind: Silence) -> Option<u64> {
-        let Heard { beat_left_ns, rpdo_left_ns, .. } = self.traffic.heard[axis];
-        match kind {
-            Silence::Heartbeat => beat_left_ns,
-            Silence::ProcessData => rpdo_left_ns,
-        }
     }
 
     /// Listens for that long.

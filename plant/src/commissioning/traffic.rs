@@ -127,6 +127,7 @@ impl Traffic {
 
     /// Notes the times of SYNC, of process data and of the master's heartbeat.
     fn note_time(&mut self, bus: usize, tapped: &TappedFrame) {
+        let axis_of = |node| self.addresses.iter().position(|at| *at == Address { bus, node });
         match Cob::try_from(tapped.frame.id()) {
             Ok(Cob::Sync) => self.sync_ns = Some(tapped.time_ns),
             Ok(Cob::Heartbeat(MASTER_NODE)) => {
@@ -134,16 +135,14 @@ impl Traffic {
                 on_bus.for_each(|(_, heard)| heard.beat_left_ns = Some(tapped.time_ns));
             }
             Ok(Cob::Rpdo1(node)) => {
-                let axis = self.addresses.iter().position(|at| *at == Address { bus, node });
-                if let Some(axis) = axis {
+                if let Some(axis) = axis_of(node) {
                     self.heard[axis].rpdo_left_ns = Some(tapped.time_ns);
                 }
             }
             Ok(Cob::Tpdo1(node)) => {
                 let bits = frame_bits(&tapped.frame) - INTERFRAME_BITS;
                 let begin_ns = tapped.time_ns.saturating_sub(self.bitrate.bits_to_ns(bits));
-                let axis = self.addresses.iter().position(|at| *at == Address { bus, node });
-                if let Some(axis) = axis {
+                if let Some(axis) = axis_of(node) {
                     self.heard[axis].process_data_ns = Some(begin_ns);
                 }
             }

@@ -173,9 +173,14 @@ impl<'a> Proof<'a> {
         };
         let limit_ns = u64::from(timeout_ms) * MILLISECOND_NS + MARGIN_NS;
         let stopped_ns = self.wait_for_stop(mover, from_m, queued_ns + limit_ns + LATE_NS)?;
-        let left_ns = mover.line.left_ns(axis, silence).filter(|&left_ns| left_ns >= queued_ns);
-        let (last_ns, last_frame) =
-            left_ns.map_or((queued_ns, LastFrame::Queued), |left_ns| (left_ns, LastFrame::Left));
+        let left_ns = match silence {
+            Silence::Heartbeat => mover.line.heard(axis).beat_left_ns,
+            Silence::ProcessData => mover.line.heard(axis).rpdo_left_ns,
+        };
+        let (last_ns, last_frame) = match left_ns {
+            Some(left_ns) if left_ns >= queued_ns => (left_ns, LastFrame::Left),
+            _ => (queued_ns, LastFrame::Queued),
+        };
         let since_ms = |now_ns: u64| now_ns.saturating_sub(last_ns) as f64 / MILLISECOND_NS as f64;
         let Some(stopped_ns) = stopped_ns else {
             let waited_ms = since_ms(mover.line.now_ns());

@@ -311,10 +311,11 @@ impl Master {
         }
         // A message of the boot counts as sent, and is repeated late.
         for axis in 0..AXES {
-            if !self.is_stuck(axis)
+            let bus = self.drives[axis].address.bus;
+            if !self.buses[bus].is_stuck
                 && let Some(frame) = self.drives[axis].boot_command(now_ns)
             {
-                self.send_to(now_ns, axis, frame, buses);
+                self.send(now_ns, bus, frame, buses);
             }
         }
         for bus in 0..self.buses.len() {
@@ -352,10 +353,6 @@ impl Master {
                 self.report_boot(now_ns, axis, Ok(()));
             }
         }
-    }
-
-    fn is_stuck(&self, axis: usize) -> bool {
-        self.buses[self.drives[axis].address.bus].is_stuck
     }
 
     fn send_to(&mut self, now_ns: u64, axis: usize, frame: Frame, buses: &mut impl Buses) {

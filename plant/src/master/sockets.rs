@@ -25,19 +25,28 @@ use crate::error::PlantError;
 /// Longest wait for a real frame, ns. A fault may hold frames back that are due before the next arrival.
 const LONGEST_BLOCK_NS: u64 = 100_000;
 
-/// Judges the interfaces of a scenario. One that cannot be asked is left out: its opening says why.
-pub fn judge_interfaces(can: &CanConfig) -> Vec<JudgedInterface> {
+/// Judges the interfaces of a scenario. One that does not exist is left out: its opening says so.
+///
+/// # Errors
+/// [`PlantError::Unfit`] for an interface of which the kernel does not tell the settings.
+pub fn judge_interfaces(can: &CanConfig) -> Result<Vec<JudgedInterface>, PlantError> {
     let judged = |(name, drives): (&String, &Vec<usize>)| {
         // SYNC, SDO and heartbeat; for each drive process data, or NMT at its start.
         let frames = 3 + 2 * drives.len() as u32;
-        JudgedInterface::read(name, InterfaceNeeds { bitrate_bps: can.bitrate_bps, frames }).ok()
+        match JudgedInterface::read(name, InterfaceNeeds { bitrate_bps: can.bitrate_bps, frames }) {
+            Err(error) if error.kind() == ErrorKind::NotFound => None,
+            judged => Some(judged.map_err(|error| {
+                let words = format!("the settings of {name} cannot be read ({error}); allow netlink sockets");
+                PlantError::Unfit(vec![words])
+            })),
+        }
     };
     can.interfaces.iter().zip(&can.buses).filter_map(judged).collect()
 }
 
 /// Refuses interfaces over which nothing may be sent.
 pub(crate) fn refuse_unfit(can: &CanConfig) -> Result<(), PlantError> {
-    let faults: Vec<_> = judge_interfaces(can).into_iter().flat_map(|judged| judged.faults).collect();
+    let faults: Vec<_> = judge_interfaces(can)?.into_iter().flat_map(|judged| judged.faults).collect();
     if faults.is_empty() { Ok(()) } else { Err(PlantError::Unfit(faults)) }
 }
 
@@ -113,6 +122,17 @@ pub(super) fn lock(interface: &str) -> Result<UnixDatagram, PlantError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_interface_whose_settings_are_unknown_is_refused() {
+        let of = |name: &str| {
+            let can = Scenario::default().can;
+            judge_interfaces(&CanConfig { interfaces: vec![name.to_owned()], ..can })
+        };
+        assert_eq!(of("nocan9"), Ok(vec![]), "its opening says that it does not exist");
+        let error = of("lo/ifindex").unwrap_err();
+        assert!(error.to_string().contains("the settings of lo/ifindex cannot be read"), "{error}");
+    }
 
     #[test]
     fn an_interface_has_one_master_until_it_is_gone() {

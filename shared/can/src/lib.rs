@@ -27,8 +27,8 @@ pub use pdo::{EVERY_SYNC, PdoMapping, PdoMappingError, Rpdo1, Tpdo1};
 pub use plan::{BusPlan, NoReleaser, Overload, PeriodicMessage, PlannedMessage, Release};
 pub use port_faults::{Faulty, NotByPort, PortFaults};
 pub use socket_can::{
-    ControlModes, Interface, InterfaceDetails, InterfaceNeeds, JudgedInterface, OpenError, SocketCan,
-    bring_up_command, explain_errno, is_supported,
+    Interface, InterfaceDetails, InterfaceNeeds, JudgedInterface, OpenError, SocketCan, bring_up_command,
+    explain_errno, is_supported,
 };
 pub use tap::{ERROR_FLAG, ErrorKind, ErrorReport, ErrorReportError, Tapped, TappedFrame, candump};
 pub use virtual_bus::{Port, VirtualWire, WireConfig};

@@ -5,6 +5,12 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
+// `socketcan` reads some of these attributes with its feature `netlink`, at the price of a dozen crates.
+use libc::{
+    IFF_UP, IFLA_CAN_BERR_COUNTER, IFLA_CAN_BITTIMING, IFLA_CAN_CTRLMODE, IFLA_CAN_DATA_BITTIMING,
+    IFLA_CAN_RESTART_MS, IFLA_CAN_STATE, IFLA_INFO_DATA, IFLA_INFO_KIND, IFLA_LINKINFO, IFLA_MTU, IFLA_QDISC,
+    IFLA_TXQLEN, NLA_TYPE_MASK, NLM_F_REQUEST, RTM_GETLINK, RTM_NEWLINK,
+};
 use rustix::net::netlink::SocketAddrNetlink;
 use rustix::net::{AddressFamily, RecvFlags, SendFlags, SocketType, recv, sendto, socket};
 
@@ -13,7 +19,7 @@ use super::interface::driver;
 /// States of fault confinement, by their number in the kernel.
 const STATES: [&str; 6] =
     ["error active", "error warning", "error passive", "bus-off", "stopped", "sleeping"];
-/// Control modes as `ip` names them, by their bit.
+/// Control modes (`CAN_CTRLMODE_…`) as `ip` names them, by their bit.
 const MODES: [&str; 11] = [
     "loopback",
     "listen-only",
@@ -28,51 +34,11 @@ const MODES: [&str; 11] = [
     "tdc-manual",
 ];
 
-// Messages and attributes (linux/rtnetlink.h, linux/if_link.h, linux/can/netlink.h). `socketcan` reads some of them with its
-// feature `netlink`, at the price of a dozen crates.
-const GET_LINK: u16 = 18;
-const NEW_LINK: u16 = 16;
-const REQUEST: u16 = 1;
-const MTU: u16 = 4;
-const QUEUEING: u16 = 6;
-const QUEUE_LENGTH: u16 = 13;
-const LINK_INFO: u16 = 18;
-const INFO_KIND: u16 = 1;
-const INFO_DATA: u16 = 2;
-const BIT_TIMING: u16 = 1;
-const STATE: u16 = 4;
-const CONTROL_MODE: u16 = 5;
-const RESTART_MS: u16 = 6;
-const ERROR_COUNTERS: u16 = 8;
-const DATA_BIT_TIMING: u16 = 9;
 /// Bytes of the header of a message, and of the link's description before its attributes.
 const HEADER: usize = 16;
 const LINK: usize = 16;
-/// Place of the flags in a message, and the flag of an interface that is up (`IFF_UP`).
+/// Place of the flags in a message.
 const FLAGS: usize = HEADER + 8;
-const UP: u32 = 1;
-
-/// Control modes of a controller (`CAN_CTRLMODE_…`), one a bit.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct ControlModes(pub u32);
-
-impl serde::Serialize for ControlModes {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_seq(self.names())
-    }
-}
-
-impl ControlModes {
-    /// Whether the mode with this name of `ip` is on.
-    pub fn has(self, mode: &str) -> bool {
-        self.names().any(|name| name == mode)
-    }
-
-    /// The names that `ip` gives to the modes that are on.
-    pub fn names(self) -> impl Iterator<Item = &'static str> {
-        MODES.into_iter().enumerate().filter(move |(bit, _)| self.0 & 1 << bit != 0).map(|(_, name)| name)
-    }
-}
 
 /// Settings and state of an interface and its controller. A driver may report only some of them; a virtual interface has
 /// no controller and no bit timing.
@@ -96,8 +62,8 @@ pub struct InterfaceDetails {
     pub data_bitrate_bps: Option<u32>,
     /// Sample point, ‰ of a bit.
     pub sample_point_permille: Option<u32>,
-    /// Control modes.
-    pub modes: ControlModes,
+    /// The control modes that are on, as `ip` names them.
+    pub modes: Vec<&'static str>,
     /// Time from bus-off to the controller's own restart, ms; 0 for never.
     pub restart_ms: Option<u32>,
     /// State of its fault confinement.
@@ -118,8 +84,8 @@ impl InterfaceDetails {
         let socket = socket(AddressFamily::NETLINK, SocketType::RAW, None)?;
         let mut request = [0; HEADER + LINK];
         request[..4].copy_from_slice(&((HEADER + LINK) as u32).to_ne_bytes());
-        request[4..6].copy_from_slice(&GET_LINK.to_ne_bytes());
-        request[6..8].copy_from_slice(&REQUEST.to_ne_bytes());
+        request[4..6].copy_from_slice(&RTM_GETLINK.to_ne_bytes());
+        request[6..8].copy_from_slice(&(NLM_F_REQUEST as u16).to_ne_bytes());
         request[20..24].copy_from_slice(&index.to_ne_bytes());
         sendto(&socket, &request, SendFlags::empty(), &SocketAddrNetlink::new(0, 0))?;
         let mut answer = vec![0; 1 << 15];
@@ -129,32 +95,37 @@ impl InterfaceDetails {
         Ok(Self { driver: driver(&folder), ..details })
     }
 
-    /// None for a message that is no description of a link.
+    /// None for a message that is no whole description of a link: without its end, a forbidden mode might be missing.
     fn parse(message: &[u8]) -> Option<Self> {
-        if short(message.get(4..)?)? != NEW_LINK {
+        let message = message.get(..long(message)? as usize)?;
+        if short(message.get(4..)?)? != RTM_NEWLINK {
             return None;
         }
         let link = message.get(HEADER + LINK..)?;
-        let info = find(link, LINK_INFO).unwrap_or_default();
-        let data = find(info, INFO_DATA).unwrap_or_default();
-        let timing = find(data, BIT_TIMING).unwrap_or_default();
-        let errors = find(data, ERROR_COUNTERS).and_then(|pair| Some([short(pair)?, short(pair.get(2..)?)?]));
-        // The first number is the mask of the modes that the driver supports.
-        let modes = find(data, CONTROL_MODE).and_then(|modes| long(modes.get(4..)?));
+        let info = find(link, IFLA_LINKINFO).unwrap_or_default();
+        let data = find(info, IFLA_INFO_DATA).unwrap_or_default();
+        let timing = find(data, IFLA_CAN_BITTIMING).unwrap_or_default();
+        let errors =
+            find(data, IFLA_CAN_BERR_COUNTER).and_then(|pair| Some([short(pair)?, short(pair.get(2..)?)?]));
+        // The first number is a mask.
+        let modes = find(data, IFLA_CAN_CTRLMODE).and_then(|modes| long(modes.get(4..)?)).unwrap_or(0);
+        let modes = MODES.into_iter().enumerate().filter(|(bit, _)| modes & 1 << bit != 0);
         let bits_per_s = |timing: &[u8]| long(timing).filter(|&bps| bps > 0);
         Some(Self {
-            is_up: long(message.get(FLAGS..)?)? & UP != 0,
-            is_virtual: find(info, INFO_KIND).and_then(text).is_some_and(|kind| kind != "can"),
+            is_up: long(message.get(FLAGS..)?)? & IFF_UP as u32 != 0,
+            is_virtual: find(info, IFLA_INFO_KIND).and_then(text).is_some_and(|kind| kind != "can"),
             driver: None,
-            mtu: find(link, MTU).and_then(long),
-            queueing: find(link, QUEUEING).and_then(text),
-            queue_length: find(link, QUEUE_LENGTH).and_then(long),
+            mtu: find(link, IFLA_MTU).and_then(long),
+            queueing: find(link, IFLA_QDISC).and_then(text),
+            queue_length: find(link, IFLA_TXQLEN).and_then(long),
             bitrate_bps: bits_per_s(timing),
-            data_bitrate_bps: find(data, DATA_BIT_TIMING).and_then(bits_per_s),
+            data_bitrate_bps: find(data, IFLA_CAN_DATA_BITTIMING).and_then(bits_per_s),
             sample_point_permille: timing.get(4..).and_then(long),
-            modes: ControlModes(modes.unwrap_or(0)),
-            restart_ms: find(data, RESTART_MS).and_then(long),
-            state: find(data, STATE).and_then(long).and_then(|state| STATES.get(state as usize).copied()),
+            modes: modes.map(|(_, name)| name).collect(),
+            restart_ms: find(data, IFLA_CAN_RESTART_MS).and_then(long),
+            state: find(data, IFLA_CAN_STATE)
+                .and_then(long)
+                .and_then(|state| STATES.get(state as usize).copied()),
             errors,
         })
     }
@@ -163,7 +134,6 @@ impl InterfaceDetails {
 impl Display for InterfaceDetails {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let number = |name: &str, value: Option<u32>| value.map(|value| format!("{name} {value}"));
-        let modes: Vec<_> = self.modes.names().collect();
         let parts = [
             Some(if self.is_up { "up" } else { "down" }.to_owned()),
             self.driver.clone(),
@@ -173,7 +143,7 @@ impl Display for InterfaceDetails {
             self.sample_point_permille.map(|permille| format!("sample point {permille} ‰")),
             self.state.map(str::to_owned),
             self.errors.map(|[sent, received]| format!("error counters {sent} and {received}")),
-            (!modes.is_empty()).then(|| modes.join(" ")),
+            (!self.modes.is_empty()).then(|| self.modes.join(" ")),
             number("restart-ms", self.restart_ms),
             number("txqueuelen", self.queue_length),
             self.queueing.clone(),
@@ -196,11 +166,12 @@ fn text(bytes: &[u8]) -> Option<String> {
 }
 
 /// The value of the first attribute of a kind. Attributes begin at multiples of four bytes.
-fn find(mut attributes: &[u8], kind: u16) -> Option<&[u8]> {
+fn find(mut attributes: &[u8], kind: impl Into<i32>) -> Option<&[u8]> {
+    let kind = kind.into();
     loop {
         let (length, found) = (usize::from(short(attributes)?), short(attributes.get(2..)?)?);
         let value = attributes.get(4..length)?;
-        if found & 0x3FFF == kind {
+        if i32::from(found) & NLA_TYPE_MASK == kind {
             return Some(value);
         }
         attributes = attributes.get(length.next_multiple_of(4)..)?;
@@ -211,7 +182,8 @@ fn find(mut attributes: &[u8], kind: u16) -> Option<&[u8]> {
 mod tests {
     use super::*;
 
-    fn attribute(kind: u16, value: &[u8]) -> Vec<u8> {
+    fn attribute(kind: impl Into<i32>, value: &[u8]) -> Vec<u8> {
+        let kind = kind.into() as u16;
         let mut bytes = [(value.len() as u16 + 4).to_ne_bytes(), kind.to_ne_bytes()].concat();
         bytes.extend(value);
         bytes.resize(bytes.len().next_multiple_of(4), 0);
@@ -224,31 +196,33 @@ mod tests {
 
     fn message(attributes: &[Vec<u8>]) -> Vec<u8> {
         let mut message = vec![0; HEADER + LINK];
-        message[4..6].copy_from_slice(&NEW_LINK.to_ne_bytes());
+        message[4..6].copy_from_slice(&RTM_NEWLINK.to_ne_bytes());
         message[FLAGS..FLAGS + 4].copy_from_slice(&0x400C1u32.to_ne_bytes());
         message.extend(attributes.concat());
+        let length = message.len() as u32;
+        message[..4].copy_from_slice(&length.to_ne_bytes());
         message
     }
 
     #[test]
     fn the_settings_of_a_controller_are_found_among_other_attributes() {
         let data = [
-            attribute(BIT_TIMING, &numbers(&[500_000, 875, 1, 2, 3, 4, 5, 6])),
+            attribute(IFLA_CAN_BITTIMING, &numbers(&[500_000, 875, 1, 2, 3, 4, 5, 6])),
             attribute(3, &[1, 2, 3]),
-            attribute(STATE, &numbers(&[3])),
-            attribute(CONTROL_MODE, &numbers(&[0xFF, 0b1010])),
-            attribute(RESTART_MS, &numbers(&[100])),
-            attribute(ERROR_COUNTERS, &[7, 0, 9, 0].map(u8::to_le)),
-            attribute(DATA_BIT_TIMING, &numbers(&[2_000_000])),
+            attribute(IFLA_CAN_STATE, &numbers(&[3])),
+            attribute(IFLA_CAN_CTRLMODE, &numbers(&[0xFF, 0b1010])),
+            attribute(IFLA_CAN_RESTART_MS, &numbers(&[100])),
+            attribute(IFLA_CAN_BERR_COUNTER, &[7, 0, 9, 0].map(u8::to_le)),
+            attribute(IFLA_CAN_DATA_BITTIMING, &numbers(&[2_000_000])),
         ]
         .concat();
-        let info = [attribute(INFO_KIND, b"can\0"), attribute(INFO_DATA, &data)].concat();
+        let info = [attribute(IFLA_INFO_KIND, b"can\0"), attribute(IFLA_INFO_DATA, &data)].concat();
         let message = message(&[
             attribute(3, b"can0\0"),
-            attribute(MTU, &numbers(&[72])),
-            attribute(QUEUEING, b"fq_codel\0"),
-            attribute(QUEUE_LENGTH, &numbers(&[10])),
-            attribute(LINK_INFO | 0x8000, &info),
+            attribute(IFLA_MTU, &numbers(&[72])),
+            attribute(IFLA_QDISC, b"fq_codel\0"),
+            attribute(IFLA_TXQLEN, &numbers(&[10])),
+            attribute(IFLA_LINKINFO | 0x8000, &info),
         ]);
         let expected = InterfaceDetails {
             is_up: true,
@@ -260,7 +234,7 @@ mod tests {
             bitrate_bps: Some(500_000),
             data_bitrate_bps: Some(2_000_000),
             sample_point_permille: Some(875),
-            modes: ControlModes(0b1010),
+            modes: vec!["listen-only", "one-shot"],
             restart_ms: Some(100),
             state: Some("bus-off"),
             errors: Some([7, 9]),
@@ -273,15 +247,14 @@ mod tests {
              listen-only one-shot, restart-ms 100, txqueuelen 10, fq_codel, mtu 72"
         );
         for length in 0..message.len() {
-            // A truncated message causes no panic.
-            let _ = InterfaceDetails::parse(&message[..length]);
+            assert_eq!(InterfaceDetails::parse(&message[..length]), None, "{length} bytes of the answer");
         }
     }
 
     #[test]
     fn a_virtual_interface_has_no_bit_timing() {
-        let info = attribute(INFO_KIND, b"vxcan\0");
-        let found = InterfaceDetails::parse(&message(&[attribute(LINK_INFO, &info)])).unwrap();
+        let info = attribute(IFLA_INFO_KIND, b"vxcan\0");
+        let found = InterfaceDetails::parse(&message(&[attribute(IFLA_LINKINFO, &info)])).unwrap();
         assert!(found.is_virtual && found.bitrate_bps.is_none(), "{found:?}");
         assert_eq!(found.to_string(), "up, virtual: no bit timing, no control modes");
     }

@@ -60,7 +60,7 @@ impl JudgedInterface {
         if !details.is_up {
             faults.push(format!("{interface} is down; '{bring_up}' brings it up"));
         } else if !details.is_virtual {
-            faults = find_faults(interface, &details, needs, &bring_up);
+            faults = find_faults(interface, &details, needs.bitrate_bps, &bring_up);
             doubts = find_doubts(interface, &details, needs);
         }
         Self { name: interface.to_owned(), details, faults, doubts }
@@ -75,13 +75,8 @@ pub fn bring_up_command(interface: &str, driver: Option<&str>, bitrate_bps: Opti
     format!("ip link set {interface} up txqueuelen {QUEUE_LENGTH}{controller}")
 }
 
-fn find_faults(
-    name: &str,
-    details: &InterfaceDetails,
-    InterfaceNeeds { bitrate_bps: wanted, .. }: InterfaceNeeds,
-    bring_up: &str,
-) -> Vec<String> {
-    let modes = FORBIDDEN.iter().filter(|(mode, _)| details.modes.has(mode));
+fn find_faults(name: &str, details: &InterfaceDetails, wanted: u32, bring_up: &str) -> Vec<String> {
+    let modes = FORBIDDEN.iter().filter(|(mode, _)| details.modes.contains(mode));
     let modes = modes
         .map(|(mode, why)| format!("{name} is in the mode {mode}: {why}; {}", change(name, mode, "off")));
     let bitrate = details.bitrate_bps.filter(|&found| found != wanted).map(|found| {
@@ -124,7 +119,7 @@ fn find_doubts(name: &str, details: &InterfaceDetails, needs: InterfaceNeeds) ->
     doubt(sent > 0 || received > 0, counters);
     let presumes = change(name, "presume-ack", "off");
     doubt(
-        details.modes.has("presume-ack"),
+        details.modes.contains(&"presume-ack"),
         format!("is in the mode presume-ack: frames count as sent that no node has; {presumes}"),
     );
     let (is_off, crashes) = (*state == Some("bus-off"), details.driver.as_deref() == Some(CRASHES));
@@ -171,7 +166,6 @@ fn change(name: &str, setting: &str, value: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::details::ControlModes;
     use super::*;
 
     const NEEDS: InterfaceNeeds = InterfaceNeeds { bitrate_bps: 1_000_000, frames: 9 };
@@ -201,18 +195,18 @@ mod tests {
     #[test]
     fn what_cannot_carry_drives_is_a_fault_with_its_command() {
         assert_eq!(said(&good()), (vec![], vec![]));
-        let mode = |bits| InterfaceDetails { modes: ControlModes(bits), ..good() };
+        let modes = |modes: &[_]| InterfaceDetails { modes: modes.to_vec(), ..good() };
         let table = [
             (
                 InterfaceDetails { is_up: false, ..good() },
                 "'ip link set can0 up txqueuelen 50 type can bitrate 1000000 restart-ms 100'",
             ),
             (
-                mode(0b10),
+                modes(&["listen-only"]),
                 "listen-only: it sends and acknowledges nothing; 'ip link set can0 down', 'ip link set can0 type can listen-only off'",
             ),
-            (mode(0b1), "loopback off"),
-            (mode(0b1000), "one-shot off"),
+            (modes(&["loopback"]), "loopback off"),
+            (modes(&["one-shot"]), "one-shot off"),
             (
                 InterfaceDetails { bitrate_bps: Some(500_000), ..good() },
                 "has 500000 bit/s, can.bitrate_bps is 1000000; 'ip link set can0 down' and 'ip link set can0 up txqueuelen 50 \
@@ -229,7 +223,7 @@ mod tests {
             assert!(faults.len() == 1 && faults[0].contains(words), "{words}: {faults:?}");
         }
         assert_eq!(
-            said(&mode(0b10100)),
+            said(&modes(&["triple-sampling", "berr-reporting"])),
             (vec![], vec![]),
             "triple sampling and reported errors disturb nobody"
         );
@@ -243,7 +237,7 @@ mod tests {
             (InterfaceDetails { state: Some("error passive"), ..good() }, "is error passive"),
             (InterfaceDetails { state: Some("bus-off"), ..good() }, "restarts within 100 ms"),
             (InterfaceDetails { errors: Some([0, 3]), ..good() }, "0 for sending and 3 for receiving"),
-            (InterfaceDetails { modes: ControlModes(0x40), ..good() }, "presume-ack off"),
+            (InterfaceDetails { modes: vec!["presume-ack"], ..good() }, "presume-ack off"),
             (InterfaceDetails { restart_ms: Some(0), ..good() }, "type can restart-ms 100'"),
             (InterfaceDetails { driver: driver(), ..good() }, "#6916); 'ip link set can0 down'"),
             (

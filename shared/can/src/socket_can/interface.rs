@@ -6,11 +6,6 @@ use std::path::Path;
 
 use socketcan::{CanSocket, Socket};
 
-/// Hardware type of CAN interfaces (`ARPHRD_CAN`).
-const CAN_TYPE: u32 = 280;
-/// Flag of an interface that is up (`IFF_UP`).
-const UP: u32 = 1;
-
 /// Why an interface is not usable, with its name first, and the number of the system's error.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum OpenError {
@@ -92,9 +87,9 @@ impl Interface {
         let text = |property: &str| fs::read_to_string(folder.join(property)).ok();
         let number = |property: &str| text(property)?.trim().parse::<u32>().ok();
         let flags = || u32::from_str_radix(text("flags")?.trim().strip_prefix("0x")?, 16).ok();
-        (number("type") == Some(CAN_TYPE)).then(|| Self {
+        (number("type") == Some(libc::ARPHRD_CAN.into())).then(|| Self {
             name: name.to_owned(),
-            is_up: flags().is_none_or(|flags| flags & UP != 0),
+            is_up: flags().is_none_or(|flags| flags & libc::IFF_UP as u32 != 0),
             is_bus_off: number("carrier") == Some(0),
             is_virtual: !folder.join("device").exists(),
             driver: driver(folder),

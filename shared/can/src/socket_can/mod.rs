@@ -49,7 +49,7 @@ mod details;
 mod fitness;
 mod interface;
 
-pub use details::{ControlModes, InterfaceDetails};
+pub use details::InterfaceDetails;
 pub use fitness::{InterfaceNeeds, JudgedInterface, bring_up_command};
 pub use interface::{Interface, OpenError, explain_errno, is_supported};
 use interface::{errno, usable_transmit_capacity};
@@ -60,11 +60,11 @@ const FRAMES_AT_ONCE: usize = 64;
 const RECEIVE_BUFFER: i32 = 1 << 20;
 /// The port of every error report: all sockets of an interface share this machine's controller.
 const OWN_PORT: u8 = 0;
-/// Number of 32-bit fields of `SO_MEMINFO` (`linux/sock_diag.h`), and the index of the counter of dropped frames.
-const MEMINFO_FIELDS: usize = 9;
-const MEMINFO_DROPS: usize = 8;
-/// Index of the bytes of frames that wait in the interface's queue or in the controller.
-const MEMINFO_UNSENT: usize = 2;
+/// Number of 32-bit fields of `SO_MEMINFO` (`linux/sock_diag.h`).
+const MEMINFO_FIELDS: usize = libc::SK_MEMINFO_DROPS as usize + 1;
+/// A frame takes whole lines of the cache, of at least so many bytes. The kernel counts a frame as one byte while another
+/// processor frees the frame (`sock_wfree`).
+const CACHE_LINE_BYTES: u32 = 32;
 /// Traffic so long after bus-off proves a restart that no error frame reported: frames received before are over, ns.
 const RESTARTED_NS: u64 = 100_000_000;
 /// Transmit error counter at which a controller is bus-off; error frames have no room for more than 255.
@@ -96,7 +96,7 @@ pub struct SocketCan {
     socket: CanSocket,
     transmit_capacity: usize,
     status: BusStatus,
-    /// Bytes of memory that the kernel counts for an unsent frame; 0 until one is sent.
+    /// Bytes of memory that the kernel counts for an unsent frame; 0 until one waits.
     frame_bytes: u32,
     /// When the driver reported bus-off.
     off_since_ns: u64,
@@ -208,20 +208,22 @@ impl SocketCan {
         if !std::mem::take(&mut self.drained) {
             return Ok(());
         }
-        let dropped =
-            self.memory_info(MEMINFO_DROPS).map_err(|error| ReceiveError::Os { errno: errno(&error) })?;
+        let dropped = self
+            .memory_info(libc::SK_MEMINFO_DROPS)
+            .map_err(|error| ReceiveError::Os { errno: errno(&error) })?;
         match dropped.wrapping_sub(std::mem::replace(&mut self.dropped, dropped)) {
             0 => Ok(()),
             lost => Err(ReceiveError::Overrun { lost: u64::from(lost) }),
         }
     }
 
-    /// A figure of the socket: the frames dropped since its opening, or the bytes of unsent ones.
-    fn memory_info(&self, index: usize) -> io::Result<u32> {
+    /// A figure of the socket: the frames dropped since its opening, or the bytes of those that wait in the interface's
+    /// queue; of older kernels, also of those in the controller.
+    fn memory_info(&self, field: i32) -> io::Result<u32> {
         let mut fields = [0; MEMINFO_FIELDS * size_of::<u32>()];
         self.socket.get_socket_option_bytes(libc::SOL_SOCKET, libc::SO_MEMINFO, &mut fields)?;
         let (fields, _) = fields.as_chunks();
-        Ok(u32::from_ne_bytes(fields[index]))
+        Ok(u32::from_ne_bytes(fields[field as usize]))
     }
 
     fn receive_failed(&mut self, error: &io::Error) -> Result<(), ReceiveError> {
@@ -251,8 +253,8 @@ impl Bus for SocketCan {
             errno => SendError::Os { errno },
         })?;
         if self.frame_bytes == 0 {
-            // The first frame is alone in the queue. A virtual interface has sent it already, and keeps none.
-            self.frame_bytes = self.memory_info(MEMINFO_UNSENT).unwrap_or(0);
+            // The first frame that waits is alone. A virtual interface has sent it already, and keeps none.
+            self.frame_bytes = self.memory_info(libc::SK_MEMINFO_WMEM_ALLOC).map_or(0, whole_frames);
         }
         Ok(())
     }
@@ -268,9 +270,14 @@ impl Bus for SocketCan {
     }
 
     fn unsent(&self) -> usize {
-        let bytes = self.memory_info(MEMINFO_UNSENT).unwrap_or(0);
+        let bytes = self.memory_info(libc::SK_MEMINFO_WMEM_ALLOC).unwrap_or(0);
         bytes.checked_div(self.frame_bytes).unwrap_or(0) as usize
     }
+}
+
+/// The bytes of a socket's unsent frames, without those that are being freed.
+fn whole_frames(bytes: u32) -> u32 {
+    bytes - bytes % CACHE_LINE_BYTES
 }
 
 fn configure(socket: &CanSocket) -> io::Result<()> {
@@ -413,6 +420,12 @@ mod tests {
         let mut port = passive;
         apply_traffic(&mut port, u64::MAX);
         assert_eq!(port, passive);
+    }
+
+    /// A frame that counts as one byte is sent: were it the measure, each frame in the queue would count as hundreds.
+    #[test]
+    fn a_frame_that_another_processor_frees_is_no_measure() {
+        assert_eq!([0, 1, 2, 768, 769, 1536].map(whole_frames), [0, 0, 0, 768, 768, 1536]);
     }
 
     #[test]
