@@ -88,7 +88,8 @@ fn a_program_leaves_the_bytes_of_the_rigs_own_controller() {
 fn a_program_controls_the_robot_in_real_time() {
     let cores = Cores::take();
     // It plays no motion of the scenario.
-    let required = "[[require]]\nname = 'holds'\nsignal = 'jaw.rotation'\nduring = 'running'\nmax = '1 deg'\n";
+    let required =
+        "[[require]]\nname = 'holds'\nsignal = 'jaw.rotation'\nduring = 'running'\nmax = '1 deg'\n";
     let workspace = Workspace::new(&format!("{SCENARIO}{LENIENT}{required}"));
     let program = script(&workspace, &format!("exec {MASSETER} controller --kind hold"));
     let controller = program.to_str().unwrap();
