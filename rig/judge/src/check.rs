@@ -152,28 +152,30 @@ pub(crate) fn tracking(
     limits: &ChecksConfig,
 ) -> Check {
     let ChecksConfig { tracking_rms_mm, tracking_max_mm, tracking_rms_deg, tracking_max_deg, .. } = *limits;
+    // Unlike the mean, the largest error is also that of the moves around the motion.
+    const AROUND: &str = ", approach and hold included";
     let figures = [
-        ("incisal point rms", errors.incisal_rms_mm, tracking_rms_mm, " mm"),
-        ("incisal point max", errors.incisal_max_mm, tracking_max_mm, " mm"),
-        ("platform rms", errors.rms_mm, tracking_rms_mm, " mm"),
-        ("platform max", errors.max_mm, tracking_max_mm, " mm"),
-        ("platform rms", errors.rms_deg, tracking_rms_deg, "°"),
-        ("platform max", errors.max_deg, tracking_max_deg, "°"),
+        ("incisal point rms", errors.incisal_rms_mm, tracking_rms_mm, " mm", ""),
+        ("incisal point max", errors.incisal_max_mm, tracking_max_mm, " mm", AROUND),
+        ("platform rms", errors.rms_mm, tracking_rms_mm, " mm", ""),
+        ("platform max", errors.max_mm, tracking_max_mm, " mm", AROUND),
+        ("platform rms", errors.rms_deg, tracking_rms_deg, "°", ""),
+        ("platform max", errors.max_deg, tracking_max_deg, "°", AROUND),
     ];
     let mut found: Vec<_> = figures
         .into_iter()
-        .filter_map(|(what, value, limit, unit)| {
+        .filter_map(|(what, value, limit, unit, more)| {
             let value = value?;
-            Some((value, limit, format!("{what} {value:.4}{unit}, limit {limit}{unit}")))
+            Some((value, limit, more, format!("{what} {value:.4}{unit}, limit {limit}{unit}")))
         })
         .collect();
-    found.sort_by(|(a, of_a, _), (b, of_b, _)| (b / of_b).total_cmp(&(a / of_a)));
-    let exceeding = found.iter().filter(|(value, limit, _)| !is_within(*value, *limit));
+    found.sort_by(|(a, of_a, ..), (b, of_b, ..)| (b / of_b).total_cmp(&(a / of_a)));
+    let exceeding = found.iter().filter(|(value, limit, ..)| !is_within(*value, *limit));
     let exceeding: Vec<_> = exceeding.map(|(.., text)| text.as_str()).collect();
     match found.first() {
         _ if !exceeding.is_empty() => Check::judged(name, exceeding.join("; "), false),
-        Some((_, _, closest)) if samples >= FEWEST_SAMPLES => {
-            Check::judged(name, format!("{closest}; {samples} samples"), true)
+        Some((_, _, more, closest)) if samples >= FEWEST_SAMPLES => {
+            Check::judged(name, format!("{closest}; {samples} samples{more}"), true)
         }
         _ => {
             let samples = counted(samples, "sample");

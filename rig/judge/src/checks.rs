@@ -145,7 +145,7 @@ fn sequence(manifest: &Manifest, figures: &Figures) -> Check {
         figures.stopped_by.filter(|_| state.is_none_or(|state| state != ControllerState::SafeStop));
     let how = match stopped_by {
         Some(by) => format!(", though {by}"),
-        None if was_stopped => ", stopped by request before the motion's end".to_owned(),
+        None if was_stopped => ", stopped before the motion's end".to_owned(),
         None => String::new(),
     };
     let in_words = state.map_or_else(|| "none".to_owned(), |state| state.to_string());

@@ -121,9 +121,11 @@ fn a_recording_is_judged_by_the_axes_the_jaw_and_the_limits_of_its_scenario() {
     let row = |i: u32| format!("{0},0,{1},0,1,0,0,0\n", f64::from(i) / 50.0, -0.3 * f64::from(i));
     let rows: String = (0..=100).map(row).collect();
     let recording = write("jaw.csv", &format!("time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n{rows}"));
-    let file = "[motion]\nkind = 'file'\npath = 'other.csv'\naxes = ['+y', '-x', '+z']\n";
+    // No jaw moves so far without a turn.
+    let any_axes = "[motion]\nkind = 'file'\npath = 'other.csv'\nif_implausible = 'warn'\n";
+    let file = format!("{any_axes}axes = ['+y', '-x', '+z']\n");
     let forward = write("forward.toml", &format!("{file}[jaw]\nclosed_offset_m = [0.012, 0.0, 0.0]"));
-    let own_axes = write("own-axes.toml", "[jaw]\nclosed_offset_m = [0.012, 0.0, 0.0]");
+    let own_axes = write("own-axes.toml", &format!("{any_axes}[jaw]\nclosed_offset_m = [0.012, 0.0, 0.0]"));
     let slow = write("slow.toml", &format!("{file}[limits]\nslide_velocity_m_s = 0.001"));
     let builders = write("builder.toml", "[mechanism]\nplatform_sides_m = [0.06, 0.06, 0.06]");
 

@@ -41,7 +41,7 @@ mod motion_checks {
         let check = tracking("tracking", 10, &good, &limits);
         assert_eq!(
             (check.result.mark(), check.finding.as_str()),
-            ("ok", "incisal point max 0.1000 mm, limit 0.5 mm; 10 samples")
+            ("ok", "incisal point max 0.1000 mm, limit 0.5 mm; 10 samples, approach and hold included")
         );
         let rms_is_closest = PoseErrors { rms_mm: Some(0.05), incisal_max_mm: Some(0.2), ..good };
         let check = tracking("tracking", 10, &rms_is_closest, &limits);

@@ -66,6 +66,18 @@ pub(crate) fn mark(result: CheckResult) -> masseter_page::Cell {
     masseter_page::Cell::Mark { mark: result.mark().to_owned(), tone }
 }
 
+/// How far the recording of a run goes that did not come to its end.
+fn played_until(figures: &Figures) -> String {
+    let over_time = &figures.over_time;
+    let began_s = over_time.motion_began_ns.map(|began_ns| since_s(figures, began_ns));
+    began_s.map_or_else(
+        || "; the motion had not begun".to_owned(),
+        |began_s| {
+            format!("; the recording ends {:.3} s after the motion began", over_time.duration_s - began_s)
+        },
+    )
+}
+
 fn panel(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> masseter_page::Verdict {
     let timing = verdict.timing.to_string();
     let (word, more) = timing.split_once(" (").unwrap_or((&timing, ""));
@@ -80,9 +92,13 @@ fn panel(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> masseter_
         }
         (false, _) => String::new(),
     };
+    let ended = match verdict.exit_code {
+        Exit::Died | Exit::Interrupted => played_until(figures),
+        _ => String::new(),
+    };
     masseter_page::Verdict {
         word: verdict.word.to_owned(),
-        reason: verdict.reason.clone() + &cause,
+        reason: verdict.reason.clone() + &cause + &ended,
         tone: match verdict.exit_code {
             Exit::Passed => Tone::Good,
             Exit::Invalid | Exit::Interrupted => Tone::Doubtful,

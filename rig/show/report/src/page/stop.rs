@@ -67,16 +67,16 @@ fn moments_of_stop(figures: &Figures) -> Vec<Moment> {
     moments
 }
 
-/// When the last axis came to where it stands; none where one moves until the end.
+/// When the last axis came to where it stands; none where one moves until its last position, or has none after the stop.
 fn standstill_s(figures: &Figures, reacted_s: f64) -> Option<f64> {
-    let last_move_s = |curve: &Curve| {
-        let (_, end_m) = *curve.last()?;
-        let (at_s, _) = curve.iter().rev().find(|(_, position_m)| (position_m - end_m).abs() > STANDS_M)?;
-        Some(*at_s)
+    let stands_s = |curve: &Curve| {
+        let (end_s, end_m) = *curve.last()?;
+        let moves = curve.iter().rev().find(|(_, position_m)| (position_m - end_m).abs() > STANDS_M);
+        let at_s = moves.map_or(reacted_s, |(at_s, _)| at_s.max(reacted_s));
+        (end_s - at_s > LEAST_STANDSTILL_S).then_some(at_s)
     };
-    let last_s = figures.over_time.position_m.iter().filter_map(last_move_s).reduce(f64::max)?;
-    let at_s = last_s.max(reacted_s);
-    (figures.over_time.duration_s - at_s > LEAST_STANDSTILL_S).then_some(at_s)
+    let axes = figures.over_time.position_m.iter().map(stands_s).collect::<Option<Vec<_>>>()?;
+    axes.into_iter().reduce(f64::max)
 }
 
 /// The chain with the times and ways between its links; nothing without a link.
