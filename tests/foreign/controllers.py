@@ -6,6 +6,7 @@
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -42,7 +43,7 @@ def make(masseter: str, language: str, folder: Path, target: Path) -> str:
         # Target and profile are the library's in C, so that both use the same built dependencies.
         profile = folder / "profile.toml"
         profile.write_text(release_profile())
-        shell(f"{command} --target-dir {target} --config {profile}", project)
+        shell(f"{command} --target-dir {target} --config {shlex.quote(str(profile))}", project)
         return str(target / "release" / "my_controller")
     if language == "python":
         shell(command, project)

@@ -125,6 +125,9 @@ impl Check {
     }
 }
 
+/// Unlike the mean, the largest error is also that of the moves around the motion.
+const AROUND: &str = ", approach and hold included";
+
 /// Fewer samples of a motion show nothing.
 const FEWEST_SAMPLES: u64 = 10;
 
@@ -152,8 +155,6 @@ pub(crate) fn tracking(
     limits: &ChecksConfig,
 ) -> Check {
     let ChecksConfig { tracking_rms_mm, tracking_max_mm, tracking_rms_deg, tracking_max_deg, .. } = *limits;
-    // Unlike the mean, the largest error is also that of the moves around the motion.
-    const AROUND: &str = ", approach and hold included";
     let figures = [
         ("incisal point rms", errors.incisal_rms_mm, tracking_rms_mm, " mm", ""),
         ("incisal point max", errors.incisal_max_mm, tracking_max_mm, " mm", AROUND),
