@@ -39,7 +39,7 @@ fn reaction_of_run(exit: Option<i32>) -> &'static str {
     }
 }
 
-/// Plays a step, and judges its log; returns the word for it, and what it says.
+/// Plays a step, and judges its log; returns the word for the log, and its text.
 fn reaction_to(robot: &Workspace, step: &str, arguments: &[&str]) -> (&'static str, String) {
     let before = folders(robot);
     let (exit, text) = play(robot, step, arguments);

@@ -104,7 +104,7 @@ pub(super) enum Meaning {
     /// A coordinate without another word.
     Bare(usize),
     Quaternion(usize),
-    /// One of q1 to q4, which do not say where the scalar is.
+    /// One of q1 to q4, whose names leave the place of the scalar open.
     Numbered(usize),
     Turn(usize),
     Matrix([usize; 2]),
@@ -314,7 +314,7 @@ struct Reader<'a> {
     assumed: Units,
     used: Vec<usize>,
     protocol: Vec<String>,
-    /// What neither the file nor a key says, each with its key.
+    /// What is in neither the file nor a key, each with its key.
     asked: Vec<String>,
 }
 

@@ -1,6 +1,6 @@
 //! Import of a recorded motion of the lower jaw: from a tracker's file to a [`Recording`] in the jaw frame.
 //!
-//! The import takes a whole file, or refuses the file with line, reason and remedy. What the file does not say is asked
+//! The import takes a whole file, or refuses the file with line, reason and remedy. What is not in the file is asked
 //! for by a key of `[motion]`, and what was read is listed in a protocol. Whether the motion is a jaw's is not judged
 //! here. Formats of bytes (C3D) are not part of the import.
 

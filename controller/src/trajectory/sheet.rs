@@ -229,7 +229,7 @@ fn names(header: &[String], above: &[String]) -> Vec<Column> {
     columns.into_iter().enumerate().map(column).collect()
 }
 
-/// What the head of a format says: the units, a line of the protocol, and the line after the head, from 0.
+/// Content of a format's head: the units, a line of the protocol, and the line after the head, from 0.
 fn vendor(text: &str) -> (Units, Option<String>, usize) {
     let lines: Vec<&str> = text.lines().take(HEAD_LINES).collect();
     let time = Some(TimeUnit::S);

@@ -99,7 +99,7 @@ pub(super) struct BusMonitor {
     /// Whether the master's controller is in bus-off.
     pub(super) is_off: bool,
     /// Whether frames wait that are older than two cycles: new ones behind them would go out in a burst. Frames of the last
-    /// cycle may wait, since an adapter on USB takes a while to tell what it has sent.
+    /// cycle may wait, since an adapter on USB reports its sent frames late.
     pub(super) is_stuck: bool,
     /// Frames handed over since the last SYNC, that one included, and in the cycle before.
     handed_over: [u32; 2],

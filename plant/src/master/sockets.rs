@@ -25,10 +25,10 @@ use crate::error::PlantError;
 /// Longest wait for a real frame, ns. A fault may hold frames back that are due before the next arrival.
 const LONGEST_BLOCK_NS: u64 = 100_000;
 
-/// Judges the interfaces of a scenario. One that does not exist is left out: its opening says so.
+/// Judges the interfaces of a scenario. One that does not exist is left out: its opening fails with the reason.
 ///
 /// # Errors
-/// [`PlantError::Unfit`] for an interface of which the kernel does not tell the settings.
+/// [`PlantError::Unfit`] for an interface whose settings cannot be read.
 pub fn judge_interfaces(can: &CanConfig) -> Result<Vec<JudgedInterface>, PlantError> {
     let judged = |(name, drives): (&String, &Vec<usize>)| {
         // SYNC, SDO and heartbeat; for each drive process data, or NMT at its start.

@@ -68,7 +68,7 @@ pub struct EventRecord {
     /// State before and after.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub transition: Option<[String; 2]>,
-    /// The defect, its place and the remedy, where figures alone do not say it.
+    /// The defect, its place and the remedy, where figures alone do not show it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub text: Option<String>,
     /// The value that explains it; NaN without one.

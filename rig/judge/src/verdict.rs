@@ -275,7 +275,7 @@ fn excuse(ending: &Ending, timing: &Timing, outage: Option<Outage>) -> Option<St
     })
 }
 
-/// A failure with the missing part of the motion, which the names of checks do not say.
+/// A failure with the missing part of the motion, which the names of checks do not show.
 fn with_shortfall((outcome, reason): OutcomeReason, manifest: &Manifest, figures: &Figures) -> OutcomeReason {
     let short = Shortfall::of(manifest, figures).map(|short| format!("; {short}"));
     (outcome, reason + &short.unwrap_or_default())

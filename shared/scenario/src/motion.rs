@@ -241,7 +241,7 @@ impl FileConfig {
     /// Size of the largest file, bytes: more than an hour of three markers at 200 Hz.
     pub const MOST_BYTES: u64 = 256 << 20;
 
-    /// A file read as its header says, with the default axes, reference point and low-pass.
+    /// A file read by its header, with the default axes, reference point and low-pass.
     pub fn new(path: impl Into<PathBuf>) -> Self {
         Self {
             path: path.into(),

@@ -305,7 +305,7 @@ fn headers() -> Vec<Case> {
     ]
 }
 
-/// Headers that do not say everything.
+/// Headers with something left open.
 fn short_headers() -> Vec<Case> {
     vec![
         ("no units", with("t,x,y,z,qw,qx,qy,qz", same), no_keys, Refused("motion.time_unit = \"s\"")),

@@ -134,7 +134,7 @@ fn event_columns() -> impl Iterator<Item = Column> {
         ("axis_name", "Axis concerned; empty when none is."),
         ("state_before", "State before, of a transition."),
         ("state_after", "State after it."),
-        ("text", "What is wrong, where, and what to do, where figures alone do not say it."),
+        ("text", "What is wrong, where, and what to do, where figures alone do not show it."),
     ];
     words.into_iter().map(|(name, about)| Column::new(name, "", about, Values::Words(Vec::new())))
 }

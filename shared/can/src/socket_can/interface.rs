@@ -123,7 +123,7 @@ pub(super) fn usable_transmit_capacity(interface: &str) -> Result<usize, OpenErr
     }
 }
 
-/// What an error of the system on an interface in use says, and what to do.
+/// What an error of the system on an interface in use in words, and what to do.
 pub fn explain_errno(interface: &str, errno: i32) -> String {
     let remedy = match errno {
         libc::ENODEV | libc::ENXIO => {

@@ -43,7 +43,7 @@ pub(super) fn motion_section(scenario: &Scenario, figures: &Figures) -> Section 
     let distance = error("Incisal point from desired", "µm", &over_time.distance_m, 1e6);
     let mut angle = error("Platform from desired, angle", "°", &over_time.angle_rad, 1f64.to_degrees());
     "angle".clone_into(&mut angle.series[0].name);
-    // What nobody knows before the run comes first.
+    // Errors come first: only the run shows them.
     let mut blocks = vec![
         Block::text("motion-in-words", motion_in_words(figures)),
         Block::chart("error", distance),
@@ -55,7 +55,7 @@ pub(super) fn motion_section(scenario: &Scenario, figures: &Figures) -> Section 
             let chart = displacement(figures, axis, closed_m[axis]);
             Block::chart(format!("motion-{}", DIRECTIONS[axis][0]), chart)
         };
-        // The jaw opens downwards, so z says most.
+        // The jaw opens downwards, so z shows most.
         blocks.extend([along(2), along(0).half(), along(1).half()]);
     }
     if figures.bite_force_max_n.is_some() {

@@ -302,7 +302,7 @@ fn now(manifest: &Manifest, figures: &Figures, number: u64, left_out: u64) -> Li
     let state = figures.final_state.map_or_else(|| "starting".to_owned(), |state: Code<_>| state.to_string());
     let tone = match figures.final_state {
         Some(Code::Known(ControllerState::SafeStop)) => Tone::Bad,
-        // Whether an end is good, says the verdict.
+        // The verdict judges whether an end is good.
         Some(Code::Known(ControllerState::Running)) => Tone::Good,
         _ => Tone::Plain,
     };

@@ -46,7 +46,7 @@ impl Recorded {
     }
 }
 
-/// What tells recordings apart: the key that names the person, and the one that differs within a person.
+/// What distinguishes recordings: the key that names the person, and the one that differs within a person.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct By {
     /// Key of a scenario, or `patient`.
@@ -72,7 +72,7 @@ impl By {
 pub struct Study {
     /// In the order of the command line.
     pub recordings: Vec<Recorded>,
-    /// What tells them apart.
+    /// What distinguishes the recordings.
     pub by: By,
 }
 
