@@ -128,9 +128,9 @@ fn a_program_that_leaves_is_named_though_the_plant_has_ended_too() {
     let name = unique("leaves");
     let rig = waiting(&workspace, &name);
     let session = Session::start(attach::attach(Some(&name)).unwrap(), Declared::default()).unwrap();
+    let plant = common::child_of(&rig, "plant").as_raw_nonzero().get();
     kill_process(Pid::from_child(&rig), Signal::STOP).unwrap();
     session.fail("no more ideas").unwrap();
-    let plant = common::child_of(&rig, "plant").as_raw_nonzero().get();
     wait_until("the plant has ended", || is_dead(plant));
     kill_process(Pid::from_child(&rig), Signal::CONT).unwrap();
     let output = rig.wait_with_output().unwrap();
