@@ -8,8 +8,9 @@ use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_scenario::CanConfig;
 use serde::{Deserialize, Serialize};
 
-use super::errors::{LineError, OtherMaster, Restarted, SdoReason, object_name, value_text};
 use super::line::{BootUps, Line};
+use super::line_error::{LineError, OtherMaster, Restarted};
+use super::object_words::{SdoReason, object_name, value_text};
 use super::settings::Survey;
 use crate::master::wanted::WantedDrive;
 

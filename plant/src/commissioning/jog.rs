@@ -7,8 +7,8 @@ use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_scenario::Scenario;
 use serde::Serialize;
 
-use super::errors::{AxisError, MotionError};
 use super::line::Line;
+use super::motion_error::{AxisError, MotionError};
 use super::mover::{Caution, Mover, Operator, POSITIONING};
 use super::steps::{SyncAnswers, sync_answers};
 use super::watch::Sample;

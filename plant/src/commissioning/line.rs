@@ -16,7 +16,8 @@ use masseter_runtime::clock::MILLISECOND_NS;
 use masseter_scenario::{MASTER_NODE, ObjectKey, Scenario};
 use serde::{Deserialize, Serialize};
 
-use super::errors::{LineError, MasterSign, Restarted, SdoReason};
+use super::line_error::{LineError, MasterSign, Restarted};
+use super::object_words::SdoReason;
 use super::traffic::{Heard, Strangers, Traffic};
 use crate::error::PlantError;
 use crate::master::link::Address;

@@ -7,8 +7,10 @@ use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_scenario::{Scenario, StoreConfig};
 use serde::Serialize;
 
-use super::errors::{LineError, MotionError, SdoReason};
 use super::line::Line;
+use super::line_error::LineError;
+use super::motion_error::MotionError;
+use super::object_words::SdoReason;
 use super::watch::{read_position, read_state};
 
 /// Time of the watch over an axis, ns.
@@ -97,7 +99,7 @@ pub struct Stand {
 /// Reads all axes twice. Nothing is written.
 ///
 /// # Errors
-/// [`MotionError::Line`] and [`AxisError::Statusword`](super::errors::AxisError::Statusword).
+/// [`MotionError::Line`] and [`AxisError::Statusword`](super::motion_error::AxisError::Statusword).
 pub fn stand(line: &mut Line, scenario: &Scenario, between_ns: u64) -> Result<Stand, MotionError> {
     let mut stand = Stand {
         positions_m: [0.0; AXES],

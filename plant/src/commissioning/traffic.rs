@@ -12,7 +12,7 @@ use masseter_model::geometry::AXES;
 use masseter_runtime::clock::{self, MILLISECOND_NS};
 use masseter_scenario::{MASTER_NODE, Scenario};
 
-use super::errors::{LineError, MasterSign, OtherMaster};
+use super::line_error::{LineError, MasterSign, OtherMaster};
 use crate::error::PlantError;
 use crate::master::link::{Address, Buses, Link, addresses, sender};
 use crate::master::sockets::SocketLink;

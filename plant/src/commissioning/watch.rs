@@ -8,8 +8,9 @@ use masseter_model::geometry::AXES;
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_scenario::{AxisScale, BrakeConfig};
 
-use super::errors::{AxisError, LineError, MotionError, StopCause, Unproved};
 use super::line::{BootUps, Line};
+use super::line_error::LineError;
+use super::motion_error::{AxisError, MotionError, StopCause, Unproved};
 
 /// Digital inputs (60FDh): limit switches.
 const INPUTS: ObjectAddress = ObjectAddress::new(0x60FD, 0);
