@@ -43,13 +43,15 @@ use_python() {
     )
 }
 
-# The README's test command, of every package. The compiler is clippy, which compiles as rustc does: its lints and the tests share
+# The README's test command, of every package or of those that -p names. The compiler is clippy, which compiles as rustc does: its lints and the tests share
 # one build. The programs of fuzz_targets/ need a foreign library, and scripts/nightly alone compiles them.
 cargo_test() {
+    local packages=(--workspace)
+    [[ " $* " != *" -p "* ]] || packages=()
     mkdir -p "$tools/documentation"
     RUSTC_WORKSPACE_WRAPPER=clippy-driver CLIPPY_ARGS=-D__CLIPPY_HACKERY__warnings \
         RUSTDOC=$PWD/.ci/rustdoc CI_DOCUMENTATION=$tools/documentation \
-        cargo test --locked --workspace "$@"
+        cargo test --locked "${packages[@]}" "$@"
 }
 
 # Sets $browser to Chromium.
