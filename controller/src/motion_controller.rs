@@ -144,14 +144,44 @@ impl MotionController {
         }
     }
 
+    /// A copy with the whole state, for an independent continuation.
+    ///
+    /// # Errors
+    /// [`NoBranch`] for a pose law without copies.
+    pub fn copy(&self) -> Result<Self, NoBranch> {
+        Ok(Self {
+            sequencer: self.sequencer.clone(),
+            start: self.start.clone(),
+            progress: self.progress.clone(),
+            law: self.law.branch()?,
+            of_law: self.of_law.clone(),
+            forces: self.forces.clone(),
+            supervision: self.supervision.clone(),
+            targets: self.targets.clone(),
+            desired: self.desired,
+        })
+    }
+
+    /// The demand of the cycle whose reading was observed and which is not decided yet.
+    pub fn coming_demand(&self) -> Demand {
+        let cycle = self.sequencer.cycle + 1;
+        let mut progress = self.progress.clone();
+        progress.advance(&self.sequencer, cycle);
+        let desired = progress.playback.pose_ahead(-self.sequencer.sample_age_in(cycle));
+        self.demand_in(cycle, &progress.playback, desired)
+    }
+
     fn demand(&self, desired: Pose) -> Demand {
-        let Sequencer { cycle, period_s, state, config, .. } = &self.sequencer;
-        let playback = &self.progress.playback;
+        self.demand_in(self.sequencer.cycle, &self.progress.playback, desired)
+    }
+
+    fn demand_in(&self, cycle: u64, playback: &Playback, desired: Pose) -> Demand {
+        let Sequencer { period_s, state, config, .. } = &self.sequencer;
         Demand {
-            cycle: *cycle,
+            cycle,
             period_s: *period_s,
             state: *state,
-            motion_time_s: playback.motion_time_ahead_s(-self.sequencer.sample_age_s()),
+            motion_time_s: playback.motion_time_ahead_s(-self.sequencer.sample_age_in(cycle)),
             desired,
             estimated: self.sequencer.fresh_estimate().map(|estimate| estimate.solution.pose),
             ahead: playback.pose_ahead(config.lead_cycles * period_s),
@@ -250,17 +280,7 @@ impl Controller for MotionController {
     }
 
     fn branch(&self) -> Result<Box<dyn Controller>, NoBranch> {
-        Ok(Box::new(Self {
-            sequencer: self.sequencer.clone(),
-            start: self.start.clone(),
-            progress: self.progress.clone(),
-            law: self.law.branch()?,
-            of_law: self.of_law.clone(),
-            forces: self.forces.clone(),
-            supervision: self.supervision.clone(),
-            targets: self.targets.clone(),
-            desired: self.desired,
-        }))
+        Ok(Box::new(self.copy()?))
     }
 }
 

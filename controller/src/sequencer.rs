@@ -165,8 +165,13 @@ impl Sequencer {
 
     /// Age of the estimate's sample beyond that of a reading in time, s. The motion waits for readings that are later.
     pub(crate) fn sample_age_s(&self) -> f64 {
-        let reading_cycle = self.estimate.map_or(self.cycle, |estimate| estimate.reading_cycle);
-        self.cycle.saturating_sub(reading_cycle).min(LATE_READING_CYCLES) as f64 * self.period_s
+        self.sample_age_in(self.cycle)
+    }
+
+    /// The same in a given cycle.
+    pub(crate) fn sample_age_in(&self, cycle: u64) -> f64 {
+        let reading_cycle = self.estimate.map_or(cycle, |estimate| estimate.reading_cycle);
+        cycle.saturating_sub(reading_cycle).min(LATE_READING_CYCLES) as f64 * self.period_s
     }
 
     pub(crate) fn is_moving(&self) -> bool {

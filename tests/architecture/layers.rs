@@ -20,7 +20,16 @@ const MAY_USE: [(&str, &[&str]); 27] = [
     ("rig/bindings/c", &["shared/model", "shared/runtime", "controller"]),
     (
         "rig/bindings/python",
-        &["shared/model", "shared/scenario", "shared/runtime", "controller", "rig/record/recording"],
+        &[
+            "shared/model",
+            "shared/scenario",
+            "shared/runtime",
+            "controller",
+            "rig/run/plan",
+            "rig/record/recording",
+            "rig/judge",
+            "rig/run/virtual_time",
+        ],
     ),
     ("plant", &["shared/can", "shared/model", "shared/scenario", "shared/runtime"]),
     ("rig/show/terminal", &[]),

@@ -31,6 +31,7 @@ mod statistic;
 mod timing;
 mod tracking;
 mod verdict;
+mod watch;
 
 pub use analysis::Analysis;
 pub use check::{Check, CheckFigures, CheckResult};
@@ -59,3 +60,4 @@ pub use statistic::Statistic;
 pub use timing::{Timing, TimingWord};
 pub use tracking::{PoseErrors, PoseSource, Track, TrackingFigures, TrackingSample, UndisturbedFigures};
 pub use verdict::{Judgement, Verdict};
+pub use watch::{UnknownRequirement, Watch};

@@ -72,6 +72,27 @@ pub(crate) struct Demand {
     signals: Py<PyDict>,
 }
 
+impl Demand {
+    pub(crate) fn new(
+        py: Python<'_>,
+        demand: &RigDemand,
+        parameters: Bound<'_, PyDict>,
+        signals: Py<PyDict>,
+    ) -> Self {
+        Self {
+            cycle: demand.cycle,
+            period_s: demand.period_s,
+            motion_time_s: demand.motion_time_s,
+            controller_state: demand.state.code(),
+            desired: (&demand.desired).into(),
+            estimated: demand.estimated.as_ref().map(Pose::from),
+            ahead: (&demand.ahead).into(),
+            parameters: PyMappingProxy::new(py, parameters.as_mapping()).unbind(),
+            signals,
+        }
+    }
+}
+
 /// A function of Python, and what it gets and fills.
 struct PythonLaw {
     function: Py<PyAny>,
@@ -87,17 +108,7 @@ impl PythonLaw {
             for (parameter, value) in self.declared.parameters.iter().zip(parameters) {
                 values.set_item(&parameter.name, value)?;
             }
-            let demand = Demand {
-                cycle: demand.cycle,
-                period_s: demand.period_s,
-                motion_time_s: demand.motion_time_s,
-                controller_state: demand.state.code(),
-                desired: (&demand.desired).into(),
-                estimated: demand.estimated.as_ref().map(Pose::from),
-                ahead: (&demand.ahead).into(),
-                parameters: PyMappingProxy::new(py, values.as_mapping()).unbind(),
-                signals: self.signals.clone_ref(py),
-            };
+            let demand = Demand::new(py, demand, values, self.signals.clone_ref(py));
             let pose = self.function.call1(py, (demand,))?;
             let pose: Pose = pose.extract(py).map_err(|_| failed("the law returned no masseter.Pose"))?;
             let signals = self.signals.bind(py);

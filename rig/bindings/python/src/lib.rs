@@ -3,8 +3,12 @@
 //! Arrays cross the border as bytes of 64-bit floats, so that this crate needs no array library.
 #![allow(clippy::needless_pass_by_value, reason = "Python passes values")]
 
+mod agent;
+mod env;
+mod episode;
 mod law;
 mod session;
+mod vector;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -46,6 +50,9 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<law::Demand>()?;
     module.add_class::<law::Pose>()?;
     module.add_class::<session::Session>()?;
+    module.add_class::<env::Env>()?;
+    module.add_class::<env::Snapshot>()?;
+    module.add_class::<vector::VectorEnv>()?;
     module.add_function(wrap_pyfunction!(law::check_declaration, module)?)?;
     module.add_function(wrap_pyfunction!(law::control, module)?)?;
     module.add_function(wrap_pyfunction!(read_run, module)?)?;
@@ -111,6 +118,11 @@ where
         rows.map(|(row, numbers)| solve(numbers).map_err(|error| format!("row {row}: {error}"))).collect()
     });
     Ok(PyBytes::new(py, cast_slice(&solved.map_err(failed)?)))
+}
+
+/// The numbers of bytes from Python.
+fn floats(bytes: &[u8]) -> Vec<f64> {
+    bytes.chunks_exact(size_of::<f64>()).map(pod_read_unaligned).collect()
 }
 
 /// The folder of a run; the messages of each topic that controllers use, in order, as the bytes of their structures; and

@@ -18,6 +18,7 @@ use std::collections::BTreeSet;
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::named::Declared;
 use masseter_scenario::input::excerpt;
+use masseter_scenario::wording::nearest;
 use masseter_scenario::{Dimension, RequirementConfig, Scenario, Statistic};
 
 use self::bounds::Bounds;
@@ -103,6 +104,26 @@ impl Requirements {
     /// Whether the list is empty: then nothing has to be taken.
     pub(crate) fn is_empty(&self) -> bool {
         self.list.is_empty()
+    }
+
+    /// The place of the requirement of that name; otherwise the most similar name.
+    pub(crate) fn place_of(&self, name: &str) -> Result<usize, Option<&str>> {
+        let names = || self.list.iter().map(|requirement| requirement.name.as_str());
+        names().position(|known| known == name).ok_or_else(|| nearest(name, names()))
+    }
+
+    /// The margin of a requirement so far, in the unit in which it is shown; none before it shows.
+    pub(crate) fn margin_so_far(&mut self, place: usize) -> Option<f64> {
+        let finding = match &mut self.list[place].kind {
+            Kind::Bounds(bounds) => bounds.finding(),
+            // The windows that are open end here, but only in a copy.
+            Kind::Response(response) => response.clone().into_finding(),
+            Kind::Never(never) => never.finding(),
+            Kind::Count(count) => count.finding(),
+            Kind::Order(order) => order.finding(),
+            Kind::Unknown(_) => return None,
+        };
+        finding.margin.map(|margin| margin / finding.unit.si)
     }
 
     /// What every requirement comes to.

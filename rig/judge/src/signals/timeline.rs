@@ -106,6 +106,8 @@ pub enum Pace {
     Live,
     /// In the order of time.
     InOrder,
+    /// In the order of time, each cycle before the next: a cycle is handed out with the first message of the next one.
+    Stepped,
 }
 
 impl Timeline {
@@ -135,6 +137,7 @@ impl Timeline {
             Pace::Recorded => KEPT,
             Pace::Live => KEPT_WHILE_RUNNING,
             Pace::InOrder => KEPT_IN_ORDER,
+            Pace::Stepped => 1,
         };
         if self.cycles.len() > kept { self.hand_out() } else { None }
     }

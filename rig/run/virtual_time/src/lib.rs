@@ -20,7 +20,7 @@ use masseter_scenario::Scenario;
 use masseter_terminal::status;
 
 use log::Stream;
-use run::Control;
+use run::{Control, built};
 
 pub use log::{Log, LoggedPorts, Sink};
 pub use rig::{Rig, RigError};
@@ -39,7 +39,7 @@ pub fn record(
     manifest: &mut Manifest,
     interrupts: &dyn Requests,
 ) -> anyhow::Result<()> {
-    let control = Control::new(plan, build, &mut manifest.declared)?;
+    let control = Control::new(plan, built(plan, build), &mut manifest.declared)?;
     let scene = Scene::new(&plan.mechanism, &plan.scenario.jaw);
     let mut recorder = Recorder::of_run(folder, scene)?;
     recorder.declare(&manifest.declared)?;
@@ -65,7 +65,7 @@ pub fn analyse(
     manifest: &mut Manifest,
     interrupts: &dyn Requests,
 ) -> anyhow::Result<Figures> {
-    let control = Control::new(plan, build, &mut manifest.declared)?;
+    let control = Control::new(plan, built(plan, build), &mut manifest.declared)?;
     let stream = Stream::new(start(&plan.scenario, &manifest.declared));
     let (stream, ending) = Run::of_control(plan, control, stream)?.play(interrupts);
     manifest.ending = ending;

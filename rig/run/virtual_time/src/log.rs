@@ -7,7 +7,7 @@ use std::cell::Cell;
 use std::convert::Infallible;
 
 use masseter_judge::signals::CycleMessages;
-use masseter_judge::{Analysis, Figures};
+use masseter_judge::{Analysis, Figures, Watch};
 use masseter_plant::core::PlantCore;
 use masseter_plant::state::{Archive, State};
 use masseter_recording::{Backlog, Recorded};
@@ -66,6 +66,16 @@ impl Sink for Stream {
 
     fn has_failed(&self) -> bool {
         self.error.is_some()
+    }
+}
+
+impl Sink for Watch {
+    fn take(&mut self, message: &Recorded, _: u64) {
+        self.take(message);
+    }
+
+    fn has_failed(&self) -> bool {
+        false
     }
 }
 

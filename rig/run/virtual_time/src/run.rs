@@ -9,7 +9,7 @@ use masseter_controller::process::BuildController;
 use masseter_plan::RunPlan;
 use masseter_plant::PlantError;
 use masseter_recording::Ending;
-use masseter_runtime::control::{Controller, Duties, NoBranch, Outcome, set_parameters};
+use masseter_runtime::control::{Controller, Duties, NoBranch, Observed, Outcome, set_parameters};
 use masseter_runtime::injection::Operator;
 use masseter_runtime::lifecycle::Party;
 use masseter_runtime::lockstep::EPOCH_NS;
@@ -53,10 +53,9 @@ impl Control {
     /// The controller of a run that has not begun. Tells what it declares.
     pub(crate) fn new(
         plan: &RunPlan,
-        build: BuildController,
+        mut controller: Box<dyn Controller>,
         declared: &mut Declared,
     ) -> anyhow::Result<Self> {
-        let mut controller = build(&plan.scenario, plan.mechanism.clone(), plan.trajectory.clone());
         let named = NamedValues::new(controller.declared(), &plan.scenario.parameters)?;
         set_parameters(&mut *controller, &named);
         *declared = named.settings().declared().clone();
@@ -67,6 +66,11 @@ impl Control {
     fn branch(&self) -> Result<Self, NoBranch> {
         Ok(Self { controller: self.controller.branch()?, duties: self.duties.clone() })
     }
+}
+
+/// The controller of a plan, by its builder.
+pub(crate) fn built(plan: &RunPlan, build: BuildController) -> Box<dyn Controller> {
+    build(&plan.scenario, plan.mechanism.clone(), plan.trajectory.clone())
 }
 
 /// A rig and its controller, cycle by cycle. The messages go to a [`Sink`].
@@ -110,6 +114,8 @@ pub struct Run<S> {
     scenario: Arc<Scenario>,
     stepper: Stepper<S>,
     control: Control,
+    /// What the controller has to decide in a cycle that has begun.
+    observed: Option<Observed>,
 }
 
 /// The state of a run at an instant: that of the rig, and that of the controller with its parameters and its operator.
@@ -118,6 +124,7 @@ pub struct RunSnapshot {
     scenario: Arc<Scenario>,
     stepper: StepperState,
     control: Control,
+    observed: Option<Observed>,
 }
 
 /// Why a run cannot go to a snapshot.
@@ -137,21 +144,55 @@ impl<S: Sink> Run<S> {
     /// # Errors
     /// When the scenario does not fit the plant, or what the controller declares.
     pub fn new(plan: &RunPlan, build: BuildController, sink: S) -> anyhow::Result<Self> {
-        Self::of_control(plan, Control::new(plan, build, &mut Declared::default())?, sink)
+        Self::with_controller(plan, built(plan, build), sink)
+    }
+
+    /// A run of the plan with this controller.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_controller(plan: &RunPlan, controller: Box<dyn Controller>, sink: S) -> anyhow::Result<Self> {
+        Self::of_control(plan, Control::new(plan, controller, &mut Declared::default())?, sink)
     }
 
     pub(crate) fn of_control(plan: &RunPlan, control: Control, sink: S) -> anyhow::Result<Self> {
         let stepper = Stepper::new(&plan.scenario, plan.schedule, sink)?;
-        Ok(Self { scenario: Arc::new(plan.scenario.clone()), stepper, control })
+        Ok(Self { scenario: Arc::new(plan.scenario.clone()), stepper, control, observed: None })
     }
 
-    /// Plays one cycle.
+    /// Begins the next cycle, unless one has begun: the controller observes its reading, and decides nothing yet.
+    ///
+    /// # Errors
+    /// When the plant fails.
+    pub fn begin_cycle(&mut self) -> Result<(), PlantError> {
+        if self.observed.is_none() {
+            let Control { controller, duties } = &mut self.control;
+            self.observed = Some(self.stepper.begin_observed(&mut **controller, duties)?);
+        }
+        Ok(())
+    }
+
+    /// Plays one cycle, or the rest of one that has [begun](Self::begin_cycle).
     ///
     /// # Errors
     /// When the plant fails.
     pub fn play_cycle(&mut self) -> Result<(), PlantError> {
-        let Control { controller, duties } = &mut self.control;
-        self.stepper.play_cycle(&mut **controller, duties)
+        let Self { stepper, control: Control { controller, duties }, observed, .. } = self;
+        let observed = match observed.take() {
+            Some(observed) => observed,
+            None => stepper.begin_observed(&mut **controller, duties)?,
+        };
+        stepper.end_decided(&mut **controller, duties, observed)
+    }
+
+    /// Where the messages went.
+    pub fn sink(&self) -> &S {
+        self.stepper.sink()
+    }
+
+    /// The same, to be changed, as after [`Self::restore`].
+    pub fn sink_mut(&mut self) -> &mut S {
+        self.stepper.sink_mut()
     }
 
     /// Plays the run to its end; returns the sink and the ending. The ending counts only if the sink took every
@@ -186,7 +227,7 @@ impl<S: Sink> Run<S> {
     /// Where the controller or its pose law is not the rig's, and has no `branch`.
     pub fn snapshot(&self) -> Result<RunSnapshot, NoBranch> {
         let (scenario, stepper) = (self.scenario.clone(), self.stepper.state());
-        Ok(RunSnapshot { scenario, stepper, control: self.control.branch()? })
+        Ok(RunSnapshot { scenario, stepper, control: self.control.branch()?, observed: self.observed })
     }
 
     /// Goes back, or on, to a snapshot. The cycles that follow are those that followed it. The sink keeps what it took.
@@ -196,6 +237,7 @@ impl<S: Sink> Run<S> {
     pub fn restore(&mut self, snapshot: &RunSnapshot) -> Result<(), RestoreError> {
         OtherScenario::refuse(&self.scenario, &snapshot.scenario)?;
         self.control = snapshot.control.branch()?;
+        self.observed = snapshot.observed;
         self.stepper.set_state(&snapshot.stepper);
         Ok(())
     }

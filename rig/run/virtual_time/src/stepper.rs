@@ -5,7 +5,7 @@ use masseter_plant::core::PlantCore;
 use masseter_plant::cycle::{PlantPorts, begin_cycle, end_cycle, run_after_controller};
 use masseter_plant::emulation::VirtualLink;
 use masseter_plant::state::{Archive, State};
-use masseter_runtime::control::{Controller, Duties};
+use masseter_runtime::control::{self, Controller, Duties, Observed};
 use masseter_runtime::lockstep::EPOCH_NS;
 use masseter_runtime::messages::{Command, Contact, Reading, Truth};
 use masseter_runtime::realtime::Wake;
@@ -60,19 +60,38 @@ impl<S: Sink> Stepper<S> {
         Ok(())
     }
 
-    /// One cycle whose command a controller gives.
-    pub(crate) fn play_cycle(
+    /// Begins a cycle, whose reading a controller takes.
+    #[inline]
+    pub(crate) fn begin_observed(
         &mut self,
         controller: &mut dyn Controller,
         duties: &mut Duties,
-    ) -> Result<(), PlantError> {
+    ) -> Result<Observed, PlantError> {
         self.begin_next_cycle()?;
-        let now_ns = self.controller_at_ns();
-        let wake = Wake::on_time(self.cycle, now_ns);
-        let mut ports = LoggedPorts::new(&mut self.ports.log, [now_ns; 3], Some(&self.ports.reading));
-        let Ok(()) = masseter_runtime::control::run_cycle(controller, duties, &mut ports, &wake);
+        let (wake, mut ports) = self.controller_ports();
+        let Ok(observed) = control::observe(controller, duties, &mut ports, &wake);
+        Ok(observed)
+    }
+
+    /// Ends that cycle with the controller's command.
+    #[inline]
+    pub(crate) fn end_decided(
+        &mut self,
+        controller: &mut dyn Controller,
+        duties: &mut Duties,
+        observed: Observed,
+    ) -> Result<(), PlantError> {
+        let (wake, mut ports) = self.controller_ports();
+        let Ok(()) = control::decide(controller, duties, &mut ports, &wake, observed);
         let command = ports.into_command();
         self.end_cycle(command)
+    }
+
+    /// When the controller of this cycle wakes, and its ports.
+    fn controller_ports(&mut self) -> (Wake, LoggedPorts<'_, S>) {
+        let now_ns = self.controller_at_ns();
+        let wake = Wake::on_time(self.cycle, now_ns);
+        (wake, LoggedPorts::new(&mut self.ports.log, [now_ns; 3], Some(&self.ports.reading)))
     }
 
     /// Ends a cycle with this command, under the cycle's number and time.

@@ -201,6 +201,15 @@ pub struct Duties {
     pub operator: Operator,
 }
 
+/// What the first part of a cycle leaves to the second one.
+#[derive(Debug, Clone, Copy)]
+pub struct Observed {
+    due: Option<(Injected, Due)>,
+    change: Option<Change>,
+    received_ns: u64,
+    solved_ns: u64,
+}
+
 /// Runs one cycle: reading, decision, command; then state, signals, parameters and events. No other loop waits for the
 /// latter.
 ///
@@ -225,10 +234,25 @@ pub struct Duties {
 /// Those of the ports.
 pub fn run_cycle<P: ControllerPorts>(
     controller: &mut dyn Controller,
-    Duties { named, operator }: &mut Duties,
+    duties: &mut Duties,
     ports: &mut P,
     wake: &Wake,
 ) -> Result<(), P::Error> {
+    let observed = observe(controller, duties, ports, wake)?;
+    decide(controller, duties, ports, wake, observed)
+}
+
+/// The first part of [`run_cycle`]: what is due, and the reading.
+///
+/// # Errors
+/// Those of the ports.
+#[inline]
+pub fn observe<P: ControllerPorts>(
+    controller: &mut dyn Controller,
+    Duties { named, operator }: &mut Duties,
+    ports: &mut P,
+    wake: &Wake,
+) -> Result<Observed, P::Error> {
     let reading = ports.reading(wake)?;
     let received_ns = ports.now_ns();
     let due = operator.take_due(reading.as_ref().map(|reading| reading.borrow().sampled_ns));
@@ -244,6 +268,21 @@ pub fn run_cycle<P: ControllerPorts>(
     }
     controller.observe(reading.as_ref().map(Borrow::borrow));
     let solved_ns = ports.now_ns();
+    Ok(Observed { due, change, received_ns, solved_ns })
+}
+
+/// The second part of [`run_cycle`]: the decision, and every message.
+///
+/// # Errors
+/// Those of the ports.
+#[inline]
+pub fn decide<P: ControllerPorts>(
+    controller: &mut dyn Controller,
+    Duties { named, operator }: &mut Duties,
+    ports: &mut P,
+    wake: &Wake,
+    Observed { due, change, received_ns, solved_ns }: Observed,
+) -> Result<(), P::Error> {
     let event = controller.decide(Tick { cycle: wake.cycle, now_ns: solved_ns });
     let commanded_ns = ports.now_ns();
     ports.publish_command(|command| controller.fill_command(command))?;
