@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
+use anyhow::bail;
 use clap::{Args, ValueEnum};
 use masseter_controller::hold_position::HoldPosition;
 use masseter_controller::motion_controller::MotionController;
@@ -20,6 +21,9 @@ use crate::cli::arguments::{Wires, parse_address, parse_cores, parse_duration, p
 
 /// The patience of a run in lockstep.
 const DEFAULT_PATIENCE: Duration = Duration::from_secs(10);
+
+/// How Python starts the program of the package that plays an FMU.
+const FMU_PLAYER: [&str; 2] = ["-m", "masseter.fmu"];
 
 const WHAT: &str = "Choose what to play";
 const HOW: &str = "Choose how it runs";
@@ -55,15 +59,19 @@ pub(crate) struct RunRequest {
     #[arg(long, value_name = "TIME", value_parser = parse_patience, help_heading = HOW)]
     pub(super) patience: Option<Patience>,
     /// Who controls the robot: motion plays the motion, hold keeps the position found at the start, a path starts
-    /// your own program, also with arguments ("python3 law.py --gain 2"), external waits until you start it [default: motion]
+    /// your own program, also with arguments ("python3 law.py --gain 2"), fmu:FILE.fmu an FMU (see --map), external waits
+    /// until you start it [default: motion]
     #[arg(
         long,
-        value_name = "motion|hold|external|none|PROGRAM",
+        value_name = "motion|hold|external|none|PROGRAM|fmu:FILE.fmu",
         default_value = "motion",
         hide_default_value = true,
         help_heading = WHAT
     )]
     pub(super) controller: ControllerChoice,
+    /// Which values of the rig the variables of an FMU are [default: the FMU's path with .toml]
+    #[arg(long, value_name = "FILE.toml", help_heading = WHAT)]
+    pub(super) map: Option<String>,
     /// Simulated buses, or the CAN interface of each bus, such as can0,can1
     #[arg(long, value_name = "virtual|IF[,IF]", value_parser = parse_wires, help_heading = HOW)]
     pub(super) can: Option<Wires>,
@@ -221,6 +229,10 @@ impl FromStr for ControllerChoice {
             "none" => return Ok(Self::None),
             _ => {}
         }
+        if let Some(file) = text.strip_prefix("fmu:") {
+            let arguments = FMU_PLAYER.into_iter().chain([file]).map(str::to_owned);
+            return Ok(Self::Executable("python3".into(), arguments.collect()));
+        }
         // A path may contain spaces.
         let words = if Path::new(text).exists() { None } else { shlex::split(text) };
         if let Some([program, arguments @ ..]) = words.as_deref().filter(|words| words.len() > 1) {
@@ -263,6 +275,20 @@ impl ControllerChoice {
             Self::None => Some("none".to_owned()),
             Self::Executable(path, arguments) if arguments.is_empty() => Some(path.display().to_string()),
             Self::Executable(path, arguments) => Some(format!("{} {}", path.display(), arguments.join(" "))),
+        }
+    }
+
+    /// The choice with this map of an FMU's variables.
+    pub(super) fn with_map(self, map: Option<&String>) -> anyhow::Result<Self> {
+        let Some(map) = map else { return Ok(self) };
+        match self {
+            Self::Executable(program, mut arguments)
+                if arguments.starts_with(&FMU_PLAYER.map(str::to_owned)) =>
+            {
+                arguments.push(map.clone());
+                Ok(Self::Executable(program, arguments))
+            }
+            _ => bail!("--map is for --controller fmu:FILE.fmu"),
         }
     }
 }

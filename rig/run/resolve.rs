@@ -27,7 +27,9 @@ pub(super) fn resolve(request: &RunRequest) -> anyhow::Result<(RunPlan, RunReque
     let overrides = request.overrides();
     let scenario = masseter_plan::scenario_with_overrides(request.scenario.as_deref(), &overrides)?;
     request.cores.map_or(Ok(()), |cores| check_cores(&cores, &usable_cores()))?;
-    let request = RunRequest { clock: choose_clock(request, &scenario), ..request.clone() };
+    let controller = request.controller.clone().with_map(request.map.as_ref())?;
+    let request = RunRequest { controller, ..request.clone() };
+    let request = RunRequest { clock: choose_clock(&request, &scenario), ..request };
     check_clock(&request, &scenario)?;
     request.live.map(live::listen_on).transpose()?;
     let plan = RunPlan::of_file(scenario, request.scenario.as_deref())?;

@@ -54,14 +54,18 @@ def control(
     rig: str | None = None,
     signals: Sequence[Signal] = (),
     parameters: Sequence[Parameter] = (),
+    prepare: Callable[[float, dict[str, float]], None] | None = None,
 ) -> bool:
     """Attaches to a rig and controls it with a pose law until the motion is over.
 
     The rig: the named one, or that of MASSETER_RIG, or the only one that takes a controller. Returns True when the motion was
     finished, False after a safe stop. An exception of the law stops the rig safely, and is raised again. The law reads
     demand.parameters and fills demand.signals, both by their names.
+
+    prepare: called once the rig has taken the controller, before the run starts, with the period (s) and the values that the
+    scenario gives parameters. Slow work belongs there.
     """
-    return _native.control(law, rig, _signals(signals), _parameters(parameters))
+    return _native.control(law, rig, _signals(signals), _parameters(parameters), prepare)
 
 
 class Cycle(NamedTuple):

@@ -158,6 +158,7 @@ pub(crate) fn declared(
 }
 
 /// Attaches to a rig and runs its controller with this law. Returns whether the motion was finished; false after a safe stop.
+/// Before the start, calls `prepare` with the period and the values that the scenario gives parameters.
 #[pyfunction]
 pub(crate) fn control(
     py: Python<'_>,
@@ -165,6 +166,7 @@ pub(crate) fn control(
     rig: Option<String>,
     signals: Vec<SignalOfPython>,
     parameters: Vec<ParameterOfPython>,
+    prepare: Option<Py<PyAny>>,
 ) -> PyResult<bool> {
     let (exception, exceptions) = mpsc::channel();
     let declared = declared(signals, parameters)?;
@@ -181,6 +183,9 @@ pub(crate) fn control(
         })
     });
     let context = py.detach(|| attach(rig.as_deref())).map_err(not_attached)?;
+    if let Some(prepare) = prepare {
+        prepare.call1(py, (context.scenario.period_s(), context.scenario.parameters.clone()))?;
+    }
     let is_simulated = context.lockstep.is_some();
     let play = move || run_with_law(context, Box::new(law)).map_err(failed);
     // Debuggers follow the caller's thread. In real time the law has a thread of its own, with which priority and core end.
