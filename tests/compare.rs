@@ -53,6 +53,11 @@ fn known_differences_between_six_sessions_are_found_and_covered() {
     assert!(!log.exists(), "a comparison writes nothing into the folders of runs");
     assert!(said.contains("before to after") && said.contains("opening, mm"), "{said}");
 
+    run(&[&["compare", "--set", "study.leave_out=[1]", "--out", "chosen"][..], &runs].concat());
+    let chosen = fs::read_to_string(workspace.file("chosen").join("cycles.csv")).unwrap();
+    let by_hand = rows(&chosen).filter(|row| row.cell("left_out") == "by_hand");
+    assert_eq!(by_hand.map(|row| row.cell("cycle").to_owned()).collect::<Vec<_>>(), ["1"; 6]);
+
     let read = |name: &str| fs::read_to_string(workspace.file("study").join(name)).unwrap();
     let differences = read("differences.csv");
     let found = |quantity: &str| -> Vec<f64> {

@@ -322,3 +322,49 @@ fn the_plain_form_has_the_protocol_and_is_the_same_motion() {
     );
     assert_eq!(fs::read_to_string(&plain).unwrap(), plain_text);
 }
+
+/// Columns beside the motion are signals of the run in motion time: requirements judge them, and tables have them.
+#[test]
+fn columns_beside_the_motion_are_signals_of_the_run() {
+    let beside = |(row, line): (usize, &str)| {
+        let gauge = if (100..110).contains(&row) { String::new() } else { row.to_string() };
+        if row == 0 { format!("{line},EMG left [µV],gauge\n") } else { format!("{line},{},{gauge}\n", row - 1) }
+    };
+    let text: String = opening(|_, _| ()).lines().enumerate().map(beside).collect();
+    let workspace = Workspace::new(
+        "[motion]
+         kind = 'file'
+         path = 'motion.csv'
+         [[require]]
+         name = 'the muscle rests'
+         signal = 'recorded.emg_left'
+         min = '0'
+         max = '200'",
+    );
+    workspace.write("motion.csv", &text);
+    let listed = stdout(&masseter(&["signals", workspace.file("scenario.toml").to_str().unwrap()]));
+    assert!(listed.contains("recorded.emg_left") && listed.contains("Column 'gauge'"), "{listed}");
+    let output = workspace.run_virtual(&[]);
+    assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+    let (run, out) = (workspace.run_folder(), workspace.file("tables"));
+    let (run, folder) = (run.to_str().unwrap(), out.to_str().unwrap());
+    let output = masseter(&["export", run, "--format", "csv", "--table", "cycles", "--out", folder]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let table = fs::read_to_string(out.join("cycles.csv")).unwrap();
+    let (head, rows) = table.split_once('\n').unwrap();
+    let place = |name| head.split(',').position(|column| column == name).unwrap_or_else(|| panic!("{name}: {head}"));
+    let places = ["motion_time", "recorded_emg_left", "recorded_gauge"].map(place);
+    let mut lost = 0;
+    for row in rows.lines() {
+        let cells: Vec<&str> = row.split(',').collect();
+        let [motion_s, emg, gauge] = places.map(|place| cells[place].parse::<f64>());
+        // Before the motion there is none.
+        let Some(motion_s) = motion_s.ok().filter(|motion_s| *motion_s >= 0.0) else { continue };
+        let expected = (motion_s * 100.0 + 1e-4).floor();
+        assert_eq!(emg, Ok(expected), "{motion_s}");
+        let is_lost = (99.0..109.0).contains(&expected);
+        lost += u32::from(is_lost);
+        assert_eq!(gauge.ok(), (!is_lost).then_some(expected + 1.0), "{motion_s}");
+    }
+    assert!((90..110).contains(&lost), "{lost} cycles");
+}

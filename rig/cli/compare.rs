@@ -21,6 +21,9 @@ pub(super) struct CompareArgs {
     /// Two keys: that of the person, and that of the condition within a person
     #[arg(long, value_name = "KEY,KEY", default_value = "patient,session", value_parser = By::parse)]
     by: By,
+    /// Change a key of 'study' in every run, which chooses jaw cycles; may be given several times
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
     /// Format of the tables
     #[arg(long, value_enum, default_value_t = FileFormat::Csv)]
     format: FileFormat,
@@ -32,7 +35,7 @@ pub(super) struct CompareArgs {
 /// Compares the runs.
 pub(super) fn compare(args: &CompareArgs) -> anyhow::Result<Exit> {
     let format = args.format.of_tables()?;
-    let study = Study::read(&args.runs, args.by.clone())?;
+    let study = Study::read(&args.runs, args.by.clone(), &args.set)?;
     new_folder(&args.out)?;
     let text = study::write(&study, &args.out, &format)?;
     result(&format!("{text}\ncomparison: {}\n", args.out.join("compare.html").display()))?;

@@ -11,7 +11,7 @@ use masseter_recorder::live::ReportServer;
 use masseter_recording::{Ending, FullSpeed, Manifest, RunFolder};
 use masseter_report::Detail;
 use masseter_runtime::transport::{Domain, DomainLock};
-use masseter_scenario::input::{MOST_KEPT_BYTES, read_foreign_text, read_text};
+use masseter_scenario::input::{MOST_KEPT_BYTES, foreign_text, read_bytes, read_text};
 use masseter_scenario::{FileConfig, Scenario};
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
@@ -189,14 +189,18 @@ fn write_manifest(folder: &RunFolder, manifest: &Manifest) -> Result<(), Failure
 fn keep_scenario(folder: &RunFolder, scenario: &Scenario) -> anyhow::Result<()> {
     let mut kept = scenario.clone();
     for (name, file) in kept.files_mut() {
-        let rows = read_foreign_text(file, FileConfig::MOST_BYTES);
-        let rows = rows.with_context(|| format!("cannot read {}", file.display()))?;
-        keep(folder, &folder.file(&name), &rows)?;
+        let bytes = read_bytes(file, FileConfig::MOST_BYTES);
+        let bytes = bytes.with_context(|| format!("cannot read {}", file.display()))?;
+        // A C3D file is no text.
+        match foreign_text(&bytes) {
+            Ok(text) => keep(folder, &folder.file(&name), &text)?,
+            Err(_) => keep(folder, &folder.file(&name), &bytes)?,
+        }
         *file = name.into();
     }
     keep(folder, &folder.scenario(), &kept.to_toml())
 }
 
-fn keep(folder: &RunFolder, path: &Path, text: &str) -> anyhow::Result<()> {
-    folder.keep(path, text).with_context(|| format!("cannot write {}", path.display()))
+fn keep(folder: &RunFolder, path: &Path, content: impl AsRef<[u8]>) -> anyhow::Result<()> {
+    folder.keep(path, content).with_context(|| format!("cannot write {}", path.display()))
 }

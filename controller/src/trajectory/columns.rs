@@ -276,6 +276,8 @@ pub(super) enum Content {
 pub(super) struct Layout {
     pub clock: Clock,
     pub content: Content,
+    /// Columns with another meaning than a motion's.
+    pub extra: Vec<usize>,
     /// A line for each part: the columns and their unit.
     pub protocol: Vec<String>,
 }
@@ -296,15 +298,19 @@ impl Layout {
         if !reader.asked.is_empty() {
             return Err(reader.asked.join("; "));
         }
-        let is_unused =
-            |(at, column): &(usize, &Column)| !reader.used.contains(at) && !column.name.is_empty();
-        let unused: Vec<_> =
-            columns.iter().enumerate().filter(is_unused).map(|(_, column)| quoted(column)).collect();
+        let is_unused = |at: &usize| {
+            let name = &columns[*at].name;
+            !reader.used.contains(at) && !name.is_empty() && name != "-"
+        };
+        let is_extra = |at: &usize| columns[*at].meaning == Meaning::Unknown;
+        let (extra, unused): (Vec<usize>, Vec<usize>) =
+            (0..columns.len()).filter(is_unused).partition(is_extra);
         let mut protocol = reader.protocol;
         if !unused.is_empty() {
+            let unused: Vec<_> = unused.into_iter().map(|at| quoted(&columns[at])).collect();
             protocol.push(format!("not used: {}", sentence(&unused.join(", "))));
         }
-        Ok(Self { clock, content, protocol })
+        Ok(Self { clock, content, extra, protocol })
     }
 }
 

@@ -2,13 +2,16 @@
 //!
 //! The import takes a whole file, or refuses the file with line, reason and remedy. What is not in the file is asked
 //! for by a key of `[motion]`, and what was read is listed in a protocol. Whether the motion is a jaw's is not judged
-//! here. Formats of bytes (C3D) are not part of the import.
+//! here.
+
+use std::fmt::Display;
 
 use masseter_model::geometry::{Pose, Vec3};
-use masseter_scenario::input::{read_bytes, read_foreign_text};
+use masseter_scenario::input::{foreign_text, read_bytes};
 use masseter_scenario::{FileConfig, JawConfig};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
 
+use super::c3d;
 use super::mandible::condylar_middle;
 use super::markers::Body;
 use super::recording::{Recording, Sample};
@@ -96,18 +99,28 @@ impl<'a> Source<'a> {
 
 fn axes_and_table(config: &FileConfig) -> Result<(Axes, Table), Located> {
     let axes = Axes::parse(&config.axes).map_err(Located::whole)?;
-    let text = read_foreign_text(&config.path, FileConfig::MOST_BYTES).map_err(|error| {
-        let is_c3d =
-            read_bytes(&config.path, FileConfig::MOST_BYTES).is_ok_and(|bytes| bytes.get(1) == Some(&0x50));
-        if is_c3d {
-            return Located::whole(
-                "C3D is not read; export the markers as TRC or CSV in the tracker's program".to_owned(),
-            );
-        }
-        Located::whole(format!("cannot be read ({error}); check the path and that it is text"))
-    })?;
-    let table = Table::parse(&text, config)?;
-    Ok((axes, table))
+    let unreadable = |error: &dyn Display| {
+        Located::whole(format!("cannot be read ({error}); check the path and that it is text or C3D"))
+    };
+    let bytes = read_bytes(&config.path, FileConfig::MOST_BYTES).map_err(|error| unreadable(&error))?;
+    if c3d::is_c3d(&bytes) {
+        return Ok((axes, of_c3d(&bytes, config)?));
+    }
+    let text = foreign_text(&bytes).map_err(|error| unreadable(&error))?;
+    Ok((axes, Table::parse(&text, config)?))
+}
+
+fn of_c3d(bytes: &[u8], config: &FileConfig) -> Result<Table, Located> {
+    let c3d::Markers { text, first_frame, protocol } =
+        c3d::markers(bytes).map_err(|error| Located::whole(error.to_string()))?;
+    let in_frame = |Located { line, problem }| {
+        let frame = line.and_then(|line| line.checked_sub(2)).map(|row| first_frame + row);
+        Located::whole(frame.map_or(problem.clone(), |frame| format!("frame {frame}: {problem}")))
+    };
+    let mut table = Table::parse(&text, config).map_err(in_frame)?;
+    // The file has no separators.
+    table.protocol.splice(..1, protocol);
+    Ok(table)
 }
 
 /// The plain form of a file, under comments with what was read and converted.

@@ -6,9 +6,11 @@
 //! at rest. [`check`] judges beforehand whether the mechanism can follow. The rig's way to the first pose is not part
 //! of a trajectory.
 
+mod c3d;
 mod check;
 mod columns;
 mod doubts;
+mod extras;
 mod frames;
 mod generators;
 mod import;
@@ -19,6 +21,7 @@ mod plausible;
 mod recording;
 mod row;
 mod sheet;
+mod signals;
 mod survey;
 mod table;
 
@@ -35,6 +38,7 @@ pub use import::plain_form;
 pub use mandible::{closed_jaw_points, closed_pose};
 pub use motion::Trajectory;
 pub use plausible::Implausible;
+pub use signals::{RecordedSignal, recorded_signals};
 pub use survey::{Gap, PointFigures, Range, RecordingSurvey, StepFigures, SurveyRow, survey};
 
 /// A motion that cannot be built or followed: the key or the line of the recording, the error there, and the remedy.

@@ -12,6 +12,7 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::columns::{Clock, Content, Layout, Scaled, Turn};
 use super::doubts::upper_median;
+use super::extras::Extras;
 use super::markers::{Body, settle};
 use super::row::{Located, Row, gaps, is_lost};
 use super::sheet::Sheet;
@@ -21,7 +22,7 @@ const FEWEST_ROWS: usize = 4;
 /// Least time between samples, s. Closer samples are repeats: the slope between them is the clock's noise.
 const SHORTEST_STEP_S: f64 = 1e-6;
 /// The longest time without a sample that interpolation may bridge, s.
-const LARGEST_GAP_S: f64 = 0.25;
+pub(super) const LARGEST_GAP_S: f64 = 0.25;
 const DAY_S: f64 = 86_400.0;
 /// Largest distance of a marker from the origin of any tracker, mm.
 pub(super) const LARGEST_MM: f64 = 1e5;
@@ -48,6 +49,8 @@ pub(super) enum Format {
 pub(super) struct Table {
     pub format: Format,
     pub rows: Vec<Row>,
+    /// Columns beside the motion.
+    pub extras: Extras,
     /// What was read, converted and left out, a line each.
     pub protocol: Vec<String>,
     /// What the user must know before a run, each with its line.
@@ -65,6 +68,7 @@ impl Table {
         let mut protocol = [sheet.protocol.clone(), layout.protocol.clone()].concat();
         let mut reader = Reader { layout: &layout, sheet: &sheet, decimal: None, last_s: None };
         let (mut rows, mut lost, mut empty) = (Vec::new(), Vec::new(), Vec::new());
+        let mut beside = Vec::new();
         for (index, row) in sheet.rows().enumerate() {
             let (line, cells) = row?;
             // Programs leave empty rows at the end of a table; between others an empty row is a lost sample.
@@ -75,6 +79,9 @@ impl Table {
             lost.append(&mut empty);
             let (time_s, values) =
                 reader.row(index, line, &cells).map_err(|problem| Located::at(line, problem))?;
+            if !layout.extra.is_empty() {
+                beside.push((line, time_s, layout.extra.iter().map(|&at| cells[at]).collect()));
+            }
             match values {
                 Some(values) => rows.push(Row { line, time_s, values }),
                 None => lost.push(line),
@@ -84,6 +91,9 @@ impl Table {
             protocol.push("decimal comma".to_owned());
         }
         protocol.extend(gaps(&lost));
+        let names: Vec<&str> = layout.extra.iter().map(|&at| sheet.columns[at].name.as_str()).collect();
+        let (extras, of_extras) = Extras::of(&names, &beside, reader.decimal.map(|(mark, _)| mark))?;
+        protocol.extend(of_extras);
         let too_few = |rows: usize| {
             let rows = counted(rows as u64, "row");
             Located::whole(format!("{rows} of data, at least {FEWEST_ROWS} are needed"))
@@ -105,7 +115,7 @@ impl Table {
             return Err(too_few(rows.len()));
         }
         check_steps(&rows)?;
-        Ok(Self { format, rows, protocol, doubts })
+        Ok(Self { format, rows, extras, protocol, doubts })
     }
 
     /// The names in the plain form.
@@ -126,10 +136,18 @@ impl Table {
         for line in &self.protocol {
             let _ = writeln!(text, "# {line}");
         }
-        text += &self.columns().join(",");
-        for row in &self.rows {
-            let _ = write!(text, "\n{}", row.time_s);
-            for value in &row.values {
+        let extra = self.extras.names.iter().map(String::as_str);
+        text += &self.columns().iter().copied().chain(extra).collect::<Vec<_>>().join(",");
+        // A row without a pose is written where it has other columns.
+        let lost = vec![f64::NAN; self.rows[0].values.len()];
+        let mut poses = self.rows.iter().peekable();
+        let mut extras = self.extras.rows.iter().filter(|_| !self.extras.names.is_empty()).peekable();
+        while let Some(row) = [poses.peek(), extras.peek()].into_iter().flatten().min_by_key(|row| row.line) {
+            let (line, time_s) = (row.line, row.time_s);
+            let pose = poses.next_if(|row| row.line == line).map_or(&lost, |row| &row.values);
+            let extra = extras.next_if(|row| row.line == line).map_or(&[][..], |row| &row.values);
+            let _ = write!(text, "\n{time_s}");
+            for value in pose.iter().chain(extra) {
                 let _ = if value.is_nan() { write!(text, ",") } else { write!(text, ",{value}") };
             }
         }

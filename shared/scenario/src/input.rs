@@ -74,10 +74,15 @@ const WINDOWS_1252: [char; 32] = [
 /// # Errors
 /// Those of [`read_bytes`], and when the file is no text.
 pub fn read_foreign_text(path: &Path, most_bytes: u64) -> io::Result<String> {
-    decode(&read_bytes(path, most_bytes)?).map_err(|reason| io::Error::new(ErrorKind::InvalidData, reason))
+    foreign_text(&read_bytes(path, most_bytes)?)
+        .map_err(|reason| io::Error::new(ErrorKind::InvalidData, reason))
 }
 
-fn decode(bytes: &[u8]) -> Result<String, &'static str> {
+/// The text of bytes that another program wrote, as [`read_foreign_text`] reads it.
+///
+/// # Errors
+/// When the bytes are no text: the reason.
+pub fn foreign_text(bytes: &[u8]) -> Result<String, &'static str> {
     let utf_16 = |bytes: &[u8], unit: fn([u8; 2]) -> u16| {
         let (pairs, rest) = bytes.as_chunks();
         let text = String::from_utf16(&pairs.iter().copied().map(unit).collect::<Vec<_>>());
@@ -203,12 +208,12 @@ mod tests {
             utf_16(u16::to_be_bytes).collect(),
             windows,
         ] {
-            assert_eq!(decode(&bytes).as_deref(), Ok(text), "{bytes:x?}");
+            assert_eq!(foreign_text(&bytes).as_deref(), Ok(text), "{bytes:x?}");
         }
-        assert_eq!(decode(b"\x8e\x9f\xa0\xff\x81").as_deref(), Ok("ŽŸ\u{a0}ÿ\u{fffd}"));
-        assert_eq!(decode(b"").as_deref(), Ok(""));
+        assert_eq!(foreign_text(b"\x8e\x9f\xa0\xff\x81").as_deref(), Ok("ŽŸ\u{a0}ÿ\u{fffd}"));
+        assert_eq!(foreign_text(b"").as_deref(), Ok(""));
         for no_text in [&b"\xff\xfea"[..], b"\xff\xfe\x00\xd8", b"a\0b\0", b"\x7fELF\0\xff"] {
-            assert!(decode(no_text).is_err(), "{no_text:x?}");
+            assert!(foreign_text(no_text).is_err(), "{no_text:x?}");
         }
     }
 

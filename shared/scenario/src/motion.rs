@@ -195,7 +195,7 @@ keys! {
     #[serde(deny_unknown_fields)]
     pub struct FileConfig {
         /// The file, relative to the scenario's folder.
-        pub path: PathBuf => "text in UTF-8, UTF-16 or Windows-1252",
+        pub path: PathBuf => "text in UTF-8, UTF-16 or Windows-1252, or C3D",
         /// The file's axes that point anterior, left and up.
         #[serde(default = "FileConfig::default_axes")]
         pub axes: [String; 3] => "signed axes, right-handed",

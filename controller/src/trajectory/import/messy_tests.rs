@@ -8,8 +8,9 @@ use masseter_scenario::{AngleUnit, LengthUnit, TimeUnit};
 
 use super::*;
 
-/// Largest difference from the plain form, in s, mm and parts of a quaternion.
+/// Largest difference from the plain form, in s, mm and parts of a quaternion; and of a file of floats.
 const NEAR: f64 = 1e-6;
+const NEAR_FLOAT: f64 = 4e-5;
 const ROWS: usize = 120;
 const RATE_HZ: f64 = 100.0;
 const POSES: &str = "time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz";
@@ -168,6 +169,8 @@ fn utf_16(text: &str, unit: fn(u16) -> [u8; 2]) -> Vec<u8> {
 enum Plain {
     Poses,
     Markers(usize),
+    /// Markers with 24 bits.
+    Floats(usize),
 }
 
 #[derive(Clone, Copy)]
@@ -612,14 +615,21 @@ fn bytes() -> Vec<(&'static str, Vec<u8>, Keys, Expected)> {
         .replace('\n', ";1\n")
         .replacen("µV;1\n", "µV\n", 1);
     let windows = text.chars().map(|c| c as u8).collect();
-    let mut c3d = vec![0; 512];
-    c3d[..2].copy_from_slice(&[2, 0x50]);
+    let named = |place: Vec<f64>| place[1..].to_vec();
+    let places: Vec<Vec<f64>> = markers(3).into_iter().map(named).collect();
+    let c3d = c3d::tests::file(&["LI", "RM", "LM"], RATE_HZ as f32, &places, c3d::tests::Numbers::Floats);
     vec![
         ("UTF-8 with a mark", ["\u{feff}", &text].concat().into_bytes(), no_keys, WHOLE),
         ("UTF-16, little end first", utf_16(&text, u16::to_le_bytes), no_keys, WHOLE),
         ("UTF-16, big end first", utf_16(&text, u16::to_be_bytes), no_keys, WHOLE),
         ("Windows-1252", windows, no_keys, WHOLE),
-        ("C3D", c3d, no_keys, Refused("export the markers as TRC or CSV")),
+        (
+            "C3D cut short",
+            c3d[..c3d.len() - 60].to_vec(),
+            no_keys,
+            Refused("cut short at frame 126 of 7 to 126"),
+        ),
+        ("C3D", c3d, no_keys, Read(Plain::Floats(3), 0)),
     ]
 }
 
@@ -627,17 +637,18 @@ fn bytes() -> Vec<(&'static str, Vec<u8>, Keys, Expected)> {
 fn difference(table: &Table, plain: Plain, gaps: usize) -> Option<String> {
     let expected = match plain {
         Plain::Poses => poses(),
-        Plain::Markers(count) => markers(count),
+        Plain::Markers(count) | Plain::Floats(count) => markers(count),
     };
     if table.rows.len() != expected.len() - gaps {
         return Some(format!("{} rows", table.rows.len()));
     }
+    let near = if let Plain::Floats(_) = plain { NEAR_FLOAT } else { NEAR };
     let begin_s = table.rows[0].time_s;
     table.rows.iter().find_map(|row| {
         let time_s = row.time_s - begin_s;
         let expected = &expected[(time_s * RATE_HZ).round() as usize];
         let both = [time_s].into_iter().chain(row.values.iter().copied()).zip(expected);
-        let mut off = both.filter(|(value, expected)| !value.is_nan() && (value - *expected).abs() > NEAR);
+        let mut off = both.filter(|(value, expected)| !value.is_nan() && (value - *expected).abs() > near);
         off.next().map(|(value, expected)| format!("line {}: {value} for {expected}", row.line))
     })
 }

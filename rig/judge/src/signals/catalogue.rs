@@ -2,10 +2,11 @@
 //!
 //! Values are SI numbers; states are their codes. A value that a cycle does not have is none, never a guess.
 
+use masseter_controller::trajectory::recorded_signals;
 use masseter_model::geometry::{AXES, AXIS_NAMES, Vec3};
 use masseter_runtime::messages::codes::{ControllerState, DriveRequest, DriveState, NO_DRIVE_STATE};
-use masseter_runtime::named::Declared;
-use masseter_scenario::{Scenario, Unit};
+use masseter_runtime::named::{Declared, PlayedMotion};
+use masseter_scenario::{MotionConfig, Scenario, Unit};
 
 use super::signal::{Jaw, JawPoint, NamedSignal, SignalList, estimated};
 use super::timeline::CycleMessages;
@@ -25,6 +26,7 @@ pub(super) fn signals(scenario: &Scenario, jaw: Jaw, declared: &Declared) -> Vec
     add_controller(&mut list);
     add_timing(&mut list);
     add_declared(&mut list, declared);
+    add_recorded(&mut list, scenario, declared);
     list.0
 }
 
@@ -253,6 +255,20 @@ fn add_declared(list: &mut SignalList, declared: &Declared) {
         let value =
             move |of: &CycleMessages| of.parameters.as_ref()?.parameters.as_slice().get(place).copied();
         list.add_declared(format!("parameter.{}", parameter.name), &parameter.unit, &parameter.about, value);
+    }
+}
+
+/// What the file of the played motion holds beside the motion; nothing where it is gone since the run.
+fn add_recorded(list: &mut SignalList, scenario: &Scenario, declared: &Declared) {
+    let MotionConfig::File(file) = &scenario.motion else { return };
+    if declared.motion != PlayedMotion::Scenario {
+        return;
+    }
+    for signal in recorded_signals(file, &scenario.jaw).unwrap_or_default() {
+        let (name, unit) = (signal.name.clone(), signal.unit.clone());
+        let about =
+            format!("Column '{}' of the motion's file at motion.time; none where it is lost.", signal.column);
+        list.add_declared(name, &unit, &about, move |of| signal.at(of.state?.motion_time_s));
     }
 }
 

@@ -144,11 +144,11 @@ impl RunFolder {
 
     /// Writes one of its files completely or not at all, so that a power cut leaves the scenario and the manifest of a
     /// recording.
-    pub fn keep(&self, path: &Path, text: &str) -> io::Result<()> {
+    pub fn keep(&self, path: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
         let unfinished = path.with_extension("part");
         let write = || {
             let mut file = File::create(&unfinished)?;
-            file.write_all(text.as_bytes())?;
+            file.write_all(content.as_ref())?;
             file.sync_all()?;
             fs::rename(&unfinished, path)
         };

@@ -122,7 +122,7 @@ impl Export<'_> {
         }
         let mut cycles = match selection.cycles {
             Some((scenario, declared)) => {
-                let table = CycleTable::new(&scenario, &declared, self.motion_ns);
+                let table = CycleTable::new(&beside(scenario, recording), &declared, self.motion_ns);
                 let file = TableFile::create(self.out, CYCLES, &self.format, table.empty())?;
                 Some((table, file))
             }

@@ -196,7 +196,20 @@
     const rows = data.cycles.map((row) => [String(row.number), [row.kind, row.side].filter(Boolean).join(' '), row.left_out ? `no: ${row.left_out.replace('_', ' ')}` : 'yes', clock.text(row.began_s + (zero || 0)),
       number(row.duration_s, 3), number(row.opening_mm, 2), number(row.lateral_mm, 2), number(row.forward_mm, 2), number(row.opening_mm_s, 1), number(row.closing_mm_s, 1), number(row.hold_s, 3), number(row.occlusal_s, 3),
       ...(data.has_force ? [number(row.force_n, 1)] : [])]);
-    holder.append(element('details', {}, element('summary', {}, `Each of ${rows.length === data.count ? 'the' : 'the first'} ${rows.length} cycles`), tableOf('Cycles', head, rows, 'cycles')));
+    holder.append(element('details', {}, element('summary', {}, `Each of ${rows.length === data.count ? 'the' : 'the first'} ${rows.length} cycles`), withChoice(tableOf('Cycles', head, rows, 'cycles'), data)));
+  }
+
+  // A box in each row of the table; the keys of the scenario follow from the boxes.
+  function withChoice(table, { cycles: found, count }) {
+    const boxes = found.map(({ number: cycle, left_out: why }) => element('input', { type: 'checkbox', 'aria-label': `leave out cycle ${cycle}`, checked: why === 'by_hand' ? '' : null }));
+    const text = element('pre', { class: 'choice', tabindex: 0, 'aria-label': 'Keys of the chosen cycles', 'aria-live': 'polite' });
+    const write = () => { text.textContent = `[study]\nleave_out = [${found.filter((_, at) => boxes[at].checked).map(({ number: cycle }) => cycle).join(', ')}]`; };
+    table.querySelector('thead tr').append(element('th', { scope: 'col' }, 'leave out'));
+    table.querySelectorAll('tbody tr').forEach((row, at) => row.append(element('td', {}, boxes[at])));
+    boxes.forEach((box) => box.addEventListener('change', write));
+    write();
+    const rest = found.length < count ? ` Add the numbers of cycles beyond ${found.length} by hand.` : '';
+    return element('div', {}, table, element('p', {}, `The boxes write these lines for the scenario, or for --set of masseter report and masseter compare.${rest}`), text);
   }
 
   // The cycles of one kind and side: their statistics, and their courses one over the other.

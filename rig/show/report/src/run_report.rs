@@ -89,7 +89,7 @@ pub fn report_past_run(path: &Path, set: &[String], format: Format) -> Result<Ex
 }
 
 /// Applies assignments of `[study]`: nothing else of a run can change once it is recorded.
-fn choose_cycles(scenario: &mut Scenario, set: &[String]) -> anyhow::Result<()> {
+pub(crate) fn choose_cycles(scenario: &mut Scenario, set: &[String]) -> anyhow::Result<()> {
     for assignment in set {
         let is_choice = assignment.trim_start().starts_with("study.");
         ensure!(is_choice, "--set {assignment}: the run is recorded; only keys of 'study.' can be set");

@@ -18,7 +18,7 @@ use masseter_recording::{Manifest, RunFolder};
 use masseter_scenario::Scenario;
 use serde_json::Value;
 
-use crate::run_report::analyse;
+use crate::run_report::{analyse, choose_cycles};
 
 pub use output::write;
 
@@ -102,16 +102,16 @@ pub struct Difference {
 }
 
 impl Study {
-    /// Reads and analyses the runs.
+    /// Reads and analyses the runs, each with these assignments of `[study]`.
     ///
     /// # Errors
     /// For a folder without a readable run, for a key that a scenario lacks, for fewer than two runs, and for a run that is
     /// named twice.
-    pub fn read(runs: &[PathBuf], by: By) -> anyhow::Result<Self> {
+    pub fn read(runs: &[PathBuf], by: By, set: &[String]) -> anyhow::Result<Self> {
         ensure!(runs.len() > 1, "name at least two runs");
         let folders = different_folders(runs)?;
         let mut recordings =
-            runs.iter().map(|run| recorded(run, &by)).collect::<Result<Vec<Recorded>, _>>()?;
+            runs.iter().map(|run| recorded(run, &by, set)).collect::<Result<Vec<Recorded>, _>>()?;
         name_persons(&mut recordings, &folders);
         Ok(Self { recordings, by })
     }
@@ -201,10 +201,11 @@ fn name_persons(recordings: &mut [Recorded], folders: &[String]) {
     }
 }
 
-fn recorded(path: &Path, by: &By) -> anyhow::Result<Recorded> {
+fn recorded(path: &Path, by: &By, set: &[String]) -> anyhow::Result<Recorded> {
     let read = || -> anyhow::Result<Recorded> {
         let folder = RunFolder::open(path)?;
-        let manifest = Manifest::read(&folder)?;
+        let mut manifest = Manifest::read(&folder)?;
+        choose_cycles(&mut manifest.scenario, set)?;
         let (figures, _) = analyse(&folder, &manifest, None)?;
         let scenario = &manifest.scenario;
         let closed_m = closed_incisal_m(scenario).context("the scenario has no closed pose")?;

@@ -72,7 +72,7 @@ fn a_run_that_is_named_twice_is_refused() {
     std::fs::create_dir(&run).unwrap();
     std::fs::write(run.join("recording.mcap"), "").unwrap();
     std::os::unix::fs::symlink(&run, &link).unwrap();
-    let refusal = Study::read(&[run, link], By::parse("patient,session").unwrap()).unwrap_err();
+    let refusal = Study::read(&[run, link], By::parse("patient,session").unwrap(), &[]).unwrap_err();
     let refusal = format!("{refusal:#}");
     assert!(
         refusal.contains("latest: it is the same run as") && refusal.contains("name each run once"),
