@@ -328,7 +328,11 @@ fn the_plain_form_has_the_protocol_and_is_the_same_motion() {
 fn columns_beside_the_motion_are_signals_of_the_run() {
     let beside = |(row, line): (usize, &str)| {
         let gauge = if (100..110).contains(&row) { String::new() } else { row.to_string() };
-        if row == 0 { format!("{line},EMG left [µV],gauge\n") } else { format!("{line},{},{gauge}\n", row - 1) }
+        if row == 0 {
+            format!("{line},EMG left [µV],gauge\n")
+        } else {
+            format!("{line},{},{gauge}\n", row - 1)
+        }
     };
     let text: String = opening(|_, _| ()).lines().enumerate().map(beside).collect();
     let workspace = Workspace::new(
@@ -352,7 +356,8 @@ fn columns_beside_the_motion_are_signals_of_the_run() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let table = fs::read_to_string(out.join("cycles.csv")).unwrap();
     let (head, rows) = table.split_once('\n').unwrap();
-    let place = |name| head.split(',').position(|column| column == name).unwrap_or_else(|| panic!("{name}: {head}"));
+    let place =
+        |name| head.split(',').position(|column| column == name).unwrap_or_else(|| panic!("{name}: {head}"));
     let places = ["motion_time", "recorded_emg_left", "recorded_gauge"].map(place);
     let mut lost = 0;
     for row in rows.lines() {

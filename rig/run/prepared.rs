@@ -201,6 +201,6 @@ fn keep_scenario(folder: &RunFolder, scenario: &Scenario) -> anyhow::Result<()> 
     keep(folder, &folder.scenario(), &kept.to_toml())
 }
 
-fn keep(folder: &RunFolder, path: &Path, content: impl AsRef<[u8]>) -> anyhow::Result<()> {
+fn keep(folder: &RunFolder, path: &Path, content: &(impl AsRef<[u8]> + ?Sized)) -> anyhow::Result<()> {
     folder.keep(path, content).with_context(|| format!("cannot write {}", path.display()))
 }

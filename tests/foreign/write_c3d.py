@@ -35,7 +35,14 @@ def write(path, places, rate_hz, unit_mm, unit):
     file["parameters"]["POINT"]["LABELS"]["value"] = NAMES
     points = np.ones((4, len(NAMES), len(places)))
     points[:3] = np.transpose(places, (2, 1, 0)) / unit_mm
+    # Some writers leave a lost point without numbers, others give it a negative residual.
+    lost = np.isnan(points[0])
+    residuals = np.where(lost, -1.0, 0.0)
+    residuals[:, LOST.start] = 0.0
+    points[:3, lost & (residuals < 0)] = 0.0
     file["data"]["points"] = points
+    file["data"]["meta_points"]["residuals"] = residuals[np.newaxis]
+    file["data"]["meta_points"]["camera_masks"] = np.zeros((7, *residuals.shape), dtype=bool)
     file["parameters"]["ANALOG"]["RATE"]["value"] = [2 * rate_hz]
     file["parameters"]["ANALOG"]["LABELS"]["value"] = ["EMG_R"]
     file["data"]["analogs"] = np.ones((1, 1, 2 * len(places)))

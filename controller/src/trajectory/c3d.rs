@@ -16,6 +16,8 @@ const KEY: u8 = 0x50;
 const BLOCK: usize = 512;
 /// The most dimensions of a parameter.
 const MOST_DIMENSIONS: usize = 7;
+/// Most names that are read of a parameter: more than a file's points.
+const MOST_NAMES: usize = u16::MAX as usize;
 /// A frame number that stands for a larger one.
 const OVERFLOW: u16 = u16::MAX;
 
@@ -66,19 +68,23 @@ pub(super) fn markers(bytes: &[u8]) -> Result<Markers, C3dError> {
     if !(scale.is_finite() && scale != 0.0) {
         return Err(C3dError::Contradiction(format!("a scale of {scale}")));
     }
+    let size = if scale < 0.0 { 4 } else { 2 };
+    let point_size = 4 * size;
+    let analog_size = size * usize::from(head.analog);
+    let frame_size = point_size * points + analog_size;
+    let data = bytes.get(head.data_at..).unwrap_or_default();
+    // The last frame's analog values are not needed. No product is larger than 2^53.
+    let needed = (count - 1) * frame_size as u64 + (point_size * points) as u64;
+    if needed > data.len() as u64 {
+        let frame = first + ((data.len() + analog_size) / frame_size) as u64;
+        return Err(C3dError::CutShort(format!("frame {frame} of {first} to {last}")));
+    }
     let unit = parameters.texts("POINT", "UNITS").into_iter().next().unwrap_or_default();
     let (names, renamed) = names(&parameters, points);
-    let size = if scale < 0.0 { 4 } else { 2 };
-    let frame_size = size * (4 * points + usize::from(head.analog));
-    let data = bytes.get(head.data_at..).unwrap_or_default();
     let mut text = header(&names, &unit);
-    for index in 0..count {
-        let begin = usize::try_from(index).ok().and_then(|index| index.checked_mul(frame_size));
-        let frame = begin.and_then(|begin| data.get(begin..)?.get(..4 * size * points));
-        let frame = frame
-            .ok_or_else(|| C3dError::CutShort(format!("frame {} of {first} to {last}", first + index)))?;
+    for (index, frame) in data.chunks(frame_size).take(count as usize).enumerate() {
         let _ = write!(text, "\n{}", index as f64 / rate_hz);
-        frame.chunks_exact(4 * size).for_each(|point| write_point(&mut text, point, scale));
+        frame.chunks_exact(point_size).take(points).for_each(|point| write_point(&mut text, point, scale));
     }
     let mut protocol = vec![format!(
         "format C3D: {}, frames {first} to {last} at {rate_hz} Hz as lines 2 to {}",
@@ -220,7 +226,7 @@ fn block_at(number: u16) -> Option<usize> {
 }
 
 struct Parameter<'a> {
-    group: i8,
+    group: u8,
     name: &'a [u8],
     /// -1 text, 1 bytes, 2 integers, 4 floats.
     kind: i8,
@@ -230,7 +236,7 @@ struct Parameter<'a> {
 
 #[derive(Default)]
 struct Parameters<'a> {
-    groups: Vec<(i8, &'a [u8])>,
+    groups: Vec<(u8, &'a [u8])>,
     all: Vec<Parameter<'a>>,
 }
 
@@ -253,10 +259,10 @@ impl<'a> Parameters<'a> {
             let offset = usize::from(u16::from_le_bytes([*low, *high]));
             let mut used = 0;
             if id < 0 {
-                parameters.groups.push((-id, name));
+                parameters.groups.push((id.unsigned_abs(), name));
             } else {
-                let parameter =
-                    Parameter::read(id, name, content).ok_or_else(|| damaged("a value is cut short"))?;
+                let parameter = Parameter::read(id.unsigned_abs(), name, content)
+                    .ok_or_else(|| damaged("a value is cut short"))?;
                 used = 2 + parameter.dimensions.len() + parameter.data.len();
                 parameters.all.push(parameter);
             }
@@ -281,7 +287,7 @@ impl<'a> Parameters<'a> {
         let Some(found) = self.find(group, name).filter(|found| found.kind == -1) else { return Vec::new() };
         let width = found.dimensions.first().map_or(1, |width| usize::from(*width).max(1));
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim_matches([' ', '\0']).to_owned();
-        found.data.chunks(width).map(text).collect()
+        found.data.chunks(width).take(MOST_NAMES).map(text).collect()
     }
 
     /// Integers have no sign, as counts of frames have none.
@@ -302,7 +308,7 @@ impl<'a> Parameters<'a> {
 }
 
 impl<'a> Parameter<'a> {
-    fn read(group: i8, name: &'a [u8], content: &'a [u8]) -> Option<Self> {
+    fn read(group: u8, name: &'a [u8], content: &'a [u8]) -> Option<Self> {
         let [kind, count, rest @ ..] = content else { return None };
         let (kind, count) = (*kind as i8, usize::from(*count));
         if count > MOST_DIMENSIONS {

@@ -158,3 +158,17 @@ fn numbers_that_contradict_the_file_are_refused_with_the_reason() {
     assert!(refusal(&file(&LABELS, 100.0, &[], Numbers::Floats)).contains("holds no frame"));
     assert!(refusal(&file(&LABELS, 100.0, &rows(), Numbers::Scaled(f32::NAN))).contains("a scale of NaN"));
 }
+
+#[test]
+fn no_byte_of_header_and_parameters_breaks_the_reading() {
+    let whole = file(&LABELS, 100.0, &rows(), Numbers::Floats);
+    for at in 2..3 * BLOCK {
+        for byte in [0, 1, 127, 128, 255] {
+            let mut changed = whole.clone();
+            changed[at] = byte;
+            if let Ok(read) = markers(&changed) {
+                assert!(read.text.len() < 64 * whole.len(), "{at}: {byte}");
+            }
+        }
+    }
+}

@@ -144,7 +144,7 @@ impl RunFolder {
 
     /// Writes one of its files completely or not at all, so that a power cut leaves the scenario and the manifest of a
     /// recording.
-    pub fn keep(&self, path: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
+    pub fn keep(&self, path: &Path, content: &(impl AsRef<[u8]> + ?Sized)) -> io::Result<()> {
         let unfinished = path.with_extension("part");
         let write = || {
             let mut file = File::create(&unfinished)?;
