@@ -179,6 +179,10 @@ fn a_wrong_requirement_is_refused_before_anything_starts() {
             "signal = 'incisal.eror'\nmax = '1 mm'",
             "scenario.toml:3:1: require.signal: require 'it': there is no signal 'incisal.eror'",
         ),
+        (
+            "signal = 'vz'\nmax = 1",
+            "there is no signal 'vz'; masseter signals lists them; one that your program declares is 'signal.vz'",
+        ),
         ("signal = 'incisal.error'\nmax = '1 N'", "give a number with one of the units m, mm"),
         ("never = 'runing'", "'runing' is no occurrence"),
         (

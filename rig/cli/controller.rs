@@ -1,7 +1,6 @@
 //! The verbs for one's own controller: `masseter controller` attaches one of the rig's to a rig, or is the
 //! controller's process of a run; `masseter param` lists, reads and sets the parameters of a running one; `masseter
-//! signals` lists what `[[require]]` can use. Signals that your own program declares are known only once it runs: a
-//! run's manifest has them.
+//! signals` lists what `[[require]]` can use.
 
 use std::path::PathBuf;
 
@@ -17,7 +16,8 @@ use masseter_runtime::transport::Domain;
 use masseter_terminal::{Exit, Format, result, result_line};
 
 use super::arguments::ProcessArgs;
-use crate::run::request::ControllerKind;
+use crate::run::declared_by;
+use crate::run::request::{ControllerChoice, ControllerKind};
 
 /// The arguments of `controller`.
 #[derive(Debug, Clone, Args)]
@@ -137,29 +137,46 @@ fn describe(Parameter { name, unit, about, value, range: [least, most] }: &Param
 
 /// The arguments of `signals`.
 #[derive(Debug, Clone, Args)]
-#[command(after_help = "Example:\n  masseter signals | grep incisal")]
+#[command(
+    after_help = "Examples:\n  masseter signals | grep incisal\n  masseter signals --controller ./my_controller | grep '^signal'"
+)]
 pub(super) struct SignalsArgs {
     /// Scenario file [default: ten seconds of chewing]
     scenario: Option<PathBuf>,
+    /// Whose own signals and parameters are listed too: motion, hold, or a program, which is started and left before the
+    /// first cycle [default: motion]
+    #[arg(
+        long,
+        value_name = "motion|hold|PROGRAM|fmu:FILE.fmu",
+        default_value = "motion",
+        hide_default_value = true
+    )]
+    controller: ControllerChoice,
     /// Format of standard output
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
 
-/// Prints every signal with its unit and its meaning.
+/// Prints every signal with its unit and its meaning, and the names of states.
 pub(super) fn signals(args: &SignalsArgs) -> anyhow::Result<Exit> {
     let plan = RunPlan::of_file(read_scenario(args.scenario.as_deref())?, args.scenario.as_deref())?;
-    let build = ControllerKind::default().builder();
-    let declared = build(&plan.scenario, plan.mechanism.clone(), plan.trajectory.clone()).declared();
-    let registry = Registry::new(&plan.scenario, &declared);
+    let registry = Registry::new(&plan.scenario, &declared_by(&args.controller, &plan)?);
     let text = match args.format {
         Format::Json => serde_json::to_string_pretty(registry.signals())? + "\n",
         Format::Human => {
             let signals = registry.signals().iter().fold(String::new(), |text, signal| {
                 text + &format!("{:<26} {:<6} {}\n", signal.name, signal.unit, signal.about)
             });
+            let states =
+                registry.signals().iter().fold(String::new(), |text, signal| match signal.states() {
+                    Some(states) => {
+                        let names: Vec<_> = states.into_iter().map(|(name, _)| name).collect();
+                        text + &format!("states of {}: {}\n", signal.name, names.join(", "))
+                    }
+                    None => text,
+                });
             let names: Vec<_> = event_names().collect();
-            format!("{signals}\nevents: {}\n", names.join(", "))
+            format!("{signals}\n{states}\nevents: {}\n", names.join(", "))
         }
     };
     result(&text)?;

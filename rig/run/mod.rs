@@ -6,6 +6,7 @@
 
 mod child;
 mod controller;
+mod declaration;
 pub(crate) mod interrupts;
 mod loop_watch;
 mod prepared;
@@ -19,5 +20,6 @@ mod supervisor;
 mod usage;
 
 pub(crate) use controller::{end_with_parent, exec_program};
+pub(crate) use declaration::declared_by;
 pub(crate) use prepared::PreparedRun;
 pub(crate) use resolve::{needs_processes, resolve_simulated};

@@ -1,6 +1,7 @@
 """FMUs as controllers: the same bytes as the law in Python, maps that do not fit, and FMUs that misbehave."""
 
 import os
+import subprocess
 import sys
 import threading
 from collections.abc import Callable
@@ -323,6 +324,19 @@ def test_an_fmu_controls_in_real_time(fmu: Callable[[str], Path], name: str) -> 
     result = play(fmu(name), clock="rt")
     # The machine may take cycles from the run, which is then not judged.
     assert result.exit_code in (0, 3), result.messages
+
+
+def test_the_signals_of_an_fmu_are_listed_before_a_run(
+    fmu: Callable[[str], Path], masseter_command: str, unpacked: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "law.fmu"
+    path.write_bytes(fmu("c2").read_bytes())
+    path.with_suffix(".toml").write_text(MAP)
+    listed = subprocess.run(
+        [masseter_command, "signals", "--controller", f"fmu:{path}"], stdout=subprocess.PIPE, text=True, timeout=60, check=True
+    ).stdout
+    assert [line.split()[0] for line in listed.splitlines() if line.startswith(("signal.", "parameter.gain"))] == ["signal.error", "parameter.gain"]
+    assert list(unpacked.iterdir()) == []
 
 
 def test_two_rigs_play_the_same_fmu_at_once(fmu: Callable[[str], Path], unpacked: Path) -> None:

@@ -75,9 +75,19 @@ impl Registry {
     /// # Errors
     /// [`UnknownSignal`] with the most similar name.
     pub fn place_of(&self, name: &str) -> Result<usize, UnknownSignal> {
-        self.signals.iter().position(|signal| signal.name == name).ok_or_else(|| {
-            let question = nearest(name, self.signals.iter().map(|signal| signal.name.as_str()))
-                .map_or_else(String::new, |likely| format!("; did you mean '{likely}'?"));
+        let place = |name: &str| self.signals.iter().position(|signal| signal.name == name);
+        place(name).ok_or_else(|| {
+            let own = format!("signal.{name}");
+            let names = self.signals.iter().map(|signal| signal.name.as_str());
+            let likely = if place(&own).is_some() { Some(&*own) } else { nearest(name, names) };
+            let question = match likely {
+                Some(likely) => format!("; did you mean '{likely}'?"),
+                None if name.contains('.') => String::new(),
+                None => format!(
+                    "; one that your program declares is '{}', and masseter signals --controller PROGRAM lists it",
+                    excerpt(&own)
+                ),
+            };
             UnknownSignal { name: name.to_owned(), question }
         })
     }
