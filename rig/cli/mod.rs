@@ -308,6 +308,8 @@ mod tests {
     use std::path::Path;
     use std::{fs, iter};
 
+    use masseter_judge::NextStep;
+
     use super::*;
 
     /// Every command that a user meets, with its names from the verb on.
@@ -326,6 +328,42 @@ mod tests {
     fn command_lines(text: &str) -> impl Iterator<Item = &str> {
         let lines = text.lines().map(str::trim_start).filter(|line| line.starts_with("masseter "));
         lines.map(|line| line.split(['<', '>', '|', '#', '(']).next().unwrap_or_default())
+    }
+
+    /// What stands between backticks.
+    fn quoted(text: &str) -> impl Iterator<Item = &str> {
+        text.split('`').skip(1).step_by(2)
+    }
+
+    #[test]
+    fn what_to_do_next_names_commands_keys_and_documents_that_exist() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let reference = fs::read_to_string(root.join("docs/scenario.md")).unwrap();
+        for step in NextStep::ALL {
+            let sentence = step.sentence();
+            let is_apart = |c: char| c.is_whitespace() || "(),:;".contains(c);
+            for document in sentence.split(is_apart).filter(|word| word.starts_with("docs/")) {
+                assert!(root.join(document.trim_end_matches('.')).is_file(), "{step:?}: {document}");
+            }
+            for quoted in quoted(sentence) {
+                let line = quoted.replace("RUN", "runs/latest").replace("CLOCK", "virtual");
+                if line.starts_with("masseter ") {
+                    assert_parsed(&line);
+                } else if line.starts_with("--") {
+                    assert_parsed(&format!("masseter run {line}"));
+                } else if !line.contains('/') {
+                    let (table, key) =
+                        line.split_once('.').map_or((line.as_str(), ""), |(table, key)| (table, key));
+                    let has_table = reference.contains(&format!("`[{table}]`"))
+                        || reference.contains(&format!("| `{table}` |"));
+                    assert!(has_table || table.starts_with("[["), "{step:?}: {quoted}");
+                    assert!(
+                        key.is_empty() || reference.contains(&format!("| `{key}` |")),
+                        "{step:?}: {quoted}"
+                    );
+                }
+            }
+        }
     }
 
     fn assert_parsed(line: &str) {

@@ -116,7 +116,7 @@ while not shown[-1]:
     shown.pop()
 screen = "\n".join(shown[-24:])
 assert code == SAFE_STOP and shown[-1] == "timing: simulated", (code, screen)
-assert any(line.startswith("SAFE STOP: ") for line in shown[-8:]) and "FAIL sequence" in screen, screen
+assert any(line.startswith("SAFE STOP: ") for line in shown[-10:]) and "FAIL sequence" in screen, screen
 assert COLOUR.sub("", output).count("following_error") == 1 and re.search(r"\n +0\.5\d\d s  controller: ", output), output
 
 # The line of the progress is rewritten without colours, too.

@@ -7,7 +7,7 @@ use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind, NO_DR
 use masseter_runtime::messages::tap::{self, TapError};
 use masseter_runtime::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
 use masseter_runtime::named::{Declared, PlayedMotion};
-use masseter_scenario::{FaultKindConfig, Scenario};
+use masseter_scenario::{ChecksConfig, FaultKindConfig, Scenario};
 
 use crate::declared_faults::FaultWatch;
 use crate::events::{Code, EventRecord};
@@ -63,6 +63,7 @@ pub struct Analysis {
     /// None but in a dry run.
     axes: Option<AxisWatch>,
     tracking: Tracking,
+    limits: ChecksConfig,
     faults: FaultWatch,
     fault_kinds: Vec<FaultKindConfig>,
     stalls: ScenarioStalls,
@@ -126,6 +127,7 @@ impl Analysis {
                 if is_emulated { PoseSource::Truth } else { PoseSource::Estimate },
                 scenario.jaw.reference_point_m,
             ),
+            limits: scenario.checks,
             faults: FaultWatch::new(scenario.faults.len()),
             fault_kinds: scenario.faults.iter().map(|fault| fault.kind).collect(),
             stalls: ScenarioStalls::default(),
@@ -270,6 +272,7 @@ impl Analysis {
                 self.timeline.reference().map_or(MotionSpeed::Full, |of| of.speed(messages.progress_s));
             self.shown.iter_mut().for_each(|shown| shown.apply_path(&path, messages, speed));
             self.faults.apply_sample(&path);
+            self.figures.path_breach.take(&path, is_running(messages.controller_state), &self.limits);
             if let (Some(recorded), Some(used)) = (&mut self.recorded, &messages.solution) {
                 let is_counted = is_running(messages.controller_state) && used.motion_time_s >= 0.0;
                 if let Some(actual) = path.actual.filter(|_| is_counted) {

@@ -7,6 +7,7 @@ use masseter_scenario::wording::counted;
 use masseter_scenario::{ChecksConfig, FaultConfig};
 use serde::Serialize;
 
+use crate::breach::Breach;
 use crate::declared_faults::FaultFigures;
 use crate::tracking::PoseErrors;
 
@@ -75,6 +76,9 @@ pub struct Check {
     pub figures: Option<CheckFigures>,
     #[serde(skip)]
     pub(crate) subject: Subject,
+    /// The value beyond its limit, where it failed.
+    #[serde(skip)]
+    pub(crate) breach: Option<Breach>,
 }
 
 /// What a check is about.
@@ -95,7 +99,8 @@ pub(crate) enum Subject {
 
 impl Check {
     pub(crate) fn new(name: impl Into<Cow<'static, str>>, finding: String, result: CheckResult) -> Self {
-        Self { name: name.into(), id: None, finding, result, figures: None, subject: Subject::Rig }
+        let (id, figures, breach) = (None, None, None);
+        Self { name: name.into(), id, finding, result, figures, subject: Subject::Rig, breach }
     }
 
     /// Whether it is a requirement of the scenario, or an event that it expects.
@@ -106,6 +111,11 @@ impl Check {
     pub(crate) fn judged(name: &'static str, finding: String, passed: bool) -> Self {
         let result = if passed { CheckResult::Passed } else { CheckResult::Failed };
         Self::new(name, finding, result)
+    }
+
+    /// With what was beyond its limit.
+    pub(crate) fn with_breach(self, breach: impl Into<Option<Breach>>) -> Self {
+        Self { breach: breach.into(), ..self }
     }
 
     /// A failure that the machine may explain is excused.
@@ -132,7 +142,7 @@ const AROUND: &str = ", approach and hold included";
 const FEWEST_SAMPLES: u64 = 10;
 
 /// NaN exceeds every limit.
-fn is_within(value: f64, limit: f64) -> bool {
+pub(crate) fn is_within(value: f64, limit: f64) -> bool {
     value <= limit
 }
 
@@ -167,16 +177,21 @@ pub(crate) fn tracking(
         .into_iter()
         .filter_map(|(what, value, limit, unit, more)| {
             let value = value?;
-            Some((value, limit, more, format!("{what} {value:.4}{unit}, limit {limit}{unit}")))
+            let breach = Breach::new(what, format!("{value:.4}{unit}"), format!("{limit}{unit}"));
+            Some((value, limit, more, breach))
         })
         .collect();
     found.sort_by(|(a, of_a, ..), (b, of_b, ..)| (b / of_b).total_cmp(&(a / of_a)));
     let exceeding = found.iter().filter(|(value, limit, ..)| !is_within(*value, *limit));
-    let exceeding: Vec<_> = exceeding.map(|(.., text)| text.as_str()).collect();
+    let in_words = |Breach { what, value, limit, .. }: &Breach| format!("{what} {value}, limit {limit}");
+    let exceeding: Vec<_> = exceeding.map(|(.., breach)| breach).collect();
     match found.first() {
-        _ if !exceeding.is_empty() => Check::judged(name, exceeding.join("; "), false),
+        _ if !exceeding.is_empty() => {
+            let finding: Vec<_> = exceeding.iter().map(|breach| in_words(breach)).collect();
+            Check::judged(name, finding.join("; "), false).with_breach(exceeding[0].clone())
+        }
         Some((_, _, more, closest)) if samples >= FEWEST_SAMPLES => {
-            Check::judged(name, format!("{closest}; {samples} samples{more}"), true)
+            Check::judged(name, format!("{}; {samples} samples{more}", in_words(closest)), true)
         }
         _ => {
             let samples = counted(samples, "sample");

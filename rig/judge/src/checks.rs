@@ -13,6 +13,7 @@ use masseter_runtime::schedule::CycleSchedule;
 use masseter_scenario::wording::counted;
 use masseter_scenario::{Dimension, ExpectedVerdict, StimulusConfig};
 
+use crate::breach::Breach;
 use crate::check::{Check, CheckFigures, CheckResult, Subject, faults, tracking};
 use crate::events::EventRecord;
 use crate::figures::Figures;
@@ -32,14 +33,19 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     let limits = &manifest.scenario.checks;
     let is_disturbed = timing.is_disturbed();
     let sequence = Check { subject: Subject::Sequence, ..sequence(manifest, figures) };
+    let path = &figures.path_breach;
     let TrackingFigures { actual_source, samples, actual, estimated, undisturbed, .. } = &figures.tracking;
     let tracking_of = |name, errors, undisturbed_errors| {
         let check = tracking(name, *samples, errors, limits);
+        let of_motion = check.breach.clone().map(|breach| breach.over(path.motion_ns));
+        let check = check.with_breach(of_motion);
         // What also fails where no lost cycle acted on the jaw is the rig's.
         let rest = tracking(name, undisturbed.samples, undisturbed_errors, limits);
         check.unless(is_disturbed && !rest.result.is_failed())
     };
-    let mut checks = vec![sequence, tracking_of("tracking", actual, &undisturbed.actual)];
+    let of_path = tracking_of("tracking", actual, &undisturbed.actual);
+    let first = path.first.clone().or_else(|| of_path.breach.clone());
+    let mut checks = vec![sequence, of_path.with_breach(first)];
     if actual_source.is_truth() {
         checks.push(tracking_of("estimated tracking", estimated, &undisturbed.estimated));
     }
@@ -66,7 +72,8 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     ]);
     // No lost cycle excuses a declared fault that led the jaw too far.
     let stopped_ns = stopped_ns(figures);
-    checks.extend(faults(&manifest.scenario.faults, &figures.faults, limits, stopped_ns));
+    let faults = faults(&manifest.scenario.faults, &figures.faults, limits, stopped_ns);
+    checks.extend(faults.map(|check| check.with_breach(path.first.clone())));
     checks.extend(stimuli(&manifest.scenario.stimulus, figures));
     checks
         .extend(figures.requirements.iter().map(|requirement| self::requirement(requirement, is_disturbed)));
@@ -83,7 +90,9 @@ fn stopped_ns(figures: &Figures) -> Option<u64> {
 /// A motion that waited for lost commands or readings is late from then on. `None` if the scenario's motion never began.
 fn motion_lag(motion: &MotionFigures, limit_ms: f64) -> Option<Check> {
     let lag_ms = motion.way_mm.and(motion.lag_ms)?;
-    Some(Check::judged("motion lag", format!("{lag_ms:.1} ms, limit {limit_ms} ms"), lag_ms <= limit_ms))
+    let check =
+        Check::judged("motion lag", format!("{lag_ms:.1} ms, limit {limit_ms} ms"), lag_ms <= limit_ms);
+    Some(check.with_breach(Breach::new("delay", format!("{lag_ms:.1} ms"), format!("{limit_ms} ms"))))
 }
 
 /// A cycle of the motion without a new command leaves the drives with the last one. As many in a row are allowed as the controller
@@ -98,7 +107,8 @@ fn missed_commands(manifest: &Manifest, figures: &Figures) -> Option<Check> {
         let why = format!("{finding}; faults of the scenario stall a loop");
         return Some(Check::not_judged("commands missed", why));
     }
-    Some(Check::judged("commands missed", finding, missed_in_a_row <= limit))
+    let breach = Breach::new("in a row", counted(missed_in_a_row, "cycle"), limit.to_string());
+    Some(Check::judged("commands missed", finding, missed_in_a_row <= limit).with_breach(breach))
 }
 
 /// Whether so many commands were late that the motion is another one than in simulated time, where none is.
@@ -132,7 +142,8 @@ fn kept_time(timing: &Timing, limit: u64) -> Option<Check> {
         TimingWord::Simulated | TimingWord::Unknown => return None,
     };
     let finding = format!("{timing}{}, limit of the rig {limit}", timing.evidence);
-    Some(Check::new("timing", finding, result))
+    let breach = Breach::new("missed by the rig", counted(timing.missed, "cycle"), limit.to_string());
+    Some(Check::new("timing", finding, result).with_breach(breach))
 }
 
 /// The motion must be played to its end, and not be stopped by request, unless the scenario expects that. The facts of master
@@ -168,7 +179,9 @@ fn sequence(manifest: &Manifest, figures: &Figures) -> Check {
     };
     let as_expected = if is_good { as_expected } else { "" };
     let whose = whose_motion(manifest);
+    let breach = Breach::new("last state", &in_words, "finished, without a stop").at(stopped_ns(figures));
     Check::judged(NAME, format!("ended in state {in_words}{how}{as_expected}{whose}"), is_good)
+        .with_breach(breach)
 }
 
 /// A test with stimuli of which one never began has not tested what it should. `None` without stimuli.
@@ -217,7 +230,8 @@ fn requirement(found: &RequirementFigures, is_disturbed: bool) -> Check {
         result => result,
     };
     let (id, figures) = (found.id.clone(), Some(figures));
-    Check { id, figures, subject, ..Check::new(found.name.clone(), finding, result) }
+    let breach = found.breach.clone();
+    Check { id, figures, subject, breach, ..Check::new(found.name.clone(), finding, result) }
 }
 
 /// Gaps show losses before the last recorded message. Losses behind it, and in unreadable parts, are unknown.
@@ -230,7 +244,11 @@ fn dropped_messages(missing: u64, ending: &Ending, is_cut_short: bool, is_damage
     ];
     match reasons.into_iter().find(|(is_so, _)| *is_so) {
         Some((_, why)) if missing == 0 => Check::not_judged(NAME, format!("no gap, but {why}")),
-        _ => Check::judged(NAME, missing.to_string(), missing == 0),
+        _ => Check::judged(NAME, missing.to_string(), missing == 0).with_breach(Breach::new(
+            "not recorded",
+            counted(missing, "message"),
+            "0",
+        )),
     }
 }
 
@@ -241,9 +259,10 @@ fn bus_response(response: &BusResponse, plant: &SkipFigures) -> Check {
     if let Some(why) = &response.unbounded {
         return Check::not_judged(NAME, why.clone());
     }
+    let us = |ns: Option<u64>| format!("{:.2} µs", ns.unwrap_or(0) as f64 / 1e3);
     let in_words = |message: &ResponseFigures| {
-        let [max_us, bound_us] = [message.max_ns, message.bound_ns].map(|ns| ns.unwrap_or(0) as f64 / 1e3);
-        format!("{} on bus {} took {max_us:.2} µs, bound {bound_us:.2} µs", message.message, message.bus)
+        let [max, bound] = [message.max_ns, message.bound_ns].map(us);
+        format!("{} on bus {} took {max}, bound {bound}", message.message, message.bus)
     };
     let unjudged = match response.off_time_frames {
         0 => String::new(),
@@ -261,7 +280,14 @@ fn bus_response(response: &BusResponse, plant: &SkipFigures) -> Check {
         let why = format!("; the plant stalled for {stalled_ms:.1} ms in all, which may explain that");
         Check::not_judged(NAME, exceeding.join("; ") + &why)
     } else {
-        Check::judged(NAME, exceeding.join("; "), false)
+        let first = response.exceeding().next().map(|message| {
+            Breach::new(
+                format!("{} on bus {}", message.message, message.bus),
+                us(message.max_ns),
+                us(message.bound_ns),
+            )
+        });
+        Check::judged(NAME, exceeding.join("; "), false).with_breach(first)
     }
 }
 

@@ -7,6 +7,7 @@ use masseter_recording::Damage;
 use masseter_runtime::messages::codes::ControllerState;
 use serde::Serialize;
 
+use crate::breach::PathBreach;
 use crate::declared_faults::FaultFigures;
 use crate::events::{Code, EventRecord};
 use crate::jaw_cycles::JawCycleFigures;
@@ -69,6 +70,9 @@ pub struct Figures {
     pub outage: Option<Outage>,
     /// Distance of the platform from its desired pose, while the motion played.
     pub tracking: TrackingFigures,
+    /// When the jaw first left its path beyond a limit.
+    #[serde(skip)]
+    pub path_breach: PathBreach,
     /// Distance of the jaw from the rows of a recorded motion; none of a generated one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recorded: Option<RecordedFigures>,

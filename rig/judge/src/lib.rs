@@ -4,6 +4,7 @@
 //! see the crates `masseter-recording` and `masseter-report`.
 
 mod analysis;
+mod breach;
 mod check;
 mod checks;
 mod declared_faults;
@@ -15,6 +16,7 @@ mod longest_cycles;
 mod lost_cycles;
 mod measured;
 mod messages;
+mod next_step;
 mod over_time;
 mod overruns;
 mod played;
@@ -34,6 +36,7 @@ mod verdict;
 mod watch;
 
 pub use analysis::Analysis;
+pub use breach::{Breach, PathBreach};
 pub use check::{Check, CheckFigures, CheckResult};
 pub use checks::whose_motion;
 pub use declared_faults::{Detection, FaultFigures};
@@ -47,6 +50,7 @@ pub use longest_cycles::{KernelCounts, WorstCycle, hop_names};
 pub use lost_cycles::{Outage, ReadingFigures};
 pub use measured::{IntervalFigures, Seconds, resolution_ns};
 pub use messages::{ParameterFigures, SequenceCheck, SignalFigures, TopicFigures};
+pub use next_step::NextStep;
 pub use over_time::{AxisFigures, ContactFigures, OverTime, ToothFigures, ToothLoads};
 pub use overruns::{LoopCounts, Overrun, OverrunCause};
 pub use played::{MotionFigures, StoppedBy};

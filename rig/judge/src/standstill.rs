@@ -12,12 +12,13 @@ use masseter_runtime::messages::codes::{ControllerState, DriveState, drive_state
 use masseter_scenario::{AFTER_STOP_S, ChecksConfig, Scenario};
 use serde::Serialize;
 
+use crate::breach::Breach;
 use crate::check::Check;
 use crate::poses::{true_pose, worse};
 use crate::signals::{CycleMessages, Sample};
 
 /// How far the mechanism moved after its stops.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct StandstillFigures {
     /// For how long the last stop was recorded, s; none without a stop.
     pub recorded_s: Option<f64>,
@@ -27,6 +28,9 @@ pub struct StandstillFigures {
     pub jaw_mm: Option<f64>,
     /// The largest angle of the platform, degrees.
     pub jaw_deg: Option<f64>,
+    /// When a way was first beyond its limit.
+    #[serde(skip)]
+    pub first: Option<Breach>,
 }
 
 /// Longest time from the stop to the loss of power; a drive that is not heard of says nothing of its power, ns.
@@ -44,6 +48,7 @@ pub(super) struct StandstillWatch {
     reaction_ns: [u64; AXES],
     is_at_work: bool,
     stop: Option<Stop>,
+    limits: ChecksConfig,
     figures: StandstillFigures,
 }
 
@@ -68,6 +73,7 @@ impl StandstillWatch {
             reaction_ns: std::array::from_fn(|axis| (reaction_s(axis) * SECOND_NS as f64) as u64),
             is_at_work: false,
             stop: None,
+            limits: scenario.checks,
             figures: StandstillFigures::default(),
         }
     }
@@ -99,6 +105,7 @@ impl StandstillWatch {
             *jaw_mm = Some(worse(jaw_mm.unwrap_or(0.0), moved.incisal_m * 1e3));
             *jaw_deg = Some(worse(jaw_deg.unwrap_or(0.0), moved.angle_rad.to_degrees()));
         }
+        self.figures.note_breach(*time_ns, &self.limits);
     }
 
     /// Notes a stop, the end of one, and the loss of power.
@@ -137,6 +144,45 @@ impl Stop {
     }
 }
 
+/// The largest way after a stop of an axis, or of the jaw, beside its limit.
+struct Way {
+    name: &'static str,
+    most: f64,
+    limit: f64,
+    unit: &'static str,
+}
+
+impl Way {
+    fn is_beyond(&self) -> bool {
+        self.most > self.limit
+    }
+}
+
+impl StandstillFigures {
+    fn ways(&self, limits: &ChecksConfig) -> Vec<Way> {
+        let ChecksConfig { standstill_axis_mm, standstill_jaw_mm, standstill_jaw_deg, .. } = *limits;
+        let way = |name, most, limit, unit| Way { name, most, limit, unit };
+        let jaw = [
+            self.jaw_mm.map(|most| way("incisal point", most, standstill_jaw_mm, " mm")),
+            self.jaw_deg.map(|most| way("platform", most, standstill_jaw_deg, "°")),
+        ];
+        let axes = AXIS_NAMES.iter().zip(self.axes_mm);
+        let axes = axes.map(|(name, most)| way(name, most, standstill_axis_mm, " mm"));
+        jaw.into_iter().flatten().chain(axes).collect()
+    }
+
+    /// Notes the first way beyond its limit.
+    fn note_breach(&mut self, time_ns: u64, limits: &ChecksConfig) {
+        if self.first.is_none() {
+            let beyond = self.ways(limits).into_iter().find(Way::is_beyond);
+            self.first = beyond.map(|Way { name, most, limit, unit }| {
+                let what = format!("{name} moved after the stop");
+                Breach::new(what, format!("{most:.3}{unit}"), format!("{limit}{unit}")).at(time_ns)
+            });
+        }
+    }
+}
+
 /// Whether the controller says that the motion is over.
 fn is_over(state: Option<u32>) -> bool {
     use ControllerState::{Disabling, Finished, SafeStop};
@@ -161,27 +207,20 @@ pub(super) fn standstill(
 ) -> Option<Check> {
     const NAME: &str = "standstill";
     let recorded_s = found.recorded_s?;
-    let ChecksConfig { standstill_axis_mm, standstill_jaw_mm, standstill_jaw_deg, .. } = *limits;
-    let axes = AXIS_NAMES.iter().zip(found.axes_mm).map(|(name, mm)| (*name, mm, standstill_axis_mm, " mm"));
-    let jaw = [
-        ("incisal point", found.jaw_mm, standstill_jaw_mm, " mm"),
-        ("platform", found.jaw_deg, standstill_jaw_deg, "°"),
-    ];
-    let jaw = jaw.into_iter().filter_map(|(name, most, limit, unit)| Some((name, most?, limit, unit)));
-    let ways: Vec<_> = jaw.chain(axes).collect();
-    let in_words = |(name, most, limit, unit): &(&str, f64, f64, &str)| {
-        format!("{name} {most:.3}{unit}, limit {limit}{unit}")
-    };
-    let beyond: Vec<_> = ways.iter().filter(|(_, most, limit, _)| most > limit).map(in_words).collect();
+    let ways = found.ways(limits);
+    let in_words =
+        |Way { name, most, limit, unit }: &Way| format!("{name} {most:.3}{unit}, limit {limit}{unit}");
+    let beyond: Vec<_> = ways.iter().filter(|way| way.is_beyond()).map(in_words).collect();
     if !beyond.is_empty() {
-        return Some(Check::judged(NAME, format!("moved after the stop: {}", beyond.join("; ")), false));
+        let check = Check::judged(NAME, format!("moved after the stop: {}", beyond.join("; ")), false);
+        return Some(check.with_breach(found.first.clone()));
     }
     if recorded_s < AFTER_STOP_S * LEAST_SHARE {
         let why = format!("recorded for {recorded_s:.3} s after the stop, {AFTER_STOP_S} s needed");
         let is_whole = matches!(ending, Ending::Completed | Ending::SafeStop) && !is_partial;
         return Some(if is_whole { Check::untested(NAME, why) } else { Check::not_judged(NAME, why) });
     }
-    let closest = ways.iter().max_by(|(_, a, of_a, _), (_, b, of_b, _)| (a / of_a).total_cmp(&(b / of_b)));
+    let closest = ways.iter().max_by(|a, b| (a.most / a.limit).total_cmp(&(b.most / b.limit)));
     let closest = closest.map_or_else(String::new, in_words);
     Some(Check::judged(NAME, format!("{closest}; observed for {recorded_s:.2} s after the stop"), true))
 }

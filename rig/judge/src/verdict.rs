@@ -10,11 +10,13 @@ use masseter_scenario::{CanConfig, ChecksConfig, ExpectConfig, ExpectedVerdict, 
 use masseter_terminal::Exit;
 use serde::Serialize;
 
+use crate::breach::{Breach, earliest_breach};
 use crate::check::{Check, CheckResult, Subject, left_its_path};
 use crate::checks::{Shortfall, checks, is_often_late};
 use crate::events::EventRecord;
 use crate::figures::Figures;
 use crate::lost_cycles::Outage;
+use crate::next_step::NextStep;
 use crate::played::{MotionFigures, StoppedBy};
 use crate::timing::{Timing, TimingWord};
 
@@ -42,6 +44,12 @@ pub struct Verdict {
     pub exit_code: Exit,
     /// Whether the deadlines were kept.
     pub timing: Timing,
+    /// The earliest value beyond its limit; none of a run that did not fail.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_breach: Option<Breach>,
+    /// What to do next, with `RUN` for the folder of the run; none of a run that passed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub next_step: Option<String>,
     /// Every check, also those that passed.
     pub checks: Vec<Check>,
     /// What the plan of the run warns of. Warnings decide nothing.
@@ -89,8 +97,12 @@ impl Verdict {
         if outcome != Outcome::Named(Pass) {
             reason += &overload(&manifest.usage, manifest.scenario.rate_hz).unwrap_or_default();
         }
+        let first_breach = (outcome.word() == "FAIL").then(|| first_breach(&all, expect, figures)).flatten();
+        let next_step = NextStep::of(outcome, manifest, figures, &all, first_breach.as_ref());
         Self {
             word: outcome.word(),
+            first_breach,
+            next_step: next_step.map(|step| step.sentence().replace("CLOCK", &manifest.clock)),
             reason,
             exit_code: outcome.exit(),
             timing,
@@ -98,6 +110,17 @@ impl Verdict {
             warnings: manifest.warnings.clone(),
             outcome,
         }
+    }
+
+    /// The reason in words, with the first breach where one shows.
+    pub fn in_words(&self) -> String {
+        let first = self.first_breach.as_ref().map(|breach| format!("; first: {breach}"));
+        self.reason.clone() + &first.unwrap_or_default()
+    }
+
+    /// What to do next with the run in this folder.
+    pub fn next_step_in(&self, folder: &str) -> Option<String> {
+        Some(self.next_step.as_ref()?.replace("RUN", folder))
     }
 
     /// What to do about the machine; `None` if the machine disturbed nothing.
@@ -385,6 +408,14 @@ fn wanted(expect: &ExpectConfig) -> String {
 /// Whether it is a check of what the scenario lets happen.
 fn is_of_scenario(check: &Check) -> bool {
     matches!(check.subject, Subject::Faults | Subject::Stimuli)
+}
+
+/// The earliest breach, but of the failures that the scenario expects.
+fn first_breach(checks: &[Check], expect: Option<&ExpectConfig>, figures: &Figures) -> Option<Breach> {
+    let is_expected =
+        |check: &&Check| expect.is_some_and(|expect| expect.failed.iter().any(|name| *name == check.name));
+    let motion_ns = figures.path_breach.motion_ns.map(|[began_ns, _]| began_ns);
+    earliest_breach(checks.iter().filter(|check| !is_expected(check)), motion_ns)
 }
 
 /// The checks of a result by their names; none without such checks.

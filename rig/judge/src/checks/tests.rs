@@ -107,6 +107,7 @@ mod shortfall {
             worst_at_s: None,
             worst_ns: None,
             latency_ms: None,
+            breach: None,
             may_be_disturbed: false,
             is_expected_event: false,
             is_truth,

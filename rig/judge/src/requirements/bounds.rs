@@ -11,6 +11,7 @@ use super::expression::Expression;
 use super::finding::{Finding, OfKey, Reason, Refused, RequirementPlot};
 use super::missing::Missing;
 use super::trigger::Window;
+use crate::breach::{Breach, widen};
 use crate::series::{Extremes, Series};
 use crate::signals::Values;
 
@@ -114,6 +115,10 @@ pub(super) struct Bounds {
     samples: u64,
     missing: Missing,
     worst: Option<Worst>,
+    /// The first value beyond a limit.
+    first: Option<Worst>,
+    /// From the first to the last judged sample, ns.
+    span_ns: Option<[u64; 2]>,
     fails_undisturbed: bool,
     sum: f64,
     squares: f64,
@@ -124,7 +129,7 @@ pub(super) struct Bounds {
     began_ns: Option<u64>,
 }
 
-/// The smallest margin so far.
+/// A margin, such as the smallest so far.
 #[derive(Debug, Clone, Copy)]
 struct Worst {
     margin: f64,
@@ -188,6 +193,8 @@ impl Bounds {
             samples: 0,
             missing: Missing::default(),
             worst: None,
+            first: None,
+            span_ns: None,
             fails_undisturbed: false,
             sum: 0.0,
             squares: 0.0,
@@ -203,24 +210,28 @@ impl Bounds {
         self.of.is_truth
     }
 
-    /// What must hold, in words.
-    pub(super) fn must(&self) -> String {
+    /// What is judged, in words.
+    fn what(&self) -> String {
         let text = &self.of.text;
-        let what = match self.statistic {
+        match self.statistic {
             Statistic::Value => text.clone(),
             Statistic::Abs => format!("|{text}|"),
             Statistic::Mean => format!("mean of {text}"),
             Statistic::Rms => format!("rms of {text}"),
             Statistic::PeakToPeak => format!("peak to peak of {text}"),
             Statistic::Percentile => format!("percentile {} of {text}", self.percentile),
-        };
+        }
+    }
+
+    /// What must hold, in words.
+    pub(super) fn must(&self) -> String {
         let in_unit = |limit: f64| self.of.unit.text(limit);
         let limits = match (self.limits.min, self.limits.max) {
             (Some(min), Some(max)) => format!("within {} and {}", in_unit(min), in_unit(max)),
             (Some(min), None) => format!("at least {}", in_unit(min)),
             (None, max) => format!("at most {}", in_unit(max.unwrap_or(f64::NAN))),
         };
-        format!("{what} {limits}{}", self.window.text)
+        format!("{} {limits}{}", self.what(), self.window.text)
     }
 
     pub(super) fn judge_moment(&mut self, moment: &Moment<'_>) {
@@ -244,9 +255,14 @@ impl Bounds {
         }
         let (margin, _) = self.limits.margin(value);
         self.fails_undisturbed |= margin < 0.0 && !moment.is_disturbed;
+        let found = Worst { margin, value, time_ns: moment.time_ns };
         if self.worst.is_none_or(|worst| margin < worst.margin) {
-            self.worst = Some(Worst { margin, value, time_ns: moment.time_ns });
+            self.worst = Some(found);
         }
+        if margin < 0.0 {
+            self.first.get_or_insert(found);
+        }
+        widen(&mut self.span_ns, moment.time_ns);
     }
 
     /// The signal over time, with its limits and the statistic that was judged.
@@ -289,10 +305,17 @@ impl Bounds {
         let value = if is_of_values { worst.value } else { self.value_of_statistic() };
         let (margin, limit) = self.limits.margin(value);
         let text = format!("{} in {} samples", unit.text(value), self.samples);
+        let (first, span_ns) = match self.first.filter(|_| is_of_values) {
+            Some(first) => (first.value, Some([first.time_ns; 2])),
+            None => (value, self.span_ns),
+        };
+        let limit_of_first = self.limits.margin(first).1;
+        let breach = Breach::new(self.what(), unit.text(first), unit.text(limit_of_first)).over(span_ns);
         let finding = Finding {
             margin: Some(margin).filter(|margin| margin.is_finite()),
             relative_margin: Finding::share(margin, limit),
             worst_ns: is_of_values.then_some(worst.time_ns),
+            breach: Some(breach).filter(|_| margin < 0.0),
             may_be_disturbed: !(is_of_values && self.fails_undisturbed),
             ..Finding::new(margin >= 0.0, text, unit)
         };

@@ -7,6 +7,7 @@ use super::condition::{Condition, Lookup, Moment, is_condition};
 use super::finding::{Finding, OfKey, Refused};
 use super::missing::Missing;
 use super::trigger::{Trigger, Window};
+use crate::breach::{Breach, widen};
 
 /// Judges that something never happens.
 #[derive(Debug, Clone)]
@@ -96,7 +97,12 @@ impl Never {
             0 => format!("never in {} samples", self.samples),
             times => format!("in {times} of {} samples", self.samples),
         };
+        let (what, how) = match &self.what {
+            What::Condition(condition) => (&condition.text, "held"),
+            What::Occurrence(trigger) => (&trigger.text, "occurred"),
+        };
         let finding = Finding {
+            breach: self.first_ns.map(|first_ns| Breach::new(what, how, "never").at(first_ns)),
             margin: worst.map(|(margin, _)| margin),
             relative_margin,
             worst_ns: self.first_ns.or(worst.map(|(_, time_ns)| time_ns)),
@@ -114,7 +120,11 @@ pub(super) struct Count {
     at_least: Option<u64>,
     at_most: Option<u64>,
     samples: u64,
+    /// From the first to the last judged sample, ns.
+    span_ns: Option<[u64; 2]>,
     times: u64,
+    /// When it first occurred more often than it may.
+    beyond_ns: Option<u64>,
     last_ns: Option<u64>,
 }
 
@@ -130,15 +140,20 @@ impl Count {
         let event = config.event.as_deref().unwrap_or_default();
         let trigger = Trigger::parse(event, of).of_key("require.event")?;
         let window = Window::new(config, of)?;
-        Ok(Self { trigger, window, at_least, at_most, samples: 0, times: 0, last_ns: None })
+        let (span_ns, beyond_ns, last_ns) = (None, None, None);
+        Ok(Self { trigger, window, at_least, at_most, samples: 0, span_ns, times: 0, beyond_ns, last_ns })
     }
 
     /// What must hold, in words.
     pub(super) fn must(&self) -> String {
+        format!("{} {} times{}", self.trigger.text, self.limits(), self.window.text)
+    }
+
+    fn limits(&self) -> String {
         let least = self.at_least.map(|least| format!("at least {least}"));
         let most = self.at_most.map(|most| format!("at most {most}"));
         let limits: Vec<_> = least.into_iter().chain(most).collect();
-        format!("{} {} times{}", self.trigger.text, limits.join(" and "), self.window.text)
+        limits.join(" and ")
     }
 
     pub(super) fn judge_moment(&mut self, moment: &Moment<'_>) {
@@ -149,6 +164,10 @@ impl Count {
             if times > 0 {
                 self.last_ns = Some(moment.time_ns);
             }
+            if self.at_most.is_some_and(|most| self.times > most) {
+                self.beyond_ns.get_or_insert(moment.time_ns);
+            }
+            widen(&mut self.span_ns, moment.time_ns);
         }
     }
 
@@ -161,7 +180,10 @@ impl Count {
         let below = self.at_most.map(|most| most as f64 - self.times as f64);
         let margin = above.into_iter().chain(below).fold(f64::INFINITY, f64::min);
         let text = counted(self.times, "time");
-        let finding = Finding::new(margin >= 0.0, text, unit);
+        let breach = Breach::new(&self.trigger.text, &text, self.limits());
+        let span_ns = self.beyond_ns.map_or(self.span_ns, |beyond_ns| Some([beyond_ns; 2]));
+        let breach = (margin < 0.0).then(|| breach.over(span_ns));
+        let finding = Finding { breach, ..Finding::new(margin >= 0.0, text, unit) };
         self.window.limit(Finding { margin: Some(margin), worst_ns: self.last_ns, ..finding }, None)
     }
 }
@@ -201,13 +223,17 @@ impl Order {
         if let Some((missing, _)) = self.steps.iter().find(|(_, first_ns)| first_ns.is_none()) {
             let text = format!("{} never came", missing.text);
             let has_begun = self.steps[0].1.is_some();
-            return if has_begun { Finding::new(false, text, unit) } else { Finding::untested(text, unit) };
+            let breach = Breach::new(&missing.text, "never came", "once");
+            let failed = Finding { breach: Some(breach), ..Finding::new(false, text.clone(), unit) };
+            return if has_begun { failed } else { Finding::untested(text, unit) };
         }
         let wrong = self.steps.windows(2).find(|pair| pair[1].1 < pair[0].1);
         match wrong {
             Some([(early, _), (late, late_ns)]) => {
                 let text = format!("{} came before {}", late.text, early.text);
-                Finding { worst_ns: *late_ns, ..Finding::new(false, text, unit) }
+                let breach =
+                    Breach::new(&late.text, format!("before {}", early.text), "after it").at(*late_ns);
+                Finding { breach: Some(breach), worst_ns: *late_ns, ..Finding::new(false, text, unit) }
             }
             _ => Finding::new(true, "in this order".to_owned(), unit),
         }

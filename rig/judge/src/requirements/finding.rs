@@ -4,6 +4,7 @@ use masseter_scenario::Unit;
 use serde::Serialize;
 
 use super::missing::Missing;
+use crate::breach::Breach;
 use crate::check::CheckResult;
 use crate::series::Curve;
 use crate::signals::UnknownSignal;
@@ -24,6 +25,8 @@ pub(super) struct Finding {
     pub(super) worst_ns: Option<u64>,
     /// The longest time from a trigger to its response, s.
     pub(super) latency_s: Option<f64>,
+    /// The first value beyond its limit; none where it passes.
+    pub(super) breach: Option<Breach>,
     /// Whether the machine may have caused a failure, where the machine lost cycles.
     pub(super) may_be_disturbed: bool,
 }
@@ -60,8 +63,9 @@ impl Finding {
     /// A judgement without figures.
     pub(super) fn new(passes: bool, text: String, unit: Unit) -> Self {
         let result = if passes { CheckResult::Passed } else { CheckResult::Failed };
-        let (margin, relative_margin, worst_ns, latency_s) = (None, None, None, None);
-        Self { result, text, margin, relative_margin, unit, worst_ns, latency_s, may_be_disturbed: true }
+        let (margin, relative_margin, worst_ns, latency_s, breach) = (None, None, None, None, None);
+        let may_be_disturbed = true;
+        Self { result, text, margin, relative_margin, unit, worst_ns, latency_s, breach, may_be_disturbed }
     }
 
     /// The share of a margin in its limit; none without a limit other than 0.
@@ -96,6 +100,9 @@ pub struct RequirementFigures {
     pub worst_ns: Option<u64>,
     /// The longest time from a trigger to its response, ms.
     pub latency_ms: Option<f64>,
+    /// The first value beyond its limit; none where it passes.
+    #[serde(skip)]
+    pub breach: Option<Breach>,
     /// Whether the machine may have caused a failure, where the machine lost cycles.
     #[serde(skip)]
     pub may_be_disturbed: bool,

@@ -266,6 +266,7 @@ impl Requirement {
             worst_at_s: finding.worst_ns.and_then(since_motion_s),
             worst_ns: finding.worst_ns,
             latency_ms: finding.latency_s.map(|seconds| seconds * 1e3),
+            breach: finding.breach,
             may_be_disturbed: finding.may_be_disturbed,
             is_expected_event: self.is_expected_event,
             is_truth,

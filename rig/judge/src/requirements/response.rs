@@ -15,6 +15,7 @@ use super::condition::{Condition, Lookup, Moment};
 use super::finding::{Finding, OfKey, Refused};
 use super::missing::Phase;
 use super::trigger::{Trigger, Window};
+use crate::breach::Breach;
 
 /// Triggers that are followed at a time. More are counted, not judged.
 const MOST_OPEN: usize = 1000;
@@ -41,6 +42,8 @@ pub(super) struct Response {
     answered: u64,
     not_followed: u64,
     worst: Option<Answer>,
+    /// The first trigger without an answer in its time.
+    first_failed: Option<Answer>,
     longest_s: Option<f64>,
     /// The shortest observation of an answer that the run's end cut, ns.
     cut_ns: Option<u64>,
@@ -105,6 +108,7 @@ impl Response {
             answered: 0,
             not_followed: 0,
             worst: None,
+            first_failed: None,
             longest_s: None,
             cut_ns: None,
             last_ns: 0,
@@ -228,6 +232,9 @@ impl Response {
             return;
         }
         self.answered += u64::from(answer.best >= 0.0);
+        if answer.best < 0.0 && self.first_failed.is_none_or(|first| answer.at_ns < first.at_ns) {
+            self.first_failed = Some(answer);
+        }
         self.cut_ns = self.cut_ns.into_iter().chain(answer.observed_ns).min();
         let margin = self.margin(&answer).unwrap_or(f64::NEG_INFINITY);
         let worst = self.worst.map(|worst| self.margin(&worst).unwrap_or(f64::NEG_INFINITY));
@@ -280,7 +287,22 @@ impl Response {
         let cut = self.cut_ns.map(|observed_ns| {
             format!("the run ended after {:.0} ms of {:.0} ms", ms(observed_ns), ms(self.stays_for_ns))
         });
-        self.window.limit(Finding { margin, relative_margin, worst_ns, latency_s, ..finding }, cut)
+        let breach = self.first_failed.map(|answer| self.breach(&answer));
+        self.window.limit(Finding { margin, relative_margin, worst_ns, latency_s, breach, ..finding }, cut)
+    }
+
+    /// A trigger without an answer in its time.
+    fn breach(&self, answer: &Answer) -> Breach {
+        let what = format!("{} after {}", self.then.text, self.trigger.text);
+        let value = answer.latency_s().map(|seconds| format!("came after {:.3} ms", seconds * 1e3));
+        let limit = self.within_ns.map(|ns| format!("{} ms", ns as f64 / 1e6));
+        let due_ns = answer.at_ns.saturating_add(self.within_ns.unwrap_or(0));
+        Breach::new(
+            what,
+            value.unwrap_or_else(|| "never came".to_owned()),
+            limit.unwrap_or_else(|| "once".to_owned()),
+        )
+        .at(due_ns)
     }
 
     fn in_words(&self) -> String {

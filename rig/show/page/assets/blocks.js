@@ -9,12 +9,13 @@
   });
 
   Masseter.block('verdict', (holder, data) => {
-    const panel = (name, tone, word, reason) => element('div', { class: `panel ${tone}` },
-      element('span', { class: 'name' }, name), element('strong', {}, word), reason ? element('p', {}, ...rich(reason)) : null);
+    const panel = (name, tone, word, reason, next) => element('div', { class: `panel ${tone}` },
+      element('span', { class: 'name' }, name), element('strong', {}, word), reason ? element('p', {}, ...rich(reason)) : null,
+      next ? element('p', { class: 'next' }, element('b', {}, 'Next: '), ...rich(next)) : null);
     const update = (now) => {
       const figures = now.figures.map(([name, value]) => [element('dt', {}, name), element('dd', {}, value)]);
       // Simulated time is no result: the line below the title names the clock.
-      holder.replaceChildren(element('div', { class: 'panels' }, panel('function', now.tone, now.word, now.reason),
+      holder.replaceChildren(element('div', { class: 'panels' }, panel('function', now.tone, now.word, now.reason, now.next),
         now.timing === 'simulated' ? null : panel('timing', now.timing_tone, now.timing, now.timing_reason)),
       figures.length ? element('dl', { class: 'figures' }, ...figures.map((pair) => element('div', {}, ...pair))) : '');
     };

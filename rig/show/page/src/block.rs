@@ -113,6 +113,8 @@ pub struct Verdict {
     pub word: String,
     /// The reason in a sentence.
     pub reason: String,
+    /// What to do next; none where nothing is to do.
+    pub next: Option<String>,
     /// The outcome as a colour.
     pub tone: Tone,
     /// The timing in a word.

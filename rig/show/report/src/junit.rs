@@ -72,7 +72,9 @@ impl<'a> JunitRun<'a> {
             _ if !is_short => CaseResult::Passed,
             // The cases of its checks say it.
             Ok(verdict) if has_failure && verdict.is_by_checks() => CaseResult::Passed,
-            Ok(verdict) => CaseResult::Error(verdict.word, format!("{}: {}", verdict.word, verdict.reason)),
+            Ok(verdict) => {
+                CaseResult::Error(verdict.word, format!("{}: {}", verdict.word, verdict.in_words()))
+            }
             Err((kind, why)) => CaseResult::Error(kind, why),
         };
         cases.insert(0, Case { name: "run", took_s, result, earlier: Vec::new(), check: None });
@@ -90,6 +92,7 @@ impl<'a> JunitRun<'a> {
         let mut run = Self::new(&tested.name, verdict, is_short, tested.took_s);
         let earlier = tested.attempts.iter().take(tested.retries());
         run.cases[0].earlier = earlier.map(Attempt::word_and_reason).collect();
+        run.properties.extend(tested.last().verdict().into_iter().flat_map(told));
         let is_flaky = tested.retries() > 0 && !is_short;
         run.properties = warned(tested.warnings());
         run.properties.extend([
@@ -148,6 +151,13 @@ fn warned(warnings: &[String]) -> Vec<(&'static str, String)> {
     if warnings.is_empty() { Vec::new() } else { vec![("warnings", warnings.join("; "))] }
 }
 
+/// The first breach of a run and what to do next, as properties.
+fn told(verdict: &Verdict) -> impl Iterator<Item = (&'static str, String)> {
+    let first_breach = verdict.first_breach.as_ref().map(|breach| ("first breach", breach.to_string()));
+    let next_step = verdict.next_step.clone().map(|step| ("next step", step));
+    first_breach.into_iter().chain(next_step)
+}
+
 /// The case of a check. One that failed, in a run that passed, did so as the scenario expects.
 fn of_check(check: &Check, is_short: bool) -> CaseResult {
     let finding = &check.finding;
@@ -176,6 +186,7 @@ pub(crate) fn xml(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> 
         properties.push(("motion", "own".to_owned()));
     }
     let run = JunitRun::new(&name, Ok(verdict), verdict.exit_code != Exit::Passed, figures.duration_s);
+    properties.extend(told(verdict));
     let timestamp = Some(manifest.began.trim_end_matches('Z'));
     properties.extend(warned(&verdict.warnings));
     let run = JunitRun { class: "masseter.run", properties, timestamp, ..run };

@@ -1,6 +1,7 @@
 //! The report as text for a terminal.
 
 use std::fmt::Write;
+use std::path::Path;
 
 use masseter_judge::{
     AxisFigures, BusResponse, EventRecord, Figures, IntervalFigures, PoseErrors, ReadingFigures,
@@ -40,10 +41,12 @@ pub enum Detail {
     Whole,
 }
 
-/// The verdict on function and timing.
-pub(crate) fn verdict_in_words(manifest: &Manifest, verdict: &Verdict) -> String {
+/// The verdict on function and timing, and what to do next with the run in this folder.
+pub(crate) fn verdict_in_words(manifest: &Manifest, verdict: &Verdict, folder: &Path) -> String {
     let advice = verdict.advice(manifest).map_or_else(String::new, |advice| format!("  {advice}\n"));
-    format!("{}: {}\ntiming: {}\n{advice}", verdict.word, verdict.reason, verdict.timing)
+    let next = verdict.next_step_in(&folder.display().to_string());
+    let next = next.map_or_else(String::new, |next| format!("next: {next}\n"));
+    format!("{}: {}\n{next}timing: {}\n{advice}", verdict.word, verdict.in_words(), verdict.timing)
 }
 
 /// Checks and faults; with every detail also latencies and losses.

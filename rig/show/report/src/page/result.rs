@@ -10,7 +10,7 @@ use masseter_page::{
     Section, Series, Style, Table, Tone,
 };
 use masseter_recording::Manifest;
-use masseter_runtime::messages::codes::{ControllerState, EventKind};
+use masseter_runtime::messages::codes::{ControllerState, EventKind, Source};
 use masseter_terminal::Exit;
 
 use super::stop::{chain, moments, stop};
@@ -83,22 +83,17 @@ fn panel(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> masseter_
     let (word, more) = timing.split_once(" (").unwrap_or((&timing, ""));
     let more = more.trim_end_matches(')').to_owned();
     let reasons = [more].into_iter().filter(|more| !more.is_empty()).chain(verdict.advice(manifest));
-    // The names of failed checks are no cause.
-    let cause = match (verdict.is_by_checks(), stop(figures)) {
-        (true, Some(stop)) => format!("; safe stop: {}", stop.in_words()),
-        (true, None) => {
-            let first = verdict.checks.iter().find(|check| check.result == CheckResult::Failed);
-            first.map_or_else(String::new, |Check { name, finding, .. }| format!("; {name}: {finding}"))
-        }
-        (false, _) => String::new(),
-    };
+    let cause = stop(figures).filter(|_| verdict.is_by_checks());
+    let cause = cause.map_or_else(String::new, |stop| format!("; safe stop: {}", stop.in_words()));
     let ended = match verdict.exit_code {
         Exit::Died | Exit::Interrupted => played_until(figures),
         _ => String::new(),
     };
     masseter_page::Verdict {
         word: verdict.word.to_owned(),
-        reason: verdict.reason.clone() + &cause + &ended,
+        reason: verdict.in_words() + &cause + &ended,
+        // The page lies in the run's folder.
+        next: verdict.next_step.as_ref().map(|step| step.replace("RUN/", "").replace("RUN", ".")),
         tone: match verdict.exit_code {
             Exit::Passed => Tone::Good,
             Exit::Invalid | Exit::Interrupted => Tone::Doubtful,
@@ -177,20 +172,43 @@ fn requirement_chart(figures: &Figures, of: &RequirementFigures) -> Option<Chart
 }
 
 pub(super) fn events_section(figures: &Figures) -> Section {
-    let row = |event: &EventRecord| {
-        let source = event.source.to_string();
-        let text = event.in_words();
-        let text = text.strip_prefix(&source).map_or(&*text, |rest| rest.trim_start_matches([':', ' ']));
-        EventRow {
-            at_s: since_s(figures, event.time_ns),
-            is_fault: event.kind == EventKind::Fault,
-            text: text.to_owned(),
-            source,
-        }
+    let row = |event: &EventRecord| EventRow {
+        at_s: since_s(figures, event.time_ns),
+        is_fault: event.kind == EventKind::Fault,
+        text: without_source(event),
+        source: event.source.to_string(),
     };
     let (start, rest) = phases(&figures.events);
     let events = Events { start: start.iter().map(row).collect(), rest: rest.iter().map(row).collect() };
-    Section::new("what-happened", "Events", vec![Block::new("events", Content::Events(events))])
+    let all = Block::new("events", Content::Events(events));
+    Section::new("what-happened", "Events", first_faults(figures).into_iter().chain([all]).collect())
+}
+
+/// An event in words, where its source stands beside.
+fn without_source(event: &EventRecord) -> String {
+    let (source, text) = (event.source.to_string(), event.in_words());
+    text.strip_prefix(&source).map_or(&*text, |rest| rest.trim_start_matches([':', ' '])).to_owned()
+}
+
+/// The first fault that each drive and each other source reports; none where there is no fault.
+fn first_faults(figures: &Figures) -> Option<Block> {
+    let who = |event: &EventRecord| match event.axis.filter(|_| event.source == Source::Drive) {
+        Some(axis) => format!("drive {axis}"),
+        None => event.source.to_string(),
+    };
+    let mut first: Vec<(String, &EventRecord)> = Vec::new();
+    for event in figures.events.iter().filter(|event| event.kind == EventKind::Fault) {
+        let name = who(event);
+        if !first.iter().any(|(other, _)| *other == name) {
+            first.push((name, event));
+        }
+    }
+    let row = |(name, event): (String, &EventRecord)| -> [Cell; 3] {
+        [name.into(), Cell::Time { at_s: since_s(figures, event.time_ns) }, without_source(event).into()]
+    };
+    let columns = [Column::texts(&["reported by", "at", "first fault"])];
+    let table = Table::new("The first fault that each part reports", columns, first.into_iter().map(row));
+    (!table.rows.is_empty()).then(|| Block::table("first-faults", table))
 }
 
 /// The events until the controller first moves the jaw, and those from then on.
@@ -327,4 +345,42 @@ fn now(manifest: &Manifest, figures: &Figures, number: u64, left_out: u64) -> Li
         shown.push(["messages left out of this page".to_owned(), left_out.to_string()]);
     }
     Live { number, state: state.replace('_', " "), tone, progress, figures: shown }
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_runtime::messages::Event;
+    use masseter_runtime::messages::codes::Cause;
+
+    use super::*;
+
+    #[test]
+    fn of_each_drive_and_source_the_first_fault_is_told() {
+        let fault = |time_ns, source, axis, value| {
+            let event = Event::new(source, EventKind::Fault, Cause::ProcessDataLost);
+            EventRecord::from(&Event { time_ns, axis, node: axis as u16 + 1, value, ..event })
+        };
+        let events = vec![
+            fault(1_000_000_000, Source::Master, 0, 4.0),
+            fault(2_000_000_000, Source::Drive, 0, 5.0),
+            fault(3_000_000_000, Source::Drive, 1, 6.0),
+            fault(4_000_000_000, Source::Master, 1, 7.0),
+            fault(5_000_000_000, Source::Drive, 0, 8.0),
+        ];
+        let told = first_faults(&Figures { events, ..Figures::default() }).unwrap();
+        let Content::Table(Table { rows, .. }) = told.content else { panic!("no table") };
+        let row = |name: &str, at_s, words: &str| vec![name.into(), Cell::Time { at_s }, words.into()];
+        let words = |axis, node, cycles| {
+            format!(
+                "process_data_lost (axis {axis} (node {node} on bus 0): process data missing for {cycles} cycles)"
+            )
+        };
+        let expected = [
+            row("master", 1.0, &words("d1", 1, 4)),
+            row("drive d1", 2.0, &words("d1", 1, 5)),
+            row("drive d2", 3.0, &words("d2", 2, 6)),
+        ];
+        assert_eq!(rows, expected);
+        assert_eq!(first_faults(&Figures::default()), None);
+    }
 }

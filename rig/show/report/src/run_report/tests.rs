@@ -36,10 +36,43 @@ fn every_document_names_what_was_not_tested() {
 }
 
 #[test]
+fn every_document_of_a_failed_run_names_the_first_breach_and_the_next_step() {
+    let (manifest, mut figures) = run(1000, 1000);
+    figures.tracking.actual.rms_mm = Some(0.25);
+    figures.path_breach.motion_ns = Some([1_000_000_000, 3_000_000_000]);
+    let verdict = Verdict::new(&manifest, &figures);
+    let first = "tracking: platform rms 0.2500 mm, limit 0.1 mm, from 0.000 s to 2.000 s of the motion";
+    let next =
+        |run| format!("Compare desired and true motion in `{run}report.html`, then tune the controller");
+    let said = table::verdict_in_words(&manifest, &verdict, "runs/x".as_ref());
+    assert!(
+        said.starts_with("FAIL: failed: ") && said.contains(&format!("; first: {first}\nnext: ")),
+        "{said}"
+    );
+    assert!(said.contains(&next("runs/x/")), "{said}");
+    let xml = junit::xml(&manifest, &figures, &verdict).unwrap();
+    let property = |name, value: &str| format!("<property name=\"{name}\" value=\"{value}");
+    assert!(
+        xml.contains(&property("first breach", first)) && xml.contains(&property("next step", &next("RUN/"))),
+        "{xml}"
+    );
+    let page = page::html(&manifest, &figures, &verdict).unwrap();
+    assert!(
+        page.contains(&format!("; first: {first}\"")) && page.contains(&format!("\"next\":\"{}", next(""))),
+        "no breach"
+    );
+    let summary: serde_json::Value =
+        serde_json::from_str(&summary_json(&verdict, &figures).unwrap()).unwrap();
+    let breach = &summary["verdict"]["first_breach"];
+    assert_eq!((&breach["value"], &breach["at_s"]), (&"0.2500 mm".into(), &2.0.into()));
+    assert!(summary["verdict"]["next_step"].as_str().unwrap().starts_with(&next("RUN/")), "{summary}");
+}
+
+#[test]
 fn a_run_without_a_cycle_claims_nothing() {
     let (manifest, figures) = run(0, 0);
     let verdict = Verdict::new(&manifest, &figures);
-    let said = table::verdict_in_words(&manifest, &verdict);
+    let said = table::verdict_in_words(&manifest, &verdict, "runs/latest".as_ref());
     let text = said + &table::table_in_words(&manifest, &figures, &verdict, Detail::Brief);
     assert!(text.starts_with("UNTESTED: no cycle ran\n") && !text.contains("FAIL"), "{text}");
     assert!(text.contains("\ntiming: unknown, because no cycle ran\n"), "{text}");

@@ -31,6 +31,7 @@ fn require(run: &mut Run, result: CheckResult, may_be_disturbed: bool) {
         worst_at_s: None,
         worst_ns: None,
         latency_ms: None,
+        breach: None,
         may_be_disturbed,
         is_expected_event: false,
         is_truth: true,

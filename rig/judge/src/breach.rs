@@ -1,0 +1,119 @@
+//! Breaches: the first value of each failed check or requirement beyond its limit. The earliest one of a run shows where to
+//! look first.
+
+use std::borrow::Cow;
+use std::fmt::{self, Display, Formatter};
+
+use masseter_scenario::ChecksConfig;
+use serde::Serialize;
+
+use crate::check::{Check, is_within};
+use crate::tracking::PathSample;
+
+/// A value beyond its limit.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Breach {
+    /// The check or requirement that failed.
+    pub check: Cow<'static, str>,
+    /// What was judged.
+    pub what: String,
+    /// Its value, with the unit.
+    pub value: String,
+    /// Its limit, with the unit.
+    pub limit: String,
+    /// Where the breach shows in a stretch of time alone, such as a mean: the beginning of the stretch, s since the motion began.
+    pub from_s: Option<f64>,
+    /// When the limit was first exceeded, or the end of that stretch, s since the motion began.
+    pub at_s: Option<f64>,
+    /// The stretch, ns of the run's clock; of a moment both ends are the same.
+    #[serde(skip)]
+    span_ns: Option<[u64; 2]>,
+}
+
+impl Breach {
+    pub(crate) fn new(what: impl Into<String>, value: impl Into<String>, limit: impl Into<String>) -> Self {
+        Self { what: what.into(), value: value.into(), limit: limit.into(), ..Self::default() }
+    }
+
+    /// A breach at a moment.
+    pub(crate) fn at(self, time_ns: impl Into<Option<u64>>) -> Self {
+        self.over(time_ns.into().map(|time_ns| [time_ns; 2]))
+    }
+
+    /// A breach that shows in a stretch of time alone.
+    pub(crate) fn over(self, span_ns: Option<[u64; 2]>) -> Self {
+        Self { span_ns, ..self }
+    }
+
+    /// With its times since the motion began.
+    fn since(self, motion_ns: Option<u64>) -> Self {
+        let since_s = |ns: u64| Some((ns as f64 - motion_ns? as f64) / 1e9);
+        let [from_ns, at_ns] = [0, 1].map(|end| self.span_ns.map(|span_ns| span_ns[end]));
+        let from_s = from_ns.filter(|_| from_ns != at_ns).and_then(since_s);
+        Self { from_s, at_s: at_ns.and_then(since_s), ..self }
+    }
+}
+
+impl Display for Breach {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { check, what, value, limit, .. } = self;
+        write!(f, "{check}: {what} {value}, limit {limit}")?;
+        match (self.from_s, self.at_s) {
+            (Some(from_s), Some(at_s)) => write!(f, ", from {from_s:.3} s to {at_s:.3} s of the motion"),
+            (None, Some(at_s)) => write!(f, ", at {at_s:.3} s of the motion"),
+            (_, None) => Ok(()),
+        }
+    }
+}
+
+/// The earliest breach of the failed checks; those without a time come last.
+pub(crate) fn earliest_breach<'a>(
+    checks: impl Iterator<Item = &'a Check>,
+    motion_ns: Option<u64>,
+) -> Option<Breach> {
+    let failed = checks.filter(|check| check.result.is_failed());
+    let breaches = failed.filter_map(|check| Some((check, check.breach.as_ref()?)));
+    let (check, breach) =
+        breaches.min_by_key(|(_, breach)| breach.span_ns.map_or(u64::MAX, |[_, at_ns]| at_ns))?;
+    Some(Breach { check: check.name.clone(), ..breach.clone() }.since(motion_ns))
+}
+
+/// When the jaw first left its path beyond a limit, and when the motion played.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PathBreach {
+    /// The first and the last cycle of the motion, ns of the run's clock.
+    pub motion_ns: Option<[u64; 2]>,
+    /// The first error beyond its limit.
+    pub first: Option<Breach>,
+}
+
+impl PathBreach {
+    pub(crate) fn take(&mut self, sample: &PathSample, is_running: bool, limits: &ChecksConfig) {
+        let time_ns = sample.sampled_ns;
+        if is_running {
+            widen(&mut self.motion_ns, time_ns);
+        }
+        if self.first.is_some() {
+            return;
+        }
+        let deviation = &sample.deviation;
+        let errors = [
+            ("incisal point", deviation.incisal_m * 1e3, limits.tracking_max_mm, " mm"),
+            ("platform", deviation.origin_m * 1e3, limits.tracking_max_mm, " mm"),
+            ("platform", deviation.angle_rad.to_degrees(), limits.tracking_max_deg, "°"),
+        ];
+        let beyond = errors.into_iter().find(|(_, value, limit, _)| !is_within(*value, *limit));
+        self.first = beyond.map(|(name, value, limit, unit)| {
+            let what = format!("{name} from its path");
+            Breach::new(what, format!("{value:.4}{unit}"), format!("{limit}{unit}")).at(time_ns)
+        });
+    }
+}
+
+/// Extends a stretch to this time.
+pub(crate) fn widen(span_ns: &mut Option<[u64; 2]>, time_ns: u64) {
+    span_ns.get_or_insert([time_ns; 2])[1] = time_ns;
+}
+
+#[cfg(test)]
+mod tests;

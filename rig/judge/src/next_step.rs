@@ -1,0 +1,213 @@
+//! What to do next about a run that did not pass: one sentence for each kind of verdict.
+
+use masseter_recording::{Ending, Manifest};
+use masseter_runtime::messages::codes::{Cause, EventKind};
+use masseter_scenario::ExpectedVerdict::{Died, Fail, Incomplete, Interrupted, Pass, SafeStop, Untested};
+
+use crate::breach::Breach;
+use crate::check::{Check, CheckResult, Subject};
+use crate::events::{Code, EventRecord};
+use crate::figures::Figures;
+use crate::verdict::Outcome;
+
+/// Declares the steps, each with its sentence.
+macro_rules! next_steps {
+    ($($(#[$meta:meta])* $step:ident => $sentence:literal,)*) => {
+        /// What to do next.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum NextStep {
+            $($(#[$meta])* $step,)*
+        }
+
+        impl NextStep {
+            /// Every step.
+            pub const ALL: &[Self] = &[$(Self::$step),*];
+
+            /// The sentence, with `RUN` for the folder of the run and `CLOCK` for its clock.
+            pub const fn sentence(self) -> &'static str {
+                match self {
+                    $(Self::$step => $sentence,)*
+                }
+            }
+        }
+    };
+}
+
+next_steps! {
+    /// FAIL of another outcome than the expected one.
+    Expectation => "If this outcome is right, change `expect.verdict` in the scenario (docs/requirements.md); otherwise correct the controller.",
+    /// FAIL by a requirement.
+    Requirement => "Open `RUN/report.html` at that time, then correct the controller, or the limit in `[[require]]` (docs/requirements.md).",
+    /// FAIL by tracking.
+    Tracking => "Compare desired and true motion in `RUN/report.html`, then tune the controller (docs/tutorials/bring-up.md), or change `checks.tracking_max_mm`.",
+    /// FAIL by a late motion or missing commands.
+    Late => "Look for late readings and lost frames in `RUN/report.html`; `checks.motion_lag_ms` and `controller.stale_cycles` are the limits.",
+    /// FAIL by missed deadlines.
+    Timing => "Shorten the longest cycles that `RUN/report.html` lists, or lower `rate_hz` (docs/realtime.md).",
+    /// FAIL by a jaw that moved after its stop.
+    Standstill => "Find in `RUN/report.html` which axis moved after the stop, then check its brake; `checks.standstill_axis_mm` is the limit.",
+    /// FAIL by a declared fault that nothing detected in time.
+    Undetected => "Look up in docs/faults.md what detects this fault, then tighten that limit, such as `can.following_limit_m`.",
+    /// FAIL by the end of the sequence.
+    Sequence => "Find in the events of `RUN/report.html` what ended the motion, then correct it, or expect it (docs/requirements.md).",
+    /// FAIL by missing messages.
+    Dropped => "Run `masseter recording info RUN` to see what is missing, then repeat the run with less beside it, or with `recording.frames` = false.",
+    /// FAIL by a late frame on a bus.
+    Bus => "Find the late message in `RUN/report.html` under buses, then look for other senders on that bus (docs/can.md).",
+    /// SAFE STOP by a fault of the scenario.
+    DeclaredFault => "A fault of the scenario caused this stop; if the stop is right, set `expect.verdict` to safe_stop (docs/requirements.md).",
+    /// SAFE STOP by a drive.
+    Drive => "Remove the cause of the drive's error, which the events in `RUN/report.html` name (docs/robot.md), then run again.",
+    /// SAFE STOP by lost messages or nodes.
+    Lost => "Check wiring, power and bit rate of the named node; `RUN/report.html` shows axis and buses around the stop (docs/can.md).",
+    /// SAFE STOP by a configuration of a drive that is not as expected.
+    Configuration => "Run `masseter robot inspect RUN/scenario.toml` to see every object that differs, then correct the drive or its profile (docs/robot.md).",
+    /// SAFE STOP by a limit of an axis.
+    Limit => "Keep the motion within the axis' limits: smaller, slower or elsewhere; `RUN/report.html` shows the axis around the stop (docs/motions.md).",
+    /// SAFE STOP by the distance from the path.
+    OffPath => "Compare true and reported position around the stop in `RUN/report.html`, then tune the controller (docs/tutorials/bring-up.md), or check the axis.",
+    /// SAFE STOP by missing readings or commands.
+    Stale => "Find what delayed controller or plant: `masseter doctor`, then the longest cycles in `RUN/report.html` (docs/interface.md).",
+    /// SAFE STOP by the controller's law or its messages.
+    Law => "Repeat the decisions with `masseter replay RUN`, then correct the controller at the cycle of the event (docs/interface.md).",
+    /// SAFE STOP by a pose that the mechanism cannot have.
+    Pose => "Compare the scenario's `mechanism` with the rig, and the motion with its reach (docs/forward-kinematics.md, docs/motions.md).",
+    /// SAFE STOP by a start too far away.
+    Start => "Bring the jaw closer to the first pose of the motion, or raise `controller.start_tolerance_mm` (docs/robot.md).",
+    /// SAFE STOP without a cause of these.
+    Stop => "Read the events in `RUN/report.html` from the first fault on; docs/troubleshooting.md lists causes and remedies.",
+    /// DIED: the controller.
+    ControllerDied => "Read the controller's own messages in the terminal, then repeat its readings under a debugger (docs/interface.md): `masseter replay RUN`.",
+    /// DIED: a process that a fault of the scenario killed.
+    DeclaredDeath => "A fault of the scenario killed the process; if the death is right, set `expect.verdict` to died (docs/requirements.md).",
+    /// DIED: another process.
+    ProcessDied => "Run `masseter doctor` to see what the machine lacks, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
+    /// INVALID by lost cycles.
+    LostCycles => "Run `masseter doctor` and remove what it lists, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
+    /// INVALID without real time.
+    NoRealTime => "Run `masseter doctor`, which names the missing permission and the command that gives it, or run without `--require-rt`.",
+    /// INVALID by a clock that was set.
+    ClockSet => "Let nothing set the clock, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
+    /// INCOMPLETE.
+    Unwritten => "Free the disk, save what was written with `masseter recording recover RUN`, then repeat the run.",
+    /// INTERRUPTED by the user.
+    Repeat => "To judge the whole motion, repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
+    /// INTERRUPTED by a stimulus of the scenario.
+    DeclaredStop => "The scenario asks for this stop; if the stop is right, set `expect.verdict` to interrupted (docs/requirements.md).",
+    /// UNTESTED: a fault or stimulus did not act.
+    NeverActed => "Let the fault or stimulus act while the motion runs: change its time in `RUN/scenario.toml`, then run that file.",
+    /// UNTESTED: a requirement.
+    NotJudged => "Choose a window, trigger or signal that this motion has for the requirement in `RUN/scenario.toml`, then run that file (docs/requirements.md).",
+    /// UNTESTED: anything else.
+    TooLittle => "Play more of the motion: raise `duration_s` in `RUN/scenario.toml`, then run that file; the reason names what is missing.",
+}
+
+impl NextStep {
+    /// After a run with this outcome; none after a pass.
+    pub(crate) fn of(
+        outcome: Outcome,
+        manifest: &Manifest,
+        figures: &Figures,
+        checks: &[Check],
+        first_breach: Option<&Breach>,
+    ) -> Option<Self> {
+        let has_process_fault = || manifest.scenario.faults.iter().any(|fault| fault.kind.is_of_process());
+        Some(match (outcome, &manifest.ending) {
+            (Outcome::Named(Pass), _) => return None,
+            (Outcome::Named(Fail) | Outcome::ChecksFailed, _) => Self::of_failure(checks, first_breach),
+            (Outcome::Named(SafeStop), _) => Self::of_stop(figures),
+            (Outcome::Named(Died), _) if has_process_fault() => Self::DeclaredDeath,
+            (Outcome::Named(Died), Ending::Died { process, .. }) if process == "controller" => {
+                Self::ControllerDied
+            }
+            (Outcome::Named(Died), _) => Self::ProcessDied,
+            (Outcome::Named(Incomplete), _) => Self::Unwritten,
+            (Outcome::Named(Interrupted), Ending::Interrupted) => Self::Repeat,
+            (Outcome::Named(Interrupted), _) => Self::DeclaredStop,
+            (Outcome::Named(Untested), _) => Self::of_untested(checks),
+            (Outcome::Invalid, Ending::NotStarted) => Self::NoRealTime,
+            (Outcome::Invalid, _)
+                if manifest.usage.clock_jump_s != 0.0 && !manifest.scenario.can.is_virtual() =>
+            {
+                Self::ClockSet
+            }
+            (Outcome::Invalid, _) => Self::LostCycles,
+        })
+    }
+
+    /// By the check with the first breach.
+    fn of_failure(checks: &[Check], first_breach: Option<&Breach>) -> Self {
+        let is_first = |check: &&Check| first_breach.is_none_or(|breach| breach.check == check.name);
+        let mut failed = checks.iter().filter(|check| check.result.is_failed());
+        let Some(check) = failed.find(is_first) else { return Self::Expectation };
+        match (check.subject, check.name.as_ref()) {
+            (Subject::Requirement | Subject::ExpectedEvent, _) => Self::Requirement,
+            (Subject::Faults, _) => Self::Undetected,
+            (Subject::Sequence, _) => Self::Sequence,
+            (_, "motion lag" | "commands missed") => Self::Late,
+            (_, "timing") => Self::Timing,
+            (_, "standstill") => Self::Standstill,
+            (_, "dropped messages") => Self::Dropped,
+            (_, "bus response") => Self::Bus,
+            _ => Self::Tracking,
+        }
+    }
+
+    /// By the first fault that anybody reports, unless a fault of the scenario came before.
+    fn of_stop(figures: &Figures) -> Self {
+        use Cause::{
+            AccelerationLimit, BadMessage, BootTimeout, BusOff, BusRefused, CommandLost, DriveFault,
+            DuplicateNode, Emergency, EnableTimeout, EndStopHit, FaultAtStart, FaultFound, FollowingError,
+            ForeignCommand, ForwardKinematics, HeartbeatLost, HomeOffset, InverseKinematics, LawFailed,
+            NodeRestarted, NodeStopped, NotAccepted, NotEnabled, NotKept, NotReady, OrientationLost,
+            ProcessDataLost, SdoAborted, SdoTimeout, SecondMaster, StaleReading, StartTooFar, StillPowered,
+            StrokeLimit, TrackingLost, UnknownNode, VelocityLimit, WrongIdentity, WrongLength, WrongObject,
+            WrongPdo, WrongUnit,
+        };
+        let is_fault = |event: &&EventRecord| event.kind == EventKind::Fault;
+        let first = figures.events.iter().find(is_fault);
+        let is_before = |time_ns: u64| first.is_none_or(|first| time_ns <= first.time_ns);
+        if figures.faults.iter().filter_map(|fault| fault.struck_ns).any(is_before) {
+            return Self::DeclaredFault;
+        }
+        let Some(Code::Known(cause)) = first.map(|event| event.cause) else { return Self::Stop };
+        match cause {
+            DriveFault | Emergency | EnableTimeout | FaultAtStart | FaultFound | NotReady | NotEnabled
+            | StillPowered => Self::Drive,
+            HeartbeatLost | ProcessDataLost | BusRefused | BootTimeout | SdoTimeout | DuplicateNode
+            | NodeRestarted | NodeStopped | WrongLength | UnknownNode | SecondMaster | BusOff => Self::Lost,
+            WrongIdentity | WrongPdo | NotAccepted | SdoAborted | HomeOffset | WrongObject | WrongUnit
+            | NotKept => Self::Configuration,
+            StrokeLimit | VelocityLimit | AccelerationLimit | EndStopHit => Self::Limit,
+            TrackingLost | OrientationLost | FollowingError => Self::OffPath,
+            StaleReading | CommandLost => Self::Stale,
+            LawFailed | BadMessage | ForeignCommand => Self::Law,
+            ForwardKinematics | InverseKinematics => Self::Pose,
+            StartTooFar => Self::Start,
+            _ => Self::Stop,
+        }
+    }
+
+    fn of_untested(checks: &[Check]) -> Self {
+        let untested = checks.iter().find(|check| check.result == CheckResult::Untested);
+        match untested.map(|check| check.subject) {
+            Some(Subject::Faults | Subject::Stimuli) => Self::NeverActed,
+            Some(Subject::Requirement | Subject::ExpectedEvent) => Self::NotJudged,
+            _ => Self::TooLittle,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_step_is_one_sentence_of_at_most_25_words() {
+        for step in NextStep::ALL {
+            let sentence = step.sentence();
+            assert!(sentence.split_whitespace().count() <= 25, "{step:?}: {sentence}");
+            assert!(sentence.ends_with('.') && !sentence.contains(". "), "{step:?}: {sentence}");
+        }
+    }
+}
