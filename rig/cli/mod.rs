@@ -15,6 +15,7 @@ mod motion;
 mod plant;
 mod report;
 mod run;
+mod sdk;
 mod starter;
 mod test;
 

@@ -5,11 +5,13 @@ use std::fs::{self, File};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, bail};
 use clap::{Args, Subcommand, ValueEnum};
 use masseter_terminal::{Exit, result_line};
 
 use crate::run::runner::word;
+
+use super::sdk::Sdk;
 
 /// The scenario, as a path within the folder.
 const SCENARIO: &str = "scenario.toml";
@@ -61,9 +63,9 @@ pub(super) struct NewControllerArgs {
     /// Language
     #[arg(long, value_enum)]
     lang: Language,
-    /// Masseter's source [default: that of this program]
-    #[arg(long, value_name = "DIR")]
-    source: Option<PathBuf>,
+    /// Masseter's source, or a folder of scripts/release [default: the one above this command or above the current folder]
+    #[arg(long, value_name = "DIR", alias = "source")]
+    sdk: Option<PathBuf>,
 }
 
 /// A language with a project.
@@ -90,8 +92,7 @@ struct Project {
 const README: &str = include_str!("../../examples/controllers/README.md");
 const CMAKE: &str = "cmake -S . -B build && cmake --build build";
 
-const PIP: &str =
-    "python3 -m venv .venv && .venv/bin/pip install @SOURCE@/rig/bindings/python && chmod +x controller.py";
+const PIP: &str = "python3 -m venv .venv && .venv/bin/pip install @PACKAGE@ && chmod +x controller.py";
 
 impl Language {
     const fn project(self) -> Project {
@@ -140,41 +141,38 @@ impl Language {
 
 /// Writes the project, and prints the next commands.
 pub(super) fn new(NewVerb::Controller(args): &NewVerb) -> anyhow::Result<Exit> {
-    let source = args.source.clone().unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into());
-    ensure!(
-        source.join("rig/bindings/interface/masseter.h").is_file(),
-        "{} is not Masseter's source: give it by --source",
-        source.display()
-    );
-    let (source, folder) = (std::path::absolute(source)?, std::path::absolute(&args.folder)?);
+    let sdk = Sdk::new(args.sdk.as_deref())?;
+    let package = match args.lang {
+        Language::Rust => sdk.demand_crates().map(|()| PathBuf::new())?,
+        Language::Python => sdk.python_package()?,
+        Language::C | Language::Cpp => PathBuf::new(),
+    };
+    let folder = std::path::absolute(&args.folder)?;
     let project = args.lang.project();
-    lay_down(&args.folder, &files_of(&project, &source, &folder))?;
-    result_line!(
-        "{}: the controller; README.md has the next steps\n\
-         next: (cd {} && {}) && masseter run --controller {}",
-        args.folder.join(project.files[0].0).display(),
-        quoted(&args.folder),
-        project.build.replace("@SOURCE@", &quoted(&source)),
-        quoted(&as_program(&args.folder.join(project.program)))
-    )?;
-    Ok(Exit::Passed)
-}
-
-fn files_of(project: &Project, source: &Path, folder: &Path) -> Vec<StarterFile> {
+    let build = project.build.replace("@PACKAGE@", &quoted(&package));
     let readme = README
         .replace("@ABOUT@", project.about)
-        .replace("@BUILD@", project.build)
+        .replace("@BUILD@", &build)
         .replace("@PROGRAM@", &format!("./{}", project.program))
         .replace("@FILE@", project.files[0].0);
     let files = project.files.iter().map(|&(path, content)| (path, content.to_owned()));
     let in_place = |(path, content): (_, String)| StarterFile {
         path,
-        content: with_interpreter(content, folder)
-            .replace("@SOURCE@", &source.display().to_string())
-            .replace("@TARGET@", &source.join("target").display().to_string())
+        content: with_interpreter(content, &folder)
+            .replace("@LIBRARY@", sdk.cmake())
+            .replace("@SOURCE@", &sdk.folder().display().to_string())
+            .replace("@PACKAGE@", &package.display().to_string())
             .replace("@FOLDER@", &folder.display().to_string()),
     };
-    files.chain([("README.md", readme)]).map(in_place).collect()
+    lay_down(&args.folder, &files.chain([("README.md", readme)]).map(in_place).collect::<Vec<_>>())?;
+    result_line!(
+        "{}: the controller; README.md has the next steps\n\
+         next: (cd {} && {build}) && masseter run --controller {}",
+        args.folder.join(project.files[0].0).display(),
+        quoted(&args.folder),
+        quoted(&as_program(&args.folder.join(project.program)))
+    )?;
+    Ok(Exit::Passed)
 }
 
 /// The content with a first line that the kernel understands. Its line for an interpreter ends at the first space, so a

@@ -1,0 +1,5 @@
+set(MASSETER "@SOURCE@" CACHE PATH "Masseter's release folder")
+set(ENV{PKG_CONFIG_PATH} "${MASSETER}/lib/pkgconfig:$ENV{PKG_CONFIG_PATH}")
+find_package(PkgConfig REQUIRED)
+pkg_check_modules(masseter REQUIRED IMPORTED_TARGET masseter)
+add_library(masseter ALIAS PkgConfig::masseter)

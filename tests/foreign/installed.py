@@ -1,0 +1,156 @@
+"""A folder of scripts/release, installed where there is no source and no Rust: new controllers are made, built, run and judged.
+
+    installed.py FOLDER
+
+As root, the source is hidden by a mount while it runs. It needs a C and a C++ compiler, pkg-config, and packages from PyPI.
+"""
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+PROJECT = Path(__file__).resolve().parents[2]
+LANGUAGES = ["python", "c", "cpp"]
+#: Programs that a build from source would need.
+RUST = ["cargo", "rustc", "rustup"]
+AIM_S = 60.0
+
+
+class Installed:
+    """A copy of the release folder, and the environment of a user who has nothing else."""
+
+    def __init__(self, release: Path, root: Path) -> None:
+        self.root = root
+        self.sdk = root / "masseter größe 2"
+        shutil.copytree(release, self.sdk, symlinks=True)
+        home = root / "home"
+        home.mkdir()
+        tools = root / "tools"
+        path = [self.sdk / "bin", tools / "bin", "/usr/local/bin", "/usr/bin", "/bin"]
+        # Nothing else of this environment: pip may need to know where its index is.
+        kept = {name: value for name, value in os.environ.items() if name.startswith("PIP_") or name.lower().endswith("_proxy")}
+        self.environment = {**kept, "HOME": str(home), "LANG": "C.UTF-8", "PATH": ":".join(map(str, path))}
+        found = [name for name in RUST if shutil.which(name, path=self.environment["PATH"])]
+        assert not found, f"Rust is on the PATH: {found}"
+        subprocess.run([sys.executable, "-m", "venv", str(tools)], check=True, env=self.environment)
+        # The project's own build command calls this Python, and CMake.
+        self.shell(f"{tools}/bin/pip install --quiet --disable-pip-version-check cmake")
+
+    def shell(self, command: str, folder: Path | None = None, code: int = 0) -> str:
+        """What a command prints, which must end with this code."""
+        ended = subprocess.run(
+            command, shell=True, cwd=folder or self.root, env=self.environment, capture_output=True, text=True, timeout=540
+        )
+        assert ended.returncode == code, f"{command}: {ended.returncode}\n{ended.stdout}{ended.stderr}"
+        return ended.stdout + ended.stderr
+
+    def digest(self, program: str) -> str:
+        """The digest of a run that passes."""
+        arguments = f"--clock lockstep --duration 2 --quiet --format json --controller '{program}'"
+        summary = json.loads(self.shell(f"masseter run {arguments} 2>errors"))
+        assert summary["verdict"]["word"] == "PASS", summary["verdict"]
+        return summary["figures"]["digest"]
+
+
+def check_content(folder: Path) -> None:
+    """Every file has its checksum; no file knows where the source was; every crate in a program has its licence."""
+    lines = [line.split("  ", 1) for line in (folder / "SHA256SUMS").read_text().splitlines()]
+    sums = {name: digest for digest, name in lines}
+    files = {str(path.relative_to(folder)): path for path in folder.rglob("*") if path.is_file()}
+    assert sums.keys() == files.keys() - {"SHA256SUMS"}, sums.keys() ^ files.keys()
+    licences = (folder / "LICENSES/CRATES.txt").read_text().partition("-----")[0].splitlines()
+    listed = {"-".join(line.partition(":")[0].split()) for line in licences}
+    compiled: set[str] = set()
+    for name in sums:
+        content = files[name].read_bytes()
+        assert hashlib.sha256(content).hexdigest() == sums[name], name
+        assert f"{PROJECT}/".encode() not in content, f"{name} has the path {PROJECT}"
+        # A program names the files where it can panic.
+        compiled |= {crate.decode() for crate in re.findall(rb"/registry/src/[^/]+/([\w.+-]+)/src/", content)}
+    assert len(compiled) > 10 and compiled <= listed, f"without a licence: {compiled - listed}"
+    print(f"{len(sums)} files; {len(compiled)} of {len(listed)} crates are named by the programs, all with a licence")
+
+
+def check_linking(installed: Installed) -> None:
+    said = installed.shell(f"ldd '{installed.sdk}/bin/masseter' || true")
+    is_static = "statically linked" in said or "not a dynamic executable" in said
+    assert is_static == (installed.sdk / "LICENSES/C-LIBRARY.txt").exists(), said
+    print(f"command: {installed.shell('masseter --version').strip()}, {'static' if is_static else 'dynamic'}")
+
+
+def new_project(installed: Installed, language: str) -> tuple[str, str]:
+    """How a new project is built, and its program."""
+    said = installed.shell(f"masseter new controller --lang {language} {language}")
+    build, program = re.search(r"next: \(cd \w+ && (.*)\) && masseter run --controller (\S+)", said).groups()
+    return build, program
+
+
+def check_projects(installed: Installed) -> str:
+    digests = {}
+    for language in LANGUAGES:
+        began_s = time.monotonic()
+        build, program = new_project(installed, language)
+        installed.shell(build, installed.root / language)
+        digests[language] = installed.digest(program)
+        took_s = time.monotonic() - began_s
+        print(f"{language}: from nothing to a judged controller in {took_s:.1f} s (aim {AIM_S:.0f} s), digest {digests[language]}")
+    assert len(set(digests.values())) == 1, digests
+    refused = installed.shell("masseter new controller --lang rust rust", code=2)
+    assert "needs Masseter's source" in refused and "--sdk" in refused, refused
+    return digests["c"]
+
+
+def check_pkg_config(installed: Installed, expected: str) -> None:
+    """Both libraries by the compiler alone; the program with the static one needs no file of the folder."""
+    # pkg-config marks what a shell would split, and eval reads the marks.
+    found = f"$(PKG_CONFIG_PATH='{installed.sdk}/lib/pkgconfig' pkg-config --cflags --libs"
+    rpath = f"-Wl,-rpath,'{installed.sdk}/lib'"
+    for package, more in [("masseter", rpath), ("masseter-static", "")]:
+        installed.shell(f'eval "cc -O2 -ffp-contract=off c/controller.c -o {package} {found} {package}) {more} -lm"')
+        needed = installed.shell(f"ldd ./{package}")
+        assert ("libmasseter_c" in needed) == (package == "masseter"), needed
+        assert installed.digest(f"./{package}") == expected
+    print("pkg-config: the shared and the static library give the same digest")
+
+
+def check_package(installed: Installed) -> None:
+    program = "import masseter; print(masseter.run(clock='virtual', duration=2).verdict)"
+    said = installed.shell(f'python/.venv/bin/python -c "{program}"').strip()
+    assert said == "PASS", said
+    print("package: masseter.run passes")
+
+
+def without_source(arguments: list[str]) -> None:
+    """Starts this program again where mounts are its own, as far as that is allowed."""
+    if os.geteuid() != 0 or shutil.which("unshare") is None:
+        print("the source is not hidden, for which root is needed")
+        return
+    os.execvp("unshare", ["unshare", "--mount", sys.executable, __file__, *arguments, HIDDEN])
+
+
+HIDDEN = "--hide-source"
+
+
+def main(release: str, *hidden: str) -> None:
+    if not hidden:
+        without_source([release])
+    with tempfile.TemporaryDirectory() as name:
+        installed = Installed(Path(release), Path(name))
+        if hidden:
+            subprocess.run(["mount", "-t", "tmpfs", "none", str(PROJECT)], check=True)
+            assert not (PROJECT / "Cargo.toml").exists()
+        check_content(installed.sdk)
+        check_linking(installed)
+        expected = check_projects(installed)
+        check_pkg_config(installed, expected)
+        check_package(installed)
+
+
+main(*sys.argv[1:])
