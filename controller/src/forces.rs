@@ -105,8 +105,8 @@ pub(crate) fn signal(name: &str, unit: &str, about: &str) -> Signal {
 ///
 /// τ = J⁻ᵀ (M V̇ + h − w) + friction, with the [equations](masseter_model::dynamics) of the rigid bodies.
 #[derive(Debug, Clone)]
-struct Model {
-    mechanism: Mechanism,
+pub(crate) struct Model {
+    pub(crate) mechanism: Mechanism,
     bodies: Bodies,
     friction: Friction,
 }
@@ -124,7 +124,7 @@ struct Braking {
 
 impl Model {
     /// The model that the controller of a scenario assumes.
-    fn new(scenario: &Scenario, mechanism: Mechanism) -> Self {
+    pub(crate) fn new(scenario: &Scenario, mechanism: Mechanism) -> Self {
         let config = scenario.model();
         Self { mechanism, bodies: Bodies::from(&config), friction: Friction::new(&config) }
     }
@@ -136,7 +136,12 @@ impl Model {
 
     /// Forces of the axes d₁ d₂ d₃ l₁ l₂ l₃ (N) that give a motion the acceleration V̇ (m/s², rad/s²). They act
     /// against an external wrench on the platform (N, N m). None in a singular pose.
-    fn force_n(&self, motion: &Motion, acceleration: &Twist, wrench: &Vector6<f64>) -> Option<Vector6<f64>> {
+    pub(crate) fn force_n(
+        &self,
+        motion: &Motion,
+        acceleration: &Twist,
+        wrench: &Vector6<f64>,
+    ) -> Option<Vector6<f64>> {
         let equations = Equations::new(&self.bodies, motion);
         let moved_n = equations.inverse(acceleration, wrench)?;
         let loads = Reactions::new(&self.bodies, motion, acceleration, &moved_n).loads(&moved_n);
@@ -171,10 +176,17 @@ impl Model {
 }
 
 /// The constant twist that leads from one pose to another in a time (s), base axes, m/s and rad/s.
-fn twist_between(from: &Pose, to: &Pose, time_s: f64) -> Twist {
+pub(crate) fn twist_between(from: &Pose, to: &Pose, time_s: f64) -> Twist {
     let way = to.translation.vector - from.translation.vector;
     let turn = (to.rotation * from.rotation.inverse()).scaled_axis();
     Twist::new(way.x, way.y, way.z, turn.x, turn.y, turn.z) / time_s
+}
+
+/// Twist and acceleration at the middle of three poses, one period (s) apart.
+pub(crate) fn derivatives([before, here, after]: [Pose; 3], period_s: f64) -> (Twist, Twist) {
+    let to = twist_between(&before, &here, period_s);
+    let from = twist_between(&here, &after, period_s);
+    ((to + from) / 2.0, (from - to) / period_s)
 }
 
 /// The measurement between the last two samples.
@@ -341,13 +353,9 @@ impl FeedForward {
     /// The forces for the middle of three desired poses, one period apart, N. A law's detour changes the velocity; its
     /// acceleration and its distance from the pose are ignored. Zeros in a singular pose.
     fn offset_n(&mut self, poses: [Pose; 3], detour: &Detour) -> [f64; AXES] {
-        let [before, here, after] = poses;
-        let to = twist_between(&before, &here, self.period_s);
-        let from = twist_between(&here, &after, self.period_s);
-        let mut twist = (to + from) / 2.0;
+        let (mut twist, acceleration) = derivatives(poses, self.period_s);
         twist.fixed_rows_mut::<3>(0).zip_apply(&detour.ahead_m_s, |mean, more| *mean += more);
-        let acceleration: Twist = (from - to) / self.period_s;
-        let motion = self.model.motion(&here, &twist);
+        let motion = self.model.motion(&poses[1], &twist);
         let force_n = motion.and_then(|motion| self.model.force_n(&motion, &acceleration, &Twist::zeros()));
         self.share = (self.share + self.period_s / FADE_IN_S).min(1.0);
         force_n.map_or([0.0; AXES], |force_n| (force_n * self.share).into())

@@ -13,6 +13,7 @@ pub mod playback;
 mod pose_control;
 pub mod pose_law;
 pub mod process;
+pub mod robot_model;
 mod safety;
 mod sequencer;
 mod targets;

@@ -3,7 +3,7 @@
 //! A pure step function: time and readings come in, messages go out, and nothing is allocated. This module
 //! uses no transport, no clock and no CAN.
 
-use masseter_model::geometry::{Mechanism, Pose};
+use masseter_model::geometry::{Mechanism, Pose, Twist};
 use masseter_runtime::control::{Controller, NoBranch, Outcome, Tick};
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::messages::{Command, Event, Reading, State};
@@ -12,11 +12,11 @@ use masseter_scenario::Scenario;
 use nalgebra::Translation3;
 
 use crate::force_control::ForceControl;
-use crate::forces::Forces;
+use crate::forces::{Forces, twist_between};
 use crate::path_supervision::{PathSupervision, StartTolerance};
 use crate::playback::{Playback, Progress};
 use crate::pose_control::PoseControl;
-use crate::pose_law::{Demand, PoseLaw};
+use crate::pose_law::{Demand, Measured, PoseLaw};
 use crate::safety::Fault;
 use crate::sequencer::Sequencer;
 use crate::targets::Targets;
@@ -47,6 +47,7 @@ pub struct MotionController {
     start: StartTolerance,
     progress: Progress,
     law: Box<dyn PoseLaw>,
+    needs_twist: bool,
     /// The declaration of the law. The controller's own parameters and signals follow.
     of_law: Declared,
     forces: Forces,
@@ -91,6 +92,7 @@ impl MotionController {
             start: StartTolerance::new(scenario, &mechanism),
             progress: Progress::new(scenario, &mechanism, trajectory),
             of_law: law.declared(),
+            needs_twist: law.needs_twist(),
             law,
             forces: Forces::new(scenario, &mechanism),
             supervision: PathSupervision::new(scenario),
@@ -154,6 +156,7 @@ impl MotionController {
             start: self.start.clone(),
             progress: self.progress.clone(),
             law: self.law.branch()?,
+            needs_twist: self.needs_twist,
             of_law: self.of_law.clone(),
             forces: self.forces.clone(),
             supervision: self.supervision.clone(),
@@ -168,7 +171,8 @@ impl MotionController {
         let mut progress = self.progress.clone();
         progress.advance(&self.sequencer, cycle);
         let desired = progress.playback.pose_ahead(-self.sequencer.sample_age_in(cycle));
-        self.demand_in(cycle, &progress.playback, desired)
+        let desired_twist = Some(self.desired_twist(cycle, &progress.playback));
+        Demand { desired_twist, ..self.demand_in(cycle, &progress.playback, desired) }
     }
 
     fn demand(&self, desired: Pose) -> Demand {
@@ -177,17 +181,30 @@ impl MotionController {
 
     fn demand_in(&self, cycle: u64, playback: &Playback, desired: Pose) -> Demand {
         let Sequencer { period_s, state, config, .. } = &self.sequencer;
+        let age_s = self.sequencer.sample_age_in(cycle);
+        let fresh = self.sequencer.fresh_estimate();
         Demand {
             cycle,
             period_s: *period_s,
             state: *state,
-            motion_time_s: playback.motion_time_ahead_s(-self.sequencer.sample_age_in(cycle)),
+            motion_time_s: playback.motion_time_ahead_s(-age_s),
             desired,
-            estimated: self.sequencer.fresh_estimate().map(|estimate| estimate.solution.pose),
+            estimated: fresh.map(|estimate| estimate.solution.pose),
             ahead: playback.pose_ahead(config.lead_cycles * period_s),
+            desired_twist: self.needs_twist.then(|| self.desired_twist(cycle, playback)),
+            measured: fresh.map(|estimate| Measured {
+                position_m: estimate.measured.to_axes(),
+                force_n: estimate.force_n,
+            }),
             external: self.forces.external(),
             load_cell_n: self.forces.load_cell_n,
         }
+    }
+
+    fn desired_twist(&self, cycle: u64, playback: &Playback) -> Twist {
+        let (period_s, age_s) = (self.sequencer.period_s, self.sequencer.sample_age_in(cycle));
+        let [before, after] = [-0.5, 0.5].map(|periods| playback.pose_ahead(periods * period_s - age_s));
+        twist_between(&before, &after, period_s)
     }
 
     /// Prepares the motion and the targets for the state that has been entered.

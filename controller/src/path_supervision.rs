@@ -273,7 +273,7 @@ mod tests {
         let measured = Actuators { slide_m: [0.0; LEGS], leg_m: [0.29; LEGS] };
         let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
         let solution = ForwardTracker::new(mechanism).update(&measured).unwrap();
-        Estimate { reading_cycle, answers_cycle, sampled_ns, measured, solution }
+        Estimate { reading_cycle, answers_cycle, sampled_ns, measured, force_n: [0.0; 6], solution }
     }
 
     fn tolerance(interfaces: &[&str], tolerance_mm: Option<f64>) -> StartTolerance {

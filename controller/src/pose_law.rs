@@ -6,7 +6,7 @@
 use std::fmt;
 use std::ops::Range;
 
-use masseter_model::geometry::{Pose, Vec3};
+use masseter_model::geometry::{AXES, Pose, Twist, Vec3};
 use masseter_runtime::control::NoBranch;
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::named::Declared;
@@ -29,14 +29,27 @@ pub struct Demand {
     pub estimated: Option<Pose>,
     /// The desired pose at the instant at which the drives reach this cycle's command.
     pub ahead: Pose,
+    /// The desired twist at the sample; none for a law that does not ask for it by [`PoseLaw::needs_twist`].
+    pub desired_twist: Option<Twist>,
+    /// What the drives measured at the sample; none without an estimate.
+    pub measured: Option<Measured>,
     /// The external force at the sample; none unless the scenario has it estimated.
     pub external: Option<ExternalForce>,
     /// The bite force that the load cell showed last, N; none without a load cell.
     pub load_cell_n: Option<f64>,
 }
 
+/// What the drives measured, in the order d₁ d₂ d₃ l₁ l₂ l₃.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Measured {
+    /// Positions of the encoders, m.
+    pub position_m: [f64; AXES],
+    /// Forces of the drives since the sample before, N.
+    pub force_n: [f64; AXES],
+}
+
 /// The external force on the platform, in base axes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ExternalForce {
     /// Force, N.
     pub force_n: [f64; 3],
@@ -117,6 +130,11 @@ pub trait PoseLaw: std::fmt::Debug {
         Detour::default()
     }
 
+    /// Whether the law uses the desired twist, which costs two more desired poses a cycle. Called once, before the start.
+    fn needs_twist(&self) -> bool {
+        false
+    }
+
     /// The signals and parameters of the law. Called once, before the start.
     fn declared(&self) -> Declared {
         Declared::default()
@@ -137,8 +155,8 @@ pub trait PoseLaw: std::fmt::Debug {
     }
 }
 
-/// A law of one function, with the arguments demand, parameters in force, and signals to fill. Both are in the order of
-/// their declaration. Signals keep their values until the next write.
+/// A law of one function, which also gets the desired twist. Its arguments are demand, parameters in force, and signals
+/// to fill. The last two are in the order of their declaration. Signals keep their values until the next write.
 pub struct FunctionLaw<F> {
     declared: Declared,
     parameters: Vec<f64>,
@@ -163,6 +181,10 @@ impl<F> fmt::Debug for FunctionLaw<F> {
 impl<F: FnMut(&Demand, &[f64], &mut [f64]) -> Result<Pose, LawFailed>> PoseLaw for FunctionLaw<F> {
     fn command(&mut self, demand: &Demand) -> Result<Pose, LawFailed> {
         (self.function)(demand, &self.parameters, &mut self.signals)
+    }
+
+    fn needs_twist(&self) -> bool {
+        true
     }
 
     fn declared(&self) -> Declared {

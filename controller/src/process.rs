@@ -73,7 +73,6 @@ pub fn for_scenario(
     build: impl FnOnce(&Scenario, Mechanism, Trajectory) -> Box<dyn Controller>,
 ) -> Result<Box<dyn Controller>, ControllerError> {
     let mechanism = Mechanism::new(&scenario.mechanism)?;
-    let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
-    let trajectory = trajectory.slowed(scenario.dry.speed_now());
+    let trajectory = Trajectory::of_scenario(scenario, &mechanism)?;
     Ok(build(scenario, mechanism, trajectory))
 }

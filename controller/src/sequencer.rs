@@ -68,6 +68,8 @@ pub(crate) struct Estimate {
     pub(crate) answers_cycle: u64,
     pub(crate) sampled_ns: u64,
     pub(crate) measured: Actuators,
+    /// Of the drives, N.
+    pub(crate) force_n: [f64; AXES],
     pub(crate) solution: Solution,
 }
 
@@ -147,10 +149,11 @@ impl Sequencer {
         if reading.fresh_axes != ALL_AXES {
             return Ok(false);
         }
-        let Reading { cycle: reading_cycle, answers_cycle, sampled_ns, .. } = *reading;
+        let Reading { cycle: reading_cycle, answers_cycle, sampled_ns, force_n, .. } = *reading;
         let measured = Actuators::from_axes(reading.position_m);
         let solution = self.tracker.update(&measured).map_err(|error| Fault::from(&error))?;
-        self.estimate = Some(Estimate { reading_cycle, answers_cycle, sampled_ns, measured, solution });
+        self.estimate =
+            Some(Estimate { reading_cycle, answers_cycle, sampled_ns, measured, force_n, solution });
         Ok(true)
     }
 

@@ -1,5 +1,5 @@
 //! Folders to start from: `masseter init` lays down a scenario, a motion and a CI workflow, `masseter new controller` a
-//! project with a working pose controller in the user's language. Nothing is replaced, and nothing is built here.
+//! project with a working controller in the user's language. Nothing is replaced, and nothing is built here.
 
 use std::fs::{self, File};
 use std::io::{ErrorKind, Write};
@@ -50,7 +50,7 @@ pub(super) fn init(InitArgs { folder }: &InitArgs) -> anyhow::Result<Exit> {
 /// What to make.
 #[derive(Debug, Clone, Subcommand)]
 pub(super) enum NewVerb {
-    /// A project with a working pose controller
+    /// A project with a working controller
     Controller(NewControllerArgs),
 }
 
@@ -63,6 +63,9 @@ pub(super) struct NewControllerArgs {
     /// Language
     #[arg(long, value_enum)]
     lang: Language,
+    /// What the controller does itself
+    #[arg(long, value_enum, default_value = "pose")]
+    kind: Kind,
     /// Masseter's source, or a folder of scripts/release [default: the one above this command or above the current folder]
     #[arg(long, value_name = "DIR", alias = "source")]
     sdk: Option<PathBuf>,
@@ -81,15 +84,34 @@ enum Language {
     Python,
 }
 
-/// A project: what it is, how it is built in its folder, what is built, and its files; the first one has the law.
+/// What a controller does itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Kind {
+    /// A law that returns a pose; the rig does the rest
+    Pose,
+    /// Everything: it commands the drives
+    Drives,
+}
+
+impl Kind {
+    const fn readme(self) -> &'static str {
+        match self {
+            Self::Pose => include_str!("../../examples/controllers/README.md"),
+            Self::Drives => include_str!("../../examples/controllers/drives/README.md"),
+        }
+    }
+}
+
+/// A project: what it is, how it is built in its folder, what is built, the controller, and the other files.
 struct Project {
     about: &'static str,
     build: &'static str,
     program: &'static str,
+    /// Path within the folder.
+    controller: &'static str,
     files: &'static [(&'static str, &'static str)],
 }
 
-const README: &str = include_str!("../../examples/controllers/README.md");
 const CMAKE: &str = "cmake -S . -B build && cmake --build build";
 
 const PIP: &str = "python3 -m venv .venv && .venv/bin/pip install @PACKAGE@ && chmod +x controller.py";
@@ -101,8 +123,8 @@ impl Language {
                 about: "Rust, the crates masseter-controller, masseter-model and masseter-runtime",
                 build: "cargo build --release",
                 program: "target/release/my_controller",
+                controller: "src/main.rs",
                 files: &[
-                    ("src/main.rs", include_str!("../../examples/controllers/rust/src/main.rs")),
                     ("Cargo.toml", include_str!("../../examples/controllers/rust/Cargo.toml")),
                     // Two versions of iceoryx2 do not understand each other.
                     ("Cargo.lock", include_str!("../../Cargo.lock")),
@@ -112,29 +134,41 @@ impl Language {
                 about: "C++17, the header masseter.hpp",
                 build: CMAKE,
                 program: "build/my_controller",
-                files: &[
-                    ("controller.cpp", include_str!("../../examples/controllers/cpp/controller.cpp")),
-                    ("CMakeLists.txt", include_str!("../../examples/controllers/cpp/CMakeLists.txt")),
-                ],
+                controller: "controller.cpp",
+                files: &[("CMakeLists.txt", include_str!("../../examples/controllers/cpp/CMakeLists.txt"))],
             },
             Self::C => Project {
                 about: "C11, the header masseter.h",
                 build: CMAKE,
                 program: "build/my_controller",
-                files: &[
-                    ("controller.c", include_str!("../../examples/controllers/c/controller.c")),
-                    ("CMakeLists.txt", include_str!("../../examples/controllers/c/CMakeLists.txt")),
-                ],
+                controller: "controller.c",
+                files: &[("CMakeLists.txt", include_str!("../../examples/controllers/c/CMakeLists.txt"))],
             },
             Self::Python => Project {
                 about: "Python, the package masseter",
                 build: PIP,
                 program: "controller.py",
-                files: &[
-                    ("controller.py", include_str!("../../examples/controllers/python/controller.py")),
-                    ("pyproject.toml", include_str!("../../examples/controllers/python/pyproject.toml")),
-                ],
+                controller: "controller.py",
+                files: &[(
+                    "pyproject.toml",
+                    include_str!("../../examples/controllers/python/pyproject.toml"),
+                )],
             },
+        }
+    }
+
+    const fn controller(self, kind: Kind) -> &'static str {
+        match (self, kind) {
+            (Self::Rust, Kind::Pose) => include_str!("../../examples/controllers/rust/src/main.rs"),
+            (Self::Cpp, Kind::Pose) => include_str!("../../examples/controllers/cpp/controller.cpp"),
+            (Self::C, Kind::Pose) => include_str!("../../examples/controllers/c/controller.c"),
+            (Self::Python, Kind::Pose) => include_str!("../../examples/controllers/python/controller.py"),
+            (Self::Rust, Kind::Drives) => include_str!("../../examples/controllers/drives/rust/main.rs"),
+            (Self::Cpp, Kind::Drives) => include_str!("../../examples/controllers/drives/cpp/controller.cpp"),
+            (Self::C, Kind::Drives) => include_str!("../../examples/controllers/drives/c/controller.c"),
+            (Self::Python, Kind::Drives) => {
+                include_str!("../../examples/controllers/drives/python/controller.py")
+            }
         }
     }
 }
@@ -150,11 +184,12 @@ pub(super) fn new(NewVerb::Controller(args): &NewVerb) -> anyhow::Result<Exit> {
     let folder = std::path::absolute(&args.folder)?;
     let project = args.lang.project();
     let build = project.build.replace("@PACKAGE@", &quoted(&package));
-    let readme = README
+    let readme = args.kind.readme();
+    let readme = readme
         .replace("@ABOUT@", project.about)
         .replace("@BUILD@", &build)
         .replace("@PROGRAM@", &format!("./{}", project.program))
-        .replace("@FILE@", project.files[0].0);
+        .replace("@FILE@", project.controller);
     let files = project.files.iter().map(|&(path, content)| (path, content.to_owned()));
     let in_place = |(path, content): (_, String)| StarterFile {
         path,
@@ -164,11 +199,13 @@ pub(super) fn new(NewVerb::Controller(args): &NewVerb) -> anyhow::Result<Exit> {
             .replace("@PACKAGE@", &package.display().to_string())
             .replace("@FOLDER@", &folder.display().to_string()),
     };
-    lay_down(&args.folder, &files.chain([("README.md", readme)]).map(in_place).collect::<Vec<_>>())?;
+    let files = files
+        .chain([(project.controller, args.lang.controller(args.kind).to_owned()), ("README.md", readme)]);
+    lay_down(&args.folder, &files.map(in_place).collect::<Vec<_>>())?;
     result_line!(
         "{}: the controller; README.md has the next steps\n\
          next: (cd {} && {build}) && masseter run --controller {}",
-        args.folder.join(project.files[0].0).display(),
+        args.folder.join(project.controller).display(),
         quoted(&args.folder),
         quoted(&as_program(&args.folder.join(project.program)))
     )?;

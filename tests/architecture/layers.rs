@@ -17,7 +17,7 @@ const MAY_USE: [(&str, &[&str]); 27] = [
     // Stands in for a crate of crates.io.
     ("shared/no_bindgen", &[]),
     ("controller", &["shared/can", "shared/model", "shared/scenario", "shared/runtime"]),
-    ("rig/bindings/c", &["shared/model", "shared/runtime", "controller"]),
+    ("rig/bindings/c", &["shared/model", "shared/runtime", "shared/scenario", "controller"]),
     (
         "rig/bindings/python",
         &[

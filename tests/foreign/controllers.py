@@ -7,13 +7,15 @@ import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 LANGUAGES = ["rust", "c", "cpp", "python"]
-MOST_LINES = 60
+MOST_LINES = {"pose": 60, "drives": 90}
+MOST_COLUMNS = 130
 # The law of a program, as gdb finds its function.
 LAWS = {"c": "^command$", "rust": "my_controller.*command"}
 
@@ -31,20 +33,24 @@ def release_profile() -> str:
     return head + cargo.read_text().partition(head)[2].partition("[profile.dist]")[0]
 
 
-def make(masseter: str, language: str, folder: Path, target: Path) -> str:
+def make(masseter: str, language: str, kind: str, folder: Path, target: Path) -> str:
     """The program of a new project, built by the command that `new` prints."""
-    said = shell(f"{masseter} new controller --lang {language} {language}", folder)
+    name = f"{language}_{kind}"
+    said = shell(f"{masseter} new controller --lang {language} --kind {kind} {name}", folder)
     command, program = re.search(r"next: \(cd \w+ && (.*)\) && masseter run --controller (\S+)", said).groups()
-    project = folder / language
+    project = folder / name
     for source in [*project.glob("**/*.rs"), *project.glob("controller.*")]:
-        lines = len(source.read_text().splitlines())
-        assert lines <= MOST_LINES, f"{source}: {lines} lines"
+        lines = source.read_text().splitlines()
+        assert len(lines) <= MOST_LINES[kind], f"{source}: {len(lines)} lines"
+        assert max(map(len, lines)) <= MOST_COLUMNS, f"{source}: {max(lines, key=len)}"
     if language == "rust":
         # Target and profile are the library's in C, so that both use the same built dependencies.
         profile = folder / "profile.toml"
         profile.write_text(release_profile())
         shell(f"{command} --target-dir {target} --config {shlex.quote(str(profile))}", project)
-        return str(target / "release" / "my_controller")
+        # Both kinds are built to the same place.
+        shutil.copy(target / "release" / "my_controller", project)
+        return str(project / "my_controller")
     if language == "python":
         shell(command, project)
         return str(folder / program)
@@ -75,6 +81,49 @@ def stop_in_the_law(masseter: str, program: str, law: str, folder: Path) -> None
     assert output.startswith("PASS"), output
 
 
+# A fault of a drive halfway, which the run expects to end in a safe stop.
+FAULT = """
+[[faults]]
+kind = "drive_fault"
+axis = "l2"
+at_s = 0.5
+
+[[require]]
+name = "stops"
+when = "fault.drive_fault"
+then = "controller.state == safe_stop"
+within = "50 ms"
+
+[expect]
+verdict = "safe_stop"
+"""
+# Somebody asks for a stop halfway.
+STOP = """
+[[stimulus]]
+stop = true
+at_s = 0.5
+
+[expect]
+verdict = "interrupted"
+"""
+
+
+def follow_the_drives(masseter: str, folder: Path, target: Path) -> None:
+    """Controllers of the drives play the same motions, stop on a fault, and come to rest when asked, in every language alike."""
+    (folder / "fault.toml").write_text(FAULT)
+    (folder / "stop.toml").write_text(STOP)
+    digests: dict[str, set[str]] = {}
+    for language in LANGUAGES:
+        program = make(masseter, language, "drives", folder, target)
+        for clock in ["lockstep", "virtual"]:
+            for scenario in [[], ["fault.toml"], ["stop.toml"], ["--set", "motion.kind=opening"]]:
+                figures = run(masseter, program, folder, clock, *scenario)["figures"]
+                digests.setdefault(" ".join(scenario), set()).add(figures["digest"])
+        print(f"{language}: a controller of the drives")
+    assert all(len(found) == 1 for found in digests.values()), digests
+    assert len(set.union(*digests.values())) == len(digests), digests
+
+
 # A requirement on what the controllers declare themselves.
 REQUIRED = """
 [[require]]
@@ -99,7 +148,7 @@ def main(masseter: str, target: str) -> None:
         digests, stiff = {}, {}
         (folder / "required.toml").write_text(REQUIRED)
         for language in LANGUAGES:
-            program = make(masseter, language, folder, Path(target))
+            program = make(masseter, language, "pose", folder, Path(target))
             digests[language] = [
                 run(masseter, program, folder, clock)["figures"]["digest"] for clock in ["lockstep", "virtual", "lockstep"]
             ]
@@ -118,6 +167,7 @@ def main(masseter: str, target: str) -> None:
         assert len({figures["digest"] for figures in stiff.values()} - found) == 1, stiff
         trims = {figures["signals"][0]["max"] for figures in stiff.values()}
         assert len(trims) == 1 and 0.001 < trims.pop() < 1.0, stiff
+        follow_the_drives(masseter, folder, Path(target))
         own = run(masseter, "motion", folder, "lockstep")["figures"]["digest"]
         assert own not in found, "the law of the projects is not the rig's own"
 

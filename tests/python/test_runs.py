@@ -219,6 +219,7 @@ def session_run(
 def test_a_controller_of_the_drives_is_recorded(masseter_command: str, tmp_path: Path) -> None:
     def work(session: masseter.Session) -> None:
         assert session.period_s == 1e-3
+        assert session.scenario["duration_s"] == session.robot.times.duration_s == 1.0
         play(session, lambda number, command: None)
         session.finish()
 

@@ -75,6 +75,8 @@ impl World {
             desired: pose(time_s),
             estimated: None,
             ahead: pose(time_s + LEAD_CYCLES as f64 * PERIOD_S),
+            desired_twist: None,
+            measured: None,
             external: Some(external),
             load_cell_n: Some(bite_n.clamp(self.cell_ends_n[0], self.cell_ends_n[1])),
         })?;

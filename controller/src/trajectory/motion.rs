@@ -2,7 +2,7 @@
 //! motion starts and ends at rest on its unchanged path.
 
 use masseter_model::geometry::{Mechanism, Pose};
-use masseter_scenario::{JawConfig, MotionConfig};
+use masseter_scenario::{JawConfig, MotionConfig, Scenario};
 
 use super::doubts::jumps;
 use super::generators::{Chewing, Excursion, minimum_jerk_integral};
@@ -71,6 +71,15 @@ impl Trajectory {
         };
         let clock = motion.clock(duration_s);
         Ok(Self { motion, clock, frame })
+    }
+
+    /// The motion of a scenario, as a run plays it: slow in a run without force.
+    ///
+    /// # Errors
+    /// Those of [`Self::new`].
+    pub fn of_scenario(scenario: &Scenario, mechanism: &Mechanism) -> Result<Self, TrajectoryError> {
+        let motion = Self::new(&scenario.motion, &scenario.jaw, mechanism, scenario.duration_s)?;
+        Ok(motion.slowed(scenario.dry.speed_now()))
     }
 
     /// The motion at a share of its speed.

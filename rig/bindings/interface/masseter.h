@@ -74,13 +74,61 @@ typedef struct masseter_demand {
     const double *parameters;
     /* The declared signals, by their places; the law writes them. */
     double *signals;
+    /* The desired twist at the sample, the mean of the period around it: m/s, then rad/s, base axes. */
+    double desired_twist[6];
+    /* Measured positions d1 d2 d3 l1 l2 l3, m; zeros without an estimate. */
+    double position_m[6];
+    /* Forces of the drives since the sample before, N; zeros without an estimate. */
+    double force_n[6];
+    /* 0 where the scenario has no load cell. */
+    uint32_t has_load_cell;
+    /* 0 where the scenario has no force estimated, and before the first estimate. */
+    uint32_t has_external;
+    /* Bite force that the load cell showed last, N; 0 without one. */
+    double load_cell_n;
+    /* Estimated wrench on the platform: N, then N m about its origin, base axes; zeros without an estimate. */
+    double external_wrench[6];
+    /* Bound of the error of the bite force in it, N. */
+    double external_uncertainty_n;
 } masseter_demand;
+
+/* The times of the scenario that a controller of the drives keeps to. */
+typedef struct masseter_times {
+    /* From one cycle to the next, s. */
+    double period_s;
+    /* From a sample until the drives reach the targets that answer it, s. */
+    double lead_s;
+    /* Of the way to the first pose, s. */
+    double ease_s;
+    /* Of the motion, s. */
+    double duration_s;
+    /* From full speed to rest, at a stop, s. */
+    double stop_ramp_s;
+    /* At rest after the motion, s. */
+    double hold_s;
+    /* Longest time without a complete reading, s. */
+    double silence_s;
+} masseter_times;
+
+/* The scenario's motion, or the way to it, at a time. Twist and acceleration are differences over a period on either side. */
+typedef struct masseter_motion {
+    masseter_pose pose;
+    /* Of the platform's origin, m/s, then angular, rad/s; base axes. */
+    double twist[6];
+    /* The same, m/s^2 and rad/s^2. */
+    double acceleration[6];
+    /* How far the motion has come, s: for state.motion_time_s. Negative on the way to it. */
+    double motion_time_s;
+} masseter_motion;
 
 static_assert(sizeof(masseter_cycle) == 24, "size of masseter_cycle");
 static_assert(sizeof(masseter_pose) == 56, "size of masseter_pose");
-static_assert(sizeof(masseter_demand) == 216, "size of masseter_demand");
+static_assert(sizeof(masseter_demand) == 432, "size of masseter_demand");
+static_assert(sizeof(masseter_times) == 56, "size of masseter_times");
+static_assert(sizeof(masseter_motion) == 160, "size of masseter_motion");
 static_assert(offsetof(masseter_demand, desired) == 32, "offset of desired");
 static_assert(offsetof(masseter_demand, ahead) == 144, "offset of ahead");
+static_assert(offsetof(masseter_demand, load_cell_n) == 368, "offset of load_cell_n");
 
 /* Writes the pose to ask for, which holds `ahead` before the call. Another result than 0 leads to a safe stop. In real time
  * it must not block. */
@@ -116,6 +164,35 @@ double masseter_parameter(const masseter_session *session, int parameter);
 
 /* Gives a signal its value, which goes out with this cycle's command and stays until it is given another. */
 int masseter_set_signal(masseter_session *session, int signal, double value);
+
+/* The scenario and its robot, from masseter_attach to the end. These functions are mathematics: they wait for nothing, and a
+ * cycle may call them as often as it likes. The first call before masseter_start takes some milliseconds. */
+
+/* The whole scenario as TOML, every default filled in; null with an error. It lasts as long as the session. */
+const char *masseter_scenario(masseter_session *session);
+
+/* The times of the scenario. */
+int masseter_times_of(masseter_session *session, masseter_times *times);
+
+/* The scenario's motion at a time after its beginning, s; at rest before 0 and after its duration. */
+int masseter_motion_at(masseter_session *session, double time_s, masseter_motion *motion);
+
+/* The way from a pose to the first pose of the motion at a time after its beginning, s: from rest to rest within ease_s. */
+int masseter_easing_at(masseter_session *session, const masseter_pose *from, double time_s, masseter_motion *motion);
+
+/* The pose of positions d1 d2 d3 l1 l2 l3, m. The pose before saves time, and settles an ambiguous input. */
+int masseter_forward_kinematics(masseter_session *session, const double position_m[6], masseter_pose *pose);
+
+/* The positions d1 d2 d3 l1 l2 l3 at a pose, m, also beyond the strokes. */
+int masseter_inverse_kinematics(masseter_session *session, const masseter_pose *pose, double position_m[6]);
+
+/* The rates of the axes by the twist at a pose: a row for each axis; m/s per m/s, then m/s per rad/s. */
+int masseter_jacobian(masseter_session *session, const masseter_pose *pose, double jacobian[6][6]);
+
+/* The forces of the axes (N) for a twist and an acceleration (as in masseter_motion) against a wrench on the platform (N, then
+ * N m about its origin, base axes; null for none), by the masses and the friction that the scenario's controller assumes. */
+int masseter_inverse_dynamics(masseter_session *session, const masseter_pose *pose, const double twist[6],
+                              const double acceleration[6], const double wrench[6], double force_n[6]);
 
 /* Runs the rig's own controller with this law until the motion is over, and frees the session. Returns MASSETER_OK,
  * MASSETER_SAFE_STOP or MASSETER_ERROR. */

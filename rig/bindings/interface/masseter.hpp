@@ -4,6 +4,8 @@
 //     session.run([&](const masseter_demand &demand) { return demand.ahead; });
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <exception>
 #include <optional>
@@ -22,6 +24,9 @@ public:
 };
 
 enum class Outcome { finished, safe_stop };
+
+// A number for each axis d1 d2 d3 l1 l2 l3; or a twist, its acceleration, or a wrench.
+using Six = std::array<double, 6>;
 
 // A cycle that has begun.
 struct Cycle {
@@ -68,6 +73,59 @@ public:
     // In a session that start has started; a law finds both in its demand.
     double parameter(int place) const { return masseter_parameter(session_, place); }
     void signal(int place, double value) { check(masseter_set_signal(session_, place, value)); }
+
+    // The scenario and its robot, from the constructor on; masseter.h has units and frames.
+    std::string scenario() {
+        const char *text = masseter_scenario(session_);
+        if (text == nullptr)
+            throw Error();
+        return text;
+    }
+
+    masseter_times times() {
+        masseter_times times;
+        check(masseter_times_of(session_, &times));
+        return times;
+    }
+
+    masseter_motion motion(double time_s) {
+        masseter_motion motion;
+        check(masseter_motion_at(session_, time_s, &motion));
+        return motion;
+    }
+
+    masseter_motion easing(const masseter_pose &from, double time_s) {
+        masseter_motion motion;
+        check(masseter_easing_at(session_, &from, time_s, &motion));
+        return motion;
+    }
+
+    masseter_pose forward_kinematics(const double (&position_m)[6]) {
+        masseter_pose pose;
+        check(masseter_forward_kinematics(session_, position_m, &pose));
+        return pose;
+    }
+
+    Six inverse_kinematics(const masseter_pose &pose) {
+        Six position_m;
+        check(masseter_inverse_kinematics(session_, &pose, position_m.data()));
+        return position_m;
+    }
+
+    std::array<Six, 6> jacobian(const masseter_pose &pose) {
+        double rows[6][6];
+        check(masseter_jacobian(session_, &pose, rows));
+        std::array<Six, 6> jacobian;
+        for (std::size_t axis = 0; axis < jacobian.size(); axis++)
+            std::copy(std::begin(rows[axis]), std::end(rows[axis]), jacobian[axis].begin());
+        return jacobian;
+    }
+
+    Six inverse_dynamics(const masseter_pose &pose, const Six &twist, const Six &acceleration, const Six &wrench = {}) {
+        Six force_n;
+        check(masseter_inverse_dynamics(session_, &pose, twist.data(), acceleration.data(), wrench.data(), force_n.data()));
+        return force_n;
+    }
 
     // Runs the rig's own controller with a pose law, masseter_pose(const masseter_demand &). An exception of the law stops
     // the rig safely, and is thrown again.

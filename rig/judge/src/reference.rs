@@ -209,8 +209,8 @@ fn as_published(pose: &Pose) -> Option<Pose> {
 /// The scenario's motion; none where its file is gone since the run.
 fn playback(scenario: &Scenario) -> Option<Playback> {
     let mechanism = Mechanism::new(&scenario.mechanism).ok()?;
-    let motion = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s).ok()?;
-    Some(Playback::of_scenario(scenario, &mechanism, motion.slowed(scenario.dry.speed_now())))
+    let motion = Trajectory::of_scenario(scenario, &mechanism).ok()?;
+    Some(Playback::of_scenario(scenario, &mechanism, motion))
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 #![allow(unsafe_code, reason = "C passes pointers")]
 
 mod law;
+mod robot;
 
 use std::borrow::Cow;
 use std::cell::RefCell;
@@ -14,11 +15,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
 use masseter_controller::process;
+use masseter_controller::robot_model::RobotModel;
 use masseter_runtime::control::{Outcome, Session, Tick, Waited};
 use masseter_runtime::lifecycle::ProcessContext;
 use masseter_runtime::lifecycle::attach::attach;
 use masseter_runtime::messages::{Command, Event, Reading, State};
 use masseter_runtime::named::{Declared, Parameter, PlayedMotion, Signal};
+use masseter_scenario::Scenario;
 
 use law::{LawFunction, law_of_c};
 
@@ -66,6 +69,10 @@ pub struct MasseterSession {
     stage: Stage,
     period_ns: u64,
     declared: Declared,
+    /// None before the first question to it, at the latest before the start.
+    robot: Option<RobotModel>,
+    /// The scenario as text; none before the first question to it.
+    text: Option<CString>,
 }
 
 #[derive(Debug)]
@@ -99,6 +106,23 @@ impl MasseterSession {
         Ok(c_int::try_from(count).expect("a few are accepted") - 1)
     }
 
+    fn scenario(&self) -> Result<&Scenario, Failure> {
+        match &self.stage {
+            Stage::Attached(context) => Ok(&context.scenario),
+            Stage::Started(session) => Ok(&session.context().scenario),
+            Stage::Over => Err(Failure::of("the session has no scenario: its start has failed")),
+        }
+    }
+
+    /// The robot of the scenario.
+    fn robot(&mut self) -> Result<&mut RobotModel, Failure> {
+        let robot = match self.robot.take() {
+            Some(robot) => robot,
+            None => RobotModel::new(self.scenario()?)?,
+        };
+        Ok(self.robot.insert(robot))
+    }
+
     fn started(&mut self) -> Result<&mut Session, Failure> {
         match &mut self.stage {
             Stage::Started(session) => Ok(session),
@@ -129,7 +153,8 @@ pub unsafe extern "C" fn masseter_attach(
         let context = attach(unsafe { text_of(rig) }?)?;
         let period_ns = context.scenario.period_ns();
         let stage = Stage::Attached(Box::new(context));
-        let attached = MasseterSession { stage, period_ns, declared: Declared::default() };
+        let declared = Declared::default();
+        let attached = MasseterSession { stage, period_ns, declared, robot: None, text: None };
         *session.ok_or(NULL)? = Box::into_raw(Box::new(attached));
         Ok(OK)
     })
@@ -140,6 +165,8 @@ pub unsafe extern "C" fn masseter_attach(
 pub extern "C" fn masseter_start(session: Option<&mut MasseterSession>) -> c_int {
     guarded(|| {
         let session = session.ok_or(NULL)?;
+        // In real time no cycle waits for it.
+        session.robot()?;
         match std::mem::replace(&mut session.stage, Stage::Over) {
             Stage::Attached(context) => {
                 let declared = std::mem::take(&mut session.declared);

@@ -3,6 +3,7 @@
     fk, ik, Mechanism     forward and inverse kinematics over arrays
     load                  a run folder as NumPy arrays
     run                   a run of the rig, with a controller of the rig or of yours
+    RobotModel            motion, Jacobian and inverse dynamics of a scenario
     control, Session      your controller in a run that somebody else has started
     Env, VectorEnv        the rig as an environment that steps, also for gymnasium
 
@@ -11,7 +12,7 @@ Lengths are in m, angles in rad, times in s unless a name says otherwise; poses 
 
 from typing import TYPE_CHECKING, Any
 
-from masseter._native import Demand, MasseterError, Pose, __version__
+from masseter._native import Demand, MasseterError, Pose, RobotModel, __version__
 from masseter.controller import Parameter, Session, Signal, control
 from masseter.kinematics import Mechanism, fk, ik
 from masseter.recording import Run, load
@@ -30,6 +31,7 @@ __all__ = [
     "Parameter",
     "Pose",
     "Result",
+    "RobotModel",
     "Run",
     "Session",
     "Signal",

@@ -1,9 +1,11 @@
 """A controller in Python, in a run that somebody else has started."""
 
+import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from types import TracebackType
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 from masseter import _native
 from masseter.messages import Command, Event, Reading, State
@@ -103,6 +105,8 @@ class Session:
         own_motion: bool = False,
     ) -> None:
         self._native = _native.Session(rig, _signals(signals), _parameters(parameters), own_motion)
+        #: Motion, kinematics and dynamics of the scenario.
+        self.robot = self._native.robot()
         self._is_over = False
         self._parameters = [parameter.name for parameter in parameters]
         #: The signals that go out with each command; a value stays until it is replaced.
@@ -123,6 +127,11 @@ class Session:
     def period_s(self) -> float:
         """Time from one cycle to the next, s."""
         return self._native.period_s
+
+    @cached_property
+    def scenario(self) -> dict[str, Any]:
+        """The whole scenario, every default filled in. The first access takes milliseconds."""
+        return tomllib.loads(self._native.scenario())
 
     @property
     def is_stop_requested(self) -> bool:

@@ -4,9 +4,11 @@ use std::sync::mpsc;
 use std::thread;
 use std::time::Duration;
 
-use masseter_controller::pose_law::{Demand as RigDemand, FunctionLaw, LawFailed, asked_pose};
+use masseter_controller::pose_law::{
+    Demand as RigDemand, ExternalForce as RigExternalForce, FunctionLaw, LawFailed, asked_pose,
+};
 use masseter_controller::process::run_with_law;
-use masseter_model::geometry;
+use masseter_model::geometry::{self, AXES};
 use masseter_runtime::control::Outcome;
 use masseter_runtime::lifecycle::attach::attach;
 use masseter_runtime::messages::pose_fields;
@@ -50,10 +52,33 @@ impl Pose {
     }
 }
 
+impl Pose {
+    /// Position and quaternion.
+    pub(crate) fn fields(self) -> ([f64; 3], [f64; 4]) {
+        let ((px, py, pz), (w, x, y, z)) = (self.position_m, self.quaternion_wxyz);
+        ([px, py, pz], [w, x, y, z])
+    }
+}
+
 impl From<&geometry::Pose> for Pose {
     fn from(pose: &geometry::Pose) -> Self {
         let (position_m, quaternion_wxyz) = pose_fields(pose);
         Self::new(position_m, quaternion_wxyz)
+    }
+}
+
+/// The estimated external force on the platform.
+#[pyclass(frozen, get_all)]
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ExternalForce {
+    force_n: [f64; 3],
+    moment_nm: [f64; 3],
+    uncertainty_n: f64,
+}
+
+impl From<RigExternalForce> for ExternalForce {
+    fn from(RigExternalForce { force_n, moment_nm, uncertainty_n }: RigExternalForce) -> Self {
+        Self { force_n, moment_nm, uncertainty_n }
     }
 }
 
@@ -68,6 +93,11 @@ pub(crate) struct Demand {
     desired: Pose,
     estimated: Option<Pose>,
     ahead: Pose,
+    desired_twist: [f64; AXES],
+    position_m: Option<[f64; AXES]>,
+    force_n: Option<[f64; AXES]>,
+    load_cell_n: Option<f64>,
+    external: Option<ExternalForce>,
     parameters: Py<PyMappingProxy>,
     signals: Py<PyDict>,
 }
@@ -87,6 +117,11 @@ impl Demand {
             desired: (&demand.desired).into(),
             estimated: demand.estimated.as_ref().map(Pose::from),
             ahead: (&demand.ahead).into(),
+            desired_twist: demand.desired_twist.unwrap_or_default().into(),
+            position_m: demand.measured.map(|measured| measured.position_m),
+            force_n: demand.measured.map(|measured| measured.force_n),
+            load_cell_n: demand.load_cell_n,
+            external: demand.external.map(ExternalForce::from),
             parameters: PyMappingProxy::new(py, parameters.as_mapping()).unbind(),
             signals,
         }
@@ -121,8 +156,8 @@ impl PythonLaw {
                     signals.keys()
                 )));
             }
-            let ((px, py, pz), (w, x, y, z)) = (pose.position_m, pose.quaternion_wxyz);
-            Ok(asked_pose([px, py, pz], [w, x, y, z]))
+            let (position_m, quaternion_wxyz) = pose.fields();
+            Ok(asked_pose(position_m, quaternion_wxyz))
         })
     }
 }

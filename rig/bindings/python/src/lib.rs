@@ -7,6 +7,7 @@ mod agent;
 mod env;
 mod episode;
 mod law;
+mod robot;
 mod session;
 mod vector;
 
@@ -48,7 +49,11 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("NoRigError", module.py().get_type::<NoRigError>())?;
     module.add_class::<Mechanism>()?;
     module.add_class::<law::Demand>()?;
+    module.add_class::<law::ExternalForce>()?;
     module.add_class::<law::Pose>()?;
+    module.add_class::<robot::MotionPoint>()?;
+    module.add_class::<robot::RobotModel>()?;
+    module.add_class::<robot::Times>()?;
     module.add_class::<session::Session>()?;
     module.add_class::<env::Env>()?;
     module.add_class::<env::Snapshot>()?;

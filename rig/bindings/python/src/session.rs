@@ -8,10 +8,12 @@ use masseter_runtime::lifecycle::ProcessContext;
 use masseter_runtime::lifecycle::attach::attach;
 use masseter_runtime::messages::{Command, Event, Message, State};
 use masseter_runtime::named::{Declared, PlayedMotion};
+use masseter_scenario::Scenario;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::law::{ParameterOfPython, SignalOfPython, declared};
+use crate::robot::RobotModel;
 use crate::{failed, not_attached};
 
 /// A part in a run. It belongs to the thread that made it.
@@ -64,10 +66,16 @@ impl Session {
 
     #[getter]
     fn period_s(&self) -> PyResult<f64> {
-        Ok(match self.stage.as_ref().ok_or_else(over)? {
-            Stage::Attached(context, _) => context.scenario.period_s(),
-            Stage::Started(session) => session.context().scenario.period_s(),
-        })
+        Ok(self.played()?.period_s())
+    }
+
+    /// The scenario as TOML.
+    fn scenario(&self) -> PyResult<String> {
+        Ok(self.played()?.to_toml())
+    }
+
+    fn robot(&self) -> PyResult<RobotModel> {
+        RobotModel::of(self.played()?)
     }
 
     #[getter]
@@ -129,6 +137,14 @@ impl Session {
         let result = py.detach(|| WAITING.with_borrow_mut(work));
         self.stage = WAITING.take();
         result
+    }
+
+    /// The scenario of the run.
+    fn played(&self) -> PyResult<&Scenario> {
+        Ok(match self.stage.as_ref().ok_or_else(over)? {
+            Stage::Attached(context, _) => &context.scenario,
+            Stage::Started(session) => &session.context().scenario,
+        })
     }
 
     fn end(&mut self) -> PyResult<control::Session> {
