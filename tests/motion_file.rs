@@ -358,7 +358,7 @@ fn columns_beside_the_motion_are_signals_of_the_run() {
     let (head, rows) = table.split_once('\n').unwrap();
     let place =
         |name| head.split(',').position(|column| column == name).unwrap_or_else(|| panic!("{name}: {head}"));
-    let places = ["motion_time", "recorded_emg_left", "recorded_gauge"].map(place);
+    let places = ["motion_time_s", "recorded_emg_left_uv", "recorded_gauge"].map(place);
     let mut lost = 0;
     for row in rows.lines() {
         let cells: Vec<&str> = row.split(',').collect();

@@ -226,6 +226,6 @@ fn column_name(signal: &NamedSignal) -> String {
     let name = signal.name.replace('.', "_");
     let unit =
         signal.unit.replace("1/", "per_").replace('/', "_").replace('%', "percent").replace('°', "deg");
-    let unit = unit.to_lowercase();
+    let unit = unit.replace(['µ', 'μ'], "u").to_lowercase();
     if unit.is_empty() || name.ends_with(&format!("_{unit}")) { name } else { format!("{name}_{unit}") }
 }
