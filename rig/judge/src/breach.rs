@@ -7,7 +7,6 @@ use std::fmt::{self, Display, Formatter};
 use masseter_scenario::ChecksConfig;
 use serde::Serialize;
 
-use crate::check::{Check, is_within};
 use crate::tracking::PathSample;
 
 /// A value beyond its limit.
@@ -31,8 +30,14 @@ pub struct Breach {
 }
 
 impl Breach {
+    /// Of no check yet.
     pub(crate) fn new(what: impl Into<String>, value: impl Into<String>, limit: impl Into<String>) -> Self {
         Self { what: what.into(), value: value.into(), limit: limit.into(), ..Self::default() }
+    }
+
+    /// The breach of this check.
+    pub(crate) fn of(self, check: Cow<'static, str>) -> Self {
+        Self { check, ..self }
     }
 
     /// A breach at a moment.
@@ -66,16 +71,15 @@ impl Display for Breach {
     }
 }
 
-/// The earliest breach of the failed checks; those without a time come last.
-pub(crate) fn earliest_breach<'a>(
-    checks: impl Iterator<Item = &'a Check>,
-    motion_ns: Option<u64>,
-) -> Option<Breach> {
-    let failed = checks.filter(|check| check.result.is_failed());
-    let breaches = failed.filter_map(|check| Some((check, check.breach.as_ref()?)));
-    let (check, breach) =
-        breaches.min_by_key(|(_, breach)| breach.span_ns.map_or(u64::MAX, |[_, at_ns]| at_ns))?;
-    Some(Breach { check: check.name.clone(), ..breach.clone() }.since(motion_ns))
+/// The earliest of these breaches; those without a time come last.
+pub(crate) fn earliest(breaches: impl Iterator<Item = Breach>, motion_ns: Option<u64>) -> Option<Breach> {
+    let earliest = breaches.min_by_key(|breach| breach.span_ns.map_or(u64::MAX, |[_, at_ns]| at_ns));
+    earliest.map(|breach| breach.since(motion_ns))
+}
+
+/// NaN exceeds every limit.
+pub(crate) fn is_within(value: f64, limit: f64) -> bool {
+    value <= limit
 }
 
 /// When the jaw first left its path beyond a limit, and when the motion played.

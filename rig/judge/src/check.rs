@@ -7,7 +7,7 @@ use masseter_scenario::wording::counted;
 use masseter_scenario::{ChecksConfig, FaultConfig};
 use serde::Serialize;
 
-use crate::breach::Breach;
+use crate::breach::{Breach, is_within};
 use crate::declared_faults::FaultFigures;
 use crate::tracking::PoseErrors;
 
@@ -115,7 +115,8 @@ impl Check {
 
     /// With what was beyond its limit.
     pub(crate) fn with_breach(self, breach: impl Into<Option<Breach>>) -> Self {
-        Self { breach: breach.into(), ..self }
+        let breach = breach.into().map(|breach| breach.of(self.name.clone()));
+        Self { breach, ..self }
     }
 
     /// A failure that the machine may explain is excused.
@@ -140,11 +141,6 @@ const AROUND: &str = ", approach and hold included";
 
 /// Fewer samples of a motion show nothing.
 const FEWEST_SAMPLES: u64 = 10;
-
-/// NaN exceeds every limit.
-pub(crate) fn is_within(value: f64, limit: f64) -> bool {
-    value <= limit
-}
 
 /// Whether the jaw left its path by more than the limits for a moment, before a safe stop or without one.
 pub(crate) fn left_its_path(errors: &PoseErrors, limits: &ChecksConfig) -> bool {

@@ -230,8 +230,8 @@ fn requirement(found: &RequirementFigures, is_disturbed: bool) -> Check {
         result => result,
     };
     let (id, figures) = (found.id.clone(), Some(figures));
-    let breach = found.breach.clone();
-    Check { id, figures, subject, breach, ..Check::new(found.name.clone(), finding, result) }
+    let check = Check::new(found.name.clone(), finding, result).with_breach(found.breach.clone());
+    Check { id, figures, subject, ..check }
 }
 
 /// Gaps show losses before the last recorded message. Losses behind it, and in unreadable parts, are unknown.

@@ -17,6 +17,7 @@ mod lost_cycles;
 mod measured;
 mod messages;
 mod next_step;
+mod outcome;
 mod over_time;
 mod overruns;
 mod played;

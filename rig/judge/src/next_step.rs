@@ -8,7 +8,7 @@ use crate::breach::Breach;
 use crate::check::{Check, CheckResult, Subject};
 use crate::events::{Code, EventRecord};
 use crate::figures::Figures;
-use crate::verdict::Outcome;
+use crate::outcome::Outcome;
 
 /// Declares the steps, each with its sentence.
 macro_rules! next_steps {

@@ -10,13 +10,14 @@ use masseter_scenario::{CanConfig, ChecksConfig, ExpectConfig, ExpectedVerdict, 
 use masseter_terminal::Exit;
 use serde::Serialize;
 
-use crate::breach::{Breach, earliest_breach};
+use crate::breach::{Breach, earliest};
 use crate::check::{Check, CheckResult, Subject, left_its_path};
 use crate::checks::{Shortfall, checks, is_often_late};
 use crate::events::EventRecord;
 use crate::figures::Figures;
 use crate::lost_cycles::Outage;
 use crate::next_step::NextStep;
+use crate::outcome::Outcome;
 use crate::played::{MotionFigures, StoppedBy};
 use crate::timing::{Timing, TimingWord};
 
@@ -413,9 +414,10 @@ fn is_of_scenario(check: &Check) -> bool {
 /// The earliest breach, but of the failures that the scenario expects.
 fn first_breach(checks: &[Check], expect: Option<&ExpectConfig>, figures: &Figures) -> Option<Breach> {
     let is_expected =
-        |check: &&Check| expect.is_some_and(|expect| expect.failed.iter().any(|name| *name == check.name));
+        |check: &Check| expect.is_some_and(|expect| expect.failed.iter().any(|name| *name == check.name));
+    let failed = checks.iter().filter(|check| check.result.is_failed() && !is_expected(check));
     let motion_ns = figures.path_breach.motion_ns.map(|[began_ns, _]| began_ns);
-    earliest_breach(checks.iter().filter(|check| !is_expected(check)), motion_ns)
+    earliest(failed.filter_map(|check| check.breach.clone()), motion_ns)
 }
 
 /// The checks of a result by their names; none without such checks.
@@ -423,50 +425,6 @@ fn named(checks: &[Check], result: CheckResult) -> Option<String> {
     let names: Vec<_> =
         checks.iter().filter(|check| check.result == result).map(|check| check.name.as_ref()).collect();
     (!names.is_empty()).then(|| names.join(", "))
-}
-
-/// The outcome of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Outcome {
-    /// One that a scenario can expect.
-    Named(ExpectedVerdict),
-    /// Failed, by checks alone: their findings are the reason.
-    ChecksFailed,
-    /// The run cannot be judged, which no scenario expects.
-    Invalid,
-}
-
-impl Outcome {
-    /// Its name in `[expect]`; none of a run that cannot be judged.
-    fn named(self) -> Option<ExpectedVerdict> {
-        match self {
-            Self::Named(outcome) => Some(outcome),
-            Self::ChecksFailed => Some(Fail),
-            Self::Invalid => None,
-        }
-    }
-
-    fn word(self) -> &'static str {
-        self.word_and_exit().0
-    }
-
-    fn exit(self) -> Exit {
-        self.word_and_exit().1
-    }
-
-    /// The word in reports, and the exit code of the program. A test that tested nothing is as red as one that failed.
-    fn word_and_exit(self) -> (&'static str, Exit) {
-        match self.named() {
-            Some(Pass) => ("PASS", Exit::Passed),
-            Some(Fail) => ("FAIL", Exit::Failed),
-            Some(Untested) => ("UNTESTED", Exit::Failed),
-            Some(Died) => ("DIED", Exit::Died),
-            Some(SafeStop) => ("SAFE STOP", Exit::SafeStop),
-            Some(Incomplete) => ("INCOMPLETE", Exit::Incomplete),
-            Some(Interrupted) => ("INTERRUPTED", Exit::Interrupted),
-            None => ("INVALID", Exit::Invalid),
-        }
-    }
 }
 
 /// The verdict on a run, and the digest of what the rig did.

@@ -1,41 +1,38 @@
 use masseter_model::geometry::Deviation;
 
 use super::*;
-use crate::check::CheckResult;
 
-fn failed(name: &'static str, breach: Option<Breach>) -> Check {
-    Check::new(name, "found".to_owned(), CheckResult::Failed).with_breach(breach)
+fn of(check: &'static str, breach: Breach) -> Breach {
+    breach.of(check.into())
 }
 
 #[test]
 fn the_earliest_breach_is_named_with_value_limit_and_time_of_the_motion() {
-    let breach = |at_ns| Breach::new("incisal.z", "12.5 mm", "12 mm").at(at_ns);
-    let checks = [
-        failed("without a time", Some(breach(None))),
-        failed("late", Some(breach(Some(3_000_000_000)))),
-        failed("early", Some(breach(Some(2_250_000_000)))),
-        Check { result: CheckResult::Excused, ..failed("excused", Some(breach(Some(1)))) },
-        failed("without a value", None),
+    let breach =
+        |check, at_ns: Option<u64>| of(check, Breach::new("incisal.z", "12.5 mm", "12 mm").at(at_ns));
+    let breaches = [
+        breach("without a time", None),
+        breach("late", Some(3_000_000_000)),
+        breach("early", Some(2_250_000_000)),
     ];
-    let first =
-        |checks: &[Check]| earliest_breach(checks.iter(), Some(1_000_000_000)).map(|found| found.to_string());
+    let first = |breaches: &[Breach]| {
+        earliest(breaches.iter().cloned(), Some(1_000_000_000)).map(|found| found.to_string())
+    };
     let early = "early: incisal.z 12.5 mm, limit 12 mm, at 1.250 s of the motion";
-    assert_eq!(first(&checks).as_deref(), Some(early));
-    assert_eq!(first(&checks[..1]).as_deref(), Some("without a time: incisal.z 12.5 mm, limit 12 mm"));
-    assert_eq!(first(&checks[3..]), None);
+    assert_eq!(first(&breaches).as_deref(), Some(early));
+    assert_eq!(first(&breaches[..1]).as_deref(), Some("without a time: incisal.z 12.5 mm, limit 12 mm"));
+    assert_eq!(first(&[]), None);
 }
 
 #[test]
 fn what_shows_in_a_stretch_of_time_counts_from_its_end() {
     let rms = Breach::new("rms", "2 mm", "1 mm").over(Some([1_000_000_000, 5_000_000_000]));
-    let checks =
-        [failed("whole", Some(rms)), failed("moment", Some(Breach::new("z", "3", "2").at(4_000_000_000)))];
-    let first = |checks: &[Check]| earliest_breach(checks.iter(), Some(1_000_000_000)).unwrap();
-    assert_eq!(first(&checks).check, "moment");
-    assert_eq!(
-        first(&checks[..1]).to_string(),
-        "whole: rms 2 mm, limit 1 mm, from 0.000 s to 4.000 s of the motion"
-    );
+    let whole = of("whole", rms);
+    let moment = of("moment", Breach::new("z", "3", "2").at(4_000_000_000));
+    let first = |breaches: &[Breach]| earliest(breaches.iter().cloned(), Some(1_000_000_000)).unwrap();
+    assert_eq!(first(&[whole.clone(), moment]).check, "moment");
+    let words = "whole: rms 2 mm, limit 1 mm, from 0.000 s to 4.000 s of the motion";
+    assert_eq!(first(&[whole]).to_string(), words);
 }
 
 #[test]

@@ -452,3 +452,23 @@ fn a_verdict_is_written_with_its_word_and_exit_code() {
     assert_eq!(written["reason"], "failed: tracking");
     assert_eq!(written["checks"].as_array().map(Vec::len), Some(9));
 }
+
+#[test]
+fn a_failed_run_names_the_first_breach_that_it_does_not_expect() {
+    let mut run = Run::new();
+    run.figures.path_breach.motion_ns = Some([0, 10_000_000_000]);
+    run.figures.tracking.actual.rms_mm = Some(0.2);
+    run.figures.motion.lag_ms = Some(30.0);
+    let first =
+        |run: &Run| Verdict::new(&run.manifest, &run.figures).first_breach.map(|first| first.to_string());
+    let tracking = "tracking: platform rms 0.2000 mm, limit 0.1 mm, from 0.000 s to 10.000 s of the motion";
+    assert_eq!(first(&run).as_deref(), Some(tracking));
+    let failed = vec!["tracking".to_owned()];
+    run.manifest.scenario.expect = Some(masseter_scenario::ExpectConfig {
+        verdict: Some(Fail),
+        failed,
+        ..masseter_scenario::ExpectConfig::default()
+    });
+    assert_eq!(first(&run).as_deref(), Some("motion lag: delay 30.0 ms, limit 20 ms"));
+    assert_eq!(first(&Run::new()), None);
+}
