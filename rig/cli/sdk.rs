@@ -100,7 +100,7 @@ impl Sdk {
 fn wheel(folder: &Path) -> Option<PathBuf> {
     let is_wheel = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        name.starts_with("masseter-") && name.ends_with(".whl")
+        name.starts_with("masseter-") && path.extension().is_some_and(|extension| extension == "whl")
     };
     fs::read_dir(folder).ok()?.filter_map(|entry| Some(entry.ok()?.path())).find(is_wheel)
 }
