@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import masseter
+import masseter.env
 from masseter.messages import ControllerState
 
 RUNNING = ControllerState.RUNNING
@@ -79,7 +80,8 @@ def test_a_pose_law_acts_as_in_a_run(tmp_path: Path) -> None:
 def test_an_episode_is_truncated_by_its_end_and_terminated_by_a_safe_stop() -> None:
     env = masseter.Env(action="pose", set={"duration_s": 0.1})
     env.reset()
-    steps, truncated, terminated, info = 0, False, False, {}
+    steps, truncated, terminated = 0, False, False
+    info: dict[str, Any] = {}
     while not (truncated or terminated):
         _, _, terminated, truncated, info = env.step(stays(env))
         steps += 1
@@ -239,15 +241,15 @@ def test_wrong_names_are_refused_with_the_nearest_one() -> None:
 
 def test_forces_are_fed_forward(tmp_path: Path) -> None:
     scenario = tmp_path / "scenario.toml"
-    scenario.write_text("duration_s = 0.3\n[drive_profile.pdos]\nrpdo1 = ['6040h', '607Ah', '60B2h']\n")
+    scenario.write_text("rate_hz = 500\nduration_s = 0.3\n[[drive_profile]]\npdos.rpdo1 = ['6040h', '607Ah', '60B2h']\n")
     env = masseter.Env(scenario, action="forces", observe=["l1.true_position"])
     lifted = []
-    for force_n in (0.0, 200.0):
+    for force_n in (0.0, 20.0):
         env.reset(seed=1)
         for _ in range(20):
             observation, *_ = env.step([0, 0, 0, force_n, force_n, force_n])
         lifted.append(observation[0])
-    assert lifted[1] > lifted[0] + 1e-4
+    assert lifted[1] > lifted[0] + 1e-4, "mm"
 
 
 def test_calls_at_the_wrong_time_are_refused() -> None:
@@ -363,8 +365,9 @@ def test_gymnasium_accepts_it() -> None:
     gymnasium = pytest.importorskip("gymnasium")
     from gymnasium.utils.env_checker import check_env
 
-    for action in ("targets", "pose"):
-        env = masseter.Env(action=action, set=SHORT, reward="-incisal.error")  # type: ignore[arg-type]
+    actions: tuple[masseter.env.Action, ...] = ("targets", "pose")
+    for action in actions:
+        env = masseter.Env(action=action, set=SHORT, reward="-incisal.error")
         assert isinstance(env, gymnasium.Env)
         check_env(env, skip_render_check=True)
     assert isinstance(masseter.VectorEnv(1, set=SHORT), gymnasium.vector.VectorEnv)
