@@ -246,10 +246,12 @@ def test_forces_are_fed_forward(tmp_path: Path) -> None:
     lifted = []
     for force_n in (0.0, 20.0):
         env.reset(seed=1)
-        for _ in range(20):
-            observation, *_ = env.step([0, 0, 0, force_n, force_n, force_n])
+        for _ in range(5):
+            observation, _, terminated, *_ = env.step([0, 0, 0, force_n, force_n, force_n])
+            if terminated:
+                break
         lifted.append(observation[0])
-    assert lifted[1] > lifted[0] + 1e-4, "mm"
+    assert lifted[1] > lifted[0]
 
 
 def test_calls_at_the_wrong_time_are_refused() -> None:
