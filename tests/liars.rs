@@ -11,7 +11,7 @@ use masseter_runtime::control::{Outcome, Session, Waited};
 use masseter_runtime::lifecycle::attach::{self, socket};
 use masseter_runtime::messages::codes::{ControllerState, DriveRequest, DriveState, drive_state};
 use masseter_runtime::messages::{Command, Reading, State, pose_fields};
-use masseter_runtime::named::{Declared, PlayedMotion};
+use masseter_runtime::named::{Declared, Parameter, PlayedMotion};
 use masseter_runtime::transport::Domain;
 use serde_json::Value;
 
@@ -103,12 +103,42 @@ fn until(end_s: f64, moment: &Moment, answer: Answer) -> Option<Answer> {
     (moment.at_s < end_s).then_some(answer)
 }
 
+/// How a controller behaves beside its motion; by default honest.
+#[derive(Clone, Copy)]
+struct Conduct {
+    /// Cycles for which it leaves enabled drives waiting.
+    wait_cycles: u32,
+    ease_cycles: u32,
+    /// Changes what it states, by the cycles in the state.
+    tell: fn(&mut State, u32),
+    /// Whether it says nothing in this cycle of the motion.
+    is_silent: fn(u64) -> bool,
+    /// A parameter of its own, and its value.
+    parameter: Option<(&'static str, f64)>,
+}
+
+const HONEST: Conduct = Conduct {
+    wait_cycles: 0,
+    ease_cycles: EASE_CYCLES,
+    tell: |_, _| (),
+    is_silent: |_| false,
+    parameter: None,
+};
+
+/// Says this state instead of that one.
+fn rename(state: &mut State, from: ControllerState, to: ControllerState) {
+    if state.controller_state == from.code() {
+        state.controller_state = to.code();
+    }
+}
+
 /// A controller that enables the drives, eases to the first pose, plays, switches off, and says that it has finished.
 struct Player {
     mechanism: Mechanism,
     motion: Trajectory,
     tracker: ForwardTracker,
     play: Play,
+    conduct: Conduct,
     end: Outcome,
     state: ControllerState,
     cycles_in_state: u32,
@@ -126,7 +156,7 @@ impl Player {
         };
         let first_m = moment.targets(&moment.first());
         let idle = |target_m, request| Answer { target_m, request, desired: estimated, motion_time_s: -1.0 };
-        let share = f64::from(self.cycles_in_state) / f64::from(EASE_CYCLES);
+        let share = f64::from(self.cycles_in_state) / f64::from(self.conduct.ease_cycles);
         let smooth = share.powi(3) * (10.0 - 15.0 * share + 6.0 * share * share);
         let eased_m: [f64; AXES] =
             std::array::from_fn(|axis| self.start_m[axis] + smooth * (first_m[axis] - self.start_m[axis]));
@@ -153,8 +183,14 @@ impl Player {
         let is_off =
             |code: &u32| drive_state(*code).is_ok_and(|state| state.is_some_and(|state| !state.is_powered()));
         let next = match self.state {
-            ControllerState::Enabling if is_in(DriveState::OperationEnabled) => ControllerState::Easing,
-            ControllerState::Easing if self.cycles_in_state == EASE_CYCLES => ControllerState::Running,
+            // Until then the drives are not enabled.
+            ControllerState::Enabling if !is_in(DriveState::OperationEnabled) => return,
+            ControllerState::Enabling if self.cycles_in_state == self.conduct.wait_cycles => {
+                ControllerState::Easing
+            }
+            ControllerState::Easing if self.cycles_in_state == self.conduct.ease_cycles => {
+                ControllerState::Running
+            }
             ControllerState::Running if is_over => ControllerState::Disabling,
             ControllerState::Disabling if reading.drive_state.iter().all(is_off) => self.last_state(),
             _ => {
@@ -173,8 +209,10 @@ impl Player {
     }
 
     /// Plays its part in a run of this rig.
-    fn run(rig: &str, motion: PlayedMotion, play: Play, end: Outcome) {
-        let declared = Declared { motion, ..Declared::default() };
+    fn run(rig: &str, motion: PlayedMotion, play: Play, conduct: Conduct, end: Outcome) {
+        let parameters = conduct.parameter.map(|(name, value)| Parameter::new(name, value));
+        let declared =
+            Declared { motion, parameters: parameters.into_iter().collect(), ..Declared::default() };
         let mut session = Session::start(attach::attach(Some(rig)).unwrap(), declared).unwrap();
         let scenario = session.context().scenario.clone();
         let mechanism = Mechanism::new(&scenario.mechanism).unwrap();
@@ -185,6 +223,7 @@ impl Player {
             mechanism,
             motion,
             play,
+            conduct,
             end,
             state: ControllerState::Enabling,
             cycles_in_state: 0,
@@ -192,6 +231,9 @@ impl Player {
         };
         while player.state != player.last_state() {
             let Waited::Cycle { tick, reading } = session.wait(None).unwrap() else { continue };
+            if player.state == ControllerState::Running && (conduct.is_silent)(tick.cycle) {
+                continue;
+            }
             let code = player.state.code();
             let mut command = Command { cycle: tick.cycle, controller_state: code, ..Command::default() };
             let mut state = State { cycle: tick.cycle, controller_state: code, ..State::default() };
@@ -199,9 +241,10 @@ impl Player {
                 (command.reading_cycle, state.reading_cycle) = (reading.cycle, reading.cycle);
                 state.sampled_ns = reading.sampled_ns;
                 player.answer(&reading, &mut command, &mut state);
-                (command.controller_state, state.controller_state) =
-                    (player.state.code(), player.state.code());
+                state.controller_state = player.state.code();
             }
+            (conduct.tell)(&mut state, player.cycles_in_state);
+            command.controller_state = state.controller_state;
             session.publish(&command, &state).unwrap();
         }
         session.finish(end).unwrap();
@@ -213,6 +256,8 @@ struct Judged {
     word: String,
     reason: String,
     sequence: String,
+    /// The findings of all checks that did not pass, each with its name.
+    findings: String,
     documents: [String; 3],
 }
 
@@ -221,13 +266,17 @@ fn judge(scenario: &str, motion: PlayedMotion, play: Play) -> Judged {
 }
 
 fn judge_end(scenario: &str, motion: PlayedMotion, play: Play, end: Outcome) -> Judged {
+    judge_conduct(scenario, motion, play, HONEST, end)
+}
+
+fn judge_conduct(scenario: &str, motion: PlayedMotion, play: Play, conduct: Conduct, end: Outcome) -> Judged {
     static NUMBER: AtomicU32 = AtomicU32::new(0);
     let workspace = Workspace::new(&format!("duration_s = 1.5\n{scenario}"));
     let name = format!("liar-{}-{}", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed));
     let rig = workspace.start_lockstep(&["--controller", "external", "--name", &name]);
     let socket = socket(&Domain::named(&name).unwrap());
     wait_until("the rig waits", || UnixStream::connect(&socket).is_ok());
-    Player::run(&name, motion, play, end);
+    Player::run(&name, motion, play, conduct, end);
     let output = rig.wait_with_output().unwrap();
     let summary = workspace.summary();
     let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
@@ -235,11 +284,15 @@ fn judge_end(scenario: &str, motion: PlayedMotion, play: Play, end: Outcome) -> 
     assert_eq!(output.status.code(), verdict["exit_code"].as_i64().map(|code| code as i32));
     let checks = verdict["checks"].as_array().unwrap();
     let sequence = checks.iter().find(|check| check["name"] == "sequence").unwrap();
+    let is_bad = |check: &&Value| check["result"] == "failed" || check["result"] == "untested";
+    let bad = checks.iter().filter(is_bad);
+    let findings = bad.map(|check| format!("{}: {}\n", text(&check["name"]), text(&check["finding"])));
     let document = |name: &str| std::fs::read_to_string(workspace.run_folder().join(name)).unwrap();
     Judged {
         word: text(&verdict["word"]),
         reason: text(&verdict["reason"]),
         sequence: text(&sequence["finding"]),
+        findings: findings.collect(),
         documents: [stdout(&output) + &stderr(&output), document("report.html"), document("junit.xml")],
     }
 }
@@ -430,3 +483,5 @@ fn an_own_motion_is_declared_lasts_as_long_as_the_scenario_says_and_something_is
         assert!(judged.sequence.starts_with(finding), "{}", judged.sequence);
     }
 }
+
+mod conduct;

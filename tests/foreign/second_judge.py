@@ -38,6 +38,9 @@ ROUNDING_M = 2e-9
 # The plan refuses some pairs of faults. More of them would test little.
 MOST_REFUSED = 0.2
 FINISHED, MASTERS_FAULT = 6, (2, 1)
+OPERATION_ENABLED, ALL_AXES = 5, 63
+# With complete readings of enabled drives the motion begins after so many cycles at the latest: those of `controller.ease_s`, and three.
+LEAD_IN = round(1.0 / PERIOD_S) + 3
 
 AXES = ("d1", "d2", "d3", "l1", "l2", "l3")
 # Kinds with the range of their size, in the unit that the size is written with.
@@ -116,18 +119,23 @@ class Run:
     """The raw recording of a run."""
 
     def __init__(self, folder):
-        self.truths, self.states, self.faults = {}, {}, []
-        for message in read_ros2_messages(folder / "recording.mcap", topics=("truth", "state", "event")):
+        self.truths, self.states, self.faults, ready = {}, {}, [], []
+        for message in read_ros2_messages(folder / "recording.mcap", topics=("truth", "reading", "state", "event")):
             at = message.ros_msg
             match message.channel.topic:
                 case "truth":
                     self.truths[at.cycle] = at
+                case "reading" if at.fresh_axes == ALL_AXES and set(at.drive_state) == {OPERATION_ENABLED}:
+                    ready.append(at.cycle)
                 case "state":
                     self.states[at.cycle] = at.controller_state
                 case "event" if (at.source, at.kind) == MASTERS_FAULT:
                     self.faults.append(at)
         stopped = min((at.cycle for at in self.faults), default=math.inf)
-        self.running = sorted(cycle for cycle, state in self.states.items() if state == RUNNING and cycle < stopped)
+        running = [cycle for cycle, state in self.states.items() if state == RUNNING and cycle < stopped]
+        begins = min([*running, *sorted(ready)[LEAD_IN : LEAD_IN + 1]], default=0)
+        # Every cycle of the motion counts, also one in which the controller reports another state, or none.
+        self.running = list(range(begins, max(running, default=begins - 1) + 1))
         self.last = max(self.states)
         self.final_state = self.states[self.last]
 

@@ -19,9 +19,10 @@ use crate::lost_cycles::{Disturbance, Freshness, OutageWatch, ScenarioStalls};
 use crate::messages::{Digest, NamedWatch, SequenceCheck};
 use crate::over_time::{AxisWatch, CONTROLLER, ContactWatch, OverTimeCollector, PLANT, Place};
 use crate::overruns::LoopSamples;
-use crate::played::{PlayedWatch, StopWatch};
+use crate::played::{MotionFigures, PlayedWatch, StopWatch};
 use crate::poses::{estimated_pose, is_moving, is_running, true_pose};
 use crate::recorded::RecordedWatch;
+use crate::reference::Reference;
 use crate::requirements::Requirements;
 use crate::response::Responses;
 use crate::signals::{CycleMessages, Pace, Sample, Timeline};
@@ -144,7 +145,7 @@ impl Analysis {
             outage: OutageWatch::default(),
             stop: StopWatch::default(),
             standstill: StandstillWatch::new(scenario),
-            played: PlayedWatch::new(&scenario.jaw),
+            played: PlayedWatch::new(scenario),
             recorded: (declared.motion == PlayedMotion::Scenario)
                 .then(|| RecordedWatch::of_scenario(scenario))
                 .flatten(),
@@ -325,7 +326,9 @@ impl Analysis {
         let topics = self.sequence.finish();
         let missing_frames =
             topics.iter().find(|topic| topic.topic == FrameTap::TOPIC).map_or(0, |topic| topic.missing);
-        let has_resumed = self.stop.has_resumed();
+        let reference = self.timeline.reference();
+        let disorder = reference.and_then(Reference::disorder);
+        let lag_causes_ms = reference.map_or([0.0; 2], Reference::lag_causes_ms);
         let running_s = self.stop.running_cycles() as f64 * self.period_ns as f64 / 1e9;
         let (stopped_by, enabled_cycles) = self.stop.into_figures();
         let enabled_s = enabled_cycles as f64 * self.period_ns as f64 / 1e9;
@@ -348,7 +351,7 @@ impl Analysis {
         let ended_ns = self.figures.final_state.filter(is_over).map(|_| self.last_due_ns + self.period_ns);
         Figures {
             ended_ns,
-            has_resumed,
+            disorder,
             digest: self.digest.in_hex(),
             duration_s: duration_ns as f64 / 1e9,
             overrun_attribution: OverrunAttribution::new(&[&self.controller_skips, &self.plant_skips]),
@@ -359,7 +362,7 @@ impl Analysis {
             stopped_by,
             enabled_s,
             running_s,
-            motion: self.played.into_figures(rest_m),
+            motion: MotionFigures { lag_causes_ms, ..self.played.into_figures(rest_m) },
             standstill: self.standstill.into_figures(),
             outage: self.outage.outage(self.period_ns),
             tracking,

@@ -154,13 +154,9 @@ pub(crate) fn left_its_path(errors: &PoseErrors, limits: &ChecksConfig) -> bool 
 }
 
 /// The error nearest to its limit, or all that exceed theirs; untested if the motion left too little to compare.
-pub(crate) fn tracking(
-    name: &'static str,
-    samples: u64,
-    errors: &PoseErrors,
-    limits: &ChecksConfig,
-) -> Check {
+pub(crate) fn tracking(name: &'static str, errors: &PoseErrors, limits: &ChecksConfig) -> Check {
     let ChecksConfig { tracking_rms_mm, tracking_max_mm, tracking_rms_deg, tracking_max_deg, .. } = *limits;
+    let samples = errors.samples;
     let figures = [
         ("incisal point rms", errors.incisal_rms_mm, tracking_rms_mm, " mm", ""),
         ("incisal point max", errors.incisal_max_mm, tracking_max_mm, " mm", AROUND),

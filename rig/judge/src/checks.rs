@@ -17,6 +17,7 @@ use crate::breach::Breach;
 use crate::check::{Check, CheckFigures, CheckResult, Subject, faults, tracking};
 use crate::events::EventRecord;
 use crate::figures::Figures;
+use crate::order::Disorder;
 use crate::played::{MotionFigures, StoppedBy};
 use crate::requirements::RequirementFigures;
 use crate::response::{BusResponse, ResponseFigures};
@@ -34,13 +35,14 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     let is_disturbed = timing.is_disturbed();
     let sequence = Check { subject: Subject::Sequence, ..sequence(manifest, figures) };
     let path = &figures.path_breach;
-    let TrackingFigures { actual_source, samples, actual, estimated, undisturbed, .. } = &figures.tracking;
+    let TrackingFigures { actual_source, without_pose, actual, estimated, undisturbed, .. } =
+        &figures.tracking;
     let tracking_of = |name, errors, undisturbed_errors| {
-        let check = tracking(name, *samples, errors, limits);
+        let check = tracking(name, errors, limits);
         let of_motion = check.breach.clone().map(|breach| breach.over(path.motion_ns));
         let check = check.with_breach(of_motion);
         // What also fails where no lost cycle acted on the jaw is the rig's.
-        let rest = tracking(name, undisturbed.samples, undisturbed_errors, limits);
+        let rest = tracking(name, undisturbed_errors, limits);
         check.unless(is_disturbed && !rest.result.is_failed())
     };
     let of_path = tracking_of("tracking", actual, &undisturbed.actual);
@@ -49,6 +51,7 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     if actual_source.is_truth() {
         checks.push(tracking_of("estimated tracking", estimated, &undisturbed.estimated));
     }
+    checks.extend(stated_pose(*without_pose));
     // A stop ends the motion somewhere, and has a verdict of its own.
     let is_stopped = figures.stopped_by.is_some()
         || figures.final_state.is_some_and(|state| state == ControllerState::SafeStop);
@@ -87,12 +90,41 @@ fn stopped_ns(figures: &Figures) -> Option<u64> {
     stops.map(|event| event.time_ns).min().or(figures.stop_without_event_ns)
 }
 
-/// A motion that waited for lost commands or readings is late from then on. `None` if the scenario's motion never began.
+/// A desired pose in the state that is none: the controller computes with such numbers. None where each was a pose.
+fn stated_pose(without: u64) -> Option<Check> {
+    let samples = counted(without, "sample");
+    let why =
+        format!("{samples} of the motion in which the controller stated no finite pose as the desired one");
+    (without > 0).then(|| Check::judged("stated pose", why, false))
+}
+
+/// A motion that waited for lost commands or readings is late from then on. The true jaw may be ahead by no more than it may be
+/// late. `None` if the scenario's motion never began.
 fn motion_lag(motion: &MotionFigures, limit_ms: f64) -> Option<Check> {
     let lag_ms = motion.way_mm.and(motion.lag_ms)?;
-    let check =
-        Check::judged("motion lag", format!("{lag_ms:.1} ms, limit {limit_ms} ms"), lag_ms <= limit_ms);
-    Some(check.with_breach(Breach::new("delay", format!("{lag_ms:.1} ms"), format!("{limit_ms} ms"))))
+    let why = lag_cause(motion, limit_ms).map_or_else(String::new, |why| format!("; {why}"));
+    let is_kept = lag_ms <= limit_ms && motion.ahead_ms.is_none();
+    let check = Check::judged("motion lag", format!("{lag_ms:.1} ms, limit {limit_ms} ms{why}"), is_kept);
+    let (what, beyond_ms) = motion.ahead_ms.map_or(("delay", lag_ms), |ahead_ms| ("lead", ahead_ms));
+    Some(check.with_breach(Breach::new(what, format!("{beyond_ms:.1} ms"), format!("{limit_ms} ms"))))
+}
+
+/// What the controller did that put the motion beyond its limit; none where it waited, or kept the limit.
+pub(crate) fn lag_cause(motion: &MotionFigures, limit_ms: f64) -> Option<String> {
+    let [began_late_ms, ran_back_ms] = motion.lag_causes_ms;
+    if let Some(ahead_ms) = motion.ahead_ms {
+        return Some(format!("the true jaw was {ahead_ms:.1} ms ahead of the motion"));
+    }
+    let is_late = motion.lag_ms.is_some_and(|lag_ms| lag_ms > limit_ms);
+    match is_late {
+        true if began_late_ms > limit_ms => {
+            Some(format!("the controller began the motion {began_late_ms:.1} ms after its lead-in"))
+        }
+        true if ran_back_ms > limit_ms => {
+            Some(format!("the controller's motion time ran back by {ran_back_ms:.1} ms"))
+        }
+        _ => None,
+    }
 }
 
 /// A cycle of the motion without a new command leaves the drives with the last one. As many in a row are allowed as the controller
@@ -307,8 +339,8 @@ const WHOLE_TIME: f64 = 0.99;
 pub(crate) enum Shortfall {
     /// The jaw went only this share of the scenario's motion.
     NotPlayed { share: f64, way_mm: f64 },
-    /// The controller left the motion and began it again: meanwhile nothing compared the jaw with its path.
-    Resumed,
+    /// The controller's states are out of order.
+    OutOfOrder(Disorder),
     /// The scenario's motion moves nothing.
     Still,
     /// An own motion did not run, with enabled drives, for as long as it is to last. Its requirements judge no other time.
@@ -329,11 +361,15 @@ impl Shortfall {
             None if is_in(ControllerState::SafeStop) => return Self::of_stated_stop(manifest, figures),
             None => {}
         }
+        let is_never = |disorder: &Disorder| *disorder == Disorder::NeverBegan;
+        // A stop by request, or the end of a process, may come before the motion.
+        let may_be_short = was_stopped_by_request(figures) || manifest.ending != Ending::Completed;
+        let disorder = figures.disorder.filter(|disorder| !(is_never(disorder) && may_be_short));
         if !is_in(ControllerState::Finished) {
-            return None;
+            return disorder.filter(is_never).map(Self::OutOfOrder);
         }
-        if figures.has_resumed {
-            return Some(Self::Resumed);
+        if let Some(disorder) = disorder {
+            return Some(Self::OutOfOrder(disorder));
         }
         if manifest.declared.motion == PlayedMotion::Own {
             return Self::of_own(manifest, figures);
@@ -374,7 +410,7 @@ impl Shortfall {
     pub(crate) fn result(self) -> CheckResult {
         match self {
             Self::Still | Self::Unjudged | Self::OnlyStated => CheckResult::Untested,
-            Self::NotPlayed { .. } | Self::OwnEarly { .. } | Self::Resumed => CheckResult::Failed,
+            Self::NotPlayed { .. } | Self::OwnEarly { .. } | Self::OutOfOrder(_) => CheckResult::Failed,
         }
     }
 }
@@ -389,7 +425,7 @@ impl Display for Shortfall {
                 // No share of -0 %.
                 (share * 100.0).round() + 0.0
             ),
-            Self::Resumed => f.write_str("the controller left the motion and began it again"),
+            Self::OutOfOrder(disorder) => disorder.fmt(f),
             Self::Still => f.write_str("the scenario's motion does not move the jaw"),
             Self::OwnEarly { running_s, duration_s } => write!(
                 f,

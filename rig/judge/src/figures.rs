@@ -15,6 +15,7 @@ use crate::longest_cycles::WorstCycle;
 use crate::lost_cycles::{Outage, ReadingFigures};
 use crate::measured::IntervalFigures;
 use crate::messages::{ParameterFigures, SignalFigures, TopicFigures};
+use crate::order::Disorder;
 use crate::over_time::{AxisFigures, ContactFigures, OverTime};
 use crate::overruns::Overrun;
 use crate::played::{MotionFigures, StoppedBy};
@@ -49,9 +50,9 @@ pub struct Figures {
     /// When the controller first stated a safe stop, or the readings first showed a stop of drives or master, ns of the run's clock.
     #[serde(skip)]
     pub stop_without_event_ns: Option<u64>,
-    /// Whether the controller left the motion and began it again.
+    /// What is out of order in the controller's states.
     #[serde(skip)]
-    pub has_resumed: bool,
+    pub disorder: Option<Disorder>,
     /// What stopped the drives, whatever the controller reports; `None` if nothing did.
     pub stopped_by: Option<StoppedBy>,
     /// For how long all drives were enabled, s.

@@ -3,6 +3,7 @@
 //! [`Analysis`] takes the messages and returns [`Figures`]; [`Verdict`] judges them. Nothing here reads or writes a file:
 //! see the crates `masseter-recording` and `masseter-report`.
 
+mod ahead;
 mod analysis;
 mod breach;
 mod check;
@@ -17,6 +18,7 @@ mod lost_cycles;
 mod measured;
 mod messages;
 mod next_step;
+mod order;
 mod outcome;
 mod over_time;
 mod overruns;
@@ -52,6 +54,7 @@ pub use lost_cycles::{Outage, ReadingFigures};
 pub use measured::{IntervalFigures, Seconds, resolution_ns};
 pub use messages::{ParameterFigures, SequenceCheck, SignalFigures, TopicFigures};
 pub use next_step::NextStep;
+pub use order::Disorder;
 pub use over_time::{AxisFigures, ContactFigures, OverTime, ToothFigures, ToothLoads};
 pub use overruns::{LoopCounts, Overrun, OverrunCause};
 pub use played::{MotionFigures, StoppedBy};

@@ -8,9 +8,10 @@ use masseter_model::geometry::{AXES, Pose, Vec3};
 use masseter_recording::jaw_points;
 use masseter_runtime::messages::codes::{ControllerState, DriveState, NO_DRIVE_STATE, drive_state};
 use masseter_runtime::messages::{Reading, State};
-use masseter_scenario::JawConfig;
+use masseter_scenario::Scenario;
 use serde::Serialize;
 
+use crate::ahead::{AheadWatch, Points};
 use crate::events::EventRecord;
 use crate::poses::{is_moving, is_running};
 
@@ -24,6 +25,12 @@ pub struct MotionFigures {
     pub played: Option<f64>,
     /// By how much the motion was late at most, ms; `None` if it never began.
     pub lag_ms: Option<f64>,
+    /// By how much the true jaw was ahead of the motion at most, ms; only beyond `checks.motion_lag_ms`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ahead_ms: Option<f64>,
+    /// By how much the motion began late, and by how much the controller's time ran back, ms.
+    #[serde(skip)]
+    pub lag_causes_ms: [f64; 2],
     /// Cycles of the motion without a new command.
     pub missed_commands: u64,
     /// The most of them in a row.
@@ -41,13 +48,15 @@ const LEAST_STEP_M: f64 = 1e-5;
 /// Follows the jaw on its way.
 #[derive(Debug, Clone)]
 pub(super) struct PlayedWatch {
-    points_m: [Vec3; 3],
+    points_m: Points,
     /// The poses of both at the last step, desired and actual.
     before: Option<[Pose; 2]>,
     progress_s: f64,
     way_m: f64,
     gone_m: f64,
     lag_s: Option<f64>,
+    most_ahead_s: f64,
+    ahead: AheadWatch,
     /// The cycle of the last reading.
     cycle: u64,
     answered: u64,
@@ -58,9 +67,11 @@ pub(super) struct PlayedWatch {
 }
 
 impl PlayedWatch {
-    pub(super) fn new(jaw: &JawConfig) -> Self {
+    pub(super) fn new(scenario: &Scenario) -> Self {
         Self {
-            points_m: jaw_points(jaw),
+            points_m: jaw_points(&scenario.jaw),
+            most_ahead_s: scenario.checks.motion_lag_ms / 1e3,
+            ahead: AheadWatch::default(),
             before: None,
             progress_s: f64::NEG_INFINITY,
             way_m: 0.0,
@@ -86,6 +97,7 @@ impl PlayedWatch {
     ) {
         self.lag_s = Some(self.lag_s.map_or(lag_s, |most_s| most_s.max(lag_s)));
         let Some(now) = desired.zip(actual).map(|(desired, actual)| [desired, actual]) else { return };
+        self.ahead.add_sample(lag_s, progress_s, now.each_ref(), |from, to| step(&self.points_m, from, to));
         let before = self.before.get_or_insert(now);
         let [desired, actual] = [0, 1].map(|of| step(&self.points_m, &before[of], &now[of]));
         let length_m = length(&desired);
@@ -121,6 +133,8 @@ impl PlayedWatch {
             way_mm: way_m.map(|way_m| way_m * 1e3),
             played: way_m.filter(|way_m| *way_m > NO_WAY_M).map(|way_m| self.gone_m / way_m),
             lag_ms: self.lag_s.map(|lag_s| lag_s * 1e3),
+            ahead_ms: Some(self.ahead.in_s()).filter(|s| *s > self.most_ahead_s).map(|s| s * 1e3),
+            lag_causes_ms: [0.0; 2],
             missed_commands: self.missed_commands,
             missed_in_a_row: self.most_in_a_row,
             late_commands: self.late_commands,
@@ -129,12 +143,12 @@ impl PlayedWatch {
 }
 
 /// How each point moves from one pose to another, m.
-fn step(points_m: &[Vec3; 3], from: &Pose, to: &Pose) -> [Vec3; 3] {
+fn step(points_m: &Points, from: &Pose, to: &Pose) -> Points {
     let place = |pose: &Pose, point: &Vec3| pose.translation.vector + pose.rotation * point;
     points_m.each_ref().map(|point| place(to, point) - place(from, point))
 }
 
-fn length(step: &[Vec3; 3]) -> f64 {
+fn length(step: &Points) -> f64 {
     step.iter().map(Vec3::norm_squared).sum::<f64>().sqrt()
 }
 
@@ -169,11 +183,9 @@ impl Display for StoppedBy {
 pub(super) struct StopWatch {
     stopped: Option<StoppedBy>,
     was_enabled: [bool; AXES],
-    /// The newest state is one of the motion; whether one was; and whether the motion began again after it was left.
+    /// The newest state is one of the motion, and whether it is `running`.
     is_moving: bool,
     is_running: bool,
-    has_moved: bool,
-    has_resumed: bool,
     /// When a drive left operation in the motion, ns, and how many states of the motion came since.
     left: Option<(u64, u32)>,
     has_left: bool,
@@ -228,10 +240,7 @@ impl StopWatch {
 
     /// Takes a state. A controller that ends its motion with the drives is no stop of theirs.
     pub(super) fn apply_state(&mut self, state: &State) {
-        let is_moving = is_moving(Some(state.controller_state));
-        self.has_resumed |= is_moving && !self.is_moving && self.has_moved;
-        self.has_moved |= is_moving;
-        self.is_moving = is_moving;
+        self.is_moving = is_moving(Some(state.controller_state));
         self.is_running = is_running(Some(state.controller_state));
         self.is_finished = state.controller_state == ControllerState::Finished.code();
         let Some((left_ns, states)) = &mut self.left else { return };
@@ -251,11 +260,6 @@ impl StopWatch {
     pub(super) fn apply_event(&mut self, event: &EventRecord) {
         let is_stop = event.is_fault_of_master() && !self.has_ended;
         self.stopped = self.stopped.or(is_stop.then_some(StoppedBy::Master));
-    }
-
-    /// Whether the motion began again after the controller had left it: meanwhile nobody compares the jaw with its path.
-    pub(super) fn has_resumed(&self) -> bool {
-        self.has_resumed
     }
 
     /// In how many cycles the controller ran its motion with all drives enabled.

@@ -1,8 +1,9 @@
 //! The pose that the jaw should have at each sample, and by how much the motion is late.
 //!
 //! While the motion plays, the pose is the scenario's, computed here; with force control its height follows the controller's
-//! within `reach_m`. The motion begins with the first sample in which the controller says `running`, and goes on by a period
-//! with each cycle that the controller runs. A controller waits where commands or readings are lost: its motion is then
+//! within `reach_m`. The motion begins with the first sample in which the controller says `running`, but no later than its
+//! [lead-in](StateOrder) allows. It goes on by a period with each cycle, but for those that the controller's loop lost. A
+//! controller waits where commands or readings are lost: its motion is then
 //! late, and the pose here is as late, up to the limit of `checks`. What was late stays late, but for what cycles without
 //! SYNC and the machine's lost cycles cost. Before the motion, and in an own motion, the controller's desired pose counts. After the motion the last pose
 //! stays. Where the machine loses cycles while the rate of the motion changes, the pose is not exactly the controller's.
@@ -11,12 +12,13 @@ use masseter_controller::playback::Playback;
 use masseter_controller::trajectory::Trajectory;
 use masseter_model::geometry::{Mechanism, Pose};
 use masseter_runtime::messages::codes::Cause;
-use masseter_runtime::messages::{Parameters, State, pose_fields};
+use masseter_runtime::messages::{Parameters, Reading, State, pose_fields};
 use masseter_runtime::named::{Declared, PlayedMotion};
 use masseter_scenario::Scenario;
 
 use crate::events::EventRecord;
 use crate::jaw_cycles::MotionSpeed;
+use crate::order::{Disorder, StateOrder};
 use crate::poses::{desired_pose, is_moving, is_running};
 
 /// What the messages of a sample say of the motion.
@@ -24,9 +26,11 @@ use crate::poses::{desired_pose, is_moving, is_running};
 #[expect(clippy::struct_excessive_bools, reason = "facts that are independent of each other")]
 pub(crate) struct Progress<'a> {
     pub(crate) cycle: u64,
-    /// Whether SYNC was sent, and whether the controller ran.
+    /// Whether SYNC was sent.
     pub(crate) has_sync: bool,
+    /// False in a cycle that the controller's loop lost. One without a state counts all the same if the loop did not lose it.
     pub(crate) has_run: bool,
+    pub(crate) reading: Option<&'a Reading>,
     /// The controller's, as a code.
     pub(crate) state: Option<u32>,
     /// Whether a cycle that the machine lost may act on this one.
@@ -50,8 +54,9 @@ pub(crate) struct Reference {
     /// How far force control may lead the jaw up or down from the motion, m.
     reach_m: f64,
     detour_m: f64,
-    /// Places of the parameters for rate and amplitude.
-    places: [Option<usize>; 2],
+    order: StateOrder,
+    /// Places of the parameters for rate and amplitude, and a value that is the controller's own alone: it changes nothing.
+    places: [Option<(usize, Option<f64>)>; 2],
     /// The controller's cycle in which somebody asked for a stop.
     stop_cycle: Option<u64>,
     has_begun: bool,
@@ -61,6 +66,10 @@ pub(crate) struct Reference {
     lag_s: f64,
     /// The part of it that does not count.
     excused_s: f64,
+    /// By how much the motion began late, how far the controller said that it came, and by how much it went back at most.
+    began_late_s: f64,
+    farthest_s: f64,
+    ran_back_s: f64,
     progress_s: f64,
     pose: Option<Pose>,
 }
@@ -70,6 +79,8 @@ pub(crate) struct Reference {
 pub(crate) struct Desired {
     pub(crate) pose: Option<Pose>,
     pub(crate) lag_s: Option<f64>,
+    /// Whether the motion plays already, and the controller has not begun it.
+    pub(crate) is_awaited: bool,
     /// How far the pose has come on the motion, s, from any instant. It goes back where a loop lost cycles.
     pub(crate) progress_s: f64,
 }
@@ -85,6 +96,11 @@ const FULL_SHARE: f64 = 0.999;
 impl Reference {
     pub(crate) fn new(scenario: &Scenario, declared: &Declared) -> Self {
         let is_of_scenario = declared.motion == PlayedMotion::Scenario;
+        let place = |name: &str| {
+            let place = declared.place_of(name).ok()?;
+            let own = (!scenario.parameters.contains_key(name)).then(|| declared.parameters[place].value);
+            Some((place, own))
+        };
         Self {
             playback: is_of_scenario.then(|| playback(scenario)).flatten(),
             period_s: scenario.period_s(),
@@ -92,13 +108,17 @@ impl Reference {
             most_lag_s: scenario.checks.motion_lag_ms / 1e3,
             reach_m: scenario.force_control.map_or(0.0, |config| config.reach_m),
             detour_m: 0.0,
-            places: ["motion_rate", "motion_amplitude"].map(|name| declared.place_of(name).ok()),
+            order: StateOrder::new(scenario, declared),
+            places: ["motion_rate", "motion_amplitude"].map(place),
             stop_cycle: None,
             has_begun: false,
             is_moving: false,
             was_moving: false,
             lag_s: 0.0,
             excused_s: 0.0,
+            began_late_s: 0.0,
+            farthest_s: 0.0,
+            ran_back_s: 0.0,
             progress_s: 0.0,
             pose: None,
         }
@@ -113,10 +133,13 @@ impl Reference {
 
     /// Goes on to the next sample.
     pub(crate) fn advance(&mut self, of: &Progress<'_>) -> Desired {
+        self.order.advance(of.state, of.reading, of.has_run && !of.is_disturbed);
         let is_moving = is_moving(of.state);
         // A sample comes before the state that it leads to: the motion has its part in the sample that ends it.
         let goes_on = std::mem::replace(&mut self.is_moving, is_moving) || is_moving;
-        let has_begun = self.has_begun || is_running(of.state);
+        let is_overdue = self.order.is_overdue() && self.stop_cycle.is_none();
+        let has_begun = self.has_begun || is_running(of.state) || is_overdue;
+        let goes_on = goes_on || (has_begun && self.order.is_before_motion());
         if has_begun && self.playback.is_some() {
             if goes_on {
                 self.play(of);
@@ -127,12 +150,17 @@ impl Reference {
         self.was_moving |= is_moving;
         let lag_s = (self.lag_s - self.excused_s).max(0.0);
         let lag_s = (self.has_begun && goes_on).then_some(lag_s);
-        Desired { pose: self.pose, lag_s, progress_s: self.progress_s }
+        let is_awaited = self.has_begun && self.order.is_before_motion();
+        Desired { pose: self.pose, lag_s, is_awaited, progress_s: self.progress_s }
     }
 
     fn play(&mut self, of: &Progress<'_>) {
         let Some(playback) = &mut self.playback else { return };
-        let set = |place: Option<usize>| of.parameters?.parameters.as_slice().get(place?).copied();
+        let set = |place: Option<(usize, Option<f64>)>| {
+            let (place, own) = place?;
+            let value = *of.parameters?.parameters.as_slice().get(place)?;
+            Some(if own == Some(value) { 1.0 } else { value })
+        };
         let [rate, amplitude] = self.places.map(set);
         if let Some(rate) = rate {
             playback.set_motion_rate(rate);
@@ -148,9 +176,19 @@ impl Reference {
         }
         let stated_s = of.next_use.map(|state| state.motion_time_s).filter(|stated_s| *stated_s >= 0.0);
         let before_s = self.lag_s;
-        let found_s = stated_s.map_or(before_s, |stated_s| playback.lag_s(stated_s, self.excused_s));
+        let waits = self.order.is_before_motion();
+        let found_s = match stated_s {
+            _ if waits => playback.trajectory().duration_s() - playback.rest_s(),
+            Some(stated_s) => playback.lag_s(stated_s, self.excused_s),
+            None => before_s,
+        };
         self.lag_s = found_s.max(before_s);
+        if let Some(stated_s) = stated_s {
+            self.farthest_s = self.farthest_s.max(stated_s);
+            self.ran_back_s = self.ran_back_s.max(self.farthest_s - stated_s);
+        }
         self.excused_s += if of.is_disturbed { self.lag_s - before_s } else { 0.0 };
+        self.began_late_s = if waits { self.lag_s - self.excused_s } else { self.began_late_s };
         // A change of the rate goes on while the controller waits for lost cycles, here but not there.
         let waited_s = found_s.max(self.lag_s - self.excused_s).min(self.most_lag_s + self.excused_s);
         let mut pose = playback.earlier_pose(waited_s);
@@ -165,6 +203,16 @@ impl Reference {
         if self.stop_cycle.is_some_and(|cycle| cycle <= of.cycle) {
             playback.stop();
         }
+    }
+
+    /// What is out of order in the controller's states.
+    pub(crate) fn disorder(&self) -> Option<Disorder> {
+        self.order.disorder()
+    }
+
+    /// By how much the motion began late, and by how much the controller's time ran back, ms.
+    pub(crate) fn lag_causes_ms(&self) -> [f64; 2] {
+        [self.began_late_s * 1e3, self.ran_back_s * 1e3]
     }
 
     /// The speed of the motion's clock at this progress, s.

@@ -7,7 +7,7 @@ use masseter_runtime::messages::codes::ControllerState;
 use serde::Serialize;
 
 use crate::measured::standard_error;
-use crate::poses::{deviation, estimated_pose, is_moving, is_running, true_pose, worse};
+use crate::poses::{desired_pose, deviation, estimated_pose, is_moving, is_running, true_pose, worse};
 use crate::signals::Sample;
 
 /// Where the actual pose comes from, which the desired pose is compared with.
@@ -44,6 +44,9 @@ pub struct TrackingFigures {
     pub actual_source: PoseSource,
     /// Cycles compared.
     pub samples: u64,
+    /// Those of them in which the controller stated no desired pose, but other numbers.
+    #[serde(skip)]
+    pub without_pose: u64,
     /// Errors of the actual pose against the desired one.
     #[serde(flatten)]
     pub actual: PoseErrors,
@@ -125,6 +128,7 @@ pub(super) struct Tracking {
     errors: Errors,
     undisturbed: Errors,
     estimates: Accumulator,
+    without_pose: u64,
     track: Vec<TrackingSample>,
     next_sample_ns: u64,
     /// How often the time between two samples of the track has doubled.
@@ -149,7 +153,9 @@ impl Tracking {
     pub(super) fn add_sample(&mut self, sample: &Sample) -> Option<PathSample> {
         let (messages, sampled_ns) = (&sample.messages, sample.time_ns);
         let state = messages.controller_state;
-        let is_moving = is_moving(state) && self.stopped.is_none_or(|stopped| messages.cycle < stopped);
+        // Nor may the jaw leave its path while a controller puts off its motion.
+        let is_moving = (is_moving(state) || messages.is_awaited)
+            && self.stopped.is_none_or(|stopped| messages.cycle < stopped);
         let on_path = match std::mem::replace(&mut self.was_moving, is_moving) {
             _ if is_moving => OnPath::Moving,
             true => OnPath::End,
@@ -172,6 +178,7 @@ impl Tracking {
             self.errors(is_disturbed).for_each(|errors| errors.actual.peak(&error));
         }
         if on_path == OnPath::Moving && is_used {
+            self.without_pose += u64::from(messages.solution.as_ref().and_then(desired_pose).is_none());
             let estimate = deviation(desired.as_ref(), estimated.as_ref(), self.incisal_m);
             let add = if is_counted { PoseErrorSums::add } else { PoseErrorSums::peak };
             self.errors(is_disturbed).for_each(|errors| add(&mut errors.estimated, &estimate));
@@ -224,6 +231,7 @@ impl Tracking {
         let figures = TrackingFigures {
             actual_source: self.source,
             samples,
+            without_pose: self.without_pose,
             actual,
             rms_noise_mm: standard_error(&self.seconds),
             estimated,
@@ -238,6 +246,9 @@ impl Tracking {
 /// hold at its end, the sample at which a safe stop began, and cycles without a fresh reading.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct PoseErrors {
+    /// Cycles compared.
+    #[serde(skip)]
+    pub samples: u64,
     /// Root mean square distance of the platform's origin, mm.
     pub rms_mm: Option<f64>,
     /// Largest distance, mm.
@@ -319,6 +330,7 @@ impl PoseErrorSums {
     fn figures(&self) -> PoseErrors {
         let rms = |sum: &Accumulator| (sum.samples > 0).then(|| sum.rms());
         PoseErrors {
+            samples: self.origin.samples,
             rms_mm: rms(&self.origin),
             max_mm: self.origin.largest,
             incisal_rms_mm: rms(&self.incisal),

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::breach::{Breach, earliest};
 use crate::check::{Check, CheckResult, Subject, left_its_path};
-use crate::checks::{Shortfall, checks, is_often_late};
+use crate::checks::{Shortfall, checks, is_often_late, lag_cause};
 use crate::events::EventRecord;
 use crate::figures::Figures;
 use crate::lost_cycles::Outage;
@@ -301,8 +301,12 @@ fn excuse(ending: &Ending, timing: &Timing, outage: Option<Outage>) -> Option<St
 
 /// A failure with the missing part of the motion, which the names of checks do not show.
 fn with_shortfall((outcome, reason): OutcomeReason, manifest: &Manifest, figures: &Figures) -> OutcomeReason {
-    let short = Shortfall::of(manifest, figures).map(|short| format!("; {short}"));
-    (outcome, reason + &short.unwrap_or_default())
+    let short = Shortfall::of(manifest, figures);
+    // A motion at another time is the cause of what the jaw did not go.
+    let is_of_time = short.is_none_or(|short| matches!(short, Shortfall::NotPlayed { .. }));
+    let cause = lag_cause(&figures.motion, manifest.scenario.checks.motion_lag_ms).filter(|_| is_of_time);
+    let why = cause.into_iter().chain(short.map(|short| short.to_string()));
+    (outcome, why.fold(reason, |reason, why| format!("{reason}; {why}")))
 }
 
 fn failed(checks: &[Check]) -> Option<OutcomeReason> {

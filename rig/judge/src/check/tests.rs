@@ -31,6 +31,7 @@ mod motion_checks {
     fn every_error_has_its_own_limit_and_the_closest_is_shown() {
         let limits = ChecksConfig::default();
         let good = PoseErrors {
+            samples: 10,
             rms_mm: Some(0.01),
             max_mm: Some(0.02),
             incisal_rms_mm: Some(0.01),
@@ -38,13 +39,13 @@ mod motion_checks {
             rms_deg: Some(0.01),
             max_deg: Some(0.02),
         };
-        let check = tracking("tracking", 10, &good, &limits);
+        let check = tracking("tracking", &good, &limits);
         assert_eq!(
             (check.result.mark(), check.finding.as_str()),
             ("ok", "incisal point max 0.1000 mm, limit 0.5 mm; 10 samples, approach and hold included")
         );
         let rms_is_closest = PoseErrors { rms_mm: Some(0.05), incisal_max_mm: Some(0.2), ..good };
-        let check = tracking("tracking", 10, &rms_is_closest, &limits);
+        let check = tracking("tracking", &rms_is_closest, &limits);
         assert_eq!(check.finding, "platform rms 0.0500 mm, limit 0.1 mm; 10 samples");
         let mm = |share: f64, limit: f64| Some(share * limit);
         let each: [(Spoil, f64); 6] = [
@@ -67,7 +68,7 @@ mod motion_checks {
                 let mut errors = good;
                 spoil(&mut errors, mm(share, limit));
                 for samples in [10, 1, 0] {
-                    let check = tracking("tracking", samples, &errors, &limits);
+                    let check = tracking("tracking", &PoseErrors { samples, ..errors }, &limits);
                     let expected = if mark == "ok" && samples < 10 { "UNTESTED" } else { mark };
                     assert_eq!(check.result.mark(), expected, "{check:?}");
                 }
@@ -87,7 +88,7 @@ mod motion_checks {
             (10, begun, "ok", "platform rms 0.0100 mm, limit 0.1 mm; 10 samples"),
         ];
         for (samples, errors, mark, finding) in cases {
-            let check = tracking("tracking", samples, &errors, &ChecksConfig::default());
+            let check = tracking("tracking", &PoseErrors { samples, ..errors }, &ChecksConfig::default());
             assert_eq!((check.result.mark(), check.finding.as_str()), (mark, finding));
         }
     }

@@ -72,6 +72,8 @@ mod shortfall {
         way_mm: Some(900.0),
         played: Some(0.999),
         lag_ms: Some(0.0),
+        ahead_ms: None,
+        lag_causes_ms: [0.0; 2],
         missed_commands: 0,
         missed_in_a_row: 0,
         late_commands: 0,
@@ -84,7 +86,7 @@ mod shortfall {
         manifest.controller = Some("external".to_owned());
         let mut figures = Analysis::new(&manifest.scenario, &Declared::default()).finish(false, &[]);
         figures.final_state = Some(Code::Known(ControllerState::Finished));
-        (figures.running_s, figures.motion) = (10.0, PLAYED);
+        (figures.running_s, figures.motion, figures.disorder) = (10.0, PLAYED, None);
         change(&mut manifest, &mut figures);
         Shortfall::of(&manifest, &figures)
     }
@@ -155,6 +157,52 @@ mod shortfall {
             .map(|lag_ms| motion_lag(&motion(lag_ms), 20.0).map(|check| check.result.mark()));
         assert_eq!(found, [Some("ok"), Some("ok"), Some("FAIL"), Some("FAIL"), None]);
         assert_eq!(motion_lag(&MotionFigures { way_mm: None, ..PLAYED }, 20.0), None, "an own motion");
+        for (change, finding) in [
+            (
+                (Some(31.0), 0.0, [0.0; 2]),
+                "0.0 ms, limit 20 ms; the true jaw was 31.0 ms ahead of the motion",
+            ),
+            (
+                (None, 30.0, [25.0, 0.0]),
+                "30.0 ms, limit 20 ms; the controller began the motion 25.0 ms after its lead-in",
+            ),
+            (
+                (None, 30.0, [15.0, 28.0]),
+                "30.0 ms, limit 20 ms; the controller's motion time ran back by 28.0 ms",
+            ),
+            ((None, 30.0, [15.0, 15.0]), "30.0 ms, limit 20 ms"),
+        ] {
+            let (ahead_ms, lag_ms, lag_causes_ms) = change;
+            let motion = MotionFigures { ahead_ms, lag_causes_ms, ..motion(Some(lag_ms)) };
+            let check = motion_lag(&motion, 20.0).unwrap();
+            assert_eq!((check.result.mark(), check.finding.as_str()), ("FAIL", finding));
+        }
+    }
+
+    #[test]
+    fn states_out_of_order_fail_and_a_stop_by_request_excuses_a_motion_that_never_began() {
+        let never = |change: fn(&mut Manifest, &mut Figures)| {
+            shortfall(|manifest, figures| {
+                (manifest.ending, figures.disorder) = (Ending::Completed, Some(Disorder::NeverBegan));
+                change(manifest, figures);
+            })
+        };
+        let found = Some(Shortfall::OutOfOrder(Disorder::NeverBegan));
+        assert_eq!(never(|_, _| ()), found);
+        let enabling = Some(Code::Known(ControllerState::Enabling));
+        assert_eq!(
+            never(|_, figures| figures.final_state = Some(Code::Known(ControllerState::Enabling))),
+            found
+        );
+        assert_eq!(never(|_, figures| stop_by_request(figures)), None);
+        let died = shortfall(|_, figures| {
+            (figures.final_state, figures.disorder) = (enabling, Some(Disorder::NeverBegan));
+        });
+        assert_eq!(died, None, "the supervisor has not entered an end");
+        let back = Disorder::Back { from: ControllerState::Running, to: ControllerState::Easing };
+        let found = shortfall(|_, figures| figures.disorder = Some(back)).unwrap();
+        assert_eq!(found.result(), CheckResult::Failed);
+        assert_eq!(found.to_string(), "the controller went back from the state running to easing");
     }
 
     #[test]

@@ -7,7 +7,7 @@ mod played {
 
     /// How far the jaw goes, where its place along x at each sample is this share of the desired one, mm.
     fn played(samples: u32, place_mm: impl Fn(f64) -> f64, rest_m: f64) -> MotionFigures {
-        let mut watch = PlayedWatch::new(&JawConfig::default());
+        let mut watch = PlayedWatch::new(&Scenario::default());
         let pose = |mm: f64| Some(Pose::translation(mm * 1e-3, 0.0, 0.0));
         for sample in 0..=samples {
             let wanted_mm = 10.0 * (f64::from(sample) * 0.1).sin();
@@ -36,7 +36,7 @@ mod played {
     /// After lost cycles the motion stands for a while, and the jaw goes on to its last target.
     #[test]
     fn a_jaw_that_catches_up_while_the_motion_waits_has_played_all() {
-        let mut watch = PlayedWatch::new(&JawConfig::default());
+        let mut watch = PlayedWatch::new(&Scenario::default());
         let pose = |mm: f64| Some(Pose::translation(mm * 1e-3, 0.0, 0.0));
         for (wanted_mm, is_mm) in (0..200).flat_map(|at| {
             let wanted_mm = f64::from(at) * 0.1;
@@ -51,17 +51,17 @@ mod played {
 
     #[test]
     fn a_motion_that_is_not_the_scenarios_or_moves_nothing_has_no_share() {
-        let own = PlayedWatch::new(&JawConfig::default()).into_figures(None);
+        let own = PlayedWatch::new(&Scenario::default()).into_figures(None);
         assert_eq!((own.way_mm, own.played, own.lag_ms), (None, None, None));
-        let still = PlayedWatch::new(&JawConfig::default()).into_figures(Some(0.0));
+        let still = PlayedWatch::new(&Scenario::default()).into_figures(Some(0.0));
         assert_eq!((still.way_mm, still.played), (Some(0.0), None));
-        let never_moved = PlayedWatch::new(&JawConfig::default()).into_figures(Some(0.9));
+        let never_moved = PlayedWatch::new(&Scenario::default()).into_figures(Some(0.9));
         assert_eq!(never_moved.played, Some(0.0));
     }
 
     #[test]
     fn the_greatest_lag_and_the_cycles_without_a_new_command_are_counted() {
-        let mut watch = PlayedWatch::new(&JawConfig::default());
+        let mut watch = PlayedWatch::new(&Scenario::default());
         for lag_s in [0.0, 0.003, 0.002] {
             watch.add_sample(lag_s, 0.0, None, None);
         }
@@ -78,7 +78,7 @@ mod played {
     #[test]
     fn a_command_that_is_used_after_its_cycle_is_late() {
         let late = |cycles_and_answers: &[(u64, u64)]| {
-            let mut watch = PlayedWatch::new(&JawConfig::default());
+            let mut watch = PlayedWatch::new(&Scenario::default());
             for &(cycle, answers_cycle) in cycles_and_answers {
                 watch.count_command(&Reading { cycle, answers_cycle, ..Reading::default() }, true);
             }

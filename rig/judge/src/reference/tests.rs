@@ -34,6 +34,7 @@ fn desired(reference: &mut Reference, states: &[Option<State>]) -> Vec<Desired> 
             cycle: place as u64 + 1,
             has_sync: true,
             has_run: true,
+            reading: None,
             is_disturbed: false,
             state: Some(ControllerState::Running.code()),
             next_use: states[place..].iter().flatten().next(),
@@ -136,6 +137,7 @@ fn a_stop_by_request_and_a_slower_rate_are_taken_over() {
             cycle,
             has_sync: true,
             has_run: true,
+            reading: None,
             is_disturbed: false,
             state,
             next_use: None,
@@ -158,6 +160,7 @@ fn before_the_motion_and_in_an_own_one_the_controllers_pose_counts_and_after_it_
             cycle: 1,
             has_sync: true,
             has_run: true,
+            reading: None,
             is_disturbed: false,
             state,
             next_use,
@@ -249,19 +252,122 @@ fn a_jaw_that_never_moves_has_played_nothing_and_one_that_moves_has_played_all()
     assert!((0.2..0.8).contains(&half.motion.played.unwrap()), "{:?}", half.motion);
 }
 
-/// Meanwhile the jaw may go anywhere, and nobody would compare it with its path.
+/// States of cycles whose readings show drives that are enabled from the third cycle on.
+fn in_order(states: &[ControllerState], motion: PlayedMotion) -> Option<Disorder> {
+    let mut order = StateOrder::new(&scenario(), &Declared { motion, ..Declared::default() });
+    for (cycle, state) in (1..).zip(states) {
+        order.advance(Some(state.code()), Some(&reading(cycle, cycle >= 3)), true);
+    }
+    order.disorder()
+}
+
+fn reading(cycle: u64, are_enabled: bool) -> Reading {
+    let state = if are_enabled { DriveState::OperationEnabled } else { DriveState::SwitchedOn };
+    Reading { cycle, drive_state: [state.code(); 6], fresh_axes: 63, ..Reading::default() }
+}
+
 #[test]
-fn a_controller_that_leaves_the_motion_and_begins_it_again_is_told() {
-    use ControllerState::{Easing, Enabling, Finished, Holding, Running};
-    for (states, expected) in [
-        (&[Enabling, Easing, Running, Running, Holding, Finished][..], false),
-        (&[Easing, Running, Enabling, Running, Finished], true),
+fn states_have_an_order_and_a_motion_its_enabled_drives() {
+    use ControllerState::{Disabling, Easing, Enabling, Finished, Holding, Running, SafeStop, WaitReadings};
+    let back = |from, to| Some(Disorder::Back { from, to });
+    let cases = [
+        (&[WaitReadings, Enabling, Easing, Running, Holding, Disabling, Finished][..], None),
+        (&[Enabling, WaitReadings, Enabling, Running, SafeStop], None),
+        (&[Enabling, Enabling, Easing, Easing, Finished], Some(Disorder::NeverBegan)),
+        (&[Enabling, Running, Running], Some(Disorder::BeforeDrives)),
+        (&[Enabling, Enabling, Running, Enabling, Running], back(Running, Enabling)),
+        (&[Enabling, Enabling, Running, Easing, Running], back(Running, Easing)),
+        (&[Enabling, Enabling, Running, Finished, Running], back(Finished, Running)),
+    ];
+    for (states, expected) in cases {
+        assert_eq!(in_order(states, PlayedMotion::Scenario), expected, "{states:?}");
+    }
+    let pause = [Enabling, Enabling, Easing, Running, Holding, Running];
+    assert_eq!(in_order(&pause, PlayedMotion::Scenario), back(Holding, Running));
+    assert_eq!(in_order(&pause, PlayedMotion::Own), None, "an own motion may hold and go on");
+    let left = [Enabling, Enabling, Running, Enabling, Running];
+    assert_eq!(in_order(&left, PlayedMotion::Own), back(Running, Enabling));
+}
+
+/// The drives are enabled in the first cycle: with a lead-in of 1.003 s the motion begins in cycle 1004, whatever the controller says.
+#[test]
+fn a_motion_begins_at_the_end_of_the_lead_in_at_the_latest() {
+    let motion = motion();
+    let waits = State { motion_time_s: -1.0, ..state(&motion, 0.0) };
+    for stated in [ControllerState::WaitReadings, ControllerState::Enabling, ControllerState::Easing] {
+        let mut reference = Reference::new(&scenario(), &Declared::default());
+        let mut advance = |cycle: u64, state: ControllerState, used: &State| {
+            reference.advance(&Progress {
+                cycle,
+                has_sync: true,
+                has_run: true,
+                reading: Some(&reading(cycle, true)),
+                is_disturbed: false,
+                state: Some(state.code()),
+                next_use: Some(used),
+                is_used: true,
+                parameters: None,
+            })
+        };
+        let before = (1..=1003).map(|cycle| advance(cycle, stated, &waits)).last().unwrap();
+        assert_eq!((before.lag_s, before.is_awaited), (None, false));
+        assert_eq!(advance(1004, stated, &waits).lag_s, Some(0.0));
+        let late = (1005..=1034).map(|cycle| advance(cycle, stated, &waits)).last().unwrap();
+        assert!(late.is_awaited && (late.lag_s.unwrap() - 0.030).abs() < 1e-9, "{late:?}");
+        let begun = advance(1035, ControllerState::Running, &state(&motion, 0.0));
+        assert!(!begun.is_awaited && begun.lag_s.unwrap() >= 0.030, "what is late stays late: {begun:?}");
+        assert!((reference.lag_causes_ms()[0] - 30.0).abs() < 1e-6);
+    }
+}
+
+/// A parameter of the motion is the operator's: a value that the controller declares for itself changes nothing.
+#[test]
+fn a_controller_scales_its_motion_only_by_order() {
+    let motion = motion();
+    let amplitude = |of_scenario: Option<f64>| {
+        let mut scenario = scenario();
+        scenario.parameters.extend(of_scenario.map(|value| ("motion_amplitude".to_owned(), value)));
+        let parameters = vec![Parameter::new("motion_amplitude", of_scenario.unwrap_or(0.0))];
+        let mut reference = Reference::new(&scenario, &Declared { parameters, ..Declared::default() });
+        let mut values = Parameters::default();
+        (values.parameters.length, values.parameters.values[0]) = (1, of_scenario.unwrap_or(0.0));
+        let advance = |cycle| {
+            reference.advance(&Progress {
+                cycle,
+                has_sync: true,
+                has_run: true,
+                reading: None,
+                is_disturbed: false,
+                state: Some(ControllerState::Running.code()),
+                next_use: None,
+                is_used: false,
+                parameters: Some(&values),
+            })
+        };
+        (1..=700).map(advance).last().unwrap()
+    };
+    assert!(apart_m(&amplitude(None), &motion, 0.699) < 1e-8, "the controller's own zero");
+    assert!(apart_m(&amplitude(Some(0.0)), &motion, 0.0) < 1e-8, "the scenario's zero");
+}
+
+/// The motion of 2 s is slow enough that no other check sees a jaw that is 30 ms ahead.
+#[test]
+fn a_jaw_that_is_ahead_of_its_motion_is_told_and_one_that_is_late_or_beside_it_is_not() {
+    let ahead = |place: fn(&Trajectory, f64) -> Pose| figures(2001, place, |_| true).motion.ahead_ms;
+    let found = ahead(|motion, at_s| motion.pose(at_s + 0.030)).unwrap();
+    assert!((found - 30.0).abs() < 3.0, "{found}");
+    assert!(
+        ahead(|motion, at_s| motion.pose(at_s + 0.030 * ((at_s - 0.8) / 0.2).clamp(0.0, 1.0)))
+            .is_some_and(|found| found > 20.0)
+    );
+    for place in [
+        Trajectory::pose as fn(&Trajectory, f64) -> Pose,
+        |motion, at_s| motion.pose(at_s + 0.010),
+        |motion, at_s| motion.pose(at_s - 0.030),
+        |motion, at_s| Pose::translation(0.0, 0.0, 1e-3) * motion.pose(at_s),
+        |motion, at_s| motion.pose(0.0).lerp_slerp(&motion.pose(at_s), 0.95),
     ] {
-        let mut watch = crate::played::StopWatch::default();
-        for name in states {
-            watch.apply_state(&State { controller_state: name.code(), ..State::default() });
-        }
-        assert_eq!(watch.has_resumed(), expected, "{states:?}");
+        assert_eq!(ahead(place), None);
     }
 }
 
@@ -299,6 +405,7 @@ fn cycles_that_a_loop_lost_are_no_lag() {
             cycle,
             has_sync,
             has_run,
+            reading: None,
             is_disturbed: (850..=900).contains(&cycle),
             state,
             next_use,

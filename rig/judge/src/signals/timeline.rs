@@ -36,6 +36,8 @@ pub struct CycleMessages {
     pub desired: Option<Pose>,
     /// By how much the motion is late, s; none but while the scenario's motion plays.
     pub lag_s: Option<f64>,
+    /// Whether the motion plays already, and the controller has not begun it.
+    pub is_awaited: bool,
     /// How far the desired pose has come on the motion, s, from any instant.
     pub progress_s: f64,
     /// The controller's command.
@@ -86,6 +88,8 @@ pub struct Timeline {
     events: Vec<EventRecord>,
     parameters: Option<Parameters>,
     controller_state: Option<u32>,
+    /// Deadlines that the controller's loop has skipped.
+    skipped_cycles: u64,
     /// `None` if nobody asks for the desired pose.
     reference: Option<Reference>,
     controller_cpu: CpuShare,
@@ -229,13 +233,19 @@ impl Timeline {
     /// Of a sample that the controller did not use, the next one that it used tells how far the motion came, or else its next state.
     fn compare_with_motion(&mut self, messages: &mut CycleMessages) {
         let Some(reference) = &mut self.reference else { return };
+        let skipped = |cycle: &CycleMessages| cycle.state.map(|state| state.skipped_cycles);
+        let is_counted =
+            skipped(messages).or_else(|| self.cycles.iter().take(KEPT_IN_ORDER).find_map(skipped));
+        let is_lost = messages.state.is_none() && is_counted.is_some_and(|now| now > self.skipped_cycles);
+        self.skipped_cycles = skipped(messages).unwrap_or(self.skipped_cycles);
         let soon = || self.cycles.iter().take(KEPT_IN_ORDER);
         let used = [&*messages].into_iter().chain(soon()).find(|cycle| cycle.solution.is_some());
         let desired = reference.advance(&Progress {
             cycle: messages.cycle,
             has_sync: messages.reading.is_some() || messages.truth.is_some(),
             state: messages.controller_state,
-            has_run: messages.state.is_some(),
+            has_run: !is_lost,
+            reading: messages.reading.as_ref(),
             // Simulated time has no account of the loops, and no lost cycles.
             is_disturbed: messages.is_disturbed && messages.state.is_some_and(|state| state.worked_ns > 0),
             next_use: used.map_or_else(|| soon().next()?.state.as_ref(), |cycle| cycle.solution.as_ref()),
@@ -246,6 +256,7 @@ impl Timeline {
         let next_run = soon().find(|cycle| cycle.state.is_some());
         messages.is_disturbed |= messages.state.is_none() && next_run.is_some_and(|cycle| cycle.is_disturbed);
         (messages.desired, messages.lag_s) = (desired.pose, desired.lag_s);
+        messages.is_awaited = desired.is_awaited;
         messages.progress_s = desired.progress_s;
     }
 }

@@ -140,8 +140,16 @@ fn a_pose_that_is_none_is_infinitely_far_from_its_path() {
                 assert_eq!(samples, 100, "{place}");
                 for (errors, is_bad) in [(actual, is_actual), (estimated, is_estimated)] {
                     let expected = Some(if is_bad { f64::INFINITY } else { 0.0 });
-                    let PoseErrors { rms_mm, max_mm, incisal_rms_mm, incisal_max_mm, rms_deg, max_deg } =
-                        errors;
+                    let PoseErrors {
+                        rms_mm,
+                        max_mm,
+                        incisal_rms_mm,
+                        incisal_max_mm,
+                        rms_deg,
+                        max_deg,
+                        samples,
+                    } = errors;
+                    assert_eq!(samples, 100, "{place}");
                     let found = [rms_mm, max_mm, incisal_rms_mm, incisal_max_mm, rms_deg, max_deg];
                     assert_eq!(found, [expected; 6], "{place}");
                 }

@@ -192,7 +192,7 @@ fn responses(response: &BusResponse) -> String {
 
 /// Distances between actual and desired pose.
 pub(crate) fn distances(tracking: &TrackingFigures) -> String {
-    let PoseErrors { rms_mm, max_mm, incisal_rms_mm, incisal_max_mm, rms_deg, max_deg } = tracking.actual;
+    let PoseErrors { rms_mm, max_mm, incisal_rms_mm, incisal_max_mm, rms_deg, max_deg, .. } = tracking.actual;
     let [rms_mm, max_mm, incisal_rms_mm, incisal_max_mm, rms_deg, max_deg] =
         [rms_mm, max_mm, incisal_rms_mm, incisal_max_mm, rms_deg, max_deg]
             .map(|value| or_dash(value, decimals));

@@ -29,13 +29,16 @@ impl Run {
         let scenario = Scenario::default();
         let mut figures = Analysis::new(&scenario, &Declared::default()).finish(false, &[]);
         figures.final_state = Some(Code::Known(ControllerState::Finished));
-        let on_path = PoseErrors { rms_mm: Some(0.05), ..PoseErrors::default() };
+        let on_path = PoseErrors { samples: 1000, rms_mm: Some(0.05), ..PoseErrors::default() };
+        figures.disorder = None;
         let undisturbed = UndisturbedFigures { samples: 900, actual: on_path, estimated: on_path };
         figures.cycles = 1000;
         figures.motion = MotionFigures {
             way_mm: Some(900.0),
             played: Some(0.999),
             lag_ms: Some(0.0),
+            ahead_ms: None,
+            lag_causes_ms: [0.0; 2],
             missed_commands: 0,
             missed_in_a_row: 0,
             late_commands: 0,
@@ -417,7 +420,7 @@ fn a_safe_stop_that_comes_too_late_fails_the_run() {
         (
             |run| {
                 // While easing.
-                run.figures.tracking.samples = 0;
+                run.figures.tracking.actual.samples = 0;
                 run.figures.tracking.actual.max_mm = Some(8.0);
             },
             Exit::Failed,

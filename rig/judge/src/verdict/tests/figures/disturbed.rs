@@ -25,7 +25,7 @@ fn a_failure_is_excused_only_if_the_undisturbed_rest_passes() {
         (
             |run| {
                 run.figures.tracking.estimated.max_deg = Some(3.0);
-                run.figures.tracking.undisturbed.samples = 9;
+                run.figures.tracking.undisturbed.actual.samples = 9;
             },
             Exit::Invalid,
             "lost cycles may explain: estimated tracking; ",

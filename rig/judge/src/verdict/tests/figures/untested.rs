@@ -9,7 +9,7 @@ fn what_was_not_tested_is_neither_passed_nor_failed() {
     let untested: [Change; 3] = [
         Run::declare_fault,
         |run| run.figures.tracking.actual.rms_mm = None,
-        |run| run.figures.tracking.samples = 9,
+        |run| run.figures.tracking.actual.samples = 9,
     ];
     for change in untested {
         let mut run = Run::new();
