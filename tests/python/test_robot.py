@@ -1,6 +1,7 @@
 """The robot of a scenario, what a session says of it, and what a law knows of a cycle."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -53,12 +54,13 @@ def test_the_way_to_the_motion_ends_at_its_first_pose(tmp_path: Path) -> None:
 def test_a_question_without_an_answer_raises_with_the_reason() -> None:
     robot = masseter.RobotModel()
     nowhere = masseter.Pose([math.nan, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0])
-    for ask, reason in [
+    asked: list[tuple[Callable[[], object], str]] = [
         (lambda: robot.motion(math.inf), "no finite number"),
         (lambda: robot.inverse_kinematics(masseter.Pose([0, 0, 0.27], [0.5, 0, 0, 0])), "length 0.5, not 1"),
         (lambda: robot.jacobian(nowhere), "no finite number"),
         (lambda: robot.forward_kinematics([0, 0, 0, 0.3, 0.3, 0.2]), "assemble"),
-    ]:
+    ]
+    for ask, reason in asked:
         with pytest.raises(masseter.MasseterError, match=reason):
             ask()
     with pytest.raises(masseter.MasseterError, match="nowhere.toml"):

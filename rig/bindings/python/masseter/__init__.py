@@ -12,8 +12,17 @@ Lengths are in m, angles in rad, times in s unless a name says otherwise; poses 
 
 from typing import TYPE_CHECKING, Any
 
-from masseter._native import Demand, MasseterError, Pose, RobotModel, __version__
-from masseter.controller import Parameter, Session, Signal, control
+from masseter._native import (
+    Demand,
+    ExternalForce,
+    MasseterError,
+    Motion,
+    Pose,
+    RobotModel,
+    Times,
+    __version__,
+)
+from masseter.controller import Cycle, Parameter, Session, Signal, control
 from masseter.kinematics import Mechanism, fk, ik
 from masseter.recording import Run, load
 from masseter.rig import Result, run
@@ -23,11 +32,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ActionError",
+    "Cycle",
     "Demand",
     "Env",
     "EnvStateError",
+    "ExternalForce",
     "MasseterError",
     "Mechanism",
+    "Motion",
     "Parameter",
     "Pose",
     "Result",
@@ -35,6 +47,7 @@ __all__ = [
     "Run",
     "Session",
     "Signal",
+    "Times",
     "VectorEnv",
     "__version__",
     "control",
