@@ -29,6 +29,9 @@ const MAY_USE: [(&str, &[&str]); 27] = [
             "rig/record/recording",
             "rig/judge",
             "rig/run/virtual_time",
+            "rig/record/recording",
+            // For the source distribution.
+            "shared/no_bindgen",
         ],
     ),
     ("plant", &["shared/can", "shared/model", "shared/scenario", "shared/runtime"]),
