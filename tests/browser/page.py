@@ -544,7 +544,7 @@ def main():
             sheet.close()
         names_its_view(browser, chewing)
         for path, words, next_step in (
-            (failed, "first: close: rms of incisal.error", "the limit in [[require]]"),
+            (failed, "failed: close: rms of incisal.error", "the limit in [[require]]"),
             (stopped, "process data missing", "set expect.verdict to safe_stop"),
             (died, "SIGKILL", "set expect.verdict to died"),
             (interrupted, "stopped by stimulus 1", "set expect.verdict to interrupted"),

@@ -37,7 +37,7 @@ next_steps! {
     /// FAIL of another outcome than the expected one.
     Expectation => "If this outcome is right, change `expect.verdict` in the scenario (docs/requirements.md); otherwise correct the controller.",
     /// FAIL by a requirement.
-    Requirement => "Open `RUN/report.html` at that time, then correct the controller, or the limit in `[[require]]` (docs/requirements.md).",
+    Requirement => "Look at that time in `RUN/report.html`, then correct the controller, or the limit in `[[require]]` (docs/requirements.md).",
     /// FAIL by tracking.
     Tracking => "Compare desired and true motion in `RUN/report.html`, then tune the controller (docs/tutorials/bring-up.md), or change `checks.tracking_max_mm`.",
     /// FAIL by a late motion or missing commands.
@@ -97,7 +97,7 @@ next_steps! {
     /// UNTESTED: a fault or stimulus did not act.
     NeverActed => "Let the fault or stimulus act while the motion runs: change its time in `RUN/scenario.toml`, then run that file.",
     /// UNTESTED: a requirement.
-    NotJudged => "Choose a window, trigger or signal that this motion has for the requirement in `RUN/scenario.toml`, then run that file (docs/requirements.md).",
+    NotJudged => "Choose a window, trigger or signal that this motion has, or let a fault bring it, in `RUN/scenario.toml`, then run that file (docs/requirements.md).",
     /// UNTESTED: anything else.
     TooLittle => "Play more of the motion: raise `duration_s` in `RUN/scenario.toml`, then run that file; the reason names what is missing.",
 }

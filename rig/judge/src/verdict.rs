@@ -115,8 +115,11 @@ impl Verdict {
 
     /// The reason in words, with the first breach where one shows.
     pub fn in_words(&self) -> String {
-        let first = self.first_breach.as_ref().map(|breach| format!("; first: {breach}"));
-        self.reason.clone() + &first.unwrap_or_default()
+        match &self.first_breach {
+            None => self.reason.clone(),
+            Some(breach) if self.reason == format!("failed: {}", breach.check) => format!("failed: {breach}"),
+            Some(breach) => format!("{}; first: {breach}", self.reason),
+        }
     }
 
     /// What to do next with the run in this folder.

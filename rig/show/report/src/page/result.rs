@@ -92,8 +92,10 @@ fn panel(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> masseter_
     masseter_page::Verdict {
         word: verdict.word.to_owned(),
         reason: verdict.in_words() + &cause + &ended,
-        // The page lies in the run's folder.
-        next: verdict.next_step.as_ref().map(|step| step.replace("RUN/", "").replace("RUN", ".")),
+        // The page lies in the run's folder, and is the report.
+        next: verdict.next_step.as_ref().map(|step| {
+            step.replace("`RUN/report.html`", "this page").replace("RUN/", "").replace("RUN", ".")
+        }),
         tone: match verdict.exit_code {
             Exit::Passed => Tone::Good,
             Exit::Invalid | Exit::Interrupted => Tone::Doubtful,

@@ -42,30 +42,31 @@ fn every_document_of_a_failed_run_names_the_first_breach_and_the_next_step() {
     figures.path_breach.motion_ns = Some([1_000_000_000, 3_000_000_000]);
     let verdict = Verdict::new(&manifest, &figures);
     let first = "tracking: platform rms 0.2500 mm, limit 0.1 mm, from 0.000 s to 2.000 s of the motion";
-    let next =
-        |run| format!("Compare desired and true motion in `{run}report.html`, then tune the controller");
+    let next = |page| format!("Compare desired and true motion in {page}, then tune the controller");
     let said = table::verdict_in_words(&manifest, &verdict, "runs/x".as_ref());
-    assert!(
-        said.starts_with("FAIL: failed: ") && said.contains(&format!("; first: {first}\nnext: ")),
-        "{said}"
-    );
-    assert!(said.contains(&next("runs/x/")), "{said}");
+    assert!(said.starts_with(&format!("FAIL: failed: {first}\nnext: ")), "{said}");
+    assert!(said.contains(&next("`runs/x/report.html`")), "{said}");
     let xml = junit::xml(&manifest, &figures, &verdict).unwrap();
     let property = |name, value: &str| format!("<property name=\"{name}\" value=\"{value}");
     assert!(
-        xml.contains(&property("first breach", first)) && xml.contains(&property("next step", &next("RUN/"))),
+        xml.contains(&property("first breach", first))
+            && xml.contains(&property("next step", &next("`RUN/report.html`"))),
         "{xml}"
     );
     let page = page::html(&manifest, &figures, &verdict).unwrap();
     assert!(
-        page.contains(&format!("; first: {first}\"")) && page.contains(&format!("\"next\":\"{}", next(""))),
+        page.contains(&format!("failed: {first}\""))
+            && page.contains(&format!("\"next\":\"{}", next("this page"))),
         "no breach"
     );
     let summary: serde_json::Value =
         serde_json::from_str(&summary_json(&verdict, &figures).unwrap()).unwrap();
     let breach = &summary["verdict"]["first_breach"];
     assert_eq!((&breach["value"], &breach["at_s"]), (&"0.2500 mm".into(), &2.0.into()));
-    assert!(summary["verdict"]["next_step"].as_str().unwrap().starts_with(&next("RUN/")), "{summary}");
+    assert!(
+        summary["verdict"]["next_step"].as_str().unwrap().starts_with(&next("`RUN/report.html`")),
+        "{summary}"
+    );
 }
 
 #[test]
