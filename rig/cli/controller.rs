@@ -138,7 +138,7 @@ fn describe(Parameter { name, unit, about, value, range: [least, most] }: &Param
 /// The arguments of `signals`.
 #[derive(Debug, Clone, Args)]
 #[command(
-    after_help = "Examples:\n  masseter signals | grep incisal\n  masseter signals --controller ./my_controller | grep '^signal'"
+    after_help = "Examples:\n  masseter signals | grep incisal\n  masseter signals --controller hold | grep '^signal'"
 )]
 pub(super) struct SignalsArgs {
     /// Scenario file [default: ten seconds of chewing]

@@ -128,7 +128,9 @@ fn write_point(text: &mut String, point: &[u8], scale: f32) {
 /// The first and the last frame.
 fn frames(head: &Head, parameters: &Parameters) -> Result<[u64; 2], C3dError> {
     let field = |name| match parameters.numbers("TRIAL", name)[..] {
-        [low, high, ..] => Some(low as u64 + ((high as u64) << 16)),
+        [low, high, ..] if [low, high].iter().all(|word| (0.0..=f64::from(u16::MAX)).contains(word)) => {
+            Some(low as u64 + ((high as u64) << 16))
+        }
         _ => None,
     };
     if head.last_frame == OVERFLOW {

@@ -60,13 +60,20 @@ impl Extras {
 
     /// The signal of a column, and its unit, which stands in brackets. Equal names are numbered.
     pub(super) fn signal_name(&self, at: usize) -> (String, String) {
+        let mut taken: Vec<String> = Vec::new();
+        for column in &self.names[..at] {
+            taken.push(free_name(&words(column).0, &taken));
+        }
         let (name, unit) = words(&self.names[at]);
-        let before = self.names[..at].iter().filter(|other| words(other).0 == name).count();
-        (
-            if before > 0 { format!("recorded.{name}_{}", before + 1) } else { format!("recorded.{name}") },
-            unit,
-        )
+        (format!("recorded.{}", free_name(&name, &taken)), unit)
     }
+}
+
+/// The name, with the first number that makes it free.
+fn free_name(name: &str, taken: &[String]) -> String {
+    let is_free = |name: &String| !taken.contains(name);
+    let mut numbered = (2..).map(|number| format!("{name}_{number}"));
+    Some(name.to_owned()).filter(is_free).or_else(|| numbered.find(is_free)).unwrap_or_default()
 }
 
 fn check_order(rows: &[Cells]) -> Result<(), Located> {

@@ -9,6 +9,8 @@ pub(super) type Points = [Vec3; 3];
 const WINDOW_S: f64 = 1.0;
 /// Fewer samples show nothing.
 const FEWEST_SAMPLES: f64 = 10.0;
+/// A shorter distance (rms, m) is noise: a slow motion would make a long time of it.
+const LEAST_DISTANCE_M: f64 = 20e-6;
 /// The share of the distance that a later time must explain.
 const EXPLAINED: f64 = 0.95;
 
@@ -45,9 +47,10 @@ impl Sums {
         let distances = self.distance_squares - of_means(&self.distance, &self.distance);
         let speeds = self.speed_squares - of_means(&self.speed, &self.speed);
         let products = self.products - of_means(&self.distance, &self.speed);
-        let is_explained =
-            self.samples >= FEWEST_SAMPLES && products * products > EXPLAINED * distances * speeds;
-        is_explained.then(|| products / speeds - self.lag_s / self.samples)
+        let is_far = distances > self.samples * LEAST_DISTANCE_M * LEAST_DISTANCE_M;
+        let is_explained = products * products > EXPLAINED * distances * speeds;
+        (self.samples >= FEWEST_SAMPLES && is_far && is_explained)
+            .then(|| products / speeds - self.lag_s / self.samples)
     }
 }
 
@@ -59,6 +62,7 @@ pub(super) struct AheadWatch {
     window_ends_s: Option<f64>,
     window: Sums,
     whole: Sums,
+    /// Of the windows that have ended.
     most_s: f64,
 }
 
@@ -83,15 +87,22 @@ impl AheadWatch {
         let distance = between(desired, actual);
         let ends_s = *self.window_ends_s.get_or_insert(progress_s + WINDOW_S);
         if progress_s >= ends_s {
-            self.most_s = self.in_s();
+            self.most_s = self.most_s.max(self.window.ahead_s().unwrap_or_default());
             (self.window, self.window_ends_s) = (Sums::default(), Some(progress_s + WINDOW_S));
         }
         self.window.add(&distance, &speed, lag_s);
         self.whole.add(&distance, &speed, lag_s);
     }
 
-    /// How far the jaw was ahead of the motion at most, s.
+    /// How far the jaw was ahead of the motion at most, s. A motion's end counts from half a window on: a few samples of a slow jaw
+    /// show nothing.
     pub(super) fn in_s(&self) -> f64 {
-        [&self.window, &self.whole].into_iter().filter_map(Sums::ahead_s).fold(self.most_s, f64::max)
+        let left_s = self.window_ends_s.zip(self.before).map(|(ends_s, (_, now_s))| ends_s - now_s);
+        let has_half = left_s.is_some_and(|left_s| left_s < WINDOW_S / 2.0);
+        let has_windows = self.whole.samples > self.window.samples;
+        [(has_half, &self.window), (has_half || has_windows, &self.whole)]
+            .into_iter()
+            .filter_map(|(is_judged, sums)| sums.ahead_s().filter(|_| is_judged))
+            .fold(self.most_s, f64::max)
     }
 }

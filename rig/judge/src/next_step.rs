@@ -3,9 +3,11 @@
 use masseter_recording::{Ending, Manifest};
 use masseter_runtime::messages::codes::{Cause, EventKind};
 use masseter_scenario::ExpectedVerdict::{Died, Fail, Incomplete, Interrupted, Pass, SafeStop, Untested};
+use masseter_scenario::Scenario;
 
 use crate::breach::Breach;
 use crate::check::{Check, CheckResult, Subject};
+use crate::checks::lag_cause;
 use crate::events::{Code, EventRecord};
 use crate::figures::Figures;
 use crate::outcome::Outcome;
@@ -42,6 +44,10 @@ next_steps! {
     Tracking => "Compare desired and true motion in `RUN/report.html`, then tune the controller (docs/tutorials/bring-up.md), or change `checks.tracking_max_mm`.",
     /// FAIL by a late motion or missing commands.
     Late => "Look for late readings and lost frames in `RUN/report.html`; `checks.motion_lag_ms` and `controller.stale_cycles` are the limits.",
+    /// FAIL by a motion whose time the controller changed.
+    MotionTime => "Begin the motion at the end of the lead-in, and let its time advance by one period a cycle (docs/interface.md).",
+    /// FAIL by a desired pose that is no pose.
+    StatedPose => "Publish a finite desired pose in each cycle of the motion; `RUN/report.html` shows where it is missing (docs/interface.md).",
     /// FAIL by missed deadlines.
     Timing => "Shorten the longest cycles that `RUN/report.html` lists, or lower `rate_hz` (docs/realtime.md).",
     /// FAIL by a jaw that moved after its stop.
@@ -70,6 +76,8 @@ next_steps! {
     Stale => "Find what delayed controller or plant: `masseter doctor`, then the longest cycles in `RUN/report.html` (docs/interface.md).",
     /// SAFE STOP by the controller's law or its messages.
     Law => "Repeat the decisions with `masseter replay RUN`, then correct the controller at the cycle of the event (docs/interface.md).",
+    /// SAFE STOP by the law or the messages of a program.
+    ProgramLaw => "Read the messages of the program in the terminal, then correct its command at the cycle of the event (docs/interface.md).",
     /// SAFE STOP by a pose that the mechanism cannot have.
     Pose => "Compare the scenario's `mechanism` with the rig, and the motion with its reach (docs/forward-kinematics.md, docs/motions.md).",
     /// SAFE STOP by a start too far away.
@@ -78,6 +86,8 @@ next_steps! {
     Stop => "Read the events in `RUN/report.html` from the first fault on; docs/troubleshooting.md lists causes and remedies.",
     /// DIED: the controller.
     ControllerDied => "Read the controller's own messages in the terminal, then repeat its readings under a debugger (docs/interface.md): `masseter replay RUN`.",
+    /// DIED: a program.
+    ProgramDied => "Read the messages of the program in the terminal, then start it under a debugger: `masseter run --controller external` waits for it.",
     /// DIED: a process that a fault of the scenario killed.
     DeclaredDeath => "A fault of the scenario killed the process; if the death is right, set `expect.verdict` to died (docs/requirements.md).",
     /// DIED: another process.
@@ -95,11 +105,11 @@ next_steps! {
     /// INTERRUPTED by a stimulus of the scenario.
     DeclaredStop => "The scenario asks for this stop; if the stop is right, set `expect.verdict` to interrupted (docs/requirements.md).",
     /// UNTESTED: a fault or stimulus did not act.
-    NeverActed => "Let the fault or stimulus act while the motion runs: change its time in `RUN/scenario.toml`, then run that file.",
+    NeverActed => "Let the fault or stimulus act while the motion runs: change its time in `RUN/scenario.toml`, then run that file as before.",
     /// UNTESTED: a requirement.
-    NotJudged => "Choose a window, trigger or signal that this motion has, or let a fault bring it, in `RUN/scenario.toml`, then run that file (docs/requirements.md).",
+    NotJudged => "Choose a window, trigger or signal that this motion has, or let a fault bring it, in `RUN/scenario.toml`, then run that file as before (docs/requirements.md).",
     /// UNTESTED: anything else.
-    TooLittle => "Play more of the motion: raise `duration_s` in `RUN/scenario.toml`, then run that file; the reason names what is missing.",
+    TooLittle => "Play more of the motion: raise `duration_s` in `RUN/scenario.toml`, then run that file as before; the reason names what is missing.",
 }
 
 impl NextStep {
@@ -111,14 +121,29 @@ impl NextStep {
         checks: &[Check],
         first_breach: Option<&Breach>,
     ) -> Option<Self> {
-        let has_process_fault = || manifest.scenario.faults.iter().any(|fault| fault.kind.is_of_process());
+        let is_kill = |name: &str| name.ends_with("_kill");
+        let was_killed = || {
+            manifest
+                .scenario
+                .faults
+                .iter()
+                .zip(&figures.faults)
+                .any(|(declared, found)| found.struck_ns.is_some() && is_kill(declared.kind.name()))
+        };
+        let is_of_program = manifest.is_of_program();
         Some(match (outcome, &manifest.ending) {
             (Outcome::Named(Pass), _) => return None,
-            (Outcome::Named(Fail) | Outcome::ChecksFailed, _) => Self::of_failure(checks, first_breach),
-            (Outcome::Named(SafeStop), _) => Self::of_stop(figures),
-            (Outcome::Named(Died), _) if has_process_fault() => Self::DeclaredDeath,
+            (Outcome::Named(Fail) | Outcome::ChecksFailed, _) => {
+                Self::of_failure(manifest, figures, checks, first_breach)
+            }
+            (Outcome::Named(SafeStop), _) => Self::of_stop(figures, is_of_program),
+            (Outcome::Named(Died), _) if was_killed() => Self::DeclaredDeath,
             (Outcome::Named(Died), Ending::Died { process, .. }) if process == "controller" => {
-                Self::ControllerDied
+                if is_of_program {
+                    Self::ProgramDied
+                } else {
+                    Self::ControllerDied
+                }
             }
             (Outcome::Named(Died), _) => Self::ProcessDied,
             (Outcome::Named(Incomplete), _) => Self::Unwritten,
@@ -135,15 +160,27 @@ impl NextStep {
         })
     }
 
-    /// By the check with the first breach.
-    fn of_failure(checks: &[Check], first_breach: Option<&Breach>) -> Self {
+    /// By the check with the first breach; without one by the first check that the scenario does not expect to fail.
+    fn of_failure(
+        manifest: &Manifest,
+        figures: &Figures,
+        checks: &[Check],
+        first_breach: Option<&Breach>,
+    ) -> Self {
+        let Scenario { expect, checks: limits, .. } = &manifest.scenario;
+        let is_expected = |check: &Check| {
+            expect.as_ref().is_some_and(|expect| expect.failed.iter().any(|name| *name == check.name))
+        };
         let is_first = |check: &&Check| first_breach.is_none_or(|breach| breach.check == check.name);
-        let mut failed = checks.iter().filter(|check| check.result.is_failed());
+        let mut failed = checks.iter().filter(|check| check.result.is_failed() && !is_expected(check));
         let Some(check) = failed.find(is_first) else { return Self::Expectation };
+        let has_own_time = || lag_cause(&figures.motion, limits.motion_lag_ms).is_some();
         match (check.subject, check.name.as_ref()) {
             (Subject::Requirement | Subject::ExpectedEvent, _) => Self::Requirement,
             (Subject::Faults, _) => Self::Undetected,
             (Subject::Sequence, _) => Self::Sequence,
+            (_, "stated pose") => Self::StatedPose,
+            (_, "motion lag") if has_own_time() => Self::MotionTime,
             (_, "motion lag" | "commands missed") => Self::Late,
             (_, "timing") => Self::Timing,
             (_, "standstill") => Self::Standstill,
@@ -154,7 +191,7 @@ impl NextStep {
     }
 
     /// By the first fault that anybody reports, unless a fault of the scenario came before.
-    fn of_stop(figures: &Figures) -> Self {
+    fn of_stop(figures: &Figures, is_of_program: bool) -> Self {
         use Cause::{
             AccelerationLimit, BadMessage, BootTimeout, BusOff, BusRefused, CommandLost, DriveFault,
             DuplicateNode, Emergency, EnableTimeout, EndStopHit, FaultAtStart, FaultFound, FollowingError,
@@ -181,6 +218,7 @@ impl NextStep {
             StrokeLimit | VelocityLimit | AccelerationLimit | EndStopHit => Self::Limit,
             TrackingLost | OrientationLost | FollowingError => Self::OffPath,
             StaleReading | CommandLost => Self::Stale,
+            LawFailed | BadMessage | ForeignCommand if is_of_program => Self::ProgramLaw,
             LawFailed | BadMessage | ForeignCommand => Self::Law,
             ForwardKinematics | InverseKinematics => Self::Pose,
             StartTooFar => Self::Start,

@@ -178,7 +178,11 @@ impl Tracking {
             self.errors(is_disturbed).for_each(|errors| errors.actual.peak(&error));
         }
         if on_path == OnPath::Moving && is_used {
-            self.without_pose += u64::from(messages.solution.as_ref().and_then(desired_pose).is_none());
+            let solution = messages
+                .solution
+                .as_ref()
+                .filter(|state| crate::poses::is_moving(Some(state.controller_state)));
+            self.without_pose += u64::from(solution.is_some_and(|state| desired_pose(state).is_none()));
             let estimate = deviation(desired.as_ref(), estimated.as_ref(), self.incisal_m);
             let add = if is_counted { PoseErrorSums::add } else { PoseErrorSums::peak };
             self.errors(is_disturbed).for_each(|errors| add(&mut errors.estimated, &estimate));

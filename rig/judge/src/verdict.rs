@@ -103,7 +103,7 @@ impl Verdict {
         Self {
             word: outcome.word(),
             first_breach,
-            next_step: next_step.map(|step| step.sentence().replace("CLOCK", &manifest.clock)),
+            next_step: next_step.map(|step| step.sentence().replace("CLOCK", &again(manifest))),
             reason,
             exit_code: outcome.exit(),
             timing,
@@ -419,6 +419,12 @@ fn is_of_scenario(check: &Check) -> bool {
 }
 
 /// The earliest breach, but of the failures that the scenario expects.
+/// The arguments of `run` that play a scenario as this run did.
+fn again(manifest: &Manifest) -> String {
+    let controller = manifest.controller.as_ref().map(|name| format!(" --controller '{name}'"));
+    manifest.clock.clone() + &controller.unwrap_or_default()
+}
+
 fn first_breach(checks: &[Check], expect: Option<&ExpectConfig>, figures: &Figures) -> Option<Breach> {
     let is_expected =
         |check: &Check| expect.is_some_and(|expect| expect.failed.iter().any(|name| *name == check.name));

@@ -20,12 +20,15 @@ if TYPE_CHECKING:
 else:
     try:
         from gymnasium import Env as _Env
-        from gymnasium.vector import AutoresetMode
         from gymnasium.vector import VectorEnv as _VectorEnv
+    except ImportError:
+        _Env = _VectorEnv = object
+    try:
+        # Since gymnasium 1.1.
+        from gymnasium.vector import AutoresetMode
 
         _NEXT_STEP = AutoresetMode.NEXT_STEP
     except ImportError:
-        _Env = _VectorEnv = object
         _NEXT_STEP = None
 
 Array = NDArray[np.float64]
@@ -49,13 +52,18 @@ def _assignments(values: Mapping[str, Any] | None) -> list[str]:
 
 
 def _signal(reward: Reward | None) -> tuple[str, float] | None:
-    if not isinstance(reward, str):
+    if reward is None:
         return None
+    if not isinstance(reward, str):
+        raise TypeError(f"the reward is a {type(reward).__name__}; give the name of a signal")
     return (reward.removeprefix("-"), -1.0 if reward.startswith("-") else 1.0)
 
 
 def _numbers(action: ArrayLike, shape: tuple[int, ...]) -> bytes:
-    array = np.asarray(action, np.float64)
+    try:
+        array = np.asarray(action, np.float64)
+    except (TypeError, ValueError) as error:
+        raise ActionError(f"the action is no array of numbers: {error}") from None
     if array.shape != shape:
         raise ActionError(f"the action has the shape {array.shape}, not {shape}")
     if not np.isfinite(array).all():
@@ -99,7 +107,7 @@ class Env(_Env):  # type: ignore[misc]
         cycles_per_step: int = 1,
     ) -> None:
         self._native: _native.Env | None = _native.Env(
-            scenario, _assignments(set), action, list(observe), _signal(reward), requirement, cycles_per_step
+            scenario, _assignments(set), action, list(observe), None if callable(reward) else _signal(reward), requirement, cycles_per_step
         )
         if callable(reward) and requirement is not None:
             raise ValueError("give a reward or a requirement, not both")
@@ -133,7 +141,7 @@ class Env(_Env):  # type: ignore[misc]
         else:
             self._seed = native.seed if self._seed is None else int(self._random.integers(2**32))
         observed = native.reset(self._seed, _assignments((options or {}).get("set")))
-        return np.frombuffer(observed), {"seed": self._seed}
+        return np.frombuffer(observed).copy(), {"seed": self._seed}
 
     def step(self, action: ArrayLike) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Plays the cycles of a step. info has the events of the step, a line each, where there are any.
@@ -146,7 +154,7 @@ class Env(_Env):  # type: ignore[misc]
         if (over := native.over) is not None:
             raise EnvStateError(f"{over}; call reset first")
         observed, reward, terminated, truncated, events = native.step(numbers)
-        observation = np.frombuffer(observed)
+        observation = np.frombuffer(observed).copy()
         info: dict[str, Any] = {"events": events} if events else {}
         if self._reward is not None:
             reward = float(self._reward(observation, info))
@@ -167,10 +175,12 @@ class Env(_Env):  # type: ignore[misc]
         """Goes to an instant of an episode of this environment with the same seed and options; returns its observation."""
         native = self._checked()
         native.restore(snapshot)
-        return np.frombuffer(native.observed())
+        return np.frombuffer(native.observed()).copy()
 
     def close(self) -> None:
         """Lets the rig go."""
+        if self._native is not None:
+            self._checked()
         self._native = None
 
     def __enter__(self) -> Self:
@@ -219,7 +229,7 @@ class VectorEnv(_VectorEnv):  # type: ignore[misc]
         self._native: _native.VectorEnv | None = _native.VectorEnv(
             *arguments, num_envs, min(num_envs, threads or cores, cores)
         )
-        self._process = os.getpid()
+        self._owner = (os.getpid(), threading.get_ident())
         self._first_seed = one.seed
         low, high = one.bounds
         self.num_envs = num_envs
@@ -231,7 +241,9 @@ class VectorEnv(_VectorEnv):  # type: ignore[misc]
         self._is_begun = False
 
     def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
-        """Begins an episode in each environment; the first one has the seed, each other one the next."""
+        """Begins an episode in each environment; the first one has the seed, each other one the next.
+
+        Without a seed, it is the scenario's each time."""
         native = self._checked()
         if options:
             raise ValueError("a vector of environments has no options; give 'set' when it is made")
@@ -251,18 +263,20 @@ class VectorEnv(_VectorEnv):  # type: ignore[misc]
             self._is_begun = False
             raise
         info: dict[str, Any] = {"events": events} if any(events) else {}
-        return self._rows(observed), np.frombuffer(rewards), np.array(terminated), np.array(truncated), info
+        return self._rows(observed), np.frombuffer(rewards).copy(), np.array(terminated), np.array(truncated), info
 
     def close(self, **_: Any) -> None:
         """Ends the threads."""
+        if self._native is not None:
+            self._checked()
         self._native = None
 
     def _rows(self, observed: bytes) -> Array:
-        return np.frombuffer(observed).reshape(self.num_envs, -1)
+        return np.frombuffer(observed).reshape(self.num_envs, -1).copy()
 
     def _checked(self) -> _native.VectorEnv:
         if self._native is None:
             raise EnvStateError("the environments are closed; make others")
-        if self._process != os.getpid():
-            raise EnvStateError("the environments were made in another process; make some here")
+        if self._owner != (os.getpid(), threading.get_ident()):
+            raise EnvStateError("the environments were made in another process or thread; make some here")
         return self._native

@@ -31,7 +31,7 @@ STATUSES = ["ok", "warning", "discard", "error", "fatal", "pending"]
 #: Messages of the FMU that are kept for an error.
 KEPT_MESSAGES = 20
 #: A difference of steps and cycles, as a share, that is rounding.
-ROUNDING = 1e-9
+NANOSECOND_S = 1e-9
 #: A quaternion of another length is no rotation.
 LENGTH_ERROR = 1e-3
 
@@ -94,11 +94,11 @@ class Fmu:
         fixed = self._description.coSimulation.fixedInternalStepSize
         step_s = self._map.step_s or fixed or period_s
         steps = round(period_s / step_s)
-        if steps < 1 or abs(steps * step_s - period_s) > ROUNDING * period_s:
+        if steps < 1 or abs(steps * step_s - period_s) > NANOSECOND_S:
             nearest = period_s / max(1, steps)
             raise FmuError(
                 f"a step of {1e3 * step_s:g} ms does not divide the cycle of {1e3 * period_s:g} ms: "
-                f"set step_ms = {1e3 * nearest:g} in the map, or rate_hz in the scenario"
+                f"set step_ms = {1e3 * nearest!r} in the map, or rate_hz in the scenario"
             )
         if fixed and round(step_s / fixed, 6) % 1:
             raise FmuError(f"step_ms = {1e3 * step_s:g}: the FMU steps by {1e3 * fixed:g} ms: give a multiple of it")

@@ -236,7 +236,7 @@ impl Timeline {
         let skipped = |cycle: &CycleMessages| cycle.state.map(|state| state.skipped_cycles);
         let is_counted =
             skipped(messages).or_else(|| self.cycles.iter().take(KEPT_IN_ORDER).find_map(skipped));
-        let is_lost = messages.state.is_none() && is_counted.is_some_and(|now| now > self.skipped_cycles);
+        let is_lost = messages.state.is_none() && is_counted.is_none_or(|now| now > self.skipped_cycles);
         self.skipped_cycles = skipped(messages).unwrap_or(self.skipped_cycles);
         let soon = || self.cycles.iter().take(KEPT_IN_ORDER);
         let used = [&*messages].into_iter().chain(soon()).find(|cycle| cycle.solution.is_some());

@@ -40,11 +40,12 @@ fn every_document_of_a_failed_run_names_the_first_breach_and_the_next_step() {
     let (manifest, mut figures) = run(1000, 1000);
     figures.tracking.actual.rms_mm = Some(0.25);
     figures.path_breach.motion_ns = Some([1_000_000_000, 3_000_000_000]);
+    figures.disorder = None;
     let verdict = Verdict::new(&manifest, &figures);
     let first = "tracking: platform rms 0.2500 mm, limit 0.1 mm, from 0.000 s to 2.000 s of the motion";
     let next = |page| format!("Compare desired and true motion in {page}, then tune the controller");
     let said = table::verdict_in_words(&manifest, &verdict, "runs/x".as_ref());
-    assert!(said.starts_with(&format!("FAIL: failed: {first}\nnext: ")), "{said}");
+    assert!(said.starts_with(&format!("FAIL: failed: sequence, tracking; first: {first}\nnext: ")), "{said}");
     assert!(said.contains(&next("`runs/x/report.html`")), "{said}");
     let xml = junit::xml(&manifest, &figures, &verdict).unwrap();
     let property = |name, value: &str| format!("<property name=\"{name}\" value=\"{value}");
@@ -55,7 +56,7 @@ fn every_document_of_a_failed_run_names_the_first_breach_and_the_next_step() {
     );
     let page = page::html(&manifest, &figures, &verdict).unwrap();
     assert!(
-        page.contains(&format!("failed: {first}\""))
+        page.contains(&format!("; first: {first}\""))
             && page.contains(&format!("\"next\":\"{}", next("this page"))),
         "no breach"
     );
