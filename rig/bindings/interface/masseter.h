@@ -166,7 +166,8 @@ double masseter_parameter(const masseter_session *session, int parameter);
 int masseter_set_signal(masseter_session *session, int signal, double value);
 
 /* The scenario and its robot, from masseter_attach to the end. These functions are mathematics: they wait for nothing, and a
- * cycle may call them as often as it likes. The first call before masseter_start takes some milliseconds. */
+ * cycle may call them as often as it likes. The first call before masseter_start takes some milliseconds. An output must not
+ * overlap an input. */
 
 /* The whole scenario as TOML, every default filled in; null with an error. It lasts as long as the session. */
 const char *masseter_scenario(masseter_session *session);
@@ -189,8 +190,8 @@ int masseter_inverse_kinematics(masseter_session *session, const masseter_pose *
 /* The rates of the axes by the twist at a pose: a row for each axis; m/s per m/s, then m/s per rad/s. */
 int masseter_jacobian(masseter_session *session, const masseter_pose *pose, double jacobian[6][6]);
 
-/* The forces of the axes (N) for a twist and an acceleration (as in masseter_motion) against a wrench on the platform (N, then
- * N m about its origin, base axes; null for none), by the masses and the friction that the scenario's controller assumes. */
+/* The forces of the axes (N) for a twist and an acceleration, as in masseter_motion. The wrench acts on the platform: N, then N m
+ * about its origin, base axes; null for none. Masses and friction are those that the scenario's controller assumes. */
 int masseter_inverse_dynamics(masseter_session *session, const masseter_pose *pose, const double twist[6],
                               const double acceleration[6], const double wrench[6], double force_n[6]);
 
