@@ -98,7 +98,7 @@ class Fmu:
             nearest = period_s / max(1, steps)
             raise FmuError(
                 f"a step of {1e3 * step_s:g} ms does not divide the cycle of {1e3 * period_s:g} ms: "
-                f"set step_ms = {1e3 * nearest!r} in the map, or rate_hz in the scenario"
+                f"set step_ms = {1e3 * nearest:.12g} in the map, or rate_hz in the scenario"
             )
         if fixed and round(step_s / fixed, 6) % 1:
             raise FmuError(f"step_ms = {1e3 * step_s:g}: the FMU steps by {1e3 * fixed:g} ms: give a multiple of it")
