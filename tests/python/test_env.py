@@ -221,7 +221,7 @@ def test_wrong_actions_are_refused_and_nothing_is_played() -> None:
     assert np.array_equal(env.step(stay)[0], other.step(stay)[0])
     pose = masseter.Env(action="pose", set=SHORT)
     pose.reset()
-    with pytest.raises(masseter.MasseterError, match="the quaternion of the action has the length 0"):
+    with pytest.raises(masseter.ActionError, match="the quaternion of the action has the length 0"):
         pose.step([0] * 7)
     assert pose.step(stays(pose))[2:4] == (False, False)
 
@@ -382,3 +382,24 @@ def test_without_gymnasium_the_spaces_are_small_boxes() -> None:
     assert space.contains(space.sample()) and space.sample() in space
     assert not space.contains(np.full(6, 2.0)) and not space.contains(np.zeros(5))
     assert Box(-np.inf, np.inf, (3,)).contains(Box(-np.inf, np.inf, (3,)).sample())
+
+
+def test_a_vector_refuses_rewards_that_it_cannot_ask_and_other_threads() -> None:
+    with pytest.raises(TypeError, match="the reward is a function; give the name of a signal"):
+        masseter.VectorEnv(2, reward=lambda observation, info: 0.0)  # type: ignore[arg-type]
+    vector = masseter.VectorEnv(2, set=SHORT)
+    vector.reset()
+    raised: list[BaseException] = []
+
+    def elsewhere() -> None:
+        for call in (lambda: vector.step(np.zeros((2, 6))), vector.close):
+            try:
+                call()
+            except masseter.EnvStateError as error:
+                raised.append(error)
+
+    thread = threading.Thread(target=elsewhere)
+    thread.start()
+    thread.join()
+    assert len(raised) == 2
+    vector.close()

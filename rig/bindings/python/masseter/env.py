@@ -59,7 +59,7 @@ def _signal(reward: Reward | None) -> tuple[str, float] | None:
     return (reward.removeprefix("-"), -1.0 if reward.startswith("-") else 1.0)
 
 
-def _numbers(action: ArrayLike, shape: tuple[int, ...]) -> bytes:
+def _numbers(action: ArrayLike, shape: tuple[int, ...], kind: Action) -> bytes:
     try:
         array = np.asarray(action, np.float64)
     except (TypeError, ValueError) as error:
@@ -69,6 +69,8 @@ def _numbers(action: ArrayLike, shape: tuple[int, ...]) -> bytes:
     if not np.isfinite(array).all():
         place = int(np.flatnonzero(~np.isfinite(array))[0])
         raise ActionError(f"number {place} of the action is {array.flat[place]}; use finite numbers")
+    if kind == "pose" and not np.linalg.norm(array[..., 3:], axis=-1).all():
+        raise ActionError("the quaternion of the action has the length 0")
     return array.tobytes()
 
 
@@ -116,6 +118,7 @@ class Env(_Env):  # type: ignore[misc]
         self._random = np.random.default_rng(self._native.seed)
         self._seed: int | None = None
         low, high = self._native.bounds
+        self._kind: Action = action
         self._shape = (len(low),)
         self.action_space = box(np.array(low), np.array(high), self._shape)
         self.observation_space = box(-np.inf, np.inf, (len(observe),))
@@ -150,7 +153,7 @@ class Env(_Env):  # type: ignore[misc]
         after the step was played.
         """
         native = self._checked()
-        numbers = _numbers(action, self._shape)
+        numbers = _numbers(action, self._shape, self._kind)
         if (over := native.over) is not None:
             raise EnvStateError(f"{over}; call reset first")
         observed, reward, terminated, truncated, events = native.step(numbers)
@@ -235,6 +238,7 @@ class VectorEnv(_VectorEnv):  # type: ignore[misc]
         self.num_envs = num_envs
         self.single_action_space = box(np.array(low), np.array(high), (len(low),))
         self.single_observation_space = box(-np.inf, np.inf, (len(observe),))
+        self._kind: Action = action
         self._shape = (num_envs, len(low))
         self.action_space = box(np.tile(low, (num_envs, 1)), np.tile(high, (num_envs, 1)), self._shape)
         self.observation_space = box(-np.inf, np.inf, (num_envs, len(observe)))
@@ -256,7 +260,7 @@ class VectorEnv(_VectorEnv):  # type: ignore[misc]
         native = self._checked()
         if not self._is_begun:
             raise EnvStateError("the environments were not reset; call reset first")
-        numbers = _numbers(actions, self._shape)
+        numbers = _numbers(actions, self._shape, self._kind)
         try:
             observed, rewards, terminated, truncated, events = native.step(numbers, self._shape[1])
         except BaseException:
