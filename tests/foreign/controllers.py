@@ -61,10 +61,12 @@ def make(masseter: str, language: str, kind: str, folder: Path, target: Path) ->
 def run(masseter: str, program: str, folder: Path, clock: str, *more: str) -> dict:
     arguments = [*more, "--quiet", "--duration", "2", "--clock", clock, "--format", "json", "--controller", program]
     ended = subprocess.run([masseter, "run", *arguments], cwd=folder, capture_output=True, text=True)
-    # The machine may take cycles from a run in real time, which is then not judged.
-    allowed = [0, 3] if clock == "rt" else [0]
-    assert ended.returncode in allowed, f"{program}, {clock}: {ended.returncode}\n{ended.stdout}{ended.stderr}"
-    return json.loads(ended.stdout)
+    figures = json.loads(ended.stdout) if ended.stdout else {"verdict": {}}
+    # The machine may take cycles from a run in real time, which is then not judged. An interpreter may compute for too long.
+    failed = [check["name"] for check in figures["verdict"].get("checks", []) if check["result"] == "failed"]
+    is_late = clock == "rt" and (ended.returncode == 3 or failed == ["timing"])
+    assert ended.returncode == 0 or is_late, f"{program}, {clock}: {ended.returncode}\n{ended.stdout}{ended.stderr}"
+    return figures
 
 
 def stop_in_the_law(masseter: str, program: str, law: str, folder: Path) -> None:
