@@ -198,3 +198,49 @@ fn two_runs_of_one_seed_are_equal_and_the_noise_of_another_seed_is_found_with_it
     assert_eq!(cycle(&different), cycle(&said), "{different}\n{said}");
     assert!(different.contains("by its digest; in cycle "), "{different}");
 }
+
+/// Why the run of a folder failed, as JSON, or the refusal.
+fn why(run: &Path, arguments: &[&str]) -> Result<Value, String> {
+    let output = masseter(&[&["why", run.to_str().unwrap(), "--format", "json"], arguments].concat());
+    if output.status.code() == Some(0) { Ok(json_of(&output)) } else { Err(stderr(&output)) }
+}
+
+#[test]
+fn the_last_way_back_of_a_stopped_run_is_the_cycle_before_its_fault_and_other_runs_are_refused() {
+    let fault = "[[faults]]\nkind = 'encoder_offset'\naxis = 'l1'\nsize = '0.3 mm'\nat_s = 0.5\n";
+    let folder = Workspace::new(fault);
+    let run = |name: &str, arguments: &[&str]| {
+        let out = folder.file(name);
+        let begin =
+            ["run", "--clock", "virtual", "--quiet", "--duration", "1", "--out", out.to_str().unwrap()];
+        masseter(&[&begin, arguments].concat());
+        out
+    };
+    let stopped = run("stopped", &[folder.file("scenario.toml").to_str().unwrap()]);
+    let found = why(&stopped, &[]).unwrap();
+    assert_eq!(found["last_way_back"]["motion_s"], 0.5, "{found}");
+    assert_eq!(found["left_first"][0]["signal"], "l1.position", "{found}");
+    assert_eq!(found["intervals"].as_array().map(Vec::len), Some(2), "{found}");
+    assert!(why(&stopped, &["--without", "stimuli"]).unwrap_err().contains("fails without them, too"));
+    assert!(why(&stopped, &["--without", "faults.0"]).unwrap_err().contains("faults.N"));
+
+    let passed = run("passed", &[]);
+    assert!(why(&passed, &[]).unwrap_err().contains("has not failed"));
+    let change = |from: &str, to: &str| {
+        let manifest = stopped.join("manifest.json");
+        let text = fs::read_to_string(&manifest).unwrap();
+        assert!(text.contains(from), "{text}");
+        fs::write(&manifest, text.replace(from, to)).unwrap();
+        let refusal = why(&stopped, &[]).unwrap_err();
+        fs::write(&manifest, text).unwrap();
+        refusal
+    };
+    assert!(change("\"clock\": \"virtual\"", "\"clock\": \"rt\"").contains("--clock virtual"));
+    assert!(change("\"controller\": null", "\"controller\": \"./law.py\"").contains("none of the rig's"));
+    let summary = stopped.join("summary.json");
+    let text = fs::read_to_string(&summary).unwrap();
+    fs::write(&summary, text.replace("\"digest\": \"", "\"digest\": \"0")).unwrap();
+    assert!(why(&stopped, &[]).unwrap_err().contains("other messages than its recording"));
+    fs::remove_file(&summary).unwrap();
+    assert!(why(&stopped, &[]).unwrap_err().contains("masseter report"));
+}

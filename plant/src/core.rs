@@ -9,6 +9,7 @@ mod tests;
 use masseter_can::canopen::Cob;
 use masseter_can::faults::FaultNote;
 use masseter_can::{ErrorKind, ErrorReport, ErrorState, ReceiveError, Tapped};
+use masseter_runtime::injection::Withdrawn;
 use masseter_runtime::messages::codes::{Cause, EventKind, Source};
 use masseter_runtime::messages::{Command, Contact, Event, FrameTap, Reading, Truth, tap};
 use masseter_runtime::realtime::Wake;
@@ -133,6 +134,12 @@ impl<L: Link> PlantCore<L> {
         };
         plant.follow_injections();
         Ok(plant)
+    }
+
+    /// Lets these faults and stimuli of its scenario act no more from that time on, ns.
+    pub fn withdraw(&mut self, scenario: &Scenario, withdrawn: Withdrawn, from_ns: u64) {
+        self.injector.withdraw(scenario, withdrawn, from_ns);
+        self.follow_injections();
     }
 
     /// The number of the last cycle that began; 0 before the first.

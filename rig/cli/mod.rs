@@ -18,6 +18,7 @@ mod run;
 mod sdk;
 mod starter;
 mod test;
+mod why;
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -54,6 +55,7 @@ use plant::PlantArgs;
 use report::{DiffArgs, ReplayArgs, ReportArgs};
 use starter::{InitArgs, NewVerb};
 use test::TestArgs;
+use why::WhyArgs;
 
 const FIRST_STEPS: &str = "\
 First steps:
@@ -104,6 +106,8 @@ enum Verb {
     Search(SearchArgs),
     /// Make a failing scenario as small as it can be and still fail
     Shrink(ShrinkArgs),
+    /// Find the last instant from which a failed run passes without what acted on it
+    Why(WhyArgs),
     /// Describe a recorded jaw motion, and whether the rig can play it
     Motion(MotionArgs),
     /// Lay down a scenario, a motion and a CI workflow to start from
@@ -247,6 +251,7 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Campaign(args) => campaign::campaign(&args),
         Verb::Search(args) => campaign::search(&args),
         Verb::Shrink(args) => campaign::shrink(&args),
+        Verb::Why(args) => why::why(&args),
         Verb::CampaignCase { folder, number } => play_case(&folder, number),
         Verb::Motion(args) => motion::motion(&args).usage(),
         Verb::Init(args) => starter::init(&args).usage(),

@@ -6,3 +6,4 @@ pub(crate) mod play;
 pub(crate) mod search;
 pub(crate) mod shrink;
 pub(crate) mod suite;
+pub(crate) mod why;

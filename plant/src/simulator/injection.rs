@@ -8,7 +8,7 @@
 
 use std::ops::Range;
 
-use masseter_runtime::injection::{Injected, Injection};
+use masseter_runtime::injection::{Injected, Injection, Withdrawn};
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::messages::{Command, Event, LAYOUT_VERSION};
 use masseter_scenario::{CommandFault, FaultConfig, FaultKindConfig, Scenario};
@@ -39,18 +39,20 @@ state!(Injector {
 impl Injector {
     /// The faults and stimuli of a scenario that is switched on at `now_ns`.
     pub(crate) fn new(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
-        let faults = scenario.faults.iter().enumerate();
-        let faults = faults.map(|(place, fault)| (Injected::Fault(place), fault.kind.is_of_process()));
-        let stimuli = scenario.stimulus.iter().enumerate();
-        let stimuli = stimuli.map(|(place, of)| (Injected::Stimulus(place), of.is_of_controller()));
         Ok(Self {
             injection: Injection::new(scenario, now_ns)
                 .map_err(|error| PlantError::Scenario(error.to_string()))?,
-            untold: faults.chain(stimuli).collect(),
+            untold: entries(scenario),
             has_news: true,
             commands: CommandFaults::new(&scenario.faults),
             events: Journal::new(),
         })
+    }
+
+    /// Lets these faults and stimuli of the scenario act no more from that time on, ns.
+    pub(crate) fn withdraw(&mut self, scenario: &Scenario, withdrawn: Withdrawn, from_ns: u64) {
+        self.injection.withdraw(withdrawn, from_ns);
+        (self.untold, self.has_news) = (entries(scenario), true);
     }
 
     /// Whether there are neither faults nor stimuli.
@@ -130,6 +132,14 @@ impl Injector {
     pub(crate) fn drain_events(&mut self, out: &mut impl FnMut(Event)) {
         self.events.drain(out);
     }
+}
+
+/// The entries of a scenario, each with whether the controller or the supervisor carries it out.
+fn entries(scenario: &Scenario) -> Vec<(Injected, bool)> {
+    let faults = scenario.faults.iter().enumerate();
+    let faults = faults.map(|(place, fault)| (Injected::Fault(place), fault.kind.is_of_process()));
+    let stimuli = scenario.stimulus.iter().enumerate();
+    faults.chain(stimuli.map(|(place, of)| (Injected::Stimulus(place), of.is_of_controller()))).collect()
 }
 
 /// Lead of another controller's cycle count: more than any run has.

@@ -32,6 +32,30 @@ impl Display for Injected {
     }
 }
 
+/// The faults and stimuli that a run goes on without.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub enum Withdrawn {
+    /// Both.
+    All,
+    /// The faults.
+    Faults,
+    /// The stimuli.
+    Stimuli,
+    /// One of them.
+    One(Injected),
+}
+
+impl Withdrawn {
+    fn holds(self, injected: Injected) -> bool {
+        match self {
+            Self::All => true,
+            Self::Faults => matches!(injected, Injected::Fault(_)),
+            Self::Stimuli => matches!(injected, Injected::Stimulus(_)),
+            Self::One(one) => one == injected,
+        }
+    }
+}
+
 /// The times of every fault and stimulus of a run.
 ///
 /// ```
@@ -51,6 +75,8 @@ pub struct Injection {
     faults: Vec<Timed>,
     stimuli: Vec<Timed>,
     state: Option<ControllerState>,
+    /// What acts no more from that time on, ns.
+    withdrawn: Option<(Withdrawn, u64)>,
 }
 
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
@@ -73,6 +99,7 @@ impl Injection {
             faults: faults.collect::<Result<_, _>>()?,
             stimuli: stimuli.collect::<Result<_, _>>()?,
             state: None,
+            withdrawn: None,
         };
         injection.occur(Start::SwitchOn, now_ns);
         Ok(injection)
@@ -106,7 +133,14 @@ impl Injection {
             Injected::Fault(place) => self.faults.get(place),
             Injected::Stimulus(place) => self.stimuli.get(place),
         };
-        timed?.window_ns.clone()
+        let Range { start, end } = timed?.window_ns.clone()?;
+        let withdrawn = self.withdrawn.filter(|(withdrawn, _)| withdrawn.holds(injected));
+        Some(start..withdrawn.map_or(end, |(_, from_ns)| end.min(from_ns).max(start)))
+    }
+
+    /// Lets these act no more from that time on, ns: what acts ends, and what has not begun never does.
+    pub fn withdraw(&mut self, withdrawn: Withdrawn, from_ns: u64) {
+        self.withdrawn = Some((withdrawn, from_ns));
     }
 
     /// Whether the fault or stimulus acts at that time, ns.
@@ -229,6 +263,11 @@ impl Operator {
             waiting.push((Injected::Fault(place), Due::Fault(place)));
         }
         Ok(Self { injection: Injection::new(scenario, now_ns)?, waiting, sampled_ns: 0 })
+    }
+
+    /// Does no more of these from that time on, ns.
+    pub fn withdraw(&mut self, withdrawn: Withdrawn, from_ns: u64) {
+        self.injection.withdraw(withdrawn, from_ns);
     }
 
     /// The due action of a cycle with a reading sampled at this time, ns. A cycle gets at most one, so that its work is

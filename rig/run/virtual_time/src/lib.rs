@@ -4,6 +4,7 @@
 //! This is a crate of its own because the compiler makes the code of a cycle where the ports are known. That is here,
 //! fully optimised.
 
+mod branches;
 mod log;
 mod rig;
 mod run;
@@ -22,6 +23,7 @@ use masseter_terminal::status;
 use log::Stream;
 use run::{Control, built};
 
+pub use branches::{BranchError, Branches, Mark};
 pub use log::{Log, LoggedPorts, Sink};
 pub use rig::{Rig, RigError};
 pub use run::{Requests, RestoreError, Run, RunSnapshot, Uninterrupted};
@@ -43,10 +45,9 @@ pub fn record(
     let scene = Scene::new(&plan.mechanism, &plan.scenario.jaw);
     let mut recorder = Recorder::of_run(folder, scene)?;
     recorder.declare(&manifest.declared)?;
-    let run = Run::of_control(plan, control, Backlog::start(recorder, Pace::Virtual))?;
-    let (backlog, ending) = run.play(interrupts);
-    manifest.ending = ending;
-    if let Some(loss) = backlog.finish().loss() {
+    let mut run = Run::of_control(plan, control, Backlog::start(recorder, Pace::Virtual))?;
+    manifest.ending = run.play(interrupts);
+    if let Some(loss) = run.into_sink().finish().loss() {
         status!("masseter: {loss}; the run ends here");
         manifest.ending = match &manifest.ending {
             died @ Ending::Died { .. } => died.clone(),
@@ -67,7 +68,7 @@ pub fn analyse(
 ) -> anyhow::Result<Figures> {
     let control = Control::new(plan, built(plan, build), &mut manifest.declared)?;
     let stream = Stream::new(start(&plan.scenario, &manifest.declared));
-    let (stream, ending) = Run::of_control(plan, control, stream)?.play(interrupts);
-    manifest.ending = ending;
-    stream.figures().context("a message on topic 'frame' holds no CAN frame")
+    let mut run = Run::of_control(plan, control, stream)?;
+    manifest.ending = run.play(interrupts);
+    run.into_sink().figures().context("a message on topic 'frame' holds no CAN frame")
 }

@@ -36,7 +36,7 @@ impl Sink for Backlog {
 }
 
 /// The analysis of a run that is not recorded.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Stream {
     analysis: Analysis,
     error: Option<TapError>,

@@ -10,7 +10,7 @@ use masseter_plan::RunPlan;
 use masseter_plant::PlantError;
 use masseter_recording::Ending;
 use masseter_runtime::control::{Controller, Duties, NoBranch, Observed, Outcome, set_parameters};
-use masseter_runtime::injection::Operator;
+use masseter_runtime::injection::{Operator, Withdrawn};
 use masseter_runtime::lifecycle::Party;
 use masseter_runtime::lockstep::EPOCH_NS;
 use masseter_runtime::named::{Declared, NamedValues};
@@ -195,9 +195,25 @@ impl<S: Sink> Run<S> {
         self.stepper.sink_mut()
     }
 
-    /// Plays the run to its end; returns the sink and the ending. The ending counts only if the sink took every
-    /// message.
-    pub(crate) fn play(mut self, interrupts: &dyn Requests) -> (S, Ending) {
+    /// The number of the last cycle that began; 0 before the first.
+    pub fn cycle(&self) -> u64 {
+        self.stepper.cycle()
+    }
+
+    /// Whether the controller has done its last cycle.
+    pub fn has_ended(&self) -> bool {
+        self.control.controller.outcome().is_some()
+    }
+
+    /// Goes on without these faults and stimuli of the scenario, between two cycles: from the next SYNC on what acts
+    /// has ended, and what has not begun never does.
+    pub fn withdraw(&mut self, withdrawn: Withdrawn) {
+        let from_ns = self.stepper.withdraw(&self.scenario, withdrawn);
+        self.control.duties.operator.withdraw(withdrawn, from_ns);
+    }
+
+    /// Plays the run to its end; returns the ending, which counts only if the sink took every message.
+    pub(crate) fn play(&mut self, interrupts: &dyn Requests) -> Ending {
         let mut plant_error = None;
         while plant_error.is_none()
             && self.control.controller.outcome().is_none()
@@ -212,13 +228,12 @@ impl<S: Sink> Run<S> {
         if self.control.controller.outcome().is_some() && plant_error.is_none() {
             plant_error = self.stepper.play_after_controller().err();
         }
-        let ending = match (plant_error, self.control.controller.outcome()) {
+        match (plant_error, self.control.controller.outcome()) {
             (Some(error), _) => Ending::died(Party::Plant.name(), error.to_string()),
             _ if interrupts.is_stop_requested() => Ending::Interrupted,
             (None, Some(Outcome::SafeStop)) => Ending::SafeStop,
             (None, _) => Ending::Completed,
-        };
-        (self.into_sink(), ending)
+        }
     }
 
     /// The state of the run between two cycles, to be [restored](Self::restore) again and again.

@@ -6,6 +6,7 @@ use masseter_plant::cycle::{PlantPorts, begin_cycle, end_cycle, run_after_contro
 use masseter_plant::emulation::VirtualLink;
 use masseter_plant::state::{Archive, State};
 use masseter_runtime::control::{self, Controller, Duties, Observed};
+use masseter_runtime::injection::Withdrawn;
 use masseter_runtime::lockstep::EPOCH_NS;
 use masseter_runtime::messages::{Command, Contact, Reading, Truth};
 use masseter_runtime::realtime::Wake;
@@ -101,6 +102,13 @@ impl<S: Sink> Stepper<S> {
             *message = Command { cycle, ..*command };
         });
         self.end_cycle(Some(command))
+    }
+
+    /// Lets these faults and stimuli of its scenario act no more from the next SYNC on; returns that time, ns.
+    pub(crate) fn withdraw(&mut self, scenario: &Scenario, withdrawn: Withdrawn) -> u64 {
+        let from_ns = sync(self.cycle + 1, self.period_ns).due_ns;
+        self.plant.withdraw(scenario, withdrawn, from_ns);
+        from_ns
     }
 
     /// The cycles after the controller's last one.

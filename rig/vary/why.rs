@@ -1,0 +1,346 @@
+//! The last way back of a failed run: the last instant from which the run still passes without its faults and stimuli.
+//!
+//! The run is played again under virtual time. From the instants of a grid it goes on without them to its end, and is judged.
+//! Where two neighbours differ, their distance is halved down to one cycle. What changes and changes back between two
+//! instants of the grid stays unseen.
+
+#[cfg(test)]
+mod tests;
+
+use std::path::Path;
+
+use anyhow::{Context, ensure};
+use masseter_controller::process::BuildController;
+use masseter_judge::signals::Registry;
+use masseter_judge::{Check, CheckResult, EventRecord, Figures, Verdict, Watch};
+use masseter_plan::{Overrides, RunPlan, scenario_with_overrides};
+use masseter_recording::{Manifest, RunFolder};
+use masseter_runtime::injection::Withdrawn;
+use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind};
+use masseter_runtime::named::NamedValues;
+use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
+use masseter_terminal::Exit;
+use masseter_virtual_time::{Branches, Mark, Run};
+use serde::Serialize;
+
+use crate::run::interrupts::Interrupts;
+use crate::run::request::ControllerKind;
+use crate::run::resolve_simulated;
+
+/// Instants of the grid.
+const LOOKS: u64 = 80;
+/// Most signals that are named.
+const NAMED: usize = 5;
+
+/// What the answer to "why" is.
+#[derive(Debug, Serialize)]
+pub(crate) struct Why {
+    /// The verdict of the run and its reason.
+    pub(crate) verdict: String,
+    /// The check whose margin is followed; none of a safe stop.
+    pub(crate) check: Option<String>,
+    /// From the run's begin on, without a gap: whether the rest passes if nothing acts from there on.
+    pub(crate) intervals: Vec<Interval>,
+    /// The last instant from which it passes.
+    pub(crate) last_way_back: Instant,
+    /// The signals that leave their nominal values first after that instant, the largest change first.
+    pub(crate) left_first: Vec<Left>,
+    /// The first report of a fault from that instant on.
+    pub(crate) detection: Option<Detected>,
+    /// Every instant that was looked at.
+    pub(crate) looks: Vec<Look>,
+}
+
+/// An instant between two cycles.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(crate) struct Instant {
+    /// The number of the last cycle before.
+    pub(crate) cycle: u64,
+    /// Time of the SYNC after, from which nothing acts, s since the motion began; none before.
+    pub(crate) motion_s: Option<f64>,
+}
+
+/// Instants with one result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub(crate) struct Interval {
+    /// The first of them.
+    pub(crate) from_cycle: u64,
+    /// The last of them.
+    pub(crate) to_cycle: u64,
+    pub(crate) passes: bool,
+}
+
+/// A signal that left its nominal value.
+#[derive(Debug, Serialize)]
+pub(crate) struct Left {
+    pub(crate) signal: String,
+    pub(crate) unit: String,
+    /// The cycle in which it did.
+    pub(crate) cycle: u64,
+    /// Without faults and stimuli from the last way back on.
+    pub(crate) nominal: f64,
+    /// In the run.
+    pub(crate) found: f64,
+}
+
+/// A report of a fault.
+#[derive(Debug, Serialize)]
+pub(crate) struct Detected {
+    pub(crate) cycle: u64,
+    pub(crate) event: String,
+    /// From the last way back on, ms.
+    pub(crate) after_ms: f64,
+}
+
+/// An instant that was looked at.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(crate) struct Look {
+    pub(crate) cycle: u64,
+    pub(crate) passes: bool,
+    /// The margin of the check there.
+    pub(crate) margin: Option<f64>,
+}
+
+/// Asks why the run of a folder failed: what acted on it is taken away.
+pub(crate) fn why(run: &Path, withdrawn: Withdrawn, interrupts: &Interrupts) -> anyhow::Result<Why> {
+    let folder = RunFolder::open(run)?;
+    let manifest = Manifest::read(&folder).with_context(|| folder.manifest().display().to_string())?;
+    ensure!(
+        !manifest.is_in_real_time(),
+        "the run was in real time, which cannot be played again: run its scenario with --clock virtual"
+    );
+    let kind = ControllerKind::of_manifest(manifest.controller.as_deref()).with_context(|| {
+        let name = manifest.controller.as_deref().unwrap_or_default();
+        format!("the controller '{name}' is none of the rig's, and its state cannot be copied: only 'motion' and 'hold' can go on from an instant")
+    })?;
+    let scenario = scenario_with_overrides(Some(&folder.scenario()), &Overrides::default())?;
+    let plan = resolve_simulated(&scenario, Some(&folder.scenario()), kind.builder())?;
+    let digest = digest_of(&folder)?;
+    Question { plan, build: kind.builder(), manifest, withdrawn, interrupts }.answer(&digest)
+}
+
+/// The digest of the run as it was judged.
+fn digest_of(folder: &RunFolder) -> anyhow::Result<String> {
+    let path = folder.summary();
+    let summary = read_text(&path, MOST_KEPT_BYTES);
+    let summary = summary
+        .with_context(|| format!("{} is needed: 'masseter report' writes it again", path.display()))?;
+    let summary: serde_json::Value =
+        serde_json::from_str(&summary).with_context(|| path.display().to_string())?;
+    let digest = summary["figures"]["digest"].as_str();
+    Ok(digest
+        .with_context(|| format!("{} has no digest: 'masseter report' writes it again", path.display()))?
+        .to_owned())
+}
+
+struct Question<'a> {
+    plan: RunPlan,
+    build: BuildController,
+    manifest: Manifest,
+    withdrawn: Withdrawn,
+    interrupts: &'a Interrupts,
+}
+
+impl Question<'_> {
+    fn answer(mut self, digest: &str) -> anyhow::Result<Why> {
+        let mut branches = Branches::new(&self.plan, self.build)?;
+        let start = branches.mark()?;
+        let (verdict, figures) = self.end(&mut branches, None)?;
+        ensure!(
+            figures.digest == digest,
+            "played again, the run has other messages than its recording: another build has made it, messages are missing, or \
+             somebody stopped it or set a parameter; run its scenario again, and ask about that run"
+        );
+        ensure!(!passes(&verdict), "the run has not failed ({}): there is nothing to explain", verdict.word);
+        let failed = |check: &&Check| check.result == CheckResult::Failed && check.figures.is_some();
+        let check = verdict.checks.iter().find(failed).map(|check| check.name.clone().into_owned());
+        let period_ms = self.plan.scenario.period_s() * 1e3;
+        let mut scan = Scan { question: self, branches, check, marks: vec![start], looks: Vec::new() };
+        let acts =
+            |event: &&EventRecord| event.cause == Cause::FaultInjected || event.cause == Cause::StimulusBegan;
+        let first = figures.events.iter().find(acts).map_or(1, |event| event.cycle);
+        scan.visit(0)?;
+        ensure!(
+            scan.looks[0].passes,
+            "the run fails without them, too ({}): they are not the cause",
+            verdict.reason
+        );
+        scan.play(first - 1, figures.cycles)?;
+        let intervals = intervals(&scan.looks);
+        let last = intervals.iter().rfind(|interval| interval.passes).map_or(0, |interval| interval.to_cycle);
+        let Scan { question, check, looks, .. } = scan;
+        let left_first = question.compare(last)?;
+        let began = figures.events.iter().find(|event| event.enters(ControllerState::Running));
+        let motion_s =
+            began.and_then(|began| Some((last + 1).checked_sub(began.cycle)? as f64 * period_ms / 1e3));
+        let detection =
+            figures.events.iter().find(|event| event.kind == EventKind::Fault && event.cycle > last);
+        Ok(Why {
+            verdict: format!("{}: {}", verdict.word, verdict.reason),
+            check,
+            intervals,
+            last_way_back: Instant { cycle: last, motion_s },
+            left_first,
+            detection: detection.map(|event| Detected {
+                cycle: event.cycle,
+                event: event.in_words(),
+                after_ms: (event.cycle - last) as f64 * period_ms,
+            }),
+            looks,
+        })
+    }
+
+    /// Plays to the end, without what is withdrawn, and judges.
+    fn end(
+        &mut self,
+        branches: &mut Branches,
+        withdrawn: Option<Withdrawn>,
+    ) -> anyhow::Result<(Verdict, Figures)> {
+        let figures = branches.end(withdrawn, &mut self.manifest, self.interrupts)?;
+        ensure!(!self.interrupts.is_stop_requested(), "interrupted");
+        Ok((Verdict::new(&self.manifest, &figures), figures))
+    }
+
+    /// The signals that leave their nominal values first after that instant.
+    fn compare(&self, last: u64) -> anyhow::Result<Vec<Left>> {
+        let (mut nominal, mut found) = (self.watched(last)?, self.watched(last)?);
+        nominal.run.withdraw(self.withdrawn);
+        while !found.run.has_ended() && !nominal.run.has_ended() {
+            nominal.run.play_cycle()?;
+            found.run.play_cycle()?;
+            let (cycle, [was, is]) = (found.run.cycle(), [nominal.values(), found.values()]);
+            let mut left: Vec<Left> = found
+                .registry
+                .signals()
+                .iter()
+                .zip(was.into_iter().zip(is))
+                .filter(|(_, (nominal, found))| {
+                    nominal.is_finite() && found.is_finite() && nominal.to_bits() != found.to_bits()
+                })
+                .map(|(signal, (nominal, found))| Left {
+                    signal: signal.name.clone(),
+                    unit: signal.unit.clone(),
+                    cycle,
+                    nominal,
+                    found,
+                })
+                .collect();
+            if !left.is_empty() {
+                left.sort_by(|a, b| b.share().total_cmp(&a.share()));
+                left.truncate(NAMED);
+                return Ok(left);
+            }
+        }
+        Ok(Vec::new())
+    }
+
+    /// The run at that instant, with the values of its signals.
+    fn watched(&self, cycle: u64) -> anyhow::Result<Watched> {
+        let controller =
+            (self.build)(&self.plan.scenario, self.plan.mechanism.clone(), self.plan.trajectory.clone());
+        let named = NamedValues::new(controller.declared(), &self.plan.scenario.parameters)?;
+        let declared = named.settings().declared();
+        let registry = Registry::new(&self.plan.scenario, declared);
+        let mut watch = Watch::new(&self.plan.scenario, declared);
+        for signal in registry.signals() {
+            watch.choose(&signal.name)?;
+        }
+        let mut run = Run::with_controller(&self.plan, controller, watch)?;
+        while run.cycle() < cycle {
+            run.play_cycle()?;
+        }
+        Ok(Watched { run, registry })
+    }
+}
+
+struct Watched {
+    run: Run<Watch>,
+    registry: Registry,
+}
+
+impl Watched {
+    fn values(&mut self) -> Vec<f64> {
+        self.run.sink_mut().values(None).to_vec()
+    }
+}
+
+impl Left {
+    /// The change as a share of the nominal value.
+    fn share(&self) -> f64 {
+        (self.found - self.nominal).abs() / self.nominal.abs().max(f64::MIN_POSITIVE)
+    }
+}
+
+/// Whether a run fails nothing. A fault that never acts is untested, and that is no failure here.
+fn passes(verdict: &Verdict) -> bool {
+    verdict.exit_code == Exit::Passed || verdict.word == "UNTESTED"
+}
+
+/// The results at instants, as intervals without gaps. Neighbours with two results follow each other.
+fn intervals(looks: &[Look]) -> Vec<Interval> {
+    let of_one = looks.chunk_by(|a, b| a.passes == b.passes);
+    let interval = |looks: &[Look]| {
+        let (first, last) = (looks.first()?, looks.last()?);
+        Some(Interval { from_cycle: first.cycle, to_cycle: last.cycle, passes: first.passes })
+    };
+    of_one.filter_map(interval).collect()
+}
+
+/// The instants that have been looked at, in their order.
+struct Scan<'a> {
+    question: Question<'a>,
+    branches: Branches,
+    check: Option<String>,
+    marks: Vec<Mark>,
+    looks: Vec<Look>,
+}
+
+impl Scan<'_> {
+    /// Looks at an instant after all others.
+    fn visit(&mut self, cycle: u64) -> anyhow::Result<()> {
+        let mark = self.mark(self.marks.len() - 1, cycle)?;
+        let look = self.look(&mark)?;
+        self.marks.push(mark);
+        self.looks.push(look);
+        Ok(())
+    }
+
+    /// Looks at a grid from the first cycle in which something acts, and between neighbours that differ.
+    fn play(&mut self, acting: u64, cycles: u64) -> anyhow::Result<()> {
+        let step = (cycles.saturating_sub(acting) / LOOKS).max(1);
+        for cycle in (acting.max(1)..cycles).step_by(step as usize) {
+            self.visit(cycle)?;
+        }
+        // At the end nothing can be taken away.
+        self.looks.push(Look { cycle: cycles, passes: false, margin: None });
+        let mut place = 0;
+        while let Some([before, after]) = self.looks.get(place..place + 2) {
+            if before.passes == after.passes || after.cycle - before.cycle == 1 {
+                place += 1;
+                continue;
+            }
+            let middle = before.cycle.midpoint(after.cycle);
+            // The marks begin with that of the run's start.
+            let mark = self.mark(place + 1, middle)?;
+            let look = self.look(&mark)?;
+            self.marks.insert(place + 2, mark);
+            self.looks.insert(place + 1, look);
+        }
+        Ok(())
+    }
+
+    /// The instant after that many cycles, from an earlier one.
+    fn mark(&mut self, from: usize, cycle: u64) -> anyhow::Result<Mark> {
+        self.branches.go_to(&self.marks[from])?;
+        self.branches.advance_to(cycle)?;
+        Ok(self.branches.mark()?)
+    }
+
+    /// What the run comes to from that instant, where it is.
+    fn look(&mut self, mark: &Mark) -> anyhow::Result<Look> {
+        let (verdict, _) = self.question.end(&mut self.branches, Some(self.question.withdrawn))?;
+        let check = verdict.checks.iter().find(|check| Some(&*check.name) == self.check.as_deref());
+        let margin = check.and_then(|check| check.figures.as_ref()?.margin);
+        Ok(Look { cycle: mark.cycle, passes: passes(&verdict), margin })
+    }
+}
