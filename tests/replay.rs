@@ -221,6 +221,8 @@ fn the_last_way_back_of_a_stopped_run_is_the_cycle_before_its_fault_and_other_ru
     assert_eq!(found["last_way_back"]["motion_s"], 0.5, "{found}");
     assert_eq!(found["left_first"][0]["signal"], "l1.position", "{found}");
     assert_eq!(found["intervals"].as_array().map(Vec::len), Some(2), "{found}");
+    let page = fs::read_to_string(stopped.join("report.html")).unwrap();
+    assert!(page.contains("without faults and stimuli from here on"), "the page has the last way back");
     assert!(why(&stopped, &["--without", "stimuli"]).unwrap_err().contains("fails without them, too"));
     assert!(why(&stopped, &["--without", "faults.0"]).unwrap_err().contains("faults.N"));
 

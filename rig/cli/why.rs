@@ -5,12 +5,13 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
+use masseter_report::why::{Detected, Interval, Left, Why};
 use masseter_runtime::injection::{Injected, Withdrawn};
 use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result};
 
 use crate::run::interrupts::Interrupts;
-use crate::vary::why::{self, Detected, Interval, Left, Why};
+use crate::vary::why;
 
 /// The arguments of `why`.
 #[derive(Debug, Clone, Args)]
@@ -50,28 +51,28 @@ fn withdrawn(text: &str) -> anyhow::Result<Withdrawn> {
 pub(super) fn why(args: &WhyArgs) -> Result<Exit, Failure> {
     let interrupts = Interrupts::of_verb()?;
     let why = why::why(&args.run, args.without, &interrupts).usage()?;
+    let page = masseter_report::explain(&args.run, &why)?;
     let text = match args.format {
-        Format::Human => in_words(&why, args.without),
+        Format::Human => format!("{}report: {}\n", in_words(&why), page.display()),
         Format::Json => serde_json::to_string_pretty(&why).map(|json| json + "\n").context("JSON").usage()?,
     };
     result(&text).usage()?;
     Ok(Exit::Passed)
 }
 
-fn in_words(why: &Why, without: Withdrawn) -> String {
-    let Why { verdict, intervals, last_way_back: last, left_first, detection, looks, .. } = why;
+fn in_words(why: &Why) -> String {
+    let Why { verdict, without, intervals, last_way_back: last, left_first, detection, looks, .. } = why;
     let at = last
         .motion_s
         .map_or("before the motion".to_owned(), |motion_s| format!("{motion_s:.3} s after the motion began"));
     let mut text = format!(
-        "{verdict}\nlast way back: {at} (cycle {}); without {} from then on the run passes, a cycle later it fails\n",
-        last.cycle,
-        name_of(without)
+        "{verdict}\nlast way back: {at} (cycle {}); without {without} from then on the run passes, a cycle later it fails\n",
+        last.cycle
     );
     for left in left_first {
         let Left { signal, unit, nominal, found, cycle } = left;
         let _ =
-            writeln!(text, "left first: {signal} {found:.6} {unit} instead of {nominal:.6} (cycle {cycle})");
+            writeln!(text, "left first: {signal} {found:.4} {unit} instead of {nominal:.4} (cycle {cycle})");
     }
     if let Some(Detected { cycle, event, after_ms }) = detection {
         let _ = writeln!(text, "first report, {after_ms:.0} ms later (cycle {cycle}): {event}");
@@ -87,14 +88,4 @@ fn in_words(why: &Why, without: Withdrawn) -> String {
         counted(looks.len() as u64, "instant")
     );
     text
-}
-
-/// What is taken away.
-fn name_of(withdrawn: Withdrawn) -> String {
-    match withdrawn {
-        Withdrawn::All => "faults and stimuli".to_owned(),
-        Withdrawn::Faults => "faults".to_owned(),
-        Withdrawn::Stimuli => "stimuli".to_owned(),
-        Withdrawn::One(one) => one.to_string(),
-    }
 }

@@ -15,13 +15,13 @@ use masseter_judge::signals::Registry;
 use masseter_judge::{Check, CheckResult, EventRecord, Figures, Verdict, Watch};
 use masseter_plan::{Overrides, RunPlan, scenario_with_overrides};
 use masseter_recording::{Manifest, RunFolder};
+use masseter_report::why::{Detected, Instant, Interval, Left, Look, Why};
 use masseter_runtime::injection::Withdrawn;
 use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind};
 use masseter_runtime::named::NamedValues;
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 use masseter_terminal::Exit;
 use masseter_virtual_time::{Branches, Mark, Run};
-use serde::Serialize;
 
 use crate::run::interrupts::Interrupts;
 use crate::run::request::ControllerKind;
@@ -31,75 +31,6 @@ use crate::run::resolve_simulated;
 const LOOKS: u64 = 80;
 /// Most signals that are named.
 const NAMED: usize = 5;
-
-/// What the answer to "why" is.
-#[derive(Debug, Serialize)]
-pub(crate) struct Why {
-    /// The verdict of the run and its reason.
-    pub(crate) verdict: String,
-    /// The check whose margin is followed; none of a safe stop.
-    pub(crate) check: Option<String>,
-    /// From the run's begin on, without a gap: whether the rest passes if nothing acts from there on.
-    pub(crate) intervals: Vec<Interval>,
-    /// The last instant from which it passes.
-    pub(crate) last_way_back: Instant,
-    /// The signals that leave their nominal values first after that instant, the largest change first.
-    pub(crate) left_first: Vec<Left>,
-    /// The first report of a fault from that instant on.
-    pub(crate) detection: Option<Detected>,
-    /// Every instant that was looked at.
-    pub(crate) looks: Vec<Look>,
-}
-
-/// An instant between two cycles.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(crate) struct Instant {
-    /// The number of the last cycle before.
-    pub(crate) cycle: u64,
-    /// Time of the SYNC after, from which nothing acts, s since the motion began; none before.
-    pub(crate) motion_s: Option<f64>,
-}
-
-/// Instants with one result.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub(crate) struct Interval {
-    /// The first of them.
-    pub(crate) from_cycle: u64,
-    /// The last of them.
-    pub(crate) to_cycle: u64,
-    pub(crate) passes: bool,
-}
-
-/// A signal that left its nominal value.
-#[derive(Debug, Serialize)]
-pub(crate) struct Left {
-    pub(crate) signal: String,
-    pub(crate) unit: String,
-    /// The cycle in which it did.
-    pub(crate) cycle: u64,
-    /// Without faults and stimuli from the last way back on.
-    pub(crate) nominal: f64,
-    /// In the run.
-    pub(crate) found: f64,
-}
-
-/// A report of a fault.
-#[derive(Debug, Serialize)]
-pub(crate) struct Detected {
-    pub(crate) cycle: u64,
-    pub(crate) event: String,
-    /// From the last way back on, ms.
-    pub(crate) after_ms: f64,
-}
-
-/// An instant that was looked at.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub(crate) struct Look {
-    pub(crate) cycle: u64,
-    pub(crate) passes: bool,
-    /// The margin of the check there.
-    pub(crate) margin: Option<f64>,
-}
 
 /// Asks why the run of a folder failed: what acted on it is taken away.
 pub(crate) fn why(run: &Path, withdrawn: Withdrawn, interrupts: &Interrupts) -> anyhow::Result<Why> {
@@ -153,7 +84,10 @@ impl Question<'_> {
         );
         ensure!(!passes(&verdict), "the run has not failed ({}): there is nothing to explain", verdict.word);
         let failed = |check: &&Check| check.result == CheckResult::Failed && check.figures.is_some();
-        let check = verdict.checks.iter().find(failed).map(|check| check.name.clone().into_owned());
+        let check = verdict.checks.iter().find(failed);
+        let unit = check.and_then(|check| Some(check.figures.as_ref()?.margin_unit));
+        let margin_unit = unit.unwrap_or_default().to_owned();
+        let check = check.map(|check| check.name.clone().into_owned());
         let period_ms = self.plan.scenario.period_s() * 1e3;
         let mut scan = Scan { question: self, branches, check, marks: vec![start], looks: Vec::new() };
         let acts =
@@ -176,8 +110,10 @@ impl Question<'_> {
         let detection =
             figures.events.iter().find(|event| event.kind == EventKind::Fault && event.cycle > last);
         Ok(Why {
+            without: name_of(question.withdrawn),
             verdict: format!("{}: {}", verdict.word, verdict.reason),
             check,
+            margin_unit,
             intervals,
             last_way_back: Instant { cycle: last, motion_s },
             left_first,
@@ -264,10 +200,13 @@ impl Watched {
     }
 }
 
-impl Left {
-    /// The change as a share of the nominal value.
-    fn share(&self) -> f64 {
-        (self.found - self.nominal).abs() / self.nominal.abs().max(f64::MIN_POSITIVE)
+/// What is taken away.
+fn name_of(withdrawn: Withdrawn) -> String {
+    match withdrawn {
+        Withdrawn::All => "faults and stimuli".to_owned(),
+        Withdrawn::Faults => "faults".to_owned(),
+        Withdrawn::Stimuli => "stimuli".to_owned(),
+        Withdrawn::One(one) => one.to_string(),
     }
 }
 

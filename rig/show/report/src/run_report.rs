@@ -2,7 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use masseter_judge::{Analysis, Figures, Judgement, Verdict};
@@ -14,6 +14,7 @@ use serde::Serialize;
 
 use crate::logs::{CandumpLogs, WriteError, write_events};
 use crate::table::{self, Detail};
+use crate::why::Why;
 use crate::{histogram_log, junit, page};
 
 /// Why the recording of a run could not be analysed.
@@ -86,6 +87,19 @@ pub fn report_past_run(path: &Path, set: &[String], format: Format) -> Result<Ex
         written => written.incomplete()?,
     }
     Ok(judgement.verdict.exit_code)
+}
+
+/// Writes the page of a failed run again, with until when the run could pass; returns its place.
+pub fn explain(path: &Path, why: &Why) -> Result<PathBuf, Failure> {
+    let folder = RunFolder::open(path).usage()?;
+    let manifest = Manifest::read(&folder).context("cannot read the manifest").usage()?;
+    let (figures, _) = analyse(&folder, &manifest, None).usage()?;
+    let verdict = Verdict::new(&manifest, &figures);
+    let html =
+        page::explained(&manifest, &figures, &verdict, why).context("cannot write the page").incomplete()?;
+    let page = folder.file("report.html");
+    fs::write(&page, html).with_context(|| format!("cannot write {}", page.display())).incomplete()?;
+    Ok(page)
 }
 
 /// Applies assignments of `[study]`: nothing else of a run can change once it is recorded.

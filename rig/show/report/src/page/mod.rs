@@ -16,12 +16,25 @@ use self::result::{events_section, live_sections, named_section, requirements_se
 use self::rig::{buses_section, circumstances_section, timing_section};
 use self::stop::{moments, stop_section, window};
 use self::times::{phases, time};
+use crate::why::{Why, why_section};
 
 pub(crate) use self::result::mark;
 
 /// The page.
 pub(crate) fn html(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Result<String, PageError> {
     let first = vec![result_section(manifest, figures, verdict)];
+    page(Life::Finished, first, manifest, figures, verdict).to_html()
+}
+
+/// The page of a failed run, with the last way back.
+pub(crate) fn explained(
+    manifest: &Manifest,
+    figures: &Figures,
+    verdict: &Verdict,
+    why: &Why,
+) -> Result<String, PageError> {
+    let why = why_section(why, manifest.scenario.period_s());
+    let first = vec![result_section(manifest, figures, verdict), why];
     page(Life::Finished, first, manifest, figures, verdict).to_html()
 }
 
