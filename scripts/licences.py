@@ -2,6 +2,7 @@
 """Licences of everything that a release contains, as a folder of texts.
 
     licences.py FOLDER [--static] PACKAGE...
+    licences.py --check [--static]      # only whether this system has the texts of its libraries: exit code 2 where it does not
 
 CRATES.txt has each crate that the packages compile in, with its licence and the texts that it brings. Crates that only run while the
 packages are built are left out: build scripts and procedural macros. A crate without a text has the one of its licence. The Rust
@@ -12,12 +13,14 @@ import argparse
 import json
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 PROJECT = Path(__file__).parents[1]
 #: How the name of a file with a licence begins.
 NAMES = ("licen", "copying", "notice", "copyright", "unlicense")
-DEBIAN = Path("/usr/share/common-licenses")
+#: Of the system's C library, as Debian and its relatives have them: the notice, and the licence.
+C_LIBRARY = [Path("/usr/share/doc/libc6-dev/copyright"), Path("/usr/share/common-licenses/LGPL-2.1")]
 
 
 def metadata() -> dict:
@@ -79,30 +82,50 @@ def write_crates(packages: list[dict], path: Path) -> None:
     path.write_text(rule.join(["\n".join(lines), *blocks]) + "\n")
 
 
-def copy_of_rust(folder: Path) -> None:
+def rust_library() -> Path:
     root = subprocess.run(["rustc", "--print", "sysroot"], check=True, capture_output=True, text=True).stdout.strip()
-    shutil.copy(Path(root) / "share/doc/rust/COPYRIGHT-library.html", folder / "RUST-STANDARD-LIBRARY.html")
+    return Path(root) / "share/doc/rust/COPYRIGHT-library.html"
 
 
-def copy_of_c_library(folder: Path) -> None:
+def write_c_library(folder: Path) -> None:
     """The system's C library is under the LGPL: whoever passes a static program on offers its source, too."""
-    notice = Path("/usr/share/doc/libc6-dev/copyright").read_text()
-    (folder / "C-LIBRARY.txt").write_text(f"{notice}\n{(DEBIAN / 'LGPL-2.1').read_text()}")
+    (folder / "C-LIBRARY.txt").write_text("\n".join(path.read_text() for path in C_LIBRARY))
+
+
+def missing(is_static: bool) -> str | None:
+    """What is to be done where this system lacks a text."""
+    if not (path := rust_library()).is_file():
+        return f"the licence of the Rust standard library is not there: {path}; rustup component add rust-docs"
+    absent = [str(path) for path in C_LIBRARY if is_static and not path.is_file()]
+    if absent:
+        return (
+            f"the licence of the C library is not there: {', '.join(absent)}. A static command contains that library. Make the release"
+            " on Debian or Ubuntu with libc6-dev, or give --dynamic"
+        )
+    return None
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("packages", nargs="+")
+    parser.add_argument("folder", type=Path, nargs="?")
+    parser.add_argument("packages", nargs="*")
     parser.add_argument("--static", action="store_true")
+    parser.add_argument("--check", action="store_true")
     arguments = parser.parse_args()
+    if problem := missing(arguments.static):
+        print(problem, file=sys.stderr)
+        sys.exit(2)
+    if arguments.check:
+        return
+    if not arguments.packages:
+        parser.error("name a folder and packages")
     arguments.folder.mkdir(parents=True, exist_ok=True)
     for name in ["LICENSE-MIT", "LICENSE-APACHE"]:
         shutil.copy(PROJECT / name, arguments.folder)
     write_crates(compiled_in(metadata(), arguments.packages), arguments.folder / "CRATES.txt")
-    copy_of_rust(arguments.folder)
+    shutil.copy(rust_library(), arguments.folder / "RUST-STANDARD-LIBRARY.html")
     if arguments.static:
-        copy_of_c_library(arguments.folder)
+        write_c_library(arguments.folder)
 
 
 if __name__ == "__main__":

@@ -152,6 +152,9 @@ pub(super) struct SignalsArgs {
         hide_default_value = true
     )]
     controller: ControllerChoice,
+    /// Which values of the rig the variables of an FMU are [default: the FMU's path with .toml]
+    #[arg(long, value_name = "FILE.toml")]
+    map: Option<String>,
     /// Format of standard output
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -160,7 +163,8 @@ pub(super) struct SignalsArgs {
 /// Prints every signal with its unit and its meaning, and the names of states.
 pub(super) fn signals(args: &SignalsArgs) -> anyhow::Result<Exit> {
     let plan = RunPlan::of_file(read_scenario(args.scenario.as_deref())?, args.scenario.as_deref())?;
-    let registry = Registry::new(&plan.scenario, &declared_by(&args.controller, &plan)?);
+    let controller = args.controller.clone().with_map(args.map.as_ref())?;
+    let registry = Registry::new(&plan.scenario, &declared_by(&controller, &plan)?);
     let text = match args.format {
         Format::Json => serde_json::to_string_pretty(registry.signals())? + "\n",
         Format::Human => {

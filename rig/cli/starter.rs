@@ -3,6 +3,7 @@
 
 use std::fs::{self, File};
 use std::io::{ErrorKind, Write};
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -196,7 +197,7 @@ pub(super) fn new(NewVerb::Controller(args): &NewVerb) -> anyhow::Result<Exit> {
         content: with_interpreter(content, &folder)
             .replace("@LIBRARY@", sdk.cmake())
             .replace("@SOURCE@", &sdk.folder().display().to_string())
-            .replace("@PACKAGE@", &package.display().to_string())
+            .replace("@PACKAGE@", &in_url(&package))
             .replace("@FOLDER@", &folder.display().to_string()),
     };
     let files = files
@@ -212,13 +213,25 @@ pub(super) fn new(NewVerb::Controller(args): &NewVerb) -> anyhow::Result<Exit> {
     Ok(Exit::Passed)
 }
 
-/// The content with a first line that the kernel understands. Its line for an interpreter ends at the first space, so a
-/// shell starts an interpreter in such a folder.
+/// The content with a first line that the kernel understands. Its line for an interpreter ends at the first space, and has a
+/// greatest length. Where that does not do, a shell starts the interpreter beside the file; so the shell reads no character of the path.
 fn with_interpreter(content: String, folder: &Path) -> String {
     const KERNELS: &str = "#!@FOLDER@/.venv/bin/python\n";
-    const SHELLS: &str = "#!/bin/sh\n'''exec' \"@FOLDER@/.venv/bin/python\" \"$0\" \"$@\"\n' '''\n";
-    let has_space = folder.display().to_string().contains(char::is_whitespace);
-    if has_space { content.replacen(KERNELS, SHELLS, 1) } else { content }
+    const SHELLS: &str = "#!/bin/sh\n'''exec' \"${0%/*}/.venv/bin/python\" \"$0\" \"$@\"\n' '''\n";
+    const MOST_BYTES: usize = 127;
+    let path = folder.display().to_string();
+    let is_kernels = path.len() + KERNELS.len() <= MOST_BYTES && !path.contains(char::is_whitespace);
+    if is_kernels { content } else { content.replacen(KERNELS, SHELLS, 1) }
+}
+
+/// A path within a URL: what is neither a letter, a digit, a slash nor one of `-._~` is percent-encoded.
+fn in_url(path: &Path) -> String {
+    let encoded = path.as_os_str().as_bytes().iter().map(|&byte| match byte {
+        b'/' | b'-' | b'.' | b'_' | b'~' => char::from(byte).to_string(),
+        _ if byte.is_ascii_alphanumeric() => char::from(byte).to_string(),
+        _ => format!("%{byte:02X}"),
+    });
+    encoded.collect()
 }
 
 /// A file of such a folder: its path within, and its content.
@@ -283,6 +296,16 @@ mod tests {
             ("-dash/s.toml", "./-dash/s.toml"),
         ] {
             assert_eq!(quoted(Path::new(path)), expected);
+        }
+    }
+
+    #[test]
+    fn a_path_in_a_url_is_percent_encoded() {
+        for (path, expected) in [
+            ("/opt/masseter-0.1_a.whl", "/opt/masseter-0.1_a.whl"),
+            ("/größe 2/a#b%c?\"d\\", "/gr%C3%B6%C3%9Fe%202/a%23b%25c%3F%22d%5C"),
+        ] {
+            assert_eq!(in_url(Path::new(path)), expected);
         }
     }
 }

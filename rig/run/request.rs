@@ -279,7 +279,7 @@ impl ControllerChoice {
     }
 
     /// The choice with this map of an FMU's variables.
-    pub(super) fn with_map(self, map: Option<&String>) -> anyhow::Result<Self> {
+    pub(crate) fn with_map(self, map: Option<&String>) -> anyhow::Result<Self> {
         let Some(map) = map else { return Ok(self) };
         match self {
             Self::Executable(program, mut arguments)

@@ -127,6 +127,27 @@ def check_package(installed: Installed) -> None:
     print("package: masseter.run passes")
 
 
+#: Ends the output of a command, before its exit code.
+MARK = "\x01"
+
+
+def check_tutorial(installed: Installed) -> None:
+    """Every command of the tutorial shows what the document says, in one shell; … is text left out."""
+    text = (installed.sdk / "docs/tutorials/your-controller.md").read_text()
+    blocks = "".join(re.findall(r"^```console\n(.*?)^```$", text, re.MULTILINE | re.DOTALL))
+    steps = re.findall(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", blocks, re.MULTILINE)
+    assert len(steps) >= 10, steps
+    folder = installed.root / "tutorial"
+    folder.mkdir()
+    script = "".join(f"{command}\nprintf '{MARK}%d\\n' $?\n" for command, _ in steps)
+    said = installed.shell(f"exec 2>&1\n{script}", folder).split(MARK)
+    for (command, shown), output, code in zip(steps, [said[0], *(rest.partition("\n")[2] for rest in said[1:])], said[1:], strict=False):
+        expected = re.escape(re.sub("^…\n", "…", shown, flags=re.MULTILINE)).replace("…", ".*")
+        assert code.startswith("0\n") and re.fullmatch(expected, output, re.DOTALL), f"$ {command}\n{output}\nexit code {code}"
+    assert len(said) == len(steps) + 1, "the shell ended early"
+    print(f"tutorial: {len(steps)} commands show what the document says")
+
+
 def without_source(arguments: list[str]) -> None:
     """Starts this program again where mounts are its own, as far as that is allowed."""
     if os.geteuid() != 0 or shutil.which("unshare") is None:
@@ -151,6 +172,7 @@ def main(release: str, *hidden: str) -> None:
         expected = check_projects(installed)
         check_pkg_config(installed, expected)
         check_package(installed)
+        check_tutorial(installed)
 
 
 main(*sys.argv[1:])

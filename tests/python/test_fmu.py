@@ -332,10 +332,14 @@ def test_the_signals_of_an_fmu_are_listed_before_a_run(
     path = tmp_path / "law.fmu"
     path.write_bytes(fmu("c2").read_bytes())
     path.with_suffix(".toml").write_text(MAP)
-    listed = subprocess.run(
-        [masseter_command, "signals", "--controller", f"fmu:{path}"], stdout=subprocess.PIPE, text=True, timeout=60, check=True
-    ).stdout
-    assert [line.split()[0] for line in listed.splitlines() if line.startswith(("signal.", "parameter.gain"))] == ["signal.error", "parameter.gain"]
+    other = tmp_path / "other map.toml"
+    other.write_text(MAP.replace("signal.error", "signal.miss"))
+    for words, name in ([], "error"), (["--map", str(other)], "miss"):
+        listed = subprocess.run(
+            [masseter_command, "signals", "--controller", f"fmu:{path}", *words], stdout=subprocess.PIPE, text=True, timeout=60, check=True
+        ).stdout
+        own = [line.split()[0] for line in listed.splitlines() if line.startswith(("signal.", "parameter.gain"))]
+        assert own == [f"signal.{name}", "parameter.gain"]
     assert list(unpacked.iterdir()) == []
 
 

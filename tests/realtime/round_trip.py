@@ -25,7 +25,7 @@ MOST = 1.5
 def build(folder: Path, target: Path) -> Path:
     program = folder / "session"
     library = target / "release" / "libmasseter_c.so"
-    include = HERE.parents[1] / "shared" / "interface"
+    include = HERE.parents[1] / "rig" / "bindings" / "interface"
     command = ["g++", "-O2", "-std=c++17", f"-I{include}", str(HERE / "session.cpp"), str(library)]
     subprocess.run([*command, f"-Wl,-rpath,{library.parent}", "-o", str(program)], check=True)
     return program

@@ -2,6 +2,8 @@ from os import PathLike
 
 from collections.abc import Callable, Mapping, Sequence
 
+from masseter.env import EnvArguments
+
 _Signal = tuple[str, str, str]
 _Parameter = tuple[str, str, str, float, tuple[float, float]]
 
@@ -188,16 +190,7 @@ class Snapshot:
     """An instant of an episode of masseter.Env."""
 
 class Env:
-    def __new__(
-        cls,
-        scenario: str | PathLike[str] | None,
-        set: list[str],
-        action: str,
-        observe: list[str],
-        reward: tuple[str, float] | None,
-        requirement: str | None,
-        cycles_per_step: int,
-    ) -> Env: ...
+    def __new__(cls, arguments: EnvArguments) -> Env: ...
     @property
     def bounds(self) -> tuple[list[float], list[float]]: ...
     @property
@@ -214,18 +207,7 @@ class Env:
     def restore(self, snapshot: Snapshot) -> None: ...
 
 class VectorEnv:
-    def __new__(
-        cls,
-        scenario: str | PathLike[str] | None,
-        set: list[str],
-        action: str,
-        observe: list[str],
-        reward: tuple[str, float] | None,
-        requirement: str | None,
-        cycles_per_step: int,
-        number: int,
-        threads: int,
-    ) -> VectorEnv: ...
+    def __new__(cls, arguments: EnvArguments, number: int, threads: int) -> VectorEnv: ...
     def reset(self, seed: int) -> bytes: ...
     def step(
         self, actions: bytes, numbers: int

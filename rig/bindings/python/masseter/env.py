@@ -6,7 +6,7 @@ import os
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -45,6 +45,20 @@ class ActionError(_native.MasseterError, ValueError):
 
 class EnvStateError(_native.MasseterError, RuntimeError):
     """A call at the wrong time: a step before the first reset or after the end, or from another thread or process."""
+
+
+class EnvArguments(NamedTuple):
+    """What an environment is made of, as the native part reads it."""
+
+    scenario: str | PathLike[str] | None
+    #: Each KEY=VALUE.
+    set: list[str]
+    action: str
+    observe: list[str]
+    #: The name of a signal, and its sign.
+    reward: tuple[str, float] | None
+    requirement: str | None
+    cycles_per_step: int
 
 
 def _assignments(values: Mapping[str, Any] | None) -> list[str]:
@@ -108,9 +122,9 @@ class Env(_Env):  # type: ignore[misc]
         set: Mapping[str, Any] | None = None,
         cycles_per_step: int = 1,
     ) -> None:
-        self._native: _native.Env | None = _native.Env(
-            scenario, _assignments(set), action, list(observe), None if callable(reward) else _signal(reward), requirement, cycles_per_step
-        )
+        signal = None if callable(reward) else _signal(reward)
+        arguments = EnvArguments(scenario, _assignments(set), action, list(observe), signal, requirement, cycles_per_step)
+        self._native: _native.Env | None = _native.Env(arguments)
         if callable(reward) and requirement is not None:
             raise ValueError("give a reward or a requirement, not both")
         self._reward = reward if callable(reward) else None
@@ -226,11 +240,11 @@ class VectorEnv(_VectorEnv):  # type: ignore[misc]
     ) -> None:
         if num_envs < 1:
             raise ValueError(f"num_envs is {num_envs}; use 1 or more")
-        arguments = (scenario, _assignments(set), action, list(observe), _signal(reward), requirement, cycles_per_step)
-        one = _native.Env(*arguments)
+        arguments = EnvArguments(scenario, _assignments(set), action, list(observe), _signal(reward), requirement, cycles_per_step)
+        one = _native.Env(arguments)
         cores = len(os.sched_getaffinity(0))
         self._native: _native.VectorEnv | None = _native.VectorEnv(
-            *arguments, num_envs, min(num_envs, threads or cores, cores)
+            arguments, num_envs, min(num_envs, threads or cores, cores)
         )
         self._owner = (os.getpid(), threading.get_ident())
         self._first_seed = one.seed

@@ -16,27 +16,37 @@ pub(crate) fn raised(error: anyhow::Error) -> PyErr {
     error.downcast::<PyErr>().unwrap_or_else(|error| failed(format!("{error:#}")))
 }
 
-/// Settings from the arguments of Python.
-pub(crate) fn settings(
+/// What an environment is made of, as Python gives it.
+#[derive(FromPyObject)]
+pub(crate) struct Arguments {
     scenario: Option<PathBuf>,
     set: Vec<String>,
-    action: &str,
+    action: String,
     observe: Vec<String>,
     reward: Option<(String, f64)>,
     requirement: Option<String>,
     cycles_per_step: u32,
-) -> PyResult<Settings> {
-    if cycles_per_step == 0 {
-        return Err(PyValueError::new_err("cycles_per_step is 0; use 1 or more"));
+}
+
+impl TryFrom<Arguments> for Settings {
+    type Error = PyErr;
+
+    fn try_from(arguments: Arguments) -> PyResult<Self> {
+        let Arguments { scenario, set, action, observe, reward, requirement, cycles_per_step } = arguments;
+        if cycles_per_step == 0 {
+            return Err(PyValueError::new_err("cycles_per_step is 0; use 1 or more"));
+        }
+        let reward = match (reward, requirement) {
+            (None, None) => Reward::None,
+            (Some((name, sign)), None) => Reward::Signal(name, sign),
+            (None, Some(name)) => Reward::Requirement(name),
+            (Some(_), Some(_)) => {
+                return Err(PyValueError::new_err("give a reward or a requirement, not both"));
+            }
+        };
+        let kind = ActionKind::named(&action).map_err(raised)?;
+        Ok(Self { scenario, set, kind, observe, reward, cycles_per_step })
     }
-    let reward = match (reward, requirement) {
-        (None, None) => Reward::None,
-        (Some((name, sign)), None) => Reward::Signal(name, sign),
-        (None, Some(name)) => Reward::Requirement(name),
-        (Some(_), Some(_)) => return Err(PyValueError::new_err("give a reward or a requirement, not both")),
-    };
-    let kind = ActionKind::named(action).map_err(raised)?;
-    Ok(Settings { scenario, set, kind, observe, reward, cycles_per_step })
 }
 
 /// Reward; whether the episode was terminated, and whether truncated; and what happened.
@@ -67,16 +77,8 @@ pub(crate) struct Snapshot(Branch);
 #[pymethods]
 impl Env {
     #[new]
-    fn new(
-        scenario: Option<PathBuf>,
-        set: Vec<String>,
-        action: &str,
-        observe: Vec<String>,
-        reward: Option<(String, f64)>,
-        requirement: Option<String>,
-        cycles_per_step: u32,
-    ) -> PyResult<Self> {
-        let settings = settings(scenario, set, action, observe, reward, requirement, cycles_per_step)?;
+    fn new(arguments: Arguments) -> PyResult<Self> {
+        let settings = Settings::try_from(arguments)?;
         let plan = episode::plan(&settings, &[], None).map_err(raised)?;
         let exchange = Exchange::new();
         // Wrong names show before the first reset.

@@ -1,6 +1,5 @@
 //! Environments side by side, on threads that run without the interpreter. A run stays on its thread, and orders pass by channels.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -13,7 +12,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::agent::Exchange;
-use crate::env::{raised, settings};
+use crate::env::{Arguments, raised};
 use crate::episode::{self, Episode, Over, Settings};
 use crate::{failed, floats};
 
@@ -143,19 +142,8 @@ type StepsOfPython<'py> = (Bound<'py, PyBytes>, Bound<'py, PyBytes>, Vec<bool>, 
 #[pymethods]
 impl VectorEnv {
     #[new]
-    #[expect(clippy::too_many_arguments, reason = "as Python gives them")]
-    fn new(
-        scenario: Option<PathBuf>,
-        set: Vec<String>,
-        action: &str,
-        observe: Vec<String>,
-        reward: Option<(String, f64)>,
-        requirement: Option<String>,
-        cycles_per_step: u32,
-        number: usize,
-        threads: usize,
-    ) -> PyResult<Self> {
-        let settings = settings(scenario, set, action, observe, reward, requirement, cycles_per_step)?;
+    fn new(arguments: Arguments, number: usize, threads: usize) -> PyResult<Self> {
+        let settings = Settings::try_from(arguments)?;
         let stop = Arc::new(AtomicBool::new(false));
         let workers = (0..threads).map(|thread| {
             let lanes = number / threads + usize::from(thread < number % threads);

@@ -13,6 +13,7 @@ use crate::clock;
 use crate::injection::{Due, Operator};
 use crate::lifecycle::{End, Party, ProcessContext, ProcessError, Report, SupervisorLink};
 use crate::lockstep::{Clock, Lockstep};
+use crate::messages::codes::{Cause, EventKind, Source};
 use crate::messages::{Command, Event, Parameters, Reading, Signals, State};
 use crate::named::{Declared, NamedValues, access};
 use crate::realtime::Wake;
@@ -49,8 +50,20 @@ pub struct Session {
     duties: Duties,
     /// Whether the scenario's operator has asked for a stop.
     is_stopped: bool,
+    stop_event: StopEvent,
     /// The cycle with an open turn.
     cycle: Option<OpenCycle>,
+}
+
+/// The event of a requested stop. A cycle that sees the request ends with it, so that a program cannot forget it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum StopEvent {
+    /// No cycle has seen a request.
+    None,
+    /// The begun cycle is the first one with a request.
+    Due,
+    /// The session or the program has published it.
+    Published,
 }
 
 /// A begun cycle.
@@ -117,7 +130,7 @@ impl Session {
         let (ports, epoch_ns) = Ports::open(&context, declared)?;
         let operator = Operator::new(&context.scenario, declared, epoch_ns)?;
         let duties = Duties { named, operator };
-        Ok(Self { context, ports, duties, is_stopped: false, cycle: None })
+        Ok(Self { context, ports, duties, is_stopped: false, stop_event: StopEvent::None, cycle: None })
     }
 
     /// Runs the controller of the declaration to its end.
@@ -128,7 +141,7 @@ impl Session {
         set_parameters(controller, &self.duties.named);
         loop {
             if let Some(outcome) = controller.outcome() {
-                self.finish(outcome)?;
+                self.end(outcome)?;
                 return Ok(outcome);
             }
             if self.is_stop_requested() {
@@ -142,7 +155,7 @@ impl Session {
     }
 
     /// Whether an orderly end is requested. The program then brings the motion to rest, switches the drives off, and
-    /// calls [`Self::finish`].
+    /// calls [`Self::finish`]. The session publishes the event, unless the program does in the same cycle.
     pub fn is_stop_requested(&self) -> bool {
         self.is_stopped || self.context.stop.is_made()
     }
@@ -157,6 +170,9 @@ impl Session {
     /// # Errors
     /// [`ProcessError`] when messages cannot be exchanged.
     pub fn wait(&mut self, timeout: Option<Duration>) -> Result<Waited, ProcessError> {
+        if self.stop_event == StopEvent::Due {
+            self.publish_stop()?;
+        }
         self.end_turn(false)?;
         if let Some(timeout) = timeout
             && !self.ports.begins_within(timeout)?
@@ -169,6 +185,9 @@ impl Session {
         let tick = Tick { cycle: wake.cycle, now_ns: received_ns };
         self.act(reading.map(|reading| reading.sampled_ns), tick)?;
         self.cycle = Some(OpenCycle { wake, received_ns, is_published: false });
+        if self.stop_event == StopEvent::None && self.is_stop_requested() {
+            self.stop_event = StopEvent::Due;
+        }
         Ok(Waited::Cycle { tick, reading })
     }
 
@@ -229,7 +248,16 @@ impl Session {
     /// # Errors
     /// [`ProcessError`] for a failed transmission.
     pub fn publish_event(&mut self, event: &Event) -> Result<(), ProcessError> {
+        if event.cause == Cause::StopRequested.code() {
+            self.stop_event = StopEvent::Published;
+        }
         self.ports.publish_event(event)
+    }
+
+    fn publish_stop(&mut self) -> Result<(), ProcessError> {
+        let cycle = self.cycle.map_or(0, |open| open.wake.cycle);
+        let event = Event::new(Source::Controller, EventKind::Notice, Cause::StopRequested);
+        self.publish_event(&Event { time_ns: self.ports.now_ns(), cycle, ..event })
     }
 
     /// Ends the work in order.
@@ -237,6 +265,13 @@ impl Session {
     /// # Errors
     /// [`ProcessError`] when the supervisor is gone.
     pub fn finish(mut self, outcome: Outcome) -> Result<(), ProcessError> {
+        if self.stop_event != StopEvent::Published && self.is_stop_requested() {
+            self.publish_stop()?;
+        }
+        self.end(outcome)
+    }
+
+    fn end(mut self, outcome: Outcome) -> Result<(), ProcessError> {
         self.end_turn(true)?;
         Ok(self.context.link.end(match outcome {
             Outcome::Finished => End::Finished,
