@@ -6,7 +6,7 @@ The drives control positions. So the law turns the estimated external force f in
 
     M dv/dt + D v + K u = f,  v = du/dt
 
-A larger K bites harder. The mass delays, and the drives and the estimate too: a damping that is small beside the stiffness of the food
+A larger K bites harder. The way is a motion of the law's own, so the rig judges what the scenario requires of the true jaw. The mass delays, and the drives and the estimate too: a damping that is small beside the stiffness of the food
 lets the jaw shake (docs/dynamics-control.md, limit of stability).
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 
 import masseter
 
-STIFFNESS = masseter.Parameter("stiffness", 10.0, (0.0, 1000.0), "N/mm", "K: force for a way.")
+STIFFNESS = masseter.Parameter("stiffness", 2.0, (0.0, 1000.0), "N/mm", "K: force for a way.")
 DAMPING = masseter.Parameter("damping", 100.0, (1.0, 100_000.0), "N s/m", "D: force for a speed.")
 MASS_TIME_S = 0.003  # M = D times this
 REACH_M = 0.02  # the most that the jaw gives way
@@ -43,4 +43,4 @@ class Impedance:
 
 
 if __name__ == "__main__":
-    masseter.control(Impedance(), signals=[WAY, FORCE], parameters=[STIFFNESS, DAMPING])
+    masseter.control(Impedance(), signals=[WAY, FORCE], parameters=[STIFFNESS, DAMPING], own_motion=True)

@@ -57,6 +57,8 @@ def control(
     signals: Sequence[Signal] = (),
     parameters: Sequence[Parameter] = (),
     prepare: Callable[[float, dict[str, float]], None] | None = None,
+    *,
+    own_motion: bool = False,
 ) -> bool:
     """Attaches to a rig and controls it with a pose law until the motion is over.
 
@@ -66,8 +68,10 @@ def control(
 
     prepare: called once the rig has taken the controller, before the run starts, with the period (s) and the values that the
     scenario gives parameters. Slow work belongs there.
+
+    own_motion: the law leads the jaw off the scenario's motion on purpose. A requirement must then judge the true jaw.
     """
-    return _native.control(law, rig, _signals(signals), _parameters(parameters), prepare)
+    return _native.control(law, rig, _signals(signals), _parameters(parameters), prepare, own_motion)
 
 
 class Cycle(NamedTuple):

@@ -89,6 +89,7 @@ def run(
     arguments: Sequence[str] = (),
     signals: Sequence[Signal] = (),
     parameters: Sequence[Parameter] = (),
+    own_motion: bool = False,
 ) -> Result:
     """Plays a scenario and judges it.
 
@@ -98,7 +99,7 @@ def run(
 
     set: values of the scenario by their keys, such as {"motion.amplitude_mm": 6}. seed, duration (s): as the options of
     'masseter run'. keep: the run folder, which must not exist; by default the folder is removed with the result. arguments: more
-    of 'masseter run'. signals, parameters: what a pose law declares.
+    of 'masseter run'. signals, parameters, own_motion: what a pose law declares ('control').
 
     Raises MasseterError with the message of the rig where no run was made; what the law raises is raised again. The command is
     that of the variable MASSETER, or masseter on the PATH.
@@ -125,7 +126,7 @@ def run(
     output = _Output(rig)
     try:
         if law:
-            _control(rig, lambda: control(law, name, signals, parameters))
+            _control(rig, lambda: control(law, name, signals, parameters, own_motion=own_motion))
         output.join()
     except BaseException as error:
         # After an exception of the law the rig ends by itself; a rig without a controller would wait for ever.

@@ -12,7 +12,7 @@ use masseter_model::geometry::{self, AXES};
 use masseter_runtime::control::Outcome;
 use masseter_runtime::lifecycle::attach::attach;
 use masseter_runtime::messages::pose_fields;
-use masseter_runtime::named::{Declared, Parameter, Signal};
+use masseter_runtime::named::{Declared, Parameter, PlayedMotion, Signal};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMappingProxy};
 
@@ -173,20 +173,21 @@ pub(crate) fn check_declaration(
     signals: Vec<SignalOfPython>,
     parameters: Vec<ParameterOfPython>,
 ) -> PyResult<()> {
-    declared(signals, parameters).map(drop)
+    declared(signals, parameters, false).map(drop)
 }
 
 /// What a program of Python declares.
 pub(crate) fn declared(
     signals: Vec<SignalOfPython>,
     parameters: Vec<ParameterOfPython>,
+    has_own_motion: bool,
 ) -> PyResult<Declared> {
     let signal = |(name, unit, about)| Signal { name, unit, about };
     let parameter = |(name, unit, about, value, range)| Parameter { name, unit, about, value, range };
     let declared = Declared {
         signals: signals.into_iter().map(signal).collect(),
         parameters: parameters.into_iter().map(parameter).collect(),
-        ..Declared::default()
+        motion: if has_own_motion { PlayedMotion::Own } else { PlayedMotion::Scenario },
     };
     declared.check().map_err(failed)?;
     Ok(declared)
@@ -202,9 +203,10 @@ pub(crate) fn control(
     signals: Vec<SignalOfPython>,
     parameters: Vec<ParameterOfPython>,
     prepare: Option<Py<PyAny>>,
+    has_own_motion: bool,
 ) -> PyResult<bool> {
     let (exception, exceptions) = mpsc::channel();
-    let declared = declared(signals, parameters)?;
+    let declared = declared(signals, parameters, has_own_motion)?;
     let signals = PyDict::new(py);
     for signal in &declared.signals {
         signals.set_item(&signal.name, 0.0)?;

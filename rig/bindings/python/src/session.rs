@@ -7,7 +7,7 @@ use masseter_runtime::control::{self, Outcome, Tick, Waited};
 use masseter_runtime::lifecycle::ProcessContext;
 use masseter_runtime::lifecycle::attach::attach;
 use masseter_runtime::messages::{Command, Event, Message, State};
-use masseter_runtime::named::{Declared, PlayedMotion};
+use masseter_runtime::named::Declared;
 use masseter_scenario::Scenario;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -44,8 +44,7 @@ impl Session {
         parameters: Vec<ParameterOfPython>,
         has_own_motion: bool,
     ) -> PyResult<Self> {
-        let motion = if has_own_motion { PlayedMotion::Own } else { PlayedMotion::Scenario };
-        let declared = Declared { motion, ..declared(signals, parameters)? };
+        let declared = declared(signals, parameters, has_own_motion)?;
         let context = attach(rig).map_err(not_attached)?;
         Ok(Self { stage: Some(Stage::Attached(Box::new(context), declared)) })
     }
