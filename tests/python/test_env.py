@@ -254,6 +254,28 @@ def test_forces_are_fed_forward(tmp_path: Path) -> None:
     assert lifted[1] > lifted[0]
 
 
+def test_forces_that_begin_at_once_move_the_legs_beyond_the_following_limit(tmp_path: Path) -> None:
+    scenario = tmp_path / "scenario.toml"
+    scenario.write_text("rate_hz = 500\nduration_s = 0.3\n[[drive_profile]]\npdos.rpdo1 = ['6040h', '607Ah', '60B2h']\n")
+
+    def play(force_n: float, ramp: int = 1, **limits: float) -> tuple[bool, str]:
+        env = masseter.Env(scenario, action="forces", observe=["l1.position"], set={f"can.{key}": value for key, value in limits.items()})
+        env.reset(seed=1)
+        events: list[str] = []
+        for cycle in range(80):
+            force = force_n * min(1.0, (cycle + 1) / ramp)
+            _, _, terminated, _, info = env.step([0, 0, 0, force, force, force])
+            events += info.get("events", [])
+            if terminated:
+                return True, events[0]
+        return False, ""
+
+    is_stopped, reason = play(20.0)
+    assert is_stopped and "following_error" in reason, reason
+    for held in (play(10.0), play(20.0, ramp=50), play(20.0, following_limit_m=5e-4)):
+        assert held == (False, "")
+
+
 def test_calls_at_the_wrong_time_are_refused() -> None:
     env = masseter.Env(set=SHORT)
     with pytest.raises(masseter.EnvStateError, match="was not reset; call reset first"):
