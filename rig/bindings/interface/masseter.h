@@ -215,7 +215,8 @@ int masseter_publish(masseter_session *session, const masseter_command *command,
 /* Publishes an event. */
 int masseter_publish_event(masseter_session *session, const masseter_event *event);
 
-/* 1 once the rig wants an orderly end, or is gone: bring the motion to rest, switch the drives off, then finish. */
+/* 1 once the rig wants an orderly end, or is gone: bring the motion to rest, switch the drives off, then finish. The session
+   publishes the event stop_requested itself. */
 int masseter_is_stop_requested(const masseter_session *session);
 
 /* Ends the work in order, and frees the session. is_safe_stop: a fault ended the motion. */
