@@ -39,8 +39,9 @@ ROUNDING_M = 2e-9
 MOST_REFUSED = 0.2
 FINISHED, MASTERS_FAULT = 6, (2, 1)
 OPERATION_ENABLED, ALL_AXES = 5, 63
-# With complete readings of enabled drives the motion begins after so many cycles at the latest: those of `controller.ease_s`, and three.
-LEAD_IN = round(1.0 / PERIOD_S) + 3
+# With complete readings of enabled drives the motion begins after so many cycles at the latest: those of `controller.ease_s`, by default
+# 1 s, and three.
+EASE_S, MORE_CYCLES = 1.0, 3
 
 AXES = ("d1", "d2", "d3", "l1", "l2", "l3")
 # Kinds with the range of their size, in the unit that the size is written with.
@@ -102,8 +103,10 @@ def scenario(draw):
         ]
     )
     expects_stop = draw.random() < 0.3
+    ease_s = draw.choice([None, None, 0.3, 0.55, 1.7])
     text = "duration_s = 3.0\nrecording.frames = false\n" + "".join(f"motion.{key} = {json.dumps(value)}\n" for key, value in motion.items())
     text += "expect.verdict = 'safe_stop'\n" if expects_stop else ""
+    text += f"controller.ease_s = {ease_s}\n" if ease_s else ""
     seed = f"seed = {draw.randrange(1 << 30)}\n"
     text += f"[[require]]\nname = 'near'\nsignal = 'incisal.error'\nduring = 'running'\nmax = '{1e3 * REQUIRED_M} mm'\n"
     text += "".join(table("faults", fault(draw)) for _ in range(draw.choice([0, 1, 1, 1, 2, 3])))
@@ -118,7 +121,7 @@ def without_faults(text):
 class Run:
     """The raw recording of a run."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, ease_s):
         self.truths, self.states, self.faults, ready = {}, {}, [], []
         for message in read_ros2_messages(folder / "recording.mcap", topics=("truth", "reading", "state", "event")):
             at = message.ros_msg
@@ -133,7 +136,8 @@ class Run:
                     self.faults.append(at)
         stopped = min((at.cycle for at in self.faults), default=math.inf)
         running = [cycle for cycle, state in self.states.items() if state == RUNNING and cycle < stopped]
-        begins = min([*running, *sorted(ready)[LEAD_IN : LEAD_IN + 1]], default=0)
+        lead_in = math.ceil(ease_s / PERIOD_S + MORE_CYCLES)
+        begins = min([*running, *sorted(ready)[lead_in : lead_in + 1]], default=0)
         # Every cycle of the motion counts, also one in which the controller reports another state, or none.
         self.running = list(range(begins, max(running, default=begins - 1) + 1))
         self.last = max(self.states)
@@ -209,7 +213,8 @@ def play(masseter, number, seed, folder):
         return "refused", [], code.stderr
     summary = json.loads((out / "summary.json").read_text())
     found = [f"exit {code.returncode}, summary {summary['verdict']['exit_code']}"] if code.returncode != summary["verdict"]["exit_code"] else []
-    found += contradictions(Run(out), path_of(without_faults(text)), summary, expects_stop)
+    ease_s = tomllib.loads(text).get("controller", {}).get("ease_s", EASE_S)
+    found += contradictions(Run(out, ease_s), path_of(without_faults(text)), summary, expects_stop)
     if not found:
         shutil.rmtree(out)
         file.unlink()
