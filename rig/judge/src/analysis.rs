@@ -281,7 +281,7 @@ impl Analysis {
                 }
             }
             if let Some(lag_s) = messages.lag_s {
-                self.played.add_sample(lag_s, messages.progress_s, path.desired, path.actual);
+                self.played.add_sample(lag_s, messages.progress_s, &path);
             }
         }
         if let Some(reading) = &messages.reading {
@@ -318,17 +318,16 @@ impl Analysis {
         while let Some(sample) = self.timeline.finish() {
             self.judge_sample(&sample);
         }
-        let rest_m =
-            self.timeline.reference().and_then(|of| of.rest(|from, to| self.played.distance_m(from, to)));
+        let reference = self.timeline.reference();
+        let rest_m = reference.and_then(|of| of.rest(|from, to| self.played.distance_m(from, to)));
+        let (disorder, disorder_ns) = reference.map(Reference::disorder).unwrap_or_default();
+        let lag_causes_ms = reference.map_or([0.0; 2], Reference::lag_causes_ms);
         let (tracking, track) = self.tracking.into_figures();
         let duration_ns =
             self.last_sample_ns.saturating_sub(self.first_sample_ns.unwrap_or(self.last_sample_ns));
         let topics = self.sequence.finish();
         let missing_frames =
             topics.iter().find(|topic| topic.topic == FrameTap::TOPIC).map_or(0, |topic| topic.missing);
-        let reference = self.timeline.reference();
-        let disorder = reference.and_then(Reference::disorder);
-        let lag_causes_ms = reference.map_or([0.0; 2], Reference::lag_causes_ms);
         let running_s = self.stop.running_cycles() as f64 * self.period_ns as f64 / 1e9;
         let (stopped_by, enabled_cycles) = self.stop.into_figures();
         let enabled_s = enabled_cycles as f64 * self.period_ns as f64 / 1e9;
@@ -352,6 +351,7 @@ impl Analysis {
         Figures {
             ended_ns,
             disorder,
+            disorder_ns,
             digest: self.digest.in_hex(),
             duration_s: duration_ns as f64 / 1e9,
             overrun_attribution: OverrunAttribution::new(&[&self.controller_skips, &self.plant_skips]),

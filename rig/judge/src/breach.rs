@@ -77,6 +77,39 @@ pub(crate) fn earliest(breaches: impl Iterator<Item = Breach>, motion_ns: Option
     earliest.map(|breach| breach.since(motion_ns))
 }
 
+/// A figure of the run beside its limit, and how both are shown.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Bound {
+    pub(crate) what: &'static str,
+    pub(crate) value: f64,
+    pub(crate) limit: f64,
+    pub(crate) unit: &'static str,
+    pub(crate) digits: usize,
+}
+
+impl Bound {
+    pub(crate) fn is_beyond(&self) -> bool {
+        !is_within(self.value, self.limit)
+    }
+
+    pub(crate) fn share(&self) -> f64 {
+        self.value / self.limit
+    }
+
+    /// The breach of it; `of` follows the name.
+    pub(crate) fn breach(&self, of: &str) -> Breach {
+        let Self { what, value, limit, unit, digits } = self;
+        Breach::new(format!("{what}{of}"), format!("{value:.digits$}{unit}"), format!("{limit}{unit}"))
+    }
+}
+
+impl Display for Bound {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Breach { what, value, limit, .. } = self.breach("");
+        write!(f, "{what} {value}, limit {limit}")
+    }
+}
+
 /// NaN exceeds every limit.
 pub(crate) fn is_within(value: f64, limit: f64) -> bool {
     value <= limit
@@ -101,16 +134,16 @@ impl PathBreach {
             return;
         }
         let deviation = &sample.deviation;
+        let mm =
+            |what, m| Bound { what, value: m * 1e3, limit: limits.tracking_max_mm, unit: " mm", digits: 4 };
+        let (value, limit) = (deviation.angle_rad.to_degrees(), limits.tracking_max_deg);
         let errors = [
-            ("incisal point", deviation.incisal_m * 1e3, limits.tracking_max_mm, " mm"),
-            ("platform", deviation.origin_m * 1e3, limits.tracking_max_mm, " mm"),
-            ("platform", deviation.angle_rad.to_degrees(), limits.tracking_max_deg, "°"),
+            mm("incisal point", deviation.incisal_m),
+            mm("platform", deviation.origin_m),
+            Bound { what: "platform", value, limit, unit: "°", digits: 4 },
         ];
-        let beyond = errors.into_iter().find(|(_, value, limit, _)| !is_within(*value, *limit));
-        self.first = beyond.map(|(name, value, limit, unit)| {
-            let what = format!("{name} from its path");
-            Breach::new(what, format!("{value:.4}{unit}"), format!("{limit}{unit}")).at(time_ns)
-        });
+        let beyond = errors.iter().find(|error| error.is_beyond());
+        self.first = beyond.map(|error| error.breach(" from its path").at(time_ns));
     }
 }
 

@@ -7,7 +7,7 @@ use masseter_scenario::wording::counted;
 use masseter_scenario::{ChecksConfig, FaultConfig};
 use serde::Serialize;
 
-use crate::breach::{Breach, is_within};
+use crate::breach::{Bound, Breach, is_within};
 use crate::declared_faults::FaultFigures;
 use crate::tracking::PoseErrors;
 
@@ -142,48 +142,32 @@ const AROUND: &str = ", approach and hold included";
 /// Fewer samples of a motion show nothing.
 const FEWEST_SAMPLES: u64 = 10;
 
-/// Whether the jaw left its path by more than the limits for a moment, before a safe stop or without one.
-pub(crate) fn left_its_path(errors: &PoseErrors, limits: &ChecksConfig) -> bool {
-    let ChecksConfig { tracking_max_mm, tracking_max_deg, .. } = *limits;
-    let peaks = [
-        (errors.incisal_max_mm, tracking_max_mm),
-        (errors.max_mm, tracking_max_mm),
-        (errors.max_deg, tracking_max_deg),
-    ];
-    peaks.into_iter().any(|(value, limit)| value.is_some_and(|value| !is_within(value, limit)))
-}
-
 /// The error nearest to its limit, or all that exceed theirs; untested if the motion left too little to compare.
 pub(crate) fn tracking(name: &'static str, errors: &PoseErrors, limits: &ChecksConfig) -> Check {
     let ChecksConfig { tracking_rms_mm, tracking_max_mm, tracking_rms_deg, tracking_max_deg, .. } = *limits;
     let samples = errors.samples;
     let figures = [
-        ("incisal point rms", errors.incisal_rms_mm, tracking_rms_mm, " mm", ""),
-        ("incisal point max", errors.incisal_max_mm, tracking_max_mm, " mm", AROUND),
-        ("platform rms", errors.rms_mm, tracking_rms_mm, " mm", ""),
-        ("platform max", errors.max_mm, tracking_max_mm, " mm", AROUND),
-        ("platform rms", errors.rms_deg, tracking_rms_deg, "°", ""),
-        ("platform max", errors.max_deg, tracking_max_deg, "°", AROUND),
+        ("incisal point rms", errors.incisal_rms_mm, tracking_rms_mm, " mm"),
+        ("incisal point max", errors.incisal_max_mm, tracking_max_mm, " mm"),
+        ("platform rms", errors.rms_mm, tracking_rms_mm, " mm"),
+        ("platform max", errors.max_mm, tracking_max_mm, " mm"),
+        ("platform rms", errors.rms_deg, tracking_rms_deg, "°"),
+        ("platform max", errors.max_deg, tracking_max_deg, "°"),
     ];
+    let figures = figures.into_iter();
     let mut found: Vec<_> = figures
-        .into_iter()
-        .filter_map(|(what, value, limit, unit, more)| {
-            let value = value?;
-            let breach = Breach::new(what, format!("{value:.4}{unit}"), format!("{limit}{unit}"));
-            Some((value, limit, more, breach))
-        })
+        .filter_map(|(what, value, limit, unit)| Some(Bound { what, value: value?, limit, unit, digits: 4 }))
         .collect();
-    found.sort_by(|(a, of_a, ..), (b, of_b, ..)| (b / of_b).total_cmp(&(a / of_a)));
-    let exceeding = found.iter().filter(|(value, limit, ..)| !is_within(*value, *limit));
-    let in_words = |Breach { what, value, limit, .. }: &Breach| format!("{what} {value}, limit {limit}");
-    let exceeding: Vec<_> = exceeding.map(|(.., breach)| breach).collect();
+    found.sort_by(|one, other| other.share().total_cmp(&one.share()));
+    let exceeding: Vec<_> = found.iter().filter(|bound| bound.is_beyond()).collect();
     match found.first() {
         _ if !exceeding.is_empty() => {
-            let finding: Vec<_> = exceeding.iter().map(|breach| in_words(breach)).collect();
-            Check::judged(name, finding.join("; "), false).with_breach(exceeding[0].clone())
+            let finding: Vec<_> = exceeding.iter().map(ToString::to_string).collect();
+            Check::judged(name, finding.join("; "), false).with_breach(exceeding[0].breach(""))
         }
-        Some((_, _, more, closest)) if samples >= FEWEST_SAMPLES => {
-            Check::judged(name, format!("{}; {samples} samples{more}", in_words(closest)), true)
+        Some(closest) if samples >= FEWEST_SAMPLES => {
+            let around = if closest.what.ends_with("max") { AROUND } else { "" };
+            Check::judged(name, format!("{closest}; {samples} samples{around}"), true)
         }
         _ => {
             let samples = counted(samples, "sample");

@@ -35,8 +35,7 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     let is_disturbed = timing.is_disturbed();
     let sequence = Check { subject: Subject::Sequence, ..sequence(manifest, figures) };
     let path = &figures.path_breach;
-    let TrackingFigures { actual_source, without_pose, actual, estimated, undisturbed, .. } =
-        &figures.tracking;
+    let TrackingFigures { actual_source, actual, estimated, undisturbed, .. } = &figures.tracking;
     let tracking_of = |name, errors, undisturbed_errors| {
         let check = tracking(name, errors, limits);
         let of_motion = check.breach.clone().map(|breach| breach.over(path.motion_ns));
@@ -51,7 +50,7 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     if actual_source.is_truth() {
         checks.push(tracking_of("estimated tracking", estimated, &undisturbed.estimated));
     }
-    checks.extend(stated_pose(*without_pose));
+    checks.extend(stated_pose(&figures.tracking));
     // A stop ends the motion somewhere, and has a verdict of its own.
     let is_stopped = figures.stopped_by.is_some()
         || figures.final_state.is_some_and(|state| state == ControllerState::SafeStop);
@@ -91,11 +90,12 @@ fn stopped_ns(figures: &Figures) -> Option<u64> {
 }
 
 /// A desired pose in the state that is none: the controller computes with such numbers. None where each was a pose.
-fn stated_pose(without: u64) -> Option<Check> {
-    let samples = counted(without, "sample");
+fn stated_pose(found: &TrackingFigures) -> Option<Check> {
+    let samples = counted(found.without_pose, "sample");
+    let breach = Breach::new("without a finite pose", samples.clone(), "0").at(found.without_pose_ns);
     let why =
         format!("{samples} of the motion in which the controller stated no finite pose as the desired one");
-    (without > 0).then(|| Check::judged("stated pose", why, false))
+    (found.without_pose > 0).then(|| Check::judged("stated pose", why, false).with_breach(breach))
 }
 
 /// A motion that waited for lost commands or readings is late from then on. The true jaw may be ahead by no more than it may be
@@ -106,7 +106,8 @@ fn motion_lag(motion: &MotionFigures, limit_ms: f64) -> Option<Check> {
     let is_kept = lag_ms <= limit_ms && motion.ahead_ms.is_none();
     let check = Check::judged("motion lag", format!("{lag_ms:.1} ms, limit {limit_ms} ms{why}"), is_kept);
     let (what, beyond_ms) = motion.ahead_ms.map_or(("delay", lag_ms), |ahead_ms| ("lead", ahead_ms));
-    Some(check.with_breach(Breach::new(what, format!("{beyond_ms:.1} ms"), format!("{limit_ms} ms"))))
+    let breach = Breach::new(what, format!("{beyond_ms:.1} ms"), format!("{limit_ms} ms"));
+    Some(check.with_breach(breach.at(motion.late_ns)))
 }
 
 /// What the controller did that put the motion beyond its limit; none where it waited, or kept the limit.
@@ -198,7 +199,8 @@ fn sequence(manifest: &Manifest, figures: &Figures) -> Check {
         return Check::not_judged(NAME, format!("ended in state {in_words}{how}"));
     }
     if let Some(shortfall) = Shortfall::of(manifest, figures) {
-        return Check::new(NAME, shortfall.to_string(), shortfall.result());
+        let check = Check::new(NAME, shortfall.to_string(), shortfall.result());
+        return check.with_breach(shortfall.breach(figures));
     }
     let has_finished = is_in(ControllerState::Finished) && figures.stopped_by.is_none();
     let has_stopped = is_in(ControllerState::SafeStop) || figures.stopped_by.is_some();
@@ -405,6 +407,25 @@ impl Shortfall {
         let has_cause = struck.any(is_before) || stimuli.any(|stimulus| is_before(stimulus.time_ns));
         let is_proved = has_cause || has_judged_truth(figures) || !manifest.is_of_program();
         (is_expected && !is_proved).then_some(Self::OnlyStated)
+    }
+
+    /// What is beyond its limit; none where nothing shows.
+    fn breach(self, figures: &Figures) -> Option<Breach> {
+        let motion_ns = figures.path_breach.motion_ns;
+        let percent = |share: f64| format!("{:.0} %", (share * 100.0).round() + 0.0);
+        let seconds = |s: f64| format!("{s:.2} s");
+        match self {
+            Self::NotPlayed { share, .. } => {
+                Some(Breach::new("played part of the motion", percent(share), percent(WHOLE)).over(motion_ns))
+            }
+            Self::OwnEarly { running_s, duration_s } => {
+                let breach =
+                    Breach::new("own motion ran for", seconds(running_s), seconds(WHOLE_TIME * duration_s));
+                Some(breach.at(motion_ns.map(|[_, ended_ns]| ended_ns)))
+            }
+            Self::OutOfOrder(disorder) => Some(disorder.breach().at(figures.disorder_ns)),
+            Self::Still | Self::Unjudged | Self::OnlyStated => None,
+        }
     }
 
     pub(crate) fn result(self) -> CheckResult {

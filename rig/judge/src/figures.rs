@@ -53,6 +53,9 @@ pub struct Figures {
     /// What is out of order in the controller's states.
     #[serde(skip)]
     pub disorder: Option<Disorder>,
+    /// When that was, ns of the run's clock; none of a motion that never began.
+    #[serde(skip)]
+    pub disorder_ns: Option<u64>,
     /// What stopped the drives, whatever the controller reports; `None` if nothing did.
     pub stopped_by: Option<StoppedBy>,
     /// For how long all drives were enabled, s.

@@ -8,6 +8,7 @@ use masseter_runtime::messages::codes::{ControllerState, DriveState};
 use masseter_runtime::named::{Declared, PlayedMotion};
 use masseter_scenario::Scenario;
 
+use crate::breach::Breach;
 use crate::poses::MOVING;
 
 /// Cycles of the lead-in beside the move to the first pose.
@@ -27,6 +28,17 @@ pub enum Disorder {
         /// The earlier state.
         to: ControllerState,
     },
+}
+
+impl Disorder {
+    pub(crate) fn breach(self) -> Breach {
+        let running = ControllerState::Running;
+        match self {
+            Self::NeverBegan => Breach::new("state running", "never", "from the end of the lead-in on"),
+            Self::BeforeDrives => Breach::new("state", running.to_string(), "once all drives are enabled"),
+            Self::Back { from, to } => Breach::new("state", to.to_string(), format!("not after {from}")),
+        }
+    }
 }
 
 impl Display for Disorder {
@@ -54,7 +66,9 @@ pub(crate) struct StateOrder {
     were_enabled: bool,
     state: Option<ControllerState>,
     has_run: bool,
+    /// The first, and when it was, ns of the run's clock.
     disorder: Option<Disorder>,
+    disorder_ns: Option<u64>,
 }
 
 impl StateOrder {
@@ -68,6 +82,7 @@ impl StateOrder {
             state: None,
             has_run: false,
             disorder: None,
+            disorder_ns: None,
         }
     }
 
@@ -90,7 +105,9 @@ impl StateOrder {
         let is_back = to.code() < from.code() && !is_early(from) && !is_pause;
         let found = is_back.then_some(Disorder::Back { from, to });
         let found = if is_before_drives { Some(Disorder::BeforeDrives) } else { found };
-        self.disorder = self.disorder.or(found);
+        if self.disorder.is_none() && found.is_some() {
+            (self.disorder, self.disorder_ns) = (found, reading.map(|of| of.sampled_ns));
+        }
     }
 
     /// Whether the controller is in a state before the motion.
@@ -103,7 +120,8 @@ impl StateOrder {
         self.is_before_motion() && self.ready_cycles > self.lead_in_cycles
     }
 
-    pub(crate) fn disorder(&self) -> Option<Disorder> {
-        self.disorder.or((!self.has_run).then_some(Disorder::NeverBegan))
+    /// What is out of order first, and when.
+    pub(crate) fn disorder(&self) -> (Option<Disorder>, Option<u64>) {
+        (self.disorder.or((!self.has_run).then_some(Disorder::NeverBegan)), self.disorder_ns)
     }
 }

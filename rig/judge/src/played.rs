@@ -14,6 +14,7 @@ use serde::Serialize;
 use crate::ahead::{AheadWatch, Points};
 use crate::events::EventRecord;
 use crate::poses::{is_moving, is_running};
+use crate::tracking::PathSample;
 
 /// The played part of the scenario's motion.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
@@ -25,6 +26,9 @@ pub struct MotionFigures {
     pub played: Option<f64>,
     /// By how much the motion was late at most, ms; `None` if it never began.
     pub lag_ms: Option<f64>,
+    /// When it was first late by more than `checks.motion_lag_ms`, ns of the run's clock.
+    #[serde(skip)]
+    pub late_ns: Option<u64>,
     /// By how much the true jaw was ahead of the motion at most, ms; only beyond `checks.motion_lag_ms`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ahead_ms: Option<f64>,
@@ -55,7 +59,9 @@ pub(super) struct PlayedWatch {
     way_m: f64,
     gone_m: f64,
     lag_s: Option<f64>,
-    most_ahead_s: f64,
+    late_ns: Option<u64>,
+    /// The limit of lag and lead.
+    most_s: f64,
     ahead: AheadWatch,
     /// The cycle of the last reading.
     cycle: u64,
@@ -70,13 +76,14 @@ impl PlayedWatch {
     pub(super) fn new(scenario: &Scenario) -> Self {
         Self {
             points_m: jaw_points(&scenario.jaw),
-            most_ahead_s: scenario.checks.motion_lag_ms / 1e3,
+            most_s: scenario.checks.motion_lag_ms / 1e3,
             ahead: AheadWatch::default(),
             before: None,
             progress_s: f64::NEG_INFINITY,
             way_m: 0.0,
             gone_m: 0.0,
             lag_s: None,
+            late_ns: None,
             cycle: 0,
             answered: 0,
             late_commands: 0,
@@ -92,10 +99,12 @@ impl PlayedWatch {
         &mut self,
         lag_s: f64,
         progress_s: f64,
-        desired: Option<Pose>,
-        actual: Option<Pose>,
+        &PathSample { sampled_ns, desired, actual, .. }: &PathSample,
     ) {
         self.lag_s = Some(self.lag_s.map_or(lag_s, |most_s| most_s.max(lag_s)));
+        if lag_s > self.most_s {
+            self.late_ns.get_or_insert(sampled_ns);
+        }
         let Some(now) = desired.zip(actual).map(|(desired, actual)| [desired, actual]) else { return };
         self.ahead.add_sample(lag_s, progress_s, now.each_ref(), |from, to| step(&self.points_m, from, to));
         let before = self.before.get_or_insert(now);
@@ -133,7 +142,8 @@ impl PlayedWatch {
             way_mm: way_m.map(|way_m| way_m * 1e3),
             played: way_m.filter(|way_m| *way_m > NO_WAY_M).map(|way_m| self.gone_m / way_m),
             lag_ms: self.lag_s.map(|lag_s| lag_s * 1e3),
-            ahead_ms: Some(self.ahead.in_s()).filter(|s| *s > self.most_ahead_s).map(|s| s * 1e3),
+            late_ns: self.late_ns,
+            ahead_ms: Some(self.ahead.in_s()).filter(|s| *s > self.most_s).map(|s| s * 1e3),
             lag_causes_ms: [0.0; 2],
             missed_commands: self.missed_commands,
             missed_in_a_row: self.most_in_a_row,

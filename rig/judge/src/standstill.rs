@@ -12,7 +12,7 @@ use masseter_runtime::messages::codes::{ControllerState, DriveState, drive_state
 use masseter_scenario::{AFTER_STOP_S, ChecksConfig, Scenario};
 use serde::Serialize;
 
-use crate::breach::Breach;
+use crate::breach::{Bound, Breach};
 use crate::check::Check;
 use crate::poses::{true_pose, worse};
 use crate::signals::{CycleMessages, Sample};
@@ -144,24 +144,11 @@ impl Stop {
     }
 }
 
-/// The largest way after a stop of an axis, or of the jaw, beside its limit.
-struct Way {
-    name: &'static str,
-    most: f64,
-    limit: f64,
-    unit: &'static str,
-}
-
-impl Way {
-    fn is_beyond(&self) -> bool {
-        self.most > self.limit
-    }
-}
-
 impl StandstillFigures {
-    fn ways(&self, limits: &ChecksConfig) -> Vec<Way> {
+    /// The largest ways, each beside its limit.
+    fn ways(&self, limits: &ChecksConfig) -> Vec<Bound> {
         let ChecksConfig { standstill_axis_mm, standstill_jaw_mm, standstill_jaw_deg, .. } = *limits;
-        let way = |name, most, limit, unit| Way { name, most, limit, unit };
+        let way = |what, value, limit, unit| Bound { what, value, limit, unit, digits: 3 };
         let jaw = [
             self.jaw_mm.map(|most| way("incisal point", most, standstill_jaw_mm, " mm")),
             self.jaw_deg.map(|most| way("platform", most, standstill_jaw_deg, "°")),
@@ -174,11 +161,8 @@ impl StandstillFigures {
     /// Notes the first way beyond its limit.
     fn note_breach(&mut self, time_ns: u64, limits: &ChecksConfig) {
         if self.first.is_none() {
-            let beyond = self.ways(limits).into_iter().find(Way::is_beyond);
-            self.first = beyond.map(|Way { name, most, limit, unit }| {
-                let what = format!("{name} moved after the stop");
-                Breach::new(what, format!("{most:.3}{unit}"), format!("{limit}{unit}")).at(time_ns)
-            });
+            let beyond = self.ways(limits).into_iter().find(Bound::is_beyond);
+            self.first = beyond.map(|way| way.breach(" moved after the stop").at(time_ns));
         }
     }
 }
@@ -208,9 +192,7 @@ pub(super) fn standstill(
     const NAME: &str = "standstill";
     let recorded_s = found.recorded_s?;
     let ways = found.ways(limits);
-    let in_words =
-        |Way { name, most, limit, unit }: &Way| format!("{name} {most:.3}{unit}, limit {limit}{unit}");
-    let beyond: Vec<_> = ways.iter().filter(|way| way.is_beyond()).map(in_words).collect();
+    let beyond: Vec<_> = ways.iter().filter(|way| way.is_beyond()).map(ToString::to_string).collect();
     if !beyond.is_empty() {
         let check = Check::judged(NAME, format!("moved after the stop: {}", beyond.join("; ")), false);
         return Some(check.with_breach(found.first.clone()));
@@ -220,8 +202,8 @@ pub(super) fn standstill(
         let is_whole = matches!(ending, Ending::Completed | Ending::SafeStop) && !is_partial;
         return Some(if is_whole { Check::untested(NAME, why) } else { Check::not_judged(NAME, why) });
     }
-    let closest = ways.iter().max_by(|a, b| (a.most / a.limit).total_cmp(&(b.most / b.limit)));
-    let closest = closest.map_or_else(String::new, in_words);
+    let closest = ways.iter().max_by(|a, b| a.share().total_cmp(&b.share()));
+    let closest = closest.map_or_else(String::new, ToString::to_string);
     Some(Check::judged(NAME, format!("{closest}; observed for {recorded_s:.2} s after the stop"), true))
 }
 

@@ -47,6 +47,9 @@ pub struct TrackingFigures {
     /// Those of them in which the controller stated no desired pose, but other numbers.
     #[serde(skip)]
     pub without_pose: u64,
+    /// When that was first, ns of the run's clock.
+    #[serde(skip)]
+    pub without_pose_ns: Option<u64>,
     /// Errors of the actual pose against the desired one.
     #[serde(flatten)]
     pub actual: PoseErrors,
@@ -129,6 +132,7 @@ pub(super) struct Tracking {
     undisturbed: Errors,
     estimates: Accumulator,
     without_pose: u64,
+    without_pose_ns: Option<u64>,
     track: Vec<TrackingSample>,
     next_sample_ns: u64,
     /// How often the time between two samples of the track has doubled.
@@ -182,7 +186,10 @@ impl Tracking {
                 .solution
                 .as_ref()
                 .filter(|state| crate::poses::is_moving(Some(state.controller_state)));
-            self.without_pose += u64::from(solution.is_some_and(|state| desired_pose(state).is_none()));
+            if solution.is_some_and(|state| desired_pose(state).is_none()) {
+                self.without_pose += 1;
+                self.without_pose_ns.get_or_insert(sampled_ns);
+            }
             let estimate = deviation(desired.as_ref(), estimated.as_ref(), self.incisal_m);
             let add = if is_counted { PoseErrorSums::add } else { PoseErrorSums::peak };
             self.errors(is_disturbed).for_each(|errors| add(&mut errors.estimated, &estimate));
@@ -236,6 +243,7 @@ impl Tracking {
             actual_source: self.source,
             samples,
             without_pose: self.without_pose,
+            without_pose_ns: self.without_pose_ns,
             actual,
             rms_noise_mm: standard_error(&self.seconds),
             estimated,

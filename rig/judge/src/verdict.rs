@@ -11,7 +11,7 @@ use masseter_terminal::Exit;
 use serde::Serialize;
 
 use crate::breach::{Breach, earliest};
-use crate::check::{Check, CheckResult, Subject, left_its_path};
+use crate::check::{Check, CheckResult, Subject};
 use crate::checks::{Shortfall, checks, is_often_late, lag_cause};
 use crate::events::EventRecord;
 use crate::figures::Figures;
@@ -69,7 +69,7 @@ impl Verdict {
         let is_beside = |check: &Check| expect.is_some_and(|expect| stands_beside(check, expect));
         let (beside, checks): (Vec<_>, Vec<_>) = all.iter().cloned().partition(is_beside);
         let excuse = excuse(&manifest.ending, &timing, figures.outage);
-        let is_too_late = left_its_path(&figures.tracking.actual, &manifest.scenario.checks)
+        let is_too_late = figures.path_breach.first.is_some()
             || checks
                 .iter()
                 .any(|check| check.subject == Subject::Faults && check.result == CheckResult::Failed);
@@ -418,13 +418,13 @@ fn is_of_scenario(check: &Check) -> bool {
     matches!(check.subject, Subject::Faults | Subject::Stimuli)
 }
 
-/// The earliest breach, but of the failures that the scenario expects.
 /// The arguments of `run` that play a scenario as this run did.
 fn again(manifest: &Manifest) -> String {
     let controller = manifest.controller.as_ref().map(|name| format!(" --controller '{name}'"));
     manifest.clock.clone() + &controller.unwrap_or_default()
 }
 
+/// The earliest breach, but of the failures that the scenario expects.
 fn first_breach(checks: &[Check], expect: Option<&ExpectConfig>, figures: &Figures) -> Option<Breach> {
     let is_expected =
         |check: &Check| expect.is_some_and(|expect| expect.failed.iter().any(|name| *name == check.name));

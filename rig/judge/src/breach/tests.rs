@@ -53,4 +53,12 @@ fn the_first_error_beyond_its_limit_counts_and_not_the_largest() {
     assert_eq!(found(&[0.1, 0.5, 0.6, 2.0]).first, Some(breach));
     assert_eq!(found(&[0.1, 0.5]), PathBreach { motion_ns: Some([11_000_000; 2]), first: None });
     assert!(found(&[f64::NAN]).first.is_some(), "what is no number is beyond every limit");
+    for (origin_m, angle_rad, is_beyond) in
+        [(6e-4, 0.0, true), (0.0, 0.02, true), (0.0, f64::NAN, true), (4e-4, 0.01, false)]
+    {
+        let mut found = PathBreach::default();
+        let deviation = Deviation { incisal_m: 0.0, angle_rad, origin_m };
+        found.take(&PathSample { deviation, ..sample(10, 0.0) }, true, &limits);
+        assert_eq!(found.first.is_some(), is_beyond, "{origin_m} m, {angle_rad} rad");
+    }
 }

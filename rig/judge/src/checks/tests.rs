@@ -66,12 +66,14 @@ mod shortfall {
     use masseter_scenario::Scenario;
 
     use super::*;
+    use crate::breach::earliest;
     use crate::{Analysis, Code, FaultFigures, StoppedBy};
 
     const PLAYED: MotionFigures = MotionFigures {
         way_mm: Some(900.0),
         played: Some(0.999),
         lag_ms: Some(0.0),
+        late_ns: None,
         ahead_ms: None,
         lag_causes_ms: [0.0; 2],
         missed_commands: 0,
@@ -203,6 +205,49 @@ mod shortfall {
         let found = shortfall(|_, figures| figures.disorder = Some(back)).unwrap();
         assert_eq!(found.result(), CheckResult::Failed);
         assert_eq!(found.to_string(), "the controller went back from the state running to easing");
+    }
+
+    #[test]
+    fn what_falls_short_has_a_value_a_limit_and_a_time() {
+        type Change = fn(&mut Manifest, &mut Figures);
+        let breach = |change: Change| {
+            let mut run = Figures::default();
+            let short = shortfall(|manifest, figures| {
+                figures.path_breach.motion_ns = Some([2_000_000_000, 12_000_000_000]);
+                change(manifest, figures);
+                run = figures.clone();
+            });
+            short.and_then(|short| short.breach(&run)).map(|breach| {
+                let motion_ns = run.path_breach.motion_ns.map(|[began_ns, _]| began_ns);
+                earliest([breach.of("sequence".into())].into_iter(), motion_ns).unwrap().to_string()
+            })
+        };
+        let early = |manifest: &mut Manifest, figures: &mut Figures| {
+            (manifest.declared.motion, figures.running_s) = (PlayedMotion::Own, 4.0);
+        };
+        let back = |_: &mut Manifest, figures: &mut Figures| {
+            let back = Disorder::Back { from: ControllerState::Running, to: ControllerState::Easing };
+            (figures.disorder, figures.disorder_ns) = (Some(back), Some(3_500_000_000));
+        };
+        let cases: [(Change, Option<&str>); 4] = [
+            (
+                |_, figures| figures.motion.played = Some(0.5),
+                Some(
+                    "sequence: played part of the motion 50 %, limit 95 %, from 0.000 s to 10.000 s of the motion",
+                ),
+            ),
+            (early, Some("sequence: own motion ran for 4.00 s, limit 9.90 s, at 10.000 s of the motion")),
+            (back, Some("sequence: state easing, limit not after running, at 1.500 s of the motion")),
+            (|_, figures| figures.motion.played = None, None),
+        ];
+        for (change, expected) in cases {
+            assert_eq!(breach(change).as_deref(), expected);
+        }
+        let found =
+            TrackingFigures { without_pose: 2, without_pose_ns: Some(4_000_000_000), ..Default::default() };
+        let stated = stated_pose(&found).unwrap().breach;
+        let stated = earliest(stated.into_iter(), Some(2_000_000_000)).unwrap().to_string();
+        assert_eq!(stated, "stated pose: without a finite pose 2 samples, limit 0, at 2.000 s of the motion");
     }
 
     #[test]

@@ -1,17 +1,22 @@
 use super::*;
 
 mod played {
+    use masseter_model::geometry::Deviation;
     use masseter_runtime::messages::codes::ControllerState;
 
     use super::*;
+
+    fn sample(desired: Option<Pose>, actual: Option<Pose>) -> PathSample {
+        PathSample { sampled_ns: 7, desired, actual, deviation: Deviation::default() }
+    }
 
     /// How far the jaw goes, where its place along x at each sample is this share of the desired one, mm.
     fn played(samples: u32, place_mm: impl Fn(f64) -> f64, rest_m: f64) -> MotionFigures {
         let mut watch = PlayedWatch::new(&Scenario::default());
         let pose = |mm: f64| Some(Pose::translation(mm * 1e-3, 0.0, 0.0));
-        for sample in 0..=samples {
-            let wanted_mm = 10.0 * (f64::from(sample) * 0.1).sin();
-            watch.add_sample(0.0, f64::from(sample), pose(wanted_mm), pose(place_mm(wanted_mm)));
+        for at in 0..=samples {
+            let wanted_mm = 10.0 * (f64::from(at) * 0.1).sin();
+            watch.add_sample(0.0, f64::from(at), &sample(pose(wanted_mm), pose(place_mm(wanted_mm))));
         }
         watch.into_figures(Some(rest_m))
     }
@@ -43,7 +48,7 @@ mod played {
             // In the third sample the motion goes back a little, as after lost cycles.
             [(wanted_mm, wanted_mm - 0.05), (wanted_mm, wanted_mm), (wanted_mm - 0.05, wanted_mm)]
         }) {
-            watch.add_sample(0.0, wanted_mm, pose(wanted_mm), pose(is_mm));
+            watch.add_sample(0.0, wanted_mm, &sample(pose(wanted_mm), pose(is_mm)));
         }
         let share = watch.into_figures(Some(0.0)).played.unwrap();
         assert!((share - 1.0).abs() < 0.02, "{share}");
@@ -63,7 +68,7 @@ mod played {
     fn the_greatest_lag_and_the_cycles_without_a_new_command_are_counted() {
         let mut watch = PlayedWatch::new(&Scenario::default());
         for lag_s in [0.0, 0.003, 0.002] {
-            watch.add_sample(lag_s, 0.0, None, None);
+            watch.add_sample(lag_s, 0.0, &sample(None, None));
         }
         let moving = is_moving(Some(ControllerState::Running.code()));
         for answers_cycle in [1, 2, 2, 2, 3, 3, 5, 6] {

@@ -258,7 +258,7 @@ fn in_order(states: &[ControllerState], motion: PlayedMotion) -> Option<Disorder
     for (cycle, state) in (1..).zip(states) {
         order.advance(Some(state.code()), Some(&reading(cycle, cycle >= 3)), true);
     }
-    order.disorder()
+    order.disorder().0
 }
 
 fn reading(cycle: u64, are_enabled: bool) -> Reading {
