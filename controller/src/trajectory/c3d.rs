@@ -7,9 +7,10 @@
 use std::fmt::Write;
 
 use masseter_scenario::input::{excerpt, sentence};
-use masseter_scenario::wording::counted;
+use masseter_scenario::wording::{counted, listed};
 
-use super::columns::{Column, Meaning, Unit};
+use super::columns::{Column, Meaning};
+use super::units::Unit;
 
 /// The second byte of every C3D file.
 const KEY: u8 = 0x50;
@@ -94,8 +95,7 @@ pub(super) fn markers(bytes: &[u8]) -> Result<Markers, C3dError> {
     protocol.extend(renamed);
     if head.analog > 0 {
         let channels = [parameters.texts("ANALOG", "LABELS"), parameters.texts("ANALOG", "LABELS2")].concat();
-        let channels =
-            channels.iter().map(|name| format!("'{}'", excerpt(name))).collect::<Vec<_>>().join(", ");
+        let channels = listed(channels.iter().map(|name| format!("'{}'", excerpt(name))));
         protocol.push(format!("analog channels are not read: {}", sentence(&channels)));
     }
     Ok(Markers { text, first_frame: first, protocol })

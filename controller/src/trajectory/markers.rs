@@ -3,9 +3,10 @@
 //! A marker that is lost in a row has no coordinates there (NaN). Three markers that are seen are enough.
 
 use masseter_model::geometry::{Pose, Vec3};
+use masseter_scenario::wording::listed;
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
-use super::columns::MARKERS;
+use super::layout::MARKERS;
 use super::row::{Located, Row, gaps};
 
 /// Markers nearer to one line than this share of their greatest distance fix no orientation.
@@ -84,12 +85,11 @@ impl Body {
         let remedy = others.map_or_else(
             || "one is loose or swapped; cut or correct the recording".to_owned(),
             |(loose, _)| {
-                let kept =
-                    names.iter().filter(|name| **name != names[loose]).map(|name| format!("\"{name}\""));
-                let kept = kept.collect::<Vec<_>>().join(", ");
+                let kept = names.iter().filter(|name| **name != names[loose]);
                 format!(
-                    "{} is loose, or not on the lower jaw; leave it out by motion.markers = [{kept}]",
-                    names[loose]
+                    "{} is loose, or not on the lower jaw; leave it out by motion.markers = [{}]",
+                    names[loose],
+                    listed(kept.map(|name| format!("\"{name}\"")))
                 )
             },
         );

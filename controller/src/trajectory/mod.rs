@@ -14,6 +14,7 @@ mod extras;
 mod frames;
 mod generators;
 mod import;
+mod layout;
 mod mandible;
 mod markers;
 mod motion;
@@ -24,13 +25,13 @@ mod sheet;
 mod signals;
 mod survey;
 mod table;
+mod units;
 
 use masseter_model::geometry::Pose;
 use masseter_model::section;
 use nalgebra::UnitQuaternion;
 
 pub use check::{TrajectoryReport, check};
-pub use columns::Unit;
 pub use doubts::Glitch;
 pub use frames::{Frame, Frames};
 pub(crate) use generators::minimum_jerk;
@@ -40,6 +41,7 @@ pub use motion::Trajectory;
 pub use plausible::Implausible;
 pub use signals::{RecordedSignal, recorded_signals};
 pub use survey::{Gap, PointFigures, Range, RecordingSurvey, StepFigures, SurveyRow, survey};
+pub use units::Unit;
 
 /// A motion that cannot be built or followed: the key or the line of the recording, the error there, and the remedy.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -112,14 +112,12 @@ impl Trajectory {
 
     /// The platform in the base frame as a recording's rows have it, without the low-pass; none for a generator.
     pub fn recorded_pose(&self, motion_s: f64) -> Option<Pose> {
-        let Motion::Recording(recording) = &self.motion else { return None };
-        Some(self.frame.platform(&recording.recorded(motion_s)))
+        Some(self.frame.platform(&self.recording()?.recorded(motion_s)))
     }
 
     /// The times of a recording's rows after one time of the motion and up to another, s; none of a generator.
     pub fn rows_between(&self, after_s: f64, to_s: f64) -> &[f64] {
-        let Motion::Recording(recording) = &self.motion else { return &[] };
-        recording.rows_between(after_s, to_s)
+        self.recording().map_or(&[], |recording| recording.rows_between(after_s, to_s))
     }
 
     /// Progress of the motion at an even pace, s, at the instant when the ramps have brought it this far.
@@ -151,20 +149,22 @@ impl Trajectory {
     /// The largest turn of the jaw, degrees, if a recording of markers gives no incisal point and the turn makes their
     /// centroid a bad substitute.
     pub fn centroid_turn_deg(&self) -> Option<f64> {
-        let Motion::Recording(recording) = &self.motion else { return None };
-        recording.centroid_turn_deg
+        self.recording()?.centroid_turn_deg
     }
 
     /// The doubts about a recording, each with its line; none for a generator.
     pub fn doubts(&self) -> Vec<String> {
-        let Motion::Recording(recording) = &self.motion else { return Vec::new() };
+        let Some(recording) = self.recording() else { return Vec::new() };
         recording.doubts.iter().cloned().chain(jumps(&recording.glitches)).collect()
     }
 
     /// File and line, `motion.csv:7`, of the recording nearest to a time of the trajectory; none for a generator.
     pub fn source_line(&self, t_s: f64) -> Option<String> {
-        let Motion::Recording(recording) = &self.motion else { return None };
-        Some(recording.source_line(self.motion_time_s(t_s)))
+        Some(self.recording()?.source_line(self.motion_time_s(t_s)))
+    }
+
+    fn recording(&self) -> Option<&Recording> {
+        if let Motion::Recording(recording) = &self.motion { Some(recording) } else { None }
     }
 }
 

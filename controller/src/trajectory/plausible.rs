@@ -9,7 +9,6 @@ use masseter_scenario::{FileConfig, IfImplausible, JawConfig, LengthUnit, TimeUn
 use serde::Serialize;
 
 use super::TrajectoryError;
-use super::columns::Unit;
 use super::doubts::{GLIDE_M, NOTHING_M, TURN_DEG_PER_M, largest, quantile};
 use super::frames::Frames;
 use super::import::Source;
@@ -17,6 +16,7 @@ use super::mandible::jaw_points;
 use super::recording::{Recording, Sample};
 use super::row::Located;
 use super::table::Format;
+use super::units::Unit;
 use Cause::{Length, Time, Turn};
 
 /// Largest ways, mm. Incisal point: 44 mm in the mean, 56 mm at the 95th percentile; condyles: 22 mm (Kordass 2014).

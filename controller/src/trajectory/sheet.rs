@@ -7,8 +7,9 @@ use masseter_scenario::input::excerpt;
 use masseter_scenario::wording::counted;
 use masseter_scenario::{AngleUnit, LengthUnit, TimeUnit};
 
-use super::columns::{Column, Meaning, Unit, Units};
+use super::columns::{Column, Meaning};
 use super::row::{Located, is_lost};
+use super::units::{Quantity, Unit};
 
 /// Lines in which the header is looked for.
 const HEAD_LINES: usize = 200;
@@ -80,7 +81,8 @@ pub(super) struct Sheet<'a> {
     pub columns: Vec<Column>,
     /// The line of the names; none if a key gives them.
     pub header_line: Option<u64>,
-    pub assumed: Units,
+    /// The units that the format fixes.
+    pub assumed: Vec<Unit>,
     pub protocol: Vec<String>,
 }
 
@@ -230,26 +232,30 @@ fn names(header: &[String], above: &[String]) -> Vec<Column> {
 }
 
 /// Content of a format's head: the units, a line of the protocol, and the line after the head, from 0.
-fn vendor(text: &str) -> (Units, Option<String>, usize) {
+fn vendor(text: &str) -> (Vec<Unit>, Option<String>, usize) {
     let lines: Vec<&str> = text.lines().take(HEAD_LINES).collect();
-    let time = Some(TimeUnit::S);
+    let seconds = Unit::Time(TimeUnit::S);
     if let [first, keys, values, ..] = lines[..]
         && first.starts_with("PathFileType")
     {
         let at = keys.split('\t').position(|key| key.trim().eq_ignore_ascii_case("units"));
         let unit = at.and_then(|at| Unit::of(values.split('\t').nth(at)?));
-        let length = if let Some(Unit::Length(length)) = unit { Some(length) } else { None };
-        return (Units { time, length, angle: None }, Some("format TRC: times in s".to_owned()), 3);
+        let length = unit.filter(|unit| unit.quantity() == Quantity::Length);
+        return (
+            [Some(seconds), length].into_iter().flatten().collect(),
+            Some("format TRC: times in s".to_owned()),
+            3,
+        );
     }
     let Some(end) = lines.iter().position(|line| line.trim().eq_ignore_ascii_case("endheader")) else {
-        return (Units::default(), None, 0);
+        return (Vec::new(), None, 0);
     };
     let is_in_degrees =
         lines[..end].iter().any(|line| line.replace(' ', "").eq_ignore_ascii_case("inDegrees=yes"));
     let (angle, angles) =
         if is_in_degrees { (AngleUnit::Deg, "degrees") } else { (AngleUnit::Rad, "radians") };
     let format = format!("format MOT/STO: times in s, lengths in m, angles in {angles}");
-    (Units { time, length: Some(LengthUnit::M), angle: Some(angle) }, Some(format), end + 1)
+    (vec![seconds, Unit::Length(LengthUnit::M), Unit::Angle(angle)], Some(format), end + 1)
 }
 
 fn no_header(head: &[(usize, &str)]) -> Located {

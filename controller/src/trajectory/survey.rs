@@ -7,7 +7,6 @@ use masseter_scenario::{FileConfig, JawConfig};
 use serde::Serialize;
 
 use super::TrajectoryError;
-use super::columns::Unit;
 use super::doubts::Glitch;
 use super::frames::Frames;
 use super::import::Source;
@@ -15,6 +14,7 @@ use super::mandible::jaw_points;
 use super::plausible::{Implausible, Judgement};
 use super::recording::{Recording, Sample, moved};
 use super::table::{Format, Table};
+use super::units::Unit;
 
 /// A step longer than this many usual steps is a gap.
 const GAP_STEPS: f64 = 1.5;

@@ -10,9 +10,9 @@ use masseter_scenario::input::excerpt;
 use masseter_scenario::wording::counted;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-use super::columns::{Clock, Content, Layout, Scaled, Turn};
 use super::doubts::upper_median;
 use super::extras::Extras;
+use super::layout::{Clock, Content, Layout, Scaled, Turn};
 use super::markers::{Body, settle};
 use super::row::{Located, Row, gaps, is_lost};
 use super::sheet::Sheet;
@@ -63,7 +63,7 @@ impl Table {
         let is_filled = |row: &Result<(_, Vec<&str>), _>| !matches!(row, Ok((_, cells)) if cells.is_empty());
         let first = sheet.rows().find(is_filled).transpose()?.map_or_else(Vec::new, |(_, cells)| cells);
         let is_clock = |at: usize| first.get(at).is_some_and(|cell: &&str| cell.contains(':'));
-        let layout = Layout::of(&sheet.columns, config, sheet.assumed, is_clock);
+        let layout = Layout::of(&sheet.columns, config, &sheet.assumed, is_clock);
         let layout = layout.map_err(|problem| Located { line: sheet.header_line, problem })?;
         let mut protocol = [sheet.protocol.clone(), layout.protocol.clone()].concat();
         let mut reader = Reader { layout: &layout, sheet: &sheet, decimal: None, last_s: None };

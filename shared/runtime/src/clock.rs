@@ -24,11 +24,6 @@ pub fn now_ns() -> u64 {
     read_ns(ClockId::Monotonic)
 }
 
-/// CPU time of the calling thread, ns. A system call.
-pub fn thread_cpu_ns() -> u64 {
-    read_ns(ClockId::ThreadCPUTime)
-}
-
 fn read_ns(clock: ClockId) -> u64 {
     let time = clock_gettime(clock);
     time.tv_sec as u64 * SECOND_NS + time.tv_nsec as u64

@@ -81,6 +81,16 @@ impl<'a> Document<'a> {
     }
 }
 
+/// The value of nested keys: in the table of that number for a key of a list of tables, and null where that table lacks
+/// it.
+pub(super) fn value_at(values: &Value, key: &str, entry: Option<usize>) -> Option<Value> {
+    let at = |key: &str| values.pointer(&format!("/{}", key.replace('.', "/"))).cloned();
+    let Some(number) = entry else { return at(key) };
+    let (list, key) = key.split_once('.').unwrap_or((key, ""));
+    let table = at(&format!("{list}.{number}"))?;
+    Some(if key.is_empty() { table } else { at(&format!("{list}.{number}.{key}")).unwrap_or_default() })
+}
+
 /// File, line and column, from 1.
 pub(super) fn place_in(path: &Path, text: &str, offset: usize) -> String {
     let before = text.get(..offset).unwrap_or(text);

@@ -1,6 +1,7 @@
 //! The reasons for the refusal of a scenario, and the checks that many of its values share.
 
 use std::fmt::Display;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use masseter_model::geometry::AXIS_NAMES;
@@ -134,6 +135,13 @@ pub(super) fn require_axes(key: &str, names: &[String]) -> Checked {
 pub(super) fn require_each<T>(entries: &[T], mut check: impl FnMut(&T) -> Checked) -> Checked {
     let mut numbered = entries.iter().enumerate();
     numbered.try_for_each(|(number, entry)| check(entry).map_err(|error| error.of_entry(number)))
+}
+
+/// Refuses a text that is no word of this many letters, digits, '-' and '_'.
+pub(super) fn require_word(key: &str, word: &str, length: RangeInclusive<usize>, need: &str) -> Checked {
+    let is_good = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_';
+    let is_word = length.contains(&word.len()) && word.bytes().all(is_good);
+    require(is_word, key, &format_args!("'{word}'"), need)
 }
 
 /// Refuses a name that cannot be a part of a signal's name.

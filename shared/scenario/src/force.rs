@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_2_PI, TAU};
 use masseter_model::section::Range;
 use serde::{Deserialize, Serialize};
 
-use super::error::{Checked, ranges_of, require, require_range};
+use super::error::{Checked, ScenarioError, ranges_of, require, require_range};
 
 section! {
     /// The estimate of the external force on the platform from the forces of the drives.
@@ -86,27 +86,40 @@ impl ForceControlConfig {
         FRAC_2_PI * stiffness_n_per_m * delay_s
     }
 
+    /// The load cell of the control; none for control by the estimate. Only the emulated jaw has a load cell.
+    pub(super) fn cell<'a>(
+        &self,
+        cell: Option<&'a LoadCellConfig>,
+        is_emulated: bool,
+    ) -> Result<Option<&'a LoadCellConfig>, ScenarioError> {
+        let need = match cell {
+            _ if self.source == ForceSource::Estimate => return Ok(None),
+            Some(_) => return Ok(cell),
+            None if is_emulated => "add the table [load_cell], or use \"estimate\"",
+            None => "use \"estimate\": on real interfaces the rig reads no load cell",
+        };
+        Err(ScenarioError::bad("force_control.source", &"\"load_cell\"", need))
+    }
+
     /// Refuses values without use, and a damping below the limit of stability. The delays (s) are the lead and that of
     /// the observer or the load cell.
     pub(super) fn validate(&self, lead_s: f64, source_s: f64) -> Checked {
         self.check_ranges(ranges_of("force_control"))?;
         require_range("force_control.peak_n", Range::Within(self.contact_n, 1000.0), self.peak_n)?;
         let delay_s = lead_s + source_s + Self::MASS_TIME_S;
+        let Self { damping_n_s_per_m, food_stiffness_n_per_m, tooth_damping_n_s_per_m, .. } = *self;
         for (key, damping, stiffness) in [
-            ("force_control.damping_n_s_per_m", self.damping_n_s_per_m, self.food_stiffness_n_per_m),
-            (
-                "force_control.tooth_damping_n_s_per_m",
-                self.tooth_damping_n_s_per_m,
-                self.tooth_stiffness_n_per_m,
-            ),
+            ("damping_n_s_per_m", damping_n_s_per_m, food_stiffness_n_per_m),
+            ("tooth_damping_n_s_per_m", tooth_damping_n_s_per_m, self.tooth_stiffness_n_per_m),
         ] {
+            let key = format!("force_control.{key}");
             let least = Self::least_damping_n_s_per_m(stiffness, delay_s);
             let need = format!(
                 "use at least {least:.1}: with less, the loop is not stable against {stiffness} N/m with a delay of \
                  {:.1} ms; or state a smaller stiffness",
                 delay_s * 1e3
             );
-            require(damping >= least && damping.is_finite(), key, &damping, need)?;
+            require(damping >= least && damping.is_finite(), &key, &damping, need)?;
         }
         Ok(())
     }

@@ -11,6 +11,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::error::{Checked, ScenarioError, ranges_of, require, require_each, require_range};
 use super::merge::{Given, over_kind};
+use crate::wording::listed;
 
 /// Farthest offset on a robot that fits on a table, m.
 const FARTHEST_M: f64 = 1.0;
@@ -256,8 +257,8 @@ impl FoodConfig {
     pub(super) fn validate(&self, arch: &[ToothConfig]) -> Checked {
         let missing = |number: &&u8| !arch.iter().any(|tooth| tooth.number == **number);
         if let Some(number) = self.teeth.iter().find(missing) {
-            let there: Vec<_> = arch.iter().map(|tooth| tooth.number.to_string()).collect();
-            let need = format!("name lower teeth that the jaw has: {}", there.join(", "));
+            let there = listed(arch.iter().map(|tooth| tooth.number));
+            let need = format!("name lower teeth that the jaw has: {there}");
             return Err(ScenarioError::bad("food.teeth", number, need));
         }
         let distinct = self.teeth.iter().collect::<BTreeSet<_>>().len();

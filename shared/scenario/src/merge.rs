@@ -10,6 +10,7 @@ use toml::de::Error as TomlError;
 use toml::{Table, Value};
 
 use super::error::ScenarioError;
+use crate::wording::listed;
 
 /// The lists whose entries have names.
 pub(super) const LISTS: [&str; 3] = ["faults", "stimulus", "require"];
@@ -97,7 +98,7 @@ impl Given {
 pub(super) fn over_kind<T: DeserializeOwned>(kinds: &Kinds, given: Table) -> Result<T, TomlError> {
     let kind = given.get("kind").and_then(Value::as_str).unwrap_or(kinds[0].0);
     let Some((_, text)) = kinds.iter().find(|(name, _)| *name == kind) else {
-        let names = kinds.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+        let names = listed(kinds.iter().map(|(name, _)| name));
         return Err(TomlError::custom(format!("there is no kind '{kind}'; use {names}")));
     };
     let mut whole: Table = toml::from_str(text).expect("the rig's kinds are TOML");

@@ -7,6 +7,7 @@
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 /// A side of the jaw, from the patient's view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -243,21 +244,9 @@ impl FileConfig {
 
     /// A file read by its header, with the default axes, reference point and low-pass.
     pub fn new(path: impl Into<PathBuf>) -> Self {
-        Self {
-            path: path.into(),
-            axes: Self::default_axes(),
-            if_implausible: Self::default_if_implausible(),
-            reference_point_mm: None,
-            marker_origin_mm: None,
-            columns: None,
-            markers: None,
-            time_unit: None,
-            length_unit: None,
-            angle_unit: None,
-            euler_order: None,
-            rate_hz: None,
-            lowpass_hz: Self::default_lowpass_hz(),
-        }
+        let unnamed: Self =
+            serde_json::from_value(json!({ "path": "" })).expect("a path alone is a recording");
+        Self { path: path.into(), ..unnamed }
     }
 
     fn default_axes() -> [String; 3] {

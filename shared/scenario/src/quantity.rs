@@ -9,7 +9,7 @@ use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::input::excerpt;
-use crate::wording::question;
+use crate::wording::{listed, question};
 
 /// The kind of a quantity. Values of different kinds cannot be compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -161,7 +161,7 @@ impl Dimension {
     /// The names of its units, for messages.
     pub fn unit_names(self) -> String {
         let names = UNITS.into_iter().filter(|unit| unit.dimension == self && !unit.name.is_empty());
-        names.map(|unit| unit.name).collect::<Vec<_>>().join(", ")
+        listed(names.map(|unit| unit.name))
     }
 }
 

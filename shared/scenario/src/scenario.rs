@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 use masseter_model::geometry::{AXES, AXIS_NAMES, MechanismConfig};
 use toml::Table;
 
-use super::document::{Document, malformed};
+use super::document::{Document, malformed, value_at};
 use super::drive_profile::over_kinds;
 use super::error::{
     Checked, LONGEST_S, ScenarioError, ranges_of, read_limited, require, require_each, require_range,
+    require_word,
 };
 use super::jaw::over_food;
 use super::matrix::Matrix;
@@ -140,13 +141,7 @@ impl Scenario {
     /// The place in its file of a key, or of its table for an absent key. `entry` is the number of the table in a list
     /// of tables, from 0. None for a file without the value of this scenario: an argument may have replaced it.
     pub fn place_of_key(&self, path: &Path, key: &str, entry: Option<usize>) -> Option<String> {
-        let value_in = |scenario: &Self| {
-            let values = serde_json::to_value(scenario).ok()?;
-            let Some(number) = entry else { return values.pointer(&pointer([key])).cloned() };
-            let (list, key) = key.split_once('.').unwrap_or((key, ""));
-            let entry = values.pointer(&pointer([list, &number.to_string()]))?;
-            Some(entry.pointer(&pointer([key])).cloned().unwrap_or_default())
-        };
+        let value_in = |scenario: &Self| value_at(&serde_json::to_value(scenario).ok()?, key, entry);
         let text = read_text(path, MOST_BYTES).ok()?;
         let given = Self::parse(path, &text).ok()?;
         let is_given = value_in(&given)? == value_in(self)?;
@@ -369,13 +364,9 @@ impl Scenario {
     }
 
     fn validate_run(&self) -> Checked {
-        let is_good = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_';
-        let named = |key, name: &String| {
-            let is_name = (1..=64).contains(&name.len()) && name.bytes().all(is_good);
-            require(is_name, key, &format!("'{name}'"), "use 1 to 64 letters, digits, '-' or '_'")
-        };
-        named("name", &self.name)?;
-        self.tags.iter().try_for_each(|tag| named("tags", tag))?;
+        let need = "use 1 to 64 letters, digits, '-' or '_'";
+        require_word("name", &self.name, 1..=64, need)?;
+        self.tags.iter().try_for_each(|tag| require_word("tags", tag, 1..=64, need))?;
         self.matrix.cases()?;
         self.study.as_ref().map_or(Ok(()), StudyConfig::validate)?;
         self.check_ranges(require_range)
@@ -404,25 +395,12 @@ impl Scenario {
             require(self.can.is_virtual(), "load_cell", &"given", need)?;
         }
         if let Some(control) = &self.force_control {
-            let cell = self.source_of(control)?;
+            let cell = control.cell(self.load_cell.as_ref(), self.can.is_virtual())?;
             let source_s = cell.map_or(estimate.observer_time_s, LoadCellConfig::time_s);
             control.validate(self.controller.lead_cycles * self.period_s(), source_s)?;
             cell.map_or(Ok(()), |cell| cell.require_for(control))?;
         }
         if self.is_force_estimated() { dynamics::require_open_screws(&self.model().friction) } else { Ok(()) }
-    }
-
-    /// The load cell of the control; none for control by the estimate. Only the emulated jaw has a load cell.
-    fn source_of(&self, control: &ForceControlConfig) -> Result<Option<&LoadCellConfig>, ScenarioError> {
-        if control.source == ForceSource::Estimate {
-            return Ok(None);
-        }
-        let bad = |need| Err(ScenarioError::bad("force_control.source", &"\"load_cell\"", need));
-        match &self.load_cell {
-            None if self.can.is_virtual() => bad("add the table [load_cell], or use \"estimate\""),
-            None => bad("use \"estimate\": on real interfaces the rig reads no load cell"),
-            cell => Ok(cell.as_ref()),
-        }
     }
 
     /// Whether the bite force is estimated: for the scenario's own request, or for the force control.
@@ -503,12 +481,6 @@ impl Scenario {
     pub fn period_s(&self) -> f64 {
         self.period_ns() as f64 / SECOND_NS as f64
     }
-}
-
-/// The JSON pointer to the value of nested keys.
-fn pointer<const N: usize>(keys: [&str; N]) -> String {
-    let steps = keys.iter().filter(|key| !key.is_empty()).flat_map(|key| key.split('.'));
-    steps.flat_map(|step| ["/", step]).collect()
 }
 
 fn table_of(text: &str) -> Table {

@@ -1,6 +1,6 @@
 //! Whose motion it is, by pseudonyms, and which of its jaw cycles count: `[study]`. No key takes a name of a person.
 
-use super::error::{Checked, require};
+use super::error::{Checked, require, require_word};
 
 section! {
     /// The place of a run in a study, and the choice of its jaw cycles.
@@ -19,20 +19,13 @@ section! {
 
 impl StudyConfig {
     pub(super) fn validate(&self) -> Checked {
-        let is_good = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_';
-        for (key, value) in [("study.patient", &self.patient), ("study.session", &self.session)] {
-            let is_pseudonym = value.len() <= 32 && value.bytes().all(is_good);
-            let need = "use a pseudonym of at most 32 letters, digits, '-' or '_'";
-            require(is_pseudonym, key, &format!("'{value}'"), need)?;
-        }
+        let need = "use a pseudonym of at most 32 letters, digits, '-' or '_'";
+        require_word("study.patient", &self.patient, 0..=32, need)?;
+        require_word("study.session", &self.session, 0..=32, need)?;
         let Some([from_s, to_s]) = self.window_s else { return Ok(()) };
         let is_window = 0.0 <= from_s && from_s < to_s && to_s.is_finite();
-        require(
-            is_window,
-            "study.window_s",
-            &format!("[{from_s}, {to_s}]"),
-            "0 or more, the end above the beginning",
-        )
+        let window = format_args!("[{from_s}, {to_s}]");
+        require(is_window, "study.window_s", &window, "0 or more, the end above the beginning")
     }
 }
 

@@ -23,6 +23,18 @@ pub fn counted(number: u64, noun: &str) -> String {
     format!("{number} {noun}{ending}")
 }
 
+/// Things behind each other, with commas between them.
+///
+/// # Examples
+/// ```
+/// use masseter_scenario::wording::listed;
+///
+/// assert_eq!(listed([1, 2, 3]), "1, 2, 3");
+/// ```
+pub fn listed<T: ToString>(things: impl IntoIterator<Item = T>) -> String {
+    things.into_iter().map(|thing| thing.to_string()).collect::<Vec<_>>().join(", ")
+}
+
 /// A number with its digits in groups of three.
 ///
 /// # Examples

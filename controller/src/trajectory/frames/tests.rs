@@ -11,9 +11,9 @@ use masseter_scenario::LengthUnit;
 use nalgebra::{Quaternion, UnitQuaternion};
 
 use super::super::c3d::tests::{Numbers, file as c3d};
-use super::super::columns::Unit;
 use super::super::plausible::import;
 use super::super::survey::survey;
+use super::super::units::Unit;
 use super::*;
 
 /// A recording with the axes that are right as it stands.

@@ -201,6 +201,26 @@ pub struct Duties {
     pub operator: Operator,
 }
 
+impl Duties {
+    /// Carries out what is due in a cycle with a reading sampled at this time, ns.
+    #[inline]
+    fn carry_out_due<P: ControllerPorts>(
+        &mut self,
+        sampled_ns: Option<u64>,
+        ports: &mut P,
+        request_stop: impl FnOnce(),
+    ) -> Result<Option<(Injected, Due)>, P::Error> {
+        let due = self.operator.take_due(sampled_ns);
+        match due {
+            Some((_, Due::Set { place, value })) => self.named.settings().store(place, value),
+            Some((_, Due::Stop)) => request_stop(),
+            Some((_, Due::Fault(fault))) => ports.fault_is_due(fault)?,
+            None => {}
+        }
+        Ok(due)
+    }
+}
+
 /// What the first part of a cycle leaves to the second one.
 #[derive(Debug, Clone, Copy)]
 pub struct Observed {
@@ -249,20 +269,15 @@ pub fn run_cycle<P: ControllerPorts>(
 #[inline]
 pub fn observe<P: ControllerPorts>(
     controller: &mut dyn Controller,
-    Duties { named, operator }: &mut Duties,
+    duties: &mut Duties,
     ports: &mut P,
     wake: &Wake,
 ) -> Result<Observed, P::Error> {
     let reading = ports.reading(wake)?;
     let received_ns = ports.now_ns();
-    let due = operator.take_due(reading.as_ref().map(|reading| reading.borrow().sampled_ns));
-    match due {
-        Some((_, Due::Set { place, value })) => named.settings().store(place, value),
-        Some((_, Due::Stop)) => controller.request_stop(),
-        Some((_, Due::Fault(fault))) => ports.fault_is_due(fault)?,
-        None => {}
-    }
-    let change = named.take_change();
+    let sampled_ns = reading.as_ref().map(|reading| reading.borrow().sampled_ns);
+    let due = duties.carry_out_due(sampled_ns, ports, || controller.request_stop())?;
+    let change = duties.named.take_change();
     if let Some(change) = &change {
         controller.set_parameter(change.place, change.to);
     }

@@ -10,7 +10,7 @@ use super::{
     run_cycle, set_parameters,
 };
 use crate::clock;
-use crate::injection::{Due, Operator};
+use crate::injection::Operator;
 use crate::lifecycle::{End, Party, ProcessContext, ProcessError, Report, SupervisorLink};
 use crate::lockstep::{Clock, Lockstep};
 use crate::messages::codes::{Cause, EventKind, Source};
@@ -193,15 +193,9 @@ impl Session {
 
     /// Carries out due stimuli, and takes over a changed parameter.
     fn act(&mut self, sampled_ns: Option<u64>, tick: Tick) -> Result<(), ProcessError> {
-        let Duties { named, operator } = &mut self.duties;
-        let due = operator.take_due(sampled_ns);
-        match due {
-            Some((_, Due::Set { place, value })) => named.settings().store(place, value),
-            Some((_, Due::Stop)) => self.is_stopped = true,
-            Some((_, Due::Fault(fault))) => self.ports.fault_is_due(fault)?,
-            None => {}
-        }
-        if let Some(change) = named.take_change() {
+        let stop = || self.is_stopped = true;
+        let due = self.duties.carry_out_due(sampled_ns, &mut self.ports, stop)?;
+        if let Some(change) = self.duties.named.take_change() {
             self.ports.publish_event(&change.event(tick.cycle, tick.now_ns))?;
         }
         publish_begin(due, &mut self.ports, tick)

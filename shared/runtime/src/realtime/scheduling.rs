@@ -4,6 +4,7 @@
 
 use std::{fs, io, thread};
 
+use masseter_scenario::wording::listed;
 use rustix::io::Errno;
 use rustix::mm::{MlockAllFlags, mlockall};
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
@@ -85,13 +86,12 @@ fn refusal(asked: io::Result<()>, is_granted: bool) -> Option<String> {
 }
 
 fn refused_core(core: usize, why: &str, choice: &[usize]) -> String {
-    let choice: Vec<_> = choice.iter().map(usize::to_string).collect();
-    let remedy = match &choice[..] {
+    let remedy = match choice {
         [only] => format!(
             "only core {only} may be used, and controller and plant delay each other there: 'masseter doctor' shows how \
              to allow two"
         ),
-        choice => format!("choose two with --cores, of {}", choice.join(", ")),
+        choice => format!("choose two with --cores, of {}", listed(choice)),
     };
     format!("core {core} refused ({why}): {remedy}")
 }

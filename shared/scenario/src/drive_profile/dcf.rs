@@ -12,7 +12,7 @@ use super::object::{OF_NODE, ObjectConfig, ObjectKey, ObjectRule};
 use crate::can::{CanConfig, MASTER_NODE};
 use crate::error::{Checked, ScenarioError, require};
 use crate::input::read_foreign_text;
-use crate::wording::counted;
+use crate::wording::{counted, listed};
 
 /// Size of the largest file, bytes.
 const MOST_BYTES: u64 = 4 << 20;
@@ -108,10 +108,7 @@ impl DcfRead {
     /// What the rig does not take from the file, in one line; `None` if it takes everything.
     pub(super) fn warning(&self) -> Option<String> {
         let count = self.not_taken.values().map(Vec::len).sum::<usize>();
-        let group = |(reason, keys): (&String, &Vec<ObjectKey>)| {
-            let keys: Vec<_> = keys.iter().map(ToString::to_string).collect();
-            format!("{} ({reason})", keys.join(", "))
-        };
+        let group = |(reason, keys): (&String, &Vec<ObjectKey>)| format!("{} ({reason})", listed(keys));
         let groups = self.not_taken.iter().map(group).collect::<Vec<_>>().join("; ");
         let count = counted(count as u64, "object");
         (!groups.is_empty()).then(|| format!("not taken from the file {}: {count}: {groups}", self.file))

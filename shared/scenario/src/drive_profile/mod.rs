@@ -19,6 +19,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use super::error::{Checked, ScenarioError, ranges_of, require, require_axes, require_each};
 use super::merge::Given;
 use crate::CanConfig;
+use crate::wording::listed;
 
 pub use dcf::DcfRead;
 pub use object::{ObjectConfig, ObjectKey, ObjectRule};
@@ -288,8 +289,7 @@ impl PdosConfig {
             ("drive_profile.pdos.tpdo1", &self.tpdo1, PdoMapping::tpdo1),
         ];
         for (key, objects, of) in places {
-            let shown = objects.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
-            mapping_of(objects, of).map_err(|error| ScenarioError::bad(key, &shown, error.to_string()))?;
+            mapping_of(objects, of).map_err(|error| ScenarioError::bad(key, &listed(objects), error))?;
         }
         Ok(())
     }

@@ -14,6 +14,7 @@ use super::can::{CanConfig, MASTER_NODE};
 use super::error::{Checked, LONGEST_S, ScenarioError, ranges_of, require, require_keys, require_name};
 use super::quantity::Quantity;
 use super::when::{EntryNames, When, WhenKeys};
+use crate::wording::listed;
 
 pub use kinds::{
     AxisFault, BusFault, CommandFault, DriveFault, EncoderFault, FaultDeclaration, FaultKindConfig,
@@ -195,8 +196,7 @@ impl FaultConfig {
         let Some(node) = self.node else { return Ok(()) };
         let drives = axes.iter().filter_map(|&axis| can.node_ids.get(axis).copied());
         let nodes: Vec<u8> = iter::once(MASTER_NODE.get()).chain(drives).collect();
-        let names = nodes.iter().map(u8::to_string).collect::<Vec<_>>().join(", ");
-        let need = format!("bus {bus} has the nodes {names}");
+        let need = format!("bus {bus} has the nodes {}", listed(&nodes));
         require(nodes.contains(&node), "faults.node", &node, need)
     }
 

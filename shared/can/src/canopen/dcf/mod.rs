@@ -15,9 +15,6 @@ mod text;
 pub use text::{DataType, DcfError, Value};
 use text::{Field, Section};
 
-const VARIABLES: [u16; 4] = [0x2, 0x5, 0x6, 0x7];
-const COLLECTIONS: [u16; 2] = [0x8, 0x9];
-
 /// A description of a device.
 ///
 /// # Examples
@@ -109,14 +106,17 @@ impl Dcf {
         section: &Section<'_>,
         by_name: &HashMap<String, &Section<'_>>,
     ) -> Result<(), DcfError> {
-        let kind = section.number("ObjectType", 0xFF)?.unwrap_or(0x7);
-        if VARIABLES.contains(&kind) {
-            self.add(Entry::read(section, ObjectAddress::new(index, 0))?);
-        } else if !COLLECTIONS.contains(&kind) {
-            let known = "2 (domain), 5, 6, 7 (variable), 8 (array), 9 (record)";
-            return Err(section.refused(format!("ObjectType={kind:#X} is not one of {known}")));
-        } else if let Some(count @ 1..) = section.number("CompactSubObj", 0xFE)? {
-            self.add_compact(index, count as u8, section, by_name)?;
+        match section.number("ObjectType", 0xFF)?.unwrap_or(0x7) {
+            DOMAIN_OBJECT | 0x5..=0x7 => self.add(Entry::read(section, ObjectAddress::new(index, 0))?),
+            0x8 | 0x9 => {
+                if let Some(count @ 1..) = section.number("CompactSubObj", 0xFE)? {
+                    self.add_compact(index, count as u8, section, by_name)?;
+                }
+            }
+            kind => {
+                let known = "2 (domain), 5, 6, 7 (variable), 8 (array), 9 (record)";
+                return Err(section.refused(format!("ObjectType={kind:#X} is not one of {known}")));
+            }
         }
         Ok(())
     }
