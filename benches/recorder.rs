@@ -109,15 +109,19 @@ impl Publishers {
 
     fn publish_cycle(&mut self, AtHand { frames, others }: &AtHand) -> anyhow::Result<()> {
         others.iter().try_for_each(|message| self.publish(message))?;
-        Ok(self.frame.publish(frames.iter().copied())?)
+        Ok(self.frame.publish_by(clock::now_ns, frames.iter().copied())?)
     }
 
     fn publish(&mut self, message: &Recorded) -> anyhow::Result<()> {
         match message {
-            Recorded::Command(message) => self.command.publish(|place| *place = *message)?,
-            Recorded::Reading(message) => self.reading.publish(|place| *place = *message)?,
-            Recorded::State(message) => self.state.publish(|place| *place = *message)?,
-            Recorded::Truth(message) => self.truth.publish(|place| *place = *message)?,
+            Recorded::Command(message) => {
+                self.command.publish_by(clock::now_ns, |place| *place = *message)?
+            }
+            Recorded::Reading(message) => {
+                self.reading.publish_by(clock::now_ns, |place| *place = *message)?
+            }
+            Recorded::State(message) => self.state.publish_by(clock::now_ns, |place| *place = *message)?,
+            Recorded::Truth(message) => self.truth.publish_by(clock::now_ns, |place| *place = *message)?,
             // Those of a cycle travel together, and the recorder has this topic from nobody.
             // There is no signal, no parameter and no contact.
             Recorded::Frame(_)
@@ -127,7 +131,8 @@ impl Publishers {
             | Recorded::Contact(_) => {}
             Recorded::Event(message) => {
                 let is_of_controller = message.source == Source::Controller.code();
-                self.events[usize::from(!is_of_controller)].publish(|place| *place = *message)?;
+                self.events[usize::from(!is_of_controller)]
+                    .publish_by(clock::now_ns, |place| *place = *message)?;
             }
         }
         Ok(())

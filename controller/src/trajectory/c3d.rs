@@ -246,17 +246,18 @@ impl<'a> Parameters<'a> {
     fn read(bytes: &'a [u8], at: usize) -> Result<Self, C3dError> {
         let mut parameters = Self::default();
         let mut rest = bytes.get(at + 4..).unwrap_or_default();
+        let damaged = |what: &str, read: &Self| {
+            C3dError::Parameters(format!("{what} after {} entries", read.all.len()))
+        };
         loop {
-            let damaged =
-                |what: &str| C3dError::Parameters(format!("{what} after {} entries", parameters.all.len()));
-            let [length, id, after @ ..] = rest else { return Err(damaged("it has no end")) };
+            let [length, id, after @ ..] = rest else { return Err(damaged("it has no end", &parameters)) };
             let (length, id) = ((*length as i8).unsigned_abs(), *id as i8);
             if length == 0 {
                 return Ok(parameters);
             }
             let entry = after.split_at_checked(usize::from(length));
             let Some((name, [low, high, content @ ..])) = entry else {
-                return Err(damaged("a name is cut short"));
+                return Err(damaged("a name is cut short", &parameters));
             };
             let offset = usize::from(u16::from_le_bytes([*low, *high]));
             let mut used = 0;
@@ -264,18 +265,16 @@ impl<'a> Parameters<'a> {
                 parameters.groups.push((id.unsigned_abs(), name));
             } else {
                 let parameter = Parameter::read(id.unsigned_abs(), name, content)
-                    .ok_or_else(|| damaged("a value is cut short"))?;
+                    .ok_or_else(|| damaged("a value is cut short", &parameters))?;
                 used = 2 + parameter.dimensions.len() + parameter.data.len();
                 parameters.all.push(parameter);
             }
             if offset == 0 {
                 return Ok(parameters);
             }
-            let damaged =
-                |what: &str| C3dError::Parameters(format!("{what} after {} entries", parameters.all.len()));
             let next =
                 offset.checked_sub(2).filter(|next| *next >= used).and_then(|next| content.get(next..));
-            rest = next.ok_or_else(|| damaged("a wrong offset"))?;
+            rest = next.ok_or_else(|| damaged("a wrong offset", &parameters))?;
         }
     }
 

@@ -120,7 +120,9 @@ fn rig_ends<Sent: Numbered, Got: Numbered>(node: &Node) -> Failable<Ends> {
     let mut publisher: Publisher<Sent> = node.publisher()?;
     let subscriber: Subscriber<Got> = node.newest_subscriber()?;
     Ok(Ends {
-        send: Box::new(move |number| Ok(publisher.publish(|message| message.set_number(number))?)),
+        send: Box::new(move |number| {
+            Ok(publisher.publish_by(clock::now_ns, |message| message.set_number(number))?)
+        }),
         receive: Box::new(move || Ok(subscriber.receive()?.map(|message| message.number()))),
     })
 }

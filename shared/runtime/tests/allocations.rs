@@ -64,7 +64,7 @@ fn check_topic<M: Topic>(node: &Node) {
 
     let (count, largest_bytes) = allocations_of(|| {
         for _ in 0..MESSAGES {
-            publisher.publish(|_| {}).unwrap();
+            publisher.publish_by(clock::now_ns, |_| {}).unwrap();
         }
     });
     assert!(count <= MESSAGES && largest_bytes <= LOAN_BYTES, "{}: {count} of {largest_bytes}", M::TOPIC);
@@ -89,7 +89,7 @@ fn check_batches(node: &Node) {
 
     let (count, largest_bytes) = allocations_of(|| {
         for _ in 0..MESSAGES {
-            publisher.publish(frames).unwrap();
+            publisher.publish_by(clock::now_ns, frames).unwrap();
         }
     });
     assert!(count <= MESSAGES && largest_bytes <= LOAN_BYTES, "{count} of {largest_bytes}");

@@ -1,5 +1,6 @@
 //! Failed connections. Alone in its file: the limit that causes the failures holds for the whole process.
 
+use masseter_runtime::clock;
 use masseter_runtime::messages::Event;
 use masseter_runtime::transport::{FramePublisher, FrameSubscriber, Node, ScratchDomain, TransportError};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
@@ -34,7 +35,7 @@ fn a_refused_connection_is_reported() {
         let subscriber = node.subscriber::<Event>().unwrap();
         let mut publisher = node.publisher::<Event>().unwrap();
         assert_tells(&refused(|| subscriber.receive()), "event");
-        publisher.publish(|_| {}).unwrap();
+        publisher.publish_by(clock::now_ns, |_| {}).unwrap();
         assert_tells(&subscriber.receive().unwrap_err().to_string(), "event");
     }
     {

@@ -121,25 +121,20 @@ impl WhenKeys<'_> {
 /// Refuses entries whose times count from each other, or from themselves. The starts are in the order of the faults and
 /// of the stimuli.
 pub(super) fn refuse_circles(faults: &[Start], stimuli: &[Start], entries: &EntryNames<'_>) -> Checked {
-    let before = |start: Start| match start {
-        Start::Fault(place) => faults.get(place).copied(),
-        Start::Stimulus(place) => stimuli.get(place).copied(),
-        Start::SwitchOn | Start::State(_) => None,
-    };
-    let place = |start: Start| match start {
+    let starts = [faults, stimuli].concat();
+    // An entry has the number of its place in both lists, the stimuli behind the faults.
+    let before = |entry: usize| match starts[entry] {
         Start::Fault(place) => Some(place),
         Start::Stimulus(place) => Some(faults.len() + place),
         Start::SwitchOn | Start::State(_) => None,
     };
-    let all = (0..faults.len()).map(Start::Fault).chain((0..stimuli.len()).map(Start::Stimulus));
     // The first walk that reaches each entry, so that the search looks at every entry once.
-    let mut first_walk = vec![None; faults.len() + stimuli.len()];
-    for (walk, entry) in all.enumerate() {
-        for start in successors(Some(entry), |start| before(*start)) {
-            let Some(there) = place(start).map(|place| &mut first_walk[place]) else { break };
-            match there {
-                None => *there = Some(walk),
-                Some(first) if *first == walk => return Err(refuse_circle(start, before, place, entries)),
+    let mut first_walk = vec![None; starts.len()];
+    for walk in 0..starts.len() {
+        for entry in successors(Some(walk), |entry| before(*entry)) {
+            match first_walk[entry] {
+                None => first_walk[entry] = Some(walk),
+                Some(first) if first == walk => return Err(refuse_circle(entry, before, entries)),
                 Some(_) => break,
             }
         }
@@ -149,29 +144,20 @@ pub(super) fn refuse_circles(faults: &[Start], stimuli: &[Start], entries: &Entr
 
 /// The refusal of a circle, from its first entry on.
 fn refuse_circle(
-    on_it: Start,
-    before: impl Fn(Start) -> Option<Start> + Copy,
-    place: impl Fn(Start) -> Option<usize>,
+    on_it: usize,
+    before: impl Fn(usize) -> Option<usize> + Copy,
     entries: &EntryNames<'_>,
 ) -> ScenarioError {
-    let round = |from| successors(Some(from), move |start| before(*start).filter(|next| *next != from));
-    let first = round(on_it).min_by_key(|start| place(*start)).unwrap_or(on_it);
-    let names = round(first).chain([first]).map(|start| start_name(start, entries));
-    let circle = names.collect::<Vec<_>>().join(" after ");
-    let need = "these times count from each other, so nothing of them begins: let one count from the motion";
-    let (key, number) = match first {
-        Start::Stimulus(number) => ("stimulus.after", number),
-        Start::Fault(number) => ("faults.after", number),
-        Start::SwitchOn | Start::State(_) => ("faults.after", 0),
+    let EntryNames { faults, stimuli, .. } = entries;
+    let round = |from| successors(Some(from), move |entry| before(*entry).filter(|next| *next != from));
+    let first = round(on_it).min().unwrap_or(on_it);
+    let name = |entry: usize| match faults.get(entry) {
+        Some(fault) => format!("fault.{fault}"),
+        None => format!("stimulus.{}", stimuli[entry - faults.len()]),
     };
+    let circle = round(first).chain([first]).map(name).collect::<Vec<_>>().join(" after ");
+    let need = "these times count from each other, so nothing of them begins: let one count from the motion";
+    let stimulus = first.checked_sub(faults.len());
+    let (key, number) = stimulus.map_or(("faults.after", first), |number| ("stimulus.after", number));
     ScenarioError::bad(key, &circle, need).of_entry(number)
-}
-
-fn start_name(start: Start, entries: &EntryNames<'_>) -> String {
-    match start {
-        Start::Fault(place) => format!("fault.{}", entries.faults[place]),
-        Start::Stimulus(place) => format!("stimulus.{}", entries.stimuli[place]),
-        Start::SwitchOn => "switch-on".to_owned(),
-        Start::State(state) => format!("controller.{}", state.name()),
-    }
 }

@@ -7,7 +7,6 @@ use iceoryx2::sample::Sample;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::{Connecting, Inlet, Node, Outlet, TransportError, check_version, failed};
-use crate::clock;
 use crate::messages::{FrameTap, Message};
 
 /// Most messages in a sample: the messages of a cycle of six drives.
@@ -99,15 +98,7 @@ impl FramePublisher {
         self.port.connect()
     }
 
-    /// Writes the frames into shared memory, stamps and publishes them in their order.
-    pub fn publish(
-        &mut self,
-        frames: impl IntoIterator<Item = FrameTap, IntoIter: ExactSizeIterator>,
-    ) -> Result<(), TransportError> {
-        self.publish_by(clock::now_ns, frames)
-    }
-
-    /// As `publish`, with the time of another clock in the stamps.
+    /// Writes the frames into shared memory, stamps them with the time of a clock, and publishes them in their order.
     pub fn publish_by(
         &mut self,
         now_ns: impl Fn() -> u64,
@@ -151,6 +142,7 @@ impl FrameSubscriber {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::clock;
     use crate::transport::ScratchDomain;
 
     #[test]
@@ -163,7 +155,7 @@ mod tests {
         for count in [0, 1, BATCH, BATCH + 1, 5 * BATCH, 3] {
             let frames: Vec<_> =
                 (0..count).map(|id| FrameTap { id: id as u32, ..FrameTap::default() }).collect();
-            publisher.publish(frames).unwrap();
+            publisher.publish_by(clock::now_ns, frames).unwrap();
             let mut received = Vec::new();
             while let Some(batch) = subscriber.receive().unwrap() {
                 received.extend(batch.iter().map(|frame| (frame.seq, frame.id)));
@@ -182,7 +174,7 @@ mod tests {
         let mut publisher = FramePublisher::open(&node).unwrap();
         let frames = [FrameTap::default(); BATCH];
         for _ in 0..FrameTap::DEPTH / BATCH + 2 {
-            publisher.publish(frames).unwrap();
+            publisher.publish_by(clock::now_ns, frames).unwrap();
         }
         let oldest = subscriber.receive().unwrap().unwrap();
         assert_eq!(oldest[0].seq, 2 * BATCH as u64 + 1);

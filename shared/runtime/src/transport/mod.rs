@@ -7,6 +7,7 @@
 //!
 //! # Examples
 //! ```
+//! use masseter_runtime::clock;
 //! use masseter_runtime::messages::Event;
 //! use masseter_runtime::transport::{Node, ScratchDomain};
 //!
@@ -14,7 +15,7 @@
 //! let node = Node::join(&domain)?;
 //! let subscriber = node.subscriber::<Event>()?;
 //! let mut publisher = node.publisher::<Event>()?;
-//! publisher.publish(|event| event.cycle = 7)?;
+//! publisher.publish_by(clock::now_ns, |event| event.cycle = 7)?;
 //! let event = subscriber.receive()?.expect("the event has arrived");
 //! assert_eq!((event.seq, event.cycle), (1, 7));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -46,7 +47,6 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use iceoryx2::service::port_factory::publisher::PortFactoryPublisher;
 use iceoryx2::service::port_factory::subscriber::PortFactorySubscriber;
 
-use crate::clock;
 use crate::messages::{
     Command, Contact, Event, LAYOUT_VERSION, Machine, Message, Parameters, Reading, Signals, State, Truth,
 };
@@ -324,12 +324,7 @@ impl<M: Message> Publisher<M> {
         self.port.connect()
     }
 
-    /// Lets `fill` write the message into shared memory, then stamps and publishes the message.
-    pub fn publish(&mut self, fill: impl FnOnce(&mut M)) -> Result<(), TransportError> {
-        self.publish_by(clock::now_ns, fill)
-    }
-
-    /// As `publish`, with the time of another clock in the stamp.
+    /// Lets `fill` write the message into shared memory, then stamps it with the time of a clock and publishes it.
     pub fn publish_by(
         &mut self,
         now_ns: impl FnOnce() -> u64,

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use iceoryx2::prelude::ZeroCopySend;
 
 use super::*;
+use crate::clock;
 
 /// Every file below a folder.
 fn files_below(folder: &Path, found: &mut Vec<PathBuf>) {
@@ -57,7 +58,7 @@ fn the_newest_message_is_found_among_many_and_while_one_is_held() {
     let mut waiter = Waiter::new(1_000_000);
     for round in 1..=3 {
         for cycle in 0..5 {
-            publisher.publish(|event| event.cycle = round * 10 + cycle).unwrap();
+            publisher.publish_by(clock::now_ns, |event| event.cycle = round * 10 + cycle).unwrap();
         }
         let held = subscriber.receive().unwrap().unwrap();
         assert_eq!(held.cycle, round * 10);
@@ -73,7 +74,7 @@ fn a_subscriber_of_the_newest_message_keeps_few_old_ones() {
     let node = Node::join(&domain).unwrap();
     let subscriber = node.newest_subscriber::<Event>().unwrap();
     let mut publisher = node.publisher::<Event>().unwrap();
-    (1..=100).for_each(|cycle| publisher.publish(|event| event.cycle = cycle).unwrap());
+    (1..=100).for_each(|cycle| publisher.publish_by(clock::now_ns, |event| event.cycle = cycle).unwrap());
     let received = std::iter::from_fn(|| subscriber.receive().unwrap()).map(|event| (event.cycle, event.seq));
     assert!(received.eq((97..=100).map(|cycle| (cycle, cycle))));
 }
@@ -85,7 +86,7 @@ fn messages_after_the_awaited_one_are_kept_for_the_next_wait() {
     let subscriber = node.subscriber::<Event>().unwrap();
     let mut publisher = node.publisher::<Event>().unwrap();
     for cycle in 1..=5 {
-        publisher.publish(|event| event.cycle = cycle).unwrap();
+        publisher.publish_by(clock::now_ns, |event| event.cycle = cycle).unwrap();
     }
     let mut waiter = Waiter::new(1_000_000);
     let deadline_ns = clock::now_ns() + 1_000_000_000;
@@ -105,12 +106,12 @@ fn a_wait_that_keeps_finding_messages_never_holds_too_many() {
     let mut publisher = node.publisher::<Event>().unwrap();
     let deadline_ns = clock::now_ns() + 1_000_000_000;
     let mut waiter = Waiter::new(1_000_000);
-    publisher.publish(|event| event.cycle = 1).unwrap();
+    publisher.publish_by(clock::now_ns, |event| event.cycle = 1).unwrap();
     let publisher = std::cell::RefCell::new(publisher);
     let newest = subscriber.latest_by(deadline_ns, &mut waiter, |event| {
         let next = event.cycle + 1;
-        publisher.borrow_mut().publish(|event| event.cycle = next).unwrap();
-        publisher.borrow_mut().publish(|event| event.cycle = next + 1).unwrap();
+        publisher.borrow_mut().publish_by(clock::now_ns, |event| event.cycle = next).unwrap();
+        publisher.borrow_mut().publish_by(clock::now_ns, |event| event.cycle = next + 1).unwrap();
         event.cycle >= 9
     });
     assert_eq!(newest.unwrap().unwrap().cycle, 9);
