@@ -87,4 +87,15 @@ fn known_differences_between_six_sessions_are_found_and_covered() {
     {
         assert!(read(name).starts_with("<svg"), "{name}");
     }
+
+    let recording = workspace.file("P1-before").join("recording.mcap");
+    let bytes = fs::read(&recording).unwrap();
+    fs::write(&recording, &bytes[..bytes.len() / 2]).unwrap();
+    let words = [&["compare", "--out", "cut"][..], &runs].concat();
+    let output = Command::new(MASSETER).args(words).current_dir(workspace.file("")).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        output.status.code() == Some(2) && said.contains("P1-before: ") && said.contains("leave the run out"),
+        "{said}"
+    );
 }

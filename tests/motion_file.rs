@@ -314,12 +314,14 @@ fn the_plain_form_has_the_protocol_and_is_the_same_motion() {
         [&found["points"], &found["turns_deg"], &found["steps"], &found["strokes"]].map(Value::clone)
     };
     assert_eq!(figures(&plain), figures(&file));
-    let over = masseter(&["motion", plain.to_str().unwrap(), "--write", plain.to_str().unwrap()]);
-    assert!(
-        over.status.code() == Some(2) && stderr(&over).contains("is the file that is read"),
-        "{}",
-        stderr(&over)
-    );
+    for option in ["--write", "--svg"] {
+        let over = masseter(&["motion", plain.to_str().unwrap(), option, plain.to_str().unwrap()]);
+        assert!(
+            over.status.code() == Some(2) && stderr(&over).contains("is the file that is read"),
+            "{option}: {}",
+            stderr(&over)
+        );
+    }
     assert_eq!(fs::read_to_string(&plain).unwrap(), plain_text);
 }
 

@@ -330,6 +330,17 @@ fn a_scenario_that_is_named_twice_runs_once() {
 }
 
 #[test]
+fn a_report_does_not_replace_a_scenario() {
+    let suite = Suite::of(&[("passes.toml", PASSES)]);
+    for option in ["--junit", "--html"] {
+        let refused = suite.test(&["suite", option, "suite/passes.toml"]);
+        assert_eq!(refused.status.code(), Some(2), "{}", stdout(&refused));
+        assert!(stderr(&refused).contains("is a scenario of the suite"), "{}", stderr(&refused));
+    }
+    assert_eq!(fs::read_to_string(suite.path("suite/passes.toml")).unwrap(), PASSES);
+}
+
+#[test]
 fn a_controller_that_the_suite_does_not_start_is_refused() {
     let suite = Suite::of(&[("one.toml", "duration_s = 0.5\n")]);
     for controller in ["external", "none"] {

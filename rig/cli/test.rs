@@ -17,7 +17,7 @@ use crate::BUILD;
 use crate::run::request::{ClockKind, ControllerChoice};
 use crate::run::runner::Runner;
 use crate::vary::suite::Suite;
-use crate::vary::suite::cases::{Cases, Selection};
+use crate::vary::suite::cases::{Case, Cases, Selection};
 use crate::vary::suite::choice::{Choice, Shard};
 
 /// The arguments of `test`.
@@ -86,6 +86,7 @@ pub(super) fn test(args: &TestArgs) -> Result<Exit, Failure> {
     check_controller(&args.controller).usage()?;
     let selection = Selection { choice: args.choice.clone(), tags: args.tags.clone(), shard: args.shard };
     let Cases { chosen, filtered_out, left_out } = Cases::find(&args.paths, &selection).usage()?;
+    check_reports(args, &chosen).usage()?;
     let baseline = args.baseline.as_deref().map(Baseline::read).transpose().usage()?;
     let out = out_folder(args).usage()?;
     let runner = Runner::of_verb(args.controller.clone())?;
@@ -139,6 +140,15 @@ fn write_document(path: &Path, text: &str) -> anyhow::Result<()> {
 fn check_controller(controller: &ControllerChoice) -> anyhow::Result<()> {
     let is_started = !matches!(controller, ControllerChoice::External | ControllerChoice::None);
     ensure!(is_started, "a suite starts its controllers itself: use --controller motion, hold, or a path");
+    Ok(())
+}
+
+/// Refuses a report in the place of a scenario.
+fn check_reports(args: &TestArgs, chosen: &[Case]) -> anyhow::Result<()> {
+    for report in args.junit.iter().chain(&args.html).filter_map(|path| path.canonicalize().ok()) {
+        let is_scenario = chosen.iter().any(|case| case.path.canonicalize().is_ok_and(|path| path == report));
+        ensure!(!is_scenario, "{} is a scenario of the suite; name another file to write", report.display());
+    }
     Ok(())
 }
 

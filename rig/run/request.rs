@@ -230,6 +230,9 @@ impl FromStr for ControllerChoice {
             _ => {}
         }
         if let Some(file) = text.strip_prefix("fmu:") {
+            if !Path::new(file).is_file() {
+                return Err(format!("{file} is no file: give the path of an FMU"));
+            }
             let arguments = FMU_PLAYER.into_iter().chain([file]).map(str::to_owned);
             return Ok(Self::Executable("python3".into(), arguments.collect()));
         }

@@ -64,11 +64,10 @@ pub(crate) fn motion(args: &MotionArgs) -> anyhow::Result<Exit> {
     let scenario = scenario_with_overrides(args.scenario.as_deref(), &overrides)?;
     let found = Found::new(&scenario, &args.file)?;
     if let (Some(path), MotionConfig::File(file)) = (&args.write, &scenario.motion) {
-        write_plain(path, &plain_form(file, &scenario.jaw)?, &args.file)?;
+        write_beside(&args.file, path, &plain_form(file, &scenario.jaw)?)?;
     }
     if let Some(path) = &args.svg {
-        fs::write(path, picture::svg(&found.survey))
-            .with_context(|| format!("cannot write {}", path.display()))?;
+        write_beside(&args.file, path, &picture::svg(&found.survey))?;
     }
     match args.format {
         Format::Json => result(&(serde_json::to_string_pretty(&found)? + "\n"))?,
@@ -77,10 +76,10 @@ pub(crate) fn motion(args: &MotionArgs) -> anyhow::Result<Exit> {
     Ok(if found.judged.refused.is_none() { Exit::Passed } else { Exit::Failed })
 }
 
-/// Writes the plain form, but not over its source.
-fn write_plain(path: &Path, text: &str, source: &Path) -> anyhow::Result<()> {
+/// Writes what was made of a recording, but not over it.
+fn write_beside(source: &Path, path: &Path, text: &str) -> anyhow::Result<()> {
     if path.canonicalize().is_ok_and(|path| source.canonicalize().is_ok_and(|source| path == source)) {
-        bail!("--write {} is the file that is read; name another one", path.display());
+        bail!("{} is the file that is read; name another one to write", path.display());
     }
     fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
 }

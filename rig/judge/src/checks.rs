@@ -333,7 +333,7 @@ fn longest_excess_ns(response: &BusResponse) -> u64 {
 
 /// Share of the motion that the jaw must go.
 const WHOLE: f64 = 0.95;
-/// Share of the time that an own motion must last.
+/// Share of the time that the motion must last.
 const WHOLE_TIME: f64 = 0.99;
 
 /// By what a finished motion is not the one that the run was to play.
@@ -345,8 +345,8 @@ pub(crate) enum Shortfall {
     OutOfOrder(Disorder),
     /// The scenario's motion moves nothing.
     Still,
-    /// An own motion did not run, with enabled drives, for as long as it is to last. Its requirements judge no other time.
-    OwnEarly { running_s: f64, duration_s: f64 },
+    /// The motion did not run, with enabled drives, for as long as it is to last. Its requirements judge no other time.
+    Early { running_s: f64, duration_s: f64 },
     /// The motion is the controller's own or gone since the run, and no requirement judges the jaw.
     Unjudged,
     /// The controller alone states or asks for the expected safe stop, and nothing caused or judged the stop.
@@ -374,23 +374,23 @@ impl Shortfall {
             return Some(Self::OutOfOrder(disorder));
         }
         if manifest.declared.motion == PlayedMotion::Own {
-            return Self::of_own(manifest, figures);
+            return Self::early(manifest, figures).or_else(|| Self::unjudged(manifest, figures));
         }
         match (figures.motion.way_mm, figures.motion.played) {
             (None, _) => Self::unjudged(manifest, figures),
             (Some(_), None) => (!was_stopped_by_request(figures)).then_some(Self::Still),
             (Some(way_mm), Some(share)) => {
                 let is_played = share >= WHOLE;
-                (!is_played).then_some(Self::NotPlayed { share, way_mm })
+                let short = (!is_played).then_some(Self::NotPlayed { share, way_mm });
+                short.or_else(|| Self::early(manifest, figures))
             }
         }
     }
 
-    fn of_own(manifest: &Manifest, figures: &Figures) -> Option<Self> {
+    fn early(manifest: &Manifest, figures: &Figures) -> Option<Self> {
         let (running_s, duration_s) = (figures.running_s, manifest.motion_s);
         let is_early = running_s < WHOLE_TIME * duration_s && !was_stopped_by_request(figures);
-        let early = is_early.then_some(Self::OwnEarly { running_s, duration_s });
-        early.or_else(|| Self::unjudged(manifest, figures))
+        is_early.then_some(Self::Early { running_s, duration_s })
     }
 
     fn unjudged(manifest: &Manifest, figures: &Figures) -> Option<Self> {
@@ -431,7 +431,7 @@ impl Shortfall {
     pub(crate) fn result(self) -> CheckResult {
         match self {
             Self::Still | Self::Unjudged | Self::OnlyStated => CheckResult::Untested,
-            Self::NotPlayed { .. } | Self::OwnEarly { .. } | Self::OutOfOrder(_) => CheckResult::Failed,
+            Self::NotPlayed { .. } | Self::Early { .. } | Self::OutOfOrder(_) => CheckResult::Failed,
         }
     }
 }
@@ -448,9 +448,9 @@ impl Display for Shortfall {
             ),
             Self::OutOfOrder(disorder) => disorder.fmt(f),
             Self::Still => f.write_str("the scenario's motion does not move the jaw"),
-            Self::OwnEarly { running_s, duration_s } => write!(
+            Self::Early { running_s, duration_s } => write!(
                 f,
-                "the controller's own motion ended early: it ran for {running_s:.2} of {duration_s:.2} s with enabled drives; \
+                "the controller's motion ended early: it ran for {running_s:.2} of {duration_s:.2} s with enabled drives; \
                  --duration declares its end"
             ),
             Self::Unjudged => f.write_str(

@@ -67,5 +67,5 @@ pub use standstill::StandstillFigures;
 pub use statistic::Statistic;
 pub use timing::{Timing, TimingWord};
 pub use tracking::{PoseErrors, PoseSource, Track, TrackingFigures, TrackingSample, UndisturbedFigures};
-pub use verdict::{Judgement, Verdict};
+pub use verdict::{Judgement, Verdict, missing_part};
 pub use watch::{UnknownRequirement, Watch};

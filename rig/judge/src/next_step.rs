@@ -109,7 +109,7 @@ next_steps! {
     /// UNTESTED: a requirement.
     NotJudged => "Choose a window, trigger or signal that this motion has, or let a fault bring it, in `RUN/scenario.toml`, then run that file as before (docs/requirements.md).",
     /// UNTESTED: anything else.
-    TooLittle => "Play more of the motion: raise `duration_s` in `RUN/scenario.toml`, then run that file as before; the reason names what is missing.",
+    TooLittle => "Change what the reason names in `RUN/scenario.toml`, such as `duration_s` where it asks for more of the motion, then run that file as before.",
 }
 
 impl NextStep {

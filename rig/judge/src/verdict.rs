@@ -212,17 +212,16 @@ fn stopped(by: Option<StoppedBy>, events: &[EventRecord]) -> String {
 }
 
 fn incomplete(figures: &Figures) -> Option<OutcomeReason> {
-    let missing = figures.missing_messages();
-    let reason = if missing > 0 {
-        format!("{missing} messages are missing from the recording")
-    } else if figures.cut_short {
-        "the recording lacks its end".to_owned()
-    } else if let Some(damage) = figures.damage.first() {
-        format!("the recording is damaged: {damage}")
-    } else {
-        return None;
-    };
-    Some((Outcome::Named(Incomplete), reason))
+    missing_part(figures).map(|reason| (Outcome::Named(Incomplete), reason))
+}
+
+/// What a recording lacks; none of a whole one.
+pub fn missing_part(figures: &Figures) -> Option<String> {
+    match (figures.missing_messages(), figures.damage.first()) {
+        (missing @ 1.., _) => Some(format!("{missing} messages are missing from the recording")),
+        _ if figures.cut_short => Some("the recording lacks its end".to_owned()),
+        (_, damage) => damage.map(|damage| format!("the recording is damaged: {damage}")),
+    }
 }
 
 /// Why the machine leaves nothing to judge a run by that ended normally; `None` if the run can be judged. What the rig
@@ -395,9 +394,12 @@ fn other_failures(expect: &ExpectConfig, checks: [&[Check]; 2]) -> Option<Outcom
     };
     let has_failed = |name: &String| all().any(|check| check.result.is_failed() && *name == check.name);
     let idle = expect.failed.iter().filter(|name| !has_failed(name)).map(|name| format!("{name} did not"));
+    let is_twice = |name: &&String| all().filter(|check| **name == check.name).count() > 1;
+    let twice = expect.failed.iter().filter(is_twice);
+    let twice = twice.map(|name| format!("two checks have the name {name}: rename the requirement"));
     let other =
         [others(CheckResult::Failed, "failed"), others(CheckResult::Untested, "is untested")].concat();
-    let wrong: Vec<_> = other.into_iter().chain(idle).collect();
+    let wrong: Vec<_> = other.into_iter().chain(idle).chain(twice).collect();
     let lost = others(CheckResult::Excused, "may have failed by lost cycles");
     let (outcome, wrong) =
         if wrong.is_empty() { (Outcome::Invalid, lost) } else { (Outcome::Named(Fail), wrong) };

@@ -179,7 +179,7 @@ impl Faults {
 
     /// The fault that holds a frame back, and for how long, ns.
     pub(crate) fn delays(&self, frame: NumberedFrame) -> Option<(FaultActivation, u64)> {
-        let activation = self.on_frame(frame, |kind| matches!(kind, FaultKind::Delay { .. }))?;
+        let activation = self.on_frame(frame, |kind| matches!(kind, FaultKind::Delay { by_ns: 1.. }))?;
         let FaultKind::Delay { by_ns } = self.list[activation.place].fault.kind else { return None };
         Some((activation, by_ns))
     }

@@ -96,6 +96,8 @@ pub fn foreign_text(bytes: &[u8]) -> Result<String, &'static str> {
             Err(_) => rest.iter().map(|&byte| windows_1252(byte)).collect(),
         },
     };
+    // Old Macs, and some instruments, end lines by CR alone.
+    let text = if text.contains('\n') { text } else { text.replace('\r', "\n") };
     let need = "it has zero bytes; save the text as UTF-8, or as UTF-16 with a byte order mark";
     if text.contains('\0') { Err(need) } else { Ok(text) }
 }
@@ -212,6 +214,7 @@ mod tests {
         }
         assert_eq!(foreign_text(b"\x8e\x9f\xa0\xff\x81").as_deref(), Ok("ŽŸ\u{a0}ÿ\u{fffd}"));
         assert_eq!(foreign_text(b"").as_deref(), Ok(""));
+        assert_eq!(foreign_text(b"a,b\r1,2\r").as_deref(), Ok("a,b\n1,2\n"));
         for no_text in [&b"\xff\xfea"[..], b"\xff\xfe\x00\xd8", b"a\0b\0", b"\x7fELF\0\xff"] {
             assert!(foreign_text(no_text).is_err(), "{no_text:x?}");
         }

@@ -239,7 +239,8 @@ impl FromStr for Quantity {
         let number = number.parse::<f64>().ok().filter(|number| number.is_finite());
         let number =
             number.ok_or_else(|| refused("write a number and its unit, such as \"50 um\"".to_owned()))?;
-        let name = unit.trim();
+        // The Greek letter and the micro sign look alike.
+        let name = &unit.trim().replace('μ', "µ");
         let unit = Unit::named(name).ok_or_else(|| {
             let question = question(name, UNITS.iter().map(|unit| unit.name));
             refused(format!("the unit '{}' is unknown{question}", excerpt(name)))

@@ -288,8 +288,13 @@ mod shortfall {
             });
             assert_eq!(found, expected, "{result:?}");
         }
-        let early = Shortfall::OwnEarly { running_s: 4.3, duration_s: 10.0 };
+        let early = Shortfall::Early { running_s: 4.3, duration_s: 10.0 };
         assert_eq!(own(|_, figures| figures.running_s = 4.3), Some(early));
+        assert_eq!(
+            shortfall(|_, figures| figures.running_s = 4.3),
+            Some(early),
+            "also of the scenario's motion"
+        );
         let interrupted = own(|_, figures| {
             figures.running_s = 4.3;
             stop_by_request(figures);

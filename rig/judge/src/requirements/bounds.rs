@@ -151,8 +151,8 @@ impl Limits {
         let above = self.min.map(|min| (value - min, min));
         let nearest = below.into_iter().chain(above).min_by(|(a, _), (b, _)| a.total_cmp(b));
         let (margin, limit) = nearest.expect("a requirement has a limit");
-        // NaN exceeds every limit.
-        (if margin.is_nan() { f64::NEG_INFINITY } else { margin }, limit)
+        // What is no number, or infinite, exceeds every limit.
+        (if margin.is_finite() { margin } else { f64::NEG_INFINITY }, limit)
     }
 }
 

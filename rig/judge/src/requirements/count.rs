@@ -200,6 +200,12 @@ impl Order {
         if config.order.len() < 2 {
             return Err(Refused::new("require.order", "give at least two occurrences in order"));
         }
+        if let Some((_, twice)) =
+            (1..).zip(&config.order).find(|(next, name)| config.order[*next..].contains(name))
+        {
+            let need = format!("{twice} occurs twice, but its first occurrence alone counts; name it once");
+            return Err(Refused::new("require.order", need));
+        }
         let step = |name: &String| Ok((Trigger::parse(name, of).of_key("require.order")?, None));
         Ok(Self { steps: config.order.iter().map(step).collect::<Result<_, Refused>>()? })
     }

@@ -370,8 +370,12 @@ fn an_answer_that_the_end_of_the_run_cuts_is_said_to_be() {
 #[test]
 fn what_is_computed_to_no_number_fails() {
     let run = Run::of(&[1.0, -1.0, 2.0]);
-    let figures = run.judge("expression = 'ln(signum({l1.force}))'\nunit = ''\nmax = 5");
-    assert_eq!((figures.result, figures.margin), (Failed, None), "{figures:?}");
+    for expression in
+        ["'ln(signum({l1.force}))'\nunit = ''\nmax = 5", "'{l1.force} / 0'\nunit = 'N'\nmin = '-1 N'"]
+    {
+        let figures = run.judge(&format!("expression = {expression}"));
+        assert_eq!((figures.result, figures.margin), (Failed, None), "{figures:?}");
+    }
 }
 
 #[test]
@@ -427,6 +431,10 @@ fn wrong_requirements_are_refused_with_what_to_write() {
         ("expression = '5'\nunit = 'N'\nmax = '1 N'", "write signals in braces"),
         ("expression = '{controller.state}'\nunit = ''\nmax = 1", "controller.state is a state, no number"),
         ("order = ['fault.encoder_stuck']", "give at least two occurrences"),
+        (
+            "order = ['controller.running', 'fault.encoder_stuck', 'controller.running']",
+            "controller.running occurs twice, but its first occurrence alone counts",
+        ),
         (
             "expression = '{l1.force} +'\nunit = 'N'\nmax = '1 N'",
             "require.expression: require 'it': '{l1.force} +': ",

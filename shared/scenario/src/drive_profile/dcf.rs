@@ -67,6 +67,10 @@ impl DcfRead {
             place: format!("{}:{}", path.display(), error.line),
             reason: error.problem,
         })?;
+        if dcf.entries().len() == 0 {
+            let reason = "it describes no object; name the EDS or DCF of the drive".to_owned();
+            return Err(ScenarioError::Malformed { place: path.display().to_string(), reason });
+        }
         let mut read = Self {
             file: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
             node_id: dcf.commissioning.node_id,
@@ -79,10 +83,19 @@ impl DcfRead {
 
     /// Adds the objects of a file. Those that the profile names itself stay as they are.
     fn add(&mut self, dcf: &Dcf, home: ObjectKey, objects: &mut BTreeMap<ObjectKey, ObjectConfig>) {
-        let absent = MAY_LACK.into_iter().filter(|address| dcf.entry(*address).is_none());
+        let is_absent = |address: &ObjectAddress| {
+            dcf.entry(*address).is_none() && !dcf.undescribed.contains(&address.index)
+        };
+        let absent = MAY_LACK.into_iter().filter(is_absent);
         for address in absent {
             let absent = ObjectConfig { rule: ObjectRule::Absent, ..Default::default() };
             objects.entry(ObjectKey(address)).or_insert(absent);
+        }
+        let undescribed = dcf.undescribed.iter().map(|index| ObjectKey(ObjectAddress::new(*index, 0)));
+        let undescribed: Vec<_> = undescribed.collect();
+        if !undescribed.is_empty() {
+            let reason = "listed without a section; is the file cut short?";
+            self.not_taken.insert(reason.to_owned(), undescribed);
         }
         for entry in dcf.entries() {
             let key = ObjectKey(entry.address);

@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail, ensure};
 use masseter_judge::{
     CycleQuantity, JawCycleFigures, Judgement, Statistic, TrackingSample, closed_incisal_m, incisal_m,
+    missing_part,
 };
 use masseter_recording::{Manifest, RunFolder};
 use masseter_scenario::Scenario;
@@ -207,6 +208,9 @@ fn recorded(path: &Path, by: &By, set: &[String]) -> anyhow::Result<Recorded> {
         let mut manifest = Manifest::read(&folder)?;
         choose_cycles(&mut manifest.scenario, set)?;
         let (figures, _) = analyse(&folder, &manifest, None)?;
+        if let Some(reason) = missing_part(&figures) {
+            bail!("{reason}: 'masseter recording verify' says where; leave the run out, or record it again");
+        }
         let scenario = &manifest.scenario;
         let closed_m = closed_incisal_m(scenario).context("the scenario has no closed pose")?;
         let place = |sample: &TrackingSample| {

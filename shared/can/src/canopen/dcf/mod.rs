@@ -34,11 +34,18 @@ use text::{Field, Section};
 pub struct Dcf {
     /// The node and the bit rate that the file is for.
     pub commissioning: Commissioning,
+    /// Objects in the lists of the file without a section: the file is cut short, or its lists are wrong.
+    pub undescribed: Vec<u16>,
     entries: BTreeMap<ObjectAddress, Entry>,
 }
 
 /// Names of the section that CiA 306 calls `DeviceComissioning`; many tools mend the spelling.
 const COMMISSIONING: [&str; 2] = ["devicecomissioning", "devicecommissioning"];
+
+/// The lists of the objects that a file describes.
+const LISTS: [&str; 3] = ["mandatoryobjects", "optionalobjects", "manufacturerobjects"];
+/// Keys that entries alone have.
+const OF_ENTRY: [&str; 3] = ["DataType", "AccessType", "ParameterValue"];
 
 /// The node and the bit rate that a configuration is for; `None` if the file has none, or 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -71,6 +78,11 @@ impl Dcf {
             dcf.commissioning.node_id = dcf.commissioning.node_id.or(node_id);
             dcf.commissioning.baudrate_kbit_s = dcf.commissioning.baudrate_kbit_s.or(baudrate_kbit_s);
         }
+        for list in LISTS.iter().filter_map(|name| by_name.get(*name)) {
+            let listed = list.numbered(u16::MAX)?;
+            dcf.undescribed
+                .extend(listed.into_iter().filter(|index| !by_name.contains_key(&format!("{index:04x}"))));
+        }
         for section in &sections {
             if let Some(index) = index(section.name) {
                 dcf.add_object(index, section, &by_name)?;
@@ -80,6 +92,11 @@ impl Dcf {
                     return Err(section.refused(format!("{of} of its object; add it")));
                 }
                 dcf.add(Entry::read(section, ObjectAddress::new(index, subindex))?);
+            } else if !is_beside_entries(section.name)
+                && OF_ENTRY.iter().any(|key| section.get(key).is_some())
+            {
+                let need = "name an entry by four hexadecimal digits, such as [6065] or [60C2sub1]";
+                return Err(section.refused(format!("[{}] is the name of no entry; {need}", section.name)));
             }
         }
         Ok(dcf)
@@ -157,6 +174,14 @@ impl Dcf {
         }
         Ok(())
     }
+}
+
+/// Whether a section belongs to a module of a modular device, such as `[M1SubExt6200]`, or to a compact array.
+fn is_beside_entries(name: &str) -> bool {
+    let name = name.to_ascii_lowercase();
+    let is_of_module = |rest: &str| rest.starts_with(|digit: char| digit.is_ascii_digit());
+    let is_of_array = ["name", "value"].iter().any(|part| name.ends_with(part));
+    is_of_array || name.strip_prefix('m').is_some_and(is_of_module)
 }
 
 /// The index in the name of an object's section.

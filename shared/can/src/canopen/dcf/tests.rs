@@ -47,6 +47,8 @@ fn what_cannot_be_read_is_refused_with_its_line_and_a_remedy() {
         ("DataType=7\ndatatype=7", 6, "datatype occurs twice in its section, first in line 5"),
         ("DataType=7\n[2000]", 6, "[2000] occurs twice, first in line 1"),
         ("DataType=7\n[2001sub0]", 6, "[2001sub0] has no section [2001] of its object; add it"),
+        ("DataType=7\n[0x2001]\nDataType=7", 6, "[0x2001] is the name of no entry; name an entry by four"),
+        ("DataType=7\n[2000sub1h]\nParameterValue=7", 6, "[2000sub1h] is the name of no entry"),
         ("DataType=7\n[2001]\nObjectType=3", 6, "ObjectType=0x3 is not one of 2 (domain)"),
     ];
     for (lines, line, message) in table {
@@ -119,4 +121,14 @@ fn a_configuration_takes_the_place_of_the_value_as_delivered() {
     let entry = read("DataType=7\nDefaultValue=1\nParameterValue=2\nLowLimit=0x1\nHighLimit=3").unwrap();
     assert_eq!(entry.value(), Some(&Value::Number(2)));
     assert_eq!([entry.lowest, entry.highest], [1, 3].map(|number| Some(Value::Number(number))));
+}
+
+#[test]
+fn objects_that_a_list_names_without_a_section_are_told() {
+    let lists = "[MandatoryObjects]\nSupportedObjects=1\n1=0x1000\n[OptionalObjects]\nSupportedObjects=2\n1=0x2000\n2=0x2001\n";
+    let dcf = Dcf::parse(&format!("{lists}[2000]\n{HEAD}DataType=7")).unwrap();
+    assert_eq!(dcf.undescribed, [0x1000, 0x2001]);
+    let module = Dcf::parse(&format!("[M1SubExt6200]\n{HEAD}DataType=7")).unwrap();
+    assert_eq!((module.undescribed, module.entries.len()), (vec![], 0));
+    assert!(Dcf::parse("[OptionalObjects]\n1=all").is_err());
 }

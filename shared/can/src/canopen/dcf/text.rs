@@ -70,6 +70,14 @@ impl<'a> Section<'a> {
         self.get(key).map(|field| field.number(highest)).transpose()
     }
 
+    /// The numbers of a list, whose keys count from 1.
+    pub(super) fn numbered(&self, highest: u16) -> Result<Vec<u16>, DcfError> {
+        let items = self.keys.values().filter(|field| field.key.bytes().all(|digit| digit.is_ascii_digit()));
+        let mut items = items.map(|field| field.number(highest)).collect::<Result<Vec<_>, _>>()?;
+        items.sort_unstable();
+        Ok(items)
+    }
+
     /// The value of a key that the section needs.
     pub(super) fn require(&self, key: &str) -> Result<Field<'a>, DcfError> {
         self.get(key).ok_or_else(|| self.refused(format!("[{}] has no {key}; add it", self.name)))

@@ -79,6 +79,15 @@ fn a_delayed_frame_is_queued_later() {
 }
 
 #[test]
+fn a_delay_of_nothing_never_acts() {
+    let mut wire = wire_with(Fault { kind: FaultKind::Delay { by_ns: 0 }, ..ANY });
+    wire.port(1).send(1000, sync::frame()).unwrap();
+    wire.advance(FOREVER / 2);
+    assert_eq!(arrivals(&mut wire), [(0x080, 1000 + 48_000)]);
+    assert_eq!(wire.next_note(FOREVER).map(|note| note.activations), None);
+}
+
+#[test]
 fn a_frame_that_finds_no_room_is_not_counted_as_delayed() {
     let mut wire =
         wire_with(Fault { kind: FaultKind::Delay { by_ns: 300_000 }, from_ns: 1000, count: 1, ..ANY });

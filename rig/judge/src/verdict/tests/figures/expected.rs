@@ -156,6 +156,16 @@ fn an_expected_failure_that_is_named_must_fail_and_no_other_may() {
         judged(&["tracking"], untested),
         why("expected that tracking fails and nothing else, but stops is untested")
     );
+    let same_name = |run: &mut Run| {
+        require(run, CheckResult::Failed, false);
+        run.figures.requirements[0].name = "tracking".to_owned();
+    };
+    assert_eq!(
+        judged(&["tracking"], same_name),
+        why(
+            "expected that tracking fails and nothing else, but two checks have the name tracking: rename the requirement"
+        )
+    );
     assert_eq!(
         judged(&["opens"], |_| ()),
         why("expected that opens fails and nothing else, but tracking failed, opens did not")
