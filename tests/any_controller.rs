@@ -135,7 +135,8 @@ fn a_program_that_leaves_is_named_though_the_plant_has_ended_too() {
     kill_process(Pid::from_child(&rig), Signal::CONT).unwrap();
     let output = rig.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(4), "{}", stderr(&output));
-    assert_eq!(workspace.summary()["verdict"]["reason"], "the controller died: no more ideas");
+    let reason = &workspace.summary()["verdict"]["reason"];
+    assert!(reason.as_str().unwrap().starts_with("the controller died: no more ideas, "), "{reason}");
 }
 
 #[test]

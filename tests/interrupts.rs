@@ -75,7 +75,8 @@ fn a_process_that_dies_after_an_interrupt_is_reported_as_dead() {
         kill_process(Pid::from_child(&child), Signal::INT).unwrap();
         kill_process(victim, Signal::KILL).unwrap();
         ended(child, 4);
-        assert_eq!(workspace.summary()["verdict"]["reason"], format!("the {role} died: SIGKILL (9)"));
+        let reason = &workspace.summary()["verdict"]["reason"];
+        assert!(reason.as_str().unwrap().starts_with(&format!("the {role} died: SIGKILL (9), ")), "{reason}");
     }
 }
 

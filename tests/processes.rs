@@ -147,7 +147,8 @@ fn the_rig_ends_in_order_whichever_process_is_killed_in_whichever_state() {
         let context = format!("{role} {moment:?}: {}{}", stdout(&output), stderr(&output));
         assert_eq!(output.status.code(), Some(4), "{context}");
         let summary = workspace.summary();
-        assert_eq!(summary["verdict"]["reason"], format!("the {role} died: SIGKILL (9)"), "{context}");
+        let reason = summary["verdict"]["reason"].as_str().unwrap();
+        assert!(reason.starts_with(&format!("the {role} died: SIGKILL (9), ")), "{context}: {reason}");
         let is_moving = matches!(moment.0, Easing | Running | Holding);
         match role {
             "controller" => {
@@ -313,7 +314,8 @@ fn a_controller_that_hangs_is_killed_by_its_silence_or_once_it_does_not_end_when
         }
         ended(child, 4);
         let reason = &workspace.summary()["verdict"]["reason"];
-        assert_eq!(reason, &format!("the controller died: it {how}, and was killed"));
+        let died = format!("the controller died: it {how}, and was killed, ");
+        assert!(reason.as_str().is_some_and(|reason| reason.starts_with(&died)), "{reason}");
     }
 }
 

@@ -8,6 +8,7 @@ Usage: page.py MASSETER FOLDER [CHROMIUM]
 import csv
 import io
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -498,6 +499,37 @@ def is_dark(sheet: Sheet):
     assert shade[0] < 100 < 500 < shade[1], (background, text)
 
 
+def campaign() -> Path:
+    """The page of a campaign some of whose cases fail."""
+    file = Path("examples/campaign/friction.toml")
+    short = file.read_text().replace("runs = 200", "runs = 24")
+    planned = FOLDER / "friction.toml"
+    planned.write_text(short.replace("chewing.toml", str(file.resolve().parent / "chewing.toml")))
+    command = [MASSETER, "campaign", planned, "--out", FOLDER / "campaign", "--record", "1"]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ended.returncode == 1, ended.stdout + ended.stderr
+    return FOLDER / "campaign" / "campaign.html"
+
+
+def tells_a_campaign(sheet: Sheet):
+    """Three factors against the margin, three pairs, a row a reason, links that lead somewhere; a dot says which case it is."""
+    assert sheet.get("document.querySelectorAll('#section-margins .chart').length") == 3
+    assert sheet.get("document.querySelectorAll('#section-pairs .chart').length") == 3
+    reasons = sheet.get("[...document.querySelectorAll('#reasons tbody tr')].map((row) => row.innerText.split('\\t'))")
+    failed = [row for row in sheet.get("[...Masseter.handles.values()].flatMap(({ chart }) => chart?.series ?? [])"
+                                       ".filter(({ name }) => name === 'did not pass').map(({ xs }) => xs.length)")]
+    assert len(reasons) < sum(int(row[1]) for row in reasons) == max(failed), (reasons, failed)
+    links = sheet.get("[...document.querySelectorAll('td a, th a')].map(({ href }) => href)")
+    assert links and all(Path(link.removeprefix("file://")).exists() for link in links), links
+    drawing = sheet.page.locator("#section-margins .chart svg[role=application]").first
+    drawing.scroll_into_view_if_needed()
+    at = sheet.get("(() => { const { chart } = [...Masseter.handles.values()].find(({ chart }) => chart); const [one] = chart.series;"
+                   " return [chart.plot.x.position(one.xs[0]), chart.plot.y.position(one.ys[0]), one.names[0]]; })()")
+    drawing.hover(position={"x": at[0], "y": at[1]})
+    said = drawing.locator(".box").text_content()
+    assert said.startswith(at[2]) and re.match(r"case \d+, PASS, margin ", said), (said, at)
+
+
 def main():
     stop = FOLDER / "stop.toml"
     FOLDER.mkdir(parents=True, exist_ok=True)
@@ -517,6 +549,7 @@ def main():
     dated = FOLDER / "dated.html"
     dated.write_text(chewing.read_text().replace('"wall_s":null', '"wall_s":1790250400.25'))
     food = run("food", "examples/food.toml")
+    varied = campaign()
     size_mb = long.stat().st_size / 1e6
     assert size_mb <= LARGEST_MB, f"60 s take {size_mb:.2f} MB"
     with sync_playwright() as playwright:
@@ -533,6 +566,8 @@ def main():
             (failed, {}, [shows_what_was_judged]),
             (stopped, {}, [opens_around_the_stop]),
             (dated, {}, [tells_wall_time]),
+            (varied, {}, [tells_a_campaign, fits_the_screen, is_accessible, prints]),
+            (varied, {"viewport": PHONE, "is_mobile": True, "color_scheme": "dark"}, [fits_the_screen, is_accessible]),
             (food, {}, [bites, is_accessible]),
             (stopped, {}, [marks_the_stop, draws_every_chart, prints]),
             (chewing, {"color_scheme": "dark"}, [is_dark, is_accessible, prints]),
@@ -548,7 +583,7 @@ def main():
             (stopped, "process data missing", "set expect.verdict to safe_stop"),
             (died, "SIGKILL", "set expect.verdict to died"),
             (interrupted, "stopped by stimulus 1", "set expect.verdict to interrupted"),
-            (invalid, "allows no lost cycle", "masseter doctor"),
+            (invalid, "allows no lost cycle", "then repeat the run"),
             (long, "every check passed", ""),
         ):
             dark = [{"color_scheme": "dark"}] if path == failed else []

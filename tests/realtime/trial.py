@@ -209,7 +209,7 @@ class Trial:
             require(not passed, f"{what}: a run passed whose process was killed")
         if how == "KILL" and not is_killed:
             require(code == DIED or moment == "end" and passed, f"{what}: the death is not the run's end")
-            require(reason in ("", f"the {role} died: SIGKILL (9)"), f"{what}: {reason}")
+            require(not reason or reason.startswith(f"the {role} died: SIGKILL (9), "), f"{what}: {reason}")
         if clock == "lockstep" and how == "STOP" and self.case.moment == MOTION:
             require(code == DIED and reason.startswith(f"the {role} died: "), f"{what}: the silent {role} was not given up: {reason}")
         if how in ("PAUSE", "NONE") or (how == "STOP" and role == "supervisor"):

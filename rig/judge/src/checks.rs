@@ -293,7 +293,10 @@ fn bus_response(response: &BusResponse, plant: &SkipFigures) -> Check {
     if let Some(why) = &response.unbounded {
         return Check::not_judged(NAME, why.clone());
     }
-    let us = |ns: Option<u64>| format!("{:.2} µs", ns.unwrap_or(0) as f64 / 1e3);
+    let us = |ns: Option<u64>| {
+        let tenths = format!("{:.1}", ns.unwrap_or(0) as f64 / 1e3);
+        format!("{} µs", tenths.trim_end_matches(".0"))
+    };
     let in_words = |message: &ResponseFigures| {
         let [max, bound] = [message.max_ns, message.bound_ns].map(us);
         format!("{} on bus {} took {max}, bound {bound}", message.message, message.bus)

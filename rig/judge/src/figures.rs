@@ -4,7 +4,7 @@
 
 use masseter_model::geometry::AXES;
 use masseter_recording::Damage;
-use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::messages::codes::{ControllerState, EventKind};
 use serde::Serialize;
 
 use crate::breach::PathBreach;
@@ -127,5 +127,13 @@ impl Figures {
     /// Messages that were published and not recorded.
     pub fn missing_messages(&self) -> u64 {
         self.topics.iter().map(|topic| topic.missing).sum()
+    }
+
+    /// The fault of the scenario that struck first, if that was before anybody reported a fault.
+    pub(crate) fn declared_cause(&self) -> Option<&FaultFigures> {
+        let first = self.events.iter().find(|event| event.kind == EventKind::Fault);
+        let struck = self.faults.iter().filter(|fault| fault.struck_ns.is_some());
+        let cause = struck.min_by_key(|fault| fault.struck_ns)?;
+        first.is_none_or(|first| cause.struck_ns <= Some(first.time_ns)).then_some(cause)
     }
 }

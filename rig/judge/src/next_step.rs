@@ -94,8 +94,10 @@ next_steps! {
     ProcessDied => "Run `masseter doctor` to see what the machine lacks, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
     /// INVALID by lost cycles.
     LostCycles => "Run `masseter doctor` and remove what it lists, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
+    /// INVALID by lost cycles, where the doctor knows the best remedy.
+    Mend => "Run `MEND`, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
     /// INVALID without real time.
-    NoRealTime => "Run `masseter doctor`, which names the missing permission and the command that gives it, or run without `--require-rt`.",
+    NoRealTime => "Run `masseter doctor`, which names the missing permission and the command that gives it, then repeat the run.",
     /// INVALID by a clock that was set.
     ClockSet => "Let nothing set the clock, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
     /// INCOMPLETE.
@@ -156,6 +158,8 @@ impl NextStep {
             {
                 Self::ClockSet
             }
+            (Outcome::Invalid, _) if manifest.refusal().is_some() => Self::NoRealTime,
+            (Outcome::Invalid, _) if manifest.mending_command.is_some() => Self::Mend,
             (Outcome::Invalid, _) => Self::LostCycles,
         })
     }
@@ -201,12 +205,11 @@ impl NextStep {
             StrokeLimit, TrackingLost, UnknownNode, VelocityLimit, WrongIdentity, WrongLength, WrongObject,
             WrongPdo, WrongUnit,
         };
-        let is_fault = |event: &&EventRecord| event.kind == EventKind::Fault;
-        let first = figures.events.iter().find(is_fault);
-        let is_before = |time_ns: u64| first.is_none_or(|first| time_ns <= first.time_ns);
-        if figures.faults.iter().filter_map(|fault| fault.struck_ns).any(is_before) {
+        if figures.declared_cause().is_some() {
             return Self::DeclaredFault;
         }
+        let is_fault = |event: &&EventRecord| event.kind == EventKind::Fault;
+        let first = figures.events.iter().find(is_fault);
         let Some(Code::Known(cause)) = first.map(|event| event.cause) else { return Self::Stop };
         match cause {
             DriveFault | Emergency | EnableTimeout | FaultAtStart | FaultFound | NotReady | NotEnabled

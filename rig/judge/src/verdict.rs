@@ -2,7 +2,7 @@
 //!
 //! [`Timing`] is judged apart. Lost cycles matter here only where they leave nothing to judge the function by.
 
-use masseter_recording::{DmaLatency, Ending, Manifest, RunUsage};
+use masseter_recording::{Ending, Manifest, RunUsage};
 use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind, Source};
 use masseter_scenario::ExpectedVerdict::{Died, Fail, Incomplete, Interrupted, Pass, SafeStop, Untested};
 use masseter_scenario::wording::{counted, grouped};
@@ -73,22 +73,31 @@ impl Verdict {
             || checks
                 .iter()
                 .any(|check| check.subject == Subject::Faults && check.result == CheckResult::Failed);
-        let (mut outcome, mut reason) = ending(&manifest.ending, figures.stopped_by, &figures.events)
-            .or_else(|| stopped_by_stimulus(&manifest.scenario, &figures.events))
-            // The machine caused the stop, or it came only after the jaw had left its path.
-            .filter(|(ending, _)| *ending != Outcome::Named(SafeStop) || (excuse.is_none() && !is_too_late))
-            .or_else(|| incomplete(figures))
-            .or_else(|| {
-                let unjudged = excuse.or_else(|| unjudged(&manifest.scenario.checks, &timing, &checks))?;
-                Some((Outcome::Invalid, format!("{unjudged}; {}", account(manifest, figures, &timing))))
-            })
-            .or_else(|| {
-                failed(&checks)
-                    .map(|failure| with_shortfall(failure, manifest, figures))
-                    .map(|failure| clock_jump(&manifest.usage, &manifest.scenario.can).unwrap_or(failure))
-            })
-            .or_else(|| untested(&checks, figures.cycles))
-            .unwrap_or_else(|| (Outcome::Named(Pass), passed(manifest, &figures.motion)));
+        let declared = declared_cause(&manifest.scenario, figures);
+        let (mut outcome, mut reason) =
+            ending(&manifest.ending, figures.stopped_by, declared, &figures.events)
+                .map(|(ending, reason)| match ending {
+                    Outcome::Named(Died) => (ending, format!("{reason}, {}", when_died(figures))),
+                    _ => (ending, reason),
+                })
+                .or_else(|| stopped_by_stimulus(&manifest.scenario, &figures.events))
+                // The machine caused the stop, or it came only after the jaw had left its path.
+                .filter(|(ending, _)| {
+                    *ending != Outcome::Named(SafeStop) || (excuse.is_none() && !is_too_late)
+                })
+                .or_else(|| incomplete(figures))
+                .or_else(|| {
+                    let unjudged =
+                        excuse.or_else(|| unjudged(&manifest.scenario.checks, &timing, &checks))?;
+                    Some((Outcome::Invalid, format!("{unjudged}; {}", account(manifest, figures, &timing))))
+                })
+                .or_else(|| {
+                    failed(&checks)
+                        .map(|failure| with_shortfall(failure, manifest, figures))
+                        .map(|failure| clock_jump(&manifest.usage, &manifest.scenario.can).unwrap_or(failure))
+                })
+                .or_else(|| untested(&checks, figures.cycles))
+                .unwrap_or_else(|| (Outcome::Named(Pass), passed(manifest, &figures.motion)));
         if let Some(expect) = expect {
             (outcome, reason) = against(expect, (outcome, reason), [&checks, &beside], figures);
         }
@@ -103,7 +112,7 @@ impl Verdict {
         Self {
             word: outcome.word(),
             first_breach,
-            next_step: next_step.map(|step| step.sentence().replace("CLOCK", &again(manifest))),
+            next_step: next_step.map(|step| in_words(step, manifest)),
             reason,
             exit_code: outcome.exit(),
             timing,
@@ -128,13 +137,10 @@ impl Verdict {
     }
 
     /// What to do about the machine; `None` if the machine disturbed nothing.
-    pub fn advice(&self, manifest: &Manifest) -> Option<String> {
-        // The reason of an INVALID run contains the advice. A run that passed needs no command as root.
-        match (self.timing.word, self.exit_code) {
-            (TimingWord::Disturbed, Exit::Passed) => Some(DOCTOR.to_owned()),
-            (_, Exit::Invalid) => None,
-            (word, _) => (word == TimingWord::Disturbed).then(|| remedy(manifest)),
-        }
+    pub fn advice(&self) -> Option<&'static str> {
+        // The next step of an INVALID run is the advice.
+        let is_advised = self.timing.word == TimingWord::Disturbed && self.exit_code != Exit::Invalid;
+        is_advised.then_some(DOCTOR)
     }
 
     /// Whether a fault or stimulus of the scenario did not act, so that the run tested nothing of what it is about.
@@ -170,10 +176,17 @@ fn overload(usage: &RunUsage, rate_hz: u32) -> Option<String> {
 type OutcomeReason = (Outcome, String);
 
 /// What master and drives show comes before what the controller reports.
-fn ending(ending: &Ending, stopped_by: Option<StoppedBy>, events: &[EventRecord]) -> Option<OutcomeReason> {
+fn ending(
+    ending: &Ending,
+    stopped_by: Option<StoppedBy>,
+    declared: Option<String>,
+    events: &[EventRecord],
+) -> Option<OutcomeReason> {
     match ending {
-        Ending::Completed => stopped_by.map(|by| (Outcome::Named(SafeStop), stopped(Some(by), events))),
-        Ending::SafeStop => Some((Outcome::Named(SafeStop), stopped(None, events))),
+        Ending::Completed => {
+            stopped_by.map(|by| (Outcome::Named(SafeStop), stopped(Some(by), declared, events)))
+        }
+        Ending::SafeStop => Some((Outcome::Named(SafeStop), stopped(None, declared, events))),
         Ending::Died { process, how } => Some((Outcome::Named(Died), format!("the {process} died: {how}"))),
         Ending::Interrupted => Some((Outcome::Named(Interrupted), "stopped by the user".to_owned())),
         Ending::NotStarted => Some((Outcome::Invalid, "real time was required and refused".to_owned())),
@@ -194,21 +207,52 @@ fn stopped_by_stimulus(scenario: &Scenario, events: &[EventRecord]) -> Option<Ou
 
 /// The first fault explains the stop: the controller's own event often names only the master. A controller that reports
 /// another end explains nothing. `by`: what master or drives show of it, whatever the controller reports.
-fn stopped(by: Option<StoppedBy>, events: &[EventRecord]) -> String {
+///
+/// A declared fault stands before what followed from it.
+fn stopped(by: Option<StoppedBy>, declared: Option<String>, events: &[EventRecord]) -> String {
     let is_heard = |event: &&EventRecord| {
         event.kind == EventKind::Fault && (by.is_none() || event.source != Source::Controller)
     };
     let first = events.iter().find(is_heard);
-    let began = events.iter().find(|event| event.enters(ControllerState::Running));
-    let at = |fault: &EventRecord| {
-        let since_ns = fault.time_ns.checked_sub(began?.time_ns)?;
-        Some(format!(", {:.3} s after the motion began", since_ns as f64 / 1e9))
-    };
-    let why = first.map_or_else(String::new, |fault| {
-        format!("; first fault: {}{}", fault.in_words(), at(fault).unwrap_or_default())
-    });
+    let since_s = |fault: &EventRecord| since_motion_s(events, fault.time_ns);
     let who = by.map_or_else(|| "the controller stopped the rig".to_owned(), |by| by.to_string());
-    format!("{who}{why}")
+    match (declared, first) {
+        (Some(declared), Some(found)) => {
+            let at = since_s(found).map_or_else(String::new, |at_s| format!(" at {at_s:.3} s"));
+            format!("{declared} → detected{at}: {} → {who}", found.in_words())
+        }
+        (Some(declared), None) => format!("{declared} → {who}"),
+        (None, Some(found)) => {
+            let at = since_s(found).map(|at_s| format!(", {at_s:.3} s after the motion began"));
+            format!("{who}; first fault: {}{}", found.in_words(), at.unwrap_or_default())
+        }
+        (None, None) => who,
+    }
+}
+
+/// Time since the motion began; none before.
+fn since_motion_s(events: &[EventRecord], time_ns: u64) -> Option<f64> {
+    let began = events.iter().find(|event| event.enters(ControllerState::Running))?;
+    Some(time_ns.checked_sub(began.time_ns)? as f64 / 1e9)
+}
+
+/// The fault of the scenario that came before every reported one.
+fn declared_cause(scenario: &Scenario, figures: &Figures) -> Option<String> {
+    let cause = figures.declared_cause()?;
+    let declared = scenario.faults.get(cause.number.checked_sub(1)?)?;
+    let at = since_motion_s(&figures.events, cause.struck_ns?);
+    Some(format!("fault {declared}{}", at.map_or_else(String::new, |at_s| format!(" at {at_s:.3} s"))))
+}
+
+/// When a process died, by the last cycle of the motion.
+fn when_died(figures: &Figures) -> String {
+    match figures.path_breach.motion_ns {
+        None => "before the motion".to_owned(),
+        Some(_) if figures.ended_ns.is_some() => "after the motion".to_owned(),
+        Some([began_ns, died_ns]) => {
+            format!("{:.3} s after the motion began", died_ns.saturating_sub(began_ns) as f64 / 1e9)
+        }
+    }
 }
 
 fn incomplete(figures: &Figures) -> Option<OutcomeReason> {
@@ -243,14 +287,14 @@ fn unjudged(limits: &ChecksConfig, timing: &Timing, checks: &[Check]) -> Option<
     if has(CheckResult::Failed) { None } else { excused() }
 }
 
-/// How many cycles were lost, and what helps.
+/// How many cycles were lost.
 fn account(manifest: &Manifest, figures: &Figures, timing: &Timing) -> String {
     let lost = counted(timing.lost, "cycle");
     match manifest.refusal() {
         Some((process, refusal)) => {
             format!("{lost} lost without real time{}; {process}: {refusal}", timing.undecided())
         }
-        None => format!("{lost} lost{}{}; {}", stalls(figures), timing.undecided(), remedy(manifest)),
+        None => format!("{lost} lost{}{}", stalls(figures), timing.undecided()),
     }
 }
 
@@ -270,7 +314,7 @@ fn clock_jump(usage: &RunUsage, can: &CanConfig) -> Option<OutcomeReason> {
     let jump_s = usage.clock_jump_s;
     (jump_s != 0.0 && !can.is_virtual()).then(|| {
         let reason = format!(
-            "the wall clock jumped by {jump_s:.3} s, as it does when it is set or the machine was suspended; repeat the run"
+            "the wall clock jumped by {jump_s:.3} s, as it does when it is set or the machine was suspended"
         );
         (Outcome::Invalid, reason)
     })
@@ -278,19 +322,6 @@ fn clock_jump(usage: &RunUsage, can: &CanConfig) -> Option<OutcomeReason> {
 
 /// Where to begin with stalls of the machine.
 const DOCTOR: &str = "masseter doctor lists what disturbs this machine";
-
-/// The remedy against stalls of the machine.
-fn remedy(manifest: &Manifest) -> String {
-    let latency = match &manifest.cpu_dma_latency {
-        Some(DmaLatency { limit_us: None, .. }) => "; realtime.cpu_dma_latency = \"hold\" may help too",
-        _ => "",
-    };
-    let is_virtual = manifest.scenario.can.is_virtual();
-    let lockstep = if is_virtual { ", --clock lockstep keeps it out of the result" } else { "" };
-    let first = manifest.mending_command.as_ref();
-    let first = first.map_or_else(String::new, |command| format!("; first try: {command}"));
-    format!("{DOCTOR}{lockstep}{latency}{first}")
-}
 
 /// The excuse for a safe stop, in words: the machine lost all missed cycles, and many of them just before the stop.
 fn excuse(ending: &Ending, timing: &Timing, outage: Option<Outage>) -> Option<String> {
@@ -418,6 +449,12 @@ fn wanted(expect: &ExpectConfig) -> String {
 /// Whether it is a check of what the scenario lets happen.
 fn is_of_scenario(check: &Check) -> bool {
     matches!(check.subject, Subject::Faults | Subject::Stimuli)
+}
+
+/// The sentence of a step, with the arguments and the command of this run's machine.
+fn in_words(step: NextStep, manifest: &Manifest) -> String {
+    let mending = manifest.mending_command.as_deref().unwrap_or_default();
+    step.sentence().replace("CLOCK", &again(manifest)).replace("MEND", mending)
 }
 
 /// The arguments of `run` that play a scenario as this run did.

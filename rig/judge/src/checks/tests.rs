@@ -39,7 +39,7 @@ mod checks {
             assert_eq!(check.result.mark(), mark, "{check:?}");
         }
         let failed = bus_response(&response(191_000, None), &SkipFigures::default());
-        assert_eq!(failed.finding, "SYNC on bus 1 took 191.00 µs, bound 190.00 µs");
+        assert_eq!(failed.finding, "SYNC on bus 1 took 191 µs, bound 190 µs");
         let off_time = BusResponse { off_time_frames: 7, ..response(150_000, None) };
         let check = bus_response(&off_time, &SkipFigures::default());
         assert_eq!(check.result.mark(), "ok");

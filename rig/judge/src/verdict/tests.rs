@@ -15,21 +15,21 @@ fn a_safe_stop_is_explained_by_what_went_wrong_first() {
         event(Source::Controller, EventKind::Fault, Cause::MasterFault),
     ];
     let (outcome, reason) =
-        ending(&Ending::SafeStop, None, &events.map(|event| EventRecord::from(&event))).unwrap();
+        ending(&Ending::SafeStop, None, None, &events.map(|event| EventRecord::from(&event))).unwrap();
     assert_eq!(outcome, Outcome::Named(SafeStop));
     assert_eq!(
         reason,
         "the controller stopped the rig; first fault: master: process_data_lost \
          (axis d1 (node 1 on bus 0): process data missing for 4 cycles)"
     );
-    assert_eq!(ending(&Ending::SafeStop, None, &[]).unwrap().1, "the controller stopped the rig");
+    assert_eq!(ending(&Ending::SafeStop, None, None, &[]).unwrap().1, "the controller stopped the rig");
 }
 
 #[test]
 fn what_master_and_drives_show_comes_before_what_the_controller_reports() {
     let fault = |source, cause| EventRecord::from(&Event::new(source, EventKind::Fault, cause));
     let events = [fault(Source::Controller, Cause::LawFailed), fault(Source::Master, Cause::BadMessage)];
-    let shown = |stopped_by| ending(&Ending::Completed, stopped_by, &events);
+    let shown = |stopped_by| ending(&Ending::Completed, stopped_by, None, &events);
     assert_eq!(shown(None), None);
     let stopped = |reason: &str| Some((Outcome::Named(SafeStop), reason.to_owned()));
     assert_eq!(
@@ -37,12 +37,36 @@ fn what_master_and_drives_show_comes_before_what_the_controller_reports() {
         stopped("the master stopped the drives; first fault: master: bad_message (value 0, limit 0)")
     );
     assert_eq!(
-        ending(&Ending::Completed, Some(StoppedBy::QuickStop), &events[..1]),
+        ending(&Ending::Completed, Some(StoppedBy::QuickStop), None, &events[..1]),
         stopped("the drives made a quick stop")
     );
     // The end of a process comes before both.
     let died = Ending::died("plant", "signal 9".to_owned());
-    assert_eq!(ending(&died, Some(StoppedBy::Master), &events).unwrap().0, Outcome::Named(Died));
+    assert_eq!(ending(&died, Some(StoppedBy::Master), None, &events).unwrap().0, Outcome::Named(Died));
+}
+
+#[test]
+fn a_fault_of_the_scenario_stands_before_what_followed_from_it() {
+    let declared = || Some("fault encoder_stuck (l1) at 1.800 s".to_owned());
+    let event = |time_ns, source, kind, cause| EventRecord {
+        time_ns,
+        ..EventRecord::from(&Event::new(source, kind, cause))
+    };
+    let began = EventRecord {
+        transition: Some(["approaching".to_owned(), ControllerState::Running.name().to_owned()]),
+        ..event(500_000_000, Source::Controller, EventKind::Transition, Cause::Sequence)
+    };
+    let found = event(2_302_000_000, Source::Master, EventKind::Fault, Cause::BadMessage);
+    let events = [began, found];
+    assert_eq!(
+        stopped(None, declared(), &events),
+        "fault encoder_stuck (l1) at 1.800 s → detected at 1.802 s: master: bad_message (value 0, limit 0) \
+         → the controller stopped the rig"
+    );
+    assert_eq!(
+        stopped(Some(StoppedBy::QuickStop), declared(), &[]),
+        "fault encoder_stuck (l1) at 1.800 s → the drives made a quick stop"
+    );
 }
 
 #[test]

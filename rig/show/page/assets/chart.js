@@ -16,6 +16,9 @@
   const all = new Set();
   let clips = 0;
 
+  // A value along an axis in words.
+  const placeText = (scale, value) => (scale.names ? scale.names[Math.round(value)] ?? '' : Masseter.significant(value));
+
   // A view of another quantity than time: it has a cursor of its own and no zoom.
   function ownView(across, changed) {
     return {
@@ -24,7 +27,7 @@
       isPlaying: false,
       seek(at) { this.cursor = at === null ? null : Math.min(this.window[1], Math.max(this.window[0], at)); changed(); },
       zoom() {}, zoomAbout() {}, pan() {}, reset() {}, play() {},
-      text: (at) => (across === 'percentile' ? `${Masseter.significant(100 - 100 / at, 6)} %` : `${Masseter.significant(at)} µs`),
+      text: (at) => (across.quantity ? placeText(across.quantity.scale, at) : across === 'percentile' ? `${Masseter.significant(100 - 100 / at, 6)} %` : `${Masseter.significant(at)} µs`),
     };
   }
 
@@ -34,7 +37,7 @@
     const own = series.colour === undefined && OWN_COLOUR[series.style];
     const stroke = own ? `var(--${own})` : `var(--c${number % PALETTE})`;
     const isSecond = !own && number >= PALETTE;
-    return { name: series.name, style: series.style, xs, ys, step: Infinity, stroke, isSecond, isShown: !series.is_hidden, place };
+    return { name: series.name, style: series.style, xs, ys, step: Infinity, stroke, isSecond, isShown: !series.is_hidden, place, names: series.names || [] };
   }
 
   function preparedAll(data) {
@@ -102,10 +105,11 @@
   }
 
   Masseter.chart = (holder, data, clock) => {
-    const isTime = data.across === 'time', isLog = data.scale === 'log';
+    const isTime = data.across === 'time', isLog = data.scale === 'log', names = data.scale.names;
+    const other = data.across.quantity, isDots = data.series.some(({ style }) => style === 'dots');
     const view = isTime ? clock : ownView(data.across, () => moveCursor());
     const clip = `clip-${clips += 1}`;
-    let series = preparedAll(data), plot = null, isDirty = true, isVisible = true, isWaiting = false, isUnderPointer = false, isBanded = false;
+    let series = preparedAll(data), plot = null, isDirty = true, isVisible = true, isWaiting = false, isUnderPointer = false, isBanded = false, pointerY = null;
 
     const label = data.unit ? `${data.title}, ${data.unit}` : data.title;
     const drawing = svg('svg', { tabindex: 0, role: 'application', 'aria-roledescription': 'chart' });
@@ -117,10 +121,11 @@
       get isShowing() { return series.some(({ xs }) => xs.length); },
       // The values under the cursor in a sentence.
       spoken() {
+        if (isDots) return dotLines(nearestDot()).join(', ');
         const values = series.filter(({ isShown }) => isShown).map((one) => [one.name, Masseter.valueAt(one, view.cursor)]);
         return [view.text(view.cursor), ...values.filter(([, value]) => value !== null).map(([name, value]) => `${name} ${valueText(value)}`)].join(', ');
       },
-      setPointer(is) { isUnderPointer = is; moveCursor(); },
+      setPointer(is, y = null) { isUnderPointer = is; pointerY = y; moveCursor(); },
       redraw,
       draw,
     };
@@ -157,12 +162,13 @@
         drawing.append(svg('text', { x: ROOM.left, y: 28, class: 'empty' }, chart.isShowing ? 'Nothing in this stretch.' : data.otherwise));
         return;
       }
-      const room = width < NARROW.width ? { ...ROOM, ...NARROW } : ROOM;
+      const room = { ...ROOM, ...(width < NARROW.width ? NARROW : {}) };
+      if (names) room.left = Math.min(0.4 * width, Math.max(room.left, 12 + Math.max(...names.map((name) => Masseter.textWidth(name, 11.5)))));
       // A share is drawn from nothing on.
       if (data.unit === '%') found[0] = Math.min(found[0], 0);
-      const { ends, near, beyond } = fitted(found, data.limits || [], isLog);
+      const { ends, near, beyond } = names ? { ends: [-0.5, names.length - 0.5], near: [], beyond: [] } : fitted(found, data.limits || [], isLog);
       const right = Math.max(room.left + 1, width - room.right);
-      const x = Masseter.axis(!isTime, window, [room.left, right]);
+      const x = Masseter.axis(other ? other.scale === 'log' : !isTime, window, [room.left, right]);
       const moments = isTime ? placed([...Masseter.moments, ...(data.moments || [])], window, x, right) : [];
       const top = room.top + ROW * Math.max(0, ...moments.map(({ row }) => row + 1));
       const bottom = top + data.height;
@@ -179,8 +185,13 @@
     }
 
     function ownWindow() {
+      if (other?.scale.names) return [-0.5, other.scale.names.length - 0.5];
       const xs = series.flatMap((one) => [one.xs[0], one.xs[one.xs.length - 1]]).filter((x) => x !== undefined);
-      return xs.length ? [Math.min(...xs), Math.max(...xs)] : [0, 1];
+      const [low, high] = xs.length ? [Math.min(...xs), Math.max(...xs)] : [0, 1];
+      if (!other) return [low, high];
+      // Dots at the ends are whole.
+      const room = other.scale === 'log' ? (high / low) ** 0.03 : 0.03 * (high - low || Math.abs(high) || 1);
+      return other.scale === 'log' ? [low / room, high * room] : [low - room, high + room];
     }
 
     function size(width, height) {
@@ -193,18 +204,27 @@
       const { x, y, left, right, top, bottom, window } = plot;
       const many = Math.max(3, Math.floor((right - left) / (isTime ? clock.tickRoom : 64))), few = Math.max(4, Math.floor(data.height / 27));
       const apart = (ticks) => ticks.reduce((kept, tick) => (kept.length && x.position(tick.value) - x.position(kept[kept.length - 1].value) < 52 ? kept : [...kept, tick]), []);
-      const across = isTime ? clock.ticks(window, many) : data.across === 'percentile' ? apart(Masseter.percentileTicks(window)) : Masseter.logTicks(window, many);
-      const up = isLog ? Masseter.logTicks(y.ends, few) : Masseter.linearTicks(y.ends, few);
+      const across = isTime ? clock.ticks(window, many) : other ? otherTicks(window, many)
+        : data.across === 'percentile' ? apart(Masseter.percentileTicks(window)) : Masseter.logTicks(window, many);
+      const up = names ? nameTicks(names) : isLog ? Masseter.logTicks(y.ends, few) : Masseter.linearTicks(y.ends, few);
       const vertical = across.map(({ value, text }) => [
         svg('line', { x1: x.position(value), x2: x.position(value), y1: top, y2: bottom, class: 'mesh' }),
         svg('text', { x: x.position(value), y: bottom + 16, class: 'tick', 'text-anchor': 'middle' }, text)]);
       const horizontal = up.map(({ value, text }) => [
         svg('line', { x1: left, x2: right, y1: y.position(value), y2: y.position(value), class: 'mesh' }),
         svg('text', { x: left - 6, y: y.position(value) + 4, class: 'tick', 'text-anchor': 'end' }, text)]);
-      const name = isTime ? clock.label : data.across === 'percentile' ? 'percentile' : 'µs';
+      const name = isTime ? clock.label : other ? other.label : data.across === 'percentile' ? 'percentile' : 'µs';
       return [...vertical.flat(), ...horizontal.flat(), svg('rect', { x: left, y: top, width: right - left, height: bottom - top, class: 'frame' }),
         svg('text', { x: right, y: bottom + 32, class: 'tick', 'text-anchor': 'end' }, name)];
     }
+
+    const nameTicks = (all) => all.map((text, value) => ({ value, text }));
+    // Names that would cover the one before are left out: dots have them under the pointer.
+    const clear = (ticks) => ticks.reduce((kept, tick) => {
+      const last = kept[kept.length - 1], half = ({ text }) => Masseter.textWidth(text, 11.5) / 2 + 4;
+      return last && plot.x.position(tick.value) - half(tick) < plot.x.position(last.value) + half(last) ? kept : [...kept, tick];
+    }, []);
+    const otherTicks = (window, many) => (other.scale.names ? clear(nameTicks(other.scale.names)) : (other.scale === 'log' ? Masseter.logTicks : Masseter.linearTicks)(window, many));
 
     // Whether the curve goes up and down over the whole height more often than the pixels show.
     function isDense({ ys }, places) {
@@ -221,6 +241,7 @@
     function curve(one) {
       if (data.across === 'duration') return svg('path', { ...strokeOf(one), d: stairs(one) });
       const { x, y, window } = plot;
+      if (one.style === 'dots') return svg('path', { ...strokeOf(one), d: one.xs.map((at, place) => `M${x.position(at).toFixed(1)} ${y.position(one.ys[place]).toFixed(1)}h0`).join('') });
       const places = Masseter.thinned(one, window, x.position, plot.right - plot.left).filter((at) => !isLog || one.ys[at] > 0);
       if (isTime && BANDED.includes(one.style) && isDense(one, places)) return band(one, places);
       const joins = (at, before) => before !== undefined && one.xs[at] - one.xs[at - 1] <= one.step;
@@ -272,12 +293,38 @@
         svg('text', { x: x + (isLeft ? -5 : 5), y: from + 11, 'text-anchor': isLeft ? 'end' : 'start' }, name)));
     }
 
+    // The dot that lies nearest to pointer or cursor, px.
+    function nearestDot() {
+      const from = plot.x.position(view.cursor);
+      let found = null, least = Infinity;
+      series.filter(({ isShown }) => isShown).forEach((one) => one.xs.forEach((at, place) => {
+        const x = plot.x.position(at), y = plot.y.position(one.ys[place]);
+        const way = Math.hypot(x - from, pointerY === null ? 0 : y - pointerY);
+        if (way < least) { least = way; found = { one, place, x, y }; }
+      }));
+      return found;
+    }
+
+    const dotLines = (dot) => (dot ? [dot.one.names[dot.place] || dot.one.name, `${other.label}  ${placeText(other.scale, dot.one.xs[dot.place])}`,
+      `${data.title}  ${names ? placeText(data.scale, dot.one.ys[dot.place]) : valueText(dot.one.ys[dot.place])}`] : []);
+
+    function markDot(group) {
+      const dot = nearestDot();
+      if (!dot) return;
+      group.append(svg('circle', { cx: dot.x, cy: dot.y, r: 6, class: 'ring', style: `stroke:${dot.one.stroke}` }));
+      if (isUnderPointer) group.append(box(dot.x, dotLines(dot)));
+    }
+
     // The line of the cursor, a dot on each curve, the values in the legend and, under the pointer, in a box.
     function moveCursor() {
       const group = drawing.querySelector('.cursor');
       const at = view.cursor;
       const isInside = plot && group && at !== null && at >= plot.window[0] && at <= plot.window[1];
       if (group) group.replaceChildren();
+      if (isDots) {
+        if (isInside) markDot(group);
+        return;
+      }
       const shown = series.filter(({ isShown }) => isShown);
       const values = shown.map((one) => (isInside ? Masseter.valueAt(one, at) : null));
       writeLegendValues(shown, values);
@@ -288,15 +335,14 @@
         if (value === null || (isLog && value <= 0)) return;
         group.append(svg('circle', { cx: x, cy: plot.y.position(value), r: 3, style: `fill:${shown[place].stroke}` }));
       });
-      if (isUnderPointer) group.append(box(x, shown, values));
+      const line = (one, place) => (values[place] === null ? null : `${one.name}  ${valueText(values[place])}`);
+      if (isUnderPointer) group.append(box(x, [view.text(at), ...shown.map(line).filter((text) => text !== null)]));
     }
 
     const decimals = () => (plot ? Math.max(0, 3 - Math.floor(Math.log10(plot.y.ends[1] - plot.y.ends[0]))) : 3);
     const valueText = (value) => `${isLog ? Masseter.significant(value) : Masseter.fixed(value, Math.min(6, decimals()))} ${data.unit}`.trim();
 
-    function box(x, shown, values) {
-      const lines = [view.text(view.cursor), ...shown.map((one, place) => (values[place] === null ? null : `${one.name}  ${valueText(values[place])}`))]
-        .filter((line) => line !== null);
+    function box(x, lines) {
       const width = Math.max(...lines.map((line) => Masseter.textWidth(line))) + 16, height = lines.length * 15 + 8;
       const left = x + 10 + width > plot.right ? x - 10 - width : x + 10;
       const top = plot.top + 4;
@@ -315,7 +361,7 @@
       legend.replaceChildren(...series.map((one) => element('button', {
         type: 'button', 'data-place': one.place, 'aria-pressed': String(one.isShown), title: `Show or hide ${one.name}`,
         onclick: () => { one.isShown = !one.isShown; writeLegend(); redraw(); },
-      }, svg('svg', { width: 22, height: 12, 'aria-hidden': 'true' }, svg('path', { ...strokeOf(one), d: 'M2 6H20' })),
+      }, svg('svg', { width: 22, height: 12, 'aria-hidden': 'true' }, svg('path', { ...strokeOf(one), d: one.style === 'dots' ? 'M11 6h0' : 'M2 6H20' })),
       element('span', {}, one.name), element('span', { class: 'value' }))));
       drawing.setAttribute('aria-label', summary());
       moveCursor();

@@ -51,16 +51,18 @@
   // The points in the window, a row for each x, a column for each curve that is shown.
   Masseter.csvText = ({ series, isTime, view, data, plot }) => {
     const shown = series.filter(({ isShown }) => isShown);
-    const window = plot ? plot.window : [-Infinity, Infinity], rows = new Map();
+    const window = plot ? plot.window : [-Infinity, Infinity], rows = [], byX = new Map();
     shown.forEach((one, column) => one.xs.forEach((x, at) => {
       if (x < window[0] || x > window[1]) return;
-      if (!rows.has(x)) rows.set(x, Array(shown.length).fill(''));
-      rows.get(x)[column] = Number(one.ys[at].toPrecision(9));
+      // Each dot has a row of its own.
+      let cells = one.style === 'dots' ? null : byX.get(x);
+      if (!cells) { byX.set(x, cells = Array(shown.length).fill('')); rows.push([x, cells]); }
+      cells[column] = Number(one.ys[at].toPrecision(9));
     }));
     const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replace(/"/g, '""')}"` : text);
     const names = shown.map(({ name }) => quoted(data.unit ? `${name} (${data.unit})` : name));
-    const first = isTime ? view.label : '1/(1 - quantile)';
-    const lines = [...rows].sort(([a], [b]) => a - b).map(([x, cells]) => [Number((isTime ? view.shown(x) : x).toFixed(9)), ...cells].join(','));
+    const first = isTime ? view.label : data.across.quantity?.label ?? '1/(1 - quantile)';
+    const lines = rows.sort(([a], [b]) => a - b).map(([x, cells]) => [Number((isTime ? view.shown(x) : x).toFixed(9)), ...cells].join(','));
     return `${[quoted(first), ...names].join(',')}\n${lines.join('\n')}\n`;
   };
 

@@ -54,7 +54,8 @@
       }
       if (from !== null) chosen(x);
       if (view.isPlaying) return;
-      chart.setPointer(true);
+      const box = drawing.getBoundingClientRect();
+      chart.setPointer(true, (event.clientY - box.top) * drawing.viewBox.baseVal.height / box.height);
       view.seek(valueAt(x));
     });
     const end = (event) => {
@@ -110,6 +111,7 @@
       if (!action || event.altKey || event.metaKey || event.ctrlKey) return;
       event.preventDefault();
       view.play(false);
+      chart.setPointer(false);
       action();
       Masseter.say(chart.spoken());
     });

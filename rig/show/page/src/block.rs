@@ -163,6 +163,13 @@ pub enum Cell {
         /// Its colour.
         tone: Tone,
     },
+    /// A link to a file beside the page.
+    Link {
+        /// Its text.
+        text: String,
+        /// The path of the file, seen from the page.
+        href: String,
+    },
     /// A time, and a button that shows what was around it.
     Time {
         /// When, s since the first SYNC.

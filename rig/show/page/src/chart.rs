@@ -5,7 +5,7 @@ use data_encoding::BASE64;
 use serde::{Serialize, Serializer};
 
 /// What is drawn from left to right.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Across {
     /// Seconds since the first SYNC. Charts over time share cursor and zoom.
@@ -14,16 +14,25 @@ pub enum Across {
     Percentile,
     /// Ends of buckets of durations, µs, by their logarithm: curves are stairs.
     Duration,
+    /// Another quantity.
+    Quantity {
+        /// What it is, with its unit.
+        label: String,
+        /// How it is spaced.
+        scale: Scale,
+    },
 }
 
-/// How values are spaced from bottom to top.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+/// How values are spaced along an axis.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Scale {
     /// Evenly.
     Linear,
     /// By their logarithm.
     Log,
+    /// Names: the first at 0, the next at 1.
+    Names(Vec<String>),
 }
 
 /// How a curve looks, by what it is.
@@ -42,6 +51,8 @@ pub enum Style {
     Raw,
     /// Above its raw values, in their colour.
     Smoothed,
+    /// Points one by one. The cursor shows the nearest of all.
+    Dots,
 }
 
 /// A curve.
@@ -59,13 +70,24 @@ pub struct Series {
     pub colour: Option<usize>,
     /// Where it goes.
     pub points: Points,
+    /// Of dots: what each point is.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub names: Vec<String>,
 }
 
 impl Series {
     /// In the colour of its style.
     #[must_use]
     pub fn new(name: impl Into<String>, style: Style, points: Points) -> Self {
-        Self { name: name.into(), style, is_hidden: false, colour: None, points }
+        Self { name: name.into(), style, is_hidden: false, colour: None, points, names: Vec::new() }
+    }
+
+    /// Named dots.
+    #[must_use]
+    pub fn dots(name: impl Into<String>, dots: impl IntoIterator<Item = ((f64, f64), String)>) -> Self {
+        let finite = dots.into_iter().filter(|((x, y), _)| x.is_finite() && y.abs() < LARGEST);
+        let (points, names): (Vec<_>, _) = finite.unzip();
+        Self { names, ..Self::new(name, Style::Dots, Points::plain(&points)) }
     }
 
     /// In a colour of the palette.

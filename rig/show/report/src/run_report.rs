@@ -159,7 +159,7 @@ fn show_and_write(
         Some((Format::Human, detail)) => {
             let table = table::table_in_words(manifest, figures, &judgement.verdict, detail);
             let more = if detail == Detail::Brief { "; --verbose shows every figure" } else { "" };
-            let said = table::verdict_in_words(manifest, &judgement.verdict, folder.path());
+            let said = table::verdict_in_words(&judgement.verdict, folder.path());
             let report = format!("report: {}{more}\n", folder.file("report.html").display());
             // What failed is the last that a screen shows; a pass fits on one.
             let text = match judgement.verdict.exit_code {

@@ -42,8 +42,8 @@ pub enum Detail {
 }
 
 /// The verdict on function and timing, and what to do next with the run in this folder.
-pub(crate) fn verdict_in_words(manifest: &Manifest, verdict: &Verdict, folder: &Path) -> String {
-    let advice = verdict.advice(manifest).map_or_else(String::new, |advice| format!("  {advice}\n"));
+pub(crate) fn verdict_in_words(verdict: &Verdict, folder: &Path) -> String {
+    let advice = verdict.advice().map_or_else(String::new, |advice| format!("  {advice}\n"));
     let next = verdict.next_step_in(&folder.display().to_string());
     let next = next.map_or_else(String::new, |next| format!("next: {next}\n"));
     format!("{}: {}\n{next}timing: {}\n{advice}", verdict.word, verdict.in_words(), verdict.timing)

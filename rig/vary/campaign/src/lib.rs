@@ -10,6 +10,8 @@ mod factor;
 mod fault_matrix;
 mod files;
 mod folder;
+mod influence;
+mod page;
 mod report;
 mod search;
 mod shrink;

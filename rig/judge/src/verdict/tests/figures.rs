@@ -4,7 +4,7 @@ use masseter_recording::{Damage, MachineInfo};
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::named::Declared;
 use masseter_runtime::realtime::scheduling::{Obtained, SchedulingRequest};
-use masseter_scenario::{BusFault, CpuDmaLatency, FaultConfig, Scenario};
+use masseter_scenario::{BusFault, FaultConfig, Scenario};
 
 use super::*;
 use crate::{
@@ -170,7 +170,7 @@ fn a_run_without_anything_wrong_passes_every_check() {
             "held, limit of the rig 0",
             "0 commands",
             "0",
-            "closest to its bound: SYNC on bus 0 took 150.00 µs, bound 190.00 µs",
+            "closest to its bound: SYNC on bus 0 took 150 µs, bound 190 µs",
         ]
     );
 }
@@ -238,7 +238,7 @@ fn each_thing_that_is_wrong_has_its_verdict() {
         (
             |run| run.manifest.ending = Ending::died("plant", "signal 9".to_owned()),
             Exit::Died,
-            "the plant died: signal 9",
+            "the plant died: signal 9, before the motion",
         ),
         (|run| run.manifest.ending = Ending::Interrupted, Exit::Interrupted, "stopped by the user"),
         (

@@ -82,11 +82,12 @@ fn panel(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> masseter_
     let timing = verdict.timing.to_string();
     let (word, more) = timing.split_once(" (").unwrap_or((&timing, ""));
     let more = more.trim_end_matches(')').to_owned();
-    let reasons = [more].into_iter().filter(|more| !more.is_empty()).chain(verdict.advice(manifest));
+    let reasons =
+        [more].into_iter().filter(|more| !more.is_empty()).chain(verdict.advice().map(str::to_owned));
     let cause = stop(figures).filter(|_| verdict.is_by_checks());
     let cause = cause.map_or_else(String::new, |stop| format!("; safe stop: {}", stop.in_words()));
     let ended = match verdict.exit_code {
-        Exit::Died | Exit::Interrupted => played_until(figures),
+        Exit::Interrupted => played_until(figures),
         _ => String::new(),
     };
     masseter_page::Verdict {

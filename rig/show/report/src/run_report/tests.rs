@@ -44,7 +44,7 @@ fn every_document_of_a_failed_run_names_the_first_breach_and_the_next_step() {
     let verdict = Verdict::new(&manifest, &figures);
     let first = "tracking: platform rms 0.2500 mm, limit 0.1 mm, from 0.000 s to 2.000 s of the motion";
     let next = |page| format!("Compare desired and true motion in {page}, then tune the controller");
-    let said = table::verdict_in_words(&manifest, &verdict, "runs/x".as_ref());
+    let said = table::verdict_in_words(&verdict, "runs/x".as_ref());
     assert!(said.starts_with(&format!("FAIL: failed: sequence, tracking; first: {first}\nnext: ")), "{said}");
     assert!(said.contains(&next("`runs/x/report.html`")), "{said}");
     let xml = junit::xml(&manifest, &figures, &verdict).unwrap();
@@ -74,7 +74,7 @@ fn every_document_of_a_failed_run_names_the_first_breach_and_the_next_step() {
 fn a_run_without_a_cycle_claims_nothing() {
     let (manifest, figures) = run(0, 0);
     let verdict = Verdict::new(&manifest, &figures);
-    let said = table::verdict_in_words(&manifest, &verdict, "runs/latest".as_ref());
+    let said = table::verdict_in_words(&verdict, "runs/latest".as_ref());
     let text = said + &table::table_in_words(&manifest, &figures, &verdict, Detail::Brief);
     assert!(text.starts_with("UNTESTED: no cycle ran\n") && !text.contains("FAIL"), "{text}");
     assert!(text.contains("\ntiming: unknown, because no cycle ran\n"), "{text}");

@@ -49,7 +49,7 @@ fn every_other_outcome_than_a_pass_goes_before_untested() {
 fn a_run_without_a_cycle_claims_nothing() {
     let endings = [
         (Ending::NotStarted, "INVALID", "real time was required and refused"),
-        (Ending::died("plant", "signal 9".to_owned()), "DIED", "the plant died: signal 9"),
+        (Ending::died("plant", "signal 9".to_owned()), "DIED", "the plant died: signal 9, before the motion"),
         (Ending::Completed, "UNTESTED", "no cycle ran"),
     ];
     for (ending, word, reason) in endings {
