@@ -421,9 +421,9 @@ impl Shortfall {
             Self::NotPlayed { share, .. } => {
                 Some(Breach::new("played part of the motion", percent(share), percent(WHOLE)).over(motion_ns))
             }
-            Self::OwnEarly { running_s, duration_s } => {
+            Self::Early { running_s, duration_s } => {
                 let breach =
-                    Breach::new("own motion ran for", seconds(running_s), seconds(WHOLE_TIME * duration_s));
+                    Breach::new("the motion ran for", seconds(running_s), seconds(WHOLE_TIME * duration_s));
                 Some(breach.at(motion_ns.map(|[_, ended_ns]| ended_ns)))
             }
             Self::OutOfOrder(disorder) => Some(disorder.breach().at(figures.disorder_ns)),

@@ -236,7 +236,7 @@ mod shortfall {
                     "sequence: played part of the motion 50 %, limit 95 %, from 0.000 s to 10.000 s of the motion",
                 ),
             ),
-            (early, Some("sequence: own motion ran for 4.00 s, limit 9.90 s, at 10.000 s of the motion")),
+            (early, Some("sequence: the motion ran for 4.00 s, limit 9.90 s, at 10.000 s of the motion")),
             (back, Some("sequence: state easing, limit not after running, at 1.500 s of the motion")),
             (|_, figures| figures.motion.played = None, None),
         ];
