@@ -350,6 +350,7 @@ impl Analysis {
         let ended_ns = self.figures.final_state.filter(is_over).map(|_| self.last_due_ns + self.period_ns);
         Figures {
             ended_ns,
+            last_cycle_ns: self.last_due_ns.min(self.last_sample_ns),
             disorder,
             disorder_ns,
             digest: self.digest.in_hex(),

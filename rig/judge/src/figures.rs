@@ -70,6 +70,9 @@ pub struct Figures {
     /// When the controller had ended in order, ns of the run's clock. What begins later is no part of the test.
     #[serde(skip)]
     pub ended_ns: Option<u64>,
+    /// The last cycle that both loops ran, ns of the run's clock: a process that died may have begun the next.
+    #[serde(skip)]
+    pub last_cycle_ns: u64,
     /// Deadlines missed just before a safe stop; none without one.
     pub outage: Option<Outage>,
     /// Distance of the platform from its desired pose, while the motion played.

@@ -244,13 +244,16 @@ fn declared_cause(scenario: &Scenario, figures: &Figures) -> Option<String> {
     Some(format!("fault {declared}{}", at.map_or_else(String::new, |at_s| format!(" at {at_s:.3} s"))))
 }
 
-/// When a process died, by the last cycle of the motion.
+/// When a process died, by the last cycle that both loops ran.
 fn when_died(figures: &Figures) -> String {
     match figures.path_breach.motion_ns {
         None => "before the motion".to_owned(),
-        Some(_) if figures.ended_ns.is_some() => "after the motion".to_owned(),
-        Some([began_ns, died_ns]) => {
-            format!("{:.3} s after the motion began", died_ns.saturating_sub(began_ns) as f64 / 1e9)
+        Some(_) if figures.final_state.is_some_and(|state| state == ControllerState::Finished) => {
+            "after the motion".to_owned()
+        }
+        Some([began_ns, _]) => {
+            let died_s = figures.last_cycle_ns.saturating_sub(began_ns) as f64 / 1e9;
+            format!("{died_s:.3} s after the motion began")
         }
     }
 }

@@ -3,6 +3,7 @@ mod figures;
 use masseter_runtime::messages::Event;
 
 use super::*;
+use crate::events::Code;
 use masseter_recording::Usage;
 
 #[test]
@@ -67,6 +68,21 @@ fn a_fault_of_the_scenario_stands_before_what_followed_from_it() {
         stopped(Some(StoppedBy::QuickStop), declared(), &[]),
         "fault encoder_stuck (l1) at 1.800 s → the drives made a quick stop"
     );
+}
+
+#[test]
+fn a_death_has_its_time_in_the_motion() {
+    let mut figures = Figures { last_cycle_ns: 2_500_000_000, ..Figures::default() };
+    assert_eq!(when_died(&figures), "before the motion");
+    figures.path_breach.motion_ns = Some([1_000_000_000, 3_000_000_000]);
+    for (state, when) in [
+        (ControllerState::Running, "1.500 s after the motion began"),
+        (ControllerState::SafeStop, "1.500 s after the motion began"),
+        (ControllerState::Finished, "after the motion"),
+    ] {
+        figures.final_state = Some(Code::Known(state));
+        assert_eq!(when_died(&figures), when);
+    }
 }
 
 #[test]

@@ -191,3 +191,19 @@ fn case_check(check: &Check) -> CaseCheck {
         relative_margin: figures.and_then(|figures| figures.relative_margin),
     }
 }
+
+/// The names of all checks, in the order in which they first appear.
+pub(crate) fn check_names(results: &[CaseResult]) -> Vec<String> {
+    in_order_of_appearance(results.iter().flat_map(|result| &result.checks).map(|check| check.name.clone()))
+}
+
+/// Each value once.
+pub(crate) fn in_order_of_appearance<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
+    let mut seen = Vec::new();
+    for value in values {
+        if !seen.contains(&value) {
+            seen.push(value);
+        }
+    }
+    seen
+}

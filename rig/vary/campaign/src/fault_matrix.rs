@@ -8,7 +8,7 @@ use anyhow::Context;
 use askama::Template;
 use masseter_scenario::{FaultConfig, FaultKindConfig};
 
-use crate::files::in_order_of_appearance;
+use crate::case::in_order_of_appearance;
 
 /// The first line of the CSV file.
 const HEADER: &str = "kind,layer,axis,phase,size,struck,detected_by,cause,latency_ms,deviation_mm,deviation_deg,end_state,verdict\n";

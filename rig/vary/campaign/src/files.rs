@@ -6,7 +6,7 @@ use anyhow::Context;
 use masseter_table::{Column, Table, Values, write_table};
 
 use crate::campaign::Campaign;
-use crate::case::{COLUMNS, CaseCheck, CaseResult};
+use crate::case::{COLUMNS, CaseCheck, CaseResult, check_names};
 use crate::factor::{Factor, Setting};
 use crate::folder::CampaignFolder;
 use crate::page;
@@ -36,7 +36,7 @@ fn results_table(campaign: &Campaign, results: &[CaseResult]) -> Table {
     });
     let factors = campaign.file.factors.iter().enumerate();
     let factors = factors.map(|(at, factor)| factor_column(results, at, factor));
-    let checks = names(results).into_iter().flat_map(|name| check_columns(results, &name));
+    let checks = check_names(results).into_iter().flat_map(|name| check_columns(results, &name));
     Table::new(identity.chain(factors).chain(verdict).chain(checks).chain(figures).collect())
 }
 
@@ -68,19 +68,4 @@ fn check_columns(results: &[CaseResult], name: &str) -> Vec<Column> {
         columns.push(column("relative_margin", "", about, |check| check.relative_margin));
     }
     columns
-}
-
-/// The names of all checks, in the order in which they first appear.
-pub(crate) fn names(results: &[CaseResult]) -> Vec<String> {
-    in_order_of_appearance(results.iter().flat_map(|result| &result.checks).map(|check| check.name.clone()))
-}
-
-pub(crate) fn in_order_of_appearance<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
-    let mut seen = Vec::new();
-    for value in values {
-        if !seen.contains(&value) {
-            seen.push(value);
-        }
-    }
-    seen
 }

@@ -6,9 +6,8 @@ use masseter_page::{
     Series, Table, Time, Tone, Verdict,
 };
 
-use crate::case::CaseResult;
+use crate::case::{CaseResult, check_names, in_order_of_appearance};
 use crate::factor::{Distribution, Setting};
-use crate::files::{in_order_of_appearance, names};
 use crate::influence::most_influential;
 use crate::report::{Report, WorstCase, percent};
 
@@ -70,7 +69,7 @@ fn margins(report: &Report<'_>) -> Option<Section> {
         };
         axes.map(chart).collect::<Vec<_>>()
     };
-    let blocks: Vec<_> = names(&report.results).iter().flat_map(drawn).collect();
+    let blocks: Vec<_> = check_names(&report.results).iter().flat_map(drawn).collect();
     (!blocks.is_empty()).then(|| Section::new("margins", "Margin against each factor", blocks))
 }
 
