@@ -111,7 +111,7 @@ def main() -> None:
     parser.add_argument("packages", nargs="*")
     parser.add_argument("--static", action="store_true")
     parser.add_argument("--check", action="store_true")
-    arguments = parser.parse_args()
+    arguments = parser.parse_intermixed_args()
     if problem := missing(arguments.static):
         print(problem, file=sys.stderr)
         sys.exit(2)
