@@ -115,10 +115,10 @@ impl Publishers {
     fn publish(&mut self, message: &Recorded) -> anyhow::Result<()> {
         match message {
             Recorded::Command(message) => {
-                self.command.publish_by(clock::now_ns, |place| *place = *message)?
+                self.command.publish_by(clock::now_ns, |place| *place = *message)?;
             }
             Recorded::Reading(message) => {
-                self.reading.publish_by(clock::now_ns, |place| *place = *message)?
+                self.reading.publish_by(clock::now_ns, |place| *place = *message)?;
             }
             Recorded::State(message) => self.state.publish_by(clock::now_ns, |place| *place = *message)?,
             Recorded::Truth(message) => self.truth.publish_by(clock::now_ns, |place| *place = *message)?,
