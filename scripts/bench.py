@@ -1,5 +1,6 @@
 """Figures of docs/realtime.md that only developers measure. Each bench calls the program and reads what its runs leave.
 
+    python3 scripts/bench.py loop MASSETER         # wake-ups of the loops at 1 kHz, beside those of cyclictest, where installed
     python3 scripts/bench.py rate MASSETER         # the whole rig in real time at 1 to 20 kHz, on wires without delays
     python3 scripts/bench.py simulated MASSETER    # whole runs in lockstep and under virtual time, per cycle
     python3 scripts/bench.py virtual MASSETER      # the default motion of 10 s without a recording, by CPU time and memory
@@ -13,6 +14,7 @@ import argparse
 import json
 import os
 import resource
+import shutil
 import statistics
 import subprocess
 import sys
@@ -91,6 +93,39 @@ def play(masseter, scenario, clock):
         return code, *(json.loads((out / name).read_text()) for name in ("summary.json", "manifest.json"))
 
 
+def cyclictest(options, core):
+    """p50 and p99 in µs of a thread that wakes as often as the rig's loops; latencies above 20 ms count as 20 ms."""
+    run = ["cyclictest", *options, "--quiet", "--mlockall", "--threads=1", "--interval=1000", f"--priority={PRIORITY}",
+           f"--affinity={core}", "--loops=5000", "--histogram=20000"]
+    told = subprocess.run(run, check=True, stdout=subprocess.PIPE, text=True).stdout.splitlines()
+    counts = [tuple(map(int, line.split())) for line in told if line and line[0].isdigit()]
+    above = next(int(line.split(":")[1]) for line in told if line.startswith("# Histogram Overflows"))
+    latest = [us for us, count in [*counts, (20_000, above)] for _ in range(count)]
+    return [latest[len(latest) * share // 100] for share in (50, 99)]
+
+
+def loop(masseter, rounds, cores):
+    def rig(latency):
+        scenario = f"name = 'loop'\nduration_s = 5.0\n[realtime]\ncores = {cores}\ncpu_dma_latency = '{latency}'\n"
+        _, summary, _ = play(masseter, scenario, "rt")
+        found = next(each for each in summary["figures"]["intervals"] if each["name"] == "controller wake-up")
+        return [found[key] / 1000 for key in ("p50_ns", "p99_ns")]
+
+    candidates = {
+        "masseter": lambda: rig("leave"),
+        "masseter, /dev/cpu_dma_latency held": lambda: rig("hold"),
+        "cyclictest --laptop": lambda: cyclictest(["--laptop"], cores[0]),
+        "cyclictest (holds it)": lambda: cyclictest([], cores[0]),
+    }
+    is_installed = shutil.which("cyclictest") is not None
+    played = [name for name in candidates if is_installed or name.startswith("masseter")]
+    measured, stillness = take_turns(played, rounds, lambda name: candidates[name]())
+    for name, turns in measured.items():
+        p50, p99 = zip(*turns)
+        print(f"{name}: p50 {spread(p50)} µs, p99 {spread(p99)} µs")
+    return stillness.exit_code()
+
+
 def rate(masseter, rounds, cores):
     def run(rate_hz):
         silence = 20 * rate_hz // 1000
@@ -166,7 +201,7 @@ def virtual(masseter, rounds, cores):
 
 
 def main():
-    benches = {bench.__name__: bench for bench in (rate, simulated, virtual)}
+    benches = {bench.__name__: bench for bench in (loop, rate, simulated, virtual)}
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("bench", choices=benches)
     arguments.add_argument("masseter")

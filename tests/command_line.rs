@@ -48,27 +48,6 @@ fn words_are_coloured_where_that_is_asked_for() {
 }
 
 #[test]
-fn verbs_of_research_are_refused_with_the_command_that_has_them() {
-    for verb in [&["kinematics", "--out", "study"][..], &["paper"], &["uniqueness", "prove", "--help"]] {
-        let output = masseter(verb);
-        assert_eq!(output.status.code(), Some(2), "{verb:?}");
-        assert!(
-            stderr(&output).contains("cargo run --release -p masseter-research --"),
-            "{}",
-            stderr(&output)
-        );
-    }
-}
-
-#[test]
-fn help_for_a_verb_of_another_command_names_the_command() {
-    for verb in ["kinematics", "uniqueness"] {
-        let said = stdout(&masseter(&["help", verb]));
-        assert!(said.contains("cargo run --release -p masseter-research -- help"), "{said}");
-    }
-}
-
-#[test]
 fn completions_are_a_script_of_their_shell() {
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
         let script = stdout(&masseter(&["completions", shell]));

@@ -5,7 +5,6 @@ mod any_controller;
 mod architecture;
 mod attacks;
 mod bad_input;
-mod bench;
 mod campaign;
 mod can_link;
 mod command_line;

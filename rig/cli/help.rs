@@ -19,7 +19,7 @@ const GROUPS: [(&str, &[&str]); 8] = [
     ("Play a scenario in many variants", &["campaign", "search", "shrink"]),
     ("Work with past runs", &["report", "compare", "export", "why", "replay", "diff", "recording"]),
     ("Bring your own controller", &["new", "interface", "controller", "param"]),
-    ("Prepare this machine", &["doctor", "bench", "clean"]),
+    ("Prepare this machine", &["doctor", "clean"]),
     ("Work with CAN and the drives", &["robot", "can", "plant"]),
     ("Solve the kinematics", &["ik", "fk"]),
     ("Set up the shell", &["completions", "man"]),

@@ -2,7 +2,6 @@
 //! those of `run` are the [`RunRequest`] itself.
 
 pub(crate) mod arguments;
-mod bench;
 mod campaign;
 mod can;
 mod compare;
@@ -25,7 +24,6 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use anyhow::anyhow;
 use clap::{ColorChoice, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 use masseter_recorder::RecorderArgs;
 use masseter_recording_verbs::{ExportArgs, RecordingVerb};
@@ -41,7 +39,6 @@ use crate::run::exec_program;
 use crate::run::request::{Readers, RunRequest};
 use crate::vary::play::play_case;
 use arguments::ProcessArgs;
-use bench::BenchVerb;
 use campaign::{CampaignArgs, SearchArgs, ShrinkArgs};
 use can::CanVerb;
 use compare::CompareArgs;
@@ -66,9 +63,6 @@ First steps:
 const EXIT_CODES: &str = "\
 Exit codes of every verb: 0 passed, 1 a check failed or was not tested, 2 wrong usage or input,
 3 cannot be judged, 4 a process died, 5 unexpected safe stop, 6 files incomplete, 130 interrupted.";
-
-const ELSEWHERE: &str = "the paper's study and uniqueness are verbs of another command: \
-                         cargo run --release -p masseter-research -- help";
 
 /// A hardware-in-the-loop rig for a 6-DOF mastication robot
 #[derive(Debug, Parser)]
@@ -155,9 +149,6 @@ enum Verb {
     /// Plan the buses, describe the drives (EDS, DBC), serve simulated buses
     #[command(subcommand, after_help = "Example:\n  masseter can plan --rate-hz 1500")]
     Can(CanVerb),
-    /// Measure the real-time loop beside a baseline
-    #[command(subcommand, after_help = "Example:\n  masseter bench loop")]
-    Bench(BenchVerb),
     /// Remove what killed runs left in shared memory
     #[command(after_help = "Example:\n  masseter clean")]
     Clean,
@@ -165,17 +156,6 @@ enum Verb {
     Completions(CompletionsArgs),
     /// Write manual pages
     Man(ManArgs),
-    /// Verbs of another command
-    #[command(
-        hide = true,
-        aliases = ["paper", "uniqueness"],
-        disable_help_flag = true,
-        override_help = ELSEWHERE
-    )]
-    Kinematics {
-        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
-        _arguments: Vec<OsString>,
-    },
     /// Run one case of a campaign, for a scheduler
     #[command(hide = true)]
     CampaignCase {
@@ -261,12 +241,10 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Compare(args) => compare::compare(&args).usage(),
         Verb::Replay(args) => report::replay(&args).usage(),
         Verb::Diff(args) => report::diff(&args).usage(),
-        Verb::Bench(verb) => bench::execute(&verb),
         Verb::Fk(args) => kinematics::forward(&args).usage(),
         Verb::Ik(args) => kinematics::inverse(&args).usage(),
         Verb::Can(verb) => can::execute(&verb).usage(),
         Verb::Robot(verb) => robot::execute(&verb),
-        Verb::Kinematics { .. } => Err(anyhow!(ELSEWHERE)).usage(),
         Verb::Doctor(args) => doctor::examine(&args).usage(),
         Verb::Export(args) => masseter_recording_verbs::export(&args).usage(),
         Verb::Recording(verb) => masseter_recording_verbs::execute(&verb).usage(),

@@ -118,7 +118,7 @@ impl Replay {
         match message {
             Recorded::Reading(reading) => self.deliveries.push(reading),
             _ if self.run.is_answer(message) => {
-                self.log.sink_mut().0.take(Side::A, message);
+                self.log.sink.0.take(Side::A, message);
                 if let Recorded::State(state) = message {
                     self.waiting.push_back(*state);
                 }
@@ -139,7 +139,7 @@ impl Replay {
         while let Some(state) = self.waiting.pop_front() {
             self.replay_cycle(&state)?;
         }
-        Ok((self.cycles, self.log.into_sink().0.finish()))
+        Ok((self.cycles, self.log.sink.0.finish()))
     }
 
     fn replay_cycle(&mut self, state: &State) -> Result<(), ReplayError> {

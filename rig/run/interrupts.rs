@@ -51,16 +51,6 @@ impl Interrupts {
         Self::listen().context("cannot listen for signals").died()
     }
 
-    /// Whether an orderly stop is requested.
-    pub(crate) fn is_stop_requested(&self) -> bool {
-        self.is_requested.load(Ordering::Relaxed) || self.count.load(Ordering::Relaxed) > 0
-    }
-
-    /// Whether an immediate end is requested.
-    pub(crate) fn is_abort_requested(&self) -> bool {
-        self.count.load(Ordering::Relaxed) > 1
-    }
-
     /// Restores the default action of the signals, for after the run.
     pub(crate) fn restore_default_actions(&self) {
         self.is_over.store(true, Ordering::Relaxed);
@@ -69,11 +59,11 @@ impl Interrupts {
 
 impl Requests for Interrupts {
     fn is_stop_requested(&self) -> bool {
-        self.is_stop_requested()
+        self.is_requested.load(Ordering::Relaxed) || self.count.load(Ordering::Relaxed) > 0
     }
 
     fn is_abort_requested(&self) -> bool {
-        self.is_abort_requested()
+        self.count.load(Ordering::Relaxed) > 1
     }
 }
 

@@ -11,6 +11,7 @@ use masseter_controller::process::BuildController;
 use masseter_judge::{Figures, Judgement, Verdict};
 use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure};
+use masseter_virtual_time::Requests;
 
 use super::interrupts::Interrupts;
 use super::prepared::{PreparedRun, analyse_unrecorded};

@@ -28,6 +28,7 @@ use masseter_runtime::schedule::OFF_TICK_NS;
 use masseter_runtime::transport::{Domain, DomainError, DomainLock, Swept};
 use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
+use masseter_virtual_time::Requests;
 
 use super::child::{CONTROLLER, KILLED, PLANT, Process, RECORDER, Reports, describe};
 use super::controller::Controller;

@@ -38,7 +38,7 @@ const READ_AGAIN_NS: u64 = 5 * MILLISECOND_NS;
 
 /// The line.
 pub struct Line {
-    traffic: Traffic,
+    pub(super) traffic: Traffic,
     /// The axis whose drive this line has switched on.
     switched_on: Option<usize>,
     /// The ledger of old values; none if nobody needs old values after a kill.
@@ -88,16 +88,6 @@ impl Line {
     /// The signs of other masters and nodes.
     pub fn strangers(&self) -> &Strangers {
         &self.traffic.strangers
-    }
-
-    /// Sends the master's heartbeat from now on, with that interval.
-    pub fn beat_every(&mut self, interval_ms: u16) {
-        self.traffic.beat_every(interval_ms);
-    }
-
-    /// Sends no further heartbeat; returns when the last one was queued, ns.
-    pub(super) fn end_heartbeat(&mut self) -> u64 {
-        self.traffic.end_heartbeat()
     }
 
     /// Sends SYNC to the bus of an axis.

@@ -80,7 +80,7 @@ impl<'a> Mover<'a> {
         let (can, scale) = (&self.scenario.can, self.scale());
         let Caution { speed_m_s, acceleration_m_s2, force_n, .. } = self.caution;
         // The drive stops when this program dies: a lost heartbeat is a quick stop.
-        self.line.beat_every(can.heartbeat_producer_ms);
+        self.line.traffic.beat_every(can.heartbeat_producer_ms);
         let consumed = u32::from(MASTER_NODE.get()) << 16 | u32::from(can.heartbeat_consumer_ms);
         let acceleration = scale.acceleration(acceleration_m_s2);
         let permille = (force_n / scale.permille_n.abs()).round() as u32;

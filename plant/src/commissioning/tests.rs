@@ -190,7 +190,7 @@ fn the_drive_stops_by_itself_without_the_heartbeat() {
         })
     }));
     assert!(died.is_err());
-    bench.line.beat_every(u16::MAX);
+    bench.line.traffic.beat_every(u16::MAX);
     bench.line.listen(SECOND_NS).unwrap();
     bench.assert_off();
 }

@@ -169,7 +169,7 @@ impl<'a> Proof<'a> {
         let queued_ns = match silence {
             Silence::Heartbeat => {
                 mover.line.listen(START_NS)?;
-                mover.line.end_heartbeat()
+                mover.line.traffic.end_heartbeat()
             }
             Silence::ProcessData => self.send_process_data(mover)?,
         };
@@ -295,7 +295,7 @@ impl<'a> Proof<'a> {
     /// Ends the faults that the silence has made, once the heartbeat is back: also drives without power may go into fault.
     fn recover(&self, mover: &mut Mover<'_>) -> Result<(), MotionError> {
         let beat_ms = self.scenario.can.heartbeat_producer_ms;
-        mover.line.beat_every(beat_ms);
+        mover.line.traffic.beat_every(beat_ms);
         mover.line.command(mover.axis, NmtCommand::EnterPreOperational)?;
         mover.line.listen(2 * u64::from(beat_ms) * MILLISECOND_NS)?;
         disable_voltage(mover.line, mover.axis)?;

@@ -235,19 +235,6 @@ impl OpenLink {
         self.free.len()
     }
 
-    /// The master's port on a bus.
-    ///
-    /// # Panics
-    /// Where there is no such bus.
-    pub fn master(&mut self, bus: usize) -> impl Bus {
-        self.link.port_at(bus, MASTER_PORT)
-    }
-
-    /// The mechanism's true motion at the last SYNC.
-    pub fn truth(&self) -> Truth {
-        self.link.emulation.truth()
-    }
-
     /// Writes the drives' changed stored values into the scenario's file (`drives.memory`).
     ///
     /// # Errors
@@ -291,11 +278,11 @@ mod tests {
     /// The answer of the drive of l1.
     fn ask(link: &mut OpenLink, now_ns: &mut u64, request: SdoRequest) -> SdoResponse {
         let node = NodeId::new(4).unwrap();
-        link.master(1).send(*now_ns, request.frame(node)).unwrap();
+        link.link.port(1).send(*now_ns, request.frame(node)).unwrap();
         for _ in 0..20 {
             *now_ns += MS;
             link.advance(*now_ns).unwrap();
-            while let Some(received) = link.master(1).receive(*now_ns).unwrap() {
+            while let Some(received) = link.link.port(1).receive(*now_ns).unwrap() {
                 if received.frame.id() == Cob::SdoResponse(node).into() {
                     return SdoResponse::decode(received.frame.data()).unwrap();
                 }
@@ -340,7 +327,7 @@ mod tests {
     fn the_jaw_can_stand_beside_its_place_and_all_six_axes_agree() {
         let mut scenario = Scenario::default();
         scenario.dynamics.initial_offset_m = [0.004, -0.003, 0.0];
-        let joints_m = OpenLink::new(&scenario, 0, 0).unwrap().truth().joint_m;
+        let joints_m = OpenLink::new(&scenario, 0, 0).unwrap().link.emulation.truth().joint_m;
         assert!(joints_m[..3].iter().any(|slide_m| slide_m.abs() > 1e-3), "{joints_m:?}");
         scenario.dynamics.initial_offset_m = [0.4, 0.0, 0.0];
         assert!(OpenLink::new(&scenario, 0, 0).is_err());

@@ -117,7 +117,7 @@ pub fn stolen_by_core_ns(root: &SystemRoot) -> BTreeMap<usize, u64> {
 }
 
 /// Steal time of all cores since boot, ns.
-pub fn stolen_ns(root: &SystemRoot) -> Option<u64> {
+fn stolen_ns(root: &SystemRoot) -> Option<u64> {
     let [.., stolen] = root.core_ticks()?;
     Some(stolen * TICK_NS)
 }

@@ -144,36 +144,15 @@ pub(crate) type Published = [u64; Publisher::PlantEvent as usize + 1];
 /// The sink, and how many messages of each publisher it took.
 #[derive(Debug)]
 pub struct Log<S> {
-    sink: S,
-    published: Published,
+    /// Where the messages go.
+    pub sink: S,
+    pub(crate) published: Published,
 }
 
 impl<S: Sink> Log<S> {
     /// The log of a run that begins.
     pub fn new(sink: S) -> Self {
         Self { sink, published: Default::default() }
-    }
-
-    pub(crate) fn sink(&self) -> &S {
-        &self.sink
-    }
-
-    pub(crate) fn published(&self) -> Published {
-        self.published
-    }
-
-    pub(crate) fn set_published(&mut self, published: Published) {
-        self.published = published;
-    }
-
-    /// Where the messages go.
-    pub fn sink_mut(&mut self) -> &mut S {
-        &mut self.sink
-    }
-
-    /// The sink, which took all messages.
-    pub fn into_sink(self) -> S {
-        self.sink
     }
 
     /// Numbers a message, as its publisher would, and hands it on.

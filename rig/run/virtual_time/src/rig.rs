@@ -120,10 +120,10 @@ impl Rig {
     pub fn step(&mut self, command: &Command) -> Result<&Reading, RigError> {
         let Self { stepper, has_failed, .. } = self;
         if *has_failed {
-            return Err(RigError::Failed { cycle: stepper.cycle() });
+            return Err(RigError::Failed { cycle: stepper.cycle });
         }
         *has_failed = true;
-        stepper.sink_mut().events.clear();
+        stepper.ports.log.sink.events.clear();
         stepper.end_with(command)?;
         stepper.begin_next_cycle()?;
         *has_failed = false;
@@ -132,7 +132,7 @@ impl Rig {
 
     /// The reading of this cycle.
     pub fn reading(&self) -> &Reading {
-        self.stepper.reading()
+        &self.stepper.ports.reading
     }
 
     /// The mechanism's true motion at the SYNC of this cycle.
@@ -183,12 +183,12 @@ impl Rig {
         let Snapshot { scenario, stepper, latest, has_failed } = snapshot;
         OtherScenario::refuse(&self.scenario, scenario)?;
         self.stepper.set_state(stepper);
-        self.stepper.sink_mut().clone_from(latest);
+        self.stepper.ports.log.sink.clone_from(latest);
         self.has_failed = *has_failed;
         Ok(())
     }
 
     fn latest(&self) -> &Latest {
-        self.stepper.sink()
+        &self.stepper.ports.log.sink
     }
 }

@@ -20,28 +20,24 @@ use crate::log::Sink;
 use crate::snapshot::OtherScenario;
 use crate::stepper::{Stepper, StepperState};
 
-/// What the user asks of a run.
+/// What the user asks of a run; nothing where a method is not written.
 pub trait Requests {
     /// Whether an orderly stop is requested.
-    fn is_stop_requested(&self) -> bool;
+    fn is_stop_requested(&self) -> bool {
+        false
+    }
 
     /// Whether an immediate end is requested.
-    fn is_abort_requested(&self) -> bool;
+    fn is_abort_requested(&self) -> bool {
+        false
+    }
 }
 
 /// Nobody asks for anything.
 #[derive(Debug, Clone, Copy)]
 pub struct Uninterrupted;
 
-impl Requests for Uninterrupted {
-    fn is_stop_requested(&self) -> bool {
-        false
-    }
-
-    fn is_abort_requested(&self) -> bool {
-        false
-    }
-}
+impl Requests for Uninterrupted {}
 
 /// The controller of a run, and what accompanies it.
 pub(crate) struct Control {
@@ -187,12 +183,12 @@ impl<S: Sink> Run<S> {
 
     /// Where the messages went.
     pub fn sink(&self) -> &S {
-        self.stepper.sink()
+        &self.stepper.ports.log.sink
     }
 
     /// The same, to be changed, as after [`Self::restore`].
     pub fn sink_mut(&mut self) -> &mut S {
-        self.stepper.sink_mut()
+        &mut self.stepper.ports.log.sink
     }
 
     /// The number of the last cycle that began; 0 before the first.
@@ -217,7 +213,7 @@ impl<S: Sink> Run<S> {
         let mut plant_error = None;
         while plant_error.is_none()
             && self.control.controller.outcome().is_none()
-            && !self.stepper.sink().has_failed()
+            && !self.sink().has_failed()
             && !interrupts.is_abort_requested()
         {
             if interrupts.is_stop_requested() {
@@ -259,6 +255,6 @@ impl<S: Sink> Run<S> {
 
     /// The sink, with what it took.
     pub fn into_sink(self) -> S {
-        self.stepper.into_sink()
+        self.stepper.ports.log.sink
     }
 }

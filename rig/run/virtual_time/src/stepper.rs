@@ -21,9 +21,9 @@ pub(crate) struct Stepper<S> {
     schedule: CycleSchedule,
     period_ns: u64,
     plant: PlantCore,
-    ports: Ports<S>,
+    pub(crate) ports: Ports<S>,
     /// The number of the cycle, from 1 on.
-    cycle: u64,
+    pub(crate) cycle: u64,
 }
 
 /// All of it that cycles change, but for the sink.
@@ -137,7 +137,7 @@ impl<S: Sink> Stepper<S> {
         let Self { plant, ports: Ports { log, now_ns, reading, .. }, cycle, .. } = self;
         StepperState {
             plant: plant.clone(),
-            published: log.published(),
+            published: log.published,
             now_ns: *now_ns,
             reading: *reading,
             cycle: *cycle,
@@ -148,31 +148,10 @@ impl<S: Sink> Stepper<S> {
     pub(crate) fn set_state(&mut self, state: &StepperState) {
         let StepperState { plant, published, now_ns, reading, cycle } = state;
         self.plant = plant.clone();
-        self.ports.log.set_published(*published);
+        self.ports.log.published = *published;
         // A cycle takes its command before it ends.
         (self.ports.now_ns, self.ports.reading, self.ports.command) = (*now_ns, *reading, None);
         self.cycle = *cycle;
-    }
-
-    pub(crate) fn cycle(&self) -> u64 {
-        self.cycle
-    }
-
-    /// The reading of this cycle, as published.
-    pub(crate) fn reading(&self) -> &Reading {
-        &self.ports.reading
-    }
-
-    pub(crate) fn sink(&self) -> &S {
-        self.ports.log.sink()
-    }
-
-    pub(crate) fn sink_mut(&mut self) -> &mut S {
-        self.ports.log.sink_mut()
-    }
-
-    pub(crate) fn into_sink(self) -> S {
-        self.ports.log.into_sink()
     }
 
     fn sync(&self) -> Wake {
@@ -190,12 +169,13 @@ fn sync(cycle: u64, period_ns: u64) -> Wake {
 }
 
 #[derive(Debug)]
-struct Ports<S> {
-    log: Log<S>,
+pub(crate) struct Ports<S> {
+    pub(crate) log: Log<S>,
     /// From SYNC to the controller's command.
     controller_at_ns: u64,
     now_ns: u64,
-    reading: Reading,
+    /// The reading of this cycle, as published.
+    pub(crate) reading: Reading,
     /// The command of this cycle.
     command: Option<Command>,
 }

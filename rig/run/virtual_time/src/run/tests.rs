@@ -37,9 +37,9 @@ pub(crate) fn run_of(scenario: &Scenario) -> Run<Kept> {
 
 /// Plays that many cycles; returns the bytes of their messages.
 fn cycles(run: &mut Run<Kept>, number: usize) -> Vec<u8> {
-    run.stepper.sink_mut().0.clear();
+    run.sink_mut().0.clear();
     (0..number).for_each(|_| run.play_cycle().unwrap());
-    run.stepper.sink().0.iter().flat_map(Recorded::body).copied().collect()
+    run.sink().0.iter().flat_map(Recorded::body).copied().collect()
 }
 
 /// The run, and a new one of the same scenario, go on twice from a snapshot after so many cycles.
