@@ -193,7 +193,7 @@ impl<S: Sink> Run<S> {
 
     /// The number of the last cycle that began; 0 before the first.
     pub fn cycle(&self) -> u64 {
-        self.stepper.cycle()
+        self.stepper.cycle
     }
 
     /// Whether the controller has done its last cycle.
