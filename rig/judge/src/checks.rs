@@ -426,7 +426,7 @@ impl Shortfall {
                     Breach::new("the motion ran for", seconds(running_s), seconds(WHOLE_TIME * duration_s));
                 Some(breach.at(motion_ns.map(|[_, ended_ns]| ended_ns)))
             }
-            Self::OutOfOrder(disorder) => Some(disorder.breach().at(figures.disorder_ns)),
+            Self::OutOfOrder(disorder) => Some(out_of_order(disorder).at(figures.disorder_ns)),
             Self::Still | Self::Unjudged | Self::OnlyStated => None,
         }
     }
@@ -465,6 +465,17 @@ impl Display for Shortfall {
                  the true jaw in [[require]]",
             ),
         }
+    }
+}
+
+/// The state that is out of order, and where it belongs.
+fn out_of_order(disorder: Disorder) -> Breach {
+    match disorder {
+        Disorder::NeverBegan => Breach::new("state running", "never", "from the end of the lead-in on"),
+        Disorder::BeforeDrives => {
+            Breach::new("state", ControllerState::Running.to_string(), "once all drives are enabled")
+        }
+        Disorder::Back { from, to } => Breach::new("state", to.to_string(), format!("not after {from}")),
     }
 }
 

@@ -8,7 +8,6 @@ use masseter_runtime::messages::codes::{ControllerState, DriveState};
 use masseter_runtime::named::{Declared, PlayedMotion};
 use masseter_scenario::Scenario;
 
-use crate::breach::Breach;
 use crate::poses::MOVING;
 
 /// Cycles of the lead-in beside the move to the first pose.
@@ -28,17 +27,6 @@ pub enum Disorder {
         /// The earlier state.
         to: ControllerState,
     },
-}
-
-impl Disorder {
-    pub(crate) fn breach(self) -> Breach {
-        let running = ControllerState::Running;
-        match self {
-            Self::NeverBegan => Breach::new("state running", "never", "from the end of the lead-in on"),
-            Self::BeforeDrives => Breach::new("state", running.to_string(), "once all drives are enabled"),
-            Self::Back { from, to } => Breach::new("state", to.to_string(), format!("not after {from}")),
-        }
-    }
 }
 
 impl Display for Disorder {
