@@ -272,6 +272,14 @@ mod tests {
     }
 
     #[test]
+    fn an_object_that_the_file_lists_without_a_section_is_not_taken_for_absent() {
+        let (objects, warning) = read(&[("2000", "DataType=7 [OptionalObjects] 1=0x6065")], "");
+        let is_absent = |key: &str| objects.contains_key(&key.parse().unwrap());
+        assert_eq!([is_absent("6065h"), is_absent("6066h")], [false, true]);
+        assert!(warning.ends_with("6065h (listed without a section; is the file cut short?)"), "{warning}");
+    }
+
+    #[test]
     fn what_a_profile_cannot_carry_is_counted_and_named() {
         let lines = [
             ("1010", "ObjectType=9"),
