@@ -21,7 +21,7 @@ use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind};
 use masseter_runtime::named::NamedValues;
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 use masseter_terminal::Exit;
-use masseter_virtual_time::{Branches, Mark, Run};
+use masseter_virtual_time::{Branches, Mark, Requests, Run};
 
 use crate::run::interrupts::Interrupts;
 use crate::run::request::ControllerKind;
