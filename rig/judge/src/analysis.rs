@@ -320,6 +320,7 @@ impl Analysis {
         }
         let reference = self.timeline.reference();
         let rest_m = reference.and_then(|of| of.rest(|from, to| self.played.distance_m(from, to)));
+        let rest_s = reference.and_then(Reference::rest_s);
         let (disorder, disorder_ns) = reference.map(Reference::disorder).unwrap_or_default();
         let lag_causes_ms = reference.map_or([0.0; 2], Reference::lag_causes_ms);
         let (tracking, track) = self.tracking.into_figures();
@@ -363,7 +364,7 @@ impl Analysis {
             stopped_by,
             enabled_s,
             running_s,
-            motion: MotionFigures { lag_causes_ms, ..self.played.into_figures(rest_m) },
+            motion: MotionFigures { lag_causes_ms, rest_s, ..self.played.into_figures(rest_m) },
             standstill: self.standstill.into_figures(),
             outage: self.outage.outage(self.period_ns),
             tracking,

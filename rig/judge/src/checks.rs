@@ -385,7 +385,7 @@ impl Shortfall {
             (Some(way_mm), Some(share)) => {
                 let is_played = share >= WHOLE;
                 let short = (!is_played).then_some(Self::NotPlayed { share, way_mm });
-                short.or_else(|| Self::early(manifest, figures))
+                short.or_else(|| Self::cut(manifest, figures))
             }
         }
     }
@@ -394,6 +394,13 @@ impl Shortfall {
         let (running_s, duration_s) = (figures.running_s, manifest.motion_s);
         let is_early = running_s < WHOLE_TIME * duration_s && !was_stopped_by_request(figures);
         is_early.then_some(Self::Early { running_s, duration_s })
+    }
+
+    /// The scenario's motion may be faster than written; what is left of it counts.
+    fn cut(manifest: &Manifest, figures: &Figures) -> Option<Self> {
+        let (rest_s, duration_s) = (figures.motion.rest_s?, manifest.motion_s);
+        let most_s = (1.0 - WHOLE_TIME) * duration_s + manifest.scenario.checks.motion_lag_ms / 1e3;
+        (rest_s > most_s).then_some(Self::Early { running_s: duration_s - rest_s, duration_s })
     }
 
     fn unjudged(manifest: &Manifest, figures: &Figures) -> Option<Self> {

@@ -24,6 +24,9 @@ pub struct MotionFigures {
     pub way_mm: Option<f64>,
     /// The share of it that the jaw went, in the direction of the motion; none of a motion without a way.
     pub played: Option<f64>,
+    /// How long the motion still lasted when the controller ended it, s; `None` if the motion is the controller's own.
+    #[serde(skip)]
+    pub rest_s: Option<f64>,
     /// By how much the motion was late at most, ms; `None` if it never began.
     pub lag_ms: Option<f64>,
     /// When it was first late by more than `checks.motion_lag_ms`, ns of the run's clock.
@@ -141,6 +144,7 @@ impl PlayedWatch {
         MotionFigures {
             way_mm: way_m.map(|way_m| way_m * 1e3),
             played: way_m.filter(|way_m| *way_m > NO_WAY_M).map(|way_m| self.gone_m / way_m),
+            rest_s: None,
             lag_ms: self.lag_s.map(|lag_s| lag_s * 1e3),
             late_ns: self.late_ns,
             ahead_ms: Some(self.ahead.in_s()).filter(|s| *s > self.most_s).map(|s| s * 1e3),

@@ -224,6 +224,13 @@ impl Reference {
         if speed >= FULL_SHARE * self.full_speed { MotionSpeed::Full } else { MotionSpeed::Ramped }
     }
 
+    /// How long the motion still lasts at its pace, s; nothing after a request to stop. None where the motion is not the
+    /// scenario's.
+    pub(crate) fn rest_s(&self) -> Option<f64> {
+        let playback = self.playback.as_ref()?;
+        Some(if self.stop_cycle.is_some() { 0.0 } else { playback.rest_s() })
+    }
+
     /// What is left of the motion, as `distance` measures it from pose to pose; nothing after a request to stop. None where the
     /// motion is not the scenario's.
     pub(crate) fn rest(&self, distance: impl Fn(&Pose, &Pose) -> f64) -> Option<f64> {

@@ -235,6 +235,14 @@ impl OpenLink {
         self.free.len()
     }
 
+    /// The master's port on a bus.
+    ///
+    /// # Panics
+    /// Where there is no such bus.
+    pub fn master(&mut self, bus: usize) -> impl Bus {
+        self.link.port(bus)
+    }
+
     /// Writes the drives' changed stored values into the scenario's file (`drives.memory`).
     ///
     /// # Errors
@@ -278,11 +286,11 @@ mod tests {
     /// The answer of the drive of l1.
     fn ask(link: &mut OpenLink, now_ns: &mut u64, request: SdoRequest) -> SdoResponse {
         let node = NodeId::new(4).unwrap();
-        link.link.port(1).send(*now_ns, request.frame(node)).unwrap();
+        link.master(1).send(*now_ns, request.frame(node)).unwrap();
         for _ in 0..20 {
             *now_ns += MS;
             link.advance(*now_ns).unwrap();
-            while let Some(received) = link.link.port(1).receive(*now_ns).unwrap() {
+            while let Some(received) = link.master(1).receive(*now_ns).unwrap() {
                 if received.frame.id() == Cob::SdoResponse(node).into() {
                     return SdoResponse::decode(received.frame.data()).unwrap();
                 }
