@@ -470,7 +470,7 @@ fn an_own_motion_is_declared_lasts_as_long_as_the_scenario_says_and_something_is
         (required, 1.6, "PASS", "ended in state finished, own motion of the controller"),
         ("", 1.6, "UNTESTED", "nothing judged the motion, which is not the scenario's: "),
         (of_its_word, 1.6, "UNTESTED", "nothing judged the motion, which is not the scenario's: "),
-        (required, 0.4, "FAIL", "the controller's motion ended early: it ran for "),
+        (required, 0.4, "FAIL", "the controller's motion ended early: "),
     ];
     for (scenario, end_s, word, finding) in cases {
         let play: Play = if end_s > 1.0 {

@@ -8,7 +8,7 @@ use clap::Args;
 use masseter_report::why::{Detected, Interval, Left, Why};
 use masseter_runtime::injection::{Injected, Withdrawn};
 use masseter_scenario::wording::counted;
-use masseter_terminal::{Exit, Failure, Format, OrFailure, result};
+use masseter_terminal::{Exit, Failure, Format, OrFailure, result, status};
 
 use crate::run::interrupts::Interrupts;
 use crate::vary::why;
@@ -51,12 +51,16 @@ fn withdrawn(text: &str) -> anyhow::Result<Withdrawn> {
 pub(super) fn why(args: &WhyArgs) -> Result<Exit, Failure> {
     let interrupts = Interrupts::of_verb()?;
     let why = why::why(&args.run, args.without, &interrupts).usage()?;
-    let page = masseter_report::explain(&args.run, &why)?;
     let text = match args.format {
-        Format::Human => format!("{}report: {}\n", in_words(&why), page.display()),
+        Format::Human => in_words(&why),
         Format::Json => serde_json::to_string_pretty(&why).map(|json| json + "\n").context("JSON").usage()?,
     };
     result(&text).usage()?;
+    // An archive takes no files; the answer is given.
+    match masseter_report::explain(&args.run, &why) {
+        Ok(page) => status!("report: {}", page.display()),
+        Err(Failure { error, .. }) => status!("masseter: the page stays as it was: {error:#}"),
+    }
     Ok(Exit::Passed)
 }
 

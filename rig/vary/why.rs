@@ -7,6 +7,7 @@
 #[cfg(test)]
 mod tests;
 
+use std::iter;
 use std::path::Path;
 
 use anyhow::{Context, ensure};
@@ -16,10 +17,12 @@ use masseter_judge::{Check, CheckResult, EventRecord, Figures, Verdict, Watch};
 use masseter_plan::{Overrides, RunPlan, scenario_with_overrides};
 use masseter_recording::{Manifest, RunFolder};
 use masseter_report::why::{Detected, Instant, Interval, Left, Look, Why};
-use masseter_runtime::injection::Withdrawn;
+use masseter_runtime::injection::{Injected, Withdrawn};
 use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind};
 use masseter_runtime::named::NamedValues;
+use masseter_scenario::Scenario;
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
+use masseter_scenario::wording::counted;
 use masseter_terminal::Exit;
 use masseter_virtual_time::{Branches, Mark, Requests, Run};
 
@@ -45,9 +48,25 @@ pub(crate) fn why(run: &Path, withdrawn: Withdrawn, interrupts: &Interrupts) -> 
         format!("the controller '{name}' is none of the rig's, and its state cannot be copied: only 'motion' and 'hold' can go on from an instant")
     })?;
     let scenario = scenario_with_overrides(Some(&folder.scenario()), &Overrides::default())?;
+    check_entries(&scenario, withdrawn)?;
     let plan = resolve_simulated(&scenario, Some(&folder.scenario()), kind.builder())?;
     let digest = digest_of(&folder)?;
     Question { plan, build: kind.builder(), manifest, withdrawn, interrupts }.answer(&digest)
+}
+
+/// Refuses to take away what the scenario does not have.
+fn check_entries(scenario: &Scenario, withdrawn: Withdrawn) -> anyhow::Result<()> {
+    let (faults, stimuli) = (scenario.faults.len(), scenario.stimulus.len());
+    let has_it = match withdrawn {
+        Withdrawn::All => faults + stimuli > 0,
+        Withdrawn::Faults => faults > 0,
+        Withdrawn::Stimuli => stimuli > 0,
+        Withdrawn::One(Injected::Fault(place)) => place < faults,
+        Withdrawn::One(Injected::Stimulus(place)) => place < stimuli,
+    };
+    let [faults, stimuli] = [counted(faults as u64, "fault"), format!("{stimuli} stimuli")];
+    ensure!(has_it, "the scenario has {faults} and {stimuli}: --without {} takes nothing away", name_of(withdrawn));
+    Ok(())
 }
 
 /// The digest of the run as it was judged.
@@ -99,7 +118,7 @@ impl Question<'_> {
             "the run fails without them, too ({}): they are not the cause",
             verdict.reason
         );
-        scan.play(first - 1, figures.cycles)?;
+        scan.play(first.saturating_sub(1), figures.cycles)?;
         let intervals = intervals(&scan.looks);
         let last = intervals.iter().rfind(|interval| interval.passes).map_or(0, |interval| interval.to_cycle);
         let Scan { question, check, looks, .. } = scan;
@@ -120,7 +139,7 @@ impl Question<'_> {
             detection: detection.map(|event| Detected {
                 cycle: event.cycle,
                 event: event.in_words(),
-                after_ms: (event.cycle - last) as f64 * period_ms,
+                after_ms: (event.cycle - last - 1) as f64 * period_ms,
             }),
             looks,
         })
@@ -235,23 +254,27 @@ struct Scan<'a> {
 }
 
 impl Scan<'_> {
-    /// Looks at an instant after all others.
-    fn visit(&mut self, cycle: u64) -> anyhow::Result<()> {
+    /// Looks at an instant after all others, or at the controller's last cycle; returns the cycle.
+    fn visit(&mut self, cycle: u64) -> anyhow::Result<u64> {
         let mark = self.mark(self.marks.len() - 1, cycle)?;
         let look = self.look(&mark)?;
         self.marks.push(mark);
         self.looks.push(look);
-        Ok(())
+        Ok(look.cycle)
     }
 
     /// Looks at a grid from the first cycle in which something acts, and between neighbours that differ.
     fn play(&mut self, acting: u64, cycles: u64) -> anyhow::Result<()> {
         let step = (cycles.saturating_sub(acting) / LOOKS).max(1);
-        for cycle in (acting.max(1)..cycles).step_by(step as usize) {
-            self.visit(cycle)?;
+        let grid = (acting.max(1)..cycles).step_by(step as usize);
+        // The last instant is that of the controller's last cycle.
+        for cycle in grid.chain(iter::once(u64::MAX)) {
+            if self.visit(cycle)? < cycle {
+                break;
+            }
         }
-        // At the end nothing can be taken away.
-        self.looks.push(Look { cycle: cycles, passes: false, margin: None });
+        let ends_well = self.looks.last().is_some_and(|look| look.passes);
+        ensure!(!ends_well, "what fails the run acts after the controller's last cycle: nothing is too late before");
         let mut place = 0;
         while let Some([before, after]) = self.looks.get(place..place + 2) {
             if before.passes == after.passes || after.cycle - before.cycle == 1 {

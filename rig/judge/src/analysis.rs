@@ -364,7 +364,7 @@ impl Analysis {
             stopped_by,
             enabled_s,
             running_s,
-            motion: MotionFigures { lag_causes_ms, rest_s, ..self.played.into_figures(rest_m) },
+            motion: MotionFigures { rest_s, lag_causes_ms, ..self.played.into_figures(rest_m) },
             standstill: self.standstill.into_figures(),
             outage: self.outage.outage(self.period_ns),
             tracking,

@@ -107,7 +107,8 @@ fn motion_lag(motion: &MotionFigures, limit_ms: f64) -> Option<Check> {
     let check = Check::judged("motion lag", format!("{lag_ms:.1} ms, limit {limit_ms} ms{why}"), is_kept);
     let (what, beyond_ms) = motion.ahead_ms.map_or(("delay", lag_ms), |ahead_ms| ("lead", ahead_ms));
     let breach = Breach::new(what, format!("{beyond_ms:.1} ms"), format!("{limit_ms} ms"));
-    Some(check.with_breach(breach.at(motion.late_ns)))
+    // A lead is found over a window.
+    Some(check.with_breach(breach.at(motion.late_ns.filter(|_| motion.ahead_ms.is_none()))))
 }
 
 /// What the controller did that put the motion beyond its limit; none where it waited, or kept the limit.
@@ -348,7 +349,7 @@ pub(crate) enum Shortfall {
     OutOfOrder(Disorder),
     /// The scenario's motion moves nothing.
     Still,
-    /// The motion did not run, with enabled drives, for as long as it is to last. Its requirements judge no other time.
+    /// The motion was not played for as long as it is to last; an own one counts with enabled drives. Its requirements judge no other time.
     Early { running_s: f64, duration_s: f64 },
     /// The motion is the controller's own or gone since the run, and no requirement judges the jaw.
     Unjudged,
@@ -460,8 +461,8 @@ impl Display for Shortfall {
             Self::Still => f.write_str("the scenario's motion does not move the jaw"),
             Self::Early { running_s, duration_s } => write!(
                 f,
-                "the controller's motion ended early: it ran for {running_s:.2} of {duration_s:.2} s with enabled drives; \
-                 --duration declares its end"
+                "the controller's motion ended early: {running_s:.2} of its {duration_s:.2} s were played; --duration \
+                 declares the end of an own one"
             ),
             Self::Unjudged => f.write_str(
                 "nothing judged the motion, which is not the scenario's: require something of the true jaw in [[require]], such as \

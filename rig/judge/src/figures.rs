@@ -4,7 +4,7 @@
 
 use masseter_model::geometry::AXES;
 use masseter_recording::Damage;
-use masseter_runtime::messages::codes::{ControllerState, EventKind};
+use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind};
 use serde::Serialize;
 
 use crate::breach::PathBreach;
@@ -126,17 +126,29 @@ pub struct Figures {
     pub over_time: OverTime,
 }
 
+/// A fault that ended may show so long after, ns.
+const AFTERMATH_NS: u64 = 500_000_000;
+
 impl Figures {
     /// Messages that were published and not recorded.
     pub fn missing_messages(&self) -> u64 {
         self.topics.iter().map(|topic| topic.missing).sum()
     }
 
-    /// The fault of the scenario that struck first, if that was before anybody reported a fault.
+    /// The fault of the scenario that struck last before anybody reported a fault, unless the fault had ended long before.
     pub(crate) fn declared_cause(&self) -> Option<&FaultFigures> {
         let first = self.events.iter().find(|event| event.kind == EventKind::Fault);
-        let struck = self.faults.iter().filter(|fault| fault.struck_ns.is_some());
-        let cause = struck.min_by_key(|fault| fault.struck_ns)?;
-        first.is_none_or(|first| cause.struck_ns <= Some(first.time_ns)).then_some(cause)
+        let reported_ns = first.map_or(u64::MAX, |event| event.time_ns);
+        let ended_ns = |fault: &FaultFigures| {
+            let is_its_end = |event: &&EventRecord| {
+                event.cause == Cause::FaultEnded && event.value as usize == fault.number
+            };
+            self.events.iter().filter(is_its_end).map(|event| event.time_ns).next_back()
+        };
+        let is_recent = |fault: &FaultFigures| {
+            ended_ns(fault).is_none_or(|ended_ns| reported_ns <= ended_ns.saturating_add(AFTERMATH_NS))
+        };
+        let struck = self.faults.iter().filter(|fault| fault.struck_ns.is_some_and(|ns| ns <= reported_ns));
+        struck.filter(|fault| is_recent(fault)).max_by_key(|fault| fault.struck_ns)
     }
 }

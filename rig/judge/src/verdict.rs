@@ -236,7 +236,7 @@ fn since_motion_s(events: &[EventRecord], time_ns: u64) -> Option<f64> {
     Some(time_ns.checked_sub(began.time_ns)? as f64 / 1e9)
 }
 
-/// The fault of the scenario that came before every reported one.
+/// The fault of the scenario that came before every reported one, in words.
 fn declared_cause(scenario: &Scenario, figures: &Figures) -> Option<String> {
     let cause = figures.declared_cause()?;
     let declared = scenario.faults.get(cause.number.checked_sub(1)?)?;
@@ -339,7 +339,7 @@ fn excuse(ending: &Ending, timing: &Timing, outage: Option<Outage>) -> Option<St
 fn with_shortfall((outcome, reason): OutcomeReason, manifest: &Manifest, figures: &Figures) -> OutcomeReason {
     let short = Shortfall::of(manifest, figures);
     // A motion at another time is the cause of what the jaw did not go.
-    let is_of_time = short.is_none_or(|short| matches!(short, Shortfall::NotPlayed { .. }));
+    let is_of_time = short.is_none_or(|short| matches!(short, Shortfall::NotPlayed { .. } | Shortfall::Early { .. }));
     let cause = lag_cause(&figures.motion, manifest.scenario.checks.motion_lag_ms).filter(|_| is_of_time);
     let why = cause.into_iter().chain(short.map(|short| short.to_string()));
     (outcome, why.fold(reason, |reason, why| format!("{reason}; {why}")))
@@ -457,7 +457,7 @@ fn is_of_scenario(check: &Check) -> bool {
 /// The sentence of a step, with the arguments and the command of this run's machine.
 fn in_words(step: NextStep, manifest: &Manifest) -> String {
     let mending = manifest.mending_command.as_deref().unwrap_or_default();
-    step.sentence().replace("CLOCK", &again(manifest)).replace("MEND", mending)
+    step.sentence().replace("MEND", mending).replace("CLOCK", &again(manifest))
 }
 
 /// The arguments of `run` that play a scenario as this run did.

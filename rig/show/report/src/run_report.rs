@@ -98,7 +98,7 @@ pub fn explain(path: &Path, why: &Why) -> Result<PathBuf, Failure> {
     let html =
         page::explained(&manifest, &figures, &verdict, why).context("cannot write the page").incomplete()?;
     let page = folder.file("report.html");
-    fs::write(&page, html).with_context(|| format!("cannot write {}", page.display())).incomplete()?;
+    folder.keep(&page, &html).with_context(|| format!("cannot write {}", page.display())).incomplete()?;
     Ok(page)
 }
 
