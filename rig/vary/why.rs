@@ -65,7 +65,11 @@ fn check_entries(scenario: &Scenario, withdrawn: Withdrawn) -> anyhow::Result<()
         Withdrawn::One(Injected::Stimulus(place)) => place < stimuli,
     };
     let [faults, stimuli] = [counted(faults as u64, "fault"), format!("{stimuli} stimuli")];
-    ensure!(has_it, "the scenario has {faults} and {stimuli}: --without {} takes nothing away", name_of(withdrawn));
+    ensure!(
+        has_it,
+        "the scenario has {faults} and {stimuli}: --without {} takes nothing away",
+        name_of(withdrawn)
+    );
     Ok(())
 }
 
@@ -274,7 +278,10 @@ impl Scan<'_> {
             }
         }
         let ends_well = self.looks.last().is_some_and(|look| look.passes);
-        ensure!(!ends_well, "what fails the run acts after the controller's last cycle: nothing is too late before");
+        ensure!(
+            !ends_well,
+            "what fails the run acts after the controller's last cycle: nothing is too late before"
+        );
         let mut place = 0;
         while let Some([before, after]) = self.looks.get(place..place + 2) {
             if before.passes == after.passes || after.cycle - before.cycle == 1 {

@@ -339,7 +339,8 @@ fn excuse(ending: &Ending, timing: &Timing, outage: Option<Outage>) -> Option<St
 fn with_shortfall((outcome, reason): OutcomeReason, manifest: &Manifest, figures: &Figures) -> OutcomeReason {
     let short = Shortfall::of(manifest, figures);
     // A motion at another time is the cause of what the jaw did not go.
-    let is_of_time = short.is_none_or(|short| matches!(short, Shortfall::NotPlayed { .. } | Shortfall::Early { .. }));
+    let is_of_time =
+        short.is_none_or(|short| matches!(short, Shortfall::NotPlayed { .. } | Shortfall::Early { .. }));
     let cause = lag_cause(&figures.motion, manifest.scenario.checks.motion_lag_ms).filter(|_| is_of_time);
     let why = cause.into_iter().chain(short.map(|short| short.to_string()));
     (outcome, why.fold(reason, |reason, why| format!("{reason}; {why}")))

@@ -72,6 +72,7 @@ mod shortfall {
     const PLAYED: MotionFigures = MotionFigures {
         way_mm: Some(900.0),
         played: Some(0.999),
+        rest_s: Some(0.0),
         lag_ms: Some(0.0),
         late_ns: None,
         ahead_ms: None,
