@@ -241,8 +241,9 @@ mod tests {
             format!("{},{x},0,{z},{},0,{},0\n", f64::from(row) / 100.0, half.cos(), half.sin())
         };
         let text: String = (0..=200).map(row).collect();
-        let path =
-            std::env::temp_dir().join(format!("masseter-recorded-{}-{lowpass_hz}.csv", std::process::id()));
+        // Tests of one process run side by side.
+        let name = format!("masseter-recorded-{}-{:?}.csv", std::process::id(), std::thread::current().id());
+        let path = std::env::temp_dir().join(name);
         std::fs::write(&path, "time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n".to_owned() + &text).unwrap();
         let scenario = Scenario::default();
         let mechanism = Mechanism::new(&scenario.mechanism).unwrap();
