@@ -332,7 +332,7 @@ impl Processes {
         let is_killed = |status: &ExitStatus| status.signal().is_some();
         let ending = if interrupts.is_stop_requested() {
             Ending::Interrupted
-        } else if let Some(ending) = self.end_silent() {
+        } else if let Some(ending) = self.end_silent(has_left) {
             ending
         } else if has_left && ![recorder, plant].iter().flatten().any(is_killed) {
             return None;
@@ -356,13 +356,16 @@ impl Processes {
     }
 
     /// Kills the first process that was reported to be silent in lockstep, if any. Were it stopped and went on, it
-    /// would find the others silent.
-    fn end_silent(&mut self) -> Option<Ending> {
+    /// would find the others silent. `has_left`: whether the controller has ended by itself.
+    fn end_silent(&mut self, has_left: bool) -> Option<Ending> {
         if !self.is_lockstep {
             return None;
         }
-        let reports = [self.controller.reports().and_then(Reports::silence), self.plant.reports.silence()];
-        let Silence { process, cycle, silent_s } = reports.into_iter().flatten().next()?;
+        let of_controller = self.controller.reports().and_then(Reports::silence);
+        // Without the controller the recorder may have nothing to answer.
+        let of_plant = self.plant.reports.silence();
+        let of_plant = of_plant.filter(|of| of.process != Party::Recorder || !has_left);
+        let Silence { process, cycle, silent_s } = of_controller.or(of_plant)?;
         let fate = match process {
             Party::Controller => self.controller.give_up(),
             Party::Plant => self.plant.give_up(),
@@ -374,7 +377,7 @@ impl Processes {
 
     /// The controller's ending. If it died, waits for the plant's master to stop the drives.
     fn controller_ending(&mut self, end: End, interrupts: &Interrupts) -> io::Result<Ending> {
-        if let Some(ending) = self.end_silent() {
+        if let Some(ending) = self.end_silent(matches!(end, End::Failed { .. })) {
             return Ok(ending);
         }
         let reason = match end {
