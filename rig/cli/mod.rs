@@ -331,7 +331,7 @@ mod tests {
             }
             for quoted in quoted(sentence) {
                 let line = quoted.replace("RUN", "runs/latest").replace("CLOCK", "virtual");
-                // The machine knows the command that mends it.
+                // The command that mends depends on the machine.
                 let line = line.replace("MEND", "masseter doctor");
                 if line.starts_with("masseter ") {
                     assert_parsed(&line);

@@ -1,12 +1,11 @@
 """The transport of a command and a reading to a controller in each language, at 1 kHz: the rig's own, and one session in C++ and
-one in Python, each blocking and polling, in turn. Beside them bare iceoryx2 between two processes.
+one in Python, each blocking and polling, in turn.
 
     python tests/realtime/round_trip.py MASSETER TARGET ROUNDS
 
 TARGET holds release/libmasseter_c.so. Exit code 1 if C++ takes more than 1.5 times the transport of the rig's own controller.
 """
 
-import json
 import subprocess
 import sys
 import tempfile
@@ -52,15 +51,6 @@ def round_trip_us(command: str, program: str, folder: Path) -> float:
     return float(np.median(to_controller) + np.median(to_plant)) / 1e3
 
 
-def bare_us(command: str) -> float:
-    ended = subprocess.run(
-        [command, "bench", "ipc", "--rounds", "1", "--format", "json"], capture_output=True, text=True
-    )
-    candidates = json.loads(ended.stdout)["comparisons"][0]["candidates"]
-    bare = next(one for one in candidates if one["name"] == "bare iceoryx2")
-    return float(bare["percentiles"][0]["median"]) / 1e3
-
-
 def main(command: str, target: str, rounds: str) -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -74,18 +64,15 @@ def main(command: str, target: str, rounds: str) -> None:
             "Python, polling": script(folder, "python-polling", f"{python} polling"),
         }
         times: dict[str, list[float]] = {one: [] for one in programs}
-        bare = []
         for number in range(int(rounds)):
             for one, path in programs.items():
                 times[one].append(round_trip_us(command, path, folder / f"run-{number}-{len(one)}-{Path(path).name}"))
-            bare.append(bare_us(command))
     own = times["the rig's own"]
     print("| controller | taking a reading and handing over a command, p50, µs | against the rig's own |")
     print("| --- | ---: | ---: |")
     for one, found in times.items():
         ratio = np.median(np.array(found) / np.array(own))
         print(f"| {one} | {np.median(found):.2f} ({min(found):.2f}–{max(found):.2f}) | {ratio:.2f} × |")
-    print(f"| bare iceoryx2, round trip between two polling processes | {np.median(bare):.2f} | |")
     ratios = [np.median(np.array(times[f"C++, {way}"]) / np.array(own)) for way in ("blocking", "polling")]
     sys.exit(int(max(ratios) > MOST))
 

@@ -349,8 +349,8 @@ pub(crate) enum Shortfall {
     OutOfOrder(Disorder),
     /// The scenario's motion moves nothing.
     Still,
-    /// The motion was not played for as long as it is to last; an own one counts with enabled drives. Its requirements judge no other time.
-    Early { running_s: f64, duration_s: f64 },
+    /// The motion ended too early. Requirements judge only what was played.
+    Early { running_s: f64, duration_s: f64, least_s: f64 },
     /// The motion is the controller's own or gone since the run, and no requirement judges the jaw.
     Unjudged,
     /// The controller alone states or asks for the expected safe stop, and nothing caused or judged the stop.
@@ -393,15 +393,17 @@ impl Shortfall {
 
     fn early(manifest: &Manifest, figures: &Figures) -> Option<Self> {
         let (running_s, duration_s) = (figures.running_s, manifest.motion_s);
-        let is_early = running_s < WHOLE_TIME * duration_s && !was_stopped_by_request(figures);
-        is_early.then_some(Self::Early { running_s, duration_s })
+        let least_s = WHOLE_TIME * duration_s;
+        let is_early = running_s < least_s && !was_stopped_by_request(figures);
+        is_early.then_some(Self::Early { running_s, duration_s, least_s })
     }
 
     /// The scenario's motion may be faster than written; what is left of it counts.
     fn cut(manifest: &Manifest, figures: &Figures) -> Option<Self> {
-        let (rest_s, duration_s) = (figures.motion.rest_s?, manifest.motion_s);
-        let most_s = (1.0 - WHOLE_TIME) * duration_s + manifest.scenario.checks.motion_lag_ms / 1e3;
-        (rest_s > most_s).then_some(Self::Early { running_s: duration_s - rest_s, duration_s })
+        let duration_s = manifest.motion_s;
+        let running_s = duration_s - figures.motion.rest_s?;
+        let least_s = WHOLE_TIME * duration_s - manifest.scenario.checks.motion_lag_ms / 1e3;
+        (running_s < least_s).then_some(Self::Early { running_s, duration_s, least_s })
     }
 
     fn unjudged(manifest: &Manifest, figures: &Figures) -> Option<Self> {
@@ -429,9 +431,8 @@ impl Shortfall {
             Self::NotPlayed { share, .. } => {
                 Some(Breach::new("played part of the motion", percent(share), percent(WHOLE)).over(motion_ns))
             }
-            Self::Early { running_s, duration_s } => {
-                let breach =
-                    Breach::new("the motion ran for", seconds(running_s), seconds(WHOLE_TIME * duration_s));
+            Self::Early { running_s, least_s, .. } => {
+                let breach = Breach::new("the motion ran for", seconds(running_s), seconds(least_s));
                 Some(breach.at(motion_ns.map(|[_, ended_ns]| ended_ns)))
             }
             Self::OutOfOrder(disorder) => Some(out_of_order(disorder).at(figures.disorder_ns)),
@@ -459,10 +460,10 @@ impl Display for Shortfall {
             ),
             Self::OutOfOrder(disorder) => disorder.fmt(f),
             Self::Still => f.write_str("the scenario's motion does not move the jaw"),
-            Self::Early { running_s, duration_s } => write!(
+            Self::Early { running_s, duration_s, .. } => write!(
                 f,
-                "the controller's motion ended early: {running_s:.2} of its {duration_s:.2} s were played; --duration \
-                 declares the end of an own one"
+                "the controller's motion ended early: {running_s:.2} of its {duration_s:.2} s were played; for a \
+                 motion of its own, set the end by --duration"
             ),
             Self::Unjudged => f.write_str(
                 "nothing judged the motion, which is not the scenario's: require something of the true jaw in [[require]], such as \

@@ -289,12 +289,13 @@ mod shortfall {
             });
             assert_eq!(found, expected, "{result:?}");
         }
-        let early = Shortfall::Early { running_s: 4.3, duration_s: 10.0 };
+        let early = Shortfall::Early { running_s: 4.3, duration_s: 10.0, least_s: 9.9 };
         assert_eq!(own(|_, figures| figures.running_s = 4.3), Some(early));
         // The scenario's motion may be faster than written, and be over sooner.
         assert_eq!(shortfall(|_, figures| figures.running_s = 4.3), None);
         assert_eq!(shortfall(|_, figures| figures.motion.rest_s = Some(0.11)), None);
-        assert_eq!(shortfall(|_, figures| figures.motion.rest_s = Some(5.7)), Some(early));
+        let cut = Shortfall::Early { running_s: 9.8, duration_s: 10.0, least_s: 9.88 };
+        assert_eq!(shortfall(|_, figures| figures.motion.rest_s = Some(0.2)), Some(cut));
         let interrupted = own(|_, figures| {
             figures.running_s = 4.3;
             stop_by_request(figures);

@@ -4,14 +4,14 @@
 //! run draws itself (`masseter-page`).
 //!
 //! ```
-//! use masseter_charts::{Axis, BLUE, Chart, Look, Scale, Series, drawing};
+//! use masseter_charts::{Axis, BLUE, Chart, Look, Series, drawing};
 //!
 //! let points = vec![(0.0, 0.0), (0.1, 4.0), (0.2, 5.0)];
 //! let chart = Chart {
 //!     frame: [0.0, 0.0, 960.0, 260.0],
 //!     title: "Step response".to_owned(),
-//!     x: Axis { label: "time, s".to_owned(), scale: Scale::Linear, ends: [0.0, 0.2] },
-//!     y: Axis { label: "stroke, mm".to_owned(), scale: Scale::Linear, ends: [0.0, 5.0] },
+//!     x: Axis { label: "time, s".to_owned(), ends: [0.0, 0.2] },
+//!     y: Axis { label: "stroke, mm".to_owned(), ends: [0.0, 5.0] },
 //!     series: vec![Series { name: "slide 1".to_owned(), colour: BLUE, look: Look::Line, points }],
 //! };
 //! let drawn = drawing([960.0, 260.0], &[chart]);
@@ -22,7 +22,7 @@ mod ticks;
 
 use std::fmt::Write;
 
-use ticks::{label_of_step, linear_ticks, log_ticks, plain_label, tick_step};
+use ticks::{label_of_step, linear_ticks, tick_step};
 
 // Colours that colour-blind people can tell apart (Okabe and Ito), and one for what stays in the background.
 /// Blue.
@@ -46,24 +46,11 @@ const LEAST_SHARE: f64 = 1e-9;
 /// A path of no size is drawn in a box of this size, in the unit of its axes.
 const LEAST_PATH: f64 = 1.0;
 
-/// What stands along an axis.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Scale {
-    /// Values, evenly.
-    Linear,
-    /// Positive values, by their logarithm.
-    Log,
-    /// Names: the first at 0, the next at 1.
-    Names(Vec<String>),
-}
-
 /// An axis.
 #[derive(Debug, Clone)]
 pub struct Axis {
     /// What it shows, with the unit.
     pub label: String,
-    /// What stands along it.
-    pub scale: Scale,
     /// The values at its ends.
     pub ends: [f64; 2],
 }
@@ -74,7 +61,7 @@ impl Axis {
     pub fn around(label: &str, values: impl IntoIterator<Item = f64>, room: f64) -> Self {
         let [low, high] = extent(values);
         let room = room * (high - low);
-        Self { label: label.to_owned(), scale: Scale::Linear, ends: [low - room, high + room] }
+        Self { label: label.to_owned(), ends: [low - room, high + room] }
     }
 
     /// To the right and upwards, in one scale around all points of a chart of this width and height, px. `around` is the extent of
@@ -99,36 +86,23 @@ impl Axis {
 
     /// Both ends, along which places are even.
     fn places(&self) -> [f64; 2] {
-        let [low, high] = self.ends.map(|end| self.place(end));
+        let [low, high] = self.ends;
         let least = LEAST.max(LEAST_SHARE * low.abs().max(high.abs()));
         if low.is_finite() && high.is_finite() { [low, high.max(low + least)] } else { [0.0, 1.0] }
-    }
-
-    fn place(&self, value: f64) -> f64 {
-        if self.scale == Scale::Log { value.log10() } else { value }
     }
 
     /// Where a value lies: 0 at the lower end, 1 at the upper one.
     fn share(&self, value: f64) -> f64 {
         let [low, high] = self.places();
-        (self.place(value) - low) / (high - low)
+        (value - low) / (high - low)
     }
 
     /// Labelled values.
     fn ticks(&self) -> Vec<(f64, String)> {
         let [low, high] = self.places();
-        match &self.scale {
-            Scale::Names(names) => (0..).map(f64::from).zip(names.iter().cloned()).collect(),
-            Scale::Log => {
-                let values = log_ticks(low, high).into_iter().map(|place| 10f64.powf(place));
-                values.map(|value| (value, plain_label(value))).collect()
-            }
-            Scale::Linear => {
-                let step = tick_step(high - low);
-                let values = linear_ticks(low, high).into_iter();
-                values.map(|value| (value, label_of_step(value, step))).collect()
-            }
-        }
+        let step = tick_step(high - low);
+        let values = linear_ticks(low, high).into_iter();
+        values.map(|value| (value, label_of_step(value, step))).collect()
     }
 }
 
@@ -279,11 +253,11 @@ mod tests {
 
     #[test]
     fn every_finite_point_lies_in_the_plot_and_others_are_left_out() {
-        let points = vec![(1.0, -2.0), (10.0, f64::NAN), (100.0, 3.0), (-1.0, 0.0)];
+        let points = vec![(1.0, -2.0), (10.0, f64::NAN), (100.0, 3.0), (f64::INFINITY, 0.0)];
         let chart = Chart {
             frame: [10.0, 20.0, 400.0, 300.0],
             title: "a < b".to_owned(),
-            x: Axis { label: "x".to_owned(), scale: Scale::Log, ends: [1.0, 100.0] },
+            x: Axis { label: "x".to_owned(), ends: [1.0, 100.0] },
             y: Axis::around("y", points.iter().map(|point| point.1), 0.1),
             series: vec![Series { name: "dots".to_owned(), colour: BLUE, look: Look::Dots, points }],
         };
@@ -292,7 +266,7 @@ mod tests {
         let plot = (20.0 + ROOM[1])..=(320.0 - ROOM[3]);
         let up = attributes(&svg, "cy");
         assert!(up.len() == 2 && up.iter().all(|y| plot.contains(y)) && up[0] > up[1], "{up:?}");
-        assert!(svg.contains("a &lt; b") && svg.contains(">10<"), "{svg}");
+        assert!(svg.contains("a &lt; b") && svg.contains(">20<"), "{svg}");
     }
 
     #[test]
@@ -321,14 +295,5 @@ mod tests {
         }
         let none = Axis::in_one_scale(["x", "y"], &[], frame, 1.1);
         assert!(none.iter().all(|axis| axis.share(3.0).is_finite()), "{none:?}");
-    }
-
-    #[test]
-    fn names_stand_at_their_places() {
-        let names = ["none", "all"].map(str::to_owned).to_vec();
-        let axis = Axis { label: String::new(), scale: Scale::Names(names), ends: [-0.5, 1.5] };
-        let shares = [0.0, 1.0].map(|place| (axis.share(place) * 100.0).round() as u32);
-        assert_eq!(shares, [25, 75]);
-        assert_eq!(axis.ticks(), [(0.0, "none".to_owned()), (1.0, "all".to_owned())]);
     }
 }

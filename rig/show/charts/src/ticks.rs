@@ -31,29 +31,8 @@ pub(crate) fn label_of_step(value: f64, step: f64) -> String {
     format!("{:.*}", decimals.max(0.0) as usize, if rounded == 0.0 { 0.0 } else { rounded })
 }
 
-/// Exponents of ten between two of them: whole ones where there are at least three, every second, third … one where there
-/// are many; otherwise those of 1, 2 and 5 times the powers of ten, or those of round values.
-pub(crate) fn log_ticks(low: f64, high: f64) -> Vec<f64> {
-    let [first, last] = [(low - 1e-9).ceil() as i64, (high + 1e-9).floor() as i64];
-    if last - first >= 2 {
-        let stride = ((last - first) as f64 / MOST).ceil() as i64;
-        return (first..=last)
-            .filter(|exponent| exponent % stride == 0)
-            .map(|exponent| exponent as f64)
-            .collect();
-    }
-    let parts = (low.floor() as i64..=high as i64 + 1)
-        .flat_map(|decade| [1.0_f64, 2.0, 5.0].map(|factor| decade as f64 + factor.log10()));
-    let parts: Vec<_> = parts.filter(|exponent| (low..=high).contains(exponent)).collect();
-    if parts.len() >= 3 {
-        return parts;
-    }
-    let values = linear_ticks(10f64.powf(low), 10f64.powf(high));
-    values.into_iter().filter(|value| *value > 0.0).map(f64::log10).collect()
-}
-
 /// A number without trailing zeros and without the rounding errors of binary fractions.
-pub(crate) fn plain_label(value: f64) -> String {
+fn plain_label(value: f64) -> String {
     if value != 0.0 && !(1e-5..1e9).contains(&value.abs()) {
         return format!("{value:.0e}");
     }
@@ -85,19 +64,6 @@ mod tests {
             assert_eq!(ticks.len(), linear_ticks(low, high).len(), "{ticks:?}");
         }
         assert!(linear_ticks(1.0, 1.0).is_empty() && linear_ticks(0.0, f64::INFINITY).is_empty());
-    }
-
-    #[test]
-    fn a_logarithmic_axis_is_labelled_at_round_values_however_short_it_is() {
-        let labels = |low: f64, high: f64| {
-            let exponents = log_ticks(low.log10(), high.log10()).into_iter();
-            exponents.map(|exponent| plain_label(10f64.powf(exponent))).collect::<Vec<_>>()
-        };
-        assert_eq!(labels(0.01, 1000.0), ["0.01", "0.1", "1", "10", "100", "1000"]);
-        assert_eq!(labels(30.0, 300.0), ["50", "100", "200"]);
-        assert_eq!(labels(120.0, 160.0), ["120", "125", "130", "135", "140", "145", "150", "155", "160"]);
-        assert_eq!(labels(1e-30, 1e2).first().unwrap(), "1e-28");
-        assert_eq!(labels(1e-8, 1e-5), ["1e-8", "1e-7", "1e-6", "0.00001"]);
     }
 
     #[test]

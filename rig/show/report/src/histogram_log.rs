@@ -15,7 +15,7 @@ use masseter_runtime::clock::SECOND_NS;
 use crate::logs::WriteError;
 
 /// Time that one line covers, ns.
-pub const INTERVAL_NS: u64 = SECOND_NS;
+const INTERVAL_NS: u64 = SECOND_NS;
 
 /// Writes the samples of each interval of a run into `folder`, which is created if it does not exist.
 pub(crate) fn write_all(folder: &Path, intervals: &[IntervalFigures]) -> Result<(), WriteError> {
@@ -29,20 +29,7 @@ pub(crate) fn write_all(folder: &Path, intervals: &[IntervalFigures]) -> Result<
 }
 
 /// Writes a log: the beginning of each second, ns, and its histogram.
-///
-/// ```
-/// use hdrhistogram::Histogram;
-/// use masseter_report::histogram_log;
-///
-/// let folder = tempfile::tempdir()?;
-/// let path = folder.path().join("latency.hlog");
-/// let mut second = Histogram::new(3)?;
-/// second.record(1000)?;
-/// histogram_log::write(&path, "latency, ns", [(0, &second)])?;
-/// assert!(std::fs::read_to_string(&path)?.contains("latency, ns"));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub fn write<H: Borrow<Histogram<u64>>>(
+fn write<H: Borrow<Histogram<u64>>>(
     path: &Path,
     comment: &str,
     intervals: impl IntoIterator<Item = (u64, H)>,

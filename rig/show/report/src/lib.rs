@@ -6,7 +6,7 @@
 
 pub mod compare;
 pub mod divergence;
-pub mod histogram_log;
+mod histogram_log;
 mod jaw_table;
 mod junit;
 mod logs;
