@@ -297,7 +297,7 @@ def test_an_fmu_that_cannot_run_here_is_refused_with_what_to_do(tmp_path: Path, 
     for name, (xml, binaries, said) in cases.items():
         assert said in refused(fmus.pack(tmp_path / f"{name}.fmu", xml, binaries))
     assert "is no FMU" in refused(text)
-    assert "is no FMU" in refused(tmp_path / "missing.fmu")
+    assert "is no file: give the path of an FMU" in refused(tmp_path / "missing.fmu")
     (tmp_path / "fmpy.py").write_text("raise ImportError('not here')")
     monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}")
     assert 'pip install "masseter[fmi]"' in refused(text)
