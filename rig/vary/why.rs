@@ -19,7 +19,7 @@ use masseter_recording::{Manifest, RunFolder};
 use masseter_report::why::{Detected, Instant, Interval, Left, Look, Why};
 use masseter_runtime::injection::{Injected, Withdrawn};
 use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind};
-use masseter_runtime::named::NamedValues;
+use masseter_runtime::named::Declared;
 use masseter_scenario::Scenario;
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 use masseter_scenario::wording::counted;
@@ -125,8 +125,8 @@ impl Question<'_> {
         scan.play(first.saturating_sub(1), figures.cycles)?;
         let intervals = intervals(&scan.looks);
         let last = intervals.iter().rfind(|interval| interval.passes).map_or(0, |interval| interval.to_cycle);
-        let Scan { question, check, looks, .. } = scan;
-        let left_first = question.compare(last)?;
+        let Scan { question, branches, check, looks, .. } = scan;
+        let left_first = question.compare(last, branches.declared())?;
         let began = figures.events.iter().find(|event| event.enters(ControllerState::Running));
         let motion_s =
             began.and_then(|began| Some((last + 1).checked_sub(began.cycle)? as f64 * period_ms / 1e3));
@@ -161,8 +161,8 @@ impl Question<'_> {
     }
 
     /// The signals that leave their nominal values first after that instant.
-    fn compare(&self, last: u64) -> anyhow::Result<Vec<Left>> {
-        let (mut nominal, mut found) = (self.watched(last)?, self.watched(last)?);
+    fn compare(&self, last: u64, declared: &Declared) -> anyhow::Result<Vec<Left>> {
+        let (mut nominal, mut found) = (self.watched(last, declared)?, self.watched(last, declared)?);
         nominal.run.withdraw(self.withdrawn);
         while !found.run.has_ended() && !nominal.run.has_ended() {
             nominal.run.play_cycle()?;
@@ -194,17 +194,13 @@ impl Question<'_> {
     }
 
     /// The run at that instant, with the values of its signals.
-    fn watched(&self, cycle: u64) -> anyhow::Result<Watched> {
-        let controller =
-            (self.build)(&self.plan.scenario, self.plan.mechanism.clone(), self.plan.trajectory.clone());
-        let named = NamedValues::new(controller.declared(), &self.plan.scenario.parameters)?;
-        let declared = named.settings().declared();
+    fn watched(&self, cycle: u64, declared: &Declared) -> anyhow::Result<Watched> {
         let registry = Registry::new(&self.plan.scenario, declared);
         let mut watch = Watch::new(&self.plan.scenario, declared);
         for signal in registry.signals() {
             watch.choose(&signal.name)?;
         }
-        let mut run = Run::with_controller(&self.plan, controller, watch)?;
+        let mut run = Run::new(&self.plan, self.build, watch)?;
         while run.cycle() < cycle {
             run.play_cycle()?;
         }

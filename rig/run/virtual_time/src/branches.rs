@@ -42,8 +42,7 @@ pub struct Branches {
 pub struct Mark {
     /// The number of the last cycle before that instant.
     pub cycle: u64,
-    /// The state of the run, for a run of the same plan with another sink.
-    pub snapshot: RunSnapshot,
+    snapshot: RunSnapshot,
     stream: Stream,
 }
 
