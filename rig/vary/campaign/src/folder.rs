@@ -117,6 +117,7 @@ impl CampaignFolder {
     /// When its folder cannot be made.
     pub fn attempt(&self, case: &Case) -> Result<Attempt, FolderError> {
         let attempts = self.path.join(ATTEMPTS);
+        let _no_sweep = self.hold_plan(FlockOperation::LockShared)?;
         let prefix = format!("{}.", case.id);
         let folder =
             tempfile::Builder::new().prefix(&prefix).tempdir_in(&attempts).map_err(system(&attempts))?;
@@ -127,15 +128,26 @@ impl CampaignFolder {
     /// Removes the attempts of processes that are gone.
     fn sweep(&self) -> Result<(), FolderError> {
         let attempts = self.path.join(ATTEMPTS);
+        let _no_beginning = self.hold_plan(FlockOperation::LockExclusive)?;
         for entry in fs::read_dir(&attempts).map_err(system(&attempts))? {
             let path = entry.map_err(system(&attempts))?.path();
-            // An attempt that just begins has no lock yet, and one that just ended is gone.
-            let Ok(file) = File::open(path.join(LOCK)) else { continue };
-            if flock(&file, FlockOperation::NonBlockingLockExclusive).is_ok() {
+            // No attempt begins now, so a folder without a lock belongs to a process that died before it had one.
+            let is_alive = File::open(path.join(LOCK))
+                .is_ok_and(|file| flock(&file, FlockOperation::NonBlockingLockExclusive).is_err());
+            if !is_alive {
                 let _ = fs::remove_dir_all(&path);
             }
         }
         Ok(())
+    }
+
+    /// Keeps the sweep and the beginning of attempts apart while the file lives: attempts share it, the sweep has it
+    /// alone.
+    fn hold_plan(&self, how: FlockOperation) -> Result<File, FolderError> {
+        let path = self.plan_path();
+        let plan = File::options().append(true).open(&path).map_err(system(&path))?;
+        flock(&plan, how).map_err(|error| system(&path)(error.into()))?;
+        Ok(plan)
     }
 
     fn read_plan(&self) -> Result<Campaign, FolderError> {
@@ -282,12 +294,14 @@ mod tests {
         let parent = tempfile::tempdir().unwrap();
         let (folder, lock) = CampaignFolder::begin(parent.path(), &two()).unwrap();
         let live = folder.attempt(&case(0)).unwrap();
-        let dead = parent.path().join(ATTEMPTS).join("00001-dead.x");
+        let attempts = parent.path().join(ATTEMPTS);
+        let [dead, dead_before_its_lock] = ["00001-dead.x", "00002-dead.y"].map(|name| attempts.join(name));
         fs::create_dir(&dead).unwrap();
         fs::write(dead.join(LOCK), "").unwrap();
+        fs::create_dir(&dead_before_its_lock).unwrap();
         drop(lock);
         CampaignFolder::begin(parent.path(), &two()).unwrap();
-        assert!(!dead.exists() && live.folder.path().exists());
+        assert!(!dead.exists() && !dead_before_its_lock.exists() && live.folder.path().exists());
     }
 
     #[test]
