@@ -20,7 +20,7 @@ use crate::messages::{Digest, NamedWatch, SequenceCheck};
 use crate::over_time::{AxisWatch, CONTROLLER, ContactWatch, OverTimeCollector, PLANT, Place};
 use crate::overruns::LoopSamples;
 use crate::played::{MotionFigures, PlayedWatch, StopWatch};
-use crate::poses::{estimated_pose, is_moving, is_running, true_pose};
+use crate::poses::{estimated_pose, is_running, true_pose};
 use crate::recorded::RecordedWatch;
 use crate::reference::Reference;
 use crate::requirements::Requirements;
@@ -287,7 +287,7 @@ impl Analysis {
         if let Some(reading) = &messages.reading {
             // Simulated time has no account of the loops, and no cycles that the machine lost.
             let is_excused = messages.is_disturbed && self.controller_skips.figures.worked_ns > 0;
-            self.played.count_command(reading, is_moving(messages.controller_state) && !is_excused);
+            self.played.add_reading(reading, messages.controller_state, is_excused);
         }
         self.requirements.iter_mut().for_each(|requirements| requirements.judge_sample(sample));
     }
@@ -329,7 +329,7 @@ impl Analysis {
         let topics = self.sequence.finish();
         let missing_frames =
             topics.iter().find(|topic| topic.topic == FrameTap::TOPIC).map_or(0, |topic| topic.missing);
-        let running_s = self.stop.running_cycles() as f64 * self.period_ns as f64 / 1e9;
+        let running_s = self.played.running_cycles() as f64 * self.period_ns as f64 / 1e9;
         let (stopped_by, enabled_cycles) = self.stop.into_figures();
         let enabled_s = enabled_cycles as f64 * self.period_ns as f64 / 1e9;
         let (intervals, worst_cycles, over_time, jaw_cycles) =

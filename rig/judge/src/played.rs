@@ -73,6 +73,8 @@ pub(super) struct PlayedWatch {
     missed_commands: u64,
     in_a_row: u64,
     most_in_a_row: u64,
+    /// Cycles in which the controller ran its motion with all drives enabled.
+    running_cycles: u64,
 }
 
 impl PlayedWatch {
@@ -93,6 +95,7 @@ impl PlayedWatch {
             missed_commands: 0,
             in_a_row: 0,
             most_in_a_row: 0,
+            running_cycles: 0,
         }
     }
 
@@ -123,14 +126,24 @@ impl PlayedWatch {
         }
     }
 
-    /// Takes the reading of a sample of the motion. It answers a command that came in time by the cycle of the reading before.
-    pub(super) fn count_command(&mut self, reading: &Reading, is_moving: bool) {
+    /// Takes the reading of a sample, with the controller's state in that cycle. The reading answers a command that came in time by
+    /// the cycle of the reading before, unless the machine excuses the command.
+    pub(super) fn add_reading(&mut self, reading: &Reading, state: Option<u32>, is_excused: bool) {
         let is_new = reading.answers_cycle > std::mem::replace(&mut self.answered, reading.answers_cycle);
         let before = std::mem::replace(&mut self.cycle, reading.cycle);
+        if is_running(state) && are_enabled(reading) {
+            self.running_cycles += reading.cycle.saturating_sub(before);
+        }
+        let is_moving = is_moving(state) && !is_excused;
         self.late_commands += u64::from(is_moving && is_new && reading.answers_cycle < before);
         self.in_a_row = if is_new || !is_moving { 0 } else { self.in_a_row + 1 };
         self.missed_commands += u64::from(self.in_a_row > 0);
         self.most_in_a_row = self.most_in_a_row.max(self.in_a_row);
+    }
+
+    /// In how many cycles the controller ran its motion with all drives enabled.
+    pub(super) fn running_cycles(&self) -> u64 {
+        self.running_cycles
     }
 
     /// How far the jaw's points move from one pose to another, m.
@@ -166,6 +179,10 @@ fn length(step: &Points) -> f64 {
     step.iter().map(Vec3::norm_squared).sum::<f64>().sqrt()
 }
 
+fn are_enabled(reading: &Reading) -> bool {
+    reading.drive_state.iter().all(|code| *code == DriveState::OperationEnabled.code())
+}
+
 /// States after the reading of a drive that left operation. The controller may miss that reading in the first.
 const STILL_MOVING: u32 = 2;
 
@@ -197,17 +214,14 @@ impl Display for StoppedBy {
 pub(super) struct StopWatch {
     stopped: Option<StoppedBy>,
     was_enabled: [bool; AXES],
-    /// The newest state is one of the motion, and whether it is `running`.
+    /// The newest state is one of the motion.
     is_moving: bool,
-    is_running: bool,
     /// When a drive left operation in the motion, ns, and how many states of the motion came since.
     left: Option<(u64, u32)>,
     has_left: bool,
     last_cycle: u64,
     /// Cycles in which all drives were enabled.
     enabled_cycles: u64,
-    /// Those of them in which the controller was in the state `running`.
-    running_cycles: u64,
     /// Whether the newest state is that of a controller that has finished; and whether no drive had power then. What master and
     /// drives report later stops no motion.
     is_finished: bool,
@@ -217,15 +231,11 @@ pub(super) struct StopWatch {
 impl StopWatch {
     /// Takes a reading. Returns whether it is that of a stop.
     pub(super) fn apply_reading(&mut self, reading: &Reading) -> bool {
-        let is_in = |state: DriveState| move |code: &u32| *code == state.code();
         let states = &reading.drive_state;
         let passed = reading.cycle.saturating_sub(self.last_cycle);
         self.last_cycle = reading.cycle;
-        if states.iter().all(is_in(DriveState::OperationEnabled)) {
-            self.enabled_cycles += passed;
-            self.running_cycles += if self.is_running { passed } else { 0 };
-        }
-        let is_quick = self.enabled_cycles > 0 && states.iter().any(is_in(DriveState::QuickStopActive));
+        self.enabled_cycles += if are_enabled(reading) { passed } else { 0 };
+        let is_quick = self.enabled_cycles > 0 && states.contains(&DriveState::QuickStopActive.code());
         let found = match reading.master_fault {
             0 => is_quick.then_some(StoppedBy::QuickStop),
             _ => Some(StoppedBy::Master),
@@ -255,7 +265,6 @@ impl StopWatch {
     /// Takes a state. A controller that ends its motion with the drives is no stop of theirs.
     pub(super) fn apply_state(&mut self, state: &State) {
         self.is_moving = is_moving(Some(state.controller_state));
-        self.is_running = is_running(Some(state.controller_state));
         self.is_finished = state.controller_state == ControllerState::Finished.code();
         let Some((left_ns, states)) = &mut self.left else { return };
         // The state of an earlier cycle may come later.
@@ -274,11 +283,6 @@ impl StopWatch {
     pub(super) fn apply_event(&mut self, event: &EventRecord) {
         let is_stop = event.is_fault_of_master() && !self.has_ended;
         self.stopped = self.stopped.or(is_stop.then_some(StoppedBy::Master));
-    }
-
-    /// In how many cycles the controller ran its motion with all drives enabled.
-    pub(super) fn running_cycles(&self) -> u64 {
-        self.running_cycles
     }
 
     /// What stopped the drives, and for how many cycles all of them were enabled.

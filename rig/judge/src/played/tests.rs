@@ -70,11 +70,11 @@ mod played {
         for lag_s in [0.0, 0.003, 0.002] {
             watch.add_sample(lag_s, 0.0, &sample(None, None));
         }
-        let moving = is_moving(Some(ControllerState::Running.code()));
+        let moving = Some(ControllerState::Running.code());
         for answers_cycle in [1, 2, 2, 2, 3, 3, 5, 6] {
-            watch.count_command(&Reading { answers_cycle, ..Reading::default() }, moving);
+            watch.add_reading(&Reading { answers_cycle, ..Reading::default() }, moving, false);
         }
-        watch.count_command(&Reading { answers_cycle: 6, ..Reading::default() }, false);
+        watch.add_reading(&Reading { answers_cycle: 6, ..Reading::default() }, None, false);
         let found = watch.into_figures(None);
         assert_eq!((found.missed_commands, found.missed_in_a_row), (3, 2));
         assert!((found.lag_ms.unwrap() - 3.0).abs() < 1e-12);
@@ -85,7 +85,11 @@ mod played {
         let late = |cycles_and_answers: &[(u64, u64)]| {
             let mut watch = PlayedWatch::new(&Scenario::default());
             for &(cycle, answers_cycle) in cycles_and_answers {
-                watch.count_command(&Reading { cycle, answers_cycle, ..Reading::default() }, true);
+                watch.add_reading(
+                    &Reading { cycle, answers_cycle, ..Reading::default() },
+                    Some(ControllerState::Running.code()),
+                    false,
+                );
             }
             let found = watch.into_figures(None);
             (found.late_commands, found.missed_commands)
@@ -143,14 +147,15 @@ mod stop {
     fn a_motion_runs_in_its_state_and_with_enabled_drives() {
         let (enabled, off) =
             (reading(DriveState::OperationEnabled, 0), reading(DriveState::SwitchOnDisabled, 0));
-        let mut watch = StopWatch::default();
+        let mut watch = PlayedWatch::new(&Scenario::default());
         let (runs, holds) = (ControllerState::Running, ControllerState::Holding);
-        let cycles = [(runs, enabled), (runs, off), (holds, enabled), (runs, enabled)];
-        for (cycle, (state, reading)) in (1..).zip(cycles) {
-            watch.apply_state(&State { controller_state: state.code(), ..State::default() });
-            watch.apply_reading(&Reading { cycle, ..reading });
+        let cycles =
+            [(1, runs, enabled), (2, runs, off), (3, holds, enabled), (4, runs, enabled), (7, runs, enabled)];
+        for (cycle, state, reading) in cycles {
+            watch.add_reading(&Reading { cycle, ..reading }, Some(state.code()), false);
         }
-        assert_eq!(watch.running_cycles(), 2);
+        // Of the cycles 5 and 6 there is no reading.
+        assert_eq!(watch.running_cycles(), 5);
     }
 
     #[test]
