@@ -97,7 +97,7 @@ fn running(workspace: &Workspace, name: &str) -> (Child, Child, PathBuf) {
     let arguments = ["--controller", "external", "--duration", "120", "--name", name, "--patience", "none"];
     let rig = workspace.start_lockstep(&arguments);
     let path = socket(&Domain::named(name).unwrap());
-    wait_until("the rig waits", || path.exists());
+    wait_until("the rig waits", || UnixStream::connect(&path).is_ok());
     let mut controller = Command::new(MASSETER);
     let controller = controller.args(["controller", "--rig", name]).stderr(Stdio::null()).spawn().unwrap();
     wait_until_it_records(workspace);
@@ -124,7 +124,8 @@ fn an_interrupt_and_a_death_end_the_run_under_attack_as_without_one() {
         assert!(taken < LONGEST_END, "{name}: {taken:?}");
         assert!(code == 130 || said.contains("the plant died: SIGKILL (9)"), "{said}");
         let refusals = said.lines().filter(|line| line.contains("refused")).count();
-        assert!(refusals < 8, "{name}: {said}");
+        // One line a second, whatever the number of attacks.
+        assert!(refusals <= taken.as_secs() as usize + 3, "{name}: {said}");
     }
 }
 

@@ -10,6 +10,7 @@ use crate::common::{Cores, LENIENT, Workspace, assert_played, has_event, massete
 use masseter_recording::{CDR_LITTLE_ENDIAN, Reader, Topic};
 use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest;
+use tungstenite::error::{Error, ProtocolError::ResetWithoutClosingHandshake};
 use tungstenite::http::HeaderValue;
 use tungstenite::{Message, WebSocket};
 
@@ -81,8 +82,8 @@ impl Watcher {
         self.socket.send(Message::Text(request.to_string().into())).unwrap();
     }
 
-    /// Every message of every topic, until the server says goodbye.
-    fn watch(mut self) -> BTreeMap<String, Vec<Vec<u8>>> {
+    /// Every message of every topic, until the server says goodbye or gives this client up; whether it has.
+    fn watch(mut self) -> (BTreeMap<String, Vec<Vec<u8>>>, bool) {
         let mut seen: BTreeMap<String, Vec<Vec<u8>>> = BTreeMap::new();
         loop {
             match self.socket.read() {
@@ -93,7 +94,8 @@ impl Watcher {
                     let topic = channel["topic"].as_str().unwrap();
                     seen.entry(topic.to_owned()).or_default().push(data[MESSAGE_HEAD..].to_vec());
                 }
-                Ok(Message::Close(_)) => return seen,
+                Ok(Message::Close(_)) => return (seen, false),
+                Err(Error::Io(_) | Error::Protocol(ResetWithoutClosingHandshake)) => return (seen, true),
                 other => panic!("{other:?}"),
             }
         }
@@ -129,9 +131,10 @@ fn a_watcher_sees_the_channels_and_messages_of_the_recording() {
     assert_eq!(watcher.info["op"], "serverInfo");
     assert_eq!(watcher.info["capabilities"], json!(["parameters", "parametersSubscribe"]));
     watcher.subscribe_to_all();
-    let seen = watcher.watch();
+    let (seen, is_given_up) = watcher.watch();
     let (status, said) = shown.finish();
     assert_played(&workspace.run_folder(), status, &said);
+    assert!(!is_given_up || said.contains("did not read to the end"), "{said}");
 
     let recorded = recorded(&workspace);
     for topic in ["command", "reading", "state", "truth", "frame"] {
@@ -216,9 +219,11 @@ fn clients_that_misbehave_or_vanish_disturb_neither_the_recording_nor_other_watc
         assert_eq!(text(&mut chatter.socket)["op"], "status", "{words}");
     }
     chatter.subscribe_to_all();
-    assert!(chatter.watch()["state"].len() > 500);
+    let (seen, is_given_up) = chatter.watch();
+    assert!(seen["state"].len() > 500);
     let (status, said) = shown.finish();
     assert_played(&workspace.run_folder(), status, &said);
+    assert!(!is_given_up || said.contains("did not read to the end"), "{said}");
     let proof = masseter(&["recording", "verify", workspace.run_folder().to_str().unwrap()]);
     assert_eq!(proof.status.code(), Some(0), "{}", stdout(&proof));
 }

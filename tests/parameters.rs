@@ -1,5 +1,6 @@
 //! Signals and parameters of a controller: declared, set from outside while it runs, recorded and reported.
 
+use std::os::unix::net::UnixStream;
 use std::process::{Child, Output};
 use std::thread;
 
@@ -129,7 +130,7 @@ fn signals_of_a_program_are_recorded_by_their_names_and_drawn() {
     let name = unique("signals");
     let rig = workspace.start_lockstep(&["--controller", "external", "--name", &name]);
     let waits = socket(&Domain::named(&name).unwrap());
-    wait_until("the rig waits", || waits.exists());
+    wait_until("the rig waits", || UnixStream::connect(&waits).is_ok());
     let controller = thread::spawn(move || {
         run_with_law(attach(Some(&name)).unwrap(), Box::new(Watching::default())).unwrap()
     });

@@ -80,7 +80,7 @@ fn a_process_that_is_killed_or_stalls_beyond_the_patience_ends_the_run_with_its_
         ("recorder", "stall", "size = '10 s'\n", silent),
     ] {
         let scenario = with_fault(&format!("{role}_{kind}"), size);
-        let (workspace, said) = in_lockstep(&scenario, &["--patience", "500ms"], 4);
+        let (workspace, said) = in_lockstep(&scenario, &["--patience", "2s"], 4);
         let summary = workspace.summary();
         let found = summary["verdict"]["reason"].as_str().unwrap();
         assert!(found.starts_with(&format!("the {role} died: {reason}")), "{found}: {said}");

@@ -69,8 +69,7 @@ with sync_playwright() as playwright:
     curve = page.locator("#section-motion .chart svg[tabindex] path.curve").first
     curve.scroll_into_view_if_needed()
     drawn = curve.get_attribute("d")
-    page.wait_for_timeout(500)
-    assert curve.get_attribute("d") != drawn
+    expect(curve).not_to_have_attribute("d", drawn, timeout=10_000)
     assert "incisal" in page.locator("#requirements").inner_text()
 
     # A parameter is changed; a value out of its range is refused in words.
@@ -78,8 +77,11 @@ with sync_playwright() as playwright:
     gain.fill("7")
     gain.press("Tab")
     listed = [MASSETER, "param", "get", "integral_gain_per_s"]
-    page.wait_for_timeout(500)
-    assert subprocess.run(listed, capture_output=True, text=True).stdout.strip() == "7"
+    for _ in range(20):
+        page.wait_for_timeout(500)
+        if (value := subprocess.run(listed, capture_output=True, text=True).stdout.strip()) == "7":
+            break
+    assert value == "7", value
     gain.fill("-3")
     gain.press("Tab")
     note = page.locator("#now .note")

@@ -72,7 +72,9 @@ mod tests {
             format!("\n5,{row:02};{x};0;0;1;0;0;0;{emg};{row};{note};{row}")
         };
         let text = HEAD.to_owned() + &(0..10).map(row).collect::<String>();
-        let path = std::env::temp_dir().join(format!("masseter-signals-{}.csv", std::process::id()));
+        // Tests run in threads of one process.
+        let owner = (std::process::id(), std::thread::current().id());
+        let path = std::env::temp_dir().join(format!("masseter-signals-{owner:?}.csv"));
         fs::write(&path, text).unwrap();
         let (config, jaw) = (FileConfig::new(&path), JawConfig::default());
         let table = Source::read(&config, &jaw).unwrap().table;

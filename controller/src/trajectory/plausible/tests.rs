@@ -19,7 +19,9 @@ fn opening(change: impl Fn(&mut [f64; 8])) -> FileConfig {
     }
     let mut hasher = DefaultHasher::new();
     text.hash(&mut hasher);
-    let path = std::env::temp_dir().join(format!("masseter-{}-{}.csv", std::process::id(), hasher.finish()));
+    // Tests run in threads of one process, and some make the same text.
+    let owner = (std::process::id(), std::thread::current().id());
+    let path = std::env::temp_dir().join(format!("masseter-{owner:?}-{}.csv", hasher.finish()));
     std::fs::write(&path, text).unwrap();
     FileConfig::new(path)
 }
