@@ -47,6 +47,7 @@ mod robot_quirks;
 mod start;
 mod stdout_errors;
 mod stimuli;
+mod storms;
 mod suite;
 mod summary;
 mod version;

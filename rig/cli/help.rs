@@ -16,7 +16,7 @@ use crate::BUILD;
 /// What a user wants, and the verbs for that.
 const GROUPS: [(&str, &[&str]); 8] = [
     ("Play a motion and judge it", &["init", "motion", "run", "test", "signals", "faults"]),
-    ("Play a scenario in many variants", &["campaign", "search", "shrink"]),
+    ("Play a scenario in many variants", &["campaign", "search", "shrink", "storm"]),
     ("Work with past runs", &["report", "compare", "export", "why", "replay", "diff", "recording"]),
     ("Bring your own controller", &["new", "interface", "controller", "param"]),
     ("Prepare this machine", &["doctor", "clean"]),

@@ -16,6 +16,7 @@ mod report;
 mod run;
 mod sdk;
 mod starter;
+mod storm;
 mod test;
 mod why;
 
@@ -51,6 +52,7 @@ use motion::MotionArgs;
 use plant::PlantArgs;
 use report::{DiffArgs, ReplayArgs, ReportArgs};
 use starter::{InitArgs, NewVerb};
+use storm::StormArgs;
 use test::TestArgs;
 use why::WhyArgs;
 
@@ -100,6 +102,8 @@ enum Verb {
     Search(SearchArgs),
     /// Make a failing scenario as small as it can be and still fail
     Shrink(ShrinkArgs),
+    /// Play random faults, stimuli and parameters from one seed until a law is broken
+    Storm(StormArgs),
     /// Find the last instant from which a failed run passes without what acted on it
     Why(WhyArgs),
     /// Describe a recorded jaw motion, and whether the rig can play it
@@ -231,6 +235,7 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Campaign(args) => campaign::campaign(&args),
         Verb::Search(args) => campaign::search(&args),
         Verb::Shrink(args) => campaign::shrink(&args),
+        Verb::Storm(args) => storm::storm(&args),
         Verb::Why(args) => why::why(&args),
         Verb::CampaignCase { folder, number } => play_case(&folder, number),
         Verb::Motion(args) => motion::motion(&args).usage(),

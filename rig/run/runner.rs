@@ -68,9 +68,19 @@ impl Runner {
     /// # Errors
     /// [`Exit::Usage`] for a scenario that cannot be played.
     pub(crate) fn play(&self, source: Source<'_>) -> Result<Judged, Failure> {
+        self.play_and(source, |judged| judged)
+    }
+
+    /// The same, and looks at what was judged; a panic in the look is the failure of the run, too.
+    pub(crate) fn play_and<T>(
+        &self,
+        source: Source<'_>,
+        look: impl FnOnce(Judged) -> T,
+    ) -> Result<T, Failure> {
         let build = self.controller.builder();
         let build = build.context("virtual time runs controllers of the rig alone").usage()?;
-        self.play_by(build, source)
+        let judged = self.play_by(build, source)?;
+        guarded(|| Ok(look(judged)))
     }
 
     /// The same by another controller.

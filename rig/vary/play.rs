@@ -48,7 +48,7 @@ pub(crate) fn plan(file: &Path, controller: ControllerKind) -> anyhow::Result<Ca
 }
 
 /// The digest of this program.
-fn this_program() -> anyhow::Result<String> {
+pub(super) fn this_program() -> anyhow::Result<String> {
     let digest = std::env::current_exe().and_then(|path| digest_of_program(&path));
     digest.context("cannot read this program")
 }

@@ -1,0 +1,211 @@
+//! The laws that no storm may break, whatever acts on the rig.
+//!
+//! A safe stop breaks none: it is what a fault shall lead to. That the rig neither panics nor refuses a storm, and that a
+//! storm played again is the same, shows only who plays it.
+
+use std::fmt::{self, Display, Formatter};
+use std::sync::LazyLock;
+
+use masseter_judge::{CheckResult, FaultFigures, Figures, Verdict};
+use masseter_runtime::messages::codes::EventKind;
+use masseter_scenario::{AxisFault, DriveFault, FaultConfig, FaultKindConfig, Quantity, Scenario};
+use serde::{Deserialize, Serialize};
+
+/// The matrix of faults: what detects each of them.
+const MATRIX: &str = include_str!("../../../../docs/faults-matrix.csv");
+/// A fault of the matrix acts so long; a shorter one need not show, s.
+const LONG_S: f64 = 0.5;
+/// The time that a report may take from the strike, ns.
+const REPORTED_NS: u64 = 1_000_000_000;
+
+/// What must hold of every storm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Law {
+    /// The rig plays the storm to an end that can be judged, and does not panic.
+    Judged,
+    /// A jaw beyond its limits is reported, unless a fault acts that the matrix calls undetected.
+    NoSilentDeviation,
+    /// A run in which the jaw left its limits does not pass.
+    NoWrongPass,
+    /// A fault that the matrix calls detected is reported.
+    Detected,
+    /// The mechanism stands still after a stop, unless brake, drive, rod or encoder of an axis has a fault.
+    Standstill,
+    /// No message is missing, and the same storm has the same messages with a recording.
+    Complete,
+    /// The requirements of the base scenario hold.
+    Requirement,
+}
+
+impl Display for Law {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Judged => "every storm ends and can be judged",
+            Self::NoSilentDeviation => "no silent deviation",
+            Self::NoWrongPass => "no wrong pass",
+            Self::Detected => "what the matrix calls detected is detected",
+            Self::Standstill => "standstill after a stop",
+            Self::Complete => "the recording is complete",
+            Self::Requirement => "the requirements hold",
+        })
+    }
+}
+
+/// A law that a storm broke, and how.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Broken {
+    /// The law.
+    pub law: Law,
+    /// What happened instead, in words.
+    pub by: String,
+}
+
+impl Broken {
+    /// The first law that a run of this storm breaks, in the order of [`Law`]; none where all hold.
+    pub fn find(storm: &Scenario, verdict: &Verdict, figures: &Figures) -> Option<Self> {
+        let run = Run { storm, verdict, figures };
+        let laws = [
+            (Law::Judged, run.unjudged()),
+            (Law::NoSilentDeviation, run.silent_deviation()),
+            (Law::NoWrongPass, run.wrong_pass()),
+            (Law::Detected, run.undetected()),
+            (Law::Standstill, run.moved()),
+            (Law::Complete, run.incomplete()),
+            (Law::Requirement, run.failed_requirement()),
+        ];
+        laws.into_iter().find_map(|(law, by)| Some(Self { law, by: by? }))
+    }
+}
+
+impl Display for Broken {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.law, self.by)
+    }
+}
+
+/// A storm that was played and judged.
+struct Run<'a> {
+    storm: &'a Scenario,
+    verdict: &'a Verdict,
+    figures: &'a Figures,
+}
+
+impl Run<'_> {
+    /// Under virtual time neither the machine nor a process disturbs a run.
+    fn unjudged(&self) -> Option<String> {
+        let Verdict { word, reason, .. } = self.verdict;
+        ["DIED", "INVALID", "INCOMPLETE"].contains(word).then(|| format!("{word}: {reason}"))
+    }
+
+    fn silent_deviation(&self) -> Option<String> {
+        let breach = self.figures.path_breach.first.as_ref()?;
+        let is_excused = self.struck().any(|(fault, _)| !is_always_reported(fault.kind));
+        (!is_excused && !self.is_reported(0)).then(|| breach.to_string())
+    }
+
+    fn wrong_pass(&self) -> Option<String> {
+        let breach = self.figures.path_breach.first.as_ref()?;
+        (self.verdict.word == "PASS").then(|| breach.to_string())
+    }
+
+    fn undetected(&self) -> Option<String> {
+        let figures = self.figures;
+        let first_ns = figures.events.iter().find(|event| event.kind == EventKind::Fault);
+        let first_ns = first_ns.map_or(u64::MAX, |event| event.time_ns);
+        let ended_ns = figures.path_breach.motion_ns.map_or(0, |[_, to_ns]| to_ns);
+        // Of several faults before the first report, each may be what it reports.
+        let is_due = |(fault, struck_ns): &(&FaultConfig, u64)| {
+            is_as_in_matrix(fault) && *struck_ns < first_ns && struck_ns + REPORTED_NS < ended_ns
+        };
+        let (fault, struck_ns) = self.struck().find(is_due).filter(|(_, ns)| !self.is_reported(*ns))?;
+        Some(format!("{fault} struck at {:.3} s of the run, and nobody reported it", struck_ns as f64 / 1e9))
+    }
+
+    fn moved(&self) -> Option<String> {
+        let check = self.verdict.checks.iter().find(|check| check.name == "standstill")?;
+        // A fault that begins while the rig stands still strikes no part of the test.
+        let is_excused = self.storm.faults.iter().any(|fault| moves_on(fault.kind));
+        (check.result == CheckResult::Failed && !is_excused).then(|| check.finding.clone())
+    }
+
+    fn incomplete(&self) -> Option<String> {
+        let missing = self.figures.missing_messages();
+        (missing > 0).then(|| format!("{missing} messages are missing"))
+    }
+
+    fn failed_requirement(&self) -> Option<String> {
+        let failed =
+            |check: &&masseter_judge::Check| check.is_requirement() && check.result == CheckResult::Failed;
+        let check = self.verdict.checks.iter().find(failed)?;
+        Some(format!("{} {}", check.name, check.finding))
+    }
+
+    /// The faults that struck, each with the time.
+    fn struck(&self) -> impl Iterator<Item = (&FaultConfig, u64)> {
+        let figures = self.figures.faults.iter();
+        self.storm
+            .faults
+            .iter()
+            .zip(figures)
+            .filter_map(|(fault, FaultFigures { struck_ns, .. })| Some((fault, (*struck_ns)?)))
+    }
+
+    fn is_reported(&self, since_ns: u64) -> bool {
+        self.figures.events.iter().any(|event| event.kind == EventKind::Fault && event.time_ns >= since_ns)
+    }
+}
+
+/// Whether somebody reports a fault of this kind in every row of the matrix.
+fn is_always_reported(kind: FaultKindConfig) -> bool {
+    static KINDS: LazyLock<Vec<&str>> = LazyLock::new(|| {
+        let rows = || MATRIX.lines().skip(1).map(|line| line.split(',').collect::<Vec<_>>());
+        let mut kinds: Vec<_> = rows().map(|row| row[0]).collect();
+        kinds.dedup();
+        kinds.retain(|kind| rows().filter(|row| row[0] == *kind).all(|row| row[6] != "nobody"));
+        kinds
+    });
+    KINDS.contains(&kind.name())
+}
+
+/// Whether an axis with such a fault may move after a stop: nothing holds it, or its drive stops by a wrong position.
+fn moves_on(kind: FaultKindConfig) -> bool {
+    let lets_go = [DriveFault::BrakeOpen.into(), DriveFault::Runaway.into(), AxisFault::BrokenRod.into()];
+    lets_go.contains(&kind) || matches!(kind, FaultKindConfig::Encoder(_))
+}
+
+/// Whether a fault is one that the matrix calls detected: of its kind, as large, as long, on every frame.
+fn is_as_in_matrix(fault: &FaultConfig) -> bool {
+    let example = fault.kind.declared().size.and_then(|size| size.example.parse::<Quantity>().ok());
+    let is_as_large = example.is_none_or(|example| fault.size_si().abs() >= example.si());
+    let is_as_long = fault.for_s.is_none_or(|for_s| for_s >= LONG_S);
+    let is_of_every_frame = fault.probability >= 1.0 && fault.count.is_none() && fault.id.is_none();
+    is_always_reported(fault.kind) && is_as_large && is_as_long && is_of_every_frame
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_scenario::{BusFault, EncoderFault};
+
+    use super::*;
+
+    #[test]
+    fn the_matrix_excuses_what_nothing_detects_alone() {
+        let reported = [BusFault::Disconnect.into(), DriveFault::Fault.into(), AxisFault::Jam.into()];
+        assert!(reported.into_iter().all(is_always_reported));
+        let silent = [EncoderFault::Drift.into(), DriveFault::Scale.into(), AxisFault::BrokenRod.into()];
+        assert!(!silent.into_iter().any(is_always_reported));
+    }
+
+    #[test]
+    fn a_fault_smaller_or_shorter_than_that_of_the_matrix_need_not_show() {
+        let offset = |size: &str, for_s| FaultConfig {
+            size: size.parse().ok(),
+            for_s,
+            ..FaultConfig::new(EncoderFault::Offset)
+        };
+        assert!(is_as_in_matrix(&offset("-1.2 mm", None)));
+        assert!(!is_as_in_matrix(&offset("0.9 mm", None)));
+        assert!(!is_as_in_matrix(&offset("1.2 mm", Some(0.4))));
+    }
+}
