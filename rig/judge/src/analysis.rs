@@ -1,34 +1,31 @@
 //! One pass over the messages of a run, and the figures that it gives.
 //!
-//! Figures that no verdict depends on are in [`Shown`]: a run without a report does without them.
+//! Figures that no verdict depends on are in [`Shown`](crate::shown::Shown): a run without a report does without them.
 
 use masseter_recording::{Damage, ProcessFault, Recorded, RunUsage};
-use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind, NO_DRIVE_STATE, Source};
+use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind, Source};
 use masseter_runtime::messages::tap::{self, TapError};
-use masseter_runtime::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
+use masseter_runtime::messages::{Event, FrameTap, Message, Reading, State, Truth};
 use masseter_runtime::named::{Declared, PlayedMotion};
 use masseter_scenario::{ChecksConfig, FaultKindConfig, Scenario};
 
 use crate::declared_faults::FaultWatch;
 use crate::events::{Code, EventRecord};
 use crate::figures::Figures;
-use crate::intervals::Intervals;
-use crate::jaw_cycles::{JawCycles, MotionSpeed};
-use crate::longest_cycles::LongestCycles;
+use crate::loads::{AxisWatch, ContactWatch};
 use crate::lost_cycles::{Disturbance, Freshness, OutageWatch, ScenarioStalls};
 use crate::messages::{Digest, NamedWatch, SequenceCheck};
-use crate::over_time::{AxisWatch, CONTROLLER, ContactWatch, OverTimeCollector, PLANT, Place};
 use crate::overruns::LoopSamples;
 use crate::played::{MotionFigures, PlayedWatch, StopWatch};
-use crate::poses::{estimated_pose, is_running, true_pose};
+use crate::poses::is_running;
 use crate::recorded::RecordedWatch;
-use crate::reference::Reference;
 use crate::requirements::Requirements;
 use crate::response::Responses;
-use crate::signals::{CycleMessages, Pace, Sample, Timeline};
+use crate::shown::Shown;
+use crate::signals::{Pace, Sample, Timeline};
 use crate::skips::{Counters, OverrunAttribution, Skips, longest_overruns};
 use crate::standstill::StandstillWatch;
-use crate::tracking::{PathSample, PoseSource, Tracking};
+use crate::tracking::{PoseSource, Tracking};
 
 /// Computes the [`Figures`] of a run from its messages, in their order in the recording.
 ///
@@ -269,8 +266,7 @@ impl Analysis {
         let messages = &sample.messages;
         self.standstill.add_sample(sample);
         if let Some(path) = self.tracking.add_sample(sample) {
-            let speed =
-                self.timeline.reference().map_or(MotionSpeed::Full, |of| of.speed(messages.progress_s));
+            let speed = self.timeline.reference.speed(messages.progress_s);
             self.shown.iter_mut().for_each(|shown| shown.apply_path(&path, messages, speed));
             self.faults.apply_sample(&path);
             self.figures.path_breach.take(&path, is_running(messages.controller_state), &self.limits);
@@ -318,11 +314,10 @@ impl Analysis {
         while let Some(sample) = self.timeline.finish() {
             self.judge_sample(&sample);
         }
-        let reference = self.timeline.reference();
-        let rest_m = reference.and_then(|of| of.rest(|from, to| self.played.distance_m(from, to)));
-        let rest_s = reference.and_then(Reference::rest_s);
-        let (disorder, disorder_ns) = reference.map(Reference::disorder).unwrap_or_default();
-        let lag_causes_ms = reference.map_or([0.0; 2], Reference::lag_causes_ms);
+        let reference = &self.timeline.reference;
+        let rest_m = reference.rest(|from, to| self.played.distance_m(from, to));
+        let (rest_s, lag_causes_ms) = (reference.rest_s(), reference.lag_causes_ms());
+        let (disorder, disorder_ns) = reference.disorder();
         let (tracking, track) = self.tracking.into_figures();
         let duration_ns =
             self.last_sample_ns.saturating_sub(self.first_sample_ns.unwrap_or(self.last_sample_ns));
@@ -332,17 +327,9 @@ impl Analysis {
         let running_s = self.played.running_cycles() as f64 * self.period_ns as f64 / 1e9;
         let (stopped_by, enabled_cycles) = self.stop.into_figures();
         let enabled_s = enabled_cycles as f64 * self.period_ns as f64 / 1e9;
-        let (intervals, worst_cycles, over_time, jaw_cycles) =
-            self.shown.map_or_else(Default::default, |shown| {
-                let Shown { intervals, longest_cycles, over_time, jaw_cycles, .. } = *shown;
-                let over_time = over_time.into_figures(self.declared.signals.len());
-                (
-                    intervals.into_figures(),
-                    longest_cycles.into_figures(),
-                    over_time,
-                    jaw_cycles.into_figures(),
-                )
-            });
+        if let Some(shown) = self.shown {
+            shown.add_to(&mut self.figures, self.declared.signals.len());
+        }
         self.figures.events.sort_by_key(|event| event.time_ns);
         let overruns = longest_overruns([&mut self.controller_skips, &mut self.plant_skips]);
         let is_over = |state: &Code<ControllerState>| {
@@ -374,95 +361,13 @@ impl Analysis {
             signals: self.named.signals,
             parameters: self.named.parameters,
             contact: self.contact.into_figures(),
-            jaw_cycles,
-            worst_cycles,
-            intervals,
             topics,
             bus_response: self.responses.into_figures(missing_frames),
             cut_short,
             damage: damage.to_vec(),
             axes: self.axes.map(|axes| axes.figures).unwrap_or_default(),
             track,
-            over_time,
             ..self.figures
         }
-    }
-}
-
-/// Collects them.
-#[derive(Debug, Clone)]
-struct Shown {
-    /// Whether the mechanism is emulated, so that its true motion is recorded.
-    has_truth: bool,
-    intervals: Intervals,
-    longest_cycles: LongestCycles,
-    over_time: OverTimeCollector,
-    jaw_cycles: JawCycles,
-}
-
-impl Shown {
-    fn new(scenario: &Scenario) -> Self {
-        Self {
-            has_truth: scenario.can.is_virtual(),
-            intervals: Intervals::new(scenario.period_ns()),
-            longest_cycles: LongestCycles::default(),
-            over_time: OverTimeCollector::new(scenario.jaw.reference_point_m, scenario.can.bitrate().ok()),
-            jaw_cycles: JawCycles::new(scenario),
-        }
-    }
-
-    fn apply_command(&mut self, command: &Command) {
-        self.intervals.apply_command(command);
-        self.longest_cycles.apply_command(command);
-    }
-
-    /// `skipped`: deadlines skipped just before it.
-    fn apply_reading(&mut self, reading: &Reading, skipped: u64) {
-        self.intervals.apply_reading(reading, skipped);
-        self.longest_cycles.apply_reading(reading);
-        self.over_time.wake_up(PLANT, reading.due_ns, reading.woke_ns);
-        let has_states = reading.drive_state.iter().all(|state| *state != NO_DRIVE_STATE);
-        match (self.has_truth, has_states) {
-            (true, _) => self.over_time.reported_beside_truth(reading),
-            (false, true) => self.over_time.reported(reading),
-            (false, false) => {}
-        }
-    }
-
-    /// `is_fresh`: the state's reading is used for the first time. `skipped`: deadlines skipped just before it.
-    fn apply_state(&mut self, state: &State, is_fresh: bool, skipped: u64) {
-        self.intervals.apply_state(state, is_fresh, skipped);
-        self.longest_cycles.apply_state(state, is_fresh);
-        self.over_time.wake_up(CONTROLLER, state.due_ns, state.woke_ns);
-        if is_fresh {
-            self.solution(state);
-        }
-    }
-
-    fn solution(&mut self, state: &State) {
-        if is_running(Some(state.controller_state)) {
-            self.over_time.running(state.sampled_ns);
-        }
-        let estimated = estimated_pose(state);
-        if self.has_truth {
-            self.over_time.incisal(Place::Estimated, state.sampled_ns, estimated.as_ref());
-        } else {
-            self.over_time.incisal(Place::Actual, state.sampled_ns, estimated.as_ref());
-        }
-    }
-
-    fn apply_path(&mut self, path: &PathSample, messages: &CycleMessages, speed: MotionSpeed) {
-        self.over_time.apply_path(path);
-        let played_ns = self.over_time.since_motion(path.sampled_ns);
-        let played_ns = played_ns.filter(|_| is_running(messages.controller_state));
-        if let Some((played_ns, actual)) = played_ns.zip(path.actual) {
-            let force_n = messages.truth.map_or(0.0, |truth| truth.bite_force_n);
-            self.jaw_cycles.add_pose(played_ns, &actual, force_n, speed);
-        }
-    }
-
-    fn apply_truth(&mut self, truth: &Truth) {
-        self.over_time.apply_truth(truth);
-        self.over_time.incisal(Place::Actual, truth.sampled_ns, true_pose(truth).as_ref());
     }
 }

@@ -4,7 +4,7 @@
 use std::borrow::Cow;
 
 use masseter_scenario::wording::counted;
-use masseter_scenario::{ChecksConfig, FaultConfig};
+use masseter_scenario::{ChecksConfig, ExpectConfig, FaultConfig};
 use serde::Serialize;
 
 use crate::breach::{Bound, Breach, is_within};
@@ -44,10 +44,10 @@ impl CheckResult {
     }
 }
 
-/// The figures of a requirement beside its check.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// The figures of a requirement.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct CheckFigures {
-    /// How far the requirement is from failing.
+    /// How far the requirement is from failing, in `margin_unit`; negative where it fails; `None` if there is no number.
     pub margin: Option<f64>,
     /// Unit of the margin.
     pub margin_unit: &'static str,
@@ -106,6 +106,11 @@ impl Check {
     /// Whether it is a requirement of the scenario, or an event that it expects.
     pub fn is_requirement(&self) -> bool {
         matches!(self.subject, Subject::Requirement | Subject::ExpectedEvent)
+    }
+
+    /// Whether the scenario names it as one that must fail.
+    pub(crate) fn must_fail(&self, expect: Option<&ExpectConfig>) -> bool {
+        expect.is_some_and(|expect| expect.failed.iter().any(|name| *name == self.name))
     }
 
     pub(crate) fn judged(name: &'static str, finding: String, passed: bool) -> Self {

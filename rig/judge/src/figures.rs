@@ -11,12 +11,13 @@ use crate::breach::PathBreach;
 use crate::declared_faults::FaultFigures;
 use crate::events::{Code, EventRecord};
 use crate::jaw_cycles::JawCycleFigures;
+use crate::loads::{AxisFigures, ContactFigures};
 use crate::longest_cycles::WorstCycle;
 use crate::lost_cycles::{Outage, ReadingFigures};
 use crate::measured::IntervalFigures;
 use crate::messages::{ParameterFigures, SignalFigures, TopicFigures};
 use crate::order::Disorder;
-use crate::over_time::{AxisFigures, ContactFigures, OverTime};
+use crate::over_time::OverTime;
 use crate::overruns::Overrun;
 use crate::played::{MotionFigures, StoppedBy};
 use crate::recorded::RecordedFigures;
@@ -133,6 +134,18 @@ impl Figures {
     /// Messages that were published and not recorded.
     pub fn missing_messages(&self) -> u64 {
         self.topics.iter().map(|topic| topic.missing).sum()
+    }
+
+    /// Whether the motion was to end early: by the operator, the scenario, or the controller itself.
+    pub(crate) fn was_stopped_by_request(&self) -> bool {
+        self.events.iter().any(|event| event.cause == Cause::StopRequested)
+    }
+
+    /// When the rig began to stop: a safe stop, or one by request. A program stops without an event.
+    pub(crate) fn stopped_ns(&self) -> Option<u64> {
+        let is_stop = |event: &&EventRecord| event.begins_stop() || event.cause == Cause::StopRequested;
+        let stops = self.events.iter().filter(is_stop);
+        stops.map(|event| event.time_ns).min().or(self.stop_without_event_ns)
     }
 
     /// The fault of the scenario that struck last before anybody reported a fault, unless the fault had ended long before.

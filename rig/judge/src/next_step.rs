@@ -10,7 +10,7 @@ use crate::check::{Check, CheckResult, Subject};
 use crate::checks::lag_cause;
 use crate::events::{Code, EventRecord};
 use crate::figures::Figures;
-use crate::outcome::Outcome;
+use crate::outcome::{Outcome, clock_jump};
 
 /// Declares the steps, each with its sentence.
 macro_rules! next_steps {
@@ -124,14 +124,9 @@ impl NextStep {
         first_breach: Option<&Breach>,
     ) -> Option<Self> {
         let is_kill = |name: &str| name.ends_with("_kill");
-        let was_killed = || {
-            manifest
-                .scenario
-                .faults
-                .iter()
-                .zip(&figures.faults)
-                .any(|(declared, found)| found.struck_ns.is_some() && is_kill(declared.kind.name()))
-        };
+        let mut faults = manifest.scenario.faults.iter().zip(&figures.faults);
+        let mut was_killed =
+            || faults.any(|(declared, found)| found.struck_ns.is_some() && is_kill(declared.kind.name()));
         let is_of_program = manifest.is_of_program();
         Some(match (outcome, &manifest.ending) {
             (Outcome::Named(Pass), _) => return None,
@@ -153,9 +148,7 @@ impl NextStep {
             (Outcome::Named(Interrupted), _) => Self::DeclaredStop,
             (Outcome::Named(Untested), _) => Self::of_untested(checks),
             (Outcome::Invalid, Ending::NotStarted) => Self::NoRealTime,
-            (Outcome::Invalid, _)
-                if manifest.usage.clock_jump_s != 0.0 && !manifest.scenario.can.is_virtual() =>
-            {
+            (Outcome::Invalid, _) if clock_jump(&manifest.usage, &manifest.scenario.can).is_some() => {
                 Self::ClockSet
             }
             (Outcome::Invalid, _) if manifest.refusal().is_some() => Self::NoRealTime,
@@ -172,11 +165,9 @@ impl NextStep {
         first_breach: Option<&Breach>,
     ) -> Self {
         let Scenario { expect, checks: limits, .. } = &manifest.scenario;
-        let is_expected = |check: &Check| {
-            expect.as_ref().is_some_and(|expect| expect.failed.iter().any(|name| *name == check.name))
-        };
         let is_first = |check: &&Check| first_breach.is_none_or(|breach| breach.check == check.name);
-        let mut failed = checks.iter().filter(|check| check.result.is_failed() && !is_expected(check));
+        let is_unexpected = |check: &&Check| check.result.is_failed() && !check.must_fail(expect.as_ref());
+        let mut failed = checks.iter().filter(is_unexpected);
         let Some(check) = failed.find(is_first) else { return Self::Expectation };
         let has_own_time = || lag_cause(&figures.motion, limits.motion_lag_ms).is_some();
         match (check.subject, check.name.as_ref()) {

@@ -4,11 +4,11 @@ use std::fmt::{self, Display, Formatter};
 
 use masseter_model::geometry::AXES;
 use masseter_runtime::messages::Reading;
-use masseter_runtime::messages::codes::{ControllerState, DriveState};
+use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::named::{Declared, PlayedMotion};
 use masseter_scenario::Scenario;
 
-use crate::poses::MOVING;
+use crate::poses::{MOVING, are_enabled};
 
 /// Cycles of the lead-in beside the move to the first pose.
 const MORE_CYCLES: f64 = 3.0;
@@ -44,7 +44,7 @@ impl Display for Disorder {
 }
 
 /// Follows the states, cycle by cycle.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct StateOrder {
     /// An own motion may hold and go on.
     is_own: bool,
@@ -62,24 +62,12 @@ pub(crate) struct StateOrder {
 impl StateOrder {
     pub(crate) fn new(scenario: &Scenario, declared: &Declared) -> Self {
         let lead_in_cycles = (scenario.controller.ease_s / scenario.period_s() + MORE_CYCLES).ceil() as u64;
-        Self {
-            is_own: declared.motion == PlayedMotion::Own,
-            lead_in_cycles,
-            ready_cycles: 0,
-            were_enabled: false,
-            state: None,
-            has_run: false,
-            disorder: None,
-            disorder_ns: None,
-        }
+        Self { is_own: declared.motion == PlayedMotion::Own, lead_in_cycles, ..Self::default() }
     }
 
     /// Takes a cycle. `is_counted`: whether no loop lost it.
     pub(crate) fn advance(&mut self, state: Option<u32>, reading: Option<&Reading>, is_counted: bool) {
-        let is_enabled = |reading: &Reading| {
-            reading.drive_state.iter().all(|code| *code == DriveState::OperationEnabled.code())
-        };
-        let are_enabled = reading.map(is_enabled);
+        let are_enabled = reading.map(are_enabled);
         self.were_enabled |= are_enabled == Some(true);
         let is_complete =
             are_enabled == Some(true) && reading.is_some_and(|of| of.fresh_axes == (1 << AXES) - 1);

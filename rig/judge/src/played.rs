@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use crate::ahead::{AheadWatch, Points};
 use crate::events::EventRecord;
-use crate::poses::{is_moving, is_running};
+use crate::poses::{are_enabled, is_moving, is_running, way};
 use crate::tracking::PathSample;
 
 /// The played part of the scenario's motion.
@@ -53,7 +53,7 @@ const NO_WAY_M: f64 = 1e-5;
 const LEAST_STEP_M: f64 = 1e-5;
 
 /// Follows the jaw on its way.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct PlayedWatch {
     points_m: Points,
     /// The poses of both at the last step, desired and actual.
@@ -82,20 +82,8 @@ impl PlayedWatch {
         Self {
             points_m: jaw_points(&scenario.jaw),
             most_s: scenario.checks.motion_lag_ms / 1e3,
-            ahead: AheadWatch::default(),
-            before: None,
             progress_s: f64::NEG_INFINITY,
-            way_m: 0.0,
-            gone_m: 0.0,
-            lag_s: None,
-            late_ns: None,
-            cycle: 0,
-            answered: 0,
-            late_commands: 0,
-            missed_commands: 0,
-            in_a_row: 0,
-            most_in_a_row: 0,
-            running_cycles: 0,
+            ..Self::default()
         }
     }
 
@@ -157,30 +145,24 @@ impl PlayedWatch {
         MotionFigures {
             way_mm: way_m.map(|way_m| way_m * 1e3),
             played: way_m.filter(|way_m| *way_m > NO_WAY_M).map(|way_m| self.gone_m / way_m),
-            rest_s: None,
             lag_ms: self.lag_s.map(|lag_s| lag_s * 1e3),
             late_ns: self.late_ns,
             ahead_ms: Some(self.ahead.in_s()).filter(|s| *s > self.most_s).map(|s| s * 1e3),
-            lag_causes_ms: [0.0; 2],
             missed_commands: self.missed_commands,
             missed_in_a_row: self.most_in_a_row,
             late_commands: self.late_commands,
+            ..MotionFigures::default()
         }
     }
 }
 
 /// How each point moves from one pose to another, m.
 fn step(points_m: &Points, from: &Pose, to: &Pose) -> Points {
-    let place = |pose: &Pose, point: &Vec3| pose.translation.vector + pose.rotation * point;
-    points_m.each_ref().map(|point| place(to, point) - place(from, point))
+    points_m.each_ref().map(|point| way(from, to, point))
 }
 
 fn length(step: &Points) -> f64 {
     step.iter().map(Vec3::norm_squared).sum::<f64>().sqrt()
-}
-
-fn are_enabled(reading: &Reading) -> bool {
-    reading.drive_state.iter().all(|code| *code == DriveState::OperationEnabled.code())
 }
 
 /// States after the reading of a drive that left operation. The controller may miss that reading in the first.

@@ -1,9 +1,9 @@
 //! Poses in messages, and how far they are apart. A pose with a value that is no number is infinitely far.
 
 use masseter_controller::trajectory::closed_pose;
-use masseter_model::geometry::{Deviation, Mechanism, Pose};
-use masseter_runtime::messages::codes::ControllerState;
-use masseter_runtime::messages::{State, Truth, pose_from_fields};
+use masseter_model::geometry::{Deviation, Mechanism, Pose, Vec3};
+use masseter_runtime::messages::codes::{ControllerState, DriveState};
+use masseter_runtime::messages::{Reading, State, Truth, pose_from_fields};
 use masseter_scenario::Scenario;
 
 /// States in which the platform has a desired pose.
@@ -13,6 +13,11 @@ pub const MOVING: [ControllerState; 3] =
 /// Whether the platform has a desired pose in this state of the controller, a code.
 pub(super) fn is_moving(state: Option<u32>) -> bool {
     MOVING.iter().any(|moving| state == Some(moving.code()))
+}
+
+/// Whether all drives are enabled.
+pub(super) fn are_enabled(reading: &Reading) -> bool {
+    reading.drive_state.iter().all(|code| *code == DriveState::OperationEnabled.code())
 }
 
 pub(super) fn is_running(state: Option<u32>) -> bool {
@@ -44,6 +49,21 @@ fn pose(position_m: [f64; 3], quaternion_wxyz: [f64; 4]) -> Option<Pose> {
     let length = quaternion_wxyz.iter().map(|part| part * part).sum::<f64>().sqrt();
     let is_pose = position_m.iter().all(|x| x.is_finite()) && (length - 1.0).abs() <= LENGTH_TOLERANCE;
     is_pose.then(|| pose_from_fields(position_m, quaternion_wxyz))
+}
+
+/// Where a point of the platform frame is, base frame, m.
+pub(super) fn place(platform: &Pose, point_m: &Vec3) -> Vec3 {
+    platform.translation.vector + platform.rotation * point_m
+}
+
+/// How a point moves from one pose to another, m.
+pub(super) fn way(from: &Pose, to: &Pose, point_m: &Vec3) -> Vec3 {
+    place(to, point_m) - place(from, point_m)
+}
+
+/// How the platform turns from one pose to another: an angle, rad, along its axis, base frame.
+pub(super) fn turn(from: &Pose, to: &Pose) -> Vec3 {
+    (to.rotation * from.rotation.inverse()).scaled_axis()
 }
 
 /// How far two poses are apart.

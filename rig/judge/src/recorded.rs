@@ -14,6 +14,8 @@ use masseter_recording::jaw_points;
 use masseter_scenario::{JawConfig, MotionConfig, Scenario};
 use serde::Serialize;
 
+use crate::poses::{turn, way};
+
 /// Incisal point, left and right condyle, then the jaw's orientation.
 const PLACES: [&str; 4] = ["incisal point", "left condyle", "right condyle", "orientation"];
 /// Parts of an error, and the unit in which a histogram counts: a nanometre or a microdegree.
@@ -214,17 +216,6 @@ fn keep_longest(kept: &mut [Vec3; 2], now: [Vec3; 2]) {
     if now[0].norm() > kept[0].norm() {
         *kept = now;
     }
-}
-
-/// How a point moves from one pose to another, m.
-fn way(from: &Pose, to: &Pose, point: &Vec3) -> Vec3 {
-    let place = |pose: &Pose| pose.translation.vector + pose.rotation * point;
-    place(to) - place(from)
-}
-
-/// How the platform turns from one pose to another, base frame, rad.
-fn turn(from: &Pose, to: &Pose) -> Vec3 {
-    (to.rotation * from.rotation.inverse()).scaled_axis()
 }
 
 #[cfg(test)]

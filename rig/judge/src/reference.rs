@@ -43,7 +43,7 @@ pub(crate) struct Progress<'a> {
 }
 
 /// Plays the scenario's motion beside the controller.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Reference {
     /// None for an own motion, and where the motion's file is gone since the run.
     playback: Option<Playback>,
@@ -107,20 +107,9 @@ impl Reference {
             full_speed: scenario.dry.speed_now(),
             most_lag_s: scenario.checks.motion_lag_ms / 1e3,
             reach_m: scenario.force_control.map_or(0.0, |config| config.reach_m),
-            detour_m: 0.0,
             order: StateOrder::new(scenario, declared),
             places: ["motion_rate", "motion_amplitude"].map(place),
-            stop_cycle: None,
-            has_begun: false,
-            is_moving: false,
-            was_moving: false,
-            lag_s: 0.0,
-            excused_s: 0.0,
-            began_late_s: 0.0,
-            farthest_s: 0.0,
-            ran_back_s: 0.0,
-            progress_s: 0.0,
-            pose: None,
+            ..Self::default()
         }
     }
 

@@ -8,13 +8,13 @@ use masseter_model::geometry::{AXES, AXIS_NAMES, Deviation, Pose};
 use masseter_recording::Ending;
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_runtime::messages::Reading;
-use masseter_runtime::messages::codes::{ControllerState, DriveState, drive_state};
+use masseter_runtime::messages::codes::{ControllerState, drive_state};
 use masseter_scenario::{AFTER_STOP_S, ChecksConfig, Scenario};
 use serde::Serialize;
 
 use crate::breach::{Bound, Breach};
 use crate::check::Check;
-use crate::poses::{true_pose, worse};
+use crate::poses::{are_enabled, true_pose, worse};
 use crate::signals::{CycleMessages, Sample};
 
 /// How far the mechanism moved after its stops.
@@ -39,7 +39,7 @@ const POWER_OFF_WITHIN_NS: u64 = 100 * MILLISECOND_NS;
 const LEAST_SHARE: f64 = 0.9;
 
 /// Watches the mechanism after each stop.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct StandstillWatch {
     has_truth: bool,
     /// The incisal point in the platform frame.
@@ -71,10 +71,8 @@ impl StandstillWatch {
             has_truth: scenario.can.is_virtual(),
             incisal_m: scenario.jaw.reference_point_m,
             reaction_ns: std::array::from_fn(|axis| (reaction_s(axis) * SECOND_NS as f64) as u64),
-            is_at_work: false,
-            stop: None,
             limits: scenario.checks,
-            figures: StandstillFigures::default(),
+            ..Self::default()
         }
     }
 
@@ -110,10 +108,7 @@ impl StandstillWatch {
 
     /// Notes a stop, the end of one, and the loss of power.
     fn follow(&mut self, time_ns: u64, reading: &Reading, controller_state: Option<u32>) {
-        let is_enabled = |code: &u32| *code == DriveState::OperationEnabled.code();
-        let is_at_work = reading.drive_state.iter().all(is_enabled)
-            && reading.master_fault == 0
-            && !is_over(controller_state);
+        let is_at_work = are_enabled(reading) && reading.master_fault == 0 && !is_over(controller_state);
         if is_at_work {
             self.stop = None;
         } else if self.is_at_work {

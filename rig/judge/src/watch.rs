@@ -1,7 +1,5 @@
 //! The signals of a run and the margins of its requirements, step by step, for whoever acts while the run is played.
 
-use std::fmt;
-
 use masseter_model::geometry::Pose;
 use masseter_recording::Recorded;
 use masseter_runtime::named::Declared;
@@ -15,22 +13,11 @@ use crate::signals::{CycleMessages, Pace, Registry, Timeline, UnknownSignal, Val
 
 /// The scenario has no requirement of that name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("the scenario has no requirement '{}'{}", excerpt(.name), Question(.likely.as_deref()))]
+#[error("the scenario has no requirement '{}'; {remedy}", excerpt(.name))]
 pub struct UnknownRequirement {
     name: String,
-    likely: Option<String>,
-}
-
-/// The most similar name as a question, or where to write one.
-struct Question<'a>(Option<&'a str>);
-
-impl fmt::Display for Question<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.0 {
-            Some(likely) => write!(f, "; did you mean '{likely}'?"),
-            None => f.write_str("; give one of its [[require]] names"),
-        }
-    }
+    /// The most similar name as a question, or where to write one.
+    remedy: String,
 }
 
 /// Takes the messages of a run in simulated time, in their order.
@@ -75,9 +62,11 @@ impl Watch {
     /// # Errors
     /// Where there is no requirement of that name, with the most similar one.
     pub fn requirement(&self, name: &str) -> Result<usize, UnknownRequirement> {
-        self.requirements
-            .place_of(name)
-            .map_err(|likely| UnknownRequirement { name: name.to_owned(), likely: likely.map(str::to_owned) })
+        self.requirements.place_of(name).map_err(|likely| {
+            let question = likely.map(|likely| format!("did you mean '{likely}'?"));
+            let remedy = question.unwrap_or_else(|| "give one of its [[require]] names".to_owned());
+            UnknownRequirement { name: name.to_owned(), remedy }
+        })
     }
 
     /// Takes the next message.

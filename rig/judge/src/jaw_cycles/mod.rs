@@ -15,7 +15,7 @@ use serde::{Serialize, Serializer};
 
 use self::cycle::Sample;
 use self::segments::{Cycle, Segments};
-use crate::poses::closed_platform;
+use crate::poses::{closed_platform, place};
 use crate::statistic::Statistic;
 
 pub(crate) use cycle::MotionSpeed;
@@ -112,14 +112,14 @@ pub fn closed_incisal_m(scenario: &Scenario) -> Option<Vec3> {
 
 /// The incisal point of a pose, base frame, m; its place in the platform frame is `jaw.reference_point_m`.
 pub fn incisal_m(platform: &Pose, in_platform_m: [f64; 3]) -> Vec3 {
-    platform.translation.vector + platform.rotation * Vec3::from(in_platform_m)
+    place(platform, &in_platform_m.into())
 }
 
 /// What cycles of a group share.
 type GroupKey = (JawCycleKind, Option<JawSide>);
 
 /// Collects them.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct JawCycles {
     /// The incisal point in the platform frame, and its closed place.
     incisal_m: [f64; 3],
@@ -144,13 +144,8 @@ impl JawCycles {
             closed_m: closed_incisal_m(scenario).unwrap_or_default(),
             has_force: scenario.has_contact(),
             study: scenario.study.clone().unwrap_or_default(),
-            segments: Segments::default(),
-            next_ns: 0,
-            force_n: 0.0,
-            most_closed_mm: None,
-            cycles: Vec::new(),
-            courses: BTreeMap::new(),
             border: vec![None; BORDER_STEPS],
+            ..Self::default()
         }
     }
 

@@ -117,7 +117,8 @@ mod stop {
         for (cycle, reading) in (1..).zip(readings) {
             watch.apply_reading(&Reading { cycle, ..*reading });
         }
-        watch.into_figures()
+        let (stopped_by, [enabled_cycles, _]) = watch.into_figures();
+        (stopped_by, enabled_cycles)
     }
 
     #[test]

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::missing::Missing;
 use crate::breach::Breach;
-use crate::check::CheckResult;
+use crate::check::{CheckFigures, CheckResult};
 use crate::series::Curve;
 use crate::signals::UnknownSignal;
 
@@ -88,18 +88,11 @@ pub struct RequirementFigures {
     pub result: CheckResult,
     /// The finding, in words.
     pub finding: String,
-    /// How far the requirement is from failing, in `margin_unit`; negative where it fails; `None` if there is no number.
-    pub margin: Option<f64>,
-    /// Its unit.
-    pub margin_unit: &'static str,
-    /// The margin as a share of the limit.
-    pub relative_margin: Option<f64>,
-    /// The moment of the smallest margin, s since the motion began.
-    pub worst_at_s: Option<f64>,
-    /// The same, ns of the run's clock.
+    /// Margin, moment and latency.
+    #[serde(flatten)]
+    pub figures: CheckFigures,
+    /// The moment of the smallest margin, ns of the run's clock.
     pub worst_ns: Option<u64>,
-    /// The longest time from a trigger to its response, ms.
-    pub latency_ms: Option<f64>,
     /// The first value beyond its limit; none where it passes.
     #[serde(skip)]
     pub breach: Option<Breach>,

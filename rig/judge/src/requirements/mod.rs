@@ -28,6 +28,7 @@ use self::finding::{Finding, Reason, Refused};
 use self::missing::Phase;
 use self::response::Response;
 use self::trigger::Trigger;
+use crate::check::CheckFigures;
 use crate::signals::{Registry, Sample, Values};
 
 pub use finding::{RequirementError, RequirementFigures, RequirementPlot};
@@ -260,12 +261,14 @@ impl Requirement {
             must,
             result: finding.result,
             finding: finding.text,
-            margin: finding.margin.map(|margin| margin / finding.unit.si),
-            margin_unit: finding.unit.name,
-            relative_margin: finding.relative_margin,
-            worst_at_s: finding.worst_ns.and_then(since_motion_s),
+            figures: CheckFigures {
+                margin: finding.margin.map(|margin| margin / finding.unit.si),
+                margin_unit: finding.unit.name,
+                relative_margin: finding.relative_margin,
+                worst_at_s: finding.worst_ns.and_then(since_motion_s),
+                latency_ms: finding.latency_s.map(|seconds| seconds * 1e3),
+            },
             worst_ns: finding.worst_ns,
-            latency_ms: finding.latency_s.map(|seconds| seconds * 1e3),
             breach: finding.breach,
             may_be_disturbed: finding.may_be_disturbed,
             is_expected_event: self.is_expected_event,

@@ -105,7 +105,11 @@ impl Run {
 /// Result, margin, and the moment of the smallest margin in samples.
 fn found(figures: &RequirementFigures) -> (CheckResult, Option<f64>, Option<f64>) {
     let rounded = |value: f64| (value * 1e6).round() / 1e6;
-    (figures.result, figures.margin.map(rounded), figures.worst_at_s.map(|at_s| rounded(at_s * 1e3)))
+    (
+        figures.result,
+        figures.figures.margin.map(rounded),
+        figures.figures.worst_at_s.map(|at_s| rounded(at_s * 1e3)),
+    )
 }
 
 #[test]
@@ -211,12 +215,12 @@ fn a_response_has_a_latency_and_the_time_left_as_its_margin() {
         let figures = run.judge(&format!("{respond}\n{within}"));
         assert_eq!(found(&figures), expected, "{within}: {figures:?}");
         let latency_ms = if within.contains("delay") { 5.5 } else { 4.5 };
-        assert!((figures.latency_ms.unwrap() - latency_ms).abs() < 1e-9, "{figures:?}");
+        assert!((figures.figures.latency_ms.unwrap() - latency_ms).abs() < 1e-9, "{figures:?}");
     }
     let idle = Run::of(&[0.0; 4]).judge(&format!("{respond}\nwithin = '5 ms'"));
     assert_eq!((idle.result, idle.finding.as_str()), (Untested, "fault.encoder_stuck never came"));
     let never = Run::of(&[0.0; 12]).struck_at(1.5).judge(&format!("{respond}\nwithin = '5 ms'"));
-    assert_eq!((never.result, never.margin, never.latency_ms), (Failed, None, None));
+    assert_eq!((never.result, never.figures.margin, never.figures.latency_ms), (Failed, None, None));
 }
 
 #[test]
@@ -288,7 +292,7 @@ fn the_margin_of_a_response_of_a_signal_is_the_robustness_of_temporal_logic() {
         ));
         let expected = robustness(&forces_n, trigger, within, stays_for, 5.0);
         assert!(
-            (figures.margin.unwrap() - expected).abs() < 1e-9,
+            (figures.figures.margin.unwrap() - expected).abs() < 1e-9,
             "{trigger} {within} {stays_for}: {figures:?}"
         );
         assert_eq!(figures.result == Passed, expected >= 0.0, "{figures:?}");
@@ -303,7 +307,7 @@ fn a_condition_as_trigger_counts_when_it_begins() {
         (figures.result, figures.finding.as_str()),
         (Failed, "1 of 2 triggers answered; longest latency 3.000 ms")
     );
-    assert_eq!(figures.worst_at_s, Some(0.004));
+    assert_eq!(figures.figures.worst_at_s, Some(0.004));
 }
 
 #[test]
@@ -374,7 +378,7 @@ fn what_is_computed_to_no_number_fails() {
         ["'ln(signum({l1.force}))'\nunit = ''\nmax = 5", "'{l1.force} / 0'\nunit = 'N'\nmin = '-1 N'"]
     {
         let figures = run.judge(&format!("expression = {expression}"));
-        assert_eq!((figures.result, figures.margin), (Failed, None), "{figures:?}");
+        assert_eq!((figures.result, figures.figures.margin), (Failed, None), "{figures:?}");
     }
 }
 
@@ -385,7 +389,7 @@ fn a_percentile_is_the_nearest_rank() {
         let bounds = format!(
             "signal = 'l1.force'\nstatistic = 'percentile'\npercentile = {percentile}\nmax = '200 N'"
         );
-        (200.0 - Run::of(&forces_n).judge(&bounds).margin.unwrap()).round() as u32
+        (200.0 - Run::of(&forces_n).judge(&bounds).figures.margin.unwrap()).round() as u32
     };
     assert_eq!([6.5, 7.0, 7.5, 50.0, 100.0, 0.0].map(rank), [7, 7, 8, 50, 100, 1]);
 }

@@ -9,7 +9,7 @@ use masseter_scenario::{Scenario, Unit};
 use serde::Serialize;
 
 use super::timeline::CycleMessages;
-use crate::poses::{closed_platform, estimated_pose, true_pose};
+use crate::poses::{closed_platform, estimated_pose, place, true_pose, turn, way};
 
 /// How a signal's value follows from a cycle, and from the pose of the jaw in the first cycle of the motion. None if
 /// the cycle lacks it.
@@ -156,12 +156,12 @@ impl Jaw {
 
     /// The incisal point from its closed place, base frame, m.
     pub(super) fn way(&self, pose: &Pose) -> Option<Vec3> {
-        Some(self.place(JawPoint::Incisal, pose) - self.place(JawPoint::Incisal, &self.closed?))
+        Some(way(&self.closed?, pose, &self.points_m[JawPoint::Incisal as usize]))
     }
 
     /// The turn from the closed jaw: an angle, rad, along its axis, base frame.
     pub(super) fn turn(&self, pose: &Pose) -> Option<Vec3> {
-        Some((pose.rotation * self.closed?.rotation.inverse()).scaled_axis())
+        Some(turn(&self.closed?, pose))
     }
 
     /// Where the finite helical axis from the closed jaw meets the midsagittal plane, from the closed incisal point, m. None for
@@ -185,12 +185,12 @@ impl Jaw {
 
     /// Where a point is in the base frame, m.
     pub(super) fn place(&self, point: JawPoint, pose: &Pose) -> Vec3 {
-        pose.translation.vector + pose.rotation * self.points_m[point as usize]
+        place(pose, &self.points_m[point as usize])
     }
 
     /// How far a point is in one pose from where it is in another, m.
     pub(super) fn distance(&self, point: JawPoint, a: &Pose, b: &Pose) -> f64 {
-        (self.place(point, a) - self.place(point, b)).norm()
+        way(a, b, &self.points_m[point as usize]).norm()
     }
 }
 

@@ -90,8 +90,8 @@ pub struct Timeline {
     controller_state: Option<u32>,
     /// Deadlines that the controller's loop has skipped.
     skipped_cycles: u64,
-    /// `None` if nobody asks for the desired pose.
-    reference: Option<Reference>,
+    /// The motion beside which the run was played.
+    pub(crate) reference: Reference,
     controller_cpu: CpuShare,
     plant_cpu: CpuShare,
     /// The newest cycle whose sample a state was computed from.
@@ -117,12 +117,7 @@ pub enum Pace {
 impl Timeline {
     /// Of a run of this scenario whose controller declares these.
     pub fn new(scenario: &Scenario, declared: &Declared, pace: Pace) -> Self {
-        Self { pace, reference: Some(Reference::new(scenario, declared)), ..Self::default() }
-    }
-
-    /// The motion beside which the run was played.
-    pub(crate) fn reference(&self) -> Option<&Reference> {
-        self.reference.as_ref()
+        Self { pace, reference: Reference::new(scenario, declared), ..Self::default() }
     }
 
     /// Takes a message of a cycle; hands out a cycle that is complete now.
@@ -168,7 +163,7 @@ impl Timeline {
 
     /// Takes an event, which belongs to the first sample at or after its time.
     pub fn event(&mut self, event: &EventRecord) {
-        self.reference.iter_mut().for_each(|reference| reference.apply_event(event));
+        self.reference.apply_event(event);
         self.events.push(event.clone());
     }
 
@@ -227,12 +222,9 @@ impl Timeline {
         }
         Some(Sample { time_ns, messages, events, is_closing: false })
     }
-}
 
-impl Timeline {
     /// Of a sample that the controller did not use, the next one that it used tells how far the motion came, or else its next state.
     fn compare_with_motion(&mut self, messages: &mut CycleMessages) {
-        let Some(reference) = &mut self.reference else { return };
         let skipped = |cycle: &CycleMessages| cycle.state.map(|state| state.skipped_cycles);
         let is_counted =
             skipped(messages).or_else(|| self.cycles.iter().take(KEPT_IN_ORDER).find_map(skipped));
@@ -240,7 +232,7 @@ impl Timeline {
         self.skipped_cycles = skipped(messages).unwrap_or(self.skipped_cycles);
         let soon = || self.cycles.iter().take(KEPT_IN_ORDER);
         let used = [&*messages].into_iter().chain(soon()).find(|cycle| cycle.solution.is_some());
-        let desired = reference.advance(&Progress {
+        let desired = self.reference.advance(&Progress {
             cycle: messages.cycle,
             has_sync: messages.reading.is_some() || messages.truth.is_some(),
             state: messages.controller_state,

@@ -1,3 +1,4 @@
+use masseter_runtime::messages::codes::DriveState;
 use masseter_runtime::messages::{Reading, Truth};
 
 use super::*;

@@ -3,6 +3,7 @@
 use masseter_scenario::{ExpectConfig, ExpectedVerdict};
 
 use super::*;
+use crate::check::CheckFigures;
 use crate::requirements::RequirementFigures;
 
 /// A run that stops safely, as its scenario expects.
@@ -25,12 +26,8 @@ fn require(run: &mut Run, result: CheckResult, may_be_disturbed: bool) {
         must: "after it: safe_stop".to_owned(),
         result,
         finding: "found".to_owned(),
-        margin: None,
-        margin_unit: "ms",
-        relative_margin: None,
-        worst_at_s: None,
+        figures: CheckFigures::default(),
         worst_ns: None,
-        latency_ms: None,
         breach: None,
         may_be_disturbed,
         is_expected_event: false,

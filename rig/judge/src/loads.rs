@@ -1,0 +1,188 @@
+//! The greatest loads of teeth and drives: what the lower teeth of the emulated jaw bore, and how each drive of a dry run met
+//! the demands. Which load is too great is no question here.
+
+use masseter_model::geometry::AXES;
+use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::messages::{Command, Contact, Reading, ToothContact};
+use masseter_scenario::{MOST_PAIRS, Scenario};
+use serde::Serialize;
+
+use crate::series::{ByCycle, Curve, Extremes, Series};
+
+/// What the teeth of the emulated jaw bore.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ContactFigures {
+    /// The greatest sum of the forces on all teeth, N.
+    pub total_max_n: f64,
+    /// When that was, ns of the run's clock.
+    pub total_max_at_ns: u64,
+    /// The lower teeth, in the order of their numbers.
+    pub teeth: Vec<ToothFigures>,
+    /// What the teeth bore over time, as often as a screen shows it; of a long run not to its end.
+    #[serde(skip)]
+    pub moments: Vec<ToothLoads>,
+}
+
+/// What a tooth bore.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ToothFigures {
+    /// FDI number.
+    pub number: u32,
+    /// Where its force acts, platform frame, m.
+    pub place_m: [f64; 3],
+    /// The greatest force on it, N.
+    pub max_n: f64,
+    /// The force on it when the sum of all was greatest, base axes, N.
+    pub at_total_max_n: [f64; 3],
+    /// The greatest force in each stretch of time, with its own time since the run's first SYNC, s and N.
+    #[serde(skip)]
+    pub course_n: Curve,
+}
+
+/// What the teeth bore when their sum was greatest within the time of a frame on a screen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ToothLoads {
+    /// When, s since the run's first SYNC.
+    pub at_s: f64,
+    /// Place of a tooth in the list of teeth, and the force on it, base axes, N; those without a force are left out.
+    pub forces_n: Vec<(usize, [f64; 3])>,
+    total_n: f64,
+}
+
+/// Length of a frame, s, and the frames that are kept.
+const FRAME_S: f64 = 1.0 / 60.0;
+const MOST_FRAMES: usize = 2048;
+/// Less is no force to be shown, N.
+const LEAST_N: f64 = 0.1;
+
+/// Collects them.
+#[derive(Debug, Clone, Default)]
+pub(super) struct ContactWatch {
+    moments: Vec<ToothLoads>,
+    frame_ends_s: f64,
+    total_max_n: f64,
+    greatest: Contact,
+    max_n: [f64; MOST_PAIRS],
+    courses: Series<Extremes<MOST_PAIRS>>,
+    /// The newest message, which names the teeth.
+    newest: Option<Contact>,
+}
+
+impl ContactWatch {
+    /// Takes a message, sampled so long after the run's first SYNC; `None` if no course is shown.
+    pub(super) fn add_contact(&mut self, contact: &Contact, since_ns: Option<u64>) {
+        let mut total_n = 0.0;
+        for (place, tooth) in contact.teeth().enumerate() {
+            let load_n = tooth.load_n();
+            total_n += load_n;
+            self.max_n[place] = self.max_n[place].max(load_n);
+            if let Some(since_ns) = since_ns {
+                self.courses.add(since_ns, place, load_n);
+            }
+        }
+        if let Some(since_ns) = since_ns {
+            self.add_moment(since_ns as f64 / 1e9, total_n, contact);
+        }
+        if total_n > self.total_max_n {
+            (self.total_max_n, self.greatest) = (total_n, *contact);
+        }
+        self.newest = Some(*contact);
+    }
+
+    fn add_moment(&mut self, at_s: f64, total_n: f64, contact: &Contact) {
+        let is_of_last = at_s < self.frame_ends_s;
+        let is_less = self.moments.last().is_some_and(|last| is_of_last && total_n <= last.total_n);
+        if total_n < LEAST_N || is_less {
+            return;
+        }
+        if is_of_last {
+            self.moments.pop();
+        } else if self.moments.len() == MOST_FRAMES {
+            return;
+        } else {
+            self.frame_ends_s = at_s + FRAME_S;
+        }
+        let loaded = contact.teeth().enumerate().filter(|(_, tooth)| tooth.load_n() >= LEAST_N);
+        let forces_n = loaded.map(|(place, tooth)| (place, tooth.force_n)).collect();
+        self.moments.push(ToothLoads { at_s, forces_n, total_n });
+    }
+
+    /// The figures; none without a message.
+    pub(super) fn into_figures(self) -> Option<ContactFigures> {
+        let greatest: Vec<_> = self.greatest.teeth().collect();
+        let tooth = |(place, tooth): (usize, ToothContact)| ToothFigures {
+            number: tooth.number,
+            place_m: tooth.place_m,
+            max_n: self.max_n[place],
+            at_total_max_n: greatest.get(place).map_or([0.0; 3], |tooth| tooth.force_n),
+            course_n: self.courses.highest(place),
+        };
+        Some(ContactFigures {
+            total_max_n: self.total_max_n,
+            total_max_at_ns: self.greatest.sampled_ns,
+            teeth: self.newest?.teeth().enumerate().map(tooth).collect(),
+            moments: self.moments,
+        })
+    }
+}
+
+/// Cycles in a row of which every command and reading must be there: a drive settles from a lost one.
+const UNDISTURBED: u64 = 12;
+
+/// The largest magnitudes of an axis.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct AxisFigures {
+    /// Distance of the position from the target that should be reached, m.
+    pub following_error_m: f64,
+    /// Force of the drive, N.
+    pub force_n: f64,
+}
+
+/// Collects them.
+#[derive(Debug, Clone, Default)]
+pub(super) struct AxisWatch {
+    /// From a command to the reading of the position that its targets lead to.
+    lead_cycles: u64,
+    targets_m: ByCycle<[f64; AXES]>,
+    /// Positions and forces.
+    found: ByCycle<([f64; AXES], [f64; AXES])>,
+    pub(super) figures: [AxisFigures; AXES],
+}
+
+impl AxisWatch {
+    pub(super) fn new(scenario: &Scenario) -> Self {
+        Self { lead_cycles: scenario.controller.lead_cycles.round() as u64, ..Self::default() }
+    }
+
+    pub(super) fn apply_command(&mut self, command: &Command) {
+        if command.controller_state == ControllerState::Running.code() {
+            self.targets_m.insert(command.cycle, command.target_m);
+            self.compare(command.cycle);
+        }
+    }
+
+    pub(super) fn apply_reading(&mut self, reading: &Reading) {
+        self.found.insert(reading.cycle, (reading.position_m, reading.force_n));
+        self.compare(reading.cycle.saturating_sub(self.lead_cycles));
+    }
+
+    /// Compares the targets of a cycle with the positions that they led to, once both are known.
+    fn compare(&mut self, cycle: u64) {
+        let pair = self.targets_m.get(cycle).zip(self.found.get(cycle + self.lead_cycles));
+        let Some((targets_m, (positions_m, forces_n))) = pair else { return };
+        let is_there = |cycle: u64| {
+            self.targets_m.get(cycle).is_some() && self.found.get(cycle + self.lead_cycles).is_some()
+        };
+        if !(cycle.saturating_sub(UNDISTURBED)..cycle).all(is_there) {
+            return;
+        }
+        for (axis, figures) in self.figures.iter_mut().enumerate() {
+            let error_m = (targets_m[axis] - positions_m[axis]).abs();
+            figures.following_error_m = figures.following_error_m.max(error_m);
+            figures.force_n = figures.force_n.max(forces_n[axis].abs());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,115 @@
+use masseter_runtime::messages::Event;
+
+use super::*;
+use crate::events::Code;
+use masseter_recording::Usage;
+
+#[test]
+fn a_safe_stop_is_explained_by_what_went_wrong_first() {
+    let event = |source, kind, cause| Event::new(source, kind, cause);
+    let lost = event(Source::Master, EventKind::Fault, Cause::ProcessDataLost);
+    let events = [
+        event(Source::Wire, EventKind::Notice, Cause::FaultInjected),
+        Event { axis: 0, node: 1, value: 4.0, ..lost },
+        event(Source::Controller, EventKind::Fault, Cause::MasterFault),
+    ];
+    let (outcome, reason) =
+        ending(&Ending::SafeStop, None, None, &events.map(|event| EventRecord::from(&event))).unwrap();
+    assert_eq!(outcome, Outcome::Named(SafeStop));
+    assert_eq!(
+        reason,
+        "the controller stopped the rig; first fault: master: process_data_lost \
+         (axis d1 (node 1 on bus 0): process data missing for 4 cycles)"
+    );
+    assert_eq!(ending(&Ending::SafeStop, None, None, &[]).unwrap().1, "the controller stopped the rig");
+}
+
+#[test]
+fn what_master_and_drives_show_comes_before_what_the_controller_reports() {
+    let fault = |source, cause| EventRecord::from(&Event::new(source, EventKind::Fault, cause));
+    let events = [fault(Source::Controller, Cause::LawFailed), fault(Source::Master, Cause::BadMessage)];
+    let shown = |stopped_by| ending(&Ending::Completed, stopped_by, None, &events);
+    assert_eq!(shown(None), None);
+    let stopped = |reason: &str| Some((Outcome::Named(SafeStop), reason.to_owned()));
+    assert_eq!(
+        shown(Some(StoppedBy::Master)),
+        stopped("the master stopped the drives; first fault: master: bad_message (value 0, limit 0)")
+    );
+    assert_eq!(
+        ending(&Ending::Completed, Some(StoppedBy::QuickStop), None, &events[..1]),
+        stopped("the drives made a quick stop")
+    );
+    // The end of a process comes before both.
+    let died = Ending::died("plant", "signal 9".to_owned());
+    assert_eq!(ending(&died, Some(StoppedBy::Master), None, &events).unwrap().0, Outcome::Named(Died));
+}
+
+#[test]
+fn a_fault_of_the_scenario_stands_before_what_followed_from_it() {
+    let declared = || Some("fault encoder_stuck (l1) at 1.800 s".to_owned());
+    let event = |time_ns, source, kind, cause| EventRecord {
+        time_ns,
+        ..EventRecord::from(&Event::new(source, kind, cause))
+    };
+    let began = EventRecord {
+        transition: Some(["approaching".to_owned(), ControllerState::Running.name().to_owned()]),
+        ..event(500_000_000, Source::Controller, EventKind::Transition, Cause::Sequence)
+    };
+    let found = event(2_302_000_000, Source::Master, EventKind::Fault, Cause::BadMessage);
+    let events = [began, found];
+    assert_eq!(
+        stopped(None, declared(), &events),
+        "fault encoder_stuck (l1) at 1.800 s → detected at 1.802 s: master: bad_message (value 0, limit 0) \
+         → the controller stopped the rig"
+    );
+    assert_eq!(
+        stopped(Some(StoppedBy::QuickStop), declared(), &[]),
+        "fault encoder_stuck (l1) at 1.800 s → the drives made a quick stop"
+    );
+}
+
+#[test]
+fn a_death_has_its_time_in_the_motion() {
+    let mut figures = Figures { last_cycle_ns: 2_500_000_000, ..Figures::default() };
+    assert_eq!(when_died(&figures), "before the motion");
+    figures.path_breach.motion_ns = Some([1_000_000_000, 3_000_000_000]);
+    for (state, when) in [
+        (ControllerState::Running, "1.500 s after the motion began"),
+        (ControllerState::SafeStop, "1.500 s after the motion began"),
+        (ControllerState::Finished, "after the motion"),
+    ] {
+        figures.final_state = Some(Code::Known(state));
+        assert_eq!(when_died(&figures), when);
+    }
+}
+
+#[test]
+fn a_process_that_hardly_sleeps_is_named_with_what_to_do() {
+    let usage = |cpu_s| {
+        let plant = Usage { observed_s: 2.0, cpu_s, ..Usage::default() };
+        RunUsage { processes: [("plant".to_owned(), plant)].into(), ..RunUsage::default() }
+    };
+    assert_eq!(overload(&usage(1.0), 20_000), None);
+    let said = overload(&usage(1.9), 20_000).unwrap();
+    assert!(said.contains("plant kept its core busy for 95 %") && said.contains("below 20000"), "{said}");
+}
+
+#[test]
+fn a_jump_of_the_clock_excuses_runs_on_real_interfaces_alone() {
+    let simulated = CanConfig::default();
+    let real = CanConfig { interfaces: vec!["can0".to_owned()], ..simulated.clone() };
+    let jump = |clock_jump_s, can| clock_jump(&RunUsage { clock_jump_s, ..RunUsage::default() }, can);
+    assert_eq!(jump(0.0, &real), None);
+    assert_eq!(jump(-3.5, &simulated), None);
+    let (outcome, reason) = jump(-3.5, &real).unwrap();
+    assert_eq!(outcome, Outcome::Invalid);
+    assert!(reason.contains("jumped by -3.500 s"), "{reason}");
+}
+
+#[test]
+fn the_exit_codes_of_scenarios_are_those_of_the_program() {
+    for expected in ExpectedVerdict::ALL {
+        assert_eq!(Outcome::Named(expected).exit() as u8, expected.exit_code(), "{expected:?}");
+    }
+    assert_eq!((Outcome::Invalid.named(), Outcome::ChecksFailed.named()), (None, Some(Fail)));
+}
