@@ -18,11 +18,7 @@
 //! assert!(drawn.starts_with("<svg") && drawn.contains("time, s"));
 //! ```
 
-mod ticks;
-
 use std::fmt::Write;
-
-use ticks::{label_of_step, linear_ticks, tick_step};
 
 // Colours that colour-blind people can tell apart (Okabe and Ito), and one for what stays in the background.
 /// Blue.
@@ -38,6 +34,8 @@ pub const GREY: &str = "#999999";
 
 /// Room around a plot for title, labels and numbers, px: left, above, right, below.
 pub const ROOM: [f64; 4] = [64.0, 30.0, 20.0, 46.0];
+/// Most ticks of an axis, but for one at its end.
+const MOST_TICKS: f64 = 8.0;
 /// Radius of a dot, px.
 const DOT: f64 = 3.0;
 /// Least length of an axis, and the same as a share of its greatest value: ticks must differ from each other.
@@ -97,12 +95,19 @@ impl Axis {
         (value - low) / (high - low)
     }
 
-    /// Labelled values.
+    /// Multiples of 1, 2 or 5 times a power of ten from end to end, each with as many decimals as their distance needs.
     fn ticks(&self) -> Vec<(f64, String)> {
         let [low, high] = self.places();
-        let step = tick_step(high - low);
-        let values = linear_ticks(low, high).into_iter();
-        values.map(|value| (value, label_of_step(value, step))).collect()
+        let least = (high - low) / MOST_TICKS;
+        let power = 10f64.powf(least.log10().floor());
+        let factor = [1.0, 2.0, 5.0].into_iter().find(|factor| factor * power >= least * (1.0 - 1e-9));
+        let step = factor.unwrap_or(10.0) * power;
+        let decimals = -(step.log10() + 1e-9).floor();
+        let tick = |multiple: i64| {
+            let value = multiple as f64 * step;
+            (value, format!("{value:.*}", decimals.max(0.0) as usize))
+        };
+        ((low / step - 1e-9).ceil() as i64..=(high / step + 1e-9).floor() as i64).map(tick).collect()
     }
 }
 
@@ -267,6 +272,26 @@ mod tests {
         let up = attributes(&svg, "cy");
         assert!(up.len() == 2 && up.iter().all(|y| plot.contains(y)) && up[0] > up[1], "{up:?}");
         assert!(svg.contains("a &lt; b") && svg.contains(">20<"), "{svg}");
+    }
+
+    fn labels(low: f64, high: f64) -> Vec<String> {
+        let axis = Axis { label: String::new(), ends: [low, high] };
+        axis.ticks().into_iter().map(|(_, label)| label).collect()
+    }
+
+    #[test]
+    fn ticks_are_round_few_and_their_labels_differ() {
+        assert_eq!(labels(-0.1, 1.05), ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
+        assert_eq!(labels(-40.0, 81.0), ["-40", "-20", "0", "20", "40", "60", "80"]);
+        assert_eq!(labels(2.0, 2.0301), ["2.000", "2.005", "2.010", "2.015", "2.020", "2.025", "2.030"]);
+        for (low, high) in [(2.0, 2.04), (0.0, 0.9), (1.0, 3.5), (-7.0, 20.0), (5.0, 800.0), (1e6, 1e6 + 1.0)]
+        {
+            let ticks = labels(low, high);
+            assert!((3..=9).contains(&ticks.len()), "{ticks:?}");
+            let mut different = ticks.clone();
+            different.dedup();
+            assert_eq!(different, ticks);
+        }
     }
 
     #[test]

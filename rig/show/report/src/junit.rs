@@ -92,7 +92,6 @@ impl<'a> JunitRun<'a> {
         let mut run = Self::new(&tested.name, verdict, is_short, tested.took_s);
         let earlier = tested.attempts.iter().take(tested.retries());
         run.cases[0].earlier = earlier.map(Attempt::word_and_reason).collect();
-        run.properties.extend(tested.last().verdict().into_iter().flat_map(told));
         let is_flaky = tested.retries() > 0 && !is_short;
         run.properties = warned(tested.warnings());
         run.properties.extend([
@@ -102,6 +101,7 @@ impl<'a> JunitRun<'a> {
             ("flaky", is_flaky.to_string()),
             ("tags", tested.tags.join(" ")),
         ]);
+        run.properties.extend(tested.last().verdict().into_iter().flat_map(told));
         run.file = Some(tested.file.display().to_string());
         run
     }

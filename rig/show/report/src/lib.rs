@@ -6,7 +6,6 @@
 
 pub mod compare;
 pub mod divergence;
-mod histogram_log;
 mod jaw_table;
 mod junit;
 mod logs;

@@ -1,12 +1,16 @@
-//! Logs of a run beside its report: `events.jsonl`, a line of JSON for each event, and CAN frames as candump logs,
-//! `can0.log`, `can1.log` and so on, one file a bus.
+//! Logs of a run beside its report: `events.jsonl`, a line of JSON for each event; CAN frames as candump logs, `can0.log`,
+//! `can1.log` and so on, one file a bus; and HdrHistogram's interval logs (`*.hlog`), a line for each second in format V2.
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
+use hdrhistogram::Histogram;
+use hdrhistogram::serialization::V2DeflateSerializer;
+use hdrhistogram::serialization::interval_log::{IntervalLogWriterBuilder, IntervalLogWriterError};
 use masseter_can::{Tapped, candump};
-use masseter_judge::EventRecord;
+use masseter_judge::{EventRecord, IntervalFigures};
 
 /// Log files, created as their buses appear.
 ///
@@ -84,6 +88,39 @@ pub(crate) fn write_events(path: &Path, events: &[EventRecord]) -> Result<(), Wr
     lines().map_err(WriteError::for_file(path))
 }
 
+/// Writes the samples of each interval of a run into `folder`, which is created if it does not exist.
+pub(crate) fn write_histograms(folder: &Path, intervals: &[IntervalFigures]) -> Result<(), WriteError> {
+    fs::create_dir_all(folder).map_err(WriteError::for_file(folder))?;
+    for interval in intervals {
+        let path = folder.join(format!("{}.hlog", interval.name.replace(' ', "-")));
+        write_histogram_log(&path, &format!("masseter: {}, ns", interval.name), interval.seconds.iter())
+            .map_err(WriteError::for_file(&path))?;
+    }
+    Ok(())
+}
+
+/// Writes a log: the beginning of each second, ns, and its histogram.
+fn write_histogram_log(
+    path: &Path,
+    comment: &str,
+    seconds: impl IntoIterator<Item = (u64, Histogram<u64>)>,
+) -> io::Result<()> {
+    let mut file = BufWriter::new(File::create(path)?);
+    let mut serializer = V2DeflateSerializer::new();
+    let mut log =
+        IntervalLogWriterBuilder::new().add_comment(comment).begin_log_with(&mut file, &mut serializer)?;
+    for (start_ns, second) in seconds {
+        let written =
+            log.write_histogram(&second, Duration::from_nanos(start_ns), Duration::from_secs(1), None);
+        written.map_err(|error| match error {
+            IntervalLogWriterError::IoError(error) => error,
+            IntervalLogWriterError::SerializeError(error) => io::Error::other(error),
+        })?;
+    }
+    // A short log fits into the buffer: until here it is in memory only.
+    file.flush()
+}
+
 /// A file of the report could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {}", path.display())]
@@ -104,7 +141,12 @@ impl WriteError {
 
 #[cfg(test)]
 mod tests {
+    use data_encoding::BASE64;
+    use hdrhistogram::serialization::Deserializer;
+    use hdrhistogram::serialization::interval_log::{IntervalLogIterator, LogEntry};
     use masseter_can::{CanId, ErrorKind, ErrorReport, Frame, TappedFrame};
+    use masseter_runtime::clock::SECOND_NS;
+    use masseter_scenario::input::{MOST_KEPT_BYTES, read_bytes};
 
     use super::*;
 
@@ -122,5 +164,60 @@ mod tests {
         assert_eq!(logs.finish().unwrap(), [0, 2]);
         let log = std::fs::read_to_string(folder.path().join("can1.log")).unwrap();
         assert_eq!(log.lines().count(), 2, "{log}");
+    }
+
+    /// Reads all seconds of a log into one histogram.
+    fn read(path: &Path) -> io::Result<Histogram<u64>> {
+        let text = read_bytes(path, MOST_KEPT_BYTES)?;
+        let mut all = Histogram::new(3).expect("three digits are allowed");
+        for entry in IntervalLogIterator::new(&text) {
+            let entry = entry.map_err(|error| invalid(format!("a line holds no interval: {error:?}")))?;
+            let LogEntry::Interval(interval) = entry else { continue };
+            let bytes = BASE64.decode(interval.encoded_histogram().as_bytes()).map_err(invalid)?;
+            let interval: Histogram<u64> =
+                Deserializer::new().deserialize(&mut bytes.as_slice()).map_err(invalid)?;
+            all.add(interval).map_err(invalid)?;
+        }
+        Ok(all)
+    }
+
+    fn invalid(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> io::Error {
+        io::Error::new(io::ErrorKind::InvalidData, error)
+    }
+
+    fn seconds() -> [(u64, Histogram<u64>); 2] {
+        [(0, 1000), (SECOND_NS, 2000)].map(|(start_ns, value_ns)| {
+            let mut second = Histogram::new(3).unwrap();
+            second.record(value_ns).unwrap();
+            (start_ns, second)
+        })
+    }
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.hlog");
+        write_histogram_log(&path, "a test", seconds()).unwrap();
+        let all = read(&path).unwrap();
+        assert_eq!((all.len(), all.min(), all.max()), (2, 1000, 2000));
+    }
+
+    #[test]
+    fn a_log_that_does_not_fit_on_its_disk_is_an_error_however_short_it_is() {
+        let error = write_histogram_log(Path::new("/dev/full"), "a test", seconds()).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::StorageFull);
+    }
+
+    #[test]
+    fn a_log_that_was_cut_is_an_error_wherever_it_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.hlog");
+        write_histogram_log(&path, "a test", seconds()).unwrap();
+        let whole = fs::read(&path).unwrap();
+        let second_line = whole.iter().position(|byte| *byte == b'\n').unwrap() + 1;
+        for length in [whole.len() - 1, whole.len() - 5, second_line + 3] {
+            fs::write(&path, &whole[..length]).unwrap();
+            assert!(read(&path).is_err(), "{length} of {} bytes", whole.len());
+        }
     }
 }

@@ -12,10 +12,10 @@ use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, result_with_tones, status};
 use serde::Serialize;
 
-use crate::logs::{CandumpLogs, WriteError, write_events};
+use crate::logs::{CandumpLogs, WriteError, write_events, write_histograms};
 use crate::table::{self, Detail};
 use crate::why::Why;
-use crate::{histogram_log, junit, page};
+use crate::{junit, page};
 
 /// Why the recording of a run could not be analysed.
 #[derive(Debug, thiserror::Error)]
@@ -95,8 +95,8 @@ pub fn explain(path: &Path, why: &Why) -> Result<PathBuf, Failure> {
     let manifest = Manifest::read(&folder).context("cannot read the manifest").usage()?;
     let (figures, _) = analyse(&folder, &manifest, None).usage()?;
     let verdict = Verdict::new(&manifest, &figures);
-    let html =
-        page::explained(&manifest, &figures, &verdict, why).context("cannot write the page").incomplete()?;
+    let html = page::html(&manifest, &figures, &verdict, Some(why));
+    let html = html.context("cannot write the page").incomplete()?;
     let page = folder.file("report.html");
     folder.keep(&page, &html).with_context(|| format!("cannot write {}", page.display())).incomplete()?;
     Ok(page)
@@ -187,7 +187,9 @@ impl Documents {
     fn new(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Result<Self, Failure> {
         Ok(Self {
             summary: summary_json(verdict, figures).context("cannot write the summary").incomplete()?,
-            page: page::html(manifest, figures, verdict).context("cannot write the page").incomplete()?,
+            page: page::html(manifest, figures, verdict, None)
+                .context("cannot write the page")
+                .incomplete()?,
             junit: junit::xml(manifest, figures, verdict).context("cannot write junit.xml").incomplete()?,
         })
     }
@@ -201,7 +203,7 @@ impl Documents {
     ) -> Result<(), WriteError> {
         fs::write(folder.summary(), self.summary).map_err(WriteError::for_file(&folder.summary()))?;
         logged?;
-        histogram_log::write_all(&folder.file("hist"), &figures.intervals)?;
+        write_histograms(&folder.file("hist"), &figures.intervals)?;
         write_events(&folder.file("events.jsonl"), &figures.events)?;
         [(folder.file("junit.xml"), self.junit), (folder.file("report.html"), self.page)]
             .into_iter()

@@ -1,7 +1,6 @@
 //! `report.html`: one page that needs no network. Each module fills a section of it; `masseter-page` draws them.
 
 mod motion;
-mod recorded;
 mod result;
 mod rig;
 mod stop;
@@ -20,21 +19,15 @@ use crate::why::{Why, why_section};
 
 pub(crate) use self::result::mark;
 
-/// The page.
-pub(crate) fn html(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Result<String, PageError> {
-    let first = vec![result_section(manifest, figures, verdict)];
-    page(Life::Finished, first, manifest, figures, verdict).to_html()
-}
-
-/// The page of a failed run, with the last way back.
-pub(crate) fn explained(
+/// The page; of a failed run also with the last way back, where it is known.
+pub(crate) fn html(
     manifest: &Manifest,
     figures: &Figures,
     verdict: &Verdict,
-    why: &Why,
+    why: Option<&Why>,
 ) -> Result<String, PageError> {
-    let why = why_section(why, manifest.scenario.period_s());
-    let first = vec![result_section(manifest, figures, verdict), why];
+    let why = why.map(|why| why_section(why, manifest.scenario.period_s()));
+    let first = [result_section(manifest, figures, verdict)].into_iter().chain(why).collect();
     page(Life::Finished, first, manifest, figures, verdict).to_html()
 }
 
@@ -110,7 +103,7 @@ mod tests {
             vec![TrackingSample { sampled_ns: 0, desired: still, estimated: still, actual: still }];
         let machine = MachineInfo { cpu: String::new(), cores: 2, kernel: String::new(), is_virtual: false };
         let manifest = Manifest::new("0.1.0", scenario, 1.0, "rt", machine);
-        let page = html(&manifest, &figures, &Verdict::new(&manifest, &figures)).unwrap();
+        let page = html(&manifest, &figures, &Verdict::new(&manifest, &figures), None).unwrap();
         let (_, from) = page.split_once("id=\"data\">").unwrap();
         serde_json::from_str(from.split_once("</script>").unwrap().0).unwrap()
     }

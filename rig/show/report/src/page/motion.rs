@@ -6,20 +6,22 @@ use std::ops::Range;
 
 use masseter_controller::trajectory::closed_pose;
 use masseter_judge::{
-    Course, CoursePoint, Curve, Figures, JawCycleFigures, JawCycleGroup, PoseSource, ToothFigures,
-    ToothLoads, TrackingSample, closed_incisal_m,
+    Course, CoursePoint, Curve, Figures, JawCycleFigures, JawCycleGroup, PoseSource, RecordedError,
+    RecordedFigures, ToothFigures, ToothLoads, TrackingSample, closed_incisal_m,
 };
 use masseter_model::geometry::{AXES, AXIS_NAMES, LEGS, Mechanism, Pose};
-use masseter_page::{Block, Chart, Content, Limit, Points, Pressure, Section, Series, Style, Tooth};
+use masseter_page::{
+    Block, Chart, Column, Content, Limit, Points, Pressure, Section, Series, Style, Table, Tooth,
+};
 use masseter_recording::jaw_points;
 use masseter_runtime::messages::pose_fields;
 use masseter_scenario::{Scenario, ToothConfig};
 use serde::Serialize;
 use serde_json::Value;
 
-use super::recorded::recorded_blocks;
 use super::times::{in_unit, limit, plain, since_s};
 use crate::table;
+use crate::text::or_dash;
 
 /// Directions of the base, and where they point.
 const DIRECTIONS: [[&str; 2]; 3] = [["x", "forward"], ["y", "to the left"], ["z", "up"]];
@@ -66,6 +68,22 @@ pub(super) fn motion_section(scenario: &Scenario, figures: &Figures) -> Section 
         blocks.push(Block::chart("bite", force));
     }
     Section::new("motion", "Motion", blocks)
+}
+
+/// A recorded motion against the played one: a table of errors, and the jaw's figures in a sentence.
+fn recorded_blocks(figures: &RecordedFigures) -> [Block; 2] {
+    let row = |error: &RecordedError| {
+        let share = or_dash(error.share, |share| format!("{:.0} %", share * 100.0));
+        let [rms, p95, max] =
+            [error.rms, error.p95, error.max].map(|value| format!("{value:.4} {}", error.unit));
+        [error.place.to_owned(), error.source.to_owned(), rms, p95, max, share]
+    };
+    let columns = [
+        Column::texts(&["recorded against played", "by"]),
+        Column::numbers(&["rms", "95 %", "max", "share of the mean square"]),
+    ];
+    let table = Table::new("Recorded against played", columns, figures.errors.iter().map(row));
+    [Block::table("recorded", table), Block::text("recorded-in-words", figures.in_words())]
 }
 
 /// Desired, actual and estimated displacement of the incisal point from the closed jaw, along one direction.

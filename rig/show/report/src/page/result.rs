@@ -2,8 +2,7 @@
 
 use masseter_judge::requirements::{RequirementFigures, RequirementPlot};
 use masseter_judge::{
-    Check, CheckResult, Code, Curve, EventRecord, Figures, ParameterFigures, SignalFigures, TimingWord,
-    Verdict,
+    Check, CheckResult, Code, EventRecord, Figures, ParameterFigures, SignalFigures, TimingWord, Verdict,
 };
 use masseter_page::{
     Block, Cell, Chart, Column, Content, EventRow, Events, LevelKind, Life, Live, Moment, MomentKind, Points,
@@ -14,7 +13,7 @@ use masseter_runtime::messages::codes::{ControllerState, EventKind, Source};
 use masseter_terminal::Exit;
 
 use super::stop::{chain, moments, stop};
-use super::times::{level, limit, plain, since_s};
+use super::times::{level, limit, motion_s, plain, since_s};
 use crate::text::{mm, or_dash};
 
 pub(super) fn result_section(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Section {
@@ -56,26 +55,22 @@ fn warning_blocks(manifest: &Manifest) -> impl Iterator<Item = Block> {
 }
 
 /// The word for a result as a cell.
-pub(crate) fn mark(result: CheckResult) -> masseter_page::Cell {
+pub(crate) fn mark(result: CheckResult) -> Cell {
     let tone = match result {
         CheckResult::Passed => Tone::Good,
         CheckResult::Failed => Tone::Bad,
         CheckResult::Excused | CheckResult::Untested => Tone::Doubtful,
         CheckResult::NotJudged => Tone::Plain,
     };
-    masseter_page::Cell::Mark { mark: result.mark().to_owned(), tone }
+    Cell::Mark { mark: result.mark().to_owned(), tone }
 }
 
 /// How far the recording of a run goes that did not come to its end.
 fn played_until(figures: &Figures) -> String {
-    let over_time = &figures.over_time;
-    let began_s = over_time.motion_began_ns.map(|began_ns| since_s(figures, began_ns));
-    began_s.map_or_else(
-        || "; the motion had not begun".to_owned(),
-        |began_s| {
-            format!("; the recording ends {:.3} s after the motion began", over_time.duration_s - began_s)
-        },
-    )
+    match motion_s(figures).map(|began_s| figures.over_time.duration_s - began_s) {
+        Some(since_s) => format!("; the recording ends {since_s:.3} s after the motion began"),
+        None => "; the motion had not begun".to_owned(),
+    }
 }
 
 fn panel(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> masseter_page::Verdict {
@@ -119,21 +114,25 @@ fn figures_in_words(manifest: &Manifest, figures: &Figures) -> Vec<[String; 2]> 
     if stop(figures).is_some() {
         return Vec::new();
     }
-    let errors = figures.tracking.actual;
     // In simulated time every cycle takes as long.
     let longest = figures.worst_cycles.first().filter(|_| manifest.is_in_real_time());
-    let longest = longest.map(|cycle| cycle.total_ns);
-    let mut all = vec![
-        ["incisal point from desired, rms".to_owned(), mm(errors.incisal_rms_mm)],
-        ["incisal point from desired, most".to_owned(), mm(errors.incisal_max_mm)],
-    ];
-    if let Some(longest_ns) = longest {
-        all.push(["longest cycle".to_owned(), format!("{:.0} µs", longest_ns as f64 / 1e3)]);
+    let mut all = distances(figures);
+    if let Some(longest) = longest {
+        all.push(["longest cycle".to_owned(), format!("{:.0} µs", longest.total_ns as f64 / 1e3)]);
     }
     if let Some(most_n) = figures.bite_force_max_n.filter(|most_n| *most_n > 0.0) {
         all.push(["greatest bite force".to_owned(), format!("{most_n:.1} N")]);
     }
     all
+}
+
+/// The distances of the incisal point from its path.
+fn distances(figures: &Figures) -> Vec<[String; 2]> {
+    let errors = figures.tracking.actual;
+    vec![
+        ["incisal point from desired, rms".to_owned(), mm(errors.incisal_rms_mm)],
+        ["incisal point from desired, most".to_owned(), mm(errors.incisal_max_mm)],
+    ]
 }
 
 /// The table of the requirements alone, for a page without a verdict, and the signal of each, what failed first. None where the
@@ -260,7 +259,6 @@ fn signals(signals: &[SignalFigures]) -> Table {
 fn signal_charts(figures: &Figures) -> Vec<Block> {
     let mut units: Vec<(&str, Vec<Series>)> = Vec::new();
     for (SignalFigures { signal, .. }, curve) in figures.signals.iter().zip(&figures.over_time.signals) {
-        let curve: &Curve = curve;
         let series = plain(&signal.name, curve, 1.0);
         match units.iter_mut().find(|(unit, _)| *unit == signal.unit) {
             Some((_, all)) => all.push(series),
@@ -327,23 +325,17 @@ fn now(manifest: &Manifest, figures: &Figures, number: u64, left_out: u64) -> Li
         Some(Code::Known(ControllerState::Running)) => Tone::Good,
         _ => Tone::Plain,
     };
-    let over_time = &figures.over_time;
-    let began_s = over_time.motion_began_ns.map(|began_ns| since_s(figures, began_ns));
-    let progress = match began_s {
+    let progress = match motion_s(figures) {
         Some(began_s) => {
-            let gone_s = (over_time.duration_s - began_s).clamp(0.0, manifest.motion_s);
+            let gone_s = (figures.over_time.duration_s - began_s).clamp(0.0, manifest.motion_s);
             format!("{gone_s:.1} s of {:.1} s of the motion", manifest.motion_s)
         }
         None => "The motion has not begun.".to_owned(),
     };
-    let errors = figures.tracking.actual;
     let missed = figures.controller_skips.skipped + figures.plant_skips.skipped;
-    let mut shown = vec![
-        ["incisal point from desired, rms".to_owned(), mm(errors.incisal_rms_mm)],
-        ["incisal point from desired, most".to_owned(), mm(errors.incisal_max_mm)],
-        ["cycles".to_owned(), figures.cycles.to_string()],
-        ["missed".to_owned(), missed.to_string()],
-    ];
+    let mut shown = distances(figures);
+    shown.push(["cycles".to_owned(), figures.cycles.to_string()]);
+    shown.push(["missed".to_owned(), missed.to_string()]);
     if left_out > 0 {
         shown.push(["messages left out of this page".to_owned(), left_out.to_string()]);
     }

@@ -124,7 +124,7 @@ fn latencies(intervals: &[IntervalFigures]) -> Table {
 fn longest(figures: &Figures) -> Table {
     let row = |worst: &WorstCycle| {
         let count = |count: Option<u64>| or_dash(count, |count| count.to_string());
-        let at_s = since_s(figures, worst.due_ns) - motion_s(figures);
+        let at_s = since_s(figures, worst.due_ns) - motion_s(figures).unwrap_or(0.0);
         [
             worst.cycle.to_string(),
             format!("{at_s:.3}"),
@@ -155,24 +155,19 @@ const WITHOUT_FRAMES: &str = "The CAN frames are not recorded (recording.frames 
      response times and no candump logs.";
 
 pub(super) fn buses_section(figures: &Figures) -> Section {
-    let mut blocks = match figures.frames {
-        Some(_) => of_frames(figures),
-        None => vec![Block::text("buses", WITHOUT_FRAMES.to_owned())],
-    };
-    blocks.push(Block::table("topics", topics(&figures.topics)).folded(topics_in_words(&figures.topics)));
-    Section::new("messages", "Messages and buses", blocks)
-}
-
-fn of_frames(figures: &Figures) -> Vec<Block> {
     let response = &figures.bus_response;
-    let mut blocks = vec![
-        Block::chart("buses", load(figures)),
-        Block::table("responses", responses(&response.messages)).folded(responses_in_words(response)),
-    ];
-    if let Some(why) = &response.unbounded {
+    let mut blocks = match figures.frames {
+        Some(_) => vec![
+            Block::chart("buses", load(figures)),
+            Block::table("responses", responses(&response.messages)).folded(responses_in_words(response)),
+        ],
+        None => vec![Block::text("buses", WITHOUT_FRAMES)],
+    };
+    if let Some(why) = response.unbounded.as_ref().filter(|_| figures.frames.is_some()) {
         blocks.push(Block::text("unbounded", format!("No bounds hold for this run: {why}.")));
     }
-    blocks
+    blocks.push(Block::table("topics", topics(&figures.topics)).folded(topics_in_words(&figures.topics)));
+    Section::new("messages", "Messages and buses", blocks)
 }
 
 fn responses_in_words(response: &BusResponse) -> String {

@@ -10,7 +10,7 @@ pub(super) fn time(manifest: &Manifest, figures: &Figures) -> Time {
     let over_time = &figures.over_time;
     let last_s = figures.events.last().map_or(0.0, |event| since_s(figures, event.time_ns));
     Time {
-        motion_s: over_time.motion_began_ns.map(|began_ns| since_s(figures, began_ns)),
+        motion_s: motion_s(figures),
         end_s: over_time.duration_s.max(last_s),
         period_s: manifest.scenario.period_ns() as f64 / 1e9,
         wall_s: manifest.wall_ahead_ns.map(|ahead_ns| (over_time.began_ns as f64 + ahead_ns as f64) / 1e9),
@@ -40,9 +40,9 @@ pub(super) fn phases(figures: &Figures) -> Vec<Phase> {
     phases
 }
 
-/// When the motion began; the first SYNC where it did not.
-pub(super) fn motion_s(figures: &Figures) -> f64 {
-    figures.over_time.motion_began_ns.map_or(0.0, |began_ns| since_s(figures, began_ns))
+/// When the motion began; none where it did not.
+pub(super) fn motion_s(figures: &Figures) -> Option<f64> {
+    figures.over_time.motion_began_ns.map(|began_ns| since_s(figures, began_ns))
 }
 
 /// A curve of several alike, in another unit.

@@ -29,7 +29,7 @@ fn every_document_names_what_was_not_tested() {
     assert!(xml.contains("<failure message=\"not tested: ") && xml.contains("type=\"untested\""), "{xml}");
     let text = table::table_in_words(&manifest, &figures, &verdict, Detail::Brief);
     assert!(text.contains("\n  UNTESTED "), "{text}");
-    let page = page::html(&manifest, &figures, &verdict).unwrap();
+    let page = page::html(&manifest, &figures, &verdict, None).unwrap();
     assert!(page.contains("{\"mark\":\"UNTESTED\",\"tone\":\"doubtful\"}"), "{page}");
     let word = format!("\"word\":\"{}\"", verdict.word);
     assert!(page.contains(&word) && page.contains("\"tone\":\"bad\""), "{page}");
@@ -54,7 +54,7 @@ fn every_document_of_a_failed_run_names_the_first_breach_and_the_next_step() {
             && xml.contains(&property("next step", &next("`RUN/report.html`"))),
         "{xml}"
     );
-    let page = page::html(&manifest, &figures, &verdict).unwrap();
+    let page = page::html(&manifest, &figures, &verdict, None).unwrap();
     assert!(
         page.contains(&format!("; first: {first}\""))
             && page.contains(&format!("\"next\":\"{}", next("this page"))),

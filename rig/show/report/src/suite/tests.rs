@@ -72,6 +72,14 @@ fn warnings_of_the_plan_are_in_every_form_also_where_results_differ() {
 }
 
 #[test]
+fn the_document_of_a_suite_says_what_to_do_next() {
+    let mut failed = judged("FAIL", Exit::Failed, "a", -1.0).unwrap();
+    failed.verdict.next_step = Some("Look there.".to_owned());
+    let xml = junit_of_suite(&report(vec![tested("one", vec![Ok(failed)])], None)).unwrap();
+    assert!(xml.contains("<property name=\"next step\" value=\"Look there.\"/>"), "{xml}");
+}
+
+#[test]
 fn a_result_that_changes_in_simulated_time_is_a_failure_of_its_own() {
     let failed = || judged("FAIL", Exit::Failed, "a", -1.0);
     for (attempts, differs) in [
