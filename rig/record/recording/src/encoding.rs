@@ -107,17 +107,10 @@ pub(super) fn definition(channel: Channel, declared: &Declared) -> Option<mcap::
 /// The definition of a topic in a run; none for signals or parameters that nobody declares. CDR writes the sequence of values
 /// as its length and, on their alignment, the values: so each may be a field of its own.
 fn named_definition(topic: Topic, definition: String, declared: &Declared) -> Option<String> {
+    let (signals, parameters) = (declared.signals.iter(), declared.parameters.iter());
     let fields: Vec<_> = match topic {
-        Topic::Signals => declared
-            .signals
-            .iter()
-            .map(|signal| field_line(&signal.name, &signal.unit, &signal.about))
-            .collect(),
-        Topic::Parameters => declared
-            .parameters
-            .iter()
-            .map(|known| field_line(&known.name, &known.unit, &known.about))
-            .collect(),
+        Topic::Signals => signals.map(|of| field_line(&of.name, &of.unit, &of.about)).collect(),
+        Topic::Parameters => parameters.map(|of| field_line(&of.name, &of.unit, &of.about)).collect(),
         _ => return Some(definition),
     };
     let before = definition.lines().filter(|line| !line.contains("[<="));

@@ -111,7 +111,7 @@ impl TableWriter {
     /// Those of the medium, and of the program that writes Parquet.
     pub fn write(&mut self, table: &Table) -> Result<(), TableError> {
         match &mut self.sink {
-            Sink::Parquet(file) => file.write_part(table)?,
+            Sink::Parquet(file) => file.send_rows(|rows| send_part(table, rows))?,
             Sink::Csv(writer) => {
                 for row in 0..table.rows() {
                     writer.write_record(table.columns().iter().map(|column| column.values.cell_text(row)))?;
@@ -127,7 +127,10 @@ impl TableWriter {
     /// Those of the medium, and of the program that writes Parquet.
     pub fn finish(self) -> Result<(), TableError> {
         match self.sink {
-            Sink::Parquet(file) => file.end_rows(),
+            Sink::Parquet(mut file) => {
+                file.send_rows(|rows| send_end(rows).and_then(|()| rows.flush()))?;
+                file.await_end()
+            }
             Sink::Csv(mut writer) => Ok(writer.flush()?),
         }
     }
@@ -194,16 +197,6 @@ struct ParquetFile {
 }
 
 impl ParquetFile {
-    fn write_part(&mut self, table: &Table) -> Result<(), TableError> {
-        self.send_rows(|rows| send_part(table, rows))
-    }
-
-    /// Waits until the file is whole.
-    fn end_rows(mut self) -> Result<(), TableError> {
-        self.send_rows(|rows| send_end(rows).and_then(|()| rows.flush()))?;
-        self.await_end()
-    }
-
     fn send_rows(
         &mut self,
         write: impl FnOnce(&mut BufWriter<ChildStdin>) -> io::Result<()>,
@@ -216,6 +209,7 @@ impl ParquetFile {
         }
     }
 
+    /// Waits until the program has ended, and with that the file.
     fn await_end(&mut self) -> Result<(), TableError> {
         // A program may read to the end of the pipe before it exits.
         self.rows = None;

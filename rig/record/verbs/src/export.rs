@@ -5,13 +5,13 @@
 //! the start of its motion. Rows are written in groups, so that its length does not matter for the memory.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
 use clap::{Args, ValueEnum};
 use masseter_judge::Analysis;
-use masseter_recording::{Columns, Description, Field, Reader, Recorded, Topic, new_folder};
+use masseter_recording::{Columns, Description, Field, Reader, Recorded, Topic, new_file, new_folder};
 use masseter_report::{CandumpLogs, jaw_cycle_table};
 use masseter_runtime::messages::tap;
 use masseter_runtime::named::{Declared, Parameter, Signal};
@@ -185,8 +185,7 @@ impl Export<'_> {
         }
         let codebook = Table::codebook(tables.iter().map(|(name, table)| (name.as_str(), table)));
         let path = self.out.join(CODEBOOK);
-        let file = File::create_new(&path).with_context(|| format!("cannot create {}", path.display()))?;
-        write_table(&Format::Csv, file, &codebook).with_context(|| path.display().to_string())?;
+        write_table(&Format::Csv, new_file(&path)?, &codebook).with_context(|| path.display().to_string())?;
         written.push((CODEBOOK.to_owned(), codebook.rows() as u64));
         for (bus, lines) in candump.map(CandumpLogs::finish).transpose()?.into_iter().flatten().enumerate() {
             written.push((format!("can{bus}.log"), lines));
@@ -211,8 +210,7 @@ impl TableFile {
     /// Creates a file in `folder` for rows of an empty table.
     fn create(folder: &Path, name: &str, format: &Format, empty: Table) -> anyhow::Result<Self> {
         let path = folder.join(format!("{name}.{}", format.extension()));
-        let file = File::create_new(&path).with_context(|| format!("cannot create {}", path.display()))?;
-        let writer = TableWriter::new(format, file, &empty);
+        let writer = TableWriter::new(format, new_file(&path)?, &empty);
         let writer = writer.with_context(|| path.display().to_string())?;
         Ok(Self { name: name.to_owned(), path, writer, group: empty, rows: 0 })
     }

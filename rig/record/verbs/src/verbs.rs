@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use clap::{Args, Subcommand};
-use masseter_recording::{Reader, recording_at, recover, thin};
+use masseter_recording::{Reader, new_file, recording_at, recover, thin};
 use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, result, result_with_tones};
 use mcap::Attachment;
@@ -120,8 +120,7 @@ fn keep_few(path: &Path, out: &Path) -> anyhow::Result<Exit> {
 
 /// Writes a new file, which is removed again where that fails. The first error is the one to report.
 fn write_new<T>(path: &Path, write: impl FnOnce(BufWriter<File>) -> anyhow::Result<T>) -> anyhow::Result<T> {
-    let file = File::create_new(path).with_context(|| format!("cannot create {}", path.display()))?;
-    write(BufWriter::new(file)).inspect_err(|_| {
+    write(BufWriter::new(new_file(path)?)).inspect_err(|_| {
         let _ = fs::remove_file(path);
     })
 }
