@@ -10,6 +10,7 @@ mod declaration;
 pub(crate) mod interrupts;
 mod loop_watch;
 mod prepared;
+mod program;
 mod reception;
 pub(crate) mod request;
 mod resolve;
@@ -19,7 +20,7 @@ mod strikes;
 mod supervisor;
 mod usage;
 
-pub(crate) use controller::{end_with_parent, exec_program};
 pub(crate) use declaration::declared_by;
 pub(crate) use prepared::PreparedRun;
+pub(crate) use program::{end_with_parent, exec_program};
 pub(crate) use resolve::{needs_processes, resolve_simulated};

@@ -4,6 +4,7 @@
 //! real time and in lockstep; the runner of virtual time calls it in one thread. Kinematics, trajectories and safety of a
 //! particular controller are not here.
 
+mod ports;
 mod session;
 
 use std::borrow::Borrow;
