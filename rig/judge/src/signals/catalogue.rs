@@ -174,16 +174,16 @@ fn add_axes(list: &mut SignalList, has_truth: bool) {
         list.add(format!("{name}.target"), Unit::MM, "Target of the cycle's command.", move |of| {
             Some(at(command(of)?.target_m))
         });
-        list.add_state(format!("{name}.drive"), "State of the drive.", drive_states, move |of| {
+        let states = || DriveState::ALL.iter().map(|state| (state.name(), state.code())).collect();
+        list.add_state(format!("{name}.drive"), "State of the drive.", states, move |of| {
             Some(reading(of)?.drive_state[axis])
         });
     }
 }
 
 fn add_controller(list: &mut SignalList) {
-    list.add_state("controller.state", "State of the controller.", controller_states, |of| {
-        of.controller_state
-    });
+    let states = || ControllerState::ALL.iter().map(|state| (state.name(), state.code())).collect();
+    list.add_state("controller.state", "State of the controller.", states, |of| of.controller_state);
     list.add("motion.time", Unit::S, "How far the motion has come, as the controller states it.", |of| {
         Some(of.state?.motion_time_s)
     });
@@ -275,12 +275,4 @@ fn add_recorded(list: &mut SignalList, scenario: &Scenario, declared: &Declared)
 /// The force on each tooth, N.
 fn loads_n(of: &CycleMessages) -> Option<impl Iterator<Item = (u32, f64)>> {
     Some(of.contact.as_ref()?.teeth().map(|tooth| (tooth.number, tooth.load_n())))
-}
-
-fn controller_states() -> Vec<(&'static str, u32)> {
-    ControllerState::ALL.iter().map(|state| (state.name(), state.code())).collect()
-}
-
-fn drive_states() -> Vec<(&'static str, u32)> {
-    DriveState::ALL.iter().map(|state| (state.name(), state.code())).collect()
 }
