@@ -25,7 +25,7 @@ use crate::requirements::RequirementFigures;
 use crate::response::BusResponse;
 use crate::skips::{OverrunAttribution, SkipFigures};
 use crate::standstill::StandstillFigures;
-use crate::tracking::{Track, TrackingFigures};
+use crate::tracking::{TrackingFigures, TrackingSample};
 
 /// The figures of a run. As JSON: `figures` of `summary.json`.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -119,9 +119,10 @@ pub struct Figures {
     /// How each drive met the demands while the motion played; zeros but in a dry run.
     #[serde(skip)]
     pub axes: [AxisFigures; AXES],
-    /// Tracking over time, for plots.
+    /// The platform from the first easing to the last hold, or to the standstill of a safe stop, as often as a screen shows; more
+    /// rarely in a long run. From the stop on, its desired pose is the last one.
     #[serde(skip)]
-    pub track: Track,
+    pub track: Vec<TrackingSample>,
     /// Wake-ups, axes and buses over time, for plots.
     #[serde(skip)]
     pub over_time: OverTime,

@@ -71,6 +71,6 @@ pub use skips::{OverrunAttribution, SkipFigures};
 pub use standstill::StandstillFigures;
 pub use statistic::Statistic;
 pub use timing::{Timing, TimingWord};
-pub use tracking::{PoseErrors, PoseSource, Track, TrackingFigures, TrackingSample, UndisturbedFigures};
+pub use tracking::{PoseErrors, PoseSource, TrackingFigures, TrackingSample, UndisturbedFigures};
 pub use verdict::{Judgement, Verdict};
 pub use watch::{UnknownRequirement, Watch};

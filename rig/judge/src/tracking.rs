@@ -88,14 +88,6 @@ pub struct TrackingSample {
     pub actual: Pose,
 }
 
-/// The platform from the first easing to the last hold, or to the standstill of a safe stop. From the stop on, its desired
-/// pose is the last one.
-#[derive(Debug, Clone, Default)]
-pub struct Track {
-    /// Cycles from the first to the last, as many as a screen shows; fewer of a long run.
-    pub samples: Vec<TrackingSample>,
-}
-
 /// Time between two samples of the track at first, ns: the 60 Hz of a screen.
 const SAMPLE_NS: u64 = SECOND_NS / 60;
 /// Most samples of the track: of more than half a minute every second, fourth … sample stays.
@@ -236,7 +228,7 @@ impl Tracking {
         self.second.add(distance_m);
     }
 
-    pub(super) fn into_figures(self) -> (TrackingFigures, Track) {
+    pub(super) fn into_figures(self) -> (TrackingFigures, Vec<TrackingSample>) {
         let UndisturbedFigures { samples, actual, estimated } = self.errors.figures();
         let has_truth = self.source == PoseSource::Truth;
         let figures = TrackingFigures {
@@ -250,7 +242,7 @@ impl Tracking {
             estimate_rms_mm: (samples > 0 && has_truth).then(|| self.estimates.rms() * 1e3),
             undisturbed: self.undisturbed.figures(),
         };
-        (figures, Track { samples: self.track })
+        (figures, self.track)
     }
 }
 

@@ -46,7 +46,7 @@ fn without_truth_the_estimate_takes_its_place() {
     let (figures, track) = tracking.into_figures();
     assert_eq!((figures.samples, figures.estimate_rms_mm), (1, None));
     assert!((figures.actual.rms_mm.unwrap() - 2.0).abs() < 1e-9);
-    assert!((track.samples[0].actual.translation.x - 0.001).abs() < 1e-12);
+    assert!((track[0].actual.translation.x - 0.001).abs() < 1e-12);
 }
 
 #[test]
@@ -73,10 +73,10 @@ fn a_long_run_keeps_samples_from_its_beginning_to_its_end() {
     }
     let (_, track) = tracking.into_figures();
     let longest_ns = 4 * (SAMPLE_NS + PERIOD_NS);
-    assert!(track.samples.windows(2).all(|pair| pair[1].sampled_ns - pair[0].sampled_ns <= longest_ns));
-    assert_eq!(track.samples[0].sampled_ns, 0);
-    assert!(99_999 * PERIOD_NS - track.samples[track.samples.len() - 1].sampled_ns <= longest_ns);
-    assert!((MOST_SAMPLES / 2..=MOST_SAMPLES).contains(&track.samples.len()), "{}", track.samples.len());
+    assert!(track.windows(2).all(|pair| pair[1].sampled_ns - pair[0].sampled_ns <= longest_ns));
+    assert_eq!(track[0].sampled_ns, 0);
+    assert!(99_999 * PERIOD_NS - track[track.len() - 1].sampled_ns <= longest_ns);
+    assert!((MOST_SAMPLES / 2..=MOST_SAMPLES).contains(&track.len()), "{}", track.len());
 }
 
 /// The controller does not use sample 2, and the motion ends with sample 3.
@@ -178,7 +178,7 @@ fn after_a_safe_stop_the_track_goes_on_beside_the_last_desired_pose() {
     }
     let (figures, track) = tracking.into_figures();
     assert_eq!(figures.samples, 19);
-    let last = track.samples.last().unwrap();
+    let last = track.last().unwrap();
     assert_eq!((last.sampled_ns, last.actual.translation.x), (60 * SAMPLE_NS, 0.06));
     assert!((last.desired.translation.x - 0.02).abs() < 1e-12, "the sample that ended the motion");
 }

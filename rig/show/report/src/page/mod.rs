@@ -99,7 +99,7 @@ mod tests {
         scenario.can.interfaces = interfaces.iter().map(|name| (*name).to_owned()).collect();
         let mut figures = Analysis::new(&scenario, &Declared::default()).finish(false, &[]);
         let still = Pose::identity();
-        figures.track.samples =
+        figures.track =
             vec![TrackingSample { sampled_ns: 0, desired: still, estimated: still, actual: still }];
         let machine = MachineInfo { cpu: String::new(), cores: 2, kernel: String::new(), is_virtual: false };
         let manifest = Manifest::new("0.1.0", scenario, 1.0, "rt", machine);

@@ -174,7 +174,7 @@ struct Animation {
 /// The animation; none without a motion or without a mechanism.
 pub(super) fn animation_data(scenario: &Scenario, figures: &Figures) -> Option<Value> {
     let mechanism = Mechanism::new(&scenario.mechanism).ok()?;
-    let samples = &figures.track.samples;
+    let samples = &figures.track;
     samples.first()?;
     let source = figures.tracking.actual_source;
     let frame = |sample| frame(sample, figures.over_time.began_ns, source);

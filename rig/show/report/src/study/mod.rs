@@ -225,7 +225,7 @@ fn recorded(path: &Path, by: &By, set: &[String]) -> anyhow::Result<Recorded> {
             condition: value_of(scenario, &by.condition)?.unwrap_or_else(|| "all".to_owned()),
             verdict: Judgement::new(&manifest, &figures).verdict.word.to_string(),
             is_true: figures.tracking.actual_source.is_truth(),
-            path_mm: figures.track.samples.iter().filter(has_begun).map(place).collect(),
+            path_mm: figures.track.iter().filter(has_begun).map(place).collect(),
             jaw: figures.jaw_cycles,
         })
     };
