@@ -52,12 +52,12 @@ def gather(source: Path) -> None:
         file = target(document, link)
         if "://" in link or file in documents:
             return link
-        # Browsers show text, and save what they do not know.
-        ending = "" if file.suffix in PICTURES else ".txt"
-        copy = source / f"{file}{ending}"
+        # Browsers show text, and save what they do not know. mdbook would take every .md for a page.
+        shown = link if file.suffix in PICTURES else link.removesuffix(".md") + ".txt"
+        copy = source / target(document, shown)
         copy.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(file, copy)
-        return link + ending
+        return shown
 
     for document in sorted(documents):
         text = LINK.sub(lambda link: placed(document, link[0]), document.read_text())
