@@ -15,6 +15,7 @@ from urllib.parse import unquote
 
 CONTENTS = Path("docs/README.md")
 PICTURES = {".png", ".svg"}
+NAMED = re.compile(r"\[(?:\w|[-./])+\.md\]\(([^)#\s]+)")
 LINK = re.compile(r'(?<=\]\()[^)#\s]+|(?<=src=")[^"]+')
 
 
@@ -59,8 +60,14 @@ def gather(source: Path) -> None:
         shutil.copyfile(file, copy)
         return shown
 
+    def titled(document: Path, link: re.Match[str]) -> str:
+        """A document by its title, where a link has the name of its file."""
+        file = target(document, link[1])
+        return f"[{file.read_text().split(chr(10), 1)[0].strip('# ')}]({link[1]}" if file in documents else link[0]
+
     for document in sorted(documents):
-        text = LINK.sub(lambda link: placed(document, link[0]), document.read_text())
+        text = NAMED.sub(lambda link: titled(document, link), document.read_text())
+        text = LINK.sub(lambda link: placed(document, link[0]), text)
         (source / document).parent.mkdir(parents=True, exist_ok=True)
         (source / document).write_text(text)
     (source / "SUMMARY.md").write_text(contents)
