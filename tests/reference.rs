@@ -1,9 +1,11 @@
-//! Tables of the documents that follow from declarations: the keys of scenarios, the kinds of faults and quirks, the signals.
+//! What documents have from declarations: the keys of scenarios, the kinds of faults and quirks, the signals, the commands.
 //!
 //! `cargo test --test rig -- --ignored renew_the_reference` writes them anew.
 
+use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use masseter_judge::signals::Registry;
 use masseter_model::geometry::{AXIS_NAMES, MechanismConfig, SlideConfig, StrokeLimits};
@@ -19,6 +21,8 @@ use masseter_scenario::{
 };
 use serde_json::Value;
 
+use crate::common::{MASSETER, stdout};
+
 const KEYS: &str = "| key | unit | default | range | meaning |\n| --- | --- | --- | --- | --- |\n";
 const FAULTS: &str = "| `faults.kind` | |\n| --- | --- |\n";
 const QUIRKS: &str = "| `drives.quirk.kind` | |\n| --- | --- |\n";
@@ -30,8 +34,9 @@ const GIVEN_WHOLE: [&str; 2] = ["[[mechanism.slides]]", "[mechanism.strokes]"];
 
 type Rewrite = fn(&str) -> String;
 
-/// Every document with such tables, and how it is written anew.
-const DOCUMENTS: [(&str, Rewrite); 2] = [("scenario.md", scenario), ("signals.md", signals)];
+/// Every such document, and how it is written anew.
+const DOCUMENTS: [(&str, Rewrite); 3] =
+    [("scenario.md", scenario), ("signals.md", signals), ("commands.md", commands)];
 
 /// The tables of a scenario by the TOML that leads to them.
 const TABLES: [(&str, &[Key]); 47] = [
@@ -305,6 +310,36 @@ fn signals(text: &str) -> String {
         format!("| `{}` | {unit}| {} |\n", signal.name, signal.about)
     });
     with_rows(text, SIGNALS, &rows.collect::<String>())
+}
+
+/// What `masseter help` prints of each verb, below the text before the first heading.
+fn commands(text: &str) -> String {
+    let (before, _) = text.split_once("\n## ").unwrap_or((text, ""));
+    let mut renewed = before.trim_end().to_owned();
+    // Verbs whose help is still to come, the next one last.
+    let mut names = vec![Vec::new()];
+    while let Some(name) = names.pop() {
+        // Without a terminal a line has as many signs as this variable says, at most 100.
+        let mut command = Command::new(MASSETER);
+        command.arg("help").args(&name).env_remove("COLUMNS");
+        let help = stdout(&command.output().unwrap());
+        let inner = verbs_of(&help).rev().map(|verb| name.iter().cloned().chain([verb.to_owned()]).collect());
+        names.extend(inner);
+        if !name.is_empty() {
+            let lines: Vec<_> = help.trim_end().lines().map(str::trim_end).collect();
+            let [name, help] = [name.join(" "), lines.join("\n")];
+            write!(renewed, "\n\n## masseter {name}\n\n```text\n{help}\n```").unwrap();
+        }
+    }
+    renewed + "\n"
+}
+
+/// The verbs that a help lists.
+fn verbs_of(help: &str) -> impl DoubleEndedIterator<Item = &str> {
+    let (list, _) = help.split_once("\nOptions:").unwrap();
+    let entries = list.lines().filter_map(|line| line.strip_prefix("  ")?.split_once("  "));
+    let verbs = entries.map(|(name, _)| name);
+    verbs.filter(|name| *name != "help" && name.starts_with(|first: char| first.is_ascii_lowercase()))
 }
 
 /// The word for a kind of motion. A new kind does not compile until it is here, and [`MOTIONS`] counts it.
