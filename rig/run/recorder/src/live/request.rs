@@ -55,7 +55,7 @@ pub(super) fn is_whole(bytes: &[u8]) -> bool {
 /// request.
 pub(super) fn wish(bytes: &[u8], secret: &str) -> Result<(Wish, usize), Vec<u8>> {
     let Ok(Some((request, length))) = parse_request(bytes) else { return Err(Vec::new()) };
-    admit(&request, secret).map_err(|refusal| http_answer(StatusCode::FORBIDDEN, "text/plain", &refusal))?;
+    admit(&request, secret).map_err(|refusal| http_answer(refusal.status(), "text/plain", &refusal))?;
     let upgrade = request.headers().get(UPGRADE).and_then(|upgrade| upgrade.to_str().ok());
     if upgrade.is_some_and(|upgrade| upgrade.eq_ignore_ascii_case("websocket")) {
         let refused = |reason: &dyn Display| http_answer(StatusCode::BAD_REQUEST, "text/plain", reason);
@@ -116,6 +116,8 @@ fn opening(request: &Request, protocol: &'static str) -> tungstenite::Result<Vec
 enum Refusal {
     #[error("ask with GET: nothing can be sent here")]
     Method,
+    #[error("name the host once (RFC 9112, 3.2)")]
+    Hosts,
     #[error("connect to an IP address or to localhost")]
     Host,
     #[error("only pages of foxglove.dev and of this machine may watch")]
@@ -124,14 +126,26 @@ enum Refusal {
     Secret,
 }
 
+impl Refusal {
+    fn status(self) -> StatusCode {
+        match self {
+            Self::Hosts => StatusCode::BAD_REQUEST,
+            Self::Method | Self::Host | Self::Origin | Self::Secret => StatusCode::FORBIDDEN,
+        }
+    }
+}
+
 /// Checks method, host, origin and secret of a request.
 fn admit(request: &Request, secret: &str) -> Result<(), Refusal> {
-    let header = |name| request.headers().get(name).map(|value| value.to_str().unwrap_or_default());
+    let headers =
+        |name| request.headers().get_all(name).iter().map(|value| value.to_str().unwrap_or_default());
     if request.method() != Method::GET {
         Err(Refusal::Method)
-    } else if !header(HOST).is_some_and(is_address) {
+    } else if headers(HOST).count() != 1 {
+        Err(Refusal::Hosts)
+    } else if !headers(HOST).all(is_address) {
         Err(Refusal::Host)
-    } else if !header(ORIGIN).is_none_or(is_allowed) {
+    } else if !headers(ORIGIN).all(is_allowed) {
         Err(Refusal::Origin)
     } else if request.uri().path().strip_prefix('/') != Some(secret) {
         Err(Refusal::Secret)
@@ -256,6 +270,23 @@ mod tests {
         ] {
             assert_eq!(ask("/5ec7e7", host, None), Err(Refusal::Host), "{host}");
         }
+    }
+
+    #[test]
+    fn a_request_names_its_host_once_and_no_second_origin_hides_behind_the_first() {
+        let answer_to = |lines: &str| {
+            let bytes = format!("GET /{SECRET} HTTP/1.1\r\n{lines}\r\n").into_bytes();
+            wish(&bytes, SECRET).map_err(|answer| String::from_utf8(answer).unwrap()[9..12].to_owned())
+        };
+        let local = "Host: localhost\r\n";
+        assert!(answer_to(local).is_ok());
+        for lines in
+            ["", "Host: localhost\r\nHost: localhost\r\n", "Host: localhost\r\nHost: evil.example\r\n"]
+        {
+            assert_eq!(answer_to(lines), Err("400".to_owned()), "{lines}");
+        }
+        let origins = format!("{local}Origin: http://localhost\r\nOrigin: https://evil.example\r\n");
+        assert_eq!(answer_to(&origins), Err("403".to_owned()));
     }
 
     #[test]
