@@ -128,7 +128,14 @@ const MAY_USE: [(&str, &[&str]); 27] = [
     ),
     (
         "rig/vary/campaign",
-        &["shared/scenario", "shared/runtime", "rig/judge", "rig/show/page", "rig/record/table"],
+        &[
+            "shared/model",
+            "shared/scenario",
+            "shared/runtime",
+            "rig/judge",
+            "rig/show/page",
+            "rig/record/table",
+        ],
     ),
     // Its drive is none of the product's, or errors of master and drive could cancel out.
     ("tests/canopen_node", &["shared/can"]),

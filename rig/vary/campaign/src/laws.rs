@@ -6,7 +6,7 @@
 use std::fmt::{self, Display, Formatter};
 use std::sync::LazyLock;
 
-use masseter_judge::{CheckResult, FaultFigures, Figures, Verdict};
+use masseter_judge::{Breach, Check, CheckResult, FaultFigures, Figures, Verdict};
 use masseter_runtime::messages::codes::EventKind;
 use masseter_scenario::{AxisFault, DriveFault, FaultConfig, FaultKindConfig, Quantity, Scenario};
 use serde::{Deserialize, Serialize};
@@ -99,14 +99,19 @@ impl Run<'_> {
     }
 
     fn silent_deviation(&self) -> Option<String> {
-        let breach = self.figures.path_breach.first.as_ref()?;
+        let breach = self.left_path()?;
         let is_excused = self.struck().any(|(fault, _)| !is_always_reported(fault.kind));
-        (!is_excused && !self.is_reported(0)).then(|| breach.to_string())
+        (!is_excused && !self.is_reported(0)).then_some(breach)
     }
 
     fn wrong_pass(&self) -> Option<String> {
-        let breach = self.figures.path_breach.first.as_ref()?;
-        (self.verdict.word == "PASS").then(|| breach.to_string())
+        self.left_path().filter(|_| self.verdict.word == "PASS")
+    }
+
+    /// How the jaw first left its path; none if it did not.
+    fn left_path(&self) -> Option<String> {
+        let Breach { what, value, limit, .. } = self.figures.path_breach.first.as_ref()?;
+        Some(format!("{what} {value}, limit {limit}"))
     }
 
     fn undetected(&self) -> Option<String> {
@@ -135,8 +140,7 @@ impl Run<'_> {
     }
 
     fn failed_requirement(&self) -> Option<String> {
-        let failed =
-            |check: &&masseter_judge::Check| check.is_requirement() && check.result == CheckResult::Failed;
+        let failed = |check: &&Check| check.is_requirement() && check.result == CheckResult::Failed;
         let check = self.verdict.checks.iter().find(failed)?;
         Some(format!("{} {}", check.name, check.finding))
     }
