@@ -15,7 +15,7 @@ PARTS = {
     "analysis": ["masseter_judge::"],
     "check of the motion": ["masseter_plan::", "trajectory::check"],
     "simulated wires": ["masseter_can::"],
-    "drives": ["masseter_plant::simulator::drive::"],
+    "drives": ["masseter_drives::"],
     "mechanism": ["masseter_plant::simulator::mechanism::", "masseter_model::dynamics::",
                   "masseter_model::geometry::", "Emulation::push", "Emulation::move_mechanism"],
     "controller": ["masseter_controller::", "masseter_runtime::control::"],

@@ -43,19 +43,11 @@ fn the_crate_of_can_stands_alone() {
     assert_eq!(used, ["libc", "rand", "rand_pcg", "rustix", "serde", "socketcan", "thiserror"]);
 }
 
-/// Emulated drives know frames and their own parts.
+/// So are emulated drives.
 #[test]
-fn emulated_drives_know_neither_mechanism_nor_scenario_nor_transport() {
-    let foreign = |line: &&str| {
-        let mut others = ["masseter_model", "masseter_runtime", "masseter_scenario", "iceoryx2"].iter();
-        !line.trim_start().starts_with("//") && others.any(|name| line.contains(name))
-    };
-    for path in code_files(&project().join("plant/src/simulator/drive")) {
-        let text = fs::read_to_string(&path).unwrap();
-        let begins_tests = |line: &&str| line.starts_with("mod ") && line.ends_with("tests {");
-        let mut code = text.lines().take_while(|line| !begins_tests(line));
-        assert_eq!(code.find(foreign), None, "{}", path.display());
-    }
+fn the_crate_of_drives_stands_on_that_of_can_alone() {
+    let used = dependencies_of(project(), "masseter-drives");
+    assert_eq!(used, ["masseter-can", "arrayvec", "serde", "thiserror"]);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Descriptions of drives for other tools. The electronic data sheet of an emulated drive (EDS, CiA 306) and the
+//! Descriptions of drives for other tools. The electronic data sheets of the emulated drives (EDS, CiA 306) and the
 //! messages of all buses (DBC) follow from the emulated drives' object dictionary. A device configuration file (DCF,
 //! CiA 306) holds the survey of a drive.
 //!
@@ -9,16 +9,13 @@ use std::collections::BTreeMap;
 
 use masseter_can::CanId;
 use masseter_can::canopen::{Cob, CobId, NmtCommand, NmtState, NodeId, ObjectAddress};
+use masseter_drives::{DriveSettings, Entry, Objects, PDOS, Ratings, object_lists};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_runtime::clock::MILLISECOND_NS;
 use masseter_scenario::{MASTER_NODE, Scenario};
 
 use crate::commissioning::{Survey, object_name};
 use crate::error::PlantError;
-use crate::simulator::drive::dictionary::{ENTRIES, Objects, Overlay, find};
-use crate::simulator::drive::names;
-use crate::simulator::drive::table::{Access, Entry, Initial, Mapping, OBJECTS, Object, PDOS, Shape};
-use crate::simulator::drive::{DriveSettings, Ratings};
 use crate::simulator::emulation::drives::drive_settings;
 
 /// The electronic data sheets of the drives, in the order of the axes.
@@ -32,7 +29,8 @@ use crate::simulator::emulation::drives::drive_settings;
 /// # Ok::<_, masseter_plant::PlantError>(())
 /// ```
 pub fn eds(scenario: &Scenario) -> Result<[String; AXES], PlantError> {
-    Ok(drive_settings(scenario)?.map(|settings| write_eds(&settings)))
+    let sheets = drive_settings(scenario)?.iter().map(masseter_drives::eds).collect::<Result<Vec<_>, _>>()?;
+    Ok(sheets.try_into().expect("a sheet for every axis"))
 }
 
 /// The messages between the master and all drives as a DBC file.
@@ -46,7 +44,10 @@ pub fn eds(scenario: &Scenario) -> Result<[String; AXES], PlantError> {
 /// # Ok::<_, masseter_plant::PlantError>(())
 /// ```
 pub fn dbc(scenario: &Scenario) -> Result<String, PlantError> {
-    Ok(write_dbc(&drive_settings(scenario)?, scenario.period_ns()))
+    let with_objects = |settings: DriveSettings| Ok((settings.objects()?, settings));
+    let drives =
+        drive_settings(scenario)?.into_iter().map(with_objects).collect::<Result<Vec<_>, PlantError>>()?;
+    Ok(write_dbc(&drives, scenario.period_ns()))
 }
 
 const MASTER: &str = "Master";
@@ -78,7 +79,7 @@ fn numbers<const N: usize>(signals: [(&str, usize); N]) -> Vec<Signal> {
 }
 
 /// The file, lines ended by a line feed.
-fn write_dbc(drives: &[DriveSettings; AXES], period_ns: u64) -> String {
+fn write_dbc(drives: &[(Objects, DriveSettings)], period_ns: u64) -> String {
     let to_all = [MASTER, ANYBODY];
     let mut parts = vec![
         format!("VERSION \"\"\n\nNS_ :\n\nBS_:\n\nBU_: {MASTER} {}\n\n", AXIS_NAMES.join(" ")),
@@ -86,14 +87,14 @@ fn write_dbc(drives: &[DriveSettings; AXES], period_ns: u64) -> String {
         message(Cob::Sync.into(), "SYNC", to_all, &[]),
         message(Cob::Heartbeat(MASTER_NODE).into(), "Master_heartbeat", to_all, &numbers([("State", 8)])),
     ];
-    for (settings, name) in drives.iter().zip(AXIS_NAMES) {
+    for ((objects, settings), name) in drives.iter().zip(AXIS_NAMES) {
         parts.extend(services(settings.node, name));
-        parts.extend(process_data(settings, name));
+        parts.extend(process_data(objects, &settings.ratings, name));
     }
     parts.push(cycle_times(drives, period_ns));
     parts.push(values(Cob::Nmt, "Command", &NmtCommand::ALL.map(|command| (command.code(), command.name()))));
     let states = NmtState::ALL.map(|state| (state.code(), state.name()));
-    let nodes = [MASTER_NODE].into_iter().chain(drives.iter().map(|settings| settings.node));
+    let nodes = [MASTER_NODE].into_iter().chain(drives.iter().map(|(_, settings)| settings.node));
     parts.extend(nodes.map(|node| values(Cob::Heartbeat(node), "State", &states)));
     parts.concat()
 }
@@ -117,14 +118,14 @@ fn services(node: NodeId, name: &str) -> [String; 4] {
 }
 
 /// The PDOs that exist after power-on.
-fn process_data(settings: &DriveSettings, name: &str) -> Vec<String> {
+fn process_data(objects: &Objects, drive: &Ratings, name: &str) -> Vec<String> {
     let mut messages = Vec::new();
     for number in 0..PDOS as u16 {
         let rpdo = ("RPDO", 0x1400, [MASTER, name]);
         for (direction, communication, nodes) in [rpdo, ("TPDO", 0x1800, [name, MASTER])] {
-            let cob_id = CobId(settings.objects.at(communication + number, 1));
+            let cob_id = CobId(objects.at(communication + number, 1));
             let Some(id) = cob_id.identifier() else { continue };
-            let signals = mapped(&settings.objects, communication + 0x0200 + number, &settings.drive);
+            let signals = mapped(objects, communication + 0x0200 + number, drive);
             messages.push(message(id, &format!("{name}_{direction}{}", number + 1), nodes, &signals));
         }
     }
@@ -132,15 +133,14 @@ fn process_data(settings: &DriveSettings, name: &str) -> Vec<String> {
 }
 
 fn mapped(objects: &Objects, index: u16, drive: &Ratings) -> Vec<Signal> {
-    let signal = |place: usize| {
-        let entry = &ENTRIES[place];
+    let signal = |entry: &Entry| {
         let (factor, unit, limits) = match entry.address.index {
             0x6064 | 0x607A => {
-                let ends = [names::MIN_POSITION_LIMIT, names::MAX_POSITION_LIMIT];
-                (drive.encoder_resolution_m, "m", Some(ends.map(|end| f64::from(objects.get(end)))))
+                let end = |subindex| f64::from(objects.at(0x607D, subindex) as i32);
+                (drive.encoder_resolution_m, "m", Some([end(1), end(2)]))
             }
             0x6077 | 0x60B2 => {
-                let most = f64::from(objects.get(names::MAX_TORQUE));
+                let most = f64::from(objects.at(0x6072, 0));
                 (drive.rated_force_n / 1000.0, "N", Some([-most, most]))
             }
             _ => (1.0, "", entry.limits.map(|(lowest, highest)| [lowest as f64, highest as f64])),
@@ -172,17 +172,16 @@ fn message(id: CanId, name: &str, [sender, receiver]: [&str; 2], signals: &[Sign
 
 /// Periods of regular messages, ms: heartbeats, and SYNC with its PDOs. The format has whole milliseconds only, so a
 /// faster SYNC has no period.
-fn cycle_times(drives: &[DriveSettings; AXES], period_ns: u64) -> String {
-    let heartbeat_ms =
-        |settings: &DriveSettings| u64::from(settings.objects.get(names::PRODUCER_HEARTBEAT_TIME_MS));
+fn cycle_times(drives: &[(Objects, DriveSettings)], period_ns: u64) -> String {
+    let heartbeat_ms = |objects: &Objects| u64::from(objects.at(0x1017, 0));
     let mut times = vec![(CanId::from(Cob::Sync), period_ns / MILLISECOND_NS)];
-    times.push((Cob::Heartbeat(MASTER_NODE).into(), heartbeat_ms(&drives[0])));
-    for settings in drives {
-        times.push((Cob::Heartbeat(settings.node).into(), heartbeat_ms(settings)));
+    times.push((Cob::Heartbeat(MASTER_NODE).into(), heartbeat_ms(&drives[0].0)));
+    for (objects, settings) in drives {
+        times.push((Cob::Heartbeat(settings.node).into(), heartbeat_ms(objects)));
         let communications = (0..PDOS as u16).flat_map(|number| [0x1400 + number, 0x1800 + number]);
         times.extend(communications.filter_map(|communication| {
-            let id = CobId(settings.objects.at(communication, 1)).identifier()?;
-            let every = u64::from(settings.objects.at(communication, 2));
+            let id = CobId(objects.at(communication, 1)).identifier()?;
+            let every = u64::from(objects.at(communication, 2));
             (1..=240).contains(&every).then_some((id, every * period_ns / MILLISECOND_NS))
         }));
     }
@@ -198,88 +197,6 @@ fn values(cob: Cob, signal: &str, names: &[(u8, &str)]) -> String {
     format!("VAL_ {} {signal} {} ;\n", CanId::from(cob).number(), names.join(" "))
 }
 
-/// Mandatory objects of CiA 301.
-const MANDATORY: [u16; 3] = [0x1000, 0x1001, 0x1018];
-
-/// The file, lines ended by a line feed.
-fn write_eds(settings: &DriveSettings) -> String {
-    let overlay = &settings.quirks.overlay;
-    let there: Vec<_> = OBJECTS.iter().filter(|object| !entries(object, overlay).is_empty()).collect();
-    let lists = lists(there.iter().map(|object| object.index()));
-    let sections = there.iter().map(|object| section(object, &entries(object, overlay), &settings.objects));
-    [head(settings.node, &settings.objects), lists].into_iter().chain(sections).collect()
-}
-
-/// The sections on the file and the device.
-fn head(node: NodeId, objects: &Objects) -> String {
-    format!(
-        include_str!("description/eds_head.txt"),
-        node = node,
-        version = env!("CARGO_PKG_VERSION"),
-        vendor = objects.at(0x1018, 1),
-        product = objects.at(0x1018, 2),
-        revision = objects.at(0x1018, 3),
-        pdos = PDOS,
-    )
-}
-
-/// The three lists of objects.
-fn lists(indices: impl Iterator<Item = u16>) -> String {
-    let (of_maker, standard): (Vec<_>, Vec<_>) = indices.partition(|index| (0x2000..0x6000).contains(index));
-    let (mandatory, optional): (Vec<_>, Vec<_>) =
-        standard.into_iter().partition(|index| MANDATORY.contains(index));
-    let list = |(section, indices): (&str, Vec<u16>)| {
-        let line = |(number, index): (usize, &u16)| format!("{number}=0x{index:04X}\n");
-        let lines: String = (1..).zip(&indices).map(line).collect();
-        format!("[{section}]\nSupportedObjects={}\n{lines}\n", indices.len())
-    };
-    [("MandatoryObjects", mandatory), ("OptionalObjects", optional), ("ManufacturerObjects", of_maker)]
-        .map(list)
-        .concat()
-}
-
-/// The entries of an object that the drive has.
-fn entries(object: &Object, overlay: &Overlay) -> Vec<Entry> {
-    let of_drive = |entry: &Entry| overlay.entry(find(entry.address).ok()?).copied();
-    object.entries.iter().filter_map(of_drive).collect()
-}
-
-fn section(object: &Object, entries: &[Entry], objects: &Objects) -> String {
-    let (index, Object { name, shape, .. }) = (object.index(), object);
-    let kind = match shape {
-        Shape::Var => return format!("[{index:04X}]\n{}", describe(&entries[0], objects)),
-        Shape::Array => 0x8,
-        Shape::Record => 0x9,
-    };
-    let sub =
-        |entry: &Entry| format!("[{index:04X}sub{:X}]\n{}", entry.address.subindex, describe(entry, objects));
-    let (count, subs) = (entries.len(), entries.iter().map(sub).collect::<String>());
-    format!("[{index:04X}]\nParameterName={name}\nObjectType=0x{kind:X}\nSubNumber={count}\n\n{subs}")
-}
-
-fn describe(entry: &Entry, objects: &Objects) -> String {
-    let access = match entry.access {
-        Access::Constant => "const",
-        Access::ReadOnly => "ro",
-        Access::ReadWrite => "rw",
-    };
-    let (name, kind, mapping) = (entry.name, entry.kind as u16, u8::from(entry.mapping != Mapping::Never));
-    let number = entry.kind.number(objects.at(entry.address.index, entry.address.subindex));
-    let value = match entry.initial {
-        Initial::Text(text) => text.to_owned(),
-        Initial::OfNode(base) => format!("$NODEID+0x{base:X}"),
-        _ if entry.kind.is_signed() => number.to_string(),
-        _ => format!("0x{number:X}"),
-    };
-    let limits = entry
-        .limits
-        .map_or_else(String::new, |(lowest, highest)| format!("LowLimit={lowest}\nHighLimit={highest}\n"));
-    format!(
-        "ParameterName={name}\nObjectType=0x7\nDataType=0x{kind:04X}\nAccessType={access}\nDefaultValue={value}\n\
-         PDOMapping={mapping}\n{limits}\n"
-    )
-}
-
 /// The survey of a drive as a device configuration file (CiA 306), without other objects.
 pub fn dcf(survey: &Survey, node: u8, name: &str) -> String {
     let mut objects: BTreeMap<u16, Vec<(ObjectAddress, &[u8])>> = BTreeMap::new();
@@ -292,7 +209,7 @@ pub fn dcf(survey: &Survey, node: u8, name: &str) -> String {
         "[FileInfo]\nFileName={name}.dcf\nDescription=Read by masseter robot inspect\n\n\
          [DeviceComissioning]\nNodeID={node}\nNodeName={name}\n\n"
     );
-    let lists = lists(objects.keys().copied());
+    let lists = object_lists(objects.keys().copied());
     let sections = objects.iter().map(|(index, entries)| match entries[..] {
         [(object, value)] if object.subindex == 0 => format!("[{index:04X}]\n{}", read_entry(object, value)),
         _ => {
@@ -327,74 +244,7 @@ fn read_entry(object: ObjectAddress, value: &[u8]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use masseter_can::canopen::dcf::{self, Dcf};
-    use masseter_scenario::{QuirkConfig, QuirkKindConfig};
-
     use super::*;
-    use crate::simulator::drive::dictionary::ENTRIES;
-    use crate::simulator::drive::table::{Access, Initial, Mapping, OBJECTS};
-
-    #[test]
-    fn a_sheet_has_every_object_and_every_entry_once() {
-        let [first, ..] = eds(&Scenario::default()).unwrap();
-        for object in OBJECTS {
-            let heading = format!("[{:04X}]\n", object.index());
-            assert_eq!(first.matches(&heading).count(), 1, "{heading}");
-        }
-        let headings = first.matches("AccessType=").count();
-        assert_eq!(headings, ENTRIES.len());
-    }
-
-    #[test]
-    fn a_reader_of_sheets_finds_every_entry_as_it_is_in_the_dictionary() {
-        let settings = drive_settings(&Scenario::default()).unwrap();
-        for settings in &settings {
-            let sheet = Dcf::parse(&write_eds(settings)).unwrap();
-            let mut entries: Vec<_> = ENTRIES.iter().collect();
-            entries.sort_by_key(|entry| (entry.address.index, entry.address.subindex));
-            assert_eq!(sheet.entries().len(), entries.len());
-            for (read, entry) in sheet.entries().zip(entries) {
-                let at = entry.address;
-                assert_eq!((read.address, read.name.as_str()), (at, entry.name));
-                assert_eq!(read.data_type.0, entry.kind as u16, "{at}");
-                assert_eq!(read.is_mappable, entry.mapping != Mapping::Never, "{at}");
-                let access = match entry.access {
-                    Access::Constant => dcf::Access::Constant,
-                    Access::ReadOnly => dcf::Access::ReadOnly,
-                    Access::ReadWrite => dcf::Access::ReadWrite,
-                };
-                assert_eq!(read.access, access, "{at}");
-                let number =
-                    |value: &Option<dcf::Value>| value.as_ref().and_then(|v| v.number(settings.node));
-                let limits = entry.limits.map(|(lowest, highest)| (lowest.into(), highest.into()));
-                assert_eq!(number(&read.lowest).zip(number(&read.highest)), limits, "{at}");
-                let default = read.default.as_ref().unwrap();
-                if let Initial::Text(text) = entry.initial {
-                    assert_eq!(default, &dcf::Value::Text(text.to_owned()), "{at}");
-                } else {
-                    let written = settings.objects.at(at.index, at.subindex).to_le_bytes();
-                    let bytes = default.number(settings.node).unwrap().to_le_bytes();
-                    let length = entry.kind.bytes();
-                    assert_eq!(bytes[..length], written[..length], "{at}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn a_sheet_lists_what_the_drive_lets_clients_read() {
-        let mut scenario = Scenario::default();
-        scenario.drives.quirk = vec![QuirkConfig {
-            axes: Some(vec!["d1".to_owned()]),
-            ..QuirkConfig::new(QuirkKindConfig::MissingObjects)
-        }];
-        let [d1, d2, ..] = eds(&scenario).unwrap();
-        for index in ["6007", "6066", "6085"] {
-            assert!(!d1.contains(&format!("[{index}]")) && !d1.contains(&format!("=0x{index}\n")), "{index}");
-            assert!(d2.contains(&format!("[{index}]")) && d2.contains(&format!("=0x{index}\n")), "{index}");
-        }
-        assert_eq!(d1.matches("AccessType=").count(), ENTRIES.len() - 3);
-    }
 
     #[test]
     fn messages_have_ranges_and_cycle_times() {

@@ -1,11 +1,10 @@
-//! The rig's plant: CAN master, emulated CiA 402 drives and the mechanism they move.
+//! The rig's plant: CAN master, emulated CiA 402 drives (`masseter-drives`) and the mechanism they move.
 //!
 //! | module | holds | depends on |
 //! | --- | --- | --- |
 //! | `master` | boot, exchange, supervision of the drives; [`wanted`] objects; link, layout of the buses | |
 //! | `simulator::mechanism` | dynamics, axes with friction and stops, contact of teeth and food, poses at rest | |
-//! | `simulator::drive` | an emulated drive: node (CiA 301), axis (CiA 402), object dictionary | |
-//! | [`emulation`] | a scenario's drives and mechanism on simulated or real wires | mechanism, drive, `master` |
+//! | [`emulation`] | a scenario's drives and mechanism on simulated or real wires | mechanism, `masseter-drives`, `master` |
 //! | `simulator::injection` | when faults and stimuli act, their events; faults of commands | `master` |
 //! | [`commissioning`] | a client of single drives that inspects, configures and moves them | `master`, [`emulation`] |
 //! | [`description`] | EDS and DBC of the emulated drives, DCF of any drive | [`emulation`], [`commissioning`] |

@@ -68,21 +68,3 @@ impl<T: State> State for Option<T> {
         self.iter_mut().try_for_each(|part| part.exchange(archive))
     }
 }
-
-/// An array of more elements than serde takes, as a list.
-pub(crate) mod as_list {
-    use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
-
-    pub(crate) fn serialize<T: Serialize, S: Serializer>(array: &[T], to: S) -> Result<S::Ok, S::Error> {
-        array.serialize(to)
-    }
-
-    pub(crate) fn deserialize<'de, T, D, const N: usize>(from: D) -> Result<[T; N], D::Error>
-    where
-        T: Deserialize<'de>,
-        D: Deserializer<'de>,
-    {
-        let list = Vec::deserialize(from)?;
-        list.try_into().map_err(|list: Vec<T>| D::Error::invalid_length(list.len(), &"another length"))
-    }
-}

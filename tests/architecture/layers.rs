@@ -7,7 +7,7 @@ use super::workspace::{crate_roots, list, metadata, text, within};
 
 /// The crates of the workspace that each crate may use, all by their folders. The root package may use all
 /// but the programs that a run does not need.
-const MAY_USE: [(&str, &[&str]); 27] = [
+const MAY_USE: [(&str, &[&str]); 28] = [
     ("shared/can", &[]),
     ("shared/model", &[]),
     ("shared/scenario", &["shared/can", "shared/model"]),
@@ -34,7 +34,8 @@ const MAY_USE: [(&str, &[&str]); 27] = [
             "shared/no_bindgen",
         ],
     ),
-    ("plant", &["shared/can", "shared/model", "shared/scenario", "shared/runtime"]),
+    ("plant/drives", &["shared/can"]),
+    ("plant", &["shared/can", "shared/model", "shared/scenario", "shared/runtime", "plant/drives"]),
     ("rig/show/terminal", &[]),
     ("rig/show/charts", &[]),
     ("rig/show/page", &[]),
@@ -161,10 +162,9 @@ pub(super) struct Room<'a> {
     pub(super) rooms: &'a [&'a str],
 }
 
-/// The rooms of the plant's simulator. A drive stands on CAN alone, the mechanism on the equations. What a scenario says
-/// becomes their values in the emulation, which knows nothing of who injects faults.
-pub(super) const ROOMS: [Room<'_>; 4] = [
-    Room { folder: "plant/src/simulator/drive", crates: &["masseter_can"], rooms: &["plant/src/state.rs"] },
+/// The rooms of the plant's simulator. The mechanism stands on the equations. What a scenario says becomes the values of
+/// drives and mechanism in the emulation, which knows nothing of who injects faults.
+pub(super) const ROOMS: [Room<'_>; 3] = [
     Room {
         folder: "plant/src/simulator/mechanism",
         // The messages of the runtime alone.
@@ -173,11 +173,16 @@ pub(super) const ROOMS: [Room<'_>; 4] = [
     },
     Room {
         folder: "plant/src/simulator/emulation",
-        crates: &["masseter_can", "masseter_model", "masseter_runtime", "masseter_scenario"],
+        crates: &[
+            "masseter_can",
+            "masseter_drives",
+            "masseter_model",
+            "masseter_runtime",
+            "masseter_scenario",
+        ],
         rooms: &[
             "plant/src/error.rs",
             "plant/src/master",
-            "plant/src/simulator/drive",
             "plant/src/simulator/mechanism",
             "plant/src/state.rs",
         ],

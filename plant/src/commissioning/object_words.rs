@@ -1,8 +1,7 @@
 //! Objects, their values, and the reasons for their absence in words.
 
 use masseter_can::canopen::{AbortCode, ObjectAddress};
-
-use crate::simulator::drive::dictionary::{ENTRIES, find};
+use masseter_drives::entry;
 
 /// The reason for a missing answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -31,9 +30,9 @@ const FURTHER: [(u16, u8, &str); 2] =
 pub fn object_name(object: ObjectAddress) -> &'static str {
     let further =
         || FURTHER.iter().find(|(index, subindex, _)| ObjectAddress::new(*index, *subindex) == object);
-    match find(object) {
-        Ok(place) => ENTRIES[place].name,
-        Err(_) => further().map_or("", |(_, _, name)| name),
+    match entry(object) {
+        Some(entry) => entry.name,
+        None => further().map_or("", |(_, _, name)| name),
     }
 }
 
@@ -42,12 +41,12 @@ pub fn value_text(object: ObjectAddress, value: u32) -> String {
     if is_code(object) {
         return format!("{value:X}h");
     }
-    match find(object) {
-        Ok(place) => ENTRIES[place].kind.number(value).to_string(),
-        Err(_) if object.index == 0x30B0 => (value as i32).to_string(),
+    match entry(object) {
+        Some(entry) => entry.kind.number(value).to_string(),
+        None if object.index == 0x30B0 => (value as i32).to_string(),
         // Nobody knows whether such an object has a sign.
-        Err(_) if value > i32::MAX as u32 => format!("{value} (with a sign {})", value as i32),
-        Err(_) => value.to_string(),
+        None if value > i32::MAX as u32 => format!("{value} (with a sign {})", value as i32),
+        None => value.to_string(),
     }
 }
 

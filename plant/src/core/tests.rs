@@ -204,7 +204,7 @@ fn without_the_master_the_drives_stop_by_themselves() {
     let bound_ns = u64::from(scenario.can.heartbeat_consumer_ms) * PERIOD_NS + 60 * PERIOD_NS;
     bench.plant.link.advance(silent_from_ns + bound_ns).unwrap();
     for drive in &bench.plant.link.emulation.drives {
-        assert_eq!(drive.axis.power.state, DriveState::SwitchOnDisabled);
+        assert_eq!(drive.state(), DriveState::SwitchOnDisabled);
     }
 }
 

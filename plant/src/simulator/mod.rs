@@ -3,7 +3,6 @@
 //! [`emulation`] steps drives and mechanism together, on simulated wires or on real interfaces. [`injection`] follows
 //! the times of faults; the emulation does not depend on it.
 
-pub(crate) mod drive;
 pub mod emulation;
 pub(crate) mod injection;
 pub(crate) mod mechanism;

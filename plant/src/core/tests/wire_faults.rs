@@ -59,7 +59,7 @@ fn a_babbling_node_makes_a_safe_stop() {
     assert_eq!(bench.causes(EventKind::Fault)[0], Cause::ProcessDataLost);
     for drive in &bench.plant.link.emulation.drives {
         assert_eq!(
-            drive.axis.power.state,
+            drive.state(),
             DriveState::SwitchOnDisabled,
             "those behind the babble by loss of the link"
         );

@@ -6,14 +6,13 @@
 
 use std::collections::VecDeque;
 
+use masseter_drives::Look;
 use masseter_model::geometry::AXES;
 use masseter_runtime::clock::SECOND_NS;
 use masseter_scenario::{EncoderFault, FaultConfig, FaultKindConfig, Overlap, Scenario};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
-
-use crate::simulator::drive::axis::encoder::Look;
 
 /// One encoder.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]

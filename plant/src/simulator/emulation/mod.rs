@@ -21,6 +21,7 @@ use std::ops::Range;
 
 use masseter_can::canopen::Cob;
 use masseter_can::{CanId, ErrorState, Frame};
+use masseter_drives::{DriveFault, DriveNode, DriveSettings, HeldMean};
 use masseter_model::geometry::{AXES, Mechanism};
 use masseter_runtime::messages::{Contact, Truth, pose_fields};
 use masseter_scenario::{self as scenario, AxisFault, FaultKindConfig, Scenario};
@@ -28,10 +29,6 @@ use nalgebra::Translation3;
 
 use crate::error::{DynamicsError, PlantError};
 use crate::master::link::Mishap;
-use crate::simulator::drive::DriveSettings;
-use crate::simulator::drive::axis::drivetrain::HeldMean;
-use crate::simulator::drive::faults::DriveFault;
-use crate::simulator::drive::node::DriveNode;
 use crate::simulator::mechanism::contact::food::{Food, FoodBreak};
 use crate::simulator::mechanism::dynamics::{Dynamics, MechanismState, closed_mouth, level};
 use crate::state::state;
@@ -94,9 +91,9 @@ pub struct Emulation {
 }
 
 state!(Emulation {
-    values: next_step_ns moved_to_ns force_n bite_force_n sample synchronised encoders served mishaps
+    values: drives next_step_ns moved_to_ns force_n bite_force_n sample synchronised encoders served mishaps
         contact;
-    parts: drives dynamics load_cell agenda memory;
+    parts: dynamics load_cell agenda memory;
     constant: step_ns food;
 });
 
@@ -140,7 +137,7 @@ impl Emulation {
             let drive = DriveNode::new(settings, now_ns, positions_m[axis]);
             drive.map_err(|reason| match &memory {
                 Some(memory) => memory.refuse(axis, &reason),
-                None => PlantError::Scenario(reason),
+                None => reason.into(),
             })
         };
         let step_ns = scenario.dynamics.step_ns;
@@ -304,7 +301,7 @@ impl Emulation {
                     self.encoders[axis].set(self.agenda.number(place), self.agenda.begun(place));
                 }
                 FaultKindConfig::Drive(of_drive) => {
-                    self.drives[axis].axis.faults.set(of_drive.into(), self.agenda.size(kind, axis));
+                    self.drives[axis].set_fault(drive_fault(of_drive), self.agenda.size(kind, axis));
                 }
                 FaultKindConfig::Axis(_) => self.dynamics.set_faults(axis, self.agenda.axis_faults(axis)),
                 // None of these is an effect on an axis.
@@ -333,7 +330,7 @@ impl Emulation {
         axes_of(axis).any(|axis| match kind {
             FaultKindConfig::Encoder(_) => self.encoders[axis].has_struck(self.agenda.number(place)),
             FaultKindConfig::Drive(of_drive) => {
-                self.drives[axis].axis.faults.has_struck(of_drive.into()) && self.agenda.acts(place, axis)
+                self.drives[axis].faults().has_struck(drive_fault(of_drive)) && self.agenda.acts(place, axis)
             }
             FaultKindConfig::Axis(AxisFault::EndStop) => {
                 let (touched, own) =
@@ -399,22 +396,21 @@ impl Emulation {
     }
 }
 
-impl From<scenario::DriveFault> for DriveFault {
-    fn from(kind: scenario::DriveFault) -> Self {
-        use scenario::DriveFault as Of;
-        match kind {
-            Of::Fault => Self::Fault,
-            Of::IgnoresTargets => Self::IgnoresTargets,
-            Of::TorqueLoss => Self::TorqueLoss,
-            Of::Runaway => Self::Runaway,
-            Of::Sto => Self::Sto,
-            Of::SlowEnable => Self::SlowEnable,
-            Of::BrakeOpen => Self::BrakeOpen,
-            Of::BrakeClosed => Self::BrakeClosed,
-            Of::Reboot => Self::Reboot,
-            Of::Scale => Self::Scale,
-            Of::EmcyStorm => Self::EmcyStorm,
-        }
+/// The drive's name of a scenario's fault.
+fn drive_fault(kind: scenario::DriveFault) -> DriveFault {
+    use scenario::DriveFault as Of;
+    match kind {
+        Of::Fault => DriveFault::Fault,
+        Of::IgnoresTargets => DriveFault::IgnoresTargets,
+        Of::TorqueLoss => DriveFault::TorqueLoss,
+        Of::Runaway => DriveFault::Runaway,
+        Of::Sto => DriveFault::Sto,
+        Of::SlowEnable => DriveFault::SlowEnable,
+        Of::BrakeOpen => DriveFault::BrakeOpen,
+        Of::BrakeClosed => DriveFault::BrakeClosed,
+        Of::Reboot => DriveFault::Reboot,
+        Of::Scale => DriveFault::Scale,
+        Of::EmcyStorm => DriveFault::EmcyStorm,
     }
 }
 

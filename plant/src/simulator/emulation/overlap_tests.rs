@@ -187,7 +187,7 @@ fn compare(emulation: &mut Emulation, entries: &[Declared], ms: u64) {
         let place = || format!("axis {axis} at {ms} ms: {entries:#?}");
         for (kind, ..) in KINDS {
             let FaultKindConfig::Drive(kind) = kind else { continue };
-            let found = emulation.drives[axis].axis.faults.size(kind.into());
+            let found = emulation.drives[axis].faults().size(drive_fault(kind));
             assert_eq!(found, model.of_drive(kind, axis, ms), "{kind:?} on {}", place());
         }
         let at_m = emulation.dynamics.state.positions_m()[axis];
@@ -224,7 +224,7 @@ fn what_acts_in_random_overlaps_is_what_the_model_says() {
             compare(&mut emulation, &entries, ms);
         }
         assert!(emulation.dynamics.axes.each.iter().all(|axis| axis.faults == AxisFaults::NONE));
-        assert!(emulation.drives.iter().all(|drive| drive.axis.faults.is_empty()));
+        assert!(emulation.drives.iter().all(|drive| drive.faults().is_empty()));
     }
 }
 

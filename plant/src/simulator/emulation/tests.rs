@@ -1,4 +1,5 @@
 use masseter_can::canopen::sync;
+use masseter_can::cia402::DriveState;
 
 use super::*;
 
@@ -52,7 +53,7 @@ fn faults_by_second_encoders(limit: &str, kind: &str) -> [bool; AXES] {
     while emulation.next_step_ns < 200_000_000 {
         emulation.step().unwrap();
     }
-    std::array::from_fn(|axis| emulation.drives[axis].axis.power.is_in_fault())
+    std::array::from_fn(|axis| emulation.drives[axis].state() == DriveState::Fault)
 }
 
 #[test]

@@ -1,0 +1,493 @@
+//! The drive's axis under CiA 402: power states, modes of operation, and the objects that show them.
+//!
+//! An axis handles no frames and works in SI units. [`Axis`] sequences its parts: [`Positioning`] and [`Homing`] return
+//! commands, the servo follows the [`Demand`], [`FollowingErrorMonitor`] supervises the servo. [`Parameters`] is
+//! the configuration in the object dictionary.
+
+pub(crate) mod drivetrain;
+pub(crate) mod encoder;
+pub(crate) mod modes;
+pub(crate) mod motion;
+pub(crate) mod parameters;
+mod power;
+mod servo;
+
+use masseter_can::cia402::{Controlword, DriveState, StateCommand, StatusBit, Statusword};
+
+use crate::dictionary::Objects;
+use crate::faults::{DriveFault, DriveFaults};
+use crate::names;
+use crate::quirks::AxisQuirks;
+use crate::ratings::Ratings;
+use crate::settings::DriveSettings;
+use drivetrain::Drivetrain;
+use encoder::{Coordinates, Look, Switches};
+use modes::{Homing, Positioning, Sensed};
+use motion::{Demand, Mode, Motion, MotionCommand, NewTargets, PositionView, Profile, ServoCommand, clamp};
+use parameters::{Offsets, Parameters};
+use power::PowerStage;
+use servo::{FollowingErrorMonitor, ServoLimits};
+
+/// One axis.
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
+pub(crate) struct Axis {
+    config: Ratings,
+    quirks: AxisQuirks,
+    coordinates: Coordinates,
+    switches: Switches,
+    drivetrain: Drivetrain,
+    /// The motor's force in 6077h, N: at SYNC the mean since the last SYNC, otherwise the present value.
+    shown_n: f64,
+    parameters: Parameters,
+    demand: Demand,
+    following: FollowingErrorMonitor,
+    positioning: Positioning,
+    pub(super) homing: Homing,
+    mode: Mode,
+    pub(crate) power: PowerStage,
+    controlword: Controlword,
+    /// Offsets of the cyclic modes.
+    offsets: Offsets,
+    /// Whether the newest cyclic target was limited.
+    is_target_limited: bool,
+    /// Injected faults of the drive.
+    pub(crate) faults: DriveFaults,
+}
+
+impl Axis {
+    /// An axis that is switched on at a position.
+    pub(super) fn new(
+        settings: &DriveSettings,
+        quirks: AxisQuirks,
+        now_ns: u64,
+        position_m: f64,
+        objects: &Objects,
+    ) -> Self {
+        let DriveSettings { ratings: config, step_ns, stroke_m, .. } = *settings;
+        let step_s = step_ns as f64 * 1e-9;
+        Self {
+            parameters: Parameters::from_objects(objects, &config, &quirks),
+            drivetrain: Drivetrain::new(config, &quirks, step_s, position_m),
+            shown_n: 0.0,
+            coordinates: Coordinates::new(config.encoder_resolution_m, position_m, quirks.is_incremental),
+            switches: Switches::new(stroke_m, position_m),
+            config,
+            quirks,
+            demand: Demand::Brake,
+            following: FollowingErrorMonitor::default(),
+            positioning: Positioning::default(),
+            homing: Homing::default(),
+            mode: Mode::from_number(objects.get(names::MODE)).unwrap_or(Mode::CyclicPosition),
+            power: PowerStage::new(now_ns.saturating_add(quirks.torque_off_ns)),
+            controlword: Controlword::DISABLE_VOLTAGE,
+            offsets: Offsets::default(),
+            is_target_limited: false,
+            faults: DriveFaults::default(),
+        }
+    }
+
+    /// Goes into fault; returns whether the fault is new.
+    pub(super) fn fail(&mut self, now_ns: u64) -> bool {
+        let fails = !self.power.is_in_fault();
+        self.enter(self.power.state.after_fault(), now_ns);
+        fails
+    }
+
+    /// The state after power-on: the brake closes, and positions count from the encoder's own zero.
+    pub(super) fn restart(&mut self, now_ns: u64, objects: &Objects) {
+        self.controlword = Controlword::DISABLE_VOLTAGE;
+        self.homing = Homing::default();
+        self.coordinates.restart();
+        self.enter(DriveState::NotReadyToSwitchOn, now_ns);
+        self.configure(now_ns, objects);
+    }
+
+    /// Applies the dictionary's configuration. A mode that changes in operation brings the axis to rest first.
+    pub(super) fn configure(&mut self, now_ns: u64, objects: &Objects) {
+        self.parameters = Parameters::from_objects(objects, &self.config, &self.quirks);
+        let mode = Mode::supported(objects.get(names::MODE), objects).unwrap_or(self.mode);
+        if mode != self.mode {
+            self.mode = mode;
+            self.interrupt_mode();
+            if self.power.is_enabled() {
+                self.slow_down(now_ns, self.parameters.profile.deceleration_m_s2);
+            }
+        }
+    }
+
+    /// Obeys a controlword (6040h); returns whether the controlword ended a fault.
+    pub(super) fn control(&mut self, now_ns: u64, word: Controlword, objects: &Objects) -> bool {
+        let before = std::mem::replace(&mut self.controlword, word);
+        let was_fault = self.power.state == DriveState::Fault;
+        self.obey(word.command(before, self.power.state), now_ns);
+        if self.power.is_operated() {
+            let (words, view) = ([before, word], self.position_view(now_ns));
+            let (target, method) = (objects.get(names::TARGET_POSITION), self.parameters.homing_method);
+            let command = match self.mode {
+                Mode::ProfilePosition => self.positioning.control(words, target, view),
+                Mode::Homing => {
+                    let (counts, limits) = (self.coordinates.counts, self.switches.limits);
+                    self.homing.control(words, method, counts, limits, view)
+                }
+                Mode::CyclicPosition | Mode::CyclicTorque => None,
+            };
+            self.execute(command, now_ns);
+        }
+        was_fault && self.power.state != DriveState::Fault
+    }
+
+    fn obey(&mut self, command: StateCommand, now_ns: u64) {
+        let holds_quick_stop = self.parameters.holds_quick_stop;
+        let next = self.power.after(command, holds_quick_stop, now_ns, &mut self.faults);
+        let Some(next) = next else { return };
+        match (self.power.is_enabled(), command, next) {
+            (true, StateCommand::Shutdown, next) => self.leave(next, self.parameters.shutdown_m_s2, now_ns),
+            (true, StateCommand::SwitchOn, next) => self.leave(next, self.parameters.disable_m_s2, now_ns),
+            _ => {
+                self.power.leaves_for = None;
+                self.enter(next, now_ns);
+            }
+        }
+    }
+
+    /// Leaves "operation enabled" at once, or at rest after a ramp.
+    fn leave(&mut self, next: DriveState, deceleration_m_s2: Option<f64>, now_ns: u64) {
+        let Some(deceleration_m_s2) = deceleration_m_s2 else { return self.enter(next, now_ns) };
+        if self.power.leaves_for.replace(next).is_none() {
+            self.interrupt_mode();
+            self.slow_down(now_ns, deceleration_m_s2);
+        }
+    }
+
+    /// Reacts by 6007h to the loss of control over the drive; returns whether the reaction is a fault.
+    pub(super) fn abort_connection(&mut self, now_ns: u64) -> bool {
+        let was_in_fault = self.power.is_in_fault();
+        match self.parameters.abort_connection_option {
+            0 => {}
+            _ if self.quirks.coasts_without_master && self.power.is_operated() => {
+                self.drivetrain.brake.fail_open();
+                self.obey(StateCommand::DisableVoltage, now_ns);
+            }
+            1 => self.enter(self.power.state.after_fault(), now_ns),
+            2 => self.obey(StateCommand::DisableVoltage, now_ns),
+            _ => self.obey(StateCommand::QuickStop, now_ns),
+        }
+        self.power.is_in_fault() && !was_in_fault
+    }
+
+    /// Applies the buffered cyclic targets. If the velocity limit has cut the way to the last target, the axis goes on
+    /// towards that target at every SYNC.
+    pub(super) fn synchronise(&mut self, now_ns: u64, new: NewTargets, objects: &Objects) {
+        let is_free = self.drivetrain.brake.free_from_ns(now_ns) == now_ns;
+        if !self.power.is_operated() || !is_free || self.ignores(new) {
+            return;
+        }
+        self.offsets = Offsets::from_objects(objects, &self.config);
+        match self.mode {
+            Mode::CyclicPosition
+                if new.position
+                    || self.is_target_limited && matches!(self.demand, Demand::Interpolate { .. }) =>
+            {
+                let target = objects.get(names::TARGET_POSITION);
+                self.follow_target(now_ns, target.saturating_add(self.offsets.position));
+            }
+            Mode::CyclicTorque if new.torque => self.apply_torque(objects.get(names::TARGET_TORQUE)),
+            _ => {}
+        }
+    }
+
+    /// Whether an injected fault makes the drive ignore its targets.
+    fn ignores(&mut self, new: NewTargets) -> bool {
+        let ignores = self.faults.has(DriveFault::IgnoresTargets);
+        if ignores && new != NewTargets::default() {
+            self.faults.strike(DriveFault::IgnoresTargets);
+        }
+        ignores
+    }
+
+    /// Follows a position target within the software position limits and the velocity limit.
+    fn follow_target(&mut self, now_ns: u64, target: i32) {
+        let allowed = self.position_view(now_ns).clamp(target);
+        let Parameters { velocity_limit_m_s: limit_m_s, period_s, .. } = self.parameters;
+        let (actual_m, target_m) = (self.measured_m(), self.coordinates.metres(allowed));
+        let is_too_fast = self.demand.interpolate(now_ns, actual_m, target_m, period_s, limit_m_s);
+        self.is_target_limited = is_too_fast || allowed != target;
+    }
+
+    fn apply_torque(&mut self, torque_permille: i16) {
+        let target_n = f64::from(torque_permille) / 1000.0 * self.config.rated_force_n + self.offsets.force_n;
+        let limit_n = self.parameters.force_limit_n;
+        let (force_n, is_limited) = clamp(target_n, [-limit_n, limit_n]);
+        self.is_target_limited = is_limited;
+        self.demand = Demand::Force { force_n };
+    }
+
+    /// A step of the servo loops with the shaft at a position. Returns the force until the next step, N, and whether
+    /// the following error has become a fault. `look` gives the encoder's output at its own position.
+    pub(super) fn step(
+        &mut self,
+        now_ns: u64,
+        position_m: f64,
+        look: impl FnOnce(f64) -> Look,
+    ) -> (f64, bool) {
+        self.complete_transition(now_ns);
+        if let Some(state) = self.power.without_torque(&mut self.faults) {
+            self.enter(state, now_ns);
+        }
+        let Look { shown_m, seen_m } = look(position_m + self.gear_error_m(now_ns));
+        let counts = self.coordinates.read(shown_m);
+        self.switches.look(position_m);
+        if self.power.is_operated() {
+            let is_at_rest = || self.demand.is_at_rest(now_ns);
+            let command = match self.mode {
+                Mode::ProfilePosition => self.positioning.step(self.controlword, is_at_rest()),
+                Mode::Homing => {
+                    let sensed = self.sensed(counts, is_at_rest());
+                    self.homing.step(&sensed)
+                }
+                Mode::CyclicPosition | Mode::CyclicTorque => None,
+            };
+            self.execute(command, now_ns);
+        }
+        let places_m = [self.coordinates.counted_m(), seen_m - position_m];
+        let command = self.servo_command(now_ns);
+        let limits = self.servo_limits(command);
+        let force_n = self.drivetrain.step(now_ns, places_m, command, &limits, &mut self.faults);
+        self.shown_n = self.drivetrain.motor_n.value;
+        (force_n, self.supervise_following(now_ns, command))
+    }
+
+    /// The command of the loops, with the velocity offset of cyclic synchronous position.
+    fn servo_command(&self, now_ns: u64) -> ServoCommand {
+        match self.demand.servo_command(now_ns) {
+            ServoCommand::Follow(Motion { position_m, velocity_m_s })
+                if self.mode == Mode::CyclicPosition =>
+            {
+                let velocity_m_s = velocity_m_s + self.offsets.velocity_m_s;
+                ServoCommand::Follow(Motion { position_m, velocity_m_s })
+            }
+            command => command,
+        }
+    }
+
+    /// The inputs of homing.
+    fn sensed(&self, counts: [i32; 2], is_at_rest: bool) -> Sensed {
+        let pushes = self.drivetrain.pushes();
+        let (actual, limits) = (self.coordinates.actual(), self.switches.limits);
+        Sensed { counts, actual, limits, pushes, is_at_rest }
+    }
+
+    /// Reads the encoder and takes the motor's mean force, as SYNC demands.
+    pub(super) fn sample(&mut self, now_ns: u64, position_m: f64, look: impl FnOnce(f64) -> Look) {
+        self.shown_n = self.drivetrain.motor_n.take_mean(now_ns);
+        let Look { shown_m, .. } = look(position_m + self.gear_error_m(now_ns));
+        self.coordinates.read(shown_m);
+    }
+
+    /// The distance of the encoder from the shaft. Only a fault asks for the demand, which costs two divisions.
+    fn gear_error_m(&mut self, now_ns: u64) -> f64 {
+        let demand_m = if self.faults.is_empty() { None } else { self.demand.position_m(now_ns) };
+        self.drivetrain.gear_error_m(demand_m, &mut self.faults)
+    }
+
+    /// Writes the state of the axis into the objects that show it.
+    pub(super) fn show(&self, now_ns: u64, objects: &mut Objects) {
+        let actual = self.coordinates.actual();
+        let demand_m = self.demand.position_m(now_ns);
+        let demand = demand_m.map_or(actual, |demand_m| self.coordinates.increments(demand_m));
+        let torque = self.shown_n / self.config.rated_force_n * 1000.0;
+        objects.set(names::STATUSWORD, self.statusword(now_ns).0);
+        objects.set(names::MODE_DISPLAY, self.mode.number());
+        objects.set(names::POSITION_DEMAND, demand);
+        objects.set(names::ENCODER_COUNTS, self.coordinates.shown_counts());
+        objects.set(names::POSITION_ACTUAL, actual);
+        objects
+            .set(names::VELOCITY_ACTUAL, self.coordinates.nearest(self.drivetrain.servo.motion.velocity_m_s));
+        objects.set(names::TORQUE_ACTUAL, torque.round() as i16);
+        objects.set(names::FOLLOWING_ERROR, demand.saturating_sub(actual));
+        objects.set(names::DIGITAL_INPUTS, self.switches.inputs());
+    }
+
+    fn statusword(&self, now_ns: u64) -> Statusword {
+        let is_enabled = self.power.is_enabled();
+        let is_free = is_enabled && self.drivetrain.brake.free_from_ns(now_ns) == now_ns;
+        let is_limited =
+            self.is_target_limited || self.positioning.is_limited || self.drivetrain.servo.is_limited;
+        let word = Statusword::for_state(self.power.state)
+            .with(StatusBit::VoltageEnabled, true)
+            .with(StatusBit::Remote, true)
+            .with(StatusBit::InternalLimit, is_enabled && is_limited);
+        match self.mode {
+            Mode::CyclicPosition => word
+                .with(StatusBit::TargetFollowed, is_free)
+                .with(StatusBit::FollowingError, self.following.is_fault),
+            Mode::CyclicTorque => word.with(StatusBit::TargetFollowed, is_free),
+            Mode::ProfilePosition => word
+                .with(StatusBit::TargetReached, is_enabled && self.has_reached_setpoint(now_ns))
+                .with(StatusBit::SETPOINT_ACKNOWLEDGED, is_enabled && self.positioning.is_acknowledged)
+                .with(StatusBit::FollowingError, self.following.is_fault),
+            Mode::Homing => self.homing.show(word, self.demand.is_at_rest(now_ns)),
+        }
+    }
+
+    /// Statusword bit 10 of profile position: within the position window of the last set-point, or halted.
+    fn has_reached_setpoint(&self, now_ns: u64) -> bool {
+        if !self.demand.is_at_rest(now_ns) || self.positioning.waiting.is_some() {
+            return false;
+        }
+        let demand_m = self.demand.position_m(now_ns).unwrap_or(self.measured_m());
+        self.controlword.halts() || (demand_m - self.measured_m()).abs() <= self.parameters.position_window_m
+    }
+
+    fn enter(&mut self, state: DriveState, now_ns: u64) {
+        if state == self.power.state {
+            return;
+        }
+        (self.power.state, self.power.leaves_for) = (state, None);
+        self.following.restart(self.power.is_in_fault());
+        self.interrupt_mode();
+        match state {
+            DriveState::OperationEnabled => self.enable(now_ns),
+            DriveState::QuickStopActive => self.stop(now_ns, self.parameters.quick_stop_m_s2),
+            DriveState::FaultReactionActive => self.stop(now_ns, self.parameters.fault_stop_m_s2),
+            _ => self.demand = Demand::Brake,
+        }
+    }
+
+    fn interrupt_mode(&mut self) {
+        (self.is_target_limited, self.offsets) = (false, Offsets::default());
+        (self.positioning, self.homing) = (Positioning::default(), self.homing.interrupted());
+    }
+
+    /// The cyclic modes wait for their first target behind a closed brake; the other modes hold the position.
+    fn enable(&mut self, now_ns: u64) {
+        self.drivetrain.brake.open(now_ns);
+        if matches!(self.mode, Mode::ProfilePosition | Mode::Homing) {
+            let here = Motion::at_rest(self.measured_m());
+            self.demand =
+                Demand::Profile(Profile::stop(now_ns, here, self.parameters.profile.deceleration_m_s2));
+        }
+    }
+
+    /// The drive's own transitions: initialised, quick stop ended, fault reaction ended.
+    fn complete_transition(&mut self, now_ns: u64) {
+        let is_complete = match self.power.state {
+            DriveState::QuickStopActive => {
+                !self.parameters.holds_quick_stop && self.demand.is_at_rest(now_ns)
+            }
+            DriveState::FaultReactionActive => self.demand.is_at_rest(now_ns),
+            DriveState::OperationEnabled => self.power.leaves_for.is_some() && self.demand.is_at_rest(now_ns),
+            _ => true,
+        };
+        if is_complete {
+            self.enter(self.power.leaves_for.unwrap_or(self.power.state.after_completion()), now_ns);
+        }
+    }
+
+    /// Judges the error of the servo from its demanded position.
+    fn supervise_following(&mut self, now_ns: u64, command: ServoCommand) -> bool {
+        let Some(window_m) = self.parameters.following_window_m else { return false };
+        let error_m = match command {
+            ServoCommand::Follow(demanded) => demanded.position_m - self.measured_m(),
+            ServoCommand::Brake | ServoCommand::Force { .. } => 0.0,
+        };
+        if !self.following.exceeds(now_ns, error_m, window_m, self.parameters.following_timeout_ns) {
+            return false;
+        }
+        self.enter(self.power.state.after_fault(), now_ns);
+        self.following.is_fault = true;
+        true
+    }
+
+    /// Compares the last count with a second encoder at the joint; returns whether their distance has become a fault.
+    /// The reaction is the brake instead of a ramp, because the true position is unknown.
+    pub(super) fn compare_encoders(&mut self, now_ns: u64, joint_m: f64) -> bool {
+        let Some(limit_m) = self.quirks.encoders_apart_m else { return false };
+        let is_apart = (self.coordinates.counted_m() - joint_m).abs() > limit_m;
+        let fails = is_apart && self.power.state != DriveState::Fault;
+        if fails {
+            self.enter(DriveState::Fault, now_ns);
+        }
+        fails
+    }
+
+    /// Executes a command of the mode of operation.
+    fn execute(&mut self, command: Option<MotionCommand>, now_ns: u64) {
+        let Some(command) = command else { return };
+        let Parameters { profile, homing, homing_to_switch, halt_m_s2, .. } = self.parameters;
+        let limits = match self.mode {
+            Mode::Homing if matches!(self.homing, Homing::Approaching(_)) => homing_to_switch,
+            Mode::Homing => homing,
+            _ => profile,
+        };
+        // Nothing moves while the brake opens.
+        let from_ns = self.drivetrain.brake.free_from_ns(now_ns);
+        match command {
+            MotionCommand::MoveTo { target } => {
+                let start = self.demand.at(now_ns).unwrap_or(Motion::at_rest(self.measured_m()));
+                self.demand =
+                    Demand::Profile(Profile::to(from_ns, start, self.coordinates.metres(target), &limits));
+            }
+            MotionCommand::SlowDown => {
+                let halt_m_s2 = halt_m_s2.filter(|_| self.controlword.halts());
+                self.slow_down(now_ns, halt_m_s2.unwrap_or(limits.deceleration_m_s2));
+            }
+            MotionCommand::Hold => {
+                let here = Motion::at_rest(self.measured_m());
+                self.demand = Demand::Profile(Profile::stop(now_ns, here, limits.deceleration_m_s2));
+            }
+            MotionCommand::SetHome { counts } => {
+                self.coordinates.set_home(counts, self.parameters.home_position);
+            }
+        }
+    }
+
+    fn stop(&mut self, now_ns: u64, deceleration_m_s2: Option<f64>) {
+        match deceleration_m_s2 {
+            Some(deceleration_m_s2) => self.slow_down(now_ns, deceleration_m_s2),
+            None => self.demand = Demand::Brake,
+        }
+    }
+
+    fn slow_down(&mut self, now_ns: u64, deceleration_m_s2: f64) {
+        self.demand.slow_down(now_ns, self.drivetrain.servo.motion, deceleration_m_s2);
+    }
+
+    /// The software position limits, which have no meaning before the homing of an incremental encoder.
+    fn position_limits(&self) -> [i32; 2] {
+        let is_referenced = self.coordinates.is_referenced;
+        if is_referenced { self.parameters.position_limits } else { [i32::MIN, i32::MAX] }
+    }
+
+    fn servo_limits(&self, command: ServoCommand) -> ServoLimits {
+        let Parameters { velocity_limit_m_s, force_limit_n, .. } = self.parameters;
+        let is_force = matches!(command, ServoCommand::Force { .. });
+        let free_velocity_m_s = if is_force { self.free_velocity_m_s() } else { [0.0; 2] };
+        let feed_n = if self.mode == Mode::CyclicPosition { self.offsets.force_n } else { 0.0 };
+        ServoLimits { force_n: force_limit_n, velocity_m_s: velocity_limit_m_s, free_velocity_m_s, feed_n }
+    }
+
+    /// Speed limit in force control: the axis can stop before the software position limits, at the profile deceleration
+    /// (6084h).
+    fn free_velocity_m_s(&self) -> [f64; 2] {
+        let Parameters { velocity_limit_m_s, profile, .. } = self.parameters;
+        let ([lowest_m, highest_m], at_m) =
+            (self.position_limits().map(|end| self.coordinates.metres(end)), self.measured_m());
+        let braking_m_s =
+            |way_m: f64| (2.0 * profile.deceleration_m_s2 * way_m.max(0.0)).sqrt().min(velocity_limit_m_s);
+        [-braking_m_s(at_m - lowest_m), braking_m_s(highest_m - at_m)]
+    }
+
+    /// The positions for a mode of operation. Homing moves the software position limits and may leave the axis outside:
+    /// the axis may then stay or come nearer, but go no further.
+    fn position_view(&self, now_ns: u64) -> PositionView {
+        let [lowest, highest] = self.position_limits();
+        let here = self.coordinates.increments(self.demand.position_m(now_ns).unwrap_or(self.measured_m()));
+        PositionView { actual: self.coordinates.actual(), allowed: [lowest.min(here), highest.max(here)] }
+    }
+
+    /// The measured position, m in the encoder's coordinates.
+    fn measured_m(&self) -> f64 {
+        self.drivetrain.servo.motion.position_m
+    }
+}
