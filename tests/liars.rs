@@ -231,6 +231,10 @@ impl Player {
         };
         while player.state != player.last_state() {
             let Waited::Cycle { tick, reading } = session.wait(None).unwrap() else { continue };
+            if session.is_stop_requested() {
+                // The rig has given it up.
+                return;
+            }
             if player.state == ControllerState::Running && (conduct.is_silent)(tick.cycle) {
                 continue;
             }

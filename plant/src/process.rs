@@ -1,6 +1,7 @@
 //! The plant's process binds the pure core to iceoryx2, and to real time or lockstep. This module decides nothing.
 
 use masseter_runtime::clock;
+use masseter_runtime::control::Deadline;
 use masseter_runtime::lifecycle::{Party, ProcessArguments, ProcessContext, ProcessError, StopRequest};
 use masseter_runtime::lockstep::{Clock, Lockstep};
 use masseter_runtime::messages::{Command, Contact, Event, Reading, Truth};
@@ -29,6 +30,8 @@ pub enum Reason {
     Requested,
     /// A silence of the controller longer than any running controller's.
     Abandoned,
+    /// A controller that did not begin its motion, or did not end, by its deadline.
+    Overdue,
 }
 
 /// The failure of the plant.
@@ -87,13 +90,14 @@ impl Ports {
     }
 }
 
-/// Runs the plant until a request to end or a hanging controller. Then stops the drives, and goes on for a while.
-pub fn run(arguments: &ProcessArguments) -> Result<Reason, PlantProcessError> {
+/// Runs the plant until a request to end, or a controller that hangs or waits for ever. Then stops the drives, and goes on for a
+/// while. A motion that lasts `motion_s` has a deadline; without a motion there is none.
+pub fn run(arguments: &ProcessArguments, motion_s: Option<f64>) -> Result<Reason, PlantProcessError> {
     let context = arguments.init()?;
     if context.scenario.can.is_virtual() {
-        serve(&context, PlantCore::new)
+        serve(&context, motion_s, PlantCore::new)
     } else {
-        serve(&context, PlantCore::on_interfaces)
+        serve(&context, motion_s, PlantCore::on_interfaces)
     }
 }
 
@@ -104,6 +108,7 @@ struct Binding<'a> {
     schedule: &'a CycleSchedule,
     /// Whether the plant receives commands: not at the end.
     takes_commands: bool,
+    deadline: Option<Deadline>,
     /// The largest number of the last cycle's samples on one topic.
     samples: usize,
 }
@@ -119,6 +124,11 @@ impl Binding<'_> {
                 Some(lost) => lost == Party::Controller,
             },
         }
+    }
+
+    /// Whether the run goes on, and the controller has not begun or ended by its deadline.
+    fn is_overdue(&self, stop: &StopRequest, cycle: u64) -> bool {
+        self.goes_on(stop) && self.deadline.is_some_and(|deadline| deadline.is_over(cycle))
     }
 
     /// Waits for the next cycle. Before it, warms up; in lockstep, lets the recorder catch up.
@@ -176,7 +186,7 @@ impl<L: Link> PlantPorts<L> for Binding<'_> {
         // No command can arrive before the controller wakes.
         let controller_at_ns = wake.due_ns + self.schedule.controller_at_ns;
         let is_awaited = |command: &Command| command.cycle >= wake.cycle;
-        Ok(match &mut self.clock {
+        let command = match &mut self.clock {
             Clock::RealTime(_) if !self.takes_commands => None,
             Clock::RealTime(cycle) => {
                 let command_by_ns = wake.due_ns + self.schedule.command_by_ns;
@@ -195,7 +205,11 @@ impl<L: Link> PlantPorts<L> for Binding<'_> {
                 }
                 self.ports.commands.latest_by(0, lockstep.waiter(), is_awaited)?
             }
-        })
+        };
+        if let (Some(deadline), Some(command)) = (&mut self.deadline, &command) {
+            deadline.note(wake.cycle, command.controller_state);
+        }
+        Ok(command)
     }
 
     fn publish_frames_and_events(&mut self, plant: &mut PlantCore<L>) -> Result<(), PlantProcessError> {
@@ -218,6 +232,7 @@ impl<L: Link> PlantPorts<L> for Binding<'_> {
 
 fn serve<L: Link>(
     context: &ProcessContext,
+    motion_s: Option<f64>,
     build: impl Fn(&Scenario, u64) -> Result<PlantCore<L>, PlantError>,
 ) -> Result<Reason, PlantProcessError> {
     let (scenario, schedule) = (&context.scenario, &context.schedule);
@@ -231,12 +246,17 @@ fn serve<L: Link>(
 
     let mut plant = build(scenario, start.epoch_ns)?;
     let clock = Clock::start(lockstep, start.epoch_ns, scenario.period_ns());
-    let mut binding = Binding { ports, clock, schedule, takes_commands: true, samples: 0 };
+    let deadline = motion_s.map(|motion_s| Deadline::new(scenario, &start.declared, motion_s));
+    let mut binding = Binding { ports, clock, schedule, takes_commands: true, deadline, samples: 0 };
     let most_silent_cycles = most_silent_cycles(context);
-    while binding.goes_on(&context.stop) && u64::from(plant.master.silent_cycles()) <= most_silent_cycles {
+    while binding.goes_on(&context.stop)
+        && !binding.is_overdue(&context.stop, plant.cycle())
+        && u64::from(plant.master.silent_cycles()) <= most_silent_cycles
+    {
         let wake = binding.wait(&mut plant)?;
         run_cycle(&mut plant, &mut binding, schedule, &wake)?;
     }
+    let is_overdue = binding.is_overdue(&context.stop, plant.cycle());
     binding.takes_commands = false;
     let wait = |plant: &mut PlantCore<L>, binding: &mut Binding<'_>| binding.wait(plant);
     run_after_controller(&mut plant, &mut binding, schedule, scenario.period_ns(), wait)?;
@@ -251,7 +271,11 @@ fn serve<L: Link>(
             context.stop.is_made()
         }
     };
-    Ok(if is_stopped { Reason::Requested } else { Reason::Abandoned })
+    Ok(match (is_overdue, is_stopped) {
+        (true, _) => Reason::Overdue,
+        (false, true) => Reason::Requested,
+        (false, false) => Reason::Abandoned,
+    })
 }
 
 /// Cycles without commands that mean the end of the controller.

@@ -30,18 +30,22 @@ pub(super) struct PlantArgs {
     emulate: bool,
     #[command(flatten)]
     process: Option<ProcessArgs>,
+    /// Duration of the controller's motion, s
+    #[arg(long, hide = true, requires = "domain")]
+    motion_s: Option<f64>,
 }
 
 /// Emulates until Ctrl-C, or runs as the supervisor's process until asked to end. That process also ends, by a safe
-/// stop, when commands stop arriving.
+/// stop, when commands stop arriving, or the controller waits for ever.
 pub(super) fn plant(args: PlantArgs) -> anyhow::Result<Exit> {
     let Some(process) = args.process else {
         emulate(&args)?;
         return Ok(Exit::Passed);
     };
-    Ok(match process::run(&process.process_arguments())? {
+    Ok(match process::run(&process.process_arguments(), args.motion_s)? {
         Reason::Requested => Exit::Passed,
         Reason::Abandoned => Exit::SafeStop,
+        Reason::Overdue => Exit::Failed,
     })
 }
 

@@ -2,8 +2,8 @@
 //!
 //! Order of ending: the controller first (it brings the drives to rest), then the plant, then the recorder, which
 //! drains the rest. A process that dies is not restarted: the rig ends in that order, and the watchdogs of the
-//! other processes stop the drives. A process that does not end in time is killed. So is a controller that hangs,
-//! which the plant detects. The supervisor reads no message of the run and judges nothing.
+//! other processes stop the drives. A process that does not end in time is killed. So is a controller that hangs or waits
+//! for ever, which the plant detects. The supervisor reads no message of the run and judges nothing.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -34,7 +34,7 @@ use super::child::{CONTROLLER, KILLED, PLANT, Process, RECORDER, Reports, descri
 use super::controller::Controller;
 use super::interrupts::Interrupts;
 use super::loop_watch::LoopWatch;
-use super::request::RunRequest;
+use super::request::{ControllerChoice, RunRequest};
 use super::room::reserve_shared_memory;
 use super::strikes::{Strikes, Victims};
 use super::usage::UsageMeter;
@@ -159,7 +159,9 @@ impl Processes {
         let lockstep = request.lockstep();
         common.extend(lockstep.map(|patience| format!("--lockstep={}", patience_text(patience)).into()));
         let with = |more: Vec<OsString>| [common.clone(), more].concat();
-        let motion = format!("--motion-s={}", plan.trajectory.duration_s()).into();
+        let motion: OsString = format!("--motion-s={}", plan.trajectory.duration_s()).into();
+        let has_controller = request.controller != ControllerChoice::None;
+        let plant_arguments = with(has_controller.then(|| motion.clone()).into_iter().collect());
         let mut recorder_arguments = with(vec!["--recording".into(), folder.recording().into(), motion]);
         recorder_arguments.extend(request.quiet.then(|| "--quiet".into()));
         recorder_arguments.extend(request.live.map(|address| format!("--live={address}").into()));
@@ -178,7 +180,7 @@ impl Processes {
             strikes: Strikes::new(&plan.scenario, folder, lockstep.is_some()),
             declared: Declared::default(),
             recorder: Process::spawn(RECORDER, &recorder_arguments)?,
-            plant: Process::spawn(PLANT, &common)?,
+            plant: Process::spawn(PLANT, &plant_arguments)?,
             controller: Controller::start_process(
                 &request.controller,
                 domain,
@@ -343,6 +345,10 @@ impl Processes {
             }
             died(RECORDER, recorder)
         } else if let Some(status) = plant {
+            if is_overdue(status) {
+                self.controller.give_up();
+                return Some(Ending::Overdue);
+            }
             if status.code() == Some(Exit::SafeStop as i32) {
                 let fate = self.controller.give_up();
                 return Some(Ending::died(CONTROLLER, format!("{SILENT}, and {fate}")));
@@ -414,7 +420,9 @@ fn patience_text(Patience(patience): Patience) -> String {
 /// controller's ending.
 fn ending_of_run(interruption: Option<Ending>, controller: Ending, others: Option<Ending>) -> Ending {
     match (interruption, controller, others) {
-        (Some(died @ Ending::Died { .. }), ..) | (_, died @ Ending::Died { .. }, _) => died,
+        (Some(first @ (Ending::Died { .. } | Ending::Overdue)), ..) | (_, first @ Ending::Died { .. }, _) => {
+            first
+        }
         (_, _, Some(others)) => others,
         (Some(interruption), _, None) => interruption,
         (None, controller, None) => controller,
@@ -423,6 +431,9 @@ fn ending_of_run(interruption: Option<Ending>, controller: Ending, others: Optio
 
 /// The ending that plant or recorder cause, if any. None as a status means that the process was killed.
 fn ending_by_plant_or_recorder(plant: Option<ExitStatus>, recorder: Option<ExitStatus>) -> Option<Ending> {
+    if plant.is_some_and(is_overdue) {
+        return Some(Ending::Overdue);
+    }
     if !plant.is_some_and(|status| status.success()) {
         return Some(died(PLANT, plant));
     }
@@ -431,6 +442,11 @@ fn ending_by_plant_or_recorder(plant: Option<ExitStatus>, recorder: Option<ExitS
         Some(code) if code == Exit::Incomplete as i32 => Some(Ending::RecordingFailed),
         _ => Some(died(RECORDER, recorder)),
     }
+}
+
+/// Whether the plant ended the run of a controller that waits for ever.
+fn is_overdue(plant: ExitStatus) -> bool {
+    plant.code() == Some(Exit::Failed as i32)
 }
 
 fn died(role: &str, status: Option<ExitStatus>) -> Ending {
@@ -447,7 +463,7 @@ mod tests {
         let died = |role| Ending::died(role, "SIGKILL (9)".to_owned());
         let (recorder, plant, controller) = (died(RECORDER), died(PLANT), died("controller"));
         let (completed, interrupted, safe_stop) = (Ending::Completed, Ending::Interrupted, Ending::SafeStop);
-        let gap = Ending::RecordingFailed;
+        let (gap, overdue) = (Ending::RecordingFailed, Ending::Overdue);
         for (interruption, by_controller, others, expected) in [
             (None, &completed, None, &completed),
             (None, &safe_stop, None, &safe_stop),
@@ -459,6 +475,8 @@ mod tests {
             (Some(&interrupted), &completed, Some(&plant), &plant),
             (Some(&interrupted), &controller, Some(&plant), &controller),
             (Some(&recorder), &controller, Some(&plant), &recorder),
+            (Some(&overdue), &controller, Some(&overdue), &overdue),
+            (None, &completed, Some(&overdue), &overdue),
         ] {
             let found = ending_of_run(interruption.cloned(), by_controller.clone(), others.cloned());
             assert_eq!(&found, expected, "{interruption:?}, {by_controller:?}, {others:?}");

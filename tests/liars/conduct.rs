@@ -110,6 +110,46 @@ fn who_delays_the_motion_or_plays_early_fails() {
     );
 }
 
+/// The check of the lead needs half a second. The distance of the jaw from its path needs a cycle.
+#[test]
+fn who_plays_early_for_a_moment_fails_by_tracking() {
+    let early: Play = |m| {
+        let ahead_s = match (m.at_s - 0.5) / 0.3 {
+            part if (0.0..1.0).contains(&part) => 0.03 * (std::f64::consts::PI * part).sin().powi(2),
+            _ => 0.0,
+        };
+        let target_m = m.targets(&m.motion.pose(m.at_s + LEAD_S + ahead_s));
+        until(1.6, m, Answer { target_m, ..m.honest() })
+    };
+    check("", &[("plays early for 0.3 s", HONEST, early, "FAIL", "failed: tracking, estimated tracking")]);
+}
+
+#[test]
+fn who_waits_for_ever_fails_at_a_deadline() {
+    let not_begun = "the controller did not begin the motion within 4.7 s of the first SYNC";
+    check(
+        "[controller]\nstart_timeout_s = 1.0\nease_s = 0.5\noverdue_s = 0.2\n[can]\nready_timeout_ms = 500\n",
+        &[
+            ("never eases", Conduct { wait_cycles: u32::MAX, ..HONEST }, PLAYS, "FAIL", not_begun),
+            ("eases for ever", Conduct { ease_cycles: u32::MAX, ..HONEST }, PLAYS, "FAIL", not_begun),
+            (
+                "says that it eases",
+                told(|state, _| rename(state, Running, Easing)),
+                |m| Some(m.honest()),
+                "FAIL",
+                not_begun,
+            ),
+            (
+                "never ends",
+                HONEST,
+                |m| Some(m.honest()),
+                "FAIL",
+                "the controller did not end within 3.2 s of the motion's beginning",
+            ),
+        ],
+    );
+}
+
 #[test]
 fn who_reports_out_of_order_fails() {
     let eases: fn(&mut State, u32) = |state, cycles| {

@@ -185,12 +185,13 @@ pub(crate) fn tracking(name: &'static str, errors: &PoseErrors, limits: &ChecksC
 
 /// A test with faults that passes without them has tested nothing, also where one struck only after the rig had
 /// stopped, unless it waits for the stop. A fault that leads the jaw beyond the limits must be detected before. None
-/// where no fault is declared.
+/// where no fault is declared. `lasted_s`: how long the run lasted since the motion began, and since the rig was switched on.
 pub(crate) fn faults(
     declared: &[FaultConfig],
     found: &[FaultFigures],
     limits: &ChecksConfig,
     stopped_ns: Option<u64>,
+    lasted_s: [Option<f64>; 2],
 ) -> Option<Check> {
     let ChecksConfig { tracking_max_mm, tracking_max_deg, .. } = *limits;
     let is_late = |(fault, found): &(&FaultConfig, &FaultFigures)| {
@@ -201,7 +202,28 @@ pub(crate) fn faults(
         let so = declared.iter().zip(found).filter(is_so);
         so.map(|(_, found)| found.number.to_string()).collect::<Vec<_>>()
     };
-    let (idle, late) = (numbers(&|(_, found)| found.struck_ns.is_none()), numbers(&is_late));
+    let behind_end = |fault: &FaultConfig| {
+        let at_s = fault.at_s.filter(|_| fault.after.is_none());
+        let mut begins_s = [at_s, fault.from_s].into_iter().zip(lasted_s);
+        begins_s
+            .find_map(|(begins_s, lasted_s)| begins_s.zip(lasted_s))
+            .filter(|(begins_s, lasted_s)| begins_s > lasted_s)
+    };
+    let is_idle = |found: &FaultFigures| found.struck_ns.is_none();
+    let idle = numbers(&|(fault, found)| is_idle(found) && behind_end(fault).is_none());
+    let late = numbers(&is_late);
+    let behind: Vec<_> = declared
+        .iter()
+        .zip(found)
+        .filter(|(_, found)| is_idle(found))
+        .filter_map(|(fault, found)| {
+            let (begins_s, lasted_s) = behind_end(fault)?;
+            Some(format!(
+                ", number {} at {begins_s} s, after the run's end at {lasted_s:.3} s: let the fault begin earlier, or play longer",
+                found.number
+            ))
+        })
+        .collect();
     let beyond: Vec<_> = declared
         .iter()
         .zip(found)
@@ -222,8 +244,9 @@ pub(crate) fn faults(
     };
     let never = which(&idle, "never: raise its probability, or let the fault act earlier or longer");
     let after = which(&late, "only after the rig had stopped");
-    let acted = declared.len() - idle.len() - late.len();
-    let struck = format!("{acted} of {} declared faults acted{after}{never}", declared.len());
+    let acted = declared.len() - idle.len() - late.len() - behind.len();
+    let struck =
+        format!("{acted} of {} declared faults acted{after}{never}{}", declared.len(), behind.concat());
     let result = match (beyond.is_empty(), acted == declared.len()) {
         (true, true) => CheckResult::Passed,
         (true, false) => CheckResult::Untested,

@@ -72,12 +72,20 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     ]);
     // No lost cycle excuses a declared fault that led the jaw too far.
     let stopped_ns = figures.stopped_ns();
-    let faults = faults(&manifest.scenario.faults, &figures.faults, limits, stopped_ns);
+    let faults = faults(&manifest.scenario.faults, &figures.faults, limits, stopped_ns, lasted_s(figures));
     checks.extend(faults.map(|check| check.with_breach(path.first.clone())));
     checks.extend(stimuli(&manifest.scenario.stimulus, figures));
     checks
         .extend(figures.requirements.iter().map(|requirement| self::requirement(requirement, is_disturbed)));
     checks
+}
+
+/// How long the run lasted since the motion began, and since the rig was switched on, s.
+fn lasted_s(figures: &Figures) -> [Option<f64>; 2] {
+    let ended_ns = figures.ended_ns.unwrap_or(figures.last_cycle_ns);
+    let of_motion =
+        figures.path_breach.motion_ns.map(|[began_ns, _]| ended_ns.saturating_sub(began_ns) as f64 / 1e9);
+    [of_motion, Some(figures.duration_s)]
 }
 
 /// A desired pose in the state that is none: the controller computes with such numbers. None where each was a pose.

@@ -56,6 +56,8 @@ next_steps! {
     Undetected => "Look up in docs/faults.md what detects this fault, then tighten that limit, such as `can.following_limit_m`.",
     /// FAIL by the end of the sequence.
     Sequence => "Find in the events of `RUN/report.html` what ended the motion, then correct it, or expect it (docs/requirements.md).",
+    /// FAIL by a controller that waits for ever.
+    Overdue => "Let the controller begin the motion once the drives are enabled, and finish after the motion (docs/interface.md), or raise `controller.overdue_s`.",
     /// FAIL by missing messages.
     Dropped => "Run `masseter recording info RUN` to see what is missing, then repeat the run with less beside it, or with `recording.frames` = false.",
     /// FAIL by a late frame on a bus.
@@ -173,6 +175,7 @@ impl NextStep {
         match (check.subject, check.name.as_ref()) {
             (Subject::Requirement | Subject::ExpectedEvent, _) => Self::Requirement,
             (Subject::Faults, _) => Self::Undetected,
+            (Subject::Sequence, _) if manifest.ending == Ending::Overdue => Self::Overdue,
             (Subject::Sequence, _) => Self::Sequence,
             (_, "stated pose") => Self::StatedPose,
             (_, "motion lag") if has_own_time() => Self::MotionTime,

@@ -92,8 +92,11 @@ pub(crate) fn ending(
     events: &[EventRecord],
 ) -> Option<OutcomeReason> {
     match ending {
-        Ending::Completed => {
-            stopped_by.map(|by| (Outcome::Named(SafeStop), stopped(Some(by), declared, events)))
+        Ending::Completed | Ending::Overdue => {
+            // The plant itself stops the drives of a controller that is overdue.
+            let is_cause = |by: &StoppedBy| *ending == Ending::Completed || *by == StoppedBy::Master;
+            let by = stopped_by.filter(is_cause);
+            by.map(|by| (Outcome::Named(SafeStop), stopped(Some(by), declared, events)))
         }
         Ending::SafeStop => Some((Outcome::Named(SafeStop), stopped(None, declared, events))),
         Ending::Died { process, how } => Some((Outcome::Named(Died), format!("the {process} died: {how}"))),

@@ -4,6 +4,7 @@
 use std::fmt::{self, Display, Formatter};
 
 use masseter_recording::{Ending, Manifest};
+use masseter_runtime::control::Deadline;
 use masseter_runtime::messages::codes::{Cause, ControllerState};
 use masseter_runtime::named::PlayedMotion;
 use masseter_scenario::ExpectedVerdict;
@@ -24,6 +25,10 @@ const WHOLE_TIME: f64 = 0.99;
 pub(crate) enum Shortfall {
     /// The jaw went only this share of the scenario's motion.
     NotPlayed { share: f64, way_mm: f64 },
+    /// The controller did not begin the motion in this time, s, so that the rig ended the run.
+    NotBegun { limit_s: f64 },
+    /// The controller did not end in this time, s, so that the rig ended the run.
+    NotEnded { limit_s: f64 },
     /// The controller's states are out of order.
     OutOfOrder(Disorder),
     /// The scenario's motion moves nothing.
@@ -40,6 +45,9 @@ impl Shortfall {
     /// `None` if the motion was played, and where something that anybody sees ended it, which has a verdict of its own.
     pub(crate) fn of(manifest: &Manifest, figures: &Figures) -> Option<Self> {
         let is_in = |expected| figures.final_state.is_some_and(|state| state == expected);
+        if manifest.ending == Ending::Overdue {
+            return Some(Self::overdue(manifest, figures));
+        }
         match figures.stopped_by {
             Some(StoppedBy::Master) => return None,
             Some(StoppedBy::QuickStop | StoppedBy::Drives) => return Self::of_stated_stop(manifest, figures),
@@ -67,6 +75,19 @@ impl Shortfall {
                 let short = (!is_played).then_some(Self::NotPlayed { share, way_mm });
                 short.or_else(|| Self::cut(manifest, figures))
             }
+        }
+    }
+
+    /// By the deadline that the plant kept.
+    fn overdue(manifest: &Manifest, figures: &Figures) -> Self {
+        let deadline = Deadline::new(&manifest.scenario, &manifest.declared, manifest.motion_s);
+        let is_early = figures.final_state.is_some_and(|state| {
+            use ControllerState::{Easing, Enabling, WaitReadings};
+            [WaitReadings, Enabling, Easing].into_iter().any(|early| state == early)
+        });
+        match figures.disorder {
+            Some(Disorder::NeverBegan) if is_early => Self::NotBegun { limit_s: deadline.begin_s },
+            _ => Self::NotEnded { limit_s: deadline.end_s },
         }
     }
 
@@ -114,6 +135,12 @@ impl Shortfall {
                 let breach = Breach::new("the motion ran for", seconds(running_s), seconds(least_s));
                 Some(breach.at(motion_ns.map(|[_, ended_ns]| ended_ns)))
             }
+            Self::NotBegun { limit_s } => {
+                Some(Breach::new("state running", "never", format!("within {}", seconds(limit_s))))
+            }
+            Self::NotEnded { limit_s } => {
+                Some(Breach::new("state finished", "never", format!("within {}", seconds(limit_s))))
+            }
             Self::OutOfOrder(disorder) => Some(out_of_order(disorder).at(figures.disorder_ns)),
             Self::Still | Self::Unjudged | Self::OnlyStated => None,
         }
@@ -122,7 +149,11 @@ impl Shortfall {
     pub(crate) fn result(self) -> CheckResult {
         match self {
             Self::Still | Self::Unjudged | Self::OnlyStated => CheckResult::Untested,
-            Self::NotPlayed { .. } | Self::Early { .. } | Self::OutOfOrder(_) => CheckResult::Failed,
+            Self::NotPlayed { .. }
+            | Self::NotBegun { .. }
+            | Self::NotEnded { .. }
+            | Self::Early { .. }
+            | Self::OutOfOrder(_) => CheckResult::Failed,
         }
     }
 }
@@ -136,6 +167,16 @@ impl Display for Shortfall {
                  declares it",
                 // No share of -0 %.
                 (share * 100.0).round() + 0.0
+            ),
+            Self::NotBegun { limit_s } => write!(
+                f,
+                "the controller did not begin the motion within {limit_s:.1} s of the first SYNC, so the rig ended the run; \
+                 controller.overdue_s gives it more time"
+            ),
+            Self::NotEnded { limit_s } => write!(
+                f,
+                "the controller did not end within {limit_s:.1} s of the motion's beginning, so the rig ended the run; \
+                 controller.overdue_s gives it more time"
             ),
             Self::OutOfOrder(disorder) => disorder.fmt(f),
             Self::Still => f.write_str("the scenario's motion does not move the jaw"),

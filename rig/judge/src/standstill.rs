@@ -194,7 +194,8 @@ pub(super) fn standstill(
     }
     if recorded_s < AFTER_STOP_S * LEAST_SHARE {
         let why = format!("recorded for {recorded_s:.3} s after the stop, {AFTER_STOP_S} s needed");
-        let is_whole = matches!(ending, Ending::Completed | Ending::SafeStop) && !is_partial;
+        let is_whole =
+            matches!(ending, Ending::Completed | Ending::SafeStop | Ending::Overdue) && !is_partial;
         return Some(if is_whole { Check::untested(NAME, why) } else { Check::not_judged(NAME, why) });
     }
     let closest = ways.iter().max_by(|a, b| a.share().total_cmp(&b.share()));

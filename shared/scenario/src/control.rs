@@ -59,6 +59,9 @@ section! {
         pub hold_s: f64 = 0.2 => UpTo(LONGEST_S),
         /// Time in which an interrupted motion comes to rest.
         pub stop_ramp_s: f64 = 0.3 => UpTo(LONGEST_S),
+        /// Time that a controller may take beyond its waits, its moves and the motion, until it begins the motion, and until it
+        /// ends. Then the plant stops the drives, and the run fails.
+        pub overdue_s: f64 = 10.0 => UpTo(LONGEST_S),
         /// From the sample of a reading to the instant at which the targets of its command are reached: a cycle until
         /// SYNC, and what the drives interpolate over.
         pub lead_cycles: f64 = 2.0 => Within(LEAST_LEAD_CYCLES, MOST_LEAD_CYCLES as f64),

@@ -119,20 +119,45 @@ mod motion_checks {
         for (declared, expected) in cases {
             let found: Vec<_> =
                 (1..=declared).map(|number| figures(number, (number == 1).then_some(5), 0.0)).collect();
-            let check = faults(&vec![fault(); declared], &found, &ChecksConfig::default(), None);
+            let check = faults(&vec![fault(); declared], &found, &ChecksConfig::default(), None, [None; 2]);
             assert_eq!(check.map(|check| (check.result.mark(), check.finding)), expected);
         }
         let found = [figures(1, None, 0.0), figures(2, Some(5), 0.6)];
-        let check = faults(&[fault(), fault()], &found, &ChecksConfig::default(), None).unwrap();
+        let check = faults(&[fault(), fault()], &found, &ChecksConfig::default(), None, [None; 2]).unwrap();
         assert_eq!(check.result.mark(), "FAIL", "one fault led the jaw too far: {check:?}");
+    }
+
+    #[test]
+    fn a_fault_that_is_to_begin_after_the_runs_end_is_told_the_end() {
+        let finding = |fault: FaultConfig| {
+            let lasted_s = [Some(9.8104), Some(11.3)];
+            let found = [figures(1, None, 0.0)];
+            faults(&[fault], &found, &ChecksConfig::default(), None, lasted_s).unwrap().finding
+        };
+        let never = "0 of 1 declared faults acted, number 1 never: ";
+        let late = "0 of 1 declared faults acted, number 1 at 12 s, after the run's end at ";
+        let at = |at_s| FaultConfig { at_s, from_s: None, ..fault() };
+        let of_motion = format!("{late}9.810 s: let the fault begin earlier, or play longer");
+        assert_eq!(finding(at(Some(12.0))), of_motion);
+        assert!(finding(at(Some(9.0))).starts_with(never), "it had its time");
+        let waits = FaultConfig { after: Some("fault.jam".to_owned()), ..at(Some(12.0)) };
+        assert!(finding(waits).starts_with(never), "nobody knows when the other one comes");
+        let of_switch = format!("{late}11.300 s: let the fault begin earlier, or play longer");
+        assert_eq!(finding(FaultConfig { from_s: Some(12.0), ..fault() }), of_switch);
+        assert!(finding(FaultConfig { from_s: Some(11.0), ..fault() }).starts_with(never));
     }
 
     #[test]
     fn a_fault_that_strikes_after_the_stop_tested_nothing_unless_it_waits_for_it() {
         let stopped = |struck_ns, after: Option<&str>| {
             let fault = FaultConfig { after: after.map(str::to_owned), ..fault() };
-            let check =
-                faults(&[fault], &[figures(1, Some(struck_ns), 0.0)], &ChecksConfig::default(), Some(5));
+            let check = faults(
+                &[fault],
+                &[figures(1, Some(struck_ns), 0.0)],
+                &ChecksConfig::default(),
+                Some(5),
+                [None; 2],
+            );
             check.map(|check| (check.result.mark(), check.finding)).unwrap()
         };
         assert_eq!(stopped(5, None).0, "ok", "it began the stop");
@@ -146,20 +171,20 @@ mod motion_checks {
     fn a_fault_that_leads_the_jaw_beyond_the_limit_fails_the_run_with_its_name() {
         for (deviation_mm, mark) in [(0.5, "ok"), (0.51, "FAIL")] {
             let found = [figures(1, Some(5), deviation_mm)];
-            let check = faults(&[fault()], &found, &ChecksConfig::default(), None).unwrap();
+            let check = faults(&[fault()], &found, &ChecksConfig::default(), None, [None; 2]).unwrap();
             assert_eq!(check.result.mark(), mark, "{check:?}");
             let named = "number 1, lose (bus 1, node 4, id 204h), moved the jaw 0.510 mm and 0.100° from its path \
                          undetected, limit 0.5 mm and 0.5°";
             assert_eq!(check.finding.contains(named), mark == "FAIL", "{check:?}");
         }
         let turned = FaultFigures { deviation_deg: 0.5, ..figures(1, Some(5), 0.1) };
-        let check = faults(&[fault()], &[turned], &ChecksConfig::default(), None).unwrap();
+        let check = faults(&[fault()], &[turned], &ChecksConfig::default(), None, [None; 2]).unwrap();
         assert_eq!(check.result.mark(), "ok", "{check:?}");
         for deviation_deg in [0.51, f64::INFINITY, f64::NAN] {
             let turned = FaultFigures { deviation_deg, ..figures(1, Some(5), 0.1) };
             let shifted = FaultFigures { deviation_mm: deviation_deg, ..figures(1, Some(5), 0.1) };
             for found in [turned, shifted] {
-                let check = faults(&[fault()], &[found], &ChecksConfig::default(), None).unwrap();
+                let check = faults(&[fault()], &[found], &ChecksConfig::default(), None, [None; 2]).unwrap();
                 assert_eq!(check.result.mark(), "FAIL", "{check:?}");
             }
         }

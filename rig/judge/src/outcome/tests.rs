@@ -39,6 +39,12 @@ fn what_master_and_drives_show_comes_before_what_the_controller_reports() {
         ending(&Ending::Completed, Some(StoppedBy::QuickStop), None, &events[..1]),
         stopped("the drives made a quick stop")
     );
+    // The plant's own stop at the deadline is no fault.
+    assert_eq!(ending(&Ending::Overdue, Some(StoppedBy::QuickStop), None, &events), None);
+    assert_eq!(
+        ending(&Ending::Overdue, Some(StoppedBy::Master), None, &events),
+        shown(Some(StoppedBy::Master))
+    );
     // The end of a process comes before both.
     let died = Ending::died("plant", "signal 9".to_owned());
     assert_eq!(ending(&died, Some(StoppedBy::Master), None, &events).unwrap().0, Outcome::Named(Died));

@@ -115,6 +115,28 @@ fn states_out_of_order_fail_and_a_stop_by_request_excuses_a_motion_that_never_be
 }
 
 #[test]
+fn a_controller_that_waited_for_ever_did_not_begin_or_did_not_end() {
+    let overdue = |state, disorder| {
+        shortfall(|manifest, figures| {
+            (manifest.ending, figures.disorder) = (Ending::Overdue, disorder);
+            figures.final_state = Some(Code::Known(state));
+            // What the plant did at the deadline.
+            figures.stopped_by = Some(StoppedBy::QuickStop);
+        })
+    };
+    let never = Some(Disorder::NeverBegan);
+    for (state, disorder, finding) in [
+        (ControllerState::Enabling, never, "did not begin the motion within "),
+        (ControllerState::Running, None, "did not end within "),
+        (ControllerState::Finished, never, "did not end within "),
+    ] {
+        let found = overdue(state, disorder).unwrap();
+        assert_eq!(found.result(), CheckResult::Failed);
+        assert!(found.to_string().starts_with(&format!("the controller {finding}")), "{found}");
+    }
+}
+
+#[test]
 fn what_falls_short_has_a_value_a_limit_and_a_time() {
     type Change = fn(&mut Manifest, &mut Figures);
     let breach = |change: Change| {

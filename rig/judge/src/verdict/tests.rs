@@ -34,7 +34,7 @@ impl Run {
         let on_path = PoseErrors { samples: 1000, rms_mm: Some(0.05), ..PoseErrors::default() };
         figures.disorder = None;
         let undisturbed = UndisturbedFigures { samples: 900, actual: on_path, estimated: on_path };
-        (figures.cycles, figures.running_s) = (1000, 10.0);
+        (figures.cycles, figures.running_s, figures.duration_s) = (1000, 10.0, 11.5);
         figures.motion = MotionFigures {
             way_mm: Some(900.0),
             played: Some(0.999),

@@ -299,6 +299,8 @@ pub enum Ending {
         /// Exit code or signal.
         how: String,
     },
+    /// The controller did not begin the motion, or did not end, by its deadline.
+    Overdue,
     /// The user interrupted it.
     Interrupted,
     /// Real time was required and refused.

@@ -9,10 +9,11 @@ use masseter_controller::process::BuildController;
 use masseter_plan::RunPlan;
 use masseter_plant::PlantError;
 use masseter_recording::Ending;
-use masseter_runtime::control::{Controller, Duties, NoBranch, Observed, Outcome, set_parameters};
+use masseter_runtime::control::{Controller, Deadline, Duties, NoBranch, Observed, Outcome, set_parameters};
 use masseter_runtime::injection::{Operator, Withdrawn};
 use masseter_runtime::lifecycle::Party;
 use masseter_runtime::lockstep::EPOCH_NS;
+use masseter_runtime::messages::Command;
 use masseter_runtime::named::{Declared, NamedValues};
 use masseter_scenario::Scenario;
 
@@ -43,6 +44,7 @@ impl Requests for Uninterrupted {}
 pub(crate) struct Control {
     controller: Box<dyn Controller>,
     duties: Duties,
+    deadline: Deadline,
 }
 
 impl Control {
@@ -56,11 +58,13 @@ impl Control {
         set_parameters(&mut *controller, &named);
         *declared = named.settings().declared().clone();
         let operator = Operator::new(&plan.scenario, declared, EPOCH_NS)?;
-        Ok(Self { controller, duties: Duties { named, operator } })
+        let deadline = Deadline::new(&plan.scenario, declared, plan.trajectory.duration_s());
+        Ok(Self { controller, duties: Duties { named, operator }, deadline })
     }
 
     fn branch(&self) -> Result<Self, NoBranch> {
-        Ok(Self { controller: self.controller.branch()?, duties: self.duties.clone() })
+        let (duties, deadline) = (self.duties.clone(), self.deadline);
+        Ok(Self { controller: self.controller.branch()?, duties, deadline })
     }
 }
 
@@ -162,7 +166,7 @@ impl<S: Sink> Run<S> {
     /// When the plant fails.
     pub fn begin_cycle(&mut self) -> Result<(), PlantError> {
         if self.observed.is_none() {
-            let Control { controller, duties } = &mut self.control;
+            let Control { controller, duties, .. } = &mut self.control;
             self.observed = Some(self.stepper.begin_observed(&mut **controller, duties)?);
         }
         Ok(())
@@ -173,7 +177,7 @@ impl<S: Sink> Run<S> {
     /// # Errors
     /// When the plant fails.
     pub fn play_cycle(&mut self) -> Result<(), PlantError> {
-        let Self { stepper, control: Control { controller, duties }, observed, .. } = self;
+        let Self { stepper, control: Control { controller, duties, .. }, observed, .. } = self;
         let observed = match observed.take() {
             Some(observed) => observed,
             None => stepper.begin_observed(&mut **controller, duties)?,
@@ -212,6 +216,7 @@ impl<S: Sink> Run<S> {
     pub(crate) fn play(&mut self, interrupts: &dyn Requests) -> Ending {
         let mut plant_error = None;
         while plant_error.is_none()
+            && !self.control.deadline.is_over(self.cycle())
             && self.control.controller.outcome().is_none()
             && !self.sink().has_failed()
             && !interrupts.is_abort_requested()
@@ -220,14 +225,20 @@ impl<S: Sink> Run<S> {
                 self.control.controller.request_stop();
             }
             plant_error = self.play_cycle().err();
+            let mut command = Command::default();
+            self.control.controller.fill_command(&mut command);
+            self.control.deadline.note(self.stepper.cycle, command.controller_state);
         }
-        if self.control.controller.outcome().is_some() && plant_error.is_none() {
+        let has_ended = self.control.controller.outcome().is_some();
+        let is_overdue = !has_ended && self.control.deadline.is_over(self.cycle());
+        if (is_overdue || has_ended) && plant_error.is_none() {
             plant_error = self.stepper.play_after_controller().err();
         }
         match (plant_error, self.control.controller.outcome()) {
             (Some(error), _) => Ending::died(Party::Plant.name(), error.to_string()),
             _ if interrupts.is_stop_requested() => Ending::Interrupted,
             (None, Some(Outcome::SafeStop)) => Ending::SafeStop,
+            _ if is_overdue => Ending::Overdue,
             (None, _) => Ending::Completed,
         }
     }

@@ -4,6 +4,7 @@
 //! real time and in lockstep; the runner of virtual time calls it in one thread. Kinematics, trajectories and safety of a
 //! particular controller are not here.
 
+mod deadline;
 mod ports;
 mod session;
 
@@ -14,6 +15,7 @@ use crate::messages::{Command, Event, Parameters, Reading, Signals, State};
 use crate::named::{Change, Declared, NamedValues};
 use crate::realtime::Wake;
 
+pub use deadline::Deadline;
 pub use session::{Session, SessionError, Waited};
 
 /// A cycle's place in time.

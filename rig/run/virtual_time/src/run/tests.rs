@@ -111,6 +111,15 @@ impl Controller for Foreign {
 }
 
 #[test]
+fn a_controller_that_waits_for_ever_is_overdue() {
+    let plan = RunPlan::new(with_keys("[controller]\nstart_timeout_s = 1.0\noverdue_s = 0.1\n")).unwrap();
+    let mut run = Run::new(&plan, |_, _, _| Box::new(Foreign), Kept::default()).unwrap();
+    assert_eq!(run.play(&Uninterrupted), Ending::Overdue);
+    let (limit, after) = ((run.control.deadline.begin_s * 1e3).ceil() as u64, 500);
+    assert!(run.cycle().abs_diff(limit + after) <= 1, "{}", run.cycle());
+}
+
+#[test]
 fn a_foreign_controller_is_refused_by_name() {
     let plan = RunPlan::new(Scenario::default()).unwrap();
     let run = Run::new(&plan, |_, _, _| Box::new(Foreign), Kept::default()).unwrap();
