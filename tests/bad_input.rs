@@ -330,7 +330,7 @@ fn manifests_that_no_run_wrote_are_refused_and_their_words_are_no_markup() {
     let workspace = Workspace::new("duration_s = 1.0");
     assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     let report_on = |edit: &dyn Fn(&mut Value)| {
-        let mut manifest = workspace.manifest();
+        let mut manifest = workspace.manifest_without_digest();
         edit(&mut manifest);
         let folder = workspace.file("edited");
         std::fs::create_dir_all(&folder).unwrap();
@@ -362,6 +362,58 @@ fn manifests_that_no_run_wrote_are_refused_and_their_words_are_no_markup() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let page = std::fs::read_to_string(workspace.file("edited").join("report.html")).unwrap();
     assert!(page.contains("\\u003cb>") && !page.contains("<b>"));
+}
+
+/// A wrong verdict is worse than none. Whoever computes the digest anew, and forges the recording too, is not kept from it.
+#[test]
+fn a_run_whose_files_were_changed_is_not_judged() {
+    let row = |i: i32| format!("{},0,0,{},1,0,0,0\n", f64::from(i) * 0.02, -(f64::from(i) * 0.1).sin());
+    let rows: String = (0..50).map(row).collect();
+    let workspace = Workspace::new("[motion]\nkind = 'file'\npath = 'jaw.csv'\n");
+    workspace.write("jaw.csv", &format!("time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n{rows}"));
+    let output = workspace.run_virtual(&[]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let run = workspace.run_folder();
+    let report = || masseter(&["report", run.to_str().unwrap()]);
+    let refused = |file: &str, edit: &dyn Fn(&str) -> String, reason: &str| {
+        let path = run.join(file);
+        let kept = fs::read_to_string(&path).unwrap();
+        assert_ne!(kept, edit(&kept), "{reason}");
+        fs::write(&path, edit(&kept)).unwrap();
+        let output = report();
+        assert!(output.status.code() == Some(2) && stderr(&output).contains(reason), "{}", stderr(&output));
+        fs::write(&path, kept).unwrap();
+    };
+    let changed = "manifest.json: it was changed after the run: its text has the digest ";
+    for (from, to) in [
+        ("\"kind\": \"completed\"", "\"kind\": \"safe_stop\""),
+        ("\"motion_lag_ms\": 20.0", "\"motion_lag_ms\": 200.0"),
+        ("\"controller\": null", "\"controller\": \"hold\""),
+    ] {
+        refused("manifest.json", &|text| text.replacen(from, to, 1), changed);
+    }
+    let without_digest = |key: [&str; 2], value: Value| {
+        let mut manifest = workspace.manifest_without_digest();
+        let [table, key] = key;
+        *(if table.is_empty() { &mut manifest[key] } else { &mut manifest["scenario"][table][key] }) = value;
+        manifest.to_string()
+    };
+    let lag = "the scenario has 'motion_lag_ms = 200.0' here and 'motion_lag_ms = 20.0' there";
+    refused("manifest.json", &|_| without_digest(["checks", "motion_lag_ms"], json!(200.0)), lag);
+    refused("manifest.json", &|_| without_digest(["", "motion_s"], json!(0.5)), "motion_s is 0.5 here and ");
+    refused("motion.csv", &|text| text.replacen("0.04,", "0.05,", 1), "motion.csv has changed since");
+    // The recording of another run.
+    let other = Workspace::new("duration_s = 1.0\n[motion]\nkind = 'opening'");
+    assert_eq!(other.run_virtual(&[]).status.code(), Some(0));
+    let recording = workspace.recording();
+    fs::write(run.join("recording.mcap"), other.recording()).unwrap();
+    let said = stderr(&report());
+    assert!(said.contains("manifest.json: it is not that of the recording: "), "{said}");
+    fs::write(run.join("recording.mcap"), recording).unwrap();
+    // The scenario to play again may change.
+    fs::write(run.join("scenario.toml"), "duration_s = 2.0").unwrap();
+    let output = report();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
 }
 
 #[test]

@@ -160,7 +160,9 @@ fn what_cannot_be_replayed_is_refused_with_the_reason() {
     };
     let (manifest, recording) = (run.join("manifest.json"), run.join("recording.mcap"));
     let text = fs::read_to_string(&manifest).unwrap();
-    fs::write(&manifest, text.replace("\"controller\": null", "\"controller\": \"external\"")).unwrap();
+    let mut of_program = workspace.manifest_without_digest();
+    of_program["controller"] = "external".into();
+    fs::write(&manifest, of_program.to_string()).unwrap();
     refused("the controller of this run was external");
     fs::write(&manifest, text).unwrap();
     let bytes = fs::read(&recording).unwrap();

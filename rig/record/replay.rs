@@ -9,7 +9,7 @@ use std::path::Path;
 use anyhow::Context;
 use masseter_controller::process;
 use masseter_plan::{Overrides, scenario_with_overrides};
-use masseter_recording::{Columns, Manifest, Reader, Recorded, RunFolder, definitions};
+use masseter_recording::{Columns, Manifest, Reader, Recorded, RunFolder, definitions, manifest_of};
 use masseter_report::divergence::{Compared, Comparison, Differences, Side};
 use masseter_runtime::control::{Controller, Duties, run_cycle, set_parameters};
 use masseter_runtime::injection::Operator;
@@ -39,7 +39,7 @@ pub(crate) struct Outcome {
 pub(crate) fn replay(run: &Path, kind: Option<ControllerKind>, set: &[String]) -> anyhow::Result<Outcome> {
     let folder = RunFolder::open(run)?;
     let path = folder.manifest();
-    let manifest = Manifest::read(&folder).with_context(|| path.display().to_string())?;
+    let manifest = manifest_of(&folder).with_context(|| path.display().to_string())?;
     let recorded_kind = ControllerKind::of_manifest(manifest.controller.as_deref());
     let recorded_kind =
         recorded_kind.ok_or_else(|| ReplayError::ForeignController(manifest.controller.clone()))?;

@@ -15,7 +15,7 @@ use masseter_controller::process::BuildController;
 use masseter_judge::signals::Registry;
 use masseter_judge::{Check, CheckResult, EventRecord, Figures, Verdict, Watch};
 use masseter_plan::{Overrides, RunPlan, scenario_with_overrides};
-use masseter_recording::{Manifest, RunFolder};
+use masseter_recording::{Manifest, RunFolder, manifest_of};
 use masseter_report::why::{Detected, Instant, Interval, Left, Look, Why};
 use masseter_runtime::injection::{Injected, Withdrawn};
 use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind};
@@ -38,7 +38,7 @@ const NAMED: usize = 5;
 /// Asks why the run of a folder failed: what acted on it is taken away.
 pub(crate) fn why(run: &Path, withdrawn: Withdrawn, interrupts: &Interrupts) -> anyhow::Result<Why> {
     let folder = RunFolder::open(run)?;
-    let manifest = Manifest::read(&folder).with_context(|| folder.manifest().display().to_string())?;
+    let manifest = manifest_of(&folder).with_context(|| folder.manifest().display().to_string())?;
     ensure!(
         !manifest.is_in_real_time(),
         "the run was in real time, which cannot be played again: run its scenario with --clock virtual"

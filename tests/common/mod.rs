@@ -172,6 +172,13 @@ impl Workspace {
     pub(crate) fn manifest(&self) -> Value {
         json(&self.run_folder().join("manifest.json"))
     }
+
+    /// The manifest without the digest of its text, to be edited: as a program writes that knows no digest.
+    pub(crate) fn manifest_without_digest(&self) -> Value {
+        let mut manifest = self.manifest();
+        manifest.as_object_mut().expect("an object").remove("digest").expect("a digest");
+        manifest
+    }
 }
 
 /// The process of a running rig that plays `role`, once it runs.

@@ -14,6 +14,7 @@ mod columns;
 mod encoding;
 mod folder;
 mod manifest;
+mod past;
 mod reader;
 mod rewrite;
 mod scene;
@@ -31,6 +32,7 @@ pub use manifest::{
     DmaLatency, Ending, FullSpeed, LoopInterval, Machine as MachineInfo, Manifest, ProcessFault, RunUsage,
     Usage,
 };
+pub use past::manifest_of;
 pub use reader::{Chunks, Entry, ReadError, Reader};
 pub use rewrite::{Digester, Digests, RecoverError, Recovered, ThinError, is_kept, recover, thin};
 pub use scene::{Scene, jaw_points};

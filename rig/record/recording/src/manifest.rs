@@ -23,6 +23,8 @@ const REAL_TIME: &str = "rt";
 /// Version of the manifest's form.
 const FORM: u32 = 1;
 
+/// How the text begins.
+const OPEN: &str = "{\n";
 /// The end of the supervisor, until the real end is written.
 const UNJUDGED: &str = "it did not live to judge the run, or could not write how it ended";
 
@@ -157,27 +159,49 @@ impl Manifest {
             .find_map(|(process, obtained)| Some((process.as_str(), obtained.refusals.first()?.as_str())))
     }
 
-    /// Writes the file completely or not at all.
+    /// Writes the file completely or not at all, with a digest of its text as the first line.
     pub fn write(&self, folder: &RunFolder) -> io::Result<()> {
-        folder.keep(&folder.manifest(), &(serde_json::to_string_pretty(self)? + "\n"))
+        let text = serde_json::to_string_pretty(self)? + "\n";
+        let (open, rest) = text.split_at(OPEN.len());
+        folder.keep(&folder.manifest(), &[open, &digest_line(&digest(&text)), rest].concat())
     }
 
-    /// Reads the file of a past run.
+    /// Reads the file. One whose text was changed after the run is refused; the digest is no seal against those who compute
+    /// another one.
     pub fn read(folder: &RunFolder) -> io::Result<Self> {
         #[derive(Deserialize)]
         struct Form {
             form: u32,
+            /// None of an older build.
+            digest: Option<String>,
         }
         let text = read_text(&folder.manifest(), MOST_KEPT_BYTES)?;
-        let Form { form } = serde_json::from_str(&text)?;
+        let Form { form, digest: written } = serde_json::from_str(&text)?;
         if form != FORM {
             return Err(io::Error::other(format!("it has form {form}, this program reads form {FORM}")));
+        }
+        if let Some(written) = written {
+            let found = digest(&text.replacen(&digest_line(&written), "", 1));
+            if found != written {
+                return Err(io::Error::other(format!(
+                    "it was changed after the run: its text has the digest {found}, not {written}; restore the file, or play the \
+                     scenario again"
+                )));
+            }
         }
         let manifest: Self = serde_json::from_str(&text)?;
         manifest.scenario.validate().map_err(io::Error::other)?;
         manifest.declared.check().map_err(io::Error::other)?;
         Ok(manifest)
     }
+}
+
+fn digest(text: &str) -> String {
+    format!("{:08x}", crc32fast::hash(text.as_bytes()))
+}
+
+fn digest_line(digest: &str) -> String {
+    format!("  \"digest\": \"{digest}\",\n")
 }
 
 /// Resources that a process used in its steady state: CPU time and page faults of all threads, the rest of the main

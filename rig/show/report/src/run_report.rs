@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use masseter_judge::{Analysis, Figures, Judgement, Verdict};
-use masseter_recording::{Manifest, ReadError, Reader, Recorded, RunFolder};
+use masseter_recording::{Manifest, ReadError, Reader, Recorded, RunFolder, manifest_of};
 use masseter_runtime::messages::tap::{self, TapError};
 use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, result_with_tones, status};
@@ -74,7 +74,7 @@ pub fn report_run(
 pub fn report_past_run(path: &Path, set: &[String], format: Format) -> Result<Exit, Failure> {
     let folder = RunFolder::open(path).usage()?;
     let unread = || format!("cannot read {}", folder.manifest().display());
-    let mut manifest = Manifest::read(&folder).with_context(unread).usage()?;
+    let mut manifest = manifest_of(&folder).with_context(unread).usage()?;
     choose_cycles(&mut manifest.scenario, set).usage()?;
     let (figures, logged) = analyse(&folder, &manifest, Some(folder.path())).usage()?;
     let shown = Some((format, Detail::Whole));
@@ -92,7 +92,7 @@ pub fn report_past_run(path: &Path, set: &[String], format: Format) -> Result<Ex
 /// Writes the page of a failed run again, with until when the run could pass; returns its place.
 pub fn explain(path: &Path, why: &Why) -> Result<PathBuf, Failure> {
     let folder = RunFolder::open(path).usage()?;
-    let manifest = Manifest::read(&folder).context("cannot read the manifest").usage()?;
+    let manifest = manifest_of(&folder).context("cannot read the manifest").usage()?;
     let (figures, _) = analyse(&folder, &manifest, None).usage()?;
     let verdict = Verdict::new(&manifest, &figures);
     let html = page::html(&manifest, &figures, &verdict, Some(why));

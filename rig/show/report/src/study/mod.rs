@@ -15,7 +15,7 @@ use masseter_judge::{
     CycleQuantity, JawCycleFigures, Judgement, Statistic, TrackingSample, closed_incisal_m, incisal_m,
     missing_part,
 };
-use masseter_recording::{Manifest, RunFolder};
+use masseter_recording::{RunFolder, manifest_of};
 use masseter_scenario::Scenario;
 use serde_json::Value;
 
@@ -205,7 +205,7 @@ fn name_persons(recordings: &mut [Recorded], folders: &[String]) {
 fn recorded(path: &Path, by: &By, set: &[String]) -> anyhow::Result<Recorded> {
     let read = || -> anyhow::Result<Recorded> {
         let folder = RunFolder::open(path)?;
-        let mut manifest = Manifest::read(&folder)?;
+        let mut manifest = manifest_of(&folder)?;
         choose_cycles(&mut manifest.scenario, set)?;
         let (figures, _) = analyse(&folder, &manifest, None)?;
         if let Some(reason) = missing_part(&figures) {
