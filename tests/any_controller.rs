@@ -8,11 +8,13 @@ use std::os::unix::net::UnixStream;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+use std::thread;
 
-use masseter_runtime::control::Session;
+use masseter_runtime::control::{Session, Waited};
 use masseter_runtime::conversation::line;
 use masseter_runtime::lifecycle::Report;
 use masseter_runtime::lifecycle::attach::{self, Hello, socket};
+use masseter_runtime::messages::{self, State};
 use masseter_runtime::named::{self, Declared, Parameter};
 use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain};
 use masseter_runtime::transport::Domain;
@@ -96,6 +98,33 @@ fn a_program_controls_the_robot_in_real_time() {
     let output = workspace.run(&cores, &["--quiet", "--controller", controller]);
     assert!(PASSED_OR_INVALID.contains(&output.status.code()), "{}{}", stdout(&output), stderr(&output));
     assert!(workspace.manifest()["scheduling"]["controller"].is_object());
+}
+
+#[test]
+fn a_program_that_waits_for_ever_in_real_time_ends_at_a_deadline() {
+    let cores = Cores::take();
+    let waits = "[controller]\nstart_timeout_s = 1.0\noverdue_s = 0.2\n[can]\nready_timeout_ms = 500\n";
+    let workspace = Workspace::new(&format!("{SCENARIO}{waits}"));
+    let name = unique("waits");
+    let rig = workspace.start(&cores, &["--controller", "external", "--name", &name, "--quiet"]);
+    let socket = socket(&Domain::named(&name).unwrap());
+    wait_until("the rig waits", || UnixStream::connect(&socket).is_ok());
+    // The thread ends with the priority that the session asks for.
+    let program = thread::spawn(move || {
+        let mut session = Session::start(attach::attach(Some(&name)).unwrap(), Declared::default()).unwrap();
+        while !session.is_stop_requested() {
+            let Ok(Waited::Cycle { tick, .. }) = session.wait(None) else { continue };
+            let command = messages::Command { cycle: tick.cycle, ..Default::default() };
+            // The rig may have given it up meanwhile.
+            let _ = session.publish(&command, &State { cycle: tick.cycle, ..State::default() });
+        }
+    });
+    let output = rig.wait_with_output().unwrap();
+    program.join().unwrap();
+    let said = stdout(&output) + &stderr(&output);
+    assert_eq!(workspace.manifest()["ending"]["kind"], "overdue", "{said}");
+    // A machine that loses many cycles leaves nothing to judge.
+    assert!(matches!(output.status.code(), Some(1 | 3)), "{said}");
 }
 
 #[test]

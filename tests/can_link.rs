@@ -142,7 +142,10 @@ fn a_run_whose_declared_fault_never_acts_is_untested() {
     let faults = check(&summary, "faults");
     assert_eq!((&summary["verdict"]["word"], &faults["result"]), (&"UNTESTED".into(), &"untested".into()));
     let finding = faults["finding"].as_str().unwrap();
-    assert!(finding.starts_with("0 of 1 declared faults acted, number 1 at 1000 s, after the run's end at "), "{finding}");
+    assert!(
+        finding.starts_with("0 of 1 declared faults acted, number 1 at 1000 s, after the run's end at "),
+        "{finding}"
+    );
 }
 
 #[test]
