@@ -17,7 +17,10 @@ use crate::BUILD;
 const GROUPS: [(&str, &[&str]); 8] = [
     ("Play a motion and judge it", &["init", "motion", "run", "test", "signals", "faults"]),
     ("Play a scenario in many variants", &["campaign", "search", "shrink", "storm"]),
-    ("Work with past runs", &["report", "compare", "export", "why", "replay", "diff", "recording"]),
+    (
+        "Work with past runs",
+        &["report", "compare", "export", "why", "identify", "replay", "diff", "recording"],
+    ),
     ("Bring your own controller", &["new", "interface", "controller", "param"]),
     ("Prepare this machine", &["doctor", "clean"]),
     ("Work with CAN and the drives", &["robot", "can", "plant"]),

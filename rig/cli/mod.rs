@@ -8,6 +8,7 @@ mod compare;
 mod controller;
 mod faults;
 mod help;
+mod identify;
 mod interface;
 mod kinematics;
 mod motion;
@@ -46,6 +47,7 @@ use compare::CompareArgs;
 use controller::{ControllerArgs, ParamVerb, SignalsArgs};
 use faults::FaultsVerb;
 use help::{CompletionsArgs, ManArgs, with_overview};
+use identify::IdentifyArgs;
 use interface::InterfaceArgs;
 use kinematics::{CsvArgs, FkArgs};
 use motion::MotionArgs;
@@ -106,6 +108,8 @@ enum Verb {
     Storm(StormArgs),
     /// Find the last instant from which a failed run passes without what acted on it
     Why(WhyArgs),
+    /// Estimate friction, masses, lag and play of the robot from a recording
+    Identify(IdentifyArgs),
     /// Describe a recorded jaw motion, and whether the rig can play it
     Motion(MotionArgs),
     /// Lay down a scenario, a motion and a CI workflow to start from
@@ -237,6 +241,7 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Shrink(args) => campaign::shrink(&args),
         Verb::Storm(args) => storm::storm(&args),
         Verb::Why(args) => why::why(&args),
+        Verb::Identify(args) => identify::identify(&args),
         Verb::CampaignCase { folder, number } => play_case(&folder, number),
         Verb::Motion(args) => motion::motion(&args).usage(),
         Verb::Init(args) => starter::init(&args).usage(),

@@ -2,6 +2,7 @@
 //! faults.
 //! All of them play their runs by the [`Runner`](crate::run::runner::Runner); their verbs are in [`cli`](crate::cli).
 
+pub(crate) mod identify;
 pub(crate) mod matrix;
 pub(crate) mod play;
 pub(crate) mod search;

@@ -164,7 +164,7 @@ impl<'a> Season<'a> {
                 broken: Some(Broken { law: Law::Judged, by }),
             };
         };
-        let judged = self.judge(&storm, number % RECORDED_EVERY == 0);
+        let judged = self.judge(&storm, number.is_multiple_of(RECORDED_EVERY));
         let (word, acted, broken) = judged;
         Played { number, storm: Some(storm), word, acted, broken }
     }

@@ -69,7 +69,7 @@ pub use response::{BusResponse, ResponseFigures};
 pub use series::Curve;
 pub use skips::{OverrunAttribution, SkipFigures};
 pub use standstill::StandstillFigures;
-pub use statistic::Statistic;
+pub use statistic::{Statistic, student_t};
 pub use timing::{Timing, TimingWord};
 pub use tracking::{PoseErrors, PoseSource, TrackingFigures, TrackingSample, UndisturbedFigures};
 pub use verdict::{Judgement, Verdict};

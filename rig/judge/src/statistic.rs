@@ -54,7 +54,7 @@ impl Statistic {
 
 /// The 97.5 % point of Student's t distribution: exact for one and two degrees of freedom, else the expansion of Cornish and
 /// Fisher (Abramowitz and Stegun 26.7.5), 0.1 % off at three degrees and less beyond.
-fn student_t(freedom: f64) -> f64 {
+pub fn student_t(freedom: f64) -> f64 {
     const Z: f64 = 1.959_963_984_540_054;
     if freedom < 1.5 {
         return 12.706_204_736;

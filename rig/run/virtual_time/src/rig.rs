@@ -130,6 +130,29 @@ impl Rig {
         Ok(self.reading())
     }
 
+    /// Steps with the commands of a recording, each of which keeps its number. A cycle without a command gets none. `look`
+    /// sees every cycle that begins, and ends the steps by `false`.
+    ///
+    /// # Errors
+    /// As [`step`](Self::step).
+    pub fn follow(
+        &mut self,
+        commands: &[Option<Command>],
+        look: &mut dyn FnMut(&Self) -> bool,
+    ) -> Result<(), RigError> {
+        for command in commands {
+            self.stepper.ports.log.sink.events.clear();
+            self.has_failed = true;
+            self.stepper.end_cycle(*command)?;
+            self.stepper.begin_next_cycle()?;
+            self.has_failed = false;
+            if !look(self) {
+                break;
+            }
+        }
+        Ok(())
+    }
+
     /// The reading of this cycle.
     pub fn reading(&self) -> &Reading {
         &self.stepper.ports.reading

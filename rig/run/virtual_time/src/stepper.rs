@@ -126,7 +126,8 @@ impl<S: Sink> Stepper<S> {
         begin_cycle(&mut self.plant, &mut self.ports, &self.schedule, &sync)
     }
 
-    fn end_cycle(&mut self, command: Option<Command>) -> Result<(), PlantError> {
+    /// Ends a cycle with this command, or without one.
+    pub(crate) fn end_cycle(&mut self, command: Option<Command>) -> Result<(), PlantError> {
         self.ports.command = command;
         let sync = self.sync();
         end_cycle(&mut self.plant, &mut self.ports, &sync)
