@@ -73,7 +73,9 @@ mod tests {
         let deadline = Deadline { begin_s: 2.0, end_s: 3.0, period_s: 0.001, began_cycle: None };
         let after = |states: &[(u64, ControllerState)]| {
             let mut deadline = deadline;
-            states.iter().for_each(|(cycle, state)| deadline.note(*cycle, state.code()));
+            for (cycle, state) in states {
+                deadline.note(*cycle, state.code());
+            }
             deadline
         };
         let waits = after(&[(1, ControllerState::WaitReadings), (1900, ControllerState::Easing)]);
