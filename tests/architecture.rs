@@ -47,7 +47,7 @@ fn the_crate_of_can_stands_alone() {
 #[test]
 fn the_crate_of_drives_stands_on_that_of_can_alone() {
     let used = dependencies_of(project(), "masseter-drives");
-    assert_eq!(used, ["masseter-can", "arrayvec", "serde", "thiserror"]);
+    assert_eq!(used, ["arrayvec", "masseter-can", "serde", "thiserror"]);
 }
 
 #[test]
