@@ -95,6 +95,9 @@ fn storms_of_another_seed_or_scenario_and_a_damaged_log_are_refused() {
         assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
         assert!(stderr(&output).contains(expected), "{}", stderr(&output));
     };
+    refused(&["--from", "5"], "go on with number 1; leave --from away");
+    refused(&["--storms", "0"], "--storms");
+    refused(&["--minutes", "nan"], "above 0");
     refused(&["--seed", "2"], "another seed; choose another --out");
     fs::write(folder.path().join("base.toml"), "duration_s = 1.0\n").unwrap();
     refused(&[], "another scenario; choose another --out");

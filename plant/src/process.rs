@@ -109,6 +109,8 @@ struct Binding<'a> {
     /// Whether the plant receives commands: not at the end.
     takes_commands: bool,
     deadline: Option<Deadline>,
+    /// Cycles that the loop did not skip: a machine that stands still for long is not the controller's delay.
+    played: u64,
     /// The largest number of the last cycle's samples on one topic.
     samples: usize,
 }
@@ -127,13 +129,14 @@ impl Binding<'_> {
     }
 
     /// Whether the run goes on, and the controller has not begun or ended by its deadline.
-    fn is_overdue(&self, stop: &StopRequest, cycle: u64) -> bool {
-        self.goes_on(stop) && self.deadline.is_some_and(|deadline| deadline.is_over(cycle))
+    fn is_overdue(&self, stop: &StopRequest) -> bool {
+        self.goes_on(stop) && self.deadline.is_some_and(|deadline| deadline.is_over(self.played))
     }
 
     /// Waits for the next cycle. Before it, warms up; in lockstep, lets the recorder catch up.
     fn wait<L: Link>(&mut self, plant: &mut PlantCore<L>) -> Result<Wake, PlantProcessError> {
         let Self { clock, ports, .. } = self;
+        self.played += 1;
         match clock {
             Clock::RealTime(cycle) => cycle.wait_warm(|| {
                 // Simulates the wires up to now.
@@ -207,7 +210,7 @@ impl<L: Link> PlantPorts<L> for Binding<'_> {
             }
         };
         if let (Some(deadline), Some(command)) = (&mut self.deadline, &command) {
-            deadline.note(wake.cycle, command.controller_state);
+            deadline.note(self.played, command.controller_state);
         }
         Ok(command)
     }
@@ -247,16 +250,17 @@ fn serve<L: Link>(
     let mut plant = build(scenario, start.epoch_ns)?;
     let clock = Clock::start(lockstep, start.epoch_ns, scenario.period_ns());
     let deadline = motion_s.map(|motion_s| Deadline::new(scenario, &start.declared, motion_s));
-    let mut binding = Binding { ports, clock, schedule, takes_commands: true, deadline, samples: 0 };
+    let mut binding =
+        Binding { ports, clock, schedule, takes_commands: true, deadline, played: 0, samples: 0 };
     let most_silent_cycles = most_silent_cycles(context);
     while binding.goes_on(&context.stop)
-        && !binding.is_overdue(&context.stop, plant.cycle())
+        && !binding.is_overdue(&context.stop)
         && u64::from(plant.master.silent_cycles()) <= most_silent_cycles
     {
         let wake = binding.wait(&mut plant)?;
         run_cycle(&mut plant, &mut binding, schedule, &wake)?;
     }
-    let is_overdue = binding.is_overdue(&context.stop, plant.cycle());
+    let is_overdue = binding.is_overdue(&context.stop);
     binding.takes_commands = false;
     let wait = |plant: &mut PlantCore<L>, binding: &mut Binding<'_>| binding.wait(plant);
     run_after_controller(&mut plant, &mut binding, schedule, scenario.period_ns(), wait)?;

@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use anyhow::ensure;
+use clap::{Args, value_parser};
 use masseter_plan::{Overrides, scenario_with_overrides};
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, status};
 
@@ -22,14 +23,14 @@ pub(super) struct StormArgs {
     /// The seed of all storms
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// The number of the first storm
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    from: u64,
+    /// The number of the first storm [default: 0, or where the storms of the folder go on]
+    #[arg(long, value_name = "N")]
+    from: Option<u64>,
     /// The most storms of this call
-    #[arg(long, value_name = "N", default_value_t = 1000)]
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = value_parser!(u64).range(1..))]
     storms: u64,
     /// The most time of this call, instead of a number of storms
-    #[arg(long, value_name = "MINUTES", conflicts_with = "storms")]
+    #[arg(long, value_name = "MINUTES", conflicts_with = "storms", value_parser = minutes)]
     minutes: Option<f64>,
     /// Go on after a storm that breaks a law
     #[arg(long)]
@@ -43,6 +44,12 @@ pub(super) struct StormArgs {
     /// Format of standard output
     #[arg(long, value_enum, default_value_t)]
     format: Format,
+}
+
+fn minutes(text: &str) -> anyhow::Result<f64> {
+    let minutes: f64 = text.parse()?;
+    ensure!(minutes.is_finite() && minutes > 0.0, "give a time above 0");
+    Ok(minutes)
 }
 
 /// Plays storms; [`Exit::Failed`] where one breaks a law.
