@@ -228,7 +228,7 @@ impl Axis {
         &mut self,
         now_ns: u64,
         position_m: f64,
-        look: impl FnOnce(f64) -> Look,
+        look: &mut dyn FnMut(f64) -> Look,
     ) -> (f64, bool) {
         self.complete_transition(now_ns);
         if let Some(state) = self.power.without_torque(&mut self.faults) {
@@ -278,7 +278,7 @@ impl Axis {
     }
 
     /// Reads the encoder and takes the motor's mean force, as SYNC demands.
-    pub(super) fn sample(&mut self, now_ns: u64, position_m: f64, look: impl FnOnce(f64) -> Look) {
+    pub(super) fn sample(&mut self, now_ns: u64, position_m: f64, look: &mut dyn FnMut(f64) -> Look) {
         self.shown_n = self.drivetrain.motor_n.take_mean(now_ns);
         let Look { shown_m, .. } = look(position_m + self.gear_error_m(now_ns));
         self.coordinates.read(shown_m);
